@@ -1,0 +1,24 @@
+# mbv_layer(folder DEPS our layers… LIBS external targets…): the static library mbv_<folder> of
+# src/<folder>/**.cc.
+
+function(mbv_compile_options target)
+  # No fused multiply-add contraction: the same numbers on every machine.
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Werror -ffp-contract=off
+                                           -Wno-maybe-uninitialized)
+endfunction()
+
+function(mbv_layer folder)
+  cmake_parse_arguments(ARG "" "" "DEPS;LIBS" ${ARGN})
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${folder}/*.cc)
+  list(TRANSFORM ARG_DEPS PREPEND mbv_)
+  if(sources)
+    add_library(mbv_${folder} STATIC ${sources})
+    mbv_compile_options(mbv_${folder})
+    set(scope PUBLIC)
+  else()
+    add_library(mbv_${folder} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_include_directories(mbv_${folder} ${scope} ${CMAKE_CURRENT_SOURCE_DIR}/src)
+  target_link_libraries(mbv_${folder} ${scope} ${ARG_DEPS} ${ARG_LIBS})
+endfunction()

@@ -1,0 +1,81 @@
+// ClosedForm: the one open interface, a paper's equations for one mechanism.
+//
+// An implementation reads its constants from Mechanism::parameters and its inputs from the
+// commanded Motion; it knows nothing about the other witnesses. A model is added by one row in
+// registry.cc.
+#pragma once
+
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "core/run_summary.h"
+#include "core/trace.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+
+namespace mbv {
+
+/// Which formulation of the paper to evaluate.
+struct ClosedFormOptions {
+  std::string model;  ///< "" is the mechanism's default, e.g. "full"; see ClosedFormRow::models
+  std::vector<std::string> as_printed;  ///< errata ("E2") to leave uncorrected, where offered
+};
+
+/// Forces of the drives and what else the equations give at one instant.
+struct ClosedFormSample {
+  DrivenSample driven;  ///< drives in model order (prescribed joints are commanded, not computed,
+                        ///< but filled too)
+  VecX force;           ///< per drive [N or N m], sign as in the drive's sheet
+  VecX extra;           ///< one value per extra channel
+};
+
+class ClosedForm {
+ public:
+  virtual ~ClosedForm() = default;
+
+  /// Signals beyond the drives': outputs (OUTPUT.x … OUTPUT.yaw), joint reactions
+  /// (JOINT.reaction.fx … where the equations give them) and the paper's own quantities.
+  /// Signals with the same name in another witness are compared.
+  [[nodiscard]] virtual std::vector<Channel> extra_channels() const = 0;
+
+  /// Positions, velocities and accelerations of everything driven. No allocation once `driven`
+  /// has its size.
+  [[nodiscard]] virtual RunSummary Kinematics(const CommandSample& command,
+                                              DrivenSample* driven) = 0;
+
+  /// Kinematics, drive forces and extra channels. No allocation once `sample` has its sizes.
+  [[nodiscard]] virtual RunSummary Dynamics(const CommandSample& command,
+                                            ClosedFormSample* sample) = 0;
+};
+
+/// Makes the closed form of a mechanism, or explains in `diagnostics` why the motion, the
+/// parameters or the options do not suit it (message and hint; the caller adds file and line).
+using ClosedFormFactory = std::unique_ptr<ClosedForm> (*)(const Mechanism&, const Motion&,
+                                                          const ClosedFormOptions&,
+                                                          Diagnostics* diagnostics);
+
+struct ClosedFormRow {
+  std::string mechanism;             ///< Mechanism::name
+  std::vector<std::string> models;   ///< accepted formulations, the default first
+  std::vector<std::string> errata;   ///< accepted entries of `as_printed`
+  ClosedFormFactory factory = nullptr;
+};
+
+/// All registered closed forms.
+[[nodiscard]] std::span<const ClosedFormRow> ClosedForms();
+/// The row for a mechanism name, or nullptr.
+[[nodiscard]] const ClosedFormRow* FindClosedForm(const std::string& mechanism);
+
+/// Runs a closed form over the motion's sample times: drive channels (position, velocity,
+/// acceleration, force) followed by the extra channels. Stops at the first failing sample.
+struct ClosedFormRun {
+  Trace trace;
+  RunSummary summary;
+};
+[[nodiscard]] ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
+                                          ClosedForm* closed_form);
+
+}  // namespace mbv

@@ -1,0 +1,20 @@
+// One row per mechanism with closed-form equations.
+#include <array>
+
+#include "analytic/closed_form.h"
+
+namespace mbv {
+
+std::span<const ClosedFormRow> ClosedForms() {
+  static const std::vector<ClosedFormRow> rows = {};
+  return rows;
+}
+
+const ClosedFormRow* FindClosedForm(const std::string& mechanism) {
+  for (const ClosedFormRow& row : ClosedForms()) {
+    if (row.mechanism == mechanism) return &row;
+  }
+  return nullptr;
+}
+
+}  // namespace mbv

@@ -1,0 +1,39 @@
+#include <chrono>
+
+#include "analytic/closed_form.h"
+#include "mechanism/channels.h"
+
+namespace mbv {
+
+ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
+                            ClosedForm* closed_form) {
+  ClosedFormRun run;
+  std::vector<Channel> channels = DriveChannels(mechanism);
+  for (Channel& channel : closed_form->extra_channels()) channels.push_back(std::move(channel));
+  run.trace.witness = "analytic";
+  run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
+
+  const auto start = std::chrono::steady_clock::now();
+  CommandSample command;
+  ClosedFormSample sample;
+  const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+  run.summary = RunSummary::Done();
+  for (size_t i = 0; i < run.trace.time_s.size() && run.summary.ok(); ++i) {
+    EvaluateMotion(motion, run.trace.time_s[i], &command);
+    run.summary = closed_form->Dynamics(command, &sample);
+    if (!run.summary.ok()) break;
+    auto row = run.trace.values.row(static_cast<Eigen::Index>(i));
+    for (Eigen::Index d = 0; d < drives; ++d) {
+      row[4 * d] = sample.driven.position[d];
+      row[4 * d + 1] = sample.driven.velocity[d];
+      row[4 * d + 2] = sample.driven.acceleration[d];
+      row[4 * d + 3] = sample.force[d];
+    }
+    row.tail(sample.extra.size()) = sample.extra.transpose();
+  }
+  run.summary.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return run;
+}
+
+}  // namespace mbv

@@ -1,0 +1,57 @@
+// Equation audit: every numbered equation of a paper as printed and as corrected, each measured
+// against an independent computation over seeded states.
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+enum class AuditVerdict {
+  kOk,              ///< as printed: right
+  kWrong,           ///< as printed: wrong; the corrected form is right
+  kWrongAndUnfixed, ///< the corrected form misses its limit too: a defect of ours
+  kNotTestable,     ///< a label, a choice or a claim that no residual measures; the note says why
+};
+
+/// One row of the audit table.
+struct AuditRow {
+  std::string equation;   ///< "(6) M", "(17)", "section 4 data"
+  std::string erratum;    ///< "E2" or ""
+  std::string printed;    ///< the form as printed, in plain text
+  std::string corrected;  ///< the corrected form; "" when the print is right
+  double residual_printed = 0.0;    ///< largest |difference| of the print; NaN if not computable
+  double residual_corrected = 0.0;  ///< largest |difference| of the corrected form (of the print
+                                    ///< when it is right)
+  double scale = 1.0;     ///< largest |value| of the quantity, same unit
+  double limit = 0.0;     ///< residual_corrected must stay at or below this (derived, see note)
+  std::string unit;
+  AuditVerdict verdict = AuditVerdict::kWrongAndUnfixed;
+  std::string note;       ///< what it was compared with, and what the difference means
+};
+
+/// The verdict that the numbers of a row give: kOk or kWrong when the corrected form is within its
+/// limit and the print is or is not; kWrongAndUnfixed otherwise.
+[[nodiscard]] AuditVerdict VerdictOf(const AuditRow& row);
+
+struct AuditTable {
+  std::string mechanism;
+  std::string source;     ///< the paper
+  std::vector<AuditRow> rows;
+};
+
+/// Computes a mechanism's table. `models_dir` holds <mechanism>/model.yaml.
+using AuditFunction = AuditTable (*)(const std::string& models_dir);
+
+struct AuditEntry {
+  std::string mechanism;
+  AuditFunction run = nullptr;
+};
+[[nodiscard]] std::span<const AuditEntry> Audits();
+
+/// Markdown of a table; residuals are rounded to one significant digit's power so that the text
+/// is the same on every machine.
+[[nodiscard]] std::string ToMarkdown(const AuditTable& table);
+
+}  // namespace mbv

@@ -1,0 +1,69 @@
+#include "core/diagnostics.h"
+
+#include <algorithm>
+#include <numeric>
+
+namespace mbv {
+namespace {
+
+// Levenshtein distance with two rows.
+size_t EditDistance(const std::string& a, const std::string& b) {
+  std::vector<size_t> previous(b.size() + 1), current(b.size() + 1);
+  std::iota(previous.begin(), previous.end(), size_t{0});
+  for (size_t i = 1; i <= a.size(); ++i) {
+    current[0] = i;
+    for (size_t j = 1; j <= b.size(); ++j) {
+      const size_t substitution = previous[j - 1] + (a[i - 1] == b[j - 1] ? 0 : 1);
+      current[j] = std::min({previous[j] + 1, current[j - 1] + 1, substitution});
+    }
+    std::swap(previous, current);
+  }
+  return previous[b.size()];
+}
+
+}  // namespace
+
+void Diagnostics::Append(const Diagnostics& other) {
+  findings_.insert(findings_.end(), other.findings_.begin(), other.findings_.end());
+}
+
+bool Diagnostics::has_errors() const {
+  return std::any_of(findings_.begin(), findings_.end(),
+                     [](const Finding& f) { return f.severity == Severity::kError; });
+}
+
+std::string Diagnostics::Text() const {
+  std::string text;
+  for (const Finding& finding : findings_) text += ToText(finding) + "\n";
+  return text;
+}
+
+std::string ToText(const Finding& finding) {
+  std::string text;
+  if (!finding.file.empty()) {
+    text += finding.file + ":";
+    if (finding.line > 0) {
+      text += std::to_string(finding.line) + ":" + std::to_string(finding.column) + ":";
+    }
+    text += " ";
+  }
+  text += finding.severity == Severity::kError ? "error: " : "warning: ";
+  text += finding.message;
+  if (!finding.hint.empty()) text += "\n  hint: " + finding.hint;
+  return text;
+}
+
+std::string ClosestWord(const std::string& word, const std::vector<std::string>& candidates) {
+  std::string best;
+  size_t best_distance = std::max<size_t>(2, word.size() / 3) + 1;
+  for (const std::string& candidate : candidates) {
+    const size_t distance = EditDistance(word, candidate);
+    if (distance < best_distance) {
+      best_distance = distance;
+      best = candidate;
+    }
+  }
+  return best;
+}
+
+}  // namespace mbv

@@ -1,0 +1,106 @@
+#include "core/profile.h"
+
+#include <cmath>
+#include <numbers>
+
+namespace mbv {
+namespace {
+
+using std::numbers::pi;
+
+// Peak of |σ''| of the 3-4-5 polynomial: 10/√3, and its peak rate 15/8.
+const double kPeakAcceleration = 10.0 / std::sqrt(3.0);
+constexpr double kPeakRate = 1.875;
+
+// σ(s) and its derivatives with respect to s, held outside [0, 1].
+Jet Poly345(double s) {
+  if (s <= 0.0) return {0.0, 0.0, 0.0};
+  if (s >= 1.0) return {1.0, 0.0, 0.0};
+  return {s * s * s * (10.0 + s * (-15.0 + 6.0 * s)), 30.0 * s * s * (1.0 - s) * (1.0 - s),
+          60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)};
+}
+
+Jet Cycloid(double s) {
+  if (s <= 0.0) return {0.0, 0.0, 0.0};
+  if (s >= 1.0) return {1.0, 0.0, 0.0};
+  return {s - std::sin(2.0 * pi * s) / (2.0 * pi), 1.0 - std::cos(2.0 * pi * s),
+          2.0 * pi * std::sin(2.0 * pi * s)};
+}
+
+// The chain rule for s = (t − start)/duration and a factor.
+Jet Scale(const Jet& unit, double factor, double duration_s) {
+  return {factor * unit.value, factor * unit.rate / duration_s,
+          factor * unit.acceleration / (duration_s * duration_s)};
+}
+
+struct RampCruiseTimes {
+  double ramp_s, ramp_length, cruise_s;
+};
+
+RampCruiseTimes TimesOf(const RampCruiseTerm& r) {
+  const double T_v = kPeakAcceleration * r.v_max / (kPeakRate * r.a_max);
+  const double S_v = r.v_max * T_v / kPeakRate;
+  if (r.length <= S_v) return {std::sqrt(kPeakAcceleration * r.length / r.a_max), r.length, 0.0};
+  return {T_v, S_v, (r.length - S_v) / r.v_max};
+}
+
+struct Evaluator {
+  double t;
+
+  Jet operator()(const ConstantTerm& c) const { return {c.value, 0.0, 0.0}; }
+  Jet operator()(const RampTerm& r) const { return {r.rate * t, r.rate, 0.0}; }
+  Jet operator()(const SineTerm& s) const {
+    const double w = 2.0 * pi * s.frequency_hz;
+    const double angle = w * t + s.phase_rad;
+    return {s.amplitude * std::sin(angle), s.amplitude * w * std::cos(angle),
+            -s.amplitude * w * w * std::sin(angle)};
+  }
+  Jet operator()(const PolyStepTerm& p) const {
+    return Scale(Poly345((t - p.start_s) / p.duration_s), p.delta, p.duration_s);
+  }
+  Jet operator()(const CycloidStepTerm& c) const {
+    return Scale(Cycloid((t - c.start_s) / c.duration_s), c.delta, c.duration_s);
+  }
+  Jet operator()(const BumpTerm& b) const {
+    const double s = (t - b.start_s) / b.duration_s;
+    if (s <= 0.0 || s >= 1.0) return {};
+    const double si = std::sin(pi * s), co = std::cos(pi * s);
+    const Jet unit{si * si * si * si, 4.0 * pi * si * si * si * co,
+                   4.0 * pi * pi * si * si * (3.0 * co * co - si * si)};
+    return Scale(unit, b.height, b.duration_s);
+  }
+  Jet operator()(const RampCruiseTerm& r) const {
+    const auto [ramp_s, ramp_length, cruise_s] = TimesOf(r);
+    const double tau = t - r.start_s;
+    const double factor = r.delta / r.length;
+    if (tau <= 0.5 * ramp_s) return Scale(Poly345(tau / ramp_s), factor * ramp_length, ramp_s);
+    if (tau < 0.5 * ramp_s + cruise_s) {
+      return {factor * (0.5 * ramp_length + r.v_max * (tau - 0.5 * ramp_s)), factor * r.v_max, 0.0};
+    }
+    Jet jet = Scale(Poly345((tau - cruise_s) / ramp_s), factor * ramp_length, ramp_s);
+    jet.value += factor * r.v_max * cruise_s;
+    return jet;
+  }
+};
+
+}  // namespace
+
+Jet Evaluate(const ProfileTerm& term, double t_s) { return std::visit(Evaluator{t_s}, term); }
+
+Jet Evaluate(const Profile& profile, double t_s) {
+  Jet sum;
+  for (const ProfileTerm& term : profile.terms) {
+    const Jet jet = Evaluate(term, t_s);
+    sum.value += jet.value;
+    sum.rate += jet.rate;
+    sum.acceleration += jet.acceleration;
+  }
+  return sum;
+}
+
+double Duration(const RampCruiseTerm& term) {
+  const RampCruiseTimes times = TimesOf(term);
+  return times.ramp_s + times.cruise_s;
+}
+
+}  // namespace mbv

@@ -1,0 +1,65 @@
+// Time profiles: scalar functions of time with two exact derivatives.
+#pragma once
+
+#include <variant>
+#include <vector>
+
+namespace mbv {
+
+/// A value with its first and second time derivative.
+struct Jet {
+  double value = 0.0, rate = 0.0, acceleration = 0.0;
+};
+
+/// c
+struct ConstantTerm {
+  double value = 0.0;
+};
+/// c·t
+struct RampTerm {
+  double rate = 0.0;
+};
+/// amplitude · sin(2π·frequency·t + phase)
+struct SineTerm {
+  double amplitude = 0.0, frequency_hz = 1.0, phase_rad = 0.0;
+};
+/// delta · σ((t − start)/duration), σ(s) = 10s³ − 15s⁴ + 6s⁵, held at 0 before and delta after.
+struct PolyStepTerm {
+  double start_s = 0.0, duration_s = 1.0, delta = 0.0;
+};
+/// delta · σ((t − start)/duration), σ(s) = s − sin(2πs)/(2π), held at 0 before and delta after.
+struct CycloidStepTerm {
+  double start_s = 0.0, duration_s = 1.0, delta = 0.0;
+};
+/// height · sin⁴(π (t − start)/duration) inside the interval, 0 outside.
+struct BumpTerm {
+  double start_s = 0.0, duration_s = 1.0, height = 0.0;
+};
+/// Half of a 3-4-5 ramp, cruise at constant speed, second half of the ramp: a path of length
+/// `length` run from rest to rest with at most v_max and a_max, scaled by delta/length.
+/// [Mei 2012, Eqs. 21, 22]; a pure 3-4-5 polynomial when the length is too short to cruise.
+struct RampCruiseTerm {
+  double start_s = 0.0;
+  double length = 0.0;  ///< path length S [m], > 0
+  double v_max = 0.0;   ///< [m/s], > 0
+  double a_max = 0.0;   ///< [m/s²], > 0
+  double delta = 0.0;   ///< change of this coordinate over the whole segment
+};
+
+using ProfileTerm = std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, CycloidStepTerm,
+                                 BumpTerm, RampCruiseTerm>;
+
+/// The sum of its terms.
+struct Profile {
+  std::vector<ProfileTerm> terms;
+};
+
+[[nodiscard]] Jet Evaluate(const ProfileTerm& term, double t_s);
+[[nodiscard]] Jet Evaluate(const Profile& profile, double t_s);
+
+/// Duration of a ramp–cruise–ramp segment [s].
+[[nodiscard]] double Duration(const RampCruiseTerm& term);
+
+[[nodiscard]] inline Profile Constant(double value) { return {{ConstantTerm{value}}}; }
+
+}  // namespace mbv

@@ -1,0 +1,37 @@
+// Trace: a time grid with named channels, the one currency between the stages.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+
+namespace mbv {
+
+/// One recorded signal.
+struct Channel {
+  std::string name;   ///< e.g. "limb1.drive.force"; the drive channels end in .position .velocity
+                      ///< .acceleration .force
+  std::string unit;   ///< SI: "m", "rad", "m/s", "N", "N m", "W", …; "1" when dimensionless
+  std::string frame;  ///< the frame its components are expressed in; empty for scalars
+};
+
+/// Samples of channels on a common time grid. Witnesses sample at the same times, so traces are
+/// compared without interpolation.
+struct Trace {
+  std::string witness;           ///< "analytic", "reference" or "simulated"
+  std::vector<double> time_s;    ///< n sample times [s], increasing
+  std::vector<Channel> channels; ///< m channels
+  MatX values;                   ///< n × m
+
+  /// Column of the channel with this name, or -1.
+  [[nodiscard]] int Find(const std::string& name) const;
+  /// Sets channels and times and fills the values with NaN.
+  void Reset(std::vector<double> times_s, std::vector<Channel> new_channels);
+};
+
+/// 0, dt, 2dt, … up to and including `duration_s` (n = round(duration/sample) + 1 samples; the
+/// grid is i·sample_s, computed without accumulating).
+[[nodiscard]] std::vector<double> SampleTimes(double duration_s, double sample_s);
+
+}  // namespace mbv

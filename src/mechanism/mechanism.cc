@@ -1,0 +1,100 @@
+#include "mechanism/mechanism.h"
+
+#include "core/demand.h"
+
+namespace mbv {
+namespace {
+
+template <typename T>
+int FindNamed(const std::vector<T>& items, const std::string& name) {
+  for (size_t i = 0; i < items.size(); ++i) {
+    if (items[i].name == name) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+// True when this joint drive's coordinate is a length.
+bool IsTranslation(const Joint& joint, int coordinate) {
+  switch (joint.kind) {
+    case JointKind::kPrismatic: return true;
+    case JointKind::kCylindrical: return coordinate == 0;
+    case JointKind::kPlanar: return coordinate < 2;
+    case JointKind::kFree: return coordinate < 3;
+    case JointKind::kFixed: case JointKind::kRevolute: case JointKind::kUniversal:
+    case JointKind::kSpherical: return false;
+  }
+  return false;
+}
+
+bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
+  const auto* joint_drive = std::get_if<JointDrive>(&drive.kind);
+  if (joint_drive == nullptr) return true;
+  return IsTranslation(mechanism.joints[joint_drive->joint], joint_drive->coordinate);
+}
+
+}  // namespace
+
+int Mechanism::FindBody(const std::string& n) const { return FindNamed(bodies, n); }
+int Mechanism::FindJoint(const std::string& n) const { return FindNamed(joints, n); }
+int Mechanism::FindDrive(const std::string& n) const { return FindNamed(drives, n); }
+int Mechanism::FindOutput(const std::string& n) const { return FindNamed(outputs, n); }
+
+const NamedFrame* Mechanism::FindFrame(int body, const std::string& frame_name) const {
+  const auto& frames = bodies[body].frames;
+  const int i = FindNamed(frames, frame_name);
+  return i < 0 ? nullptr : &frames[i];
+}
+
+double Mechanism::ParameterValue(const std::string& parameter_name) const {
+  const int i = FindNamed(parameters, parameter_name);
+  MBV_DEMAND(i >= 0, name + " has no parameter '" + parameter_name + "'");
+  return parameters[i].value;
+}
+
+bool Mechanism::HasParameter(const std::string& parameter_name) const {
+  return FindNamed(parameters, parameter_name) >= 0;
+}
+
+std::string PositionUnit(const Mechanism& mechanism, const Drive& drive) {
+  return IsTranslation(mechanism, drive) ? "m" : "rad";
+}
+
+std::string ForceUnit(const Mechanism& mechanism, const Drive& drive) {
+  return IsTranslation(mechanism, drive) ? "N" : "N m";
+}
+
+SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive) {
+  SignalSheet sheet{.signal = drive.name + ".force", .acts_on = {}, .exerted_by = {}, .frame = {},
+                    .positive = {}, .unit = ForceUnit(mechanism, drive)};
+  if (const auto* distance = std::get_if<DistanceDrive>(&drive.kind)) {
+    sheet.acts_on = mechanism.bodies[distance->body_to].name + " (and, opposite, on " +
+                    mechanism.bodies[distance->body_from].name + ")";
+    sheet.exerted_by = "the drive leg " + drive.name;
+    sheet.frame = "along the line from the ball on " + mechanism.bodies[distance->body_from].name +
+                  " to the ball on " + mechanism.bodies[distance->body_to].name;
+    sheet.positive = "push: the leg is in compression and drives its ends apart";
+    return sheet;
+  }
+  const Joint& joint = mechanism.joints[std::get<JointDrive>(drive.kind).joint];
+  const bool translation = IsTranslation(mechanism, drive);
+  sheet.acts_on = mechanism.bodies[joint.child].name;
+  sheet.exerted_by = mechanism.bodies[joint.parent].name + " through the drive of " + joint.name;
+  sheet.frame = std::string(translation ? "along" : "about") + " the axis of " + joint.name +
+                ", positive along the axis given on " + mechanism.bodies[joint.parent].name;
+  sheet.positive = translation ? "push: towards a larger coordinate" :
+                                 "turns the child towards a larger angle";
+  return sheet;
+}
+
+SignalSheet SheetOf(const Mechanism& mechanism, const Joint& joint) {
+  return {.signal = joint.name + ".reaction",
+          .acts_on = mechanism.bodies[joint.child].name,
+          .exerted_by = mechanism.bodies[joint.parent].name + " through " + joint.name +
+                        " (drive forces excluded)",
+          .frame = "joint frame on " + mechanism.bodies[joint.parent].name +
+                   ", about the joint frame's origin on " + mechanism.bodies[joint.child].name,
+          .positive = "along the positive axes of that frame",
+          .unit = "N, N m"};
+}
+
+}  // namespace mbv

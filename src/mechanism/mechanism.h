@@ -1,0 +1,212 @@
+// Mechanism: a closed-loop mechanism as data, resolved to numbers.
+//
+// The description is what all witnesses share. It is made by the loader (load_model.h) and then
+// only read. Bodies are rigid; joints connect a frame F on the parent body to a frame M on the
+// child body; F and M coincide when all joint coordinates are zero.
+//
+// Joint kinds and their coordinates (X_FM as a function of q; `axis` in F, same components in M):
+//   fixed        –                    X_FM = 1
+//   revolute     θ                    Rot(axis, θ)
+//   prismatic    s                    translation s·axis
+//   cylindrical  s, θ                 translation s·axis, Rot(axis, θ)
+//   universal    θ1, θ2               Rot(axis, θ1) Rot(axis2, θ2); axis fixed in F, axis2 in M
+//   spherical    roll, pitch, yaw     Rz(yaw) Ry(pitch) Rx(roll) (coordinates for guesses only)
+//   planar       u, v, θ              translation u·e1 + v·e2, Rot(axis, θ); e1, e2, axis
+//                                     right-handed (axis z: x, y; axis x: y, z; axis y: z, x;
+//                                     else e1 = the axis' unitOrthogonal())
+//   free         x, y, z, roll, pitch, yaw
+#pragma once
+
+#include <array>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "core/types.h"
+
+namespace mbv {
+
+/// Where a parameter's number comes from.
+enum class Source { kUnstated, kPrinted, kAssumed, kCorrected };
+
+struct Parameter {
+  std::string name;
+  double value = kNan;
+  std::string unit;
+  Source source = Source::kUnstated;
+  std::string note;
+};
+
+struct NamedFrame {
+  std::string name;
+  Pose X_BF = Pose::Identity();  ///< pose of the frame in its body
+};
+
+// Shapes are for pictures only.
+struct Capsule {
+  Vec3 p_from = Vec3::Zero(), p_to = Vec3::Zero();  ///< end points in the body frame [m]
+  double radius = 0.01;                             ///< [m]
+};
+struct Cylinder {
+  Vec3 p_from = Vec3::Zero(), p_to = Vec3::Zero();
+  double radius = 0.01;
+};
+struct Box {
+  Pose X_BG = Pose::Identity();  ///< pose of the box centre in the body frame
+  Vec3 size = Vec3::Ones();      ///< full edge lengths [m]
+};
+struct Ball {
+  Vec3 p_centre = Vec3::Zero();
+  double radius = 0.01;
+};
+struct Shape {
+  std::variant<Capsule, Cylinder, Box, Ball> geometry;
+  std::string color = "steel";  ///< material name ("steel", "accent", …) or "#rrggbb[aa]"
+};
+
+struct Body {
+  std::string name;
+  double mass = 0.0;            ///< [kg], >= 0; 0 is a massless connecting piece
+  Vec3 p_BoBcm_B = Vec3::Zero();  ///< centre of mass [m]
+  Mat3 I_Bcm_B = Mat3::Zero();  ///< about the centre of mass, body axes [kg m²]
+  std::vector<NamedFrame> frames;
+  std::vector<Shape> shapes;
+};
+
+enum class JointKind {
+  kFixed, kRevolute, kPrismatic, kCylindrical, kUniversal, kSpherical, kPlanar, kFree
+};
+
+/// Number of coordinates = degrees of freedom of a joint kind.
+[[nodiscard]] constexpr int FreedomsOf(JointKind kind) {
+  switch (kind) {
+    case JointKind::kFixed: return 0;
+    case JointKind::kRevolute: case JointKind::kPrismatic: return 1;
+    case JointKind::kCylindrical: case JointKind::kUniversal: return 2;
+    case JointKind::kSpherical: case JointKind::kPlanar: return 3;
+    case JointKind::kFree: return 6;
+  }
+  return -1;
+}
+
+struct CoordinateRange {
+  double lower = -std::numeric_limits<double>::infinity();
+  double upper = std::numeric_limits<double>::infinity();
+};
+
+struct Joint {
+  std::string name;
+  JointKind kind = JointKind::kFixed;
+  int parent = 0;                 ///< body index; 0 is the world
+  Pose X_PF = Pose::Identity();   ///< joint frame on the parent
+  int child = 0;
+  Pose X_CM = Pose::Identity();   ///< joint frame on the child
+  Vec3 axis = Vec3::UnitZ();      ///< unit; see the table above
+  Vec3 axis2 = Vec3::UnitX();     ///< unit; universal only
+  std::array<double, 6> guess{};  ///< coordinates to start the home solution from
+  std::array<double, 6> home{};   ///< coordinates at the solved home pose
+  std::array<CoordinateRange, 6> range;  ///< limits, for reports and range checks
+  bool closure = false;           ///< true: cut by the spanning tree (a loop closure)
+  /// Isostatic rule: this revolute/universal joint transmits a force only (as a ball would), which
+  /// makes the reactions of an overconstrained loop definite. Kinematics of the mechanism must not
+  /// change by it; the loader checks that by rank.
+  bool transmits_force_only = false;
+};
+
+/// A drive on one coordinate of a joint: force/torque positive along the positive coordinate,
+/// exerted by the parent on the child.
+struct JointDrive {
+  int joint = -1;
+  int coordinate = 0;
+};
+/// A massless S-P-S leg between two points; position is their distance; positive force is thrust
+/// (the leg pushes its ends apart).
+struct DistanceDrive {
+  int body_from = 0;
+  Vec3 p_from = Vec3::Zero();  ///< in body_from's frame
+  int body_to = 0;
+  Vec3 p_to = Vec3::Zero();
+};
+
+struct Drive {
+  std::string name;
+  std::variant<JointDrive, DistanceDrive> kind;
+  CoordinateRange range;
+  double radius = 0.0;  ///< for pictures [m]; 0: chosen by the renderer
+};
+
+/// A one-freedom joint whose motion is given (a ship's roll); it is driven, but its force is base
+/// reaction and not compared as a drive.
+struct Prescribed {
+  std::string name;
+  int joint = -1;
+};
+
+/// A frame whose pose is commanded or compared: components x, y, z, roll, pitch, yaw of X_RO.
+struct Output {
+  std::string name;
+  int body = 0;
+  Pose X_BO = Pose::Identity();
+  int reference_body = 0;         ///< frame R lies on this body (0: the world)
+  Pose X_RbR = Pose::Identity();
+};
+
+/// A linear spring-damper between two points (free length) — for users' own mechanisms.
+struct SpringDamper {
+  std::string name;
+  int body_from = 0;
+  Vec3 p_from = Vec3::Zero();
+  int body_to = 0;
+  Vec3 p_to = Vec3::Zero();
+  double stiffness = 0.0;      ///< [N/m]
+  double damping = 0.0;        ///< [N s/m]
+  double free_length_m = 0.0;
+};
+
+struct Mechanism {
+  std::string name;
+  std::string file;         ///< model.yaml it came from, as given
+  std::string description;
+  Vec3 gravity_W = Vec3(0, 0, -9.81);  ///< [m/s²]
+  std::vector<Parameter> parameters;   ///< with overrides applied
+  std::vector<Body> bodies;            ///< bodies[0] is the world
+  std::vector<Joint> joints;
+  std::vector<Drive> drives;
+  std::vector<Prescribed> prescribed;
+  std::vector<Output> outputs;
+  std::vector<SpringDamper> springs;
+
+  std::vector<int> tree_joints;    ///< indices of the spanning tree's joints, parents first (every
+                                   ///< non-world body is the outboard body of exactly one)
+  std::vector<bool> tree_reversed; ///< per tree joint: true if its child is the inboard body
+  std::vector<Pose> X_WB_home;     ///< per body, the closed home pose
+
+  [[nodiscard]] int FindBody(const std::string& body_name) const;    ///< index or -1
+  [[nodiscard]] int FindJoint(const std::string& joint_name) const;
+  [[nodiscard]] int FindDrive(const std::string& drive_name) const;
+  [[nodiscard]] int FindOutput(const std::string& output_name) const;
+  [[nodiscard]] const NamedFrame* FindFrame(int body, const std::string& frame_name) const;
+  /// Value of a parameter; the name must exist (MBV_DEMAND).
+  [[nodiscard]] double ParameterValue(const std::string& parameter_name) const;
+  [[nodiscard]] bool HasParameter(const std::string& parameter_name) const;
+};
+
+/// How to read a force signal: printed in every report.
+struct SignalSheet {
+  std::string signal;      ///< channel name without the witness
+  std::string acts_on;
+  std::string exerted_by;
+  std::string frame;       ///< frame and axis of the components
+  std::string positive;    ///< what a positive value means
+  std::string unit;
+};
+
+/// Unit of a drive's position ("m" or "rad") and of its force ("N" or "N m").
+[[nodiscard]] std::string PositionUnit(const Mechanism& mechanism, const Drive& drive);
+[[nodiscard]] std::string ForceUnit(const Mechanism& mechanism, const Drive& drive);
+[[nodiscard]] SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive);
+/// Sheet of a joint's reaction: the wrench that the parent exerts on the child through the joint,
+/// about M's origin, expressed in F. Channels: JOINT.reaction.{fx,fy,fz,mx,my,mz}.
+[[nodiscard]] SignalSheet SheetOf(const Mechanism& mechanism, const Joint& joint);
+
+}  // namespace mbv

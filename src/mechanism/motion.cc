@@ -1,0 +1,38 @@
+#include "mechanism/motion.h"
+
+namespace mbv {
+
+int Motion::FindCommand(const std::string& command_name) const {
+  for (size_t i = 0; i < commands.size(); ++i) {
+    if (commands[i].name == command_name) return static_cast<int>(i);
+  }
+  return -1;
+}
+
+void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
+  const auto n = static_cast<Eigen::Index>(motion.commands.size());
+  sample->time_s = t_s;
+  sample->position.resize(n);
+  sample->velocity.resize(n);
+  sample->acceleration.resize(n);
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const Jet jet = Evaluate(motion.commands[k].profile, t_s);
+    sample->position[k] = jet.value;
+    sample->velocity[k] = jet.rate;
+    sample->acceleration[k] = jet.acceleration;
+  }
+  sample->loads.resize(motion.loads.size());
+  for (size_t i = 0; i < motion.loads.size(); ++i) {
+    const Load& load = motion.loads[i];
+    LoadSample& out = sample->loads[i];
+    out.body = load.body;
+    out.p_BoQ_B = load.p_BoQ_B;
+    out.in_body_axes = load.in_body_axes;
+    for (int c = 0; c < 3; ++c) {
+      out.force[c] = Evaluate(load.force[c], t_s).value;
+      out.moment[c] = Evaluate(load.moment[c], t_s).value;
+    }
+  }
+}
+
+}  // namespace mbv

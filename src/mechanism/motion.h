@@ -1,0 +1,82 @@
+// Motion: what a scenario commands, as scalar coordinates with time profiles, and its loads.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/profile.h"
+#include "core/trace.h"
+#include "core/types.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// A scalar coordinate of a mechanism that a command can refer to.
+struct Coordinate {
+  enum class Kind {
+    kPrescribed,  ///< index into Mechanism::prescribed
+    kDrive,       ///< index into Mechanism::drives
+    kOutput,      ///< index into Mechanism::outputs, component 0…5 = x, y, z, roll, pitch, yaw
+  };
+  Kind kind = Kind::kDrive;
+  int index = 0;
+  int component = 0;
+};
+
+/// Σ factor · coordinate = profile(t). Most commands have one term with factor 1; a coupling such
+/// as "these two drives are equally long" is a difference commanded to zero.
+struct Command {
+  struct Term {
+    Coordinate coordinate;
+    double factor = 1.0;
+  };
+  std::string name;  ///< "roll", "limb1.drive", "platform.z", "limb1.drive - limb1.drive_p"
+  std::vector<Term> terms;
+  Profile profile;
+};
+
+/// An external wrench on a body, acting at point Q fixed in the body.
+struct Load {
+  std::string name;
+  int body = 0;
+  Vec3 p_BoQ_B = Vec3::Zero();
+  bool in_body_axes = false;             ///< components in body axes instead of world axes
+  std::array<Profile, 3> force;          ///< [N]
+  std::array<Profile, 3> moment;         ///< [N m], about Q
+};
+
+struct Motion {
+  double duration_s = 1.0;
+  double sample_s = 0.01;
+  std::vector<Command> commands;
+  std::vector<Load> loads;
+
+  [[nodiscard]] int FindCommand(const std::string& command_name) const;  ///< index or -1
+};
+
+/// A load at one instant.
+struct LoadSample {
+  int body = 0;
+  Vec3 p_BoQ_B = Vec3::Zero();
+  bool in_body_axes = false;
+  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+};
+
+/// All commands at one instant: entry k belongs to Motion::commands[k].
+struct CommandSample {
+  double time_s = 0.0;
+  VecX position, velocity, acceleration;
+  std::vector<LoadSample> loads;
+};
+
+/// Evaluates every profile at t. Allocates only when `sample` is first used.
+void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample);
+
+/// Motion of everything driven at one instant: the drives in model order, then the prescribed
+/// joints in model order.
+struct DrivenSample {
+  VecX position, velocity, acceleration;
+};
+
+}  // namespace mbv

@@ -1,0 +1,63 @@
+// The reference witness: a generic closed-loop solver for any Mechanism.
+//
+// Loop closure by Newton in maximal coordinates (joint rows + commands), velocities and
+// accelerations from the same Jacobian, then Newton–Euler for every body with all joint reactions,
+// drive forces and base reactions as unknowns; minimum norm where a reaction is statically
+// indeterminate. No MuJoCo and no paper formula.
+#pragma once
+
+#include <memory>
+
+#include "core/run_summary.h"
+#include "core/trace.h"
+#include "mechanism/constraints.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+
+namespace mbv {
+
+struct ReferenceOptions {
+  double closure_tolerance_m = 1e-13;  ///< Newton stops when the largest residual is below this
+  int max_iterations = 30;             ///< per sample, > 0
+  int homotopy_steps = 40;             ///< from home to the first sample, > 0
+  bool reactions = true;               ///< record every joint's reaction channels
+};
+
+/// Everything the reference knows at one instant.
+struct ReferenceSample {
+  BodyStates states;
+  DrivenSample driven;         ///< drives, then prescribed joints
+  VecX drive_force;            ///< per drive
+  VecX prescribed_force;       ///< per prescribed joint
+  MatX reactions;              ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
+  MatX outputs;                ///< outputs × 6
+  double closure_position_m = kNan, closure_rotation_rad = kNan;
+  double power_input_W = kNan, energy_rate_W = kNan;
+};
+
+/// Follows a motion sample by sample (warm start from the previous one).
+class ReferenceSolver {
+ public:
+  ReferenceSolver(const Mechanism& mechanism, const Motion& motion,
+                  const ReferenceOptions& options = {});
+  ~ReferenceSolver();
+  ReferenceSolver(ReferenceSolver&&) noexcept;
+
+  /// Positions, velocities and accelerations only.
+  [[nodiscard]] RunSummary Kinematics(const CommandSample& command, ReferenceSample* sample);
+  /// Kinematics and forces.
+  [[nodiscard]] RunSummary Dynamics(const CommandSample& command, ReferenceSample* sample);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+struct ReferenceRun {
+  Trace trace;  ///< drive, output, prescribed, reaction and audit channels
+  RunSummary summary;
+};
+[[nodiscard]] ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
+                                        const ReferenceOptions& options = {});
+
+}  // namespace mbv
