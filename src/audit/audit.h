@@ -50,8 +50,17 @@ struct AuditEntry {
 };
 [[nodiscard]] std::span<const AuditEntry> Audits();
 
-/// Markdown of a table; residuals are rounded to one significant digit's power so that the text
-/// is the same on every machine.
-[[nodiscard]] std::string ToMarkdown(const AuditTable& table);
+[[nodiscard]] const char* ToText(AuditVerdict verdict);
+
+/// How residuals are written: as measured, or stable across machines (a residual within its limit
+/// is roundoff and shows as "≤ limit"; one above it is a fact and shows with two digits).
+enum class AuditNumbers { kStable, kMeasured };
+
+/// Markdown of a table, one line per row.
+[[nodiscard]] std::string ToMarkdown(const AuditTable& table,
+                                     AuditNumbers numbers = AuditNumbers::kStable);
+
+/// The text of docs/equation_audit.md: every registered mechanism's table, stable numbers.
+[[nodiscard]] std::string AuditDocument(const std::string& models_dir);
 
 }  // namespace mbv
