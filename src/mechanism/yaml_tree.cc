@@ -1,0 +1,216 @@
+// YamlReader::Parse: yaml-cpp's events → YamlNode tree, refusing what the formats do not allow.
+#include <fmt/format.h>
+#include <yaml-cpp/eventhandler.h>
+#include <yaml-cpp/exceptions.h>
+#include <yaml-cpp/mark.h>
+#include <yaml-cpp/parser.h>
+
+#include <algorithm>
+#include <map>
+#include <sstream>
+
+#include "mechanism/yaml_reader.h"
+
+namespace mbv {
+namespace {
+
+using Kind = YamlNode::Kind;
+
+// Ends parsing at a place where the rest of the file cannot be read sensibly.
+struct Stop {
+  YAML::Mark mark;
+  std::string message;
+};
+
+class TreeBuilder : public YAML::EventHandler {
+ public:
+  explicit TreeBuilder(YamlReader* reader) : reader_(reader) {}
+  [[nodiscard]] YamlNodePtr root() const { return root_; }
+
+  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentEnd() override {}
+  void OnNull(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    Leaf(MakeNode(Kind::kNull, mark), anchor);
+  }
+  void OnScalar(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                const std::string& value) override {
+    auto node = MakeNode(Kind::kScalar, mark);
+    node->text = value;
+    node->quoted = tag == "!";
+    CheckTag(mark, tag);
+    Leaf(node, anchor);
+  }
+  void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
+    const auto found = anchors_.find(anchor);
+    if (found == anchors_.end()) throw Stop{mark, "an alias refers to the value it stands in"};
+    Add(found->second);
+  }
+  void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                       YAML::EmitterStyle::value) override {
+    Open(Kind::kSequence, mark, tag, anchor);
+  }
+  void OnSequenceEnd() override { Close(); }
+  void OnMapStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
+                  YAML::EmitterStyle::value) override {
+    Open(Kind::kMap, mark, tag, anchor);
+  }
+  void OnMapEnd() override { Close(); }
+
+ private:
+  struct Level {
+    std::shared_ptr<YamlNode> node;
+    YAML::anchor_t anchor = 0;
+    YamlNodePtr key;  // waiting for its value
+  };
+
+  static std::shared_ptr<YamlNode> MakeNode(Kind kind, const YAML::Mark& mark) {
+    auto node = std::make_shared<YamlNode>();
+    node->kind = kind;
+    node->line = mark.line + 1;
+    node->column = mark.column + 1;
+    return node;
+  }
+
+  void CheckTag(const YAML::Mark& mark, const std::string& tag) {
+    if (tag.empty() || tag == "?" || tag == "!") return;
+    reader_->AddAt(Severity::kError, mark.line + 1, mark.column + 1,
+                   fmt::format("the tag {} is not part of this format", tag), "leave the tag out");
+  }
+
+  void Leaf(const std::shared_ptr<YamlNode>& node, YAML::anchor_t anchor) {
+    if (anchor != 0) anchors_[anchor] = node;
+    Add(node);
+  }
+
+  void Open(Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
+    CheckTag(mark, tag);
+    if (levels_.size() >= YamlReader::kMaxDepth) {
+      throw Stop{mark, fmt::format("nested deeper than {} levels", YamlReader::kMaxDepth)};
+    }
+    levels_.push_back({MakeNode(kind, mark), anchor, nullptr});
+  }
+
+  void Close() {
+    const Level level = levels_.back();
+    levels_.pop_back();
+    if (level.anchor != 0) anchors_[level.anchor] = level.node;
+    Add(level.node);
+  }
+
+  // Puts a complete node where it belongs.
+  void Add(const YamlNodePtr& node) {
+    if (levels_.empty()) {
+      root_ = node;
+      return;
+    }
+    Level& level = levels_.back();
+    level.node->size += node->size;
+    if (level.node->size > YamlReader::kMaxNodes) {
+      throw Stop{YAML::Mark::null_mark(), "the file has too many values (aliases expanded)"};
+    }
+    if (level.node->kind == Kind::kSequence) {
+      level.node->items.push_back(node);
+    } else if (level.key == nullptr) {
+      level.key = node;
+    } else {
+      AddEntry(level.node.get(), *level.key, node);
+      level.key = nullptr;
+    }
+  }
+
+  void AddEntry(YamlNode* map, const YamlNode& key, const YamlNodePtr& value) {
+    if (!key.is_scalar() || key.text.empty()) {
+      reader_->Error(key, fmt::format("a key is {}, a word is needed", Describe(key)));
+      return;
+    }
+    if (key.text == "<<" && !key.quoted) {
+      reader_->Error(key, "merge keys (<<) are not part of this format",
+                     "write equal groups once under 'parts' and place them by 'instances'");
+      return;
+    }
+    const int known = FindKey(map, key.text);
+    if (known >= 0) {
+      reader_->Error(key, fmt::format("the key {} is already given in line {}", Describe(key),
+                                      map->entries[known].line));
+      return;
+    }
+    keys_[map].emplace(key.text, static_cast<int>(map->entries.size()));
+    map->entries.push_back({key.text, key.line, key.column, value});
+  }
+
+  int FindKey(const YamlNode* map, const std::string& key) {
+    const auto& keys = keys_[map];
+    const auto found = keys.find(key);
+    return found == keys.end() ? -1 : found->second;
+  }
+
+  YamlReader* reader_;
+  YamlNodePtr root_;
+  std::vector<Level> levels_;
+  std::map<YAML::anchor_t, YamlNodePtr> anchors_;
+  std::map<const YamlNode*, std::map<std::string, int>> keys_;
+};
+
+// Offset of the first byte that is no UTF-8 text (control characters included), or npos.
+size_t FindNonText(const std::string& text) {
+  size_t i = 0;
+  while (i < text.size()) {
+    const auto byte = static_cast<unsigned char>(text[i]);
+    if (byte < 0x20 && byte != '\t' && byte != '\n' && byte != '\r') return i;
+    if (byte == 0x7F) return i;
+    const int tail = byte < 0x80   ? 0
+                     : byte < 0xC2 ? -1
+                     : byte < 0xE0 ? 1
+                     : byte < 0xF0 ? 2
+                     : byte < 0xF5 ? 3
+                                   : -1;
+    if (tail < 0) return i;
+    for (int k = 1; k <= tail; ++k) {
+      if (i + k >= text.size() || (static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80) {
+        return i;
+      }
+    }
+    i += 1 + static_cast<size_t>(tail);
+  }
+  return std::string::npos;
+}
+
+}  // namespace
+
+YamlNodePtr YamlReader::Parse(const std::string& text) {
+  if (text.size() > kMaxBytes) {
+    AddAt(Severity::kError, 0, 0, fmt::format("the file is larger than {} bytes", kMaxBytes));
+    return nullptr;
+  }
+  if (const size_t at = FindNonText(text); at != std::string::npos) {
+    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(at), '\n');
+    const size_t start = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
+    AddAt(Severity::kError, static_cast<int>(line),
+          static_cast<int>(start == std::string::npos ? at + 1 : at - start),
+          fmt::format("byte 0x{:02x} is not UTF-8 text", static_cast<unsigned char>(text[at])),
+          "save the file as UTF-8 text");
+    return nullptr;
+  }
+  TreeBuilder builder(this);
+  try {
+    std::istringstream stream(text);
+    YAML::Parser parser(stream);
+    if (!parser.HandleNextDocument(builder) || builder.root() == nullptr) {
+      AddAt(Severity::kError, 1, 1, "the file is empty");
+      return nullptr;
+    }
+    if (parser) AddAt(Severity::kWarning, 0, 0, "only the first YAML document is read");
+  } catch (const YAML::Exception& e) {
+    AddAt(Severity::kError, e.mark.line + 1, e.mark.column + 1, "YAML syntax: " + e.msg);
+    return nullptr;
+  } catch (const Stop& stop) {
+    AddAt(Severity::kError, stop.mark.line + 1, stop.mark.column + 1, stop.message);
+    return nullptr;
+  } catch (const std::exception& e) {
+    AddAt(Severity::kError, 0, 0, std::string("YAML syntax: ") + e.what());
+    return nullptr;
+  }
+  return builder.root();
+}
+
+}  // namespace mbv
