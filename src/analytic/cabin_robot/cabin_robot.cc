@@ -1,0 +1,186 @@
+#include "analytic/cabin_robot/cabin_robot.h"
+
+#include <fmt/format.h>
+
+#include <array>
+
+#include "analytic/cabin_robot/cabin_dynamics.h"
+#include "core/spatial.h"
+
+namespace mbv {
+namespace {
+
+using namespace cabin;
+
+constexpr std::array<const char*, kDrives> kDriveNames = {"d1",  "X1",  "X2", "X3",
+                                                          "th3", "th4", "d5", "th6"};
+constexpr std::array<const char*, kBodies> kBodyNames = {
+    "carriage", "sliderA", "sliderD", "sliderF", "AB",      "CD",     "EF",
+    "platform", "support", "flip",    "table",   "slewing", "payload"};
+constexpr std::array<const char*, 3> kTaskNames = {"platform.x", "platform.y", "platform.yaw"};
+
+CabinGeometry ReadGeometry(const Mechanism& m) {
+  CabinGeometry g;
+  g.planar = {m.ParameterValue("L1"), m.ParameterValue("L2"), m.ParameterValue("L3"),
+              m.ParameterValue("L4")};
+  g.wrist = {m.ParameterValue("a2"), m.ParameterValue("d3"), m.ParameterValue("a3"),
+             m.ParameterValue("a4"), m.ParameterValue("d6")};
+  g.gravity = m.gravity_W;
+  for (int b = 0; b < kBodies; ++b) {
+    const std::string name = kBodyNames[b];
+    BodyData& body = g.bodies[b];
+    body.mass = m.ParameterValue("m_" + name);
+    for (int c = 0; c < 3; ++c) {
+      const std::string axis(1, "xyz"[c]);
+      body.com[c] = m.ParameterValue("c_" + name + "_" + axis);
+      body.inertia(c, c) = m.ParameterValue("I_" + name + "_" + axis);
+    }
+  }
+  return g;
+}
+
+class CabinRobot final : public ClosedForm {
+ public:
+  CabinRobot(const Mechanism& mechanism, const Motion& motion)
+      : geometry_(ReadGeometry(mechanism)) {
+    for (int d = 0; d < kDrives; ++d) {
+      command_of_drive_[d] = motion.FindCommand(kDriveNames[d]);
+      model_order_[d] = mechanism.FindDrive(kDriveNames[d]);
+    }
+    for (int k = 0; k < 3; ++k) command_of_task_[k] = motion.FindCommand(kTaskNames[k]);
+    task_space_ = command_of_task_[0] >= 0;
+    for (int b = 0; b < kBodies; ++b) model_body_[b] = mechanism.FindBody(kBodyNames[b]);
+  }
+
+  std::vector<Channel> extra_channels() const override {
+    std::vector<Channel> channels;
+    for (const char* output : {"platform", "tool"}) {
+      for (const char* c : {"x", "y", "z"}) {
+        channels.push_back({std::string(output) + "." + c, "m", "world"});
+      }
+      for (const char* c : {"roll", "pitch", "yaw"}) {
+        channels.push_back({std::string(output) + "." + c, "rad", "world"});
+      }
+    }
+    for (const char* angle : {"alpha", "beta", "epsilon"}) {
+      channels.push_back({std::string("linkage.") + angle, "rad", ""});
+    }
+    return channels;
+  }
+
+  RunSummary Kinematics(const CommandSample& command, DrivenSample* driven) override {
+    const RunSummary summary = Solve(command);
+    if (summary.ok()) Store(driven);
+    return summary;
+  }
+
+  RunSummary Dynamics(const CommandSample& command, ClosedFormSample* sample) override {
+    const RunSummary summary = Solve(command);
+    if (!summary.ok()) return summary;
+    Store(&sample->driven);
+    ComputeFrames(geometry_, planar_, outer_, &frames_);
+    Vec8 tau = DriveForces(geometry_, frames_);
+    for (const LoadSample& load : command.loads) tau += ForcesOf(load);
+    sample->force.resize(kDrives);
+    for (int d = 0; d < kDrives; ++d) sample->force[model_order_[d]] = tau[d];
+
+    sample->extra.resize(15);
+    StorePose(frames_[kPlatform], sample->extra.data());
+    StorePose(frames_[kPayload], sample->extra.data() + 6);
+    sample->extra[12] = planar_.alpha.p;
+    sample->extra[13] = planar_.beta.p;
+    sample->extra[14] = planar_.epsilon.p;
+    return summary;
+  }
+
+ private:
+  static Motion1 At(const CommandSample& command, int k) {
+    return {command.position[k], command.velocity[k], command.acceleration[k]};
+  }
+
+  RunSummary Solve(const CommandSample& command) {
+    outer_ = {At(command, command_of_drive_[kRail]), At(command, command_of_drive_[kTh3]),
+              At(command, command_of_drive_[kTh4]), At(command, command_of_drive_[kD5]),
+              At(command, command_of_drive_[kTh6])};
+    RunSummary summary;
+    if (task_space_) {
+      planar_.X = At(command, command_of_task_[0]);
+      planar_.Y = At(command, command_of_task_[1]);
+      planar_.gamma = At(command, command_of_task_[2]);
+      summary = SolveInverse(geometry_.planar, &planar_);
+    } else {
+      planar_.X1 = At(command, command_of_drive_[kX1]);
+      planar_.X2 = At(command, command_of_drive_[kX2]);
+      planar_.X3 = At(command, command_of_drive_[kX3]);
+      summary = SolveForward(geometry_.planar, &planar_);
+    }
+    summary.time_s = command.time_s;
+    return summary;
+  }
+
+  void Store(DrivenSample* driven) const {
+    driven->position.resize(kDrives);
+    driven->velocity.resize(kDrives);
+    driven->acceleration.resize(kDrives);
+    const std::array<const Motion1*, kDrives> coordinates = {&outer_.d1,  &planar_.X1, &planar_.X2,
+                                                             &planar_.X3, &outer_.th3, &outer_.th4,
+                                                             &outer_.d5,  &outer_.th6};
+    for (int d = 0; d < kDrives; ++d) {
+      driven->position[model_order_[d]] = coordinates[d]->p;
+      driven->velocity[model_order_[d]] = coordinates[d]->v;
+      driven->acceleration[model_order_[d]] = coordinates[d]->a;
+    }
+  }
+
+  static void StorePose(const FrameMotion& frame, double* out) {
+    Eigen::Map<Vec3>{out} = frame.p;
+    Eigen::Map<Vec3>{out + 3} = RpyOf(frame.R);
+  }
+
+  Vec8 ForcesOf(const LoadSample& load) const {
+    int body = 0;
+    while (body < kBodies && model_body_[body] != load.body) ++body;
+    if (body == kBodies) return Vec8::Zero();  // a wrench on the world
+    const Mat3 R = load.in_body_axes ? frames_[body].R : Mat3::Identity();
+    return DriveForcesOf(frames_, {body, load.p_BoQ_B, R * load.force, R * load.moment});
+  }
+
+  CabinGeometry geometry_;
+  bool task_space_ = true;
+  std::array<int, kDrives> command_of_drive_{}, model_order_{};
+  std::array<int, 3> command_of_task_{};
+  std::array<int, kBodies> model_body_{};
+  PlanarState planar_;
+  OuterDrives outer_;
+  std::array<FrameMotion, kBodies> frames_;
+};
+
+}  // namespace
+
+std::unique_ptr<ClosedForm> MakeCabinRobot(const Mechanism& mechanism, const Motion& motion,
+                                           const ClosedFormOptions&, Diagnostics* diagnostics) {
+  int task = 0, sliders = 0;
+  for (const char* name : kTaskNames) task += motion.FindCommand(name) >= 0;
+  for (const char* name : {"X1", "X2", "X3"}) sliders += motion.FindCommand(name) >= 0;
+  if ((task != 3 || sliders != 0) && (task != 0 || sliders != 3)) {
+    diagnostics->Add({.severity = Severity::kError,
+                      .file = {},
+                      .message = fmt::format("the cabin robot's equations need either platform.x, "
+                                             "platform.y, platform.yaw or X1, X2, X3; the motion "
+                                             "commands {} of the first and {} of the second",
+                                             task, sliders),
+                      .hint = "command one of the two sets completely"});
+  }
+  for (const char* name : {"d1", "th3", "th4", "d5", "th6"}) {
+    if (motion.FindCommand(name) < 0) {
+      diagnostics->Add({.severity = Severity::kError,
+                        .file = {},
+                        .message = fmt::format("the motion does not command the drive {}", name),
+                        .hint = fmt::format("add `{}: VALUE` under motion.commands", name)});
+    }
+  }
+  if (diagnostics->has_errors()) return nullptr;
+  return std::make_unique<CabinRobot>(mechanism, motion);
+}
+
+}  // namespace mbv
