@@ -1,0 +1,35 @@
+// Spanning tree of the joint graph: which joints carry coordinates and which ones close loops.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// Hints by joint index: true = cut here, false = never cut, empty = free choice. A shorter vector
+/// leaves the remaining joints free.
+using ClosureHints = std::vector<std::optional<bool>>;
+
+struct SpanningTreeResult {
+  /// Bodies that no chain of uncut joints connects to the world. A floating mechanism needs an
+  /// explicit `free` joint; nothing is added silently.
+  std::vector<int> unconnected_bodies;
+  /// Joints hinted "never cut" that nevertheless had to be cut (they close a loop of such joints).
+  std::vector<int> hints_broken;
+
+  [[nodiscard]] bool ok() const { return unconnected_bodies.empty() && hints_broken.empty(); }
+};
+
+/// Chooses the spanning tree from the world and sets Mechanism::tree_joints (inboard first),
+/// tree_reversed and Joint::closure. Among joints without hint the tree prefers the costlier to
+/// cut (driven and prescribed joints, then those with the fewest freedoms), so that spherical and
+/// force-only joints become the closures. Depends only on the order and data of the joints.
+SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& hints = {});
+
+/// The same with the hints that Joint::closure itself can carry: true = cut here, false = free.
+SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism);
+
+}  // namespace mbv
