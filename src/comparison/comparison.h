@@ -1,0 +1,126 @@
+// Comparison: traces of the witnesses → metrics, checks, verdict and attribution.
+//
+// Compared are signals with the same channel name at common sample times. Angles are differenced
+// modulo 2π, orientations as log(RᵀR'). A check passes only if its value is a number at or below
+// its limit. The verdict starts as kNotRun and is kAgree only if drive forces of at least one pair
+// of witnesses were compared, no witness broke down and every check passes.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "comparison/metrics.h"
+#include "core/run_summary.h"
+#include "core/trace.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "scenario/checks.h"
+
+namespace mbv {
+
+enum class Verdict { kNotRun, kAgree, kDisagree };
+[[nodiscard]] const char* ToText(Verdict verdict);  ///< "not_run", "agree", "disagree"
+
+/// One witness as handed to the comparison.
+struct Witness {
+  std::string name;              ///< "analytic", "reference" or "simulated"
+  const Trace* trace = nullptr;  ///< null if there is none; summary says why
+  RunSummary summary;            ///< the trace is compared only if this is ok
+};
+
+struct ComparisonInput {
+  const Mechanism* mechanism = nullptr;
+  const Motion* motion = nullptr;
+  CheckLimits limits;
+  LimitColumn simulation_limits = LimitColumn::kForward;
+  double start_window_s = 0.0;     ///< force samples before it are left out (named in the scenario)
+  std::vector<Witness> witnesses;  ///< in the order analytic, reference, simulated
+  std::string driven_by;           ///< the witness whose kinematics the simulation follows
+  std::vector<std::string> joints_not_unique;  ///< reactions that statics leaves open
+};
+
+/// One drive's force in a pair of witnesses.
+struct DriveMetrics {
+  std::string drive;
+  std::string unit;            ///< of the force
+  double rms_truth = kNan;     ///< RMS force of the second witness
+  double rms_measured = kNan;  ///< RMS force of the first witness
+  double nrmse = kNan;
+  double max_error = kNan;  ///< [unit]
+  double max_relative = kNan;
+  double digits = kNan;           ///< matching digits, from the NRMSE
+  double time_s = kNan;           ///< of the largest error
+  double factor = kNan;           ///< k of the best fit measured = k · truth
+  double factor_residual = kNan;  ///< RMS of measured − k · truth, over the RMS of the truth
+};
+
+/// What could not be compared, and why.
+struct NotCompared {
+  std::string what;
+  std::string why;
+};
+
+/// `measured` against `truth`.
+struct PairComparison {
+  std::string measured, truth;
+  bool compared = false;                    ///< drive forces at one common sample at least
+  std::string reason = "was not compared";  ///< why not, when not compared
+  size_t samples = 0;                       ///< common samples
+  size_t force_samples = 0;                 ///< of these, inside the judged window
+  std::map<Metric, Measured> metrics;       ///< those that could be measured
+  std::vector<DriveMetrics> drives;
+  std::vector<std::string> reactions;  ///< joints whose reactions were compared
+  double digits = kNan;                ///< matching digits of all forces
+
+  [[nodiscard]] std::string name() const { return measured + "_vs_" + truth; }
+};
+
+/// What one witness shows by itself.
+struct WitnessMetrics {
+  std::string witness;
+  std::map<Metric, Measured> metrics;
+};
+
+struct CheckResult {
+  std::string name;     ///< "simulated_vs_analytic.force_nrmse", "simulated.closure_m"
+  std::string subject;  ///< the part before the point
+  Metric metric = Metric::kForceNrmse;
+  double value = kNan;
+  std::optional<double> limit;  ///< empty: switched off in the scenario
+  bool pass = false;
+  double time_s = kNan;
+  std::string channel;
+};
+
+/// What the witnesses say about each other.
+struct Attribution {
+  std::string odd_one_out;  ///< the witness that is wrong, "" if none or undecided
+  std::string text;         ///< one or two sentences for people
+};
+
+struct Comparison {
+  Verdict verdict = Verdict::kNotRun;
+  std::string reason = "comparison was not run";  ///< one sentence
+  std::vector<PairComparison> pairs;
+  std::vector<WitnessMetrics> witnesses;  ///< those that ran
+  std::vector<CheckResult> checks;        ///< off ones included
+  std::vector<NotCompared> not_compared;
+  Attribution attribution;
+
+  [[nodiscard]] const PairComparison* FindPair(const std::string& name) const;
+  [[nodiscard]] const CheckResult* FindCheck(const std::string& name) const;
+  [[nodiscard]] size_t failed() const;    ///< checks that have a limit and did not pass
+  [[nodiscard]] size_t verified() const;  ///< checks that passed
+};
+
+[[nodiscard]] Comparison Compare(const ComparisonInput& input);
+
+/// The parts of Compare(), for tests and for other uses (a second engine, history).
+[[nodiscard]] PairComparison ComparePair(const ComparisonInput& input, const Trace& measured,
+                                         const Trace& truth);
+[[nodiscard]] WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace);
+[[nodiscard]] Attribution Attribute(const ComparisonInput& input, const Comparison& comparison);
+
+}  // namespace mbv

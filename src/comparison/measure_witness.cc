@@ -1,0 +1,139 @@
+// What one witness shows by itself: commands followed, loops closed, power balanced, and rates
+// that are the derivatives of their positions.
+#include <cmath>
+
+#include "comparison/comparison.h"
+
+namespace mbv {
+namespace {
+
+// A mechanism at rest has no power; the scale of the balance is never taken below what the largest
+// drive force does at this speed [m/s or rad/s].
+constexpr double kSlowest = 1e-3;
+// The same for the derivative check, per second and per second².
+constexpr double kSlowestRate = 1e-3;
+
+std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate) {
+  static constexpr const char* kComponents[] = {"x", "y", "z", "roll", "pitch", "yaw"};
+  const auto index = static_cast<size_t>(coordinate.index);
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kDrive:
+      return mechanism.drives[index].name + ".position";
+    case Coordinate::Kind::kPrescribed:
+      return mechanism.prescribed[index].name + ".position";
+    case Coordinate::Kind::kOutput:
+      return mechanism.outputs[index].name + "." + kComponents[coordinate.component];
+  }
+  return "";
+}
+
+// Columns of all terms of a command, or nothing if one of them is not recorded.
+std::optional<std::vector<int>> ColumnsOf(const Mechanism& mechanism, const Command& command,
+                                          const Trace& trace) {
+  std::vector<int> columns;
+  for (const Command::Term& term : command.terms) {
+    columns.push_back(trace.Find(ChannelOf(mechanism, term.coordinate)));
+    if (columns.back() < 0) return {};
+  }
+  return columns;
+}
+
+void MeasureCommands(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
+  for (const Command& command : input.motion->commands) {
+    const auto columns = ColumnsOf(*input.mechanism, command, trace);
+    if (!columns || columns->empty()) continue;
+    const bool angle = trace.channels[static_cast<size_t>(columns->front())].unit == "rad";
+    const Metric metric = angle ? Metric::kCommandRad : Metric::kCommandM;
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      double value = 0.0;
+      for (size_t k = 0; k < columns->size(); ++k) {
+        value +=
+            command.terms[k].factor * trace.values(static_cast<Eigen::Index>(i), (*columns)[k]);
+      }
+      const double wanted = Evaluate(command.profile, trace.time_s[i]).value;
+      const double error = angle ? AngleDifference(value, wanted) : value - wanted;
+      KeepWorst(&out->metrics[metric], std::abs(error), trace.time_s[i], command.name);
+    }
+  }
+}
+
+void MeasureClosure(const Trace& trace, WitnessMetrics* out) {
+  for (const auto& [name, metric] : {std::pair{"closure.position", Metric::kClosureM},
+                                     std::pair{"closure.rotation", Metric::kClosureRad}}) {
+    const int column = trace.Find(name);
+    if (column < 0) continue;
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      KeepWorst(&out->metrics[metric], std::abs(trace.values(static_cast<Eigen::Index>(i), column)),
+                trace.time_s[i], name);
+    }
+  }
+}
+
+void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
+  const int in = trace.Find("power.input"), rate = trace.Find("power.energy_rate");
+  if (in < 0 || rate < 0 || trace.time_s.empty()) return;
+  double scale = std::max(trace.values.col(in).cwiseAbs().maxCoeff(),
+                          trace.values.col(rate).cwiseAbs().maxCoeff());
+  for (const Drive& drive : input.mechanism->drives) {
+    const int force = trace.Find(drive.name + ".force");
+    if (force < 0) continue;
+    scale = std::max(scale, kSlowest * trace.values.col(force).cwiseAbs().maxCoeff());
+  }
+  for (size_t i = 0; i < trace.time_s.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    const double error = std::abs(trace.values(row, in) - trace.values(row, rate));
+    KeepWorst(&out->metrics[Metric::kPower], error == 0.0 ? 0.0 : error / scale, trace.time_s[i],
+              "power.input");
+  }
+}
+
+// Central differences of orders 4 and 6 at row i of a column, spacing h.
+struct Differences {
+  double fourth, sixth;
+};
+Differences Differentiate(const MatX& values, Eigen::Index i, int column, double h) {
+  const auto step = [&](Eigen::Index k) { return values(i + k, column) - values(i - k, column); };
+  return {(8 * step(1) - step(2)) / (12 * h), (45 * step(1) - 9 * step(2) + step(3)) / (60 * h)};
+}
+
+// One column against the derivative of another. The difference of the two formulas estimates the
+// truncation error and is taken off, so that coarse grids and jumps of the jerk do not count.
+void MeasureDerivative(const Trace& trace, int position, int rate, WitnessMetrics* out) {
+  const auto n = static_cast<Eigen::Index>(trace.time_s.size());
+  const double h = trace.time_s[1] - trace.time_s[0];
+  const double rms = std::sqrt(trace.values.col(rate).squaredNorm() / static_cast<double>(n));
+  const double scale = std::isnan(rms) ? kNan : std::max(rms, kSlowestRate);
+  for (Eigen::Index i = 3; i + 3 < n; ++i) {
+    const auto [fourth, sixth] = Differentiate(trace.values, i, position, h);
+    const double error = std::abs(sixth - trace.values(i, rate)) - std::abs(sixth - fourth);
+    const double value = error <= 0.0 ? 0.0 : error / scale;
+    KeepWorst(&out->metrics[Metric::kDerivatives], value, trace.time_s[static_cast<size_t>(i)],
+              trace.channels[static_cast<size_t>(rate)].name);
+  }
+}
+
+void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
+  if (trace.time_s.size() < 7) return;
+  for (const Drive& drive : input.mechanism->drives) {
+    const int position = trace.Find(drive.name + ".position");
+    const int velocity = trace.Find(drive.name + ".velocity");
+    const int acceleration = trace.Find(drive.name + ".acceleration");
+    if (position < 0 || velocity < 0 || acceleration < 0) continue;
+    MeasureDerivative(trace, position, velocity, out);
+    MeasureDerivative(trace, velocity, acceleration, out);
+  }
+}
+
+}  // namespace
+
+WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) {
+  WitnessMetrics metrics{.witness = trace.witness, .metrics = {}};
+  MeasureCommands(input, trace, &metrics);
+  MeasureClosure(trace, &metrics);
+  MeasurePower(input, trace, &metrics);
+  // An integrated velocity carries the integrator's error; only computed ones are checked.
+  if (trace.witness != "simulated") MeasureDerivatives(input, trace, &metrics);
+  return metrics;
+}
+
+}  // namespace mbv

@@ -1,0 +1,59 @@
+// Error measures between two traces sampled at the same times.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/trace.h"
+#include "core/types.h"
+
+namespace mbv {
+
+/// A measured quantity and where it is worst. NaN until measured; NaN never passes a check.
+struct Measured {
+  double value = kNan;
+  double time_s = kNan;
+  std::string channel;
+};
+
+/// Keeps the larger one; a NaN stays once it is in.
+void KeepWorst(Measured* worst, double value, double time_s, const std::string& channel);
+
+/// Rows (of a, of b) that share a sample time, to 1e-9 s. Nothing is interpolated.
+using CommonSamples = std::vector<std::pair<Eigen::Index, Eigen::Index>>;
+[[nodiscard]] CommonSamples AlignSamples(const Trace& a, const Trace& b);
+
+/// a − b in (−π, π].
+[[nodiscard]] double AngleDifference(double a, double b);
+
+/// Sums of a measured signal against its truth.
+class ErrorSum {
+ public:
+  /// One sample; `error` is measured − truth.
+  void Add(double error, double truth, double time_s, const std::string& channel);
+  void Merge(const ErrorSum& other);
+
+  [[nodiscard]] double rms_error() const;
+  [[nodiscard]] double rms_truth() const;
+  [[nodiscard]] double max_error() const { return worst_.value; }
+  [[nodiscard]] double max_truth() const { return max_truth_; }
+  [[nodiscard]] double worst_time_s() const { return worst_.time_s; }
+  [[nodiscard]] const std::string& worst_channel() const { return worst_.channel; }
+  [[nodiscard]] size_t count() const { return count_; }
+
+  /// RMS error / max(RMS truth, floor); 0/0 is 0 (both signals vanish), x/0 is infinite.
+  [[nodiscard]] double Nrmse(double floor = 0.0) const;
+  /// Largest error / largest truth, same conventions.
+  [[nodiscard]] double MaxRelative() const;
+
+ private:
+  double sum_error2_ = 0.0, sum_truth2_ = 0.0, max_truth_ = 0.0;
+  size_t count_ = 0;
+  Measured worst_{.value = 0.0, .time_s = kNan, .channel = {}};
+};
+
+/// Decimal digits that agree, from a relative error: −log10, 0 … 16; NaN stays NaN.
+[[nodiscard]] double MatchingDigits(double relative_error);
+
+}  // namespace mbv

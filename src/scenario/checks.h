@@ -1,0 +1,73 @@
+// The checks of a run: which quantities are judged and how good they must be.
+//
+// Every quantity has three default limits, because three kinds of computation are judged by it: a
+// simulation integrated forward in time, a simulation evaluated by inverse dynamics, and the two
+// computations without an engine (closed form and generic reference). A scenario changes them by
+//   checks: {force_nrmse: 1e-7}                               both simulation modes
+//           {force_nrmse: {forward: 1e-7, inverse: 1e-10}}    each mode
+//           {reference_force_nrmse: 1e-10}                    reference against closed form
+//           {force_max: null}                                 switched off, and reported as such
+#pragma once
+
+#include <array>
+#include <optional>
+#include <span>
+#include <string>
+
+namespace mbv {
+
+/// A judged quantity. Those of a pair compare two witnesses; the others need one witness only.
+enum class Metric {
+  kForceNrmse,    ///< pair: RMS error of all drive forces of one unit / RMS force
+  kForceMax,      ///< pair: largest error / largest force, drives of one unit
+  kPositionM,     ///< pair: drive positions [m]
+  kPositionRad,   ///< pair: drive positions [rad]
+  kVelocity,      ///< pair: drive velocities, RMS error / RMS
+  kAcceleration,  ///< pair: drive accelerations, RMS error / RMS
+  kPoseM,         ///< pair: outputs, distance of origins [m]
+  kPoseRad,       ///< pair: outputs, angle of the relative rotation [rad]
+  kReaction,      ///< pair: unique joint reactions, RMS error / RMS
+  kCommandM,      ///< commanded lengths against what the witness did [m]
+  kCommandRad,    ///< commanded angles against what the witness did [rad]
+  kClosureM,      ///< loop gap [m]
+  kClosureRad,    ///< loop twist gap [rad]
+  kPower,         ///< |input power − energy rate| / largest power
+  kDerivatives,   ///< drive velocity and acceleration against differences of the positions
+};
+inline constexpr int kMetrics = 15;
+
+/// Which column of limits applies.
+enum class LimitColumn { kForward, kInverse, kReference };
+
+/// Limits of one metric; an empty one is switched off.
+struct MetricLimits {
+  std::optional<double> forward, inverse, reference;
+
+  [[nodiscard]] std::optional<double> Of(LimitColumn column) const;
+};
+
+/// What is known about a metric at compile time.
+struct MetricRow {
+  Metric metric;
+  const char* key;      ///< in `checks:` and in check names
+  const char* json;     ///< in summary.json's metrics
+  const char* title;    ///< for people
+  const char* unit;     ///< "m", "rad" or "" for a ratio
+  bool of_pair;         ///< compares two witnesses
+  MetricLimits limits;  ///< defaults
+};
+
+[[nodiscard]] std::span<const MetricRow> MetricRows();
+[[nodiscard]] const MetricRow& RowOf(Metric metric);
+[[nodiscard]] const MetricRow* FindMetric(const std::string& key);
+
+/// All limits of a scenario, starting from the defaults.
+struct CheckLimits {
+  CheckLimits();
+  std::array<MetricLimits, kMetrics> of;
+
+  [[nodiscard]] const MetricLimits& operator[](Metric m) const { return of[static_cast<int>(m)]; }
+  [[nodiscard]] MetricLimits& operator[](Metric m) { return of[static_cast<int>(m)]; }
+};
+
+}  // namespace mbv

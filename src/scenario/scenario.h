@@ -1,0 +1,94 @@
+// Scenario: one experiment on a mechanism, as data. Read by load_scenario.h, then only read.
+//
+// Every number is SI and radians; only the file may use keys ending in _deg and _mm.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "core/types.h"
+#include "mechanism/motion.h"
+#include "scenario/checks.h"
+
+namespace mbv {
+
+/// Model parameters by name.
+using Overrides = std::map<std::string, double>;
+
+/// The closed form's part in a scenario.
+struct AnalyticSettings {
+  bool on = true;                       ///< false: `analytic: none`
+  std::string model;                    ///< formulation; "" is the mechanism's default
+  std::vector<std::string> as_printed;  ///< errata left uncorrected on purpose
+  Overrides parameters;                 ///< bend this witness only
+};
+
+/// The generic reference's part.
+struct ReferenceSettings {
+  bool on = true;
+  Overrides parameters;
+};
+
+/// Forces that are linear in a parameter, extrapolated to the scenario's value of it from two runs
+/// at values an engine can handle (massless links from factors 1 and 0.5).
+struct Extrapolation {
+  std::string parameter;
+  std::array<double, 2> from{1.0, 0.5};
+};
+
+/// The simulation's part.
+struct SimulationSettings {
+  bool on = true;
+  bool forward = true;         ///< time integration; false: inverse dynamics per sample
+  bool stock_engine = false;   ///< judge MuJoCo as it is instead of the corrected engine
+  bool stock_too = true;       ///< forward only: run stock MuJoCo too and report its error
+  double step_s = 1e-3;        ///< > 0
+  bool ignore_ranges = false;  ///< simulate beyond drive and joint ranges
+  Overrides parameters;
+  std::optional<Extrapolation> extrapolate;
+};
+
+struct CameraSettings {
+  std::optional<double> azimuth_rad, elevation_rad, distance_m;
+  std::optional<Vec3> lookat_W;
+};
+
+struct SnapshotSettings {
+  std::vector<double> times_s;  ///< within the motion
+  std::array<int, 2> size_px{1280, 960};
+  CameraSettings camera;
+};
+
+/// What running this file must give; used by the tests of the shipped scenarios.
+struct Expectation {
+  std::string verdict = "agree";  ///< "agree", "disagree" or "not_run"
+  int exit_code = 0;
+  std::string mentions;  ///< must occur in the printed result
+};
+
+struct Scenario {
+  std::string file;  ///< as given
+  std::string name;  ///< file name without its ending, "must_fail/x" below a model's folder
+  std::string description;
+  std::string model_file;                           ///< the model.yaml it uses
+  Overrides parameters;                             ///< for all witnesses
+  std::map<std::string, Finding> parameter_places;  ///< where each override was written
+  Motion motion;
+  /// Samples before this time are left out of the force metrics; 0 unless the file names it.
+  double start_window_s = 0.0;
+  AnalyticSettings analytic;
+  ReferenceSettings reference;
+  SimulationSettings simulation;
+  CheckLimits checks;
+  SnapshotSettings snapshots;
+  Expectation expect;
+};
+
+/// The sum of two override sets; `over` wins.
+[[nodiscard]] Overrides Merge(const Overrides& base, const Overrides& over);
+
+}  // namespace mbv
