@@ -2,11 +2,14 @@
 #include <array>
 
 #include "analytic/closed_form.h"
+#include "analytic/scara_robot/closed_form.h"
 
 namespace mbv {
 
 std::span<const ClosedFormRow> ClosedForms() {
-  static const std::vector<ClosedFormRow> rows = {};
+  static const std::vector<ClosedFormRow> rows = {
+      {"scara_robot", {"full", "thin_rods"}, {}, &scara::MakeClosedForm},
+  };
   return rows;
 }
 

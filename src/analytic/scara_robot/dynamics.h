@@ -1,0 +1,63 @@
+// SCARA parallel robot: motion of the passive links and drive torques by virtual work.
+// Terms as in geometry.h; Φ_i is the i-th unit vector of R⁴.
+//
+//   (31)      v_i1 = c l1 θ̇_i n_i = J_i1 θ̇               COM of the arm (c = ½ in the paper)
+//   (32)      v_C  = l1 θ̇_i n_i = J_Ci θ̇
+//   (33, 35)  v_B  = v_D = ṗ + k_i φ̇ = [E k_i] J⁻¹ θ̇ = J_Bi θ̇
+//   (34, 36)  v_i2 = ½ (v_C + v_B) = J_i2 θ̇              COM of the rods
+//   (37, 38)  η̇ = (v_B − v_C)/L_i,  ω = η × η̇ + b ψ̇ η = J_ωi θ̇
+//             b = η·a, ψ̇ = η̇·(a × η)/(1 − b²): the rods turn like universal joints at C_i whose
+//             first axis is a_i (the paper leaves the spin b ψ̇ out)
+//   (39 – 41) the time derivatives of these
+//   (48)      M = J⁻ᵀ { [m_p (p̈ − g); I_pz φ̈] − [F; M_z] }
+//               + Σ_i { J_i1ᵀ m_i1 (v̇_i1 − g) + I_t1 θ̈_i Φ_i
+//                     + J_i2ᵀ m_i2 (v̇_i2 − g) + J_ωiᵀ [I_i2 ω̇_i + ω_i × (I_i2 ω_i)] }
+//
+// (48) is the corrected form: as printed the platform's inertia and the external force are
+// missing, gravity and the arms' inertia have wrong signs and J stands for J⁻¹. The two rods of a
+// parallelogram have the same ω and, on average, the COM motion of the line C_i D_i, so that one
+// rod of their total mass on this line is exact for any width d. [Zhu 2019 §3.2–3.5]
+#pragma once
+
+#include "analytic/scara_robot/velocity.h"
+
+namespace mbv::scara {
+
+/// Which rod rotation enters the dynamics.
+enum class RodModel {
+  kFull,  ///< with the spin about the rod's own axis
+  kThin,  ///< the paper's: no spin, no axial inertia
+};
+
+/// Motion of the links of one limb (world axes) and its Jacobians to θ̇ (3 × 4).
+struct LinkMotion {
+  Vec3 v_arm, dv_arm;  ///< COM of the arm [m/s], [m/s²]
+  Vec3 v_rod, dv_rod;  ///< COM of the rods
+  Vec3 omega, domega;  ///< rods [rad/s], [rad/s²]
+  Mat34 J_arm, J_rod, J_omega;
+};
+
+/// Equations (31) – (41) for one limb. `J_inverse` is J⁻¹ (4 × 4).
+void FillLinkMotion(const Parameters& parameters, const Position& position, const Rates& rates,
+                    const Mat4& J_inverse, RodModel rod_model, int limb, LinkMotion* links);
+
+/// J⁻¹ = J_θ⁻¹ J_x: Ẋ per θ̇.
+[[nodiscard]] Mat4 InverseOfJ(const Parameters& parameters, const Position& position);
+
+/// Drive torques [N m], positive along +θ. [Zhu 2019, Eq. 48 corrected]
+/// `F_P` external force on the platform at P [N], `M_z` external moment about z at P [N m].
+[[nodiscard]] Vec4 DriveTorques(const Parameters& parameters, const Position& position,
+                                const Rates& rates, const Vec3& F_P, double M_z,
+                                RodModel rod_model = RodModel::kFull);
+
+/// Kinetic plus potential energy [J], for the power balance Σ M θ̇ + F·ṗ + M_z φ̇ = dE/dt.
+[[nodiscard]] double Energy(const Parameters& parameters, const Position& position,
+                            const Rates& rates, RodModel rod_model = RodModel::kFull);
+
+/// Transverse and axial inertia of a solid round bar about its COM [kg m²].
+struct BarInertia {
+  double transverse = 0.0, axial = 0.0;
+};
+[[nodiscard]] BarInertia SolidBar(double mass, double radius, double length);
+
+}  // namespace mbv::scara
