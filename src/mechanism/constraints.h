@@ -25,12 +25,13 @@ struct BodyStates {
 /// Up to six scalar rows between two bodies.
 struct ConstraintRows {
   int rows = 0;
+  int translation_rows = 0;  ///< these come first; the rest are rotation rows
   int parent = 0, child = 0;
-  Vec6 residual = Vec6::Zero();            ///< first `rows` entries: m for translation rows,
-                                           ///< direction cosines (≈ rad) for rotation rows
-  Mat6 J_parent = Mat6::Zero();            ///< rows × 6, multiplies V of the parent
-  Mat6 J_child = Mat6::Zero();             ///< rows × 6, multiplies V of the child
-  Vec6 bias = Vec6::Zero();                ///< b in r̈ = J A + b
+  Vec6 residual = Vec6::Zero();  ///< first `rows` entries: m for translation rows,
+                                 ///< direction cosines (≈ rad) for rotation rows
+  Mat6 J_parent = Mat6::Zero();  ///< rows × 6, multiplies V of the parent
+  Mat6 J_child = Mat6::Zero();   ///< rows × 6, multiplies V of the child
+  Vec6 bias = Vec6::Zero();      ///< b in r̈ = J A + b
 };
 
 /// Rows that a joint imposes (6 − freedoms). With `reactions` true, the isostatic rule is applied:
@@ -57,11 +58,18 @@ struct ScalarRow {
 [[nodiscard]] ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate,
                                       const BodyStates& states, double near_value = 0.0);
 
+/// Columns e1, e2, axis: the right-handed basis in F that planar joints use (see mechanism.h).
+[[nodiscard]] Mat3 JointBasis(const Joint& joint);
+
 /// X_FM for given joint coordinates.
 [[nodiscard]] Pose JointPose(const Joint& joint, const std::array<double, 6>& coordinates);
 /// Joint coordinates of X_FM (the inverse of JointPose on the joint's own motions; spherical and
 /// free rotations as roll, pitch, yaw).
 [[nodiscard]] std::array<double, 6> CoordinatesOf(const Joint& joint, const Pose& X_FM);
+
+/// Rotation [rad] by which X_FM leaves the joint's own motions, in [0, π]. Unlike the direction
+/// cosines of RowsOf it does not vanish when an axis points backwards.
+[[nodiscard]] double RotationGap(const Joint& joint, const Pose& X_FM);
 
 /// Body poses of the spanning tree for joint coordinates `q[joint]` (entries of closures unused).
 [[nodiscard]] std::vector<Pose> TreePoses(const Mechanism& mechanism,

@@ -10,17 +10,17 @@ namespace mbv {
 
 /// Gap of one loop closure at the end of the home solution.
 struct LoopGap {
-  int joint = -1;                 ///< index of the closure joint
-  double position_m = kNan;       ///< largest translation row
-  double rotation_rad = kNan;     ///< largest rotation row (direction cosine ≈ rad)
+  int joint = -1;              ///< index of the closure joint
+  double position_m = kNan;    ///< largest translation row
+  double rotation_rad = kNan;  ///< largest rotation row (direction cosine ≈ rad)
 };
 
 struct HomeResult {
   bool closed = false;
   int iterations = 0;
-  double gap = kNan;              ///< largest row of all closures [m or ≈ rad]
-  double gap_at_guess = kNan;     ///< the same at the joint guesses
-  std::vector<LoopGap> gaps;      ///< per closure joint, worst first
+  double gap = kNan;           ///< largest row of all closures [m or ≈ rad]
+  double gap_at_guess = kNan;  ///< the same at the joint guesses
+  std::vector<LoopGap> gaps;   ///< per closure joint, worst first
 
   /// One line for people: "loop at limb1.S is open by 0.12 m, 0.3 rad; …" (at most three loops).
   [[nodiscard]] std::string Text(const Mechanism& mechanism) const;
