@@ -48,3 +48,8 @@ add_library(mbv_urdfdom INTERFACE)
 target_link_libraries(mbv_urdfdom INTERFACE PkgConfig::URDFDOM)
 add_library(mbv_osmesa INTERFACE)
 target_link_libraries(mbv_osmesa INTERFACE PkgConfig::OSMESA)
+
+# Debian's mujoco target names an include folder that only another package would bring.
+get_target_property(mujoco_includes mujoco::mujoco INTERFACE_INCLUDE_DIRECTORIES)
+list(FILTER mujoco_includes EXCLUDE REGEX qhull)
+set_target_properties(mujoco::mujoco PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${mujoco_includes}")
