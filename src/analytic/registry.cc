@@ -2,12 +2,19 @@
 #include <array>
 
 #include "analytic/closed_form.h"
+#include "analytic/stabilizing_platform/stabilizing_platform.h"
 #include "analytic/scara_robot/closed_form.h"
+#include "analytic/spr_tripod/closed_form.h"
 
 namespace mbv {
 
 std::span<const ClosedFormRow> ClosedForms() {
   static const std::vector<ClosedFormRow> rows = {
+      {"stabilizing_platform",
+       {"full", "massless", "paper_text"},
+       {"E2"},
+       &stabilizing_platform::MakeClosedForm},
+      {"spr_tripod", {"full"}, {}, &MakeSprTripod},
       {"scara_robot", {"full", "thin_rods"}, {}, &scara::MakeClosedForm},
   };
   return rows;
