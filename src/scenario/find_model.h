@@ -1,0 +1,29 @@
+// Where models and scenarios are.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+/// Folders searched for models/<name>/model.yaml, best first: "models" beside the start folder and
+/// beside each folder above it, $MBVERIFY_MODELS, ./models, and the installed share folder.
+[[nodiscard]] std::vector<std::filesystem::path> ModelFolders(const std::filesystem::path& start);
+
+/// Path of a model named as in a scenario: a path (relative to `start`) if it contains '/' or ends
+/// in .yaml, otherwise a name looked up in ModelFolders(start). Empty when there is none.
+[[nodiscard]] std::optional<std::string> FindModel(const std::string& name,
+                                                   const std::filesystem::path& start);
+
+/// Names of all models in ModelFolders(start), sorted, each once.
+[[nodiscard]] std::vector<std::string> ModelNames(const std::filesystem::path& start);
+
+/// The folder with the shipped scenarios: ./scenarios or the installed one; empty if there is none.
+[[nodiscard]] std::optional<std::filesystem::path> ScenariosFolder();
+
+/// `path` relative to the current folder if it lies below it, else as it is.
+[[nodiscard]] std::string Shown(const std::filesystem::path& path);
+
+}  // namespace mbv

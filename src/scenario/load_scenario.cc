@@ -1,0 +1,241 @@
+#include "scenario/load_scenario.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+
+#include "mechanism/load_model.h"
+#include "mechanism/mobility.h"
+#include "scenario/find_model.h"
+#include "scenario/motion_reader.h"
+#include "scenario/set_values.h"
+#include "scenario/settings_reader.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string> kKeys = {"mechanism", "description", "parameters", "motion",
+                                        "loads",     "analytic",    "reference",  "simulation",
+                                        "checks",    "snapshots",   "expect"};
+
+// "sea_state", or "must_fail/wrong_mass" for a file in a folder below one named as the mechanism.
+std::string CaseName(const fs::path& file, const std::string& mechanism) {
+  fs::path name = file.stem();
+  for (fs::path folder = file.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
+    if (folder.filename() == mechanism) return name;
+    name = folder.filename() / name;
+  }
+  return file.stem();
+}
+
+std::string JoinWords(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+class Loader {
+ public:
+  Loader(const std::string& file, const ScenarioOptions& options)
+      : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
+
+  ScenarioResult Load(const std::string& text) {
+    YamlNodePtr root = yaml_.Parse(text);
+    if (root != nullptr) root = SetValues(root, options_.set, &yaml_);
+    if (root != nullptr) Read(*root);
+    ScenarioResult result;
+    result.diagnostics = PlaceSetFindings(yaml_.diagnostics(), options_.set);
+    result.diagnostics.Append(model_findings_);
+    if (result.diagnostics.has_errors() || !mechanism_) return result;
+    result.scenario = std::move(scenario_);
+    result.mechanism = std::move(mechanism_);
+    return result;
+  }
+
+  ScenarioResult LoadFile() {
+    const auto text = yaml_.ReadFile();
+    if (text) return Load(*text);
+    return {{}, {}, yaml_.diagnostics()};
+  }
+
+ private:
+  void Read(const YamlNode& root) {
+    YamlMap map(&yaml_, &root, "", kKeys);
+    scenario_.file = file_;
+    if (const YamlNode* description = map.Find("description")) {
+      scenario_.description = yaml_.Text(*description, "description").value_or("");
+    }
+    ReadParameters(map.Find("parameters"));
+    if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
+    // Numbers from here on may be expressions of the model's parameters.
+    if (mechanism_) {
+      for (const Parameter& p : mechanism_->parameters) scope_.Set(p.name, p.value);
+    }
+    scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
+    scenario_.reference = ReadReference(&values_, map.Find("reference"));
+    scenario_.simulation = ReadSimulation(&values_, map.Find("simulation"));
+    scenario_.checks = ReadChecks(&values_, map.Find("checks"), &scenario_.start_window_s);
+    scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
+    if (!mechanism_) return;
+    const YamlNode* motion = map.Required("motion");
+    if (motion == nullptr) return;
+    scenario_.motion = ReadMotion(&values_, *mechanism_, motion, map.Find("loads"));
+    scenario_.snapshots =
+        ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s);
+    CheckParameterNames(map);
+    if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
+  }
+
+  void ReadParameters(const YamlNode* node) {
+    scenario_.parameters = ReadOverrides(&values_, node, "parameters");
+    if (node == nullptr) return;
+    for (const YamlEntry& entry : node->entries) {
+      Finding place;
+      place.file = file_;
+      place.line = entry.line;
+      place.column = entry.column;
+      if (entry.line < 0) {
+        const SetValue& value = options_.set[static_cast<size_t>(-entry.line - 1)];
+        place = {};
+        place.file = "--set " + value.first + "=" + value.second;
+      }
+      scenario_.parameter_places[entry.key] = place;
+    }
+  }
+
+  void LoadMechanism(const YamlNode& node) {
+    const auto name = yaml_.Text(node, "mechanism");
+    if (!name) return;
+    const fs::path folder = fs::path(file_).parent_path();
+    const auto model_file = FindModel(*name, folder);
+    if (!model_file) {
+      const std::string near = ClosestWord(*name, ModelNames(folder));
+      yaml_.Error(node, fmt::format("mechanism = '{}': there is no such model", *name),
+                  !near.empty() ? fmt::format("did you mean '{}'?", near)
+                                : "known models: " + JoinWords(ModelNames(folder)));
+      return;
+    }
+    scenario_.model_file = *model_file;
+    LoadOptions options;
+    options.overrides = scenario_.parameters;
+    options.override_places = scenario_.parameter_places;
+    LoadResult loaded = LoadModel(*model_file, options);
+    model_findings_ = loaded.diagnostics;
+    if (!loaded.mechanism) return;
+    mechanism_ = std::move(loaded.mechanism);
+    scenario_.name = CaseName(file_, mechanism_->name);
+  }
+
+  // Overrides of single witnesses must name parameters of the model, too.
+  void CheckParameterNames(const YamlMap& map) {
+    std::vector<std::string> known;
+    for (const Parameter& p : mechanism_->parameters) known.push_back(p.name);
+    const auto check = [&](const YamlEntry& entry, const std::string& path) {
+      if (mechanism_->HasParameter(entry.key)) return;
+      const std::string near = ClosestWord(entry.key, known);
+      yaml_.Error(entry,
+                  fmt::format("{}: {} has no parameter '{}'", path, mechanism_->name, entry.key),
+                  near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+    };
+    for (const char* section : {"analytic", "reference", "simulation"}) {
+      const YamlNode* node = map.Find(section);
+      const YamlNode* parameters = node == nullptr ? nullptr : node->Find("parameters");
+      if (parameters == nullptr) continue;
+      for (const YamlEntry& entry : parameters->entries) {
+        check(entry, std::string(section) + ".parameters");
+      }
+    }
+    if (!scenario_.simulation.extrapolate) return;
+    const YamlNode* node = map.Find("simulation")->Find("extrapolate")->Find("parameter");
+    if (node != nullptr) {
+      check({node->text, node->line, node->column, nullptr}, "simulation.extrapolate.parameter");
+    }
+  }
+
+  // Rules that need several sections.
+  void CheckTogether(const YamlNode& motion, const YamlNode* simulation) {
+    CheckCommandCount(motion);
+    const SimulationSettings& settings = scenario_.simulation;
+    const double steps = scenario_.motion.sample_s / settings.step_s;
+    if (settings.on && settings.forward && std::abs(steps - std::round(steps)) > 1e-6 * steps) {
+      yaml_.Error(simulation != nullptr ? *simulation : motion,
+                  fmt::format("simulation.step_s = {} violates motion.sample_s = {} = n · step_s",
+                              settings.step_s, scenario_.motion.sample_s),
+                  "samples must fall on whole steps");
+    }
+    if (!scenario_.analytic.on && !scenario_.reference.on && !settings.on) {
+      yaml_.Error(motion, "analytic, reference and simulation are all off");
+    }
+  }
+
+  // Every freedom needs one command.
+  void CheckCommandCount(const YamlNode& motion) {
+    const Mobility mobility = AnalyseMobility(*mechanism_);
+    const auto commands = static_cast<int>(scenario_.motion.commands.size());
+    if (commands == mobility.freedoms) return;
+    yaml_.Error(motion,
+                fmt::format("motion gives {} commands, but {} has {} freedoms", commands,
+                            mechanism_->name, mobility.freedoms),
+                commands < mobility.freedoms
+                    ? "command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives "
+                      "under motion.equal"
+                    : "leave commands out: each further one contradicts the others");
+  }
+
+  std::string file_;
+  const ScenarioOptions& options_;
+  YamlReader yaml_;
+  Scope scope_;
+  ValueReader values_;
+  Diagnostics model_findings_;
+  Scenario scenario_;
+  std::optional<Mechanism> mechanism_;
+};
+
+// The value of a first line "# expect: {…}", or nothing.
+std::optional<std::string> FirstLineExpectation(const std::string& text) {
+  constexpr std::string_view kStart = "# expect:";
+  if (!text.starts_with(kStart)) return {};
+  return text.substr(kStart.size(), text.find('\n') - kStart.size());
+}
+
+}  // namespace
+
+ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& options) {
+  return Loader(file, options).LoadFile();
+}
+
+ScenarioResult LoadScenarioText(const std::string& text, const std::string& file,
+                                const ScenarioOptions& options) {
+  return Loader(file, options).Load(text);
+}
+
+ScenarioHead ReadScenarioHead(const std::string& file) {
+  ScenarioHead head;
+  YamlReader yaml(file);
+  Scope scope;
+  ValueReader values(&yaml, &scope);
+  const auto text = yaml.ReadFile();
+  if (!text) return head;
+  if (const auto line = FirstLineExpectation(*text)) {
+    const YamlNodePtr expect = YamlReader(file).Parse(*line);
+    if (expect != nullptr) head.expect = ReadExpectation(&values, expect.get());
+    head.is_scenario = true;
+  }
+  const YamlNodePtr root = yaml.Parse(*text);
+  if (root == nullptr || !root->is_map()) return head;
+  const auto word = [&](const char* key) {
+    const YamlNode* node = root->Find(key);
+    return node != nullptr && node->is_scalar() ? node->text : std::string();
+  };
+  head.mechanism = word("mechanism");
+  head.description = word("description");
+  head.is_scenario = head.is_scenario || root->Find("mechanism") != nullptr;
+  if (const YamlNode* expect = root->Find("expect")) head.expect = ReadExpectation(&values, expect);
+  return head;
+}
+
+}  // namespace mbv

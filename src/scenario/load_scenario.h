@@ -1,0 +1,46 @@
+// Scenario file → Scenario, resolved against its mechanism.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "mechanism/mechanism.h"
+#include "scenario/scenario.h"
+
+namespace mbv {
+
+/// "simulation.step_s" = "0.002": replaces or adds a value of the file; the value is YAML text.
+using SetValue = std::pair<std::string, std::string>;
+
+struct ScenarioOptions {
+  std::vector<SetValue> set;  ///< applied in order
+};
+
+struct ScenarioResult {
+  std::optional<Scenario> scenario;    ///< empty when there are errors
+  std::optional<Mechanism> mechanism;  ///< with the scenario's `parameters` applied
+  Diagnostics diagnostics;             ///< all findings of the file and of its model
+};
+
+/// Loads a scenario file and the model it names (see find_model.h). Collects all findings; never
+/// throws for bad input.
+[[nodiscard]] ScenarioResult LoadScenario(const std::string& file,
+                                          const ScenarioOptions& options = {});
+
+/// The same from text, for tests; `file` is used in messages and to find the model.
+[[nodiscard]] ScenarioResult LoadScenarioText(const std::string& text, const std::string& file,
+                                              const ScenarioOptions& options = {});
+
+/// Only the mechanism name, description and `expect:` of a file, even if the rest is wrong. A file
+/// that is no YAML may carry its expectation in a first line "# expect: {…}".
+struct ScenarioHead {
+  bool is_scenario = false;  ///< has a `mechanism:` key (or an expectation)
+  std::string mechanism, description;
+  Expectation expect;
+};
+[[nodiscard]] ScenarioHead ReadScenarioHead(const std::string& file);
+
+}  // namespace mbv

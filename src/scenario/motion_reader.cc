@@ -1,0 +1,367 @@
+#include "scenario/motion_reader.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/spatial.h"
+#include "scenario/profile_reader.h"
+
+namespace mbv {
+namespace {
+
+constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
+constexpr double kMostSamples = 1e6;
+
+bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
+  return a.kind == b.kind && a.index == b.index && a.component == b.component;
+}
+
+// Names a command may use: prescribed joints, drives, output components.
+std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
+  std::vector<std::string> names;
+  for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
+  for (const Drive& d : mechanism.drives) names.push_back(d.name);
+  for (const Output& o : mechanism.outputs) {
+    for (const char* c : kComponents) names.push_back(o.name + "." + c);
+  }
+  return names;
+}
+
+// The k-th name of CoordinateNames as a coordinate.
+Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
+  using Kind = Coordinate::Kind;
+  if (k < mechanism.prescribed.size()) return {Kind::kPrescribed, static_cast<int>(k), 0};
+  k -= mechanism.prescribed.size();
+  if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
+  k -= mechanism.drives.size();
+  return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
+}
+
+std::string UnitOf(const Mechanism& mechanism, const Coordinate& coordinate) {
+  const auto index = static_cast<size_t>(coordinate.index);
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kDrive:
+      return PositionUnit(mechanism, mechanism.drives[index]);
+    case Coordinate::Kind::kPrescribed: {
+      const auto joint = static_cast<size_t>(mechanism.prescribed[index].joint);
+      return mechanism.joints[joint].kind == JointKind::kPrismatic ? "m" : "rad";
+    }
+    case Coordinate::Kind::kOutput:
+      return coordinate.component < 3 ? "m" : "rad";
+  }
+  return "";
+}
+
+class Reader {
+ public:
+  Reader(ValueReader* values, const Mechanism& mechanism)
+      : values_(values), mechanism_(mechanism), names_(CoordinateNames(mechanism)) {}
+
+  Motion Read(const YamlNode* node, const YamlNode* loads) {
+    YamlMap map(&yaml(), node, "motion", {"duration_s", "sample_s", "commands", "equal", "path"});
+    if (const YamlNode* commands = map.Find("commands")) ReadCommands(*commands);
+    if (const YamlNode* equal = map.Find("equal")) ReadEqual(*equal);
+    double path_end_s = kNan;
+    if (const YamlNode* path = map.Find("path")) path_end_s = ReadPath(*path);
+    ReadTimes(map, path_end_s);
+    if (loads != nullptr) ReadLoads(*loads);
+    if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
+      yaml().Error(*node, "motion commands nothing", "give commands, equal or path");
+    }
+    return motion_;
+  }
+
+ private:
+  YamlReader& yaml() { return values_->yaml(); }
+
+  void ReadTimes(const YamlMap& map, double path_end_s) {
+    if (!map.valid() || map.node() == nullptr) return;
+    std::optional<double> duration_s = path_end_s;
+    if (std::isnan(path_end_s) || map.Has("duration_s")) {
+      duration_s = values_->RequiredPositive(map, "duration_s");
+    }
+    if (const YamlNode* sample = map.Find("sample_s")) {
+      motion_.sample_s = values_->Positive(*sample, "motion.sample_s").value_or(motion_.sample_s);
+    }
+    if (!duration_s) return;
+    motion_.duration_s = *duration_s;
+    if (motion_.sample_s > motion_.duration_s ||
+        motion_.duration_s / motion_.sample_s > kMostSamples) {
+      yaml().Error(*map.node(), fmt::format("motion.sample_s = {} and duration_s = {} violate "
+                                            "1 <= duration_s/sample_s <= {:g}",
+                                            motion_.sample_s, motion_.duration_s, kMostSamples));
+    }
+  }
+
+  // A coordinate by name; a finding names the closest one.
+  std::optional<Coordinate> FindCoordinate(const YamlEntry& entry, const std::string& path) {
+    const auto found = std::find(names_.begin(), names_.end(), entry.key);
+    if (found != names_.end()) {
+      return CoordinateAt(mechanism_, static_cast<size_t>(found - names_.begin()));
+    }
+    const std::string near = ClosestWord(entry.key, names_);
+    std::string hint;
+    if (!near.empty()) {
+      hint = fmt::format("did you mean '{}'?", near);
+    } else {
+      hint = "known: prescribed joints, drives, and OUTPUT.x … OUTPUT.yaw: ";
+      for (size_t i = 0; i < names_.size() && i < 12; ++i) hint += (i == 0 ? "" : ", ") + names_[i];
+      if (names_.size() > 12) hint += ", …";
+    }
+    yaml().Error(entry,
+                 fmt::format("{}: {} has no coordinate '{}'", path, mechanism_.name, entry.key),
+                 hint);
+    return {};
+  }
+
+  void AddCommand(const YamlEntry& entry, Command command) {
+    for (const Command& other : motion_.commands) {
+      const bool same = other.terms.size() == 1 && command.terms.size() == 1 &&
+                        SameCoordinate(other.terms[0].coordinate, command.terms[0].coordinate);
+      if (same || other.name == command.name) {
+        yaml().Error(entry, fmt::format("motion commands '{}' twice", command.name));
+        return;
+      }
+    }
+    motion_.commands.push_back(std::move(command));
+  }
+
+  void ReadCommands(const YamlNode& node) {
+    for (const YamlEntry& entry : yaml().Entries(node, "motion.commands")) {
+      const std::string path = "motion.commands." + entry.key;
+      const auto coordinate = FindCoordinate(entry, "motion.commands");
+      if (!coordinate) continue;
+      const ProfileContext context{.unit = UnitOf(mechanism_, *coordinate),
+                                   .home = HomeValue(mechanism_, *coordinate)};
+      AddCommand(entry, {.name = entry.key,
+                         .terms = {{*coordinate, 1.0}},
+                         .profile = ReadProfile(values_, *entry.value, path, context)});
+    }
+  }
+
+  static YamlEntry AsEntry(const YamlNode& node) {
+    return {node.text, node.line, node.column, nullptr};
+  }
+
+  void ReadEqual(const YamlNode& node) {
+    const auto pairs = yaml().Items(node, "motion.equal");
+    if (!pairs) return;
+    for (size_t i = 0; i < pairs->size(); ++i) {
+      const std::string path = fmt::format("motion.equal[{}]", i);
+      const auto items = yaml().Items(*(*pairs)[i], path, 2);
+      if (!items || !yaml().Text(*(*items)[0], path) || !yaml().Text(*(*items)[1], path)) continue;
+      const YamlEntry a = AsEntry(*(*items)[0]), b = AsEntry(*(*items)[1]);
+      const auto ca = FindCoordinate(a, path), cb = FindCoordinate(b, path);
+      if (!ca || !cb) continue;
+      if (SameCoordinate(*ca, *cb) || UnitOf(mechanism_, *ca) != UnitOf(mechanism_, *cb)) {
+        yaml().Error(*(*pairs)[i], fmt::format("{}: {} and {} are not two coordinates of one unit",
+                                               path, a.key, b.key));
+        continue;
+      }
+      AddCommand(a, {.name = a.key + " - " + b.key,
+                     .terms = {{*ca, 1.0}, {*cb, -1.0}},
+                     .profile = Constant(0.0)});
+    }
+  }
+
+  // Way points with rest at each; returns when the path ends [s].
+  double ReadPath(const YamlNode& node) {
+    YamlMap map(&yaml(), &node, "motion.path",
+                {"outputs", "points", "points_mm", "v_max", "a_max", "law", "start_s"});
+    if (!map.valid()) return kNan;
+    const std::vector<Command> axes = ReadPathOutputs(map);
+    const auto v_max = values_->RequiredPositive(map, "v_max");
+    const auto a_max = values_->RequiredPositive(map, "a_max");
+    const double start_s = values_->InUnit(map, "start_s", {kPlain}).value_or(0.0);
+    bool full = false;
+    if (const YamlNode* law = map.Find("law")) {
+      full = yaml().Choice(*law, "motion.path.law", {"ramp_cruise", "full"}).value_or(0) == 1;
+    }
+    const std::vector<VecX> points = ReadPoints(map, axes.size());
+    if (axes.empty() || points.size() < 2 || !v_max || !a_max) return kNan;
+    return BuildPath(node, axes, points, *v_max, *a_max, full, start_s);
+  }
+
+  std::vector<Command> ReadPathOutputs(const YamlMap& map) {
+    std::vector<Command> axes;
+    const YamlNode* node = map.Required("outputs");
+    const auto items = node == nullptr ? std::nullopt : yaml().Items(*node, "motion.path.outputs");
+    if (!items) return {};
+    for (const YamlNode* item : *items) {
+      if (!yaml().Text(*item, "motion.path.outputs")) continue;
+      const auto coordinate = FindCoordinate(AsEntry(*item), "motion.path.outputs");
+      if (!coordinate) continue;
+      if (UnitOf(mechanism_, *coordinate) != "m") {
+        yaml().Error(*item, fmt::format("motion.path.outputs: {} is no length", item->text),
+                     "v_max and a_max are in m/s and m/s²; command angles under motion.commands");
+        continue;
+      }
+      axes.push_back({.name = item->text, .terms = {{*coordinate, 1.0}}, .profile = {}});
+    }
+    return axes.size() == items->size() ? axes : std::vector<Command>{};
+  }
+
+  std::vector<VecX> ReadPoints(const YamlMap& map, size_t axes) {
+    const YamlMap::InUnit found = map.FindInUnit("points", {kPlain, kMm});
+    if (found.node == nullptr) {
+      (void)map.Required("points");  // reports it
+      return {};
+    }
+    const std::string path = map.PathOf(found.key);
+    const auto items = yaml().Items(*found.node, path);
+    if (!items) return {};
+    if (items->size() < 2) yaml().Error(*found.node, path + " has fewer than two points");
+    std::vector<VecX> points;
+    for (size_t i = 0; i < items->size(); ++i) {
+      const auto numbers = values_->Numbers(*(*items)[i], fmt::format("{}[{}]", path, i),
+                                            axes == 0 ? -1 : static_cast<int>(axes));
+      if (!numbers) return {};
+      points.push_back(
+          found.unit.factor *
+          Eigen::Map<const VecX>(numbers->data(), static_cast<Eigen::Index>(numbers->size())));
+    }
+    return points;
+  }
+
+  // One term per segment and axis, each from rest to rest.
+  double BuildPath(const YamlNode& node, std::vector<Command> axes, const std::vector<VecX>& points,
+                   double v_max, double a_max, bool full, double start_s) {
+    double t = start_s;
+    for (size_t k = 0; k < axes.size(); ++k) {
+      axes[k].profile.terms.emplace_back(ConstantTerm{points[0][static_cast<Eigen::Index>(k)]});
+    }
+    for (size_t i = 0; i + 1 < points.size(); ++i) {
+      const VecX step = points[i + 1] - points[i];
+      const double length = step.norm();
+      if (length == 0.0) {
+        yaml().Error(node, fmt::format("motion.path.points: points {} and {} are equal", i, i + 1));
+        return kNan;
+      }
+      // Peaks of the 3-4-5 law: 15/8 of the mean speed, 10/√3 · length/T².
+      const double full_s =
+          std::max(1.875 * length / v_max, std::sqrt(10.0 / std::sqrt(3.0) * length / a_max));
+      const RampCruiseTerm ramp{t, length, v_max, a_max, 0.0};
+      const double duration_s = full ? full_s : Duration(ramp);
+      for (size_t k = 0; k < axes.size(); ++k) {
+        const double delta = step[static_cast<Eigen::Index>(k)];
+        if (full) {
+          axes[k].profile.terms.emplace_back(PolyStepTerm{t, duration_s, delta});
+        } else {
+          RampCruiseTerm term = ramp;
+          term.delta = delta;
+          axes[k].profile.terms.emplace_back(term);
+        }
+      }
+      t += duration_s;
+    }
+    const YamlEntry place{"path", node.line, node.column, nullptr};
+    for (Command& axis : axes) AddCommand(place, std::move(axis));
+    return t;
+  }
+
+  void ReadLoads(const YamlNode& node) {
+    for (const YamlEntry& entry : yaml().Entries(node, "loads")) {
+      const std::string path = "loads." + entry.key;
+      YamlMap map(&yaml(), entry.value.get(), path, {"on", "at", "force", "moment", "in"});
+      Load load{.name = entry.key, .force = {}, .moment = {}};
+      if (const YamlNode* on = map.Required("on")) ReadPlace(*on, path, &load);
+      if (const YamlNode* at = map.Find("at")) {
+        const auto offset = values_->Vector(*at, path + ".at");
+        if (offset) load.p_BoQ_B += *offset;
+      }
+      if (const YamlNode* in = map.Find("in")) {
+        load.in_body_axes = yaml().Choice(*in, path + ".in", {"world", "body"}).value_or(0) == 1;
+      }
+      if (map.valid() && !map.Has("force") && !map.Has("moment")) {
+        yaml().Error(entry, path + " has neither force nor moment");
+      }
+      ReadComponents(map.Find("force"), path + ".force", "N", &load.force);
+      ReadComponents(map.Find("moment"), path + ".moment", "N m", &load.moment);
+      motion_.loads.push_back(std::move(load));
+    }
+  }
+
+  void ReadComponents(const YamlNode* node, const std::string& path, const char* unit,
+                      std::array<Profile, 3>* profiles) {
+    if (node == nullptr) return;
+    const auto items = yaml().Items(*node, path, 3);
+    if (!items) return;
+    for (size_t i = 0; i < 3; ++i) {
+      (*profiles)[i] = ReadProfile(values_, *(*items)[i], fmt::format("{}[{}]", path, i),
+                                   {.unit = unit, .home = {}});
+    }
+  }
+
+  // "body", "body.frame" or an output's name; bodies of instances have dots in their names.
+  void ReadPlace(const YamlNode& node, const std::string& path, Load* load) {
+    const auto text = yaml().Text(node, path + ".on");
+    if (!text) return;
+    std::vector<std::string> known;
+    for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
+      const Body& body = mechanism_.bodies[b];
+      known.push_back(body.name);
+      if (*text == body.name) load->body = static_cast<int>(b);
+      for (const NamedFrame& frame : body.frames) {
+        known.push_back(body.name + "." + frame.name);
+        if (*text != known.back()) continue;
+        load->body = static_cast<int>(b);
+        load->p_BoQ_B = frame.X_BF.translation();
+      }
+    }
+    if (load->body > 0) return;
+    const std::string near = ClosestWord(*text, known);
+    yaml().Error(
+        node, fmt::format("{}.on = '{}' is no body or frame of {}", path, *text, mechanism_.name),
+        near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+  }
+
+  ValueReader* values_;
+  const Mechanism& mechanism_;
+  std::vector<std::string> names_;
+  Motion motion_;
+};
+
+Pose HomePose(const Mechanism& mechanism, int body) {
+  return mechanism.X_WB_home[static_cast<size_t>(body)];
+}
+
+}  // namespace
+
+double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
+  const auto index = static_cast<size_t>(coordinate.index);
+  const auto home_of = [&](int joint, int c) {
+    return mechanism.joints[static_cast<size_t>(joint)].home[static_cast<size_t>(c)];
+  };
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kPrescribed:
+      return home_of(mechanism.prescribed[index].joint, 0);
+    case Coordinate::Kind::kDrive: {
+      const Drive& drive = mechanism.drives[index];
+      if (const auto* joint = std::get_if<JointDrive>(&drive.kind)) {
+        return home_of(joint->joint, joint->coordinate);
+      }
+      const auto& leg = std::get<DistanceDrive>(drive.kind);
+      return (HomePose(mechanism, leg.body_to) * leg.p_to -
+              HomePose(mechanism, leg.body_from) * leg.p_from)
+          .norm();
+    }
+    case Coordinate::Kind::kOutput: {
+      const Output& output = mechanism.outputs[index];
+      const Pose X_RO = (HomePose(mechanism, output.reference_body) * output.X_RbR).inverse() *
+                        HomePose(mechanism, output.body) * output.X_BO;
+      return coordinate.component < 3 ? X_RO.translation()[coordinate.component]
+                                      : RpyOf(X_RO.linear())[coordinate.component - 3];
+    }
+  }
+  return kNan;
+}
+
+Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
+                  const YamlNode* loads) {
+  return Reader(values, mechanism).Read(motion, loads);
+}
+
+}  // namespace mbv

@@ -1,0 +1,84 @@
+#include "scenario/set_values.h"
+
+namespace mbv {
+namespace {
+
+std::string OptionText(const SetValue& value) {
+  return "--set " + value.first + "=" + value.second;
+}
+
+// A copy whose every node carries `line`.
+YamlNodePtr Relocate(const YamlNode& node, int line) {
+  auto copy = std::make_shared<YamlNode>(node);
+  copy->line = line;
+  copy->column = 0;
+  for (YamlNodePtr& item : copy->items) item = Relocate(*item, line);
+  for (YamlEntry& entry : copy->entries) {
+    entry.line = line;
+    entry.column = 0;
+    entry.value = Relocate(*entry.value, line);
+  }
+  return copy;
+}
+
+// Length of the first key of `path` in `map`: the longest key that is there, else up to the first
+// dot; names of commands contain dots themselves ("platform.z").
+size_t FirstKey(const YamlNode& map, const std::string& path, const std::string& parent) {
+  size_t best = 0;
+  for (const YamlEntry& entry : map.entries) {
+    const size_t n = entry.key.size();
+    if (n > best && path.starts_with(entry.key) && (path.size() == n || path[n] == '.')) best = n;
+  }
+  if (best > 0) return best;
+  return parent == "commands" ? path.size() : std::min(path.find('.'), path.size());
+}
+
+YamlNodePtr SetAt(const YamlNode* node, const std::string& parent, const std::string& path,
+                  const YamlNodePtr& value) {
+  if (path.empty()) return value;
+  auto map = std::make_shared<YamlNode>();
+  map->line = value->line;
+  if (node != nullptr && node->is_map()) *map = *node;
+  map->kind = YamlNode::Kind::kMap;
+  const size_t length = FirstKey(*map, path, parent);
+  const std::string key = path.substr(0, length);
+  const std::string rest = length < path.size() ? path.substr(length + 1) : "";
+  for (YamlEntry& entry : map->entries) {
+    if (entry.key != key) continue;
+    entry.value = SetAt(entry.value.get(), key, rest, value);
+    return map;
+  }
+  map->entries.push_back({key, value->line, 0, SetAt(nullptr, key, rest, value)});
+  return map;
+}
+
+}  // namespace
+
+YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, YamlReader* reader) {
+  for (size_t k = 0; k < values.size(); ++k) {
+    const int line = -static_cast<int>(k) - 1;
+    YamlReader value_reader(OptionText(values[k]));
+    const YamlNodePtr value = value_reader.Parse(values[k].second);
+    if (value == nullptr || values[k].first.empty()) {
+      reader->AddAt(Severity::kError, line, 0, "the value is no YAML",
+                    "write --set key=value, e.g. --set simulation.step_s=0.002");
+      continue;
+    }
+    root = SetAt(root.get(), "", values[k].first, Relocate(*value, line));
+  }
+  return root;
+}
+
+Diagnostics PlaceSetFindings(const Diagnostics& diagnostics, const std::vector<SetValue>& values) {
+  Diagnostics placed;
+  for (Finding finding : diagnostics.findings()) {
+    if (finding.line < 0) {
+      finding.file = OptionText(values[static_cast<size_t>(-finding.line - 1)]);
+      finding.line = 0;
+    }
+    placed.Add(std::move(finding));
+  }
+  return placed;
+}
+
+}  // namespace mbv

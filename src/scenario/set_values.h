@@ -1,0 +1,18 @@
+// `--set key=value`: replacing values of a YAML tree from the command line.
+#pragma once
+
+#include "mechanism/yaml_reader.h"
+#include "scenario/load_scenario.h"
+
+namespace mbv {
+
+/// The tree with the values put in; maps on the way are made when missing. Values that are no YAML
+/// are findings. Nodes that came from the k-th value carry the line −(k + 1).
+[[nodiscard]] YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values,
+                                    YamlReader* reader);
+
+/// Moves findings about such nodes from the file to "--set key=value".
+[[nodiscard]] Diagnostics PlaceSetFindings(const Diagnostics& diagnostics,
+                                           const std::vector<SetValue>& values);
+
+}  // namespace mbv

@@ -1,0 +1,232 @@
+#include "scenario/settings_reader.h"
+
+#include <fmt/format.h>
+
+namespace mbv {
+namespace {
+
+// `on`, `off`, `none` (and what YAML 1.1 users write for them); empty for anything else.
+std::optional<bool> AsSwitch(const YamlNode& node) {
+  if (!node.is_scalar()) return {};
+  for (const char* word : {"on", "true", "yes"}) {
+    if (node.text == word) return true;
+  }
+  for (const char* word : {"off", "none", "false", "no"}) {
+    if (node.text == word) return false;
+  }
+  return {};
+}
+
+// A limit: positive number, or nothing/off; reported otherwise.
+struct LimitValue {
+  bool valid = false;
+  std::optional<double> limit;
+};
+LimitValue ReadLimit(ValueReader* values, const YamlNode& node, const std::string& path) {
+  if (node.is_null() || AsSwitch(node) == false) return {true, {}};
+  const auto number = values->Positive(node, path);
+  return {number.has_value(), number};
+}
+
+constexpr std::string_view kReferencePrefix = "reference_";
+
+std::vector<std::string> CheckKeys() {
+  std::vector<std::string> keys = {"start_window_s"};
+  for (const MetricRow& row : MetricRows()) {
+    keys.emplace_back(row.key);
+    keys.push_back(std::string(kReferencePrefix) + row.key);
+  }
+  return keys;
+}
+
+void ReadCheck(ValueReader* values, const YamlEntry& entry, CheckLimits* limits) {
+  const std::string path = "checks." + entry.key;
+  const bool reference = entry.key.starts_with(kReferencePrefix);
+  const MetricRow* row =
+      FindMetric(reference ? entry.key.substr(kReferencePrefix.size()) : entry.key);
+  if (row == nullptr) return;  // reported as unknown key
+  MetricLimits& target = (*limits)[row->metric];
+  if (entry.value->is_map() && !reference) {
+    YamlMap map(&values->yaml(), entry.value.get(), path, {"forward", "inverse"});
+    for (const YamlEntry& mode : entry.value->entries) {
+      const LimitValue value = ReadLimit(values, *mode.value, JoinPath(path, mode.key));
+      if (!value.valid) continue;
+      if (mode.key == "forward") target.forward = value.limit;
+      if (mode.key == "inverse") target.inverse = value.limit;
+    }
+    return;
+  }
+  const LimitValue value = ReadLimit(values, *entry.value, path);
+  if (!value.valid) return;
+  if (reference) {
+    target.reference = value.limit;
+  } else {
+    target.forward = target.inverse = value.limit;
+  }
+}
+
+}  // namespace
+
+AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node) {
+  AnalyticSettings settings;
+  if (node == nullptr || node->is_null()) return settings;
+  if (const auto on = AsSwitch(*node)) {
+    settings.on = *on;
+    return settings;
+  }
+  YamlReader& yaml = values->yaml();
+  YamlMap map(&yaml, node, "analytic", {"model", "as_printed", "parameters"});
+  if (const YamlNode* model = map.Find("model")) {
+    settings.model = yaml.Text(*model, "analytic.model").value_or("");
+  }
+  if (const YamlNode* printed = map.Find("as_printed")) {
+    const auto items = yaml.Items(*printed, "analytic.as_printed");
+    for (const YamlNode* item : items ? *items : std::vector<const YamlNode*>{}) {
+      const auto text = yaml.Text(*item, "analytic.as_printed");
+      if (text) settings.as_printed.push_back(*text);
+    }
+  }
+  settings.parameters = ReadOverrides(values, map.Find("parameters"), "analytic.parameters");
+  return settings;
+}
+
+ReferenceSettings ReadReference(ValueReader* values, const YamlNode* node) {
+  ReferenceSettings settings;
+  if (node == nullptr || node->is_null()) return settings;
+  if (const auto on = AsSwitch(*node)) {
+    settings.on = *on;
+    return settings;
+  }
+  YamlMap map(&values->yaml(), node, "reference", {"parameters"});
+  settings.parameters = ReadOverrides(values, map.Find("parameters"), "reference.parameters");
+  return settings;
+}
+
+namespace {
+
+Extrapolation ReadExtrapolation(ValueReader* values, const YamlNode& node) {
+  YamlReader& yaml = values->yaml();
+  Extrapolation extrapolation;
+  YamlMap map(&yaml, &node, "simulation.extrapolate", {"parameter", "from"});
+  if (const YamlNode* parameter = map.Required("parameter")) {
+    extrapolation.parameter =
+        yaml.Text(*parameter, "simulation.extrapolate.parameter").value_or("");
+  }
+  if (const YamlNode* from = map.Find("from")) {
+    const auto numbers = values->Numbers(*from, "simulation.extrapolate.from", 2);
+    if (numbers) extrapolation.from = {(*numbers)[0], (*numbers)[1]};
+    if (numbers && (*numbers)[0] == (*numbers)[1]) {
+      yaml.Error(*from, "simulation.extrapolate.from: the two values are equal");
+    }
+  }
+  return extrapolation;
+}
+
+}  // namespace
+
+SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node) {
+  SimulationSettings settings;
+  if (node == nullptr || node->is_null()) return settings;
+  if (const auto on = AsSwitch(*node)) {
+    settings.on = *on;
+    return settings;
+  }
+  YamlReader& yaml = values->yaml();
+  YamlMap map(
+      &yaml, node, "simulation",
+      {"mode", "step_s", "engine", "stock_too", "parameters", "extrapolate", "ignore_ranges"});
+  if (const YamlNode* mode = map.Find("mode")) {
+    settings.forward = yaml.Choice(*mode, "simulation.mode", {"forward", "inverse"}) != 1;
+  }
+  if (const YamlNode* engine = map.Find("engine")) {
+    settings.stock_engine = yaml.Choice(*engine, "simulation.engine", {"corrected", "stock"}) == 1;
+  }
+  if (const YamlNode* step = map.Find("step_s")) {
+    settings.step_s = values->Positive(*step, "simulation.step_s").value_or(settings.step_s);
+  }
+  if (const YamlNode* flag = map.Find("stock_too")) {
+    settings.stock_too = yaml.Flag(*flag, "simulation.stock_too").value_or(settings.stock_too);
+  }
+  if (const YamlNode* flag = map.Find("ignore_ranges")) {
+    settings.ignore_ranges = yaml.Flag(*flag, "simulation.ignore_ranges").value_or(false);
+  }
+  settings.parameters = ReadOverrides(values, map.Find("parameters"), "simulation.parameters");
+  if (const YamlNode* extrapolate = map.Find("extrapolate")) {
+    settings.extrapolate = ReadExtrapolation(values, *extrapolate);
+  }
+  return settings;
+}
+
+CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, double* start_window_s) {
+  CheckLimits limits;
+  YamlMap map(&values->yaml(), node, "checks", CheckKeys());
+  if (!map.valid() || node == nullptr) return limits;
+  for (const YamlEntry& entry : node->entries) {
+    if (entry.key == "start_window_s") {
+      *start_window_s = values->Positive(*entry.value, "checks.start_window_s").value_or(0.0);
+    } else {
+      ReadCheck(values, entry, &limits);
+    }
+  }
+  return limits;
+}
+
+SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node, double duration_s) {
+  SnapshotSettings settings;
+  YamlReader& yaml = values->yaml();
+  YamlMap map(&yaml, node, "snapshots", {"times_s", "size_px", "camera"});
+  settings.times_s = {0.0, 0.5 * duration_s};
+  if (const YamlNode* times = map.Find("times_s")) {
+    settings.times_s = values->Numbers(*times, "snapshots.times_s").value_or(settings.times_s);
+    for (const double t : settings.times_s) {
+      if (t >= 0.0 && t <= duration_s) continue;
+      yaml.Error(*times,
+                 fmt::format("snapshots.times_s = {} violates 0 <= t <= {}", t, duration_s));
+    }
+  }
+  if (const YamlNode* size = map.Find("size_px")) {
+    const auto numbers = values->Numbers(*size, "snapshots.size_px", 2);
+    if (numbers) settings.size_px = {int((*numbers)[0]), int((*numbers)[1])};
+    if (numbers && (settings.size_px[0] < 16 || settings.size_px[1] < 16 ||
+                    settings.size_px[0] > 8192 || settings.size_px[1] > 8192)) {
+      yaml.Error(*size, fmt::format("snapshots.size_px = {} x {} violates 16 … 8192",
+                                    settings.size_px[0], settings.size_px[1]));
+    }
+  }
+  YamlMap camera(&yaml, map.Find("camera"), "snapshots.camera",
+                 {"azimuth_deg", "elevation_deg", "distance", "lookat"});
+  if (camera.node() == nullptr) return settings;
+  settings.camera.azimuth_rad = values->InUnit(camera, "azimuth", {kDeg});
+  settings.camera.elevation_rad = values->InUnit(camera, "elevation", {kDeg});
+  settings.camera.distance_m = values->InUnit(camera, "distance", {kPlain});
+  if (const YamlNode* lookat = camera.Find("lookat")) {
+    settings.camera.lookat_W = values->Vector(*lookat, "snapshots.camera.lookat");
+  }
+  return settings;
+}
+
+Expectation ReadExpectation(ValueReader* values, const YamlNode* node) {
+  Expectation expect;
+  YamlReader& yaml = values->yaml();
+  YamlMap map(&yaml, node, "expect", {"verdict", "exit_code", "mentions"});
+  const std::vector<std::string> words = {"agree", "disagree", "not_run"};
+  if (const YamlNode* verdict = map.Find("verdict")) {
+    const auto choice = yaml.Choice(*verdict, "expect.verdict", words);
+    if (choice) expect.verdict = words[static_cast<size_t>(*choice)];
+    expect.exit_code = choice == 1 ? 1 : choice == 2 ? 3 : 0;
+  }
+  if (const YamlNode* code = map.Find("exit_code")) {
+    expect.exit_code = yaml.Integer(*code, "expect.exit_code").value_or(0);
+    if (!map.Has("verdict")) {
+      expect.verdict = expect.exit_code == 0   ? "agree"
+                       : expect.exit_code == 1 ? "disagree"
+                                               : "not_run";
+    }
+  }
+  if (const YamlNode* mentions = map.Find("mentions")) {
+    expect.mentions = yaml.Text(*mentions, "expect.mentions").value_or("");
+  }
+  return expect;
+}
+
+}  // namespace mbv

@@ -1,0 +1,20 @@
+// The sections of a scenario file that do not concern motion.
+#pragma once
+
+#include "scenario/scenario.h"
+#include "scenario/value_reader.h"
+
+namespace mbv {
+
+[[nodiscard]] AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node);
+[[nodiscard]] ReferenceSettings ReadReference(ValueReader* values, const YamlNode* node);
+[[nodiscard]] SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node);
+/// Limits, and `start_window_s` if it is given.
+[[nodiscard]] CheckLimits ReadChecks(ValueReader* values, const YamlNode* node,
+                                     double* start_window_s);
+/// Without the section: pictures at the start and half way.
+[[nodiscard]] SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node,
+                                             double duration_s);
+[[nodiscard]] Expectation ReadExpectation(ValueReader* values, const YamlNode* node);
+
+}  // namespace mbv
