@@ -6,6 +6,7 @@
 #include "core/demand.h"
 #include "core/spatial.h"
 #include "mechanism/frame_pair.h"
+#include "mechanism/tree_motion.h"
 
 namespace mbv {
 namespace {
@@ -239,21 +240,32 @@ double RotationGap(const Joint& joint, const Pose& X_FM) {
   return LogRotation(X_nearest.linear().transpose() * X_FM.linear()).norm();
 }
 
-std::vector<Pose> TreePoses(const Mechanism& mechanism,
-                            const std::vector<std::array<double, 6>>& q) {
-  MBV_DEMAND(mechanism.tree_joints.size() == mechanism.tree_reversed.size(), mechanism.name);
-  std::vector<Pose> X_WB(mechanism.bodies.size(), Pose::Identity());
-  for (size_t i = 0; i < mechanism.tree_joints.size(); ++i) {
-    const int j = mechanism.tree_joints[i];
-    const Joint& joint = mechanism.joints[j];
-    const Pose X_FM = JointPose(joint, q[j]);
-    if (mechanism.tree_reversed[i]) {
-      X_WB[joint.parent] = X_WB[joint.child] * joint.X_CM * X_FM.inverse() * joint.X_PF.inverse();
-    } else {
-      X_WB[joint.child] = X_WB[joint.parent] * joint.X_PF * X_FM * joint.X_CM.inverse();
+double CharacteristicLength(const Mechanism& mechanism) {
+  double sum = 0.0;
+  int count = 0;
+  const auto add = [&](const Vec3& p) {
+    if (p.norm() < 1e-9) return;
+    sum += p.squaredNorm();
+    ++count;
+  };
+  for (const Joint& joint : mechanism.joints) {
+    add(joint.X_PF.translation());
+    add(joint.X_CM.translation());
+  }
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+      add(leg->p_from);
+      add(leg->p_to);
     }
   }
-  return X_WB;
+  return count == 0 ? 1.0 : std::sqrt(sum / count);
+}
+
+std::vector<Pose> TreePoses(const Mechanism& mechanism,
+                            const std::vector<std::array<double, 6>>& q) {
+  std::vector<Pose> X_FM(mechanism.joints.size(), Pose::Identity());
+  for (const int j : mechanism.tree_joints) X_FM[j] = JointPose(mechanism.joints[j], q[j]);
+  return internal::ChainPoses(mechanism, X_FM);
 }
 
 }  // namespace mbv

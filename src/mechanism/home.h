@@ -1,6 +1,7 @@
 // The home pose: where all loops close, solved from the joint guesses.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -12,30 +13,33 @@ namespace mbv {
 struct LoopGap {
   int joint = -1;              ///< index of the closure joint
   double position_m = kNan;    ///< largest translation row
-  double rotation_rad = kNan;  ///< largest rotation row (direction cosine ≈ rad)
+  double rotation_rad = kNan;  ///< rotation that is not a motion of the joint
 };
 
 struct HomeResult {
   bool closed = false;
+  /// Largest gap of all closures [m or rad], at the solution and at the guesses.
+  double gap = kNan, gap_at_guess = kNan;
+  bool drives_moved = false;   ///< driven joints had to leave their guesses to close the loops
+  bool guesses_moved = false;  ///< closed only from disturbed guesses: may be another assembly
   int iterations = 0;
-  double gap = kNan;           ///< largest row of all closures [m or ≈ rad]
-  double gap_at_guess = kNan;  ///< the same at the joint guesses
-  std::vector<LoopGap> gaps;   ///< per closure joint, worst first
+  std::vector<LoopGap> gaps;  ///< per closure joint, worst first
 
-  /// One line for people: "loop at limb1.S is open by 0.12 m, 0.3 rad; …" (at most three loops).
+  /// One line for people: "limb1.S is open by 0.12 m and 0.3 rad; …" (at most three loops).
   [[nodiscard]] std::string Text(const Mechanism& mechanism) const;
 };
 
-/// Loop closure tolerance of the home pose [m or rad].
+/// Loops count as closed below this gap [m per m of size, rad].
 inline constexpr double kHomeTolerance = 1e-12;
 
-/// Solves all loop closures by damped minimum-norm Newton steps in the coordinates of the spanning
-/// tree (BuildSpanningTree first), from Joint::guess; among the poses that close, one near the
-/// guesses is found. Fills X_WB_home and Joint::home of every joint, closures included (angles
-/// within π of their guess), with the best pose found even if the loops do not close.
+/// Solves all loop closures in the coordinates of the spanning tree (BuildSpanningTree first), from
+/// Joint::guess: Levenberg–Marquardt, first with driven and prescribed joints held at their
+/// guesses, then with them free, then from guesses disturbed by a fixed random sequence. Fills
+/// X_WB_home and Joint::home of every joint, closures included (angles within π of their guess);
+/// with the best pose found if the loops do not close.
 HomeResult SolveHome(Mechanism* mechanism);
 
-/// Joint coordinates of every joint at given body poses; angles within π of `near[joint]`.
+/// Coordinates of every joint at given body poses; angles within π of `near[joint]`.
 [[nodiscard]] std::vector<std::array<double, 6>> JointCoordinatesAt(
     const Mechanism& mechanism, const std::vector<Pose>& X_WB,
     const std::vector<std::array<double, 6>>& near);
