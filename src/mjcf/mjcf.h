@@ -8,13 +8,29 @@
 namespace mbv {
 
 struct MjcfOptions {
-  double step_s = 1e-3;          ///< <option timestep>
-  bool pictures = true;          ///< geoms, lights and scene assets
+  double step_s = 1e-3;  ///< <option timestep>
+  bool pictures = true;  ///< geoms, lights and scene assets
 };
 
-/// The MJCF of a mechanism in its home pose: bodies along the spanning tree, `connect`/`weld`
-/// equalities for the closures, `joint`/`tendon` equalities that guide drives and prescribed
-/// joints, motors and sensors for stock tools. Numbers are written with 17 significant digits.
+/// Strongest impedance that MuJoCo accepts, and the guiding constraints' time constant in steps.
+inline constexpr double kMjcfImpedance = 0.9999;
+inline constexpr double kMjcfTimeConstantSteps = 2.0;
+
+/// The MJCF of a mechanism in its home pose: bodies along the spanning tree (mjcf/plan.h),
+/// `connect`/`weld` equalities "close:JOINT" for the closures, `joint`/`tendon` equalities
+/// "drive:DRIVE" and "base:PRESCRIBED" that guide drives and prescribed joints (at home until the
+/// first polynomial coefficient is changed), motors and sensors for stock tools, sites "JOINT.F"
+/// (on the parent) and "JOINT.M" (on the child) at closures and sites named like the outputs.
+/// Every number reads back as the same double. Loads in MuJoCo 2.2.2 and later.
 [[nodiscard]] std::string WriteMjcf(const Mechanism& mechanism, const MjcfOptions& options = {});
+
+/// Principal moments (descending) and axes of an inertia matrix: I = R diag(moments) Rᵀ. Diagonal
+/// matrices keep their axes. Moments are made admissible where rounding or a slender body breaks
+/// MuJoCo's rules (positive; none larger than the sum of the others).
+struct PrincipalInertia {
+  Vec3 moments = Vec3::Zero();
+  Mat3 R = Mat3::Identity();
+};
+[[nodiscard]] PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass);
 
 }  // namespace mbv

@@ -1,0 +1,384 @@
+#include "mjcf/mjcf.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "mjcf/plan.h"
+#include "mjcf/scene.h"
+#include "mjcf/writer.h"
+
+namespace mbv {
+namespace {
+
+using mjcf::Plan;
+using mjcf::PlannedBody;
+using mjcf::PlannedClosure;
+using mjcf::PlannedJoint;
+using mjcf::XmlWriter;
+
+class MjcfWriter {
+ public:
+  MjcfWriter(const Mechanism& mechanism, const MjcfOptions& options)
+      : mechanism_(mechanism), options_(options), plan_(mjcf::MakePlan(mechanism)) {}
+
+  std::string Write() {
+    xml_.Open("mujoco");
+    xml_.Set("model", mechanism_.name);
+    WriteHead();
+    WriteTree();
+    WriteTendons();
+    WriteEqualities();
+    WriteMotors();
+    WriteSensors();
+    xml_.Close();
+    return xml_.Text();
+  }
+
+ private:
+  void Option(const char* element, const char* name, const char* value) {
+    xml_.Open(element);
+    xml_.Set(name, value);
+    xml_.Close();
+  }
+
+  void WriteHead() {
+    xml_.Comment(" Written by mbverify. SI units, radians. ");
+    xml_.Open("compiler");
+    xml_.Set("angle", "radian");
+    xml_.Set("autolimits", "false");
+    xml_.Set("inertiafromgeom", "false");
+    xml_.Close();
+    xml_.Open("option");
+    xml_.Set("timestep", options_.step_s);
+    xml_.Set("gravity", mechanism_.gravity_W);
+    xml_.Set("integrator", "Euler");
+    xml_.Set("solver", "Newton");
+    xml_.Set("tolerance", "1e-14");
+    xml_.Set("jacobian", "dense");
+    xml_.Open("flag");
+    xml_.Set("contact", "disable");
+    xml_.Set("energy", "enable");
+    xml_.Close();
+    xml_.Close();
+    WriteDefaults();
+    if (!options_.pictures) return;
+    xml_.Open("visual");
+    xml_.Open("global");
+    xml_.Set("offwidth", "2560");
+    xml_.Set("offheight", "1920");
+    xml_.Close();
+    xml_.Close();
+    mjcf::WriteMaterials(mechanism_, &xml_);
+  }
+
+  void WriteDefaults() {
+    xml_.Open("default");
+    xml_.Open("equality");
+    xml_.Set("solref", std::array<double, 2>{kMjcfTimeConstantSteps * options_.step_s, 1.0});
+    xml_.Set("solimp", std::array<double, 5>{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0});
+    xml_.Close();
+    xml_.Open("joint");
+    xml_.Set("limited", "false");
+    xml_.Close();
+    xml_.Open("tendon");
+    xml_.Set("limited", "false");
+    xml_.Close();
+    xml_.Open("motor");
+    xml_.Set("ctrllimited", "false");
+    xml_.Set("forcelimited", "false");
+    xml_.Close();
+    xml_.Open("geom");
+    xml_.Set("contype", "0");
+    xml_.Set("conaffinity", "0");
+    xml_.Close();
+    xml_.Open("site");
+    xml_.Set("group", "3");
+    xml_.Set("size", "0.005");
+    xml_.Close();
+    xml_.Close();
+  }
+
+  void WriteTree() {
+    xml_.Open("worldbody");
+    if (options_.pictures) mjcf::WriteSurroundings(mechanism_, &xml_);
+    WriteBodyContent(0);
+    xml_.Close();
+  }
+
+  void WriteBody(int index) {
+    const PlannedBody& body = plan_.bodies[index];
+    xml_.Open("body");
+    xml_.Set("name", body.name);
+    const Pose X_WB = mechanism_.X_WB_home[body.body];
+    xml_.SetPose(mechanism_.X_WB_home[plan_.bodies[body.parent].body].inverse() * X_WB);
+    WriteInertial(body);
+    for (const PlannedJoint& joint : body.joints) WriteJoint(joint, X_WB);
+    WriteBodyContent(index);
+    xml_.Close();
+  }
+
+  void WriteInertial(const PlannedBody& body) {
+    if (body.mass <= 0.0) return;
+    const PrincipalInertia principal = PrincipalInertiaOf(body.I_Bcm_B, body.mass);
+    if (plan_.tiny_mass[body.body]) {
+      xml_.Comment(" massless in the mechanism; MuJoCo needs some mass ");
+    }
+    xml_.Open("inertial");
+    xml_.Set("pos", mechanism_.bodies[body.body].p_BoBcm_B);
+    xml_.Set("mass", body.mass);
+    const Eigen::Vector4d quat = mjcf::QuatOf(principal.R);
+    if (quat[0] != 1.0) xml_.Set("quat", std::span<const double>(quat.data(), 4));
+    xml_.Set("diaginertia", std::span<const double>(principal.moments.data(), 3));
+    xml_.Close();
+  }
+
+  void WriteJoint(const PlannedJoint& joint, const Pose& X_WB) {
+    using Type = PlannedJoint::Type;
+    if (joint.type == Type::kFree) {
+      xml_.Open("freejoint");
+      xml_.Set("name", joint.name);
+      xml_.Close();
+      return;
+    }
+    xml_.Open("joint");
+    xml_.Set("name", joint.name);
+    const bool slide = joint.type == Type::kSlide, ball = joint.type == Type::kBall;
+    xml_.Set("type", slide ? "slide" : ball ? "ball" : "hinge");
+    if (!slide) xml_.Set("pos", Vec3(X_WB.inverse() * joint.p_WAnchor));
+    if (!ball) xml_.Set("axis", Vec3(X_WB.linear().transpose() * joint.axis_W));
+    if (joint.ref != 0.0) xml_.Set("ref", joint.ref);
+    if (!ball && joint.coordinate >= 0) WriteRange(joint);
+    xml_.Close();
+  }
+
+  // The range is stated but not enforced: a limit force would be mistaken for the drive's.
+  void WriteRange(const PlannedJoint& joint) {
+    const CoordinateRange& range = mechanism_.joints[joint.joint].range[joint.coordinate];
+    if (std::isfinite(range.lower) && std::isfinite(range.upper) && range.lower < range.upper) {
+      xml_.Set("range", std::array<double, 2>{range.lower, range.upper});
+    }
+  }
+
+  // Shapes and sites of a body, then the bodies that hang on it.
+  void WriteBodyContent(int index) {
+    const PlannedBody& body = plan_.bodies[index];
+    if (body.half_of < 0) {
+      if (options_.pictures) mjcf::WriteShapes(mechanism_.bodies[body.body], &xml_);
+      WriteSites(body.body);
+    }
+    WriteClosureSites(index);
+    for (size_t i = 1; i < plan_.bodies.size(); ++i) {
+      if (plan_.bodies[i].parent == index) WriteBody(static_cast<int>(i));
+    }
+  }
+
+  void WriteSite(const std::string& name, const Pose& X) {
+    xml_.Open("site");
+    xml_.Set("name", name);
+    xml_.SetPose(X);
+    xml_.Close();
+  }
+
+  void WritePointSite(const std::string& name, const Vec3& p) {
+    Pose X = Pose::Identity();
+    X.translation() = p;
+    WriteSite(name, X);
+  }
+
+  // Ends of distance drives and springs, outputs.
+  void WriteSites(int body) {
+    for (const Drive& drive : mechanism_.drives) {
+      const auto* leg = std::get_if<DistanceDrive>(&drive.kind);
+      if (leg == nullptr) continue;
+      if (leg->body_from == body) WritePointSite(drive.name + ".from", leg->p_from);
+      if (leg->body_to == body) WritePointSite(drive.name + ".to", leg->p_to);
+    }
+    for (const SpringDamper& spring : mechanism_.springs) {
+      if (spring.body_from == body) WritePointSite(spring.name + ".from", spring.p_from);
+      if (spring.body_to == body) WritePointSite(spring.name + ".to", spring.p_to);
+    }
+    for (const Output& output : mechanism_.outputs) {
+      if (output.body == body) WriteSite(output.name, output.X_BO);
+    }
+  }
+
+  // F and M of closing joints; of a split, on the halves' own sides.
+  void WriteClosureSites(int index) {
+    for (const PlannedClosure& closure : plan_.closures) {
+      const Joint& joint = mechanism_.joints[closure.joint];
+      const bool split = closure.type == PlannedClosure::Type::kSplit;
+      const Pose& X_1 = closure.split_parent ? joint.X_PF : joint.X_CM;
+      const Pose& X_2 = split ? X_1 : joint.X_PF;
+      if (closure.body1 == index) WriteSite(joint.name + ".M", X_1);
+      if (closure.body2 == index) WriteSite(joint.name + ".F", X_2);
+    }
+  }
+
+  void WriteTendon(const std::string& name, double width) {
+    xml_.Open("spatial");
+    xml_.Set("name", name);
+    if (width > 0.0) xml_.Set("width", width);
+  }
+
+  void FinishTendon(const std::string& name) {
+    for (const char* end : {".from", ".to"}) {
+      xml_.Open("site");
+      xml_.Set("site", name + end);
+      xml_.Close();
+    }
+    xml_.Close();
+  }
+
+  void WriteTendons() {
+    bool any = !mechanism_.springs.empty();
+    for (const Drive& drive : mechanism_.drives) {
+      any = any || std::holds_alternative<DistanceDrive>(drive.kind);
+    }
+    if (!any) return;
+    xml_.Open("tendon");
+    for (const Drive& drive : mechanism_.drives) {
+      if (!std::holds_alternative<DistanceDrive>(drive.kind)) continue;
+      WriteTendon(drive.name, drive.radius);
+      FinishTendon(drive.name);
+    }
+    for (const SpringDamper& spring : mechanism_.springs) {
+      WriteTendon(spring.name, 0.0);
+      xml_.Set("stiffness", spring.stiffness);
+      xml_.Set("damping", spring.damping);
+      xml_.Set("springlength", spring.free_length_m);
+      FinishTendon(spring.name);
+    }
+    xml_.Close();
+  }
+
+  void WriteEqualities() {
+    if (plan_.closures.empty() && mechanism_.drives.empty() && mechanism_.prescribed.empty()) {
+      return;
+    }
+    xml_.Open("equality");
+    for (const PlannedClosure& closure : plan_.closures) WriteClosure(closure);
+    for (const Drive& drive : mechanism_.drives) {
+      const auto* driven = std::get_if<JointDrive>(&drive.kind);
+      const std::string name = mjcf::DriveEqualityName(drive);
+      if (driven == nullptr) {
+        WriteGuide("tendon", name, "tendon1", drive.name);
+      } else if (IsGuided(driven->joint)) {
+        WriteGuide("joint", name, "joint1",
+                   mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
+      }
+    }
+    for (const Prescribed& base : mechanism_.prescribed) {
+      WriteGuide("joint", mjcf::BaseEqualityName(base), "joint1",
+                 mjcf::JointName(mechanism_.joints[base.joint], 0));
+    }
+    xml_.Close();
+  }
+
+  // Balls and free joints have no scalar coordinate in MuJoCo.
+  bool IsGuided(int joint) const {
+    const JointKind kind = mechanism_.joints[joint].kind;
+    return kind != JointKind::kSpherical && kind != JointKind::kFree;
+  }
+
+  void WriteClosure(const PlannedClosure& closure) {
+    const bool connect = closure.type == PlannedClosure::Type::kConnect;
+    const Joint& joint = mechanism_.joints[closure.joint];
+    xml_.Open(connect ? "connect" : "weld");
+    xml_.Set("name", closure.name);
+    xml_.Set("body1", plan_.bodies[closure.body1].name);
+    xml_.Set("body2", plan_.bodies[closure.body2].name);
+    if (connect) {
+      xml_.Set("anchor", Vec3(joint.X_CM.translation()));
+    } else {
+      // A weld's anchor lies on its second body; the relative pose is taken from home.
+      const bool split = closure.type == PlannedClosure::Type::kSplit;
+      const bool on_child = split && !closure.split_parent;
+      xml_.Set("anchor", Vec3((on_child ? joint.X_CM : joint.X_PF).translation()));
+    }
+    xml_.Close();
+  }
+
+  void WriteGuide(const char* element, const std::string& name, const char* object_key,
+                  const std::string& object) {
+    xml_.Open(element);
+    xml_.Set("name", name);
+    xml_.Set(object_key, object);
+    xml_.Close();
+  }
+
+  void WriteMotors() {
+    if (mechanism_.drives.empty()) return;
+    xml_.Open("actuator");
+    for (const Drive& drive : mechanism_.drives) {
+      const auto* driven = std::get_if<JointDrive>(&drive.kind);
+      if (driven != nullptr && !IsGuided(driven->joint)) continue;
+      xml_.Open("motor");
+      xml_.Set("name", drive.name);
+      if (driven == nullptr) {
+        xml_.Set("tendon", drive.name);
+      } else {
+        xml_.Set("joint", mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
+      }
+      xml_.Close();
+    }
+    xml_.Close();
+  }
+
+  void WriteSensor(const char* element, const std::string& name, const char* object_key,
+                   const std::string& object) {
+    xml_.Open(element);
+    xml_.Set("name", name);
+    xml_.Set(object_key, object);
+    xml_.Close();
+  }
+
+  void WriteSensors() {
+    if (mechanism_.drives.empty() && plan_.closures.empty()) return;
+    xml_.Open("sensor");
+    for (const Drive& drive : mechanism_.drives) {
+      const auto* driven = std::get_if<JointDrive>(&drive.kind);
+      if (driven == nullptr) {
+        WriteSensor("tendonpos", drive.name + ".position", "tendon", drive.name);
+      } else if (IsGuided(driven->joint)) {
+        WriteSensor("jointpos", drive.name + ".position", "joint",
+                    mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
+      } else {
+        continue;
+      }
+      WriteSensor("actuatorfrc", drive.name + ".force", "actuator", drive.name);
+    }
+    for (const PlannedClosure& closure : plan_.closures) WriteClosureSensors(closure);
+    xml_.Close();
+  }
+
+  // The gap of every closure; its force only for split closures, where it is a tree force (MuJoCo
+  // 2.2.2 has no sensor for the force of a constraint).
+  void WriteClosureSensors(const PlannedClosure& closure) {
+    const std::string& name = mechanism_.joints[closure.joint].name;
+    xml_.Open("framepos");
+    xml_.Set("name", name + ".gap");
+    xml_.Set("objtype", "site");
+    xml_.Set("objname", name + ".M");
+    xml_.Set("reftype", "site");
+    xml_.Set("refname", name + ".F");
+    xml_.Close();
+    if (closure.type != PlannedClosure::Type::kSplit) return;
+    WriteSensor("force", name + ".closure_force", "site", name + ".F");
+    WriteSensor("torque", name + ".closure_torque", "site", name + ".F");
+  }
+
+  const Mechanism& mechanism_;
+  const MjcfOptions options_;
+  const Plan plan_;
+  XmlWriter xml_;
+};
+
+}  // namespace
+
+std::string WriteMjcf(const Mechanism& mechanism, const MjcfOptions& options) {
+  return MjcfWriter(mechanism, options).Write();
+}
+
+}  // namespace mbv

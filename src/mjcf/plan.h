@@ -1,0 +1,83 @@
+// How a Mechanism is laid out as MuJoCo bodies: which bodies and joints exist, under which names.
+//
+// The text (mjcf.cc) and the simulation read the same plan, so that every coordinate, body and
+// closure of the mechanism is found again in the compiled model by name.
+//
+// * Bodies follow the spanning tree at the home pose. A massless body to which nothing but two
+//   tree joints is attached is merged into its outboard body: the joints become several joints of
+//   one MuJoCo body, which is exact.
+// * Joints with several freedoms become several hinges and slides; a ball in the tree stays a
+//   ball. A revolute or universal tree joint that transmits a force only is a ball as well.
+//   `ref` makes the position of every hinge and slide equal to the joint coordinate.
+// * Closures: ball and force-only joints are `connect`, fixed ones `weld`. Any other kind is
+//   represented exactly by splitting the closing body into equal halves: the new half hangs on
+//   the closing joint like a tree body, and the halves are welded together.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv::mjcf {
+
+/// A joint of MuJoCo. `ref` equals the mechanism's coordinate at home.
+struct PlannedJoint {
+  enum class Type { kHinge, kSlide, kBall, kFree };
+  std::string name;  ///< JOINT, or JOINT.k for coordinate k of a joint with several freedoms
+  Type type = Type::kHinge;
+  int joint = -1;       ///< Mechanism::joints
+  int coordinate = -1;  ///< of that joint; -1 for ball, free, and the slides and ball of a free
+                        ///< joint inside the tree
+  Vec3 axis_W = Vec3::UnitZ();    ///< hinge and slide: at home, positive as the coordinate
+  Vec3 p_WAnchor = Vec3::Zero();  ///< at home [m]
+  double ref = 0.0;
+};
+
+struct PlannedBody {
+  std::string name;                  ///< of the mechanism's body; JOINT.half for a half
+  int body = 0;                      ///< Mechanism::bodies
+  int half_of = -1;                  ///< closure joint for which this half was made
+  int parent = 0;                    ///< index into Plan::bodies, smaller than the own
+  std::vector<PlannedJoint> joints;  ///< inner to outer
+  double share = 1.0;                ///< part of the body's mass and inertia
+  double mass = 0.0;                 ///< [kg], share applied, tiny mass of massless bodies included
+  Mat3 I_Bcm_B = Mat3::Zero();       ///< [kg m²], as `mass`
+};
+
+struct PlannedClosure {
+  enum class Type { kConnect, kWeld, kSplit };
+  Type type = Type::kConnect;
+  std::string name;  ///< of the equality constraint: "close:JOINT"
+  int joint = -1;    ///< Mechanism::joints
+  int body1 = 0;     ///< Plan::bodies: the joint's child; for a split, the whole body's rest
+  int body2 = 0;     ///< Plan::bodies: the joint's parent; for a split, the half
+  bool split_parent = false;  ///< the parent body was split, not the child
+};
+
+struct Plan {
+  std::vector<PlannedBody> bodies;  ///< [0] is the world; parents before children
+  std::vector<PlannedClosure> closures;
+  std::vector<int> body_of;     ///< per mechanism body: index into `bodies`, -1 if merged
+  std::vector<bool> tiny_mass;  ///< per mechanism body: massless, given a tiny mass
+};
+
+/// Mass given to a massless body that cannot be merged, as a fraction of the mechanism's mass. Its
+/// radius of gyration is a tenth of the mechanism's extent at home.
+inline constexpr double kTinyMassFraction = 1e-9;
+
+[[nodiscard]] Plan MakePlan(const Mechanism& mechanism);
+
+/// True when a drive or prescribed joint uses a coordinate of this joint.
+[[nodiscard]] bool IsDriven(const Mechanism& mechanism, int joint);
+
+/// Name of the MuJoCo joint of a joint's coordinate.
+[[nodiscard]] std::string JointName(const Joint& joint, int coordinate);
+
+/// Names of the equality constraints.
+[[nodiscard]] std::string ClosureName(const Joint& joint);           // "close:JOINT"
+[[nodiscard]] std::string DriveEqualityName(const Drive& drive);     // "drive:DRIVE"
+[[nodiscard]] std::string BaseEqualityName(const Prescribed& base);  // "base:PRESCRIBED"
+
+}  // namespace mbv::mjcf

@@ -1,0 +1,138 @@
+#include "simulation/engine_model.h"
+
+#include <array>
+
+#include "mechanism/constraints.h"
+
+namespace mbv::simulation {
+namespace {
+
+using mjcf::PlannedClosure;
+
+// MuJoCo takes one of the two anchors of a closure from the reference pose, where a small gap would
+// be frozen in: both are stated here.
+void MakeAnchorsExact(const EngineModel& engine) {
+  for (size_t c = 0; c < engine.plan.closures.size(); ++c) {
+    const PlannedClosure& closure = engine.plan.closures[c];
+    const Joint& joint = engine.mechanism->joints[closure.joint];
+    double* data = engine.m->eq_data + mjNEQDATA * engine.closure_equality[c];
+    Pose X_1 = joint.X_CM, X_2 = joint.X_PF;
+    if (closure.type == PlannedClosure::Type::kSplit) {
+      X_1 = X_2 = closure.split_parent ? joint.X_PF : joint.X_CM;
+    }
+    if (closure.type == PlannedClosure::Type::kConnect) {
+      Eigen::Map<Vec3>{data} = X_1.translation();
+      Eigen::Map<Vec3>{data + 3} = X_2.translation();
+      continue;
+    }
+    // Weld: the anchor on the second body comes first, then that on the first body, then the
+    // rotation of body 2 in body 1.
+    Eigen::Map<Vec3>{data} = X_2.translation();
+    Eigen::Map<Vec3>{data + 3} = X_1.translation();
+    const Eigen::Quaterniond q(Mat3(X_1.linear() * X_2.linear().transpose()));
+    const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
+    std::copy(wxyz.begin(), wxyz.end(), data + 6);
+  }
+}
+
+RunSummary FindDriven(EngineModel* engine) {
+  const Mechanism& mechanism = *engine->mechanism;
+  const mjModel& m = *engine->m;
+  const auto add_joint = [&](const std::string& name, const std::string& equality, int joint,
+                             int coordinate) {
+    DrivenPlace place{.name = name, .equality = IdOf(m, mjOBJ_EQUALITY, equality)};
+    place.object = IdOf(m, mjOBJ_JOINT, mjcf::JointName(mechanism.joints[joint], coordinate));
+    place.dof = m.jnt_dofadr[place.object];
+    place.home = m.qpos0[m.jnt_qposadr[place.object]];
+    engine->driven.push_back(place);
+  };
+  for (const Drive& drive : mechanism.drives) {
+    const std::string equality = mjcf::DriveEqualityName(drive);
+    const auto* driven = std::get_if<JointDrive>(&drive.kind);
+    if (driven == nullptr) {
+      DrivenPlace place{.name = drive.name, .equality = IdOf(m, mjOBJ_EQUALITY, equality)};
+      place.is_tendon = true;
+      place.object = IdOf(m, mjOBJ_TENDON, drive.name);
+      place.home = m.tendon_length0[place.object];
+      engine->driven.push_back(place);
+      continue;
+    }
+    const JointKind kind = mechanism.joints[driven->joint].kind;
+    if (kind == JointKind::kSpherical || kind == JointKind::kFree) {
+      return {.stop = Stop::kUnsupported,
+              .message = "drive '" + drive.name +
+                         "' acts on a coordinate of the ball or free joint '" +
+                         mechanism.joints[driven->joint].name + "', which MuJoCo does not have",
+              .where = drive.name,
+              .unit = {}};
+    }
+    add_joint(drive.name, equality, driven->joint, driven->coordinate);
+  }
+  for (const Prescribed& base : mechanism.prescribed) {
+    add_joint(base.name, mjcf::BaseEqualityName(base), base.joint, 0);
+  }
+  return RunSummary::Done();
+}
+
+}  // namespace
+
+RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
+                           EngineModel* engine) {
+  engine->mechanism = &mechanism;
+  engine->plan = mjcf::MakePlan(mechanism);
+  engine->m = CompileMjcf(mjcf);
+  const mjModel& m = *engine->m;
+  engine->joint_ids.resize(mechanism.joints.size());
+  for (const mjcf::PlannedBody& body : engine->plan.bodies) {
+    engine->body_id.push_back(IdOf(m, mjOBJ_BODY, body.name));
+    for (const mjcf::PlannedJoint& joint : body.joints) {
+      engine->joint_ids[joint.joint].push_back(IdOf(m, mjOBJ_JOINT, joint.name));
+    }
+  }
+  for (const mjcf::PlannedClosure& closure : engine->plan.closures) {
+    engine->closure_equality.push_back(IdOf(m, mjOBJ_EQUALITY, closure.name));
+  }
+  for (const SpringDamper& spring : mechanism.springs) {
+    engine->spring_tendon.push_back(IdOf(m, mjOBJ_TENDON, spring.name));
+  }
+  engine->dof_is_rotation3.assign(m.nv, false);
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_type[j] == mjJNT_BALL) engine->dof_is_rotation3[m.jnt_dofadr[j]] = true;
+    if (m.jnt_type[j] == mjJNT_FREE) engine->dof_is_rotation3[m.jnt_dofadr[j] + 3] = true;
+  }
+  MakeAnchorsExact(*engine);
+  return FindDriven(engine);
+}
+
+Pose PoseOf(const mjData& d, int body_id) {
+  Pose X = Pose::Identity();
+  X.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.xmat + 9 * body_id);
+  X.translation() = Eigen::Map<const Vec3>(d.xpos + 3 * body_id);
+  return X;
+}
+
+void BodyPoses(const EngineModel& engine, const mjData& d, std::vector<Pose>* X_WB) {
+  const Mechanism& mechanism = *engine.mechanism;
+  X_WB->resize(mechanism.bodies.size());
+  (*X_WB)[0] = Pose::Identity();
+  for (size_t k = 0; k < mechanism.tree_joints.size(); ++k) {
+    const Joint& joint = mechanism.joints[mechanism.tree_joints[k]];
+    const bool reversed = mechanism.tree_reversed[k];
+    const int body = reversed ? joint.parent : joint.child;
+    if (const int planned = engine.PlannedOf(body); planned >= 0) {
+      (*X_WB)[body] = PoseOf(d, engine.body_id[planned]);
+      continue;
+    }
+    // A merged body has hinges and slides only; their positions are the joint's coordinates.
+    std::array<double, 6> q{};
+    const std::vector<int>& ids = engine.joint_ids[mechanism.tree_joints[k]];
+    for (size_t i = 0; i < ids.size(); ++i) {
+      const size_t coordinate = reversed ? ids.size() - 1 - i : i;
+      q[coordinate] = d.qpos[engine.m->jnt_qposadr[ids[i]]];
+    }
+    const Pose X_PC = joint.X_PF * JointPose(joint, q) * joint.X_CM.inverse();
+    (*X_WB)[body] = reversed ? (*X_WB)[joint.child] * X_PC.inverse() : (*X_WB)[joint.parent] * X_PC;
+  }
+}
+
+}  // namespace mbv::simulation

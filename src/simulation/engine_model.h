@@ -1,0 +1,52 @@
+// A compiled mechanism: MuJoCo's model with the places of everything the mechanism names.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/run_summary.h"
+#include "mechanism/mechanism.h"
+#include "mjcf/plan.h"
+#include "simulation/engine.h"
+
+namespace mbv::simulation {
+
+/// A driven coordinate (drives in model order, then prescribed joints).
+struct DrivenPlace {
+  std::string name;
+  int equality = -1;  ///< of its guiding constraint
+  bool is_tendon = false;
+  int object = -1;    ///< tendon or joint
+  int dof = -1;       ///< joints only
+  double home = 0.0;  ///< the constraint's residual is position − home − eq_data[0]
+};
+
+struct EngineModel {
+  const Mechanism* mechanism = nullptr;
+  mjcf::Plan plan;
+  ModelHandle m;
+  std::vector<int> body_id;  ///< per planned body
+  std::vector<DrivenPlace> driven;
+  std::vector<int> closure_equality;        ///< per planned closure
+  std::vector<int> spring_tendon;           ///< per spring
+  std::vector<std::vector<int>> joint_ids;  ///< per mechanism joint: MuJoCo joints, inner to outer
+  std::vector<bool> dof_is_rotation3;       ///< first of three dofs of a ball (or of a free joint's
+                                            ///< rotation): quaternion coordinates
+
+  /// The planned body that carries a mechanism body, or -1 if it was merged.
+  [[nodiscard]] int PlannedOf(int body) const { return plan.body_of[body]; }
+};
+
+/// Compiles the MJCF of a mechanism and makes the closures' anchors exact. Throws EngineError when
+/// MuJoCo refuses it; returns kUnsupported for drives that have no scalar coordinate in MuJoCo.
+[[nodiscard]] RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
+                                         EngineModel* engine);
+
+/// Poses of all mechanism bodies in the world from the data's current kinematics; merged bodies
+/// from the joint coordinates of their chain.
+void BodyPoses(const EngineModel& engine, const mjData& d, std::vector<Pose>* X_WB);
+
+/// Pose of one MuJoCo body.
+[[nodiscard]] Pose PoseOf(const mjData& d, int body_id);
+
+}  // namespace mbv::simulation
