@@ -10,21 +10,24 @@
 namespace mbv {
 
 struct Mobility {
-  int body_coordinates = 0;    ///< 6 × moving bodies
-  int constraint_rows = 0;     ///< scalar joint constraints (true joint kinds)
+  int body_coordinates = 0;  ///< 6 × moving bodies
+  int constraint_rows = 0;   ///< scalar joint constraints (true joint kinds)
   int constraint_rank = 0;
-  int freedoms = 0;            ///< body_coordinates − constraint_rank
-  int redundant = 0;           ///< constraint_rows − constraint_rank
-  int kutzbach = 0;            ///< body_coordinates − constraint_rows
+  int freedoms = 0;   ///< body_coordinates − constraint_rank
+  int redundant = 0;  ///< constraint_rows − constraint_rank
+  int kutzbach = 0;   ///< body_coordinates − constraint_rows
   int drives = 0, prescribed = 0;
-  int undriven = 0;            ///< freedoms left with all drives and prescribed joints locked
+  int undriven = 0;  ///< freedoms left with all drives and prescribed joints locked
   bool drives_determine_motion = false;  ///< undriven == 0
   bool drive_forces_unique = false;      ///< no self-stress of the locked mechanism acts on a drive
   std::vector<std::string> drives_not_unique;
   std::vector<std::string> joints_not_unique;  ///< joints with a reaction component that is not
                                                ///< unique (isostatic rule applied)
-  double smallest_kept = 0.0;   ///< smallest singular value counted (column-scaled)
-  double largest_dropped = 0.0; ///< largest singular value counted as zero
+  /// The isostatic rule releases reactions only, not motions: the reaction rows have the rank of
+  /// the true rows. False means a joint that transmits a force only was wrongly declared so.
+  bool isostatic_rule_sound = false;
+  double smallest_kept = 0.0;    ///< smallest singular value counted (column-scaled)
+  double largest_dropped = 0.0;  ///< largest singular value counted as zero
 };
 
 /// Mobility at the given body poses (the home pose by default).
