@@ -1,0 +1,28 @@
+// Materials by name: what a shape's `color` may say.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+namespace mbv::render {
+
+/// A surface for the fixed-function renderer. Colours are display values 0 … 1.
+struct Material {
+  std::array<float, 4> rgba{0.6F, 0.6F, 0.6F, 1.0F};
+  float specular = 0.3F;   ///< strength of the highlight, 0 … 1
+  float shininess = 0.4F;  ///< narrowness of the highlight, 0 … 1
+  float emission = 0.0F;   ///< light of its own, 0 … 1
+};
+
+/// The material of a name ("steel", "accent", …) or of "#rrggbb[aa]"; unknown text gives "grey".
+[[nodiscard]] Material MaterialOf(const std::string& color);
+
+/// Shapes of these materials ("sea", "hull", "deck") are surroundings: drawn, but the automatic
+/// camera does not have to fit them.
+[[nodiscard]] bool IsScenery(const std::string& color);
+
+/// Names that MaterialOf knows, sorted.
+[[nodiscard]] std::vector<std::string> MaterialNames();
+
+}  // namespace mbv::render

@@ -1,0 +1,426 @@
+#include "render/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mbv::render {
+
+Mat3 FrameAlong(const Vec3& axis) {
+  const Vec3 z = axis.normalized();
+  const Vec3 x = z.unitOrthogonal();
+  Mat3 R;
+  R << x, z.cross(x), z;
+  return R;
+}
+
+Item Between(Solid solid, const Vec3& p, const Vec3& q, double radius, const Material& material) {
+  const Vec3 d = q - p;
+  const double length = d.norm();
+  if (length < 1e-9 * radius) return BallAt(p, radius, material);
+  Item item{.solid = solid, .material = material};
+  item.X_WG.linear() = FrameAlong(d);
+  item.X_WG.translation() = solid == Solid::kArrow ? p : Vec3(0.5 * (p + q));
+  item.size = Vec3(radius, radius, solid == Solid::kArrow ? length : 0.5 * length);
+  return item;
+}
+
+Item BallAt(const Vec3& p, double radius, const Material& material) {
+  Item item{.solid = Solid::kBall, .material = material};
+  item.X_WG.translation() = p;
+  item.size = Vec3::Constant(radius);
+  return item;
+}
+
+std::vector<Vec3> Corners(const Item& item) {
+  Vec3 low = -item.size, high = item.size;
+  if (item.solid == Solid::kCapsule) {
+    low.z() -= item.size.x();
+    high.z() += item.size.x();
+  } else if (item.solid == Solid::kArrow) {
+    low.z() = 0.0;
+  }
+  std::vector<Vec3> corners;
+  for (int i = 0; i < 8; ++i) {
+    const Vec3 p_G((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
+                   (i & 4) != 0 ? high.z() : low.z());
+    corners.push_back(item.X_WG * p_G);
+  }
+  return corners;
+}
+
+namespace {
+
+// Points where joints and distance drives touch a body, in the body's frame. Joints that move a
+// base (prescribed) or do not move at all are not touching points.
+std::vector<Vec3> TouchPoints(const Mechanism& mechanism, int body) {
+  std::vector<Vec3> points;
+  const auto add = [&points](const Vec3& p) {
+    for (const Vec3& q : points) {
+      if ((p - q).norm() < 1e-9) return;
+    }
+    points.push_back(p);
+  };
+  for (std::size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    const bool moves_base = std::ranges::any_of(
+        mechanism.prescribed, [j](const Prescribed& p) { return p.joint == static_cast<int>(j); });
+    if (moves_base || joint.kind == JointKind::kFree) continue;
+    if (joint.parent == body) add(joint.X_PF.translation());
+    if (joint.child == body) add(joint.X_CM.translation());
+  }
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+      if (leg->body_from == body) add(leg->p_from);
+      if (leg->body_to == body) add(leg->p_to);
+    }
+  }
+  return points;
+}
+
+void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
+  const Material material = MaterialOf(shape.color);
+  Item item;
+  if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
+    item = Between(Solid::kCapsule, X_WB * capsule->p_from, X_WB * capsule->p_to, capsule->radius,
+                   material);
+  } else if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
+    item = Between(Solid::kCylinder, X_WB * cylinder->p_from, X_WB * cylinder->p_to,
+                   cylinder->radius, material);
+  } else if (const auto* box = std::get_if<Box>(&shape.geometry)) {
+    item = {.solid = Solid::kBox, .X_WG = X_WB * box->X_BG, .size = 0.5 * box->size,
+            .material = material};
+  } else {
+    const Ball& ball = std::get<Ball>(shape.geometry);
+    item = BallAt(X_WB * ball.p_centre, ball.radius, material);
+  }
+  item.framed = !IsScenery(shape.color);
+  items->push_back(item);
+}
+
+// A body without shapes: a rod between two touching points, a star and a rim for more.
+void AddDefaultShape(const Mechanism& mechanism, int body, const Pose& X_WB, const Scale& scale,
+                     std::vector<Item>* items) {
+  std::vector<Vec3> points = TouchPoints(mechanism, body);
+  if (points.empty()) return;
+  const Body& b = mechanism.bodies[body];
+  const bool is_output = std::ranges::any_of(
+      mechanism.outputs, [body](const Output& output) { return output.body == body; });
+  const Material material = MaterialOf(body == 0 ? "base" : is_output ? "accent" : "steel");
+  const double radius = 0.8 * scale.leg_m;
+  if (points.size() == 1 && b.p_BoBcm_B != points[0] && b.mass > 0.0) points.push_back(b.p_BoBcm_B);
+  if (points.size() == 1) {
+    items->push_back(BallAt(X_WB * points[0], 1.2 * radius, material));
+    return;
+  }
+  if (points.size() == 2) {
+    items->push_back(
+        Between(Solid::kCapsule, X_WB * points[0], X_WB * points[1], radius, material));
+    return;
+  }
+  Vec3 centre = Vec3::Zero();
+  for (const Vec3& p : points) centre += p / static_cast<double>(points.size());
+  for (const Vec3& p : points) {
+    items->push_back(Between(Solid::kCapsule, X_WB * centre, X_WB * p, radius, material));
+  }
+}
+
+// Radius of the thickest rod of a body that passes a point, so that a joint there can be seen.
+double RodRadiusAt(const Body& body, const Vec3& p, double reach) {
+  double radius = 0.0;
+  const auto visit = [&](const Vec3& from, const Vec3& to, double r) {
+    const Vec3 d = to - from;
+    const double s = std::clamp((p - from).dot(d) / std::max(d.squaredNorm(), 1e-300), 0.0, 1.0);
+    if ((from + s * d - p).norm() < reach) radius = std::max(radius, r);
+  };
+  for (const Shape& shape : body.shapes) {
+    if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
+      visit(capsule->p_from, capsule->p_to, capsule->radius);
+    } else if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
+      visit(cylinder->p_from, cylinder->p_to, cylinder->radius);
+    }
+  }
+  return radius;
+}
+
+double JointRadius(const Mechanism& mechanism, const Joint& joint, const Scale& scale) {
+  const double rod = std::max(RodRadiusAt(mechanism.bodies[joint.parent],
+                                          joint.X_PF.translation(), scale.joint_m),
+                              RodRadiusAt(mechanism.bodies[joint.child],
+                                          joint.X_CM.translation(), scale.joint_m));
+  return std::min(std::max(scale.joint_m, 1.3 * rod), 4.0 * scale.joint_m);
+}
+
+void AddJoint(const Mechanism& mechanism, const Joint& joint, const PictureFrame& frame,
+              const Scale& scale, std::vector<Item>* items) {
+  const Pose X_WF = frame.X_WB[joint.parent] * joint.X_PF;
+  const Pose X_WM = frame.X_WB[joint.child] * joint.X_CM;
+  const Vec3 p = X_WF.translation();
+  const Vec3 a1 = X_WF.linear() * joint.axis, a2 = X_WM.linear() * joint.axis2;
+  const double r = JointRadius(mechanism, joint, scale);
+  const Material pin = MaterialOf("dark_steel"), ball = MaterialOf("brass");
+  switch (joint.kind) {
+    case JointKind::kRevolute:
+      items->push_back(Between(Solid::kCylinder, p - 1.5 * r * a1, p + 1.5 * r * a1, r, pin));
+      break;
+    case JointKind::kUniversal:
+      items->push_back(
+          Between(Solid::kCylinder, p - 1.6 * r * a1, p + 1.6 * r * a1, 0.6 * r, pin));
+      items->push_back(
+          Between(Solid::kCylinder, p - 1.6 * r * a2, p + 1.6 * r * a2, 0.6 * r, ball));
+      break;
+    case JointKind::kSpherical:
+      items->push_back(BallAt(p, 1.2 * r, ball));
+      break;
+    case JointKind::kPrismatic:
+    case JointKind::kCylindrical: {
+      const Vec3 c = X_WM.translation();
+      items->push_back(Between(Solid::kCylinder, c - 1.2 * r * a1, c + 1.2 * r * a1, r, pin));
+      break;
+    }
+    case JointKind::kPlanar:
+      items->push_back(Between(Solid::kCylinder, p - 0.2 * r * a1, p + 0.2 * r * a1, 2.0 * r, pin));
+      break;
+    case JointKind::kFixed:
+    case JointKind::kFree:
+      break;
+  }
+}
+
+// A leg that telescopes: the barrel keeps its length, the rod slides in it.
+void AddLeg(const Drive& drive, const DistanceDrive& leg, double barrel_m,
+            const PictureFrame& frame, const Scale& scale, std::vector<Item>* items) {
+  const Vec3 p = frame.X_WB[leg.body_from] * leg.p_from;
+  const Vec3 q = frame.X_WB[leg.body_to] * leg.p_to;
+  const double length = (q - p).norm(), r = drive.radius > 0.0 ? drive.radius : scale.leg_m;
+  const Vec3 e = length > 0.0 ? Vec3((q - p) / length) : Vec3::UnitZ();
+  const Vec3 mouth = p + std::min(barrel_m, length) * e;
+  items->push_back(Between(Solid::kCylinder, p, mouth, r, MaterialOf("blue")));
+  items->push_back(
+      Between(Solid::kCylinder, mouth - 0.25 * r * e, mouth + 0.5 * r * e, 1.15 * r,
+              MaterialOf("dark_steel")));
+  items->push_back(Between(Solid::kCylinder, mouth, q, 0.55 * r, MaterialOf("aluminium")));
+  for (const Vec3& end : {p, q}) items->push_back(BallAt(end, 1.25 * r, MaterialOf("brass")));
+}
+
+void AddTriad(const Pose& X_WO, double length, std::vector<Item>* items) {
+  const char* names[] = {"x_axis", "y_axis", "z_axis"};
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 p = X_WO.translation(), q = p + length * X_WO.linear().col(i);
+    items->push_back(Between(Solid::kArrow, p, q, 0.035 * length, MaterialOf(names[i])));
+  }
+}
+
+// A ring around `centre` in the plane normal to `normal`, as a chain of capsules.
+void AddRing(const Vec3& centre, const Vec3& normal, double radius, double thickness,
+             const Material& material, std::vector<Item>* items) {
+  constexpr int kPieces = 32;
+  const Mat3 R = FrameAlong(normal);
+  const auto point = [&](int i) {
+    const double angle = 2.0 * std::numbers::pi * i / kPieces;
+    return Vec3(centre + radius * (R * Vec3(std::cos(angle), std::sin(angle), 0.0)));
+  };
+  for (int i = 0; i < kPieces; ++i) {
+    items->push_back(Between(Solid::kCapsule, point(i), point(i + 1), thickness, material));
+  }
+}
+
+// A torque as an arc around its axis; the sweep follows the torque, 300° for the largest.
+void AddTorqueArc(const Vec3& p, const Vec3& axis, double share, double radius, double thickness,
+                  const Material& material, std::vector<Item>* items) {
+  const double sweep = share * 300.0 / 180.0 * std::numbers::pi;
+  const Mat3 R = FrameAlong(axis);
+  const auto point = [&](double angle) {
+    return Vec3(p + radius * (R * Vec3(std::cos(angle), std::sin(angle), 0.0)));
+  };
+  const double head = std::copysign(std::min(0.5, 0.6 * std::abs(sweep)), sweep);
+  const double shaft = sweep - head;
+  const int pieces = std::max(1, static_cast<int>(std::ceil(std::abs(shaft) / 0.1)));
+  for (int i = 0; i < pieces; ++i) {
+    items->push_back(Between(Solid::kCapsule, point(shaft * i / pieces),
+                             point(shaft * (i + 1) / pieces), thickness, material));
+  }
+  // The head: three discs that taper to the tip.
+  constexpr int kDiscs = 8;
+  for (int i = 0; i < kDiscs; ++i) {
+    const double from = shaft + head * i / kDiscs, to = shaft + head * (i + 1) / kDiscs;
+    items->push_back(Between(Solid::kCylinder, point(from), point(to),
+                             2.4 * thickness * (1.0 - (i + 0.5) / kDiscs), material));
+  }
+}
+
+void AddForce(const Mechanism& mechanism, const Drive& drive, double force,
+              const PictureFrame& frame, const Scale& scale, std::vector<Item>* items) {
+  const Material material = MaterialOf(force >= 0.0 ? "push" : "pull");
+  const double r = 0.055 * scale.arrow_m;
+  const auto arrow = [&](const Vec3& p, const Vec3& direction) {
+    const double length = scale.arrow_m * std::abs(force) / scale.longest_force_N;
+    if (length < 0.02 * scale.arrow_m) return;
+    const Vec3 q = p + std::copysign(length, force) * direction;
+    items->push_back(Between(Solid::kArrow, p, q, r, material));
+  };
+  if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+    // The force on the far body: thrust points on along the leg, tension back along it.
+    const Vec3 p = frame.X_WB[leg->body_from] * leg->p_from;
+    const Vec3 q = frame.X_WB[leg->body_to] * leg->p_to;
+    if (scale.longest_force_N > 0.0 && (q - p).norm() > 0.0) arrow(q, (q - p).normalized());
+    return;
+  }
+  const JointDrive& at = std::get<JointDrive>(drive.kind);
+  const Joint& joint = mechanism.joints[at.joint];
+  const Pose X_WF = frame.X_WB[joint.parent] * joint.X_PF;
+  const Vec3 p_M = (frame.X_WB[joint.child] * joint.X_CM).translation();
+  const Vec3 axis = X_WF.linear() * joint.axis;
+  const bool linear = ForceUnit(mechanism, drive) == "N";
+  if (linear && scale.longest_force_N > 0.0) {
+    arrow(p_M, axis);
+  } else if (!linear && scale.longest_torque_Nm > 0.0) {
+    const double share = force / scale.longest_torque_Nm;
+    if (std::abs(share) < 0.02) return;
+    AddTorqueArc(X_WF.translation(), axis, share, 0.3 * scale.arrow_m, 0.6 * r, material, items);
+  }
+}
+
+}  // namespace
+
+Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frames) {
+  Scale scale;
+  const std::vector<Pose>& X_WB = frames.empty() ? mechanism.X_WB_home : frames[0].X_WB;
+  Eigen::AlignedBox3d box;
+  for (std::size_t b = 0; b < mechanism.bodies.size(); ++b) {
+    for (const Vec3& p : TouchPoints(mechanism, static_cast<int>(b))) box.extend(X_WB[b] * p);
+  }
+  if (!box.isEmpty() && box.diagonal().norm() > 1e-9) scale.extent_m = box.diagonal().norm();
+  scale.joint_m = 0.0085 * scale.extent_m;
+  scale.leg_m = 0.0085 * scale.extent_m;
+  scale.arrow_m = 0.16 * scale.extent_m;
+  scale.barrel_m.assign(mechanism.drives.size(), 0.0);
+  for (std::size_t d = 0; d < mechanism.drives.size(); ++d) {
+    const bool linear = ForceUnit(mechanism, mechanism.drives[d]) == "N";
+    double& longest = linear ? scale.longest_force_N : scale.longest_torque_Nm;
+    double shortest = std::numeric_limits<double>::infinity();
+    for (const PictureFrame& frame : frames) {
+      if (d < frame.drive_forces.size() && std::isfinite(frame.drive_forces[d])) {
+        longest = std::max(longest, std::abs(frame.drive_forces[d]));
+      }
+      if (const auto* leg = std::get_if<DistanceDrive>(&mechanism.drives[d].kind)) {
+        shortest = std::min(shortest, (frame.X_WB[leg->body_from] * leg->p_from -
+                                       frame.X_WB[leg->body_to] * leg->p_to).norm());
+      }
+    }
+    const double lower = mechanism.drives[d].range.lower;
+    if (std::isfinite(lower) && lower > 0.0) shortest = std::min(shortest, lower);
+    if (std::isfinite(shortest)) scale.barrel_m[d] = 0.62 * shortest;
+  }
+  return scale;
+}
+
+std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame& frame,
+                                 const Scale& scale, const PictureOptions& options) {
+  std::vector<Item> items;
+  const bool any_shapes = std::ranges::any_of(
+      mechanism.bodies, [](const Body& body) { return !body.shapes.empty(); });
+  for (std::size_t b = 0; b < mechanism.bodies.size(); ++b) {
+    const Body& body = mechanism.bodies[b];
+    const bool massless_piece = b > 0 && body.mass <= 0.0 && any_shapes;
+    for (const Shape& shape : body.shapes) {
+      if (b == 0 && shape.color == "sea") continue;  // drawn as an endless plane
+      AddShape(shape, frame.X_WB[b], &items);
+    }
+    if (body.shapes.empty() && !massless_piece && !(b == 0 && any_shapes)) {
+      AddDefaultShape(mechanism, static_cast<int>(b), frame.X_WB[b], scale, &items);
+    }
+  }
+  for (std::size_t d = 0; d < mechanism.drives.size(); ++d) {
+    if (const auto* leg = std::get_if<DistanceDrive>(&mechanism.drives[d].kind)) {
+      AddLeg(mechanism.drives[d], *leg, scale.barrel_m[d], frame, scale, &items);
+    }
+  }
+  if (options.joints) {
+    for (std::size_t j = 0; j < mechanism.joints.size(); ++j) {
+      const bool moves_base = std::ranges::any_of(
+          mechanism.prescribed,
+          [j](const Prescribed& p) { return p.joint == static_cast<int>(j); });
+      if (!moves_base) AddJoint(mechanism, mechanism.joints[j], frame, scale, &items);
+    }
+  }
+  if (options.output_frames) {
+    for (const Output& output : mechanism.outputs) {
+      AddTriad(frame.X_WB[output.body] * output.X_BO, 0.10 * scale.extent_m, &items);
+    }
+  }
+  return items;
+}
+
+std::vector<Item> AnnotationItems(const Mechanism& mechanism, const PictureFrame& frame,
+                                  const Scale& scale, const PictureOptions& options,
+                                  const Vec3& forward_W) {
+  std::vector<Item> items;
+  if (options.drive_forces) {
+    for (std::size_t d = 0; d < frame.drive_forces.size(); ++d) {
+      if (std::isfinite(frame.drive_forces[d])) {
+        AddForce(mechanism, mechanism.drives[d], frame.drive_forces[d], frame, scale, &items);
+      }
+    }
+  }
+  if (options.closures) {
+    for (const Joint& joint : mechanism.joints) {
+      if (!joint.closure) continue;
+      const double r = JointRadius(mechanism, joint, scale);
+      const Vec3 p_F = (frame.X_WB[joint.parent] * joint.X_PF).translation();
+      const Vec3 p_M = (frame.X_WB[joint.child] * joint.X_CM).translation();
+      AddRing(p_M, forward_W, 2.1 * r, 0.22 * r, MaterialOf("closure"), &items);
+      // A joint that came apart: a red bar across the gap.
+      const bool may_slide = joint.kind == JointKind::kPrismatic ||
+                             joint.kind == JointKind::kCylindrical ||
+                             joint.kind == JointKind::kPlanar || joint.kind == JointKind::kFree;
+      if (!may_slide && (p_F - p_M).norm() > 0.5 * r) {
+        items.push_back(Between(Solid::kCapsule, p_F, p_M, 0.3 * r, MaterialOf("gap")));
+      }
+    }
+  }
+  return items;
+}
+
+std::vector<Item> PathItems(const Overlay& overlay, const Scale& scale) {
+  std::vector<Item> items;
+  for (const PolylineOverlay& path : overlay.paths) {
+    Material material = MaterialOf(path.color);
+    material.emission = 0.3F;
+    const double radius = path.radius_m > 0.0 ? path.radius_m : 0.0025 * scale.extent_m;
+    // Points closer than a fifth of the radius to the last drawn one are passed over.
+    std::size_t last = 0;
+    for (std::size_t i = 1; i < path.points_W.size(); ++i) {
+      const Vec3 &p = path.points_W[last], &q = path.points_W[i];
+      if ((q - p).norm() < 0.2 * radius && i + 1 < path.points_W.size()) continue;
+      items.push_back(Between(Solid::kCapsule, p, q, radius, material));
+      last = i;
+    }
+  }
+  return items;
+}
+
+Mat3 UprightRotation(const Vec3& gravity_W) {
+  if (gravity_W.norm() == 0.0) return Mat3::Identity();
+  const Vec3 up = -gravity_W.normalized();
+  // x of D: the world's x made level, or its z where x is vertical.
+  const Vec3 reference = std::abs(up.x()) < 0.99 ? Vec3::UnitX() : Vec3::UnitZ();
+  const Vec3 x = (reference - reference.dot(up) * up).normalized();
+  Mat3 R_DW;
+  R_DW << x.transpose(), up.cross(x).transpose(), up.transpose();
+  return R_DW;
+}
+
+std::optional<double> SeaLevel(const Mechanism& mechanism, const Mat3& R_DW) {
+  for (const Shape& shape : mechanism.bodies[0].shapes) {
+    if (shape.color != "sea") continue;
+    std::vector<Item> items;
+    AddShape(shape, Pose::Identity(), &items);
+    double top = -std::numeric_limits<double>::infinity();
+    for (const Vec3& p_W : Corners(items[0])) top = std::max(top, (R_DW * p_W).z());
+    return top;
+  }
+  return std::nullopt;
+}
+
+}  // namespace mbv::render

@@ -1,0 +1,68 @@
+// What is drawn: primitive solids placed in the world, made from a mechanism and its poses.
+// No OpenGL here.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "mechanism/mechanism.h"
+#include "render/palette.h"
+#include "render/render.h"
+
+namespace mbv::render {
+
+enum class Solid {
+  kBall,      ///< size = (radius, –, –)
+  kCapsule,   ///< along z of G, size = (radius, –, half length without caps)
+  kCylinder,  ///< along z of G, size = (radius, –, half length)
+  kBox,       ///< size = half edges
+  kArrow,     ///< from G's origin along z, size = (radius, –, length)
+};
+
+struct Item {
+  Solid solid = Solid::kBall;
+  Pose X_WG = Pose::Identity();  ///< pose of the solid in the world [m]
+  Vec3 size = Vec3::Ones();      ///< [m]
+  Material material;
+  bool framed = true;            ///< the automatic camera fits it
+};
+
+/// The two unit vectors that complete `axis` to a right-handed frame (axis last).
+[[nodiscard]] Mat3 FrameAlong(const Vec3& axis);
+/// A solid with an axis from p to q: capsule, cylinder or arrow [m].
+[[nodiscard]] Item Between(Solid solid, const Vec3& p, const Vec3& q, double radius,
+                           const Material& material);
+[[nodiscard]] Item BallAt(const Vec3& p, double radius, const Material& material);
+/// Corners of the box around an item, in the world [m].
+[[nodiscard]] std::vector<Vec3> Corners(const Item& item);
+
+/// Sizes that follow from the mechanism, so that a 10 m crane and a 0.2 m gripper look alike.
+struct Scale {
+  double extent_m = 1.0;      ///< diagonal of the box around all joint points at home
+  double joint_m = 0.01;      ///< smallest radius of a joint's ball
+  double leg_m = 0.01;        ///< radius of a distance drive without its own
+  double arrow_m = 0.2;       ///< length of the longest force arrow
+  double longest_force_N = 0.0, longest_torque_Nm = 0.0;  ///< over all frames
+  std::vector<double> barrel_m;  ///< per drive: length of the distance drive's barrel
+};
+[[nodiscard]] Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frames);
+
+/// Bodies, legs, joints and triads of one frame.
+[[nodiscard]] std::vector<Item> MechanismItems(const Mechanism& mechanism,
+                                               const PictureFrame& frame, const Scale& scale,
+                                               const PictureOptions& options);
+/// Force arrows and closure rings; rings face the camera that looks along `forward_W`.
+[[nodiscard]] std::vector<Item> AnnotationItems(const Mechanism& mechanism,
+                                                const PictureFrame& frame, const Scale& scale,
+                                                const PictureOptions& options,
+                                                const Vec3& forward_W);
+[[nodiscard]] std::vector<Item> PathItems(const Overlay& overlay, const Scale& scale);
+
+/// Up against gravity and a level x axis: the rotation into the frame D in which is drawn (z up).
+[[nodiscard]] Mat3 UprightRotation(const Vec3& gravity_W);  // R_DW
+
+/// Height (along up) of the water: the top of the world's first shape of material "sea".
+[[nodiscard]] std::optional<double> SeaLevel(const Mechanism& mechanism, const Mat3& R_DW);
+
+}  // namespace mbv::render

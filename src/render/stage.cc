@@ -1,0 +1,340 @@
+#include "render/stage.h"
+
+#include <GL/osmesa.h>
+#include <fmt/format.h>
+#include <mujoco/mujoco.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <numbers>
+
+#include "render/mesh_pass.h"
+#include "render/textures.h"
+
+namespace mbv::render {
+namespace {
+
+constexpr int kTexture_px = 1024;
+constexpr double kKey = 0.62, kSky = 0.42, kAmbient = 0.14;  // light of a white surface, in sum ~1.2
+
+/// MuJoCo's errors end here: its handler must not return.
+struct EngineError {
+  std::string message;
+};
+[[noreturn]] void OnError(const char* message) { throw EngineError{message}; }
+void OnWarning(const char*) {}
+
+// Installs our handlers while MuJoCo is at work and puts the former ones back.
+class HandlerScope {
+ public:
+  HandlerScope() : error_(mju_user_error), warning_(mju_user_warning) {
+    mju_user_error = OnError;
+    mju_user_warning = OnWarning;
+  }
+  ~HandlerScope() {
+    mju_user_error = error_;
+    mju_user_warning = warning_;
+  }
+  HandlerScope(const HandlerScope&) = delete;
+  HandlerScope& operator=(const HandlerScope&) = delete;
+
+ private:
+  void (*error_)(const char*);
+  void (*warning_)(const char*);
+};
+
+RunSummary Failure(const std::string& message) {
+  RunSummary summary;
+  summary.stop = Stop::kEngineFailure;
+  summary.message = "pictures: " + message;
+  return summary;
+}
+
+// The i-th point of a sequence that fills the unit square evenly (generalised golden ratio).
+Eigen::Vector2d EvenPoint(int i) {
+  const double a = 0.5 + 0.7548776662466927 * (i + 1), b = 0.5 + 0.5698402909980532 * (i + 1);
+  return {a - std::floor(a), b - std::floor(b)};
+}
+
+// Sky, ground and lights as MJCF; the ground's texture is painted afterwards.
+std::string StageMjcf(const StageOptions& o) {
+  const double repeat = o.sea ? 0.35 / o.radius_m : 1.0 / (5.0 * o.grid_m);
+  const std::string haze = o.sea ? "0.80 0.86 0.91 1" : "0.93 0.945 0.96 1";
+  const std::string zenith = o.sea ? "0.50 0.66 0.82" : "0.70 0.78 0.87";
+  return fmt::format(
+      "<mujoco><statistic extent='{0:.9g}' center='0 0 0'/>"
+      "<visual><global offwidth='{1}' offheight='{2}' fovy='{3}'/>"
+      "<quality offsamples='4' shadowsize='2048' numslices='48' numstacks='24' numquads='2'/>"
+      "<map znear='0.05' zfar='40' shadowclip='1.0' haze='0.35'/><rgba haze='{4}'/>"
+      "<headlight active='0'/></visual>"
+      "<asset><texture name='sky' type='skybox' builtin='gradient' rgb1='{5}' rgb2='{6}' "
+      "width='256' height='1536'/>"
+      "<texture name='ground' type='2d' builtin='flat' width='{7}' height='{7}'/>"
+      "<material name='ground' texture='ground' texuniform='true' texrepeat='{8:.9g} {8:.9g}' "
+      "reflectance='{9}' specular='{10}' shininess='0.7'/></asset>"
+      "<worldbody><geom type='plane' size='0 0 1' pos='0 0 {11:.9g}' material='ground'/>"
+      "</worldbody></mujoco>",
+      o.radius_m, o.width, o.height, kFieldOfView_deg, haze, zenith,
+      o.sea ? "0.80 0.86 0.91" : "0.93 0.945 0.96", kTexture_px, repeat, o.sea ? 0.22 : 0.06,
+      o.sea ? 0.5 : 0.1, o.ground_m);
+}
+
+mjtGeom TypeOf(Solid solid) {
+  switch (solid) {
+    case Solid::kBall: return mjGEOM_SPHERE;
+    case Solid::kCapsule: return mjGEOM_CAPSULE;
+    case Solid::kCylinder: return mjGEOM_CYLINDER;
+    case Solid::kBox: return mjGEOM_BOX;
+    case Solid::kArrow: return mjGEOM_ARROW;
+  }
+  return mjGEOM_SPHERE;
+}
+
+class OsMesaStage final : public Stage {
+ public:
+  explicit OsMesaStage(const StageOptions& options) : options_(options) {}
+  OsMesaStage(const OsMesaStage&) = delete;
+  OsMesaStage& operator=(const OsMesaStage&) = delete;
+
+  ~OsMesaStage() override {
+    const HandlerScope handlers;
+    if (context_made_) mjr_freeContext(&context_);
+    if (scene_made_) mjv_freeScene(&scene_);
+    if (data_ != nullptr) mj_deleteData(data_);
+    if (model_ != nullptr) mj_deleteModel(model_);
+    if (mesa_ != nullptr) OSMesaDestroyContext(mesa_);
+  }
+
+  RunSummary Make() {
+    mesa_ = OSMesaCreateContextExt(OSMESA_RGBA, 24, 8, 0, nullptr);
+    if (mesa_ == nullptr ||
+        OSMesaMakeCurrent(mesa_, window_.data(), GL_UNSIGNED_BYTE, kWindow_px, kWindow_px) == 0) {
+      return Failure("OSMesa gives no off-screen context");
+    }
+    return Guarded([this] { return MakeInMujoco(); });
+  }
+
+  RunSummary Draw(const std::vector<Item>& items, const std::vector<MeshOverlay>& meshes,
+                  const Mat3& R_DW, const Camera& camera, Picture* picture) override {
+    return Guarded([&] { return DrawInMujoco(items, meshes, R_DW, camera, picture); });
+  }
+
+  RunSummary Font(std::vector<Glyph>* glyphs) override {
+    return Guarded([&] { return FontInMujoco(glyphs); });
+  }
+
+ private:
+  static constexpr int kWindow_px = 64;  // OSMesa wants a window; everything goes into a buffer
+
+  template <typename Work>
+  static RunSummary Guarded(const Work& work) {
+    const HandlerScope handlers;
+    try {
+      return work();
+    } catch (const EngineError& error) {
+      return Failure("MuJoCo: " + error.message);
+    }
+  }
+
+  RunSummary MakeInMujoco() {
+    const std::string xml = StageMjcf(options_);
+    // The virtual file system is too large for the stack.
+    const auto files = std::make_unique<mjVFS>();
+    mj_defaultVFS(files.get());
+    mj_makeEmptyFileVFS(files.get(), "stage.xml", static_cast<int>(xml.size()));
+    std::memcpy(files->filedata[0], xml.data(), xml.size());
+    std::array<char, 500> error{};
+    model_ = mj_loadXML("stage.xml", files.get(), error.data(), error.size());
+    mj_deleteVFS(files.get());
+    if (model_ == nullptr) return Failure(std::string("stage: ") + error.data());
+    PaintGround();
+    data_ = mj_makeData(model_);
+    mj_forward(model_, data_);
+    mjv_defaultScene(&scene_);
+    mjv_makeScene(model_, &scene_, kMostGeoms);
+    scene_made_ = true;
+    mjr_defaultContext(&context_);
+    context_made_ = true;
+    mjr_makeContext(model_, &context_, mjFONTSCALE_300);
+    mjr_setBuffer(mjFB_OFFSCREEN, &context_);
+    if (context_.currentBuffer != mjFB_OFFSCREEN) return Failure("no off-screen buffer");
+    return RunSummary::Done();
+  }
+
+  void PaintGround() {
+    const int texture = mj_name2id(model_, mjOBJ_TEXTURE, "ground");
+    const std::vector<std::uint8_t> rgb =
+        options_.sea ? WaterTexture(kTexture_px) : GridTexture(kTexture_px);
+    std::ranges::copy(rgb, model_->tex_rgb + model_->tex_adr[texture]);
+  }
+
+  // The ground comes from the model, everything else is appended.
+  RunSummary FillScene(const std::vector<Item>& items, const Mat3& R_DW, const Camera& camera) {
+    mjvOption show;
+    mjv_defaultOption(&show);
+    mjvCamera from;
+    mjv_defaultCamera(&from);
+    from.type = mjCAMERA_FREE;
+    from.azimuth = camera.azimuth_deg + 180.0;
+    from.elevation = -camera.elevation_deg;
+    from.distance = camera.distance_m;
+    std::copy_n(camera.lookat_D.data(), 3, from.lookat);
+    // Twice: an endless plane is centred under the camera of the call before.
+    for (int i = 0; i < 2; ++i) {
+      mjv_updateScene(model_, data_, &show, nullptr, &from, mjCAT_ALL, &scene_);
+    }
+    if (scene_.ngeom + static_cast<int>(items.size()) > scene_.maxgeom) {
+      return Failure(fmt::format("{} solids are more than the {} that fit", items.size(),
+                                 scene_.maxgeom));
+    }
+    for (const Item& item : items) AppendGeom(item, R_DW);
+    std::ranges::fill(scene_.flags, 0);
+    scene_.flags[mjRND_SHADOW] = options_.shadows;
+    scene_.flags[mjRND_REFLECTION] = 1;
+    scene_.flags[mjRND_SKYBOX] = 1;
+    scene_.flags[mjRND_HAZE] = 1;
+    scene_.flags[mjRND_CULL_FACE] = 1;
+    return RunSummary::Done();
+  }
+
+  void AppendGeom(const Item& item, const Mat3& R_DW) {
+    mjvGeom& geom = scene_.geoms[scene_.ngeom++];
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = R_DW * item.X_WG.linear();
+    const Vec3 p = R_DW * item.X_WG.translation();
+    mjv_initGeom(&geom, TypeOf(item.solid), item.size.data(), p.data(), R.data(),
+                 item.material.rgba.data());
+    // mjv_initGeom changes the sizes of some types; ours are meant as they are.
+    const Vec3& s = item.size;
+    geom.size[0] = static_cast<float>(s.x());
+    geom.size[1] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.y());
+    geom.size[2] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.z());
+    geom.category = mjCAT_DYNAMIC;  // decoration would cast no shadow
+    geom.specular = item.material.specular;
+    geom.shininess = item.material.shininess;
+    geom.emission = item.material.emission;
+    geom.reflectance = 0.0F;
+  }
+
+  // Key light from behind the viewer's left shoulder, sky light from somewhere above.
+  void SetLights(const Camera& camera, int pass) {
+    const double deg = std::numbers::pi / 180.0;
+    const Eigen::Vector2d u = EvenPoint(pass), w = EvenPoint(pass + 1000);
+    const double spread = options_.passes > 1 ? 1.0 : 0.0;
+    const double azimuth = (camera.azimuth_deg - 48.0 + spread * 7.0 * (u.x() - 0.5)) * deg;
+    const double height = (50.0 + spread * 7.0 * (u.y() - 0.5)) * deg;
+    const Vec3 key(std::cos(height) * std::cos(azimuth), std::cos(height) * std::sin(azimuth),
+                   std::sin(height));
+    // Cosine-weighted over the hemisphere, none below 17° (long shadows of single passes).
+    const double r = options_.passes > 1 ? std::sqrt(0.92 * w.x()) : 0.0;
+    const double angle = 2.0 * std::numbers::pi * w.y();
+    const Vec3 sky(r * std::cos(angle), r * std::sin(angle), std::sqrt(1.0 - r * r));
+    scene_.nlight = 2;
+    SetLight(&scene_.lights[0], key, kKey, 0.35, kAmbient);
+    SetLight(&scene_.lights[1], sky, kSky, 0.0, 0.0);
+  }
+
+  void SetLight(mjvLight* light, const Vec3& to_light_D, double diffuse, double specular,
+                double ambient) const {
+    *light = mjvLight{};
+    const Vec3 p = options_.centre_D + 3.0 * options_.radius_m * to_light_D;
+    for (int i = 0; i < 3; ++i) {
+      light->pos[i] = static_cast<float>(p(i));
+      light->dir[i] = static_cast<float>(-to_light_D(i));
+      light->ambient[i] = static_cast<float>(ambient);
+      light->diffuse[i] = static_cast<float>(diffuse);
+      light->specular[i] = static_cast<float>(specular);
+    }
+    light->attenuation[0] = 1.0F;
+    light->cutoff = 45.0F;
+    light->directional = 1;
+    light->castshadow = 1;
+  }
+
+  RunSummary DrawInMujoco(const std::vector<Item>& items, const std::vector<MeshOverlay>& meshes,
+                          const Mat3& R_DW, const Camera& camera, Picture* picture) {
+    if (RunSummary filled = FillScene(items, R_DW, camera); !filled.ok()) return filled;
+    const mjrRect view{0, 0, options_.width, options_.height};
+    const mjvGLCamera centred = scene_.camera[0];
+    const std::size_t bytes = 3UL * options_.width * options_.height;
+    std::vector<std::uint8_t> pass_rgb(bytes);
+    std::vector<std::uint32_t> sum(bytes, 0);
+    for (int pass = 0; pass < options_.passes; ++pass) {
+      // Shift by a part of a pixel.
+      const double pixel = (centred.frustum_top - centred.frustum_bottom) / options_.height;
+      const Eigen::Vector2d shift = options_.passes > 1
+                                        ? Eigen::Vector2d(pixel * (EvenPoint(pass).array() - 0.5))
+                                        : Eigen::Vector2d::Zero();
+      mjvGLCamera shifted = centred;
+      shifted.frustum_center += static_cast<float>(shift.x());
+      shifted.frustum_bottom += static_cast<float>(shift.y());
+      shifted.frustum_top += static_cast<float>(shift.y());
+      scene_.camera[0] = scene_.camera[1] = shifted;
+      SetLights(camera, pass);
+      mjr_render(view, &scene_, &context_);
+      DrawMeshes(meshes, R_DW, {shifted, options_.width, options_.height});
+      mjr_readPixels(pass_rgb.data(), nullptr, view, &context_);
+      for (std::size_t i = 0; i < bytes; ++i) sum[i] += pass_rgb[i];
+    }
+    // Mean; OpenGL's rows start at the bottom.
+    *picture = {.width = options_.width, .height = options_.height,
+                .rgb = std::vector<std::uint8_t>(bytes)};
+    const std::size_t row = 3UL * options_.width;
+    const auto n = static_cast<std::uint32_t>(options_.passes);
+    for (int y = 0; y < options_.height; ++y) {
+      const std::uint32_t* from = sum.data() + row * (options_.height - 1 - y);
+      std::uint8_t* to = picture->rgb.data() + row * y;
+      for (std::size_t i = 0; i < row; ++i) to[i] = static_cast<std::uint8_t>((from[i] + n / 2) / n);
+    }
+    return RunSummary::Done();
+  }
+
+  // Writes each character alone into the lower left corner and reads it back.
+  RunSummary FontInMujoco(std::vector<Glyph>* glyphs) {
+    glyphs->assign(127, {});
+    const int height = context_.charHeight;
+    for (int c = 32; c < 127; ++c) {
+      Glyph& glyph = (*glyphs)[c];
+      glyph = {.width = context_.charWidth[c], .height = height, .coverage = {}};
+      if (glyph.width > options_.width || height > options_.height) {
+        return Failure("the picture is smaller than a character");
+      }
+      const mjrRect box{0, 0, options_.width, options_.height};
+      mjr_rectangle({0, 0, glyph.width, height}, 0, 0, 0, 1);
+      const std::array<char, 2> text{static_cast<char>(c), '\0'};
+      mjr_text(mjFONT_NORMAL, text.data(), &context_, 0, 0, 1, 1, 1);
+      (void)box;
+      std::vector<std::uint8_t> rgb(3UL * glyph.width * height);
+      mjr_readPixels(rgb.data(), nullptr, {0, 0, glyph.width, height}, &context_);
+      glyph.coverage.resize(1UL * glyph.width * height);
+      for (int y = 0; y < height; ++y) {
+        for (int x = 0; x < glyph.width; ++x) {
+          glyph.coverage[y * glyph.width + x] = rgb[3UL * ((height - 1 - y) * glyph.width + x)];
+        }
+      }
+    }
+    return RunSummary::Done();
+  }
+
+  static constexpr int kMostGeoms = 60000;
+
+  StageOptions options_;
+  std::array<std::uint8_t, 4UL * kWindow_px * kWindow_px> window_{};
+  OSMesaContext mesa_ = nullptr;
+  mjModel* model_ = nullptr;
+  mjData* data_ = nullptr;
+  mjvScene scene_{};
+  mjrContext context_{};
+  bool scene_made_ = false, context_made_ = false;
+};
+
+}  // namespace
+
+RunSummary Stage::Open(const StageOptions& options, std::unique_ptr<Stage>* stage) {
+  auto made = std::make_unique<OsMesaStage>(options);
+  RunSummary summary = made->Make();
+  if (summary.ok()) *stage = std::move(made);
+  return summary;
+}
+
+}  // namespace mbv::render

@@ -1,0 +1,66 @@
+#include "render/textures.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mbv::render {
+namespace {
+
+void Put(std::vector<std::uint8_t>* rgb, std::size_t pixel, double r, double g, double b) {
+  const double values[] = {r, g, b};
+  for (int i = 0; i < 3; ++i) {
+    (*rgb)[3 * pixel + i] = static_cast<std::uint8_t>(std::clamp(values[i], 0.0, 1.0) * 255.0);
+  }
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> GridTexture(int size) {
+  std::vector<std::uint8_t> rgb(3UL * size * size);
+  const int field = size / 5;
+  const auto line = [&](int i) {
+    const int to_major = std::min(i, size - i);
+    const int to_minor = std::min(i % field, field - i % field);
+    if (to_major <= size / 256) return 0.16;
+    return to_minor <= size / 512 ? 0.09 : 0.0;
+  };
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      const double dark = std::max(line(x), line(y));
+      Put(&rgb, static_cast<std::size_t>(y) * size + x, 0.90 - dark, 0.91 - dark,
+          0.92 - 0.9 * dark);
+    }
+  }
+  return rgb;
+}
+
+std::vector<std::uint8_t> WaterTexture(int size) {
+  // Waves of whole numbers of periods per tile, so that tiles join.
+  struct Wave {
+    int kx, ky;
+    double phase, height;
+  };
+  const Wave waves[] = {{3, 1, 0.3, 0.9},   {-2, 4, 1.9, 0.8},  {6, -3, 4.0, 0.6},
+                        {5, 7, 0.8, 0.5},   {-9, 4, 2.7, 0.45}, {11, 9, 5.1, 0.35},
+                        {-7, 15, 3.3, 0.3}, {19, -8, 1.2, 0.25}, {-16, -21, 0.1, 0.2},
+                        {27, 18, 2.2, 0.16}};
+  std::vector<std::uint8_t> rgb(3UL * size * size);
+  const double unit = 2.0 * std::numbers::pi / size;
+  for (int y = 0; y < size; ++y) {
+    for (int x = 0; x < size; ++x) {
+      double height = 0.0;
+      for (const Wave& wave : waves) {
+        height += wave.height * std::sin(unit * (wave.kx * x + wave.ky * y) + wave.phase);
+      }
+      // Crests are narrow and light, troughs broad and dark.
+      const double crest = std::exp(0.75 * height - 1.2);
+      const double light = std::min(0.035 * height + 0.10 * crest, 0.30);
+      Put(&rgb, static_cast<std::size_t>(y) * size + x, 0.15 + light, 0.33 + light,
+          0.44 + 0.95 * light);
+    }
+  }
+  return rgb;
+}
+
+}  // namespace mbv::render
