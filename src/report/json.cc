@@ -1,0 +1,213 @@
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "report/report.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSchema = "mbverify.summary/1";
+
+// NaN and infinity have no JSON number and become null.
+Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+
+Json ChecksJson(const Comparison& comparison) {
+  Json checks = Json::array();
+  for (const CheckResult& check : comparison.checks) {
+    if (!check.limit) continue;
+    checks.push_back({{"name", check.name},
+                      {"value", Number(check.value)},
+                      {"limit", *check.limit},
+                      {"pass", check.pass},
+                      {"time_s", Number(check.time_s)},
+                      {"channel", check.channel}});
+  }
+  return checks;
+}
+
+Json ChecksOffJson(const Comparison& comparison) {
+  Json checks = Json::array();
+  for (const CheckResult& check : comparison.checks) {
+    if (!check.limit) checks.push_back({{"name", check.name}, {"value", Number(check.value)}});
+  }
+  return checks;
+}
+
+Json DrivesJson(const PairComparison& pair) {
+  Json drives = Json::array();
+  for (const DriveMetrics& drive : pair.drives) {
+    drives.push_back({{"drive", drive.drive},
+                      {"unit", drive.unit},
+                      {"rms", Number(drive.rms_truth)},
+                      {"rms_measured", Number(drive.rms_measured)},
+                      {"nrmse", Number(drive.nrmse)},
+                      {"max_error", Number(drive.max_error)},
+                      {"max_rel", Number(drive.max_relative)},
+                      {"matching_digits", Number(drive.digits)},
+                      {"time_s", Number(drive.time_s)}});
+  }
+  return drives;
+}
+
+void AddMetrics(const std::map<Metric, Measured>& metrics, Json* json) {
+  for (const auto& [metric, measured] : metrics) {
+    (*json)[RowOf(metric).json] = Number(measured.value);
+  }
+}
+
+// A pair's metrics, and with them what its first witness shows by itself (closure, power, …).
+Json MetricsJson(const Comparison& comparison) {
+  Json all = Json::object();
+  for (const PairComparison& pair : comparison.pairs) {
+    if (!pair.compared) continue;
+    Json json = Json::object();
+    AddMetrics(pair.metrics, &json);
+    for (const WitnessMetrics& witness : comparison.witnesses) {
+      if (witness.witness == pair.measured) AddMetrics(witness.metrics, &json);
+    }
+    json["matching_digits"] = Number(pair.digits);
+    json["samples"] = pair.samples;
+    json["force_samples"] = pair.force_samples;
+    const auto force = pair.metrics.find(Metric::kForceMax);
+    if (force != pair.metrics.end()) {
+      json["worst"] = {{"channel", force->second.channel},
+                       {"time_s", Number(force->second.time_s)}};
+    }
+    json["drives"] = DrivesJson(pair);
+    json["reactions"] = pair.reactions;
+    all[pair.name()] = std::move(json);
+  }
+  return all;
+}
+
+Json WitnessesJson(const Report& report) {
+  Json witnesses = Json::array();
+  for (const WitnessRecord& record : report.witnesses) {
+    Json json = {{"name", record.name},
+                 {"ran", record.summary.ok()},
+                 {"stop", ToText(record.summary.stop)},
+                 {"message", record.summary.message}};
+    if (!record.summary.ok() && record.summary.stop != Stop::kNotRun) {
+      json["time_s"] = Number(record.summary.time_s);
+      json["where"] = record.summary.where;
+      json["amount"] = Number(record.summary.amount);
+      json["unit"] = record.summary.unit;
+    }
+    for (const WitnessMetrics& metrics : report.comparison.witnesses) {
+      if (metrics.witness == record.name) AddMetrics(metrics.metrics, &json);
+    }
+    witnesses.push_back(std::move(json));
+  }
+  return witnesses;
+}
+
+Json SheetsJson(const std::vector<SignalSheet>& sheets) {
+  Json json = Json::array();
+  for (const SignalSheet& sheet : sheets) {
+    json.push_back({{"signal", sheet.signal},
+                    {"unit", sheet.unit},
+                    {"acts_on", sheet.acts_on},
+                    {"exerted_by", sheet.exerted_by},
+                    {"frame", sheet.frame},
+                    {"positive", sheet.positive}});
+  }
+  return json;
+}
+
+Json EngineJson(const EngineComparison& engine) {
+  const auto error = [](const EngineError& e) {
+    return Json{{"force_nrmse", Number(e.force_nrmse)},
+                {"force_max_rel", Number(e.force_max_rel)},
+                {"closure_max_m", Number(e.closure_max_m)}};
+  };
+  Json json = {{"truth", engine.truth},
+               {"stock", error(engine.stock)},
+               {"corrected", error(engine.corrected)}};
+  if (!engine.failure.empty()) json["failure"] = engine.failure;
+  return json;
+}
+
+Json FindingsJson(const Diagnostics& diagnostics) {
+  Json json = Json::array();
+  for (const Finding& finding : diagnostics.findings()) json.push_back(ToText(finding));
+  return json;
+}
+
+Json NotComparedJson(const Comparison& comparison) {
+  Json json = Json::array();
+  for (const NotCompared& item : comparison.not_compared) {
+    json.push_back({{"what", item.what}, {"why", item.why}});
+  }
+  return json;
+}
+
+Json CountsJson(const Report& report) {
+  size_t ran = 0, compared = 0, limits = 0;
+  for (const WitnessRecord& witness : report.witnesses) ran += witness.summary.ok() ? 1 : 0;
+  for (const PairComparison& pair : report.comparison.pairs) compared += pair.compared ? 1 : 0;
+  for (const CheckResult& check : report.comparison.checks) limits += check.limit ? 1 : 0;
+  return {{"witnesses_ran", ran},
+          {"pairs_compared", compared},
+          {"checks", limits},
+          {"checks_verified", report.comparison.verified()},
+          {"checks_off", report.comparison.checks.size() - limits}};
+}
+
+Json TimingJson(const Timing& timing) {
+  Json json = {{"analytic_s", timing.analytic_s},
+               {"reference_s", timing.reference_s},
+               {"simulation_s", timing.simulation_s},
+               {"render_s", timing.render_s},
+               {"stock_s", timing.stock_s},
+               {"total_s", timing.total_s},
+               {"loop_s", timing.loop_s},
+               {"steps", timing.steps}};
+  if (timing.loop_s > 0.0) {
+    json["steps_per_s"] = static_cast<double>(timing.steps) / timing.loop_s;
+  }
+  return json;
+}
+
+}  // namespace
+
+std::string ToJson(const Report& report) {
+  Json json = {{"schema", kSchema},
+               {"scenario", report.scenario},
+               {"scenario_file", report.scenario_file},
+               {"mechanism", report.mechanism},
+               {"model_file", report.model_file},
+               {"description", report.description},
+               {"verdict", ToText(report.comparison.verdict)},
+               {"reason", report.comparison.reason},
+               {"exit_code", report.exit_code},
+               {"attribution",
+                {{"odd_one_out", report.comparison.attribution.odd_one_out},
+                 {"text", report.comparison.attribution.text}}},
+               {"checks", ChecksJson(report.comparison)},
+               {"checks_off", ChecksOffJson(report.comparison)},
+               {"drives", report.drives},
+               {"metrics", MetricsJson(report.comparison)},
+               {"witnesses", WitnessesJson(report)},
+               {"not_compared", NotComparedJson(report.comparison)},
+               {"counts", CountsJson(report)},
+               {"simulation",
+                {{"mode", report.mode},
+                 {"engine", report.engine},
+                 {"step_s", Number(report.step_s)},
+                 {"driven_by", report.driven_by}}},
+               {"duration_s", Number(report.duration_s)},
+               {"sample_s", Number(report.sample_s)},
+               {"start_window_s", report.start_window_s}};
+  if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
+  json["findings"] = FindingsJson(report.findings);
+  json["signals"] = SheetsJson(report.sheets);
+  json["pictures"] = report.pictures;
+  json["timing"] = TimingJson(report.timing);
+  json["versions"] = Json::object();
+  for (const auto& [name, version] : report.versions) json["versions"][name] = version;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace mbv

@@ -1,0 +1,91 @@
+// Report: everything one run gave, and its writers (value → text).
+//
+// The formats are described in docs/outputs.md; summary.json carries its version in `schema`.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "comparison/comparison.h"
+#include "core/diagnostics.h"
+#include "core/run_summary.h"
+#include "core/trace.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// One witness' part in a run.
+struct WitnessRecord {
+  std::string name;    ///< "analytic", "reference" or "simulated"
+  RunSummary summary;  ///< kNotRun with the reason if it was switched off
+  Trace trace;         ///< empty if it did not run
+};
+
+/// An engine's error against the same truth.
+struct EngineError {
+  double force_nrmse = kNan, force_max_rel = kNan, closure_max_m = kNan;
+};
+/// The simulator's own modelling error: MuJoCo as it is, and with the corrections, judged against
+/// another witness.
+struct EngineComparison {
+  std::string truth;  ///< witness both are judged by
+  EngineError stock, corrected;
+  std::string failure;  ///< why the second run gave nothing; "" if it ran
+};
+
+struct Timing {
+  double analytic_s = 0.0, reference_s = 0.0, simulation_s = 0.0, stock_s = 0.0, render_s = 0.0;
+  double total_s = 0.0;
+  double loop_s = 0.0;  ///< inside the step loop of the judged simulation
+  long steps = 0;
+};
+
+struct Report {
+  std::string scenario, scenario_file, mechanism, model_file, description;
+  std::vector<std::string> drives;   ///< model order
+  std::string simulation;            ///< one line: mode, step, engine
+  std::string mode;                  ///< "forward", "inverse" or "off"
+  std::string engine = "corrected";  ///< or "stock"
+  double step_s = kNan;
+  double duration_s = kNan, sample_s = kNan;
+  double start_window_s = 0.0;  ///< left out of the force metrics
+  std::string driven_by;
+  std::vector<WitnessRecord> witnesses;
+  Comparison comparison;
+  int exit_code = 3;
+  Diagnostics findings;  ///< warnings, range violations
+  std::vector<SignalSheet> sheets;
+  std::optional<EngineComparison> engine_comparison;
+  Timing timing;
+  std::vector<std::pair<std::string, std::string>> versions;
+  std::vector<std::string> pictures;  ///< file names below snapshots/
+};
+
+/// summary.json.
+[[nodiscard]] std::string ToJson(const Report& report);
+
+/// traces.csv: time_s; per drive the four channels of each witness; then each witness' further
+/// channels. 17 significant digits, "nan" for missing values.
+[[nodiscard]] std::string ToCsv(const Report& report);
+
+struct TableOptions {
+  bool color = false;
+  bool verbose = false;  ///< also how to read each signal, and what could not be compared
+};
+/// The verdict table for a terminal.
+[[nodiscard]] std::string ToTable(const Report& report, const TableOptions& options);
+
+/// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
+[[nodiscard]] std::string CountLine(const std::vector<const Report*>& reports);
+
+/// The pair a reader looks at first: simulated vs analytic if compared, else simulated vs
+/// reference, else reference vs analytic; null if none was compared.
+[[nodiscard]] const PairComparison* MainPair(const Comparison& comparison);
+
+/// mechanisms' force signals and the reactions that were compared.
+[[nodiscard]] std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism,
+                                                const Comparison& comparison);
+
+}  // namespace mbv

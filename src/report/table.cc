@@ -1,0 +1,173 @@
+// The verdict table for people.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "report/report.h"
+
+namespace mbv {
+namespace {
+
+enum class Paint { kPlain, kGood, kBad, kDoubt, kTitle, kFaint };
+
+class Writer {
+ public:
+  explicit Writer(const TableOptions& options) : options_(options) {}
+
+  std::string Write(const Report& report) {
+    Head(report);
+    Checks(report.comparison);
+    if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
+    Engine(report);
+    Tail(report);
+    if (options_.verbose) Details(report);
+    return text_;
+  }
+
+ private:
+  std::string Painted(const std::string& text, Paint paint) const {
+    if (!options_.color || paint == Paint::kPlain) return text;
+    static constexpr const char* kCodes[] = {"0", "1;32", "1;31", "1;33", "1", "2"};
+    return fmt::format("\x1b[{}m{}\x1b[0m", kCodes[static_cast<int>(paint)], text);
+  }
+
+  void Line(const std::string& text = "") { text_ += text + "\n"; }
+
+  void Head(const Report& report) {
+    const Verdict verdict = report.comparison.verdict;
+    const std::string word = verdict == Verdict::kAgree      ? Painted("AGREE", Paint::kGood)
+                             : verdict == Verdict::kDisagree ? Painted("DISAGREE", Paint::kBad)
+                                                             : Painted("NOT RUN", Paint::kDoubt);
+    Line(fmt::format("{}: {}", Painted(report.mechanism + " / " + report.scenario, Paint::kTitle),
+                     word));
+    if (!report.description.empty()) Line("  " + report.description);
+    Line("  " + report.simulation);
+    if (report.start_window_s > 0.0) {
+      Line(fmt::format("  start-up window: forces before {:g} s are not judged",
+                       report.start_window_s));
+    }
+    Line("  " + report.comparison.reason);
+    const Attribution& attribution = report.comparison.attribution;
+    if (!attribution.text.empty()) Line("  " + attribution.text);
+    for (const Finding& finding : report.findings.findings()) Line("  " + ToText(finding));
+  }
+
+  void Checks(const Comparison& comparison) {
+    if (comparison.checks.empty()) return;
+    Line();
+    Line(Painted(
+        fmt::format("  {:<28}{:>12}{:>11}         {}", "check", "value", "limit", "worst at"),
+        Paint::kFaint));
+    std::string subject;
+    for (const CheckResult& check : comparison.checks) {
+      if (check.subject != subject) {
+        subject = check.subject;
+        Line("  " + TitleOf(subject));
+      }
+      Line(CheckLine(check));
+    }
+  }
+
+  static std::string TitleOf(std::string subject) {
+    std::replace(subject.begin(), subject.end(), '_', ' ');
+    return subject;
+  }
+
+  std::string CheckLine(const CheckResult& check) const {
+    const MetricRow& row = RowOf(check.metric);
+    const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
+    const std::string limit = check.limit ? fmt::format("{:.1e}", *check.limit) : "off";
+    const std::string word = !check.limit ? Painted("-   ", Paint::kFaint)
+                             : check.pass ? Painted("ok  ", Paint::kGood)
+                                          : Painted("FAIL", Paint::kBad);
+    std::string line =
+        fmt::format("    {:<26}{:>12.2e}{:>11}   {}  ", row.title + unit, check.value, limit, word);
+    if (!check.channel.empty()) line += fmt::format("{}, {:.4g} s", check.channel, check.time_s);
+    while (line.back() == ' ') line.pop_back();
+    return line;
+  }
+
+  void Drives(const PairComparison& pair) {
+    size_t width = 12;
+    for (const DriveMetrics& drive : pair.drives) width = std::max(width, drive.drive.size());
+    Line();
+    Line(Painted(
+        fmt::format("  {:<{}}{:>16}{:>12}{:>16}{:>10}{:>9}", "drive (" + TitleOf(pair.name()) + ")",
+                    std::max(width, size_t{33}), "RMS force", "NRMSE", "max error", "at", "digits"),
+        Paint::kFaint));
+    for (const DriveMetrics& drive : pair.drives) {
+      Line(fmt::format("  {:<{}}{:>16}{:>12.2e}{:>16}{:>10}{:>9.1f}", drive.drive,
+                       std::max(width, size_t{33}),
+                       fmt::format("{:.6g} {}", drive.rms_truth, drive.unit), drive.nrmse,
+                       fmt::format("{:.2e} {}", drive.max_error, drive.unit),
+                       fmt::format("{:.4g} s", drive.time_s), drive.digits));
+    }
+  }
+
+  void Engine(const Report& report) {
+    if (!report.engine_comparison) return;
+    const EngineComparison& engine = *report.engine_comparison;
+    Line();
+    if (!engine.failure.empty()) {
+      Line("  the simulator's own error: stock MuJoCo gave no result: " + engine.failure);
+      return;
+    }
+    Line(
+        fmt::format("  the simulator's own error (drive force against {}, RMS): stock MuJoCo "
+                    "{:.2e}, corrected {:.2e};",
+                    engine.truth, engine.stock.force_nrmse, engine.corrected.force_nrmse));
+    Line(fmt::format("    loop gap: stock {:.2e} m, corrected {:.2e} m", engine.stock.closure_max_m,
+                     engine.corrected.closure_max_m));
+  }
+
+  void Tail(const Report& report) {
+    const Timing& timing = report.timing;
+    Line();
+    std::string line = fmt::format(
+        "  time: analytic {:.3f} s, reference {:.3f} s, simulation "
+        "{:.3f} s",
+        timing.analytic_s, timing.reference_s, timing.simulation_s);
+    if (timing.stock_s > 0.0) line += fmt::format(", stock {:.3f} s", timing.stock_s);
+    if (timing.render_s > 0.0) line += fmt::format(", pictures {:.3f} s", timing.render_s);
+    if (timing.loop_s > 0.0 && timing.steps > 0) {
+      line += fmt::format("; {} {}, {:.0f}/s", timing.steps,
+                          report.mode == "forward" ? "steps" : "samples",
+                          static_cast<double>(timing.steps) / timing.loop_s);
+    }
+    Line(line);
+    const size_t skipped = report.comparison.not_compared.size();
+    if (skipped > 0 && !options_.verbose) {
+      Line(fmt::format("  {} quantit{} could not be compared (--verbose says why)", skipped,
+                       skipped == 1 ? "y" : "ies"));
+    }
+  }
+
+  void Details(const Report& report) {
+    if (!report.comparison.not_compared.empty()) {
+      Line();
+      Line("  not compared");
+      for (const NotCompared& item : report.comparison.not_compared) {
+        Line(fmt::format("    {}: {}", item.what, item.why));
+      }
+    }
+    Line();
+    Line("  how to read the signals");
+    for (const SignalSheet& sheet : report.sheets) {
+      Line(fmt::format("    {} [{}]", sheet.signal, sheet.unit));
+      Line(fmt::format("      acts on {}, exerted by {}", sheet.acts_on, sheet.exerted_by));
+      Line(fmt::format("      {}; positive: {}", sheet.frame, sheet.positive));
+    }
+  }
+
+  const TableOptions& options_;
+  std::string text_;
+};
+
+}  // namespace
+
+std::string ToTable(const Report& report, const TableOptions& options) {
+  return Writer(options).Write(report);
+}
+
+}  // namespace mbv
