@@ -13,9 +13,16 @@ int FindNamed(const std::vector<T>& items, const std::string& name) {
   return -1;
 }
 
-// True when this joint drive's coordinate is a length.
-bool IsTranslation(const Joint& joint, int coordinate) {
-  switch (joint.kind) {
+bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
+  const auto* joint_drive = std::get_if<JointDrive>(&drive.kind);
+  if (joint_drive == nullptr) return true;
+  return IsLength(mechanism.joints[joint_drive->joint].kind, joint_drive->coordinate);
+}
+
+}  // namespace
+
+bool IsLength(JointKind kind, int coordinate) {
+  switch (kind) {
     case JointKind::kPrismatic: return true;
     case JointKind::kCylindrical: return coordinate == 0;
     case JointKind::kPlanar: return coordinate < 2;
@@ -25,14 +32,6 @@ bool IsTranslation(const Joint& joint, int coordinate) {
   }
   return false;
 }
-
-bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
-  const auto* joint_drive = std::get_if<JointDrive>(&drive.kind);
-  if (joint_drive == nullptr) return true;
-  return IsTranslation(mechanism.joints[joint_drive->joint], joint_drive->coordinate);
-}
-
-}  // namespace
 
 int Mechanism::FindBody(const std::string& n) const { return FindNamed(bodies, n); }
 int Mechanism::FindJoint(const std::string& n) const { return FindNamed(joints, n); }

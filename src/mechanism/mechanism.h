@@ -89,6 +89,9 @@ enum class JointKind {
   return -1;
 }
 
+/// True when a coordinate of a joint is a length (else it is an angle).
+[[nodiscard]] bool IsLength(JointKind kind, int coordinate);
+
 struct CoordinateRange {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();

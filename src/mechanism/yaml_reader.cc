@@ -188,7 +188,9 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
     if (std::find(keys.begin(), keys.end(), entry.key) != keys.end()) continue;
     const std::string near = ClosestWord(Shortened(entry.key), keys);
     std::string hint;
-    if (!near.empty()) {
+    if (entry.value->is_null() && entry.key.find(' ') != std::string::npos) {
+      hint = "inside { } a text with a comma needs quotes";
+    } else if (!near.empty()) {
       hint = fmt::format("did you mean '{}'?", near);
     } else {
       for (const std::string& key : keys) hint += (hint.empty() ? "known keys: " : ", ") + key;

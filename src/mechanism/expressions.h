@@ -1,0 +1,62 @@
+// Numbers written as expressions of named parameters: "sqrt(q_home^2 - (b-a)^2)".
+//
+// The language is muParser's: + - * / ^, comparisons, ?:, && ||, and its functions (sin, atan2,
+// sqrt, min, …); angles are radians; `pi` is known. Parameters may refer to each other in any
+// order; cycles are errors.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+/// A value, or why there is none. `error` is empty when the cause is a parameter whose own error is
+/// reported at its own place.
+struct ExpressionResult {
+  std::optional<double> value;
+  std::string error;
+  std::string hint;
+};
+
+/// Parameters of one level: of the model, or of an instance of a part (which also sees outwards).
+class Scope {
+ public:
+  explicit Scope(Scope* outer = nullptr) : outer_(outer) {}
+
+  /// Defines name = factor · (expression), evaluated when first asked for. Replaces an earlier
+  /// definition.
+  void Define(const std::string& name, std::string expression, double factor = 1.0);
+  void Set(const std::string& name, double value);
+
+  /// Value of a parameter of this level or further out. A failed parameter gives its error the
+  /// first time it is asked for by Lookup and no text when an expression refers to it.
+  ExpressionResult Lookup(const std::string& name);
+  ExpressionResult Evaluate(const std::string& expression);
+
+  /// All visible names, for "did you mean".
+  [[nodiscard]] std::vector<std::string> Names() const;
+  [[nodiscard]] bool Has(const std::string& name) const { return entries_.count(name) > 0; }
+
+ private:
+  enum class State { kWaiting, kEvaluating, kDone, kFailed };
+  struct Entry {
+    std::string expression;
+    double factor = 1.0;
+    State state = State::kWaiting;
+    ExpressionResult result;
+  };
+  // The value of a name that an expression uses; kFailed entries stay silent.
+  ExpressionResult Use(const std::string& name);
+  void EvaluateEntry(const std::string& name, Entry* entry);
+
+  Scope* outer_;
+  std::map<std::string, Entry> entries_;
+  std::vector<std::string> evaluating_;  // chain of names, to find cycles
+};
+
+/// Empty if `name` may name a parameter, else why not ("'2a' is no name: …").
+[[nodiscard]] std::string WhyNoParameterName(const std::string& name);
+
+}  // namespace mbv

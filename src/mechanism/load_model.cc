@@ -1,0 +1,71 @@
+#include "mechanism/load_model.h"
+
+#include "mechanism/model_reader.h"
+
+namespace mbv {
+
+LoadResult ModelReader::Load(const std::string& text) {
+  mechanism_.file = yaml_.file();
+  mechanism_.bodies.push_back({.name = "world", .frames = {}, .shapes = {}});
+  body_places_.push_back(nullptr);
+  body_paths_.push_back("world");
+  root_ = yaml_.Parse(text);
+  if (root_ != nullptr) ReadAll();
+  LoadResult result;
+  result.diagnostics.Append(yaml_.diagnostics());
+  result.diagnostics.Append(override_findings_);
+  if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism_);
+  return result;
+}
+
+void ModelReader::ReadAll() {
+  blocks_.push_back({.node = root_.get(),
+                     .scope = &scopes_.emplace_back(),
+                     .path = "",
+                     .prefix = "",
+                     .levels = {""},
+                     .parts = {}});
+  ReadHead();
+  if (!root_->is_map()) return;
+  ExpandInstances(blocks_.front());
+  CheckOverrides();
+
+  // Each stage over all blocks, so that every name it refers to is there.
+  using Stage = void (ModelReader::*)(const Block&);
+  for (const Stage stage :
+       {Stage{&ModelReader::ReadBodies}, Stage{&ModelReader::ReadAttachedFrames},
+        Stage{&ModelReader::ReadShapes}, Stage{&ModelReader::ReadJoints},
+        Stage{&ModelReader::ReadDrives}, Stage{&ModelReader::ReadPrescribed},
+        Stage{&ModelReader::ReadOutputs}, Stage{&ModelReader::ReadSprings}}) {
+    for (const Block& block : blocks_) {
+      yaml_.SetNote(block.Note());
+      (this->*stage)(block);
+    }
+  }
+  yaml_.SetNote("");
+  OrderDrives(*root_);
+  CheckCoordinateNames();
+  CheckMasses();
+  // With a broken joint, findings about the graph would only be its consequences; with a broken
+  // number, those about the loops.
+  if (!joints_good_ || !CheckTree()) return;
+  if (yaml_.has_errors() || override_findings_.has_errors()) return;
+  CloseLoops();
+  if (yaml_.has_errors()) return;
+  CheckHome();
+  CheckIsostaticRule();
+}
+
+LoadResult LoadModelText(const std::string& text, const std::string& file,
+                         const LoadOptions& options) {
+  return ModelReader(file, options).Load(text);
+}
+
+LoadResult LoadModel(const std::string& file, const LoadOptions& options) {
+  YamlReader reader(file);
+  const auto text = reader.ReadFile();
+  if (!text) return {.mechanism = std::nullopt, .diagnostics = reader.diagnostics()};
+  return LoadModelText(*text, file, options);
+}
+
+}  // namespace mbv

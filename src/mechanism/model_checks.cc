@@ -1,0 +1,177 @@
+// Checks on the whole model: masses, the graph of joints, loops closed at home, ranges, and the
+// isostatic rule.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "mechanism/constraints.h"
+#include "mechanism/home.h"
+#include "mechanism/mobility.h"
+#include "mechanism/model_reader.h"
+
+namespace mbv {
+
+void ModelReader::CheckMasses() {
+  for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
+    if (body_places_[b] == nullptr) continue;
+    CheckMass(mechanism_.bodies[b], *body_places_[b], body_paths_[b]);
+  }
+}
+
+void ModelReader::CheckMass(const Body& body, const YamlEntry& at, const std::string& path) {
+  if (!std::isfinite(body.mass)) return;  // already reported
+  yaml_.SetNote(body.name == at.key ? "" : fmt::format(" (body {})", body.name));
+  if (body.mass == 0.0) {
+    if (body.I_Bcm_B.isZero(0.0)) return;
+    yaml_.Error(at, fmt::format("{}: an inertia without mass", path),
+                "give the mass, or leave both out for a massless connecting piece");
+    return;
+  }
+  const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
+  const std::string shown =
+      fmt::format("{:.6g}, {:.6g}, {:.6g} kg m²", principal[0], principal[1], principal[2]);
+  if (body.I_Bcm_B.isZero(0.0)) {
+    yaml_.Error(at, fmt::format("{}: mass = {} without inertia", path, body.mass),
+                "give the inertia about the centre of mass");
+  } else if (!(principal[0] > 0.0)) {
+    yaml_.Error(at, fmt::format("{}: principal inertias {} violate I > 0", path, shown));
+  } else if (principal[0] + principal[1] < principal[2] * (1.0 - 1e-9)) {
+    yaml_.Error(at, fmt::format("{}: principal inertias {} violate I1 + I2 >= I3", path, shown),
+                "no distribution of mass has such inertias; look for exchanged or missing digits, "
+                "and that they are about the centre of mass");
+  }
+}
+
+bool ModelReader::CheckTree() {
+  const SpanningTreeResult tree = BuildSpanningTree(&mechanism_, hints_);
+  ReportTree(tree);
+  return tree.ok();
+}
+
+void ModelReader::CloseLoops() {
+  const HomeResult home = SolveHome(&mechanism_);
+  if (home.closed) return;
+  for (const LoopGap& gap : home.gaps) {
+    if (gap.position_m <= kHomeTolerance && gap.rotation_rad <= kHomeTolerance) continue;
+    const Joint& joint = mechanism_.joints[gap.joint];
+    const std::string text = fmt::format(
+        "the loop at joint '{}' does not close: gap {:.3g} m, "
+        "{:.3g} rad",
+        joint.name, gap.position_m, gap.rotation_rad);
+    const std::string hint =
+        "improve the guesses of the loop's joints, or look for a wrong length "
+        "or axis";
+    const YamlEntry* at = joint_places_[gap.joint];
+    yaml_.SetNote("");
+    yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0, text, hint);
+  }
+}
+
+namespace {
+
+// Marks what `joints` connect to the world.
+std::vector<bool> ConnectedBodies(const Mechanism& mechanism) {
+  std::vector<bool> connected(mechanism.bodies.size(), false);
+  connected[0] = true;
+  for (bool grown = true; grown;) {
+    grown = false;
+    for (const Joint& joint : mechanism.joints) {
+      if (connected[joint.parent] == connected[joint.child]) continue;
+      connected[joint.parent] = connected[joint.child] = grown = true;
+    }
+  }
+  return connected;
+}
+
+}  // namespace
+
+void ModelReader::ReportTree(const SpanningTreeResult& tree) {
+  const std::vector<bool> connected = ConnectedBodies(mechanism_);
+  yaml_.SetNote("");
+  for (const int body : tree.unconnected_bodies) {
+    const YamlEntry* at = body_places_[body];
+    const int line = at ? at->line : 0, column = at ? at->column : 0;
+    const std::string& name = mechanism_.bodies[body].name;
+    if (connected[body]) {
+      yaml_.AddAt(Severity::kError, line, column,
+                  fmt::format("body '{}' is cut off from the world: every chain of joints to it "
+                              "has a joint with closure: true",
+                              name),
+                  "a body that hangs on closures only needs a free joint to the world");
+    } else {
+      yaml_.AddAt(Severity::kError, line, column,
+                  fmt::format("no chain of joints connects body '{}' to the world", name),
+                  "a floating body needs a free joint");
+    }
+  }
+  for (const int joint : tree.hints_broken) {
+    const YamlEntry* at = joint_places_[joint];
+    yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0,
+                fmt::format("joint '{}' has closure: false, but all joints of its loop have, and "
+                            "one must be cut",
+                            mechanism_.joints[joint].name));
+  }
+}
+
+void ModelReader::CheckHome() {
+  yaml_.SetNote("");
+  const double slack = 1e-9;
+  const auto outside = [&](double value, const CoordinateRange& range) {
+    return value < range.lower - slack || value > range.upper + slack;
+  };
+  for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
+    const Joint& joint = mechanism_.joints[j];
+    for (int k = 0; k < FreedomsOf(joint.kind); ++k) {
+      if (joint_places_[j] == nullptr || !outside(joint.home[k], joint.range[k])) continue;
+      yaml_.AddAt(
+          Severity::kWarning, joint_places_[j]->line, joint_places_[j]->column,
+          fmt::format("joint '{}' is at {:.6g} at home, its range is {:.6g} … {:.6g}", joint.name,
+                      joint.home[k], joint.range[k].lower, joint.range[k].upper));
+    }
+  }
+  BodyStates states;
+  states.Resize(mechanism_.bodies.size());
+  states.X_WB = mechanism_.X_WB_home;
+  for (const Drive& drive : mechanism_.drives) {
+    const double value = DriveRow(mechanism_, drive, states).value;
+    const YamlEntry& at = *signal_places_[drive.name].front().entry;
+    if (std::holds_alternative<DistanceDrive>(drive.kind) && value < 1e-9) {
+      yaml_.Error(at,
+                  fmt::format("drive '{}': its two ends are the same point at home", drive.name));
+    } else if (outside(value, drive.range)) {
+      yaml_.AddAt(Severity::kWarning, at.line, at.column,
+                  fmt::format("drive '{}' is at {:.6g} at home, its range is {:.6g} … {:.6g}",
+                              drive.name, value, drive.range.lower, drive.range.upper));
+    }
+  }
+}
+
+// A joint that transmits a force only must not gain freedom by it: with all of them as balls, the
+// mechanism must have the same number of freedoms.
+void ModelReader::CheckIsostaticRule() {
+  Mechanism balls = mechanism_;
+  const YamlEntry* at = nullptr;
+  for (size_t j = 0; j < balls.joints.size(); ++j) {
+    Joint& joint = balls.joints[j];
+    if (!joint.transmits_force_only || joint.kind == JointKind::kSpherical) continue;
+    joint.kind = JointKind::kSpherical;
+    at = joint_places_[j];
+  }
+  if (at == nullptr) return;
+  balls.drives.clear();
+  balls.prescribed.clear();
+  Mechanism passive = mechanism_;
+  passive.drives.clear();
+  passive.prescribed.clear();
+  const int freedoms = AnalyseMobility(passive).freedoms;
+  const int as_balls = AnalyseMobility(balls).freedoms;
+  if (freedoms == as_balls) return;
+  yaml_.Error(*at,
+              fmt::format("transmits: force changes the mechanism: {} freedoms instead of {}",
+                          as_balls, freedoms),
+              "only a redundant constraint can be left out of the reactions");
+}
+
+}  // namespace mbv

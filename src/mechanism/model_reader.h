@@ -1,0 +1,172 @@
+// Inside of the model loader: the state shared by its stages. Include load_model.h instead.
+//
+// A "block" is a level of declarations: the model itself, or one instance of a part. Stages run
+// over all blocks one after the other, so that every name exists before it is referred to:
+// parameters and blocks (model_parts.cc), bodies and frames, then shapes (model_bodies.cc), joints
+// and drives (model_joints.cc), springs, outputs and order (model_signals.cc), then the
+// checks on the whole (model_checks.cc).
+#pragma once
+
+#include <deque>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mechanism/expressions.h"
+#include "mechanism/load_model.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/spanning_tree.h"
+#include "mechanism/yaml_reader.h"
+
+namespace mbv {
+
+/// One level of declarations.
+struct Block {
+  const YamlNode* node = nullptr;
+  Scope* scope = nullptr;
+  std::string path;                 ///< YAML path for messages: "" or "parts.limb"
+  std::string prefix;               ///< "" or "limb1." or "limb1.left."
+  std::vector<std::string> levels;  ///< prefixes in which a name is looked up, inner first
+  std::vector<std::string> parts;   ///< names of the parts around, to find endless nesting
+
+  [[nodiscard]] const YamlNode* Section(std::string_view key) const;
+  [[nodiscard]] std::string Note() const;  ///< " (in limb1)" for messages
+  [[nodiscard]] std::string PathOf(std::string_view key) const { return JoinPath(path, key); }
+};
+
+/// A frame on a body, as a joint or an output refers to it.
+struct FrameRef {
+  int body = 0;
+  Pose X_BF = Pose::Identity();
+};
+
+class ModelReader {
+ public:
+  /// Bounds on what a file may ask for; beyond them the file is refused, not computed.
+  static constexpr size_t kMaxBodies = 200;
+  static constexpr size_t kMaxBlocks = 400;
+  static constexpr size_t kMaxJoints = 400;
+  static constexpr size_t kMaxItems = 2000;  ///< of frames, shapes, drives, …
+
+  ModelReader(std::string file, const LoadOptions& options)
+      : yaml_(std::move(file)), options_(options) {}
+
+  /// Runs all stages on the text.
+  LoadResult Load(const std::string& text);
+
+ private:
+  void ReadAll();
+
+  // model_parts.cc
+  void ReadHead();
+  void ReadParameters(const Block& block, const YamlNode* node, const std::string& path);
+  void EvaluateParameters(const Block& block, const YamlNode* node, const std::string& path);
+  void ApplyOverrides(const Block& block);
+  void CheckOverrides();
+  void ExpandInstances(const Block& block);
+  void AddInstance(const Block& block, const YamlEntry& entry);
+  void ReadInstance(const Block& block, const YamlEntry& entry, const YamlNode& part,
+                    const std::string& part_name);
+  [[nodiscard]] const YamlNode* FindPart(const std::string& name) const;
+
+  // model_bodies.cc
+  void ReadBodies(const Block& block);
+  void ReadBody(const Block& block, const YamlEntry& entry);
+  void ReadMass(const Block& block, const YamlMap& map, Body* body);
+  void ReadAttachedFrames(const Block& block);
+  void ReadFrames(const Block& block, const YamlNode* node, const std::string& path,
+                  const std::string& prefix, int body);
+  void ReadShapes(const Block& block);
+  void ReadShapes(const Block& block, const YamlNode& node, const std::string& path, int body);
+  std::optional<Shape> ReadShape(const Block& block, const YamlNode& node, const std::string& path,
+                                 int body);
+  std::optional<Vec3> ShapePoint(const Block& block, const YamlMap& map, const std::string& key,
+                                 int body);
+  std::optional<double> Radius(const Block& block, const YamlMap& map);
+  template <typename Rod>
+  std::optional<Rod> ReadRod(const Block& block, const YamlNode& node, const std::string& path,
+                             int body);
+  std::optional<Box> ReadBox(const Block& block, const YamlNode& node, const std::string& path,
+                             int body);
+  std::optional<Ball> ReadBall(const Block& block, const YamlNode& node, const std::string& path,
+                               int body);
+  void ImportUrdf(const YamlNode& node);
+
+  // model_joints.cc
+  void ReadJoints(const Block& block);
+  void ReadJoint(const Block& block, const YamlEntry& entry);
+  bool ReadAxes(const Block& block, const YamlMap& map, Joint* joint);
+  void ReadGuess(const Block& block, const YamlMap& map, Joint* joint);
+  void ReadJointRange(const Block& block, const YamlMap& map, Joint* joint);
+  bool ReadFreeChoices(const YamlMap& map, Joint* joint);
+
+  // model_signals.cc
+  void ReadDrives(const Block& block);
+  void ReadDrive(const Block& block, const YamlEntry& entry);
+  std::optional<JointDrive> ReadJointDrive(const Block& block, const YamlMap& map);
+  template <typename Line>
+  bool ReadEnds(const Block& block, const YamlMap& map, Line* line);
+  void ReadPrescribed(const Block& block);
+  void ReadOutputs(const Block& block);
+  void ReadSprings(const Block& block);
+  void OrderDrives(const YamlNode& root);
+  void CheckCoordinateNames();
+
+  // model_checks.cc
+  void CheckMasses();
+  void CheckMass(const Body& body, const YamlEntry& at, const std::string& path);
+  bool CheckTree();
+  void CloseLoops();
+  void ReportTree(const SpanningTreeResult& tree);
+  void CheckHome();
+  void CheckIsostaticRule();
+
+  // model_values.cc: one value each; empty after a finding.
+  std::optional<double> Number(const Block& block, const YamlNode& node, const std::string& path,
+                               double factor = 1.0);
+  std::optional<Vec3> Vector(const Block& block, const YamlNode& node, const std::string& path,
+                             double factor = 1.0);
+  std::optional<double> Number(const Block& block, const YamlMap& map, const std::string& key,
+                               std::initializer_list<UnitSuffix> units);
+  std::optional<Vec3> Vector(const Block& block, const YamlMap& map, const std::string& key,
+                             std::initializer_list<UnitSuffix> units);
+  std::optional<Vec3> Axis(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<Mat3> Rotation(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<Mat3> RotationFromAxes(const Block& block, const YamlNode& node,
+                                       const std::string& path);
+  std::optional<Pose> PoseOf(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<CoordinateRange> Range(const Block& block, const YamlNode& node,
+                                       const std::string& path, double factor);
+
+  // Names (model_values.cc). The resolvers look in the block, then outwards.
+  bool CheckNewName(const YamlEntry& entry, const std::string& path);
+  std::optional<int> BodyRef(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<int> JointRef(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<FrameRef> Frame(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<Pose> FrameOn(const Block& block, int body, const std::string& name) const;
+  /// False (after a finding, once) when a list has grown beyond `limit`.
+  bool Room(const YamlNode& at, size_t size, size_t limit, const char* what);
+
+  YamlReader yaml_;
+  const LoadOptions& options_;
+  YamlNodePtr root_;
+  std::deque<Scope> scopes_;  // stable addresses
+  std::deque<Block> blocks_;  // blocks_[0] is the model itself
+  Mechanism mechanism_;
+  ClosureHints hints_;                          // per joint
+  std::vector<const YamlEntry*> body_places_;   // per body; null: the world, URDF links
+  std::vector<const YamlEntry*> joint_places_;  // per joint
+  std::vector<std::string> body_paths_, joint_paths_;
+  bool joints_good_ = true;  // false: the graph of joints is not worth checking
+  struct SignalPlace {
+    const char* what;  // "drive", …
+    const YamlEntry* entry;
+  };
+  std::map<std::string, std::vector<SignalPlace>> signal_places_;
+  std::map<std::string, bool> override_used_;
+  Diagnostics override_findings_;              // they belong to the file that overrides
+  std::vector<std::string> known_parameters_;  // dotted names, for "did you mean"
+};
+
+}  // namespace mbv
