@@ -1,6 +1,7 @@
 // One row per mechanism with closed-form equations.
 #include <array>
 
+#include "analytic/cabin_robot/cabin_robot.h"
 #include "analytic/closed_form.h"
 #include "analytic/stabilizing_platform/stabilizing_platform.h"
 #include "analytic/scara_robot/closed_form.h"
@@ -15,6 +16,7 @@ std::span<const ClosedFormRow> ClosedForms() {
        {"E2"},
        &stabilizing_platform::MakeClosedForm},
       {"spr_tripod", {"full"}, {}, &MakeSprTripod},
+      {"cabin_robot", {"full"}, {}, &MakeCabinRobot},
       {"scara_robot", {"full", "thin_rods"}, {}, &scara::MakeClosedForm},
   };
   return rows;

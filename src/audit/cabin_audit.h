@@ -1,0 +1,43 @@
+// Parts of the cabin robot's equation audit [Liu 2025]; stiffness, Eqs. (54)–(75), is not covered.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "audit/audit.h"
+#include "core/types.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv::cabin_audit {
+
+/// Sixth-order central differences of a vector function of time, step h.
+template <typename F>
+auto FirstDifference(const F& f, double h) {
+  using V = decltype(f(0.0));
+  return V((45.0 * (f(h) - f(-h)) - 9.0 * (f(2 * h) - f(-2 * h)) + (f(3 * h) - f(-3 * h))) /
+           (60.0 * h));
+}
+template <typename F>
+auto SecondDifference(const F& f, double h) {
+  using V = decltype(f(0.0));
+  return V((270.0 * (f(h) + f(-h)) - 27.0 * (f(2 * h) + f(-2 * h)) + 2.0 * (f(3 * h) + f(-3 * h)) -
+            490.0 * f(0.0)) /
+           (180.0 * h * h));
+}
+
+struct Lengths {
+  double L1, L2, L3, L4, a2, d3, a3, a4, d6;
+};
+[[nodiscard]] Lengths LengthsOf(const Mechanism& mechanism);
+
+/// Equations (1)–(4), (8), (9): positions of the planar linkage.
+[[nodiscard]] std::vector<AuditRow> PositionRows(const Lengths& lengths);
+/// Equations (14)–(25), (35)–(40): velocities, Jacobian and accelerations of the planar linkage.
+[[nodiscard]] std::vector<AuditRow> VelocityRows(const Lengths& lengths);
+/// Equations (5)–(7), (10)–(13), (26)–(34), (41)–(46): wrist and complete chain.
+[[nodiscard]] std::vector<AuditRow> WristRows(const Lengths& lengths);
+/// Equations (47)–(53): dynamics, against the generic reference solver.
+[[nodiscard]] std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism);
+
+}  // namespace mbv::cabin_audit
