@@ -43,7 +43,9 @@ void WireLegs(const Mechanism& mechanism, Wiring* wiring, Diagnostics* diagnosti
     }
     wiring->body[CylinderBody(leg)] = mechanism.joints[slide].parent;
     wiring->body[RodBody(leg)] = mechanism.joints[slide].child;
-    wiring->body[kPlatform] = mechanism.joints[hinge].child;
+    const Joint& joint = mechanism.joints[hinge];  // written either way round
+    wiring->body[kPlatform] =
+        joint.child == wiring->body[RodBody(leg)] ? joint.parent : joint.child;
     wiring->R_WF[leg] = mechanism.joints[ball].X_PF.linear();
     wiring->ball_name[leg] = mechanism.joints[ball].name;
     const auto* drive = leg < static_cast<int>(mechanism.drives.size())
