@@ -1,0 +1,14 @@
+// Validation of files without running anything.
+#pragma once
+
+#include <string>
+
+#include "core/diagnostics.h"
+
+namespace mbv {
+
+/// All findings about a model file or a scenario (a file with a `mechanism:` key), including what
+/// its closed form has to say about the motion.
+[[nodiscard]] Diagnostics CheckFile(const std::string& file);
+
+}  // namespace mbv

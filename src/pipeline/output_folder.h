@@ -1,0 +1,33 @@
+// A result folder that appears whole or not at all.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace mbv {
+
+/// Files are written into a hidden temporary folder beside the target; Commit() exchanges it with
+/// the target in one step. Without Commit() the old result stays as it was and the temporary
+/// folder is removed. Temporary folders left by killed runs are removed by the next one.
+class OutputFolder {
+ public:
+  explicit OutputFolder(std::filesystem::path target);
+  ~OutputFolder();
+  OutputFolder(const OutputFolder&) = delete;
+  OutputFolder& operator=(const OutputFolder&) = delete;
+
+  /// Each returns "" or what went wrong, with the path and the system's reason.
+  [[nodiscard]] std::string Create();
+  [[nodiscard]] std::string Write(const std::string& name, const std::string& content);
+  [[nodiscard]] std::string Commit();
+
+  [[nodiscard]] const std::filesystem::path& target() const { return target_; }
+
+ private:
+  void RemoveLeftovers() const;
+
+  std::filesystem::path target_, temporary_;
+  bool created_ = false;
+};
+
+}  // namespace mbv

@@ -1,0 +1,79 @@
+#include "pipeline/pictures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numbers>
+
+#include "render/render.h"
+
+namespace mbv {
+namespace {
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+std::optional<double> Degrees(std::optional<double> angle_rad) {
+  if (angle_rad) *angle_rad *= kDegPerRad;
+  return angle_rad;
+}
+
+PictureOptions OptionsOf(const SnapshotSettings& settings) {
+  PictureOptions options;
+  options.size_px = settings.size_px;
+  options.camera = {.azimuth_deg = Degrees(settings.camera.azimuth_rad),
+                    .elevation_deg = Degrees(settings.camera.elevation_rad),
+                    .distance_m = settings.camera.distance_m,
+                    .lookat_W = settings.camera.lookat_W};
+  return options;
+}
+
+// Index of the sample nearest to a time.
+int NearestSample(const std::vector<double>& times, double t_s) {
+  const auto nearer = [&](double a, double b) { return std::abs(a - t_s) < std::abs(b - t_s); };
+  return static_cast<int>(std::min_element(times.begin(), times.end(), nearer) - times.begin());
+}
+
+Caption CaptionOf(const Report& report, double t_s) {
+  Caption caption{.title = report.mechanism + " / " + report.scenario,
+                  .detail = fmt::format("t = {:.3f} s", t_s),
+                  .status = ToText(report.comparison.verdict)};
+  if (const PairComparison* pair = MainPair(report.comparison)) {
+    const auto force = pair->metrics.find(Metric::kForceNrmse);
+    if (force != pair->metrics.end()) {
+      caption.detail += fmt::format("   drive forces: {} against {}, NRMSE {:.1e}", pair->measured,
+                                    pair->truth, force->second.value);
+    }
+  }
+  caption.mood = report.comparison.verdict == Verdict::kAgree      ? Caption::Mood::kGood
+                 : report.comparison.verdict == Verdict::kDisagree ? Caption::Mood::kBad
+                                                                   : Caption::Mood::kNeutral;
+  return caption;
+}
+
+}  // namespace
+
+RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
+                         const SimulationRun& run, const Report& report,
+                         std::vector<PictureFile>* files) {
+  const auto start = std::chrono::steady_clock::now();
+  std::vector<PictureFrame> frames;
+  for (const double t_s : scenario.snapshots.times_s) {
+    const int sample = NearestSample(run.trace.time_s, t_s);
+    frames.push_back(SampleFrame(mechanism, run, sample));
+    const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
+    frames.back().caption = CaptionOf(report, sample_s);
+    files->push_back({fmt::format("t_{:.3f}s.png", sample_s), ""});
+  }
+  RunSummary summary = RenderPictures(
+      mechanism, frames, {}, OptionsOf(scenario.snapshots), [&](int index, Picture picture) {
+        (*files)[static_cast<size_t>(index)].content = EncodePng(picture);
+        return true;
+      });
+  if (!summary.ok()) files->clear();
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return summary;
+}
+
+}  // namespace mbv

@@ -1,0 +1,26 @@
+// Snapshots of a run.
+#pragma once
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/run_summary.h"
+#include "mechanism/mechanism.h"
+#include "report/report.h"
+#include "scenario/scenario.h"
+#include "simulation/simulation.h"
+
+namespace mbv {
+
+struct PictureFile {
+  std::string name;     ///< "t_1.500s.png"
+  std::string content;  ///< PNG
+};
+
+/// Draws the simulation at the scenario's snapshot times (nearest sample each).
+[[nodiscard]] RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
+                                       const SimulationRun& run, const Report& report,
+                                       std::vector<PictureFile>* files);
+
+}  // namespace mbv

@@ -1,0 +1,354 @@
+#include "pipeline/run_scenario.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "mechanism/mobility.h"
+#include "pipeline/output_folder.h"
+#include "pipeline/pictures.h"
+#include "pipeline/ranges.h"
+#include "pipeline/version.h"
+#include "pipeline/witnesses.h"
+#include "reference/reference.h"
+
+namespace mbv {
+namespace {
+
+RunSummary NotRun(const std::string& why) {
+  RunSummary summary;
+  summary.message = why;
+  return summary;
+}
+
+class ScenarioRun {
+ public:
+  ScenarioRun(const std::string& file, const RunOptions& options)
+      : file_(file), options_(options) {}
+
+  RunOutcome Run() {
+    const auto start = std::chrono::steady_clock::now();
+    if (!Prepare()) return BadInput();
+    RunAnalytic();
+    RunReferenceWitness();
+    if (CheckStrokes()) RunSimulated();
+    if (outcome_.diagnostics.has_errors()) return BadInput();
+    Judge();
+    DrawPictures();
+    report_.timing.total_s =
+        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    report_.exit_code = ExitCode();
+    outcome_.exit_code = report_.exit_code;
+    WriteFiles();
+    outcome_.report = std::move(report_);
+    return std::move(outcome_);
+  }
+
+ private:
+  RunOutcome BadInput() {
+    outcome_.exit_code = 2;
+    return std::move(outcome_);
+  }
+
+  std::function<void(double)> ProgressOf(const std::string& stage) const {
+    if (!options_.progress) return {};
+    return [this, stage](double fraction) { options_.progress(stage, fraction); };
+  }
+
+  // Loads everything; false after bad input.
+  bool Prepare() {
+    ScenarioResult loaded = LoadScenario(file_, options_.scenario);
+    outcome_.diagnostics = loaded.diagnostics;
+    if (!loaded.scenario) return false;
+    scenario_ = *std::move(loaded.scenario);
+    base_ = *std::move(loaded.mechanism);
+    mechanisms_ = LoadWitnessMechanisms(scenario_, base_, &outcome_.diagnostics);
+    closed_form_ = MakeClosedForm(scenario_, mechanisms_.analytic, &outcome_.diagnostics);
+    if (scenario_.simulation.on && closed_form_.closed_form == nullptr && !scenario_.reference.on) {
+      AddError(
+          "simulation needs the drive motion, but neither a closed form nor the reference "
+          "computes it",
+          "set reference: on");
+    }
+    if (outcome_.diagnostics.has_errors()) return false;
+    Describe();
+    return true;
+  }
+
+  void AddError(const std::string& message, const std::string& hint) {
+    Finding finding;
+    finding.file = file_;
+    finding.message = message;
+    finding.hint = hint;
+    outcome_.diagnostics.Add(std::move(finding));
+  }
+
+  void Describe() {
+    const SimulationSettings& simulation = scenario_.simulation;
+    report_.scenario = scenario_.name;
+    report_.scenario_file = scenario_.file;
+    report_.mechanism = base_.name;
+    report_.model_file = scenario_.model_file;
+    report_.description = scenario_.description;
+    for (const Drive& drive : base_.drives) report_.drives.push_back(drive.name);
+    report_.mode = !simulation.on ? "off" : simulation.forward ? "forward" : "inverse";
+    report_.engine = simulation.stock_engine ? "stock" : "corrected";
+    report_.step_s = simulation.step_s;
+    report_.duration_s = scenario_.motion.duration_s;
+    report_.sample_s = scenario_.motion.sample_s;
+    report_.start_window_s = scenario_.start_window_s;
+    report_.driven_by = closed_form_.closed_form != nullptr ? "analytic" : "reference";
+    report_.simulation = SimulationLine();
+    report_.findings = outcome_.diagnostics;
+    report_.versions = Versions();
+  }
+
+  std::string SimulationLine() const {
+    const SimulationSettings& simulation = scenario_.simulation;
+    if (!simulation.on) return "no simulation";
+    std::string line = simulation.forward
+                           ? fmt::format("forward simulation, step {:g} ms, {} engine",
+                                         1e3 * simulation.step_s, report_.engine)
+                           : std::string("inverse dynamics at each sample");
+    line += fmt::format(", {} drive motion, {:g} s sampled every {:g} ms", report_.driven_by,
+                        report_.duration_s, 1e3 * report_.sample_s);
+    if (simulation.extrapolate) {
+      line += fmt::format("; forces extrapolated in {} from {:g} and {:g} to {:g}",
+                          simulation.extrapolate->parameter, simulation.extrapolate->from[0],
+                          simulation.extrapolate->from[1],
+                          mechanisms_.simulated.ParameterValue(simulation.extrapolate->parameter));
+    }
+    return line;
+  }
+
+  void AddWitness(const std::string& name, RunSummary summary, Trace trace) {
+    trace.witness = name;
+    report_.witnesses.push_back({name, std::move(summary), std::move(trace)});
+  }
+
+  void RunAnalytic() {
+    if (closed_form_.closed_form == nullptr) {
+      AddWitness("analytic", NotRun(closed_form_.reason), {});
+      return;
+    }
+    ClosedFormRun run =
+        RunClosedForm(mechanisms_.analytic, scenario_.motion, closed_form_.closed_form.get());
+    report_.timing.analytic_s = run.summary.wall_s;
+    AddWitness("analytic", std::move(run.summary), std::move(run.trace));
+  }
+
+  void RunReferenceWitness() {
+    if (!scenario_.reference.on) {
+      AddWitness("reference", NotRun("switched off in the scenario"), {});
+      return;
+    }
+    ReferenceRun run = RunReference(mechanisms_.reference, scenario_.motion);
+    report_.timing.reference_s = run.summary.wall_s;
+    AddWitness("reference", std::move(run.summary), std::move(run.trace));
+  }
+
+  const WitnessRecord& Driver() const {
+    return report_.witnesses[report_.driven_by == "analytic" ? 0 : 1];
+  }
+
+  Severity RangeSeverity() const {
+    return scenario_.simulation.ignore_ranges ? Severity::kWarning : Severity::kError;
+  }
+
+  // Strokes along the commanded motion; false if the simulation must not run.
+  bool CheckStrokes() {
+    const auto violations = DriveViolations(base_, Driver().trace);
+    if (violations.empty()) return true;
+    AddFindings(violations, file_, RangeSeverity(), &report_.findings);
+    if (scenario_.simulation.ignore_ranges) return true;
+    AddWitness("simulated", LimitSummary(violations), {});
+    return false;
+  }
+
+  DrivenMotion MakeDrivenMotion() {
+    if (report_.driven_by == "reference") {
+      return DriveByReference(mechanisms_.reference, scenario_.motion);
+    }
+    // A fresh one: it may follow its solution from the start of the motion.
+    ClosedFormChoice fresh = MakeClosedForm(scenario_, mechanisms_.analytic, &outcome_.diagnostics);
+    return DriveByClosedForm(scenario_.motion, std::move(fresh.closed_form));
+  }
+
+  void RunSimulated() {
+    if (!scenario_.simulation.on) {
+      AddWitness("simulated", NotRun("switched off in the scenario"), {});
+      return;
+    }
+    if (!Driver().summary.ok()) {
+      AddWitness(
+          "simulated",
+          NotRun(fmt::format("there is no drive motion, because {} failed", report_.driven_by)),
+          {});
+      return;
+    }
+    const Engine engine = scenario_.simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
+    SimulatedWitness witness = RunSimulation(scenario_, mechanisms_.simulated, MakeDrivenMotion(),
+                                             engine, ProgressOf("simulation"));
+    outcome_.diagnostics.Append(witness.diagnostics);
+    report_.timing.simulation_s = witness.run.summary.wall_s;
+    report_.timing.loop_s = witness.run.loop_wall_s;
+    report_.timing.steps = witness.run.steps;
+    AddWarnings(witness.run.warnings);
+    CheckJoints(&witness.run);
+    AddWitness("simulated", witness.run.summary, witness.run.trace);
+    simulation_ = std::move(witness.run);
+    RunOtherEngine(engine == Engine::kStock ? Engine::kCorrected : Engine::kStock);
+  }
+
+  void AddWarnings(const std::vector<std::string>& warnings) {
+    for (const std::string& warning : warnings) {
+      Finding finding;
+      finding.severity = Severity::kWarning;
+      finding.message = "MuJoCo: " + warning;
+      report_.findings.Add(std::move(finding));
+    }
+  }
+
+  // Joint ranges along the simulated motion.
+  void CheckJoints(SimulationRun* run) {
+    if (!run->summary.ok()) return;
+    const auto violations = JointViolations(base_, run->trace.time_s, run->X_WB);
+    AddFindings(violations, file_, RangeSeverity(), &report_.findings);
+    if (violations.empty() || scenario_.simulation.ignore_ranges) return;
+    run->summary = LimitSummary(violations);
+  }
+
+  // The simulator's own modelling error: the same run by the other engine.
+  void RunOtherEngine(Engine other) {
+    const SimulationSettings& settings = scenario_.simulation;
+    if (!settings.forward || !settings.stock_too || !simulation_->summary.ok()) return;
+    SimulatedWitness witness =
+        RunSimulation(scenario_, mechanisms_.simulated, MakeDrivenMotion(), other,
+                      ProgressOf(other == Engine::kStock ? "stock engine" : "corrected engine"));
+    report_.timing.stock_s = witness.run.summary.wall_s;
+    other_engine_ = std::move(witness.run);
+  }
+
+  ComparisonInput MakeComparisonInput() const {
+    ComparisonInput input{.mechanism = &base_,
+                          .motion = &scenario_.motion,
+                          .limits = scenario_.checks,
+                          .simulation_limits = scenario_.simulation.forward ? LimitColumn::kForward
+                                                                            : LimitColumn::kInverse,
+                          .start_window_s = scenario_.start_window_s,
+                          .witnesses = {},
+                          .driven_by = report_.driven_by,
+                          .joints_not_unique = AnalyseMobility(base_).joints_not_unique};
+    for (const WitnessRecord& record : report_.witnesses) {
+      input.witnesses.push_back(
+          {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});
+    }
+    return input;
+  }
+
+  void Judge() {
+    const ComparisonInput input = MakeComparisonInput();
+    report_.comparison = Compare(input);
+    report_.sheets = SheetsOf(base_, report_.comparison);
+    if (other_engine_) CompareEngines(input);
+  }
+
+  void CompareEngines(const ComparisonInput& input) {
+    const bool by_analytic = report_.witnesses[0].summary.ok();
+    const WitnessRecord& truth = report_.witnesses[by_analytic ? 0 : 1];
+    const auto error = [&](const SimulationRun& run) {
+      const PairComparison pair = ComparePair(input, run.trace, truth.trace);
+      const WitnessMetrics own = MeasureWitness(input, run.trace);
+      const auto value = [](const std::map<Metric, Measured>& metrics, Metric metric) {
+        const auto found = metrics.find(metric);
+        return found == metrics.end() ? kNan : found->second.value;
+      };
+      return EngineError{value(pair.metrics, Metric::kForceNrmse),
+                         value(pair.metrics, Metric::kForceMax),
+                         value(own.metrics, Metric::kClosureM)};
+    };
+    EngineComparison engines{.truth = truth.name, .stock = {}, .corrected = {}, .failure = {}};
+    const bool judged_stock = scenario_.simulation.stock_engine;
+    (judged_stock ? engines.stock : engines.corrected) = error(*simulation_);
+    if (other_engine_->summary.ok()) {
+      (judged_stock ? engines.corrected : engines.stock) = error(*other_engine_);
+    } else {
+      engines.failure = other_engine_->summary.message;
+    }
+    report_.engine_comparison = std::move(engines);
+  }
+
+  void DrawPictures() {
+    if (!options_.pictures || options_.out_dir.empty() || !simulation_ ||
+        simulation_->X_WB.empty() || scenario_.snapshots.times_s.empty()) {
+      return;
+    }
+    const RunSummary drawn =
+        DrawSnapshots(scenario_, mechanisms_.simulated, *simulation_, report_, &pictures_);
+    report_.timing.render_s = drawn.wall_s;
+    if (!drawn.ok()) {
+      Finding finding;
+      finding.severity = Severity::kWarning;
+      finding.message = "no pictures: " + drawn.message;
+      report_.findings.Add(std::move(finding));
+    }
+    for (const PictureFile& picture : pictures_) report_.pictures.push_back(picture.name);
+  }
+
+  int ExitCode() const {
+    switch (report_.comparison.verdict) {
+      case Verdict::kAgree:
+        return 0;
+      case Verdict::kDisagree:
+        return 1;
+      case Verdict::kNotRun:
+        return 3;
+    }
+    return 4;
+  }
+
+  void WriteFiles() {
+    if (options_.out_dir.empty()) return;
+    OutputFolder folder(std::filesystem::path(options_.out_dir) / base_.name / scenario_.name);
+    std::string trouble = folder.Create();
+    const auto write = [&](const std::string& name, const std::string& content) {
+      if (trouble.empty()) trouble = folder.Write(name, content);
+    };
+    write("traces.csv", ToCsv(report_));
+    if (simulation_ && !simulation_->mjcf.empty()) write("model.xml", simulation_->mjcf);
+    for (const PictureFile& picture : pictures_) {
+      write("snapshots/" + picture.name, picture.content);
+    }
+    write("summary.json", ToJson(report_));
+    if (trouble.empty()) trouble = folder.Commit();
+    if (trouble.empty()) {
+      outcome_.folder = folder.target();
+      return;
+    }
+    Finding finding;
+    finding.message = trouble;
+    finding.hint = "choose another folder with --out";
+    outcome_.diagnostics.Add(std::move(finding));
+    outcome_.exit_code = 2;
+  }
+
+  const std::string file_;
+  const RunOptions& options_;
+  RunOutcome outcome_;
+  Scenario scenario_;
+  Mechanism base_;
+  WitnessMechanisms mechanisms_;
+  ClosedFormChoice closed_form_;
+  Report report_;
+  std::optional<SimulationRun> simulation_, other_engine_;
+  std::vector<PictureFile> pictures_;
+};
+
+}  // namespace
+
+RunOutcome RunScenario(const std::string& file, const RunOptions& options) {
+  return ScenarioRun(file, options).Run();
+}
+
+}  // namespace mbv

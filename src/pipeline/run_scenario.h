@@ -1,0 +1,35 @@
+// One scenario through all stages: load → witnesses → comparison → files.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "core/diagnostics.h"
+#include "report/report.h"
+#include "scenario/load_scenario.h"
+
+namespace mbv {
+
+/// Stage ("simulation") and how much of it is done (0 … 1).
+using ProgressFunction = std::function<void(const std::string& stage, double fraction)>;
+
+struct RunOptions {
+  ScenarioOptions scenario;
+  std::string out_dir;   ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
+  bool pictures = true;  ///< needs out_dir
+  ProgressFunction progress;
+};
+
+struct RunOutcome {
+  int exit_code = 4;             ///< 0 agree, 1 disagree, 2 bad input, 3 could not run
+  Diagnostics diagnostics;       ///< bad input and warnings
+  std::optional<Report> report;  ///< empty after bad input
+  std::string folder;            ///< what was written; "" if nothing
+};
+
+/// Runs a scenario file. Bad input and numerical trouble are in the outcome; only our own bugs
+/// throw (InternalError).
+[[nodiscard]] RunOutcome RunScenario(const std::string& file, const RunOptions& options);
+
+}  // namespace mbv

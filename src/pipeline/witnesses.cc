@@ -1,0 +1,183 @@
+#include "pipeline/witnesses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/demand.h"
+#include "mechanism/load_model.h"
+#include "reference/reference.h"
+
+namespace mbv {
+namespace {
+
+void AddError(const Scenario& scenario, const std::string& message, const std::string& hint,
+              Diagnostics* diagnostics) {
+  Finding finding;
+  finding.file = scenario.file;
+  finding.message = message;
+  finding.hint = hint;
+  diagnostics->Add(std::move(finding));
+}
+
+// The base mechanism, or the model loaded again with a witness' own overrides.
+Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Overrides& own,
+                      const std::string& witness, Diagnostics* diagnostics) {
+  if (own.empty()) return base;
+  LoadOptions options;
+  options.overrides = Merge(scenario.parameters, own);
+  LoadResult loaded = LoadModel(scenario.model_file, options);
+  if (loaded.mechanism) return *std::move(loaded.mechanism);
+  diagnostics->Append(loaded.diagnostics);
+  AddError(scenario,
+           fmt::format("the model cannot be loaded with the parameters of the {} witness", witness),
+           "", diagnostics);
+  return base;
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+bool Contains(const std::vector<std::string>& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+SimulationOptions OptionsOf(const Scenario& scenario, Engine engine) {
+  SimulationOptions options;
+  options.mode = scenario.simulation.forward ? SimulationMode::kForward : SimulationMode::kInverse;
+  options.engine = engine;
+  options.step_s = scenario.simulation.step_s;
+  return options;
+}
+
+}  // namespace
+
+WitnessMechanisms LoadWitnessMechanisms(const Scenario& scenario, const Mechanism& base,
+                                        Diagnostics* diagnostics) {
+  return {LoadVariant(scenario, base, scenario.analytic.parameters, "analytic", diagnostics),
+          LoadVariant(scenario, base, scenario.reference.parameters, "reference", diagnostics),
+          LoadVariant(scenario, base, scenario.simulation.parameters, "simulated", diagnostics)};
+}
+
+ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
+                                Diagnostics* diagnostics) {
+  if (!scenario.analytic.on) return {nullptr, "switched off in the scenario"};
+  const ClosedFormRow* row = FindClosedForm(mechanism.name);
+  if (row == nullptr) return {nullptr, "there are no closed-form equations for " + mechanism.name};
+  const AnalyticSettings& settings = scenario.analytic;
+  bool fits = true;
+  if (!settings.model.empty() && !Contains(row->models, settings.model)) {
+    AddError(
+        scenario,
+        fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(row->models)),
+        "", diagnostics);
+    fits = false;
+  }
+  for (const std::string& erratum : settings.as_printed) {
+    if (Contains(row->errata, erratum)) continue;
+    AddError(
+        scenario,
+        fmt::format("analytic.as_printed: '{}' is not one of: {}", erratum, Joined(row->errata)),
+        "", diagnostics);
+    fits = false;
+  }
+  if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
+  Diagnostics found;
+  auto closed_form =
+      row->factory(mechanism, scenario.motion,
+                   {.model = settings.model, .as_printed = settings.as_printed}, &found);
+  for (Finding finding : found.findings()) {
+    if (finding.file.empty()) finding.file = scenario.file;
+    diagnostics->Add(std::move(finding));
+  }
+  if (closed_form == nullptr) return {nullptr, "the closed form does not suit this scenario"};
+  return {std::move(closed_form), ""};
+}
+
+DrivenMotion DriveByClosedForm(const Motion& motion, std::shared_ptr<ClosedForm> closed_form) {
+  auto command = std::make_shared<CommandSample>();
+  return
+      [&motion, command, closed_form = std::move(closed_form)](double t_s, DrivenSample* driven) {
+        EvaluateMotion(motion, t_s, command.get());
+        return closed_form->Kinematics(*command, driven);
+      };
+}
+
+DrivenMotion DriveByReference(const Mechanism& mechanism, const Motion& motion) {
+  struct State {
+    ReferenceSolver solver;
+    CommandSample command;
+    ReferenceSample sample;
+  };
+  auto state = std::make_shared<State>(State{ReferenceSolver(mechanism, motion), {}, {}});
+  return [&motion, state](double t_s, DrivenSample* driven) {
+    EvaluateMotion(motion, t_s, &state->command);
+    RunSummary summary = state->solver.Kinematics(state->command, &state->sample);
+    if (summary.ok()) *driven = state->sample.driven;
+    return summary;
+  };
+}
+
+Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, double target) {
+  MBV_DEMAND(a.values.rows() == b.values.rows() && a.values.cols() == b.values.cols(),
+             a.values.rows());
+  MBV_DEMAND(at_a != at_b, at_a);
+  Trace trace = a;
+  const double factor = (target - at_a) / (at_b - at_a);
+  for (size_t c = 0; c < a.channels.size(); ++c) {
+    const auto column = static_cast<Eigen::Index>(c);
+    const Channel& channel = a.channels[c];
+    if (channel.unit == "N" || channel.unit == "N m" || channel.unit == "W") {
+      trace.values.col(column) += factor * (b.values.col(column) - a.values.col(column));
+    } else if (channel.name.starts_with("closure.")) {
+      trace.values.col(column) = a.values.col(column).cwiseAbs().cwiseMax<Eigen::PropagateNaN>(
+          b.values.col(column).cwiseAbs());
+    }
+  }
+  return trace;
+}
+
+SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
+                               const DrivenMotion& driven, Engine engine,
+                               const std::function<void(double)>& progress) {
+  SimulatedWitness witness;
+  const SimulationOptions options = OptionsOf(scenario, engine);
+  witness.diagnostics = Check(options);
+  if (witness.diagnostics.has_errors()) return witness;
+  if (!scenario.simulation.extrapolate) {
+    witness.run = Simulate(mechanism, scenario.motion, driven, options, progress);
+    return witness;
+  }
+  const Extrapolation& extrapolation = *scenario.simulation.extrapolate;
+  const Overrides base = Merge(scenario.parameters, scenario.simulation.parameters);
+  std::array<SimulationRun, 2> runs;
+  for (size_t k = 0; k < 2; ++k) {
+    const Mechanism variant = LoadVariant(
+        scenario, mechanism, Merge(base, {{extrapolation.parameter, extrapolation.from[k]}}),
+        "simulated", &witness.diagnostics);
+    if (witness.diagnostics.has_errors()) return witness;
+    const auto half = [&](double fraction) {
+      if (progress) progress(0.5 * (static_cast<double>(k) + fraction));
+    };
+    runs[k] = Simulate(variant, scenario.motion, driven, options, half);
+    if (!runs[k].summary.ok()) {
+      witness.run = std::move(runs[k]);
+      return witness;
+    }
+  }
+  const double target = mechanism.ParameterValue(extrapolation.parameter);
+  const Trace trace = Extrapolate(runs[0].trace, extrapolation.from[0], runs[1].trace,
+                                  extrapolation.from[1], target);
+  witness.run = std::move(runs[0]);
+  witness.run.trace = trace;
+  witness.run.steps += runs[1].steps;
+  witness.run.loop_wall_s += runs[1].loop_wall_s;
+  witness.run.summary.wall_s += runs[1].summary.wall_s;
+  return witness;
+}
+
+}  // namespace mbv
