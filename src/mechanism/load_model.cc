@@ -13,7 +13,7 @@ LoadResult ModelReader::Load(const std::string& text) {
   if (root_ != nullptr) ReadAll();
   LoadResult result;
   result.diagnostics.Append(yaml_.diagnostics());
-  result.diagnostics.Append(override_findings_);
+  result.diagnostics.Append(other_findings_);
   if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism_);
   return result;
 }
@@ -43,13 +43,14 @@ void ModelReader::ReadAll() {
     }
   }
   yaml_.SetNote("");
+  WeldUrdfRoot();
   OrderDrives(*root_);
   CheckCoordinateNames();
   CheckMasses();
   // With a broken joint, findings about the graph would only be its consequences; with a broken
   // number, those about the loops.
   if (!joints_good_ || !CheckTree()) return;
-  if (yaml_.has_errors() || override_findings_.has_errors()) return;
+  if (yaml_.has_errors() || other_findings_.has_errors()) return;
   CloseLoops();
   if (yaml_.has_errors()) return;
   CheckHome();

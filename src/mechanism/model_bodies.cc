@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include "mechanism/model_reader.h"
-#include "mechanism/urdf.h"
 
 namespace mbv {
 

@@ -13,35 +13,53 @@
 
 namespace mbv {
 
-void ModelReader::CheckMasses() {
-  for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
-    if (body_places_[b] == nullptr) continue;
-    CheckMass(mechanism_.bodies[b], *body_places_[b], body_paths_[b]);
-  }
-}
+namespace {
 
-void ModelReader::CheckMass(const Body& body, const YamlEntry& at, const std::string& path) {
-  if (!std::isfinite(body.mass)) return;  // already reported
-  yaml_.SetNote(body.name == at.key ? "" : fmt::format(" (body {})", body.name));
+struct Reason {
+  std::string text;  // empty: nothing wrong
+  std::string hint;
+};
+
+// Why no distribution of mass has this mass and inertia.
+Reason WhyNotPhysical(const Body& body) {
   if (body.mass == 0.0) {
-    if (body.I_Bcm_B.isZero(0.0)) return;
-    yaml_.Error(at, fmt::format("{}: an inertia without mass", path),
-                "give the mass, or leave both out for a massless connecting piece");
-    return;
+    if (body.I_Bcm_B.isZero(0.0)) return {};
+    return {"an inertia without mass",
+            "give the mass, or leave both out for a massless connecting piece"};
+  }
+  if (body.I_Bcm_B.isZero(0.0)) {
+    return {fmt::format("mass = {} without inertia", body.mass),
+            "give the inertia about the centre of mass"};
   }
   const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
-  const std::string shown =
-      fmt::format("{:.6g}, {:.6g}, {:.6g} kg m²", principal[0], principal[1], principal[2]);
-  if (body.I_Bcm_B.isZero(0.0)) {
-    yaml_.Error(at, fmt::format("{}: mass = {} without inertia", path, body.mass),
-                "give the inertia about the centre of mass");
-  } else if (!(principal[0] > 0.0)) {
-    yaml_.Error(at, fmt::format("{}: principal inertias {} violate I > 0", path, shown));
-  } else if (principal[0] + principal[1] < principal[2] * (1.0 - 1e-9)) {
-    yaml_.Error(at, fmt::format("{}: principal inertias {} violate I1 + I2 >= I3", path, shown),
-                "no distribution of mass has such inertias; look for exchanged or missing digits, "
-                "and that they are about the centre of mass");
+  const std::string shown = fmt::format("principal inertias {:.6g}, {:.6g}, {:.6g} kg m²",
+                                        principal[0], principal[1], principal[2]);
+  if (!(principal[0] > 0.0)) return {shown + " violate I > 0", ""};
+  if (principal[0] + principal[1] < principal[2] * (1.0 - 1e-9)) {
+    return {shown + " violate I1 + I2 >= I3",
+            "no distribution of mass has such inertias; look for exchanged or missing digits, and "
+            "that they are about the centre of mass"};
   }
+  return {};
+}
+
+}  // namespace
+
+void ModelReader::CheckMasses() {
+  for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
+    const Body& body = mechanism_.bodies[b];
+    if (!std::isfinite(body.mass)) continue;  // already reported
+    const Reason reason = WhyNotPhysical(body);
+    if (reason.text.empty()) continue;
+    if (const YamlEntry* at = body_places_[b]; at != nullptr) {
+      yaml_.SetNote(body.name == at->key ? "" : fmt::format(" (body {})", body.name));
+      yaml_.Error(*at, body_paths_[b] + ": " + reason.text, reason.hint);
+    } else {
+      other_findings_.Add({Severity::kError, body_paths_[b], 0, 0,
+                           fmt::format("link '{}': {}", body.name, reason.text), reason.hint});
+    }
+  }
+  yaml_.SetNote("");
 }
 
 bool ModelReader::CheckTree() {

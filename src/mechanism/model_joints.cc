@@ -77,7 +77,9 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
                                         JointKind::kUniversal, JointKind::kSpherical,
                                         JointKind::kPlanar,    JointKind::kFree}[*choice];
     good = ReadAxes(block, map, &joint) && good;
-    ReadGuess(block, map, &joint);
+    if (const auto guess = map.FindInUnit("guess", {kPlain, kDeg, kMm}); guess.node != nullptr) {
+      ReadGuess(block, *guess.node, map.PathOf(guess.key), guess.unit, &joint);
+    }
     ReadJointRange(block, map, &joint);
     good = ReadFreeChoices(map, &joint) && good;
   }
@@ -100,7 +102,6 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   hints_.resize(mechanism_.joints.size());
   hints_.back() = hint;
   joint_places_.push_back(&entry);
-  joint_paths_.push_back(path);
 }
 
 bool ModelReader::ReadAxes(const Block& block, const YamlMap& map, Joint* joint) {
@@ -131,22 +132,19 @@ bool ModelReader::ReadAxes(const Block& block, const YamlMap& map, Joint* joint)
   return false;
 }
 
-void ModelReader::ReadGuess(const Block& block, const YamlMap& map, Joint* joint) {
-  const YamlMap::InUnit guess = map.FindInUnit("guess", {kPlain, kDeg, kMm});
-  if (guess.node == nullptr) return;
-  const std::string path = map.PathOf(guess.key);
+void ModelReader::ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
+                            const UnitSuffix& unit, Joint* joint) {
   const int n = FreedomsOf(joint->kind);
-  if (n == 1 && guess.node->is_scalar()) {
-    joint->guess[0] =
-        Number(block, *guess.node, path, FactorOf(guess.unit, joint->kind, 0)).value_or(0.0);
+  if (n == 1 && node.is_scalar()) {
+    joint->guess[0] = Number(block, node, path, FactorOf(unit, joint->kind, 0)).value_or(0.0);
     return;
   }
-  const auto items = yaml_.Items(*guess.node, path, n);
+  const auto items = yaml_.Items(node, path, n);
   if (!items) return;
   for (int k = 0; k < n; ++k) {
-    joint->guess[k] = Number(block, *(*items)[k], fmt::format("{}[{}]", path, k),
-                             FactorOf(guess.unit, joint->kind, k))
-                          .value_or(0.0);
+    joint->guess[k] =
+        Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), FactorOf(unit, joint->kind, k))
+            .value_or(0.0);
   }
 }
 

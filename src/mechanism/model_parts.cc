@@ -12,7 +12,7 @@ namespace {
 const std::vector<std::string> kModelKeys = {"name",       "description", "parameters", "gravity",
                                              "world",      "bodies",      "joints",     "drives",
                                              "prescribed", "outputs",     "springs",    "parts",
-                                             "instances",  "drive_order", "urdf"};
+                                             "instances",  "drive_order", "urdf",       "attach"};
 const std::vector<std::string> kPartKeys = {"parameters", "attach",     "bodies",  "joints",
                                             "drives",     "prescribed", "outputs", "springs",
                                             "instances",  "description"};
@@ -146,7 +146,7 @@ void ModelReader::CheckOverrides() {
       const std::string near = ClosestWord(name, known_parameters_);
       if (!near.empty()) finding.hint = fmt::format("did you mean '{}'?", near);
     }
-    override_findings_.Add(finding);
+    other_findings_.Add(finding);
   }
 }
 

@@ -17,6 +17,7 @@
 #include "mechanism/load_model.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/spanning_tree.h"
+#include "mechanism/urdf.h"
 #include "mechanism/yaml_reader.h"
 
 namespace mbv {
@@ -91,13 +92,19 @@ class ModelReader {
                              int body);
   std::optional<Ball> ReadBall(const Block& block, const YamlNode& node, const std::string& path,
                                int body);
+
+  // model_urdf.cc
   void ImportUrdf(const YamlNode& node);
+  void ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& joints);
+  void AddUrdf(const UrdfTree& tree, const std::string& file);
+  void WeldUrdfRoot();
 
   // model_joints.cc
   void ReadJoints(const Block& block);
   void ReadJoint(const Block& block, const YamlEntry& entry);
   bool ReadAxes(const Block& block, const YamlMap& map, Joint* joint);
-  void ReadGuess(const Block& block, const YamlMap& map, Joint* joint);
+  void ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
+                 const UnitSuffix& unit, Joint* joint);
   void ReadJointRange(const Block& block, const YamlMap& map, Joint* joint);
   bool ReadFreeChoices(const YamlMap& map, Joint* joint);
 
@@ -115,7 +122,6 @@ class ModelReader {
 
   // model_checks.cc
   void CheckMasses();
-  void CheckMass(const Body& body, const YamlEntry& at, const std::string& path);
   bool CheckTree();
   void CloseLoops();
   void ReportTree(const SpanningTreeResult& tree);
@@ -157,15 +163,16 @@ class ModelReader {
   ClosureHints hints_;                          // per joint
   std::vector<const YamlEntry*> body_places_;   // per body; null: the world, URDF links
   std::vector<const YamlEntry*> joint_places_;  // per joint
-  std::vector<std::string> body_paths_, joint_paths_;
-  bool joints_good_ = true;  // false: the graph of joints is not worth checking
+  std::vector<std::string> body_paths_;         // YAML path, or the URDF file
+  bool joints_good_ = true;                     // false: the graph of joints is not worth checking
   struct SignalPlace {
     const char* what;  // "drive", …
     const YamlEntry* entry;
   };
   std::map<std::string, std::vector<SignalPlace>> signal_places_;
+  int urdf_root_ = -1;  // body that needs a joint to the world
   std::map<std::string, bool> override_used_;
-  Diagnostics override_findings_;              // they belong to the file that overrides
+  Diagnostics other_findings_;  // of other files: overrides, URDF
   std::vector<std::string> known_parameters_;  // dotted names, for "did you mean"
 };
 

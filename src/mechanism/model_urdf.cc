@@ -1,10 +1,87 @@
-// The `urdf:` key of a model file.
+// The `urdf:` key of a model file: FILE, or {file: FILE, guess: {JOINT: …}}.
+#include <fmt/format.h>
+
+#include <filesystem>
+
 #include "mechanism/model_reader.h"
+#include "mechanism/urdf.h"
 
 namespace mbv {
 
 void ModelReader::ImportUrdf(const YamlNode& node) {
-  yaml_.Error(node, "urdf: reading URDF files is not available");
+  const bool short_form = node.is_scalar();
+  const YamlMap map(&yaml_, short_form ? nullptr : &node, "urdf", {"file", "guess", "guess_deg"});
+  const YamlNode* name = short_form ? &node : map.Required("file");
+  const auto file = name == nullptr ? std::nullopt : yaml_.Text(*name, "urdf");
+  joints_good_ = false;  // until the tree is read
+  if (!file) return;
+  const std::filesystem::path path = std::filesystem::path(yaml_.file()).parent_path() / *file;
+  YamlReader reader(path.string());
+  const auto text = reader.ReadFile();
+  if (!text) {
+    yaml_.Error(*name, fmt::format("urdf = {} cannot be read", Describe(*name)),
+                "the path is relative to this file");
+    return;
+  }
+  Diagnostics findings;
+  const UrdfTree tree = ReadUrdf(*text, path.string(), &findings);
+  other_findings_.Append(findings);
+  if (findings.has_errors()) return;
+  if (!Room(node, tree.bodies.size(), kMaxBodies + 1, "bodies")) return;
+  joints_good_ = true;
+  AddUrdf(tree, path.string());
+  ReadUrdfGuesses(map, tree.joints);
+}
+
+void ModelReader::AddUrdf(const UrdfTree& tree, const std::string& file) {
+  const int first = static_cast<int>(mechanism_.bodies.size());
+  for (const Body& body : tree.bodies) {
+    mechanism_.bodies.push_back(body);
+    body_places_.push_back(nullptr);
+    body_paths_.push_back(file);
+  }
+  const auto index = [first](int body) { return body < 0 ? 0 : first + body; };
+  for (Joint joint : tree.joints) {
+    joint.parent = index(joint.parent);
+    joint.child = index(joint.child);
+    mechanism_.joints.push_back(joint);
+    joint_places_.push_back(nullptr);
+  }
+  hints_.resize(mechanism_.joints.size());
+  if (tree.root >= 0) urdf_root_ = first + tree.root;
+}
+
+void ModelReader::ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& joints) {
+  const auto found = map.FindInUnit("guess", {kPlain, kDeg});
+  if (found.node == nullptr) return;
+  const Block& model = blocks_.front();
+  for (const YamlEntry& entry : yaml_.Entries(*found.node, map.PathOf(found.key))) {
+    const std::string path = JoinPath(map.PathOf(found.key), entry.key);
+    const int index = mechanism_.FindJoint(entry.key);
+    if (index < 0) {
+      std::vector<std::string> names;
+      for (const Joint& joint : joints) names.push_back(joint.name);
+      const std::string near = ClosestWord(entry.key, names);
+      yaml_.Error(entry, fmt::format("{}: there is no such joint in the URDF file", path),
+                  near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+      continue;
+    }
+    ReadGuess(model, *entry.value, path, found.unit, &mechanism_.joints[index]);
+  }
+}
+
+// The root link is fixed to the world unless a joint of the model file carries it.
+void ModelReader::WeldUrdfRoot() {
+  if (urdf_root_ < 0) return;
+  for (const Joint& joint : mechanism_.joints) {
+    if (joint.child == urdf_root_ || (joint.parent == urdf_root_ && joint.child == 0)) return;
+  }
+  Joint weld;
+  weld.name = mechanism_.bodies[urdf_root_].name + ".weld";
+  weld.child = urdf_root_;
+  mechanism_.joints.push_back(weld);
+  joint_places_.push_back(nullptr);
+  hints_.resize(mechanism_.joints.size());
 }
 
 }  // namespace mbv

@@ -1,14 +1,41 @@
-// URDF export of the spanning tree and import of a URDF tree, through urdfdom's types.
+// URDF: the spanning tree of a mechanism as URDF text, and a URDF file as bodies and joints.
+//
+// Conventions of URDF (as urdfdom reads it, pinned by tests/mechanism/urdf_test.cc): a link's frame
+// is the frame of the joint that carries it; `rpy` is Rz(yaw) Ry(pitch) Rx(roll); a joint's axis is
+// given in the joint frame; an inertia is about the centre of mass, in the axes of its own
+// `origin`.
 #pragma once
 
 #include <string>
+#include <vector>
 
-#include "mechanism/load_model.h"
+#include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
 
-/// The spanning tree as URDF text (closures are listed in a comment and cannot be stated).
+/// The spanning tree as URDF text. Joints with several coordinates become chains of single ones
+/// with massless links between ("JOINT.yaw", "JOINT.pitch", …). What URDF cannot state (closures,
+/// drives, home pose) stands in a comment as a model.yaml that reads this file back: cut the
+/// comment out, name the URDF file in its `urdf:` key, and the same mechanism results (dots in the
+/// names of drives and closures become _).
 [[nodiscard]] std::string WriteUrdf(const Mechanism& mechanism);
+
+/// The model.yaml in that comment.
+[[nodiscard]] std::string WriteUrdfCompanion(const Mechanism& mechanism,
+                                             const std::string& urdf_file);
+
+/// What a URDF file holds.
+struct UrdfTree {
+  std::string name;
+  std::vector<Body> bodies;   ///< without a root link named "world"
+  std::vector<Joint> joints;  ///< body indices count `bodies`; -1 is the world
+  int root = -1;              ///< index of the root link; -1 if it is the world
+};
+
+/// Reads URDF text; everything urdfdom says is a finding. Mimic joints, meshes and textures are
+/// left out with a warning. The tree is empty after an error.
+[[nodiscard]] UrdfTree ReadUrdf(const std::string& text, const std::string& file,
+                                Diagnostics* diagnostics);
 
 }  // namespace mbv

@@ -55,6 +55,9 @@ struct YamlNode {
 /// The value of `text` if it is a plain, finite-or-not decimal number ("0.2", "1e-3", "-4").
 [[nodiscard]] std::optional<double> PlainNumber(std::string_view text);
 
+/// Offset of the first byte that is no UTF-8 text (control characters included), or npos.
+[[nodiscard]] size_t FindNonText(const std::string& text);
+
 /// Parses and reads one file; collects its findings (each once, at most kMaxFindings).
 class YamlReader {
  public:

@@ -151,7 +151,8 @@ class TreeBuilder : public YAML::EventHandler {
   std::map<const YamlNode*, std::map<std::string, int>> keys_;
 };
 
-// Offset of the first byte that is no UTF-8 text (control characters included), or npos.
+}  // namespace
+
 size_t FindNonText(const std::string& text) {
   size_t i = 0;
   while (i < text.size()) {
@@ -174,8 +175,6 @@ size_t FindNonText(const std::string& text) {
   }
   return std::string::npos;
 }
-
-}  // namespace
 
 YamlNodePtr YamlReader::Parse(const std::string& text) {
   if (text.size() > kMaxBytes) {

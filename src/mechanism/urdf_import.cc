@@ -1,0 +1,256 @@
+#include <console_bridge/console.h>
+#include <fmt/format.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/spatial.h"
+#include "mechanism/urdf.h"
+#include "mechanism/urdf_frames.h"
+#include "mechanism/yaml_reader.h"
+
+namespace mbv {
+namespace {
+
+// urdfdom talks through console_bridge; while this lives, its words become findings.
+class LogCapture : public console_bridge::OutputHandler {
+ public:
+  LogCapture(std::string file, Diagnostics* diagnostics)
+      : file_(std::move(file)), diagnostics_(diagnostics), level_(console_bridge::getLogLevel()) {
+    console_bridge::useOutputHandler(this);
+    console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_WARN);
+  }
+  ~LogCapture() override {
+    console_bridge::restorePreviousOutputHandler();
+    console_bridge::setLogLevel(level_);
+  }
+  LogCapture(const LogCapture&) = delete;
+  LogCapture& operator=(const LogCapture&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    const bool error = level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR;
+    diagnostics_->Add({.severity = error ? Severity::kError : Severity::kWarning,
+                       .file = file_,
+                       .message = "urdfdom: " + text,
+                       .hint = ""});
+  }
+
+ private:
+  std::string file_;
+  Diagnostics* diagnostics_;
+  console_bridge::LogLevel level_;
+};
+
+Vec3 ToVec(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+
+Pose ToPose(const urdf::Pose& p) {
+  Pose X = Pose::Identity();
+  X.translation() = ToVec(p.position);
+  X.linear() = Eigen::Quaterniond(p.rotation.w, p.rotation.x, p.rotation.y, p.rotation.z)
+                   .normalized()
+                   .toRotationMatrix();
+  return X;
+}
+
+class Importer {
+ public:
+  Importer(const std::string& file, Diagnostics* diagnostics)
+      : file_(file), diagnostics_(diagnostics) {}
+
+  UrdfTree Run(const urdf::ModelInterface& model) {
+    tree_.name = model.getName();
+    const urdf::LinkConstSharedPtr root = model.getRoot();
+    // Depth first in name order: the order in the file is lost in urdfdom's maps.
+    AddLink(*root);
+    if (root->name == "world") {
+      if (root->inertial) Warn("the inertia of the link 'world' has no meaning");
+      tree_.root = -1;
+    } else {
+      tree_.root = 0;
+    }
+    return std::move(tree_);
+  }
+
+ private:
+  void Error(const std::string& text, const std::string& hint = "") {
+    diagnostics_->Add({Severity::kError, file_, 0, 0, text, hint});
+  }
+  void Warn(const std::string& text) {
+    diagnostics_->Add({Severity::kWarning, file_, 0, 0, text, ""});
+  }
+
+  void AddLink(const urdf::Link& start) {
+    std::vector<const urdf::Link*> waiting = {&start};
+    while (!waiting.empty()) {
+      const urdf::Link& link = *waiting.back();
+      waiting.pop_back();
+      if (&link == &start && link.name == "world") {
+        index_[link.name] = -1;
+      } else {
+        index_[link.name] = static_cast<int>(tree_.bodies.size());
+        tree_.bodies.push_back(BodyOf(link));
+        if (link.parent_joint) AddJoint(*link.parent_joint);
+      }
+      for (auto it = link.child_links.rbegin(); it != link.child_links.rend(); ++it) {
+        waiting.push_back(it->get());
+      }
+    }
+  }
+
+  Body BodyOf(const urdf::Link& link) {
+    Body body{.name = link.name, .frames = {}, .shapes = {}};
+    if (const auto& inertial = link.inertial) {
+      const Pose X_BI = ToPose(inertial->origin);
+      Mat3 I;
+      I << inertial->ixx, inertial->ixy, inertial->ixz, inertial->ixy, inertial->iyy, inertial->iyz,
+          inertial->ixz, inertial->iyz, inertial->izz;
+      body.mass = inertial->mass;
+      body.p_BoBcm_B = X_BI.translation();
+      body.I_Bcm_B = X_BI.linear() * I * X_BI.linear().transpose();
+      if (!std::isfinite(body.mass) || !body.p_BoBcm_B.allFinite() || !body.I_Bcm_B.allFinite() ||
+          body.mass < 0.0) {
+        Error(
+            fmt::format("link '{}': its inertial values violate mass >= 0 and finite", link.name));
+      }
+    }
+    for (const urdf::VisualSharedPtr& visual : link.visual_array) AddShape(*visual, &body);
+    return body;
+  }
+
+  void AddShape(const urdf::Visual& visual, Body* body) {
+    if (!visual.geometry) return;
+    const Pose X = ToPose(visual.origin);
+    if (!X.matrix().allFinite()) return;
+    Shape shape;
+    if (const auto* box = dynamic_cast<const urdf::Box*>(visual.geometry.get())) {
+      shape.geometry = Box{X, ToVec(box->dim)};
+    } else if (const auto* c = dynamic_cast<const urdf::Cylinder*>(visual.geometry.get())) {
+      const Vec3 half(0, 0, 0.5 * c->length);
+      shape.geometry = Cylinder{X * Vec3(-half), X * half, c->radius};
+    } else if (const auto* s = dynamic_cast<const urdf::Sphere*>(visual.geometry.get())) {
+      shape.geometry = Ball{X.translation(), s->radius};
+    } else {
+      Warn(fmt::format("link '{}': a mesh is left out of the pictures", body->name));
+      return;
+    }
+    if (visual.material) {
+      const urdf::Color& c = visual.material->color;
+      const auto byte = [](float x) {
+        return static_cast<int>(std::lround(255.0 * std::clamp(double{x}, 0.0, 1.0)));
+      };
+      shape.color =
+          fmt::format("#{:02x}{:02x}{:02x}{:02x}", byte(c.r), byte(c.g), byte(c.b), byte(c.a));
+    }
+    body->shapes.push_back(shape);
+  }
+
+  void AddJoint(const urdf::Joint& from) {
+    Joint joint;
+    joint.name = from.name;
+    joint.parent = index_[from.parent_link_name];
+    joint.child = index_[from.child_link_name];
+    joint.X_PF = ToPose(from.parent_to_joint_origin_transform);
+    if (!joint.X_PF.matrix().allFinite()) {
+      Error(fmt::format("joint '{}': its origin is not finite", from.name));
+    }
+    bool has_axis = true;
+    switch (from.type) {
+      case urdf::Joint::REVOLUTE:
+      case urdf::Joint::CONTINUOUS:
+        joint.kind = JointKind::kRevolute;
+        break;
+      case urdf::Joint::PRISMATIC:
+        joint.kind = JointKind::kPrismatic;
+        break;
+      case urdf::Joint::PLANAR:
+        joint.kind = JointKind::kPlanar;
+        break;
+      case urdf::Joint::FLOATING:
+        joint.kind = JointKind::kFree;
+        has_axis = false;
+        break;
+      case urdf::Joint::FIXED:
+        joint.kind = JointKind::kFixed;
+        has_axis = false;
+        break;
+      case urdf::Joint::UNKNOWN:
+        Error(fmt::format("joint '{}' has no known type", from.name));
+        break;
+    }
+    const Vec3 axis = ToVec(from.axis);
+    if (has_axis && !(axis.norm() > 1e-9 && std::isfinite(axis.norm()))) {
+      Error(fmt::format("joint '{}': the axis ({}, {}, {}) has no direction", from.name, axis.x(),
+                        axis.y(), axis.z()));
+    } else if (has_axis) {
+      joint.axis = axis.normalized();
+    }
+    ReadLimits(from, &joint);
+    if (from.mimic) {
+      Warn(fmt::format("joint '{}': mimic is left out; couple drives in the scenario instead",
+                       from.name));
+    }
+    tree_.joints.push_back(joint);
+  }
+
+  void ReadLimits(const urdf::Joint& from, Joint* joint) {
+    const bool limited =
+        from.limits && (from.type == urdf::Joint::REVOLUTE || from.type == urdf::Joint::PRISMATIC);
+    if (!limited || from.limits->lower >= from.limits->upper) return;
+    if (from.limits->lower > -kUrdfNoLimit) joint->range[0].lower = from.limits->lower;
+    if (from.limits->upper < kUrdfNoLimit) joint->range[0].upper = from.limits->upper;
+  }
+
+  std::string file_;
+  Diagnostics* diagnostics_;
+  UrdfTree tree_;
+  std::map<std::string, int> index_;
+};
+
+// TinyXML reads nested elements by recursion: refuse what would exhaust the stack.
+bool NestsDeeperThan(const std::string& xml, int limit) {
+  int depth = 0;
+  for (size_t i = 0; i + 1 < xml.size(); ++i) {
+    if (xml[i] == '<' && xml.compare(i, 4, "<!--") == 0) {
+      i = xml.find("-->", i);
+      if (i == std::string::npos) return false;
+    } else if (xml[i] == '<' && xml[i + 1] == '/') {
+      --depth;
+    } else if (xml[i] == '<' && xml[i + 1] != '?' && xml[i + 1] != '!') {
+      if (++depth > limit) return true;
+    } else if (xml[i] == '/' && xml[i + 1] == '>') {
+      --depth;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics* diagnostics) {
+  const auto fail = [&](const std::string& message) {
+    diagnostics->Add({Severity::kError, file, 0, 0, message, ""});
+    return UrdfTree{};
+  };
+  if (FindNonText(text) != std::string::npos) return fail("the file is not UTF-8 text");
+  if (NestsDeeperThan(text, 100)) return fail("XML elements are nested deeper than 100 levels");
+  Diagnostics said;
+  urdf::ModelInterfaceSharedPtr model;
+  try {
+    const LogCapture capture(file, &said);
+    model = urdf::parseURDF(text);
+  } catch (const std::exception& e) {
+    said.Add({Severity::kError, file, 0, 0, std::string("urdfdom: ") + e.what(), ""});
+  }
+  diagnostics->Append(said);
+  if (said.has_errors()) return {};
+  if (model == nullptr || model->getRoot() == nullptr) return fail("urdfdom finds no robot");
+  Diagnostics read;
+  UrdfTree tree = Importer(file, &read).Run(*model);
+  diagnostics->Append(read);
+  return read.has_errors() ? UrdfTree{} : tree;
+}
+
+}  // namespace mbv
