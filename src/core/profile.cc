@@ -1,5 +1,6 @@
 #include "core/profile.h"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -83,7 +84,35 @@ struct Evaluator {
   }
 };
 
+struct BreakFinder {
+  std::vector<double>* times;
+
+  void Ends(double start_s, double duration_s) const {
+    times->push_back(start_s);
+    times->push_back(start_s + duration_s);
+  }
+  void operator()(const ConstantTerm&) const {}
+  void operator()(const RampTerm&) const {}
+  void operator()(const SineTerm&) const {}
+  void operator()(const PolyStepTerm& p) const { Ends(p.start_s, p.duration_s); }
+  void operator()(const CycloidStepTerm& c) const { Ends(c.start_s, c.duration_s); }
+  void operator()(const BumpTerm& b) const { Ends(b.start_s, b.duration_s); }
+  void operator()(const RampCruiseTerm& r) const {
+    const auto [ramp_s, ramp_length, cruise_s] = TimesOf(r);
+    Ends(r.start_s, ramp_s + cruise_s);
+    if (cruise_s > 0.0) Ends(r.start_s + 0.5 * ramp_s, cruise_s);
+  }
+};
+
 }  // namespace
+
+std::vector<double> BreakTimes(const Profile& profile) {
+  std::vector<double> times;
+  for (const ProfileTerm& term : profile.terms) std::visit(BreakFinder{&times}, term);
+  std::sort(times.begin(), times.end());
+  times.erase(std::unique(times.begin(), times.end()), times.end());
+  return times;
+}
 
 Jet Evaluate(const ProfileTerm& term, double t_s) { return std::visit(Evaluator{t_s}, term); }
 

@@ -60,6 +60,10 @@ struct Profile {
 /// Duration of a ramp–cruise–ramp segment [s].
 [[nodiscard]] double Duration(const RampCruiseTerm& term);
 
+/// Times at which some derivative of the profile jumps (ascending, without repetition) [s]: an
+/// integrator should step onto them.
+[[nodiscard]] std::vector<double> BreakTimes(const Profile& profile);
+
 [[nodiscard]] inline Profile Constant(double value) { return {{ConstantTerm{value}}}; }
 
 }  // namespace mbv

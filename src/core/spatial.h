@@ -55,10 +55,14 @@ inline Mat3 RotZ(double a) { return Eigen::AngleAxisd(a, Vec3::UnitZ()).toRotati
 /// Rz(yaw) Ry(pitch) Rx(roll), the URDF convention.
 inline Mat3 RotRpy(const Vec3& rpy) { return RotZ(rpy.z()) * RotY(rpy.y()) * RotX(rpy.x()); }
 
-/// Roll, pitch, yaw of R = Rz Ry Rx, pitch in [-π/2, π/2].
+/// Roll, pitch, yaw of R = Rz Ry Rx, pitch in [-π/2, π/2]. At pitch = ±π/2 roll and yaw are not
+/// unique; they are then one of the pairs that reproduce R.
 inline Vec3 RpyOf(const Mat3& R) {
-  return {std::atan2(R(2, 1), R(2, 2)), std::atan2(-R(2, 0), std::hypot(R(2, 1), R(2, 2))),
-          std::atan2(R(1, 0), R(0, 0))};
+  const double yaw = std::atan2(R(1, 0), R(0, 0));
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  // Rz(-yaw) R = Ry Rx holds whatever yaw came from rounding.
+  return {std::atan2(s * R(0, 2) - c * R(1, 2), c * R(1, 1) - s * R(0, 1)),
+          std::atan2(-R(2, 0), c * R(0, 0) + s * R(1, 0)), yaw};
 }
 
 /// Rotation vector log(R) [rad], |log| in [0, π].

@@ -22,9 +22,9 @@ enum class Engine {
 struct SimulationOptions {
   SimulationMode mode = SimulationMode::kForward;
   Engine engine = Engine::kCorrected;
-  double step_s = 1e-3;           ///< integration step, > 0; samples fall on whole steps
-  double loop_tc_steps = 2.0;     ///< time constant of the closures in steps, >= 2
-  double drive_tc_steps = 50.0;   ///< time constant of the drives' guidance in steps, >= 2
+  double step_s = 1e-3;          ///< integration step, > 0; samples fall on whole steps
+  double loop_tc_steps = 2.0;    ///< time constant of the closures in steps, >= 2
+  double drive_tc_steps = 50.0;  ///< time constant of the drives' guidance in steps, >= 2
 };
 [[nodiscard]] Diagnostics Check(const SimulationOptions& options);
 
@@ -32,14 +32,17 @@ struct SimulationOptions {
 using DrivenMotion = std::function<RunSummary(double t_s, DrivenSample* driven)>;
 
 struct SimulationRun {
-  Trace trace;          ///< drive, output, prescribed, closure-reaction and audit channels
+  Trace trace;  ///< drive, output, prescribed, closure-reaction and audit channels
   RunSummary summary;
-  MatX qpos;            ///< samples × nq, MuJoCo's configuration, for pictures
+  MatX qpos;                            ///< samples × nq, MuJoCo's configuration, for pictures
   std::vector<std::vector<Pose>> X_WB;  ///< per sample, per body of the mechanism
-  std::string mjcf;     ///< the model as simulated
+  std::string mjcf;                     ///< the model as simulated
   long steps = 0;
-  double loop_wall_s = 0.0;          ///< time in the step loop
-  std::vector<std::string> warnings; ///< MuJoCo's warnings
+  double loop_wall_s = 0.0;           ///< time in the step loop
+  std::vector<std::string> warnings;  ///< MuJoCo's warnings
+  /// Drives and prescribed joints whose force is not unique (a self-stress of the mechanism acts
+  /// on them): what is reported is one choice of many.
+  std::vector<std::string> not_unique;
 };
 
 /// `motion` gives duration, sample times and loads; `driven` gives the commanded motion, evaluated

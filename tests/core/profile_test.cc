@@ -51,6 +51,19 @@ TEST(Profile, RampCruiseReachesItsLimitsAndItsEnd) {
   EXPECT_NEAR(Evaluate(pure, 0.5 * Duration(pure)).rate, 0.604446, 1e-6);
 }
 
+TEST(Profile, BreakTimesAreTheEndsOfItsPieces) {
+  const Profile sum{{RampCruiseTerm{0.1, 0.24, 0.75, 10.0, 0.24}, PolyStepTerm{0.1, 0.5, 1.0},
+                     SineTerm{1.0, 1.0, 0.0}}};
+  const std::vector<double> times = BreakTimes(sum);
+  ASSERT_EQ(times.size(), 5u);
+  EXPECT_DOUBLE_EQ(times[0], 0.1);
+  EXPECT_NEAR(times[3], 0.1 + Duration(RampCruiseTerm{0.1, 0.24, 0.75, 10.0, 0.24}), 1e-15);
+  EXPECT_DOUBLE_EQ(times[4], 0.6);
+  // Ramp and cruise join where the speed limit is reached.
+  EXPECT_NEAR(Evaluate(sum.terms[0], times[1]).rate, 0.75, 1e-12);
+  EXPECT_NEAR(Evaluate(sum.terms[0], times[2]).rate, 0.75, 1e-12);
+}
+
 TEST(Profile, SumAddsItsTerms) {
   const Profile sum{{ConstantTerm{1.0}, RampTerm{2.0}}};
   const Jet jet = Evaluate(sum, 3.0);

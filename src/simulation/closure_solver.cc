@@ -1,0 +1,162 @@
+#include "simulation/closure_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbv::simulation {
+namespace {
+
+constexpr int kMaxNewton = 15;
+// Newton stops when the last step was so small that the next one would be round-off.
+constexpr double kSmallStep = 1e-12;
+// Below this step the factors of the previous iterate serve on, with refinement.
+constexpr double kChordStep = 1e-5;
+// A solution of Newton must be closed to this [m or rad].
+constexpr double kClosed = 1e-10;
+// Relative rank tolerance, columns of J having the natural scale of metres and radians.
+constexpr double kRankTolerance = 1e-9;
+
+}  // namespace
+
+ClosureSolver::ClosureSolver(ConstraintSystem* system) : system_(system) {
+  const int rows = system->rows(), nv = system->nv();
+  rhs_.setZero(rows);
+  step_.setZero(nv);
+  bias_.setZero(rows);
+  if (rows == nv) lu_ = Eigen::PartialPivLU<MatX>(rows);
+}
+
+void ClosureSolver::Factor() {
+  stale_ = false;
+  if (system_->rows() == system_->nv()) {
+    lu_.compute(system_->J());
+    // The ratio of the pivots is a cheap warning sign of rank deficiency.
+    const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
+    if (pivots.minCoeff() > kRankTolerance * pivots.maxCoeff()) {
+      regular_ = true;
+      rank_ = system_->nv();
+      return;
+    }
+  }
+  regular_ = false;
+  cod_.setThreshold(kRankTolerance);
+  cod_.compute(system_->J());
+  rank_ = static_cast<int>(cod_.rank());
+}
+
+void ClosureSolver::SolveInto(const VecX& b, VecX* x) {
+  if (!regular_) {
+    *x = cod_.solve(b);
+    return;
+  }
+  *x = lu_.solve(b);
+  if (!stale_) return;
+  refinement_ = b;
+  refinement_.noalias() -= system_->J() * *x;
+  *x += lu_.solve(refinement_);
+}
+
+void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
+  if (!regular_) {
+    *x = cod_.transpose().solve(b);
+    return;
+  }
+  *x = lu_.transpose().solve(b);
+  if (!stale_) return;
+  refinement_ = b;
+  refinement_.noalias() -= system_->J().transpose() * *x;
+  step_ = lu_.transpose().solve(refinement_);
+  *x += step_;
+}
+
+RunSummary ClosureSolver::Close(const VecX& to) {
+  const mjModel* m = system_->engine().m.get();
+  mjData* d = system_->data();
+  system_->SetTargets(to);
+  double size = kNan;
+  for (int iteration = 0; iteration < kMaxNewton; ++iteration) {
+    system_->EvaluatePosition();
+    if (iteration > 0 && size < kChordStep && regular_) {
+      stale_ = true;
+    } else {
+      Factor();
+    }
+    rhs_ = -system_->residual();
+    SolveInto(rhs_, &step_);
+    size = step_.lpNorm<Eigen::Infinity>();
+    if (!std::isfinite(size) || size > 1e3) break;
+    if (size < kSmallStep && rhs_.lpNorm<Eigen::Infinity>() < kClosed) return RunSummary::Done();
+    mj_integratePos(m, d->qpos, step_.data(), 1.0);
+  }
+  const double open = system_->residual().lpNorm<Eigen::Infinity>();
+  return {.stop = Stop::kNoConvergence,
+          .message = fmt::format("the loops do not close with the commanded drive positions (open "
+                                 "by {:.3g} after {} iterations)",
+                                 open, kMaxNewton),
+          .where = {},
+          .amount = open,
+          .unit = "m or rad"};
+}
+
+RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
+  const mjModel& m = *system_->engine().m;
+  mjData* d = system_->data();
+  const std::vector<double> start(d->qpos, d->qpos + m.nq);
+  RunSummary summary = Close(to);
+  if (summary.ok()) return summary;
+  // Walk there in steps that adapt to what Newton can bridge.
+  std::vector<double> reached = start;
+  double s = 0.0, ds = 0.25;
+  while (s < 1.0) {
+    std::copy(reached.begin(), reached.end(), d->qpos);
+    const double next = std::min(1.0, s + ds);
+    summary = Close(from + next * (to - from));
+    if (summary.ok()) {
+      s = next;
+      ds *= 1.5;
+      reached.assign(d->qpos, d->qpos + m.nq);
+    } else {
+      ds *= 0.5;
+      if (ds < 1e-4) return summary;
+    }
+  }
+  return RunSummary::Done();
+}
+
+void ClosureSolver::SolveVelocity(const VecX& driven_velocity) {
+  rhs_.setZero();
+  rhs_.tail(driven_velocity.size()) = driven_velocity;
+  SolveInto(rhs_, &step_);
+  std::copy(step_.begin(), step_.end(), system_->data()->qvel);
+  mj_comVel(system_->engine().m.get(), system_->data());
+}
+
+void ClosureSolver::SolveAcceleration(const VecX& driven_acceleration) {
+  system_->Bias(&bias_);
+  rhs_ = -bias_;
+  rhs_.tail(driven_acceleration.size()) += driven_acceleration;
+  SolveInto(rhs_, &step_);
+  std::copy(step_.begin(), step_.end(), system_->data()->qacc);
+}
+
+void ClosureSolver::SolveForces(const VecX& tau) {
+  SolveTransposedInto(tau, &rhs_);
+  system_->force() = rhs_;
+}
+
+std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
+  std::vector<int> rows;
+  if (redundant() == 0) return rows;
+  // Self-stress: the null space of Jᵀ, from the Q factor behind the rank.
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->J());
+  const MatX Q = qr.householderQ();
+  const MatX self_stress = Q.rightCols(redundant());
+  for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {
+    if (self_stress.row(i).norm() > 1e-6) rows.push_back(i - system_->first_driven_row());
+  }
+  return rows;
+}
+
+}  // namespace mbv::simulation

@@ -1,0 +1,52 @@
+// Solutions of the constraint system: positions by Newton, then velocities, accelerations and
+// forces from the same Jacobian.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/run_summary.h"
+#include "mechanism/motion.h"
+#include "simulation/constraint_system.h"
+
+namespace mbv::simulation {
+
+class ClosureSolver {
+ public:
+  explicit ClosureSolver(ConstraintSystem* system);
+
+  /// Moves d.qpos from the present (closed) configuration with targets `from` to the targets `to`,
+  /// in as many intermediate steps as it takes.
+  [[nodiscard]] RunSummary Follow(const VecX& from, const VecX& to);
+
+  /// Newton from d.qpos to the targets `to`. On success MuJoCo's position stage, J and its
+  /// factors belong to the final qpos up to round-off.
+  [[nodiscard]] RunSummary Close(const VecX& to);
+
+  /// d.qvel with J q̇ = [0; ẋ], minimum norm where freedoms are not driven. Evaluates mj_comVel.
+  void SolveVelocity(const VecX& driven_velocity);
+  /// d.qacc with J q̈ = [0; ẍ] − J̇q̇.
+  void SolveAcceleration(const VecX& driven_acceleration);
+  /// λ with Jᵀλ = τ, minimum norm where it is not unique; written to d.efc_force.
+  void SolveForces(const VecX& tau);
+
+  [[nodiscard]] int undriven() const { return system_->nv() - rank_; }
+  [[nodiscard]] int redundant() const { return system_->rows() - rank_; }
+  /// Driven rows whose force is not unique at the present configuration.
+  [[nodiscard]] std::vector<int> DrivenRowsNotUnique() const;
+
+ private:
+  void Factor();
+  void SolveInto(const VecX& b, VecX* x);            // x = J⁺ b
+  void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b
+
+  ConstraintSystem* const system_;
+  bool regular_ = false;  // square and of full rank: lu_ is valid, otherwise cod_
+  bool stale_ = false;    // factors belong to a configuration nearby: solves are refined
+  int rank_ = 0;
+  Eigen::PartialPivLU<MatX> lu_;
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
+  VecX rhs_, step_, bias_, refinement_;
+};
+
+}  // namespace mbv::simulation

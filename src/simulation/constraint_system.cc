@@ -1,0 +1,126 @@
+#include "simulation/constraint_system.h"
+
+#include <cmath>
+
+#include "core/spatial.h"
+
+namespace mbv::simulation {
+namespace {
+
+using mjcf::PlannedClosure;
+using ConstVec3 = Eigen::Map<const Vec3>;
+using ConstVec6 = Eigen::Map<const Vec6>;
+
+Eigen::Quaterniond QuatAt(const double* wxyz) {
+  return Eigen::Quaterniond(wxyz[0], wxyz[1], wxyz[2], wxyz[3]);
+}
+Eigen::Quaterniond Pure(const Vec3& v) { return Eigen::Quaterniond(0, v.x(), v.y(), v.z()); }
+
+}  // namespace
+
+ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d) : engine_(engine), d_(d) {
+  for (const PlannedClosure& closure : engine.plan.closures) {
+    closure_row_.push_back(closure_rows_);
+    closure_rows_ += closure.type == PlannedClosure::Type::kConnect ? 3 : 6;
+  }
+  rows_ = closure_rows_ + static_cast<int>(engine.driven.size());
+  A0_.setZero(6, engine.m->nbody);
+}
+
+void ConstraintSystem::SetTargets(const VecX& position) {
+  for (size_t k = 0; k < engine_.driven.size(); ++k) {
+    const DrivenPlace& place = engine_.driven[k];
+    engine_.m->eq_data[mjNEQDATA * place.equality] = position[k] - place.home;
+  }
+}
+
+void ConstraintSystem::EvaluatePosition() {
+  const mjModel* m = engine_.m.get();
+  mj_kinematics(m, d_);
+  mj_comPos(m, d_);
+  mj_tendon(m, d_);
+  mj_makeConstraint(m, d_);
+  // MuJoCo drops a constraint whose Jacobian is zero; no sensible mechanism has one.
+  if (d_->ne != rows_) throw EngineError("a closure or drive constrains nothing");
+}
+
+void ConstraintSystem::BodyBiasAccelerations() {
+  const mjModel& m = *engine_.m;
+  for (int b = 1; b < m.nbody; ++b) {
+    Vec6 A0 = A0_.col(m.body_parentid[b]);
+    for (int j = m.body_dofadr[b], end = j + m.body_dofnum[b]; j < end; ++j) {
+      A0 += ConstVec6(d_->cdof_dot + 6 * j) * d_->qvel[j];
+    }
+    A0_.col(b) = A0;
+  }
+}
+
+ConstraintSystem::Point ConstraintSystem::PointOn(int body, const Vec3& p_W) const {
+  const Vec3 r = p_W - ConstVec3(d_->subtree_com + 3 * engine_.m->body_rootid[body]);
+  const ConstVec6 V(d_->cvel + 6 * body);
+  const Vec3 w = V.head<3>();
+  const Vec3 v = V.tail<3>() + w.cross(r);
+  const auto A = A0_.col(body);
+  return {p_W, v, Vec3(A.tail<3>()) + Vec3(A.head<3>()).cross(r) + w.cross(v)};
+}
+
+double ConstraintSystem::TendonBias(int tendon) const {
+  const mjModel& m = *engine_.m;
+  const int* sites = m.wrap_objid + m.tendon_adr[tendon];
+  const auto point = [&](int site) {
+    return PointOn(m.site_bodyid[site], ConstVec3(d_->site_xpos + 3 * site));
+  };
+  const Point from = point(sites[0]), to = point(sites[1]);
+  const double L = d_->ten_length[tendon];
+  const Vec3 u = (to.p - from.p) / L, w = to.v - from.v;
+  const double rate = u.dot(w);
+  return u.dot(to.a0 - from.a0) + (w.squaredNorm() - rate * rate) / L;
+}
+
+void ConstraintSystem::ClosureBias(int closure, VecX* bias) const {
+  const PlannedClosure& planned = engine_.plan.closures[closure];
+  const bool connect = planned.type == PlannedClosure::Type::kConnect;
+  const double* data = engine_.m->eq_data + mjNEQDATA * engine_.closure_equality[closure];
+  const int b1 = engine_.body_id[planned.body1], b2 = engine_.body_id[planned.body2];
+  const ConstVec3 p1_B(data + (connect ? 0 : 3)), p2_B(data + (connect ? 3 : 0));
+  const Point p1 = PointOn(b1, PoseOf(*d_, b1) * p1_B);
+  const Point p2 = PointOn(b2, PoseOf(*d_, b2) * p2_B);
+  const int row = closure_row_[closure];
+  bias->segment<3>(row) = p1.a0 - p2.a0;
+  if (connect) return;
+  const Eigen::Quaterniond q1_rel = QuatAt(d_->xquat + 4 * b1) * QuatAt(data + 6);
+  const Eigen::Quaterniond q2_inverse = QuatAt(d_->xquat + 4 * b2).conjugate();
+  const Vec3 w1 = ConstVec3(d_->cvel + 6 * b1), w2 = ConstVec3(d_->cvel + 6 * b2);
+  const Vec3 w = w1 - w2;
+  const Vec3 alpha = A0_.col(b1).head<3>() - A0_.col(b2).head<3>();
+  Eigen::Quaterniond inner = Pure(alpha);
+  inner.coeffs() += 0.5 * ((Pure(w) * Pure(w1)).coeffs() - (Pure(w2) * Pure(w)).coeffs());
+  bias->segment<3>(row + 3) = 0.5 * (q2_inverse * inner * q1_rel).vec();
+}
+
+void ConstraintSystem::Bias(VecX* bias) {
+  bias->setZero(rows_);
+  BodyBiasAccelerations();
+  for (size_t c = 0; c < engine_.plan.closures.size(); ++c) {
+    ClosureBias(static_cast<int>(c), bias);
+  }
+  for (size_t k = 0; k < engine_.driven.size(); ++k) {
+    const DrivenPlace& place = engine_.driven[k];
+    if (place.is_tendon) (*bias)[closure_rows_ + k] = TendonBias(place.object);
+  }
+}
+
+ConstraintSystem::Gap ConstraintSystem::LargestGap() const {
+  Gap gap;
+  const auto r = residual();
+  for (size_t c = 0; c < engine_.plan.closures.size(); ++c) {
+    const int row = closure_row_[c];
+    gap.position_m = std::max(gap.position_m, r.segment<3>(row).norm());
+    if (engine_.plan.closures[c].type == PlannedClosure::Type::kConnect) continue;
+    const double half_sine = std::min(1.0, r.segment<3>(row + 3).norm());
+    gap.rotation_rad = std::max(gap.rotation_rad, 2.0 * std::asin(half_sine));
+  }
+  return gap;
+}
+
+}  // namespace mbv::simulation

@@ -1,0 +1,79 @@
+// MuJoCo's equality constraints as a system r(q) = 0 with Jacobian J and bias J̇q̇.
+//
+// Rows: the closures in plan order, then the driven coordinates (drives, prescribed joints). The
+// residual of a driven row is position − target. MuJoCo 2.2.2 has no J̇q̇ in its reference
+// accelerations; it is computed here from MuJoCo's own cvel and cdof_dot:
+//
+//   bias acceleration of body b (spatial, about the root's centre of mass c):
+//     A0_b = A0_parent + Σ_j cdof_dot_j q̇_j                                                   (1)
+//   classical acceleration of a point p of b for q̈ = 0:
+//     a0_p = A0_lin + A0_ang × (p − c) + ω × v_p,  v_p = v_c + ω × (p − c)                     (2)
+//   connect, translation of a weld:  bias = a0_p1 − a0_p2                                      (3)
+//   rotation of a weld, r = Im(q2⁻¹ q1 q_rel), w = ω1 − ω2 (world):
+//     bias = ½ Im(q2⁻¹ ((α0_1 − α0_2) + ½ (w ω1 − ω2 w)) q1 q_rel)   (quaternion products)     (4)
+//   tendon of length L from p1 to p2, u = (p2 − p1)/L, w = v_p2 − v_p1:
+//     bias = u·(a0_p2 − a0_p1) + (w·w − (u·w)²)/L                                              (5)
+//   joint: bias = 0.
+#pragma once
+
+#include <vector>
+
+#include "core/types.h"
+#include "simulation/engine_model.h"
+
+namespace mbv::simulation {
+
+using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+
+class ConstraintSystem {
+ public:
+  /// Both outlive the system. `d` is the state that all functions work on.
+  ConstraintSystem(const EngineModel& engine, mjData* d);
+
+  [[nodiscard]] int rows() const { return rows_; }
+  [[nodiscard]] int closure_rows() const { return closure_rows_; }
+  [[nodiscard]] int driven_rows() const { return rows_ - closure_rows_; }
+  [[nodiscard]] int nv() const { return engine_.m->nv; }
+  [[nodiscard]] const EngineModel& engine() const { return engine_; }
+  [[nodiscard]] mjData* data() const { return d_; }
+
+  /// Targets of the driven rows [m or rad].
+  void SetTargets(const VecX& position);
+
+  /// Kinematics, inertias about the centre of mass, tendons and constraint rows at d.qpos.
+  void EvaluatePosition();
+  [[nodiscard]] Eigen::Map<const VecX> residual() const { return {d_->efc_pos, rows_}; }
+  [[nodiscard]] Eigen::Map<const RowMajor> J() const { return {d_->efc_J, rows_, engine_.m->nv}; }
+  [[nodiscard]] Eigen::Map<VecX> force() const { return {d_->efc_force, rows_}; }
+
+  /// J̇q̇ of every row, from positions and velocities evaluated by MuJoCo (mj_comVel).
+  void Bias(VecX* bias);
+
+  /// Velocity and bias acceleration of the tendon-like row between two points fixed to bodies.
+  [[nodiscard]] int first_driven_row() const { return closure_rows_; }
+  /// First row of a planned closure.
+  [[nodiscard]] int closure_row(int closure) const { return closure_row_[closure]; }
+
+  /// Largest gaps of the closures: |translation| [m] and rotation angle of welds [rad].
+  struct Gap {
+    double position_m = 0.0, rotation_rad = 0.0;
+  };
+  [[nodiscard]] Gap LargestGap() const;
+
+ private:
+  struct Point {
+    Vec3 p, v, a0;  // position, velocity, bias acceleration [m, m/s, m/s²]
+  };
+  void BodyBiasAccelerations();
+  [[nodiscard]] Point PointOn(int body, const Vec3& p_W) const;
+  [[nodiscard]] double TendonBias(int tendon) const;
+  void ClosureBias(int closure, VecX* bias) const;
+
+  const EngineModel& engine_;
+  mjData* const d_;
+  int rows_ = 0, closure_rows_ = 0;
+  std::vector<int> closure_row_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)
+};
+
+}  // namespace mbv::simulation

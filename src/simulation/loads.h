@@ -1,0 +1,37 @@
+// External wrenches and spring-dampers as MuJoCo sees them.
+#pragma once
+
+#include <vector>
+
+#include "mechanism/motion.h"
+#include "simulation/engine_model.h"
+
+namespace mbv::simulation {
+
+/// A load in world axes.
+struct WorldLoad {
+  int body_id = 0;                                   ///< MuJoCo's body
+  Vec3 p_WQ = Vec3::Zero();                          ///< point of action [m]
+  Vec3 force = Vec3::Zero(), moment = Vec3::Zero();  ///< [N], [N m]
+};
+
+/// A load on a body that MuJoCo does not have (merged) is not supported.
+[[nodiscard]] RunSummary CheckLoads(const EngineModel& engine, const Motion& motion);
+
+/// Evaluates the motion's loads at t for the data's current poses.
+class Loads {
+ public:
+  Loads(const EngineModel& engine, const Motion& motion) : engine_(engine), motion_(motion) {}
+
+  void Evaluate(double t_s, const mjData& d);
+  [[nodiscard]] const std::vector<WorldLoad>& world() const { return world_; }
+  /// Adds Jᵀ(load) of the loads last evaluated to `qfrc` (nv).
+  void AddGeneralized(mjData* d, double* qfrc) const;
+
+ private:
+  const EngineModel& engine_;
+  const Motion& motion_;
+  std::vector<WorldLoad> world_;
+};
+
+}  // namespace mbv::simulation

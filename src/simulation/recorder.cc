@@ -1,0 +1,282 @@
+#include "simulation/recorder.h"
+
+#include "core/demand.h"
+#include "core/spatial.h"
+#include "mechanism/channels.h"
+
+namespace mbv::simulation {
+namespace {
+
+using mjcf::PlannedClosure;
+using ConstVec3 = Eigen::Map<const Vec3>;
+using ConstVecX = Eigen::Map<const VecX>;
+
+void Append(const std::vector<Channel>& more, std::vector<Channel>* channels) {
+  channels->insert(channels->end(), more.begin(), more.end());
+}
+
+}  // namespace
+
+Recorder::Recorder(ConstraintSystem* system) : system_(system), engine_(system->engine()) {
+  const Mechanism& mechanism = *engine_.mechanism;
+  const auto column = [this] { return static_cast<int>(channels_.size()); };
+  Append(DriveChannels(mechanism), &channels_);
+  output_column_ = column();
+  Append(OutputChannels(mechanism), &channels_);
+  prescribed_column_ = column();
+  Append(PrescribedChannels(mechanism), &channels_);
+  reaction_column_ = column();
+  for (const Joint& joint : mechanism.joints) Append(ReactionChannels(joint), &channels_);
+  audit_column_ = column();
+  Append(AuditChannels(), &channels_);
+  W_.setZero(6, engine_.m->nbody);
+  work_.setZero(engine_.m->nv);
+  FindReactionPlaces();
+}
+
+void Recorder::FindReactionPlaces() {
+  const Mechanism& mechanism = *engine_.mechanism;
+  places_.resize(mechanism.joints.size());
+  driven_of_.resize(mechanism.joints.size());
+  // A merged body passes on what its only outboard body needs: search from the leaves inwards.
+  std::vector<int> carrier(mechanism.bodies.size(), -1);
+  for (size_t b = 0; b < carrier.size(); ++b) {
+    if (const int p = engine_.PlannedOf(static_cast<int>(b)); p >= 0) {
+      carrier[b] = engine_.body_id[p];
+    }
+  }
+  for (size_t k = mechanism.tree_joints.size(); k-- > 0;) {
+    const int j = mechanism.tree_joints[k];
+    const Joint& joint = mechanism.joints[j];
+    const bool reversed = mechanism.tree_reversed[k];
+    const int outboard = reversed ? joint.parent : joint.child;
+    const int inboard = reversed ? joint.child : joint.parent;
+    if (carrier[inboard] < 0) carrier[inboard] = carrier[outboard];
+    places_[j] = {.body_id = carrier[outboard], .sign = reversed ? -1.0 : 1.0};
+  }
+  for (size_t c = 0; c < engine_.plan.closures.size(); ++c) {
+    const PlannedClosure& closure = engine_.plan.closures[c];
+    ReactionPlace& place = places_[closure.joint];
+    if (closure.type == PlannedClosure::Type::kSplit) {
+      place = {.body_id = engine_.body_id[closure.body2],
+               .sign = closure.split_parent ? -1.0 : 1.0};
+    } else {
+      place.closure = static_cast<int>(c);
+    }
+  }
+  const auto add = [this](int joint, size_t row) {
+    if (!engine_.driven[row].is_tendon) {
+      driven_of_[joint].emplace_back(static_cast<int>(row), engine_.driven[row].object);
+    }
+  };
+  size_t row = 0;
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* driven = std::get_if<JointDrive>(&drive.kind)) add(driven->joint, row);
+    ++row;
+  }
+  for (const Prescribed& base : mechanism.prescribed) add(base.joint, row++);
+}
+
+void Recorder::Record(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row,
+                      std::vector<Pose>* X_WB) {
+  BodyPoses(engine_, *system_->data(), X_WB);
+  RecordDriven(row);
+  RecordOutputs(*X_WB, row);
+  RecordReactions(loads, *X_WB, row);
+  RecordAudit(loads, row);
+}
+
+void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
+  const mjData* d = system_->data();
+  const int nv = engine_.m->nv;
+  system_->Bias(&bias_);
+  const auto J = system_->J();
+  const auto force = system_->force();
+  const int drives = static_cast<int>(engine_.mechanism->drives.size());
+  for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
+    const DrivenPlace& place = engine_.driven[k];
+    const int r = system_->first_driven_row() + k;
+    if (k >= drives) {
+      row[prescribed_column_ + k - drives] = force[r];
+      continue;
+    }
+    row[4 * k] = place.is_tendon ? d->ten_length[place.object]
+                                 : d->qpos[engine_.m->jnt_qposadr[place.object]];
+    row[4 * k + 1] = J.row(r).dot(ConstVecX(d->qvel, nv));
+    row[4 * k + 2] = J.row(r).dot(ConstVecX(d->qacc, nv)) + bias_[r];
+    row[4 * k + 3] = force[r];
+  }
+}
+
+void Recorder::RecordOutputs(const std::vector<Pose>& X_WB,
+                             Eigen::Ref<Eigen::RowVectorXd> row) const {
+  int column = output_column_;
+  for (const Output& output : engine_.mechanism->outputs) {
+    const Pose X_WR = X_WB[output.reference_body] * output.X_RbR;
+    const Pose X_RO = X_WR.inverse(Eigen::Isometry) * X_WB[output.body] * output.X_BO;
+    row.segment<3>(column) = X_RO.translation().transpose();
+    row.segment<3>(column + 3) = RpyOf(X_RO.linear()).transpose();
+    column += 6;
+  }
+}
+
+void Recorder::AddExternal(int body_id, const Vec3& p_W, const Vec3& force, const Vec3& moment) {
+  if (body_id == 0) return;
+  const ConstVec3 c(system_->data()->subtree_com + 3 * engine_.m->body_rootid[body_id]);
+  W_.col(body_id).head<3>() -= moment + (p_W - c).cross(force);
+  W_.col(body_id).tail<3>() -= force;
+}
+
+// A tendon pushes its ends apart with `force`.
+void Recorder::AddTendon(int tendon, double force) {
+  const mjModel& m = *engine_.m;
+  const mjData* d = system_->data();
+  const int* sites = m.wrap_objid + m.tendon_adr[tendon];
+  const ConstVec3 from(d->site_xpos + 3 * sites[0]), to(d->site_xpos + 3 * sites[1]);
+  const Vec3 f = force * (to - from).normalized();
+  AddExternal(m.site_bodyid[sites[0]], from, -f, Vec3::Zero());
+  AddExternal(m.site_bodyid[sites[1]], to, f, Vec3::Zero());
+}
+
+// Wrench [m; f] on the closure's first body at its anchor, world axes.
+Vec6 Recorder::ClosureWrench(int c) const {
+  const mjData* d = system_->data();
+  const PlannedClosure& closure = engine_.plan.closures[c];
+  const auto force = system_->force();
+  const int row = system_->closure_row(c);
+  Vec6 F = Vec6::Zero();
+  F.tail<3>() = force.segment<3>(row);
+  if (closure.type == PlannedClosure::Type::kConnect) return F;
+  // Transpose of the rotation rows, ½ Im(q2⁻¹ ω q1 q_rel).
+  const auto quat = [](const double* q) { return Eigen::Quaterniond(q[0], q[1], q[2], q[3]); };
+  const double* data = engine_.m->eq_data + mjNEQDATA * engine_.closure_equality[c];
+  const int b1 = engine_.body_id[closure.body1], b2 = engine_.body_id[closure.body2];
+  const Eigen::Quaterniond q1_rel = quat(d->xquat + 4 * b1) * quat(data + 6);
+  const Eigen::Quaterniond q2_inverse = quat(d->xquat + 4 * b2).conjugate();
+  for (int axis = 0; axis < 3; ++axis) {
+    Eigen::Quaterniond e(0, 0, 0, 0);
+    e.vec()[axis] = 0.5;
+    F[axis] = (q2_inverse * e * q1_rel).vec().dot(force.segment<3>(row + 3));
+  }
+  return F;
+}
+
+void Recorder::TreeWrenches(const Loads& loads) {
+  const mjModel& m = *engine_.m;
+  mjData* d = system_->data();
+  // MuJoCo's own recursion without the constraint forces: it knows nothing of tendons, and takes
+  // a weld's rotation rows for a torque in world axes, which they are not.
+  const int ne = d->ne;
+  d->ne = 0;
+  mj_rnePostConstraint(&m, d);
+  d->ne = ne;
+  W_.setZero();
+  for (size_t c = 0; c < engine_.plan.closures.size(); ++c) {
+    const PlannedClosure& closure = engine_.plan.closures[c];
+    const bool connect = closure.type == PlannedClosure::Type::kConnect;
+    const double* data = m.eq_data + mjNEQDATA * engine_.closure_equality[c];
+    const int b1 = engine_.body_id[closure.body1], b2 = engine_.body_id[closure.body2];
+    const Vec6 F = ClosureWrench(static_cast<int>(c));
+    AddExternal(b1, PoseOf(*d, b1) * ConstVec3(data + (connect ? 0 : 3)), F.tail<3>(), F.head<3>());
+    AddExternal(b2, PoseOf(*d, b2) * ConstVec3(data + (connect ? 3 : 0)), -F.tail<3>(),
+                -F.head<3>());
+  }
+  for (size_t k = 0; k < engine_.driven.size(); ++k) {
+    const DrivenPlace& place = engine_.driven[k];
+    if (place.is_tendon) {
+      AddTendon(place.object, system_->force()[system_->first_driven_row() + k]);
+    }
+  }
+  for (size_t s = 0; s < engine_.spring_tendon.size(); ++s) {
+    const SpringDamper& spring = engine_.mechanism->springs[s];
+    const int tendon = engine_.spring_tendon[s];
+    const double rate = ConstVecX(d->ten_J + tendon * m.nv, m.nv).dot(ConstVecX(d->qvel, m.nv));
+    AddTendon(tendon, -spring.stiffness * (d->ten_length[tendon] - spring.free_length_m) -
+                          spring.damping * rate);
+  }
+  for (const WorldLoad& load : loads.world()) {
+    AddExternal(load.body_id, load.p_WQ, load.force, load.moment);
+  }
+  // What a body needs beyond the forces on it and its subtree comes from its parent.
+  for (int b = m.nbody - 1; b > 0; --b) {
+    if (m.body_parentid[b] > 0) W_.col(m.body_parentid[b]) += W_.col(b);
+  }
+  W_ += Eigen::Map<const Eigen::Matrix<double, 6, Eigen::Dynamic>>(d->cfrc_int, 6, m.nbody);
+}
+
+// The drive acts along or about the joint's own axis, through M's origin.
+void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
+  const mjData* d = system_->data();
+  for (const auto& [row, id] : driven_of_[joint]) {
+    const double f = sign * system_->force()[system_->first_driven_row() + row];
+    const ConstVec3 axis(d->xaxis + 3 * id);
+    if (engine_.m->jnt_type[id] == mjJNT_SLIDE) {
+      F_W->tail<3>() -= f * axis;
+    } else {
+      F_W->head<3>() -= f * axis;
+    }
+  }
+}
+
+Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {
+  const Joint& joint = engine_.mechanism->joints[j];
+  const ReactionPlace& place = places_[j];
+  Vec6 F_W;
+  if (place.closure >= 0) {
+    F_W = ClosureWrench(place.closure);
+  } else {
+    const ConstVec3 c(system_->data()->subtree_com + 3 * engine_.m->body_rootid[place.body_id]);
+    const Vec3 p_WM = X_WB[joint.child] * joint.X_CM.translation();
+    F_W = place.sign * ShiftWrench(W_.col(place.body_id), c - p_WM);
+    ExcludeDrives(j, place.sign, &F_W);
+  }
+  const Mat3 R_FW = (X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
+  Vec6 F_F;
+  F_F << R_FW * F_W.head<3>(), R_FW * F_W.tail<3>();
+  return F_F;
+}
+
+void Recorder::RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
+                               Eigen::Ref<Eigen::RowVectorXd> row) {
+  TreeWrenches(loads);
+  for (int j = 0; j < static_cast<int>(places_.size()); ++j) {
+    const Vec6 F = ReactionOf(j, X_WB);
+    row.segment<3>(reaction_column_ + 6 * j) = F.tail<3>().transpose();
+    row.segment<3>(reaction_column_ + 6 * j + 3) = F.head<3>().transpose();
+  }
+}
+
+void Recorder::RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row) {
+  const mjModel& m = *engine_.m;
+  mjData* d = system_->data();
+  const ConstVecX qvel(d->qvel, m.nv);
+  const ConstraintSystem::Gap gap = system_->LargestGap();
+  double power = 0.0;
+  const int first = system_->first_driven_row();
+  for (int r = first; r < system_->rows(); ++r) {
+    power += system_->force()[r] * system_->J().row(r).dot(qvel);
+  }
+  for (const WorldLoad& load : loads.world()) {
+    const Eigen::Map<const Vec6> V(d->cvel + 6 * load.body_id);
+    const ConstVec3 c(d->subtree_com + 3 * m.body_rootid[load.body_id]);
+    const Vec3 w = V.head<3>();
+    const Vec3 v = V.tail<3>() + w.cross(load.p_WQ - c);
+    power += load.moment.dot(w) + load.force.dot(v);
+  }
+  // d/dt(kinetic + gravity) = q̇·(M q̈ + bias); springs add theirs, dampers take from the input.
+  mj_rne(&m, d, 1, work_.data());
+  double energy_rate = qvel.dot(work_);
+  for (size_t s = 0; s < engine_.spring_tendon.size(); ++s) {
+    const SpringDamper& spring = engine_.mechanism->springs[s];
+    const int tendon = engine_.spring_tendon[s];
+    const double rate = ConstVecX(d->ten_J + tendon * m.nv, m.nv).dot(qvel);
+    energy_rate += spring.stiffness * (d->ten_length[tendon] - spring.free_length_m) * rate;
+    power -= spring.damping * rate * rate;
+  }
+  row[audit_column_] = gap.position_m;
+  row[audit_column_ + 1] = gap.rotation_rad;
+  row[audit_column_ + 2] = power;
+  row[audit_column_ + 3] = energy_rate;
+}
+
+}  // namespace mbv::simulation

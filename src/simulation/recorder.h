@@ -1,0 +1,55 @@
+// Reads the trace channels of one sample from MuJoCo's data.
+#pragma once
+
+#include <vector>
+
+#include "core/trace.h"
+#include "simulation/constraint_system.h"
+#include "simulation/loads.h"
+
+namespace mbv::simulation {
+
+/// Expects positions, velocities (mj_comVel), accelerations qacc and constraint forces efc_force
+/// of one and the same instant in the system's data.
+class Recorder {
+ public:
+  explicit Recorder(ConstraintSystem* system);
+
+  [[nodiscard]] std::vector<Channel> channels() const { return channels_; }
+
+  /// Writes one row of the trace and the poses of all bodies.
+  void Record(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row, std::vector<Pose>* X_WB);
+
+ private:
+  // Where a joint's reaction is read.
+  struct ReactionPlace {
+    int closure = -1;   // a connect or weld; otherwise the tree:
+    int body_id = -1;   // MuJoCo body whose wrench from its parent is the reaction
+    double sign = 1.0;  // −1 if that is the wrench of the child on the parent
+  };
+  void FindReactionPlaces();
+  void RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row);
+  void RecordOutputs(const std::vector<Pose>& X_WB, Eigen::Ref<Eigen::RowVectorXd> row) const;
+  void RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
+                       Eigen::Ref<Eigen::RowVectorXd> row);
+  void RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row);
+  void TreeWrenches(const Loads& loads);
+  void AddExternal(int body_id, const Vec3& p_W, const Vec3& force, const Vec3& moment);
+  void AddTendon(int tendon, double force);
+  [[nodiscard]] Vec6 ReactionOf(int joint, const std::vector<Pose>& X_WB) const;
+  [[nodiscard]] Vec6 ClosureWrench(int closure) const;
+  void ExcludeDrives(int joint, double sign, Vec6* F_W) const;
+
+  ConstraintSystem* const system_;
+  const EngineModel& engine_;
+  std::vector<Channel> channels_;
+  int output_column_ = 0, prescribed_column_ = 0, reaction_column_ = 0, audit_column_ = 0;
+  std::vector<ReactionPlace> places_;  // per joint
+  std::vector<std::vector<std::pair<int, int>>>
+      driven_of_;                               // per joint: (driven row, MuJoCo joint)
+  Eigen::Matrix<double, 6, Eigen::Dynamic> W_;  // per MuJoCo body: wrench from its parent about the
+                                                // root's centre of mass, world axes
+  VecX bias_, acceleration_, work_;
+};
+
+}  // namespace mbv::simulation

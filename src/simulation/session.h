@@ -1,0 +1,52 @@
+// What one simulation works with, and its three ways to run.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "simulation/closure_solver.h"
+#include "simulation/constraint_system.h"
+#include "simulation/loads.h"
+#include "simulation/recorder.h"
+#include "simulation/simulation.h"
+
+namespace mbv::simulation {
+
+/// Everything one run needs. Members are used in place: a Session is not copied or moved.
+struct Session {
+  Session(EngineModel model, const Motion& motion_, const SimulationOptions& options_,
+          SimulationRun* run_);
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
+
+  /// Stores sample i and reports progress now and then.
+  void Record(size_t i);
+
+  const EngineModel engine;
+  const DataHandle data;
+  const Motion& motion;
+  const SimulationOptions& options;
+  SimulationRun* const run;
+  ConstraintSystem system;
+  ClosureSolver solver;
+  Loads loads;
+  Recorder recorder;
+  std::function<void(double)> progress;
+};
+
+/// The modes. Start configuration: closed, at the first driven sample. Each fills the run's trace,
+/// qpos and poses and returns how it ended.
+[[nodiscard]] RunSummary RunInverse(Session* session, const DrivenMotion& driven);
+[[nodiscard]] RunSummary RunCorrected(Session* session, const DrivenMotion& driven);
+[[nodiscard]] RunSummary RunStock(Session* session, const DrivenMotion& driven);
+
+/// Largest absolute entry is finite.
+[[nodiscard]] bool AllFinite(const double* x, int n);
+
+/// q ⊕ h v̄ in place, where v̄ is the mean velocity over the step; the coordinates of balls and free
+/// rotations get the commutator term h²/12 (ω_0 × ω_1) of their rotation vector, without which a
+/// turning axis costs an error of second order. v_0, v_1: velocities at the ends (nv).
+void AdvancePositions(const EngineModel& engine, double h, const VecX& mean, const VecX& v_0,
+                      const VecX& v_1, VecX* work, double* qpos);
+
+}  // namespace mbv::simulation

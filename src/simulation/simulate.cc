@@ -1,0 +1,126 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <cmath>
+
+#include "mjcf/mjcf.h"
+#include "simulation/session.h"
+
+namespace mbv {
+namespace simulation {
+
+Session::Session(EngineModel model, const Motion& motion_, const SimulationOptions& options_,
+                 SimulationRun* run_)
+    : engine(std::move(model)),
+      data(MakeData(*engine.m)),
+      motion(motion_),
+      options(options_),
+      run(run_),
+      system(engine, data.get()),
+      solver(&system),
+      loads(engine, motion_),
+      recorder(&system) {
+  run->trace.witness = "simulated";
+  run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
+  run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
+  run->X_WB.resize(run->trace.time_s.size());
+}
+
+void Session::Record(size_t i) {
+  const auto row = static_cast<Eigen::Index>(i);
+  Eigen::RowVectorXd values(run->trace.values.cols());
+  recorder.Record(loads, values, &run->X_WB[i]);
+  run->trace.values.row(row) = values;
+  run->qpos.row(row) = Eigen::Map<const Eigen::RowVectorXd>(data->qpos, engine.m->nq);
+  if (progress && i % 16 == 0) {
+    progress(static_cast<double>(i) / static_cast<double>(run->trace.time_s.size()));
+  }
+}
+
+bool AllFinite(const double* x, int n) {
+  // A sum is finite only if every entry is (up to overflow, which is as bad).
+  double sum = 0.0;
+  for (int i = 0; i < n; ++i) sum += std::abs(x[i]);
+  return std::isfinite(sum);
+}
+
+void AdvancePositions(const EngineModel& engine, double h, const VecX& mean, const VecX& v_0,
+                      const VecX& v_1, VecX* work, double* qpos) {
+  *work = mean;
+  for (int i = 0; i < engine.m->nv; ++i) {
+    if (!engine.dof_is_rotation3[i]) continue;
+    const Vec3 w_0 = v_0.segment<3>(i), w_1 = v_1.segment<3>(i);
+    work->segment<3>(i) += h / 12.0 * w_0.cross(w_1);
+  }
+  mj_integratePos(engine.m.get(), qpos, work->data(), h);
+}
+
+namespace {
+
+RunSummary RunMode(Session* session, const DrivenMotion& driven) {
+  if (session->options.mode == SimulationMode::kInverse) return RunInverse(session, driven);
+  if (session->options.engine == Engine::kStock) return RunStock(session, driven);
+  return RunCorrected(session, driven);
+}
+
+void ReportUniqueness(const Session& session, SimulationRun* run) {
+  for (int k : session.solver.DrivenRowsNotUnique()) {
+    run->not_unique.push_back(session.engine.driven[k].name);
+  }
+}
+
+RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
+               const SimulationOptions& options, const std::function<void(double)>& progress,
+               SimulationRun* run) {
+  run->mjcf = WriteMjcf(mechanism, {.step_s = options.step_s});
+  EngineModel engine;
+  if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
+    return summary;
+  }
+  if (RunSummary summary = CheckLoads(engine, motion); !summary.ok()) return summary;
+  Session session(std::move(engine), motion, options, run);
+  session.progress = progress;
+  RunSummary summary = RunMode(&session, driven);
+  if (summary.ok()) ReportUniqueness(session, run);
+  return summary;
+}
+
+}  // namespace
+}  // namespace simulation
+
+Diagnostics Check(const SimulationOptions& options) {
+  Diagnostics diagnostics;
+  const auto require = [&](bool holds, const std::string& rule, double value) {
+    if (!holds) {
+      diagnostics.Add(
+          {.file = {}, .message = fmt::format("{} violates {}", value, rule), .hint = {}});
+    }
+  };
+  require(options.step_s > 0.0, "step_s > 0", options.step_s);
+  require(options.loop_tc_steps >= 2.0, "loop_tc_steps >= 2", options.loop_tc_steps);
+  require(options.drive_tc_steps >= 2.0, "drive_tc_steps >= 2", options.drive_tc_steps);
+  return diagnostics;
+}
+
+SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
+                       const SimulationOptions& options,
+                       const std::function<void(double)>& progress) {
+  SimulationRun run;
+  const auto start = std::chrono::steady_clock::now();
+  {
+    simulation::EngineSession session(&run.warnings);
+    try {
+      run.summary = simulation::Run(mechanism, motion, driven, options, progress, &run);
+    } catch (const simulation::EngineError& error) {
+      run.summary = {.stop = Stop::kEngineFailure,
+                     .message = std::string("MuJoCo: ") + error.what(),
+                     .where = {},
+                     .unit = {}};
+    }
+  }
+  run.summary.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return run;
+}
+
+}  // namespace mbv

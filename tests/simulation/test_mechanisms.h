@@ -1,0 +1,132 @@
+// Small mechanisms with known answers, built by hand.
+#pragma once
+
+#include <cmath>
+#include <numbers>
+
+#include "core/spatial.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+
+namespace mbv::testing {
+
+inline Pose PoseAt(const Vec3& p, const Mat3& R = Mat3::Identity()) {
+  Pose X = Pose::Identity();
+  X.linear() = R;
+  X.translation() = p;
+  return X;
+}
+
+inline Body MakeBody(const std::string& name, double mass, const Vec3& com, const Vec3& inertia) {
+  Body body;
+  body.name = name;
+  body.mass = mass;
+  body.p_BoBcm_B = com;
+  body.I_Bcm_B = inertia.asDiagonal();
+  return body;
+}
+
+/// A planar four-bar in the xy-plane, gravity along −y, hinges about z: crank 0.2 m at the origin,
+/// coupler 0.5 m, rocker 0.4 m at (0.5, 0, 0). The closure is the coupler–rocker hinge.
+struct FourBar {
+  static constexpr double a = 0.2, b = 0.5, c = 0.4, d = 0.5, g = 9.81;
+  static constexpr double m1 = 0.8, m2 = 1.5, m3 = 1.1;
+  static constexpr double I1 = 0.004, I2 = 0.04, I3 = 0.02;
+  static constexpr double kHomeAngle = 1.0;
+
+  double t1, t2, t3;  ///< angles of crank, coupler, rocker from x
+
+  explicit FourBar(double crank_angle) : t1(crank_angle) {
+    const double bx = a * std::cos(t1), by = a * std::sin(t1);
+    const double r = std::hypot(d - bx, -by), phi = std::atan2(-by, d - bx);
+    t2 = phi + std::acos((r * r + b * b - c * c) / (2 * b * r));
+    t3 = std::atan2(by + b * std::sin(t2), bx + b * std::cos(t2) - d);
+  }
+  // Rates of coupler and rocker per crank rate, from the loop's velocity equation.
+  [[nodiscard]] double k2() const { return a * std::sin(t3 - t1) / (b * std::sin(t2 - t3)); }
+  [[nodiscard]] double k3() const { return a * std::sin(t2 - t1) / (c * std::sin(t2 - t3)); }
+  // Kinetic energy ½ J(θ) θ̇² and potential energy; the centres of mass are at mid-link.
+  [[nodiscard]] double J() const {
+    const double vx = -a * std::sin(t1) - 0.5 * b * k2() * std::sin(t2);
+    const double vy = a * std::cos(t1) + 0.5 * b * k2() * std::cos(t2);
+    return I1 + m1 * a * a / 4 + I2 * k2() * k2() + m2 * (vx * vx + vy * vy) +
+           (I3 + m3 * c * c / 4) * k3() * k3();
+  }
+  [[nodiscard]] double V() const {
+    return g * (m1 * a / 2 * std::sin(t1) + m2 * (a * std::sin(t1) + b / 2 * std::sin(t2)) +
+                m3 * c / 2 * std::sin(t3));
+  }
+  /// Crank torque for a given motion: J θ̈ + ½ J' θ̇² + V', derivatives by eighth-order
+  /// differences.
+  [[nodiscard]] static double Torque(double angle, double rate, double acceleration) {
+    const auto derivative = [angle](auto f) {
+      constexpr double h = 4e-3;
+      const auto difference = [&](int k) {
+        return f(FourBar(angle + k * h)) - f(FourBar(angle - k * h));
+      };
+      return (672 * difference(1) - 168 * difference(2) + 32 * difference(3) - 3 * difference(4)) /
+             (840 * h);
+    };
+    const double dJ = derivative([](const FourBar& x) { return x.J(); });
+    const double dV = derivative([](const FourBar& x) { return x.V(); });
+    return FourBar(angle).J() * acceleration + 0.5 * dJ * rate * rate + dV;
+  }
+};
+
+inline Joint MakeJoint(const std::string& name, JointKind kind, int parent, const Vec3& p_parent,
+                       int child, const Vec3& p_child, double home = 0.0, bool closure = false) {
+  Joint joint;
+  joint.name = name;
+  joint.kind = kind;
+  joint.parent = parent;
+  joint.X_PF = PoseAt(p_parent);
+  joint.child = child;
+  joint.X_CM = PoseAt(p_child);
+  joint.home[0] = joint.guess[0] = home;
+  joint.closure = closure;
+  return joint;
+}
+
+inline void AddTree(Mechanism* m) {
+  for (size_t j = 0; j < m->joints.size(); ++j) {
+    if (m->joints[j].closure) continue;
+    m->tree_joints.push_back(static_cast<int>(j));
+    m->tree_reversed.push_back(false);
+  }
+}
+
+/// The four-bar with its closing hinge of a given kind: revolute (exact), spherical, …
+inline Mechanism MakeFourBar(JointKind closing = JointKind::kRevolute, bool force_only = false) {
+  using F = FourBar;
+  const F home(F::kHomeAngle);
+  Mechanism m;
+  m.name = "four_bar";
+  m.gravity_W = Vec3(0, -F::g, 0);
+  Body world;
+  world.name = "world";
+  m.bodies = {world, MakeBody("crank", F::m1, {F::a / 2, 0, 0}, {0.001, 0.0035, F::I1}),
+              MakeBody("coupler", F::m2, {F::b / 2, 0, 0}, {0.01, 0.035, F::I2}),
+              MakeBody("rocker", F::m3, {F::c / 2, 0, 0}, {0.01, 0.015, F::I3})};
+  m.bodies[1].shapes.push_back({Capsule{{0, 0, 0}, {F::a, 0, 0}, 0.01}, "accent"});
+  m.bodies[2].shapes.push_back({Capsule{{0, 0, 0}, {F::b, 0, 0}, 0.01}, "steel"});
+  m.bodies[3].shapes.push_back({Capsule{{0, 0, 0}, {F::c, 0, 0}, 0.01}, "#336699"});
+  m.joints = {
+      MakeJoint("A", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, home.t1),
+      MakeJoint("B", JointKind::kRevolute, 1, {F::a, 0, 0}, 2, {0, 0, 0}, home.t2 - home.t1),
+      MakeJoint("D", JointKind::kRevolute, 0, {F::d, 0, 0}, 3, {0, 0, 0}, home.t3),
+      MakeJoint("C", closing, 2, {F::b, 0, 0}, 3, {F::c, 0, 0}, home.t3 - home.t2, true)};
+  m.joints[3].transmits_force_only = force_only;
+  AddTree(&m);
+  const Vec3 elbow(F::a * std::cos(home.t1), F::a * std::sin(home.t1), 0);
+  m.X_WB_home = {Pose::Identity(), PoseAt({0, 0, 0}, RotZ(home.t1)), PoseAt(elbow, RotZ(home.t2)),
+                 PoseAt({F::d, 0, 0}, RotZ(home.t3))};
+  m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+  Output tip;
+  tip.name = "tip";
+  tip.body = 2;
+  tip.X_BO = PoseAt({F::b, 0, 0});
+  m.outputs.push_back(tip);
+  return m;
+}
+
+}  // namespace mbv::testing
