@@ -73,8 +73,8 @@ Camera FitCamera(const std::vector<Vec3>& points_D, const CameraView& view, doub
     for (const Vec3& p_D : points_D) {
       const Vec3 p = p_D - camera.lookat_D;
       const double x = p.dot(right), y = p.dot(up), z = p.dot(forward);
-      const double needed = std::max({x / across.t_plus, -x / across.t_minus, y / along.t_plus,
-                                      -y / along.t_minus});
+      const double needed =
+          std::max({x / across.t_plus, -x / across.t_minus, y / along.t_plus, -y / along.t_minus});
       distance = std::max(distance, needed - z);
     }
     camera.distance_m = std::max(distance, 1e-6);

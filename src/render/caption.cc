@@ -13,16 +13,20 @@ constexpr Rgb kPaper{1.0F, 1.0F, 1.0F}, kRule{0.55F, 0.58F, 0.62F};
 
 Rgb MoodColor(Caption::Mood mood) {
   switch (mood) {
-    case Caption::Mood::kNeutral: return kSoftInk;
-    case Caption::Mood::kGood: return {0.07F, 0.50F, 0.20F};
-    case Caption::Mood::kBad: return {0.78F, 0.09F, 0.08F};
+    case Caption::Mood::kNeutral:
+      return kSoftInk;
+    case Caption::Mood::kGood:
+      return {0.07F, 0.50F, 0.20F};
+    case Caption::Mood::kBad:
+      return {0.78F, 0.09F, 0.08F};
   }
   return kInk;
 }
 
 void Blend(Picture* picture, int x, int y, const Rgb& color, float share) {
   if (x < 0 || y < 0 || x >= picture->width || y >= picture->height) return;
-  std::uint8_t* pixel = picture->rgb.data() + 3UL * (static_cast<std::size_t>(y) * picture->width + x);
+  std::uint8_t* pixel =
+      picture->rgb.data() + 3UL * (static_cast<std::size_t>(y) * picture->width + x);
   for (int i = 0; i < 3; ++i) {
     const float value = share * color[i] * 255.0F + (1.0F - share) * pixel[i];
     pixel[i] = static_cast<std::uint8_t>(std::lround(value));
@@ -144,7 +148,7 @@ int BarHeight(const Caption& caption, const std::array<int, 2>& size_px) {
 
 std::string PlainText(const std::string& utf8) {
   static const std::pair<const char*, const char*> kSubstitutes[] = {
-      {"°", " deg"}, {"²", "^2"}, {"³", "^3"}, {"·", "."}, {"−", "-"}, {"–", "-"}, {"µ", "u"},
+      {"°", " deg"}, {"²", "^2"}, {"³", "^3"},  {"·", "."},  {"−", "-"},  {"–", "-"},  {"µ", "u"},
       {"μ", "u"},    {"×", "x"},  {"…", "..."}, {"±", "+-"}, {"≤", "<="}, {"≥", ">="}, {"→", "->"}};
   std::string plain;
   for (std::size_t i = 0; i < utf8.size();) {

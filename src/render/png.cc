@@ -17,8 +17,8 @@ std::string EncodePng(const Picture& picture) {
   // The size that always suffices, then the size it took.
   png_alloc_size_t bytes = PNG_IMAGE_PNG_SIZE_MAX(image);
   std::string png(bytes, '\0');
-  const int ok = png_image_write_to_memory(&image, png.data(), &bytes, 0, picture.rgb.data(), 0,
-                                           nullptr);
+  const int ok =
+      png_image_write_to_memory(&image, png.data(), &bytes, 0, picture.rgb.data(), 0, nullptr);
   MBV_DEMAND(ok != 0, std::string(image.message));
   png.resize(bytes);
   return png;

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/demand.h"
+#include "render/annotations.h"
 #include "render/camera.h"
 #include "render/caption.h"
 #include "render/scene.h"
@@ -104,13 +105,10 @@ Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
   int bar_px = 0;
   for (const PictureFrame& frame : frames) {
     include(rn::MechanismItems(mechanism, frame, set.scale, options));
-    // Rings turn with the camera, which is not known yet; they are small.
-    PictureOptions arrows = options;
-    arrows.closures = false;
-    include(rn::AnnotationItems(mechanism, frame, set.scale, arrows, Vec3::UnitX()));
+    include(rn::Annotate(mechanism, frame, set.scale, options, Vec3::UnitX()).items);
     bar_px = std::max(bar_px, rn::BarHeight(frame.caption, options.size_px));
   }
-  include(rn::PathItems(overlay, set.scale));
+  include(rn::OverlayAnnotations(overlay, set.scale).items);
   for (const MeshOverlay& mesh : overlay.meshes) {
     for (const Vec3& p_W : mesh.vertices_W) framed.emplace_back(set.R_DW * p_W);
   }
@@ -118,7 +116,8 @@ Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
   if (all.empty()) all = framed;
 
   const double aspect = static_cast<double>(options.size_px[0]) / options.size_px[1];
-  const rn::Margins margins{.side = 0.05, .top = 0.045,
+  const rn::Margins margins{.side = 0.05,
+                            .top = 0.045,
                             .bottom = 0.045 + static_cast<double>(bar_px) / options.size_px[1]};
   set.camera = rn::FitCamera(framed, options.camera, aspect, margins, set.R_DW);
   set.forward_W = set.R_DW.transpose() * set.camera.forward_D();
@@ -126,11 +125,15 @@ Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
   const Eigen::AlignedBox3d box = BoxOf(framed);
   const std::optional<double> sea = rn::SeaLevel(mechanism, set.R_DW);
   const double height = box.sizes().z();
-  set.stage = {.width = options.size_px[0], .height = options.size_px[1],
-               .passes = options.passes, .shadows = options.shadows, .centre_D = box.center(),
+  set.stage = {.width = options.size_px[0],
+               .height = options.size_px[1],
+               .passes = options.passes,
+               .shadows = options.shadows,
+               .centre_D = box.center(),
                .radius_m = std::max(0.75 * box.diagonal().norm(), 1e-6),
                .ground_m = sea.value_or(BoxOf(all).min().z() - 0.02 * height),
-               .sea = sea.has_value(), .grid_m = RoundLength(0.14 * box.diagonal().norm())};
+               .sea = sea.has_value(),
+               .grid_m = RoundLength(0.14 * box.diagonal().norm())};
   return set;
 }
 
@@ -139,8 +142,8 @@ std::vector<rn::LegendEntry> LegendOf(const Mechanism& mechanism, const Set& set
   std::vector<rn::LegendEntry> legend;
   const double force = set.scale.longest_force_N, torque = set.scale.longest_torque_Nm;
   if (options.drive_forces && (force > 0.0 || torque > 0.0)) {
-    legend.push_back({"push", "push (+)"});
-    legend.push_back({"pull", "pull (-)"});
+    legend.push_back({"push", force > 0.0 ? "push (+)" : "torque +"});
+    legend.push_back({"pull", force > 0.0 ? "pull (-)" : "torque -"});
     if (force > 0.0) {
       legend.push_back({"", "arrows linear, longest = " + WithUnit(force, "N")});
     }
@@ -211,22 +214,21 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
     if (RunSummary got = stage->Font(&font); !got.ok()) return got;
   }
   const std::vector<rn::LegendEntry> legend = LegendOf(mechanism, set, options);
+  const rn::Annotations overlaid = rn::OverlayAnnotations(overlay, set.scale);
   for (std::size_t f = 0; f < frames.size(); ++f) {
     std::vector<rn::Item> items = rn::MechanismItems(mechanism, frames[f], set.scale, options);
-    for (const auto& more : {rn::AnnotationItems(mechanism, frames[f], set.scale, options,
-                                                 set.forward_W),
-                             rn::PathItems(overlay, set.scale)}) {
-      items.insert(items.end(), more.begin(), more.end());
-    }
+    rn::Annotations marks = rn::Annotate(mechanism, frames[f], set.scale, options, set.forward_W);
+    items.insert(items.end(), marks.items.begin(), marks.items.end());
+    items.insert(items.end(), overlaid.items.begin(), overlaid.items.end());
+    marks.flats.insert(marks.flats.end(), overlaid.flats.begin(), overlaid.flats.end());
     Picture picture;
-    RunSummary drawn = stage->Draw(items, overlay.meshes, set.R_DW, set.camera, &picture);
+    RunSummary drawn = stage->Draw(items, marks.flats, set.R_DW, set.camera, &picture);
     if (!drawn.ok()) return drawn;
     rn::PaintCaption(frames[f].caption, legend, font, &picture);
     if (!sink(static_cast<int>(f), std::move(picture))) break;
   }
   RunSummary summary = RunSummary::Done();
-  summary.wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }
 

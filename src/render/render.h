@@ -37,13 +37,14 @@ struct CameraView {
 
 struct PictureOptions {
   std::array<int, 2> size_px{1280, 960};  ///< each 64 … 8192
-  int passes = 8;  ///< averaged passes, 1 … 64: smoother edges and softer shadows; time grows with it
+  int passes =
+      8;  ///< averaged passes, 1 … 64: smoother edges and softer shadows; time grows with it
   CameraView camera;
   bool shadows = true;
-  bool joints = true;        ///< joints as small balls and cylinders
-  bool closures = true;      ///< rings around the joints that close loops
-  bool drive_forces = true;  ///< arrows, where the frame has forces
-  bool output_frames = true; ///< triads at the outputs and at the world's origin
+  bool joints = true;         ///< joints as small balls and cylinders
+  bool closures = true;       ///< rings around the joints that close loops
+  bool drive_forces = true;   ///< arrows, where the frame has forces
+  bool output_frames = true;  ///< triads at the outputs and at the world's origin
 };
 [[nodiscard]] Diagnostics Check(const PictureOptions& options);
 

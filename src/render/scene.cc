@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 namespace mbv::render {
 
@@ -88,7 +87,9 @@ void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
     item = Between(Solid::kCylinder, X_WB * cylinder->p_from, X_WB * cylinder->p_to,
                    cylinder->radius, material);
   } else if (const auto* box = std::get_if<Box>(&shape.geometry)) {
-    item = {.solid = Solid::kBox, .X_WG = X_WB * box->X_BG, .size = 0.5 * box->size,
+    item = {.solid = Solid::kBox,
+            .X_WG = X_WB * box->X_BG,
+            .size = 0.5 * box->size,
             .material = material};
   } else {
     const Ball& ball = std::get<Ball>(shape.geometry);
@@ -125,13 +126,27 @@ void AddDefaultShape(const Mechanism& mechanism, int body, const Pose& X_WB, con
   }
 }
 
-// Radius of the thickest rod of a body that passes a point, so that a joint there can be seen.
+// Whether the model's own shapes already show a joint here: a ball at the point or a pin along
+// the axis whose middle is the point.
+bool IsShown(const Body& body, const Vec3& p, const Vec3& axis, double reach) {
+  return std::ranges::any_of(body.shapes, [&](const Shape& shape) {
+    if (const auto* ball = std::get_if<Ball>(&shape.geometry)) {
+      return (ball->p_centre - p).norm() < reach;
+    }
+    if (const auto* pin = std::get_if<Cylinder>(&shape.geometry)) {
+      const Vec3 d = pin->p_to - pin->p_from;
+      return (0.5 * (pin->p_from + pin->p_to) - p).norm() < reach &&
+             d.cross(axis).norm() < 1e-6 * d.norm();
+    }
+    return false;
+  });
+}
+
+// Radius of the thickest rod of a body that ends at a point.
 double RodRadiusAt(const Body& body, const Vec3& p, double reach) {
   double radius = 0.0;
   const auto visit = [&](const Vec3& from, const Vec3& to, double r) {
-    const Vec3 d = to - from;
-    const double s = std::clamp((p - from).dot(d) / std::max(d.squaredNorm(), 1e-300), 0.0, 1.0);
-    if ((from + s * d - p).norm() < reach) radius = std::max(radius, r);
+    if (std::min((from - p).norm(), (to - p).norm()) < reach) radius = std::max(radius, r);
   };
   for (const Shape& shape : body.shapes) {
     if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
@@ -143,14 +158,6 @@ double RodRadiusAt(const Body& body, const Vec3& p, double reach) {
   return radius;
 }
 
-double JointRadius(const Mechanism& mechanism, const Joint& joint, const Scale& scale) {
-  const double rod = std::max(RodRadiusAt(mechanism.bodies[joint.parent],
-                                          joint.X_PF.translation(), scale.joint_m),
-                              RodRadiusAt(mechanism.bodies[joint.child],
-                                          joint.X_CM.translation(), scale.joint_m));
-  return std::min(std::max(scale.joint_m, 1.3 * rod), 4.0 * scale.joint_m);
-}
-
 void AddJoint(const Mechanism& mechanism, const Joint& joint, const PictureFrame& frame,
               const Scale& scale, std::vector<Item>* items) {
   const Pose X_WF = frame.X_WB[joint.parent] * joint.X_PF;
@@ -158,14 +165,19 @@ void AddJoint(const Mechanism& mechanism, const Joint& joint, const PictureFrame
   const Vec3 p = X_WF.translation();
   const Vec3 a1 = X_WF.linear() * joint.axis, a2 = X_WM.linear() * joint.axis2;
   const double r = JointRadius(mechanism, joint, scale);
+  if (IsShown(mechanism.bodies[joint.parent], joint.X_PF.translation(),
+              joint.X_PF.linear() * joint.axis, scale.joint_m) ||
+      IsShown(mechanism.bodies[joint.child], joint.X_CM.translation(),
+              joint.X_CM.linear() * joint.axis, scale.joint_m)) {
+    return;
+  }
   const Material pin = MaterialOf("dark_steel"), ball = MaterialOf("brass");
   switch (joint.kind) {
     case JointKind::kRevolute:
       items->push_back(Between(Solid::kCylinder, p - 1.5 * r * a1, p + 1.5 * r * a1, r, pin));
       break;
     case JointKind::kUniversal:
-      items->push_back(
-          Between(Solid::kCylinder, p - 1.6 * r * a1, p + 1.6 * r * a1, 0.6 * r, pin));
+      items->push_back(Between(Solid::kCylinder, p - 1.6 * r * a1, p + 1.6 * r * a1, 0.6 * r, pin));
       items->push_back(
           Between(Solid::kCylinder, p - 1.6 * r * a2, p + 1.6 * r * a2, 0.6 * r, ball));
       break;
@@ -196,9 +208,8 @@ void AddLeg(const Drive& drive, const DistanceDrive& leg, double barrel_m,
   const Vec3 e = length > 0.0 ? Vec3((q - p) / length) : Vec3::UnitZ();
   const Vec3 mouth = p + std::min(barrel_m, length) * e;
   items->push_back(Between(Solid::kCylinder, p, mouth, r, MaterialOf("blue")));
-  items->push_back(
-      Between(Solid::kCylinder, mouth - 0.25 * r * e, mouth + 0.5 * r * e, 1.15 * r,
-              MaterialOf("dark_steel")));
+  items->push_back(Between(Solid::kCylinder, mouth - 0.25 * r * e, mouth + 0.5 * r * e, 1.15 * r,
+                           MaterialOf("dark_steel")));
   items->push_back(Between(Solid::kCylinder, mouth, q, 0.55 * r, MaterialOf("aluminium")));
   for (const Vec3& end : {p, q}) items->push_back(BallAt(end, 1.25 * r, MaterialOf("brass")));
 }
@@ -211,77 +222,14 @@ void AddTriad(const Pose& X_WO, double length, std::vector<Item>* items) {
   }
 }
 
-// A ring around `centre` in the plane normal to `normal`, as a chain of capsules.
-void AddRing(const Vec3& centre, const Vec3& normal, double radius, double thickness,
-             const Material& material, std::vector<Item>* items) {
-  constexpr int kPieces = 32;
-  const Mat3 R = FrameAlong(normal);
-  const auto point = [&](int i) {
-    const double angle = 2.0 * std::numbers::pi * i / kPieces;
-    return Vec3(centre + radius * (R * Vec3(std::cos(angle), std::sin(angle), 0.0)));
-  };
-  for (int i = 0; i < kPieces; ++i) {
-    items->push_back(Between(Solid::kCapsule, point(i), point(i + 1), thickness, material));
-  }
-}
-
-// A torque as an arc around its axis; the sweep follows the torque, 300° for the largest.
-void AddTorqueArc(const Vec3& p, const Vec3& axis, double share, double radius, double thickness,
-                  const Material& material, std::vector<Item>* items) {
-  const double sweep = share * 300.0 / 180.0 * std::numbers::pi;
-  const Mat3 R = FrameAlong(axis);
-  const auto point = [&](double angle) {
-    return Vec3(p + radius * (R * Vec3(std::cos(angle), std::sin(angle), 0.0)));
-  };
-  const double head = std::copysign(std::min(0.5, 0.6 * std::abs(sweep)), sweep);
-  const double shaft = sweep - head;
-  const int pieces = std::max(1, static_cast<int>(std::ceil(std::abs(shaft) / 0.1)));
-  for (int i = 0; i < pieces; ++i) {
-    items->push_back(Between(Solid::kCapsule, point(shaft * i / pieces),
-                             point(shaft * (i + 1) / pieces), thickness, material));
-  }
-  // The head: three discs that taper to the tip.
-  constexpr int kDiscs = 8;
-  for (int i = 0; i < kDiscs; ++i) {
-    const double from = shaft + head * i / kDiscs, to = shaft + head * (i + 1) / kDiscs;
-    items->push_back(Between(Solid::kCylinder, point(from), point(to),
-                             2.4 * thickness * (1.0 - (i + 0.5) / kDiscs), material));
-  }
-}
-
-void AddForce(const Mechanism& mechanism, const Drive& drive, double force,
-              const PictureFrame& frame, const Scale& scale, std::vector<Item>* items) {
-  const Material material = MaterialOf(force >= 0.0 ? "push" : "pull");
-  const double r = 0.055 * scale.arrow_m;
-  const auto arrow = [&](const Vec3& p, const Vec3& direction) {
-    const double length = scale.arrow_m * std::abs(force) / scale.longest_force_N;
-    if (length < 0.02 * scale.arrow_m) return;
-    const Vec3 q = p + std::copysign(length, force) * direction;
-    items->push_back(Between(Solid::kArrow, p, q, r, material));
-  };
-  if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
-    // The force on the far body: thrust points on along the leg, tension back along it.
-    const Vec3 p = frame.X_WB[leg->body_from] * leg->p_from;
-    const Vec3 q = frame.X_WB[leg->body_to] * leg->p_to;
-    if (scale.longest_force_N > 0.0 && (q - p).norm() > 0.0) arrow(q, (q - p).normalized());
-    return;
-  }
-  const JointDrive& at = std::get<JointDrive>(drive.kind);
-  const Joint& joint = mechanism.joints[at.joint];
-  const Pose X_WF = frame.X_WB[joint.parent] * joint.X_PF;
-  const Vec3 p_M = (frame.X_WB[joint.child] * joint.X_CM).translation();
-  const Vec3 axis = X_WF.linear() * joint.axis;
-  const bool linear = ForceUnit(mechanism, drive) == "N";
-  if (linear && scale.longest_force_N > 0.0) {
-    arrow(p_M, axis);
-  } else if (!linear && scale.longest_torque_Nm > 0.0) {
-    const double share = force / scale.longest_torque_Nm;
-    if (std::abs(share) < 0.02) return;
-    AddTorqueArc(X_WF.translation(), axis, share, 0.3 * scale.arrow_m, 0.6 * r, material, items);
-  }
-}
-
 }  // namespace
+
+double JointRadius(const Mechanism& mechanism, const Joint& joint, const Scale& scale) {
+  const double rod =
+      std::max(RodRadiusAt(mechanism.bodies[joint.parent], joint.X_PF.translation(), scale.joint_m),
+               RodRadiusAt(mechanism.bodies[joint.child], joint.X_CM.translation(), scale.joint_m));
+  return std::min(std::max(scale.joint_m, 1.2 * rod), 4.0 * scale.joint_m);
+}
 
 Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frames) {
   Scale scale;
@@ -291,9 +239,9 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
     for (const Vec3& p : TouchPoints(mechanism, static_cast<int>(b))) box.extend(X_WB[b] * p);
   }
   if (!box.isEmpty() && box.diagonal().norm() > 1e-9) scale.extent_m = box.diagonal().norm();
-  scale.joint_m = 0.0085 * scale.extent_m;
+  scale.joint_m = 0.0075 * scale.extent_m;
   scale.leg_m = 0.0085 * scale.extent_m;
-  scale.arrow_m = 0.16 * scale.extent_m;
+  scale.arrow_m = 0.2 * scale.extent_m;
   scale.barrel_m.assign(mechanism.drives.size(), 0.0);
   for (std::size_t d = 0; d < mechanism.drives.size(); ++d) {
     const bool linear = ForceUnit(mechanism, mechanism.drives[d]) == "N";
@@ -305,7 +253,8 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
       }
       if (const auto* leg = std::get_if<DistanceDrive>(&mechanism.drives[d].kind)) {
         shortest = std::min(shortest, (frame.X_WB[leg->body_from] * leg->p_from -
-                                       frame.X_WB[leg->body_to] * leg->p_to).norm());
+                                       frame.X_WB[leg->body_to] * leg->p_to)
+                                          .norm());
       }
     }
     const double lower = mechanism.drives[d].range.lower;
@@ -318,8 +267,8 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
 std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame& frame,
                                  const Scale& scale, const PictureOptions& options) {
   std::vector<Item> items;
-  const bool any_shapes = std::ranges::any_of(
-      mechanism.bodies, [](const Body& body) { return !body.shapes.empty(); });
+  const bool any_shapes =
+      std::ranges::any_of(mechanism.bodies, [](const Body& body) { return !body.shapes.empty(); });
   for (std::size_t b = 0; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
     const bool massless_piece = b > 0 && body.mass <= 0.0 && any_shapes;
@@ -338,63 +287,15 @@ std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame&
   }
   if (options.joints) {
     for (std::size_t j = 0; j < mechanism.joints.size(); ++j) {
-      const bool moves_base = std::ranges::any_of(
-          mechanism.prescribed,
-          [j](const Prescribed& p) { return p.joint == static_cast<int>(j); });
+      const bool moves_base = std::ranges::any_of(mechanism.prescribed, [j](const Prescribed& p) {
+        return p.joint == static_cast<int>(j);
+      });
       if (!moves_base) AddJoint(mechanism, mechanism.joints[j], frame, scale, &items);
     }
   }
   if (options.output_frames) {
     for (const Output& output : mechanism.outputs) {
       AddTriad(frame.X_WB[output.body] * output.X_BO, 0.10 * scale.extent_m, &items);
-    }
-  }
-  return items;
-}
-
-std::vector<Item> AnnotationItems(const Mechanism& mechanism, const PictureFrame& frame,
-                                  const Scale& scale, const PictureOptions& options,
-                                  const Vec3& forward_W) {
-  std::vector<Item> items;
-  if (options.drive_forces) {
-    for (std::size_t d = 0; d < frame.drive_forces.size(); ++d) {
-      if (std::isfinite(frame.drive_forces[d])) {
-        AddForce(mechanism, mechanism.drives[d], frame.drive_forces[d], frame, scale, &items);
-      }
-    }
-  }
-  if (options.closures) {
-    for (const Joint& joint : mechanism.joints) {
-      if (!joint.closure) continue;
-      const double r = JointRadius(mechanism, joint, scale);
-      const Vec3 p_F = (frame.X_WB[joint.parent] * joint.X_PF).translation();
-      const Vec3 p_M = (frame.X_WB[joint.child] * joint.X_CM).translation();
-      AddRing(p_M, forward_W, 2.1 * r, 0.22 * r, MaterialOf("closure"), &items);
-      // A joint that came apart: a red bar across the gap.
-      const bool may_slide = joint.kind == JointKind::kPrismatic ||
-                             joint.kind == JointKind::kCylindrical ||
-                             joint.kind == JointKind::kPlanar || joint.kind == JointKind::kFree;
-      if (!may_slide && (p_F - p_M).norm() > 0.5 * r) {
-        items.push_back(Between(Solid::kCapsule, p_F, p_M, 0.3 * r, MaterialOf("gap")));
-      }
-    }
-  }
-  return items;
-}
-
-std::vector<Item> PathItems(const Overlay& overlay, const Scale& scale) {
-  std::vector<Item> items;
-  for (const PolylineOverlay& path : overlay.paths) {
-    Material material = MaterialOf(path.color);
-    material.emission = 0.3F;
-    const double radius = path.radius_m > 0.0 ? path.radius_m : 0.0025 * scale.extent_m;
-    // Points closer than a fifth of the radius to the last drawn one are passed over.
-    std::size_t last = 0;
-    for (std::size_t i = 1; i < path.points_W.size(); ++i) {
-      const Vec3 &p = path.points_W[last], &q = path.points_W[i];
-      if ((q - p).norm() < 0.2 * radius && i + 1 < path.points_W.size()) continue;
-      items.push_back(Between(Solid::kCapsule, p, q, radius, material));
-      last = i;
     }
   }
   return items;

@@ -25,7 +25,7 @@ struct Item {
   Pose X_WG = Pose::Identity();  ///< pose of the solid in the world [m]
   Vec3 size = Vec3::Ones();      ///< [m]
   Material material;
-  bool framed = true;            ///< the automatic camera fits it
+  bool framed = true;  ///< the automatic camera fits it
 };
 
 /// The two unit vectors that complete `axis` to a right-handed frame (axis last).
@@ -39,10 +39,10 @@ struct Item {
 
 /// Sizes that follow from the mechanism, so that a 10 m crane and a 0.2 m gripper look alike.
 struct Scale {
-  double extent_m = 1.0;      ///< diagonal of the box around all joint points at home
-  double joint_m = 0.01;      ///< smallest radius of a joint's ball
-  double leg_m = 0.01;        ///< radius of a distance drive without its own
-  double arrow_m = 0.2;       ///< length of the longest force arrow
+  double extent_m = 1.0;  ///< diagonal of the box around all joint points at home
+  double joint_m = 0.01;  ///< smallest radius of a joint's ball
+  double leg_m = 0.01;    ///< radius of a distance drive without its own
+  double arrow_m = 0.2;   ///< length of the longest force arrow
   double longest_force_N = 0.0, longest_torque_Nm = 0.0;  ///< over all frames
   std::vector<double> barrel_m;  ///< per drive: length of the distance drive's barrel
 };
@@ -52,12 +52,9 @@ struct Scale {
 [[nodiscard]] std::vector<Item> MechanismItems(const Mechanism& mechanism,
                                                const PictureFrame& frame, const Scale& scale,
                                                const PictureOptions& options);
-/// Force arrows and closure rings; rings face the camera that looks along `forward_W`.
-[[nodiscard]] std::vector<Item> AnnotationItems(const Mechanism& mechanism,
-                                                const PictureFrame& frame, const Scale& scale,
-                                                const PictureOptions& options,
-                                                const Vec3& forward_W);
-[[nodiscard]] std::vector<Item> PathItems(const Overlay& overlay, const Scale& scale);
+/// Radius that shows at the end of the rods that a joint connects [m].
+[[nodiscard]] double JointRadius(const Mechanism& mechanism, const Joint& joint,
+                                 const Scale& scale);
 
 /// Up against gravity and a level x axis: the rotation into the frame D in which is drawn (z up).
 [[nodiscard]] Mat3 UprightRotation(const Vec3& gravity_W);  // R_DW

@@ -6,43 +6,18 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 
-#include "render/mesh_pass.h"
+#include "render/flat_pass.h"
 #include "render/textures.h"
+#include "simulation/engine.h"
 
 namespace mbv::render {
 namespace {
 
 constexpr int kTexture_px = 1024;
-constexpr double kKey = 0.62, kSky = 0.42, kAmbient = 0.14;  // light of a white surface, in sum ~1.2
-
-/// MuJoCo's errors end here: its handler must not return.
-struct EngineError {
-  std::string message;
-};
-[[noreturn]] void OnError(const char* message) { throw EngineError{message}; }
-void OnWarning(const char*) {}
-
-// Installs our handlers while MuJoCo is at work and puts the former ones back.
-class HandlerScope {
- public:
-  HandlerScope() : error_(mju_user_error), warning_(mju_user_warning) {
-    mju_user_error = OnError;
-    mju_user_warning = OnWarning;
-  }
-  ~HandlerScope() {
-    mju_user_error = error_;
-    mju_user_warning = warning_;
-  }
-  HandlerScope(const HandlerScope&) = delete;
-  HandlerScope& operator=(const HandlerScope&) = delete;
-
- private:
-  void (*error_)(const char*);
-  void (*warning_)(const char*);
-};
+// Light that falls on a surface facing each source; a level white floor gets about 1.
+constexpr double kKey = 0.50, kSky = 0.22, kFill = 0.26, kAmbient = 0.30;
 
 RunSummary Failure(const std::string& message) {
   RunSummary summary;
@@ -65,7 +40,7 @@ std::string StageMjcf(const StageOptions& o) {
   return fmt::format(
       "<mujoco><statistic extent='{0:.9g}' center='0 0 0'/>"
       "<visual><global offwidth='{1}' offheight='{2}' fovy='{3}'/>"
-      "<quality offsamples='4' shadowsize='2048' numslices='48' numstacks='24' numquads='2'/>"
+      "<quality offsamples='0' shadowsize='2048' numslices='64' numstacks='12' numquads='2'/>"
       "<map znear='0.05' zfar='40' shadowclip='1.0' haze='0.35'/><rgba haze='{4}'/>"
       "<headlight active='0'/></visual>"
       "<asset><texture name='sky' type='skybox' builtin='gradient' rgb1='{5}' rgb2='{6}' "
@@ -76,17 +51,29 @@ std::string StageMjcf(const StageOptions& o) {
       "<worldbody><geom type='plane' size='0 0 1' pos='0 0 {11:.9g}' material='ground'/>"
       "</worldbody></mujoco>",
       o.radius_m, o.width, o.height, kFieldOfView_deg, haze, zenith,
-      o.sea ? "0.80 0.86 0.91" : "0.93 0.945 0.96", kTexture_px, repeat, o.sea ? 0.22 : 0.06,
+      o.sea ? "0.80 0.86 0.91" : "0.93 0.945 0.96", kTexture_px, repeat, o.sea ? 0.2 : 0.0,
       o.sea ? 0.5 : 0.1, o.ground_m);
+}
+
+// Unit vector with an azimuth from x about z and a height above the horizon [deg].
+Vec3 Direction(double azimuth_deg, double height_deg) {
+  const double a = azimuth_deg * std::numbers::pi / 180.0;
+  const double h = height_deg * std::numbers::pi / 180.0;
+  return {std::cos(h) * std::cos(a), std::cos(h) * std::sin(a), std::sin(h)};
 }
 
 mjtGeom TypeOf(Solid solid) {
   switch (solid) {
-    case Solid::kBall: return mjGEOM_SPHERE;
-    case Solid::kCapsule: return mjGEOM_CAPSULE;
-    case Solid::kCylinder: return mjGEOM_CYLINDER;
-    case Solid::kBox: return mjGEOM_BOX;
-    case Solid::kArrow: return mjGEOM_ARROW;
+    case Solid::kBall:
+      return mjGEOM_SPHERE;
+    case Solid::kCapsule:
+      return mjGEOM_CAPSULE;
+    case Solid::kCylinder:
+      return mjGEOM_CYLINDER;
+    case Solid::kBox:
+      return mjGEOM_BOX;
+    case Solid::kArrow:
+      return mjGEOM_ARROW;
   }
   return mjGEOM_SPHERE;
 }
@@ -98,11 +85,9 @@ class OsMesaStage final : public Stage {
   OsMesaStage& operator=(const OsMesaStage&) = delete;
 
   ~OsMesaStage() override {
-    const HandlerScope handlers;
+    const simulation::EngineSession session(nullptr);
     if (context_made_) mjr_freeContext(&context_);
     if (scene_made_) mjv_freeScene(&scene_);
-    if (data_ != nullptr) mj_deleteData(data_);
-    if (model_ != nullptr) mj_deleteModel(model_);
     if (mesa_ != nullptr) OSMesaDestroyContext(mesa_);
   }
 
@@ -115,9 +100,9 @@ class OsMesaStage final : public Stage {
     return Guarded([this] { return MakeInMujoco(); });
   }
 
-  RunSummary Draw(const std::vector<Item>& items, const std::vector<MeshOverlay>& meshes,
+  RunSummary Draw(const std::vector<Item>& items, const std::vector<FlatMesh>& flats,
                   const Mat3& R_DW, const Camera& camera, Picture* picture) override {
-    return Guarded([&] { return DrawInMujoco(items, meshes, R_DW, camera, picture); });
+    return Guarded([&] { return DrawInMujoco(items, flats, R_DW, camera, picture); });
   }
 
   RunSummary Font(std::vector<Glyph>* glyphs) override {
@@ -129,41 +114,32 @@ class OsMesaStage final : public Stage {
 
   template <typename Work>
   static RunSummary Guarded(const Work& work) {
-    const HandlerScope handlers;
+    const simulation::EngineSession session(nullptr);
     try {
       return work();
-    } catch (const EngineError& error) {
-      return Failure("MuJoCo: " + error.message);
+    } catch (const simulation::EngineError& error) {
+      return Failure(std::string("MuJoCo: ") + error.what());
     }
   }
 
   RunSummary MakeInMujoco() {
-    const std::string xml = StageMjcf(options_);
-    // The virtual file system is too large for the stack.
-    const auto files = std::make_unique<mjVFS>();
-    mj_defaultVFS(files.get());
-    mj_makeEmptyFileVFS(files.get(), "stage.xml", static_cast<int>(xml.size()));
-    std::memcpy(files->filedata[0], xml.data(), xml.size());
-    std::array<char, 500> error{};
-    model_ = mj_loadXML("stage.xml", files.get(), error.data(), error.size());
-    mj_deleteVFS(files.get());
-    if (model_ == nullptr) return Failure(std::string("stage: ") + error.data());
+    model_ = simulation::CompileMjcf(StageMjcf(options_));
     PaintGround();
-    data_ = mj_makeData(model_);
-    mj_forward(model_, data_);
+    data_ = simulation::MakeData(*model_);
+    mj_forward(model_.get(), data_.get());
     mjv_defaultScene(&scene_);
-    mjv_makeScene(model_, &scene_, kMostGeoms);
+    mjv_makeScene(model_.get(), &scene_, kMostGeoms);
     scene_made_ = true;
     mjr_defaultContext(&context_);
     context_made_ = true;
-    mjr_makeContext(model_, &context_, mjFONTSCALE_300);
+    mjr_makeContext(model_.get(), &context_, mjFONTSCALE_300);
     mjr_setBuffer(mjFB_OFFSCREEN, &context_);
     if (context_.currentBuffer != mjFB_OFFSCREEN) return Failure("no off-screen buffer");
     return RunSummary::Done();
   }
 
   void PaintGround() {
-    const int texture = mj_name2id(model_, mjOBJ_TEXTURE, "ground");
+    const int texture = simulation::IdOf(*model_, mjOBJ_TEXTURE, "ground");
     const std::vector<std::uint8_t> rgb =
         options_.sea ? WaterTexture(kTexture_px) : GridTexture(kTexture_px);
     std::ranges::copy(rgb, model_->tex_rgb + model_->tex_adr[texture]);
@@ -182,16 +158,16 @@ class OsMesaStage final : public Stage {
     std::copy_n(camera.lookat_D.data(), 3, from.lookat);
     // Twice: an endless plane is centred under the camera of the call before.
     for (int i = 0; i < 2; ++i) {
-      mjv_updateScene(model_, data_, &show, nullptr, &from, mjCAT_ALL, &scene_);
+      mjv_updateScene(model_.get(), data_.get(), &show, nullptr, &from, mjCAT_ALL, &scene_);
     }
     if (scene_.ngeom + static_cast<int>(items.size()) > scene_.maxgeom) {
-      return Failure(fmt::format("{} solids are more than the {} that fit", items.size(),
-                                 scene_.maxgeom));
+      return Failure(
+          fmt::format("{} solids are more than the {} that fit", items.size(), scene_.maxgeom));
     }
     for (const Item& item : items) AppendGeom(item, R_DW);
     std::ranges::fill(scene_.flags, 0);
     scene_.flags[mjRND_SHADOW] = options_.shadows;
-    scene_.flags[mjRND_REFLECTION] = 1;
+    scene_.flags[mjRND_REFLECTION] = options_.sea;
     scene_.flags[mjRND_SKYBOX] = 1;
     scene_.flags[mjRND_HAZE] = 1;
     scene_.flags[mjRND_CULL_FACE] = 1;
@@ -216,26 +192,25 @@ class OsMesaStage final : public Stage {
     geom.reflectance = 0.0F;
   }
 
-  // Key light from behind the viewer's left shoulder, sky light from somewhere above.
+  // Key light from behind the viewer's left shoulder, sky light from somewhere above, and a weak
+  // fill light from the right that casts no shadow.
   void SetLights(const Camera& camera, int pass) {
-    const double deg = std::numbers::pi / 180.0;
     const Eigen::Vector2d u = EvenPoint(pass), w = EvenPoint(pass + 1000);
     const double spread = options_.passes > 1 ? 1.0 : 0.0;
-    const double azimuth = (camera.azimuth_deg - 48.0 + spread * 7.0 * (u.x() - 0.5)) * deg;
-    const double height = (50.0 + spread * 7.0 * (u.y() - 0.5)) * deg;
-    const Vec3 key(std::cos(height) * std::cos(azimuth), std::cos(height) * std::sin(azimuth),
-                   std::sin(height));
-    // Cosine-weighted over the hemisphere, none below 17° (long shadows of single passes).
-    const double r = options_.passes > 1 ? std::sqrt(0.92 * w.x()) : 0.0;
-    const double angle = 2.0 * std::numbers::pi * w.y();
+    const Vec3 key = Direction(camera.azimuth_deg - 50.0 + spread * 4.0 * (u.x() - 0.5),
+                               52.0 + spread * 4.0 * (u.y() - 0.5));
+    // Cosine-weighted over the upper hemisphere, none below 48°.
+    const double r = spread * std::sqrt(0.45 * w.x()), angle = 2.0 * std::numbers::pi * w.y();
     const Vec3 sky(r * std::cos(angle), r * std::sin(angle), std::sqrt(1.0 - r * r));
-    scene_.nlight = 2;
-    SetLight(&scene_.lights[0], key, kKey, 0.35, kAmbient);
-    SetLight(&scene_.lights[1], sky, kSky, 0.0, 0.0);
+    scene_.nlight = 3;
+    SetLight(&scene_.lights[0], key, kKey, 0.35, 0.0, true);
+    SetLight(&scene_.lights[1], sky, kSky, 0.0, 0.0, true);
+    SetLight(&scene_.lights[2], Direction(camera.azimuth_deg + 50.0, 15.0), kFill, 0.1, kAmbient,
+             false);  // a light with shadows has its ambient part shadowed, too
   }
 
   void SetLight(mjvLight* light, const Vec3& to_light_D, double diffuse, double specular,
-                double ambient) const {
+                double ambient, bool shadow) const {
     *light = mjvLight{};
     const Vec3 p = options_.centre_D + 3.0 * options_.radius_m * to_light_D;
     for (int i = 0; i < 3; ++i) {
@@ -248,10 +223,10 @@ class OsMesaStage final : public Stage {
     light->attenuation[0] = 1.0F;
     light->cutoff = 45.0F;
     light->directional = 1;
-    light->castshadow = 1;
+    light->castshadow = shadow;
   }
 
-  RunSummary DrawInMujoco(const std::vector<Item>& items, const std::vector<MeshOverlay>& meshes,
+  RunSummary DrawInMujoco(const std::vector<Item>& items, const std::vector<FlatMesh>& flats,
                           const Mat3& R_DW, const Camera& camera, Picture* picture) {
     if (RunSummary filled = FillScene(items, R_DW, camera); !filled.ok()) return filled;
     const mjrRect view{0, 0, options_.width, options_.height};
@@ -272,19 +247,21 @@ class OsMesaStage final : public Stage {
       scene_.camera[0] = scene_.camera[1] = shifted;
       SetLights(camera, pass);
       mjr_render(view, &scene_, &context_);
-      DrawMeshes(meshes, R_DW, {shifted, options_.width, options_.height});
+      DrawFlats(flats, R_DW, {shifted, options_.width, options_.height});
       mjr_readPixels(pass_rgb.data(), nullptr, view, &context_);
       for (std::size_t i = 0; i < bytes; ++i) sum[i] += pass_rgb[i];
     }
     // Mean; OpenGL's rows start at the bottom.
-    *picture = {.width = options_.width, .height = options_.height,
+    *picture = {.width = options_.width,
+                .height = options_.height,
                 .rgb = std::vector<std::uint8_t>(bytes)};
     const std::size_t row = 3UL * options_.width;
     const auto n = static_cast<std::uint32_t>(options_.passes);
     for (int y = 0; y < options_.height; ++y) {
       const std::uint32_t* from = sum.data() + row * (options_.height - 1 - y);
       std::uint8_t* to = picture->rgb.data() + row * y;
-      for (std::size_t i = 0; i < row; ++i) to[i] = static_cast<std::uint8_t>((from[i] + n / 2) / n);
+      for (std::size_t i = 0; i < row; ++i)
+        to[i] = static_cast<std::uint8_t>((from[i] + n / 2) / n);
     }
     return RunSummary::Done();
   }
@@ -299,11 +276,9 @@ class OsMesaStage final : public Stage {
       if (glyph.width > options_.width || height > options_.height) {
         return Failure("the picture is smaller than a character");
       }
-      const mjrRect box{0, 0, options_.width, options_.height};
       mjr_rectangle({0, 0, glyph.width, height}, 0, 0, 0, 1);
       const std::array<char, 2> text{static_cast<char>(c), '\0'};
       mjr_text(mjFONT_NORMAL, text.data(), &context_, 0, 0, 1, 1, 1);
-      (void)box;
       std::vector<std::uint8_t> rgb(3UL * glyph.width * height);
       mjr_readPixels(rgb.data(), nullptr, {0, 0, glyph.width, height}, &context_);
       glyph.coverage.resize(1UL * glyph.width * height);
@@ -321,8 +296,8 @@ class OsMesaStage final : public Stage {
   StageOptions options_;
   std::array<std::uint8_t, 4UL * kWindow_px * kWindow_px> window_{};
   OSMesaContext mesa_ = nullptr;
-  mjModel* model_ = nullptr;
-  mjData* data_ = nullptr;
+  simulation::ModelHandle model_;
+  simulation::DataHandle data_;
   mjvScene scene_{};
   mjrContext context_{};
   bool scene_made_ = false, context_made_ = false;

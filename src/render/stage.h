@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/run_summary.h"
+#include "render/annotations.h"
 #include "render/camera.h"
 #include "render/render.h"
 #include "render/scene.h"
@@ -21,11 +22,11 @@ struct StageOptions {
   int width = 1280, height = 960;
   int passes = 8;
   bool shadows = true;
-  Vec3 centre_D = Vec3::Zero();     ///< middle of what is lit [m]
-  double radius_m = 1.0;            ///< shadows are cast within this radius of the centre
-  double ground_m = 0.0;            ///< height of the ground plane or the water
+  Vec3 centre_D = Vec3::Zero();  ///< middle of what is lit [m]
+  double radius_m = 1.0;         ///< shadows are cast within this radius of the centre
+  double ground_m = 0.0;         ///< height of the ground plane or the water
   bool sea = false;
-  double grid_m = 0.1;              ///< spacing of the ground's grid lines
+  double grid_m = 0.1;  ///< spacing of the ground's grid lines
 };
 
 /// One character of the renderer's font as coverage 0 … 255.
@@ -40,9 +41,9 @@ class Stage {
   [[nodiscard]] static RunSummary Open(const StageOptions& options, std::unique_ptr<Stage>* stage);
   virtual ~Stage() = default;
 
-  /// Draws the items (world frame) and translucent meshes as seen by the camera.
+  /// Draws the items and flat meshes (world frame) as seen by the camera.
   [[nodiscard]] virtual RunSummary Draw(const std::vector<Item>& items,
-                                        const std::vector<MeshOverlay>& meshes, const Mat3& R_DW,
+                                        const std::vector<FlatMesh>& flats, const Mat3& R_DW,
                                         const Camera& camera, Picture* picture) = 0;
   /// Glyphs of the characters 32 … 126.
   [[nodiscard]] virtual RunSummary Font(std::vector<Glyph>* glyphs) = 0;

@@ -1,12 +1,9 @@
-#include "render/mesh_pass.h"
+#include "render/flat_pass.h"
 
 #include <GL/gl.h>
 
 #include <algorithm>
 #include <cmath>
-
-#include "core/demand.h"
-#include "render/palette.h"
 
 namespace mbv::render {
 namespace {
@@ -20,7 +17,7 @@ struct Triangle {
 Vec3 FromFloats(const float* values) { return {values[0], values[1], values[2]}; }
 
 // The camera of mjr_render as OpenGL matrices.
-void LoadMatrices(const MeshView& view) {
+void LoadMatrices(const FlatView& view) {
   const mjvGLCamera& camera = view.camera;
   const double half = 0.5 * (camera.frustum_top - camera.frustum_bottom) * view.width / view.height;
   glMatrixMode(GL_PROJECTION);
@@ -39,24 +36,29 @@ void LoadMatrices(const MeshView& view) {
   glLoadMatrixd(look.data());
 }
 
-std::vector<Triangle> SortedTriangles(const std::vector<MeshOverlay>& meshes, const Mat3& R_DW,
-                                      const MeshView& view) {
+// Light on a surface that is lit from the viewer and from above, either side alike.
+float LightOn(const Vec3& normal, const Vec3& to_surface) {
+  const Vec3 n = normal.norm() > 0.0 ? Vec3(normal.normalized()) : Vec3::UnitZ();
+  return static_cast<float>(0.45 + 0.35 * std::abs(n.dot(to_surface.normalized())) +
+                            0.25 * std::abs(n.z()));
+}
+
+std::vector<Triangle> SortedTriangles(const std::vector<FlatMesh>& meshes, FlatMesh::Depth depth,
+                                      const Mat3& R_DW, const FlatView& view) {
   const Vec3 eye = FromFloats(view.camera.pos), forward = FromFloats(view.camera.forward);
   std::vector<Triangle> triangles;
-  for (const MeshOverlay& mesh : meshes) {
-    const Material material = MaterialOf(mesh.color);
+  for (const FlatMesh& mesh : meshes) {
+    if (mesh.depth != depth) continue;
     for (const auto& corner : mesh.triangles) {
-      Triangle triangle{.p_D = {}, .depth = 0.0, .rgba = material.rgba};
+      Triangle triangle{.p_D = {}, .depth = 0.0, .rgba = mesh.rgba};
       for (int i = 0; i < 3; ++i) triangle.p_D[i] = R_DW * mesh.vertices_W[corner[i]];
       const Vec3 centre = (triangle.p_D[0] + triangle.p_D[1] + triangle.p_D[2]) / 3.0;
       triangle.depth = (centre - eye).dot(forward);
-      // Lit from the viewer and from above, either side alike.
-      Vec3 n = (triangle.p_D[1] - triangle.p_D[0]).cross(triangle.p_D[2] - triangle.p_D[0]);
-      n = n.norm() > 0.0 ? Vec3(n.normalized()) : Vec3::UnitZ();
-      const double light =
-          0.45 + 0.35 * std::abs(n.dot((centre - eye).normalized())) + 0.25 * std::abs(n.z());
-      for (int i = 0; i < 3; ++i) {
-        triangle.rgba[i] = std::min(1.0F, triangle.rgba[i] * static_cast<float>(light));
+      if (mesh.shaded) {
+        const Vec3 normal =
+            (triangle.p_D[1] - triangle.p_D[0]).cross(triangle.p_D[2] - triangle.p_D[0]);
+        const float light = LightOn(normal, centre - eye);
+        for (int i = 0; i < 3; ++i) triangle.rgba[i] = std::min(1.0F, triangle.rgba[i] * light);
       }
       triangles.push_back(triangle);
     }
@@ -65,27 +67,31 @@ std::vector<Triangle> SortedTriangles(const std::vector<MeshOverlay>& meshes, co
   return triangles;
 }
 
-}  // namespace
-
-void DrawMeshes(const std::vector<MeshOverlay>& meshes, const Mat3& R_DW, const MeshView& view) {
-  if (meshes.empty()) return;
-  glPushAttrib(GL_ALL_ATTRIB_BITS);
-  glViewport(0, 0, view.width, view.height);
-  LoadMatrices(view);
-  glDisable(GL_LIGHTING);
-  glDisable(GL_TEXTURE_2D);
-  glDisable(GL_CULL_FACE);
-  glDisable(GL_FOG);
-  glEnable(GL_DEPTH_TEST);
-  glDepthMask(GL_FALSE);
-  glEnable(GL_BLEND);
-  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+void Emit(const std::vector<Triangle>& triangles) {
   glBegin(GL_TRIANGLES);
-  for (const Triangle& triangle : SortedTriangles(meshes, R_DW, view)) {
+  for (const Triangle& triangle : triangles) {
     glColor4fv(triangle.rgba.data());
     for (const Vec3& p_D : triangle.p_D) glVertex3dv(p_D.data());
   }
   glEnd();
+}
+
+}  // namespace
+
+void DrawFlats(const std::vector<FlatMesh>& meshes, const Mat3& R_DW, const FlatView& view) {
+  if (meshes.empty()) return;
+  glPushAttrib(GL_ALL_ATTRIB_BITS);
+  glViewport(0, 0, view.width, view.height);
+  LoadMatrices(view);
+  for (const GLenum off : {GL_LIGHTING, GL_TEXTURE_2D, GL_CULL_FACE, GL_FOG}) glDisable(off);
+  glEnable(GL_DEPTH_TEST);
+  glDepthMask(GL_FALSE);
+  glEnable(GL_BLEND);
+  glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
+  glDepthFunc(GL_GREATER);
+  Emit(SortedTriangles(meshes, FlatMesh::Depth::kHidden, R_DW, view));
+  glDepthFunc(GL_LEQUAL);
+  Emit(SortedTriangles(meshes, FlatMesh::Depth::kVisible, R_DW, view));
   glPopAttrib();
 }
 

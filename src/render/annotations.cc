@@ -1,0 +1,195 @@
+#include "render/annotations.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+namespace mbv::render {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+constexpr double kFullArc = 300.0 / 180.0 * kPi;  // sweep of the largest torque [rad]
+constexpr double kSmallestShare = 0.02;           // forces below this share get no arrow
+constexpr float kGhost = 0.5F;                   // opacity of what bodies hide
+
+std::array<float, 4> WithAlpha(const Material& material, float alpha) {
+  return {material.rgba[0], material.rgba[1], material.rgba[2], alpha};
+}
+
+// A flat ring in the plane normal to `normal`; its hidden part shows through.
+void AddRing(const Vec3& centre, const Vec3& normal, double inner, double outer,
+             const Material& material, std::vector<FlatMesh>* flats) {
+  constexpr int kPieces = 64;
+  const Mat3 R = FrameAlong(normal);
+  FlatMesh ring{.vertices_W = {}, .triangles = {}, .rgba = WithAlpha(material, 0.95F)};
+  for (int i = 0; i < kPieces; ++i) {
+    const double angle = 2.0 * kPi * i / kPieces;
+    const Vec3 e = R * Vec3(std::cos(angle), std::sin(angle), 0.0);
+    ring.vertices_W.emplace_back(centre + inner * e);
+    ring.vertices_W.emplace_back(centre + outer * e);
+    const int a = 2 * i, b = 2 * ((i + 1) % kPieces);
+    ring.triangles.push_back({a, a + 1, b});
+    ring.triangles.push_back({b, a + 1, b + 1});
+  }
+  flats->push_back(ring);
+  ring.rgba[3] = kGhost;
+  ring.depth = FlatMesh::Depth::kHidden;
+  flats->push_back(std::move(ring));
+}
+
+// The outline of an arrow, turned to the camera, to be seen through what hides the arrow. It lies
+// a head's width before the arrow, so that the arrow does not hide its own ghost.
+void AddArrowGhost(const Vec3& p, const Vec3& q, double radius, const Material& material,
+                   const Vec3& forward_W, std::vector<FlatMesh>* flats) {
+  const Vec3 e = (q - p).normalized();
+  const Vec3 across = e.cross(forward_W);
+  if (across.norm() < 0.05) return;  // seen from its end
+  const Vec3 s = across.normalized(), shift = -4.0 * radius * forward_W;
+  const double head = std::min(6.0 * radius, 0.5 * (q - p).norm());
+  const Vec3 neck = q - head * e + shift;
+  FlatMesh ghost{.vertices_W = {p + shift - radius * s, p + shift + radius * s, neck - radius * s,
+                                neck + radius * s, neck - 2.0 * radius * s, neck + 2.0 * radius * s,
+                                q + shift},
+                 .triangles = {{0, 1, 2}, {1, 3, 2}, {4, 5, 6}},
+                 .rgba = WithAlpha(material, kGhost),
+                 .depth = FlatMesh::Depth::kHidden};
+  flats->push_back(std::move(ghost));
+}
+
+// A torque as an arc around its axis; the sweep follows the torque.
+void AddTorqueArc(const Vec3& p, const Vec3& axis, double share, double radius, double thickness,
+                  const Material& material, std::vector<Item>* items) {
+  const double sweep = share * kFullArc;
+  const Mat3 R = FrameAlong(axis);
+  const auto point = [&](double angle) {
+    return Vec3(p + radius * (R * Vec3(std::cos(angle), std::sin(angle), 0.0)));
+  };
+  const double head = std::copysign(std::min(0.6, 0.6 * std::abs(sweep)), sweep);
+  const double shaft = sweep - head;
+  const int pieces = std::max(1, static_cast<int>(std::ceil(std::abs(shaft) / 0.1)));
+  for (int i = 0; i < pieces; ++i) {
+    items->push_back(Between(Solid::kCapsule, point(shaft * i / pieces),
+                             point(shaft * (i + 1) / pieces), thickness, material));
+  }
+  // The head: discs that taper to the tip.
+  constexpr int kDiscs = 12;
+  for (int i = 0; i < kDiscs; ++i) {
+    const double from = shaft + head * i / kDiscs, to = shaft + head * (i + 1) / kDiscs;
+    items->push_back(Between(Solid::kCylinder, point(from), point(to),
+                             2.6 * thickness * (1.0 - (i + 0.5) / kDiscs), material));
+  }
+}
+
+class ForceMarks {
+ public:
+  ForceMarks(const Mechanism& mechanism, const PictureFrame& frame, const Scale& scale,
+             const Vec3& forward_W, Annotations* out)
+      : mechanism_(mechanism), frame_(frame), scale_(scale), forward_W_(forward_W), out_(out) {}
+
+  void Add(const Drive& drive, double force) const {
+    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+      // The force on the far body: thrust points on along the leg, tension back along it.
+      const Vec3 p = frame_.X_WB[leg->body_from] * leg->p_from;
+      const Vec3 q = frame_.X_WB[leg->body_to] * leg->p_to;
+      if ((q - p).norm() > 0.0) AddArrow(q, (q - p).normalized(), force);
+      return;
+    }
+    const JointDrive& at = std::get<JointDrive>(drive.kind);
+    const Joint& joint = mechanism_.joints[at.joint];
+    const Pose X_WF = frame_.X_WB[joint.parent] * joint.X_PF;
+    const Vec3 p_M = (frame_.X_WB[joint.child] * joint.X_CM).translation();
+    const Vec3 axis = X_WF.linear() * joint.axis;
+    if (ForceUnit(mechanism_, drive) == "N") {
+      AddArrow(p_M, axis, force);
+      return;
+    }
+    if (scale_.longest_torque_Nm <= 0.0) return;
+    const double share = force / scale_.longest_torque_Nm;
+    if (std::abs(share) < kSmallestShare) return;
+    AddTorqueArc(X_WF.translation(), axis, share, 0.3 * scale_.arrow_m, 0.022 * scale_.arrow_m,
+                 Color(force), &out_->items);
+  }
+
+ private:
+  static Material Color(double force) { return MaterialOf(force >= 0.0 ? "push" : "pull"); }
+
+  void AddArrow(const Vec3& p, const Vec3& direction, double force) const {
+    if (scale_.longest_force_N <= 0.0) return;
+    const double share = force / scale_.longest_force_N;
+    if (std::abs(share) < kSmallestShare) return;
+    const Vec3 q = p + share * scale_.arrow_m * direction;
+    const double radius = 0.035 * scale_.arrow_m;
+    out_->items.push_back(Between(Solid::kArrow, p, q, radius, Color(force)));
+    AddArrowGhost(p, q, radius, Color(force), forward_W_, &out_->flats);
+  }
+
+  const Mechanism& mechanism_;
+  const PictureFrame& frame_;
+  const Scale& scale_;
+  const Vec3 forward_W_;
+  Annotations* out_;
+};
+
+void AddClosure(const Mechanism& mechanism, const Joint& joint, const PictureFrame& frame,
+                const Scale& scale, const Vec3& forward_W, Annotations* out) {
+  const double r = JointRadius(mechanism, joint, scale);
+  const Vec3 p_F = (frame.X_WB[joint.parent] * joint.X_PF).translation();
+  const Vec3 p_M = (frame.X_WB[joint.child] * joint.X_CM).translation();
+  AddRing(p_M, forward_W, 1.75 * r, 2.1 * r, MaterialOf("closure"), &out->flats);
+  const bool may_slide = joint.kind == JointKind::kPrismatic ||
+                         joint.kind == JointKind::kCylindrical ||
+                         joint.kind == JointKind::kPlanar || joint.kind == JointKind::kFree;
+  if (!may_slide && (p_F - p_M).norm() > 0.5 * r) {
+    out->items.push_back(Between(Solid::kCapsule, p_F, p_M, 0.3 * r, MaterialOf("gap")));
+  }
+}
+
+void AddPath(const PolylineOverlay& path, double radius, std::vector<Item>* items) {
+  Material material = MaterialOf(path.color);
+  material.emission = 0.3F;
+  // Points closer than a fifth of the radius to the last drawn one are passed over.
+  std::size_t last = 0;
+  for (std::size_t i = 1; i < path.points_W.size(); ++i) {
+    const Vec3 &p = path.points_W[last], &q = path.points_W[i];
+    if ((q - p).norm() < 0.2 * radius && i + 1 < path.points_W.size()) continue;
+    items->push_back(Between(Solid::kCapsule, p, q, radius, material));
+    last = i;
+  }
+}
+
+}  // namespace
+
+Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame, const Scale& scale,
+                     const PictureOptions& options, const Vec3& forward_W) {
+  Annotations out;
+  if (options.drive_forces) {
+    const ForceMarks marks(mechanism, frame, scale, forward_W, &out);
+    for (std::size_t d = 0; d < frame.drive_forces.size(); ++d) {
+      if (std::isfinite(frame.drive_forces[d])) {
+        marks.Add(mechanism.drives[d], frame.drive_forces[d]);
+      }
+    }
+  }
+  if (options.closures) {
+    for (const Joint& joint : mechanism.joints) {
+      if (joint.closure) AddClosure(mechanism, joint, frame, scale, forward_W, &out);
+    }
+  }
+  return out;
+}
+
+Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale) {
+  Annotations out;
+  for (const PolylineOverlay& path : overlay.paths) {
+    AddPath(path, path.radius_m > 0.0 ? path.radius_m : 0.0025 * scale.extent_m, &out.items);
+  }
+  for (const MeshOverlay& mesh : overlay.meshes) {
+    out.flats.push_back({.vertices_W = mesh.vertices_W,
+                         .triangles = mesh.triangles,
+                         .rgba = MaterialOf(mesh.color).rgba,
+                         .shaded = true});
+  }
+  return out;
+}
+
+}  // namespace mbv::render
