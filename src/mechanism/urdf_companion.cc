@@ -23,7 +23,9 @@ std::string YamlName(std::string name) {
   return name;
 }
 
-std::string List(const Vec3& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
+std::string List(const Vec3& v) {
+  return fmt::format("[{}, {}, {}]", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
+}
 
 std::string RangeText(const CoordinateRange& range) {
   const auto bound = [](double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; };

@@ -35,8 +35,10 @@ std::string Escaped(const std::string& text) {
   return result;
 }
 
-// Shortest text that reads back as the same number.
-std::string Xyz(const Vec3& v) { return fmt::format("{} {} {}", v.x(), v.y(), v.z()); }
+// Shortest text that reads back as the same number; adding zero turns -0 into 0.
+std::string Xyz(const Vec3& v) {
+  return fmt::format("{} {} {}", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
+}
 
 std::string Origin(const Pose& X) {
   return fmt::format("<origin xyz=\"{}\" rpy=\"{}\"/>", Xyz(X.translation()),
