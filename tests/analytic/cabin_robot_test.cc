@@ -277,6 +277,54 @@ TEST(CabinRobot, StrutInLineWithABIsSingular) {
   EXPECT_EQ(summary.where, "strut EF");
 }
 
+// Fits commands that hold the tool's pose of another motion at t, with both derivatives.
+CommandSample ToolCommandsOf(const Mechanism& mechanism, const Motion& joint_motion, double t) {
+  const auto value = [&](double s) {
+    const ClosedFormSample at = Evaluate(mechanism, joint_motion, s);
+    Eigen::Matrix<double, 8, 1> v;  // tool pose, platform.yaw, d1
+    v << at.extra.segment<6>(6), at.extra[5], at.driven.position[0];
+    return v;
+  };
+  constexpr double h = 1e-3;
+  CommandSample c;
+  c.time_s = t;
+  c.position = value(t);
+  c.velocity = (45 * (value(t + h) - value(t - h)) - 9 * (value(t + 2 * h) - value(t - 2 * h)) +
+                (value(t + 3 * h) - value(t - 3 * h))) /
+               (60 * h);
+  c.acceleration =
+      (270 * (value(t + h) + value(t - h)) - 27 * (value(t + 2 * h) + value(t - 2 * h)) +
+       2 * (value(t + 3 * h) + value(t - 3 * h)) - 490 * value(t)) /
+      (180 * h * h);
+  return c;
+}
+
+TEST(CabinRobot, ToolPoseWithGivenRailLeadsBackToTheSameDrives) {
+  const Mechanism mechanism = LoadCabin();
+  const Motion joint_motion = DefaultMotion();
+  Motion tool_motion;
+  for (const char* name : {"tool.x", "tool.y", "tool.z", "tool.roll", "tool.pitch", "tool.yaw",
+                           "platform.yaw", "d1"}) {
+    Add(name, Constant(0.0), &tool_motion);
+  }
+  Diagnostics diagnostics;
+  const auto form = MakeCabinRobot(mechanism, tool_motion, {}, &diagnostics);
+  ASSERT_NE(form, nullptr) << diagnostics.Text();
+  for (double t : {1.1, 2.0, 3.3}) {
+    const ClosedFormSample truth = Evaluate(mechanism, joint_motion, t);
+    ClosedFormSample sample;
+    const RunSummary summary = form->Dynamics(ToolCommandsOf(mechanism, joint_motion, t), &sample);
+    ASSERT_TRUE(summary.ok()) << summary.message;
+    // Differences of the pose: 1e-12 in rates, 1e-9 in accelerations; forces scale with 377 kg.
+    for (int d = 0; d < kDrives; ++d) {
+      EXPECT_NEAR(sample.driven.position[d], truth.driven.position[d], 1e-12) << d;
+      EXPECT_NEAR(sample.driven.velocity[d], truth.driven.velocity[d], 1e-10) << d;
+      EXPECT_NEAR(sample.driven.acceleration[d], truth.driven.acceleration[d], 1e-7) << d;
+      EXPECT_NEAR(sample.force[d], truth.force[d], 1e-4) << d;
+    }
+  }
+}
+
 TEST(CabinRobot, AMotionThatCommandsHalfOfASetIsExplained) {
   Motion motion = HoldMotion(0.0, 0.36, 0.0);
   motion.commands.erase(motion.commands.begin() + 3);

@@ -5,6 +5,7 @@
 #include <array>
 
 #include "analytic/cabin_robot/cabin_dynamics.h"
+#include "analytic/cabin_robot/tool_inverse.h"
 #include "core/spatial.h"
 
 namespace mbv {
@@ -18,6 +19,30 @@ constexpr std::array<const char*, kBodies> kBodyNames = {
     "carriage", "sliderA", "sliderD", "sliderF", "AB",      "CD",     "EF",
     "platform", "support", "flip",    "table",   "slewing", "payload"};
 constexpr std::array<const char*, 3> kTaskNames = {"platform.x", "platform.y", "platform.yaw"};
+constexpr std::array<const char*, 6> kToolNames = {"tool.x",    "tool.y",     "tool.z",
+                                                   "tool.roll", "tool.pitch", "tool.yaw"};
+
+// Which coordinates a motion commands.
+enum class Space { kPlatform, kSliders, kToolRail, kToolHeight, kNone };
+
+int Count(const Motion& motion, std::initializer_list<const char*> names) {
+  int count = 0;
+  for (const char* name : names) count += motion.FindCommand(name) >= 0;
+  return count;
+}
+
+Space SpaceOf(const Motion& motion) {
+  const int commands = static_cast<int>(motion.commands.size());
+  if (commands != kDrives) return Space::kNone;
+  int tool = 0;
+  for (const char* name : kToolNames) tool += motion.FindCommand(name) >= 0;
+  if (tool == 6 && Count(motion, {"platform.yaw", "d1"}) == 2) return Space::kToolRail;
+  if (tool == 6 && Count(motion, {"platform.yaw", "platform.y"}) == 2) return Space::kToolHeight;
+  if (Count(motion, {"d1", "th3", "th4", "d5", "th6"}) != 5) return Space::kNone;
+  if (Count(motion, {"platform.x", "platform.y", "platform.yaw"}) == 3) return Space::kPlatform;
+  if (Count(motion, {"X1", "X2", "X3"}) == 3) return Space::kSliders;
+  return Space::kNone;
+}
 
 CabinGeometry ReadGeometry(const Mechanism& m) {
   CabinGeometry g;
@@ -48,7 +73,8 @@ class CabinRobot final : public ClosedForm {
       model_order_[d] = mechanism.FindDrive(kDriveNames[d]);
     }
     for (int k = 0; k < 3; ++k) command_of_task_[k] = motion.FindCommand(kTaskNames[k]);
-    task_space_ = command_of_task_[0] >= 0;
+    for (int k = 0; k < 6; ++k) command_of_tool_[k] = motion.FindCommand(kToolNames[k]);
+    space_ = SpaceOf(motion);
     for (int b = 0; b < kBodies; ++b) model_body_[b] = mechanism.FindBody(kBodyNames[b]);
   }
 
@@ -99,23 +125,43 @@ class CabinRobot final : public ClosedForm {
   }
 
   RunSummary Solve(const CommandSample& command) {
-    outer_ = {At(command, command_of_drive_[kRail]), At(command, command_of_drive_[kTh3]),
-              At(command, command_of_drive_[kTh4]), At(command, command_of_drive_[kD5]),
-              At(command, command_of_drive_[kTh6])};
     RunSummary summary;
-    if (task_space_) {
-      planar_.X = At(command, command_of_task_[0]);
-      planar_.Y = At(command, command_of_task_[1]);
-      planar_.gamma = At(command, command_of_task_[2]);
-      summary = SolveInverse(geometry_.planar, &planar_);
+    if (space_ == Space::kToolRail || space_ == Space::kToolHeight) {
+      summary = SolveTool(command);
     } else {
-      planar_.X1 = At(command, command_of_drive_[kX1]);
-      planar_.X2 = At(command, command_of_drive_[kX2]);
-      planar_.X3 = At(command, command_of_drive_[kX3]);
-      summary = SolveForward(geometry_.planar, &planar_);
+      outer_ = {At(command, command_of_drive_[kRail]), At(command, command_of_drive_[kTh3]),
+                At(command, command_of_drive_[kTh4]), At(command, command_of_drive_[kD5]),
+                At(command, command_of_drive_[kTh6])};
+      summary = SolvePlane(command);
     }
     summary.time_s = command.time_s;
     return summary;
+  }
+
+  RunSummary SolvePlane(const CommandSample& command) {
+    if (space_ == Space::kPlatform) {
+      planar_.X = At(command, command_of_task_[0]);
+      planar_.Y = At(command, command_of_task_[1]);
+      planar_.gamma = At(command, command_of_task_[2]);
+      return SolveInverse(geometry_.planar, &planar_);
+    }
+    planar_.X1 = At(command, command_of_drive_[kX1]);
+    planar_.X2 = At(command, command_of_drive_[kX2]);
+    planar_.X3 = At(command, command_of_drive_[kX3]);
+    return SolveForward(geometry_.planar, &planar_);
+  }
+
+  RunSummary SolveTool(const CommandSample& command) {
+    ToolCommand tool;
+    for (int k = 0; k < 3; ++k) {
+      tool.position[k] = At(command, command_of_tool_[k]);
+      tool.rpy[k] = At(command, command_of_tool_[3 + k]);
+    }
+    tool.gamma = At(command, command_of_task_[2]);
+    const bool rail = space_ == Space::kToolRail;
+    tool.resolved = At(command, rail ? command_of_drive_[kRail] : command_of_task_[1]);
+    return SolveToolPose(geometry_, rail ? Resolution::kRailGiven : Resolution::kHeightGiven, tool,
+                         &planar_, &outer_);
   }
 
   void Store(DrivenSample* driven) const {
@@ -146,9 +192,10 @@ class CabinRobot final : public ClosedForm {
   }
 
   CabinGeometry geometry_;
-  bool task_space_ = true;
+  Space space_ = Space::kNone;
   std::array<int, kDrives> command_of_drive_{}, model_order_{};
   std::array<int, 3> command_of_task_{};
+  std::array<int, 6> command_of_tool_{};
   std::array<int, kBodies> model_body_{};
   PlanarState planar_;
   OuterDrives outer_;
@@ -159,25 +206,19 @@ class CabinRobot final : public ClosedForm {
 
 std::unique_ptr<ClosedForm> MakeCabinRobot(const Mechanism& mechanism, const Motion& motion,
                                            const ClosedFormOptions&, Diagnostics* diagnostics) {
-  int task = 0, sliders = 0;
-  for (const char* name : kTaskNames) task += motion.FindCommand(name) >= 0;
-  for (const char* name : {"X1", "X2", "X3"}) sliders += motion.FindCommand(name) >= 0;
-  if ((task != 3 || sliders != 0) && (task != 0 || sliders != 3)) {
-    diagnostics->Add({.severity = Severity::kError,
-                      .file = {},
-                      .message = fmt::format("the cabin robot's equations need either platform.x, "
-                                             "platform.y, platform.yaw or X1, X2, X3; the motion "
-                                             "commands {} of the first and {} of the second",
-                                             task, sliders),
-                      .hint = "command one of the two sets completely"});
-  }
-  for (const char* name : {"d1", "th3", "th4", "d5", "th6"}) {
-    if (motion.FindCommand(name) < 0) {
-      diagnostics->Add({.severity = Severity::kError,
-                        .file = {},
-                        .message = fmt::format("the motion does not command the drive {}", name),
-                        .hint = fmt::format("add `{}: VALUE` under motion.commands", name)});
+  if (SpaceOf(motion) == Space::kNone) {
+    std::string commanded;
+    for (const Command& command : motion.commands) {
+      commanded += (commanded.empty() ? "" : ", ") + command.name;
     }
+    diagnostics->Add(
+        {.severity = Severity::kError,
+         .file = {},
+         .message = fmt::format("the cabin robot's equations cannot follow the commands {}",
+                                commanded.empty() ? "(none)" : commanded),
+         .hint = "command exactly eight: d1, th3, th4, d5, th6 with platform.x, platform.y, "
+                 "platform.yaw or with X1, X2, X3; or tool.x ... tool.yaw with platform.yaw and "
+                 "either d1 (rail given) or platform.y (height given)"});
   }
   if (diagnostics->has_errors()) return nullptr;
   return std::make_unique<CabinRobot>(mechanism, motion);
