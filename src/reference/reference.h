@@ -26,11 +26,11 @@ struct ReferenceOptions {
 /// Everything the reference knows at one instant.
 struct ReferenceSample {
   BodyStates states;
-  DrivenSample driven;         ///< drives, then prescribed joints
-  VecX drive_force;            ///< per drive
-  VecX prescribed_force;       ///< per prescribed joint
-  MatX reactions;              ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
-  MatX outputs;                ///< outputs × 6
+  DrivenSample driven;    ///< drives, then prescribed joints
+  VecX drive_force;       ///< per drive
+  VecX prescribed_force;  ///< per prescribed joint
+  MatX reactions;         ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
+  MatX outputs;           ///< outputs × 6
   double closure_position_m = kNan, closure_rotation_rad = kNan;
   double power_input_W = kNan, energy_rate_W = kNan;
 };

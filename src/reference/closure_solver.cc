@@ -1,0 +1,335 @@
+#include "reference/closure_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "core/demand.h"
+#include "core/spatial.h"
+#include "reference/closure_failure.h"
+
+namespace mbv::internal {
+namespace {
+
+// A Newton solution farther than this from its prediction [rad, characteristic lengths] may lie on
+// another branch; the way there is then divided into steps.
+constexpr double kTrustedCorrection = 0.2;
+// Square roots of the rounding error cannot be told from zero at a singular pose.
+constexpr double kSingularValue = 1e-7;
+constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
+
+std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
+  std::vector<Command> commands = motion.commands;
+  for (size_t p = 0; p < mechanism.prescribed.size(); ++p) {
+    const auto commanded = [&](const Command& command) {
+      return std::any_of(command.terms.begin(), command.terms.end(), [&](const auto& term) {
+        return term.coordinate.kind == Coordinate::Kind::kPrescribed &&
+               term.coordinate.index == static_cast<int>(p);
+      });
+    };
+    if (std::any_of(commands.begin(), commands.end(), commanded)) continue;
+    const Prescribed& prescribed = mechanism.prescribed[p];
+    commands.push_back({.name = prescribed.name,
+                        .terms = {{{Coordinate::Kind::kPrescribed, static_cast<int>(p), 0}, 1.0}},
+                        .profile = Constant(mechanism.joints[prescribed.joint].home[0])});
+  }
+  return commands;
+}
+
+// A value of the coordinate at home that says which turn an angle is in.
+double HomeTurn(const Mechanism& mechanism, const Coordinate& coordinate, double commanded) {
+  const auto home_of = [&](int joint, int c) { return mechanism.joints[joint].home[c]; };
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kPrescribed:
+      return home_of(mechanism.prescribed[coordinate.index].joint, 0);
+    case Coordinate::Kind::kDrive: {
+      const auto* d = std::get_if<JointDrive>(&mechanism.drives[coordinate.index].kind);
+      return d == nullptr ? 0.0 : home_of(d->joint, d->coordinate);
+    }
+    case Coordinate::Kind::kOutput:
+      return commanded;
+  }
+  return 0.0;
+}
+
+VecX Extended(const VecX& values, size_t size) {
+  VecX out = VecX::Zero(static_cast<Eigen::Index>(size));
+  out.head(values.size()) = values;
+  return out;
+}
+
+// Largest rotation [rad] or translation [characteristic lengths] of stacked twists.
+double SizeOf(const VecX& twists, double length) {
+  double size = 0.0;
+  for (Eigen::Index i = 0; i < twists.size(); i += 6) {
+    size = std::max({size, twists.segment<3>(i).norm(), twists.segment<3>(i + 3).norm() / length});
+  }
+  return size;
+}
+
+RunSummary Failed(Stop stop, const std::string& message) {
+  RunSummary summary;
+  summary.stop = stop;
+  summary.message = message;
+  return summary;
+}
+
+}  // namespace
+
+void MoveBodies(const VecX& twists, BodyStates* states) {
+  for (size_t b = 1; b < states->X_WB.size(); ++b) {
+    const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
+    Pose& X = states->X_WB[b];
+    const Mat3 R = ExpRotation(twists.segment<3>(at)) * X.linear();
+    // One Newton step towards the nearest rotation.
+    X.linear() = 0.5 * R * (3.0 * Mat3::Identity() - R.transpose() * R);
+    X.translation() += twists.segment<3>(at + 3);
+  }
+}
+
+ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
+                             const ReferenceOptions& options)
+    : mechanism_(mechanism),
+      options_(options),
+      length_(CharacteristicLength(mechanism)),
+      commands_(AllCommands(mechanism, motion)),
+      system_(mechanism.bodies.size(), length_) {
+  MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
+  states_.Resize(mechanism.bodies.size());
+  states_.X_WB = mechanism.X_WB_home;
+}
+
+void ClosureSolver::EvaluateRows(Trial* trial) {
+  rows_.Clear();
+  for (const Joint& joint : mechanism_.joints) {
+    const ConstraintRows rows = RowsOf(joint, trial->states, false);
+    rows_.Add(rows, rows.rows);
+  }
+  joint_rows_ = rows_.size();
+  for (size_t k = 0; k < commands_.size(); ++k) {
+    rows_.Add(mechanism_, commands_[k], trial->states, &trial->near_values[k]);
+  }
+}
+
+VecX ClosureSolver::Residual(const VecX& target) const {
+  VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
+  r.tail(target.size()) -= target;
+  return r;
+}
+
+RunSummary ClosureSolver::SelectRows() {
+  selection_ = system_.IndependentRows(rows_, 0, joint_rows_);
+  selection_is_new_ = true;
+  orientation_ = 0;
+  const int freedoms = system_.size() - static_cast<int>(selection_.size());
+  if (freedoms != static_cast<int>(commands_.size())) {
+    return Failed(Stop::kUnsupported,
+                  fmt::format("the joints leave {} freedoms, but {} coordinates are commanded",
+                              freedoms, commands_.size()));
+  }
+  for (int k = joint_rows_; k < rows_.size(); ++k) selection_.push_back(k);
+  return RunSummary::Done();
+}
+
+RunSummary ClosureSolver::Prepare() {
+  near_values_.clear();
+  for (const Command& command : commands_) {
+    const double commanded = Evaluate(command.profile, 0.0).value;
+    auto& near = near_values_.emplace_back();
+    for (const auto& term : command.terms) {
+      near.push_back(HomeTurn(mechanism_, term.coordinate,
+                              command.terms.size() == 1 ? commanded / term.factor : 0.0));
+    }
+  }
+  Trial home{states_, near_values_};
+  EvaluateRows(&home);
+  near_values_ = home.near_values;
+  target_ = Eigen::Map<const VecX>(rows_.value.data() + joint_rows_, rows_.size() - joint_rows_);
+  return SelectRows();
+}
+
+ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, Trial* trial) {
+  bool factored = false;
+  double previous = std::numeric_limits<double>::infinity(), moved = 0.0;
+  for (int i = 0; i < options_.max_iterations; ++i) {
+    EvaluateRows(trial);
+    const VecX r_all = Residual(target);
+    VecX r(system_.size());
+    for (int k = 0; k < system_.size(); ++k) r[k] = r_all[selection_[k]];
+    const double largest = r.size() == 0 ? 0.0 : r.cwiseAbs().maxCoeff();
+    if (!std::isfinite(largest)) return Step::kSlow;
+    // Round-off of the largest coordinates may exceed the asked tolerance.
+    const bool small = largest < std::max(options_.closure_tolerance_m, 32 * kEps * length_);
+    if (!factored || (!small && largest > 0.01 * previous)) {
+      if (!system_.Factor(rows_, selection_, selection_is_new_)) return Step::kSingular;
+      selection_is_new_ = false;
+      factored = true;
+      // Other row orders have other signs; within one, a change means a singular pose between.
+      if (orientation_ != 0 && small && system_.determinant_sign() != orientation_) {
+        return Step::kSingular;
+      }
+    }
+    const VecX step = -system_.SolveTransposed(r);
+    const double size = SizeOf(step, length_);
+    moved += size;
+    if (limit_step && moved > kTrustedCorrection) return Step::kFar;
+    if (!(size < 10.0)) return Step::kSlow;
+    MoveBodies(step, &trial->states);
+    if (small) {
+      EvaluateRows(trial);
+      const bool turned = orientation_ != 0 && system_.determinant_sign() != orientation_;
+      return turned ? Step::kSingular : Step::kDone;
+    }
+    previous = largest;
+  }
+  return Step::kSlow;
+}
+
+void ClosureSolver::Accept(const VecX& target, Trial&& trial) {
+  states_ = std::move(trial.states);
+  near_values_ = std::move(trial.near_values);
+  target_ = target;
+  orientation_ = system_.determinant_sign();
+}
+
+RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
+  const VecX start = target_;
+  double reached = 0.0, step = 1.0 / first_steps;
+  int easy = 0;
+  while (reached < 1.0) {
+    const double next = std::min(1.0, reached + step);
+    const VecX between = start + next * (target - start);
+    Trial trial{states_, near_values_};
+    if (Newton(between, true, &trial) == Step::kDone) {
+      Accept(between, std::move(trial));
+      reached = next;
+      if (++easy >= 3) step = std::min(2 * step, 4.0 / first_steps);
+      continue;
+    }
+    easy = 0;
+    step *= 0.5;
+    if (step * kSmallestStep < 1.0) {
+      return ExplainUnreached(mechanism_, commands_, target, states_, near_values_);
+    }
+  }
+  return RunSummary::Done();
+}
+
+RunSummary ClosureSolver::Singular(const std::string& why) const {
+  RunSummary summary = Failed(Stop::kSingular, why);
+  summary.where = MostMovingJoint(mechanism_, states_, system_.SoftMotion());
+  return summary;
+}
+
+RunSummary ClosureSolver::CheckPose() {
+  gap_position_m_ = gap_rotation_rad_ = 0.0;
+  int worst = 0;
+  for (int i = 0; i < joint_rows_; ++i) {
+    double& gap = rows_.angular[i] ? gap_rotation_rad_ : gap_position_m_;
+    gap = std::max(gap, std::abs(rows_.value[i]));
+    if (std::abs(rows_.value[i]) > std::abs(rows_.value[worst])) worst = i;
+  }
+  if (gap_position_m_ > 1e-9 * length_ || gap_rotation_rad_ > 1e-9) {
+    RunSummary summary = Failed(
+        Stop::kNoConvergence,
+        "a constraint that was redundant at the home pose is violated: the loops close there only");
+    int row = 0;
+    for (const Joint& joint : mechanism_.joints) {
+      row += 6 - FreedomsOf(joint.kind);
+      if (worst < row) {
+        summary.where = joint.name;
+        break;
+      }
+    }
+    summary.amount = rows_.value[worst];
+    summary.unit = rows_.angular[worst] ? "rad" : "m";
+    return summary;
+  }
+  const double sigma = system_.SmallestSingularValue(1);
+  if (sigma < kSingularValue) {
+    RunSummary summary = Singular(fmt::format(
+        "singular pose: the commands do not hold the mechanism (smallest singular value {:.1e})",
+        sigma));
+    summary.amount = sigma;
+    summary.unit = "1";
+    return summary;
+  }
+  return RunSummary::Done();
+}
+
+VecX ClosureSolver::Refined(const VecX& rates, bool* accurate) {
+  // The factors belong to a pose nearby; refinement against the true rows restores all digits.
+  VecX V = VecX::Zero(system_.size());
+  std::vector<Vec6> per_body(mechanism_.bodies.size(), Vec6::Zero());
+  const double scale = std::max(rates.cwiseAbs().maxCoeff(), 1e-3);
+  double previous = std::numeric_limits<double>::infinity();
+  *accurate = false;
+  for (int i = 0; i < 12; ++i) {
+    const VecX have = rows_.Rates(per_body);
+    VecX missing(system_.size());
+    for (int k = 0; k < system_.size(); ++k) {
+      missing[k] = rates[selection_[k]] - have[selection_[k]];
+    }
+    const double largest = missing.size() == 0 ? 0.0 : missing.cwiseAbs().maxCoeff();
+    *accurate = largest < 1e-9 * scale;
+    if (largest == 0.0 || (largest < 1e-12 * scale && largest > 0.1 * previous)) break;
+    V += system_.SolveTransposed(missing);
+    Unstack(V, &per_body);
+    previous = largest;
+  }
+  return V;
+}
+
+RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
+  const size_t count = commands_.size();
+  VecX rates = VecX::Zero(rows_.size());
+  rates.tail(count) = Extended(command.velocity, count);
+  bool accurate = false, accurate_too = false;
+  Unstack(Refined(rates, &accurate), &states_.V_WB);
+
+  Trial here{states_, near_values_};  // biases depend on the velocities
+  EvaluateRows(&here);
+  rates.tail(count) = Extended(command.acceleration, count);
+  rates -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
+  Unstack(Refined(rates, &accurate_too), &states_.A_WB);
+  if (accurate && accurate_too) return RunSummary::Done();
+  return Singular("the velocities are not determined by the commands at this pose");
+}
+
+RunSummary ClosureSolver::Solve(const CommandSample& command) {
+  const bool first = near_values_.empty();
+  if (first) {
+    if (RunSummary summary = Prepare(); !summary.ok()) return summary;
+  }
+  VecX target = target_;
+  target.head(command.position.size()) = command.position;
+  if (first) {
+    // Prescribed joints without a command stay at their home coordinate.
+    for (size_t k = command.position.size(); k < commands_.size(); ++k) {
+      target[k] = Evaluate(commands_[k].profile, 0.0).value;
+    }
+  }
+
+  // Extrapolate the previous sample; where that does not lead, follow the commands in steps.
+  const double dt = command.time_s - time_s_;
+  bool done = false;
+  if (!first && dt > 0.0 && std::isfinite(dt)) {
+    Trial trial{states_, near_values_};
+    MoveBodies(dt * Stack(states_.V_WB) + 0.5 * dt * dt * Stack(states_.A_WB), &trial.states);
+    if (Newton(target, true, &trial) == Step::kDone) {
+      Accept(target, std::move(trial));
+      done = true;
+    }
+  }
+  RunSummary summary = RunSummary::Done();
+  if (!done) summary = Follow(target, first ? options_.homotopy_steps : 4);
+  if (summary.ok()) summary = CheckPose();
+  if (summary.ok()) summary = SolveRates(command);
+  time_s_ = command.time_s;
+  if (!summary.ok()) summary.time_s = command.time_s;
+  return summary;
+}
+
+}  // namespace mbv::internal

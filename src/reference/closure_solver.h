@@ -1,0 +1,75 @@
+// Loop closure: poses, velocities and accelerations of all bodies under the commands. Internal to
+// reference/.
+//
+// Newton in maximal coordinates on an independent subset of the joint rows plus one row per
+// command; the matrix is factored once near the solution and then refined against. Redundant joint
+// rows are dropped and their residuals checked.
+#pragma once
+
+#include <vector>
+
+#include "core/run_summary.h"
+#include "mechanism/constraints.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "reference/reference.h"
+#include "reference/row_set.h"
+#include "reference/square_system.h"
+
+namespace mbv::internal {
+
+class ClosureSolver {
+ public:
+  ClosureSolver(const Mechanism& mechanism, const Motion& motion, const ReferenceOptions& options);
+
+  /// Brings states() to the command, from the previous sample's or from the home pose.
+  [[nodiscard]] RunSummary Solve(const CommandSample& command);
+
+  [[nodiscard]] const BodyStates& states() const { return states_; }
+  /// Largest translation and rotation residual over all joints.
+  [[nodiscard]] double gap_position_m() const { return gap_position_m_; }
+  [[nodiscard]] double gap_rotation_rad() const { return gap_rotation_rad_; }
+
+ private:
+  enum class Step { kDone, kSlow, kFar, kSingular };
+
+  // Where a pose search stands: everything that is thrown away if it fails.
+  struct Trial {
+    BodyStates states;
+    std::vector<std::vector<double>> near_values;  ///< per command, per term
+  };
+
+  [[nodiscard]] RunSummary Prepare();
+  void EvaluateRows(Trial* trial);
+  [[nodiscard]] VecX Residual(const VecX& target) const;
+  [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
+  [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
+  [[nodiscard]] RunSummary SelectRows();
+  [[nodiscard]] RunSummary CheckPose();
+  [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
+  [[nodiscard]] VecX Refined(const VecX& rates, bool* accurate);
+  [[nodiscard]] RunSummary Singular(const std::string& why) const;
+  void Accept(const VecX& target, Trial&& trial);
+
+  const Mechanism& mechanism_;
+  const ReferenceOptions options_;
+  const double length_;
+  std::vector<Command> commands_;  ///< of the motion, then prescribed joints held at home
+  SquareSystem system_;
+  RowSet rows_;  ///< all joint rows, then the command rows
+  int joint_rows_ = 0;
+  std::vector<int> selection_;
+  bool selection_is_new_ = true;
+  int orientation_ = 0;  ///< sign of the determinant on this branch
+
+  BodyStates states_;
+  std::vector<std::vector<double>> near_values_;
+  VecX target_;  ///< command positions of states_
+  double time_s_ = kNan;
+  double gap_position_m_ = kNan, gap_rotation_rad_ = kNan;
+};
+
+/// Moves all bodies by small twists: R ← exp(δω) R, p ← p + δv; keeps rotations orthonormal.
+void MoveBodies(const VecX& stacked_twists, BodyStates* states);
+
+}  // namespace mbv::internal

@@ -1,0 +1,170 @@
+#include "reference/force_solver.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/demand.h"
+#include "core/spatial.h"
+
+namespace mbv::internal {
+namespace {
+
+// Forces must satisfy the equations of motion to this share of the largest wrench.
+constexpr double kBalanceTolerance = 1e-9;
+
+bool IsAngularJoint(const Joint& joint) { return joint.kind != JointKind::kPrismatic; }
+
+int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
+  return joint.transmits_force_only ? rows.translation_rows : rows.rows;
+}
+
+}  // namespace
+
+ForceSolver::ForceSolver(const Mechanism& mechanism)
+    : mechanism_(mechanism),
+      length_(CharacteristicLength(mechanism)),
+      system_(mechanism.bodies.size(), length_) {}
+
+void ForceSolver::FillRows(const BodyStates& states) {
+  rows_.Clear();
+  for (const Joint& joint : mechanism_.joints) {
+    const ConstraintRows rows = RowsOf(joint, states, true);
+    rows_.Add(rows, ReactionRows(joint, rows));
+  }
+  for (const Drive& drive : mechanism_.drives) {
+    rows_.Add(DriveRow(mechanism_, drive, states), PositionUnit(mechanism_, drive) == "rad");
+  }
+  for (const Prescribed& prescribed : mechanism_.prescribed) {
+    const Joint& joint = mechanism_.joints[prescribed.joint];
+    rows_.Add(JointCoordinateRow(joint, 0, states), IsAngularJoint(joint));
+  }
+}
+
+RunSummary ForceSolver::SelectBasis() {
+  basis_ = system_.IndependentRows(rows_, 0, rows_.size());
+  if (static_cast<int>(basis_.size()) < system_.size()) {
+    RunSummary summary;
+    summary.stop = Stop::kSingular;
+    summary.message = fmt::format(
+        "drives and reactions cannot hold the mechanism at this pose: {} of {} equations of motion "
+        "have no force",
+        system_.size() - static_cast<int>(basis_.size()), system_.size());
+    return summary;
+  }
+  rest_.clear();
+  for (int i = 0, next = 0; i < rows_.size(); ++i) {
+    if (next < system_.size() && basis_[next] == i) {
+      ++next;
+    } else {
+      rest_.push_back(i);
+    }
+  }
+  basis_is_new_ = chosen_ = true;
+  return RunSummary::Done();
+}
+
+bool ForceSolver::Factor() {
+  if (!system_.Factor(rows_, basis_, basis_is_new_)) return false;
+  basis_is_new_ = false;
+  // Self-stresses: each force outside the basis with the basis forces that balance it.
+  self_stress_.resize(rows_.size(), static_cast<Eigen::Index>(rest_.size()));
+  for (size_t k = 0; k < rest_.size(); ++k) {
+    const int i = rest_[k];
+    VecX wrench = VecX::Zero(system_.size());
+    for (int p = rows_.start[i]; p < rows_.start[i + 1]; ++p) {
+      wrench.segment<6>(6 * (rows_.body[p] - 1)) = system_.RowScale(rows_.angular[i]) * rows_.J[p];
+    }
+    const VecX balance = -system_.Solve(wrench);
+    self_stress_.col(k).setZero();
+    for (int b = 0; b < system_.size(); ++b) {
+      self_stress_(basis_[b], k) = balance[b] / system_.RowScale(rows_.angular[basis_[b]]);
+    }
+    self_stress_(i, k) = 1.0;
+  }
+  return true;
+}
+
+double ForceSolver::Missing(const VecX& force, const VecX& wrenches, VecX* residual) const {
+  std::vector<Vec6> have(mechanism_.bodies.size(), Vec6::Zero());
+  rows_.AddWrenches(force, &have);
+  *residual = wrenches - Stack(have);
+  return system_.body_scale().cwiseProduct(*residual).cwiseAbs().maxCoeff();
+}
+
+VecX ForceSolver::LeastNorm(const VecX& wrenches) {
+  VecX force = VecX::Zero(rows_.size());
+  VecX missing = wrenches;
+  // The second pass is iterative refinement.
+  for (int pass = 0; pass < 2; ++pass) {
+    const VecX part = system_.Solve(missing);
+    for (int b = 0; b < system_.size(); ++b) force[basis_[b]] += part[b];
+    (void)Missing(force, wrenches, &missing);
+  }
+  if (rest_.empty()) return force;
+  VecX scale(rows_.size());
+  for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
+  const VecX scaled = force.cwiseQuotient(scale);
+  const VecX share = self_stress_.householderQr().solve(scaled);
+  return scale.cwiseProduct(scaled - self_stress_ * share);
+}
+
+RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample) {
+  FillRows(sample->states);
+  std::vector<Vec6> required;
+  RequiredWrenches(mechanism_, sample->states, loads, &required);
+  const VecX wrenches = Stack(required);
+  const double largest =
+      system_.size() == 0 ? 0.0 : system_.body_scale().cwiseProduct(wrenches).cwiseAbs().maxCoeff();
+
+  // A basis chosen earlier may have become bad; choose again once.
+  VecX residual;
+  for (int attempt = chosen_ ? 0 : 1; attempt < 2; ++attempt) {
+    if (attempt == 1) {
+      if (RunSummary summary = SelectBasis(); !summary.ok()) return summary;
+    }
+    if (!Factor()) continue;
+    const VecX force = LeastNorm(wrenches);
+    if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
+    Report(force, sample);
+    const PowerAudit audit = AuditPower(mechanism_, sample->states, loads);
+    sample->energy_rate_W = audit.energy_rate_W;
+    sample->power_input_W = audit.loads_and_dampers_W;
+    const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
+    sample->power_input_W += sample->drive_force.dot(sample->driven.velocity.head(drives));
+    sample->power_input_W += sample->prescribed_force.dot(
+        sample->driven.velocity.tail(sample->driven.velocity.size() - drives));
+    return RunSummary::Done();
+  }
+  RunSummary summary;
+  summary.stop = Stop::kSingular;
+  summary.message = "singular pose: the drives do not control the mechanism";
+  return summary;
+}
+
+void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
+  const auto joints = static_cast<Eigen::Index>(mechanism_.joints.size());
+  sample->reactions.setZero(joints, 6);
+  int row = 0;
+  for (Eigen::Index j = 0; j < joints; ++j) {
+    const Joint& joint = mechanism_.joints[j];
+    // Wrench on the child about Co in world axes …
+    Vec6 wrench = Vec6::Zero();
+    const ConstraintRows rows = RowsOf(joint, sample->states, true);
+    for (int i = 0; i < ReactionRows(joint, rows); ++i) {
+      wrench += force[row++] * rows.J_child.row(i).transpose();
+    }
+    // … moved to Mo and turned into F.
+    const Pose& X_WC = sample->states.X_WB[joint.child];
+    const Vec3 p_CoMo = X_WC.linear() * joint.X_CM.translation();
+    const Mat3 R_FW =
+        (sample->states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
+    const Vec3 moment = wrench.head<3>() - p_CoMo.cross(wrench.tail<3>());
+    sample->reactions.row(j) << (R_FW * wrench.tail<3>()).transpose(), (R_FW * moment).transpose();
+  }
+  sample->drive_force = force.segment(row, mechanism_.drives.size());
+  row += static_cast<int>(mechanism_.drives.size());
+  sample->prescribed_force = force.segment(row, mechanism_.prescribed.size());
+}
+
+}  // namespace mbv::internal

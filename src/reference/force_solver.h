@@ -1,0 +1,56 @@
+// Newton–Euler for every body with all reactions, drive and base forces as unknowns. Internal to
+// reference/.
+#pragma once
+
+#include <vector>
+
+#include "core/run_summary.h"
+#include "mechanism/constraints.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "reference/reference.h"
+#include "reference/row_set.h"
+#include "reference/square_system.h"
+
+namespace mbv::internal {
+
+class ForceSolver {
+ public:
+  explicit ForceSolver(const Mechanism& mechanism);
+
+  /// Fills forces, reactions and the power audit of `sample` from its states and driven motion.
+  /// Where the equations leave a choice, the forces of least norm are taken (moments divided by the
+  /// characteristic length).
+  [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample);
+
+ private:
+  void FillRows(const BodyStates& states);
+  [[nodiscard]] RunSummary SelectBasis();
+  [[nodiscard]] bool Factor();
+  [[nodiscard]] VecX LeastNorm(const VecX& wrenches);
+  [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
+  void Report(const VecX& force, ReferenceSample* sample) const;
+
+  const Mechanism& mechanism_;
+  const double length_;
+  SquareSystem system_;
+  RowSet rows_;  ///< reaction rows of all joints, drives, prescribed joints
+  std::vector<int> basis_, rest_;
+  bool basis_is_new_ = true, chosen_ = false;
+  MatX self_stress_;  ///< scaled; basis rows then rest rows
+};
+
+/// Wrench [m about Bo; f] that each body needs beyond gravity, springs and loads, in world axes:
+/// [Featherstone 2008, ch. 2, Eq. 2.65] written at the origin with classical accelerations.
+void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
+                      const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W);
+
+/// Power of the loads and dampers, and d/dt of kinetic plus potential energy (gravity, springs).
+struct PowerAudit {
+  double loads_and_dampers_W = 0.0;
+  double energy_rate_W = 0.0;
+};
+[[nodiscard]] PowerAudit AuditPower(const Mechanism& mechanism, const BodyStates& states,
+                                    const std::vector<LoadSample>& loads);
+
+}  // namespace mbv::internal

@@ -1,0 +1,101 @@
+// Newton–Euler at the body origins in world axes, and the energy balance from the same states.
+#include "core/spatial.h"
+#include "reference/force_solver.h"
+
+namespace mbv::internal {
+namespace {
+
+// A body's inertial quantities in world axes.
+struct Inertial {
+  Vec3 c;  ///< from Bo to the centre of mass
+  Mat3 I;  ///< about the centre of mass
+  Vec3 v_cm, a_cm;
+  Vec3 w, e;  ///< angular velocity and acceleration
+};
+
+Inertial InertialOf(const Body& body, const Pose& X_WB, const Vec6& V, const Vec6& A) {
+  Inertial x;
+  const Mat3 R = X_WB.linear();
+  x.c = R * body.p_BoBcm_B;
+  x.I = R * body.I_Bcm_B * R.transpose();
+  x.w = V.head<3>();
+  x.e = A.head<3>();
+  x.v_cm = V.tail<3>() + x.w.cross(x.c);
+  x.a_cm = A.tail<3>() + x.e.cross(x.c) + x.w.cross(x.w.cross(x.c));
+  return x;
+}
+
+// A load's force and moment about Q in world axes, and Q from Bo.
+struct LoadInWorld {
+  Vec3 force, moment, p_BoQ;
+};
+
+LoadInWorld InWorld(const LoadSample& load, const Pose& X_WB) {
+  const Mat3 R = X_WB.linear();
+  if (!load.in_body_axes) return {load.force, load.moment, R * load.p_BoQ_B};
+  return {R * load.force, R * load.moment, R * load.p_BoQ_B};
+}
+
+ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
+                    const BodyStates& states) {
+  Drive leg;
+  leg.kind = DistanceDrive{spring.body_from, spring.p_from, spring.body_to, spring.p_to};
+  return DriveRow(mechanism, leg, states);
+}
+
+double RateOf(const ScalarRow& row, const std::vector<Vec6>& V) {
+  return row.J_parent.dot(V[row.parent]) + row.J_child.dot(V[row.child]);
+}
+
+}  // namespace
+
+void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
+                      const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W) {
+  wrench_W->assign(mechanism.bodies.size(), Vec6::Zero());
+  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
+    const Body& body = mechanism.bodies[b];
+    const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
+    const Vec3 force = body.mass * (x.a_cm - mechanism.gravity_W);
+    const Vec3 moment_cm = x.I * x.e + x.w.cross(x.I * x.w);
+    (*wrench_W)[b] << moment_cm + x.c.cross(force), force;
+  }
+  for (const LoadSample& load : loads) {
+    const LoadInWorld f = InWorld(load, states.X_WB[load.body]);
+    (*wrench_W)[load.body].head<3>() -= f.moment + f.p_BoQ.cross(f.force);
+    (*wrench_W)[load.body].tail<3>() -= f.force;
+  }
+  for (const SpringDamper& spring : mechanism.springs) {
+    const ScalarRow row = LengthRow(spring, mechanism, states);
+    const double thrust = -spring.stiffness * (row.value - spring.free_length_m) -
+                          spring.damping * RateOf(row, states.V_WB);
+    (*wrench_W)[row.parent] -= thrust * row.J_parent;
+    (*wrench_W)[row.child] -= thrust * row.J_child;
+  }
+}
+
+PowerAudit AuditPower(const Mechanism& mechanism, const BodyStates& states,
+                      const std::vector<LoadSample>& loads) {
+  PowerAudit audit;
+  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
+    const Body& body = mechanism.bodies[b];
+    const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
+    // d/dt ½ ω·Iω = ω·Iε, since ω·(ω × Iω) = 0.
+    audit.energy_rate_W +=
+        body.mass * x.v_cm.dot(x.a_cm - mechanism.gravity_W) + x.w.dot(x.I * x.e);
+  }
+  for (const LoadSample& load : loads) {
+    const LoadInWorld f = InWorld(load, states.X_WB[load.body]);
+    const Vec3 w = states.V_WB[load.body].head<3>();
+    audit.loads_and_dampers_W +=
+        f.force.dot(states.V_WB[load.body].tail<3>() + w.cross(f.p_BoQ)) + f.moment.dot(w);
+  }
+  for (const SpringDamper& spring : mechanism.springs) {
+    const ScalarRow row = LengthRow(spring, mechanism, states);
+    const double rate = RateOf(row, states.V_WB);
+    audit.loads_and_dampers_W -= spring.damping * rate * rate;
+    audit.energy_rate_W += spring.stiffness * (row.value - spring.free_length_m) * rate;
+  }
+  return audit;
+}
+
+}  // namespace mbv::internal

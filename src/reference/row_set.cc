@@ -1,0 +1,96 @@
+#include "reference/row_set.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace mbv::internal {
+
+void RowSet::Clear() {
+  start.resize(1);
+  body.clear();
+  J.clear();
+  value.clear();
+  bias.clear();
+  angular.clear();
+}
+
+void RowSet::AddPiece(int body_index, const Vec6& J_piece) {
+  if (body_index == 0) return;
+  // Insert in order, or add to the piece of the same body.
+  auto at = static_cast<size_t>(start.back());
+  while (at < body.size() && body[at] < body_index) ++at;
+  if (at < body.size() && body[at] == body_index) {
+    J[at] += J_piece;
+    return;
+  }
+  body.insert(body.begin() + static_cast<std::ptrdiff_t>(at), body_index);
+  J.insert(J.begin() + static_cast<std::ptrdiff_t>(at), J_piece);
+}
+
+void RowSet::CloseRow(double row_value, double row_bias, bool is_angle) {
+  start.push_back(static_cast<int>(body.size()));
+  value.push_back(row_value);
+  bias.push_back(row_bias);
+  angular.push_back(is_angle ? 1 : 0);
+}
+
+void RowSet::Add(const ConstraintRows& rows, int count) {
+  for (int i = 0; i < count; ++i) {
+    AddPiece(rows.parent, rows.J_parent.row(i));
+    AddPiece(rows.child, rows.J_child.row(i));
+    CloseRow(rows.residual[i], rows.bias[i], i >= rows.translation_rows);
+  }
+}
+
+void RowSet::Add(const ScalarRow& row, bool is_angle) {
+  AddPiece(row.parent, row.J_parent);
+  AddPiece(row.child, row.J_child);
+  CloseRow(row.value, row.bias, is_angle);
+}
+
+void RowSet::Add(const Mechanism& mechanism, const Command& command, const BodyStates& states,
+                 std::vector<double>* near_values) {
+  double sum = 0.0, sum_bias = 0.0;
+  bool is_angle = true;
+  for (size_t k = 0; k < command.terms.size(); ++k) {
+    const auto& [coordinate, factor] = command.terms[k];
+    const ScalarRow row = CoordinateRow(mechanism, coordinate, states, (*near_values)[k]);
+    (*near_values)[k] = row.value;
+    AddPiece(row.parent, factor * row.J_parent);
+    AddPiece(row.child, factor * row.J_child);
+    sum += factor * row.value;
+    sum_bias += factor * row.bias;
+    is_angle = is_angle && IsAngle(mechanism, coordinate);
+  }
+  CloseRow(sum, sum_bias, is_angle);
+}
+
+VecX RowSet::Rates(const std::vector<Vec6>& motion) const {
+  VecX rates = VecX::Zero(size());
+  for (int i = 0; i < size(); ++i) {
+    for (int p = start[i]; p < start[i + 1]; ++p) rates[i] += J[p].dot(motion[body[p]]);
+  }
+  return rates;
+}
+
+void RowSet::AddWrenches(const VecX& force, std::vector<Vec6>* wrench_W) const {
+  for (int i = 0; i < size(); ++i) {
+    for (int p = start[i]; p < start[i + 1]; ++p) (*wrench_W)[body[p]] += force[i] * J[p];
+  }
+}
+
+bool IsAngle(const Mechanism& mechanism, const Coordinate& coordinate) {
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kPrescribed: {
+      const int joint = mechanism.prescribed[coordinate.index].joint;
+      return mechanism.joints[joint].kind != JointKind::kPrismatic;
+    }
+    case Coordinate::Kind::kDrive:
+      return PositionUnit(mechanism, mechanism.drives[coordinate.index]) == "rad";
+    case Coordinate::Kind::kOutput:
+      return coordinate.component >= 3;
+  }
+  return false;
+}
+
+}  // namespace mbv::internal

@@ -1,0 +1,72 @@
+// One factorisation for both sides of the duality: Σ x_i J_iᵀ = wrenches and J_i · V = rates.
+// Internal to reference/.
+//
+// Inside, lengths are measured in a characteristic length L, so that forces and moments, metres
+// and radians weigh alike: the unknown force of an angular row is moment/L, and the rotational
+// equations of a body are divided by L.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <Eigen/SparseLU>
+#include <vector>
+
+#include "core/types.h"
+#include "reference/row_set.h"
+
+namespace mbv::internal {
+
+class SquareSystem {
+ public:
+  /// For `bodies` bodies, the world included.
+  SquareSystem(size_t bodies, double length);
+
+  [[nodiscard]] int size() const { return size_; }
+
+  /// Chooses rows independent of each other among the `rows` with first <= index < last, by QR
+  /// with column pivoting; increasing. Fewer than size() if their rank is less.
+  [[nodiscard]] std::vector<int> IndependentRows(const RowSet& rows, int first, int last) const;
+
+  /// Factors the matrix of the rows `selection` (size() of them, always the same ones unless
+  /// `new_selection`). False if it is exactly singular.
+  [[nodiscard]] bool Factor(const RowSet& rows, const std::vector<int>& selection,
+                            bool new_selection);
+  /// Sign of the determinant of the last factorisation; comparable for the same selection.
+  [[nodiscard]] int determinant_sign() const { return determinant_sign_; }
+
+  /// x with Σ x_i J_iᵀ = b; b stacks the wrenches [m; f] of the moving bodies.
+  [[nodiscard]] VecX Solve(const VecX& wrenches);
+  /// V with J_i · V = rates_i, stacked for the moving bodies.
+  [[nodiscard]] VecX SolveTransposed(const VecX& rates);
+
+  /// Estimate of the smallest singular value (scaled, dimensionless; the largest is of order one)
+  /// by inverse iteration started from the previous estimate.
+  [[nodiscard]] double SmallestSingularValue(int iterations);
+  /// The motion (twists stacked) that belongs to it: what the rows hardly hold.
+  [[nodiscard]] VecX SoftMotion() const { return body_scale_.cwiseProduct(soft_motion_); }
+
+  /// Scale of row i's unknown: 1 for lengths, L for angles.
+  [[nodiscard]] double RowScale(bool angular) const { return angular ? length_ : 1.0; }
+  [[nodiscard]] const VecX& body_scale() const { return body_scale_; }
+
+ private:
+  [[nodiscard]] VecX SolveScaled(const VecX& b);
+  [[nodiscard]] VecX SolveScaledTransposed(const VecX& c);
+  void BuildPattern(const RowSet& rows, const std::vector<int>& selection);
+
+  int size_;
+  double length_;
+  bool dense_;
+  VecX body_scale_;  ///< 1/L for rotations, 1 for translations
+  VecX row_scale_;   ///< per selected row
+  Eigen::SparseMatrix<double> matrix_;
+  Eigen::SparseLU<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> sparse_lu_;
+  Eigen::PartialPivLU<MatX> dense_lu_;
+  int determinant_sign_ = 0;
+  VecX soft_force_, soft_motion_;
+};
+
+/// Stacks the moving bodies' entries of `per_body` and back.
+[[nodiscard]] VecX Stack(const std::vector<Vec6>& per_body);
+void Unstack(const VecX& stacked, std::vector<Vec6>* per_body);
+
+}  // namespace mbv::internal
