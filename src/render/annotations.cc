@@ -10,7 +10,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kFullArc = 300.0 / 180.0 * kPi;  // sweep of the largest torque [rad]
 constexpr double kSmallestShare = 0.02;           // forces below this share get no arrow
-constexpr float kGhost = 0.5F;                   // opacity of what bodies hide
+constexpr float kGhost = 0.5F;                    // opacity of what bodies hide
 
 std::array<float, 4> WithAlpha(const Material& material, float alpha) {
   return {material.rgba[0], material.rgba[1], material.rgba[2], alpha};
@@ -130,17 +130,29 @@ class ForceMarks {
   Annotations* out_;
 };
 
+// A ring around closures that share a place, radius by the largest of them.
+struct Ring {
+  Vec3 centre;
+  double radius;
+};
+
 void AddClosure(const Mechanism& mechanism, const Joint& joint, const PictureFrame& frame,
-                const Scale& scale, const Vec3& forward_W, Annotations* out) {
+                const Scale& scale, std::vector<Ring>* rings, std::vector<Item>* items) {
   const double r = JointRadius(mechanism, joint, scale);
   const Vec3 p_F = (frame.X_WB[joint.parent] * joint.X_PF).translation();
   const Vec3 p_M = (frame.X_WB[joint.child] * joint.X_CM).translation();
-  AddRing(p_M, forward_W, 1.75 * r, 2.1 * r, MaterialOf("closure"), &out->flats);
+  const auto same = std::ranges::find_if(
+      *rings, [&](const Ring& ring) { return (ring.centre - p_M).norm() < 0.5 * r; });
+  if (same == rings->end()) {
+    rings->push_back({.centre = p_M, .radius = r});
+  } else {
+    same->radius = std::max(same->radius, r);
+  }
   const bool may_slide = joint.kind == JointKind::kPrismatic ||
                          joint.kind == JointKind::kCylindrical ||
                          joint.kind == JointKind::kPlanar || joint.kind == JointKind::kFree;
   if (!may_slide && (p_F - p_M).norm() > 0.5 * r) {
-    out->items.push_back(Between(Solid::kCapsule, p_F, p_M, 0.3 * r, MaterialOf("gap")));
+    items->push_back(Between(Solid::kCapsule, p_F, p_M, 0.3 * r, MaterialOf("gap")));
   }
 }
 
@@ -171,8 +183,13 @@ Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame, cons
     }
   }
   if (options.closures) {
+    std::vector<Ring> rings;
     for (const Joint& joint : mechanism.joints) {
-      if (joint.closure) AddClosure(mechanism, joint, frame, scale, forward_W, &out);
+      if (joint.closure) AddClosure(mechanism, joint, frame, scale, &rings, &out.items);
+    }
+    for (const Ring& ring : rings) {
+      AddRing(ring.centre, forward_W, 1.75 * ring.radius, 2.1 * ring.radius, MaterialOf("closure"),
+              &out.flats);
     }
   }
   return out;
