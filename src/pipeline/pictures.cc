@@ -7,8 +7,6 @@
 #include <cmath>
 #include <numbers>
 
-#include "render/render.h"
-
 namespace mbv {
 namespace {
 
@@ -35,15 +33,17 @@ int NearestSample(const std::vector<double>& times, double t_s) {
   return static_cast<int>(std::min_element(times.begin(), times.end(), nearer) - times.begin());
 }
 
-Caption CaptionOf(const Report& report, double t_s) {
+}  // namespace
+
+Caption CaptionOf(const Report& report) {
   Caption caption{.title = report.mechanism + " / " + report.scenario,
-                  .detail = fmt::format("t = {:.3f} s", t_s),
+                  .detail = {},
                   .status = ToText(report.comparison.verdict)};
   if (const PairComparison* pair = MainPair(report.comparison)) {
     const auto force = pair->metrics.find(Metric::kForceNrmse);
     if (force != pair->metrics.end()) {
-      caption.detail += fmt::format("   drive forces: {} against {}, NRMSE {:.1e}", pair->measured,
-                                    pair->truth, force->second.value);
+      caption.detail = fmt::format("drive forces: {} against {}, NRMSE {:.1e}", pair->measured,
+                                   pair->truth, force->second.value);
     }
   }
   caption.mood = report.comparison.verdict == Verdict::kAgree      ? Caption::Mood::kGood
@@ -52,10 +52,9 @@ Caption CaptionOf(const Report& report, double t_s) {
   return caption;
 }
 
-}  // namespace
-
 RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
-                         const SimulationRun& run, const Report& report,
+                         const SimulationRun& run, const Caption& caption,
+                         const std::function<void(double)>& progress,
                          std::vector<PictureFile>* files) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<PictureFrame> frames;
@@ -63,7 +62,8 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
     const int sample = NearestSample(run.trace.time_s, t_s);
     frames.push_back(SampleFrame(mechanism, run, sample));
     const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
-    frames.back().caption = CaptionOf(report, sample_s);
+    frames.back().caption = caption;
+    frames.back().caption.detail = fmt::format("t = {:.3f} s   {}", sample_s, caption.detail);
     files->push_back({fmt::format("t_{:.3f}s.png", sample_s), ""});
   }
   RunSummary summary = RenderPictures(

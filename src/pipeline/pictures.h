@@ -7,6 +7,7 @@
 
 #include "core/run_summary.h"
 #include "mechanism/mechanism.h"
+#include "render/render.h"
 #include "report/report.h"
 #include "scenario/scenario.h"
 #include "simulation/simulation.h"
@@ -18,9 +19,13 @@ struct PictureFile {
   std::string content;  ///< PNG
 };
 
+/// Title and status of a run's pictures; the time is added to the detail of each.
+[[nodiscard]] Caption CaptionOf(const Report& report);
+
 /// Draws the simulation at the scenario's snapshot times (nearest sample each).
 [[nodiscard]] RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
-                                       const SimulationRun& run, const Report& report,
+                                       const SimulationRun& run, const Caption& caption,
+                                       const std::function<void(double)>& progress,
                                        std::vector<PictureFile>* files);
 
 }  // namespace mbv

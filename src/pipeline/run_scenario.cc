@@ -8,9 +8,9 @@
 #include "mechanism/mobility.h"
 #include "pipeline/output_folder.h"
 #include "pipeline/pictures.h"
+#include "pipeline/prepare.h"
 #include "pipeline/ranges.h"
 #include "pipeline/version.h"
-#include "pipeline/witnesses.h"
 #include "reference/reference.h"
 
 namespace mbv {
@@ -29,7 +29,9 @@ class ScenarioRun {
 
   RunOutcome Run() {
     const auto start = std::chrono::steady_clock::now();
-    if (!Prepare()) return BadInput();
+    prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics);
+    if (!prepared_) return BadInput();
+    Describe();
     RunAnalytic();
     RunReferenceWitness();
     if (CheckStrokes()) RunSimulated();
@@ -46,6 +48,9 @@ class ScenarioRun {
   }
 
  private:
+  [[nodiscard]] const Scenario& scenario() const { return prepared_->scenario; }
+  [[nodiscard]] const Mechanism& base() const { return prepared_->base; }
+
   RunOutcome BadInput() {
     outcome_.exit_code = 2;
     return std::move(outcome_);
@@ -56,56 +61,28 @@ class ScenarioRun {
     return [this, stage](double fraction) { options_.progress(stage, fraction); };
   }
 
-  // Loads everything; false after bad input.
-  bool Prepare() {
-    ScenarioResult loaded = LoadScenario(file_, options_.scenario);
-    outcome_.diagnostics = loaded.diagnostics;
-    if (!loaded.scenario) return false;
-    scenario_ = *std::move(loaded.scenario);
-    base_ = *std::move(loaded.mechanism);
-    mechanisms_ = LoadWitnessMechanisms(scenario_, base_, &outcome_.diagnostics);
-    closed_form_ = MakeClosedForm(scenario_, mechanisms_.analytic, &outcome_.diagnostics);
-    if (scenario_.simulation.on && closed_form_.closed_form == nullptr && !scenario_.reference.on) {
-      AddError(
-          "simulation needs the drive motion, but neither a closed form nor the reference "
-          "computes it",
-          "set reference: on");
-    }
-    if (outcome_.diagnostics.has_errors()) return false;
-    Describe();
-    return true;
-  }
-
-  void AddError(const std::string& message, const std::string& hint) {
-    Finding finding;
-    finding.file = file_;
-    finding.message = message;
-    finding.hint = hint;
-    outcome_.diagnostics.Add(std::move(finding));
-  }
-
   void Describe() {
-    const SimulationSettings& simulation = scenario_.simulation;
-    report_.scenario = scenario_.name;
-    report_.scenario_file = scenario_.file;
-    report_.mechanism = base_.name;
-    report_.model_file = scenario_.model_file;
-    report_.description = scenario_.description;
-    for (const Drive& drive : base_.drives) report_.drives.push_back(drive.name);
+    const SimulationSettings& simulation = scenario().simulation;
+    report_.scenario = scenario().name;
+    report_.scenario_file = scenario().file;
+    report_.mechanism = base().name;
+    report_.model_file = scenario().model_file;
+    report_.description = scenario().description;
+    for (const Drive& drive : base().drives) report_.drives.push_back(drive.name);
     report_.mode = !simulation.on ? "off" : simulation.forward ? "forward" : "inverse";
     report_.engine = simulation.stock_engine ? "stock" : "corrected";
     report_.step_s = simulation.step_s;
-    report_.duration_s = scenario_.motion.duration_s;
-    report_.sample_s = scenario_.motion.sample_s;
-    report_.start_window_s = scenario_.start_window_s;
-    report_.driven_by = closed_form_.closed_form != nullptr ? "analytic" : "reference";
+    report_.duration_s = scenario().motion.duration_s;
+    report_.sample_s = scenario().motion.sample_s;
+    report_.start_window_s = scenario().start_window_s;
+    report_.driven_by = prepared_->driven_by;
     report_.simulation = SimulationLine();
     report_.findings = outcome_.diagnostics;
     report_.versions = Versions();
   }
 
   std::string SimulationLine() const {
-    const SimulationSettings& simulation = scenario_.simulation;
+    const SimulationSettings& simulation = scenario().simulation;
     if (!simulation.on) return "no simulation";
     std::string line = simulation.forward
                            ? fmt::format("forward simulation, step {:g} ms, {} engine",
@@ -114,10 +91,11 @@ class ScenarioRun {
     line += fmt::format(", {} drive motion, {:g} s sampled every {:g} ms", report_.driven_by,
                         report_.duration_s, 1e3 * report_.sample_s);
     if (simulation.extrapolate) {
-      line += fmt::format("; forces extrapolated in {} from {:g} and {:g} to {:g}",
-                          simulation.extrapolate->parameter, simulation.extrapolate->from[0],
-                          simulation.extrapolate->from[1],
-                          mechanisms_.simulated.ParameterValue(simulation.extrapolate->parameter));
+      line += fmt::format(
+          "; forces extrapolated in {} from {:g} and {:g} to {:g}",
+          simulation.extrapolate->parameter, simulation.extrapolate->from[0],
+          simulation.extrapolate->from[1],
+          prepared_->mechanisms.simulated.ParameterValue(simulation.extrapolate->parameter));
     }
     return line;
   }
@@ -128,22 +106,22 @@ class ScenarioRun {
   }
 
   void RunAnalytic() {
-    if (closed_form_.closed_form == nullptr) {
-      AddWitness("analytic", NotRun(closed_form_.reason), {});
+    if (prepared_->closed_form.closed_form == nullptr) {
+      AddWitness("analytic", NotRun(prepared_->closed_form.reason), {});
       return;
     }
-    ClosedFormRun run =
-        RunClosedForm(mechanisms_.analytic, scenario_.motion, closed_form_.closed_form.get());
+    ClosedFormRun run = RunClosedForm(prepared_->mechanisms.analytic, scenario().motion,
+                                      prepared_->closed_form.closed_form.get());
     report_.timing.analytic_s = run.summary.wall_s;
     AddWitness("analytic", std::move(run.summary), std::move(run.trace));
   }
 
   void RunReferenceWitness() {
-    if (!scenario_.reference.on) {
+    if (!scenario().reference.on) {
       AddWitness("reference", NotRun("switched off in the scenario"), {});
       return;
     }
-    ReferenceRun run = RunReference(mechanisms_.reference, scenario_.motion);
+    ReferenceRun run = RunReference(prepared_->mechanisms.reference, scenario().motion);
     report_.timing.reference_s = run.summary.wall_s;
     AddWitness("reference", std::move(run.summary), std::move(run.trace));
   }
@@ -153,30 +131,21 @@ class ScenarioRun {
   }
 
   Severity RangeSeverity() const {
-    return scenario_.simulation.ignore_ranges ? Severity::kWarning : Severity::kError;
+    return scenario().simulation.ignore_ranges ? Severity::kWarning : Severity::kError;
   }
 
   // Strokes along the commanded motion; false if the simulation must not run.
   bool CheckStrokes() {
-    const auto violations = DriveViolations(base_, Driver().trace);
+    const auto violations = DriveViolations(base(), Driver().trace);
     if (violations.empty()) return true;
     AddFindings(violations, file_, RangeSeverity(), &report_.findings);
-    if (scenario_.simulation.ignore_ranges) return true;
+    if (scenario().simulation.ignore_ranges) return true;
     AddWitness("simulated", LimitSummary(violations), {});
     return false;
   }
 
-  DrivenMotion MakeDrivenMotion() {
-    if (report_.driven_by == "reference") {
-      return DriveByReference(mechanisms_.reference, scenario_.motion);
-    }
-    // A fresh one: it may follow its solution from the start of the motion.
-    ClosedFormChoice fresh = MakeClosedForm(scenario_, mechanisms_.analytic, &outcome_.diagnostics);
-    return DriveByClosedForm(scenario_.motion, std::move(fresh.closed_form));
-  }
-
   void RunSimulated() {
-    if (!scenario_.simulation.on) {
+    if (!scenario().simulation.on) {
       AddWitness("simulated", NotRun("switched off in the scenario"), {});
       return;
     }
@@ -187,9 +156,10 @@ class ScenarioRun {
           {});
       return;
     }
-    const Engine engine = scenario_.simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
-    SimulatedWitness witness = RunSimulation(scenario_, mechanisms_.simulated, MakeDrivenMotion(),
-                                             engine, ProgressOf("simulation"));
+    const Engine engine = scenario().simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
+    SimulatedWitness witness =
+        RunSimulation(scenario(), prepared_->mechanisms.simulated, prepared_->MakeDrivenMotion(),
+                      engine, ProgressOf("simulation"));
     outcome_.diagnostics.Append(witness.diagnostics);
     report_.timing.simulation_s = witness.run.summary.wall_s;
     report_.timing.loop_s = witness.run.loop_wall_s;
@@ -213,33 +183,34 @@ class ScenarioRun {
   // Joint ranges along the simulated motion.
   void CheckJoints(SimulationRun* run) {
     if (!run->summary.ok()) return;
-    const auto violations = JointViolations(base_, run->trace.time_s, run->X_WB);
+    const auto violations = JointViolations(base(), run->trace.time_s, run->X_WB);
     AddFindings(violations, file_, RangeSeverity(), &report_.findings);
-    if (violations.empty() || scenario_.simulation.ignore_ranges) return;
+    if (violations.empty() || scenario().simulation.ignore_ranges) return;
     run->summary = LimitSummary(violations);
   }
 
   // The simulator's own modelling error: the same run by the other engine.
   void RunOtherEngine(Engine other) {
-    const SimulationSettings& settings = scenario_.simulation;
+    const SimulationSettings& settings = scenario().simulation;
     if (!settings.forward || !settings.stock_too || !simulation_->summary.ok()) return;
-    SimulatedWitness witness =
-        RunSimulation(scenario_, mechanisms_.simulated, MakeDrivenMotion(), other,
-                      ProgressOf(other == Engine::kStock ? "stock engine" : "corrected engine"));
+    SimulatedWitness witness = RunSimulation(
+        scenario(), prepared_->mechanisms.simulated, prepared_->MakeDrivenMotion(), other,
+        ProgressOf(other == Engine::kStock ? "stock engine" : "corrected engine"));
     report_.timing.stock_s = witness.run.summary.wall_s;
     other_engine_ = std::move(witness.run);
   }
 
   ComparisonInput MakeComparisonInput() const {
-    ComparisonInput input{.mechanism = &base_,
-                          .motion = &scenario_.motion,
-                          .limits = scenario_.checks,
-                          .simulation_limits = scenario_.simulation.forward ? LimitColumn::kForward
-                                                                            : LimitColumn::kInverse,
-                          .start_window_s = scenario_.start_window_s,
+    ComparisonInput input{.mechanism = &base(),
+                          .motion = &scenario().motion,
+                          .limits = scenario().checks,
+                          .simulation_limits = scenario().simulation.forward
+                                                   ? LimitColumn::kForward
+                                                   : LimitColumn::kInverse,
+                          .start_window_s = scenario().start_window_s,
                           .witnesses = {},
                           .driven_by = report_.driven_by,
-                          .joints_not_unique = AnalyseMobility(base_).joints_not_unique};
+                          .joints_not_unique = AnalyseMobility(base()).joints_not_unique};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
           {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});
@@ -250,7 +221,7 @@ class ScenarioRun {
   void Judge() {
     const ComparisonInput input = MakeComparisonInput();
     report_.comparison = Compare(input);
-    report_.sheets = SheetsOf(base_, report_.comparison);
+    report_.sheets = SheetsOf(base(), report_.comparison);
     if (other_engine_) CompareEngines(input);
   }
 
@@ -269,7 +240,7 @@ class ScenarioRun {
                          value(own.metrics, Metric::kClosureM)};
     };
     EngineComparison engines{.truth = truth.name, .stock = {}, .corrected = {}, .failure = {}};
-    const bool judged_stock = scenario_.simulation.stock_engine;
+    const bool judged_stock = scenario().simulation.stock_engine;
     (judged_stock ? engines.stock : engines.corrected) = error(*simulation_);
     if (other_engine_->summary.ok()) {
       (judged_stock ? engines.corrected : engines.stock) = error(*other_engine_);
@@ -281,11 +252,12 @@ class ScenarioRun {
 
   void DrawPictures() {
     if (!options_.pictures || options_.out_dir.empty() || !simulation_ ||
-        simulation_->X_WB.empty() || scenario_.snapshots.times_s.empty()) {
+        simulation_->X_WB.empty() || scenario().snapshots.times_s.empty()) {
       return;
     }
     const RunSummary drawn =
-        DrawSnapshots(scenario_, mechanisms_.simulated, *simulation_, report_, &pictures_);
+        DrawSnapshots(scenario(), prepared_->mechanisms.simulated, *simulation_, CaptionOf(report_),
+                      ProgressOf("pictures"), &pictures_);
     report_.timing.render_s = drawn.wall_s;
     if (!drawn.ok()) {
       Finding finding;
@@ -310,7 +282,7 @@ class ScenarioRun {
 
   void WriteFiles() {
     if (options_.out_dir.empty()) return;
-    OutputFolder folder(std::filesystem::path(options_.out_dir) / base_.name / scenario_.name);
+    OutputFolder folder(std::filesystem::path(options_.out_dir) / base().name / scenario().name);
     std::string trouble = folder.Create();
     const auto write = [&](const std::string& name, const std::string& content) {
       if (trouble.empty()) trouble = folder.Write(name, content);
@@ -336,10 +308,7 @@ class ScenarioRun {
   const std::string file_;
   const RunOptions& options_;
   RunOutcome outcome_;
-  Scenario scenario_;
-  Mechanism base_;
-  WitnessMechanisms mechanisms_;
-  ClosedFormChoice closed_form_;
+  std::optional<Prepared> prepared_;
   Report report_;
   std::optional<SimulationRun> simulation_, other_engine_;
   std::vector<PictureFile> pictures_;

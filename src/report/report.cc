@@ -28,7 +28,7 @@ std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& 
   return sheets;
 }
 
-std::string CountLine(const std::vector<const Report*>& reports) {
+std::string CountLine(const std::vector<const Report*>& reports, int bad_input) {
   size_t ran = 0, compared = 0, verified = 0;
   for (const Report* report : reports) {
     bool any = false;
@@ -37,8 +37,11 @@ std::string CountLine(const std::vector<const Report*>& reports) {
     compared += MainPair(report->comparison) != nullptr ? 1 : 0;
     verified += report->comparison.verdict == Verdict::kAgree ? 1 : 0;
   }
-  return fmt::format("{} scenario{}: {} ran, {} compared, {} verified\n", reports.size(),
-                     reports.size() == 1 ? "" : "s", ran, compared, verified);
+  const size_t all = reports.size() + static_cast<size_t>(bad_input);
+  std::string text = fmt::format("{} scenario{}: {} ran, {} compared, {} verified", all,
+                                 all == 1 ? "" : "s", ran, compared, verified);
+  if (bad_input > 0) text += fmt::format(", {} with bad input", bad_input);
+  return text + "\n";
 }
 
 }  // namespace mbv

@@ -15,6 +15,18 @@ class Writer {
  public:
   explicit Writer(const TableOptions& options) : options_(options) {}
 
+  std::string VerdictWord(Verdict verdict) const {
+    switch (verdict) {
+      case Verdict::kAgree:
+        return Painted("AGREE", Paint::kGood);
+      case Verdict::kDisagree:
+        return Painted("DISAGREE", Paint::kBad);
+      case Verdict::kNotRun:
+        return Painted("NOT RUN", Paint::kDoubt);
+    }
+    return "?";
+  }
+
   std::string Write(const Report& report) {
     Head(report);
     Checks(report.comparison);
@@ -35,12 +47,8 @@ class Writer {
   void Line(const std::string& text = "") { text_ += text + "\n"; }
 
   void Head(const Report& report) {
-    const Verdict verdict = report.comparison.verdict;
-    const std::string word = verdict == Verdict::kAgree      ? Painted("AGREE", Paint::kGood)
-                             : verdict == Verdict::kDisagree ? Painted("DISAGREE", Paint::kBad)
-                                                             : Painted("NOT RUN", Paint::kDoubt);
     Line(fmt::format("{}: {}", Painted(report.mechanism + " / " + report.scenario, Paint::kTitle),
-                     word));
+                     VerdictWord(report.comparison.verdict)));
     if (!report.description.empty()) Line("  " + report.description);
     Line("  " + report.simulation);
     if (report.start_window_s > 0.0) {
@@ -165,6 +173,20 @@ class Writer {
 };
 
 }  // namespace
+
+std::string VerdictLine(const Report& report, const TableOptions& options) {
+  std::string line = fmt::format("{} / {}: {}", report.mechanism, report.scenario,
+                                 Writer(options).VerdictWord(report.comparison.verdict));
+  const PairComparison* pair = MainPair(report.comparison);
+  const CheckResult* check =
+      pair == nullptr ? nullptr : report.comparison.FindCheck(pair->name() + ".force_nrmse");
+  if (check != nullptr && report.comparison.verdict != Verdict::kNotRun) {
+    line += fmt::format("  {} vs {} {:.1e}", pair->measured, pair->truth, check->value);
+    if (check->limit) line += fmt::format(" (limit {:.1e})", *check->limit);
+  }
+  if (report.comparison.verdict != Verdict::kAgree) line += "  " + report.comparison.reason;
+  return line + "\n";
+}
 
 std::string ToTable(const Report& report, const TableOptions& options) {
   return Writer(options).Write(report);

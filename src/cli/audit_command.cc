@@ -1,0 +1,99 @@
+// mbverify audit
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "audit/audit.h"
+#include "cli/cli.h"
+#include "cli/terminal.h"
+#include "core/diagnostics.h"
+#include "scenario/find_model.h"
+
+namespace mbv {
+namespace {
+
+struct AuditArguments {
+  std::string model;
+  bool markdown = false;
+};
+
+std::string Word(AuditVerdict verdict, bool color) {
+  const char* code = verdict == AuditVerdict::kOk                ? "32"
+                     : verdict == AuditVerdict::kWrong           ? "33"
+                     : verdict == AuditVerdict::kWrongAndUnfixed ? "1;31"
+                                                                 : "2";
+  const std::string text = ToText(verdict);
+  return color ? fmt::format("\x1b[{}m{}\x1b[0m", code, text) : text;
+}
+
+void PrintRow(const AuditRow& row, bool color) {
+  fmt::print("  {:<28} {:<5} {}\n", row.equation, row.erratum, Word(row.verdict, color));
+  if (!row.printed.empty()) fmt::print("      printed:   {}\n", row.printed);
+  if (!row.corrected.empty()) fmt::print("      corrected: {}\n", row.corrected);
+  if (row.verdict != AuditVerdict::kNotTestable) {
+    fmt::print("      residual: ");
+    if (!row.corrected.empty()) fmt::print("printed {:.2e}, corrected ", row.residual_printed);
+    fmt::print("{:.2e} (limit {:.1e}) {} of {:.3g}\n", row.residual_corrected, row.limit, row.unit,
+               row.scale);
+  }
+  if (!row.note.empty()) fmt::print("      {}\n", row.note);
+}
+
+void PrintTable(const AuditTable& table, bool color) {
+  fmt::print("{}: {}\n", table.mechanism, table.source);
+  size_t ok = 0, wrong = 0, unfixed = 0;
+  for (const AuditRow& row : table.rows) {
+    PrintRow(row, color);
+    ok += row.verdict == AuditVerdict::kOk ? 1 : 0;
+    wrong += row.verdict == AuditVerdict::kWrong ? 1 : 0;
+    unfixed += row.verdict == AuditVerdict::kWrongAndUnfixed ? 1 : 0;
+  }
+  fmt::print(
+      "  {} rows: {} right as printed, {} wrong as printed and corrected, {} unexplained\n\n",
+      table.rows.size(), ok, wrong, unfixed);
+}
+
+// Exit 1 if a corrected form misses its limit: then the corrections are wrong, too.
+int Audit(const AuditArguments& arguments) {
+  std::vector<std::string> names;
+  int exit_code = 0;
+  bool found = false;
+  for (const AuditEntry& entry : Audits()) {
+    names.push_back(entry.mechanism);
+    if (!arguments.model.empty() && entry.mechanism != arguments.model) continue;
+    found = true;
+    const auto file = FindModel(entry.mechanism, ".");
+    if (!file) {
+      fmt::print(stderr, "error: the model of {} is not found\n", entry.mechanism);
+      return 2;
+    }
+    const auto models_dir = std::filesystem::path(*file).parent_path().parent_path();
+    const AuditTable table = entry.run(models_dir);
+    if (arguments.markdown) {
+      fmt::print("{}", ToMarkdown(table));
+    } else {
+      PrintTable(table, WantsColor());
+    }
+    for (const AuditRow& row : table.rows) {
+      if (row.verdict == AuditVerdict::kWrongAndUnfixed) exit_code = 1;
+    }
+  }
+  if (found) return exit_code;
+  const std::string near = ClosestWord(arguments.model, names);
+  fmt::print(stderr, "error: there is no equation audit of '{}'\n", arguments.model);
+  if (!near.empty()) fmt::print(stderr, "  hint: did you mean '{}'?\n", near);
+  return 2;
+}
+
+}  // namespace
+
+void AddAuditCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<AuditArguments>();
+  CLI::App* audit =
+      app->add_subcommand("audit", "Each equation of a paper, as printed and as corrected");
+  audit->add_option("model", arguments->model, "model name; all without it");
+  audit->add_flag("--markdown", arguments->markdown, "print a Markdown table");
+  audit->callback([arguments, exit_code] { *exit_code = Audit(*arguments); });
+}
+
+}  // namespace mbv

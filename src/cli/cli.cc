@@ -1,0 +1,60 @@
+#include "cli/cli.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cstdio>
+
+#include "pipeline/version.h"
+
+namespace mbv {
+namespace {
+
+std::string VersionText() {
+  std::string text;
+  for (const auto& [name, version] : Versions()) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : "\n", name, version);
+  }
+  return text;
+}
+
+}  // namespace
+
+int WorseExit(int a, int b) {
+  static constexpr std::array<int, 5> kBadness = {0, 1, 3, 2, 4};  // of exit codes 0 … 4
+  return kBadness[static_cast<size_t>(a)] >= kBadness[static_cast<size_t>(b)] ? a : b;
+}
+
+int RunCli(int argc, char** argv) {
+  CLI::App app(
+      "Verifies the dynamics of closed-loop mechanisms: closed-form equations, a generic "
+      "reference solver and MuJoCo against each other.");
+  app.name("mbverify");
+  app.set_version_flag("--version", VersionText());
+  app.require_subcommand(1);
+  app.footer(
+      "Examples:\n"
+      "  mbverify run scenarios/stabilizing_platform/sea_state.yaml\n"
+      "  mbverify check my_model.yaml my_scenario.yaml\n"
+      "  mbverify model spr_tripod --format mjcf\n"
+      "  mbverify audit scara_robot\n"
+      "Exit codes: 0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
+  int exit_code = 4;
+  AddRunCommand(&app, &exit_code);
+  AddRenderCommand(&app, &exit_code);
+  AddModelCommand(&app, &exit_code);
+  AddCheckCommand(&app, &exit_code);
+  AddAuditCommand(&app, &exit_code);
+  AddListCommand(&app, &exit_code);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "internal error: {}\n", error.what());
+    return 4;
+  }
+  return exit_code;
+}
+
+}  // namespace mbv

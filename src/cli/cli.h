@@ -1,0 +1,27 @@
+// argv → command → exit code.
+//
+// Exit codes: 0 agree (or done), 1 disagree, 2 bad input, 3 could not run, 4 internal error; over
+// several scenarios the worst in the order 4, 2, 3, 1, 0. Results go to stdout, talk to stderr.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+/// Runs the program; never throws.
+[[nodiscard]] int RunCli(int argc, char** argv);
+
+/// The worse of two exit codes.
+[[nodiscard]] int WorseExit(int a, int b);
+
+// One function per command: adds it to the app; when chosen, its callback sets *exit_code.
+void AddRunCommand(CLI::App* app, int* exit_code);
+void AddRenderCommand(CLI::App* app, int* exit_code);
+void AddModelCommand(CLI::App* app, int* exit_code);
+void AddCheckCommand(CLI::App* app, int* exit_code);
+void AddAuditCommand(CLI::App* app, int* exit_code);
+void AddListCommand(CLI::App* app, int* exit_code);
+
+}  // namespace mbv

@@ -1,0 +1,25 @@
+// Files named on the command line.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace mbv {
+
+/// Scenario files: files as given; a folder stands for all scenarios below it, sorted, except those
+/// in folders named must_fail further down. "" in `trouble` or what was wrong.
+[[nodiscard]] std::vector<std::string> ExpandScenarios(const std::vector<std::string>& arguments,
+                                                       std::string* trouble);
+
+/// All .yaml files below a folder, sorted; a file stands for itself.
+[[nodiscard]] std::vector<std::string> ExpandYaml(const std::string& argument);
+
+/// "key=value" → pair; empty if there is no '=' or no key.
+[[nodiscard]] std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& text);
+
+/// Writes a file whole or not at all (temporary file, then rename); "" or what went wrong.
+[[nodiscard]] std::string WriteWholeFile(const std::string& path, const std::string& content);
+
+}  // namespace mbv

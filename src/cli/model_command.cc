@@ -1,0 +1,148 @@
+// mbverify model, check, list
+#include <fmt/format.h>
+
+#include <charconv>
+#include <filesystem>
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "mechanism/load_model.h"
+#include "pipeline/check_file.h"
+#include "pipeline/model_text.h"
+#include "scenario/find_model.h"
+#include "scenario/load_scenario.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ModelArguments {
+  std::string model, format, out;
+  std::vector<std::string> set;
+};
+
+// "m_p=1000" of --set.
+bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
+  for (const std::string& text : texts) {
+    const auto set = SplitSet(text);
+    double value = 0.0;
+    const char* end = set ? set->second.data() + set->second.size() : nullptr;
+    const auto parsed = set ? std::from_chars(set->second.data(), end, value)
+                            : std::from_chars_result{nullptr, std::errc::invalid_argument};
+    if (parsed.ec != std::errc() || parsed.ptr != end) {
+      fmt::print(stderr, "--set {}: error: write PARAMETER=NUMBER, e.g. m_p=45000\n", text);
+      return false;
+    }
+    options->overrides[set->first] = value;
+    Finding place;
+    place.file = "--set " + text;
+    options->override_places[set->first] = place;
+  }
+  return true;
+}
+
+int Model(const ModelArguments& arguments) {
+  LoadOptions options;
+  if (!ReadParameters(arguments.set, &options)) return 2;
+  const auto file = FindModel(arguments.model, ".");
+  if (!file) {
+    const std::vector<std::string> names = ModelNames(".");
+    const std::string near = ClosestWord(arguments.model, names);
+    fmt::print(stderr, "error: there is no model '{}'\n", arguments.model);
+    if (!near.empty()) fmt::print(stderr, "  hint: did you mean '{}'?\n", near);
+    return 2;
+  }
+  const LoadResult loaded = LoadModel(*file, options);
+  fmt::print(stderr, "{}", loaded.diagnostics.Text());
+  if (!loaded.mechanism) return 2;
+  const std::string text =
+      arguments.format.empty()
+          ? MobilityText(*loaded.mechanism)
+          : ModelText(*loaded.mechanism,
+                      arguments.format == "urdf" ? ModelFormat::kUrdf : ModelFormat::kMjcf);
+  if (arguments.out.empty()) {
+    fmt::print("{}", text);
+    return 0;
+  }
+  const std::string trouble = WriteWholeFile(arguments.out, text);
+  if (trouble.empty()) return 0;
+  fmt::print(stderr, "error: {}\n", trouble);
+  return 2;
+}
+
+int CheckFiles(const std::vector<std::string>& arguments) {
+  int exit_code = 0;
+  for (const std::string& argument : arguments) {
+    for (const std::string& file : ExpandYaml(argument)) {
+      const Diagnostics diagnostics = CheckFile(file);
+      fmt::print("{}", diagnostics.Text());
+      if (diagnostics.has_errors()) {
+        exit_code = 2;
+      } else {
+        fmt::print("{}: ok\n", file);
+      }
+    }
+  }
+  return exit_code;
+}
+
+void ListModels() {
+  fmt::print("models\n");
+  for (const std::string& name : ModelNames(".")) {
+    const auto file = FindModel(name, ".");
+    const LoadResult loaded = LoadModel(*file);
+    fmt::print("  {:<24}{}\n", name,
+               loaded.mechanism ? loaded.mechanism->description
+                                : "(has errors: mbverify check " + *file + ")");
+  }
+}
+
+void ListScenarios() {
+  const auto folder = ScenariosFolder();
+  if (!folder) return;
+  fmt::print("scenarios\n");
+  for (const std::string& file : ExpandYaml(*folder)) {
+    const ScenarioHead head = ReadScenarioHead(file);
+    if (!head.is_scenario) continue;
+    fmt::print("  {}\n      {}\n", file,
+               head.description.empty() ? "(no description)" : head.description);
+  }
+}
+
+}  // namespace
+
+void AddModelCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<ModelArguments>();
+  CLI::App* model = app->add_subcommand("model", "Mobility report, or the generated MJCF or URDF");
+  model->add_option("model", arguments->model, "model name or model.yaml")->required();
+  model->add_option("--format", arguments->format, "print the generated model")
+      ->check(CLI::IsMember({"mjcf", "urdf"}));
+  model->add_option("--out", arguments->out, "write to this file instead of stdout");
+  model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
+      ->allow_extra_args(false);
+  model->footer(
+      "Examples:\n"
+      "  mbverify model stabilizing_platform\n"
+      "  mbverify model spr_tripod --format mjcf --out spr_tripod.xml");
+  model->callback([arguments, exit_code] { *exit_code = Model(*arguments); });
+}
+
+void AddCheckCommand(CLI::App* app, int* exit_code) {
+  auto files = std::make_shared<std::vector<std::string>>();
+  CLI::App* check = app->add_subcommand("check", "Validate model and scenario files");
+  check->add_option("file", *files, "files, or folders of them")->required();
+  check->callback([files, exit_code] { *exit_code = CheckFiles(*files); });
+}
+
+void AddListCommand(CLI::App* app, int* exit_code) {
+  CLI::App* list = app->add_subcommand("list", "List models and scenarios");
+  list->callback([exit_code] {
+    ListModels();
+    ListScenarios();
+    *exit_code = 0;
+  });
+}
+
+}  // namespace mbv

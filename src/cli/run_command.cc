@@ -1,0 +1,124 @@
+// mbverify run
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "cli/terminal.h"
+#include "core/demand.h"
+#include "pipeline/run_scenario.h"
+
+namespace mbv {
+namespace {
+
+struct RunArguments {
+  std::vector<std::string> scenarios, set;
+  std::string out = "out", mode;
+  bool no_pictures = false, quiet = false, verbose = false;
+};
+
+// One scenario; prints its result. Our own bugs end this scenario, not the others.
+RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunArguments& arguments,
+                  ProgressLine* progress) {
+  RunOutcome outcome;
+  try {
+    outcome = RunScenario(file, options);
+  } catch (const std::exception& error) {
+    progress->Clear();
+    fmt::print(stderr, "{}: internal error: {}\n", file, error.what());
+    return {};
+  }
+  progress->Clear();
+  fmt::print(stderr, "{}", outcome.diagnostics.Text());
+  if (outcome.report) {
+    const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
+    fmt::print("{}", arguments.quiet ? VerdictLine(*outcome.report, table)
+                                     : ToTable(*outcome.report, table) + "\n");
+  }
+  if (!outcome.folder.empty() && !arguments.quiet) {
+    fmt::print(stderr, "results in {}\n", outcome.folder);
+  }
+  std::fflush(stdout);
+  return outcome;
+}
+
+// Options of all scenarios; false (after a message) if --set is malformed.
+bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
+  options->out_dir = arguments.out;
+  options->pictures = !arguments.no_pictures;
+  for (const std::string& text : arguments.set) {
+    const auto set = SplitSet(text);
+    if (!set) {
+      fmt::print(stderr, "--set {}: error: write key=value, e.g. simulation.step_s=0.002\n", text);
+      return false;
+    }
+    options->scenario.set.push_back(*set);
+  }
+  if (!arguments.mode.empty()) {
+    options->scenario.set.emplace_back("simulation.mode", arguments.mode);
+  }
+  return true;
+}
+
+int Run(const RunArguments& arguments) {
+  RunOptions options;
+  if (!MakeOptions(arguments, &options)) return 2;
+  std::string trouble;
+  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
+  if (!trouble.empty()) {
+    fmt::print(stderr, "{}\n", trouble);
+    return 2;
+  }
+  ProgressLine progress(!arguments.quiet);
+  std::vector<Report> reports;
+  int exit_code = 0, bad = 0;
+  for (const std::string& file : files) {
+    if (progress.active()) {
+      options.progress = [&](const std::string& stage, double fraction) {
+        progress.Show(file + ": " + stage, fraction);
+      };
+    }
+    RunOutcome outcome = RunOne(file, options, arguments, &progress);
+    exit_code = WorseExit(exit_code, outcome.exit_code);
+    if (!outcome.report) ++bad;
+    if (!outcome.report || files.size() == 1) continue;
+    for (WitnessRecord& witness : outcome.report->witnesses) witness.trace = {};  // memory
+    reports.push_back(*std::move(outcome.report));
+  }
+  if (files.size() > 1) {
+    std::vector<const Report*> pointers;
+    for (const Report& report : reports) pointers.push_back(&report);
+    fmt::print("{}", CountLine(pointers, bad));
+  }
+  return exit_code;
+}
+
+}  // namespace
+
+void AddRunCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<RunArguments>();
+  CLI::App* run = app->add_subcommand("run", "Compare analytic, reference and simulated forces");
+  run->add_option("scenario", arguments->scenarios, "scenario files, or folders of them")
+      ->required();
+  run->add_option("--out", arguments->out, "folder for results")->capture_default_str();
+  run->add_option("--mode", arguments->mode, "overrides the scenario's simulation mode")
+      ->check(CLI::IsMember({"forward", "inverse"}));
+  run->add_option("--set", arguments->set,
+                  "key=value: overrides a value of the scenario (repeatable)")
+      ->allow_extra_args(false);
+  run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
+  run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");
+  run->add_flag("-v,--verbose", arguments->verbose,
+                "also how to read each signal, and what could not be compared");
+  run->footer(
+      "Examples:\n"
+      "  mbverify run scenarios/stabilizing_platform/sea_state.yaml\n"
+      "  mbverify run scenarios/spr_tripod --mode inverse --quiet\n"
+      "  mbverify run my.yaml --set parameters.m_p=45000 --set simulation.step_s=0.0005\n"
+      "Exit codes: 0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
+  run->callback([arguments, exit_code] { *exit_code = Run(*arguments); });
+}
+
+}  // namespace mbv

@@ -1,0 +1,40 @@
+#include "pipeline/prepare.h"
+
+namespace mbv {
+
+std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& options,
+                                Diagnostics* diagnostics) {
+  ScenarioResult loaded = LoadScenario(file, options);
+  diagnostics->Append(loaded.diagnostics);
+  if (!loaded.scenario) return {};
+  Prepared prepared{.scenario = *std::move(loaded.scenario),
+                    .base = *std::move(loaded.mechanism),
+                    .mechanisms = {},
+                    .closed_form = {},
+                    .driven_by = {}};
+  prepared.mechanisms = LoadWitnessMechanisms(prepared.scenario, prepared.base, diagnostics);
+  prepared.closed_form =
+      MakeClosedForm(prepared.scenario, prepared.mechanisms.analytic, diagnostics);
+  const bool analytic = prepared.closed_form.closed_form != nullptr;
+  prepared.driven_by = analytic ? "analytic" : "reference";
+  if (prepared.scenario.simulation.on && !analytic && !prepared.scenario.reference.on) {
+    Finding finding;
+    finding.file = file;
+    finding.message =
+        "simulation needs the drive motion, but neither a closed form nor the reference gives it";
+    finding.hint = "set reference: on";
+    diagnostics->Add(std::move(finding));
+  }
+  if (diagnostics->has_errors()) return {};
+  return prepared;
+}
+
+DrivenMotion Prepared::MakeDrivenMotion() const {
+  if (driven_by == "reference") return DriveByReference(mechanisms.reference, scenario.motion);
+  // A fresh closed form, because it may follow its solution from the start of the motion.
+  Diagnostics known;
+  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);
+  return DriveByClosedForm(scenario.motion, std::move(fresh.closed_form));
+}
+
+}  // namespace mbv

@@ -1,0 +1,295 @@
+// Every metric and every verdict: exact data passes, data bent by twice its limit fails.
+#include "comparison/comparison.h"
+
+#include <gtest/gtest.h>
+
+#include "synthetic.h"
+
+namespace mbv {
+namespace {
+
+using synthetic::Bend;
+using synthetic::Case;
+using synthetic::Stretch;
+
+double Value(const Comparison& comparison, const std::string& check) {
+  const CheckResult* found = comparison.FindCheck(check);
+  return found == nullptr ? -1.0 : found->value;
+}
+
+bool Fails(const Comparison& comparison, const std::string& check) {
+  const CheckResult* found = comparison.FindCheck(check);
+  return found != nullptr && found->limit && !found->pass;
+}
+
+TEST(Comparison, StartsPessimistic) {
+  const Comparison comparison;
+  EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
+  EXPECT_EQ(comparison.reason, "comparison was not run");
+}
+
+TEST(Comparison, EqualWitnessesAgreeInEveryCheck) {
+  const Comparison comparison = Case().Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
+  EXPECT_EQ(comparison.failed(), 0u);
+  // Per pair: two force, one position, velocity, acceleration, two pose, reaction.
+  EXPECT_EQ(comparison.checks.size(), 3u * 8u + 2u * 5u + 4u);
+  EXPECT_TRUE(comparison.attribution.odd_one_out.empty());
+}
+
+TEST(Comparison, ForceNrmseIsRmsErrorOverRmsForceOfAllDrives) {
+  Case c;
+  // A constant error e on drive 1 only: pooled RMS error e/√2, pooled RMS force over 101 samples.
+  Bend(&c.simulated, "d1.force", 1e-6);
+  const double sum =
+      c.analytic.values.col(3).squaredNorm() + c.analytic.values.col(7).squaredNorm();
+  const double expected = 1e-6 * std::sqrt(101.0) / std::sqrt(sum);
+  const Comparison comparison = c.Run();
+  EXPECT_NEAR(Value(comparison, "simulated_vs_analytic.force_nrmse"), expected,
+              1e-12 * expected + 1e-15);
+  EXPECT_NEAR(Value(comparison, "simulated_vs_analytic.force_max"), 1e-6 / 100.0, 1e-14);
+  const PairComparison* pair = comparison.FindPair("simulated_vs_analytic");
+  ASSERT_EQ(pair->drives.size(), 2u);
+  EXPECT_NEAR(pair->drives[0].max_error, 1e-6, 1e-14);
+  EXPECT_EQ(pair->drives[1].max_error, 0.0);
+  EXPECT_NEAR(pair->drives[0].digits, -std::log10(pair->drives[0].nrmse), 1e-12);
+}
+
+TEST(Comparison, TheWorstSampleIsNamed) {
+  Case c;
+  c.simulated.values(42, c.simulated.Find("d2.force")) += 1.0;
+  const CheckResult* check = c.Run().FindCheck("simulated_vs_analytic.force_max");
+  ASSERT_NE(check, nullptr);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.FindCheck("simulated_vs_analytic.force_max")->channel, "d2.force");
+  EXPECT_DOUBLE_EQ(comparison.FindCheck("simulated_vs_analytic.force_max")->time_s, 0.42);
+}
+
+// One bend per metric: channel, offset that is about twice the inverse-mode limit, check that
+// fails.
+struct BendCase {
+  const char* channel;
+  double offset;
+  const char* check;
+};
+
+class BentSimulation : public testing::TestWithParam<BendCase> {};
+
+TEST_P(BentSimulation, FailsItsCheckAndTheVerdict) {
+  Case c;
+  Bend(&c.simulated, GetParam().channel, GetParam().offset);
+  const Comparison comparison = c.Run();
+  EXPECT_TRUE(Fails(comparison, GetParam().check)) << Value(comparison, GetParam().check);
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+}
+
+TEST_P(BentSimulation, PassesWithAHundredthOfTheBend) {
+  Case c;
+  Bend(&c.simulated, GetParam().channel, 0.01 * GetParam().offset);
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Metrics, BentSimulation,
+    testing::Values(
+        BendCase{"d1.force", 2e-10 * 76.2, "simulated_vs_analytic.force_nrmse"},
+        BendCase{"d1.position", 2e-10, "simulated_vs_analytic.position_m"},
+        BendCase{"d1.velocity", 2e-9 * 3.4, "simulated_vs_reference.velocity_nrmse"},
+        BendCase{"d1.acceleration", 2e-8 * 21.0, "simulated_vs_analytic.acceleration_nrmse"},
+        BendCase{"plate.x", 2e-9, "simulated_vs_analytic.pose_m"},
+        BendCase{"plate.yaw", 2e-9, "simulated_vs_analytic.pose_rad"},
+        BendCase{"slide1.reaction.fx", 2e-8 * 10.5 * 1.8, "simulated_vs_analytic.reaction_nrmse"},
+        BendCase{"slide1.reaction.my", 2e-8 * 2.0 * 1.8, "simulated_vs_analytic.reaction_nrmse"},
+        BendCase{"closure.position", 2e-10, "simulated.closure_m"},
+        BendCase{"closure.rotation", 2e-10, "simulated.closure_rad"},
+        BendCase{"power.energy_rate", 2e-8 * 50.0, "simulated.power_balance"}),
+    [](const auto& info) {
+      std::string name = info.param.check;
+      name = name.substr(name.find('.') + 1) + std::to_string(info.index);
+      return name;
+    });
+
+TEST(Comparison, MissedCommandsFailWithoutAnyOtherWitness) {
+  Case c;
+  // All three agree with each other, and all are off the command by 2 nm.
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) Bend(trace, "d2.position", 2e-9);
+  const Comparison comparison = c.Run();
+  EXPECT_TRUE(Fails(comparison, "simulated.command_m"));
+  EXPECT_EQ(comparison.FindCheck("simulated.command_m")->channel, "d2");
+  EXPECT_FALSE(Fails(comparison, "simulated_vs_analytic.position_m"));
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+}
+
+TEST(Comparison, CouplingsAreCheckedAsDifferences) {
+  Case c;
+  c.motion.commands = {
+      {"d1 - d2",
+       {{{Coordinate::Kind::kDrive, 0, 0}, 1.0}, {{Coordinate::Kind::kDrive, 1, 0}, -1.0}},
+       Constant(0.0)}};
+  EXPECT_TRUE(Fails(c.Run(), "simulated.command_m"));
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    trace->values.col(trace->Find("d2.position")) = trace->values.col(trace->Find("d1.position"));
+  }
+  EXPECT_FALSE(Fails(c.Run(), "simulated.command_m"));
+}
+
+TEST(Comparison, CommandedAnglesAreTakenModuloATurn) {
+  Case c;
+  c.motion.commands = {{"plate.yaw",
+                        {{{Coordinate::Kind::kOutput, 0, 5}, 1.0}},
+                        {{ConstantTerm{3.0 - 2.0 * std::numbers::pi}, RampTerm{0.5}}}}};
+  EXPECT_FALSE(Fails(c.Run(), "simulated.command_rad"));
+  Bend(&c.simulated, "plate.yaw", 2e-9);
+  EXPECT_TRUE(Fails(c.Run(), "simulated.command_rad"));
+}
+
+TEST(Comparison, OrientationsAreComparedAsRotationsNotAsAngles) {
+  Case c;
+  // The same rotations, written with yaw in (−π, π]: 3.2 rad becomes −3.08 rad.
+  const int yaw = c.simulated.Find("plate.yaw");
+  for (Eigen::Index i = 0; i < c.simulated.values.rows(); ++i) {
+    c.simulated.values(i, yaw) = std::remainder(c.simulated.values(i, yaw), 2 * std::numbers::pi);
+  }
+  const Comparison comparison = c.Run();
+  // cos and sin of an angle near π round at ε: a few ε are left.
+  EXPECT_LT(Value(comparison, "simulated_vs_analytic.pose_rad"), 8 * kEps);
+}
+
+TEST(Comparison, NanNeverPasses) {
+  for (const char* channel : {"d1.force", "plate.x", "plate.roll", "closure.position",
+                              "power.input", "d2.position", "slide1.reaction.fx"}) {
+    Case c;
+    c.simulated.values(7, c.simulated.Find(channel)) = kNan;
+    EXPECT_EQ(c.Run().verdict, Verdict::kDisagree) << channel;
+  }
+  Case c;
+  c.analytic.values(7, c.analytic.Find("d1.force")) = kNan;
+  EXPECT_TRUE(std::isnan(Value(c.Run(), "simulated_vs_analytic.force_nrmse")));
+  EXPECT_TRUE(Fails(c.Run(), "simulated_vs_analytic.force_nrmse"));
+}
+
+TEST(Comparison, InfinityNeverPasses) {
+  Case c;
+  c.simulated.values(7, c.simulated.Find("d1.force")) = HUGE_VAL;
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+}
+
+TEST(Comparison, ForcesThatVanishInBothAgreeAndNoiseAroundZeroDoesNot) {
+  Case c;
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    Stretch(trace, "d1.force", 0.0);
+    Stretch(trace, "d2.force", 0.0);
+  }
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
+  Bend(&c.simulated, "d1.force", 1e-12);
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+}
+
+TEST(Comparison, OnlyCommonSampleTimesAreCompared) {
+  Case c;
+  // Every second sample, and a wrong value at a time that the other does not have.
+  Trace coarse = c.simulated;
+  coarse.time_s.clear();
+  coarse.values.resize(51, c.simulated.values.cols());
+  for (Eigen::Index i = 0; i < 51; ++i) {
+    coarse.time_s.push_back(c.simulated.time_s[static_cast<size_t>(2 * i)]);
+    coarse.values.row(i) = c.simulated.values.row(2 * i);
+  }
+  coarse.time_s[50] = 0.995;
+  coarse.values.row(50).setConstant(1e9);
+  const PairComparison pair = ComparePair(c.Input(), coarse, c.analytic);
+  EXPECT_TRUE(pair.compared);
+  EXPECT_EQ(pair.samples, 50u);
+  EXPECT_EQ(pair.metrics.at(Metric::kForceNrmse).value, 0.0);
+}
+
+TEST(Comparison, NoCommonTimeMeansNotRun) {
+  Case c;
+  for (double& t : c.simulated.time_s) t += 0.005;
+  const PairComparison pair = ComparePair(c.Input(), c.simulated, c.analytic);
+  EXPECT_FALSE(pair.compared);
+  EXPECT_EQ(pair.reason, "the two have no sample time in common");
+}
+
+TEST(Comparison, TheStartWindowExcludesForcesOnlyAndOnlyWhenAsked) {
+  Case c;
+  c.simulated.values(3, c.simulated.Find("d1.force")) += 1.0;
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+  c.start_window_s = 0.05;
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
+  EXPECT_EQ(c.Run().FindPair("simulated_vs_analytic")->force_samples, 96u);
+  c.simulated.values(3, c.simulated.Find("d1.position")) += 1.0;
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+}
+
+TEST(Comparison, ABrokenWitnessMakesTheVerdictNotRun) {
+  Case c;
+  c.reference_summary = {
+      .stop = Stop::kSingular, .message = "singular at t = 0.3 s", .where = {}, .unit = {}};
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
+  EXPECT_EQ(comparison.reason, "reference: singular at t = 0.3 s");
+  EXPECT_TRUE(comparison.FindPair("simulated_vs_analytic")->compared);
+  EXPECT_FALSE(comparison.FindPair("reference_vs_analytic")->compared);
+}
+
+TEST(Comparison, AWitnessThatWasSwitchedOffIsNotAFailure) {
+  Case c;
+  c.reference_summary = {.message = "switched off in the scenario", .where = {}, .unit = {}};
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree);
+  ASSERT_FALSE(comparison.not_compared.empty());
+  EXPECT_EQ(comparison.not_compared[0].what, "reference_vs_analytic");
+  EXPECT_EQ(comparison.not_compared[0].why, "reference: switched off in the scenario");
+}
+
+TEST(Comparison, OneWitnessAloneVerifiesNothing) {
+  Case c;
+  c.reference_summary = c.simulated_summary = {.message = "off", .where = {}, .unit = {}};
+  EXPECT_EQ(c.Run().verdict, Verdict::kNotRun);
+}
+
+TEST(Comparison, SwitchedOffForceChecksVerifyNothing) {
+  Case c;
+  c.limits[Metric::kForceNrmse] = {};
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);  // the maximum is still judged
+  c.limits[Metric::kForceMax] = {};
+  EXPECT_EQ(c.Run().verdict, Verdict::kNotRun);
+}
+
+TEST(Comparison, ReactionsThatStaticsLeavesOpenAreNotJudged) {
+  Case c;
+  Bend(&c.simulated, "slide1.reaction.fx", 5.0);
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+  c.joints_not_unique = {"slide1"};
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree);
+  EXPECT_EQ(comparison.FindCheck("simulated_vs_analytic.reaction_nrmse"), nullptr);
+  bool named = false;
+  for (const NotCompared& item : comparison.not_compared) {
+    named = named || item.what == "slide1.reaction";
+  }
+  EXPECT_TRUE(named);
+}
+
+TEST(Comparison, LimitsOfTheForwardModeApplyToTheSimulationOnly) {
+  Case c;
+  c.column = LimitColumn::kForward;
+  Bend(&c.simulated, "d1.force", 1e-9 * 76.2);  // beyond the inverse limit, within the forward one
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
+  Bend(&c.reference, "d1.force", 1e-9 * 76.2);
+  EXPECT_TRUE(Fails(c.Run(), "reference_vs_analytic.force_nrmse"));
+}
+
+TEST(Comparison, WrongRatesAreSeenWithoutAnotherWitness) {
+  Case c;
+  // Simulation and closed form share a velocity that is 1 % off; the positions are right.
+  for (Trace* trace : {&c.analytic, &c.simulated}) Stretch(trace, "d1.velocity", 1.01);
+  c.reference_summary = {.message = "off", .where = {}, .unit = {}};
+  const Comparison comparison = c.Run();
+  EXPECT_TRUE(Fails(comparison, "analytic.derivatives"));
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+}
+
+}  // namespace
+}  // namespace mbv
