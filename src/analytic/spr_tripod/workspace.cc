@@ -1,0 +1,283 @@
+#include "analytic/spr_tripod/workspace.h"
+
+#include <Eigen/SVD>
+#include <cmath>
+#include <numbers>
+#include <unordered_map>
+
+#include "core/demand.h"
+#include "core/spatial.h"
+
+namespace mbv::spr_tripod {
+namespace {
+
+using std::numbers::pi;
+
+struct GaussRule {
+  std::vector<double> node, weight;  // on [-1, 1]
+};
+
+// Gauss–Legendre nodes by Newton on the Legendre polynomial.
+GaussRule GaussLegendre(int n) {
+  GaussRule rule;
+  for (int i = 1; i <= n; ++i) {
+    double x = std::cos(pi * (i - 0.25) / (n + 0.5)), slope = 0.0;
+    for (int k = 0; k < 20; ++k) {
+      double p = 1.0, previous = 0.0;
+      for (int j = 1; j <= n; ++j) {
+        const double next = ((2 * j - 1) * x * p - (j - 1) * previous) / j;
+        previous = p;
+        p = next;
+      }
+      slope = n * (x * p - previous) / (x * x - 1);
+      const double step = p / slope;
+      x -= step;
+      if (std::abs(step) < kEps) break;
+    }
+    rule.node.push_back(x);
+    rule.weight.push_back(2 / ((1 - x * x) * slope * slope));
+  }
+  return rule;
+}
+
+// A node in the stroke and its weight.
+double LengthAt(const Geometry& g, double node) {
+  return 0.5 * (g.q_min + g.q_max) + 0.5 * (g.q_max - g.q_min) * node;
+}
+
+// Forward position and Jacobian; false when the legs do not meet the platform.
+bool PoseAt(const Geometry& g, const PerLeg<double>& q, Posture* p, Jacobians* j) {
+  return SolveForward(g, q, p).ok() && FillJacobians(g, *p, j).ok();
+}
+
+}  // namespace
+
+double WorkspaceMesh::FaceArea(int face) const {
+  const size_t count = 2u * intervals * intervals;
+  return AreaOf(mesh, face * count, count);
+}
+
+WorkspaceMesh TriangulateFaces(const Geometry& geometry, int intervals) {
+  MBV_DEMAND(intervals > 0, intervals);
+  WorkspaceMesh result;
+  result.intervals = intervals;
+  result.summary = RunSummary::Done();
+  const int n = intervals;
+  // Vertices by their place on the lattice of the cube, so that faces share their edges.
+  std::unordered_map<long, int> index;
+  const auto vertex = [&](const std::array<int, 3>& k) {
+    const auto [at, is_new] = index.try_emplace((long{k[0]} * (n + 1) + k[1]) * (n + 1) + k[2],
+                                                static_cast<int>(result.mesh.vertices.size()));
+    if (is_new) {
+      PerLeg<double> q;
+      for (int i = 0; i < 3; ++i) {
+        q[i] = geometry.q_min + (geometry.q_max - geometry.q_min) * k[i] / n;
+      }
+      Posture p;
+      RunSummary summary = SolveForward(geometry, q, &p);
+      if (!summary.ok()) result.summary = summary;
+      result.mesh.vertices.push_back(p.r);
+    }
+    return at->second;
+  };
+  for (int leg = 0; leg < 3; ++leg) {
+    for (const bool longest : {false, true}) {
+      // q → r keeps orientation (det J > 0): outward is +q_leg on the longest face.
+      const int first = (leg + (longest ? 1 : 2)) % 3, second = (leg + (longest ? 2 : 1)) % 3;
+      const auto corner = [&](int i, int j) {
+        std::array<int, 3> k{};
+        k[leg] = longest ? n : 0;
+        k[first] = i;
+        k[second] = j;
+        return vertex(k);
+      };
+      for (int i = 0; i < n; ++i) {
+        for (int j = 0; j < n; ++j) {
+          const int p00 = corner(i, j), p10 = corner(i + 1, j), p11 = corner(i + 1, j + 1),
+                    p01 = corner(i, j + 1);
+          result.mesh.triangles.push_back({p00, p10, p11});
+          result.mesh.triangles.push_back({p00, p11, p01});
+        }
+      }
+    }
+  }
+  if (!result.summary.ok()) result.mesh = {};
+  return result;
+}
+
+FaceIntegrals IntegrateFaces(const Geometry& geometry, int points) {
+  const GaussRule rule = GaussLegendre(points);
+  const double half = 0.5 * (geometry.q_max - geometry.q_min);
+  FaceIntegrals result;
+  double volume = 0.0;
+  Vec3 moment = Vec3::Zero();
+  for (int face = 0; face < kFaces; ++face) {
+    const int leg = face / 2;
+    const bool longest = face % 2 == 1;
+    const int first = (leg + 1) % 3, second = (leg + 2) % 3;
+    for (int i = 0; i < points; ++i) {
+      for (int j = 0; j < points; ++j) {
+        PerLeg<double> q;
+        q[leg] = longest ? geometry.q_max : geometry.q_min;
+        q[first] = LengthAt(geometry, rule.node[i]);
+        q[second] = LengthAt(geometry, rule.node[j]);
+        Posture p;
+        Jacobians jacobians;
+        if (!PoseAt(geometry, q, &p, &jacobians)) return {};
+        // Outward area vector; ∫ x dV = ½ ∮ x² n_x dA.
+        const double weight = rule.weight[i] * rule.weight[j] * half * half;
+        const Vec3 dA = (longest ? weight : -weight) *
+                        jacobians.J_inv.col(first).cross(jacobians.J_inv.col(second));
+        volume += p.r.dot(dA) / 3.0;
+        moment += 0.5 * p.r.cwiseProduct(p.r).cwiseProduct(dA);
+        result.face_area[face] += dA.norm();
+      }
+    }
+  }
+  result.solid = {volume, 0.0, moment / volume};
+  for (double area : result.face_area) result.solid.area += area;
+  return result;
+}
+
+double VolumeByInterior(const Geometry& geometry, int points) {
+  const GaussRule rule = GaussLegendre(points);
+  const double half = 0.5 * (geometry.q_max - geometry.q_min);
+  double volume = 0.0;
+  for (int i = 0; i < points; ++i) {
+    for (int j = 0; j < points; ++j) {
+      for (int k = 0; k < points; ++k) {
+        const PerLeg<double> q = {LengthAt(geometry, rule.node[i]),
+                                  LengthAt(geometry, rule.node[j]),
+                                  LengthAt(geometry, rule.node[k])};
+        Posture p;
+        Jacobians jacobians;
+        if (!PoseAt(geometry, q, &p, &jacobians)) return kNan;
+        volume += rule.weight[i] * rule.weight[j] * rule.weight[k] / jacobians.det;
+      }
+    }
+  }
+  return volume * half * half * half;
+}
+
+bool IsReachable(const Geometry& geometry, const Vec3& r) {
+  Posture p;
+  if (!SolveInverse(geometry, r, &p).ok()) return false;
+  for (double q : p.q) {
+    if (!(q >= geometry.q_min && q <= geometry.q_max)) return false;
+  }
+  return true;
+}
+
+double VolumeByVoxels(const Geometry& geometry, int cells, const Box3& box) {
+  const Vec3 cell = (box.upper - box.lower) / cells;
+  long inside = 0;
+  for (int i = 0; i < cells; ++i) {
+    for (int j = 0; j < cells; ++j) {
+      for (int k = 0; k < cells; ++k) {
+        const Vec3 offset = cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
+        inside += IsReachable(geometry, box.lower + offset);
+      }
+    }
+  }
+  return static_cast<double>(inside) * cell.prod();
+}
+
+double ReachAt(const Geometry& geometry, double z, double azimuth) {
+  const Vec3 d(std::cos(azimuth), std::sin(azimuth), 0.0);
+  const auto inside = [&](double rho) {
+    return IsReachable(geometry, rho * d + z * Vec3::UnitZ());
+  };
+  if (!inside(0.0)) return kNan;
+  // First step that leaves, then bisection.
+  const double step = 0.01 * geometry.q_max;
+  double low = 0.0;
+  while (inside(low + step)) low += step;
+  double high = low + step;
+  while (high - low > 1e-13) {
+    const double middle = 0.5 * (low + high);
+    (inside(middle) ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+std::vector<Vec3> HorizontalSection(const Geometry& geometry, double z, int count) {
+  std::vector<Vec3> points;
+  for (int k = 0; k < count; ++k) {
+    const double azimuth = 2 * pi * k / count;
+    const double rho = ReachAt(geometry, z, azimuth);
+    points.push_back({rho * std::cos(azimuth), rho * std::sin(azimuth), z});
+  }
+  return points;
+}
+
+std::vector<AxialLimits> AxialSection(const Geometry& geometry, double azimuth,
+                                      const std::vector<double>& heights) {
+  std::vector<AxialLimits> limits;
+  for (double z : heights) {
+    limits.push_back({z, -ReachAt(geometry, z, azimuth + pi), ReachAt(geometry, z, azimuth)});
+  }
+  return limits;
+}
+
+namespace {
+
+// Inward lean of leg i in the platform.
+double LeanOf(const Geometry& g, const Posture& p, int leg) {
+  const Vec3 w_P = p.R.transpose() * p.w[leg];
+  return std::atan2(-w_P.dot(g.f[leg]), w_P.z());
+}
+
+// Rotation of the leg from its home, split into a swing of its axis and a twist about it.
+void AddBallAngles(const Mat3& R_home, const Mat3& R, WorkspaceRanges* ranges) {
+  const Vec3 w_home = R_home.col(2), w = R.col(2);
+  const double swing = std::atan2(w_home.cross(w).norm(), w_home.dot(w));
+  ranges->ball_swing.Add(swing);
+  const Mat3 swing_R = swing > 0.0 ? Mat3(Eigen::AngleAxisd(swing, w_home.cross(w).normalized()))
+                                   : Mat3(Mat3::Identity());
+  const Mat3 twist = (swing_R * R_home).transpose() * R;  // about z of the leg frame
+  ranges->ball_twist.Add(std::atan2(twist(1, 0), twist(0, 0)));
+}
+
+}  // namespace
+
+WorkspaceRanges RangesOf(const Geometry& geometry, int intervals) {
+  WorkspaceRanges ranges;
+  Posture home;
+  const double middle = 0.5 * (geometry.q_min + geometry.q_max);
+  if (!SolveForward(geometry, {middle, middle, middle}, &home).ok()) return ranges;
+  const auto length = [&](int k) {
+    return geometry.q_min + (geometry.q_max - geometry.q_min) * k / intervals;
+  };
+  const auto add_matrix = [](const Mat3& A, Range* sigma, Range* cond) {
+    const Vec3 s = Eigen::JacobiSVD<Mat3>(A).singularValues();
+    if (sigma != nullptr) {
+      sigma->Add(s[0]);
+      sigma->Add(s[2]);
+    }
+    cond->Add(s[0] / s[2]);
+  };
+  for (int i = 0; i <= intervals; ++i) {
+    for (int j = 0; j <= intervals; ++j) {
+      for (int k = 0; k <= intervals; ++k) {
+        Posture p;
+        Jacobians jacobians;
+        if (!PoseAt(geometry, {length(i), length(j), length(k)}, &p, &jacobians)) continue;
+        ranges.x.Add(p.r.x());
+        ranges.y.Add(p.r.y());
+        ranges.z.Add(p.r.z());
+        ranges.tilt.Add(p.tilt.Angle());
+        ranges.det.Add(jacobians.det);
+        ranges.det_c.Add(std::abs(jacobians.det_c));
+        add_matrix(jacobians.J, &ranges.sigma, &ranges.cond);
+        add_matrix(jacobians.D_inv, nullptr, &ranges.cond_c);
+        for (int leg = 0; leg < 3; ++leg) {
+          AddBallAngles(LegRotation(home, leg), LegRotation(p, leg), &ranges);
+          ranges.lean.Add(LeanOf(geometry, p, leg) - LeanOf(geometry, home, leg));
+        }
+      }
+    }
+  }
+  return ranges;
+}
+
+}  // namespace mbv::spr_tripod

@@ -1,0 +1,110 @@
+// Reachable workspace of O_A under the leg limits [Mei 2012 §3], its measures and its sections.
+//
+// The paper bounds it by "leg-length approximation": six faces W1…W6, on each of which one leg
+// keeps its shortest or longest length while the two others run over the stroke. That is right
+// where q → O_A is one-to-one on the cube [q_min, q_max]³, i.e. det J > 0 there (checked). Four
+// ways to the volume share nothing but the kinematics:
+//   mesh        the faces, triangulated, by the divergence theorem: error ∝ step²
+//   faces       the smooth faces, V = ⅓ ∮ r·(∂r/∂q_j × ∂r/∂q_k) dq_j dq_k, Gauss–Legendre
+//   interior    V = ∫ dq / det J over the cube, Gauss–Legendre
+//   voxels      counting the cells whose centre has an inverse solution within the limits
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "analytic/spr_tripod/dynamics.h"
+#include "analytic/triangle_mesh.h"
+
+namespace mbv::spr_tripod {
+
+/// The six faces in the paper's order: W1 q1 = q_min, W2 q1 = q_max, W3 q2 = q_min, … W6.
+inline constexpr int kFaces = 6;
+
+/// The faces with shared edges, `intervals` steps along each leg (> 0): 2·intervals² triangles per
+/// face, in the order W1…W6. Empty with a summary when a leg triple has no assembly.
+struct WorkspaceMesh {
+  TriangleMesh mesh;
+  int intervals = 0;
+  RunSummary summary;
+
+  [[nodiscard]] double FaceArea(int face) const;  ///< of W1 (0) … W6 (5) [m²]
+};
+[[nodiscard]] WorkspaceMesh TriangulateFaces(const Geometry& geometry, int intervals);
+
+/// Volume, areas and centroid of the smooth faces, `points`² Gauss points per face.
+struct FaceIntegrals {
+  SolidProperties solid;
+  std::array<double, kFaces> face_area{};  ///< [m²]
+};
+[[nodiscard]] FaceIntegrals IntegrateFaces(const Geometry& geometry, int points);
+
+/// ∫ dq/det J with `points`³ Gauss points [m³].
+[[nodiscard]] double VolumeByInterior(const Geometry& geometry, int points);
+
+/// Cells of an axis-parallel box, `cells` along each side, whose centre is reachable [m³].
+struct Box3 {
+  Vec3 lower = Vec3(-0.27, -0.27, 0.43), upper = Vec3(0.27, 0.27, 0.715);
+};
+[[nodiscard]] double VolumeByVoxels(const Geometry& geometry, int cells, const Box3& box = {});
+
+/// True when O_A can be at r on the home branch within the stroke.
+[[nodiscard]] bool IsReachable(const Geometry& geometry, const Vec3& r);
+
+/// How far O_A can go from the z axis at height z in the direction of `azimuth` [m]; NaN when the
+/// axis itself is out of reach there. Accurate to 1e-12 m.
+[[nodiscard]] double ReachAt(const Geometry& geometry, double z, double azimuth);
+
+/// Points of the horizontal section at height z, `count` azimuths from 0 to 2π (exclusive).
+[[nodiscard]] std::vector<Vec3> HorizontalSection(const Geometry& geometry, double z, int count);
+
+/// One height of the section through the z axis at azimuth γ (the paper's Fig. 2 and 6).
+struct AxialLimits {
+  double z = 0.0;
+  double rho_min = kNan, rho_max = kNan;  ///< signed distance from the axis along γ [m]
+};
+[[nodiscard]] std::vector<AxialLimits> AxialSection(const Geometry& geometry, double azimuth,
+                                                    const std::vector<double>& heights);
+
+/// Ranges over a grid of the cube, `intervals` steps along each leg.
+struct Range {
+  double lower = std::numeric_limits<double>::infinity();
+  double upper = -std::numeric_limits<double>::infinity();
+  void Add(double x) {
+    lower = std::min(lower, x);
+    upper = std::max(upper, x);
+  }
+};
+struct WorkspaceRanges {
+  Range x, y, z;           ///< of O_A [m]
+  Range det, sigma, cond;  ///< of J: determinant, singular values, condition number
+  Range det_c, cond_c;     ///< of the matrix of (12); |determinant| [m³]
+  Range tilt;              ///< θ [rad]
+  Range ball_swing;        ///< leg against its home direction [rad]
+  Range ball_twist;        ///< leg about its own axis against home [rad]
+  Range lean;              ///< inward lean of the legs in the platform against home [rad]
+};
+[[nodiscard]] WorkspaceRanges RangesOf(const Geometry& geometry, int intervals);
+
+struct WorkspaceOptions {
+  std::vector<int> mesh_intervals = {5, 10, 25, 50};  ///< refinements; the last one is returned
+  int gauss_points = 12;
+  int voxels = 80;  ///< cells per side; 0 leaves the count out
+  std::vector<double> heights = {0.45, 0.50, 0.54, 0.57, 0.60, 0.66, 0.69};  ///< of sections [m]
+  int section_azimuths = 180;
+};
+
+/// Everything a command needs: a text for people, the mesh, and the section curves.
+struct WorkspaceReport {
+  RunSummary summary;
+  std::string text;          ///< plain text, one finding per line
+  WorkspaceMesh faces;       ///< the finest mesh
+  std::string sections_csv;  ///< section,azimuth_rad,x_m,y_m,z_m
+  SolidProperties exact;     ///< from IntegrateFaces
+  double volume_interior = kNan, volume_voxels = kNan;
+  double convergence_order = kNan;  ///< of the mesh volume in the step; 2 expected
+};
+[[nodiscard]] WorkspaceReport ReportWorkspace(const Geometry& geometry,
+                                              const WorkspaceOptions& options = {});
+
+}  // namespace mbv::spr_tripod
