@@ -4,12 +4,16 @@
 
 #include <cmath>
 
+#include "audit/scara_robot_audit.h"
+
 namespace mbv {
 namespace {
 
 // One row per mechanism with an equation audit, in the order of docs/equation_audit.md.
 const std::vector<AuditEntry>& Registry() {
-  static const std::vector<AuditEntry> entries = {};
+  static const std::vector<AuditEntry> entries = {
+      {"scara_robot", &AuditScaraRobot},
+  };
   return entries;
 }
 

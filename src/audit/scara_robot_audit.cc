@@ -1,0 +1,28 @@
+#include "audit/scara_robot_audit.h"
+#include "audit/scara_audit.h"
+#include "core/demand.h"
+#include "mechanism/load_model.h"
+
+namespace mbv {
+
+AuditTable AuditScaraRobot(const std::string& models_dir) {
+  const LoadResult model = LoadModel(models_dir + "/scara_robot/model.yaml");
+  MBV_DEMAND(model.mechanism.has_value(), model.diagnostics.Text());
+  const scara::Parameters parameters = scara::ParametersOf(*model.mechanism);
+  const std::vector<scara_audit::State> states = scara_audit::Sweep(*model.mechanism);
+  AuditTable table;
+  table.mechanism = "scara_robot";
+  table.source =
+      "Zhu Wei, Guo Qian, Ma Zhiyuan, Shen Huiping, Wu Guanglei, Stiffness and dynamics analysis "
+      "of SCARA parallel mechanism, Trans. Chinese Society for Agricultural Machinery 50(10), "
+      "2019 (position, kinematics and dynamics)";
+  for (auto rows :
+       {scara_audit::PositionRows(*model.mechanism, parameters, states),
+        scara_audit::VelocityRows(parameters, states), scara_audit::LinkRows(parameters, states),
+        scara_audit::DynamicsRows(parameters, states)}) {
+    for (AuditRow& row : rows) table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+}  // namespace mbv
