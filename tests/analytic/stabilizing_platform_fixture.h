@@ -116,8 +116,8 @@ inline Evaluation Evaluate(const PlatformEquations& equations, const PoseCommand
   return e;
 }
 
-/// Motion of a scenario on MechanismOfNames: sea state; synchronous unless `hold_still`.
-inline Motion SeaStateMotion(bool hold_still = false) {
+/// Motion of a scenario: sea state; synchronous unless `hold_still`.
+inline Motion SeaStateMotion(const Mechanism& mechanism, bool hold_still = false) {
   using Kind = Coordinate::Kind;
   Motion motion;
   motion.duration_s = 12;
@@ -125,23 +125,36 @@ inline Motion SeaStateMotion(bool hold_still = false) {
   auto single = [&](const char* name, Kind kind, int index, int component, ProfileTerm term) {
     motion.commands.push_back({name, {{{kind, index, component}, 1.0}}, {{term}}});
   };
-  single("roll", Kind::kPrescribed, 0, 0, SineTerm{6 * kDegree, 1.0 / 6, 0});
-  single("pitch", Kind::kPrescribed, 1, 0, SineTerm{3 * kDegree, 0.25, 0});
-  single("heave", Kind::kPrescribed, 2, 0, SineTerm{1.5, 1.0 / 6, 0});
+  auto ship = [&](const std::string& name, ProfileTerm term) {
+    for (size_t k = 0; k < mechanism.prescribed.size(); ++k) {
+      if (mechanism.prescribed[k].name != name) continue;
+      single(name.c_str(), Kind::kPrescribed, static_cast<int>(k), 0, term);
+    }
+  };
+  ship("roll", SineTerm{6 * kDegree, 1.0 / 6, 0});
+  ship("pitch", SineTerm{3 * kDegree, 0.25, 0});
+  ship("heave", SineTerm{1.5, 1.0 / 6, 0});
   const char* names[] = {"platform.x",    "platform.y",     "platform.z",
                          "platform.roll", "platform.pitch", "platform.yaw"};
+  const int output = mechanism.FindOutput("platform");
   for (int c = 0; c < 6; ++c) {
     const bool follows = c == 0 || c == 1 || c == 5;
     if (follows && !hold_still) continue;
-    single(names[c], Kind::kOutput, 0, c, ConstantTerm{c == 2 ? 3.5 : 0.0});
+    single(names[c], Kind::kOutput, output, c, ConstantTerm{c == 2 ? 3.5 : 0.0});
   }
-  for (int i = 0; i < 3 && !hold_still; ++i) {
+  for (int i = 1; i <= 3 && !hold_still; ++i) {
+    const int drive = mechanism.FindDrive(fmt::format("limb{}.drive", i));
+    const int drive_p = mechanism.FindDrive(fmt::format("limb{}.drive_p", i));
     motion.commands.push_back(
-        {fmt::format("limb{0}.drive - limb{0}.drive_p", i + 1),
-         {{{Kind::kDrive, 2 * i, 0}, 1.0}, {{Kind::kDrive, 2 * i + 1, 0}, -1.0}},
+        {fmt::format("limb{0}.drive - limb{0}.drive_p", i),
+         {{{Kind::kDrive, drive, 0}, 1.0}, {{Kind::kDrive, drive_p, 0}, -1.0}},
          {{ConstantTerm{0}}}});
   }
   return motion;
+}
+/// The same on MechanismOfNames.
+inline Motion SeaStateMotion(bool hold_still = false) {
+  return SeaStateMotion(MechanismOfNames(DefaultParameters()), hold_still);
 }
 
 }  // namespace mbv::stabilizing_platform
