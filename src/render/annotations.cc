@@ -71,12 +71,14 @@ void AddTorqueArc(const Vec3& p, const Vec3& axis, double share, double radius, 
     items->push_back(Between(Solid::kCapsule, point(shaft * i / pieces),
                              point(shaft * (i + 1) / pieces), thickness, material));
   }
-  // The head: discs that taper to the tip.
-  constexpr int kDiscs = 12;
-  for (int i = 0; i < kDiscs; ++i) {
-    const double from = shaft + head * i / kDiscs, to = shaft + head * (i + 1) / kDiscs;
-    items->push_back(Between(Solid::kCylinder, point(from), point(to),
-                             2.6 * thickness * (1.0 - (i + 0.5) / kDiscs), material));
+  // The head: a straight cone of balls that taper to the tip.
+  constexpr int kBalls = 24;
+  const Vec3 neck = point(shaft);
+  const Vec3 tip = neck + radius * head * (R * Vec3(-std::sin(shaft), std::cos(shaft), 0.0));
+  for (int i = 0; i < kBalls; ++i) {
+    const double share_of_head = static_cast<double>(i) / kBalls;
+    items->push_back(BallAt(neck + share_of_head * (tip - neck),
+                            2.6 * thickness * (1.0 - share_of_head), material));
   }
 }
 

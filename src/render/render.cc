@@ -87,6 +87,20 @@ Eigen::AlignedBox3d BoxOf(const std::vector<Vec3>& points) {
   return box;
 }
 
+// Adds the items that lie within a quarter of the diagonal around what is framed already.
+void IncludeNear(const std::vector<std::vector<Vec3>>& items, std::vector<Vec3>* framed) {
+  Eigen::AlignedBox3d box = BoxOf(*framed);
+  if (box.isEmpty()) return;
+  const double reach = 0.25 * box.diagonal().norm();
+  box.min().array() -= reach;
+  box.max().array() += reach;
+  for (const std::vector<Vec3>& corners : items) {
+    if (std::ranges::all_of(corners, [&](const Vec3& p) { return box.contains(p); })) {
+      framed->insert(framed->end(), corners.begin(), corners.end());
+    }
+  }
+}
+
 // Camera, ground and stage from what all frames show together.
 Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
             const Overlay& overlay, const PictureOptions& options) {
@@ -94,11 +108,16 @@ Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
   set.R_DW = rn::UprightRotation(mechanism.gravity_W);
   set.scale = rn::ScaleOf(mechanism, frames);
   std::vector<Vec3> framed, all;
+  std::vector<std::vector<Vec3>> maybe;  // corners of parts of the world
   const auto include = [&](const std::vector<rn::Item>& items) {
     for (const rn::Item& item : items) {
-      for (const Vec3& p_W : rn::Corners(item)) {
-        all.emplace_back(set.R_DW * p_W);
-        if (item.framed) framed.push_back(all.back());
+      std::vector<Vec3> corners = rn::Corners(item);
+      for (Vec3& p : corners) p = set.R_DW * p;
+      all.insert(all.end(), corners.begin(), corners.end());
+      if (item.framing == rn::Framing::kAlways) {
+        framed.insert(framed.end(), corners.begin(), corners.end());
+      } else if (item.framing == rn::Framing::kIfNear) {
+        maybe.push_back(std::move(corners));
       }
     }
   };
@@ -112,6 +131,7 @@ Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
   for (const MeshOverlay& mesh : overlay.meshes) {
     for (const Vec3& p_W : mesh.vertices_W) framed.emplace_back(set.R_DW * p_W);
   }
+  IncludeNear(maybe, &framed);
   if (framed.empty()) framed = {Vec3::Zero(), Vec3::Ones()};
   if (all.empty()) all = framed;
 

@@ -95,7 +95,7 @@ void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
     const Ball& ball = std::get<Ball>(shape.geometry);
     item = BallAt(X_WB * ball.p_centre, ball.radius, material);
   }
-  item.framed = !IsScenery(shape.color);
+  if (IsScenery(shape.color)) item.framing = Framing::kNever;
   items->push_back(item);
 }
 
@@ -275,6 +275,9 @@ std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame&
     for (const Shape& shape : body.shapes) {
       if (b == 0 && shape.color == "sea") continue;  // drawn as an endless plane
       AddShape(shape, frame.X_WB[b], &items);
+      if (b == 0 && items.back().framing == Framing::kAlways) {
+        items.back().framing = Framing::kIfNear;
+      }
     }
     if (body.shapes.empty() && !massless_piece && !(b == 0 && any_shapes)) {
       AddDefaultShape(mechanism, static_cast<int>(b), frame.X_WB[b], scale, &items);

@@ -20,12 +20,19 @@ enum class Solid {
   kArrow,     ///< from G's origin along z, size = (radius, –, length)
 };
 
+/// Whether the automatic camera has to show an item.
+enum class Framing {
+  kAlways,
+  kIfNear,  ///< parts of the world: only if they lie around what is always shown
+  kNever,
+};
+
 struct Item {
   Solid solid = Solid::kBall;
   Pose X_WG = Pose::Identity();  ///< pose of the solid in the world [m]
   Vec3 size = Vec3::Ones();      ///< [m]
   Material material;
-  bool framed = true;  ///< the automatic camera fits it
+  Framing framing = Framing::kAlways;
 };
 
 /// The two unit vectors that complete `axis` to a right-handed frame (axis last).

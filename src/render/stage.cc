@@ -230,7 +230,8 @@ class OsMesaStage final : public Stage {
                           const Mat3& R_DW, const Camera& camera, Picture* picture) {
     if (RunSummary filled = FillScene(items, R_DW, camera); !filled.ok()) return filled;
     const mjrRect view{0, 0, options_.width, options_.height};
-    const mjvGLCamera centred = scene_.camera[0];
+    // Both eyes of the stereo pair alike.
+    const mjvGLCamera centred = mjv_averageCamera(&scene_.camera[0], &scene_.camera[1]);
     const std::size_t bytes = 3UL * options_.width * options_.height;
     std::vector<std::uint8_t> pass_rgb(bytes);
     std::vector<std::uint32_t> sum(bytes, 0);
