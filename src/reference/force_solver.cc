@@ -6,12 +6,15 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "reference/closure_failure.h"
 
 namespace mbv::internal {
 namespace {
 
 // Forces must satisfy the equations of motion to this share of the largest wrench.
 constexpr double kBalanceTolerance = 1e-9;
+// Scaled singular value of a pose that the drives do not hold; see ClosureSolver.
+constexpr double kSingularValue = 1e-7;
 
 bool IsAngularJoint(const Joint& joint) { return joint.kind != JointKind::kPrismatic; }
 
@@ -61,6 +64,7 @@ RunSummary ForceSolver::SelectBasis() {
     }
   }
   basis_is_new_ = chosen_ = true;
+  orientation_ = 0;
   return RunSummary::Done();
 }
 
@@ -83,6 +87,24 @@ bool ForceSolver::Factor() {
     self_stress_(i, k) = 1.0;
   }
   return true;
+}
+
+RunSummary ForceSolver::CheckControl(const BodyStates& states) {
+  const double sigma = system_.SmallestSingularValue(1);
+  const int orientation = system_.determinant_sign();
+  // With forces left over, another choice of basis would have another sign.
+  const bool crossed = rest_.empty() && orientation_ != 0 && orientation != orientation_;
+  orientation_ = orientation;
+  if (!crossed && sigma > kSingularValue) return RunSummary::Done();
+  RunSummary summary;
+  summary.stop = Stop::kSingular;
+  summary.where = MostMovingJoint(mechanism_, states, system_.SoftMotion());
+  summary.amount = sigma;
+  summary.unit = "1";
+  summary.message =
+      fmt::format("singular pose{}: the drives lose control of {} (smallest singular value {:.1e})",
+                  crossed ? " since the last sample" : "", summary.where, sigma);
+  return summary;
 }
 
 double ForceSolver::Missing(const VecX& force, const VecX& wrenches, VecX* residual) const {
@@ -124,6 +146,7 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
       if (RunSummary summary = SelectBasis(); !summary.ok()) return summary;
     }
     if (!Factor()) continue;
+    if (RunSummary summary = CheckControl(sample->states); !summary.ok()) return summary;
     const VecX force = LeastNorm(wrenches);
     if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
     Report(force, sample);

@@ -27,6 +27,7 @@ class ForceSolver {
   void FillRows(const BodyStates& states);
   [[nodiscard]] RunSummary SelectBasis();
   [[nodiscard]] bool Factor();
+  [[nodiscard]] RunSummary CheckControl(const BodyStates& states);
   [[nodiscard]] VecX LeastNorm(const VecX& wrenches);
   [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
   void Report(const VecX& force, ReferenceSample* sample) const;
@@ -37,7 +38,8 @@ class ForceSolver {
   RowSet rows_;  ///< reaction rows of all joints, drives, prescribed joints
   std::vector<int> basis_, rest_;
   bool basis_is_new_ = true, chosen_ = false;
-  MatX self_stress_;  ///< scaled; basis rows then rest rows
+  int orientation_ = 0;  ///< sign of the determinant so far, where the forces are unique
+  MatX self_stress_;     ///< scaled; basis rows then rest rows
 };
 
 /// Wrench [m about Bo; f] that each body needs beyond gravity, springs and loads, in world axes:
