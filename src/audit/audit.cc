@@ -4,7 +4,10 @@
 
 #include <cmath>
 
+#include "audit/cabin_audit.h"
 #include "audit/scara_robot_audit.h"
+#include "audit/spr_tripod_audit.h"
+#include "audit/stabilizing_platform_audit.h"
 
 namespace mbv {
 namespace {
@@ -12,7 +15,10 @@ namespace {
 // One row per mechanism with an equation audit, in the order of docs/equation_audit.md.
 const std::vector<AuditEntry>& Registry() {
   static const std::vector<AuditEntry> entries = {
+      {"stabilizing_platform", &AuditStabilizingPlatform},
+      {"spr_tripod", &AuditSprTripod},
       {"scara_robot", &AuditScaraRobot},
+      {"cabin_robot", &AuditCabinRobot},
   };
   return entries;
 }
@@ -49,8 +55,9 @@ std::string Numbers(const AuditRow& row, AuditNumbers numbers) {
   if (row.verdict == AuditVerdict::kNotTestable) return "– | – | –";
   const std::string corrected =
       row.corrected.empty() ? "–" : Residual(row.residual_corrected, row, numbers);
-  return fmt::format("{} | {} | {:.2g} {}", Residual(row.residual_printed, row, numbers), corrected,
-                     row.scale, row.unit);
+  const std::string unit = row.unit == "1" ? "" : " " + row.unit;
+  return fmt::format("{} | {} | {:.2g}{}", Residual(row.residual_printed, row, numbers), corrected,
+                     row.scale, unit);
 }
 
 }  // namespace

@@ -9,6 +9,13 @@
 #include "core/types.h"
 #include "mechanism/mechanism.h"
 
+namespace mbv {
+
+/// All rows of the cabin robot; `models_dir` holds cabin_robot/model.yaml.
+[[nodiscard]] AuditTable AuditCabinRobot(const std::string& models_dir);
+
+}  // namespace mbv
+
 namespace mbv::cabin_audit {
 
 /// Sixth-order central differences of a vector function of time, step h.
