@@ -40,7 +40,7 @@ int Save(const std::string& path, const std::string& content) {
 }
 
 int Render(const RenderArguments& arguments) {
-  RenderRequest request{.scenario = {}, .frames_per_s = {}};
+  RenderRequest request;
   if (!arguments.at.empty()) {
     request.scenario.set.emplace_back("snapshots.times_s", "[" + arguments.at + "]");
   }

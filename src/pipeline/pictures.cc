@@ -69,6 +69,7 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
   RunSummary summary = RenderPictures(
       mechanism, frames, {}, OptionsOf(scenario.snapshots), [&](int index, Picture picture) {
         (*files)[static_cast<size_t>(index)].content = EncodePng(picture);
+        if (progress) progress((index + 1.0) / static_cast<double>(frames.size()));
         return true;
       });
   if (!summary.ok()) files->clear();

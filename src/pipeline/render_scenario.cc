@@ -52,10 +52,10 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
   if (request.frames_per_s) {
     scenario.snapshots.times_s = FrameTimes(scenario.motion.duration_s, *request.frames_per_s);
   }
-  const RunSummary drawn =
-      DrawSnapshots(scenario, prepared->mechanisms.simulated, witness.run,
-                    {outcome.mechanism + " / " + outcome.scenario, "", Caption::Mood::kNeutral},
-                    progress("pictures"), &outcome.pictures);
+  const RunSummary drawn = DrawSnapshots(
+      scenario, prepared->mechanisms.simulated, witness.run,
+      {.title = outcome.mechanism + " / " + outcome.scenario, .detail = {}, .status = {}},
+      progress("pictures"), &outcome.pictures);
   if (!drawn.ok()) {
     AddError(file, drawn, &outcome.diagnostics);
     return outcome;

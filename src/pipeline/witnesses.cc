@@ -134,8 +134,9 @@ Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, doub
     if (channel.unit == "N" || channel.unit == "N m" || channel.unit == "W") {
       trace.values.col(column) += factor * (b.values.col(column) - a.values.col(column));
     } else if (channel.name.starts_with("closure.")) {
-      trace.values.col(column) = a.values.col(column).cwiseAbs().cwiseMax<Eigen::PropagateNaN>(
-          b.values.col(column).cwiseAbs());
+      const auto worse = [](double x, double y) { return std::isnan(x) || x > y ? x : y; };
+      trace.values.col(column) =
+          a.values.col(column).cwiseAbs().binaryExpr(b.values.col(column).cwiseAbs(), worse);
     }
   }
   return trace;
