@@ -44,6 +44,15 @@ void ConstraintSystem::EvaluatePosition() {
   if (d_->ne != rows_) throw EngineError("a closure or drive constrains nothing");
 }
 
+void ConstraintSystem::EvaluatePassive() {
+  if (engine_.spring_tendon.empty()) return;
+  const mjModel* m = engine_.m.get();
+  Eigen::Map<VecX>(d_->ten_velocity, m->ntendon) =
+      Eigen::Map<const RowMajor>(d_->ten_J, m->ntendon, m->nv) *
+      Eigen::Map<const VecX>(d_->qvel, m->nv);
+  mj_passive(m, d_);
+}
+
 void ConstraintSystem::BodyBiasAccelerations() {
   const mjModel& m = *engine_.m;
   for (int b = 1; b < m.nbody; ++b) {

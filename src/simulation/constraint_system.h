@@ -46,10 +46,12 @@ class ConstraintSystem {
   [[nodiscard]] Eigen::Map<const RowMajor> J() const { return {d_->efc_J, rows_, engine_.m->nv}; }
   [[nodiscard]] Eigen::Map<VecX> force() const { return {d_->efc_force, rows_}; }
 
+  /// Forces of the springs at d.qpos, d.qvel into qfrc_passive.
+  void EvaluatePassive();
+
   /// J̇q̇ of every row, from positions and velocities evaluated by MuJoCo (mj_comVel).
   void Bias(VecX* bias);
 
-  /// Velocity and bias acceleration of the tendon-like row between two points fixed to bodies.
   [[nodiscard]] int first_driven_row() const { return closure_rows_; }
   /// First row of a planned closure.
   [[nodiscard]] int closure_row(int closure) const { return closure_row_[closure]; }

@@ -43,17 +43,13 @@ void SolveDynamics(Session* s, double t_s, VecX* tau) {
   const mjModel* m = s->engine.m.get();
   mjData* d = s->data.get();
   mj_rne(m, d, 1, tau->data());
-  if (m->ntendon > 0 && !s->engine.spring_tendon.empty()) {
-    const Eigen::Map<const RowMajor> ten_J(d->ten_J, m->ntendon, m->nv);
-    Eigen::Map<VecX>(d->ten_velocity, m->ntendon) = ten_J * Eigen::Map<const VecX>(d->qvel, m->nv);
-    mj_passive(m, d);
-    *tau -= Eigen::Map<const VecX>(d->qfrc_passive, m->nv);
-  }
+  s->system.EvaluatePassive();
+  *tau -= Eigen::Map<const VecX>(d->qfrc_passive, m->nv);
   s->loads.Evaluate(t_s, *d);
   if (!s->loads.world().empty()) {
-    *tau *= -1.0;
+    *tau = -*tau;
     s->loads.AddGeneralized(d, tau->data());
-    *tau *= -1.0;
+    *tau = -*tau;
   }
   s->solver.SolveForces(*tau);
 }
@@ -72,15 +68,13 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
     if (RunSummary summary = driven(times[i], &samples[i]); !summary.ok()) return summary;
   }
   mjData* d = s->data.get();
-  VecX from(s->engine.driven.size());
-  for (size_t k = 0; k < s->engine.driven.size(); ++k) from[k] = s->engine.driven[k].home;
   Predictor predictor(s->engine);
   VecX tau(s->engine.m->nv);
   const auto start = std::chrono::steady_clock::now();
   for (size_t i = 0; i < times.size(); ++i) {
     if (i > 0) predictor.Predict(times[i] - times[i - 1], d);
-    if (RunSummary summary =
-            s->solver.Follow(i > 0 ? samples[i - 1].position : from, samples[i].position);
+    if (RunSummary summary = s->solver.Follow(
+            i > 0 ? samples[i - 1].position : HomePositions(s->engine), samples[i].position);
         !summary.ok()) {
       return At(summary, times[i]);
     }

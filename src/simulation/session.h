@@ -40,7 +40,10 @@ struct Session {
 [[nodiscard]] RunSummary RunCorrected(Session* session, const DrivenMotion& driven);
 [[nodiscard]] RunSummary RunStock(Session* session, const DrivenMotion& driven);
 
-/// Largest absolute entry is finite.
+/// Positions of everything driven at home.
+[[nodiscard]] VecX HomePositions(const EngineModel& engine);
+
+/// True if every entry is finite.
 [[nodiscard]] bool AllFinite(const double* x, int n);
 
 /// q ⊕ h v̄ in place, where v̄ is the mean velocity over the step; the coordinates of balls and free

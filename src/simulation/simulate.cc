@@ -5,6 +5,7 @@
 
 #include "mjcf/mjcf.h"
 #include "simulation/session.h"
+#include "simulation/steps.h"
 
 namespace mbv {
 namespace simulation {
@@ -35,6 +36,12 @@ void Session::Record(size_t i) {
   if (progress && i % 16 == 0) {
     progress(static_cast<double>(i) / static_cast<double>(run->trace.time_s.size()));
   }
+}
+
+VecX HomePositions(const EngineModel& engine) {
+  VecX home(engine.driven.size());
+  for (size_t k = 0; k < engine.driven.size(); ++k) home[k] = engine.driven[k].home;
+  return home;
 }
 
 bool AllFinite(const double* x, int n) {
@@ -72,7 +79,7 @@ void ReportUniqueness(const Session& session, SimulationRun* run) {
 RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
                const SimulationOptions& options, const std::function<void(double)>& progress,
                SimulationRun* run) {
-  run->mjcf = WriteMjcf(mechanism, {.step_s = options.step_s});
+  run->mjcf = WriteMjcf(mechanism, {.step_s = AdjustedStep(motion, options.step_s)});
   EngineModel engine;
   if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
     return summary;
@@ -97,8 +104,7 @@ Diagnostics Check(const SimulationOptions& options) {
     }
   };
   require(options.step_s > 0.0, "step_s > 0", options.step_s);
-  require(options.loop_tc_steps >= 2.0, "loop_tc_steps >= 2", options.loop_tc_steps);
-  require(options.drive_tc_steps >= 2.0, "drive_tc_steps >= 2", options.drive_tc_steps);
+  require(options.guidance_steps >= 20.0, "guidance_steps >= 20", options.guidance_steps);
   return diagnostics;
 }
 

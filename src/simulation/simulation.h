@@ -22,9 +22,11 @@ enum class Engine {
 struct SimulationOptions {
   SimulationMode mode = SimulationMode::kForward;
   Engine engine = Engine::kCorrected;
-  double step_s = 1e-3;          ///< integration step, > 0; samples fall on whole steps
-  double loop_tc_steps = 2.0;    ///< time constant of the closures in steps, >= 2
-  double drive_tc_steps = 50.0;  ///< time constant of the drives' guidance in steps, >= 2
+  double step_s = 1e-3;  ///< integration step, > 0; samples fall on whole steps
+  /// Time constant with which closures and driven coordinates are guided back to their commanded
+  /// motion (corrected engine), in steps, >= 20: stiffer guidance destabilises the integration,
+  /// softer guidance lets errors live longer.
+  double guidance_steps = 50.0;
 };
 [[nodiscard]] Diagnostics Check(const SimulationOptions& options);
 
@@ -45,8 +47,12 @@ struct SimulationRun {
   std::vector<std::string> not_unique;
 };
 
-/// `motion` gives duration, sample times and loads; `driven` gives the commanded motion, evaluated
-/// once before the loop.
+/// `motion` gives duration, sample times, loads and the times at which profiles break (the
+/// integration steps onto them); `driven` gives the commanded motion, evaluated before the loop.
+/// Fails with what `driven` returned; kNoConvergence (the loops do not close with the commanded
+/// drive positions); kUnsupported (undriven freedoms in inverse mode, a load on a merged body, a
+/// drive on a ball); kEngineFailure (MuJoCo's errors, motion not finite, loops apart). Samples up
+/// to the failure are filled, the others NaN.
 [[nodiscard]] SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion,
                                      const DrivenMotion& driven, const SimulationOptions& options,
                                      const std::function<void(double)>& progress = {});

@@ -1,0 +1,158 @@
+#include "simulation/integrator.h"
+
+#include <algorithm>
+
+namespace mbv::simulation {
+namespace {
+
+// Softness R of a constraint row relative to MuJoCo's own at its strongest impedance, 0.9999. The
+// force error that it leaves falls with R, the rounding error of the force rises with 1/R; in
+// between lie four decades where neither is seen.
+constexpr double kSoftness = 1e-5;
+// Repeated solutions where no force is expected yet: each reduces the error by R's share.
+constexpr int kStartRepeats = 4;
+// With redundant constraints the self-stress is only determined through R, and a force that
+// relies on its own past would drift: the past is trusted a little less.
+constexpr double kTrustIfRedundant = 0.9;
+
+}  // namespace
+
+Integrator::Integrator(Session* session, double h)
+    : s_(*session), m_(session->engine.m.get()), d_(session->data.get()) {
+  const double tc = session->options.guidance_steps * h;
+  b_ = 2.0 / tc;
+  k_ = 1.0 / (tc * tc);
+  if (s_.solver.redundant() > 0) trust_ = kTrustIfRedundant;
+  const int rows = s_.system.rows();
+  for (VecX* x : {&bias_, &rate_, &aref_, &expected_, &last_force_}) x->setZero(rows);
+  q_ = Eigen::Map<const VecX>(d_->qpos, m_->nq);
+  v_ = Eigen::Map<const VecX>(d_->qvel, m_->nv);
+  a_.fill(VecX::Zero(m_->nv));
+  // Two Newton iterations: the second refines the first, the problem being quadratic.
+  session->engine.m->opt.iterations = 2;
+  session->engine.m->opt.tolerance = 0.0;
+}
+
+void Integrator::Start(const DrivenSample& first) {
+  warm_ = qacc();
+  Evaluate(q_, v_, first, 0.0);
+  for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
+  RememberAcceleration();
+}
+
+void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
+  const double c = h / 24.0, e = h / 360.0;
+  // (2), (3)
+  v_p_ = v_ + c * (55.0 * a_[0] - 59.0 * a_[1] + 37.0 * a_[2] - 9.0 * a_[3]);
+  mean_ = v_ + e * (323.0 * a_[0] - 264.0 * a_[1] + 159.0 * a_[2] - 38.0 * a_[3]);
+  q_p_ = q_;
+  AdvancePositions(s_.engine, h, mean_, v_, v_p_, &work_, q_p_.data());
+  expected_ = 2.0 * trust_ * s_.system.force() - trust_ * trust_ * last_force_;
+  warm_ = 2.0 * a_[0] - a_[1];
+  Evaluate(q_p_, v_p_, end, end_s);
+  RememberAcceleration();
+  // (4), (5)
+  mean_ = v_ + e * (38.0 * a_[0] + 171.0 * a_[1] - 36.0 * a_[2] + 7.0 * a_[3]);
+  v_p_ = v_ + c * (9.0 * a_[0] + 19.0 * a_[1] - 5.0 * a_[2] + a_[3]);
+  AdvancePositions(s_.engine, h, mean_, v_, v_p_, &work_, q_.data());
+  v_.swap(v_p_);
+}
+
+void Integrator::RungeKutta(double h, const DrivenSample& middle, const DrivenSample& end,
+                            double from_s) {
+  const double half = 0.5 * h;
+  const VecX v1 = v_, k1 = a_[0];
+  const VecX v2 = v_ + half * k1, u2 = half * v1;
+  const VecX k2 = Stage(u2, v2, middle, from_s + half), r2 = Rate(u2, v2);
+  const VecX v3 = v_ + half * k2, u3 = half * r2;
+  const VecX k3 = Stage(u3, v3, middle, from_s + half), r3 = Rate(u3, v3);
+  const VecX v4 = v_ + h * k3, u4 = h * r3;
+  const VecX k4 = Stage(u4, v4, end, from_s + h), r4 = Rate(u4, v4);
+  const VecX mean = (v1 + 2.0 * r2 + 2.0 * r3 + r4) / 6.0;
+  mj_integratePos(m_, q_.data(), mean.data(), h);
+  v_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+  expected_ = s_.system.force();
+  warm_ = k4;
+  Evaluate(q_, v_, end, from_s + h);
+  SolveAgain();
+  RememberAcceleration();
+}
+
+// Acceleration at q ⊕ u.
+VecX Integrator::Stage(const VecX& u, const VecX& v, const DrivenSample& at, double t_s) {
+  q_p_ = q_;
+  mj_integratePos(m_, q_p_.data(), u.data(), 1.0);
+  expected_ = s_.system.force();
+  warm_ = qacc();
+  Evaluate(q_p_, v, at, t_s);
+  return qacc();
+}
+
+// u̇ of q = q_n ⊕ u.
+VecX Integrator::Rate(const VecX& u, const VecX& v) const {
+  VecX rate = v;
+  for (int i = 0; i < m_->nv; ++i) {
+    if (!s_.engine.dof_is_rotation3[i]) continue;
+    const Vec3 u3 = u.segment<3>(i), w = v.segment<3>(i), c = u3.cross(w);
+    rate.segment<3>(i) = w + 0.5 * c + u3.cross(c) / 12.0;
+  }
+  return rate;
+}
+
+void Integrator::RememberAcceleration() {
+  for (int i = 3; i > 0; --i) a_[i].swap(a_[i - 1]);
+  a_[0] = qacc();
+}
+
+// MuJoCo's stages at one state.
+void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s) {
+  last_force_ = s_.system.force();
+  std::copy(q.begin(), q.end(), d_->qpos);
+  std::copy(v.begin(), v.end(), d_->qvel);
+  d_->time = t_s;
+  s_.system.SetTargets(at.position);
+  s_.system.EvaluatePosition();
+  mj_crb(m_, d_);
+  mj_factorM(m_, d_);
+  mj_comVel(m_, d_);
+  s_.system.EvaluatePassive();
+  mj_rne(m_, d_, 0, d_->qfrc_bias);
+  s_.loads.Evaluate(t_s, *d_);
+  if (!s_.loads.world().empty()) {
+    mju_zero(d_->qfrc_applied, m_->nv);
+    s_.loads.AddGeneralized(d_, d_->qfrc_applied);
+  }
+  SetReference(v, at);
+  std::copy(warm_.begin(), warm_.end(), d_->qacc_warmstart);
+  mj_fwdAcceleration(m_, d_);
+  mj_fwdConstraint(m_, d_);
+}
+
+// (1) without the expected force; R and its inverse D.
+void Integrator::SetReference(const VecX& v, const DrivenSample& at) {
+  const int rows = s_.system.rows(), driven = s_.system.driven_rows();
+  s_.system.Bias(&bias_);
+  rate_.noalias() = s_.system.J() * v;
+  aref_ = -bias_;
+  rate_.tail(driven) -= at.velocity;
+  aref_.tail(driven) += at.acceleration;
+  aref_ -= b_ * rate_ + k_ * s_.system.residual();
+  Eigen::Map<VecX>(d_->efc_R, rows) *= kSoftness;
+  Eigen::Map<VecX>(d_->efc_D, rows) /= kSoftness;
+  ApplyReference();
+}
+
+void Integrator::ApplyReference() {
+  const int rows = s_.system.rows();
+  Eigen::Map<VecX>(d_->efc_aref, rows) =
+      aref_ + Eigen::Map<const VecX>(d_->efc_R, rows).cwiseProduct(expected_);
+}
+
+// The constraint stage once more, expecting the force just found.
+void Integrator::SolveAgain() {
+  expected_ = s_.system.force();
+  ApplyReference();
+  mj_fwdConstraint(m_, d_);
+}
+
+}  // namespace mbv::simulation

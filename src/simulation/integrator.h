@@ -1,0 +1,62 @@
+// Forward integration of MuJoCo's accelerations with fourth order, one evaluation per step.
+//
+// At every node MuJoCo computes accelerations and constraint forces from position, velocity and
+// commanded motion at that very time. What 2.2.2 leaves out of its constraint rows is supplied
+// between its velocity and its constraint stage:
+//   aref = ẍ_ref − J̇q̇ − b (J q̇ − ẋ_ref) − k r + R f̂,   b = 2/tc, k = 1/tc²                   (1)
+// (closures: ẍ_ref = ẋ_ref = 0). R, the softness of MuJoCo's constraints, is lowered beyond the
+// bound that the impedance limit sets, and the force f̂ expected from the last nodes cancels what
+// is left of it. Between nodes:
+//   predictor  v* = v_n + h/24 (55 a_n − 59 a_{n−1} + 37 a_{n−2} − 9 a_{n−3}) (2)
+//              q* = q_n ⊕ (h v_n + h²/360 (323 a_n − 264 a_{n−1} + 159 a_{n−2} − 38 a_{n−3})) (3)
+//   evaluate   a_{n+1}, f_{n+1} at (q*, v*): the state that is recorded
+//   corrector  v_{n+1} = v_n + h/24 (9 a_{n+1} + 19 a_n − 5 a_{n−1} + a_{n−2}) (4)
+//              q_{n+1} = q_n ⊕ (h v_n + h²/360 (38 a_{n+1} + 171 a_n − 36 a_{n−1} + 7 a_{n−2})) (5)
+// [Hairer, Nørsett, Wanner 1993, III.1 and III.10]. The classical Runge–Kutta method builds up the
+// history at the start and after every break of the commanded profiles. Rotation vectors of balls
+// and free bodies follow u̇ = ω + ½ u × ω + 1/12 u × (u × ω) [Iserles et al. 2000, Eq. 2.42].
+#pragma once
+
+#include <array>
+
+#include "simulation/session.h"
+
+namespace mbv::simulation {
+
+class Integrator {
+ public:
+  /// Starts from the data's qpos and qvel, with qacc as a first guess. `h`: the uniform step [s].
+  Integrator(Session* session, double h);
+
+  /// Evaluates the first node, t = 0.
+  void Start(const DrivenSample& first);
+  /// One evaluation; needs four uniform nodes behind it.
+  void MultiStep(double h, const DrivenSample& end, double end_s);
+  /// Four evaluations and one at the end.
+  void RungeKutta(double h, const DrivenSample& middle, const DrivenSample& end, double from_s);
+
+  /// False once an acceleration is no longer finite.
+  [[nodiscard]] bool healthy() const { return AllFinite(d_->qacc, m_->nv); }
+
+ private:
+  void Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s);
+  void SetReference(const VecX& v, const DrivenSample& at);
+  void ApplyReference();
+  void SolveAgain();
+  void RememberAcceleration();
+  VecX Stage(const VecX& u, const VecX& v, const DrivenSample& at, double t_s);
+  [[nodiscard]] VecX Rate(const VecX& u, const VecX& v) const;
+  [[nodiscard]] Eigen::Map<const VecX> qacc() const { return {d_->qacc, m_->nv}; }
+
+  Session& s_;
+  const mjModel* const m_;
+  mjData* const d_;
+  double b_ = 0.0, k_ = 0.0;  // of (1)
+  double trust_ = 1.0;        // in the extrapolated force
+  VecX q_, v_;                // corrected state at the present node
+  VecX q_p_, v_p_, mean_, work_, warm_;
+  VecX bias_, rate_, aref_, expected_, last_force_;
+  std::array<VecX, 4> a_;  // accelerations at the last nodes, newest first
+};
+
+}  // namespace mbv::simulation
