@@ -9,26 +9,26 @@
 namespace mbv {
 
 enum class AuditVerdict {
-  kOk,              ///< as printed: right
-  kWrong,           ///< as printed: wrong; the corrected form is right
-  kWrongAndUnfixed, ///< the corrected form misses its limit too: a defect of ours
-  kNotTestable,     ///< a label, a choice or a claim that no residual measures; the note says why
+  kOk,               ///< as printed: right
+  kWrong,            ///< as printed: wrong; the corrected form is right
+  kWrongAndUnfixed,  ///< the corrected form misses its limit too: a defect of ours
+  kNotTestable,      ///< a label, a choice or a claim that no residual measures; the note says why
 };
 
 /// One row of the audit table.
 struct AuditRow {
-  std::string equation;   ///< "(6) M", "(17)", "section 4 data"
-  std::string erratum;    ///< "E2" or ""
-  std::string printed;    ///< the form as printed, in plain text
-  std::string corrected;  ///< the corrected form; "" when the print is right
+  std::string equation{};           ///< "(6) M", "(17)", "section 4 data"
+  std::string erratum{};            ///< "E2" or ""
+  std::string printed{};            ///< the form as printed, in plain text
+  std::string corrected{};          ///< the corrected form; "" when the print is right
   double residual_printed = 0.0;    ///< largest |difference| of the print; NaN if not computable
   double residual_corrected = 0.0;  ///< largest |difference| of the corrected form (of the print
                                     ///< when it is right)
-  double scale = 1.0;     ///< largest |value| of the quantity, same unit
-  double limit = 0.0;     ///< residual_corrected must stay at or below this (derived, see note)
-  std::string unit;
+  double scale = 1.0;               ///< largest |value| of the quantity, same unit
+  double limit = 0.0;  ///< residual_corrected must stay at or below this (derived, see note)
+  std::string unit{};
   AuditVerdict verdict = AuditVerdict::kWrongAndUnfixed;
-  std::string note;       ///< what it was compared with, and what the difference means
+  std::string note{};  ///< what it was compared with, and what the difference means
 };
 
 /// The verdict that the numbers of a row give: kOk or kWrong when the corrected form is within its
@@ -37,7 +37,7 @@ struct AuditRow {
 
 struct AuditTable {
   std::string mechanism;
-  std::string source;     ///< the paper
+  std::string source;  ///< the paper
   std::vector<AuditRow> rows;
 };
 
