@@ -160,7 +160,7 @@ ExpressionResult Scope::Use(const std::string& name) {
   const auto found = entries_.find(name);
   if (found == entries_.end()) {
     if (outer_ != nullptr) return outer_->Use(name);
-    return {.value = {}, .error = fmt::format("unknown symbol '{}'", name), .hint = ""};
+    return {.value = {}, .error = fmt::format("has the unknown symbol '{}'", name), .hint = ""};
   }
   Entry& entry = found->second;
   if (entry.state == State::kWaiting) EvaluateEntry(name, &entry);
@@ -193,7 +193,7 @@ ExpressionResult Scope::Evaluate(const std::string& expression) {
     if (used.is_call) {
       if (TheParser().GetFunDef().count(used.name) > 0) continue;
       return {.value = {},
-              .error = fmt::format("unknown function '{}'", used.name),
+              .error = fmt::format("has the unknown function '{}'", used.name),
               .hint = DidYouMean(used.name, FunctionNames())};
     }
     ExpressionResult result = Use(used.name);

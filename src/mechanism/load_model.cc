@@ -1,8 +1,27 @@
 #include "mechanism/load_model.h"
 
+#include <algorithm>
+#include <utility>
+
 #include "mechanism/model_reader.h"
 
 namespace mbv {
+namespace {
+
+// The stages find things in their own order; people read files from the top.
+Diagnostics InFileOrder(const Diagnostics& diagnostics) {
+  std::vector<Finding> findings = diagnostics.findings();
+  std::stable_sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
+    const bool a_placed = a.line > 0, b_placed = b.line > 0;
+    if (a_placed != b_placed) return a_placed;
+    return std::pair(a.line, a.column) < std::pair(b.line, b.column);
+  });
+  Diagnostics sorted;
+  for (Finding& finding : findings) sorted.Add(std::move(finding));
+  return sorted;
+}
+
+}  // namespace
 
 LoadResult ModelReader::Load(const std::string& text) {
   mechanism_.file = yaml_.file();
@@ -12,7 +31,7 @@ LoadResult ModelReader::Load(const std::string& text) {
   root_ = yaml_.Parse(text);
   if (root_ != nullptr) ReadAll();
   LoadResult result;
-  result.diagnostics.Append(yaml_.diagnostics());
+  result.diagnostics.Append(InFileOrder(yaml_.diagnostics()));
   result.diagnostics.Append(other_findings_);
   if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism_);
   return result;

@@ -74,17 +74,16 @@ void ModelReader::CloseLoops() {
   for (const LoopGap& gap : home.gaps) {
     if (gap.position_m <= kHomeTolerance && gap.rotation_rad <= kHomeTolerance) continue;
     const Joint& joint = mechanism_.joints[gap.joint];
-    const std::string text = fmt::format(
-        "the loop at joint '{}' does not close: gap {:.3g} m, "
-        "{:.3g} rad",
-        joint.name, gap.position_m, gap.rotation_rad);
+    std::string text = fmt::format("the loop at joint '{}' does not close: gap", joint.name);
+    if (!(gap.position_m <= kHomeTolerance)) text += fmt::format(" {:.3g} m", gap.position_m);
+    if (!(gap.rotation_rad <= kHomeTolerance)) text += fmt::format(" {:.3g} rad", gap.rotation_rad);
     const std::string hint =
-        "improve the guesses of the loop's joints, or look for a wrong length "
-        "or axis";
+        "improve the guesses of the loop's joints, or look for a wrong length or axis";
     const YamlEntry* at = joint_places_[gap.joint];
     yaml_.SetNote("");
     yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0, text, hint);
   }
+  if (!yaml_.has_errors()) yaml_.AddAt(Severity::kError, 0, 0, "the home pose was not found");
 }
 
 namespace {

@@ -51,6 +51,7 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   const std::string path = JoinPath(block.PathOf("joints"), entry.key);
   const bool good_before = joints_good_;
   joints_good_ = false;  // until the end of a good joint
+  refused_joints_.insert(block.prefix + entry.key);
   if (!CheckNewName(entry, block.PathOf("joints"))) return;
   if (!Room(*entry.value, mechanism_.joints.size(), kMaxJoints, "joints")) return;
   Joint joint;
@@ -82,6 +83,8 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
     }
     ReadJointRange(block, map, &joint);
     good = ReadFreeChoices(map, &joint) && good;
+  } else if (const YamlNode* axis = map.Find("axis")) {
+    (void)Axis(block, *axis, map.PathOf("axis"));  // for its findings
   }
   if (on_parent && on_child && on_parent->body == on_child->body) {
     yaml_.Error(entry, fmt::format("{} connects body '{}' with itself", path,
@@ -89,7 +92,7 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
     good = false;
   }
   joints_good_ = good_before && good;
-  if (!on_parent || !on_child) return;
+  if (!good) return;
   joint.parent = on_parent->body;
   joint.X_PF = on_parent->X_BF;
   joint.child = on_child->body;
@@ -102,6 +105,7 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   hints_.resize(mechanism_.joints.size());
   hints_.back() = hint;
   joint_places_.push_back(&entry);
+  refused_joints_.erase(joint.name);
 }
 
 bool ModelReader::ReadAxes(const Block& block, const YamlMap& map, Joint* joint) {

@@ -217,6 +217,7 @@ void ModelReader::ReadInstance(const Block& block, const YamlEntry& entry, const
   ReadParameters(inner, parameters, inner.PathOf("parameters"));
 
   // The instance's values replace the defaults; they see the parameters where they are written.
+  yaml_.SetNote(block.Note());
   for (const YamlEntry& given : entry.value->entries) {
     if (given.key == "part") continue;
     if (!inner.scope->Has(given.key)) {
@@ -229,6 +230,7 @@ void ModelReader::ReadInstance(const Block& block, const YamlEntry& entry, const
     const auto value = Number(block, *given.value, JoinPath(path, given.key));
     inner.scope->Set(given.key, value.value_or(0.0));
   }
+  yaml_.SetNote(inner.Note());
   ApplyOverrides(inner);
   EvaluateParameters(inner, parameters, inner.PathOf("parameters"));
   blocks_.push_back(inner);

@@ -10,6 +10,7 @@
 #include <deque>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -164,7 +165,8 @@ class ModelReader {
   std::vector<const YamlEntry*> body_places_;   // per body; null: the world, URDF links
   std::vector<const YamlEntry*> joint_places_;  // per joint
   std::vector<std::string> body_paths_;         // YAML path, or the URDF file
-  bool joints_good_ = true;                     // false: the graph of joints is not worth checking
+  std::set<std::string> refused_joints_;
+  bool joints_good_ = true;  // false: the graph of joints is not worth checking
   struct SignalPlace {
     const char* what;  // "drive", …
     const YamlEntry* entry;
@@ -172,7 +174,7 @@ class ModelReader {
   std::map<std::string, std::vector<SignalPlace>> signal_places_;
   int urdf_root_ = -1;  // body that needs a joint to the world
   std::map<std::string, bool> override_used_;
-  Diagnostics other_findings_;  // of other files: overrides, URDF
+  Diagnostics other_findings_;                 // of other files: overrides, URDF
   std::vector<std::string> known_parameters_;  // dotted names, for "did you mean"
 };
 

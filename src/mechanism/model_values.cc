@@ -247,9 +247,12 @@ std::optional<int> ModelReader::JointRef(const Block& block, const YamlNode& nod
   if (!name) return std::nullopt;
   for (const std::string& level : block.levels) {
     if (const int joint = mechanism_.FindJoint(level + *name); joint >= 0) return joint;
+    if (refused_joints_.count(level + *name) > 0) return std::nullopt;  // has its own finding
   }
+  std::vector<std::string> names = NamesOf(mechanism_.joints);
+  names.insert(names.end(), refused_joints_.begin(), refused_joints_.end());
   yaml_.Error(node, fmt::format("{} = {}: there is no such joint", path, Describe(node)),
-              DidYouMean(*name, ShortNames(NamesOf(mechanism_.joints), block.levels)));
+              DidYouMean(*name, ShortNames(names, block.levels)));
   return std::nullopt;
 }
 

@@ -24,6 +24,11 @@ std::string JoinPath(std::string_view path, std::string_view key) {
 
 std::optional<double> PlainNumber(std::string_view text) {
   if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  // YAML's words for what is not finite.
+  for (const std::string_view word : {".inf", ".Inf", ".INF", "-.inf", "-.Inf", "-.INF"}) {
+    if (text == word) return text.front() == '-' ? -HUGE_VAL : HUGE_VAL;
+  }
+  if (text == ".nan" || text == ".NaN" || text == ".NAN") return std::nan("");
   double value = 0.0;
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, value);
@@ -163,12 +168,13 @@ std::optional<std::vector<const YamlNode*>> YamlReader::Items(const YamlNode& no
   return items;
 }
 
-std::vector<YamlEntry> YamlReader::Entries(const YamlNode& node, const std::string& path) {
+const std::vector<YamlEntry>& YamlReader::Entries(const YamlNode& node, const std::string& path) {
+  static const std::vector<YamlEntry> none;
   if (node.is_map()) return node.entries;
   if (!node.is_null()) {
     Error(node, fmt::format("{} is {}, a map of names is needed", path, Describe(node)));
   }
-  return {};
+  return none;
 }
 
 YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,

@@ -52,7 +52,7 @@ struct YamlNode {
 /// "the number 3", "a list", … for messages.
 [[nodiscard]] std::string Describe(const YamlNode& node);
 
-/// The value of `text` if it is a plain, finite-or-not decimal number ("0.2", "1e-3", "-4").
+/// The value of `text` if it is a plain decimal number ("0.2", "1e-3", "-4", also ".inf", ".nan").
 [[nodiscard]] std::optional<double> PlainNumber(std::string_view text);
 
 /// Offset of the first byte that is no UTF-8 text (control characters included), or npos.
@@ -96,7 +96,7 @@ class YamlReader {
   std::optional<std::vector<const YamlNode*>> Items(const YamlNode& node, const std::string& path,
                                                     int count = -1);
   /// Entries of a map with free keys; empty after a finding, and for null.
-  std::vector<YamlEntry> Entries(const YamlNode& node, const std::string& path);
+  const std::vector<YamlEntry>& Entries(const YamlNode& node, const std::string& path);
 
   [[nodiscard]] const std::string& file() const { return file_; }
   [[nodiscard]] const Diagnostics& diagnostics() const { return diagnostics_; }
