@@ -120,7 +120,7 @@ class ForceMarks {
     const double share = force / scale_.longest_force_N;
     if (std::abs(share) < kSmallestShare) return;
     const Vec3 q = p + share * scale_.arrow_m * direction;
-    const double radius = 0.035 * scale_.arrow_m;
+    const double radius = 0.032 * scale_.arrow_m;
     out_->items.push_back(Between(Solid::kArrow, p, q, radius, Color(force)));
     AddArrowGhost(p, q, radius, Color(force), forward_W_, &out_->flats);
   }

@@ -23,16 +23,16 @@ namespace mbv {
 /// An RGB image, top row first, 3 bytes per pixel.
 struct Picture {
   int width = 0, height = 0;
-  std::vector<std::uint8_t> rgb;
+  std::vector<std::uint8_t> rgb = {};
 };
 
 /// Where the camera stands; what is left empty is chosen so that every frame's mechanism fits.
 struct CameraView {
-  std::optional<double> azimuth_deg;    ///< from the look-at point to the camera, about up; 0 is
-                                        ///< the world's x axis (its z axis where x is vertical)
-  std::optional<double> elevation_deg;  ///< height of the camera above the horizon, -90 … 90
-  std::optional<double> distance_m;     ///< to the look-at point, > 0
-  std::optional<Vec3> lookat_W;         ///< [m]
+  std::optional<double> azimuth_deg = {};  ///< from the look-at point to the camera, about up; 0 is
+                                           ///< the world's x axis (its z axis where x is vertical)
+  std::optional<double> elevation_deg = {};  ///< height of the camera above the horizon, -90 … 90
+  std::optional<double> distance_m = {};     ///< to the look-at point, > 0
+  std::optional<Vec3> lookat_W = {};         ///< [m]
 };
 
 struct PictureOptions {
@@ -50,17 +50,17 @@ struct PictureOptions {
 
 /// Text under the picture. ASCII and a few symbols (° ² · − µ); other characters become '?'.
 struct Caption {
-  std::string title;   ///< large, left: "stabilizing_platform / sea_state"
-  std::string detail;  ///< small, left: "t = 1.500 s   NRMSE 4.2e-08 …"
-  std::string status;  ///< large, right: "agree"
+  std::string title = {};   ///< large, left: "stabilizing_platform / sea_state"
+  std::string detail = {};  ///< small, left: "t = 1.500 s   NRMSE 4.2e-08 …"
+  std::string status = {};  ///< large, right: "agree"
   enum class Mood { kNeutral, kGood, kBad } mood = Mood::kNeutral;  ///< grey, green or red status
 };
 
 /// What one picture shows.
 struct PictureFrame {
-  std::vector<Pose> X_WB;            ///< per body of the mechanism
-  std::vector<double> drive_forces;  ///< per drive [N or N m]; empty: no arrows; NaN: no arrow
-  Caption caption;                   ///< all empty: no caption bar
+  std::vector<Pose> X_WB;                 ///< per body of the mechanism
+  std::vector<double> drive_forces = {};  ///< per drive [N or N m]; empty: no arrows; NaN: no arrow
+  Caption caption = {};                   ///< all empty: no caption bar
 };
 
 /// Additions drawn into every frame.
@@ -75,8 +75,8 @@ struct MeshOverlay {
   std::string color = "#2f7ed866";            ///< translucent by its alpha
 };
 struct Overlay {
-  std::vector<PolylineOverlay> paths;
-  std::vector<MeshOverlay> meshes;
+  std::vector<PolylineOverlay> paths = {};
+  std::vector<MeshOverlay> meshes = {};
 };
 
 /// The frame of the home pose, without forces.

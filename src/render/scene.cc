@@ -241,7 +241,7 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
   if (!box.isEmpty() && box.diagonal().norm() > 1e-9) scale.extent_m = box.diagonal().norm();
   scale.joint_m = 0.0075 * scale.extent_m;
   scale.leg_m = 0.0085 * scale.extent_m;
-  scale.arrow_m = 0.2 * scale.extent_m;
+  scale.arrow_m = 0.18 * scale.extent_m;
   scale.barrel_m.assign(mechanism.drives.size(), 0.0);
   for (std::size_t d = 0; d < mechanism.drives.size(); ++d) {
     const bool linear = ForceUnit(mechanism, mechanism.drives[d]) == "N";

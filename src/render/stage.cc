@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kTexture_px = 1024;
 // Light that falls on a surface facing each source; a level white floor gets about 1.
-constexpr double kKey = 0.50, kSky = 0.22, kFill = 0.26, kAmbient = 0.30;
+constexpr double kKey = 0.50, kSky = 0.16, kFill = 0.27, kAmbient = 0.35;
 
 RunSummary Failure(const std::string& message) {
   RunSummary summary;
@@ -185,7 +185,8 @@ class OsMesaStage final : public Stage {
     geom.size[0] = static_cast<float>(s.x());
     geom.size[1] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.y());
     geom.size[2] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.z());
-    geom.category = mjCAT_DYNAMIC;  // decoration would cast no shadow
+    if (item.solid == Solid::kArrow) geom.size[2] *= 2.0F;  // arrows are drawn half as long
+    geom.category = mjCAT_DYNAMIC;                          // decoration would cast no shadow
     geom.specular = item.material.specular;
     geom.shininess = item.material.shininess;
     geom.emission = item.material.emission;

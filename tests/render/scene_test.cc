@@ -1,0 +1,149 @@
+#include "render/scene.h"
+
+#include <gtest/gtest.h>
+
+#include "render/annotations.h"
+#include "render/camera.h"
+#include "render/caption.h"
+#include "render/palette.h"
+#include "test_mechanisms.h"
+
+namespace mbv::render {
+namespace {
+
+constexpr double kRoundoff = 64 * kEps;
+
+TEST(UprightRotation, IsTheIdentityForGravityAlongMinusZ) {
+  EXPECT_TRUE(UprightRotation(Vec3(0, 0, -9.81)).isIdentity(kRoundoff));
+  EXPECT_TRUE(UprightRotation(Vec3::Zero()).isIdentity(kRoundoff));
+}
+
+TEST(UprightRotation, TurnsUpToZAndKeepsXLevel) {
+  for (const Vec3& g : {Vec3(0, 0, 9.81), Vec3(0, -9.81, 0), Vec3(3, 4, -12), Vec3(-1, 0, 0)}) {
+    const Mat3 R_DW = UprightRotation(g);
+    EXPECT_TRUE((R_DW * R_DW.transpose()).isIdentity(kRoundoff));
+    EXPECT_NEAR(R_DW.determinant(), 1.0, kRoundoff);
+    EXPECT_TRUE((R_DW * -g.normalized()).isApprox(Vec3::UnitZ(), kRoundoff));
+  }
+  // Gravity -Y: the world's x stays x, its z comes towards -y.
+  const Mat3 R_DW = UprightRotation(Vec3(0, -9.81, 0));
+  EXPECT_TRUE((R_DW * Vec3::UnitX()).isApprox(Vec3::UnitX(), kRoundoff));
+  EXPECT_TRUE((R_DW * Vec3::UnitZ()).isApprox(-Vec3::UnitY(), kRoundoff));
+}
+
+TEST(FitCamera, TouchesTheMarginsAndCrossesNone) {
+  std::vector<Vec3> points;
+  for (int i = 0; i < 8; ++i) {
+    points.emplace_back((i & 1) != 0 ? 2.0 : -0.5, (i & 2) != 0 ? 1.0 : 0.0,
+                        (i & 4) != 0 ? 3.0 : 0.2);
+  }
+  const double aspect = 4.0 / 3.0, slack = 1e-9;
+  const Margins margins{.side = 0.05, .top = 0.03, .bottom = 0.2};
+  for (const double azimuth : {-60.0, 10.0, 200.0}) {
+    for (const double elevation : {-20.0, 0.0, 16.0, 89.0}) {
+      const Camera camera = FitCamera(points, {.azimuth_deg = azimuth, .elevation_deg = elevation},
+                                      aspect, margins, Mat3::Identity());
+      Eigen::AlignedBox2d box;
+      for (const Vec3& p : points) box.extend(Project(camera, aspect, p));
+      EXPECT_GE(box.min().x(), margins.side - slack);
+      EXPECT_LE(box.max().x(), 1.0 - margins.side + slack);
+      EXPECT_GE(box.min().y(), margins.top - slack);
+      EXPECT_LE(box.max().y(), 1.0 - margins.bottom + slack);
+      // The nearest such camera: it touches both margins of one direction.
+      const double across = box.sizes().x() - (1.0 - 2.0 * margins.side);
+      const double along = box.sizes().y() - (1.0 - margins.top - margins.bottom);
+      EXPECT_NEAR(std::max(across, along), 0.0, slack);
+    }
+  }
+}
+
+TEST(FitCamera, LooksWhereItIsTold) {
+  const std::vector<Vec3> points = {Vec3(1, 0, 0), Vec3(0, 0, 1)};
+  const Mat3 R_DW = UprightRotation(Vec3(0, -9.81, 0));
+  const CameraView view{
+      .azimuth_deg = 0.0, .elevation_deg = 0.0, .distance_m = 5.0, .lookat_W = Vec3(0, 1, 0)};
+  const Camera camera = FitCamera(points, view, 1.0, {}, R_DW);
+  EXPECT_TRUE(camera.lookat_D.isApprox(Vec3(0, 0, 1), kRoundoff));
+  EXPECT_TRUE(camera.position_D().isApprox(Vec3(5, 0, 1), kRoundoff));
+  const Eigen::Vector2d centre = Project(camera, 1.0, camera.lookat_D);
+  EXPECT_NEAR(centre.x(), 0.5, kRoundoff);
+  EXPECT_NEAR(centre.y(), 0.5, kRoundoff);
+}
+
+TEST(ScaleOf, TakesTheLongestForceOfAllFrames) {
+  const Mechanism mechanism = test::BallOnLeg();
+  PictureFrame a = HomeFrame(mechanism), b = a;
+  a.drive_forces = {3.0};
+  b.drive_forces = {-7.0};
+  const Scale scale = ScaleOf(mechanism, {a, b});
+  EXPECT_EQ(scale.longest_force_N, 7.0);
+  EXPECT_EQ(scale.longest_torque_Nm, 0.0);
+  EXPECT_NEAR(scale.extent_m, 1.0, kRoundoff);
+}
+
+TEST(MechanismItems, MakeALegTelescopeBetweenItsEnds) {
+  const Mechanism mechanism = test::BallOnLeg();
+  PictureFrame shorter = HomeFrame(mechanism), longer = shorter;
+  shorter.X_WB[1].translation() = Vec3(0, 0, 0.8);
+  longer.X_WB[1].translation() = Vec3(0, 0, 1.3);
+  const Scale scale = ScaleOf(mechanism, {shorter, longer});
+  const auto cylinders = [&](const PictureFrame& frame) {
+    std::vector<double> lengths;
+    for (const Item& item : MechanismItems(mechanism, frame, scale, PictureOptions{})) {
+      if (item.solid == Solid::kCylinder) lengths.push_back(2.0 * item.size.z());
+    }
+    return lengths;
+  };
+  const std::vector<double> a = cylinders(shorter), b = cylinders(longer);
+  ASSERT_EQ(a.size(), 3U);  // barrel, collar, rod
+  EXPECT_NEAR(a[0], b[0], kRoundoff);
+  EXPECT_NEAR(a[0] + a[2], 0.8, kRoundoff);
+  EXPECT_NEAR(b[0] + b[2], 1.3, kRoundoff);
+}
+
+TEST(Annotate, GivesArrowsWhoseLengthFollowsTheForce) {
+  const Mechanism mechanism = test::BallOnLeg();
+  PictureFrame frame = HomeFrame(mechanism);
+  Scale scale = ScaleOf(mechanism, {frame});
+  scale.longest_force_N = 100.0;
+  PictureOptions options;
+  options.closures = false;
+  const auto arrow = [&](double force) {
+    frame.drive_forces = {force};
+    return Annotate(mechanism, frame, scale, options, Vec3::UnitX()).items;
+  };
+  ASSERT_EQ(arrow(100.0).size(), 1U);
+  EXPECT_NEAR(arrow(100.0)[0].size.z(), scale.arrow_m, kRoundoff);
+  EXPECT_NEAR(arrow(-25.0)[0].size.z(), 0.25 * scale.arrow_m, kRoundoff);
+  // Thrust on the ball points up, tension down; both start at the ball.
+  EXPECT_TRUE(arrow(50.0)[0].X_WG.linear().col(2).isApprox(Vec3::UnitZ(), kRoundoff));
+  EXPECT_TRUE(arrow(-50.0)[0].X_WG.linear().col(2).isApprox(-Vec3::UnitZ(), kRoundoff));
+  EXPECT_TRUE(arrow(50.0)[0].X_WG.translation().isApprox(Vec3::UnitZ(), kRoundoff));
+  EXPECT_TRUE(arrow(0.5).empty());
+}
+
+TEST(Annotate, DrawsOneRingForClosuresAtOnePlace) {
+  Mechanism mechanism = test::BallOnLeg();
+  mechanism.joints.push_back(mechanism.joints[0]);
+  const PictureFrame frame = HomeFrame(mechanism);
+  const Scale scale = ScaleOf(mechanism, {frame});
+  const Annotations marks = Annotate(mechanism, frame, scale, PictureOptions{}, Vec3::UnitX());
+  EXPECT_EQ(marks.flats.size(), 2U);  // what is visible and what shows through
+}
+
+TEST(Palette, KnowsNamesAndHexAndMakesTheRestGrey) {
+  EXPECT_EQ(MaterialOf("#ff8000").rgba, (std::array<float, 4>{1.0F, 128 / 255.0F, 0.0F, 1.0F}));
+  EXPECT_EQ(MaterialOf("#00000080").rgba[3], 128 / 255.0F);
+  EXPECT_EQ(MaterialOf("no such colour").rgba, MaterialOf("grey").rgba);
+  EXPECT_EQ(MaterialOf("#12345").rgba, MaterialOf("grey").rgba);
+  EXPECT_EQ(MaterialOf("#gg0000").rgba, MaterialOf("grey").rgba);
+  EXPECT_NE(MaterialOf("steel").rgba, MaterialOf("grey").rgba);
+}
+
+TEST(PlainText, ReplacesWhatTheFontLacks) {
+  EXPECT_EQ(PlainText("5° 3 m² −1 µm"), "5 deg 3 m^2 -1 um");
+  EXPECT_EQ(PlainText("a\tb€"), "a?b?");
+}
+
+}  // namespace
+}  // namespace mbv::render
