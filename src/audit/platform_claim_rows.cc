@@ -90,7 +90,7 @@ void FigureRow(const Case& c, std::vector<AuditRow>* rows) {
         const double s = &side == &limb.side[0] ? 1.0 : -1.0;
         const Vec3 end_2 =
             side.elbow_A + c.parameters.L3 * Vec3(0, s * std::cos(side.q2), std::sin(side.q2));
-        members.Add(0, (side.elbow_A - B).norm(), (end_2 - B).norm());
+        members.Add(limb.l, limb.l + (side.elbow_A - B).norm(), limb.l + (end_2 - B).norm());
       }
     }
   }

@@ -120,7 +120,8 @@ void LimbSystemRows(const Case& c, std::vector<AuditRow>* rows) {
         const VecX x = A.completeOrthogonalDecomposition().solve(s.right_side);
         return (A * x - s.right_side).cwiseAbs().maxCoeff();
       };
-      solvable.Add(0, misfit(printed), misfit(corrected));
+      const double size = corrected.right_side.cwiseAbs().maxCoeff();
+      solvable.Add(size, size + misfit(printed), size + misfit(corrected));
       const sp::LimbSystemSolution solved = sp::SolveLimbSystem(corrected, f_Y, f_Z);
       for (int j = 0; j < 2; ++j) {
         drives.Add(c.truth[n].limbs[i].drive[j], text.forces[i].drive[j], solved.forces.drive[j]);

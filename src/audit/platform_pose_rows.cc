@@ -41,7 +41,7 @@ void ScrewRows(const Case& c, std::vector<AuditRow>* rows) {
       primed.Add(E_p.z(), -E.z(), E.z());
       const Vec6& V_op = c.truth[n].V_op;
       const Vec3 B_rate = V_op.tail<3>() + V_op.head<3>().cross(limb.p_oB);
-      equivalent.Add(0, limb.R_oA.col(1).dot(B_rate));
+      equivalent.Add(B_rate.norm(), B_rate.norm() + limb.R_oA.col(1).dot(B_rate));
     }
   }
   rows->push_back(chain.Finish());
@@ -88,7 +88,8 @@ void ClosureRows(const Case& c, std::vector<AuditRow>* rows) {
     }
     const Vec3& B3 = t.limbs[2].p_oB;
     auto off_plane = [&](double psi) { return -std::sin(psi) * B3.x() + std::cos(psi) * B3.y(); };
-    planes.Add(0, off_plane(third), off_plane(c.parameters.theta_2));
+    const double r = B3.norm();
+    planes.Add(r, r + off_plane(third), r + off_plane(c.parameters.theta_2));
     const double yaw = std::atan2(t.X_ep.linear()(1, 0), t.X_ep.linear()(0, 0));
     azimuth.Add(yaw, kNan, std::atan2(c.closed[n].upper.R_EB(1, 0), c.closed[n].upper.R_EB(0, 0)));
   }

@@ -90,7 +90,8 @@ TEST(StabilizingPlatformAudit, NoticesEquationsBentByTwiceTheirLimit) {
   const Case longer = bent_case(&sp::PlatformParameters::L4, 2 * kPositionLimit);
   EXPECT_EQ(RowOf(LimbRows(longer), "(20) R").verdict, kFailed);
   EXPECT_EQ(RowOf(LimbRows(longer), "(17)").verdict, AuditVerdict::kWrong);
-  const Case wider = bent_case(&sp::PlatformParameters::r_a, 2 * kPositionLimit);
+  // Lengths see a wider base through the sine of the tilt, at most 0.18.
+  const Case wider = bent_case(&sp::PlatformParameters::r_a, 2 * kPositionLimit / 0.18);
   EXPECT_EQ(RowOf(TwistRows(wider), "(14)").verdict, kFailed);
   const Case turned = bent_case(&sp::PlatformParameters::theta_2, 1e-10);
   EXPECT_EQ(RowOf(PoseRows(turned), "(5) x").verdict, kFailed);
