@@ -16,8 +16,9 @@ namespace {
 // A Newton solution farther than this from its prediction [rad, characteristic lengths] may lie on
 // another branch; the way there is then divided into steps.
 constexpr double kTrustedCorrection = 0.2;
-// Square roots of the rounding error cannot be told from zero at a singular pose.
-constexpr double kSingularValue = 1e-7;
+// Near a singular pose loops closed to 1e-13 leave the pose open to its square root, 3e-7, and the
+// singular value with it; ten times that cannot be told from zero.
+constexpr double kSingularValue = 3e-6;
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -283,19 +284,34 @@ VecX ClosureSolver::Refined(const VecX& rates, bool* accurate) {
 }
 
 RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
-  const size_t count = commands_.size();
-  VecX rates = VecX::Zero(rows_.size());
-  rates.tail(count) = Extended(command.velocity, count);
-  bool accurate = false, accurate_too = false;
-  Unstack(Refined(rates, &accurate), &states_.V_WB);
+  // Near a singular pose the factors from the way here are too far off: take those of the pose.
+  for (const bool refactor : {false, true}) {
+    if (refactor) {
+      if (!system_.Factor(rows_, selection_, false)) break;
+      if (system_.determinant_sign() != orientation_) break;
+      if (system_.SmallestSingularValue(3) < kSingularValue) break;
+    }
+    const size_t count = commands_.size();
+    VecX rates = VecX::Zero(rows_.size());
+    rates.tail(count) = Extended(command.velocity, count);
+    bool accurate = false, accurate_too = false;
+    Unstack(Refined(rates, &accurate), &states_.V_WB);
 
-  Trial here{states_, near_values_};  // biases depend on the velocities
-  EvaluateRows(&here);
-  rates.tail(count) = Extended(command.acceleration, count);
-  rates -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
-  Unstack(Refined(rates, &accurate_too), &states_.A_WB);
-  if (accurate && accurate_too) return RunSummary::Done();
-  return Singular("the velocities are not determined by the commands at this pose");
+    Trial here{states_, near_values_};  // biases depend on the velocities
+    EvaluateRows(&here);
+    rates.tail(count) = Extended(command.acceleration, count);
+    rates -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
+    Unstack(Refined(rates, &accurate_too), &states_.A_WB);
+    if (accurate && accurate_too) return RunSummary::Done();
+  }
+  const double sigma = system_.SmallestSingularValue(3);
+  RunSummary summary =
+      Singular(fmt::format("the commands do not determine the velocities at this pose (smallest "
+                           "singular value {:.1e})",
+                           sigma));
+  summary.amount = sigma;
+  summary.unit = "1";
+  return summary;
 }
 
 RunSummary ClosureSolver::Solve(const CommandSample& command) {

@@ -14,7 +14,7 @@ namespace {
 // Forces must satisfy the equations of motion to this share of the largest wrench.
 constexpr double kBalanceTolerance = 1e-9;
 // Scaled singular value of a pose that the drives do not hold; see ClosureSolver.
-constexpr double kSingularValue = 1e-7;
+constexpr double kSingularValue = 3e-6;
 
 bool IsAngularJoint(const Joint& joint) { return joint.kind != JointKind::kPrismatic; }
 

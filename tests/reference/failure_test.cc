@@ -91,6 +91,27 @@ TEST(ReferenceFailure, AParallelogramPassingThroughItsFlatPoseIsSingular) {
   EXPECT_FALSE(run.summary.where.empty());
 }
 
+TEST(ReferenceFailure, ASampleExactlyOnTheDeadPointIsSingularNotHuge) {
+  Mechanism m = MakeFourBar();
+  m.drives = {{.name = "rocker_motor", .kind = JointDrive{2, 0}, .range = {}}};
+  const double home = m.joints[2].home[0];
+  // Crank and coupler stretched to b + a: the rocker's largest angle.
+  using F = FourBar;
+  const double r = F::a + F::b;
+  const double dead =
+      std::numbers::pi - std::acos((F::d * F::d + F::c * F::c - r * r) / (2 * F::d * F::c));
+  const ReferenceRun run = RunReference(
+      m, DriveMotion(m, {{{ConstantTerm{home}, RampTerm{-(dead - home)}}}}, 1.0, 0.01));
+  const ReferenceRun other =
+      RunReference(m, DriveMotion(m, {{{ConstantTerm{home}, RampTerm{dead - home}}}}, 1.0, 0.01));
+  // One of the two ways leads to this dead point; neither may end with endless forces.
+  for (const ReferenceRun* way : {&run, &other}) {
+    const Eigen::VectorXd forces = ColumnOf(way->trace, "rocker_motor.force");
+    for (const double force : forces) EXPECT_FALSE(std::abs(force) > 1e9) << force;
+  }
+  EXPECT_FALSE(run.summary.ok() && other.summary.ok());
+}
+
 TEST(ReferenceFailure, CoarseSamplesStayOnTheBranch) {
   const Mechanism m = MakeFourBar();
   const Profile turn{{ConstantTerm{FourBar::kHomeAngle}, RampTerm{5.0}}};

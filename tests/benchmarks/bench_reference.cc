@@ -1,0 +1,57 @@
+// Cost of the reference witness per sample: kinematics alone and with all forces.
+#include <benchmark/benchmark.h>
+
+#include <string>
+
+#include "mechanism/mobility.h"
+#include "reference/reference.h"
+#include "scenario/load_scenario.h"
+
+namespace mbv {
+namespace {
+
+ScenarioResult Load(benchmark::State& state, const std::string& scenario) {
+  ScenarioResult loaded = LoadScenario(MBV_SOURCE_DIR "/scenarios/" + scenario);
+  if (!loaded.scenario || !loaded.mechanism) state.SkipWithError("scenario does not load");
+  return loaded;
+}
+
+// Walks through the scenario's samples, again from the start at its end.
+void FollowScenario(benchmark::State& state, const std::string& scenario, bool forces) {
+  const ScenarioResult loaded = Load(state, scenario);
+  if (!loaded.scenario || !loaded.mechanism) return;
+  const Motion& motion = loaded.scenario->motion;
+  const std::vector<double> times = SampleTimes(motion.duration_s, motion.sample_s);
+  ReferenceSolver solver(*loaded.mechanism, motion);
+  CommandSample command;
+  ReferenceSample sample;
+  size_t next = 0;
+  for (auto _ : state) {
+    EvaluateMotion(motion, times[next], &command);
+    const RunSummary summary =
+        forces ? solver.Dynamics(command, &sample) : solver.Kinematics(command, &sample);
+    if (!summary.ok()) state.SkipWithError(summary.message.c_str());
+    next = (next + 1) % times.size();
+  }
+}
+
+BENCHMARK_CAPTURE(FollowScenario, platform_kinematics, "stabilizing_platform/sea_state.yaml", false)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowScenario, platform_forces, "stabilizing_platform/sea_state.yaml", true)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowScenario, tripod_forces, "spr_tripod/harmonic.yaml", true)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowScenario, scara_forces, "scara_robot/default.yaml", true)
+    ->Unit(benchmark::kMicrosecond);
+BENCHMARK_CAPTURE(FollowScenario, cabin_forces, "cabin_robot/default.yaml", true)
+    ->Unit(benchmark::kMicrosecond);
+
+void Mobility(benchmark::State& state) {
+  const ScenarioResult loaded = Load(state, "stabilizing_platform/sea_state.yaml");
+  if (!loaded.mechanism) return;
+  for (auto _ : state) benchmark::DoNotOptimize(AnalyseMobility(*loaded.mechanism));
+}
+BENCHMARK(Mobility)->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace mbv
