@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "comparison/comparison.h"
 
@@ -15,6 +16,16 @@ const Witness* FindWitness(const ComparisonInput& input, const std::string& name
   return nullptr;
 }
 
+// "reference: singular pose near limb2.R12 (t = 3.22 s)".
+std::string Explain(const Witness& witness) {
+  std::string text = witness.name + ": " + witness.summary.message;
+  const bool has_time = witness.summary.message.find("t = ") != std::string::npos;
+  if (!has_time && !std::isnan(witness.summary.time_s)) {
+    text += fmt::format(" (t = {:.6g} s)", witness.summary.time_s);
+  }
+  return text;
+}
+
 bool Ran(const Witness& witness) { return witness.trace != nullptr && witness.summary.ok(); }
 
 // Why a pair cannot be compared, from its two witnesses; "" if both ran.
@@ -22,8 +33,7 @@ std::string WhyNot(const Witness& a, const Witness& b) {
   std::string why;
   for (const Witness* witness : {&a, &b}) {
     if (Ran(*witness)) continue;
-    why +=
-        fmt::format("{}{}: {}", why.empty() ? "" : "; ", witness->name, witness->summary.message);
+    why += (why.empty() ? "" : "; ") + Explain(*witness);
   }
   return why;
 }
@@ -112,7 +122,7 @@ const Witness* FindBroken(const ComparisonInput& input) {
 
 void Judge(const ComparisonInput& input, Comparison* comparison) {
   if (const Witness* broken = FindBroken(input)) {
-    comparison->reason = fmt::format("{}: {}", broken->name, broken->summary.message);
+    comparison->reason = Explain(*broken);
     return;
   }
   const auto compared = std::count_if(comparison->pairs.begin(), comparison->pairs.end(),

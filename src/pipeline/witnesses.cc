@@ -147,7 +147,10 @@ SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechan
                                const std::function<void(double)>& progress) {
   SimulatedWitness witness;
   const SimulationOptions options = OptionsOf(scenario, engine);
-  witness.diagnostics = Check(options);
+  const Diagnostics option_findings = Check(options);
+  for (const Finding& finding : option_findings.findings()) {
+    AddError(scenario, "simulation: " + finding.message, finding.hint, &witness.diagnostics);
+  }
   if (witness.diagnostics.has_errors()) return witness;
   if (!scenario.simulation.extrapolate) {
     witness.run = Simulate(mechanism, scenario.motion, driven, options, progress);

@@ -67,14 +67,61 @@ class Writer {
     Line(Painted(
         fmt::format("  {:<28}{:>12}{:>11}         {}", "check", "value", "limit", "worst at"),
         Paint::kFaint));
-    std::string subject;
-    for (const CheckResult& check : comparison.checks) {
-      if (check.subject != subject) {
-        subject = check.subject;
-        Line("  " + TitleOf(subject));
+    for (size_t first = 0; first < comparison.checks.size();) {
+      size_t last = first;
+      while (last < comparison.checks.size() &&
+             comparison.checks[last].subject == comparison.checks[first].subject) {
+        ++last;
       }
-      Line(CheckLine(check));
+      Subject({comparison.checks.begin() + static_cast<std::ptrdiff_t>(first),
+               comparison.checks.begin() + static_cast<std::ptrdiff_t>(last)});
+      first = last;
     }
+  }
+
+  // Checks of one pair or witness; without --verbose, those that pass and are of less interest are
+  // counted only.
+  void Subject(const std::vector<CheckResult>& checks) {
+    Line("  " + TitleOf(checks.front().subject));
+    size_t folded = 0;
+    for (const CheckResult& check : checks) {
+      if (!options_.verbose && check.limit && check.pass && !IsKey(check)) {
+        ++folded;
+      } else {
+        Line(CheckLine(check));
+      }
+    }
+    if (folded > 0) {
+      Line(Painted(fmt::format("    {} {}within limits", folded,
+                               folded == checks.size() ? "checks " : "more "),
+                   Paint::kFaint));
+    }
+  }
+
+  static bool IsKey(const CheckResult& check) {
+    const bool simulated = check.subject.starts_with("simulated");
+    switch (check.metric) {
+      case Metric::kForceNrmse:
+        return true;
+      case Metric::kForceMax:
+      case Metric::kPoseM:
+      case Metric::kPoseRad:
+        return check.subject == "simulated_vs_analytic";
+      case Metric::kCommandM:
+      case Metric::kCommandRad:
+      case Metric::kClosureM:
+      case Metric::kPower:
+        return simulated;
+      case Metric::kPositionM:
+      case Metric::kPositionRad:
+      case Metric::kVelocity:
+      case Metric::kAcceleration:
+      case Metric::kReaction:
+      case Metric::kClosureRad:
+      case Metric::kDerivatives:
+        return false;
+    }
+    return true;
   }
 
   static std::string TitleOf(std::string subject) {

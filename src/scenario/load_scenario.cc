@@ -124,6 +124,8 @@ class Loader {
     options.override_places = scenario_.parameter_places;
     LoadResult loaded = LoadModel(*model_file, options);
     model_findings_ = loaded.diagnostics;
+    // Wrong overrides alone must not hide what else is wrong with the scenario.
+    if (!loaded.mechanism && !options.overrides.empty()) loaded = LoadModel(*model_file);
     if (!loaded.mechanism) return;
     mechanism_ = std::move(loaded.mechanism);
     scenario_.name = CaseName(file_, mechanism_->name);
