@@ -251,7 +251,7 @@ RunSummary ClosureSolver::CheckPose() {
   const double sigma = system_.SmallestSingularValue(1);
   if (sigma < kSingularValue) {
     RunSummary summary = Singular(fmt::format(
-        "singular pose: the commands do not hold the mechanism (smallest singular value {:.1e})",
+        "the commands do not hold the mechanism at this pose (smallest singular value {:.1e})",
         sigma));
     summary.amount = sigma;
     summary.unit = "1";

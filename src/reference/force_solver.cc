@@ -102,8 +102,8 @@ RunSummary ForceSolver::CheckControl(const BodyStates& states) {
   summary.amount = sigma;
   summary.unit = "1";
   summary.message =
-      fmt::format("singular pose{}: the drives lose control of {} (smallest singular value {:.1e})",
-                  crossed ? " since the last sample" : "", summary.where, sigma);
+      fmt::format("the drives lose control of {}{} (smallest singular value {:.1e})", summary.where,
+                  crossed ? " between the last sample and this one" : "", sigma);
   return summary;
 }
 
@@ -161,7 +161,7 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
   }
   RunSummary summary;
   summary.stop = Stop::kSingular;
-  summary.message = "singular pose: the drives do not control the mechanism";
+  summary.message = "the drives do not control the mechanism at this pose";
   return summary;
 }
 

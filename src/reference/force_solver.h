@@ -43,7 +43,7 @@ class ForceSolver {
 };
 
 /// Wrench [m about Bo; f] that each body needs beyond gravity, springs and loads, in world axes:
-/// [Featherstone 2008, ch. 2, Eq. 2.65] written at the origin with classical accelerations.
+/// m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W);
 

@@ -76,7 +76,7 @@ TEST(Reference, AnglesCountFullTurns) {
   EXPECT_NEAR(At(run.trace, 200, "motor.position"), 20.0, 1e-11);
 }
 
-// Two equal links in the xz plane; τ from the manipulator equations [Spong 2006, §7.4] with
+// Two equal links in the xz plane; τ from the manipulator equations [Spong 2006, ch. 7] with
 // absolute angle of link 1 and relative angle of link 2 from the hanging pose.
 TEST(Reference, ADoublePendulumFollowsItsTwoEquations) {
   Mechanism m;
