@@ -351,7 +351,7 @@ TEST(ScaraClosedForm, PathAcrossASingularLineBetweenSamplesIsReported) {
   const auto closed_form = MakeClosedForm(mechanism, motion, {}, &diagnostics);
   const ClosedFormRun run = RunClosedForm(mechanism, motion, closed_form.get());
   EXPECT_EQ(run.summary.stop, Stop::kSingular);
-  EXPECT_NE(run.summary.message.find("changes its sign"), std::string::npos);
+  EXPECT_NE(run.summary.message.find("changed its sign"), std::string::npos);
 }
 
 TEST(ScaraClosedForm, RefusesMotionsItCannotTake) {

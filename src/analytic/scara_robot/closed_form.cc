@@ -115,7 +115,7 @@ class ScaraClosedForm final : public ClosedForm {
       summary.unit = "1";
       summary.message = fmt::format(
           "the path crosses a singular pose before ({:.3f}, {:.3f}, {:.3f}) mm, {:.3f} deg: the "
-          "determinant of the direct Jacobian changes its sign after t = {:.6g} s",
+          "determinant of the direct Jacobian has changed its sign since {:.6g} s",
           1e3 * position_.X[0], 1e3 * position_.X[1], 1e3 * position_.X[2],
           position_.X[3] * 180.0 / std::numbers::pi, last_time_s_);
     }
