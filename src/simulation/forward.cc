@@ -79,7 +79,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
     } else {
       integrator.RungeKutta(h, middles[i], ends[i], step.from_s);
     }
-    if (!integrator.healthy()) return Failure("the simulated motion is not finite", step.to_s);
+    if (!integrator.healthy()) return Failure("the simulated motion diverged", step.to_s);
     if (step.sample < 0) continue;
     s->Record(static_cast<size_t>(step.sample));
     if (RunSummary summary = CheckSample(*s, largest_gap, step.to_s); !summary.ok()) return summary;
@@ -125,7 +125,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     mj_step(m, data);
     if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||
         data->warning[mjWARN_BADQVEL].number > 0) {
-      return Failure("MuJoCo reset the simulation, its motion is not finite",
+      return Failure("MuJoCo reset the simulation, which had diverged",
                      static_cast<double>(n) * h);
     }
   }

@@ -35,8 +35,8 @@ class Integrator {
   /// Four evaluations and one at the end.
   void RungeKutta(double h, const DrivenSample& middle, const DrivenSample& end, double from_s);
 
-  /// False once an acceleration is no longer finite.
-  [[nodiscard]] bool healthy() const { return AllFinite(d_->qacc, m_->nv); }
+  /// False once the accelerations have diverged.
+  [[nodiscard]] bool healthy() const { return IsSane(d_->qacc, m_->nv); }
 
  private:
   void Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s);

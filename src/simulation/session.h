@@ -43,8 +43,8 @@ struct Session {
 /// Positions of everything driven at home.
 [[nodiscard]] VecX HomePositions(const EngineModel& engine);
 
-/// True if every entry is finite.
-[[nodiscard]] bool AllFinite(const double* x, int n);
+/// True if every entry is finite and below the size that MuJoCo itself takes for divergence.
+[[nodiscard]] bool IsSane(const double* x, int n);
 
 /// q ⊕ h v̄ in place, where v̄ is the mean velocity over the step; the coordinates of balls and free
 /// rotations get the commutator term h²/12 (ω_0 × ω_1) of their rotation vector, without which a

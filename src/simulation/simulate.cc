@@ -44,11 +44,11 @@ VecX HomePositions(const EngineModel& engine) {
   return home;
 }
 
-bool AllFinite(const double* x, int n) {
-  // A sum is finite only if every entry is (up to overflow, which is as bad).
+bool IsSane(const double* x, int n) {
+  // NaN compares false.
   double sum = 0.0;
   for (int i = 0; i < n; ++i) sum += std::abs(x[i]);
-  return std::isfinite(sum);
+  return sum < mjMAXVAL;
 }
 
 void AdvancePositions(const EngineModel& engine, double h, const VecX& mean, const VecX& v_0,

@@ -3,8 +3,11 @@
 
 #include <cmath>
 #include <numbers>
+#include <vector>
 
+#include "core/run_summary.h"
 #include "core/spatial.h"
+#include "mechanism/constraints.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 
@@ -126,6 +129,57 @@ inline Mechanism MakeFourBar(JointKind closing = JointKind::kRevolute, bool forc
   tip.body = 2;
   tip.X_BO = PoseAt({F::b, 0, 0});
   m.outputs.push_back(tip);
+  return m;
+}
+
+/// Everything driven stays at these positions.
+inline auto HoldStill(std::vector<double> positions) {
+  return [positions](double, DrivenSample* driven) {
+    const auto n = static_cast<Eigen::Index>(positions.size());
+    driven->position = Eigen::Map<const VecX>(positions.data(), n);
+    driven->velocity.setZero(n);
+    driven->acceleration.setZero(n);
+    return RunSummary::Done();
+  };
+}
+
+/// A serial chain with one joint of every kind that has coordinates in MuJoCo, with skew frames and
+/// axes, at a pose away from zero. `reversed`: every joint is described from tip to base.
+inline Mechanism MakeJointZoo(bool reversed) {
+  Mechanism m;
+  m.name = reversed ? "joint_zoo_reversed" : "joint_zoo";
+  Body world;
+  world.name = "world";
+  m.bodies.push_back(world);
+  const JointKind kinds[] = {JointKind::kRevolute, JointKind::kPrismatic,   JointKind::kUniversal,
+                             JointKind::kPlanar,   JointKind::kCylindrical, JointKind::kFixed};
+  int last = 0;
+  for (const JointKind kind : kinds) {
+    const int n = static_cast<int>(m.bodies.size());
+    Body body = MakeBody("body" + std::to_string(n), 1.0 + 0.1 * n, {0.01, -0.02, 0.03 * n},
+                         {0.02, 0.03, 0.04});
+    body.I_Bcm_B(0, 1) = body.I_Bcm_B(1, 0) = 0.003;
+    m.bodies.push_back(body);
+    Joint joint = MakeJoint("joint" + std::to_string(n), kind, last, {0.1, 0.2, -0.1}, n,
+                            {-0.05, 0.1, 0.02 * n});
+    joint.X_PF.linear() = RotRpy({0.2 * n, -0.3, 0.5});
+    joint.X_CM.linear() = RotRpy({-0.4, 0.1 * n, 0.2});
+    joint.axis = Vec3(0.6, 0.0, 0.8);
+    joint.axis2 = Vec3(0.8, 0.0, -0.6);
+    joint.home = {0.3, -0.2, 0.4, 0, 0, 0};
+    for (int k = FreedomsOf(kind); k < 6; ++k) joint.home[k] = 0.0;
+    if (reversed) {
+      std::swap(joint.parent, joint.child);
+      std::swap(joint.X_PF, joint.X_CM);
+    }
+    m.joints.push_back(joint);
+    m.tree_joints.push_back(n - 1);
+    m.tree_reversed.push_back(reversed);
+    last = n;
+  }
+  std::vector<std::array<double, 6>> q;
+  for (const Joint& joint : m.joints) q.push_back(joint.home);
+  m.X_WB_home = TreePoses(m, q);
   return m;
 }
 

@@ -1,0 +1,85 @@
+// J̇q̇ of every kind of row against differences of MuJoCo's own J q̇ along the motion.
+#include "simulation/constraint_system.h"
+
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "mechanism/load_model.h"
+#include "mjcf/mjcf.h"
+#include "tests/simulation/test_mechanisms.h"
+
+namespace mbv::simulation {
+namespace {
+
+// Connect, tendon and joint rows with balls, free and merged joints (platform, tripod, SCARA), and
+// welds between turning bodies (four-bar).
+std::vector<Mechanism> Mechanisms() {
+  std::vector<Mechanism> all{testing::MakeFourBar()};
+  for (const char* name : {"stabilizing_platform", "spr_tripod", "scara_robot"}) {
+    LoadResult result = LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml");
+    if (result.mechanism.has_value()) all.push_back(*std::move(result.mechanism));
+  }
+  EXPECT_EQ(all.size(), 4u);
+  return all;
+}
+
+TEST(ConstraintSystem, BiasIsTheRateOfChangeOfTheJacobian) {
+  for (const Mechanism& mechanism : Mechanisms()) {
+    std::vector<std::string> warnings;
+    EngineSession session(&warnings);
+    EngineModel engine;
+    ASSERT_TRUE(MakeEngineModel(mechanism, WriteMjcf(mechanism), &engine).ok());
+    const DataHandle data = MakeData(*engine.m);
+    mjData* d = data.get();
+    ConstraintSystem system(engine, d);
+    std::mt19937_64 random(20220809);
+    std::uniform_real_distribution<double> uniform(-1.0, 1.0);
+    VecX v(engine.m->nv);
+    for (double& x : v) x = uniform(random);
+    // Off the manifold too: loops open, welds twisted by small amounts.
+    VecX offset = 0.02 * v.reverse();
+    mj_integratePos(engine.m.get(), d->qpos, offset.data(), 1.0);
+    const VecX q0 = Eigen::Map<const VecX>(d->qpos, engine.m->nq);
+    const auto J_v_at = [&](double t) -> VecX {
+      std::copy(q0.begin(), q0.end(), d->qpos);
+      mj_integratePos(engine.m.get(), d->qpos, v.data(), t);
+      system.EvaluatePosition();
+      return system.J() * v;
+    };
+    constexpr double h = 1e-3;
+    const VecX difference =
+        (8.0 * (J_v_at(h) - J_v_at(-h)) - (J_v_at(2 * h) - J_v_at(-2 * h))) / (12.0 * h);
+    (void)J_v_at(0.0);
+    std::copy(v.begin(), v.end(), d->qvel);
+    mj_comVel(engine.m.get(), d);
+    VecX bias;
+    system.Bias(&bias);
+    // Fourth-order difference: h⁴ times fifth derivatives of order one to ten, and ε/h.
+    EXPECT_LT((bias - difference).lpNorm<Eigen::Infinity>(), 1e-9 * (1.0 + bias.norm()))
+        << mechanism.name;
+    EXPECT_GT(bias.norm(), 0.1) << mechanism.name;
+  }
+}
+
+TEST(ConstraintSystem, ResidualOfADrivenRowIsPositionMinusTarget) {
+  const Mechanism mechanism = testing::MakeFourBar();
+  std::vector<std::string> warnings;
+  EngineSession session(&warnings);
+  EngineModel engine;
+  ASSERT_TRUE(MakeEngineModel(mechanism, WriteMjcf(mechanism), &engine).ok());
+  const DataHandle data = MakeData(*engine.m);
+  ConstraintSystem system(engine, data.get());
+  system.SetTargets(VecX::Constant(1, 0.9));
+  data->qpos[0] = 1.2;
+  system.EvaluatePosition();
+  EXPECT_EQ(system.rows(), 7);
+  EXPECT_EQ(system.closure_rows(), 6);
+  EXPECT_NEAR(system.residual()[6], 0.3, 1e-15);
+  // The crank tip moved by 2·0.2·sin(0.1) and took the coupler's end with it.
+  EXPECT_GT(system.LargestGap().position_m, 0.03);
+  EXPECT_NEAR(system.LargestGap().rotation_rad, 0.2, 1e-12);
+}
+
+}  // namespace
+}  // namespace mbv::simulation

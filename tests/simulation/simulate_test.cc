@@ -1,0 +1,253 @@
+// The simulation of a four-bar against its closed form, in all modes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "simulation/simulation.h"
+#include "tests/simulation/test_mechanisms.h"
+
+namespace mbv {
+namespace {
+
+using testing::FourBar;
+
+Motion OneSecond() { return {.duration_s = 1.0, .sample_s = 0.01, .commands = {}, .loads = {}}; }
+
+// A crank that swings: θ = 1 + 0.5 t + 0.7 sin 3t.
+RunSummary Swing(double t, DrivenSample* driven) {
+  driven->position = VecX::Constant(1, 1.0 + 0.5 * t + 0.7 * std::sin(3 * t));
+  driven->velocity = VecX::Constant(1, 0.5 + 2.1 * std::cos(3 * t));
+  driven->acceleration = VecX::Constant(1, -6.3 * std::sin(3 * t));
+  return RunSummary::Done();
+}
+
+// RMS of (simulated − closed form) over RMS of the closed form.
+double TorqueError(const SimulationRun& run, double factor = 1.0) {
+  const int column = run.trace.Find("motor.force");
+  double error = 0.0, size = 0.0;
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    DrivenSample at;
+    (void)Swing(run.trace.time_s[i], &at);
+    const double torque =
+        factor * FourBar::Torque(at.position[0], at.velocity[0], at.acceleration[0]);
+    const double difference = run.trace.values(static_cast<Eigen::Index>(i), column) - torque;
+    error += difference * difference;
+    size += torque * torque;
+  }
+  return std::sqrt(error / size);
+}
+
+double Largest(const SimulationRun& run, const std::string& channel) {
+  return run.trace.values.col(run.trace.Find(channel)).cwiseAbs().maxCoeff();
+}
+
+constexpr JointKind kClosings[] = {JointKind::kRevolute, JointKind::kSpherical};
+
+TEST(FourBarTruth, TorqueAtRestIsTheGradientOfThePotential) {
+  // Independent of the loop's rates: gravity torque by moving the whole linkage.
+  constexpr double h = 1e-5;
+  const double gradient = (FourBar(0.7 + h).V() - FourBar(0.7 - h).V()) / (2 * h);
+  EXPECT_NEAR(FourBar::Torque(0.7, 0.0, 0.0), gradient, 1e-8);
+  EXPECT_NEAR(FourBar(FourBar::kHomeAngle).k3(),
+              (FourBar(1.0 + h).t3 - FourBar(1.0 - h).t3) / (2 * h), 1e-9);
+}
+
+TEST(Inverse, AgreesWithTheClosedFormToRoundOff) {
+  for (const JointKind closing : kClosings) {
+    const SimulationRun run = Simulate(testing::MakeFourBar(closing), OneSecond(), Swing,
+                                       {.mode = SimulationMode::kInverse});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    EXPECT_TRUE(run.warnings.empty());
+    // The closed form's differences are good to 1e-12.
+    EXPECT_LT(TorqueError(run), 3e-12);
+    EXPECT_LT(Largest(run, "closure.position"), 1e-14);
+  }
+}
+
+TEST(Inverse, NoticesAMassThatIsWrongByOnePartInABillion) {
+  Mechanism bent = testing::MakeFourBar();
+  bent.bodies[2].mass *= 1.0 + 1e-9;
+  const SimulationRun run = Simulate(bent, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  EXPECT_GT(TorqueError(run), 1e-11);
+}
+
+TEST(Inverse, RefusesUndrivenFreedoms) {
+  Mechanism m = testing::MakeFourBar();
+  m.joints.pop_back();  // open chain: coupler and rocker swing freely
+  const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_NE(run.summary.message.find("2 freedoms"), std::string::npos) << run.summary.message;
+}
+
+TEST(Forward, ConvergesWithFourthOrder) {
+  double coarse = 0.0, fine = 0.0;
+  for (const auto& [step, error] : {std::pair{0.01, &coarse}, std::pair{0.005, &fine}}) {
+    const SimulationRun run =
+        Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.step_s = step});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    *error = Largest(run, "closure.position");
+  }
+  EXPECT_GT(coarse / fine, std::pow(2.0, 3.5));
+  EXPECT_LT(fine, 1e-8);
+}
+
+TEST(Forward, AgreesWithTheClosedFormAtEveryUsualStep) {
+  for (const JointKind closing : kClosings) {
+    for (const auto& [step, limit] :
+         {std::pair{0.005, 5e-8}, std::pair{0.001, 1e-8}, std::pair{0.0002, 1e-8}}) {
+      const SimulationRun run =
+          Simulate(testing::MakeFourBar(closing), OneSecond(), Swing, {.step_s = step});
+      ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+      EXPECT_LT(TorqueError(run), limit) << step;
+    }
+  }
+}
+
+TEST(Forward, NoticesATorqueThatIsWrongByOnePartInAMillion) {
+  const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  EXPECT_LT(TorqueError(run), 1e-8);
+  EXPECT_GT(TorqueError(run, 1.0 + 1e-6), 0.9e-6);
+}
+
+TEST(Forward, StockEngineIsManyTimesWorse) {
+  const SimulationRun stock =
+      Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.engine = Engine::kStock});
+  ASSERT_TRUE(stock.summary.ok()) << stock.summary.message;
+  EXPECT_GT(TorqueError(stock), 1e-4);
+  EXPECT_LT(TorqueError(stock), 0.1);
+}
+
+TEST(Forward, PowerOfTheDriveIsTheRateOfEnergy) {
+  const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  const VecX input = run.trace.values.col(run.trace.Find("power.input"));
+  const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
+  EXPECT_GT(input.norm(), 1.0);
+  // Closure forces work on the closures' rates, which are not exactly zero.
+  EXPECT_LT((input - rate).norm(), 1e-8 * input.norm());
+}
+
+TEST(Forward, ClosureReactionsDoNotDependOnHowTheClosureIsRepresented) {
+  // In the plane: split hinge (weld of halves) against ball (connect).
+  const SimulationRun split =
+      Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  const SimulationRun ball = Simulate(testing::MakeFourBar(JointKind::kSpherical), OneSecond(),
+                                      Swing, {.mode = SimulationMode::kInverse});
+  for (const char* joint : {"A", "B", "C", "D"}) {
+    for (const char* c : {".reaction.fx", ".reaction.fy", ".reaction.mz"}) {
+      const std::string channel = std::string(joint) + c;
+      const VecX x = split.trace.values.col(split.trace.Find(channel));
+      const VecX y = ball.trace.values.col(ball.trace.Find(channel));
+      EXPECT_LT((x - y).lpNorm<Eigen::Infinity>(), 1e-12) << channel;
+    }
+  }
+}
+
+TEST(Forward, ReactionsCarryTheWeightAtRest) {
+  const SimulationRun run =
+      Simulate(testing::MakeFourBar(), OneSecond(), testing::HoldStill({1.0}), {});
+  ASSERT_TRUE(run.summary.ok());
+  const auto at = [&](const char* channel) {
+    return run.trace.values(50, run.trace.Find(channel));
+  };
+  const double weight = FourBar::g * (FourBar::m1 + FourBar::m2 + FourBar::m3);
+  EXPECT_NEAR(at("A.reaction.fy") + at("D.reaction.fy"), weight, 1e-7 * weight);
+  EXPECT_NEAR(at("A.reaction.fx") + at("D.reaction.fx"), 0.0, 1e-7 * weight);
+  EXPECT_NEAR(at("A.reaction.mz"), 0.0, 1e-9);  // the motor's torque is not the hinge's
+  EXPECT_NEAR(at("motor.force"), FourBar::Torque(1.0, 0, 0), 1e-8);
+}
+
+TEST(Forward, ALoadActsAtItsPointAndInItsAxes) {
+  Motion motion = OneSecond();
+  Load load;
+  load.name = "tool";
+  load.body = 2;
+  load.p_BoQ_B = {FourBar::b, 0, 0};
+  load.in_body_axes = true;
+  load.force[1] = Constant(-3.0);
+  motion.loads.push_back(load);
+  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+    const SimulationRun run =
+        Simulate(testing::MakeFourBar(), motion, testing::HoldStill({1.0}), {.mode = mode});
+    ASSERT_TRUE(run.summary.ok());
+    // Virtual work of the load: its power per crank rate.
+    const FourBar at(1.0);
+    const Vec3 dp(-FourBar::a * std::sin(at.t1) - FourBar::b * at.k2() * std::sin(at.t2),
+                  FourBar::a * std::cos(at.t1) + FourBar::b * at.k2() * std::cos(at.t2), 0);
+    const Vec3 f = RotZ(at.t2) * Vec3(0, -3, 0);
+    EXPECT_NEAR(run.trace.values(50, run.trace.Find("motor.force")),
+                FourBar::Torque(1.0, 0, 0) - f.dot(dp), 1e-8);
+  }
+}
+
+TEST(Forward, ASpringDamperPullsAndDissipates) {
+  Mechanism m = testing::MakeFourBar();
+  m.springs.push_back({.name = "spring",
+                       .body_from = 0,
+                       .p_from = {FourBar::d, 0, 0},
+                       .body_to = 1,
+                       .p_to = {FourBar::a, 0, 0},
+                       .stiffness = 200.0,
+                       .damping = 5.0,
+                       .free_length_m = 0.3});
+  const SimulationRun run = Simulate(m, OneSecond(), Swing, {});
+  ASSERT_TRUE(run.summary.ok());
+  DrivenSample at;
+  (void)Swing(0.5, &at);
+  const double angle = at.position[0], rate = at.velocity[0];
+  // Length from the rocker's foot to the crank's tip.
+  const double L = std::sqrt(FourBar::d * FourBar::d + FourBar::a * FourBar::a -
+                             2 * FourBar::a * FourBar::d * std::cos(angle));
+  const double dL = FourBar::a * FourBar::d * std::sin(angle) / L;
+  const double tension = 200.0 * (L - 0.3) + 5.0 * dL * rate;
+  EXPECT_NEAR(run.trace.values(50, run.trace.Find("motor.force")),
+              FourBar::Torque(angle, rate, at.acceleration[0]) + tension * dL, 1e-8);
+  const VecX input = run.trace.values.col(run.trace.Find("power.input"));
+  const VecX energy = run.trace.values.col(run.trace.Find("power.energy_rate"));
+  EXPECT_LT((input - energy).norm(), 1e-9 * input.norm());
+}
+
+// A heavy disk on a ball joint, free to turn: the torque-free top keeps energy and angular
+// momentum. Tests the integration of quaternions.
+TEST(Forward, AFreeTopKeepsItsMomentum) {
+  Mechanism m;
+  m.name = "top";
+  m.gravity_W.setZero();
+  Body world;
+  world.name = "world";
+  m.bodies = {world, testing::MakeBody("arm", 1.0, {0, 0, 0}, {1, 1, 1}),
+              testing::MakeBody("top", 2.0, {0, 0, 0}, {0.02, 0.03, 0.045})};
+  m.joints = {testing::MakeJoint("arm_hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}),
+              testing::MakeJoint("ball", JointKind::kSpherical, 1, {0, 0, 0}, 2, {0, 0, 0})};
+  testing::AddTree(&m);
+  m.X_WB_home.assign(3, Pose::Identity());
+  m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+  m.springs.push_back({.name = "kick",  // sets the top spinning about a skew axis
+                       .body_from = 0,
+                       .p_from = {0.3, 0.2, 0.1},
+                       .body_to = 2,
+                       .p_to = {0.1, -0.1, 0.2},
+                       .stiffness = 20.0,
+                       .damping = 0.0,
+                       .free_length_m = 0.1});
+  m.outputs.push_back({.name = "top", .body = 2, .X_BO = Pose::Identity(), .X_RbR = {}});
+  const auto end = [&](double step) {
+    const SimulationRun run = Simulate(m, OneSecond(), testing::HoldStill({0.0}), {.step_s = step});
+    EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+    return LogRotation(run.X_WB.back()[2].linear());
+  };
+  const Vec3 exact = end(0.0005);
+  const double coarse = (end(0.01) - exact).norm(), fine = (end(0.005) - exact).norm();
+  EXPECT_GT(exact.norm(), 0.5);
+  EXPECT_GT(coarse / fine, std::pow(2.0, 3.5));
+  EXPECT_LT(fine, 1e-4);
+}
+
+TEST(Forward, RunsAreIdentical) {
+  const SimulationRun a = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun b = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  EXPECT_EQ(a.trace.values, b.trace.values);
+  EXPECT_EQ(a.qpos, b.qpos);
+}
+
+}  // namespace
+}  // namespace mbv
