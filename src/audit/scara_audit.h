@@ -11,6 +11,7 @@
 
 #include "analytic/scara_robot/dynamics.h"
 #include "audit/audit.h"
+#include "audit/row_meter.h"
 #include "mechanism/constraints.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -68,6 +69,13 @@ struct PathPoint {
 /// Limit for quantities of the given scale: the reference solver closes its loops to 1e-13 m in
 /// limbs of 0.1 m, magnified by 1/s_min ≤ 10 of the direct Jacobian.
 [[nodiscard]] inline double Limit(double scale) { return 1e-11 * scale; }
+
+/// Adds every component of a vector quantity to a row.
+inline void AddAll(RowMeter* meter, const VecX& truth, const VecX& printed, const VecX& corrected) {
+  for (Eigen::Index c = 0; c < truth.size(); ++c) {
+    meter->Add(truth[c], printed[c], corrected[c]);
+  }
+}
 
 /// Topology, Table 1, Eqs. (1)–(10), (22), (23), (49).
 [[nodiscard]] std::vector<AuditRow> PositionRows(const Mechanism& mechanism,

@@ -1,18 +1,11 @@
 #include <cmath>
 
-#include "audit/row_meter.h"
 #include "audit/scara_audit.h"
 
 namespace mbv::scara_audit {
 namespace {
 
 using scara::MotorAxis;
-
-void AddAll(RowMeter* meter, const VecX& truth, const VecX& printed, const VecX& corrected) {
-  for (Eigen::Index c = 0; c < truth.size(); ++c) {
-    meter->Add(truth[c], printed[c], corrected[c]);
-  }
-}
 
 /// −d/dt (I ω) of a body with solid-bar inertia, x along the bar, from its pose and rates.
 Vec3 InertiaMoment(const scara::BarInertia& bar, const Mat3& R, const Vec3& omega,

@@ -1,14 +1,9 @@
 #include <cmath>
 
-#include "audit/row_meter.h"
 #include "audit/scara_audit.h"
 
 namespace mbv::scara_audit {
 namespace {
-
-void AddVector(RowMeter* meter, const Vec3& truth, const Vec3& printed, const Vec3& corrected) {
-  for (int c = 0; c < 3; ++c) meter->Add(truth[c], printed[c], corrected[c]);
-}
 
 Vec3 Across(const Vec3& v, const Vec3& axis) { return v - axis.dot(v) * axis; }
 
@@ -106,16 +101,16 @@ std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<S
       const LimbTruth& limb = state.limbs[i];
       const Vec3 middle = 0.5 * p.l1 * dtheta[i] * at.n[i];
       const Vec3 v_B = dX.head<3>() + at.k[i] * dX[3];
-      AddVector(&v1, limb.arm.v, middle, middle);
-      AddVector(&J1, limb.arm.v, middle * dtheta[i], middle);
-      AddVector(&vC, limb.C.v, middle, 2 * middle);
-      if (i < 2) AddVector(&vB, limb.B.v, limb.D.v, limb.D.v);
+      AddAll(&v1, limb.arm.v, middle, middle);
+      AddAll(&J1, limb.arm.v, middle * dtheta[i], middle);
+      AddAll(&vC, limb.C.v, middle, 2 * middle);
+      if (i < 2) AddAll(&vB, limb.B.v, limb.D.v, limb.D.v);
       Vec3 printed_B = dX.head<3>();
       for (int k = 0; k < kLimbs; ++k) printed_B += at.k[k] * dtheta[k];
-      AddVector(&JB, limb.B.v, printed_B, v_B);
+      AddAll(&JB, limb.B.v, printed_B, v_B);
       const Vec3 rods = 0.5 * (2 * middle + v_B);
-      AddVector(&v2, limb.rods.v, 0.5 * (limb.C.v + limb.D.v), rods);
-      AddVector(&J2, limb.rods.v, 0.5 * (middle + v_B), rods);
+      AddAll(&v2, limb.rods.v, 0.5 * (limb.C.v + limb.D.v), rods);
+      AddAll(&J2, limb.rods.v, 0.5 * (middle + v_B), rods);
     }
   }
   return {v1.Finish(), J1.Finish(), vC.Finish(), vB.Finish(),
@@ -154,10 +149,10 @@ std::vector<AuditRow> RotationRows(const scara::Parameters& p, const std::vector
       FillLinkMotion(p, at, state.rates, state.J_inverse, scara::RodModel::kFull, i, &full);
       const Vec3 truth = Across(limb.omega_rod, limb.R_rod.col(0));
       const Vec3 from_J = thin.J_omega * state.rates.dtheta;
-      if (i < 2) AddVector(&across, truth, from_J, from_J);
+      if (i < 2) AddAll(&across, truth, from_J, from_J);
       if (i < 2) across.Add(0.0, limb.rods_apart);
-      AddVector(&spin, limb.omega_rod, thin.omega, full.J_omega * state.rates.dtheta);
-      if (i >= 2) AddVector(&third, truth, from_J * p.l3 / p.l2, from_J);
+      AddAll(&spin, limb.omega_rod, thin.omega, full.J_omega * state.rates.dtheta);
+      if (i >= 2) AddAll(&third, truth, from_J * p.l3 / p.l2, from_J);
     }
   }
   return {across.Finish(), spin.Finish(), third.Finish()};
@@ -201,10 +196,10 @@ std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
       const Vec3 deta = limb.omega_rod.cross(eta);
       const Vec3 ddeta = limb.domega_rod.cross(eta) + limb.omega_rod.cross(deta);
       const Vec3 truth = eta.cross(ddeta);
-      if (i < 2) AddVector(&eps, truth, turn, turn);
-      if (i >= 2) AddVector(&omega, truth, turn * p.l3 / p.l2, turn);
+      if (i < 2) AddAll(&eps, truth, turn, turn);
+      if (i >= 2) AddAll(&omega, truth, turn * p.l3 / p.l2, turn);
       const Vec3 dv = dJ.J_i2 * dtheta + J.J_i2 * ddtheta;
-      AddVector(&rods, limb.rods.a, dv, dv);
+      AddAll(&rods, limb.rods.a, dv, dv);
     }
   }
   return {eps.Finish(), omega.Finish(), rods.Finish()};

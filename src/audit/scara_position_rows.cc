@@ -4,7 +4,6 @@
 #include <numbers>
 
 #include "analytic/scara_robot/workspace.h"
-#include "audit/row_meter.h"
 #include "audit/scara_audit.h"
 #include "mechanism/mobility.h"
 
@@ -13,10 +12,6 @@ namespace {
 
 using scara::MotorAxis;
 using scara::Radial;
-
-void AddVector(RowMeter* meter, const Vec3& truth, const Vec3& printed, const Vec3& corrected) {
-  for (int c = 0; c < 3; ++c) meter->Add(truth[c], printed[c], corrected[c]);
-}
 
 AuditRow TopologyRow(const Mechanism& mechanism) {
   RowMeter meter({.equation = "F = Σf − Σξ",
@@ -128,16 +123,16 @@ std::vector<AuditRow> VectorRows(const scara::Parameters& p, const std::vector<S
     const scara::Position& at = state.position;
     for (int i = 0; i < kLimbs; ++i) {
       const LimbTruth& limb = state.limbs[i];
-      AddVector(&s, limb.B.p - state.P.p, at.s[i], at.s[i]);
-      AddVector(&r, limb.A.p, p.R * Radial(i), p.R * Radial(i));
-      AddVector(&u, (limb.C.p - limb.A.p) / p.l1, at.u[i], at.u[i]);
+      AddAll(&s, limb.B.p - state.P.p, at.s[i], at.s[i]);
+      AddAll(&r, limb.A.p, p.R * Radial(i), p.R * Radial(i));
+      AddAll(&u, (limb.C.p - limb.A.p) / p.l1, at.u[i], at.u[i]);
       const Vec3 e(0, 0, -p.drop(i)), rod = p.rod_length(i) * limb.R_rod.col(0);
       const Vec3 chain = p.R * Radial(i) + p.l1 * at.u[i] + rod;
-      if (i < 2) AddVector(&five, limb.B.p, chain - e, chain + e);
-      if (i >= 2) AddVector(&six, limb.B.p, chain, chain);
+      if (i < 2) AddAll(&five, limb.B.p, chain - e, chain + e);
+      if (i >= 2) AddAll(&six, limb.B.p, chain, chain);
       const Vec3 w = state.P.p + at.s[i] - p.R * Radial(i) - p.l1 * at.u[i] - e;
       seven.Add(p.rod_length(i) * p.rod_length(i), w.squaredNorm());
-      AddVector(&eta, limb.R_rod.col(0), w / p.rod_length(i), w / p.rod_length(i));
+      AddAll(&eta, limb.R_rod.col(0), w / p.rod_length(i), w / p.rod_length(i));
     }
   }
   return {s.Finish(),   r.Finish(),     five.Finish(), u.Finish(),

@@ -1,18 +1,11 @@
 #include <cmath>
 
-#include "audit/row_meter.h"
 #include "audit/scara_audit.h"
 
 namespace mbv::scara_audit {
 namespace {
 
 using scara::MotorAxis;
-
-void AddAll(RowMeter* meter, const VecX& truth, const VecX& printed, const VecX& corrected) {
-  for (Eigen::Index c = 0; c < truth.size(); ++c) {
-    meter->Add(truth[c], printed[c], corrected[c]);
-  }
-}
 
 /// (30) with each of its errors optional; the transposes of R_i are always mended (as printed the
 /// shapes do not fit).
