@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 
 #include "core/demand.h"
@@ -23,65 +22,62 @@ Axes AxesOf(const Camera& camera) {
           .forward = -Vec3(std::cos(e) * std::cos(a), std::cos(e) * std::sin(a), std::sin(e))};
 }
 
-// In one picture direction, a camera at (c, depth cz) sees the point (a, z) inside the margins if
-// a - c <= t_plus (z - cz) and -(a - c) <= t_minus (z - cz). Over all points:
-// c - t_plus cz >= plus and -c - t_minus cz >= minus.
-struct Side {
-  double t_plus = 1.0, t_minus = 1.0;
-  double plus = -std::numeric_limits<double>::infinity();
-  double minus = -std::numeric_limits<double>::infinity();
-
-  void Include(double a, double z) {
-    plus = std::max(plus, a - t_plus * z);
-    minus = std::max(minus, -a - t_minus * z);
-  }
-  [[nodiscard]] double nearest() const { return -(plus + minus) / (t_plus + t_minus); }
-  // Middle of what is allowed at the depth cz.
-  [[nodiscard]] double middle(double cz) const {
-    return 0.5 * ((plus + t_plus * cz) - (minus + t_minus * cz));
-  }
-};
-
 }  // namespace
 
 Vec3 Camera::forward_D() const { return AxesOf(*this).forward; }
 
-Camera FitCamera(const std::vector<Vec3>& points_D, const CameraView& view, double aspect,
-                 const Margins& margins, const Mat3& R_DW) {
-  MBV_DEMAND(!points_D.empty(), points_D.size());
-  Camera camera;
-  camera.azimuth_deg = view.azimuth_deg.value_or(-60.0);
-  camera.elevation_deg = view.elevation_deg.value_or(16.0);
-  const auto [right, up, forward] = AxesOf(camera);
+// A camera at c and depth cz sees the point (a, z) inside the margins if a - c <= t_plus (z - cz)
+// and -(a - c) <= t_minus (z - cz). Over all points: c - t_plus cz >= plus, -c - t_minus cz >=
+// minus.
+void CameraFit::Side::Include(double a, double z) {
+  plus = std::max(plus, a - t_plus * z);
+  minus = std::max(minus, -a - t_minus * z);
+}
+
+double CameraFit::Side::nearest() const { return -(plus + minus) / (t_plus + t_minus); }
+
+// Middle of what is allowed at the depth cz.
+double CameraFit::Side::middle(double cz) const {
+  return 0.5 * ((plus + t_plus * cz) - (minus + t_minus * cz));
+}
+
+CameraFit::CameraFit(const CameraView& view, double aspect, const Margins& margins,
+                     const Mat3& R_DW)
+    : view_(view) {
+  camera_.azimuth_deg = view.azimuth_deg.value_or(-60.0);
+  camera_.elevation_deg = view.elevation_deg.value_or(16.0);
+  if (view.lookat_W) camera_.lookat_D = R_DW * *view.lookat_W;
   const double t = std::tan(0.5 * kFieldOfView_deg * kRadPerDeg);
-  Side across{.t_plus = aspect * t * (1.0 - 2.0 * margins.side),
-              .t_minus = aspect * t * (1.0 - 2.0 * margins.side)};
-  Side along{.t_plus = t * (1.0 - 2.0 * margins.top), .t_minus = t * (1.0 - 2.0 * margins.bottom)};
-  Vec3 centre = Vec3::Zero();
-  for (const Vec3& p : points_D) {
-    across.Include(p.dot(right), p.dot(forward));
-    along.Include(p.dot(up), p.dot(forward));
-    centre += p / static_cast<double>(points_D.size());
-  }
-  const double cz = std::min(across.nearest(), along.nearest());
-  const Vec3 position = across.middle(cz) * right + along.middle(cz) * up + cz * forward;
-  camera.distance_m = std::max((centre - position).dot(forward), 1e-6);
-  if (view.lookat_W) {
-    // Looking elsewhere: far enough that everything still fits.
-    camera.lookat_D = R_DW * *view.lookat_W;
-    double distance = 0.0;
-    for (const Vec3& p_D : points_D) {
-      const Vec3 p = p_D - camera.lookat_D;
-      const double x = p.dot(right), y = p.dot(up), z = p.dot(forward);
-      const double needed =
-          std::max({x / across.t_plus, -x / across.t_minus, y / along.t_plus, -y / along.t_minus});
-      distance = std::max(distance, needed - z);
-    }
-    camera.distance_m = std::max(distance, 1e-6);
+  across_.t_plus = across_.t_minus = aspect * t * (1.0 - 2.0 * margins.side);
+  along_.t_plus = t * (1.0 - 2.0 * margins.top);
+  along_.t_minus = t * (1.0 - 2.0 * margins.bottom);
+}
+
+void CameraFit::Include(const Vec3& p_D) {
+  const auto [right, up, forward] = AxesOf(camera_);
+  across_.Include(p_D.dot(right), p_D.dot(forward));
+  along_.Include(p_D.dot(up), p_D.dot(forward));
+  box_.extend(p_D);
+  const Vec3 p = p_D - camera_.lookat_D;
+  const double x = p.dot(right), y = p.dot(up);
+  const double needed =
+      std::max({x / across_.t_plus, -x / across_.t_minus, y / along_.t_plus, -y / along_.t_minus});
+  distance_to_lookat_ = std::max(distance_to_lookat_, needed - p.dot(forward));
+}
+
+Camera CameraFit::Fit() const {
+  MBV_DEMAND(!box_.isEmpty(), "a camera fitted to no points");
+  const auto [right, up, forward] = AxesOf(camera_);
+  Camera camera = camera_;
+  if (view_.lookat_W) {
+    camera.distance_m = std::max(distance_to_lookat_, 1e-6);
   } else {
+    const double cz = std::min(across_.nearest(), along_.nearest());
+    const Vec3 position = across_.middle(cz) * right + along_.middle(cz) * up + cz * forward;
+    camera.distance_m = std::max((box_.center() - position).dot(forward), 1e-6);
     camera.lookat_D = position + camera.distance_m * forward;
   }
-  if (view.distance_m) camera.distance_m = *view.distance_m;
+  if (view_.distance_m) camera.distance_m = *view_.distance_m;
   return camera;
 }
 

@@ -1,7 +1,7 @@
 // Where the camera stands. Everything here is in the drawing frame D (z up, same origin as W).
 #pragma once
 
-#include <vector>
+#include <limits>
 
 #include "core/types.h"
 #include "render/render.h"
@@ -25,11 +25,35 @@ struct Margins {
   double side = 0.05, top = 0.05, bottom = 0.05;
 };
 
-/// The nearest camera of the view's direction (default: azimuth -60°, elevation 16°) from which
-/// all points lie inside the margins; the view's own distance and look-at point take precedence.
-/// `aspect` is width over height. Needs at least one point.
-[[nodiscard]] Camera FitCamera(const std::vector<Vec3>& points_D, const CameraView& view,
-                               double aspect, const Margins& margins, const Mat3& R_DW);
+/// Fits a camera of the view's direction (default: azimuth -60°, elevation 16°) to points that are
+/// given one by one: the nearest one from which all lie inside the margins. The view's own distance
+/// and look-at point take precedence.
+class CameraFit {
+ public:
+  /// `aspect` is width over height.
+  CameraFit(const CameraView& view, double aspect, const Margins& margins, const Mat3& R_DW);
+  void Include(const Vec3& p_D);
+  /// Needs at least one point.
+  [[nodiscard]] Camera Fit() const;
+
+ private:
+  // One picture direction: right or up.
+  struct Side {
+    double t_plus = 1.0, t_minus = 1.0;  // tangents of the angles that the margins leave
+    double plus = -std::numeric_limits<double>::infinity();
+    double minus = -std::numeric_limits<double>::infinity();
+
+    void Include(double a, double z);
+    [[nodiscard]] double nearest() const;
+    [[nodiscard]] double middle(double cz) const;
+  };
+
+  CameraView view_;
+  Camera camera_;
+  Side across_, along_;
+  Eigen::AlignedBox3d box_;
+  double distance_to_lookat_ = 0.0;  // that a given look-at point needs
+};
 
 /// Picture coordinates (0 … 1 from the left and from the top) of a point before the camera.
 [[nodiscard]] Eigen::Vector2d Project(const Camera& camera, double aspect, const Vec3& p_D);

@@ -8,7 +8,7 @@
 
 #include "core/demand.h"
 #include "render/annotations.h"
-#include "render/camera.h"
+#include "render/arrangement.h"
 #include "render/caption.h"
 #include "render/scene.h"
 #include "render/stage.h"
@@ -59,123 +59,6 @@ RunSummary CheckInput(const Mechanism& mechanism, const std::vector<PictureFrame
   return RunSummary::Done();
 }
 
-// 1, 2 or 5 times a power of ten, not above `value`.
-double RoundLength(double value) {
-  const double power = std::pow(10.0, std::floor(std::log10(value)));
-  const double digit = value / power;
-  return (digit >= 5.0 ? 5.0 : digit >= 2.0 ? 2.0 : 1.0) * power;
-}
-
-std::string WithUnit(double value, const std::string& unit) {
-  if (value >= 1e6) return fmt::format("{:.3g} M{}", value * 1e-6, unit);
-  if (value >= 1e3) return fmt::format("{:.3g} k{}", value * 1e-3, unit);
-  return fmt::format("{:.3g} {}", value, unit);
-}
-
-// Everything that is common to all pictures of one call.
-struct Set {
-  Mat3 R_DW = Mat3::Identity();
-  rn::Scale scale;
-  rn::Camera camera;
-  rn::StageOptions stage;
-  Vec3 forward_W = Vec3::UnitX();
-};
-
-Eigen::AlignedBox3d BoxOf(const std::vector<Vec3>& points) {
-  Eigen::AlignedBox3d box;
-  for (const Vec3& p : points) box.extend(p);
-  return box;
-}
-
-// Adds the items that lie within a quarter of the diagonal around what is framed already.
-void IncludeNear(const std::vector<std::vector<Vec3>>& items, std::vector<Vec3>* framed) {
-  Eigen::AlignedBox3d box = BoxOf(*framed);
-  if (box.isEmpty()) return;
-  const double reach = 0.25 * box.diagonal().norm();
-  box.min().array() -= reach;
-  box.max().array() += reach;
-  for (const std::vector<Vec3>& corners : items) {
-    if (std::ranges::all_of(corners, [&](const Vec3& p) { return box.contains(p); })) {
-      framed->insert(framed->end(), corners.begin(), corners.end());
-    }
-  }
-}
-
-// Camera, ground and stage from what all frames show together.
-Set Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
-            const Overlay& overlay, const PictureOptions& options) {
-  Set set;
-  set.R_DW = rn::UprightRotation(mechanism.gravity_W);
-  set.scale = rn::ScaleOf(mechanism, frames);
-  std::vector<Vec3> framed, all;
-  std::vector<std::vector<Vec3>> maybe;  // corners of parts of the world
-  const auto include = [&](const std::vector<rn::Item>& items) {
-    for (const rn::Item& item : items) {
-      std::vector<Vec3> corners = rn::Corners(item);
-      for (Vec3& p : corners) p = set.R_DW * p;
-      all.insert(all.end(), corners.begin(), corners.end());
-      if (item.framing == rn::Framing::kAlways) {
-        framed.insert(framed.end(), corners.begin(), corners.end());
-      } else if (item.framing == rn::Framing::kIfNear) {
-        maybe.push_back(std::move(corners));
-      }
-    }
-  };
-  int bar_px = 0;
-  for (const PictureFrame& frame : frames) {
-    include(rn::MechanismItems(mechanism, frame, set.scale, options));
-    include(rn::Annotate(mechanism, frame, set.scale, options, Vec3::UnitX()).items);
-    bar_px = std::max(bar_px, rn::BarHeight(frame.caption, options.size_px));
-  }
-  include(rn::OverlayAnnotations(overlay, set.scale).items);
-  for (const MeshOverlay& mesh : overlay.meshes) {
-    for (const Vec3& p_W : mesh.vertices_W) framed.emplace_back(set.R_DW * p_W);
-  }
-  IncludeNear(maybe, &framed);
-  if (framed.empty()) framed = {Vec3::Zero(), Vec3::Ones()};
-  if (all.empty()) all = framed;
-
-  const double aspect = static_cast<double>(options.size_px[0]) / options.size_px[1];
-  const rn::Margins margins{.side = 0.05,
-                            .top = 0.045,
-                            .bottom = 0.045 + static_cast<double>(bar_px) / options.size_px[1]};
-  set.camera = rn::FitCamera(framed, options.camera, aspect, margins, set.R_DW);
-  set.forward_W = set.R_DW.transpose() * set.camera.forward_D();
-
-  const Eigen::AlignedBox3d box = BoxOf(framed);
-  const std::optional<double> sea = rn::SeaLevel(mechanism, set.R_DW);
-  const double height = box.sizes().z();
-  set.stage = {.width = options.size_px[0],
-               .height = options.size_px[1],
-               .passes = options.passes,
-               .shadows = options.shadows,
-               .centre_D = box.center(),
-               .radius_m = std::max(0.75 * box.diagonal().norm(), 1e-6),
-               .ground_m = sea.value_or(BoxOf(all).min().z() - 0.02 * height),
-               .sea = sea.has_value(),
-               .grid_m = RoundLength(0.14 * box.diagonal().norm())};
-  return set;
-}
-
-std::vector<rn::LegendEntry> LegendOf(const Mechanism& mechanism, const Set& set,
-                                      const PictureOptions& options) {
-  std::vector<rn::LegendEntry> legend;
-  const double force = set.scale.longest_force_N, torque = set.scale.longest_torque_Nm;
-  if (options.drive_forces && (force > 0.0 || torque > 0.0)) {
-    legend.push_back({"push", force > 0.0 ? "push (+)" : "torque +"});
-    legend.push_back({"pull", force > 0.0 ? "pull (-)" : "torque -"});
-    if (force > 0.0) {
-      legend.push_back({"", "arrows linear, longest = " + WithUnit(force, "N")});
-    }
-    if (torque > 0.0) legend.push_back({"", "arcs linear, 300 deg = " + WithUnit(torque, "N m")});
-  }
-  const bool any_closure =
-      std::ranges::any_of(mechanism.joints, [](const Joint& joint) { return joint.closure; });
-  if (options.closures && any_closure) legend.push_back({"closure", "loop closure"});
-  if (!set.stage.sea) legend.push_back({"", fmt::format("grid {:g} m", set.stage.grid_m)});
-  return legend;
-}
-
 }  // namespace
 
 Diagnostics Check(const PictureOptions& options) {
@@ -224,7 +107,7 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
   }
   if (RunSummary input = CheckInput(mechanism, frames, overlay); !input.ok()) return input;
   if (frames.empty()) return RunSummary::Done();
-  const Set set = Arrange(mechanism, frames, overlay, options);
+  const rn::Arrangement set = rn::Arrange(mechanism, frames, overlay, options);
   std::unique_ptr<rn::Stage> stage;
   if (RunSummary opened = rn::Stage::Open(set.stage, &stage); !opened.ok()) return opened;
   std::vector<rn::Glyph> font;
@@ -233,7 +116,7 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
   if (any_caption) {
     if (RunSummary got = stage->Font(&font); !got.ok()) return got;
   }
-  const std::vector<rn::LegendEntry> legend = LegendOf(mechanism, set, options);
+  const std::vector<rn::LegendEntry> legend = rn::LegendOf(mechanism, set, options);
   const rn::Annotations overlaid = rn::OverlayAnnotations(overlay, set.scale);
   for (std::size_t f = 0; f < frames.size(); ++f) {
     std::vector<rn::Item> items = rn::MechanismItems(mechanism, frames[f], set.scale, options);

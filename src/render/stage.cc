@@ -40,7 +40,7 @@ std::string StageMjcf(const StageOptions& o) {
   return fmt::format(
       "<mujoco><statistic extent='{0:.9g}' center='0 0 0'/>"
       "<visual><global offwidth='{1}' offheight='{2}' fovy='{3}'/>"
-      "<quality offsamples='0' shadowsize='2048' numslices='64' numstacks='12' numquads='2'/>"
+      "<quality offsamples='0' shadowsize='2048' numslices='40' numstacks='10' numquads='2'/>"
       "<map znear='0.05' zfar='40' shadowclip='1.0' haze='0.35'/><rgba haze='{4}'/>"
       "<headlight active='0'/></visual>"
       "<asset><texture name='sky' type='skybox' builtin='gradient' rgb1='{5}' rgb2='{6}' "
@@ -128,7 +128,7 @@ class OsMesaStage final : public Stage {
     data_ = simulation::MakeData(*model_);
     mj_forward(model_.get(), data_.get());
     mjv_defaultScene(&scene_);
-    mjv_makeScene(model_.get(), &scene_, kMostGeoms);
+    mjv_makeScene(model_.get(), &scene_, options_.most_items + kGroundGeoms);
     scene_made_ = true;
     mjr_defaultContext(&context_);
     context_made_ = true;
@@ -293,7 +293,7 @@ class OsMesaStage final : public Stage {
     return RunSummary::Done();
   }
 
-  static constexpr int kMostGeoms = 60000;
+  static constexpr int kGroundGeoms = 8;  // what the stage itself puts into the scene
 
   StageOptions options_;
   std::array<std::uint8_t, 4UL * kWindow_px * kWindow_px> window_{};

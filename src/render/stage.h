@@ -26,7 +26,8 @@ struct StageOptions {
   double radius_m = 1.0;         ///< shadows are cast within this radius of the centre
   double ground_m = 0.0;         ///< height of the ground plane or the water
   bool sea = false;
-  double grid_m = 0.1;  ///< spacing of the ground's grid lines
+  int most_items = 1000;  ///< room for so many solids in one picture
+  double grid_m = 0.1;    ///< spacing of the ground's grid lines
 };
 
 /// One character of the renderer's font as coverage 0 … 255.

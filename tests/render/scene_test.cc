@@ -11,6 +11,13 @@
 namespace mbv::render {
 namespace {
 
+Camera FitCamera(const std::vector<Vec3>& points_D, const CameraView& view, double aspect,
+                 const Margins& margins, const Mat3& R_DW) {
+  CameraFit fit(view, aspect, margins, R_DW);
+  for (const Vec3& p_D : points_D) fit.Include(p_D);
+  return fit.Fit();
+}
+
 constexpr double kRoundoff = 64 * kEps;
 
 TEST(UprightRotation, IsTheIdentityForGravityAlongMinusZ) {
@@ -31,7 +38,7 @@ TEST(UprightRotation, TurnsUpToZAndKeepsXLevel) {
   EXPECT_TRUE((R_DW * Vec3::UnitZ()).isApprox(-Vec3::UnitY(), kRoundoff));
 }
 
-TEST(FitCamera, TouchesTheMarginsAndCrossesNone) {
+TEST(CameraFit, TouchesTheMarginsAndCrossesNone) {
   std::vector<Vec3> points;
   for (int i = 0; i < 8; ++i) {
     points.emplace_back((i & 1) != 0 ? 2.0 : -0.5, (i & 2) != 0 ? 1.0 : 0.0,
@@ -57,7 +64,7 @@ TEST(FitCamera, TouchesTheMarginsAndCrossesNone) {
   }
 }
 
-TEST(FitCamera, LooksWhereItIsTold) {
+TEST(CameraFit, LooksWhereItIsTold) {
   const std::vector<Vec3> points = {Vec3(1, 0, 0), Vec3(0, 0, 1)};
   const Mat3 R_DW = UprightRotation(Vec3(0, -9.81, 0));
   const CameraView view{
