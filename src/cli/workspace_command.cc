@@ -1,0 +1,66 @@
+// mbverify workspace
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "cli/cli.h"
+#include "mechanism/load_model.h"
+#include "pipeline/output_folder.h"
+#include "pipeline/workspace.h"
+#include "scenario/find_model.h"
+
+namespace mbv {
+namespace {
+
+struct WorkspaceArguments {
+  std::string model, out = "out";
+  bool no_pictures = false;
+};
+
+int Workspace(const WorkspaceArguments& arguments) {
+  const auto file = FindModel(arguments.model, ".");
+  if (!file) {
+    fmt::print(stderr, "error: there is no model '{}'\n", arguments.model);
+    return 2;
+  }
+  const LoadResult loaded = LoadModel(*file);
+  fmt::print(stderr, "{}", loaded.diagnostics.Text());
+  if (!loaded.mechanism) return 2;
+  const WorkspaceOutcome outcome = ComputeWorkspace(*loaded.mechanism, !arguments.no_pictures);
+  fmt::print(stderr, "{}", outcome.diagnostics.Text());
+  if (outcome.diagnostics.has_errors()) return 2;
+  fmt::print("{}", outcome.text);
+  if (!outcome.summary.ok()) {
+    fmt::print(stderr, "error: {}\n", outcome.summary.message);
+    return outcome.summary.stop == Stop::kUnsupported ? 2 : 3;
+  }
+  OutputFolder folder(std::filesystem::path(arguments.out) / loaded.mechanism->name / "workspace");
+  std::string trouble = folder.Create();
+  for (const auto& [name, content] : outcome.files) {
+    if (trouble.empty()) trouble = folder.Write(name, content);
+  }
+  if (trouble.empty()) trouble = folder.Commit();
+  if (!trouble.empty()) {
+    fmt::print(stderr, "error: {}\n", trouble);
+    return 2;
+  }
+  fmt::print(stderr, "results in {}\n", folder.target().string());
+  return 0;
+}
+
+}  // namespace
+
+void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<WorkspaceArguments>();
+  CLI::App* workspace =
+      app->add_subcommand("workspace", "Reachable workspace: measures, meshes, sections, pictures");
+  workspace
+      ->add_option("model", arguments->model, "scara_robot, spr_tripod, or a model.yaml of one")
+      ->required();
+  workspace->add_option("--out", arguments->out, "result folder")->capture_default_str();
+  workspace->add_flag("--no-pictures", arguments->no_pictures, "data files only");
+  workspace->callback([arguments, exit_code] { *exit_code = Workspace(*arguments); });
+}
+
+}  // namespace mbv

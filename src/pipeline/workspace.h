@@ -1,0 +1,28 @@
+// Workspaces of the mechanisms whose closed forms compute one: text, data files and pictures.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "core/run_summary.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+struct WorkspaceOutcome {
+  RunSummary summary;       ///< kUnsupported when the mechanism has no workspace computation
+  Diagnostics diagnostics;  ///< parameters that do not suit it
+  std::string text;         ///< findings for people
+  std::vector<std::pair<std::string, std::string>> files;  ///< name, content
+};
+
+/// Mechanism names that ComputeWorkspace() supports.
+[[nodiscard]] std::vector<std::string> WorkspaceMechanisms();
+
+/// spr_tripod: the six faces (STL, PLY), sections (CSV, SVG), pictures with the mechanism inside.
+/// scara_robot: the paper's cylinder point by point, volumes, singularity maps (CSV, SVG), picture.
+[[nodiscard]] WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures);
+
+}  // namespace mbv

@@ -1,0 +1,232 @@
+#include "report/svg_plot.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+namespace mbv {
+namespace {
+
+// Colour-blind safe line colours (Okabe and Ito).
+constexpr std::array<const char*, 7> kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                "#e69f00", "#56b4e9", "#000000"};
+constexpr double kWidth = 720, kHeight = 520;
+constexpr double kLeft = 84, kRight = 24, kTop = 44, kBottom = 60;
+
+std::string Escaped(const std::string& text) {
+  std::string out;
+  for (char c : text) {
+    if (c == '&')
+      out += "&amp;";
+    else if (c == '<')
+      out += "&lt;";
+    else if (c == '>')
+      out += "&gt;";
+    else
+      out += c;
+  }
+  return out;
+}
+
+struct Axis {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  bool log = false;
+  double from_px = 0, to_px = 1;
+
+  [[nodiscard]] bool Shows(double v) const { return std::isfinite(v) && (!log || v > 0); }
+  [[nodiscard]] double Inner(double v) const { return log ? std::log10(v) : v; }
+  void Add(double v) {
+    if (!Shows(v)) return;
+    low = std::min(low, Inner(v));
+    high = std::max(high, Inner(v));
+  }
+  void Pad() {
+    if (!(low <= high)) low = 0, high = 1;
+    const double pad =
+        high > low ? 0.04 * (high - low) : (log ? 0.5 : std::max(1e-12, std::abs(high)));
+    low -= pad;
+    high += pad;
+  }
+  [[nodiscard]] double Px(double v) const {
+    return from_px + (Inner(v) - low) / (high - low) * (to_px - from_px);
+  }
+  // Round values inside the range: decades, or steps of 1, 2 or 5 times a power of ten.
+  [[nodiscard]] std::vector<double> Ticks() const {
+    std::vector<double> ticks;
+    if (log) {
+      const int step = std::max(1, static_cast<int>(std::ceil((high - low) / 8)));
+      for (int d = static_cast<int>(std::ceil(low)); d <= high; d += step) {
+        ticks.push_back(std::pow(10.0, d));
+      }
+      return ticks;
+    }
+    const double raw = (high - low) / 6, power = std::pow(10.0, std::floor(std::log10(raw)));
+    const double unit = raw / power < 1.5   ? power
+                        : raw / power < 3.5 ? 2 * power
+                        : raw / power < 7.5 ? 5 * power
+                                            : 10 * power;
+    for (double v = std::ceil(low / unit) * unit; v <= high; v += unit) {
+      ticks.push_back(std::abs(v) < 1e-9 * unit ? 0.0 : v);
+    }
+    return ticks;
+  }
+};
+
+std::string Header(const std::string& title) {
+  return fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
+      "height=\"{1}\" font-family=\"sans-serif\" font-size=\"13\" "
+      "role=\"img\">\n<title>{2}</title>\n"
+      "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
+      "<text x=\"{3}\" y=\"26\" font-size=\"16\">{2}</text>\n",
+      kWidth, kHeight, Escaped(title), kLeft);
+}
+
+std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
+                  const std::string& y_label) {
+  const double left = x.from_px, right = x.to_px, top = y.to_px, bottom = y.from_px;
+  std::string svg;
+  for (double v : x.Ticks()) {
+    const double px = x.Px(v);
+    svg += fmt::format(
+        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" stroke=\"#dddddd\"/>"
+        "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\">{4:g}</text>\n",
+        px, top, bottom, bottom + 18, v);
+  }
+  for (double v : y.Ticks()) {
+    const double px = y.Px(v);
+    svg += fmt::format(
+        "<line x1=\"{1:.1f}\" x2=\"{2:.1f}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#dddddd\"/>"
+        "<text x=\"{3:.1f}\" y=\"{4:.1f}\" text-anchor=\"end\">{5:g}</text>\n",
+        px, left, right, left - 8, px + 4, v);
+  }
+  svg += fmt::format(
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
+      "stroke=\"#444444\"/>\n<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n"
+      "<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
+      left, top, right - left, bottom - top, 0.5 * (left + right), bottom + 42, Escaped(x_label),
+      0.5 * (top + bottom), Escaped(y_label));
+  return svg;
+}
+
+// Widens the axis whose unit would be longer, so that both have one scale.
+void EqualScale(Axis* x, Axis* y) {
+  const double x_px = std::abs(x->to_px - x->from_px), y_px = std::abs(y->to_px - y->from_px);
+  const double scale = std::max((x->high - x->low) / x_px, (y->high - y->low) / y_px);
+  for (auto [axis, px] : {std::pair{x, x_px}, std::pair{y, y_px}}) {
+    const double middle = 0.5 * (axis->low + axis->high);
+    axis->low = middle - 0.5 * scale * px;
+    axis->high = middle + 0.5 * scale * px;
+  }
+}
+
+std::string Curve(const PlotLine& line, const char* color, const Axis& x, const Axis& y) {
+  std::string path, dots;
+  bool pen_down = false;
+  for (const auto& [u, v] : line.points) {
+    if (!x.Shows(u) || !y.Shows(v)) {
+      pen_down = false;
+      continue;
+    }
+    path += fmt::format("{}{:.2f} {:.2f}", pen_down ? " L" : " M", x.Px(u), y.Px(v));
+    if (line.markers) {
+      dots += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"3.5\" fill=\"{}\"/>\n", x.Px(u),
+                          y.Px(v), color);
+    }
+    pen_down = true;
+  }
+  if (line.closed && !path.empty()) path += " Z";
+  return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\"/>\n{}", path,
+                     color, dots);
+}
+
+// Dark blue over green to yellow (a short version of viridis).
+std::string MapColor(double t) {
+  constexpr std::array<std::array<double, 3>, 5> stops = {
+      {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}}};
+  const double at = std::clamp(t, 0.0, 1.0) * 4;
+  const int k = std::min(3, static_cast<int>(at));
+  std::array<int, 3> rgb{};
+  for (int c = 0; c < 3; ++c) {
+    rgb[c] =
+        static_cast<int>(std::lround(stops[k][c] + (at - k) * (stops[k + 1][c] - stops[k][c])));
+  }
+  return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
+}
+
+}  // namespace
+
+std::string ToSvg(const LinePlot& plot) {
+  Axis x{.log = plot.log_x, .from_px = kLeft, .to_px = kWidth - kRight};
+  Axis y{.log = plot.log_y, .from_px = kHeight - kBottom, .to_px = kTop};
+  for (const PlotLine& line : plot.lines) {
+    for (const auto& [u, v] : line.points) {
+      if (!x.Shows(u) || !y.Shows(v)) continue;
+      x.Add(u);
+      y.Add(v);
+    }
+  }
+  x.Pad();
+  y.Pad();
+  if (plot.equal_scale) EqualScale(&x, &y);
+  std::string svg = Header(plot.title) + Frame(x, y, plot.x_label, plot.y_label);
+  double legend_y = kTop + 18;
+  for (size_t i = 0; i < plot.lines.size(); ++i) {
+    const char* color = kColors[i % kColors.size()];
+    svg += Curve(plot.lines[i], color, x, y);
+    if (plot.lines[i].label.empty()) continue;
+    svg += fmt::format(
+        "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"2.5\"/>"
+        "<text x=\"{4}\" y=\"{5}\">{6}</text>\n",
+        kLeft + 10, kLeft + 32, legend_y - 4, color, kLeft + 38, legend_y,
+        Escaped(plot.lines[i].label));
+    legend_y += 17;
+  }
+  return svg + "</svg>\n";
+}
+
+std::string ToSvg(const MapPlot& plot) {
+  Axis x{.low = plot.x_min, .high = plot.x_max, .from_px = kLeft, .to_px = kWidth - kRight - 90};
+  Axis y{.low = plot.y_min, .high = plot.y_max, .from_px = kHeight - kBottom, .to_px = kTop};
+  EqualScale(&x, &y);
+  Axis value{.log = plot.log_scale, .from_px = kHeight - kBottom, .to_px = kTop};
+  for (double v : plot.values) value.Add(v);
+  if (!(value.low <= value.high)) value.low = 0, value.high = 1;
+  if (value.low == value.high) value.high = value.low + 1;
+
+  std::string svg = Header(plot.title);
+  const double w = std::abs(x.Px(plot.x_max) - x.Px(plot.x_min)) / plot.columns;
+  const double h = std::abs(y.Px(plot.y_max) - y.Px(plot.y_min)) / plot.rows;
+  for (int r = 0; r < plot.rows; ++r) {
+    for (int c = 0; c < plot.columns; ++c) {
+      const double v = plot.values[static_cast<size_t>(r) * plot.columns + c];
+      if (!value.Shows(v)) continue;
+      const double t = (value.Inner(v) - value.low) / (value.high - value.low);
+      svg += fmt::format(
+          "<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
+          x.Px(plot.x_min) + c * w, y.Px(plot.y_min) - (r + 1) * h, w + 0.3, h + 0.3, MapColor(t));
+    }
+  }
+  svg += Frame(x, y, plot.x_label, plot.y_label);
+  const double bar_x = kWidth - kRight - 60;
+  for (int i = 0; i < 50; ++i) {
+    const double cell = (kHeight - kBottom - kTop) / 50;
+    svg += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.2f}\" width=\"16\" height=\"{:.2f}\" fill=\"{}\"/>\n", bar_x,
+        kHeight - kBottom - (i + 1) * cell, cell + 0.3, MapColor((i + 0.5) / 50));
+  }
+  for (double v : value.Ticks()) {
+    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\">{:g}</text>\n", bar_x + 20,
+                       value.Px(v) + 4, v);
+  }
+  svg += fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"12\" text-anchor=\"end\">{}</text>\n",
+      kWidth - 8, kTop - 8, Escaped(plot.value_label));
+  return svg + "</svg>\n";
+}
+
+}  // namespace mbv
