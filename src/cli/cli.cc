@@ -46,6 +46,7 @@ int RunCli(int argc, char** argv) {
   AddCheckCommand(&app, &exit_code);
   AddAuditCommand(&app, &exit_code);
   AddListCommand(&app, &exit_code);
+  AddWorkspaceCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -23,5 +23,6 @@ void AddModelCommand(CLI::App* app, int* exit_code);
 void AddCheckCommand(CLI::App* app, int* exit_code);
 void AddAuditCommand(CLI::App* app, int* exit_code);
 void AddListCommand(CLI::App* app, int* exit_code);
+void AddWorkspaceCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv
