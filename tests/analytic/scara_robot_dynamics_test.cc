@@ -354,6 +354,27 @@ TEST(ScaraClosedForm, PathAcrossASingularLineBetweenSamplesIsReported) {
   EXPECT_NE(run.summary.message.find("changed its sign"), std::string::npos);
 }
 
+TEST(ScaraClosedForm, MarksThePosesNearASingularLine) {
+  const Mechanism mechanism = PaperMechanism();
+  Motion motion = TaskMotion();
+  motion.sample_s = 0.01;
+  motion.duration_s = 0.49;
+  motion.commands[0].profile = {{ConstantTerm{-0.05}, RampTerm{0.1}}};
+  motion.commands[1].profile = Constant(-0.05);
+  motion.commands[3].profile = Constant(0.0);
+  Diagnostics diagnostics;
+  const auto closed_form = MakeClosedForm(mechanism, motion, {}, &diagnostics);
+  const ClosedFormRun run = RunClosedForm(mechanism, motion, closed_form.get());
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const VecX near = run.trace.values.col(run.trace.Find("singularity.near"));
+  const VecX s_min = run.trace.values.col(run.trace.Find("singularity.s_min"));
+  EXPECT_EQ(near[0], 0.0);
+  EXPECT_EQ(near[near.size() - 1], 1.0);
+  for (Eigen::Index i = 0; i < near.size(); ++i) {
+    EXPECT_EQ(near[i] == 1.0, s_min[i] < kNearlySingular) << i;
+  }
+}
+
 TEST(ScaraClosedForm, RefusesMotionsItCannotTake) {
   const Mechanism mechanism = PaperMechanism();
   Motion incomplete = TaskMotion();

@@ -94,11 +94,12 @@ TEST(ScaraModel, HomeIsTheClosedFormsHome) {
   }
 }
 
-/// Pick-and-place torques of the reference solver, samples × 4, with the closed form's.
+/// Torques of the reference solver and of the closed form, samples × 4, over this share of the
+/// pick-and-place stroke.
 struct Torques {
   MatX reference, closed_form;
 };
-Torques PickPlaceTorques(const std::map<std::string, double>& overrides) {
+Torques PickPlaceTorques(const std::map<std::string, double>& overrides, double share = 1.0) {
   std::map<std::string, double> all = overrides;
   all.insert({{"home_x", -0.09}, {"home_y", -0.025}, {"home_z", -0.165}, {"home_phi", -15 * kDeg}});
   const Mechanism mechanism = Loaded(ModelText(), all);
@@ -115,7 +116,7 @@ Torques PickPlaceTorques(const std::map<std::string, double>& overrides) {
     Command command;
     command.name = row.name;
     command.terms = {{{Coordinate::Kind::kOutput, 0, row.component}, 1.0}};
-    command.profile = {{ConstantTerm{row.start}, PolyStepTerm{0.0, 0.12, row.delta}}};
+    command.profile = {{ConstantTerm{row.start}, PolyStepTerm{0.0, 0.12, share * row.delta}}};
     motion.commands.push_back(command);
   }
   Load load;
@@ -157,6 +158,13 @@ double Difference(const MatX& a, const MatX& b) {
 TEST(ScaraModel, ReferenceAgreesWithTheClosedFormInPickAndPlace) {
   const Torques torques = PickPlaceTorques({});
   EXPECT_LT(Difference(torques.reference, torques.closed_form), kTorqueTolerance);
+}
+
+TEST(ScaraModel, ReferenceAgreesWithTheClosedFormOnTheOtherBranch) {
+  // The whole stroke is singular there, as both report.
+  const Torques torques = PickPlaceTorques({{"branch", -1.0}}, 0.2);
+  EXPECT_LT(Difference(torques.reference, torques.closed_form), kTorqueTolerance);
+  EXPECT_GT(Difference(torques.closed_form, PickPlaceTorques({}).closed_form), 0.1);
 }
 
 TEST(ScaraModel, BearingsOnTheBarsAndTheirWidthChangeNoTorque) {

@@ -14,7 +14,7 @@ namespace {
 
 constexpr std::array<int, 4> kTaskComponents = {0, 1, 2, 5};  // x, y, z, yaw of an output
 constexpr std::array<const char*, 4> kTaskNames = {"x", "y", "z", "yaw"};
-constexpr int kOutputChannels = 6, kSingularityChannels = 2, kLimbChannels = 3;
+constexpr int kOutputChannels = 6, kSingularityChannels = 3, kLimbChannels = 3;
 
 /// Where the four commanded coordinates are among the motion's commands.
 struct CommandMap {
@@ -46,6 +46,7 @@ class ScaraClosedForm final : public ClosedForm {
     }
     channels.push_back({"singularity.s_min", "1", ""});
     channels.push_back({"singularity.det", "1", ""});
+    channels.push_back({"singularity.near", "1", ""});
     for (int i = 0; i < kLimbs; ++i) {
       const std::string limb = LimbName(i);
       channels.push_back({limb + ".dead_point", "1", ""});
@@ -141,6 +142,7 @@ class ScaraClosedForm final : public ClosedForm {
     extra->head<kOutputChannels>() << position_.X.head<3>(), 0.0, 0.0, position_.X[3];
     (*extra)[kOutputChannels] = singularity_.s_min;
     (*extra)[kOutputChannels + 1] = singularity_.det;
+    (*extra)[kOutputChannels + 2] = singularity_.s_min < kNearlySingular ? 1.0 : 0.0;
     for (int i = 0; i < kLimbs; ++i) {
       extra->segment<kLimbChannels>(kOutputChannels + kSingularityChannels + kLimbChannels * i)
           << position_.V[i],

@@ -8,7 +8,8 @@ namespace mbv::scara {
 /// Driven in joint space (commands on all four drives; the forward position starts from the pose
 /// home_x, home_y, home_z, home_phi) or in task space (platform.x, .y, .z, .yaw). Loads act on the
 /// body "platform". Models: "full", "thin_rods" (the paper's rods without spin).
-/// Extra channels: platform.x … platform.yaw, singularity.s_min, singularity.det and, per limb,
+/// Extra channels: platform.x … platform.yaw, singularity.s_min, singularity.det,
+/// singularity.near (1 where s_min < kNearlySingular: usable with care, else 0) and, per limb,
 /// limbN.dead_point (V), limbN.rod_shear, limbN.rod_tilt.
 [[nodiscard]] std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism,
                                                          const Motion& motion,
