@@ -44,7 +44,7 @@ void AddArrowGhost(const Vec3& p, const Vec3& q, double radius, const Material& 
   const Vec3 e = (q - p).normalized();
   const Vec3 across = e.cross(forward_W);
   if (across.norm() < 0.05) return;  // seen from its end
-  const Vec3 s = across.normalized(), shift = -4.0 * radius * forward_W;
+  const Vec3 s = across.normalized(), shift = -2.2 * radius * forward_W;
   const double head = std::min(6.0 * radius, 0.5 * (q - p).norm());
   const Vec3 neck = q - head * e + shift;
   FlatMesh ghost{.vertices_W = {p + shift - radius * s, p + shift + radius * s, neck - radius * s,
@@ -90,7 +90,7 @@ class ForceMarks {
 
   void Add(const Drive& drive, double force) const {
     if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
-      // The force on the far body: thrust points on along the leg, tension back along it.
+      // The force on the far body: thrust points on along the leg, tension back towards it.
       const Vec3 p = frame_.X_WB[leg->body_from] * leg->p_from;
       const Vec3 q = frame_.X_WB[leg->body_to] * leg->p_to;
       if ((q - p).norm() > 0.0) AddArrow(q, (q - p).normalized(), force);
@@ -115,11 +115,14 @@ class ForceMarks {
  private:
   static Material Color(double force) { return MaterialOf(force >= 0.0 ? "push" : "pull"); }
 
-  void AddArrow(const Vec3& p, const Vec3& direction, double force) const {
+  // Both signs on the far side of the point at which the force acts: a push points away from it,
+  // a pull towards it.
+  void AddArrow(const Vec3& point, const Vec3& direction, double force) const {
     if (scale_.longest_force_N <= 0.0) return;
-    const double share = force / scale_.longest_force_N;
-    if (std::abs(share) < kSmallestShare) return;
-    const Vec3 q = p + share * scale_.arrow_m * direction;
+    const double share = std::abs(force) / scale_.longest_force_N;
+    if (share < kSmallestShare) return;
+    Vec3 p = point, q = point + share * scale_.arrow_m * direction;
+    if (force < 0.0) std::swap(p, q);
     const double radius = 0.032 * scale_.arrow_m;
     out_->items.push_back(Between(Solid::kArrow, p, q, radius, Color(force)));
     AddArrowGhost(p, q, radius, Color(force), forward_W_, &out_->flats);

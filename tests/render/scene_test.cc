@@ -122,10 +122,12 @@ TEST(Annotate, GivesArrowsWhoseLengthFollowsTheForce) {
   ASSERT_EQ(arrow(100.0).size(), 1U);
   EXPECT_NEAR(arrow(100.0)[0].size.z(), scale.arrow_m, kRoundoff);
   EXPECT_NEAR(arrow(-25.0)[0].size.z(), 0.25 * scale.arrow_m, kRoundoff);
-  // Thrust on the ball points up, tension down; both start at the ball.
-  EXPECT_TRUE(arrow(50.0)[0].X_WG.linear().col(2).isApprox(Vec3::UnitZ(), kRoundoff));
-  EXPECT_TRUE(arrow(-50.0)[0].X_WG.linear().col(2).isApprox(-Vec3::UnitZ(), kRoundoff));
-  EXPECT_TRUE(arrow(50.0)[0].X_WG.translation().isApprox(Vec3::UnitZ(), kRoundoff));
+  // Thrust on the ball points up from it, tension down to it.
+  const Item push = arrow(50.0)[0], pull = arrow(-50.0)[0];
+  EXPECT_TRUE(push.X_WG.linear().col(2).isApprox(Vec3::UnitZ(), kRoundoff));
+  EXPECT_TRUE(push.X_WG.translation().isApprox(Vec3::UnitZ(), kRoundoff));
+  EXPECT_TRUE(pull.X_WG.linear().col(2).isApprox(-Vec3::UnitZ(), kRoundoff));
+  EXPECT_TRUE((pull.X_WG * Vec3(0, 0, pull.size.z())).isApprox(Vec3::UnitZ(), kRoundoff));
   EXPECT_TRUE(arrow(0.5).empty());
 }
 
