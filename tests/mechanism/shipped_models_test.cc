@@ -1,6 +1,9 @@
 // The shipped models against numbers of the papers' data.
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <iterator>
+
 #include "mechanism/constraints.h"
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
@@ -114,6 +117,21 @@ TEST(SprTripodModel, HasThreeFreedomsAndNothingRedundant) {
   EXPECT_EQ(mobility.freedoms, 3);
   EXPECT_EQ(mobility.redundant, 0);
   EXPECT_EQ(mobility.undriven, 0);
+}
+
+TEST(ModelFormatDocument, ItsExampleLoads) {
+  const std::string file = std::string(MBV_SOURCE_DIR) + "/docs/model_format.md";
+  std::ifstream stream(file);
+  const std::string text(std::istreambuf_iterator<char>(stream), {});
+  const std::string fence = "```yaml\n";
+  const size_t start = text.find(fence);
+  ASSERT_NE(start, std::string::npos);
+  const size_t begin = start + fence.size();
+  const LoadResult result =
+      LoadModelText(text.substr(begin, text.find("```", begin) - begin), file);
+  EXPECT_EQ(result.diagnostics.Text(), "");
+  ASSERT_TRUE(result.mechanism);
+  EXPECT_EQ(AnalyseMobility(*result.mechanism).freedoms, 1);
 }
 
 }  // namespace
