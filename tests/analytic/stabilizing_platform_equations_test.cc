@@ -1,41 +1,17 @@
 // Stabilizing platform: each equation against an evaluation that shares nothing with it: poses
-// closed by Newton on the vector loops, sixth-order differences in time, momenta of the links.
+// closed by Newton on the vector loops and sixth-order differences in time.
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <functional>
 #include <random>
 
 #include "analytic/stabilizing_platform/equivalent_limb.h"
-#include "analytic/stabilizing_platform/limb_system.h"
 #include "core/spatial.h"
+#include "tests/analytic/stabilizing_platform_differences.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 
 namespace mbv::stabilizing_platform {
 namespace {
-
-// Sixth-order central differences. With h = 5 ms on motions of up to 3 × 1.6 rad/s and size
-// S the truncation is below 1e-13 S, and roundoff 2 ε S/h and 5 ε S/h² dominates.
-constexpr double kStep = 5e-3;
-template <typename F>
-auto Rate(F f, double t) {
-  const double h = kStep;
-  return ((45 * (f(t + h) - f(t - h)) - 9 * (f(t + 2 * h) - f(t - 2 * h)) +
-           (f(t + 3 * h) - f(t - 3 * h))) /
-          (60 * h))
-      .eval();
-}
-template <typename F>
-auto Acceleration(F f, double t) {
-  const double h = kStep;
-  return ((270 * (f(t + h) + f(t - h)) - 27 * (f(t + 2 * h) + f(t - 2 * h)) +
-           2 * (f(t + 3 * h) + f(t - 3 * h)) - 490 * f(t)) /
-          (180 * h * h))
-      .eval();
-}
-// Limits for quantities of size S whose samples carry roundoff of k ε S.
-double RateLimit(double size) { return 20 * 2 * kEps * size / kStep; }
-double AccelerationLimit(double size) { return 20 * 5 * kEps * size / (kStep * kStep); }
 
 const PlatformParameters& Default() {
   static const PlatformParameters p = ParametersOf(DefaultParameters());
@@ -189,15 +165,6 @@ TEST(Equations6And7, AreWrongWithThePrintedSignInM) {
   }
   EXPECT_NEAR(rate_error, 1.5e-2, 0.05e-2);
   EXPECT_NEAR(acceleration_error, 5.0e-2, 0.05e-2);
-}
-
-// The twist about the earth's origin from poses alone: V× = X' X⁻¹.
-Vec6 TwistFromPoses(const std::function<Pose(double)>& X, double t) {
-  auto matrix = [&](double s) -> Eigen::Matrix4d { return X(s).matrix(); };
-  const Eigen::Matrix4d V = Rate(matrix, t) * X(t).inverse().matrix();
-  Vec6 twist;
-  twist << V(2, 1), V(0, 2), V(1, 0), V(0, 3), V(1, 3), V(2, 3);
-  return twist;
 }
 
 Pose PoseOf(const FrameMotion& m) {
@@ -357,128 +324,6 @@ TEST(Equations1And2, SpanTheSameMotionsUpToTheLoop) {
   const int members[] = {0, 1, 2, 3, 6, 7, 8};
   for (int k = 0; k < 7; ++k) loop.col(k) = screws[members[k]];
   EXPECT_EQ((loop.colPivHouseholderQr().rank()), 4);
-}
-
-// Pose of a link's frame in the earth frame.
-Pose LinkPose(const PlatformEquations& equations, double t, int limb, int link,
-              PoseCommand (*command)(double)) {
-  Evaluation e;
-  const RunSummary summary = equations.EvaluateKinematics(command(t), &e);
-  EXPECT_TRUE(summary.ok()) << summary.message;
-  const LimbGeometry g = GeometryOf(equations.parameters(), e.limbs[limb]);
-  Pose X = Pose::Identity();
-  X.linear() = e.lower.R_EB * e.limbs[limb].R_oA * g.R_AL(link);
-  X.translation() =
-      e.lower.p_EB + e.lower.R_EB * (e.limbs[limb].p_oA + e.limbs[limb].R_oA * g.origin(link));
-  return X;
-}
-
-PoseCommand HeldStill(double t) { return SeaState(t); }
-
-// Required wrench about the earth's origin = rate of momentum − gravity, from poses alone.
-Vec6 WrenchFromPoses(const PlatformParameters& p, const LinkInertia& link, double com_y,
-                     const std::function<Pose(double)>& X, double t) {
-  auto momentum = [&](double s) -> Vec6 {
-    const Vec6 V = TwistFromPoses(X, s);
-    const Pose X_s = X(s);
-    const Vec3 c = X_s * Vec3(0, com_y, 0);
-    const Vec3 f = link.mass * (V.tail<3>() + V.head<3>().cross(c));
-    const Mat3 I = X_s.linear() * link.moments.asDiagonal() * X_s.linear().transpose();
-    Vec6 h;
-    h << I * V.head<3>() + c.cross(f), f;
-    return h;
-  };
-  Vec6 W = Rate(momentum, t);
-  const Vec3 weight(0, 0, -p.g * link.mass), c = X(t) * Vec3(0, com_y, 0);
-  W.head<3>() -= c.cross(weight);
-  W.tail<3>() -= weight;
-  return W;
-}
-
-void CheckRequiredWrenches(DrivePairs pairs) {
-  const PlatformParameters& p = Default();
-  const PlatformEquations equations(p, pairs);
-  for (double t : {0.3, 1.5, 7.3}) {
-    const Evaluation e = Evaluate(equations, HeldStill(t));
-    for (int i = 0; i < 3; ++i) {
-      for (int k = 0; k < 4; ++k) {
-        auto pose = [&](double s) { return LinkPose(equations, s, i, k, &HeldStill); };
-        const double length = k < kLink2 ? p.L1 : p.L3;
-        const Vec6 expected =
-            WrenchFromPoses(p, p.links[k], p.links[k].com_fraction * length, pose, t);
-        // From {A_i} to the earth's origin.
-        const Mat3 R_eA = e.lower.R_EB * e.limbs[i].R_oA;
-        const Vec3 p_eA = e.lower.p_EB + e.lower.R_EB * e.limbs[i].p_oA;
-        Vec6 got;
-        got.tail<3>() = R_eA * e.required[i][k].tail<3>();
-        got.head<3>() = R_eA * e.required[i][k].head<3>() + p_eA.cross(got.tail<3>());
-        // Momenta of 2e4 kg m/s · 8 m carry differences of differences of poses.
-        EXPECT_LT((got - expected).cwiseAbs().maxCoeff(), 2e-3)
-            << "t = " << t << ", limb " << i + 1 << ", " << kLinkNames[k];
-      }
-    }
-  }
-}
-
-TEST(LinkWrenches, AreTheRatesOfMomentumOfSynchronousLimbs) {
-  CheckRequiredWrenches(DrivePairs::kSynchronous);
-}
-TEST(LinkWrenches, AreTheRatesOfMomentumOfIndependentLimbs) {
-  CheckRequiredWrenches(DrivePairs::kIndependent);
-}
-
-TEST(LimbSystem, OfThePrintHasRank28AndIsInconsistent) {
-  for (int k = 0; k < 48; ++k) {
-    const Evaluation e =
-        Evaluate(PlatformEquations(Default(), DrivePairs::kSynchronous), SeaState(0.25 * k));
-    for (int i = 0; i < 3; ++i) {
-      const LimbSystem printed = MakeLimbSystem(LimbSystemForm::kPrinted, e.geometry[i],
-                                                e.required[i], e.f[3 + i], e.f[i]);
-      const auto sigma = ColumnScaledSingularValues(printed);
-      EXPECT_GE(sigma[27], 0.04);
-      EXPECT_LT(sigma[28], 1e-14);
-      // No solution once links have mass.
-      const Eigen::MatrixXd A = printed.matrix;
-      const Eigen::VectorXd x = A.completeOrthogonalDecomposition().solve(printed.right_side);
-      EXPECT_GT((A * x - printed.right_side).norm(), 1);  // N, N m
-    }
-  }
-}
-
-TEST(LimbSystem, CorrectedIsRegularAndAgreesWithTheClosedForm) {
-  double worst_condition = 0;
-  for (int k = 0; k < 240; ++k) {
-    const Evaluation e =
-        Evaluate(PlatformEquations(Default(), DrivePairs::kSynchronous), SeaState(0.05 * k));
-    for (int i = 0; i < 3; ++i) {
-      const LimbSystem system = MakeLimbSystem(LimbSystemForm::kCorrected, e.geometry[i],
-                                               e.required[i], e.f[3 + i], e.f[i]);
-      const auto sigma = ColumnScaledSingularValues(system);
-      worst_condition = std::max(worst_condition, sigma[0] / sigma[29]);
-      const LimbSystemSolution solved = SolveLimbSystem(system, e.f[3 + i], e.f[i]);
-      const LimbReactions closed = ReactionsOf(e.geometry[i], e.required[i], e.forces[i]);
-      const double limit = 1e4 * kEps * 1.2e6;  // forces up to 1.2 MN, condition 39, 30 unknowns
-      EXPECT_NEAR(solved.tau_X, 0, limit);
-      EXPECT_NEAR(solved.forces.on_platform.x(), e.f_X[i], limit);
-      for (int j = 0; j < 2; ++j) {
-        EXPECT_NEAR(solved.forces.drive[j], e.forces[i].drive[j], limit);
-        EXPECT_LT((solved.forces.P[j] - e.forces[i].P[j]).norm(), limit);
-        EXPECT_LT((solved.reactions.elbow[j] - closed.elbow[j]).norm(), limit);
-        EXPECT_LT((solved.reactions.foot[j] - closed.foot[j]).norm(), limit);
-      }
-    }
-  }
-  EXPECT_LE(worst_condition, 39);
-}
-
-TEST(LimbSystem, NoticesAWrenchBentByItsTolerance) {
-  Evaluation e = Evaluate(PlatformEquations(Default(), DrivePairs::kSynchronous), SeaState(1.5));
-  const double limit = 1e4 * kEps * 1.2e6;
-  e.required[1][kLink1][0] += 20 * limit;  // N m at an arm of 3 m
-  const LimbSystem system =
-      MakeLimbSystem(LimbSystemForm::kCorrected, e.geometry[1], e.required[1], e.f[4], e.f[1]);
-  const LimbSystemSolution solved = SolveLimbSystem(system, e.f[4], e.f[1]);
-  EXPECT_GT(std::abs(solved.forces.drive[0] - e.forces[1].drive[0]), limit);
 }
 
 }  // namespace

@@ -10,10 +10,6 @@ namespace {
 constexpr std::array kShip = {"roll", "pitch", "heave"};
 constexpr std::array kPose = {"x", "y", "z", "roll", "pitch", "yaw"};
 
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint) {
-  diagnostics->Add({.file = {}, .message = std::move(message), .hint = std::move(hint)});
-}
-
 constexpr const char* kHint =
     "command roll, pitch and heave, and either platform.z, platform.roll, platform.pitch with "
     "three "

@@ -4,6 +4,8 @@
 
 #include <cmath>
 
+#include "core/spatial.h"
+
 namespace mbv::stabilizing_platform {
 namespace {
 
@@ -34,12 +36,6 @@ struct PlaneMotion {
     omega = omega_base + tilt;
     epsilon = R_Ao * epsilon_o + Vec3(0, limb.tilt.acceleration, 0) + omega_base.cross(tilt);
     spin = omega * omega.transpose() - omega.squaredNorm() * Mat3::Identity() + Skew(epsilon);
-  }
-
-  static Mat3 Skew(const Vec3& v) {
-    Mat3 S;
-    S << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
-    return S;
   }
 };
 

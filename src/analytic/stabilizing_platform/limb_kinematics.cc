@@ -74,6 +74,35 @@ RunSummary CheckToggle(const PlatformParameters& p, DrivePairs pairs, const Limb
                  toggle - m.length.value, "m");
 }
 
+// (14), (17), (d), (e): the limb plane and the tip's motion in it.
+void ComputePlane(const LimbPlace& place, const RelativeMotion& motion, bool synchronous,
+                  LimbMotion* m) {
+  // (14)
+  m->p_oA = place.p_oA;
+  m->p_oB = motion.p_op + motion.R_op * place.p_pB;
+  const Vec3 AB = m->p_oB - m->p_oA;
+  const double radial = place.e_r.dot(AB), lateral = place.e_t.dot(AB);
+  // In the plane; a synchronous limb's y is zero by (5), and l = |AB| as printed.
+  const double l = synchronous ? AB.norm() : std::hypot(radial, AB.z());
+  m->tilt.value = std::atan2(radial, AB.z());  // (17)
+  const double in_plane = std::hypot(radial, AB.z());
+  const double c = AB.z() / in_plane, s = radial / in_plane;
+  m->R_oA.col(1) = place.e_t;
+  m->R_oA.col(0) = c * place.e_r - Vec3(0, 0, s);
+  m->R_oA.col(2) = s * place.e_r + Vec3(0, 0, c);
+
+  // (d), (e)
+  const auto omega = motion.V_op.head<3>(), epsilon = motion.A_op.head<3>();
+  m->v_oB = motion.V_op.tail<3>() + omega.cross(m->p_oB);
+  m->a_oB = motion.A_op.tail<3>() + epsilon.cross(m->p_oB) + omega.cross(m->v_oB);
+  const auto X = m->R_oA.col(0), Y = m->R_oA.col(1), Z = m->R_oA.col(2);
+  m->length = {.value = l, .rate = Z.dot(m->v_oB)};
+  m->tilt.rate = X.dot(m->v_oB) / l;
+  m->length.acceleration = Z.dot(m->a_oB) + l * m->tilt.rate * m->tilt.rate;
+  m->tilt.acceleration = (X.dot(m->a_oB) - 2 * m->length.rate * m->tilt.rate) / l;
+  m->lateral = synchronous ? Jet{} : Jet{lateral, Y.dot(m->v_oB), Y.dot(m->a_oB)};
+}
+
 }  // namespace
 
 LimbPlace::LimbPlace(double azimuth, double r_a, double r_b)
@@ -119,31 +148,8 @@ RunSummary ComputeSide(const PlatformParameters& p, const Jet& Y, const Jet& l, 
 
 RunSummary ComputeLimb(const PlatformParameters& p, int limb, const LimbPlace& place,
                        const RelativeMotion& motion, DrivePairs pairs, LimbMotion* m) {
-  // (14)
-  m->p_oA = place.p_oA;
-  m->p_oB = motion.p_op + motion.R_op * place.p_pB;
-  const Vec3 AB = m->p_oB - m->p_oA;
   const bool synchronous = pairs == DrivePairs::kSynchronous;
-  const double radial = place.e_r.dot(AB), lateral = place.e_t.dot(AB);
-  // In the plane; a synchronous limb's y is zero by (5), and l = |AB| as printed.
-  const double l = synchronous ? AB.norm() : std::hypot(radial, AB.z());
-  m->tilt.value = std::atan2(radial, AB.z());  // (17)
-  const double in_plane = std::hypot(radial, AB.z());
-  const double c = AB.z() / in_plane, s = radial / in_plane;
-  m->R_oA.col(1) = place.e_t;
-  m->R_oA.col(0) = c * place.e_r - Vec3(0, 0, s);
-  m->R_oA.col(2) = s * place.e_r + Vec3(0, 0, c);
-
-  // (d), (e)
-  const auto omega = motion.V_op.head<3>(), epsilon = motion.A_op.head<3>();
-  m->v_oB = motion.V_op.tail<3>() + omega.cross(m->p_oB);
-  m->a_oB = motion.A_op.tail<3>() + epsilon.cross(m->p_oB) + omega.cross(m->v_oB);
-  const auto X = m->R_oA.col(0), Y = m->R_oA.col(1), Z = m->R_oA.col(2);
-  m->length = {.value = l, .rate = Z.dot(m->v_oB)};
-  m->tilt.rate = X.dot(m->v_oB) / l;
-  m->length.acceleration = Z.dot(m->a_oB) + l * m->tilt.rate * m->tilt.rate;
-  m->tilt.acceleration = (X.dot(m->a_oB) - 2 * m->length.rate * m->tilt.rate) / l;
-  m->lateral = synchronous ? Jet{} : Jet{lateral, Y.dot(m->v_oB), Y.dot(m->a_oB)};
+  ComputePlane(place, motion, synchronous, m);
 
   // (18)–(20); a synchronous limb's sides are mirror images.
   RunSummary summary = RunSummary::Done();

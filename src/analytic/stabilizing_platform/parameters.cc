@@ -6,11 +6,12 @@
 #include <numbers>
 
 namespace mbv::stabilizing_platform {
-namespace {
 
 void AddError(Diagnostics* diagnostics, std::string message, std::string hint) {
   diagnostics->Add({.file = {}, .message = std::move(message), .hint = std::move(hint)});
 }
+
+namespace {
 
 // Reads one parameter, or reports that it is missing.
 class Reader {

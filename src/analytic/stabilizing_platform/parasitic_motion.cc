@@ -7,6 +7,8 @@
 namespace mbv::stabilizing_platform {
 namespace {
 
+constexpr double kSmall = 1e-6;  // of denominators of order 1; below, six digits are lost
+
 // A value and its time derivative.
 struct Rated {
   double value = 0, rate = 0;
@@ -95,16 +97,9 @@ RunSummary Singular(const char* where, double amount) {
           .unit = "1"};
 }
 
-}  // namespace
-
-RunSummary ComputeParasiticMotion(const PlatformParameters& p, const Jet& roll, const Jet& pitch,
-                                  const Jet& height, SignInM sign, ParasiticMotion* motion) {
-  constexpr double kSmall = 1e-6;  // of quantities of order 1
-  const AzimuthTerms k(p);
-  const Angle a(roll), b(pitch);
-  if (!(a.c > kSmall)) return Singular("cos(roll)", a.c);
-  if (!(b.c > kSmall)) return Singular("cos(pitch)", b.c);
-
+// γ with its derivatives.
+RunSummary ComputeYaw(const AzimuthTerms& k, const Jet& roll, const Jet& pitch, const Angle& a,
+                      const Angle& b, Jet* gamma) {
   // (5)
   const double yaw_y = k.u1 * (b.c - a.c) + k.u2 * a.s * b.s;
   const double yaw_x = k.u3 * a.c + k.u2 * b.c - k.u1 * a.s * b.s;
@@ -113,14 +108,27 @@ RunSummary ComputeParasiticMotion(const PlatformParameters& p, const Jet& roll, 
   const YawTerms yaw_terms(k, a, b);
   const auto& [W1, W2, U] = yaw_terms;
   if (!(std::abs(U.value) > kSmall * size * size)) return Singular("U", U.value);
-  Jet& gamma = motion->yaw;
-  gamma.value = std::atan(yaw_y / yaw_x);
-  gamma.rate = (roll.rate * W1.value + pitch.rate * W2.value) / U.value;  // (6)
-  gamma.acceleration =
+  gamma->value = std::atan(yaw_y / yaw_x);
+  gamma->rate = (roll.rate * W1.value + pitch.rate * W2.value) / U.value;  // (6)
+  gamma->acceleration =
       (roll.acceleration * W1.value + roll.rate * W1.rate + pitch.acceleration * W2.value +
-       pitch.rate * W2.rate - gamma.rate * U.rate) /
+       pitch.rate * W2.rate - gamma->rate * U.rate) /
       U.value;  // (7)
+  return RunSummary::Done();
+}
 
+}  // namespace
+
+RunSummary ComputeParasiticMotion(const PlatformParameters& p, const Jet& roll, const Jet& pitch,
+                                  const Jet& height, SignInM sign, ParasiticMotion* motion) {
+  const AzimuthTerms k(p);
+  const Angle a(roll), b(pitch);
+  if (!(a.c > kSmall)) return Singular("cos(roll)", a.c);
+  if (!(b.c > kSmall)) return Singular("cos(pitch)", b.c);
+
+  RunSummary yaw_summary = ComputeYaw(k, roll, pitch, a, b, &motion->yaw);
+  if (!yaw_summary.ok()) return yaw_summary;
+  const Jet& gamma = motion->yaw;
   const Angle yaw(gamma);
   const Angle delta(Jet{gamma.value + p.theta_2, gamma.rate, gamma.acceleration});
   const double sec2_a = 1 + a.t * a.t, sec2_b = 1 + b.t * b.t;
