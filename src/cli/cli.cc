@@ -47,6 +47,7 @@ int RunCli(int argc, char** argv) {
   AddAuditCommand(&app, &exit_code);
   AddListCommand(&app, &exit_code);
   AddWorkspaceCommand(&app, &exit_code);
+  AddMutateCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

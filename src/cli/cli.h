@@ -24,5 +24,6 @@ void AddCheckCommand(CLI::App* app, int* exit_code);
 void AddAuditCommand(CLI::App* app, int* exit_code);
 void AddListCommand(CLI::App* app, int* exit_code);
 void AddWorkspaceCommand(CLI::App* app, int* exit_code);
+void AddMutateCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -161,11 +162,14 @@ WorkspaceOutcome ScaraWorkspace(const Mechanism& mechanism, bool pictures) {
   for (double yaw : {0.0, 45.0, -45.0}) {
     const scara::CylinderCheck check =
         scara::CheckCylinder(parameters, limits, space, yaw * kDeg, 14, 20, 72);
+    const auto reached = std::count_if(
+        check.poses.begin(), check.poses.end(),
+        [](const scara::PoseCheck& pose) { return pose.reach == scara::Reach::kReachable; });
     outcome.text += fmt::format(
-        "  yaw {:g} deg: {} of {} poses; smallest V {:.3g} at ({:.1f}, {:.1f}, "
-        "{:.1f}) mm\n",
-        yaw, check.complete ? "all" : "some are out of reach", check.poses.size(), check.V_min,
-        1e3 * check.X_at_V_min[0], 1e3 * check.X_at_V_min[1], 1e3 * check.X_at_V_min[2]);
+        "  yaw {:g} deg: {} of {} poses reached; smallest V {:.3g} at ({:.1f}, {:.1f}, {:.1f}) "
+        "mm\n",
+        yaw, reached, check.poses.size(), check.V_min, 1e3 * check.X_at_V_min[0],
+        1e3 * check.X_at_V_min[1], 1e3 * check.X_at_V_min[2]);
     for (size_t k = 0; k < check.layer_z.size(); ++k) {
       if (check.layer_reached[k] >= 1.0) continue;
       outcome.text += fmt::format("    z = {:.0f} mm: {:.1f} % reached\n", 1e3 * check.layer_z[k],
