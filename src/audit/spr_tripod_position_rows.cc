@@ -60,7 +60,7 @@ void GeometryRows(const Case& c, std::vector<AuditRow>* rows) {
                      .note = "the printed matrix at the reference's angles, against its rotation"});
   RowMeter loop = row("(1)", "r = b_i + q_i w_i − a_i", "with the reference's q_i, w_i");
   RowMeter hinge = row("(2)", "q_i w_i·c_i = 0, c_i = R (cos θ_i, sin θ_i, 0)",
-                       "size: a residual has none; the reference's legs and platform");
+                       "with the reference's A_i, B_i and platform; size: q_i");
   RowMeter joints = row("(3)", "B_i = b f_i, A_i = a R f_i + r",
                         "against origins of the reference's cylinders and rods");
   RowMeter length = row("(4)", "q_i² = |A_i − B_i|²", "lengths q_i against the reference's slides");
@@ -85,7 +85,7 @@ void GeometryRows(const Case& c, std::vector<AuditRow>* rows) {
         vector.Add(leg.q * leg.w[k], qw[k]);
         direction.Add(leg.w[k], qw[k] / leg.q);
       }
-      hinge.Add(0, leg.q * leg.w.dot(t.R * c.geometry.c[i]));
+      hinge.Add(leg.q, leg.q + (leg.A - leg.B).dot(t.R * c.geometry.c[i]));
       length.Add(leg.q, qw.norm());
       forward.Add(leg.q, std::sqrt(qw.dot(qw)));
     }
@@ -123,12 +123,13 @@ void ClosedFormRows(const Case& c, std::vector<AuditRow>* rows) {
                     .limit = kPositionLimit,
                     .unit = "rad",
                     .note = "wrong sign: the torsion δ + ψ of the platform is zero"});
-  RowMeter impossible({.equation = "(6) δ in (2)",
-                       .printed = "constraints (2) at δ = ψ, x0 and y0 fitted best",
-                       .corrected = "at δ = −ψ",
-                       .limit = kPositionLimit,
-                       .unit = "m",
-                       .note = "with the printed torsion no position meets the constraints"});
+  RowMeter impossible(
+      {.equation = "(6) δ in (2)",
+       .printed = "constraints (2) at δ = ψ, x0 and y0 fitted best",
+       .corrected = "at δ = −ψ",
+       .limit = kPositionLimit,
+       .unit = "m",
+       .note = "with the printed torsion no position meets the constraints; size: b"});
   RowMeter lengths({.equation = "(7)",
                     .printed = kPrinted7,
                     .corrected = kCorrected7,
@@ -164,7 +165,8 @@ void ClosedFormRows(const Case& c, std::vector<AuditRow>* rows) {
       const Vec3 gap = C * C.colPivHouseholderQr().solve(rhs) - rhs;
       return gap.lpNorm<Eigen::Infinity>();
     };
-    impossible.Add(0, misfit(t.psi), misfit(-t.psi));
+    const double size = c.geometry.b;
+    impossible.Add(size, size + misfit(t.psi), size + misfit(-t.psi));
     const PerLeg<double> q_printed = PrintedSquares(c.geometry, t.r, t.R);
     const PerLeg<double> q_corrected = SquaredLengths(c.geometry, t.r, t.R);
     for (int i = 0; i < 3; ++i) {

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "mechanism/load_model.h"
+#include "reference/reference.h"
 #include "spr_tripod_model.h"
 #include "tests/analytic/allocation_counter.h"
 
@@ -74,6 +76,41 @@ TEST(SprTripodClosedForm, DefaultPathReachesTheTabulatedExtremes) {
   }
   EXPECT_NEAR(acceleration, 10.33, 0.01);
   EXPECT_NEAR(spin, 0.438, 1e-3);
+}
+
+Mechanism ShippedModel() {
+  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/spr_tripod/model.yaml");
+  EXPECT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  return *std::move(loaded.mechanism);
+}
+
+TEST(SprTripodClosedForm, ShippedModelGivesTheDriveForcesOfTheOneMadeByHand) {
+  const Motion motion = PathMotion(50 * kDeg, 0.12, 0.06, 0.57, 0.01);
+  const Trace shipped = RunTripod(ShippedModel(), motion).trace;
+  const Trace by_hand = RunTripod(TripodByHand(), motion).trace;
+  for (const Channel& channel : by_hand.channels) {
+    if (channel.name.find("reaction") != std::string::npos) continue;  // other joint axes
+    const VecX difference = ColumnOf(shipped, channel.name) - ColumnOf(by_hand, channel.name);
+    EXPECT_LT(difference.lpNorm<Eigen::Infinity>(), kForceRoundoff_N) << channel.name;
+  }
+}
+
+TEST(SprTripodClosedForm, ReferenceAgreesOnEveryChannelTheyShare) {
+  const Mechanism mechanism = ShippedModel();
+  const Motion motion = PathMotion(50 * kDeg, 0.12, 0.06, 0.57, 0.02);
+  const Trace analytic = RunTripod(mechanism, motion).trace;
+  const ReferenceRun reference = RunReference(mechanism, motion);
+  ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
+  int shared = 0;
+  for (const Channel& channel : analytic.channels) {
+    if (reference.trace.Find(channel.name) < 0) continue;
+    ++shared;
+    const VecX a = ColumnOf(analytic, channel.name), r = ColumnOf(reference.trace, channel.name);
+    // Loops close to 1e-13 m; forces follow from a system of condition 1e4.
+    EXPECT_LT((a - r).lpNorm<Eigen::Infinity>(), 1e-9 * std::max(1.0, a.lpNorm<Eigen::Infinity>()))
+        << channel.name;
+  }
+  EXPECT_EQ(shared, 12 + 6 + 9);  // drives, platform, forces of the ball joints
 }
 
 TEST(SprTripodClosedForm, PathOfTheSymmetryPlaneDrivesTwoLegsAlike) {

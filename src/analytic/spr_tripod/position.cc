@@ -32,7 +32,7 @@ Conics Evaluate(double b, const Vec3& r, const Tilt& t) {
   return k;
 }
 
-// `missing`: by how much r is too high, where that is the reason [m].
+// `missing`: by how much r.z is too small, where that is the reason [m].
 RunSummary Unreachable(const Vec3& r, const std::string& why, double missing = kNan) {
   return {.stop = Stop::kUnreachable,
           .message = fmt::format("O_A = ({:.6g}, {:.6g}, {:.6g}) m {}", r.x(), r.y(), r.z(), why),
@@ -159,8 +159,8 @@ RunSummary SolveInverse(const Geometry& geometry, const Vec3& r, Posture* postur
   const double missing = 0.5 * geometry.b - r.z();
   if (!(missing < 0.0)) {
     return Unreachable(r,
-                       fmt::format("is not below z = b/2 = {:.6g} m (z points from base to "
-                                   "platform), where the upright assembly is unique",
+                       fmt::format("lies nearer to the base than z = b/2 = {:.6g} m, where several "
+                                   "upright assemblies share a position",
                                    0.5 * geometry.b),
                        missing);
   }
