@@ -11,8 +11,11 @@
 namespace mbv {
 namespace {
 
-// Force errors below this are roundoff of the inverse dynamics, not an effect of the parameter.
-constexpr double kRoundoff = 1e-11;
+// A value counts as an effect of the parameter when it is clearly above what the unbent run gives.
+constexpr double kRoundoff = 1e-12;
+constexpr double kAboveBase = 5.0;
+
+double Visible(double base) { return std::max(kRoundoff, kAboveBase * base); }
 
 RunOptions OptionsFor(const std::string& parameter, double value) {
   RunOptions options;
@@ -27,12 +30,19 @@ RunOptions OptionsFor(const std::string& parameter, double value) {
 
 bool IsForce(Metric metric) { return metric == Metric::kForceNrmse || metric == Metric::kForceMax; }
 
-// What the checks of a bent run say; `base` are those of the unbent run.
-void Judge(const Report& bent, double size, Mutation* m) {
+constexpr const char* kForceCheck = "simulated_vs_analytic.force_nrmse";
+
+double ValueOf(const Report& report, const std::string& check_name) {
+  const CheckResult* check = report.comparison.FindCheck(check_name);
+  return check == nullptr ? 0.0 : check->value;
+}
+
+// What the checks of a bent run say; `base` is the unbent run.
+void Judge(const Report& bent, const Report& base, double size, Mutation* m) {
   double best = std::numeric_limits<double>::infinity();
+  m->force_change = ValueOf(bent, kForceCheck);
   for (const CheckResult& check : bent.comparison.checks) {
-    if (check.name == "simulated_vs_analytic.force_nrmse") m->force_change = check.value;
-    if (!check.limit || !(check.value > kRoundoff)) continue;
+    if (!check.limit || !(check.value > Visible(ValueOf(base, check.name)))) continue;
     // A check that fails shows the error; NaN fails too.
     if (!check.pass) {
       m->detected = true;
@@ -47,15 +57,16 @@ void Judge(const Report& bent, double size, Mutation* m) {
   if (m->detected) m->smallest = best;
 }
 
-std::string WhyUnseen(const Mutation& m, const std::string& note) {
-  if (!(m.force_change > kRoundoff)) {
+std::string WhyUnseen(const Mutation& m, const Report& base, const std::string& note) {
+  if (!(m.force_change > Visible(ValueOf(base, kForceCheck)))) {
     return "the simulated motion and drive forces do not depend on it" +
            (note.empty() ? "" : " (" + note + ")");
   }
   return fmt::format("its effect on the drive forces ({:.1e}) is below the limit", m.force_change);
 }
 
-Mutation Bend(const std::string& file, const Parameter& parameter, double size) {
+Mutation Bend(const std::string& file, const Parameter& parameter, const Report& base,
+              double size) {
   Mutation m;
   m.parameter = parameter.name;
   m.unit = parameter.unit;
@@ -77,8 +88,8 @@ Mutation Bend(const std::string& file, const Parameter& parameter, double size) 
     m.reason = outcome.report->comparison.reason;
     return m;
   }
-  Judge(*outcome.report, size, &m);
-  if (!m.detected) m.reason = WhyUnseen(m, parameter.note);
+  Judge(*outcome.report, base, size, &m);
+  if (!m.detected) m.reason = WhyUnseen(m, base, parameter.note);
   return m;
 }
 
@@ -127,7 +138,7 @@ MutationReport MutateScenario(const std::string& file, const MutationOptions& op
     if (options.progress) {
       options.progress(parameters[i].name, static_cast<double>(i) / parameters.size());
     }
-    report.mutations.push_back(Bend(file, parameters[i], options.size));
+    report.mutations.push_back(Bend(file, parameters[i], *base.report, options.size));
   }
   std::stable_sort(report.mutations.begin(), report.mutations.end(),
                    [](const Mutation& a, const Mutation& b) {
@@ -137,8 +148,9 @@ MutationReport MutateScenario(const std::string& file, const MutationOptions& op
                      return key(a) > key(b);
                    });
   const bool missed =
-      std::any_of(report.mutations.begin(), report.mutations.end(),
-                  [](const Mutation& m) { return !m.detected && m.force_change > kRoundoff; });
+      std::any_of(report.mutations.begin(), report.mutations.end(), [&](const Mutation& m) {
+        return !m.detected && m.force_change > Visible(ValueOf(*base.report, kForceCheck));
+      });
   report.exit_code = missed ? 1 : 0;
   return report;
 }
