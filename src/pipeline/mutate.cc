@@ -42,7 +42,7 @@ void Judge(const Report& bent, const Report& base, double size, Mutation* m) {
   double best = std::numeric_limits<double>::infinity();
   m->force_change = ValueOf(bent, kForceCheck);
   for (const CheckResult& check : bent.comparison.checks) {
-    if (!check.limit || !(check.value > Visible(ValueOf(base, check.name)))) continue;
+    if (!check.limit || check.value <= Visible(ValueOf(base, check.name))) continue;
     // A check that fails shows the error; NaN fails too.
     if (!check.pass) {
       m->detected = true;
