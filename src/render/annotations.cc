@@ -56,30 +56,66 @@ void AddArrowGhost(const Vec3& p, const Vec3& q, double radius, const Material& 
   flats->push_back(std::move(ghost));
 }
 
-// A torque as an arc around its axis; the sweep follows the torque.
-void AddTorqueArc(const Vec3& p, const Vec3& axis, double share, double radius, double thickness,
-                  const Material& material, std::vector<Item>* items) {
-  const double sweep = share * kFullArc;
-  const Mat3 R = FrameAlong(axis);
-  const auto point = [&](double angle) {
-    return Vec3(p + radius * (R * Vec3(std::cos(angle), std::sin(angle), 0.0)));
-  };
-  const double head = std::copysign(std::min(0.6, 0.6 * std::abs(sweep)), sweep);
-  const double shaft = sweep - head;
-  const int pieces = std::max(1, static_cast<int>(std::ceil(std::abs(shaft) / 0.1)));
-  for (int i = 0; i < pieces; ++i) {
-    items->push_back(Between(Solid::kCapsule, point(shaft * i / pieces),
-                             point(shaft * (i + 1) / pieces), thickness, material));
+// A torque as an arc around its axis; the sweep follows the torque. The middle of the arc looks at
+// the camera; what bodies hide of it shows through.
+struct TorqueArc {
+  Vec3 centre;
+  Mat3 R;  // columns: middle of the arc, across it, axis
+  double radius, thickness, sweep;
+
+  [[nodiscard]] Vec3 Radial(double angle) const {
+    return R * Vec3(std::cos(angle), std::sin(angle), 0.0);
+  }
+  [[nodiscard]] Vec3 Point(double angle) const { return centre + radius * Radial(angle); }
+};
+
+void AddTorqueArc(const TorqueArc& arc, const Material& material, const Vec3& forward_W,
+                  Annotations* out) {
+  const double head = std::copysign(std::min(0.6, 0.6 * std::abs(arc.sweep)), arc.sweep);
+  const double start = -0.5 * arc.sweep, neck_angle = 0.5 * arc.sweep - head;
+  const Vec3 neck = arc.Point(neck_angle);
+  const Vec3 along = arc.R.col(2).cross(arc.Radial(neck_angle));
+  const Vec3 tip = neck + arc.radius * head * along;
+  const Vec3 shift = -2.2 * arc.thickness * forward_W;
+  FlatMesh ghost{.rgba = WithAlpha(material, kGhost), .depth = FlatMesh::Depth::kHidden};
+  const int pieces = std::max(1, static_cast<int>(std::ceil(std::abs(neck_angle - start) / 0.1)));
+  for (int i = 0; i <= pieces; ++i) {
+    const double angle = start + (neck_angle - start) * i / pieces;
+    const double next = start + (neck_angle - start) * (i + 1) / pieces;
+    for (const double side : {-1.0, 1.0}) {
+      ghost.vertices_W.emplace_back(arc.Point(angle) + side * arc.thickness * arc.Radial(angle) +
+                                    shift);
+    }
+    if (i == pieces) break;
+    const int k = 2 * i;
+    ghost.triangles.push_back({k, k + 1, k + 2});
+    ghost.triangles.push_back({k + 2, k + 1, k + 3});
+    out->items.push_back(
+        Between(Solid::kCapsule, arc.Point(angle), arc.Point(next), arc.thickness, material));
   }
   // The head: a straight cone of balls that taper to the tip.
   constexpr int kBalls = 24;
-  const Vec3 neck = point(shaft);
-  const Vec3 tip = neck + radius * head * (R * Vec3(-std::sin(shaft), std::cos(shaft), 0.0));
+  const double width = 2.6 * arc.thickness;
   for (int i = 0; i < kBalls; ++i) {
-    const double share_of_head = static_cast<double>(i) / kBalls;
-    items->push_back(BallAt(neck + share_of_head * (tip - neck),
-                            2.6 * thickness * (1.0 - share_of_head), material));
+    const double share = static_cast<double>(i) / kBalls;
+    out->items.push_back(BallAt(neck + share * (tip - neck), width * (1.0 - share), material));
   }
+  const int k = static_cast<int>(ghost.vertices_W.size());
+  for (const double side : {-1.0, 1.0}) {
+    ghost.vertices_W.emplace_back(neck + side * width * arc.Radial(neck_angle) + shift);
+  }
+  ghost.vertices_W.emplace_back(tip + shift);
+  ghost.triangles.push_back({k, k + 1, k + 2});
+  out->flats.push_back(std::move(ghost));
+}
+
+// The arc's axes: its middle towards the viewer, as far as the axis allows.
+Mat3 ArcAxes(const Vec3& axis, const Vec3& forward_W) {
+  Vec3 middle = -forward_W + forward_W.dot(axis) * axis;
+  middle = middle.norm() > 0.2 ? Vec3(middle.normalized()) : axis.unitOrthogonal();
+  Mat3 R;
+  R << middle, axis.cross(middle), axis;
+  return R;
 }
 
 class ForceMarks {
@@ -108,8 +144,12 @@ class ForceMarks {
     if (scale_.longest_torque_Nm <= 0.0) return;
     const double share = force / scale_.longest_torque_Nm;
     if (std::abs(share) < kSmallestShare) return;
-    AddTorqueArc(X_WF.translation(), axis, share, 0.3 * scale_.arrow_m, 0.022 * scale_.arrow_m,
-                 Color(force), &out_->items);
+    AddTorqueArc({.centre = X_WF.translation(),
+                  .R = ArcAxes(axis, forward_W_),
+                  .radius = 0.3 * scale_.arrow_m,
+                  .thickness = 0.022 * scale_.arrow_m,
+                  .sweep = share * kFullArc},
+                 Color(force), forward_W_, out_);
   }
 
  private:
@@ -123,7 +163,7 @@ class ForceMarks {
     if (share < kSmallestShare) return;
     Vec3 p = point, q = point + share * scale_.arrow_m * direction;
     if (force < 0.0) std::swap(p, q);
-    const double radius = 0.032 * scale_.arrow_m;
+    const double radius = 0.038 * scale_.arrow_m;
     out_->items.push_back(Between(Solid::kArrow, p, q, radius, Color(force)));
     AddArrowGhost(p, q, radius, Color(force), forward_W_, &out_->flats);
   }

@@ -17,8 +17,8 @@ struct FlatMesh {
     kVisible,  ///< hidden by solids before it
     kHidden,   ///< only where solids hide it
   };
-  std::vector<Vec3> vertices_W;               ///< [m]
-  std::vector<std::array<int, 3>> triangles;  ///< indices into vertices_W
+  std::vector<Vec3> vertices_W = {};               ///< [m]
+  std::vector<std::array<int, 3>> triangles = {};  ///< indices into vertices_W
   std::array<float, 4> rgba{};
   Depth depth = Depth::kVisible;
   bool shaded = false;  ///< darker where it is seen at a flat angle
