@@ -119,7 +119,7 @@ const CheckResult* WorstPairCheck(const Comparison& comparison) {
   double worst_ratio = -1.0;
   for (const CheckResult& check : comparison.checks) {
     if (!Failed(&check) || !RowOf(check.metric).of_pair) continue;
-    const bool force = check.metric == Metric::kForceNrmse || check.metric == Metric::kForceMax;
+    const bool force = IsDriveForce(check.metric);
     double ratio = std::isnan(check.value) ? 1e300 : check.value / *check.limit;
     if (force) ratio += 1e301;
     if (ratio > worst_ratio) {

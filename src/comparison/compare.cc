@@ -134,10 +134,8 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     return;
   }
   const bool force_judged = std::any_of(
-      comparison->checks.begin(), comparison->checks.end(), [](const CheckResult& check) {
-        return check.limit &&
-               (check.metric == Metric::kForceNrmse || check.metric == Metric::kForceMax);
-      });
+      comparison->checks.begin(), comparison->checks.end(),
+      [](const CheckResult& check) { return check.limit && IsDriveForce(check.metric); });
   if (!force_judged) {
     comparison->reason = "every force check is switched off, so nothing was verified";
     return;

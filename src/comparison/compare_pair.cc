@@ -15,6 +15,9 @@ namespace {
 constexpr double kVelocityFloor = 1e-3;
 constexpr double kAccelerationFloor = 1e-3;
 constexpr double kMomentArm_m = 1e-3;
+// A drive whose force is smaller than this share of its unit's RMS is judged by that share: a drive
+// that holds nothing has no scale of its own.
+constexpr double kIdleDrive = 1e-3;
 
 // The same channel in both traces; absent if `measured` < 0 or `truth` < 0.
 struct Columns {
@@ -90,6 +93,7 @@ void FitFactor(const PairReader& reader, Columns columns, double start_s, DriveM
 // Forces: per drive and pooled over the drives of one unit.
 void CompareForces(const ComparisonInput& input, const PairReader& reader, PairComparison* pair) {
   std::map<std::string, ErrorSum> pooled;
+  std::vector<std::pair<std::string, ErrorSum>> drives;  // unit and sums, as pair->drives
   for (const Drive& drive : input.mechanism->drives) {
     const std::string channel = drive.name + ".force";
     const Columns columns = reader.Find(channel);
@@ -101,6 +105,11 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
     FitFactor(reader, columns, input.start_window_s, &pair->drives.back());
     pair->force_samples = sum.count();
     pooled[unit].Merge(sum);
+    drives.emplace_back(unit, sum);
+  }
+  for (const auto& [unit, sum] : drives) {
+    const double floor = kIdleDrive * pooled[unit].rms_truth();
+    KeepWorst(&pair->metrics, Metric::kForceOwn, AsMeasured(sum, sum.Nrmse(floor)));
   }
   for (const auto& [unit, sum] : pooled) {
     KeepWorst(&pair->metrics, Metric::kForceNrmse, AsMeasured(sum, sum.Nrmse()));

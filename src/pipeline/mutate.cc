@@ -28,8 +28,6 @@ RunOptions OptionsFor(const std::string& parameter, double value) {
   return options;
 }
 
-bool IsForce(Metric metric) { return metric == Metric::kForceNrmse || metric == Metric::kForceMax; }
-
 constexpr const char* kForceCheck = "simulated_vs_analytic.force_nrmse";
 
 double ValueOf(const Report& report, const std::string& check_name) {
@@ -46,7 +44,7 @@ void Judge(const Report& bent, const Report& base, double size, Mutation* m) {
     // A check that fails shows the error; NaN fails too.
     if (!check.pass) {
       m->detected = true;
-      m->by_force = m->by_force || IsForce(check.metric);
+      m->by_force = m->by_force || IsDriveForce(check.metric);
     }
     const double smallest = size * *check.limit / check.value;
     if (smallest < best) {

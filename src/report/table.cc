@@ -104,6 +104,7 @@ class Writer {
       case Metric::kForceNrmse:
         return true;
       case Metric::kForceMax:
+      case Metric::kForceOwn:
       case Metric::kPoseM:
       case Metric::kPoseRad:
         return check.subject == "simulated_vs_analytic";
@@ -179,12 +180,14 @@ class Writer {
   void Tail(const Report& report) {
     const Timing& timing = report.timing;
     Line();
-    std::string line = fmt::format(
-        "  time: analytic {:.3f} s, reference {:.3f} s, simulation "
-        "{:.3f} s",
-        timing.analytic_s, timing.reference_s, timing.simulation_s);
-    if (timing.stock_s > 0.0) line += fmt::format(", stock {:.3f} s", timing.stock_s);
-    if (timing.render_s > 0.0) line += fmt::format(", pictures {:.3f} s", timing.render_s);
+    std::string line = "  time:";
+    for (const auto& [what, seconds] :
+         {std::pair{"analytic", timing.analytic_s}, std::pair{"reference", timing.reference_s},
+          std::pair{"simulation", timing.simulation_s}, std::pair{"other engine", timing.stock_s},
+          std::pair{"pictures", timing.render_s}}) {
+      if (seconds > 0.0) line += fmt::format(" {} {:.3f} s,", what, seconds);
+    }
+    line += fmt::format(" all {:.3f} s", timing.total_s);
     if (timing.loop_s > 0.0 && timing.steps > 0) {
       line += fmt::format("; {} {}, {:.0f}/s", timing.steps,
                           report.mode == "forward" ? "steps" : "samples",

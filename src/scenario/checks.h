@@ -20,6 +20,8 @@ namespace mbv {
 enum class Metric {
   kForceNrmse,    ///< pair: RMS error of all drive forces of one unit / RMS force
   kForceMax,      ///< pair: largest error / largest force, drives of one unit
+  kForceOwn,      ///< pair: worst drive's RMS error / its own RMS force (at least 0.1 % of the
+                  ///< RMS force of all drives of its unit)
   kPositionM,     ///< pair: drive positions [m]
   kPositionRad,   ///< pair: drive positions [rad]
   kVelocity,      ///< pair: drive velocities, RMS error / RMS
@@ -34,7 +36,7 @@ enum class Metric {
   kPower,         ///< |input power − energy rate| / largest power
   kDerivatives,   ///< drive velocity and acceleration against differences of the positions
 };
-inline constexpr int kMetrics = 15;
+inline constexpr int kMetrics = 16;
 
 /// Which column of limits applies.
 enum class LimitColumn { kForward, kInverse, kReference };
@@ -56,6 +58,12 @@ struct MetricRow {
   bool of_pair;         ///< compares two witnesses
   MetricLimits limits;  ///< defaults
 };
+
+/// Judges drive forces.
+[[nodiscard]] constexpr bool IsDriveForce(Metric metric) {
+  return metric == Metric::kForceNrmse || metric == Metric::kForceMax ||
+         metric == Metric::kForceOwn;
+}
 
 [[nodiscard]] std::span<const MetricRow> MetricRows();
 [[nodiscard]] const MetricRow& RowOf(Metric metric);

@@ -3,7 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include "synthetic.h"
+#include "tests/comparison/synthetic.h"
 
 namespace mbv {
 namespace {
@@ -32,8 +32,8 @@ TEST(Comparison, EqualWitnessesAgreeInEveryCheck) {
   const Comparison comparison = Case().Run();
   EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
   EXPECT_EQ(comparison.failed(), 0u);
-  // Per pair: two force, one position, velocity, acceleration, two pose, reaction.
-  EXPECT_EQ(comparison.checks.size(), 3u * 8u + 2u * 5u + 4u);
+  // Per pair: three force, one position, velocity, acceleration, two pose, reaction.
+  EXPECT_EQ(comparison.checks.size(), 3u * 9u + 2u * 5u + 4u);
   EXPECT_TRUE(comparison.attribution.odd_one_out.empty());
 }
 
@@ -249,9 +249,27 @@ TEST(Comparison, OneWitnessAloneVerifiesNothing) {
   EXPECT_EQ(c.Run().verdict, Verdict::kNotRun);
 }
 
+TEST(Comparison, ASmallDriveIsJudgedOnItsOwnScale) {
+  Case c;
+  // Drive 1 carries 1 % of drive 2; an error that is small for both together is large for it.
+  const int d1 = c.analytic.Find("d1.force"), d2 = c.analytic.Find("d2.force");
+  ASSERT_GE(d1, 0);
+  ASSERT_GE(d2, 0);
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    trace->values.col(d1) *= 0.01 * trace->values.col(d2).norm() / trace->values.col(d1).norm();
+  }
+  const double own_rms = c.analytic.values.col(d1).norm() / std::sqrt(101.0);
+  Bend(&c.simulated, "d1.force", 1e-3 * own_rms);
+  const PairComparison pair = ComparePair(c.Input(), c.simulated, c.analytic);
+  EXPECT_NEAR(pair.metrics.at(Metric::kForceOwn).value, 1e-3, 1e-12);
+  EXPECT_LT(pair.metrics.at(Metric::kForceNrmse).value, 1e-5);
+  EXPECT_EQ(pair.metrics.at(Metric::kForceOwn).channel, "d1.force");
+}
+
 TEST(Comparison, SwitchedOffForceChecksVerifyNothing) {
   Case c;
   c.limits[Metric::kForceNrmse] = {};
+  c.limits[Metric::kForceOwn] = {};
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);  // the maximum is still judged
   c.limits[Metric::kForceMax] = {};
   EXPECT_EQ(c.Run().verdict, Verdict::kNotRun);
