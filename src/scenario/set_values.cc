@@ -1,5 +1,7 @@
 #include "scenario/set_values.h"
 
+#include <algorithm>
+
 namespace mbv {
 namespace {
 
@@ -70,14 +72,19 @@ YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, Yam
 }
 
 Diagnostics PlaceSetFindings(const Diagnostics& diagnostics, const std::vector<SetValue>& values) {
-  Diagnostics placed;
+  std::vector<Finding> findings;
   for (Finding finding : diagnostics.findings()) {
     if (finding.line < 0) {
       finding.file = OptionText(values[static_cast<size_t>(-finding.line - 1)]);
       finding.line = 0;
     }
-    placed.Add(std::move(finding));
+    findings.push_back(std::move(finding));
   }
+  std::stable_sort(findings.begin(), findings.end(), [](const Finding& a, const Finding& b) {
+    return std::pair(a.line, a.column) < std::pair(b.line, b.column);
+  });
+  Diagnostics placed;
+  for (Finding& finding : findings) placed.Add(std::move(finding));
   return placed;
 }
 

@@ -11,7 +11,7 @@ namespace mbv {
 [[nodiscard]] YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values,
                                     YamlReader* reader);
 
-/// Moves findings about such nodes from the file to "--set key=value".
+/// Moves findings about such nodes from the file to "--set key=value", and sorts all by place.
 [[nodiscard]] Diagnostics PlaceSetFindings(const Diagnostics& diagnostics,
                                            const std::vector<SetValue>& values);
 

@@ -11,7 +11,7 @@ std::optional<double> ValueReader::Number(const YamlNode& node, const std::strin
   }
   const ExpressionResult result = scope_->Evaluate(node.text);
   if (!result.value) {
-    yaml_->Error(node, fmt::format("{} = {}: {}", path, Describe(node), result.error), result.hint);
+    yaml_->Error(node, fmt::format("{} = {} {}", path, Describe(node), result.error), result.hint);
   }
   return result.value;
 }

@@ -1,0 +1,195 @@
+// The program from outside: exit codes, where output goes, what is left behind.
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <nlohmann/json.hpp>
+
+#include "tests/cli/program.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kGood = "scenarios/stabilizing_platform/static.yaml";
+constexpr const char* kDisagrees = "scenarios/stabilizing_platform/must_fail/analytic_mass.yaml";
+constexpr const char* kBadInput = "scenarios/stabilizing_platform/must_fail/no_yaml.yaml";
+constexpr const char* kCannotRun = "scenarios/stabilizing_platform/must_fail/out_of_reach.yaml";
+
+std::string Run(const Program& mbverify, const std::string& arguments) {
+  return "run --no-pictures --out " + mbverify.Out() + " " + arguments;
+}
+
+class CliTest : public testing::Test {
+ protected:
+  Program mbverify{testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(CliTest, VersionAndHelpGoToStdout) {
+  const ProgramResult version = mbverify("--version");
+  EXPECT_EQ(version.exit_code, 0);
+  EXPECT_EQ(version.out.substr(0, 9), "mbverify ");
+  const ProgramResult help = mbverify("run --help");
+  EXPECT_EQ(help.exit_code, 0);
+  EXPECT_NE(help.out.find("Examples:"), std::string::npos);
+}
+
+TEST_F(CliTest, WrongUseIsBadInput) {
+  for (const char* arguments : {"", "rum", "run", "run --mode backward x.yaml", "model",
+                                "run x.yaml --set nonsense", "model no_such_model"}) {
+    const ProgramResult result = mbverify(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    EXPECT_FALSE(result.err.empty()) << arguments;
+    EXPECT_TRUE(result.out.empty()) << result.out;
+  }
+}
+
+TEST_F(CliTest, TheWorstScenarioDecidesTheExitCode) {
+  const std::string good = kGood, disagrees = kDisagrees, bad = kBadInput, cannot = kCannotRun;
+  EXPECT_EQ(mbverify(Run(mbverify, good)).exit_code, 0);
+  EXPECT_EQ(mbverify(Run(mbverify, good + " " + disagrees)).exit_code, 1);
+  EXPECT_EQ(mbverify(Run(mbverify, cannot + " " + disagrees)).exit_code, 3);
+  const ProgramResult all =
+      mbverify(Run(mbverify, "-q " + cannot + " " + bad + " " + good + " " + disagrees));
+  EXPECT_EQ(all.exit_code, 2);
+  EXPECT_NE(all.out.find("4 scenarios: 2 ran, 2 compared, 1 verified, 1 with bad input"),
+            std::string::npos)
+      << all.out;
+}
+
+TEST_F(CliTest, FoldersStandForTheirScenariosButNotForThoseThatMustFail) {
+  fs::create_directories(mbverify.folder() / "mine" / "must_fail");
+  const fs::path source = MBV_SOURCE_DIR;
+  fs::copy(source / kGood, mbverify.folder() / "mine" / "a.yaml");
+  fs::copy(source / kDisagrees, mbverify.folder() / "mine" / "must_fail" / "b.yaml");
+  std::ofstream(mbverify.folder() / "mine" / "other.yaml") << "a: 1\n";
+  const std::string models = "MBVERIFY_MODELS='" MBV_SOURCE_DIR "/models' ";
+  setenv("MBVERIFY_MODELS", MBV_SOURCE_DIR "/models", 1);
+  const ProgramResult result =
+      mbverify(Run(mbverify, "-q " + (mbverify.folder() / "mine").string()));
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+  EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1) << result.out;
+  fs::create_directories(mbverify.folder() / "empty");
+  EXPECT_EQ(mbverify(Run(mbverify, (mbverify.folder() / "empty").string())).exit_code, 2);
+  unsetenv("MBVERIFY_MODELS");
+}
+
+TEST_F(CliTest, ResultsGoToStdoutTalkToStderrAndFilesToTheFolder) {
+  const ProgramResult result = mbverify(Run(mbverify, kGood));
+  EXPECT_EQ(result.out.substr(0, 35), "stabilizing_platform / static: AGREE");
+  EXPECT_NE(result.err.find("results in "), std::string::npos);
+  EXPECT_EQ(result.out.find('\x1b'), std::string::npos);  // no colour into a file
+  const fs::path folder = fs::path(mbverify.Out()) / "stabilizing_platform" / "static";
+  for (const char* name : {"summary.json", "traces.csv", "model.xml"}) {
+    EXPECT_TRUE(fs::exists(folder / name)) << name;
+  }
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.parent_path()), {}), 1);
+}
+
+TEST_F(CliTest, TheSameScenarioTwiceGivesTheSameBytes) {
+  const std::string arguments =
+      std::string(kDisagrees) + " --mode forward --set motion.duration_s=1";
+  const fs::path csv =
+      fs::path(mbverify.Out()) / "stabilizing_platform/must_fail/analytic_mass/traces.csv";
+  ASSERT_EQ(mbverify(Run(mbverify, arguments)).exit_code, 1);
+  const std::string first = ReadAll(csv);
+  ASSERT_EQ(mbverify(Run(mbverify, arguments)).exit_code, 1);
+  EXPECT_GT(first.size(), 10000u);
+  EXPECT_TRUE(first == ReadAll(csv));
+}
+
+TEST_F(CliTest, AKilledRunLeavesTheOldResultWhole) {
+  ASSERT_EQ(mbverify(Run(mbverify, kGood)).exit_code, 0);
+  const fs::path summary = fs::path(mbverify.Out()) / "stabilizing_platform/static/summary.json";
+  const std::string before = ReadAll(summary);
+  // Killed somewhere on the way; the time is meant to hit different stages.
+  for (const char* limit : {"0.05", "0.1", "0.15", "0.2"}) {
+    const std::string command = std::string("cd '" MBV_SOURCE_DIR "' && timeout -s KILL ") + limit +
+                                " '" MBV_BINARY_DIR "/mbverify' " + Run(mbverify, kGood) +
+                                " >/dev/null 2>&1";
+    const int status = std::system(command.c_str());
+    (void)status;  // whole or killed, the summary must be one of a complete run
+    const auto json = nlohmann::json::parse(ReadAll(summary), nullptr, false);
+    ASSERT_FALSE(json.is_discarded()) << limit;
+    EXPECT_EQ(json["verdict"], "agree");
+  }
+  ASSERT_EQ(mbverify(Run(mbverify, kGood)).exit_code, 0);
+  EXPECT_EQ(std::distance(fs::directory_iterator(summary.parent_path().parent_path()), {}), 1);
+  EXPECT_FALSE(before.empty());
+}
+
+TEST_F(CliTest, AFolderThatCannotBeWrittenIsBadInput) {
+  std::ofstream(mbverify.folder() / "file") << "x";
+  const ProgramResult result =
+      mbverify("run --no-pictures --out " + (mbverify.folder() / "file").string() + " " + kGood);
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_NE(result.err.find("cannot make folder"), std::string::npos) << result.err;
+  EXPECT_NE(result.err.find("hint: choose another folder with --out"), std::string::npos);
+}
+
+TEST_F(CliTest, ModeAndSetReachTheScenario) {
+  const ProgramResult result = mbverify(
+      Run(mbverify, std::string(kGood) + " --mode forward --set simulation.step_s=0.0005 --set "
+                                         "parameters.m_p=1000 --set motion.duration_s=0.1"));
+  EXPECT_EQ(result.exit_code, 0) << result.out;
+  EXPECT_NE(result.out.find("forward simulation, step 0.5 ms"), std::string::npos) << result.out;
+  const ProgramResult wrong =
+      mbverify(Run(mbverify, std::string(kGood) + " --set simulation.stepp_s=1"));
+  EXPECT_EQ(wrong.exit_code, 2);
+  EXPECT_NE(wrong.err.find("did you mean 'step_s'?"), std::string::npos);
+}
+
+TEST_F(CliTest, CheckPrintsEveryFindingAndEveryFileThatIsFine) {
+  const ProgramResult good =
+      mbverify(std::string("check models/stabilizing_platform/model.yaml ") + kGood);
+  EXPECT_EQ(good.exit_code, 0);
+  EXPECT_EQ(good.out,
+            std::string("models/stabilizing_platform/model.yaml: ok\n") + kGood + ": ok\n");
+  const ProgramResult bad =
+      mbverify("check scenarios/stabilizing_platform/must_fail/unknown_names.yaml");
+  EXPECT_EQ(bad.exit_code, 2);
+  EXPECT_EQ(std::count(bad.out.begin(), bad.out.end(), '\n') / 2, 7) << bad.out;
+}
+
+TEST_F(CliTest, ModelReportsMobilityAndWritesMjcf) {
+  const ProgramResult report = mbverify("model stabilizing_platform");
+  EXPECT_EQ(report.exit_code, 0);
+  EXPECT_NE(report.out.find("freedoms: 9"), std::string::npos) << report.out;
+  EXPECT_NE(report.out.find("redundant constraints: 6"), std::string::npos) << report.out;
+  const ProgramResult mjcf = mbverify("model stabilizing_platform --format mjcf --out " +
+                                      (mbverify.folder() / "p.xml").string());
+  EXPECT_EQ(mjcf.exit_code, 0);
+  EXPECT_NE(ReadAll(mbverify.folder() / "p.xml").find("<mujoco"), std::string::npos);
+  const ProgramResult near = mbverify("model stabilising_platform");
+  EXPECT_NE(near.err.find("did you mean 'stabilizing_platform'?"), std::string::npos);
+}
+
+TEST_F(CliTest, AuditOfOneModelListsItsErrata) {
+  const ProgramResult audit = mbverify("audit stabilizing_platform");
+  EXPECT_EQ(audit.exit_code, 0) << audit.err;
+  EXPECT_NE(audit.out.find("E2"), std::string::npos);
+  EXPECT_NE(mbverify("audit stabilizing_platform --markdown").out.find("|"), std::string::npos);
+  EXPECT_EQ(mbverify("audit nothing").exit_code, 2);
+}
+
+TEST_F(CliTest, ListNamesModelsAndScenarios) {
+  const ProgramResult list = mbverify("list");
+  EXPECT_EQ(list.exit_code, 0);
+  for (const char* name :
+       {"stabilizing_platform", "spr_tripod", "scara_robot", "cabin_robot", kGood}) {
+    EXPECT_NE(list.out.find(name), std::string::npos) << name;
+  }
+}
+
+TEST_F(CliTest, RenderWritesPicturesAndVideos) {
+  const std::string size = std::string(kGood) + " --size 64x64 ";
+  const ProgramResult pictures = mbverify("render " + size + "--at 0,0.25 --out " + mbverify.Out());
+  EXPECT_EQ(pictures.exit_code, 0) << pictures.err;
+  EXPECT_TRUE(fs::exists(fs::path(mbverify.Out()) / "stabilizing_platform/static/t_0.250s.png"));
+  const std::string video = (mbverify.folder() / "v.png").string();
+  EXPECT_EQ(mbverify("render " + size + "--fps 4 --video " + video).exit_code, 0);
+  EXPECT_NE(ReadAll(video).find("acTL"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace mbv

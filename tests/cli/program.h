@@ -1,0 +1,54 @@
+// Runs the built program as a user would.
+#pragma once
+
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <string>
+
+namespace mbv {
+
+inline std::string ReadAll(const std::filesystem::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+struct ProgramResult {
+  int exit_code = -1;
+  std::string out, err;  ///< stdout, stderr
+};
+
+/// A temporary folder with a program run in the project's folder.
+class Program {
+ public:
+  explicit Program(const std::string& name)
+      : folder_(std::filesystem::temp_directory_path() / ("mbv_cli_" + name)) {
+    std::filesystem::remove_all(folder_);
+    std::filesystem::create_directories(folder_);
+  }
+  ~Program() { std::filesystem::remove_all(folder_); }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  [[nodiscard]] const std::filesystem::path& folder() const { return folder_; }
+  [[nodiscard]] std::string Out() const { return (folder_ / "out").string(); }
+
+  ProgramResult operator()(const std::string& arguments) const {
+    const std::string command =
+        "cd '" MBV_SOURCE_DIR "' && NO_COLOR= '" MBV_BINARY_DIR "/mbverify' " + arguments + " >'" +
+        (folder_ / "stdout").string() + "' 2>'" + (folder_ / "stderr").string() + "'";
+    const int status = std::system(command.c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, ReadAll(folder_ / "stdout"),
+            ReadAll(folder_ / "stderr")};
+  }
+
+ private:
+  std::filesystem::path folder_;
+};
+
+}  // namespace mbv

@@ -1,0 +1,73 @@
+// Every scenario file in the project does what its `expect:` says.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+#include "scenario/load_scenario.h"
+#include "tests/cli/program.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> ShippedScenarios() {
+  std::vector<std::string> files;
+  const fs::path root = MBV_SOURCE_DIR;
+  for (const auto& entry : fs::recursive_directory_iterator(root / "scenarios")) {
+    if (entry.path().extension() == ".yaml" && ReadScenarioHead(entry.path()).is_scenario) {
+      files.push_back(entry.path().lexically_relative(root));
+    }
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string NameOf(std::string file) {
+  file = file.substr(0, file.size() - 5).substr(std::string("scenarios/").size());
+  for (char& c : file) c = std::isalnum(static_cast<unsigned char>(c)) != 0 ? c : '_';
+  return file;
+}
+
+class ShippedScenario : public testing::TestWithParam<std::string> {};
+
+TEST_P(ShippedScenario, GivesWhatItExpects) {
+  const Expectation expect =
+      ReadScenarioHead(std::string(MBV_SOURCE_DIR) + "/" + GetParam()).expect;
+  const Program mbverify(NameOf(GetParam()));
+  const ProgramResult result =
+      mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());
+  const std::string printed = result.out + result.err;
+  EXPECT_EQ(result.exit_code, expect.exit_code) << printed;
+  EXPECT_NE(printed.find(expect.mentions), std::string::npos)
+      << "'" << expect.mentions << "' is missing in\n"
+      << printed;
+  if (expect.exit_code == 2) {
+    EXPECT_TRUE(result.out.empty()) << result.out;
+    EXPECT_FALSE(fs::exists(mbverify.Out()));
+    return;
+  }
+  // <model>/<case>/, where the case may lie in must_fail/.
+  fs::path summary;
+  for (const auto& entry : fs::recursive_directory_iterator(mbverify.Out())) {
+    if (entry.path().filename() == "summary.json") summary = entry.path();
+  }
+  ASSERT_FALSE(summary.empty());
+  const auto json = nlohmann::json::parse(ReadAll(summary));
+  EXPECT_EQ(json["verdict"], expect.verdict);
+  EXPECT_EQ(json["exit_code"], expect.exit_code);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, ShippedScenario, testing::ValuesIn(ShippedScenarios()),
+                         [](const auto& info) { return NameOf(info.param); });
+
+TEST(ShippedScenarios, EachFileBelowMustFailExpectsAFailure) {
+  for (const std::string& file : ShippedScenarios()) {
+    const Expectation expect = ReadScenarioHead(std::string(MBV_SOURCE_DIR) + "/" + file).expect;
+    EXPECT_EQ(file.find("/must_fail/") != std::string::npos, expect.exit_code != 0) << file;
+  }
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,20 @@
+#include "pipeline/version.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <sstream>
+
+namespace mbv {
+namespace {
+
+TEST(Version, IsTheOneOfTheBuildFile) {
+  std::ifstream stream(std::string(MBV_SOURCE_DIR) + "/CMakeLists.txt");
+  std::stringstream text;
+  text << stream.rdbuf();
+  EXPECT_NE(text.str().find(std::string("project(mbverify VERSION ") + kVersion),
+            std::string::npos);
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,370 @@
+// Scenario files: what they mean, and what is said about wrong ones.
+#include "scenario/load_scenario.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "scenario/motion_reader.h"
+
+namespace mbv {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+
+// Scenario texts are loaded as if they lay beside the platform's; paths in messages are relative to
+// the project's folder.
+constexpr const char* kFile = "scenarios/stabilizing_platform/t.yaml";
+
+class LoadScenarioTest : public testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::current_path(MBV_SOURCE_DIR); }
+
+  static ScenarioResult Load(const std::string& text, const std::vector<SetValue>& set = {}) {
+    ScenarioOptions options;
+    options.set = set;
+    return LoadScenarioText(text, kFile, options);
+  }
+  // A complete scenario; `more` is appended.
+  static std::string Complete(const std::string& more = "") {
+    return "mechanism: stabilizing_platform\n"
+           "motion:\n"
+           "  duration_s: 12\n"
+           "  sample_s: 0.01\n"
+           "  commands:\n"
+           "    roll: {sine: {amplitude_deg: 6, period_s: 6, phase_deg: 90}}\n"
+           "    pitch: 0\n"
+           "    heave: [0.5, {cycloid: {start_s: 1, duration_s: 6, delta_mm: 600}}]\n"
+           "    platform.z: z_0 + 0.25\n"
+           "    platform.roll: 0\n"
+           "    platform.pitch: {value_deg: 1}\n"
+           "  equal:\n"
+           "    - [limb1.drive, limb1.drive_p]\n"
+           "    - [limb2.drive, limb2.drive_p]\n"
+           "    - [limb3.drive, limb3.drive_p]\n" +
+           more;
+  }
+  static std::string Messages(const std::string& text, const std::vector<SetValue>& set = {}) {
+    return Load(text, set).diagnostics.Text();
+  }
+};
+
+TEST_F(LoadScenarioTest, CommandsAreResolvedInSiUnits) {
+  const ScenarioResult result = Load(Complete());
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const Motion& motion = result.scenario->motion;
+  ASSERT_EQ(motion.commands.size(), 9u);
+  const Jet roll = Evaluate(motion.commands[0].profile, 0.0);
+  EXPECT_DOUBLE_EQ(roll.value, 6 * kDegree);  // the phase makes it a cosine
+  EXPECT_EQ(motion.commands[0].terms[0].coordinate.kind, Coordinate::Kind::kPrescribed);
+  EXPECT_DOUBLE_EQ(Evaluate(motion.commands[2].profile, 9.0).value, 1.1);
+  EXPECT_EQ(motion.commands[3].name, "platform.z");
+  EXPECT_EQ(motion.commands[3].terms[0].coordinate.component, 2);
+  EXPECT_DOUBLE_EQ(Evaluate(motion.commands[3].profile, 0.0).value, 3.75);  // z_0 = 3.5
+  EXPECT_DOUBLE_EQ(Evaluate(motion.commands[5].profile, 0.0).value, kDegree);
+}
+
+TEST_F(LoadScenarioTest, CouplingsAreDifferencesCommandedToZero) {
+  const ScenarioResult result = Load(Complete());
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const Command& coupling = result.scenario->motion.commands[7];
+  EXPECT_EQ(coupling.name, "limb2.drive - limb2.drive_p");
+  ASSERT_EQ(coupling.terms.size(), 2u);
+  EXPECT_EQ(coupling.terms[0].coordinate.index, 2);
+  EXPECT_EQ(coupling.terms[1].coordinate.index, 3);
+  EXPECT_EQ(coupling.terms[1].factor, -1.0);
+  EXPECT_EQ(Evaluate(coupling.profile, 5.0).value, 0.0);
+}
+
+TEST_F(LoadScenarioTest, EverythingLeftOutHasADefault) {
+  const ScenarioResult result = Load(Complete());
+  ASSERT_TRUE(result.scenario);
+  const Scenario& scenario = *result.scenario;
+  EXPECT_EQ(scenario.name, "t");
+  EXPECT_TRUE(scenario.analytic.on);
+  EXPECT_TRUE(scenario.reference.on);
+  EXPECT_TRUE(scenario.simulation.forward);
+  EXPECT_EQ(scenario.simulation.step_s, 1e-3);
+  EXPECT_EQ(scenario.start_window_s, 0.0);
+  for (const MetricRow& row : MetricRows()) {
+    EXPECT_TRUE(scenario.checks[row.metric].forward) << row.key;
+    EXPECT_TRUE(scenario.checks[row.metric].inverse) << row.key;
+    EXPECT_TRUE(scenario.checks[row.metric].reference) << row.key;
+  }
+  EXPECT_EQ(scenario.snapshots.times_s, (std::vector<double>{0.0, 6.0}));
+  EXPECT_EQ(scenario.expect.verdict, "agree");
+}
+
+TEST_F(LoadScenarioTest, LimitsAreSetPerModeForBothOrSwitchedOff) {
+  const ScenarioResult result =
+      Load(Complete("checks:\n"
+                    "  force_nrmse: {forward: 1e-7}\n"
+                    "  force_max: 1e-3\n"
+                    "  reference_force_nrmse: 1e-11\n"
+                    "  pose_m: null\n"
+                    "  reaction_nrmse: off\n"
+                    "  start_window_s: 0.2\n"));
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const CheckLimits& checks = result.scenario->checks;
+  EXPECT_EQ(checks[Metric::kForceNrmse].forward, 1e-7);
+  EXPECT_EQ(checks[Metric::kForceNrmse].inverse, RowOf(Metric::kForceNrmse).limits.inverse);
+  EXPECT_EQ(checks[Metric::kForceNrmse].reference, 1e-11);
+  EXPECT_EQ(checks[Metric::kForceMax].forward, 1e-3);
+  EXPECT_EQ(checks[Metric::kForceMax].inverse, 1e-3);
+  EXPECT_FALSE(checks[Metric::kPoseM].forward);
+  EXPECT_TRUE(checks[Metric::kPoseM].reference);
+  EXPECT_FALSE(checks[Metric::kReaction].inverse);
+  EXPECT_EQ(result.scenario->start_window_s, 0.2);
+}
+
+TEST_F(LoadScenarioTest, WitnessesHaveTheirOwnParameters) {
+  const ScenarioResult result =
+      Load(Complete("parameters: {m_p: 40000}\n"
+                    "analytic: {model: full, as_printed: [E2], parameters: {m_1: 2*800}}\n"
+                    "reference: {parameters: {L2: 4.7901}}\n"
+                    "simulation:\n"
+                    "  mode: inverse\n"
+                    "  engine: stock\n"
+                    "  parameters: {link_mass_scale: 1}\n"
+                    "  extrapolate: {parameter: link_mass_scale, from: [1, 0.25]}\n"));
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const Scenario& scenario = *result.scenario;
+  EXPECT_EQ(result.mechanism->ParameterValue("m_p"), 40000.0);
+  EXPECT_EQ(scenario.analytic.parameters.at("m_1"), 1600.0);
+  EXPECT_EQ(scenario.analytic.as_printed, std::vector<std::string>{"E2"});
+  EXPECT_EQ(scenario.reference.parameters.at("L2"), 4.7901);
+  EXPECT_FALSE(scenario.simulation.forward);
+  EXPECT_TRUE(scenario.simulation.stock_engine);
+  EXPECT_EQ(scenario.simulation.extrapolate->from[1], 0.25);
+  EXPECT_EQ(Merge(scenario.parameters, {{"m_p", 1.0}}).at("m_p"), 1.0);
+}
+
+TEST_F(LoadScenarioTest, LoadsActAtAFrameWithAnOffset) {
+  const ScenarioResult result = Load(Complete(
+      "loads:\n"
+      "  crane: {on: limb1.link1, at: [0, 0.5, 0], force: [0, {sine: {amplitude: 9, period_s: 2}}, "
+      "-400], in: body}\n"
+      "  wind: {on: platform.p, moment: [1, 2, 3]}\n"));
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const auto& loads = result.scenario->motion.loads;
+  ASSERT_EQ(loads.size(), 2u);
+  EXPECT_EQ(loads[0].body, result.mechanism->FindBody("limb1.link1"));
+  EXPECT_EQ(loads[0].p_BoQ_B, Vec3(0, 0.5, 0));
+  EXPECT_TRUE(loads[0].in_body_axes);
+  EXPECT_DOUBLE_EQ(Evaluate(loads[0].force[1], 0.5).value, 9.0);
+  EXPECT_FALSE(loads[1].in_body_axes);
+  EXPECT_DOUBLE_EQ(Evaluate(loads[1].moment[2], 0.5).value, 3.0);
+}
+
+TEST_F(LoadScenarioTest, APathRestsAtItsPointsAndGivesTheDuration) {
+  const std::string text =
+      "mechanism: stabilizing_platform\n"
+      "motion:\n"
+      "  sample_s: 0.01\n"
+      "  commands: {roll: 0, pitch: 0, heave: 0, platform.roll: 0, platform.pitch: 0, "
+      "platform.yaw: 0}\n"
+      "  path:\n"
+      "    outputs: [platform.x, platform.y, platform.z]\n"
+      "    points_mm: [[0, 0, 3500], [0, 0, 3560], [240, 0, 3560], [240, 0, 3500]]\n"
+      "    v_max: 0.75\n"
+      "    a_max: 10\n";
+  const ScenarioResult result = Load(text);
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  const Motion& motion = result.scenario->motion;
+  // Two strokes of 0.06 m and one of 0.24 m, ramp-cruise-ramp.
+  EXPECT_NEAR(motion.duration_s, 0.800013994, 1e-9);
+  const Profile& x = motion.commands[static_cast<size_t>(motion.FindCommand("platform.x"))].profile;
+  EXPECT_NEAR(Evaluate(x, 0.186120972).rate, 0.0, 1e-6);
+  EXPECT_NEAR(Evaluate(x, 0.4).rate, 0.75, 1e-12);
+  EXPECT_NEAR(Evaluate(x, 0.7).value, 0.24, 1e-12);
+  const ScenarioResult full = Load(text + "    law: full\n");
+  ASSERT_TRUE(full.scenario) << full.diagnostics.Text();
+  EXPECT_NEAR(full.scenario->motion.duration_s, 2 * 0.186120972 + 0.6, 1e-8);
+}
+
+TEST_F(LoadScenarioTest, HomeStandsForTheValueAtTheHomePose) {
+  std::string text = Complete();
+  text.replace(text.find("z_0 + 0.25"), 10, "[home, 0.1]");
+  const ScenarioResult result = Load(text);
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  // The home pose of the platform is level at z_0.
+  EXPECT_NEAR(Evaluate(result.scenario->motion.commands[3].profile, 0.0).value, 3.6, 1e-12);
+  // Neutral drive length, from the closed form of a symmetric limb.
+  EXPECT_NEAR(HomeValue(*result.mechanism, {Coordinate::Kind::kDrive, 3, 0}), 2.818013474642,
+              1e-11);
+}
+
+TEST_F(LoadScenarioTest, SetReplacesAndAddsValues) {
+  const ScenarioResult result =
+      Load(Complete("simulation: {mode: forward}\n"), {{"simulation.step_s", "0.0005"},
+                                                       {"simulation.mode", "inverse"},
+                                                       {"parameters.m_p", "45000"},
+                                                       {"motion.commands.platform.z", "3.6"},
+                                                       {"checks.force_nrmse.inverse", "1e-12"}});
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  EXPECT_EQ(result.scenario->simulation.step_s, 0.0005);
+  EXPECT_FALSE(result.scenario->simulation.forward);
+  EXPECT_EQ(result.mechanism->ParameterValue("m_p"), 45000.0);
+  EXPECT_DOUBLE_EQ(Evaluate(result.scenario->motion.commands[3].profile, 0.0).value, 3.6);
+  EXPECT_EQ(result.scenario->checks[Metric::kForceNrmse].inverse, 1e-12);
+}
+
+TEST_F(LoadScenarioTest, FindingsAboutSetValuesNameTheOption) {
+  EXPECT_EQ(Messages(Complete(), {{"simulation.stp_s", "0.1"}}),
+            "--set simulation.stp_s=0.1: error: simulation: unknown key 'stp_s'\n"
+            "  hint: did you mean 'step_s'?\n");
+  EXPECT_EQ(
+      Messages(Complete(), {{"parameters.m_q", "1"}}),
+      "--set parameters.m_q=1: error: models/stabilizing_platform/model.yaml has no parameter "
+      "'m_q'\n  hint: did you mean 'm_1'?\n");
+  EXPECT_EQ(Messages(Complete(), {{"motion", "{"}}),
+            "--set motion={: error: the value is no YAML\n"
+            "  hint: write --set key=value, e.g. --set simulation.step_s=0.002\n");
+}
+
+struct Golden {
+  const char* name;
+  std::string text;
+  std::string messages;
+};
+
+class WrongScenario : public LoadScenarioTest, public testing::WithParamInterface<Golden> {
+ public:
+  using LoadScenarioTest::Complete;
+};
+
+TEST_P(WrongScenario, IsExplained) {
+  const ScenarioResult result = Load(GetParam().text);
+  EXPECT_FALSE(result.scenario);
+  EXPECT_EQ(result.diagnostics.Text(), GetParam().messages);
+}
+
+std::string At(const std::string& place, const std::string& rest) {
+  return std::string(kFile) + ":" + place + ": error: " + rest + "\n";
+}
+
+std::vector<Golden> Goldens() {
+  const auto complete = [](const std::string& more) { return WrongScenario::Complete(more); };
+  const auto replaced = [&](const std::string& from, const std::string& to) {
+    std::string text = complete("");
+    return text.replace(text.find(from), from.size(), to);
+  };
+  return {
+      {"Empty", "", At("1:1", "the file is empty")},
+      {"NotAMap", "- 1\n", At("1:1", "the file is a list of 1, a map is needed")},
+      {"NoMechanism", "motion: {}\n", At("1:1", "the file: 'mechanism' is missing")},
+      {"UnknownMechanism", "mechanism: stabilising_platform\nmotion: {}\n",
+       At("1:12",
+          "mechanism = 'stabilising_platform': there is no such model\n"
+          "  hint: did you mean 'stabilizing_platform'?")},
+      {"NoMotion", "mechanism: stabilizing_platform\n", At("1:1", "the file: 'motion' is missing")},
+      {"UnknownKey", complete("chekcs: {}\n"),
+       At("16:1", "the file: unknown key 'chekcs'\n  hint: did you mean 'checks'?")},
+      {"UnknownCommand", replaced("platform.z:", "platfrom.z:"),
+       At("9:5",
+          "motion.commands: stabilizing_platform has no coordinate 'platfrom.z'\n"
+          "  hint: did you mean 'platform.z'?")},
+      {"UnknownDriveInCoupling", replaced("[limb2.drive, limb2", "[limb4.drive, limb2"),
+       At("14:8",
+          "motion.equal[1]: stabilizing_platform has no coordinate 'limb4.drive'\n"
+          "  hint: did you mean 'limb1.drive'?")},
+      {"TooFewCommands", replaced("    pitch: 0\n", ""),
+       At("3:3",
+          "motion gives 8 commands, but stabilizing_platform has 9 freedoms\n"
+          "  hint: command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives "
+          "under motion.equal")},
+      {"TooManyCommands", replaced("    pitch: 0\n", "    pitch: 0\n    platform.yaw: 0\n"),
+       At("3:3",
+          "motion gives 10 commands, but stabilizing_platform has 9 freedoms\n"
+          "  hint: leave commands out: each further one contradicts the others")},
+      {"CoupledWithItself", replaced("[limb1.drive, limb1.drive_p]", "[limb1.drive, limb1.drive]"),
+       At("13:7",
+          "motion.equal[0]: limb1.drive and limb1.drive are not two coordinates of one "
+          "unit")},
+      {"DegreesForALength", replaced("z_0 + 0.25", "{value_deg: 3}"),
+       At("9:29",
+          "motion.commands.platform.z.value_deg is given, but this value is in m\n"
+          "  hint: write motion.commands.platform.z.value")},
+      {"MillimetresForAnAngle",
+       replaced("pitch: 0", "pitch: {sine: {amplitude_mm: 1, period_s: 1}}"),
+       At("7:34",
+          "motion.commands.pitch.sine.amplitude_mm is given, but this value is in rad\n"
+          "  hint: write motion.commands.pitch.sine.amplitude")},
+      {"NegativeDuration", replaced("duration_s: 12", "duration_s: -12"),
+       At("3:15", "motion.duration_s = -12 violates motion.duration_s > 0")},
+      {"UnknownParameterInAnExpression", replaced("z_0 + 0.25", "z_o + 0.25"),
+       At("9:17",
+          "motion.commands.platform.z = 'z_o + 0.25' has the unknown symbol 'z_o'\n"
+          "  hint: did you mean 'z_0'?")},
+      {"StepThatDoesNotDivideTheSample", complete("simulation: {step_s: 0.003}\n"),
+       At("16:13",
+          "simulation.step_s = 0.003 violates motion.sample_s = 0.01 = n · step_s\n"
+          "  hint: samples must fall on whole steps")},
+      {"UnknownLoadBody", complete("loads: {w: {on: platfrm, force: [0, 0, 1]}}\n"),
+       At("16:17",
+          "loads.w.on = 'platfrm' is no body or frame of stabilizing_platform\n"
+          "  hint: did you mean 'platform'?")},
+      {"LoadWithoutForce", complete("loads: {w: {on: platform}}\n"),
+       At("16:9", "loads.w has neither force nor moment")},
+      {"WitnessParameter", complete("analytic: {parameters: {m_9: 1}}\n"),
+       At("16:25",
+          "analytic.parameters: stabilizing_platform has no parameter 'm_9'\n"
+          "  hint: did you mean 'm_p'?")},
+      {"SnapshotAfterTheEnd", complete("snapshots: {times_s: [0, 13]}\n"),
+       At("16:22", "snapshots.times_s = 13 violates 0 <= t <= 12")},
+      {"NegativeLimit", complete("checks: {force_max: -1}\n"),
+       At("16:21", "checks.force_max = -1 violates checks.force_max > 0")},
+      {"SyntaxError", "mechanism: [\n", At("2:1", "YAML syntax: end of sequence flow not found")},
+  };
+}
+
+INSTANTIATE_TEST_SUITE_P(Golden, WrongScenario, testing::ValuesIn(Goldens()),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST_F(LoadScenarioTest, AllFindingsComeAtOnceInTheOrderOfTheFile) {
+  const std::string messages = Messages(
+      "mechanism: stabilizing_platform\n"
+      "parameters: {m_pp: 1}\n"
+      "motion: {duration_s: 0, commands: {rol: 0}}\n"
+      "simulation: {mode: backward}\n");
+  const size_t duration = messages.find("3:22: error: motion.duration_s = 0");
+  const size_t command = messages.find("3:36: error: motion.commands");
+  const size_t mode = messages.find("4:20: error: simulation.mode");
+  EXPECT_NE(messages.find("2:14: error"), std::string::npos) << messages;
+  EXPECT_LT(duration, command);
+  EXPECT_LT(command, mode);
+  EXPECT_NE(mode, std::string::npos) << messages;
+}
+
+TEST_F(LoadScenarioTest, AMissingFileIsAFinding) {
+  EXPECT_EQ(LoadScenario("scenarios/none.yaml").diagnostics.Text(),
+            "scenarios/none.yaml: error: the file cannot be read\n"
+            "  hint: check the name; paths are relative to the current folder\n");
+}
+
+TEST_F(LoadScenarioTest, TheHeadIsReadFromBrokenFilesToo) {
+  const auto folder = std::filesystem::temp_directory_path() / "mbv_scenario_head";
+  std::filesystem::create_directories(folder);
+  const std::string file = folder / "broken.yaml";
+  std::ofstream(file) << "# expect: {exit_code: 2, mentions: \"YAML syntax\"}\nmechanism: [\n";
+  const ScenarioHead head = ReadScenarioHead(file);
+  std::filesystem::remove_all(folder);
+  EXPECT_TRUE(head.is_scenario);
+  EXPECT_EQ(head.expect.exit_code, 2);
+  EXPECT_EQ(head.expect.verdict, "not_run");
+  EXPECT_EQ(head.expect.mentions, "YAML syntax");
+}
+
+TEST_F(LoadScenarioTest, CasesAreNamedByTheirPathBelowTheModelsFolder) {
+  const ScenarioResult result =
+      LoadScenario("scenarios/stabilizing_platform/must_fail/analytic_mass.yaml");
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  EXPECT_EQ(result.scenario->name, "must_fail/analytic_mass");
+  EXPECT_EQ(result.scenario->expect.verdict, "disagree");
+  EXPECT_EQ(result.scenario->expect.exit_code, 1);
+}
+
+}  // namespace
+}  // namespace mbv
