@@ -246,10 +246,14 @@ Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale) {
     AddPath(path, path.radius_m > 0.0 ? path.radius_m : 0.0025 * scale.extent_m, &out.items);
   }
   for (const MeshOverlay& mesh : overlay.meshes) {
-    out.flats.push_back({.vertices_W = mesh.vertices_W,
-                         .triangles = mesh.triangles,
-                         .rgba = MaterialOf(mesh.color).rgba,
-                         .shaded = true});
+    FlatMesh flat{.vertices_W = mesh.vertices_W,
+                  .triangles = mesh.triangles,
+                  .rgba = MaterialOf(mesh.color).rgba,
+                  .shaded = true};
+    out.flats.push_back(flat);
+    flat.rgba[3] *= kGhost;
+    flat.depth = FlatMesh::Depth::kHidden;
+    out.flats.push_back(std::move(flat));
   }
   return out;
 }

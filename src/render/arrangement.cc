@@ -140,7 +140,8 @@ std::vector<LegendEntry> LegendOf(const Mechanism& mechanism, const Arrangement&
   const bool any_closure =
       std::ranges::any_of(mechanism.joints, [](const Joint& joint) { return joint.closure; });
   if (options.closures && any_closure) legend.push_back({"closure", "loop closure"});
-  if (!arrangement.stage.sea) {
+  const bool ground_seen = arrangement.camera.position_D().z() >= arrangement.stage.ground_m;
+  if (!arrangement.stage.sea && ground_seen) {
     legend.push_back({"", fmt::format("grid {:g} m", arrangement.stage.grid_m)});
   }
   return legend;

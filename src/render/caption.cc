@@ -107,11 +107,11 @@ class Writer {
 struct Layout {
   double pad, title, detail, legend;
 
-  explicit Layout(const std::array<int, 2>& size_px) {
+  Layout(const Caption& caption, const std::array<int, 2>& size_px) {
     const double unit = std::min(size_px[0] * 0.75, static_cast<double>(size_px[1]));
     pad = 0.009 * unit;
     title = 0.033 * unit;
-    detail = 0.0245 * unit;
+    detail = caption.detail.empty() ? -pad : 0.0245 * unit;  // without its gap, too
     legend = 0.0215 * unit;
   }
   [[nodiscard]] double bar() const { return 4.6 * pad + title + detail + legend; }
@@ -143,7 +143,7 @@ bool IsEmpty(const Caption& caption) {
 }
 
 int BarHeight(const Caption& caption, const std::array<int, 2>& size_px) {
-  return IsEmpty(caption) ? 0 : static_cast<int>(std::ceil(Layout(size_px).bar()));
+  return IsEmpty(caption) ? 0 : static_cast<int>(std::ceil(Layout(caption, size_px).bar()));
 }
 
 std::string PlainText(const std::string& utf8) {
@@ -176,7 +176,7 @@ void PaintCaption(const Caption& caption, const std::vector<LegendEntry>& legend
   const std::array<int, 2> size{picture->width, picture->height};
   const int bar = BarHeight(caption, size);
   if (bar == 0) return;
-  const Layout layout(size);
+  const Layout layout(caption, size);
   const int top = picture->height - bar;
   Fill(picture, 0, top, picture->width, bar, kPaper);
   Fill(picture, 0, top, picture->width, std::max(1, picture->height / 500), kRule);
@@ -191,8 +191,10 @@ void PaintCaption(const Caption& caption, const std::vector<LegendEntry>& legend
   writer.Write(writer.Fit(PlainText(caption.title), layout.title, title_room), left, y,
                layout.title, kInk);
   y += layout.title + layout.pad;
-  writer.Write(writer.Fit(PlainText(caption.detail), layout.detail, room), left, y, layout.detail,
-               kInk);
+  if (!caption.detail.empty()) {
+    writer.Write(writer.Fit(PlainText(caption.detail), layout.detail, room), left, y, layout.detail,
+                 kInk);
+  }
   y += layout.detail + layout.pad;
   WriteLegend(legend, writer, y, layout, picture);
 }

@@ -160,6 +160,8 @@ class OsMesaStage final : public Stage {
     for (int i = 0; i < 2; ++i) {
       mjv_updateScene(model_.get(), data_.get(), &show, nullptr, &from, mjCAT_ALL, &scene_);
     }
+    // Seen from below, the ground would be a veil before everything.
+    if (camera.position_D().z() < options_.ground_m) scene_.ngeom = 0;
     if (scene_.ngeom + static_cast<int>(items.size()) > scene_.maxgeom) {
       return Failure(
           fmt::format("{} solids are more than the {} that fit", items.size(), scene_.maxgeom));
@@ -203,10 +205,12 @@ class OsMesaStage final : public Stage {
     // Cosine-weighted over the upper hemisphere, none below 48°.
     const double r = spread * std::sqrt(0.45 * w.x()), angle = 2.0 * std::numbers::pi * w.y();
     const Vec3 sky(r * std::cos(angle), r * std::sin(angle), std::sqrt(1.0 - r * r));
+    const double fill_height = camera.elevation_deg < 0.0 ? 0.7 * camera.elevation_deg : 15.0;
+    const Vec3 fill = Direction(camera.azimuth_deg + 50.0, fill_height);
     scene_.nlight = 3;
     SetLight(&scene_.lights[0], key, kKey, 0.35, 0.0, true);
     SetLight(&scene_.lights[1], sky, kSky, 0.0, 0.0, true);
-    SetLight(&scene_.lights[2], Direction(camera.azimuth_deg + 50.0, 15.0), kFill, 0.1, kAmbient,
+    SetLight(&scene_.lights[2], fill, kFill, 0.1, kAmbient,
              false);  // a light with shadows has its ambient part shadowed, too
   }
 

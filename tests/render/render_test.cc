@@ -268,6 +268,14 @@ TEST(Pictures, DrawTheSeaOnlyWhereTheWorldHasOne) {
   EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), Quick()), is_water).count, 20000);
 }
 
+TEST(Pictures, ShowTheMechanismFromBelowTheGroundUnveiled) {
+  const Mechanism mechanism = BallOnLeg();
+  PictureOptions options = Quick();
+  options.camera.elevation_deg = -30.0;
+  const Picture below = DrawOne(mechanism, HomeFrame(mechanism), options);
+  EXPECT_GT(BoundsOf(below, IsGreen).count, 100);
+}
+
 TEST(Pictures, StopWhenTheSinkHasEnough) {
   const Mechanism mechanism = BallOnLeg();
   int drawn = 0;
