@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "comparison/comparison.h"
-#include "synthetic.h"
+#include "tests/comparison/synthetic.h"
 
 namespace mbv {
 namespace {
