@@ -11,6 +11,9 @@ namespace {
 using std::numbers::pi;
 constexpr double kDeg = pi / 180.0;
 
+// Rounding noise about zero would print as -0.000000000 on one machine and +0.000000000 on another.
+double Clean(double x) { return std::abs(x) < 5e-10 ? 0.0 : x; }
+
 // Volumes of the refined meshes; fills the finest mesh and the order of convergence.
 std::string MeshTable(const Geometry& geometry, const WorkspaceOptions& options,
                       WorkspaceReport* report) {
@@ -40,7 +43,7 @@ std::string CornerTable(const Geometry& geometry) {
     Posture p;
     if (!SolveForward(geometry, q, &p).ok()) continue;
     text += fmt::format("{:.4f}  {:.4f}  {:.4f}  {:+.9f}  {:+.9f}  {:+.9f}  {:.6f}\n", q[0], q[1],
-                        q[2], p.r.x(), p.r.y(), p.r.z(), p.tilt.Angle() / kDeg);
+                        q[2], Clean(p.r.x()), Clean(p.r.y()), p.r.z(), p.tilt.Angle() / kDeg);
   }
   return text;
 }
@@ -112,8 +115,9 @@ WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions
   }
   report.text += fmt::format("area {:.9f} m2; faces", faces.solid.area);
   for (double area : faces.face_area) report.text += fmt::format(" {:.9f}", area);
-  report.text += fmt::format("\ncentroid ({:.9f}, {:.9f}, {:.9f}) m\n\n", faces.solid.centroid.x(),
-                             faces.solid.centroid.y(), faces.solid.centroid.z());
+  report.text +=
+      fmt::format("\ncentroid ({:.9f}, {:.9f}, {:.9f}) m\n\n", Clean(faces.solid.centroid.x()),
+                  Clean(faces.solid.centroid.y()), faces.solid.centroid.z());
   report.text += meshes + "\n" + CornerTable(geometry) + "\n" + RangeTable(ranges) + "\n" +
                  SectionTable(geometry, options.heights);
   report.sections_csv = SectionsCsv(geometry, options);
