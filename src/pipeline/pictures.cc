@@ -10,6 +10,8 @@
 namespace mbv {
 namespace {
 
+constexpr size_t kFewPictures = 24;  // more are a video: drawn faster, a little less smooth
+constexpr int kVideoPasses = 2;
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 std::optional<double> Degrees(std::optional<double> angle_rad) {
@@ -31,6 +33,23 @@ PictureOptions OptionsOf(const SnapshotSettings& settings) {
 int NearestSample(const std::vector<double>& times, double t_s) {
   const auto nearer = [&](double a, double b) { return std::abs(a - t_s) < std::abs(b - t_s); };
   return static_cast<int>(std::min_element(times.begin(), times.end(), nearer) - times.begin());
+}
+
+// Averages squares of pixels so that the width is at most 640.
+Picture Shrunk(const Picture& picture) {
+  const int n = std::max(1, (picture.width + 639) / 640);
+  Picture small{.width = picture.width / n, .height = picture.height / n};
+  for (int y = 0; y < small.height; ++y) {
+    for (int x = 0; x < 3 * small.width; ++x) {
+      int sum = 0;
+      for (int k = 0; k < n * n; ++k) {
+        const int row = n * y + k / n, column = n * (x / 3) + k % n;
+        sum += picture.rgb[static_cast<size_t>(3 * (row * picture.width + column) + x % 3)];
+      }
+      small.rgb.push_back(static_cast<std::uint8_t>(sum / (n * n)));
+    }
+  }
+  return small;
 }
 
 }  // namespace
@@ -64,11 +83,15 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
     const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
     frames.back().caption = caption;
     frames.back().caption.detail = fmt::format("t = {:.3f} s   {}", sample_s, caption.detail);
-    files->push_back({fmt::format("t_{:.3f}s.png", sample_s), ""});
+    files->push_back({fmt::format("t_{:.3f}s.png", sample_s), "", ""});
   }
-  RunSummary summary = RenderPictures(
-      mechanism, frames, {}, OptionsOf(scenario.snapshots), [&](int index, Picture picture) {
-        (*files)[static_cast<size_t>(index)].content = EncodePng(picture);
+  PictureOptions options = OptionsOf(scenario.snapshots);
+  if (frames.size() > kFewPictures) options.passes = kVideoPasses;
+  RunSummary summary =
+      RenderPictures(mechanism, frames, {}, options, [&](int index, Picture picture) {
+        PictureFile& file = (*files)[static_cast<size_t>(index)];
+        file.content = EncodePng(picture);
+        file.preview = EncodePng(Shrunk(picture));
         if (progress) progress((index + 1.0) / static_cast<double>(frames.size()));
         return true;
       });

@@ -17,6 +17,7 @@ namespace mbv {
 struct PictureFile {
   std::string name;     ///< "t_1.500s.png"
   std::string content;  ///< PNG
+  std::string preview;  ///< PNG, at most 640 pixels wide
 };
 
 /// Title and status of a run's pictures; the time is added to the detail of each.

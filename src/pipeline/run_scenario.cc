@@ -10,6 +10,7 @@
 #include "pipeline/pictures.h"
 #include "pipeline/prepare.h"
 #include "pipeline/ranges.h"
+#include "pipeline/run_page.h"
 #include "pipeline/version.h"
 #include "reference/reference.h"
 
@@ -293,6 +294,9 @@ class ScenarioRun {
       write("snapshots/" + picture.name, picture.content);
     }
     write("summary.json", ToJson(report_));
+    write("report.html", RunPage(report_, prepared_->mechanisms.simulated,
+                                 simulation_ ? &*simulation_ : nullptr, pictures_,
+                                 options_.scenario));
     if (trouble.empty()) trouble = folder.Commit();
     if (trouble.empty()) {
       outcome_.folder = folder.target();

@@ -1,0 +1,20 @@
+// report.html of a run: gathers what the page shows from the stages.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/pictures.h"
+#include "report/report.h"
+#include "scenario/load_scenario.h"
+#include "simulation/simulation.h"
+
+namespace mbv {
+
+/// `simulation` may be null (it did not run); `mechanism` is the one it simulated.
+[[nodiscard]] std::string RunPage(const Report& report, const Mechanism& mechanism,
+                                  const SimulationRun* simulation,
+                                  const std::vector<PictureFile>& pictures,
+                                  const ScenarioOptions& options);
+
+}  // namespace mbv

@@ -1,0 +1,56 @@
+// report.html: one page with everything a run gave. It needs no other file and no network; without
+// JavaScript it still shows the verdict, the tables and the pictures.
+#pragma once
+
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "report/report.h"
+
+namespace mbv {
+
+/// How shapes of one `color` are drawn.
+struct HtmlPaint {
+  std::array<float, 4> rgba{0.6F, 0.6F, 0.6F, 1.0F};
+  bool scenery = false;  ///< surroundings that the camera does not have to fit
+};
+
+struct HtmlPicture {
+  std::string name;  ///< file name below snapshots/
+  std::string png;   ///< small copy of it
+};
+
+/// One numbered equation of the mechanism's paper.
+struct HtmlEquation {
+  std::string equation, erratum, status, printed, corrected, note;
+  std::string residual;          ///< for people, with unit
+  bool right = false;            ///< as printed
+  bool corrected_right = false;  ///< the corrected form is
+};
+struct HtmlAudit {
+  std::string source;  ///< the paper
+  std::vector<HtmlEquation> rows;
+};
+
+struct HtmlInput {
+  const Report* report = nullptr;
+  const Mechanism* mechanism = nullptr;                  ///< as simulated
+  const std::vector<std::vector<Pose>>* X_WB = nullptr;  ///< per sample of the simulation, per
+                                                         ///< body; null: the home pose is shown
+  std::map<std::string, HtmlPaint> paints;  ///< by a shape's `color`
+  std::vector<HtmlPicture> pictures;        ///< a few hundred kB in total
+  std::optional<HtmlAudit> audit;
+  std::vector<std::string> arguments;  ///< of the command line, after the scenario file
+};
+
+/// The whole page.
+[[nodiscard]] std::string ToHtml(const HtmlInput& input);
+
+/// The data that the page's script reads: signals, errors and the replay (JSON; arrays of
+/// little-endian 32-bit floats in base64). No "</" occurs in it.
+[[nodiscard]] std::string PageData(const HtmlInput& input);
+
+}  // namespace mbv

@@ -1,0 +1,308 @@
+#include "report/html_tables.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "report/html_text.h"
+
+namespace mbv {
+namespace {
+
+std::string Spaced(std::string text) {
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
+}
+
+std::string Number(double value, const char* format = "{:.2e}") {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "–";
+}
+
+std::string At(double time_s) {
+  return std::isfinite(time_s) ? fmt::format("{:.4g} s", time_s) : "";
+}
+
+std::string Note(const std::string& text) { return "<p class=\"faint\">" + text + "</p>\n"; }
+
+std::string Pill(const char* kind, const std::string& text) {
+  return fmt::format("<span class=\"pill {}\">{}</span>", kind, Escape(text));
+}
+
+// Limit over value as a factor, with a bar of its decimal digits (ten fill it).
+std::string Margin(const CheckResult& check) {
+  if (!check.limit || !std::isfinite(check.value)) return "";
+  if (check.value <= 0.0) return "exact";
+  const double digits = std::log10(*check.limit / check.value);
+  const double filled = std::clamp(10.0 * std::abs(digits), 2.0, 100.0);
+  const std::string factor = digits >= 0.0
+                                 ? fmt::format("{:.3g}×", *check.limit / check.value)
+                                 : fmt::format("{:.3g}× over", check.value / *check.limit);
+  return fmt::format("<span class=\"margin{}\"><i style=\"width:{:.0f}%\"></i></span> {}",
+                     check.pass ? "" : " over", filled, factor);
+}
+
+std::vector<Cell> CheckRow(const CheckResult& check) {
+  const MetricRow& row = RowOf(check.metric);
+  const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
+  const std::string pill = !check.limit ? Pill("off", "off")
+                           : check.pass ? Pill("ok", "ok")
+                                        : Pill("fail", "fail");
+  std::string where = check.channel;
+  if (!where.empty() && std::isfinite(check.time_s)) where += ", " + At(check.time_s);
+  return {Text(Spaced(check.subject)),
+          Text(row.title + unit),
+          Digits(Number(check.value)),
+          Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
+          Markup(pill),
+          Markup(Margin(check)),
+          Text(where)};
+}
+
+double Trapezoid(const std::vector<double>& time_s, const std::function<double(Eigen::Index)>& f) {
+  double sum = 0.0;
+  for (size_t i = 1; i < time_s.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    sum += 0.5 * (f(k - 1) + f(k)) * (time_s[i] - time_s[i - 1]);
+  }
+  return sum;
+}
+
+}  // namespace
+
+std::string FindingsHtml(const Report& report) {
+  if (report.findings.empty()) return "";
+  std::string html = "<ul class=\"findings\">\n";
+  for (const Finding& finding : report.findings.findings()) {
+    html += "<li>" + Escape(ToText(finding)) + "</li>\n";
+  }
+  return html + "</ul>\n";
+}
+
+std::string ChecksHtml(const Report& report) {
+  if (report.comparison.checks.empty()) return "";
+  Table table{.caption = "Checks, failed ones first",
+              .head = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"), Text(""),
+                       Text("margin"), Text("worst at")},
+              .rows = {}};
+  for (const bool failed : {true, false}) {
+    for (const CheckResult& check : report.comparison.checks) {
+      if ((check.limit && !check.pass) == failed) table.rows.push_back(CheckRow(check));
+    }
+  }
+  return ToHtml(table) +
+         Note("The margin is the limit over the value; a full bar is ten decimal digits.");
+}
+
+std::string DrivesHtml(const Report& report) {
+  std::string html;
+  const PairComparison* main = MainPair(report.comparison);
+  for (const PairComparison& pair : report.comparison.pairs) {
+    if (!pair.compared || pair.drives.empty()) continue;
+    Table table{.caption = pair.measured + " against " + pair.truth,
+                .head = {Text("drive"), Digits("RMS force"), Digits("RMS error / RMS force"),
+                         Digits("largest error"), Digits("at"), Digits("matching digits")},
+                .rows = {}};
+    for (const DriveMetrics& drive : pair.drives) {
+      table.rows.push_back(
+          {Text(drive.drive), Digits(fmt::format("{:.6g} {}", drive.rms_truth, drive.unit)),
+           Digits(Number(drive.nrmse)), Digits(Number(drive.max_error) + " " + drive.unit),
+           Digits(At(drive.time_s)), Digits(Number(drive.digits, "{:.1f}"))});
+    }
+    const bool first = &pair == main;
+    html += first ? ToHtml(table)
+                  : "<details><summary>" + Escape(table.caption) + "</summary>" + ToHtml(table) +
+                        "</details>\n";
+  }
+  return html;
+}
+
+std::string EngineHtml(const Report& report) {
+  if (!report.engine_comparison) return "";
+  const EngineComparison& engine = *report.engine_comparison;
+  if (!engine.failure.empty()) {
+    return "<p>The second run gave no result: " + Escape(engine.failure) + ".</p>\n";
+  }
+  const auto row = [](const char* name, const EngineError& error) {
+    return std::vector<Cell>{Text(name), Digits(Number(error.force_nrmse)),
+                             Digits(Number(error.force_max_rel)),
+                             Digits(Number(error.closure_max_m) + " m")};
+  };
+  std::string html =
+      ToHtml(Table{.caption = "The same run by both engines, against " + engine.truth,
+                   .head = {Text("engine"), Digits("force error, RMS"),
+                            Digits("force error, largest"), Digits("loop gap")},
+                   .rows = {row("MuJoCo as it is (stock)", engine.stock),
+                            row("with the corrections", engine.corrected)}});
+  const double gain = engine.stock.force_nrmse / engine.corrected.force_nrmse;
+  if (std::isfinite(gain)) {
+    html +=
+        Note(fmt::format("What stock MuJoCo is off by is its own modelling error, not the "
+                         "equations': the corrections reduce it {:.1e}-fold.",
+                         gain));
+  }
+  return html;
+}
+
+Work WorkOf(const Trace& trace, const std::vector<std::string>& drives) {
+  Work work;
+  for (const std::string& drive : drives) {
+    const int force = trace.Find(drive + ".force"), velocity = trace.Find(drive + ".velocity");
+    double sum = kNan, peak = kNan;
+    if (force >= 0 && velocity >= 0) {
+      const auto power = [&](Eigen::Index i) {
+        return trace.values(i, force) * trace.values(i, velocity);
+      };
+      sum = Trapezoid(trace.time_s, power);
+      peak =
+          (trace.values.col(force).array() * trace.values.col(velocity).array()).abs().maxCoeff();
+    }
+    work.drives.push_back(sum);
+    work.peak_w.push_back(peak);
+  }
+  const auto integral = [&](const char* channel) {
+    const int column = trace.Find(channel);
+    if (column < 0) return kNan;
+    return Trapezoid(trace.time_s, [&](Eigen::Index i) { return trace.values(i, column); });
+  };
+  work.input = integral("power.input");
+  work.energy = integral("power.energy_rate");
+  return work;
+}
+
+std::string EnergyHtml(const Report& report) {
+  std::vector<std::pair<std::string, Work>> works;
+  for (const WitnessRecord& record : report.witnesses) {
+    if (!record.summary.ok() || record.trace.time_s.size() < 2) continue;
+    works.emplace_back(record.name, WorkOf(record.trace, report.drives));
+  }
+  if (works.empty()) return "";
+  Table table{.caption = "Work over the run [J]", .head = {Text("of")}, .rows = {}};
+  for (const auto& [name, work] : works) table.head.push_back(Digits(name));
+  table.head.push_back(Digits("peak power [W]"));
+  const auto add = [&](const std::string& title, const std::function<double(const Work&)>& value,
+                       double peak_w) {
+    std::vector<Cell> row = {Text(title)};
+    for (const auto& [name, work] : works) row.push_back(Digits(Number(value(work), "{:.6g}")));
+    row.push_back(Digits(Number(peak_w, "{:.4g}")));
+    table.rows.push_back(std::move(row));
+  };
+  const auto drives_sum = [](const Work& work) {
+    double sum = 0.0;
+    for (const double drive : work.drives) sum += drive;
+    return sum;
+  };
+  for (size_t i = 0; i < report.drives.size(); ++i) {
+    add(
+        report.drives[i], [i](const Work& work) { return work.drives[i]; },
+        works.back().second.peak_w[i]);
+  }
+  add("all drives", drives_sum, kNan);
+  add(
+      "base and loads", [&](const Work& work) { return work.input - drives_sum(work); }, kNan);
+  add(
+      "change of energy", [](const Work& work) { return work.energy; }, kNan);
+  add(
+      "drift: input − change", [](const Work& work) { return work.input - work.energy; }, kNan);
+  return ToHtml(table) + Note("Trapezoidal rule over the samples; peak power of " +
+                              Escape(works.back().first) + ".");
+}
+
+std::string NotComparedHtml(const Report& report) {
+  std::string html;
+  for (const WitnessRecord& record : report.witnesses) {
+    if (record.summary.ok()) continue;
+    html += "<li><b>" + Escape(record.name) + "</b>: " + Escape(ToText(record.summary.stop)) +
+            ". " + Escape(record.summary.message) + "</li>\n";
+  }
+  for (const NotCompared& item : report.comparison.not_compared) {
+    html += "<li><b>" + Escape(item.what) + "</b>: " + Escape(item.why) + "</li>\n";
+  }
+  return html.empty() ? "" : "<ul>\n" + html + "</ul>\n";
+}
+
+std::string AuditHtml(const std::optional<HtmlAudit>& audit) {
+  if (!audit) return "";
+  size_t right = 0, corrected = 0, open = 0;
+  Table table{.caption = "Every numbered equation",
+              .head = {Text("equation"), Text("status"), Text("as printed"), Text("corrected"),
+                       Text("residual"), Text("note")},
+              .rows = {}};
+  for (const HtmlEquation& row : audit->rows) {
+    right += row.right ? 1 : 0;
+    corrected += row.corrected_right ? 1 : 0;
+    open += row.right || row.corrected_right ? 0 : 1;
+    const char* kind = row.right ? "ok" : row.corrected_right ? "warn" : "off";
+    table.rows.push_back({Text(row.equation + (row.erratum.empty() ? "" : " " + row.erratum)),
+                          Markup(Pill(kind, row.status)), Text(row.printed), Text(row.corrected),
+                          Text(row.residual), Text(row.note)});
+  }
+  return "<p>" + Escape(audit->source) +
+         fmt::format(
+             "</p>\n<p><b>{}</b> of {} rows are right as printed, <b>{}</b> are wrong as "
+             "printed and corrected here, {} are labels, choices or claims that no "
+             "residual decides.</p>\n",
+             right, audit->rows.size(), corrected, open) +
+         "<details><summary>All rows</summary>" + ToHtml(table) + "</details>\n";
+}
+
+std::string SignalsHtml(const Report& report) {
+  if (report.sheets.empty()) return "";
+  Table table{.caption = "Frame and sign of each force signal",
+              .head = {Text("signal"), Text("unit"), Text("acts on"), Text("exerted by"),
+                       Text("frame and axis"), Text("positive means")},
+              .rows = {}};
+  for (const SignalSheet& sheet : report.sheets) {
+    table.rows.push_back({Text(sheet.signal), Text(sheet.unit), Text(sheet.acts_on),
+                          Text(sheet.exerted_by), Text(sheet.frame), Text(sheet.positive)});
+  }
+  return ToHtml(table);
+}
+
+std::string ParametersHtml(const Mechanism& mechanism) {
+  if (mechanism.parameters.empty()) return "";
+  Table table{.caption = "Parameters with the scenario's overrides",
+              .head = {Text("name"), Digits("value"), Text("unit"), Text("source"), Text("note")},
+              .rows = {}};
+  for (const Parameter& parameter : mechanism.parameters) {
+    const char* source = parameter.source == Source::kPrinted     ? "printed"
+                         : parameter.source == Source::kAssumed   ? "assumed"
+                         : parameter.source == Source::kCorrected ? "corrected"
+                                                                  : "";
+    table.rows.push_back({Text(parameter.name), Digits(fmt::format("{:.10g}", parameter.value)),
+                          Text(parameter.unit), Text(source), Text(parameter.note)});
+  }
+  return "<details><summary>" + fmt::format("{} parameters", mechanism.parameters.size()) +
+         "</summary>" + ToHtml(table) + "</details>\n";
+}
+
+std::string ReproduceHtml(const HtmlInput& input) {
+  const Report& report = *input.report;
+  std::string command = "mbverify run " + report.scenario_file;
+  for (const std::string& argument : input.arguments) command += " " + argument;
+  std::string html = "<pre><code>" + Escape(command) + "</code></pre>\n";
+  Table table{.caption = "Inputs and versions", .head = {Text("what"), Text("is")}, .rows = {}};
+  table.rows.push_back({Text("scenario"), Text(report.scenario_file)});
+  table.rows.push_back({Text("model"), Text(report.model_file)});
+  for (const auto& [name, version] : report.versions) {
+    table.rows.push_back({Text(name), Text(version)});
+  }
+  const Timing& timing = report.timing;
+  std::string times = fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
+                                  timing.analytic_s, timing.reference_s, timing.simulation_s);
+  if (timing.stock_s > 0.0) times += fmt::format(", stock engine {:.3f} s", timing.stock_s);
+  if (timing.render_s > 0.0) times += fmt::format(", pictures {:.3f} s", timing.render_s);
+  if (timing.loop_s > 0.0 && timing.steps > 0) {
+    times += fmt::format("; {} {}, {:.0f}/s", timing.steps,
+                         report.mode == "forward" ? "steps" : "samples",
+                         static_cast<double>(timing.steps) / timing.loop_s);
+  }
+  table.rows.push_back({Text("time taken"), Text(times)});
+  return html + ToHtml(table) +
+         Note(
+             "Files beside this page: summary.json (every number), traces.csv (17 digits), "
+             "model.xml (the MJCF as simulated).");
+}
+
+}  // namespace mbv

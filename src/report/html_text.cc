@@ -1,0 +1,92 @@
+#include "report/html_text.h"
+
+#include <bit>
+#include <cstdint>
+
+#include "core/demand.h"
+
+namespace mbv {
+namespace {
+
+std::string CellHtml(const Cell& cell, const char* tag, const char* scope) {
+  std::string html = std::string("<") + tag + scope;
+  if (cell.number) html += " class=\"n\"";
+  html += ">" + (cell.html ? cell.text : Escape(cell.text)) + "</" + tag + ">";
+  return html;
+}
+
+}  // namespace
+
+std::string Escape(std::string_view text) {
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : text) {
+    switch (c) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += c;
+    }
+  }
+  return escaped;
+}
+
+std::string Base64(std::string_view bytes) {
+  static constexpr char kDigits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const size_t count = std::min<size_t>(3, bytes.size() - i);
+    std::uint32_t word = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      word = word << 8U | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      text += k <= count ? kDigits[word >> (18 - 6 * k) & 63U] : '=';
+    }
+  }
+  return text;
+}
+
+std::string Base64(std::span<const float> values) {
+  std::string bytes;
+  bytes.reserve(4 * values.size());
+  for (const float value : values) {
+    const auto word = std::bit_cast<std::uint32_t>(value);
+    for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 255U);
+  }
+  return Base64(bytes);
+}
+
+std::string ToHtml(const Table& table) {
+  std::string html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"" +
+                     Escape(table.caption) + "\"><table><caption>" + Escape(table.caption) +
+                     "</caption><thead><tr>";
+  for (const Cell& cell : table.head) html += CellHtml(cell, "th", " scope=\"col\"");
+  html += "</tr></thead><tbody>\n";
+  for (const std::vector<Cell>& row : table.rows) {
+    html += "<tr>";
+    for (size_t i = 0; i < row.size(); ++i) {
+      MBV_DEMAND(row.size() == table.head.size(), row.size());
+      html += i == 0 ? CellHtml(row[i], "th", " scope=\"row\"") : CellHtml(row[i], "td", "");
+    }
+    html += "</tr>\n";
+  }
+  return html + "</tbody></table></div>\n";
+}
+
+}  // namespace mbv

@@ -1,0 +1,37 @@
+// Pieces of HTML: escaped text, tables, base64.
+#pragma once
+
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbv {
+
+/// Text that is safe between tags and in quoted attributes.
+[[nodiscard]] std::string Escape(std::string_view text);
+
+/// RFC 4648, with padding.
+[[nodiscard]] std::string Base64(std::string_view bytes);
+/// The values as little-endian 32-bit floats.
+[[nodiscard]] std::string Base64(std::span<const float> values);
+
+/// A table cell: text is escaped unless it is marked as HTML.
+struct Cell {
+  std::string text;
+  bool number = false;  ///< aligned to the right
+  bool html = false;    ///< `text` is HTML already
+};
+[[nodiscard]] inline Cell Text(std::string text) { return {std::move(text), false, false}; }
+[[nodiscard]] inline Cell Digits(std::string text) { return {std::move(text), true, false}; }
+[[nodiscard]] inline Cell Markup(std::string html) { return {std::move(html), false, true}; }
+
+/// A table that scrolls by itself where the page is narrow; the first column names the row.
+struct Table {
+  std::string caption;
+  std::vector<Cell> head;
+  std::vector<std::vector<Cell>> rows;
+};
+[[nodiscard]] std::string ToHtml(const Table& table);
+
+}  // namespace mbv
