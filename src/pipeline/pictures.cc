@@ -52,6 +52,16 @@ Picture Shrunk(const Picture& picture) {
   return small;
 }
 
+// The path of an output's origin through the run, in the world.
+PolylineOverlay PathOf(const Mechanism& mechanism, const SimulationRun& run, int output_index) {
+  const Output& output = mechanism.outputs[static_cast<size_t>(output_index)];
+  PolylineOverlay path;
+  for (const std::vector<Pose>& X_WB : run.X_WB) {
+    path.points_W.push_back(X_WB[static_cast<size_t>(output.body)] * output.X_BO.translation());
+  }
+  return path;
+}
+
 }  // namespace
 
 Caption CaptionOf(const Report& report) {
@@ -87,8 +97,12 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
   }
   PictureOptions options = OptionsOf(scenario.snapshots);
   if (frames.size() > kFewPictures) options.passes = kVideoPasses;
+  Overlay overlay;
+  if (scenario.snapshots.path_output >= 0) {
+    overlay.paths.push_back(PathOf(mechanism, run, scenario.snapshots.path_output));
+  }
   RunSummary summary =
-      RenderPictures(mechanism, frames, {}, options, [&](int index, Picture picture) {
+      RenderPictures(mechanism, frames, overlay, options, [&](int index, Picture picture) {
         PictureFile& file = (*files)[static_cast<size_t>(index)];
         file.content = EncodePng(picture);
         file.preview = EncodePng(Shrunk(picture));

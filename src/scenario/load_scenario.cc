@@ -84,7 +84,7 @@ class Loader {
     if (motion == nullptr) return;
     scenario_.motion = ReadMotion(&values_, *mechanism_, motion, map.Find("loads"));
     scenario_.snapshots =
-        ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s);
+        ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s, *mechanism_);
     CheckParameterNames(map);
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
   }

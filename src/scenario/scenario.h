@@ -61,6 +61,7 @@ struct SnapshotSettings {
   std::vector<double> times_s;  ///< within the motion
   std::array<int, 2> size_px{1280, 960};
   CameraSettings camera;
+  int path_output = -1;  ///< output whose path through the whole motion is drawn; -1: none
 };
 
 /// What running this file must give; used by the tests of the shipped scenarios.

@@ -171,10 +171,11 @@ CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, double* start_
   return limits;
 }
 
-SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node, double duration_s) {
+SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node, double duration_s,
+                               const Mechanism& mechanism) {
   SnapshotSettings settings;
   YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "snapshots", {"times_s", "size_px", "camera"});
+  YamlMap map(&yaml, node, "snapshots", {"times_s", "size_px", "camera", "path"});
   settings.times_s = {0.0, 0.5 * duration_s};
   if (const YamlNode* times = map.Find("times_s")) {
     settings.times_s = values->Numbers(*times, "snapshots.times_s").value_or(settings.times_s);
@@ -192,6 +193,12 @@ SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node, double
       yaml.Error(*size, fmt::format("snapshots.size_px = {} x {} violates 16 … 8192",
                                     settings.size_px[0], settings.size_px[1]));
     }
+  }
+  if (const YamlNode* path = map.Find("path")) {
+    std::vector<std::string> outputs;
+    for (const Output& output : mechanism.outputs) outputs.push_back(output.name);
+    const auto choice = yaml.Choice(*path, "snapshots.path", outputs);
+    if (choice) settings.path_output = static_cast<int>(*choice);
   }
   YamlMap camera(&yaml, map.Find("camera"), "snapshots.camera",
                  {"azimuth_deg", "elevation_deg", "distance", "lookat"});

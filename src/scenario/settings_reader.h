@@ -14,7 +14,7 @@ namespace mbv {
                                      double* start_window_s);
 /// Without the section: pictures at the start and half way.
 [[nodiscard]] SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node,
-                                             double duration_s);
+                                             double duration_s, const Mechanism& mechanism);
 [[nodiscard]] Expectation ReadExpectation(ValueReader* values, const YamlNode* node);
 
 }  // namespace mbv
