@@ -2,44 +2,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <set>
-#include <string_view>
+
+#include "mechanism/colors.h"
 
 namespace mbv::mjcf {
 namespace {
-
-struct NamedColor {
-  std::string_view name;
-  std::array<double, 4> rgba;
-};
-constexpr std::array kColors{
-    NamedColor{"accent", {0.93, 0.55, 0.14, 1}},    NamedColor{"aluminium", {0.78, 0.8, 0.83, 1}},
-    NamedColor{"base", {0.27, 0.3, 0.34, 1}},       NamedColor{"black", {0.1, 0.1, 0.11, 1}},
-    NamedColor{"blue", {0.2, 0.42, 0.7, 1}},        NamedColor{"brass", {0.8, 0.65, 0.3, 1}},
-    NamedColor{"copper", {0.74, 0.45, 0.28, 1}},    NamedColor{"dark_steel", {0.34, 0.37, 0.41, 1}},
-    NamedColor{"deck", {0.52, 0.57, 0.58, 1}},      NamedColor{"glass", {0.7, 0.82, 0.9, 0.3}},
-    NamedColor{"green", {0.27, 0.57, 0.36, 1}},     NamedColor{"hull", {0.36, 0.14, 0.13, 1}},
-    NamedColor{"light_grey", {0.8, 0.81, 0.82, 1}}, NamedColor{"red", {0.75, 0.2, 0.17, 1}},
-    NamedColor{"rubber", {0.16, 0.16, 0.17, 1}},    NamedColor{"sea", {0.16, 0.37, 0.5, 1}},
-    NamedColor{"steel", {0.6, 0.64, 0.69, 1}},      NamedColor{"white", {0.93, 0.93, 0.92, 1}},
-    NamedColor{"wood", {0.72, 0.56, 0.38, 1}},      NamedColor{"yellow", {0.93, 0.77, 0.2, 1}},
-};
-constexpr std::array<double, 4> kGrey{0.58, 0.6, 0.62, 1};
-
-std::array<double, 4> ColorOf(const std::string& color) {
-  for (const NamedColor& named : kColors) {
-    if (named.name == color) return named.rgba;
-  }
-  if (color.size() != 7 && color.size() != 9) return kGrey;
-  std::array<double, 4> rgba{0, 0, 0, 1};
-  for (size_t i = 0; 2 * i + 2 < color.size(); ++i) {
-    unsigned value = 0;
-    std::from_chars(color.data() + 1 + 2 * i, color.data() + 3 + 2 * i, value, 16);
-    rgba[i] = value / 255.0;
-  }
-  return rgba;
-}
 
 struct Bounds {
   Vec3 low = Vec3::Constant(1e300), high = Vec3::Constant(-1e300);
@@ -111,7 +79,8 @@ void WriteMaterials(const Mechanism& mechanism, XmlWriter* xml) {
   for (const std::string& name : names) {
     xml->Open("material");
     xml->Set("name", name);
-    xml->Set("rgba", name == "ground" ? std::array<double, 4>{0.87, 0.87, 0.86, 1} : ColorOf(name));
+    xml->Set("rgba",
+             name == "ground" ? std::array<double, 4>{0.87, 0.87, 0.86, 1} : ShapeColor(name));
     xml->Close();
   }
   xml->Close();

@@ -1,9 +1,8 @@
-// Materials by name: what a shape's `color` may say.
+// Materials by name.
 #pragma once
 
 #include <array>
 #include <string>
-#include <vector>
 
 namespace mbv::render {
 
@@ -15,14 +14,12 @@ struct Material {
   float emission = 0.0F;   ///< light of its own, 0 … 1
 };
 
-/// The material of a name ("steel", "accent", …) or of "#rrggbb[aa]"; unknown text gives "grey".
+/// The material of a shape's colour (mechanism/colors.h) or of a mark: closure, gap, pull, push,
+/// x_axis, y_axis, z_axis.
 [[nodiscard]] Material MaterialOf(const std::string& color);
 
 /// Shapes of these materials ("sea", "hull", "deck") are surroundings: drawn, but the automatic
 /// camera does not have to fit them.
 [[nodiscard]] bool IsScenery(const std::string& color);
-
-/// Names that MaterialOf knows, sorted.
-[[nodiscard]] std::vector<std::string> MaterialNames();
 
 }  // namespace mbv::render

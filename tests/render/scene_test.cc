@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mechanism/colors.h"
 #include "render/annotations.h"
 #include "render/camera.h"
 #include "render/caption.h"
@@ -140,13 +141,14 @@ TEST(Annotate, DrawsOneRingForClosuresAtOnePlace) {
   EXPECT_EQ(marks.flats.size(), 2U);  // what is visible and what shows through
 }
 
-TEST(Palette, KnowsNamesAndHexAndMakesTheRestGrey) {
+TEST(Palette, TakesTheShapeColoursAndKeepsItsMarksApart) {
   EXPECT_EQ(MaterialOf("#ff8000").rgba, (std::array<float, 4>{1.0F, 128 / 255.0F, 0.0F, 1.0F}));
-  EXPECT_EQ(MaterialOf("#00000080").rgba[3], 128 / 255.0F);
   EXPECT_EQ(MaterialOf("no such colour").rgba, MaterialOf("grey").rgba);
-  EXPECT_EQ(MaterialOf("#12345").rgba, MaterialOf("grey").rgba);
-  EXPECT_EQ(MaterialOf("#gg0000").rgba, MaterialOf("grey").rgba);
-  EXPECT_NE(MaterialOf("steel").rgba, MaterialOf("grey").rgba);
+  EXPECT_GT(MaterialOf("steel").specular, MaterialOf("wood").specular);
+  for (const char* mark : {"push", "pull", "closure", "gap", "x_axis", "y_axis", "z_axis"}) {
+    EXPECT_FALSE(IsShapeColor(mark)) << mark;
+    EXPECT_GT(MaterialOf(mark).emission, 0.0F) << mark;
+  }
 }
 
 TEST(PlainText, ReplacesWhatTheFontLacks) {
