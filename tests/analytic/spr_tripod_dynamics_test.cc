@@ -243,10 +243,8 @@ Vec6 MomentumRate(const Path& path, const Masses& masses, double t) {
     const State s = path.At(u, masses);
     Vec6 h = Vec6::Zero();
     for (int body = 0; body < kBodies; ++body) {
-      const int leg = body == kPlatform ? -1 : (body - 1) % 3;
-      const Inertia& inertia = body == kPlatform   ? masses.platform
-                               : body < RodBody(0) ? masses.cylinder
-                                                   : masses.rod;
+      const int leg = LegOf(body);
+      const Inertia& inertia = InertiaOf(masses, body);
       const Pose X = BodyPose(s.p, body);
       const Vec3 omega = leg < 0 ? s.v.omega : s.v.omega_leg[leg];
       Vec3 v_G = omega.cross(X.linear() * inertia.com);
@@ -273,9 +271,7 @@ TEST(SprTripodDynamics, BaseReactionsBalanceTheMomentumOfAllBodies) {
       moment += s.p.b[i].cross(s.f.S[i]);
     }
     for (int body = 0; body < kBodies; ++body) {
-      const Inertia& inertia = body == kPlatform   ? masses.platform
-                               : body < RodBody(0) ? masses.cylinder
-                                                   : masses.rod;
+      const Inertia& inertia = InertiaOf(masses, body);
       const Pose X = BodyPose(s.p, body);
       const Vec3 weight = inertia.mass * masses.gravity;
       force += weight + loads.force[body];
@@ -352,10 +348,8 @@ TEST(SprTripodDynamics, BaseReactionsSolveTheNineBalanceEquations) {
     A.block<1, 3>(6 + i, 3 * i) = s.p.c[i].cross(-s.p.q[i] * s.p.w[i]).transpose();
   }
   for (int body = 0; body < kBodies; ++body) {
-    const int leg = body == kPlatform ? -1 : (body - 1) % 3;
-    const Inertia& inertia = body == kPlatform   ? masses.platform
-                             : body < RodBody(0) ? masses.cylinder
-                                                 : masses.rod;
+    const int leg = LegOf(body);
+    const Inertia& inertia = InertiaOf(masses, body);
     const Pose X = BodyPose(s.p, body);
     const Mat3 I = X.linear() * inertia.I * X.linear().transpose();
     const Vec3 omega = leg < 0 ? s.v.omega : s.v.omega_leg[leg];

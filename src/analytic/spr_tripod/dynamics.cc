@@ -38,12 +38,65 @@ Demand DemandOf(const Inertia& body, const Mat3& R, const Vec3& omega, const Vec
   return {F - force, N + rho.cross(F) - moment};
 }
 
-const Inertia& InertiaOf(const Masses& masses, int body) {
-  if (body == kPlatform) return masses.platform;
-  return body < RodBody(0) ? masses.cylinder : masses.rod;
+// What the motion of all bodies asks for, loads deducted.
+struct Balance {
+  Vec3 Q_v = Vec3::Zero(), Q_omega = Vec3::Zero();  // (D8) as Q = Q_v + J_cᵀ Q_ω
+  Vec3 F = Vec3::Zero(), M = Vec3::Zero();          // sum of forces; of moments about O_A
+  PerLeg<Vec3> F_cylinder;
+  PerLeg<double> hinge_moment{};  // of leg i about its hinge axis
+};
+
+void AddPlatform(const Posture& p, const Velocities& s, const Accelerations& acc,
+                 const Masses& masses, const ExternalLoads& loads, Balance* balance) {
+  const Demand d = DemandOf(masses.platform, p.R, s.omega, acc.omega_dot, acc.v_dot, masses.gravity,
+                            loads.force[kPlatform], loads.moment[kPlatform]);
+  balance->Q_v += d.F;
+  balance->Q_omega += d.M;
+  balance->F += d.F;
+  balance->M += d.M;
 }
 
-int LegOf(int body) { return body == kPlatform ? -1 : (body - 1) % 3; }
+// Cylinder and rod; their demands' moments are about B_i and A_i.
+void AddLeg(const Posture& p, const Velocities& s, const Accelerations& acc, const Masses& masses,
+            const ExternalLoads& loads, int i, Balance* balance) {
+  const Mat3 R = LegRotation(p, i);
+  const Vec3 &w = p.w[i], &a = p.a[i], &g = masses.gravity;
+  const double q = p.q[i];
+  const int cyl = CylinderBody(i), rod = RodBody(i);
+  const Demand c = DemandOf(masses.cylinder, R, s.omega_leg[i], acc.omega_leg_dot[i], Vec3::Zero(),
+                            g, loads.force[cyl], loads.moment[cyl]);
+  const Demand r = DemandOf(masses.rod, R, s.omega_leg[i], acc.omega_leg_dot[i], acc.a_A[i], g,
+                            loads.force[rod], loads.moment[rod]);
+  // (D8), V and W multiplied out: the rod moves with A_i (V = 1 − [a_i×] J_c), and both parts turn
+  // by J_di of (20c).
+  const Vec3 M = c.M + r.M;
+  balance->Q_v += r.F + M.cross(w) / q;
+  balance->Q_omega += a.cross(r.F) + (w.dot(a) * M - w * a.dot(M)) / q + w * w.dot(M);
+  balance->F += c.F + r.F;
+  balance->M += c.M + p.d[i].cross(c.F) + r.M + a.cross(r.F);
+  balance->F_cylinder[i] = c.F;
+  balance->hinge_moment[i] = p.c[i].dot(M - q * w.cross(c.F));
+}
+
+// (D11), (D12). S_i = S_c c_i + S_y y_i + S_w w_i: the hinge balance gives S_y; what is left of
+// force and moment is carried by S_c and S_w, and J_c, J eliminate them one after the other.
+void FillReactions(const Posture& p, const Jacobians& jacobians, const Balance& balance,
+                   Forces* forces) {
+  Vec3 F = balance.F, M = balance.M;
+  PerLeg<Vec3> S_y;
+  for (int i = 0; i < 3; ++i) {
+    S_y[i] = (balance.hinge_moment[i] / p.q[i]) * p.w[i].cross(p.c[i]);
+    F -= S_y[i];
+    M -= p.d[i].cross(S_y[i]);
+  }
+  const Vec3 S_w = jacobians.J_inv.transpose() * (F + jacobians.J_c.transpose() * M);
+  for (int i = 0; i < 3; ++i) M -= S_w[i] * p.a[i].cross(p.w[i]);
+  const Vec3 S_c = jacobians.D_inv.transpose() * M;
+  for (int i = 0; i < 3; ++i) {
+    forces->S[i] = S_c[i] * p.c[i] + S_y[i] + S_w[i] * p.w[i];
+    forces->f_check[i] = S_w[i] - balance.F_cylinder[i].dot(p.w[i]);  // (D12)
+  }
+}
 
 }  // namespace
 
@@ -116,6 +169,11 @@ void FillAccelerations(const Posture& p, const Jacobians& jacobians, const Veloc
   }
 }
 
+const Inertia& InertiaOf(const Masses& masses, int body) {
+  if (body == kPlatform) return masses.platform;
+  return body < RodBody(0) ? masses.cylinder : masses.rod;
+}
+
 Mat3 LegRotation(const Posture& posture, int leg) {
   Mat3 R;
   R << posture.c[leg], posture.w[leg].cross(posture.c[leg]), posture.w[leg];
@@ -134,55 +192,14 @@ Pose BodyPose(const Posture& p, int body) {
 void FillForces(const Posture& p, const Jacobians& jacobians, const Velocities& s,
                 const Accelerations& acc, const Masses& masses, const ExternalLoads& loads,
                 Forces* forces) {
-  const Vec3& g = masses.gravity;
-  // (D7); F_sum and M_sum (about O_A) are the demands of everything that moves.
-  const Demand platform = DemandOf(masses.platform, p.R, s.omega, acc.omega_dot, acc.v_dot, g,
-                                   loads.force[kPlatform], loads.moment[kPlatform]);
-  Vec3 F_sum = platform.F, M_sum = platform.M;
-  // (D8) as Q = Q_v + J_cᵀ Q_ω, with V and W of the bodies multiplied out.
-  Vec3 Q_v = platform.F, Q_omega = platform.M;
-  PerLeg<Vec3> F_cylinder;
-  Vec3 hinge_demand;  // of leg i about its hinge axis
-  for (int i = 0; i < 3; ++i) {
-    const Mat3 R = LegRotation(p, i);
-    const Vec3 &w = p.w[i], &a = p.a[i];
-    const double q = p.q[i];
-    const int cyl = CylinderBody(i), rod = RodBody(i);
-    const Demand c = DemandOf(masses.cylinder, R, s.omega_leg[i], acc.omega_leg_dot[i],
-                              Vec3::Zero(), g, loads.force[cyl], loads.moment[cyl]);
-    const Demand d = DemandOf(masses.rod, R, s.omega_leg[i], acc.omega_leg_dot[i], acc.a_A[i], g,
-                              loads.force[rod], loads.moment[rod]);
-    // The rod moves with A_i (V = 1 − [a_i×] J_c), and both parts turn by J_di of (20c).
-    const Vec3 M_leg = c.M + d.M;
-    Q_v += d.F + M_leg.cross(w) / q;
-    Q_omega += a.cross(d.F) + (w.dot(a) * M_leg - w * a.dot(M_leg)) / q + w * w.dot(M_leg);
-    // Moments of the cylinder are about B_i, of the rod about A_i.
-    F_sum += c.F + d.F;
-    M_sum += c.M + p.d[i].cross(c.F) + d.M + a.cross(d.F);
-    F_cylinder[i] = c.F;
-    hinge_demand[i] = p.c[i].dot(M_leg - q * w.cross(c.F));
-  }
+  Balance balance;
+  AddPlatform(p, s, acc, masses, loads, &balance);
+  for (int leg = 0; leg < 3; ++leg) AddLeg(p, s, acc, masses, loads, leg, &balance);
   // (D9)
-  const Vec3 Q = Q_v + jacobians.J_c.transpose() * Q_omega;
+  const Vec3 Q = balance.Q_v + jacobians.J_c.transpose() * balance.Q_omega;
   const Vec3 f = jacobians.J_inv.transpose() * Q;
-
-  // (D11): S_i = S_c c_i + S_y y_i + S_w w_i. The hinge balance gives S_y; what is left of force
-  // and moment is carried by S_c and S_w, and J_c, J eliminate them one after the other.
-  Vec3 F_left = F_sum, M_left = M_sum;
-  PerLeg<Vec3> S_y;
-  for (int i = 0; i < 3; ++i) {
-    S_y[i] = (hinge_demand[i] / p.q[i]) * p.w[i].cross(p.c[i]);
-    F_left -= S_y[i];
-    M_left -= p.d[i].cross(S_y[i]);
-  }
-  const Vec3 S_w = jacobians.J_inv.transpose() * (F_left + jacobians.J_c.transpose() * M_left);
-  for (int i = 0; i < 3; ++i) M_left -= S_w[i] * p.a[i].cross(p.w[i]);
-  const Vec3 S_c = jacobians.D_inv.transpose() * M_left;
-  for (int i = 0; i < 3; ++i) {
-    forces->f[i] = f[i];
-    forces->S[i] = S_c[i] * p.c[i] + S_y[i] + S_w[i] * p.w[i];
-    forces->f_check[i] = S_w[i] - F_cylinder[i].dot(p.w[i]);  // (D12)
-  }
+  for (int i = 0; i < 3; ++i) forces->f[i] = f[i];
+  FillReactions(p, jacobians, balance, forces);
 }
 
 Mat3 TaskSpaceMass(const Posture& p, const Jacobians& jacobians, const Masses& masses) {

@@ -79,6 +79,9 @@ inline constexpr int kBodies = 7;
 inline constexpr int kPlatform = 0;
 inline constexpr int CylinderBody(int leg) { return 1 + leg; }
 inline constexpr int RodBody(int leg) { return 4 + leg; }
+/// Leg 0…2 that a body belongs to, -1 for the platform.
+inline constexpr int LegOf(int body) { return body == kPlatform ? -1 : (body - 1) % 3; }
+[[nodiscard]] const Inertia& InertiaOf(const Masses& masses, int body);
 
 /// External force and moment (about the body's origin) per body, world axes.
 struct ExternalLoads {
