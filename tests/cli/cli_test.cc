@@ -16,7 +16,7 @@ constexpr const char* kDisagrees = "scenarios/stabilizing_platform/must_fail/ana
 constexpr const char* kBadInput = "scenarios/stabilizing_platform/must_fail/no_yaml.yaml";
 constexpr const char* kCannotRun = "scenarios/stabilizing_platform/must_fail/out_of_reach.yaml";
 
-std::string Run(const Program& mbverify, const std::string& arguments) {
+std::string RunArguments(const Program& mbverify, const std::string& arguments) {
   return "run --no-pictures --out " + mbverify.Out() + " " + arguments;
 }
 
@@ -46,11 +46,11 @@ TEST_F(CliTest, WrongUseIsBadInput) {
 
 TEST_F(CliTest, TheWorstScenarioDecidesTheExitCode) {
   const std::string good = kGood, disagrees = kDisagrees, bad = kBadInput, cannot = kCannotRun;
-  EXPECT_EQ(mbverify(Run(mbverify, good)).exit_code, 0);
-  EXPECT_EQ(mbverify(Run(mbverify, good + " " + disagrees)).exit_code, 1);
-  EXPECT_EQ(mbverify(Run(mbverify, cannot + " " + disagrees)).exit_code, 3);
+  EXPECT_EQ(mbverify(RunArguments(mbverify, good)).exit_code, 0);
+  EXPECT_EQ(mbverify(RunArguments(mbverify, good + " " + disagrees)).exit_code, 1);
+  EXPECT_EQ(mbverify(RunArguments(mbverify, cannot + " " + disagrees)).exit_code, 3);
   const ProgramResult all =
-      mbverify(Run(mbverify, "-q " + cannot + " " + bad + " " + good + " " + disagrees));
+      mbverify(RunArguments(mbverify, "-q " + cannot + " " + bad + " " + good + " " + disagrees));
   EXPECT_EQ(all.exit_code, 2);
   EXPECT_NE(all.out.find("4 scenarios: 2 ran, 2 compared, 1 verified, 1 with bad input"),
             std::string::npos)
@@ -63,19 +63,18 @@ TEST_F(CliTest, FoldersStandForTheirScenariosButNotForThoseThatMustFail) {
   fs::copy(source / kGood, mbverify.folder() / "mine" / "a.yaml");
   fs::copy(source / kDisagrees, mbverify.folder() / "mine" / "must_fail" / "b.yaml");
   std::ofstream(mbverify.folder() / "mine" / "other.yaml") << "a: 1\n";
-  const std::string models = "MBVERIFY_MODELS='" MBV_SOURCE_DIR "/models' ";
   setenv("MBVERIFY_MODELS", MBV_SOURCE_DIR "/models", 1);
   const ProgramResult result =
-      mbverify(Run(mbverify, "-q " + (mbverify.folder() / "mine").string()));
+      mbverify(RunArguments(mbverify, "-q " + (mbverify.folder() / "mine").string()));
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   EXPECT_EQ(std::count(result.out.begin(), result.out.end(), '\n'), 1) << result.out;
   fs::create_directories(mbverify.folder() / "empty");
-  EXPECT_EQ(mbverify(Run(mbverify, (mbverify.folder() / "empty").string())).exit_code, 2);
+  EXPECT_EQ(mbverify(RunArguments(mbverify, (mbverify.folder() / "empty").string())).exit_code, 2);
   unsetenv("MBVERIFY_MODELS");
 }
 
 TEST_F(CliTest, ResultsGoToStdoutTalkToStderrAndFilesToTheFolder) {
-  const ProgramResult result = mbverify(Run(mbverify, kGood));
+  const ProgramResult result = mbverify(RunArguments(mbverify, kGood));
   EXPECT_EQ(result.out.substr(0, 35), "stabilizing_platform / static: AGREE");
   EXPECT_NE(result.err.find("results in "), std::string::npos);
   EXPECT_EQ(result.out.find('\x1b'), std::string::npos);  // no colour into a file
@@ -91,21 +90,21 @@ TEST_F(CliTest, TheSameScenarioTwiceGivesTheSameBytes) {
       std::string(kDisagrees) + " --mode forward --set motion.duration_s=1";
   const fs::path csv =
       fs::path(mbverify.Out()) / "stabilizing_platform/must_fail/analytic_mass/traces.csv";
-  ASSERT_EQ(mbverify(Run(mbverify, arguments)).exit_code, 1);
+  ASSERT_EQ(mbverify(RunArguments(mbverify, arguments)).exit_code, 1);
   const std::string first = ReadAll(csv);
-  ASSERT_EQ(mbverify(Run(mbverify, arguments)).exit_code, 1);
+  ASSERT_EQ(mbverify(RunArguments(mbverify, arguments)).exit_code, 1);
   EXPECT_GT(first.size(), 10000u);
   EXPECT_TRUE(first == ReadAll(csv));
 }
 
 TEST_F(CliTest, AKilledRunLeavesTheOldResultWhole) {
-  ASSERT_EQ(mbverify(Run(mbverify, kGood)).exit_code, 0);
+  ASSERT_EQ(mbverify(RunArguments(mbverify, kGood)).exit_code, 0);
   const fs::path summary = fs::path(mbverify.Out()) / "stabilizing_platform/static/summary.json";
   const std::string before = ReadAll(summary);
   // Killed somewhere on the way; the time is meant to hit different stages.
   for (const char* limit : {"0.05", "0.1", "0.15", "0.2"}) {
     const std::string command = std::string("cd '" MBV_SOURCE_DIR "' && timeout -s KILL ") + limit +
-                                " '" MBV_BINARY_DIR "/mbverify' " + Run(mbverify, kGood) +
+                                " '" MBV_BINARY_DIR "/mbverify' " + RunArguments(mbverify, kGood) +
                                 " >/dev/null 2>&1";
     const int status = std::system(command.c_str());
     (void)status;  // whole or killed, the summary must be one of a complete run
@@ -113,7 +112,7 @@ TEST_F(CliTest, AKilledRunLeavesTheOldResultWhole) {
     ASSERT_FALSE(json.is_discarded()) << limit;
     EXPECT_EQ(json["verdict"], "agree");
   }
-  ASSERT_EQ(mbverify(Run(mbverify, kGood)).exit_code, 0);
+  ASSERT_EQ(mbverify(RunArguments(mbverify, kGood)).exit_code, 0);
   EXPECT_EQ(std::distance(fs::directory_iterator(summary.parent_path().parent_path()), {}), 1);
   EXPECT_FALSE(before.empty());
 }
@@ -128,13 +127,13 @@ TEST_F(CliTest, AFolderThatCannotBeWrittenIsBadInput) {
 }
 
 TEST_F(CliTest, ModeAndSetReachTheScenario) {
-  const ProgramResult result = mbverify(
-      Run(mbverify, std::string(kGood) + " --mode forward --set simulation.step_s=0.0005 --set "
-                                         "parameters.m_p=1000 --set motion.duration_s=0.1"));
+  const ProgramResult result = mbverify(RunArguments(
+      mbverify, std::string(kGood) + " --mode forward --set simulation.step_s=0.0005 --set "
+                                     "parameters.m_p=1000 --set motion.duration_s=0.1"));
   EXPECT_EQ(result.exit_code, 0) << result.out;
   EXPECT_NE(result.out.find("forward simulation, step 0.5 ms"), std::string::npos) << result.out;
   const ProgramResult wrong =
-      mbverify(Run(mbverify, std::string(kGood) + " --set simulation.stepp_s=1"));
+      mbverify(RunArguments(mbverify, std::string(kGood) + " --set simulation.stepp_s=1"));
   EXPECT_EQ(wrong.exit_code, 2);
   EXPECT_NE(wrong.err.find("did you mean 'step_s'?"), std::string::npos);
 }

@@ -48,6 +48,7 @@ TEST_P(ShippedScenario, GivesWhatItExpects) {
     EXPECT_FALSE(fs::exists(mbverify.Out()));
     return;
   }
+  ASSERT_TRUE(fs::exists(mbverify.Out())) << printed;
   // <model>/<case>/, where the case may lie in must_fail/.
   fs::path summary;
   for (const auto& entry : fs::recursive_directory_iterator(mbverify.Out())) {

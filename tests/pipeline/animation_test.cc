@@ -18,8 +18,14 @@ size_t Count(const std::string& text, const std::string& word) {
   return count;
 }
 
+std::vector<PictureFile> ThreePictures() {
+  std::vector<PictureFile> pictures(3);
+  for (size_t i = 0; i < 3; ++i) pictures[i].content = Png(static_cast<unsigned char>(100 * i));
+  return pictures;
+}
+
 TEST(AnimatedPng, HoldsEveryFrameOnceAndStaysAValidStillPicture) {
-  const std::string video = AnimatedPng({{"a", Png(0)}, {"b", Png(100)}, {"c", Png(200)}}, 25.0);
+  const std::string video = AnimatedPng(ThreePictures(), 25.0);
   EXPECT_EQ(video.substr(0, 8), Png(0).substr(0, 8));
   EXPECT_EQ(Count(video, "acTL"), 1u);
   EXPECT_EQ(Count(video, "fcTL"), 3u);

@@ -170,7 +170,7 @@ TEST(Report, CountsTellRanComparedAndVerifiedApart) {
 
 TEST(Report, TheShortLineNamesVerdictValueAndLimit) {
   EXPECT_EQ(VerdictLine(MakeReport(BentCase()), {}),
-            "two_sliders / bent: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  2 of 16 "
+            "two_sliders / bent: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 17 "
             "checks exceed their limits\n");
 }
 
