@@ -2,14 +2,14 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <signal.h>
 #include <stdio.h>
+#include <sys/file.h>
 #include <unistd.h>
 
 #include <cerrno>
-#include <charconv>
 #include <cstring>
 #include <fstream>
+#include <vector>
 
 #include "core/demand.h"
 
@@ -26,6 +26,15 @@ std::string TemporaryPrefix(const fs::path& target) {
   return "." + target.filename().string() + ".tmp-";
 }
 
+// Descriptor of a folder with a lock that ends with this process, or -1.
+int LockFolder(const fs::path& folder) {
+  const int descriptor = open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return -1;
+  if (flock(descriptor, LOCK_EX | LOCK_NB) == 0) return descriptor;
+  close(descriptor);
+  return -1;
+}
+
 }  // namespace
 
 OutputFolder::OutputFolder(fs::path target) : target_(std::move(target)) {
@@ -33,8 +42,10 @@ OutputFolder::OutputFolder(fs::path target) : target_(std::move(target)) {
 }
 
 OutputFolder::~OutputFolder() {
+  if (lock_ < 0) return;
   std::error_code error;
-  if (created_) fs::remove_all(temporary_, error);
+  fs::remove_all(temporary_, error);
+  close(lock_);
 }
 
 std::string OutputFolder::Create() {
@@ -49,12 +60,12 @@ std::string OutputFolder::Create() {
   RemoveLeftovers();
   fs::create_directory(temporary_, error);
   if (error) return Trouble("make folder", temporary_, error.message());
-  created_ = true;
-  return "";
+  lock_ = LockFolder(temporary_);
+  return lock_ >= 0 ? "" : Trouble("lock", temporary_, std::strerror(errno));
 }
 
 std::string OutputFolder::Write(const std::string& name, const std::string& content) {
-  MBV_DEMAND(created_, name);
+  MBV_DEMAND(lock_ >= 0, name);
   const fs::path path = temporary_ / name;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
@@ -67,7 +78,7 @@ std::string OutputFolder::Write(const std::string& name, const std::string& cont
 }
 
 std::string OutputFolder::Commit() {
-  MBV_DEMAND(created_, target_.string());
+  MBV_DEMAND(lock_ >= 0, target_.string());
   std::error_code error;
   if (fs::exists(target_, error)) {
     if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_EXCHANGE) == 0) {
@@ -78,23 +89,21 @@ std::string OutputFolder::Commit() {
   }
   fs::rename(temporary_, target_, error);
   if (error) return Trouble("make", target_, error.message());
-  created_ = false;
   return "";
 }
 
 void OutputFolder::RemoveLeftovers() const {
   std::error_code error;
-  const std::string prefix = TemporaryPrefix(target_);
+  std::vector<fs::path> leftovers;
   for (const auto& entry : fs::directory_iterator(target_.parent_path(), error)) {
     const std::string name = entry.path().filename();
-    if (!name.starts_with(prefix)) continue;
-    int process = 0;
-    const char* end = name.data() + name.size();
-    const auto parsed = std::from_chars(name.data() + prefix.size(), end, process);
-    if (parsed.ec != std::errc() || parsed.ptr != end) continue;
-    const bool alive = process != getpid() && (kill(process, 0) == 0 || errno == EPERM);
-    std::error_code ignored;
-    if (!alive) fs::remove_all(entry.path(), ignored);
+    if (name.starts_with(TemporaryPrefix(target_))) leftovers.push_back(entry.path());
+  }
+  for (const fs::path& leftover : leftovers) {
+    const int lock = LockFolder(leftover);
+    if (lock < 0) continue;  // still being filled
+    fs::remove_all(leftover, error);
+    close(lock);
   }
 }
 

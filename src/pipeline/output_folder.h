@@ -8,7 +8,8 @@ namespace mbv {
 
 /// Files are written into a hidden temporary folder beside the target; Commit() exchanges it with
 /// the target in one step. Without Commit() the old result stays as it was and the temporary
-/// folder is removed. Temporary folders left by killed runs are removed by the next one.
+/// folder is removed. Temporary folders left by killed runs are removed by the next one (they are
+/// told by a lock that ends with its process).
 class OutputFolder {
  public:
   explicit OutputFolder(std::filesystem::path target);
@@ -27,7 +28,7 @@ class OutputFolder {
   void RemoveLeftovers() const;
 
   std::filesystem::path target_, temporary_;
-  bool created_ = false;
+  int lock_ = -1;  ///< file descriptor of the temporary folder, locked while it is being filled
 };
 
 }  // namespace mbv

@@ -75,7 +75,7 @@ TEST_F(CliTest, FoldersStandForTheirScenariosButNotForThoseThatMustFail) {
 
 TEST_F(CliTest, ResultsGoToStdoutTalkToStderrAndFilesToTheFolder) {
   const ProgramResult result = mbverify(RunArguments(mbverify, kGood));
-  EXPECT_EQ(result.out.substr(0, 35), "stabilizing_platform / static: AGREE");
+  EXPECT_EQ(result.out.substr(0, 36), "stabilizing_platform / static: AGREE");
   EXPECT_NE(result.err.find("results in "), std::string::npos);
   EXPECT_EQ(result.out.find('\x1b'), std::string::npos);  // no colour into a file
   const fs::path folder = fs::path(mbverify.Out()) / "stabilizing_platform" / "static";
@@ -129,7 +129,8 @@ TEST_F(CliTest, AFolderThatCannotBeWrittenIsBadInput) {
 TEST_F(CliTest, ModeAndSetReachTheScenario) {
   const ProgramResult result = mbverify(RunArguments(
       mbverify, std::string(kGood) + " --mode forward --set simulation.step_s=0.0005 --set "
-                                     "parameters.m_p=1000 --set motion.duration_s=0.1"));
+                                     "parameters.m_p=1000 --set motion.duration_s=0.1 "
+                                     "--set checks.force_nrmse=1e-6"));
   EXPECT_EQ(result.exit_code, 0) << result.out;
   EXPECT_NE(result.out.find("forward simulation, step 0.5 ms"), std::string::npos) << result.out;
   const ProgramResult wrong =

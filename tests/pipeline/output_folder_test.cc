@@ -1,7 +1,10 @@
 // Results appear whole or not at all.
 #include "pipeline/output_folder.h"
 
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
+#include <unistd.h>
 
 #include <fstream>
 #include <sstream>
@@ -72,11 +75,22 @@ TEST_F(OutputFolderTest, WithoutCommitTheOldResultStays) {
 }
 
 TEST_F(OutputFolderTest, LeftoversOfDeadProcessesAreRemoved) {
-  fs::create_directories(root_ / ".case.tmp-2147483646");  // above the largest process id
-  fs::create_directories(root_ / ".case.tmp-notes");
+  fs::create_directories(root_ / ".case.tmp-12345" / "snapshots");
+  fs::create_directories(root_ / ".other.tmp-12345");
   WriteResult(root_ / "case", "{}");
-  EXPECT_FALSE(fs::exists(root_ / ".case.tmp-2147483646"));
-  EXPECT_TRUE(fs::exists(root_ / ".case.tmp-notes"));
+  EXPECT_FALSE(fs::exists(root_ / ".case.tmp-12345"));
+  EXPECT_TRUE(fs::exists(root_ / ".other.tmp-12345"));
+}
+
+TEST_F(OutputFolderTest, FoldersThatAreStillBeingFilledStay) {
+  fs::create_directories(root_ / ".case.tmp-12345");
+  const int other = open((root_ / ".case.tmp-12345").c_str(), O_RDONLY | O_DIRECTORY);
+  ASSERT_EQ(flock(other, LOCK_EX), 0);  // as another process holds it
+  WriteResult(root_ / "case", "{}");
+  EXPECT_TRUE(fs::exists(root_ / ".case.tmp-12345"));
+  close(other);
+  WriteResult(root_ / "case", "{}");
+  EXPECT_FALSE(fs::exists(root_ / ".case.tmp-12345"));
 }
 
 TEST_F(OutputFolderTest, ForeignFilesAreNotReplaced) {
