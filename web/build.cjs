@@ -16,6 +16,7 @@ function literal(text) {
 const bundle = esbuild.buildSync({
   entryPoints: [path.join(__dirname, 'src', 'report.js')],
   bundle: true,
+  nodePaths: process.env.NODE_PATH.split(path.delimiter),
   minify: true,
   charset: 'ascii',
   legalComments: 'none',
@@ -36,15 +37,15 @@ fs.writeFileSync(process.argv[2], `// Made by web/build.cjs.
 namespace mbv {
 
 std::string_view PageScript() {
-  static constexpr std::string_view kScript =
+  static constexpr char kScript[] =
 ${literal(script)};
-  return kScript;
+  return {kScript, sizeof kScript - 1};
 }
 
 std::string_view PageStyle() {
-  static constexpr std::string_view kStyle =
+  static constexpr char kStyle[] =
 ${literal(style)};
-  return kStyle;
+  return {kStyle, sizeof kStyle - 1};
 }
 
 }  // namespace mbv
