@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <utility>
 
 namespace mbv::render {
 namespace {
@@ -201,16 +202,50 @@ void AddClosure(const Mechanism& mechanism, const Joint& joint, const PictureFra
   }
 }
 
+// Distance of a point from the stretch p … q.
+double DistanceFromStretch(const Vec3& point, const Vec3& p, const Vec3& q) {
+  const Vec3 d = q - p;
+  const double s = d.squaredNorm() > 0.0 ? (point - p).dot(d) / d.squaredNorm() : 0.0;
+  return (p + std::clamp(s, 0.0, 1.0) * d - point).norm();
+}
+
+// Leaves out points that lie within `tolerance` of the line through their neighbours that stay
+// (Douglas and Peucker's rule).
+std::vector<Vec3> Thinned(const std::vector<Vec3>& points, double tolerance) {
+  if (points.size() < 3) return points;
+  std::vector<bool> stays(points.size(), false);
+  stays.front() = stays.back() = true;
+  std::vector<std::pair<std::size_t, std::size_t>> stretches = {{0, points.size() - 1}};
+  while (!stretches.empty()) {
+    const auto [first, last] = stretches.back();
+    stretches.pop_back();
+    double farthest = tolerance;
+    std::size_t at = first;
+    for (std::size_t i = first + 1; i < last; ++i) {
+      const double distance = DistanceFromStretch(points[i], points[first], points[last]);
+      if (distance > farthest) {
+        farthest = distance;
+        at = i;
+      }
+    }
+    if (at == first) continue;
+    stays[at] = true;
+    stretches.emplace_back(first, at);
+    stretches.emplace_back(at, last);
+  }
+  std::vector<Vec3> thinned;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (stays[i]) thinned.push_back(points[i]);
+  }
+  return thinned;
+}
+
 void AddPath(const PolylineOverlay& path, double radius, std::vector<Item>* items) {
   Material material = MaterialOf(path.color);
   material.emission = 0.3F;
-  // Points closer than a fifth of the radius to the last drawn one are passed over.
-  std::size_t last = 0;
-  for (std::size_t i = 1; i < path.points_W.size(); ++i) {
-    const Vec3 &p = path.points_W[last], &q = path.points_W[i];
-    if ((q - p).norm() < 0.2 * radius && i + 1 < path.points_W.size()) continue;
-    items->push_back(Between(Solid::kCapsule, p, q, radius, material));
-    last = i;
+  const std::vector<Vec3> points = Thinned(path.points_W, 0.1 * radius);
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+    items->push_back(Between(Solid::kCapsule, points[i], points[i + 1], radius, material));
   }
 }
 
@@ -238,6 +273,25 @@ Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame, cons
     }
   }
   return out;
+}
+
+FlatMesh GlassBox(const Item& box) {
+  // Corner i has the signs of i's three bits; two triangles per face.
+  return {.vertices_W = Corners(box),
+          .triangles = {{0, 1, 3},
+                        {0, 3, 2},
+                        {4, 5, 7},
+                        {4, 7, 6},
+                        {0, 1, 5},
+                        {0, 5, 4},
+                        {2, 3, 7},
+                        {2, 7, 6},
+                        {0, 2, 6},
+                        {0, 6, 4},
+                        {1, 3, 7},
+                        {1, 7, 5}},
+          .rgba = box.material.rgba,
+          .shaded = true};
 }
 
 Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale) {

@@ -124,6 +124,11 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
     items.insert(items.end(), marks.items.begin(), marks.items.end());
     items.insert(items.end(), overlaid.items.begin(), overlaid.items.end());
     marks.flats.insert(marks.flats.end(), overlaid.flats.begin(), overlaid.flats.end());
+    std::erase_if(items, [&marks](const rn::Item& item) {
+      const bool glass = item.solid == rn::Solid::kBox && item.material.rgba[3] < 0.5F;
+      if (glass) marks.flats.push_back(rn::GlassBox(item));
+      return glass;
+    });
     Picture picture;
     RunSummary drawn = stage->Draw(items, marks.flats, set.R_DW, set.camera, &picture);
     if (!drawn.ok()) return drawn;

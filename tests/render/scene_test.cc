@@ -141,6 +141,23 @@ TEST(Annotate, DrawsOneRingForClosuresAtOnePlace) {
   EXPECT_EQ(marks.flats.size(), 2U);  // what is visible and what shows through
 }
 
+TEST(OverlayAnnotations, ThinsPathsWithoutMovingThem) {
+  const double radius = 0.01;
+  Overlay overlay;
+  PolylineOverlay line{.points_W = {}, .radius_m = radius}, circle = line;
+  for (int i = 0; i <= 1000; ++i) {
+    line.points_W.emplace_back(i <= 500 ? Vec3(i * 1e-3, 0, 0) : Vec3(0.5, (i - 500) * 1e-3, 0));
+    circle.points_W.emplace_back(std::cos(i * 1e-2), std::sin(i * 1e-2), 0.0);
+  }
+  overlay.paths = {line};
+  EXPECT_EQ(OverlayAnnotations(overlay, Scale{}).items.size(), 2U);  // two legs of an angle
+  // On a circle of 1 m a chord with a sagitta of a tenth of the radius spans 0.09 rad.
+  overlay.paths = {circle};
+  const std::vector<Item> items = OverlayAnnotations(overlay, Scale{}).items;
+  EXPECT_GT(items.size(), 10.0 / 0.09);
+  EXPECT_LT(items.size(), 3 * 10.0 / 0.09);
+}
+
 TEST(Palette, TakesTheShapeColoursAndKeepsItsMarksApart) {
   EXPECT_EQ(MaterialOf("#ff8000").rgba, (std::array<float, 4>{1.0F, 128 / 255.0F, 0.0F, 1.0F}));
   EXPECT_EQ(MaterialOf("no such colour").rgba, MaterialOf("grey").rgba);
