@@ -14,14 +14,7 @@ constexpr double kForceLimit =
     1e-8;  // of up to 4 kN; closure 1e-13 m and conditioning of the loops
 
 AuditRow Texts(const char* equation, const char* printed, const char* corrected, const char* note) {
-  AuditRow row;
-  row.equation = equation;
-  row.printed = printed;
-  row.corrected = corrected;
-  row.unit = "N, N m";
-  row.limit = kForceLimit;
-  row.note = note;
-  return row;
+  return TextRow(equation, printed, corrected, "N, N m", kForceLimit, note);
 }
 
 // Harmonic motion of all eight drives around a regular pose.

@@ -12,15 +12,8 @@ constexpr double kLimit = 1e-13;
 constexpr const char* kTruth = "pins closed by Newton on the rod lengths";
 
 AuditRow Texts(const char* equation, const char* printed, const char* corrected, const char* unit,
-               std::string note = kTruth) {
-  AuditRow row;
-  row.equation = equation;
-  row.printed = printed;
-  row.corrected = corrected;
-  row.unit = unit;
-  row.limit = kLimit;
-  row.note = std::move(note);
-  return row;
+               const char* note = kTruth) {
+  return TextRow(equation, printed, corrected, unit, kLimit, note);
 }
 
 }  // namespace

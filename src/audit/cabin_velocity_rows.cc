@@ -19,14 +19,7 @@ constexpr double kRateLimit = 2e-10, kAccelerationLimit = 1e-8;
 
 AuditRow Texts(const char* equation, const char* printed, const char* corrected, const char* unit,
                const char* note = "differences of Newton-closed pins", double limit = kRateLimit) {
-  AuditRow row;
-  row.equation = equation;
-  row.printed = printed;
-  row.corrected = corrected;
-  row.unit = unit;
-  row.limit = limit;
-  row.note = note;
-  return row;
+  return TextRow(equation, printed, corrected, unit, limit, note);
 }
 
 // Velocities relative to slider A, and the angles, of one state.

@@ -15,17 +15,6 @@ using Mat64 = Eigen::Matrix<double, 6, 4>;
 constexpr double kQuarter = std::numbers::pi / 2;
 constexpr double kStep = 1e-3;
 
-AuditRow Texts(const char* equation, const char* printed, const char* corrected, const char* unit,
-               double limit, const char* note) {
-  AuditRow row;
-  row.equation = equation;
-  row.printed = printed;
-  row.corrected = corrected;
-  row.unit = unit;
-  row.limit = limit;
-  row.note = note;
-  return row;
-}
 constexpr double kPoseLimit = 1e-14, kRateLimit = 1e-11, kAccelerationLimit = 2e-8;
 constexpr const char* kChain = "product of elementary rotations and translations";
 
@@ -110,13 +99,13 @@ Mat64 SerialJacobian(const Lengths& l, const Vec4& q, bool printed) {
 void SerialPositionRows(const Lengths& l, const std::vector<State>& states,
                         std::vector<AuditRow>* rows) {
   RowMeter m6(
-      Texts("(5), (6)", "elements of the wrist's transform", "", "1, m", kPoseLimit, kChain));
-  RowMeter t2(Texts("(7) θ2, d2", "θ2 = asin(−a_z), d2 = −(p_z + (a2+d3) sin θ2)/cos θ2", "",
-                    "rad, m", 2e-13, "asin near its end costs digits"));
-  RowMeter t3(Texts("(7) θ3", "asin(n_z/cos θ2)", "atan2(n_z, o_z)", "rad", 1e-13,
-                    "wrong quadrant for |θ6| > 90°"));
-  RowMeter t1(Texts("(7) θ1", "acos(a_x/cos θ2)", "atan2(a_y, a_x)", "rad", 1e-13,
-                    "wrong sign for θ1 < 0"));
+      TextRow("(5), (6)", "elements of the wrist's transform", "", "1, m", kPoseLimit, kChain));
+  RowMeter t2(TextRow("(7) θ2, d2", "θ2 = asin(−a_z), d2 = −(p_z + (a2+d3) sin θ2)/cos θ2", "",
+                      "rad, m", 2e-13, "asin near its end costs digits"));
+  RowMeter t3(TextRow("(7) θ3", "asin(n_z/cos θ2)", "atan2(n_z, o_z)", "rad", 1e-13,
+                      "wrong quadrant for |θ6| > 90°"));
+  RowMeter t1(TextRow("(7) θ1", "acos(a_x/cos θ2)", "atan2(a_y, a_x)", "rad", 1e-13,
+                      "wrong sign for θ1 < 0"));
   for (const State& s : states) {
     const Pose X = Wrist(l, s.q);
     const Mat3 R = X.linear();
@@ -186,12 +175,13 @@ std::array<Element, 12> ChainElements(const Lengths& l, const State& s) {
 }
 
 void ChainRows(const Lengths& l, const std::vector<State>& states, std::vector<AuditRow>* rows) {
-  rows->push_back(Texts("(10), (11)", "chain of transforms, ¹₂T = trans(X, Y, 0) rot(Z, α)", "", "",
-                        0.0, "α here is the platform's tilt γ; tested element by element in (13)"));
+  rows->push_back(TextRow("(10), (11)", "chain of transforms, ¹₂T = trans(X, Y, 0) rot(Z, α)", "",
+                          "", 0.0,
+                          "α here is the platform's tilt γ; tested element by element in (13)"));
   rows->back().verdict = AuditVerdict::kNotTestable;
   std::vector<RowMeter> meters;
   for (const Element& e : ChainElements(l, states.front())) {
-    AuditRow row = Texts("", e.printed, e.corrected, e.unit, kPoseLimit, kChain);
+    AuditRow row = TextRow("", e.printed, e.corrected, e.unit, kPoseLimit, kChain);
     row.equation = std::string("(12), (13) ") + e.name;
     meters.emplace_back(row);
   }
@@ -208,14 +198,15 @@ void ChainRows(const Lengths& l, const std::vector<State>& states, std::vector<A
 
 void JacobianRows(const Lengths& l, const std::vector<State>& states, std::vector<AuditRow>* rows) {
   constexpr const char* kTruth = "tool-frame twist from differences of the wrist's transform";
-  RowMeter first(Texts("(28), (29)", "(p×n)_z = c2c3(d3+a2) + a1c3, (p×o)_z = −c2s3(d3+a2) + a1s3",
-                       "c3 H, −s3 H with H = a1 + c2(a2+d3) − d2 s2", "m, 1", kRateLimit, kTruth));
-  RowMeter second(Texts("(30)", "[−s3(d3+a2), −c3(d3+a2), 0, c2, −s3, 0]", "third −d2, fourth c3",
-                        "m, 1", kRateLimit, kTruth));
-  RowMeter third(Texts("(31)", "[−s3, −c3, 0, 0, 0, 0]", "", "1", kRateLimit, kTruth));
-  RowMeter all(Texts("(26), (27), (32)", "J2 with the columns (28)–(31)",
-                     "J2 with corrected columns", "m, 1", kRateLimit,
-                     "inherits the errors of (29) and (30)"));
+  RowMeter first(
+      TextRow("(28), (29)", "(p×n)_z = c2c3(d3+a2) + a1c3, (p×o)_z = −c2s3(d3+a2) + a1s3",
+              "c3 H, −s3 H with H = a1 + c2(a2+d3) − d2 s2", "m, 1", kRateLimit, kTruth));
+  RowMeter second(TextRow("(30)", "[−s3(d3+a2), −c3(d3+a2), 0, c2, −s3, 0]", "third −d2, fourth c3",
+                          "m, 1", kRateLimit, kTruth));
+  RowMeter third(TextRow("(31)", "[−s3, −c3, 0, 0, 0, 0]", "", "1", kRateLimit, kTruth));
+  RowMeter all(TextRow("(26), (27), (32)", "J2 with the columns (28)–(31)",
+                       "J2 with corrected columns", "m, 1", kRateLimit,
+                       "inherits the errors of (29) and (30)"));
   for (const State& s : states) {
     const Mat64 printed = SerialJacobian(l, s.q, true), corrected = SerialJacobian(l, s.q, false);
     for (int k = 0; k < 4; ++k) {
@@ -232,13 +223,14 @@ void JacobianRows(const Lengths& l, const std::vector<State>& states, std::vecto
 }
 
 void HybridRows(const Lengths& l, const std::vector<State>& states, std::vector<AuditRow>* rows) {
-  RowMeter hybrid(Texts(
+  RowMeter hybrid(TextRow(
       "(33), (34)", "J1 and J2 stacked (shapes do not fit; no rail, no rotation)",
       "v = ḋ1 e_z + (V_X, V_Y, 0) + W_γ e_z×r + R06 J2v q̇, ω = W_γ e_z + R06 J2ω q̇", "m/s, rad/s",
       kRateLimit, "print read as v = (V_X, V_Y, 0) + J2v q̇, ω = W_γ e_z + J2ω q̇"));
-  RowMeter acceleration(Texts("(41)–(46)", "J̇2 (θ1, θ2, d1, θ3) + J2 (θ̇1, θ̇2, ḋ1, θ̇3)",
-                              "J̇2 q̇ + J2 q̈ + ω_tool × v_tool (translation)", "m/s²",
-                              kAccelerationLimit, "positions for rates, rates for accelerations"));
+  RowMeter acceleration(TextRow("(41)–(46)", "J̇2 (θ1, θ2, d1, θ3) + J2 (θ̇1, θ̇2, ḋ1, θ̇3)",
+                                "J̇2 q̇ + J2 q̈ + ω_tool × v_tool (translation)", "m/s²",
+                                kAccelerationLimit,
+                                "positions for rates, rates for accelerations"));
   for (const State& s : states) {
     const auto pose = [&](double t) {
       return Chain(l, s.planar + t * s.planar_v + 0.5 * t * t * s.planar_a,

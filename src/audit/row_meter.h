@@ -2,11 +2,25 @@
 #pragma once
 
 #include <cmath>
+#include <string>
 #include <utility>
 
 #include "audit/audit.h"
 
 namespace mbv {
+
+/// A row's texts and limit, before anything is measured.
+inline AuditRow TextRow(std::string equation, std::string printed, std::string corrected,
+                        std::string unit, double limit, std::string note) {
+  AuditRow row;
+  row.equation = std::move(equation);
+  row.printed = std::move(printed);
+  row.corrected = std::move(corrected);
+  row.unit = std::move(unit);
+  row.limit = limit;
+  row.note = std::move(note);
+  return row;
+}
 
 class RowMeter {
  public:

@@ -71,6 +71,10 @@ struct BendCase {
   const char* channel;
   double offset;
   const char* check;
+
+  friend std::ostream& operator<<(std::ostream& out, const BendCase& bend) {
+    return out << bend.channel << " + " << bend.offset;
+  }
 };
 
 class BentSimulation : public testing::TestWithParam<BendCase> {};
