@@ -19,19 +19,22 @@ declare -A ours=(
   [comparison]="core mechanism scenario comparison"
   [report]="core mechanism comparison report"
   [pipeline]="core mechanism scenario analytic reference audit mjcf simulation render comparison report pipeline"
-  [cli]="core mechanism scenario analytic audit comparison report pipeline cli"
+  [regress]="core mechanism scenario regress"
+  [cli]="core mechanism scenario analytic audit comparison report pipeline regress cli"
 )
 # external header prefix: folders that may include it
 declare -A external=(
   [mujoco/]="simulation render"
   [GL/]="render"
-  [png]="render"
+  [png]="render regress"
   [urdf]="mechanism"
   [muParser]="mechanism"
   [yaml-cpp/]="mechanism scenario"
   [tinyxml2]="mjcf mechanism"
   [CLI/]="cli"
-  [nlohmann/]="report cli"
+  [nlohmann/]="report regress cli"
+  [sqlite3]="regress"
+  [zlib]="regress"
 )
 
 check() {  # reads "src/folder/file:header" lines, prints offences

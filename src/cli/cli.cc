@@ -48,6 +48,9 @@ int RunCli(int argc, char** argv) {
   AddListCommand(&app, &exit_code);
   AddWorkspaceCommand(&app, &exit_code);
   AddMutateCommand(&app, &exit_code);
+  AddRegressCommand(&app, &exit_code);
+  AddMergeCommand(&app, &exit_code);
+  AddHistoryCommand(&app, &exit_code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

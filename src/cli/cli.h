@@ -25,5 +25,8 @@ void AddAuditCommand(CLI::App* app, int* exit_code);
 void AddListCommand(CLI::App* app, int* exit_code);
 void AddWorkspaceCommand(CLI::App* app, int* exit_code);
 void AddMutateCommand(CLI::App* app, int* exit_code);
+void AddRegressCommand(CLI::App* app, int* exit_code);
+void AddMergeCommand(CLI::App* app, int* exit_code);
+void AddHistoryCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

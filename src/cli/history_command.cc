@@ -1,0 +1,67 @@
+// mbverify history
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "regress/history.h"
+
+namespace mbv {
+namespace {
+
+struct HistoryArguments {
+  std::string history = "out/regress/history.sqlite";
+  std::string run_a, run_b, csv, scenario, note;
+};
+
+int Show(const HistoryText& answer) {
+  fmt::print("{}", answer.text);
+  if (answer.trouble.empty()) return 0;
+  fmt::print(stderr, "error: {}\n", answer.trouble);
+  return 2;
+}
+
+int Export(const HistoryArguments& arguments) {
+  const HistoryText answer = HistoryCsv(arguments.history);
+  if (arguments.csv.empty() || !answer.trouble.empty()) return Show(answer);
+  return Show({"", WriteWholeFile(arguments.csv, answer.text)});
+}
+
+}  // namespace
+
+void AddHistoryCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<HistoryArguments>();
+  CLI::App* history = app->add_subcommand("history", "Ask the history of regress");
+  history->add_option("--history", arguments->history, "SQLite file")->capture_default_str();
+  history->require_subcommand(1);
+  history->fallthrough();
+  history->add_subcommand("list", "All runs")->callback([arguments, exit_code] {
+    *exit_code = Show(ListRuns(arguments->history));
+  });
+  CLI::App* compare = history->add_subcommand("compare", "What differs between two runs");
+  compare->add_option("run1", arguments->run_a, "number, last or last~1")->required();
+  compare->add_option("run2", arguments->run_b, "number, last or last~1")->required();
+  compare->callback([arguments, exit_code] {
+    *exit_code = Show(CompareRuns(arguments->history, arguments->run_a, arguments->run_b));
+  });
+  CLI::App* csv = history->add_subcommand("export", "All metrics of all runs as CSV");
+  csv->add_option("--csv", arguments->csv, "write to this file instead of stdout");
+  csv->callback([arguments, exit_code] { *exit_code = Export(*arguments); });
+  CLI::App* accept =
+      history->add_subcommand("accept", "Start baselines with a run: drift is meant");
+  accept->add_option("run", arguments->run_a, "number, last or last~1")->required();
+  accept->add_option("--scenario", arguments->scenario, "only this one, e.g. spr_tripod/default");
+  accept->add_option("--note", arguments->note, "why");
+  accept->callback([arguments, exit_code] {
+    *exit_code =
+        Show(AcceptRun(arguments->history, arguments->run_a, arguments->scenario, arguments->note));
+  });
+  history->footer(
+      "Examples:\n"
+      "  mbverify history list\n"
+      "  mbverify history compare last~1 last --history nightly.sqlite\n"
+      "  mbverify history export --csv metrics.csv");
+}
+
+}  // namespace mbv

@@ -1,0 +1,135 @@
+// mbverify regress, merge
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <csignal>
+#include <filesystem>
+#include <memory>
+#include <thread>
+
+#include "cli/cli.h"
+#include "cli/live_table.h"
+#include "cli/terminal.h"
+#include "pipeline/version.h"
+#include "regress/regress.h"
+#include "regress/summaries.h"
+
+namespace mbv {
+namespace {
+
+struct RegressArguments {
+  RegressOptions options;
+  std::vector<std::string> folders;  // of merge
+  std::string shard, worker;
+  bool no_pictures = false, no_history = false, quiet = false, fail_on_drift = false;
+};
+
+volatile std::sig_atomic_t interrupted = 0;
+void Interrupt(int) { interrupted = 1; }
+
+// Options that follow from others; false after a message.
+bool Complete(RegressArguments* arguments) {
+  RegressOptions& options = arguments->options;
+  if (!arguments->shard.empty()) {
+    const auto shard = ParseShard(arguments->shard);
+    if (!shard) {
+      fmt::print(stderr, "--shard {}: error: write i/n with 1 <= i <= n, e.g. 2/3\n",
+                 arguments->shard);
+      return false;
+    }
+    options.shard = *shard;
+  }
+  if (arguments->no_history) {
+    options.history.clear();
+  } else if (options.history.empty() && options.shard.count == 1) {
+    options.history = (std::filesystem::path(options.out) / "history.sqlite").string();
+  }
+  options.pictures = !arguments->no_pictures;
+  options.program = std::string("mbverify ") + kVersion;
+  if (!arguments->worker.empty()) options.worker = {arguments->worker};
+  options.stop = &interrupted;
+  return true;
+}
+
+int Conclude(const RegressArguments& arguments, const RegressOutcome& outcome) {
+  if (!outcome.trouble.empty()) fmt::print(stderr, "{}\n", outcome.trouble);
+  if (outcome.files.empty()) return outcome.exit_code;
+  fmt::print("{}", ToSummaryText(outcome.report));
+  if (!arguments.quiet) {
+    for (const std::string& file : outcome.files) fmt::print(stderr, "wrote {}\n", file);
+  }
+  const bool drifted = CountCases(outcome.report).drifted > 0;
+  return outcome.exit_code == 0 && drifted && arguments.fail_on_drift ? 1 : outcome.exit_code;
+}
+
+int RunRegress(RegressArguments* arguments) {
+  if (!Complete(arguments)) return 2;
+  std::signal(SIGINT, Interrupt);
+  std::signal(SIGTERM, Interrupt);
+  LiveTable table(!arguments->quiet);
+  RegressProgress progress;
+  progress.begin = [&](size_t cases, size_t kept) { table.Begin(cases, kept); };
+  progress.started = [&](const std::string& key) { table.Started(key); };
+  progress.ended = [&](const CaseResult& result) { table.Ended(result); };
+  progress.tick = [&] { table.Draw(); };
+  const RegressOutcome outcome = Regress(arguments->options, progress);
+  table.Clear();
+  return Conclude(*arguments, outcome);
+}
+
+int RunMerge(RegressArguments* arguments) {
+  if (!Complete(arguments)) return 2;
+  return Conclude(*arguments, MergeRuns(arguments->folders, arguments->options));
+}
+
+void AddOutputOptions(CLI::App* app, RegressArguments* arguments) {
+  RegressOptions& options = arguments->options;
+  app->add_option("--out", options.out, "folder for results and summaries")->capture_default_str();
+  app->add_option("--history", options.history, "SQLite file to append to (OUT/history.sqlite)");
+  app->add_flag("--no-history", arguments->no_history, "do not keep or judge the history");
+  app->add_option("--junit", options.junit, "JUnit XML file (OUT/junit.xml)");
+  app->add_option("--markdown", options.markdown, "Markdown file (OUT/summary.md)");
+  app->add_option("--label", options.label, "text kept with the run, e.g. a commit");
+  app->add_flag("--fail-on-drift", arguments->fail_on_drift, "exit code 1 if a metric drifted");
+  app->add_flag("-q,--quiet", arguments->quiet, "only what failed or drifted, and the counts");
+}
+
+}  // namespace
+
+void AddRegressCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<RegressArguments>();
+  RegressOptions& options = arguments->options;
+  options.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  CLI::App* regress = app->add_subcommand(
+      "regress", "Run all scenarios, judge them by their expect:, keep history");
+  regress->add_option("path", options.paths, "scenario files or folders (scenarios)");
+  AddOutputOptions(regress, arguments.get());
+  regress->add_option("--jobs", options.jobs, "worker processes at once")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  regress->add_option("--shard", arguments->shard, "i/n: run the i-th of n parts");
+  regress->add_flag("--resume", options.resume, "keep what an interrupted run has finished");
+  regress->add_option("--timeout", options.timeout_s, "wall time limit of a scenario [s]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  regress->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
+  regress->add_option("--worker", arguments->worker, "program run instead of this one")->group("");
+  regress->footer(
+      "Examples:\n"
+      "  mbverify regress\n"
+      "  mbverify regress scenarios/spr_tripod --no-pictures --junit junit.xml\n"
+      "  mbverify regress --shard 1/4 --out shard1\n"
+      "Exit codes: 0 all as expected, 1 some not, 2 bad input, 3 some could not run");
+  regress->callback([arguments, exit_code] { *exit_code = RunRegress(arguments.get()); });
+}
+
+void AddMergeCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<RegressArguments>();
+  CLI::App* merge = app->add_subcommand("merge", "Join the folders of regress --shard into one");
+  merge->add_option("folder", arguments->folders, "folders of regress")->required();
+  AddOutputOptions(merge, arguments.get());
+  merge->footer("Example:\n  mbverify merge shard1 shard2 --out night --history nightly.sqlite");
+  merge->callback([arguments, exit_code] { *exit_code = RunMerge(arguments.get()); });
+}
+
+}  // namespace mbv

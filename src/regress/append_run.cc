@@ -1,0 +1,255 @@
+// Appends a run to the history, judging it against the runs before.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <filesystem>
+#include <thread>
+
+#include "regress/files.h"
+#include "regress/history.h"
+#include "regress/history_schema.h"
+
+namespace mbv {
+namespace {
+
+class Appender {
+ public:
+  Appender(Database* database, const HistoryOptions& options) : db_(database), options_(options) {}
+
+  void Append(const std::map<std::string, GoldenTraces>& goldens, RegressReport* report) {
+    InsertRun(report);
+    for (CaseResult& result : report->cases) {
+      const long scenario = ScenarioId(result.key);
+      const long since = AcceptedRun(scenario);
+      FindDrifts(scenario, since, &result);
+      const auto golden = goldens.find(result.key);
+      if (golden != goldens.end()) FindMovement(scenario, since, golden->second, &result);
+      FillCourse(scenario, &result);
+      const long id = InsertResult(report->run.id, scenario, result);
+      if (golden != goldens.end()) InsertGolden(id, golden->second);
+    }
+    FinishRun(*report);
+    DropOldGolden();
+  }
+
+ private:
+  void InsertRun(RegressReport* report) {
+    const RunInfo& run = report->run;
+    Statement(db_,
+              "INSERT INTO run(started_utc, finished_utc, wall_s, jobs, label, host, program, "
+              "shard, exit_code, total, as_expected, ran, compared, verified, drifted) "
+              "VALUES(?,?,?,?,?,?,?,?,0,0,0,0,0,0,0)")
+        .Bind(run.started_utc, run.finished_utc, run.wall_s, run.jobs, run.label, run.host,
+              run.program, run.shard)
+        .Execute();
+    report->run.id = db_->last_id();
+    std::map<std::string, std::string> versions;
+    for (const CaseResult& result : report->cases) {
+      versions.insert(result.versions.begin(), result.versions.end());
+    }
+    Statement insert(db_, "INSERT INTO version VALUES(?,?,?)");
+    for (const auto& [name, version] : versions) {
+      insert.Bind(report->run.id, name, version).Execute();
+    }
+  }
+
+  void FinishRun(const RegressReport& report) {
+    const Counts counts = CountCases(report);
+    Statement(db_,
+              "UPDATE run SET exit_code=?, total=?, as_expected=?, ran=?, compared=?, verified=?, "
+              "drifted=? WHERE id=?")
+        .Bind(ExitCodeOf(report), counts.total, counts.as_expected, counts.ran, counts.compared,
+              counts.verified, counts.drifted, report.run.id)
+        .Execute();
+  }
+
+  long ScenarioId(const std::string& key) {
+    Statement find(db_, "SELECT id FROM scenario WHERE key = ?");
+    if (find.Bind(key).Step()) return find.Integer(0);
+    Statement(db_, "INSERT INTO scenario(key) VALUES(?)").Bind(key).Execute();
+    return db_->last_id();
+  }
+
+  // Baselines start with this run; 0: with the first.
+  long AcceptedRun(long scenario) {
+    Statement find(db_, "SELECT MAX(run) FROM accepted WHERE scenario = ?");
+    return find.Bind(scenario).Step() ? find.Integer(0) : 0;
+  }
+
+  std::vector<PastValue> Past(long scenario, long since, const std::string& metric) {
+    // Newest first and bounded: enough for a window of good runs with failed nights between.
+    Statement select(db_,
+                     "SELECT r.run, m.value, r.status = 'as_expected' AND m.pass, "
+                     "m.drifted AND r.run > ?2 FROM result r JOIN metric m ON m.result = r.id "
+                     "WHERE r.scenario = ?1 AND r.run >= ?2 AND m.name = ?3 "
+                     "ORDER BY r.run DESC LIMIT 400");
+    select.Bind(scenario, since, metric);
+    std::vector<PastValue> past;
+    while (select.Step()) {
+      past.push_back(
+          {select.Integer(0), select.Real(1), select.Integer(2) != 0, select.Integer(3) != 0});
+    }
+    std::reverse(past.begin(), past.end());
+    return past;
+  }
+
+  void FindDrifts(long scenario, long since, CaseResult* result) {
+    result->drifts.clear();
+    if (result->failed()) return;
+    for (const auto& [name, metric] : result->metrics) {
+      if (metric.limit && !metric.pass) continue;  // a case that must fail
+      const std::vector<PastValue> past = Past(scenario, since, name);
+      const auto found = FindDrift(past, metric.value, RuleAfter(since));
+      if (!found) continue;
+      Drift drift{name, "", metric.value, found->baseline, found->since_run, ""};
+      if (found->since_run != 0) drift.since = DescribeRun(found->since_run);
+      drift.text = fmt::format(
+          "{} is {:.2e}, {:.0f} times the median {:.2e} of {} good runs (reported above {:.1e}{})",
+          name, metric.value, metric.value / found->baseline, found->baseline, found->good_runs,
+          found->threshold,
+          metric.limit ? fmt::format(", limit {:.1e}", *metric.limit) : ", no limit");
+      result->drifts.push_back(std::move(drift));
+    }
+  }
+
+  // An accepted run is a baseline by itself.
+  DriftRule RuleAfter(long since) const {
+    DriftRule rule = options_.rule;
+    if (since != 0) rule.min_runs = 1;
+    return rule;
+  }
+
+  std::string DescribeRun(long run) {
+    Statement find(db_, "SELECT started_utc, label, program FROM run WHERE id = ?");
+    if (!find.Bind(run).Step()) return "";
+    const std::string label = find.Text(1);
+    return fmt::format("run {} of {}{}, {}", run, find.Text(0), label.empty() ? "" : ", " + label,
+                       find.Text(2));
+  }
+
+  // Against the last good run with traces: a step is told once, in the run that took it.
+  void FindMovement(long scenario, long since, const GoldenTraces& now, CaseResult* result) {
+    if (result->failed()) return;
+    Statement last(db_,
+                   "SELECT r.id, r.run, r.inputs FROM result r WHERE r.scenario = ? AND "
+                   "r.run >= ? AND r.status = 'as_expected' AND EXISTS(SELECT 1 FROM golden g "
+                   "WHERE g.result = r.id) ORDER BY r.run DESC LIMIT 1");
+    if (!last.Bind(scenario, since).Step()) return;
+    const std::string who = AttributeMovement(LoadGolden(db_, last.Integer(0)), now);
+    if (who.empty()) return;
+    const bool changed = last.Text(2) != result->inputs;
+    Drift drift;
+    drift.metric = "traces";
+    drift.text = fmt::format(
+        "drive forces: {} since {}; {}", who, DescribeRun(last.Integer(1)),
+        changed ? "the scenario or model file changed" : "scenario and model files are the same");
+    result->drifts.push_back(std::move(drift));
+  }
+
+  void FillCourse(long scenario, CaseResult* result) {
+    result->course.clear();
+    const auto* key = KeyMetric(*result);
+    if (key == nullptr) return;
+    Statement select(db_,
+                     "SELECT m.value FROM result r JOIN metric m ON m.result = r.id "
+                     "WHERE r.scenario = ? AND m.name = ? ORDER BY r.run DESC LIMIT ?");
+    select.Bind(scenario, key->first, options_.course_runs - 1);
+    while (select.Step()) result->course.push_back(select.Real(0));
+    std::reverse(result->course.begin(), result->course.end());
+    result->course.push_back(key->second.value);
+  }
+
+  long InsertResult(long run, long scenario, const CaseResult& result) {
+    Statement(db_,
+              "INSERT INTO result(run, scenario, status, verdict, exit_code, reason, inputs, "
+              "wall_s, cpu_s, peak_kib) VALUES(?,?,?,?,?,?,?,?,?,?)")
+        .Bind(run, scenario, ToText(result.status), result.verdict, result.exit_code, result.reason,
+              result.inputs, result.cost.wall_s, result.cost.cpu_s, result.cost.peak_kib)
+        .Execute();
+    const long id = db_->last_id();
+    Statement metric(db_, "INSERT INTO metric VALUES(?,?,?,?,?,?)");
+    for (const auto& [name, value] : result.metrics) {
+      const bool drifted = std::any_of(result.drifts.begin(), result.drifts.end(),
+                                       [&](const Drift& drift) { return drift.metric == name; });
+      metric.Bind(id, name, value.value, value.limit, value.pass || !value.limit, drifted)
+          .Execute();
+    }
+    Statement drift(db_, "INSERT INTO drift VALUES(?,?,?,?,?,?)");
+    for (const Drift& d : result.drifts) {
+      drift.Bind(id, d.metric, d.value, d.baseline, d.since_run == 0 ? run : d.since_run, d.text)
+          .Execute();
+    }
+    return id;
+  }
+
+  void InsertGolden(long result, const GoldenTraces& traces) {
+    Statement find(db_, "SELECT id FROM trace WHERE digest = ? AND bytes = ?");
+    Statement insert(db_, "INSERT INTO trace(digest, bytes) VALUES(?,?)");
+    Statement link(db_, "INSERT INTO golden VALUES(?,?,?)");
+    for (const auto& [witness, trace] : traces) {
+      const std::string bytes = Encode(trace);
+      Fingerprint fingerprint;
+      fingerprint.Add(bytes);
+      const std::string digest = fingerprint.Text();
+      long id = 0;
+      if (find.Bind(digest, Blob{bytes}).Step()) {
+        id = find.Integer(0);
+      } else {
+        insert.Bind(digest, Blob{bytes}).Execute();
+        id = db_->last_id();
+      }
+      link.Bind(result, witness, id).Execute();
+    }
+  }
+
+  // The newest runs of each scenario keep their traces.
+  void DropOldGolden() {
+    Statement(db_,
+              "DELETE FROM golden WHERE result IN (SELECT id FROM (SELECT r.id, ROW_NUMBER() OVER "
+              "(PARTITION BY r.scenario ORDER BY r.run DESC) AS age FROM result r WHERE EXISTS("
+              "SELECT 1 FROM golden g WHERE g.result = r.id)) WHERE age > ?)")
+        .Bind(options_.golden_runs)
+        .Execute();
+    db_->Run("DELETE FROM trace WHERE id NOT IN (SELECT trace FROM golden)");
+  }
+
+  Database* db_;
+  const HistoryOptions& options_;
+};
+
+std::string AppendOnce(const std::string& path, const std::map<std::string, GoldenTraces>& goldens,
+                       RegressReport* report, const HistoryOptions& options) {
+  Database database(path, Database::Mode::kCreate);
+  database.Run("PRAGMA journal_mode = WAL");
+  database.Run("PRAGMA synchronous = NORMAL");
+  database.Run("PRAGMA foreign_keys = ON");
+  database.Run("BEGIN IMMEDIATE");
+  if (!database.ok()) return database.trouble();
+  if (std::string trouble = PrepareSchema(path, &database); !trouble.empty()) return trouble;
+  RegressReport judged = *report;
+  Appender(&database, options).Append(goldens, &judged);
+  database.Run("COMMIT");
+  if (!database.ok()) return database.trouble();  // closing rolls back
+  *report = std::move(judged);
+  return "";
+}
+
+}  // namespace
+
+std::string AppendRun(const std::string& path, const std::map<std::string, GoldenTraces>& goldens,
+                      RegressReport* report, const HistoryOptions& options) {
+  std::error_code error;
+  const auto folder = std::filesystem::path(path).parent_path();
+  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  // SQLite does not wait where waiting could be a deadlock, e.g. when two programs make the file.
+  std::string trouble;
+  for (int attempt = 0; attempt < 50; ++attempt) {
+    trouble = AppendOnce(path, goldens, report, options);
+    if (!trouble.ends_with("locked")) break;
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+  }
+  return trouble;
+}
+
+}  // namespace mbv

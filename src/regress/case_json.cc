@@ -1,0 +1,192 @@
+// regress.json and the state files: CaseResult and RegressReport ↔ JSON.
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "regress/case_result.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSchema = "mbverify.regress/1";
+
+// NaN and infinity have no JSON number and become null; null is read as NaN.
+Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+double NumberOf(const Json& json) { return json.is_number() ? json.get<double>() : kNan; }
+
+Json MetricsJson(const CaseResult& result) {
+  Json metrics = Json::object();
+  for (const auto& [name, metric] : result.metrics) {
+    Json json = {{"value", Number(metric.value)}};
+    if (metric.limit) {
+      json["limit"] = *metric.limit;
+      json["pass"] = metric.pass;
+    }
+    metrics[name] = std::move(json);
+  }
+  return metrics;
+}
+
+Json DriftsJson(const CaseResult& result) {
+  Json drifts = Json::array();
+  for (const Drift& drift : result.drifts) {
+    drifts.push_back({{"metric", drift.metric},
+                      {"text", drift.text},
+                      {"value", Number(drift.value)},
+                      {"baseline", Number(drift.baseline)},
+                      {"since_run", drift.since_run},
+                      {"since", drift.since}});
+  }
+  return drifts;
+}
+
+Json CaseJson(const CaseResult& result) {
+  Json json = {{"key", result.key},
+               {"file", result.file},
+               {"description", result.description},
+               {"inputs", result.inputs},
+               {"fingerprint", result.fingerprint},
+               {"status", ToText(result.status)},
+               {"reason", result.reason},
+               {"verdict", result.verdict},
+               {"exit_code", result.exit_code},
+               {"signal", result.signal},
+               {"expected",
+                {{"verdict", result.expected.verdict},
+                 {"exit_code", result.expected.exit_code},
+                 {"mentions", result.expected.mentions}}},
+               {"ran", result.ran},
+               {"compared", result.compared},
+               {"verified", result.verified},
+               {"metrics", MetricsJson(result)}};
+  json["not_compared"] = Json::array();
+  for (const Unmeasured& item : result.not_compared) {
+    json["not_compared"].push_back({{"what", item.what}, {"why", item.why}});
+  }
+  json["versions"] = result.versions;
+  json["has_folder"] = result.has_folder;
+  json["cost"] = {{"wall_s", result.cost.wall_s},
+                  {"cpu_s", result.cost.cpu_s},
+                  {"peak_kib", result.cost.peak_kib}};
+  json["log_tail"] = result.log_tail;
+  json["kept"] = result.kept;
+  json["drifts"] = DriftsJson(result);
+  json["course"] = Json::array();
+  for (double value : result.course) json["course"].push_back(Number(value));
+  return json;
+}
+
+CaseResult CaseOf(const Json& json) {
+  CaseResult result;
+  result.key = json.at("key");
+  result.file = json.at("file");
+  result.description = json.at("description");
+  result.inputs = json.at("inputs");
+  result.fingerprint = json.at("fingerprint");
+  result.status = CaseStatusOf(json.at("status"));
+  result.reason = json.at("reason");
+  result.verdict = json.at("verdict");
+  result.exit_code = json.at("exit_code");
+  result.signal = json.at("signal");
+  result.expected.verdict = json.at("expected").at("verdict");
+  result.expected.exit_code = json.at("expected").at("exit_code");
+  result.expected.mentions = json.at("expected").at("mentions");
+  result.ran = json.at("ran");
+  result.compared = json.at("compared");
+  result.verified = json.at("verified");
+  for (const auto& [name, metric] : json.at("metrics").items()) {
+    MetricValue& value = result.metrics[name];
+    value.value = NumberOf(metric.at("value"));
+    if (!metric.contains("limit")) continue;
+    value.limit = metric.at("limit").get<double>();
+    value.pass = metric.at("pass");
+  }
+  for (const Json& item : json.at("not_compared")) {
+    result.not_compared.push_back({item.at("what"), item.at("why")});
+  }
+  result.versions = json.at("versions").get<std::map<std::string, std::string>>();
+  result.has_folder = json.at("has_folder");
+  result.cost.wall_s = json.at("cost").at("wall_s");
+  result.cost.cpu_s = json.at("cost").at("cpu_s");
+  result.cost.peak_kib = json.at("cost").at("peak_kib");
+  result.log_tail = json.at("log_tail");
+  result.kept = json.at("kept");
+  for (const Json& drift : json.at("drifts")) {
+    result.drifts.push_back({drift.at("metric"), drift.at("text"), NumberOf(drift.at("value")),
+                             NumberOf(drift.at("baseline")), drift.at("since_run"),
+                             drift.at("since")});
+  }
+  for (const Json& value : json.at("course")) result.course.push_back(NumberOf(value));
+  return result;
+}
+
+std::string Dump(const Json& json) {
+  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace
+
+std::string ToJson(const CaseResult& result) { return Dump(CaseJson(result)); }
+
+std::string ToJson(const RegressReport& report) {
+  const Counts counts = CountCases(report);
+  Json json = {{"schema", kSchema},
+               {"run",
+                {{"id", report.run.id},
+                 {"started_utc", report.run.started_utc},
+                 {"finished_utc", report.run.finished_utc},
+                 {"label", report.run.label},
+                 {"host", report.run.host},
+                 {"program", report.run.program},
+                 {"shard", report.run.shard},
+                 {"wall_s", report.run.wall_s},
+                 {"jobs", report.run.jobs}}},
+               {"exit_code", ExitCodeOf(report)},
+               {"counts",
+                {{"total", counts.total},
+                 {"as_expected", counts.as_expected},
+                 {"ran", counts.ran},
+                 {"compared", counts.compared},
+                 {"verified", counts.verified},
+                 {"must_fail_as_expected", counts.must_fail},
+                 {"drifted", counts.drifted}}},
+               {"notes", report.notes},
+               {"cases", Json::array()}};
+  for (const CaseResult& result : report.cases) json["cases"].push_back(CaseJson(result));
+  return Dump(json);
+}
+
+// The library throws at the first thing that is not as written; a damaged file is simply not used.
+std::optional<CaseResult> CaseFromJson(const std::string& text) {
+  try {
+    return CaseOf(Json::parse(text));
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<RegressReport> ReportFromJson(const std::string& text) {
+  try {
+    const Json json = Json::parse(text);
+    if (json.at("schema") != kSchema) return std::nullopt;
+    RegressReport report;
+    const Json& run = json.at("run");
+    report.run.id = run.at("id");
+    report.run.started_utc = run.at("started_utc");
+    report.run.finished_utc = run.at("finished_utc");
+    report.run.label = run.at("label");
+    report.run.host = run.at("host");
+    report.run.program = run.at("program");
+    report.run.shard = run.at("shard");
+    report.run.wall_s = run.at("wall_s");
+    report.run.jobs = run.at("jobs");
+    report.notes = json.at("notes").get<std::vector<std::string>>();
+    for (const Json& item : json.at("cases")) report.cases.push_back(CaseOf(item));
+    return report;
+  } catch (const Json::exception&) {
+    return std::nullopt;
+  }
+}
+
+}  // namespace mbv

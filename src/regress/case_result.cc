@@ -1,0 +1,76 @@
+#include "regress/case_result.h"
+
+#include <algorithm>
+#include <array>
+
+namespace mbv {
+namespace {
+
+constexpr std::array<const char*, 8> kStatusWords = {"not_run",   "as_expected",   "unexpected",
+                                                     "bad_input", "could_not_run", "crashed",
+                                                     "timed_out", "internal_error"};
+
+}  // namespace
+
+const char* ToText(CaseStatus status) { return kStatusWords[static_cast<size_t>(status)]; }
+
+CaseStatus CaseStatusOf(const std::string& text) {
+  for (size_t i = 0; i < kStatusWords.size(); ++i) {
+    if (text == kStatusWords[i]) return static_cast<CaseStatus>(i);
+  }
+  return CaseStatus::kNotRun;
+}
+
+int ExitCodeOf(CaseStatus status) {
+  switch (status) {
+    case CaseStatus::kAsExpected:
+      return 0;
+    case CaseStatus::kUnexpected:
+      return 1;
+    case CaseStatus::kBadInput:
+      return 2;
+    case CaseStatus::kNotRun:
+    case CaseStatus::kCouldNotRun:
+    case CaseStatus::kCrashed:
+    case CaseStatus::kTimedOut:
+    case CaseStatus::kInternal:
+      return 3;
+  }
+  return 4;
+}
+
+const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result) {
+  for (const char* pair :
+       {"simulated_vs_analytic", "simulated_vs_reference", "reference_vs_analytic"}) {
+    const auto found = result.metrics.find(std::string(pair) + ".force_nrmse");
+    if (found != result.metrics.end()) return &*found;
+  }
+  return nullptr;
+}
+
+Counts CountCases(const RegressReport& report) {
+  Counts counts;
+  for (const CaseResult& result : report.cases) {
+    const bool fine = !result.failed();
+    ++counts.total;
+    counts.as_expected += fine ? 1 : 0;
+    counts.ran += result.ran ? 1 : 0;
+    counts.compared += result.compared ? 1 : 0;
+    counts.verified += result.verified ? 1 : 0;
+    counts.must_fail += fine && result.expected.verdict != "agree" ? 1 : 0;
+    counts.drifted += result.drifts.empty() ? 0 : 1;
+  }
+  return counts;
+}
+
+int ExitCodeOf(const RegressReport& report) {
+  static constexpr std::array<int, 4> kBadness = {0, 1, 3, 2};  // of exit codes 0 … 3
+  int worst = 0;
+  for (const CaseResult& result : report.cases) {
+    const int code = ExitCodeOf(result.status);
+    if (kBadness[static_cast<size_t>(code)] > kBadness[static_cast<size_t>(worst)]) worst = code;
+  }
+  return worst;
+}
+
+}  // namespace mbv

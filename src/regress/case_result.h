@@ -1,0 +1,127 @@
+// What the nightly regression knows about one scenario after running it.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+#include "scenario/scenario.h"
+
+namespace mbv {
+
+/// How a scenario ended. Everything but kAsExpected is a failed scenario.
+enum class CaseStatus {
+  kNotRun,       ///< pessimistic start value
+  kAsExpected,   ///< verdict, exit code and text are what the file's `expect:` says
+  kUnexpected,   ///< ran, but they are not
+  kBadInput,     ///< the file was refused, unexpectedly
+  kCouldNotRun,  ///< numerical trouble, unexpectedly
+  kCrashed,      ///< killed by a signal, or could not be started
+  kTimedOut,     ///< killed after the time limit
+  kInternal,     ///< exit code 4 or one that mbverify does not have
+};
+[[nodiscard]] const char* ToText(CaseStatus status);  ///< "as_expected", "timed_out", …
+[[nodiscard]] CaseStatus CaseStatusOf(const std::string& text);  ///< kNotRun for unknown words
+/// Exit code a status asks for: 0 as expected, 1 unexpected, 2 bad input, 3 everything else.
+[[nodiscard]] int ExitCodeOf(CaseStatus status);
+
+/// One judged or only measured quantity of a scenario.
+struct MetricValue {
+  double value = kNan;
+  std::optional<double> limit;  ///< empty: measured, not judged
+  bool pass = false;
+};
+
+struct Unmeasured {
+  std::string what, why;
+};
+
+/// What a worker process used.
+struct Cost {
+  double wall_s = 0.0, cpu_s = 0.0;
+  long peak_kib = 0;  ///< largest resident size
+};
+
+/// A metric that got worse inside its limit, or traces that moved.
+struct Drift {
+  std::string metric;      ///< check name, or "traces"
+  std::string text;        ///< one sentence with numbers
+  double value = kNan;     ///< now
+  double baseline = kNan;  ///< median of the good runs before
+  long since_run = 0;      ///< first run of the unbroken stretch; 0: this one
+  std::string since;       ///< that run's date, label and versions
+};
+
+struct CaseResult {
+  std::string key;   ///< "stabilizing_platform/must_fail/stroke": result folder and history name
+  std::string file;  ///< as found
+  std::string description;
+  Expectation expected;
+  std::string inputs;       ///< fingerprint of the scenario and its model
+  std::string fingerprint;  ///< of these, the program and the options that change results
+
+  CaseStatus status = CaseStatus::kNotRun;
+  std::string reason = "was not run";  ///< one sentence for people
+  std::string verdict = "not_run";
+  int exit_code = -1;  ///< of the worker; -1 if it did not end by itself
+  int signal = 0;      ///< that ended it
+
+  bool ran = false;                            ///< at least one witness ran to its end
+  bool compared = false;                       ///< drive forces of at least one pair of witnesses
+  bool verified = false;                       ///< verdict agree, as expected
+  std::map<std::string, MetricValue> metrics;  ///< by check name
+  std::vector<Unmeasured> not_compared;
+  std::map<std::string, std::string> versions;
+  bool has_folder = false;  ///< OUT/<key>/ holds a result
+  Cost cost;
+  std::string log_tail;  ///< last lines the worker printed; only of failed scenarios
+  bool kept = false;     ///< taken over from the interrupted run (--resume)
+
+  std::vector<Drift> drifts;   ///< filled from the history
+  std::vector<double> course;  ///< key metric of the last runs, oldest first, this one included
+
+  [[nodiscard]] bool failed() const { return status != CaseStatus::kAsExpected; }
+};
+
+/// The metric shown first: drive forces (RMS), simulated vs analytic if measured, else the next
+/// pair; null if no forces were compared.
+[[nodiscard]] const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result);
+
+/// A whole regression run.
+struct RunInfo {
+  long id = 0;                            ///< in the history; 0 without one
+  std::string started_utc, finished_utc;  ///< "2026-01-31T02:00:00Z"
+  std::string label;                      ///< free text, e.g. a commit
+  std::string host, program;              ///< program: version and fingerprint
+  std::string shard;                      ///< "2/3"; "" for all
+  double wall_s = 0.0;
+  int jobs = 1;
+};
+
+struct RegressReport {
+  RunInfo run;
+  std::vector<CaseResult> cases;   ///< sorted by key
+  std::vector<std::string> notes;  ///< trouble with history, pictures, …
+};
+
+/// "ran", "compared" and "verified" are counted separately.
+struct Counts {
+  int total = 0, as_expected = 0, ran = 0, compared = 0, verified = 0;
+  int must_fail = 0;  ///< as expected, and what is expected is not "agree"
+  int drifted = 0;
+};
+[[nodiscard]] Counts CountCases(const RegressReport& report);
+
+/// Worst of all scenarios, in the order 2, 3, 1, 0.
+[[nodiscard]] int ExitCodeOf(const RegressReport& report);
+
+/// regress.json and the state files of single scenarios.
+[[nodiscard]] std::string ToJson(const CaseResult& result);
+[[nodiscard]] std::string ToJson(const RegressReport& report);
+/// Empty when the text is not what ToJson() wrote.
+[[nodiscard]] std::optional<CaseResult> CaseFromJson(const std::string& text);
+[[nodiscard]] std::optional<RegressReport> ReportFromJson(const std::string& text);
+
+}  // namespace mbv

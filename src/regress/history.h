@@ -1,0 +1,49 @@
+// The history of regression runs: one SQLite file, schema in docs/nightly.md.
+//
+// A run is appended in one transaction (write-ahead log, waiting for other writers), so the file
+// holds whole runs only, whatever is killed when.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "regress/case_result.h"
+#include "regress/drift.h"
+#include "regress/golden.h"
+
+namespace mbv {
+
+struct HistoryOptions {
+  DriftRule rule;
+  int course_runs = 30;  ///< length of the course given back for each scenario
+  int golden_runs = 50;  ///< runs whose golden traces are kept
+};
+
+/// Judges a run against the history and appends it: fills the report's run id, drifts and courses.
+/// `goldens` by scenario key. "" or what went wrong; then nothing was appended.
+[[nodiscard]] std::string AppendRun(const std::string& path,
+                                    const std::map<std::string, GoldenTraces>& goldens,
+                                    RegressReport* report, const HistoryOptions& options = {});
+
+/// Text and what went wrong with it.
+struct HistoryText {
+  std::string text, trouble;
+};
+
+/// A table of the runs, newest last.
+[[nodiscard]] HistoryText ListRuns(const std::string& path);
+/// What differs between two runs: status, key metrics, cost, and which witness moved. A run is a
+/// number, "last" or "last~2".
+[[nodiscard]] HistoryText CompareRuns(const std::string& path, const std::string& run_a,
+                                      const std::string& run_b);
+/// One line per run, scenario and metric.
+[[nodiscard]] HistoryText HistoryCsv(const std::string& path);
+/// Takes what run `run` measured as right: baselines start there. `key` "" means all scenarios.
+[[nodiscard]] HistoryText AcceptRun(const std::string& path, const std::string& run,
+                                    const std::string& key, const std::string& note);
+
+/// Wall time of each scenario in the newest run that has it, to start long ones first.
+[[nodiscard]] std::map<std::string, double> LastWallTimes(const std::string& path);
+
+}  // namespace mbv

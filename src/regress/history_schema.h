@@ -1,0 +1,26 @@
+// Tables of the history.
+#pragma once
+
+#include <string>
+
+#include "regress/database.h"
+#include "regress/golden.h"
+
+namespace mbv {
+
+inline constexpr int kHistoryVersion = 1;  ///< PRAGMA user_version
+
+/// Makes the tables where they are missing; a newer program's file is trouble. Call inside a write
+/// transaction. "" or what went wrong.
+[[nodiscard]] std::string PrepareSchema(const std::string& path, Database* database);
+
+/// The same check for readers, which change nothing.
+[[nodiscard]] std::string CheckSchema(const std::string& path, Database* database);
+
+/// Number of a run given as "17", "last" or "last~1"; 0 if there is none.
+[[nodiscard]] long FindRun(Database* database, const std::string& text);
+
+/// The golden traces kept with a result.
+[[nodiscard]] GoldenTraces LoadGolden(Database* database, long result);
+
+}  // namespace mbv

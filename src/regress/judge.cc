@@ -1,0 +1,155 @@
+#include "regress/judge.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <nlohmann/json.hpp>
+
+#include "regress/files.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::json;
+
+constexpr int kTailLines = 12;
+
+std::string Word(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
+}
+
+double Number(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() && found->is_number() ? found->get<double>() : kNan;
+}
+
+Json Part(const Json& json, const char* key) {
+  const auto found = json.find(key);
+  return found != json.end() ? *found : Json();
+}
+
+// What summary.json says; its `reason` or "" if it is not one.
+std::string ReadSummary(const std::string& text, CaseResult* result) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return "";
+  if (const std::string verdict = Word(json, "verdict"); !verdict.empty()) {
+    result->verdict = verdict;
+  }
+  if (result->description.empty()) result->description = Word(json, "description");
+  for (const Json& witness : Part(json, "witnesses")) {
+    result->ran = result->ran || witness.value("ran", false);
+  }
+  result->compared = Number(Part(json, "counts"), "pairs_compared") > 0.0;
+  for (const char* list : {"checks", "checks_off"}) {
+    for (const Json& check : Part(json, list)) {
+      MetricValue& metric = result->metrics[Word(check, "name")];
+      metric.value = Number(check, "value");
+      if (!check.contains("limit")) continue;
+      metric.limit = Number(check, "limit");
+      metric.pass = check.value("pass", false);
+    }
+  }
+  for (const Json& item : Part(json, "not_compared")) {
+    result->not_compared.push_back({Word(item, "what"), Word(item, "why")});
+  }
+  for (const auto& [name, version] : Part(json, "versions").items()) {
+    if (version.is_string()) result->versions[name] = version;
+  }
+  return Word(json, "reason");
+}
+
+// The line that tells what went wrong: the last one with "error", else the last one.
+std::string TellingLine(const std::string& output) {
+  const std::string tail = LastLines(output, 200);
+  const size_t error = tail.rfind("error");
+  const size_t at = error == std::string::npos ? tail.size() : error;
+  const size_t newline = tail.rfind('\n', at == 0 ? 0 : at - 1);
+  const size_t begin = newline == std::string::npos ? 0 : newline + 1;
+  return tail.substr(begin, tail.find('\n', begin) - begin);
+}
+
+// What is not as expected, "" if nothing.
+std::string Offence(const CaseResult& result, const std::string& output) {
+  const Expectation& expected = result.expected;
+  if (result.exit_code != expected.exit_code) {
+    return fmt::format("exit code {}, expected {}", result.exit_code, expected.exit_code);
+  }
+  if (result.verdict != expected.verdict) {
+    return fmt::format("verdict {}, expected {}", result.verdict, expected.verdict);
+  }
+  if (WithoutControls(output).find(expected.mentions) == std::string::npos) {
+    return fmt::format("the output does not mention '{}'", expected.mentions);
+  }
+  return "";
+}
+
+CaseStatus StatusOf(const CaseResult& result) {
+  if (result.exit_code == result.expected.exit_code) return CaseStatus::kUnexpected;
+  if (result.exit_code == 2) return CaseStatus::kBadInput;
+  if (result.exit_code == 3) return CaseStatus::kCouldNotRun;
+  return CaseStatus::kUnexpected;
+}
+
+// Ends that no `expect:` can ask for; false if the worker ended properly.
+bool EndedBadly(const WorkerEnd& end, double timeout_s, const std::string& output,
+                CaseResult* result) {
+  const auto is = [&](CaseStatus status, std::string reason) {
+    result->status = status;
+    result->reason = std::move(reason);
+    return true;
+  };
+  if (end.timed_out) {
+    return is(CaseStatus::kTimedOut, fmt::format("no end after {:g} s: killed", timeout_s));
+  }
+  if (end.signal != 0) {
+    return is(CaseStatus::kCrashed,
+              fmt::format("killed by signal {} ({})", end.signal, strsignal(end.signal)));
+  }
+  if (!end.trouble.empty()) {
+    return is(CaseStatus::kCrashed, end.trouble + ": " + TellingLine(output));
+  }
+  if (end.exit_code < 0 || end.exit_code > 3) {
+    return is(CaseStatus::kInternal,
+              fmt::format("exit code {}: {}", end.exit_code, TellingLine(output)));
+  }
+  return false;
+}
+
+}  // namespace
+
+CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_s,
+                     const std::string& output, const std::optional<std::string>& summary) {
+  CaseResult result;
+  result.key = file.key;
+  result.file = file.file;
+  result.description = file.head.description;
+  result.expected = file.head.expect;
+  result.inputs = file.inputs;
+  result.exit_code = end.exit_code;
+  result.signal = end.signal;
+  result.cost = end.cost;
+  std::string reason = summary ? ReadSummary(*summary, &result) : "";
+  if (!EndedBadly(end, timeout_s, output, &result)) {
+    const std::string offence = Offence(result, output);
+    if (reason.empty()) reason = TellingLine(output);
+    if (!summary && end.exit_code != 2) {
+      result.status = CaseStatus::kInternal;
+      result.reason = fmt::format("exit code {} but no summary.json", end.exit_code);
+    } else if (offence.empty()) {
+      result.status = CaseStatus::kAsExpected;
+      result.reason = reason;
+      result.verified = result.verdict == "agree";
+    } else {
+      result.status = StatusOf(result);
+      result.reason = offence + (reason.empty() ? "" : ": " + reason);
+    }
+  }
+  if (!result.ran && result.not_compared.empty()) {
+    result.not_compared.push_back({"everything", result.reason});
+  }
+  if (result.failed()) result.log_tail = LastLines(output, kTailLines);
+  return result;
+}
+
+}  // namespace mbv

@@ -1,0 +1,180 @@
+// What the history can be asked.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <set>
+
+#include "regress/files.h"
+#include "regress/history.h"
+#include "regress/history_schema.h"
+
+namespace mbv {
+namespace {
+
+struct Row {
+  long result = 0;
+  std::string status;
+  double key_value = kNan;
+  double wall_s = kNan;
+};
+
+constexpr const char* kKeyMetric =
+    "(SELECT m.value FROM metric m WHERE m.result = r.id AND m.name IN "
+    "('simulated_vs_analytic.force_nrmse', 'simulated_vs_reference.force_nrmse', "
+    "'reference_vs_analytic.force_nrmse') ORDER BY CASE m.name "
+    "WHEN 'simulated_vs_analytic.force_nrmse' THEN 0 "
+    "WHEN 'simulated_vs_reference.force_nrmse' THEN 1 ELSE 2 END LIMIT 1)";
+
+std::map<std::string, Row> RowsOf(Database* database, long run) {
+  Statement select(database, fmt::format("SELECT s.key, r.id, r.status, {}, r.wall_s FROM result r "
+                                         "JOIN scenario s ON s.id = r.scenario WHERE r.run = ?",
+                                         kKeyMetric));
+  select.Bind(run);
+  std::map<std::string, Row> rows;
+  while (select.Step()) {
+    rows[select.Text(0)] = {select.Integer(1), select.Text(2), select.Real(3), select.Real(4)};
+  }
+  return rows;
+}
+
+std::string Value(double value) { return std::isnan(value) ? "-" : fmt::format("{:.2e}", value); }
+
+std::string RunLine(Database* database, long run) {
+  Statement select(database, "SELECT started_utc, label, program FROM run WHERE id = ?");
+  if (!select.Bind(run).Step()) return "";
+  const std::string label = select.Text(1);
+  return fmt::format("run {}: {}{}, {}\n", run, select.Text(0), label.empty() ? "" : ", " + label,
+                     select.Text(2));
+}
+
+std::string CompareRow(Database* database, const std::string& key, const Row& a, const Row& b) {
+  const std::string moved =
+      AttributeMovement(LoadGolden(database, a.result), LoadGolden(database, b.result));
+  const double ratio = b.key_value / a.key_value;
+  const bool same =
+      a.status == b.status && moved.empty() && (a.key_value == b.key_value || std::isnan(ratio));
+  std::string line = fmt::format("  {:<52}{:>10} → {:<10}{:>7.1f} s → {:.1f} s", key,
+                                 Value(a.key_value), Value(b.key_value), a.wall_s, b.wall_s);
+  if (same) return line + "  same\n";
+  if (a.status != b.status) line += fmt::format("  {} → {}", a.status, b.status);
+  if (std::isfinite(ratio) && ratio != 1.0) line += fmt::format("  ×{:.3g}", ratio);
+  if (!moved.empty()) line += "  " + moved;
+  return line + "\n";
+}
+
+std::string CsvText(const std::string& text) {
+  if (text.find_first_of(",\"\n") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
+}
+
+std::string CsvNumber(double value) {
+  return std::isnan(value) ? "" : fmt::format("{:.17g}", value);
+}
+
+}  // namespace
+
+HistoryText ListRuns(const std::string& path) {
+  Database database(path, Database::Mode::kRead);
+  if (auto trouble = CheckSchema(path, &database); !trouble.empty()) return {"", trouble};
+  std::string text = fmt::format("{:>5}  {:<20}  {:>9}  {:>4}  {:>8}  {:>8}  {:>7}  {:>8}  {}\n",
+                                 "run", "started (UTC)", "as exp.", "ran", "compared", "verified",
+                                 "drifted", "wall [s]", "label, program");
+  Statement select(&database,
+                   "SELECT id, started_utc, as_expected, total, ran, compared, verified, drifted, "
+                   "wall_s, label, program, shard FROM run ORDER BY id");
+  while (select.Step()) {
+    const std::string label = select.Text(9), shard = select.Text(11);
+    text += fmt::format("{:>5}  {:<20}  {:>9}  {:>4}  {:>8}  {:>8}  {:>7}  {:>8.1f}  {}{}{}\n",
+                        select.Integer(0), select.Text(1),
+                        fmt::format("{}/{}", select.Integer(2), select.Integer(3)),
+                        select.Integer(4), select.Integer(5), select.Integer(6), select.Integer(7),
+                        select.Real(8), label.empty() ? "" : label + ", ", select.Text(10),
+                        shard.empty() ? "" : ", shard " + shard);
+  }
+  return {text, database.trouble()};
+}
+
+HistoryText CompareRuns(const std::string& path, const std::string& run_a,
+                        const std::string& run_b) {
+  Database database(path, Database::Mode::kRead);
+  if (auto trouble = CheckSchema(path, &database); !trouble.empty()) return {"", trouble};
+  const long a = FindRun(&database, run_a), b = FindRun(&database, run_b);
+  for (const auto& [id, name] : {std::pair{a, run_a}, std::pair{b, run_b}}) {
+    if (id == 0) return {"", fmt::format("history {}: there is no run '{}'", path, name)};
+  }
+  std::string text = RunLine(&database, a) + RunLine(&database, b);
+  const auto rows_a = RowsOf(&database, a), rows_b = RowsOf(&database, b);
+  text += fmt::format("  {:<52}{:>23}{:>18}\n", "scenario", "force error (RMS)", "wall time");
+  for (const auto& [key, row] : rows_b) {
+    const auto before = rows_a.find(key);
+    text += before == rows_a.end() ? fmt::format("  {:<52}  only in run {}\n", key, b)
+                                   : CompareRow(&database, key, before->second, row);
+  }
+  for (const auto& [key, row] : rows_a) {
+    if (!rows_b.contains(key)) text += fmt::format("  {:<52}  only in run {}\n", key, a);
+  }
+  return {text, database.trouble()};
+}
+
+HistoryText HistoryCsv(const std::string& path) {
+  Database database(path, Database::Mode::kRead);
+  if (auto trouble = CheckSchema(path, &database); !trouble.empty()) return {"", trouble};
+  std::string text =
+      "run,started_utc,label,program,scenario,status,verdict,exit_code,wall_s,cpu_s,peak_kib,"
+      "metric,value,limit,pass,drifted\n";
+  Statement select(&database,
+                   "SELECT u.id, u.started_utc, u.label, u.program, s.key, r.status, r.verdict, "
+                   "r.exit_code, r.wall_s, r.cpu_s, r.peak_kib, m.name, m.value, m.upper_limit, "
+                   "m.pass, m.drifted FROM run u JOIN result r ON r.run = u.id JOIN scenario s ON "
+                   "s.id = r.scenario LEFT JOIN metric m ON m.result = r.id "
+                   "ORDER BY u.id, s.key, m.name");
+  while (select.Step()) {
+    const bool metric = !select.Text(11).empty();
+    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", select.Integer(0),
+                        select.Text(1), CsvText(select.Text(2)), CsvText(select.Text(3)),
+                        CsvText(select.Text(4)), select.Text(5), select.Text(6), select.Integer(7),
+                        CsvNumber(select.Real(8)), CsvNumber(select.Real(9)), select.Integer(10),
+                        select.Text(11), CsvNumber(select.Real(12)), CsvNumber(select.Real(13)),
+                        metric ? fmt::format("{}", select.Integer(14)) : "",
+                        metric ? fmt::format("{}", select.Integer(15)) : "");
+  }
+  return {text, database.trouble()};
+}
+
+HistoryText AcceptRun(const std::string& path, const std::string& run, const std::string& key,
+                      const std::string& note) {
+  Database database(path, Database::Mode::kWrite);
+  if (auto trouble = CheckSchema(path, &database); !trouble.empty()) return {"", trouble};
+  database.Run("BEGIN IMMEDIATE");
+  const long id = FindRun(&database, run);
+  if (id == 0) return {"", fmt::format("history {}: there is no run '{}'", path, run)};
+  Statement insert(
+      &database,
+      "INSERT OR REPLACE INTO accepted SELECT r.scenario, r.run, ?, ? FROM result r "
+      "JOIN scenario s ON s.id = r.scenario WHERE r.run = ? AND (? = '' OR s.key = ?)");
+  insert.Bind(UtcNow(), note, id, key, key).Execute();
+  Statement count(&database, "SELECT changes()");
+  const long accepted = count.Step() ? count.Integer(0) : 0;
+  if (accepted == 0) {
+    return {"", fmt::format("history {}: run {} has no scenario '{}'", path, id, key)};
+  }
+  database.Run("COMMIT");
+  return {fmt::format("baselines of {} scenario{} start with run {}\n", accepted,
+                      accepted == 1 ? "" : "s", id),
+          database.trouble()};
+}
+
+std::map<std::string, double> LastWallTimes(const std::string& path) {
+  Database database(path, Database::Mode::kRead);
+  if (!CheckSchema(path, &database).empty()) return {};
+  std::map<std::string, double> times;
+  Statement select(&database,
+                   "SELECT s.key, r.wall_s FROM result r JOIN scenario s ON s.id = r.scenario "
+                   "WHERE r.run > (SELECT MAX(id) FROM run) - 5 ORDER BY r.run");
+  while (select.Step()) times[select.Text(0)] = select.Real(1);
+  return times;
+}
+
+}  // namespace mbv

@@ -1,0 +1,59 @@
+// The nightly regression: all scenarios in worker processes, judged, summarised, remembered.
+//
+// OUT/ holds: <key>/ result folders, logs/<key>.txt, regress.json, junit.xml, summary.md,
+// index.html, history.sqlite, and .state/ for --resume.
+#pragma once
+
+#include <csignal>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "regress/case_result.h"
+#include "regress/find_cases.h"
+
+namespace mbv {
+
+struct RegressOptions {
+  std::vector<std::string> paths = {"scenarios"};
+  std::string out = "out/regress";
+  std::string history;   ///< SQLite file; "" writes none
+  std::string junit;     ///< "" is OUT/junit.xml
+  std::string markdown;  ///< "" is OUT/summary.md
+  std::string label;     ///< kept with the run, e.g. a commit
+  std::string program;   ///< version text; its file's fingerprint is added
+  Shard shard;
+  bool resume = false;
+  bool pictures = true;
+  int jobs = 1;              ///< worker processes at once, >= 1
+  double timeout_s = 300.0;  ///< of one scenario, > 0
+  /// Program and arguments; "run FILE --out DIR" is added.
+  std::vector<std::string> worker = {"/proc/self/exe"};
+  const volatile std::sig_atomic_t* stop = nullptr;  ///< not 0: stop the workers and return
+};
+
+/// What runs now and what is done, for people who watch.
+struct RegressProgress {
+  std::function<void(size_t cases, size_t kept)> begin;
+  std::function<void(const std::string& key)> started;
+  std::function<void(const CaseResult& result)> ended;
+  std::function<void()> tick;
+};
+
+struct RegressOutcome {
+  int exit_code = 4;    ///< 0 all as expected, 1 some not, 2 bad input, 3 some could not run
+  std::string trouble;  ///< why nothing was run, or "interrupted"
+  RegressReport report;
+  std::vector<std::string> files;  ///< summaries that were written
+};
+
+/// Runs and writes everything. Never throws for what scenarios or workers do.
+[[nodiscard]] RegressOutcome Regress(const RegressOptions& options,
+                                     const RegressProgress& progress);
+
+/// Joins the folders of shards (or of any runs of different scenarios) into one: result folders are
+/// copied, and all summaries are written as if one run had done it.
+[[nodiscard]] RegressOutcome MergeRuns(const std::vector<std::string>& folders,
+                                       const RegressOptions& options);
+
+}  // namespace mbv

@@ -1,0 +1,119 @@
+// What all summaries share, and the one for terminals.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "regress/summaries.h"
+
+namespace mbv {
+namespace {
+
+// Bytes of the UTF-8 sequence at `at`, 0 if it is broken or a character XML 1.0 forbids.
+size_t SequenceLength(const std::string& text, size_t at) {
+  const auto byte = [&](size_t i) {
+    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
+  };
+  const unsigned c = byte(at);
+  if (c < 0x80) return c >= 0x20 || c == '\n' || c == '\t' ? 1 : 0;
+  const size_t length = c >= 0xC2 && c < 0xE0   ? 2
+                        : (c & 0xF0) == 0xE0    ? 3
+                        : c >= 0xF0 && c < 0xF5 ? 4
+                                                : 0;
+  unsigned code = length == 2 ? c & 0x1F : length == 3 ? c & 0x0F : c & 0x07;
+  for (size_t k = 1; k < length; ++k) {
+    if ((byte(at + k) & 0xC0) != 0x80) return 0;
+    code = (code << 6) | (byte(at + k) & 0x3F);
+  }
+  static constexpr unsigned kLeast[] = {0, 0, 0x80, 0x800, 0x10000};
+  const bool forbidden = code < kLeast[length] || (code >= 0xD800 && code < 0xE000) ||
+                         code == 0xFFFE || code == 0xFFFF || code > 0x10FFFF;
+  return forbidden ? 0 : length;
+}
+
+}  // namespace
+
+std::string EscapeXml(const std::string& text) {
+  std::string escaped;
+  for (size_t i = 0; i < text.size();) {
+    const size_t length = SequenceLength(text, i);
+    switch (text[i]) {
+      case '&':
+        escaped += "&amp;";
+        break;
+      case '<':
+        escaped += "&lt;";
+        break;
+      case '>':
+        escaped += "&gt;";
+        break;
+      case '"':
+        escaped += "&quot;";
+        break;
+      case '\'':
+        escaped += "&#39;";
+        break;
+      default:
+        escaped += text.substr(i, length);
+    }
+    i += std::max<size_t>(length, 1);
+  }
+  return escaped;
+}
+
+std::string CountsText(const Counts& counts) {
+  std::string text = fmt::format("{} scenario{}: {} as expected", counts.total,
+                                 counts.total == 1 ? "" : "s", counts.as_expected);
+  if (counts.must_fail > 0) text += fmt::format(" ({} of them must fail)", counts.must_fail);
+  text += fmt::format(", {} ran, {} compared, {} verified", counts.ran, counts.compared,
+                      counts.verified);
+  if (counts.drifted > 0) text += fmt::format(", {} drifted", counts.drifted);
+  return text;
+}
+
+std::string WordOf(const CaseResult& result) {
+  if (result.failed()) {
+    std::string word = ToText(result.status);
+    std::replace(word.begin(), word.end(), '_', ' ');
+    return word;
+  }
+  if (!result.drifts.empty()) return "drift";
+  return result.verified ? "agree" : "fails as it must";
+}
+
+std::string KeyText(const CaseResult& result) {
+  const auto* key = KeyMetric(result);
+  if (key == nullptr) return "";
+  std::string pair = key->first.substr(0, key->first.find('.'));
+  std::replace(pair.begin(), pair.end(), '_', ' ');
+  std::string text = fmt::format("{:.1e}", key->second.value);
+  if (key->second.limit) text += fmt::format(" of {:.1e}", *key->second.limit);
+  return text + " (" + pair + ")";
+}
+
+std::string ToSummaryText(const RegressReport& report) {
+  std::string text;
+  for (const CaseResult& result : report.cases) {
+    if (!result.failed()) continue;
+    text += fmt::format("{}: {}\n    {}\n", result.key, WordOf(result), result.reason);
+  }
+  for (const CaseResult& result : report.cases) {
+    for (const Drift& drift : result.drifts) {
+      text += fmt::format("{}: drift\n    {}\n", result.key, drift.text);
+      if (!drift.since.empty()) text += fmt::format("    since {}\n", drift.since);
+    }
+  }
+  for (const std::string& note : report.notes) text += "note: " + note + "\n";
+  long peak = 0;
+  double cpu_s = 0.0;
+  for (const CaseResult& result : report.cases) {
+    peak = std::max(peak, result.cost.peak_kib);
+    cpu_s += result.cost.cpu_s;
+  }
+  text += CountsText(CountCases(report)) + "\n";
+  text += fmt::format("{:.1f} s wall with {} worker{}, {:.1f} s CPU, largest worker {:.0f} MiB\n",
+                      report.run.wall_s, report.run.jobs, report.run.jobs == 1 ? "" : "s", cpu_s,
+                      static_cast<double>(peak) / 1024.0);
+  return text;
+}
+
+}  // namespace mbv
