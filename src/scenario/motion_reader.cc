@@ -311,10 +311,17 @@ class Reader {
         load->p_BoQ_B = frame.X_BF.translation();
       }
     }
+    for (const Output& output : mechanism_.outputs) {
+      known.push_back(output.name);
+      if (*text != output.name) continue;
+      load->body = output.body;
+      load->p_BoQ_B = output.X_BO.translation();
+    }
     if (load->body > 0) return;
     const std::string near = ClosestWord(*text, known);
     yaml().Error(
-        node, fmt::format("{}.on = '{}' is no body or frame of {}", path, *text, mechanism_.name),
+        node,
+        fmt::format("{}.on = '{}' is no body, frame or output of {}", path, *text, mechanism_.name),
         near.empty() ? "" : fmt::format("did you mean '{}'?", near));
   }
 

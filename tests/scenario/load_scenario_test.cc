@@ -146,7 +146,7 @@ TEST_F(LoadScenarioTest, LoadsActAtAFrameWithAnOffset) {
       "loads:\n"
       "  crane: {on: limb1.link1, at: [0, 0.5, 0], force: [0, {sine: {amplitude: 9, period_s: 2}}, "
       "-400], in: body}\n"
-      "  wind: {on: platform.p, moment: [1, 2, 3]}\n"));
+      "  wind: {on: platform_in_base, moment: [1, 2, 3]}\n"));
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   const auto& loads = result.scenario->motion.loads;
   ASSERT_EQ(loads.size(), 2u);
@@ -154,6 +154,7 @@ TEST_F(LoadScenarioTest, LoadsActAtAFrameWithAnOffset) {
   EXPECT_EQ(loads[0].p_BoQ_B, Vec3(0, 0.5, 0));
   EXPECT_TRUE(loads[0].in_body_axes);
   EXPECT_DOUBLE_EQ(Evaluate(loads[0].force[1], 0.5).value, 9.0);
+  EXPECT_EQ(loads[1].body, result.mechanism->FindBody("platform"));
   EXPECT_FALSE(loads[1].in_body_axes);
   EXPECT_DOUBLE_EQ(Evaluate(loads[1].moment[2], 0.5).value, 3.0);
 }
@@ -304,7 +305,7 @@ std::vector<Golden> Goldens() {
           "  hint: samples must fall on whole steps")},
       {"UnknownLoadBody", complete("loads: {w: {on: platfrm, force: [0, 0, 1]}}\n"),
        At("16:17",
-          "loads.w.on = 'platfrm' is no body or frame of stabilizing_platform\n"
+          "loads.w.on = 'platfrm' is no body, frame or output of stabilizing_platform\n"
           "  hint: did you mean 'platform'?")},
       {"LoadWithoutForce", complete("loads: {w: {on: platform}}\n"),
        At("16:9", "loads.w has neither force nor moment")},

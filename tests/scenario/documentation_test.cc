@@ -1,0 +1,49 @@
+// docs/scenario_format.md says what the program does.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+
+#include "scenario/load_scenario.h"
+
+namespace mbv {
+namespace {
+
+std::string Document() {
+  std::ifstream stream(std::string(MBV_SOURCE_DIR) + "/docs/scenario_format.md");
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+TEST(ScenarioDocument, ItsExampleLoads) {
+  std::filesystem::current_path(MBV_SOURCE_DIR);
+  const std::string document = Document();
+  const size_t start = document.find("```yaml\n") + 8;
+  const std::string example = document.substr(start, document.find("```", start) - start);
+  const ScenarioResult result = LoadScenarioText(example, "scenarios/example.yaml");
+  EXPECT_TRUE(result.diagnostics.empty()) << result.diagnostics.Text();
+  EXPECT_TRUE(result.scenario);
+}
+
+TEST(ScenarioDocument, ItsTableHoldsEveryCheckWithItsDefaults) {
+  const std::string document = Document();
+  for (const MetricRow& row : MetricRows()) {
+    const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
+    const std::string line =
+        fmt::format("| `{}` | {}{} | {:.0e}, {:.0e}, {:.0e} |\n", row.key, row.title, unit,
+                    *row.limits.forward, *row.limits.inverse, *row.limits.reference);
+    // C++ writes 1e-06 where people write 1e-6.
+    std::string plain;
+    for (size_t i = 0; i < line.size(); ++i) {
+      if (line[i] == '0' && i > 1 && line[i - 1] == '-' && line[i - 2] == 'e') continue;
+      plain += line[i];
+    }
+    EXPECT_NE(document.find(plain), std::string::npos) << plain;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
