@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 
 #include "report/html_assets.h"
@@ -32,6 +33,14 @@ std::string Card(const std::string& title, const std::string& value, const std::
                      Escape(value), detail.empty() ? "" : "<span>" + Escape(detail) + "</span>");
 }
 
+// With a capital letter and a full stop.
+std::string Sentence(std::string text) {
+  if (text.empty()) return text;
+  text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  if (text.back() != '.') text += '.';
+  return text;
+}
+
 class PageWriter {
  public:
   explicit PageWriter(const HtmlInput& input) : input_(input), report_(*input.report) {}
@@ -41,24 +50,27 @@ class PageWriter {
     Verdict();
     Interactive();
     Pictures();
-    Add("Checks", "checks", ChecksHtml(report_));
-    Add("Drives", "drives", DrivesHtml(report_));
-    Add("The simulator's own error", "engine", EngineHtml(report_));
-    Add("Energy", "energy", EnergyHtml(report_));
-    Add("What could not be compared", "gaps", NotComparedHtml(report_));
-    Add("The paper's equations", "equations", AuditHtml(input_.audit));
-    Add("How to read the force signals", "signals", SignalsHtml(report_));
-    Add("Parameters", "parameters", ParametersHtml(*input_.mechanism));
-    Add("Reproduce this run", "reproduce", ReproduceHtml(input_));
+    Add("Checks", "Checks", ChecksHtml(report_));
+    Add("Drives", "Drives", DrivesHtml(report_));
+    Add("The simulator's own error", "Engine", EngineHtml(report_));
+    Add("Energy", "Energy", EnergyHtml(report_));
+    Add("What could not be compared", "Gaps", NotComparedHtml(report_));
+    Add("The paper's equations", "Equations", AuditHtml(input_.audit));
+    Add("How to read the force signals", "Signals", SignalsHtml(report_));
+    Add("Parameters", "Parameters", ParametersHtml(*input_.mechanism));
+    Add("Reproduce this run", "Reproduce", ReproduceHtml(input_));
     return Assemble();
   }
 
  private:
   std::string Title() const { return report_.mechanism + " / " + report_.scenario; }
 
-  void Add(const std::string& title, const std::string& id, const std::string& content) {
+  // `link` names the section in the navigation; its lower case is the anchor.
+  void Add(const std::string& title, const std::string& link, const std::string& content) {
     if (content.empty()) return;
-    nav_ += fmt::format("<a href=\"#{}\">{}</a>\n", id, Escape(title));
+    std::string id = link;
+    id[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(id[0])));
+    nav_ += fmt::format("<a href=\"#{}\">{}</a>\n", id, link);
     main_ +=
         fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n", id, Escape(title), content);
   }
@@ -74,20 +86,22 @@ class PageWriter {
   }
 
   void Verdict() {
-    std::string html = "<p class=\"reason\">" + Escape(report_.comparison.reason) + ".</p>\n";
+    std::string html =
+        "<p class=\"reason\">" + Escape(Sentence(report_.comparison.reason)) + "</p>\n";
     const Attribution& attribution = report_.comparison.attribution;
     if (!attribution.text.empty()) {
-      html += fmt::format("<p class=\"attribution{}\">{}.</p>\n",
-                          attribution.odd_one_out.empty() ? "" : " odd", Escape(attribution.text));
+      html += fmt::format("<p class=\"attribution{}\">{}</p>\n",
+                          attribution.odd_one_out.empty() ? "" : " odd",
+                          Escape(Sentence(attribution.text)));
     }
     html += "<dl class=\"cards\">\n" + Cards() + "</dl>\n";
-    html += "<p class=\"faint\">" + Escape(report_.simulation) + ".";
+    html += "<p class=\"faint\">" + Escape(Sentence(report_.simulation));
     if (report_.start_window_s > 0.0) {
       html += fmt::format(" Start-up window: forces before {:g} s are not judged.",
                           report_.start_window_s);
     }
     html += "</p>\n" + FindingsHtml(report_);
-    Add("Verdict", "verdict", html);
+    Add("Verdict", "Verdict", html);
   }
 
   std::string Cards() const {
@@ -146,8 +160,8 @@ class PageWriter {
     const std::string hint =
         "<noscript><p class=\"faint\">This part needs JavaScript; the pictures and tables below do "
         "not.</p></noscript>\n";
-    Add("Replay", "replay", hint + "<div id=\"replay-view\"></div>\n");
-    Add("Signals over time", "plots", hint + "<div id=\"plot-view\"></div>\n");
+    Add("Replay", "Replay", hint + "<div id=\"replay-view\"></div>\n");
+    Add("Signals over time", "Plots", hint + "<div id=\"plot-view\"></div>\n");
   }
 
   void Pictures() {
@@ -160,7 +174,7 @@ class PageWriter {
           name, Base64(std::string_view(picture.png)));
     }
     if (html.empty()) return;
-    Add("Snapshots", "snapshots",
+    Add("Snapshots", "Snapshots",
         "<div class=\"pictures\">\n" + html +
             "</div>\n<p class=\"faint\">Small copies; the originals are in snapshots/ beside "
             "this page.</p>\n");

@@ -126,8 +126,8 @@ const kStyles = {
   simulated: {width: 0, marks: true},
 };
 
-function seriesOf(line) {
-  const style = kStyles[line.style] ?? kStyles.solid;
+function seriesOf(line, log) {
+  const style = log ? {width: 1} : kStyles[line.style] ?? kStyles.solid;
   const color = line.color();
   return {
     label: line.label,
@@ -256,6 +256,11 @@ export class Plots {
     const ink = css.getPropertyValue('--faint').trim(), grid = css.getPropertyValue('--grid').trim();
     const font = '12px system-ui, sans-serif';
     const axis = {stroke: ink, font, grid: {stroke: grid, width: 1}, ticks: {stroke: grid, width: 1}};
+    // Only whole decades have lines and labels.
+    const whole = (_u, splits) => splits.map(
+        (v) => Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-6 ? v : null);
+    const lines = panel.log ? {grid: {...axis.grid, filter: whole},
+                               ticks: {...axis.ticks, filter: whole}, filter: whole} : {};
     const labels = panel.log
         ? (_u, splits) => splits.map((v) => v === null ? '' : exponent(v))
         : (_u, splits) => axisLabels(splits);
@@ -269,8 +274,8 @@ export class Plots {
       scales: {x: {time: false, min: this.range[0], max: this.range[1]},
                y: panel.log ? {distr: 3, log: 10, range: () => range} : {range: padded}},
       axes: [{...axis, size: 34, values: (_u, splits) => axisLabels(splits).map((s) => s && s + ' s')},
-             {...axis, size: 62, values: labels}],
-      series: [{}, ...panel.lines.map((line) => ({...seriesOf(line), show: !this.hidden.has(line.key)}))],
+             {...axis, ...lines, size: 62, values: labels}],
+      series: [{}, ...panel.lines.map((line) => ({...seriesOf(line, panel.log), show: !this.hidden.has(line.key)}))],
       hooks: {
         setScale: [(u, key) => key === 'x' && this.followZoom(u)],
         setCursor: [(u) => this.read(u.cursor.idx)],
@@ -292,11 +297,10 @@ export class Plots {
   drawMarks(u, panel) {
     const {ctx, bbox} = u;
     const css = getComputedStyle(document.documentElement);
-    ctx.save();
-    ctx.beginPath();
-    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
-    ctx.clip();
     const ratio = devicePixelRatio || 1;
+    ctx.save();
+    ctx.textAlign = 'left';
+    ctx.textBaseline = 'alphabetic';
     ctx.font = `${12 * ratio}px system-ui, sans-serif`;
     if (panel.limit) {
       const y = u.valToPos(panel.limit, 'y', true);
@@ -309,7 +313,8 @@ export class Plots {
       ctx.stroke();
       ctx.fillText(`limit ${formatError(panel.limit)}`, bbox.left + 8 * ratio, y + 15 * ratio);
     }
-    if (panel.worst && Number.isFinite(panel.worst.time)) this.drawWorst(u, panel.worst, ratio, css);
+    const {min, max} = u.scales.x;
+    if (panel.worst && panel.worst.time >= min && panel.worst.time <= max) this.drawWorst(u, panel.worst, ratio, css);
     ctx.restore();
   }
 
