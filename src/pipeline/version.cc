@@ -1,13 +1,16 @@
 #include "pipeline/version.h"
 
+#include <fmt/format.h>
+
 #include <Eigen/Core>
 
-#include <fmt/format.h>
+#include "simulation/engine_version.h"
 
 namespace mbv {
 
 std::vector<std::pair<std::string, std::string>> Versions() {
   return {{"mbverify", kVersion},
+          {"mujoco", EngineVersion()},
           {"eigen",
            fmt::format("{}.{}.{}", EIGEN_WORLD_VERSION, EIGEN_MAJOR_VERSION, EIGEN_MINOR_VERSION)},
           {"compiler", __VERSION__}};

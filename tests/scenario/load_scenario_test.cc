@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <random>
 
 #include "scenario/motion_reader.h"
 
@@ -337,6 +338,22 @@ TEST_F(LoadScenarioTest, AllFindingsComeAtOnceInTheOrderOfTheFile) {
   EXPECT_LT(duration, command);
   EXPECT_LT(command, mode);
   EXPECT_NE(mode, std::string::npos) << messages;
+}
+
+TEST_F(LoadScenarioTest, DamagedFilesGiveFindingsAndNeverAScenarioThatIsIncomplete) {
+  const std::string whole = Complete("loads: {w: {on: platform, force: [0, 0, 1]}}\n");
+  std::mt19937_64 random(20260101);
+  for (int k = 0; k < 60; ++k) {
+    std::string text = whole;
+    const size_t at = random() % text.size();
+    if (k % 3 == 0) text.resize(at);
+    if (k % 3 == 1) text.erase(at, 1 + random() % 5);
+    if (k % 3 == 2) text[at] = static_cast<char>(random() % 128);
+    const ScenarioResult result = Load(text);
+    EXPECT_EQ(result.scenario.has_value(), !result.diagnostics.has_errors()) << text;
+    if (!result.scenario) continue;
+    EXPECT_EQ(result.scenario->motion.commands.size(), 9u) << text;
+  }
 }
 
 TEST_F(LoadScenarioTest, AMissingFileIsAFinding) {
