@@ -278,7 +278,7 @@ export class Plots {
       series: [{}, ...panel.lines.map((line) => ({...seriesOf(line, panel.log), show: !this.hidden.has(line.key)}))],
       hooks: {
         setScale: [(u, key) => key === 'x' && this.followZoom(u)],
-        setCursor: [(u) => this.read(u.cursor.idx)],
+        setCursor: [(u) => this.readSoon(u.cursor.idx)],
         draw: [(u) => this.drawMarks(u, panel)],
         ready: [(u) => this.clickSetsTime(u)],
       },
@@ -333,6 +333,17 @@ export class Plots {
     ctx.fillText(`worst ${formatError(worst.value)}, ${this.data.drives[worst.drive].name}`,
                  x + (left ? -11 : 11) * ratio, y + 4 * ratio);
     ctx.textAlign = 'left';
+  }
+
+  // All plots' cursors move together; their values are written once per picture.
+  readSoon(index) {
+    if (this.reading === undefined) {
+      requestAnimationFrame(() => {
+        this.read(this.reading);
+        this.reading = undefined;
+      });
+    }
+    this.reading = index ?? null;
   }
 
   read(index) {
@@ -393,7 +404,7 @@ export class Plots {
       view.head.style.display = inside ? '' : 'none';
       view.head.style.transform = `translateX(${view.plot.valToPos(time, 'x')}px)`;
     }
-    if (!this.views?.some((view) => view.plot?.cursor.left >= 0)) this.read(null);
+    if (!this.views?.some((view) => view.plot?.cursor.left >= 0)) this.readSoon(null);
   }
 
   resize() {

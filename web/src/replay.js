@@ -76,7 +76,7 @@ export class Replay {
     const colouring = element('select', {id: 'colouring', onchange: () => {
       this.colouring = colouring.value;
       this.update();
-    }}, element('option', {value: 'sign'}, 'push, pull'));
+    }}, element('option', {value: 'sign'}, 'sign'));
     if (this.errorPair()) colouring.append(element('option', {value: 'error'}, 'error'));
     const check = (text, on, action) => {
       const box = element('input', {type: 'checkbox', checked: on, onchange: () => {
@@ -608,8 +608,8 @@ export class Replay {
           element('span', {}, `${this.errorPair().measured} against ${this.errorPair().truth}`));
     } else {
       this.legend.replaceChildren(
-          element('span', {class: 'key push'}, element('i'), 'push (+)'),
-          element('span', {class: 'key pull'}, element('i'), 'pull (−)'),
+          element('span', {class: 'key push'}, element('i'), 'positive (push)'),
+          element('span', {class: 'key pull'}, element('i'), 'negative (pull)'),
           element('span', {class: 'key closure'}, element('i'), 'loop closure'),
           element('span', {class: 'faint'}, longest ? `longest arrow ${longest}` : ''));
     }
