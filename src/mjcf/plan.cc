@@ -220,6 +220,7 @@ class Planner {
     for (const Body& body : mechanism_.bodies) total += body.mass;
     const double tiny = kTinyMassFraction * (total > 0.0 ? total : 1.0);
     const double gyration_m = 0.1 * Extent();
+    constexpr double kSmallest = 1e-13;  // MuJoCo refuses less than 1e-15 kg and kg m²
     for (size_t i = 1; i < plan_.bodies.size(); ++i) {
       PlannedBody& planned = plan_.bodies[i];
       const Body& body = mechanism_.bodies[planned.body];
@@ -228,8 +229,9 @@ class Planner {
       planned.I_Bcm_B = planned.share * body.I_Bcm_B;
       if (!IsMassless(body) || planned.joints.empty()) continue;
       plan_.tiny_mass[planned.body] = true;
-      planned.mass = planned.share * tiny;
-      planned.I_Bcm_B = planned.mass * gyration_m * gyration_m * Mat3::Identity();
+      planned.mass = std::max(planned.share * tiny, kSmallest);
+      planned.I_Bcm_B =
+          std::max(planned.mass * gyration_m * gyration_m, kSmallest) * Mat3::Identity();
     }
   }
 

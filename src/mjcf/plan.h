@@ -65,7 +65,7 @@ struct Plan {
 
 /// Mass given to a massless body that cannot be merged, as a fraction of the mechanism's mass. Its
 /// radius of gyration is a tenth of the mechanism's extent at home.
-inline constexpr double kTinyMassFraction = 1e-9;
+inline constexpr double kTinyMassFraction = 1e-11;
 
 [[nodiscard]] Plan MakePlan(const Mechanism& mechanism);
 

@@ -9,10 +9,14 @@ namespace mbv::simulation {
 namespace {
 
 constexpr int kMaxNewton = 15;
-// Newton stops when the last step was so small that the next one would be round-off.
-constexpr double kSmallStep = 1e-12;
+// Newton stops when its step is round-off, or must be after a step whose square is.
+constexpr double kSmallStep = 1e-14;
+constexpr double kSmallSquare = 1e-8;
 // Below this step the factors of the previous iterate serve on, with refinement.
 constexpr double kChordStep = 1e-5;
+// Each refinement shrinks the error of factors that are kChordStep old by about kChordStep times
+// the condition: one leaves up to 1e-9 of the forces, three leave round-off.
+constexpr int kRefinements = 3;
 // A solution of Newton must be closed to this [m or rad].
 constexpr double kClosed = 1e-10;
 // Relative rank tolerance, columns of J having the natural scale of metres and radians.
@@ -52,10 +56,11 @@ void ClosureSolver::SolveInto(const VecX& b, VecX* x) {
     return;
   }
   *x = lu_.solve(b);
-  if (!stale_) return;
-  refinement_ = b;
-  refinement_.noalias() -= system_->J() * *x;
-  *x += lu_.solve(refinement_);
+  for (int i = 0; stale_ && i < kRefinements; ++i) {
+    refinement_ = b;
+    refinement_.noalias() -= system_->J() * *x;
+    *x += lu_.solve(refinement_);
+  }
 }
 
 void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
@@ -64,11 +69,12 @@ void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
     return;
   }
   *x = lu_.transpose().solve(b);
-  if (!stale_) return;
-  refinement_ = b;
-  refinement_.noalias() -= system_->J().transpose() * *x;
-  step_ = lu_.transpose().solve(refinement_);
-  *x += step_;
+  for (int i = 0; stale_ && i < kRefinements; ++i) {
+    refinement_ = b;
+    refinement_.noalias() -= system_->J().transpose() * *x;
+    step_ = lu_.transpose().solve(refinement_);
+    *x += step_;
+  }
 }
 
 RunSummary ClosureSolver::Close(const VecX& to) {
@@ -78,16 +84,15 @@ RunSummary ClosureSolver::Close(const VecX& to) {
   double size = kNan;
   for (int iteration = 0; iteration < kMaxNewton; ++iteration) {
     system_->EvaluatePosition();
-    if (iteration > 0 && size < kChordStep && regular_) {
-      stale_ = true;
-    } else {
-      Factor();
-    }
     rhs_ = -system_->residual();
+    const bool closed = rhs_.lpNorm<Eigen::Infinity>() < kClosed;
+    stale_ = iteration > 0 && size < kChordStep && regular_;
+    if (stale_ && size < kSmallSquare && closed) return RunSummary::Done();
+    if (!stale_) Factor();
     SolveInto(rhs_, &step_);
     size = step_.lpNorm<Eigen::Infinity>();
     if (!std::isfinite(size) || size > 1e3) break;
-    if (size < kSmallStep && rhs_.lpNorm<Eigen::Infinity>() < kClosed) return RunSummary::Done();
+    if (size < kSmallStep && closed) return RunSummary::Done();
     mj_integratePos(m, d->qpos, step_.data(), 1.0);
   }
   const double open = system_->residual().lpNorm<Eigen::Infinity>();
@@ -103,20 +108,19 @@ RunSummary ClosureSolver::Close(const VecX& to) {
 RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
   const mjModel& m = *system_->engine().m;
   mjData* d = system_->data();
-  const std::vector<double> start(d->qpos, d->qpos + m.nq);
+  reached_.assign(d->qpos, d->qpos + m.nq);
   RunSummary summary = Close(to);
   if (summary.ok()) return summary;
   // Walk there in steps that adapt to what Newton can bridge.
-  std::vector<double> reached = start;
   double s = 0.0, ds = 0.25;
   while (s < 1.0) {
-    std::copy(reached.begin(), reached.end(), d->qpos);
+    std::copy(reached_.begin(), reached_.end(), d->qpos);
     const double next = std::min(1.0, s + ds);
     summary = Close(from + next * (to - from));
     if (summary.ok()) {
       s = next;
       ds *= 1.5;
-      reached.assign(d->qpos, d->qpos + m.nq);
+      reached_.assign(d->qpos, d->qpos + m.nq);
     } else {
       ds *= 0.5;
       if (ds < 1e-4) return summary;

@@ -47,6 +47,7 @@ class ClosureSolver {
   Eigen::PartialPivLU<MatX> lu_;
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
   VecX rhs_, step_, bias_, refinement_;
+  std::vector<double> reached_;  // last closed configuration on the way of Follow
 };
 
 }  // namespace mbv::simulation

@@ -125,8 +125,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     mj_step(m, data);
     if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||
         data->warning[mjWARN_BADQVEL].number > 0) {
-      return Failure("MuJoCo reset the simulation, which had diverged",
-                     static_cast<double>(n) * h);
+      return Failure("MuJoCo reset the simulation, which had diverged", static_cast<double>(n) * h);
     }
   }
   s->run->loop_wall_s = std::chrono::duration<double>(Clock::now() - start).count();

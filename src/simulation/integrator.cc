@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "mjcf/mjcf.h"
+
 namespace mbv::simulation {
 namespace {
 
@@ -9,6 +11,9 @@ namespace {
 // force error that it leaves falls with R, the rounding error of the force rises with 1/R; in
 // between lie four decades where neither is seen.
 constexpr double kSoftness = 1e-5;
+// Bodies lighter than this part of the mechanism do not soften it: MuJoCo takes R from the lighter
+// of two bodies, and next to a massless one (plan.h) nothing would be held.
+constexpr double kLightest = 1e-4;
 // Repeated solutions where no force is expected yet: each reduces the error by R's share.
 constexpr int kStartRepeats = 4;
 // With redundant constraints the self-stress is only determined through R, and a force that
@@ -25,12 +30,14 @@ Integrator::Integrator(Session* session, double h)
   if (s_.solver.redundant() > 0) trust_ = kTrustIfRedundant;
   const int rows = s_.system.rows();
   for (VecX* x : {&bias_, &rate_, &aref_, &expected_, &last_force_}) x->setZero(rows);
+  largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_));
   q_ = Eigen::Map<const VecX>(d_->qpos, m_->nq);
   v_ = Eigen::Map<const VecX>(d_->qvel, m_->nv);
   a_.fill(VecX::Zero(m_->nv));
-  // Two Newton iterations: the second refines the first, the problem being quadratic.
-  session->engine.m->opt.iterations = 2;
-  session->engine.m->opt.tolerance = 0.0;
+  // The problem is quadratic and the start good: one Newton iteration solves it to round-off. The
+  // tolerance only ends its line search, which without one would hunt round-off fifty times.
+  session->engine.m->opt.iterations = 1;
+  session->engine.m->opt.tolerance = 1e-12;
 }
 
 void Integrator::Start(const DrivenSample& first) {
@@ -137,8 +144,9 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at) {
   rate_.tail(driven) -= at.velocity;
   aref_.tail(driven) += at.acceleration;
   aref_ -= b_ * rate_ + k_ * s_.system.residual();
-  Eigen::Map<VecX>(d_->efc_R, rows) *= kSoftness;
-  Eigen::Map<VecX>(d_->efc_D, rows) /= kSoftness;
+  Eigen::Map<VecX> R(d_->efc_R, rows);
+  R = kSoftness * R.cwiseMin(largest_R_);
+  Eigen::Map<VecX>(d_->efc_D, rows) = R.cwiseInverse();
   ApplyReference();
 }
 

@@ -3,6 +3,8 @@
 // Jᵀλ = τ.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
 
 #include "simulation/session.h"
@@ -10,33 +12,38 @@
 namespace mbv::simulation {
 namespace {
 
-// Positions, velocities and accelerations of the last two samples predict the next: the velocity
-// is extrapolated by the cubic through both ends and integrated.
+// Predicts the next sample's configuration: the velocity is extrapolated by the polynomial through
+// velocities and accelerations of the last (up to three) samples, equally spaced, and integrated.
 class Predictor {
  public:
   explicit Predictor(const EngineModel& engine) : engine_(engine) {}
 
   void Predict(double h, mjData* d) {
-    const Eigen::Map<const VecX> v(d->qvel, engine_.m->nv), a(d->qacc, engine_.m->nv);
-    if (known_ > 0) {
-      mean_ = v + 0.5 * h * a;
-      if (known_ > 1) {
-        const auto A = v_old_ - v + h * a;
-        const auto B = h * (a_old_ - a);
-        mean_ += 1.5 * A + 7.0 / 12.0 * B;
-      }
-      v_new_ = v + h * a;
-      AdvancePositions(engine_, h, mean_, v, v_new_, &work_, d->qpos);
-      v_old_ = v;
-      a_old_ = a;
+    const int nv = engine_.m->nv;
+    for (int i = 2; i > 0; --i) {
+      v_[i].swap(v_[i - 1]);
+      a_[i].swap(a_[i - 1]);
     }
-    known_ = std::min(known_ + 1, 2);
+    v_[0] = Eigen::Map<const VecX>(d->qvel, nv);
+    a_[0] = Eigen::Map<const VecX>(d->qacc, nv);
+    known_ = std::min(known_ + 1, 3);
+    if (known_ == 1) {
+      mean_ = v_[0] + h / 2.0 * a_[0];
+    } else if (known_ == 2) {
+      mean_ = 1.5 * v_[1] - 0.5 * v_[0] + h / 12.0 * (17.0 * a_[0] + 7.0 * a_[1]);
+    } else {
+      mean_ = (-949.0 * v_[0] + 608.0 * v_[1] + 581.0 * v_[2]) / 240.0 +
+              h / 240.0 * (637.0 * a_[0] + 1080.0 * a_[1] + 173.0 * a_[2]);
+    }
+    v_new_ = v_[0] + h * a_[0];
+    AdvancePositions(engine_, h, mean_, v_[0], v_new_, &work_, d->qpos);
   }
 
  private:
   const EngineModel& engine_;
   int known_ = 0;
-  VecX v_old_, a_old_, mean_, v_new_, work_;
+  std::array<VecX, 3> v_, a_;  // newest first
+  VecX mean_, v_new_, work_;
 };
 
 void SolveDynamics(Session* s, double t_s, VecX* tau) {

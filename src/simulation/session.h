@@ -32,6 +32,7 @@ struct Session {
   Loads loads;
   Recorder recorder;
   std::function<void(double)> progress;
+  Eigen::RowVectorXd record;  ///< one row of the trace
 };
 
 /// The modes. Start configuration: closed, at the first driven sample. Each fills the run's trace,

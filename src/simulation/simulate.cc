@@ -24,14 +24,15 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
   run->trace.witness = "simulated";
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
-  run->X_WB.resize(run->trace.time_s.size());
+  run->X_WB.assign(run->trace.time_s.size(), {});
+  for (std::vector<Pose>& X_WB : run->X_WB) X_WB.reserve(engine.mechanism->bodies.size());
+  record.setZero(run->trace.values.cols());
 }
 
 void Session::Record(size_t i) {
   const auto row = static_cast<Eigen::Index>(i);
-  Eigen::RowVectorXd values(run->trace.values.cols());
-  recorder.Record(loads, values, &run->X_WB[i]);
-  run->trace.values.row(row) = values;
+  recorder.Record(loads, record, &run->X_WB[i]);
+  run->trace.values.row(row) = record;
   run->qpos.row(row) = Eigen::Map<const Eigen::RowVectorXd>(data->qpos, engine.m->nq);
   if (progress && i % 16 == 0) {
     progress(static_cast<double>(i) / static_cast<double>(run->trace.time_s.size()));
