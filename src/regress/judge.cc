@@ -29,16 +29,24 @@ Json Part(const Json& json, const char* key) {
   return found != json.end() ? *found : Json();
 }
 
-// What summary.json says; its `reason` or "" if it is not one.
-std::string ReadSummary(const std::string& text, CaseResult* result) {
+struct SummaryText {
+  std::string reason;
+  std::string culprits;  ///< failed checks and where witnesses broke down, one per line
+};
+
+// What summary.json says; nothing if it is not one.
+SummaryText ReadSummary(const std::string& text, CaseResult* result) {
+  SummaryText words;
   const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) return "";
+  if (!json.is_object()) return words;
+  words.reason = Word(json, "reason");
   if (const std::string verdict = Word(json, "verdict"); !verdict.empty()) {
     result->verdict = verdict;
   }
   if (result->description.empty()) result->description = Word(json, "description");
   for (const Json& witness : Part(json, "witnesses")) {
     result->ran = result->ran || witness.value("ran", false);
+    words.culprits += "\n" + Word(witness, "where");
   }
   result->compared = Number(Part(json, "counts"), "pairs_compared") > 0.0;
   for (const char* list : {"checks", "checks_off"}) {
@@ -48,15 +56,17 @@ std::string ReadSummary(const std::string& text, CaseResult* result) {
       if (!check.contains("limit")) continue;
       metric.limit = Number(check, "limit");
       metric.pass = check.value("pass", false);
+      if (!metric.pass) words.culprits += "\n" + Word(check, "name");
     }
   }
   for (const Json& item : Part(json, "not_compared")) {
     result->not_compared.push_back({Word(item, "what"), Word(item, "why")});
   }
-  for (const auto& [name, version] : Part(json, "versions").items()) {
+  const Json versions = Part(json, "versions");
+  for (const auto& [name, version] : versions.items()) {
     if (version.is_string()) result->versions[name] = version;
   }
-  return Word(json, "reason");
+  return words;
 }
 
 // The line that tells what went wrong: the last one with "error", else the last one.
@@ -69,8 +79,8 @@ std::string TellingLine(const std::string& output) {
   return tail.substr(begin, tail.find('\n', begin) - begin);
 }
 
-// What is not as expected, "" if nothing.
-std::string Offence(const CaseResult& result, const std::string& output) {
+// What is not as expected, "" if nothing; `text` must have what the file says is mentioned.
+std::string Offence(const CaseResult& result, const std::string& text) {
   const Expectation& expected = result.expected;
   if (result.exit_code != expected.exit_code) {
     return fmt::format("exit code {}, expected {}", result.exit_code, expected.exit_code);
@@ -78,8 +88,8 @@ std::string Offence(const CaseResult& result, const std::string& output) {
   if (result.verdict != expected.verdict) {
     return fmt::format("verdict {}, expected {}", result.verdict, expected.verdict);
   }
-  if (WithoutControls(output).find(expected.mentions) == std::string::npos) {
-    return fmt::format("the output does not mention '{}'", expected.mentions);
+  if (WithoutControls(text).find(expected.mentions) == std::string::npos) {
+    return fmt::format("the result does not mention '{}'", expected.mentions);
   }
   return "";
 }
@@ -129,9 +139,10 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
   result.exit_code = end.exit_code;
   result.signal = end.signal;
   result.cost = end.cost;
-  std::string reason = summary ? ReadSummary(*summary, &result) : "";
+  const SummaryText words = summary ? ReadSummary(*summary, &result) : SummaryText{};
+  std::string reason = words.reason;
   if (!EndedBadly(end, timeout_s, output, &result)) {
-    const std::string offence = Offence(result, output);
+    const std::string offence = Offence(result, output + words.culprits);
     if (reason.empty()) reason = TellingLine(output);
     if (!summary && end.exit_code != 2) {
       result.status = CaseStatus::kInternal;

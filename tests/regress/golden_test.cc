@@ -24,9 +24,8 @@ ForceTrace Sine(double factor) {
 }
 
 GoldenTraces Witnesses(double analytic, double simulated, double reference) {
-  return {{"analytic", Sine(analytic)},
-          {"simulated", Sine(simulated)},
-          {"reference", Sine(reference)}};
+  return {
+      {"analytic", Sine(analytic)}, {"simulated", Sine(simulated)}, {"reference", Sine(reference)}};
 }
 
 TEST(Golden, ReadsTheForceColumnsOfEachWitness) {
@@ -61,8 +60,9 @@ TEST(Golden, ComesBackToElevenDigitsAndMuchSmaller) {
   const auto back = DecodeForces(bytes);
   ASSERT_TRUE(back);
   EXPECT_EQ(back->drives, trace.drives);
-  const double worst =
-      ((back->force - trace.force).array() / trace.force.array().abs().max(1e-300)).abs().maxCoeff();
+  const double worst = ((back->force - trace.force).array() / trace.force.array().abs().max(1e-300))
+                           .abs()
+                           .maxCoeff();
   EXPECT_LE(worst, std::ldexp(1.0, -37));
   EXPECT_LT(bytes.size(), 8U * 1000U * 3U / 4U);
 }

@@ -48,7 +48,7 @@ inline CaseResult AgreeingCase(const std::string& key, double nrmse) {
   result.reason = "all checks are within their limits";
   result.verdict = "agree";
   result.exit_code = 0;
-  result.ran = result.compared = result.verified = true;
+  result.ran = result.compared = result.verified = result.has_folder = true;
   result.metrics["simulated_vs_analytic.force_nrmse"] = {nrmse, 1e-6, nrmse <= 1e-6};
   result.versions["mbverify"] = "0.1.0";
   result.cost = {1.5, 1.25, 51200};

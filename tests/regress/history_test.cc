@@ -1,0 +1,222 @@
+// The history: whole runs only, whoever writes or is killed; drift and movements told from it.
+#include "regress/history.h"
+
+#include <signal.h>
+#include <sys/wait.h>
+
+#include <cmath>
+#include <thread>
+
+#include "regress/database.h"
+#include "regress_fixture.h"
+
+namespace mbv {
+namespace {
+
+constexpr const char* kFile = "history.sqlite";
+
+class HistoryTest : public FolderTest {
+ protected:
+  // Appends one run of one scenario; the run as judged.
+  static RegressReport Night(double nrmse, const std::string& label = "",
+                             const GoldenTraces& golden = {}, const std::string& inputs = "1111") {
+    CaseResult result = AgreeingCase("model/case", nrmse);
+    result.inputs = inputs;
+    RegressReport report = OneRun({result}, label);
+    std::map<std::string, GoldenTraces> goldens;
+    if (!golden.empty()) goldens["model/case"] = golden;
+    EXPECT_EQ(AppendRun(kFile, goldens, &report), "");
+    return report;
+  }
+  static const std::vector<Drift>& DriftsOf(const RegressReport& report) {
+    return report.cases.front().drifts;
+  }
+  static long Count(const std::string& sql) {
+    Database database(kFile, Database::Mode::kRead);
+    Statement select(&database, sql);
+    const long count = select.Step() ? select.Integer(0) : -1;
+    EXPECT_EQ(database.trouble(), "");
+    return count;
+  }
+  static GoldenTraces Forces(double analytic, double simulated) {
+    const auto trace = [](double factor) {
+      ForceTrace t{{"leg"}, MatX(100, 1)};
+      for (int i = 0; i < 100; ++i) t.force(i, 0) = factor * (1000.0 + i);
+      return t;
+    };
+    return {{"analytic", trace(analytic)}, {"simulated", trace(simulated)}};
+  }
+};
+
+TEST_F(HistoryTest, RunsAreNumberedAndTheirCourseComesBack) {
+  EXPECT_EQ(Night(1e-9).run.id, 1);
+  EXPECT_EQ(Night(2e-9).run.id, 2);
+  const RegressReport third = Night(3e-9);
+  EXPECT_EQ(third.run.id, 3);
+  EXPECT_EQ(third.cases.front().course, (std::vector<double>{1e-9, 2e-9, 3e-9}));
+}
+
+TEST_F(HistoryTest, TenTimesWorseInsideItsLimitIsDriftWithTheRunItBegan) {
+  for (int i = 0; i < 4; ++i) EXPECT_TRUE(DriftsOf(Night(1e-9)).empty());
+  const RegressReport fifth = Night(2e-8, "commit-five");
+  ASSERT_EQ(DriftsOf(fifth).size(), 1U);
+  EXPECT_TRUE(fifth.cases.front().verified) << "inside its limit of 1e-6";
+  EXPECT_EQ(DriftsOf(fifth)[0].metric, "simulated_vs_analytic.force_nrmse");
+  EXPECT_EQ(CountCases(fifth).drifted, 1);
+  const RegressReport sixth = Night(2e-8, "commit-six");
+  ASSERT_EQ(DriftsOf(sixth).size(), 1U);
+  EXPECT_EQ(DriftsOf(sixth)[0].since_run, 5);
+  EXPECT_NE(DriftsOf(sixth)[0].since.find("commit-five"), std::string::npos);
+  EXPECT_NE(DriftsOf(sixth)[0].since.find("build 0123abcd"), std::string::npos);
+}
+
+TEST_F(HistoryTest, AFiveTimesWorseNightIsNoDrift) {
+  for (int i = 0; i < 4; ++i) Night(1e-9);
+  EXPECT_TRUE(DriftsOf(Night(5e-9)).empty());
+}
+
+TEST_F(HistoryTest, AcceptingARunStartsANewBaseline) {
+  for (int i = 0; i < 4; ++i) Night(1e-9);
+  Night(2e-8);
+  EXPECT_EQ(AcceptRun(kFile, "last", "", "a coarser step").trouble, "");
+  EXPECT_TRUE(DriftsOf(Night(2e-8)).empty());
+  EXPECT_EQ(DriftsOf(Night(3e-7)).size(), 1U);
+  EXPECT_NE(AcceptRun(kFile, "last", "model/unknown", "").trouble, "");
+}
+
+TEST_F(HistoryTest, SaysWhichWitnessTookAStepOnce) {
+  EXPECT_TRUE(DriftsOf(Night(1e-9, "", Forces(1, 1))).empty());
+  const RegressReport analytic = Night(1e-9, "", Forces(1.001, 1));
+  ASSERT_EQ(DriftsOf(analytic).size(), 1U);
+  EXPECT_NE(DriftsOf(analytic)[0].text.find("analytic moved"), std::string::npos);
+  EXPECT_NE(DriftsOf(analytic)[0].text.find("files are the same"), std::string::npos);
+  EXPECT_TRUE(DriftsOf(Night(1e-9, "", Forces(1.001, 1))).empty());
+  const RegressReport simulated = Night(1e-9, "", Forces(1.001, 1.001));
+  EXPECT_NE(DriftsOf(simulated).at(0).text.find("simulation moved"), std::string::npos);
+  const RegressReport both = Night(1e-9, "", Forces(2, 2), "2222");
+  EXPECT_NE(DriftsOf(both).at(0).text.find("both moved"), std::string::npos);
+  EXPECT_NE(DriftsOf(both).at(0).text.find("model file changed"), std::string::npos);
+}
+
+TEST_F(HistoryTest, EqualNightsShareOneCopyOfTheirTraces) {
+  for (int i = 0; i < 5; ++i) Night(1e-9, "", Forces(1, 2));
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM golden"), 10);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM trace"), 2);
+}
+
+TEST_F(HistoryTest, OldTracesAreDroppedNotOldNumbers) {
+  HistoryOptions options;
+  options.golden_runs = 3;
+  for (int i = 0; i < 6; ++i) {
+    RegressReport report = OneRun({AgreeingCase("model/case", 1e-9)});
+    ASSERT_EQ(AppendRun(kFile, {{"model/case", Forces(1 + i, 1)}}, &report, options), "");
+  }
+  EXPECT_EQ(Count("SELECT COUNT(DISTINCT result) FROM golden"), 3);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM trace"), 4);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM run"), 6);
+}
+
+TEST_F(HistoryTest, TwoWritersAtOnceLoseNothing) {
+  constexpr int kWriters = 2, kRuns = 15;
+  std::vector<pid_t> children;
+  for (int w = 0; w < kWriters; ++w) {
+    const pid_t pid = fork();
+    if (pid == 0) {
+      int bad = 0;
+      for (int i = 0; i < kRuns; ++i) {
+        RegressReport report = OneRun({AgreeingCase("model/case", 1e-9)}, std::to_string(w));
+        bad += AppendRun(kFile, {{"model/case", Forces(w + 1, i + 1)}}, &report).empty() ? 0 : 1;
+      }
+      _exit(bad);
+    }
+    children.push_back(pid);
+  }
+  for (const pid_t pid : children) {
+    int status = 0;
+    waitpid(pid, &status, 0);
+    EXPECT_TRUE(WIFEXITED(status));
+    EXPECT_EQ(WEXITSTATUS(status), 0);
+  }
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM run"), kWriters * kRuns);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM result"), kWriters * kRuns);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM golden"), 2 * kWriters * kRuns);
+}
+
+// A process is killed at many moments of its writing; what is there afterwards are whole runs.
+TEST_F(HistoryTest, KillingAWriterLeavesWholeRunsOnly) {
+  constexpr int kCases = 40;
+  const auto night = [] {
+    std::vector<CaseResult> cases;
+    std::map<std::string, GoldenTraces> goldens;
+    for (int i = 0; i < kCases; ++i) {
+      cases.push_back(AgreeingCase("model/case" + std::to_string(i), 1e-9));
+      goldens[cases.back().key] = Forces(i + 1, i + 2);
+    }
+    RegressReport report = OneRun(std::move(cases));
+    return AppendRun(kFile, goldens, &report);
+  };
+  ASSERT_EQ(night(), "");
+  for (int moment = 0; moment < 25; ++moment) {
+    const pid_t pid = fork();
+    if (pid == 0) {
+      while (night().empty()) {
+      }
+      _exit(1);
+    }
+    std::this_thread::sleep_for(std::chrono::microseconds(3000 + 1700 * moment));
+    kill(pid, SIGKILL);
+    int status = 0;
+    waitpid(pid, &status, 0);
+    ASSERT_TRUE(WIFSIGNALED(status)) << "the writer must die while writing";
+    ASSERT_EQ(Count("SELECT COUNT(*) FROM run") * kCases, Count("SELECT COUNT(*) FROM result"));
+    ASSERT_EQ(Count("SELECT COUNT(*) FROM run WHERE total = 0"), 0);
+    ASSERT_EQ(Count("SELECT COUNT(*) FROM metric"), Count("SELECT COUNT(*) FROM result"));
+    ASSERT_EQ(Count("SELECT COUNT(*) FROM pragma_integrity_check WHERE integrity_check <> 'ok'"),
+              0);
+  }
+  const long before = Count("SELECT COUNT(*) FROM run");
+  ASSERT_EQ(night(), "") << "and the next run writes as if nothing had happened";
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM run"), before + 1);
+}
+
+TEST_F(HistoryTest, ComparesTwoRunsByStatusNumbersAndWitness) {
+  Night(1e-9, "", Forces(1, 1));
+  Night(4e-9, "", Forces(1, 1.5));
+  const HistoryText text = CompareRuns(kFile, "last~1", "last");
+  EXPECT_EQ(text.trouble, "");
+  EXPECT_NE(text.text.find("1.00e-09 → 4.00e-09"), std::string::npos) << text.text;
+  EXPECT_NE(text.text.find("×4"), std::string::npos);
+  EXPECT_NE(text.text.find("simulation moved"), std::string::npos);
+  EXPECT_NE(CompareRuns(kFile, "7", "last").trouble.find("no run '7'"), std::string::npos);
+  EXPECT_NE(CompareRuns(kFile, "last~9", "last").trouble, "");
+  EXPECT_NE(CompareRuns(kFile, "lastly", "last").trouble, "");
+}
+
+TEST_F(HistoryTest, ExportsOneLinePerMetricAndRun) {
+  Night(1e-9, "a, \"b\"");
+  const HistoryText csv = HistoryCsv(kFile);
+  EXPECT_EQ(csv.trouble, "");
+  EXPECT_EQ(csv.text.substr(csv.text.find('\n') + 1),
+            "1,2026-01-31T02:00:00Z,\"a, \"\"b\"\"\",mbverify 0.1.0 build 0123abcd,model/case,"
+            "as_expected,agree,0,1.5,1.25,51200,simulated_vs_analytic.force_nrmse,"
+            "1.0000000000000001e-09,9.9999999999999995e-07,1,0\n");
+}
+
+TEST_F(HistoryTest, AForeignOrNewerFileIsRefusedAndLeftAlone) {
+  Write(kFile, "this is no database, but long enough to look at");
+  RegressReport report = OneRun({AgreeingCase("model/case", 1e-9)});
+  EXPECT_NE(AppendRun(kFile, {}, &report), "");
+  EXPECT_EQ(Read(kFile), "this is no database, but long enough to look at");
+  std::filesystem::remove(kFile);
+  Night(1e-9);
+  {
+    Database database(kFile, Database::Mode::kWrite);
+    database.Run("PRAGMA user_version = 99");
+    ASSERT_TRUE(database.ok());
+  }
+  EXPECT_NE(AppendRun(kFile, {}, &report).find("schema 99"), std::string::npos);
+  EXPECT_NE(ListRuns("missing.sqlite").trouble, "");
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,281 @@
+// Whole regressions with a fake worker: what it does is written in the scenario's file name.
+#include "regress/regress.h"
+
+#include <sys/wait.h>
+
+#include <cmath>
+
+#include "regress/history.h"
+#include "regress_fixture.h"
+
+namespace mbv {
+namespace {
+
+// worker run FILE --out DIR [--no-pictures]
+constexpr const char* kWorker = R"sh(#!/bin/sh
+name=$(basename "$2" .yaml)
+echo "$name" >> calls.txt
+result() {
+  mkdir -p "$dir/m/$name"
+  echo "{\"verdict\": \"$1\", \"reason\": \"made up\", \"exit_code\": $2, \"witnesses\":
+    [{\"name\": \"analytic\", \"ran\": true}], \"counts\": {\"pairs_compared\": 1}, \"checks\":
+    [{\"name\": \"simulated_vs_analytic.force_nrmse\", \"value\": 1e-9, \"limit\": 1e-6,
+    \"pass\": true}, {\"name\": \"simulated.closure_m\", \"value\": 1, \"limit\": 0.1,
+    \"pass\": false}], \"versions\": {\"mbverify\": \"0.1.0\"}}" > "$dir/m/$name/summary.json"
+  printf 'time_s,leg.force.analytic\n0,1\n1,2\n' > "$dir/m/$name/traces.csv"
+}
+dir=$4
+case $name in
+  agree*) result agree 0; echo "all is well"; exit 0;;
+  disagree*) result disagree 1; echo "mass is wrong"; exit 1;;
+  not_run*) result not_run 3; echo "out of reach"; exit 3;;
+  bad*) echo "x.yaml:1: error: bad input" >&2; exit 2;;
+  crash*) result agree 0; kill -SEGV $$; sleep 5;;
+  hang*) sleep 60 & sleep 60;;
+  internal*) echo "internal error: demand failed" >&2; exit 4;;
+  silent*) exit 0;;
+esac
+)sh";
+
+class RegressTest : public FolderTest {
+ protected:
+  void SetUp() override {
+    FolderTest::SetUp();
+    Write("worker", kWorker);
+    std::filesystem::permissions("worker", std::filesystem::perms::owner_all);
+    options_.out = "out";
+    options_.worker = {(folder_ / "worker").string()};
+    options_.jobs = 2;
+    options_.timeout_s = 20.0;
+  }
+  // Adds a scenario of the fake model m.
+  static void Scenario(const std::string& name, const std::string& expect = "verdict: agree") {
+    Write("scenarios/m/" + name + ".yaml",
+          "mechanism: m\ndescription: made up\nexpect: {" + expect + "}\n");
+  }
+  RegressOutcome RunAll() { return Regress(options_, {}); }
+  static const CaseResult& CaseOf(const RegressOutcome& outcome, const std::string& key) {
+    for (const CaseResult& result : outcome.report.cases) {
+      if (result.key == key) return result;
+    }
+    ADD_FAILURE() << "no case " << key;
+    return outcome.report.cases.front();
+  }
+  static int Calls() {
+    const std::string calls = Read("calls.txt");
+    return static_cast<int>(std::count(calls.begin(), calls.end(), '\n'));
+  }
+  RegressOptions options_;
+};
+
+TEST_F(RegressTest, EverythingAsExpectedIsExitCode0WithAllFiles) {
+  Scenario("agree");
+  Scenario("must_fail/disagree", "verdict: disagree, mentions: mass is wrong");
+  Scenario("must_fail/not_run", "verdict: not_run, mentions: out of reach");
+  Scenario("must_fail/bad", "exit_code: 2, mentions: bad input");
+  const RegressOutcome outcome = RunAll();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.trouble;
+  const Counts counts = CountCases(outcome.report);
+  EXPECT_EQ(counts.as_expected, 4);
+  EXPECT_EQ(counts.must_fail, 3);
+  EXPECT_EQ(counts.ran, 3);
+  EXPECT_EQ(counts.verified, 1);
+  for (const char* file : {"out/junit.xml", "out/summary.md", "out/index.html", "out/regress.json",
+                           "out/m/agree/summary.json", "out/logs/m/must_fail/bad.txt"}) {
+    EXPECT_TRUE(std::filesystem::exists(file)) << file;
+  }
+  EXPECT_FALSE(std::filesystem::exists("out/.work"));
+  EXPECT_GT(CaseOf(outcome, "m/agree").cost.peak_kib, 0);
+  EXPECT_EQ(CaseOf(outcome, "m/must_fail/bad").not_compared.size(), 1U);
+}
+
+TEST_F(RegressTest, OtherVerdictExitCodeOrTextFails) {
+  Scenario("agree", "verdict: disagree");
+  Scenario("disagree");
+  Scenario("disagree_other", "verdict: disagree, mentions: inertia is wrong");
+  Scenario("agree_fine");
+  const RegressOutcome outcome = RunAll();
+  EXPECT_EQ(outcome.exit_code, 1);
+  EXPECT_EQ(CaseOf(outcome, "m/agree").status, CaseStatus::kUnexpected);
+  EXPECT_EQ(CaseOf(outcome, "m/disagree").reason, "exit code 1, expected 0: made up");
+  EXPECT_EQ(CaseOf(outcome, "m/disagree_other").reason,
+            "the result does not mention 'inertia is wrong': made up");
+  EXPECT_EQ(CountCases(outcome.report).as_expected, 1);
+}
+
+TEST_F(RegressTest, NamesOfFailedChecksCountAsMentioned) {
+  Scenario("disagree", "verdict: disagree, mentions: simulated.closure_m");
+  EXPECT_EQ(RunAll().exit_code, 0);
+  Scenario("disagree", "verdict: disagree, mentions: simulated_vs_analytic.force_nrmse");
+  EXPECT_EQ(RunAll().exit_code, 1) << "that check passed";
+}
+
+TEST_F(RegressTest, CrashHangAndWorseAreFailedScenariosWithReasons) {
+  Scenario("agree");
+  Scenario("crash");
+  Scenario("hang");
+  Scenario("internal");
+  Scenario("silent");
+  options_.timeout_s = 1.0;
+  const RegressOutcome outcome = RunAll();
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_EQ(CaseOf(outcome, "m/agree").status, CaseStatus::kAsExpected);
+  EXPECT_EQ(CaseOf(outcome, "m/crash").status, CaseStatus::kCrashed);
+  EXPECT_EQ(CaseOf(outcome, "m/crash").reason, "killed by signal 11 (Segmentation fault)");
+  EXPECT_EQ(CaseOf(outcome, "m/hang").status, CaseStatus::kTimedOut);
+  EXPECT_EQ(CaseOf(outcome, "m/hang").reason, "no end after 1 s: killed");
+  EXPECT_LT(CaseOf(outcome, "m/hang").cost.wall_s, 5.0);
+  EXPECT_EQ(CaseOf(outcome, "m/internal").reason, "exit code 4: internal error: demand failed");
+  EXPECT_EQ(CaseOf(outcome, "m/silent").reason, "exit code 0 but no summary.json");
+}
+
+TEST_F(RegressTest, AWorkerThatCannotStartIsToldAsSuch) {
+  Scenario("agree");
+  options_.worker = {"./no_such_program"};
+  const RegressOutcome outcome = RunAll();
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(CaseOf(outcome, "m/agree").reason.find("No such file"), std::string::npos);
+}
+
+TEST_F(RegressTest, BadInputRunsNothing) {
+  EXPECT_EQ(RunAll().exit_code, 2);
+  std::filesystem::create_directories("scenarios/empty");
+  EXPECT_NE(RunAll().trouble.find("no scenario in this folder"), std::string::npos);
+  Scenario("agree");
+  Write("copy/scenarios/m/agree.yaml", "mechanism: m\n");
+  options_.paths = {"scenarios", "copy"};
+  EXPECT_NE(RunAll().trouble.find("same name 'm/agree'"), std::string::npos);
+  EXPECT_EQ(Calls(), 0);
+}
+
+TEST_F(RegressTest, AScenarioThatIsNoYamlAnyMoreDoesNotDropOut) {
+  Scenario("agree");
+  Write("scenarios/m/bad.yaml", "mechanism: m\nmotion: {a: [\n");
+  const RegressOutcome outcome = RunAll();
+  EXPECT_EQ(outcome.exit_code, 2);
+  EXPECT_EQ(CaseOf(outcome, "m/bad").status, CaseStatus::kBadInput);
+}
+
+TEST_F(RegressTest, ResumeRunsOnlyWhatIsUnfinishedOrChanged) {
+  for (const char* name : {"agree1", "agree2", "agree3", "disagree", "crash"}) Scenario(name);
+  // Stopped after three scenarios, as by a signal.
+  volatile std::sig_atomic_t stop = 0;
+  options_.stop = &stop;
+  options_.jobs = 1;
+  int ended = 0;
+  RegressProgress progress;
+  progress.ended = [&](const CaseResult&) { stop = ++ended == 3 ? 1 : 0; };
+  const RegressOutcome first = Regress(options_, progress);
+  EXPECT_EQ(first.exit_code, 3);
+  EXPECT_NE(first.trouble.find("interrupted after 3 of 5"), std::string::npos) << first.trouble;
+  EXPECT_EQ(Calls(), 3);
+  stop = 0;
+  Write("scenarios/m/agree2.yaml", "mechanism: m\nexpect: {verdict: agree}\n# changed\n");
+  options_.resume = true;
+  const RegressOutcome second = RunAll();
+  EXPECT_EQ(second.report.cases.size(), 5U);
+  EXPECT_EQ(second.exit_code, 3);
+  EXPECT_TRUE(CaseOf(second, "m/agree1").kept);
+  EXPECT_FALSE(CaseOf(second, "m/agree2").kept) << "its file changed";
+  // crash (again), disagree or what was left, agree2, agree3: agree1 alone is kept with one more.
+  const int kept =
+      static_cast<int>(std::count_if(second.report.cases.begin(), second.report.cases.end(),
+                                     [](const CaseResult& result) { return result.kept; }));
+  EXPECT_EQ(Calls(), 3 + 5 - kept);
+  EXPECT_FALSE(CaseOf(second, "m/crash").kept) << "what crashed is tried again";
+}
+
+TEST_F(RegressTest, ResumeAfterKill9KeepsWhatWasFinished) {
+  for (const char* name : {"agree1", "agree2", "hang"}) Scenario(name);
+  options_.jobs = 1;
+  const pid_t pid = fork();
+  if (pid == 0) {
+    (void)RunAll();
+    _exit(0);
+  }
+  for (int i = 0; i < 400 && !std::filesystem::exists("out/.state/m/agree2.json"); ++i) {
+    usleep(10000);
+  }
+  kill(pid, SIGKILL);
+  waitpid(pid, nullptr, 0);
+  Scenario("hang", "verdict: agree, mentions: nothing");
+  std::filesystem::remove("scenarios/m/hang.yaml");
+  Scenario("agree3");
+  options_.resume = true;
+  const RegressOutcome outcome = RunAll();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.trouble;
+  EXPECT_TRUE(CaseOf(outcome, "m/agree1").kept);
+  EXPECT_TRUE(CaseOf(outcome, "m/agree2").kept);
+  EXPECT_FALSE(CaseOf(outcome, "m/agree3").kept);
+}
+
+// What must not depend on how the work was split: everything but times and the shard's name.
+std::string Comparable(RegressReport report) {
+  report.run = {};
+  for (CaseResult& result : report.cases) result.cost = {};
+  return ToJson(report);
+}
+
+TEST_F(RegressTest, ShardsMergedEqualOneRun) {
+  for (const char* name : {"agree1", "agree2", "agree3", "disagree", "bad", "not_run"}) {
+    Scenario(name);
+  }
+  options_.history = "whole.sqlite";
+  const RegressOutcome whole = RunAll();
+  options_.history.clear();
+  std::vector<std::string> folders;
+  size_t cases = 0;
+  for (int i = 1; i <= 4; ++i) {
+    options_.shard = {i, 4};
+    options_.out = "shard" + std::to_string(i);
+    folders.push_back(options_.out);
+    const RegressOutcome shard = RunAll();
+    EXPECT_LE(shard.report.cases.size(), 2U);
+    cases += shard.report.cases.size();
+  }
+  EXPECT_EQ(cases, 6U);
+  options_.out = "joined";
+  options_.history = "joined.sqlite";
+  const RegressOutcome joined = MergeRuns(folders, options_);
+  EXPECT_EQ(joined.exit_code, whole.exit_code);
+  EXPECT_EQ(Comparable(joined.report), Comparable(whole.report));
+  EXPECT_TRUE(std::filesystem::exists("joined/m/agree2/traces.csv"));
+  EXPECT_TRUE(std::filesystem::exists("joined/logs/m/bad.txt"));
+  EXPECT_NE(ListRuns("joined.sqlite").text.find("3/6"), std::string::npos);
+  EXPECT_NE(MergeRuns({"shard1", "shard1"}, options_).trouble.find("too"), std::string::npos);
+  EXPECT_EQ(MergeRuns({"nowhere"}, options_).exit_code, 2);
+}
+
+TEST_F(RegressTest, TwoRunsInOneFolderAreRefused) {
+  Scenario("hang");
+  Scenario("agree");
+  options_.timeout_s = 2.0;
+  const pid_t pid = fork();
+  if (pid == 0) _exit(RunAll().exit_code);
+  for (int i = 0; i < 200 && !std::filesystem::exists("calls.txt"); ++i) usleep(10000);
+  const RegressOutcome second = RunAll();
+  EXPECT_EQ(second.exit_code, 2);
+  EXPECT_NE(second.trouble.find("in use"), std::string::npos);
+  int status = 0;
+  waitpid(pid, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 3);
+}
+
+TEST(Shard, IsIOfN) {
+  const auto shard = ParseShard("2/3");
+  ASSERT_TRUE(shard);
+  EXPECT_EQ(shard->index, 2);
+  EXPECT_EQ(shard->count, 3);
+  for (const char* bad : {"", "2", "0/3", "4/3", "1/3x", "a/3", "1/", "-1/3"}) {
+    EXPECT_FALSE(ParseShard(bad)) << bad;
+  }
+}
+
+TEST(CaseKey, IsTheSameFromEveryFolder) {
+  EXPECT_EQ(CaseKey("/x/scenarios/m/must_fail/a.yaml"), "m/must_fail/a");
+  EXPECT_EQ(CaseKey("/x/scenarios/old/scenarios/m/a.yaml"), "m/a");
+  EXPECT_EQ(CaseKey("mine/a.yaml"), "mine/a");
+}
+
+}  // namespace
+}  // namespace mbv

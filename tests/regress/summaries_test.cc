@@ -1,0 +1,164 @@
+// JUnit, Markdown, index.html and regress.json of a made-up run.
+#include "regress/summaries.h"
+
+#include <tinyxml2.h>
+
+#include <nlohmann/json.hpp>
+
+#include "regress_fixture.h"
+
+namespace mbv {
+namespace {
+
+constexpr const char* kGoldenFolder = MBV_SOURCE_DIR "/tests/regress/golden/";
+
+// One of each kind.
+RegressReport Mixed() {
+  CaseResult good = AgreeingCase("model/good", 2e-9);
+  CaseResult drifted = AgreeingCase("model/drifted", 5e-8);
+  drifted.drifts.push_back({"simulated_vs_analytic.force_nrmse", "25 times the median", 5e-8, 2e-9,
+                            7, "run 7 of 2026-01-30T02:00:00Z"});
+  drifted.course = {2e-9, 2e-9, 5e-8};
+  CaseResult must_fail = AgreeingCase("model/must_fail/mass", 1e-3);
+  must_fail.expected = {"disagree", 1, "simulation and reference agree"};
+  must_fail.verdict = "disagree";
+  must_fail.exit_code = 1;
+  must_fail.verified = false;
+  must_fail.reason = "1 of 38 checks is not within its limit";
+  CaseResult wrong = AgreeingCase("other/wrong", 1e-3);
+  wrong.status = CaseStatus::kUnexpected;
+  wrong.verdict = "disagree";
+  wrong.exit_code = 1;
+  wrong.verified = false;
+  wrong.reason = "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ\x01";
+  wrong.log_tail = "line 1\nline 2 \xff <b>";
+  CaseResult hung = AgreeingCase("other/hung", kNan);
+  hung.metrics.clear();
+  hung.status = CaseStatus::kTimedOut;
+  hung.verdict = "not_run";
+  hung.exit_code = -1;
+  hung.signal = 9;
+  hung.ran = hung.compared = hung.verified = false;
+  hung.reason = "no end after 300 s: killed";
+  hung.not_compared.push_back({"everything", hung.reason});
+  RegressReport report = OneRun({good, drifted, must_fail, hung, wrong}, "abc123");
+  report.run.id = 8;
+  return report;
+}
+
+// Differences to a golden file; MBV_UPDATE_GOLDEN=1 writes it.
+void ExpectGolden(const std::string& name, const std::string& text) {
+  const std::string path = kGoldenFolder + name;
+  if (std::getenv("MBV_UPDATE_GOLDEN") != nullptr) {
+    ASSERT_EQ(WriteDurably(path, text), "");
+  }
+  EXPECT_EQ(ReadWholeFile(path).value_or("(missing)"), text);
+}
+
+TEST(JUnit, IsTheGoldenFile) { ExpectGolden("junit.xml", ToJUnit(Mixed())); }
+
+TEST(JUnit, CountsMatchItsElements) {
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);
+  const auto* root = document.FirstChildElement("testsuites");
+  ASSERT_NE(root, nullptr);
+  EXPECT_EQ(root->IntAttribute("tests"), 5);
+  EXPECT_EQ(root->IntAttribute("failures"), 1);
+  EXPECT_EQ(root->IntAttribute("errors"), 1);
+  int suites = 0, cases = 0, failures = 0, errors = 0;
+  for (const auto* suite = root->FirstChildElement("testsuite"); suite != nullptr;
+       suite = suite->NextSiblingElement("testsuite")) {
+    ++suites;
+    int in_suite = 0;
+    for (const auto* test = suite->FirstChildElement("testcase"); test != nullptr;
+         test = test->NextSiblingElement("testcase")) {
+      ++in_suite;
+      failures += test->FirstChildElement("failure") != nullptr ? 1 : 0;
+      errors += test->FirstChildElement("error") != nullptr ? 1 : 0;
+      EXPECT_NE(test->Attribute("name"), nullptr);
+      EXPECT_STREQ(test->Attribute("classname"), suite->Attribute("name"));
+    }
+    EXPECT_EQ(in_suite, suite->IntAttribute("tests"));
+    cases += in_suite;
+  }
+  EXPECT_EQ(suites, 2);
+  EXPECT_EQ(cases, 5);
+  EXPECT_EQ(failures, 1);
+  EXPECT_EQ(errors, 1);
+}
+
+TEST(JUnit, AwkwardTextArrivesUnchanged) {
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);
+  const auto* suite = document.FirstChildElement("testsuites")->LastChildElement("testsuite");
+  const auto* failure = suite->LastChildElement("testcase")->FirstChildElement("failure");
+  ASSERT_NE(failure, nullptr);
+  EXPECT_STREQ(failure->Attribute("message"),
+               "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ");
+}
+
+TEST(EscapeXml, DropsWhatXmlCannotHold) {
+  EXPECT_EQ(EscapeXml("a\x01"
+                      "b\x1b\xff\xc0\x80"
+                      "c"),
+            "abc");
+  EXPECT_EQ(EscapeXml("6° – 數"), "6° – 數");
+  EXPECT_EQ(EscapeXml("\xed\xa0\x80\xef\xbf\xbf"
+                      "x\xe2\x82"),
+            "x");
+}
+
+TEST(Markdown, IsTheGoldenFile) { ExpectGolden("summary.md", ToMarkdown(Mixed())); }
+
+TEST(RegressJson, ComesBackTheSame) {
+  const std::string json = ToJson(Mixed());
+  const auto back = ReportFromJson(json);
+  ASSERT_TRUE(back);
+  EXPECT_EQ(ToJson(*back), json);
+  EXPECT_FALSE(ReportFromJson(json.substr(0, json.size() / 2)));
+  EXPECT_FALSE(ReportFromJson("{\"schema\": \"another\"}"));
+}
+
+TEST(RegressJson, CountsRanComparedAndVerifiedSeparately) {
+  const auto counts = nlohmann::json::parse(ToJson(Mixed())).at("counts");
+  EXPECT_EQ(counts.at("total"), 5);
+  EXPECT_EQ(counts.at("as_expected"), 3);
+  EXPECT_EQ(counts.at("ran"), 4);
+  EXPECT_EQ(counts.at("compared"), 4);
+  EXPECT_EQ(counts.at("verified"), 2);
+  EXPECT_EQ(counts.at("must_fail_as_expected"), 1);
+  EXPECT_EQ(counts.at("drifted"), 1);
+}
+
+TEST(ExitCode, IsTheWorstOfAllScenarios) {
+  RegressReport report = Mixed();
+  EXPECT_EQ(ExitCodeOf(report), 3);  // one hung
+  report.cases.erase(report.cases.begin() + 3);
+  EXPECT_EQ(ExitCodeOf(report), 1);
+  report.cases.pop_back();
+  EXPECT_EQ(ExitCodeOf(report), 0);
+  report.cases[0].status = CaseStatus::kBadInput;
+  EXPECT_EQ(ExitCodeOf(report), 2);
+}
+
+TEST(IndexHtml, HasOneRowPerScenarioAndNeedsNothingElse) {
+  const std::string html = ToIndexHtml(Mixed(), {{"model/good", "data:image/png;base64,AAAA"}});
+  size_t rows = 0;
+  for (size_t at = html.find("<tr data-kind"); at != std::string::npos;
+       at = html.find("<tr data-kind", at + 1)) {
+    ++rows;
+  }
+  EXPECT_EQ(rows, 5U);
+  EXPECT_NE(html.find("src=\"data:image/png;base64,AAAA\""), std::string::npos);
+  EXPECT_NE(html.find("<polyline class=\"curve\""), std::string::npos);
+  EXPECT_NE(html.find("href=\"model/good/report.html\""), std::string::npos);
+  EXPECT_NE(html.find("&lt;forces&gt; &amp; &quot;moments&quot;"), std::string::npos);
+  for (const char* foreign : {"http://", "https://", "<link", "@import", "src=\"/"}) {
+    EXPECT_EQ(html.find(foreign), std::string::npos) << foreign;
+  }
+}
+
+TEST(Thumbnail, WhatIsNoPngHasNone) { EXPECT_EQ(ThumbnailUri("no picture", 100), ""); }
+
+}  // namespace
+}  // namespace mbv
