@@ -11,8 +11,7 @@
 
 namespace mbv::laws {
 
-/// Rounding of a few hundred operations at a pose that amplifies errors by `condition` in the
-/// force map and once more in the acceleration map.
+/// Rounding of about a thousand operations, amplified by the pose (State::condition).
 [[nodiscard]] inline double Rounding(double condition) { return 1e3 * kEps * (1 + condition); }
 
 /// Loops and forward solutions stop at a residual of at most 1e-13 m; the pose, and with it the

@@ -69,19 +69,6 @@ Subject MakeSubject(const std::string& model, const std::string& scenario) {
   return s;
 }
 
-const std::map<std::string, Subject>& Subjects() {
-  static const auto subjects = [] {
-    std::map<std::string, Subject> all;
-    for (const std::string& model : ModelNames()) {
-      for (const std::string& scenario : ScenariosOf(model)) {
-        all.emplace(model + "_" + scenario, MakeSubject(model, scenario));
-      }
-    }
-    return all;
-  }();
-  return subjects;
-}
-
 // Largest singular value over the smallest, with metres divided by the mechanism's length.
 double ConditionOf(const Subject& subject, const CommandSample& at) {
   MatX J = DriveJacobian(subject, at);
@@ -317,7 +304,20 @@ std::vector<std::string> SubjectNames() {
   return names;
 }
 
-const Subject& SubjectOf(const std::string& name) { return Subjects().at(name); }
+const Subject& SubjectOf(const std::string& name) {
+  static std::map<std::string, Subject> cache;
+  const auto found = cache.find(name);
+  if (found != cache.end()) return found->second;
+  for (const std::string& model : ModelNames()) {
+    for (const std::string& scenario : ScenariosOf(model)) {
+      if (model + "_" + scenario == name) {
+        return cache.emplace(name, MakeSubject(model, scenario)).first->second;
+      }
+    }
+  }
+  MBV_DEMAND(false, name);
+  return cache.begin()->second;
+}
 
 const std::string& NameOf(Regime regime) {
   static const std::string names[] = {"first_sample", "close_by", "random", "near_singular"};
