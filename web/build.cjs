@@ -13,6 +13,11 @@ function literal(text) {
   return pieces.map((piece) => `R"mbv(${piece})mbv"`).join('\n');
 }
 
+// The licences ask for their text in every copy.
+const packages = process.env.NODE_PATH.split(path.delimiter)[0];
+const licences = ['three', 'uplot'].map((name) =>
+    `${name}\n${fs.readFileSync(path.join(packages, name, 'LICENSE'), 'utf8').trim()}`);
+
 const bundle = esbuild.buildSync({
   entryPoints: [path.join(__dirname, 'src', 'report.js')],
   bundle: true,
@@ -20,6 +25,7 @@ const bundle = esbuild.buildSync({
   minify: true,
   charset: 'ascii',
   legalComments: 'none',
+  banner: {js: `/*\n${licences.join('\n\n')}\n*/`},
   target: ['es2020'],
   format: 'iife',
   outdir: 'bundle',

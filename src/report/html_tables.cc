@@ -185,7 +185,7 @@ std::string EnergyHtml(const Report& report) {
                        double peak_w) {
     std::vector<Cell> row = {Text(title)};
     for (const auto& [name, work] : works) row.push_back(Digits(Number(value(work), "{:.6g}")));
-    row.push_back(Digits(Number(peak_w, "{:.4g}")));
+    row.push_back(Digits(std::isfinite(peak_w) ? fmt::format("{:.0f}", peak_w) : ""));
     table.rows.push_back(std::move(row));
   };
   const auto drives_sum = [](const Work& work) {

@@ -74,7 +74,7 @@ export function formatValue(value, unit = '') {
   else if (prefixed && size >= 1e3) [text, prefix] = [(value / 1e3).toPrecision(4), 'k'];
   else if (size !== 0 && (size < 1e-3 || size >= 1e6)) text = value.toExponential(2);
   else text = value.toPrecision(4);
-  return (text + ' ' + prefix + unit).trim().replace('-', '−');
+  return (text + ' ' + prefix + unit).trim().replaceAll('-', '−');
 }
 
 const kLight = ['#1667ad', '#c8471d', '#127a50', '#9a3d78', '#806200', '#0b7f97', '#5f49b8', '#7d4526'];

@@ -104,7 +104,7 @@ function decades(panel) {
   }
   if (high === 0) return null;
   const top = 10 ** Math.ceil(Math.log10(Math.max(high, panel.limit ?? 0)) + 0.2);
-  const bottom = 10 ** Math.floor(Math.log10(low));
+  const bottom = 10 ** Math.floor(Math.log10(Math.min(low, panel.limit ?? low)));
   return [Math.max(bottom, top * 1e-16), top];
 }
 

@@ -1,0 +1,190 @@
+// The page's text and data. What it looks like is tested in a browser (tests/web).
+#include "report/html_report.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <nlohmann/json.hpp>
+
+#include "report/html_tables.h"
+#include "report/html_text.h"
+#include "tests/comparison/synthetic.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::json;
+using synthetic::Case;
+
+// Two sliders, simulation 1 % off on d1; three frames in which body b moves along x.
+struct Page {
+  Case c;
+  Report report;
+  std::vector<std::vector<Pose>> poses;
+
+  Page() {
+    c.column = LimitColumn::kForward;
+    synthetic::Stretch(&c.simulated, "d1.force", 1.01);
+    report.scenario = "bent";
+    report.scenario_file = "scenarios/two_sliders/bent.yaml";
+    report.mechanism = "two_sliders";
+    report.description = "Plates <b>&</b> \"sliders\"";
+    report.drives = {"d1", "d2"};
+    report.mode = "forward";
+    report.comparison = c.Run();
+    report.witnesses = {{"analytic", c.analytic_summary, c.analytic},
+                        {"simulated", c.simulated_summary, c.simulated}};
+    for (int i = 0; i < 3; ++i) {
+      std::vector<Pose> frame(c.mechanism.bodies.size(), Pose::Identity());
+      frame[2].translation() = Vec3(0.25 * i, 0, 0);
+      poses.push_back(frame);
+    }
+  }
+  [[nodiscard]] HtmlInput input() const {
+    HtmlInput input;
+    input.report = &report;
+    input.mechanism = &c.mechanism;
+    input.X_WB = &poses;
+    return input;
+  }
+};
+
+std::vector<float> Floats(const std::string& base64) {
+  static const std::string digits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string bytes;
+  for (size_t i = 0; i < base64.size(); i += 4) {
+    std::uint32_t word = 0;
+    for (size_t k = 0; k < 4; ++k) {
+      const size_t digit = digits.find(base64[i + k]);
+      word = word << 6U | static_cast<std::uint32_t>(digit == std::string::npos ? 0 : digit);
+    }
+    for (int shift = 16; shift >= 0; shift -= 8) bytes += static_cast<char>(word >> shift & 255U);
+  }
+  std::vector<float> values;
+  for (size_t i = 0; i + 4 <= bytes.size(); i += 4) {
+    std::uint32_t word = 0;
+    for (size_t k = 4; k-- > 0;) word = word << 8U | static_cast<unsigned char>(bytes[i + k]);
+    values.push_back(std::bit_cast<float>(word));
+  }
+  return values;
+}
+
+TEST(HtmlText, EscapesWhatWouldBecomeMarkup) {
+  EXPECT_EQ(Escape("a<b> & \"c\" 'd'"), "a&lt;b&gt; &amp; &quot;c&quot; &#39;d&#39;");
+}
+
+TEST(HtmlText, Base64FollowsTheStandardsExamples) {
+  const std::vector<std::pair<std::string, std::string>> examples = {
+      {"", ""}, {"f", "Zg=="}, {"fo", "Zm8="}, {"foo", "Zm9v"}, {"foobar", "Zm9vYmFy"}};
+  for (const auto& [bytes, text] : examples) EXPECT_EQ(Base64(std::string_view(bytes)), text);
+}
+
+TEST(HtmlText, FloatsComeBackAsTheyWere) {
+  const std::vector<float> values = {0.0F, -1.5F, 3.25e-12F, 4.5e5F};
+  EXPECT_EQ(Floats(Base64(values)), values);
+}
+
+TEST(HtmlData, TheErrorIsRelativeToTheLargestForceOfItsUnit) {
+  const Page page;
+  const Json data = Json::parse(PageData(page.input()));
+  const Json& pair = data["pairs"][0];
+  ASSERT_EQ(pair["name"], "simulated_vs_analytic");
+  const std::vector<float> error = Floats(pair["error"][0].get<std::string>());
+  // Forces of 100 N at most; 1 % of them on d1.
+  EXPECT_NEAR(*std::max_element(error.begin(), error.end()), 0.01, 1e-5);
+  EXPECT_EQ(pair["worst"]["drive"], 0);
+  EXPECT_EQ(error.size(), data["time"].size());
+}
+
+TEST(HtmlData, ThinningKeepsTheWorstSample) {
+  Page page;
+  // One wrong sample among 10001.
+  Trace exact;
+  exact.Reset(SampleTimes(100.0, 0.01), DriveChannels(page.c.mechanism));
+  exact.values.setOnes();
+  Trace bent = exact;
+  bent.values(4321, bent.Find("d1.force")) = 1.5;
+  page.report.witnesses = {{"analytic", RunSummary::Done(), exact},
+                           {"simulated", RunSummary::Done(), bent}};
+  const Json data = Json::parse(PageData(page.input()));
+  EXPECT_LE(data["time"].size(), 2500U);
+  const std::vector<float> error = Floats(data["pairs"][0]["error"][0].get<std::string>());
+  EXPECT_NEAR(*std::max_element(error.begin(), error.end()), 0.5, 1e-6);
+}
+
+TEST(HtmlData, PosesAreThoseOfTheSimulation) {
+  const Page page;
+  const Json replay = Json::parse(PageData(page.input()))["replay"];
+  EXPECT_TRUE(replay["simulated"]);
+  EXPECT_EQ(replay["bodies"][1]["poses"].size(), 7U);  // at rest: one pose
+  const std::vector<float> poses = Floats(replay["bodies"][2]["poses"].get<std::string>());
+  ASSERT_EQ(poses.size(), 21U);
+  EXPECT_FLOAT_EQ(poses[14], 0.5F);
+  EXPECT_FLOAT_EQ(poses[20], 1.0F);
+  EXPECT_EQ(replay["up"], Json({0.0, 0.0, 1.0}));
+}
+
+TEST(HtmlData, PosesEndWhereTheSimulationFailed) {
+  Page page;
+  page.poses[2][2].translation().setConstant(kNan);
+  const Json replay = Json::parse(PageData(page.input()))["replay"];
+  EXPECT_EQ(replay["time"].size(), 2U);
+}
+
+TEST(HtmlData, WithoutASimulationThereIsTheHomePose) {
+  const Page page;
+  HtmlInput input = page.input();
+  input.X_WB = nullptr;
+  const Json replay = Json::parse(PageData(input))["replay"];
+  EXPECT_FALSE(replay["simulated"]);
+  for (const Json& body : replay["bodies"]) EXPECT_EQ(body["poses"].size(), 7U);
+}
+
+TEST(HtmlData, NoNameEndsTheScript) {
+  Page page;
+  page.report.scenario = "x</script><b>";
+  const std::string data = PageData(page.input());
+  EXPECT_EQ(data.find("</"), std::string::npos);
+  EXPECT_EQ(Json::parse(data)["title"], "two_sliders / x</script><b>");
+}
+
+TEST(HtmlTables, WorkIsForceTimesWay) {
+  Trace trace;
+  trace.Reset({0.0, 1.0, 2.0}, {{"d1.velocity", "m/s", ""},
+                                {"d1.force", "N", ""},
+                                {"power.input", "W", ""},
+                                {"power.energy_rate", "W", ""}});
+  trace.values << 1, 10, 10, 9, 1, 10, 10, 9, 1, 10, 10, 9;
+  const Work work = WorkOf(trace, {"d1", "d2"});
+  EXPECT_DOUBLE_EQ(work.drives[0], 20.0);
+  EXPECT_TRUE(std::isnan(work.drives[1]));
+  EXPECT_DOUBLE_EQ(work.peak_w[0], 10.0);
+  EXPECT_DOUBLE_EQ(work.input - work.energy, 2.0);
+}
+
+TEST(HtmlTables, FailedChecksComeFirst) {
+  const Page page;
+  const std::string html = ChecksHtml(page.report);
+  const size_t fail = html.rfind("pill fail"), ok = html.find("pill ok");
+  ASSERT_NE(fail, std::string::npos);
+  ASSERT_NE(ok, std::string::npos);
+  EXPECT_LT(fail, ok);
+}
+
+TEST(HtmlPage, IsOneFileThatAsksForNothing) {
+  const Page page;
+  const std::string html = ToHtml(page.input());
+  EXPECT_TRUE(html.starts_with("<!doctype html>"));
+  EXPECT_NE(html.find("default-src 'none'"), std::string::npos);
+  EXPECT_NE(html.find("verdict disagree"), std::string::npos);
+  EXPECT_NE(html.find("Plates &lt;b&gt;&amp;"), std::string::npos);
+  EXPECT_EQ(html.find(" src=\"http"), std::string::npos);
+  EXPECT_EQ(html.find("<link rel=\"stylesheet"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace mbv
