@@ -90,6 +90,8 @@ class Run {
       return std::move(outcome_);
     }
     Finish(options_, folder_, &outcome_);
+    // A finished run is not resumed: the next --resume starts anew.
+    if (outcome_.trouble.empty()) folder_.ForgetStates();
     return std::move(outcome_);
   }
 

@@ -185,6 +185,14 @@ TEST_F(RegressTest, ResumeRunsOnlyWhatIsUnfinishedOrChanged) {
   EXPECT_FALSE(CaseOf(second, "m/crash").kept) << "what crashed is tried again";
 }
 
+TEST_F(RegressTest, ResumeAfterAFinishedRunStartsAnew) {
+  Scenario("agree");
+  options_.resume = true;
+  EXPECT_EQ(RunAll().exit_code, 0);
+  EXPECT_FALSE(CaseOf(RunAll(), "m/agree").kept);
+  EXPECT_EQ(Calls(), 2);
+}
+
 TEST_F(RegressTest, ResumeAfterKill9KeepsWhatWasFinished) {
   for (const char* name : {"agree1", "agree2", "hang"}) Scenario(name);
   options_.jobs = 1;
