@@ -25,8 +25,9 @@ table{border-collapse:collapse;width:100%}th,td{border-top:1px solid var(--line)
 text-align:left;vertical-align:top}thead th{background:var(--head);position:sticky;top:0}
 th button{all:unset;cursor:pointer;font-weight:600}th button:focus-visible{outline:2px solid var(--link)}
 th[aria-sort=ascending] button::after{content:" ▲"}th[aria-sort=descending] button::after{content:" ▼"}
-tbody th{font-weight:600}.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.good{color:var(--good)}.bad{color:var(--bad)}.warn{color:var(--warn)}.word{font-weight:600;white-space:nowrap}
+tbody th{font-weight:600;min-width:14rem}th .soft,caption{font-weight:400}caption{text-align:left}
+.notes{min-width:12rem;overflow-wrap:anywhere}.notes p{margin:0 0 .3rem}.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
+.good{color:var(--good)}.bad{color:var(--bad)}.warn{color:var(--warn)}.word{font-weight:600}
 img{display:block;border-radius:4px;max-width:144px;height:auto}svg{display:block}
 .curve{fill:none;stroke:var(--link);stroke-width:1.5}.limit{stroke:var(--bad);stroke-dasharray:3 3}
 .now{fill:var(--link)}pre{white-space:pre-wrap;font-size:.8rem;margin:.3rem 0}
@@ -72,6 +73,7 @@ std::string Sparkline(const CaseResult& result) {
   std::string limit;
   if (key->second.limit && *key->second.limit > 0.0) {
     top = std::max(top, std::log10(*key->second.limit) + 0.3);
+    bottom = std::min(bottom, std::log10(*key->second.limit) - 0.3);
   }
   const auto y = [&](double level) {
     return kMargin + (kHeight - 2.0 * kMargin) * (top - level) / (top - bottom);
@@ -154,7 +156,7 @@ std::string Row(const CaseResult& result, const std::string& thumbnail) {
   row += fmt::format(
       "<td class=\"n\" data-sort=\"{0}\">{0}</td>",
       key == nullptr || !key->second.limit ? "" : fmt::format("{:.1e}", *key->second.limit));
-  row += "<td>" + Sparkline(result) + "</td><td>" + Notes(result) + "</td>";
+  row += "<td>" + Sparkline(result) + "</td><td class=\"notes\">" + Notes(result) + "</td>";
   const double mib = static_cast<double>(result.cost.peak_kib) / 1024.0;
   for (const double value : {result.cost.wall_s, result.cost.cpu_s}) {
     row += fmt::format("<td class=\"n\" data-sort=\"{0:.3f}\">{0:.1f}</td>", value);
