@@ -171,6 +171,7 @@ struct Mechanism {
   std::string file;         ///< model.yaml it came from, as given
   std::string description;
   Vec3 gravity_W = Vec3(0, 0, -9.81);  ///< [m/s²]
+  Vec3 up_W = Vec3::UnitZ();  ///< unit, for pictures: stated, or against gravity, or z
   std::vector<Parameter> parameters;   ///< with overrides applied
   std::vector<Body> bodies;            ///< bodies[0] is the world
   std::vector<Joint> joints;

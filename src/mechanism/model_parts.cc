@@ -9,10 +9,10 @@
 namespace mbv {
 namespace {
 
-const std::vector<std::string> kModelKeys = {"name",       "description", "parameters", "gravity",
-                                             "world",      "bodies",      "joints",     "drives",
-                                             "prescribed", "outputs",     "springs",    "parts",
-                                             "instances",  "drive_order", "urdf",       "attach"};
+const std::vector<std::string> kModelKeys = {
+    "name",      "description", "parameters", "gravity", "world",   "bodies",
+    "joints",    "drives",      "prescribed", "outputs", "springs", "parts",
+    "instances", "drive_order", "urdf",       "attach",  "up"};
 const std::vector<std::string> kPartKeys = {"parameters", "attach",     "bodies",  "joints",
                                             "drives",     "prescribed", "outputs", "springs",
                                             "instances",  "description"};
@@ -49,6 +49,21 @@ void ModelReader::ReadHead() {
   EvaluateParameters(model, parameters, "parameters");
   if (const YamlNode* gravity = map.Find("gravity")) {
     mechanism_.gravity_W = Vector(model, *gravity, "gravity").value_or(Vec3::Zero());
+  }
+  ReadUp(model, map.Find("up"));
+}
+
+// Which way is up in pictures; gravity says it unless a scenario switches it off.
+void ModelReader::ReadUp(const Block& model, const YamlNode* node) {
+  const double g = mechanism_.gravity_W.norm();
+  if (g > 0.0) mechanism_.up_W = -mechanism_.gravity_W / g;
+  if (node == nullptr) return;
+  const auto up = Vector(model, *node, "up");
+  if (!up) return;
+  if (up->norm() > 0.0) {
+    mechanism_.up_W = up->normalized();
+  } else {
+    yaml_.Error(*node, "up = [0, 0, 0] has no direction", "e.g. up: [0, 0, 1]");
   }
 }
 

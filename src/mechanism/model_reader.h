@@ -62,6 +62,7 @@ class ModelReader {
 
   // model_parts.cc
   void ReadHead();
+  void ReadUp(const Block& model, const YamlNode* node);
   void ReadParameters(const Block& block, const YamlNode* node, const std::string& path);
   void EvaluateParameters(const Block& block, const YamlNode* node, const std::string& path);
   void ApplyOverrides(const Block& block);

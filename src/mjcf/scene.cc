@@ -89,8 +89,7 @@ void WriteMaterials(const Mechanism& mechanism, XmlWriter* xml) {
 void WriteSurroundings(const Mechanism& mechanism, XmlWriter* xml) {
   const Bounds bounds = HomeBounds(mechanism);
   if (bounds.empty()) return;
-  const double weight = mechanism.gravity_W.norm();
-  const Vec3 up = weight > 0.0 ? Vec3(-mechanism.gravity_W / weight) : Vec3::UnitZ();
+  const Vec3& up = mechanism.up_W;
   const Vec3 centre = 0.5 * (bounds.low + bounds.high);
   const double extent = std::max((bounds.high - bounds.low).norm(), 1e-3);
   const Vec3 side = up.unitOrthogonal();

@@ -82,7 +82,7 @@ class Extent {
 Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
                     const Overlay& overlay, const PictureOptions& options) {
   Arrangement set;
-  set.R_DW = UprightRotation(mechanism.gravity_W);
+  set.R_DW = UprightRotation(-mechanism.up_W);
   set.scale = ScaleOf(mechanism, frames);
   int bar_px = 0;
   for (const PictureFrame& frame : frames) {

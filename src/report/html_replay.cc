@@ -89,10 +89,7 @@ class ReplayWriter {
     for (size_t i = 0; i < good; i += stride) frames_.push_back(i);
   }
 
-  Json Up() const {
-    const double g = mechanism_.gravity_W.norm();
-    return Vector(g > 0.0 ? Vec3(-mechanism_.gravity_W / g) : Vec3::UnitZ());
-  }
+  Json Up() const { return Vector(mechanism_.up_W); }
 
   Json Times() const {
     Json times = Json::array();

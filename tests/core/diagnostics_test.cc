@@ -6,7 +6,11 @@ namespace mbv {
 namespace {
 
 TEST(Diagnostics, AFindingIsPrintedWithPlaceAndHint) {
-  const Finding finding{Severity::kError, "a.yaml", 3, 7, "mass = -1 violates mass >= 0",
+  const Finding finding{Severity::kError,
+                        "a.yaml",
+                        3,
+                        7,
+                        "mass = -1 violates mass >= 0",
                         "leave the key out for a massless body"};
   EXPECT_EQ(ToText(finding),
             "a.yaml:3:7: error: mass = -1 violates mass >= 0\n"

@@ -16,6 +16,7 @@ inline Mechanism BallOnLeg(const Vec3& gravity_W = Vec3(0, 0, -9.81)) {
   Mechanism mechanism;
   mechanism.name = "ball_on_leg";
   mechanism.gravity_W = gravity_W;
+  if (gravity_W.norm() > 0.0) mechanism.up_W = -gravity_W.normalized();
   Body world{.name = "world", .frames = {}, .shapes = {}};
   Body ball{.name = "ball", .mass = 1.0, .frames = {}, .shapes = {}};
   ball.shapes.push_back(

@@ -105,6 +105,7 @@ inline Mechanism MakeFourBar(JointKind closing = JointKind::kRevolute, bool forc
   Mechanism m;
   m.name = "four_bar";
   m.gravity_W = Vec3(0, -F::g, 0);
+  m.up_W = Vec3::UnitY();
   Body world;
   world.name = "world";
   m.bodies = {world, MakeBody("crank", F::m1, {F::a / 2, 0, 0}, {0.001, 0.0035, F::I1}),
