@@ -43,7 +43,7 @@ TEST(Profile, RatesAreDerivativesOfValues) {
 
 TEST(Profile, RampCruiseReachesItsLimitsAndItsEnd) {
   const RampCruiseTerm cruise{0.0, 0.24, 0.75, 10.0, 0.24};
-  EXPECT_NEAR(Duration(cruise), 0.427772050, 1e-9);  // tripod sheet, default path
+  EXPECT_NEAR(Duration(cruise), 0.427772050, 1e-9);  // the tripod's default path
   EXPECT_DOUBLE_EQ(Evaluate(cruise, 0.2).rate, 0.75);
   EXPECT_NEAR(Evaluate(cruise, 1.0).value, 0.24, 1e-15);
   const RampCruiseTerm pure{0.0, 0.06, 0.75, 10.0, 0.06};
