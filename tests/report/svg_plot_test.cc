@@ -1,0 +1,56 @@
+#include "report/svg_plot.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace mbv {
+namespace {
+
+size_t Count(const std::string& text, const std::string& word) {
+  size_t count = 0;
+  for (size_t at = text.find(word); at != std::string::npos; at = text.find(word, at + 1)) ++count;
+  return count;
+}
+
+TEST(SvgPlot, EachLineIsOnePathAndMarkersAreDots) {
+  const LinePlot plot{.title = "a < b & c",
+                      .x_label = "x [m]",
+                      .y_label = "y [m]",
+                      .lines = {{.label = "one", .points = {{0, 0}, {1, 1}}, .markers = true},
+                                {.label = "two", .points = {{0, 1}, {1, 0}}}}};
+  const std::string svg = ToSvg(plot);
+  EXPECT_EQ(Count(svg, "<path"), 2u);
+  EXPECT_EQ(Count(svg, "<circle"), 2u);
+  EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
+}
+
+TEST(SvgPlot, MissingAndNonPositiveValuesBreakALogarithmicLine) {
+  const LinePlot plot{.title = "t",
+                      .x_label = "x",
+                      .y_label = "y",
+                      .log_y = true,
+                      .lines = {{.label = "", .points = {{0, 1}, {1, NAN}, {2, 0}, {3, 10}}}}};
+  const std::string svg = ToSvg(plot);
+  EXPECT_EQ(Count(svg, " M"), 2u);  // two single points, no stroke between them
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+  EXPECT_EQ(svg.find("inf"), std::string::npos);
+}
+
+TEST(SvgPlot, AMapLeavesMissingCellsBlankAndEndsInItsTwoColours) {
+  const MapPlot plot{.title = "m",
+                     .x_label = "x",
+                     .y_label = "y",
+                     .value_label = "v",
+                     .columns = 2,
+                     .rows = 2,
+                     .values = {1.0, 2.0, NAN, 3.0}};
+  const std::string svg = ToSvg(plot);
+  // Background, frame, three cells and fifty cells of the colour bar.
+  EXPECT_EQ(Count(svg, "<rect"), 1u + 1u + 3u + 50u);
+  EXPECT_NE(svg.find("#440154"), std::string::npos);
+  EXPECT_NE(svg.find("#fde725"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace mbv
