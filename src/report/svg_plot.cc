@@ -7,6 +7,8 @@
 #include <cmath>
 #include <limits>
 
+#include "report/html_text.h"
+
 namespace mbv {
 namespace {
 
@@ -15,21 +17,6 @@ constexpr std::array<const char*, 7> kColors = {"#0072b2", "#d55e00", "#009e73",
                                                 "#e69f00", "#56b4e9", "#000000"};
 constexpr double kWidth = 720, kHeight = 520;
 constexpr double kLeft = 84, kRight = 24, kTop = 44, kBottom = 60;
-
-std::string Escaped(const std::string& text) {
-  std::string out;
-  for (char c : text) {
-    if (c == '&')
-      out += "&amp;";
-    else if (c == '<')
-      out += "&lt;";
-    else if (c == '>')
-      out += "&gt;";
-    else
-      out += c;
-  }
-  return out;
-}
 
 struct Axis {
   double low = std::numeric_limits<double>::infinity();
@@ -83,7 +70,7 @@ std::string Header(const std::string& title) {
       "role=\"img\">\n<title>{2}</title>\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
       "<text x=\"{3}\" y=\"26\" font-size=\"16\">{2}</text>\n",
-      kWidth, kHeight, Escaped(title), kLeft);
+      kWidth, kHeight, Escape(title), kLeft);
 }
 
 std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
@@ -108,8 +95,8 @@ std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
       "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
       "stroke=\"#444444\"/>\n<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n"
       "<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-      left, top, right - left, bottom - top, 0.5 * (left + right), bottom + 42, Escaped(x_label),
-      0.5 * (top + bottom), Escaped(y_label));
+      left, top, right - left, bottom - top, 0.5 * (left + right), bottom + 42, Escape(x_label),
+      0.5 * (top + bottom), Escape(y_label));
   return svg;
 }
 
@@ -183,7 +170,7 @@ std::string ToSvg(const LinePlot& plot) {
         "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"2.5\"/>"
         "<text x=\"{4}\" y=\"{5}\">{6}</text>\n",
         kLeft + 10, kLeft + 32, legend_y - 4, color, kLeft + 38, legend_y,
-        Escaped(plot.lines[i].label));
+        Escape(plot.lines[i].label));
     legend_y += 17;
   }
   return svg + "</svg>\n";
@@ -225,7 +212,7 @@ std::string ToSvg(const MapPlot& plot) {
   }
   svg += fmt::format(
       "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"12\" text-anchor=\"end\">{}</text>\n",
-      kWidth - 8, kTop - 8, Escaped(plot.value_label));
+      kWidth - 8, kTop - 8, Escape(plot.value_label));
   return svg + "</svg>\n";
 }
 
