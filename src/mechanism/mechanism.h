@@ -18,6 +18,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <string>
 #include <variant>
 #include <vector>
@@ -71,6 +72,29 @@ struct Body {
   Mat3 I_Bcm_B = Mat3::Zero();  ///< about the centre of mass, body axes [kg m²]
   std::vector<NamedFrame> frames;
   std::vector<Shape> shapes;
+};
+
+/// Cross section of a beam. Beam axes: x along the beam, y and z principal axes of the section.
+struct Section {
+  double area = kNan;     ///< A [m²]
+  double I_y = kNan;      ///< ∫ z² dA [m⁴], bending in the x–z plane
+  double I_z = kNan;      ///< ∫ y² dA [m⁴], bending in the x–y plane
+  double torsion = kNan;  ///< St Venant's constant [m⁴]
+};
+
+/// A straight, uniform Euler–Bernoulli beam between two points of a body. A body with beams is
+/// elastic: its joints sit on beam ends, which move with the beams; a body without is rigid. Beams
+/// count in stiffness computations only (`mbverify stiffness`), never in dynamics.
+struct Beam {
+  std::string name;  ///< "BODY.BEAM", or the body's name if it has one beam only
+  int body = 0;
+  Vec3 p_from = Vec3::Zero(), p_to = Vec3::Zero();  ///< in the body frame [m]
+  Mat3 R_BE = Mat3::Identity();                     ///< beam axes in the body: x from → to
+  Section section;
+  double youngs_modulus = kNan;  ///< E [Pa]
+  double shear_modulus = kNan;   ///< G [Pa]
+
+  [[nodiscard]] double length() const { return (p_to - p_from).norm(); }
 };
 
 enum class JointKind {
@@ -136,6 +160,8 @@ struct Drive {
   std::variant<JointDrive, DistanceDrive> kind;
   CoordinateRange range;
   double radius = 0.0;  ///< for pictures [m]; 0: chosen by the renderer
+  /// Of the servo that holds the drive [N/m or N m/rad]; infinite: locked. Stiffness only.
+  double stiffness = std::numeric_limits<double>::infinity();
 };
 
 /// A one-freedom joint whose motion is given (a ship's roll); it is driven, but its force is base
@@ -179,6 +205,7 @@ struct Mechanism {
   std::vector<Prescribed> prescribed;
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
+  std::vector<Beam> beams;  ///< of the elastic bodies; empty in most models
 
   std::vector<int> tree_joints;    ///< indices of the spanning tree's joints, parents first (every
                                    ///< non-world body is the outboard body of exactly one)

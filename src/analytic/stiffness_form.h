@@ -1,0 +1,60 @@
+// StiffnessForm: a paper's stiffness model of one mechanism.
+//
+// Like ClosedForm (closed_form.h): reads its constants from Mechanism::parameters and knows nothing
+// of beams, finite elements or MuJoCo. A model is added by one row in stiffness_registry.cc.
+#pragma once
+
+#include <map>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "core/stiffness.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// A pose as the values of an independent set of coordinates by name: OUTPUT.x … OUTPUT.yaw or
+/// DRIVE [m, rad].
+using PoseCoordinates = std::map<std::string, double>;
+
+/// A number that the paper derives from K ("kappa_m").
+struct StiffnessIndex {
+  std::string name, unit, meaning;
+};
+
+class StiffnessForm {
+ public:
+  virtual ~StiffnessForm() = default;
+
+  /// K, C and the elements' shares at a pose. Unreachable poses and singular ones are in the
+  /// summary of the result.
+  [[nodiscard]] virtual StiffnessResult Evaluate(const PoseCoordinates& pose) const = 0;
+
+  /// The paper's indices, and their values for a stiffness.
+  [[nodiscard]] virtual std::vector<StiffnessIndex> indices() const = 0;
+  [[nodiscard]] virtual std::vector<double> IndexValues(const StiffnessResult& result) const = 0;
+};
+
+/// Makes the form, or explains in `diagnostics` why the parameters, the names of the pose's
+/// coordinates or the model do not suit it.
+using StiffnessFormFactory = std::unique_ptr<StiffnessForm> (*)(const Mechanism&,
+                                                                const PoseCoordinates& pose,
+                                                                const std::string& model,
+                                                                Diagnostics* diagnostics);
+
+struct StiffnessFormRow {
+  std::string mechanism;            ///< Mechanism::name
+  std::string output;               ///< the output whose stiffness the paper gives
+  std::vector<std::string> models;  ///< formulations, the default ("corrected") first, the paper's
+                                    ///< own ("as_printed") among them
+  StiffnessFormFactory factory = nullptr;
+};
+
+[[nodiscard]] std::span<const StiffnessFormRow> StiffnessForms();
+/// The row for a mechanism name, or nullptr.
+[[nodiscard]] const StiffnessFormRow* FindStiffnessForm(const std::string& mechanism);
+
+}  // namespace mbv
