@@ -7,6 +7,7 @@
 
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
+#include "scenario/file_parts.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/set_values.h"
@@ -17,19 +18,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kKeys = {"mechanism", "description", "parameters", "motion",
-                                        "loads",     "analytic",    "reference",  "simulation",
-                                        "checks",    "snapshots",   "expect"};
-
-// "sea_state", or "must_fail/wrong_mass" for a file in a folder below one named as the mechanism.
-std::string CaseName(const fs::path& file, const std::string& mechanism) {
-  fs::path name = file.stem();
-  for (fs::path folder = file.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
-    if (folder.filename() == mechanism) return name;
-    name = folder.filename() / name;
-  }
-  return file.stem();
-}
+const std::vector<std::string> kKeys = {"kind",       "mechanism", "description", "parameters",
+                                        "motion",     "loads",     "analytic",    "reference",
+                                        "simulation", "checks",    "snapshots",   "expect"};
 
 std::string JoinWords(const std::vector<std::string>& words) {
   std::string text;
@@ -63,6 +54,7 @@ class Loader {
 
  private:
   void Read(const YamlNode& root) {
+    if (const YamlNode* kind = root.Find("kind"); kind != nullptr && !IsMotion(*kind)) return;
     YamlMap map(&yaml_, &root, "", kKeys);
     scenario_.file = file_;
     if (const YamlNode* description = map.Find("description")) {
@@ -89,21 +81,18 @@ class Loader {
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
   }
 
+  // Of another kind, nothing else in the file is of use here.
+  bool IsMotion(const YamlNode& kind) {
+    if (yaml_.Choice(kind, "kind", {"motion", "stiffness"}) != 1) return true;
+    yaml_.Error(kind, "kind = stiffness: this scenario has a pose and no motion",
+                "mbverify run, regress, check and list take it; render and mutate need a motion");
+    return false;
+  }
+
   void ReadParameters(const YamlNode* node) {
     scenario_.parameters = ReadOverrides(&values_, node, "parameters");
     if (node == nullptr) return;
-    for (const YamlEntry& entry : node->entries) {
-      Finding place;
-      place.file = file_;
-      place.line = entry.line;
-      place.column = entry.column;
-      if (entry.line < 0) {
-        const SetValue& value = options_.set[static_cast<size_t>(-entry.line - 1)];
-        place = {};
-        place.file = "--set " + value.first + "=" + value.second;
-      }
-      scenario_.parameter_places[entry.key] = place;
-    }
+    scenario_.parameter_places = PlacesOf(*node, file_, options_.set);
   }
 
   void LoadMechanism(const YamlNode& node) {
@@ -133,14 +122,8 @@ class Loader {
 
   // Overrides of single witnesses must name parameters of the model, too.
   void CheckParameterNames(const YamlMap& map) {
-    std::vector<std::string> known;
-    for (const Parameter& p : mechanism_->parameters) known.push_back(p.name);
     const auto check = [&](const YamlEntry& entry, const std::string& path) {
-      if (mechanism_->HasParameter(entry.key)) return;
-      const std::string near = ClosestWord(entry.key, known);
-      yaml_.Error(entry,
-                  fmt::format("{}: {} has no parameter '{}'", path, mechanism_->name, entry.key),
-                  near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+      CheckParameterName(entry, path, *mechanism_, &yaml_);
     };
     for (const char* section : {"analytic", "reference", "simulation"}) {
       const YamlNode* node = map.Find(section);
@@ -233,6 +216,7 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
     const YamlNode* node = root->Find(key);
     return node != nullptr && node->is_scalar() ? node->text : std::string();
   };
+  head.kind = word("kind");
   head.mechanism = word("mechanism");
   head.description = word("description");
   head.is_scenario = head.is_scenario || root->Find("mechanism") != nullptr;

@@ -38,8 +38,11 @@ struct ScenarioResult {
 /// that is no YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
   bool is_scenario = false;  ///< has a `mechanism:` key (or an expectation)
+  std::string kind;          ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;
+
+  [[nodiscard]] bool is_stiffness() const { return kind == "stiffness"; }
 };
 [[nodiscard]] ScenarioHead ReadScenarioHead(const std::string& file);
 

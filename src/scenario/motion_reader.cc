@@ -19,27 +19,6 @@ bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
   return a.kind == b.kind && a.index == b.index && a.component == b.component;
 }
 
-// Names a command may use: prescribed joints, drives, output components.
-std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
-  std::vector<std::string> names;
-  for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
-  for (const Drive& d : mechanism.drives) names.push_back(d.name);
-  for (const Output& o : mechanism.outputs) {
-    for (const char* c : kComponents) names.push_back(o.name + "." + c);
-  }
-  return names;
-}
-
-// The k-th name of CoordinateNames as a coordinate.
-Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
-  using Kind = Coordinate::Kind;
-  if (k < mechanism.prescribed.size()) return {Kind::kPrescribed, static_cast<int>(k), 0};
-  k -= mechanism.prescribed.size();
-  if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
-  k -= mechanism.drives.size();
-  return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
-}
-
 std::string UnitOf(const Mechanism& mechanism, const Coordinate& coordinate) {
   const auto index = static_cast<size_t>(coordinate.index);
   switch (coordinate.kind) {
@@ -51,6 +30,8 @@ std::string UnitOf(const Mechanism& mechanism, const Coordinate& coordinate) {
     }
     case Coordinate::Kind::kOutput:
       return coordinate.component < 3 ? "m" : "rad";
+    case Coordinate::Kind::kJoint:
+      return IsLength(mechanism.joints[index].kind, coordinate.component) ? "m" : "rad";
   }
   return "";
 }
@@ -337,6 +318,25 @@ Pose HomePose(const Mechanism& mechanism, int body) {
 
 }  // namespace
 
+std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
+  std::vector<std::string> names;
+  for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
+  for (const Drive& d : mechanism.drives) names.push_back(d.name);
+  for (const Output& o : mechanism.outputs) {
+    for (const char* c : kComponents) names.push_back(o.name + "." + c);
+  }
+  return names;
+}
+
+Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
+  using Kind = Coordinate::Kind;
+  if (k < mechanism.prescribed.size()) return {Kind::kPrescribed, static_cast<int>(k), 0};
+  k -= mechanism.prescribed.size();
+  if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
+  k -= mechanism.drives.size();
+  return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
+}
+
 double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
   const auto index = static_cast<size_t>(coordinate.index);
   const auto home_of = [&](int joint, int c) {
@@ -362,6 +362,8 @@ double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
       return coordinate.component < 3 ? X_RO.translation()[coordinate.component]
                                       : RpyOf(X_RO.linear())[coordinate.component - 3];
     }
+    case Coordinate::Kind::kJoint:
+      return home_of(coordinate.index, coordinate.component);
   }
   return kNan;
 }

@@ -2,20 +2,10 @@
 
 #include <fmt/format.h>
 
+#include "scenario/file_parts.h"
+
 namespace mbv {
 namespace {
-
-// `on`, `off`, `none` (and what YAML 1.1 users write for them); empty for anything else.
-std::optional<bool> AsSwitch(const YamlNode& node) {
-  if (!node.is_scalar()) return {};
-  for (const char* word : {"on", "true", "yes"}) {
-    if (node.text == word) return true;
-  }
-  for (const char* word : {"off", "none", "false", "no"}) {
-    if (node.text == word) return false;
-  }
-  return {};
-}
 
 // A limit: positive number, or nothing/off; reported otherwise.
 struct LimitValue {

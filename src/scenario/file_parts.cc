@@ -1,0 +1,57 @@
+#include "scenario/file_parts.h"
+
+#include <fmt/format.h>
+
+namespace mbv {
+
+namespace fs = std::filesystem;
+
+std::string CaseName(const fs::path& file, const std::string& mechanism) {
+  fs::path name = file.stem();
+  for (fs::path folder = file.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
+    if (folder.filename() == mechanism) return name;
+    name = folder.filename() / name;
+  }
+  return file.stem();
+}
+
+std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& file,
+                                        const std::vector<SetValue>& set) {
+  std::map<std::string, Finding> places;
+  for (const YamlEntry& entry : map.entries) {
+    Finding place;
+    if (entry.line < 0) {
+      const SetValue& value = set[static_cast<size_t>(-entry.line - 1)];
+      place.file = "--set " + value.first + "=" + value.second;
+    } else {
+      place.file = file;
+      place.line = entry.line;
+      place.column = entry.column;
+    }
+    places[entry.key] = place;
+  }
+  return places;
+}
+
+void CheckParameterName(const YamlEntry& entry, const std::string& path, const Mechanism& mechanism,
+                        YamlReader* yaml) {
+  if (mechanism.HasParameter(entry.key)) return;
+  std::vector<std::string> known;
+  for (const Parameter& p : mechanism.parameters) known.push_back(p.name);
+  const std::string near = ClosestWord(entry.key, known);
+  yaml->Error(entry, fmt::format("{}: {} has no parameter '{}'", path, mechanism.name, entry.key),
+              near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+}
+
+std::optional<bool> AsSwitch(const YamlNode& node) {
+  if (!node.is_scalar()) return {};
+  for (const char* word : {"on", "true", "yes"}) {
+    if (node.text == word) return true;
+  }
+  for (const char* word : {"off", "none", "false", "no"}) {
+    if (node.text == word) return false;
+  }
+  return {};
+}
+
+}  // namespace mbv
