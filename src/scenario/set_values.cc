@@ -32,7 +32,8 @@ size_t FirstKey(const YamlNode& map, const std::string& path, const std::string&
     if (n > best && path.starts_with(entry.key) && (path.size() == n || path[n] == '.')) best = n;
   }
   if (best > 0) return best;
-  return parent == "commands" ? path.size() : std::min(path.find('.'), path.size());
+  return parent == "commands" || parent == "pose" ? path.size()
+                                                  : std::min(path.find('.'), path.size());
 }
 
 YamlNodePtr SetAt(const YamlNode* node, const std::string& parent, const std::string& path,

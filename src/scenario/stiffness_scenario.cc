@@ -1,0 +1,228 @@
+#include "scenario/stiffness_scenario.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "mechanism/load_model.h"
+#include "scenario/file_parts.h"
+#include "scenario/motion_reader.h"
+#include "scenario/set_values.h"
+#include "scenario/settings_reader.h"
+#include "scenario/stiffness_settings.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string> kKeys = {
+    "kind",      "mechanism",  "description", "parameters",      "pose",   "output", "analytic",
+    "reference", "simulation", "loads",       "compare_printed", "checks", "expect"};
+
+bool Contains(const std::vector<std::string>& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+// "platform.x" and 1e-3 from "platform.x_mm".
+std::pair<std::string, double> WithoutUnit(const std::string& key) {
+  for (const UnitSuffix& unit : {kDeg, kMm}) {
+    if (key.ends_with(unit.suffix)) {
+      return {key.substr(0, key.size() - unit.suffix.size()), unit.factor};
+    }
+  }
+  return {key, 1.0};
+}
+
+class Loader {
+ public:
+  Loader(const std::string& file, const ScenarioOptions& options)
+      : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
+
+  StiffnessScenarioResult Load(const std::string& text) {
+    YamlNodePtr root = yaml_.Parse(text);
+    if (root != nullptr) root = SetValues(root, options_.set, &yaml_);
+    if (root != nullptr) Read(*root);
+    StiffnessScenarioResult result;
+    result.diagnostics = PlaceSetFindings(yaml_.diagnostics(), options_.set);
+    result.diagnostics.Append(model_findings_);
+    if (result.diagnostics.has_errors() || !mechanism_) return result;
+    result.scenario = std::move(scenario_);
+    result.mechanism = std::move(mechanism_);
+    return result;
+  }
+
+  StiffnessScenarioResult LoadFile() {
+    const auto text = yaml_.ReadFile();
+    if (text) return Load(*text);
+    return {{}, {}, yaml_.diagnostics()};
+  }
+
+ private:
+  void Read(const YamlNode& root) {
+    YamlMap map(&yaml_, &root, "", kKeys);
+    scenario_.file = file_;
+    if (const YamlNode* kind = map.Required("kind")) {
+      (void)yaml_.Choice(*kind, "kind", {"stiffness"});
+    }
+    if (const YamlNode* description = map.Find("description")) {
+      scenario_.description = yaml_.Text(*description, "description").value_or("");
+    }
+    if (const YamlNode* parameters = map.Find("parameters")) {
+      scenario_.parameters = ReadOverrides(&values_, parameters, "parameters");
+      scenario_.parameter_places = PlacesOf(*parameters, file_, options_.set);
+    }
+    if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
+    ReadSettings(map);
+    if (!mechanism_) return;
+    if (const YamlNode* pose = map.Find("pose")) ReadPose(*pose);
+    if (const YamlNode* output = map.Find("output")) ReadOutput(*output);
+    CheckParameters(map);
+    if (!scenario_.analytic.on && !scenario_.reference.on && !scenario_.simulation.on) {
+      yaml_.Error(root, "analytic, reference and simulation are all off");
+    }
+  }
+
+  void LoadMechanism(const YamlNode& node) {
+    const auto name = yaml_.Text(node, "mechanism");
+    if (!name) return;
+    std::string why;
+    const auto model = FindElasticModel(*name, fs::path(file_).parent_path().string(), &why);
+    if (!model) {
+      const size_t hint = why.find("; ");
+      yaml_.Error(node, fmt::format("mechanism = '{}': {}", *name, why.substr(0, hint)),
+                  hint == std::string::npos ? "" : why.substr(hint + 2));
+      return;
+    }
+    scenario_.model_file = *model;
+    LoadWith(scenario_.parameters);
+    if (!mechanism_) return;
+    scenario_.name = CaseName(file_, mechanism_->name);
+    if (mechanism_->beams.empty() && !HasServos()) {
+      yaml_.Error(node, fmt::format("mechanism: {} is rigid: it has no beams and no drive with a "
+                                    "stiffness",
+                                    *model));
+    }
+  }
+
+  void LoadWith(const Overrides& overrides) {
+    LoadOptions options;
+    options.overrides = overrides;
+    options.override_places = scenario_.parameter_places;
+    LoadResult loaded = LoadModel(scenario_.model_file, options);
+    model_findings_ = loaded.diagnostics;
+    // Wrong overrides alone must not hide what else is wrong with the scenario.
+    if (!loaded.mechanism && !overrides.empty()) loaded = LoadModel(scenario_.model_file);
+    mechanism_ = std::move(loaded.mechanism);
+    if (!mechanism_) return;
+    for (const Parameter& p : mechanism_->parameters) scope_.Set(p.name, p.value);
+  }
+
+  bool HasServos() const {
+    return std::any_of(mechanism_->drives.begin(), mechanism_->drives.end(),
+                       [](const Drive& drive) { return std::isfinite(drive.stiffness); });
+  }
+
+  void ReadSettings(const YamlMap& map) {
+    scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
+    if (!scenario_.analytic.as_printed.empty()) {
+      yaml_.Error(*map.Find("analytic"), "analytic.as_printed: stiffness models have no errata",
+                  "analytic: {model: as_printed} takes the whole of the paper's own model");
+    }
+    scenario_.reference = ReadStiffnessReference(&values_, map.Find("reference"));
+    scenario_.simulation = ReadStiffnessSimulation(&values_, map.Find("simulation"));
+    scenario_.loads = ReadStiffnessLoads(&values_, map.Find("loads"), &scenario_.loads_text);
+    scenario_.checks = ReadStiffnessChecks(&values_, map.Find("checks"));
+    scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
+    if (const YamlNode* printed = map.Find("compare_printed")) {
+      scenario_.compare_printed = yaml_.Flag(*printed, "compare_printed").value_or(false);
+    }
+  }
+
+  // Coordinates of the pose, and parameters of the model that belong to it.
+  void ReadPose(const YamlNode& node) {
+    if (node.is_scalar() && node.text == "home") return;
+    const std::vector<std::string> coordinates = CoordinateNames(*mechanism_);
+    Overrides parameters;
+    for (const YamlEntry& entry : yaml_.Entries(node, "pose")) {
+      const auto [name, factor] = WithoutUnit(entry.key);
+      const auto number = values_.Number(*entry.value, JoinPath("pose", entry.key));
+      const bool coordinate = Contains(coordinates, name);
+      const bool parameter = mechanism_->HasParameter(name);
+      if (!coordinate && !parameter) {
+        UnknownName(entry, name, coordinates);
+        continue;
+      }
+      if (scenario_.pose.contains(name) || parameters.contains(name)) {
+        yaml_.Error(entry, fmt::format("pose: {} is given twice", name));
+      }
+      if (!number) continue;
+      if (coordinate) scenario_.pose[name] = factor * *number;
+      if (parameter) parameters[name] = factor * *number;
+      if (parameter)
+        scenario_.parameter_places[name] = PlacesOf(node, file_, options_.set)[entry.key];
+    }
+    if (!parameters.empty()) {
+      scenario_.parameters = Merge(scenario_.parameters, parameters);
+      LoadWith(scenario_.parameters);
+    }
+    if (!mechanism_ || yaml_.has_errors() || scenario_.pose.empty()) return;
+    const PoseFault fault = CheckPose(*mechanism_, scenario_.pose);
+    if (!fault.message.empty()) yaml_.Error(node, fault.message, fault.hint);
+  }
+
+  void UnknownName(const YamlEntry& entry, const std::string& name,
+                   std::vector<std::string> known) {
+    for (const Parameter& p : mechanism_->parameters) known.push_back(p.name);
+    const std::string near = ClosestWord(name, known);
+    yaml_.Error(entry,
+                fmt::format("pose: {} has no coordinate or parameter '{}'", mechanism_->name, name),
+                near.empty() ? "known: drives, OUTPUT.x … OUTPUT.yaw, and the model's parameters"
+                             : fmt::format("did you mean '{}'?", near));
+  }
+
+  void ReadOutput(const YamlNode& node) {
+    std::vector<std::string> names;
+    for (const Output& output : mechanism_->outputs) names.push_back(output.name);
+    const auto choice = yaml_.Choice(node, "output", names);
+    if (choice) scenario_.output = names[static_cast<size_t>(*choice)];
+  }
+
+  // Overrides of single witnesses must name parameters of the model, too.
+  void CheckParameters(const YamlMap& map) {
+    if (!mechanism_) return;
+    for (const char* section : {"analytic", "reference", "simulation"}) {
+      const YamlNode* node = map.Find(section);
+      const YamlNode* parameters = node == nullptr ? nullptr : node->Find("parameters");
+      if (parameters == nullptr) continue;
+      for (const YamlEntry& entry : parameters->entries) {
+        CheckParameterName(entry, std::string(section) + ".parameters", *mechanism_, &yaml_);
+      }
+    }
+  }
+
+  std::string file_;
+  const ScenarioOptions& options_;
+  YamlReader yaml_;
+  Scope scope_;
+  ValueReader values_;
+  Diagnostics model_findings_;
+  StiffnessScenario scenario_;
+  std::optional<Mechanism> mechanism_;
+};
+
+}  // namespace
+
+StiffnessScenarioResult LoadStiffnessScenario(const std::string& file,
+                                              const ScenarioOptions& options) {
+  return Loader(file, options).LoadFile();
+}
+
+StiffnessScenarioResult LoadStiffnessScenarioText(const std::string& text, const std::string& file,
+                                                  const ScenarioOptions& options) {
+  return Loader(file, options).Load(text);
+}
+
+}  // namespace mbv

@@ -1,0 +1,17 @@
+// The sections of a stiffness scenario that do not need its mechanism.
+#pragma once
+
+#include "scenario/stiffness_scenario.h"
+#include "scenario/value_reader.h"
+
+namespace mbv {
+
+[[nodiscard]] ReferenceSettings ReadStiffnessReference(ValueReader* values, const YamlNode* node);
+[[nodiscard]] StiffnessSimulation ReadStiffnessSimulation(ValueReader* values,
+                                                          const YamlNode* node);
+/// The wrenches of `loads:` and where they come from.
+[[nodiscard]] std::vector<Vec6> ReadStiffnessLoads(ValueReader* values, const YamlNode* node,
+                                                   std::string* text);
+[[nodiscard]] StiffnessLimits ReadStiffnessChecks(ValueReader* values, const YamlNode* node);
+
+}  // namespace mbv
