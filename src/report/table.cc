@@ -102,6 +102,7 @@ class Writer {
     const bool simulated = check.subject.starts_with("simulated");
     switch (check.metric) {
       case Metric::kForceNrmse:
+      case Metric::kTableTube:
         return true;
       case Metric::kForceMax:
       case Metric::kForceOwn:
@@ -121,6 +122,8 @@ class Writer {
       case Metric::kClosureRad:
       case Metric::kDerivatives:
         return false;
+      case Metric::kEnergy:
+        return simulated;
     }
     return true;
   }

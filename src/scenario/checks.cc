@@ -108,6 +108,20 @@ constexpr MetricRow kRows[] = {
      "",
      false,
      {1e-4, 1e-4, 1e-4}},
+    {Metric::kEnergy,
+     "energy_drift",
+     "energy_drift_rel",
+     "energy drift",
+     "",
+     false,
+     {1e-6, 1e-6, 1e-8}},
+    {Metric::kTableTube,
+     "table_tube",
+     "table_tube_max",
+     "table column / its tube",
+     "",
+     true,
+     {1.0, 1.0, 1.0}},
 };
 static_assert(std::size(kRows) == kMetrics);
 

@@ -35,8 +35,10 @@ enum class Metric {
   kClosureRad,    ///< loop twist gap [rad]
   kPower,         ///< |input power − energy rate| / largest power
   kDerivatives,   ///< drive velocity and acceleration against differences of the positions
+  kEnergy,        ///< free motion: |energy − start − work of the input| / largest of the two
+  kTableTube,     ///< pair with a table: worst column's difference / its tolerance tube
 };
-inline constexpr int kMetrics = 16;
+inline constexpr int kMetrics = 18;
 
 /// Which column of limits applies.
 enum class LimitColumn { kForward, kInverse, kReference };

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@
 #include "scenario/checks.h"
 
 namespace mbv {
+
+struct ReferenceTable;  // scenario/table.h
 
 /// Model parameters by name.
 using Overrides = std::map<std::string, double>;
@@ -27,10 +30,11 @@ struct AnalyticSettings {
   Overrides parameters;                 ///< bend this witness only
 };
 
-/// The generic reference's part.
+/// The reference's part: the generic solver, or a table of forces in its place.
 struct ReferenceSettings {
   bool on = true;
   Overrides parameters;
+  std::shared_ptr<const ReferenceTable> table;  ///< `reference: {csv: …}`; null: generic solver
 };
 
 /// Forces that are linear in a parameter, extrapolated to the scenario's value of it from two runs
