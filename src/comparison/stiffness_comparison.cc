@@ -1,0 +1,360 @@
+#include "comparison/stiffness_comparison.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "comparison/stiffness_measures.h"
+
+namespace mbv {
+namespace {
+
+// sqrt(M_ii) per row. An entry that vanishes (a freedom that nothing holds) is compared in units of
+// its kind's largest, times 1e-3.
+Vec6 ScaleOf(const Mat6& M) {
+  Vec6 scale;
+  for (int first : {0, 3}) {
+    const double most = M.diagonal().segment<3>(first).cwiseAbs().maxCoeff();
+    for (int i = first; i < first + 3; ++i) scale[i] = std::sqrt(std::max(M(i, i), 1e-6 * most));
+  }
+  return scale;
+}
+
+Mat6 Scaled(const Mat6& M, const Vec6& scale) {
+  const Vec6 inverse = scale.cwiseInverse();
+  return inverse.asDiagonal() * M * inverse.asDiagonal();
+}
+
+// Infinite instead of NaN when something is missing, so that it never passes.
+WorstEntry WorstOf(const Mat6& difference, const char* matrix) {
+  WorstEntry worst{0.0, ""};
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) {
+      const double value = std::abs(difference(i, j));
+      if (std::isnan(value)) return {kNan, ""};
+      if (value <= worst.value && !worst.where.empty()) continue;
+      worst = {value, fmt::format("{}({}, {})", matrix, AxisName(i), AxisName(j))};
+    }
+  }
+  return worst;
+}
+
+WorstEntry WorstShare(const StiffnessResult& measured, const StiffnessResult& truth) {
+  const Vec6 scale = ScaleOf(truth.C);
+  WorstEntry worst{0.0, ""};
+  for (const ComplianceShare& share : truth.shares) {
+    const auto found =
+        std::find_if(measured.shares.begin(), measured.shares.end(),
+                     [&](const ComplianceShare& other) { return other.element == share.element; });
+    if (found == measured.shares.end()) return {kNan, share.element + " is missing"};
+    const WorstEntry entry = WorstOf(Scaled(found->C - share.C, scale), "C");
+    if (!(entry.value <= worst.value) || worst.where.empty()) {
+      worst = {entry.value, share.element + ", " + entry.where};
+      if (std::isnan(worst.value)) return worst;
+    }
+  }
+  return worst;
+}
+
+LoadErrors CompareLoads(const std::vector<Vec6>& measured, const std::vector<Vec6>& truth) {
+  LoadErrors errors;
+  errors.scale = errors.max = errors.mean = Vec6::Zero();
+  errors.vector_max = errors.vector_mean = 0.0;
+  for (const Vec6& d : truth) errors.scale = errors.scale.cwiseMax(d.cwiseAbs());
+  // An axis that hardly moves is compared in units of its kind's largest, times 1e-3.
+  for (int first : {0, 3}) {
+    const double floor = 1e-3 * errors.scale.segment<3>(first).maxCoeff();
+    for (int i = first; i < first + 3; ++i) errors.scale[i] = std::max(errors.scale[i], floor);
+  }
+  double worst = -1.0;
+  const auto count = static_cast<double>(truth.size());
+  for (size_t k = 0; k < truth.size(); ++k) {
+    const Vec6 error = measured[k] - truth[k];
+    const Vec6 relative = error.cwiseAbs().cwiseQuotient(errors.scale);
+    errors.mean += relative / count;
+    // A NaN must stay; cwiseMax might drop it.
+    for (int i = 0; i < 6; ++i) {
+      if (!(relative[i] <= errors.max[i])) errors.max[i] = relative[i];
+    }
+    if (const double most = relative.tail<3>().maxCoeff(); !(most <= worst)) {
+      worst = most;
+      errors.worst_load = static_cast<int>(k);
+    }
+    const double of_vector = error.tail<3>().norm() / truth[k].tail<3>().norm();
+    errors.vector.push_back(of_vector);
+    errors.vector_mean += of_vector / count;
+    if (!(of_vector <= errors.vector_max) || k == 0) {
+      errors.vector_max = of_vector;
+      errors.worst_vector = static_cast<int>(k);
+    }
+  }
+  return errors;
+}
+
+WorstEntry WorstAxis(const LoadErrors& errors, int first) {
+  WorstEntry worst{0.0, ""};
+  for (int i = first; i < first + 3; ++i) {
+    if (errors.max[i] <= worst.value && !worst.where.empty()) continue;
+    worst = {errors.max[i], AxisName(i)};
+  }
+  return worst;
+}
+
+// "reference: singular pose near …", "…: switched off in the scenario".
+std::string Explain(const StiffnessWitness& witness) {
+  return witness.name + ": " + witness.result.summary.message;
+}
+
+void AddCheck(const StiffnessInput& input, const std::string& subject, StiffnessMetric metric,
+              const WorstEntry& measured, StiffnessComparison* comparison) {
+  const StiffnessLimit& limit = input.limits[metric];
+  StiffnessCheck check{.name = subject + "." + RowOf(metric).key,
+                       .subject = subject,
+                       .metric = metric,
+                       .value = measured.value,
+                       .limit = subject.starts_with("simulated") ? limit.simulated : limit.computed,
+                       .where = measured.where};
+  check.pass = check.limit && check.value <= *check.limit;  // false for NaN
+  comparison->checks.push_back(std::move(check));
+}
+
+const StiffnessWitness* FindWitness(const StiffnessInput& input, const std::string& name) {
+  for (const StiffnessWitness& witness : input.witnesses) {
+    if (witness.name == name) return &witness;
+  }
+  return nullptr;
+}
+
+void AddPair(const StiffnessInput& input, const char* measured, const char* truth,
+             StiffnessComparison* comparison) {
+  const StiffnessWitness* a = FindWitness(input, measured);
+  const StiffnessWitness* b = FindWitness(input, truth);
+  if (a == nullptr || b == nullptr) return;
+  StiffnessPair pair = CompareStiffnessPair(*a, *b);
+  const auto note = [&](const std::string& what, const std::string& why) {
+    comparison->not_compared.push_back({pair.name() + what, why});
+  };
+  if (!pair.compared) {
+    note("", pair.reason);
+  } else {
+    if (!pair.metrics.contains(StiffnessMetric::kComplianceEntry)) {
+      note(".compliance", "the stiffness is singular and has no inverse");
+    }
+    if (!pair.metrics.contains(StiffnessMetric::kShareEntry)) {
+      note(".shares", "not both give the elements' shares");
+    }
+    if (!pair.loads && !input.loads.empty()) note(".loads", "not both give displacements");
+  }
+  for (const auto& [metric, worst] : pair.metrics) {
+    AddCheck(input, pair.name(), metric, worst, comparison);
+  }
+  comparison->pairs.push_back(std::move(pair));
+}
+
+// What one witness shows by itself.
+void AddOwnChecks(const StiffnessInput& input, const StiffnessWitness& witness,
+                  StiffnessComparison* comparison) {
+  const StiffnessResult& result = witness.result;
+  const auto add = [&](StiffnessMetric metric, const WorstEntry& worst) {
+    AddCheck(input, witness.name, metric, worst, comparison);
+  };
+  const Vec6 scale = ScaleOf(result.K);
+  add(StiffnessMetric::kSymmetry, WorstOf(Scaled(result.K - result.K.transpose(), scale), "K"));
+  const Eigen::SelfAdjointEigenSolver<Mat6> solver(
+      Scaled(0.5 * (result.K + result.K.transpose()), scale));
+  add(StiffnessMetric::kDefinite, {std::max(0.0, -solver.eigenvalues()[0]), ""});
+  if (!result.shares.empty() && result.C.allFinite()) {
+    Mat6 rest = -result.C;
+    for (const ComplianceShare& share : result.shares) rest += share.C;
+    add(StiffnessMetric::kSharesSum, WorstOf(Scaled(rest, ScaleOf(result.C)), "C"));
+  }
+  if (witness.name != "simulated") return;
+  add(StiffnessMetric::kResidual, {witness.residual, ""});
+  add(StiffnessMetric::kExtrapolation, {witness.extrapolation_error, ""});
+}
+
+bool JudgesStiffness(const StiffnessCheck& check) {
+  return check.limit && (check.metric == StiffnessMetric::kStiffnessEntry ||
+                         check.metric == StiffnessMetric::kComplianceEntry);
+}
+
+void Judge(const StiffnessInput& input, StiffnessComparison* comparison) {
+  for (const StiffnessWitness& witness : input.witnesses) {
+    const RunSummary& summary = witness.result.summary;
+    if (summary.ok() || summary.stop == Stop::kNotRun) continue;
+    comparison->reason = Explain(witness);
+    return;
+  }
+  if (comparison->MainPair() == nullptr) {
+    comparison->reason = "no stiffness could be compared";
+    if (!comparison->pairs.empty()) comparison->reason += ": " + comparison->pairs.front().reason;
+    return;
+  }
+  if (std::none_of(comparison->checks.begin(), comparison->checks.end(), JudgesStiffness)) {
+    comparison->reason = "every check of K and C is switched off, so nothing was verified";
+    return;
+  }
+  const size_t failed = comparison->failed();
+  comparison->verdict = failed == 0 ? Verdict::kAgree : Verdict::kDisagree;
+  comparison->reason =
+      failed == 0 ? fmt::format("all {} checks are within their limits", comparison->verified())
+                  : fmt::format("{} of {} checks exceed their limits", failed,
+                                failed + comparison->verified());
+}
+
+std::string Amount(double value) {
+  return value >= 1e-3 ? fmt::format("{:.2g} %", 100 * value) : fmt::format("{:.1e}", value);
+}
+
+double DistanceOf(const StiffnessComparison& comparison, const std::string& pair) {
+  const StiffnessPair* found = comparison.FindPair(pair);
+  if (found == nullptr || !found->compared) return kNan;
+  return found->metrics.at(StiffnessMetric::kStiffnessEntry).value;
+}
+
+// The two that are closest by far stand against the third.
+Attribution Attribute(const StiffnessComparison& comparison) {
+  struct Side {
+    const char *odd, *pair, *others[2];
+    double distance;
+  };
+  std::vector<Side> sides = {{"simulated",
+                              "reference_vs_analytic",
+                              {"simulated_vs_analytic", "simulated_vs_reference"},
+                              0},
+                             {"reference",
+                              "simulated_vs_analytic",
+                              {"reference_vs_analytic", "simulated_vs_reference"},
+                              0},
+                             {"analytic",
+                              "simulated_vs_reference",
+                              {"simulated_vs_analytic", "reference_vs_analytic"},
+                              0}};
+  for (Side& side : sides) side.distance = DistanceOf(comparison, side.pair);
+  const StiffnessPair* main = comparison.MainPair();
+  if (main == nullptr) return {};
+  if (std::any_of(sides.begin(), sides.end(),
+                  [](const Side& side) { return std::isnan(side.distance); })) {
+    return {"", fmt::format("only two computations were compared: K differs by {} at most",
+                            Amount(main->metrics.at(StiffnessMetric::kStiffnessEntry).value))};
+  }
+  const bool stiffness_fails =
+      std::any_of(comparison.checks.begin(), comparison.checks.end(),
+                  [](const StiffnessCheck& c) { return JudgesStiffness(c) && !c.pass; });
+  std::sort(sides.begin(), sides.end(),
+            [](const Side& a, const Side& b) { return a.distance < b.distance; });
+  if (!stiffness_fails) {
+    return {"", fmt::format("all three agree: K to {} between closed form and frame elements, to "
+                            "{} with the simulation",
+                            Amount(DistanceOf(comparison, "reference_vs_analytic")),
+                            Amount(DistanceOf(comparison, "simulated_vs_analytic")))};
+  }
+  const Side& closest = sides.front();
+  constexpr double kClearlyFarther = 10.0;
+  if (!(sides[1].distance > kClearlyFarther * closest.distance)) {
+    return {"", "the three computations differ among each other; none stands out"};
+  }
+  const std::string far = closest.others[0];
+  const StiffnessPair* pair = comparison.FindPair(far);
+  const WorstEntry& worst = pair->metrics.at(StiffnessMetric::kStiffnessEntry);
+  std::string names = closest.pair;
+  const size_t at = names.find("_vs_");
+  return {closest.odd,
+          fmt::format("{} and {} agree on K to {}; {} differs from them by {}, most at {}",
+                      names.substr(0, at), names.substr(at + 4), Amount(closest.distance),
+                      closest.odd, Amount(worst.value), worst.where)};
+}
+
+}  // namespace
+
+const StiffnessPair* StiffnessComparison::FindPair(const std::string& name) const {
+  for (const StiffnessPair& pair : pairs) {
+    if (pair.name() == name) return &pair;
+  }
+  return nullptr;
+}
+
+const StiffnessCheck* StiffnessComparison::FindCheck(const std::string& name) const {
+  for (const StiffnessCheck& check : checks) {
+    if (check.name == name) return &check;
+  }
+  return nullptr;
+}
+
+const StiffnessPair* StiffnessComparison::MainPair() const {
+  for (const char* name :
+       {"simulated_vs_analytic", "simulated_vs_reference", "reference_vs_analytic"}) {
+    const StiffnessPair* pair = FindPair(name);
+    if (pair != nullptr && pair->compared) return pair;
+  }
+  return nullptr;
+}
+
+size_t StiffnessComparison::failed() const {
+  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(),
+                                           [](const auto& c) { return c.limit && !c.pass; }));
+}
+
+size_t StiffnessComparison::verified() const {
+  return static_cast<size_t>(
+      std::count_if(checks.begin(), checks.end(), [](const auto& c) { return c.limit && c.pass; }));
+}
+
+StiffnessPair CompareStiffnessPair(const StiffnessWitness& measured,
+                                   const StiffnessWitness& truth) {
+  StiffnessPair pair;
+  pair.measured = measured.name;
+  pair.truth = truth.name;
+  pair.reason.clear();
+  for (const StiffnessWitness* witness : {&measured, &truth}) {
+    if (witness->ran()) continue;
+    pair.reason += (pair.reason.empty() ? "" : "; ") + Explain(*witness);
+  }
+  if (!pair.reason.empty()) return pair;
+  pair.compared = true;
+  const StiffnessResult &a = measured.result, &b = truth.result;
+  pair.K_difference = Scaled(a.K - b.K, ScaleOf(b.K));
+  pair.metrics[StiffnessMetric::kStiffnessEntry] = WorstOf(pair.K_difference, "K");
+  if (a.C.allFinite() && b.C.allFinite()) {
+    pair.C_difference = Scaled(a.C - b.C, ScaleOf(b.C));
+    pair.metrics[StiffnessMetric::kComplianceEntry] = WorstOf(pair.C_difference, "C");
+    if (!a.shares.empty() && !b.shares.empty()) {
+      pair.metrics[StiffnessMetric::kShareEntry] = WorstShare(a, b);
+    }
+  }
+  if (measured.displacements.empty() ||
+      measured.displacements.size() != truth.displacements.size()) {
+    return pair;
+  }
+  pair.loads = CompareLoads(measured.displacements, truth.displacements);
+  WorstEntry axis = WorstAxis(*pair.loads, 3);
+  axis.where = fmt::format("{}, load {}", axis.where, pair.loads->worst_load + 1);
+  pair.metrics[StiffnessMetric::kDisplacementAxis] = axis;
+  pair.metrics[StiffnessMetric::kRotationAxis] = WorstAxis(*pair.loads, 0);
+  pair.metrics[StiffnessMetric::kDisplacementVector] = {
+      pair.loads->vector_max, fmt::format("load {}", pair.loads->worst_vector + 1)};
+  return pair;
+}
+
+std::vector<Vec6> Displacements(const StiffnessResult& result, const std::vector<Vec6>& loads) {
+  std::vector<Vec6> displacements;
+  if (!result.C.allFinite()) return displacements;
+  for (const Vec6& load : loads) displacements.push_back(result.C * load);
+  return displacements;
+}
+
+StiffnessComparison CompareStiffness(const StiffnessInput& input) {
+  StiffnessComparison comparison;
+  AddPair(input, "simulated", "analytic", &comparison);
+  AddPair(input, "reference", "analytic", &comparison);
+  AddPair(input, "simulated", "reference", &comparison);
+  for (const StiffnessWitness& witness : input.witnesses) {
+    if (witness.ran()) AddOwnChecks(input, witness, &comparison);
+  }
+  Judge(input, &comparison);
+  comparison.attribution = Attribute(comparison);
+  return comparison;
+}
+
+}  // namespace mbv
