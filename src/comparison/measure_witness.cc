@@ -23,6 +23,8 @@ std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate) 
       return mechanism.prescribed[index].name + ".position";
     case Coordinate::Kind::kOutput:
       return mechanism.outputs[index].name + "." + kComponents[coordinate.component];
+    case Coordinate::Kind::kJoint:
+      return "";  // not recorded
   }
   return "";
 }

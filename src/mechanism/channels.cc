@@ -59,4 +59,6 @@ std::vector<Channel> AuditChannels() {
           {"power.energy_rate", "W", ""}};
 }
 
+std::vector<Channel> EnergyChannels() { return {{"energy.total", "J", ""}}; }
+
 }  // namespace mbv

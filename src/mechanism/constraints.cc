@@ -183,6 +183,9 @@ ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate
     case Coordinate::Kind::kOutput:
       return OutputRow(mechanism.outputs[coordinate.index], coordinate.component, states,
                        near_value);
+    case Coordinate::Kind::kJoint:
+      return JointCoordinateRow(mechanism.joints[coordinate.index], coordinate.component, states,
+                                near_value);
   }
   ThrowDemand("known coordinate kind", __FILE__, __LINE__, "?");
 }

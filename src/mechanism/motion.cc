@@ -9,6 +9,13 @@ int Motion::FindCommand(const std::string& command_name) const {
   return -1;
 }
 
+int Motion::FindForce(int drive) const {
+  for (size_t i = 0; i < forces.size(); ++i) {
+    if (forces[i].drive == drive) return static_cast<int>(i);
+  }
+  return -1;
+}
+
 void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
   const auto n = static_cast<Eigen::Index>(motion.commands.size());
   sample->time_s = t_s;

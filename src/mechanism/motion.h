@@ -18,6 +18,7 @@ struct Coordinate {
     kPrescribed,  ///< index into Mechanism::prescribed
     kDrive,       ///< index into Mechanism::drives
     kOutput,      ///< index into Mechanism::outputs, component 0…5 = x, y, z, roll, pitch, yaw
+    kJoint,       ///< index into Mechanism::joints, component: its coordinate; start values only
   };
   Kind kind = Kind::kDrive;
   int index = 0;
@@ -46,11 +47,31 @@ struct Load {
   std::array<Profile, 3> moment;         ///< [N m], about Q
 };
 
+/// A drive that pushes with a given force instead of following a command.
+struct DriveForce {
+  int drive = 0;  ///< index into Mechanism::drives
+  Profile force;  ///< [N] or [N m]
+};
+
+/// Where a freedom starts that moves by forces.
+struct InitialValue {
+  std::string name;
+  Coordinate coordinate;
+  double position = 0.0, rate = 0.0;  ///< [m] or [rad], per second
+};
+
 struct Motion {
   double duration_s = 1.0;
   double sample_s = 0.01;
   std::vector<Command> commands;
   std::vector<Load> loads;
+  std::vector<DriveForce> forces;     ///< free motion only; no drive is commanded and forced
+  std::vector<InitialValue> initial;  ///< one per freedom that no command holds
+
+  /// True when some freedoms move by forces (forward dynamics) instead of by commands.
+  [[nodiscard]] bool free() const { return !initial.empty(); }
+  /// Index into `forces` of a drive, or -1.
+  [[nodiscard]] int FindForce(int drive) const;
 
   [[nodiscard]] int FindCommand(const std::string& command_name) const;  ///< index or -1
 };

@@ -51,6 +51,8 @@ double HomeTurn(const Mechanism& mechanism, const Coordinate& coordinate, double
     }
     case Coordinate::Kind::kOutput:
       return commanded;
+    case Coordinate::Kind::kJoint:
+      return home_of(coordinate.index, coordinate.component);
   }
   return 0.0;
 }

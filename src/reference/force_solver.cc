@@ -24,6 +24,13 @@ int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
 
 }  // namespace
 
+void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* out) {
+  for (const Joint& joint : mechanism.joints) {
+    const ConstraintRows rows = RowsOf(joint, states, true);
+    out->Add(rows, ReactionRows(joint, rows));
+  }
+}
+
 ForceSolver::ForceSolver(const Mechanism& mechanism)
     : mechanism_(mechanism),
       length_(CharacteristicLength(mechanism)),
@@ -31,10 +38,7 @@ ForceSolver::ForceSolver(const Mechanism& mechanism)
 
 void ForceSolver::FillRows(const BodyStates& states) {
   rows_.Clear();
-  for (const Joint& joint : mechanism_.joints) {
-    const ConstraintRows rows = RowsOf(joint, states, true);
-    rows_.Add(rows, ReactionRows(joint, rows));
-  }
+  AddReactionRows(mechanism_, states, &rows_);
   for (const Drive& drive : mechanism_.drives) {
     rows_.Add(DriveRow(mechanism_, drive, states), PositionUnit(mechanism_, drive) == "rad");
   }
@@ -165,26 +169,31 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
   return summary;
 }
 
-void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
-  const auto joints = static_cast<Eigen::Index>(mechanism_.joints.size());
-  sample->reactions.setZero(joints, 6);
+int FillReactions(const Mechanism& mechanism, const BodyStates& states, const VecX& force,
+                  MatX* reactions) {
+  const auto joints = static_cast<Eigen::Index>(mechanism.joints.size());
+  reactions->setZero(joints, 6);
   int row = 0;
   for (Eigen::Index j = 0; j < joints; ++j) {
-    const Joint& joint = mechanism_.joints[j];
+    const Joint& joint = mechanism.joints[j];
     // Wrench on the child about Co in world axes …
     Vec6 wrench = Vec6::Zero();
-    const ConstraintRows rows = RowsOf(joint, sample->states, true);
+    const ConstraintRows rows = RowsOf(joint, states, true);
     for (int i = 0; i < ReactionRows(joint, rows); ++i) {
       wrench += force[row++] * rows.J_child.row(i).transpose();
     }
     // … moved to Mo and turned into F.
-    const Pose& X_WC = sample->states.X_WB[joint.child];
+    const Pose& X_WC = states.X_WB[joint.child];
     const Vec3 p_CoMo = X_WC.linear() * joint.X_CM.translation();
-    const Mat3 R_FW =
-        (sample->states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
+    const Mat3 R_FW = (states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
     const Vec3 moment = wrench.head<3>() - p_CoMo.cross(wrench.tail<3>());
-    sample->reactions.row(j) << (R_FW * wrench.tail<3>()).transpose(), (R_FW * moment).transpose();
+    reactions->row(j) << (R_FW * wrench.tail<3>()).transpose(), (R_FW * moment).transpose();
   }
+  return row;
+}
+
+void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
+  int row = FillReactions(mechanism_, sample->states, force, &sample->reactions);
   sample->drive_force = force.segment(row, mechanism_.drives.size());
   row += static_cast<int>(mechanism_.drives.size());
   sample->prescribed_force = force.segment(row, mechanism_.prescribed.size());

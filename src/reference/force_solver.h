@@ -42,6 +42,13 @@ class ForceSolver {
   MatX self_stress_;     ///< scaled; basis rows then rest rows
 };
 
+/// Rows of all joints, with the isostatic rule applied: what the joints can transmit.
+void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* rows);
+/// joints × 6 as ReactionChannels() defines, from the forces of AddReactionRows(), which come
+/// first in `force`; returns their number.
+int FillReactions(const Mechanism& mechanism, const BodyStates& states, const VecX& force,
+                  MatX* reactions);
+
 /// Wrench [m about Bo; f] that each body needs beyond gravity, springs and loads, in world axes:
 /// m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
@@ -52,6 +59,8 @@ struct PowerAudit {
   double loads_and_dampers_W = 0.0;
   double energy_rate_W = 0.0;
 };
+/// Kinetic plus potential energy (gravity from the world's origin, springs) [J].
+[[nodiscard]] double EnergyOf(const Mechanism& mechanism, const BodyStates& states);
 [[nodiscard]] PowerAudit AuditPower(const Mechanism& mechanism, const BodyStates& states,
                                     const std::vector<LoadSample>& loads);
 

@@ -89,6 +89,8 @@ bool IsAngle(const Mechanism& mechanism, const Coordinate& coordinate) {
       return PositionUnit(mechanism, mechanism.drives[coordinate.index]) == "rad";
     case Coordinate::Kind::kOutput:
       return coordinate.component >= 3;
+    case Coordinate::Kind::kJoint:
+      return !IsLength(mechanism.joints[coordinate.index].kind, coordinate.component);
   }
   return false;
 }

@@ -129,9 +129,18 @@ RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
   return RunSummary::Done();
 }
 
+void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {
+  Eigen::Map<VecX> qvel(system_->data()->qvel, system_->nv());
+  rhs_ = -(system_->J() * qvel);
+  rhs_.tail(system_->driven_rows()) += system_->Guided(driven_velocity);
+  SolveInto(rhs_, &step_);
+  qvel += step_;
+  mj_comVel(system_->engine().m.get(), system_->data());
+}
+
 void ClosureSolver::SolveVelocity(const VecX& driven_velocity) {
   rhs_.setZero();
-  rhs_.tail(driven_velocity.size()) = driven_velocity;
+  rhs_.tail(system_->driven_rows()) = system_->Guided(driven_velocity);
   SolveInto(rhs_, &step_);
   std::copy(step_.begin(), step_.end(), system_->data()->qvel);
   mj_comVel(system_->engine().m.get(), system_->data());
@@ -140,7 +149,7 @@ void ClosureSolver::SolveVelocity(const VecX& driven_velocity) {
 void ClosureSolver::SolveAcceleration(const VecX& driven_acceleration) {
   system_->Bias(&bias_);
   rhs_ = -bias_;
-  rhs_.tail(driven_acceleration.size()) += driven_acceleration;
+  rhs_.tail(system_->driven_rows()) += system_->Guided(driven_acceleration);
   SolveInto(rhs_, &step_);
   std::copy(step_.begin(), step_.end(), system_->data()->qacc);
 }
@@ -158,7 +167,7 @@ std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
   const MatX Q = qr.householderQ();
   const MatX self_stress = Q.rightCols(redundant());
   for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {
-    if (self_stress.row(i).norm() > 1e-6) rows.push_back(i - system_->first_driven_row());
+    if (self_stress.row(i).norm() > 1e-6) rows.push_back(i);
   }
   return rows;
 }

@@ -25,6 +25,8 @@ class ClosureSolver {
 
   /// d.qvel with J q̇ = [0; ẋ], minimum norm where freedoms are not driven. Evaluates mj_comVel.
   void SolveVelocity(const VecX& driven_velocity);
+  /// The least change of d.qvel that meets J q̇ = [0; ẋ]. Evaluates mj_comVel.
+  void CorrectVelocity(const VecX& driven_velocity);
   /// d.qacc with J q̈ = [0; ẍ] − J̇q̇.
   void SolveAcceleration(const VecX& driven_acceleration);
   /// λ with Jᵀλ = τ, minimum norm where it is not unique; written to d.efc_force.
@@ -32,7 +34,7 @@ class ClosureSolver {
 
   [[nodiscard]] int undriven() const { return system_->nv() - rank_; }
   [[nodiscard]] int redundant() const { return system_->rows() - rank_; }
-  /// Driven rows whose force is not unique at the present configuration.
+  /// Rows of guided coordinates whose force is not unique at the present configuration.
   [[nodiscard]] std::vector<int> DrivenRowsNotUnique() const;
 
  private:

@@ -23,7 +23,15 @@ ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d) : engin
     closure_row_.push_back(closure_rows_);
     closure_rows_ += closure.type == PlannedClosure::Type::kConnect ? 3 : 6;
   }
-  rows_ = closure_rows_ + static_cast<int>(engine.driven.size());
+  rows_ = closure_rows_;
+  const auto driven = static_cast<Eigen::Index>(engine.driven.size());
+  given_.setZero(driven);
+  unit_.setZero(engine.m->nv, driven);
+  for (Eigen::Index k = 0; k < driven; ++k) {
+    const DrivenPlace& place = engine.driven[static_cast<size_t>(k)];
+    driven_row_.push_back(place.forced ? -1 : rows_++);
+    if (!place.is_tendon) unit_(place.dof, k) = 1.0;
+  }
   A0_.setZero(6, engine.m->nbody);
 }
 
@@ -31,6 +39,38 @@ void ConstraintSystem::SetTargets(const VecX& position) {
   for (size_t k = 0; k < engine_.driven.size(); ++k) {
     const DrivenPlace& place = engine_.driven[k];
     engine_.m->eq_data[mjNEQDATA * place.equality] = position[k] - place.home;
+  }
+}
+
+VecX ConstraintSystem::Guided(const VecX& per_driven) const {
+  VecX guided(driven_rows());
+  for (Eigen::Index k = 0; k < per_driven.size(); ++k) {
+    if (driven_row_[k] >= 0) guided[driven_row_[k] - closure_rows_] = per_driven[k];
+  }
+  return guided;
+}
+
+double ConstraintSystem::DrivenForce(int k) const {
+  return driven_row_[k] >= 0 ? d_->efc_force[driven_row_[k]] : given_[k];
+}
+
+Eigen::Map<const VecX> ConstraintSystem::DrivenJacobian(int k) const {
+  const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
+  const int nv = engine_.m->nv;
+  if (place.is_tendon) return {d_->ten_J + place.object * nv, nv};
+  return {unit_.data() + static_cast<Eigen::Index>(k) * nv, nv};
+}
+
+double ConstraintSystem::DrivenBias(int k, const VecX& bias) {
+  if (driven_row_[k] >= 0) return bias[driven_row_[k]];
+  const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
+  return place.is_tendon ? TendonBias(place.object) : 0.0;
+}
+
+void ConstraintSystem::AddGivenForces(double* qfrc) const {
+  Eigen::Map<VecX> out(qfrc, engine_.m->nv);
+  for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
+    if (driven_row_[k] < 0) out += given_[k] * DrivenJacobian(k);
   }
 }
 
@@ -115,7 +155,7 @@ void ConstraintSystem::Bias(VecX* bias) {
   }
   for (size_t k = 0; k < engine_.driven.size(); ++k) {
     const DrivenPlace& place = engine_.driven[k];
-    if (place.is_tendon) (*bias)[closure_rows_ + k] = TendonBias(place.object);
+    if (place.is_tendon && driven_row_[k] >= 0) (*bias)[driven_row_[k]] = TendonBias(place.object);
   }
 }
 

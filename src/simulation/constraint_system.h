@@ -1,7 +1,7 @@
 // MuJoCo's equality constraints as a system r(q) = 0 with Jacobian J and bias J̇q̇.
 //
-// Rows: the closures in plan order, then the driven coordinates (drives, prescribed joints). The
-// residual of a driven row is position − target. MuJoCo 2.2.2 has no J̇q̇ in its reference
+// Rows: the closures in plan order, then the guided coordinates (drives without a given force,
+// prescribed joints). The residual of a guided row is position − target. MuJoCo 2.2.2 has no J̇q̇ in its reference
 // accelerations; it is computed here from MuJoCo's own cvel and cdof_dot:
 //
 //   bias acceleration of body b (spatial, about the root's centre of mass c):
@@ -33,6 +33,24 @@ class ConstraintSystem {
   [[nodiscard]] int rows() const { return rows_; }
   [[nodiscard]] int closure_rows() const { return closure_rows_; }
   [[nodiscard]] int driven_rows() const { return rows_ - closure_rows_; }
+  /// Row of driven coordinate k, or -1 if its force is given.
+  [[nodiscard]] int driven_row(int k) const { return driven_row_[k]; }
+  /// The entries of a vector over all driven coordinates that have rows.
+  [[nodiscard]] VecX Guided(const VecX& per_driven) const;
+
+  /// Forces of the drives that have no row, per driven coordinate.
+  void SetGivenForces(const VecX& force) { given_ = force; }
+  /// Force of driven coordinate k: its constraint's, or the given one.
+  [[nodiscard]] double DrivenForce(int k) const;
+  /// dx/dq̇ of driven coordinate k at the present position.
+  [[nodiscard]] Eigen::Map<const VecX> DrivenJacobian(int k) const;
+  /// J̇q̇ of driven coordinate k, given the bias of all rows.
+  [[nodiscard]] double DrivenBias(int k, const VecX& bias);
+  /// Adds Jᵀ · given force to `qfrc` (nv).
+  void AddGivenForces(double* qfrc) const;
+  [[nodiscard]] bool has_given_forces() const {
+    return driven_rows() < static_cast<int>(engine_.driven.size());
+  }
   [[nodiscard]] int nv() const { return engine_.m->nv; }
   [[nodiscard]] const EngineModel& engine() const { return engine_; }
   [[nodiscard]] mjData* data() const { return d_; }
@@ -74,7 +92,9 @@ class ConstraintSystem {
   const EngineModel& engine_;
   mjData* const d_;
   int rows_ = 0, closure_rows_ = 0;
-  std::vector<int> closure_row_;
+  std::vector<int> closure_row_, driven_row_;
+  VecX given_;
+  MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)
 };
 

@@ -104,6 +104,14 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   return FindDriven(engine);
 }
 
+void ReleaseForcedDrives(const Motion& motion, EngineModel* engine) {
+  for (const DriveForce& force : motion.forces) {
+    DrivenPlace& place = engine->driven[static_cast<size_t>(force.drive)];
+    place.forced = true;
+    engine->m->eq_active[place.equality] = 0;
+  }
+}
+
 Pose PoseOf(const mjData& d, int body_id) {
   Pose X = Pose::Identity();
   X.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.xmat + 9 * body_id);

@@ -6,6 +6,7 @@
 
 #include "core/run_summary.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
 #include "mjcf/plan.h"
 #include "simulation/engine.h"
 
@@ -19,6 +20,7 @@ struct DrivenPlace {
   int object = -1;    ///< tendon or joint
   int dof = -1;       ///< joints only
   double home = 0.0;  ///< the constraint's residual is position − home − eq_data[0]
+  bool forced = false;  ///< moves by a given force: its guiding constraint is switched off
 };
 
 struct EngineModel {
@@ -41,6 +43,9 @@ struct EngineModel {
 /// MuJoCo refuses it; returns kUnsupported for drives that have no scalar coordinate in MuJoCo.
 [[nodiscard]] RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                                          EngineModel* engine);
+
+/// Switches off the guiding constraints of the drives whose force the motion gives.
+void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);
 
 /// Poses of all mechanism bodies in the world from the data's current kinematics; merged bodies
 /// from the joint coordinates of their chain.

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <ctime>
 
 #include "mjcf/mjcf.h"
 #include "simulation/integrator.h"
@@ -12,7 +13,25 @@
 namespace mbv::simulation {
 namespace {
 
-using Clock = std::chrono::steady_clock;
+// Wall and processor time of the step loop.
+class LoopClock {
+ public:
+  void Stop(SimulationRun* run) const {
+    run->loop_wall_s = std::chrono::duration<double>(Clock::now() - wall_).count();
+    run->loop_cpu_s = CpuSeconds() - cpu_s_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  static double CpuSeconds() {
+    timespec now{};
+    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  }
+
+  const Clock::time_point wall_ = Clock::now();
+  const double cpu_s_ = CpuSeconds();
+};
 
 // A closure open by more than this part of the mechanism's extent has come apart.
 constexpr double kApart = 0.01;
@@ -27,6 +46,7 @@ RunSummary Failure(const std::string& message, double t_s) {
 
 // Home to the first driven sample, with consistent velocities and accelerations.
 RunSummary PutAtStart(Session* s, const DrivenSample& first) {
+  if (s->motion.free()) return PutAtFreeStart(s, first);
   if (RunSummary summary = s->solver.Follow(HomePositions(s->engine), first.position);
       !summary.ok()) {
     summary.time_s = 0.0;
@@ -68,7 +88,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   if (RunSummary summary = PutAtStart(s, first); !summary.ok()) return summary;
   const double largest_gap = kApart * ExtentOf(*s->engine.mechanism);
   Integrator integrator(s, AdjustedStep(s->motion, s->options.step_s));
-  const auto start = Clock::now();
+  const LoopClock clock;
   integrator.Start(first);
   s->Record(0);
   for (size_t i = 0; i < steps.size(); ++i) {
@@ -84,7 +104,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
     s->Record(static_cast<size_t>(step.sample));
     if (RunSummary summary = CheckSample(*s, largest_gap, step.to_s); !summary.ok()) return summary;
   }
-  s->run->loop_wall_s = std::chrono::duration<double>(Clock::now() - start).count();
+  clock.Stop(s->run);
   s->run->steps = static_cast<long>(steps.size());
   return RunSummary::Done();
 }
@@ -103,21 +123,18 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
   if (RunSummary summary = PutAtStart(s, samples[0]); !summary.ok()) return summary;
   // The reference of MuJoCo's row is aref = −b J q̇ − k d (x − target): the target is moved so that
   // aref is the commanded acceleration where position and velocity are as commanded.
-  const double d = kMjcfImpedance, tc = kMjcfTimeConstantSteps * h;
+  const double d = kMjcfImpedance, tc = s->options.stock_time_constant_steps * h;
   const double b = 2.0 / (d * tc), k_d = d / (d * d * tc * tc);
   const mjModel* m = s->engine.m.get();
   mjData* data = s->data.get();
   VecX target;
-  const auto start = Clock::now();
+  const LoopClock clock;
   for (long n = 0; n <= last; ++n) {
     const DrivenSample& at = samples[n];
     target = at.position + (b * at.velocity + at.acceleration) / k_d;
     s->system.SetTargets(target);
-    s->loads.Evaluate(static_cast<double>(n) * h, *data);
-    if (!s->loads.world().empty()) {
-      mju_zero(data->qfrc_applied, m->nv);
-      s->loads.AddGeneralized(data, data->qfrc_applied);
-    }
+    if (s->system.has_given_forces()) s->system.EvaluatePosition();
+    s->ApplyForces(static_cast<double>(n) * h);
     if (n % per_sample == 0) {
       mj_forward(m, data);
       s->Record(static_cast<size_t>(n / per_sample));
@@ -128,7 +145,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
       return Failure("MuJoCo reset the simulation, which had diverged", static_cast<double>(n) * h);
     }
   }
-  s->run->loop_wall_s = std::chrono::duration<double>(Clock::now() - start).count();
+  clock.Stop(s->run);
   s->run->steps = last;
   return RunSummary::Done();
 }

@@ -124,11 +124,7 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, 
   mj_comVel(m_, d_);
   s_.system.EvaluatePassive();
   mj_rne(m_, d_, 0, d_->qfrc_bias);
-  s_.loads.Evaluate(t_s, *d_);
-  if (!s_.loads.world().empty()) {
-    mju_zero(d_->qfrc_applied, m_->nv);
-    s_.loads.AddGeneralized(d_, d_->qfrc_applied);
-  }
+  s_.ApplyForces(t_s);
   SetReference(v, at);
   std::copy(warm_.begin(), warm_.end(), d_->qacc_warmstart);
   mj_fwdAcceleration(m_, d_);
@@ -141,8 +137,8 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at) {
   s_.system.Bias(&bias_);
   rate_.noalias() = s_.system.J() * v;
   aref_ = -bias_;
-  rate_.tail(driven) -= at.velocity;
-  aref_.tail(driven) += at.acceleration;
+  rate_.tail(driven) -= s_.system.Guided(at.velocity);
+  aref_.tail(driven) += s_.system.Guided(at.acceleration);
   aref_ -= b_ * rate_ + k_ * s_.system.residual();
   Eigen::Map<VecX> R(d_->efc_R, rows);
   R = kSoftness * R.cwiseMin(largest_R_);

@@ -69,6 +69,13 @@ RunSummary At(RunSummary summary, double t_s) {
 }  // namespace
 
 RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
+  if (s->motion.free()) {
+    return {.stop = Stop::kUnsupported,
+            .message = "a motion that follows from forces needs mode: forward",
+            .time_s = 0.0,
+            .where = {},
+            .unit = {}};
+  }
   const std::vector<double>& times = s->run->trace.time_s;
   std::vector<DrivenSample> samples(times.size());
   for (size_t i = 0; i < times.size(); ++i) {

@@ -17,7 +17,8 @@ void Append(const std::vector<Channel>& more, std::vector<Channel>* channels) {
 
 }  // namespace
 
-Recorder::Recorder(ConstraintSystem* system) : system_(system), engine_(system->engine()) {
+Recorder::Recorder(ConstraintSystem* system, bool energy)
+    : system_(system), engine_(system->engine()), energy_(energy) {
   const Mechanism& mechanism = *engine_.mechanism;
   const auto column = [this] { return static_cast<int>(channels_.size()); };
   Append(DriveChannels(mechanism), &channels_);
@@ -29,6 +30,7 @@ Recorder::Recorder(ConstraintSystem* system) : system_(system), engine_(system->
   for (const Joint& joint : mechanism.joints) Append(ReactionChannels(joint), &channels_);
   audit_column_ = column();
   Append(AuditChannels(), &channels_);
+  if (energy) Append(EnergyChannels(), &channels_);
   W_.setZero(6, engine_.m->nbody);
   work_.setZero(engine_.m->nv);
   FindReactionPlaces();
@@ -90,21 +92,19 @@ void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
   const mjData* d = system_->data();
   const int nv = engine_.m->nv;
   system_->Bias(&bias_);
-  const auto J = system_->J();
-  const auto force = system_->force();
   const int drives = static_cast<int>(engine_.mechanism->drives.size());
   for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
     const DrivenPlace& place = engine_.driven[k];
-    const int r = system_->first_driven_row() + k;
     if (k >= drives) {
-      row[prescribed_column_ + k - drives] = force[r];
+      row[prescribed_column_ + k - drives] = system_->DrivenForce(k);
       continue;
     }
     row[4 * k] = place.is_tendon ? d->ten_length[place.object]
                                  : d->qpos[engine_.m->jnt_qposadr[place.object]];
-    row[4 * k + 1] = J.row(r).dot(ConstVecX(d->qvel, nv));
-    row[4 * k + 2] = J.row(r).dot(ConstVecX(d->qacc, nv)) + bias_[r];
-    row[4 * k + 3] = force[r];
+    const auto J = system_->DrivenJacobian(k);
+    row[4 * k + 1] = J.dot(ConstVecX(d->qvel, nv));
+    row[4 * k + 2] = J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k, bias_);
+    row[4 * k + 3] = system_->DrivenForce(k);
   }
 }
 
@@ -184,7 +184,7 @@ void Recorder::TreeWrenches(const Loads& loads) {
   for (size_t k = 0; k < engine_.driven.size(); ++k) {
     const DrivenPlace& place = engine_.driven[k];
     if (place.is_tendon) {
-      AddTendon(place.object, system_->force()[system_->first_driven_row() + k]);
+      AddTendon(place.object, system_->DrivenForce(static_cast<int>(k)));
     }
   }
   for (size_t s = 0; s < engine_.spring_tendon.size(); ++s) {
@@ -208,7 +208,7 @@ void Recorder::TreeWrenches(const Loads& loads) {
 void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
   const mjData* d = system_->data();
   for (const auto& [row, id] : driven_of_[joint]) {
-    const double f = sign * system_->force()[system_->first_driven_row() + row];
+    const double f = sign * system_->DrivenForce(row);
     const ConstVec3 axis(d->xaxis + 3 * id);
     if (engine_.m->jnt_type[id] == mjJNT_SLIDE) {
       F_W->tail<3>() -= f * axis;
@@ -252,9 +252,8 @@ void Recorder::RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> ro
   const ConstVecX qvel(d->qvel, m.nv);
   const ConstraintSystem::Gap gap = system_->LargestGap();
   double power = 0.0;
-  const int first = system_->first_driven_row();
-  for (int r = first; r < system_->rows(); ++r) {
-    power += system_->force()[r] * system_->J().row(r).dot(qvel);
+  for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
+    power += system_->DrivenForce(k) * system_->DrivenJacobian(k).dot(qvel);
   }
   for (const WorldLoad& load : loads.world()) {
     const Eigen::Map<const Vec6> V(d->cvel + 6 * load.body_id);
@@ -277,6 +276,10 @@ void Recorder::RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> ro
   row[audit_column_ + 1] = gap.rotation_rad;
   row[audit_column_ + 2] = power;
   row[audit_column_ + 3] = energy_rate;
+  if (!energy_) return;
+  mj_energyPos(&m, d);
+  mj_energyVel(&m, d);
+  row[audit_column_ + 4] = d->energy[0] + d->energy[1];
 }
 
 }  // namespace mbv::simulation

@@ -13,7 +13,8 @@ namespace mbv::simulation {
 /// of one and the same instant in the system's data.
 class Recorder {
  public:
-  explicit Recorder(ConstraintSystem* system);
+  /// `energy`: with EnergyChannels().
+  Recorder(ConstraintSystem* system, bool energy);
 
   [[nodiscard]] std::vector<Channel> channels() const { return channels_; }
 
@@ -44,6 +45,7 @@ class Recorder {
   const EngineModel& engine_;
   std::vector<Channel> channels_;
   int output_column_ = 0, prescribed_column_ = 0, reaction_column_ = 0, audit_column_ = 0;
+  const bool energy_;
   std::vector<ReactionPlace> places_;  // per joint
   std::vector<std::vector<std::pair<int, int>>>
       driven_of_;                               // per joint: (driven row, MuJoCo joint)

@@ -21,6 +21,8 @@ struct Session {
 
   /// Stores sample i and reports progress now and then.
   void Record(size_t i);
+  /// Loads and given drive forces at t, for the data's current position, into qfrc_applied.
+  void ApplyForces(double t_s);
 
   const EngineModel engine;
   const DataHandle data;
@@ -40,6 +42,9 @@ struct Session {
 [[nodiscard]] RunSummary RunInverse(Session* session, const DrivenMotion& driven);
 [[nodiscard]] RunSummary RunCorrected(Session* session, const DrivenMotion& driven);
 [[nodiscard]] RunSummary RunStock(Session* session, const DrivenMotion& driven);
+
+/// Start of a free motion: options.start on the loops, guided coordinates at `first`.
+[[nodiscard]] RunSummary PutAtFreeStart(Session* session, const DrivenSample& first);
 
 /// Positions of everything driven at home.
 [[nodiscard]] VecX HomePositions(const EngineModel& engine);

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 
@@ -20,7 +21,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       system(engine, data.get()),
       solver(&system),
       loads(engine, motion_),
-      recorder(&system) {
+      recorder(&system, motion_.free()) {
   run->trace.witness = "simulated";
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
@@ -43,6 +44,20 @@ VecX HomePositions(const EngineModel& engine) {
   VecX home(engine.driven.size());
   for (size_t k = 0; k < engine.driven.size(); ++k) home[k] = engine.driven[k].home;
   return home;
+}
+
+void Session::ApplyForces(double t_s) {
+  loads.Evaluate(t_s, *data);
+  if (loads.world().empty() && !system.has_given_forces()) return;
+  mju_zero(data->qfrc_applied, engine.m->nv);
+  loads.AddGeneralized(data.get(), data->qfrc_applied);
+  if (!system.has_given_forces()) return;
+  VecX given = VecX::Zero(static_cast<Eigen::Index>(engine.driven.size()));
+  for (const DriveForce& force : motion.forces) {
+    given[force.drive] = Evaluate(force.force, t_s).value;
+  }
+  system.SetGivenForces(given);
+  system.AddGivenForces(data->qfrc_applied);
 }
 
 bool IsSane(const double* x, int n) {
@@ -72,20 +87,26 @@ RunSummary RunMode(Session* session, const DrivenMotion& driven) {
 }
 
 void ReportUniqueness(const Session& session, SimulationRun* run) {
-  for (int k : session.solver.DrivenRowsNotUnique()) {
-    run->not_unique.push_back(session.engine.driven[k].name);
+  const std::vector<int> rows = session.solver.DrivenRowsNotUnique();
+  for (size_t k = 0; k < session.engine.driven.size(); ++k) {
+    const int row = session.system.driven_row(static_cast<int>(k));
+    if (std::find(rows.begin(), rows.end(), row) != rows.end()) {
+      run->not_unique.push_back(session.engine.driven[k].name);
+    }
   }
 }
 
 RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
                const SimulationOptions& options, const std::function<void(double)>& progress,
                SimulationRun* run) {
-  run->mjcf = WriteMjcf(mechanism, {.step_s = AdjustedStep(motion, options.step_s)});
+  run->mjcf = WriteMjcf(mechanism, {.step_s = AdjustedStep(motion, options.step_s),
+                                    .time_constant_steps = options.stock_time_constant_steps});
   EngineModel engine;
   if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
     return summary;
   }
   if (RunSummary summary = CheckLoads(engine, motion); !summary.ok()) return summary;
+  ReleaseForcedDrives(motion, &engine);
   Session session(std::move(engine), motion, options, run);
   session.progress = progress;
   RunSummary summary = RunMode(&session, driven);
@@ -106,6 +127,8 @@ Diagnostics Check(const SimulationOptions& options) {
   };
   require(options.step_s > 0.0, "step_s > 0", options.step_s);
   require(options.guidance_steps >= 20.0, "guidance_steps >= 20", options.guidance_steps);
+  require(options.stock_time_constant_steps >= 2.0, "stock_time_constant_steps >= 2",
+          options.stock_time_constant_steps);
   return diagnostics;
 }
 

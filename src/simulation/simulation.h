@@ -8,6 +8,7 @@
 #include "core/diagnostics.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
+#include "mechanism/constraints.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 
@@ -27,6 +28,12 @@ struct SimulationOptions {
   /// motion (corrected engine), in steps, >= 20: stiffer guidance destabilises the integration,
   /// softer guidance lets errors live longer.
   double guidance_steps = 50.0;
+  /// Time constant of the generated file's equality constraints (stock engine), in steps, >= 2:
+  /// MuJoCo itself raises smaller ones.
+  double stock_time_constant_steps = 2.0;
+  /// Free motion only: poses and twists of all bodies at t = 0. They are put onto the loops of the
+  /// simulated model, with the guided coordinates where they are commanded.
+  BodyStates start;
 };
 [[nodiscard]] Diagnostics Check(const SimulationOptions& options);
 
@@ -41,16 +48,18 @@ struct SimulationRun {
   std::string mjcf;                     ///< the model as simulated
   long steps = 0;
   double loop_wall_s = 0.0;           ///< time in the step loop
+  double loop_cpu_s = 0.0;            ///< processor time of this thread in the step loop
   std::vector<std::string> warnings;  ///< MuJoCo's warnings
   /// Drives and prescribed joints whose force is not unique (a self-stress of the mechanism acts
   /// on them): what is reported is one choice of many.
   std::vector<std::string> not_unique;
 };
 
-/// `motion` gives duration, sample times, loads and the times at which profiles break (the
-/// integration steps onto them); `driven` gives the commanded motion, evaluated before the loop.
+/// `motion` gives duration, sample times, loads, forces of drives and the times at which profiles
+/// break (the integration steps onto them); of a free motion `driven` counts for the commanded
+/// drives and prescribed joints only; `driven` gives the commanded motion, evaluated before the loop.
 /// Fails with what `driven` returned; kNoConvergence (the loops do not close with the commanded
-/// drive positions); kUnsupported (undriven freedoms in inverse mode, a load on a merged body, a
+/// drive positions); kUnsupported (undriven freedoms or a free motion in inverse mode, a load on a merged body, a
 /// drive on a ball); kEngineFailure (MuJoCo's errors, motion not finite, loops apart). Samples up
 /// to the failure are filled, the others NaN.
 [[nodiscard]] SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion,

@@ -16,6 +16,7 @@ std::vector<double> MotionBreaks(const Motion& motion) {
     breaks.insert(breaks.end(), times.begin(), times.end());
   };
   for (const Command& command : motion.commands) add(command.profile);
+  for (const DriveForce& force : motion.forces) add(force.force);
   for (const Load& load : motion.loads) {
     for (int c = 0; c < 3; ++c) {
       add(load.force[c]);

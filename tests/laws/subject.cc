@@ -278,6 +278,8 @@ bool Subject::IsLengthCommand(size_t k) const {
       return PositionUnit(mechanism, mechanism.drives[c.index]) == "m";
     case Coordinate::Kind::kOutput:
       return c.component < 3;
+    case Coordinate::Kind::kJoint:
+      return IsLength(mechanism.joints[c.index].kind, c.component);
   }
   return false;
 }

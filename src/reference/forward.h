@@ -1,0 +1,60 @@
+// Free motion of the reference: forward dynamics of any Mechanism.
+//
+// Poses and twists of all bodies are integrated by Runge–Kutta–Fehlberg 7(8) with error control
+// (Boost.Odeint) from accelerations of FreeDynamics; after every step the poses are put back onto
+// the loops and commands, then the twists. No MuJoCo and no paper formula.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/run_summary.h"
+#include "core/trace.h"
+#include "mechanism/constraints.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+
+namespace mbv {
+
+struct ForwardOptions {
+  /// Largest error of one step in every pose and twist component (m, m/s, rad/s, quaternions),
+  /// absolute and relative; > 0.
+  double tolerance = 1e-12;
+  bool reactions = true;  ///< record every joint's reaction channels
+  /// Also integrate with 100 times the tolerance and from a slightly moved start, to state how far
+  /// the result can be trusted.
+  bool measure_trust = true;
+};
+
+/// A singular pose that the motion passed or came close to.
+struct SingularPassage {
+  double time_s = kNan;
+  double pivot = kNan;  ///< weakest constraint there over its largest value in this run
+  std::string joint;    ///< moves most in the momentary freedom
+  bool passed = false;  ///< the pivot vanishes there to within the search
+};
+
+struct ForwardRun {
+  Trace trace;         ///< the reference's channels and EnergyChannels()
+  RunSummary summary;  ///< kSingular, kNoConvergence, kUnsupported, or what the start failed with
+  BodyStates start;    ///< at t = 0
+  long steps = 0, evaluations = 0;
+  std::vector<SingularPassage> singular;
+  /// Largest difference over all samples to the run with 100 times the tolerance, in drive
+  /// positions and outputs, lengths over the characteristic length [1]: an upper estimate of the
+  /// integration error. NaN if not measured.
+  double uncertainty = kNan;
+  /// Largest ratio of the distance between two motions to that of their starts: how much a
+  /// difference of the witnesses grows by itself. NaN if not measured.
+  double growth = kNan;
+};
+
+/// States at t = 0: the commands and motion.initial met, velocities included.
+[[nodiscard]] RunSummary InitialStates(const Mechanism& mechanism, const Motion& motion,
+                                       BodyStates* states);
+
+/// Integrates a free motion (motion.free()). Samples up to a failure are filled, the others NaN.
+[[nodiscard]] ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
+                                             const ForwardOptions& options = {});
+
+}  // namespace mbv

@@ -1,0 +1,299 @@
+#include "reference/free_dynamics.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/demand.h"
+#include "core/spatial.h"
+#include "reference/closure_failure.h"
+#include "reference/closure_solver.h"
+#include "reference/force_solver.h"
+#include "reference/square_system.h"
+
+namespace mbv::internal {
+namespace {
+
+// A row with a smaller pivot (relative) is lost: accelerations divide by it.
+constexpr double kLost = 1e-9;
+// Corrections of the pose use rows with larger pivots only; what a weaker row misses is second
+// order there, and dividing round-off by its pivot would push the pose sideways.
+constexpr double kFirm = 1e-5;
+// A row beyond the expected rank with a larger pivot contradicts it; closed loops leave 1e-11.
+constexpr double kExtra = 1e-6;
+constexpr int kMostCorrections = 12;
+
+// The rotation [rad] or translation [L] of the largest twist.
+double SizeOf(const VecX& twists, double length) {
+  double size = 0.0;
+  for (Eigen::Index i = 0; i < twists.size(); i += 6) {
+    size = std::max({size, twists.segment<3>(i).norm(), twists.segment<3>(i + 3).norm() / length});
+  }
+  return size;
+}
+
+}  // namespace
+
+FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
+    : mechanism_(mechanism),
+      motion_(motion),
+      length_(CharacteristicLength(mechanism)),
+      size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
+      freedoms_(static_cast<int>(motion.initial.size())) {
+  body_scale_.setOnes(size_);
+  for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
+  EvaluateMotion(motion, 0.0, &command_);
+  for (size_t k = 0; k < motion.commands.size(); ++k) {
+    const size_t terms = motion.commands[k].terms.size();
+    const double start = terms == 1 ? command_.position[static_cast<Eigen::Index>(k)] : 0.0;
+    near_values_.emplace_back(terms, start);
+  }
+}
+
+void FreeDynamics::Factor(double t_s, const BodyStates& states) {
+  EvaluateMotion(motion_, t_s, &command_);
+  rows_.Clear();
+  for (const Joint& joint : mechanism_.joints) {
+    const ConstraintRows rows = RowsOf(joint, states, false);
+    rows_.Add(rows, rows.rows);
+  }
+  joint_rows_ = rows_.size();
+  for (size_t k = 0; k < motion_.commands.size(); ++k) {
+    rows_.Add(mechanism_, motion_.commands[k], states, &near_values_[k]);
+    rows_.value.back() -= command_.position[static_cast<Eigen::Index>(k)];
+  }
+  MatX columns = MatX::Zero(size_, rows_.size());
+  row_scale_.resize(rows_.size());
+  for (int i = 0; i < rows_.size(); ++i) {
+    row_scale_[i] = rows_.angular[i] ? length_ : 1.0;
+    for (int p = rows_.start[i]; p < rows_.start[i + 1]; ++p) {
+      const int at = 6 * (rows_.body[p] - 1);
+      columns.col(i).segment<6>(at) =
+          row_scale_[i] * body_scale_.segment<6>(at).cwiseProduct(rows_.J[p]);
+    }
+  }
+  qr_.compute(columns);
+  Q_ = qr_.householderQ();
+  const Eigen::Index rank = size_ - freedoms_;
+  const auto pivots = qr_.matrixQR().diagonal();
+  if (rank == 0) {
+    pivot_ = 1.0;
+  } else {
+    pivot_ = rank > pivots.size() ? 0.0 : std::abs(pivots[rank - 1]) / std::abs(pivots[0]);
+  }
+}
+
+Eigen::Index FreeDynamics::FirmRank() const {
+  const auto pivots = qr_.matrixQR().diagonal();
+  Eigen::Index rank = std::min<Eigen::Index>(size_ - freedoms_, pivots.size());
+  while (rank > 0 && std::abs(pivots[rank - 1]) < kFirm * std::abs(pivots[0])) --rank;
+  return rank;
+}
+
+VecX FreeDynamics::LeastMotion(const VecX& rates, Eigen::Index rank) const {
+  if (rank == 0) return VecX::Zero(size_);
+  // Jᵀ P = Q R, so the chosen rows give R₁ᵀ (Q₁ᵀ V) = (P ᵀrates)₁.
+  const VecX ordered = qr_.colsPermutation().transpose() * rates.cwiseProduct(row_scale_);
+  const auto R = qr_.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
+  const VecX y = R.transpose().solve(ordered.head(rank));
+  return body_scale_.cwiseProduct(Q_.leftCols(rank) * y);
+}
+
+MatX FreeDynamics::Motions() const {
+  return body_scale_.asDiagonal() * Q_.rightCols(freedoms_);
+}
+
+std::string FreeDynamics::SoftJoint(const BodyStates& states) const {
+  const Eigen::Index weakest = size_ - freedoms_ - 1;
+  if (weakest < 0) return "";
+  // The part of the weakest row that no stronger one holds.
+  return MostMovingJoint(mechanism_, states, body_scale_.cwiseProduct(Q_.col(weakest)));
+}
+
+RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
+  RunSummary summary;
+  summary.stop = Stop::kSingular;
+  summary.time_s = t_s;
+  summary.where = SoftJoint(states);
+  summary.amount = pivot_;
+  summary.unit = "1";
+  summary.message = fmt::format(
+      "the loops lose a constraint at this pose: besides the {} freedom{} of the mechanism, {} "
+      "moves freely there, so the way on is not determined (relative pivot {:.1e})",
+      freedoms_ + static_cast<int>(motion_.commands.size()),
+      freedoms_ + motion_.commands.size() == 1 ? "" : "s", summary.where, pivot_);
+  return summary;
+}
+
+RunSummary FreeDynamics::CheckFreedoms(double t_s) const {
+  const auto pivots = qr_.matrixQR().diagonal();
+  const Eigen::Index rank = size_ - freedoms_;
+  if (rank >= pivots.size() || !(std::abs(pivots[rank]) > kExtra * std::abs(pivots[0]))) {
+    return RunSummary::Done();
+  }
+  RunSummary summary;
+  summary.stop = Stop::kUnsupported;
+  summary.time_s = t_s;
+  summary.amount = std::abs(pivots[rank]) / std::abs(pivots[0]);
+  summary.unit = "1";
+  summary.message = fmt::format(
+      "the loops and commands leave fewer than the {} freedoms that have initial values: the home "
+      "pose was singular, or a command contradicts another (relative pivot {:.1e})",
+      freedoms_, summary.amount);
+  return summary;
+}
+
+void FreeDynamics::AddDriveForces(double t_s, const BodyStates& states,
+                                  std::vector<Vec6>* wrench_W) const {
+  for (const DriveForce& drive : motion_.forces) {
+    const ScalarRow row = DriveRow(mechanism_, mechanism_.drives[drive.drive], states);
+    const double force = Evaluate(drive.force, t_s).value;
+    (*wrench_W)[row.parent] += force * row.J_parent;
+    (*wrench_W)[row.child] += force * row.J_child;
+  }
+}
+
+RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
+  Factor(t_s, *states);
+  if (!(pivot_ > kLost)) return Singular(t_s, *states);
+  if (RunSummary summary = CheckFreedoms(t_s); !summary.ok()) return summary;
+  VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
+  rates.tail(command_.acceleration.size()) += command_.acceleration;
+  const VecX A_p = LeastMotion(rates, size_ - freedoms_);
+  Unstack(A_p, &states->A_WB);
+
+  std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
+  RequiredWrenches(mechanism_, *states, command_.loads, &required);
+  AddDriveForces(t_s, *states, &drives);
+  const MatX R = Motions();
+  MatX MR(size_, freedoms_);
+  for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
+    const Body& body = mechanism_.bodies[b];
+    const Mat3 R_WB = states->X_WB[b].linear();
+    const Mat6 M = SpatialInertia(body.mass, R_WB * body.p_BoBcm_B,
+                                  R_WB * body.I_Bcm_B * R_WB.transpose());
+    const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
+    MR.middleRows<6>(at) = M * R.middleRows<6>(at);
+  }
+  const MatX inertia = R.transpose() * MR;
+  const Eigen::LDLT<MatX> factors(inertia);
+  const VecX D = factors.vectorD();
+  if (!(D.minCoeff() > kEps * D.maxCoeff())) {
+    const Eigen::SelfAdjointEigenSolver<MatX> eigen(inertia);
+    RunSummary summary;
+    summary.stop = Stop::kSingular;
+    summary.time_s = t_s;
+    summary.where = MostMovingJoint(mechanism_, *states, R * eigen.eigenvectors().col(0));
+    summary.message = fmt::format(
+        "a freedom near {} has no inertia, so forces do not determine its acceleration",
+        summary.where);
+    return summary;
+  }
+  const VecX u = factors.solve(R.transpose() * (Stack(drives) - Stack(required)));
+  Unstack(A_p + R * u, &states->A_WB);
+  return RunSummary::Done();
+}
+
+RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) {
+  const double tolerance = std::max(1e-13, 32 * kEps * length_);
+  if (moved != nullptr) *moved = 0.0;
+  double open = kNan, previous = std::numeric_limits<double>::infinity();
+  for (int i = 0; i < kMostCorrections; ++i) {
+    Factor(t_s, *states);
+    const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
+    open = r.size() == 0 ? 0.0 : r.cwiseAbs().maxCoeff();
+    if (!std::isfinite(open)) break;
+    if (open < tolerance || (open < 1e-11 && open > 0.5 * previous)) {
+      VecX rates = VecX::Zero(rows_.size());
+      rates.tail(command_.velocity.size()) = command_.velocity;
+      rates -= rows_.Rates(states->V_WB);
+      Unstack(Stack(states->V_WB) + LeastMotion(rates, FirmRank()), &states->V_WB);
+      return RunSummary::Done();
+    }
+    previous = open;
+    const VecX step = LeastMotion(-r, FirmRank());
+    if (moved != nullptr) *moved += SizeOf(step, length_);
+    MoveBodies(step, states);
+  }
+  RunSummary summary;
+  summary.stop = Stop::kNoConvergence;
+  summary.time_s = t_s;
+  summary.amount = open;
+  summary.unit = "m or rad";
+  summary.message = fmt::format("the loops cannot be closed again (open by {:.3g})", open);
+  return summary;
+}
+
+void FreeDynamics::Gaps(const BodyStates& states, double* position_m,
+                        double* rotation_rad) const {
+  *position_m = *rotation_rad = 0.0;
+  for (const Joint& joint : mechanism_.joints) {
+    const ConstraintRows rows = RowsOf(joint, states, false);
+    for (int i = 0; i < rows.rows; ++i) {
+      double* gap = i < rows.translation_rows ? position_m : rotation_rad;
+      *gap = std::max(*gap, std::abs(rows.residual[i]));
+    }
+  }
+}
+
+RunSummary FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
+  const BodyStates& states = sample->states;
+  EvaluateMotion(motion_, t_s, &command_);
+  RowSet rows;
+  AddReactionRows(mechanism_, states, &rows);
+  const int first_drive = rows.size();
+  std::vector<int> row_of_drive(mechanism_.drives.size(), -1);
+  for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+    if (motion_.FindForce(static_cast<int>(d)) >= 0) continue;
+    row_of_drive[d] = rows.size();
+    rows.Add(DriveRow(mechanism_, mechanism_.drives[d], states),
+             PositionUnit(mechanism_, mechanism_.drives[d]) == "rad");
+  }
+  const int first_prescribed = rows.size();
+  for (const Prescribed& prescribed : mechanism_.prescribed) {
+    const Joint& joint = mechanism_.joints[prescribed.joint];
+    rows.Add(JointCoordinateRow(joint, 0, states), !IsLength(joint.kind, 0));
+  }
+
+  std::vector<Vec6> required, given(mechanism_.bodies.size(), Vec6::Zero());
+  RequiredWrenches(mechanism_, states, command_.loads, &required);
+  AddDriveForces(t_s, states, &given);
+  const VecX wrenches = body_scale_.cwiseProduct(Stack(required) - Stack(given));
+  MatX columns = MatX::Zero(size_, rows.size());
+  VecX scale(rows.size());
+  for (int i = 0; i < rows.size(); ++i) {
+    scale[i] = rows.angular[i] ? length_ : 1.0;
+    for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
+      const int at = 6 * (rows.body[p] - 1);
+      columns.col(i).segment<6>(at) = scale[i] * body_scale_.segment<6>(at).cwiseProduct(rows.J[p]);
+    }
+  }
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kLost);
+  cod.compute(columns);
+  VecX force = cod.solve(wrenches);
+  force += cod.solve(wrenches - columns * force);  // refinement
+  force = force.cwiseProduct(scale);
+
+  MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == first_drive,
+             first_drive);
+  const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
+  sample->drive_force.resize(drives);
+  for (Eigen::Index d = 0; d < drives; ++d) {
+    const int given_index = motion_.FindForce(static_cast<int>(d));
+    sample->drive_force[d] = given_index >= 0
+                                 ? Evaluate(motion_.forces[given_index].force, t_s).value
+                                 : force[row_of_drive[d]];
+  }
+  sample->prescribed_force = force.tail(rows.size() - first_prescribed);
+  const PowerAudit audit = AuditPower(mechanism_, states, command_.loads);
+  sample->energy_rate_W = audit.energy_rate_W;
+  sample->power_input_W = audit.loads_and_dampers_W +
+                          sample->drive_force.dot(sample->driven.velocity.head(drives)) +
+                          sample->prescribed_force.dot(sample->driven.velocity.tail(
+                              sample->driven.velocity.size() - drives));
+  return RunSummary::Done();
+}
+
+}  // namespace mbv::internal

@@ -1,0 +1,83 @@
+// Accelerations of a mechanism whose motion follows from forces. Internal to reference/.
+//
+// With the scaled Jacobian J of all joint rows and commands, a QR factorisation of Jᵀ with column
+// pivoting at the present pose picks k = n − f independent rows (n: body coordinates, f: freedoms
+// that move by forces) and gives an orthonormal basis R of the motions they leave:
+//   J R = 0                                                                                    (1)
+//   A = A_p + R u̇,  A_p = J⁺(ẍ − b)  (least norm)                                             (2)
+//   RᵀM R u̇ = Rᵀ(F − w(A_p))                                                                  (3)
+// with w(A) = M A + … what Newton–Euler asks of each body beyond gravity, springs and loads, and F
+// the wrenches of the forced drives. Reactions drop out of (3); massless bodies need no inertia as
+// long as RᵀM R has it [Udwadia, Kalaba 1996; García de Jalón, Bayo 1994, ch. 5]. Redundant rows
+// cost nothing, and no choice of rows outlives a pose.
+#pragma once
+
+#include <Eigen/QR>
+#include <vector>
+
+#include "core/run_summary.h"
+#include "mechanism/constraints.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "reference/reference.h"
+#include "reference/row_set.h"
+
+namespace mbv::internal {
+
+class FreeDynamics {
+ public:
+  /// Both outlive the object. motion.initial.size() freedoms move by forces.
+  FreeDynamics(const Mechanism& mechanism, const Motion& motion);
+
+  /// A_WB at t from X_WB and V_WB. kSingular where the pose leaves more freedoms than that, or
+  /// where one of them has no inertia.
+  [[nodiscard]] RunSummary Accelerate(double t_s, BodyStates* states);
+
+  /// Poses onto the loops and commands at t by Newton with the least correction, then velocities;
+  /// `moved` (if given) is the size of the correction of the pose [rad, characteristic lengths].
+  [[nodiscard]] RunSummary Project(double t_s, BodyStates* states, double* moved = nullptr);
+
+  /// Reactions, forces of commanded drives and prescribed joints, and the power audit, from
+  /// complete states; forces of least norm where statics leaves a choice.
+  [[nodiscard]] RunSummary Forces(double t_s, ReferenceSample* sample);
+
+  /// Smallest pivot kept by the last factorisation, over the largest: 0 where the loops lose a
+  /// constraint.
+  [[nodiscard]] double pivot() const { return pivot_; }
+  /// Name of the joint that moves most in the motion that the weakest row hardly holds.
+  [[nodiscard]] std::string SoftJoint(const BodyStates& states) const;
+
+  /// Factors the rows at a pose, for pivot() and Motions().
+  void Factor(double t_s, const BodyStates& states);
+  /// Largest translation and rotation residual over all joints.
+  void Gaps(const BodyStates& states, double* position_m, double* rotation_rad) const;
+
+  [[nodiscard]] double length() const { return length_; }
+  [[nodiscard]] int freedoms() const { return freedoms_; }
+  /// Basis R of the last factorisation, scaled back: 6·bodies × freedoms.
+  [[nodiscard]] MatX Motions() const;
+
+ private:
+  /// Least-norm twists with J V = rates, from the first `rank` pivots.
+  [[nodiscard]] VecX LeastMotion(const VecX& rates, Eigen::Index rank) const;
+  [[nodiscard]] Eigen::Index FirmRank() const;
+  void AddDriveForces(double t_s, const BodyStates& states, std::vector<Vec6>* wrench_W) const;
+  [[nodiscard]] RunSummary CheckFreedoms(double t_s) const;
+  [[nodiscard]] RunSummary Singular(double t_s, const BodyStates& states) const;
+
+  const Mechanism& mechanism_;
+  const Motion& motion_;
+  const double length_;
+  const int size_, freedoms_;
+  VecX body_scale_;
+  RowSet rows_;
+  int joint_rows_ = 0;
+  VecX row_scale_;
+  CommandSample command_;
+  std::vector<std::vector<double>> near_values_;  ///< per command, per term
+  Eigen::ColPivHouseholderQR<MatX> qr_;           ///< of the scaled Jᵀ
+  MatX Q_;
+  double pivot_ = kNan;
+};
+
+}  // namespace mbv::internal

@@ -1,0 +1,35 @@
+// What a trace records of one sample. Internal to reference/.
+#pragma once
+
+#include <vector>
+
+#include "core/trace.h"
+#include "reference/reference.h"
+
+namespace mbv::internal {
+
+/// Reads drives, prescribed joints and outputs from body states. It remembers the last sample,
+/// which says which turn an angle is in; the first one counts from home.
+class SampleRecorder {
+ public:
+  explicit SampleRecorder(const Mechanism& mechanism) : mechanism_(mechanism) {}
+
+  /// Fills `driven` and `outputs` of a sample from its states.
+  void Record(ReferenceSample* sample);
+
+ private:
+  void RecordDriven(ReferenceSample* sample);
+  void RecordOutputs(ReferenceSample* sample);
+
+  const Mechanism& mechanism_;
+  VecX last_driven_;
+  MatX last_outputs_;
+};
+
+/// Channels of the reference's traces.
+[[nodiscard]] std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reactions);
+/// Writes a sample into the first columns of `row`, in the order of ReferenceChannels().
+void WriteSample(const ReferenceSample& sample, bool reactions,
+                 Eigen::Ref<Eigen::RowVectorXd> row);
+
+}  // namespace mbv::internal

@@ -1,0 +1,122 @@
+// Free motion of the reference against closed forms.
+#include "reference/forward.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "tests/reference/fixture.h"
+
+namespace mbv::testing {
+namespace {
+
+// A point that slides along x on a spring to the origin's left; free length 0.4 m.
+Mechanism SpringMass(double mass, double stiffness, double damping) {
+  Mechanism m;
+  m.name = "spring_mass";
+  m.gravity_W.setZero();
+  m.bodies = {MakeWorld(), MakeBody("mass", mass, Vec3::Zero(), Vec3::Constant(0.01))};
+  m.joints = {MakeJoint("slide", JointKind::kPrismatic, 0, Vec3::Zero(), 1, Vec3::Zero())};
+  m.joints[0].axis = Vec3::UnitX();
+  m.springs = {{.name = "spring",
+                .body_from = 0,
+                .p_from = Vec3(-0.4, 0, 0),
+                .body_to = 1,
+                .stiffness = stiffness,
+                .damping = damping,
+                .free_length_m = 0.4}};
+  Drive motor;
+  motor.name = "motor";
+  motor.kind = JointDrive{0, 0};
+  m.drives = {motor};
+  FinishTree(&m);
+  return m;
+}
+
+Motion FreeMotionOf(const Mechanism& m, double position, double rate, double duration_s) {
+  Motion motion;
+  motion.duration_s = duration_s;
+  motion.sample_s = 0.01;
+  motion.initial = {{m.joints[0].name, {Coordinate::Kind::kJoint, 0, 0}, position, rate}};
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    motion.forces.push_back({static_cast<int>(d), Constant(0.0)});
+  }
+  return motion;
+}
+
+// What tolerance 1e-12 per step leaves after some hundred steps.
+constexpr double kIntegrated = 1e-9;
+
+TEST(Forward, AMassOnASpringSwingsLikeACosine) {
+  const double mass = 2.0, k = 50.0, x0 = 0.1, w = std::sqrt(k / mass);
+  const Mechanism m = SpringMass(mass, k, 0.0);
+  const ForwardRun run = RunForwardReference(m, FreeMotionOf(m, x0, 0.0, 5.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const auto x = ColumnOf(run.trace, "motor.position"), v = ColumnOf(run.trace, "motor.velocity");
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    const double t = run.trace.time_s[i];
+    EXPECT_NEAR(x[i], x0 * std::cos(w * t), kIntegrated) << t;
+    EXPECT_NEAR(v[i], -x0 * w * std::sin(w * t), 10 * kIntegrated) << t;
+  }
+  const auto energy = ColumnOf(run.trace, "energy.total");
+  EXPECT_NEAR(energy.maxCoeff(), 0.5 * k * x0 * x0, kIntegrated);
+  EXPECT_NEAR(energy.minCoeff(), 0.5 * k * x0 * x0, kIntegrated);
+}
+
+TEST(Forward, ADampedMassFollowsItsClosedForm) {
+  const double mass = 2.0, k = 50.0, c = 3.0, x0 = 0.1, v0 = 0.4;
+  const Mechanism m = SpringMass(mass, k, c);
+  const ForwardRun run = RunForwardReference(m, FreeMotionOf(m, x0, v0, 3.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const double d = c / (2 * mass), w = std::sqrt(k / mass - d * d);
+  const auto x = ColumnOf(run.trace, "motor.position");
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    const double t = run.trace.time_s[i];
+    const double exact =
+        std::exp(-d * t) * (x0 * std::cos(w * t) + (v0 + d * x0) / w * std::sin(w * t));
+    EXPECT_NEAR(x[i], exact, kIntegrated) << t;
+  }
+  // Mutation: 0.1 % more stiffness is seen at once.
+  const Mechanism bent = SpringMass(mass, 1.001 * k, c);
+  const ForwardRun wrong = RunForwardReference(bent, FreeMotionOf(bent, x0, v0, 3.0));
+  EXPECT_GT((ColumnOf(wrong.trace, "motor.position") - x).cwiseAbs().maxCoeff(), 1e4 * kIntegrated);
+}
+
+TEST(Forward, AConstantForceAcceleratesAMassEvenly) {
+  const Mechanism m = SpringMass(2.0, 0.0, 0.0);
+  Motion motion = FreeMotionOf(m, 0.0, 0.0, 2.0);
+  motion.forces[0].force = Constant(3.0);
+  const ForwardRun run = RunForwardReference(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_NEAR(ColumnOf(run.trace, "motor.position").tail<1>()[0], 0.5 * 1.5 * 4.0, kIntegrated);
+  EXPECT_NEAR(At(run.trace, 7, "motor.force"), 3.0, 0.0);
+}
+
+TEST(Forward, APendulumReturnsAfterThePeriodOfTheEllipticIntegral) {
+  const double length = 1.2, g = 9.81, amplitude = 2.5;
+  Mechanism m;
+  m.name = "pendulum";
+  m.gravity_W = Vec3(0, 0, -g);
+  // Nearly a point mass at the end: I about the pivot is m l² + 1e-4.
+  m.bodies = {MakeWorld(), MakeBody("bob", 1.0, Vec3(0, 0, -length), Vec3::Constant(1e-4))};
+  m.joints = {MakeJoint("pivot", JointKind::kRevolute, 0, Vec3::Zero(), 1, Vec3::Zero())};
+  m.joints[0].axis = Vec3::UnitY();
+  FinishTree(&m);
+  const double w = std::sqrt(g * length / (length * length + 1e-4));
+  const double period = 4.0 / w * std::comp_ellint_1(std::sin(amplitude / 2));
+  Motion motion = FreeMotionOf(m, amplitude, 0.0, 3 * period);
+  motion.sample_s = period / 100;
+  const ForwardRun run = RunForwardReference(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  // The pivot's force at the turning points is that of the start.
+  for (const char* channel : {"pivot.reaction.fx", "pivot.reaction.fz"}) {
+    EXPECT_NEAR(At(run.trace, 300, channel), At(run.trace, 0, channel), 1e-8) << channel;
+  }
+  EXPECT_LT(run.uncertainty, 1e-8);
+  EXPECT_GT(run.growth, 1.0);
+  EXPECT_LT(run.growth, 100.0);
+}
+
+}  // namespace
+}  // namespace mbv::testing
