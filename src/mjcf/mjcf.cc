@@ -76,7 +76,7 @@ class MjcfWriter {
   void WriteDefaults() {
     xml_.Open("default");
     xml_.Open("equality");
-    xml_.Set("solref", std::array<double, 2>{kMjcfTimeConstantSteps * options_.step_s, 1.0});
+    xml_.Set("solref", std::array<double, 2>{options_.time_constant_steps * options_.step_s, 1.0});
     xml_.Set("solimp", std::array<double, 5>{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0});
     xml_.Close();
     xml_.Open("joint");

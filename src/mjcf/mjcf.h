@@ -7,14 +7,16 @@
 
 namespace mbv {
 
+/// Strongest impedance that MuJoCo accepts, and the usual time constant of the guiding constraints
+/// in steps.
+inline constexpr double kMjcfImpedance = 0.9999;
+inline constexpr double kMjcfTimeConstantSteps = 2.0;
+
 struct MjcfOptions {
   double step_s = 1e-3;  ///< <option timestep>
   bool pictures = true;  ///< geoms, lights and scene assets
+  double time_constant_steps = kMjcfTimeConstantSteps;  ///< of every equality (solref), in steps
 };
-
-/// Strongest impedance that MuJoCo accepts, and the guiding constraints' time constant in steps.
-inline constexpr double kMjcfImpedance = 0.9999;
-inline constexpr double kMjcfTimeConstantSteps = 2.0;
 
 /// The MJCF of a mechanism in its home pose: bodies along the spanning tree (mjcf/plan.h),
 /// `connect`/`weld` equalities "close:JOINT" for the closures, `joint`/`tendon` equalities

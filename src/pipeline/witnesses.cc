@@ -145,8 +145,13 @@ Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, doub
 SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
                                const DrivenMotion& driven, Engine engine,
                                const std::function<void(double)>& progress) {
+  return RunSimulation(scenario, mechanism, driven, OptionsOf(scenario, engine), progress);
+}
+
+SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
+                               const DrivenMotion& driven, const SimulationOptions& options,
+                               const std::function<void(double)>& progress) {
   SimulatedWitness witness;
-  const SimulationOptions options = OptionsOf(scenario, engine);
   const Diagnostics option_findings = Check(options);
   for (const Finding& finding : option_findings.findings()) {
     AddError(scenario, "simulation: " + finding.message, finding.hint, &witness.diagnostics);
@@ -180,6 +185,7 @@ SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechan
   witness.run.trace = trace;
   witness.run.steps += runs[1].steps;
   witness.run.loop_wall_s += runs[1].loop_wall_s;
+  witness.run.loop_cpu_s += runs[1].loop_cpu_s;
   witness.run.summary.wall_s += runs[1].summary.wall_s;
   return witness;
 }

@@ -45,6 +45,11 @@ struct SimulatedWitness {
 [[nodiscard]] SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
                                              const DrivenMotion& driven, Engine engine,
                                              const std::function<void(double)>& progress);
+/// The same with the engine's options given instead of taken from the scenario.
+[[nodiscard]] SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
+                                             const DrivenMotion& driven,
+                                             const SimulationOptions& options,
+                                             const std::function<void(double)>& progress);
 
 /// a + (b − a)(target − at_a)/(at_b − at_a) for forces and powers; motion from `a`; the worse
 /// closure of both.
