@@ -43,6 +43,13 @@ bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options)
   return true;
 }
 
+ModelFormat FormatOf(const std::string& word) {
+  return word == "mjcf"   ? ModelFormat::kMjcf
+         : word == "urdf" ? ModelFormat::kUrdf
+         : word == "json" ? ModelFormat::kJson
+                          : ModelFormat::kMobility;
+}
+
 int Model(const ModelArguments& arguments) {
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
@@ -57,11 +64,7 @@ int Model(const ModelArguments& arguments) {
   const LoadResult loaded = LoadModel(*file, options);
   fmt::print(stderr, "{}", loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
-  const std::string text =
-      arguments.format.empty()
-          ? MobilityText(*loaded.mechanism)
-          : ModelText(*loaded.mechanism,
-                      arguments.format == "urdf" ? ModelFormat::kUrdf : ModelFormat::kMjcf);
+  const std::string text = ModelText(*loaded.mechanism, FormatOf(arguments.format));
   if (arguments.out.empty()) {
     fmt::print("{}", text);
     return 0;
@@ -117,8 +120,11 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<ModelArguments>();
   CLI::App* model = app->add_subcommand("model", "Mobility report, or the generated MJCF or URDF");
   model->add_option("model", arguments->model, "model name or model.yaml")->required();
-  model->add_option("--format", arguments->format, "print the generated model")
-      ->check(CLI::IsMember({"mjcf", "urdf"}));
+  model
+      ->add_option("--format", arguments->format,
+                   "text (mobility report), json (the same for programs), or the model as mjcf or "
+                   "urdf")
+      ->check(CLI::IsMember({"text", "json", "mjcf", "urdf"}));
   model->add_option("--out", arguments->out, "write to this file instead of stdout");
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);

@@ -7,11 +7,8 @@
 
 namespace mbv {
 
-/// Size, freedoms, redundant constraints, what the drives determine, which forces are unique.
-[[nodiscard]] std::string MobilityText(const Mechanism& mechanism);
-
-/// "mjcf" or "urdf" text of a mechanism.
-enum class ModelFormat { kMjcf, kUrdf };
+/// Mobility report for people or as JSON, or the generated MJCF or URDF.
+enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf };
 [[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format);
 
 }  // namespace mbv

@@ -1,0 +1,205 @@
+#include "report/mobility_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Joined(const std::vector<std::string>& words, const char* between = ", ") {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : between) + word;
+  return text;
+}
+
+std::string Count(int n, const std::string& one, const std::string& many) {
+  return fmt::format("{} {}", n, n == 1 ? one : many);
+}
+
+std::string HeadText(const Mechanism& mechanism, const Mobility& m) {
+  const auto closures = std::count_if(mechanism.joints.begin(), mechanism.joints.end(),
+                                      [](const Joint& joint) { return joint.closure; });
+  std::string text =
+      fmt::format("{}: {}\n  file: {}\n", mechanism.name, mechanism.description, mechanism.file);
+  text += fmt::format("  {}, {} ({} {}), {}, {}\n",
+                      Count(static_cast<int>(mechanism.bodies.size()) - 1, "body", "bodies"),
+                      Count(static_cast<int>(mechanism.joints.size()), "joint", "joints"), closures,
+                      closures == 1 ? "closes a loop" : "close loops",
+                      Count(m.drives, "drive", "drives"),
+                      Count(m.prescribed, "prescribed joint", "prescribed joints"));
+  return text;
+}
+
+std::string FreedomsText(const MobilityReport& report) {
+  const Mobility& m = report.home;
+  std::string text =
+      fmt::format("  freedoms: {} = {} body coordinates - rank {} of {} joint constraints\n",
+                  m.freedoms, m.body_coordinates, m.constraint_rank, m.constraint_rows);
+  double kept = m.smallest_kept, dropped = m.largest_dropped;
+  for (const Mobility& near : report.nearby) {
+    kept = std::min(kept, near.smallest_kept);
+    dropped = std::max(dropped, near.largest_dropped);
+  }
+  if (report.home_singular()) {
+    text += fmt::format(
+        "  the home pose is singular: {} at home, {} at {} random poses nearby; choose guesses for "
+        "another home\n",
+        Count(m.freedoms, "freedom", "freedoms"), report.freedoms(), report.nearby.size());
+  } else if (report.nearby.empty()) {
+    text += "    by numerical rank at home";
+  } else {
+    text += fmt::format(
+        "    by numerical rank at home and, with the same result, at {} random "
+        "poses nearby",
+        report.nearby.size());
+  }
+  if (!report.home_singular()) {
+    text += fmt::format(";\n    smallest singular value kept {:.1e}, largest dropped {:.1e}\n",
+                        kept, dropped);
+  }
+  return text;
+}
+
+std::string RedundancyText(const MobilityReport& report) {
+  const Mobility& m = report.home;
+  std::string text = fmt::format(
+      "  redundant constraints: {}; Kutzbach's count, which cannot see them, gives {} freedoms\n",
+      m.redundant, m.kutzbach);
+  if (m.redundant == 0) {
+    text = fmt::format("  redundant constraints: 0; Kutzbach's count is right\n");
+  }
+  for (const StressGroup& group : report.redundant) {
+    text += fmt::format("    {} shared by {}\n", group.count, Joined(group.joints));
+  }
+  for (const LoopCount& loop : report.loops) {
+    text += fmt::format("  loop {}: {}, screws of rank {}{}\n", Joined(loop.joints, " "),
+                        Count(loop.joint_freedoms, "joint freedom", "joint freedoms"),
+                        loop.screw_rank, loop.screw_rank == 3 ? " (planar or spherical)" : "");
+  }
+  return text;
+}
+
+std::string DrivenText(const MobilityReport& report) {
+  const Mobility& m = report.home;
+  if (m.undriven == 0) return "  drives and prescribed joints determine the motion\n";
+  std::string text =
+      fmt::format("  {} left when drives and prescribed joints are locked; {} can still move\n",
+                  Count(m.undriven, "freedom is", "freedoms are"), Joined(report.free_bodies));
+  if (report.drives_singular()) {
+    text += fmt::format(
+        "  only at home: nearby the drives leave {}; the home pose is singular for these drives\n",
+        Count(report.undriven(), "freedom", "freedoms"));
+  }
+  return text;
+}
+
+// Why the forces of a group are not unique.
+std::string ReasonText(const StressGroup& group) {
+  std::vector<std::string> all = group.drives;
+  all.insert(all.end(), group.prescribed.begin(), group.prescribed.end());
+  if (!all.empty()) {
+    return fmt::format(
+        "    {} hold each other: {} more than the freedoms they share (through {})\n", Joined(all),
+        Count(group.count, "drive", "drives"),
+        group.joints.empty() ? "no joint" : Joined(group.joints));
+  }
+  return fmt::format("    {} share {}: forces can act there against each other without any load\n",
+                     Joined(group.joints),
+                     Count(group.count, "redundant constraint", "redundant constraints"));
+}
+
+std::string ForcesText(const Mechanism& mechanism, const MobilityReport& report) {
+  const std::vector<std::string>& drives = report.home.drives_not_unique;
+  std::string text =
+      drives.empty() ? "  drive forces: all determined by statics\n"
+                     : "  drive forces: not determined by statics alone: " + Joined(drives) + "\n";
+  if (report.reactions.empty()) return text + "  joint reactions: all determined by statics\n";
+  text += fmt::format("  joint reactions: {} of {} joints not determined by statics alone\n",
+                      report.reactions.size(), mechanism.joints.size());
+  for (const UndeterminedReaction& reaction : report.reactions) {
+    text += fmt::format("    {}: {}\n", reaction.joint, Joined(reaction.components, " "));
+  }
+  text += "  because\n";
+  for (const StressGroup& group : report.undetermined) text += ReasonText(group);
+  text +=
+      "    `transmits: force` on a joint leaves its moments out and can make the rest definite\n";
+  return text;
+}
+
+Json GroupsJson(const std::vector<StressGroup>& groups) {
+  Json list = Json::array();
+  for (const StressGroup& group : groups) {
+    list.push_back({{"count", group.count},
+                    {"joints", group.joints},
+                    {"drives", group.drives},
+                    {"prescribed", group.prescribed}});
+  }
+  return list;
+}
+
+Json PoseJson(const Mobility& m) {
+  return {{"freedoms", m.freedoms},
+          {"redundant", m.redundant},
+          {"undriven", m.undriven},
+          {"smallest_kept", m.smallest_kept},
+          {"largest_dropped", m.largest_dropped},
+          {"drives_not_unique", m.drives_not_unique},
+          {"joints_not_unique", m.joints_not_unique}};
+}
+
+}  // namespace
+
+std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report) {
+  std::string text = HeadText(mechanism, report.home) + FreedomsText(report) +
+                     RedundancyText(report) + DrivenText(report) + ForcesText(mechanism, report);
+  text += "  drives:";
+  for (const Drive& drive : mechanism.drives) text += " " + drive.name;
+  text += "\n  outputs:";
+  for (const Output& output : mechanism.outputs) text += " " + output.name;
+  return text + "\n";
+}
+
+std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& report) {
+  Json json = {{"schema", "mbverify.model/1"},
+               {"name", mechanism.name},
+               {"file", mechanism.file},
+               {"description", mechanism.description},
+               {"bodies", mechanism.bodies.size() - 1},
+               {"joints", mechanism.joints.size()},
+               {"body_coordinates", report.home.body_coordinates},
+               {"joint_constraints", report.home.constraint_rows},
+               {"constraint_rank", report.home.constraint_rank},
+               {"kutzbach", report.home.kutzbach},
+               {"freedoms", report.freedoms()},
+               {"home_singular", report.home_singular()},
+               {"drives_singular_at_home", report.drives_singular()}};
+  json["drives"] = Json::array();
+  for (const Drive& drive : mechanism.drives) json["drives"].push_back(drive.name);
+  json["outputs"] = Json::array();
+  for (const Output& output : mechanism.outputs) json["outputs"].push_back(output.name);
+  json["home"] = PoseJson(report.home);
+  json["nearby"] = Json::array();
+  for (const Mobility& near : report.nearby) json["nearby"].push_back(PoseJson(near));
+  json["free_bodies"] = report.free_bodies;
+  json["loops"] = Json::array();
+  for (const LoopCount& loop : report.loops) {
+    json["loops"].push_back({{"closure", loop.closure},
+                             {"joints", loop.joints},
+                             {"joint_freedoms", loop.joint_freedoms},
+                             {"screw_rank", loop.screw_rank}});
+  }
+  json["redundant_constraints"] = GroupsJson(report.redundant);
+  json["undetermined_forces"] = GroupsJson(report.undetermined);
+  json["undetermined_reactions"] = Json::array();
+  for (const UndeterminedReaction& reaction : report.reactions) {
+    json["undetermined_reactions"].push_back(
+        {{"joint", reaction.joint}, {"components", reaction.components}});
+  }
+  return json.dump(2) + "\n";
+}
+
+}  // namespace mbv

@@ -1,0 +1,17 @@
+// The mobility report of `mbverify model` for people and for programs.
+#pragma once
+
+#include <string>
+
+#include "mechanism/mobility_report.h"
+
+namespace mbv {
+
+/// Lines for the terminal.
+[[nodiscard]] std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report);
+
+/// JSON, schema "mbverify.model/1": name, file, bodies, joints, freedoms, loops, redundant
+/// constraints, undetermined forces.
+[[nodiscard]] std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& report);
+
+}  // namespace mbv
