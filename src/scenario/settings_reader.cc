@@ -87,6 +87,7 @@ ReferenceSettings ReadReference(ValueReader* values, const YamlNode* node) {
     settings.on = *on;
     return settings;
   }
+  if (node->is_map() && node->Find("csv") != nullptr) return settings;  // see table_settings.h
   YamlMap map(&values->yaml(), node, "reference", {"parameters"});
   settings.parameters = ReadOverrides(values, map.Find("parameters"), "reference.parameters");
   return settings;

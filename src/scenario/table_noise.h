@@ -1,0 +1,20 @@
+// Noise of sampled signals.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "core/types.h"
+
+namespace mbv {
+
+/// Standard deviation of the noise in each column of `values` (rows at `time_s`, increasing): what
+/// a smooth curve cannot explain. A sample is predicted from its 2, 4, … 10 nearest neighbours by
+/// the polynomial through them; the median of the errors, scaled to what white noise of deviation
+/// 1 would give, estimates the deviation. The truncation error of a smooth signal falls with the
+/// number of neighbours while noise keeps its size, so the smallest of the estimates is taken.
+/// The median makes it robust against steps and kinks. Zero with fewer than kFewestForNoise rows.
+[[nodiscard]] std::vector<double> EstimateNoise(std::span<const double> time_s, const MatX& values);
+inline constexpr size_t kFewestForNoise = 16;
+
+}  // namespace mbv
