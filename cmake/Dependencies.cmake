@@ -1,40 +1,7 @@
 # Finds every dependency and, when one is missing, names the Debian package that brings it.
-set(MBV_MISSING "")
-
-macro(mbv_find package debian_package)
-  find_package(${package} QUIET ${ARGN})
-  if(NOT ${package}_FOUND)
-    list(APPEND MBV_MISSING "${package} (${debian_package})")
-  endif()
-endmacro()
-
-set(OpenGL_GL_PREFERENCE GLVND)
-mbv_find(Eigen3 libeigen3-dev)
-mbv_find(OpenGL libgl-dev)
-mbv_find(mujoco libmujoco-dev)
-mbv_find(yaml-cpp libyaml-cpp-dev)
-mbv_find(muparser libmuparser-dev)
-mbv_find(fmt libfmt-dev)
-mbv_find(CLI11 libcli11-dev)
-mbv_find(nlohmann_json nlohmann-json3-dev)
-mbv_find(tinyxml2 libtinyxml2-dev)
-mbv_find(PNG libpng-dev)
-mbv_find(SQLite3 libsqlite3-dev)
-mbv_find(ZLIB zlib1g-dev)
+include(Libraries)
 mbv_find(GTest libgtest-dev)
 mbv_find(benchmark libbenchmark-dev)
-mbv_find(PkgConfig pkg-config)
-
-if(PKG_CONFIG_FOUND)
-  pkg_check_modules(URDFDOM QUIET IMPORTED_TARGET urdfdom)
-  pkg_check_modules(OSMESA QUIET IMPORTED_TARGET osmesa)
-endif()
-if(NOT URDFDOM_FOUND)
-  list(APPEND MBV_MISSING "urdfdom (liburdfdom-dev)")
-endif()
-if(NOT OSMESA_FOUND)
-  list(APPEND MBV_MISSING "OSMesa (libosmesa6-dev)")
-endif()
 
 # The script of report.html is bundled with npm's packages (web/).
 find_program(NODE NAMES node nodejs)
@@ -51,17 +18,3 @@ if(MBV_MISSING)
   message(FATAL_ERROR "mbverify: missing dependencies (Debian package in brackets):\n"
                       "  ${missing_text}\nRun scripts/setup to install them.")
 endif()
-
-if(NOT mujoco_VERSION VERSION_EQUAL 2.2.2)
-  message(WARNING "mbverify is written for MuJoCo 2.2.2, found '${mujoco_VERSION}'")
-endif()
-
-add_library(mbv_urdfdom INTERFACE)
-target_link_libraries(mbv_urdfdom INTERFACE PkgConfig::URDFDOM)
-add_library(mbv_osmesa INTERFACE)
-target_link_libraries(mbv_osmesa INTERFACE PkgConfig::OSMESA)
-
-# Debian's mujoco target names an include folder that only another package would bring.
-get_target_property(mujoco_includes mujoco::mujoco INTERFACE_INCLUDE_DIRECTORIES)
-list(FILTER mujoco_includes EXCLUDE REGEX qhull)
-set_target_properties(mujoco::mujoco PROPERTIES INTERFACE_INCLUDE_DIRECTORIES "${mujoco_includes}")

@@ -20,6 +20,11 @@ function(mbv_layer folder)
     add_library(mbv_${folder} INTERFACE)
     set(scope INTERFACE)
   endif()
-  target_include_directories(mbv_${folder} ${scope} ${CMAKE_CURRENT_SOURCE_DIR}/src)
+  target_include_directories(mbv_${folder} ${scope}
+                             $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/src>
+                             $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/mbverify>)
   target_link_libraries(mbv_${folder} ${scope} ${ARG_DEPS} ${ARG_LIBS})
+  target_compile_features(mbv_${folder} ${scope} cxx_std_20)
+  set_target_properties(mbv_${folder} PROPERTIES EXPORT_NAME ${folder})
+  install(TARGETS mbv_${folder} EXPORT mbverify ARCHIVE COMPONENT development)
 endfunction()

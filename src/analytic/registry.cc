@@ -1,16 +1,20 @@
 // One row per mechanism with closed-form equations.
-#include <array>
+#include <vector>
 
 #include "analytic/cabin_robot/cabin_robot.h"
 #include "analytic/closed_form.h"
-#include "analytic/stabilizing_platform/stabilizing_platform.h"
+#include "analytic/register_closed_form.h"
 #include "analytic/scara_robot/closed_form.h"
 #include "analytic/spr_tripod/closed_form.h"
+#include "analytic/stabilizing_platform/stabilizing_platform.h"
+#include "core/demand.h"
 
 namespace mbv {
 
-std::span<const ClosedFormRow> ClosedForms() {
-  static const std::vector<ClosedFormRow> rows = {
+namespace {
+
+std::vector<ClosedFormRow>& Rows() {
+  static std::vector<ClosedFormRow> rows = {
       {"stabilizing_platform",
        {"full", "massless", "paper_text"},
        {"E2"},
@@ -21,6 +25,17 @@ std::span<const ClosedFormRow> ClosedForms() {
   };
   return rows;
 }
+
+}  // namespace
+
+ClosedFormRegistration::ClosedFormRegistration(ClosedFormRow row) {
+  MBV_DEMAND(!row.mechanism.empty() && !row.models.empty() && row.factory != nullptr,
+             row.mechanism);
+  std::erase_if(Rows(), [&](const ClosedFormRow& old) { return old.mechanism == row.mechanism; });
+  Rows().push_back(std::move(row));
+}
+
+std::span<const ClosedFormRow> ClosedForms() { return Rows(); }
 
 const ClosedFormRow* FindClosedForm(const std::string& mechanism) {
   for (const ClosedFormRow& row : ClosedForms()) {

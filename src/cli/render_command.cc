@@ -47,7 +47,8 @@ int Render(const RenderArguments& arguments) {
   if (!arguments.size.empty()) {
     request.scenario.set.emplace_back("snapshots.size_px", SizeText(arguments.size));
   }
-  if (!arguments.video.empty()) request.frames_per_s = arguments.frames_per_s;
+  request.video_file = arguments.video;
+  request.frames_per_s = arguments.frames_per_s;
   ProgressLine progress(true);
   if (progress.active()) {
     request.progress = [&](const std::string& stage, double fraction) {
@@ -77,7 +78,8 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
   render->add_option("--at", arguments->at, "times [s], separated by commas");
   render->add_option("--size", arguments->size, "WIDTHxHEIGHT in pixels");
   render->add_option("--video", arguments->video,
-                     "write a video of the whole motion (animated PNG, plays in every browser)");
+                     "write a video of the whole motion: .mp4, .mkv, .webm, .gif (by ffmpeg), or "
+                     "an animated .png, which needs nothing");
   render->add_option("--fps", arguments->frames_per_s, "frames per second of the video")
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
@@ -86,7 +88,7 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
       "Examples:\n"
       "  mbverify render scenarios/stabilizing_platform/sea_state.yaml --at 0,1.42 --size "
       "1920x1080\n"
-      "  mbverify render scenarios/spr_tripod/default.yaml --video tripod.png");
+      "  mbverify render scenarios/spr_tripod/default.yaml --video tripod.mp4");
   render->callback([arguments, exit_code] { *exit_code = Render(*arguments); });
 }
 

@@ -81,19 +81,17 @@ Caption CaptionOf(const Report& report) {
   return caption;
 }
 
-RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
-                         const SimulationRun& run, const Caption& caption,
-                         const std::function<void(double)>& progress,
-                         std::vector<PictureFile>* files) {
+RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
+                  const Mechanism& mechanism, const SimulationRun& run, const Caption& caption,
+                  const PictureSink& sink) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<PictureFrame> frames;
-  for (const double t_s : scenario.snapshots.times_s) {
+  for (const double t_s : times_s) {
     const int sample = NearestSample(run.trace.time_s, t_s);
     frames.push_back(SampleFrame(mechanism, run, sample));
-    const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
     frames.back().caption = caption;
-    frames.back().caption.detail = fmt::format("t = {:.3f} s   {}", sample_s, caption.detail);
-    files->push_back({fmt::format("t_{:.3f}s.png", sample_s), "", ""});
+    frames.back().caption.detail = fmt::format(
+        "t = {:.3f} s   {}", run.trace.time_s[static_cast<size_t>(sample)], caption.detail);
   }
   PictureOptions options = OptionsOf(scenario.snapshots);
   if (frames.size() > kFewPictures) options.passes = kVideoPasses;
@@ -101,16 +99,30 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
   if (scenario.snapshots.path_output >= 0) {
     overlay.paths.push_back(PathOf(mechanism, run, scenario.snapshots.path_output));
   }
+  RunSummary summary = RenderPictures(mechanism, frames, overlay, options, sink);
+  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return summary;
+}
+
+RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
+                         const SimulationRun& run, const Caption& caption,
+                         const std::function<void(double)>& progress,
+                         std::vector<PictureFile>* files) {
+  const std::vector<double>& times_s = scenario.snapshots.times_s;
+  for (const double t_s : times_s) {
+    const int sample = NearestSample(run.trace.time_s, t_s);
+    const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
+    files->push_back({fmt::format("t_{:.3f}s.png", sample_s), "", ""});
+  }
   RunSummary summary =
-      RenderPictures(mechanism, frames, overlay, options, [&](int index, Picture picture) {
+      DrawAt(times_s, scenario, mechanism, run, caption, [&](int index, Picture picture) {
         PictureFile& file = (*files)[static_cast<size_t>(index)];
         file.content = EncodePng(picture);
         file.preview = EncodePng(Shrunk(picture));
-        if (progress) progress((index + 1.0) / static_cast<double>(frames.size()));
+        if (progress) progress((index + 1.0) / static_cast<double>(times_s.size()));
         return true;
       });
   if (!summary.ok()) files->clear();
-  summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return summary;
 }
 

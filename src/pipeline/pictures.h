@@ -29,4 +29,10 @@ struct PictureFile {
                                        const std::function<void(double)>& progress,
                                        std::vector<PictureFile>* files);
 
+/// Draws the simulation at these times (nearest sample each), a little less smooth if there are
+/// many.
+[[nodiscard]] RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
+                                const Mechanism& mechanism, const SimulationRun& run,
+                                const Caption& caption, const PictureSink& sink);
+
 }  // namespace mbv

@@ -4,6 +4,7 @@
 
 #include "pipeline/animation.h"
 #include "pipeline/prepare.h"
+#include "pipeline/video.h"
 
 namespace mbv {
 namespace {
@@ -23,10 +24,50 @@ std::vector<double> FrameTimes(double duration_s, double frames_per_s) {
   return times;
 }
 
+// Frames go to the encoder as they are drawn; an animated PNG is joined at the end.
+RunSummary DrawVideo(const Scenario& scenario, const Mechanism& mechanism, const SimulationRun& run,
+                     const Caption& caption, const RenderRequest& request,
+                     const std::function<void(double)>& progress, std::string* video) {
+  const std::vector<double> times = FrameTimes(scenario.motion.duration_s, request.frames_per_s);
+  const auto advance = [&](int index) {
+    if (progress) progress((index + 1.0) / static_cast<double>(times.size()));
+  };
+  if (VideoFormatOf(request.video_file) == VideoFormat::kAnimatedPng) {
+    std::vector<PictureFile> frames;
+    RunSummary drawn =
+        DrawAt(times, scenario, mechanism, run, caption, [&](int index, const Picture& picture) {
+          frames.push_back({"", EncodePng(picture), ""});
+          advance(index);
+          return true;
+        });
+    if (drawn.ok()) *video = AnimatedPng(frames, request.frames_per_s);
+    return drawn;
+  }
+  VideoEncoder encoder(request.video_file, request.frames_per_s);
+  RunSummary drawn =
+      DrawAt(times, scenario, mechanism, run, caption, [&](int index, const Picture& picture) {
+        advance(index);
+        return encoder.Add(picture);
+      });
+  const std::string trouble = encoder.Finish(video);
+  if (trouble.empty()) return drawn;
+  drawn.stop = Stop::kEngineFailure;
+  drawn.message = trouble;
+  return drawn;
+}
+
 }  // namespace
 
 RenderOutcome RenderScenario(const std::string& file, const RenderRequest& request) {
   RenderOutcome outcome;
+  if (const std::string trouble = request.video_file.empty() ? "" : CheckVideo(request.video_file);
+      !trouble.empty()) {
+    Finding finding;
+    finding.message = trouble;
+    outcome.diagnostics.Add(std::move(finding));
+    outcome.exit_code = 2;
+    return outcome;
+  }
   auto prepared = Prepare(file, request.scenario, &outcome.diagnostics);
   if (!prepared) {
     outcome.exit_code = 2;
@@ -49,20 +90,17 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
     AddError(file, witness.run.summary, &outcome.diagnostics);
     return outcome;
   }
-  if (request.frames_per_s) {
-    scenario.snapshots.times_s = FrameTimes(scenario.motion.duration_s, *request.frames_per_s);
-  }
-  const RunSummary drawn = DrawSnapshots(
-      scenario, prepared->mechanisms.simulated, witness.run,
-      {.title = outcome.mechanism + " / " + outcome.scenario, .detail = {}, .status = {}},
-      progress("pictures"), &outcome.pictures);
+  const Caption caption{
+      .title = outcome.mechanism + " / " + outcome.scenario, .detail = {}, .status = {}};
+  const RunSummary drawn =
+      request.video_file.empty()
+          ? DrawSnapshots(scenario, prepared->mechanisms.simulated, witness.run, caption,
+                          progress("pictures"), &outcome.pictures)
+          : DrawVideo(scenario, prepared->mechanisms.simulated, witness.run, caption, request,
+                      progress("video"), &outcome.video);
   if (!drawn.ok()) {
     AddError(file, drawn, &outcome.diagnostics);
     return outcome;
-  }
-  if (request.frames_per_s) {
-    outcome.video = AnimatedPng(outcome.pictures, *request.frames_per_s);
-    outcome.pictures.clear();
   }
   outcome.exit_code = 0;
   return outcome;

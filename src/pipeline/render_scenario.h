@@ -14,7 +14,9 @@ namespace mbv {
 
 struct RenderRequest {
   ScenarioOptions scenario;
-  std::optional<double> frames_per_s;  ///< given: one video instead of single pictures
+  std::string video_file;  ///< given: one video instead of single pictures; its ending tells the
+                           ///< format (pipeline/video.h)
+  double frames_per_s = 25.0;
   ProgressFunction progress;
 };
 
@@ -23,7 +25,7 @@ struct RenderOutcome {
   Diagnostics diagnostics;
   std::string mechanism, scenario;
   std::vector<PictureFile> pictures;
-  std::string video;  ///< animated PNG
+  std::string video;  ///< content of the video file
 };
 
 [[nodiscard]] RenderOutcome RenderScenario(const std::string& file, const RenderRequest& request);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "report/html_assets.h"
+#include "report/html_plots.h"
 #include "report/html_report.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
@@ -155,13 +156,14 @@ class PageWriter {
                 fmt::format("witnesses of 3 · pairs of 3 · checks of {}", limits));
   }
 
-  // Filled by the script.
+  // Filled by the script; without it, plots that do not move.
   void Interactive() {
-    const std::string hint =
-        "<noscript><p class=\"faint\">This part needs JavaScript; the pictures and tables below do "
-        "not.</p></noscript>\n";
-    Add("Replay", "Replay", hint + "<div id=\"replay-view\"></div>\n");
-    Add("Signals over time", "Plots", hint + "<div id=\"plot-view\"></div>\n");
+    Add("Replay", "Replay",
+        "<noscript><p class=\"faint\">The replay needs JavaScript; the pictures below do not.</p>"
+        "</noscript>\n<div id=\"replay-view\"></div>\n");
+    Add("Signals over time", "Plots",
+        "<noscript><p class=\"faint\">Without JavaScript the plots do not zoom.</p>\n" +
+            StaticPlotsHtml(report_) + "</noscript>\n<div id=\"plot-view\"></div>\n");
   }
 
   void Pictures() {

@@ -191,5 +191,62 @@ TEST_F(CliTest, RenderWritesPicturesAndVideos) {
   EXPECT_NE(ReadAll(video).find("acTL"), std::string::npos);
 }
 
+TEST_F(CliTest, FfmpegWritesTheOtherVideos) {
+  for (const std::string ending : {"mp4", "webm", "gif"}) {
+    const std::string video = (mbverify.folder() / ("v." + ending)).string();
+    // Odd sizes are what players refuse.
+    const ProgramResult made =
+        mbverify("render " + std::string(kGood) + " --size 65x63 --fps 20 --video " + video);
+    ASSERT_EQ(made.exit_code, 0) << made.err;
+    // 0.5 s at 20 frames a second, both ends included.
+    const std::string count = (mbverify.folder() / "count").string();
+    const std::string probe =
+        "ffprobe -v error -count_frames -show_entries stream=nb_read_frames -of csv=p=0 '" + video +
+        "' >'" + count + "'";
+    ASSERT_EQ(std::system(probe.c_str()), 0);
+    EXPECT_EQ(std::stoi(ReadAll(count)), 11) << ending;
+  }
+}
+
+TEST_F(CliTest, VideosThatCannotBeWrittenAreRefusedBeforeAnyWork) {
+  const std::string video = (mbverify.folder() / "v").string();
+  const std::string render = "render " + std::string(kGood) + " --size 64x64 --video " + video;
+  const ProgramResult unknown = mbverify(render + ".avi");
+  EXPECT_EQ(unknown.exit_code, 2);
+  EXPECT_NE(unknown.err.find(".mp4, .mkv, .webm, .gif"), std::string::npos) << unknown.err;
+  const ProgramResult missing = mbverify.WithPath("/nowhere", render + ".mp4");
+  EXPECT_EQ(missing.exit_code, 2);
+  EXPECT_NE(missing.err.find("ffmpeg is needed for .mp4"), std::string::npos) << missing.err;
+  EXPECT_NE(missing.err.find("--video " + video + ".png"), std::string::npos) << missing.err;
+  // A program of that name that fails.
+  const fs::path bin = mbverify.folder() / "bin";
+  fs::create_directories(bin);
+  std::ofstream(bin / "ffmpeg") << "#!/bin/sh\necho broken codec >&2\nexit 1\n";
+  fs::permissions(bin / "ffmpeg", fs::perms::owner_all);
+  const ProgramResult broken = mbverify.WithPath(bin.string() + ":/usr/bin:/bin", render + ".mp4");
+  EXPECT_EQ(broken.exit_code, 3);
+  EXPECT_NE(broken.err.find("ffmpeg failed: broken codec"), std::string::npos) << broken.err;
+  EXPECT_FALSE(fs::exists(video + ".mp4"));
+}
+
+// On a terminal the running scenarios are shown below the finished ones and wiped again.
+TEST_F(CliTest, RegressShowsALiveTableOnATerminal) {
+  const ProgramResult regress =
+      mbverify.OnTerminal("regress --no-pictures --no-history --jobs 1 --out " + mbverify.Out() +
+                          " " + kGood + " " + kDisagrees);
+  EXPECT_EQ(regress.exit_code, 0) << regress.out;
+  for (const char* part :
+       {"  running  stabilizing_platform/static ", "\x1b[2A\x1b[J",
+        "0 of 2 done, 0 not as expected", "[1/2] agree ", "[2/2] disagree ", "2 scenarios"}) {
+    EXPECT_NE(regress.out.find(part), std::string::npos) << part << "\n" << regress.out;
+  }
+  // The last thing on the screen is the summary, not a running scenario.
+  EXPECT_GT(regress.out.rfind("2 scenarios"), regress.out.rfind("  running  "));
+  const ProgramResult plain =
+      mbverify("regress --no-pictures --no-history --out " + mbverify.Out() + " " + kGood);
+  EXPECT_EQ(plain.err.find('\x1b'), std::string::npos) << plain.err;
+  EXPECT_EQ(plain.err.find("running"), std::string::npos) << plain.err;
+}
+
 }  // namespace
 }  // namespace mbv

@@ -39,15 +39,31 @@ class Program {
   [[nodiscard]] std::string Out() const { return (folder_ / "out").string(); }
 
   ProgramResult operator()(const std::string& arguments) const {
-    const std::string command =
-        "cd '" MBV_SOURCE_DIR "' && NO_COLOR= '" MBV_BINARY_DIR "/mbverify' " + arguments + " >'" +
-        (folder_ / "stdout").string() + "' 2>'" + (folder_ / "stderr").string() + "'";
+    return Execute("NO_COLOR= " + Call(arguments));
+  }
+  /// With another search path for programs.
+  ProgramResult WithPath(const std::string& path, const std::string& arguments) const {
+    return Execute("PATH='" + path + "' " + Call(arguments));
+  }
+  /// With a terminal for input and output, both in `out`; `script` is part of every Debian.
+  ProgramResult OnTerminal(const std::string& arguments) const {
+    return Execute("script --quiet --return --command \"NO_COLOR=1 " + Call(arguments) +
+                   "\" /dev/null </dev/null");
+  }
+
+ private:
+  [[nodiscard]] static std::string Call(const std::string& arguments) {
+    return "'" MBV_BINARY_DIR "/mbverify' " + arguments;
+  }
+  [[nodiscard]] ProgramResult Execute(const std::string& call) const {
+    const std::string command = "cd '" MBV_SOURCE_DIR "' && " + call + " >'" +
+                                (folder_ / "stdout").string() + "' 2>'" +
+                                (folder_ / "stderr").string() + "'";
     const int status = std::system(command.c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, ReadAll(folder_ / "stdout"),
             ReadAll(folder_ / "stderr")};
   }
 
- private:
   std::filesystem::path folder_;
 };
 

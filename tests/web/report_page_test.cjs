@@ -1,19 +1,13 @@
-// report.html in a real browser; run.sh makes the page and names it in MBV_PAGE, Chromium in
-// MBV_CHROMIUM and the folder with playwright-core in NODE_PATH.
+// report.html in a real browser; run.sh makes the page and names it in MBV_PAGE.
 'use strict';
 const assert = require('node:assert/strict');
 const fs = require('node:fs');
 const {after, before, test} = require('node:test');
 const {pathToFileURL} = require('node:url');
 
-const {chromium} = require('playwright-core');
+const {launch, openPage} = require('./browser.cjs');
 
-const [page_file, browser_file] = [process.env.MBV_PAGE, process.env.MBV_CHROMIUM];
-const kFlags = [
-  '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
-  '--disable-quic', '--no-first-run', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync',
-];
+const page_file = process.env.MBV_PAGE;
 
 let browser, page;
 const trouble = [], requests = [];
@@ -40,18 +34,8 @@ const frame = () => page.evaluate(() => new Promise((done) => {
 }));
 
 before(async () => {
-  assert.ok(browser_file && fs.existsSync(browser_file),
-            'no Chromium: install the Debian package chromium (scripts/setup does)');
-  browser = await chromium.launch({executablePath: browser_file, args: kFlags});
-  page = await browser.newPage({viewport: {width: 1280, height: 900}, reducedMotion: 'reduce'});
-  page.on('console', (message) => {
-    if (['error', 'warning'].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) {
-      trouble.push(message.text());
-    }
-  });
-  page.on('pageerror', (error) => trouble.push(String(error)));
-  page.on('request', (request) => requests.push(request.url()));
-  await page.goto(pathToFileURL(page_file).href);
+  browser = await launch();
+  page = await openPage(browser, page_file, {trouble, requests});
   await page.waitForSelector('html[data-ready]', {timeout: 15000});
 });
 
@@ -234,6 +218,13 @@ test('Without JavaScript the verdict, the tables and the pictures remain', async
   assert.ok(await plain.locator('#checks tbody tr').count() > 5);
   assert.ok(await plain.locator('#snapshots img').count() >= 1);
   assert.equal(await plain.locator('.timeline').count(), 0);
+  // Plots that do not move: forces and errors, one curve per drive.
+  assert.equal(await plain.locator('.static-plots svg').count(), 2);
+  for (const plot of await plain.locator('.static-plots svg').all()) {
+    assert.equal(await plot.locator('path').count(), 6);
+    const box = await plot.boundingBox();
+    assert.ok(box.width > 200 && box.height > 100, JSON.stringify(box));
+  }
   await context.close();
 });
 

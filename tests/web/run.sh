@@ -1,9 +1,29 @@
 #!/bin/sh
-# Makes a report page and looks at it in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM
+# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|night
 set -eu
-mbverify=$1 source=$2 work=$3 node=$4 chromium=$5
+mbverify=$1 source=$2 work=$3 node=$4 chromium=$5 what=$6
 cd "$source"
-"$mbverify" run scenarios/stabilizing_platform/sea_state.yaml --quiet --out "$work/page" \
-  --set 'snapshots.times_s=[1.42]' --set 'snapshots.size_px=[640, 480]'
-MBV_PAGE=$work/page/stabilizing_platform/sea_state/report.html MBV_CHROMIUM=$chromium \
-  NODE_PATH=$work/node_modules exec "$node" --test tests/web/report_page_test.cjs
+export MBV_CHROMIUM="$chromium" NODE_PATH="$work/node_modules"
+case $what in
+report)
+  "$mbverify" run scenarios/stabilizing_platform/sea_state.yaml --quiet --out "$work/page" \
+    --set 'snapshots.times_s=[1.42]' --set 'snapshots.size_px=[640, 480]'
+  MBV_PAGE=$work/page/stabilizing_platform/sea_state/report.html \
+    exec "$node" --test tests/web/report_page_test.cjs
+  ;;
+night)
+  # Agree, disagree, could not run, bad input, and one that is not what its file says; run twice.
+  rm -rf "$work/night" "$work/own"
+  mkdir -p "$work/own"
+  sed -e "s|^mechanism:.*|mechanism: $source/models/scara_robot/model.yaml|" -e '/^expect:/d' \
+    scenarios/scara_robot/static.yaml >"$work/own/wrong_expectation.yaml"
+  echo 'expect: {verdict: disagree, exit_code: 1}' >>"$work/own/wrong_expectation.yaml"
+  for run in 1 2; do
+    "$mbverify" regress --quiet --no-pictures --out "$work/night" scenarios/spr_tripod/static.yaml \
+      scenarios/spr_tripod/must_fail/simulated_com.yaml scenarios/spr_tripod/literal.yaml \
+      scenarios/stabilizing_platform/must_fail/no_yaml.yaml "$work/own/wrong_expectation.yaml" \
+      >/dev/null && exit 1 || [ $? = 1 ]
+  done
+  MBV_NIGHT=$work/night exec "$node" --test tests/web/index_page_test.cjs
+  ;;
+esac

@@ -1,0 +1,22 @@
+# `cmake --install`: the program with its models and scenarios, and the package that
+# find_package(mbverify) finds: headers, libraries and mbverify::main.
+include(CMakePackageConfigHelpers)
+
+install(TARGETS mbverify)
+install(DIRECTORY models scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify)
+install(DIRECTORY examples docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(TARGETS mbv_main EXPORT mbverify ARCHIVE COMPONENT development)
+install(DIRECTORY src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbverify COMPONENT development
+        FILES_MATCHING PATTERN "*.h")
+
+set(package ${CMAKE_INSTALL_LIBDIR}/cmake/mbverify)
+install(EXPORT mbverify NAMESPACE mbverify:: FILE mbverify-targets.cmake DESTINATION ${package}
+        COMPONENT development)
+configure_package_config_file(cmake/mbverify-config.cmake.in
+                              ${CMAKE_BINARY_DIR}/mbverify-config.cmake
+                              INSTALL_DESTINATION ${package})
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/mbverify-config-version.cmake
+                                 COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/mbverify-config.cmake
+              ${CMAKE_BINARY_DIR}/mbverify-config-version.cmake cmake/Libraries.cmake
+        DESTINATION ${package} COMPONENT development)

@@ -1,0 +1,18 @@
+// Adds a closed form from outside this source tree: a namespace-scope object in any source file of
+// a program that links mbverify::main.
+//
+//   const mbv::ClosedFormRegistration kMine({.mechanism = "my_arm", .models = {"full"},
+//                                            .errata = {}, .factory = &MakeMyArm});
+#pragma once
+
+#include "analytic/closed_form.h"
+
+namespace mbv {
+
+/// Adds a row to ClosedForms(); one for a mechanism that has a row already takes its place. Before
+/// main() or before the first look-up only.
+struct ClosedFormRegistration {
+  explicit ClosedFormRegistration(ClosedFormRow row);
+};
+
+}  // namespace mbv

@@ -1,0 +1,176 @@
+#include "pipeline/video.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spawn.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <csignal>
+#include <cstdlib>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <map>
+#include <sstream>
+#include <vector>
+
+#include "core/demand.h"
+
+extern char** environ;
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Codec options by ending. Players want even sizes and 4:2:0 colours; a video that starts before
+// it is loaded whole has its index in front.
+const std::map<std::string, std::vector<std::string>> kCodecs = {
+    {".mp4",
+     {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18", "-pix_fmt",
+      "yuv420p", "-movflags", "+faststart"}},
+    {".mkv",
+     {"-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2", "-c:v", "libx264", "-crf", "18", "-pix_fmt",
+      "yuv420p"}},
+    {".webm", {"-c:v", "libvpx-vp9", "-crf", "30", "-b:v", "0", "-pix_fmt", "yuv420p"}},
+    {".gif", {"-vf", "split[a][b];[a]palettegen[p];[b][p]paletteuse"}},
+};
+
+std::string EndingOf(const std::string& file) { return fs::path(file).extension().string(); }
+
+bool IsInstalled(const std::string& program) {
+  const char* path = std::getenv("PATH");
+  std::istringstream folders(path == nullptr ? "" : path);
+  for (std::string folder; std::getline(folders, folder, ':');) {
+    if (!folder.empty() && access((folder + "/" + program).c_str(), X_OK) == 0) return true;
+  }
+  return false;
+}
+
+std::string ReadFile(const fs::path& path) {
+  std::ifstream in(path, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
+
+}  // namespace
+
+VideoFormat VideoFormatOf(const std::string& file) {
+  const std::string ending = EndingOf(file);
+  if (ending == ".png" || ending == ".apng") return VideoFormat::kAnimatedPng;
+  return kCodecs.contains(ending) ? VideoFormat::kFfmpeg : VideoFormat::kUnknown;
+}
+
+std::string CheckVideo(const std::string& file) {
+  switch (VideoFormatOf(file)) {
+    case VideoFormat::kAnimatedPng:
+      return "";
+    case VideoFormat::kUnknown:
+      return fmt::format(
+          "--video {}: no known video format; the name must end in .mp4, .mkv, .webm, .gif, or in "
+          ".png or .apng (animated PNG)",
+          file);
+    case VideoFormat::kFfmpeg:
+      break;
+  }
+  if (IsInstalled("ffmpeg")) return "";
+  return fmt::format(
+      "--video {}: ffmpeg is needed for {} and is not installed; install it (Debian: apt install "
+      "ffmpeg), or write an animated PNG: --video {}",
+      file, EndingOf(file), fs::path(file).replace_extension(".png").string());
+}
+
+VideoEncoder::VideoEncoder(std::string file, double frames_per_s)
+    : file_(std::move(file)), frames_per_s_(frames_per_s) {
+  MBV_DEMAND(VideoFormatOf(file_) == VideoFormat::kFfmpeg, file_);
+  // A dead ffmpeg is a failed write, not the end of this process.
+  old_sigpipe_ = std::signal(SIGPIPE, SIG_IGN);
+}
+
+VideoEncoder::~VideoEncoder() {
+  if (pipe_ >= 0) close(pipe_);
+  if (pid_ > 0) {
+    kill(pid_, SIGKILL);
+    waitpid(pid_, nullptr, 0);
+  }
+  std::error_code error;
+  if (!folder_.empty()) fs::remove_all(folder_, error);
+  std::signal(SIGPIPE, old_sigpipe_);
+}
+
+bool VideoEncoder::Start(const Picture& picture) {
+  std::error_code error;
+  std::string pattern = (fs::temp_directory_path(error) / "mbverify-video-XXXXXX").string();
+  if (mkdtemp(pattern.data()) == nullptr) {
+    trouble_ = fmt::format("cannot make a folder {}: {}", pattern, std::strerror(errno));
+    return false;
+  }
+  folder_ = pattern;
+  std::vector<std::string> words = {
+      "ffmpeg",    "-hide_banner",
+      "-loglevel", "error",
+      "-f",        "rawvideo",
+      "-pix_fmt",  "rgb24",
+      "-s",        fmt::format("{}x{}", picture.width, picture.height),
+      "-r",        fmt::format("{}", frames_per_s_),
+      "-i",        "-"};
+  const auto& codec = kCodecs.at(EndingOf(file_));
+  words.insert(words.end(), codec.begin(), codec.end());
+  words.push_back(folder_ + "/video" + EndingOf(file_));
+  std::vector<char*> argv;
+  for (std::string& word : words) argv.push_back(word.data());
+  argv.push_back(nullptr);
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0) {
+    trouble_ = fmt::format("cannot make a pipe: {}", std::strerror(errno));
+    return false;
+  }
+  posix_spawn_file_actions_t actions;
+  posix_spawn_file_actions_init(&actions);
+  posix_spawn_file_actions_adddup2(&actions, ends[0], STDIN_FILENO);
+  posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, (folder_ + "/log").c_str(),
+                                   O_WRONLY | O_CREAT, 0600);
+  const int failure = posix_spawnp(&pid_, "ffmpeg", &actions, nullptr, argv.data(), environ);
+  posix_spawn_file_actions_destroy(&actions);
+  close(ends[0]);
+  pipe_ = ends[1];
+  if (failure == 0) return true;
+  pid_ = -1;
+  trouble_ = fmt::format("cannot start ffmpeg: {}", std::strerror(failure));
+  return false;
+}
+
+bool VideoEncoder::Add(const Picture& picture) {
+  if (pid_ < 0 && (!trouble_.empty() || !Start(picture))) return false;
+  const auto* at = reinterpret_cast<const char*>(picture.rgb.data());
+  for (size_t left = picture.rgb.size(); left > 0;) {
+    const ssize_t written = write(pipe_, at, left);
+    if (written < 0 && errno == EINTR) continue;
+    if (written <= 0) return false;
+    at += written;
+    left -= static_cast<size_t>(written);
+  }
+  return true;
+}
+
+std::string VideoEncoder::LogTail() const {
+  const std::string log = ReadFile(folder_ + "/log");
+  return log.empty() ? "no message" : log.substr(log.size() - std::min<size_t>(log.size(), 400));
+}
+
+std::string VideoEncoder::Finish(std::string* content) {
+  if (!trouble_.empty()) return trouble_;
+  MBV_DEMAND(pid_ > 0, pid_);
+  close(pipe_);
+  pipe_ = -1;
+  int status = 0;
+  waitpid(pid_, &status, 0);
+  pid_ = -1;
+  if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return "ffmpeg failed: " + LogTail();
+  *content = ReadFile(folder_ + "/video" + EndingOf(file_));
+  return content->empty() ? "ffmpeg wrote nothing: " + LogTail() : "";
+}
+
+}  // namespace mbv

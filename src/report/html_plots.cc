@@ -1,0 +1,94 @@
+#include "report/html_plots.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "report/svg_plot.h"
+
+namespace mbv {
+namespace {
+
+// More points than a picture this wide can show are thinned; extremes of each bin are kept.
+constexpr size_t kBins = 240;
+
+const Trace* TraceOf(const Report& report, const std::string& witness) {
+  for (const WitnessRecord& record : report.witnesses) {
+    if (record.name == witness && !record.trace.time_s.empty()) return &record.trace;
+  }
+  return nullptr;
+}
+
+using Points = std::vector<std::pair<double, double>>;
+
+Points Thinned(const Points& points) {
+  if (points.size() <= 2 * kBins) return points;
+  Points kept;
+  const size_t bin = (points.size() + kBins - 1) / kBins;
+  for (size_t from = 0; from < points.size(); from += bin) {
+    const auto first = points.begin() + static_cast<std::ptrdiff_t>(from);
+    const auto last =
+        points.begin() + static_cast<std::ptrdiff_t>(std::min(from + bin, points.size()));
+    const auto lower = [](const auto& a, const auto& b) { return a.second < b.second; };
+    auto [low, high] = std::minmax_element(first, last, lower);
+    if (high < low) std::swap(low, high);
+    kept.push_back(*low);
+    if (high != low) kept.push_back(*high);
+  }
+  return kept;
+}
+
+// Witnesses sample at the same times; a shorter trace ended early.
+Points ErrorOf(const Trace& measured, int column, const Trace& truth, int truth_column) {
+  Points points;
+  for (size_t i = 0; i < std::min(measured.time_s.size(), truth.time_s.size()); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    points.emplace_back(measured.time_s[i],
+                        std::abs(measured.values(row, column) - truth.values(row, truth_column)));
+  }
+  return points;
+}
+
+Points ValuesOf(const Trace& trace, int column) {
+  Points points;
+  for (size_t i = 0; i < trace.time_s.size(); ++i) {
+    points.emplace_back(trace.time_s[i], trace.values(static_cast<Eigen::Index>(i), column));
+  }
+  return points;
+}
+
+}  // namespace
+
+std::string StaticPlotsHtml(const Report& report) {
+  const PairComparison* pair = MainPair(report.comparison);
+  if (pair == nullptr) return "";
+  const Trace* measured = TraceOf(report, pair->measured);
+  const Trace* truth = TraceOf(report, pair->truth);
+  if (measured == nullptr || truth == nullptr) return "";
+  std::map<std::string, LinePlot> forces, errors;  // by unit
+  for (const std::string& drive : report.drives) {
+    const int column = measured->Find(drive + ".force"), other = truth->Find(drive + ".force");
+    if (column < 0 || other < 0) continue;
+    const std::string& unit = measured->channels[static_cast<size_t>(column)].unit;
+    const auto add = [&](LinePlot* plot, const Points& points) {
+      plot->x_label = "time [s]";
+      plot->y_label = fmt::format("[{}]", unit);
+      plot->lines.push_back({.label = drive, .points = Thinned(points)});
+    };
+    add(&forces[unit], ValuesOf(*measured, column));
+    add(&errors[unit], ErrorOf(*measured, column, *truth, other));
+  }
+  std::string html;
+  for (auto& [unit, plot] : forces) {
+    plot.title = fmt::format("Drive forces, {}", pair->measured);
+    LinePlot& error = errors[unit];
+    error.title = fmt::format("Drive forces, |{} − {}|", pair->measured, pair->truth);
+    error.log_y = true;
+    html += "<figure>" + ToSvg(plot) + "</figure>\n<figure>" + ToSvg(error) + "</figure>\n";
+  }
+  return html.empty() ? "" : "<div class=\"static-plots\">\n" + html + "</div>\n";
+}
+
+}  // namespace mbv
