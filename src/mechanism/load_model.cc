@@ -55,7 +55,9 @@ void ModelReader::ReadAll() {
        {Stage{&ModelReader::ReadBodies}, Stage{&ModelReader::ReadAttachedFrames},
         Stage{&ModelReader::ReadShapes}, Stage{&ModelReader::ReadJoints},
         Stage{&ModelReader::ReadDrives}, Stage{&ModelReader::ReadPrescribed},
-        Stage{&ModelReader::ReadOutputs}, Stage{&ModelReader::ReadSprings}}) {
+        Stage{&ModelReader::ReadOutputs}, Stage{&ModelReader::ReadSprings},
+        Stage{&ModelReader::ReadMaterials}, Stage{&ModelReader::ReadSections},
+        Stage{&ModelReader::ReadBeams}}) {
     for (const Block& block : blocks_) {
       yaml_.SetNote(block.Note());
       (this->*stage)(block);
@@ -66,6 +68,7 @@ void ModelReader::ReadAll() {
   OrderDrives(*root_);
   CheckCoordinateNames();
   CheckMasses();
+  CheckBeams();
   // With a broken joint, findings about the graph would only be its consequences; with a broken
   // number, those about the loops.
   if (!joints_good_ || !CheckTree()) return;

@@ -33,7 +33,7 @@ void ModelReader::ReadBody(const Block& block, const YamlEntry& entry) {
     return;
   }
   const YamlMap map(&yaml_, entry.value.get(), path,
-                    {"mass", "com", "com_mm", "inertia", "frames", "shapes"});
+                    {"mass", "com", "com_mm", "inertia", "frames", "shapes", "beams"});
   ReadMass(block, map, &body);
   const int index = static_cast<int>(mechanism_.bodies.size());
   mechanism_.bodies.push_back(std::move(body));

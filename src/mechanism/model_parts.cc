@@ -1,4 +1,4 @@
-// Head, parameters, and the expansion of instances into blocks.
+// Head, and the expansion of instances into blocks.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,16 +10,12 @@ namespace mbv {
 namespace {
 
 const std::vector<std::string> kModelKeys = {
-    "name",      "description", "parameters", "gravity", "world",   "bodies",
-    "joints",    "drives",      "prescribed", "outputs", "springs", "parts",
-    "instances", "drive_order", "urdf",       "attach",  "up"};
-const std::vector<std::string> kPartKeys = {"parameters", "attach",     "bodies",  "joints",
-                                            "drives",     "prescribed", "outputs", "springs",
-                                            "instances",  "description"};
-
-Source SourceOf(int choice) {
-  return std::vector<Source>{Source::kPrinted, Source::kAssumed, Source::kCorrected}[choice];
-}
+    "name",   "description", "parameters", "gravity",   "world",    "bodies",         "joints",
+    "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
+    "urdf",   "attach",      "up",         "materials", "sections", "parameters_from"};
+const std::vector<std::string> kPartKeys = {"parameters", "attach",      "bodies",    "joints",
+                                            "drives",     "prescribed",  "outputs",   "springs",
+                                            "instances",  "description", "materials", "sections"};
 
 }  // namespace
 
@@ -43,10 +39,7 @@ void ModelReader::ReadHead() {
     mechanism_.description = yaml_.Text(*text, "description").value_or("");
   }
   // Parameters come first: gravity may use them.
-  const YamlNode* parameters = map.Find("parameters");
-  ReadParameters(model, parameters, "parameters");
-  ApplyOverrides(model);
-  EvaluateParameters(model, parameters, "parameters");
+  ReadModelParameters(model, map);
   if (const YamlNode* gravity = map.Find("gravity")) {
     mechanism_.gravity_W = Vector(model, *gravity, "gravity").value_or(Vec3::Zero());
   }
@@ -64,104 +57,6 @@ void ModelReader::ReadUp(const Block& model, const YamlNode* node) {
     mechanism_.up_W = up->normalized();
   } else {
     yaml_.Error(*node, "up = [0, 0, 0] has no direction", "e.g. up: [0, 0, 1]");
-  }
-}
-
-void ModelReader::ReadParameters(const Block& block, const YamlNode* node,
-                                 const std::string& path) {
-  if (node == nullptr) return;
-  for (const YamlEntry& entry : yaml_.Entries(*node, path)) {
-    const std::string where = JoinPath(path, entry.key);
-    if (const std::string why = WhyNoParameterName(entry.key); !why.empty()) {
-      yaml_.Error(entry, fmt::format("{}: bad parameter name '{}'", path, entry.key), why);
-      continue;
-    }
-    const YamlNode* value = entry.value.get();
-    double factor = 1.0;
-    if (value->is_map()) {
-      const YamlMap map(&yaml_, value, where,
-                        {"value", "value_deg", "value_mm", "unit", "source", "note"});
-      const auto found = map.FindInUnit("value", {kPlain, kDeg, kMm});
-      if (found.node == nullptr) (void)map.Required("value");
-      value = found.node;
-      factor = found.unit.factor;
-    }
-    if (value == nullptr) continue;
-    if (!value->is_scalar()) {
-      yaml_.Error(*value, fmt::format("{} is {}, a number or an expression is needed", where,
-                                      Describe(*value)));
-      continue;
-    }
-    block.scope->Define(entry.key, value->text, factor);
-  }
-}
-
-// Reports what fails, and lists the parameters in the mechanism.
-void ModelReader::EvaluateParameters(const Block& block, const YamlNode* node,
-                                     const std::string& path) {
-  if (node == nullptr || !node->is_map()) return;
-  for (const YamlEntry& entry : node->entries) {
-    if (!block.scope->Has(entry.key)) continue;
-    const std::string where = JoinPath(path, entry.key);
-    Parameter parameter{.name = block.prefix + entry.key, .unit = "", .note = ""};
-    const ExpressionResult result = block.scope->Lookup(entry.key);
-    if (result.value) parameter.value = *result.value;
-    const YamlNode* at = entry.value.get();
-    if (at->is_map()) {
-      const YamlMap map(&yaml_, at, where,
-                        {"value", "value_deg", "value_mm", "unit", "source", "note"});
-      if (const auto found = map.FindInUnit("value", {kPlain, kDeg, kMm}); found.node != nullptr) {
-        at = found.node;
-      }
-      if (const YamlNode* unit = map.Find("unit")) {
-        parameter.unit = yaml_.Text(*unit, map.PathOf("unit")).value_or("");
-      }
-      if (const YamlNode* note = map.Find("note")) {
-        parameter.note = yaml_.Text(*note, map.PathOf("note")).value_or("");
-      }
-      if (const YamlNode* source = map.Find("source")) {
-        const auto choice =
-            yaml_.Choice(*source, map.PathOf("source"), {"printed", "assumed", "corrected"});
-        if (choice) parameter.source = SourceOf(*choice);
-      }
-    }
-    if (!result.value && !result.error.empty()) {
-      yaml_.Error(*at, fmt::format("{} = {} {}", where, Describe(*at), result.error), result.hint);
-    }
-    mechanism_.parameters.push_back(std::move(parameter));
-  }
-}
-
-void ModelReader::ApplyOverrides(const Block& block) {
-  for (const auto& [name, value] : options_.overrides) {
-    if (!name.starts_with(block.prefix)) continue;
-    const std::string inner = name.substr(block.prefix.size());
-    if (!block.scope->Has(inner)) continue;
-    block.scope->Set(inner, value);
-    override_used_[name] = true;
-  }
-  for (const std::string& name : block.scope->Names()) {
-    if (block.scope->Has(name)) known_parameters_.push_back(block.prefix + name);
-  }
-}
-
-void ModelReader::CheckOverrides() {
-  for (const auto& [name, value] : options_.overrides) {
-    if (override_used_[name] && std::isfinite(value)) continue;
-    Finding finding;
-    if (const auto place = options_.override_places.find(name);
-        place != options_.override_places.end()) {
-      finding = place->second;
-    }
-    finding.severity = Severity::kError;
-    if (override_used_[name]) {
-      finding.message = fmt::format("parameter {} = {} is not a finite number", name, value);
-    } else {
-      finding.message = fmt::format("{} has no parameter '{}'", yaml_.file(), name);
-      const std::string near = ClosestWord(name, known_parameters_);
-      if (!near.empty()) finding.hint = fmt::format("did you mean '{}'?", near);
-    }
-    other_findings_.Add(finding);
   }
 }
 
@@ -229,7 +124,7 @@ void ModelReader::ReadInstance(const Block& block, const YamlEntry& entry, const
   yaml_.SetNote(inner.Note());
   const YamlMap map(&yaml_, &part, inner.path, kPartKeys);
   const YamlNode* parameters = map.Find("parameters");
-  ReadParameters(inner, parameters, inner.PathOf("parameters"));
+  ReadParameters(&yaml_, inner, parameters, inner.PathOf("parameters"));
 
   // The instance's values replace the defaults; they see the parameters where they are written.
   yaml_.SetNote(block.Note());
@@ -247,7 +142,7 @@ void ModelReader::ReadInstance(const Block& block, const YamlEntry& entry, const
   }
   yaml_.SetNote(inner.Note());
   ApplyOverrides(inner);
-  EvaluateParameters(inner, parameters, inner.PathOf("parameters"));
+  EvaluateParameters(&yaml_, inner, parameters, inner.PathOf("parameters"));
   blocks_.push_back(inner);
   // A copy: blocks_ grows while the nested instances are added.
   ExpandInstances(inner);

@@ -2,9 +2,10 @@
 //
 // A "block" is a level of declarations: the model itself, or one instance of a part. Stages run
 // over all blocks one after the other, so that every name exists before it is referred to:
-// parameters and blocks (model_parts.cc), bodies and frames, then shapes (model_bodies.cc), joints
-// and drives (model_joints.cc), springs, outputs and order (model_signals.cc), then the
-// checks on the whole (model_checks.cc).
+// parameters (model_parameters.cc), head and blocks (model_parts.cc), bodies and frames, then
+// shapes (model_bodies.cc), joints (model_joints.cc), drives, springs, outputs and order
+// (model_signals.cc), materials, sections and beams (model_elastic.cc), then the checks on the
+// whole (model_checks.cc, model_beam_checks.cc).
 #pragma once
 
 #include <deque>
@@ -63,15 +64,22 @@ class ModelReader {
   // model_parts.cc
   void ReadHead();
   void ReadUp(const Block& model, const YamlNode* node);
-  void ReadParameters(const Block& block, const YamlNode* node, const std::string& path);
-  void EvaluateParameters(const Block& block, const YamlNode* node, const std::string& path);
-  void ApplyOverrides(const Block& block);
-  void CheckOverrides();
   void ExpandInstances(const Block& block);
   void AddInstance(const Block& block, const YamlEntry& entry);
   void ReadInstance(const Block& block, const YamlEntry& entry, const YamlNode& part,
                     const std::string& part_name);
   [[nodiscard]] const YamlNode* FindPart(const std::string& name) const;
+
+  // model_parameters.cc
+  void ReadModelParameters(const Block& model, const YamlMap& map);
+  void OpenParameterFiles(YamlReader* yaml, const YamlNode& root,
+                          const std::vector<std::string>& chain);
+  void ReadParameters(YamlReader* yaml, const Block& block, const YamlNode* node,
+                      const std::string& path);
+  void EvaluateParameters(YamlReader* yaml, const Block& block, const YamlNode* node,
+                          const std::string& path, const std::set<std::string>& replaced = {});
+  void ApplyOverrides(const Block& block);
+  void CheckOverrides();
 
   // model_bodies.cc
   void ReadBodies(const Block& block);
@@ -121,6 +129,33 @@ class ModelReader {
   void ReadSprings(const Block& block);
   void OrderDrives(const YamlNode& root);
   void CheckCoordinateNames();
+  double ReadDriveStiffness(const Block& block, const YamlMap& map);
+
+  // model_elastic.cc
+  void ReadMaterials(const Block& block);
+  void ReadMaterial(const Block& block, const YamlEntry& entry);
+  void ReadSections(const Block& block);
+  std::optional<Section> ReadSection(const Block& block, const YamlNode& node,
+                                     const std::string& path);
+  std::optional<Section> ReadRectangle(const Block& block, const YamlNode& node,
+                                       const std::string& path);
+  std::optional<bool> PrintedTorsion(const Block& block, const YamlMap& map);
+  std::optional<double> Positive(const Block& block, const YamlMap& map, const std::string& key,
+                                 std::initializer_list<UnitSuffix> units);
+  template <typename T>
+  std::optional<T> Described(const Block& block, const YamlMap& map, const std::string& key,
+                             const std::map<std::string, std::optional<T>>& known);
+  void ReadBeams(const Block& block);
+  void ReadBeam(const Block& block, const YamlEntry& entry, const std::string& path, int body,
+                const std::string& name);
+  std::optional<Mat3> BeamAxes(const Block& block, const YamlMap& map, const Vec3& along,
+                               const Section& section);
+
+  // model_beam_checks.cc
+  void CheckBeams();
+  void CheckFrameOfBeams(int body);
+  void CheckEndsOnBeams();
+  bool IsOnBeamEnd(int body, const Vec3& p) const;
 
   // model_checks.cc
   void CheckMasses();
@@ -156,6 +191,16 @@ class ModelReader {
   /// False (after a finding, once) when a list has grown beyond `limit`.
   bool Room(const YamlNode& at, size_t size, size_t limit, const char* what);
 
+  /// Young's and shear modulus [Pa].
+  struct Material {
+    double youngs = kNan, shear = kNan;
+  };
+  /// Another model file whose parameters this one takes.
+  struct ParameterFile {
+    YamlReader yaml;
+    YamlNodePtr root;
+  };
+
   YamlReader yaml_;
   const LoadOptions& options_;
   YamlNodePtr root_;
@@ -173,9 +218,15 @@ class ModelReader {
     const YamlEntry* entry;
   };
   std::map<std::string, std::vector<SignalPlace>> signal_places_;
-  int urdf_root_ = -1;  // body that needs a joint to the world
+  // By full name; empty: badly described, which has its own finding.
+  std::map<std::string, std::optional<Material>> materials_;
+  std::map<std::string, std::optional<Section>> sections_;
+  std::vector<const YamlEntry*> beam_places_;  // per beam
+  bool beams_good_ = true;                     // false: their frame is not worth checking
+  std::deque<ParameterFile> parameter_files_;  // stable addresses; innermost base first
+  int urdf_root_ = -1;                         // body that needs a joint to the world
   std::map<std::string, bool> override_used_;
-  Diagnostics other_findings_;                 // of other files: overrides, URDF
+  Diagnostics other_findings_;                 // of other files: overrides, URDF, parameters
   std::vector<std::string> known_parameters_;  // dotted names, for "did you mean"
 };
 

@@ -22,11 +22,12 @@ void ModelReader::ReadDrive(const Block& block, const YamlEntry& entry) {
   if (!Room(*entry.value, mechanism_.drives.size(), kMaxItems, "drives")) return;
   const YamlNode* kind_node = entry.value->is_map() ? entry.value->Find("kind") : nullptr;
   const bool joint_drive = kind_node != nullptr && kind_node->text == "joint";
-  const YamlMap map(&yaml_, entry.value.get(), path,
-                    joint_drive ? std::vector<std::string>{"kind", "joint", "coordinate", "range",
-                                                           "range_deg", "range_mm"}
-                                : std::vector<std::string>{"kind", "from", "to", "range",
-                                                           "range_mm", "radius", "radius_mm"});
+  const YamlMap map(
+      &yaml_, entry.value.get(), path,
+      joint_drive ? std::vector<std::string>{"kind", "joint", "coordinate", "range", "range_deg",
+                                             "range_mm", "stiffness", "compliance"}
+                  : std::vector<std::string>{"kind", "from", "to", "range", "range_mm", "radius",
+                                             "radius_mm", "stiffness", "compliance"});
   if (!map.valid() || map.Required("kind") == nullptr) return;
   if (!yaml_.Choice(*kind_node, map.PathOf("kind"), {"joint", "distance"})) return;
   Drive drive;
@@ -53,8 +54,26 @@ void ModelReader::ReadDrive(const Block& block, const YamlEntry& entry) {
     drive.range = Range(block, *range.node, map.PathOf(range.key), range.unit.factor)
                       .value_or(CoordinateRange{});
   }
+  drive.stiffness = ReadDriveStiffness(block, map);
   mechanism_.drives.push_back(drive);
   signal_places_[drive.name].push_back({"drive", &entry});
+}
+
+// Of the servo [N/m or N m/rad]; infinite (locked) when neither key is given.
+double ModelReader::ReadDriveStiffness(const Block& block, const YamlMap& map) {
+  const double locked = std::numeric_limits<double>::infinity();
+  if (map.Has("stiffness") && map.Has("compliance")) {
+    yaml_.Error(*map.node(), fmt::format("{} has both stiffness and compliance", map.path()),
+                "compliance is 1/stiffness; give one of them");
+    return locked;
+  }
+  if (map.Has("stiffness")) return Positive(block, map, "stiffness", {kPlain}).value_or(locked);
+  const auto compliance = Number(block, map, "compliance", {kPlain});
+  if (!compliance || *compliance == 0.0) return locked;
+  if (*compliance > 0.0) return 1.0 / *compliance;
+  yaml_.Error(*map.Find("compliance"), fmt::format("{} = {} violates compliance >= 0",
+                                                   map.PathOf("compliance"), *compliance));
+  return locked;
 }
 
 std::optional<JointDrive> ModelReader::ReadJointDrive(const Block& block, const YamlMap& map) {
