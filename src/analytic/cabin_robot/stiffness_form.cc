@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace mbv::cabin {
 namespace {
@@ -118,6 +119,12 @@ void CheckParameters(const Mechanism& mechanism, Diagnostics* diagnostics) {
   for (const std::string beam : kBeamNames) {
     check("b_" + beam, true);
     check("h_" + beam, true);
+  }
+  for (const Drive& drive : mechanism.drives) {
+    if (std::isinf(drive.stiffness)) continue;
+    AddError(diagnostics,
+             fmt::format("the servo of {} has the stiffness {:g}", drive.name, drive.stiffness),
+             "the paper locks all drives: leave their compliance 0 for the closed form");
   }
 }
 

@@ -197,7 +197,8 @@ LimbStiffness StiffnessOf(const LimbSprings& limb, double length) {
   LimbStiffness result;
   result.rank = static_cast<int>(W.cols());
   const Square flexibility = W.transpose() * SpringCompliance(limb) * W;
-  result.K = W * flexibility.inverse() * W.transpose();
+  const Mat6 K = W * flexibility.inverse() * W.transpose();
+  result.K = 0.5 * (K + K.transpose());  // symmetric to the last digit
   return result;
 }
 
