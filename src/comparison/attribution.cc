@@ -52,7 +52,7 @@ bool PositionsDiffer(const Comparison& comparison, const std::string& pair) {
 
 // 1. Rates against differences of positions.
 Attribution ByDerivatives(const Comparison& comparison) {
-  for (const char* name : {"analytic", "reference"}) {
+  for (const char* name : {"analytic", "reference", "solver"}) {
     const CheckResult* check = comparison.FindCheck(std::string(name) + ".derivatives");
     if (!Failed(check)) continue;
     return {name, fmt::format("{}: its drive rates are not the time derivatives of its drive "
@@ -93,9 +93,10 @@ Attribution ByCommand(const ComparisonInput& input, const Comparison& comparison
                       miss, AmountOf(drive), Place(drive.channel, drive.time_s))};
 }
 
-const char* NameOf(const std::string& witness) {
+std::string NameOf(const Comparison& comparison, const std::string& witness) {
   if (witness == "simulated") return "simulation";
-  return witness == "reference" ? "reference" : "analytic";
+  if (witness == "reference" && comparison.table) return "the table " + comparison.table->name;
+  return witness == "solver" ? "the generic solver" : witness;
 }
 
 // What a wrong force looks like: opposite sign or a constant factor.
@@ -155,9 +156,12 @@ bool IsDriveMotion(Metric metric) {
          metric == Metric::kVelocity || metric == Metric::kAcceleration;
 }
 
-std::string ThirdOf(const PairComparison& pair) {
-  for (const char* name : {"analytic", "reference", "simulated"}) {
-    if (pair.measured != name && pair.truth != name) return name;
+// The witness of the compared pairs that is not in this one.
+std::string ThirdOf(const std::vector<Distance>& distances, const PairComparison& pair) {
+  for (const Distance& distance : distances) {
+    for (const std::string& name : {distance.pair->measured, distance.pair->truth}) {
+      if (pair.measured != name && pair.truth != name) return name;
+    }
   }
   return "";
 }
@@ -176,7 +180,7 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
                                                  "motion and cannot tell which is wrong",
                                                  input.driven_by);
     return {"", fmt::format("{} and {} differ by {} in {}: worst at {}{}; {}",
-                            NameOf(pair.measured), NameOf(pair.truth), AmountOf(*check), row.title,
+                            NameOf(comparison, pair.measured), NameOf(comparison, pair.truth), AmountOf(*check), row.title,
                             Place(check->channel, check->time_s), Hint(pair), why)};
   }
   const Distance &near = distances[0], &far = distances[1];
@@ -189,10 +193,10 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
                         Amount(far.measured.value, row.unit), distances[2].pair->name(),
                         Amount(distances[2].measured.value, row.unit), row.title)};
   }
-  const std::string odd = ThirdOf(*near.pair);
+  const std::string odd = ThirdOf(distances, *near.pair);
   return {odd, fmt::format("{} and {} agree to {}, {} differs by {} in {}: worst at {}{}",
-                           NameOf(near.pair->measured), NameOf(near.pair->truth),
-                           Amount(near.measured.value, row.unit), NameOf(odd),
+                           NameOf(comparison, near.pair->measured), NameOf(comparison, near.pair->truth),
+                           Amount(near.measured.value, row.unit), NameOf(comparison, odd),
                            Amount(far.measured.value, row.unit), row.title,
                            Place(far.measured.channel, far.measured.time_s), Hint(*far.pair))};
 }
@@ -202,7 +206,7 @@ Attribution BySingleCheck(const Comparison& comparison) {
   for (const CheckResult& check : comparison.checks) {
     if (!Failed(&check) || RowOf(check.metric).of_pair) continue;
     return {check.subject,
-            fmt::format("{}: {} is {} at {}", NameOf(check.subject), RowOf(check.metric).title,
+            fmt::format("{}: {} is {} at {}", NameOf(comparison, check.subject), RowOf(check.metric).title,
                         AmountOf(check), Place(check.channel, check.time_s))};
   }
   return {};
@@ -210,10 +214,15 @@ Attribution BySingleCheck(const Comparison& comparison) {
 
 std::string AgreementText(const Comparison& comparison) {
   std::string text;
-  for (const Distance& distance : Distances(comparison, Metric::kForceNrmse)) {
-    text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",
-                        NameOf(distance.pair->measured), NameOf(distance.pair->truth),
-                        Amount(distance.measured.value, ""));
+  // A free motion has no drive force to compare.
+  for (const Metric metric :
+       {Metric::kForceNrmse, Metric::kPoseM, Metric::kPositionM, Metric::kPositionRad}) {
+    for (const Distance& distance : Distances(comparison, metric)) {
+      text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",
+                          NameOf(comparison, distance.pair->measured), NameOf(comparison, distance.pair->truth),
+                          Amount(distance.measured.value, RowOf(metric).unit));
+    }
+    if (!text.empty()) break;
   }
   return text;
 }

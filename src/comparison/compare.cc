@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/table_diagnosis.h"
+#include "comparison/table_tube.h"
 
 namespace mbv {
 namespace {
@@ -42,19 +44,42 @@ LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) 
   return measured == "simulated" ? input.simulation_limits : LimitColumn::kReference;
 }
 
+// `tubes`: what a table's own uncertainty allows; the wider of it and the limit counts.
 void AddChecks(const ComparisonInput& input, const std::string& subject, LimitColumn column,
-               const std::map<Metric, Measured>& metrics, Comparison* comparison) {
+               const std::map<Metric, Measured>& metrics, const std::map<Metric, double>& tubes,
+               Comparison* comparison) {
   for (const auto& [metric, measured] : metrics) {
     CheckResult check{.name = subject + "." + RowOf(metric).key,
                       .subject = subject,
                       .metric = metric,
                       .value = measured.value,
                       .limit = input.limits[metric].Of(column),
+                      .stated_limit = {},
                       .time_s = measured.time_s,
                       .channel = measured.channel};
+    const auto tube = tubes.find(metric);
+    if (check.limit && tube != tubes.end() && tube->second > *check.limit) {
+      check.stated_limit = check.limit;
+      check.limit = tube->second;
+    }
     check.pass = check.limit && check.value <= *check.limit;  // false for NaN
     comparison->checks.push_back(std::move(check));
   }
+}
+
+bool IsTable(const ComparisonInput& input, const std::string& witness) {
+  return input.table != nullptr && witness == "reference";
+}
+
+// A pair with a table: its columns judged one by one, and the tubes of its metrics.
+std::map<Metric, double> JudgeTablePair(const ComparisonInput& input, const Witness& other,
+                                        PairComparison* pair, TableVerdict* verdict) {
+  const bool table_is_truth = IsTable(input, pair->truth);
+  pair->columns = JudgeColumns(input, *other.trace, ColumnOf(input, pair->measured));
+  if (!pair->columns.empty()) pair->metrics[Metric::kTableTube] = WorstOf(pair->columns);
+  std::map<Metric, double> tubes = TubeLimits(input, *other.trace, table_is_truth);
+  if (verdict->too_coarse.empty()) verdict->too_coarse = TooCoarse(input, tubes, pair->columns);
+  return tubes;
 }
 
 void AddPair(const ComparisonInput& input, const char* measured, const char* truth,
@@ -67,8 +92,12 @@ void AddPair(const ComparisonInput& input, const char* measured, const char* tru
   pair.truth = truth;
   pair.reason = WhyNot(*a, *b);
   if (pair.reason.empty()) pair = ComparePair(input, *a->trace, *b->trace);
+  std::map<Metric, double> tubes;
+  if (Ran(*a) && Ran(*b) && (IsTable(input, measured) || IsTable(input, truth))) {
+    tubes = JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
+  }
   if (!pair.compared) comparison->not_compared.push_back({pair.name(), pair.reason});
-  AddChecks(input, pair.name(), ColumnOf(input, measured), pair.metrics, comparison);
+  AddChecks(input, pair.name(), ColumnOf(input, measured), pair.metrics, tubes, comparison);
   comparison->pairs.push_back(std::move(pair));
 }
 
@@ -88,6 +117,7 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
   }
   for (const WitnessMetrics& witness : comparison->witnesses) {
     if (witness.witness == "analytic") continue;  // has no bodies to close and no energy
+    if (IsTable(input, witness.witness)) continue;
     if (!witness.metrics.contains(Metric::kClosureM))
       note(witness.witness + ".closure", "not recorded");
     if (!witness.metrics.contains(Metric::kPower)) note(witness.witness + ".power", "not recorded");
@@ -112,12 +142,64 @@ void AddCommandNotes(const ComparisonInput& input, Comparison* comparison) {
   }
 }
 
+// Given forces are the same in every witness.
+void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
+  for (const DriveForce& force : input.motion->forces) {
+    comparison->not_compared.push_back({input.mechanism->drives[force.drive].name + ".force",
+                                        "it is given by the scenario; the motion it causes is "
+                                        "compared"});
+  }
+}
+
 // A witness that started and broke down, or nullptr.
 const Witness* FindBroken(const ComparisonInput& input) {
   for (const Witness& witness : input.witnesses) {
     if (!witness.summary.ok() && witness.summary.stop != Stop::kNotRun) return &witness;
   }
   return nullptr;
+}
+
+// A table that was given must have been judged, and must be able to tell something.
+std::string WhyTableVerifiesNothing(const Comparison& comparison) {
+  const TableVerdict& table = *comparison.table;
+  if (!table.too_coarse.empty()) return table.too_coarse;
+  const bool judged = std::any_of(
+      comparison.checks.begin(), comparison.checks.end(), [](const CheckResult& check) {
+        return check.limit && (check.metric == Metric::kTableTube || check.stated_limit);
+      });
+  if (judged) return "";
+  return fmt::format("nothing of the table {} could be compared", table.name);
+}
+
+// What the table is, for the report.
+TableVerdict Introduce(const AlignedTable& table) {
+  TableVerdict verdict;
+  verdict.name = table.name;
+  verdict.grid = table.grid;
+  verdict.notes = table.notes;
+  verdict.columns = table.columns;
+  verdict.uncertainty = table.uncertainty;
+  verdict.coverage = table.coverage;
+  return verdict;
+}
+
+// Drives without a column, and what the differences look like.
+void FinishTable(const ComparisonInput& input, Comparison* comparison) {
+  TableVerdict& table = *comparison->table;
+  for (const Drive& drive : input.mechanism->drives) {
+    if (input.table->trace.Find(drive.name + ".force") >= 0) continue;
+    comparison->not_compared.push_back({drive.name + ".force", "it is not in the table"});
+  }
+  // The computation that the simulation does not depend on tells more than the simulation.
+  for (const char* name :
+       {"reference_vs_analytic", "reference_vs_solver", "simulated_vs_reference"}) {
+    const PairComparison* pair = comparison->FindPair(name);
+    if (pair == nullptr || pair->columns.empty()) continue;
+    table.judged_against = pair->measured == "reference" ? pair->truth : pair->measured;
+    const Witness* other = FindWitness(input, table.judged_against);
+    table.diagnoses = DiagnoseTable(input, *other->trace, pair->columns);
+    return;
+  }
 }
 
 void Judge(const ComparisonInput& input, Comparison* comparison) {
@@ -129,18 +211,25 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
                                       [](const PairComparison& p) { return p.compared; });
   if (compared == 0) {
     comparison->verdict = Verdict::kNotRun;
-    comparison->reason = "no drive force could be compared";
+    comparison->reason = input.motion->free() ? "no free motion could be compared"
+                                              : "no drive force could be compared";
     if (!comparison->pairs.empty()) comparison->reason += ": " + comparison->pairs.front().reason;
     return;
   }
-  const bool force_judged = std::any_of(
-      comparison->checks.begin(), comparison->checks.end(),
-      [](const CheckResult& check) { return check.limit && IsDriveForce(check.metric); });
-  if (!force_judged) {
-    comparison->reason = "every force check is switched off, so nothing was verified";
+  const bool free = input.motion->free();
+  const auto judges = [&](const CheckResult& check) {
+    return check.limit && (free ? IsTrajectory(check.metric) : IsDriveForce(check.metric));
+  };
+  if (std::none_of(comparison->checks.begin(), comparison->checks.end(), judges)) {
+    comparison->reason = fmt::format("every {} check is switched off, so nothing was verified",
+                                     free ? "position and pose" : "force");
     return;
   }
   const size_t failed = comparison->failed();
+  if (input.table != nullptr && failed == 0) {
+    comparison->reason = WhyTableVerifiesNothing(*comparison);
+    if (!comparison->reason.empty()) return;
+  }
   comparison->verdict = failed == 0 ? Verdict::kAgree : Verdict::kDisagree;
   comparison->reason =
       failed == 0 ? fmt::format("all {} checks are within their limits", comparison->verified())
@@ -188,18 +277,27 @@ size_t Comparison::verified() const {
 
 Comparison Compare(const ComparisonInput& input) {
   Comparison comparison;
+  if (input.table != nullptr) comparison.table = Introduce(*input.table);
   AddPair(input, "simulated", "analytic", &comparison);
   AddPair(input, "reference", "analytic", &comparison);
   AddPair(input, "simulated", "reference", &comparison);
+  // The generic solver takes part by its own name where a table has the reference's place.
+  AddPair(input, "simulated", "solver", &comparison);
+  AddPair(input, "reference", "solver", &comparison);
   for (const Witness& witness : input.witnesses) {
     if (!Ran(witness)) continue;
     WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
-    AddChecks(input, witness.name, ColumnOf(input, witness.name), metrics.metrics, &comparison);
+    const auto tubes =
+        IsTable(input, witness.name) ? CommandTubes(input) : std::map<Metric, double>();
+    AddChecks(input, witness.name, ColumnOf(input, witness.name), metrics.metrics, tubes,
+              &comparison);
     comparison.witnesses.push_back(std::move(metrics));
   }
   AddMissingNotes(input, &comparison);
   AddReactionNotes(input, &comparison);
   AddCommandNotes(input, &comparison);
+  AddForceNotes(input, &comparison);
+  if (input.table != nullptr) FinishTable(input, &comparison);
   Judge(input, &comparison);
   comparison.attribution = Attribute(input, comparison);
   return comparison;

@@ -94,7 +94,11 @@ void FitFactor(const PairReader& reader, Columns columns, double start_s, DriveM
 void CompareForces(const ComparisonInput& input, const PairReader& reader, PairComparison* pair) {
   std::map<std::string, ErrorSum> pooled;
   std::vector<std::pair<std::string, ErrorSum>> drives;  // unit and sums, as pair->drives
-  for (const Drive& drive : input.mechanism->drives) {
+  size_t wanted = 0;
+  for (size_t d = 0; d < input.mechanism->drives.size(); ++d) {
+    if (input.motion->FindForce(static_cast<int>(d)) >= 0) continue;  // given to both
+    const Drive& drive = input.mechanism->drives[d];
+    ++wanted;
     const std::string channel = drive.name + ".force";
     const Columns columns = reader.Find(channel);
     if (!columns.both()) continue;
@@ -115,10 +119,16 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
     KeepWorst(&pair->metrics, Metric::kForceNrmse, AsMeasured(sum, sum.Nrmse()));
     KeepWorst(&pair->metrics, Metric::kForceMax, AsMeasured(sum, sum.MaxRelative()));
   }
-  pair->compared = pair->drives.size() == input.mechanism->drives.size() && !pair->drives.empty();
+  // A table need not hold every drive.
+  const bool table = input.table != nullptr &&
+                     (reader.measured.witness == "reference" || reader.truth.witness == "reference");
+  const bool all = pair->drives.size() == wanted || (table && !pair->drives.empty());
+  pair->compared = all && (!pair->drives.empty() || (input.motion->free() && pair->samples > 0));
   if (pair->compared) {
     pair->reason.clear();
-    pair->digits = MatchingDigits(pair->metrics[Metric::kForceNrmse].value);
+    if (!pair->drives.empty()) {
+      pair->digits = MatchingDigits(pair->metrics[Metric::kForceNrmse].value);
+    }
   } else if (reader.samples.empty()) {
     pair->reason = "the two have no sample time in common";
   } else if (pair->drives.empty()) {
@@ -236,6 +246,13 @@ PairComparison ComparePair(const ComparisonInput& input, const Trace& measured,
   CompareForces(input, reader, &pair);
   CompareDriveMotion(input, reader, &pair);
   ComparePoses(input, reader, &pair);
+  // A free motion is judged by where it leads.
+  const bool trajectory = std::any_of(pair.metrics.begin(), pair.metrics.end(),
+                                      [](const auto& entry) { return IsTrajectory(entry.first); });
+  if (pair.compared && pair.drives.empty() && !trajectory) {
+    pair.compared = false;
+    pair.reason = "the model has neither drives nor outputs whose motion could be compared";
+  }
   CompareReactions(input, reader, &pair);
   return pair;
 }

@@ -3,7 +3,8 @@
 // Compared are signals with the same channel name at common sample times. Angles are differenced
 // modulo 2π, orientations as log(RᵀR'). A check passes only if its value is a number at or below
 // its limit. The verdict starts as kNotRun and is kAgree only if drive forces of at least one pair
-// of witnesses were compared, no witness broke down and every check passes.
+// of witnesses were compared (trajectories, where freedoms move by given forces), no witness broke
+// down and every check passes.
 #pragma once
 
 #include <map>
@@ -17,6 +18,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
+#include "scenario/table.h"
 
 namespace mbv {
 
@@ -39,7 +41,14 @@ struct ComparisonInput {
   std::vector<Witness> witnesses;  ///< in the order analytic, reference, simulated
   std::string driven_by;           ///< the witness whose kinematics the simulation follows
   std::vector<std::string> joints_not_unique;  ///< reactions that statics leaves open
+  const AlignedTable* table = nullptr;  ///< what the witness "reference" is, if it is a table
 };
+
+/// Judges where a free motion leads.
+[[nodiscard]] constexpr bool IsTrajectory(Metric metric) {
+  return metric == Metric::kPositionM || metric == Metric::kPositionRad ||
+         metric == Metric::kPoseM || metric == Metric::kPoseRad;
+}
 
 /// One drive's force in a pair of witnesses.
 struct DriveMetrics {
@@ -62,6 +71,23 @@ struct NotCompared {
   std::string why;
 };
 
+/// One column of a table against the same signal of another witness. All in the signal's SI unit.
+struct TableColumnResult {
+  std::string channel;
+  size_t column = 0;        ///< of the table's trace
+  size_t samples = 0;       ///< compared
+  double rms = kNan;        ///< of the table
+  double standard = kNan;   ///< RMS of its standard uncertainty
+  double bound = kNan;      ///< largest distance that its uncertainty allows a sample
+  double error_rms = kNan;  ///< difference to the other witness
+  double error_max = kNan;
+  double time_s = kNan;    ///< of the largest difference
+  double tube_rms = kNan;  ///< limits of both; infinite where the scenario switched them off
+  double tube_max = kNan;
+  [[nodiscard]] double ratio() const;  ///< difference / tube, the worse of both; NaN stays
+  [[nodiscard]] bool inside() const { return ratio() <= 1.0; }
+};
+
 /// `measured` against `truth`.
 struct PairComparison {
   std::string measured, truth;
@@ -71,8 +97,9 @@ struct PairComparison {
   size_t force_samples = 0;                 ///< of these, inside the judged window
   std::map<Metric, Measured> metrics;       ///< those that could be measured
   std::vector<DriveMetrics> drives;
-  std::vector<std::string> reactions;  ///< joints whose reactions were compared
-  double digits = kNan;                ///< matching digits of all forces
+  std::vector<std::string> reactions;      ///< joints whose reactions were compared
+  double digits = kNan;                    ///< matching digits of all forces
+  std::vector<TableColumnResult> columns;  ///< where one of the two is a table
 
   [[nodiscard]] std::string name() const { return measured + "_vs_" + truth; }
 };
@@ -89,6 +116,8 @@ struct CheckResult {
   Metric metric = Metric::kForceNrmse;
   double value = kNan;
   std::optional<double> limit;  ///< empty: switched off in the scenario
+  /// Set where `limit` is not the scenario's own but what a table's uncertainty allows.
+  std::optional<double> stated_limit;
   bool pass = false;
   double time_s = kNan;
   std::string channel;
@@ -100,6 +129,19 @@ struct Attribution {
   std::string text;         ///< one or two sentences for people
 };
 
+/// What there is to say about a table that stands in for the reference.
+struct TableVerdict {
+  std::string name;  ///< file name
+  std::string grid;  ///< how its rows meet the scenario's samples
+  std::vector<std::string> notes;
+  std::vector<TableColumn> columns;
+  std::vector<TableUncertainty> uncertainty;  ///< of columns
+  double coverage = kNan;                     ///< k
+  std::string judged_against;                 ///< witness of the results that are shown first
+  std::string too_coarse;                     ///< why it verifies nothing; "" if it does
+  std::vector<std::string> diagnoses;         ///< what the differences look like
+};
+
 struct Comparison {
   Verdict verdict = Verdict::kNotRun;
   std::string reason = "comparison was not run";  ///< one sentence
@@ -108,6 +150,7 @@ struct Comparison {
   std::vector<CheckResult> checks;        ///< off ones included
   std::vector<NotCompared> not_compared;
   Attribution attribution;
+  std::optional<TableVerdict> table;
 
   [[nodiscard]] const PairComparison* FindPair(const std::string& name) const;
   [[nodiscard]] const CheckResult* FindCheck(const std::string& name) const;

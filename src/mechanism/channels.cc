@@ -59,6 +59,8 @@ std::vector<Channel> AuditChannels() {
           {"power.energy_rate", "W", ""}};
 }
 
-std::vector<Channel> EnergyChannels() { return {{"energy.total", "J", ""}}; }
+std::vector<Channel> EnergyChannels() {
+  return {{"energy.kinetic", "J", ""}, {"energy.potential", "J", ""}};
+}
 
 }  // namespace mbv

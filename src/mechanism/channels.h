@@ -21,7 +21,7 @@ namespace mbv {
 /// closure.position [m], closure.rotation [rad]: largest loop gap;
 /// power.input [W]: Σ drive + base + load power; power.energy_rate [W]: d/dt(kinetic + potential).
 [[nodiscard]] std::vector<Channel> AuditChannels();
-/// Free motion only: energy.total [J], kinetic + potential (gravity from the world's origin,
+/// Free motion only: energy.kinetic and energy.potential [J] (gravity from the world's origin,
 /// springs).
 [[nodiscard]] std::vector<Channel> EnergyChannels();
 

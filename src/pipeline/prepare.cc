@@ -17,7 +17,8 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
       MakeClosedForm(prepared.scenario, prepared.mechanisms.analytic, diagnostics);
   const bool analytic = prepared.closed_form.closed_form != nullptr;
   prepared.driven_by = analytic ? "analytic" : "reference";
-  if (prepared.scenario.simulation.on && !analytic && !prepared.scenario.reference.on) {
+  if (prepared.scenario.simulation.on && !analytic && !prepared.scenario.reference.on &&
+      !prepared.scenario.motion.free()) {
     Finding finding;
     finding.file = file;
     finding.message =
@@ -30,6 +31,7 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
 }
 
 DrivenMotion Prepared::MakeDrivenMotion() const {
+  if (scenario.motion.free()) return DriveByCommands(mechanisms.simulated, scenario.motion);
   if (driven_by == "reference") return DriveByReference(mechanisms.reference, scenario.motion);
   // A fresh closed form, because it may follow its solution from the start of the motion.
   Diagnostics known;

@@ -7,6 +7,7 @@
 
 #include "core/demand.h"
 #include "mechanism/load_model.h"
+#include "reference/forward.h"
 #include "reference/reference.h"
 
 namespace mbv {
@@ -66,6 +67,9 @@ WitnessMechanisms LoadWitnessMechanisms(const Scenario& scenario, const Mechanis
 ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
                                 Diagnostics* diagnostics) {
   if (!scenario.analytic.on) return {nullptr, "switched off in the scenario"};
+  if (scenario.motion.free()) {
+    return {nullptr, "closed forms give forces for a motion, not the motion for forces"};
+  }
   const ClosedFormRow* row = FindClosedForm(mechanism.name);
   if (row == nullptr) return {nullptr, "there are no closed-form equations for " + mechanism.name};
   const AnalyticSettings& settings = scenario.analytic;
@@ -105,6 +109,24 @@ DrivenMotion DriveByClosedForm(const Motion& motion, std::shared_ptr<ClosedForm>
         EvaluateMotion(motion, t_s, command.get());
         return closed_form->Kinematics(*command, driven);
       };
+}
+
+DrivenMotion DriveByCommands(const Mechanism& mechanism, const Motion& motion) {
+  const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+  const auto all = drives + static_cast<Eigen::Index>(mechanism.prescribed.size());
+  return [&motion, drives, all](double t_s, DrivenSample* driven) {
+    for (VecX* x : {&driven->position, &driven->velocity, &driven->acceleration}) x->setZero(all);
+    for (const Command& command : motion.commands) {
+      const Coordinate& c = command.terms.front().coordinate;
+      MBV_DEMAND(c.kind != Coordinate::Kind::kOutput, command.name);
+      const auto k = c.index + (c.kind == Coordinate::Kind::kDrive ? 0 : drives);
+      const Jet jet = Evaluate(command.profile, t_s);
+      driven->position[k] = jet.value;
+      driven->velocity[k] = jet.rate;
+      driven->acceleration[k] = jet.acceleration;
+    }
+    return RunSummary::Done();
+  };
 }
 
 DrivenMotion DriveByReference(const Mechanism& mechanism, const Motion& motion) {
@@ -158,9 +180,15 @@ SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechan
   }
   if (witness.diagnostics.has_errors()) return witness;
   if (!scenario.simulation.extrapolate) {
-    witness.run = Simulate(mechanism, scenario.motion, driven, options, progress);
+    SimulationOptions started = options;
+    if (scenario.motion.free()) {
+      witness.run.summary = InitialStates(mechanism, scenario.motion, &started.start);
+      if (!witness.run.summary.ok()) return witness;
+    }
+    witness.run = Simulate(mechanism, scenario.motion, driven, started, progress);
     return witness;
   }
+  MBV_DEMAND(!scenario.motion.free(), scenario.name);  // forces are not linear in it
   const Extrapolation& extrapolation = *scenario.simulation.extrapolate;
   const Overrides base = Merge(scenario.parameters, scenario.simulation.parameters);
   std::array<SimulationRun, 2> runs;

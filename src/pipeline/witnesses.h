@@ -35,6 +35,8 @@ struct ClosedFormChoice {
 /// Drive motion for the simulation, computed by the closed form or by the reference.
 [[nodiscard]] DrivenMotion DriveByClosedForm(const Motion& motion,
                                              std::shared_ptr<ClosedForm> closed_form);
+/// Of a free motion: commanded drives and prescribed joints; the other entries are 0.
+[[nodiscard]] DrivenMotion DriveByCommands(const Mechanism& mechanism, const Motion& motion);
 [[nodiscard]] DrivenMotion DriveByReference(const Mechanism& mechanism, const Motion& motion);
 
 /// Simulates, extrapolating if the scenario asks for it.

@@ -59,8 +59,11 @@ struct PowerAudit {
   double loads_and_dampers_W = 0.0;
   double energy_rate_W = 0.0;
 };
-/// Kinetic plus potential energy (gravity from the world's origin, springs) [J].
-[[nodiscard]] double EnergyOf(const Mechanism& mechanism, const BodyStates& states);
+/// Energies [J]; gravity's counts from the world's origin.
+struct Energies {
+  double kinetic = 0.0, potential = 0.0;
+};
+[[nodiscard]] Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states);
 [[nodiscard]] PowerAudit AuditPower(const Mechanism& mechanism, const BodyStates& states,
                                     const std::vector<LoadSample>& loads);
 

@@ -35,7 +35,7 @@ struct SingularPassage {
 };
 
 struct ForwardRun {
-  Trace trace;         ///< the reference's channels and EnergyChannels()
+  Trace trace;         ///< the reference's channels, then EnergyChannels()
   RunSummary summary;  ///< kSingular, kNoConvergence, kUnsupported, or what the start failed with
   BodyStates start;    ///< at t = 0
   long steps = 0, evaluations = 0;

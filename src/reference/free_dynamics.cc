@@ -100,9 +100,7 @@ VecX FreeDynamics::LeastMotion(const VecX& rates, Eigen::Index rank) const {
   return body_scale_.cwiseProduct(Q_.leftCols(rank) * y);
 }
 
-MatX FreeDynamics::Motions() const {
-  return body_scale_.asDiagonal() * Q_.rightCols(freedoms_);
-}
+MatX FreeDynamics::Motions() const { return body_scale_.asDiagonal() * Q_.rightCols(freedoms_); }
 
 std::string FreeDynamics::SoftJoint(const BodyStates& states) const {
   const Eigen::Index weakest = size_ - freedoms_ - 1;
@@ -171,8 +169,8 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
     const Body& body = mechanism_.bodies[b];
     const Mat3 R_WB = states->X_WB[b].linear();
-    const Mat6 M = SpatialInertia(body.mass, R_WB * body.p_BoBcm_B,
-                                  R_WB * body.I_Bcm_B * R_WB.transpose());
+    const Mat6 M =
+        SpatialInertia(body.mass, R_WB * body.p_BoBcm_B, R_WB * body.I_Bcm_B * R_WB.transpose());
     const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
     MR.middleRows<6>(at) = M * R.middleRows<6>(at);
   }
@@ -185,9 +183,9 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
     summary.stop = Stop::kSingular;
     summary.time_s = t_s;
     summary.where = MostMovingJoint(mechanism_, *states, R * eigen.eigenvectors().col(0));
-    summary.message = fmt::format(
-        "a freedom near {} has no inertia, so forces do not determine its acceleration",
-        summary.where);
+    summary.message =
+        fmt::format("a freedom near {} has no inertia, so forces do not determine its acceleration",
+                    summary.where);
     return summary;
   }
   const VecX u = factors.solve(R.transpose() * (Stack(drives) - Stack(required)));
@@ -225,8 +223,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
   return summary;
 }
 
-void FreeDynamics::Gaps(const BodyStates& states, double* position_m,
-                        double* rotation_rad) const {
+void FreeDynamics::Gaps(const BodyStates& states, double* position_m, double* rotation_rad) const {
   *position_m = *rotation_rad = 0.0;
   for (const Joint& joint : mechanism_.joints) {
     const ConstraintRows rows = RowsOf(joint, states, false);
@@ -289,10 +286,10 @@ RunSummary FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
   sample->prescribed_force = force.tail(rows.size() - first_prescribed);
   const PowerAudit audit = AuditPower(mechanism_, states, command_.loads);
   sample->energy_rate_W = audit.energy_rate_W;
-  sample->power_input_W = audit.loads_and_dampers_W +
-                          sample->drive_force.dot(sample->driven.velocity.head(drives)) +
-                          sample->prescribed_force.dot(sample->driven.velocity.tail(
-                              sample->driven.velocity.size() - drives));
+  sample->power_input_W =
+      audit.loads_and_dampers_W + sample->drive_force.dot(sample->driven.velocity.head(drives)) +
+      sample->prescribed_force.dot(
+          sample->driven.velocity.tail(sample->driven.velocity.size() - drives));
   return RunSummary::Done();
 }
 

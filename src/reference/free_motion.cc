@@ -16,7 +16,7 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 
-constexpr size_t kPerBody = 13;         // position, quaternion (w, x, y, z), twist
+constexpr size_t kPerBody = 13;          // position, quaternion (w, x, y, z), twist
 constexpr double kSmallestStep = 1e-10;  // of the duration
 // A pose counts as near singular while its pivot is below this share of the largest of the run, and
 // as passed if the search between the nodes brings it below the second.
@@ -69,9 +69,9 @@ struct FreeMotion::Stepper {
   odeint::controlled_runge_kutta<Fehlberg> controlled;
 
   explicit Stepper(double tolerance)
-      : controlled(odeint::default_error_checker<double, odeint::range_algebra,
-                                                 odeint::default_operations>(tolerance, tolerance)) {
-  }
+      : controlled(
+            odeint::default_error_checker<double, odeint::range_algebra,
+                                          odeint::default_operations>(tolerance, tolerance)) {}
 };
 
 FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance)

@@ -73,18 +73,18 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
   }
 }
 
-double EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
-  double energy = 0.0;
+Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
+  Energies energy;
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
     const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
     const Vec3 p_Wcm = states.X_WB[b].translation() + x.c;
-    energy += 0.5 * (body.mass * x.v_cm.squaredNorm() + x.w.dot(x.I * x.w)) -
-              body.mass * mechanism.gravity_W.dot(p_Wcm);
+    energy.kinetic += 0.5 * (body.mass * x.v_cm.squaredNorm() + x.w.dot(x.I * x.w));
+    energy.potential -= body.mass * mechanism.gravity_W.dot(p_Wcm);
   }
   for (const SpringDamper& spring : mechanism.springs) {
     const double stretch = LengthRow(spring, mechanism, states).value - spring.free_length_m;
-    energy += 0.5 * spring.stiffness * stretch * stretch;
+    energy.potential += 0.5 * spring.stiffness * stretch * stretch;
   }
   return energy;
 }

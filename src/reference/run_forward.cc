@@ -114,7 +114,8 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
     if (!summary.ok()) break;
     Eigen::RowVectorXd row(run->trace.values.cols());
     internal::WriteSample(sample, options.reactions, row);
-    row[row.size() - 1] = internal::EnergyOf(mechanism, sample.states);
+    const internal::Energies energies = internal::EnergyOf(mechanism, sample.states);
+    row.tail<2>() << energies.kinetic, energies.potential;
     run->trace.values.row(static_cast<Eigen::Index>(i)) = row;
     samples.push_back(sample.states);
   }
@@ -134,10 +135,9 @@ RunSummary InitialStates(const Mechanism& mechanism, const Motion& motion, BodyS
   start.initial.clear();
   start.forces.clear();
   for (const InitialValue& value : motion.initial) {
-    start.commands.push_back(
-        {.name = value.name,
-         .terms = {{value.coordinate, 1.0}},
-         .profile = {{ConstantTerm{value.position}, RampTerm{value.rate}}}});
+    start.commands.push_back({.name = value.name,
+                              .terms = {{value.coordinate, 1.0}},
+                              .profile = {{ConstantTerm{value.position}, RampTerm{value.rate}}}});
   }
   ReferenceSolver solver(mechanism, start);
   CommandSample command;

@@ -29,7 +29,6 @@ class SampleRecorder {
 /// Channels of the reference's traces.
 [[nodiscard]] std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reactions);
 /// Writes a sample into the first columns of `row`, in the order of ReferenceChannels().
-void WriteSample(const ReferenceSample& sample, bool reactions,
-                 Eigen::Ref<Eigen::RowVectorXd> row);
+void WriteSample(const ReferenceSample& sample, bool reactions, Eigen::Ref<Eigen::RowVectorXd> row);
 
 }  // namespace mbv::internal

@@ -5,24 +5,31 @@
 #include <cmath>
 #include <filesystem>
 
+#include "mechanism/command_rank.h"
 #include "mechanism/load_model.h"
-#include "mechanism/mobility.h"
+#include "mechanism/mobility_report.h"
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/set_values.h"
 #include "scenario/settings_reader.h"
+#include "scenario/table_settings.h"
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kKeys = {"kind",       "mechanism", "description", "parameters",
-                                        "motion",     "loads",     "analytic",    "reference",
-                                        "simulation", "checks",    "snapshots",   "expect"};
+const std::vector<std::string> kKeys = {
+    "kind",     "mechanism", "description", "parameters", "motion",    "loads", "forces",
+    "analytic", "reference", "simulation",  "checks",     "snapshots", "expect"};
 
-std::string JoinWords(const std::vector<std::string>& words) {
+std::string JoinWords(std::vector<std::string> words) {
+  constexpr size_t kMost = 8;
+  if (words.size() > kMost) {
+    words.resize(kMost);
+    words.emplace_back("…");
+  }
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
@@ -40,6 +47,7 @@ class Loader {
     ScenarioResult result;
     result.diagnostics = PlaceSetFindings(yaml_.diagnostics(), options_.set);
     result.diagnostics.Append(model_findings_);
+    result.diagnostics.Append(table_findings_);
     if (result.diagnostics.has_errors() || !mechanism_) return result;
     result.scenario = std::move(scenario_);
     result.mechanism = std::move(mechanism_);
@@ -72,9 +80,12 @@ class Loader {
     scenario_.checks = ReadChecks(&values_, map.Find("checks"), &scenario_.start_window_s);
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
     if (!mechanism_) return;
+    const MotionTimes times = ReadTable(map.Find("reference"));
     const YamlNode* motion = map.Required("motion");
     if (motion == nullptr) return;
-    scenario_.motion = ReadMotion(&values_, *mechanism_, motion, map.Find("loads"));
+    scenario_.motion =
+        ReadMotion(&values_, *mechanism_, motion, map.Find("loads"), map.Find("forces"), times);
+    FitStep(*motion, map.Find("simulation"));
     scenario_.snapshots =
         ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s, *mechanism_);
     CheckParameterNames(map);
@@ -87,6 +98,26 @@ class Loader {
     yaml_.Error(kind, "kind = stiffness: this scenario has a pose and no motion",
                 "mbverify run, regress, check and list take it; render and mutate need a motion");
     return false;
+  }
+
+  // A table in the reference's place, and the times it gives a motion that states none.
+  MotionTimes ReadTable(const YamlNode* node) {
+    if (node == nullptr || !node->is_map() || node->Find("csv") == nullptr) return {};
+    const TableSettings settings = ReadTableSettings(&values_, node);
+    if (settings.file.empty()) return {};
+    scenario_.reference.table = LoadTable(settings, *mechanism_, &yaml_, &table_findings_);
+    if (scenario_.reference.table == nullptr) return {1.0, {}};  // its end is not known
+    const ReferenceTable& table = *scenario_.reference.table;
+    return {table.time_s.back(), SuggestSample(table)};
+  }
+
+  // Samples that a table sets need not be multiples of the default step: a step that fits.
+  void FitStep(const YamlNode& motion, const YamlNode* simulation) {
+    if (scenario_.reference.table == nullptr || motion.Find("sample_s") != nullptr) return;
+    if (simulation != nullptr && simulation->Find("step_s") != nullptr) return;
+    const double sample_s = scenario_.motion.sample_s;
+    double& step_s = scenario_.simulation.step_s;
+    step_s = sample_s / std::ceil(sample_s / step_s - 1e-9);
   }
 
   void ReadParameters(const YamlNode* node) {
@@ -142,7 +173,7 @@ class Loader {
 
   // Rules that need several sections.
   void CheckTogether(const YamlNode& motion, const YamlNode* simulation) {
-    CheckCommandCount(motion);
+    CheckCommands(motion);
     const SimulationSettings& settings = scenario_.simulation;
     const double steps = scenario_.motion.sample_s / settings.step_s;
     if (settings.on && settings.forward && std::abs(steps - std::round(steps)) > 1e-6 * steps) {
@@ -156,18 +187,54 @@ class Loader {
     }
   }
 
-  // Every freedom needs one command.
-  void CheckCommandCount(const YamlNode& motion) {
-    const Mobility mobility = AnalyseMobility(*mechanism_);
+  // Every freedom needs one command, or a start value where it moves by forces.
+  void CheckCommands(const YamlNode& motion) {
+    if (scenario_.motion.free()) {
+      const SimulationSettings& settings = scenario_.simulation;
+      if (settings.on && !settings.forward) {
+        yaml_.Error(motion, "simulation.mode = inverse, but some freedoms move by forces",
+                    "inverse dynamics needs every motion: use mode: forward");
+      }
+      return;
+    }
+    const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
     const auto commands = static_cast<int>(scenario_.motion.commands.size());
-    if (commands == mobility.freedoms) return;
-    yaml_.Error(motion,
-                fmt::format("motion gives {} commands, but {} has {} freedoms", commands,
-                            mechanism_->name, mobility.freedoms),
-                commands < mobility.freedoms
-                    ? "command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives "
-                      "under motion.equal"
-                    : "leave commands out: each further one contradicts the others");
+    int freedoms = rank.freedoms;
+    if (commands != freedoms) freedoms = ReportMobility(*mechanism_).freedoms();
+    if (commands != freedoms) {
+      yaml_.Error(motion,
+                  fmt::format("motion gives {} commands, but {} has {} freedoms", commands,
+                              mechanism_->name, freedoms),
+                  CountHint(rank, commands < freedoms));
+    } else if (rank.redundant > 0 && freedoms == rank.freedoms) {
+      yaml_.Error(motion,
+                  fmt::format("motion commands coordinates that depend on each other: {}",
+                              JoinWords(DependentNames(rank))),
+                  fmt::format("leave out {} of them; not held yet: {}", rank.redundant,
+                              JoinWords(rank.free_joints)));
+    }
+  }
+
+  [[nodiscard]] std::vector<std::string> DependentNames(const CommandRank& rank) const {
+    std::vector<std::string> names;
+    for (const int k : rank.dependent) {
+      names.push_back(scenario_.motion.commands[static_cast<size_t>(k)].name);
+    }
+    return names;
+  }
+
+  [[nodiscard]] std::string CountHint(const CommandRank& rank, bool too_few) const {
+    if (too_few) {
+      return "command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives under "
+             "motion.equal; what moves by forces needs motion.initial; not held yet: " +
+             JoinWords(rank.free_joints);
+    }
+    std::string hint = "leave commands out: each further one contradicts the others";
+    if (!rank.dependent.empty()) hint += "; " + JoinWords(DependentNames(rank)) + " are dependent";
+    if (static_cast<int>(mechanism_->drives.size()) > rank.freedoms) {
+      hint += "; drives that are not commanded share the force by least norm";
+    }
+    return hint;
   }
 
   std::string file_;
@@ -175,7 +242,7 @@ class Loader {
   YamlReader yaml_;
   Scope scope_;
   ValueReader values_;
-  Diagnostics model_findings_;
+  Diagnostics model_findings_, table_findings_;
   Scenario scenario_;
   std::optional<Mechanism> mechanism_;
 };

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/spatial.h"
+#include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
 
 namespace mbv {
@@ -19,38 +20,29 @@ bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
   return a.kind == b.kind && a.index == b.index && a.component == b.component;
 }
 
-std::string UnitOf(const Mechanism& mechanism, const Coordinate& coordinate) {
-  const auto index = static_cast<size_t>(coordinate.index);
-  switch (coordinate.kind) {
-    case Coordinate::Kind::kDrive:
-      return PositionUnit(mechanism, mechanism.drives[index]);
-    case Coordinate::Kind::kPrescribed: {
-      const auto joint = static_cast<size_t>(mechanism.prescribed[index].joint);
-      return mechanism.joints[joint].kind == JointKind::kPrismatic ? "m" : "rad";
-    }
-    case Coordinate::Kind::kOutput:
-      return coordinate.component < 3 ? "m" : "rad";
-    case Coordinate::Kind::kJoint:
-      return IsLength(mechanism.joints[index].kind, coordinate.component) ? "m" : "rad";
-  }
-  return "";
-}
-
 class Reader {
  public:
-  Reader(ValueReader* values, const Mechanism& mechanism)
-      : values_(values), mechanism_(mechanism), names_(CoordinateNames(mechanism)) {}
+  Reader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise)
+      : values_(values),
+        mechanism_(mechanism),
+        otherwise_(otherwise),
+        names_(CoordinateNames(mechanism)) {}
 
-  Motion Read(const YamlNode* node, const YamlNode* loads) {
-    YamlMap map(&yaml(), node, "motion", {"duration_s", "sample_s", "commands", "equal", "path"});
+  Motion Read(const YamlNode* node, const YamlNode* loads, const YamlNode* forces) {
+    YamlMap map(
+        &yaml(), node, "motion",
+        {"duration_s", "sample_s", "commands", "equal", "path", "initial", "initial_rates"});
     if (const YamlNode* commands = map.Find("commands")) ReadCommands(*commands);
     if (const YamlNode* equal = map.Find("equal")) ReadEqual(*equal);
     double path_end_s = kNan;
     if (const YamlNode* path = map.Find("path")) path_end_s = ReadPath(*path);
     ReadTimes(map, path_end_s);
     if (loads != nullptr) ReadLoads(*loads);
-    if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
-      yaml().Error(*node, "motion commands nothing", "give commands, equal or path");
+    if (map.valid() && node != nullptr && IsFree(node, forces)) {
+      ReadFreeMotion(values_, mechanism_, *node, forces, &motion_);
+    } else if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
+      yaml().Error(*node, "motion commands nothing",
+                   "give commands, equal or path; or forces and initial values");
     }
     return motion_;
   }
@@ -61,9 +53,11 @@ class Reader {
   void ReadTimes(const YamlMap& map, double path_end_s) {
     if (!map.valid() || map.node() == nullptr) return;
     std::optional<double> duration_s = path_end_s;
-    if (std::isnan(path_end_s) || map.Has("duration_s")) {
+    if (std::isnan(path_end_s)) duration_s = otherwise_.duration_s;
+    if (!duration_s || map.Has("duration_s")) {
       duration_s = values_->RequiredPositive(map, "duration_s");
     }
+    motion_.sample_s = otherwise_.sample_s.value_or(motion_.sample_s);
     if (const YamlNode* sample = map.Find("sample_s")) {
       motion_.sample_s = values_->Positive(*sample, "motion.sample_s").value_or(motion_.sample_s);
     }
@@ -115,7 +109,7 @@ class Reader {
       const std::string path = "motion.commands." + entry.key;
       const auto coordinate = FindCoordinate(entry, "motion.commands");
       if (!coordinate) continue;
-      const ProfileContext context{.unit = UnitOf(mechanism_, *coordinate),
+      const ProfileContext context{.unit = CoordinateUnit(mechanism_, *coordinate),
                                    .home = HomeValue(mechanism_, *coordinate)};
       AddCommand(entry, {.name = entry.key,
                          .terms = {{*coordinate, 1.0}},
@@ -137,7 +131,8 @@ class Reader {
       const YamlEntry a = AsEntry(*(*items)[0]), b = AsEntry(*(*items)[1]);
       const auto ca = FindCoordinate(a, path), cb = FindCoordinate(b, path);
       if (!ca || !cb) continue;
-      if (SameCoordinate(*ca, *cb) || UnitOf(mechanism_, *ca) != UnitOf(mechanism_, *cb)) {
+      if (SameCoordinate(*ca, *cb) ||
+          CoordinateUnit(mechanism_, *ca) != CoordinateUnit(mechanism_, *cb)) {
         yaml().Error(*(*pairs)[i], fmt::format("{}: {} and {} are not two coordinates of one unit",
                                                path, a.key, b.key));
         continue;
@@ -175,7 +170,7 @@ class Reader {
       if (!yaml().Text(*item, "motion.path.outputs")) continue;
       const auto coordinate = FindCoordinate(AsEntry(*item), "motion.path.outputs");
       if (!coordinate) continue;
-      if (UnitOf(mechanism_, *coordinate) != "m") {
+      if (CoordinateUnit(mechanism_, *coordinate) != "m") {
         yaml().Error(*item, fmt::format("motion.path.outputs: {} is no length", item->text),
                      "v_max and a_max are in m/s and m/s²; command angles under motion.commands");
         continue;
@@ -308,6 +303,7 @@ class Reader {
 
   ValueReader* values_;
   const Mechanism& mechanism_;
+  const MotionTimes otherwise_;
   std::vector<std::string> names_;
   Motion motion_;
 };
@@ -335,6 +331,23 @@ Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
   if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
   k -= mechanism.drives.size();
   return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
+}
+
+std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate) {
+  const auto index = static_cast<size_t>(coordinate.index);
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kDrive:
+      return PositionUnit(mechanism, mechanism.drives[index]);
+    case Coordinate::Kind::kPrescribed: {
+      const auto joint = static_cast<size_t>(mechanism.prescribed[index].joint);
+      return mechanism.joints[joint].kind == JointKind::kPrismatic ? "m" : "rad";
+    }
+    case Coordinate::Kind::kOutput:
+      return coordinate.component < 3 ? "m" : "rad";
+    case Coordinate::Kind::kJoint:
+      return IsLength(mechanism.joints[index].kind, coordinate.component) ? "m" : "rad";
+  }
+  return "";
 }
 
 double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
@@ -369,8 +382,8 @@ double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
 }
 
 Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
-                  const YamlNode* loads) {
-  return Reader(values, mechanism).Read(motion, loads);
+                  const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise) {
+  return Reader(values, mechanism, otherwise).Read(motion, loads, forces);
 }
 
 }  // namespace mbv

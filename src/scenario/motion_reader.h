@@ -1,5 +1,7 @@
-// The `motion:` and `loads:` sections of a scenario.
+// The `motion:`, `loads:` and `forces:` sections of a scenario.
 #pragma once
+
+#include <optional>
 
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -7,15 +9,25 @@
 
 namespace mbv {
 
-/// Reads both sections against a mechanism. Findings go to the reader; the motion is complete only
+/// Times for a motion that states none, from a table that it is compared with.
+struct MotionTimes {
+  std::optional<double> duration_s, sample_s;
+};
+
+/// Reads the sections against a mechanism. Findings go to the reader; the motion is complete only
 /// if it reported no error.
 [[nodiscard]] Motion ReadMotion(ValueReader* values, const Mechanism& mechanism,
-                                const YamlNode* motion, const YamlNode* loads);
+                                const YamlNode* motion, const YamlNode* loads,
+                                const YamlNode* forces = nullptr,
+                                const MotionTimes& otherwise = {});
 
 /// Names a command may use: prescribed joints, drives, output components ("platform.yaw").
 [[nodiscard]] std::vector<std::string> CoordinateNames(const Mechanism& mechanism);
 /// The k-th of these names as a coordinate.
 [[nodiscard]] Coordinate CoordinateAt(const Mechanism& mechanism, size_t k);
+
+/// "m" or "rad".
+[[nodiscard]] std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate);
 
 /// Value of a coordinate at the mechanism's home pose [m or rad].
 [[nodiscard]] double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate);

@@ -57,8 +57,8 @@ class Start {
         const Joint& source = mechanism_.joints[joint.joint];
         const ScalarRow row = JointCoordinateRow(source, joint.coordinate, states_);
         *qpos = coordinates_[joint.joint][joint.coordinate];
-        *qvel = row.J_parent.dot(states_.V_WB[row.parent]) +
-                row.J_child.dot(states_.V_WB[row.child]);
+        *qvel =
+            row.J_parent.dot(states_.V_WB[row.parent]) + row.J_child.dot(states_.V_WB[row.child]);
         return true;
       }
       case PlannedJoint::Type::kBall: {
@@ -101,8 +101,9 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
   }
   if (!Start(s->engine, start, s->data.get()).Put()) {
     return {.stop = Stop::kUnsupported,
-            .message = "a ball or free joint between moving bodies that is not alone on its body "
-                       "cannot be started",
+            .message =
+                "a ball or free joint between moving bodies that is not alone on its body "
+                "cannot be started",
             .time_s = 0.0,
             .where = {},
             .unit = {}};

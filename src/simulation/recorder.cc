@@ -279,7 +279,8 @@ void Recorder::RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> ro
   if (!energy_) return;
   mj_energyPos(&m, d);
   mj_energyVel(&m, d);
-  row[audit_column_ + 4] = d->energy[0] + d->energy[1];
+  row[audit_column_ + 4] = d->energy[1];
+  row[audit_column_ + 5] = d->energy[0];
 }
 
 }  // namespace mbv::simulation

@@ -1,0 +1,32 @@
+// Which commands determine the motion, which contradict each other, and what stays free.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+
+namespace mbv {
+
+/// Rank of a set of commands at the home pose.
+struct CommandRank {
+  int freedoms = 0;                      ///< of the mechanism without commands, at home
+  int undriven = 0;                      ///< freedoms that are left with the commands held
+  int redundant = 0;                     ///< commands too many: they cannot be given independently
+  std::vector<int> dependent;            ///< commands that share the redundancy, by index
+  std::vector<std::string> free_joints;  ///< joints that still move with the commands held
+};
+
+/// At a singular home pose the numbers hold there only.
+[[nodiscard]] CommandRank RankCommands(const Mechanism& mechanism,
+                                       const std::vector<Command>& commands);
+
+/// The first candidates, in their order, that together with `commands` hold each freedom once; by
+/// index. At most `count`.
+[[nodiscard]] std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
+                                                      const std::vector<Command>& commands,
+                                                      const std::vector<Command>& candidates,
+                                                      size_t count);
+
+}  // namespace mbv

@@ -1,0 +1,19 @@
+// Forward dynamics in scenario files: `forces:`, `motion.initial` and `motion.initial_rates`.
+#pragma once
+
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "scenario/value_reader.h"
+
+namespace mbv {
+
+/// True when the scenario leaves freedoms to forces.
+[[nodiscard]] bool IsFree(const YamlNode* motion, const YamlNode* forces);
+
+/// Reads drive forces and start values into a motion whose commands have been read, and completes
+/// the start values: freedoms that are not named start at home, at rest, in joint coordinates in
+/// model order. Findings go to the reader.
+void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
+                    const YamlNode* forces, Motion* motion);
+
+}  // namespace mbv
