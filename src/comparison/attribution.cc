@@ -64,6 +64,13 @@ Attribution ByDerivatives(const Comparison& comparison) {
 
 // 2. The commanded pose.
 Attribution ByCommand(const ComparisonInput& input, const Comparison& comparison) {
+  if (const CheckResult* check = FailedCommand(comparison, "reference");
+      check != nullptr && comparison.table) {
+    return {"reference", fmt::format("the table {} does not follow the commanded motion: {} off "
+                                     "at {}; does it belong to another motion?",
+                                     comparison.table->name, AmountOf(*check),
+                                     Place(check->channel, check->time_s))};
+  }
   if (const CheckResult* check = FailedCommand(comparison, "reference")) {
     return {"reference", fmt::format("the reference misses the commanded motion by {} at {}",
                                      AmountOf(*check), Place(check->channel, check->time_s))};
@@ -73,7 +80,8 @@ Attribution ByCommand(const ComparisonInput& input, const Comparison& comparison
   const std::string miss = fmt::format("misses the commanded motion by {} at {}", AmountOf(*check),
                                        Place(check->channel, check->time_s));
   const PairComparison* kinematics = comparison.FindPair("reference_vs_analytic");
-  if (input.driven_by != "analytic" || kinematics == nullptr || !kinematics->compared) {
+  if (input.driven_by != "analytic" || kinematics == nullptr || !kinematics->compared ||
+      comparison.table) {
     return {"", fmt::format("the simulation, driven by the {} drive motion, {}; either that drive "
                             "motion or the simulated model is wrong, and there is no third "
                             "witness to tell",
@@ -180,8 +188,9 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
                                                  "motion and cannot tell which is wrong",
                                                  input.driven_by);
     return {"", fmt::format("{} and {} differ by {} in {}: worst at {}{}; {}",
-                            NameOf(comparison, pair.measured), NameOf(comparison, pair.truth), AmountOf(*check), row.title,
-                            Place(check->channel, check->time_s), Hint(pair), why)};
+                            NameOf(comparison, pair.measured), NameOf(comparison, pair.truth),
+                            AmountOf(*check), row.title, Place(check->channel, check->time_s),
+                            Hint(pair), why)};
   }
   const Distance &near = distances[0], &far = distances[1];
   if (!(far.measured.value >= kClearlyFarther * near.measured.value ||
@@ -194,20 +203,21 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
                         Amount(distances[2].measured.value, row.unit), row.title)};
   }
   const std::string odd = ThirdOf(distances, *near.pair);
-  return {odd, fmt::format("{} and {} agree to {}, {} differs by {} in {}: worst at {}{}",
-                           NameOf(comparison, near.pair->measured), NameOf(comparison, near.pair->truth),
-                           Amount(near.measured.value, row.unit), NameOf(comparison, odd),
-                           Amount(far.measured.value, row.unit), row.title,
-                           Place(far.measured.channel, far.measured.time_s), Hint(*far.pair))};
+  return {odd,
+          fmt::format("{} and {} agree to {}, {} differs by {} in {}: worst at {}{}",
+                      NameOf(comparison, near.pair->measured), NameOf(comparison, near.pair->truth),
+                      Amount(near.measured.value, row.unit), NameOf(comparison, odd),
+                      Amount(far.measured.value, row.unit), row.title,
+                      Place(far.measured.channel, far.measured.time_s), Hint(*far.pair))};
 }
 
 // 4. A check of the simulation alone (loop gap, power) that fails while all pairs agree.
 Attribution BySingleCheck(const Comparison& comparison) {
   for (const CheckResult& check : comparison.checks) {
     if (!Failed(&check) || RowOf(check.metric).of_pair) continue;
-    return {check.subject,
-            fmt::format("{}: {} is {} at {}", NameOf(comparison, check.subject), RowOf(check.metric).title,
-                        AmountOf(check), Place(check.channel, check.time_s))};
+    return {check.subject, fmt::format("{}: {} is {} at {}", NameOf(comparison, check.subject),
+                                       RowOf(check.metric).title, AmountOf(check),
+                                       Place(check.channel, check.time_s))};
   }
   return {};
 }
@@ -219,7 +229,8 @@ std::string AgreementText(const Comparison& comparison) {
        {Metric::kForceNrmse, Metric::kPoseM, Metric::kPositionM, Metric::kPositionRad}) {
     for (const Distance& distance : Distances(comparison, metric)) {
       text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",
-                          NameOf(comparison, distance.pair->measured), NameOf(comparison, distance.pair->truth),
+                          NameOf(comparison, distance.pair->measured),
+                          NameOf(comparison, distance.pair->truth),
                           Amount(distance.measured.value, RowOf(metric).unit));
     }
     if (!text.empty()) break;
@@ -236,6 +247,11 @@ Attribution Attribute(const ComparisonInput& input, const Comparison& comparison
   if (attribution.text.empty()) attribution = ByCommand(input, comparison);
   if (attribution.text.empty()) attribution = ByDistance(input, comparison);
   if (attribution.text.empty()) attribution = BySingleCheck(comparison);
+  if (comparison.table) {
+    for (const std::string& diagnosis : comparison.table->diagnoses) {
+      attribution.text += (attribution.text.empty() ? "" : "; ") + diagnosis;
+    }
+  }
   return attribution;
 }
 

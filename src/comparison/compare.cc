@@ -163,8 +163,8 @@ const Witness* FindBroken(const ComparisonInput& input) {
 std::string WhyTableVerifiesNothing(const Comparison& comparison) {
   const TableVerdict& table = *comparison.table;
   if (!table.too_coarse.empty()) return table.too_coarse;
-  const bool judged = std::any_of(
-      comparison.checks.begin(), comparison.checks.end(), [](const CheckResult& check) {
+  const bool judged =
+      std::any_of(comparison.checks.begin(), comparison.checks.end(), [](const CheckResult& check) {
         return check.limit && (check.metric == Metric::kTableTube || check.stated_limit);
       });
   if (judged) return "";

@@ -120,8 +120,8 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
     KeepWorst(&pair->metrics, Metric::kForceMax, AsMeasured(sum, sum.MaxRelative()));
   }
   // A table need not hold every drive.
-  const bool table = input.table != nullptr &&
-                     (reader.measured.witness == "reference" || reader.truth.witness == "reference");
+  const bool table = input.table != nullptr && (reader.measured.witness == "reference" ||
+                                                reader.truth.witness == "reference");
   const bool all = pair->drives.size() == wanted || (table && !pair->drives.empty());
   pair->compared = all && (!pair->drives.empty() || (input.motion->free() && pair->samples > 0));
   if (pair->compared) {

@@ -1,0 +1,373 @@
+#include "comparison/table_diagnosis.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <optional>
+
+namespace mbv {
+namespace {
+
+// An explanation must leave less than this share of the difference …
+constexpr double kExplains = 0.1;
+// … and no more than this multiple of the column's tube, or this share of the signal.
+constexpr double kTubes = 3.0;
+constexpr double kShare = 0.02;
+// How far a fitted factor may be from a known one.
+constexpr double kSameFactor = 5e-3;
+constexpr size_t kMostShifted = 800;  // rows used to find a time shift
+constexpr int kShiftSteps = 400;      // to either side
+
+struct KnownFactor {
+  double factor;
+  const char* text;
+};
+constexpr double kPi = std::numbers::pi;
+constexpr KnownFactor kFactors[] = {
+    {1e3, "1000: is the unit kN, mm or ms mistaken?"},
+    {1e-3, "1/1000: is the unit kN, mm or ms mistaken?"},
+    {1e6, "1000000: is the unit mistaken?"},
+    {1e-6, "1/1000000: is the unit mistaken?"},
+    {180.0 / kPi, "180/pi: degrees taken for radians?"},
+    {kPi / 180.0, "pi/180: radians taken for degrees?"},
+    {9.80665, "9.81: N taken for kgf, or a mass for a weight?"},
+    {1.0 / 9.80665, "1/9.81: kgf taken for N, or a weight for a mass?"},
+    {4.4482216152605, "4.448: N taken for lbf?"},
+    {1.0 / 4.4482216152605, "1/4.448: lbf taken for N?"},
+    {0.0254, "0.0254: inches taken for metres?"},
+    {1.0 / 0.0254, "1/0.0254: metres taken for inches?"},
+    {2.0 * kPi, "2 pi: revolutions taken for radians?"},
+    {0.5 / kPi, "1/(2 pi): radians taken for revolutions?"},
+    {2.0, "2: is something counted twice?"},
+    {0.5, "1/2: is it shared between two?"},
+};
+
+const KnownFactor* FindFactor(double factor) {
+  for (const KnownFactor& known : kFactors) {
+    if (std::abs(factor / known.factor - 1.0) < kSameFactor) return &known;
+  }
+  return nullptr;
+}
+
+// One column of the table and the other witness' signal of the same name, at common samples.
+struct Series {
+  const TableColumnResult* result;
+  std::string heading, unit;
+  VecX table, other;
+};
+
+double Rms(const VecX& values) {
+  return values.size() == 0 ? kNan
+                            : std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+}
+
+double RmsDeviation(const VecX& values) { return Rms((values.array() - values.mean()).matrix()); }
+
+// "limb1.drive.force" → "force": only like signals are exchanged.
+std::string Signal(const std::string& channel) { return channel.substr(channel.rfind('.') + 1); }
+
+// An explanation of one column.
+struct Explanation {
+  enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor };
+  Kind kind = Kind::kSign;
+  double factor = 1.0, offset = 0.0;
+  size_t partner = 0;  // index of the series that it looks like
+  double left = kNan;  // RMS of the difference that stays
+};
+
+class Diagnosis {
+ public:
+  Diagnosis(const ComparisonInput& input, const Trace& other,
+            const std::vector<TableColumnResult>& columns)
+      : table_(*input.table), other_(other) {
+    samples_ = AlignSamples(table_.trace, other);
+    std::erase_if(samples_, [&](const auto& sample) {
+      return table_.trace.time_s[static_cast<size_t>(sample.first)] < input.start_window_s;
+    });
+    for (const TableColumnResult& column : columns) series_.push_back(Read(column));
+  }
+
+  std::vector<std::string> Find() {
+    if (samples_.size() < 4) return {};
+    if (auto shifted = TimeShift()) return {*shifted};
+    found_.resize(series_.size());
+    for (size_t k = 0; k < series_.size(); ++k) {
+      if (!series_[k].result->inside()) found_[k] = Explain(k);
+    }
+    return Texts();
+  }
+
+ private:
+  [[nodiscard]] Series Read(const TableColumnResult& column) const {
+    const TableColumn& source = table_.columns[column.column];
+    Series series{.result = &column,
+                  .heading = source.heading,
+                  .unit = source.channel.unit,
+                  .table = {},
+                  .other = {}};
+    const int from = other_.Find(column.channel);
+    series.table.resize(static_cast<Eigen::Index>(samples_.size()));
+    series.other = series.table;
+    for (size_t i = 0; i < samples_.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      series.table(row) =
+          table_.trace.values(samples_[i].first, static_cast<Eigen::Index>(column.column));
+      series.other(row) = other_.values(samples_[i].second, from);
+    }
+    return series;
+  }
+
+  // What is left must be little of the difference, and near the tube or small.
+  [[nodiscard]] bool IsGood(const Series& series, double left) const {
+    const double difference = Rms(series.table - series.other);
+    const double allowed =
+        std::max(kTubes * series.result->tube_rms, kShare * RmsDeviation(series.table));
+    return left <= kExplains * difference && left <= allowed;
+  }
+
+  [[nodiscard]] std::optional<Explanation> Explain(size_t k) const {
+    const Series& series = series_[k];
+    const auto good = [&](const Explanation& finding) { return IsGood(series, finding.left); };
+    if (const Explanation sign = Scaled(series, -1.0); good(sign)) return sign;
+    const double square = series.other.squaredNorm();
+    const double factor = square > 0.0 ? series.table.dot(series.other) / square : kNan;
+    Explanation scaled = Scaled(series, factor);
+    scaled.kind = Explanation::Kind::kFactor;
+    if (good(scaled) && FindFactor(std::abs(factor)) != nullptr) return scaled;
+    if (const auto exchange = Exchanged(k)) return exchange;
+    Explanation offset{.kind = Explanation::Kind::kOffset};
+    offset.offset = (series.table - series.other).mean();
+    offset.left = RmsDeviation(series.table - series.other);
+    if (good(offset)) return offset;
+    scaled.kind = Explanation::Kind::kUnknownFactor;
+    if (good(scaled)) return scaled;
+    return {};
+  }
+
+  static Explanation Scaled(const Series& series, double factor) {
+    Explanation finding{.kind = Explanation::Kind::kSign, .factor = factor};
+    finding.left = Rms(series.table - factor * series.other);
+    return finding;
+  }
+
+  // Another signal of the same kind that the column fits, with either sign.
+  [[nodiscard]] std::optional<Explanation> Exchanged(size_t k) const {
+    const Series& series = series_[k];
+    std::optional<Explanation> best;
+    for (size_t other = 0; other < series_.size(); ++other) {
+      const Series& candidate = series_[other];
+      if (other == k || candidate.unit != series.unit ||
+          Signal(candidate.result->channel) != Signal(series.result->channel)) {
+        continue;
+      }
+      for (const double sign : {1.0, -1.0}) {
+        Explanation finding{.kind = Explanation::Kind::kExchange, .factor = sign, .partner = other};
+        finding.left = Rms(series.table - sign * candidate.other);
+        if (IsGood(series, finding.left) && (!best || finding.left < best->left)) best = finding;
+      }
+    }
+    return best;
+  }
+
+  [[nodiscard]] std::vector<std::string> Texts() const {
+    std::vector<std::string> texts;
+    std::vector<bool> said(series_.size(), false);
+    for (size_t k = 0; k < series_.size(); ++k) {
+      if (!found_[k] || said[k]) continue;
+      const std::vector<size_t> same = Alike(k);
+      for (const size_t other : same) said[other] = true;
+      texts.push_back(TextOf(k, same, &said));
+    }
+    return texts;
+  }
+
+  // Columns with the same explanation, so that it is given once.
+  [[nodiscard]] std::vector<size_t> Alike(size_t k) const {
+    std::vector<size_t> same;
+    for (size_t other = k; other < series_.size(); ++other) {
+      if (!found_[other] || found_[other]->kind != found_[k]->kind) continue;
+      const bool scale = found_[k]->kind == Explanation::Kind::kSign ||
+                         found_[k]->kind == Explanation::Kind::kFactor;
+      const bool equal = std::abs(found_[other]->factor / found_[k]->factor - 1.0) < kSameFactor;
+      if (other == k || (scale && equal)) same.push_back(other);
+    }
+    return same;
+  }
+
+  [[nodiscard]] std::string Names(const std::vector<size_t>& same, bool headings) const {
+    std::string text;
+    for (size_t i = 0; i < std::min<size_t>(same.size(), 4); ++i) {
+      const Series& series = series_[same[i]];
+      text += i == 0 ? "" : ", ";
+      text += headings ? "'" + series.heading + "'" : series.result->channel;
+    }
+    if (same.size() > 4) text += fmt::format(" and {} more", same.size() - 4);
+    return text;
+  }
+
+  [[nodiscard]] std::string Left(size_t k) const {
+    return fmt::format("what is left is {:.2g} {} RMS", found_[k]->left, series_[k].unit);
+  }
+
+  [[nodiscard]] std::string TextOf(size_t k, const std::vector<size_t>& same,
+                                   std::vector<bool>* said) const {
+    const Explanation& finding = *found_[k];
+    const std::string& channel = series_[k].result->channel;
+    const bool many = same.size() > 1;
+    const std::string columns = fmt::format("column{} {}", many ? "s" : "", Names(same, true));
+    switch (finding.kind) {
+      case Explanation::Kind::kSign:
+        return fmt::format("{} {} the negative of {}: sign? ({}: {{sign: -1}}; {})", columns,
+                           many ? "are" : "is", Names(same, false), channel, Left(k));
+      case Explanation::Kind::kFactor:
+        return fmt::format("{} {} {} times a factor of {}{} ({})", columns, many ? "are" : "is",
+                           Names(same, false), finding.factor < 0.0 ? "-" : "",
+                           FindFactor(std::abs(finding.factor))->text, Left(k));
+      case Explanation::Kind::kExchange:
+        return ExchangeText(k, said);
+      case Explanation::Kind::kOffset:
+        return fmt::format(
+            "{} is {} with {:.6g} {} added: a preload, a weight or a zero point? "
+            "({})",
+            columns, channel, finding.offset, series_[k].unit, Left(k));
+      case Explanation::Kind::kUnknownFactor:
+        return fmt::format("{} is {:.6g} times {}: a mass, a length or a gear ratio? ({})", columns,
+                           finding.factor, channel, Left(k));
+    }
+    return "";
+  }
+
+  [[nodiscard]] std::string ExchangeText(size_t k, std::vector<bool>* said) const {
+    const Explanation& finding = *found_[k];
+    const Series &series = series_[k], &partner = series_[finding.partner];
+    const auto& back = found_[finding.partner];
+    const char* negative = finding.factor < 0.0 ? " (and one sign is changed)" : "";
+    if (back && back->kind == Explanation::Kind::kExchange && back->partner == k) {
+      (*said)[finding.partner] = true;
+      return fmt::format("{} and {} look exchanged{}: columns '{}' and '{}' ({})",
+                         series.result->channel, partner.result->channel, negative, series.heading,
+                         partner.heading, Left(k));
+    }
+    return fmt::format("column '{}', mapped to {}, looks like {}{} ({})", series.heading,
+                       series.result->channel, partner.result->channel, negative, Left(k));
+  }
+
+  // All columns that leave their tubes, explained by one shift of the time.
+  std::optional<std::string> TimeShift() {
+    std::vector<size_t> moving;
+    for (size_t k = 0; k < series_.size(); ++k) {
+      if (!series_[k].result->inside() && RmsDeviation(series_[k].other) > 0.0) moving.push_back(k);
+    }
+    if (moving.empty() || other_.time_s.size() < 8) return {};
+    const double span_s = other_.time_s.back() - other_.time_s.front();
+    const double step_s = std::max(span_s / (4 * kShiftSteps), Step());
+    const auto misfit = [&](double shift_s) { return Misfit(moving, shift_s); };
+    double best_s = 0.0, best = misfit(0.0);
+    const double unshifted = best;
+    for (int k = -kShiftSteps; k <= kShiftSteps; ++k) {
+      if (std::abs(k * step_s) > 0.25 * span_s) continue;
+      const double value = misfit(k * step_s);
+      if (value < best) {
+        best = value;
+        best_s = k * step_s;
+      }
+    }
+    best_s = Refine(misfit, best_s - step_s, best_s + step_s);
+    best = misfit(best_s);
+    if (!(best <= kExplains * unshifted) || !AllFit(moving, best_s)) return {};
+    return fmt::format(
+        "the table is shifted by {:.4g} s: it is {} (time_offset_s: {:.4g} on top "
+        "of what is stated)",
+        std::abs(best_s), best_s > 0.0 ? "late" : "early", -best_s);
+  }
+
+  [[nodiscard]] double Step() const {
+    return (other_.time_s.back() - other_.time_s.front()) /
+           static_cast<double>(other_.time_s.size() - 1);
+  }
+
+  // The other witness' signal at time t by a cubic through four samples; NaN outside.
+  [[nodiscard]] double OtherAt(int column, double t) const {
+    const double position = (t - other_.time_s.front()) / Step();
+    const auto last = static_cast<double>(other_.time_s.size() - 1);
+    if (!(position >= 0.0 && position <= last)) return kNan;
+    const double first = std::clamp(std::floor(position) - 1.0, 0.0, last - 3.0);
+    double value = 0.0;
+    for (int a = 0; a < 4; ++a) {
+      double weight = 1.0;
+      for (int b = 0; b < 4; ++b) {
+        if (a != b) weight *= (position - first - b) / (a - b);
+      }
+      value += weight * other_.values(static_cast<Eigen::Index>(first) + a, column);
+    }
+    return value;
+  }
+
+  // RMS difference of one column when the other signal comes `shift_s` later.
+  [[nodiscard]] double ShiftedRms(size_t k, double shift_s) const {
+    const Series& series = series_[k];
+    const int column = other_.Find(series.result->channel);
+    double sum2 = 0.0, count = 0.0;
+    const size_t stride = samples_.size() / kMostShifted + 1;
+    for (size_t i = 0; i < samples_.size(); i += stride) {
+      const double t = table_.trace.time_s[static_cast<size_t>(samples_[i].first)];
+      const double value = OtherAt(column, t - shift_s);
+      if (std::isnan(value)) continue;
+      const double error = series.table(static_cast<Eigen::Index>(i)) - value;
+      sum2 += error * error;
+      count += 1.0;
+    }
+    return count > 0.0 ? std::sqrt(sum2 / count) : kNan;
+  }
+
+  // The columns together, each by its own scale.
+  [[nodiscard]] double Misfit(const std::vector<size_t>& moving, double shift_s) const {
+    double sum2 = 0.0;
+    for (const size_t k : moving) {
+      const double rms = ShiftedRms(k, shift_s) / RmsDeviation(series_[k].other);
+      sum2 += rms * rms;
+    }
+    return std::sqrt(sum2 / static_cast<double>(moving.size()));
+  }
+
+  [[nodiscard]] bool AllFit(const std::vector<size_t>& moving, double shift_s) const {
+    return std::all_of(moving.begin(), moving.end(),
+                       [&](size_t k) { return IsGood(series_[k], ShiftedRms(k, shift_s)); });
+  }
+
+  // Golden section.
+  static double Refine(const std::function<double(double)>& f, double a, double b) {
+    constexpr double kGolden = 0.6180339887498949;
+    for (int i = 0; i < 40; ++i) {
+      const double left = b - kGolden * (b - a), right = a + kGolden * (b - a);
+      if (f(left) < f(right)) {
+        b = right;
+      } else {
+        a = left;
+      }
+    }
+    return 0.5 * (a + b);
+  }
+
+  const AlignedTable& table_;
+  const Trace& other_;
+  CommonSamples samples_;
+  std::vector<Series> series_;
+  std::vector<std::optional<Explanation>> found_;
+};
+
+}  // namespace
+
+std::vector<std::string> DiagnoseTable(const ComparisonInput& input, const Trace& other,
+                                       const std::vector<TableColumnResult>& columns) {
+  const bool any = std::any_of(columns.begin(), columns.end(),
+                               [](const TableColumnResult& column) { return !column.inside(); });
+  if (!any) return {};
+  return Diagnosis(input, other, columns).Find();
+}
+
+}  // namespace mbv
