@@ -81,9 +81,19 @@ void ModelReader::CloseLoops() {
         "improve the guesses of the loop's joints, or look for a wrong length or axis";
     const YamlEntry* at = joint_places_[gap.joint];
     yaml_.SetNote("");
-    yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0, text, hint);
+    if (const auto urdf = urdf_places_.find(joint.name);
+        at == nullptr && urdf != urdf_places_.end()) {
+      Finding finding = urdf->second;
+      finding.message = text;
+      finding.hint =
+          hint + "; guesses of URDF joints stand in the model file under `urdf: {guess: …}`";
+      other_findings_.Add(finding);
+    } else {
+      yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0, text, hint);
+    }
   }
-  if (!yaml_.has_errors()) yaml_.AddAt(Severity::kError, 0, 0, "the home pose was not found");
+  if (!yaml_.has_errors() && !other_findings_.has_errors())
+    yaml_.AddAt(Severity::kError, 0, 0, "the home pose was not found");
 }
 
 namespace {

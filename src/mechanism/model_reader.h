@@ -107,7 +107,12 @@ class ModelReader {
   void ImportUrdf(const YamlNode& node);
   void ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& joints);
   void AddUrdf(const UrdfTree& tree, const std::string& file);
+  void AddUrdfDrives(const std::vector<std::string>& motors, const YamlNode* at);
   void WeldUrdfRoot();
+
+  // model_urdf_closures.cc
+  static void DropClosures(UrdfTree* tree);
+  bool ReadClosureFile(const YamlNode& node, UrdfTree* tree, std::vector<std::string>* motors);
 
   // model_joints.cc
   void ReadJoints(const Block& block);
@@ -221,10 +226,12 @@ class ModelReader {
   // By full name; empty: badly described, which has its own finding.
   std::map<std::string, std::optional<Material>> materials_;
   std::map<std::string, std::optional<Section>> sections_;
-  std::vector<const YamlEntry*> beam_places_;  // per beam
-  bool beams_good_ = true;                     // false: their frame is not worth checking
-  std::deque<ParameterFile> parameter_files_;  // stable addresses; innermost base first
-  int urdf_root_ = -1;                         // body that needs a joint to the world
+  std::vector<const YamlEntry*> beam_places_;   // per beam
+  bool beams_good_ = true;                      // false: their frame is not worth checking
+  std::deque<ParameterFile> parameter_files_;   // stable addresses; innermost base first
+  int urdf_root_ = -1;                          // body that needs a joint to the world
+  std::map<std::string, Finding> urdf_places_;  // of the URDF's joints, closures included
+  std::deque<YamlEntry> urdf_drives_;           // places of drives that a closure file names
   std::map<std::string, bool> override_used_;
   Diagnostics other_findings_;                 // of other files: overrides, URDF, parameters
   std::vector<std::string> known_parameters_;  // dotted names, for "did you mean"

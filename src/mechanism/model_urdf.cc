@@ -1,4 +1,4 @@
-// The `urdf:` key of a model file: FILE, or {file: FILE, guess: {JOINT: …}}.
+// The `urdf:` key of a model file: FILE, or {file, closures, constraints, guess: {JOINT: …}}.
 #include <fmt/format.h>
 
 #include <filesystem>
@@ -10,7 +10,8 @@ namespace mbv {
 
 void ModelReader::ImportUrdf(const YamlNode& node) {
   const bool short_form = node.is_scalar();
-  const YamlMap map(&yaml_, short_form ? nullptr : &node, "urdf", {"file", "guess", "guess_deg"});
+  const YamlMap map(&yaml_, short_form ? nullptr : &node, "urdf",
+                    {"file", "closures", "constraints", "guess", "guess_deg"});
   const YamlNode* name = short_form ? &node : map.Required("file");
   const auto file = name == nullptr ? std::nullopt : yaml_.Text(*name, "urdf");
   joints_good_ = false;  // until the tree is read
@@ -24,30 +25,42 @@ void ModelReader::ImportUrdf(const YamlNode& node) {
     return;
   }
   Diagnostics findings;
-  const UrdfTree tree = ReadUrdf(*text, path.string(), &findings);
+  UrdfTree tree = ReadUrdf(*text, path.string(), &findings);
   other_findings_.Append(findings);
   if (findings.has_errors()) return;
+  if (const YamlNode* constraints = map.Find("constraints")) {
+    if (!yaml_.Flag(*constraints, map.PathOf("constraints")).value_or(true)) DropClosures(&tree);
+  }
+  std::vector<std::string> motors;
+  const YamlNode* closures = map.Find("closures");
+  if (closures != nullptr && !ReadClosureFile(*closures, &tree, &motors)) return;
   if (!Room(node, tree.bodies.size(), kMaxBodies + 1, "bodies")) return;
   joints_good_ = true;
   AddUrdf(tree, path.string());
   ReadUrdfGuesses(map, tree.joints);
+  // The model file's own drives are the better ones.
+  if (blocks_.front().Section("drives") == nullptr) AddUrdfDrives(motors, closures);
 }
 
 void ModelReader::AddUrdf(const UrdfTree& tree, const std::string& file) {
   const int first = static_cast<int>(mechanism_.bodies.size());
-  for (const Body& body : tree.bodies) {
-    mechanism_.bodies.push_back(body);
+  for (size_t b = 0; b < tree.bodies.size(); ++b) {
+    mechanism_.bodies.push_back(tree.bodies[b]);
     body_places_.push_back(nullptr);
-    body_paths_.push_back(file);
+    body_paths_.push_back(tree.body_lines[b] > 0 ? fmt::format("{}:{}", file, tree.body_lines[b])
+                                                 : file);
   }
   const auto index = [first](int body) { return body < 0 ? 0 : first + body; };
-  for (Joint joint : tree.joints) {
+  hints_.resize(mechanism_.joints.size());
+  for (size_t j = 0; j < tree.joints.size(); ++j) {
+    Joint joint = tree.joints[j];
     joint.parent = index(joint.parent);
     joint.child = index(joint.child);
+    hints_.push_back(joint.closure ? std::optional(true) : std::nullopt);
     mechanism_.joints.push_back(joint);
     joint_places_.push_back(nullptr);
+    urdf_places_[joint.name] = {Severity::kError, file, tree.joint_lines[j], 1, "", ""};
   }
-  hints_.resize(mechanism_.joints.size());
   if (tree.root >= 0) urdf_root_ = first + tree.root;
 }
 
@@ -67,6 +80,20 @@ void ModelReader::ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& 
       continue;
     }
     ReadGuess(model, *entry.value, path, found.unit, &mechanism_.joints[index]);
+  }
+}
+
+void ModelReader::AddUrdfDrives(const std::vector<std::string>& motors, const YamlNode* at) {
+  for (const std::string& motor : motors) {
+    YamlEntry& place = urdf_drives_.emplace_back();
+    place.key = motor;
+    place.line = at->line;
+    place.column = at->column;
+    if (!Room(*at, mechanism_.drives.size(), kMaxItems, "drives")) return;
+    Drive drive{.name = motor, .kind = JointDrive{mechanism_.FindJoint(motor), 0}, .range = {}};
+    drive.range = mechanism_.joints[mechanism_.FindJoint(motor)].range[0];
+    mechanism_.drives.push_back(drive);
+    signal_places_[motor].push_back({"drive", &place});
   }
 }
 

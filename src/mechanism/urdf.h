@@ -15,10 +15,11 @@
 namespace mbv {
 
 /// The spanning tree as URDF text. Joints with several coordinates become chains of single ones
-/// with massless links between ("JOINT.yaw", "JOINT.pitch", …). What URDF cannot state (closures,
-/// drives, home pose) stands in a comment as a model.yaml that reads this file back: cut the
-/// comment out, name the URDF file in its `urdf:` key, and the same mechanism results (dots in the
-/// names of drives and closures become _).
+/// with massless links between ("JOINT.yaw", "JOINT.pitch", …). Closures follow as <constraint>
+/// elements, which readers of plain URDF pass over. What is left (drives, guesses of the home pose)
+/// stands in a comment as a model.yaml that reads this file back: cut the comment out, name the
+/// URDF file in its `urdf:` key, and the same mechanism results (dots in the names of drives and
+/// closures become _). It states the closures itself, exactly, and skips those of the URDF.
 [[nodiscard]] std::string WriteUrdf(const Mechanism& mechanism);
 
 /// The model.yaml in that comment.
@@ -29,12 +30,17 @@ namespace mbv {
 struct UrdfTree {
   std::string name;
   std::vector<Body> bodies;   ///< without a root link named "world"
-  std::vector<Joint> joints;  ///< body indices count `bodies`; -1 is the world
-  int root = -1;              ///< index of the root link; -1 if it is the world
+  std::vector<Joint> joints;  ///< body indices count `bodies`; -1 is the world; closures last
+  std::vector<int> body_lines, joint_lines;  ///< in the file; 0: unknown
+  int root = -1;                             ///< index of the root link; -1 if it is the world
+
+  /// Index of a link (-1: the world), or -2.
+  [[nodiscard]] int FindLink(const std::string& link) const;
 };
 
-/// Reads URDF text; everything urdfdom says is a finding. Mimic joints, meshes and textures are
-/// left out with a warning. The tree is empty after an error.
+/// Reads URDF text; everything urdfdom says is a finding, with the line where it is known. Closures
+/// are read in the forms listed in urdf_closures.h. Mimic joints, meshes, gears and joints inside
+/// <gazebo> are left out with a warning. The tree is empty after an error.
 [[nodiscard]] UrdfTree ReadUrdf(const std::string& text, const std::string& file,
                                 Diagnostics* diagnostics);
 

@@ -68,8 +68,9 @@ class Companion {
     WriteClosures();
     WriteDrives();
     WriteRest();
-    std::string text = fmt::format("name: {}\nurdf:\n  file: \"{}\"\n  guess:\n{}gravity: {}\n",
-                                   YamlName(m_.name), urdf_file, guesses_, List(m_.gravity_W));
+    std::string text = fmt::format(
+        "name: {}\nurdf:\n  file: \"{}\"\n  constraints: false\n  guess:\n{}gravity: {}\n",
+        YamlName(m_.name), urdf_file, guesses_, List(m_.gravity_W));
     text += "attach:\n";
     for (const auto& [body, frames] : attached_) {
       text += fmt::format("  \"{}\":\n{}", m_.bodies[body].name, frames);

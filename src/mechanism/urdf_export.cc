@@ -7,6 +7,7 @@
 #include "core/spatial.h"
 #include "mechanism/constraints.h"
 #include "mechanism/urdf.h"
+#include "mechanism/urdf_closures.h"
 #include "mechanism/urdf_frames.h"
 
 namespace mbv {
@@ -222,8 +223,9 @@ std::string WriteUrdf(const Mechanism& mechanism) {
   for (size_t at; (at = comment.find("--")) != std::string::npos;) comment.replace(at, 2, "-");
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n"
-      "<!-- Spanning tree of {0}, by mbverify. URDF cannot state closed loops; as model.yaml, the\n"
-      "lines below add them to this file.\n{1}-->\n<robot name=\"{0}\">\n",
+      "<!-- {0}, by mbverify: spanning tree, and the closed loops as constraint elements, which\n"
+      "plain URDF does not know. As model.yaml, the lines below complete this file.\n{1}-->\n"
+      "<robot name=\"{0}\">\n",
       Escaped(mechanism.name), comment);
   for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
     text += LinkText(mechanism.bodies[b], frames[b]);
@@ -231,7 +233,7 @@ std::string WriteUrdf(const Mechanism& mechanism) {
   for (size_t t = 0; t < mechanism.tree_joints.size(); ++t) {
     text += JointText(mechanism, static_cast<int>(t), frames);
   }
-  return text + "</robot>\n";
+  return text + internal::ConstraintText(mechanism, frames) + "</robot>\n";
 }
 
 }  // namespace mbv

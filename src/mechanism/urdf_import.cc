@@ -9,6 +9,7 @@
 
 #include "core/spatial.h"
 #include "mechanism/urdf.h"
+#include "mechanism/urdf_closures.h"
 #include "mechanism/urdf_frames.h"
 #include "mechanism/yaml_reader.h"
 
@@ -57,8 +58,8 @@ Pose ToPose(const urdf::Pose& p) {
 
 class Importer {
  public:
-  Importer(const std::string& file, Diagnostics* diagnostics)
-      : file_(file), diagnostics_(diagnostics) {}
+  Importer(const std::string& file, const internal::UrdfDetails& details, Diagnostics* diagnostics)
+      : file_(file), details_(details), diagnostics_(diagnostics) {}
 
   UrdfTree Run(const urdf::ModelInterface& model) {
     tree_.name = model.getName();
@@ -66,20 +67,32 @@ class Importer {
     // Depth first in name order: the order in the file is lost in urdfdom's maps.
     AddLink(*root);
     if (root->name == "world") {
-      if (root->inertial) Warn("the inertia of the link 'world' has no meaning");
+      if (root->inertial) {
+        Warn(LineOf(details_.link_lines, "world"),
+             "the inertia of the link 'world' has no meaning");
+      }
       tree_.root = -1;
     } else {
       tree_.root = 0;
     }
+    for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
+    WarnOfMeshes();
     return std::move(tree_);
   }
 
  private:
-  void Error(const std::string& text, const std::string& hint = "") {
-    diagnostics_->Add({Severity::kError, file_, 0, 0, text, hint});
+  static int LineOf(const std::map<std::string, int>& lines, const std::string& name) {
+    const auto it = lines.find(name);
+    return it == lines.end() ? 0 : it->second;
   }
-  void Warn(const std::string& text) {
-    diagnostics_->Add({Severity::kWarning, file_, 0, 0, text, ""});
+  void Add(Severity severity, int line, const std::string& text, const std::string& hint) {
+    diagnostics_->Add({severity, file_, line, line > 0 ? 1 : 0, text, hint});
+  }
+  void Error(int line, const std::string& text, const std::string& hint = "") {
+    Add(Severity::kError, line, text, hint);
+  }
+  void Warn(int line, const std::string& text, const std::string& hint = "") {
+    Add(Severity::kWarning, line, text, hint);
   }
 
   void AddLink(const urdf::Link& start) {
@@ -91,6 +104,7 @@ class Importer {
         index_[link.name] = -1;
       } else {
         index_[link.name] = static_cast<int>(tree_.bodies.size());
+        tree_.body_lines.push_back(LineOf(details_.link_lines, link.name));
         tree_.bodies.push_back(BodyOf(link));
         if (link.parent_joint) AddJoint(*link.parent_joint);
       }
@@ -113,6 +127,7 @@ class Importer {
       if (!std::isfinite(body.mass) || !body.p_BoBcm_B.allFinite() || !body.I_Bcm_B.allFinite() ||
           body.mass < 0.0) {
         Error(
+            tree_.body_lines.back(),
             fmt::format("link '{}': its inertial values violate mass >= 0 and finite", link.name));
       }
     }
@@ -133,7 +148,7 @@ class Importer {
     } else if (const auto* s = dynamic_cast<const urdf::Sphere*>(visual.geometry.get())) {
       shape.geometry = Ball{X.translation(), s->radius};
     } else {
-      Warn(fmt::format("link '{}': a mesh is left out of the pictures", body->name));
+      if (meshes_++ == 0) first_mesh_ = body->name;
       return;
     }
     if (visual.material) {
@@ -147,14 +162,54 @@ class Importer {
     body->shapes.push_back(shape);
   }
 
+  // One finding for all: robots have hundreds.
+  void WarnOfMeshes() {
+    if (meshes_ == 0) return;
+    Warn(LineOf(details_.link_lines, first_mesh_),
+         fmt::format("link '{}'{}: meshes are left out of the pictures", first_mesh_,
+                     meshes_ == 1 ? "" : fmt::format(" and {} more visuals", meshes_ - 1)),
+         "boxes, cylinders and spheres are drawn");
+  }
+
+  void AddClosure(const internal::UrdfClosure& closure) {
+    Joint joint = closure.joint;
+    std::vector<std::string> links = {"world"};
+    for (const auto& [name, index] : index_) links.push_back(name);
+    const auto find = [&](const std::string& link) {
+      if (link == "world") return -1;
+      if (const auto it = index_.find(link); it != index_.end()) return it->second;
+      const std::string near = ClosestWord(link, links);
+      Error(closure.line, fmt::format("closure '{}': there is no link '{}'", joint.name, link),
+            near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+      return -2;
+    };
+    joint.parent = find(closure.parent);
+    joint.child = find(closure.child);
+    if (joint.parent == -2 || joint.child == -2) return;
+    if (joint.parent == joint.child) {
+      Error(closure.line,
+            fmt::format("closure '{}' connects link '{}' with itself", joint.name, closure.parent));
+      return;
+    }
+    for (const Joint& other : tree_.joints) {
+      if (other.name != joint.name) continue;
+      Error(closure.line,
+            fmt::format("closure '{}': a joint of this name is there already", joint.name));
+      return;
+    }
+    tree_.joints.push_back(joint);
+    tree_.joint_lines.push_back(closure.line);
+  }
+
   void AddJoint(const urdf::Joint& from) {
+    const int line = LineOf(details_.joint_lines, from.name);
     Joint joint;
     joint.name = from.name;
     joint.parent = index_[from.parent_link_name];
     joint.child = index_[from.child_link_name];
     joint.X_PF = ToPose(from.parent_to_joint_origin_transform);
     if (!joint.X_PF.matrix().allFinite()) {
-      Error(fmt::format("joint '{}': its origin is not finite", from.name));
+      Error(line, fmt::format("joint '{}': its origin is not finite", from.name));
     }
     bool has_axis = true;
     switch (from.type) {
@@ -177,22 +232,26 @@ class Importer {
         has_axis = false;
         break;
       case urdf::Joint::UNKNOWN:
-        Error(fmt::format("joint '{}' has no known type", from.name));
+        Error(line, fmt::format("joint '{}' has no known type", from.name));
         break;
     }
     const Vec3 axis = ToVec(from.axis);
     if (has_axis && !(axis.norm() > 1e-9 && std::isfinite(axis.norm()))) {
-      Error(fmt::format("joint '{}': the axis ({}, {}, {}) has no direction", from.name, axis.x(),
-                        axis.y(), axis.z()));
+      Error(line, fmt::format("joint '{}': the axis ({}, {}, {}) has no direction", from.name,
+                              axis.x(), axis.y(), axis.z()));
     } else if (has_axis) {
       joint.axis = axis.normalized();
     }
     ReadLimits(from, &joint);
     if (from.mimic) {
-      Warn(fmt::format("joint '{}': mimic is left out; couple drives in the scenario instead",
-                       from.name));
+      Warn(line,
+           fmt::format("joint '{}': mimic of '{}' is left out, the joint is free", from.name,
+                       from.mimic->joint_name),
+           "where it stands for a closed loop, state the loop by a closure; gears are commanded: "
+           "drive both joints and couple them by `equal` in the scenario");
     }
     tree_.joints.push_back(joint);
+    tree_.joint_lines.push_back(line);
   }
 
   void ReadLimits(const urdf::Joint& from, Joint* joint) {
@@ -204,9 +263,12 @@ class Importer {
   }
 
   std::string file_;
+  const internal::UrdfDetails& details_;
   Diagnostics* diagnostics_;
   UrdfTree tree_;
   std::map<std::string, int> index_;
+  int meshes_ = 0;
+  std::string first_mesh_;
 };
 
 // TinyXML reads nested elements by recursion: refuse what would exhaust the stack.
@@ -229,6 +291,14 @@ bool NestsDeeperThan(const std::string& xml, int limit) {
 
 }  // namespace
 
+int UrdfTree::FindLink(const std::string& link) const {
+  if (root == -1 && link == "world") return -1;
+  for (size_t b = 0; b < bodies.size(); ++b) {
+    if (bodies[b].name == link) return static_cast<int>(b);
+  }
+  return -2;
+}
+
 UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics* diagnostics) {
   const auto fail = [&](const std::string& message) {
     diagnostics->Add({Severity::kError, file, 0, 0, message, ""});
@@ -248,7 +318,8 @@ UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics*
   if (said.has_errors()) return {};
   if (model == nullptr || model->getRoot() == nullptr) return fail("urdfdom finds no robot");
   Diagnostics read;
-  UrdfTree tree = Importer(file, &read).Run(*model);
+  const internal::UrdfDetails details = internal::ReadUrdfDetails(text, file, &read);
+  UrdfTree tree = Importer(file, details, &read).Run(*model);
   diagnostics->Append(read);
   return read.has_errors() ? UrdfTree{} : tree;
 }

@@ -84,8 +84,9 @@ TEST(UrdfConventions, LimitsAreReadAndMimicIsLeftOutAloud) {
   Diagnostics diagnostics;
   const UrdfTree tree = ReadUrdf(text, "r.urdf", &diagnostics);
   EXPECT_EQ(diagnostics.Text(),
-            "r.urdf: warning: joint 'k': mimic is left out; couple drives in "
-            "the scenario instead\n");
+            "r.urdf:1:1: warning: joint 'k': mimic of 'j' is left out, the joint is free\n"
+            "  hint: where it stands for a closed loop, state the loop by a closure; gears are "
+            "commanded: drive both joints and couple them by `equal` in the scenario\n");
   EXPECT_EQ(tree.joints.at(0).range[0].lower, -0.1);
   EXPECT_EQ(tree.joints.at(0).range[0].upper, 0.4);
   // lower = upper = 0 is urdfdom's word for "not given".
@@ -176,7 +177,7 @@ TEST_P(ShippedModel, SurvivesTheRoundTripThroughUrdf) {
 
 INSTANTIATE_TEST_SUITE_P(Urdf, ShippedModel,
                          testing::Values("stabilizing_platform", "spr_tripod", "cabin_robot",
-                                         "scara_robot"),
+                                         "scara_robot", "four_bar", "slider_crank", "stewart"),
                          [](const auto& name) { return std::string(name.param); });
 
 TEST(UrdfExport, ChainsReversedJointsOffsetFramesAndRangesSurviveTheRoundTrip) {
@@ -275,7 +276,7 @@ TEST(UrdfKey, FindingsNameTheUrdfFile) {
             "<parent link=\"world\"/><child link=\"a\"/></joint>"));
   const std::string heavy =
       LoadModel(WriteFile("heavy.yaml", "name: m\nurdf: heavy.urdf\n")).diagnostics.Text();
-  EXPECT_NE(heavy.find("heavy.urdf: error: link 'a': principal inertias 1, 1, 5 kg m² violate"),
+  EXPECT_NE(heavy.find("heavy.urdf:1: error: link 'a': principal inertias 1, 1, 5 kg m² violate"),
             std::string::npos)
       << heavy;
   const std::string missing =
