@@ -80,6 +80,8 @@ class PlanarSliderCrank final : public ClosedForm {
     for (const auto& [weight, first, second] : coordinates) {
       torque += weight * first * (first * acceleration + second * rate * rate);  // (1), inertia
     }
+    sample->force.resize(1);  // allocates the first time only
+    sample->extra.resize(1);
     sample->force[0] = torque;
     sample->extra[0] = r_ * c + l_ * cos_phi;
     return RunSummary::Done();

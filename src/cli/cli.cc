@@ -47,6 +47,7 @@ int RunCli(int argc, char** argv) {
   AddAuditCommand(&app, &exit_code);
   AddListCommand(&app, &exit_code);
   AddWorkspaceCommand(&app, &exit_code);
+  AddStiffnessCommand(&app, &exit_code);
   AddMutateCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);

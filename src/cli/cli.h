@@ -24,6 +24,7 @@ void AddCheckCommand(CLI::App* app, int* exit_code);
 void AddAuditCommand(CLI::App* app, int* exit_code);
 void AddListCommand(CLI::App* app, int* exit_code);
 void AddWorkspaceCommand(CLI::App* app, int* exit_code);
+void AddStiffnessCommand(CLI::App* app, int* exit_code);
 void AddMutateCommand(CLI::App* app, int* exit_code);
 void AddRegressCommand(CLI::App* app, int* exit_code);
 void AddMergeCommand(CLI::App* app, int* exit_code);

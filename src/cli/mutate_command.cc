@@ -31,7 +31,9 @@ int Mutate(const MutateArguments& arguments) {
   progress.Clear();
   fmt::print(stderr, "{}", report.diagnostics.Text());
   if (report.mutations.empty()) {
-    fmt::print(stderr, "error: {} does not agree before anything is bent\n", arguments.scenario);
+    if (report.exit_code != 2) {
+      fmt::print(stderr, "error: {} does not agree before anything is bent\n", arguments.scenario);
+    }
     return report.exit_code;
   }
   fmt::print("{}", ToText(report, arguments.markdown));

@@ -9,6 +9,7 @@
 #include "cli/terminal.h"
 #include "core/demand.h"
 #include "pipeline/run_scenario.h"
+#include "report/stiffness_report.h"
 
 namespace mbv {
 namespace {
@@ -36,6 +37,11 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
     const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
     fmt::print("{}", arguments.quiet ? VerdictLine(*outcome.report, table)
                                      : ToTable(*outcome.report, table) + "\n");
+  }
+  if (outcome.stiffness != nullptr) {
+    const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
+    fmt::print("{}", arguments.quiet ? VerdictLine(*outcome.stiffness, table)
+                                     : ToTable(*outcome.stiffness, table) + "\n");
   }
   if (!outcome.folder.empty() && !arguments.quiet) {
     fmt::print(stderr, "results in {}\n", outcome.folder);
@@ -72,26 +78,21 @@ int Run(const RunArguments& arguments) {
     return 2;
   }
   ProgressLine progress(!arguments.quiet);
-  std::vector<Report> reports;
-  int exit_code = 0, bad = 0;
+  RunCounts counts;
+  int exit_code = 0;
   for (const std::string& file : files) {
     if (progress.active()) {
       options.progress = [&](const std::string& stage, double fraction) {
         progress.Show(file + ": " + stage, fraction);
       };
     }
-    RunOutcome outcome = RunOne(file, options, arguments, &progress);
+    const RunOutcome outcome = RunOne(file, options, arguments, &progress);
     exit_code = WorseExit(exit_code, outcome.exit_code);
-    if (!outcome.report) ++bad;
-    if (!outcome.report || files.size() == 1) continue;
-    for (WitnessRecord& witness : outcome.report->witnesses) witness.trace = {};  // memory
-    reports.push_back(*std::move(outcome.report));
+    counts += outcome.report      ? CountOf(*outcome.report)
+              : outcome.stiffness ? CountOf(*outcome.stiffness)
+                                  : RunCounts{.scenarios = 1, .bad_input = 1};
   }
-  if (files.size() > 1) {
-    std::vector<const Report*> pointers;
-    for (const Report& report : reports) pointers.push_back(&report);
-    fmt::print("{}", CountLine(pointers, bad));
-  }
+  if (files.size() > 1) fmt::print("{}", CountLine(counts));
   return exit_code;
 }
 

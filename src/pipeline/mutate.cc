@@ -122,12 +122,17 @@ MutationReport MutateScenario(const std::string& file, const MutationOptions& op
   MutationReport report;
   report.scenario = file;
   report.size = options.size;
+  const ScenarioResult scenario = LoadScenario(file);
+  if (!scenario.scenario) {  // bad input, or no motion
+    report.diagnostics = scenario.diagnostics;
+    report.exit_code = 2;
+    return report;
+  }
   const RunOutcome base = RunScenario(file, OptionsFor("", 0.0));
   report.diagnostics = base.diagnostics;
   report.exit_code = base.exit_code;
   if (base.exit_code != 0) return report;  // an unbent disagreement would detect everything
 
-  const ScenarioResult scenario = LoadScenario(file);
   std::vector<Parameter> parameters;
   for (const Parameter& parameter : scenario.mechanism->parameters) {
     if (Wanted(options, parameter)) parameters.push_back(parameter);

@@ -49,6 +49,7 @@ RunSummary DrawVideo(const Scenario& scenario, const Mechanism& mechanism, const
         advance(index);
         return encoder.Add(picture);
       });
+  if (!drawn.ok()) return drawn;
   const std::string trouble = encoder.Finish(video);
   if (trouble.empty()) return drawn;
   drawn.stop = Stop::kEngineFailure;

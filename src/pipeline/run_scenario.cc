@@ -6,11 +6,13 @@
 #include <filesystem>
 
 #include "mechanism/mobility.h"
+#include "pipeline/free_motion_text.h"
 #include "pipeline/output_folder.h"
 #include "pipeline/pictures.h"
 #include "pipeline/prepare.h"
 #include "pipeline/ranges.h"
 #include "pipeline/run_page.h"
+#include "pipeline/stiffness.h"
 #include "pipeline/version.h"
 #include "reference/reference.h"
 
@@ -89,8 +91,10 @@ class ScenarioRun {
                            ? fmt::format("forward simulation, step {:g} ms, {} engine",
                                          1e3 * simulation.step_s, report_.engine)
                            : std::string("inverse dynamics at each sample");
-    line += fmt::format(", {} drive motion, {:g} s sampled every {:g} ms", report_.driven_by,
-                        report_.duration_s, 1e3 * report_.sample_s);
+    const std::string motion = scenario().motion.free() ? FreeMotionText(base(), scenario().motion)
+                                                        : report_.driven_by + " drive motion";
+    line += fmt::format(", {}, {:g} s sampled every {:g} ms", motion, report_.duration_s,
+                        1e3 * report_.sample_s);
     if (simulation.extrapolate) {
       line += fmt::format(
           "; forces extrapolated in {} from {:g} and {:g} to {:g}",
@@ -122,8 +126,22 @@ class ScenarioRun {
       AddWitness("reference", NotRun("switched off in the scenario"), {});
       return;
     }
+    if (scenario().motion.free()) {
+      RunFreeReference();
+      return;
+    }
     ReferenceRun run = RunReference(prepared_->mechanisms.reference, scenario().motion);
     report_.timing.reference_s = run.summary.wall_s;
+    AddWitness("reference", std::move(run.summary), std::move(run.trace));
+  }
+
+  void RunFreeReference() {
+    ForwardRun run = RunForwardReference(prepared_->mechanisms.reference, scenario().motion);
+    report_.timing.reference_s = run.summary.wall_s;
+    report_.simulation += "; " + TrustLine(run);
+    for (const std::string& text : PassageTexts(run, scenario().motion.duration_s)) {
+      AddWarning(text);
+    }
     AddWitness("reference", std::move(run.summary), std::move(run.trace));
   }
 
@@ -150,7 +168,8 @@ class ScenarioRun {
       AddWitness("simulated", NotRun("switched off in the scenario"), {});
       return;
     }
-    if (!Driver().summary.ok()) {
+    const bool needs_driver = !scenario().motion.free() || scenario().reference.on;
+    if (needs_driver && !Driver().summary.ok()) {
       AddWitness(
           "simulated",
           NotRun(fmt::format("there is no drive motion, because {} failed", report_.driven_by)),
@@ -172,13 +191,15 @@ class ScenarioRun {
     RunOtherEngine(engine == Engine::kStock ? Engine::kCorrected : Engine::kStock);
   }
 
+  void AddWarning(const std::string& text) {
+    Finding finding;
+    finding.severity = Severity::kWarning;
+    finding.message = text;
+    report_.findings.Add(std::move(finding));
+  }
+
   void AddWarnings(const std::vector<std::string>& warnings) {
-    for (const std::string& warning : warnings) {
-      Finding finding;
-      finding.severity = Severity::kWarning;
-      finding.message = "MuJoCo: " + warning;
-      report_.findings.Add(std::move(finding));
-    }
+    for (const std::string& warning : warnings) AddWarning("MuJoCo: " + warning);
   }
 
   // Joint ranges along the simulated motion.
@@ -193,6 +214,8 @@ class ScenarioRun {
   // The simulator's own modelling error: the same run by the other engine.
   void RunOtherEngine(Engine other) {
     const SimulationSettings& settings = scenario().simulation;
+    // Its error is stated in drive forces, which a free motion does not compare.
+    if (scenario().motion.free()) return;
     if (!settings.forward || !settings.stock_too || !simulation_->summary.ok()) return;
     SimulatedWitness witness = RunSimulation(
         scenario(), prepared_->mechanisms.simulated, prepared_->MakeDrivenMotion(), other,
@@ -321,6 +344,7 @@ class ScenarioRun {
 }  // namespace
 
 RunOutcome RunScenario(const std::string& file, const RunOptions& options) {
+  if (ReadScenarioHead(file).is_stiffness()) return RunStiffnessScenario(file, options);
   return ScenarioRun(file, options).Run();
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -10,6 +11,8 @@
 #include "scenario/load_scenario.h"
 
 namespace mbv {
+
+struct StiffnessReport;  // report/stiffness_report.h
 
 /// Stage ("simulation") and how much of it is done (0 … 1).
 using ProgressFunction = std::function<void(const std::string& stage, double fraction)>;
@@ -24,7 +27,8 @@ struct RunOptions {
 struct RunOutcome {
   int exit_code = 4;             ///< 0 agree, 1 disagree, 2 bad input, 3 could not run
   Diagnostics diagnostics;       ///< bad input and warnings
-  std::optional<Report> report;  ///< empty after bad input
+  std::optional<Report> report;  ///< of a motion; empty after bad input
+  std::shared_ptr<const StiffnessReport> stiffness;  ///< of a stiffness; null after bad input
   std::string folder;            ///< what was written; "" if nothing
 };
 

@@ -28,19 +28,30 @@ std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& 
   return sheets;
 }
 
-std::string CountLine(const std::vector<const Report*>& reports, int bad_input) {
-  size_t ran = 0, compared = 0, verified = 0;
-  for (const Report* report : reports) {
-    bool any = false;
-    for (const WitnessRecord& witness : report->witnesses) any = any || witness.summary.ok();
-    ran += any ? 1 : 0;
-    compared += MainPair(report->comparison) != nullptr ? 1 : 0;
-    verified += report->comparison.verdict == Verdict::kAgree ? 1 : 0;
+RunCounts& RunCounts::operator+=(const RunCounts& other) {
+  scenarios += other.scenarios;
+  ran += other.ran;
+  compared += other.compared;
+  verified += other.verified;
+  bad_input += other.bad_input;
+  return *this;
+}
+
+RunCounts CountOf(const Report& report) {
+  RunCounts counts{.scenarios = 1};
+  for (const WitnessRecord& witness : report.witnesses) {
+    if (witness.summary.ok()) counts.ran = 1;
   }
-  const size_t all = reports.size() + static_cast<size_t>(bad_input);
-  std::string text = fmt::format("{} scenario{}: {} ran, {} compared, {} verified", all,
-                                 all == 1 ? "" : "s", ran, compared, verified);
-  if (bad_input > 0) text += fmt::format(", {} with bad input", bad_input);
+  counts.compared = MainPair(report.comparison) != nullptr ? 1 : 0;
+  counts.verified = report.comparison.verdict == Verdict::kAgree ? 1 : 0;
+  return counts;
+}
+
+std::string CountLine(const RunCounts& counts) {
+  std::string text =
+      fmt::format("{} scenario{}: {} ran, {} compared, {} verified", counts.scenarios,
+                  counts.scenarios == 1 ? "" : "s", counts.ran, counts.compared, counts.verified);
+  if (counts.bad_input > 0) text += fmt::format(", {} with bad input", counts.bad_input);
   return text + "\n";
 }
 

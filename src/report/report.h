@@ -80,9 +80,17 @@ struct TableOptions {
 /// "stabilizing_platform / sea_state: AGREE  simulated vs analytic 4.2e-08 (limit 1.0e-07)".
 [[nodiscard]] std::string VerdictLine(const Report& report, const TableOptions& options);
 
-/// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified"; `bad_input` were
-/// not even loaded.
-[[nodiscard]] std::string CountLine(const std::vector<const Report*>& reports, int bad_input);
+/// What several runs came to.
+struct RunCounts {
+  size_t scenarios = 0, ran = 0, compared = 0, verified = 0;
+  size_t bad_input = 0;  ///< not even loaded
+
+  RunCounts& operator+=(const RunCounts& other);
+};
+[[nodiscard]] RunCounts CountOf(const Report& report);
+
+/// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
+[[nodiscard]] std::string CountLine(const RunCounts& counts);
 
 /// The pair a reader looks at first: simulated vs analytic if compared, else simulated vs
 /// reference, else reference vs analytic; null if none was compared.

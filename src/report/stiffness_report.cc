@@ -31,6 +31,16 @@ const StiffnessWitness* StiffnessReport::WithShares() const {
   return nullptr;
 }
 
+RunCounts CountOf(const StiffnessReport& report) {
+  RunCounts counts{.scenarios = 1};
+  for (const StiffnessWitness& witness : report.witnesses) {
+    if (witness.result.summary.ok()) counts.ran = 1;
+  }
+  counts.compared = report.comparison.MainPair() != nullptr ? 1 : 0;
+  counts.verified = report.comparison.verdict == Verdict::kAgree ? 1 : 0;
+  return counts;
+}
+
 std::string StiffnessCsv(const StiffnessReport& report) {
   std::string text = "witness,matrix,row,column,unit,value\n";
   auto out = std::back_inserter(text);

@@ -67,6 +67,8 @@ struct StiffnessReport {
 [[nodiscard]] std::string ToTable(const StiffnessReport& report, const TableOptions& options);
 [[nodiscard]] std::string VerdictLine(const StiffnessReport& report, const TableOptions& options);
 
+[[nodiscard]] RunCounts CountOf(const StiffnessReport& report);
+
 /// report.html: one page that needs no other file and no script.
 [[nodiscard]] std::string ToHtml(const StiffnessReport& report);
 

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "report/html_text.h"
+#include "report/svg_contours.h"
 
 namespace mbv {
 namespace {
@@ -145,6 +146,32 @@ std::string MapColor(double t) {
   return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
 }
 
+// Equal steps in what the colours show; they run through the middles of the cells.
+std::string Contours(const MapPlot& plot, const Axis& x, const Axis& y, const Axis& value) {
+  std::vector<double> inner(plot.values.size());
+  for (size_t k = 0; k < inner.size(); ++k) {
+    inner[k] = value.Shows(plot.values[k]) ? value.Inner(plot.values[k])
+                                           : std::numeric_limits<double>::quiet_NaN();
+  }
+  const double w = (plot.x_max - plot.x_min) / plot.columns;
+  const double h = (plot.y_max - plot.y_min) / plot.rows;
+  const auto at = [&](const std::array<double, 2>& p) {
+    return fmt::format("{:.1f} {:.1f}", x.Px(plot.x_min + (p[0] + 0.5) * w),
+                       y.Px(plot.y_min + (p[1] + 0.5) * h));
+  };
+  std::string path;
+  for (int k = 1; k <= plot.contours; ++k) {
+    const double level = value.low + k * (value.high - value.low) / (plot.contours + 1);
+    for (const ContourPiece& piece : Contour(inner, plot.columns, plot.rows, level)) {
+      path += "M" + at(piece.from) + "L" + at(piece.to);
+    }
+  }
+  return path.empty() ? ""
+                      : "<path d=\"" + path +
+                            "\" fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1\" "
+                            "stroke-opacity=\"0.7\"/>\n";
+}
+
 }  // namespace
 
 std::string ToSvg(const LinePlot& plot) {
@@ -198,6 +225,7 @@ std::string ToSvg(const MapPlot& plot) {
           x.Px(plot.x_min) + c * w, y.Px(plot.y_min) - (r + 1) * h, w + 0.3, h + 0.3, MapColor(t));
     }
   }
+  if (plot.contours > 0) svg += Contours(plot, x, y, value);
   svg += Frame(x, y, plot.x_label, plot.y_label);
   const double bar_x = kWidth - kRight - 60;
   for (int i = 0; i < 50; ++i) {

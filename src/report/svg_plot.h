@@ -29,6 +29,7 @@ struct MapPlot {
   int columns = 0, rows = 0;                          ///< row 0 at y_min
   std::vector<double> values;                         ///< rows × columns; NaN is left blank
   bool log_scale = false;
+  int contours = 0;  ///< number of contour lines, in equal steps of the colour scale
 };
 [[nodiscard]] std::string ToSvg(const MapPlot& plot);
 

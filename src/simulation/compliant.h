@@ -11,9 +11,12 @@
 
 namespace mbv {
 
+/// Largest loads of the small-load extrapolation. They are reduced where the output would move by
+/// more than 1e-4 of the mechanism's size or rad: larger motions bring geometry in, smaller ones
+/// drown in the round-off of positions.
 struct CompliantOptions {
-  double force_N = 1.0;     ///< largest load of the small-load extrapolation, > 0
-  double moment_Nm = 0.05;  ///< > 0
+  double force_N = 1000.0;   ///< > 0
+  double moment_Nm = 100.0;  ///< > 0
 };
 
 /// One finite load: the platform's displacement in equilibrium, geometry included.
@@ -24,7 +27,7 @@ struct LoadedDisplacement {
 };
 
 struct CompliantRun {
-  StiffnessResult result;  ///< at zero load, extrapolated
+  StiffnessResult result;             ///< at zero load, extrapolated
   double extrapolation_error = kNan;  ///< relative, of C: difference of the last two extrapolates
   double residual = kNan;             ///< worst of all load cases
   std::vector<LoadedDisplacement> loaded;  ///< per given wrench

@@ -159,13 +159,14 @@ TEST(Report, CsvNumbersReadBackExactly) {
 }
 
 TEST(Report, CountsTellRanComparedAndVerifiedApart) {
-  Report agreed = MakeReport(Case());
-  Report disagreed = MakeReport(BentCase());
+  const Report agreed = MakeReport(Case());
+  const Report disagreed = MakeReport(BentCase());
   Case alone;
   alone.reference_summary = alone.simulated_summary = {.message = "off", .where = {}, .unit = {}};
-  Report ran_only = MakeReport(alone);
-  EXPECT_EQ(CountLine({&agreed, &disagreed, &ran_only}, 1),
-            "4 scenarios: 3 ran, 2 compared, 1 verified, 1 with bad input\n");
+  const Report ran_only = MakeReport(alone);
+  RunCounts counts{.scenarios = 1, .bad_input = 1};
+  for (const Report* report : {&agreed, &disagreed, &ran_only}) counts += CountOf(*report);
+  EXPECT_EQ(CountLine(counts), "4 scenarios: 3 ran, 2 compared, 1 verified, 1 with bad input\n");
 }
 
 TEST(Report, TheShortLineNamesVerdictValueAndLimit) {

@@ -53,7 +53,7 @@ test('What failed can be shown alone, with its reason', async () => {
   const bad = await names();
   assert.equal(bad.length, 1);
   assert.match(bad[0], /wrong_expectation/);
-  assert.match(await page.innerText('tbody tr:not([hidden])'), /disagree/);
+  assert.match(await page.innerText('tbody tr:not([hidden])'), /exit code 0, expected 1/);
   await page.selectOption('#kind', 'good');
   assert.equal((await names()).length, 4);
   await page.selectOption('#kind', '');

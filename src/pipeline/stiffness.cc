@@ -1,0 +1,298 @@
+#include "pipeline/stiffness.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <filesystem>
+
+#include "core/demand.h"
+#include "pipeline/output_folder.h"
+#include "pipeline/version.h"
+#include "reference/frame_stiffness.h"
+#include "reference/reference.h"
+#include "scenario/motion_reader.h"
+#include "simulation/compliant.h"
+
+namespace mbv {
+namespace {
+
+RunSummary NotRun(const std::string& why) {
+  RunSummary summary;
+  summary.message = why;
+  return summary;
+}
+
+double Since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+std::string Quoted(const std::string& argument) {
+  return argument.find_first_of(" '\"$&|;()[]{}*?<>") == std::string::npos ? argument
+                                                                           : "'" + argument + "'";
+}
+
+class Runner {
+ public:
+  Runner(const PreparedStiffness& prepared, const ProgressFunction& progress)
+      : prepared_(prepared), scenario_(prepared.scenario), progress_(progress) {}
+
+  StiffnessRun Run() {
+    const auto start = std::chrono::steady_clock::now();
+    Describe();
+    Show("closed form", 0.0);
+    RunAnalytic();
+    Show("frame elements", 0.1);
+    RunFrame();
+    Show("simulation", 0.2);
+    RunSimulated();
+    RunPrinted();
+    Judge();
+    Measure();
+    run_.report.timing.total_s = Since(start);
+    return std::move(run_);
+  }
+
+ private:
+  StiffnessReport& report() { return run_.report; }
+
+  void Show(const char* stage, double fraction) const {
+    if (progress_) progress_(stage, fraction);
+  }
+
+  void Describe() {
+    StiffnessReport& r = report();
+    r.scenario = scenario_.name;
+    r.scenario_file = scenario_.file;
+    r.mechanism = prepared_.base.name;
+    r.model_file = scenario_.model_file;
+    r.description = scenario_.description;
+    r.output = prepared_.base.outputs[static_cast<size_t>(prepared_.output)].name;
+    r.pose_note = prepared_.pose_note;
+    r.model = prepared_.form_model;
+    r.loads = scenario_.loads;
+    r.loads_text = scenario_.loads_text;
+    r.versions = Versions();
+    r.parameters = prepared_.base.parameters;
+    const Motion motion = PoseMotion(prepared_.base, scenario_.pose);
+    for (const Command& command : motion.commands) {
+      r.pose.push_back({command.name, Evaluate(command.profile, 0.0).value,
+                        CoordinateUnit(prepared_.base, command.terms[0].coordinate)});
+    }
+  }
+
+  StiffnessWitness& Add(const std::string& name, StiffnessResult result) {
+    StiffnessWitness witness;
+    witness.name = name;
+    witness.displacements = Displacements(result, scenario_.loads);
+    witness.result = std::move(result);
+    report().witnesses.push_back(std::move(witness));
+    return report().witnesses.back();
+  }
+
+  void AddFailed(const std::string& name, RunSummary summary) {
+    StiffnessResult result;
+    result.summary = std::move(summary);
+    Add(name, std::move(result));
+  }
+
+  void RunAnalytic() {
+    if (prepared_.form == nullptr) {
+      AddFailed("analytic", NotRun(prepared_.form_reason));
+      return;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    StiffnessResult result = prepared_.form->Evaluate(scenario_.pose);
+    report().timing.analytic_s = result.summary.wall_s = Since(start);
+    Add("analytic", std::move(result));
+  }
+
+  void RunFrame() {
+    if (!scenario_.reference.on) {
+      AddFailed("reference", NotRun("switched off in the scenario"));
+      return;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<Pose> X_WB;
+    const RunSummary closed = CloseLoops(prepared_.reference, scenario_.pose, &X_WB);
+    if (!closed.ok()) {
+      AddFailed("reference", closed);
+      return;
+    }
+    LocateOutput(X_WB);
+    StiffnessResult result = FrameStiffness(prepared_.reference, X_WB, prepared_.output);
+    report().timing.reference_s = result.summary.wall_s = Since(start);
+    Add("reference", std::move(result));
+  }
+
+  void LocateOutput(const std::vector<Pose>& X_WB) {
+    const Output& output = prepared_.base.outputs[static_cast<size_t>(prepared_.output)];
+    report().p_WO = (X_WB[static_cast<size_t>(output.body)] * output.X_BO).translation();
+  }
+
+  // No load can be in equilibrium where another computation found a freedom that nothing holds.
+  bool IsSingular() const {
+    for (const StiffnessWitness& witness : run_.report.witnesses) {
+      if (witness.result.summary.stop == Stop::kSingular) return true;
+    }
+    return false;
+  }
+
+  void RunSimulated() {
+    if (!scenario_.simulation.on) {
+      AddFailed("simulated", NotRun("switched off in the scenario"));
+      return;
+    }
+    if (IsSingular()) {
+      AddFailed("simulated", NotRun("the stiffness is singular: nothing can be loaded"));
+      return;
+    }
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<Pose> X_WB;
+    const RunSummary closed = CloseLoops(prepared_.simulated, scenario_.pose, &X_WB);
+    if (!closed.ok()) {
+      AddFailed("simulated", closed);
+      return;
+    }
+    LocateOutput(X_WB);
+    CompliantRun run = SimulateStiffness(
+        prepared_.simulated, X_WB, prepared_.output, scenario_.loads,
+        {.force_N = scenario_.simulation.force_N, .moment_Nm = scenario_.simulation.moment_Nm});
+    report().timing.simulation_s = run.result.summary.wall_s = Since(start);
+    run_.mjcf = std::move(run.mjcf);
+    StiffnessWitness& witness = Add("simulated", std::move(run.result));
+    witness.residual = run.residual;
+    witness.extrapolation_error = run.extrapolation_error;
+    // Under finite loads, geometry included.
+    witness.displacements.clear();
+    for (const LoadedDisplacement& loaded : run.loaded) {
+      witness.displacements.push_back(loaded.displacement);
+    }
+  }
+
+  void RunPrinted() {
+    if (prepared_.printed == nullptr) return;
+    StiffnessWitness witness;
+    witness.name = "printed";
+    witness.result = prepared_.printed->Evaluate(scenario_.pose);
+    // Its stiffness is compared even where its model finds itself singular.
+    witness.displacements = Displacements(witness.result, scenario_.loads);
+    report().printed_pairs.push_back(CompareStiffnessPair(witness, report().witnesses.front()));
+    report().printed.push_back(std::move(witness));
+  }
+
+  void Judge() {
+    StiffnessInput input;
+    input.limits = scenario_.checks;
+    input.loads = scenario_.loads;
+    input.witnesses = report().witnesses;
+    report().comparison = CompareStiffness(input);
+    switch (report().comparison.verdict) {
+      case Verdict::kAgree:
+        report().exit_code = 0;
+        break;
+      case Verdict::kDisagree:
+        report().exit_code = 1;
+        break;
+      case Verdict::kNotRun:
+        report().exit_code = 3;
+        break;
+    }
+  }
+
+  void Measure() {
+    StiffnessReport& r = report();
+    const auto add = [&](const std::string& name, const std::string& unit,
+                         const std::string& meaning, const auto& value_of) {
+      IndexRow row{.name = name, .unit = unit, .meaning = meaning, .values = {}};
+      for (const StiffnessWitness& witness : r.witnesses) {
+        row.values.push_back(witness.ran() ? value_of(witness.result) : kNan);
+      }
+      r.indices.push_back(std::move(row));
+    };
+    if (prepared_.form != nullptr) {
+      const std::vector<StiffnessIndex> indices = prepared_.form->indices();
+      for (size_t k = 0; k < indices.size(); ++k) {
+        add(indices[k].name, indices[k].unit, indices[k].meaning,
+            [&](const StiffnessResult& result) { return prepared_.form->IndexValues(result)[k]; });
+      }
+    }
+    const std::vector<NamedIndex> general = GeneralIndices({});
+    for (size_t k = 0; k < general.size(); ++k) {
+      add(general[k].name, general[k].unit, general[k].meaning,
+          [k](const StiffnessResult& result) { return GeneralIndices(result)[k].value; });
+    }
+  }
+
+  const PreparedStiffness& prepared_;
+  const StiffnessScenario& scenario_;
+  const ProgressFunction& progress_;
+  StiffnessRun run_;
+};
+
+}  // namespace
+
+RunSummary CloseLoops(const Mechanism& mechanism, const PoseValues& pose, std::vector<Pose>* X_WB) {
+  const Motion motion = PoseMotion(mechanism, pose);
+  ReferenceOptions options;
+  options.reactions = false;
+  ReferenceSolver solver(mechanism, motion, options);
+  CommandSample command;
+  EvaluateMotion(motion, 0.0, &command);
+  ReferenceSample sample;
+  RunSummary summary = solver.Kinematics(command, &sample);
+  if (summary.ok()) *X_WB = sample.states.X_WB;
+  return summary;
+}
+
+StiffnessRun RunStiffness(const PreparedStiffness& prepared, const ProgressFunction& progress) {
+  return Runner(prepared, progress).Run();
+}
+
+std::vector<std::pair<std::string, std::string>> StiffnessFiles(const StiffnessRun& run) {
+  std::vector<std::pair<std::string, std::string>> files = {
+      {"stiffness.csv", StiffnessCsv(run.report)},
+      {"contributions.csv", ContributionsCsv(run.report)},
+      {"summary.json", ToJson(run.report)},
+      {"report.html", ToHtml(run.report)}};
+  if (!run.report.loads.empty()) files.emplace_back("loads.csv", LoadsCsv(run.report));
+  if (!run.mjcf.empty()) files.emplace_back("model.xml", run.mjcf);
+  return files;
+}
+
+RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& options) {
+  RunOutcome outcome;
+  const auto prepared = PrepareStiffnessFile(file, options.scenario, &outcome.diagnostics);
+  if (!prepared) {
+    outcome.exit_code = 2;
+    return outcome;
+  }
+  StiffnessRun run = RunStiffness(*prepared, options.progress);
+  run.report.findings = outcome.diagnostics;
+  run.report.command = "mbverify run " + Quoted(file);
+  for (const auto& [key, value] : options.scenario.set) {
+    run.report.command += " --set " + Quoted(key + "=" + value);
+  }
+  outcome.exit_code = run.report.exit_code;
+  if (!options.out_dir.empty()) {
+    OutputFolder folder(std::filesystem::path(options.out_dir) / prepared->base.name /
+                        prepared->scenario.name);
+    std::string trouble = folder.Create();
+    for (const auto& [name, content] : StiffnessFiles(run)) {
+      if (trouble.empty()) trouble = folder.Write(name, content);
+    }
+    if (trouble.empty()) trouble = folder.Commit();
+    if (trouble.empty()) {
+      outcome.folder = folder.target();
+    } else {
+      Finding finding;
+      finding.message = trouble;
+      finding.hint = "choose another folder with --out";
+      outcome.diagnostics.Add(std::move(finding));
+      outcome.exit_code = 2;
+    }
+  }
+  outcome.stiffness = std::make_shared<StiffnessReport>(std::move(run.report));
+  return outcome;
+}
+
+}  // namespace mbv

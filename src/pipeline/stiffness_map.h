@@ -1,0 +1,61 @@
+// Maps of stiffness indices over two coordinates.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "pipeline/stiffness.h"
+
+namespace mbv {
+
+struct MapAxis {
+  std::string name;  ///< a coordinate of the pose
+  double low = kNan, high = kNan;
+  int count = 0;  ///< points, both ends included, >= 2
+};
+
+struct StiffnessMap {
+  std::array<MapAxis, 2> axes;
+  PoseValues fixed;      ///< other coordinates of the pose that the map changes
+  double within = kNan;  ///< only points whose two coordinates lie in a circle of this radius about
+                         ///< zero; NaN: all
+};
+
+/// "platform.x=-0.1:0.1:61,platform.y_mm=-100:100:61,platform.z=-0.1,within=0.1": two ranges
+/// LOW:HIGH:POINTS, and values of other coordinates of `pose`. Keys may end in _mm or _deg. Wrong
+/// ones are findings.
+[[nodiscard]] std::optional<StiffnessMap> ParseMap(const std::string& text, const PoseValues& pose,
+                                                   Diagnostics* diagnostics);
+
+/// The maps of a mechanism's paper (scara_robot: Figs 9–11), or one over the plane for the cabin
+/// robot; empty for others. In the text form of ParseMap().
+[[nodiscard]] std::vector<std::string> UsualMaps(const std::string& mechanism);
+
+struct MapResult {
+  std::vector<NamedIndex> indices;          ///< of the form, then general ones; no values
+  std::vector<std::vector<double>> values;  ///< per index: rows × columns, axes[0] fastest; NaN
+                                            ///< where the pose is not reached or out of the circle
+  std::vector<int> rank;                    ///< −1 where there is no stiffness
+  size_t points = 0, reached = 0;           ///< within the circle
+  double wall_s = 0.0;
+  bool closed_form = false;  ///< else frame elements
+};
+/// Evaluates by the closed form where there is one, else by frame elements.
+[[nodiscard]] MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
+                                   const ProgressFunction& progress = {});
+
+/// Files (name, content): the CSV of all indices and an SVG for each of `names` (default: the
+/// closed form's first two and the weakest stiffnesses). Unknown names are findings.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> MapFiles(
+    const StiffnessMap& map, const MapResult& result, const std::string& mechanism,
+    const std::vector<std::string>& names, Diagnostics* diagnostics);
+
+/// Median, smallest and largest value of each index with its place, for people.
+[[nodiscard]] std::string MapText(const StiffnessMap& map, const MapResult& result,
+                                  const std::vector<std::string>& names);
+
+/// "z-0.1_yaw0": the fixed coordinates, for file names.
+[[nodiscard]] std::string MapName(const StiffnessMap& map);
+
+}  // namespace mbv

@@ -1,0 +1,163 @@
+// Stiffness scenarios made ready: output, pose, witnesses' parameters, closed forms.
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "core/demand.h"
+#include "mechanism/load_model.h"
+#include "pipeline/stiffness.h"
+
+namespace mbv {
+namespace {
+
+constexpr const char* kPrintedModel = "as_printed";
+
+void AddError(const StiffnessScenario& scenario, const std::string& message,
+              const std::string& hint, Diagnostics* diagnostics) {
+  Finding finding;
+  finding.file = scenario.file;
+  finding.message = message;
+  finding.hint = hint;
+  diagnostics->Add(std::move(finding));
+}
+
+std::string Joined(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
+  return text;
+}
+
+Mechanism WithParameters(const PreparedStiffness& prepared, const Overrides& own,
+                         const char* witness, Diagnostics* diagnostics) {
+  if (own.empty()) return prepared.base;
+  LoadOptions options;
+  options.overrides = Merge(prepared.scenario.parameters, own);
+  LoadResult loaded = LoadModel(prepared.scenario.model_file, options);
+  if (loaded.mechanism) return *std::move(loaded.mechanism);
+  diagnostics->Append(loaded.diagnostics);
+  AddError(prepared.scenario,
+           fmt::format("the model cannot be loaded with the parameters of the {} witness", witness),
+           "", diagnostics);
+  return prepared.base;
+}
+
+void ResolveOutput(PreparedStiffness* prepared, Diagnostics* diagnostics) {
+  const StiffnessFormRow* row = FindStiffnessForm(prepared->base.name);
+  std::string name = prepared->scenario.output;
+  if (name.empty() && row != nullptr) name = row->output;
+  if (name.empty() && prepared->base.outputs.size() == 1) name = prepared->base.outputs[0].name;
+  prepared->output = prepared->base.FindOutput(name);
+  if (prepared->output >= 0) return;
+  std::vector<std::string> known;
+  for (const Output& output : prepared->base.outputs) known.push_back(output.name);
+  AddError(prepared->scenario,
+           name.empty() ? fmt::format("output is not given, and {} has {}", prepared->base.name,
+                                      known.empty() ? "none" : "several")
+                        : fmt::format("there is no output '{}'", name),
+           known.empty() ? "declare one under outputs: in the model" : "outputs: " + Joined(known),
+           diagnostics);
+}
+
+void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
+  PoseValues& pose = prepared->scenario.pose;
+  if (!pose.empty()) return;
+  pose = ExamplePose(prepared->base.name);
+  prepared->pose_note = "no pose is given: this is the pose of the project's example";
+  if (!pose.empty()) return;
+  pose = HomePose(prepared->base);
+  prepared->pose_note = "no pose is given: this is the model's home pose";
+  const PoseFault fault = CheckPose(prepared->base, pose);
+  if (!fault.message.empty()) {
+    AddError(prepared->scenario, fault.message, fault.hint, diagnostics);
+  }
+}
+
+std::unique_ptr<StiffnessForm> MakeForm(const PreparedStiffness& prepared,
+                                        const StiffnessFormRow& row, const std::string& model,
+                                        Diagnostics* diagnostics) {
+  Diagnostics own;
+  auto form = row.factory(prepared.analytic, prepared.scenario.pose, model, &own);
+  for (Finding finding : own.findings()) {
+    if (finding.file.empty()) finding.file = prepared.scenario.file;
+    diagnostics->Add(std::move(finding));
+  }
+  return form;
+}
+
+void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
+  const AnalyticSettings& settings = prepared->scenario.analytic;
+  const StiffnessFormRow* row = FindStiffnessForm(prepared->base.name);
+  if (!settings.on) {
+    prepared->form_reason = "switched off in the scenario";
+    return;
+  }
+  if (row == nullptr) {
+    prepared->form_reason = "there is no closed form of the stiffness of " + prepared->base.name;
+    if (!settings.model.empty()) {
+      AddError(prepared->scenario, "analytic.model: " + prepared->form_reason, "", diagnostics);
+    }
+    return;
+  }
+  const std::string& output = prepared->base.outputs[size_t(prepared->output)].name;
+  if (output != row->output) {
+    prepared->form_reason =
+        fmt::format("the closed form is for output {}, not {}", row->output, output);
+    return;
+  }
+  const auto& models = row->models;
+  prepared->form_model = settings.model.empty() ? models.front() : settings.model;
+  if (std::find(models.begin(), models.end(), prepared->form_model) == models.end()) {
+    AddError(prepared->scenario,
+             fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(models)),
+             "", diagnostics);
+    return;
+  }
+  prepared->form = MakeForm(*prepared, *row, prepared->form_model, diagnostics);
+  if (prepared->scenario.compare_printed && prepared->form != nullptr) {
+    prepared->printed = MakeForm(*prepared, *row, kPrintedModel, diagnostics);
+  }
+}
+
+}  // namespace
+
+PoseValues ExamplePose(const std::string& mechanism) {
+  if (mechanism == "scara_robot") {
+    return {{"platform.x", -0.050},
+            {"platform.y", -0.050},
+            {"platform.z", -0.150},
+            {"platform.yaw", 0.2}};
+  }
+  if (mechanism == "cabin_robot") {
+    return {{"d1", 0.5},           {"platform.x", 0.0}, {"platform.y", 0.36}, {"platform.yaw", 0.0},
+            {"th3", EIGEN_PI / 2}, {"th4", 0.0},        {"th6", 0.0}};  // d5: the model's
+  }
+  return {};
+}
+
+std::optional<PreparedStiffness> PrepareStiffness(StiffnessScenario scenario, Mechanism base,
+                                                  Diagnostics* diagnostics) {
+  PreparedStiffness prepared;
+  prepared.scenario = std::move(scenario);
+  prepared.base = std::move(base);
+  const StiffnessScenario& s = prepared.scenario;
+  prepared.analytic = WithParameters(prepared, s.analytic.parameters, "analytic", diagnostics);
+  prepared.reference = WithParameters(prepared, s.reference.parameters, "reference", diagnostics);
+  prepared.simulated = WithParameters(prepared, s.simulation.parameters, "simulated", diagnostics);
+  ResolveOutput(&prepared, diagnostics);
+  ResolvePose(&prepared, diagnostics);
+  if (diagnostics->has_errors()) return {};
+  MakeForms(&prepared, diagnostics);
+  if (diagnostics->has_errors()) return {};
+  return prepared;
+}
+
+std::optional<PreparedStiffness> PrepareStiffnessFile(const std::string& file,
+                                                      const ScenarioOptions& options,
+                                                      Diagnostics* diagnostics) {
+  StiffnessScenarioResult loaded = LoadStiffnessScenario(file, options);
+  diagnostics->Append(loaded.diagnostics);
+  if (!loaded.scenario) return {};
+  return PrepareStiffness(*std::move(loaded.scenario), *std::move(loaded.mechanism), diagnostics);
+}
+
+}  // namespace mbv
