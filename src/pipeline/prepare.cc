@@ -26,6 +26,13 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
     finding.hint = "set reference: on";
     diagnostics->Add(std::move(finding));
   }
+  if (prepared.scenario.reference.table != nullptr) {
+    Finding finding;
+    finding.file = file;
+    finding.message = "reference.csv: a table can be read and checked, but not yet compared with";
+    finding.hint = "set reference: on to compare with the generic solver";
+    diagnostics->Add(std::move(finding));
+  }
   if (diagnostics->has_errors()) return {};
   return prepared;
 }
