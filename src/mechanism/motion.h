@@ -42,9 +42,9 @@ struct Load {
   std::string name;
   int body = 0;
   Vec3 p_BoQ_B = Vec3::Zero();
-  bool in_body_axes = false;             ///< components in body axes instead of world axes
-  std::array<Profile, 3> force;          ///< [N]
-  std::array<Profile, 3> moment;         ///< [N m], about Q
+  bool in_body_axes = false;      ///< components in body axes instead of world axes
+  std::array<Profile, 3> force;   ///< [N]
+  std::array<Profile, 3> moment;  ///< [N m], about Q
 };
 
 /// A drive that pushes with a given force instead of following a command.
@@ -65,8 +65,8 @@ struct Motion {
   double sample_s = 0.01;
   std::vector<Command> commands;
   std::vector<Load> loads;
-  std::vector<DriveForce> forces;     ///< free motion only; no drive is commanded and forced
-  std::vector<InitialValue> initial;  ///< one per freedom that no command holds
+  std::vector<DriveForce> forces = {};     ///< free motion only; no drive is commanded and forced
+  std::vector<InitialValue> initial = {};  ///< one per freedom that no command holds
 
   /// True when some freedoms move by forces (forward dynamics) instead of by commands.
   [[nodiscard]] bool free() const { return !initial.empty(); }

@@ -33,7 +33,7 @@ struct SimulationOptions {
   double stock_time_constant_steps = 2.0;
   /// Free motion only: poses and twists of all bodies at t = 0. They are put onto the loops of the
   /// simulated model, with the guided coordinates where they are commanded.
-  BodyStates start;
+  BodyStates start = {};
 };
 [[nodiscard]] Diagnostics Check(const SimulationOptions& options);
 
@@ -57,11 +57,11 @@ struct SimulationRun {
 
 /// `motion` gives duration, sample times, loads, forces of drives and the times at which profiles
 /// break (the integration steps onto them); of a free motion `driven` counts for the commanded
-/// drives and prescribed joints only; `driven` gives the commanded motion, evaluated before the loop.
-/// Fails with what `driven` returned; kNoConvergence (the loops do not close with the commanded
-/// drive positions); kUnsupported (undriven freedoms or a free motion in inverse mode, a load on a merged body, a
-/// drive on a ball); kEngineFailure (MuJoCo's errors, motion not finite, loops apart). Samples up
-/// to the failure are filled, the others NaN.
+/// drives and prescribed joints only; `driven` gives the commanded motion, evaluated before the
+/// loop. Fails with what `driven` returned; kNoConvergence (the loops do not close with the
+/// commanded drive positions); kUnsupported (undriven freedoms or a free motion in inverse mode, a
+/// load on a merged body, a drive on a ball); kEngineFailure (MuJoCo's errors, motion not finite,
+/// loops apart). Samples up to the failure are filled, the others NaN.
 [[nodiscard]] SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion,
                                      const DrivenMotion& driven, const SimulationOptions& options,
                                      const std::function<void(double)>& progress = {});

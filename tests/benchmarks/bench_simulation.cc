@@ -1,7 +1,5 @@
 // Time per step of the simulation on the stabilizing platform, beside a bare mj_step loop on the
 // same model, and time per sample of inverse mode.
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 #include <benchmark/benchmark.h>
 

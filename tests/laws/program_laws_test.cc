@@ -1,6 +1,4 @@
 // Laws of the witnesses as programs: the same twice, never silent about trouble, one model.
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 #include <cmath>
 #include <cstring>

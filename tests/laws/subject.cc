@@ -1,6 +1,3 @@
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-
 #include "tests/laws/subject.h"
 
 #include <algorithm>

@@ -1,6 +1,4 @@
 // MuJoCo's errors and warnings, and what becomes of them.
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 #include "simulation/engine.h"
 

@@ -1,6 +1,4 @@
 // The simulation of the shipped models against the other witnesses, on shortened scenarios.
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,4 @@
 // The simulation of a four-bar against its closed form, in all modes.
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
 
 #include <gtest/gtest.h>
 

@@ -1,6 +1,3 @@
-// Options are named where they differ from their defaults.
-#pragma GCC diagnostic ignored "-Wmissing-field-initializers"
-
 #include "simulation/steps.h"
 
 #include <gtest/gtest.h>
