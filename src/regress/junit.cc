@@ -29,15 +29,15 @@ struct Totals {
     time_s += result.cost.wall_s;
   }
   [[nodiscard]] std::string Attributes() const {
-    return fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" skipped=\"0\" time=\"{:.3f}\"",
-                       tests, failures, errors, time_s);
+    return fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\"", tests,
+                       failures, errors, time_s);
   }
 };
 
 std::string Output(const CaseResult& result) {
   std::string text =
-      fmt::format("verdict {}, exit code {} (expected {}, {})\n", result.verdict, result.exit_code,
-                  result.expected.verdict, result.expected.exit_code);
+      fmt::format("{}\nverdict {}, exit code {} (expected {}, {})\n", result.file, result.verdict,
+                  result.exit_code, result.expected.verdict, result.expected.exit_code);
   if (const std::string key = KeyText(result); !key.empty()) {
     text += "drive force error, RMS: " + key + "\n";
   }
@@ -54,9 +54,8 @@ std::string Output(const CaseResult& result) {
 }
 
 std::string TestCase(const CaseResult& result, const std::string& suite, const std::string& test) {
-  std::string text =
-      fmt::format("    <testcase name=\"{}\" classname=\"{}\" file=\"{}\" time=\"{:.3f}\">\n",
-                  EscapeXml(test), EscapeXml(suite), EscapeXml(result.file), result.cost.wall_s);
+  std::string text = fmt::format("    <testcase name=\"{}\" classname=\"{}\" time=\"{:.3f}\">\n",
+                                 EscapeXml(test), EscapeXml(suite), result.cost.wall_s);
   if (result.failed()) {
     const char* element = IsError(result.status) ? "error" : "failure";
     text +=

@@ -3,7 +3,10 @@
 
 #include <tinyxml2.h>
 
+#include <functional>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "regress_fixture.h"
 
@@ -85,6 +88,35 @@ TEST(JUnit, CountsMatchItsElements) {
   EXPECT_EQ(cases, 5);
   EXPECT_EQ(failures, 1);
   EXPECT_EQ(errors, 1);
+}
+
+// Readers that validate (the xUnit step of Jenkins) refuse a file with any other attribute.
+TEST(JUnit, HasTheAttributesOfTheSchemaOnly) {
+  const std::map<std::string, std::set<std::string>> allowed = {
+      {"testsuites", {"name", "time", "tests", "failures", "errors"}},
+      {"testsuite", {"name", "time", "tests", "failures", "errors", "timestamp", "hostname"}},
+      {"testcase", {"name", "time", "classname"}},
+      {"failure", {"type", "message"}},
+      {"error", {"type", "message"}},
+      {"system-out", {}}};
+  tinyxml2::XMLDocument document;
+  ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);
+  int elements = 0;
+  const std::function<void(const tinyxml2::XMLElement&)> visit = [&](const auto& element) {
+    ++elements;
+    ASSERT_TRUE(allowed.contains(element.Name())) << element.Name();
+    for (const auto* attribute = element.FirstAttribute(); attribute != nullptr;
+         attribute = attribute->Next()) {
+      EXPECT_TRUE(allowed.at(element.Name()).contains(attribute->Name()))
+          << element.Name() << " " << attribute->Name();
+    }
+    for (const auto* child = element.FirstChildElement(); child != nullptr;
+         child = child->NextSiblingElement()) {
+      visit(*child);
+    }
+  };
+  visit(*document.RootElement());
+  EXPECT_EQ(elements, 1 + 2 + 5 + 2 + 5);  // root, suites, cases, failure and error, outputs
 }
 
 TEST(JUnit, AwkwardTextArrivesUnchanged) {
