@@ -240,13 +240,35 @@ std::vector<Vec3> Thinned(const std::vector<Vec3>& points, double tolerance) {
   return thinned;
 }
 
-void AddPath(const PolylineOverlay& path, double radius, std::vector<Item>* items) {
+// A path as a ribbon that faces the camera, to be seen through what hides the path. As with arrows
+// it lies before the path, so that the path does not hide its own ghost.
+void AddPathGhost(const std::vector<Vec3>& points, double radius, const Material& material,
+                  const Vec3& forward_W, std::vector<FlatMesh>* flats) {
+  FlatMesh ghost{.rgba = WithAlpha(material, kGhost), .depth = FlatMesh::Depth::kHidden};
+  const Vec3 shift = -2.2 * radius * forward_W;
+  Vec3 side = forward_W.unitOrthogonal();
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec3 along = points[std::min(i + 1, points.size() - 1)] - points[i == 0 ? 0 : i - 1];
+    const Vec3 across = along.cross(forward_W);
+    if (across.norm() > 0.05 * along.norm()) side = across.normalized();
+    ghost.vertices_W.emplace_back(points[i] + shift - radius * side);
+    ghost.vertices_W.emplace_back(points[i] + shift + radius * side);
+    if (i == 0) continue;
+    const int k = 2 * static_cast<int>(i);
+    ghost.triangles.push_back({k - 2, k - 1, k});
+    ghost.triangles.push_back({k, k - 1, k + 1});
+  }
+  flats->push_back(std::move(ghost));
+}
+
+void AddPath(const PolylineOverlay& path, double radius, const Vec3& forward_W, Annotations* out) {
   Material material = MaterialOf(path.color);
   material.emission = 0.3F;
   const std::vector<Vec3> points = Thinned(path.points_W, 0.1 * radius);
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    items->push_back(Between(Solid::kCapsule, points[i], points[i + 1], radius, material));
+    out->items.push_back(Between(Solid::kCapsule, points[i], points[i + 1], radius, material));
   }
+  AddPathGhost(points, radius, material, forward_W, &out->flats);
 }
 
 }  // namespace
@@ -294,10 +316,10 @@ FlatMesh GlassBox(const Item& box) {
           .shaded = true};
 }
 
-Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale) {
+Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale, const Vec3& forward_W) {
   Annotations out;
   for (const PolylineOverlay& path : overlay.paths) {
-    AddPath(path, path.radius_m > 0.0 ? path.radius_m : 0.0025 * scale.extent_m, &out.items);
+    AddPath(path, path.radius_m > 0.0 ? path.radius_m : 0.0025 * scale.extent_m, forward_W, &out);
   }
   for (const MeshOverlay& mesh : overlay.meshes) {
     FlatMesh flat{.vertices_W = mesh.vertices_W,

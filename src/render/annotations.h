@@ -37,7 +37,9 @@ struct Annotations {
                                    const Vec3& forward_W);
 /// A translucent box as flat faces: solids, even translucent ones, cast full shadows.
 [[nodiscard]] FlatMesh GlassBox(const Item& box);
-/// The overlay's paths as rods and its meshes.
-[[nodiscard]] Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale);
+/// The overlay's paths as rods and its meshes, with ghosts where bodies hide them from a camera
+/// looking along `forward_W`.
+[[nodiscard]] Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale,
+                                             const Vec3& forward_W);
 
 }  // namespace mbv::render

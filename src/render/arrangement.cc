@@ -102,7 +102,7 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
     extent.Include(marks.items, false);
     most_items = std::max(most_items, items.size() + marks.items.size());
   }
-  const Annotations overlaid = OverlayAnnotations(overlay, set.scale);
+  const Annotations overlaid = OverlayAnnotations(overlay, set.scale, Vec3::UnitX());
   extent.Include(overlaid.items, false);
   for (const MeshOverlay& mesh : overlay.meshes) {
     for (const Vec3& p_W : mesh.vertices_W) extent.IncludePoint(set.R_DW * p_W);

@@ -117,7 +117,7 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
     if (RunSummary got = stage->Font(&font); !got.ok()) return got;
   }
   const std::vector<rn::LegendEntry> legend = rn::LegendOf(mechanism, set, options);
-  const rn::Annotations overlaid = rn::OverlayAnnotations(overlay, set.scale);
+  const rn::Annotations overlaid = rn::OverlayAnnotations(overlay, set.scale, set.forward_W);
   for (std::size_t f = 0; f < frames.size(); ++f) {
     std::vector<rn::Item> items = rn::MechanismItems(mechanism, frames[f], set.scale, options);
     rn::Annotations marks = rn::Annotate(mechanism, frames[f], set.scale, options, set.forward_W);

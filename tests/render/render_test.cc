@@ -247,6 +247,14 @@ TEST(Pictures, ShowPathsAndTranslucentMeshes) {
                         .color = "#ff0000",
                         .radius_m = 0.02});
   EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options, path), IsRed).count, 50);
+  // Inside the green ball it shows through.
+  const auto is_mixed = [](const std::uint8_t* p) {
+    return p[0] > 90 && p[0] < 2 * p[1] && p[2] < 80;
+  };
+  const int without = BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options), is_mixed).count;
+  path.paths[0].points_W = {Vec3(-0.06, 0, 1), Vec3(0.06, 0, 1)};
+  EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options, path), is_mixed).count,
+            without + 30);
   // A pane before the ball tints it, but lets its green through.
   Overlay pane;
   const Vec3 c(0.4, -0.7, 1.1), x(0.6, 0.35, 0.0), z(0, 0, 0.7);

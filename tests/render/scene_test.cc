@@ -150,10 +150,14 @@ TEST(OverlayAnnotations, ThinsPathsWithoutMovingThem) {
     circle.points_W.emplace_back(std::cos(i * 1e-2), std::sin(i * 1e-2), 0.0);
   }
   overlay.paths = {line};
-  EXPECT_EQ(OverlayAnnotations(overlay, Scale{}).items.size(), 2U);  // two legs of an angle
+  const Annotations angle = OverlayAnnotations(overlay, Scale{}, Vec3::UnitZ());
+  EXPECT_EQ(angle.items.size(), 2U);  // two legs
+  ASSERT_EQ(angle.flats.size(), 1U);  // what shows through bodies: a ribbon of two pieces
+  EXPECT_EQ(angle.flats[0].triangles.size(), 4U);
+  EXPECT_EQ(angle.flats[0].depth, FlatMesh::Depth::kHidden);
   // On a circle of 1 m a chord with a sagitta of a tenth of the radius spans 0.09 rad.
   overlay.paths = {circle};
-  const std::vector<Item> items = OverlayAnnotations(overlay, Scale{}).items;
+  const std::vector<Item> items = OverlayAnnotations(overlay, Scale{}, Vec3::UnitZ()).items;
   EXPECT_GT(items.size(), 10.0 / 0.09);
   EXPECT_LT(items.size(), 3 * 10.0 / 0.09);
 }
