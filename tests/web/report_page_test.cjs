@@ -76,7 +76,7 @@ test('The replay shows the mechanism and moves it with the time', async () => {
   assert.notDeepEqual(await page.locator('#scene').screenshot(), before);
   const moved = await page.evaluate(() => {
     const {replay, timeline} = globalThis.mbverify;
-    const places = () => replay.bodies.map((body) => body.position.toArray());
+    const places = () => replay.bodies.groups.map((body) => body.position.toArray());
     timeline.set(timeline.start);
     const first = places();
     timeline.set(timeline.start + 0.37 * (timeline.end - timeline.start));
@@ -148,7 +148,7 @@ test('A click into a plot sets the time, a drag zooms all plots', async () => {
 });
 
 test('The arrow keys turn the replay while it has the focus', async () => {
-  const view = () => page.evaluate(() => globalThis.mbverify.replay.camera.position.toArray());
+  const view = () => page.evaluate(() => globalThis.mbverify.replay.view.camera.position.toArray());
   await page.focus('#scene');
   const [before, then] = [await view(), await time()];
   await page.keyboard.press('ArrowRight');

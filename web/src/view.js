@@ -1,0 +1,85 @@
+// The camera of the replay, turned by mouse, touch and keys.
+import {PerspectiveCamera} from 'three';
+import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
+
+const kFieldOfView = 26;
+
+export class View {
+  /** `points` must be in the standard view; `toCamera` is its direction, `up` stands upright in it. */
+  constructor(canvas, {up, toCamera, radius, points}, onChange) {
+    Object.assign(this, {up, toCamera, points, onChange});
+    this.camera = new PerspectiveCamera(kFieldOfView, 1, 0.01 * radius, 400 * radius);
+    this.camera.up.copy(up);
+    this.controls = new OrbitControls(this.camera, canvas);
+    Object.assign(this.controls, {minDistance: 0.1 * radius, maxDistance: 30 * radius});
+    this.controls.addEventListener('change', onChange);
+    // The wheel scrolls the page until the replay is in use.
+    this.controls.enableZoom = false;
+    canvas.addEventListener('pointerdown', () => { this.controls.enableZoom = true; });
+    canvas.addEventListener('focus', () => { this.controls.enableZoom = true; });
+    canvas.addEventListener('blur', () => { this.controls.enableZoom = false; });
+    canvas.addEventListener('keydown', (event) => this.key(event));
+    canvas.addEventListener('dblclick', () => this.reset());
+  }
+
+  resize(width, height) {
+    this.camera.aspect = width / height;
+    this.camera.updateProjectionMatrix();
+    this.onChange();
+  }
+
+  /** The nearest camera in the standard direction that shows every point. */
+  reset() {
+    const {toCamera} = this;
+    const right = this.up.clone().cross(toCamera).normalize();
+    const above = toCamera.clone().cross(right);
+    const tanV = Math.tan(kFieldOfView * Math.PI / 360) * 0.92, tanH = tanV * this.camera.aspect;
+    const middle = (axis) => {
+      const values = this.points.map((point) => point.dot(axis));
+      return (Math.min(...values) + Math.max(...values)) / 2;
+    };
+    const target = right.clone().multiplyScalar(middle(right)).addScaledVector(above, middle(above))
+                       .addScaledVector(toCamera, middle(toCamera));
+    let distance = 0;
+    for (const point of this.points) {
+      const p = point.clone().sub(target);
+      const z = p.dot(toCamera);
+      distance = Math.max(distance, z + Math.abs(p.dot(right)) / tanH, z + Math.abs(p.dot(above)) / tanV);
+    }
+    this.camera.position.copy(target).addScaledVector(toCamera, distance);
+    this.controls.target.copy(target);
+    this.moved();
+  }
+
+  key(event) {
+    const turn = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
+    if (turn) this.orbit(turn[0] * 6, turn[1] * 6);
+    else if (event.key === '+' || event.key === '=') this.dolly(0.9);
+    else if (event.key === '-') this.dolly(1 / 0.9);
+    else if (event.key.toLowerCase() === 'r') this.reset();
+    else return;
+    event.preventDefault();
+    event.stopPropagation();
+  }
+
+  orbit(azimuth, elevation) {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    offset.applyAxisAngle(this.up, azimuth * Math.PI / 180);
+    const angle = offset.angleTo(this.up) * 180 / Math.PI;
+    const wanted = Math.min(175, Math.max(5, angle - elevation));
+    const side = this.up.clone().cross(offset).normalize();
+    offset.applyAxisAngle(side, (wanted - angle) * Math.PI / 180);
+    this.camera.position.copy(this.controls.target).add(offset);
+    this.moved();
+  }
+
+  dolly(factor) {
+    this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
+    this.moved();
+  }
+
+  moved() {
+    this.controls.update();
+    this.onChange();
+  }
+}
