@@ -309,8 +309,7 @@ class Expander {
     } else if (std::isfinite(drive.stiffness)) {
       AddSpring({.element = ServoName(drive),
                  .object = JointName(joint, driven.coordinate),
-                 .stiffness = drive.stiffness,
-                 .reference = joint.home[driven.coordinate]});
+                 .stiffness = drive.stiffness});
     } else {
       model_.mechanism.drives.push_back(
           {.name = drive.name, .kind = JointDrive{index, driven.coordinate}, .range = {}});
@@ -367,7 +366,9 @@ class Expander {
     MBV_DEMAND(tree.hints_broken.empty(), tree.hints_broken.size());
   }
 
-  // The writer's text with stiffness and zero of the joint springs (those of tendons are there).
+  // The writer's text with the stiffness of the joint springs (those of tendons are there). Their
+  // coordinates count from the given pose, so that they are deformations: the rounding of an angle
+  // of 1 rad, times the servo's stiffness, would unbalance small loads.
   [[nodiscard]] std::string TextWithSprings() const {
     std::map<std::string, const ElasticSpring*> on_joint;
     for (const ElasticSpring& spring : model_.springs) {
@@ -391,7 +392,9 @@ class Expander {
       const auto spring = is_joint && name != nullptr ? on_joint.find(name) : on_joint.end();
       if (spring != on_joint.end() && child->Attribute("type") != nullptr) {
         child->SetAttribute("stiffness", NumberText(spring->second->stiffness).c_str());
-        child->SetAttribute("springref", NumberText(spring->second->reference).c_str());
+        child->SetAttribute("springref", "0");
+        for (const char* of_own_zero : {"ref", "range", "limited"})
+          child->DeleteAttribute(of_own_zero);
       }
       SetSprings(child, on_joint);
     }

@@ -28,7 +28,7 @@ struct ElasticSpring {
   std::string object;   ///< MuJoCo's joint or tendon
   bool is_tendon = false;
   double stiffness = kNan;  ///< [N/m or N m/rad]
-  double reference = 0.0;   ///< coordinate or length without force [m or rad]
+  double reference = 0.0;   ///< of tendons: length without force [m]; joints are at 0 without force
 };
 
 struct CompliantModel {

@@ -39,10 +39,17 @@ int ExitCodeOf(CaseStatus status) {
   return 4;
 }
 
+std::span<const std::string_view> KeyMetricNames() {
+  static constexpr std::array<std::string_view, 6> kNames = {
+      "simulated_vs_analytic.force_nrmse",      "simulated_vs_reference.force_nrmse",
+      "reference_vs_analytic.force_nrmse",      "simulated_vs_analytic.stiffness_entry",
+      "simulated_vs_reference.stiffness_entry", "reference_vs_analytic.stiffness_entry"};
+  return kNames;
+}
+
 const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result) {
-  for (const char* pair :
-       {"simulated_vs_analytic", "simulated_vs_reference", "reference_vs_analytic"}) {
-    const auto found = result.metrics.find(std::string(pair) + ".force_nrmse");
+  for (const std::string_view name : KeyMetricNames()) {
+    const auto found = result.metrics.find(std::string(name));
     if (found != result.metrics.end()) return &*found;
   }
   return nullptr;

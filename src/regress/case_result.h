@@ -3,7 +3,9 @@
 
 #include <map>
 #include <optional>
+#include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/types.h"
@@ -85,8 +87,10 @@ struct CaseResult {
   [[nodiscard]] bool failed() const { return status != CaseStatus::kAsExpected; }
 };
 
-/// The metric shown first: drive forces (RMS), simulated vs analytic if measured, else the next
-/// pair; null if no forces were compared.
+/// Names of the metrics that may be shown first, best first: drive forces (RMS), then stiffness
+/// (worst entry); simulated vs analytic, then the other pairs.
+[[nodiscard]] std::span<const std::string_view> KeyMetricNames();
+/// The first of these that was measured; null if neither forces nor a stiffness were compared.
 [[nodiscard]] const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result);
 
 /// A whole regression run.

@@ -187,10 +187,10 @@ constexpr const char* kControls = R"html(<form role="search">
 <label>Show<select id="kind"><option value="">all</option><option value="bad">not as expected</option>
 <option value="warn">drift</option><option value="good">as expected</option></select></label>
 <span id="shown" class="soft" role="status"></span></form>
-<div class="scroll"><table><caption class="soft">Drive force error: RMS over all drives of one unit,
-simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
+<div class="scroll"><table><caption class="soft">Error: drive forces, RMS over all drives of one
+unit, or the worst entry of the stiffness; simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
 <td></td><th scope="col"><button>scenario</button></th><th scope="col"><button>result</button></th>
-<th scope="col"><button>force error</button></th><th scope="col"><button>limit</button></th>
+<th scope="col"><button>error</button></th><th scope="col"><button>limit</button></th>
 <th scope="col">last runs</th><th scope="col">notes</th><th scope="col"><button>wall [s]</button></th>
 <th scope="col"><button>CPU [s]</button></th><th scope="col"><button>memory [MiB]</button></th>
 </tr></thead><tbody>

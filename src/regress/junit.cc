@@ -39,7 +39,7 @@ std::string Output(const CaseResult& result) {
       fmt::format("{}\nverdict {}, exit code {} (expected {}, {})\n", result.file, result.verdict,
                   result.exit_code, result.expected.verdict, result.expected.exit_code);
   if (const std::string key = KeyText(result); !key.empty()) {
-    text += "drive force error, RMS: " + key + "\n";
+    text += KeyTitle(result) + ": " + key + "\n";
   }
   for (const Drift& drift : result.drifts) {
     text += "drift: " + drift.text + "\n";

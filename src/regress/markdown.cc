@@ -77,7 +77,8 @@ std::string ToMarkdown(const RegressReport& report) {
   text += NotCompared(report);
   text +=
       "\n<details><summary>All scenarios</summary>\n\n"
-      "| scenario | result | drive force error, RMS | wall [s] | CPU [s] | memory [MiB] |\n"
+      "| scenario | result | drive force error, RMS (or stiffness) | wall [s] | CPU [s] | memory "
+      "[MiB] |\n"
       "|---|---|---|---:|---:|---:|\n";
   for (const CaseResult& result : report.cases) text += Row(result);
   return text + "\n</details>\n";

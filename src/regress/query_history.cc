@@ -18,17 +18,23 @@ struct Row {
   double wall_s = kNan;
 };
 
-constexpr const char* kKeyMetric =
-    "(SELECT m.value FROM metric m WHERE m.result = r.id AND m.name IN "
-    "('simulated_vs_analytic.force_nrmse', 'simulated_vs_reference.force_nrmse', "
-    "'reference_vs_analytic.force_nrmse') ORDER BY CASE m.name "
-    "WHEN 'simulated_vs_analytic.force_nrmse' THEN 0 "
-    "WHEN 'simulated_vs_reference.force_nrmse' THEN 1 ELSE 2 END LIMIT 1)";
+// The value of the result's KeyMetric().
+std::string KeyMetricQuery() {
+  std::string names, ranks;
+  for (size_t i = 0; i < KeyMetricNames().size(); ++i) {
+    names += fmt::format("{}'{}'", i == 0 ? "" : ", ", KeyMetricNames()[i]);
+    ranks += fmt::format(" WHEN '{}' THEN {}", KeyMetricNames()[i], i);
+  }
+  return fmt::format(
+      "(SELECT m.value FROM metric m WHERE m.result = r.id AND m.name IN ({}) "
+      "ORDER BY CASE m.name{} END LIMIT 1)",
+      names, ranks);
+}
 
 std::map<std::string, Row> RowsOf(Database* database, long run) {
   Statement select(database, fmt::format("SELECT s.key, r.id, r.status, {}, r.wall_s FROM result r "
                                          "JOIN scenario s ON s.id = r.scenario WHERE r.run = ?",
-                                         kKeyMetric));
+                                         KeyMetricQuery()));
   select.Bind(run);
   std::map<std::string, Row> rows;
   while (select.Step()) {

@@ -29,7 +29,10 @@ namespace mbv {
 /// "ok", "FAILED", "drift" …: a case in one word.
 [[nodiscard]] std::string WordOf(const CaseResult& result);
 
-/// "2.8e-11 of 1.0e-09 (simulated vs analytic)": the key metric for people; "" if there is none.
+/// "drive force error, RMS" or "stiffness error, worst entry"; "" without key metric.
+[[nodiscard]] std::string KeyTitle(const CaseResult& result);
+/// "2.8e-11 of 1.0e-09 (simulated vs analytic)", "2.8e-11 of 1.0e-09 (stiffness, simulated vs
+/// analytic)": the key metric for people; "" if there is none.
 [[nodiscard]] std::string KeyText(const CaseResult& result);
 
 /// Smaller copy of a PNG as a data URI, at most `width_px` wide; "" if it is no PNG.

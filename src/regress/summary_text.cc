@@ -30,6 +30,10 @@ size_t SequenceLength(const std::string& text, size_t at) {
   return forbidden ? 0 : length;
 }
 
+bool OfStiffness(const std::pair<const std::string, MetricValue>& key) {
+  return key.first.ends_with(".stiffness_entry");
+}
+
 }  // namespace
 
 std::string EscapeXml(const std::string& text) {
@@ -80,6 +84,12 @@ std::string WordOf(const CaseResult& result) {
   return result.verified ? "agree" : "fails as it must";
 }
 
+std::string KeyTitle(const CaseResult& result) {
+  const auto* key = KeyMetric(result);
+  if (key == nullptr) return "";
+  return OfStiffness(*key) ? "stiffness error, worst entry" : "drive force error, RMS";
+}
+
 std::string KeyText(const CaseResult& result) {
   const auto* key = KeyMetric(result);
   if (key == nullptr) return "";
@@ -87,7 +97,7 @@ std::string KeyText(const CaseResult& result) {
   std::replace(pair.begin(), pair.end(), '_', ' ');
   std::string text = fmt::format("{:.1e}", key->second.value);
   if (key->second.limit) text += fmt::format(" of {:.1e}", *key->second.limit);
-  return text + " (" + pair + ")";
+  return text + (OfStiffness(*key) ? " (stiffness, " : " (") + pair + ")";
 }
 
 std::string ToSummaryText(const RegressReport& report) {

@@ -188,19 +188,29 @@ std::string ToSvg(const LinePlot& plot) {
   y.Pad();
   if (plot.equal_scale) EqualScale(&x, &y);
   std::string svg = Header(plot.title) + Frame(x, y, plot.x_label, plot.y_label);
+  std::string legend;
+  size_t longest = 0;
   double legend_y = kTop + 18;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
     const char* color = kColors[i % kColors.size()];
     svg += Curve(plot.lines[i], color, x, y);
     if (plot.lines[i].label.empty()) continue;
-    svg += fmt::format(
+    longest = std::max(longest, plot.lines[i].label.size());
+    legend += fmt::format(
         "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"2.5\"/>"
         "<text x=\"{4}\" y=\"{5}\">{6}</text>\n",
         kLeft + 10, kLeft + 32, legend_y - 4, color, kLeft + 38, legend_y,
         Escape(plot.lines[i].label));
     legend_y += 17;
   }
-  return svg + "</svg>\n";
+  // Curves may run behind the legend.
+  if (!legend.empty()) {
+    svg += fmt::format(
+        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#ffffff\" "
+        "fill-opacity=\"0.8\"/>\n",
+        kLeft + 4, kTop + 3, 44 + 7.5 * static_cast<double>(longest), legend_y - kTop - 13);
+  }
+  return svg + legend + "</svg>\n";
 }
 
 std::string ToSvg(const MapPlot& plot) {
@@ -215,6 +225,7 @@ std::string ToSvg(const MapPlot& plot) {
   std::string svg = Header(plot.title);
   const double w = std::abs(x.Px(plot.x_max) - x.Px(plot.x_min)) / plot.columns;
   const double h = std::abs(y.Px(plot.y_max) - y.Px(plot.y_min)) / plot.rows;
+  svg += "<g shape-rendering=\"crispEdges\">\n";
   for (int r = 0; r < plot.rows; ++r) {
     for (int c = 0; c < plot.columns; ++c) {
       const double v = plot.values[static_cast<size_t>(r) * plot.columns + c];
@@ -225,6 +236,7 @@ std::string ToSvg(const MapPlot& plot) {
           x.Px(plot.x_min) + c * w, y.Px(plot.y_min) - (r + 1) * h, w + 0.3, h + 0.3, MapColor(t));
     }
   }
+  svg += "</g>\n";
   if (plot.contours > 0) svg += Contours(plot, x, y, value);
   svg += Frame(x, y, plot.x_label, plot.y_label);
   const double bar_x = kWidth - kRight - 60;

@@ -20,8 +20,8 @@ using PoseValues = std::map<std::string, double>;
 struct StiffnessSimulation {
   bool on = true;
   Overrides parameters;
-  double force_N = 1.0;     ///< largest load of the extrapolation to zero load, > 0
-  double moment_Nm = 0.05;  ///< > 0
+  double force_N = 1000.0;   ///< largest load of the extrapolation to zero load, > 0
+  double moment_Nm = 100.0;  ///< > 0
 };
 
 struct StiffnessScenario {

@@ -192,6 +192,19 @@ TEST_F(HistoryTest, ComparesTwoRunsByStatusNumbersAndWitness) {
   EXPECT_NE(CompareRuns(kFile, "lastly", "last").trouble, "");
 }
 
+TEST_F(HistoryTest, StiffnessIsComparedWhereThereAreNoForces) {
+  for (const double error : {1e-9, 4e-9}) {
+    CaseResult result = AgreeingCase("model/stiffness", error);
+    result.metrics.erase("simulated_vs_analytic.force_nrmse");
+    result.metrics["simulated_vs_analytic.stiffness_entry"] = {error, 1e-4, true};
+    RegressReport report = OneRun({result});
+    ASSERT_EQ(AppendRun(kFile, {}, &report), "");
+    EXPECT_EQ(report.cases[0].course.back(), error);
+  }
+  const HistoryText text = CompareRuns(kFile, "last~1", "last");
+  EXPECT_NE(text.text.find("1.00e-09 → 4.00e-09"), std::string::npos) << text.text;
+}
+
 TEST_F(HistoryTest, ExportsOneLinePerMetricAndRun) {
   Night(1e-9, "a, \"b\"");
   const HistoryText csv = HistoryCsv(kFile);

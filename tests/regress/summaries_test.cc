@@ -60,6 +60,21 @@ void ExpectGolden(const std::string& name, const std::string& text) {
 
 TEST(JUnit, IsTheGoldenFile) { ExpectGolden("junit.xml", ToJUnit(Mixed())); }
 
+TEST(Summaries, StiffnessIsTheKeyMetricOfAScenarioWithoutForces) {
+  CaseResult result = AgreeingCase("model/stiffness", 1e-9);
+  result.metrics["reference_vs_analytic.stiffness_entry"] = {3e-13, 1e-9, true};
+  EXPECT_EQ(KeyTitle(result), "drive force error, RMS");
+  result.metrics.erase("simulated_vs_analytic.force_nrmse");
+  EXPECT_EQ(KeyText(result), "3.0e-13 of 1.0e-09 (stiffness, reference vs analytic)");
+  result.metrics["simulated_vs_analytic.stiffness_entry"] = {5e-9, 1e-4, true};
+  EXPECT_EQ(KeyTitle(result), "stiffness error, worst entry");
+  EXPECT_EQ(KeyText(result), "5.0e-09 of 1.0e-04 (stiffness, simulated vs analytic)");
+  const RegressReport report = OneRun({result});
+  for (const std::string& text : {ToMarkdown(report), ToJUnit(report), ToIndexHtml(report, {})}) {
+    EXPECT_NE(text.find("5.0e-09"), std::string::npos) << text;
+  }
+}
+
 TEST(JUnit, CountsMatchItsElements) {
   tinyxml2::XMLDocument document;
   ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);

@@ -226,6 +226,26 @@ TEST(CompliantSimulation, AServoAddsItsSpringToTheCrank) {
   EXPECT_NEAR(run.result.shares.back().C(3, 3) * servo / (L * L), 1.0, 10 * kMeasured);
 }
 
+TEST(CompliantSimulation, TheAngleOfAServoDoesNotRoundSmallLoadsAway) {
+  // An arm of 39 N/m behind a servo of 1e5 N m/rad allows loads of 1e-3 N. Rounding the servo's
+  // angle of 1.57 rad would unbalance them by 1e-11 N m, 1e-8 of the load; counted from the given
+  // pose the angle is its deformation.
+  Mechanism m = Parallelogram(1e5);
+  const int arm = Add(&m, "arm", PoseAt({0.3, 0.4, 0}));
+  m.joints.push_back(MakeJoint("mount", JointKind::kFixed, 3, {0.3, 0, 0}, arm, {0, 0, 0}));
+  m.beams.push_back(MakeBeam("arm", arm, {0, 0, 0}, {0.2, 0, 0}));
+  m.beams.back().section = {.area = 4e-4, .I_y = 5e-13, .I_z = 5e-13, .torsion = 1e-12};
+  m.outputs.clear();
+  AddOutput(&m, arm, PoseAt({0.2, 0, 0}));
+  const CompliantRun run = Simulated(m);
+  ASSERT_TRUE(run.result.summary.ok()) << run.result.summary.message;
+  EXPECT_LT(run.residual, 1e-10);
+  // The arm bends; the cranks stretch and let the coupler turn about its middle, 0.35 m away.
+  const double bending = 0.2 * 0.2 * 0.2 / (3 * kE * 5e-13);
+  const double cranks = 0.4 / (2 * kE * TestSection().area) * (1 + std::pow(0.35 / 0.15, 2));
+  EXPECT_NEAR(run.result.C(4, 4) / (bending + cranks), 1.0, 1e-8);
+}
+
 TEST(CompliantSimulation, WithoutMotorTheParallelogramHasNoStiffnessAlongItsMotion) {
   Mechanism m = Parallelogram(1.0);
   m.drives.clear();
