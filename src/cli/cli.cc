@@ -49,6 +49,7 @@ int RunCli(int argc, char** argv) {
   AddWorkspaceCommand(&app, &exit_code);
   AddStiffnessCommand(&app, &exit_code);
   AddMutateCommand(&app, &exit_code);
+  AddConvergeCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);

@@ -26,6 +26,7 @@ void AddListCommand(CLI::App* app, int* exit_code);
 void AddWorkspaceCommand(CLI::App* app, int* exit_code);
 void AddStiffnessCommand(CLI::App* app, int* exit_code);
 void AddMutateCommand(CLI::App* app, int* exit_code);
+void AddConvergeCommand(CLI::App* app, int* exit_code);
 void AddRegressCommand(CLI::App* app, int* exit_code);
 void AddMergeCommand(CLI::App* app, int* exit_code);
 void AddHistoryCommand(CLI::App* app, int* exit_code);

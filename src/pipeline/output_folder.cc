@@ -37,7 +37,8 @@ int LockFolder(const fs::path& folder) {
 
 }  // namespace
 
-OutputFolder::OutputFolder(fs::path target) : target_(std::move(target)) {
+OutputFolder::OutputFolder(fs::path target, std::string marker)
+    : target_(std::move(target)), marker_(std::move(marker)) {
   temporary_ = target_.parent_path() / (TemporaryPrefix(target_) + std::to_string(getpid()));
 }
 
@@ -52,7 +53,7 @@ std::string OutputFolder::Create() {
   std::error_code error;
   if (fs::exists(target_, error) &&
       (!fs::is_directory(target_, error) ||
-       (!fs::is_empty(target_, error) && !fs::exists(target_ / "summary.json", error)))) {
+       (!fs::is_empty(target_, error) && !fs::exists(target_ / marker_, error)))) {
     return Trouble("replace", target_, "it holds something that is no mbverify result");
   }
   fs::create_directories(target_.parent_path(), error);

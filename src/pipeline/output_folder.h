@@ -12,7 +12,8 @@ namespace mbv {
 /// told by a lock that ends with its process).
 class OutputFolder {
  public:
-  explicit OutputFolder(std::filesystem::path target);
+  /// \param marker  file that tells a result of the same kind, which may be replaced
+  explicit OutputFolder(std::filesystem::path target, std::string marker = "summary.json");
   ~OutputFolder();
   OutputFolder(const OutputFolder&) = delete;
   OutputFolder& operator=(const OutputFolder&) = delete;
@@ -28,6 +29,7 @@ class OutputFolder {
   void RemoveLeftovers() const;
 
   std::filesystem::path target_, temporary_;
+  std::string marker_;
   int lock_ = -1;  ///< file descriptor of the temporary folder, locked while it is being filled
 };
 

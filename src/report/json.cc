@@ -1,6 +1,4 @@
-#include <cmath>
-#include <nlohmann/json.hpp>
-
+#include "report/json_number.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -9,9 +7,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kSchema = "mbverify.summary/1";
-
-// NaN and infinity have no JSON number and become null.
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 Json ChecksJson(const Comparison& comparison) {
   Json checks = Json::array();

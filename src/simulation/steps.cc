@@ -9,6 +9,12 @@ namespace {
 // Breaks closer than this fraction of a step to a node are taken to lie on it.
 constexpr double kSnap = 1e-6;
 
+long StepsPerSample(const Motion& motion, double step_s) {
+  return std::max(1L, std::lround(std::ceil(motion.sample_s / step_s - 1e-9)));
+}
+
+}  // namespace
+
 std::vector<double> MotionBreaks(const Motion& motion) {
   std::vector<double> breaks;
   const auto add = [&breaks](const Profile& profile) {
@@ -26,12 +32,6 @@ std::vector<double> MotionBreaks(const Motion& motion) {
   std::sort(breaks.begin(), breaks.end());
   return breaks;
 }
-
-long StepsPerSample(const Motion& motion, double step_s) {
-  return std::max(1L, std::lround(std::ceil(motion.sample_s / step_s - 1e-9)));
-}
-
-}  // namespace
 
 double AdjustedStep(const Motion& motion, double step_s) {
   return motion.sample_s / static_cast<double>(StepsPerSample(motion, step_s));

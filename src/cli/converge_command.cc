@@ -1,0 +1,93 @@
+// mbverify converge
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <filesystem>
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "cli/terminal.h"
+#include "pipeline/converge.h"
+#include "pipeline/output_folder.h"
+#include "report/convergence_report.h"
+
+namespace mbv {
+namespace {
+
+struct ConvergeArguments {
+  std::string scenario, out = "out";
+  std::vector<double> steps_s = ConvergeOptions{}.steps_s;
+  std::vector<std::string> set;
+};
+
+// "" or what went wrong.
+std::string WriteFolder(const std::string& out, const ConvergenceReport& report) {
+  OutputFolder folder(
+      std::filesystem::path(out) / report.mechanism / "convergence" / report.scenario,
+      "converge.json");
+  std::string trouble = folder.Create();
+  const auto write = [&](const std::string& name, const std::string& content) {
+    if (trouble.empty()) trouble = folder.Write(name, content);
+  };
+  write("converge.json", ToJson(report));
+  write("converge.csv", ToCsv(report));
+  for (const auto& [name, content] : ConvergencePlots(report)) write(name, content);
+  if (trouble.empty()) trouble = folder.Commit();
+  if (trouble.empty()) fmt::print(stderr, "results in {}\n", folder.target().string());
+  return trouble;
+}
+
+int RunConverge(const ConvergeArguments& arguments) {
+  ConvergeOptions options;
+  options.steps_s = arguments.steps_s;
+  for (const std::string& text : arguments.set) {
+    const auto value = SplitSet(text);
+    if (!value) {
+      fmt::print(stderr, "--set {}: error: write KEY=VALUE, e.g. parameters.link_mass=0.5\n", text);
+      return 2;
+    }
+    options.scenario.set.push_back(*value);
+  }
+  ProgressLine progress(true);
+  if (progress.active()) {
+    options.progress = [&](const std::string& what, double fraction) {
+      progress.Show(what, fraction);
+    };
+  }
+  const ConvergeOutcome outcome = Converge(arguments.scenario, options);
+  progress.Clear();
+  fmt::print(stderr, "{}", outcome.diagnostics.Text());
+  if (outcome.exit_code == 3) fmt::print(stderr, "error: could not run: {}\n", outcome.failure);
+  if (outcome.exit_code > 1) return outcome.exit_code;
+  fmt::print("{}", ToText(outcome.report));
+  std::fflush(stdout);
+  if (const std::string trouble = WriteFolder(arguments.out, outcome.report); !trouble.empty()) {
+    fmt::print(stderr, "error: {}\n", trouble);
+    return 2;
+  }
+  return outcome.exit_code;
+}
+
+}  // namespace
+
+void AddConvergeCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<ConvergeArguments>();
+  CLI::App* converge = app->add_subcommand(
+      "converge", "Refine step and constraint time constant: is the order that of the scheme?");
+  converge->add_option("scenario", arguments->scenario, "scenario file with a motion")->required();
+  converge
+      ->add_option("--steps", arguments->steps_s,
+                   "steps in s, each the same whole fraction of the one before")
+      ->delimiter(',')
+      ->capture_default_str();
+  converge->add_option("--set", arguments->set, "replace a value of the scenario: KEY=VALUE");
+  converge->add_option("--out", arguments->out, "folder for results")->capture_default_str();
+  converge->footer(
+      "Example:\n"
+      "  mbverify converge scenarios/slider_crank/turn.yaml --steps 0.004,0.002,0.001,0.0005\n"
+      "Exit codes: 0 orders as expected, 1 a finding, 2 bad input, 3 could not run");
+  converge->callback([arguments, exit_code] { *exit_code = RunConverge(*arguments); });
+}
+
+}  // namespace mbv

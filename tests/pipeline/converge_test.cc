@@ -1,0 +1,77 @@
+// The orders of the schemes, seen on shipped scenarios.
+#include "pipeline/converge.h"
+
+#include <gtest/gtest.h>
+
+namespace mbv {
+namespace {
+
+ConvergeOutcome Study(const std::string& scenario, ConvergeOptions options = {}) {
+  return Converge(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml", options);
+}
+
+const ConvergenceSeries& Find(const ConvergeOutcome& outcome, const std::string& name) {
+  for (const ConvergenceSeries& series : outcome.report.series) {
+    if (series.name == name) return series;
+  }
+  throw std::runtime_error("no series " + name);
+}
+
+TEST(Converge, OnTheSliderCrankEachSchemeShowsItsOrder) {
+  const ConvergeOutcome outcome = Study("slider_crank/press");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.failure;
+  EXPECT_EQ(outcome.report.series.size(), 6u);
+  for (const char* name :
+       {"corrected_both", "corrected_step", "stock_both", "stock_step", "stock_time_constant"}) {
+    EXPECT_TRUE(Find(outcome, name).verdict.judged) << name;
+  }
+  // Half an order apart from the neighbours is what tells them apart.
+  EXPECT_NEAR(Find(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
+  EXPECT_NEAR(Find(outcome, "stock_step").fit.order, 1.0, kOrderTolerance);
+  EXPECT_NEAR(Find(outcome, "stock_time_constant").fit.order, 2.0, kOrderTolerance);
+  // The study is not a list of zeros: the stock engine is that far off, the corrected one is not.
+  EXPECT_GT(Find(outcome, "stock_both").points.back().error.smooth, 1e-8);
+  EXPECT_LT(Find(outcome, "corrected_both").points.back().error.smooth, 1e-10);
+  const ForceExtrapolation& e = outcome.report.extrapolation;
+  EXPECT_TRUE(e.pass);
+  ASSERT_EQ(e.drives.size(), 1u);
+  EXPECT_GT(e.drives[0].uncertainty, 0.0);
+  EXPECT_LT(e.drives[0].uncertainty, 1e-8 * e.drives[0].rms);
+}
+
+TEST(Converge, BreaksOfTheMotionAreKeptApart) {
+  const ConvergeOutcome outcome = Study("spr_tripod/default");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.failure;
+  EXPECT_EQ(outcome.report.breaks, 4u);
+  EXPECT_LT(outcome.report.smooth_samples, outcome.report.samples);
+  EXPECT_NEAR(Find(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
+  // After a break the Runge–Kutta steps leave an error of first order.
+  const OrderFit& breaks = Find(outcome, "corrected_both").breaks_fit;
+  EXPECT_NEAR(breaks.pairwise.back(), 1.0, 2 * kOrderTolerance);
+}
+
+TEST(Converge, StepsMustBePositiveFallAndDivideOneAnother) {
+  const auto check = [](std::vector<double> steps) {
+    return Check(ConvergeOptions{.steps_s = std::move(steps)});
+  };
+  EXPECT_FALSE(check({4e-3, 2e-3, 1e-3}).has_errors());
+  EXPECT_FALSE(check({9e-3, 3e-3, 1e-3}).has_errors());
+  EXPECT_TRUE(check({4e-3, 2e-3}).has_errors());  // an order needs three
+  EXPECT_TRUE(check({4e-3, 0.0, -1e-3}).has_errors());
+  EXPECT_TRUE(check({kNan, 2e-3, 1e-3}).has_errors());
+  EXPECT_TRUE(check({1e-3, 2e-3, 4e-3}).has_errors());    // rising
+  EXPECT_TRUE(check({4e-3, 3e-3, 2e-3}).has_errors());    // no common sample times
+  EXPECT_TRUE(check({4e-3, 2e-3, 0.5e-3}).has_errors());  // not always the same fraction
+  // All findings at once.
+  EXPECT_EQ(check({4e-3, 0.0, -1e-3}).findings().size(), 2u);
+}
+
+TEST(Converge, WithoutAStepOfTheCorrectedEngineItCouldNotRun) {
+  // A motion out of reach ends inverse mode already.
+  const ConvergeOutcome outcome = Study("four_bar/must_fail/out_of_reach");
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.failure.find("inverse mode"), std::string::npos) << outcome.failure;
+}
+
+}  // namespace
+}  // namespace mbv
