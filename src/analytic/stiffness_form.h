@@ -33,9 +33,13 @@ class StiffnessForm {
   /// summary of the result.
   [[nodiscard]] virtual StiffnessResult Evaluate(const PoseCoordinates& pose) const = 0;
 
-  /// The paper's indices, and their values for a stiffness.
+  /// The same without the elements' shares, for many poses: takes no memory where the summary is
+  /// kDone.
+  [[nodiscard]] virtual StiffnessResult EvaluateMatrices(const PoseCoordinates& pose) const = 0;
+
+  /// The paper's indices, and their values for a stiffness (one per index).
   [[nodiscard]] virtual std::vector<StiffnessIndex> indices() const = 0;
-  [[nodiscard]] virtual std::vector<double> IndexValues(const StiffnessResult& result) const = 0;
+  virtual void IndexValues(const StiffnessResult& result, std::span<double> values) const = 0;
 };
 
 /// Makes the form, or explains in `diagnostics` why the parameters, the names of the pose's

@@ -18,7 +18,8 @@ namespace {
 
 struct StiffnessArguments {
   std::string model, output, out, format = "text", seed, closed_form;
-  std::vector<std::string> at, set, maps, indices;
+  std::vector<std::string> at, set, indices;
+  std::vector<std::vector<std::string>> maps;
   int loads = 0;
   double force_max = 1000.0, moment_max = 1.0;
   bool no_simulation = false, verbose = false;
@@ -149,7 +150,8 @@ struct MapFolder {
 MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness& prepared,
                    const ProgressFunction& progress, Diagnostics* diagnostics) {
   std::vector<std::string> texts;
-  for (const std::string& text : arguments.maps) {
+  for (const std::vector<std::string>& words : arguments.maps) {
+    const std::string text = fmt::format("{}", fmt::join(words, " "));
     if (text != "usual") {
       texts.push_back(text);
       continue;
@@ -166,7 +168,7 @@ MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness&
   }
   MapFolder folder;
   for (const std::string& text : texts) {
-    const auto map = ParseMap(text, prepared.scenario.pose, diagnostics);
+    const auto map = ParseMap(text, prepared, diagnostics);
     if (!map) continue;
     const MapResult result = ComputeMap(prepared, *map, progress);
     folder.text += MapText(*map, result, arguments.indices);
@@ -237,11 +239,11 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   stiffness->add_option("--moment-max", arguments->moment_max, "of the random wrenches [N m]")
       ->capture_default_str();
-  stiffness
-      ->add_option("--map", arguments->maps,
-                   "map over two coordinates: NAME=LOW:HIGH:POINTS,NAME=LOW:HIGH:POINTS and other "
-                   "coordinates NAME=VALUE; 'usual' draws those of the mechanism (repeatable)")
-      ->allow_extra_args(false);
+  stiffness->add_option(
+      "--map", arguments->maps,
+      "map over two coordinates: NAME=LOW:HIGH:POINTS twice (default: the ranges of the "
+      "mechanism's usual map) and others NAME=VALUE; 'usual' draws all usual maps "
+      "(repeatable)");
   stiffness->add_option("--index", arguments->indices, "index to draw on maps (repeatable)")
       ->allow_extra_args(false);
   stiffness->add_option("--out", arguments->out, "folder for results (maps: default out)");
@@ -254,6 +256,7 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
       "Examples:\n"
       "  mbverify stiffness scara_robot\n"
       "  mbverify stiffness scara_robot --at platform.x_mm=-60 platform.yaw_deg=10 --out out\n"
+      "  mbverify stiffness scara_robot --map z=-0.1 phi=0 --map z=-0.23 phi_deg=45\n"
       "  mbverify stiffness scara_robot --map usual --index kappa_f\n"
       "  mbverify stiffness cabin_robot --at d5=-0.3 --loads 50\n"
       "Exit codes: 0 the computations agree, 1 they do not, 2 bad input, 3 could not run");

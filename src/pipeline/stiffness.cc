@@ -213,7 +213,11 @@ class Runner {
       const std::vector<StiffnessIndex> indices = prepared_.form->indices();
       for (size_t k = 0; k < indices.size(); ++k) {
         add(indices[k].name, indices[k].unit, indices[k].meaning,
-            [&](const StiffnessResult& result) { return prepared_.form->IndexValues(result)[k]; });
+            [&](const StiffnessResult& result) {
+              std::vector<double> values(indices.size());
+              prepared_.form->IndexValues(result, values);
+              return values[k];
+            });
       }
     }
     const std::vector<NamedIndex> general = GeneralIndices({});

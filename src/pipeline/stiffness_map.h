@@ -11,21 +11,29 @@ namespace mbv {
 
 struct MapAxis {
   std::string name;  ///< a coordinate of the pose
+  std::string unit;  ///< "m" or "rad"
   double low = kNan, high = kNan;
   int count = 0;  ///< points, both ends included, >= 2
 };
 
-struct StiffnessMap {
-  std::array<MapAxis, 2> axes;
-  PoseValues fixed;      ///< other coordinates of the pose that the map changes
-  double within = kNan;  ///< only points whose two coordinates lie in a circle of this radius about
-                         ///< zero; NaN: all
+struct MapValue {
+  std::string name, unit;
+  double value = kNan;
 };
 
-/// "platform.x=-0.1:0.1:61,platform.y_mm=-100:100:61,platform.z=-0.1,within=0.1": two ranges
-/// LOW:HIGH:POINTS, and values of other coordinates of `pose`. Keys may end in _mm or _deg. Wrong
-/// ones are findings.
-[[nodiscard]] std::optional<StiffnessMap> ParseMap(const std::string& text, const PoseValues& pose,
+struct StiffnessMap {
+  std::array<MapAxis, 2> axes;
+  std::vector<MapValue> fixed;  ///< other coordinates of the pose that the map changes
+  double within = kNan;  ///< only points whose two coordinates lie in a circle of this radius
+                         ///< about zero; NaN: all
+};
+
+/// "platform.x=-0.1:0.1:61,y_mm=-100:100:61,z=-0.1,within=0.1": two ranges LOW:HIGH:POINTS, and
+/// values of other coordinates of the pose, with commas or blanks between them. Without ranges,
+/// those of the mechanism's usual map. Keys may end in _mm or _deg; x … yaw and phi (yaw) are those
+/// of the output by which the pose is told. Wrong ones are findings.
+[[nodiscard]] std::optional<StiffnessMap> ParseMap(const std::string& text,
+                                                   const PreparedStiffness& prepared,
                                                    Diagnostics* diagnostics);
 
 /// The maps of a mechanism's paper (scara_robot: Figs 9–11), or one over the plane for the cabin
@@ -55,7 +63,7 @@ struct MapResult {
 [[nodiscard]] std::string MapText(const StiffnessMap& map, const MapResult& result,
                                   const std::vector<std::string>& names);
 
-/// "z-0.1_yaw0": the fixed coordinates, for file names.
+/// "x_y_yaw0deg_z-100mm", for file names.
 [[nodiscard]] std::string MapName(const StiffnessMap& map);
 
 }  // namespace mbv

@@ -2,6 +2,8 @@
 // of frames whose end is differentiated numerically, and beams by integration of unit loads.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <numbers>
 
 #include "analytic/scara_robot/stiffness.h"
@@ -26,6 +28,22 @@ inline StiffnessParameters PaperStiffness() {
 inline Vec4 ExamplePose() { return {-0.05, -0.05, -0.15, 0.2}; }
 
 inline double RelativeDifference(const MatX& A, const MatX& B) { return (A - B).norm() / B.norm(); }
+
+/// 6 × 6 algebra with condition numbers up to 1e5.
+inline constexpr double kAlgebra = 1e-11;
+
+inline PlatformStiffness At(const Vec4& X, const PrintedForms& printed = {},
+                            const StiffnessParameters& p = PaperStiffness()) {
+  PlatformStiffness at;
+  const RunSummary summary = SolveStiffness(p, printed, X, &at);
+  EXPECT_TRUE(summary.ok() || summary.stop == Stop::kSingular) << summary.message;
+  return at;
+}
+
+inline StiffnessIndices Indices(const Vec4& X, const StiffnessParameters& p = PaperStiffness()) {
+  const PlatformStiffness at = At(X, {}, p);
+  return IndicesOf(at.K, at.C);
+}
 
 /// Flexibility of a clamped round member at its tip (rotations, then displacements; x along it):
 /// ∫ Nᵀ diag(1/GI_x, 1/EI, 1/EI, 1/EA) N ds with N = (M_x, M_y, M_z, F_x) of a section under unit

@@ -8,6 +8,7 @@
 #include <set>
 #include <string>
 
+#include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/scara_robot_stiffness_fixture.h"
 
 namespace mbv {
@@ -85,7 +86,14 @@ void ExpectLaws(const Case& c, const std::string& model, int elements) {
   EXPECT_LT(ScaledDifference(sum, result.C), 1e-10);
   sum -= result.shares.front().C;  // a missing element is seen
   EXPECT_GT(ScaledDifference(sum, result.C), 1e-10);
-  EXPECT_EQ(form->IndexValues(result).size(), form->indices().size());
+  std::vector<double> indices(form->indices().size(), kNan);
+  form->IndexValues(result, indices);
+  EXPECT_TRUE(std::all_of(indices.begin(), indices.end(), [](double v) { return v > 0.0; }));
+  const StiffnessResult matrices = form->EvaluateMatrices(c.pose);
+  EXPECT_EQ(matrices.K, result.K);
+  EXPECT_EQ(matrices.C, result.C);
+  EXPECT_EQ(matrices.rank, result.rank);
+  EXPECT_TRUE(matrices.shares.empty());
 }
 
 TEST(StiffnessForm, EveryMechanismHasTheDefaultModelFirst) {
@@ -169,7 +177,8 @@ TEST(StiffnessForm, CabinIndicesAreTheDiagonalOfC) {
   const Case c = CabinCase();
   const auto form = Make(c, "", &diagnostics);
   const StiffnessResult result = form->Evaluate(c.pose);
-  const std::vector<double> values = form->IndexValues(result);
+  std::vector<double> values(6);
+  form->IndexValues(result, values);
   EXPECT_EQ(form->indices()[0].name, "c_x");
   EXPECT_EQ(values[0], result.C(3, 3));
   EXPECT_EQ(values[3], result.C(0, 0));
@@ -229,7 +238,28 @@ TEST(StiffnessForm, UnreachableAndSingularPosesAreInTheSummary) {
   EXPECT_EQ(centre.rank, 5);
   EXPECT_TRUE(centre.K.allFinite());
   EXPECT_TRUE(centre.shares.empty());
-  EXPECT_NEAR(form->IndexValues(centre)[0], 5519, 0.5);
+  std::vector<double> values(form->indices().size());
+  form->IndexValues(centre, values);
+  EXPECT_NEAR(values[0], 5519, 0.5);
+}
+
+TEST(StiffnessForm, SweepsTakeNoMemory) {
+  for (Case c : {ScaraCase(), CabinCase()}) {
+    Diagnostics diagnostics;
+    const auto form = Make(c, "", &diagnostics);
+    std::vector<double> values(form->indices().size());
+    double& x = c.pose["platform.x"];
+    const double start = x;
+    const std::size_t before = AllocationCount();
+    for (int k = 0; k < 100; ++k) {
+      x = start + 1e-5 * k;
+      const StiffnessResult result = form->EvaluateMatrices(c.pose);
+      if (!result.summary.ok()) break;
+      form->IndexValues(result, values);
+    }
+    EXPECT_EQ(AllocationCount(), before) << c.mechanism.name;
+    EXPECT_NEAR(x, start + 99e-5, 1e-12);
+  }
 }
 
 }  // namespace

@@ -1,6 +1,7 @@
-// Cost per sample of the closed forms (goals: platform 4 µs).
+// Cost per sample of the closed forms (goals: platform 4 µs), and per pose of the stiffness forms.
 #include <benchmark/benchmark.h>
 
+#include "analytic/stiffness_form.h"
 #include "core/demand.h"
 #include "mechanism/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
@@ -8,8 +9,8 @@
 namespace mbv {
 namespace {
 
-Mechanism Shipped(const std::string& name) {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/" + name + "/model.yaml");
+Mechanism Shipped(const std::string& name, const std::string& file = "model.yaml") {
+  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/" + name + "/" + file);
   MBV_DEMAND(loaded.mechanism.has_value(), loaded.diagnostics.Text());
   return std::move(*loaded.mechanism);
 }
@@ -51,6 +52,37 @@ BENCHMARK_CAPTURE(StabilizingPlatform, full, "full", true, false, false);
 BENCHMARK_CAPTURE(StabilizingPlatform, full_reactions, "full", true, true, false);
 BENCHMARK_CAPTURE(StabilizingPlatform, massless, "massless", true, false, false);
 BENCHMARK_CAPTURE(StabilizingPlatform, hold_still, "full", true, false, true);
+
+// One pose of a map: matrices and indices; with_shares: what a single pose is asked.
+void Stiffness(benchmark::State& state, const char* name, const PoseCoordinates& start,
+               bool with_shares) {
+  const Mechanism mechanism = Shipped(name, "elastic.yaml");
+  Diagnostics diagnostics;
+  PoseCoordinates pose = start;
+  const auto form = FindStiffnessForm(name)->factory(mechanism, pose, "", &diagnostics);
+  MBV_DEMAND(form != nullptr, diagnostics.Text());
+  std::vector<double> values(form->indices().size());
+  double& x = pose.at("platform.x");
+  size_t k = 0;
+  for (auto _ : state) {
+    x = start.at("platform.x") + 1e-4 * static_cast<double>(k++ % 100);
+    const StiffnessResult result =
+        with_shares ? form->Evaluate(pose) : form->EvaluateMatrices(pose);
+    if (!result.summary.ok()) state.SkipWithError(result.summary.message.c_str());
+    form->IndexValues(result, values);
+    benchmark::DoNotOptimize(values.data());
+  }
+}
+
+const PoseCoordinates kScaraPose = {
+    {"platform.x", -0.05}, {"platform.y", -0.05}, {"platform.z", -0.15}, {"platform.yaw", 0.2}};
+const PoseCoordinates kCabinPose = {{"platform.x", -0.005}, {"platform.y", 0.36},
+                                    {"platform.yaw", 0.0},  {"th3", 1.57},
+                                    {"th4", 0.0},           {"d5", -0.2}};
+BENCHMARK_CAPTURE(Stiffness, scara_map, "scara_robot", kScaraPose, false);
+BENCHMARK_CAPTURE(Stiffness, scara_pose, "scara_robot", kScaraPose, true);
+BENCHMARK_CAPTURE(Stiffness, cabin_map, "cabin_robot", kCabinPose, false);
+BENCHMARK_CAPTURE(Stiffness, cabin_pose, "cabin_robot", kCabinPose, true);
 
 }  // namespace
 }  // namespace mbv

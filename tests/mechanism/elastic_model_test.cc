@@ -9,6 +9,7 @@
 #include "four_bar.h"
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
+#include "slip.h"
 
 namespace mbv {
 namespace {
@@ -151,14 +152,6 @@ joints: {mount: {kind: fixed, parent: world, child: base}}
   EXPECT_EQ(m.beams[2].name, "two.link");
   EXPECT_EQ(m.beams[2].length(), 2);
 }
-
-struct Slip {
-  const char* name;
-  const char* from;
-  const char* to;
-  const char* said;
-};
-std::ostream& operator<<(std::ostream& out, const Slip& slip) { return out << slip.name; }
 
 class BracketWith : public testing::TestWithParam<Slip> {};
 

@@ -8,6 +8,7 @@
 
 #include "four_bar.h"
 #include "mechanism/load_model.h"
+#include "slip.h"
 
 namespace mbv {
 namespace {
@@ -17,16 +18,6 @@ std::string FindingsOf(const std::string& text, const LoadOptions& options = {})
   EXPECT_EQ(result.mechanism.has_value(), !result.diagnostics.has_errors());
   return result.diagnostics.Text();
 }
-
-// A change of the four-bar and what must be said about it.
-struct Slip {
-  const char* name;
-  const char* from;
-  const char* to;
-  const char* said;
-};
-
-std::ostream& operator<<(std::ostream& out, const Slip& slip) { return out << slip.name; }
 
 class FourBarWith : public testing::TestWithParam<Slip> {};
 

@@ -4,16 +4,14 @@
 
 #include <algorithm>
 #include <array>
-#include <utility>
+
+#include "analytic/stiffness_form_checks.h"
 
 namespace mbv::scara {
 namespace {
 
 constexpr std::array<const char*, 4> kPoseNames = {"platform.x", "platform.y", "platform.z",
                                                    "platform.yaw"};
-constexpr std::array<const char*, 12> kParameterNames = {
-    "R", "r", "l1", "l2", "l3", "e", "d", "branch", "E", "nu", "section_diameter", "K_act"};
-
 struct NamedModel {
   const char* name;
   PrintedForms printed;
@@ -35,12 +33,8 @@ const std::array<NamedModel, 10>& Models() {
   return models;
 }
 
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint = {}) {
-  diagnostics->Add({.file = {}, .message = std::move(message), .hint = std::move(hint)});
-}
-
 void AddShare(const std::string& element, const Mat6& share, StiffnessResult* result) {
-  result->shares.push_back({element, 0.5 * (share + share.transpose())});
+  result->shares.push_back({element, Symmetric(share)});
 }
 
 class ScaraStiffness final : public StiffnessForm {
@@ -57,23 +51,22 @@ class ScaraStiffness final : public StiffnessForm {
   }
 
   StiffnessResult Evaluate(const PoseCoordinates& pose) const override {
-    Vec4 X;
-    for (int c = 0; c < 4; ++c) X[c] = pose.at(kPoseNames[c]);
-    StiffnessResult result;
     PlatformStiffness at;
-    result.summary = SolveStiffness(parameters_, printed_, X, &at);
-    result.K = at.K;
-    result.C = at.C;
-    result.rank = at.rank;
+    StiffnessResult result = Solve(pose, &at);
     if (!result.summary.ok()) return result;
     result.shares.reserve(16);
     for (int i = 0; i < kLimbs; ++i) AddLimbShares(at, i, &result);
     return result;
   }
 
+  StiffnessResult EvaluateMatrices(const PoseCoordinates& pose) const override {
+    PlatformStiffness at;
+    return Solve(pose, &at);
+  }
+
   std::vector<StiffnessIndex> indices() const override {
-    return {{"kappa_m", "1", "largest moment per unit displacement, (21); mixes N m/rad and N"},
-            {"kappa_f", "1", "largest force per unit displacement, (21); mixes N/rad and N/m"},
+    return {{"kappa_m", "mixed", "largest moment per unit displacement, (21); mixes N m/rad and N"},
+            {"kappa_f", "mixed", "largest force per unit displacement, (21); mixes N/rad and N/m"},
             {"k_mr", "N m/rad", "largest moment per rotation, norm of K_mr in (16)"},
             {"k_mt", "N", "largest moment per displacement, norm of K_mt in (16)"},
             {"k_fr", "N/rad", "largest force per rotation, norm of K_fr in (16)"},
@@ -82,12 +75,25 @@ class ScaraStiffness final : public StiffnessForm {
             {"c_translation", "m/N", "largest displacement per force"}};
   }
 
-  std::vector<double> IndexValues(const StiffnessResult& result) const override {
+  void IndexValues(const StiffnessResult& result, std::span<double> values) const override {
     const StiffnessIndices k = IndicesOf(result.K, result.C);
-    return {k.kappa_m, k.kappa_f, k.K_mr, k.K_mt, k.K_fr, k.K_ft, k.C_rotation, k.C_translation};
+    const std::array<double, 8> all = {k.kappa_m, k.kappa_f, k.K_mr,       k.K_mt,
+                                       k.K_fr,    k.K_ft,    k.C_rotation, k.C_translation};
+    std::copy(all.begin(), all.end(), values.begin());
   }
 
  private:
+  StiffnessResult Solve(const PoseCoordinates& pose, PlatformStiffness* at) const {
+    Vec4 X;
+    for (int c = 0; c < 4; ++c) X[c] = pose.at(kPoseNames[c]);
+    StiffnessResult result;
+    result.summary = SolveStiffness(parameters_, printed_, X, at);
+    result.K = at->K;
+    result.C = at->C;
+    result.rank = at->rank;
+    return result;
+  }
+
   void AddLimbShares(const PlatformStiffness& at, int limb, StiffnessResult* result) const {
     // What the limb carries of the six unit wrenches on the platform.
     const Mat6 B = at.limbs[limb].K * at.C;
@@ -133,33 +139,15 @@ class ScaraStiffness final : public StiffnessForm {
   std::array<std::vector<std::string>, kLimbs> names_;
 };
 
-void CheckPose(const PoseCoordinates& pose, Diagnostics* diagnostics) {
-  const std::string hint = "the pose is platform.x, platform.y, platform.z and platform.yaw";
-  for (const auto& [name, value] : pose) {
-    if (std::find(kPoseNames.begin(), kPoseNames.end(), name) != kPoseNames.end()) continue;
-    AddError(diagnostics,
-             fmt::format("the stiffness of scara_robot cannot take the coordinate \"{}\"", name),
-             hint);
-  }
-  for (const char* name : kPoseNames) {
-    if (!pose.contains(name)) AddError(diagnostics, fmt::format("{} is not given", name), hint);
-  }
-}
-
-void CheckParameters(const Mechanism& mechanism, Diagnostics* diagnostics) {
-  for (const char* name : kParameterNames) {
-    if (!mechanism.HasParameter(name)) {
-      AddError(diagnostics, fmt::format("the model has no parameter \"{}\"", name),
-               "the stiffness of scara_robot needs models/scara_robot/elastic.yaml");
-    }
-  }
-  for (const char* name : {"l1", "l2", "l3", "e", "d", "E", "section_diameter", "K_act"}) {
-    if (!mechanism.HasParameter(name)) continue;
-    const double value = mechanism.ParameterValue(name);
-    if (!(value > 0.0)) {
-      AddError(diagnostics, fmt::format("{} = {:g} violates {} > 0", name, value, name));
-    }
-  }
+void CheckAll(const Mechanism& mechanism, const PoseCoordinates& pose, Diagnostics* diagnostics) {
+  const PoseNames names{.needed = {kPoseNames.begin(), kPoseNames.end()},
+                        .accepted = {},
+                        .hint = "the pose is platform.x, platform.y, platform.z and platform.yaw"};
+  CheckPoseNames(mechanism, names, pose, diagnostics);
+  const std::vector<std::string> positive = {"l1",   "l2", "l3", "e", "d", "E", "section_diameter",
+                                             "K_act"};
+  const std::vector<std::string> others = {"R", "r", "branch", "nu"};
+  CheckStiffnessParameters(mechanism, positive, others, diagnostics);
 }
 
 }  // namespace
@@ -193,18 +181,12 @@ std::unique_ptr<StiffnessForm> MakeStiffnessForm(const Mechanism& mechanism,
                                                  const std::string& model,
                                                  Diagnostics* diagnostics) {
   Diagnostics findings;
-  CheckPose(pose, &findings);
-  CheckParameters(mechanism, &findings);
-  const auto found = std::find_if(Models().begin(), Models().end(), [&](const NamedModel& m) {
-    return model.empty() || model == m.name;  // the first is the default
-  });
-  if (found == Models().end()) {
-    AddError(&findings, fmt::format("unknown model \"{}\"", model),
-             fmt::format("models: {}", fmt::join(StiffnessModels(), ", ")));
-  }
+  CheckAll(mechanism, pose, &findings);
+  const int found = IndexOfModel(StiffnessModels(), model, &findings);
   diagnostics->Append(findings);
   if (findings.has_errors()) return nullptr;
-  return std::make_unique<ScaraStiffness>(StiffnessParametersOf(mechanism), found->printed);
+  return std::make_unique<ScaraStiffness>(StiffnessParametersOf(mechanism),
+                                          Models()[static_cast<size_t>(found)].printed);
 }
 
 }  // namespace mbv::scara
