@@ -1,10 +1,11 @@
-// Parts of the cabin robot's equation audit [Liu 2025]; stiffness, Eqs. (54)–(75), is not covered.
+// Parts of the cabin robot's equation audit [Liu 2025].
 #pragma once
 
 #include <functional>
 #include <string>
 #include <vector>
 
+#include "analytic/cabin_robot/stiffness.h"
 #include "audit/audit.h"
 #include "core/types.h"
 #include "mechanism/mechanism.h"
@@ -46,5 +47,9 @@ struct Lengths {
 [[nodiscard]] std::vector<AuditRow> WristRows(const Lengths& lengths);
 /// Equations (47)–(53): dynamics, against the generic reference solver.
 [[nodiscard]] std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism);
+/// Equations (54)–(75) and Table 2, against frame elements; `models_dir` holds
+/// cabin_robot/elastic.yaml.
+[[nodiscard]] std::vector<AuditRow> StiffnessRows(const std::string& models_dir,
+                                                  const cabin::StiffnessParameters& parameters);
 
 }  // namespace mbv::cabin_audit

@@ -1,4 +1,6 @@
+#include "analytic/cabin_robot/stiffness_form.h"
 #include "audit/cabin_audit.h"
+#include "audit/stiffness_truth.h"
 #include "core/demand.h"
 #include "mechanism/load_model.h"
 
@@ -17,17 +19,20 @@ AuditTable AuditCabinRobot(const std::string& models_dir) {
   const LoadResult model = LoadModel(models_dir + "/cabin_robot/model.yaml");
   MBV_DEMAND(model.mechanism.has_value(), model.diagnostics.Text());
   const cabin_audit::Lengths lengths = cabin_audit::LengthsOf(*model.mechanism);
+  const Mechanism elastic = stiffness_audit::LoadElastic(models_dir, "cabin_robot");
   AuditTable table;
   table.mechanism = "cabin_robot";
   table.source =
       "Liu Yi, Yao Jiantao, Guo Yutong, Yi Wangmin, Zhao Yongsheng, Design and analysis of hybrid "
       "cabin assembly attitude adjustment robot system, J. of National University of Defense "
-      "Technology 47(2), 2025 (kinematics and dynamics; directions of the figures are inferred "
+      "Technology 47(2), 2025 (kinematics, dynamics and stiffness; directions of the figures are "
+      "inferred "
       "from "
       "the equations)";
   for (auto rows :
        {cabin_audit::PositionRows(lengths), cabin_audit::WristRows(lengths),
-        cabin_audit::VelocityRows(lengths), cabin_audit::DynamicsRows(*model.mechanism)}) {
+        cabin_audit::VelocityRows(lengths), cabin_audit::DynamicsRows(*model.mechanism),
+        cabin_audit::StiffnessRows(models_dir, cabin::StiffnessParametersOf(elastic))}) {
     for (AuditRow& row : rows) table.rows.push_back(std::move(row));
   }
   return table;

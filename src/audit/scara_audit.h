@@ -1,8 +1,9 @@
-// Parts of the SCARA robot's equation audit [Zhu 2019]; stiffness, Eqs. (11)–(21), is not covered.
+// Parts of the SCARA robot's equation audit [Zhu 2019].
 //
 // Truth is the generic reference solver on models/scara_robot: bodies, joints and loads only, no
-// formula of the paper. The states follow a fast closed path inside one quadrant of the workspace
-// (up to 30 m/s², 150 rad/s²) under gravity, a force and a moment on the platform.
+// formula of the paper; for stiffness, frame elements on its elastic model. The states follow a
+// fast closed path inside one quadrant of the workspace (up to 30 m/s², 150 rad/s²) under gravity,
+// a force and a moment on the platform.
 #pragma once
 
 #include <array>
@@ -10,6 +11,7 @@
 #include <vector>
 
 #include "analytic/scara_robot/dynamics.h"
+#include "analytic/scara_robot/stiffness.h"
 #include "audit/audit.h"
 #include "audit/row_meter.h"
 #include "mechanism/constraints.h"
@@ -90,5 +92,8 @@ inline void AddAll(RowMeter* meter, const VecX& truth, const VecX& printed, cons
 /// Eqs. (42)–(48).
 [[nodiscard]] std::vector<AuditRow> DynamicsRows(const scara::Parameters& parameters,
                                                  const std::vector<State>& states);
+/// Eqs. (11)–(21) and the symmetry of Figs 9–11, on models_dir/scara_robot/elastic.yaml.
+[[nodiscard]] std::vector<AuditRow> StiffnessRows(const std::string& models_dir,
+                                                  const scara::StiffnessParameters& parameters);
 
 }  // namespace mbv::scara_audit

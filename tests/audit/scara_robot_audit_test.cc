@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <set>
 
@@ -30,11 +31,32 @@ TEST(ScaraAudit, EveryCorrectedFormIsConfirmed) {
 }
 
 TEST(ScaraAudit, RightEquationsAreTheseAndNoOthers) {
-  const std::set<std::string> right = {
-      "F = Σf − Σξ", "M_pa",      "Table 1, platform", "(1)",        "(2)",    "(4)",
-      "(6)",         "(7), (8)",  "(22), (23)",        "(24), (25)", "(28) J", "(29) Ẍ",
-      "(31) v_i1",   "(33)",      "(34), (36) v_i2",   "(37)",       "(39)",   "(41)",
-      "(43)",        "(44), (45)"};
+  const std::set<std::string> right = {"F = Σf − Σξ",
+                                       "M_pa",
+                                       "Table 1, platform",
+                                       "(1)",
+                                       "(2)",
+                                       "(4)",
+                                       "(6)",
+                                       "(7), (8)",
+                                       "(22), (23)",
+                                       "(24), (25)",
+                                       "(28) J",
+                                       "(29) Ẍ",
+                                       "(31) v_i1",
+                                       "(33)",
+                                       "(34), (36) v_i2",
+                                       "(37)",
+                                       "(39)",
+                                       "(41)",
+                                       "(43)",
+                                       "(44), (45)",
+                                       "(12)",
+                                       "(15)",
+                                       "(16), (17)",
+                                       "(18), (21) κ_m",
+                                       "(19), (21) κ_f",
+                                       "Fig. 9, symmetry"};
   std::set<std::string> found;
   for (const AuditRow& row : Table().rows) {
     if (row.verdict == AuditVerdict::kOk) found.insert(row.equation);
@@ -46,6 +68,7 @@ TEST(ScaraAudit, RightEquationsAreTheseAndNoOthers) {
 TEST(ScaraAudit, EveryErratumIsLargeComparedWithItsLimit) {
   for (const AuditRow& row : Table().rows) {
     if (row.verdict != AuditVerdict::kWrong || row.equation.starts_with("Table")) continue;
+    if (std::isnan(row.residual_printed)) continue;  // not computable: its shapes do not fit
     EXPECT_GT(row.residual_printed, 1e-2 * row.scale) << row.equation;
   }
 }
