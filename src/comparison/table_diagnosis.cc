@@ -19,8 +19,9 @@ constexpr double kTubes = 3.0;
 constexpr double kShare = 0.02;
 // How far a fitted factor may be from a known one.
 constexpr double kSameFactor = 5e-3;
-constexpr size_t kMostShifted = 800;  // rows used to find a time shift
-constexpr int kShiftSteps = 400;      // to either side
+constexpr size_t kOneOutlierIn = 100;  // rows; more of them are no outliers
+constexpr size_t kMostShifted = 800;   // rows used to find a time shift
+constexpr int kShiftSteps = 400;       // to either side
 
 struct KnownFactor {
   double factor;
@@ -72,11 +73,12 @@ std::string Signal(const std::string& channel) { return channel.substr(channel.r
 
 // An explanation of one column.
 struct Explanation {
-  enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor };
+  enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor, kOutliers };
   Kind kind = Kind::kSign;
   double factor = 1.0, offset = 0.0;
-  size_t partner = 0;  // index of the series that it looks like
-  double left = kNan;  // RMS of the difference that stays
+  size_t partner = 0;                // index of the series that it looks like
+  double left = kNan;                // RMS of the difference that stays
+  std::vector<double> times_s = {};  // of outliers
 };
 
 class Diagnosis {
@@ -145,7 +147,28 @@ class Diagnosis {
     if (good(offset)) return offset;
     scaled.kind = Explanation::Kind::kUnknownFactor;
     if (good(scaled)) return scaled;
-    return {};
+    return Outliers(series);
+  }
+
+  // A few rows that leave the tube of a single sample, while all others lie in the tubes.
+  [[nodiscard]] std::optional<Explanation> Outliers(const Series& series) const {
+    Explanation finding{.kind = Explanation::Kind::kOutliers};
+    double sum2 = 0.0;
+    for (size_t i = 0; i < samples_.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const double error = series.table(row) - series.other(row);
+      if (std::abs(error) <= series.result->tube_max) {
+        sum2 += error * error;
+      } else {
+        finding.times_s.push_back(table_.trace.time_s[static_cast<size_t>(samples_[i].first)]);
+      }
+    }
+    const size_t most = std::max<size_t>(1, samples_.size() / kOneOutlierIn);
+    if (finding.times_s.empty() || finding.times_s.size() > most) return {};
+    const auto rest = static_cast<double>(samples_.size() - finding.times_s.size());
+    finding.left = std::sqrt(sum2 / rest);
+    if (!(finding.left <= series.result->tube_rms)) return {};
+    return finding;
   }
 
   static Explanation Scaled(const Series& series, double factor) {
@@ -234,11 +257,27 @@ class Diagnosis {
             "{} is {} with {:.6g} {} added: a preload, a weight or a zero point? "
             "({})",
             columns, channel, finding.offset, series_[k].unit, Left(k));
+      case Explanation::Kind::kOutliers:
+        return OutlierText(k);
       case Explanation::Kind::kUnknownFactor:
         return fmt::format("{} is {:.6g} times {}: a mass, a length or a gear ratio? ({})", columns,
                            finding.factor, channel, Left(k));
     }
     return "";
+  }
+
+  [[nodiscard]] std::string OutlierText(size_t k) const {
+    const std::vector<double>& times_s = found_[k]->times_s;
+    std::string at;
+    for (size_t i = 0; i < std::min<size_t>(times_s.size(), 4); ++i) {
+      at += fmt::format("{}{:.6g} s", i == 0 ? "" : ", ", times_s[i]);
+    }
+    if (times_s.size() > 4) at += ", …";
+    return fmt::format(
+        "column '{}' leaves the tube of {} in {} of {} rows only, at t = {}: are they "
+        "outliers? ({})",
+        series_[k].heading, series_[k].result->channel, times_s.size(), samples_.size(), at,
+        Left(k));
   }
 
   [[nodiscard]] std::string ExchangeText(size_t k, std::vector<bool>* said) const {

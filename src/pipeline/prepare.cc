@@ -16,7 +16,8 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
   prepared.closed_form =
       MakeClosedForm(prepared.scenario, prepared.mechanisms.analytic, diagnostics);
   const bool analytic = prepared.closed_form.closed_form != nullptr;
-  prepared.driven_by = analytic ? "analytic" : "reference";
+  const bool table = prepared.scenario.reference.table != nullptr;
+  prepared.driven_by = analytic ? "analytic" : table ? "solver" : "reference";
   if (prepared.scenario.simulation.on && !analytic && !prepared.scenario.reference.on &&
       !prepared.scenario.motion.free()) {
     Finding finding;
@@ -26,20 +27,13 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
     finding.hint = "set reference: on";
     diagnostics->Add(std::move(finding));
   }
-  if (prepared.scenario.reference.table != nullptr) {
-    Finding finding;
-    finding.file = file;
-    finding.message = "reference.csv: a table can be read and checked, but not yet compared with";
-    finding.hint = "set reference: on to compare with the generic solver";
-    diagnostics->Add(std::move(finding));
-  }
   if (diagnostics->has_errors()) return {};
   return prepared;
 }
 
 DrivenMotion Prepared::MakeDrivenMotion() const {
   if (scenario.motion.free()) return DriveByCommands(mechanisms.simulated, scenario.motion);
-  if (driven_by == "reference") return DriveByReference(mechanisms.reference, scenario.motion);
+  if (driven_by != "analytic") return DriveByReference(mechanisms.reference, scenario.motion);
   // A fresh closed form, because it may follow its solution from the start of the motion.
   Diagnostics known;
   ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);

@@ -2,9 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
 #include <filesystem>
 
+#include "core/demand.h"
 #include "mechanism/mobility.h"
 #include "pipeline/free_motion_text.h"
 #include "pipeline/output_folder.h"
@@ -15,6 +17,7 @@
 #include "pipeline/stiffness.h"
 #include "pipeline/version.h"
 #include "reference/reference.h"
+#include "scenario/table.h"
 
 namespace mbv {
 namespace {
@@ -121,32 +124,53 @@ class ScenarioRun {
     AddWitness("analytic", std::move(run.summary), std::move(run.trace));
   }
 
+  // The generic solver, or a table in its place. Without a closed form the solver takes part beside
+  // the table, by its own name: it gives the drive motion, and a third opinion.
   void RunReferenceWitness() {
     if (!scenario().reference.on) {
       AddWitness("reference", NotRun("switched off in the scenario"), {});
       return;
     }
+    if (scenario().reference.table == nullptr) {
+      RunSolver("reference");
+      return;
+    }
+    table_ = AlignTable(*scenario().reference.table, scenario().motion);
+    const bool any = !table_->trace.time_s.empty();
+    AddWitness("reference",
+               any ? RunSummary::Done()
+                   : NotRun(fmt::format("no row of {} lies inside the motion, 0 … {:g} s",
+                                        table_->name, report_.duration_s)),
+               table_->trace);
+    if (report_.driven_by != "analytic") RunSolver("solver");
+  }
+
+  void RunSolver(const std::string& name) {
     if (scenario().motion.free()) {
-      RunFreeReference();
+      RunFreeSolver(name);
       return;
     }
     ReferenceRun run = RunReference(prepared_->mechanisms.reference, scenario().motion);
     report_.timing.reference_s = run.summary.wall_s;
-    AddWitness("reference", std::move(run.summary), std::move(run.trace));
+    AddWitness(name, std::move(run.summary), std::move(run.trace));
   }
 
-  void RunFreeReference() {
+  void RunFreeSolver(const std::string& name) {
     ForwardRun run = RunForwardReference(prepared_->mechanisms.reference, scenario().motion);
     report_.timing.reference_s = run.summary.wall_s;
     report_.simulation += "; " + TrustLine(run);
     for (const std::string& text : PassageTexts(run, scenario().motion.duration_s)) {
       AddWarning(text);
     }
-    AddWitness("reference", std::move(run.summary), std::move(run.trace));
+    AddWitness(name, std::move(run.summary), std::move(run.trace));
   }
 
   const WitnessRecord& Driver() const {
-    return report_.witnesses[report_.driven_by == "analytic" ? 0 : 1];
+    const auto found =
+        std::find_if(report_.witnesses.begin(), report_.witnesses.end(),
+                     [&](const WitnessRecord& w) { return w.name == report_.driven_by; });
+    MBV_DEMAND(found != report_.witnesses.end(), report_.driven_by);
+    return *found;
   }
 
   Severity RangeSeverity() const {
@@ -234,7 +258,8 @@ class ScenarioRun {
                           .start_window_s = scenario().start_window_s,
                           .witnesses = {},
                           .driven_by = report_.driven_by,
-                          .joints_not_unique = AnalyseMobility(base()).joints_not_unique};
+                          .joints_not_unique = AnalyseMobility(base()).joints_not_unique,
+                          .table = table_ ? &*table_ : nullptr};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
           {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});
@@ -250,8 +275,9 @@ class ScenarioRun {
   }
 
   void CompareEngines(const ComparisonInput& input) {
-    const bool by_analytic = report_.witnesses[0].summary.ok();
-    const WitnessRecord& truth = report_.witnesses[by_analytic ? 0 : 1];
+    // The computation that drives the simulation; else the other one.
+    const bool driver = Driver().summary.ok();
+    const WitnessRecord& truth = driver ? Driver() : report_.witnesses[1];
     const auto error = [&](const SimulationRun& run) {
       const PairComparison pair = ComparePair(input, run.trace, truth.trace);
       const WitnessMetrics own = MeasureWitness(input, run.trace);
@@ -317,9 +343,9 @@ class ScenarioRun {
       write("snapshots/" + picture.name, picture.content);
     }
     write("summary.json", ToJson(report_));
-    write("report.html", RunPage(report_, prepared_->mechanisms.simulated,
-                                 simulation_ ? &*simulation_ : nullptr, pictures_,
-                                 options_.scenario));
+    write("report.html",
+          RunPage(report_, prepared_->mechanisms.simulated, simulation_ ? &*simulation_ : nullptr,
+                  pictures_, options_.scenario));
     if (trouble.empty()) trouble = folder.Commit();
     if (trouble.empty()) {
       outcome_.folder = folder.target();
@@ -338,6 +364,7 @@ class ScenarioRun {
   std::optional<Prepared> prepared_;
   Report report_;
   std::optional<SimulationRun> simulation_, other_engine_;
+  std::optional<AlignedTable> table_;  // in the reference's place
   std::vector<PictureFile> pictures_;
 };
 

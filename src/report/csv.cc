@@ -1,8 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <iterator>
+#include <map>
 
+#include "comparison/metrics.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -15,6 +18,13 @@ struct CsvColumn {
   const Trace* trace;
   int column;
 };
+
+// For each sample of the grid the row of a trace; -1 where it has none.
+std::vector<Eigen::Index> RowsOf(const Trace& grid, const Trace& trace) {
+  std::vector<Eigen::Index> rows(grid.time_s.size(), -1);
+  for (const auto& [i, j] : AlignSamples(grid, trace)) rows[static_cast<size_t>(i)] = j;
+  return rows;
+}
 
 class Columns {
  public:
@@ -30,7 +40,13 @@ class Columns {
 
   [[nodiscard]] const std::string& header() const { return header_; }
   [[nodiscard]] const std::vector<CsvColumn>& columns() const { return columns_; }
-  [[nodiscard]] const Trace* first() const { return traces_.empty() ? nullptr : traces_.front(); }
+  // The longest: a table has fewer rows, a witness that broke down ends early.
+  [[nodiscard]] const Trace* grid() const {
+    const auto longest = std::max_element(
+        traces_.begin(), traces_.end(),
+        [](const Trace* a, const Trace* b) { return a->time_s.size() < b->time_s.size(); });
+    return longest == traces_.end() ? nullptr : *longest;
+  }
 
  private:
   void Add(size_t w, int column) {
@@ -70,16 +86,18 @@ class Columns {
 std::string ToCsv(const Report& report) {
   const Columns columns(report);
   std::string text = columns.header() + "\n";
-  if (columns.first() == nullptr) return text;
-  const std::vector<double>& times = columns.first()->time_s;
+  const Trace* grid = columns.grid();
+  if (grid == nullptr) return text;
+  std::map<const Trace*, std::vector<Eigen::Index>> rows;
+  for (const CsvColumn& c : columns.columns()) {
+    if (!rows.contains(c.trace)) rows[c.trace] = RowsOf(*grid, *c.trace);
+  }
   auto out = std::back_inserter(text);
-  for (size_t i = 0; i < times.size(); ++i) {
-    fmt::format_to(out, "{:.17g}", times[i]);
+  for (size_t i = 0; i < grid->time_s.size(); ++i) {
+    fmt::format_to(out, "{:.17g}", grid->time_s[i]);
     for (const CsvColumn& c : columns.columns()) {
-      // All witnesses sample the scenario's grid; a shorter trace ends early.
-      const bool there = i < c.trace->time_s.size();
-      fmt::format_to(out, ",{:.17g}",
-                     there ? c.trace->values(static_cast<Eigen::Index>(i), c.column) : kNan);
+      const Eigen::Index row = rows[c.trace][i];
+      fmt::format_to(out, ",{:.17g}", row >= 0 ? c.trace->values(row, c.column) : kNan);
     }
     text += '\n';
   }

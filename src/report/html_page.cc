@@ -10,6 +10,7 @@
 #include "report/html_report.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
+#include "report/reference_table.h"
 
 namespace mbv {
 namespace {
@@ -52,6 +53,7 @@ class PageWriter {
     Interactive();
     Pictures();
     Add("Checks", "Checks", ChecksHtml(report_));
+    Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
     Add("Drives", "Drives", DrivesHtml(report_));
     Add("The simulator's own error", "Engine", EngineHtml(report_));
     Add("Energy", "Energy", EnergyHtml(report_));

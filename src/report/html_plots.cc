@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "comparison/metrics.h"
 #include "report/svg_plot.h"
 
 namespace mbv {
@@ -21,11 +22,29 @@ const Trace* TraceOf(const Report& report, const std::string& witness) {
   return nullptr;
 }
 
-using Points = std::vector<std::pair<double, double>>;
+// At common times: a table has fewer rows, a shorter trace ended early.
+PlotPoints ErrorOf(const Trace& measured, int column, const Trace& truth, int truth_column) {
+  PlotPoints points;
+  for (const auto& [i, j] : AlignSamples(measured, truth)) {
+    points.emplace_back(measured.time_s[static_cast<size_t>(i)],
+                        std::abs(measured.values(i, column) - truth.values(j, truth_column)));
+  }
+  return points;
+}
 
-Points Thinned(const Points& points) {
+PlotPoints ValuesOf(const Trace& trace, int column) {
+  PlotPoints points;
+  for (size_t i = 0; i < trace.time_s.size(); ++i) {
+    points.emplace_back(trace.time_s[i], trace.values(static_cast<Eigen::Index>(i), column));
+  }
+  return points;
+}
+
+}  // namespace
+
+PlotPoints Thinned(const PlotPoints& points) {
   if (points.size() <= 2 * kBins) return points;
-  Points kept;
+  PlotPoints kept;
   const size_t bin = (points.size() + kBins - 1) / kBins;
   for (size_t from = 0; from < points.size(); from += bin) {
     const auto first = points.begin() + static_cast<std::ptrdiff_t>(from);
@@ -40,27 +59,6 @@ Points Thinned(const Points& points) {
   return kept;
 }
 
-// Witnesses sample at the same times; a shorter trace ended early.
-Points ErrorOf(const Trace& measured, int column, const Trace& truth, int truth_column) {
-  Points points;
-  for (size_t i = 0; i < std::min(measured.time_s.size(), truth.time_s.size()); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    points.emplace_back(measured.time_s[i],
-                        std::abs(measured.values(row, column) - truth.values(row, truth_column)));
-  }
-  return points;
-}
-
-Points ValuesOf(const Trace& trace, int column) {
-  Points points;
-  for (size_t i = 0; i < trace.time_s.size(); ++i) {
-    points.emplace_back(trace.time_s[i], trace.values(static_cast<Eigen::Index>(i), column));
-  }
-  return points;
-}
-
-}  // namespace
-
 std::string StaticPlotsHtml(const Report& report) {
   const PairComparison* pair = MainPair(report.comparison);
   if (pair == nullptr) return "";
@@ -72,7 +70,7 @@ std::string StaticPlotsHtml(const Report& report) {
     const int column = measured->Find(drive + ".force"), other = truth->Find(drive + ".force");
     if (column < 0 || other < 0) continue;
     const std::string& unit = measured->channels[static_cast<size_t>(column)].unit;
-    const auto add = [&](LinePlot* plot, const Points& points) {
+    const auto add = [&](LinePlot* plot, const PlotPoints& points) {
       plot->x_label = "time [s]";
       plot->y_label = fmt::format("[{}]", unit);
       plot->lines.push_back({.label = drive, .points = Thinned(points)});

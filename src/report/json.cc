@@ -18,8 +18,61 @@ Json ChecksJson(const Comparison& comparison) {
                       {"pass", check.pass},
                       {"time_s", Number(check.time_s)},
                       {"channel", check.channel}});
+    if (check.stated_limit) checks.back()["stated_limit"] = *check.stated_limit;
   }
   return checks;
+}
+
+Json TableColumnJson(const TableColumnResult& column) {
+  return {{"standard", Number(column.standard)},
+          {"bound", Number(column.bound)},
+          {"rms", Number(column.rms)},
+          {"error_rms", Number(column.error_rms)},
+          {"error_max", Number(column.error_max)},
+          {"time_s", Number(column.time_s)},
+          {"tube_rms", Number(column.tube_rms)},
+          {"tube_max", Number(column.tube_max)},
+          {"samples", column.samples},
+          {"inside", column.inside()}};
+}
+
+// The table in the reference's place: what it is, how sure it is, and how each column was judged by
+// each witness. A tube that is switched off is null.
+Json ReferenceTableJson(const Comparison& comparison) {
+  const TableVerdict& table = *comparison.table;
+  Json columns = Json::array();
+  for (size_t c = 0; c < table.columns.size(); ++c) {
+    const TableColumn& column = table.columns[c];
+    const TableUncertainty& parts = table.uncertainty[c];
+    Json json = {{"signal", column.channel.name},
+                 {"unit", column.channel.unit},
+                 {"column", column.heading},
+                 {"file_unit", column.unit},
+                 {"factor", Number(column.factor)},
+                 {"shift", Number(column.shift)},
+                 {"uncertainty",
+                  {{"stated", parts.stated},
+                   {"digits", Number(parts.digits)},
+                   {"noise", Number(parts.noise)},
+                   {"time_stamps", Number(parts.stamps)},
+                   {"interpolation", Number(parts.interpolation)}}}};
+    Json judged = Json::object();
+    for (const PairComparison& pair : comparison.pairs) {
+      for (const TableColumnResult& result : pair.columns) {
+        if (result.column == c) judged[pair.name()] = TableColumnJson(result);
+      }
+    }
+    json["judged"] = std::move(judged);
+    columns.push_back(std::move(json));
+  }
+  return {{"name", table.name},
+          {"grid", table.grid},
+          {"coverage", Number(table.coverage)},
+          {"judged_against", table.judged_against},
+          {"too_coarse", table.too_coarse},
+          {"diagnoses", table.diagnoses},
+          {"notes", table.notes},
+          {"columns", std::move(columns)}};
 }
 
 Json ChecksOffJson(const Comparison& comparison) {
@@ -195,6 +248,7 @@ std::string ToJson(const Report& report) {
                {"duration_s", Number(report.duration_s)},
                {"sample_s", Number(report.sample_s)},
                {"start_window_s", report.start_window_s}};
+  if (report.comparison.table) json["reference_table"] = ReferenceTableJson(report.comparison);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/reference_table.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -30,6 +31,7 @@ class Writer {
   std::string Write(const Report& report) {
     Head(report);
     Checks(report.comparison);
+    ReferenceTable(report.comparison);
     if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
     Engine(report);
     Tail(report);
@@ -143,8 +145,18 @@ class Writer {
     std::string line =
         fmt::format("    {:<26}{:>12.2e}{:>11}   {}  ", row.title + unit, check.value, limit, word);
     if (!check.channel.empty()) line += fmt::format("{}, {:.4g} s", check.channel, check.time_s);
+    if (check.stated_limit) {
+      line +=
+          fmt::format(" (limit by the table's uncertainty, stated {:.1e})", *check.stated_limit);
+    }
     while (line.back() == ' ') line.pop_back();
     return line;
+  }
+
+  void ReferenceTable(const Comparison& comparison) {
+    const std::vector<std::string> lines = ReferenceTableLines(comparison, options_.verbose);
+    if (!lines.empty()) Line();
+    for (const std::string& line : lines) Line("  " + line);
   }
 
   void Drives(const PairComparison& pair) {

@@ -1,0 +1,206 @@
+#include "report/reference_table.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "report/html_plots.h"
+#include "report/html_text.h"
+#include "report/svg_plot.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kMostPlots = 8;  // columns, the worst first
+
+std::string Number(double value, const char* format = "{:.2e}") {
+  if (std::isinf(value)) return "off";
+  return std::isnan(value) ? "–" : fmt::format(fmt::runtime(format), value);
+}
+
+const TableColumn& SourceOf(const TableVerdict& table, const TableColumnResult& column) {
+  return table.columns[column.column];
+}
+
+// Worst first; columns without a number count as worst.
+std::vector<const TableColumnResult*> ByRatio(const PairComparison& pair) {
+  std::vector<const TableColumnResult*> columns;
+  for (const TableColumnResult& column : pair.columns) columns.push_back(&column);
+  const auto key = [](const TableColumnResult* column) {
+    const double ratio = column->ratio();
+    return std::isnan(ratio) ? std::numeric_limits<double>::infinity() : ratio;
+  };
+  std::stable_sort(columns.begin(), columns.end(),
+                   [&](const auto* a, const auto* b) { return key(a) > key(b); });
+  return columns;
+}
+
+const Trace* TraceOf(const Report& report, const std::string& witness) {
+  for (const WitnessRecord& record : report.witnesses) {
+    if (record.name == witness && !record.trace.time_s.empty()) return &record.trace;
+  }
+  return nullptr;
+}
+
+std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
+  Table html{.caption = fmt::format("Columns of {} against {}, worst first", table.name,
+                                    table.judged_against),
+             .head = {Text("signal"), Text("column"), Digits("RMS"), Digits("uncertainty"),
+                      Text("of it"), Digits("RMS difference"), Digits("tube"),
+                      Digits("largest difference"), Digits("tube"), Digits("at"), Text("")},
+             .rows = {}};
+  for (const TableColumnResult* column : ByRatio(pair)) {
+    const TableColumn& source = SourceOf(table, *column);
+    const bool inside = column->inside();
+    html.rows.push_back(
+        {Text(column->channel), Text(source.heading),
+         Digits(Number(column->rms, "{:.6g} ") + source.channel.unit),
+         Digits(Number(column->standard)), Text(UncertaintyText(table.uncertainty[column->column])),
+         Digits(Number(column->error_rms)), Digits(Number(column->tube_rms)),
+         Digits(Number(column->error_max)), Digits(Number(column->tube_max)),
+         Digits(Number(column->time_s, "{:.4g} s")),
+         Markup(fmt::format("<span class=\"pill {}\">{}</span>", inside ? "ok" : "fail",
+                            inside ? "inside" : "outside"))});
+  }
+  return ToHtml(html);
+}
+
+// The table's values with their tube on the other witness' curve, and the difference in the tube.
+std::string PlotsHtml(const Report& report, const PairComparison& pair) {
+  const TableVerdict& table = *report.comparison.table;
+  const Trace* values = TraceOf(report, "reference");
+  const Trace* other = TraceOf(report, table.judged_against);
+  if (values == nullptr || other == nullptr) return "";
+  std::string html;
+  const std::vector<const TableColumnResult*> columns = ByRatio(pair);
+  for (size_t k = 0; k < std::min(kMostPlots, columns.size()); ++k) {
+    const TableColumnResult& column = *columns[k];
+    const int a = values->Find(column.channel), b = other->Find(column.channel);
+    if (a < 0 || b < 0) continue;
+    const std::string& unit = SourceOf(table, column).channel.unit;
+    PlotPoints points, curve, upper, lower, difference;
+    for (const auto& [i, j] : AlignSamples(*values, *other)) {
+      const double t = values->time_s[static_cast<size_t>(i)];
+      const double value = values->values(i, a);
+      const double error = value - other->values(j, b);
+      points.emplace_back(t, value);
+      upper.emplace_back(t, value + column.tube_max);
+      lower.emplace_back(t, value - column.tube_max);
+      difference.emplace_back(t,
+                              unit == "rad" ? AngleDifference(value, other->values(j, b)) : error);
+    }
+    for (size_t i = 0; i < other->time_s.size(); ++i) {
+      curve.emplace_back(other->time_s[i], other->values(static_cast<Eigen::Index>(i), b));
+    }
+    if (difference.empty()) continue;
+    const double from = difference.front().first, to = difference.back().first;
+    LinePlot signal{
+        .title = column.channel, .x_label = "time [s]", .y_label = "[" + unit + "]", .lines = {}};
+    signal.lines = {{.label = table.judged_against, .points = Thinned(curve)},
+                    {.label = table.name, .points = Thinned(points), .markers = true},
+                    {.label = "tube", .points = Thinned(upper)},
+                    {.label = "", .points = Thinned(lower)}};
+    LinePlot error{
+        .title = fmt::format("{}: {} − {}", column.channel, table.name, table.judged_against),
+        .x_label = "time [s]",
+        .y_label = "[" + unit + "]",
+        .lines = {}};
+    error.lines = {{.label = "difference", .points = Thinned(difference), .markers = true},
+                   {.label = fmt::format("tube ±{:.2g}", column.tube_max),
+                    .points = {{from, column.tube_max}, {to, column.tube_max}}},
+                   {.label = "", .points = {{from, -column.tube_max}, {to, -column.tube_max}}}};
+    html += "<figure>" + ToSvg(signal) + "</figure>\n<figure>" + ToSvg(error) + "</figure>\n";
+  }
+  if (columns.size() > kMostPlots) {
+    html += fmt::format("<p class=\"faint\">The {} worst of {} columns.</p>\n", kMostPlots,
+                        columns.size());
+  }
+  return html;
+}
+
+}  // namespace
+
+const PairComparison* TablePair(const Comparison& comparison) {
+  if (!comparison.table || comparison.table->judged_against.empty()) return nullptr;
+  for (const PairComparison& pair : comparison.pairs) {
+    const std::string& other = pair.measured == "reference" ? pair.truth : pair.measured;
+    const bool of_table = pair.measured == "reference" || pair.truth == "reference";
+    if (of_table && other == comparison.table->judged_against && !pair.columns.empty()) {
+      return &pair;
+    }
+  }
+  return nullptr;
+}
+
+std::string UncertaintyText(const TableUncertainty& uncertainty) {
+  if (uncertainty.stated) return "stated in the scenario";
+  std::string text;
+  for (const auto& [name, value] :
+       {std::pair{"digits", uncertainty.digits}, std::pair{"noise", uncertainty.noise},
+        std::pair{"time stamps", uncertainty.stamps},
+        std::pair{"interpolation", uncertainty.interpolation}}) {
+    if (value > 0.0) text += fmt::format("{}{} {:.1e}", text.empty() ? "" : ", ", name, value);
+  }
+  return text;
+}
+
+std::vector<std::string> ReferenceTableLines(const Comparison& comparison, bool verbose) {
+  if (!comparison.table) return {};
+  const TableVerdict& table = *comparison.table;
+  std::vector<std::string> lines = {
+      fmt::format("the reference is the table {}: {}", table.name, table.grid)};
+  if (const PairComparison* pair = TablePair(comparison)) {
+    lines.push_back(
+        fmt::format("  each column against {}; the tube is {:g} times its uncertainty "
+                    "or the limit, whichever is wider",
+                    table.judged_against, table.coverage));
+    size_t width = 0;
+    for (const TableColumnResult& column : pair->columns) {
+      width = std::max(width, column.channel.size());
+    }
+    for (const TableColumnResult* column : ByRatio(*pair)) {
+      lines.push_back(fmt::format(
+          "  {:<{}}  RMS {:.5g} {}, uncertainty {:.1e}, differs by {:.1e} (tube {}), at most "
+          "{:.1e} (tube {}): {}",
+          column->channel, width, column->rms, SourceOf(table, *column).channel.unit,
+          column->standard, column->error_rms, Number(column->tube_rms, "{:.1e}"),
+          column->error_max, Number(column->tube_max, "{:.1e}"),
+          column->inside() ? "inside" : "OUTSIDE"));
+      const std::string parts = UncertaintyText(table.uncertainty[column->column]);
+      if (verbose && !parts.empty()) lines.push_back("      uncertainty: " + parts);
+    }
+  }
+  if (verbose) {
+    for (const std::string& note : table.notes) lines.push_back("  " + note);
+  }
+  return lines;
+}
+
+std::string ReferenceTableHtml(const Report& report) {
+  if (!report.comparison.table) return "";
+  const TableVerdict& table = *report.comparison.table;
+  std::string html = "<p>" + Escape(table.name) + ": " + Escape(table.grid) + "</p>\n";
+  if (!table.too_coarse.empty()) {
+    html += "<p class=\"attribution odd\">" + Escape(table.too_coarse) + "</p>\n";
+  }
+  for (const std::string& diagnosis : table.diagnoses) {
+    html += "<p class=\"attribution odd\">" + Escape(diagnosis) + "</p>\n";
+  }
+  if (const PairComparison* pair = TablePair(report.comparison)) {
+    html += ColumnsHtml(table, *pair);
+    html += fmt::format(
+        "<p class=\"faint\">The tube is {:g} times the column's uncertainty or the scenario's "
+        "limit, whichever is wider.</p>\n",
+        table.coverage);
+    html += PlotsHtml(report, *pair);
+  }
+  if (!table.notes.empty()) {
+    html += "<details><summary>How the file was read</summary><ul>\n";
+    for (const std::string& note : table.notes) html += "<li>" + Escape(note) + "</li>\n";
+    html += "</ul></details>\n";
+  }
+  return html;
+}
+
+}  // namespace mbv
