@@ -41,7 +41,7 @@ function spread(u, _series, show, indices) {
 const kStyles = {
   solid: {width: 1.6},
   analytic: {width: 4.5, alpha: 0.38},
-  reference: {width: 1.3},
+  reference: {width: 1.3, spans: true},  // a table may have fewer rows than there are samples
   simulated: {width: 0, marks: true},
 };
 
@@ -54,7 +54,7 @@ function seriesOf(line, log) {
     alpha: style.alpha ?? 1,
     width: style.width,
     dash: line.dash ? [7, 4] : undefined,
-    spanGaps: false,
+    spanGaps: style.spans ?? false,
     paths: style.marks ? () => null : undefined,
     points: {show: Boolean(style.marks), size: 5, width: 1.2, stroke: color,
              fill: isDark() ? '#14191f' : '#fff', filter: style.marks ? spread : undefined},
