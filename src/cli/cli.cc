@@ -34,12 +34,14 @@ int RunCli(int argc, char** argv) {
   app.require_subcommand(1);
   app.footer(
       "Examples:\n"
+      "  mbverify init my_linkage\n"
       "  mbverify run scenarios/stabilizing_platform/sea_state.yaml\n"
       "  mbverify check my_model.yaml my_scenario.yaml\n"
       "  mbverify model spr_tripod --format mjcf\n"
       "  mbverify audit scara_robot\n"
       "Exit codes: 0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
   int exit_code = 4;
+  AddInitCommand(&app, &exit_code);
   AddRunCommand(&app, &exit_code);
   AddRenderCommand(&app, &exit_code);
   AddModelCommand(&app, &exit_code);

@@ -17,6 +17,7 @@ namespace mbv {
 [[nodiscard]] int WorseExit(int a, int b);
 
 // One function per command: adds it to the app; when chosen, its callback sets *exit_code.
+void AddInitCommand(CLI::App* app, int* exit_code);
 void AddRunCommand(CLI::App* app, int* exit_code);
 void AddRenderCommand(CLI::App* app, int* exit_code);
 void AddModelCommand(CLI::App* app, int* exit_code);

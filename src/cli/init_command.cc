@@ -1,0 +1,42 @@
+// mbverify init
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "cli/cli.h"
+#include "pipeline/init_model.h"
+
+namespace mbv {
+namespace {
+
+int Init(const InitOptions& options) {
+  const InitResult result = InitModel(options);
+  fmt::print(stderr, "{}", result.diagnostics.Text());
+  if (result.files.empty()) return 2;
+  for (const std::string& file : result.files) fmt::print("wrote {}\n", file);
+  fmt::print("next: mbverify run {}\n", result.files.back());
+  return 0;
+}
+
+}  // namespace
+
+void AddInitCommand(CLI::App* app, int* exit_code) {
+  auto options = std::make_shared<InitOptions>();
+  std::string names;
+  for (const Starter& starter : Starters()) {
+    names += fmt::format("{}{}", names.empty() ? "" : ", ", starter.name);
+  }
+  CLI::App* init = app->add_subcommand("init", "Write a model and a scenario to start from");
+  init->add_option("name", options->name, "name of your mechanism")->required();
+  init->add_option("--from", options->from, "mechanism to start from: " + names)
+      ->capture_default_str();
+  init->add_option("--into", options->into, "folder that gets models/ and scenarios/")
+      ->capture_default_str();
+  init->footer(
+      "Example:\n"
+      "  mbverify init my_linkage && mbverify run scenarios/my_linkage/first.yaml\n"
+      "Nothing that exists is overwritten.");
+  init->callback([options, exit_code] { *exit_code = Init(*options); });
+}
+
+}  // namespace mbv

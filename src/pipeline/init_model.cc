@@ -1,0 +1,214 @@
+#include "pipeline/init_model.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <stdio.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <fstream>
+#include <system_error>
+
+#include "analytic/closed_form.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr size_t kLongestName = 64;
+constexpr const char* kPlace = "@NAME@";
+
+bool IsNameCharacter(char c) {
+  const auto u = static_cast<unsigned char>(c);
+  return u < 0x80 && (std::isalnum(u) != 0 || c == '_');
+}
+
+bool IsName(const std::string& name) {
+  return !name.empty() && name.size() <= kLongestName &&
+         std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
+         std::all_of(name.begin(), name.end(), IsNameCharacter);
+}
+
+// "My arm-2" → "My_arm_2"; "" when nothing is left.
+std::string NearestName(const std::string& name) {
+  std::string near;
+  for (const char c : name.substr(0, kLongestName)) {
+    near += IsNameCharacter(c) ? c : '_';
+  }
+  while (!near.empty() && std::isalpha(static_cast<unsigned char>(near[0])) == 0) {
+    near.erase(near.begin());
+  }
+  while (!near.empty() && near.back() == '_') near.pop_back();
+  return near;
+}
+
+std::string Filled(std::string text, const std::string& name) {
+  for (size_t at = 0; (at = text.find(kPlace, at)) != std::string::npos; at += name.size()) {
+    text.replace(at, std::strlen(kPlace), name);
+  }
+  return text;
+}
+
+// A folder with one file that appears whole, and only where nothing was before.
+class NewFolder {
+ public:
+  NewFolder(fs::path target, std::string file, std::string content)
+      : target_(std::move(target)), file_(std::move(file)), content_(std::move(content)) {
+    temporary_ =
+        target_.parent_path() / fmt::format(".{}.tmp-{}", target_.filename().string(), getpid());
+  }
+  ~NewFolder() {
+    std::error_code error;
+    fs::remove_all(temporary_, error);
+    // Folders made on the way, if nothing came to lie in them.
+    for (const fs::path& made : made_) {
+      if (!kept_) fs::remove(made, error);
+    }
+  }
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+
+  [[nodiscard]] fs::path path() const { return target_ / file_; }
+
+  // Each returns "" or what went wrong.
+  [[nodiscard]] std::string Fill() {
+    std::error_code error;
+    for (fs::path folder = target_.parent_path(); !folder.empty() && !fs::exists(folder, error);
+         folder = folder.parent_path()) {
+      made_.push_back(folder);
+    }
+    fs::create_directories(temporary_, error);
+    if (error) return Trouble("make folder", target_, error.message());
+    errno = 0;
+    std::ofstream stream(temporary_ / file_, std::ios::binary);
+    stream << content_;
+    stream.close();
+    return stream ? "" : Trouble("write", path(), std::strerror(errno));
+  }
+  [[nodiscard]] std::string Commit() {
+    if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_NOREPLACE) == 0) {
+      kept_ = true;
+      return "";
+    }
+    return Trouble("make", target_, std::strerror(errno));
+  }
+  void TakeBack() {
+    std::error_code error;
+    fs::remove_all(target_, error);
+    kept_ = false;
+  }
+
+ private:
+  static std::string Trouble(const char* what, const fs::path& path, const std::string& reason) {
+    return fmt::format("cannot {} {}: {}", what, path.string(), reason);
+  }
+
+  fs::path target_, temporary_;
+  std::string file_, content_;
+  std::vector<fs::path> made_;  // innermost first
+  bool kept_ = false;
+};
+
+class Initialiser {
+ public:
+  explicit Initialiser(const InitOptions& options) : options_(options) {}
+
+  InitResult Run() {
+    CheckName();
+    const Starter* starter = FindStarter();
+    const fs::path into = fs::path(options_.into).lexically_normal();
+    const fs::path model = into / "models" / options_.name;
+    const fs::path scenario = into / "scenarios" / options_.name;
+    if (IsName(options_.name)) {
+      CheckFree(model);
+      CheckFree(scenario);
+    }
+    CheckFolder(into);
+    if (result_.diagnostics.has_errors()) return std::move(result_);
+    Write(*starter, model, scenario);
+    return std::move(result_);
+  }
+
+ private:
+  void Add(const std::string& message, const std::string& hint) {
+    Finding finding;
+    finding.message = message;
+    finding.hint = hint;
+    result_.diagnostics.Add(std::move(finding));
+  }
+
+  void CheckName() {
+    const std::string& name = options_.name;
+    if (!IsName(name)) {
+      const std::string near = NearestName(name);
+      Add(fmt::format("name = '{}' violates: a letter, then letters, digits and '_', at most {} "
+                      "characters",
+                      name, kLongestName),
+          near.empty() ? "for example my_linkage" : fmt::format("for example {}", near));
+      return;
+    }
+    for (const ClosedFormRow& row : ClosedForms()) {
+      if (row.mechanism != name) continue;
+      Add(fmt::format("name = '{}' belongs to a mechanism with a closed form of its own", name),
+          fmt::format("for example my_{}", name));
+    }
+  }
+
+  const Starter* FindStarter() {
+    std::vector<std::string> names;
+    for (const Starter& starter : Starters()) {
+      if (starter.name == options_.from) return &starter;
+      names.emplace_back(starter.name);
+    }
+    const std::string near = ClosestWord(options_.from, names);
+    Add(fmt::format("--from {} is none of {}", options_.from, fmt::join(names, ", ")),
+        near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+    return nullptr;
+  }
+
+  void CheckFree(const fs::path& folder) {
+    std::error_code error;
+    if (!fs::exists(fs::symlink_status(folder, error))) return;
+    Add(fmt::format("{} is already there and is not overwritten", folder.string()),
+        "choose another name, another folder by --into, or move it away");
+  }
+
+  void CheckFolder(const fs::path& into) {
+    std::error_code error;
+    if (!fs::exists(into, error) || fs::is_directory(into, error)) return;
+    Add(fmt::format("--into {} is no folder", into.string()), "");
+  }
+
+  void Write(const Starter& starter, const fs::path& model, const fs::path& scenario) {
+    NewFolder a(model, "model.yaml", Filled(starter.model, options_.name));
+    NewFolder b(scenario, "first.yaml", Filled(starter.first, options_.name));
+    std::string trouble = a.Fill();
+    if (trouble.empty()) trouble = b.Fill();
+    if (trouble.empty()) trouble = a.Commit();
+    if (trouble.empty()) {
+      trouble = b.Commit();
+      if (!trouble.empty()) a.TakeBack();
+    }
+    if (!trouble.empty()) {
+      Add(trouble, "choose another folder by --into");
+      return;
+    }
+    for (const NewFolder* folder : {&a, &b}) {
+      result_.files.push_back(folder->path().string());
+    }
+  }
+
+  const InitOptions& options_;
+  InitResult result_;
+};
+
+}  // namespace
+
+InitResult InitModel(const InitOptions& options) { return Initialiser(options).Run(); }
+
+}  // namespace mbv
