@@ -64,6 +64,14 @@ int Model(const ModelArguments& arguments) {
   const LoadResult loaded = LoadModel(*file, options);
   fmt::print(stderr, "{}", loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
+  if (FormatOf(arguments.format) == ModelFormat::kUrdf && !loaded.mechanism->beams.empty()) {
+    Finding finding;
+    finding.severity = Severity::kWarning;
+    finding.file = *file;
+    finding.message = fmt::format("URDF has rigid links only: {} beams are left out",
+                                  loaded.mechanism->beams.size());
+    fmt::print(stderr, "{}", ToText(finding) + "\n");
+  }
   const std::string text = ModelText(*loaded.mechanism, FormatOf(arguments.format));
   if (arguments.out.empty()) {
     fmt::print("{}", text);

@@ -44,6 +44,51 @@ TEST_F(CliTest, WrongUseIsBadInput) {
   }
 }
 
+TEST_F(CliTest, TheMobilityReportIsJsonToo) {
+  const ProgramResult stewart = mbverify("model stewart --format json");
+  EXPECT_EQ(stewart.exit_code, 0) << stewart.err;
+  const auto json = nlohmann::json::parse(stewart.out, nullptr, false);
+  ASSERT_FALSE(json.is_discarded()) << stewart.out;
+  EXPECT_EQ(json["schema"], "mbverify.model/1");
+  EXPECT_EQ(json["name"], "stewart");
+  // 13 bodies and 18 joints in the legs: 6·13 − 6·(4 + 5 + 3) = 6.
+  EXPECT_EQ(json["bodies"], 13);
+  EXPECT_EQ(json["body_coordinates"], 78);
+  EXPECT_EQ(json["constraint_rank"], 72);
+  EXPECT_EQ(json["freedoms"], 6);
+  EXPECT_EQ(json["drives"].size(), 6u);
+  EXPECT_TRUE(json["redundant_constraints"].empty());
+  EXPECT_FALSE(json["home_singular"].get<bool>());
+  // A planar loop of four parallel hinges in space: 18 − 20 by counting, 1 in truth, 3 redundant.
+  const auto four_bar = nlohmann::json::parse(mbverify("model four_bar --format json").out);
+  EXPECT_EQ(four_bar["kutzbach"], -2);
+  EXPECT_EQ(four_bar["freedoms"], 1);
+  EXPECT_EQ(four_bar["home"]["redundant"], 3);
+  ASSERT_EQ(four_bar["loops"].size(), 1u);
+  EXPECT_EQ(four_bar["loops"][0]["screw_rank"], 3);
+  EXPECT_FALSE(four_bar["undetermined_forces"].empty());
+}
+
+TEST_F(CliTest, TheJsonGoesToAFileWholeOrNotAtAll) {
+  const std::string file = (mbverify.folder() / "report.json").string();
+  const ProgramResult written = mbverify("model spr_tripod --format json --out " + file);
+  EXPECT_EQ(written.exit_code, 0) << written.err;
+  EXPECT_EQ(written.out, "");
+  EXPECT_EQ(ReadAll(file), mbverify("model spr_tripod --format json").out);
+  const ProgramResult bad =
+      mbverify("model spr_tripod --format json --set m_rod=-1 --out " + file + ".bad");
+  EXPECT_EQ(bad.exit_code, 2);
+  EXPECT_FALSE(fs::exists(file + ".bad"));
+  EXPECT_EQ(mbverify("model spr_tripod --format yaml").exit_code, 2);
+}
+
+TEST_F(CliTest, UrdfLeavesBeamsOutWithAWarning) {
+  const ProgramResult elastic = mbverify("model models/scara_robot/elastic.yaml --format urdf");
+  EXPECT_EQ(elastic.exit_code, 0);
+  EXPECT_NE(elastic.err.find("URDF has rigid links only"), std::string::npos) << elastic.err;
+  EXPECT_EQ(mbverify("model scara_robot --format urdf").err.find("beams"), std::string::npos);
+}
+
 TEST_F(CliTest, TheWorstScenarioDecidesTheExitCode) {
   const std::string good = kGood, disagrees = kDisagrees, bad = kBadInput, cannot = kCannotRun;
   EXPECT_EQ(mbverify(RunArguments(mbverify, good)).exit_code, 0);
@@ -235,9 +280,9 @@ TEST_F(CliTest, RegressShowsALiveTableOnATerminal) {
       mbverify.OnTerminal("regress --no-pictures --no-history --jobs 1 --out " + mbverify.Out() +
                           " " + kGood + " " + kDisagrees);
   EXPECT_EQ(regress.exit_code, 0) << regress.out;
-  for (const char* part :
-       {"  running  stabilizing_platform/static ", "\x1b[2A\x1b[J",
-        "0 of 2 done, 0 not as expected", "[1/2] fails as it must ", "[2/2] agree ", "2 scenarios"}) {
+  for (const char* part : {"  running  stabilizing_platform/static ", "\x1b[2A\x1b[J",
+                           "0 of 2 done, 0 not as expected", "[1/2] fails as it must ",
+                           "[2/2] agree ", "2 scenarios"}) {
     EXPECT_NE(regress.out.find(part), std::string::npos) << part << "\n" << regress.out;
   }
   // The last thing on the screen is the summary, not a running scenario.

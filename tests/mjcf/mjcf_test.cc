@@ -55,7 +55,9 @@ void ExpectGolden(const std::string& text, const std::string& path) {
 }
 
 const std::string kModels = std::string(MBV_SOURCE_DIR) + "/models/";
-const char* const kShipped[] = {"stabilizing_platform", "spr_tripod", "scara_robot", "cabin_robot"};
+const char* const kShipped[] = {
+    "stabilizing_platform", "spr_tripod", "scara_robot", "cabin_robot", "four_bar",
+    "slider_crank",         "stewart"};
 
 Mechanism Load(const std::string& name) {
   LoadResult result = LoadModel(kModels + name + "/model.yaml");
