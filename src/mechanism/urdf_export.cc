@@ -4,6 +4,7 @@
 #include <cmath>
 #include <functional>
 
+#include "core/markup.h"
 #include "core/spatial.h"
 #include "mechanism/constraints.h"
 #include "mechanism/urdf.h"
@@ -12,29 +13,6 @@
 
 namespace mbv {
 namespace {
-
-std::string Escaped(const std::string& text) {
-  std::string result;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        result += "&amp;";
-        break;
-      case '<':
-        result += "&lt;";
-        break;
-      case '>':
-        result += "&gt;";
-        break;
-      case '"':
-        result += "&quot;";
-        break;
-      default:
-        result += c;
-    }
-  }
-  return result;
-}
 
 // Shortest text that reads back as the same number; adding zero turns -0 into 0.
 std::string Xyz(const Vec3& v) {
@@ -92,7 +70,7 @@ class ShapeWriter {
 
 std::string LinkText(const Body& body, const Pose& X_BL) {
   const Pose X_LB = X_BL.inverse();
-  std::string text = fmt::format("  <link name=\"{}\">\n", Escaped(body.name));
+  std::string text = fmt::format("  <link name=\"{}\">\n", EscapeMarkup(body.name));
   if (body.mass > 0.0) {
     const Mat3 I = X_LB.linear() * body.I_Bcm_B * X_LB.linear().transpose();
     text += fmt::format(
@@ -129,12 +107,12 @@ std::string JointText(const Mechanism& mechanism, int tree_index,
   for (size_t k = 0; k < steps.size(); ++k) {
     const bool last = k + 1 == steps.size();
     const std::string child = last ? mechanism.bodies[outboard].name : steps[k].name + ".link";
-    if (!last) text += fmt::format("  <link name=\"{}\"/>\n", Escaped(child));
+    if (!last) text += fmt::format("  <link name=\"{}\"/>\n", EscapeMarkup(child));
     text += fmt::format(
         "  <joint name=\"{}\" type=\"{}\">{}<parent link=\"{}\"/>"
         "<child link=\"{}\"/>",
-        Escaped(steps[k].name), steps[k].type, Origin(k == 0 ? X_LJ : Pose::Identity()),
-        Escaped(parent), Escaped(child));
+        EscapeMarkup(steps[k].name), steps[k].type, Origin(k == 0 ? X_LJ : Pose::Identity()),
+        EscapeMarkup(parent), EscapeMarkup(child));
     if (steps[k].type != "fixed" && steps[k].type != "floating") {
       text += fmt::format("<axis xyz=\"{}\"/>", Xyz(steps[k].axis));
     }
@@ -226,7 +204,7 @@ std::string WriteUrdf(const Mechanism& mechanism) {
       "<!-- {0}, by mbverify: spanning tree, and the closed loops as constraint elements, which\n"
       "plain URDF does not know. As model.yaml, the lines below complete this file.\n{1}-->\n"
       "<robot name=\"{0}\">\n",
-      Escaped(mechanism.name), comment);
+      EscapeMarkup(mechanism.name), comment);
   for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
     text += LinkText(mechanism.bodies[b], frames[b]);
   }

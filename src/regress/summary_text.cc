@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "core/markup.h"
 #include "regress/summaries.h"
 
 namespace mbv {
@@ -37,31 +38,13 @@ bool OfStiffness(const std::pair<const std::string, MetricValue>& key) {
 }  // namespace
 
 std::string EscapeXml(const std::string& text) {
-  std::string escaped;
+  std::string valid;
   for (size_t i = 0; i < text.size();) {
     const size_t length = SequenceLength(text, i);
-    switch (text[i]) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += text.substr(i, length);
-    }
+    valid += text.substr(i, length);
     i += std::max<size_t>(length, 1);
   }
-  return escaped;
+  return EscapeMarkup(valid);
 }
 
 std::string CountsText(const Counts& counts) {

@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "core/demand.h"
+#include "core/markup.h"
 
 namespace mbv {
 namespace {
@@ -17,32 +18,7 @@ std::string CellHtml(const Cell& cell, const char* tag, const char* scope) {
 
 }  // namespace
 
-std::string Escape(std::string_view text) {
-  std::string escaped;
-  escaped.reserve(text.size());
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        escaped += "&amp;";
-        break;
-      case '<':
-        escaped += "&lt;";
-        break;
-      case '>':
-        escaped += "&gt;";
-        break;
-      case '"':
-        escaped += "&quot;";
-        break;
-      case '\'':
-        escaped += "&#39;";
-        break;
-      default:
-        escaped += c;
-    }
-  }
-  return escaped;
-}
+std::string Escape(std::string_view text) { return EscapeMarkup(text); }
 
 std::string Base64(std::string_view bytes) {
   static constexpr char kDigits[] =
