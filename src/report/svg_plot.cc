@@ -17,6 +17,8 @@ namespace {
 constexpr std::array<const char*, 7> kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
                                                 "#e69f00", "#56b4e9", "#000000"};
 constexpr double kWidth = 720, kHeight = 520;
+constexpr double kRoundOff = 1e-9;  // a smaller relative range is shown as a constant
+constexpr int kMostTicks = 16;
 constexpr double kLeft = 84, kRight = 24, kTop = 44, kBottom = 60;
 
 struct Axis {
@@ -34,8 +36,10 @@ struct Axis {
   }
   void Pad() {
     if (!(low <= high)) low = 0, high = 1;
-    const double pad =
-        high > low ? 0.04 * (high - low) : (log ? 0.5 : std::max(1e-12, std::abs(high)));
+    // Round-off of a constant is no range to show: between its ends no tick could be told apart.
+    const double largest = std::max(std::abs(low), std::abs(high));
+    const bool constant = log ? high <= low : high - low <= kRoundOff * largest;
+    const double pad = !constant ? 0.04 * (high - low) : log ? 0.5 : std::max(1e-12, largest);
     low -= pad;
     high += pad;
   }
@@ -57,8 +61,9 @@ struct Axis {
                         : raw / power < 3.5 ? 2 * power
                         : raw / power < 7.5 ? 5 * power
                                             : 10 * power;
-    for (double v = std::ceil(low / unit) * unit; v <= high; v += unit) {
-      ticks.push_back(std::abs(v) < 1e-9 * unit ? 0.0 : v);
+    const double first = std::ceil(low / unit);
+    for (int k = 0; k <= kMostTicks && (first + k) * unit <= high; ++k) {
+      ticks.push_back((first + k) * unit);
     }
     return ticks;
   }

@@ -37,6 +37,18 @@ TEST(SvgPlot, MissingAndNonPositiveValuesBreakALogarithmicLine) {
   EXPECT_EQ(svg.find("inf"), std::string::npos);
 }
 
+TEST(SvgPlot, RoundOffOfAConstantIsDrawnAsAConstant) {
+  // One unit in the last place between the ends: ticks of that range would never end.
+  const double next = std::nextafter(0.6, 1.0);
+  const LinePlot plot{.title = "t",
+                      .x_label = "x",
+                      .y_label = "y",
+                      .lines = {{.label = "", .points = {{0, 0.6}, {1, next}, {2, 0.6}}}}};
+  const std::string svg = ToSvg(plot);
+  EXPECT_LT(Count(svg, "<line"), 40u);
+  EXPECT_GE(Count(svg, "<line"), 4u);
+}
+
 TEST(SvgPlot, AMapLeavesMissingCellsBlankAndEndsInItsTwoColours) {
   const MapPlot plot{.title = "m",
                      .x_label = "x",
