@@ -2,6 +2,7 @@
 #pragma once
 
 #include <map>
+#include <ostream>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,8 @@ struct Subject {
   /// equations with coupled drives are for a level platform).
   [[nodiscard]] bool IsHeld(size_t k) const { return held[k]; }
   std::vector<bool> held;
+  /// Commands that are neither held nor base motion.
+  [[nodiscard]] std::vector<size_t> FreeCommands() const;
 };
 
 /// Every model folder and every registered closed form.
@@ -47,6 +50,7 @@ struct Subject {
 
 enum class Regime { kFirstSample, kClose, kRandom, kNearSingular };
 [[nodiscard]] const std::string& NameOf(Regime regime);
+void PrintTo(Regime regime, std::ostream* out);  ///< for GoogleTest
 
 struct State {
   std::string name;
