@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/force_scale.h"
 #include "core/spatial.h"
 #include "mechanism/channels.h"
 
@@ -17,7 +18,7 @@ constexpr double kAccelerationFloor = 1e-3;
 constexpr double kMomentArm_m = 1e-3;
 // A drive whose force is smaller than this share of its unit's RMS is judged by that share: a drive
 // that holds nothing has no scale of its own.
-constexpr double kIdleDrive = 1e-3;
+constexpr double kIdleDrive = ForceScale::kIdle;
 
 // The same channel in both traces; absent if `measured` < 0 or `truth` < 0.
 struct Columns {
@@ -55,14 +56,15 @@ void KeepWorst(std::map<Metric, Measured>* metrics, Metric metric, const Measure
   KeepWorst(&(*metrics)[metric], measured.value, measured.time_s, measured.channel);
 }
 
-DriveMetrics DriveMetricsOf(const Drive& drive, const std::string& unit, const ErrorSum& force) {
+DriveMetrics DriveMetricsOf(const Drive& drive, const std::string& unit, const ErrorSum& force,
+                            double floor) {
   return {.drive = drive.name,
           .unit = unit,
           .rms_truth = force.rms_truth(),
-          .nrmse = force.Nrmse(),
+          .nrmse = force.Nrmse(floor),
           .max_error = force.max_error(),
-          .max_relative = force.MaxRelative(),
-          .digits = MatchingDigits(force.Nrmse()),
+          .max_relative = force.MaxRelative(floor),
+          .digits = MatchingDigits(force.Nrmse(floor)),
           .time_s = force.worst_time_s()};
 }
 
@@ -94,6 +96,7 @@ void FitFactor(const PairReader& reader, Columns columns, double start_s, DriveM
 void CompareForces(const ComparisonInput& input, const PairReader& reader, PairComparison* pair) {
   std::map<std::string, ErrorSum> pooled;
   std::vector<std::pair<std::string, ErrorSum>> drives;  // unit and sums, as pair->drives
+  const ForceScale scale = ForceScaleOf(input, reader.truth);
   size_t wanted = 0;
   for (size_t d = 0; d < input.mechanism->drives.size(); ++d) {
     if (input.motion->FindForce(static_cast<int>(d)) >= 0) continue;  // given to both
@@ -105,19 +108,21 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
     const ErrorSum sum = reader.Sum(channel, columns, input.start_window_s, false);
     if (sum.count() == 0) continue;
     const std::string unit = ForceUnit(*input.mechanism, drive);
-    pair->drives.push_back(DriveMetricsOf(drive, unit, sum));
+    pair->drives.push_back(DriveMetricsOf(drive, unit, sum, scale.Floor(unit)));
     FitFactor(reader, columns, input.start_window_s, &pair->drives.back());
     pair->force_samples = sum.count();
     pooled[unit].Merge(sum);
     drives.emplace_back(unit, sum);
   }
   for (const auto& [unit, sum] : drives) {
-    const double floor = kIdleDrive * pooled[unit].rms_truth();
+    const double idle = kIdleDrive * pooled[unit].rms_truth();
+    const double floor = std::isnan(idle) ? idle : std::max(idle, scale.Floor(unit));
     KeepWorst(&pair->metrics, Metric::kForceOwn, AsMeasured(sum, sum.Nrmse(floor)));
   }
   for (const auto& [unit, sum] : pooled) {
-    KeepWorst(&pair->metrics, Metric::kForceNrmse, AsMeasured(sum, sum.Nrmse()));
-    KeepWorst(&pair->metrics, Metric::kForceMax, AsMeasured(sum, sum.MaxRelative()));
+    KeepWorst(&pair->metrics, Metric::kForceNrmse, AsMeasured(sum, sum.Nrmse(scale.Floor(unit))));
+    KeepWorst(&pair->metrics, Metric::kForceMax,
+              AsMeasured(sum, sum.MaxRelative(scale.Floor(unit))));
   }
   // A table need not hold every drive.
   const bool table = input.table != nullptr && (reader.measured.witness == "reference" ||
@@ -208,6 +213,7 @@ void CompareReactions(const ComparisonInput& input, const PairReader& reader,
                       PairComparison* pair) {
   ErrorSum forces, moments;
   for (const Joint& joint : input.mechanism->joints) {
+    if (FreedomsOf(joint.kind) == 6) continue;  // transmits nothing
     bool compared = false;
     for (const Channel& channel : ReactionChannels(joint)) {
       const Columns c = reader.Find(channel.name);
@@ -225,11 +231,13 @@ void CompareReactions(const ComparisonInput& input, const PairReader& reader,
     }
     if (compared) pair->reactions.push_back(joint.name);
   }
+  const double least = ForceScaleOf(input, reader.truth).Floor("N");
   if (forces.count() > 0) {
-    KeepWorst(&pair->metrics, Metric::kReaction, AsMeasured(forces, forces.Nrmse()));
+    KeepWorst(&pair->metrics, Metric::kReaction, AsMeasured(forces, forces.Nrmse(least)));
   }
   if (moments.count() > 0) {
-    const double floor = forces.count() > 0 ? forces.rms_truth() * kMomentArm_m : 0.0;
+    const double rms = forces.count() > 0 ? forces.rms_truth() : 0.0;
+    const double floor = (std::isnan(rms) ? rms : std::max(rms, least)) * kMomentArm_m;
     KeepWorst(&pair->metrics, Metric::kReaction, AsMeasured(moments, moments.Nrmse(floor)));
   }
 }

@@ -104,10 +104,33 @@ struct PairComparison {
   [[nodiscard]] std::string name() const { return measured + "_vs_" + truth; }
 };
 
+/// One place where energy came from or went.
+struct EnergyPart {
+  std::string name;  ///< "kinetic energy", "gravity", "springs", a drive, "loads", "dampers", …
+  bool stored = false;   ///< a change of energy since the start; otherwise work put in
+  double end_J = kNan;   ///< at the end
+  double most_J = kNan;  ///< largest magnitude
+};
+
+/// The energy balance of one run.
+struct EnergyAudit {
+  std::string witness;
+  bool integrated = false;  ///< the witness integrated the work; otherwise cubics through samples
+  std::vector<EnergyPart> parts;
+  double scale_J = kNan;                      ///< energy turned over
+  Measured drift;                             ///< largest |energy − start − work| / scale
+  double drift_J = kNan, end_drift_J = kNan;  ///< largest, and at the end
+  double from_s = kNan;                       ///< first sample beyond the limit; NaN if none
+  std::string culprit;                        ///< part that the drift is proportional to, or ""
+  double share = kNan;                        ///< drift = share · part
+  std::string text;                           ///< one sentence; "" without a drift beyond the limit
+};
+
 /// What one witness shows by itself.
 struct WitnessMetrics {
   std::string witness;
   std::map<Metric, Measured> metrics;
+  std::optional<EnergyAudit> energy = {};
 };
 
 struct CheckResult {

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/energy_audit.h"
+#include "comparison/force_scale.h"
 
 namespace mbv {
 namespace {
@@ -74,37 +76,6 @@ void MeasureStart(const ComparisonInput& input, const Trace& trace, WitnessMetri
   }
 }
 
-// Energy against that of the start and the work of drives, base, loads and dampers since. The work
-// is the integral of the cubics through four samples of the power.
-void MeasureEnergy(const Trace& trace, WitnessMetrics* out) {
-  const int kinetic = trace.Find("energy.kinetic"), potential = trace.Find("energy.potential");
-  const int power = trace.Find("power.input");
-  const auto n = static_cast<Eigen::Index>(trace.time_s.size());
-  if (kinetic < 0 || potential < 0 || power < 0 || n < 4) return;
-  const VecX T = trace.values.col(kinetic), P = trace.values.col(power);
-  const VecX E = T + trace.values.col(potential);
-  const double h = trace.time_s[1] - trace.time_s[0];
-  VecX work = VecX::Zero(n);
-  for (Eigen::Index i = 0; i + 1 < n; ++i) {
-    double sum = 0.0;
-    if (i == 0) {
-      sum = 9 * P[0] + 19 * P[1] - 5 * P[2] + P[3];
-    } else if (i + 2 < n) {
-      sum = -P[i - 1] + 13 * P[i] + 13 * P[i + 1] - P[i + 2];
-    } else {
-      sum = P[i - 2] - 5 * P[i - 1] + 19 * P[i] + 9 * P[i + 1];
-    }
-    work[i + 1] = work[i] + h / 24.0 * sum;
-  }
-  const VecX drift = (E.array() - E[0]).matrix() - work;
-  const double scale = std::max(T.maxCoeff(), work.cwiseAbs().maxCoeff());
-  for (Eigen::Index i = 0; i < n; ++i) {
-    const double value = drift[i] == 0.0 ? 0.0 : std::abs(drift[i]) / scale;
-    KeepWorst(&out->metrics[Metric::kEnergy], value, trace.time_s[static_cast<size_t>(i)],
-              "energy.kinetic");
-  }
-}
-
 void MeasureClosure(const Trace& trace, WitnessMetrics* out) {
   for (const auto& [name, metric] : {std::pair{"closure.position", Metric::kClosureM},
                                      std::pair{"closure.rotation", Metric::kClosureRad}}) {
@@ -117,21 +88,57 @@ void MeasureClosure(const Trace& trace, WitnessMetrics* out) {
   }
 }
 
+// Input without the word of the witness for it: what the recorded forces do at the recorded
+// velocities. Nothing where the trace lacks a part.
+std::optional<VecX> InputOf(const Mechanism& mechanism, const Trace& trace) {
+  VecX input = VecX::Zero(trace.values.rows());
+  for (const Drive& drive : mechanism.drives) {
+    const int force = trace.Find(drive.name + ".force");
+    const int velocity = trace.Find(drive.name + ".velocity");
+    if (force < 0 || velocity < 0) return {};
+    input += trace.values.col(force).cwiseProduct(trace.values.col(velocity));
+  }
+  for (const char* part : {"power.base", "power.loads", "power.dampers"}) {
+    const int column = trace.Find(part);
+    if (column < 0) return {};
+    input += trace.values.col(column);
+  }
+  return input;
+}
+
+// Where power flows within the mechanism and little comes in, the flow is the scale: what gravity
+// and springs exchange with the motion, and the kinetic energy per duration.
+double PowerScale(const ComparisonInput& input, const Trace& trace) {
+  double scale = kSlowest * ForceScaleOf(input, trace).Floor("N");
+  const auto largest = [&](const std::string& name) {
+    const int column = trace.Find(name);
+    return column < 0 ? 0.0 : trace.values.col(column).cwiseAbs().maxCoeff();
+  };
+  for (const char* name : {"power.input", "power.energy_rate", "power.base", "power.loads",
+                           "power.dampers", "power.gravity", "power.springs"}) {
+    scale = std::max(scale, largest(name));
+  }
+  const double duration_s = trace.time_s.back() - trace.time_s.front();
+  if (duration_s > 0.0) scale = std::max(scale, largest("energy.kinetic") / duration_s);
+  for (const Drive& drive : input.mechanism->drives) {
+    scale = std::max(scale, kSlowest * largest(drive.name + ".force"));
+  }
+  return scale;
+}
+
 void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
   const int in = trace.Find("power.input"), rate = trace.Find("power.energy_rate");
   if (in < 0 || rate < 0 || trace.time_s.empty()) return;
-  double scale = std::max(trace.values.col(in).cwiseAbs().maxCoeff(),
-                          trace.values.col(rate).cwiseAbs().maxCoeff());
-  for (const Drive& drive : input.mechanism->drives) {
-    const int force = trace.Find(drive.name + ".force");
-    if (force < 0) continue;
-    scale = std::max(scale, kSlowest * trace.values.col(force).cwiseAbs().maxCoeff());
-  }
-  for (size_t i = 0; i < trace.time_s.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    const double error = std::abs(trace.values(row, in) - trace.values(row, rate));
-    KeepWorst(&out->metrics[Metric::kPower], error == 0.0 ? 0.0 : error / scale, trace.time_s[i],
-              "power.input");
+  const double scale = PowerScale(input, trace);
+  std::vector<VecX> inputs = {trace.values.col(in)};
+  if (auto recorded = InputOf(*input.mechanism, trace)) inputs.push_back(*std::move(recorded));
+  for (const VecX& power : inputs) {
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      const double error = std::abs(power[row] - trace.values(row, rate));
+      KeepWorst(&out->metrics[Metric::kPower], error == 0.0 ? 0.0 : error / scale, trace.time_s[i],
+                "power.input");
+    }
   }
 }
 
@@ -196,9 +203,13 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   if (input.table != nullptr && trace.witness == "reference") return metrics;
   MeasureClosure(trace, &metrics);
   MeasurePower(input, trace, &metrics);
-  if (input.motion->free()) {
-    MeasureStart(input, trace, &metrics);
-    MeasureEnergy(trace, &metrics);
+  if (input.motion->free()) MeasureStart(input, trace, &metrics);
+  const LimitColumn column =
+      trace.witness == "simulated" ? input.simulation_limits : LimitColumn::kReference;
+  metrics.energy = AuditEnergy(input, trace, input.limits[Metric::kEnergy].Of(column));
+  // Work from samples has their error; only integrated work is judged.
+  if (metrics.energy && metrics.energy->integrated) {
+    metrics.metrics[Metric::kEnergy] = metrics.energy->drift;
   }
   // An integrated velocity carries the integrator's error; only computed ones are checked.
   if (trace.witness != "simulated") MeasureDerivatives(input, trace, &metrics);

@@ -73,8 +73,8 @@ double ErrorSum::Nrmse(double floor) const {
   return Ratio(rms_error(), LargerOrNan(rms_truth(), floor));
 }
 
-double ErrorSum::MaxRelative() const {
-  return count_ == 0 ? kNan : Ratio(worst_.value, max_truth_);
+double ErrorSum::MaxRelative(double floor) const {
+  return count_ == 0 ? kNan : Ratio(worst_.value, LargerOrNan(max_truth_, floor));
 }
 
 double MatchingDigits(double relative_error) {

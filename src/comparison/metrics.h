@@ -44,8 +44,8 @@ class ErrorSum {
 
   /// RMS error / max(RMS truth, floor); 0/0 is 0 (both signals vanish), x/0 is infinite.
   [[nodiscard]] double Nrmse(double floor = 0.0) const;
-  /// Largest error / largest truth, same conventions.
-  [[nodiscard]] double MaxRelative() const;
+  /// Largest error / max(largest truth, floor), same conventions.
+  [[nodiscard]] double MaxRelative(double floor = 0.0) const;
 
  private:
   double sum_error2_ = 0.0, sum_truth2_ = 0.0, max_truth_ = 0.0;

@@ -53,14 +53,25 @@ std::vector<Channel> ReactionChannels(const Joint& joint) {
 }
 
 std::vector<Channel> AuditChannels() {
-  return {{"closure.position", "m", ""},
-          {"closure.rotation", "rad", ""},
-          {"power.input", "W", ""},
-          {"power.energy_rate", "W", ""}};
+  return {
+      {"closure.position", "m", ""},  {"closure.rotation", "rad", ""}, {"power.input", "W", ""},
+      {"power.energy_rate", "W", ""}, {"power.base", "W", ""},         {"power.loads", "W", ""},
+      {"power.dampers", "W", ""},     {"power.gravity", "W", ""},      {"power.springs", "W", ""}};
 }
 
 std::vector<Channel> EnergyChannels() {
-  return {{"energy.kinetic", "J", ""}, {"energy.potential", "J", ""}};
+  return {{"energy.kinetic", "J", ""}, {"energy.gravity", "J", ""}, {"energy.springs", "J", ""}};
+}
+
+std::vector<Channel> WorkChannels(const Mechanism& mechanism) {
+  std::vector<Channel> channels;
+  for (const Drive& drive : mechanism.drives) channels.push_back({drive.name + ".work", "J", ""});
+  for (const Prescribed& base : mechanism.prescribed) {
+    channels.push_back({base.name + ".work", "J", ""});
+  }
+  channels.push_back({"loads.work", "J", ""});
+  channels.push_back({"dampers.work", "J", ""});
+  return channels;
 }
 
 }  // namespace mbv

@@ -19,10 +19,14 @@ namespace mbv {
 /// excluded), about M's origin, in F's axes.
 [[nodiscard]] std::vector<Channel> ReactionChannels(const Joint& joint);
 /// closure.position [m], closure.rotation [rad]: largest loop gap;
-/// power.input [W]: Σ drive + base + load power; power.energy_rate [W]: d/dt(kinetic + potential).
+/// power.input [W]: Σ drive + base + load power − damping; power.energy_rate [W]: d/dt(kinetic +
+/// gravity + springs); then the parts of both that are not drives: power.base (prescribed joints),
+/// power.loads, power.dampers (≤ 0), power.gravity, power.springs (what they put in).
 [[nodiscard]] std::vector<Channel> AuditChannels();
-/// Free motion only: energy.kinetic and energy.potential [J] (gravity from the world's origin,
-/// springs).
+/// energy.kinetic, energy.gravity (from the world's origin) and energy.springs [J].
 [[nodiscard]] std::vector<Channel> EnergyChannels();
+/// Where a witness integrates the motion: work since the start [J] as NAME.work for every drive,
+/// then every prescribed joint, then loads.work and dampers.work.
+[[nodiscard]] std::vector<Channel> WorkChannels(const Mechanism& mechanism);
 
 }  // namespace mbv

@@ -8,8 +8,8 @@
 #include <optional>
 #include <unordered_map>
 
+#include "mechanism/break_times.h"
 #include "pipeline/prepare.h"
-#include "simulation/steps.h"
 
 namespace mbv {
 namespace {
@@ -92,7 +92,7 @@ class Study {
     const double coarsest = options_.steps_s.front();
     m.sample_s = coarsest * std::ceil(m.sample_s / coarsest - 1e-9);
     m.duration_s = m.sample_s * std::max(1.0, std::floor(m.duration_s / m.sample_s + 1e-9));
-    std::vector<double> breaks = simulation::MotionBreaks(m);
+    std::vector<double> breaks = BreakTimes(m);
     std::erase_if(breaks, [&](double t) { return t <= 0.0 || t >= m.duration_s; });
     breaks.erase(std::unique(breaks.begin(), breaks.end()), breaks.end());
     report().scenario = prepared_->scenario.name;

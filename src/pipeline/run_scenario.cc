@@ -108,6 +108,31 @@ class ScenarioRun {
     return line;
   }
 
+  // Drives that share a force among them, unless all of them are given it.
+  void NameSharedDrives(const Mobility& mobility) {
+    std::string names;
+    bool moments = false, forces = false;
+    for (size_t d = 0; d < base().drives.size(); ++d) {
+      const Drive& drive = base().drives[d];
+      const auto& shared = mobility.drives_not_unique;
+      if (scenario().motion.FindForce(static_cast<int>(d)) >= 0) continue;
+      if (std::find(shared.begin(), shared.end(), drive.name) == shared.end()) continue;
+      report_.drives_not_unique.push_back(drive.name);
+      names += (names.empty() ? "" : ", ") + drive.name;
+      (ForceUnit(base(), drive) == "N" ? forces : moments) = true;
+    }
+    if (report_.drives_not_unique.size() < 2) {
+      report_.drives_not_unique.clear();
+      return;
+    }
+    std::string text = "drive forces not unique: minimum norm over " + names;
+    if (moments && forces) {
+      text += fmt::format(", moments divided by the characteristic length {:.4g} m",
+                          CharacteristicLength(base()));
+    }
+    AddWarning(text);
+  }
+
   void AddWitness(const std::string& name, RunSummary summary, Trace trace) {
     trace.witness = name;
     report_.witnesses.push_back({name, std::move(summary), std::move(trace)});
@@ -248,7 +273,7 @@ class ScenarioRun {
     other_engine_ = std::move(witness.run);
   }
 
-  ComparisonInput MakeComparisonInput() const {
+  ComparisonInput MakeComparisonInput(const Mobility& mobility) const {
     ComparisonInput input{.mechanism = &base(),
                           .motion = &scenario().motion,
                           .limits = scenario().checks,
@@ -258,7 +283,7 @@ class ScenarioRun {
                           .start_window_s = scenario().start_window_s,
                           .witnesses = {},
                           .driven_by = report_.driven_by,
-                          .joints_not_unique = AnalyseMobility(base()).joints_not_unique,
+                          .joints_not_unique = mobility.joints_not_unique,
                           .table = table_ ? &*table_ : nullptr};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
@@ -268,7 +293,9 @@ class ScenarioRun {
   }
 
   void Judge() {
-    const ComparisonInput input = MakeComparisonInput();
+    const Mobility mobility = AnalyseMobility(base());
+    NameSharedDrives(mobility);
+    const ComparisonInput input = MakeComparisonInput(mobility);
     report_.comparison = Compare(input);
     report_.sheets = SheetsOf(base(), report_.comparison);
     if (other_engine_) CompareEngines(input);

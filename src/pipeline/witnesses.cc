@@ -153,7 +153,8 @@ Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, doub
   for (size_t c = 0; c < a.channels.size(); ++c) {
     const auto column = static_cast<Eigen::Index>(c);
     const Channel& channel = a.channels[c];
-    if (channel.unit == "N" || channel.unit == "N m" || channel.unit == "W") {
+    if (channel.unit == "N" || channel.unit == "N m" || channel.unit == "W" ||
+        channel.unit == "J") {
       trace.values.col(column) += factor * (b.values.col(column) - a.values.col(column));
     } else if (channel.name.starts_with("closure.")) {
       const auto worse = [](double x, double y) { return std::isnan(x) || x > y ? x : y; };

@@ -7,6 +7,7 @@
 #include "core/demand.h"
 #include "core/spatial.h"
 #include "reference/closure_failure.h"
+#include "reference/least_forces.h"
 
 namespace mbv::internal {
 namespace {
@@ -39,6 +40,7 @@ ForceSolver::ForceSolver(const Mechanism& mechanism)
 void ForceSolver::FillRows(const BodyStates& states) {
   rows_.Clear();
   AddReactionRows(mechanism_, states, &rows_);
+  first_driven_ = rows_.size();
   for (const Drive& drive : mechanism_.drives) {
     rows_.Add(DriveRow(mechanism_, drive, states), PositionUnit(mechanism_, drive) == "rad");
   }
@@ -130,9 +132,9 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
   if (rest_.empty()) return force;
   VecX scale(rows_.size());
   for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
-  const VecX scaled = force.cwiseQuotient(scale);
-  const VecX share = self_stress_.householderQr().solve(scaled);
-  return scale.cwiseProduct(scaled - self_stress_ * share);
+  VecX scaled = force.cwiseQuotient(scale);
+  TakeLeastForces(self_stress_, first_driven_, &scaled);
+  return scale.cwiseProduct(scaled);
 }
 
 RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample) {
@@ -154,13 +156,7 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
     const VecX force = LeastNorm(wrenches);
     if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
     Report(force, sample);
-    const PowerAudit audit = AuditPower(mechanism_, sample->states, loads);
-    sample->energy_rate_W = audit.energy_rate_W;
-    sample->power_input_W = audit.loads_and_dampers_W;
-    const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
-    sample->power_input_W += sample->drive_force.dot(sample->driven.velocity.head(drives));
-    sample->power_input_W += sample->prescribed_force.dot(
-        sample->driven.velocity.tail(sample->driven.velocity.size() - drives));
+    AuditSample(mechanism_, loads, sample);
     return RunSummary::Done();
   }
   RunSummary summary;

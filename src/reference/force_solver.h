@@ -19,8 +19,7 @@ class ForceSolver {
   explicit ForceSolver(const Mechanism& mechanism);
 
   /// Fills forces, reactions and the power audit of `sample` from its states and driven motion.
-  /// Where the equations leave a choice, the forces of least norm are taken (moments divided by the
-  /// characteristic length).
+  /// Where the equations leave a choice, TakeLeastForces() decides.
   [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample);
 
  private:
@@ -35,7 +34,8 @@ class ForceSolver {
   const Mechanism& mechanism_;
   const double length_;
   SquareSystem system_;
-  RowSet rows_;  ///< reaction rows of all joints, drives, prescribed joints
+  RowSet rows_;           ///< reaction rows of all joints, drives, prescribed joints
+  int first_driven_ = 0;  ///< row of the first drive
   std::vector<int> basis_, rest_;
   bool basis_is_new_ = true, chosen_ = false;
   int orientation_ = 0;  ///< sign of the determinant so far, where the forces are unique
@@ -54,17 +54,12 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ve
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W);
 
-/// Power of the loads and dampers, and d/dt of kinetic plus potential energy (gravity, springs).
-struct PowerAudit {
-  double loads_and_dampers_W = 0.0;
-  double energy_rate_W = 0.0;
-};
-/// Energies [J]; gravity's counts from the world's origin.
-struct Energies {
-  double kinetic = 0.0, potential = 0.0;
-};
 [[nodiscard]] Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states);
-[[nodiscard]] PowerAudit AuditPower(const Mechanism& mechanism, const BodyStates& states,
-                                    const std::vector<LoadSample>& loads);
+/// Powers but for the base and the input.
+[[nodiscard]] Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
+                              const std::vector<LoadSample>& loads);
+/// Energies and all powers of a sample whose forces and driven motion are known.
+void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& loads,
+                 ReferenceSample* sample);
 
 }  // namespace mbv::internal

@@ -1,8 +1,10 @@
 // Free motion of the reference: forward dynamics of any Mechanism.
 //
 // Poses and twists of all bodies are integrated by Runge–Kutta–Fehlberg 7(8) with error control
-// (Boost.Odeint) from accelerations of FreeDynamics; after every step the poses are put back onto
-// the loops and commands, then the twists. No MuJoCo and no paper formula.
+// (Boost.Odeint) from accelerations of FreeDynamics, and with them the work of every drive; after
+// every step the poses are put back onto the loops and commands, then the twists. Poses where the
+// loops lose a constraint for an instant are passed (free_motion.h). No MuJoCo and no paper
+// formula.
 #pragma once
 
 #include <string>
@@ -35,14 +37,15 @@ struct SingularPassage {
 };
 
 struct ForwardRun {
-  Trace trace;         ///< the reference's channels, then EnergyChannels()
+  Trace trace;         ///< the reference's channels, then WorkChannels()
   RunSummary summary;  ///< kSingular, kNoConvergence, kUnsupported, or what the start failed with
   BodyStates start;    ///< at t = 0
   long steps = 0, evaluations = 0;
   std::vector<SingularPassage> singular;
   /// Largest difference over all samples to the run with 100 times the tolerance, in drive
   /// positions and outputs, lengths over the characteristic length [1]: an upper estimate of the
-  /// integration error. NaN if not measured.
+  /// integration error. Where the samples alone set the steps, to a run with half of them. At least
+  /// round-off; NaN if not measured.
   double uncertainty = kNan;
   /// Largest ratio of the distance between two motions to that of their starts: how much a
   /// difference of the witnesses grows by itself. NaN if not measured.

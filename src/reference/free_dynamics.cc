@@ -10,6 +10,7 @@
 #include "reference/closure_failure.h"
 #include "reference/closure_solver.h"
 #include "reference/force_solver.h"
+#include "reference/least_forces.h"
 #include "reference/square_system.h"
 
 namespace mbv::internal {
@@ -234,16 +235,24 @@ void FreeDynamics::Gaps(const BodyStates& states, double* position_m, double* ro
   }
 }
 
-RunSummary FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
+VecX FreeDynamics::GivenOr(double t_s, const VecX& solved) const {
+  VecX force(static_cast<Eigen::Index>(mechanism_.drives.size()));
+  Eigen::Index next = 0;
+  for (Eigen::Index d = 0; d < force.size(); ++d) {
+    const int given = motion_.FindForce(static_cast<int>(d));
+    force[d] = given >= 0 ? Evaluate(motion_.forces[given].force, t_s).value : solved[next++];
+  }
+  return force;
+}
+
+void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   const BodyStates& states = sample->states;
   EvaluateMotion(motion_, t_s, &command_);
   RowSet rows;
   AddReactionRows(mechanism_, states, &rows);
-  const int first_drive = rows.size();
-  std::vector<int> row_of_drive(mechanism_.drives.size(), -1);
+  const int first_driven = rows.size();
   for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
     if (motion_.FindForce(static_cast<int>(d)) >= 0) continue;
-    row_of_drive[d] = rows.size();
     rows.Add(DriveRow(mechanism_, mechanism_.drives[d], states),
              PositionUnit(mechanism_, mechanism_.drives[d]) == "rad");
   }
@@ -271,26 +280,50 @@ RunSummary FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
   cod.compute(columns);
   VecX force = cod.solve(wrenches);
   force += cod.solve(wrenches - columns * force);  // refinement
-  force = force.cwiseProduct(scale);
-
-  MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == first_drive,
-             first_drive);
-  const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
-  sample->drive_force.resize(drives);
-  for (Eigen::Index d = 0; d < drives; ++d) {
-    const int given_index = motion_.FindForce(static_cast<int>(d));
-    sample->drive_force[d] = given_index >= 0
-                                 ? Evaluate(motion_.forces[given_index].force, t_s).value
-                                 : force[row_of_drive[d]];
+  if (cod.rank() < columns.cols()) {
+    const MatX Q = Eigen::ColPivHouseholderQR<MatX>(columns.transpose()).householderQ();
+    TakeLeastForces(Q.rightCols(columns.cols() - cod.rank()), first_driven, &force);
   }
+  force = force.cwiseProduct(scale);
+  MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == first_driven,
+             first_driven);
+  sample->drive_force = GivenOr(t_s, force.segment(first_driven, first_prescribed - first_driven));
   sample->prescribed_force = force.tail(rows.size() - first_prescribed);
-  const PowerAudit audit = AuditPower(mechanism_, states, command_.loads);
-  sample->energy_rate_W = audit.energy_rate_W;
-  sample->power_input_W =
-      audit.loads_and_dampers_W + sample->drive_force.dot(sample->driven.velocity.head(drives)) +
-      sample->prescribed_force.dot(
-          sample->driven.velocity.tail(sample->driven.velocity.size() - drives));
-  return RunSummary::Done();
+}
+
+void FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
+  SolveForces(t_s, sample);
+  AuditSample(mechanism_, command_.loads, sample);
+}
+
+VecX FreeDynamics::WorkRates(double t_s, const BodyStates& states) {
+  ReferenceSample sample;
+  sample.states = states;
+  if (motion_.commands.empty() && mechanism_.prescribed.empty()) {
+    EvaluateMotion(motion_, t_s, &command_);
+    sample.drive_force =
+        GivenOr(t_s, VecX::Zero(static_cast<Eigen::Index>(mechanism_.drives.size())));
+  } else {
+    SolveForces(t_s, &sample);
+  }
+  VecX rates(works());
+  Eigen::Index next = 0;
+  const auto put = [&](double force, const ScalarRow& row) {
+    rates[next++] = force * (row.J_parent.dot(states.V_WB[row.parent]) +
+                             row.J_child.dot(states.V_WB[row.child]));
+  };
+  for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+    put(sample.drive_force[static_cast<Eigen::Index>(d)],
+        DriveRow(mechanism_, mechanism_.drives[d], states));
+  }
+  for (size_t p = 0; p < mechanism_.prescribed.size(); ++p) {
+    put(sample.prescribed_force[static_cast<Eigen::Index>(p)],
+        JointCoordinateRow(mechanism_.joints[mechanism_.prescribed[p].joint], 0, states));
+  }
+  const Powers power = PowersOf(mechanism_, states, command_.loads);
+  rates[next++] = power.loads;
+  rates[next++] = power.dampers;
+  return rates;
 }
 
 }  // namespace mbv::internal

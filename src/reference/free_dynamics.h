@@ -37,9 +37,15 @@ class FreeDynamics {
   /// `moved` (if given) is the size of the correction of the pose [rad, characteristic lengths].
   [[nodiscard]] RunSummary Project(double t_s, BodyStates* states, double* moved = nullptr);
 
-  /// Reactions, forces of commanded drives and prescribed joints, and the power audit, from
-  /// complete states; forces of least norm where statics leaves a choice.
-  [[nodiscard]] RunSummary Forces(double t_s, ReferenceSample* sample);
+  /// Reactions, forces of all drives and prescribed joints, powers and energies, from complete
+  /// states; TakeLeastForces() where statics leaves a choice.
+  void Forces(double t_s, ReferenceSample* sample);
+
+  /// Powers that WorkChannels() integrates, from complete states.
+  [[nodiscard]] VecX WorkRates(double t_s, const BodyStates& states);
+  [[nodiscard]] Eigen::Index works() const {
+    return static_cast<Eigen::Index>(mechanism_.drives.size() + mechanism_.prescribed.size()) + 2;
+  }
 
   /// Smallest pivot kept by the last factorisation, over the largest: 0 where the loops lose a
   /// constraint.
@@ -61,6 +67,9 @@ class FreeDynamics {
   /// Least-norm twists with J V = rates, from the first `rank` pivots.
   [[nodiscard]] VecX LeastMotion(const VecX& rates, Eigen::Index rank) const;
   [[nodiscard]] Eigen::Index FirmRank() const;
+  void SolveForces(double t_s, ReferenceSample* sample);
+  /// Per drive: the given force at t, or the next of those solved for.
+  [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;
   void AddDriveForces(double t_s, const BodyStates& states, std::vector<Vec6>* wrench_W) const;
   [[nodiscard]] RunSummary CheckFreedoms(double t_s) const;
   [[nodiscard]] RunSummary Singular(double t_s, const BodyStates& states) const;

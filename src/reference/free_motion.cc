@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <boost/numeric/odeint/stepper/controlled_runge_kutta.hpp>
-#include <boost/numeric/odeint/stepper/runge_kutta_fehlberg78.hpp>
+#include <boost/numeric/odeint.hpp>
 #include <cmath>
 
-#include "core/spatial.h"
+#include "mechanism/break_times.h"
 #include "reference/closure_solver.h"
+#include "reference/force_solver.h"
 #include "reference/square_system.h"
 
 namespace mbv::internal {
@@ -21,46 +21,18 @@ constexpr double kSmallestStep = 1e-10;  // of the duration
 // A pose counts as near singular while its pivot is below this share of the largest of the run, and
 // as passed if the search between the nodes brings it below the second.
 constexpr double kNear = 0.03, kPassed = 1e-3;
-
-void Pack(const BodyStates& states, std::vector<double>* x) {
-  x->resize(kPerBody * (states.X_WB.size() - 1));
-  double* out = x->data();
-  for (size_t b = 1; b < states.X_WB.size(); ++b, out += kPerBody) {
-    Eigen::Map<Vec3>{out} = states.X_WB[b].translation();
-    const Eigen::Quaterniond q(Mat3(states.X_WB[b].linear()));
-    Eigen::Map<Eigen::Vector4d>(out + 3) << q.w(), q.x(), q.y(), q.z();
-    Eigen::Map<Vec6>{out + 7} = states.V_WB[b];
-  }
-}
-
-void Unpack(const std::vector<double>& x, BodyStates* states) {
-  const double* in = x.data();
-  for (size_t b = 1; b < states->X_WB.size(); ++b, in += kPerBody) {
-    states->X_WB[b].translation() = Eigen::Map<const Vec3>(in);
-    const Eigen::Quaterniond q(in[3], in[4], in[5], in[6]);
-    states->X_WB[b].linear() = q.normalized().toRotationMatrix();
-    states->V_WB[b] = Eigen::Map<const Vec6>(in + 7);
-  }
-}
-
-// Times at which a force, load or command changes its formula.
-std::vector<double> BreaksOf(const Motion& motion) {
-  std::vector<double> breaks;
-  const auto add = [&breaks](const Profile& profile) {
-    const std::vector<double> times = BreakTimes(profile);
-    breaks.insert(breaks.end(), times.begin(), times.end());
-  };
-  for (const Command& command : motion.commands) add(command.profile);
-  for (const DriveForce& force : motion.forces) add(force.force);
-  for (const Load& load : motion.loads) {
-    for (int c = 0; c < 3; ++c) {
-      add(load.force[c]);
-      add(load.moment[c]);
-    }
-  }
-  std::sort(breaks.begin(), breaks.end());
-  return breaks;
-}
+// Below this share of the largest pivot steps go half the way to the singular pose at most, and
+// below the second a bridge is tried: there round-off in the states (1e-13) is still divided by
+// 1e-2 only.
+constexpr double kApproach = 0.2, kBridge = 0.02;
+// A bridge rests on this many nodes, each at least this many bridge lengths from the next: the
+// polynomial of degree 9 then carries on their round-off 1e3 times.
+constexpr size_t kPillars = 5;
+constexpr double kSpacing = 1.0;
+// A bridge whose end must be moved farther onto the loops [rad, characteristic lengths], or whose
+// energy and work differ by a larger share, does not follow the motion.
+constexpr double kMoved = 1e-7, kUnbalanced = 1e-8;
+constexpr size_t kMostNodes = 600;
 
 }  // namespace
 
@@ -74,22 +46,50 @@ struct FreeMotion::Stepper {
                                           odeint::default_operations>(tolerance, tolerance)) {}
 };
 
-FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance)
-    : duration_s_(motion.duration_s),
+FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance,
+                       double largest_step_s)
+    : mechanism_(mechanism),
+      duration_s_(motion.duration_s),
+      largest_step_s_(largest_step_s),
       dynamics_(mechanism, motion),
       stepper_(std::make_unique<Stepper>(tolerance)),
-      breaks_(BreaksOf(motion)),
-      dt_(std::min(motion.sample_s, 1e-3)) {
+      breaks_(BreakTimes(motion)),
+      dt_(std::min({motion.sample_s, largest_step_s, 1e-3})) {
   now_.states.Resize(mechanism.bodies.size());
-  work_ = now_.states;
+  work_states_ = sampled_ = now_.states;
 }
 
 FreeMotion::~FreeMotion() = default;
 
+FreeMotion::State FreeMotion::Pack(const Node& node) const {
+  State x(kPerBody * (node.states.X_WB.size() - 1));
+  double* out = x.data();
+  for (size_t b = 1; b < node.states.X_WB.size(); ++b, out += kPerBody) {
+    Eigen::Map<Vec3>{out} = node.states.X_WB[b].translation();
+    const Eigen::Quaterniond q(Mat3(node.states.X_WB[b].linear()));
+    Eigen::Map<Eigen::Vector4d>(out + 3) << q.w(), q.x(), q.y(), q.z();
+    Eigen::Map<Vec6>{out + 7} = node.states.V_WB[b];
+  }
+  x.insert(x.end(), node.work.begin(), node.work.end());
+  return x;
+}
+
+void FreeMotion::Unpack(const State& x, BodyStates* states, VecX* work) const {
+  const double* in = x.data();
+  for (size_t b = 1; b < states->X_WB.size(); ++b, in += kPerBody) {
+    states->X_WB[b].translation() = Eigen::Map<const Vec3>(in);
+    const Eigen::Quaterniond q(in[3], in[4], in[5], in[6]);
+    states->X_WB[b].linear() = q.normalized().toRotationMatrix();
+    states->V_WB[b] = Eigen::Map<const Vec6>(in + 7);
+  }
+  if (work != nullptr) *work = Eigen::Map<const VecX>(in, dynamics_.works());
+}
+
 RunSummary FreeMotion::Start(const BodyStates& states) {
   now_.states = states;
+  now_.work.setZero(dynamics_.works());
   now_.time_s = 0.0;
-  nodes_ = 1;
+  nodes_.clear();
   if (RunSummary summary = dynamics_.Project(0.0, &now_.states); !summary.ok()) return summary;
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
@@ -100,68 +100,83 @@ void FreeMotion::Rates(const State& x, State* rates, double t_s) {
   rates->assign(x.size(), 0.0);
   if (!trouble_.ok()) return;
   ++evaluations_;
-  Unpack(x, &work_);
-  trouble_ = dynamics_.Accelerate(t_s, &work_);
+  Unpack(x, &work_states_, nullptr);
+  trouble_ = dynamics_.Accelerate(t_s, &work_states_);
   if (!trouble_.ok()) return;
   double* out = rates->data();
   const double* in = x.data();
-  for (size_t b = 1; b < work_.X_WB.size(); ++b, out += kPerBody, in += kPerBody) {
-    Eigen::Map<Vec3>{out} = work_.V_WB[b].tail<3>();
+  for (size_t b = 1; b < work_states_.X_WB.size(); ++b, out += kPerBody, in += kPerBody) {
+    Eigen::Map<Vec3>{out} = work_states_.V_WB[b].tail<3>();
     const Eigen::Quaterniond q(in[3], in[4], in[5], in[6]);
-    const Vec3 w = work_.V_WB[b].head<3>();
+    const Vec3 w = work_states_.V_WB[b].head<3>();
     const Eigen::Quaterniond q_rate = Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * q;
     Eigen::Map<Eigen::Vector4d>(out + 3) << q_rate.w(), q_rate.x(), q_rate.y(), q_rate.z();
     Eigen::Map<Eigen::Vector4d>(out + 3) *= 0.5;
-    Eigen::Map<Vec6>{out + 7} = work_.A_WB[b];
+    Eigen::Map<Vec6>{out + 7} = work_states_.A_WB[b];
   }
+  Eigen::Map<VecX>(out, dynamics_.works()) = dynamics_.WorkRates(t_s, work_states_);
 }
 
 RunSummary FreeMotion::Accept(const State& x, double t_s) {
-  before_ = std::move(last_);
-  last_ = now_;
-  Unpack(x, &now_.states);
+  nodes_.push_back(now_);
+  if (nodes_.size() > kMostNodes) nodes_.pop_front();
+  Unpack(x, &now_.states, &now_.work);
   now_.time_s = t_s;
   if (RunSummary summary = dynamics_.Project(t_s, &now_.states); !summary.ok()) return summary;
   now_.pivot = dynamics_.pivot();
   largest_pivot_ = std::max(largest_pivot_, now_.pivot);
-  ++nodes_;
   ++steps_;
   Watch();
+  TryBridge();
   return RunSummary::Done();
 }
 
-// One smooth piece.
+RunSummary FreeMotion::NoWayOn(double dt_s) const {
+  if (!trouble_.ok()) return trouble_;
+  const bool singular = now_.pivot < kNear * largest_pivot_;
+  RunSummary summary;
+  summary.time_s = now_.time_s;
+  if (!singular) {
+    summary.stop = Stop::kNoConvergence;
+    summary.message = "the step of the integration became too small";
+    summary.amount = dt_s;
+    summary.unit = "s";
+    return summary;
+  }
+  summary.stop = Stop::kSingular;
+  summary.where = dynamics_.SoftJoint(now_.states);
+  summary.amount = now_.pivot / largest_pivot_;
+  summary.unit = "1";
+  summary.message = fmt::format(
+      "the motion runs into a singular pose: the loops lose a constraint, {} could move by itself "
+      "(weakest constraint {:.1e} of its usual size), and the way on is not determined",
+      summary.where, summary.amount);
+  return summary;
+}
+
+// One smooth piece, or a bridge beyond its end.
 RunSummary FreeMotion::Segment(double to_s) {
-  State x;
-  Pack(now_.states, &x);
-  double t = now_.time_s;
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
-  while (to_s - t > 1e-14 * std::max(1.0, to_s)) {
-    const bool clipped = dt_ > to_s - t;
+  while (to_s - now_.time_s > 1e-14 * std::max(1.0, to_s)) {
+    double t = now_.time_s;
+    State x = Pack(now_);
     const double natural = dt_;
-    double dt = std::min(dt_, to_s - t);
+    double dt = std::min({dt_, largest_step_s_, to_s - t});
+    if (now_.pivot < kApproach * largest_pivot_) dt = std::min(dt, 0.5 * TimeToSingular());
+    const bool clipped = dt < natural, to_the_end = dt >= to_s - t;
+    const double tried = dt;
     trouble_ = RunSummary::Done();
-    const State x_before = x;
-    const double t_before = t;
     const bool accepted =
         stepper_->controlled.try_step(rates, x, t, dt) == odeint::success && trouble_.ok();
     if (!accepted) {
-      x = x_before;
-      t = t_before;
-      dt_ = trouble_.ok() ? dt : 0.25 * std::min(natural, to_s - t);
+      dt_ = trouble_.ok() ? dt : 0.25 * tried;
       if (dt_ > kSmallestStep * duration_s_) continue;
-      if (!trouble_.ok()) return trouble_;
-      return {.stop = Stop::kNoConvergence,
-              .message = "the step of the integration became too small",
-              .time_s = t,
-              .where = {},
-              .amount = dt_,
-              .unit = "s"};
+      return NoWayOn(dt_);
     }
     dt_ = clipped ? std::max(natural, dt) : dt;
-    if (clipped) t = to_s;
+    if (to_the_end) t = to_s;
     if (RunSummary summary = Accept(x, t); !summary.ok()) return summary;
-    Pack(now_.states, &x);
+    if (tried < kSmallestStep * duration_s_ && !to_the_end) return NoWayOn(tried);
   }
   return RunSummary::Done();
 }
@@ -170,26 +185,128 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
   for (const double at : breaks_) {
     if (at <= now_.time_s || at >= t_s) continue;
     if (RunSummary summary = Segment(at); !summary.ok()) return summary;
+    nodes_.clear();
   }
   if (RunSummary summary = Segment(t_s); !summary.ok()) return summary;
-  return dynamics_.Accelerate(t_s, &now_.states);
+  on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(1.0, t_s);
+  if (on_bridge_) return SampleBridge(t_s);
+  return dynamics_.Accelerate(now_.time_s, &now_.states);
+}
+
+// Near the singular pose the accelerations are the polynomial's, too.
+RunSummary FreeMotion::SampleBridge(double t_s) {
+  VecX x, rates;
+  bridge_->way.Evaluate(t_s, &x, &rates);
+  Unpack({x.begin(), x.end()}, &sampled_, &sampled_work_);
+  const double* in = rates.data();
+  for (size_t b = 1; b < sampled_.A_WB.size(); ++b, in += kPerBody) {
+    sampled_.A_WB[b] = Eigen::Map<const Vec6>(in + 7);
+  }
+  return dynamics_.Project(t_s, &sampled_);
+}
+
+double FreeMotion::TimeToSingular() const {
+  constexpr double kNever = std::numeric_limits<double>::infinity();
+  if (nodes_.empty() || !(nodes_.back().pivot > now_.pivot)) return kNever;
+  const Node& before = nodes_.back();
+  return now_.pivot * (now_.time_s - before.time_s) / (before.pivot - now_.pivot);
+}
+
+// The polynomial through now_ and four nodes before it, or nothing if they do not reach back far
+// enough.
+std::optional<Hermite> FreeMotion::WayOn(double gap_s) {
+  std::vector<double> times;
+  std::vector<VecX> values, rates;
+  State previous;
+  auto next = nodes_.rbegin();
+  for (size_t k = 0; k < kPillars; ++k) {
+    const Node* nearest = &now_;
+    if (k > 0) {
+      const double latest = times.back() - kSpacing * gap_s;
+      while (next != nodes_.rend() && next->time_s > latest) ++next;
+      if (next == nodes_.rend()) return {};
+      nearest = &*next;
+    }
+    State x = Pack(*nearest), x_rate;
+    // Quaternions up to sign: the one next to the last pillar's.
+    for (size_t at = 3; k > 0 && at + 10 <= x.size() && at / kPerBody + 1 < now_.states.X_WB.size();
+         at += kPerBody) {
+      Eigen::Map<Eigen::Vector4d> q(x.data() + at);
+      if (q.dot(Eigen::Map<Eigen::Vector4d>(previous.data() + at)) < 0.0) q = -q;
+    }
+    trouble_ = RunSummary::Done();
+    Rates(x, &x_rate, nearest->time_s);
+    if (!trouble_.ok()) return {};
+    times.push_back(nearest->time_s);
+    values.push_back(Eigen::Map<const VecX>(x.data(), static_cast<Eigen::Index>(x.size())));
+    rates.push_back(
+        Eigen::Map<const VecX>(x_rate.data(), static_cast<Eigen::Index>(x_rate.size())));
+    previous = std::move(x);
+  }
+  return Hermite(times, values, rates);
+}
+
+bool FreeMotion::Land(const Hermite& way, double at_s, Node* node) {
+  VecX x, rates;
+  way.Evaluate(at_s, &x, &rates);
+  *node = now_;
+  node->time_s = at_s;
+  Unpack({x.begin(), x.end()}, &node->states, &node->work);
+  double moved = kNan;
+  if (!dynamics_.Project(at_s, &node->states, &moved).ok()) return false;
+  node->pivot = dynamics_.pivot();
+  const Energies from = EnergyOf(mechanism_, now_.states);
+  const Energies to = EnergyOf(mechanism_, node->states);
+  const double change = to.kinetic + to.gravity + to.springs - from.kinetic - from.gravity -
+                        from.springs - (node->work - now_.work).sum();
+  return moved < kMoved && std::abs(change) <= kUnbalanced * std::max(from.kinetic, to.kinetic);
+}
+
+void FreeMotion::TryBridge() {
+  if (!(now_.pivot < kBridge * largest_pivot_)) return;
+  const double half = TimeToSingular(), landing = now_.time_s + 2.0 * half;
+  if (!std::isfinite(landing)) return;
+  for (const double at : breaks_) {
+    if (at > now_.time_s && at < landing) return;
+  }
+  std::optional<Hermite> way = WayOn(2.0 * half);
+  trouble_ = RunSummary::Done();
+  if (!way) return;
+  Node end;
+  if (!Land(*way, landing, &end)) return;
+  const auto states_at = [&](double t_s, BodyStates* states) {
+    VecX x, rates;
+    way->Evaluate(t_s, &x, &rates);
+    *states = now_.states;
+    Unpack({x.begin(), x.end()}, states, nullptr);
+  };
+  passages_.push_back(Closest(now_.time_s, landing, states_at));
+  bridge_ = Bridge{now_.time_s, landing, *std::move(way)};
+  now_ = std::move(end);
+  nodes_.clear();
 }
 
 // Looks for a singular pose around the last node where its pivot is a local minimum.
 void FreeMotion::Watch() {
-  if (nodes_ < 3 || !(last_.pivot < before_.pivot && last_.pivot <= now_.pivot)) return;
-  if (last_.pivot > 0.5 * largest_pivot_) return;
-  const SingularPassage passage = Closest(last_, before_.time_s, now_.time_s);
+  if (nodes_.size() < 2) return;
+  const Node &last = nodes_.back(), &before = nodes_[nodes_.size() - 2];
+  if (!(last.pivot < before.pivot && last.pivot <= now_.pivot)) return;
+  if (last.pivot > 0.5 * largest_pivot_) return;
+  const auto states_at = [&](double t_s, BodyStates* states) {
+    const double dt = t_s - last.time_s;
+    *states = last.states;
+    MoveBodies(dt * Stack(states->V_WB) + 0.5 * dt * dt * Stack(states->A_WB), states);
+  };
+  const SingularPassage passage = Closest(before.time_s, now_.time_s, states_at);
   if (passage.pivot < kNear * largest_pivot_) passages_.push_back(passage);
 }
 
-// Golden-section search for the smallest pivot, on parabolas through the node.
-SingularPassage FreeMotion::Closest(const Node& from, double first_s, double last_s) {
+// Golden-section search for the smallest pivot.
+template <typename StatesAt>
+SingularPassage FreeMotion::Closest(double first_s, double last_s, const StatesAt& states_at) {
   BodyStates states;
   const auto pivot_at = [&](double t_s) {
-    const double dt = t_s - from.time_s;
-    states = from.states;
-    MoveBodies(dt * Stack(states.V_WB) + 0.5 * dt * dt * Stack(states.A_WB), &states);
+    states_at(t_s, &states);
     dynamics_.Factor(t_s, states);
     return dynamics_.pivot();
   };

@@ -1,19 +1,31 @@
 // Integration of a free motion from sample to sample. Internal to reference/.
+//
+// Runge–Kutta–Fehlberg 7(8) between the times where forces, loads or commands break. Where the
+// loops lose a constraint for an instant, the equations of motion divide by zero although the
+// motion itself goes on smoothly [Bayo, Avello 1994]. Shortly before such a pose the motion is
+// continued by the polynomial through states and rates of the last nodes to the mirror time behind
+// it, put back onto loops and commands, and integrated on from there. The bridge holds only if the
+// loops are closed and the energy balances at its end; otherwise the integration goes on step by
+// step and ends at the pose.
 #pragma once
 
+#include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "core/run_summary.h"
 #include "reference/forward.h"
 #include "reference/free_dynamics.h"
+#include "reference/hermite.h"
 
 namespace mbv::internal {
 
 class FreeMotion {
  public:
-  /// Mechanism and motion outlive the object.
-  FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance);
+  /// Mechanism and motion outlive the object. Steps are at most `largest_step_s`.
+  FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance,
+             double largest_step_s);
   ~FreeMotion();
 
   /// Puts `states` onto loops and commands at t = 0 and starts there.
@@ -21,7 +33,9 @@ class FreeMotion {
   /// Integrates to `t_s`; states() then has accelerations too.
   [[nodiscard]] RunSummary AdvanceTo(double t_s);
 
-  [[nodiscard]] const BodyStates& states() const { return now_.states; }
+  [[nodiscard]] const BodyStates& states() const { return on_bridge_ ? sampled_ : now_.states; }
+  /// Work since the start, as WorkChannels().
+  [[nodiscard]] const VecX& work() const { return on_bridge_ ? sampled_work_ : now_.work; }
   [[nodiscard]] FreeDynamics& dynamics() { return dynamics_; }
   [[nodiscard]] long steps() const { return steps_; }
   [[nodiscard]] long evaluations() const { return evaluations_; }
@@ -29,29 +43,49 @@ class FreeMotion {
   [[nodiscard]] std::vector<SingularPassage> Passages() const;
 
  private:
+  using State = std::vector<double>;
   // A node of the integration.
   struct Node {
     double time_s = 0.0;
     double pivot = kNan;
     BodyStates states;
+    VecX work;
   };
-  using State = std::vector<double>;
+  struct Bridge {
+    double from_s = 0.0, to_s = 0.0;
+    Hermite way;
+  };
 
+  [[nodiscard]] State Pack(const Node& node) const;
+  void Unpack(const State& x, BodyStates* states, VecX* work) const;
   void Rates(const State& x, State* rates, double t_s);
   [[nodiscard]] RunSummary Segment(double to_s);
   [[nodiscard]] RunSummary Accept(const State& x, double t_s);
+  [[nodiscard]] RunSummary SampleBridge(double t_s);
+  /// Time to the singular pose ahead, if the weakest pivot goes on as between the last two nodes.
+  [[nodiscard]] double TimeToSingular() const;
+  void TryBridge();
+  [[nodiscard]] std::optional<Hermite> WayOn(double gap_s);
+  [[nodiscard]] bool Land(const Hermite& way, double at_s, Node* node);
   void Watch();
-  [[nodiscard]] SingularPassage Closest(const Node& from, double first_s, double last_s);
+  [[nodiscard]] RunSummary NoWayOn(double dt_s) const;
+  template <typename StatesAt>
+  [[nodiscard]] SingularPassage Closest(double first_s, double last_s, const StatesAt& states_at);
 
   struct Stepper;
-  const double duration_s_;
+  const Mechanism& mechanism_;
+  const double duration_s_, largest_step_s_;
   FreeDynamics dynamics_;
   std::unique_ptr<Stepper> stepper_;
   std::vector<double> breaks_;
-  Node before_, last_, now_;
-  int nodes_ = 0;
+  std::deque<Node> nodes_;  ///< before now_, since the last break or bridge
+  Node now_;
+  std::optional<Bridge> bridge_;
+  bool on_bridge_ = false;
+  BodyStates sampled_;  ///< on the bridge
+  VecX sampled_work_;
   double dt_ = 0.0;
-  BodyStates work_;
+  BodyStates work_states_;
   RunSummary trouble_;  ///< of the last Rates()
   long steps_ = 0, evaluations_ = 0;
   double largest_pivot_ = 0.0;

@@ -80,38 +80,51 @@ Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
     const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
     const Vec3 p_Wcm = states.X_WB[b].translation() + x.c;
     energy.kinetic += 0.5 * (body.mass * x.v_cm.squaredNorm() + x.w.dot(x.I * x.w));
-    energy.potential -= body.mass * mechanism.gravity_W.dot(p_Wcm);
+    energy.gravity -= body.mass * mechanism.gravity_W.dot(p_Wcm);
   }
   for (const SpringDamper& spring : mechanism.springs) {
     const double stretch = LengthRow(spring, mechanism, states).value - spring.free_length_m;
-    energy.potential += 0.5 * spring.stiffness * stretch * stretch;
+    energy.springs += 0.5 * spring.stiffness * stretch * stretch;
   }
   return energy;
 }
 
-PowerAudit AuditPower(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<LoadSample>& loads) {
-  PowerAudit audit;
+Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
+                const std::vector<LoadSample>& loads) {
+  Powers power;
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
     const Inertial x = InertialOf(body, states.X_WB[b], states.V_WB[b], states.A_WB[b]);
     // d/dt ½ ω·Iω = ω·Iε, since ω·(ω × Iω) = 0.
-    audit.energy_rate_W +=
-        body.mass * x.v_cm.dot(x.a_cm - mechanism.gravity_W) + x.w.dot(x.I * x.e);
+    power.energy_rate += body.mass * x.v_cm.dot(x.a_cm - mechanism.gravity_W) + x.w.dot(x.I * x.e);
+    power.gravity += body.mass * x.v_cm.dot(mechanism.gravity_W);
   }
   for (const LoadSample& load : loads) {
     const LoadInWorld f = InWorld(load, states.X_WB[load.body]);
     const Vec3 w = states.V_WB[load.body].head<3>();
-    audit.loads_and_dampers_W +=
+    power.loads +=
         f.force.dot(states.V_WB[load.body].tail<3>() + w.cross(f.p_BoQ)) + f.moment.dot(w);
   }
   for (const SpringDamper& spring : mechanism.springs) {
     const ScalarRow row = LengthRow(spring, mechanism, states);
     const double rate = RateOf(row, states.V_WB);
-    audit.loads_and_dampers_W -= spring.damping * rate * rate;
-    audit.energy_rate_W += spring.stiffness * (row.value - spring.free_length_m) * rate;
+    power.dampers -= spring.damping * rate * rate;
+    power.springs -= spring.stiffness * (row.value - spring.free_length_m) * rate;
   }
-  return audit;
+  power.energy_rate -= power.springs;
+  return power;
+}
+
+void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& loads,
+                 ReferenceSample* sample) {
+  sample->energy = EnergyOf(mechanism, sample->states);
+  sample->power = PowersOf(mechanism, sample->states, loads);
+  const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+  const VecX& velocity = sample->driven.velocity;
+  Powers& power = sample->power;
+  power.base = sample->prescribed_force.dot(velocity.tail(velocity.size() - drives));
+  power.input =
+      sample->drive_force.dot(velocity.head(drives)) + power.base + power.loads + power.dampers;
 }
 
 }  // namespace mbv::internal

@@ -23,6 +23,18 @@ struct ReferenceOptions {
   bool reactions = true;               ///< record every joint's reaction channels
 };
 
+/// Where power comes from and goes to [W].
+struct Powers {
+  double base = 0.0, loads = 0.0, dampers = 0.0;  ///< put in; dampers ≤ 0
+  double gravity = 0.0, springs = 0.0;            ///< put in by gravity and by elasticity
+  double energy_rate = 0.0;                       ///< of kinetic energy, gravity's and springs'
+  double input = kNan;                            ///< drives, base, loads and dampers
+};
+/// Energies [J]; gravity's counts from the world's origin.
+struct Energies {
+  double kinetic = 0.0, gravity = 0.0, springs = 0.0;
+};
+
 /// Everything the reference knows at one instant.
 struct ReferenceSample {
   BodyStates states;
@@ -32,7 +44,9 @@ struct ReferenceSample {
   MatX reactions;         ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
   MatX outputs;           ///< outputs × 6
   double closure_position_m = kNan, closure_rotation_rad = kNan;
-  double power_input_W = kNan, energy_rate_W = kNan;
+  Powers power;
+  Energies energy;
+  VecX work;  ///< free motion: since the start [J], as WorkChannels(); otherwise empty
 };
 
 /// Follows a motion sample by sample (warm start from the previous one).
@@ -54,7 +68,7 @@ class ReferenceSolver {
 };
 
 struct ReferenceRun {
-  Trace trace;  ///< drive, output, prescribed, reaction and audit channels
+  Trace trace;  ///< drive, output, prescribed, reaction, audit and energy channels
   RunSummary summary;
 };
 [[nodiscard]] ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <optional>
 
 #include "core/demand.h"
 #include "core/spatial.h"
@@ -43,31 +44,44 @@ double LargestDifference(const BodyStates& a, const BodyStates& b, double length
   return largest;
 }
 
-// Integrates once more from `start` and calls `compare` at every sample; false if it fails.
+// Integrates once more from `start` and calls `compare` at every sample; the steps it took, or none
+// if it fails.
 template <typename Compare>
-bool Repeat(const Mechanism& mechanism, const Motion& motion, const std::vector<double>& times,
-            const BodyStates& start, double tolerance, const Compare& compare) {
-  FreeMotion motion_again(mechanism, motion, tolerance);
-  if (!motion_again.Start(start).ok()) return false;
-  compare(0, motion_again.states());
+std::optional<long> Repeat(const Mechanism& mechanism, const Motion& motion,
+                           const std::vector<double>& times, const BodyStates& start,
+                           double tolerance, double largest_step_s, const Compare& compare) {
+  FreeMotion again(mechanism, motion, tolerance, largest_step_s);
+  if (!again.Start(start).ok()) return {};
+  compare(0, again.states());
   for (size_t i = 1; i < times.size(); ++i) {
-    if (!motion_again.AdvanceTo(times[i]).ok()) return false;
-    compare(i, motion_again.states());
+    if (!again.AdvanceTo(times[i]).ok()) return {};
+    compare(i, again.states());
   }
-  return true;
+  return again.steps();
+}
+
+void MeasureUncertainty(const Mechanism& mechanism, const Motion& motion,
+                        const ForwardOptions& options, const std::vector<BodyStates>& samples,
+                        double length, ForwardRun* run) {
+  double difference = 0.0;
+  const auto repeat = [&](double tolerance, double largest_step_s) {
+    return Repeat(mechanism, motion, run->trace.time_s, run->start, tolerance, largest_step_s,
+                  [&](size_t i, const BodyStates& states) {
+                    difference =
+                        std::max(difference, LargestDifference(states, samples[i], length));
+                  });
+  };
+  std::optional<long> steps = repeat(kLooser * options.tolerance, motion.sample_s);
+  // Where the samples alone set the steps, the tolerance changes nothing; shorter steps do.
+  if (steps == run->steps) steps = repeat(options.tolerance, 0.5 * motion.sample_s);
+  if (steps) run->uncertainty = std::max(difference, kEps);
 }
 
 void MeasureTrust(const Mechanism& mechanism, const Motion& motion, const ForwardOptions& options,
                   const std::vector<BodyStates>& samples, ForwardRun* run) {
   internal::FreeDynamics dynamics(mechanism, motion);
   const double length = dynamics.length();
-  double uncertainty = 0.0;
-  const bool looser =
-      Repeat(mechanism, motion, run->trace.time_s, run->start, kLooser * options.tolerance,
-             [&](size_t i, const BodyStates& states) {
-               uncertainty = std::max(uncertainty, LargestDifference(states, samples[i], length));
-             });
-  if (looser) run->uncertainty = uncertainty;
+  MeasureUncertainty(mechanism, motion, options, samples, length, run);
 
   BodyStates disturbed = run->start;
   dynamics.Factor(0.0, disturbed);
@@ -78,22 +92,24 @@ void MeasureTrust(const Mechanism& mechanism, const Motion& motion, const Forwar
   step *= kDisturbance / size.norm();
   internal::MoveBodies(step, &disturbed);
   double at_start = kNan, growth = 0.0;
-  const bool moved = Repeat(mechanism, motion, run->trace.time_s, disturbed, options.tolerance,
-                            [&](size_t i, const BodyStates& states) {
-                              const double distance = Distance(states, samples[i], length);
-                              if (i == 0) at_start = distance;
-                              growth = std::max(growth, distance / at_start);
-                            });
+  const std::optional<long> moved =
+      Repeat(mechanism, motion, run->trace.time_s, disturbed, options.tolerance, motion.sample_s,
+             [&](size_t i, const BodyStates& states) {
+               const double distance = Distance(states, samples[i], length);
+               if (i == 0) at_start = distance;
+               growth = std::max(growth, distance / at_start);
+             });
   if (moved) run->growth = growth;
 }
 
 // Everything a sample records, from states with accelerations.
-RunSummary Complete(double t_s, FreeMotion* free, internal::SampleRecorder* recorder,
-                    ReferenceSample* sample) {
+void Complete(double t_s, FreeMotion* free, internal::SampleRecorder* recorder,
+              ReferenceSample* sample) {
   sample->states = free->states();
+  sample->work = free->work();
   free->dynamics().Gaps(sample->states, &sample->closure_position_m, &sample->closure_rotation_rad);
   recorder->Record(sample);
-  return free->dynamics().Forces(t_s, sample);
+  free->dynamics().Forces(t_s, sample);
 }
 
 RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
@@ -101,7 +117,7 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
   if (RunSummary summary = InitialStates(mechanism, motion, &run->start); !summary.ok()) {
     return summary;
   }
-  FreeMotion free(mechanism, motion, options.tolerance);
+  FreeMotion free(mechanism, motion, options.tolerance, motion.sample_s);
   if (RunSummary summary = free.Start(run->start); !summary.ok()) return summary;
   internal::SampleRecorder recorder(mechanism);
   ReferenceSample sample;
@@ -110,12 +126,10 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
   for (size_t i = 0; i < run->trace.time_s.size() && summary.ok(); ++i) {
     const double t_s = run->trace.time_s[i];
     if (i > 0) summary = free.AdvanceTo(t_s);
-    if (summary.ok()) summary = Complete(t_s, &free, &recorder, &sample);
     if (!summary.ok()) break;
+    Complete(t_s, &free, &recorder, &sample);
     Eigen::RowVectorXd row(run->trace.values.cols());
     internal::WriteSample(sample, options.reactions, row);
-    const internal::Energies energies = internal::EnergyOf(mechanism, sample.states);
-    row.tail<2>() << energies.kinetic, energies.potential;
     run->trace.values.row(static_cast<Eigen::Index>(i)) = row;
     samples.push_back(sample.states);
   }
@@ -160,7 +174,7 @@ ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
   ForwardRun run;
   run.trace.witness = "reference";
   std::vector<Channel> channels = internal::ReferenceChannels(mechanism, options.reactions);
-  for (Channel& channel : EnergyChannels()) channels.push_back(std::move(channel));
+  for (Channel& channel : WorkChannels(mechanism)) channels.push_back(std::move(channel));
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
   run.summary = Integrate(mechanism, motion, options, &run);
   run.summary.wall_s =

@@ -67,6 +67,7 @@ std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reaction
     for (const Joint& joint : mechanism.joints) append(ReactionChannels(joint));
   }
   append(AuditChannels());
+  append(EnergyChannels());
   return channels;
 }
 
@@ -92,9 +93,16 @@ void WriteSample(const ReferenceSample& sample, bool reactions,
   if (reactions) put_rows(sample.reactions);
   put(sample.closure_position_m);
   put(sample.closure_rotation_rad);
-  put(sample.power_input_W);
-  put(sample.energy_rate_W);
-  MBV_DEMAND(at <= row.size(), at);
+  const Powers& power = sample.power;
+  for (const double watts : {power.input, power.energy_rate, power.base, power.loads, power.dampers,
+                             power.gravity, power.springs}) {
+    put(watts);
+  }
+  put(sample.energy.kinetic);
+  put(sample.energy.gravity);
+  put(sample.energy.springs);
+  for (const double work : sample.work) put(work);
+  MBV_DEMAND(at == row.size(), at);
 }
 
 }  // namespace mbv::internal

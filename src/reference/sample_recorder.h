@@ -28,7 +28,7 @@ class SampleRecorder {
 
 /// Channels of the reference's traces.
 [[nodiscard]] std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reactions);
-/// Writes a sample into the first columns of `row`, in the order of ReferenceChannels().
+/// Writes a sample into `row`, in the order of ReferenceChannels(), then the work if there is any.
 void WriteSample(const ReferenceSample& sample, bool reactions, Eigen::Ref<Eigen::RowVectorXd> row);
 
 }  // namespace mbv::internal

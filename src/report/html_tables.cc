@@ -171,7 +171,52 @@ Work WorkOf(const Trace& trace, const std::vector<std::string>& drives) {
   return work;
 }
 
+namespace {
+
+// One column per witness that recorded its energies.
+std::string EnergyAuditHtml(const Comparison& comparison) {
+  std::vector<const EnergyAudit*> audits;
+  for (const WitnessMetrics& witness : comparison.witnesses) {
+    if (witness.energy) audits.push_back(&*witness.energy);
+  }
+  if (audits.empty()) return "";
+  Table table{
+      .caption = "Energy balance at the end of the run [J]", .head = {Text("of")}, .rows = {}};
+  for (const EnergyAudit* audit : audits) table.head.push_back(Digits(audit->witness));
+  const auto add = [&](const std::string& title, const auto& value) {
+    std::vector<Cell> row = {Text(title)};
+    for (const EnergyAudit* audit : audits) row.push_back(Digits(value(*audit)));
+    table.rows.push_back(std::move(row));
+  };
+  for (const EnergyPart& part : audits.back()->parts) {
+    add((part.stored ? "change: " : "work: ") + part.name, [&](const EnergyAudit& audit) {
+      for (const EnergyPart& own : audit.parts) {
+        if (own.name == part.name) return Number(own.end_J, "{:.6g}");
+      }
+      return Number(kNan);
+    });
+  }
+  add("drift: change − work", [](const EnergyAudit& audit) { return Number(audit.end_drift_J); });
+  add("largest drift", [](const EnergyAudit& audit) { return Number(audit.drift_J); });
+  add("largest drift / energy turned over",
+      [](const EnergyAudit& audit) { return Number(audit.drift.value); });
+  add("work by", [](const EnergyAudit& audit) {
+    return std::string(audit.integrated ? "integration" : "samples");
+  });
+  std::string html = ToHtml(table);
+  for (const EnergyAudit* audit : audits) {
+    if (audit->text.empty()) continue;
+    html += "<p class=\"reason\">" + Escape(audit->witness + ": " + audit->text + ".") + "</p>\n";
+  }
+  return html + Note(
+                    "Work that a witness does not integrate with its motion is the integral of "
+                    "cubics through the samples; the drift then holds their error.");
+}
+
+}  // namespace
+
 std::string EnergyHtml(const Report& report) {
+  if (std::string html = EnergyAuditHtml(report.comparison); !html.empty()) return html;
   std::vector<std::pair<std::string, Work>> works;
   for (const WitnessRecord& record : report.witnesses) {
     if (!record.summary.ok() || record.trace.time_s.size() < 2) continue;

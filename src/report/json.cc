@@ -130,6 +130,24 @@ Json MetricsJson(const Comparison& comparison) {
   return all;
 }
 
+Json EnergyJson(const EnergyAudit& audit) {
+  Json parts = Json::array();
+  for (const EnergyPart& part : audit.parts) {
+    parts.push_back({{"name", part.name},
+                     {"kind", part.stored ? "stored" : "work"},
+                     {"end_J", Number(part.end_J)},
+                     {"most_J", Number(part.most_J)}});
+  }
+  Json drift = {{"largest_J", Number(audit.drift_J)},    {"end_J", Number(audit.end_drift_J)},
+                {"relative", Number(audit.drift.value)}, {"time_s", Number(audit.drift.time_s)},
+                {"from_s", Number(audit.from_s)},        {"part", audit.culprit},
+                {"share", Number(audit.share)},          {"text", audit.text}};
+  return {{"parts", std::move(parts)},
+          {"work_integrated", audit.integrated},
+          {"turned_over_J", Number(audit.scale_J)},
+          {"drift", std::move(drift)}};
+}
+
 Json WitnessesJson(const Report& report) {
   Json witnesses = Json::array();
   for (const WitnessRecord& record : report.witnesses) {
@@ -144,7 +162,9 @@ Json WitnessesJson(const Report& report) {
       json["unit"] = record.summary.unit;
     }
     for (const WitnessMetrics& metrics : report.comparison.witnesses) {
-      if (metrics.witness == record.name) AddMetrics(metrics.metrics, &json);
+      if (metrics.witness != record.name) continue;
+      AddMetrics(metrics.metrics, &json);
+      if (metrics.energy) json["energy"] = EnergyJson(*metrics.energy);
     }
     witnesses.push_back(std::move(json));
   }
@@ -236,6 +256,7 @@ std::string ToJson(const Report& report) {
                {"checks", ChecksJson(report.comparison)},
                {"checks_off", ChecksOffJson(report.comparison)},
                {"drives", report.drives},
+               {"drives_not_unique", report.drives_not_unique},
                {"metrics", MetricsJson(report.comparison)},
                {"witnesses", WitnessesJson(report)},
                {"not_compared", NotComparedJson(report.comparison)},

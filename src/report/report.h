@@ -52,6 +52,7 @@ struct Report {
   double duration_s = kNan, sample_s = kNan;
   double start_window_s = 0.0;  ///< left out of the force metrics
   std::string driven_by;
+  std::vector<std::string> drives_not_unique;  ///< they share their forces by least norm
   std::vector<WitnessRecord> witnesses;
   Comparison comparison;
   int exit_code = 3;

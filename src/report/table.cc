@@ -34,6 +34,7 @@ class Writer {
     ReferenceTable(report.comparison);
     if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
     Engine(report);
+    Energy(report.comparison);
     Tail(report);
     if (options_.verbose) Details(report);
     return text_;
@@ -190,6 +191,31 @@ class Writer {
                     engine.truth, engine.stock.force_nrmse, engine.corrected.force_nrmse));
     Line(fmt::format("    loop gap: stock {:.2e} m, corrected {:.2e} m", engine.stock.closure_max_m,
                      engine.corrected.closure_max_m));
+  }
+
+  // Where the energy came from and went; zeros are left out.
+  void Energy(const Comparison& comparison) {
+    constexpr size_t kMostParts = 8;
+    bool first = true;
+    for (const WitnessMetrics& witness : comparison.witnesses) {
+      if (!witness.energy) continue;
+      const EnergyAudit& audit = *witness.energy;
+      if (witness.witness != "simulated" && audit.text.empty()) continue;
+      if (first) Line();
+      first = false;
+      std::string work, stored;
+      size_t parts = 0;
+      for (const EnergyPart& part : audit.parts) {
+        if (part.most_J == 0.0) continue;
+        if (!part.stored && ++parts > kMostParts) continue;
+        std::string& text = part.stored ? stored : work;
+        text += fmt::format("{}{} {:.4g} J", text.empty() ? "" : ", ", part.name, part.end_J);
+      }
+      if (parts > kMostParts) work += fmt::format(" and {} more", parts - kMostParts);
+      Line(fmt::format("  energy of {}: work {}; change {}", witness.witness,
+                       work.empty() ? "none" : work, stored.empty() ? "none" : stored));
+      if (!audit.text.empty()) Line("    " + Painted(audit.text, Paint::kBad));
+    }
   }
 
   void Tail(const Report& report) {

@@ -35,7 +35,7 @@ enum class Metric {
   kClosureRad,    ///< loop twist gap [rad]
   kPower,         ///< |input power − energy rate| / largest power
   kDerivatives,   ///< drive velocity and acceleration against differences of the positions
-  kEnergy,        ///< free motion: |energy − start − work of the input| / largest of the two
+  kEnergy,        ///< |energy − start − work| / energy turned over, where work is integrated
   kTableTube,     ///< pair with a table: worst column's difference / its tolerance tube
 };
 inline constexpr int kMetrics = 18;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/constraints.h"
+
 namespace mbv::simulation {
 namespace {
 
@@ -24,7 +26,8 @@ constexpr double kRankTolerance = 1e-9;
 
 }  // namespace
 
-ClosureSolver::ClosureSolver(ConstraintSystem* system) : system_(system) {
+ClosureSolver::ClosureSolver(ConstraintSystem* system)
+    : system_(system), length_(CharacteristicLength(*system->engine().mechanism)) {
   const int rows = system->rows(), nv = system->nv();
   rhs_.setZero(rows);
   step_.setZero(nv);
@@ -157,6 +160,62 @@ void ClosureSolver::SolveAcceleration(const VecX& driven_acceleration) {
 void ClosureSolver::SolveForces(const VecX& tau) {
   SolveTransposedInto(tau, &rhs_);
   system_->force() = rhs_;
+}
+
+void ClosureSolver::SolveForcesHere(const VecX& tau) {
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kRankTolerance);
+  cod.compute(system_->J().transpose());
+  VecX lambda = cod.solve(tau);
+  lambda += cod.solve(tau - system_->J().transpose() * lambda);
+  system_->force() = lambda;
+}
+
+double ClosureSolver::WeakestPivot() const {
+  if (rank_ == 0) return 1.0;
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->J().transpose());
+  const auto pivots = qr.matrixQR().diagonal();
+  return std::abs(pivots[rank_ - 1]) / std::abs(pivots[0]);
+}
+
+void ClosureSolver::SolveLeastDriven(const VecX& tau) {
+  const EngineModel& engine = system_->engine();
+  const int nv = system_->nv(), closures = system_->first_driven_row();
+  const int driven = system_->driven_rows();
+  VecX scale = VecX::Ones(driven);
+  for (size_t k = 0; k < engine.driven.size(); ++k) {
+    const int row = system_->driven_row(static_cast<int>(k)) - closures;
+    const DrivenPlace& place = engine.driven[k];
+    const bool angle = !place.is_tendon && engine.m->jnt_type[place.object] == mjJNT_HINGE;
+    if (row >= 0 && angle) scale[row] = length_;
+  }
+  const MatX J_c = system_->J().topRows(closures), J_u = system_->J().bottomRows(driven);
+  MatX N = MatX::Identity(nv, nv);
+  if (closures > 0) {
+    Eigen::ColPivHouseholderQR<MatX> qr;
+    qr.setThreshold(kRankTolerance);
+    qr.compute(J_c.transpose());
+    const MatX Q = qr.householderQ();
+    N = Q.rightCols(nv - qr.rank());
+  }
+  const MatX B = (J_u * N).transpose() * scale.asDiagonal();
+  const VecX b = N.transpose() * tau;
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kRankTolerance);
+  cod.compute(B);
+  VecX u = cod.solve(b);
+  u += cod.solve(b - B * u);
+  u = scale.cwiseProduct(u);
+  VecX lambda(closures + driven);
+  lambda.tail(driven) = u;
+  if (closures > 0) {
+    cod.compute(J_c.transpose());
+    const VecX rest = tau - J_u.transpose() * u;
+    VecX lambda_c = cod.solve(rest);
+    lambda_c += cod.solve(rest - J_c.transpose() * lambda_c);
+    lambda.head(closures) = lambda_c;
+  }
+  system_->force() = lambda;
 }
 
 std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {

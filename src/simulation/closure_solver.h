@@ -32,6 +32,18 @@ class ClosureSolver {
   /// λ with Jᵀλ = τ, minimum norm where it is not unique; written to d.efc_force.
   void SolveForces(const VecX& tau);
 
+  /// Of all λ with Jᵀλ = τ, the one whose driven forces (moments divided by the characteristic
+  /// length) have least norm, written to d.efc_force. With N the motions that the closures leave
+  /// (J_c N = 0) the driven forces are the least-norm u of
+  ///   (J_u N)ᵀ u = Nᵀ τ,  then J_cᵀ λ_c = τ − J_uᵀ u
+  void SolveLeastDriven(const VecX& tau);
+
+  /// As SolveForces, for the present J; keeps rank and factors of the last configuration solved.
+  void SolveForcesHere(const VecX& tau);
+  /// Smallest over largest pivot of the present J among as many as the last configuration solved
+  /// had independent rows: 0 where a constraint is lost.
+  [[nodiscard]] double WeakestPivot() const;
+
   [[nodiscard]] int undriven() const { return system_->nv() - rank_; }
   [[nodiscard]] int redundant() const { return system_->rows() - rank_; }
   /// Rows of guided coordinates whose force is not unique at the present configuration.
@@ -43,6 +55,7 @@ class ClosureSolver {
   void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b
 
   ConstraintSystem* const system_;
+  const double length_;
   bool regular_ = false;  // square and of full rank: lu_ is valid, otherwise cod_
   bool stale_ = false;    // factors belong to a configuration nearby: solves are refined
   int rank_ = 0;

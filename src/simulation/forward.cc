@@ -90,6 +90,8 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   Integrator integrator(s, AdjustedStep(s->motion, s->options.step_s));
   const LoopClock clock;
   integrator.Start(first);
+  s->FindShared();
+  s->work.Start(s->WorkRates());
   s->Record(0);
   for (size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
@@ -100,6 +102,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
       integrator.RungeKutta(h, middles[i], ends[i], step.from_s);
     }
     if (!integrator.healthy()) return Failure("the simulated motion diverged", step.to_s);
+    s->work.Step(h, step.uniform == 4, s->WorkRates());
     if (step.sample < 0) continue;
     s->Record(static_cast<size_t>(step.sample));
     if (RunSummary summary = CheckSample(*s, largest_gap, step.to_s); !summary.ok()) return summary;
@@ -125,6 +128,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
   // aref is the commanded acceleration where position and velocity are as commanded.
   const double d = kMjcfImpedance, tc = s->options.stock_time_constant_steps * h;
   const double b = 2.0 / (d * tc), k_d = d / (d * d * tc * tc);
+  s->FindShared();
   const mjModel* m = s->engine.m.get();
   mjData* data = s->data.get();
   VecX target;

@@ -19,6 +19,8 @@ constexpr int kStartRepeats = 4;
 // With redundant constraints the self-stress is only determined through R, and a force that
 // relies on its own past would drift: the past is trusted a little less.
 constexpr double kTrustIfRedundant = 0.9;
+// Shares of the largest pivot of J, see the head of integrator.h.
+constexpr double kWeak = 0.01, kNear = 0.2;
 
 }  // namespace
 
@@ -57,6 +59,8 @@ void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
   expected_ = 2.0 * trust_ * s_.system.force() - trust_ * trust_ * last_force_;
   warm_ = 2.0 * a_[0] - a_[1];
   Evaluate(q_p_, v_p_, end, end_s);
+  nodes_ = std::min(nodes_ + 1, static_cast<int>(a_.size()));
+  if (s_.motion.free() && PassesSingularPose()) Coast();
   RememberAcceleration();
   // (4), (5)
   mean_ = v_ + e * (38.0 * a_[0] + 171.0 * a_[1] - 36.0 * a_[2] + 7.0 * a_[3]);
@@ -67,6 +71,7 @@ void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
 
 void Integrator::RungeKutta(double h, const DrivenSample& middle, const DrivenSample& end,
                             double from_s) {
+  nodes_ = 3;  // what the first multistep finds, but one
   const double half = 0.5 * h;
   const VecX v1 = v_, k1 = a_[0];
   const VecX v2 = v_ + half * k1, u2 = half * v1;
@@ -76,13 +81,32 @@ void Integrator::RungeKutta(double h, const DrivenSample& middle, const DrivenSa
   const VecX v4 = v_ + h * k3, u4 = h * r3;
   const VecX k4 = Stage(u4, v4, end, from_s + h), r4 = Rate(u4, v4);
   const VecX mean = (v1 + 2.0 * r2 + 2.0 * r3 + r4) / 6.0;
-  mj_integratePos(m_, q_.data(), mean.data(), h);
   v_ += h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4);
+  MeasureMiddle(h, v1, k1, k4, middle, from_s + half);
+  mj_integratePos(m_, q_.data(), mean.data(), h);
   expected_ = s_.system.force();
   warm_ = k4;
   Evaluate(q_, v_, end, from_s + h);
   SolveAgain();
   RememberAcceleration();
+}
+
+// The power half way, at the state that the cubic through the velocities and accelerations of both
+// ends has there: that of a stage is only of second order.
+void Integrator::MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const VecX& a_1,
+                               const DrivenSample& middle, double t_s) {
+  const VecX force = s_.system.force(), last = last_force_;
+  v_p_ = 0.5 * (v_0 + v_) + h / 8.0 * (a_0 - a_1);
+  mean_ = (13.0 * v_0 + 3.0 * v_) / 16.0 + h / 96.0 * (11.0 * a_0 - 5.0 * a_1);
+  q_p_ = q_;
+  AdvancePositions(s_.engine, 0.5 * h, mean_, v_0, v_p_, &work_, q_p_.data());
+  expected_ = force;
+  warm_ = 0.5 * (a_0 + a_1);
+  Evaluate(q_p_, v_p_, middle, t_s);
+  SolveAgain();
+  s_.work.Middle(s_.WorkRates());
+  s_.system.force() = force;
+  last_force_ = last;
 }
 
 // Acceleration at q ⊕ u.
@@ -106,8 +130,36 @@ VecX Integrator::Rate(const VecX& u, const VecX& v) const {
   return rate;
 }
 
+// Near it, the softness of the constraints is felt more: solutions are repeated.
+bool Integrator::PassesSingularPose() {
+  const double pivot = s_.solver.WeakestPivot();
+  largest_pivot_ = std::max(largest_pivot_, pivot);
+  if (pivot < kWeak * largest_pivot_) return true;
+  if (pivot < kNear * largest_pivot_) {
+    for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
+  }
+  return false;
+}
+
+// (6)
+void Integrator::Coast() {
+  work_.setZero(m_->nv);
+  double binomial = 1.0;
+  for (int i = 1; i <= nodes_; ++i) {
+    binomial *= static_cast<double>(nodes_ - i + 1) / i;
+    work_ += (i % 2 == 1 ? binomial : -binomial) * a_[static_cast<size_t>(i - 1)];
+  }
+  std::copy(work_.begin(), work_.end(), d_->qacc);
+  VecX tau(m_->nv);
+  mj_mulM(m_, d_, tau.data(), d_->qacc);
+  tau += Eigen::Map<const VecX>(d_->qfrc_bias, m_->nv) -
+         Eigen::Map<const VecX>(d_->qfrc_passive, m_->nv) -
+         Eigen::Map<const VecX>(d_->qfrc_applied, m_->nv);
+  s_.solver.SolveForcesHere(tau);
+}
+
 void Integrator::RememberAcceleration() {
-  for (int i = 3; i > 0; --i) a_[i].swap(a_[i - 1]);
+  for (size_t i = a_.size() - 1; i > 0; --i) a_[i].swap(a_[i - 1]);
   a_[0] = qacc();
 }
 

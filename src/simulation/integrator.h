@@ -12,7 +12,14 @@
 //   evaluate   a_{n+1}, f_{n+1} at (q*, v*): the state that is recorded
 //   corrector  v_{n+1} = v_n + h/24 (9 a_{n+1} + 19 a_n − 5 a_{n−1} + a_{n−2}) (4)
 //              q_{n+1} = q_n ⊕ (h v_n + h²/360 (38 a_{n+1} + 171 a_n − 36 a_{n−1} + 7 a_{n−2})) (5)
-// [Hairer, Nørsett, Wanner 1993, III.1 and III.10]. The classical Runge–Kutta method builds up the
+// [Hairer, Nørsett, Wanner 1993, III.1 and III.10].
+//
+// Where a free motion passes a pose at which a constraint is lost, constraint forces divide by zero
+// although the accelerations go on smoothly. At the nodes next to such a pose (a pivot of J below
+// kWeak of its largest) they are extrapolated by the polynomial through the last n ≤ 6 nodes,
+//   a_{n+1} = Σ_i (−1)^{i+1} C(n, i) a_{n+1−i},                                               (6)
+// and the forces are those of least norm that belong to them.
+// The classical Runge–Kutta method builds up the
 // history at the start and after every break of the commanded profiles. Rotation vectors of balls
 // and free bodies follow u̇ = ω + ½ u × ω + 1/12 u × (u × ω) [Iserles et al. 2000, Eq. 2.42].
 #pragma once
@@ -44,6 +51,10 @@ class Integrator {
   void ApplyReference();
   void SolveAgain();
   void RememberAcceleration();
+  [[nodiscard]] bool PassesSingularPose();
+  void Coast();
+  void MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const VecX& a_1,
+                     const DrivenSample& middle, double t_s);
   VecX Stage(const VecX& u, const VecX& v, const DrivenSample& at, double t_s);
   [[nodiscard]] VecX Rate(const VecX& u, const VecX& v) const;
   [[nodiscard]] Eigen::Map<const VecX> qacc() const { return {d_->qacc, m_->nv}; }
@@ -52,12 +63,14 @@ class Integrator {
   const mjModel* const m_;
   mjData* const d_;
   double b_ = 0.0, k_ = 0.0;  // of (1)
-  double trust_ = 1.0;         // in the extrapolated force
-  double largest_R_ = 0.0;     // [1/kg]; rotation rows: of a lever of one metre
+  double trust_ = 1.0;        // in the extrapolated force
+  double largest_R_ = 0.0;    // [1/kg]; rotation rows: of a lever of one metre
   VecX q_, v_;                // corrected state at the present node
   VecX q_p_, v_p_, mean_, work_, warm_;
   VecX bias_, rate_, aref_, expected_, last_force_;
-  std::array<VecX, 4> a_;  // accelerations at the last nodes, newest first
+  std::array<VecX, 6> a_;  // accelerations at the last nodes, newest first
+  int nodes_ = 0;          // of these that lie at equal distances
+  double largest_pivot_ = 0.0;
 };
 
 }  // namespace mbv::simulation

@@ -58,7 +58,11 @@ void SolveDynamics(Session* s, double t_s, VecX* tau) {
     s->loads.AddGeneralized(d, tau->data());
     *tau = -*tau;
   }
-  s->solver.SolveForces(*tau);
+  if (s->shared) {
+    s->solver.SolveLeastDriven(*tau);
+  } else {
+    s->solver.SolveForces(*tau);
+  }
 }
 
 RunSummary At(RunSummary summary, double t_s) {
@@ -102,6 +106,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
           .where = {},
           .unit = {}};
     }
+    if (i == 0) s->FindShared();
     s->solver.SolveVelocity(samples[i].velocity);
     s->solver.SolveAcceleration(samples[i].acceleration);
     SolveDynamics(s, times[i], &tau);

@@ -3,6 +3,7 @@
 #include "core/demand.h"
 #include "core/spatial.h"
 #include "mechanism/channels.h"
+#include "simulation/powers.h"
 
 namespace mbv::simulation {
 namespace {
@@ -17,8 +18,8 @@ void Append(const std::vector<Channel>& more, std::vector<Channel>* channels) {
 
 }  // namespace
 
-Recorder::Recorder(ConstraintSystem* system, bool energy)
-    : system_(system), engine_(system->engine()), energy_(energy) {
+Recorder::Recorder(ConstraintSystem* system, bool work)
+    : system_(system), engine_(system->engine()) {
   const Mechanism& mechanism = *engine_.mechanism;
   const auto column = [this] { return static_cast<int>(channels_.size()); };
   Append(DriveChannels(mechanism), &channels_);
@@ -30,7 +31,8 @@ Recorder::Recorder(ConstraintSystem* system, bool energy)
   for (const Joint& joint : mechanism.joints) Append(ReactionChannels(joint), &channels_);
   audit_column_ = column();
   Append(AuditChannels(), &channels_);
-  if (energy) Append(EnergyChannels(), &channels_);
+  Append(EnergyChannels(), &channels_);
+  if (work) Append(WorkChannels(mechanism), &channels_);
   W_.setZero(6, engine_.m->nbody);
   work_.setZero(engine_.m->nv);
   FindReactionPlaces();
@@ -79,13 +81,13 @@ void Recorder::FindReactionPlaces() {
   for (const Prescribed& base : mechanism.prescribed) add(base.joint, row++);
 }
 
-void Recorder::Record(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row,
+void Recorder::Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
                       std::vector<Pose>* X_WB) {
   BodyPoses(engine_, *system_->data(), X_WB);
   RecordDriven(row);
   RecordOutputs(*X_WB, row);
   RecordReactions(loads, *X_WB, row);
-  RecordAudit(loads, row);
+  RecordAudit(loads, work, row);
 }
 
 void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
@@ -246,41 +248,21 @@ void Recorder::RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB
   }
 }
 
-void Recorder::RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row) {
+void Recorder::RecordAudit(const Loads& loads, const VecX& work,
+                           Eigen::Ref<Eigen::RowVectorXd> row) {
   const mjModel& m = *engine_.m;
-  mjData* d = system_->data();
-  const ConstVecX qvel(d->qvel, m.nv);
   const ConstraintSystem::Gap gap = system_->LargestGap();
-  double power = 0.0;
-  for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
-    power += system_->DrivenForce(k) * system_->DrivenJacobian(k).dot(qvel);
-  }
-  for (const WorldLoad& load : loads.world()) {
-    const Eigen::Map<const Vec6> V(d->cvel + 6 * load.body_id);
-    const ConstVec3 c(d->subtree_com + 3 * m.body_rootid[load.body_id]);
-    const Vec3 w = V.head<3>();
-    const Vec3 v = V.tail<3>() + w.cross(load.p_WQ - c);
-    power += load.moment.dot(w) + load.force.dot(v);
-  }
-  // d/dt(kinetic + gravity) = q̇·(M q̈ + bias); springs add theirs, dampers take from the input.
-  mj_rne(&m, d, 1, work_.data());
-  double energy_rate = qvel.dot(work_);
-  for (size_t s = 0; s < engine_.spring_tendon.size(); ++s) {
-    const SpringDamper& spring = engine_.mechanism->springs[s];
-    const int tendon = engine_.spring_tendon[s];
-    const double rate = ConstVecX(d->ten_J + tendon * m.nv, m.nv).dot(qvel);
-    energy_rate += spring.stiffness * (d->ten_length[tendon] - spring.free_length_m) * rate;
-    power -= spring.damping * rate * rate;
-  }
-  row[audit_column_] = gap.position_m;
-  row[audit_column_ + 1] = gap.rotation_rad;
-  row[audit_column_ + 2] = power;
-  row[audit_column_ + 3] = energy_rate;
-  if (!energy_) return;
-  mj_energyPos(&m, d);
-  mj_energyVel(&m, d);
-  row[audit_column_ + 4] = d->energy[1];
-  row[audit_column_ + 5] = d->energy[0];
+  const Powers power = PowersOf(*system_, loads);
+  const Energies energy = EnergiesOf(*system_);
+  // d/dt(kinetic + gravity) = q̇·(M q̈ + bias).
+  mj_rne(&m, system_->data(), 1, work_.data());
+  const double energy_rate = ConstVecX(system_->data()->qvel, m.nv).dot(work_) - power.springs;
+  const auto drives = static_cast<Eigen::Index>(engine_.mechanism->drives.size());
+  const double base = power.driven.tail(power.driven.size() - drives).sum();
+  row.segment<12>(audit_column_) << gap.position_m, gap.rotation_rad,
+      power.driven.sum() + power.loads + power.dampers, energy_rate, base, power.loads,
+      power.dampers, power.gravity, power.springs, energy.kinetic, energy.gravity, energy.springs;
+  if (work.size() > 0) row.segment(audit_column_ + 12, work.size()) = work.transpose();
 }
 
 }  // namespace mbv::simulation

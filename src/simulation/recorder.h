@@ -13,13 +13,15 @@ namespace mbv::simulation {
 /// of one and the same instant in the system's data.
 class Recorder {
  public:
-  /// `energy`: with EnergyChannels().
-  Recorder(ConstraintSystem* system, bool energy);
+  /// `work`: with WorkChannels().
+  Recorder(ConstraintSystem* system, bool work);
 
   [[nodiscard]] std::vector<Channel> channels() const { return channels_; }
 
-  /// Writes one row of the trace and the poses of all bodies.
-  void Record(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row, std::vector<Pose>* X_WB);
+  /// Writes one row of the trace and the poses of all bodies. `work`: empty without channels for
+  /// it.
+  void Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
+              std::vector<Pose>* X_WB);
 
  private:
   // Where a joint's reaction is read.
@@ -33,7 +35,7 @@ class Recorder {
   void RecordOutputs(const std::vector<Pose>& X_WB, Eigen::Ref<Eigen::RowVectorXd> row) const;
   void RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
                        Eigen::Ref<Eigen::RowVectorXd> row);
-  void RecordAudit(const Loads& loads, Eigen::Ref<Eigen::RowVectorXd> row);
+  void RecordAudit(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row);
   void TreeWrenches(const Loads& loads);
   void AddExternal(int body_id, const Vec3& p_W, const Vec3& force, const Vec3& moment);
   void AddTendon(int tendon, double force);
@@ -45,7 +47,6 @@ class Recorder {
   const EngineModel& engine_;
   std::vector<Channel> channels_;
   int output_column_ = 0, prescribed_column_ = 0, reaction_column_ = 0, audit_column_ = 0;
-  const bool energy_;
   std::vector<ReactionPlace> places_;  // per joint
   std::vector<std::vector<std::pair<int, int>>>
       driven_of_;                               // per joint: (driven row, MuJoCo joint)

@@ -7,6 +7,7 @@
 #include "simulation/closure_solver.h"
 #include "simulation/constraint_system.h"
 #include "simulation/loads.h"
+#include "simulation/powers.h"
 #include "simulation/recorder.h"
 #include "simulation/simulation.h"
 
@@ -21,6 +22,10 @@ struct Session {
 
   /// Stores sample i and reports progress now and then.
   void Record(size_t i);
+  /// Work rates at the present state, as WorkChannels().
+  [[nodiscard]] VecX WorkRates();
+  /// Decides, at the present configuration, whether the drives share their forces.
+  void FindShared();
   /// Loads and given drive forces at t, for the data's current position, into qfrc_applied.
   void ApplyForces(double t_s);
 
@@ -33,6 +38,8 @@ struct Session {
   ClosureSolver solver;
   Loads loads;
   Recorder recorder;
+  WorkMeter work;
+  bool shared = false;  ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
   Eigen::RowVectorXd record;  ///< one row of the trace
 };

@@ -10,6 +10,33 @@
 
 namespace mbv {
 namespace simulation {
+namespace {
+
+// Puts the least driven forces into the data for as long as it lives.
+class LeastForces {
+ public:
+  explicit LeastForces(Session* session) : session_(*session) {
+    if (!session_.shared) return;
+    found_ = session_.system.force();
+    session_.solver.SolveLeastDriven(session_.system.J().transpose() * found_);
+  }
+  ~LeastForces() {
+    if (session_.shared) session_.system.force() = found_;
+  }
+  LeastForces(const LeastForces&) = delete;
+  LeastForces& operator=(const LeastForces&) = delete;
+
+ private:
+  Session& session_;
+  VecX found_;
+};
+
+// Only the corrected engine's states are of one instant.
+bool Integrates(const SimulationOptions& options) {
+  return options.mode == SimulationMode::kForward && options.engine == Engine::kCorrected;
+}
+
+}  // namespace
 
 Session::Session(EngineModel model, const Motion& motion_, const SimulationOptions& options_,
                  SimulationRun* run_)
@@ -21,7 +48,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       system(engine, data.get()),
       solver(&system),
       loads(engine, motion_),
-      recorder(&system, motion_.free()) {
+      recorder(&system, Integrates(options_)) {
   run->trace.witness = "simulated";
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
@@ -32,13 +59,23 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
 
 void Session::Record(size_t i) {
   const auto row = static_cast<Eigen::Index>(i);
-  recorder.Record(loads, record, &run->X_WB[i]);
+  {
+    const LeastForces least(this);
+    recorder.Record(loads, work.work(), record, &run->X_WB[i]);
+  }
   run->trace.values.row(row) = record;
   run->qpos.row(row) = Eigen::Map<const Eigen::RowVectorXd>(data->qpos, engine.m->nq);
   if (progress && i % 16 == 0) {
     progress(static_cast<double>(i) / static_cast<double>(run->trace.time_s.size()));
   }
 }
+
+VecX Session::WorkRates() {
+  const LeastForces least(this);
+  return PowersOf(system, loads).Works();
+}
+
+void Session::FindShared() { shared = !solver.DrivenRowsNotUnique().empty(); }
 
 VecX HomePositions(const EngineModel& engine) {
   VecX home(engine.driven.size());

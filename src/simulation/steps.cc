@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/break_times.h"
+
 namespace mbv::simulation {
 namespace {
 
@@ -15,24 +17,6 @@ long StepsPerSample(const Motion& motion, double step_s) {
 
 }  // namespace
 
-std::vector<double> MotionBreaks(const Motion& motion) {
-  std::vector<double> breaks;
-  const auto add = [&breaks](const Profile& profile) {
-    const std::vector<double> times = BreakTimes(profile);
-    breaks.insert(breaks.end(), times.begin(), times.end());
-  };
-  for (const Command& command : motion.commands) add(command.profile);
-  for (const DriveForce& force : motion.forces) add(force.force);
-  for (const Load& load : motion.loads) {
-    for (int c = 0; c < 3; ++c) {
-      add(load.force[c]);
-      add(load.moment[c]);
-    }
-  }
-  std::sort(breaks.begin(), breaks.end());
-  return breaks;
-}
-
 double AdjustedStep(const Motion& motion, double step_s) {
   return motion.sample_s / static_cast<double>(StepsPerSample(motion, step_s));
 }
@@ -41,7 +25,7 @@ std::vector<Step> MakeSteps(const Motion& motion, double step_s) {
   const long per_sample = StepsPerSample(motion, step_s);
   const double h = AdjustedStep(motion, step_s);
   const long samples = static_cast<long>(SampleTimes(motion.duration_s, motion.sample_s).size());
-  const std::vector<double> breaks = MotionBreaks(motion);
+  const std::vector<double> breaks = BreakTimes(motion);
   auto next_break = breaks.begin();
   std::vector<Step> steps;
   int uniform = 1;

@@ -15,9 +15,6 @@ struct Step {
   long sample = -1;  ///< index of the sample at `to_s`, or -1
 };
 
-/// Times at which some profile of the motion has a break, ascending.
-[[nodiscard]] std::vector<double> MotionBreaks(const Motion& motion);
-
 /// Steps of length `step_s`, adjusted so that samples fall on whole steps; a step is divided where
 /// some profile of the motion has a break.
 [[nodiscard]] std::vector<Step> MakeSteps(const Motion& motion, double step_s);

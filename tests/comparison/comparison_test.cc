@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "comparison/force_scale.h"
+
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {
@@ -178,15 +180,46 @@ TEST(Comparison, InfinityNeverPasses) {
   EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
 }
 
-TEST(Comparison, ForcesThatVanishInBothAgreeAndNoiseAroundZeroDoesNot) {
+TEST(Comparison, ForcesThatCancelOutAreJudgedByTheForceScaleOfTheMechanism) {
+  const double limit = 1e-10;  // force_nrmse, inverse
+  const auto bent_by = [](double amount) {
+    Case c;
+    for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+      Stretch(trace, "d1.force", 0.0);
+      Stretch(trace, "d2.force", 0.0);
+    }
+    Bend(&c.simulated, "d1.force", amount);
+    return c.Run();
+  };
+  // Bodies of 1 kg: the scale is what the fastest drive's RMS acceleration asks of one of them.
   Case c;
-  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
-    Stretch(trace, "d1.force", 0.0);
-    Stretch(trace, "d2.force", 0.0);
-  }
-  EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
-  Bend(&c.simulated, "d1.force", 1e-12);
-  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+  const double w = 2.0 * std::numbers::pi;
+  const ForceScale scale = ForceScaleOf(c.Input(), c.analytic);
+  EXPECT_NEAR(scale.force_N, 0.5 * w * w / std::numbers::sqrt2, 0.1);
+  EXPECT_EQ(bent_by(0.0).verdict, Verdict::kAgree);
+  // One of two drives is bent: the pooled RMS is 1/√2 of the bend.
+  const double just = std::numbers::sqrt2 * limit * scale.Floor("N");
+  EXPECT_EQ(bent_by(0.5 * just).verdict, Verdict::kAgree);
+  EXPECT_TRUE(Fails(bent_by(2.0 * just), "simulated_vs_analytic.force_nrmse"));
+}
+
+TEST(Comparison, TheForceScaleIsTheLargestOfWeightLoadAndInertia) {
+  Case c;
+  c.mechanism.bodies[1].mass = 50.0;
+  c.mechanism.gravity_W = Vec3(0, 0, -9.81);
+  c.motion = {};
+  Trace still = c.analytic;
+  Stretch(&still, "d1.acceleration", 0.0);
+  Stretch(&still, "d2.acceleration", 0.0);
+  EXPECT_NEAR(ForceScaleOf(c.Input(), still).force_N, 50.0 * 9.81, 1e-9);
+  Load load;
+  load.body = 1;
+  load.force = {Constant(3000.0), Constant(0.0), Constant(4000.0)};
+  c.motion.loads = {load};
+  EXPECT_NEAR(ForceScaleOf(c.Input(), still).force_N, 5000.0, 1e-9);
+  c.motion.loads.clear();
+  c.mechanism.gravity_W.setZero();
+  EXPECT_NEAR(ForceScaleOf(c.Input(), still).force_N, 50.0 * 1.0, 1e-9);  // at 1 m/s²
 }
 
 TEST(Comparison, OnlyCommonSampleTimesAreCompared) {

@@ -73,17 +73,7 @@ TEST(ReferenceFailure, AMotionWithoutAnyDriveHasNoForce) {
 
 // A parallelogram lies flat at 0: there it may fold into the other branch.
 TEST(ReferenceFailure, AParallelogramPassingThroughItsFlatPoseIsSingular) {
-  Mechanism m;
-  m.name = "parallelogram";
-  m.bodies = {MakeWorld(), MakeBody("crank", 1, {0.1, 0, 0}, {0.01, 0.01, 0.01}),
-              MakeBody("coupler", 1, {0.25, 0, 0}, {0.01, 0.01, 0.01}),
-              MakeBody("rocker", 1, {0.1, 0, 0}, {0.01, 0.01, 0.01})};
-  m.joints = {MakeJoint("A", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, 1.0),
-              MakeJoint("B", JointKind::kRevolute, 1, {0.2, 0, 0}, 2, {0, 0, 0}, -1.0),
-              MakeJoint("D", JointKind::kRevolute, 0, {0.5, 0, 0}, 3, {0, 0, 0}, 1.0),
-              MakeJoint("C", JointKind::kRevolute, 2, {0.5, 0, 0}, 3, {0.2, 0, 0}, 1.0, true)};
-  m.drives = {{.name = "motor", .kind = JointDrive{0, 0}, .range = {}}};
-  FinishTree(&m);
+  const Mechanism m = MakeParallelogram(1.0);
   const ReferenceRun run =
       RunReference(m, DriveMotion(m, {{{ConstantTerm{1.0}, RampTerm{-1.0}}}}, 2.0, 0.013));
   EXPECT_EQ(run.summary.stop, Stop::kSingular) << run.summary.message;

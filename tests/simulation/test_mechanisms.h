@@ -133,6 +133,61 @@ inline Mechanism MakeFourBar(JointKind closing = JointKind::kRevolute, bool forc
   return m;
 }
 
+/// A parallelogram in the xy-plane without gravity: crank and rocker of 0.2 m on feet 0.5 m apart,
+/// at `angle`. Its energy depends on the crank's rate alone, so it turns at a constant rate, and
+/// twice per turn all bars lie in one line, where the rocker could go backwards.
+inline Mechanism MakeParallelogram(double angle) {
+  Mechanism m;
+  m.name = "parallelogram";
+  m.gravity_W.setZero();
+  Body world;
+  world.name = "world";
+  m.bodies = {world, MakeBody("crank", 1, {0.1, 0, 0}, {0.01, 0.01, 0.01}),
+              MakeBody("coupler", 1, {0.25, 0, 0}, {0.01, 0.01, 0.01}),
+              MakeBody("rocker", 1, {0.1, 0, 0}, {0.01, 0.01, 0.01})};
+  m.joints = {MakeJoint("A", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, angle),
+              MakeJoint("B", JointKind::kRevolute, 1, {0.2, 0, 0}, 2, {0, 0, 0}, -angle),
+              MakeJoint("D", JointKind::kRevolute, 0, {0.5, 0, 0}, 3, {0, 0, 0}, angle),
+              MakeJoint("C", JointKind::kRevolute, 2, {0.5, 0, 0}, 3, {0.2, 0, 0}, angle, true)};
+  m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+  AddTree(&m);
+  std::vector<std::array<double, 6>> q;
+  for (const Joint& joint : m.joints) q.push_back(joint.home);
+  m.X_WB_home = TreePoses(m, q);
+  return m;
+}
+
+/// An arm of 2 kg m² about z at the origin, turned by a motor and by a massless leg that pulls at a
+/// right angle with a lever of 0.5 m while the arm lies along x: one freedom, two drives. Torque T
+/// is shared with least (τ/L)² + f² by f = 0.5 T / (L² + 0.25), τ = T − 0.5 f.
+inline Mechanism MakeSharedArm() {
+  Mechanism m;
+  m.name = "shared_arm";
+  m.gravity_W.setZero();
+  Body world;
+  world.name = "world";
+  m.bodies = {world, MakeBody("arm", 1.0, {0, 0, 0}, {2, 2, 2})};
+  m.joints = {MakeJoint("hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0})};
+  AddTree(&m);
+  m.X_WB_home.assign(2, Pose::Identity());
+  m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+  m.drives.push_back(
+      {.name = "leg", .kind = DistanceDrive{0, {0.5, -0.8, 0}, 1, {0.5, 0, 0}}, .range = {}});
+  return m;
+}
+
+/// Starts the first joint's freedom at a position and rate; all drives push with nothing.
+inline Motion FreeMotion(const Mechanism& m, double position, double rate, double duration_s) {
+  Motion motion;
+  motion.duration_s = duration_s;
+  motion.sample_s = 0.01;
+  motion.initial = {{m.joints[0].name, {Coordinate::Kind::kJoint, 0, 0}, position, rate}};
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    motion.forces.push_back({static_cast<int>(d), Constant(0.0)});
+  }
+  return motion;
+}
+
 /// Everything driven stays at these positions.
 inline auto HoldStill(std::vector<double> positions) {
   return [positions](double, DrivenSample* driven) {

@@ -1,0 +1,44 @@
+// Powers and energies of MuJoCo's state, and the work that the powers do over a run.
+#pragma once
+
+#include <array>
+
+#include "simulation/constraint_system.h"
+#include "simulation/loads.h"
+
+namespace mbv::simulation {
+
+/// What is put in by what [W].
+struct Powers {
+  VecX driven;  ///< per driven coordinate: drives, then prescribed joints
+  double loads = 0.0, dampers = 0.0, gravity = 0.0, springs = 0.0;
+
+  /// The entries that WorkChannels() integrates.
+  [[nodiscard]] VecX Works() const;
+};
+/// Of velocities, forces and loads last evaluated.
+[[nodiscard]] Powers PowersOf(const ConstraintSystem& system, const Loads& loads);
+
+/// Energies [J]; gravity's counts from the world's origin.
+struct Energies {
+  double kinetic = 0.0, gravity = 0.0, springs = 0.0;
+};
+[[nodiscard]] Energies EnergiesOf(const ConstraintSystem& system);
+
+/// Integrates powers along the nodes of Integrator, with fourth order like the motion:
+///   W_{n+1} = W_n + h/24 (9 P_{n+1} + 19 P_n − 5 P_{n−1} + P_{n−2})                           (1)
+/// where it takes a multistep, else by Simpson's rule.
+class WorkMeter {
+ public:
+  void Start(const VecX& power);
+  void Middle(const VecX& power) { middle_ = power; }
+  /// The step of length `h` to a node with this power.
+  void Step(double h, bool multistep, const VecX& power);
+  [[nodiscard]] const VecX& work() const { return work_; }
+
+ private:
+  VecX work_, middle_;
+  std::array<VecX, 3> power_;  ///< at the last nodes, newest first
+};
+
+}  // namespace mbv::simulation
