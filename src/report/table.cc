@@ -161,6 +161,7 @@ class Writer {
   }
 
   void Drives(const PairComparison& pair) {
+    if (pair.drives.empty()) return;
     size_t width = 12;
     for (const DriveMetrics& drive : pair.drives) width = std::max(width, drive.drive.size());
     Line();
