@@ -162,6 +162,14 @@ void ClosureSolver::SolveForces(const VecX& tau) {
   system_->force() = rhs_;
 }
 
+void ClosureSolver::RemoveSelfStress(VecX* force) const {
+  if (redundant() == 0) return;
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->J());
+  VecX y = qr.householderQ().adjoint() * *force;
+  y.tail(redundant()).setZero();
+  *force = qr.householderQ() * y;
+}
+
 void ClosureSolver::SolveForcesHere(const VecX& tau) {
   Eigen::CompleteOrthogonalDecomposition<MatX> cod;
   cod.setThreshold(kRankTolerance);

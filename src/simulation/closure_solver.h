@@ -44,6 +44,10 @@ class ClosureSolver {
   /// had independent rows: 0 where a constraint is lost.
   [[nodiscard]] double WeakestPivot() const;
 
+  /// Takes the part out of row forces that does not act on the present configuration: what remains
+  /// is J x for some x. As many dimensions as rows were redundant when last solved.
+  void RemoveSelfStress(VecX* force) const;
+
   [[nodiscard]] int undriven() const { return system_->nv() - rank_; }
   [[nodiscard]] int redundant() const { return system_->rows() - rank_; }
   /// Rows of guided coordinates whose force is not unique at the present configuration.

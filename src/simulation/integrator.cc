@@ -16,9 +16,6 @@ constexpr double kSoftness = 1e-5;
 constexpr double kLightest = 1e-4;
 // Repeated solutions where no force is expected yet: each reduces the error by R's share.
 constexpr int kStartRepeats = 4;
-// With redundant constraints the self-stress is only determined through R, and a force that
-// relies on its own past would drift: the past is trusted a little less.
-constexpr double kTrustIfRedundant = 0.9;
 // Shares of the largest pivot of J, see the head of integrator.h.
 constexpr double kWeak = 0.01, kNear = 0.2;
 
@@ -29,7 +26,6 @@ Integrator::Integrator(Session* session, double h)
   const double tc = session->options.guidance_steps * h;
   b_ = 2.0 / tc;
   k_ = 1.0 / (tc * tc);
-  if (s_.solver.redundant() > 0) trust_ = kTrustIfRedundant;
   const int rows = s_.system.rows();
   for (VecX* x : {&bias_, &rate_, &aref_, &expected_, &last_force_}) x->setZero(rows);
   largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_));
@@ -56,7 +52,7 @@ void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
   mean_ = v_ + e * (323.0 * a_[0] - 264.0 * a_[1] + 159.0 * a_[2] - 38.0 * a_[3]);
   q_p_ = q_;
   AdvancePositions(s_.engine, h, mean_, v_, v_p_, &work_, q_p_.data());
-  expected_ = 2.0 * trust_ * s_.system.force() - trust_ * trust_ * last_force_;
+  expected_ = 2.0 * s_.system.force() - last_force_;
   warm_ = 2.0 * a_[0] - a_[1];
   Evaluate(q_p_, v_p_, end, end_s);
   nodes_ = std::min(nodes_ + 1, static_cast<int>(a_.size()));
@@ -198,8 +194,11 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at) {
   ApplyReference();
 }
 
+// With redundant constraints the self-stress is determined through R alone, and a force that relies
+// on its own past would drift: no self-stress is expected, so none is found.
 void Integrator::ApplyReference() {
   const int rows = s_.system.rows();
+  s_.solver.RemoveSelfStress(&expected_);
   Eigen::Map<VecX>(d_->efc_aref, rows) =
       aref_ + Eigen::Map<const VecX>(d_->efc_R, rows).cwiseProduct(expected_);
 }

@@ -63,7 +63,6 @@ class Integrator {
   const mjModel* const m_;
   mjData* const d_;
   double b_ = 0.0, k_ = 0.0;  // of (1)
-  double trust_ = 1.0;        // in the extrapolated force
   double largest_R_ = 0.0;    // [1/kg]; rotation rows: of a lever of one metre
   VecX q_, v_;                // corrected state at the present node
   VecX q_p_, v_p_, mean_, work_, warm_;
