@@ -1,9 +1,12 @@
 // mbverify mutate
 #include <fmt/format.h>
 
+#include <charconv>
 #include <memory>
+#include <optional>
 
 #include "cli/cli.h"
+#include "cli/files.h"
 #include "cli/terminal.h"
 #include "pipeline/mutate.h"
 
@@ -12,15 +15,35 @@ namespace {
 
 struct MutateArguments {
   std::string scenario;
-  double percent = 0.1;
+  std::string size = "0.1 %";
+  double resolution_percent = 10.0;
   std::vector<std::string> parameters;
-  bool markdown = false;
+  bool markdown = false, no_search = false, no_faults = false;
+  std::string json;
 };
 
+// "0.1", "0.1%", "0.1 %": percent; empty when it is none or not above 0.
+std::optional<double> ReadPercent(std::string text) {
+  while (!text.empty() && (text.back() == '%' || text.back() == ' ')) text.pop_back();
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size() || !(value > 0.0)) return {};
+  return value / 100.0;
+}
+
 int Mutate(const MutateArguments& arguments) {
+  const auto size = ReadPercent(arguments.size);
+  if (!size) {
+    fmt::print(stderr, "--size {}: error: violates: a percentage above 0, e.g. 1%\n",
+               arguments.size);
+    return 2;
+  }
   MutationOptions options;
-  options.size = arguments.percent / 100;
+  options.size = *size;
   options.parameters = arguments.parameters;
+  options.resolution = arguments.resolution_percent / 100.0;
+  options.smallest = !arguments.no_search;
+  options.structural = !arguments.no_faults;
   ProgressLine progress(true);
   if (progress.active()) {
     options.progress = [&](const std::string& parameter, double fraction) {
@@ -30,11 +53,13 @@ int Mutate(const MutateArguments& arguments) {
   const MutationReport report = MutateScenario(arguments.scenario, options);
   progress.Clear();
   fmt::print(stderr, "{}", report.diagnostics.Text());
-  if (report.mutations.empty()) {
-    if (report.exit_code != 2) {
-      fmt::print(stderr, "error: {} does not agree before anything is bent\n", arguments.scenario);
+  if (report.mutations.empty() && report.faults.empty()) return report.exit_code;
+  if (!arguments.json.empty()) {
+    const std::string trouble = WriteWholeFile(arguments.json, ToJson(report));
+    if (!trouble.empty()) {
+      fmt::print(stderr, "error: {}\n", trouble);
+      return 2;
     }
-    return report.exit_code;
   }
   fmt::print("{}", ToText(report, arguments.markdown));
   return report.exit_code;
@@ -45,17 +70,28 @@ int Mutate(const MutateArguments& arguments) {
 void AddMutateCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<MutateArguments>();
   CLI::App* mutate = app->add_subcommand(
-      "mutate", "Bend each parameter of the simulated side: which errors would be noticed?");
+      "mutate",
+      "Bend each parameter of the simulated side and put structural faults into it: which errors "
+      "would be noticed, and down to which size?");
   mutate->add_option("scenario", arguments->scenario, "scenario file that agrees")->required();
-  mutate->add_option("--size", arguments->percent, "relative error in percent")
+  mutate->add_option("--size", arguments->size, "relative error in percent (1%)")
+      ->capture_default_str();
+  mutate->add_option("--parameter", arguments->parameters, "only these parameters (repeatable)")
+      ->allow_extra_args(false);
+  mutate
+      ->add_option("--resolution", arguments->resolution_percent,
+                   "of the smallest detectable error, in percent")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  mutate->add_option("--parameter", arguments->parameters, "only these parameters (repeatable)");
-  mutate->add_flag("--markdown", arguments->markdown, "print a Markdown table");
+  mutate->add_flag("--no-search", arguments->no_search,
+                   "smallest errors by proportion, without searching");
+  mutate->add_flag("--no-faults", arguments->no_faults, "parameters only");
+  mutate->add_flag("--markdown", arguments->markdown, "print Markdown tables");
+  mutate->add_option("--json", arguments->json, "write the results to this file, too");
   mutate->footer(
       "Example:\n"
-      "  mbverify mutate scenarios/stabilizing_platform/sea_state.yaml --size 0.1\n"
-      "Exit codes: 0 every parameter that matters is detected, 1 some are missed");
+      "  mbverify mutate scenarios/stabilizing_platform/sea_state.yaml --size 1%\n"
+      "Exit codes: 0 everything that matters is detected, 1 some is missed");
   mutate->callback([arguments, exit_code] { *exit_code = Mutate(*arguments); });
 }
 

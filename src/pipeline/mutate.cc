@@ -3,179 +3,287 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
+#include <limits>
+#include <optional>
 
-#include "pipeline/run_scenario.h"
-#include "scenario/load_scenario.h"
+#include "pipeline/mutation_bench.h"
+#include "pipeline/mutation_reason.h"
+#include "pipeline/structural_faults.h"
 
 namespace mbv {
 namespace {
 
-// A value counts as an effect of the parameter when it is clearly above what the unbent run gives.
-constexpr double kRoundoff = 1e-12;
-constexpr double kAboveBase = 5.0;
+// The check that shows a bend best: largest value over limit among those that the bend moves.
+struct Best {
+  const CheckResult* check = nullptr;
+  double ratio = 0.0;  // value over limit
+};
 
-double Visible(double base) { return std::max(kRoundoff, kAboveBase * base); }
-
-RunOptions OptionsFor(const std::string& parameter, double value) {
-  RunOptions options;
-  options.pictures = false;
-  options.scenario.set = {{"simulation.mode", "inverse"}, {"reference", "off"}};
-  if (!parameter.empty()) {
-    options.scenario.set.emplace_back("simulation.parameters." + parameter,
-                                      fmt::format("{:.17g}", value));
+Best BestOf(const MutationBench& bench, const BentRun& run) {
+  Best best;
+  for (const CheckResult& check : run.comparison.checks) {
+    if (!check.limit) continue;
+    if (check.value <= MutationBench::Visible(bench.base().ValueOf(check.name))) continue;
+    const double ratio = std::isnan(check.value) ? std::numeric_limits<double>::infinity()
+                                                 : check.value / *check.limit;
+    if (best.check == nullptr || ratio > best.ratio) best = {&check, ratio};
   }
-  return options;
+  return best;
 }
 
-constexpr const char* kForceCheck = "simulated_vs_analytic.force_nrmse";
+class Mutator {
+ public:
+  Mutator(const MutationOptions& options, const MutationBench& bench, MutationReport* report)
+      : options_(options), bench_(bench), report_(*report) {}
 
-double ValueOf(const Report& report, const std::string& check_name) {
-  const CheckResult* check = report.comparison.FindCheck(check_name);
-  return check == nullptr ? 0.0 : check->value;
-}
-
-// What the checks of a bent run say; `base` is the unbent run.
-void Judge(const Report& bent, const Report& base, double size, Mutation* m) {
-  double best = std::numeric_limits<double>::infinity();
-  m->force_change = ValueOf(bent, kForceCheck);
-  for (const CheckResult& check : bent.comparison.checks) {
-    if (!check.limit || check.value <= Visible(ValueOf(base, check.name))) continue;
-    // A check that fails shows the error; NaN fails too.
-    if (!check.pass) {
-      m->detected = true;
-      m->by_force = m->by_force || IsDriveForce(check.metric);
+  void BendParameters() {
+    std::vector<Parameter> parameters;
+    for (const Parameter& parameter : bench_.mechanism().parameters) {
+      if (Wanted(parameter)) parameters.push_back(parameter);
     }
-    const double smallest = size * *check.limit / check.value;
-    if (smallest < best) {
-      best = smallest;
-      m->best_check = check.name;
+    for (size_t i = 0; i < parameters.size(); ++i) {
+      fraction_ = static_cast<double>(i) / static_cast<double>(parameters.size());
+      report_.mutations.push_back(Bend(parameters[i]));
+    }
+    std::stable_sort(report_.mutations.begin(), report_.mutations.end(),
+                     [](const Mutation& a, const Mutation& b) { return Rank(a) < Rank(b); });
+  }
+
+  void PutFaults() {
+    std::vector<StructuralFault> faults = StructuralFaults(bench_.mechanism());
+    for (size_t i = 0; i < faults.size(); ++i) {
+      fraction_ = static_cast<double>(i) / static_cast<double>(faults.size());
+      if (options_.progress) options_.progress(faults[i].kind, fraction_);
+      report_.faults.push_back(Put(faults[i]));
     }
   }
-  if (m->detected) m->smallest = best;
-}
 
-std::string WhyUnseen(const Mutation& m, const Report& base, const std::string& note) {
-  if (!(m.force_change > Visible(ValueOf(base, kForceCheck)))) {
-    return "the simulated motion and drive forces do not depend on it" +
-           (note.empty() ? "" : " (" + note + ")");
+  [[nodiscard]] bool missed() const { return missed_; }
+
+ private:
+  // By smallest error where it is known, else by the force change.
+  static double Rank(const Mutation& m) {
+    if (!std::isnan(m.smallest)) return m.smallest;
+    return m.detected && !std::isnan(m.force_change) ? 1.0 / (1.0 + m.force_change) : 10.0;
   }
-  return fmt::format("its effect on the drive forces ({:.1e}) is below the limit", m.force_change);
-}
 
-Mutation Bend(const std::string& file, const Parameter& parameter, const Report& base,
-              double size) {
-  Mutation m;
-  m.parameter = parameter.name;
-  m.unit = parameter.unit;
-  m.value = parameter.value;
-  const RunOutcome outcome =
-      RunScenario(file, OptionsFor(parameter.name, parameter.value * (1 + size)));
-  if (!outcome.report) {
-    // The bent model contradicts itself (a loop that does not close, an inertia that is not
-    // physical): found before any force was compared.
-    m.detected = true;
-    m.reason = outcome.diagnostics.findings().empty()
-                   ? "the bent model could not be loaded"
-                   : outcome.diagnostics.findings().front().message;
+  [[nodiscard]] bool Wanted(const Parameter& parameter) const {
+    // An instance's parameter ("limb2.azimuth") follows from the model's.
+    const bool of_instance = parameter.name.find('.') != std::string::npos;
+    if (options_.parameters.empty()) return parameter.value != 0.0 && !of_instance;
+    return std::find(options_.parameters.begin(), options_.parameters.end(), parameter.name) !=
+           options_.parameters.end();
+  }
+
+  BentRun RunAt(const Parameter& parameter, double size) {
+    if (options_.progress) {
+      options_.progress(fmt::format("{} by {:.1e}", parameter.name, size), fraction_);
+    }
+    ++report_.runs;
+    return bench_.Run(parameter.name, parameter.value * (1.0 + size));
+  }
+
+  Mutation Bend(const Parameter& parameter) {
+    Mutation m;
+    m.parameter = parameter.name;
+    m.unit = parameter.unit;
+    m.value = parameter.value;
+    const BentRun run = RunAt(parameter, options_.size);
+    m.ran = run.ran;
+    m.detected = run.detected();
+    if (run.ran) m.force_change = run.ValueOf(bench_.ForceCheck());
+    m.by_force = FailsByForce(run);
+    if (!run.ran) m.reason = run.failure;
+    const Best best = BestOf(bench_, run);
+    if (m.detected) {
+      m.best_check = best.check == nullptr ? "model" : best.check->name;
+      if (options_.smallest) {
+        FindSmallest(parameter, 0.0, options_.size, best.ratio, &m);
+      } else if (best.check != nullptr) {
+        m.smallest = options_.size / best.ratio;
+      }
+      return m;
+    }
+    BendFurther(parameter, run, &m);
+    missed_ = missed_ ||
+              m.force_change > MutationBench::Visible(bench_.base().ValueOf(bench_.ForceCheck()));
     return m;
   }
-  m.ran = outcome.report->comparison.verdict != Verdict::kNotRun;
-  if (!m.ran) {
-    m.detected = true;
-    m.reason = outcome.report->comparison.reason;
-    return m;
-  }
-  Judge(*outcome.report, base, size, &m);
-  if (!m.detected) m.reason = WhyUnseen(m, base, parameter.note);
-  return m;
-}
 
-bool Wanted(const MutationOptions& options, const Parameter& parameter) {
-  // An instance's parameter ("limb2.azimuth") follows from the model's.
-  const bool of_instance = parameter.name.find('.') != std::string::npos;
-  if (options.parameters.empty()) return parameter.value != 0.0 && !of_instance;
-  return std::find(options.parameters.begin(), options.parameters.end(), parameter.name) !=
-         options.parameters.end();
-}
-
-std::string Row(const Mutation& m, bool markdown) {
-  const std::string seen = !m.detected  ? "no"
-                           : m.by_force ? "drive forces"
-                           : m.ran      ? "yes"
-                                        : "refused";
-  const std::string change =
-      std::isnan(m.force_change) ? "-" : fmt::format("{:.1e}", m.force_change);
-  const std::string smallest = std::isnan(m.smallest) ? "-" : fmt::format("{:.0e}", m.smallest);
-  const std::string note = m.reason.empty() ? m.best_check : m.reason;
-  if (markdown) {
-    return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {} |\n", m.parameter, m.value, m.unit,
-                       seen, change, smallest, note);
+  static bool FailsByForce(const BentRun& run) {
+    return std::any_of(run.comparison.checks.begin(), run.comparison.checks.end(),
+                       [](const CheckResult& check) {
+                         return check.limit && !check.pass && IsDriveForce(check.metric);
+                       });
   }
-  return fmt::format("  {:<22}{:>12g} {:<7}{:<14}{:>9}  {:>8}  {}\n", m.parameter, m.value, m.unit,
-                     seen, change, smallest, note);
+
+  // Undetected at the size asked for: bent by kLargestBend, and if that is seen or refused, by ten
+  // times as much as before until it is.
+  void BendFurther(const Parameter& parameter, const BentRun& first, Mutation* m) {
+    double unseen = options_.size;
+    BentRun last = first;
+    BentRun largest = unseen < kLargestBend ? RunAt(parameter, kLargestBend) : BentRun();
+    if (largest.ran && !largest.detected()) {
+      unseen = kLargestBend;
+      last = std::move(largest);
+    }
+    for (double size = 10.0 * options_.size; unseen < kLargestBend; size *= 10.0) {
+      size = std::min(size, kLargestBend);
+      BentRun run = RunAt(parameter, size);
+      if (!run.ran) break;  // the model itself objects; forces have not seen it up to here
+      if (run.detected()) {
+        const Best best = BestOf(bench_, run);
+        m->best_check = best.check == nullptr ? "" : best.check->name;
+        if (options_.smallest) FindSmallest(parameter, unseen, size, best.ratio, m);
+        m->reason = fmt::format("its effect ({:.1e} in the drive forces) is below the limit",
+                                m->force_change);
+        return;
+      }
+      unseen = size;
+      last = std::move(run);
+    }
+    m->proved_to = unseen;
+    m->sensitivity = ForceSensitivity(bench_, last.trace);
+    std::string why;
+    const auto bent = bench_.Bend(parameter.name, parameter.value * (1.0 + unseen), &why);
+    m->reason = bent ? WhyUnseen(bench_, *bent, last, unseen) : why;
+  }
+
+  // Between `unseen` (0: not known) and `seen`; `ratio` is value over limit at `seen`.
+  void FindSmallest(const Parameter& parameter, double unseen, double seen, double ratio,
+                    Mutation* m) {
+    const double fine = 1.0 + options_.resolution;
+    double step = fine;
+    // Where proportion puts the limit, a little beyond; 0 where nothing is proportional.
+    double guess = std::isfinite(ratio) && ratio > 1.0 ? seen / ratio * std::sqrt(fine) : 0.0;
+    while ((unseen == 0.0 || seen / unseen > fine) && seen > kSmallestBend) {
+      double size = 0.0;
+      if (guess > unseen && guess < seen) {
+        size = guess;
+      } else if (unseen == 0.0) {
+        size = seen / step;
+        step *= step;
+      } else if (unseen * step * fine < seen) {
+        size = unseen * step;
+        step *= step;
+      } else {
+        size = std::sqrt(unseen * seen);
+      }
+      guess = 0.0;
+      size = std::max(size, kSmallestBend);
+      const BentRun run = RunAt(parameter, size);
+      if (!run.detected()) {
+        unseen = size;
+        continue;
+      }
+      seen = size;
+      const Best best = BestOf(bench_, run);
+      m->best_check = best.check == nullptr ? "model" : best.check->name;
+    }
+    m->smallest = seen;
+  }
+
+  FaultResult Put(const StructuralFault& fault) {
+    FaultResult result;
+    result.kind = fault.kind;
+    result.where = fault.where;
+    result.alike = fault.alike;
+    result.reason = fault.not_applicable;
+    if (fault.wrong.empty()) return result;
+    if (bench_.scenario().simulation.extrapolate) {
+      result.reason = "the scenario extrapolates over models that are loaded anew";
+      return result;
+    }
+    const std::optional<BentRun> run = RunFault(fault);
+    if (!run) {
+      result.reason = fmt::format(
+          "the simulation brings all of {} random starts to the same "
+          "assembly, or to none",
+          fault.wrong.size());
+      return result;
+    }
+    result.applicable = true;
+    result.ran = run->ran;
+    result.detected = run->detected();
+    if (!run->ran) {
+      result.check = "model";
+      result.reason = run->failure;
+      return result;
+    }
+    const Best best = BestOf(bench_, *run);
+    if (best.check != nullptr) {
+      result.check = best.check->name;
+      result.value = best.check->value;
+      result.limit = *best.check->limit;
+    }
+    if (!result.detected) result.reason = WhyFaultUnseen(fault, *run);
+    return result;
+  }
+
+  // The fault; of several candidates the first that runs and moves differently, else that is
+  // refused for its ranges; empty when none is.
+  std::optional<BentRun> RunFault(const StructuralFault& fault) {
+    for (const Mechanism& wrong : fault.wrong) {
+      ++report_.runs;
+      BentRun run = bench_.Run(wrong);
+      if (fault.wrong.size() == 1 || run.out_of_range || (run.ran && run.detected())) return run;
+    }
+    return {};
+  }
+
+  std::string WhyFaultUnseen(const StructuralFault& fault, const BentRun& run) {
+    const double change = ForceSensitivity(bench_, run.trace);
+    if (change > MutationBench::Visible(0.0)) {
+      missed_ = true;
+    } else if (!fault.first.empty()) {
+      return WhySwapUnseen(bench_, fault.first, fault.second);
+    }
+    return WhyUnseen(bench_, fault.wrong.front(), run, kNan);
+  }
+
+  const MutationOptions& options_;
+  const MutationBench& bench_;
+  MutationReport& report_;
+  double fraction_ = 0.0;
+  bool missed_ = false;
+};
+
+// Named parameters that the model does not have.
+void CheckNames(const MutationOptions& options, const Mechanism& mechanism,
+                MutationReport* report) {
+  std::vector<std::string> names;
+  for (const Parameter& parameter : mechanism.parameters) names.push_back(parameter.name);
+  for (const std::string& wanted : options.parameters) {
+    if (std::find(names.begin(), names.end(), wanted) != names.end()) continue;
+    Finding finding;
+    finding.message = fmt::format("{} has no parameter '{}'", mechanism.name, wanted);
+    const std::string near = ClosestWord(wanted, names);
+    if (!near.empty()) finding.hint = fmt::format("did you mean '{}'?", near);
+    report->diagnostics.Add(std::move(finding));
+    report->exit_code = 2;
+  }
 }
 
 }  // namespace
 
 MutationReport MutateScenario(const std::string& file, const MutationOptions& options) {
+  const auto start = std::chrono::steady_clock::now();
   MutationReport report;
   report.scenario = file;
   report.size = options.size;
-  const ScenarioResult scenario = LoadScenario(file);
-  if (!scenario.scenario) {  // bad input, or no motion
-    report.diagnostics = scenario.diagnostics;
-    report.exit_code = 2;
-    return report;
-  }
-  const RunOutcome base = RunScenario(file, OptionsFor("", 0.0));
-  report.diagnostics = base.diagnostics;
-  report.exit_code = base.exit_code;
-  if (base.exit_code != 0) return report;  // an unbent disagreement would detect everything
-
-  std::vector<Parameter> parameters;
-  for (const Parameter& parameter : scenario.mechanism->parameters) {
-    if (Wanted(options, parameter)) parameters.push_back(parameter);
-  }
-  for (size_t i = 0; i < parameters.size(); ++i) {
-    if (options.progress) {
-      options.progress(parameters[i].name, static_cast<double>(i) / parameters.size());
-    }
-    report.mutations.push_back(Bend(file, parameters[i], *base.report, options.size));
-  }
-  std::stable_sort(report.mutations.begin(), report.mutations.end(),
-                   [](const Mutation& a, const Mutation& b) {
-                     const auto key = [](const Mutation& m) {
-                       return std::isnan(m.force_change) ? -1.0 : m.force_change;
-                     };
-                     return key(a) > key(b);
-                   });
-  const bool missed =
-      std::any_of(report.mutations.begin(), report.mutations.end(), [&](const Mutation& m) {
-        return !m.detected && m.force_change > Visible(ValueOf(*base.report, kForceCheck));
-      });
-  report.exit_code = missed ? 1 : 0;
+  report.resolution = options.resolution;
+  const auto bench = MutationBench::Make(file, &report.diagnostics, &report.exit_code);
+  if (bench == nullptr) return report;
+  CheckNames(options, bench->mechanism(), &report);
+  if (report.exit_code != 0) return report;
+  Mutator mutator(options, *bench, &report);
+  mutator.BendParameters();
+  if (options.structural && options.parameters.empty()) mutator.PutFaults();
+  report.exit_code = mutator.missed() ? 1 : 0;
+  report.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return report;
-}
-
-std::string ToText(const MutationReport& report, bool markdown) {
-  const auto count = [&](auto predicate) {
-    return std::count_if(report.mutations.begin(), report.mutations.end(), predicate);
-  };
-  const auto detected = count([](const Mutation& m) { return m.detected; });
-  const auto by_force = count([](const Mutation& m) { return m.by_force; });
-  std::string text = fmt::format(
-      "{}: {} of {} parameters, each {:g} % wrong on the simulated side, turn the verdict; {} of "
-      "them "
-      "by the drive forces\n\n",
-      report.scenario, detected, report.mutations.size(), 100 * report.size, by_force);
-  text += markdown
-              ? "| parameter | value | detected | force NRMSE | smallest relative error | seen "
-                "first by, or why not |\n|---|---|---|---|---|---|\n"
-              : fmt::format("  {:<22}{:>12} {:<7}{:<14}{:>9}  {:>8}  {}\n", "parameter", "value",
-                            "", "detected", "force", "smallest", "seen first by, or why not");
-  for (const Mutation& m : report.mutations) text += Row(m, markdown);
-  return text;
 }
 
 }  // namespace mbv

@@ -1,49 +1,30 @@
-// Detection power: does a small error in one parameter turn the verdict?
+// Detection power: does a small error in one parameter, or a structural fault, turn the verdict?
 #pragma once
 
 #include <functional>
 #include <string>
 #include <vector>
 
-#include "core/diagnostics.h"
-#include "core/types.h"
+#include "report/mutation_report.h"
 
 namespace mbv {
 
-/// One parameter bent on the simulated side only.
-struct Mutation {
-  std::string parameter, unit;
-  double value = kNan;
-  bool ran = false;            ///< false: the bent model could not be simulated; `reason` says why
-  bool detected = false;       ///< a check failed, or the bent model could not run at all
-  bool by_force = false;       ///< a drive-force check failed
-  double force_change = kNan;  ///< drive-force error caused, relative (the NRMSE of the check)
-  double smallest = kNan;      ///< relative error at which the first check would reach its limit,
-                               ///< by proportion from this run
-  std::string best_check;      ///< the check that sees it first
-  std::string reason;          ///< why not detected, or why it did not run
-};
-
-struct MutationReport {
-  int exit_code = 4;  ///< 0 all detected or explained by no influence, 1 some missed, 2, 3 as run
-  Diagnostics diagnostics;
-  std::string scenario;
-  double size = kNan;
-  std::vector<Mutation> mutations;
-};
+inline constexpr double kLargestBend = 0.1;     ///< undetected parameters are bent up to this
+inline constexpr double kSmallestBend = 1e-15;  ///< smaller errors vanish in the parameter's digits
 
 struct MutationOptions {
   double size = 1e-3;                   ///< relative error, > 0
   std::vector<std::string> parameters;  ///< empty: the model's own that are not zero
   std::function<void(const std::string& parameter, double fraction)> progress;
+  bool smallest = true;     ///< search for the smallest detectable error
+  double resolution = 0.1;  ///< of the search, relative, > 0
+  bool structural = true;   ///< structural faults, too (never when `parameters` are named)
 };
 
-/// Runs the scenario once as it is and once per parameter, with MuJoCo's inverse dynamics per
-/// sample (roundoff accuracy) and the reference switched off; the scenario's own limits judge.
+/// Runs the scenario once as it is and many times with the simulated side bent, with MuJoCo's
+/// inverse dynamics per sample (roundoff accuracy); the scenario's own limits judge. Bends make a
+/// parameter larger. The search is a bisection in log scale, started where proportion puts it.
 [[nodiscard]] MutationReport MutateScenario(const std::string& file,
                                             const MutationOptions& options);
-
-/// A table, most sensitive first; Markdown when `markdown`.
-[[nodiscard]] std::string ToText(const MutationReport& report, bool markdown);
 
 }  // namespace mbv

@@ -89,6 +89,24 @@ TEST_F(CliTest, UrdfLeavesBeamsOutWithAWarning) {
   EXPECT_EQ(mbverify("model scara_robot --format urdf").err.find("beams"), std::string::npos);
 }
 
+TEST_F(CliTest, MutateTakesPercentAndWritesJson) {
+  const std::string json = (mbverify.folder() / "m.json").string();
+  const ProgramResult result = mbverify(
+      "mutate scenarios/four_bar/turn_inverse.yaml --parameter rho --size 1% --json " + json);
+  EXPECT_EQ(result.exit_code, 0) << result.err;
+  EXPECT_NE(result.out.find("1 of 1 parameters, each 1 % wrong"), std::string::npos) << result.out;
+  const auto parsed = nlohmann::json::parse(ReadAll(json), nullptr, false);
+  ASSERT_FALSE(parsed.is_discarded());
+  EXPECT_EQ(parsed["size"], 0.01);
+  EXPECT_EQ(parsed["parameters"][0]["parameter"], "rho");
+  for (const char* size : {"0", "-1%", "one", "1 m"}) {
+    const ProgramResult bad =
+        mbverify("mutate scenarios/four_bar/turn_inverse.yaml --size '" + std::string(size) + "'");
+    EXPECT_EQ(bad.exit_code, 2) << size;
+    EXPECT_NE(bad.err.find("violates: a percentage above 0"), std::string::npos) << bad.err;
+  }
+}
+
 TEST_F(CliTest, TheWorstScenarioDecidesTheExitCode) {
   const std::string good = kGood, disagrees = kDisagrees, bad = kBadInput, cannot = kCannotRun;
   EXPECT_EQ(mbverify(RunArguments(mbverify, good)).exit_code, 0);

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 namespace mbv {
@@ -13,6 +15,14 @@ using Names = std::set<std::string>;
 
 MutationReport Mutate(const std::string& scenario, MutationOptions options = {}) {
   return MutateScenario(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml", options);
+}
+
+// Parameters at one size, without searching for the smallest one.
+MutationOptions Plain() {
+  MutationOptions options;
+  options.smallest = false;
+  options.structural = false;
+  return options;
 }
 
 Names Undetected(const MutationReport& report) {
@@ -31,7 +41,7 @@ const Mutation* Find(const MutationReport& report, const std::string& parameter)
 }
 
 TEST(Mutate, OnTheStabilizingPlatformOnlyWhatCannotActStaysUnseen) {
-  const MutationReport report = Mutate("stabilizing_platform/sea_state");
+  const MutationReport report = Mutate("stabilizing_platform/sea_state", Plain());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   EXPECT_EQ(Undetected(report),
             (Names{
@@ -44,7 +54,7 @@ TEST(Mutate, OnTheStabilizingPlatformOnlyWhatCannotActStaysUnseen) {
 }
 
 TEST(Mutate, OnTheTripodOnlyWhatCannotActStaysUnseen) {
-  const MutationReport report = Mutate("spr_tripod/default_inverse");
+  const MutationReport report = Mutate("spr_tripod/default_inverse", Plain());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   EXPECT_EQ(Undetected(report),
             (Names{
@@ -62,7 +72,7 @@ TEST(Mutate, OnTheTripodOnlyWhatCannotActStaysUnseen) {
 }
 
 TEST(Mutate, OnTheScaraRobotOnlyWhatCannotActStaysUnseen) {
-  const MutationReport report = Mutate("scara_robot/pick_place");
+  const MutationReport report = Mutate("scara_robot/pick_place", Plain());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   EXPECT_EQ(Undetected(report),
             (Names{
@@ -82,7 +92,7 @@ TEST(Mutate, OnTheScaraRobotOnlyWhatCannotActStaysUnseen) {
 }
 
 TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
-  const MutationReport report = Mutate("cabin_robot/zero_g");
+  const MutationReport report = Mutate("cabin_robot/zero_g", Plain());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   Names expected{
       "c_carriage_y",  // the carriage and the sliders move without turning
@@ -116,19 +126,138 @@ TEST(Mutate, ASmallErrorIsMissedAndSaysSo) {
   EXPECT_FALSE(report.mutations[0].reason.empty());
 }
 
-TEST(Mutate, TheSmallestDetectableErrorIsPredictedFromALargeOne) {
-  const MutationOptions options{.size = 1e-3, .parameters = {"m_rod"}, .progress = {}};
-  const MutationReport large = Mutate("spr_tripod/default_inverse", options);
-  ASSERT_EQ(large.mutations.size(), 1u);
-  const double smallest = large.mutations[0].smallest;
-  const auto detected_at = [&](double size) {
-    return Mutate("spr_tripod/default_inverse",
-                  {.size = size, .parameters = {"m_rod"}, .progress = {}})
-        .mutations[0]
-        .detected;
-  };
-  EXPECT_TRUE(detected_at(2 * smallest));
-  EXPECT_FALSE(detected_at(0.5 * smallest));
+TEST(Mutate, TheSmallestErrorIsDetectedAndOneResolutionSmallerIsNot) {
+  for (const char* parameter : {"m_rod", "I_rod_zz", "b"}) {
+    MutationOptions options{.size = 1e-3, .parameters = {parameter}, .progress = {}};
+    const MutationReport report = Mutate("spr_tripod/default_inverse", options);
+    ASSERT_EQ(report.mutations.size(), 1u);
+    const double smallest = report.mutations[0].smallest;
+    EXPECT_LT(smallest, 1e-5) << parameter;
+    const auto detected_at = [&](double size) {
+      options.size = size;
+      options.smallest = false;
+      return Mutate("spr_tripod/default_inverse", options).mutations[0].detected;
+    };
+    EXPECT_TRUE(detected_at(smallest)) << parameter;
+    EXPECT_FALSE(detected_at(smallest / (1.0 + report.resolution))) << parameter;
+  }
+}
+
+TEST(Mutate, AFinerResolutionNarrowsTheSearch) {
+  const MutationReport report =
+      Mutate("four_bar/turn_inverse",
+             {.size = 1e-2, .parameters = {"rho"}, .progress = {}, .resolution = 1e-3});
+  ASSERT_EQ(report.mutations.size(), 1u);
+  // Forces are proportional to the density: the NRMSE is the relative error itself, its limit
+  // 1e-10.
+  EXPECT_NEAR(report.mutations[0].smallest, 1e-10, 1.1e-13);
+  EXPECT_EQ(report.mutations[0].best_check, "simulated_vs_reference.force_nrmse");
+}
+
+TEST(Mutate, WhatIsMissedAtTheSizeAskedForIsSearchedForAbove) {
+  const MutationReport report =
+      Mutate("four_bar/turn_inverse", {.size = 1e-11, .parameters = {"rho"}, .progress = {}});
+  ASSERT_EQ(report.mutations.size(), 1u);
+  EXPECT_FALSE(report.mutations[0].detected);
+  EXPECT_NEAR(report.mutations[0].smallest, 1e-10, 1.1e-11);
+  EXPECT_EQ(report.exit_code, 1);  // it matters and was missed
+}
+
+TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
+  const MutationReport report = Mutate("spr_tripod/default_inverse", Plain());
+  for (const Mutation& m : report.mutations) {
+    if (m.detected) continue;
+    EXPECT_EQ(m.proved_to, kLargestBend) << m.parameter;
+    EXPECT_LE(m.sensitivity, 1e-12) << m.parameter;
+    EXPECT_NE(m.reason.find("10 % wrong changes no drive force"), std::string::npos) << m.reason;
+  }
+  const Mutation* inertia = Find(report, "I_platform_zz");
+  ASSERT_NE(inertia, nullptr);
+  EXPECT_NE(
+      inertia->reason.find("it changes the inertia of platform; the motion calls for the same "
+                           "inertia forces"),
+      std::string::npos)
+      << inertia->reason;
+  const Mutation* tool = Find(report, "tool_z");
+  ASSERT_NE(tool, nullptr);
+  EXPECT_NE(tool->reason.find("no mass, joint, drive or output depends on it"), std::string::npos);
+}
+
+TEST(Mutate, WhereAnUnseenEffectGoesIsNamed) {
+  const MutationReport report = Mutate("stabilizing_platform/static",
+                                       {.size = 1e-3, .parameters = {"m_ship"}, .progress = {}});
+  ASSERT_EQ(report.mutations.size(), 1u) << report.diagnostics.Text();
+  const std::string& reason = report.mutations[0].reason;
+  EXPECT_NE(reason.find("the mass of ship"), std::string::npos) << reason;
+  EXPECT_NE(reason.find("carried by the prescribed motion"), std::string::npos) << reason;
+}
+
+const FaultResult* FindFault(const MutationReport& report, const std::string& kind) {
+  for (const FaultResult& fault : report.faults) {
+    if (fault.kind == kind) return &fault;
+  }
+  return nullptr;
+}
+
+TEST(Mutate, StructuralFaultsAreDetectedInAMechanismWithoutClosedForm) {
+  MutationOptions options;
+  options.smallest = false;
+  const MutationReport report = Mutate("stewart/wave", options);
+  EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
+  for (const FaultResult& fault : report.faults) {
+    EXPECT_EQ(fault.detected, fault.applicable) << fault.kind << " " << fault.where;
+    EXPECT_EQ(fault.reason.empty(), fault.ran) << fault.kind;
+    if (fault.ran) {
+      EXPECT_GT(fault.value, fault.limit) << fault.kind;
+    }
+  }
+  const FaultResult* gravity = FindFault(report, "9.80665 for 9.81");
+  ASSERT_NE(gravity, nullptr);
+  // The forces are mostly weight: 3.4e-4 less of it.
+  EXPECT_NEAR(gravity->value, 1.0 - 9.80665 / 9.81, 5e-5);
+  EXPECT_FALSE(FindFault(report, "sign of products of inertia")->applicable);
+}
+
+TEST(Mutate, DrivesThatDoTheSameMayBeSwappedUnseenAndSaySo) {
+  // The path lies in the symmetry plane of legs 1 and 2.
+  MutationOptions options;
+  options.smallest = false;
+  const MutationReport report = Mutate("spr_tripod/default_inverse", options);
+  const FaultResult* swap = FindFault(report, "swapped drives");
+  ASSERT_NE(swap, nullptr);
+  EXPECT_EQ(swap->where, "leg1 and leg2");
+  EXPECT_FALSE(swap->detected);
+  EXPECT_NE(swap->reason.find("leg1 and leg2 do the same"), std::string::npos) << swap->reason;
+}
+
+TEST(Mutate, ATableOfFewDigitsSeesLessThanTheGenericSolver) {
+  const MutationOptions options{.size = 1e-2, .parameters = {"rho"}, .progress = {}};
+  const MutationReport table = Mutate("four_bar/table_excel", options);
+  ASSERT_EQ(table.mutations.size(), 1u) << table.diagnostics.Text();
+  // The solver beside the table still sees it; against the table alone it would be about 1e-3.
+  EXPECT_EQ(table.mutations[0].best_check, "simulated_vs_solver.force_nrmse");
+  EXPECT_NEAR(table.mutations[0].smallest, 1e-10, 1.1e-11);
+}
+
+TEST(Mutate, UnknownParametersAreBadInput) {
+  const MutationReport report =
+      Mutate("four_bar/turn_inverse", {.size = 1e-2, .parameters = {"roh"}, .progress = {}});
+  EXPECT_EQ(report.exit_code, 2);
+  EXPECT_NE(report.diagnostics.Text().find("did you mean 'rho'?"), std::string::npos);
+}
+
+TEST(Mutate, ResultsAreJsonToo) {
+  const MutationReport report = Mutate("four_bar/turn_inverse");
+  const auto json = nlohmann::json::parse(ToJson(report));
+  EXPECT_EQ(json["schema"], "mbverify.mutate/1");
+  EXPECT_EQ(json["size"], 1e-3);
+  ASSERT_EQ(json["parameters"].size(), report.mutations.size());
+  ASSERT_EQ(json["faults"].size(), report.faults.size());
+  for (size_t i = 0; i < report.mutations.size(); ++i) {
+    const Mutation& m = report.mutations[i];
+    EXPECT_EQ(json["parameters"][i]["parameter"], m.parameter);
+    EXPECT_EQ(json["parameters"][i]["smallest"].is_null(), std::isnan(m.smallest));
+  }
 }
 
 TEST(Mutate, AScenarioThatDisagreesIsNotBent) {

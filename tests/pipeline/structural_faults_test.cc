@@ -1,0 +1,162 @@
+// Structural faults: each is what it says, keeps the model consistent, and is seen or explained.
+#include "pipeline/structural_faults.h"
+
+#include <gtest/gtest.h>
+
+#include <map>
+#include <set>
+
+#include "mechanism/load_model.h"
+#include "mechanism/mobility.h"
+
+namespace mbv {
+namespace {
+
+Mechanism Load(const std::string& name) {
+  LoadResult loaded = LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml");
+  if (!loaded.mechanism.has_value()) throw std::runtime_error(loaded.diagnostics.Text());
+  return *std::move(loaded.mechanism);
+}
+
+std::vector<StructuralFault> Of(const Mechanism& mechanism, const std::string& kind) {
+  std::vector<StructuralFault> found;
+  for (StructuralFault& fault : StructuralFaults(mechanism)) {
+    if (fault.kind == kind) found.push_back(std::move(fault));
+  }
+  return found;
+}
+
+constexpr const char* kKinds[] = {"swapped drives",
+                                  "flipped axis",
+                                  "exchanged universal-joint axes",
+                                  "sign of products of inertia",
+                                  "wrong elbow branch",
+                                  "missing closure",
+                                  "9.80665 for 9.81"};
+
+TEST(StructuralFaults, EveryKindIsThereOrSaysWhyNot) {
+  for (const char* model : {"four_bar", "slider_crank", "stewart", "spr_tripod"}) {
+    const std::vector<StructuralFault> faults = StructuralFaults(Load(model));
+    for (const char* kind : kKinds) {
+      bool found = false;
+      for (const StructuralFault& fault : faults) {
+        if (fault.kind != kind) continue;
+        found = true;
+        EXPECT_EQ(fault.wrong.empty(), !fault.not_applicable.empty()) << model << kind;
+      }
+      EXPECT_TRUE(found) << model << ": " << kind;
+    }
+  }
+}
+
+TEST(StructuralFaults, SwappedDrivesActOnEachOthersJoints) {
+  const Mechanism stewart = Load("stewart");
+  const std::vector<StructuralFault> faults = Of(stewart, "swapped drives");
+  ASSERT_EQ(faults.size(), 5u);  // six legs, each with the next
+  const auto joint = [](const Mechanism& m, size_t d) {
+    return std::get<JointDrive>(m.drives[d].kind).joint;
+  };
+  EXPECT_EQ(faults[0].where, "leg1.length and leg2.length");
+  EXPECT_EQ(joint(faults[0].wrong[0], 0), joint(stewart, 1));
+  EXPECT_EQ(joint(faults[0].wrong[0], 1), joint(stewart, 0));
+  EXPECT_EQ(joint(faults[0].wrong[0], 2), joint(stewart, 2));
+  EXPECT_NE(Of(Load("four_bar"), "swapped drives")[0].not_applicable, "");
+}
+
+TEST(StructuralFaults, AFlippedAxisKeepsTheHomePoseAndTurnsTheCoordinate) {
+  const Mechanism stewart = Load("stewart");
+  const std::vector<StructuralFault> faults = Of(stewart, "flipped axis");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_EQ(faults[0].alike, 5u);  // the other legs
+  const auto j = static_cast<size_t>(stewart.FindJoint("leg1.P"));
+  const Joint &as_is = stewart.joints[j], &wrong = faults[0].wrong[0].joints[j];
+  EXPECT_EQ(wrong.axis, -as_is.axis);
+  EXPECT_EQ(wrong.home[0], -as_is.home[0]);
+  EXPECT_EQ(wrong.range[0].lower, -as_is.range[0].upper);
+  EXPECT_EQ(faults[0].wrong[0].X_WB_home[3].matrix(), stewart.X_WB_home[3].matrix());
+}
+
+TEST(StructuralFaults, ExchangedUniversalAxesCloseAgain) {
+  const Mechanism crank = Load("slider_crank");
+  const std::vector<StructuralFault> faults = Of(crank, "exchanged universal-joint axes");
+  ASSERT_EQ(faults.size(), 1u);
+  const auto j = static_cast<size_t>(crank.FindJoint("C"));
+  EXPECT_EQ(faults[0].wrong[0].joints[j].axis, crank.joints[j].axis2);
+  EXPECT_EQ(faults[0].wrong[0].joints[j].axis2, crank.joints[j].axis);
+  EXPECT_EQ(AnalyseMobility(faults[0].wrong[0]).freedoms, 1);
+  EXPECT_NE(Of(Load("four_bar"), "exchanged universal-joint axes")[0].not_applicable, "");
+}
+
+TEST(StructuralFaults, ProductsOfInertiaChangeTheirSignAndNothingElse) {
+  Mechanism bar = Load("four_bar");
+  EXPECT_EQ(Of(bar, "sign of products of inertia")[0].not_applicable,
+            "every body's inertia is given in its principal axes");
+  Mat3& I = bar.bodies[2].I_Bcm_B;
+  I(0, 1) = I(1, 0) = 1e-4;
+  const std::vector<StructuralFault> faults = Of(bar, "sign of products of inertia");
+  ASSERT_EQ(faults.size(), 1u);
+  const Mat3& wrong = faults[0].wrong[0].bodies[2].I_Bcm_B;
+  EXPECT_DOUBLE_EQ(wrong(0, 1), -1e-4);
+  EXPECT_DOUBLE_EQ(wrong(1, 0), -1e-4);
+  EXPECT_DOUBLE_EQ(wrong(2, 2), I(2, 2));
+}
+
+TEST(StructuralFaults, TheOtherAssemblyOfAFourBarIsItsMirrorImage) {
+  const Mechanism bar = Load("four_bar");
+  const std::vector<StructuralFault> faults = Of(bar, "wrong elbow branch");
+  ASSERT_EQ(faults.size(), 1u);
+  ASSERT_EQ(faults[0].wrong.size(), 1u);  // a four-bar has two assemblies
+  const Mechanism& wrong = faults[0].wrong[0];
+  const int crank = bar.FindBody("crank"), rocker = bar.FindBody("rocker");
+  const auto X = [](const Mechanism& m, int body) {
+    return m.X_WB_home[static_cast<size_t>(body)];
+  };
+  // Newton closes loops to 1e-12.
+  EXPECT_LT((X(bar, crank).matrix() - X(wrong, crank).matrix()).norm(), 1e-11);
+  // The joint between coupler and rocker is reflected in the line from the crank's end B to D.
+  const Vec3 B = X(bar, crank) * Vec3(bar.ParameterValue("crank"), 0, 0);
+  const Vec3 D(bar.ParameterValue("ground"), 0, 0);
+  const Vec3 u = (D - B).normalized();
+  const Vec3 end(bar.ParameterValue("rocker"), 0, 0);
+  const Vec3 C = X(bar, rocker) * end, C_wrong = X(wrong, rocker) * end;
+  EXPECT_LT((C_wrong - (B + 2.0 * u * u.dot(C - B) - (C - B))).norm(), 1e-11);
+}
+
+TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
+  for (const char* model : {"four_bar", "slider_crank", "stewart", "spr_tripod"}) {
+    const Mechanism mechanism = Load(model);
+    const int freedoms = AnalyseMobility(mechanism).freedoms;
+    for (const StructuralFault& fault : Of(mechanism, "missing closure")) {
+      ASSERT_FALSE(fault.wrong.empty()) << model;
+      const Mechanism& wrong = fault.wrong[0];
+      EXPECT_EQ(wrong.joints.size(), mechanism.joints.size() - 1);
+      EXPECT_EQ(wrong.FindJoint(fault.where), -1);
+      EXPECT_GT(AnalyseMobility(wrong).freedoms, freedoms) << model << " " << fault.where;
+      for (size_t d = 0; d < wrong.drives.size(); ++d) {
+        const auto* drive = std::get_if<JointDrive>(&wrong.drives[d].kind);
+        if (drive == nullptr) continue;
+        const auto& as_is = std::get<JointDrive>(mechanism.drives[d].kind);
+        EXPECT_EQ(wrong.joints[static_cast<size_t>(drive->joint)].name,
+                  mechanism.joints[static_cast<size_t>(as_is.joint)].name);
+      }
+      for (size_t t = 0; t < wrong.tree_joints.size(); ++t) {
+        EXPECT_EQ(wrong.joints[static_cast<size_t>(wrong.tree_joints[t])].name,
+                  mechanism.joints[static_cast<size_t>(mechanism.tree_joints[t])].name);
+      }
+    }
+  }
+}
+
+TEST(StructuralFaults, StandardGravityKeepsItsDirection) {
+  const std::vector<StructuralFault> faults = Of(Load("four_bar"), "9.80665 for 9.81");
+  ASSERT_EQ(faults.size(), 1u);
+  EXPECT_LT((faults[0].wrong[0].gravity_W - Vec3(0, -9.80665, 0)).norm(), 4 * kEps * 9.81);
+  Mechanism weightless = Load("four_bar");
+  weightless.gravity_W.setZero();
+  EXPECT_EQ(Of(weightless, "9.80665 for 9.81")[0].not_applicable, "it has no gravity");
+  weightless.gravity_W = Vec3(0, 0, -1.62);
+  EXPECT_EQ(Of(weightless, "9.80665 for 9.81")[0].not_applicable, "its gravity is 1.62 m/s²");
+}
+
+}  // namespace
+}  // namespace mbv
