@@ -26,6 +26,9 @@ Mat6 Scaled(const Mat6& M, const Vec6& scale) {
   return inverse.asDiagonal() * M * inverse.asDiagonal();
 }
 
+// True if `value` is worse than the worst so far; NaN is worst and stays.
+bool IsWorse(double value, double worst) { return !std::isnan(worst) && !(value <= worst); }
+
 // Infinite instead of NaN when something is missing, so that it never passes.
 WorstEntry WorstOf(const Mat6& difference, const char* matrix) {
   WorstEntry worst{0.0, ""};
@@ -33,7 +36,7 @@ WorstEntry WorstOf(const Mat6& difference, const char* matrix) {
     for (int j = 0; j < 6; ++j) {
       const double value = std::abs(difference(i, j));
       if (std::isnan(value)) return {kNan, ""};
-      if (value <= worst.value && !worst.where.empty()) continue;
+      if (!worst.where.empty() && !IsWorse(value, worst.value)) continue;
       worst = {value, fmt::format("{}({}, {})", matrix, AxisName(i), AxisName(j))};
     }
   }
@@ -73,18 +76,18 @@ LoadErrors CompareLoads(const std::vector<Vec6>& measured, const std::vector<Vec
     const Vec6 error = measured[k] - truth[k];
     const Vec6 relative = error.cwiseAbs().cwiseQuotient(errors.scale);
     errors.mean += relative / count;
-    // A NaN must stay; cwiseMax might drop it.
     for (int i = 0; i < 6; ++i) {
-      if (!(relative[i] <= errors.max[i])) errors.max[i] = relative[i];
+      if (IsWorse(relative[i], errors.max[i])) errors.max[i] = relative[i];
     }
-    if (const double most = relative.tail<3>().maxCoeff(); !(most <= worst)) {
+    if (const double most = relative.tail<3>().maxCoeff<Eigen::PropagateNaN>();
+        IsWorse(most, worst)) {
       worst = most;
       errors.worst_load = static_cast<int>(k);
     }
     const double of_vector = error.tail<3>().norm() / truth[k].tail<3>().norm();
     errors.vector.push_back(of_vector);
     errors.vector_mean += of_vector / count;
-    if (!(of_vector <= errors.vector_max) || k == 0) {
+    if (k == 0 || IsWorse(of_vector, errors.vector_max)) {
       errors.vector_max = of_vector;
       errors.worst_vector = static_cast<int>(k);
     }
@@ -95,7 +98,7 @@ LoadErrors CompareLoads(const std::vector<Vec6>& measured, const std::vector<Vec
 WorstEntry WorstAxis(const LoadErrors& errors, int first) {
   WorstEntry worst{0.0, ""};
   for (int i = first; i < first + 3; ++i) {
-    if (errors.max[i] <= worst.value && !worst.where.empty()) continue;
+    if (!worst.where.empty() && !IsWorse(errors.max[i], worst.value)) continue;
     worst = {errors.max[i], AxisName(i)};
   }
   return worst;

@@ -74,9 +74,9 @@ struct Bend {
 };
 void PrintTo(const Bend& bend, std::ostream* out) { *out << bend.check; }
 
-class BentSimulation : public testing::TestWithParam<Bend> {};
+class BentCompliance : public testing::TestWithParam<Bend> {};
 
-TEST_P(BentSimulation, FailsItsCheckOnly) {
+TEST_P(BentCompliance, FailsItsCheckOnly) {
   StiffnessInput input = MakeInput();
   GetParam().bend(&input.witnesses[2]);
   const StiffnessComparison comparison = CompareStiffness(input);
@@ -126,7 +126,7 @@ const Bend kBends[] = {
     {"simulated.residual", [](StiffnessWitness* w) { w->residual = 2e-8; }},
     {"simulated.extrapolation", [](StiffnessWitness* w) { w->extrapolation_error = 2e-5; }},
 };
-INSTANTIATE_TEST_SUITE_P(All, BentSimulation, testing::ValuesIn(kBends), [](const auto& info) {
+INSTANTIATE_TEST_SUITE_P(All, BentCompliance, testing::ValuesIn(kBends), [](const auto& info) {
   std::string name = info.param.check;
   std::replace(name.begin(), name.end(), '.', '_');
   return name;

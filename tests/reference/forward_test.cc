@@ -109,8 +109,12 @@ TEST(Forward, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
   const ForwardRun run = RunForwardReference(m, FreeMotion(m, start, rate, 5.0));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message << run.summary.time_s;
   const auto angle = ColumnOf(run.trace, "motor.position");
+  // A bridge may change the energy by 1e-8 of what it is, and so the rate by half of that.
+  constexpr double kBridged = 0.5e-8;
   for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
-    EXPECT_NEAR(angle[i], start + rate * run.trace.time_s[i], kIntegrated) << i;
+    const double turned = rate * run.trace.time_s[i];
+    const double bridges = std::floor((start + turned) / std::numbers::pi);
+    EXPECT_NEAR(angle[i], start + turned, kIntegrated + bridges * kBridged * turned) << i;
   }
   // Flat at π, 2π, 3π, 4π.
   ASSERT_EQ(run.singular.size(), 4u);
@@ -122,7 +126,7 @@ TEST(Forward, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
 }
 
 TEST(Forward, AStartInASingularPoseIsReportedAtOnce) {
-  const Mechanism m = MakeParallelogram(0.0);
+  const Mechanism m = MakeParallelogram(1.0);
   const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.0, 2.0, 1.0));
   EXPECT_EQ(run.summary.stop, Stop::kSingular) << run.summary.message;
   EXPECT_EQ(run.summary.time_s, 0.0);
