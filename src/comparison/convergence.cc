@@ -143,17 +143,20 @@ ErrorPair RelativeError(const Mechanism& mechanism, const MatX& difference, cons
       sums.all.Add(error, force, kNan, "");
     }
   }
-  ErrorPair worst;
-  const auto keep = [](const ErrorSum& sum, double scale, double* value) {
-    if (sum.count() == 0) return;
-    const double error = sum.rms_error() == 0.0 ? 0.0 : sum.rms_error() / scale;
-    if (!(error <= *value)) *value = error;
+  // The worst unit; one without samples says nothing, and NaN is worst and stays.
+  const auto worst_of = [&units = units](ErrorSum Sums::*of) {
+    double worst = kNan;
+    bool any = false;
+    for (const auto& [unit, sums] : units) {
+      const ErrorSum& sum = sums.*of;
+      if (sum.count() == 0) continue;
+      const double error = sum.rms_error() == 0.0 ? 0.0 : sum.rms_error() / sums.all.rms_truth();
+      if (!any || (!std::isnan(worst) && !(error <= worst))) worst = error;
+      any = true;
+    }
+    return worst;
   };
-  for (const auto& [unit, sums] : units) {
-    keep(sums.smooth, sums.all.rms_truth(), &worst.smooth);
-    keep(sums.breaks, sums.all.rms_truth(), &worst.breaks);
-  }
-  return worst;
+  return {worst_of(&Sums::smooth), worst_of(&Sums::breaks)};
 }
 
 double KnobOf(const ConvergenceSeries& series, const ConvergencePoint& point) {

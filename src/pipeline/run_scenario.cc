@@ -9,6 +9,7 @@
 #include "core/demand.h"
 #include "mechanism/mobility.h"
 #include "pipeline/free_motion_text.h"
+#include "pipeline/not_run.h"
 #include "pipeline/output_folder.h"
 #include "pipeline/pictures.h"
 #include "pipeline/prepare.h"
@@ -21,12 +22,6 @@
 
 namespace mbv {
 namespace {
-
-RunSummary NotRun(const std::string& why) {
-  RunSummary summary;
-  summary.message = why;
-  return summary;
-}
 
 class ScenarioRun {
  public:

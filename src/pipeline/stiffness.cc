@@ -6,6 +6,7 @@
 #include <filesystem>
 
 #include "core/demand.h"
+#include "pipeline/not_run.h"
 #include "pipeline/output_folder.h"
 #include "pipeline/version.h"
 #include "reference/frame_stiffness.h"
@@ -15,12 +16,6 @@
 
 namespace mbv {
 namespace {
-
-RunSummary NotRun(const std::string& why) {
-  RunSummary summary;
-  summary.message = why;
-  return summary;
-}
 
 double Since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -113,20 +108,22 @@ class Runner {
     }
     const auto start = std::chrono::steady_clock::now();
     std::vector<Pose> X_WB;
-    const RunSummary closed = CloseLoops(prepared_.reference, scenario_.pose, &X_WB);
-    if (!closed.ok()) {
-      AddFailed("reference", closed);
-      return;
-    }
-    LocateOutput(X_WB);
+    if (!Assemble("reference", prepared_.reference, &X_WB)) return;
     StiffnessResult result = FrameStiffness(prepared_.reference, X_WB, prepared_.output);
     report().timing.reference_s = result.summary.wall_s = Since(start);
     Add("reference", std::move(result));
   }
 
-  void LocateOutput(const std::vector<Pose>& X_WB) {
+  // Poses of all bodies of a witness' mechanism, and where its output is; false after a failure.
+  bool Assemble(const std::string& witness, const Mechanism& mechanism, std::vector<Pose>* X_WB) {
+    const RunSummary closed = CloseLoops(mechanism, scenario_.pose, X_WB);
+    if (!closed.ok()) {
+      AddFailed(witness, closed);
+      return false;
+    }
     const Output& output = prepared_.base.outputs[static_cast<size_t>(prepared_.output)];
-    report().p_WO = (X_WB[static_cast<size_t>(output.body)] * output.X_BO).translation();
+    report().p_WO = ((*X_WB)[static_cast<size_t>(output.body)] * output.X_BO).translation();
+    return true;
   }
 
   // No load can be in equilibrium where another computation found a freedom that nothing holds.
@@ -148,12 +145,7 @@ class Runner {
     }
     const auto start = std::chrono::steady_clock::now();
     std::vector<Pose> X_WB;
-    const RunSummary closed = CloseLoops(prepared_.simulated, scenario_.pose, &X_WB);
-    if (!closed.ok()) {
-      AddFailed("simulated", closed);
-      return;
-    }
-    LocateOutput(X_WB);
+    if (!Assemble("simulated", prepared_.simulated, &X_WB)) return;
     CompliantRun run = SimulateStiffness(
         prepared_.simulated, X_WB, prepared_.output, scenario_.loads,
         {.force_N = scenario_.simulation.force_N, .moment_Nm = scenario_.simulation.moment_Nm});

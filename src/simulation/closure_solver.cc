@@ -24,6 +24,17 @@ constexpr double kClosed = 1e-10;
 // Relative rank tolerance, columns of J having the natural scale of metres and radians.
 constexpr double kRankTolerance = 1e-9;
 
+// The shortest x with A x = b as well as can be, refined once.
+VecX LeastNorm(const MatX& A, const VecX& b) {
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kRankTolerance);
+  cod.compute(A);
+  VecX x = cod.solve(b);
+  const VecX rest = b - A * x;
+  x += cod.solve(rest);
+  return x;
+}
+
 }  // namespace
 
 ClosureSolver::ClosureSolver(ConstraintSystem* system)
@@ -171,12 +182,7 @@ void ClosureSolver::RemoveSelfStress(VecX* force) const {
 }
 
 void ClosureSolver::SolveForcesHere(const VecX& tau) {
-  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
-  cod.setThreshold(kRankTolerance);
-  cod.compute(system_->J().transpose());
-  VecX lambda = cod.solve(tau);
-  lambda += cod.solve(tau - system_->J().transpose() * lambda);
-  system_->force() = lambda;
+  system_->force() = LeastNorm(system_->J().transpose(), tau);
 }
 
 double ClosureSolver::WeakestPivot() const {
@@ -207,21 +213,11 @@ void ClosureSolver::SolveLeastDriven(const VecX& tau) {
     N = Q.rightCols(nv - qr.rank());
   }
   const MatX B = (J_u * N).transpose() * scale.asDiagonal();
-  const VecX b = N.transpose() * tau;
-  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
-  cod.setThreshold(kRankTolerance);
-  cod.compute(B);
-  VecX u = cod.solve(b);
-  u += cod.solve(b - B * u);
-  u = scale.cwiseProduct(u);
+  const VecX u = scale.cwiseProduct(LeastNorm(B, N.transpose() * tau));
   VecX lambda(closures + driven);
   lambda.tail(driven) = u;
   if (closures > 0) {
-    cod.compute(J_c.transpose());
-    const VecX rest = tau - J_u.transpose() * u;
-    VecX lambda_c = cod.solve(rest);
-    lambda_c += cod.solve(rest - J_c.transpose() * lambda_c);
-    lambda.head(closures) = lambda_c;
+    lambda.head(closures) = LeastNorm(J_c.transpose(), tau - J_u.transpose() * u);
   }
   system_->force() = lambda;
 }

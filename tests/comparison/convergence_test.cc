@@ -79,6 +79,18 @@ TEST(RelativeError, IsTheRmsOverTheRmsOfAllTrueForces) {
   EXPECT_TRUE(std::isnan(RelativeError(mechanism, difference, truth, classes).smooth));
 }
 
+TEST(RelativeError, ANumberOfOneUnitDoesNotHideThatAnotherHasNone) {
+  Mechanism mechanism = synthetic::TwoSliders();
+  const SampleClasses classes({0.0, 1.0}, {}, 0.5);
+  const MatX truth = MatX::Constant(2, 2, 10.0);
+  mechanism.joints[0].kind = JointKind::kRevolute;  // N m beside N
+  for (const int none : {0, 1}) {
+    MatX difference = MatX::Ones(2, 2);
+    difference(1, none) = kNan;
+    EXPECT_TRUE(std::isnan(RelativeError(mechanism, difference, truth, classes).smooth)) << none;
+  }
+}
+
 TEST(Judge, EachSchemeHasItsOwnOrder) {
   EXPECT_FALSE(Make(4.0).series.verdict.finding);
   EXPECT_TRUE(Make(2.0).series.verdict.finding);

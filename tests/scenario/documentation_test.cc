@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "scenario/load_scenario.h"
+#include "tests/document_text.h"
 
 namespace mbv {
 namespace {
@@ -35,12 +36,7 @@ TEST(ScenarioDocument, ItsTableHoldsEveryCheckWithItsDefaults) {
     const std::string line =
         fmt::format("| `{}` | {}{} | {:.0e}, {:.0e}, {:.0e} |\n", row.key, row.title, unit,
                     *row.limits.forward, *row.limits.inverse, *row.limits.reference);
-    // C++ writes 1e-06 where people write 1e-6.
-    std::string plain;
-    for (size_t i = 0; i < line.size(); ++i) {
-      if (line[i] == '0' && i > 1 && line[i - 1] == '-' && line[i - 2] == 'e') continue;
-      plain += line[i];
-    }
+    const std::string plain = test::AsPeopleWrite(line);
     EXPECT_NE(document.find(plain), std::string::npos) << plain;
   }
 }

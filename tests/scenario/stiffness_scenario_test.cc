@@ -1,5 +1,6 @@
 // Stiffness scenarios are read completely, or everything that is wrong with them is said.
 #include "scenario/stiffness_scenario.h"
+#include "tests/document_text.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -175,11 +176,7 @@ TEST_F(StiffnessScenarioText, TheDocumentsExampleLoadsAndItsTableHoldsTheDefault
   for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
     std::string line = fmt::format("| `{}` | {} | {:.0e} | {:.0e} |\n", row.key, row.title,
                                    *row.limit.simulated, *row.limit.computed);
-    std::string plain;  // C++ writes 1e-06 where people write 1e-6
-    for (size_t i = 0; i < line.size(); ++i) {
-      if (line[i] == '0' && i > 1 && line[i - 1] == '-' && line[i - 2] == 'e') continue;
-      plain += line[i];
-    }
+    const std::string plain = test::AsPeopleWrite(line);
     EXPECT_NE(document.find(plain), std::string::npos) << plain;
   }
 }

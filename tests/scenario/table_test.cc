@@ -15,34 +15,13 @@
 #include "scenario/table_noise.h"
 #include "scenario/table_settings.h"
 #include "scenario/table_units.h"
+#include "tests/two_sliders.h"
 
 namespace mbv {
 namespace {
 
 // Numbers of these tests are written with few digits; conversion to double and one factor.
 constexpr double kTiny = 4 * kEps;
-
-// Two driven sliders.
-Mechanism Sliders() {
-  Mechanism mechanism;
-  mechanism.name = "sliders";
-  mechanism.bodies = {{.name = "world", .frames = {}, .shapes = {}},
-                      {.name = "a", .mass = 1.0, .frames = {}, .shapes = {}},
-                      {.name = "b", .mass = 1.0, .frames = {}, .shapes = {}}};
-  for (int j = 0; j < 2; ++j) {
-    Joint joint;
-    joint.name = j == 0 ? "slide1" : "slide2";
-    joint.kind = JointKind::kPrismatic;
-    joint.parent = j;
-    joint.child = j + 1;
-    mechanism.joints.push_back(joint);
-    Drive drive;
-    drive.name = j == 0 ? "d1" : "d2";
-    drive.kind = JointDrive{j, 0};
-    mechanism.drives.push_back(drive);
-  }
-  return mechanism;
-}
 
 struct Loaded {
   std::shared_ptr<const ReferenceTable> table;
@@ -61,7 +40,7 @@ Loaded Load(const std::string& csv, const std::string& yaml = "{csv: t.csv}") {
   settings.file = "t.csv";
   Diagnostics findings;
   Loaded loaded;
-  loaded.table = LoadTableText(csv, settings, Sliders(), &reader, &findings);
+  loaded.table = LoadTableText(csv, settings, test::DrivenSliders(), &reader, &findings);
   Diagnostics all = reader.diagnostics();
   all.Append(findings);
   loaded.text = all.Text();
@@ -196,7 +175,7 @@ TEST(TableFindings, AMissingColumnIsNamedAtItsKeyWithTheNearestHeading) {
 TEST(TableFindings, AnUnknownSignalIsNamedWithTheNearestOne) {
   const std::string text =
       Load("t,F\n0,1\n1,2\n2,3\n3,4\n", "{csv: t.csv, columns: {d1.forse: F}}").text;
-  EXPECT_TRUE(Has(text, "sliders has no signal 'd1.forse'")) << text;
+  EXPECT_TRUE(Has(text, "two_sliders has no signal 'd1.forse'")) << text;
   EXPECT_TRUE(Has(text, "did you mean 'd1.force'?")) << text;
 }
 
