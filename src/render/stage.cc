@@ -40,7 +40,7 @@ std::string StageMjcf(const StageOptions& o) {
   return fmt::format(
       "<mujoco><statistic extent='{0:.9g}' center='0 0 0'/>"
       "<visual><global offwidth='{1}' offheight='{2}' fovy='{3}'/>"
-      "<quality offsamples='0' shadowsize='2048' numslices='48' numstacks='8' numquads='2'/>"
+      "<quality offsamples='0' shadowsize='1024' numslices='32' numstacks='6' numquads='2'/>"
       "<map znear='0.05' zfar='40' shadowclip='1.0' haze='0.35'/><rgba haze='{4}'/>"
       "<headlight active='0'/></visual>"
       "<asset><texture name='sky' type='skybox' builtin='gradient' rgb1='{5}' rgb2='{6}' "
