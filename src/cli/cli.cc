@@ -3,7 +3,10 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <cerrno>
 #include <cstdio>
+#include <cstring>
+#include <system_error>
 
 #include "pipeline/version.h"
 
@@ -16,6 +19,14 @@ std::string VersionText() {
     text += fmt::format("{}{} {}", text.empty() ? "" : "\n", name, version);
   }
   return text;
+}
+
+// Does not throw: standard error may be full, too.
+void Complain(const std::string& text) { std::fputs((text + "\n").c_str(), stderr); }
+
+int InternalError(const std::exception& error) {
+  Complain(std::string("internal error: ") + error.what());
+  return 4;
 }
 
 }  // namespace
@@ -55,15 +66,23 @@ int RunCli(int argc, char** argv) {
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);
+  std::string lost;  // why output was lost
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    exit_code = app.exit(error) == 0 ? 0 : 2;
+  } catch (const std::system_error& error) {
+    // This is how printing reports that it failed.
+    if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) return InternalError(error);
+    lost = error.code().message();
   } catch (const std::exception& error) {
-    fmt::print(stderr, "internal error: {}\n", error.what());
-    return 4;
+    return InternalError(error);
   }
-  return exit_code;
+  if (std::fflush(stdout) != 0) lost = std::strerror(errno);
+  if (lost.empty() && std::ferror(stdout) == 0) return exit_code;
+  // Results that nobody can read are not delivered.
+  Complain("error: cannot write to standard output: " + lost);
+  return 2;
 }
 
 }  // namespace mbv

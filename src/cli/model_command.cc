@@ -86,7 +86,12 @@ int Model(const ModelArguments& arguments) {
 int CheckFiles(const std::vector<std::string>& arguments) {
   int exit_code = 0;
   for (const std::string& argument : arguments) {
-    for (const std::string& file : ExpandYaml(argument)) {
+    const std::vector<std::string> files = ExpandYaml(argument);
+    if (files.empty()) {
+      fmt::print("{}: error: no *.yaml file in this folder\n", argument);
+      exit_code = 2;
+    }
+    for (const std::string& file : files) {
       const Diagnostics diagnostics = CheckFile(file);
       fmt::print("{}", diagnostics.Text());
       if (diagnostics.has_errors()) {

@@ -30,7 +30,9 @@ int Save(const std::string& path, const std::string& content) {
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
-  const std::string trouble = WriteWholeFile(path, content);
+  const std::string trouble =
+      error ? fmt::format("cannot make folder {}: {}", folder.string(), error.message())
+            : WriteWholeFile(path, content);
   if (!trouble.empty()) {
     fmt::print(stderr, "error: {}\n", trouble);
     return 2;

@@ -10,6 +10,7 @@
 
 #include "mechanism/break_times.h"
 #include "pipeline/prepare.h"
+#include "scenario/settings_reader.h"
 
 namespace mbv {
 namespace {
@@ -77,11 +78,18 @@ class Study {
     if (outcome_.diagnostics.has_errors()) return false;
     prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics);
     if (!prepared_) return false;
-    if (!motion().free() && !mechanism().drives.empty()) return true;
     Finding finding;
     finding.file = file_;
-    finding.message = motion().free() ? "a free motion has no drive forces that could converge"
-                                      : "the mechanism has no drive whose force could converge";
+    if (motion().free()) {
+      finding.message = "a free motion has no drive forces that could converge";
+    } else if (mechanism().drives.empty()) {
+      finding.message = "the mechanism has no drive whose force could converge";
+    } else if (!(motion().duration_s / options_.steps_s.back() <= kMaxSteps)) {
+      finding.message = fmt::format("--steps: {:g} s violates motion.duration_s / step <= {:g}",
+                                    options_.steps_s.back(), kMaxSteps);
+    } else {
+      return true;
+    }
     outcome_.diagnostics.Add(std::move(finding));
     return false;
   }

@@ -69,10 +69,10 @@ SummaryText ReadSummary(const std::string& text, CaseResult* result) {
   return words;
 }
 
-// The line that tells what went wrong: the last one with "error", else the last one.
+// The line that tells what went wrong: the last one with "error:", else the last one.
 std::string TellingLine(const std::string& output) {
   const std::string tail = LastLines(output, 200);
-  const size_t error = tail.rfind("error");
+  const size_t error = tail.rfind("error:");
   const size_t at = error == std::string::npos ? tail.size() : error;
   const size_t newline = tail.rfind('\n', at == 0 ? 0 : at - 1);
   const size_t begin = newline == std::string::npos ? 0 : newline + 1;

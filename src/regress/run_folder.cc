@@ -31,6 +31,7 @@ RunFolder::~RunFolder() {
 std::string RunFolder::Open() {
   std::error_code error;
   fs::create_directories(out_, error);
+  if (error) return fmt::format("cannot make folder {}: {}", out_.string(), error.message());
   const fs::path file = out_ / ".lock";
   lock_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
   if (lock_ < 0) return fmt::format("cannot write to {}: {}", out_.string(), std::strerror(errno));

@@ -176,7 +176,13 @@ class Loader {
     CheckCommands(motion);
     const SimulationSettings& settings = scenario_.simulation;
     const double steps = scenario_.motion.sample_s / settings.step_s;
-    if (settings.on && settings.forward && std::abs(steps - std::round(steps)) > 1e-6 * steps) {
+    if (settings.on && settings.forward &&
+        !(scenario_.motion.duration_s / settings.step_s <= kMaxSteps)) {
+      yaml_.Error(simulation != nullptr ? *simulation : motion,
+                  fmt::format("simulation.step_s = {} violates motion.duration_s / step_s <= {:g}",
+                              settings.step_s, kMaxSteps));
+    } else if (settings.on && settings.forward &&
+               std::abs(steps - std::round(steps)) > 1e-6 * steps) {
       yaml_.Error(simulation != nullptr ? *simulation : motion,
                   fmt::format("simulation.step_s = {} violates motion.sample_s = {} = n · step_s",
                               settings.step_s, scenario_.motion.sample_s),

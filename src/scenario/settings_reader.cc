@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "scenario/file_parts.h"
 
 namespace mbv {
@@ -178,11 +180,14 @@ SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node, double
   }
   if (const YamlNode* size = map.Find("size_px")) {
     const auto numbers = values->Numbers(*size, "snapshots.size_px", 2);
-    if (numbers) settings.size_px = {int((*numbers)[0]), int((*numbers)[1])};
-    if (numbers && (settings.size_px[0] < 16 || settings.size_px[1] < 16 ||
-                    settings.size_px[0] > 8192 || settings.size_px[1] > 8192)) {
-      yaml.Error(*size, fmt::format("snapshots.size_px = {} x {} violates 16 … 8192",
-                                    settings.size_px[0], settings.size_px[1]));
+    for (int i = 0; numbers && i < 2; ++i) {
+      const double number = (*numbers)[i];
+      if (number >= 64.0 && number <= 8192.0 && number == std::floor(number)) {
+        settings.size_px[i] = static_cast<int>(number);
+      } else {
+        yaml.Error(*size, fmt::format("snapshots.size_px: {} is not a whole number from 64 to 8192",
+                                      number));
+      }
     }
   }
   if (const YamlNode* path = map.Find("path")) {

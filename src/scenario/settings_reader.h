@@ -6,6 +6,9 @@
 
 namespace mbv {
 
+/// A forward simulation takes at most this many steps; each needs about 200 bytes.
+inline constexpr double kMaxSteps = 1e7;
+
 [[nodiscard]] AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node);
 [[nodiscard]] ReferenceSettings ReadReference(ValueReader* values, const YamlNode* node);
 [[nodiscard]] SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node);

@@ -1,0 +1,224 @@
+// What goes wrong outside the program: numbers beyond all bounds, huge files, files that cannot be
+// read, folders that cannot be written, a full disk. (Killed runs: cli_test.cc, tests/regress.)
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "tests/cli/program.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kScenario = "scenarios/slider_crank/turn.yaml";
+
+class RobustnessTest : public testing::Test {
+ protected:
+  Program mbverify{testing::UnitTest::GetInstance()->current_test_info()->name()};
+
+  std::string Write(const std::string& name, const std::string& content) const {
+    const fs::path path = mbverify.folder() / name;
+    std::ofstream(path, std::ios::binary) << content;
+    return path.string();
+  }
+  /// A shell script that calls "$mbverify" itself.
+  [[nodiscard]] ProgramResult Shell(const std::string& script) const {
+    const std::string out = (mbverify.folder() / "shell_out").string();
+    const std::string err = (mbverify.folder() / "shell_err").string();
+    const int status =
+        std::system(("cd '" MBV_SOURCE_DIR "' && mbverify='" MBV_BINARY_DIR "/mbverify' && (" +
+                     script + ") >'" + out + "' 2>'" + err + "'")
+                        .c_str());
+    return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, ReadAll(out), ReadAll(err)};
+  }
+  [[nodiscard]] std::string Run(const std::string& arguments) const {
+    return "run --no-pictures -q --out '" + mbverify.Out() + "' " + arguments;
+  }
+};
+
+// Files below a folder, hidden ones included.
+std::vector<std::string> FilesBelow(const fs::path& folder) {
+  std::vector<std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.is_regular_file()) files.push_back(entry.path().string());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+TEST_F(RobustnessTest, NumbersBeyondAllBoundsAreRefusedWithTheirKey) {
+  for (const auto& [set, message] : std::vector<std::pair<std::string, std::string>>{
+           {"parameters.crank=.nan", "parameters.crank = '.nan' is not a finite number"},
+           {"parameters.crank=-.inf", "parameters.crank = '-.inf' is not a finite number"},
+           {"parameters.crank=1e300", "bodies.crank: frame 'end' is farther away than 1e+09 m"},
+           {"parameters.offset=1e300", "world: frame 'rail' is farther away than 1e+09 m"},
+           {"parameters.m_crank=1e300", "bodies.crank: mass = 1e+300 violates mass <= 1e+15 kg"},
+           {"parameters.rod=1e-310", "violate I > 0"},
+           {"motion.duration_s=.inf", "motion.duration_s = '.inf' is not a finite number"},
+           {"motion.duration_s=1e300", "violate 1 <= duration_s/sample_s <= 1e+06"},
+           {"motion.sample_s=1e-310", "violate 1 <= duration_s/sample_s <= 1e+06"},
+           {"simulation.step_s=1e-12", "violates motion.duration_s / step_s <= 1e+07"},
+           {"simulation.step_s=1e-310", "violates motion.duration_s / step_s <= 1e+07"},
+           {"simulation.step_s=1e300", "n · step_s"},
+       }) {
+    const ProgramResult result = mbverify(Run(std::string(kScenario) + " --set " + set));
+    EXPECT_EQ(result.exit_code, 2) << set << "\n" << result.err;
+    EXPECT_NE(result.err.find(message), std::string::npos) << set << "\n" << result.err;
+  }
+  EXPECT_FALSE(fs::exists(mbverify.Out()));
+  const ProgramResult steps = mbverify(std::string("converge --steps 4e-9,2e-9,1e-9 ") + kScenario);
+  EXPECT_EQ(steps.exit_code, 2);
+  EXPECT_NE(steps.err.find("1e-09 s violates motion.duration_s / step"), std::string::npos)
+      << steps.err;
+}
+
+TEST_F(RobustnessTest, AMassTooSmallForTheEngineIsNamedAndNothingIsCompared) {
+  const ProgramResult result = mbverify("run --no-pictures --out '" + mbverify.Out() + "' " +
+                                        kScenario + " --set parameters.m_crank=1e-310");
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.out.find("mass and inertia of moving bodies must be larger"), std::string::npos)
+      << result.out;
+}
+
+TEST_F(RobustnessTest, FilesOf10000LinesAreReadInSeconds) {
+  // A chain of bodies would be refused by number; parameters may be many.
+  std::string model = "name: long\nparameters:\n";
+  for (int i = 0; i < 10000; ++i) model += "  p" + std::to_string(i) + ": 0.5\n";
+  model +=
+      "bodies: {bar: {mass: p9999, inertia: [1, 1, 1]}}\n"
+      "joints: {pivot: {kind: revolute, parent: world, child: bar, axis: y}}\n"
+      "drives: {motor: {kind: joint, joint: pivot}}\n";
+  std::string broken = "name: long\nbodies:\n";
+  for (int i = 0; i < 10000; ++i) broken += "  b" + std::to_string(i) + ": {mas: 1}\n";
+  std::string scenario =
+      "mechanism: slider_crank\nmotion:\n  duration_s: 1\n  sample_s: 0.01\n"
+      "  commands:\n    motor:\n      - home\n";
+  for (int i = 0; i < 10000; ++i)
+    scenario += "      - {sine: {amplitude: 1e-5, frequency_hz: 1}}\n";
+  scenario += "analytic: none\n";
+  const auto start = std::chrono::steady_clock::now();
+  const ProgramResult good = mbverify("check " + Write("model.yaml", model));
+  EXPECT_EQ(good.exit_code, 0) << good.err.substr(0, 2000);
+  const ProgramResult bad = mbverify("check " + Write("broken.yaml", broken));
+  EXPECT_EQ(bad.exit_code, 2);
+  EXPECT_NE((bad.out + bad.err).find("more findings are left out"), std::string::npos);
+  (void)mbverify("check " + Write("scenario.yaml", scenario));
+  // 1 s each on an idle machine; the limit only tells seconds from minutes.
+  EXPECT_LT(std::chrono::steady_clock::now() - start, std::chrono::seconds(60));
+}
+
+TEST_F(RobustnessTest, WhatCannotBeReadIsBadInput) {
+  fs::create_directories(mbverify.folder() / "folder.yaml");
+  // /proc/self/mem can be opened, but reading it fails.
+  const std::string folder = (mbverify.folder() / "folder.yaml").string();
+  std::vector<std::string> calls = {Run("'" + folder + "'"), "converge '" + folder + "'"};
+  for (const std::string& file :
+       {std::string("/proc/self/mem"), (mbverify.folder() / "missing.yaml").string(),
+        Write("empty.yaml", ""), Write("zeros.yaml", std::string(4096, '\0'))}) {
+    calls.insert(calls.end(), {"check '" + file + "'", Run("'" + file + "'")});
+  }
+  for (const std::string& call : calls) {
+    const ProgramResult result = mbverify(call);
+    EXPECT_EQ(result.exit_code, 2) << call << "\n" << result.err;
+    EXPECT_NE((result.out + result.err).find("error"), std::string::npos) << call;
+  }
+}
+
+TEST_F(RobustnessTest, EveryCommandNamesAFolderThatCannotBeMade) {
+  const std::string file = Write("file", "x");
+  for (const std::string& command :
+       {"run --no-pictures --out '" + file + "/out' " + kScenario,
+        "converge --steps 0.004,0.002,0.001 --out '" + file + "/out' " + kScenario,
+        "render --at 0 --size 64x64 --out '" + file + "/out' " + kScenario,
+        "regress --no-pictures --out '" + file + "/out' " + kScenario,
+        "model slider_crank --format mjcf --out '" + file + "/model.xml'"}) {
+    const ProgramResult result = mbverify(command);
+    EXPECT_EQ(result.exit_code, 2) << command << "\n" << result.err;
+    EXPECT_NE(result.err.find("Not a directory"), std::string::npos) << command << result.err;
+  }
+  EXPECT_EQ(ReadAll(file), "x");
+}
+
+// A file-size limit stands in for a full disk: writes end short in the same way, with another
+// reason. The shell ignores the signal that would come with it.
+TEST_F(RobustnessTest, AFullDiskIsNamedAndTheOldResultStays) {
+  const std::string run = "\"$mbverify\" " + Run(kScenario);
+  ASSERT_EQ(Shell(run).exit_code, 0);
+  const std::vector<std::string> before = FilesBelow(mbverify.Out());
+  const fs::path summary = fs::path(mbverify.Out()) / "slider_crank" / "turn" / "summary.json";
+  const std::string old = ReadAll(summary);
+  ASSERT_GT(fs::file_size(summary.parent_path() / "traces.csv"), 8u * 1024u);
+  const ProgramResult full = Shell("trap '' XFSZ; ulimit -f 8; " + run);
+  EXPECT_EQ(full.exit_code, 2);
+  EXPECT_NE(full.err.find("cannot write"), std::string::npos) << full.err;
+  EXPECT_NE(full.err.find("File too large"), std::string::npos) << full.err;
+  EXPECT_EQ(FilesBelow(mbverify.Out()), before);
+  EXPECT_EQ(ReadAll(summary), old);
+  // Nothing of a first result either.
+  fs::remove_all(mbverify.Out());
+  EXPECT_EQ(Shell("trap '' XFSZ; ulimit -f 8; " + run).exit_code, 2);
+  EXPECT_TRUE(FilesBelow(mbverify.Out()).empty());
+  EXPECT_EQ(Shell(run).exit_code, 0);
+}
+
+TEST_F(RobustnessTest, AFullDiskLeavesNoHalfOfASingleFile) {
+  const fs::path file = mbverify.folder() / "model.xml";
+  const ProgramResult full =
+      Shell("trap '' XFSZ; ulimit -f 2; \"$mbverify\" model scara_robot --format mjcf --out '" +
+            file.string() + "'");
+  EXPECT_EQ(full.exit_code, 2);
+  EXPECT_NE(full.err.find("File too large"), std::string::npos) << full.err;
+  for (const std::string& left : FilesBelow(mbverify.folder())) {
+    EXPECT_EQ(left.find("model.xml"), std::string::npos) << left;
+  }
+}
+
+TEST_F(RobustnessTest, ResultsThatCannotBePrintedAreAnError) {
+  for (const std::string& command :
+       {std::string("list"), Run(kScenario), std::string("model slider_crank --format mjcf")}) {
+    const ProgramResult result = Shell("\"$mbverify\" " + command + " >/dev/full");
+    EXPECT_EQ(result.exit_code, 2) << command << "\n" << result.err;
+    EXPECT_NE(result.err.find("cannot write to standard output"), std::string::npos)
+        << command << "\n"
+        << result.err;
+  }
+  // Nobody to complain to either.
+  EXPECT_EQ(Shell("\"$mbverify\" " + Run(kScenario) + " >/dev/full 2>/dev/full").exit_code, 2);
+}
+
+TEST_F(RobustnessTest, ARegressionOnAFullDiskTellsWhyEachScenarioFailed) {
+  const ProgramResult full =
+      Shell("trap '' XFSZ; ulimit -f 40; \"$mbverify\" regress --no-pictures --out '" +
+            mbverify.Out() + "' " + kScenario);
+  EXPECT_EQ(full.exit_code, 2);
+  EXPECT_NE(full.out.find("exit code 2, expected 0: "), std::string::npos) << full.out;
+  EXPECT_NE(full.out.find("File too large"), std::string::npos) << full.out;
+}
+
+TEST_F(RobustnessTest, AFolderWithoutFilesIsNotFoundInOrder) {
+  const fs::path folder = mbverify.folder() / "empty";
+  fs::create_directories(folder);
+  for (const std::string& call :
+       {"check '" + folder.string() + "'", Run("'" + folder.string() + "'"),
+        "regress --no-pictures --out '" + mbverify.Out() + "' '" + folder.string() + "'"}) {
+    const ProgramResult result = mbverify(call);
+    EXPECT_EQ(result.exit_code, 2) << call;
+    EXPECT_NE((result.out + result.err).find("in this folder"), std::string::npos) << call;
+  }
+}
+
+TEST_F(RobustnessTest, PictureSizesAreWholeNumbersWithinBounds) {
+  for (const std::string& size : {std::string("640.5x480"), std::string("10x480"),
+                                  std::string("1e300x480"), std::string("480x9000")}) {
+    const ProgramResult result =
+        mbverify("render --at 0 --out '" + mbverify.Out() + "' --size " + size + " " + kScenario);
+    EXPECT_EQ(result.exit_code, 2) << size;
+    EXPECT_NE(result.err.find("is not a whole number from 64 to 8192"), std::string::npos)
+        << size << result.err;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
