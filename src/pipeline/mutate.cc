@@ -33,6 +33,25 @@ Best BestOf(const MutationBench& bench, const BentRun& run) {
   return best;
 }
 
+std::string Percent(double size) { return fmt::format("{:.3g} %", 100.0 * size); }
+
+// A parameter and what an error of 1 adds to it.
+struct Target {
+  Parameter parameter;
+  double relative_to = kNan;
+
+  [[nodiscard]] double At(double size) const { return parameter.value + relative_to * size; }
+  [[nodiscard]] Target Reversed() const { return {parameter, -relative_to}; }
+  /// "10 % wrong"
+  [[nodiscard]] std::string Text(double size) const {
+    if (parameter.value == 0.0) {
+      return fmt::format("{} of {:g}{}{} instead of 0", Percent(size), relative_to,
+                         parameter.unit.empty() ? "" : " ", parameter.unit);
+    }
+    return Percent(size) + (relative_to / parameter.value > 0.0 ? " wrong" : " less");
+  }
+};
+
 class Mutator {
  public:
   Mutator(const MutationOptions& options, const MutationBench& bench, MutationReport* report)
@@ -45,7 +64,7 @@ class Mutator {
     }
     for (size_t i = 0; i < parameters.size(); ++i) {
       fraction_ = static_cast<double>(i) / static_cast<double>(parameters.size());
-      report_.mutations.push_back(Bend(parameters[i]));
+      report_.mutations.push_back(Bend({parameters[i], ScaleOf(parameters[i])}));
     }
     std::stable_sort(report_.mutations.begin(), report_.mutations.end(),
                      [](const Mutation& a, const Mutation& b) { return Rank(a) < Rank(b); });
@@ -72,25 +91,46 @@ class Mutator {
   [[nodiscard]] bool Wanted(const Parameter& parameter) const {
     // An instance's parameter ("limb2.azimuth") follows from the model's.
     const bool of_instance = parameter.name.find('.') != std::string::npos;
-    if (options_.parameters.empty()) return parameter.value != 0.0 && !of_instance;
+    if (options_.parameters.empty()) return !of_instance;
     return std::find(options_.parameters.begin(), options_.parameters.end(), parameter.name) !=
            options_.parameters.end();
   }
 
-  BentRun RunAt(const Parameter& parameter, double size) {
-    if (options_.progress) {
-      options_.progress(fmt::format("{} by {:.1e}", parameter.name, size), fraction_);
+  // Its value; the largest one of its unit if that is zero.
+  [[nodiscard]] double ScaleOf(const Parameter& parameter) const {
+    if (parameter.value != 0.0) return parameter.value;
+    double largest = 0.0;
+    for (const Parameter& other : bench_.mechanism().parameters) {
+      if (other.unit == parameter.unit) largest = std::max(largest, std::abs(other.value));
     }
-    ++report_.runs;
-    return bench_.Run(parameter.name, parameter.value * (1.0 + size));
+    return largest > 0.0 ? largest : 1.0;
   }
 
-  Mutation Bend(const Parameter& parameter) {
+  BentRun RunAt(const Target& target, double size) {
+    if (options_.progress) {
+      options_.progress(fmt::format("{} by {:.1e}", target.parameter.name, size), fraction_);
+    }
+    ++report_.runs;
+    return bench_.Run(target.parameter.name, target.At(size));
+  }
+
+  // As far as the bent model runs; the other way round where it does not, but runs there.
+  BentRun RunEitherWay(Target* target, double size) {
+    BentRun run = RunAt(*target, size);
+    if (run.ran) return run;
+    BentRun other = RunAt(target->Reversed(), size);
+    if (!other.ran) return run;
+    *target = target->Reversed();
+    return other;
+  }
+
+  Mutation Bend(Target target) {
     Mutation m;
-    m.parameter = parameter.name;
-    m.unit = parameter.unit;
-    m.value = parameter.value;
-    const BentRun run = RunAt(parameter, options_.size);
+    m.parameter = target.parameter.name;
+    m.unit = target.parameter.unit;
+    m.value = target.parameter.value;
+    const BentRun run = RunEitherWay(&target, options_.size);
+    m.relative_to = target.relative_to;
     m.ran = run.ran;
     m.detected = run.detected();
     if (run.ran) m.force_change = run.ValueOf(bench_.ForceCheck());
@@ -100,13 +140,13 @@ class Mutator {
     if (m.detected) {
       m.best_check = best.check == nullptr ? "model" : best.check->name;
       if (options_.smallest) {
-        FindSmallest(parameter, 0.0, options_.size, best.ratio, &m);
+        FindSmallest(target, 0.0, options_.size, best.ratio, &m);
       } else if (best.check != nullptr) {
         m.smallest = options_.size / best.ratio;
       }
       return m;
     }
-    BendFurther(parameter, run, &m);
+    BendFurther(target, run, &m);
     missed_ = missed_ ||
               m.force_change > MutationBench::Visible(bench_.base().ValueOf(bench_.ForceCheck()));
     return m;
@@ -121,22 +161,26 @@ class Mutator {
 
   // Undetected at the size asked for: bent by kLargestBend, and if that is seen or refused, by ten
   // times as much as before until it is.
-  void BendFurther(const Parameter& parameter, const BentRun& first, Mutation* m) {
+  void BendFurther(Target target, const BentRun& first, Mutation* m) {
     double unseen = options_.size;
     BentRun last = first;
-    BentRun largest = unseen < kLargestBend ? RunAt(parameter, kLargestBend) : BentRun();
-    if (largest.ran && !largest.detected()) {
-      unseen = kLargestBend;
-      last = std::move(largest);
+    if (unseen < kLargestBend) {
+      BentRun largest = RunEitherWay(&target, kLargestBend);
+      if (target.relative_to != m->relative_to) unseen = 0.0;  // nothing is known of this way yet
+      m->relative_to = target.relative_to;
+      if (largest.ran && !largest.detected()) {
+        unseen = kLargestBend;
+        last = std::move(largest);
+      }
     }
     for (double size = 10.0 * options_.size; unseen < kLargestBend; size *= 10.0) {
       size = std::min(size, kLargestBend);
-      BentRun run = RunAt(parameter, size);
+      BentRun run = RunAt(target, size);
       if (!run.ran) break;  // the model itself objects; forces have not seen it up to here
       if (run.detected()) {
         const Best best = BestOf(bench_, run);
         m->best_check = best.check == nullptr ? "" : best.check->name;
-        if (options_.smallest) FindSmallest(parameter, unseen, size, best.ratio, m);
+        if (options_.smallest) FindSmallest(target, unseen, size, best.ratio, m);
         m->reason = fmt::format("its effect ({:.1e} in the drive forces) is below the limit",
                                 m->force_change);
         return;
@@ -147,13 +191,12 @@ class Mutator {
     m->proved_to = unseen;
     m->sensitivity = ForceSensitivity(bench_, last.trace);
     std::string why;
-    const auto bent = bench_.Bend(parameter.name, parameter.value * (1.0 + unseen), &why);
-    m->reason = bent ? WhyUnseen(bench_, *bent, last, unseen) : why;
+    const auto bent = bench_.Bend(m->parameter, target.At(unseen), &why);
+    m->reason = bent ? WhyUnseen(bench_, *bent, last, target.Text(unseen)) : why;
   }
 
   // Between `unseen` (0: not known) and `seen`; `ratio` is value over limit at `seen`.
-  void FindSmallest(const Parameter& parameter, double unseen, double seen, double ratio,
-                    Mutation* m) {
+  void FindSmallest(const Target& target, double unseen, double seen, double ratio, Mutation* m) {
     const double fine = 1.0 + options_.resolution;
     double step = fine;
     // Where proportion puts the limit, a little beyond; 0 where nothing is proportional.
@@ -173,7 +216,7 @@ class Mutator {
       }
       guess = 0.0;
       size = std::max(size, kSmallestBend);
-      const BentRun run = RunAt(parameter, size);
+      const BentRun run = RunAt(target, size);
       if (!run.detected()) {
         unseen = size;
         continue;
@@ -222,13 +265,13 @@ class Mutator {
     return result;
   }
 
-  // The fault; of several candidates the first that runs and moves differently, else that is
-  // refused for its ranges; empty when none is.
+  // The fault; of several candidates the first that runs and moves differently; empty when none
+  // does.
   std::optional<BentRun> RunFault(const StructuralFault& fault) {
     for (const Mechanism& wrong : fault.wrong) {
       ++report_.runs;
       BentRun run = bench_.Run(wrong);
-      if (fault.wrong.size() == 1 || run.out_of_range || (run.ran && run.detected())) return run;
+      if (fault.wrong.size() == 1 || (run.ran && run.detected())) return run;
     }
     return {};
   }
@@ -240,7 +283,7 @@ class Mutator {
     } else if (!fault.first.empty()) {
       return WhySwapUnseen(bench_, fault.first, fault.second);
     }
-    return WhyUnseen(bench_, fault.wrong.front(), run, kNan);
+    return WhyUnseen(bench_, fault.wrong.front(), run, "it");
   }
 
   const MutationOptions& options_;

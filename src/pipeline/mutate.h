@@ -14,7 +14,7 @@ inline constexpr double kSmallestBend = 1e-15;  ///< smaller errors vanish in th
 
 struct MutationOptions {
   double size = 1e-3;                   ///< relative error, > 0
-  std::vector<std::string> parameters;  ///< empty: the model's own that are not zero
+  std::vector<std::string> parameters;  ///< empty: all of the model's own
   std::function<void(const std::string& parameter, double fraction)> progress;
   bool smallest = true;     ///< search for the smallest detectable error
   double resolution = 0.1;  ///< of the search, relative, > 0
@@ -23,7 +23,9 @@ struct MutationOptions {
 
 /// Runs the scenario once as it is and many times with the simulated side bent, with MuJoCo's
 /// inverse dynamics per sample (roundoff accuracy); the scenario's own limits judge. Bends make a
-/// parameter larger. The search is a bisection in log scale, started where proportion puts it.
+/// parameter larger, or smaller where the model refuses that; errors of a parameter that is zero
+/// are relative to the largest one of its unit. The search is a bisection in log scale, started
+/// where proportion puts it.
 [[nodiscard]] MutationReport MutateScenario(const std::string& file,
                                             const MutationOptions& options);
 

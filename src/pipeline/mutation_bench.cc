@@ -181,7 +181,6 @@ BentRun MutationBench::Run(const Mechanism& wrong) const {
   if (!scenario().simulation.ignore_ranges) {
     const auto violations = JointViolations(wrong, witness.run.trace.time_s, witness.run.X_WB);
     if (!violations.empty()) {
-      bent.out_of_range = true;
       bent.failure = violations.front().Text();
       return bent;
     }

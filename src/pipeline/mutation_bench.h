@@ -14,9 +14,8 @@ namespace mbv {
 
 /// What the checks say when the simulated side is `wrong`.
 struct BentRun {
-  bool ran = false;           ///< false: `failure` says why there is nothing to compare
-  bool out_of_range = false;  ///< it moved, but beyond the ranges of its joints
-  bool loaded = true;         ///< false: the loader refused the bent model
+  bool ran = false;    ///< false: `failure` says why there is nothing to compare
+  bool loaded = true;  ///< false: the loader refused the bent model
   std::string failure;
   Trace trace;  ///< of the simulation
   Comparison comparison;

@@ -152,8 +152,6 @@ double ChannelChange(const Trace& base, const Trace& bent, F wanted) {
   return change == 0.0 ? 0.0 : change / largest;
 }
 
-std::string Percent(double size) { return fmt::format("{:.3g} %", 100.0 * size); }
-
 }  // namespace
 
 double ForceSensitivity(const MutationBench& bench, const Trace& bent) {
@@ -237,13 +235,11 @@ std::string DescribeChange(const Mechanism& base, const Mechanism& bent) {
 }
 
 std::string WhyUnseen(const MutationBench& bench, const Mechanism& bent, const BentRun& run,
-                      double size) {
+                      const std::string& bend) {
   const Mechanism& base = bench.mechanism();
   const std::string change = DescribeChange(base, bent);
   const double sensitivity = ForceSensitivity(bench, run.trace);
-  const std::string proof = fmt::format(
-      "{} changes no drive force {}",
-      std::isnan(size) ? std::string("it") : Percent(size) + " wrong", Bound(sensitivity));
+  const std::string proof = fmt::format("{} changes no drive force {}", bend, Bound(sensitivity));
   if (change.empty()) {
     return "no mass, joint, drive or output depends on it (pictures, or numbers that only other "
            "parameters use); " +

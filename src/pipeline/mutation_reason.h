@@ -13,10 +13,10 @@ namespace mbv {
 
 /// One sentence with numbers: what the bend changes in the model, the largest change of any drive
 /// force over the run relative to its RMS, and where the effect goes instead (base reactions, joint
-/// reactions, inertia forces that the motion does not call for). `size` is the relative bend; NaN
-/// for a structural fault.
+/// reactions, inertia forces that the motion does not call for). `bend` is the subject of that
+/// sentence: "10 % wrong".
 [[nodiscard]] std::string WhyUnseen(const MutationBench& bench, const Mechanism& bent,
-                                    const BentRun& run, double size);
+                                    const BentRun& run, const std::string& bend);
 
 /// Why two exchanged drives are not told apart: how much they differ in the unbent run.
 [[nodiscard]] std::string WhySwapUnseen(const MutationBench& bench, const std::string& a,

@@ -164,13 +164,15 @@ class Collector {
     faults_.push_back(std::move(fault));
   }
 
-  // Guesses anywhere, but of driven and prescribed joints as they are.
+  // Without ranges, which might refuse what forces should notice. Guesses anywhere, but of driven
+  // and prescribed joints as they are.
   Mechanism Disturbed(std::mt19937_64* random) const {
     std::uniform_real_distribution<double> angle(-3.1, 3.1), share(-1.0, 1.0);
     const double size = Size();
     Mechanism wrong = m_;
     for (size_t j = 0; j < wrong.joints.size(); ++j) {
       Joint& joint = wrong.joints[j];
+      joint.range = {};
       joint.guess = joint.home;
       if (joint.closure || IsDriven(static_cast<int>(j))) continue;
       for (int c = 0; c < FreedomsOf(joint.kind); ++c) {

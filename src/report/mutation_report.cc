@@ -32,9 +32,17 @@ std::string SeenText(const Mutation& m) {
 std::string Row(const Mutation& m, bool markdown) {
   const std::string change = Cell(m.force_change, "{:.1e}");
   const std::string smallest = Cell(m.smallest, "{:.1e}");
+  std::string relative;
+  if (m.value == 0.0) {
+    relative =
+        fmt::format("relative to {:g}{}{}; ", m.relative_to, m.unit.empty() ? "" : " ", m.unit);
+  } else if (m.relative_to / m.value < 0.0) {
+    relative = "made smaller; ";
+  }
   std::string note = m.best_check == "model" ? "the model is refused: " + m.reason : m.best_check;
   if (!m.detected)
     note = m.reason + (m.best_check.empty() ? "" : "; seen first by " + m.best_check);
+  note = relative + note;
   if (markdown) {
     return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {} |\n", m.parameter, m.value, m.unit,
                        SeenText(m), change, smallest, InCell(note));
@@ -115,6 +123,7 @@ std::string ToJson(const MutationReport& report) {
     json["parameters"].push_back({{"parameter", m.parameter},
                                   {"unit", m.unit},
                                   {"value", Number(m.value)},
+                                  {"relative_to", Number(m.relative_to)},
                                   {"ran", m.ran},
                                   {"detected", m.detected},
                                   {"by_force", m.by_force},

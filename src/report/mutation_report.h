@@ -13,6 +13,9 @@ namespace mbv {
 struct Mutation {
   std::string parameter, unit;
   double value = kNan;
+  /// What relative errors are relative to: the value, or if that is zero the largest one of its
+  /// unit (1 if there is none). Negative when the parameter was made smaller.
+  double relative_to = kNan;
   bool ran = false;            ///< false: the bent model could not be simulated; `reason` says why
   bool detected = false;       ///< a check failed, or the bent model could not run at all
   bool by_force = false;       ///< a drive-force check failed

@@ -77,25 +77,33 @@ TEST(Mutate, OnTheScaraRobotOnlyWhatCannotActStaysUnseen) {
   EXPECT_EQ(Undetected(report),
             (Names{
                 "I_p_x",     "I_p_y",      "I_plate_x",
-                "I_plate_y", "I_plate_xy",             // only turns about z
-                "bar_com",   "I_bar_y",    "I_bar_z",  // the bars move without turning
-                "ball_mass", "pivot_mass",             // moved between bodies that share the point
-                "d",                                   // the width of a parallelogram
+                "I_plate_y", "I_plate_xy",  // only turns about z
+                "bar_com",   "I_bar_x",    "I_bar_y",
+                "I_bar_z",                  // the bars move without turning
+                "ball_mass", "pivot_mass",  // moved between bodies that share the point
+                "d",                        // the width of a parallelogram
                 "home_x",    "home_y",     "home_z",
                 "home_phi",  "branch",                   // where the solution starts
                 "theta_min", "theta_max",  "shear_max",  // ranges
             }));
-  // A flat bar's inertias obey x = y + z; one alone that is larger is no rigid body.
-  const Mutation* bar = Find(report, "I_bar_x");
-  ASSERT_NE(bar, nullptr);
-  EXPECT_FALSE(bar->ran);
+  // A flat bar's inertias obey x = y + z; x alone may become smaller only, y alone hardly larger.
+  for (const char* name : {"I_bar_x", "I_bar_y"}) {
+    const Mutation* bar = Find(report, name);
+    ASSERT_NE(bar, nullptr) << name;
+    EXPECT_TRUE(bar->ran) << name;
+    EXPECT_EQ(bar->proved_to, kLargestBend) << bar->reason;
+  }
+  EXPECT_EQ(Find(report, "I_bar_x")->relative_to, -Find(report, "I_bar_x")->value);
 }
 
 TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
   const MutationReport report = Mutate("cabin_robot/zero_g", Plain());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   Names expected{
-      "c_carriage_y",  // the carriage and the sliders move without turning
+      "c_AB_z",
+      "c_CD_z",
+      "c_EF_z",
+      "c_platform_z",  // along the axis about which these turn
       "w",             // pictures
       "I_AB_x",
       "I_AB_y",
@@ -113,7 +121,11 @@ TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
       "epsilon_home",  // start
   };
   for (const char* body : {"carriage", "sliderA", "sliderD", "sliderF"}) {
-    for (const char* axis : {"_x", "_y", "_z"}) expected.insert("I_" + std::string(body) + axis);
+    // They move without turning.
+    for (const char* axis : {"_x", "_y", "_z"}) {
+      expected.insert("I_" + std::string(body) + axis);
+      expected.insert("c_" + std::string(body) + axis);
+    }
   }
   EXPECT_EQ(Undetected(report), expected);
 }
@@ -127,7 +139,7 @@ TEST(Mutate, ASmallErrorIsMissedAndSaysSo) {
 }
 
 TEST(Mutate, TheSmallestErrorIsDetectedAndOneResolutionSmallerIsNot) {
-  for (const char* parameter : {"m_rod", "I_rod_zz", "b"}) {
+  for (const char* parameter : {"m_rod", "I_rod_zz", "b", "phi_3"}) {
     MutationOptions options{.size = 1e-3, .parameters = {parameter}, .progress = {}};
     const MutationReport report = Mutate("spr_tripod/default_inverse", options);
     ASSERT_EQ(report.mutations.size(), 1u);
@@ -152,6 +164,21 @@ TEST(Mutate, AFinerResolutionNarrowsTheSearch) {
   // 1e-10.
   EXPECT_NEAR(report.mutations[0].smallest, 1e-10, 1.1e-13);
   EXPECT_EQ(report.mutations[0].best_check, "simulated_vs_reference.force_nrmse");
+}
+
+TEST(Mutate, ParametersThatAreZeroAreBentByAShareOfTheirLike) {
+  const MutationReport report =
+      Mutate("spr_tripod/default_inverse",
+             {.size = 1e-3, .parameters = {"phi_3", "m_rod"}, .progress = {}});
+  const Mutation* zero = Find(report, "phi_3");
+  ASSERT_NE(zero, nullptr);
+  EXPECT_EQ(zero->value, 0.0);
+  EXPECT_NEAR(zero->relative_to, 150.0 / 180.0 * 3.14159265358979, 1e-12);  // theta_2
+  EXPECT_TRUE(zero->by_force);
+  EXPECT_NE(ToText(report, false).find("relative to 2.61799 rad; "), std::string::npos);
+  const Mutation* other = Find(report, "m_rod");
+  ASSERT_NE(other, nullptr);
+  EXPECT_EQ(other->relative_to, other->value);
 }
 
 TEST(Mutate, WhatIsMissedAtTheSizeAskedForIsSearchedForAbove) {
@@ -228,6 +255,17 @@ TEST(Mutate, DrivesThatDoTheSameMayBeSwappedUnseenAndSaySo) {
   EXPECT_EQ(swap->where, "leg1 and leg2");
   EXPECT_FALSE(swap->detected);
   EXPECT_NE(swap->reason.find("leg1 and leg2 do the same"), std::string::npos) << swap->reason;
+}
+
+TEST(Mutate, AnotherAssemblyIsSeenByForcesNotOnlyByRanges) {
+  MutationOptions options;
+  options.smallest = false;
+  const MutationReport report = Mutate("spr_tripod/default_inverse", options);
+  const FaultResult* elbow = FindFault(report, "wrong elbow branch");
+  ASSERT_NE(elbow, nullptr);
+  EXPECT_TRUE(elbow->ran) << elbow->reason;
+  EXPECT_EQ(elbow->check, "simulated_vs_analytic.force_nrmse");
+  EXPECT_GT(elbow->value, 0.1);
 }
 
 TEST(Mutate, ATableOfFewDigitsSeesLessThanTheGenericSolver) {
