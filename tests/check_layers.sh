@@ -35,7 +35,7 @@ declare -A external=(
   [nlohmann/]="report regress cli"
   [sqlite3]="regress"
   [zlib]="regress"
-  [boost/]="reference"
+  [boost/]="reference comparison"
 )
 
 check() {  # reads "src/folder/file:header" lines, prints offences

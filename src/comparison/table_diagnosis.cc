@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/math/tools/minima.hpp>
 #include <cmath>
-#include <functional>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <tuple>
 
 namespace mbv {
 namespace {
@@ -315,8 +317,8 @@ class Diagnosis {
         best_s = k * step_s;
       }
     }
-    best_s = Refine(misfit, best_s - step_s, best_s + step_s);
-    best = misfit(best_s);
+    std::tie(best_s, best) = boost::math::tools::brent_find_minima(
+        misfit, best_s - step_s, best_s + step_s, std::numeric_limits<double>::digits / 2);
     if (!(best <= kExplains * unshifted) || !AllFit(moving, best_s)) return {};
     return fmt::format(
         "the table is shifted by {:.4g} s: it is {} (time_offset_s: {:.4g} on top "
@@ -376,20 +378,6 @@ class Diagnosis {
   [[nodiscard]] bool AllFit(const std::vector<size_t>& moving, double shift_s) const {
     return std::all_of(moving.begin(), moving.end(),
                        [&](size_t k) { return IsGood(series_[k], ShiftedRms(k, shift_s)); });
-  }
-
-  // Golden section.
-  static double Refine(const std::function<double(double)>& f, double a, double b) {
-    constexpr double kGolden = 0.6180339887498949;
-    for (int i = 0; i < 40; ++i) {
-      const double left = b - kGolden * (b - a), right = a + kGolden * (b - a);
-      if (f(left) < f(right)) {
-        b = right;
-      } else {
-        a = left;
-      }
-    }
-    return 0.5 * (a + b);
   }
 
   const AlignedTable& table_;

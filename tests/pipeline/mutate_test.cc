@@ -17,10 +17,16 @@ MutationReport Mutate(const std::string& scenario, MutationOptions options = {})
   return MutateScenario(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml", options);
 }
 
-// Parameters at one size, without searching for the smallest one.
-MutationOptions Plain() {
+// Everything at one size, without searching for the smallest one.
+MutationOptions WithFaults() {
   MutationOptions options;
   options.smallest = false;
+  return options;
+}
+
+// The same without structural faults.
+MutationOptions Plain() {
+  MutationOptions options = WithFaults();
   options.structural = false;
   return options;
 }
@@ -227,9 +233,7 @@ const FaultResult* FindFault(const MutationReport& report, const std::string& ki
 }
 
 TEST(Mutate, StructuralFaultsAreDetectedInAMechanismWithoutClosedForm) {
-  MutationOptions options;
-  options.smallest = false;
-  const MutationReport report = Mutate("stewart/wave", options);
+  const MutationReport report = Mutate("stewart/wave", WithFaults());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   for (const FaultResult& fault : report.faults) {
     EXPECT_EQ(fault.detected, fault.applicable) << fault.kind << " " << fault.where;
@@ -247,9 +251,7 @@ TEST(Mutate, StructuralFaultsAreDetectedInAMechanismWithoutClosedForm) {
 
 TEST(Mutate, DrivesThatDoTheSameMayBeSwappedUnseenAndSaySo) {
   // The path lies in the symmetry plane of legs 1 and 2.
-  MutationOptions options;
-  options.smallest = false;
-  const MutationReport report = Mutate("spr_tripod/default_inverse", options);
+  const MutationReport report = Mutate("spr_tripod/default_inverse", WithFaults());
   const FaultResult* swap = FindFault(report, "swapped drives");
   ASSERT_NE(swap, nullptr);
   EXPECT_EQ(swap->where, "leg1 and leg2");
@@ -258,9 +260,7 @@ TEST(Mutate, DrivesThatDoTheSameMayBeSwappedUnseenAndSaySo) {
 }
 
 TEST(Mutate, AnotherAssemblyIsSeenByForcesNotOnlyByRanges) {
-  MutationOptions options;
-  options.smallest = false;
-  const MutationReport report = Mutate("spr_tripod/default_inverse", options);
+  const MutationReport report = Mutate("spr_tripod/default_inverse", WithFaults());
   const FaultResult* elbow = FindFault(report, "wrong elbow branch");
   ASSERT_NE(elbow, nullptr);
   EXPECT_TRUE(elbow->ran) << elbow->reason;
