@@ -25,7 +25,7 @@ table{border-collapse:collapse;width:100%}th,td{border-top:1px solid var(--line)
 text-align:left;vertical-align:top}thead th{background:var(--head);position:sticky;top:0}
 th button{all:unset;cursor:pointer;font-weight:600}th button:focus-visible{outline:2px solid var(--link)}
 th[aria-sort=ascending] button::after{content:" ▲"}th[aria-sort=descending] button::after{content:" ▼"}
-tbody th{font-weight:600;min-width:14rem}th .soft,caption{font-weight:400}caption{text-align:left}
+tbody th{font-weight:600;min-width:14rem;overflow-wrap:anywhere}th .soft,caption{font-weight:400}caption{text-align:left}
 .notes{min-width:12rem;overflow-wrap:anywhere}.notes p{margin:0 0 .3rem}.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
 .good{color:var(--good)}.bad{color:var(--bad)}.warn{color:var(--warn)}.word{font-weight:600}
 img{display:block;border-radius:4px;max-width:144px;height:auto}svg{display:block}
@@ -188,7 +188,7 @@ constexpr const char* kControls = R"html(<form role="search">
 <option value="warn">drift</option><option value="good">as expected</option></select></label>
 <span id="shown" class="soft" role="status"></span></form>
 <div class="scroll"><table><caption class="soft">Error: drive forces, RMS over all drives of one
-unit, or the worst entry of the stiffness; simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
+unit; the worst entry of a stiffness; velocities of a free motion, RMS; simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
 <td></td><th scope="col"><button>scenario</button></th><th scope="col"><button>result</button></th>
 <th scope="col"><button>error</button></th><th scope="col"><button>limit</button></th>
 <th scope="col">last runs</th><th scope="col">notes</th><th scope="col"><button>wall [s]</button></th>

@@ -29,7 +29,7 @@ namespace mbv {
 /// "ok", "FAILED", "drift" …: a case in one word.
 [[nodiscard]] std::string WordOf(const CaseResult& result);
 
-/// "drive force error, RMS" or "stiffness error, worst entry"; "" without key metric.
+/// What KeyMetric() is: "drive force error, RMS"; "" without one.
 [[nodiscard]] std::string KeyTitle(const CaseResult& result);
 /// "2.8e-11 of 1.0e-09 (simulated vs analytic)", "2.8e-11 of 1.0e-09 (stiffness, simulated vs
 /// analytic)": the key metric for people; "" if there is none.

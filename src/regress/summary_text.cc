@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
+#include <string_view>
 
 #include "core/markup.h"
 #include "regress/summaries.h"
@@ -31,8 +33,17 @@ size_t SequenceLength(const std::string& text, size_t at) {
   return forbidden ? 0 : length;
 }
 
-bool OfStiffness(const std::pair<const std::string, MetricValue>& key) {
-  return key.first.ends_with(".stiffness_entry");
+struct KeyWords {
+  std::string_view ending, title, prefix;  // of the metric's name; of the text
+};
+
+const KeyWords& WordsOf(const std::string& metric) {
+  static constexpr std::array<KeyWords, 3> kWords = {
+      {{".force_nrmse", "drive force error, RMS", ""},
+       {".stiffness_entry", "stiffness error, worst entry", "stiffness, "},
+       {".velocity_nrmse", "velocity error of a free motion, RMS", "free motion, "}}};
+  return *std::ranges::find_if(
+      kWords, [&](const KeyWords& words) { return metric.ends_with(words.ending); });
 }
 
 }  // namespace
@@ -70,7 +81,7 @@ std::string WordOf(const CaseResult& result) {
 std::string KeyTitle(const CaseResult& result) {
   const auto* key = KeyMetric(result);
   if (key == nullptr) return "";
-  return OfStiffness(*key) ? "stiffness error, worst entry" : "drive force error, RMS";
+  return std::string(WordsOf(key->first).title);
 }
 
 std::string KeyText(const CaseResult& result) {
@@ -80,7 +91,7 @@ std::string KeyText(const CaseResult& result) {
   std::replace(pair.begin(), pair.end(), '_', ' ');
   std::string text = fmt::format("{:.1e}", key->second.value);
   if (key->second.limit) text += fmt::format(" of {:.1e}", *key->second.limit);
-  return text + (OfStiffness(*key) ? " (stiffness, " : " (") + pair + ")";
+  return text + fmt::format(" ({}{})", WordsOf(key->first).prefix, pair);
 }
 
 std::string ToSummaryText(const RegressReport& report) {

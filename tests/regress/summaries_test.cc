@@ -75,6 +75,16 @@ TEST(Summaries, StiffnessIsTheKeyMetricOfAScenarioWithoutForces) {
   }
 }
 
+TEST(Summaries, VelocitiesAreTheKeyMetricOfAFreeMotion) {
+  CaseResult result = AgreeingCase("model/fall", 1e-9);
+  result.metrics["simulated_vs_reference.velocity_nrmse"] = {4.6e-12, 1e-5, true};
+  EXPECT_EQ(KeyTitle(result), "drive force error, RMS");
+  result.metrics.erase("simulated_vs_analytic.force_nrmse");
+  EXPECT_EQ(KeyTitle(result), "velocity error of a free motion, RMS");
+  EXPECT_EQ(KeyText(result), "4.6e-12 of 1.0e-05 (free motion, simulated vs reference)");
+  EXPECT_NE(ToIndexHtml(OneRun({result}), {}).find("4.6e-12"), std::string::npos);
+}
+
 TEST(JUnit, CountsMatchItsElements) {
   tinyxml2::XMLDocument document;
   ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);
