@@ -40,10 +40,11 @@ int ExitCodeOf(CaseStatus status) {
 }
 
 std::span<const std::string_view> KeyMetricNames() {
-  static constexpr std::array<std::string_view, 8> kNames = {
+  static constexpr std::array<std::string_view, 10> kNames = {
       "simulated_vs_analytic.force_nrmse",      "simulated_vs_reference.force_nrmse",
       "reference_vs_analytic.force_nrmse",      "simulated_vs_analytic.stiffness_entry",
       "simulated_vs_reference.stiffness_entry", "reference_vs_analytic.stiffness_entry",
+      "simulated_vs_analytic.pose_m",           "simulated_vs_reference.pose_m",
       "simulated_vs_analytic.velocity_nrmse",   "simulated_vs_reference.velocity_nrmse"};
   return kNames;
 }

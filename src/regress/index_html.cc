@@ -188,7 +188,8 @@ constexpr const char* kControls = R"html(<form role="search">
 <option value="warn">drift</option><option value="good">as expected</option></select></label>
 <span id="shown" class="soft" role="status"></span></form>
 <div class="scroll"><table><caption class="soft">Error: drive forces, RMS over all drives of one
-unit; the worst entry of a stiffness; velocities of a free motion, RMS; simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
+unit; the worst entry of a stiffness; the largest of an output's place [m] in a
+free motion; simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
 <td></td><th scope="col"><button>scenario</button></th><th scope="col"><button>result</button></th>
 <th scope="col"><button>error</button></th><th scope="col"><button>limit</button></th>
 <th scope="col">last runs</th><th scope="col">notes</th><th scope="col"><button>wall [s]</button></th>

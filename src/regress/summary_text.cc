@@ -38,10 +38,11 @@ struct KeyWords {
 };
 
 const KeyWords& WordsOf(const std::string& metric) {
-  static constexpr std::array<KeyWords, 3> kWords = {
+  static constexpr std::array<KeyWords, 4> kWords = {
       {{".force_nrmse", "drive force error, RMS", ""},
        {".stiffness_entry", "stiffness error, worst entry", "stiffness, "},
-       {".velocity_nrmse", "velocity error of a free motion, RMS", "free motion, "}}};
+       {".pose_m", "error of an output's place, largest [m]", "output's place [m], "},
+       {".velocity_nrmse", "velocity error, RMS", "velocity, "}}};
   return *std::ranges::find_if(
       kWords, [&](const KeyWords& words) { return metric.ends_with(words.ending); });
 }

@@ -75,14 +75,17 @@ TEST(Summaries, StiffnessIsTheKeyMetricOfAScenarioWithoutForces) {
   }
 }
 
-TEST(Summaries, VelocitiesAreTheKeyMetricOfAFreeMotion) {
+TEST(Summaries, AnOutputsPlaceOrElseVelocitiesAreTheKeyMetricOfAFreeMotion) {
   CaseResult result = AgreeingCase("model/fall", 1e-9);
-  result.metrics["simulated_vs_reference.velocity_nrmse"] = {4.6e-12, 1e-5, true};
+  result.metrics["simulated_vs_reference.pose_m"] = {4.6e-12, 1e-6, true};
+  result.metrics["simulated_vs_reference.velocity_nrmse"] = {3.3e-12, 1e-5, true};
   EXPECT_EQ(KeyTitle(result), "drive force error, RMS");
   result.metrics.erase("simulated_vs_analytic.force_nrmse");
-  EXPECT_EQ(KeyTitle(result), "velocity error of a free motion, RMS");
-  EXPECT_EQ(KeyText(result), "4.6e-12 of 1.0e-05 (free motion, simulated vs reference)");
+  EXPECT_EQ(KeyTitle(result), "error of an output's place, largest [m]");
+  EXPECT_EQ(KeyText(result), "4.6e-12 of 1.0e-06 (output's place [m], simulated vs reference)");
   EXPECT_NE(ToIndexHtml(OneRun({result}), {}).find("4.6e-12"), std::string::npos);
+  result.metrics.erase("simulated_vs_reference.pose_m");
+  EXPECT_EQ(KeyText(result), "3.3e-12 of 1.0e-05 (velocity, simulated vs reference)");
 }
 
 TEST(JUnit, CountsMatchItsElements) {
