@@ -2,29 +2,47 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <atomic>
 #include <cstdlib>
-#include <new>
+#include <numeric>
 #include <vector>
+#ifdef __SANITIZE_ADDRESS__
+#include <sanitizer/allocator_interface.h>
+#endif
 
 namespace {
 
 std::atomic<std::size_t> allocations{0};
 
-void* Allocate(std::size_t size) {
-  ++allocations;
-  if (void* memory = std::malloc(size == 0 ? 1 : size)) return memory;
-  throw std::bad_alloc();
-}
-
 }  // namespace
 
-void* operator new(std::size_t size) { return Allocate(size); }
-void* operator new[](std::size_t size) { return Allocate(size); }
-void operator delete(void* memory) noexcept { std::free(memory); }
-void operator delete[](void* memory) noexcept { std::free(memory); }
-void operator delete(void* memory, std::size_t) noexcept { std::free(memory); }
-void operator delete[](void* memory, std::size_t) noexcept { std::free(memory); }
+#ifdef __SANITIZE_ADDRESS__
+// The sanitizer's own allocator stays in place and tells what it gives out.
+[[maybe_unused]] const int kHooks = __sanitizer_install_malloc_and_free_hooks(
+    [](const volatile void*, std::size_t) { ++allocations; }, [](const volatile void*) {});
+#else
+// glibc's allocator under its other names. operator new ends here, and so do Eigen's matrices.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_realloc(void* memory, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) noexcept {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* realloc(void* memory, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_realloc(memory, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+}
+#endif
 
 namespace mbv {
 
@@ -34,6 +52,24 @@ TEST(AllocationCounter, SeesAnAllocation) {
   const std::size_t before = AllocationCount();
   std::vector<double> values(100, 1.0);
   EXPECT_GT(AllocationCount(), before) << values.front();
+}
+
+TEST(AllocationCounter, SeesMatricesOfDynamicSize) {
+  const std::size_t before = AllocationCount();
+  Eigen::MatrixXd values = Eigen::MatrixXd::Ones(10, 10);
+  EXPECT_GT(AllocationCount(), before) << values(0, 0);
+  const std::size_t after = AllocationCount();
+  values.resize(20, 10);
+  EXPECT_GT(AllocationCount(), after);
+}
+
+TEST(AllocationCounter, SeesTheBufferOfAStableSort) {
+  std::vector<int> values(100);
+  std::iota(values.rbegin(), values.rend(), 0);
+  const std::size_t before = AllocationCount();
+  std::stable_sort(values.begin(), values.end());
+  EXPECT_GT(AllocationCount(), before);
+  EXPECT_EQ(values.front(), 0);
 }
 
 }  // namespace mbv

@@ -5,7 +5,7 @@
 
 namespace mbv {
 
-/// Calls of operator new since the program started.
+/// Allocations from the heap since the program started: operator new, and Eigen's calls of malloc.
 [[nodiscard]] std::size_t AllocationCount();
 
 }  // namespace mbv
