@@ -8,9 +8,6 @@
 #include <cstdlib>
 #include <numeric>
 #include <vector>
-#ifdef __SANITIZE_ADDRESS__
-#include <sanitizer/allocator_interface.h>
-#endif
 
 namespace {
 
@@ -19,7 +16,11 @@ std::atomic<std::size_t> allocations{0};
 }  // namespace
 
 #ifdef __SANITIZE_ADDRESS__
-// The sanitizer's own allocator stays in place and tells what it gives out.
+// The sanitizer's own allocator stays in place and tells what it gives out (GCC 12 lacks the header
+// that declares this function of it).
+extern "C" int __sanitizer_install_malloc_and_free_hooks(void (*on_malloc)(const volatile void*,
+                                                                           std::size_t),
+                                                         void (*on_free)(const volatile void*));
 [[maybe_unused]] const int kHooks = __sanitizer_install_malloc_and_free_hooks(
     [](const volatile void*, std::size_t) { ++allocations; }, [](const volatile void*) {});
 #else
