@@ -50,6 +50,22 @@ TEST(Converge, BreaksOfTheMotionAreKeptApart) {
   EXPECT_NEAR(breaks.pairwise.back(), 1.0, 2 * kOrderTolerance);
 }
 
+TEST(Converge, AMotionTooFastForATimeConstantEndsInAFinding) {
+  // 20 Hz: stock MuJoCo's time constants of 2 to 32 ms are not small against a period.
+  ConvergeOptions options{.steps_s = {4e-3, 2e-3, 1e-3}};
+  options.scenario.set = {
+      {"motion.commands.motor", "[home, {sine: {amplitude: 0.002, frequency_hz: 20}}]"},
+      {"motion.duration_s", "0.5"},
+      {"snapshots.times_s", "[]"}};
+  const ConvergeOutcome outcome = Study("slider_crank/turn", options);
+  EXPECT_EQ(outcome.exit_code, 1) << outcome.failure << outcome.diagnostics.Text();
+  EXPECT_TRUE(outcome.report.finding());
+  EXPECT_TRUE(Find(outcome, "stock_time_constant").verdict.finding);
+  // The corrected engine keeps its order, so the finding is of that series alone.
+  EXPECT_FALSE(Find(outcome, "corrected_both").verdict.finding);
+  EXPECT_TRUE(outcome.report.extrapolation.pass);
+}
+
 TEST(Converge, StepsMustBePositiveFallAndDivideOneAnother) {
   const auto check = [](std::vector<double> steps) {
     return Check(ConvergeOptions{.steps_s = std::move(steps)});
