@@ -18,9 +18,9 @@ constexpr double kSameTime_s = 1e-9;
 ExpectedOrder Expected(bool stock, Knob knob) {
   switch (knob) {
     case Knob::kBoth:
-      return stock ? ExpectedOrder{1.0, 2.0} : ExpectedOrder{4.0, 4.0};
+      return stock ? ExpectedOrder{1.0, 2.0} : ExpectedOrder{4.0, 6.0};
     case Knob::kStep:
-      return stock ? ExpectedOrder{1.0, 1.0} : ExpectedOrder{2.0, 4.0};
+      return stock ? ExpectedOrder{1.0, 1.0} : ExpectedOrder{4.0, 4.0};
     case Knob::kTimeConstant:
       return stock ? ExpectedOrder{1.0, 2.0} : ExpectedOrder{-2.0, 2.0};
   }
@@ -28,7 +28,7 @@ ExpectedOrder Expected(bool stock, Knob knob) {
 }
 
 ExpectedOrder ExpectedPose(bool stock) {
-  return stock ? ExpectedOrder{2.0, 2.0} : ExpectedOrder{3.0, 6.0};
+  return stock ? ExpectedOrder{2.0, 2.0} : ExpectedOrder{4.0, 6.0};
 }
 
 // What a break may have left in the error of the smooth samples: the errors near breaks contain

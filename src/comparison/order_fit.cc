@@ -151,7 +151,9 @@ Richardson MakeRichardson(double coarse_step, double fine_step, const OrderFit& 
   MBV_DEMAND(coarse_step > fine_step && fine_step > 0.0, fine_step);
   Richardson result;
   const bool observed = fit.order >= 0.5 && !std::isnan(fit.order_error);
-  result.order = observed ? std::min(fit.order, expected.highest) : std::max(1.0, expected.lowest);
+  // As the step falls, the term of the lowest order is what remains.
+  const double formal = std::max(1.0, expected.lowest);
+  result.order = observed ? std::min(fit.order, formal) : formal;
   result.factor = 1.0 / (std::pow(coarse_step / fine_step, result.order) - 1.0);
   result.safety = observed ? 1.25 : 3.0;
   return result;

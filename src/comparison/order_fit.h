@@ -63,7 +63,8 @@ struct Richardson {
   double factor = kNan;  ///< 1/(ratio^order − 1)
   double safety = kNan;  ///< 1.25 with an order observed on three steps or more, 3 otherwise
 };
-/// `expected` supplies the order where `fit` has none: the lowest one, at least 1.
+/// The order is that of `fit`, at most the lowest one of `expected`, which also serves where `fit`
+/// has none (at least 1).
 [[nodiscard]] Richardson MakeRichardson(double coarse_step, double fine_step, const OrderFit& fit,
                                         const ExpectedOrder& expected);
 

@@ -16,6 +16,8 @@ constexpr double kSoftness = 1e-5;
 constexpr double kLightest = 1e-4;
 // Repeated solutions where no force is expected yet: each reduces the error by R's share.
 constexpr int kStartRepeats = 4;
+// How far off the acceleration is that the solver starts from [m/s², rad/s²].
+constexpr double kNudge = 1e-9;
 // Shares of the largest pivot of J, see the head of integrator.h.
 constexpr double kWeak = 0.01, kNear = 0.2;
 
@@ -27,7 +29,8 @@ Integrator::Integrator(Session* session, double h)
   b_ = 2.0 / tc;
   k_ = 1.0 / (tc * tc);
   const int rows = s_.system.rows();
-  for (VecX* x : {&bias_, &rate_, &aref_, &expected_, &last_force_}) x->setZero(rows);
+  for (VecX* x : {&bias_, &rate_, &guidance_, &aref_, &expected_}) x->setZero(rows);
+  f_.fill(VecX::Zero(rows));
   largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_));
   q_ = Eigen::Map<const VecX>(d_->qpos, m_->nq);
   v_ = Eigen::Map<const VecX>(d_->qvel, m_->nv);
@@ -42,7 +45,7 @@ void Integrator::Start(const DrivenSample& first) {
   warm_ = qacc();
   Evaluate(q_, v_, first, 0.0);
   for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
-  RememberAcceleration();
+  RememberNode();
 }
 
 void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
@@ -52,12 +55,12 @@ void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
   mean_ = v_ + e * (323.0 * a_[0] - 264.0 * a_[1] + 159.0 * a_[2] - 38.0 * a_[3]);
   q_p_ = q_;
   AdvancePositions(s_.engine, h, mean_, v_, v_p_, &work_, q_p_.data());
-  expected_ = 2.0 * s_.system.force() - last_force_;
-  warm_ = 2.0 * a_[0] - a_[1];
+  expected_ = 4.0 * (f_[0] + f_[2]) - 6.0 * f_[1] - f_[3];
+  warm_ = 4.0 * (a_[0] + a_[2]) - 6.0 * a_[1] - a_[3];
   Evaluate(q_p_, v_p_, end, end_s);
   nodes_ = std::min(nodes_ + 1, static_cast<int>(a_.size()));
   if (s_.motion.free() && PassesSingularPose()) Coast();
-  RememberAcceleration();
+  RememberNode();
   // (4), (5)
   mean_ = v_ + e * (38.0 * a_[0] + 171.0 * a_[1] - 36.0 * a_[2] + 7.0 * a_[3]);
   v_p_ = v_ + c * (9.0 * a_[0] + 19.0 * a_[1] - 5.0 * a_[2] + a_[3]);
@@ -84,14 +87,14 @@ void Integrator::RungeKutta(double h, const DrivenSample& middle, const DrivenSa
   warm_ = k4;
   Evaluate(q_, v_, end, from_s + h);
   SolveAgain();
-  RememberAcceleration();
+  RememberNode();
 }
 
 // The power half way, at the state that the cubic through the velocities and accelerations of both
 // ends has there: that of a stage is only of second order.
 void Integrator::MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const VecX& a_1,
                                const DrivenSample& middle, double t_s) {
-  const VecX force = s_.system.force(), last = last_force_;
+  const VecX force = s_.system.force();
   v_p_ = 0.5 * (v_0 + v_) + h / 8.0 * (a_0 - a_1);
   mean_ = (13.0 * v_0 + 3.0 * v_) / 16.0 + h / 96.0 * (11.0 * a_0 - 5.0 * a_1);
   q_p_ = q_;
@@ -102,7 +105,6 @@ void Integrator::MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const
   SolveAgain();
   s_.work.Middle(s_.WorkRates());
   s_.system.force() = force;
-  last_force_ = last;
 }
 
 // Acceleration at q ⊕ u.
@@ -111,7 +113,8 @@ VecX Integrator::Stage(const VecX& u, const VecX& v, const DrivenSample& at, dou
   mj_integratePos(m_, q_p_.data(), u.data(), 1.0);
   expected_ = s_.system.force();
   warm_ = qacc();
-  Evaluate(q_p_, v, at, t_s);
+  Evaluate(q_p_, v, at, t_s, Guidance::kOfTheNode);
+  SolveAgain();
   return qacc();
 }
 
@@ -154,14 +157,16 @@ void Integrator::Coast() {
   s_.solver.SolveForcesHere(tau);
 }
 
-void Integrator::RememberAcceleration() {
+void Integrator::RememberNode() {
   for (size_t i = a_.size() - 1; i > 0; --i) a_[i].swap(a_[i - 1]);
   a_[0] = qacc();
+  for (size_t i = f_.size() - 1; i > 0; --i) f_[i].swap(f_[i - 1]);
+  f_[0] = s_.system.force();
 }
 
 // MuJoCo's stages at one state.
-void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s) {
-  last_force_ = s_.system.force();
+void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s,
+                          Guidance guidance) {
   std::copy(q.begin(), q.end(), d_->qpos);
   std::copy(v.begin(), v.end(), d_->qvel);
   d_->time = t_s;
@@ -173,21 +178,29 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, 
   s_.system.EvaluatePassive();
   mj_rne(m_, d_, 0, d_->qfrc_bias);
   s_.ApplyForces(t_s);
-  SetReference(v, at);
+  SetReference(v, at, guidance);
   std::copy(warm_.begin(), warm_.end(), d_->qacc_warmstart);
   mj_fwdAcceleration(m_, d_);
+  SolveConstraints();
+}
+
+// MuJoCo's constraint stage, from a warm start that is a little off: it takes no Newton step
+// shorter than 1e-15, and what that leaves undone in the acceleration is divided by R in the force.
+void Integrator::SolveConstraints() {
+  Eigen::Map<VecX>(d_->qacc_warmstart, m_->nv).array() += kNudge;
   mj_fwdConstraint(m_, d_);
 }
 
 // (1) without the expected force; R and its inverse D.
-void Integrator::SetReference(const VecX& v, const DrivenSample& at) {
+void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance guidance) {
   const int rows = s_.system.rows(), driven = s_.system.driven_rows();
   s_.system.Bias(&bias_);
   rate_.noalias() = s_.system.J() * v;
   aref_ = -bias_;
   rate_.tail(driven) -= s_.system.Guided(at.velocity);
   aref_.tail(driven) += s_.system.Guided(at.acceleration);
-  aref_ -= b_ * rate_ + k_ * s_.system.residual();
+  if (guidance == Guidance::kNew) guidance_ = b_ * rate_ + k_ * s_.system.residual();
+  aref_ -= guidance_;
   Eigen::Map<VecX> R(d_->efc_R, rows);
   R = kSoftness * R.cwiseMin(largest_R_);
   Eigen::Map<VecX>(d_->efc_D, rows) = R.cwiseInverse();
@@ -207,7 +220,7 @@ void Integrator::ApplyReference() {
 void Integrator::SolveAgain() {
   expected_ = s_.system.force();
   ApplyReference();
-  mj_fwdConstraint(m_, d_);
+  SolveConstraints();
 }
 
 }  // namespace mbv::simulation

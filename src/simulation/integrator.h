@@ -19,8 +19,10 @@
 // kWeak of its largest) they are extrapolated by the polynomial through the last n ≤ 6 nodes,
 //   a_{n+1} = Σ_i (−1)^{i+1} C(n, i) a_{n+1−i},                                               (6)
 // and the forces are those of least norm that belong to them.
-// The classical Runge–Kutta method builds up the
-// history at the start and after every break of the commanded profiles. Rotation vectors of balls
+// The classical Runge–Kutta method builds up the history at the start and after every break of the
+// commanded profiles. Its stages lie off the path by h²; guided back from there, at a rate that
+// rises with 1/h, they would leave a velocity error of h². So b (J q̇ − ẋ_ref) + k r of the step's
+// first node serves all of its stages. Rotation vectors of balls
 // and free bodies follow u̇ = ω + ½ u × ω + 1/12 u × (u × ω) [Iserles et al. 2000, Eq. 2.42].
 #pragma once
 
@@ -46,11 +48,14 @@ class Integrator {
   [[nodiscard]] bool healthy() const { return IsSane(d_->qacc, m_->nv); }
 
  private:
-  void Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s);
-  void SetReference(const VecX& v, const DrivenSample& at);
+  enum class Guidance { kNew, kOfTheNode };  // by the present state, or as at the last node
+  void Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s,
+                Guidance guidance = Guidance::kNew);
+  void SetReference(const VecX& v, const DrivenSample& at, Guidance guidance);
   void ApplyReference();
+  void SolveConstraints();
   void SolveAgain();
-  void RememberAcceleration();
+  void RememberNode();
   [[nodiscard]] bool PassesSingularPose();
   void Coast();
   void MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const VecX& a_1,
@@ -66,8 +71,9 @@ class Integrator {
   double largest_R_ = 0.0;    // [1/kg]; rotation rows: of a lever of one metre
   VecX q_, v_;                // corrected state at the present node
   VecX q_p_, v_p_, mean_, work_, warm_;
-  VecX bias_, rate_, aref_, expected_, last_force_;
+  VecX bias_, rate_, guidance_, aref_, expected_;
   std::array<VecX, 6> a_;  // accelerations at the last nodes, newest first
+  std::array<VecX, 4> f_;  // constraint forces there
   int nodes_ = 0;          // of these that lie at equal distances
   double largest_pivot_ = 0.0;
 };

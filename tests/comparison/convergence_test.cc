@@ -93,9 +93,12 @@ TEST(RelativeError, ANumberOfOneUnitDoesNotHideThatAnotherHasNone) {
 
 TEST(Judge, EachSchemeHasItsOwnOrder) {
   EXPECT_FALSE(Make(4.0).series.verdict.finding);
-  EXPECT_TRUE(Make(2.0).series.verdict.finding);
-  EXPECT_FALSE(Make(2.0, Knob::kStep).series.verdict.finding);
-  EXPECT_TRUE(Make(0.0, Knob::kStep).series.verdict.finding);
+  EXPECT_FALSE(Make(6.0).series.verdict.finding);
+  EXPECT_TRUE(Make(3.0).series.verdict.finding);
+  EXPECT_TRUE(Make(7.0).series.verdict.finding);
+  EXPECT_FALSE(Make(4.0, Knob::kStep).series.verdict.finding);
+  EXPECT_TRUE(Make(3.0, Knob::kStep).series.verdict.finding);
+  EXPECT_TRUE(Make(5.0, Knob::kStep).series.verdict.finding);
   EXPECT_FALSE(Make(1.5, Knob::kBoth, true).series.verdict.finding);
   EXPECT_TRUE(Make(4.0, Knob::kBoth, true).series.verdict.finding);
   EXPECT_FALSE(Make(1.0, Knob::kStep, true).series.verdict.finding);
@@ -111,7 +114,7 @@ TEST(Judge, OrdersOfTheStockEngineWithOneKnobFixedAreThoseOfChanges) {
 TEST(Judge, APoseOfWrongOrderIsAFindingThoughTheForcesAreRight) {
   Manufactured m = Make(4.0);
   EXPECT_FALSE(m.series.pose_verdict.finding);
-  for (ConvergencePoint& point : m.series.points) point.pose_m = 1e-4 * point.step_s;
+  for (ConvergencePoint& point : m.series.points) point.pose_m = std::pow(point.step_s, 3.0);
   Judge(Classes(), &m.series);
   EXPECT_TRUE(m.series.pose_verdict.finding);
   ConvergenceReport report;

@@ -115,7 +115,8 @@ TEST(Richardson, RemovesTheLeadingErrorAndItsIndexCoversWhatIsLeft) {
   const OrderFit fit = Fit(errors);
   const Richardson r = MakeRichardson(1e-3, 5e-4, fit, {2.0, 2.0});
   EXPECT_EQ(r.safety, 1.25);
-  EXPECT_EQ(r.order, 2.0);  // 2.1 is observed; more than the scheme has is not believed
+  EXPECT_EQ(r.order, 2.0);  // 2.1 is observed; more than the scheme has is not believed …
+  EXPECT_EQ(MakeRichardson(1e-3, 5e-4, fit, {2.0, 6.0}).order, 2.0);  // … near step zero
   EXPECT_NEAR(r.factor, 1.0 / 3.0, 1e-12);
   const double difference = f(5e-4) - f(1e-3);
   const double extrapolated = f(5e-4) + r.factor * difference;

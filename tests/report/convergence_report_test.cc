@@ -27,7 +27,7 @@ ConvergenceReport WrongOrder() {
 
 TEST(ConvergenceReport, TheTableNamesTheFindingTheOrdersAndTheRunThatFailed) {
   const std::string text = ToText(WrongOrder());
-  for (const char* part : {"robot / case: FINDING", "order 2.00 ± 0.00, expected 4: too low",
+  for (const char* part : {"robot / case: FINDING", "order 2.00 ± 0.00, expected 4 to 6: too low",
                            "no result at step 0.0005 s", "diverged", "1.60e-05"}) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
