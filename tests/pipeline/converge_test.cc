@@ -49,6 +49,18 @@ TEST(Converge, BreaksOfTheMotionAreKeptApart) {
   EXPECT_NEAR(Find(outcome, "corrected_both").breaks_fit.order, 4.0, kOrderTolerance);
 }
 
+TEST(Converge, AtRestThereIsNothingButRoundOff) {
+  for (const char* scenario : {"cabin_robot/static", "spr_tripod/static"}) {
+    const ConvergeOutcome outcome = Study(scenario);
+    EXPECT_EQ(outcome.exit_code, 0) << scenario << outcome.failure;
+    EXPECT_FALSE(Find(outcome, "corrected_both").verdict.judged) << scenario;
+    for (const ConvergencePoint& point : Find(outcome, "corrected_both").points) {
+      EXPECT_LT(point.error.smooth, 1e-12) << scenario << " " << point.step_s;
+      EXPECT_LT(point.error.breaks, 1e-12) << scenario << " " << point.step_s;
+    }
+  }
+}
+
 TEST(Converge, AMotionTooFastForATimeConstantEndsInAFinding) {
   // 20 Hz: stock MuJoCo's time constants of 2 to 32 ms are not small against a period.
   ConvergeOptions options{.steps_s = {4e-3, 2e-3, 1e-3}};
