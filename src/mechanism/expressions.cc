@@ -95,6 +95,9 @@ ExpressionResult Compute(const std::string& text, const std::map<std::string, do
               .error = fmt::format("gives {}, a finite number is needed", value),
               .hint = "look for a root of a negative number or a division by zero"};
     }
+    if (const std::string why = WhyNoNumber(value); !why.empty()) {
+      return {.value = {}, .error = fmt::format("gives {}, which {}", value, why), .hint = ""};
+    }
     return {.value = value, .error = "", .hint = ""};
   } catch (const mu::ParserError& e) {
     return {.value = {}, .error = "is no expression: " + e.GetMsg(), .hint = ""};
@@ -178,8 +181,9 @@ ExpressionResult Scope::Use(const std::string& name) {
 
 ExpressionResult Scope::Evaluate(const std::string& expression) {
   if (const auto number = PlainNumber(expression)) {
-    if (std::isfinite(*number)) return {.value = number, .error = "", .hint = ""};
-    return {.value = {}, .error = "is not a finite number", .hint = ""};
+    const std::string why = WhyNoNumber(*number);
+    if (why.empty()) return {.value = number, .error = "", .hint = ""};
+    return {.value = {}, .error = why, .hint = ""};
   }
   if (expression.size() > kMaxExpression) {
     return {.value = {}, .error = "is too long for an expression", .hint = ""};
@@ -211,6 +215,12 @@ std::vector<std::string> Scope::Names() const {
       outer_ == nullptr ? std::vector<std::string>{"pi"} : outer_->Names();
   for (const auto& [name, entry] : entries_) names.push_back(name);
   return names;
+}
+
+std::string WhyNoNumber(double value) {
+  if (!std::isfinite(value)) return "is not a finite number";
+  if (std::abs(value) <= kLargestNumber) return "";
+  return fmt::format("violates |number| <= {:g}", kLargestNumber);
 }
 
 }  // namespace mbv

@@ -56,6 +56,11 @@ class Scope {
   std::vector<std::string> evaluating_;  // chain of names, to find cycles
 };
 
+/// Larger numbers lose what they are added to, and their squares overflow sooner or later.
+inline constexpr double kLargestNumber = 1e15;
+/// Empty if a model may contain this number, else why not ("is not a finite number").
+[[nodiscard]] std::string WhyNoNumber(double value);
+
 /// Empty if `name` may name a parameter, else why not ("'2a' is no name: …").
 [[nodiscard]] std::string WhyNoParameterName(const std::string& name);
 

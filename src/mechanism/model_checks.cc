@@ -15,10 +15,6 @@ namespace mbv {
 
 namespace {
 
-// Larger numbers lose the smaller ones beside them, and their squares overflow sooner or later.
-constexpr double kLargestLength_m = 1e9;
-constexpr double kLargestMass_kg = 1e15;
-
 struct Reason {
   std::string text;  // empty: nothing wrong
   std::string hint;
@@ -47,32 +43,21 @@ Reason WhyNotPhysical(const Body& body) {
   return {};
 }
 
-// Values that are not finite are reported where they are read.
+// Numbers of URDF, which are not expressions.
 Reason WhyTooLarge(const Body& body) {
-  if (body.mass > kLargestMass_kg) {
-    return {fmt::format("mass = {} violates mass <= {:g} kg", body.mass, kLargestMass_kg), ""};
-  }
-  const auto far = [](const Vec3& p) {
-    return p.allFinite() && p.cwiseAbs().maxCoeff() > kLargestLength_m;
+  double largest = body.mass;
+  const auto look = [&](const Vec3& p) {
+    if (p.allFinite()) largest = std::max(largest, p.cwiseAbs().maxCoeff());
   };
-  const std::string hint = "lengths are in metres";
-  if (far(body.p_BoBcm_B)) {
-    return {fmt::format("com is farther away than {:g} m", kLargestLength_m), hint};
-  }
-  for (const NamedFrame& frame : body.frames) {
-    if (!far(frame.X_BF.translation())) continue;
-    return {fmt::format("frame '{}' is farther away than {:g} m", frame.name, kLargestLength_m),
-            hint};
-  }
-  return {};
+  look(body.p_BoBcm_B);
+  for (const NamedFrame& frame : body.frames) look(frame.X_BF.translation());
+  if (largest <= kLargestNumber) return {};
+  return {fmt::format("{} {}", largest, WhyNoNumber(largest)), ""};
 }
 
 }  // namespace
 
 void ModelReader::CheckMasses() {
-  if (const Reason reason = WhyTooLarge(mechanism_.bodies.front()); !reason.text.empty()) {
-    yaml_.AddAt(Severity::kError, 0, 0, "world: " + reason.text, reason.hint);
-  }
   for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
     const Body& body = mechanism_.bodies[b];
     if (!std::isfinite(body.mass)) continue;  // already reported

@@ -170,7 +170,8 @@ void ModelReader::ApplyOverrides(const Block& block) {
 
 void ModelReader::CheckOverrides() {
   for (const auto& [name, value] : options_.overrides) {
-    if (override_used_[name] && std::isfinite(value)) continue;
+    const std::string why = WhyNoNumber(value);
+    if (override_used_[name] && why.empty()) continue;
     Finding finding;
     if (const auto place = options_.override_places.find(name);
         place != options_.override_places.end()) {
@@ -178,7 +179,7 @@ void ModelReader::CheckOverrides() {
     }
     finding.severity = Severity::kError;
     if (override_used_[name]) {
-      finding.message = fmt::format("parameter {} = {} is not a finite number", name, value);
+      finding.message = fmt::format("parameter {} = {} {}", name, value, why);
     } else {
       finding.message = fmt::format("{} has no parameter '{}'", yaml_.file(), name);
       const std::string near = ClosestWord(name, known_parameters_);

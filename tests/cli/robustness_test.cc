@@ -52,16 +52,16 @@ TEST_F(RobustnessTest, NumbersBeyondAllBoundsAreRefusedWithTheirKey) {
   for (const auto& [set, message] : std::vector<std::pair<std::string, std::string>>{
            {"parameters.crank=.nan", "parameters.crank = '.nan' is not a finite number"},
            {"parameters.crank=-.inf", "parameters.crank = '-.inf' is not a finite number"},
-           {"parameters.crank=1e300", "bodies.crank: frame 'end' is farther away than 1e+09 m"},
-           {"parameters.offset=1e300", "world: frame 'rail' is farther away than 1e+09 m"},
-           {"parameters.m_crank=1e300", "bodies.crank: mass = 1e+300 violates mass <= 1e+15 kg"},
+           {"parameters.crank=1e300", "parameters.crank = '1e300' violates |number| <= 1e+15"},
+           {"parameters.offset=-1e16", "parameters.offset = '-1e16' violates |number| <= 1e+15"},
+           {"parameters.m_crank=1e300", "parameters.m_crank = '1e300' violates |number| <= 1e+15"},
            {"parameters.rod=1e-310", "violate I > 0"},
            {"motion.duration_s=.inf", "motion.duration_s = '.inf' is not a finite number"},
-           {"motion.duration_s=1e300", "violate 1 <= duration_s/sample_s <= 1e+06"},
+           {"motion.duration_s=1e12", "violate 1 <= duration_s/sample_s <= 1e+06"},
            {"motion.sample_s=1e-310", "violate 1 <= duration_s/sample_s <= 1e+06"},
            {"simulation.step_s=1e-12", "violates motion.duration_s / step_s <= 1e+07"},
            {"simulation.step_s=1e-310", "violates motion.duration_s / step_s <= 1e+07"},
-           {"simulation.step_s=1e300", "n · step_s"},
+           {"simulation.step_s=1e12", "n · step_s"},
        }) {
     const ProgramResult result = mbverify(Run(std::string(kScenario) + " --set " + set));
     EXPECT_EQ(result.exit_code, 2) << set << "\n" << result.err;
@@ -211,7 +211,7 @@ TEST_F(RobustnessTest, AFolderWithoutFilesIsNotFoundInOrder) {
 
 TEST_F(RobustnessTest, PictureSizesAreWholeNumbersWithinBounds) {
   for (const std::string& size : {std::string("640.5x480"), std::string("10x480"),
-                                  std::string("1e300x480"), std::string("480x9000")}) {
+                                  std::string("1e9x480"), std::string("480x9000")}) {
     const ProgramResult result =
         mbverify("render --at 0 --out '" + mbverify.Out() + "' --size " + size + " " + kScenario);
     EXPECT_EQ(result.exit_code, 2) << size;
