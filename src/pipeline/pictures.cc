@@ -69,10 +69,15 @@ Caption CaptionOf(const Report& report) {
                   .detail = {},
                   .status = ToText(report.comparison.verdict)};
   if (const PairComparison* pair = MainPair(report.comparison)) {
+    const std::string witnesses = fmt::format("{} against {}", pair->measured, pair->truth);
     const auto force = pair->metrics.find(Metric::kForceNrmse);
+    const auto place = pair->metrics.find(Metric::kPoseM);
     if (force != pair->metrics.end()) {
-      caption.detail = fmt::format("drive forces: {} against {}, NRMSE {:.1e}", pair->measured,
-                                   pair->truth, force->second.value);
+      caption.detail =
+          fmt::format("drive forces: {}, NRMSE {:.1e}", witnesses, force->second.value);
+    } else if (place != pair->metrics.end()) {
+      caption.detail =
+          fmt::format("motion: {}, outputs within {:.1e} m", witnesses, place->second.value);
     }
   }
   caption.mood = report.comparison.verdict == Verdict::kAgree      ? Caption::Mood::kGood
