@@ -56,8 +56,8 @@ class Scope {
   std::vector<std::string> evaluating_;  // chain of names, to find cycles
 };
 
-/// Larger numbers lose what they are added to, and their squares overflow sooner or later.
-inline constexpr double kLargestNumber = 1e15;
+/// Products of a few larger numbers overflow.
+inline constexpr double kLargestNumber = 1e30;
 /// Empty if a model may contain this number, else why not ("is not a finite number").
 [[nodiscard]] std::string WhyNoNumber(double value);
 

@@ -15,6 +15,10 @@ namespace mbv {
 
 namespace {
 
+// Beside larger ones, usual masses and lengths are lost in a sum.
+constexpr double kLargestMass_kg = 1e15;
+constexpr double kLargestLength_m = 1e12;
+
 struct Reason {
   std::string text;  // empty: nothing wrong
   std::string hint;
@@ -43,16 +47,21 @@ Reason WhyNotPhysical(const Body& body) {
   return {};
 }
 
-// Numbers of URDF, which are not expressions.
 Reason WhyTooLarge(const Body& body) {
-  double largest = body.mass;
-  const auto look = [&](const Vec3& p) {
-    if (p.allFinite()) largest = std::max(largest, p.cwiseAbs().maxCoeff());
+  if (body.mass > kLargestMass_kg) {
+    return {fmt::format("mass = {} violates mass <= {:g} kg", body.mass, kLargestMass_kg), ""};
+  }
+  const auto far = [](const Vec3& p) {
+    return p.allFinite() && p.cwiseAbs().maxCoeff() > kLargestLength_m;
   };
-  look(body.p_BoBcm_B);
-  for (const NamedFrame& frame : body.frames) look(frame.X_BF.translation());
-  if (largest <= kLargestNumber) return {};
-  return {fmt::format("{} {}", largest, WhyNoNumber(largest)), ""};
+  const std::string hint = fmt::format("within {:g} m, lengths are in metres", kLargestLength_m);
+  if (far(body.p_BoBcm_B)) return {"its centre of mass is too far away", hint};
+  for (const NamedFrame& frame : body.frames) {
+    if (far(frame.X_BF.translation())) {
+      return {fmt::format("its frame '{}' is too far away", frame.name), hint};
+    }
+  }
+  return {};
 }
 
 }  // namespace

@@ -79,12 +79,12 @@ TEST(Expressions, NonFiniteResultsAreRefused) {
 
 TEST(Expressions, NumbersBeyondBoundsAreRefused) {
   Scope scope;
-  for (const char* text : {"1e16", "-2e15", "10^15 + 1", "-1e300"}) {
+  for (const char* text : {"1e31", "-2e30", "10^30 * 1.1", "-1e300"}) {
     const ExpressionResult result = scope.Evaluate(text);
     EXPECT_FALSE(result.value) << text;
-    EXPECT_NE(result.error.find("violates |number| <= 1e+15"), std::string::npos) << result.error;
+    EXPECT_NE(result.error.find("violates |number| <= 1e+30"), std::string::npos) << result.error;
   }
-  EXPECT_EQ(scope.Evaluate("-1e15").value, -1e15);
+  EXPECT_EQ(scope.Evaluate("-1e30").value, -1e30);
 }
 
 TEST(Expressions, WhatIsNoExpressionIsRefusedWithoutThrowing) {
