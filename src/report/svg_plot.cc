@@ -14,8 +14,8 @@ namespace mbv {
 namespace {
 
 // Colour-blind safe line colours (Okabe and Ito).
-constexpr std::array<const char*, 7> kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                                "#e69f00", "#56b4e9", "#000000"};
+constexpr std::array<const char*, 8> kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
+                                                "#e69f00", "#56b4e9", "#000000", "#888888"};
 constexpr double kWidth = 720, kHeight = 520;
 constexpr double kRoundOff = 1e-9;  // a smaller relative range is shown as a constant
 constexpr int kMostTicks = 16;
@@ -46,13 +46,18 @@ struct Axis {
   [[nodiscard]] double Px(double v) const {
     return from_px + (Inner(v) - low) / (high - low) * (to_px - from_px);
   }
-  // Round values inside the range: decades, or steps of 1, 2 or 5 times a power of ten.
+  // Round values inside the range: decades (with their doubles and fivefolds where they are few),
+  // or steps of 1, 2 or 5 times a power of ten.
   [[nodiscard]] std::vector<double> Ticks() const {
     std::vector<double> ticks;
     if (log) {
       const int step = std::max(1, static_cast<int>(std::ceil((high - low) / 8)));
-      for (int d = static_cast<int>(std::ceil(low)); d <= high; d += step) {
-        ticks.push_back(std::pow(10.0, d));
+      const bool few = high - low < 2.0;
+      for (int d = static_cast<int>(std::floor(low)); d <= high; d += step) {
+        for (const double factor : {1.0, 2.0, 5.0}) {
+          const double tick = factor * std::pow(10.0, d), inner = Inner(tick);
+          if ((factor == 1.0 || few) && inner >= low && inner <= high) ticks.push_back(tick);
+        }
       }
       return ticks;
     }
@@ -69,14 +74,14 @@ struct Axis {
   }
 };
 
-std::string Header(const std::string& title) {
+std::string Header(const std::string& title, double height = kHeight) {
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
       "height=\"{1}\" font-family=\"sans-serif\" font-size=\"13\" "
       "role=\"img\">\n<title>{2}</title>\n"
       "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
       "<text x=\"{3}\" y=\"26\" font-size=\"16\">{2}</text>\n",
-      kWidth, kHeight, Escape(title), kLeft);
+      kWidth, height, Escape(title), kLeft);
 }
 
 std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
@@ -137,6 +142,32 @@ std::string Curve(const PlotLine& line, const char* color, const Axis& x, const 
                      color, dots);
 }
 
+struct LegendEntry {
+  std::string label;
+  const char* color = nullptr;
+};
+
+// Below the axes, in two columns if the labels are short; makes the figure higher.
+std::string Legend(const std::vector<LegendEntry>& entries, double* height) {
+  constexpr double kRow = 18, kColumn = 312;
+  constexpr size_t kShort = 40;  // characters that fit into a column
+  const bool two = std::all_of(entries.begin(), entries.end(), [](const LegendEntry& entry) {
+    return entry.label.size() <= kShort;
+  });
+  const size_t columns = two ? 2 : 1;
+  std::string svg;
+  for (size_t i = 0; i < entries.size(); ++i) {
+    const double left = kLeft + kColumn * static_cast<double>(i % columns);
+    const double y = kHeight + 4 + kRow * static_cast<double>(i / columns);
+    svg += fmt::format(
+        "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"2.5\"/>"
+        "<text x=\"{4}\" y=\"{5}\">{6}</text>\n",
+        left, left + 22, y - 4, entries[i].color, left + 28, y, Escape(entries[i].label));
+  }
+  *height += kRow * static_cast<double>((entries.size() + columns - 1) / columns);
+  return svg;
+}
+
 // Dark blue over green to yellow (a short version of viridis).
 std::string MapColor(double t) {
   constexpr std::array<std::array<double, 3>, 5> stops = {
@@ -192,30 +223,17 @@ std::string ToSvg(const LinePlot& plot) {
   x.Pad();
   y.Pad();
   if (plot.equal_scale) EqualScale(&x, &y);
-  std::string svg = Header(plot.title) + Frame(x, y, plot.x_label, plot.y_label);
-  std::string legend;
-  size_t longest = 0;
-  double legend_y = kTop + 18;
+  std::string curves;
+  std::vector<LegendEntry> legend;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
     const char* color = kColors[i % kColors.size()];
-    svg += Curve(plot.lines[i], color, x, y);
-    if (plot.lines[i].label.empty()) continue;
-    longest = std::max(longest, plot.lines[i].label.size());
-    legend += fmt::format(
-        "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"2.5\"/>"
-        "<text x=\"{4}\" y=\"{5}\">{6}</text>\n",
-        kLeft + 10, kLeft + 32, legend_y - 4, color, kLeft + 38, legend_y,
-        Escape(plot.lines[i].label));
-    legend_y += 17;
+    curves += Curve(plot.lines[i], color, x, y);
+    if (!plot.lines[i].label.empty()) legend.push_back({plot.lines[i].label, color});
   }
-  // Curves may run behind the legend.
-  if (!legend.empty()) {
-    svg += fmt::format(
-        "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#ffffff\" "
-        "fill-opacity=\"0.8\"/>\n",
-        kLeft + 4, kTop + 3, 44 + 7.5 * static_cast<double>(longest), legend_y - kTop - 13);
-  }
-  return svg + legend + "</svg>\n";
+  double height = kHeight;
+  const std::string below = Legend(legend, &height);
+  return Header(plot.title, height) + Frame(x, y, plot.x_label, plot.y_label) + curves + below +
+         "</svg>\n";
 }
 
 std::string ToSvg(const MapPlot& plot) {

@@ -25,6 +25,26 @@ TEST(SvgPlot, EachLineIsOnePathAndMarkersAreDots) {
   EXPECT_NE(svg.find("a &lt; b &amp; c"), std::string::npos);
 }
 
+TEST(SvgPlot, TheLegendStandsBelowTheAxesAndHidesNoCurve) {
+  LinePlot plot{.title = "t", .x_label = "x", .y_label = "y", .lines = {}};
+  const std::string bare = ToSvg(plot);
+  EXPECT_NE(bare.find("height=\"520\""), std::string::npos);
+  for (int i = 0; i < 3; ++i) plot.lines.push_back({.label = "line", .points = {{0, i}, {1, i}}});
+  EXPECT_NE(ToSvg(plot).find("height=\"556\""), std::string::npos);  // two rows of two
+  plot.lines[0].label = "a label that is too long for half of the width";
+  EXPECT_NE(ToSvg(plot).find("height=\"574\""), std::string::npos);  // three rows
+}
+
+TEST(SvgPlot, FewDecadesHaveTicksBetween) {
+  LinePlot plot{.title = "t", .x_label = "x", .y_label = "y", .log_x = true, .lines = {}};
+  plot.lines.push_back({.label = "", .points = {{2.5e-4, 0}, {4e-3, 1}}});
+  for (const char* tick : {">0.0005<", ">0.001<", ">0.002<"}) {
+    EXPECT_NE(ToSvg(plot).find(tick), std::string::npos) << tick;
+  }
+  plot.lines[0].points = {{1e-6, 0}, {1, 1}};
+  EXPECT_EQ(ToSvg(plot).find(">2e-05<"), std::string::npos);
+}
+
 TEST(SvgPlot, MissingAndNonPositiveValuesBreakALogarithmicLine) {
   const LinePlot plot{.title = "t",
                       .x_label = "x",
