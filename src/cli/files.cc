@@ -63,7 +63,7 @@ std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& t
   return std::pair{text.substr(0, at), text.substr(at + 1)};
 }
 
-std::string WriteWholeFile(const std::string& path, const std::string& content) {
+int WriteWholeFile(const std::string& path, const std::string& content) {
   const std::string temporary = path + ".tmp-" + std::to_string(getpid());
   errno = 0;
   std::ofstream stream(temporary, std::ios::binary);
@@ -71,10 +71,11 @@ std::string WriteWholeFile(const std::string& path, const std::string& content) 
   stream.close();
   std::error_code error;
   if (stream) fs::rename(temporary, path, error);
-  if (stream && !error) return "";
+  if (stream && !error) return 0;
   const std::string reason = error ? error.message() : std::strerror(errno);
   fs::remove(temporary, error);
-  return fmt::format("cannot write {}: {}", path, reason);
+  fmt::print(stderr, "error: cannot write {}: {}\n", path, reason);
+  return 2;
 }
 
 }  // namespace mbv

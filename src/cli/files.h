@@ -19,7 +19,8 @@ namespace mbv {
 /// "key=value" → pair; empty if there is no '=' or no key.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& text);
 
-/// Writes a file whole or not at all (temporary file, then rename); "" or what went wrong.
-[[nodiscard]] std::string WriteWholeFile(const std::string& path, const std::string& content);
+/// Writes a file whole or not at all (temporary file, then rename). Exit code: 0, or 2 after saying
+/// on standard error what went wrong.
+[[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content);
 
 }  // namespace mbv

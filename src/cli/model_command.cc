@@ -77,10 +77,7 @@ int Model(const ModelArguments& arguments) {
     fmt::print("{}", text);
     return 0;
   }
-  const std::string trouble = WriteWholeFile(arguments.out, text);
-  if (trouble.empty()) return 0;
-  fmt::print(stderr, "error: {}\n", trouble);
-  return 2;
+  return WriteWholeFile(arguments.out, text);
 }
 
 int CheckFiles(const std::vector<std::string>& arguments) {

@@ -55,11 +55,7 @@ int Mutate(const MutateArguments& arguments) {
   fmt::print(stderr, "{}", report.diagnostics.Text());
   if (report.mutations.empty() && report.faults.empty()) return report.exit_code;
   if (!arguments.json.empty()) {
-    const std::string trouble = WriteWholeFile(arguments.json, ToJson(report));
-    if (!trouble.empty()) {
-      fmt::print(stderr, "error: {}\n", trouble);
-      return 2;
-    }
+    if (const int code = WriteWholeFile(arguments.json, ToJson(report)); code != 0) return code;
   }
   fmt::print("{}", ToText(report, arguments.markdown));
   return report.exit_code;

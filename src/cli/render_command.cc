@@ -30,13 +30,11 @@ int Save(const std::string& path, const std::string& content) {
   std::error_code error;
   const std::filesystem::path folder = std::filesystem::path(path).parent_path();
   if (!folder.empty()) std::filesystem::create_directories(folder, error);
-  const std::string trouble =
-      error ? fmt::format("cannot make folder {}: {}", folder.string(), error.message())
-            : WriteWholeFile(path, content);
-  if (!trouble.empty()) {
-    fmt::print(stderr, "error: {}\n", trouble);
+  if (error) {
+    fmt::print(stderr, "error: cannot make folder {}: {}\n", folder.string(), error.message());
     return 2;
   }
+  if (const int code = WriteWholeFile(path, content); code != 0) return code;
   fmt::print("{}\n", path);
   return 0;
 }

@@ -163,9 +163,9 @@ class Mutator {
   // times as much as before until it is.
   void BendFurther(Target target, const BentRun& first, Mutation* m) {
     double unseen = options_.size;
-    BentRun last = first;
+    BentRun last = first, largest;
     if (unseen < kLargestBend) {
-      BentRun largest = RunEitherWay(&target, kLargestBend);
+      largest = RunEitherWay(&target, kLargestBend);
       if (target.relative_to != m->relative_to) unseen = 0.0;  // nothing is known of this way yet
       m->relative_to = target.relative_to;
       if (largest.ran && !largest.detected()) {
@@ -175,7 +175,7 @@ class Mutator {
     }
     for (double size = 10.0 * options_.size; unseen < kLargestBend; size *= 10.0) {
       size = std::min(size, kLargestBend);
-      BentRun run = RunAt(target, size);
+      BentRun run = size < kLargestBend ? RunAt(target, size) : std::move(largest);
       if (!run.ran) break;  // the model itself objects; forces have not seen it up to here
       if (run.detected()) {
         const Best best = BestOf(bench_, run);

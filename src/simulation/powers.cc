@@ -15,38 +15,53 @@ Vec3 VelocityOf(const mjModel& m, const mjData& d, int body, const Vec3& p_W) {
   return V.tail<3>() + V.head<3>().cross(p_W - c);
 }
 
+// Rate of a spring's length [m/s].
+double SpringRate(const ConstraintSystem& system, size_t spring) {
+  const EngineModel& engine = system.engine();
+  const int nv = engine.m->nv;
+  const double* const J = system.data()->ten_J + engine.spring_tendon[spring] * nv;
+  return ConstVecX(J, nv).dot(ConstVecX(system.data()->qvel, nv));
+}
+
 }  // namespace
 
-VecX Powers::Works() const {
-  VecX works(driven.size() + 2);
-  works << driven, loads, dampers;
-  return works;
+void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) {
+  const EngineModel& engine = system.engine();
+  const mjModel& m = *engine.m;
+  const mjData& d = *system.data();
+  const ConstVecX qvel(d.qvel, m.nv);
+  const auto driven = static_cast<Eigen::Index>(engine.driven.size());
+  rates->setZero(driven + 2);
+  for (Eigen::Index k = 0; k < driven; ++k) {
+    const int coordinate = static_cast<int>(k);
+    (*rates)[k] = system.DrivenForce(coordinate) * system.DrivenJacobian(coordinate).dot(qvel);
+  }
+  for (const WorldLoad& load : loads.world()) {
+    const ConstVec3 w(d.cvel + 6 * load.body_id);
+    (*rates)[driven] +=
+        load.moment.dot(w) + load.force.dot(VelocityOf(m, d, load.body_id, load.p_WQ));
+  }
+  for (size_t s = 0; s < engine.spring_tendon.size(); ++s) {
+    const double rate = SpringRate(system, s);
+    (*rates)[driven + 1] -= engine.mechanism->springs[s].damping * rate * rate;
+  }
 }
 
 Powers PowersOf(const ConstraintSystem& system, const Loads& loads) {
   const EngineModel& engine = system.engine();
   const mjModel& m = *engine.m;
   const mjData& d = *system.data();
-  const ConstVecX qvel(d.qvel, m.nv);
   Powers power;
-  power.driven.resize(static_cast<Eigen::Index>(engine.driven.size()));
-  for (int k = 0; k < static_cast<int>(engine.driven.size()); ++k) {
-    power.driven[k] = system.DrivenForce(k) * system.DrivenJacobian(k).dot(qvel);
-  }
-  for (const WorldLoad& load : loads.world()) {
-    const ConstVec3 w(d.cvel + 6 * load.body_id);
-    power.loads += load.moment.dot(w) + load.force.dot(VelocityOf(m, d, load.body_id, load.p_WQ));
-  }
+  WorkRates(system, loads, &power.rates);
   const ConstVec3 g(m.opt.gravity);
   for (int b = 1; b < m.nbody; ++b) {
     power.gravity += m.body_mass[b] * g.dot(VelocityOf(m, d, b, ConstVec3(d.xipos + 3 * b)));
   }
   for (size_t s = 0; s < engine.spring_tendon.size(); ++s) {
     const SpringDamper& spring = engine.mechanism->springs[s];
-    const int tendon = engine.spring_tendon[s];
-    const double rate = ConstVecX(d.ten_J + tendon * m.nv, m.nv).dot(qvel);
-    power.springs -= spring.stiffness * (d.ten_length[tendon] - spring.free_length_m) * rate;
-    power.dampers -= spring.damping * rate * rate;
+    power.springs -= spring.stiffness *
+                     (d.ten_length[engine.spring_tendon[s]] - spring.free_length_m) *
+                     SpringRate(system, s);
   }
   return power;
 }

@@ -10,13 +10,18 @@ namespace mbv::simulation {
 
 /// What is put in by what [W].
 struct Powers {
-  VecX driven;  ///< per driven coordinate: drives, then prescribed joints
-  double loads = 0.0, dampers = 0.0, gravity = 0.0, springs = 0.0;
+  VecX rates;  ///< WorkRates()
+  double gravity = 0.0, springs = 0.0;
 
-  /// The entries that WorkChannels() integrates.
-  [[nodiscard]] VecX Works() const;
+  /// Per driven coordinate: drives, then prescribed joints.
+  [[nodiscard]] auto driven() const { return rates.head(rates.size() - 2); }
+  [[nodiscard]] double loads() const { return rates[rates.size() - 2]; }
+  [[nodiscard]] double dampers() const { return rates[rates.size() - 1]; }
 };
-/// Of velocities, forces and loads last evaluated.
+/// What WorkChannels() integrates, of velocities, forces and loads last evaluated: the driven
+/// coordinates, then loads and dampers [W].
+void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates);
+/// The same and what is stored.
 [[nodiscard]] Powers PowersOf(const ConstraintSystem& system, const Loads& loads);
 
 /// Energies [J]; gravity's counts from the world's origin.

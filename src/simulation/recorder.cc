@@ -258,10 +258,10 @@ void Recorder::RecordAudit(const Loads& loads, const VecX& work,
   mj_rne(&m, system_->data(), 1, work_.data());
   const double energy_rate = ConstVecX(system_->data()->qvel, m.nv).dot(work_) - power.springs;
   const auto drives = static_cast<Eigen::Index>(engine_.mechanism->drives.size());
-  const double base = power.driven.tail(power.driven.size() - drives).sum();
+  const double base = power.driven().tail(power.driven().size() - drives).sum();
   row.segment<12>(audit_column_) << gap.position_m, gap.rotation_rad,
-      power.driven.sum() + power.loads + power.dampers, energy_rate, base, power.loads,
-      power.dampers, power.gravity, power.springs, energy.kinetic, energy.gravity, energy.springs;
+      power.driven().sum() + power.loads() + power.dampers(), energy_rate, base, power.loads(),
+      power.dampers(), power.gravity, power.springs, energy.kinetic, energy.gravity, energy.springs;
   if (work.size() > 0) row.segment(audit_column_ + 12, work.size()) = work.transpose();
 }
 

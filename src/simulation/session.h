@@ -23,7 +23,7 @@ struct Session {
   /// Stores sample i and reports progress now and then.
   void Record(size_t i);
   /// Work rates at the present state, as WorkChannels().
-  [[nodiscard]] VecX WorkRates();
+  [[nodiscard]] const VecX& WorkRates();
   /// Decides, at the present configuration, whether the drives share their forces.
   void FindShared();
   /// Loads and given drive forces at t, for the data's current position, into qfrc_applied.
@@ -39,6 +39,7 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
+  VecX work_rates;      ///< of the state that was asked for last
   bool shared = false;  ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
   Eigen::RowVectorXd record;  ///< one row of the trace

@@ -70,9 +70,10 @@ void Session::Record(size_t i) {
   }
 }
 
-VecX Session::WorkRates() {
+const VecX& Session::WorkRates() {
   const LeastForces least(this);
-  return PowersOf(system, loads).Works();
+  simulation::WorkRates(system, loads, &work_rates);
+  return work_rates;
 }
 
 void Session::FindShared() { shared = !solver.DrivenRowsNotUnique().empty(); }
