@@ -147,10 +147,10 @@ class Collector {
     for (int k = 0; k < kAssemblyTries && fault.wrong.size() < kMostAssemblies; ++k) {
       Mechanism wrong = Disturbed(&random);
       const HomeResult home = SolveHome(&wrong);
-      if (!home.closed || home.drives_moved || !Differs(m_, wrong)) continue;
+      if (!home.closed || home.drives_moved || FirstMoved(m_, wrong).empty()) continue;
       const bool known =
           std::any_of(fault.wrong.begin(), fault.wrong.end(),
-                      [&](const Mechanism& other) { return !Differs(other, wrong); });
+                      [&](const Mechanism& other) { return FirstMoved(other, wrong).empty(); });
       if (!known) fault.wrong.push_back(std::move(wrong));
     }
     if (fault.wrong.empty()) {
@@ -160,7 +160,7 @@ class Collector {
                                 kAssemblyTries));
       return;
     }
-    fault.where = FirstMoved(fault.wrong.front()) + " in another place at home";
+    fault.where = FirstMoved(m_, fault.wrong.front()) + " in another place at home";
     faults_.push_back(std::move(fault));
   }
 
@@ -223,20 +223,12 @@ class Collector {
     return size > 0.0 ? 0.3 * size : 0.1;
   }
 
-  static bool Differs(const Mechanism& a, const Mechanism& b) {
-    for (size_t k = 0; k < a.bodies.size(); ++k) {
+  // The first body that is elsewhere at home; empty where all are in the same place.
+  static std::string FirstMoved(const Mechanism& a, const Mechanism& b) {
+    for (size_t k = 1; k < a.bodies.size(); ++k) {
       const double difference =
           (a.X_WB_home[k].matrix() - b.X_WB_home[k].matrix()).lpNorm<Eigen::Infinity>();
-      if (difference > kOtherPose) return true;
-    }
-    return false;
-  }
-
-  [[nodiscard]] std::string FirstMoved(const Mechanism& other) const {
-    for (size_t b = 1; b < m_.bodies.size(); ++b) {
-      const double difference =
-          (other.X_WB_home[b].matrix() - m_.X_WB_home[b].matrix()).lpNorm<Eigen::Infinity>();
-      if (difference > kOtherPose) return m_.bodies[b].name;
+      if (difference > kOtherPose) return a.bodies[k].name;
     }
     return "";
   }

@@ -301,7 +301,8 @@ void FreeMotion::Watch() {
   if (passage.pivot < kNear * largest_pivot_) passages_.push_back(passage);
 }
 
-// Golden-section search for the smallest pivot.
+// Golden-section search for the smallest pivot. It falls and rises like |t|, so that the time can
+// be found to round-off; Boost's minimiser stops at its root, where a parabola would be flat.
 template <typename StatesAt>
 SingularPassage FreeMotion::Closest(double first_s, double last_s, const StatesAt& states_at) {
   BodyStates states;

@@ -88,8 +88,8 @@ struct CaseResult {
 };
 
 /// Names of the metrics that may be shown first, best first: drive forces (RMS), then stiffness
-/// (worst entry), then velocities (RMS) of a motion that follows from forces; simulated vs
-/// analytic, then the other pairs.
+/// (worst entry), then, of a motion that follows from forces, the place of an output or the
+/// velocities (RMS); simulated vs analytic, then the other pairs.
 [[nodiscard]] std::span<const std::string_view> KeyMetricNames();
 /// The first of these that was measured; null if nothing of the kind was compared.
 [[nodiscard]] const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result);
