@@ -81,7 +81,7 @@ int RunCli(int argc, char** argv) {
   if (std::fflush(stdout) != 0) lost = std::strerror(errno);
   if (lost.empty() && std::ferror(stdout) == 0) return exit_code;
   // Results that nobody can read are not delivered.
-  Complain("error: cannot write to standard output: " + lost);
+  Complain("error: cannot write to standard output" + (lost.empty() ? "" : ": " + lost));
   return 2;
 }
 
