@@ -60,7 +60,8 @@ class TreeBuilder : public YAML::EventHandler {
   struct Level {
     std::shared_ptr<YamlNode> node;
     YAML::anchor_t anchor = 0;
-    YamlNodePtr key;  // waiting for its value
+    YamlNodePtr key;                  // waiting for its value
+    std::map<std::string, int> keys;  // of a map: where each key's entry is
   };
 
   static std::shared_ptr<YamlNode> MakeNode(Kind kind, const YAML::Mark& mark) {
@@ -87,11 +88,11 @@ class TreeBuilder : public YAML::EventHandler {
     if (levels_.size() >= YamlReader::kMaxDepth) {
       throw Stop{mark, fmt::format("nested deeper than {} levels", YamlReader::kMaxDepth)};
     }
-    levels_.push_back({MakeNode(kind, mark), anchor, nullptr});
+    levels_.push_back({MakeNode(kind, mark), anchor, nullptr, {}});
   }
 
   void Close() {
-    const Level level = levels_.back();
+    const Level level = std::move(levels_.back());
     levels_.pop_back();
     if (level.anchor != 0) anchors_[level.anchor] = level.node;
     Add(level.node);
@@ -113,12 +114,13 @@ class TreeBuilder : public YAML::EventHandler {
     } else if (level.key == nullptr) {
       level.key = node;
     } else {
-      AddEntry(level.node.get(), *level.key, node);
+      AddEntry(&level, *level.key, node);
       level.key = nullptr;
     }
   }
 
-  void AddEntry(YamlNode* map, const YamlNode& key, const YamlNodePtr& value) {
+  void AddEntry(Level* level, const YamlNode& key, const YamlNodePtr& value) {
+    std::vector<YamlEntry>& entries = level->node->entries;
     if (!key.is_scalar() || key.text.empty()) {
       reader_->Error(key, fmt::format("a key is {}, a word is needed", Describe(key)));
       return;
@@ -128,27 +130,19 @@ class TreeBuilder : public YAML::EventHandler {
                      "write equal groups once under 'parts' and place them by 'instances'");
       return;
     }
-    const int known = FindKey(map, key.text);
-    if (known >= 0) {
+    const auto [known, added] = level->keys.emplace(key.text, static_cast<int>(entries.size()));
+    if (!added) {
       reader_->Error(key, fmt::format("the key {} is already given in line {}", Describe(key),
-                                      map->entries[known].line));
+                                      entries[known->second].line));
       return;
     }
-    keys_[map].emplace(key.text, static_cast<int>(map->entries.size()));
-    map->entries.push_back({key.text, key.line, key.column, value});
-  }
-
-  int FindKey(const YamlNode* map, const std::string& key) {
-    const auto& keys = keys_[map];
-    const auto found = keys.find(key);
-    return found == keys.end() ? -1 : found->second;
+    entries.push_back({key.text, key.line, key.column, value});
   }
 
   YamlReader* reader_;
   YamlNodePtr root_;
   std::vector<Level> levels_;
   std::map<YAML::anchor_t, YamlNodePtr> anchors_;
-  std::map<const YamlNode*, std::map<std::string, int>> keys_;
 };
 
 }  // namespace

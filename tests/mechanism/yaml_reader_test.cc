@@ -86,6 +86,30 @@ TEST(YamlReader, DuplicateMergeAndOddKeysAndTagsAreFindings) {
             "  hint: leave the tag out\n");
 }
 
+// What is dropped leaves its memory to what follows; that must not be taken for one another.
+TEST(YamlReader, KeysOfDroppedValuesAreForgotten) {
+  const std::string block = "{k0: {x: {kind: a, y: 1}}, k1: {x: {kind: b, y: 2}}}\n";
+  for (const std::string& dropped :
+       {"<<: " + block, "a: 0\na: " + block, "? [1]\n: " + block, "? " + block + ": 1\n",
+        "\"\": " + block, "a: " + block + "a: " + block}) {
+    for (int copies = 1; copies <= 8; ++copies) {
+      std::string text;
+      for (int i = 0; i < copies; ++i) text += dropped;
+      text += "b: " + block;
+      YamlReader reader("a.yaml");
+      const YamlNodePtr root = reader.Parse(text);
+      ASSERT_TRUE(root) << text;
+      EXPECT_TRUE(reader.has_errors()) << text;
+      for (const char* key : {"k0", "k1"}) {
+        const YamlNode* kept = root->Find("b")->Find(key);
+        ASSERT_NE(kept, nullptr) << text;
+        ASSERT_NE(kept->Find("x"), nullptr) << text;
+        EXPECT_EQ(kept->Find("x")->entries.size(), 2u) << text;
+      }
+    }
+  }
+}
+
 TEST(YamlReader, AliasesAreReplaced) {
   YamlReader reader("a.yaml");
   const YamlNodePtr root = reader.Parse("a: &v [1, 2]\nb: *v\n");
