@@ -6,15 +6,6 @@ function(mbv_compile_options target)
   # are wrong in GCC 12 for std::string and Eigen at -O3 (GCC bugs 105651, 105562).
   target_compile_options(${target} PRIVATE -Wall -Wextra -Wpedantic -Werror -ffp-contract=off
                                            -Wno-restrict -Wno-maybe-uninitialized)
-  # Broken memory ends the program at once instead of going on with wrong numbers: overwritten stack
-  # frames, indices beyond a container, overlong copies. No path of the build in what is built.
-  target_compile_options(${target} PRIVATE -fstack-protector-strong
-                                           -ffile-prefix-map=${CMAKE_SOURCE_DIR}/=)
-  target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
-  target_compile_options(${target} PRIVATE
-                         $<$<CONFIG:Release>:-U_FORTIFY_SOURCE>
-                         $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
-  target_link_options(${target} PRIVATE LINKER:-z,relro,-z,now)
 endfunction()
 
 function(mbv_layer folder)
