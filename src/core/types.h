@@ -6,7 +6,7 @@
 // F = [m; f] has the moment first. W is the world. SI units and radians.
 #pragma once
 
-#include <Eigen/Dense>
+#include "core/eigen_instances.h"
 
 namespace mbv {
 

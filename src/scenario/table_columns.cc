@@ -163,7 +163,7 @@ class Mapper {
     if (text.empty()) {
       if (name == "timems") mapping_.time_factor = 1e-3;
       if (name != "timems" && name != "times" && name != "timesec") {
-        mapping_.notes.push_back("its time has no unit: seconds are assumed");
+        mapping_.notes.emplace_back("its time has no unit: seconds are assumed");
       }
       return;
     }

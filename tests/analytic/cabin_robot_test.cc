@@ -9,6 +9,7 @@
 #include "analytic/cabin_robot/cabin_dynamics.h"
 #include "core/spatial.h"
 #include "mechanism/load_model.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -21,7 +22,7 @@ constexpr PlanarGeometry kLinks{0.520, 0.420, 0.500, 0.280};
 Mechanism LoadCabin(std::map<std::string, double> overrides = {}) {
   LoadOptions options;
   options.overrides = std::move(overrides);
-  LoadResult result = LoadModel(MBV_SOURCE_DIR "/models/cabin_robot/model.yaml", options);
+  LoadResult result = LoadModel(SourcePath("/models/cabin_robot/model.yaml"), options);
   EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
   return *result.mechanism;
 }

@@ -8,11 +8,12 @@
 #include "mechanism/mobility.h"
 #include "reference/reference.h"
 #include "tests/analytic/scara_robot_fixture.h"
+#include "tests/source_dir.h"
 
 namespace mbv::scara {
 namespace {
 
-const std::string kModelFile = MBV_SOURCE_DIR "/models/scara_robot/model.yaml";
+const std::string kModelFile = SourcePath("/models/scara_robot/model.yaml");
 
 std::string ModelText() {
   std::ifstream file(kModelFile);

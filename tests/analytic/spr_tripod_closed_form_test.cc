@@ -11,6 +11,7 @@
 #include "reference/reference.h"
 #include "spr_tripod_model.h"
 #include "tests/analytic/allocation_counter.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -79,7 +80,7 @@ TEST(SprTripodClosedForm, DefaultPathReachesTheTabulatedExtremes) {
 }
 
 Mechanism ShippedModel() {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/spr_tripod/model.yaml");
+  LoadResult loaded = LoadModel(SourcePath("/models/spr_tripod/model.yaml"));
   EXPECT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   return *std::move(loaded.mechanism);
 }

@@ -5,6 +5,7 @@
 #include "mechanism/load_model.h"
 #include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
+#include "tests/source_dir.h"
 
 namespace mbv::stabilizing_platform {
 namespace {
@@ -213,7 +214,7 @@ TEST(StabilizingPlatformClosedForm, PrintedSignInMChangesTheForces) {
 class ShippedModel : public testing::Test {
  protected:
   void SetUp() override {
-    LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/stabilizing_platform/model.yaml");
+    LoadResult loaded = LoadModel(SourcePath("/models/stabilizing_platform/model.yaml"));
     ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
     mechanism_ = std::move(*loaded.mechanism);
   }

@@ -8,6 +8,7 @@
 
 #include "mechanism/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
+#include "tests/source_dir.h"
 
 namespace mbv::stabilizing_platform {
 namespace {
@@ -15,7 +16,7 @@ namespace {
 Mechanism Load(const std::map<std::string, double>& overrides = {}) {
   LoadOptions options;
   options.overrides = overrides;
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/stabilizing_platform/model.yaml", options);
+  LoadResult loaded = LoadModel(SourcePath("/models/stabilizing_platform/model.yaml"), options);
   MBV_DEMAND(loaded.mechanism.has_value(), loaded.diagnostics.Text());
   return std::move(*loaded.mechanism);
 }

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "core/types.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -73,7 +74,7 @@ TEST(AuditMarkdown, IsTheSameForResidualsThatDifferByRoundoff) {
 
 // Update with MBV_UPDATE_GOLDEN=1.
 TEST(EquationAudit, DocumentIsInStep) {
-  const std::string root = MBV_SOURCE_DIR;
+  const std::string root = kSourceDir;
   const std::string path = root + "/docs/equation_audit.md";
   const std::string text = AuditDocument(root + "/models");
   if (std::getenv("MBV_UPDATE_GOLDEN") != nullptr) std::ofstream(path) << text;

@@ -11,11 +11,12 @@
 
 #include "audit/scara_audit.h"
 #include "mechanism/load_model.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
-constexpr const char* kModels = MBV_SOURCE_DIR "/models";
+const std::string kModels = SourcePath("/models");
 
 const AuditTable& Table() {
   static const AuditTable table = AuditScaraRobot(kModels);

@@ -1,6 +1,7 @@
 // The 3-SPR mechanism's audit: every numbered equation has its row, the known errors are found in
 // their known size, and every corrected form is confirmed.
 #include "audit/spr_tripod_audit.h"
+#include "tests/source_dir.h"
 
 #include <gtest/gtest.h>
 
@@ -10,7 +11,7 @@ namespace mbv {
 namespace {
 
 const AuditTable& Table() {
-  static const AuditTable table = AuditSprTripod(MBV_SOURCE_DIR "/models");
+  static const AuditTable table = AuditSprTripod(SourcePath("/models"));
   return table;
 }
 
@@ -74,7 +75,7 @@ TEST(SprTripodAudit, PrintedPositionsHoldInAFrameTurnedBy150Degrees) {
 
 TEST(SprTripodAudit, ABentEquationIsFoundOut) {
   // The limits are close enough to see a dimension that is 1e-9 m wrong.
-  spr_tripod_audit::Case c = spr_tripod_audit::MakeCase(MBV_SOURCE_DIR "/models");
+  spr_tripod_audit::Case c = spr_tripod_audit::MakeCase(SourcePath("/models"));
   c.geometry.a += 1e-9;
   int unconfirmed = 0;
   for (const AuditRow& row : spr_tripod_audit::PositionRows(c)) {

@@ -8,11 +8,12 @@
 #include <set>
 
 #include "audit/platform_audit.h"
+#include "tests/source_dir.h"
 
 namespace mbv::platform_audit {
 namespace {
 
-const std::string kModels = std::string(MBV_SOURCE_DIR) + "/models";
+const std::string kModels = std::string(kSourceDir) + "/models";
 
 const AuditTable& Table() {
   static const AuditTable table = AuditStabilizingPlatform(kModels);

@@ -9,11 +9,12 @@
 #include "audit/cabin_audit.h"
 #include "audit/scara_audit.h"
 #include "audit/stiffness_truth.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
-constexpr const char* kModels = MBV_SOURCE_DIR "/models";
+const std::string kModels = SourcePath("/models");
 
 std::set<std::string> With(const std::vector<AuditRow>& rows, AuditVerdict verdict) {
   std::set<std::string> equations;

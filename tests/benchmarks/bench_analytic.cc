@@ -5,12 +5,13 @@
 #include "core/demand.h"
 #include "mechanism/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 Mechanism Shipped(const std::string& name, const std::string& file = "model.yaml") {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/" + name + "/" + file);
+  LoadResult loaded = LoadModel(SourcePath("/models/") + name + "/" + file);
   MBV_DEMAND(loaded.mechanism.has_value(), loaded.diagnostics.Text());
   return std::move(*loaded.mechanism);
 }

@@ -6,12 +6,13 @@
 #include "mechanism/mobility.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 ScenarioResult Load(benchmark::State& state, const std::string& scenario) {
-  ScenarioResult loaded = LoadScenario(MBV_SOURCE_DIR "/scenarios/" + scenario);
+  ScenarioResult loaded = LoadScenario(SourcePath("/scenarios/") + scenario);
   if (!loaded.scenario || !loaded.mechanism) state.SkipWithError("scenario does not load");
   return loaded;
 }

@@ -11,6 +11,7 @@
 #include "scenario/load_scenario.h"
 #include "simulation/engine_model.h"
 #include "simulation/simulation.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -22,7 +23,7 @@ struct Platform {
   CommandSample command;
 
   Platform() {
-    ScenarioResult result = LoadScenario(std::string(MBV_SOURCE_DIR) +
+    ScenarioResult result = LoadScenario(std::string(kSourceDir) +
                                          "/scenarios/stabilizing_platform/sea_state.yaml");
     MBV_DEMAND(result.mechanism.has_value(), result.diagnostics.Text());
     mechanism = *std::move(result.mechanism);

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "tests/cli/program.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -122,11 +123,11 @@ TEST_F(CliTest, TheWorstScenarioDecidesTheExitCode) {
 
 TEST_F(CliTest, FoldersStandForTheirScenariosButNotForThoseThatMustFail) {
   fs::create_directories(mbverify.folder() / "mine" / "must_fail");
-  const fs::path source = MBV_SOURCE_DIR;
+  const fs::path source = kSourceDir;
   fs::copy(source / kGood, mbverify.folder() / "mine" / "a.yaml");
   fs::copy(source / kDisagrees, mbverify.folder() / "mine" / "must_fail" / "b.yaml");
   std::ofstream(mbverify.folder() / "mine" / "other.yaml") << "a: 1\n";
-  setenv("MBVERIFY_MODELS", MBV_SOURCE_DIR "/models", 1);
+  setenv("MBVERIFY_MODELS", SourcePath("/models").c_str(), 1);
   const ProgramResult result =
       mbverify(RunArguments(mbverify, "-q " + (mbverify.folder() / "mine").string()));
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
@@ -166,8 +167,8 @@ TEST_F(CliTest, AKilledRunLeavesTheOldResultWhole) {
   const std::string before = ReadAll(summary);
   // Killed somewhere on the way; the time is meant to hit different stages.
   for (const char* limit : {"0.05", "0.1", "0.15", "0.2"}) {
-    const std::string command = std::string("cd '" MBV_SOURCE_DIR "' && timeout -s KILL ") + limit +
-                                " '" MBV_BINARY_DIR "/mbverify' " + RunArguments(mbverify, kGood) +
+    const std::string command = std::string("cd '" + std::string(kSourceDir) + "' && timeout -s KILL ") + limit +
+                                " '" + std::string(kBinaryDir) + "/mbverify' " + RunArguments(mbverify, kGood) +
                                 " >/dev/null 2>&1";
     const int status = std::system(command.c_str());
     (void)status;  // whole or killed, the summary must be one of a complete run

@@ -9,6 +9,8 @@
 #include <sstream>
 #include <string>
 
+#include "tests/source_dir.h"
+
 namespace mbv {
 
 inline std::string ReadAll(const std::filesystem::path& path) {
@@ -53,10 +55,10 @@ class Program {
 
  private:
   [[nodiscard]] static std::string Call(const std::string& arguments) {
-    return "'" MBV_BINARY_DIR "/mbverify' " + arguments;
+    return "'" + std::string(kBinaryDir) + "/mbverify' " + arguments;
   }
   [[nodiscard]] ProgramResult Execute(const std::string& call) const {
-    const std::string command = "cd '" MBV_SOURCE_DIR "' && " + call + " >'" +
+    const std::string command = "cd '" + std::string(kSourceDir) + "' && " + call + " >'" +
                                 (folder_ / "stdout").string() + "' 2>'" +
                                 (folder_ / "stderr").string() + "'";
     const int status = std::system(command.c_str());

@@ -6,6 +6,7 @@
 #include <chrono>
 
 #include "tests/cli/program.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -28,7 +29,7 @@ class RobustnessTest : public testing::Test {
     const std::string out = (mbverify.folder() / "shell_out").string();
     const std::string err = (mbverify.folder() / "shell_err").string();
     const int status =
-        std::system(("cd '" MBV_SOURCE_DIR "' && mbverify='" MBV_BINARY_DIR "/mbverify' && (" +
+        std::system(("cd '" + std::string(kSourceDir) + "' && mbverify='" + std::string(kBinaryDir) + "/mbverify' && (" +
                      script + ") >'" + out + "' 2>'" + err + "'")
                         .c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, ReadAll(out), ReadAll(err)};

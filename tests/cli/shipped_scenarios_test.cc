@@ -6,6 +6,7 @@
 
 #include "scenario/load_scenario.h"
 #include "tests/cli/program.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -14,7 +15,7 @@ namespace fs = std::filesystem;
 
 std::vector<std::string> ShippedScenarios() {
   std::vector<std::string> files;
-  const fs::path root = MBV_SOURCE_DIR;
+  const fs::path root = kSourceDir;
   for (const auto& entry : fs::recursive_directory_iterator(root / "scenarios")) {
     if (entry.path().extension() == ".yaml" && ReadScenarioHead(entry.path()).is_scenario) {
       files.push_back(entry.path().lexically_relative(root));
@@ -53,7 +54,7 @@ class ShippedScenario : public testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedScenario, GivesWhatItExpects) {
   const Expectation expect =
-      ReadScenarioHead(std::string(MBV_SOURCE_DIR) + "/" + GetParam()).expect;
+      ReadScenarioHead(std::string(kSourceDir) + "/" + GetParam()).expect;
   const Program mbverify(NameOf(GetParam()));
   const ProgramResult result =
       mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());
@@ -81,7 +82,7 @@ INSTANTIATE_TEST_SUITE_P(Shipped, ShippedScenario, testing::ValuesIn(ShippedScen
 
 TEST(ShippedScenarios, EachFileBelowMustFailExpectsAFailure) {
   for (const std::string& file : ShippedScenarios()) {
-    const Expectation expect = ReadScenarioHead(std::string(MBV_SOURCE_DIR) + "/" + file).expect;
+    const Expectation expect = ReadScenarioHead(std::string(kSourceDir) + "/" + file).expect;
     if (file.find("/must_fail/") == std::string::npos) continue;
     EXPECT_NE(expect.exit_code, 0) << file;
     EXPECT_FALSE(expect.mentions.empty()) << file << " does not say what must be found";

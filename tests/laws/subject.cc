@@ -9,6 +9,7 @@
 #include "core/demand.h"
 #include "mechanism/channels.h"
 #include "mechanism/load_model.h"
+#include "tests/source_dir.h"
 
 namespace mbv::laws {
 namespace {
@@ -54,7 +55,7 @@ std::vector<bool> HeldCommands(const Subject& s) {
 
 Subject MakeSubject(const std::string& model, const std::string& scenario) {
   const std::string file =
-      std::string(MBV_SOURCE_DIR) + "/scenarios/" + model + "/" + scenario + ".yaml";
+      std::string(kSourceDir) + "/scenarios/" + model + "/" + scenario + ".yaml";
   ScenarioResult loaded = LoadScenario(file);
   MBV_DEMAND(loaded.scenario.has_value() && loaded.mechanism.has_value(),
              loaded.diagnostics.Text());
@@ -287,7 +288,7 @@ bool Subject::IsLengthCommand(size_t k) const {
 std::vector<std::string> ModelNames() {
   std::set<std::string> names;
   for (const auto& entry :
-       std::filesystem::directory_iterator(std::string(MBV_SOURCE_DIR) + "/models")) {
+       std::filesystem::directory_iterator(std::string(kSourceDir) + "/models")) {
     const std::string name = entry.path().filename().string();
     if (std::filesystem::exists(entry.path() / "model.yaml") && FindClosedForm(name) != nullptr) {
       names.insert(name);

@@ -10,6 +10,7 @@
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
 #include "slip.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -296,7 +297,7 @@ TEST_F(OtherFiles, ThatCannotBeReadAreReported) {
 }
 
 Mechanism LoadShipped(const std::string& name) {
-  const LoadResult result = LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name);
+  const LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + name);
   EXPECT_EQ(result.diagnostics.Text(), "");
   return result.mechanism.value_or(Mechanism{});
 }

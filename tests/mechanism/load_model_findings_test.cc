@@ -9,6 +9,7 @@
 #include "four_bar.h"
 #include "mechanism/load_model.h"
 #include "slip.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -234,7 +235,7 @@ TEST(LoadModelFindings, PartsThatMultiplyWithoutEndAreRefused) {
 // Each file in data/malformed has its findings beside it.
 TEST(LoadModelFindings, MalformedFilesSayWhatTheirGoldenTextsSay) {
   const std::filesystem::path folder =
-      std::filesystem::path(MBV_SOURCE_DIR) / "tests/mechanism/data/malformed";
+      std::filesystem::path(kSourceDir) / "tests/mechanism/data/malformed";
   const auto read = [](const std::filesystem::path& path) {
     std::ifstream stream(path, std::ios::binary);
     return std::string(std::istreambuf_iterator<char>(stream), {});

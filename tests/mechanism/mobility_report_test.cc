@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "mechanism/load_model.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -12,7 +13,7 @@ using Names = std::vector<std::string>;
 
 Mechanism Shipped(const std::string& name) {
   const LoadResult loaded =
-      LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml");
+      LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
   EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   return *loaded.mechanism;
 }

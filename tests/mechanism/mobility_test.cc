@@ -5,6 +5,7 @@
 
 #include "mechanism/load_model.h"
 #include "tests/simulation/test_mechanisms.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -61,7 +62,7 @@ TEST(Mobility, AnIsostaticRuleThatFreesALinkIsFoundOut) {
 }
 
 TEST(Mobility, TheStabilizingPlatformHasTwoRedundantConstraintsPerLimb) {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/stabilizing_platform/model.yaml");
+  LoadResult loaded = LoadModel(SourcePath("/models/stabilizing_platform/model.yaml"));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mobility mobility = AnalyseMobility(*loaded.mechanism);
   EXPECT_EQ(mobility.redundant, 6);
@@ -80,7 +81,7 @@ TEST(Mobility, TheStabilizingPlatformHasTwoRedundantConstraintsPerLimb) {
 }
 
 TEST(Mobility, TheTripodHasThreeFreedomsAndNoRedundancy) {
-  const LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/spr_tripod/model.yaml");
+  const LoadResult loaded = LoadModel(SourcePath("/models/spr_tripod/model.yaml"));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mobility mobility = AnalyseMobility(*loaded.mechanism);
   EXPECT_EQ(mobility.freedoms, 3);

@@ -7,13 +7,14 @@
 #include "mechanism/constraints.h"
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 Mechanism LoadShipped(const std::string& name, const LoadOptions& options = {}) {
   const LoadResult result =
-      LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml", options);
+      LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml", options);
   EXPECT_EQ(result.diagnostics.Text(), "");
   return result.mechanism.value_or(Mechanism{});
 }
@@ -120,7 +121,7 @@ TEST(SprTripodModel, HasThreeFreedomsAndNothingRedundant) {
 }
 
 TEST(ModelFormatDocument, ItsExampleLoads) {
-  const std::string file = std::string(MBV_SOURCE_DIR) + "/docs/model_format.md";
+  const std::string file = std::string(kSourceDir) + "/docs/model_format.md";
   std::ifstream stream(file);
   const std::string text(std::istreambuf_iterator<char>(stream), {});
   const std::string fence = "```yaml\n";

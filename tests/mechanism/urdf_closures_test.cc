@@ -8,6 +8,7 @@
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
 #include "mechanism/urdf.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -179,7 +180,7 @@ TEST(UrdfConstraint, WhatIsNotReadIsSaid) {
 TEST(UrdfExport, TheConstraintsAloneCloseTheLoopsAgain) {
   for (const char* name : {"four_bar", "slider_crank", "stewart"}) {
     const LoadResult loaded =
-        LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml");
+        LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
     ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
     WriteFile("alone.urdf", WriteUrdf(*loaded.mechanism));
     // The companion's guesses; closures from the URDF.

@@ -10,6 +10,7 @@
 #include "four_bar.h"
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -170,7 +171,7 @@ class ShippedModel : public testing::TestWithParam<const char*> {};
 
 TEST_P(ShippedModel, SurvivesTheRoundTripThroughUrdf) {
   const LoadResult loaded =
-      LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + GetParam() + "/model.yaml");
+      LoadModel(std::string(kSourceDir) + "/models/" + GetParam() + "/model.yaml");
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   ExpectRoundTrip(*loaded.mechanism);
 }

@@ -12,6 +12,7 @@
 #include "mjcf/plan.h"
 #include "simulation/engine_model.h"
 #include "tests/simulation/test_mechanisms.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -54,7 +55,7 @@ void ExpectGolden(const std::string& text, const std::string& path) {
       << path << " is out of step; write it anew with MBV_UPDATE_GOLDEN=1 test_mjcf";
 }
 
-const std::string kModels = std::string(MBV_SOURCE_DIR) + "/models/";
+const std::string kModels = std::string(kSourceDir) + "/models/";
 const char* const kShipped[] = {
     "stabilizing_platform", "spr_tripod", "scara_robot", "cabin_robot", "four_bar",
     "slider_crank",         "stewart"};
@@ -93,7 +94,7 @@ struct Compiled {
 
 TEST(Mjcf, AFourBarIsWrittenAsCommitted) {
   ExpectGolden(WriteMjcf(testing::MakeFourBar()),
-               std::string(MBV_SOURCE_DIR) + "/tests/mjcf/four_bar.xml");
+               std::string(kSourceDir) + "/tests/mjcf/four_bar.xml");
 }
 
 TEST(Mjcf, TheGoldenComparisonNoticesAChangedNumberAndAChangedWord) {

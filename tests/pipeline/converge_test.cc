@@ -1,5 +1,6 @@
 // The orders of the schemes, seen on shipped scenarios.
 #include "pipeline/converge.h"
+#include "tests/source_dir.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +8,7 @@ namespace mbv {
 namespace {
 
 ConvergeOutcome Study(const std::string& scenario, ConvergeOptions options = {}) {
-  return Converge(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml", options);
+  return Converge(std::string(kSourceDir) + "/scenarios/" + scenario + ".yaml", options);
 }
 
 const ConvergenceSeries& Find(const ConvergeOutcome& outcome, const std::string& name) {

@@ -10,6 +10,7 @@
 
 #include "pipeline/run_scenario.h"
 #include "scenario/load_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -70,7 +71,7 @@ TEST_F(InitModelTest, AStarterIsTheShippedModelWithComments) {
       if (!line.starts_with("#")) plain += line + "\n";
     }
     EXPECT_EQ(plain,
-              ReadText(std::string(MBV_SOURCE_DIR) + "/models/" + starter.name + "/model.yaml"));
+              ReadText(std::string(kSourceDir) + "/models/" + starter.name + "/model.yaml"));
   }
 }
 

@@ -1,6 +1,7 @@
 // Detection power on the shipped scenarios: which parameters may be 0.1 % wrong on the simulated
 // side without anybody noticing? Every name below has a physical reason.
 #include "pipeline/mutate.h"
+#include "tests/source_dir.h"
 
 #include <gtest/gtest.h>
 
@@ -14,7 +15,7 @@ namespace {
 using Names = std::set<std::string>;
 
 MutationReport Mutate(const std::string& scenario, MutationOptions options = {}) {
-  return MutateScenario(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml", options);
+  return MutateScenario(std::string(kSourceDir) + "/scenarios/" + scenario + ".yaml", options);
 }
 
 // Everything at one size, without searching for the smallest one.

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "pipeline/stiffness_map.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -18,7 +19,7 @@ constexpr double kEntry = 1e-4;
 constexpr double kLoose = 1e3;  // [rad/(N m)]: one degree under 0.02 N mm
 
 std::optional<PreparedStiffness> Prepare(const std::string& mechanism, const std::string& more) {
-  std::filesystem::current_path(MBV_SOURCE_DIR);
+  std::filesystem::current_path(kSourceDir);
   const std::string text = "kind: stiffness\nmechanism: " + mechanism + "\n" + more;
   StiffnessScenarioResult loaded = LoadStiffnessScenarioText(text, "scenarios/s.yaml");
   EXPECT_TRUE(loaded.scenario) << loaded.diagnostics.Text();

@@ -8,12 +8,13 @@
 
 #include "mechanism/load_model.h"
 #include "mechanism/mobility.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 Mechanism Load(const std::string& name) {
-  LoadResult loaded = LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml");
+  LoadResult loaded = LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
   if (!loaded.mechanism.has_value()) throw std::runtime_error(loaded.diagnostics.Text());
   return *std::move(loaded.mechanism);
 }

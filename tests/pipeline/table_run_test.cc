@@ -7,12 +7,13 @@
 #include <sstream>
 
 #include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 std::string Scenario(const std::string& name) {
-  return std::string(MBV_SOURCE_DIR) + "/scenarios/" + name + ".yaml";
+  return std::string(kSourceDir) + "/scenarios/" + name + ".yaml";
 }
 
 std::string ReadText(const std::filesystem::path& path) {

@@ -1,4 +1,5 @@
 #include "pipeline/version.h"
+#include "tests/source_dir.h"
 
 #include <gtest/gtest.h>
 
@@ -9,7 +10,7 @@ namespace mbv {
 namespace {
 
 TEST(Version, IsTheOneOfTheBuildFile) {
-  std::ifstream stream(std::string(MBV_SOURCE_DIR) + "/CMakeLists.txt");
+  std::ifstream stream(std::string(kSourceDir) + "/CMakeLists.txt");
   std::stringstream text;
   text << stream.rdbuf();
   EXPECT_NE(text.str().find(std::string("project(mbverify VERSION ") + kVersion),

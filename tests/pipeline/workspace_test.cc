@@ -5,12 +5,13 @@
 #include <algorithm>
 
 #include "mechanism/load_model.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 Mechanism Load(const std::string& name) {
-  LoadResult result = LoadModel(MBV_SOURCE_DIR "/models/" + name + "/model.yaml");
+  LoadResult result = LoadModel(SourcePath("/models/") + name + "/model.yaml");
   EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
   return *result.mechanism;
 }

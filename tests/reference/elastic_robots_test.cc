@@ -10,6 +10,7 @@
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
 #include "tests/reference/direct_stiffness.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -21,7 +22,7 @@ constexpr double kAlgebra = 1e6 * kEps;
 constexpr double kDirect = 1e-8;
 
 Mechanism LoadShipped(const std::string& file, const LoadOptions& options = {}) {
-  const LoadResult result = LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + file, options);
+  const LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + file, options);
   EXPECT_EQ(result.diagnostics.Text(), "");
   return result.mechanism.value_or(Mechanism{});
 }

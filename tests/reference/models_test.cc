@@ -7,6 +7,7 @@
 #include "core/spatial.h"
 #include "mechanism/load_model.h"
 #include "tests/reference/fixture.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -18,7 +19,7 @@ constexpr double kDegree = std::numbers::pi / 180;
 Mechanism Load(const std::string& name, std::map<std::string, double> overrides = {}) {
   LoadOptions options;
   options.overrides = std::move(overrides);
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/" + name + "/model.yaml", options);
+  LoadResult loaded = LoadModel(SourcePath("/models/") + name + "/model.yaml", options);
   if (!loaded.mechanism.has_value()) throw std::runtime_error(loaded.diagnostics.Text());
   return *std::move(loaded.mechanism);
 }

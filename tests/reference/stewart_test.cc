@@ -9,6 +9,7 @@
 #include "core/spatial.h"
 #include "mechanism/load_model.h"
 #include "reference/reference.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -38,7 +39,7 @@ std::array<Leg, 6> Legs() {
 }
 
 Mechanism Stewart() {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/stewart/model.yaml");
+  LoadResult loaded = LoadModel(SourcePath("/models/stewart/model.yaml"));
   if (!loaded.mechanism.has_value()) throw std::runtime_error(loaded.diagnostics.Text());
   return *std::move(loaded.mechanism);
 }

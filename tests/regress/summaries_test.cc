@@ -9,11 +9,12 @@
 #include <set>
 
 #include "regress_fixture.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
-constexpr const char* kGoldenFolder = MBV_SOURCE_DIR "/tests/regress/golden/";
+const std::string kGoldenFolder = SourcePath("/tests/regress/golden/");
 
 // One of each kind.
 RegressReport Mixed() {

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "tests/comparison/synthetic.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -18,7 +19,7 @@ using synthetic::Bend;
 using synthetic::Case;
 
 std::string Golden(const std::string& name, const std::string& actual) {
-  const std::string path = std::string(MBV_SOURCE_DIR) + "/tests/report/golden/" + name;
+  const std::string path = std::string(kSourceDir) + "/tests/report/golden/" + name;
   if (std::getenv("MBV_UPDATE_GOLDEN") != nullptr) std::ofstream(path) << actual;
   std::ifstream stream(path);
   std::stringstream text;

@@ -8,19 +8,20 @@
 
 #include "scenario/load_scenario.h"
 #include "tests/document_text.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 std::string Document() {
-  std::ifstream stream(std::string(MBV_SOURCE_DIR) + "/docs/scenario_format.md");
+  std::ifstream stream(std::string(kSourceDir) + "/docs/scenario_format.md");
   std::stringstream text;
   text << stream.rdbuf();
   return text.str();
 }
 
 TEST(ScenarioDocument, ItsExampleLoads) {
-  std::filesystem::current_path(MBV_SOURCE_DIR);
+  std::filesystem::current_path(kSourceDir);
   const std::string document = Document();
   const size_t start = document.find("```yaml\n") + 8;
   const std::string example = document.substr(start, document.find("```", start) - start);

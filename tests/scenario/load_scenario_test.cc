@@ -9,6 +9,7 @@
 #include <random>
 
 #include "scenario/motion_reader.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -21,7 +22,7 @@ constexpr const char* kFile = "scenarios/stabilizing_platform/t.yaml";
 
 class LoadScenarioTest : public testing::Test {
  protected:
-  void SetUp() override { std::filesystem::current_path(MBV_SOURCE_DIR); }
+  void SetUp() override { std::filesystem::current_path(kSourceDir); }
 
   static ScenarioResult Load(const std::string& text, const std::vector<SetValue>& set = {}) {
     ScenarioOptions options;

@@ -1,6 +1,7 @@
 // Stiffness scenarios are read completely, or everything that is wrong with them is said.
 #include "scenario/stiffness_scenario.h"
 #include "tests/document_text.h"
+#include "tests/source_dir.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -14,7 +15,7 @@ namespace {
 
 class StiffnessScenarioText : public testing::Test {
  protected:
-  void SetUp() override { std::filesystem::current_path(MBV_SOURCE_DIR); }
+  void SetUp() override { std::filesystem::current_path(kSourceDir); }
 
   static StiffnessScenarioResult Load(const std::string& text,
                                       const ScenarioOptions& options = {}) {

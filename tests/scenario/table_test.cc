@@ -16,6 +16,7 @@
 #include "scenario/table_settings.h"
 #include "scenario/table_units.h"
 #include "tests/two_sliders.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -273,7 +274,7 @@ TEST(TableFindings, WhatIsNoTableSaysSo) {
 }
 
 TEST(TableFindings, AMissingFileIsNamedAtItsKey) {
-  std::filesystem::current_path(MBV_SOURCE_DIR);
+  std::filesystem::current_path(kSourceDir);
   const ScenarioResult result = LoadScenarioText(
       "mechanism: four_bar\nmotion: {duration_s: 1, commands: {motor: home}}\nanalytic: none\n"
       "reference: {csv: tables/none.csv}\n",

@@ -8,6 +8,7 @@
 #include "mechanism/load_model.h"
 #include "mjcf/mjcf.h"
 #include "tests/simulation/test_mechanisms.h"
+#include "tests/source_dir.h"
 
 namespace mbv::simulation {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 std::vector<Mechanism> Mechanisms() {
   std::vector<Mechanism> all{testing::MakeFourBar()};
   for (const char* name : {"stabilizing_platform", "spr_tripod", "scara_robot"}) {
-    LoadResult result = LoadModel(std::string(MBV_SOURCE_DIR) + "/models/" + name + "/model.yaml");
+    LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
     if (result.mechanism.has_value()) all.push_back(*std::move(result.mechanism));
   }
   EXPECT_EQ(all.size(), 4u);

@@ -5,6 +5,7 @@
 #include "reference/forward.h"
 #include "scenario/load_scenario.h"
 #include "simulation/simulation.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -24,7 +25,7 @@ struct Benchmark {
   double step_s;
 
   Benchmark() {
-    ScenarioResult result = LoadScenario(std::string(MBV_SOURCE_DIR) +
+    ScenarioResult result = LoadScenario(std::string(kSourceDir) +
                                          "/scenarios/andrews_squeezer/benchmark.yaml");
     MBV_DEMAND(result.scenario.has_value() && result.mechanism.has_value(),
                result.diagnostics.Text());

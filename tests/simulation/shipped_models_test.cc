@@ -10,6 +10,7 @@
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
 #include "simulation/simulation.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -22,7 +23,7 @@ struct Case {
 
   explicit Case(const std::string& scenario, double duration_s) {
     ScenarioResult result =
-        LoadScenario(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml");
+        LoadScenario(std::string(kSourceDir) + "/scenarios/" + scenario + ".yaml");
     MBV_DEMAND(result.scenario.has_value() && result.mechanism.has_value(),
                result.diagnostics.Text());
     mechanism = *std::move(result.mechanism);

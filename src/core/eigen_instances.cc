@@ -1,0 +1,3 @@
+#include "core/eigen_instances.h"
+
+MBV_EIGEN_INSTANCES(template)
