@@ -198,7 +198,7 @@ std::string WriteUrdf(const Mechanism& mechanism) {
   const std::vector<Pose> frames = UrdfLinkFrames(mechanism);
   std::string comment = WriteUrdfCompanion(mechanism, mechanism.name + ".urdf");
   // XML forbids two hyphens in a comment.
-  for (size_t at; (at = comment.find("--")) != std::string::npos;) comment.replace(at, 2, "-");
+  for (size_t at; (at = comment.find("--")) != std::string::npos;) comment.erase(at, 1);
   std::string text = fmt::format(
       "<?xml version=\"1.0\"?>\n"
       "<!-- {0}, by mbverify: spanning tree, and the closed loops as constraint elements, which\n"
