@@ -1,5 +1,5 @@
-# The headers that nearly every file includes, parsed once: mbv_pch for the program, mbv_test_pch
-# for the tests. Both are libraries of one empty file; other targets reuse their headers.
+# The headers that nearly every file includes, parsed once: mbv_pch for what computes, mbv_light_pch
+# for the rest of the program, mbv_test_pch for the tests. All are libraries of one empty file; other targets reuse their headers.
 function(mbv_precompiled target)
   cmake_parse_arguments(ARG "" "" "LIBS;HEADERS" ${ARGN})
   file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/${target}.cc CONTENT "")
@@ -15,3 +15,5 @@ set(MBV_COMMON_HEADERS
     <span> <string> <string_view> <variant> <vector> <fmt/format.h>
     <core/eigen_instances.h>)
 mbv_precompiled(mbv_pch LIBS Eigen3::Eigen fmt::fmt HEADERS ${MBV_COMMON_HEADERS})
+mbv_precompiled(mbv_light_pch LIBS Eigen3::Eigen fmt::fmt HEADERS ${MBV_COMMON_HEADERS})
+mbv_light(mbv_light_pch)
