@@ -2,9 +2,9 @@
 # find_package(mbverify) finds: headers, libraries and mbverify::main.
 include(CMakePackageConfigHelpers)
 
-install(TARGETS mbverify)
-install(DIRECTORY models scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify)
-install(DIRECTORY examples docs DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(TARGETS mbverify COMPONENT runtime)
+install(DIRECTORY models scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify COMPONENT runtime)
+install(DIRECTORY examples docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
 install(TARGETS mbv_main EXPORT mbverify ARCHIVE COMPONENT development)
 install(DIRECTORY src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbverify COMPONENT development
         FILES_MATCHING PATTERN "*.h")

@@ -9,7 +9,7 @@ const {chromium} = require('playwright-core');
 const kFlags = [
   '--no-sandbox', '--use-gl=angle', '--use-angle=swiftshader', '--enable-unsafe-swiftshader',
   '--disable-quic', '--no-first-run', '--disable-background-networking',
-  '--disable-component-update', '--disable-sync',
+  '--disable-component-update', '--disable-sync', '--enable-precise-memory-info',
 ];
 
 async function launch() {

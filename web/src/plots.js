@@ -3,28 +3,15 @@ import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 
 import {element, formatError, formatValue, isDark, nearest} from './data.js';
+import {decadeMarks, decades} from './log_axis.js';
 import {groupBy, makePanels, nameOf} from './panels.js';
+
+const kPaperWidth = 640;  // [px], what A4 leaves between its margins
 
 // NaN is a gap; on a log axis zero is drawn at the lower edge.
 function plottable(values, floor) {
   return Array.from(values, (value) => !Number.isFinite(value) ? null
                                        : floor && value < floor ? floor : value);
-}
-
-// Decades that hold the values and the limit, at most 16.
-function decades(panel) {
-  let low = Infinity, high = 0;
-  for (const line of panel.lines) {
-    for (const value of line.values) {
-      if (!(value > 0) || !Number.isFinite(value)) continue;
-      low = Math.min(low, value);
-      high = Math.max(high, value);
-    }
-  }
-  if (high === 0) return null;
-  const top = 10 ** Math.ceil(Math.log10(Math.max(high, panel.limit ?? 0)) + 0.2);
-  const bottom = 10 ** Math.floor(Math.log10(Math.min(low, panel.limit ?? low)));
-  return [Math.max(bottom, top * 1e-16), top];
 }
 
 // Marks spread evenly over what is visible.
@@ -71,20 +58,35 @@ export class Plots {
     this.range = [timeline.start, timeline.end];
     this.build();
     new ResizeObserver(() => this.resize()).observe(parent);
-    timeline.onChange((time) => this.moveHead(time));
+    this.drawForPaper();
+    timeline.onChange(() => this.moveHead());
+  }
+
+  // On paper plots have the paper's width and its colours.
+  drawForPaper() {
+    addEventListener('beforeprint', () => {
+      this.screenTheme = document.documentElement.dataset.theme ?? '';
+      document.documentElement.dataset.theme = 'light';
+      this.build(kPaperWidth);
+    });
+    addEventListener('afterprint', () => {
+      if (this.screenTheme) document.documentElement.dataset.theme = this.screenTheme;
+      else delete document.documentElement.dataset.theme;
+      this.build();
+    });
   }
 
   shown() {
     return this.panels.filter((panel) => !panel.pair || panel.pair === this.pair);
   }
 
-  build() {
+  build(width = null) {
     for (const view of this.views ?? []) view.plot?.destroy();
     this.grid = element('div', {class: 'plots'});
     this.views = this.shown().map((panel) => this.addPanel(panel));
     this.parent.replaceChildren(this.toolbar(), this.grid);
-    this.resize();
-    this.moveHead(this.timeline.time);
+    this.resize(width);
+    this.moveHead();
   }
 
   toolbar() {
@@ -123,7 +125,7 @@ export class Plots {
     const figure = element('figure', {class: 'panel'}, caption, legend, box);
     this.grid.append(figure);
     const view = {panel, figure, legend, box, readouts: []};
-    const range = panel.log ? decades(panel) : null;
+    const range = panel.log ? decades(panel.lines, panel.limit) : null;
     this.addLegend(view);
     if (panel.log && !range) {
       box.append(element('p', {class: 'faint'}, 'Exactly zero at every sample.'));
@@ -175,13 +177,12 @@ export class Plots {
     const ink = css.getPropertyValue('--faint').trim(), grid = css.getPropertyValue('--grid').trim();
     const font = '12px system-ui, sans-serif';
     const axis = {stroke: ink, font, grid: {stroke: grid, width: 1}, ticks: {stroke: grid, width: 1}};
-    // Only whole decades have lines and labels.
-    const whole = (_u, splits) => splits.map(
-        (v) => Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-6 ? v : null);
-    const lines = panel.log ? {grid: {...axis.grid, filter: whole},
-                               ticks: {...axis.ticks, filter: whole}, filter: whole} : {};
+    // uPlot's own marks of a logarithmic axis do not end where steps fall below its rounding.
+    const marks = panel.log ? {splits: () => decadeMarks(...range), filter: (_u, splits) => splits} : {};
+    const lines = panel.log ? {...marks, grid: {...axis.grid, filter: marks.filter},
+                               ticks: {...axis.ticks, filter: marks.filter}} : {};
     const labels = panel.log
-        ? (_u, splits) => splits.map((v) => v === null ? '' : exponent(v))
+        ? (_u, splits) => splits.map(exponent)
         : (_u, splits) => axisLabels(splits);
     return {
       width: 600,
@@ -198,7 +199,7 @@ export class Plots {
       hooks: {
         setScale: [(u, key) => key === 'x' && this.followZoom(u)],
         setCursor: [(u) => this.readSoon(u.cursor.idx)],
-        draw: [(u) => this.drawMarks(u, panel)],
+        draw: [(u) => { this.drawMarks(u, panel); this.placeHead(view, u); }],
         ready: [(u) => this.clickSetsTime(u)],
       },
     };
@@ -299,7 +300,7 @@ export class Plots {
     this.range = [min, max];
     for (const view of this.views ?? []) view.plot?.setScale('x', {min, max});
     this.zooming = false;
-    this.moveHead(this.timeline.time);
+    this.moveHead();
   }
 
   /** Scales the visible span around a time. */
@@ -316,24 +317,30 @@ export class Plots {
     this.setRange(this.timeline.start, this.timeline.end);
   }
 
-  moveHead(time) {
-    for (const view of this.views ?? []) {
-      if (!view.plot) continue;
-      const inside = time >= this.range[0] - 1e-9 && time <= this.range[1] + 1e-9;
-      view.head.style.display = inside ? '' : 'none';
-      view.head.style.transform = `translateX(${view.plot.valToPos(time, 'x')}px)`;
-    }
+  // uPlot takes a new range at its next drawing; that places the heads, too.
+  moveHead() {
+    for (const view of this.views ?? []) if (view.plot) this.placeHead(view, view.plot);
     if (!this.views?.some((view) => view.plot?.cursor.left >= 0)) this.readSoon(null);
   }
 
-  resize() {
+  placeHead({head}, plot) {
+    if (!head) return;
+    const {time} = this.timeline;
+    const {min, max} = plot.scales.x;
+    const slack = 1e-9 * (max - min);  // of a time that was rounded
+    const inside = time >= min - slack && time <= max + slack;
+    head.style.display = inside ? '' : 'none';
+    head.style.transform = `translateX(${plot.valToPos(time, 'x')}px)`;
+  }
+
+  resize(given = null) {
     for (const view of this.views ?? []) {
-      const width = view.box.clientWidth;
+      const width = given ?? view.box.clientWidth;
       if (view.plot && width > 0 && width !== view.plot.width) {
         view.plot.setSize({width, height: 210});
       }
     }
-    if (this.views) this.moveHead(this.timeline.time);
+    if (this.views) this.moveHead();
   }
 }
 

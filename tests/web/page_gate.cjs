@@ -1,0 +1,117 @@
+// What every page must keep, whatever it shows: node page_gate.cjs FOLDER opens each report.html
+// and index.html below FOLDER in a real browser (MBV_CHROMIUM), light and dark, wide, narrow and on
+// paper. Prints what fails and exits with 1; a folder without pages fails, too.
+'use strict';
+const fs = require('node:fs');
+const path = require('node:path');
+
+const {launch, openPage} = require('./browser.cjs');
+
+const kReady_ms = 2000, kHeap_bytes = 200e6, kWaiting_ms = 20000;
+
+function pagesBelow(folder) {
+  return fs.readdirSync(folder, {withFileTypes: true, recursive: true})
+      .filter((entry) => entry.isFile() && ['report.html', 'index.html'].includes(entry.name))
+      .map((entry) => path.join(entry.parentPath ?? entry.path, entry.name)).sort();
+}
+
+// Plots without a coloured curve, as [title].
+const emptyPlots = (page) => page.evaluate(() => {
+  const coloured = (canvas) => {
+    const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    let count = 0;
+    for (let i = 0; i < data.length; i += 4) {
+      const [r, g, b, a] = data.subarray(i, i + 4);
+      if (a > 60 && Math.max(r, g, b) - Math.min(r, g, b) > 40) ++count;
+    }
+    return count;
+  };
+  return (globalThis.mbverify?.plots?.views ?? [])
+      .filter((view) => view.plot && coloured(view.plot.ctx.canvas) < 10)
+      .map((view) => view.panel.title);
+});
+
+const settled = (page) => page.evaluate(() => new Promise((done) => {
+  requestAnimationFrame(() => requestAnimationFrame(done));
+}));
+
+// Elements that reach beyond the right edge of the window.
+const tooWide = (page) => page.evaluate(() => {
+  const {scrollWidth, clientWidth} = document.documentElement;
+  return scrollWidth > clientWidth ? [`${scrollWidth} px in a window of ${clientWidth} px`] : [];
+});
+
+async function openOnce(browser, file) {
+  const found = {trouble: [], requests: []};
+  const page = await openPage(browser, file, found);
+  const report = path.basename(file) === 'report.html';
+  const bad = [];
+  let ready_ms = 0;
+  if (report) {
+    try {
+      await page.waitForSelector('html[data-ready]', {timeout: kWaiting_ms});
+      ready_ms = Number(await page.getAttribute('html', 'data-ready'));
+    } catch {
+      bad.push(`not ready after ${kWaiting_ms} ms`);
+    }
+  }
+  return {page, found, bad, ready_ms};
+}
+
+async function faultsOf(browser, file) {
+  let {page, found, bad, ready_ms} = await openOnce(browser, file);
+  // A busy machine may hold up one opening; a slow page is slow twice.
+  if (ready_ms > kReady_ms) {
+    await page.close();
+    ({page, found, bad, ready_ms} = await openOnce(browser, file));
+  }
+  if (bad.length) {
+    await page.close();
+    return [...bad, ...found.trouble];
+  }
+  if (ready_ms > kReady_ms) bad.push(`ready after ${ready_ms} ms`);
+  const check = async (state) => {
+    await settled(page);
+    for (const title of await emptyPlots(page)) bad.push(`${state}: empty plot "${title}"`);
+    for (const text of await tooWide(page)) bad.push(`${state}: ${text}`);
+  };
+  for (const colorScheme of ['light', 'dark']) {
+    await page.emulateMedia({colorScheme});
+    for (const width of [1400, 390]) {
+      await page.setViewportSize({width, height: 900});
+      await check(`${colorScheme}, ${width} px`);
+    }
+  }
+  await page.emulateMedia({media: 'print', colorScheme: 'dark'});
+  await page.setViewportSize({width: 718, height: 1000});  // A4 between margins of 1 cm
+  await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
+  await check('print');
+  const cut = await page.evaluate(() => [...document.querySelectorAll('.plot canvas')]
+      .filter((canvas) => canvas.getBoundingClientRect().right > innerWidth + 1).length);
+  if (cut) bad.push(`print: ${cut} plots are cut`);
+  const heap = await page.evaluate(() => performance.memory.usedJSHeapSize);
+  if (heap > kHeap_bytes) bad.push(`heap of ${Math.round(heap / 1e6)} MB`);
+  await page.close();
+  const foreign = found.requests.filter((url) => !/^(data|file|blob):/.test(url));
+  return [...bad, ...found.trouble, ...foreign.map((url) => `asks for ${url}`)];
+}
+
+async function main(folder) {
+  const pages = pagesBelow(folder);
+  if (pages.length === 0) {
+    console.error(`no page below ${folder}`);
+    return 1;
+  }
+  const browser = await launch();
+  let failed = 0;
+  for (const file of pages) {
+    const faults = await faultsOf(browser, file);
+    if (faults.length) ++failed;
+    for (const fault of faults) console.error(`${path.relative(folder, file)}: ${fault}`);
+  }
+  await browser.close();
+  console.log(`${pages.length - failed} of ${pages.length} pages keep their promises`);
+  return failed ? 1 : 0;
+}
+
+main(process.argv[2]).then((code) => { process.exitCode = code; });
