@@ -93,10 +93,9 @@ class PlanarSliderCrank final : public ClosedForm {
 
 std::unique_ptr<ClosedForm> Make(const Mechanism& mechanism, const Motion& motion,
                                  const ClosedFormOptions&, Diagnostics* diagnostics) {
-  const bool by_motor = motion.commands.size() == 1 && motion.commands[0].name == "motor";
-  if (!by_motor || !motion.loads.empty()) {
+  if (motion.commands.size() != 1 || motion.commands[0].name != "motor") {
     Finding finding;
-    finding.message = "the closed form takes the command \"motor\" and no loads";
+    finding.message = "the closed form takes the command \"motor\" only";
     finding.hint = "command the motor's angle only";
     diagnostics->Add(std::move(finding));
     return nullptr;
@@ -104,7 +103,66 @@ std::unique_ptr<ClosedForm> Make(const Mechanism& mechanism, const Motion& motio
   return std::make_unique<PlanarSliderCrank>(mechanism);
 }
 
-const ClosedFormRegistration kRegistration(
-    {.mechanism = "planar_slider_crank", .models = {"full"}, .errata = {}, .factory = &Make});
+// What (1) takes for granted; NaN: of no influence. Bodies move in the plane, so that only turning
+// about z counts, and nothing but the motor and gravity acts on them.
+Coverage CoverageOf(const Mechanism& mechanism) {
+  Coverage c;
+  c.form = "the closed form of the slider-crank";
+  const ParameterReader read(mechanism, &c);
+  const double r = read("r"), l = read("l"), g = read("g");
+  const Vec3 zero = Vec3::Zero(), x = Vec3::UnitX(), z = Vec3::UnitZ();
+  const auto add_body = [&](const char* name, double mass, const Vec3& com, double I_z) {
+    Mat3 inertia = kAnyMatrix;
+    inertia(2, 2) = I_z;
+    c.bodies.push_back({.name = name,
+                        .mass = mass,
+                        .com = com,
+                        .inertia = inertia,
+                        .why = "centres of mass are in the middle of crank and rod",
+                        .takes_loads = false});
+  };
+  add_body("crank", read("m_crank"), Vec3(r / 2, 0, kNan), read("I_crank"));
+  add_body("rod", read("m_rod"), Vec3(l / 2, 0, kNan), read("I_rod"));
+  add_body("slider", read("m_slider"), kAnyVector, kNan);
+  const auto add_joint = [&](const char* name, JointKind kind, const char* parent,
+                             const char* child, const Vec3& p_parent, const Vec3& axis) {
+    c.joints.push_back({.name = name,
+                        .kind = kind,
+                        .parent = parent,
+                        .child = child,
+                        .p_parent = p_parent,
+                        .p_child = zero,
+                        .axis_parent = axis,
+                        .axis_child = axis,
+                        .R_zero = Mat3::Identity()});
+  };
+  add_joint("motor", JointKind::kRevolute, "world", "crank", zero, z);
+  add_joint("pin", JointKind::kRevolute, "crank", "rod", r * x, z);
+  add_joint("wrist", JointKind::kRevolute, "rod", "slider", l * x, z);
+  add_joint("guide", JointKind::kPrismatic, "world", "slider", zero, x);
+  c.drives = {{.name = "motor", .joint = "motor"}};
+  c.outputs = {{.name = "slider", .body = "slider"}};
+  for (int k = 0; k < 3; ++k) {
+    c.numbers.push_back({.subject = "gravity",
+                         .quantity = k == 0   ? "component x"
+                                     : k == 1 ? "component y"
+                                              : "component z",
+                         .actual = mechanism.gravity_W[k],
+                         .assumed = k == 0   ? 0.0
+                                    : k == 1 ? -g
+                                             : kNan,
+                         .scale = std::abs(g),
+                         .unit = "m/s^2",
+                         .why = "gravity is g along -y",
+                         .inertial = true});
+  }
+  return c;
+}
+
+const ClosedFormRegistration kRegistration({.mechanism = "planar_slider_crank",
+                                            .models = {"full"},
+                                            .errata = {},
+                                            .factory = &Make,
+                                            .coverage = &CoverageOf});
 
 }  // namespace

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "analytic/coverage.h"
 #include "core/diagnostics.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
@@ -62,12 +63,17 @@ struct ClosedFormRow {
   std::vector<std::string> models;   ///< accepted formulations, the default first
   std::vector<std::string> errata;   ///< accepted entries of `as_printed`
   ClosedFormFactory factory = nullptr;
+  /// What the equations take for granted. Checked against the mechanism before the factory is asked:
+  /// outside, there is no closed form, and the other witnesses go on. nullptr: nothing is checked.
+  CoverageFunction coverage = nullptr;
 };
 
 /// All registered closed forms.
 [[nodiscard]] std::span<const ClosedFormRow> ClosedForms();
 /// The row for a mechanism name, or nullptr.
 [[nodiscard]] const ClosedFormRow* FindClosedForm(const std::string& mechanism);
+/// What the closed form of the mechanism's name does not cover of it; empty without one.
+[[nodiscard]] std::vector<Finding> FindUncovered(const Mechanism& mechanism);
 
 /// Runs a closed form over the motion's sample times: drive channels (position, velocity,
 /// acceleration, force) followed by the extra channels. Stops at the first failing sample.

@@ -2,7 +2,8 @@
 // a program that links mbverify::main.
 //
 //   const mbv::ClosedFormRegistration kMine({.mechanism = "my_arm", .models = {"full"},
-//                                            .errata = {}, .factory = &MakeMyArm});
+//                                            .errata = {}, .factory = &MakeMyArm,
+//                                            .coverage = &CoverageOfMyArm});
 #pragma once
 
 #include "analytic/closed_form.h"

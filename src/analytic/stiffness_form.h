@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "analytic/coverage.h"
 #include "core/diagnostics.h"
 #include "core/stiffness.h"
 #include "mechanism/mechanism.h"
@@ -55,6 +56,7 @@ struct StiffnessFormRow {
   std::vector<std::string> models;  ///< formulations, the default ("corrected") first, the paper's
                                     ///< own ("as_printed") among them
   StiffnessFormFactory factory = nullptr;
+  CoverageFunction coverage = nullptr;  ///< what it takes for granted; see ClosedFormRow
 };
 
 [[nodiscard]] std::span<const StiffnessFormRow> StiffnessForms();

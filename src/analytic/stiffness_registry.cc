@@ -1,5 +1,7 @@
 // One row per mechanism with a closed-form stiffness.
+#include "analytic/cabin_robot/coverage.h"
 #include "analytic/cabin_robot/stiffness_form.h"
+#include "analytic/scara_robot/coverage.h"
 #include "analytic/scara_robot/stiffness_form.h"
 #include "analytic/stiffness_form.h"
 
@@ -7,8 +9,10 @@ namespace mbv {
 
 std::span<const StiffnessFormRow> StiffnessForms() {
   static const std::vector<StiffnessFormRow> rows = {
-      {"scara_robot", "platform", scara::StiffnessModels(), &scara::MakeStiffnessForm},
-      {"cabin_robot", "tool", cabin::StiffnessModels(), &cabin::MakeStiffnessForm},
+      {"scara_robot", "platform", scara::StiffnessModels(), &scara::MakeStiffnessForm,
+       &scara::StiffnessCoverageOf},
+      {"cabin_robot", "tool", cabin::StiffnessModels(), &cabin::MakeStiffnessForm,
+       &cabin::StiffnessCoverageOf},
   };
   return rows;
 }

@@ -11,6 +11,7 @@ namespace mbv {
 enum class AuditVerdict {
   kOk,               ///< as printed: right
   kWrong,            ///< as printed: wrong; the corrected form is right
+  kApproximation,    ///< as printed: as near to the exact form as an approximation is said to be
   kWrongAndUnfixed,  ///< the corrected form misses its limit too: a defect of ours
   kNotTestable,      ///< a label, a choice or a claim that no residual measures; the note says why
 };
@@ -21,10 +22,11 @@ struct AuditRow {
   std::string erratum{};            ///< "E2" or ""
   std::string printed{};            ///< the form as printed, in plain text
   std::string corrected{};          ///< the corrected form; "" when the print is right
-  double residual_printed = 0.0;    ///< largest |difference| of the print; NaN if not computable
+  double residual_printed = 0.0;    ///< largest |difference| of the print; NaN if it cannot be evaluated
   double residual_corrected = 0.0;  ///< largest |difference| of the corrected form (of the print
                                     ///< when it is right)
   double scale = 1.0;               ///< largest |value| of the quantity, same unit
+  double approximation = 0.0;  ///< how far an approximation may be off, same unit; 0: it is none
   double limit = 0.0;  ///< residual_corrected must stay at or below this (derived, see note)
   std::string unit{};
   AuditVerdict verdict = AuditVerdict::kWrongAndUnfixed;
@@ -32,7 +34,8 @@ struct AuditRow {
 };
 
 /// The verdict that the numbers of a row give: kOk or kWrong when the corrected form is within its
-/// limit and the print is or is not; kWrongAndUnfixed otherwise.
+/// limit and the print is or is not, kApproximation where the print keeps `approximation`;
+/// kWrongAndUnfixed otherwise.
 [[nodiscard]] AuditVerdict VerdictOf(const AuditRow& row);
 
 struct AuditTable {

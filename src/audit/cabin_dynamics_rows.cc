@@ -79,7 +79,9 @@ Mechanism WithoutCarriageAndPayload(Mechanism mechanism) {
 std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism) {
   RowMeter bodies(Texts("(47)", "T, U over platform, three drive branches and four wrist bodies",
                         "carriage and payload added; branches are slider + link",
-                        "drive forces against the generic reference solver"));
+                        "drive forces against the generic reference solver; how much the print "
+                        "leaves out rests on masses assumed here: the paper prints none of the "
+                        "carriage and the payload"));
   RowMeter lagrange(Texts("(48), (50)–(52)", "Lagrange's equation and virtual work", "",
                           "drive forces with an end-effector wrench against the reference solver"));
   RowMeter wrench(Texts("(53)", "τ = JᵀQ", "τ = −JᵀW for a wrench W acting on the end effector",

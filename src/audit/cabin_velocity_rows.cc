@@ -27,15 +27,15 @@ struct PlanarRates {
   double al, be, ga, ep;  // angles
   double V0, V2, V3;      // slider A; F and D relative to it
   Vec2 vB, vC, vE, vK;    // relative to A
-  double w;               // turning rate of BC
+  double w, w_CD;         // turning rates of BC; of CD, as β grows
 };
 
 PlanarRates RatesAt(const Lengths& l, const SliderMotion& m) {
   const Pins& p = m.start;
   const auto pins = [&](double t) {
     const Pins q = Close(l, m, t);
-    Eigen::Matrix<double, 9, 1> v;
-    v << q.B - q.A, q.C - q.A, q.E - q.A, q.K() - q.A, q.gamma();
+    Eigen::Matrix<double, 10, 1> v;
+    v << q.B - q.A, q.C - q.A, q.E - q.A, q.K() - q.A, q.gamma(), q.beta();
     return v;
   };
   const auto rate = FirstDifference(pins, kRateStep);
@@ -50,7 +50,8 @@ PlanarRates RatesAt(const Lengths& l, const SliderMotion& m) {
           rate.segment<2>(2),
           rate.segment<2>(4),
           rate.segment<2>(6),
-          rate[8]};
+          rate[8],
+          rate[9]};
 }
 
 // Jacobian of (V_X, V_Y, W_γ) with respect to (V0, V2, V3) by differences.
@@ -160,8 +161,9 @@ std::vector<AuditRow> VelocityRows(const Lengths& l) {
       Texts("(16)", "V_E = V_EF/cos δ, δ = α + β − 90°", "δ = α + ε − 90°", "m/s", "wrong index"));
   RowMeter b17(Texts("(17)", "V_E = V2 cos ε/sin(α+ε), V_B = 2 V_E", "", "m/s"));
   RowMeter bc18(Texts("(18), (19)", "V_BC^n = V_B sin(α−γ), V_BC^t = V_B cos(α−γ)", "", "m/s"));
-  RowMeter cd20(Texts("(20)", "V_CD^n = V3 cos β, V_CD^t = V3 sin β", "", "m/s",
-                      "compared through the rigidity of CD"));
+  RowMeter cd20(
+      Texts("(20)", "V_CD^n = V3 cos β, V_CD^t = V3 sin β", "", "m/s",
+            "the velocity of D relative to A, from that of C and the turning of the rigid CD"));
   RowMeter m20(Texts("below (20): m", "m⃗ = (m sin γ, m cos γ)", "m⃗ = (m sin γ, −m cos γ)", "m/s",
                      "the printed vector is not normal to BC; (21) uses the corrected one"));
   RowMeter m22(Texts("(21), (22)", "m = −V_B sin(α−γ) cot(β+γ) + V3 cos β/sin(β+γ)", "", "m/s"));
@@ -187,7 +189,10 @@ std::vector<AuditRow> VelocityRows(const Lengths& l) {
     const double Vn = V_B * std::sin(s.al - s.ga), Vt = V_B * std::cos(s.al - s.ga);
     bc18.Add(s.vB.dot(along_BC), Vn);
     bc18.Add(s.vB.dot(across_BC), Vt);
+    // C moves across CD by what CD turns about D, and with D.
+    const Vec2 across_CD(std::sin(s.be), std::cos(s.be));
     cd20.Add(s.vC.dot(along_CD), s.V3 * std::cos(s.be));
+    cd20.Add(s.vC.dot(across_CD) - l.L3 * s.w_CD, s.V3 * std::sin(s.be));
     const double S = std::sin(s.be + s.ga);
     const double mm = -Vn * std::cos(s.be + s.ga) / S + s.V3 * std::cos(s.be) / S;
     m22.Add(s.vC.dot(across_BC), mm);

@@ -1,6 +1,7 @@
 // mbverify audit
 #include <fmt/format.h>
 
+#include <cmath>
 #include <memory>
 
 #include "audit/audit.h"
@@ -19,6 +20,7 @@ struct AuditArguments {
 
 std::string Word(AuditVerdict verdict, bool color) {
   const char* code = verdict == AuditVerdict::kOk                ? "32"
+                     : verdict == AuditVerdict::kApproximation   ? "36"
                      : verdict == AuditVerdict::kWrong           ? "33"
                      : verdict == AuditVerdict::kWrongAndUnfixed ? "1;31"
                                                                  : "2";
@@ -32,7 +34,11 @@ void PrintRow(const AuditRow& row, bool color) {
   if (!row.corrected.empty()) fmt::print("      corrected: {}\n", row.corrected);
   if (row.verdict != AuditVerdict::kNotTestable) {
     fmt::print("      residual: ");
-    if (!row.corrected.empty()) fmt::print("printed {:.2e}, corrected ", row.residual_printed);
+    if (!row.corrected.empty()) {
+      fmt::print("printed {}, corrected ", std::isnan(row.residual_printed)
+                                               ? "not evaluated"
+                                               : fmt::format("{:.2e}", row.residual_printed));
+    }
     fmt::print("{:.2e} (limit {:.1e}) {} of {:.3g}\n", row.residual_corrected, row.limit, row.unit,
                row.scale);
   }
@@ -41,16 +47,18 @@ void PrintRow(const AuditRow& row, bool color) {
 
 void PrintTable(const AuditTable& table, bool color) {
   fmt::print("{}: {}\n", table.mechanism, table.source);
-  size_t ok = 0, wrong = 0, unfixed = 0;
+  size_t ok = 0, near = 0, wrong = 0, unfixed = 0;
   for (const AuditRow& row : table.rows) {
     PrintRow(row, color);
     ok += row.verdict == AuditVerdict::kOk ? 1 : 0;
+    near += row.verdict == AuditVerdict::kApproximation ? 1 : 0;
     wrong += row.verdict == AuditVerdict::kWrong ? 1 : 0;
     unfixed += row.verdict == AuditVerdict::kWrongAndUnfixed ? 1 : 0;
   }
   fmt::print(
-      "  {} rows: {} right as printed, {} wrong as printed and corrected, {} unexplained\n\n",
-      table.rows.size(), ok, wrong, unfixed);
+      "  {} rows: {} right as printed, {} approximations, {} wrong as printed and corrected, {} "
+      "unexplained, {} without a residual\n\n",
+      table.rows.size(), ok, near, wrong, unfixed, table.rows.size() - ok - near - wrong - unfixed);
 }
 
 // Exit 1 if a corrected form misses its limit: then the corrections are wrong, too.

@@ -15,7 +15,7 @@
 namespace mbv {
 
 /// The spanning tree as URDF text. Joints with several coordinates become chains of single ones
-/// with massless links between ("JOINT.yaw", "JOINT.pitch", …). Closures follow as <constraint>
+/// with massless links between ("JOINT.yaw", "JOINT.pitch", …), a ball's all zero at home. Closures follow as <constraint>
 /// elements, which readers of plain URDF pass over. What is left (drives, guesses of the home pose)
 /// stands in a comment as a model.yaml that reads this file back: cut the comment out, name the
 /// URDF file in its `urdf:` key, and the same mechanism results (dots in the names of drives and

@@ -61,7 +61,7 @@ const char* KindWord(JointKind kind) {
 class Companion {
  public:
   explicit Companion(const Mechanism& mechanism)
-      : m_(mechanism), link_frames_(UrdfLinkFrames(mechanism)) {}
+      : m_(WithBallsAtZero(mechanism)), link_frames_(UrdfLinkFrames(m_)) {}
 
   std::string Text(const std::string& urdf_file) {
     WriteGuesses();
@@ -189,7 +189,7 @@ class Companion {
     }
   }
 
-  const Mechanism& m_;
+  const Mechanism m_;
   std::vector<Pose> link_frames_;
   std::string guesses_;
   std::map<int, std::string> attached_;

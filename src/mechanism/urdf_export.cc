@@ -124,6 +124,24 @@ std::string JointText(const Mechanism& mechanism, int tree_index,
 
 }  // namespace
 
+Mechanism WithBallsAtZero(const Mechanism& mechanism) {
+  Mechanism straight = mechanism;
+  std::vector<bool> named(mechanism.joints.size(), false);  // by drives: their zero is meant
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* on = std::get_if<JointDrive>(&drive.kind)) named[size_t(on->joint)] = true;
+  }
+  for (const int index : mechanism.tree_joints) {
+    Joint& joint = straight.joints[size_t(index)];
+    const bool limited = std::any_of(
+        joint.range.begin(), joint.range.begin() + 3,
+        [](const CoordinateRange& r) { return std::isfinite(r.lower) || std::isfinite(r.upper); });
+    if (joint.kind != JointKind::kSpherical || limited || named[size_t(index)]) continue;
+    joint.X_PF.linear() = joint.X_PF.linear() * JointPose(joint, joint.home).linear();
+    joint.home = joint.guess = {};
+  }
+  return straight;
+}
+
 std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed) {
   const auto step = [&](const std::string& suffix, int coordinate, const Vec3& axis) {
     const CoordinateRange& range = joint.range[coordinate];
@@ -194,7 +212,8 @@ std::optional<std::array<double, 4>> HexColor(const std::string& text) {
   return rgba;
 }
 
-std::string WriteUrdf(const Mechanism& mechanism) {
+std::string WriteUrdf(const Mechanism& original) {
+  const Mechanism mechanism = WithBallsAtZero(original);
   const std::vector<Pose> frames = UrdfLinkFrames(mechanism);
   std::string comment = WriteUrdfCompanion(mechanism, mechanism.name + ".urdf");
   // XML forbids two hyphens in a comment.

@@ -22,6 +22,11 @@ struct UrdfStep {
   int coordinate = 0;  ///< of the joint; -1 for fixed and floating
 };
 
+/// The mechanism with the frames of its balls turned so that their coordinates are zero at home. A
+/// ball of the tree becomes three hinges, which lose a freedom where the middle one is at 90
+/// degrees: from home, they are the farthest from there. Balls with limits stay as they are.
+[[nodiscard]] Mechanism WithBallsAtZero(const Mechanism& mechanism);
+
 /// The chain, inboard first. `reversed`: the tree runs from the child to the parent.
 [[nodiscard]] std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed);
 

@@ -72,6 +72,21 @@ void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   }
 }
 
+// Why the closed form does not take this model; "" if it does. One warning each.
+std::string Decline(const PreparedStiffness& prepared, const StiffnessFormRow& row,
+                    Diagnostics* diagnostics) {
+  if (row.coverage == nullptr) return "";
+  std::vector<Finding> uncovered =
+      FindUncovered(row.coverage(prepared.analytic), prepared.analytic, Concern::kStiffness);
+  const std::string reason = ReasonToDecline(uncovered);
+  for (Finding& finding : uncovered) {
+    finding.file = prepared.scenario.file;
+    finding.message = "analytic declines: " + finding.message;
+    diagnostics->Add(std::move(finding));
+  }
+  return reason;
+}
+
 std::unique_ptr<StiffnessForm> MakeForm(const PreparedStiffness& prepared,
                                         const StiffnessFormRow& row, const std::string& model,
                                         Diagnostics* diagnostics) {
@@ -112,6 +127,8 @@ void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
              "", diagnostics);
     return;
   }
+  prepared->form_reason = Decline(*prepared, *row, diagnostics);
+  if (!prepared->form_reason.empty()) return;
   prepared->form = MakeForm(*prepared, *row, prepared->form_model, diagnostics);
   if (prepared->scenario.compare_printed && prepared->form != nullptr) {
     prepared->printed = MakeForm(*prepared, *row, kPrintedModel, diagnostics);

@@ -47,6 +47,24 @@ bool Contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
+// Why the closed form does not take this mechanism and its loads; "" if it does. One warning each.
+std::string Decline(const Scenario& scenario, const Mechanism& mechanism, const ClosedFormRow& row,
+                    Diagnostics* diagnostics) {
+  if (row.coverage == nullptr) return "";
+  const Coverage coverage = row.coverage(mechanism);
+  std::vector<Finding> uncovered = FindUncovered(coverage, mechanism, Concern::kDynamics);
+  for (Finding& load : FindUncoveredLoads(coverage, mechanism, scenario.motion)) {
+    uncovered.push_back(std::move(load));
+  }
+  const std::string reason = ReasonToDecline(uncovered);
+  for (Finding& finding : uncovered) {
+    finding.file = scenario.file;
+    finding.message = "analytic declines: " + finding.message;
+    diagnostics->Add(std::move(finding));
+  }
+  return reason;
+}
+
 SimulationOptions OptionsOf(const Scenario& scenario, Engine engine) {
   SimulationOptions options;
   options.mode = scenario.simulation.forward ? SimulationMode::kForward : SimulationMode::kInverse;
@@ -90,6 +108,9 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
     fits = false;
   }
   if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
+  if (std::string reason = Decline(scenario, mechanism, *row, diagnostics); !reason.empty()) {
+    return {nullptr, std::move(reason)};
+  }
   Diagnostics found;
   auto closed_form =
       row->factory(mechanism, scenario.motion,

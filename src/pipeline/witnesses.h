@@ -26,9 +26,11 @@ struct WitnessMechanisms {
 /// A closed form for a scenario, or the reason why there is none.
 struct ClosedFormChoice {
   std::unique_ptr<ClosedForm> closed_form;
-  std::string reason;  ///< not empty: switched off, or the mechanism has none
+  std::string reason;  ///< not empty: switched off, or the mechanism has none, or it is outside
+                       ///< what the equations cover
 };
-/// Unsuitable models, errata and motions are findings.
+/// Unsuitable models, errata and commands are errors; what the equations do not cover of the
+/// mechanism and its loads is a warning each.
 [[nodiscard]] ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
                                               Diagnostics* diagnostics);
 

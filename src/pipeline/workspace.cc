@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "analytic/closed_form.h"
 #include "analytic/scara_robot/workspace.h"
 #include "analytic/spr_tripod/workspace.h"
 #include "render/render.h"
@@ -192,11 +193,26 @@ WorkspaceOutcome ScaraWorkspace(const Mechanism& mechanism, bool pictures) {
   return outcome;
 }
 
+// The workspace has no other witness: outside what the equations cover it is an error.
+void RefuseUncovered(const Mechanism& mechanism, Diagnostics* diagnostics) {
+  const ClosedFormRow* row = FindClosedForm(mechanism.name);
+  if (row == nullptr || row->coverage == nullptr) return;
+  for (Finding& finding :
+       FindUncovered(row->coverage(mechanism), mechanism, Concern::kKinematics)) {
+    finding.severity = Severity::kError;
+    finding.file = mechanism.file;
+    diagnostics->Add(std::move(finding));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> WorkspaceMechanisms() { return {"scara_robot", "spr_tripod"}; }
 
 WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures) {
+  WorkspaceOutcome refused;
+  RefuseUncovered(mechanism, &refused.diagnostics);
+  if (refused.diagnostics.has_errors()) return refused;
   if (mechanism.name == "spr_tripod") return TripodWorkspace(mechanism, pictures);
   if (mechanism.name == "scara_robot") return ScaraWorkspace(mechanism, pictures);
   WorkspaceOutcome outcome;

@@ -106,6 +106,23 @@ TEST(StabilizingPlatformAgainstReference, AgreesWithOtherParameters) {
   ExpectAgreement(Compare(mechanism, Coarse(mechanism, false)), kChannels);
 }
 
+TEST(StabilizingPlatformAgainstReference, AgreesWithCentresOfMassOffTheAxes) {
+  const Mechanism mechanism = Load({{"c_p_x", 0.4},
+                                    {"c_p_y", -0.3},
+                                    {"c_p_z", 1.2},
+                                    {"c_1_x", 0.15},
+                                    {"c_1_z", -0.2},
+                                    {"c_1p_x", -0.05},
+                                    {"c_1p_z", 0.1},
+                                    {"c_2_x", 0.1},
+                                    {"c_2_z", 0.08},
+                                    {"c_2p_x", 0.12},
+                                    {"c_2p_z", -0.06}});
+  for (bool hold_still : {false, true}) {
+    ExpectAgreement(Compare(mechanism, Coarse(mechanism, hold_still)), kChannels);
+  }
+}
+
 TEST(StabilizingPlatformAgainstReference, AgreesWithLoadsOnPlatformAndLinks) {
   const Mechanism mechanism = Load();
   for (bool hold_still : {false, true}) {

@@ -42,6 +42,27 @@ TEST(AuditVerdict, NeverPassesNaN) {
   EXPECT_EQ(VerdictOf(row), AuditVerdict::kWrongAndUnfixed);
 }
 
+TEST(AuditVerdict, TellsAnApproximationFromAnErrorByHowNearItIs) {
+  AuditRow row = Row();
+  row.approximation = 2e-2;
+  EXPECT_EQ(VerdictOf(row), AuditVerdict::kApproximation);
+  row.residual_printed = 2 * row.approximation;
+  EXPECT_EQ(VerdictOf(row), AuditVerdict::kWrong);
+  row.residual_printed = 1e-2;
+  row.residual_corrected = 2 * row.limit;
+  EXPECT_EQ(VerdictOf(row), AuditVerdict::kWrongAndUnfixed);
+}
+
+// A corrected form whose limit is as large as the quantity itself is not confirmed by it.
+TEST(AuditTables, NoLimitExceedsTwoPercentOfItsQuantity) {
+  for (const AuditEntry& entry : Audits()) {
+    for (const AuditRow& row : entry.run(MBV_SOURCE_DIR "/models").rows) {
+      if (row.verdict == AuditVerdict::kNotTestable) continue;
+      EXPECT_LE(row.limit, 0.02 * row.scale) << entry.mechanism << " " << row.equation;
+    }
+  }
+}
+
 TEST(AuditVerdict, TakesAPrintThatCannotBeComputedAsWrong) {
   AuditRow row = Row();
   row.residual_printed = kNan;

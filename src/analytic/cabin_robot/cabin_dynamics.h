@@ -40,6 +40,13 @@ enum BodyIndex {
   kBodies
 };
 
+/// Names in the model, in the order of DriveIndex and BodyIndex.
+inline constexpr std::array<const char*, kDrives> kDriveNames = {"d1",  "X1",  "X2", "X3",
+                                                                 "th3", "th4", "d5", "th6"};
+inline constexpr std::array<const char*, kBodies> kBodyNames = {
+    "carriage", "sliderA", "sliderD", "sliderF", "AB",      "CD",     "EF",
+    "platform", "support", "flip",    "table",   "slewing", "payload"};
+
 struct BodyData {
   double mass = 0.0;
   Vec3 com = Vec3::Zero();      ///< in the body frame [m]

@@ -4,7 +4,7 @@
 
 #include <array>
 
-#include "analytic/cabin_robot/cabin_dynamics.h"
+#include "analytic/cabin_robot/reactions.h"
 #include "analytic/cabin_robot/tool_inverse.h"
 #include "core/spatial.h"
 
@@ -13,11 +13,6 @@ namespace {
 
 using namespace cabin;
 
-constexpr std::array<const char*, kDrives> kDriveNames = {"d1",  "X1",  "X2", "X3",
-                                                          "th3", "th4", "d5", "th6"};
-constexpr std::array<const char*, kBodies> kBodyNames = {
-    "carriage", "sliderA", "sliderD", "sliderF", "AB",      "CD",     "EF",
-    "platform", "support", "flip",    "table",   "slewing", "payload"};
 constexpr std::array<const char*, 3> kTaskNames = {"platform.x", "platform.y", "platform.yaw"};
 constexpr std::array<const char*, 6> kToolNames = {"tool.x",    "tool.y",     "tool.z",
                                                    "tool.roll", "tool.pitch", "tool.yaw"};
@@ -67,7 +62,7 @@ CabinGeometry ReadGeometry(const Mechanism& m) {
 class CabinRobot final : public ClosedForm {
  public:
   CabinRobot(const Mechanism& mechanism, const Motion& motion)
-      : geometry_(ReadGeometry(mechanism)) {
+      : geometry_(ReadGeometry(mechanism)), reactions_(mechanism) {
     for (int d = 0; d < kDrives; ++d) {
       command_of_drive_[d] = motion.FindCommand(kDriveNames[d]);
       model_order_[d] = mechanism.FindDrive(kDriveNames[d]);
@@ -91,6 +86,7 @@ class CabinRobot final : public ClosedForm {
     for (const char* angle : {"alpha", "beta", "epsilon"}) {
       channels.push_back({std::string("linkage.") + angle, "rad", ""});
     }
+    channels.insert(channels.end(), reactions_.channels().begin(), reactions_.channels().end());
     return channels;
   }
 
@@ -106,16 +102,23 @@ class CabinRobot final : public ClosedForm {
     Store(&sample->driven);
     ComputeFrames(geometry_, planar_, outer_, &frames_);
     Vec8 tau = DriveForces(geometry_, frames_);
-    for (const LoadSample& load : command.loads) tau += ForcesOf(load);
+    Demands demands = DemandsOf(geometry_, frames_);
+    for (const LoadSample& load : command.loads) {
+      const BodyWrench wrench = WrenchOf(load);
+      if (wrench.body == kBodies) continue;  // on the world
+      tau += DriveForcesOf(frames_, wrench);
+      TakeOff(wrench, frames_, &demands);
+    }
     sample->force.resize(kDrives);
     for (int d = 0; d < kDrives; ++d) sample->force[model_order_[d]] = tau[d];
 
-    sample->extra.resize(15);
+    sample->extra.resize(15 + static_cast<Eigen::Index>(reactions_.channels().size()));
     StorePose(frames_[kPlatform], sample->extra.data());
     StorePose(frames_[kPayload], sample->extra.data() + 6);
     sample->extra[12] = planar_.alpha.p;
     sample->extra[13] = planar_.beta.p;
     sample->extra[14] = planar_.epsilon.p;
+    reactions_.Write(geometry_, frames_, demands, sample->extra.data() + 15);
     return summary;
   }
 
@@ -183,15 +186,19 @@ class CabinRobot final : public ClosedForm {
     Eigen::Map<Vec3>{out + 3} = RpyOf(frame.R);
   }
 
-  Vec8 ForcesOf(const LoadSample& load) const {
+  // In world axes; the body is kBodies for a wrench on the world.
+  BodyWrench WrenchOf(const LoadSample& load) const {
     int body = 0;
     while (body < kBodies && model_body_[body] != load.body) ++body;
-    if (body == kBodies) return Vec8::Zero();  // a wrench on the world
-    const Mat3 R = load.in_body_axes ? frames_[body].R : Mat3::Identity();
-    return DriveForcesOf(frames_, {body, load.p_BoQ_B, R * load.force, R * load.moment});
+    if (body == kBodies || !load.in_body_axes) {
+      return {body, load.p_BoQ_B, load.force, load.moment};
+    }
+    const Mat3& R = frames_[body].R;
+    return {body, load.p_BoQ_B, R * load.force, R * load.moment};
   }
 
   CabinGeometry geometry_;
+  JointReactions reactions_;
   Space space_ = Space::kNone;
   std::array<int, kDrives> command_of_drive_{}, model_order_{};
   std::array<int, 3> command_of_task_{};

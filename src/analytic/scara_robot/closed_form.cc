@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <numbers>
 
-#include "analytic/scara_robot/dynamics.h"
+#include "analytic/scara_robot/reactions.h"
 #include "core/demand.h"
 #include "core/spatial.h"
 
@@ -34,6 +34,7 @@ class ScaraClosedForm final : public ClosedForm {
       : parameters_(ParametersOf(mechanism)),
         map_(map),
         rod_model_(rod_model),
+        reactions_(mechanism),
         tracker_(parameters_) {}
 
   std::vector<Channel> extra_channels() const override {
@@ -53,6 +54,7 @@ class ScaraClosedForm final : public ClosedForm {
       channels.push_back({limb + ".rod_shear", "rad", ""});
       channels.push_back({limb + ".rod_tilt", "rad", ""});
     }
+    channels.insert(channels.end(), reactions_.channels().begin(), reactions_.channels().end());
     return channels;
   }
 
@@ -73,7 +75,7 @@ class ScaraClosedForm final : public ClosedForm {
     if (!summary.ok()) return summary;
     const PlatformLoad load = Loads(command);
     sample->force = DriveTorques(parameters_, position_, rates_, load.F_P, load.M_z, rod_model_);
-    FillExtra(&sample->extra);
+    FillExtra(load, &sample->extra);
     return summary;
   }
 
@@ -110,19 +112,23 @@ class ScaraClosedForm final : public ClosedForm {
     RunSummary summary = CheckRegular(position_, singularity_);
     if (!summary.ok()) return summary;
     if (time_s > last_time_s_ && last_det_ * singularity_.det < 0.0) {
-      summary.stop = Stop::kSingular;
-      summary.where = "platform";
-      summary.amount = singularity_.s_min;
-      summary.unit = "1";
-      summary.message = fmt::format(
-          "the path crosses a singular pose before ({:.3f}, {:.3f}, {:.3f}) mm, {:.3f} deg: the "
-          "determinant of the direct Jacobian has changed its sign since {:.6g} s",
-          1e3 * position_.X[0], 1e3 * position_.X[1], 1e3 * position_.X[2],
-          position_.X[3] * 180.0 / std::numbers::pi, last_time_s_);
+      summary = Crossed();
     }
     last_time_s_ = time_s;
     last_det_ = singularity_.det;
     return summary;
+  }
+
+  [[nodiscard]] RunSummary Crossed() const {
+    return {.stop = Stop::kSingular,
+            .message = fmt::format(
+                "the path crosses a singular pose before ({:.3f}, {:.3f}, {:.3f}) mm, {:.3f} deg: "
+                "the determinant of the direct Jacobian has changed its sign since {:.6g} s",
+                1e3 * position_.X[0], 1e3 * position_.X[1], 1e3 * position_.X[2],
+                position_.X[3] * 180.0 / std::numbers::pi, last_time_s_),
+            .where = "platform",
+            .amount = singularity_.s_min,
+            .unit = "1"};
   }
 
   PlatformLoad Loads(const CommandSample& command) const {
@@ -137,8 +143,9 @@ class ScaraClosedForm final : public ClosedForm {
     return sum;
   }
 
-  void FillExtra(VecX* extra) const {
-    extra->resize(kOutputChannels + kSingularityChannels + kLimbs * kLimbChannels);
+  void FillExtra(const PlatformLoad& load, VecX* extra) const {
+    constexpr int kKinematic = kOutputChannels + kSingularityChannels + kLimbs * kLimbChannels;
+    extra->resize(kKinematic + static_cast<Eigen::Index>(reactions_.channels().size()));
     extra->head<kOutputChannels>() << position_.X.head<3>(), 0.0, 0.0, position_.X[3];
     (*extra)[kOutputChannels] = singularity_.s_min;
     (*extra)[kOutputChannels + 1] = singularity_.det;
@@ -148,11 +155,15 @@ class ScaraClosedForm final : public ClosedForm {
           << position_.V[i],
           RodShear(position_, i), RodTilt(position_, i);
     }
+    reactions_.Write(parameters_, position_,
+                     JointForces(parameters_, position_, rates_, load.F_P, load.M_z, rod_model_),
+                     extra->data() + kKinematic);
   }
 
   Parameters parameters_;
   CommandMap map_;
   RodModel rod_model_;
+  ReactionChannelsOfLimbs reactions_;
   ForwardTracker tracker_;
   Position position_;
   Rates rates_;

@@ -10,7 +10,8 @@ namespace mbv::scara {
 /// body "platform". Models: "full", "thin_rods" (the paper's rods without spin).
 /// Extra channels: platform.x … platform.yaw, singularity.s_min, singularity.det,
 /// singularity.near (1 where s_min < kNearlySingular: usable with care, else 0) and, per limb,
-/// limbN.dead_point (V), limbN.rod_shear, limbN.rod_tilt.
+/// limbN.dead_point (V), limbN.rod_shear, limbN.rod_tilt; and the forces in the joints limbN.motor,
+/// .pivot (limbs 1, 2), .wrist and .ball_B (limbs 3, 4), where the mechanism has them.
 [[nodiscard]] std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism,
                                                          const Motion& motion,
                                                          const ClosedFormOptions& options,

@@ -1,24 +1,20 @@
 #include "analytic/scara_robot/dynamics.h"
 
 namespace mbv::scara {
-namespace {
+BarInertia SolidBar(double mass, double radius, double length) {
+  const double r2 = radius * radius;
+  return {mass * (3.0 * r2 + length * length) / 12.0, mass * r2 / 2.0};
+}
 
-/// I ω for a rod of direction η.
 Vec3 Times(const BarInertia& inertia, const Vec3& eta, const Vec3& omega) {
   return inertia.transverse * omega + (inertia.axial - inertia.transverse) * eta.dot(omega) * eta;
 }
 
-BarInertia RodInertia(const Parameters& p, RodModel rod_model, int limb) {
-  BarInertia inertia = SolidBar(p.m_rods, p.rod_radius, p.rod_length(limb));
+BarInertia RodInertia(const Parameters& parameters, RodModel rod_model, int limb) {
+  BarInertia inertia =
+      SolidBar(parameters.m_rods, parameters.rod_radius, parameters.rod_length(limb));
   if (rod_model == RodModel::kThin) inertia.axial = 0.0;
   return inertia;
-}
-
-}  // namespace
-
-BarInertia SolidBar(double mass, double radius, double length) {
-  const double r2 = radius * radius;
-  return {mass * (3.0 * r2 + length * length) / 12.0, mass * r2 / 2.0};
 }
 
 Mat4 InverseOfJ(const Parameters& parameters, const Position& position) {

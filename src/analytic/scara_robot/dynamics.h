@@ -59,5 +59,9 @@ struct BarInertia {
   double transverse = 0.0, axial = 0.0;
 };
 [[nodiscard]] BarInertia SolidBar(double mass, double radius, double length);
+/// Of the rods of a limb together.
+[[nodiscard]] BarInertia RodInertia(const Parameters& parameters, RodModel rod_model, int limb);
+/// I ω for a rod of direction η.
+[[nodiscard]] Vec3 Times(const BarInertia& inertia, const Vec3& eta, const Vec3& omega);
 
 }  // namespace mbv::scara

@@ -85,6 +85,7 @@ Parameters ParametersOf(const Mechanism& mechanism) {
   p.arm_com = value("arm_com");
   p.m_rods = value("m_rods");
   p.rod_radius = value("rod_radius");
+  if (mechanism.HasParameter("pivot_mass")) p.pivot_mass = value("pivot_mass");
   p.branch = value("branch") < 0.0 ? -1.0 : 1.0;
   p.gravity_W = mechanism.gravity_W;
   p.home_X << value("home_x"), value("home_y"), value("home_z"), value("home_phi");

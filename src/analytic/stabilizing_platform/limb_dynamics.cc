@@ -55,6 +55,17 @@ PlanePoint Along(const PlanePoint& from, double s, const Jet& q, const Vec3& d, 
   return to;
 }
 
+// A link's centre of mass: at a fraction of its length, com_x beside the plane, com_z beside the
+// line; the normal X × d turns with the link as d does.
+PlanePoint CentreOf(const LinkInertia& link, const PlanePoint& from, double s, const Jet& q,
+                    const Vec3& d, double length) {
+  PlanePoint com = Along(from, s, q, d, link.com_fraction * length);
+  const Vec3 normal(0, -d.z(), d.y());  // X × normal = −d
+  com = Along(com, s, q, normal, link.com_z);
+  com.p.x() += link.com_x;
+  return com;
+}
+
 // (a), (b) for one link.
 Vec6 RequiredWrench(const LinkInertia& link, const PlaneMotion& plane, const PlanePoint& com,
                     double s, const Jet& q, const Vec3& d) {
@@ -111,8 +122,8 @@ void RequiredWrenches(const PlatformParameters& p, const LimbMotion& limb,
     const Vec3 &d1 = geometry.d1[j], &d2 = geometry.d2[j];
     const PlanePoint foot{.p = geometry.U[j]};
     const PlanePoint elbow = Along(foot, s, side.q1, d1, p.L1);
-    const PlanePoint com1 = Along(foot, s, side.q1, d1, first.com_fraction * p.L1);
-    const PlanePoint com2 = Along(elbow, s, side.q2, d2, second.com_fraction * p.L3);
+    const PlanePoint com1 = CentreOf(first, foot, s, side.q1, d1, p.L1);
+    const PlanePoint com2 = CentreOf(second, elbow, s, side.q2, d2, p.L3);
     (*required)[kLink1 + j] = RequiredWrench(first, plane, com1, s, side.q1, d1);
     (*required)[kLink2 + j] = RequiredWrench(second, plane, com2, s, side.q2, d2);
   }

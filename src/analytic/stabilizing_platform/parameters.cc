@@ -31,6 +31,9 @@ class Reader {
   Vec3 GetVector(const std::string& stem) const {
     return {Get(stem + "_x"), Get(stem + "_y"), Get(stem + "_z")};
   }
+  Vec3 GetVector(const std::string& stem, double fallback) const {
+    return {Get(stem + "_x", fallback), Get(stem + "_y", fallback), Get(stem + "_z", fallback)};
+  }
 
  private:
   const Mechanism& mechanism_;
@@ -114,15 +117,18 @@ PlatformParameters ReadParameters(const Mechanism& mechanism, Diagnostics* diagn
                               {"g", &p.g}}) {
     *target = read.Get(name);
   }
+  p.c_p = read.GetVector("c_p", 0.0);
   p.I_p = read.GetVector("I_p");
   const double scale = read.Get("link_mass_scale", 1.0);
   const double inertia_scale = read.Get("link1_inertia_scale", 1.0);
   for (int k = 0; k < 4; ++k) {
-    const std::string stem = std::array{"1", "1p", "2", "2p"}[k];
+    const std::string stem = kLinkStems[k];
     const bool first = k == kLink1 || k == kLink1p;
     p.links[k] = {.mass = scale * read.Get("m_" + stem),
                   .moments = scale * (first ? inertia_scale : 1.0) * read.GetVector("I_" + stem),
-                  .com_fraction = read.Get(first ? "c_1" : "c_2", 0.5)};
+                  .com_fraction = read.Get(first ? "c_1" : "c_2"),
+                  .com_x = read.Get("c_" + stem + "_x", 0.0),
+                  .com_z = read.Get("c_" + stem + "_z", 0.0)};
   }
   if (!missing.empty()) {
     diagnostics->Append(missing);

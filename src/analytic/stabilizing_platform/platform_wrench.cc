@@ -5,10 +5,18 @@
 #include "core/spatial.h"
 
 namespace mbv::stabilizing_platform {
+namespace {
+
+// Of the platform with its load, in {o}.
+Vec3 CentreOfMass(const PlatformParameters& p, const RelativeMotion& motion) {
+  return motion.p_op + motion.R_op * p.c_p;
+}
+
+}  // namespace
 
 Vec6 InertiaWrench(const PlatformParameters& p, const RelativeMotion& motion) {
   const Mat3 I_o = motion.R_op * p.I_p.asDiagonal() * motion.R_op.transpose();
-  const Mat6 N = SpatialInertia(p.m_p, motion.p_op, I_o);
+  const Mat6 N = SpatialInertia(p.m_p, CentreOfMass(p, motion), I_o);
   const Vec6 momentum = N * motion.V_ep;
   // ad(V)ᵀ h = −(ω × m + v × f ; ω × f) for h = (m ; f).
   const auto omega = motion.V_ep.head<3>(), v = motion.V_ep.tail<3>();
@@ -21,7 +29,7 @@ Vec6 InertiaWrench(const PlatformParameters& p, const RelativeMotion& motion) {
 Vec6 GravityWrench(const PlatformParameters& p, const RelativeMotion& motion) {
   Vec6 W;
   const Vec3 weight = p.m_p * motion.gravity;
-  W << motion.p_op.cross(weight), weight;
+  W << CentreOfMass(p, motion).cross(weight), weight;
   return W;
 }
 

@@ -2,7 +2,8 @@
 //
 // Used terms: everything in {o}, moments about {o}'s origin; B_i tip of limb i, X_i, Y_i, Z_i axes
 // of {A_i}; f_i, f_{3+i}, f_X,i forces of limb i on the platform along Z_i, Y_i, X_i; N spatial
-// inertia of the platform; W^I wrench of inertia, W^G of gravity, W^E of external loads.
+// inertia of the platform; r_c its centre of mass (at p in the paper); W^I wrench of inertia, W^G
+// of gravity, W^E of external loads.
 // Assumptions: balls at the tips (no moments).
 //
 // (21) [S1 … S6] f = −W^G − W^I − W^E − Σ f_X,i (B_i × X_i ; X_i),
@@ -16,7 +17,7 @@
 
 namespace mbv::stabilizing_platform {
 
-/// W^I of (22) for the platform with its centre of mass at p.
+/// W^I of (22).
 [[nodiscard]] Vec6 InertiaWrench(const PlatformParameters& p, const RelativeMotion& motion);
 /// W^G of (22).
 [[nodiscard]] Vec6 GravityWrench(const PlatformParameters& p, const RelativeMotion& motion);

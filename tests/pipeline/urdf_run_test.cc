@@ -1,0 +1,106 @@
+// Exported to URDF and read back, the papers' mechanisms run again and need the same drive forces.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+
+#include "mechanism/load_model.h"
+#include "mechanism/urdf.h"
+#include "pipeline/run_scenario.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Case {
+  const char* model;
+  double amplitude;  // of all drives [m or rad]
+};
+
+// The export writes dots in names of drives as _.
+std::string Flat(std::string name) {
+  std::replace(name.begin(), name.end(), '.', '_');
+  return name;
+}
+
+std::string Write(const fs::path& file, const std::string& text) {
+  fs::create_directories(file.parent_path());
+  std::ofstream(file) << text;
+  return file.string();
+}
+
+// All drives swing about home, what is prescribed stays there.
+std::string Scenario(const std::string& model, const Mechanism& mechanism, double amplitude) {
+  std::string text = fmt::format(
+      "mechanism: {}\nmotion:\n  duration_s: 1\n  sample_s: 0.05\n"
+      "  commands:\n",
+      model);
+  for (const Drive& drive : mechanism.drives) {
+    text += fmt::format("    {}: [home, {{sine: {{amplitude: {}, period_s: 1}}}}]\n", drive.name,
+                        amplitude);
+  }
+  for (const Prescribed& p : mechanism.prescribed) text += fmt::format("    {}: home\n", p.name);
+  return text + "analytic: none\nsimulation: {mode: inverse}\nsnapshots: {times_s: []}\n";
+}
+
+Trace TraceOf(const RunOutcome& outcome, const std::string& witness) {
+  EXPECT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  if (!outcome.report) return {};
+  for (const WitnessRecord& record : outcome.report->witnesses) {
+    if (record.name != witness) continue;
+    EXPECT_TRUE(record.summary.ok()) << witness << ": " << record.summary.message;
+    return record.trace;
+  }
+  return {};
+}
+
+class ExportedModel : public testing::TestWithParam<Case> {};
+
+TEST_P(ExportedModel, RunsAgainWithTheSameDriveForces) {
+  const std::string shipped =
+      fmt::format("{}/models/{}/model.yaml", MBV_SOURCE_DIR, GetParam().model);
+  const LoadResult loaded = LoadModel(shipped);
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const fs::path folder = fs::path(testing::TempDir()) / "mbv_urdf_run" / GetParam().model;
+  Write(folder / "robot.urdf", WriteUrdf(*loaded.mechanism));
+  const std::string model =
+      Write(folder / "model.yaml", WriteUrdfCompanion(*loaded.mechanism, "robot.urdf"));
+  const LoadResult back = LoadModel(model);
+  ASSERT_TRUE(back.mechanism) << back.diagnostics.Text();
+
+  RunOptions options;
+  options.pictures = false;
+  const RunOutcome before = RunScenario(
+      Write(folder / "before.yaml", Scenario(shipped, *loaded.mechanism, GetParam().amplitude)),
+      options);
+  const RunOutcome after = RunScenario(
+      Write(folder / "after.yaml", Scenario(model, *back.mechanism, GetParam().amplitude)),
+      options);
+  for (const char* witness : {"reference", "simulated"}) {
+    const Trace a = TraceOf(before, witness), b = TraceOf(after, witness);
+    ASSERT_EQ(a.time_s.size(), 21u) << witness;
+    ASSERT_EQ(b.time_s.size(), 21u) << witness;
+    double scale = 0.0, worst = 0.0;
+    for (const Drive& drive : loaded.mechanism->drives) {
+      const int i = a.Find(drive.name + ".force"), k = b.Find(Flat(drive.name) + ".force");
+      ASSERT_TRUE(i >= 0 && k >= 0) << drive.name;
+      scale = std::max(scale, a.values.col(i).cwiseAbs().maxCoeff());
+      const double difference = (a.values.col(i) - b.values.col(k)).cwiseAbs().maxCoeff();
+      worst = std::isnan(difference) ? kNan : std::max(worst, difference);
+    }
+    // Both close their loops to round-off: 1e-9 is far above it, and far below another mechanism.
+    EXPECT_LT(worst, 1e-9 * scale) << witness;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Urdf, ExportedModel,
+                         testing::Values(Case{"stabilizing_platform", 0.1},
+                                         Case{"spr_tripod", 0.02}, Case{"cabin_robot", 0.02},
+                                         Case{"scara_robot", 0.1}),
+                         [](const auto& c) { return std::string(c.param.model); });
+
+}  // namespace
+}  // namespace mbv
