@@ -24,8 +24,8 @@ namespace fs = std::filesystem;
 constexpr double kMostValues = 1e7;  // of one witness: 80 MB
 
 const std::vector<std::string> kKeys = {
-    "kind",     "mechanism", "description", "parameters", "motion",    "loads", "forces",
-    "analytic", "reference", "simulation",  "checks",     "snapshots", "expect"};
+    "kind",   "mechanism", "description", "parameters", "gravity", "motion",    "loads",
+    "forces", "analytic",  "reference",   "simulation", "checks",  "snapshots", "expect"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -76,6 +76,9 @@ class Loader {
       scenario_.description = yaml_.Text(*description, "description").value_or("");
     }
     ReadParameters(map.Find("parameters"));
+    if (const YamlNode* gravity = map.Find("gravity")) {
+      scenario_.gravity_W = values_.Vector(*gravity, "gravity");
+    }
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     // Numbers from here on may be expressions of the model's parameters.
     if (mechanism_) {
@@ -166,9 +169,7 @@ class Loader {
       return;
     }
     scenario_.model_file = *model_file;
-    LoadOptions options;
-    options.overrides = scenario_.parameters;
-    options.override_places = scenario_.parameter_places;
+    const LoadOptions options = ModelOptions(scenario_);
     LoadResult loaded = LoadModel(*model_file, options);
     model_findings_ = loaded.diagnostics;
     // Wrong overrides alone must not hide what else is wrong with the scenario.
@@ -314,6 +315,14 @@ std::optional<std::string> FirstLineExpectation(const std::string& text) {
 }
 
 }  // namespace
+
+LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more) {
+  LoadOptions options;
+  options.overrides = Merge(scenario.parameters, more);
+  options.override_places = scenario.parameter_places;
+  options.gravity_W = scenario.gravity_W;
+  return options;
+}
 
 ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& options) {
   return Loader(file, options).LoadFile();

@@ -73,6 +73,18 @@ TEST_P(ChangedModelTest, AnEditedLengthIsComparedAndTheAuditStaysWithTheShippedM
   EXPECT_NE(page.find(std::string("mbverify audit ") + GetParam().model), std::string::npos);
 }
 
+TEST_P(ChangedModelTest, GravityOfTheScenarioIsThatOfAllWitnesses) {
+  const std::string gravity = std::string(GetParam().model) == "cabin_robot"  ? "[0, -1.62, 0]"
+                              : std::string(GetParam().model) == "spr_tripod" ? "[0, 0, 1.62]"
+                                                                              : "[0, 0, -1.62]";
+  const std::string scenario =
+      (kScenarios / GetParam().model / GetParam().scenario).string() + ".yaml";
+  const ProgramResult result = mbverify(
+      "run -q --no-pictures --mode inverse --set motion.sample_s=0.05 --set 'gravity=" + gravity +
+      "' --out '" + mbverify.Out() + "' '" + scenario + "'");
+  EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
+}
+
 INSTANTIATE_TEST_SUITE_P(Papers, ChangedModelTest, testing::ValuesIn(kPapers),
                          [](const auto& info) { return std::string(info.param.model); });
 

@@ -254,6 +254,18 @@ TEST_F(LoadScenarioTest, ParametersMayBeGivenInDegreesAndMillimetres) {
             std::string::npos);
 }
 
+TEST_F(LoadScenarioTest, AScenarioMayGiveGravity) {
+  const ScenarioResult result = Load(Complete("gravity: [0, 0, -1.62]\n"));
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  EXPECT_EQ(result.mechanism->gravity_W, Vec3(0, 0, -1.62));
+  EXPECT_EQ(*ModelOptions(*result.scenario).gravity_W, Vec3(0, 0, -1.62));
+  const ScenarioResult weightless = Load(Complete(), {{"gravity", "[0, 0, 0]"}});
+  ASSERT_TRUE(weightless.scenario) << weightless.diagnostics.Text();
+  EXPECT_EQ(weightless.mechanism->gravity_W, Vec3::Zero());
+  EXPECT_EQ(weightless.mechanism->up_W, Vec3::UnitZ());
+  EXPECT_NE(Messages(Complete("gravity: 9.81\n")).find("gravity"), std::string::npos);
+}
+
 TEST_F(LoadScenarioTest, FindingsAboutSetValuesNameTheOption) {
   EXPECT_EQ(Messages(Complete(), {{"simulation.stp_s", "0.1"}}),
             "--set simulation.stp_s=0.1: error: simulation: unknown key 'stp_s'\n"

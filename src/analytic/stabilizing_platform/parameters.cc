@@ -110,9 +110,16 @@ PlatformParameters ReadParameters(const Mechanism& mechanism, Diagnostics* diagn
                               {"L4", &p.L4},
                               {"L5", &p.L5},
                               {"s_r_so", &p.s_r_so},
-                              {"m_p", &p.m_p},
-                              {"g", &p.g}}) {
+                              {"m_p", &p.m_p}}) {
     *target = read.Get(name);
+  }
+  const Vec3& gravity = mechanism.gravity_W;
+  p.g = -gravity.z();
+  if (gravity.x() != 0.0 || gravity.y() != 0.0) {
+    AddError(&missing,
+             fmt::format("gravity = [{}, {}, {}]: the closed form has gravity along z only",
+                         gravity.x(), gravity.y(), gravity.z()),
+             "analytic: none leaves it out");
   }
   p.I_p = read.GetVector("I_p");
   const double scale = read.Get("link_mass_scale", 1.0);
