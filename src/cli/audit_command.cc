@@ -70,13 +70,13 @@ int Audit(const AuditArguments& arguments) {
     names.push_back(entry.mechanism);
     if (!arguments.model.empty() && entry.mechanism != arguments.model) continue;
     found = true;
-    const auto file = FindModel(entry.mechanism, ".");
-    if (!file) {
-      fmt::print(stderr, "error: the model of {} is not found\n", entry.mechanism);
+    // A model of the same name in the current folder may be another one.
+    const auto models_dir = ShippedModels();
+    if (!models_dir) {
+      fmt::print(stderr, "error: the models that come with the program are not found\n");
       return 2;
     }
-    const auto models_dir = std::filesystem::path(*file).parent_path().parent_path();
-    const AuditTable table = entry.run(models_dir);
+    const AuditTable table = entry.run(models_dir->string());
     if (arguments.markdown) {
       fmt::print("{}", ToMarkdown(table));
     } else {

@@ -4,8 +4,11 @@
 
 #include <array>
 #include <cerrno>
+#include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
+#include <new>
 #include <system_error>
 
 #include "pipeline/version.h"
@@ -27,6 +30,21 @@ void Complain(const std::string& text) { std::fputs((text + "\n").c_str(), stder
 int InternalError(const std::exception& error) {
   Complain(std::string("internal error: ") + error.what());
   return 4;
+}
+
+// NaN passes every range, and infinity most.
+std::string WhyNotFinite(const std::string& text) {
+  // What is no number at all has its own message.
+  return std::isfinite(std::strtod(text.c_str(), nullptr)) ? "" : text + " is not a finite number";
+}
+
+void RequireFiniteNumbers(CLI::App* app) {
+  for (CLI::Option* option : app->get_options()) {
+    if (option->get_type_name().starts_with("FLOAT")) option->check(WhyNotFinite, "");
+  }
+  for (CLI::App* command : app->get_subcommands([](CLI::App*) { return true; })) {
+    RequireFiniteNumbers(command);
+  }
 }
 
 }  // namespace
@@ -66,6 +84,7 @@ int RunCli(int argc, char** argv) {
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);
+  RequireFiniteNumbers(&app);
   std::string lost;  // why output was lost
   try {
     app.parse(argc, argv);
@@ -75,6 +94,9 @@ int RunCli(int argc, char** argv) {
     // This is how printing reports that it failed.
     if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) return InternalError(error);
     lost = error.code().message();
+  } catch (const std::bad_alloc&) {
+    Complain("error: could not run: out of memory");
+    exit_code = 3;
   } catch (const std::exception& error) {
     return InternalError(error);
   }

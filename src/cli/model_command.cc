@@ -1,17 +1,18 @@
 // mbverify model, check, list
 #include <fmt/format.h>
 
-#include <charconv>
 #include <filesystem>
 #include <memory>
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/terminal.h"
 #include "mechanism/load_model.h"
 #include "pipeline/check_file.h"
 #include "pipeline/model_text.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
+#include "scenario/set_values.h"
 
 namespace mbv {
 namespace {
@@ -23,24 +24,20 @@ struct ModelArguments {
   std::vector<std::string> set;
 };
 
-// "m_p=1000" of --set.
+// "m_p=1000" of --set; false after a message.
 bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
+  std::vector<SetValue> values;
   for (const std::string& text : texts) {
     const auto set = SplitSet(text);
-    double value = 0.0;
-    const char* end = set ? set->second.data() + set->second.size() : nullptr;
-    const auto parsed = set ? std::from_chars(set->second.data(), end, value)
-                            : std::from_chars_result{nullptr, std::errc::invalid_argument};
-    if (parsed.ec != std::errc() || parsed.ptr != end) {
+    if (!set) {
       fmt::print(stderr, "--set {}: error: write PARAMETER=NUMBER, e.g. m_p=45000\n", text);
       return false;
     }
-    options->overrides[set->first] = value;
-    Finding place;
-    place.file = "--set " + text;
-    options->override_places[set->first] = place;
+    values.push_back(*set);
   }
-  return true;
+  const Diagnostics findings = ReadParameterOptions(values, options);
+  fmt::print(stderr, "{}", findings.Text());
+  return !findings.has_errors();
 }
 
 ModelFormat FormatOf(const std::string& word) {
@@ -82,6 +79,7 @@ int Model(const ModelArguments& arguments) {
 
 int CheckFiles(const std::vector<std::string>& arguments) {
   int exit_code = 0;
+  FindingPrinter findings(stdout);
   for (const std::string& argument : arguments) {
     const std::vector<std::string> files = ExpandYaml(argument);
     if (files.empty()) {
@@ -90,7 +88,7 @@ int CheckFiles(const std::vector<std::string>& arguments) {
     }
     for (const std::string& file : files) {
       const Diagnostics diagnostics = CheckFile(file);
-      fmt::print("{}", diagnostics.Text());
+      findings.Print(diagnostics);
       if (diagnostics.has_errors()) {
         exit_code = 2;
       } else {

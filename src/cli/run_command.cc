@@ -3,11 +3,13 @@
 
 #include <cstdio>
 #include <memory>
+#include <new>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "core/demand.h"
+#include "pipeline/out_of_memory.h"
 #include "pipeline/run_scenario.h"
 #include "report/stiffness_report.h"
 
@@ -22,17 +24,19 @@ struct RunArguments {
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
 RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunArguments& arguments,
-                  ProgressLine* progress) {
+                  ProgressLine* progress, FindingPrinter* findings) {
   RunOutcome outcome;
   try {
     outcome = RunScenario(file, options);
+  } catch (const std::bad_alloc&) {
+    outcome = OutOfMemory(file, options.scenario);
   } catch (const std::exception& error) {
     progress->Clear();
     fmt::print(stderr, "{}: internal error: {}\n", file, error.what());
     return {};
   }
   progress->Clear();
-  fmt::print(stderr, "{}", outcome.diagnostics.Text());
+  findings->Print(outcome.diagnostics);
   if (outcome.report) {
     const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
     fmt::print("{}", arguments.quiet ? VerdictLine(*outcome.report, table)
@@ -78,6 +82,7 @@ int Run(const RunArguments& arguments) {
     return 2;
   }
   ProgressLine progress(!arguments.quiet);
+  FindingPrinter findings(stderr);
   RunCounts counts;
   int exit_code = 0;
   for (const std::string& file : files) {
@@ -86,7 +91,7 @@ int Run(const RunArguments& arguments) {
         progress.Show(file + ": " + stage, fraction);
       };
     }
-    const RunOutcome outcome = RunOne(file, options, arguments, &progress);
+    const RunOutcome outcome = RunOne(file, options, arguments, &progress, &findings);
     exit_code = WorseExit(exit_code, outcome.exit_code);
     counts += outcome.report      ? CountOf(*outcome.report)
               : outcome.stiffness ? CountOf(*outcome.stiffness)

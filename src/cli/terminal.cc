@@ -1,11 +1,19 @@
 #include "cli/terminal.h"
 
+#include <fmt/format.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
 
 namespace mbv {
+
+void FindingPrinter::Print(const Diagnostics& diagnostics) {
+  for (const Finding& finding : diagnostics.findings()) {
+    const std::string text = ToText(finding);
+    if (told_.insert(text).second) fmt::print(to_, "{}\n", text);
+  }
+}
 
 bool WantsColor() {
   const char* no_color = std::getenv("NO_COLOR");

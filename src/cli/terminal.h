@@ -1,9 +1,24 @@
 // What the terminal is like, and progress on it.
 #pragma once
 
+#include <cstdio>
+#include <set>
 #include <string>
 
+#include "core/diagnostics.h"
+
 namespace mbv {
+
+/// Prints findings, each once while the program runs: scenarios of one model share its warnings.
+class FindingPrinter {
+ public:
+  explicit FindingPrinter(std::FILE* to) : to_(to) {}
+  void Print(const Diagnostics& diagnostics);
+
+ private:
+  std::FILE* to_;
+  std::set<std::string> told_;
+};
 
 /// Colour on stdout: a terminal, and NO_COLOR is not set.
 [[nodiscard]] bool WantsColor();

@@ -7,9 +7,11 @@
 #include <boost/math/tools/minima.hpp>
 #include <cmath>
 #include <limits>
-#include <numbers>
 #include <optional>
 #include <tuple>
+
+#include "comparison/known_factors.h"
+#include "comparison/table_drift.h"
 
 namespace mbv {
 namespace {
@@ -19,42 +21,9 @@ constexpr double kExplains = 0.1;
 // … and no more than this multiple of the column's tube, or this share of the signal.
 constexpr double kTubes = 3.0;
 constexpr double kShare = 0.02;
-// How far a fitted factor may be from a known one.
-constexpr double kSameFactor = 5e-3;
 constexpr size_t kOneOutlierIn = 100;  // rows; more of them are no outliers
 constexpr size_t kMostShifted = 800;   // rows used to find a time shift
 constexpr int kShiftSteps = 400;       // to either side
-
-struct KnownFactor {
-  double factor;
-  const char* text;
-};
-constexpr double kPi = std::numbers::pi;
-constexpr KnownFactor kFactors[] = {
-    {1e3, "1000: is the unit kN, mm or ms mistaken?"},
-    {1e-3, "1/1000: is the unit kN, mm or ms mistaken?"},
-    {1e6, "1000000: is the unit mistaken?"},
-    {1e-6, "1/1000000: is the unit mistaken?"},
-    {180.0 / kPi, "180/pi: degrees taken for radians?"},
-    {kPi / 180.0, "pi/180: radians taken for degrees?"},
-    {9.80665, "9.81: N taken for kgf, or a mass for a weight?"},
-    {1.0 / 9.80665, "1/9.81: kgf taken for N, or a weight for a mass?"},
-    {4.4482216152605, "4.448: N taken for lbf?"},
-    {1.0 / 4.4482216152605, "1/4.448: lbf taken for N?"},
-    {0.0254, "0.0254: inches taken for metres?"},
-    {1.0 / 0.0254, "1/0.0254: metres taken for inches?"},
-    {2.0 * kPi, "2 pi: revolutions taken for radians?"},
-    {0.5 / kPi, "1/(2 pi): radians taken for revolutions?"},
-    {2.0, "2: is something counted twice?"},
-    {0.5, "1/2: is it shared between two?"},
-};
-
-const KnownFactor* FindFactor(double factor) {
-  for (const KnownFactor& known : kFactors) {
-    if (std::abs(factor / known.factor - 1.0) < kSameFactor) return &known;
-  }
-  return nullptr;
-}
 
 // One column of the table and the other witness' signal of the same name, at common samples.
 struct Series {
@@ -75,12 +44,13 @@ std::string Signal(const std::string& channel) { return channel.substr(channel.r
 
 // An explanation of one column.
 struct Explanation {
-  enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor, kOutliers };
+  enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor, kOutliers, kDrift };
   Kind kind = Kind::kSign;
   double factor = 1.0, offset = 0.0;
   size_t partner = 0;                // index of the series that it looks like
   double left = kNan;                // RMS of the difference that stays
   std::vector<double> times_s = {};  // of outliers
+  std::string text = {};             // of a drift
 };
 
 class Diagnosis {
@@ -149,7 +119,22 @@ class Diagnosis {
     if (good(offset)) return offset;
     scaled.kind = Explanation::Kind::kUnknownFactor;
     if (good(scaled)) return scaled;
-    return Outliers(series);
+    if (auto outliers = Outliers(series)) return outliers;
+    return Drifting(series);
+  }
+
+  [[nodiscard]] std::optional<Explanation> Drifting(const Series& series) const {
+    VecX time_s(series.table.size());
+    for (size_t i = 0; i < samples_.size(); ++i) {
+      const auto row = static_cast<size_t>(samples_[i].first);
+      time_s(static_cast<Eigen::Index>(i)) = table_.trace.time_s[row];
+    }
+    const auto drift = FindDrift(time_s, series.table - series.other, series.unit);
+    if (!drift) return {};
+    Explanation finding{.kind = Explanation::Kind::kDrift};
+    finding.left = drift->left;
+    finding.text = drift->text;
+    return finding;
   }
 
   // A few rows that leave the tube of a single sample, while all others lie in the tubes.
@@ -261,6 +246,8 @@ class Diagnosis {
             columns, channel, finding.offset, series_[k].unit, Left(k));
       case Explanation::Kind::kOutliers:
         return OutlierText(k);
+      case Explanation::Kind::kDrift:
+        return fmt::format("{} drifts away from {}: {}", columns, channel, finding.text);
       case Explanation::Kind::kUnknownFactor:
         return fmt::format("{} is {:.6g} times {}: a mass, a length or a gear ratio? ({})", columns,
                            finding.factor, channel, Left(k));

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <numeric>
+#include <tuple>
+
+#include "core/text.h"
 
 namespace mbv {
 namespace {
@@ -23,8 +26,16 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 
 }  // namespace
 
+// Files that are read for several purposes give their findings once.
 void Diagnostics::Append(const Diagnostics& other) {
-  findings_.insert(findings_.end(), other.findings_.begin(), other.findings_.end());
+  const auto parts = [](const Finding& f) {
+    return std::tie(f.severity, f.file, f.line, f.column, f.message, f.hint);
+  };
+  for (const Finding& finding : other.findings_) {
+    const bool known = std::any_of(findings_.begin(), findings_.end(),
+                                   [&](const Finding& f) { return parts(f) == parts(finding); });
+    if (!known) findings_.push_back(finding);
+  }
 }
 
 bool Diagnostics::has_errors() const {
@@ -50,7 +61,7 @@ std::string ToText(const Finding& finding) {
   text += finding.severity == Severity::kError ? "error: " : "warning: ";
   text += finding.message;
   if (!finding.hint.empty()) text += "\n  hint: " + finding.hint;
-  return text;
+  return Printable(text);  // names and values come from files
 }
 
 std::string ClosestWord(const std::string& word, const std::vector<std::string>& candidates) {

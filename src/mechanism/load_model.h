@@ -1,6 +1,7 @@
 // model.yaml (and URDF) → Mechanism.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -12,11 +13,22 @@
 namespace mbv {
 
 struct LoadOptions {
-  /// Parameter overrides by name; an unknown name is an error.
+  /// Parameter overrides by name; an unknown name is an error. Names may end in a unit:
+  /// ParameterIn().
   std::map<std::string, double> overrides;
   /// Where the overrides were written, for messages ("scenario.yaml:7:3").
   std::map<std::string, Finding> override_places;
+  std::optional<Vec3> gravity_W;  ///< [m/s²], instead of the model's; its `up` stays
 };
+
+/// The parameter that an override sets: "alpha_deg" is alpha in degrees, "l_mm" is l in
+/// millimetres, where the model has no parameter of the whole name.
+struct ParameterInUnit {
+  std::string name;     ///< as given if no parameter fits
+  double factor = 1.0;  ///< to SI and radians
+};
+[[nodiscard]] ParameterInUnit ParameterIn(
+    const std::string& given, const std::function<bool(const std::string&)>& is_parameter);
 
 struct LoadResult {
   std::optional<Mechanism> mechanism;  ///< empty when there are errors

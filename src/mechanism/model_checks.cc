@@ -10,6 +10,7 @@
 #include "mechanism/home.h"
 #include "mechanism/mobility.h"
 #include "mechanism/model_reader.h"
+#include "mechanism/tilted_axis.h"
 
 namespace mbv {
 
@@ -93,6 +94,7 @@ bool ModelReader::CheckTree() {
 void ModelReader::CloseLoops() {
   const HomeResult home = SolveHome(&mechanism_);
   if (home.closed) return;
+  CheckAxes(false);
   for (const LoopGap& gap : home.gaps) {
     if (gap.position_m <= kHomeTolerance && gap.rotation_rad <= kHomeTolerance) continue;
     const Joint& joint = mechanism_.joints[gap.joint];
@@ -164,8 +166,38 @@ void ModelReader::ReportTree(const SpanningTreeResult& tree) {
   }
 }
 
+// An axis that is tilted by a typing slip: the cause behind what else is wrong.
+void ModelReader::CheckAxes(bool closed_at_home) {
+  const auto tilted = FindTiltedAxis(mechanism_, closed_at_home);
+  if (!tilted) return;
+  const Joint &joint = mechanism_.joints[tilted->joint], &other = mechanism_.joints[tilted->other];
+  const bool like = (joint.kind == JointKind::kPrismatic) == (other.kind == JointKind::kPrismatic);
+  const std::string text = fmt::format(
+      "the axis of joint '{}' is tilted by {:.3g} deg against that of joint '{}' on {}: with {} "
+      "axes "
+      "{}",
+      joint.name, tilted->angle_rad / kDeg.factor, other.name, mechanism_.bodies[tilted->body].name,
+      like ? "parallel" : "perpendicular",
+      closed_at_home ? fmt::format("the mechanism has {} freedoms instead of {}",
+                                   tilted->freedoms_aligned, tilted->freedoms)
+                     : "the loops close");
+  const YamlEntry* at = joint_places_[tilted->joint];
+  const std::string hint = "look at its axis and at the rotations of its two frames";
+  if (const auto urdf = urdf_places_.find(joint.name);
+      at == nullptr && urdf != urdf_places_.end()) {
+    Finding finding = urdf->second;
+    finding.severity = Severity::kWarning;
+    finding.message = text;
+    finding.hint = hint;
+    other_findings_.Add(finding);
+    return;
+  }
+  yaml_.AddAt(Severity::kWarning, at ? at->line : 0, at ? at->column : 0, text, hint);
+}
+
 void ModelReader::CheckHome() {
   yaml_.SetNote("");
+  CheckAxes(true);
   const double slack = 1e-9;
   const auto outside = [&](double value, const CoordinateRange& range) {
     return value < range.lower - slack || value > range.upper + slack;

@@ -155,29 +155,50 @@ void ModelReader::EvaluateParameters(YamlReader* yaml, const Block& block, const
   }
 }
 
+ParameterInUnit ParameterIn(const std::string& given,
+                            const std::function<bool(const std::string&)>& is_parameter) {
+  if (is_parameter(given)) return {given, 1.0};
+  for (const UnitSuffix& unit : {kDeg, kMm}) {
+    if (!given.ends_with(unit.suffix)) continue;
+    std::string plain = given.substr(0, given.size() - unit.suffix.size());
+    if (is_parameter(plain)) return {std::move(plain), unit.factor};
+  }
+  return {given, 1.0};
+}
+
 void ModelReader::ApplyOverrides(const Block& block) {
   for (const auto& [name, value] : options_.overrides) {
     if (!name.starts_with(block.prefix)) continue;
-    const std::string inner = name.substr(block.prefix.size());
+    const auto [inner, factor] =
+        ParameterIn(name.substr(block.prefix.size()),
+                    [&](const std::string& known) { return block.scope->Has(known); });
     if (!block.scope->Has(inner)) continue;
-    block.scope->Set(inner, value);
+    block.scope->Set(inner, factor * value);
     override_used_[name] = true;
+    if (const auto [other, first] = overridden_.emplace(block.prefix + inner, name); !first) {
+      Finding finding = PlaceOfOverride(name);
+      finding.message = fmt::format("{} and {} are both given", other->second, name);
+      finding.hint = "keep one of them";
+      other_findings_.Add(finding);
+    }
   }
   for (const std::string& name : block.scope->Names()) {
     if (block.scope->Has(name)) known_parameters_.push_back(block.prefix + name);
   }
 }
 
+Finding ModelReader::PlaceOfOverride(const std::string& name) const {
+  const auto place = options_.override_places.find(name);
+  Finding finding = place == options_.override_places.end() ? Finding{} : place->second;
+  finding.severity = Severity::kError;
+  return finding;
+}
+
 void ModelReader::CheckOverrides() {
   for (const auto& [name, value] : options_.overrides) {
     const std::string why = WhyNoNumber(value);
     if (override_used_[name] && why.empty()) continue;
-    Finding finding;
-    if (const auto place = options_.override_places.find(name);
-        place != options_.override_places.end()) {
-      finding = place->second;
-    }
-    finding.severity = Severity::kError;
+    Finding finding = PlaceOfOverride(name);
     if (override_used_[name]) {
       finding.message = fmt::format("parameter {} = {} {}", name, value, why);
     } else {

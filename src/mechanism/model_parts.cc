@@ -44,6 +44,7 @@ void ModelReader::ReadHead() {
     mechanism_.gravity_W = Vector(model, *gravity, "gravity").value_or(Vec3::Zero());
   }
   ReadUp(model, map.Find("up"));
+  if (options_.gravity_W) mechanism_.gravity_W = *options_.gravity_W;
 }
 
 // Which way is up in pictures; gravity says it unless a scenario switches it off.

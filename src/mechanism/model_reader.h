@@ -79,6 +79,7 @@ class ModelReader {
   void EvaluateParameters(YamlReader* yaml, const Block& block, const YamlNode* node,
                           const std::string& path, const std::set<std::string>& replaced = {});
   void ApplyOverrides(const Block& block);
+  [[nodiscard]] Finding PlaceOfOverride(const std::string& name) const;
   void CheckOverrides();
 
   // model_bodies.cc
@@ -167,6 +168,7 @@ class ModelReader {
   bool CheckTree();
   void CloseLoops();
   void ReportTree(const SpanningTreeResult& tree);
+  void CheckAxes(bool closed_at_home);
   void CheckHome();
   void CheckIsostaticRule();
 
@@ -233,8 +235,9 @@ class ModelReader {
   std::map<std::string, Finding> urdf_places_;  // of the URDF's joints, closures included
   std::deque<YamlEntry> urdf_drives_;           // places of drives that a closure file names
   std::map<std::string, bool> override_used_;
-  Diagnostics other_findings_;                 // of other files: overrides, URDF, parameters
-  std::vector<std::string> known_parameters_;  // dotted names, for "did you mean"
+  std::map<std::string, std::string> overridden_;  // full name of a parameter → name as given
+  Diagnostics other_findings_;                     // of other files: overrides, URDF, parameters
+  std::vector<std::string> known_parameters_;      // dotted names, for "did you mean"
 };
 
 }  // namespace mbv

@@ -202,7 +202,27 @@ class ClosureReader {
   bool good_ = true;
 };
 
-// Closures that mbverify does not read, but that must not be lost silently.
+// A gear ratio anywhere inside a <transmission>: dialects put it below the joint, the actuator or
+// the transmission itself.
+void WarnOfReduction(const XMLElement& element, const char* transmission, const std::string& file,
+                     Diagnostics* diagnostics) {
+  for (const XMLElement* e = element.FirstChildElement(); e != nullptr;
+       e = e->NextSiblingElement()) {
+    WarnOfReduction(*e, transmission, file, diagnostics);
+    const std::string tag = e->Name();
+    if (tag != "mechanicalReduction" && tag != "mechanical_reduction") continue;
+    double ratio = 0.0;
+    if (e->QueryDoubleText(&ratio) == tinyxml2::XML_SUCCESS && ratio == 1.0) continue;
+    const char* text = e->GetText();
+    diagnostics->Add(
+        {Severity::kWarning, file, e->GetLineNum(), 1,
+         fmt::format("transmission '{}': the reduction {} is left out",
+                     transmission == nullptr ? "" : transmission, text == nullptr ? "" : text),
+         "positions and forces are those of the joint, not of the motor"});
+  }
+}
+
+// Closures and gears that mbverify does not read, but that must not be lost silently.
 void WarnOfOthers(const XMLElement& element, const std::string& file, Diagnostics* diagnostics) {
   const std::string tag = element.Name();
   const auto warn = [&](const std::string& text, const std::string& hint) {
@@ -214,6 +234,8 @@ void WarnOfOthers(const XMLElement& element, const std::string& file, Diagnostic
   } else if (tag == "coupling") {
     warn("<coupling> is left out: there are no gears between joints here",
          "drive both joints and couple them by `equal` in the scenario");
+  } else if (tag == "transmission") {
+    WarnOfReduction(element, element.Attribute("name"), file, diagnostics);
   }
 }
 

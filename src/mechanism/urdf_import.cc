@@ -8,6 +8,7 @@
 #include <set>
 
 #include "core/spatial.h"
+#include "core/text.h"
 #include "mechanism/urdf.h"
 #include "mechanism/urdf_closures.h"
 #include "mechanism/urdf_frames.h"
@@ -63,6 +64,7 @@ class Importer {
 
   UrdfTree Run(const urdf::ModelInterface& model) {
     tree_.name = model.getName();
+    CheckName("robot", tree_.name, 0);
     const urdf::LinkConstSharedPtr root = model.getRoot();
     // Depth first in name order: the order in the file is lost in urdfdom's maps.
     AddLink(*root);
@@ -77,6 +79,8 @@ class Importer {
     }
     for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
     WarnOfMeshes();
+    WarnOfLosses("damping", damped_);
+    WarnOfLosses("friction", rubbing_);
     return std::move(tree_);
   }
 
@@ -95,6 +99,12 @@ class Importer {
     Add(Severity::kWarning, line, text, hint);
   }
 
+  // Character references (&#27;) can write what the file itself must not hold.
+  void CheckName(const char* what, const std::string& name, int line) {
+    if (FindNonName(name) == std::string::npos) return;
+    Error(line, fmt::format("{} '{}': the name holds control characters", what, name));
+  }
+
   void AddLink(const urdf::Link& start) {
     std::vector<const urdf::Link*> waiting = {&start};
     while (!waiting.empty()) {
@@ -105,6 +115,7 @@ class Importer {
       } else {
         index_[link.name] = static_cast<int>(tree_.bodies.size());
         tree_.body_lines.push_back(LineOf(details_.link_lines, link.name));
+        CheckName("link", link.name, tree_.body_lines.back());
         tree_.bodies.push_back(BodyOf(link));
         if (link.parent_joint) AddJoint(*link.parent_joint);
       }
@@ -162,6 +173,27 @@ class Importer {
     body->shapes.push_back(shape);
   }
 
+  // Joints with a value that is left out.
+  struct Losses {
+    int joints = 0, line = 0;
+    std::string text;
+  };
+  static void AddLoss(const std::string& joint, double value, int line, Losses* losses) {
+    constexpr int kMost = 8;
+    if (value == 0.0) return;
+    if (losses->joints++ == 0) losses->line = line;
+    if (losses->joints > kMost) return;
+    losses->text += fmt::format("{}{} ({:g})", losses->joints == 1 ? "" : ", ", joint, value);
+    if (losses->joints == kMost) losses->text += ", …";
+  }
+  void WarnOfLosses(const char* what, const Losses& losses) {
+    if (losses.joints == 0) return;
+    Warn(losses.line,
+         fmt::format("{} in {} joint{} is left out: {}", what, losses.joints,
+                     losses.joints == 1 ? "" : "s", losses.text),
+         "drive forces are computed without it");
+  }
+
   // One finding for all: robots have hundreds.
   void WarnOfMeshes() {
     if (meshes_ == 0) return;
@@ -173,6 +205,7 @@ class Importer {
 
   void AddClosure(const internal::UrdfClosure& closure) {
     Joint joint = closure.joint;
+    CheckName("closure", joint.name, closure.line);
     std::vector<std::string> links = {"world"};
     for (const auto& [name, index] : index_) links.push_back(name);
     const auto find = [&](const std::string& link) {
@@ -203,6 +236,7 @@ class Importer {
 
   void AddJoint(const urdf::Joint& from) {
     const int line = LineOf(details_.joint_lines, from.name);
+    CheckName("joint", from.name, line);
     Joint joint;
     joint.name = from.name;
     joint.parent = index_[from.parent_link_name];
@@ -243,6 +277,10 @@ class Importer {
       joint.axis = axis.normalized();
     }
     ReadLimits(from, &joint);
+    if (from.dynamics) {
+      AddLoss(from.name, from.dynamics->damping, line, &damped_);
+      AddLoss(from.name, from.dynamics->friction, line, &rubbing_);
+    }
     if (from.mimic) {
       Warn(line,
            fmt::format("joint '{}': mimic of '{}' is left out, the joint is free", from.name,
@@ -267,6 +305,7 @@ class Importer {
   Diagnostics* diagnostics_;
   UrdfTree tree_;
   std::map<std::string, int> index_;
+  Losses damped_, rubbing_;
   int meshes_ = 0;
   std::string first_mesh_;
 };

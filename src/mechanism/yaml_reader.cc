@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <iterator>
+#include <map>
+#include <utility>
 
 namespace mbv {
 
@@ -49,6 +52,27 @@ std::string Shortened(const std::string& text) {
 
 }  // namespace
 
+namespace {
+
+bool IsControl(char c) {
+  const auto byte = static_cast<unsigned char>(c);
+  return byte < 0x20 || byte == 0x7F;
+}
+
+// Where the text of a pipe (`<(…)`, /dev/stdin) is kept, which gives it only once although a
+// scenario is read for its kind, for its values and for each witness; null for files and folders.
+std::optional<std::string>* KeptText(const std::string& file) {
+  static std::map<std::string, std::optional<std::string>> texts;
+  std::error_code error;
+  const auto type = std::filesystem::status(file, error).type();
+  const bool pipe = type == std::filesystem::file_type::fifo ||
+                    type == std::filesystem::file_type::socket ||
+                    type == std::filesystem::file_type::character;
+  return pipe ? &texts[file] : nullptr;
+}
+
+}  // namespace
+
 std::string Describe(const YamlNode& node) {
   switch (node.kind) {
     case YamlNode::Kind::kNull:
@@ -64,6 +88,13 @@ std::string Describe(const YamlNode& node) {
 }
 
 std::optional<std::string> YamlReader::ReadFile() {
+  // Results are named after files, in folders, pages and terminals.
+  if (std::any_of(file_.begin(), file_.end(), IsControl)) {
+    AddAt(Severity::kError, 0, 0, "the name of the file holds control characters", "rename it");
+    return std::nullopt;
+  }
+  std::optional<std::string>* kept = KeptText(file_);
+  if (kept != nullptr && *kept) return **kept;
   std::ifstream stream(file_, std::ios::binary);
   std::string text;
   if (stream) {
@@ -77,6 +108,7 @@ std::optional<std::string> YamlReader::ReadFile() {
           "check the name; paths are relative to the current folder");
     return std::nullopt;
   }
+  if (kept != nullptr) *kept = text;
   return text;
 }
 
@@ -185,17 +217,35 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
     return;
   }
   const std::string shown = path_.empty() ? "the file" : path_;
+  const auto is_known = [&](const std::string& key) {
+    return std::find(keys.begin(), keys.end(), key) != keys.end();
+  };
   if (!node_->is_map()) {
-    reader_->Error(*node_, fmt::format("{} is {}, a map is needed", shown, Describe(*node_)));
+    const size_t dot = path_.rfind('.');
+    const std::string own = dot == std::string::npos ? "" : path_.substr(dot + 1);
+    reader_->Error(*node_, fmt::format("{} is {}, a map is needed", shown, Describe(*node_)),
+                   is_known(own) ? fmt::format("'{}' belongs into an entry of {}: indent it deeper",
+                                               own, path_.substr(0, dot))
+                                 : "");
     return;
   }
   valid_ = true;
+  const YamlEntry* before = nullptr;
   for (const YamlEntry& entry : node_->entries) {
-    if (std::find(keys.begin(), keys.end(), entry.key) != keys.end()) continue;
+    const YamlEntry* above = std::exchange(before, &entry);
+    if (is_known(entry.key)) continue;
     const std::string near = ClosestWord(Shortened(entry.key), keys);
+    const std::vector<YamlEntry>& inner = entry.value->entries;
+    const bool like_this = !inner.empty() && !path_.empty() &&
+                           std::all_of(inner.begin(), inner.end(),
+                                       [&](const YamlEntry& e) { return is_known(e.key); });
     std::string hint;
     if (entry.value->is_null() && entry.key.find(' ') != std::string::npos) {
       hint = "inside { } a text with a comma needs quotes";
+    } else if (like_this) {
+      hint = "it looks like another entry of the level above: indent it less";
+    } else if (near.empty() && above != nullptr && above->value->is_null()) {
+      hint = fmt::format("if it belongs into '{}', indent it deeper", Shortened(above->key));
     } else if (!near.empty()) {
       hint = fmt::format("did you mean '{}'?", near);
     } else {

@@ -9,7 +9,9 @@
 #include <map>
 #include <sstream>
 
+#include "core/text.h"
 #include "mechanism/yaml_reader.h"
+#include "mechanism/yaml_syntax.h"
 
 namespace mbv {
 namespace {
@@ -38,6 +40,7 @@ class TreeBuilder : public YAML::EventHandler {
     node->text = value;
     node->quoted = tag == "!";
     CheckTag(mark, tag);
+    CheckText(mark, value);
     Leaf(node, anchor);
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
@@ -76,6 +79,15 @@ class TreeBuilder : public YAML::EventHandler {
     if (tag.empty() || tag == "?" || tag == "!") return;
     reader_->AddAt(Severity::kError, mark.line + 1, mark.column + 1,
                    fmt::format("the tag {} is not part of this format", tag), "leave the tag out");
+  }
+
+  // Escapes in quotes ("\\e") can write what the file itself must not hold.
+  void CheckText(const YAML::Mark& mark, const std::string& value) {
+    const size_t at = FindNonText(value);
+    if (at == std::string::npos) return;
+    reader_->AddAt(Severity::kError, mark.line + 1, mark.column + 1,
+                   fmt::format("the value holds the control character 0x{:02x}",
+                               static_cast<unsigned char>(value[at])));
   }
 
   void Leaf(const std::shared_ptr<YamlNode>& node, YAML::anchor_t anchor) {
@@ -147,28 +159,7 @@ class TreeBuilder : public YAML::EventHandler {
 
 }  // namespace
 
-size_t FindNonText(const std::string& text) {
-  size_t i = 0;
-  while (i < text.size()) {
-    const auto byte = static_cast<unsigned char>(text[i]);
-    if (byte < 0x20 && byte != '\t' && byte != '\n' && byte != '\r') return i;
-    if (byte == 0x7F) return i;
-    const int tail = byte < 0x80   ? 0
-                     : byte < 0xC2 ? -1
-                     : byte < 0xE0 ? 1
-                     : byte < 0xF0 ? 2
-                     : byte < 0xF5 ? 3
-                                   : -1;
-    if (tail < 0) return i;
-    for (int k = 1; k <= tail; ++k) {
-      if (i + k >= text.size() || (static_cast<unsigned char>(text[i + k]) & 0xC0) != 0x80) {
-        return i;
-      }
-    }
-    i += 1 + static_cast<size_t>(tail);
-  }
-  return std::string::npos;
-}
+size_t FindNonText(const std::string& text) { return FindNonText(std::string_view(text)); }
 
 YamlNodePtr YamlReader::Parse(const std::string& text) {
   if (text.size() > kMaxBytes) {
@@ -194,7 +185,12 @@ YamlNodePtr YamlReader::Parse(const std::string& text) {
     }
     if (parser) AddAt(Severity::kWarning, 0, 0, "only the first YAML document is read");
   } catch (const YAML::Exception& e) {
-    AddAt(Severity::kError, e.mark.line + 1, e.mark.column + 1, "YAML syntax: " + e.msg);
+    if (const auto cause = internal::FindSyntaxCause(text)) {
+      AddAt(Severity::kError, cause->line, cause->column, "YAML syntax: " + cause->message,
+            cause->hint);
+    } else {
+      AddAt(Severity::kError, e.mark.line + 1, e.mark.column + 1, "YAML syntax: " + e.msg);
+    }
     return nullptr;
   } catch (const Stop& stop) {
     AddAt(Severity::kError, stop.mark.line + 1, stop.mark.column + 1, stop.message);

@@ -121,10 +121,8 @@ ComparisonInput MutationBench::Input() const {
 
 std::optional<Mechanism> MutationBench::Bend(const std::string& parameter, double value,
                                              std::string* why) const {
-  LoadOptions options;
-  options.overrides =
-      Merge(Merge(scenario().parameters, scenario().simulation.parameters), {{parameter, value}});
-  LoadResult loaded = LoadModel(scenario().model_file, options);
+  const Overrides own = Merge(scenario().simulation.parameters, {{parameter, value}});
+  LoadResult loaded = LoadModel(scenario().model_file, ModelOptions(scenario(), own));
   if (loaded.mechanism) return *std::move(loaded.mechanism);
   *why = "the model does not load";
   for (const Finding& finding : loaded.diagnostics.findings()) {

@@ -66,13 +66,19 @@ std::string OutputFolder::Create() {
 }
 
 std::string OutputFolder::Write(const std::string& name, const std::string& content) {
+  return Write(name, [&](const auto& write) { write(content); });
+}
+
+std::string OutputFolder::Write(const std::string& name, const FileContent& content) {
   MBV_DEMAND(lock_ >= 0, name);
   const fs::path path = temporary_ / name;
   std::error_code error;
   fs::create_directories(path.parent_path(), error);
   errno = 0;
   std::ofstream stream(path, std::ios::binary);
-  stream.write(content.data(), static_cast<std::streamsize>(content.size()));
+  content([&](std::string_view piece) {
+    stream.write(piece.data(), static_cast<std::streamsize>(piece.size()));
+  });
   stream.close();
   if (stream) return "";
   return Trouble("write", target_ / name, std::strerror(errno));

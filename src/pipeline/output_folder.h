@@ -2,9 +2,14 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
+#include <string_view>
 
 namespace mbv {
+
+/// Gives a file's content piece by piece.
+using FileContent = std::function<void(const std::function<void(std::string_view)>& write)>;
 
 /// Files are written into a hidden temporary folder beside the target; Commit() exchanges it with
 /// the target in one step. Without Commit() the old result stays as it was and the temporary
@@ -21,6 +26,7 @@ class OutputFolder {
   /// Each returns "" or what went wrong, with the path and the system's reason.
   [[nodiscard]] std::string Create();
   [[nodiscard]] std::string Write(const std::string& name, const std::string& content);
+  [[nodiscard]] std::string Write(const std::string& name, const FileContent& content);
   [[nodiscard]] std::string Commit();
 
   [[nodiscard]] const std::filesystem::path& target() const { return target_; }

@@ -3,13 +3,18 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "audit/audit.h"
 #include "render/palette.h"
 #include "report/html_report.h"
+#include "scenario/find_model.h"
 
 namespace mbv {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr size_t kPictureBytes = 900000;  // all embedded pictures together
 
@@ -22,26 +27,55 @@ std::string ResidualText(const AuditRow& row) {
   return fmt::format("{} {} of {:.3g} (limit {:.1e})", text, row.unit, row.scale, row.limit);
 }
 
-// The audit of the mechanism's paper; none for mechanisms of one's own.
+bool SameText(const fs::path& a, const fs::path& b) {
+  const auto read = [](const fs::path& path) {
+    std::ifstream stream(path, std::ios::binary);
+    return std::string(std::istreambuf_iterator<char>(stream), {});
+  };
+  std::error_code error;
+  return fs::is_regular_file(a, error) && fs::is_regular_file(b, error) && read(a) == read(b);
+}
+
+HtmlAudit ToHtmlAudit(const AuditTable& table) {
+  HtmlAudit audit{.source = table.source, .rows = {}, .note = {}};
+  for (const AuditRow& row : table.rows) {
+    audit.rows.push_back({.equation = row.equation,
+                          .erratum = row.erratum,
+                          .status = ToText(row.verdict),
+                          .printed = row.printed,
+                          .corrected = row.corrected,
+                          .note = row.note,
+                          .residual = ResidualText(row),
+                          .right = row.verdict == AuditVerdict::kOk,
+                          .corrected_right = row.verdict == AuditVerdict::kWrong});
+  }
+  return audit;
+}
+
+// The audit of the mechanism's paper; none for mechanisms of one's own. It is about the models that
+// the program came with, so a run of a model that was changed only says where it is. A run that is
+// compared does not end because its page lacks a section.
 std::optional<HtmlAudit> AuditOf(const Report& report) {
-  const auto models_dir = std::filesystem::path(report.model_file).parent_path().parent_path();
   for (const AuditEntry& entry : Audits()) {
     if (entry.mechanism != report.mechanism) continue;
-    if (!std::filesystem::exists(models_dir / entry.mechanism / "model.yaml")) break;
-    const AuditTable table = entry.run(models_dir.string());
-    HtmlAudit audit{.source = table.source, .rows = {}};
-    for (const AuditRow& row : table.rows) {
-      audit.rows.push_back({.equation = row.equation,
-                            .erratum = row.erratum,
-                            .status = ToText(row.verdict),
-                            .printed = row.printed,
-                            .corrected = row.corrected,
-                            .note = row.note,
-                            .residual = ResidualText(row),
-                            .right = row.verdict == AuditVerdict::kOk,
-                            .corrected_right = row.verdict == AuditVerdict::kWrong});
+    const auto note = [&](const std::string& why) {
+      return HtmlAudit{.source = {},
+                       .rows = {},
+                       .note = why + fmt::format("; the paper's equations are audited with the "
+                                                 "shipped model: mbverify audit {}",
+                                                 entry.mechanism)};
+    };
+    const std::optional<fs::path> shipped = ShippedModels();
+    if (!shipped) return note("The shipped models were not found");
+    const fs::path model = report.model_file;
+    if (!SameText(model, *shipped / entry.mechanism / model.filename())) {
+      return note(model.string() + " is not the shipped model");
     }
-    return audit;
+    try {
+      return ToHtmlAudit(entry.run(shipped->string()));
+    } catch (const std::exception& error) {
+      return note(std::string("The audit failed: ") + error.what());
+    }
   }
   return {};
 }

@@ -18,6 +18,7 @@
 #include "pipeline/stiffness.h"
 #include "pipeline/version.h"
 #include "reference/reference.h"
+#include "report/csv.h"
 #include "scenario/table.h"
 
 namespace mbv {
@@ -157,11 +158,7 @@ class ScenarioRun {
     }
     table_ = AlignTable(*scenario().reference.table, scenario().motion);
     const bool any = !table_->trace.time_s.empty();
-    AddWitness("reference",
-               any ? RunSummary::Done()
-                   : NotRun(fmt::format("no row of {} lies inside the motion, 0 … {:g} s",
-                                        table_->name, report_.duration_s)),
-               table_->trace);
+    AddWitness("reference", any ? RunSummary::Done() : NotRun(table_->grid), table_->trace);
     if (report_.driven_by != "analytic") RunSolver("solver");
   }
 
@@ -176,7 +173,8 @@ class ScenarioRun {
   }
 
   void RunFreeSolver(const std::string& name) {
-    ForwardRun run = RunForwardReference(prepared_->mechanisms.reference, scenario().motion);
+    ForwardRun run = RunForwardReference(prepared_->mechanisms.reference, scenario().motion,
+                                         {.progress = ProgressOf("reference")});
     report_.timing.reference_s = run.summary.wall_s;
     report_.simulation += "; " + TrustLine(run);
     for (const std::string& text : PassageTexts(run, scenario().motion.duration_s)) {
@@ -356,10 +354,10 @@ class ScenarioRun {
     if (options_.out_dir.empty()) return;
     OutputFolder folder(std::filesystem::path(options_.out_dir) / base().name / scenario().name);
     std::string trouble = folder.Create();
-    const auto write = [&](const std::string& name, const std::string& content) {
+    const auto write = [&](const std::string& name, const auto& content) {
       if (trouble.empty()) trouble = folder.Write(name, content);
     };
-    write("traces.csv", ToCsv(report_));
+    write("traces.csv", FileContent([&](const auto& piece) { WriteCsv(report_, piece); }));
     if (simulation_ && !simulation_->mjcf.empty()) write("model.xml", simulation_->mjcf);
     for (const PictureFile& picture : pictures_) {
       write("snapshots/" + picture.name, picture.content);

@@ -26,9 +26,7 @@ void AddError(const Scenario& scenario, const std::string& message, const std::s
 Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Overrides& own,
                       const std::string& witness, Diagnostics* diagnostics) {
   if (own.empty()) return base;
-  LoadOptions options;
-  options.overrides = Merge(scenario.parameters, own);
-  LoadResult loaded = LoadModel(scenario.model_file, options);
+  LoadResult loaded = LoadModel(scenario.model_file, ModelOptions(scenario, own));
   if (loaded.mechanism) return *std::move(loaded.mechanism);
   diagnostics->Append(loaded.diagnostics);
   AddError(scenario,

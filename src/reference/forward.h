@@ -7,6 +7,7 @@
 // formula.
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,11 @@ struct ForwardOptions {
   /// Also integrate with 100 times the tolerance and from a slightly moved start, to state how far
   /// the result can be trusted.
   bool measure_trust = true;
+  /// Steps (tried ones included) beyond four per sample, after which the integration gives up with
+  /// kNoConvergence: something moves much faster than it is sampled. Runs that measure trust have
+  /// twice as many.
+  long spare_steps = 200000;
+  std::function<void(double fraction)> progress = {};  ///< share of the work that is done
 };
 
 /// A singular pose that the motion passed or came close to.

@@ -33,6 +33,7 @@ constexpr double kSpacing = 1.0;
 // energy and work differ by a larger share, does not follow the motion.
 constexpr double kMoved = 1e-7, kUnbalanced = 1e-8;
 constexpr size_t kMostNodes = 600;
+constexpr long kTold = 64;  // steps from one word about the progress to the next
 
 }  // namespace
 
@@ -47,10 +48,11 @@ struct FreeMotion::Stepper {
 };
 
 FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance,
-                       double largest_step_s)
+                       double largest_step_s, Effort effort)
     : mechanism_(mechanism),
       duration_s_(motion.duration_s),
       largest_step_s_(largest_step_s),
+      effort_(std::move(effort)),
       dynamics_(mechanism, motion),
       stepper_(std::make_unique<Stepper>(tolerance)),
       breaks_(BreakTimes(motion)),
@@ -154,10 +156,26 @@ RunSummary FreeMotion::NoWayOn(double dt_s) const {
   return summary;
 }
 
+RunSummary FreeMotion::TooManySteps() const {
+  RunSummary summary;
+  summary.stop = Stop::kNoConvergence;
+  summary.time_s = now_.time_s;
+  summary.amount = dt_;
+  summary.unit = "s";
+  summary.message = fmt::format(
+      "{} steps reach t = {:.3g} s of {:g} s only (now {:.2g} s each): something moves much faster "
+      "than the motion is sampled, as a stiff spring at a small mass does; make it softer, or the "
+      "motion shorter",
+      tried_steps_ - 1, now_.time_s, duration_s_, dt_);
+  return summary;
+}
+
 // One smooth piece, or a bridge beyond its end.
 RunSummary FreeMotion::Segment(double to_s) {
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(1.0, to_s)) {
+    if (++tried_steps_ > effort_.most_steps) return TooManySteps();
+    if (effort_.progress && tried_steps_ % kTold == 0) effort_.progress(now_.time_s / duration_s_);
     double t = now_.time_s;
     State x = Pack(now_);
     const double natural = dt_;

@@ -21,11 +21,17 @@
 
 namespace mbv::internal {
 
+/// How long an integration may take, and whom it tells how far it is.
+struct Effort {
+  long most_steps = 0;                            ///< tried ones included
+  std::function<void(double fraction)> progress;  ///< of the motion's duration; may be empty
+};
+
 class FreeMotion {
  public:
   /// Mechanism and motion outlive the object. Steps are at most `largest_step_s`.
   FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance,
-             double largest_step_s);
+             double largest_step_s, Effort effort);
   ~FreeMotion();
 
   /// Puts `states` onto loops and commands at t = 0 and starts there.
@@ -69,12 +75,14 @@ class FreeMotion {
   [[nodiscard]] bool Land(const Hermite& way, double at_s, Node* node);
   void Watch();
   [[nodiscard]] RunSummary NoWayOn(double dt_s) const;
+  [[nodiscard]] RunSummary TooManySteps() const;
   template <typename StatesAt>
   [[nodiscard]] SingularPassage Closest(double first_s, double last_s, const StatesAt& states_at);
 
   struct Stepper;
   const Mechanism& mechanism_;
   const double duration_s_, largest_step_s_;
+  const Effort effort_;
   FreeDynamics dynamics_;
   std::unique_ptr<Stepper> stepper_;
   std::vector<double> breaks_;
@@ -87,7 +95,7 @@ class FreeMotion {
   double dt_ = 0.0;
   BodyStates work_states_;
   RunSummary trouble_;  ///< of the last Rates()
-  long steps_ = 0, evaluations_ = 0;
+  long steps_ = 0, tried_steps_ = 0, evaluations_ = 0;
   double largest_pivot_ = 0.0;
   std::vector<SingularPassage> passages_;
 };

@@ -16,12 +16,26 @@
 namespace mbv {
 namespace {
 
+using internal::Effort;
 using internal::FreeMotion;
 
 // The disturbance of the start for ForwardRun::growth [rad, characteristic lengths]: far above the
 // integration error, far below the mechanism.
 constexpr double kDisturbance = 1e-7;
 constexpr double kLooser = 100.0;  // times the tolerance
+// The three integrations of a run with measured trust, in their order.
+enum class Pass { kMain, kLooser, kDisturbed };
+
+Effort EffortOf(const ForwardOptions& options, size_t samples, Pass pass) {
+  const long most = 4 * static_cast<long>(samples) + options.spare_steps;
+  Effort effort{.most_steps = pass == Pass::kMain ? most : 2 * most, .progress = {}};
+  if (!options.progress) return effort;
+  const double parts = options.measure_trust ? 3.0 : 1.0;
+  effort.progress = [report = options.progress, parts, pass](double fraction) {
+    report((static_cast<double>(pass) + fraction) / parts);
+  };
+  return effort;
+}
 
 // Distance of two sets of poses [rad, characteristic lengths].
 double Distance(const BodyStates& a, const BodyStates& b, double length) {
@@ -49,8 +63,9 @@ double LargestDifference(const BodyStates& a, const BodyStates& b, double length
 template <typename Compare>
 std::optional<long> Repeat(const Mechanism& mechanism, const Motion& motion,
                            const std::vector<double>& times, const BodyStates& start,
-                           double tolerance, double largest_step_s, const Compare& compare) {
-  FreeMotion again(mechanism, motion, tolerance, largest_step_s);
+                           double tolerance, double largest_step_s, Effort effort,
+                           const Compare& compare) {
+  FreeMotion again(mechanism, motion, tolerance, largest_step_s, std::move(effort));
   if (!again.Start(start).ok()) return {};
   compare(0, again.states());
   for (size_t i = 1; i < times.size(); ++i) {
@@ -65,11 +80,11 @@ void MeasureUncertainty(const Mechanism& mechanism, const Motion& motion,
                         double length, ForwardRun* run) {
   double difference = 0.0;
   const auto repeat = [&](double tolerance, double largest_step_s) {
-    return Repeat(mechanism, motion, run->trace.time_s, run->start, tolerance, largest_step_s,
-                  [&](size_t i, const BodyStates& states) {
-                    difference =
-                        std::max(difference, LargestDifference(states, samples[i], length));
-                  });
+    return Repeat(
+        mechanism, motion, run->trace.time_s, run->start, tolerance, largest_step_s,
+        EffortOf(options, samples.size(), Pass::kLooser), [&](size_t i, const BodyStates& states) {
+          difference = std::max(difference, LargestDifference(states, samples[i], length));
+        });
   };
   std::optional<long> steps = repeat(kLooser * options.tolerance, motion.sample_s);
   // Where the samples alone set the steps, the tolerance changes nothing; shorter steps do.
@@ -92,13 +107,13 @@ void MeasureTrust(const Mechanism& mechanism, const Motion& motion, const Forwar
   step *= kDisturbance / size.norm();
   internal::MoveBodies(step, &disturbed);
   double at_start = kNan, growth = 0.0;
-  const std::optional<long> moved =
-      Repeat(mechanism, motion, run->trace.time_s, disturbed, options.tolerance, motion.sample_s,
-             [&](size_t i, const BodyStates& states) {
-               const double distance = Distance(states, samples[i], length);
-               if (i == 0) at_start = distance;
-               growth = std::max(growth, distance / at_start);
-             });
+  const std::optional<long> moved = Repeat(
+      mechanism, motion, run->trace.time_s, disturbed, options.tolerance, motion.sample_s,
+      EffortOf(options, samples.size(), Pass::kDisturbed), [&](size_t i, const BodyStates& states) {
+        const double distance = Distance(states, samples[i], length);
+        if (i == 0) at_start = distance;
+        growth = std::max(growth, distance / at_start);
+      });
   if (moved) run->growth = growth;
 }
 
@@ -117,7 +132,8 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
   if (RunSummary summary = InitialStates(mechanism, motion, &run->start); !summary.ok()) {
     return summary;
   }
-  FreeMotion free(mechanism, motion, options.tolerance, motion.sample_s);
+  FreeMotion free(mechanism, motion, options.tolerance, motion.sample_s,
+                  EffortOf(options, run->trace.time_s.size(), Pass::kMain));
   if (RunSummary summary = free.Start(run->start); !summary.ok()) return summary;
   internal::SampleRecorder recorder(mechanism);
   ReferenceSample sample;

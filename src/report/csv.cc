@@ -1,3 +1,5 @@
+#include "report/csv.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -6,7 +8,6 @@
 #include <map>
 
 #include "comparison/metrics.h"
-#include "report/report.h"
 
 namespace mbv {
 namespace {
@@ -84,10 +85,17 @@ class Columns {
 }  // namespace
 
 std::string ToCsv(const Report& report) {
+  std::string text;
+  WriteCsv(report, [&](std::string_view piece) { text += piece; });
+  return text;
+}
+
+void WriteCsv(const Report& report, const std::function<void(std::string_view)>& write) {
+  constexpr size_t kPiece = 1 << 16;
   const Columns columns(report);
   std::string text = columns.header() + "\n";
   const Trace* grid = columns.grid();
-  if (grid == nullptr) return text;
+  if (grid == nullptr) return write(text);
   std::map<const Trace*, std::vector<Eigen::Index>> rows;
   for (const CsvColumn& c : columns.columns()) {
     if (!rows.contains(c.trace)) rows[c.trace] = RowsOf(*grid, *c.trace);
@@ -100,8 +108,11 @@ std::string ToCsv(const Report& report) {
       fmt::format_to(out, ",{:.17g}", row >= 0 ? c.trace->values(row, c.column) : kNan);
     }
     text += '\n';
+    if (text.size() < kPiece) continue;
+    write(text);
+    text.clear();
   }
-  return text;
+  write(text);
 }
 
 }  // namespace mbv

@@ -33,6 +33,7 @@ struct HtmlEquation {
 struct HtmlAudit {
   std::string source;  ///< the paper
   std::vector<HtmlEquation> rows;
+  std::string note;  ///< why there are no rows
 };
 
 struct HtmlInput {
@@ -40,8 +41,8 @@ struct HtmlInput {
   const Mechanism* mechanism = nullptr;                  ///< as simulated
   const std::vector<std::vector<Pose>>* X_WB = nullptr;  ///< per sample of the simulation, per
                                                          ///< body; null: the home pose is shown
-  std::map<std::string, HtmlPaint> paints;  ///< by a shape's `color`
-  std::vector<HtmlPicture> pictures;        ///< a few hundred kB in total
+  std::map<std::string, HtmlPaint> paints;               ///< by a shape's `color`
+  std::vector<HtmlPicture> pictures;                     ///< a few hundred kB in total
   std::optional<HtmlAudit> audit;
   std::vector<std::string> arguments;  ///< of the command line, after the scenario file
 };

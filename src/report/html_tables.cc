@@ -269,6 +269,7 @@ std::string NotComparedHtml(const Report& report) {
 
 std::string AuditHtml(const std::optional<HtmlAudit>& audit) {
   if (!audit) return "";
+  if (!audit->note.empty()) return "<p>" + Escape(audit->note) + "</p>\n";
   size_t right = 0, corrected = 0, open = 0;
   Table table{.caption = "Every numbered equation",
               .head = {Text("equation"), Text("status"), Text("as printed"), Text("corrected"),

@@ -199,7 +199,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
     json["undetermined_reactions"].push_back(
         {{"joint", reaction.joint}, {"components", reaction.components}});
   }
-  return json.dump(2) + "\n";
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
 
 }  // namespace mbv

@@ -33,9 +33,22 @@ std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& 
   return places;
 }
 
+ParameterInUnit PlainName(const std::string& name, const Mechanism& mechanism) {
+  return ParameterIn(name, [&](const std::string& known) { return mechanism.HasParameter(known); });
+}
+
+Overrides InPlainUnits(const Overrides& overrides, const Mechanism& mechanism) {
+  Overrides plain;
+  for (const auto& [given, value] : overrides) {
+    const auto [name, factor] = PlainName(given, mechanism);
+    plain[name] = factor * value;
+  }
+  return plain;
+}
+
 void CheckParameterName(const YamlEntry& entry, const std::string& path, const Mechanism& mechanism,
                         YamlReader* yaml) {
-  if (mechanism.HasParameter(entry.key)) return;
+  if (mechanism.HasParameter(PlainName(entry.key, mechanism).name)) return;
   std::vector<std::string> known;
   for (const Parameter& p : mechanism.parameters) known.push_back(p.name);
   const std::string near = ClosestWord(entry.key, known);

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/diagnostics.h"
+#include "mechanism/load_model.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/yaml_reader.h"
 #include "scenario/load_scenario.h"
@@ -20,6 +21,11 @@ namespace mbv {
 /// Where each entry of a map was written: in `file`, or on the command line by --set.
 [[nodiscard]] std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& file,
                                                       const std::vector<SetValue>& set);
+
+/// The parameter of the mechanism that a name in a file means, with its unit.
+[[nodiscard]] ParameterInUnit PlainName(const std::string& name, const Mechanism& mechanism);
+/// Overrides whose names may end in a unit, by the parameters' own names in SI.
+[[nodiscard]] Overrides InPlainUnits(const Overrides& overrides, const Mechanism& mechanism);
 
 /// A finding if the mechanism has no parameter of this name; `path` names the section.
 void CheckParameterName(const YamlEntry& entry, const std::string& path, const Mechanism& mechanism,

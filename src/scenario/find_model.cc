@@ -8,13 +8,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// <prefix>/share/mbverify of the running program <prefix>/bin/mbverify.
-fs::path ShareFolder() {
-  std::error_code error;
-  const fs::path program = fs::read_symlink("/proc/self/exe", error);
-  return error ? fs::path() : program.parent_path().parent_path() / "share" / "mbverify";
-}
-
 bool IsFile(const fs::path& path) {
   std::error_code error;
   return fs::is_regular_file(path, error);
@@ -23,6 +16,20 @@ bool IsFile(const fs::path& path) {
 bool IsFolder(const fs::path& path) {
   std::error_code error;
   return fs::is_directory(path, error);
+}
+
+// The folder with the models and scenarios that the running program came with: <prefix>/share/
+// mbverify of <prefix>/bin/mbverify, or the source tree that it was built in.
+std::optional<fs::path> ShippedFolder() {
+  std::error_code error;
+  const fs::path program = fs::read_symlink("/proc/self/exe", error);
+  if (error) return std::nullopt;
+  const fs::path share = program.parent_path().parent_path() / "share" / "mbverify";
+  if (IsFolder(share / "models")) return share;
+  for (fs::path folder = program.parent_path();; folder = folder.parent_path()) {
+    if (IsFolder(folder / "models") && IsFolder(folder / "scenarios")) return folder;
+    if (folder == folder.parent_path()) return std::nullopt;
+  }
 }
 
 fs::path Absolute(const fs::path& path) {
@@ -41,7 +48,7 @@ std::vector<fs::path> ModelFolders(const fs::path& start) {
   }
   if (const char* variable = std::getenv("MBVERIFY_MODELS")) candidates.emplace_back(variable);
   candidates.push_back(Absolute("models"));
-  candidates.push_back(ShareFolder() / "models");
+  if (const auto shipped = ShippedModels()) candidates.push_back(*shipped);
   std::vector<fs::path> folders;
   for (const fs::path& candidate : candidates) {
     if (IsFolder(candidate)) folders.push_back(candidate);
@@ -74,10 +81,15 @@ std::vector<std::string> ModelNames(const fs::path& start) {
 }
 
 std::optional<fs::path> ScenariosFolder() {
-  for (const fs::path& folder : {fs::path("scenarios"), ShareFolder() / "scenarios"}) {
-    if (IsFolder(folder)) return folder;
-  }
+  if (IsFolder("scenarios")) return fs::path("scenarios");
+  const auto shipped = ShippedFolder();
+  if (shipped && IsFolder(*shipped / "scenarios")) return *shipped / "scenarios";
   return std::nullopt;
+}
+
+std::optional<fs::path> ShippedModels() {
+  const auto folder = ShippedFolder();
+  return folder ? std::optional(*folder / "models") : std::nullopt;
 }
 
 std::string Shown(const fs::path& path) {

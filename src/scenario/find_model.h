@@ -9,7 +9,7 @@
 namespace mbv {
 
 /// Folders searched for models/<name>/model.yaml, best first: "models" beside the start folder and
-/// beside each folder above it, $MBVERIFY_MODELS, ./models, and the installed share folder.
+/// beside each folder above it, $MBVERIFY_MODELS, ./models, and ShippedModels().
 [[nodiscard]] std::vector<std::filesystem::path> ModelFolders(const std::filesystem::path& start);
 
 /// Path of a model named as in a scenario: a path (relative to `start`) if it contains '/' or ends
@@ -20,8 +20,13 @@ namespace mbv {
 /// Names of all models in ModelFolders(start), sorted, each once.
 [[nodiscard]] std::vector<std::string> ModelNames(const std::filesystem::path& start);
 
-/// The folder with the shipped scenarios: ./scenarios or the installed one; empty if there is none.
+/// The folder with the shipped scenarios: ./scenarios, or the one beside ShippedModels(); empty if
+/// there is none.
 [[nodiscard]] std::optional<std::filesystem::path> ScenariosFolder();
+
+/// The models that the running program came with: the installed ones, or those of the source tree
+/// that the program was built in; empty if there are none.
+[[nodiscard]] std::optional<std::filesystem::path> ShippedModels();
 
 /// `path` relative to the current folder if it lies below it, else as it is.
 [[nodiscard]] std::string Shown(const std::filesystem::path& path);

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "mechanism/channel_count.h"
 #include "mechanism/command_rank.h"
 #include "mechanism/load_model.h"
 #include "mechanism/mobility_report.h"
@@ -20,9 +21,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kMostValues = 1e7;  // of one witness: 80 MB
+
 const std::vector<std::string> kKeys = {
-    "kind",     "mechanism", "description", "parameters", "motion",    "loads", "forces",
-    "analytic", "reference", "simulation",  "checks",     "snapshots", "expect"};
+    "kind",   "mechanism", "description", "parameters", "gravity", "motion",    "loads",
+    "forces", "analytic",  "reference",   "simulation", "checks",  "snapshots", "expect"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -33,6 +36,10 @@ std::string JoinWords(std::vector<std::string> words) {
   std::string text;
   for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
   return text;
+}
+
+std::string WithoutUnit(const std::string& key) {
+  return ParameterIn(key, [&](const std::string& plain) { return plain != key; }).name;
 }
 
 class Loader {
@@ -69,6 +76,9 @@ class Loader {
       scenario_.description = yaml_.Text(*description, "description").value_or("");
     }
     ReadParameters(map.Find("parameters"));
+    if (const YamlNode* gravity = map.Find("gravity")) {
+      scenario_.gravity_W = values_.Vector(*gravity, "gravity");
+    }
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     // Numbers from here on may be expressions of the model's parameters.
     if (mechanism_) {
@@ -80,12 +90,13 @@ class Loader {
     scenario_.checks = ReadChecks(&values_, map.Find("checks"), &scenario_.start_window_s);
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
     if (!mechanism_) return;
+    UsePlainNames();
     const MotionTimes times = ReadTable(map.Find("reference"));
     const YamlNode* motion = map.Required("motion");
     if (motion == nullptr) return;
     scenario_.motion =
         ReadMotion(&values_, *mechanism_, motion, map.Find("loads"), map.Find("forces"), times);
-    FitStep(*motion, map.Find("simulation"));
+    FitStep(map.Find("simulation"));
     scenario_.snapshots =
         ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s, *mechanism_);
     CheckParameterNames(map);
@@ -111,19 +122,38 @@ class Loader {
     return {table.time_s.back(), SuggestSample(table)};
   }
 
-  // Samples that a table sets need not be multiples of the default step: a step that fits.
-  void FitStep(const YamlNode& motion, const YamlNode* simulation) {
-    if (scenario_.reference.table == nullptr || motion.Find("sample_s") != nullptr) return;
-    if (simulation != nullptr && simulation->Find("step_s") != nullptr) return;
+  // Samples must fall on whole steps: the next smaller step that divides them. Told where the
+  // scenario states another one.
+  void FitStep(const YamlNode* simulation) {
+    const bool stated = simulation != nullptr && simulation->Find("step_s") != nullptr;
     const double sample_s = scenario_.motion.sample_s;
     double& step_s = scenario_.simulation.step_s;
-    step_s = sample_s / std::ceil(sample_s / step_s - 1e-9);
+    const double steps = sample_s / step_s;
+    if (!(steps <= kMaxSteps) || std::abs(steps - std::round(steps)) <= 1e-6 * steps) return;
+    if (stated && steps < 1.0) return;  // reported later
+    const double fitting_s = sample_s / std::ceil(steps - 1e-9);
+    if (stated && scenario_.simulation.on && scenario_.simulation.forward) {
+      yaml_.Warn(*simulation->Find("step_s"),
+                 fmt::format("simulation.step_s = {} does not divide motion.sample_s = {}: the "
+                             "step is {:.6g} s",
+                             step_s, sample_s, fitting_s),
+                 "samples must fall on whole steps");
+    }
+    step_s = fitting_s;
   }
 
   void ReadParameters(const YamlNode* node) {
     scenario_.parameters = ReadOverrides(&values_, node, "parameters");
     if (node == nullptr) return;
     scenario_.parameter_places = PlacesOf(*node, file_, options_.set);
+    // What an option sets in one unit replaces what the file gives in another.
+    for (const YamlEntry& option : node->entries) {
+      if (option.line >= 0) continue;
+      for (const YamlEntry& entry : node->entries) {
+        if (entry.line < 0 || WithoutUnit(entry.key) != WithoutUnit(option.key)) continue;
+        scenario_.parameters.erase(entry.key);
+      }
+    }
   }
 
   void LoadMechanism(const YamlNode& node) {
@@ -139,9 +169,7 @@ class Loader {
       return;
     }
     scenario_.model_file = *model_file;
-    LoadOptions options;
-    options.overrides = scenario_.parameters;
-    options.override_places = scenario_.parameter_places;
+    const LoadOptions options = ModelOptions(scenario_);
     LoadResult loaded = LoadModel(*model_file, options);
     model_findings_ = loaded.diagnostics;
     // Wrong overrides alone must not hide what else is wrong with the scenario.
@@ -149,6 +177,18 @@ class Loader {
     if (!loaded.mechanism) return;
     mechanism_ = std::move(loaded.mechanism);
     scenario_.name = CaseName(file_, mechanism_->name);
+  }
+
+  // Parameters given in degrees or millimetres: what follows knows SI only.
+  void UsePlainNames() {
+    for (Overrides* overrides :
+         {&scenario_.parameters, &scenario_.analytic.parameters, &scenario_.reference.parameters,
+          &scenario_.simulation.parameters}) {
+      *overrides = InPlainUnits(*overrides, *mechanism_);
+    }
+    for (const auto& [name, place] : std::map(scenario_.parameter_places)) {
+      scenario_.parameter_places[PlainName(name, *mechanism_).name] = place;
+    }
   }
 
   // Overrides of single witnesses must name parameters of the model, too.
@@ -174,6 +214,7 @@ class Loader {
   // Rules that need several sections.
   void CheckTogether(const YamlNode& motion, const YamlNode* simulation) {
     CheckCommands(motion);
+    CheckSize(motion);
     const SimulationSettings& settings = scenario_.simulation;
     const double steps = scenario_.motion.sample_s / settings.step_s;
     if (settings.on && settings.forward &&
@@ -191,6 +232,19 @@ class Loader {
     if (!scenario_.analytic.on && !scenario_.reference.on && !settings.on) {
       yaml_.Error(motion, "analytic, reference and simulation are all off");
     }
+  }
+
+  // What the witnesses record must fit into memory.
+  void CheckSize(const YamlNode& motion) {
+    const double samples = scenario_.motion.duration_s / scenario_.motion.sample_s;
+    const auto signals = static_cast<double>(MostChannels(*mechanism_));
+    if (samples * signals <= kMostValues) return;
+    yaml_.Error(motion,
+                fmt::format("{:g} samples of {:g} signals each violate samples · signals <= {:g}",
+                            std::floor(samples), signals, kMostValues),
+                fmt::format("at most {:g} samples for {}: choose motion.sample_s >= {:.3g}",
+                            std::floor(kMostValues / signals), mechanism_->name,
+                            scenario_.motion.duration_s * signals / kMostValues));
   }
 
   // Every freedom needs one command, or a start value where it moves by forces.
@@ -261,6 +315,14 @@ std::optional<std::string> FirstLineExpectation(const std::string& text) {
 }
 
 }  // namespace
+
+LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more) {
+  LoadOptions options;
+  options.overrides = Merge(scenario.parameters, more);
+  options.override_places = scenario.parameter_places;
+  options.gravity_W = scenario.gravity_W;
+  return options;
+}
 
 ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& options) {
   return Loader(file, options).LoadFile();

@@ -12,6 +12,11 @@
 
 namespace mbv {
 
+struct LoadOptions;  // mechanism/load_model.h
+
+/// How the scenario's model is loaded: with its parameters, `more` on top, and its gravity.
+[[nodiscard]] LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more = {});
+
 /// "simulation.step_s" = "0.002": replaces or adds a value of the file; the value is YAML text.
 using SetValue = std::pair<std::string, std::string>;
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "scenario/value_reader.h"
+
 namespace mbv {
 namespace {
 
@@ -70,6 +72,25 @@ YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, Yam
     root = SetAt(root.get(), "", values[k].first, Relocate(*value, line));
   }
   return root;
+}
+
+Diagnostics ReadParameterOptions(const std::vector<SetValue>& values, LoadOptions* options) {
+  Diagnostics diagnostics;
+  for (const SetValue& value : values) {
+    YamlReader yaml(OptionText(value));
+    Scope scope;
+    ValueReader reader(&yaml, &scope);
+    const YamlNodePtr node = yaml.Parse(value.second);
+    const auto number = node == nullptr ? std::nullopt : reader.Number(*node, value.first);
+    if (number) options->overrides[value.first] = *number;
+    options->override_places[value.first].file = OptionText(value);
+    for (Finding finding : yaml.diagnostics().findings()) {
+      finding.line = 0;  // there is only one
+      if (finding.hint.empty()) finding.hint = "write --set PARAMETER=NUMBER, e.g. --set m_p=45000";
+      diagnostics.Add(std::move(finding));
+    }
+  }
+  return diagnostics;
 }
 
 Diagnostics PlaceSetFindings(const Diagnostics& diagnostics, const std::vector<SetValue>& values) {

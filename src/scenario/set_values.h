@@ -1,6 +1,7 @@
 // `--set key=value`: replacing values of a YAML tree from the command line.
 #pragma once
 
+#include "mechanism/load_model.h"
 #include "mechanism/yaml_reader.h"
 #include "scenario/load_scenario.h"
 
@@ -10,6 +11,11 @@ namespace mbv {
 /// are findings. Nodes that came from the k-th value carry the line −(k + 1).
 [[nodiscard]] YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values,
                                     YamlReader* reader);
+
+/// Overrides of parameters by `--set NAME=VALUE`: numbers and expressions as a scenario's
+/// `parameters` takes them. Findings name the option.
+[[nodiscard]] Diagnostics ReadParameterOptions(const std::vector<SetValue>& values,
+                                               LoadOptions* options);
 
 /// Moves findings about such nodes from the file to "--set key=value", and sorts all by place.
 [[nodiscard]] Diagnostics PlaceSetFindings(const Diagnostics& diagnostics,

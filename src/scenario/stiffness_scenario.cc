@@ -77,6 +77,11 @@ class Loader {
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     ReadSettings(map);
     if (!mechanism_) return;
+    for (Overrides* overrides :
+         {&scenario_.parameters, &scenario_.analytic.parameters, &scenario_.reference.parameters,
+          &scenario_.simulation.parameters}) {
+      *overrides = InPlainUnits(*overrides, *mechanism_);
+    }
     if (const YamlNode* pose = map.Find("pose")) ReadPose(*pose);
     if (const YamlNode* output = map.Find("output")) ReadOutput(*output);
     CheckParameters(map);

@@ -109,6 +109,11 @@ class Aligner {
     if (!TakeRows()) InterpolateRows();
     AddUncertainty();
     AddRangeNotes();
+    if (out_.trace.time_s.empty()) {
+      out_.grid = fmt::format(
+          "no row of {} lies inside the motion, 0 … {:g} s: it runs from {:g} to {:g} s{}",
+          table_.name, motion_.duration_s, times_.front(), times_.back(), OffsetHint());
+    }
     return std::move(out_);
   }
 
@@ -246,14 +251,22 @@ class Aligner {
     }
     const double gap = 1.5 * std::max(motion_.sample_s, table_.spacing_s);
     if (times_.front() > gap || times_.back() < motion_.duration_s - gap) {
-      out_.notes.push_back(fmt::format(
-          "it covers {:g} … {:g} s of the motion's 0 … {:g} s", std::max(times_.front(), 0.0),
-          std::min(times_.back(), motion_.duration_s), motion_.duration_s));
+      out_.notes.push_back(
+          fmt::format("it covers {:g} … {:g} s of the motion's 0 … {:g} s{}",
+                      std::max(times_.front(), 0.0), std::min(times_.back(), motion_.duration_s),
+                      motion_.duration_s, times_.front() > gap ? OffsetHint() : ""));
     }
     if (table_.stamp_error_s > 0.0) {
       out_.notes.push_back(
           fmt::format("its time stamps are rounded to {:.2g} s", 2.0 * table_.stamp_error_s));
     }
+  }
+
+  // Clocks of other programs often run before the motion starts.
+  [[nodiscard]] std::string OffsetHint() const {
+    return fmt::format(
+        "; if the motion starts with its first row, add time_offset_s: {:g} to what is stated",
+        -times_.front());
   }
 
   const ReferenceTable& table_;

@@ -18,6 +18,9 @@ namespace {
 
 constexpr size_t kMostFindings = 20;  // of one table
 constexpr size_t kFewestRows = 4;
+// Events write a time twice; where more than one row in so many is such a time, the printed times
+// have too few digits.
+constexpr size_t kRowsPerEvent = 20;
 
 // The numbers of the mapped columns, as printed.
 class RowReader {
@@ -38,6 +41,7 @@ class RowReader {
       CutCells(line.text, text_.delimiter, &cut);
       if (CheckRow(line, cut)) ReadRow(line, cut);
     }
+    LeaveOutEvents();
     if (text_.rows.size() < kFewestRows) {
       Add(0, 0,
           fmt::format("has {} rows of numbers, at least {} are needed", text_.rows.size(),
@@ -56,8 +60,17 @@ class RowReader {
 
   std::vector<std::vector<double>> numbers;  // time first, then the mapped columns
   std::vector<DigitStatistics> digits;
+  std::vector<std::string> notes;  // about rows that are left out
 
  private:
+  // A time that is written more than once.
+  struct Repeat {
+    size_t row;      // of numbers, its first
+    bool different;  // with other values
+    int line, column;
+    std::string text;
+  };
+
   void Add(int line, int column, const std::string& message, const std::string& hint) {
     if (++found_ > kMostFindings) return;
     Finding finding;
@@ -101,7 +114,7 @@ class RowReader {
       complete = false;
       Report(line, cell, k, row_[k].kind);
     }
-    if (!complete || !CheckTime(line, cut.cells[indices_[0]])) return;
+    if (!complete || !CheckTime(line, cut.cells[indices_[0]]) || IsRepeat(line, cut)) return;
     for (size_t k = 0; k < indices_.size(); ++k) {
       numbers[k].push_back(row_[k].value);
       digits[k].Add(row_[k]);
@@ -148,17 +161,81 @@ class RowReader {
 
   bool CheckTime(const TableLine& line, const TableCell& cell) {
     const double t = row_[0].value;
-    if (!numbers[0].empty() && t <= numbers[0].back()) {
-      const bool repeated = t == numbers[0].back();
-      Add(line.number, cell.column,
-          fmt::format(
-              "{} = {} {}", NameOf(0), Shown(cell.text),
-              repeated ? "is repeated" : fmt::format("goes back from {:g}", numbers[0].back())),
-          repeated ? "keep one row per time; print more digits of the time"
-                   : "times must increase; is this the time column?");
-      return false;
+    if (numbers[0].empty() || t >= numbers[0].back()) return true;
+    Add(line.number, cell.column,
+        fmt::format("{} = {} goes back from {:g}", NameOf(0), Shown(cell.text), numbers[0].back()),
+        "times must increase; is this the time column?");
+    return false;
+  }
+
+  // Dymola and OpenModelica write the last time twice, and every event once before and once after.
+  bool IsRepeat(const TableLine& line, const CutLine& cut) {
+    if (numbers[0].empty() || row_[0].value != numbers[0].back()) return false;
+    bool different = false;
+    for (size_t k = 1; k < indices_.size(); ++k) {
+      different = different || row_[k].value != numbers[k].back();
+    }
+    const size_t row = numbers[0].size() - 1;
+    const TableCell& cell = cut.cells[indices_[0]];
+    if (!repeats_.empty() && repeats_.back().row == row) {
+      repeats_.back().different = repeats_.back().different || different;
+    } else {
+      repeats_.push_back({row, different, line.number, cell.column, Shown(cell.text)});
     }
     return true;
+  }
+
+  // At an event a signal may have two values, and its time need not lie on the table's grid: rows
+  // with two values, and rows beside the grid, are left out.
+  void LeaveOutEvents() {
+    const auto events = static_cast<size_t>(std::count_if(
+        repeats_.begin(), repeats_.end(), [](const Repeat& repeat) { return repeat.different; }));
+    if (events * kRowsPerEvent > numbers[0].size()) {
+      for (const Repeat& repeat : repeats_) {
+        if (!repeat.different) continue;
+        Add(repeat.line, repeat.column, fmt::format("{} = {} is repeated", NameOf(0), repeat.text),
+            "keep one row per time; print more digits of the time");
+      }
+      return;
+    }
+    const double spacing = UsualStep();
+    size_t left_out = 0;
+    for (auto repeat = repeats_.rbegin(); repeat != repeats_.rend(); ++repeat) {
+      const double steps = (numbers[0][repeat->row] - numbers[0][0]) / spacing;
+      if (!repeat->different && std::abs(steps - std::round(steps)) <= 1e-3) continue;
+      ++left_out;
+      for (std::vector<double>& column : numbers) {
+        column.erase(column.begin() + static_cast<std::ptrdiff_t>(repeat->row));
+      }
+    }
+    if (left_out > 0) {
+      notes.push_back(fmt::format(
+          "{} times are left out: they are written twice, as at events, where a signal may jump",
+          left_out));
+    }
+    if (repeats_.size() > left_out) {
+      notes.push_back(fmt::format("{} rows that repeat the row before are left out",
+                                  repeats_.size() - left_out));
+    }
+  }
+
+  // Median step of the times that are written once.
+  [[nodiscard]] double UsualStep() const {
+    std::vector<double> steps;
+    auto repeat = repeats_.begin();
+    double before = kNan;
+    for (size_t i = 0; i < numbers[0].size(); ++i) {
+      if (repeat != repeats_.end() && repeat->row == i) {
+        ++repeat;
+        continue;
+      }
+      if (!std::isnan(before)) steps.push_back(numbers[0][i] - before);
+      before = numbers[0][i];
+    }
+    if (steps.empty()) return kNan;
+    const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+    std::nth_element(steps.begin(), middle, steps.end());
+    return *middle;
   }
 
   const TableText& text_;
@@ -167,6 +244,7 @@ class RowReader {
   Diagnostics* diagnostics_;
   std::vector<size_t> indices_;
   std::vector<CellNumber> row_;
+  std::vector<Repeat> repeats_;
   size_t found_ = 0;
 };
 
@@ -187,6 +265,7 @@ std::shared_ptr<ReferenceTable> MakeTable(const TableSettings& settings, TableMa
   table->coverage = settings.coverage;
   table->coarsest = settings.coarsest;
   table->notes = std::move(mapping.notes);
+  table->notes.insert(table->notes.end(), rows.notes.begin(), rows.notes.end());
   for (const double t : rows.numbers[0]) {
     table->time_s.push_back(mapping.time_factor * t + settings.time_offset_s);
   }

@@ -47,6 +47,14 @@ class Program {
   ProgramResult WithPath(const std::string& path, const std::string& arguments) const {
     return Execute("PATH='" + path + "' " + Call(arguments));
   }
+  /// In another folder than the project's.
+  ProgramResult From(const std::filesystem::path& folder, const std::string& arguments) const {
+    return Execute("cd '" + folder.string() + "' && NO_COLOR= " + Call(arguments));
+  }
+  /// As part of a shell script, where "$mbverify" is the program.
+  ProgramResult Script(const std::string& script) const {
+    return Execute("mbverify='" + std::string(kBinaryDir) + "/mbverify'; { " + script + "; }");
+  }
   /// With a terminal for input and output, both in `out`; `script` is part of every Debian.
   ProgramResult OnTerminal(const std::string& arguments) const {
     return Execute("script --quiet --return --command \"NO_COLOR=1 " + Call(arguments) +

@@ -266,6 +266,27 @@ TEST(TableDiagnosis, AnAddedConstantIsNamed) {
   EXPECT_TRUE(Says(c.Run(), "with 12.5 N added"));
 }
 
+TEST(TableDiagnosis, ADriftIsNamedWithItsRate) {
+  TableCase c;
+  for (int i = 0; i <= 100; ++i) c.table.values(i, 0) += 0.5 * (0.01 * i);
+  c.Print(1e-4);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+  EXPECT_TRUE(Says(comparison, "the difference grows by 0.5 N/s")) << All(comparison);
+}
+
+TEST(TableDiagnosis, AnErrorThatGrowsInSwingsIsSaidToGrow) {
+  TableCase c;
+  for (int i = 0; i <= 100; ++i) {
+    const double t = 0.01 * i;
+    c.table.values(i, 0) += 0.2 * t * t * std::sin(7 * kOmega * t);
+  }
+  c.Print(1e-4);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+  EXPECT_TRUE(Says(comparison, "errors of an integration")) << All(comparison);
+}
+
 TEST(TableDiagnosis, AShiftInTimeIsFoundBetweenSamplesWithItsDirection) {
   for (const double shift_s : {0.0234, -0.0166}) {
     TableCase c;

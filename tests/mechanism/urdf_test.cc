@@ -94,6 +94,37 @@ TEST(UrdfConventions, LimitsAreReadAndMimicIsLeftOutAloud) {
   EXPECT_FALSE(std::isfinite(tree.joints.at(1).range[0].upper));
 }
 
+TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {
+  const auto joint = [](const std::string& name, const std::string& inner) {
+    return "<link name=\"" + name + "_link\"/>\n<joint name=\"" + name +
+           "\" type=\"continuous\"><parent link=\"world\"/><child link=\"" + name + "_link\"/>" +
+           inner + "</joint>\n";
+  };
+  const std::string text = Robot(
+      "\n" + joint("a", "<dynamics damping=\"0.5\"/>") +
+      joint("b", "<dynamics friction=\"0.1\"/>") +
+      joint("c", "<dynamics damping=\"2\" friction=\"0.2\"/>") +
+      joint("d", "<dynamics damping=\"0\" friction=\"0\"/>") +
+      "<transmission name=\"t1\"><joint name=\"a\"/><actuator name=\"m\">"
+      "<mechanicalReduction>50</mechanicalReduction></actuator></transmission>\n"
+      "<transmission name=\"t2\"><joint name=\"b\"><mechanicalReduction>-1"
+      "</mechanicalReduction></joint></transmission>\n"
+      "<transmission name=\"t3\"><mechanicalReduction>1.0</mechanicalReduction></transmission>\n");
+  Diagnostics diagnostics;
+  (void)ReadUrdf(text, "r.urdf", &diagnostics);
+  const std::string said = diagnostics.Text();
+  for (const char* part :
+       {"r.urdf:3:1: warning: damping in 2 joints is left out: a (0.5), c (2)\n"
+        "  hint: drive forces are computed without it\n",
+        "r.urdf:5:1: warning: friction in 2 joints is left out: b (0.1), c (0.2)\n",
+        "r.urdf:10:1: warning: transmission 't1': the reduction 50 is left out\n"
+        "  hint: positions and forces are those of the joint, not of the motor\n",
+        "r.urdf:11:1: warning: transmission 't2': the reduction -1 is left out\n"}) {
+    EXPECT_NE(said.find(part), std::string::npos) << part << said;
+  }
+  EXPECT_EQ(diagnostics.findings().size(), 4u) << said;
+}
+
 TEST(UrdfImport, FindingsReplaceUrdfdomsTalk) {
   testing::internal::CaptureStderr();
   EXPECT_NE(Findings("<robot").find("r.urdf: error:"), std::string::npos);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -52,6 +53,26 @@ TEST(Forward, AMassOnASpringSwingsLikeACosine) {
                       ColumnOf(run.trace, "energy.gravity") + ColumnOf(run.trace, "energy.springs");
   EXPECT_NEAR(energy.maxCoeff(), 0.5 * k * x0 * x0, kIntegrated);
   EXPECT_NEAR(energy.minCoeff(), 0.5 * k * x0 * x0, kIntegrated);
+}
+
+TEST(Forward, AnIntegrationThatWouldTakeTooLongIsGivenUp) {
+  const Mechanism m = SpringMass(1.0, 1e8, 0.0);
+  std::vector<double> told;
+  const ForwardRun run = RunForwardReference(
+      m, FreeMotion(m, 0.1, 0.0, 60.0),
+      {.spare_steps = 2000, .progress = [&](double fraction) { told.push_back(fraction); }});
+  EXPECT_EQ(run.summary.stop, Stop::kNoConvergence);
+  EXPECT_NE(run.summary.message.find("a stiff spring at a small mass"), std::string::npos)
+      << run.summary.message;
+  EXPECT_GT(run.summary.time_s, 0.0);
+  EXPECT_LE(run.steps, 2000 + 4 * 6001);
+  ASSERT_FALSE(told.empty());
+  EXPECT_TRUE(std::is_sorted(told.begin(), told.end()));
+  EXPECT_LT(told.back(), 1.0 / 3.0);
+  // What is sampled as finely as it moves has as many steps as it has samples.
+  const Mechanism soft = SpringMass(1.0, 100.0, 0.0);
+  EXPECT_TRUE(
+      RunForwardReference(soft, FreeMotion(soft, 0.1, 0.0, 5.0), {.spare_steps = 1}).summary.ok());
 }
 
 TEST(Forward, ADampedMassFollowsItsClosedForm) {

@@ -8,6 +8,7 @@
 #include <numbers>
 #include <random>
 
+#include "mechanism/load_model.h"
 #include "scenario/motion_reader.h"
 #include "tests/source_dir.h"
 
@@ -214,6 +215,57 @@ TEST_F(LoadScenarioTest, SetReplacesAndAddsValues) {
   EXPECT_EQ(result.scenario->checks[Metric::kForceNrmse].inverse, 1e-12);
 }
 
+TEST_F(LoadScenarioTest, AStepThatDoesNotDivideTheSamplesIsMadeToFitAloud) {
+  const ScenarioResult stated = Load(Complete("simulation: {step_s: 0.003}\n"));
+  ASSERT_TRUE(stated.scenario) << stated.diagnostics.Text();
+  EXPECT_DOUBLE_EQ(stated.scenario->simulation.step_s, 0.0025);
+  EXPECT_NE(stated.diagnostics.Text().find("16:22: warning: simulation.step_s = 0.003 does not "
+                                           "divide motion.sample_s = 0.01: the step is 0.0025 s"),
+            std::string::npos)
+      << stated.diagnostics.Text();
+  // The default step is nobody's choice.
+  for (const auto& [sample_s, step_s] : {std::pair{"0.0005", 0.0005}, {"0.0125", 0.0125 / 13}}) {
+    const ScenarioResult result = Load(Complete(), {{"motion.sample_s", sample_s}});
+    ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+    EXPECT_DOUBLE_EQ(result.scenario->simulation.step_s, step_s);
+    EXPECT_TRUE(result.diagnostics.empty()) << result.diagnostics.Text();
+  }
+}
+
+TEST_F(LoadScenarioTest, ParametersMayBeGivenInDegreesAndMillimetres) {
+  const auto theta_1 = [&](const std::vector<SetValue>& set, const std::string& text) {
+    const ScenarioResult result = Load(Complete(text), set);
+    EXPECT_TRUE(result.scenario) << result.diagnostics.Text();
+    return result.mechanism ? result.mechanism->ParameterValue("theta_1") : kNan;
+  };
+  EXPECT_DOUBLE_EQ(theta_1({{"parameters.theta_1_deg", "121"}}, ""), 121 * std::numbers::pi / 180);
+  EXPECT_DOUBLE_EQ(theta_1({}, "parameters: {theta_1_deg: 60 + 61}\n"),
+                   121 * std::numbers::pi / 180);
+  // An option replaces what the file gives in another unit, either way.
+  EXPECT_DOUBLE_EQ(theta_1({{"parameters.theta_1", "2.1"}}, "parameters: {theta_1_deg: 119}\n"),
+                   2.1);
+  const ScenarioResult bent = Load(Complete("analytic: {parameters: {r_a_mm: 7400}}\n"));
+  ASSERT_TRUE(bent.scenario) << bent.diagnostics.Text();
+  EXPECT_EQ(bent.scenario->analytic.parameters, (Overrides{{"r_a", 7.4}}));
+  EXPECT_NE(Messages(Complete("parameters: {theta_1: 2, theta_1_deg: 120}\n"))
+                .find("theta_1 and theta_1_deg are both given"),
+            std::string::npos);
+  EXPECT_NE(Messages(Complete("parameters: {theta_9_deg: 120}\n")).find("no parameter"),
+            std::string::npos);
+}
+
+TEST_F(LoadScenarioTest, AScenarioMayGiveGravity) {
+  const ScenarioResult result = Load(Complete("gravity: [0, 0, -1.62]\n"));
+  ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
+  EXPECT_EQ(result.mechanism->gravity_W, Vec3(0, 0, -1.62));
+  EXPECT_EQ(*ModelOptions(*result.scenario).gravity_W, Vec3(0, 0, -1.62));
+  const ScenarioResult weightless = Load(Complete(), {{"gravity", "[0, 0, 0]"}});
+  ASSERT_TRUE(weightless.scenario) << weightless.diagnostics.Text();
+  EXPECT_EQ(weightless.mechanism->gravity_W, Vec3::Zero());
+  EXPECT_EQ(weightless.mechanism->up_W, Vec3::UnitZ());
+  EXPECT_NE(Messages(Complete("gravity: 9.81\n")).find("gravity"), std::string::npos);
+}
+
 TEST_F(LoadScenarioTest, FindingsAboutSetValuesNameTheOption) {
   EXPECT_EQ(Messages(Complete(), {{"simulation.stp_s", "0.1"}}),
             "--set simulation.stp_s=0.1: error: simulation: unknown key 'stp_s'\n"
@@ -304,9 +356,9 @@ std::vector<Golden> Goldens() {
        At("9:17",
           "motion.commands.platform.z = 'z_o + 0.25' has the unknown symbol 'z_o'\n"
           "  hint: did you mean 'z_0'?")},
-      {"StepThatDoesNotDivideTheSample", complete("simulation: {step_s: 0.003}\n"),
+      {"StepLongerThanTheSample", complete("simulation: {step_s: 0.03}\n"),
        At("16:13",
-          "simulation.step_s = 0.003 violates motion.sample_s = 0.01 = n · step_s\n"
+          "simulation.step_s = 0.03 violates motion.sample_s = 0.01 = n · step_s\n"
           "  hint: samples must fall on whole steps")},
       {"UnknownLoadBody", complete("loads: {w: {on: platfrm, force: [0, 0, 1]}}\n"),
        At("16:17",

@@ -2,12 +2,14 @@
 // ones.
 #include "scenario/table.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <random>
 
@@ -217,6 +219,56 @@ TEST(TableFindings, TimesThatGoBackOrRepeatAreRefused) {
   const std::string text = Load("t,d1.force\n0,1\n2,2\n1,3\n3,4\n3,5\n4,6\n").text;
   EXPECT_TRUE(Has(text, "t.csv:4:1: error: t = 1 goes back from 2")) << text;
   EXPECT_TRUE(Has(text, "t.csv:6:1: error: t = 3 is repeated")) << text;
+}
+
+// Every 0.1 s; what `more` adds is written after the row of its time.
+std::string ModelicaTable(const std::map<int, std::string>& more) {
+  std::string csv = "time,d1.force,d2.force\n";
+  for (int i = 0; i <= 40; ++i) {
+    csv += fmt::format("{:.2f},{:.3f},{:.3f}\n", 0.1 * i, std::sin(0.1 * i), std::cos(0.1 * i));
+    if (const auto found = more.find(i); found != more.end()) csv += found->second;
+  }
+  return csv;
+}
+
+TEST(TableTimes, TheLastTimeMayBeWrittenTwice) {
+  const std::string last = fmt::format("4.00,{:.3f},{:.3f}\n", std::sin(4.0), std::cos(4.0));
+  const Loaded loaded = Load(ModelicaTable({{40, last}}));
+  ASSERT_NE(loaded.table, nullptr) << loaded.text;
+  EXPECT_EQ(loaded.table->time_s.size(), 41u);
+  EXPECT_TRUE(loaded.table->uniform);
+  EXPECT_EQ(SuggestSample(*loaded.table), 0.1);
+}
+
+TEST(TableTimes, EventsAreLeftOutAndTheRestStaysOnItsGrid) {
+  const Loaded loaded = Load(ModelicaTable({{12, "1.23,0.9,0.3\n1.23,0.5,0.3\n"},
+                                            {20, "2.00,0.1,0.2\n"},
+                                            {31, "3.17,0,-1\n3.17,0,-1\n3.17,0,-1\n"}}));
+  ASSERT_NE(loaded.table, nullptr) << loaded.text;
+  EXPECT_EQ(loaded.table->time_s.size(), 40u);
+  EXPECT_EQ(SuggestSample(*loaded.table), 0.1);
+  Motion motion;
+  motion.duration_s = 4.0;
+  motion.sample_s = 0.1;
+  EXPECT_FALSE(AlignTable(*loaded.table, motion).interpolated);
+  bool said = false;
+  for (const std::string& note : loaded.table->notes) said = said || Has(note, "as at events");
+  EXPECT_TRUE(said);
+}
+
+TEST(TableTimes, ALateStartIsToldWithTheOffsetThatMendsIt) {
+  const Loaded loaded = Load("t,d1.force\n3.5,1\n3.6,2\n3.7,3\n3.8,5\n3.9,4\n");
+  ASSERT_NE(loaded.table, nullptr) << loaded.text;
+  Motion motion;
+  motion.duration_s = 0.4;
+  motion.sample_s = 0.1;
+  EXPECT_TRUE(Has(AlignTable(*loaded.table, motion).grid, "add time_offset_s: -3.5"));
+  motion.duration_s = 3.9;
+  const AlignedTable partly = AlignTable(*loaded.table, motion);
+  EXPECT_FALSE(partly.trace.time_s.empty());
+  bool said = false;
+  for (const std::string& note : partly.notes) said = said || Has(note, "add time_offset_s: -3.5");
+  EXPECT_TRUE(said);
 }
 
 TEST(TableFindings, AllOfThemAreGivenAtOnceUpToALimit) {

@@ -113,10 +113,10 @@ PlatformParameters ReadParameters(const Mechanism& mechanism, Diagnostics* diagn
                               {"L4", &p.L4},
                               {"L5", &p.L5},
                               {"s_r_so", &p.s_r_so},
-                              {"m_p", &p.m_p},
-                              {"g", &p.g}}) {
+                              {"m_p", &p.m_p}}) {
     *target = read.Get(name);
   }
+  p.g = -mechanism.gravity_W.z();  // the coverage demands that it points down
   p.c_p = read.GetVector("c_p", 0.0);
   p.I_p = read.GetVector("I_p");
   const double scale = read.Get("link_mass_scale", 1.0);

@@ -1,0 +1,266 @@
+// Feeds structurally changed models, scenarios, URDF files and tables to the whole program: it must
+// end by itself with an exit code from 0 to 3, in time. (scripts/fuzz_structure)
+//   mutate_files --program FILE --source FOLDER --out FOLDER [--count N] [--seed N] [--jobs N]
+// Inputs that break this stay in OUT/found; each has its seed, with which it is made again.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <thread>
+
+#include "regress/workers.h"
+#include "tests/fuzz/structure/mutations.h"
+
+namespace mbv::fuzz {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Options {
+  std::string program, source, out;
+  size_t count = 200;
+  unsigned long seed = 1;
+  int jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+};
+
+std::string Read(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  return std::string(std::istreambuf_iterator<char>(stream), {});
+}
+
+void WriteText(const fs::path& path, const std::string& text) {
+  fs::create_directories(path.parent_path());
+  std::ofstream(path, std::ios::binary) << text;
+}
+
+std::vector<fs::path> FilesBelow(const fs::path& folder, const std::string& extension) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
+    if (entry.path().extension() == extension) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// A changed file, and what the program is asked to do with it.
+struct Input {
+  std::vector<std::string> argv;
+  fs::path folder;
+};
+
+class Maker {
+ public:
+  explicit Maker(const Options& options) : options_(options) {
+    const fs::path source = options.source;
+    models_ = FilesBelow(source / "models", ".yaml");
+    for (const fs::path& file : FilesBelow(source / "scenarios", ".yaml")) {
+      const std::string text = Read(file);
+      if (text.find("\nmotion:") != std::string::npos) motions_.push_back(file);
+      if (text.find("kind: stiffness") != std::string::npos) stiffness_.push_back(file);
+    }
+    urdfs_ = FilesBelow(source / "tests/fuzz/seeds/urdf", ".urdf");
+    tables_ = FilesBelow(source / "scenarios", ".csv");
+  }
+
+  // The k-th input; it depends on the seed and k alone.
+  [[nodiscard]] Input Make(size_t k) const {
+    Random random(options_.seed * 1000003UL + k);
+    Input input;
+    input.folder = fs::path(options_.out) / "work" / std::to_string(k);
+    switch (k % 8) {
+      case 0:
+        Urdf(&random, &input);
+        break;
+      case 1:
+        Table(&random, &input);
+        break;
+      case 2:
+        Stiffness(&random, &input);
+        break;
+      case 3:
+      case 4:
+        Model(&random, &input);
+        break;
+      case 5:
+        ModelInScenario(&random, &input);
+        break;
+      default:
+        Motion(&random, &input);
+    }
+    input.argv.insert(input.argv.begin(), options_.program);
+    return input;
+  }
+
+ private:
+  static const fs::path& OneOf(const std::vector<fs::path>& files, Random* random) {
+    return files[static_cast<size_t>((*random)() % files.size())];
+  }
+
+  void Model(Random* random, Input* input) const {
+    const fs::path seed = OneOf(models_, random);
+    const fs::path file = input->folder / seed.filename();
+    WriteText(file, MutateYaml(Read(seed), random));
+    // Files that it refers to.
+    for (const auto& beside : fs::directory_iterator(seed.parent_path())) {
+      std::error_code error;
+      if (beside.path().extension() == ".xml" || beside.path().filename() == seed.filename())
+        continue;
+      fs::copy(beside.path(), input->folder / beside.path().filename(), error);
+    }
+    const std::vector<std::string> format = {"text", "json", "mjcf", "urdf"};
+    input->argv = {"model", file.string(), "--format", format[(*random)() % 4]};
+  }
+
+  void Motion(Random* random, Input* input) const {
+    const fs::path seed = OneOf(motions_, random);
+    Short(MutateYaml(Read(seed), random), seed, input);
+  }
+
+  // A few samples only: what takes long otherwise is what the file asks for.
+  void Short(const std::string& text, const fs::path& seed, Input* input) const {
+    const fs::path file = input->folder / seed.filename();
+    WriteText(file, text);
+    input->argv = {"run",
+                   "-q",
+                   "--no-pictures",
+                   "--out",
+                   (input->folder / "out").string(),
+                   "--set",
+                   "motion.duration_s=0.05",
+                   "--set",
+                   "motion.sample_s=0.01",
+                   "--set",
+                   "snapshots.times_s=[]",
+                   file.string()};
+  }
+
+  void ModelInScenario(Random* random, Input* input) const {
+    const fs::path scenario = OneOf(motions_, random);
+    const fs::path model =
+        fs::path(options_.source) / "models" /
+        scenario.lexically_relative(fs::path(options_.source) / "scenarios").begin()->string() /
+        "model.yaml";
+    if (!fs::exists(model)) return Motion(random, input);
+    WriteText(input->folder / "model.yaml", MutateYaml(Read(model), random));
+    Short(Read(scenario), scenario, input);
+    input->argv.insert(input->argv.begin() + 1,
+                       {"--set", "mechanism=" + (input->folder / "model.yaml").string()});
+  }
+
+  void Stiffness(Random* random, Input* input) const {
+    const fs::path seed = OneOf(stiffness_, random);
+    const fs::path file = input->folder / seed.filename();
+    WriteText(file, MutateYaml(Read(seed), random));
+    input->argv = {"run",        "-q", "--no-pictures", "--out", (input->folder / "out").string(),
+                   file.string()};
+  }
+
+  void Urdf(Random* random, Input* input) const {
+    const fs::path seed = OneOf(urdfs_, random);
+    WriteText(input->folder / "robot.urdf", MutateXml(Read(seed), random));
+    WriteText(input->folder / "model.yaml", "name: robot\nurdf: robot.urdf\n");
+    input->argv = {"model", (input->folder / "model.yaml").string(), "--format", "mjcf"};
+  }
+
+  void Table(Random* random, Input* input) const {
+    const fs::path seed = OneOf(tables_, random);
+    const fs::path csv = input->folder / "table.csv";
+    WriteText(csv, MutateTable(Read(seed), random));
+    // The first scenario that uses the seed.
+    for (const fs::path& scenario : motions_) {
+      const std::string text = Read(scenario);
+      if (text.find(seed.filename().string()) == std::string::npos) continue;
+      WriteText(input->folder / scenario.filename(), text);
+      input->argv = {"run",
+                     "-q",
+                     "--no-pictures",
+                     "--out",
+                     (input->folder / "out").string(),
+                     "--set",
+                     "reference.csv=" + csv.string(),
+                     "--set",
+                     "simulation=off",
+                     (input->folder / scenario.filename()).string()};
+      return;
+    }
+    Urdf(random, input);
+  }
+
+  const Options& options_;
+  std::vector<fs::path> models_, motions_, stiffness_, urdfs_, tables_;
+};
+
+// Whether the program kept its promise; a reason if not.
+std::string Broken(const WorkerEnd& end) {
+  if (end.timed_out) return "hangs";
+  if (end.signal != 0) return fmt::format("ended by signal {}", end.signal);
+  if (end.exit_code < 0 || end.exit_code > 3) return fmt::format("exit code {}", end.exit_code);
+  return "";
+}
+
+int Run(const Options& options) {
+  constexpr size_t kBatch = 256;  // folders at a time
+  constexpr double kTimeout_s = 60.0;
+  const Maker maker(options);
+  const auto start = std::chrono::steady_clock::now();
+  std::map<int, size_t> codes;
+  size_t broken = 0;
+  double slowest_s = 0.0;
+  fs::remove_all(fs::path(options.out) / "work");
+  for (size_t from = 0; from < options.count; from += kBatch) {
+    std::vector<Input> inputs;
+    std::vector<WorkerJob> jobs;
+    for (size_t k = from; k < std::min(from + kBatch, options.count); ++k) {
+      inputs.push_back(maker.Make(k));
+      jobs.push_back({inputs.back().argv, inputs.back().folder / "log.txt"});
+    }
+    WorkerPool pool;
+    pool.parallel = options.jobs;
+    pool.timeout_s = kTimeout_s;
+    pool.ended = [&](size_t job, const WorkerEnd& end) {
+      ++codes[end.exit_code];
+      slowest_s = std::max(slowest_s, end.cost.wall_s);
+      const Input& input = inputs[job];
+      const std::string why = Broken(end);
+      if (!why.empty()) {
+        ++broken;
+        const fs::path kept = fs::path(options.out) / "found" /
+                              fmt::format("{}_{}", options.seed, input.folder.filename().string());
+        fs::create_directories(kept.parent_path());
+        fs::remove_all(kept);
+        fs::copy(input.folder, kept, fs::copy_options::recursive);
+        fmt::print("{}: {}: {}\n", kept.string(), why, fmt::join(input.argv, " "));
+      }
+      fs::remove_all(input.folder);
+    };
+    (void)pool.Run(jobs);
+  }
+  fs::remove_all(fs::path(options.out) / "work");
+  const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+  fmt::print("{} inputs in {:.0f} s, slowest {:.1f} s; exit codes", options.count, took.count(),
+             slowest_s);
+  for (const auto& [code, count] : codes) fmt::print("  {}: {}", code, count);
+  fmt::print("; {} broken\n", broken);
+  return broken == 0 ? 0 : 1;
+}
+
+}  // namespace
+}  // namespace mbv::fuzz
+
+int main(int argc, char** argv) {
+  mbv::fuzz::Options options;
+  CLI::App app("Structurally changed inputs for the whole program");
+  app.add_option("--program", options.program)->required();
+  app.add_option("--source", options.source)->required();
+  app.add_option("--out", options.out)->required();
+  app.add_option("--count", options.count);
+  app.add_option("--seed", options.seed);
+  app.add_option("--jobs", options.jobs)->check(CLI::Range(1, 1024));
+  CLI11_PARSE(app, argc, argv);
+  return mbv::fuzz::Run(options);
+}
