@@ -14,16 +14,7 @@
 #include "scenario/load_scenario.h"
 
 namespace mbv {
-namespace {
 
-namespace fs = std::filesystem;
-
-struct ModelArguments {
-  std::string model, format, out;
-  std::vector<std::string> set;
-};
-
-// "m_p=1000" of --set.
 bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
   for (const std::string& text : texts) {
     const auto set = SplitSet(text);
@@ -42,6 +33,15 @@ bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options)
   }
   return true;
 }
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ModelArguments {
+  std::string model, format, out;
+  std::vector<std::string> set;
+};
 
 ModelFormat FormatOf(const std::string& word) {
   return word == "mjcf"   ? ModelFormat::kMjcf
