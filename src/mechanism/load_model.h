@@ -11,16 +11,25 @@
 
 namespace mbv {
 
+/// A number that a file writes out where it is used: no parameter, no expression of parameters.
+struct Literal {
+  std::string place;    ///< "parts.leg.bodies.rod.mass", "urdf.rod.inertia.xy"
+  double value = kNan;  ///< SI units
+};
+
 struct LoadOptions {
   /// Parameter overrides by name; an unknown name is an error.
   std::map<std::string, double> overrides;
   /// Where the overrides were written, for messages ("scenario.yaml:7:3").
   std::map<std::string, Finding> override_places;
+  /// Other values of literals, by place.
+  std::map<std::string, double> literals;
 };
 
 struct LoadResult {
   std::optional<Mechanism> mechanism;  ///< empty when there are errors
   Diagnostics diagnostics;             ///< all findings, warnings included
+  std::vector<Literal> literals;       ///< in the order of reading, each place once
 };
 
 /// Loads `file` (a model.yaml), evaluates its expressions, builds the joint graph and spanning
