@@ -38,6 +38,9 @@ class StiffnessForm {
   /// kDone.
   [[nodiscard]] virtual StiffnessResult EvaluateMatrices(const PoseCoordinates& pose) const = 0;
 
+  /// No joint and no drive is beyond its range at a pose that is reached: what workspaces ask, too.
+  [[nodiscard]] virtual bool IsWithinRanges(const PoseCoordinates& pose) const = 0;
+
   /// The paper's indices, and their values for a stiffness (one per index).
   [[nodiscard]] virtual std::vector<StiffnessIndex> indices() const = 0;
   virtual void IndexValues(const StiffnessResult& result, std::span<double> values) const = 0;

@@ -39,14 +39,18 @@ struct Lengths {
 };
 [[nodiscard]] Lengths LengthsOf(const Mechanism& mechanism);
 
+// Each takes what the equations are given and what the independent computation is given: the same,
+// unless a test bends one of them.
+
 /// Equations (1)–(4), (8), (9): positions of the planar linkage.
-[[nodiscard]] std::vector<AuditRow> PositionRows(const Lengths& lengths);
+[[nodiscard]] std::vector<AuditRow> PositionRows(const Lengths& lengths, const Lengths& truth);
 /// Equations (14)–(25), (35)–(40): velocities, Jacobian and accelerations of the planar linkage.
-[[nodiscard]] std::vector<AuditRow> VelocityRows(const Lengths& lengths);
+[[nodiscard]] std::vector<AuditRow> VelocityRows(const Lengths& lengths, const Lengths& truth);
 /// Equations (5)–(7), (10)–(13), (26)–(34), (41)–(46): wrist and complete chain.
-[[nodiscard]] std::vector<AuditRow> WristRows(const Lengths& lengths);
+[[nodiscard]] std::vector<AuditRow> WristRows(const Lengths& lengths, const Lengths& truth);
 /// Equations (47)–(53): dynamics, against the generic reference solver.
-[[nodiscard]] std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism);
+[[nodiscard]] std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism,
+                                                 const Mechanism& truth);
 /// Equations (54)–(75) and Table 2, against frame elements; `models_dir` holds
 /// cabin_robot/elastic.yaml.
 [[nodiscard]] std::vector<AuditRow> StiffnessRows(const std::string& models_dir,

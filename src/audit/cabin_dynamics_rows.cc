@@ -76,7 +76,7 @@ Mechanism WithoutCarriageAndPayload(Mechanism mechanism) {
 
 }  // namespace
 
-std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism) {
+std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism, const Mechanism& truth) {
   RowMeter bodies(Texts("(47)", "T, U over platform, three drive branches and four wrist bodies",
                         "carriage and payload added; branches are slider + link",
                         "drive forces against the generic reference solver; how much the print "
@@ -91,19 +91,19 @@ std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism) {
   Motion loaded = bare;
   loaded.loads.push_back(ToolLoad(mechanism));
   const Mechanism printed = WithoutCarriageAndPayload(mechanism);
-  ReferenceSolver bare_solver(mechanism, bare), loaded_solver(mechanism, loaded);
+  ReferenceSolver bare_solver(truth, bare), loaded_solver(truth, loaded);
   for (int i = 0; i < 40; ++i) {
     const double t = 0.05 * i;
-    const VecX truth = ReferenceForces(&bare_solver, bare, t);
-    const VecX truth_loaded = ReferenceForces(&loaded_solver, loaded, t);
+    const VecX force = ReferenceForces(&bare_solver, bare, t);
+    const VecX force_loaded = ReferenceForces(&loaded_solver, loaded, t);
     const VecX form = ClosedFormForces(mechanism, bare, t);
     const VecX form_loaded = ClosedFormForces(mechanism, loaded, t);
     const VecX form_printed = ClosedFormForces(printed, bare, t);
     for (int d = 0; d < 8; ++d) {
-      bodies.Add(truth[d], form_printed[d], form[d]);
-      lagrange.Add(truth_loaded[d], form_loaded[d]);
+      bodies.Add(force[d], form_printed[d], form[d]);
+      lagrange.Add(force_loaded[d], form_loaded[d]);
       const double share = form_loaded[d] - form[d];
-      wrench.Add(truth_loaded[d] - truth[d], -share, share);
+      wrench.Add(force_loaded[d] - force[d], -share, share);
     }
   }
   AuditRow seven =

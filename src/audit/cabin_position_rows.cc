@@ -18,7 +18,7 @@ AuditRow Texts(const char* equation, const char* printed, const char* corrected,
 
 }  // namespace
 
-std::vector<AuditRow> PositionRows(const Lengths& l) {
+std::vector<AuditRow> PositionRows(const Lengths& l, const Lengths& truth) {
   RowMeter alpha(Texts("(1) α, ε", "α = asin(s_B/L1), ε = asin(s_B/(2 L4)), s_B = Y − (L2/2) sin γ",
                        "", "rad"));
   RowMeter AF(Texts("(1) AF", "AF = (L1/2) cos α + L4 cos ε", "", "m"));
@@ -35,7 +35,7 @@ std::vector<AuditRow> PositionRows(const Lengths& l) {
   RowMeter C(Texts("after (9): C, G", "C = (L1 cos α + BM, L3 sin β), G = (L1 cos α + BM/2, …)",
                    "the same with X1 added to both abscissas", "m",
                    "right only with the origin at A"));
-  for (const SliderMotion& m : RandomMotions(l, 200)) {
+  for (const SliderMotion& m : RandomMotions(truth, 200)) {
     const Pins& p = m.start;
     const double ga = p.gamma(), s_B = p.B.y(), s_C = p.C.y();
     const double al = std::asin((p.K().y() - l.L2 / 2 * std::sin(ga)) / l.L1);

@@ -30,8 +30,9 @@ AuditTable AuditCabinRobot(const std::string& models_dir) {
       "from "
       "the equations)";
   for (auto rows :
-       {cabin_audit::PositionRows(lengths), cabin_audit::WristRows(lengths),
-        cabin_audit::VelocityRows(lengths), cabin_audit::DynamicsRows(*model.mechanism),
+       {cabin_audit::PositionRows(lengths, lengths), cabin_audit::WristRows(lengths, lengths),
+        cabin_audit::VelocityRows(lengths, lengths),
+        cabin_audit::DynamicsRows(*model.mechanism, *model.mechanism),
         cabin_audit::StiffnessRows(models_dir, cabin::StiffnessParametersOf(elastic))}) {
     for (AuditRow& row : rows) table.rows.push_back(std::move(row));
   }

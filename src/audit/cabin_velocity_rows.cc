@@ -91,7 +91,8 @@ JacobianForms JacobianOf(const Lengths& l, const PlanarRates& s) {
   return J;
 }
 
-std::vector<AuditRow> JacobianRows(const Lengths& l, const std::vector<SliderMotion>& motions) {
+std::vector<AuditRow> JacobianRows(const Lengths& l, const Lengths& truth,
+                                   const std::vector<SliderMotion>& motions) {
   struct Element {
     int row, column;
     RowMeter meter;
@@ -119,10 +120,10 @@ std::vector<AuditRow> JacobianRows(const Lengths& l, const std::vector<SliderMot
        RowMeter(Texts("(25) J33", "cos β/(L2 sin(γ+β))", "−cos β/(L2 sin(β+γ))", "1/m",
                       "sense of rotation opposite to γ"))}};
   for (const SliderMotion& m : motions) {
-    const Mat3 truth = TrueJacobian(l, m);
-    const JacobianForms forms = JacobianOf(l, RatesAt(l, m));
+    const Mat3 J = TrueJacobian(truth, m);
+    const JacobianForms forms = JacobianOf(l, RatesAt(truth, m));
     for (Element& e : elements) {
-      e.meter.Add(truth(e.row, e.column), forms.printed(e.row, e.column),
+      e.meter.Add(J(e.row, e.column), forms.printed(e.row, e.column),
                   forms.corrected(e.row, e.column));
     }
   }
@@ -131,30 +132,31 @@ std::vector<AuditRow> JacobianRows(const Lengths& l, const std::vector<SliderMot
   return rows;
 }
 
-AuditRow AccelerationRow(const Lengths& l, const std::vector<SliderMotion>& motions) {
+AuditRow AccelerationRow(const Lengths& l, const Lengths& truth,
+                         const std::vector<SliderMotion>& motions) {
   RowMeter meter(Texts("(35), (36)", "A = J̇ V + J V̇ = q̇ᵀ H q̇ + G q̈", "", "m/s², rad/s²",
                        "form, with the corrected J; second differences of Newton-closed pins",
                        kAccelerationLimit));
   for (const SliderMotion& m : motions) {
     const auto pose = [&](double t) {
-      const Pins q = Close(l, m, t);
+      const Pins q = Close(truth, m, t);
       return Vec3(q.K().x(), q.K().y(), q.gamma());
     };
-    const Vec3 truth = SecondDifference(pose, kAccelerationStep);
+    const Vec3 a = SecondDifference(pose, kAccelerationStep);
     cabin::PlanarState s;
     s.X1 = {m.x[0], m.v[0], m.a[0]};
     s.X2 = {m.x[1], m.v[1], m.a[1]};
     s.X3 = {m.x[2], m.v[2], m.a[2]};
     const bool ok = cabin::SolveForward({l.L1, l.L2, l.L3, l.L4}, &s).ok();
     const Vec3 form(s.X.a, s.Y.a, s.gamma.a);
-    for (int c = 0; c < 3; ++c) meter.Add(truth[c], ok ? form[c] : kNan);
+    for (int c = 0; c < 3; ++c) meter.Add(a[c], ok ? form[c] : kNan);
   }
   return meter.Finish();
 }
 
 }  // namespace
 
-std::vector<AuditRow> VelocityRows(const Lengths& l) {
+std::vector<AuditRow> VelocityRows(const Lengths& l, const Lengths& truth) {
   RowMeter ep14(Texts("(14)", "ε = asin(L1 sin α/(2 L4))", "", "rad"));
   RowMeter ef15(Texts("(15)", "V_EF = V2 cos ε", "", "m/s", "V2 is the speed of F relative to A"));
   RowMeter e16(
@@ -174,9 +176,9 @@ std::vector<AuditRow> VelocityRows(const Lengths& l) {
                      "V_BC^n sin γ − ½ (m + V_BC^t) cos γ", "m/s"));
   RowMeter w23(
       Texts("(23) W_γ", "(m − V_BC^t)/L2", "(V_BC^t − m)/L2", "rad/s", "wrong sense of rotation"));
-  const std::vector<SliderMotion> motions = RandomMotions(l, 100);
+  const std::vector<SliderMotion> motions = RandomMotions(truth, 100);
   for (const SliderMotion& m : motions) {
-    const PlanarRates s = RatesAt(l, m);
+    const PlanarRates s = RatesAt(truth, m);
     const Vec2 along_EF(std::cos(s.ep), -std::sin(s.ep)), along_CD(std::cos(s.be), -std::sin(s.be));
     const Vec2 across_AB(std::sin(s.al), -std::cos(s.al));
     const Vec2 along_BC(std::cos(s.ga), std::sin(s.ga)), across_BC(std::sin(s.ga), -std::cos(s.ga));
@@ -208,8 +210,8 @@ std::vector<AuditRow> VelocityRows(const Lengths& l) {
   std::vector<AuditRow> rows = {ep14.Finish(), ef15.Finish(), e16.Finish(), b17.Finish(),
                                 bc18.Finish(), cd20.Finish(), m20.Finish(), m22.Finish(),
                                 x23.Finish(),  y23.Finish(),  w23.Finish()};
-  for (AuditRow& row : JacobianRows(l, motions)) rows.push_back(std::move(row));
-  rows.push_back(AccelerationRow(l, motions));
+  for (AuditRow& row : JacobianRows(l, truth, motions)) rows.push_back(std::move(row));
+  rows.push_back(AccelerationRow(l, truth, motions));
   AuditRow shapes = Texts("(37)–(40)", "rows and columns of ν, α_ij, H transposed at places",
                           "ν is 1×3, α_ij is 3×1, H is 3×3×3", "",
                           "definitions of the influence coefficients; only shapes to correct");

@@ -96,7 +96,7 @@ Mat64 SerialJacobian(const Lengths& l, const Vec4& q, bool printed) {
   return J;
 }
 
-void SerialPositionRows(const Lengths& l, const std::vector<State>& states,
+void SerialPositionRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
                         std::vector<AuditRow>* rows) {
   RowMeter m6(
       TextRow("(5), (6)", "elements of the wrist's transform", "", "1, m", kPoseLimit, kChain));
@@ -107,7 +107,7 @@ void SerialPositionRows(const Lengths& l, const std::vector<State>& states,
   RowMeter t1(TextRow("(7) θ1", "acos(a_x/cos θ2)", "atan2(a_y, a_x)", "rad", 1e-13,
                       "wrong sign for θ1 < 0"));
   for (const State& s : states) {
-    const Pose X = Wrist(l, s.q);
+    const Pose X = Wrist(truth, s.q);
     const Mat3 R = X.linear();
     const Vec3 p = X.translation();
     const double c1 = std::cos(s.q[0]), s1 = std::sin(s.q[0]), c2 = std::cos(s.q[1]);
@@ -174,7 +174,8 @@ std::array<Element, 12> ChainElements(const Lengths& l, const State& s) {
            {"p_z", "as printed", "", "m", pz, pz}}};
 }
 
-void ChainRows(const Lengths& l, const std::vector<State>& states, std::vector<AuditRow>* rows) {
+void ChainRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
+               std::vector<AuditRow>* rows) {
   rows->push_back(TextRow("(10), (11)", "chain of transforms, ¹₂T = trans(X, Y, 0) rot(Z, α)", "",
                           "", 0.0,
                           "α here is the platform's tilt γ; tested element by element in (13)"));
@@ -186,17 +187,18 @@ void ChainRows(const Lengths& l, const std::vector<State>& states, std::vector<A
     meters.emplace_back(row);
   }
   for (const State& s : states) {
-    const Pose X = Chain(l, s.planar, s.q);
+    const Pose X = Chain(truth, s.planar, s.q);
     const auto elements = ChainElements(l, s);
     for (int k = 0; k < 12; ++k) {
-      const double truth = k < 9 ? X.linear()(k % 3, k / 3) : X.translation()[k - 9];
-      meters[k].Add(truth, elements[k].value_printed, elements[k].value_corrected);
+      const double value = k < 9 ? X.linear()(k % 3, k / 3) : X.translation()[k - 9];
+      meters[k].Add(value, elements[k].value_printed, elements[k].value_corrected);
     }
   }
   for (RowMeter& meter : meters) rows->push_back(meter.Finish());
 }
 
-void JacobianRows(const Lengths& l, const std::vector<State>& states, std::vector<AuditRow>* rows) {
+void JacobianRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
+                  std::vector<AuditRow>* rows) {
   constexpr const char* kTruth = "tool-frame twist from differences of the wrist's transform";
   RowMeter first(
       TextRow("(28), (29)", "(p×n)_z = c2c3(d3+a2) + a1c3, (p×o)_z = −c2s3(d3+a2) + a1s3",
@@ -210,19 +212,20 @@ void JacobianRows(const Lengths& l, const std::vector<State>& states, std::vecto
   for (const State& s : states) {
     const Mat64 printed = SerialJacobian(l, s.q, true), corrected = SerialJacobian(l, s.q, false);
     for (int k = 0; k < 4; ++k) {
-      const Vec6 truth = ToolTwist([&](double t) { return Wrist(l, s.q + t * Vec4::Unit(k)); });
+      const Vec6 twist = ToolTwist([&](double t) { return Wrist(truth, s.q + t * Vec4::Unit(k)); });
       RowMeter* own[] = {&first, &second, &third, nullptr};
       for (int r = 0; r < 6; ++r) {
-        if (own[k] != nullptr && k == 2) own[k]->Add(truth[r], printed(r, k));
-        if (own[k] != nullptr && k != 2) own[k]->Add(truth[r], printed(r, k), corrected(r, k));
-        all.Add(truth[r], printed(r, k), corrected(r, k));
+        if (own[k] != nullptr && k == 2) own[k]->Add(twist[r], printed(r, k));
+        if (own[k] != nullptr && k != 2) own[k]->Add(twist[r], printed(r, k), corrected(r, k));
+        all.Add(twist[r], printed(r, k), corrected(r, k));
       }
     }
   }
   for (RowMeter* m : {&first, &second, &third, &all}) rows->push_back(m->Finish());
 }
 
-void HybridRows(const Lengths& l, const std::vector<State>& states, std::vector<AuditRow>* rows) {
+void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
+                std::vector<AuditRow>* rows) {
   RowMeter hybrid(TextRow(
       "(33), (34)", "J1 and J2 stacked (shapes do not fit; no rail, no rotation)",
       "v = ḋ1 e_z + (V_X, V_Y, 0) + W_γ e_z×r + R06 J2v q̇, ω = W_γ e_z + R06 J2ω q̇", "m/s, rad/s",
@@ -233,7 +236,7 @@ void HybridRows(const Lengths& l, const std::vector<State>& states, std::vector<
                                 "positions for rates, rates for accelerations"));
   for (const State& s : states) {
     const auto pose = [&](double t) {
-      return Chain(l, s.planar + t * s.planar_v + 0.5 * t * t * s.planar_a,
+      return Chain(truth, s.planar + t * s.planar_v + 0.5 * t * t * s.planar_a,
                    s.q + t * s.v + 0.5 * t * t * s.a);
     };
     const Mat3 R = pose(0.0).linear();
@@ -243,20 +246,20 @@ void HybridRows(const Lengths& l, const std::vector<State>& states, std::vector<
     const Vec3 spin(0, 0, s.planar_v[3]), slide(s.planar_v[1], s.planar_v[2], 0);
     const Vec3 K(s.planar[1], s.planar[2], s.planar[0]);
     const Vec3 r = pose(0.0).translation() - K;
-    Vec6 truth, printed, corrected;
-    truth << R * tool.head<3>(), R * tool.tail<3>();
+    Vec6 twist, printed, corrected;
+    twist << R * tool.head<3>(), R * tool.tail<3>();
     printed << slide + wrist.head<3>(), spin + wrist.tail<3>();
     corrected << Vec3(0, 0, s.planar_v[0]) + slide + spin.cross(r) + R * wrist.head<3>(),
         spin + R * wrist.tail<3>();
-    for (int c = 0; c < 6; ++c) hybrid.Add(truth[c], printed[c], corrected[c]);
+    for (int c = 0; c < 6; ++c) hybrid.Add(twist[c], printed[c], corrected[c]);
 
     const auto q = [&](double t) { return Vec4(s.q + t * s.v + 0.5 * t * t * s.a); };
     const auto J = [&](double t) { return SerialJacobian(l, q(t), false); };
     const Mat64 Jdot = FirstDifference(J, kStep);
-    const Mat3 Rw = Wrist(l, s.q).linear();
+    const Mat3 Rw = Wrist(truth, s.q).linear();
     const Vec3 a_true =
         Rw.transpose() *
-        SecondDifference([&](double t) { return Vec3(Wrist(l, q(t)).translation()); }, kStep);
+        SecondDifference([&](double t) { return Vec3(Wrist(truth, q(t)).translation()); }, kStep);
     const Vec6 literal = Jdot * s.q + J2 * s.v, rate = Jdot * s.v + J2 * s.a;
     const Vec3 full = rate.head<3>() + wrist.tail<3>().cross(wrist.head<3>());
     for (int c = 0; c < 3; ++c) acceleration.Add(a_true[c], literal[c], full[c]);
@@ -267,13 +270,13 @@ void HybridRows(const Lengths& l, const std::vector<State>& states, std::vector<
 
 }  // namespace
 
-std::vector<AuditRow> WristRows(const Lengths& lengths) {
+std::vector<AuditRow> WristRows(const Lengths& lengths, const Lengths& truth) {
   const std::vector<State> states = RandomStates(100);
   std::vector<AuditRow> rows;
-  SerialPositionRows(lengths, states, &rows);
-  ChainRows(lengths, states, &rows);
-  JacobianRows(lengths, states, &rows);
-  HybridRows(lengths, states, &rows);
+  SerialPositionRows(lengths, truth, states, &rows);
+  ChainRows(lengths, truth, states, &rows);
+  JacobianRows(lengths, truth, states, &rows);
+  HybridRows(lengths, truth, states, &rows);
   return rows;
 }
 

@@ -8,6 +8,8 @@
 
 namespace mbv {
 
+struct LoadOptions;
+
 /// Scenario files: files as given; a folder stands for all scenarios below it, sorted, except those
 /// in folders named must_fail further down. "" in `trouble` or what was wrong.
 [[nodiscard]] std::vector<std::string> ExpandScenarios(const std::vector<std::string>& arguments,
@@ -18,6 +20,9 @@ namespace mbv {
 
 /// "key=value" → pair; empty if there is no '=' or no key.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& text);
+
+/// "m_p=1000" of --set → overrides; false after saying what is wrong with one.
+[[nodiscard]] bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options);
 
 /// Writes a file whole or not at all (temporary file, then rename). Exit code: 0, or 2 after saying
 /// on standard error what went wrong.

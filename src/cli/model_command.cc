@@ -15,16 +15,7 @@
 #include "scenario/set_values.h"
 
 namespace mbv {
-namespace {
 
-namespace fs = std::filesystem;
-
-struct ModelArguments {
-  std::string model, format, out;
-  std::vector<std::string> set;
-};
-
-// "m_p=1000" of --set; false after a message.
 bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
   std::vector<SetValue> values;
   for (const std::string& text : texts) {
@@ -39,6 +30,15 @@ bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options)
   fmt::print(stderr, "{}", findings.Text());
   return !findings.has_errors();
 }
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ModelArguments {
+  std::string model, format, out;
+  std::vector<std::string> set;
+};
 
 ModelFormat FormatOf(const std::string& word) {
   return word == "mjcf"   ? ModelFormat::kMjcf

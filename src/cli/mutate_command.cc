@@ -1,25 +1,38 @@
 // mbverify mutate
 #include <fmt/format.h>
+#include <unistd.h>
 
+#include <algorithm>
 #include <charconv>
+#include <filesystem>
+#include <fstream>
+#include <limits>
 #include <memory>
 #include <optional>
+#include <sstream>
+#include <thread>
+#include <utility>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "pipeline/mutate.h"
+#include "regress/find_cases.h"
+#include "regress/workers.h"
 
 namespace mbv {
 namespace {
+
+namespace fs = std::filesystem;
 
 struct MutateArguments {
   std::string scenario;
   std::string size = "0.1 %";
   double resolution_percent = 10.0;
-  std::vector<std::string> parameters;
+  std::vector<std::string> numbers;
   bool markdown = false, no_search = false, no_faults = false;
-  std::string json;
+  std::string mode = "both", json, part;
+  int jobs = 1;
 };
 
 // "0.1", "0.1%", "0.1 %": percent; empty when it is none or not above 0.
@@ -31,33 +44,126 @@ std::optional<double> ReadPercent(std::string text) {
   return value / 100.0;
 }
 
-int Mutate(const MutateArguments& arguments) {
+// Empty after a message.
+std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
+  MutationOptions options;
   const auto size = ReadPercent(arguments.size);
   if (!size) {
     fmt::print(stderr, "--size {}: error: violates: a percentage above 0, e.g. 1%\n",
                arguments.size);
-    return 2;
+    return {};
   }
-  MutationOptions options;
   options.size = *size;
-  options.parameters = arguments.parameters;
+  options.numbers = arguments.numbers;
   options.resolution = arguments.resolution_percent / 100.0;
   options.smallest = !arguments.no_search;
   options.structural = !arguments.no_faults;
+  options.modes = arguments.mode == "own"       ? MutationModes::kOwn
+                  : arguments.mode == "inverse" ? MutationModes::kInverse
+                                                : MutationModes::kBoth;
+  if (arguments.part.empty()) return options;
+  const auto part = ParseShard(arguments.part);
+  if (!part) {
+    fmt::print(stderr, "--part {}: error: write i/n with 1 <= i <= n, e.g. 2/3\n", arguments.part);
+    return {};
+  }
+  options.part = static_cast<size_t>(part->index - 1);
+  options.parts = static_cast<size_t>(part->count);
+  return options;
+}
+
+std::string ReadAll(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  std::stringstream content;
+  content << in.rdbuf();
+  return content.str();
+}
+
+// What a worker is started with: these arguments, for one part.
+std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
+                                   const std::string& json) {
+  std::vector<std::string> argv = {"/proc/self/exe", "mutate", arguments.scenario, "--size",
+                                   arguments.size, "--resolution",
+                                   fmt::format("{:.17g}", arguments.resolution_percent), "--part",
+                                   fmt::format("{}/{}", part + 1, arguments.jobs), "--mode",
+                                   arguments.mode, "--json", json};
+  for (const std::string& number : arguments.numbers) {
+    argv.insert(argv.end(), {"--parameter", number});
+  }
+  if (arguments.no_search) argv.emplace_back("--no-search");
+  if (arguments.no_faults) argv.emplace_back("--no-faults");
+  return argv;
+}
+
+// The work shared out to processes. Where a worker fails, the report has its exit code and nothing
+// else, and what it said is told.
+MutationReport RunWorkers(const MutateArguments& arguments) {
+  const fs::path folder = fs::temp_directory_path() / fmt::format("mbverify_mutate_{}", getpid());
+  const auto place = [&](size_t part, const char* ending) {
+    return folder / fmt::format("{}.{}", part, ending);
+  };
+  std::vector<WorkerJob> jobs;
+  for (int part = 0; part < arguments.jobs; ++part) {
+    const auto k = static_cast<size_t>(part);
+    jobs.push_back({CommandOf(arguments, part, place(k, "json").string()), place(k, "log")});
+  }
+  ProgressLine progress(true);
+  std::vector<MutationReport> parts(jobs.size());
+  size_t done = 0;
+  int failure = 0;
+  bool told = false;
+  WorkerPool pool;
+  pool.parallel = arguments.jobs;
+  pool.timeout_s = std::numeric_limits<double>::infinity();
+  pool.ended = [&](size_t part, const WorkerEnd& end) {
+    progress.Show(fmt::format("{} workers", arguments.jobs),
+                  static_cast<double>(++done) / static_cast<double>(jobs.size()));
+    auto report = MutationReportOf(ReadAll(place(part, "json")));
+    const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
+    if (good) parts[part] = *std::move(report);
+    // All workers find the same in the files.
+    if (std::exchange(told, true) && (good || failure > 0)) return;
+    progress.Clear();
+    fmt::print(stderr, "{}", ReadAll(place(part, "log")));
+    if (!good) {
+      if (end.signal != 0) fmt::print(stderr, "a worker was ended by signal {}\n", end.signal);
+      failure = std::max(failure, end.exit_code > 0 ? end.exit_code : 3);
+    }
+  };
+  (void)pool.Run(jobs);
+  std::error_code ignored;
+  fs::remove_all(folder, ignored);
+  if (failure == 0) return MergeParts(std::move(parts));
+  MutationReport report;
+  report.exit_code = failure;
+  return report;
+}
+
+MutationReport RunHere(const MutateArguments& arguments, MutationOptions options) {
   ProgressLine progress(true);
   if (progress.active()) {
-    options.progress = [&](const std::string& parameter, double fraction) {
-      progress.Show(parameter, fraction);
+    options.progress = [&](const std::string& number, double fraction) {
+      progress.Show(number, fraction);
     };
   }
-  const MutationReport report = MutateScenario(arguments.scenario, options);
-  progress.Clear();
+  return MutateScenario(arguments.scenario, options);
+}
+
+int Mutate(MutateArguments arguments) {
+  const auto options = OptionsOf(arguments);
+  if (!options) return 2;
+  if (!options->numbers.empty()) {
+    arguments.jobs = std::min(arguments.jobs, static_cast<int>(options->numbers.size()));
+  }
+  const bool shared = arguments.jobs > 1 && arguments.part.empty();
+  const MutationReport report = shared ? RunWorkers(arguments) : RunHere(arguments, *options);
   fmt::print(stderr, "{}", report.diagnostics.Text());
-  if (report.mutations.empty() && report.faults.empty()) return report.exit_code;
+  const bool nothing = report.mutations.empty() && report.faults.empty();
+  if (report.exit_code > 1 || (nothing && arguments.part.empty())) return report.exit_code;
   if (!arguments.json.empty()) {
     if (const int code = WriteWholeFile(arguments.json, ToJson(report)); code != 0) return code;
   }
-  fmt::print("{}", ToText(report, arguments.markdown));
+  if (arguments.part.empty()) fmt::print("{}", ToText(report, arguments.markdown));
   return report.exit_code;
 }
 
@@ -65,14 +171,18 @@ int Mutate(const MutateArguments& arguments) {
 
 void AddMutateCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<MutateArguments>();
+  arguments->jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
   CLI::App* mutate = app->add_subcommand(
       "mutate",
-      "Bend each parameter of the simulated side and put structural faults into it: which errors "
+      "Bend each number of the simulated side and put structural faults into it: which errors "
       "would be noticed, and down to which size?");
   mutate->add_option("scenario", arguments->scenario, "scenario file that agrees")->required();
   mutate->add_option("--size", arguments->size, "relative error in percent (1%)")
       ->capture_default_str();
-  mutate->add_option("--parameter", arguments->parameters, "only these parameters (repeatable)")
+  mutate
+      ->add_option("--parameter", arguments->numbers,
+                   "only these numbers: a parameter, limb2.azimuth of an instance, or the place of "
+                   "a number such as bodies.rod.mass (repeatable)")
       ->allow_extra_args(false);
   mutate
       ->add_option("--resolution", arguments->resolution_percent,
@@ -81,7 +191,16 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   mutate->add_flag("--no-search", arguments->no_search,
                    "smallest errors by proportion, without searching");
-  mutate->add_flag("--no-faults", arguments->no_faults, "parameters only");
+  mutate->add_flag("--no-faults", arguments->no_faults, "numbers only");
+  mutate
+      ->add_option("--mode", arguments->mode,
+                   "of a forward scenario: its own, inverse dynamics, or both side by side")
+      ->check(CLI::IsMember({"both", "own", "inverse"}))
+      ->capture_default_str();
+  mutate->add_option("--jobs", arguments->jobs, "worker processes at once")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  mutate->add_option("--part", arguments->part, "i/n: a worker's share")->group("");
   mutate->add_flag("--markdown", arguments->markdown, "print Markdown tables");
   mutate->add_option("--json", arguments->json, "write the results to this file, too");
   mutate->footer(

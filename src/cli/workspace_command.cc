@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "cli/cli.h"
+#include "cli/files.h"
 #include "mechanism/load_model.h"
 #include "pipeline/output_folder.h"
 #include "pipeline/workspace.h"
@@ -15,6 +16,7 @@ namespace {
 
 struct WorkspaceArguments {
   std::string model, out = "out";
+  std::vector<std::string> set;
   bool no_pictures = false;
 };
 
@@ -24,7 +26,9 @@ int Workspace(const WorkspaceArguments& arguments) {
     fmt::print(stderr, "error: there is no model '{}'\n", arguments.model);
     return 2;
   }
-  const LoadResult loaded = LoadModel(*file);
+  LoadOptions options;
+  if (!ReadParameters(arguments.set, &options)) return 2;
+  const LoadResult loaded = LoadModel(*file, options);
   fmt::print(stderr, "{}", loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
   const WorkspaceOutcome outcome = ComputeWorkspace(*loaded.mechanism, !arguments.no_pictures);
@@ -46,7 +50,7 @@ int Workspace(const WorkspaceArguments& arguments) {
     return 2;
   }
   fmt::print(stderr, "results in {}\n", folder.target().string());
-  return 0;
+  return outcome.agree ? 0 : 1;
 }
 
 }  // namespace
@@ -58,8 +62,14 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   workspace
       ->add_option("model", arguments->model, "scara_robot, spr_tripod, or a model.yaml of one")
       ->required();
+  workspace->add_option("--set", arguments->set, "PARAMETER=VALUE of the model (repeatable)")
+      ->allow_extra_args(false);
   workspace->add_option("--out", arguments->out, "result folder")->capture_default_str();
   workspace->add_flag("--no-pictures", arguments->no_pictures, "data files only");
+  workspace->footer(
+      "Example:\n"
+      "  mbverify workspace spr_tripod --set q_min=0.45 --set q_max=0.65\n"
+      "Exit codes: 0 the ways to a measure agree, 1 they contradict each other");
   workspace->callback([arguments, exit_code] { *exit_code = Workspace(*arguments); });
 }
 

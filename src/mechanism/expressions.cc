@@ -108,6 +108,12 @@ ExpressionResult Compute(const std::string& text, const std::map<std::string, do
 
 }  // namespace
 
+bool IsWrittenOut(const std::string& expression) {
+  const std::vector<UsedName> names = NamesIn(expression);
+  return std::all_of(names.begin(), names.end(),
+                     [](const UsedName& used) { return used.is_call || used.name == "pi"; });
+}
+
 std::string WhyNoParameterName(const std::string& name) {
   const bool is_name = !name.empty() && IsNameStart(name.front()) &&
                        std::all_of(name.begin(), name.end(), IsNamePart);

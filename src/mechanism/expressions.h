@@ -56,6 +56,9 @@ class Scope {
   std::vector<std::string> evaluating_;  // chain of names, to find cycles
 };
 
+/// True where an expression refers to no parameter: a number, or "pi/3".
+[[nodiscard]] bool IsWrittenOut(const std::string& expression);
+
 /// Products of a few larger numbers overflow.
 inline constexpr double kLargestNumber = 1e30;
 /// Empty if a model may contain this number, else why not ("is not a finite number").

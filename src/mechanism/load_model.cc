@@ -33,6 +33,7 @@ LoadResult ModelReader::Load(const std::string& text) {
   LoadResult result;
   result.diagnostics.Append(InFileOrder(yaml_.diagnostics()));
   result.diagnostics.Append(other_findings_);
+  result.literals = std::move(literals_);
   if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism_);
   return result;
 }
@@ -87,7 +88,7 @@ LoadResult LoadModelText(const std::string& text, const std::string& file,
 LoadResult LoadModel(const std::string& file, const LoadOptions& options) {
   YamlReader reader(file);
   const auto text = reader.ReadFile();
-  if (!text) return {.mechanism = std::nullopt, .diagnostics = reader.diagnostics()};
+  if (!text) return {.mechanism = {}, .diagnostics = reader.diagnostics(), .literals = {}};
   return LoadModelText(*text, file, options);
 }
 

@@ -12,6 +12,12 @@
 
 namespace mbv {
 
+/// A number that a file writes out where it is used: no parameter, no expression of parameters.
+struct Literal {
+  std::string place;    ///< "parts.leg.bodies.rod.mass", "urdf.rod.inertia.xy"
+  double value = kNan;  ///< SI units
+};
+
 struct LoadOptions {
   /// Parameter overrides by name; an unknown name is an error. Names may end in a unit:
   /// ParameterIn().
@@ -19,6 +25,8 @@ struct LoadOptions {
   /// Where the overrides were written, for messages ("scenario.yaml:7:3").
   std::map<std::string, Finding> override_places;
   std::optional<Vec3> gravity_W;  ///< [m/s²], instead of the model's; its `up` stays
+  /// Other values of literals, by place.
+  std::map<std::string, double> literals;
 };
 
 /// The parameter that an override sets: "alpha_deg" is alpha in degrees, "l_mm" is l in
@@ -33,6 +41,7 @@ struct ParameterInUnit {
 struct LoadResult {
   std::optional<Mechanism> mechanism;  ///< empty when there are errors
   Diagnostics diagnostics;             ///< all findings, warnings included
+  std::vector<Literal> literals;       ///< in the order of reading, each place once
 };
 
 /// Loads `file` (a model.yaml), evaluates its expressions, builds the joint graph and spanning

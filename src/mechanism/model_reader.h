@@ -107,6 +107,7 @@ class ModelReader {
   // model_urdf.cc
   void ImportUrdf(const YamlNode& node);
   void ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& joints);
+  void TakeUrdfLiterals(Body* body);
   void AddUrdf(const UrdfTree& tree, const std::string& file);
   void AddUrdfDrives(const std::vector<std::string>& motors, const YamlNode* at);
   void WeldUrdfRoot();
@@ -173,6 +174,8 @@ class ModelReader {
   void CheckIsostaticRule();
 
   // model_values.cc: one value each; empty after a finding.
+  /// The value, or what LoadOptions::literals puts in its place.
+  double LiteralAt(const std::string& place, double value);
   std::optional<double> Number(const Block& block, const YamlNode& node, const std::string& path,
                                double factor = 1.0);
   std::optional<Vec3> Vector(const Block& block, const YamlNode& node, const std::string& path,
@@ -238,6 +241,8 @@ class ModelReader {
   std::map<std::string, std::string> overridden_;  // full name of a parameter → name as given
   Diagnostics other_findings_;                     // of other files: overrides, URDF, parameters
   std::vector<std::string> known_parameters_;      // dotted names, for "did you mean"
+  std::vector<Literal> literals_;
+  std::set<std::string> literal_places_;
 };
 
 }  // namespace mbv

@@ -42,10 +42,24 @@ void ModelReader::ImportUrdf(const YamlNode& node) {
   if (blocks_.front().Section("drives") == nullptr) AddUrdfDrives(motors, closures);
 }
 
+void ModelReader::TakeUrdfLiterals(Body* body) {
+  const std::string place = "urdf." + body->name;
+  body->mass = LiteralAt(place + ".mass", body->mass);
+  for (int row = 0; row < 3; ++row) {
+    body->p_BoBcm_B[row] = LiteralAt(fmt::format("{}.com[{}]", place, row), body->p_BoBcm_B[row]);
+    for (int col = row; col < 3; ++col) {
+      const std::string key = {"xyz"[row], "xyz"[col]};
+      const double value = LiteralAt(place + ".inertia." + key, body->I_Bcm_B(row, col));
+      body->I_Bcm_B(row, col) = body->I_Bcm_B(col, row) = value;
+    }
+  }
+}
+
 void ModelReader::AddUrdf(const UrdfTree& tree, const std::string& file) {
   const int first = static_cast<int>(mechanism_.bodies.size());
   for (size_t b = 0; b < tree.bodies.size(); ++b) {
     mechanism_.bodies.push_back(tree.bodies[b]);
+    TakeUrdfLiterals(&mechanism_.bodies.back());
     body_places_.push_back(nullptr);
     body_paths_.push_back(tree.body_lines[b] > 0 ? fmt::format("{}:{}", file, tree.body_lines[b])
                                                  : file);
@@ -56,6 +70,10 @@ void ModelReader::AddUrdf(const UrdfTree& tree, const std::string& file) {
     Joint joint = tree.joints[j];
     joint.parent = index(joint.parent);
     joint.child = index(joint.child);
+    for (int k = 0; k < 3; ++k) {
+      double& offset = joint.X_PF.translation()[k];
+      offset = LiteralAt(fmt::format("urdf.{}.origin[{}]", joint.name, k), offset);
+    }
     hints_.push_back(joint.closure ? std::optional(true) : std::nullopt);
     mechanism_.joints.push_back(joint);
     joint_places_.push_back(nullptr);

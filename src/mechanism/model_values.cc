@@ -17,12 +17,22 @@ std::optional<double> ModelReader::Number(const Block& block, const YamlNode& no
     return std::nullopt;
   }
   const ExpressionResult result = block.scope->Evaluate(node.text);
-  if (result.value) return *result.value * factor;
+  if (result.value) {
+    const double value = *result.value * factor;
+    return IsWrittenOut(node.text) ? LiteralAt(path, value) : value;
+  }
   // An empty text: a parameter failed whose own place already carries the finding.
   if (!result.error.empty()) {
     yaml_.Error(node, fmt::format("{} = {} {}", path, Describe(node), result.error), result.hint);
   }
   return std::nullopt;
+}
+
+double ModelReader::LiteralAt(const std::string& place, double value) {
+  // An instance's literal is read once, its part's as often as there are instances.
+  if (literal_places_.insert(place).second) literals_.push_back({place, value});
+  const auto other = options_.literals.find(place);
+  return other == options_.literals.end() ? value : other->second;
 }
 
 std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlNode& node,

@@ -27,6 +27,25 @@ void AddError(const std::string& file, const std::string& message, const std::st
   diagnostics->Add(std::move(finding));
 }
 
+// There is a motion to hold, and a simulation.
+bool CanBeBent(const Scenario& scenario, Diagnostics* diagnostics) {
+  if (scenario.motion.free()) {
+    AddError(scenario.file,
+             "the motion follows from forces, so there is none to hold while a model is bent",
+             "command the drives or the outputs", diagnostics);
+  } else if (!scenario.simulation.on) {
+    AddError(scenario.file, "has no simulation to bend", "e.g. simulation: {mode: forward}",
+             diagnostics);
+  } else {
+    return true;
+  }
+  return false;
+}
+
+Engine EngineOf(const Scenario& scenario) {
+  return scenario.simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
+}
+
 }  // namespace
 
 double BentRun::ValueOf(const std::string& check) const {
@@ -36,35 +55,31 @@ double BentRun::ValueOf(const std::string& check) const {
 
 double MutationBench::Visible(double base) { return std::max(kRoundoff, kAboveBase * base); }
 
-std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file,
+std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, BenchMode mode,
                                                    Diagnostics* diagnostics, int* exit_code) {
   *exit_code = 2;
   ScenarioOptions options;
-  options.set = {{"simulation.mode", "inverse"}};
+  if (mode == BenchMode::kInverse) options.set = {{"simulation.mode", "inverse"}};
   if (ReadScenarioHead(file).is_stiffness()) {
     AddError(file, "is a stiffness scenario", "mutate bends the model of a motion", diagnostics);
     return nullptr;
   }
   std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
-  if (!prepared) return nullptr;
-  if (prepared->scenario.motion.free()) {
-    AddError(file, "the motion follows from forces, so there is none to hold while a model is bent",
-             "command the drives or the outputs", diagnostics);
-    return nullptr;
-  }
+  if (!prepared || !CanBeBent(prepared->scenario, diagnostics)) return nullptr;
   std::unique_ptr<MutationBench> bench(new MutationBench(*std::move(prepared)));
   bench->joints_not_unique_ = AnalyseMobility(bench->prepared_.base).joints_not_unique;
+  bench->literals_ = LoadModel(bench->scenario().model_file, bench->SimulatedOptions()).literals;
   bench->RunTruths();
-  bench->TakeDrivenMotion();
-  bench->base_ = bench->Run(bench->mechanism());
-  const Comparison& base = bench->base_.comparison;
-  *exit_code = !bench->base_.ran || base.verdict == Verdict::kNotRun ? 3
-               : base.verdict == Verdict::kDisagree                  ? 1
-                                                                     : 0;
-  if (*exit_code == 0) return bench;
+  bench->RunUnbent();
+  const BentRun& base = bench->base_;
+  if (base.ran && base.comparison.verdict == Verdict::kAgree) {
+    *exit_code = 0;
+    return bench;
+  }
+  *exit_code = base.ran && base.comparison.verdict == Verdict::kDisagree ? 1 : 3;
   AddError(file,
            "does not agree before anything is bent: " +
-               (bench->base_.ran ? base.reason : bench->base_.failure),
+               (base.ran ? base.comparison.reason : base.failure),
            "mbverify run shows why", diagnostics);
   return nullptr;
 }
@@ -93,21 +108,22 @@ void MutationBench::RunTruths() {
   truth_ = analytic ? "analytic" : "reference";
 }
 
-void MutationBench::TakeDrivenMotion() {
+void MutationBench::RunUnbent() {
   const DrivenMotion driven = prepared_.MakeDrivenMotion();
-  const Motion& motion = scenario().motion;
-  for (const double t : SampleTimes(motion.duration_s, motion.sample_s)) {
-    driven_.emplace_back();
-    driven_summary_ = driven(t, &driven_.back());
-    if (!driven_summary_.ok()) return;
-  }
+  base_ = Run(mechanism(), scenario(), [&](double t_s, DrivenSample* sample) {
+    RunSummary summary = driven(t_s, sample);
+    if (summary.ok()) driven_[t_s] = *sample;
+    return summary;
+  });
 }
 
 ComparisonInput MutationBench::Input() const {
   ComparisonInput input{.mechanism = &prepared_.base,
                         .motion = &scenario().motion,
                         .limits = scenario().checks,
-                        .simulation_limits = LimitColumn::kInverse,
+                        .simulation_limits = scenario().simulation.forward
+                                                 ? LimitColumn::kForward
+                                                 : LimitColumn::kInverse,
                         .start_window_s = scenario().start_window_s,
                         .witnesses = {},
                         .driven_by = prepared_.driven_by,
@@ -119,10 +135,16 @@ ComparisonInput MutationBench::Input() const {
   return input;
 }
 
-std::optional<Mechanism> MutationBench::Bend(const std::string& parameter, double value,
+LoadOptions MutationBench::SimulatedOptions() const {
+  return ModelOptions(scenario(), scenario().simulation.parameters);
+}
+
+std::optional<Mechanism> MutationBench::Bend(const Replacement& replacement,
                                              std::string* why) const {
-  const Overrides own = Merge(scenario().simulation.parameters, {{parameter, value}});
-  LoadResult loaded = LoadModel(scenario().model_file, ModelOptions(scenario(), own));
+  LoadOptions options = SimulatedOptions();
+  (replacement.literal ? options.literals : options.overrides)[replacement.name] =
+      replacement.value;
+  LoadResult loaded = LoadModel(scenario().model_file, options);
   if (loaded.mechanism) return *std::move(loaded.mechanism);
   *why = "the model does not load";
   for (const Finding& finding : loaded.diagnostics.findings()) {
@@ -133,41 +155,38 @@ std::optional<Mechanism> MutationBench::Bend(const std::string& parameter, doubl
   return {};
 }
 
-BentRun MutationBench::Run(const std::string& parameter, double value) const {
+BentRun MutationBench::Run(const Replacement& replacement) const {
   BentRun bent;
-  const auto mechanism = Bend(parameter, value, &bent.failure);
-  if (mechanism) {
-    if (!scenario().simulation.extrapolate) return Run(*mechanism);
-    // Extrapolation loads the model anew, so the bend has to be in the scenario.
-    MutationBench copy(Prepared{.scenario = scenario(),
-                                .base = prepared_.base,
-                                .mechanisms = prepared_.mechanisms,
-                                .closed_form = {},
-                                .driven_by = prepared_.driven_by});
-    copy.prepared_.scenario.simulation.parameters[parameter] = value;
-    copy.summaries_ = summaries_;
-    copy.traces_ = traces_;
-    copy.table_ = table_;
-    copy.driven_ = driven_;
-    copy.driven_summary_ = driven_summary_;
-    copy.joints_not_unique_ = joints_not_unique_;
-    return copy.Run(*mechanism);
+  const auto mechanism = Bend(replacement, &bent.failure);
+  if (!mechanism) {
+    bent.loaded = false;
+    return bent;
   }
-  bent.loaded = false;
-  return bent;
+  if (!scenario().simulation.extrapolate) return Run(*mechanism);
+  // Extrapolation loads the model anew, so the bend has to be in the scenario.
+  MBV_DEMAND(!replacement.literal, replacement.name);
+  Scenario wrong = scenario();
+  wrong.simulation.parameters[replacement.name] = replacement.value;
+  return Run(*mechanism, wrong, Remembered());
 }
 
 BentRun MutationBench::Run(const Mechanism& wrong) const {
-  BentRun bent;
-  size_t next = 0;
-  const auto driven = [&](double t_s, DrivenSample* sample) {
-    // Asked for each sample in turn; an extrapolation starts again.
-    if (t_s == 0.0) next = 0;
-    if (next >= driven_.size()) return driven_summary_;
-    *sample = driven_[next++];
-    return next == driven_.size() ? driven_summary_ : RunSummary::Done();
+  return Run(wrong, scenario(), Remembered());
+}
+
+DrivenMotion MutationBench::Remembered() const {
+  return [this](double t_s, DrivenSample* sample) {
+    const auto found = driven_.find(t_s);
+    MBV_DEMAND(found != driven_.end(), t_s);
+    *sample = found->second;
+    return RunSummary::Done();
   };
-  SimulatedWitness witness = RunSimulation(scenario(), wrong, driven, Engine::kCorrected, {});
+}
+
+BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario,
+                           const DrivenMotion& driven) const {
+  BentRun bent;
+  SimulatedWitness witness = RunSimulation(scenario, wrong, driven, EngineOf(scenario), {});
   if (witness.diagnostics.has_errors()) {
     bent.failure = witness.diagnostics.findings().front().message;
     return bent;
@@ -176,7 +195,7 @@ BentRun MutationBench::Run(const Mechanism& wrong) const {
     bent.failure = witness.run.summary.message;
     return bent;
   }
-  if (!scenario().simulation.ignore_ranges) {
+  if (!scenario.simulation.ignore_ranges) {
     const auto violations = JointViolations(wrong, witness.run.trace.time_s, witness.run.X_WB);
     if (!violations.empty()) {
       bent.failure = violations.front().Text();

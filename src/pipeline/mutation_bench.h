@@ -2,11 +2,13 @@
 // once.
 #pragma once
 
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "comparison/comparison.h"
+#include "mechanism/load_model.h"
 #include "pipeline/prepare.h"
 #include "scenario/table.h"
 
@@ -26,45 +28,65 @@ struct BentRun {
   [[nodiscard]] double ValueOf(const std::string& check) const;
 };
 
+/// One number of the model file, replaced.
+struct Replacement {
+  std::string name;      ///< of a parameter ("limb2.azimuth" of an instance's), or a literal's place
+  bool literal = false;  ///< Literal, load_model.h
+  double value = kNan;
+};
+
+/// How a bench runs the scenario.
+enum class BenchMode { kAsIs, kInverse };
+
 class MutationBench {
  public:
-  /// Loads and runs the unbent scenario with inverse dynamics per sample (round-off accuracy). The
-  /// generic reference takes part only where no closed form does. Null after bad input, or when
-  /// the unbent scenario does not agree; `exit_code` as of `run`.
-  [[nodiscard]] static std::unique_ptr<MutationBench> Make(const std::string& file,
+  /// Loads and runs the unbent scenario as it is, or with inverse dynamics per sample (round-off
+  /// accuracy); its limits for that mode judge. The generic reference takes part only where no
+  /// closed form does. Null after bad input, or when the unbent scenario does not agree; `exit_code`
+  /// as of `run`.
+  [[nodiscard]] static std::unique_ptr<MutationBench> Make(const std::string& file, BenchMode mode,
                                                            Diagnostics* diagnostics,
                                                            int* exit_code);
 
   [[nodiscard]] const Scenario& scenario() const { return prepared_.scenario; }
   /// The simulated side as it is.
   [[nodiscard]] const Mechanism& mechanism() const { return prepared_.mechanisms.simulated; }
+  /// Numbers that its file writes out where they are used.
+  [[nodiscard]] const std::vector<Literal>& literals() const { return literals_; }
   [[nodiscard]] const BentRun& base() const { return base_; }
   /// "analytic", "reference" (a table, too) or "solver": what the simulation is judged by first.
   [[nodiscard]] const std::string& truth() const { return truth_; }
   [[nodiscard]] std::string ForceCheck() const { return "simulated_vs_" + truth_ + ".force_nrmse"; }
 
-  /// The simulated side with one parameter replaced.
-  [[nodiscard]] BentRun Run(const std::string& parameter, double value) const;
+  /// The simulated side with one number replaced.
+  [[nodiscard]] BentRun Run(const Replacement& replacement) const;
   [[nodiscard]] BentRun Run(const Mechanism& wrong) const;
-  /// The model with one parameter replaced; empty with the reason when it does not load.
-  [[nodiscard]] std::optional<Mechanism> Bend(const std::string& parameter, double value,
+  /// The model with one number replaced; empty with the reason when it does not load.
+  [[nodiscard]] std::optional<Mechanism> Bend(const Replacement& replacement,
                                               std::string* why) const;
 
   /// A value counts as an effect when it is clearly above what the unbent run gives.
   [[nodiscard]] static double Visible(double base);
 
  private:
+  /// The commanded motion of everything driven, by time.
+  using DrivenSamples = std::map<double, DrivenSample>;
+
   explicit MutationBench(Prepared prepared) : prepared_(std::move(prepared)) {}
   void RunTruths();
-  void TakeDrivenMotion();
+  void RunUnbent();
+  [[nodiscard]] BentRun Run(const Mechanism& wrong, const Scenario& scenario,
+                            const DrivenMotion& driven) const;
+  [[nodiscard]] DrivenMotion Remembered() const;
   [[nodiscard]] ComparisonInput Input() const;
+  [[nodiscard]] LoadOptions SimulatedOptions() const;
 
   Prepared prepared_;
+  std::vector<Literal> literals_;
   std::vector<std::pair<std::string, RunSummary>> summaries_;  // of traces_
   std::vector<Trace> traces_;
   std::optional<AlignedTable> table_;
-  std::vector<DrivenSample> driven_;  // per sample of the motion
-  RunSummary driven_summary_;
+  DrivenSamples driven_;  // at every time that the unbent run asks for; bent ones ask the same
   std::string truth_;
   std::vector<std::string> joints_not_unique_;
   BentRun base_;

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/demand.h"
@@ -110,6 +111,40 @@ std::vector<RangeViolation> JointViolations(const Mechanism& mechanism,
     if (w.worst.amount > 0.0) violations.push_back(std::move(w.worst));
   }
   return violations;
+}
+
+bool HasRanges(const Mechanism& mechanism) {
+  return std::any_of(mechanism.joints.begin(), mechanism.joints.end(),
+                     [](const Joint& joint) {
+                       return std::any_of(joint.range.begin(), joint.range.end(), IsBounded);
+                     }) ||
+         std::any_of(mechanism.drives.begin(), mechanism.drives.end(),
+                     [](const Drive& drive) { return IsBounded(drive.range); });
+}
+
+bool IsWithinRanges(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
+  std::vector<std::array<double, 6>> home;
+  for (const Joint& joint : mechanism.joints) home.push_back(joint.home);
+  const auto coordinates = JointCoordinatesAt(mechanism, X_WB, home);
+  const auto inside = [](double value, const CoordinateRange& range) {
+    return value >= range.lower - kTouch && value <= range.upper + kTouch;
+  };
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    for (size_t c = 0; c < static_cast<size_t>(FreedomsOf(joint.kind)); ++c) {
+      if (!inside(coordinates[j][c], joint.range[c])) return false;
+    }
+  }
+  return std::all_of(mechanism.drives.begin(), mechanism.drives.end(), [&](const Drive& drive) {
+    if (const auto* of_joint = std::get_if<JointDrive>(&drive.kind)) {
+      const auto j = static_cast<size_t>(of_joint->joint);
+      return inside(coordinates[j][static_cast<size_t>(of_joint->coordinate)], drive.range);
+    }
+    const auto& line = std::get<DistanceDrive>(drive.kind);
+    const Vec3 from = X_WB[static_cast<size_t>(line.body_from)] * line.p_from;
+    const Vec3 to = X_WB[static_cast<size_t>(line.body_to)] * line.p_to;
+    return inside((to - from).norm(), drive.range);
+  });
 }
 
 RunSummary LimitSummary(const std::vector<RangeViolation>& violations) {

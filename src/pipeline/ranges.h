@@ -33,6 +33,13 @@ struct RangeViolation {
     const Mechanism& mechanism, const std::vector<double>& time_s,
     const std::vector<std::vector<Pose>>& X_WB);
 
+/// Any joint coordinate or drive is bounded.
+[[nodiscard]] bool HasRanges(const Mechanism& mechanism);
+
+/// No joint coordinate and no drive is beyond its range at these body poses. Workspaces and
+/// stiffness maps count a pose as reached under this condition.
+[[nodiscard]] bool IsWithinRanges(const Mechanism& mechanism, const std::vector<Pose>& X_WB);
+
 /// The summary of a witness that must not run (or not count) because of violations.
 [[nodiscard]] RunSummary LimitSummary(const std::vector<RangeViolation>& violations);
 

@@ -10,6 +10,7 @@
 #include <numbers>
 
 #include "mechanism/yaml_reader.h"
+#include "pipeline/ranges.h"
 #include "reference/frame_stiffness.h"
 #include "report/svg_plot.h"
 
@@ -20,13 +21,20 @@ double PointOf(const MapAxis& axis, int k) {
   return axis.low + (axis.high - axis.low) * k / (axis.count - 1);
 }
 
-StiffnessResult StiffnessAt(const PreparedStiffness& prepared, const PoseValues& pose) {
-  if (prepared.form != nullptr) return prepared.form->EvaluateMatrices(pose);
-  std::vector<Pose> X_WB;
+// Sets `out_of_range` instead of a result where a joint or drive would have to leave its range.
+StiffnessResult StiffnessAt(const PreparedStiffness& prepared, const PoseValues& pose,
+                            bool* out_of_range) {
   StiffnessResult result;
+  if (prepared.form != nullptr) {
+    result = prepared.form->EvaluateMatrices(pose);
+    *out_of_range = result.K.allFinite() && !prepared.form->IsWithinRanges(pose);
+    return result;
+  }
+  std::vector<Pose> X_WB;
   result.summary = CloseLoops(prepared.base, pose, &X_WB);
   if (!result.summary.ok()) return result;
-  return FrameStiffness(prepared.base, X_WB, prepared.output);
+  *out_of_range = !IsWithinRanges(prepared.base, X_WB);
+  return *out_of_range ? result : FrameStiffness(prepared.base, X_WB, prepared.output);
 }
 
 // Those drawn when none are named.
@@ -146,8 +154,10 @@ MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
       ++result.points;
       u_of_pose = u;
       v_of_pose = v;
-      const StiffnessResult at = StiffnessAt(prepared, pose);
-      if (!at.K.allFinite()) continue;
+      bool out_of_range = false;
+      const StiffnessResult at = StiffnessAt(prepared, pose, &out_of_range);
+      result.out_of_range += out_of_range;
+      if (out_of_range || !at.K.allFinite()) continue;
       ++result.reached;
       result.rank[k] = at.rank;
       if (prepared.form != nullptr) {
@@ -206,9 +216,13 @@ std::vector<std::pair<std::string, std::string>> MapFiles(const StiffnessMap& ma
 std::string MapText(const StiffnessMap& map, const MapResult& result,
                     const std::vector<std::string>& names) {
   std::string text =
-      fmt::format("map over {} and {}{}: {} of {} poses reached, by {}, {:.2f} s\n",
+      fmt::format("map over {} and {}{}: {} of {} poses reached{}, by {}, {:.2f} s\n",
                   ShortName(map.axes[0].name), ShortName(map.axes[1].name),
                   map.fixed.empty() ? "" : " at " + FixedText(map), result.reached, result.points,
+                  result.out_of_range == 0
+                      ? ""
+                      : fmt::format(" ({} more only beyond ranges of joints or drives)",
+                                    result.out_of_range),
                   result.closed_form ? "the closed form" : "frame elements", result.wall_s);
   for (const std::string& name : Chosen(result, names)) {
     for (size_t i = 0; i < result.indices.size(); ++i) {

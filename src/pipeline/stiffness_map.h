@@ -43,9 +43,11 @@ struct StiffnessMap {
 struct MapResult {
   std::vector<NamedIndex> indices;          ///< of the form, then general ones; no values
   std::vector<std::vector<double>> values;  ///< per index: rows × columns, axes[0] fastest; NaN
-                                            ///< where the pose is not reached or out of the circle
+                                            ///< where the pose is not reached, out of a range
+                                            ///< of joints or drives, or out of the circle
   std::vector<int> rank;                    ///< −1 where there is no stiffness
   size_t points = 0, reached = 0;           ///< within the circle
+  size_t out_of_range = 0;  ///< poses that only joints or drives beyond their ranges would reach
   double wall_s = 0.0;
   bool closed_form = false;  ///< else frame elements
 };

@@ -9,6 +9,7 @@
 #include "analytic/closed_form.h"
 #include "analytic/scara_robot/workspace.h"
 #include "analytic/spr_tripod/workspace.h"
+#include "pipeline/ranges.h"
 #include "render/render.h"
 #include "report/svg_plot.h"
 
@@ -45,8 +46,10 @@ std::string AxialSectionPlot(const spr_tripod::Geometry& geometry) {
                 .y_label = "z [m]",
                 .equal_scale = true,
                 .lines = {}};
+  const auto [low, high] = spr_tripod::AxisRange(geometry);
+  constexpr int kSteps = 280;
   std::vector<double> heights;
-  for (double z = 0.434; z <= 0.711; z += 0.001) heights.push_back(z);
+  for (int k = 0; k <= kSteps; ++k) heights.push_back(low + (high - low) * k / kSteps);
   for (double azimuth : {0.0, 30.0, 90.0}) {
     PlotLine line{.label = fmt::format("azimuth {:g} deg", azimuth), .points = {}, .closed = true};
     std::vector<std::pair<double, double>> back;
@@ -78,13 +81,36 @@ std::string HorizontalSectionPlot(const spr_tripod::Geometry& geometry,
   return ToSvg(plot);
 }
 
+// Ranges of the joints besides the strokes; empty where none has one.
+spr_tripod::PoseFilter JointFilter(const Mechanism& mechanism) {
+  std::vector<int> body(mechanism.bodies.size(), -1);  // of the closed form's seven
+  for (int k = 0; k < spr_tripod::kBodies; ++k) {
+    const int leg = spr_tripod::LegOf(k);
+    const std::string name =
+        leg < 0 ? "platform"
+                : fmt::format("leg{}.{}", leg + 1, k == spr_tripod::CylinderBody(leg) ? "cyl" : "rod");
+    const int found = mechanism.FindBody(name);
+    if (found < 0) return {};
+    body[static_cast<size_t>(found)] = k;
+  }
+  if (!HasRanges(mechanism)) return {};
+  return [&mechanism, body](const spr_tripod::Posture& posture) {
+    std::vector<Pose> X_WB(body.size(), Pose::Identity());
+    for (size_t b = 0; b < body.size(); ++b) {
+      if (body[b] >= 0) X_WB[b] = spr_tripod::BodyPose(posture, body[b]);
+    }
+    return IsWithinRanges(mechanism, X_WB);
+  };
+}
+
 WorkspaceOutcome TripodWorkspace(const Mechanism& mechanism, bool pictures) {
   WorkspaceOutcome outcome;
   const spr_tripod::Geometry geometry = spr_tripod::ReadGeometry(mechanism, &outcome.diagnostics);
   if (outcome.diagnostics.has_errors()) return outcome;
-  const spr_tripod::WorkspaceOptions options;
-  const spr_tripod::WorkspaceReport report = spr_tripod::ReportWorkspace(geometry, options);
+  const spr_tripod::WorkspaceReport report =
+      spr_tripod::ReportWorkspace(geometry, {.within_ranges = JointFilter(mechanism)});
   outcome.summary = report.summary;
+  outcome.agree = report.contradictions.empty();
   outcome.text = report.text;
   if (!report.summary.ok()) return outcome;
   outcome.files.emplace_back("workspace.stl", ToStl(report.faces.mesh, "spr_tripod workspace [m]"));
@@ -92,7 +118,7 @@ WorkspaceOutcome TripodWorkspace(const Mechanism& mechanism, bool pictures) {
   outcome.files.emplace_back("sections.csv", report.sections_csv);
   outcome.files.emplace_back("sections_axial.svg", AxialSectionPlot(geometry));
   outcome.files.emplace_back("sections_horizontal.svg",
-                             HorizontalSectionPlot(geometry, options.heights));
+                             HorizontalSectionPlot(geometry, report.heights));
   if (pictures) {
     outcome.summary = DrawInside(mechanism, report.faces.mesh,
                                  "spr_tripod / workspace of the platform centre", &outcome);
@@ -152,6 +178,21 @@ void AddSlice(const scara::Parameters& parameters, const scara::Limits& limits, 
   outcome->files.emplace_back(name + ".csv", csv);
 }
 
+// In a box that is large enough for a robot of any size.
+scara::Volume WholeVolume(const scara::Parameters& parameters, const scara::Limits& limits,
+                          double yaw) {
+  constexpr int kCells = 60, kMostTries = 12;
+  constexpr std::uint64_t kSeed = 2019;
+  scara::Box3 box;
+  scara::Volume volume = scara::EstimateVolume(parameters, limits, yaw, box, kCells, kSeed);
+  for (int k = 0; k < kMostTries && volume.touches_box; ++k) {
+    const Vec3 middle = 0.5 * (box.low + box.high), half = 0.75 * (box.high - box.low);
+    box = {middle - half, middle + half};
+    volume = scara::EstimateVolume(parameters, limits, yaw, box, kCells, kSeed);
+  }
+  return volume;
+}
+
 WorkspaceOutcome ScaraWorkspace(const Mechanism& mechanism, bool pictures) {
   WorkspaceOutcome outcome;
   outcome.summary = RunSummary::Done();
@@ -178,7 +219,7 @@ WorkspaceOutcome ScaraWorkspace(const Mechanism& mechanism, bool pictures) {
     }
   }
   for (double yaw : {0.0, 45.0}) {
-    const scara::Volume v = scara::EstimateVolume(parameters, limits, yaw * kDeg, {}, 60, 2019);
+    const scara::Volume v = WholeVolume(parameters, limits, yaw * kDeg);
     outcome.text += fmt::format(
         "reachable volume at yaw {:g} deg: {:.4e} +- {:.1e} m^3 (two standard "
         "errors, {} samples); {:.1f} % of it away from singular poses\n",

@@ -4,14 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
 namespace mbv {
 namespace {
-
-using Json = nlohmann::ordered_json;
-
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 std::string Cell(double value, const char* format) {
   return std::isnan(value) ? "-" : fmt::format(fmt::runtime(format), value);
@@ -25,129 +20,156 @@ std::string InCell(std::string text) {
   return text;
 }
 
-std::string SeenText(const Mutation& m) {
-  return !m.detected ? "no" : m.by_force ? "drive forces" : m.ran ? "yes" : "refused";
+// By smallest error where it is known, else by the force change.
+double Rank(const Sighting& s) {
+  if (!std::isnan(s.smallest)) return s.smallest;
+  return s.detected && !std::isnan(s.force_change) ? 1.0 / (1.0 + s.force_change) : 10.0;
 }
 
-std::string Row(const Mutation& m, bool markdown) {
-  const std::string change = Cell(m.force_change, "{:.1e}");
-  const std::string smallest = Cell(m.smallest, "{:.1e}");
-  std::string relative;
+std::string SeenText(const Sighting& s) {
+  return !s.detected ? "no" : s.by_force ? "drive forces" : s.ran ? "yes" : "refused";
+}
+
+std::string NoteOf(const Mutation& m) {
+  const Sighting& s = m.own;
+  std::string note;
   if (m.value == 0.0) {
-    relative =
-        fmt::format("relative to {:g}{}{}; ", m.relative_to, m.unit.empty() ? "" : " ", m.unit);
-  } else if (m.relative_to / m.value < 0.0) {
-    relative = "made smaller; ";
+    note = fmt::format("relative to {:g}{}{}; ", m.relative_to, m.unit.empty() ? "" : " ", m.unit);
   }
-  std::string note = m.best_check == "model" ? "the model is refused: " + m.reason : m.best_check;
-  if (!m.detected)
-    note = m.reason + (m.best_check.empty() ? "" : "; seen first by " + m.best_check);
-  note = relative + note;
-  if (markdown) {
-    return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {} |\n", m.parameter, m.value, m.unit,
-                       SeenText(m), change, smallest, InCell(note));
+  if (!s.only.empty()) note += fmt::format("only {}, the model refuses the other way; ", s.only);
+  if (!s.detected) {
+    note += m.reason + (s.best_check.empty() ? "" : "; seen first by " + s.best_check);
+  } else if (s.best_check == "model") {
+    note += "the model is refused";
+    if (!s.reason.empty()) note += ": " + s.reason;
+  } else {
+    note += s.best_check;
   }
-  return fmt::format("  {:<22}{:>12g} {:<7}{:<14}{:>9}  {:>8}  {}\n", m.parameter, m.value, m.unit,
-                     SeenText(m), change, smallest, note);
+  return note;
 }
 
-std::string Row(const FaultResult& f, bool markdown) {
-  const std::string seen = !f.applicable ? "not applicable" : f.detected ? "yes" : "no";
-  std::string note = f.reason;
-  if (f.applicable && f.ran && f.detected) {
-    note = fmt::format("{} = {:.1e} (limit {:.0e})", f.check, f.value, f.limit);
-  } else if (f.applicable && !f.ran) {
-    note = "could not run: " + f.reason;
+bool HasInverse(const MutationReport& report) {
+  return std::any_of(report.mutations.begin(), report.mutations.end(),
+                     [](const Mutation& m) { return m.inverse.has_value(); }) ||
+         std::any_of(report.faults.begin(), report.faults.end(),
+                     [](const FaultResult& f) { return f.inverse.has_value(); });
+}
+
+std::string Row(const Mutation& m, bool inverse, bool markdown) {
+  const std::string change = Cell(m.own.force_change, "{:.1e}");
+  const std::string smallest = Cell(m.own.smallest, "{:.1e}");
+  const std::string by_inverse = Cell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
+  if (markdown) {
+    return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {}{} |\n", m.name, m.value, m.unit,
+                       SeenText(m.own), change, smallest,
+                       inverse ? by_inverse + " | " : "", InCell(NoteOf(m)));
+  }
+  return fmt::format("  {:<22}{:>12g} {:<7}{:<14}{:>9}  {:>8}  {}{}\n", m.name, m.value, m.unit,
+                     SeenText(m.own), change, smallest,
+                     inverse ? fmt::format("{:>8}  ", by_inverse) : "", NoteOf(m));
+}
+
+std::string SeenText(const FaultSighting& s) { return s.detected ? "yes" : "no"; }
+
+std::string Row(const FaultResult& f, bool inverse, bool markdown) {
+  const std::string seen = !f.applicable ? "not applicable" : SeenText(f.own);
+  const std::string by_inverse = f.inverse ? SeenText(*f.inverse) : "-";
+  std::string note = f.applicable ? f.own.reason : f.reason;
+  if (f.applicable && f.own.ran && f.own.detected) {
+    note = fmt::format("{} = {:.1e} (limit {:.0e})", f.own.check, f.own.value, f.own.limit);
+  } else if (f.applicable && !f.own.ran) {
+    note = "could not run: " + f.own.reason;
   }
   const std::string where = f.where + (f.alike > 0 ? fmt::format(" (and {} alike)", f.alike) : "");
   if (markdown) {
-    return fmt::format("| {} | {} | {} | {} |\n", f.kind, where, seen, InCell(note));
+    return fmt::format("| {} | {} | {} | {}{} |\n", f.kind, where, seen,
+                       inverse ? by_inverse + " | " : "", InCell(note));
   }
-  return fmt::format("  {:<31}{:<38}{:<15}{}\n", f.kind, where, seen, note);
+  return fmt::format("  {:<31}{:<38}{:<15}{}{}\n", f.kind, where, seen,
+                     inverse ? fmt::format("{:<9}", by_inverse) : "", note);
 }
 
-std::string Head(const MutationReport& report) {
+std::string CountText(const MutationReport& report) {
+  const auto of_kind = [&](NumberKind kind) {
+    return std::count_if(report.mutations.begin(), report.mutations.end(),
+                         [kind](const Mutation& m) { return m.kind == kind; });
+  };
+  const auto instance = of_kind(NumberKind::kInstance), literal = of_kind(NumberKind::kLiteral);
+  std::string text = fmt::format("{} parameters", of_kind(NumberKind::kParameter));
+  if (instance > 0) text += fmt::format(", {} of instances", instance);
+  if (literal > 0) text += fmt::format(", {} written out in place", literal);
+  return text;
+}
+
+std::string Head(const MutationReport& report, bool inverse) {
   const auto count = [&](auto predicate) {
     return std::count_if(report.mutations.begin(), report.mutations.end(), predicate);
   };
-  const auto detected = count([](const Mutation& m) { return m.detected; });
-  const auto by_force = count([](const Mutation& m) { return m.by_force; });
+  const auto seen = count([](const Mutation& m) { return m.own.detected; });
+  const auto by_force = count([](const Mutation& m) { return m.own.by_force; });
   std::string text = fmt::format(
-      "{}: {} of {} parameters, each {:g} % wrong on the simulated side, turn the verdict; {} of "
-      "them by the drive forces",
-      report.scenario, detected, report.mutations.size(), 100 * report.size, by_force);
+      "{}: {} of {} numbers ({}), each {:g} % too large and too small on the simulated side, turn "
+      "the verdict in {} mode; {} of them by the drive forces",
+      report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
+      report.mode, by_force);
+  if (inverse) {
+    text += fmt::format("; {} do in inverse mode", count([](const Mutation& m) {
+                          return m.inverse && m.inverse->detected;
+                        }));
+  }
   if (!report.faults.empty()) {
-    size_t applicable = 0, seen = 0;
+    size_t applicable = 0, detected = 0;
     for (const FaultResult& fault : report.faults) {
       applicable += fault.applicable ? 1 : 0;
-      seen += fault.detected ? 1 : 0;
+      detected += fault.applicable && fault.own.detected ? 1 : 0;
     }
-    text += fmt::format("; so do {} of {} structural faults", seen, applicable);
+    text += fmt::format("; so do {} of {} structural faults in {} mode", detected, applicable,
+                        report.mode);
   }
   return text + fmt::format(" ({} simulations in {:.1f} s)\n\n", report.runs, report.wall_s);
 }
 
-}  // namespace
-
-std::string ToText(const MutationReport& report, bool markdown) {
-  std::string text = Head(report);
-  text += markdown
-              ? "| parameter | value | detected | force NRMSE | smallest relative error | seen "
-                "first by, or why not |\n|---|---|---|---|---|---|\n"
-              : fmt::format("  {:<22}{:>12} {:<7}{:<14}{:>9}  {:>8}  {}\n", "parameter", "value",
-                            "", "detected", "force", "smallest", "seen first by, or why not");
-  for (const Mutation& m : report.mutations) text += Row(m, markdown);
-  text += fmt::format(
-      "\n{}The smallest relative error is the smallest one that was detected; one {:g} % smaller "
-      "was not.\n",
-      markdown ? "" : "  ", 100.0 * report.resolution);
-  if (report.faults.empty()) return text;
-  text += markdown
-              ? "\n| structural fault | where | detected | how, or why not |\n|---|---|---|---|\n"
-              : fmt::format("\n  {:<31}{:<38}{:<15}{}\n", "structural fault", "where", "detected",
-                            "how, or why not");
-  for (const FaultResult& fault : report.faults) text += Row(fault, markdown);
-  return text;
+std::string NumberHead(const MutationReport& report, bool inverse, bool markdown) {
+  if (markdown) {
+    return fmt::format(
+        "| number | value | detected | force NRMSE | smallest relative error, {} | {}seen first "
+        "by, or why not |\n|---|---|---|---|---|{}---|\n",
+        report.mode, inverse ? "inverse | " : "", inverse ? "---|" : "");
+  }
+  return fmt::format("  {:<22}{:>12} {:<7}{:<14}{:>9}  {:>8}  {}{}\n", "number", "value", "",
+                     "detected", "force", "smallest", inverse ? " inverse  " : "",
+                     "seen first by, or why not");
 }
 
-std::string ToJson(const MutationReport& report) {
-  Json json = {{"schema", "mbverify.mutate/1"},
-               {"scenario", report.scenario},
-               {"exit_code", report.exit_code},
-               {"size", Number(report.size)},
-               {"resolution", Number(report.resolution)},
-               {"simulations", report.runs},
-               {"wall_s", report.wall_s}};
-  json["parameters"] = Json::array();
-  for (const Mutation& m : report.mutations) {
-    json["parameters"].push_back({{"parameter", m.parameter},
-                                  {"unit", m.unit},
-                                  {"value", Number(m.value)},
-                                  {"relative_to", Number(m.relative_to)},
-                                  {"ran", m.ran},
-                                  {"detected", m.detected},
-                                  {"by_force", m.by_force},
-                                  {"force_nrmse", Number(m.force_change)},
-                                  {"smallest", Number(m.smallest)},
-                                  {"check", m.best_check},
-                                  {"unseen_up_to", Number(m.proved_to)},
-                                  {"force_sensitivity", Number(m.sensitivity)},
-                                  {"reason", m.reason}});
+std::string FaultHead(bool inverse, bool markdown) {
+  if (markdown) {
+    return fmt::format(
+        "\n| structural fault | where | detected | {}how, or why not |\n|---|---|---|{}---|\n",
+        inverse ? "inverse | " : "", inverse ? "---|" : "");
   }
-  json["faults"] = Json::array();
-  for (const FaultResult& f : report.faults) {
-    json["faults"].push_back({{"fault", f.kind},
-                              {"where", f.where},
-                              {"applicable", f.applicable},
-                              {"ran", f.ran},
-                              {"detected", f.detected},
-                              {"check", f.check},
-                              {"value", Number(f.value)},
-                              {"limit", Number(f.limit)},
-                              {"alike", f.alike},
-                              {"reason", f.reason}});
-  }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return fmt::format("\n  {:<31}{:<38}{:<15}{}{}\n", "structural fault", "where", "detected",
+                     inverse ? "inverse  " : "", "how, or why not");
+}
+
+}  // namespace
+
+void SortBySensitivity(MutationReport* report) {
+  std::stable_sort(report->mutations.begin(), report->mutations.end(),
+                   [](const Mutation& a, const Mutation& b) { return Rank(a.own) < Rank(b.own); });
+}
+
+std::string ToText(const MutationReport& report, bool markdown) {
+  const bool inverse = HasInverse(report);
+  std::string text = Head(report, inverse) + NumberHead(report, inverse, markdown);
+  for (const Mutation& m : report.mutations) text += Row(m, inverse, markdown);
+  text += fmt::format(
+      "\n{}The smallest relative error is the smallest one that was detected both ways; one {:g} % "
+      "smaller was not.\n",
+      markdown ? "" : "  ", 100.0 * report.resolution);
+  if (report.faults.empty()) return text;
+  text += FaultHead(inverse, markdown);
+  for (const FaultResult& fault : report.faults) text += Row(fault, inverse, markdown);
+  return text;
 }
 
 }  // namespace mbv

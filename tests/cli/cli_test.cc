@@ -95,17 +95,35 @@ TEST_F(CliTest, MutateTakesPercentAndWritesJson) {
   const ProgramResult result = mbverify(
       "mutate scenarios/four_bar/turn_inverse.yaml --parameter rho --size 1% --json " + json);
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find("1 of 1 parameters, each 1 % wrong"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("1 of 1 numbers (1 parameters), each 1 % too large and too small"), std::string::npos) << result.out;
   const auto parsed = nlohmann::json::parse(ReadAll(json), nullptr, false);
   ASSERT_FALSE(parsed.is_discarded());
   EXPECT_EQ(parsed["size"], 0.01);
-  EXPECT_EQ(parsed["parameters"][0]["parameter"], "rho");
+  EXPECT_EQ(parsed["numbers"][0]["name"], "rho");
   for (const char* size : {"0", "-1%", "one", "1 m"}) {
     const ProgramResult bad =
         mbverify("mutate scenarios/four_bar/turn_inverse.yaml --size '" + std::string(size) + "'");
     EXPECT_EQ(bad.exit_code, 2) << size;
     EXPECT_NE(bad.err.find("violates: a percentage above 0"), std::string::npos) << bad.err;
   }
+}
+
+TEST_F(CliTest, MutateSharesItsWorkOutToProcesses) {
+  const std::string command = "mutate scenarios/four_bar/turn_inverse.yaml --no-search --json ";
+  const std::string one = (mbverify.folder() / "1.json").string();
+  const std::string two = (mbverify.folder() / "2.json").string();
+  EXPECT_EQ(mbverify(command + one + " --jobs 1").exit_code, 0);
+  EXPECT_EQ(mbverify(command + two + " --jobs 2").exit_code, 0);
+  auto alone = nlohmann::json::parse(ReadAll(one), nullptr, false);
+  auto shared = nlohmann::json::parse(ReadAll(two), nullptr, false);
+  ASSERT_FALSE(alone.is_discarded() || shared.is_discarded());
+  alone.erase("wall_s");
+  shared.erase("wall_s");
+  EXPECT_EQ(alone, shared);
+  const ProgramResult bad =
+      mbverify("mutate scenarios/four_bar/turn_inverse.yaml --jobs 2 --parameter roh --parameter x");
+  EXPECT_EQ(bad.exit_code, 2);
+  EXPECT_NE(bad.err.find("did you mean 'rho'?"), std::string::npos) << bad.err;
 }
 
 TEST_F(CliTest, TheWorstScenarioDecidesTheExitCode) {

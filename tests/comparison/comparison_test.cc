@@ -115,6 +115,14 @@ INSTANTIATE_TEST_SUITE_P(
       return name;
     });
 
+TEST(Comparison, PowerThatFlowsTheOtherWayIsNoBalance) {
+  Case c;
+  Stretch(&c.simulated, "power.energy_rate", -1.0);
+  const Comparison comparison = c.Run();
+  EXPECT_NEAR(Value(comparison, "simulated.power_balance"), 2.0, 1e-12);
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+}
+
 TEST(Comparison, MissedCommandsFailWithoutAnyOtherWitness) {
   Case c;
   // All three agree with each other, and all are off the command by 2 nm.

@@ -63,6 +63,51 @@ TEST(LoadModel, AFourBarIsReadAsWrittenAndClosedAsDrawn) {
   EXPECT_LT((m.outputs[0].X_BO.linear() - RotZ(pi / 6)).norm(), kRoundoff);
 }
 
+TEST(LoadModel, ProductsOfInertiaAreTheEntriesOfTheMatrix) {
+  const Mechanism m = MustLoad(R"(
+name: one
+bodies:
+  a: {mass: 1, inertia: {xx: 1, yy: 2, zz: 2.5, xy: 0.1, xz: -0.2, yz: 0.05}}
+joints: {hinge: {kind: revolute, parent: world, child: a, axis: z}}
+)");
+  Mat3 expected;
+  expected << 1, 0.1, -0.2, 0.1, 2, 0.05, -0.2, 0.05, 2.5;
+  EXPECT_EQ(m.bodies[1].I_Bcm_B, expected);
+}
+
+TEST(LoadModel, NumbersWrittenInPlaceAreListedAndMayBeReplaced) {
+  const std::string text = R"(
+name: two
+parameters: {m: 3}
+parts:
+  link:
+    parameters: {length: 0.5}
+    attach: {world: {foot: [0, length, 0.25]}}
+    bodies: {rod: {mass: 2*pi, com_mm: [10, 0, 0], inertia: [1, m, 1]}}
+    joints: {hinge: {kind: revolute, parent: world.foot, child: rod, axis: z, guess_deg: 90}}
+instances: {a: {part: link}, b: {part: link, length: 0.75}}
+)";
+  const LoadResult as_is = LoadModelText(text, "m.yaml");
+  ASSERT_TRUE(as_is.mechanism) << as_is.diagnostics.Text();
+  std::map<std::string, double> literals;
+  for (const Literal& literal : as_is.literals) literals[literal.place] = literal.value;
+  EXPECT_EQ(literals.size(), as_is.literals.size());  // each once, though there are two rods
+  EXPECT_NEAR(literals.at("parts.link.bodies.rod.mass"), 2 * pi, kRoundoff);
+  EXPECT_NEAR(literals.at("parts.link.bodies.rod.com_mm[0]"), 0.01, kRoundoff);
+  EXPECT_EQ(literals.at("parts.link.attach.world.foot[2]"), 0.25);
+  EXPECT_EQ(literals.at("instances.b.length"), 0.75);
+  EXPECT_EQ(literals.count("parts.link.bodies.rod.inertia[1]"), 0u);  // a parameter
+  EXPECT_EQ(literals.count("parts.link.attach.world.foot[1]"), 0u);
+  LoadOptions options;
+  options.literals = {{"parts.link.bodies.rod.com_mm[0]", 0.02}};
+  const LoadResult bent = LoadModelText(text, "m.yaml", options);
+  ASSERT_TRUE(bent.mechanism);
+  for (const char* rod : {"a.rod", "b.rod"}) {
+    const Body& body = bent.mechanism->bodies[bent.mechanism->FindBody(rod)];
+    EXPECT_EQ(body.p_BoBcm_B, Vec3(0.02, 0, 0));
+  }
+}
+
 TEST(LoadModel, OverridesReplaceParametersBeforeAnythingIsComputed) {
   LoadOptions options;
   options.overrides["crank"] = 0.3;

@@ -1,5 +1,5 @@
-// Detection power on the shipped scenarios: which parameters may be 0.1 % wrong on the simulated
-// side without anybody noticing? Every name below has a physical reason.
+// Detection power on the shipped scenarios: which numbers may be 0.1 % wrong on the simulated side
+// without anybody noticing? Every name below has a physical reason.
 #include "pipeline/mutate.h"
 #include "tests/source_dir.h"
 
@@ -25,24 +25,25 @@ MutationOptions WithFaults() {
   return options;
 }
 
-// The same without structural faults.
+// The same without structural faults, by inverse dynamics.
 MutationOptions Plain() {
   MutationOptions options = WithFaults();
   options.structural = false;
+  options.modes = MutationModes::kInverse;
   return options;
 }
 
 Names Undetected(const MutationReport& report) {
   Names names;
   for (const Mutation& m : report.mutations) {
-    if (!m.detected) names.insert(m.parameter);
+    if (!m.own.detected) names.insert(m.name);
   }
   return names;
 }
 
-const Mutation* Find(const MutationReport& report, const std::string& parameter) {
+const Mutation* Find(const MutationReport& report, const std::string& name) {
   for (const Mutation& m : report.mutations) {
-    if (m.parameter == parameter) return &m;
+    if (m.name == name) return &m;
   }
   return nullptr;
 }
@@ -73,8 +74,8 @@ TEST(Mutate, OnTheTripodOnlyWhatCannotActStaysUnseen) {
   for (const char* name : {"q_home", "z_home", "q_min", "q_max"}) {
     const Mutation* m = Find(report, name);
     ASSERT_NE(m, nullptr) << name;
-    EXPECT_FALSE(m->by_force) << name;
-    EXPECT_EQ(m->best_check, "simulated_vs_analytic.reaction_nrmse") << name;
+    EXPECT_FALSE(m->own.by_force) << name;
+    EXPECT_EQ(m->own.best_check, "simulated_vs_analytic.reaction_nrmse") << name;
   }
 }
 
@@ -97,10 +98,10 @@ TEST(Mutate, OnTheScaraRobotOnlyWhatCannotActStaysUnseen) {
   for (const char* name : {"I_bar_x", "I_bar_y"}) {
     const Mutation* bar = Find(report, name);
     ASSERT_NE(bar, nullptr) << name;
-    EXPECT_TRUE(bar->ran) << name;
+    EXPECT_TRUE(bar->own.ran) << name;
     EXPECT_EQ(bar->proved_to, kLargestBend) << bar->reason;
   }
-  EXPECT_EQ(Find(report, "I_bar_x")->relative_to, -Find(report, "I_bar_x")->value);
+  EXPECT_EQ(Find(report, "I_bar_x")->own.only, "smaller");
 }
 
 TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
@@ -139,23 +140,23 @@ TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
 
 TEST(Mutate, ASmallErrorIsMissedAndSaysSo) {
   const MutationReport report = Mutate("spr_tripod/default_inverse",
-                                       {.size = 1e-10, .parameters = {"I_rod_zz"}, .progress = {}});
+                                       {.size = 1e-10, .numbers = {"I_rod_zz"}, .progress = {}});
   ASSERT_EQ(report.mutations.size(), 1u);
-  EXPECT_FALSE(report.mutations[0].detected);
+  EXPECT_FALSE(report.mutations[0].own.detected);
   EXPECT_FALSE(report.mutations[0].reason.empty());
 }
 
 TEST(Mutate, TheSmallestErrorIsDetectedAndOneResolutionSmallerIsNot) {
   for (const char* parameter : {"m_rod", "I_rod_zz", "b", "phi_3"}) {
-    MutationOptions options{.size = 1e-3, .parameters = {parameter}, .progress = {}};
+    MutationOptions options{.size = 1e-3, .numbers = {parameter}, .progress = {}};
     const MutationReport report = Mutate("spr_tripod/default_inverse", options);
     ASSERT_EQ(report.mutations.size(), 1u);
-    const double smallest = report.mutations[0].smallest;
+    const double smallest = report.mutations[0].own.smallest;
     EXPECT_LT(smallest, 1e-5) << parameter;
     const auto detected_at = [&](double size) {
       options.size = size;
       options.smallest = false;
-      return Mutate("spr_tripod/default_inverse", options).mutations[0].detected;
+      return Mutate("spr_tripod/default_inverse", options).mutations[0].own.detected;
     };
     EXPECT_TRUE(detected_at(smallest)) << parameter;
     EXPECT_FALSE(detected_at(smallest / (1.0 + report.resolution))) << parameter;
@@ -165,23 +166,23 @@ TEST(Mutate, TheSmallestErrorIsDetectedAndOneResolutionSmallerIsNot) {
 TEST(Mutate, AFinerResolutionNarrowsTheSearch) {
   const MutationReport report =
       Mutate("four_bar/turn_inverse",
-             {.size = 1e-2, .parameters = {"rho"}, .progress = {}, .resolution = 1e-3});
+             {.size = 1e-2, .numbers = {"rho"}, .progress = {}, .resolution = 1e-3});
   ASSERT_EQ(report.mutations.size(), 1u);
   // Forces are proportional to the density: the NRMSE is the relative error itself, its limit
   // 1e-10.
-  EXPECT_NEAR(report.mutations[0].smallest, 1e-10, 1.1e-13);
-  EXPECT_EQ(report.mutations[0].best_check, "simulated_vs_reference.force_nrmse");
+  EXPECT_NEAR(report.mutations[0].own.smallest, 1e-10, 1.1e-13);
+  EXPECT_EQ(report.mutations[0].own.best_check, "simulated_vs_reference.force_nrmse");
 }
 
 TEST(Mutate, ParametersThatAreZeroAreBentByAShareOfTheirLike) {
   const MutationReport report =
       Mutate("spr_tripod/default_inverse",
-             {.size = 1e-3, .parameters = {"phi_3", "m_rod"}, .progress = {}});
+             {.size = 1e-3, .numbers = {"phi_3", "m_rod"}, .progress = {}});
   const Mutation* zero = Find(report, "phi_3");
   ASSERT_NE(zero, nullptr);
   EXPECT_EQ(zero->value, 0.0);
   EXPECT_NEAR(zero->relative_to, 150.0 / 180.0 * 3.14159265358979, 1e-12);  // theta_2
-  EXPECT_TRUE(zero->by_force);
+  EXPECT_TRUE(zero->own.by_force);
   EXPECT_NE(ToText(report, false).find("relative to 2.61799 rad; "), std::string::npos);
   const Mutation* other = Find(report, "m_rod");
   ASSERT_NE(other, nullptr);
@@ -190,19 +191,19 @@ TEST(Mutate, ParametersThatAreZeroAreBentByAShareOfTheirLike) {
 
 TEST(Mutate, WhatIsMissedAtTheSizeAskedForIsSearchedForAbove) {
   const MutationReport report =
-      Mutate("four_bar/turn_inverse", {.size = 1e-11, .parameters = {"rho"}, .progress = {}});
+      Mutate("four_bar/turn_inverse", {.size = 1e-11, .numbers = {"rho"}, .progress = {}});
   ASSERT_EQ(report.mutations.size(), 1u);
-  EXPECT_FALSE(report.mutations[0].detected);
-  EXPECT_NEAR(report.mutations[0].smallest, 1e-10, 1.1e-11);
+  EXPECT_FALSE(report.mutations[0].own.detected);
+  EXPECT_NEAR(report.mutations[0].own.smallest, 1e-10, 1.1e-11);
   EXPECT_EQ(report.exit_code, 1);  // it matters and was missed
 }
 
 TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
   const MutationReport report = Mutate("spr_tripod/default_inverse", Plain());
   for (const Mutation& m : report.mutations) {
-    if (m.detected) continue;
-    EXPECT_EQ(m.proved_to, kLargestBend) << m.parameter;
-    EXPECT_LE(m.sensitivity, 1e-12) << m.parameter;
+    if (m.own.detected) continue;
+    EXPECT_EQ(m.proved_to, kLargestBend) << m.name;
+    EXPECT_LE(m.sensitivity, 1e-12) << m.name;
     EXPECT_NE(m.reason.find("10 % wrong changes no drive force"), std::string::npos) << m.reason;
   }
   const Mutation* inertia = Find(report, "I_platform_zz");
@@ -219,7 +220,7 @@ TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
 
 TEST(Mutate, WhereAnUnseenEffectGoesIsNamed) {
   const MutationReport report = Mutate("stabilizing_platform/static",
-                                       {.size = 1e-3, .parameters = {"m_ship"}, .progress = {}});
+                                       {.size = 1e-3, .numbers = {"m_ship"}, .progress = {}});
   ASSERT_EQ(report.mutations.size(), 1u) << report.diagnostics.Text();
   const std::string& reason = report.mutations[0].reason;
   EXPECT_NE(reason.find("the mass of ship"), std::string::npos) << reason;
@@ -237,16 +238,17 @@ TEST(Mutate, StructuralFaultsAreDetectedInAMechanismWithoutClosedForm) {
   const MutationReport report = Mutate("stewart/wave", WithFaults());
   EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
   for (const FaultResult& fault : report.faults) {
-    EXPECT_EQ(fault.detected, fault.applicable) << fault.kind << " " << fault.where;
-    EXPECT_EQ(fault.reason.empty(), fault.ran) << fault.kind;
-    if (fault.ran) {
-      EXPECT_GT(fault.value, fault.limit) << fault.kind;
+    EXPECT_EQ(fault.own.detected, fault.applicable) << fault.kind << " " << fault.where;
+    EXPECT_EQ(fault.applicable ? fault.own.reason.empty() : fault.reason.empty(), fault.own.ran)
+        << fault.kind;
+    if (fault.own.ran) {
+      EXPECT_GT(fault.own.value, fault.own.limit) << fault.kind;
     }
   }
   const FaultResult* gravity = FindFault(report, "9.80665 for 9.81");
   ASSERT_NE(gravity, nullptr);
   // The forces are mostly weight: 3.4e-4 less of it.
-  EXPECT_NEAR(gravity->value, 1.0 - 9.80665 / 9.81, 5e-5);
+  EXPECT_NEAR(gravity->own.value, 1.0 - 9.80665 / 9.81, 5e-5);
   EXPECT_FALSE(FindFault(report, "sign of products of inertia")->applicable);
 }
 
@@ -256,31 +258,31 @@ TEST(Mutate, DrivesThatDoTheSameMayBeSwappedUnseenAndSaySo) {
   const FaultResult* swap = FindFault(report, "swapped drives");
   ASSERT_NE(swap, nullptr);
   EXPECT_EQ(swap->where, "leg1 and leg2");
-  EXPECT_FALSE(swap->detected);
-  EXPECT_NE(swap->reason.find("leg1 and leg2 do the same"), std::string::npos) << swap->reason;
+  EXPECT_FALSE(swap->own.detected);
+  EXPECT_NE(swap->own.reason.find("leg1 and leg2 do the same"), std::string::npos) << swap->own.reason;
 }
 
 TEST(Mutate, AnotherAssemblyIsSeenByForcesNotOnlyByRanges) {
   const MutationReport report = Mutate("spr_tripod/default_inverse", WithFaults());
   const FaultResult* elbow = FindFault(report, "wrong elbow branch");
   ASSERT_NE(elbow, nullptr);
-  EXPECT_TRUE(elbow->ran) << elbow->reason;
-  EXPECT_EQ(elbow->check, "simulated_vs_analytic.force_nrmse");
-  EXPECT_GT(elbow->value, 0.1);
+  EXPECT_TRUE(elbow->own.ran) << elbow->own.reason;
+  EXPECT_EQ(elbow->own.check, "simulated_vs_analytic.force_nrmse");
+  EXPECT_GT(elbow->own.value, 0.1);
 }
 
 TEST(Mutate, ATableOfFewDigitsSeesLessThanTheGenericSolver) {
-  const MutationOptions options{.size = 1e-2, .parameters = {"rho"}, .progress = {}};
+  const MutationOptions options{.size = 1e-2, .numbers = {"rho"}, .progress = {}};
   const MutationReport table = Mutate("four_bar/table_excel", options);
   ASSERT_EQ(table.mutations.size(), 1u) << table.diagnostics.Text();
   // The solver beside the table still sees it; against the table alone it would be about 1e-3.
-  EXPECT_EQ(table.mutations[0].best_check, "simulated_vs_solver.force_nrmse");
-  EXPECT_NEAR(table.mutations[0].smallest, 1e-10, 1.1e-11);
+  EXPECT_EQ(table.mutations[0].own.best_check, "simulated_vs_solver.force_nrmse");
+  EXPECT_NEAR(table.mutations[0].own.smallest, 1e-10, 1.1e-11);
 }
 
 TEST(Mutate, UnknownParametersAreBadInput) {
   const MutationReport report =
-      Mutate("four_bar/turn_inverse", {.size = 1e-2, .parameters = {"roh"}, .progress = {}});
+      Mutate("four_bar/turn_inverse", {.size = 1e-2, .numbers = {"roh"}, .progress = {}});
   EXPECT_EQ(report.exit_code, 2);
   EXPECT_NE(report.diagnostics.Text().find("did you mean 'rho'?"), std::string::npos);
 }
@@ -288,15 +290,96 @@ TEST(Mutate, UnknownParametersAreBadInput) {
 TEST(Mutate, ResultsAreJsonToo) {
   const MutationReport report = Mutate("four_bar/turn_inverse");
   const auto json = nlohmann::json::parse(ToJson(report));
-  EXPECT_EQ(json["schema"], "mbverify.mutate/1");
+  EXPECT_EQ(json["schema"], "mbverify.mutate/2");
   EXPECT_EQ(json["size"], 1e-3);
-  ASSERT_EQ(json["parameters"].size(), report.mutations.size());
+  ASSERT_EQ(json["numbers"].size(), report.mutations.size());
   ASSERT_EQ(json["faults"].size(), report.faults.size());
   for (size_t i = 0; i < report.mutations.size(); ++i) {
     const Mutation& m = report.mutations[i];
-    EXPECT_EQ(json["parameters"][i]["parameter"], m.parameter);
-    EXPECT_EQ(json["parameters"][i]["smallest"].is_null(), std::isnan(m.smallest));
+    EXPECT_EQ(json["numbers"][i]["name"], m.name);
+    EXPECT_EQ(json["numbers"][i]["own"]["smallest"].is_null(), std::isnan(m.own.smallest));
   }
+  const auto back = MutationReportOf(ToJson(report));
+  ASSERT_TRUE(back.has_value());
+  EXPECT_EQ(ToJson(*back), ToJson(report));
+  EXPECT_FALSE(MutationReportOf("{}").has_value());
+}
+
+TEST(Mutate, PartsOfWorkersMakeTheWhole) {
+  MutationOptions options = WithFaults();
+  MutationReport whole = Mutate("four_bar/turn_inverse", options);
+  options.parts = 3;
+  std::vector<MutationReport> parts;
+  for (options.part = 0; options.part < 3; ++options.part) {
+    parts.push_back(Mutate("four_bar/turn_inverse", options));
+  }
+  MutationReport merged = MergeParts(std::move(parts));
+  whole.wall_s = merged.wall_s = 0.0;
+  EXPECT_EQ(ToJson(merged), ToJson(whole));
+}
+
+TEST(Mutate, AForwardScenarioIsBentInItsOwnModeAndLimitsAndInInverseMode) {
+  MutationOptions options{.size = 1e-3, .numbers = {"rho"}, .progress = {}};
+  const MutationReport report = Mutate("four_bar/turn", options);
+  EXPECT_EQ(report.mode, "forward");
+  ASSERT_EQ(report.mutations.size(), 1u) << report.diagnostics.Text();
+  const Mutation& m = report.mutations[0];
+  ASSERT_TRUE(m.inverse.has_value());
+  // Forces are proportional to the density: the limits themselves are found.
+  EXPECT_NEAR(m.inverse->smallest, 1e-10, 1.1e-11);
+  EXPECT_GT(m.own.smallest, 10.0 * m.inverse->smallest);
+  // Between the two, inverse mode sees what the scenario as it runs does not.
+  options.size = std::sqrt(m.own.smallest * m.inverse->smallest);
+  const MutationReport between = Mutate("four_bar/turn", options);
+  EXPECT_FALSE(between.mutations[0].own.detected);
+  EXPECT_TRUE(between.mutations[0].inverse->detected);
+  EXPECT_EQ(between.exit_code, 1);
+  EXPECT_NE(between.mutations[0].reason.find("below the limit"), std::string::npos);
+}
+
+TEST(Mutate, ForwardPickAndPlaceSeesWhatInverseModeSees) {
+  MutationOptions options = WithFaults();
+  options.structural = false;
+  const MutationReport report = Mutate("scara_robot/pick_place", options);
+  EXPECT_EQ(report.exit_code, 0) << ToText(report, false);
+  for (const Mutation& m : report.mutations) {
+    ASSERT_TRUE(m.inverse.has_value());
+    EXPECT_EQ(m.own.detected, m.inverse->detected) << m.name << " " << m.reason;
+  }
+}
+
+TEST(Mutate, NumbersOfInstancesAndNumbersWrittenInPlaceAreBent) {
+  const MutationReport report = Mutate("stewart/wave", Plain());
+  EXPECT_EQ(report.exit_code, 0) << ToText(report, false);
+  for (const auto& [name, kind] :
+       {std::pair{"m_rod", NumberKind::kParameter}, std::pair{"leg1.base", NumberKind::kInstance},
+        std::pair{"leg6.top", NumberKind::kInstance},
+        std::pair{"parts.leg.bodies.cyl.inertia[0]", NumberKind::kLiteral},
+        std::pair{"parts.leg.bodies.rod.inertia[2]", NumberKind::kLiteral}}) {
+    const Mutation* m = Find(report, name);
+    ASSERT_NE(m, nullptr) << name;
+    EXPECT_EQ(m->kind, kind) << name;
+    EXPECT_TRUE(m->own.by_force) << name;
+  }
+  EXPECT_EQ(Find(report, "parts.leg.bodies.rod.inertia[2]")->unit, "kg m^2");
+  // Ranges and pictures are no numbers that could act; zeros are structure.
+  for (const Mutation& m : report.mutations) {
+    EXPECT_EQ(m.name.find("range"), std::string::npos) << m.name;
+    EXPECT_EQ(m.name.find("shapes"), std::string::npos) << m.name;
+    EXPECT_TRUE(m.kind != NumberKind::kLiteral || m.value != 0.0) << m.name;
+  }
+}
+
+TEST(Mutate, ErrorsOfBothSignsMustBeSeen) {
+  // A motor's range that is too wide is never noticed, one that is much too narrow is.
+  const MutationReport report = Mutate(
+      "scara_robot/pick_place",
+      {.size = 0.9, .numbers = {"theta_max"}, .progress = {}, .modes = MutationModes::kInverse});
+  ASSERT_EQ(report.mutations.size(), 1u) << report.diagnostics.Text();
+  const Sighting& seen = report.mutations[0].own;
+  EXPECT_TRUE(seen.ran);
+  EXPECT_EQ(seen.only, "larger");
+  EXPECT_FALSE(seen.detected);
 }
 
 TEST(Mutate, AScenarioThatDisagreesIsNotBent) {

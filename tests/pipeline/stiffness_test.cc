@@ -144,5 +144,29 @@ TEST(StiffnessMap, PointsOutOfTheCircleOrOfReachAreLeftOut) {
   EXPECT_EQ(result.rank[0], -1);
 }
 
+// By the closed form and by frame elements alike.
+TEST(StiffnessMap, PosesBeyondRangesAreLeftOutAndCounted) {
+  std::array<MapResult, 2> maps;
+  for (const bool form : {true, false}) {
+    const auto prepared =
+        Prepare("scara_robot", std::string("simulation: off\nparameters: {theta_max: 1.2}\n") +
+                                   (form ? "" : "analytic: none\n"));
+    ASSERT_TRUE(prepared);
+    Diagnostics diagnostics;
+    const auto map = ParseMap("x=-0.06:0.06:5,y=-0.06:0.06:5,z=-0.19,phi_deg=10", *prepared,
+                              &diagnostics);
+    ASSERT_TRUE(map) << diagnostics.Text();
+    MapResult& result = maps[form ? 0 : 1];
+    result = ComputeMap(*prepared, *map);
+    EXPECT_EQ(result.closed_form, form);
+    EXPECT_GT(result.out_of_range, 0u);
+    EXPECT_GT(result.reached, 0u);
+    EXPECT_EQ(result.reached + result.out_of_range, 25u);
+    EXPECT_NE(MapText(*map, result, {}).find("more only beyond ranges of joints or drives"),
+              std::string::npos);
+  }
+  EXPECT_EQ(maps[0].rank, maps[1].rank);
+}
+
 }  // namespace
 }  // namespace mbv

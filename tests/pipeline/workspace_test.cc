@@ -48,6 +48,21 @@ TEST(Workspace, ScaraReachesThePapersCylinderWithoutYawAndNotWithIt) {
   EXPECT_EQ(std::count(map->begin(), map->end(), '\n'), 1 + 61 * 61);
 }
 
+TEST(Workspace, JointRangesCountAsInStiffnessMaps) {
+  Mechanism tripod = Load("spr_tripod");
+  const WorkspaceOutcome whole = ComputeWorkspace(tripod, false);
+  EXPECT_TRUE(whole.agree);
+  EXPECT_NE(whole.text.find("within the ranges of the model's joints, too: 100.00 %"),
+            std::string::npos)
+      << whole.text;
+  for (Joint& joint : tripod.joints) {
+    if (joint.name.ends_with(".R")) joint.range[0] = {-0.05, 0.05};
+  }
+  const WorkspaceOutcome part = ComputeWorkspace(tripod, false);
+  EXPECT_TRUE(part.agree);
+  EXPECT_EQ(part.text.find("too: 100.00 %"), std::string::npos) << part.text;
+}
+
 TEST(Workspace, AMechanismWithoutOneIsRefusedByName) {
   const WorkspaceOutcome outcome = ComputeWorkspace(Load("cabin_robot"), false);
   EXPECT_EQ(outcome.summary.stop, Stop::kUnsupported);

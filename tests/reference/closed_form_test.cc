@@ -208,6 +208,60 @@ TEST(Reference, AnOverconstrainedDoorGetsTheReactionsOfLeastNorm) {
   EXPECT_NEAR(At(run.trace, 0, "lower.reaction.my"), -share * L * L, tolerance);
 }
 
+TEST(Reference, SpringDamperAndGravityPowersHaveTheirSigns) {
+  Mechanism m = MakeFourBar();
+  m.springs.push_back({.name = "spring",
+                       .body_from = 0,
+                       .p_from = {FourBar::d, 0, 0},
+                       .body_to = 1,
+                       .p_to = {FourBar::a, 0, 0},
+                       .stiffness = 200.0,
+                       .damping = 5.0,
+                       .free_length_m = 0.3});
+  const Profile swing{{ConstantTerm{FourBar::kHomeAngle}, SineTerm{0.7, 0.9, 0.4}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {swing}, 0.5, 0.1));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  for (const Eigen::Index row : {1, 3, 5}) {
+    const Jet q = Evaluate(swing, run.trace.time_s[static_cast<size_t>(row)]);
+    // Length from the rocker's foot to the crank's tip.
+    const double L = std::sqrt(FourBar::d * FourBar::d + FourBar::a * FourBar::a -
+                               2 * FourBar::a * FourBar::d * cos(q.value));
+    const double dL = FourBar::a * FourBar::d * sin(q.value) / L;
+    const double pull = 200.0 * (L - 0.3), drag = 5.0 * dL * q.rate;
+    const double torque = FourBar::Torque(q.value, q.rate, q.acceleration) + (pull + drag) * dL;
+    EXPECT_NEAR(At(run.trace, row, "motor.force"), torque, 1e-8);  // by differences
+    EXPECT_NEAR(At(run.trace, row, "power.springs"), -pull * dL * q.rate, 1e-11);
+    EXPECT_NEAR(At(run.trace, row, "power.dampers"), -drag * dL * q.rate, 1e-11);
+    EXPECT_NEAR(At(run.trace, row, "power.gravity"),
+                -FourBar::Torque(q.value, 0.0, 0.0) * q.rate, 1e-8);
+    EXPECT_NEAR(At(run.trace, row, "energy.gravity"), FourBar(q.value).V(), 1e-11);
+    EXPECT_NEAR(At(run.trace, row, "energy.springs"), 100.0 * (L - 0.3) * (L - 0.3), 1e-11);
+  }
+}
+
+// A body that hangs crooked on its hinge: the moment about the hinge is that of the body's y axis.
+TEST(Reference, AMomentInBodyAxesTurnsWithItsBody) {
+  Mechanism m;
+  m.name = "arm";
+  m.gravity_W.setZero();
+  m.bodies = {MakeWorld(), MakeBody("arm", 1.0, {0.1, 0, 0}, {0.1, 0.1, 0.1})};
+  m.joints = {MakeJoint("hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, 0.3)};
+  m.joints[0].X_CM.linear() = RotX(-std::numbers::pi / 2);  // body y along the hinge
+  m.drives = {{.name = "motor", .kind = JointDrive{0, 0}, .range = {}}};
+  FinishTree(&m);
+  Motion motion = DriveMotion(m, {Constant(0.3)}, 0.0, 0.1);
+  motion.loads = {{.name = "screw",
+                   .body = 1,
+                   .p_BoQ_B = {0.5, 0, 0},
+                   .in_body_axes = true,
+                   .force = {Constant(0), Constant(0), Constant(10)},
+                   .moment = {Constant(1), Constant(2), Constant(4)}}};
+  // The body's z axis points along −y of the hinge's frame: the force turns by −10 N · 0.5 m.
+  EXPECT_NEAR(At(RunReference(m, motion).trace, 0, "motor.force"), -2.0 + 5.0, 1e-12);
+  motion.loads[0].in_body_axes = false;
+  EXPECT_NEAR(At(RunReference(m, motion).trace, 0, "motor.force"), -4.0, 1e-12);
+}
+
 TEST(Reference, PowerBalancesWithSpringsDampersAndLoads) {
   Mechanism m = MakeFourBar();
   m.springs = {{.name = "spring",

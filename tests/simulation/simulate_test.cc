@@ -3,7 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
+#include "mechanism/tree_motion.h"
 #include "simulation/simulation.h"
 #include "tests/simulation/test_mechanisms.h"
 
@@ -118,6 +120,24 @@ TEST(Forward, StockEngineIsManyTimesWorse) {
   EXPECT_LT(TorqueError(stock), 0.1);
 }
 
+// Gravity puts in what the potential loses.
+TEST(Forward, PowerOfGravityHasItsSignInBothModes) {
+  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+    const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok());
+    const VecX power = run.trace.values.col(run.trace.Find("power.gravity"));
+    const VecX energy = run.trace.values.col(run.trace.Find("energy.gravity"));
+    for (const Eigen::Index i : {10, 50, 90}) {
+      DrivenSample at;
+      (void)Swing(run.trace.time_s[static_cast<size_t>(i)], &at);
+      const double angle = at.position[0], gradient = FourBar::Torque(angle, 0.0, 0.0);
+      EXPECT_NEAR(power[i], -gradient * at.velocity[0], 1e-7);
+      EXPECT_NEAR(energy[i], FourBar(angle).V(), 1e-7);
+    }
+    EXPECT_GT(power.cwiseAbs().maxCoeff(), 1.0);
+  }
+}
+
 TEST(Forward, PowerOfTheDriveIsTheRateOfEnergy) {
   const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
   const VecX input = run.trace.values.col(run.trace.Find("power.input"));
@@ -180,6 +200,38 @@ TEST(Forward, ALoadActsAtItsPointAndInItsAxes) {
   }
 }
 
+// A body that hangs crooked on its hinge: the moment about the hinge is that of the body's y axis.
+TEST(Forward, AMomentInBodyAxesTurnsWithItsBody) {
+  Mechanism m;
+  m.name = "arm";
+  m.gravity_W.setZero();
+  Body world;
+  world.name = "world";
+  m.bodies = {world, testing::MakeBody("arm", 1.0, {0.1, 0, 0}, {0.1, 0.1, 0.1})};
+  m.joints = {testing::MakeJoint("hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, 0.3)};
+  m.joints[0].X_CM.linear() = RotX(-std::numbers::pi / 2);  // body y along the hinge
+  testing::AddTree(&m);
+  m.X_WB_home = TreePoses(m, {m.joints[0].home});
+  m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+  Motion motion = OneSecond();
+  motion.sample_s = 0.1;
+  Load load;
+  load.name = "screw";
+  load.body = 1;
+  load.in_body_axes = true;
+  load.moment = {Constant(1.0), Constant(2.0), Constant(4.0)};
+  motion.loads.push_back(load);
+  for (const bool in_body_axes : {true, false}) {
+    motion.loads[0].in_body_axes = in_body_axes;
+    for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+      const SimulationRun run = Simulate(m, motion, testing::HoldStill({0.3}), {.mode = mode});
+      ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+      EXPECT_NEAR(run.trace.values(5, run.trace.Find("motor.force")), in_body_axes ? -2.0 : -4.0,
+                  1e-9);
+    }
+  }
+}
+
 TEST(Forward, ASpringDamperPullsAndDissipates) {
   Mechanism m = testing::MakeFourBar();
   m.springs.push_back({.name = "spring",
@@ -190,8 +242,6 @@ TEST(Forward, ASpringDamperPullsAndDissipates) {
                        .stiffness = 200.0,
                        .damping = 5.0,
                        .free_length_m = 0.3});
-  const SimulationRun run = Simulate(m, OneSecond(), Swing, {});
-  ASSERT_TRUE(run.summary.ok());
   DrivenSample at;
   (void)Swing(0.5, &at);
   const double angle = at.position[0], rate = at.velocity[0];
@@ -199,12 +249,22 @@ TEST(Forward, ASpringDamperPullsAndDissipates) {
   const double L = std::sqrt(FourBar::d * FourBar::d + FourBar::a * FourBar::a -
                              2 * FourBar::a * FourBar::d * std::cos(angle));
   const double dL = FourBar::a * FourBar::d * std::sin(angle) / L;
-  const double tension = 200.0 * (L - 0.3) + 5.0 * dL * rate;
-  EXPECT_NEAR(run.trace.values(50, run.trace.Find("motor.force")),
-              FourBar::Torque(angle, rate, at.acceleration[0]) + tension * dL, 1e-8);
-  const VecX input = run.trace.values.col(run.trace.Find("power.input"));
-  const VecX energy = run.trace.values.col(run.trace.Find("power.energy_rate"));
-  EXPECT_LT((input - energy).norm(), 1e-9 * input.norm());
+  const double pull = 200.0 * (L - 0.3), drag = 5.0 * dL * rate;
+  for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
+    const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok());
+    const auto half_way = [&](const char* channel) {
+      return run.trace.values(50, run.trace.Find(channel));
+    };
+    EXPECT_NEAR(half_way("motor.force"),
+                FourBar::Torque(angle, rate, at.acceleration[0]) + (pull + drag) * dL, 1e-8);
+    EXPECT_NEAR(half_way("power.springs"), -pull * dL * rate, 1e-8);
+    EXPECT_NEAR(half_way("power.dampers"), -drag * dL * rate, 1e-8);
+    EXPECT_NEAR(half_way("energy.springs"), 100.0 * (L - 0.3) * (L - 0.3), 1e-8);
+    const VecX input = run.trace.values.col(run.trace.Find("power.input"));
+    const VecX energy = run.trace.values.col(run.trace.Find("power.energy_rate"));
+    EXPECT_LT((input - energy).norm(), 1e-9 * input.norm());
+  }
 }
 
 // A heavy disk on a ball joint, free to turn: the torque-free top keeps energy and angular

@@ -28,8 +28,9 @@ Mat6 RotationFirst(const Mat6& M) {
 
 class CabinStiffness final : public StiffnessForm {
  public:
-  CabinStiffness(const StiffnessParameters& parameters, LimbForm form, double d5)
-      : parameters_(parameters), form_(form), d5_(d5) {}
+  CabinStiffness(const StiffnessParameters& parameters, LimbForm form, double d5,
+                 std::vector<Drive> drives)
+      : parameters_(parameters), form_(form), d5_(d5), drives_(std::move(drives)) {}
 
   StiffnessResult Evaluate(const PoseCoordinates& pose) const override {
     ToolStiffness tool;
@@ -47,6 +48,25 @@ class CabinStiffness final : public StiffnessForm {
   StiffnessResult EvaluateMatrices(const PoseCoordinates& pose) const override {
     ToolStiffness tool;
     return Solve(pose, &tool);
+  }
+
+  bool IsWithinRanges(const PoseCoordinates& pose) const override {
+    PlanarState s;
+    s.X.p = pose.at("platform.x");
+    s.Y.p = pose.at("platform.y");
+    s.gamma.p = pose.at("platform.yaw");
+    if (!SolveInverse(parameters_.planar, &s).ok()) return false;
+    for (const Drive& drive : drives_) {
+      const auto given = pose.find(drive.name);
+      const double value = drive.name == "X1"        ? s.X1.p
+                           : drive.name == "X2"      ? s.X2.p
+                           : drive.name == "X3"      ? s.X3.p
+                           : given != pose.end()     ? given->second
+                           : drive.name == "d5"      ? d5_
+                                                     : kNan;  // moves nothing here
+      if (value < drive.range.lower || value > drive.range.upper) return false;
+    }
+    return true;
   }
 
   std::vector<StiffnessIndex> indices() const override {
@@ -84,6 +104,7 @@ class CabinStiffness final : public StiffnessForm {
   StiffnessParameters parameters_;
   LimbForm form_;
   double d5_ = kNan;  ///< of the model, where the pose does not give it
+  std::vector<Drive> drives_;
 };
 
 PoseNames NamesOfPose(const Mechanism& mechanism) {
@@ -147,7 +168,7 @@ std::unique_ptr<StiffnessForm> MakeStiffnessForm(const Mechanism& mechanism,
   const double d5 = mechanism.HasParameter("d5") ? mechanism.ParameterValue("d5") : kNan;
   return std::make_unique<CabinStiffness>(StiffnessParametersOf(mechanism),
                                           form == 1 ? LimbForm::kAsPrinted : LimbForm::kCorrected,
-                                          d5);
+                                          d5, mechanism.drives);
 }
 
 }  // namespace mbv::cabin

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 
+#include "analytic/scara_robot/workspace.h"
 #include "analytic/stiffness_form_checks.h"
 
 namespace mbv::scara {
@@ -39,8 +40,9 @@ void AddShare(const std::string& element, const Mat6& share, StiffnessResult* re
 
 class ScaraStiffness final : public StiffnessForm {
  public:
-  ScaraStiffness(const StiffnessParameters& parameters, const PrintedForms& printed)
-      : parameters_(parameters), printed_(printed) {
+  ScaraStiffness(const StiffnessParameters& parameters, const Limits& limits,
+                 const PrintedForms& printed)
+      : parameters_(parameters), limits_(limits), printed_(printed) {
     for (int i = 0; i < kLimbs; ++i) {
       const std::string limb = LimbName(i);
       names_[i] =
@@ -64,6 +66,10 @@ class ScaraStiffness final : public StiffnessForm {
     return Solve(pose, &at);
   }
 
+  bool IsWithinRanges(const PoseCoordinates& pose) const override {
+    return CheckPose(parameters_.geometry, limits_, PlatformPose(pose)).reach == Reach::kReachable;
+  }
+
   std::vector<StiffnessIndex> indices() const override {
     return {{"kappa_m", "mixed", "largest moment per unit displacement, (21); mixes N m/rad and N"},
             {"kappa_f", "mixed", "largest force per unit displacement, (21); mixes N/rad and N/m"},
@@ -83,11 +89,15 @@ class ScaraStiffness final : public StiffnessForm {
   }
 
  private:
-  StiffnessResult Solve(const PoseCoordinates& pose, PlatformStiffness* at) const {
+  static Vec4 PlatformPose(const PoseCoordinates& pose) {
     Vec4 X;
     for (int c = 0; c < 4; ++c) X[c] = pose.at(kPoseNames[c]);
+    return X;
+  }
+
+  StiffnessResult Solve(const PoseCoordinates& pose, PlatformStiffness* at) const {
     StiffnessResult result;
-    result.summary = SolveStiffness(parameters_, printed_, X, at);
+    result.summary = SolveStiffness(parameters_, printed_, PlatformPose(pose), at);
     result.K = at->K;
     result.C = at->C;
     result.rank = at->rank;
@@ -135,6 +145,7 @@ class ScaraStiffness final : public StiffnessForm {
   }
 
   StiffnessParameters parameters_;
+  Limits limits_;
   PrintedForms printed_;
   std::array<std::vector<std::string>, kLimbs> names_;
 };
@@ -185,7 +196,7 @@ std::unique_ptr<StiffnessForm> MakeStiffnessForm(const Mechanism& mechanism,
   const int found = IndexOfModel(StiffnessModels(), model, &findings);
   diagnostics->Append(findings);
   if (findings.has_errors()) return nullptr;
-  return std::make_unique<ScaraStiffness>(StiffnessParametersOf(mechanism),
+  return std::make_unique<ScaraStiffness>(StiffnessParametersOf(mechanism), LimitsOf(mechanism),
                                           Models()[static_cast<size_t>(found)].printed);
 }
 

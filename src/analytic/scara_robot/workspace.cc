@@ -10,8 +10,13 @@
 namespace mbv::scara {
 
 Limits LimitsOf(const Mechanism& mechanism) {
-  return {mechanism.ParameterValue("theta_min"), mechanism.ParameterValue("theta_max"),
-          mechanism.ParameterValue("shear_max")};
+  Limits limits;
+  for (const auto& [name, limit] :
+       {std::pair{"theta_min", &limits.theta_min}, std::pair{"theta_max", &limits.theta_max},
+        std::pair{"shear_max", &limits.shear_max}}) {
+    if (mechanism.HasParameter(name)) *limit = mechanism.ParameterValue(name);
+  }
+  return limits;
 }
 
 PoseCheck CheckPose(const Parameters& parameters, const Limits& limits, const Vec4& X) {
@@ -65,7 +70,7 @@ Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double
   // 53 random bits, the same on every standard library.
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1.0p-53; };
   const Vec3 cell = (box.high - box.low) / cells;
-  std::int64_t reached = 0, usable = 0;
+  std::int64_t reached = 0, usable = 0, at_edge = 0;
   double differences = 0.0;
   const auto sample = [&](const Vec3& corner) {
     const Vec3 p(corner.x() + cell.x() * uniform(), corner.y() + cell.y() * uniform(),
@@ -80,13 +85,17 @@ Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double
     for (int j = 0; j < cells; ++j) {
       for (int k = 0; k < cells; ++k) {
         const Vec3 corner = box.low + cell.cwiseProduct(Vec3(i, j, k));
-        differences += sample(corner) != sample(corner);
+        const bool first = sample(corner), second = sample(corner);
+        differences += first != second;
+        const auto [least, most] = std::minmax({i, j, k});
+        at_edge += (first || second) && (least == 0 || most == cells - 1);
       }
     }
   }
   // Per cell the mean of two samples; half their squared difference estimates the variance of one.
   const double cell_volume = cell.prod();
   Volume volume;
+  volume.touches_box = at_edge > 0;
   volume.samples = 2LL * cells * cells * cells;
   volume.volume_m3 = cell_volume * static_cast<double>(reached) / 2.0;
   volume.uncertainty_m3 = 2.0 * cell_volume * std::sqrt(differences) / 2.0;

@@ -16,7 +16,7 @@ struct Limits {
   double theta_max = std::numeric_limits<double>::infinity();
   double shear_max = std::numeric_limits<double>::infinity();  ///< |asin(η·a)| of every rod
 };
-/// theta_min, theta_max, shear_max of the model.
+/// theta_min, theta_max, shear_max of the model, as far as it has them.
 [[nodiscard]] Limits LimitsOf(const Mechanism& mechanism);
 
 enum class Reach {
@@ -55,6 +55,7 @@ struct Volume {
   double uncertainty_m3 = kNan;   ///< two standard errors
   double fraction_usable = kNan;  ///< of it: s_min ≥ kNearlySingular
   std::int64_t samples = 0;
+  bool touches_box = false;  ///< reached in the outermost cells: there may be more beyond
 };
 /// `cells` cells along each axis of the box, two samples per cell (their differences give the
 /// standard error); > 0. The same seed gives the same numbers.

@@ -1,6 +1,7 @@
 #include "analytic/spr_tripod/workspace.h"
 
 #include <Eigen/SVD>
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <unordered_map>
@@ -159,27 +160,72 @@ double VolumeByInterior(const Geometry& geometry, int points) {
   return volume * half * half * half;
 }
 
-bool IsReachable(const Geometry& geometry, const Vec3& r) {
-  Posture p;
-  if (!SolveInverse(geometry, r, &p).ok()) return false;
-  for (double q : p.q) {
-    if (!(q >= geometry.q_min && q <= geometry.q_max)) return false;
-  }
-  return true;
+namespace {
+
+bool IsWithinStroke(const Geometry& geometry, const Posture& p) {
+  return std::all_of(p.q.begin(), p.q.end(),
+                     [&](double q) { return q >= geometry.q_min && q <= geometry.q_max; });
 }
 
-double VolumeByVoxels(const Geometry& geometry, int cells, const Box3& box) {
+// A forward solution is the posture it started from, to this [m].
+constexpr double kSamePlace = 1e-7;
+
+}  // namespace
+
+std::vector<Posture> PosturesAt(const Geometry& geometry, const Vec3& r) {
+  std::vector<Posture> found;
+  Posture p;
+  if (r.z() > 0.5 * geometry.b) {
+    if (SolveInverse(geometry, r, &p).ok() && IsWithinStroke(geometry, p)) found.push_back(p);
+    return found;
+  }
+  // Nearer to the base several upright assemblies share a position.
+  for (const Assembly& assembly : AllAssemblies(geometry, r)) {
+    if (assembly.turned || !assembly.upright) continue;
+    FillPosture(geometry, r, assembly.tilt, &p);
+    Posture home;
+    if (IsWithinStroke(geometry, p) && SolveForward(geometry, p.q, &home).ok() &&
+        (home.r - r).norm() < kSamePlace * geometry.b) {
+      found.push_back(p);
+    }
+  }
+  return found;
+}
+
+bool IsReachable(const Geometry& geometry, const Vec3& r) {
+  return !PosturesAt(geometry, r).empty();
+}
+
+VoxelCount CountVoxels(const Geometry& geometry, int cells, const Box3& box,
+                       const PoseFilter& filter) {
+  MBV_DEMAND(cells > 0, cells);
   const Vec3 cell = (box.upper - box.lower) / cells;
-  long inside = 0;
-  for (int i = 0; i < cells; ++i) {
-    for (int j = 0; j < cells; ++j) {
-      for (int k = 0; k < cells; ++k) {
-        const Vec3 offset = cell.cwiseProduct(Vec3(i + 0.5, j + 0.5, k + 0.5));
-        inside += IsReachable(geometry, box.lower + offset);
+  const auto n = static_cast<size_t>(cells);
+  std::vector<char> inside(n * n * n, 0);
+  const auto at = [&](size_t i, size_t j, size_t k) -> char& { return inside[(i * n + j) * n + k]; };
+  long count = 0, several = 0, filtered = 0, boundary = 0;
+  for (size_t i = 0; i < n; ++i) {
+    for (size_t j = 0; j < n; ++j) {
+      for (size_t k = 0; k < n; ++k) {
+        const Vec3 steps(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
+        const auto found = PosturesAt(
+            geometry, box.lower + cell.cwiseProduct(steps + Vec3::Constant(0.5)));
+        at(i, j, k) = !found.empty();
+        count += !found.empty();
+        several += found.size() > 1;
+        filtered += filter && std::any_of(found.begin(), found.end(), filter);
+        // Pairs of neighbours of which one is inside: a face of the boundary between them.
+        boundary += (i > 0 && at(i, j, k) != at(i - 1, j, k)) +
+                    (j > 0 && at(i, j, k) != at(i, j - 1, k)) +
+                    (k > 0 && at(i, j, k) != at(i, j, k - 1));
       }
     }
   }
-  return static_cast<double>(inside) * cell.prod();
+  // A cell cut by the boundary counts whole or not at all: a variance of 1/12.
+  const double size = cell.prod();
+  return {static_cast<double>(count) * size,
+          4.0 * std::sqrt(static_cast<double>(boundary) / 12.0) * size,
+          static_cast<double>(several) * size, static_cast<double>(filtered) * size};
 }
 
 double ReachAt(const Geometry& geometry, double z, double azimuth) {
@@ -198,6 +244,25 @@ double ReachAt(const Geometry& geometry, double z, double azimuth) {
     (inside(middle) ? low : high) = middle;
   }
   return 0.5 * (low + high);
+}
+
+Range AxisRange(const Geometry& geometry) {
+  const double offset = geometry.b - geometry.a;
+  const auto height = [&](double q) { return std::sqrt(std::max(0.0, q * q - offset * offset)); };
+  return {height(geometry.q_min), height(geometry.q_max)};
+}
+
+std::vector<double> RoundHeights(const Geometry& geometry) {
+  const auto [low, high] = AxisRange(geometry);
+  // 1, 2, 5 or 10 times a power of ten.
+  const double rough = (high - low) / 6.0;
+  double step = std::pow(10.0, std::floor(std::log10(rough)));
+  step *= rough < 1.5 * step ? 1.0 : rough < 3.5 * step ? 2.0 : rough < 7.5 * step ? 5.0 : 10.0;
+  std::vector<double> heights;
+  for (double k = std::ceil(low / step); k * step < high; ++k) {
+    if (k * step > low) heights.push_back(k * step);
+  }
+  return heights;
 }
 
 std::vector<Vec3> HorizontalSection(const Geometry& geometry, double z, int count) {

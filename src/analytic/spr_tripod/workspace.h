@@ -8,8 +8,10 @@
 //   faces       the smooth faces, V = ⅓ ∮ r·(∂r/∂q_j × ∂r/∂q_k) dq_j dq_k, Gauss–Legendre
 //   interior    V = ∫ dq / det J over the cube, Gauss–Legendre
 //   voxels      counting the cells whose centre has an inverse solution within the limits
+// Where two of them differ by more than their errors, the report says so (a contradiction).
 #pragma once
 
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -42,13 +44,25 @@ struct FaceIntegrals {
 /// ∫ dq/det J with `points`³ Gauss points [m³].
 [[nodiscard]] double VolumeByInterior(const Geometry& geometry, int points);
 
-/// Cells of an axis-parallel box, `cells` along each side, whose centre is reachable [m³].
+/// Says whether a pose counts, besides the stroke.
+using PoseFilter = std::function<bool(const Posture&)>;
+
+/// Cells of an axis-parallel box, `cells` along each side, whose centre is reachable.
 struct Box3 {
   Vec3 lower = Vec3(-0.27, -0.27, 0.43), upper = Vec3(0.27, 0.27, 0.715);
 };
-[[nodiscard]] double VolumeByVoxels(const Geometry& geometry, int cells, const Box3& box = {});
+struct VoxelCount {
+  double volume = kNan;       ///< [m³]
+  double uncertainty = kNan;  ///< four standard errors of the cells on the boundary [m³]
+  double several = 0.0;       ///< of the volume: reached with several leg triples [m³]
+  double filtered = 0.0;      ///< of the volume: what the filter lets pass [m³]
+};
+[[nodiscard]] VoxelCount CountVoxels(const Geometry& geometry, int cells, const Box3& box = {},
+                                     const PoseFilter& filter = {});
 
-/// True when O_A can be at r on the home branch within the stroke.
+/// The leg triples within the stroke that put O_A at r on the home branch (the assembly that the
+/// forward problem finds): at most one where z > b/2.
+[[nodiscard]] std::vector<Posture> PosturesAt(const Geometry& geometry, const Vec3& r);
 [[nodiscard]] bool IsReachable(const Geometry& geometry, const Vec3& r);
 
 /// How far O_A can go from the z axis at height z in the direction of `azimuth` [m]; NaN when the
@@ -88,20 +102,35 @@ struct WorkspaceRanges {
 
 struct WorkspaceOptions {
   std::vector<int> mesh_intervals = {5, 10, 25, 50};  ///< refinements; the last one is returned
-  int gauss_points = 12;
-  int voxels = 80;  ///< cells per side; 0 leaves the count out
-  std::vector<double> heights = {0.45, 0.50, 0.54, 0.57, 0.60, 0.66, 0.69};  ///< of sections [m]
+  int gauss_points = 12;  ///< > 4; the error of a volume is what 4 points fewer change
+  int voxels = 80;        ///< cells per side; 0 leaves the count out
+  std::vector<double> heights = {};  ///< of sections [m]; empty: round ones where the z axis is reached
   int section_azimuths = 180;
+  PoseFilter within_ranges = {};  ///< of the joints besides the stroke; empty: there are none
+};
+
+/// Heights between which (0, 0, z) is reached without tilt [m].
+[[nodiscard]] Range AxisRange(const Geometry& geometry);
+/// Round ones among them, about six.
+[[nodiscard]] std::vector<double> RoundHeights(const Geometry& geometry);
+
+/// A volume by one way [m³]; `error` is what coarser points change, or the count's uncertainty.
+struct VolumeEstimate {
+  std::string way;
+  double value = kNan, error = kNan;
 };
 
 /// Everything a command needs: a text for people, the mesh, and the section curves.
 struct WorkspaceReport {
   RunSummary summary;
-  std::string text;          ///< plain text, one finding per line
-  WorkspaceMesh faces;       ///< the finest mesh
-  std::string sections_csv;  ///< section,azimuth_rad,x_m,y_m,z_m
-  SolidProperties exact;     ///< from IntegrateFaces
-  double volume_interior = kNan, volume_voxels = kNan;
+  std::string text;           ///< plain text, one finding per line
+  WorkspaceMesh faces;        ///< the finest mesh
+  std::string sections_csv;   ///< section,azimuth_rad,x_m,y_m,z_m
+  SolidProperties exact;      ///< from IntegrateFaces
+  std::vector<double> heights;             ///< of the sections [m]
+  std::vector<VolumeEstimate> volumes;     ///< faces, interior, mesh, voxels
+  std::vector<std::string> contradictions;  ///< between them; empty: they agree
+  double mesh_error = kNan;         ///< finest mesh against the smooth faces [m³]
   double convergence_order = kNan;  ///< of the mesh volume in the step; 2 expected
 };
 [[nodiscard]] WorkspaceReport ReportWorkspace(const Geometry& geometry,

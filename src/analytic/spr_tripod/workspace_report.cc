@@ -1,9 +1,11 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "analytic/spr_tripod/workspace.h"
+#include "core/demand.h"
 
 namespace mbv::spr_tripod {
 namespace {
@@ -14,24 +16,140 @@ constexpr double kDeg = pi / 180.0;
 // Rounding noise about zero would print as -0.000000000 on one machine and +0.000000000 on another.
 double Clean(double x) { return std::abs(x) < 5e-10 ? 0.0 : x; }
 
-// Volumes of the refined meshes; fills the finest mesh and the order of convergence.
+constexpr int kMostDecimals = 14;
+// The error of a Gauss rule is what so many points fewer change.
+constexpr int kFewerPoints = 4;
+// Of an order that is measured on steps far from zero.
+constexpr double kOrderTolerance = 0.5;
+
+// Digits that an error leaves: the last one printed is of its size.
+int Decimals(double error) {
+  if (!(error > 0.0)) return kMostDecimals;
+  return std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 0, kMostDecimals);
+}
+
+std::string Volume(const VolumeEstimate& v) {
+  return fmt::format("{:.{}f} m3 (error {:.0e})", v.value, Decimals(v.error), v.error);
+}
+
+// Volumes of the refined meshes; fills the finest mesh, its volume and the order of convergence.
 std::string MeshTable(const Geometry& geometry, const WorkspaceOptions& options,
                       WorkspaceReport* report) {
   std::string text = "step_m      mesh_volume_m3       error_m3\n";
-  double previous_error = kNan, previous_step = kNan;
+  double previous = kNan, previous_step = kNan;
+  VolumeEstimate mesh{.way = "mesh"};
   for (int intervals : options.mesh_intervals) {
     report->faces = TriangulateFaces(geometry, intervals);
     if (!report->faces.summary.ok()) return {};
     const double step = (geometry.q_max - geometry.q_min) / intervals;
     const double volume = PropertiesOf(report->faces.mesh).volume;
     const double error = volume - report->exact.volume;
-    text += fmt::format("{:<10.6g}  {:.14f}  {:+.3e}\n", step, volume, error);
-    report->convergence_order = std::log(previous_error / error) / std::log(previous_step / step);
-    previous_error = error;
+    text += fmt::format("{:<10.6g}  {:<19.{}f}  {:+.3e}\n", step, volume, Decimals(std::abs(error)),
+                        error);
+    report->convergence_order = std::log((previous - report->exact.volume) / error) /
+                                std::log(previous_step / step);
+    mesh.value = volume;
+    mesh.error = std::abs(std::isnan(previous) ? error : volume - previous);
+    report->mesh_error = error;
+    previous = volume;
     previous_step = step;
   }
+  report->volumes.push_back(mesh);
   text += fmt::format("order of convergence {:.3f} (2 expected)\n", report->convergence_order);
   return text;
+}
+
+// Everything but the mesh. The errors of Gauss rules are what fewer points change.
+void FillVolumes(const Geometry& geometry, const WorkspaceOptions& options, double coarse_faces,
+                 WorkspaceReport* report) {
+  const int points = options.gauss_points, fewer = points - kFewerPoints;
+  // Sums of as many terms keep no more digits.
+  const double roundoff = 64.0 * kEps * std::abs(report->exact.volume);
+  const auto estimate = [&](const char* way, double fine, double coarse) {
+    report->volumes.push_back({way, fine, std::max(std::abs(fine - coarse), roundoff)});
+  };
+  estimate("smooth faces", report->exact.volume, coarse_faces);
+  estimate("interior", VolumeByInterior(geometry, points), VolumeByInterior(geometry, fewer));
+}
+
+// The count, in a box around the ranges, with what the joints' own ranges leave of it.
+std::string AddVoxels(const Geometry& geometry, const WorkspaceOptions& options,
+                      const WorkspaceRanges& ranges, WorkspaceReport* report) {
+  const Vec3 lower(ranges.x.lower, ranges.y.lower, ranges.z.lower);
+  const Vec3 upper(ranges.x.upper, ranges.y.upper, ranges.z.upper);
+  const Vec3 margin = 0.05 * (upper - lower);
+  const VoxelCount count = CountVoxels(geometry, options.voxels, {lower - margin, upper + margin},
+                                       options.within_ranges);
+  report->volumes.push_back({"voxels", count.volume, count.uncertainty});
+  std::string text;
+  if (options.within_ranges) {
+    text = fmt::format(
+        "within the ranges of the model's joints, too: {:.2f} % of it (by {}^3 voxels)\n",
+        100.0 * count.filtered / count.volume, options.voxels);
+  }
+  if (count.several > count.uncertainty) {
+    report->contradictions.push_back(fmt::format(
+        "{:.2g} % of the volume is reached with several leg triples: the faces bound it more than "
+        "once",
+        100.0 * count.several / count.volume));
+  }
+  return text;
+}
+
+// Two ways that differ by more than both errors, and signs that the faces are no boundary.
+void FindContradictions(const WorkspaceRanges& ranges, WorkspaceReport* report) {
+  const VolumeEstimate& faces = report->volumes.front();
+  for (const VolumeEstimate& other : report->volumes) {
+    const double difference = std::abs(other.value - faces.value);
+    if (difference <= other.error + faces.error) continue;
+    if (std::isnan(difference)) {
+      report->contradictions.push_back("some leg triples within the stroke have no regular pose");
+      continue;
+    }
+    report->contradictions.push_back(
+        fmt::format("the volume by {} is {:.2g} % {} than that by {}", other.way,
+                    100.0 * difference / std::abs(faces.value),
+                    other.value < faces.value ? "smaller" : "larger", faces.way));
+  }
+  if (!(ranges.det.lower > 0.0)) {
+    report->contradictions.push_back(
+        fmt::format("det J is not positive all over the stroke ({:.3g} … {:.3g}): the six faces "
+                    "need not bound the workspace",
+                    ranges.det.lower, ranges.det.upper));
+  }
+  const bool measurable = std::abs(report->mesh_error) > 10.0 * faces.error;
+  if (measurable && !(std::abs(report->convergence_order - 2.0) < kOrderTolerance)) {
+    report->contradictions.push_back(
+        fmt::format("the meshes converge with order {:.3f} instead of 2: the faces are not smooth",
+                    report->convergence_order));
+  }
+}
+
+std::string VerdictText(const WorkspaceReport& report) {
+  if (report.contradictions.empty()) {
+    return fmt::format("AGREE: {} ways to the volume differ by less than their errors\n",
+                       report.volumes.size());
+  }
+  std::string text;
+  for (const std::string& contradiction : report.contradictions) {
+    text += "DISAGREE: " + contradiction + "\n";
+  }
+  return text;
+}
+
+// Areas and centroid of the smooth faces.
+std::string MeasuresText(const FaceIntegrals& fine, const FaceIntegrals& coarse) {
+  const auto decimals = [](double a, double b) { return std::min(9, Decimals(std::abs(a - b))); };
+  std::string text = fmt::format("area {:.{}f} m2; faces", fine.solid.area,
+                                 decimals(fine.solid.area, coarse.solid.area));
+  for (size_t k = 0; k < fine.face_area.size(); ++k) {
+    text += fmt::format(" {:.{}f}", fine.face_area[k],
+                        decimals(fine.face_area[k], coarse.face_area[k]));
+  }
+  const Vec3 &c = fine.solid.centroid, &d = coarse.solid.centroid;
+  const int digits = decimals((c - d).norm(), 0.0);
+  return text + fmt::format("\ncentroid ({:.{}f}, {:.{}f}, {:.{}f}) m\n\n", Clean(c.x()), digits,
+                            Clean(c.y()), digits, c.z(), digits);
 }
 
 std::string CornerTable(const Geometry& geometry) {
@@ -72,9 +190,10 @@ std::string SectionTable(const Geometry& geometry, const std::vector<double>& he
   return text;
 }
 
-std::string SectionsCsv(const Geometry& geometry, const WorkspaceOptions& options) {
+std::string SectionsCsv(const Geometry& geometry, const WorkspaceOptions& options,
+                        const std::vector<double>& heights) {
   std::string csv = "section,azimuth_rad,x_m,y_m,z_m\n";
-  for (double z : options.heights) {
+  for (double z : heights) {
     const std::vector<Vec3> curve = HorizontalSection(geometry, z, options.section_azimuths);
     for (size_t k = 0; k < curve.size(); ++k) {
       csv += fmt::format("z={:g},{:.17g},{:.17g},{:.17g},{:.17g}\n", z, 2 * pi * k / curve.size(),
@@ -87,10 +206,12 @@ std::string SectionsCsv(const Geometry& geometry, const WorkspaceOptions& option
 }  // namespace
 
 WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions& options) {
+  MBV_DEMAND(options.gauss_points > kFewerPoints, options.gauss_points);
   WorkspaceReport report;
   const FaceIntegrals faces = IntegrateFaces(geometry, options.gauss_points);
+  const FaceIntegrals coarse = IntegrateFaces(geometry, options.gauss_points - kFewerPoints);
   report.exact = faces.solid;
-  report.volume_interior = VolumeByInterior(geometry, options.gauss_points);
+  FillVolumes(geometry, options, coarse.solid.volume, &report);
   const std::string meshes = MeshTable(geometry, options, &report);
   if (std::isnan(report.exact.volume) || !report.faces.summary.ok()) {
     report.summary = report.faces.summary;
@@ -98,29 +219,20 @@ WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions
     return report;
   }
   const WorkspaceRanges ranges = RangesOf(geometry, 20);
-  report.text = fmt::format(
-      "Reachable workspace of O_A, legs {} … {} m, home branch\n\n"
-      "volume by smooth faces    {:.14f} m3\n"
-      "volume by interior        {:.14f} m3\n",
-      geometry.q_min, geometry.q_max, report.exact.volume, report.volume_interior);
-  if (options.voxels > 0) {
-    // A box around the ranges with a margin of two cells of the coarsest sensible count.
-    const Vec3 lower(ranges.x.lower, ranges.y.lower, ranges.z.lower);
-    const Vec3 upper(ranges.x.upper, ranges.y.upper, ranges.z.upper);
-    const Vec3 margin = 0.05 * (upper - lower);
-    report.volume_voxels =
-        VolumeByVoxels(geometry, options.voxels, {lower - margin, upper + margin});
-    report.text +=
-        fmt::format("volume by {}^3 voxels      {:.8f} m3\n", options.voxels, report.volume_voxels);
+  std::string within;
+  if (options.voxels > 0) within = AddVoxels(geometry, options, ranges, &report);
+  FindContradictions(ranges, &report);
+  report.heights = options.heights.empty() ? RoundHeights(geometry) : options.heights;
+  report.text = fmt::format("Reachable workspace of O_A, legs {} … {} m, home branch\n\n",
+                            geometry.q_min, geometry.q_max);
+  for (const VolumeEstimate& v : report.volumes) {
+    report.text += fmt::format("volume by {:<14}  {}\n", v.way, Volume(v));
   }
-  report.text += fmt::format("area {:.9f} m2; faces", faces.solid.area);
-  for (double area : faces.face_area) report.text += fmt::format(" {:.9f}", area);
-  report.text +=
-      fmt::format("\ncentroid ({:.9f}, {:.9f}, {:.9f}) m\n\n", Clean(faces.solid.centroid.x()),
-                  Clean(faces.solid.centroid.y()), faces.solid.centroid.z());
+  report.text += VerdictText(report) + within;
+  report.text += MeasuresText(faces, coarse);
   report.text += meshes + "\n" + CornerTable(geometry) + "\n" + RangeTable(ranges) + "\n" +
-                 SectionTable(geometry, options.heights);
-  report.sections_csv = SectionsCsv(geometry, options);
+                 SectionTable(geometry, report.heights);
+  report.sections_csv = SectionsCsv(geometry, options, report.heights);
   report.summary = RunSummary::Done();
   return report;
 }
