@@ -77,6 +77,7 @@ void ModelReader::ReadAll() {
   if (yaml_.has_errors()) return;
   CheckHome();
   CheckIsostaticRule();
+  CheckPlausible();
 }
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
