@@ -1,111 +1,31 @@
 // Which witness is the odd one out, and what the difference looks like.
 //
-// The simulation follows the drive motion of one other witness, so their agreement on motion is no
-// evidence. Evidence is taken in this order:
-//   1. a witness whose drive rates are not the derivatives of its drive positions is wrong;
-//   2. a mechanism that misses the commanded pose tells of wrong drive motion, or of a wrong model
-//      if two witnesses agree on that motion;
-//   3. otherwise the two that are closest by far stand against the third.
+// Evidence is taken in this order:
+//   1. motion: rates that are no derivatives, drive motion that leads elsewhere than commanded
+//      (attribution_kinematics.cc). Wrong motion makes wrong forces, so it is looked at first;
+//   2. the two that are closest by far stand against the third;
+//   3. of two that differ, the one whose own energy drifts (attribution_energy.cc).
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 
-#include "comparison/comparison.h"
+#include "comparison/attribution_parts.h"
+#include "comparison/metrics.h"
 
 namespace mbv {
 namespace {
 
+using internal::Amount;
+using internal::AmountOf;
+using internal::Failed;
+using internal::NameOf;
+using internal::Place;
+
 // The third witness must be this much farther from the other two than they are from each other.
 constexpr double kClearlyFarther = 10.0;
-
-std::string Amount(double value, const char* unit) {
-  if (*unit != '\0') return fmt::format("{:.2g} {}", value, unit);
-  if (value >= 1e-3) return fmt::format("{:.2g} %", 100.0 * value);
-  return fmt::format("{:.1e}", value);
-}
-
-std::string Place(const std::string& channel, double time_s) {
-  return fmt::format("{}, t = {:.4g} s", channel, time_s);
-}
-
-std::string AmountOf(const CheckResult& check) {
-  return Amount(check.value, RowOf(check.metric).unit);
-}
-
-bool Failed(const CheckResult* check) { return check != nullptr && check->limit && !check->pass; }
-
-// A failed command check of a witness, metres before radians.
-const CheckResult* FailedCommand(const Comparison& comparison, const std::string& witness) {
-  for (const char* key : {".command_m", ".command_rad"}) {
-    const CheckResult* check = comparison.FindCheck(witness + key);
-    if (Failed(check)) return check;
-  }
-  return nullptr;
-}
-
-bool PositionsDiffer(const Comparison& comparison, const std::string& pair) {
-  return Failed(comparison.FindCheck(pair + ".position_m")) ||
-         Failed(comparison.FindCheck(pair + ".position_rad"));
-}
-
-// 1. Rates against differences of positions.
-Attribution ByDerivatives(const Comparison& comparison) {
-  for (const char* name : {"analytic", "reference", "solver"}) {
-    const CheckResult* check = comparison.FindCheck(std::string(name) + ".derivatives");
-    if (!Failed(check)) continue;
-    return {name, fmt::format("{}: its drive rates are not the time derivatives of its drive "
-                              "positions; they differ by {} at {}",
-                              name, AmountOf(*check), Place(check->channel, check->time_s))};
-  }
-  return {};
-}
-
-// 2. The commanded pose.
-Attribution ByCommand(const ComparisonInput& input, const Comparison& comparison) {
-  if (const CheckResult* check = FailedCommand(comparison, "reference");
-      check != nullptr && comparison.table) {
-    return {"reference", fmt::format("the table {} does not follow the commanded motion: {} off "
-                                     "at {}; does it belong to another motion?",
-                                     comparison.table->name, AmountOf(*check),
-                                     Place(check->channel, check->time_s))};
-  }
-  if (const CheckResult* check = FailedCommand(comparison, "reference")) {
-    return {"reference", fmt::format("the reference misses the commanded motion by {} at {}",
-                                     AmountOf(*check), Place(check->channel, check->time_s))};
-  }
-  const CheckResult* check = FailedCommand(comparison, "simulated");
-  if (check == nullptr) return {};
-  const std::string miss = fmt::format("misses the commanded motion by {} at {}", AmountOf(*check),
-                                       Place(check->channel, check->time_s));
-  const PairComparison* kinematics = comparison.FindPair("reference_vs_analytic");
-  if (input.driven_by != "analytic" || kinematics == nullptr || !kinematics->compared ||
-      comparison.table) {
-    return {"", fmt::format("the simulation, driven by the {} drive motion, {}; either that drive "
-                            "motion or the simulated model is wrong, and there is no third "
-                            "witness to tell",
-                            input.driven_by, miss)};
-  }
-  if (!PositionsDiffer(comparison, "reference_vs_analytic")) {
-    return {"simulated", fmt::format("analytic and reference agree on the drive motion, but under "
-                                     "it the simulation {}",
-                                     miss)};
-  }
-  const bool lengths = Failed(comparison.FindCheck("reference_vs_analytic.position_m"));
-  const CheckResult& drive = *comparison.FindCheck(lengths ? "reference_vs_analytic.position_m"
-                                                           : "reference_vs_analytic.position_rad");
-  return {"analytic",
-          fmt::format("under the analytic drive motion the simulation {}; the reference, which "
-                      "meets the command, needs drive positions that differ by {} (worst at {})",
-                      miss, AmountOf(drive), Place(drive.channel, drive.time_s))};
-}
-
-std::string NameOf(const Comparison& comparison, const std::string& witness) {
-  if (witness == "simulated") return "simulation";
-  if (witness == "reference" && comparison.table) return "the table " + comparison.table->name;
-  return witness == "solver" ? "the generic solver" : witness;
-}
 
 // What a wrong force looks like: opposite sign or a constant factor.
 std::string Hint(const PairComparison& pair) {
@@ -139,16 +59,57 @@ const CheckResult* WorstPairCheck(const Comparison& comparison) {
   return worst;
 }
 
+// What a failed check of a pair is measured by in all pairs.
+struct Yardstick {
+  std::string title;  // "drive force, RMS"
+  std::string unit;   // "" for a ratio
+  Metric metric = Metric::kForceNrmse;
+  std::string column = {};  // of a table; "" measures the metric itself
+};
+
 struct Distance {
   const PairComparison* pair;
   Measured measured;
 };
 
-// The compared pairs by increasing distance in one metric; NaN counts as farthest.
-std::vector<Distance> Distances(const Comparison& comparison, Metric metric) {
+const Trace* TraceOf(const ComparisonInput& input, const std::string& witness) {
+  for (const Witness& w : input.witnesses) {
+    if (w.name == witness && w.trace != nullptr && w.summary.ok()) return w.trace;
+  }
+  return nullptr;
+}
+
+// RMS difference of one signal in two traces [unit].
+std::optional<Measured> SignalDistance(const ComparisonInput& input, const PairComparison& pair,
+                                       const std::string& channel) {
+  const Trace* a = TraceOf(input, pair.measured);
+  const Trace* b = TraceOf(input, pair.truth);
+  if (a == nullptr || b == nullptr) return {};
+  const int i = a->Find(channel), j = b->Find(channel);
+  if (i < 0 || j < 0) return {};
+  const bool angle = a->channels[static_cast<size_t>(i)].unit == "rad";
+  ErrorSum sum;
+  for (const auto& [k, l] : AlignSamples(*a, *b)) {
+    const double time_s = a->time_s[static_cast<size_t>(k)];
+    if (time_s < input.start_window_s) continue;
+    const double x = a->values(k, i), y = b->values(l, j);
+    sum.Add(angle ? AngleDifference(x, y) : x - y, y, time_s, channel);
+  }
+  if (sum.count() == 0) return {};
+  return Measured{sum.rms_error(), sum.worst_time_s(), channel};
+}
+
+// The compared pairs by increasing distance; NaN counts as farthest.
+std::vector<Distance> Distances(const ComparisonInput& input, const Comparison& comparison,
+                                const Yardstick& yardstick) {
   std::vector<Distance> distances;
   for (const PairComparison& pair : comparison.pairs) {
-    const auto found = pair.metrics.find(metric);
+    if (!yardstick.column.empty()) {
+      const auto distance = SignalDistance(input, pair, yardstick.column);
+      if (distance) distances.push_back({&pair, *distance});
+      continue;
+    }
+    const auto found = pair.metrics.find(yardstick.metric);
     if (pair.compared && found != pair.metrics.end()) distances.push_back({&pair, found->second});
   }
   const auto key = [](const Distance& d) {
@@ -159,9 +120,18 @@ std::vector<Distance> Distances(const Comparison& comparison, Metric metric) {
   return distances;
 }
 
-bool IsDriveMotion(Metric metric) {
-  return metric == Metric::kPositionM || metric == Metric::kPositionRad ||
-         metric == Metric::kVelocity || metric == Metric::kAcceleration;
+// A column of a table is measured in its own unit: how often it leaves its tube says nothing about
+// two computations that have none.
+Yardstick YardstickOf(const ComparisonInput& input, const CheckResult& check) {
+  Yardstick yardstick{
+      .title = RowOf(check.metric).title, .unit = RowOf(check.metric).unit, .metric = check.metric};
+  if (check.metric != Metric::kTableTube || input.table == nullptr) return yardstick;
+  const int column = input.table->trace.Find(check.channel);
+  if (column < 0) return yardstick;
+  yardstick.column = check.channel;
+  yardstick.unit = input.table->trace.channels[static_cast<size_t>(column)].unit;
+  yardstick.title = check.channel + ", RMS";
+  return yardstick;
 }
 
 // The witness of the compared pairs that is not in this one.
@@ -174,40 +144,63 @@ std::string ThirdOf(const std::vector<Distance>& distances, const PairComparison
   return "";
 }
 
-// 3. Two against one.
+// Why two computations that differ do not tell which of them is wrong, or that they do.
+Attribution WhyUndecided(const ComparisonInput& input, const Comparison& comparison,
+                         const CheckResult& check, bool third) {
+  const PairComparison& pair = *comparison.FindPair(check.subject);
+  if (check.follows && pair.measured == "simulated" && pair.truth == input.driven_by) {
+    if (third) return {"simulated", "the simulation does not follow the motion that it is given"};
+    return {"",
+            "either the simulation does not follow the motion that it is given, or that motion "
+            "contradicts itself"};
+  }
+  if (!third) {
+    Attribution energy = internal::AttributeByEnergy(comparison, pair);
+    if (!energy.text.empty()) return energy;
+    return {"", "a third witness would tell which one is wrong"};
+  }
+  return {"", fmt::format("the simulation follows the {} drive motion and cannot tell which is "
+                          "wrong",
+                          input.driven_by)};
+}
+
+// Two computations only, or drive motion that one of them took from another.
+Attribution TwoDiffer(const ComparisonInput& input, const Comparison& comparison,
+                      const CheckResult& check, bool third) {
+  const PairComparison& pair = *comparison.FindPair(check.subject);
+  Attribution attribution = WhyUndecided(input, comparison, check, third);
+  attribution.text = fmt::format("{} and {} differ by {} in {}: worst at {}{}; {}",
+                                 NameOf(comparison, pair.measured), NameOf(comparison, pair.truth),
+                                 AmountOf(check), RowOf(check.metric).title,
+                                 Place(check.channel, check.time_s), Hint(pair), attribution.text);
+  return attribution;
+}
+
+// 2. Two against one.
 Attribution ByDistance(const ComparisonInput& input, const Comparison& comparison) {
   const CheckResult* check = WorstPairCheck(comparison);
   if (check == nullptr) return {};
-  const MetricRow& row = RowOf(check->metric);
-  const std::vector<Distance> distances = Distances(comparison, check->metric);
-  if (distances.size() < 3 || IsDriveMotion(check->metric)) {
-    const PairComparison& pair = *comparison.FindPair(check->subject);
-    std::string why = distances.size() < 3 ? "a third witness would tell which one is wrong"
-                                           : fmt::format(
-                                                 "the simulation follows the {} drive "
-                                                 "motion and cannot tell which is wrong",
-                                                 input.driven_by);
-    return {"", fmt::format("{} and {} differ by {} in {}: worst at {}{}; {}",
-                            NameOf(comparison, pair.measured), NameOf(comparison, pair.truth),
-                            AmountOf(*check), row.title, Place(check->channel, check->time_s),
-                            Hint(pair), why)};
+  const Yardstick yardstick = YardstickOf(input, *check);
+  const auto amount = [&](const Distance& d) { return Amount(d.measured.value, yardstick.unit); };
+  const std::vector<Distance> distances = Distances(input, comparison, yardstick);
+  const bool followed = IsDriveMotion(check->metric) && !input.motion->free();
+  if (distances.size() < 3 || followed) {
+    return TwoDiffer(input, comparison, *check, distances.size() >= 3);
   }
   const Distance &near = distances[0], &far = distances[1];
   if (!(far.measured.value >= kClearlyFarther * near.measured.value ||
         std::isnan(far.measured.value))) {
-    return {"",
-            fmt::format("no two witnesses stand clearly against the third: {} {}, {} {}, {} {} "
-                        "({})",
-                        near.pair->name(), Amount(near.measured.value, row.unit), far.pair->name(),
-                        Amount(far.measured.value, row.unit), distances[2].pair->name(),
-                        Amount(distances[2].measured.value, row.unit), row.title)};
+    return {"", fmt::format("no two witnesses stand clearly against the third: {} {}, {} {}, {} {} "
+                            "({})",
+                            near.pair->name(), amount(near), far.pair->name(), amount(far),
+                            distances[2].pair->name(), amount(distances[2]), yardstick.title)};
   }
   const std::string odd = ThirdOf(distances, *near.pair);
+  const std::string tube = yardstick.column.empty() ? "" : " (" + AmountOf(*check) + ")";
   return {odd,
-          fmt::format("{} and {} agree to {}, {} differs by {} in {}: worst at {}{}",
+          fmt::format("{} and {} agree to {}, {} differs by {} in {}{}: worst at {}{}",
                       NameOf(comparison, near.pair->measured), NameOf(comparison, near.pair->truth),
-                      Amount(near.measured.value, row.unit), NameOf(comparison, odd),
-                      Amount(far.measured.value, row.unit), row.title,
+                      amount(near), NameOf(comparison, odd), amount(far), yardstick.title, tube,
                       Place(far.measured.channel, far.measured.time_s), Hint(*far.pair))};
 }
 
@@ -222,31 +215,76 @@ Attribution BySingleCheck(const Comparison& comparison) {
   return {};
 }
 
-std::string AgreementText(const Comparison& comparison) {
+std::string AgreementText(const ComparisonInput& input, const Comparison& comparison) {
   std::string text;
   // A free motion has no drive force to compare.
   for (const Metric metric :
        {Metric::kForceNrmse, Metric::kPoseM, Metric::kPositionM, Metric::kPositionRad}) {
-    for (const Distance& distance : Distances(comparison, metric)) {
+    const Yardstick yardstick{.title = "", .unit = RowOf(metric).unit, .metric = metric};
+    for (const Distance& distance : Distances(input, comparison, yardstick)) {
       text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",
                           NameOf(comparison, distance.pair->measured),
                           NameOf(comparison, distance.pair->truth),
-                          Amount(distance.measured.value, RowOf(metric).unit));
+                          Amount(distance.measured.value, yardstick.unit));
     }
     if (!text.empty()) break;
   }
   return text;
 }
 
+// What a disagreement comes from: motion first, then forces. Motion that only the simulation gets
+// wrong (its own error) does not hide that another witness' forces are wrong by far.
+Attribution OfDisagreement(const ComparisonInput& input, const Comparison& comparison) {
+  const Attribution motion = internal::AttributeByKinematics(input, comparison);
+  if (motion.text.empty()) {
+    Attribution found = ByDistance(input, comparison);
+    if (found.text.empty()) found = BySingleCheck(comparison);
+    const bool said = found.text.find("step_s") != std::string::npos;
+    if (found.odd_one_out == "simulated" && !said) found.text += internal::EnergyHint(comparison);
+    return found;
+  }
+  if (motion.odd_one_out != "simulated") return motion;
+  const Attribution distance = ByDistance(input, comparison);
+  if (distance.odd_one_out.empty() || distance.odd_one_out == "simulated") return motion;
+  return {distance.odd_one_out, distance.text + "; besides, " + motion.text};
+}
+
 }  // namespace
+
+namespace internal {
+
+std::string Amount(double value, const std::string& unit) {
+  if (!unit.empty()) return fmt::format("{:.2g} {}", value, unit);
+  if (value >= 10.0) return fmt::format("{:.2g} times", value);
+  if (value >= 1.0) return fmt::format("{:.0f} %", 100.0 * value);
+  if (value >= 1e-3) return fmt::format("{:.2g} %", 100.0 * value);
+  return fmt::format("{:.1e}", value);
+}
+
+std::string AmountOf(const CheckResult& check) {
+  if (check.metric == Metric::kTableTube)
+    return fmt::format("{:.2g} times its tolerance", check.value);
+  return Amount(check.value, RowOf(check.metric).unit);
+}
+
+std::string Place(const std::string& channel, double time_s) {
+  return fmt::format("{}, t = {:.4g} s", channel, time_s);
+}
+
+std::string NameOf(const Comparison& comparison, const std::string& witness) {
+  if (witness == "simulated") return "simulation";
+  if (witness == "reference" && comparison.table) return "the table " + comparison.table->name;
+  return witness == "solver" ? "the generic solver" : witness;
+}
+
+bool Failed(const CheckResult* check) { return check != nullptr && check->limit && !check->pass; }
+
+}  // namespace internal
 
 Attribution Attribute(const ComparisonInput& input, const Comparison& comparison) {
   if (comparison.verdict == Verdict::kNotRun) return {};
-  if (comparison.verdict == Verdict::kAgree) return {"", AgreementText(comparison)};
-  Attribution attribution = ByDerivatives(comparison);
-  if (attribution.text.empty()) attribution = ByCommand(input, comparison);
-  if (attribution.text.empty()) attribution = ByDistance(input, comparison);
-  if (attribution.text.empty()) attribution = BySingleCheck(comparison);
+  if (comparison.verdict == Verdict::kAgree) return {"", AgreementText(input, comparison)};
+  Attribution attribution = OfDisagreement(input, comparison);
   if (comparison.table) {
     for (const std::string& diagnosis : comparison.table->diagnoses) {
       attribution.text += (attribution.text.empty() ? "" : "; ") + diagnosis;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/drive_motion.h"
 #include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
 
@@ -65,6 +66,7 @@ void AddChecks(const ComparisonInput& input, const std::string& subject, LimitCo
       check.limit = tube->second;
     }
     check.pass = check.limit && check.value <= *check.limit;  // false for NaN
+    check.follows = ComparesMotionWithItself(input, subject, metric);
     comparison->checks.push_back(std::move(check));
   }
 }
@@ -123,6 +125,10 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
     if (!witness.metrics.contains(Metric::kClosureM))
       note(witness.witness + ".closure", "not recorded");
     if (!witness.metrics.contains(Metric::kPower)) note(witness.witness + ".power", "not recorded");
+    if (witness.witness == "simulated" && IsTaskSpace(*input.motion) &&
+        !witness.metrics.contains(Metric::kCommandVelocity)) {
+      note("simulated.command_velocity", "the rates of the commanded outputs are not recorded");
+    }
   }
 }
 
@@ -204,6 +210,18 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
   }
 }
 
+std::string CountText(const Comparison& comparison) {
+  const size_t failed = comparison.failed(), followed = comparison.followed();
+  const size_t all = failed + comparison.verified() + followed;
+  if (failed > 0) return fmt::format("{} of {} checks exceed their limits", failed, all);
+  std::string text = fmt::format("all {} checks are within their limits", all);
+  if (followed > 0) {
+    text += fmt::format(", but {} of them compare{} a drive motion with itself and verif{} nothing",
+                        followed, followed == 1 ? "s" : "", followed == 1 ? "ies" : "y");
+  }
+  return text;
+}
+
 void Judge(const ComparisonInput& input, Comparison* comparison) {
   if (const Witness* broken = FindBroken(input)) {
     comparison->reason = Explain(*broken);
@@ -233,10 +251,7 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     if (!comparison->reason.empty()) return;
   }
   comparison->verdict = failed == 0 ? Verdict::kAgree : Verdict::kDisagree;
-  comparison->reason =
-      failed == 0 ? fmt::format("all {} checks are within their limits", comparison->verified())
-                  : fmt::format("{} of {} checks exceed their limits", failed,
-                                failed + comparison->verified());
+  comparison->reason = CountText(*comparison);
 }
 
 }  // namespace
@@ -273,13 +288,21 @@ size_t Comparison::failed() const {
 }
 
 size_t Comparison::verified() const {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(),
-                                           [](const CheckResult& c) { return c.limit && c.pass; }));
+  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
+    return c.limit && c.pass && !c.follows;
+  }));
+}
+
+size_t Comparison::followed() const {
+  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
+    return c.limit && c.pass && c.follows;
+  }));
 }
 
 Comparison Compare(const ComparisonInput& input) {
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
+  comparison.driving = DrivingText(input);
   AddPair(input, "simulated", "analytic", &comparison);
   AddPair(input, "reference", "analytic", &comparison);
   AddPair(input, "simulated", "reference", &comparison);

@@ -142,6 +142,8 @@ struct CheckResult {
   /// Set where `limit` is not the scenario's own but what a table's uncertainty allows.
   std::optional<double> stated_limit;
   bool pass = false;
+  /// Compares a drive motion with itself: it can fail, but that it passes verifies nothing.
+  bool follows = false;
   double time_s = kNan;
   std::string channel;
 };
@@ -168,6 +170,7 @@ struct TableVerdict {
 struct Comparison {
   Verdict verdict = Verdict::kNotRun;
   std::string reason = "comparison was not run";  ///< one sentence
+  std::string driving;  ///< one sentence: whose motion the simulation follows
   std::vector<PairComparison> pairs;
   std::vector<WitnessMetrics> witnesses;  ///< those that ran
   std::vector<CheckResult> checks;        ///< off ones included
@@ -178,7 +181,8 @@ struct Comparison {
   [[nodiscard]] const PairComparison* FindPair(const std::string& name) const;
   [[nodiscard]] const CheckResult* FindCheck(const std::string& name) const;
   [[nodiscard]] size_t failed() const;    ///< checks that have a limit and did not pass
-  [[nodiscard]] size_t verified() const;  ///< checks that passed
+  [[nodiscard]] size_t verified() const;  ///< checks that passed and verify something
+  [[nodiscard]] size_t followed() const;  ///< checks that passed and compare a motion with itself
 };
 
 [[nodiscard]] Comparison Compare(const ComparisonInput& input);

@@ -5,6 +5,7 @@
 #include "comparison/comparison.h"
 #include "comparison/energy_audit.h"
 #include "comparison/force_scale.h"
+#include "mechanism/constraints.h"
 
 namespace mbv {
 namespace {
@@ -14,17 +15,22 @@ namespace {
 constexpr double kSlowest = 1e-3;
 // The same for the derivative check, per second and per second².
 constexpr double kSlowestRate = 1e-3;
+// Share of the fastest motion below which a commanded rate counts as holding still.
+constexpr double kIdle = 1e-3;
 
-std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate) {
+// `signal`: "" for the value itself, or "velocity", "acceleration".
+std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate,
+                      const std::string& signal) {
   static constexpr const char* kComponents[] = {"x", "y", "z", "roll", "pitch", "yaw"};
   const auto index = static_cast<size_t>(coordinate.index);
   switch (coordinate.kind) {
     case Coordinate::Kind::kDrive:
-      return mechanism.drives[index].name + ".position";
+      return mechanism.drives[index].name + "." + (signal.empty() ? "position" : signal);
     case Coordinate::Kind::kPrescribed:
-      return mechanism.prescribed[index].name + ".position";
+      return mechanism.prescribed[index].name + "." + (signal.empty() ? "position" : signal);
     case Coordinate::Kind::kOutput:
-      return mechanism.outputs[index].name + "." + kComponents[coordinate.component];
+      return mechanism.outputs[index].name + "." + kComponents[coordinate.component] +
+             (signal.empty() ? "" : "." + signal);
     case Coordinate::Kind::kJoint:
       return "";  // not recorded
   }
@@ -33,13 +39,23 @@ std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate) 
 
 // Columns of all terms of a command, or nothing if one of them is not recorded.
 std::optional<std::vector<int>> ColumnsOf(const Mechanism& mechanism, const Command& command,
-                                          const Trace& trace) {
+                                          const Trace& trace, const std::string& signal = "") {
   std::vector<int> columns;
   for (const Command::Term& term : command.terms) {
-    columns.push_back(trace.Find(ChannelOf(mechanism, term.coordinate)));
+    columns.push_back(trace.Find(ChannelOf(mechanism, term.coordinate, signal)));
     if (columns.back() < 0) return {};
   }
   return columns;
+}
+
+// Σ factor · channel in one row.
+double ValueOf(const Trace& trace, const Command& command, const std::vector<int>& columns,
+               Eigen::Index row) {
+  double value = 0.0;
+  for (size_t k = 0; k < columns.size(); ++k) {
+    value += command.terms[k].factor * trace.values(row, columns[k]);
+  }
+  return value;
 }
 
 void MeasureCommands(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
@@ -49,15 +65,71 @@ void MeasureCommands(const ComparisonInput& input, const Trace& trace, WitnessMe
     const bool angle = trace.channels[static_cast<size_t>(columns->front())].unit == "rad";
     const Metric metric = angle ? Metric::kCommandRad : Metric::kCommandM;
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
-      double value = 0.0;
-      for (size_t k = 0; k < columns->size(); ++k) {
-        value +=
-            command.terms[k].factor * trace.values(static_cast<Eigen::Index>(i), (*columns)[k]);
-      }
+      const double value = ValueOf(trace, command, *columns, static_cast<Eigen::Index>(i));
       const double wanted = Evaluate(command.profile, trace.time_s[i]).value;
       const double error = angle ? AngleDifference(value, wanted) : value - wanted;
       KeepWorst(&out->metrics[metric], std::abs(error), trace.time_s[i], command.name);
     }
+  }
+}
+
+// The fastest RMS rate of anything that is commanded or driven, lengths [m] per time; angles count
+// at the characteristic length.
+double FastestRate(const ComparisonInput& input, const Trace& trace, const std::string& signal,
+                   double length_m) {
+  double fastest = 0.0;
+  const auto keep = [&](const ErrorSum& sum, bool angle) {
+    const double rms = sum.rms_truth() * (angle ? length_m : 1.0);
+    if (std::isfinite(rms)) fastest = std::max(fastest, rms);
+  };
+  for (const Drive& drive : input.mechanism->drives) {
+    const int column = trace.Find(drive.name + "." + signal);
+    if (column < 0) continue;
+    ErrorSum sum;
+    for (const double value : trace.values.col(column)) sum.Add(0.0, value, 0.0, drive.name);
+    keep(sum, PositionUnit(*input.mechanism, drive) == "rad");
+  }
+  for (const Command& command : input.motion->commands) {
+    const Coordinate& first = command.terms.front().coordinate;
+    if (first.kind != Coordinate::Kind::kPrescribed) continue;
+    ErrorSum sum;
+    for (const double t_s : trace.time_s) {
+      const Jet jet = Evaluate(command.profile, t_s);
+      sum.Add(0.0, signal == "velocity" ? jet.rate : jet.acceleration, t_s, command.name);
+    }
+    const Joint& joint = input.mechanism->joints[input.mechanism->prescribed[first.index].joint];
+    keep(sum, joint.kind != JointKind::kPrismatic);
+  }
+  return fastest;
+}
+
+// Rates or accelerations of commanded outputs against their commands, pooled per unit. A command
+// that holds still is judged by 0.1 % of what moves elsewhere.
+void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, const char* signal,
+                         Metric metric, WitnessMetrics* out) {
+  std::map<bool, ErrorSum> sums;  // by angle
+  for (const Command& command : input.motion->commands) {
+    if (command.terms.front().coordinate.kind != Coordinate::Kind::kOutput) continue;
+    const auto columns = ColumnsOf(*input.mechanism, command, trace, signal);
+    if (!columns) continue;
+    ErrorSum& sum = sums[command.terms.front().coordinate.component >= 3];
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      const Jet jet = Evaluate(command.profile, trace.time_s[i]);
+      const double wanted = metric == Metric::kCommandVelocity ? jet.rate : jet.acceleration;
+      const double value = ValueOf(trace, command, *columns, static_cast<Eigen::Index>(i));
+      sum.Add(value - wanted, wanted, trace.time_s[i], command.name);
+    }
+  }
+  if (sums.empty()) return;
+  const double length_m = CharacteristicLength(*input.mechanism);
+  double fastest = FastestRate(input, trace, signal, length_m);
+  for (const auto& [angle, sum] : sums) {
+    fastest = std::max(fastest, sum.rms_truth() * (angle ? length_m : 1.0));
+  }
+  for (const auto& [angle, sum] : sums) {
+    const double floor =
+        std::max(kSlowestRate * length_m, kIdle * fastest) / (angle ? length_m : 1.0);
+    KeepWorst(&out->metrics[metric], sum.Nrmse(floor), sum.worst_time_s(), sum.worst_channel());
   }
 }
 
@@ -66,7 +138,7 @@ void MeasureStart(const ComparisonInput& input, const Trace& trace, WitnessMetri
   if (trace.time_s.empty() || trace.time_s.front() != 0.0) return;
   for (const InitialValue& value : input.motion->initial) {
     if (value.coordinate.kind == Coordinate::Kind::kJoint) continue;  // not recorded
-    const int column = trace.Find(ChannelOf(*input.mechanism, value.coordinate));
+    const int column = trace.Find(ChannelOf(*input.mechanism, value.coordinate, ""));
     if (column < 0) continue;
     const bool angle = trace.channels[static_cast<size_t>(column)].unit == "rad";
     const double error = angle ? AngleDifference(trace.values(0, column), value.position)
@@ -201,6 +273,8 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   MeasureCommands(input, trace, &metrics);
   // A table follows a motion; it has no bodies, and its digits leave no derivatives to check.
   if (input.table != nullptr && trace.witness == "reference") return metrics;
+  MeasureCommandRates(input, trace, "velocity", Metric::kCommandVelocity, &metrics);
+  MeasureCommandRates(input, trace, "acceleration", Metric::kCommandAcceleration, &metrics);
   MeasureClosure(trace, &metrics);
   MeasurePower(input, trace, &metrics);
   if (input.motion->free()) MeasureStart(input, trace, &metrics);

@@ -31,6 +31,18 @@ std::vector<Channel> OutputChannels(const Mechanism& mechanism) {
   return channels;
 }
 
+std::vector<Channel> OutputRateChannels(const Mechanism& mechanism, const Output& output) {
+  const std::string frame = mechanism.bodies[output.reference_body].name;
+  std::vector<Channel> channels;
+  for (const auto& [signal, power] : {std::pair{".velocity", ""}, {".acceleration", "^2"}}) {
+    for (const char* c : {"x", "y", "z", "roll", "pitch", "yaw"}) {
+      const char* unit = std::string(c).size() == 1 ? "m" : "rad";
+      channels.push_back({output.name + "." + c + signal, PerTime(unit, power), frame});
+    }
+  }
+  return channels;
+}
+
 std::vector<Channel> PrescribedChannels(const Mechanism& mechanism) {
   std::vector<Channel> channels;
   for (const Prescribed& prescribed : mechanism.prescribed) {

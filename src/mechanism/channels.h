@@ -13,6 +13,10 @@ namespace mbv {
 [[nodiscard]] std::vector<Channel> DriveChannels(const Mechanism& mechanism);
 /// OUTPUT.x, .y, .z [m], .roll, .pitch, .yaw [rad] for every output in model order.
 [[nodiscard]] std::vector<Channel> OutputChannels(const Mechanism& mechanism);
+/// OUTPUT.x.velocity … OUTPUT.yaw.velocity, then OUTPUT.x.acceleration … OUTPUT.yaw.acceleration:
+/// first and second time derivatives of the components of one output.
+[[nodiscard]] std::vector<Channel> OutputRateChannels(const Mechanism& mechanism,
+                                                      const Output& output);
 /// PRESCRIBED.force for every prescribed joint: the base reaction along its coordinate.
 [[nodiscard]] std::vector<Channel> PrescribedChannels(const Mechanism& mechanism);
 /// JOINT.reaction.fx … .mz: wrench of the parent on the child through the joint (drive forces

@@ -78,6 +78,7 @@ void ModelReader::ReadAll() {
   if (yaml_.has_errors()) return;
   CheckHome();
   CheckIsostaticRule();
+  CheckPlausible();
 }
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,

@@ -93,7 +93,10 @@ bool ModelReader::CheckTree() {
 
 void ModelReader::CloseLoops() {
   const HomeResult home = SolveHome(&mechanism_);
-  if (home.closed) return;
+  if (home.closed) {
+    if (home.guesses_moved) WarnAboutAssembly(home);
+    return;
+  }
   CheckAxes(false);
   for (const LoopGap& gap : home.gaps) {
     if (gap.position_m <= kHomeTolerance && gap.rotation_rad <= kHomeTolerance) continue;
@@ -118,6 +121,36 @@ void ModelReader::CloseLoops() {
   }
   if (!yaml_.has_errors() && !other_findings_.has_errors())
     yaml_.AddAt(Severity::kError, 0, 0, "the home pose was not found");
+}
+
+// Only guesses that were disturbed led to closed loops: which assembly they led to is chance.
+void ModelReader::WarnAboutAssembly(const HomeResult& home) {
+  constexpr size_t kMostJoints = 4;
+  std::vector<std::pair<double, int>> moved;  // by how much, tree joint
+  const double length_m = CharacteristicLength(mechanism_);
+  for (const int j : mechanism_.tree_joints) {
+    const Joint& joint = mechanism_.joints[j];
+    double most = 0.0;
+    for (int k = 0; k < FreedomsOf(joint.kind); ++k) {
+      const double unit = IsLength(joint.kind, k) ? length_m : 1.0;
+      most = std::max(most, std::abs(joint.home[k] - joint.guess[k]) / unit);
+    }
+    if (most > 0.0) moved.emplace_back(-most, j);
+  }
+  std::sort(moved.begin(), moved.end());
+  std::string text;
+  for (size_t i = 0; i < std::min(moved.size(), kMostJoints); ++i) {
+    const Joint& joint = mechanism_.joints[moved[i].second];
+    text += fmt::format("{}{} from {:.4g} to {:.4g}", i == 0 ? "" : ", ", joint.name,
+                        joint.guess[0], joint.home[0]);
+  }
+  const YamlEntry* at = moved.empty() ? nullptr : joint_places_[moved.front().second];
+  yaml_.SetNote("");
+  yaml_.AddAt(Severity::kWarning, at ? at->line : 0, at ? at->column : 0,
+              fmt::format("the loops close only from disturbed guesses (gap {:.2g} at the guesses): "
+                          "this may be another assembly than meant; {}",
+                          home.gap_at_guess, text),
+              "look at a picture of the home pose, and guess nearer to the pose that is meant");
 }
 
 namespace {

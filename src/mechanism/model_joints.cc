@@ -2,6 +2,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <numbers>
 
 #include "mechanism/model_reader.h"
 
@@ -141,6 +143,7 @@ void ModelReader::ReadGuess(const Block& block, const YamlNode& node, const std:
   const int n = FreedomsOf(joint->kind);
   if (n == 1 && node.is_scalar()) {
     joint->guess[0] = Number(block, node, path, FactorOf(unit, joint->kind, 0)).value_or(0.0);
+    WarnAboutGuess(node, path, unit, *joint, 0);
     return;
   }
   const auto items = yaml_.Items(node, path, n);
@@ -149,7 +152,18 @@ void ModelReader::ReadGuess(const Block& block, const YamlNode& node, const std:
     joint->guess[k] =
         Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), FactorOf(unit, joint->kind, k))
             .value_or(0.0);
+    WarnAboutGuess(*(*items)[k], fmt::format("{}[{}]", path, k), unit, *joint, k);
   }
+}
+
+// More than a turn is no guess; degrees are.
+void ModelReader::WarnAboutGuess(const YamlNode& node, const std::string& path,
+                                 const UnitSuffix& unit, const Joint& joint, int k) {
+  const double guess = joint.guess[static_cast<size_t>(k)];
+  if (IsLength(joint.kind, k) || unit.suffix == kDeg.suffix) return;
+  if (std::abs(guess) <= 2.0 * std::numbers::pi) return;
+  yaml_.Warn(node, fmt::format("{} = {:.6g} rad is more than a turn", path, guess),
+             "angles are in radians; write guess_deg for degrees");
 }
 
 void ModelReader::ReadJointRange(const Block& block, const YamlMap& map, Joint* joint) {

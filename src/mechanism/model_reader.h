@@ -5,7 +5,7 @@
 // parameters (model_parameters.cc), head and blocks (model_parts.cc), bodies and frames, then
 // shapes (model_bodies.cc), joints (model_joints.cc), drives, springs, outputs and order
 // (model_signals.cc), materials, sections and beams (model_elastic.cc), then the checks on the
-// whole (model_checks.cc, model_beam_checks.cc).
+// whole (model_checks.cc, model_beam_checks.cc, model_plausibility.cc).
 #pragma once
 
 #include <deque>
@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "mechanism/expressions.h"
+#include "mechanism/home.h"
 #include "mechanism/load_model.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/spanning_tree.h"
@@ -122,6 +123,8 @@ class ModelReader {
   bool ReadAxes(const Block& block, const YamlMap& map, Joint* joint);
   void ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
                  const UnitSuffix& unit, Joint* joint);
+  void WarnAboutGuess(const YamlNode& node, const std::string& path, const UnitSuffix& unit,
+                      const Joint& joint, int k);
   void ReadJointRange(const Block& block, const YamlMap& map, Joint* joint);
   bool ReadFreeChoices(const YamlMap& map, Joint* joint);
 
@@ -168,10 +171,17 @@ class ModelReader {
   void CheckMasses();
   bool CheckTree();
   void CloseLoops();
+  void WarnAboutAssembly(const HomeResult& home);
   void ReportTree(const SpanningTreeResult& tree);
   void CheckAxes(bool closed_at_home);
   void CheckHome();
   void CheckIsostaticRule();
+
+  // model_plausibility.cc
+  void CheckPlausible();
+  void WarnAboutBody(int body, const std::string& text, const std::string& hint);
+  void WarnAboutLengths(const std::vector<int>& thin, double extent_m);
+  void WarnAboutGravity();
 
   // model_values.cc: one value each; empty after a finding.
   /// The value, or what LoadOptions::literals puts in its place.

@@ -15,7 +15,9 @@
 #include "pipeline/prepare.h"
 #include "pipeline/ranges.h"
 #include "pipeline/run_page.h"
+#include "pipeline/shared_forces.h"
 #include "pipeline/stiffness.h"
+#include "pipeline/table_gravity.h"
 #include "pipeline/version.h"
 #include "reference/reference.h"
 #include "report/csv.h"
@@ -102,31 +104,6 @@ class ScenarioRun {
           prepared_->mechanisms.simulated.ParameterValue(simulation.extrapolate->parameter));
     }
     return line;
-  }
-
-  // Drives that share a force among them, unless all of them are given it.
-  void NameSharedDrives(const Mobility& mobility) {
-    std::string names;
-    bool moments = false, forces = false;
-    for (size_t d = 0; d < base().drives.size(); ++d) {
-      const Drive& drive = base().drives[d];
-      const auto& shared = mobility.drives_not_unique;
-      if (scenario().motion.FindForce(static_cast<int>(d)) >= 0) continue;
-      if (std::find(shared.begin(), shared.end(), drive.name) == shared.end()) continue;
-      report_.drives_not_unique.push_back(drive.name);
-      names += (names.empty() ? "" : ", ") + drive.name;
-      (ForceUnit(base(), drive) == "N" ? forces : moments) = true;
-    }
-    if (report_.drives_not_unique.size() < 2) {
-      report_.drives_not_unique.clear();
-      return;
-    }
-    std::string text = "drive forces not unique: minimum norm over " + names;
-    if (moments && forces) {
-      text += fmt::format(", moments divided by the characteristic length {:.4g} m",
-                          CharacteristicLength(base()));
-    }
-    AddWarning(text);
   }
 
   void AddWitness(const std::string& name, RunSummary summary, Trace trace) {
@@ -227,6 +204,7 @@ class ScenarioRun {
     report_.timing.loop_s = witness.run.loop_wall_s;
     report_.timing.steps = witness.run.steps;
     AddWarnings(witness.run.warnings);
+    report_.simulated_not_unique = witness.run.not_unique;
     CheckJoints(&witness.run);
     AddWitness("simulated", witness.run.summary, witness.run.trace);
     simulation_ = std::move(witness.run);
@@ -287,11 +265,24 @@ class ScenarioRun {
 
   void Judge() {
     const Mobility mobility = AnalyseMobility(base());
-    NameSharedDrives(mobility);
+    report_.drives_not_unique = SharedDrives(base(), scenario().motion, mobility);
+    for (const std::string& text :
+         SharedForceTexts(base(), report_.drives_not_unique, report_.simulated_not_unique)) {
+      AddWarning(text);
+    }
     const ComparisonInput input = MakeComparisonInput(mobility);
     report_.comparison = Compare(input);
+    DoubtGravity();
     report_.sheets = SheetsOf(base(), report_.comparison);
     if (other_engine_) CompareEngines(input);
+  }
+
+  // A table that was made with another value of g agrees within any usual tolerance.
+  void DoubtGravity() {
+    if (!table_ || scenario().motion.free()) return;
+    const std::string doubt = GravityDoubt(prepared_->mechanisms.reference, scenario().motion,
+                                           *table_, scenario().start_window_s);
+    if (!doubt.empty()) AddWarning(doubt);
   }
 
   void CompareEngines(const ComparisonInput& input) {

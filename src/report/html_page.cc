@@ -99,6 +99,9 @@ class PageWriter {
     }
     html += "<dl class=\"cards\">\n" + Cards() + "</dl>\n";
     html += "<p class=\"faint\">" + Escape(Sentence(report_.simulation));
+    if (!report_.comparison.driving.empty()) {
+      html += " " + Escape(Sentence(report_.comparison.driving));
+    }
     if (report_.start_window_s > 0.0) {
       html += fmt::format(" Start-up window: forces before {:g} s are not judged.",
                           report_.start_window_s);

@@ -46,9 +46,10 @@ std::string Margin(const CheckResult& check) {
 std::vector<Cell> CheckRow(const CheckResult& check) {
   const MetricRow& row = RowOf(check.metric);
   const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
-  const std::string pill = !check.limit ? Pill("off", "off")
-                           : check.pass ? Pill("ok", "ok")
-                                        : Pill("fail", "fail");
+  const std::string pill = !check.limit    ? Pill("off", "off")
+                           : !check.pass   ? Pill("fail", "fail")
+                           : check.follows ? Pill("off", "held")
+                                           : Pill("ok", "ok");
   std::string where = check.channel;
   if (!where.empty() && std::isfinite(check.time_s)) where += ", " + At(check.time_s);
   return {Text(Spaced(check.subject)),
@@ -92,7 +93,9 @@ std::string ChecksHtml(const Report& report) {
     }
   }
   return ToHtml(table) +
-         Note("The margin is the limit over the value; a full bar is ten decimal digits.");
+         Note(
+             "The margin is the limit over the value; a full bar is ten decimal digits. Held: a "
+             "drive motion compared with itself, which verifies nothing.");
 }
 
 std::string DrivesHtml(const Report& report) {

@@ -16,6 +16,7 @@ Json ChecksJson(const Comparison& comparison) {
                       {"value", Number(check.value)},
                       {"limit", *check.limit},
                       {"pass", check.pass},
+                      {"verifies", !check.follows},
                       {"time_s", Number(check.time_s)},
                       {"channel", check.channel}});
     if (check.stated_limit) checks.back()["stated_limit"] = *check.stated_limit;
@@ -220,6 +221,7 @@ Json CountsJson(const Report& report) {
           {"pairs_compared", compared},
           {"checks", limits},
           {"checks_verified", report.comparison.verified()},
+          {"checks_of_a_motion_with_itself", report.comparison.followed()},
           {"checks_off", report.comparison.checks.size() - limits}};
 }
 
@@ -265,7 +267,9 @@ std::string ToJson(const Report& report) {
                 {{"mode", report.mode},
                  {"engine", report.engine},
                  {"step_s", Number(report.step_s)},
-                 {"driven_by", report.driven_by}}},
+                 {"driven_by", report.driven_by},
+                 {"driving", report.comparison.driving},
+                 {"forces_not_unique", report.simulated_not_unique}}},
                {"duration_s", Number(report.duration_s)},
                {"sample_s", Number(report.sample_s)},
                {"start_window_s", report.start_window_s}};

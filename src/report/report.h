@@ -53,6 +53,8 @@ struct Report {
   double start_window_s = 0.0;  ///< left out of the force metrics
   std::string driven_by;
   std::vector<std::string> drives_not_unique;  ///< they share their forces by least norm
+  /// Drives and prescribed joints whose force MuJoCo finds not unique; one choice is recorded.
+  std::vector<std::string> simulated_not_unique;
   std::vector<WitnessRecord> witnesses;
   Comparison comparison;
   int exit_code = 3;

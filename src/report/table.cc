@@ -54,6 +54,7 @@ class Writer {
                      VerdictWord(report.comparison.verdict)));
     if (!report.description.empty()) Line("  " + report.description);
     Line("  " + report.simulation);
+    if (!report.comparison.driving.empty()) Line("  " + report.comparison.driving);
     if (report.start_window_s > 0.0) {
       Line(fmt::format("  start-up window: forces before {:g} s are not judged",
                        report.start_window_s));
@@ -114,6 +115,8 @@ class Writer {
         return check.subject == "simulated_vs_analytic";
       case Metric::kCommandM:
       case Metric::kCommandRad:
+      case Metric::kCommandVelocity:
+      case Metric::kCommandAcceleration:
       case Metric::kClosureM:
       case Metric::kPower:
         return simulated;
@@ -140,9 +143,10 @@ class Writer {
     const MetricRow& row = RowOf(check.metric);
     const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
     const std::string limit = check.limit ? fmt::format("{:.1e}", *check.limit) : "off";
-    const std::string word = !check.limit ? Painted("-   ", Paint::kFaint)
-                             : check.pass ? Painted("ok  ", Paint::kGood)
-                                          : Painted("FAIL", Paint::kBad);
+    const std::string word = !check.limit    ? Painted("-   ", Paint::kFaint)
+                             : !check.pass   ? Painted("FAIL", Paint::kBad)
+                             : check.follows ? Painted("held", Paint::kFaint)
+                                             : Painted("ok  ", Paint::kGood);
     std::string line =
         fmt::format("    {:<26}{:>12.2e}{:>11}   {}  ", row.title + unit, check.value, limit, word);
     if (!check.channel.empty()) line += fmt::format("{}, {:.4g} s", check.channel, check.time_s);

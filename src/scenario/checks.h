@@ -31,6 +31,8 @@ enum class Metric {
   kReaction,      ///< pair: unique joint reactions, RMS error / RMS
   kCommandM,      ///< commanded lengths against what the witness did [m]
   kCommandRad,    ///< commanded angles against what the witness did [rad]
+  kCommandVelocity,      ///< commanded outputs' rates against what the witness did, RMS error / RMS
+  kCommandAcceleration,  ///< their accelerations, the same way
   kClosureM,      ///< loop gap [m]
   kClosureRad,    ///< loop twist gap [rad]
   kPower,         ///< |input power − energy rate| / largest power
@@ -38,7 +40,7 @@ enum class Metric {
   kEnergy,        ///< |energy − start − work| / energy turned over, where work is integrated
   kTableTube,     ///< pair with a table: worst column's difference / its tolerance tube
 };
-inline constexpr int kMetrics = 18;
+inline constexpr int kMetrics = 20;
 
 /// Which column of limits applies.
 enum class LimitColumn { kForward, kInverse, kReference };
@@ -65,6 +67,12 @@ struct MetricRow {
 [[nodiscard]] constexpr bool IsDriveForce(Metric metric) {
   return metric == Metric::kForceNrmse || metric == Metric::kForceMax ||
          metric == Metric::kForceOwn;
+}
+
+/// Judges positions, velocities or accelerations of drives.
+[[nodiscard]] constexpr bool IsDriveMotion(Metric metric) {
+  return metric == Metric::kPositionM || metric == Metric::kPositionRad ||
+         metric == Metric::kVelocity || metric == Metric::kAcceleration;
 }
 
 [[nodiscard]] std::span<const MetricRow> MetricRows();

@@ -3,6 +3,7 @@
 #include "core/demand.h"
 #include "core/spatial.h"
 #include "mechanism/channels.h"
+#include "simulation/output_rates.h"
 #include "simulation/powers.h"
 
 namespace mbv::simulation {
@@ -33,6 +34,12 @@ Recorder::Recorder(ConstraintSystem* system, bool work)
   Append(AuditChannels(), &channels_);
   Append(EnergyChannels(), &channels_);
   if (work) Append(WorkChannels(mechanism), &channels_);
+  rate_column_ = column();
+  for (const Output& output : mechanism.outputs) {
+    if (!HasOutputRates(engine_, output)) continue;
+    rated_.push_back(&output);
+    Append(OutputRateChannels(mechanism, output), &channels_);
+  }
   W_.setZero(6, engine_.m->nbody);
   work_.setZero(engine_.m->nv);
   FindReactionPlaces();
@@ -87,6 +94,7 @@ void Recorder::Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::Ro
   RecordDriven(row);
   RecordOutputs(*X_WB, row);
   RecordReactions(loads, *X_WB, row);
+  RecordOutputRates(row);  // from the accelerations that the reactions needed
   RecordAudit(loads, work, row);
 }
 
@@ -119,6 +127,16 @@ void Recorder::RecordOutputs(const std::vector<Pose>& X_WB,
     row.segment<3>(column) = X_RO.translation().transpose();
     row.segment<3>(column + 3) = RpyOf(X_RO.linear()).transpose();
     column += 6;
+  }
+}
+
+void Recorder::RecordOutputRates(Eigen::Ref<Eigen::RowVectorXd> row) const {
+  int column = rate_column_;
+  for (const Output* output : rated_) {
+    const OutputRates rates = OutputRatesOf(engine_, *system_->data(), *output);
+    row.segment<6>(column) = rates.velocity.transpose();
+    row.segment<6>(column + 6) = rates.acceleration.transpose();
+    column += 12;
   }
 }
 

@@ -33,6 +33,7 @@ class Recorder {
   void FindReactionPlaces();
   void RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row);
   void RecordOutputs(const std::vector<Pose>& X_WB, Eigen::Ref<Eigen::RowVectorXd> row) const;
+  void RecordOutputRates(Eigen::Ref<Eigen::RowVectorXd> row) const;
   void RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
                        Eigen::Ref<Eigen::RowVectorXd> row);
   void RecordAudit(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row);
@@ -47,6 +48,8 @@ class Recorder {
   const EngineModel& engine_;
   std::vector<Channel> channels_;
   int output_column_ = 0, prescribed_column_ = 0, reaction_column_ = 0, audit_column_ = 0;
+  int rate_column_ = 0;
+  std::vector<const Output*> rated_;   // outputs whose rates MuJoCo's bodies give
   std::vector<ReactionPlace> places_;  // per joint
   std::vector<std::vector<std::pair<int, int>>>
       driven_of_;                               // per joint: (driven row, MuJoCo joint)

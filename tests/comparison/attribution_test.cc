@@ -93,7 +93,7 @@ TEST(Attribution, RatesThatAreNoDerivativesConvictTheirWitnessThoughTheSimulatio
 
 TEST(Attribution, WrongDrivePositionsAreSeenInTheSimulatedPose) {
   Case c;
-  c.motion.commands = {{"plate.x", {{{Coordinate::Kind::kOutput, 0, 0}, 1.0}}, {{RampTerm{0.3}}}}};
+  c.CommandPlate();
   // The closed form's drive motion is off by 1 mm; the simulation follows it and misses the pose.
   for (Trace* trace : {&c.analytic, &c.simulated}) Bend(trace, "d1.position", 1e-3);
   Bend(&c.simulated, "plate.x", 1e-3);
@@ -104,11 +104,79 @@ TEST(Attribution, WrongDrivePositionsAreSeenInTheSimulatedPose) {
 
 TEST(Attribution, AWrongSimulatedModelIsToldFromWrongDriveMotion) {
   Case c;
-  c.motion.commands = {{"plate.x", {{{Coordinate::Kind::kOutput, 0, 0}, 1.0}}, {{RampTerm{0.3}}}}};
+  c.CommandPlate();
   Bend(&c.simulated, "plate.x", 1e-3);  // the drive motion is right in all three
   const Attribution attribution = c.Run().attribution;
   EXPECT_EQ(attribution.odd_one_out, "simulated");
   EXPECT_TRUE(Mentions(attribution, "agree on the drive motion")) << attribution.text;
+}
+
+TEST(Attribution, WrongDriveAccelerationsAreSeenInTheSimulatedAccelerationNotBlamedOnIt) {
+  // The closed form's acceleration is off, so coarsely sampled that its own rates do not tell; its
+  // forces do not use it. The simulation follows it: its forces are wrong, and it is not to blame.
+  Case c;
+  c.CommandPlate();
+  for (Trace* trace : {&c.analytic, &c.simulated}) Bend(trace, "d1.acceleration", 1.0);
+  Bend(&c.simulated, "plate.x.acceleration", 1.0);
+  Bend(&c.simulated, "d1.force", 5.0);
+  c.limits[Metric::kDerivatives] = {};
+  const Attribution attribution = c.Run().attribution;
+  EXPECT_EQ(attribution.odd_one_out, "analytic") << attribution.text;
+  EXPECT_TRUE(Mentions(attribution, "the simulation misses the commanded acceleration"))
+      << attribution.text;
+  EXPECT_TRUE(Mentions(attribution, "needs drive accelerations that differ by"))
+      << attribution.text;
+}
+
+TEST(Attribution, GuidanceThatHidesAWrongAccelerationLeavesItsPlaceToTell) {
+  // Forward in time the guidance pulls the mechanism back: it ends up a little off the command.
+  Case c;
+  c.CommandPlate();
+  c.column = LimitColumn::kForward;
+  Bend(&c.analytic, "d1.acceleration", 1.0);
+  Bend(&c.simulated, "d1.force", 5.0);
+  Bend(&c.simulated, "plate.x", 1e-4);
+  c.limits[Metric::kDerivatives] = {};
+  EXPECT_EQ(c.Run().attribution.odd_one_out, "analytic") << c.Run().attribution.text;
+}
+
+TEST(Attribution, AWrongReferenceMotionIsToldByTheSimulationThatMeetsTheCommand) {
+  Case c;
+  c.CommandPlate();
+  Bend(&c.reference, "d1.acceleration", 1.0);
+  Stretch(&c.reference, "d1.force", 1.05);
+  c.limits[Metric::kDerivatives] = {};
+  const Attribution attribution = c.Run().attribution;
+  EXPECT_EQ(attribution.odd_one_out, "reference") << attribution.text;
+  EXPECT_TRUE(Mentions(attribution, "the simulation meets the command")) << attribution.text;
+}
+
+TEST(Attribution, TwoAssembliesThatBothMeetTheCommandAreNobodysFault) {
+  Case c;
+  c.CommandPlate();
+  Bend(&c.reference, "d1.position", 0.2);
+  const Attribution attribution = c.Run().attribution;
+  EXPECT_EQ(attribution.odd_one_out, "");
+  EXPECT_TRUE(Mentions(attribution, "two assemblies")) << attribution.text;
+}
+
+TEST(Attribution, AMissOfTheSimulationDoesNotHideWrongForcesOfTheClosedForm) {
+  Case c;
+  c.CommandPlate();
+  c.column = LimitColumn::kForward;
+  Bend(&c.simulated, "plate.x", 2e-6);
+  Stretch(&c.analytic, "d1.force", 1.05);
+  const Attribution attribution = c.Run().attribution;
+  EXPECT_EQ(attribution.odd_one_out, "analytic") << attribution.text;
+  EXPECT_TRUE(Mentions(attribution, "besides")) << attribution.text;
+}
+
+TEST(Attribution, ASimulationThatDoesNotFollowIsNamed) {
+  Case c;
+  Bend(&c.simulated, "d1.acceleration", 1.0);
+  const Attribution attribution = c.Run().attribution;
+  EXPECT_EQ(attribution.odd_one_out, "simulated") << attribution.text;
+  EXPECT_TRUE(Mentions(attribution, "does not follow the motion")) << attribution.text;
 }
 
 TEST(Attribution, AnOpenLoopIsNamedWhenForcesAgree) {

@@ -43,6 +43,10 @@ inline Trace ExactTrace(const std::string& witness) {
        {OutputChannels(mechanism), ReactionChannels(mechanism.joints[0]), audit}) {
     channels.insert(channels.end(), more.begin(), more.end());
   }
+  if (witness == "simulated") {
+    const std::vector<Channel> rates = OutputRateChannels(mechanism, mechanism.outputs[0]);
+    channels.insert(channels.end(), rates.begin(), rates.end());
+  }
   Trace trace;
   trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), channels);
   trace.witness = witness;
@@ -65,6 +69,10 @@ inline Trace ExactTrace(const std::string& witness) {
     set("d2.force", 40.0 * std::cos(w * t));
     set("plate.x", 0.3 * t);
     set("plate.yaw", 3.0 + 0.5 * t);  // passes π
+    if (witness == "simulated") {
+      set("plate.x.velocity", 0.3);
+      set("plate.yaw.velocity", 0.5);
+    }
     set("slide1.reaction.fx", 10.0 + t);
     set("slide1.reaction.my", 2.0);
     set("power.input", 50.0 * std::sin(w * t));
@@ -98,6 +106,14 @@ struct Case {
   CheckLimits limits;
   double start_window_s = 0.0;
   std::vector<std::string> joints_not_unique;
+
+  /// The plate's way is commanded instead of the drives'.
+  void CommandPlate() {
+    motion.commands = {{"plate.x", {{{Coordinate::Kind::kOutput, 0, 0}, 1.0}}, {{RampTerm{0.3}}}},
+                       {"plate.yaw",
+                        {{{Coordinate::Kind::kOutput, 0, 5}, 1.0}},
+                        {{ConstantTerm{3.0}, RampTerm{0.5}}}}};
+  }
 
   [[nodiscard]] ComparisonInput Input() const {
     return {.mechanism = &mechanism,

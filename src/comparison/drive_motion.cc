@@ -1,0 +1,129 @@
+#include "comparison/drive_motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <vector>
+
+namespace mbv {
+namespace {
+
+bool IsOfDrives(const Command& command) {
+  return std::all_of(command.terms.begin(), command.terms.end(), [](const Command::Term& term) {
+    return term.coordinate.kind == Coordinate::Kind::kDrive;
+  });
+}
+
+// Per drive: its motion follows from commands of drives alone.
+std::vector<bool> CommandedDrives(const ComparisonInput& input) {
+  const auto drives = static_cast<Eigen::Index>(input.mechanism->drives.size());
+  std::vector<VecX> rows;
+  for (const Command& command : input.motion->commands) {
+    if (!IsOfDrives(command)) continue;
+    rows.emplace_back(VecX::Zero(drives));
+    for (const Command::Term& term : command.terms) {
+      rows.back()[term.coordinate.index] += term.factor;
+    }
+  }
+  MatX transposed(drives, static_cast<Eigen::Index>(rows.size()));
+  for (size_t k = 0; k < rows.size(); ++k) {
+    transposed.col(static_cast<Eigen::Index>(k)) = rows[k];
+  }
+  std::vector<bool> commanded(static_cast<size_t>(drives), false);
+  if (rows.empty()) return commanded;
+  const Eigen::ColPivHouseholderQR<MatX> qr(transposed);
+  for (Eigen::Index d = 0; d < drives; ++d) {
+    const VecX unit = VecX::Unit(drives, d);
+    commanded[static_cast<size_t>(d)] = (transposed * qr.solve(unit) - unit).norm() < 1e-9;
+  }
+  return commanded;
+}
+
+// All drives that a metric is about are commanded as such.
+bool AllCommanded(const ComparisonInput& input, Metric metric) {
+  const std::vector<bool> commanded = CommandedDrives(input);
+  bool any = false;
+  for (size_t d = 0; d < commanded.size(); ++d) {
+    const bool angle = PositionUnit(*input.mechanism, input.mechanism->drives[d]) == "rad";
+    if (metric == Metric::kPositionM && angle) continue;
+    if (metric == Metric::kPositionRad && !angle) continue;
+    if (!commanded[d]) return false;
+    any = true;
+  }
+  return any;
+}
+
+// All commands that a witness can be held against are about drives.
+bool OnlyDriveCommands(const ComparisonInput& input, Metric metric) {
+  for (const Command& command : input.motion->commands) {
+    const Coordinate& first = command.terms.front().coordinate;
+    bool angle = first.component >= 3;
+    if (first.kind == Coordinate::Kind::kDrive) {
+      angle = PositionUnit(*input.mechanism, input.mechanism->drives[first.index]) == "rad";
+    }
+    const bool recorded =
+        std::none_of(command.terms.begin(), command.terms.end(), [](const Command::Term& term) {
+          return term.coordinate.kind == Coordinate::Kind::kPrescribed;
+        });
+    if (!recorded || angle != (metric == Metric::kCommandRad)) continue;
+    if (!IsOfDrives(command)) return false;
+  }
+  return !input.motion->free();  // start values are measured, not followed
+}
+
+}  // namespace
+
+bool IsTaskSpace(const Motion& motion) {
+  return std::any_of(motion.commands.begin(), motion.commands.end(), [](const Command& command) {
+    return std::any_of(command.terms.begin(), command.terms.end(), [](const Command::Term& term) {
+      return term.coordinate.kind == Coordinate::Kind::kOutput;
+    });
+  });
+}
+
+std::string DrivingText(const ComparisonInput& input) {
+  const auto simulated =
+      std::find_if(input.witnesses.begin(), input.witnesses.end(),
+                   [](const Witness& witness) { return witness.name == "simulated"; });
+  if (simulated == input.witnesses.end() || simulated->trace == nullptr) return "";
+  if (input.motion->free()) {
+    return "free motion: the simulation starts from the state that the reference computes from the "
+           "initial values; then forces alone move it";
+  }
+  const std::vector<bool> commanded = CommandedDrives(input);
+  if (std::find(commanded.begin(), commanded.end(), false) == commanded.end()) {
+    return "commanded in joint space, every computation is given the same drive motion";
+  }
+  return fmt::format(
+      "commanded in {} space, the simulation follows the drive positions, rates and accelerations "
+      "that the {} computes",
+      IsTaskSpace(*input.motion) ? "task" : "joint",
+      input.driven_by == "analytic"    ? "closed form"
+      : input.driven_by == "reference" ? "reference"
+                                       : "generic solver");
+}
+
+bool ComparesMotionWithItself(const ComparisonInput& input, const std::string& subject,
+                              Metric metric) {
+  const auto involves = [&](const char* witness) {
+    return subject.starts_with(witness) || subject.ends_with(witness);
+  };
+  const bool table = input.table != nullptr && involves("reference");
+  switch (metric) {
+    case Metric::kPositionM:
+    case Metric::kPositionRad:
+    case Metric::kVelocity:
+    case Metric::kAcceleration:
+      if (!input.motion->free() && involves("simulated")) return true;
+      return !table && AllCommanded(input, metric);
+    case Metric::kDerivatives:
+      return AllCommanded(input, metric);
+    case Metric::kCommandM:
+    case Metric::kCommandRad:
+      return !table && OnlyDriveCommands(input, metric);
+    default:
+      return false;
+  }
+}
+
+}  // namespace mbv

@@ -1,0 +1,22 @@
+// Whose motion the drives follow, and which comparisons are therefore no evidence.
+#pragma once
+
+#include <string>
+
+#include "comparison/comparison.h"
+
+namespace mbv {
+
+/// One sentence about who gives the simulation its motion; "" where nothing was simulated.
+[[nodiscard]] std::string DrivingText(const ComparisonInput& input);
+
+/// True when some command is about an output: drive motions are then computed, not given.
+[[nodiscard]] bool IsTaskSpace(const Motion& motion);
+
+/// True when a check compares a drive motion with itself: the simulation's with what it was told
+/// to follow, or a drive that the scenario commands with its command. Such a check can fail; that
+/// it passes verifies nothing. `subject` as in CheckResult.
+[[nodiscard]] bool ComparesMotionWithItself(const ComparisonInput& input,
+                                            const std::string& subject, Metric metric);
+
+}  // namespace mbv
