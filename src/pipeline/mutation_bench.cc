@@ -53,7 +53,7 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file,
     return nullptr;
   }
   std::unique_ptr<MutationBench> bench(new MutationBench(*std::move(prepared)));
-  bench->joints_not_unique_ = AnalyseMobility(bench->prepared_.base).joints_not_unique;
+  bench->reactions_not_unique_ = ReactionsNotUnique(bench->prepared_.base, {});
   bench->RunTruths();
   bench->TakeDrivenMotion();
   bench->base_ = bench->Run(bench->mechanism());
@@ -111,7 +111,7 @@ ComparisonInput MutationBench::Input() const {
                         .start_window_s = scenario().start_window_s,
                         .witnesses = {},
                         .driven_by = prepared_.driven_by,
-                        .joints_not_unique = joints_not_unique_,
+                        .reactions_not_unique = reactions_not_unique_,
                         .table = table_ ? &*table_ : nullptr};
   for (size_t k = 0; k < traces_.size(); ++k) {
     input.witnesses.push_back({summaries_[k].first, &traces_[k], summaries_[k].second});
@@ -152,7 +152,7 @@ BentRun MutationBench::Run(const std::string& parameter, double value) const {
     copy.table_ = table_;
     copy.driven_ = driven_;
     copy.driven_summary_ = driven_summary_;
-    copy.joints_not_unique_ = joints_not_unique_;
+    copy.reactions_not_unique_ = reactions_not_unique_;
     return copy.Run(*mechanism);
   }
   bent.loaded = false;

@@ -66,7 +66,7 @@ class MutationBench {
   std::vector<DrivenSample> driven_;  // per sample of the motion
   RunSummary driven_summary_;
   std::string truth_;
-  std::vector<std::string> joints_not_unique_;
+  std::vector<std::string> reactions_not_unique_;
   BentRun base_;
 };
 

@@ -268,7 +268,7 @@ class ScenarioRun {
     other_engine_ = std::move(witness.run);
   }
 
-  ComparisonInput MakeComparisonInput(const Mobility& mobility) const {
+  ComparisonInput MakeComparisonInput() const {
     ComparisonInput input{.mechanism = &base(),
                           .motion = &scenario().motion,
                           .limits = scenario().checks,
@@ -278,7 +278,9 @@ class ScenarioRun {
                           .start_window_s = scenario().start_window_s,
                           .witnesses = {},
                           .driven_by = report_.driven_by,
-                          .joints_not_unique = mobility.joints_not_unique,
+                          .reactions_not_unique = ReactionsNotUnique(
+                              base(), simulation_ ? simulation_->X_WB
+                                                  : std::vector<std::vector<Pose>>()),
                           .table = table_ ? &*table_ : nullptr};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
@@ -288,9 +290,8 @@ class ScenarioRun {
   }
 
   void Judge() {
-    const Mobility mobility = AnalyseMobility(base());
-    NameSharedDrives(mobility);
-    const ComparisonInput input = MakeComparisonInput(mobility);
+    NameSharedDrives(AnalyseMobility(base()));
+    const ComparisonInput input = MakeComparisonInput();
     report_.comparison = Compare(input);
     report_.sheets = SheetsOf(base(), report_.comparison);
     if (other_engine_) CompareEngines(input);

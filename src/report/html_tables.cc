@@ -47,6 +47,7 @@ std::vector<Cell> CheckRow(const CheckResult& check) {
   const MetricRow& row = RowOf(check.metric);
   const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
   const std::string pill = !check.limit ? Pill("off", "off")
+                           : check.pass && !check.blind.empty() ? Pill("warn", "verifies nothing")
                            : check.pass ? Pill("ok", "ok")
                                         : Pill("fail", "fail");
   std::string where = check.channel;
@@ -55,8 +56,8 @@ std::vector<Cell> CheckRow(const CheckResult& check) {
           Text(row.title + unit),
           Digits(Number(check.value)),
           Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
-          Markup(pill),
-          Markup(Margin(check)),
+          Markup(pill + (check.floored ? " " + Pill("warn", "floored") : "")),
+          Markup(check.blind.empty() ? Margin(check) : ""),
           Text(where)};
 }
 
@@ -108,7 +109,10 @@ std::string DrivesHtml(const Report& report) {
       table.rows.push_back(
           {Text(drive.drive), Digits(fmt::format("{:.6g} {}", drive.rms_truth, drive.unit)),
            Digits(Number(drive.nrmse)), Digits(Number(drive.max_error) + " " + drive.unit),
-           Digits(At(drive.time_s)), Digits(Number(drive.digits, "{:.1f}"))});
+           Digits(At(drive.time_s)),
+           Cell{Number(drive.digits, "{:.1f}") +
+                    (drive.floored ? " " + Pill("warn", "floored") : ""),
+                true, true}});
     }
     const bool first = &pair == main;
     html += first ? ToHtml(table)
