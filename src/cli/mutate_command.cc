@@ -82,11 +82,19 @@ std::string ReadAll(const fs::path& file) {
 // What a worker is started with: these arguments, for one part.
 std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
                                    const std::string& json) {
-  std::vector<std::string> argv = {"/proc/self/exe", "mutate", arguments.scenario, "--size",
-                                   arguments.size, "--resolution",
-                                   fmt::format("{:.17g}", arguments.resolution_percent), "--part",
-                                   fmt::format("{}/{}", part + 1, arguments.jobs), "--mode",
-                                   arguments.mode, "--json", json};
+  std::vector<std::string> argv = {"/proc/self/exe",
+                                   "mutate",
+                                   arguments.scenario,
+                                   "--size",
+                                   arguments.size,
+                                   "--resolution",
+                                   fmt::format("{:.17g}", arguments.resolution_percent),
+                                   "--part",
+                                   fmt::format("{}/{}", part + 1, arguments.jobs),
+                                   "--mode",
+                                   arguments.mode,
+                                   "--json",
+                                   json};
   for (const std::string& number : arguments.numbers) {
     argv.insert(argv.end(), {"--parameter", number});
   }
@@ -95,49 +103,65 @@ std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
   return argv;
 }
 
-// The work shared out to processes. Where a worker fails, the report has its exit code and nothing
-// else, and what it said is told.
-MutationReport RunWorkers(const MutateArguments& arguments) {
-  const fs::path folder = fs::temp_directory_path() / fmt::format("mbverify_mutate_{}", getpid());
-  const auto place = [&](size_t part, const char* ending) {
-    return folder / fmt::format("{}.{}", part, ending);
-  };
-  std::vector<WorkerJob> jobs;
-  for (int part = 0; part < arguments.jobs; ++part) {
-    const auto k = static_cast<size_t>(part);
-    jobs.push_back({CommandOf(arguments, part, place(k, "json").string()), place(k, "log")});
+// The work shared out to processes.
+class Workers {
+ public:
+  explicit Workers(const MutateArguments& arguments)
+      : arguments_(arguments), parts_(static_cast<size_t>(arguments.jobs)) {}
+  ~Workers() {
+    std::error_code ignored;
+    fs::remove_all(folder_, ignored);
   }
-  ProgressLine progress(true);
-  std::vector<MutationReport> parts(jobs.size());
-  size_t done = 0;
-  int failure = 0;
-  bool told = false;
-  WorkerPool pool;
-  pool.parallel = arguments.jobs;
-  pool.timeout_s = std::numeric_limits<double>::infinity();
-  pool.ended = [&](size_t part, const WorkerEnd& end) {
-    progress.Show(fmt::format("{} workers", arguments.jobs),
-                  static_cast<double>(++done) / static_cast<double>(jobs.size()));
-    auto report = MutationReportOf(ReadAll(place(part, "json")));
-    const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
-    if (good) parts[part] = *std::move(report);
-    // All workers find the same in the files.
-    if (std::exchange(told, true) && (good || failure > 0)) return;
-    progress.Clear();
-    fmt::print(stderr, "{}", ReadAll(place(part, "log")));
-    if (!good) {
-      if (end.signal != 0) fmt::print(stderr, "a worker was ended by signal {}\n", end.signal);
-      failure = std::max(failure, end.exit_code > 0 ? end.exit_code : 3);
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
+
+  // Where a worker fails, the report has its exit code and nothing else, and what it said is told.
+  MutationReport Run() {
+    std::vector<WorkerJob> jobs;
+    for (size_t k = 0; k < parts_.size(); ++k) {
+      jobs.push_back(
+          {CommandOf(arguments_, static_cast<int>(k), Place(k, "json").string()), Place(k, "log")});
     }
-  };
-  (void)pool.Run(jobs);
-  std::error_code ignored;
-  fs::remove_all(folder, ignored);
-  if (failure == 0) return MergeParts(std::move(parts));
-  MutationReport report;
-  report.exit_code = failure;
-  return report;
-}
+    WorkerPool pool;
+    pool.parallel = arguments_.jobs;
+    pool.timeout_s = std::numeric_limits<double>::infinity();
+    pool.ended = [this](size_t part, const WorkerEnd& end) { Take(part, end); };
+    (void)pool.Run(jobs);
+    progress_.Clear();
+    if (failure_ == 0) return MergeParts(std::move(parts_));
+    MutationReport report;
+    report.exit_code = failure_;
+    return report;
+  }
+
+ private:
+  [[nodiscard]] fs::path Place(size_t part, const char* ending) const {
+    return folder_ / fmt::format("{}.{}", part, ending);
+  }
+
+  void Take(size_t part, const WorkerEnd& end) {
+    progress_.Show(fmt::format("{} workers", arguments_.jobs),
+                   static_cast<double>(++done_) / static_cast<double>(parts_.size()));
+    auto report = MutationReportOf(ReadAll(Place(part, "json")));
+    const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
+    if (good) parts_[part] = *std::move(report);
+    // All workers find the same in the files.
+    if (std::exchange(told_, true) && (good || failure_ > 0)) return;
+    progress_.Clear();
+    fmt::print(stderr, "{}", ReadAll(Place(part, "log")));
+    if (good) return;
+    if (end.signal != 0) fmt::print(stderr, "a worker was ended by signal {}\n", end.signal);
+    failure_ = std::max(failure_, end.exit_code > 0 ? end.exit_code : 3);
+  }
+
+  const MutateArguments& arguments_;
+  const fs::path folder_ = fs::temp_directory_path() / fmt::format("mbverify_mutate_{}", getpid());
+  ProgressLine progress_{true};
+  std::vector<MutationReport> parts_;
+  size_t done_ = 0;
+  int failure_ = 0;
+  bool told_ = false;
+};
 
 MutationReport RunHere(const MutateArguments& arguments, MutationOptions options) {
   ProgressLine progress(true);
@@ -156,7 +180,7 @@ int Mutate(MutateArguments arguments) {
     arguments.jobs = std::min(arguments.jobs, static_cast<int>(options->numbers.size()));
   }
   const bool shared = arguments.jobs > 1 && arguments.part.empty();
-  const MutationReport report = shared ? RunWorkers(arguments) : RunHere(arguments, *options);
+  const MutationReport report = shared ? Workers(arguments).Run() : RunHere(arguments, *options);
   fmt::print(stderr, "{}", report.diagnostics.Text());
   const bool nothing = report.mutations.empty() && report.faults.empty();
   if (report.exit_code > 1 || (nothing && arguments.part.empty())) return report.exit_code;

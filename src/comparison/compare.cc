@@ -6,8 +6,11 @@
 
 #include "comparison/comparison.h"
 #include "comparison/drive_motion.h"
+#include "comparison/force_scale.h"
+#include "comparison/reservations.h"
 #include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
+#include "mechanism/channels.h"
 
 namespace mbv {
 namespace {
@@ -59,7 +62,8 @@ void AddChecks(const ComparisonInput& input, const std::string& subject, LimitCo
                       .limit = input.limits[metric].Of(column),
                       .stated_limit = {},
                       .time_s = measured.time_s,
-                      .channel = measured.channel};
+                      .channel = measured.channel,
+                      .floored = measured.floored};
     const auto tube = tubes.find(metric);
     if (check.limit && tube != tubes.end() && tube->second > *check.limit) {
       check.stated_limit = check.limit;
@@ -130,12 +134,26 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
       note("simulated.command_velocity", "the rates of the commanded outputs are not recorded");
     }
   }
+  for (const WitnessMetrics& witness : comparison->witnesses) {
+    if (witness.derivatives_gap.empty()) continue;
+    note(witness.witness + ".derivatives", witness.derivatives_gap.c_str());
+  }
 }
 
+// Reaction components that statics leaves open, joint by joint: "hinge.reaction (fz, mx, my)".
 void AddReactionNotes(const ComparisonInput& input, Comparison* comparison) {
-  for (const std::string& joint : input.joints_not_unique) {
+  for (const Joint& joint : input.mechanism->joints) {
+    std::string components;
+    size_t count = 0;
+    for (const Channel& channel : ReactionChannels(joint)) {
+      const auto& open = input.reactions_not_unique;
+      if (std::find(open.begin(), open.end(), channel.name) == open.end()) continue;
+      components += (count++ == 0 ? "" : ", ") + channel.name.substr(channel.name.size() - 2);
+    }
+    if (count == 0) continue;
     comparison->not_compared.push_back(
-        {joint + ".reaction", "statics alone does not determine it (redundant constraints)"});
+        {joint.name + ".reaction" + (count == 6 ? "" : " (" + components + ")"),
+         "statics alone does not determine it (redundant constraints)"});
   }
 }
 
@@ -204,6 +222,9 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
     const PairComparison* pair = comparison->FindPair(name);
     if (pair == nullptr || pair->columns.empty()) continue;
     table.judged_against = pair->measured == "reference" ? pair->truth : pair->measured;
+    const CheckResult* tube = comparison->FindCheck(pair->name() + ".table_tube");
+    table.judged = tube != nullptr && tube->limit;
+    if (!table.judged) return;  // nothing to explain
     const Witness* other = FindWitness(input, table.judged_against);
     table.diagnoses = DiagnoseTable(input, *other->trace, pair->columns);
     return;
@@ -212,13 +233,15 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
 
 std::string CountText(const Comparison& comparison) {
   const size_t failed = comparison.failed(), followed = comparison.followed();
-  const size_t all = failed + comparison.verified() + followed;
+  const size_t blind = comparison.blind();
+  const size_t all = failed + comparison.verified() + followed + blind;
   if (failed > 0) return fmt::format("{} of {} checks exceed their limits", failed, all);
   std::string text = fmt::format("all {} checks are within their limits", all);
   if (followed > 0) {
     text += fmt::format(", but {} of them compare{} a drive motion with itself and verif{} nothing",
                         followed, followed == 1 ? "s" : "", followed == 1 ? "ies" : "y");
   }
+  if (blind > 0) text += fmt::format("; {} more verify nothing", blind);
   return text;
 }
 
@@ -236,16 +259,12 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     if (!comparison->pairs.empty()) comparison->reason += ": " + comparison->pairs.front().reason;
     return;
   }
-  const bool free = input.motion->free();
-  const auto judges = [&](const CheckResult& check) {
-    return check.limit && (free ? IsTrajectory(check.metric) : IsDriveForce(check.metric));
-  };
-  if (std::none_of(comparison->checks.begin(), comparison->checks.end(), judges)) {
-    comparison->reason = fmt::format("every {} check is switched off, so nothing was verified",
-                                     free ? "position and pose" : "force");
+  const std::string nothing = WhyNothingVerified(input, *comparison);
+  const size_t failed = comparison->failed();
+  if (failed == 0 && !nothing.empty()) {
+    comparison->reason = nothing;
     return;
   }
-  const size_t failed = comparison->failed();
   if (input.table != nullptr && failed == 0) {
     comparison->reason = WhyTableVerifiesNothing(*comparison);
     if (!comparison->reason.empty()) return;
@@ -289,7 +308,7 @@ size_t Comparison::failed() const {
 
 size_t Comparison::verified() const {
   return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
-    return c.limit && c.pass && !c.follows;
+    return c.limit && c.pass && !c.follows && c.blind.empty();
   }));
 }
 
@@ -299,7 +318,16 @@ size_t Comparison::followed() const {
   }));
 }
 
-Comparison Compare(const ComparisonInput& input) {
+size_t Comparison::blind() const {
+  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
+    return c.limit && c.pass && !c.follows && !c.blind.empty();
+  }));
+}
+
+Comparison Compare(const ComparisonInput& given) {
+  ComparisonInput input = given;
+  const DrivenTwists twists = TwistsFor(input);
+  if (input.twists == nullptr) input.twists = &twists;
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
   comparison.driving = DrivingText(input);
@@ -323,7 +351,9 @@ Comparison Compare(const ComparisonInput& input) {
   AddCommandNotes(input, &comparison);
   AddForceNotes(input, &comparison);
   if (input.table != nullptr) FinishTable(input, &comparison);
+  MarkBlind(input, &comparison);
   Judge(input, &comparison);
+  comparison.reservations = Reservations(input, comparison);
   comparison.attribution = Attribute(input, comparison);
   return comparison;
 }

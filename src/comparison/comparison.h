@@ -3,8 +3,9 @@
 // Compared are signals with the same channel name at common sample times. Angles are differenced
 // modulo 2π, orientations as log(RᵀR'). A check passes only if its value is a number at or below
 // its limit. The verdict starts as kNotRun and is kAgree only if drive forces of at least one pair
-// of witnesses were compared (trajectories, where freedoms move by given forces), no witness broke
-// down and every check passes.
+// of witnesses were compared (trajectories, where freedoms move by given forces) on enough samples
+// and within limits that can tell something, no witness broke down and every check passes. What
+// makes an agreement say less than it seems to is a reservation.
 #pragma once
 
 #include <map>
@@ -15,6 +16,7 @@
 #include "comparison/metrics.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
+#include "mechanism/driven_twists.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
@@ -40,8 +42,10 @@ struct ComparisonInput {
   double start_window_s = 0.0;     ///< force samples before it are left out (named in the scenario)
   std::vector<Witness> witnesses;  ///< in the order analytic, reference, simulated
   std::string driven_by;           ///< the witness whose kinematics the simulation follows
-  std::vector<std::string> joints_not_unique;  ///< reactions that statics leaves open
+  /// Channels of reactions that statics leaves open ("hinge.reaction.fz").
+  std::vector<std::string> reactions_not_unique;
   const AlignedTable* table = nullptr;  ///< what the witness "reference" is, if it is a table
+  const DrivenTwists* twists = nullptr;  ///< TwistsFor() this; found where needed if null
 };
 
 /// Judges where a free motion leads.
@@ -60,6 +64,7 @@ struct DriveMetrics {
   double max_error = kNan;  ///< [unit]
   double max_relative = kNan;
   double digits = kNan;           ///< matching digits, from the NRMSE
+  bool floored = false;           ///< NRMSE and digits relate to a floor above the RMS force
   double time_s = kNan;           ///< of the largest error
   double factor = kNan;           ///< k of the best fit measured = k · truth
   double factor_residual = kNan;  ///< RMS of measured − k · truth, over the RMS of the truth
@@ -95,9 +100,11 @@ struct PairComparison {
   std::string reason = "was not compared";  ///< why not, when not compared
   size_t samples = 0;                       ///< common samples
   size_t force_samples = 0;                 ///< of these, inside the judged window
+  double from_s = kNan, to_s = kNan;        ///< first and last sample that forces were judged at
+  bool forces_act = true;                   ///< some load, weight or motion asks for drive forces
   std::map<Metric, Measured> metrics;       ///< those that could be measured
   std::vector<DriveMetrics> drives;
-  std::vector<std::string> reactions;      ///< joints whose reactions were compared
+  std::vector<std::string> reactions;      ///< joints of which a reaction component was compared
   double digits = kNan;                    ///< matching digits of all forces
   std::vector<TableColumnResult> columns;  ///< where one of the two is a table
 
@@ -131,6 +138,7 @@ struct WitnessMetrics {
   std::string witness;
   std::map<Metric, Measured> metrics;
   std::optional<EnergyAudit> energy = {};
+  std::string derivatives_gap = {};  ///< why rates were not checked against positions; "" if so
 };
 
 struct CheckResult {
@@ -146,6 +154,8 @@ struct CheckResult {
   bool follows = false;
   double time_s = kNan;
   std::string channel;
+  bool floored = false;           ///< the value relates to a floor above the quantity itself
+  std::string blind = {};         ///< why passing verifies nothing; "" if it does
 };
 
 /// What the witnesses say about each other.
@@ -163,6 +173,7 @@ struct TableVerdict {
   std::vector<TableUncertainty> uncertainty;  ///< of columns
   double coverage = kNan;                     ///< k
   std::string judged_against;                 ///< witness of the results that are shown first
+  bool judged = false;                        ///< there columns must stay inside their tubes
   std::string too_coarse;                     ///< why it verifies nothing; "" if it does
   std::vector<std::string> diagnoses;         ///< what the differences look like
 };
@@ -175,6 +186,7 @@ struct Comparison {
   std::vector<WitnessMetrics> witnesses;  ///< those that ran
   std::vector<CheckResult> checks;        ///< off ones included
   std::vector<NotCompared> not_compared;
+  std::vector<std::string> reservations;  ///< why an agreement says less than it seems to
   Attribution attribution;
   std::optional<TableVerdict> table;
 
@@ -183,9 +195,10 @@ struct Comparison {
   [[nodiscard]] size_t failed() const;    ///< checks that have a limit and did not pass
   [[nodiscard]] size_t verified() const;  ///< checks that passed and verify something
   [[nodiscard]] size_t followed() const;  ///< checks that passed and compare a motion with itself
+  [[nodiscard]] size_t blind() const;     ///< other checks that passed and verify nothing
 };
 
-[[nodiscard]] Comparison Compare(const ComparisonInput& input);
+[[nodiscard]] Comparison Compare(const ComparisonInput& given);
 
 /// The parts of Compare(), for tests and for other uses (a second engine, history).
 [[nodiscard]] PairComparison ComparePair(const ComparisonInput& input, const Trace& measured,

@@ -10,8 +10,9 @@
 namespace mbv {
 namespace {
 
-// The energy scale is never below what the force scale does over this way [m].
-constexpr double kShortest_m = 1e-3;
+// The energy scale is never below what the force scale does over this share of the
+// characteristic length.
+constexpr double kShortest = 1e-3;
 // A part explains the drift if what is left of it, RMS, is below this share; two parts that do so
 // equally well (within the second factor) are both named.
 constexpr double kExplained = 0.3, kTie = 2.0;
@@ -123,6 +124,8 @@ std::optional<EnergyAudit> AuditEnergy(const ComparisonInput& input, const Trace
   EnergyAudit audit;
   audit.witness = trace.witness;
   audit.integrated = AddWorks(*input.mechanism, trace, &curves);
+  // Work from samples has their error: it is not judged, and nothing is to blame.
+  if (!audit.integrated) limit.reset();
   VecX drift = VecX::Zero(n), work = VecX::Zero(n);
   for (const Curve& curve : curves) {
     drift += curve.stored ? curve.values : VecX(-curve.values);
@@ -130,8 +133,9 @@ std::optional<EnergyAudit> AuditEnergy(const ComparisonInput& input, const Trace
     audit.parts.push_back(
         {curve.name, curve.stored, curve.values[n - 1], curve.values.cwiseAbs().maxCoeff()});
   }
+  const ForceScale force = ForceScaleOf(input, trace);
   audit.scale_J = std::max({kinetic->maxCoeff(), work.cwiseAbs().maxCoeff(),
-                            kShortest_m * ForceScaleOf(input, trace).force_N});
+                            kShortest * force.length_m * force.force_N});
   if (!drift.allFinite()) audit.scale_J = kNan;
   for (Eigen::Index i = 0; i < n; ++i) {
     const double value = std::abs(drift[i]) / audit.scale_J,

@@ -2,39 +2,56 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "mechanism/constraints.h"
 
 namespace mbv {
 namespace {
 
-double LargestLoad(const Motion& motion, const Trace& trace, double length_m) {
-  double largest = 0.0;
-  for (const double t_s : trace.time_s) {
-    for (const Load& load : motion.loads) {
-      Vec3 force, moment;
-      for (int c = 0; c < 3; ++c) {
-        force[c] = Evaluate(load.force[c], t_s).value;
-        moment[c] = Evaluate(load.moment[c], t_s).value;
-      }
-      largest = std::max({largest, force.norm(), moment.norm() / length_m});
-    }
-  }
-  return largest;
+// Of the centripetal acceleration: it mostly turns a force instead of making it larger.
+constexpr double kTurning = 1e-2;
+// Parts below this share of the largest are round-off.
+constexpr double kRoundoff = 1e-9;
+
+// RMS rates of a driven coordinate, and its largest velocity.
+struct Rates {
+  double velocity = 0.0, acceleration = 0.0, fastest = 0.0;
+};
+
+Rates DriveRates(const Drive& drive, const Trace& trace) {
+  Rates rates;
+  const auto rms = [&](const std::string& name, double* largest) {
+    const int column = trace.Find(name);
+    if (column < 0 || trace.values.rows() == 0) return 0.0;
+    const auto values = trace.values.col(column);
+    const double value = std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+    if (!std::isfinite(value)) return 0.0;
+    if (largest != nullptr) *largest = values.cwiseAbs().maxCoeff();
+    return value;
+  };
+  rates.velocity = rms(drive.name + ".velocity", &rates.fastest);
+  rates.acceleration = rms(drive.name + ".acceleration", nullptr);
+  return rates;
 }
 
-// RMS acceleration of the fastest drive, angles at the characteristic length.
-double LargestAcceleration(const Mechanism& mechanism, const Trace& trace, double length_m) {
-  double largest = 0.0;
-  for (const Drive& drive : mechanism.drives) {
-    const int column = trace.Find(drive.name + ".acceleration");
-    if (column < 0 || trace.values.rows() == 0) continue;
-    const double rms = std::sqrt(trace.values.col(column).squaredNorm() /
-                                 static_cast<double>(trace.values.rows()));
-    const double arm = PositionUnit(mechanism, drive) == "rad" ? length_m : 1.0;
-    if (std::isfinite(rms)) largest = std::max(largest, arm * rms);
+// No witness records them: from the commands.
+Rates PrescribedRates(const Motion& motion, int prescribed, const Trace& trace) {
+  Rates rates;
+  for (const Command& command : motion.commands) {
+    for (const Command::Term& term : command.terms) {
+      const Coordinate& c = term.coordinate;
+      if (c.kind != Coordinate::Kind::kPrescribed || c.index != prescribed) continue;
+      for (const double t_s : trace.time_s) {
+        const Jet jet = Evaluate(command.profile, t_s);
+        rates.velocity += jet.rate * jet.rate;
+        rates.acceleration += jet.acceleration * jet.acceleration;
+        rates.fastest = std::max(rates.fastest, std::abs(jet.rate));
+      }
+    }
   }
-  return largest;
+  const double n = std::max<double>(1.0, static_cast<double>(trace.time_s.size()));
+  return {std::sqrt(rates.velocity / n), std::sqrt(rates.acceleration / n), rates.fastest};
 }
 
 // From the energy: F = √(2 k E), at most.
@@ -49,21 +66,247 @@ double LargestSpringForce(const Mechanism& mechanism, const Trace& trace) {
   return energy > 0.0 ? std::sqrt(2.0 * stiffness * energy) : 0.0;
 }
 
+class Scales {
+ public:
+  Scales(const ComparisonInput& input, const Trace& trace, const DrivenTwists& twists)
+      : mechanism_(*input.mechanism), motion_(*input.motion), twists_(twists) {
+    scale_.length_m = CharacteristicLength(mechanism_);
+    X_WB_ = mechanism_.X_WB_home;
+    if (X_WB_.empty()) X_WB_.assign(mechanism_.bodies.size(), Pose::Identity());
+    for (const Drive& drive : mechanism_.drives) rates_.push_back(DriveRates(drive, trace));
+    for (size_t p = 0; p < mechanism_.prescribed.size(); ++p) {
+      rates_.push_back(PrescribedRates(motion_, static_cast<int>(p), trace));
+    }
+    spring_N_ = LargestSpringForce(mechanism_, trace);
+    TakeLoads(trace);
+    for (size_t b = 0; b < mechanism_.bodies.size(); ++b) bodies_.push_back(MotionOf(b));
+  }
+
+  ForceScale Find() {
+    scale_.driven.assign(rates_.size(), 0.0);
+    std::vector<size_t> heaviest(rates_.size(), 0);
+    for (size_t k = 0; k < rates_.size(); ++k) heaviest[k] = FindDriven(k);
+    FindCarries(heaviest);
+    FindForce();
+    if (!scale_.acts) TakeRound();
+    scale_.moved = twists_.moved;
+    for (const BodyMotion& body : bodies_) scale_.acceleration.push_back(body.acceleration);
+    return std::move(scale_);
+  }
+
+ private:
+  struct BodyMotion {
+    double inertial = 0.0;      // acceleration of the centre of mass
+    double acceleration = 0.0;  // the same or gravity
+    double turning = 0.0;       // angular acceleration
+    double speed = 0.0;         // largest
+  };
+  struct LargestLoad {
+    double force_N = 0.0, moment_Nm = 0.0;
+  };
+
+  [[nodiscard]] Vec3 VelocityOf(size_t k, size_t b, const Vec3& p_B) const {
+    const Vec6& V = twists_.V_WB[k][b];
+    return V.tail<3>() + V.head<3>().cross(X_WB_[b].linear() * p_B);
+  }
+  [[nodiscard]] Vec3 Centre(size_t k, size_t b) const {
+    return VelocityOf(k, b, mechanism_.bodies[b].p_BoBcm_B);
+  }
+
+  void TakeLoads(const Trace& trace) {
+    loads_.resize(motion_.loads.size());
+    for (size_t l = 0; l < loads_.size(); ++l) {
+      const Load& load = motion_.loads[l];
+      for (const double t_s : trace.time_s) {
+        Vec3 force, moment;
+        for (int c = 0; c < 3; ++c) {
+          force[c] = Evaluate(load.force[c], t_s).value;
+          moment[c] = Evaluate(load.moment[c], t_s).value;
+        }
+        loads_[l].force_N = std::max(loads_[l].force_N, force.norm());
+        loads_[l].moment_Nm = std::max(loads_[l].moment_Nm, moment.norm());
+      }
+    }
+  }
+
+  [[nodiscard]] BodyMotion MotionOf(size_t b) const {
+    BodyMotion motion;
+    for (size_t k = 0; k < rates_.size(); ++k) {
+      const double v = Centre(k, b).norm(), w = twists_.V_WB[k][b].head<3>().norm();
+      const Rates& rates = rates_[k];
+      motion.inertial = std::max({motion.inertial, v * rates.acceleration,
+                                  kTurning * w * v * rates.velocity * rates.velocity});
+      motion.turning = std::max(motion.turning, w * rates.acceleration);
+      motion.speed += v * rates.fastest;
+    }
+    motion.acceleration = std::max(motion.inertial, mechanism_.gravity_W.norm());
+    return motion;
+  }
+
+  // Scale of one driven coordinate; returns the body that weighs most on it.
+  size_t FindDriven(size_t k) {
+    size_t heaviest = 0;
+    double largest = 0.0;
+    for (size_t b = 1; b < bodies_.size(); ++b) {
+      const Body& body = mechanism_.bodies[b];
+      const Vec3 v = Centre(k, b);
+      const double w = twists_.V_WB[k][b].head<3>().norm();
+      const double work = std::max(body.mass * v.norm() * bodies_[b].acceleration,
+                                   w * body.I_Bcm_B.norm() * bodies_[b].turning);
+      if (work > largest) heaviest = b;
+      largest = std::max(largest, work);
+      const double weight = std::abs(mechanism_.gravity_W.dot(v));
+      const double all = mechanism_.gravity_W.norm() * v.norm();
+      acts_ = acts_ || (IsCompared(k) && body.mass > 0.0 && weight > kRoundoff * all);
+    }
+    const double pushed = std::max(LoadWork(k), SpringWork(k));
+    acts_ = acts_ || (IsCompared(k) && pushed > 0.0);
+    scale_.driven[k] = std::max(largest, pushed);
+    if (IsCompared(k)) {
+      double& of_unit = scale_.of_unit[ForceUnit(mechanism_, mechanism_.drives[k])];
+      of_unit = std::max(of_unit, scale_.driven[k]);
+    }
+    return heaviest;
+  }
+
+  [[nodiscard]] bool IsCompared(size_t k) const {
+    return k < mechanism_.drives.size() && motion_.FindForce(static_cast<int>(k)) < 0;
+  }
+
+  [[nodiscard]] double LoadWork(size_t k) const {
+    double largest = 0.0;
+    for (size_t l = 0; l < loads_.size(); ++l) {
+      const auto b = static_cast<size_t>(motion_.loads[l].body);
+      largest = std::max(
+          largest, loads_[l].force_N * VelocityOf(k, b, motion_.loads[l].p_BoQ_B).norm() +
+                       loads_[l].moment_Nm * twists_.V_WB[k][b].head<3>().norm());
+    }
+    return largest;
+  }
+
+  // Rate of the springs' lengths.
+  [[nodiscard]] double SpringWork(size_t k) const {
+    double largest = 0.0;
+    for (const SpringDamper& spring : mechanism_.springs) {
+      const auto from = static_cast<size_t>(spring.body_from);
+      const auto to = static_cast<size_t>(spring.body_to);
+      const Vec3 d = X_WB_[to] * spring.p_to - X_WB_[from] * spring.p_from;
+      const Vec3 rate = VelocityOf(k, to, spring.p_to) - VelocityOf(k, from, spring.p_from);
+      largest = std::max(largest, spring_N_ * std::abs(d.normalized().dot(rate)));
+    }
+    return largest;
+  }
+
+  void FindCarries(const std::vector<size_t>& heaviest) {
+    const size_t drives = mechanism_.drives.size();
+    scale_.carries.assign(drives, std::vector<bool>(drives, false));
+    for (size_t c = 0; c < drives; ++c) {
+      for (size_t d = 0; d < drives; ++d) {
+        double largest = 0.0;
+        for (size_t b = 1; b < bodies_.size(); ++b) largest = std::max(largest, Size(d, b));
+        scale_.carries[c][d] = c == d || Size(d, heaviest[c]) > kRoundoff * largest;
+      }
+    }
+  }
+  [[nodiscard]] double Size(size_t k, size_t b) const {
+    const Vec6& V = twists_.V_WB[k][b];
+    return V.tail<3>().norm() + scale_.length_m * V.head<3>().norm();
+  }
+
+  // Where nothing acts, forces are round-off, as of masses that go their own length in the time.
+  void TakeRound() {
+    const double acceleration = scale_.length_m / (motion_.duration_s * motion_.duration_s);
+    for (size_t k = 0; k < rates_.size(); ++k) {
+      for (size_t b = 1; b < bodies_.size(); ++b) {
+        const Body& body = mechanism_.bodies[b];
+        const double turning = twists_.V_WB[k][b].head<3>().norm() / scale_.length_m;
+        scale_.driven[k] =
+            std::max({scale_.driven[k], body.mass * acceleration * Centre(k, b).norm(),
+                      body.I_Bcm_B.norm() * acceleration * turning});
+      }
+      if (!IsCompared(k)) continue;
+      double& of_unit = scale_.of_unit[ForceUnit(mechanism_, mechanism_.drives[k])];
+      of_unit = std::max(of_unit, scale_.driven[k]);
+    }
+  }
+
+  void FindForce() {
+    const double still = kRoundoff / (motion_.duration_s * motion_.duration_s);
+    double fastest = 0.0;
+    for (size_t b = 1; b < bodies_.size(); ++b) {
+      if (!twists_.moved[b]) continue;
+      const Body& body = mechanism_.bodies[b];
+      scale_.force_N = std::max(scale_.force_N, body.mass * bodies_[b].acceleration);
+      acts_ = acts_ || (body.mass > 0.0 && bodies_[b].inertial > still * scale_.length_m) ||
+              (!body.I_Bcm_B.isZero(0.0) && bodies_[b].turning > still);
+      fastest = std::max(fastest, bodies_[b].speed);
+    }
+    for (size_t l = 0; l < loads_.size(); ++l) {
+      if (!twists_.moved[static_cast<size_t>(motion_.loads[l].body)]) continue;
+      scale_.force_N = std::max(
+          {scale_.force_N, loads_[l].force_N, loads_[l].moment_Nm / scale_.length_m});
+    }
+    scale_.force_N = std::max(scale_.force_N, spring_N_);
+    scale_.power_W = mechanism_.prescribed.empty() ? std::numeric_limits<double>::infinity()
+                                                   : scale_.force_N * fastest;
+    scale_.acts = acts_;
+  }
+
+  const Mechanism& mechanism_;
+  const Motion& motion_;
+  const DrivenTwists& twists_;
+  std::vector<Pose> X_WB_;
+  std::vector<Rates> rates_;         // drives, then prescribed joints
+  std::vector<LargestLoad> loads_;   // as motion_.loads
+  std::vector<BodyMotion> bodies_;
+  double spring_N_ = 0.0;
+  bool acts_ = false;
+  ForceScale scale_;
+};
+
 }  // namespace
 
+double ForceScale::Floor(const std::string& unit) const {
+  const auto found = of_unit.find(unit);
+  return found == of_unit.end() ? 0.0 : kIdle * found->second;
+}
+
+DrivenTwists TwistsFor(const ComparisonInput& input) {
+  std::vector<bool> held;
+  for (size_t d = 0; d < input.mechanism->drives.size(); ++d) {
+    held.push_back(input.motion->FindForce(static_cast<int>(d)) < 0);
+  }
+  return TwistsOfDriven(*input.mechanism, held);
+}
+
 ForceScale ForceScaleOf(const ComparisonInput& input, const Trace& trace) {
-  constexpr double kLeastAcceleration = 1.0;  // [m/s²]
-  const Mechanism& mechanism = *input.mechanism;
-  double heaviest_kg = 0.0;
-  for (const Body& body : mechanism.bodies) heaviest_kg = std::max(heaviest_kg, body.mass);
-  ForceScale scale;
-  scale.length_m = CharacteristicLength(mechanism);
-  const double acceleration = std::max({kLeastAcceleration, mechanism.gravity_W.norm(),
-                                        LargestAcceleration(mechanism, trace, scale.length_m)});
-  scale.force_N =
-      std::max({heaviest_kg * acceleration, LargestLoad(*input.motion, trace, scale.length_m),
-                LargestSpringForce(mechanism, trace)});
-  return scale;
+  if (input.twists != nullptr) return Scales(input, trace, *input.twists).Find();
+  const DrivenTwists twists = TwistsFor(input);
+  return Scales(input, trace, twists).Find();
+}
+
+RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit) {
+  constexpr double kOfGravity = 1e-4;
+  const double length_m = CharacteristicLength(*input.mechanism);
+  const double T = input.motion->duration_s;
+  const double size = position_unit == "rad" ? 1.0 : length_m;
+  return {ForceScale::kIdle * size / T,
+          std::max(ForceScale::kIdle * size / (T * T),
+                   kOfGravity * input.mechanism->gravity_W.norm() * size / length_m)};
+}
+
+RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit,
+                      const Trace& trace) {
+  const double length_m = CharacteristicLength(*input.mechanism);
+  RestFloor floor = RestFloorOf(input, position_unit);
+  for (const Drive& drive : input.mechanism->drives) {
+    const std::string unit = PositionUnit(*input.mechanism, drive);
+    const double size = unit == position_unit ? 1.0 : unit == "rad" ? length_m : 1.0 / length_m;
+    const Rates rates = DriveRates(drive, trace);
+    floor.velocity = std::max(floor.velocity, ForceScale::kIdle * size * rates.velocity);
+    floor.acceleration = std::max(floor.acceleration, ForceScale::kIdle * size * rates.acceleration);
+  }
+  return floor;
 }
 
 }  // namespace mbv

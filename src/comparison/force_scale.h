@@ -1,24 +1,53 @@
-// How small a force is that a mechanism does not notice.
+// How small a force, a power or a rate is that a mechanism does not notice.
 #pragma once
 
+#include <map>
+#include <string>
+#include <vector>
+
 #include "comparison/comparison.h"
+#include "mechanism/driven_twists.h"
 
 namespace mbv {
 
-/// The largest force that a run has anyway: the heaviest body's weight, the largest load, the
-/// heaviest body at the drives' RMS acceleration (angles at the characteristic length), the largest
-/// spring force; at least the heaviest body's mass at 1 m/s² [N].
+/// What a run has anyway, by virtual work at the home pose: while a driven coordinate moves alone
+/// by 1 m (or 1 rad) it does work on the bodies that it carries, against their weight, their inertia
+/// at the RMS accelerations of all driven coordinates, the loads on them and the springs between
+/// them; the largest of these works is its scale [N or N m]. What only prescribed joints carry, and
+/// what is fixed, does not count for drives.
 struct ForceScale {
-  double force_N = 0.0;
-  double length_m = 1.0;  ///< characteristic length of the mechanism: arm of the moments
+  double length_m = 1.0;            ///< characteristic length of the mechanism
+  double force_N = 0.0;             ///< largest such force on a body that drives can move
+  std::vector<double> driven;       ///< per drive, then per prescribed joint [N or N m]
+  std::map<std::string, double> of_unit;  ///< the largest of the compared drives by unit
+  /// Gravity, motion, a load or a spring acts in the direction of some compared drive.
+  bool acts = false;
+  std::vector<bool> moved;           ///< per body: drives can move it
+  std::vector<double> acceleration;  ///< per body: gravity or what the motion asks for [m/s²]
+  /// `force_N` at the fastest such body; infinite where no joint is prescribed [W].
+  double power_W = 0.0;
+  /// carries[c][d]: drive d moves the body that weighs most on drive c.
+  std::vector<std::vector<bool>> carries;
 
-  /// Relative errors of forces below 0.1 % of the scale are taken from there [N or N m]: forces
-  /// that cancel out leave round-off of this size, and its relative error says nothing.
-  [[nodiscard]] double Floor(const std::string& unit) const {
-    return kIdle * force_N * (unit == "N m" ? length_m : 1.0);
-  }
+  /// Relative errors of forces below 0.1 % of the scale are taken from there: forces that cancel
+  /// out leave round-off of this size, and its relative error says nothing.
+  [[nodiscard]] double Floor(const std::string& unit) const;
+  [[nodiscard]] double Floor(size_t coordinate) const { return kIdle * driven[coordinate]; }
   static constexpr double kIdle = 1e-3;
 };
 [[nodiscard]] ForceScale ForceScaleOf(const ComparisonInput& input, const Trace& trace);
+
+/// Twists of the motions that force scales need; drives with given forces are not held.
+[[nodiscard]] DrivenTwists TwistsFor(const ComparisonInput& input);
+
+/// Rates below which a coordinate counts as at rest: 0.1 % of the characteristic length (1 rad) in
+/// the motion's duration; for accelerations also 0.01 % of gravity.
+struct RestFloor {
+  double velocity = 0.0, acceleration = 0.0;
+};
+[[nodiscard]] RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit);
+/// At least 0.1 % of the RMS rates of the fastest drive in `trace`, too, whatever its unit.
+[[nodiscard]] RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit,
+                                    const Trace& trace);
 
 }  // namespace mbv

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/derivatives.h"
 #include "comparison/energy_audit.h"
 #include "comparison/force_scale.h"
 #include "mechanism/constraints.h"
@@ -10,10 +11,7 @@
 namespace mbv {
 namespace {
 
-// A mechanism at rest has no power; the scale of the balance is never taken below what the largest
-// drive force does at this speed [m/s or rad/s].
-constexpr double kSlowest = 1e-3;
-// The same for the derivative check, per second and per second².
+// Commanded rates below this, per second and per second², hold still.
 constexpr double kSlowestRate = 1e-3;
 // Share of the fastest motion below which a commanded rate counts as holding still.
 constexpr double kIdle = 1e-3;
@@ -179,23 +177,34 @@ std::optional<VecX> InputOf(const Mechanism& mechanism, const Trace& trace) {
 }
 
 // Where power flows within the mechanism and little comes in, the flow is the scale: what gravity
-// and springs exchange with the motion, and the kinetic energy per duration.
+// and springs exchange with the motion, and the kinetic energy per duration. A base that moves
+// bodies which no drive carries has power of its own, which must not hide what the drives do: flows
+// count up to what the carried bodies can take.
 double PowerScale(const ComparisonInput& input, const Trace& trace) {
-  double scale = kSlowest * ForceScaleOf(input, trace).Floor("N");
+  const ForceScale force = ForceScaleOf(input, trace);
   const auto largest = [&](const std::string& name) {
     const int column = trace.Find(name);
     return column < 0 ? 0.0 : trace.values.col(column).cwiseAbs().maxCoeff();
   };
+  double flow = 0.0;
   for (const char* name : {"power.input", "power.energy_rate", "power.base", "power.loads",
                            "power.dampers", "power.gravity", "power.springs"}) {
-    scale = std::max(scale, largest(name));
+    flow = std::max(flow, largest(name));
   }
   const double duration_s = trace.time_s.back() - trace.time_s.front();
-  if (duration_s > 0.0) scale = std::max(scale, largest("energy.kinetic") / duration_s);
+  if (duration_s > 0.0) flow = std::max(flow, largest("energy.kinetic") / duration_s);
+  // A mechanism at rest has no power: forces count at the speed of rest.
+  double scale = RestFloorOf(input, "m").velocity * ForceScale::kIdle * force.force_N;
+  double carried = force.power_W;
   for (const Drive& drive : input.mechanism->drives) {
-    scale = std::max(scale, kSlowest * largest(drive.name + ".force"));
+    const double rest = RestFloorOf(input, PositionUnit(*input.mechanism, drive)).velocity;
+    const int f = trace.Find(drive.name + ".force"), v = trace.Find(drive.name + ".velocity");
+    scale = std::max(scale, rest * largest(drive.name + ".force"));
+    if (f < 0 || v < 0) continue;
+    carried = std::max(
+        carried, trace.values.col(f).cwiseProduct(trace.values.col(v)).cwiseAbs().maxCoeff());
   }
-  return scale;
+  return std::max(scale, std::min(flow, carried));
 }
 
 void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
@@ -211,58 +220,6 @@ void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetri
       KeepWorst(&out->metrics[Metric::kPower], error == 0.0 ? 0.0 : error / scale, trace.time_s[i],
                 "power.input");
     }
-  }
-}
-
-// Central differences of orders 4 and 6 at row i of a column, spacing h.
-struct Differences {
-  double fourth, sixth;
-};
-Differences Differentiate(const MatX& values, Eigen::Index i, int column, double h) {
-  const auto step = [&](Eigen::Index k) { return values(i + k, column) - values(i - k, column); };
-  return {(8 * step(1) - step(2)) / (12 * h), (45 * step(1) - 9 * step(2) + step(3)) / (60 * h)};
-}
-
-// One column against the derivative of another. Where the formulas differ, the truncation error
-// of the sixth-order one is taken off: smooth motions lose nothing, and coarse grids and jumps of
-// the jerk do not count. A jump J of the jerk makes an error of up to 0.15 J h, while the formulas
-// differ by at least 0.0125 J h at the nearest sample: a factor of 12, within three samples.
-constexpr double kTruncation = 12.0;
-constexpr Eigen::Index kReach = 3;  // samples to either side that the formulas use
-
-void MeasureDerivative(const Trace& trace, int position, int rate, WitnessMetrics* out) {
-  const auto n = static_cast<Eigen::Index>(trace.time_s.size());
-  const double h = trace.time_s[1] - trace.time_s[0];
-  const double rms = std::sqrt(trace.values.col(rate).squaredNorm() / static_cast<double>(n));
-  const double scale = std::isnan(rms) ? kNan : std::max(rms, kSlowestRate);
-  std::vector<Differences> differences(trace.time_s.size());
-  for (Eigen::Index i = kReach; i + kReach < n; ++i) {
-    differences[static_cast<size_t>(i)] = Differentiate(trace.values, i, position, h);
-  }
-  for (Eigen::Index i = kReach; i + kReach < n; ++i) {
-    double truncation = 0.0;
-    for (Eigen::Index k = std::max(kReach, i - kReach); k <= std::min(n - 1 - kReach, i + kReach);
-         ++k) {
-      const auto [fourth, sixth] = differences[static_cast<size_t>(k)];
-      truncation = std::max(truncation, std::abs(sixth - fourth));
-    }
-    const double sixth = differences[static_cast<size_t>(i)].sixth;
-    const double error = std::abs(sixth - trace.values(i, rate)) - kTruncation * truncation;
-    const double value = error <= 0.0 ? 0.0 : error / scale;
-    KeepWorst(&out->metrics[Metric::kDerivatives], value, trace.time_s[static_cast<size_t>(i)],
-              trace.channels[static_cast<size_t>(rate)].name);
-  }
-}
-
-void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
-  if (trace.time_s.size() < 7) return;
-  for (const Drive& drive : input.mechanism->drives) {
-    const int position = trace.Find(drive.name + ".position");
-    const int velocity = trace.Find(drive.name + ".velocity");
-    const int acceleration = trace.Find(drive.name + ".acceleration");
-    if (position < 0 || velocity < 0 || acceleration < 0) continue;
-    MeasureDerivative(trace, position, velocity, out);
-    MeasureDerivative(trace, velocity, acceleration, out);
   }
 }
 

@@ -20,7 +20,17 @@ double LargerOrNan(double a, double b) { return std::isnan(a) || a > b ? a : b; 
 void KeepWorst(Measured* worst, double value, double time_s, const std::string& channel) {
   const bool first = worst->channel.empty() && std::isnan(worst->value);
   if (!first && (std::isnan(worst->value) || value <= worst->value)) return;
-  *worst = {value, time_s, channel};
+  worst->value = value;
+  worst->time_s = time_s;
+  worst->channel = channel;
+}
+
+void KeepWorst(Measured* worst, const Measured& measured) {
+  const double of_zero = std::isnan(worst->of_zero) ? measured.of_zero
+                                                    : std::max(worst->of_zero, measured.of_zero);
+  const bool first = worst->channel.empty() && std::isnan(worst->value);
+  if (first || (!std::isnan(worst->value) && !(measured.value <= worst->value))) *worst = measured;
+  worst->of_zero = of_zero;
 }
 
 CommonSamples AlignSamples(const Trace& a, const Trace& b) {
@@ -75,6 +85,22 @@ double ErrorSum::Nrmse(double floor) const {
 
 double ErrorSum::MaxRelative(double floor) const {
   return count_ == 0 ? kNan : Ratio(worst_.value, LargerOrNan(max_truth_, floor));
+}
+
+Measured ErrorSum::MeasuredNrmse(double floor) const {
+  return {.value = Nrmse(floor),
+          .time_s = worst_.time_s,
+          .channel = worst_.channel,
+          .floored = floor > rms_truth(),
+          .of_zero = Ratio(rms_truth(), LargerOrNan(rms_truth(), floor))};
+}
+
+Measured ErrorSum::MeasuredMax(double floor) const {
+  return {.value = MaxRelative(floor),
+          .time_s = worst_.time_s,
+          .channel = worst_.channel,
+          .floored = floor > max_truth_,
+          .of_zero = Ratio(max_truth_, LargerOrNan(max_truth_, floor))};
 }
 
 double MatchingDigits(double relative_error) {

@@ -15,10 +15,14 @@ struct Measured {
   double value = kNan;
   double time_s = kNan;
   std::string channel;
+  bool floored = false;   ///< relative to a floor that is larger than the quantity itself
+  double of_zero = kNan;  ///< value if zero had been measured everywhere: at most 1
 };
 
 /// Keeps the larger one; a NaN stays once it is in.
 void KeepWorst(Measured* worst, double value, double time_s, const std::string& channel);
+/// The same with floors; the largest `of_zero` of all is kept.
+void KeepWorst(Measured* worst, const Measured& measured);
 
 /// Rows (of a, of b) that share a sample time, to 1e-9 s. Nothing is interpolated.
 using CommonSamples = std::vector<std::pair<Eigen::Index, Eigen::Index>>;
@@ -46,6 +50,9 @@ class ErrorSum {
   [[nodiscard]] double Nrmse(double floor = 0.0) const;
   /// Largest error / max(largest truth, floor), same conventions.
   [[nodiscard]] double MaxRelative(double floor = 0.0) const;
+  /// Both with place, floor and value of zero.
+  [[nodiscard]] Measured MeasuredNrmse(double floor) const;
+  [[nodiscard]] Measured MeasuredMax(double floor) const;
 
  private:
   double sum_error2_ = 0.0, sum_truth2_ = 0.0, max_truth_ = 0.0;

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "comparison/force_scale.h"
 #include "mechanism/channels.h"
 
 namespace mbv {
@@ -14,11 +15,10 @@ namespace {
 
 // Signals without a limit on their largest difference get this multiple of the RMS one.
 constexpr double kPeakOverRms = 10.0;
-// As in the metrics: below these a signal counts as at rest.
-constexpr double kRateFloor = 1e-3;
 
 constexpr Metric kRmsMetrics[] = {Metric::kForceNrmse, Metric::kForceOwn, Metric::kVelocity,
-                                  Metric::kAcceleration, Metric::kReaction};
+                                  Metric::kAcceleration, Metric::kReaction,
+                                  Metric::kReactionOwn, Metric::kBaseForce};
 constexpr Metric kMaxMetrics[] = {Metric::kForceMax, Metric::kPositionM, Metric::kPositionRad,
                                   Metric::kPoseM, Metric::kPoseRad};
 
@@ -69,7 +69,7 @@ Trace Bent(const Trace& truth, const MatX& uncertainty) {
   return bent;
 }
 
-enum class Quantity { kForce, kPosition, kRate, kRate2, kPose, kReaction, kOther };
+enum class Quantity { kForce, kBase, kPosition, kRate, kRate2, kPose, kReaction, kOther };
 
 Quantity QuantityOf(const Mechanism& mechanism, const std::string& channel) {
   for (const Drive& drive : mechanism.drives) {
@@ -81,6 +81,9 @@ Quantity QuantityOf(const Mechanism& mechanism, const std::string& channel) {
     if (signal == "acceleration") return Quantity::kRate2;
   }
   if (channel.find(".reaction.") != std::string::npos) return Quantity::kReaction;
+  for (const Prescribed& base : mechanism.prescribed) {
+    if (channel == base.name + ".force") return Quantity::kBase;
+  }
   for (const Output& output : mechanism.outputs) {
     if (channel.starts_with(output.name + ".")) return Quantity::kPose;
   }
@@ -101,6 +104,8 @@ class StatedLimits {
     const bool angle = channel.unit == "rad";
     const Quantity quantity = QuantityOf(*input_.mechanism, channel.name);
     const Pooled pooled = Pool(quantity, channel.unit);
+    const RestFloor rest =
+        RestFloorOf(input_, channel.unit.starts_with("rad") ? "rad" : "m", shared_.table);
     switch (quantity) {
       case Quantity::kForce: {
         const auto rms = Limit(Metric::kForceNrmse), max = Limit(Metric::kForceMax);
@@ -112,11 +117,13 @@ class StatedLimits {
       case Quantity::kPose:
         return Absolute(angle ? Metric::kPoseRad : Metric::kPoseM);
       case Quantity::kRate:
-        return Relative(Metric::kVelocity, std::max(pooled.rms, kRateFloor));
+        return Relative(Metric::kVelocity, std::max(pooled.rms, rest.velocity));
       case Quantity::kRate2:
-        return Relative(Metric::kAcceleration, std::max(pooled.rms, kRateFloor));
+        return Relative(Metric::kAcceleration, std::max(pooled.rms, rest.acceleration));
       case Quantity::kReaction:
         return Relative(Metric::kReaction, pooled.rms);
+      case Quantity::kBase:
+        return Relative(Metric::kBaseForce, pooled.rms);
       case Quantity::kOther:
         return Relative(Metric::kForceNrmse, pooled.rms);
     }
@@ -165,8 +172,8 @@ class StatedLimits {
 };
 
 bool IsForceLike(Quantity quantity) {
-  return quantity == Quantity::kForce || quantity == Quantity::kReaction ||
-         quantity == Quantity::kOther;
+  return quantity == Quantity::kForce || quantity == Quantity::kBase ||
+         quantity == Quantity::kReaction || quantity == Quantity::kOther;
 }
 
 // Differences of one column; the start-up window is left out of forces.
@@ -199,9 +206,8 @@ TableColumnResult Measure(const ComparisonInput& input, const Shared& shared, Ei
 }
 
 bool IsNotUnique(const ComparisonInput& input, const std::string& channel) {
-  return std::any_of(
-      input.joints_not_unique.begin(), input.joints_not_unique.end(),
-      [&](const std::string& joint) { return channel.starts_with(joint + ".reaction."); });
+  const auto& open = input.reactions_not_unique;
+  return std::find(open.begin(), open.end(), channel) != open.end();
 }
 
 }  // namespace
@@ -277,25 +283,24 @@ Measured WorstOf(const std::vector<TableColumnResult>& columns) {
 std::string TooCoarse(const ComparisonInput& input, const std::map<Metric, double>& tubes,
                       const std::vector<TableColumnResult>& columns) {
   const AlignedTable& table = *input.table;
-  bool any_force = false, stated = false, all_coarse = true;
+  bool any_force = false, all_coarse = true;
   for (const TableColumnResult& column : columns) {
     const Quantity quantity = QuantityOf(*input.mechanism, column.channel);
     any_force = any_force || quantity == Quantity::kForce;
-    stated = stated || table.uncertainty[column.column].stated;
     all_coarse = all_coarse && table.coverage * column.standard > table.coarsest * column.rms;
   }
-  if (columns.empty() || stated) return "";
+  if (columns.empty()) return "";
   const auto force = tubes.find(Metric::kForceNrmse);
   const bool coarse_force = any_force && force != tubes.end() && !(force->second <= table.coarsest);
   if (coarse_force) {
     return fmt::format(
-        "the table {} is too coarse to verify anything: {:g} times its own "
+        "the table {} is too coarse to verify anything: {:g} times its own or stated "
         "uncertainty is {:.2g} % of the RMS force (at most {:g} %)",
         table.name, table.coverage, 100.0 * force->second, 100.0 * table.coarsest);
   }
   if (all_coarse && !any_force) {
     return fmt::format(
-        "the table {} is too coarse to verify anything: {:g} times its own "
+        "the table {} is too coarse to verify anything: {:g} times its own or stated "
         "uncertainty exceeds {:g} % of every column",
         table.name, table.coverage, 100.0 * table.coarsest);
   }

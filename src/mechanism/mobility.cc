@@ -1,6 +1,9 @@
 // Rank analysis of the scaled constraint Jacobian.
 #include "mechanism/mobility.h"
 
+#include <algorithm>
+#include <set>
+
 #include "core/demand.h"
 #include "mechanism/row_stack.h"
 
@@ -18,25 +21,64 @@ bool ActsOn(const MatX& self_stress, int first_row, int rows) {
          self_stress.middleRows(first_row, rows).cwiseAbs().maxCoeff() > kStressTolerance;
 }
 
-// Which forces a self-stress of the locked mechanism can change, isostatic rule applied.
+// The rows that transmit reactions (isostatic rule applied), then those of everything driven.
+struct ReactionStack {
+  RowStack stack;
+  std::vector<ConstraintRows> rows;  // per joint
+  std::vector<int> first_row;        // per joint, then of the first drive
+
+  ReactionStack(const Mechanism& mechanism, const BodyStates& states, double length)
+      : stack(mechanism.bodies.size(), length) {
+    for (const Joint& joint : mechanism.joints) {
+      first_row.push_back(stack.size());
+      rows.push_back(RowsOf(joint, states, true));
+      stack.Add(rows.back());
+    }
+    first_row.push_back(stack.size());
+  }
+};
+
+// The components of a joint's reaction that self-stresses can change. A row that is scaled by s acts
+// with s times its Jacobian.
+UndeterminedReaction OpenComponents(const Joint& joint, const ConstraintRows& rows,
+                                    const BodyStates& states, double length,
+                                    const MatX& self_stress, int first_row) {
+  static constexpr const char* kNames[] = {"fx", "fy", "fz", "mx", "my", "mz"};
+  const Mat3 R_FW = (states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
+  const Vec3 r_M = states.X_WB[joint.child].linear() * joint.X_CM.translation();
+  Vec6 most = Vec6::Zero();  // [f; m / L]
+  for (Eigen::Index k = 0; k < self_stress.cols(); ++k) {
+    Vec6 F = Vec6::Zero();  // [m about Co; f] on the child
+    for (int i = 0; i < rows.rows; ++i) {
+      const double scale = i < rows.translation_rows ? 1.0 : length;
+      F += self_stress(first_row + i, k) * scale * rows.J_child.row(i).transpose();
+    }
+    const Vec3 f = R_FW * F.tail<3>();
+    const Vec3 m = R_FW * (F.head<3>() - r_M.cross(F.tail<3>()));
+    most.head<3>() = most.head<3>().cwiseMax(f.cwiseAbs());
+    most.tail<3>() = most.tail<3>().cwiseMax(m.cwiseAbs() / length);
+  }
+  UndeterminedReaction reaction{joint.name, {}};
+  for (Eigen::Index c = 0; c < 6; ++c) {
+    if (most[c] > kStressTolerance) reaction.components.emplace_back(kNames[c]);
+  }
+  return reaction;
+}
+
+// Which forces a self-stress of the locked mechanism can change.
 void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, double length,
                          Mobility* mobility) {
-  RowStack stack(mechanism.bodies.size(), length);
-  std::vector<int> first_row;
-  for (const Joint& joint : mechanism.joints) {
-    first_row.push_back(stack.size());
-    stack.Add(RowsOf(joint, states, true));
-  }
-  first_row.push_back(stack.size());
-  mobility->isostatic_rule_sound =
-      FindRank(stack.Matrix(), NullSpaces::kNone).rank == mobility->constraint_rank;
-
-  stack.AddDriven(mechanism, states);
-  const MatX self_stress = FindRank(stack.Matrix(), NullSpaces::kSelfStress).self_stress;
+  ReactionStack reactions(mechanism, states, length);
+  mobility->isostatic_rule_sound = FindRank(reactions.stack.Matrix(), NullSpaces::kNone).rank ==
+                                   mobility->constraint_rank;
+  reactions.stack.AddDriven(mechanism, states);
+  const MatX self_stress = FindRank(reactions.stack.Matrix(), NullSpaces::kSelfStress).self_stress;
+  const std::vector<int>& first_row = reactions.first_row;
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
-    if (ActsOn(self_stress, first_row[j], first_row[j + 1] - first_row[j])) {
-      mobility->joints_not_unique.push_back(mechanism.joints[j].name);
-    }
+    if (!ActsOn(self_stress, first_row[j], first_row[j + 1] - first_row[j])) continue;
+    mobility->joints_not_unique.push_back(mechanism.joints[j].name);
+    mobility->reactions_not_unique.push_back(OpenComponents(
+        mechanism.joints[j], reactions.rows[j], states, length, self_stress, first_row[j]));
   }
   for (size_t d = 0; d < mechanism.drives.size(); ++d) {
     if (ActsOn(self_stress, first_row.back() + static_cast<int>(d), 1)) {
@@ -80,6 +122,33 @@ Mobility AnalyseMobility(const Mechanism& mechanism) {
   states.Resize(mechanism.bodies.size());
   states.X_WB = mechanism.X_WB_home;
   return AnalyseMobility(mechanism, states);
+}
+
+std::vector<std::string> ReactionsNotUnique(const Mechanism& mechanism,
+                                            const std::vector<std::vector<Pose>>& X_WB) {
+  constexpr size_t kPoses = 5;
+  std::set<std::string> open;
+  const auto add = [&](const Mobility& mobility) {
+    for (const UndeterminedReaction& reaction : mobility.reactions_not_unique) {
+      for (const std::string& component : reaction.components) {
+        open.insert(reaction.joint + ".reaction." + component);
+      }
+    }
+  };
+  add(AnalyseMobility(mechanism));
+  const size_t count = open.empty() ? 0 : std::min(kPoses, X_WB.size());
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  for (size_t k = 0; k < count; ++k) {
+    states.X_WB = X_WB[(2 * k + 1) * X_WB.size() / (2 * count)];
+    const auto finite = [](const Pose& X) { return X.matrix().allFinite(); };
+    if (states.X_WB.size() != mechanism.bodies.size() ||
+        !std::all_of(states.X_WB.begin(), states.X_WB.end(), finite)) {
+      continue;  // the simulation broke down before
+    }
+    add(AnalyseMobility(mechanism, states));
+  }
+  return {open.begin(), open.end()};
 }
 
 }  // namespace mbv

@@ -104,43 +104,6 @@ std::vector<StressGroup> GroupsOf(const Mechanism& mechanism, const Stresses& st
   return groups;
 }
 
-// Reaction components that some self-stress changes.
-std::vector<UndeterminedReaction> UndeterminedOf(const Mechanism& mechanism,
-                                                 const BodyStates& states,
-                                                 const Stresses& stresses) {
-  static constexpr const char* kNames[] = {"fx", "fy", "fz", "mx", "my", "mz"};
-  const double length = CharacteristicLength(mechanism);
-  std::vector<UndeterminedReaction> out;
-  for (const Owner& owner : stresses.owners) {
-    if (owner.kind != Owner::Kind::kJoint || stresses.self_stress.cols() == 0) continue;
-    const Joint& joint = mechanism.joints[owner.index];
-    const ConstraintRows rows = RowsOf(joint, states, true);
-    const Mat3 R_FW = (states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
-    const Vec3 p_BoMo_W = states.X_WB[joint.child].linear() * joint.X_CM.translation();
-    std::array<bool, 6> changed{};
-    for (int s = 0; s < stresses.self_stress.cols(); ++s) {
-      Vec3 m = Vec3::Zero(), f = Vec3::Zero();  // on the child, about its origin; lengths in L
-      for (int i = 0; i < owner.rows; ++i) {
-        const double scale = i < rows.translation_rows ? 1.0 / length : 1.0;
-        const double lambda = scale * stresses.self_stress(owner.first_row + i, s);
-        m += lambda * rows.J_child.row(i).head<3>().transpose();
-        f += lambda * rows.J_child.row(i).tail<3>().transpose();
-      }
-      const Vec3 f_F = length * (R_FW * f), m_F = R_FW * (m - p_BoMo_W.cross(f));
-      for (int c = 0; c < 3; ++c) {
-        changed[c] = changed[c] || std::abs(f_F[c]) > kStressTolerance;
-        changed[3 + c] = changed[3 + c] || std::abs(m_F[c]) > kStressTolerance;
-      }
-    }
-    UndeterminedReaction reaction{joint.name, {}};
-    for (int c = 0; c < 6; ++c) {
-      if (changed[c]) reaction.components.emplace_back(kNames[c]);
-    }
-    if (!reaction.components.empty()) out.push_back(reaction);
-  }
-  return out;
-}
-
 std::vector<std::string> FreeBodies(const Mechanism& mechanism, const BodyStates& states) {
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
@@ -212,9 +175,7 @@ MobilityReport ReportMobility(const Mechanism& mechanism, int poses) {
 
   report.loops = CountLoops(mechanism);
   report.redundant = GroupsOf(mechanism, FindStresses(mechanism, home, false));
-  const Stresses locked = FindStresses(mechanism, home, true);
-  report.undetermined = GroupsOf(mechanism, locked);
-  report.reactions = UndeterminedOf(mechanism, home, locked);
+  report.undetermined = GroupsOf(mechanism, FindStresses(mechanism, home, true));
   if (report.home.undriven > 0) report.free_bodies = FreeBodies(mechanism, home);
   return report;
 }

@@ -16,12 +16,6 @@ struct StressGroup {
   std::vector<std::string> joints, drives, prescribed;
 };
 
-/// A reaction with components that statics does not determine (isostatic rule applied).
-struct UndeterminedReaction {
-  std::string joint;
-  std::vector<std::string> components;  ///< of "fx" … "mz", in the joint frame F, about M's origin
-};
-
 /// A loop of the spanning tree: the joint that closes it and the tree joints around it.
 struct LoopCount {
   std::string closure;
@@ -39,7 +33,6 @@ struct MobilityReport {
   std::vector<LoopCount> loops;
   std::vector<StressGroup> redundant;  ///< of the true joints alone; counts add up to `redundant`
   std::vector<StressGroup> undetermined;  ///< isostatic rule applied, drives and base motion locked
-  std::vector<UndeterminedReaction> reactions;
   /// Bodies that can still move with drives and prescribed joints locked, at home.
   std::vector<std::string> free_bodies;
 

@@ -12,9 +12,9 @@ namespace mbv {
 
 /// What is known of errors of one sign.
 struct Direction {
-  double sign = 1.0;    ///< of the relative error
-  BentRun run;          ///< at the size asked for, then the largest that was not seen
-  bool ran = false;     ///< at the size asked for
+  double sign = 1.0;  ///< of the relative error
+  BentRun run;        ///< at the size asked for, then the largest that was not seen
+  bool ran = false;   ///< at the size asked for
   bool detected = false, by_force = false;  ///< the same; not running is noticed, too
   double force_change = kNan;               ///< the same
   double unseen = 0.0;                      ///< largest error known not to be seen

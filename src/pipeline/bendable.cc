@@ -43,7 +43,7 @@ bool Has(const std::vector<std::string>& keys, const std::string& word) {
 
 bool CanAct(const Literal& literal) {
   const std::vector<std::string> keys = KeysOf(literal.place);
-  static constexpr std::array kNoForce = {"shapes", "range", "guess",    "up",        "radius",
+  static constexpr std::array kNoForce = {"shapes", "range",    "guess",     "up",       "radius",
                                           "beams",  "sections", "materials", "instances"};
   if (std::any_of(kNoForce.begin(), kNoForce.end(),
                   [&](const char* key) { return Has(keys, key); })) {
@@ -73,8 +73,8 @@ std::string UnitOf(const Literal& literal) {
 std::string Bendable::Text(double error) const {
   const std::string percent = fmt::format("{:.3g} %", 100.0 * std::abs(error));
   if (value != 0.0) return percent + (error > 0.0 ? " too large" : " too small");
-  return fmt::format("{} of {:g}{}{} instead of 0", percent, error > 0.0 ? relative_to : -relative_to,
-                     unit.empty() ? "" : " ", unit);
+  return fmt::format("{} of {:g}{}{} instead of 0", percent,
+                     error > 0.0 ? relative_to : -relative_to, unit.empty() ? "" : " ", unit);
 }
 
 std::vector<Bendable> BendablesOf(const Mechanism& mechanism,
@@ -90,8 +90,8 @@ std::vector<Bendable> BendablesOf(const Mechanism& mechanism,
   }
   for (const Literal& literal : literals) {
     if (!CanAct(literal)) continue;
-    all.push_back({literal.place, UnitOf(literal), NumberKind::kLiteral, literal.value,
-                   literal.value});
+    all.push_back(
+        {literal.place, UnitOf(literal), NumberKind::kLiteral, literal.value, literal.value});
   }
   return all;
 }

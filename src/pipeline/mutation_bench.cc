@@ -67,7 +67,7 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
   if (!prepared || !CanBeBent(prepared->scenario, diagnostics)) return nullptr;
   std::unique_ptr<MutationBench> bench(new MutationBench(*std::move(prepared)));
-  bench->joints_not_unique_ = AnalyseMobility(bench->prepared_.base).joints_not_unique;
+  bench->reactions_not_unique_ = ReactionsNotUnique(bench->prepared_.base, {});
   bench->literals_ = LoadModel(bench->scenario().model_file, bench->SimulatedOptions()).literals;
   bench->RunTruths();
   bench->RunUnbent();
@@ -127,7 +127,7 @@ ComparisonInput MutationBench::Input() const {
                         .start_window_s = scenario().start_window_s,
                         .witnesses = {},
                         .driven_by = prepared_.driven_by,
-                        .joints_not_unique = joints_not_unique_,
+                        .reactions_not_unique = reactions_not_unique_,
                         .table = table_ ? &*table_ : nullptr};
   for (size_t k = 0; k < traces_.size(); ++k) {
     input.witnesses.push_back({summaries_[k].first, &traces_[k], summaries_[k].second});

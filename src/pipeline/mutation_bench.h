@@ -30,7 +30,7 @@ struct BentRun {
 
 /// One number of the model file, replaced.
 struct Replacement {
-  std::string name;      ///< of a parameter ("limb2.azimuth" of an instance's), or a literal's place
+  std::string name;  ///< of a parameter ("limb2.azimuth" of an instance's), or a literal's place
   bool literal = false;  ///< Literal, load_model.h
   double value = kNan;
 };
@@ -42,8 +42,8 @@ class MutationBench {
  public:
   /// Loads and runs the unbent scenario as it is, or with inverse dynamics per sample (round-off
   /// accuracy); its limits for that mode judge. The generic reference takes part only where no
-  /// closed form does. Null after bad input, or when the unbent scenario does not agree; `exit_code`
-  /// as of `run`.
+  /// closed form does. Null after bad input, or when the unbent scenario does not agree;
+  /// `exit_code` as of `run`.
   [[nodiscard]] static std::unique_ptr<MutationBench> Make(const std::string& file, BenchMode mode,
                                                            Diagnostics* diagnostics,
                                                            int* exit_code);
@@ -88,7 +88,7 @@ class MutationBench {
   std::optional<AlignedTable> table_;
   DrivenSamples driven_;  // at every time that the unbent run asks for; bent ones ask the same
   std::string truth_;
-  std::vector<std::string> joints_not_unique_;
+  std::vector<std::string> reactions_not_unique_;
   BentRun base_;
 };
 

@@ -244,7 +244,7 @@ class ScenarioRun {
     other_engine_ = std::move(witness.run);
   }
 
-  ComparisonInput MakeComparisonInput(const Mobility& mobility) const {
+  ComparisonInput MakeComparisonInput() const {
     ComparisonInput input{.mechanism = &base(),
                           .motion = &scenario().motion,
                           .limits = scenario().checks,
@@ -254,7 +254,9 @@ class ScenarioRun {
                           .start_window_s = scenario().start_window_s,
                           .witnesses = {},
                           .driven_by = report_.driven_by,
-                          .joints_not_unique = mobility.joints_not_unique,
+                          .reactions_not_unique = ReactionsNotUnique(
+                              base(), simulation_ ? simulation_->X_WB
+                                                  : std::vector<std::vector<Pose>>()),
                           .table = table_ ? &*table_ : nullptr};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
@@ -270,7 +272,7 @@ class ScenarioRun {
          SharedForceTexts(base(), report_.drives_not_unique, report_.simulated_not_unique)) {
       AddWarning(text);
     }
-    const ComparisonInput input = MakeComparisonInput(mobility);
+    const ComparisonInput input = MakeComparisonInput();
     report_.comparison = Compare(input);
     DoubtGravity();
     report_.sheets = SheetsOf(base(), report_.comparison);

@@ -215,15 +215,14 @@ std::vector<std::pair<std::string, std::string>> MapFiles(const StiffnessMap& ma
 
 std::string MapText(const StiffnessMap& map, const MapResult& result,
                     const std::vector<std::string>& names) {
-  std::string text =
-      fmt::format("map over {} and {}{}: {} of {} poses reached{}, by {}, {:.2f} s\n",
-                  ShortName(map.axes[0].name), ShortName(map.axes[1].name),
-                  map.fixed.empty() ? "" : " at " + FixedText(map), result.reached, result.points,
-                  result.out_of_range == 0
-                      ? ""
-                      : fmt::format(" ({} more only beyond ranges of joints or drives)",
-                                    result.out_of_range),
-                  result.closed_form ? "the closed form" : "frame elements", result.wall_s);
+  std::string text = fmt::format(
+      "map over {} and {}{}: {} of {} poses reached{}, by {}, {:.2f} s\n",
+      ShortName(map.axes[0].name), ShortName(map.axes[1].name),
+      map.fixed.empty() ? "" : " at " + FixedText(map), result.reached, result.points,
+      result.out_of_range == 0
+          ? ""
+          : fmt::format(" ({} more only beyond ranges of joints or drives)", result.out_of_range),
+      result.closed_form ? "the closed form" : "frame elements", result.wall_s);
   for (const std::string& name : Chosen(result, names)) {
     for (size_t i = 0; i < result.indices.size(); ++i) {
       if (result.indices[i].name != name) continue;

@@ -87,8 +87,9 @@ spr_tripod::PoseFilter JointFilter(const Mechanism& mechanism) {
   for (int k = 0; k < spr_tripod::kBodies; ++k) {
     const int leg = spr_tripod::LegOf(k);
     const std::string name =
-        leg < 0 ? "platform"
-                : fmt::format("leg{}.{}", leg + 1, k == spr_tripod::CylinderBody(leg) ? "cyl" : "rod");
+        leg < 0
+            ? "platform"
+            : fmt::format("leg{}.{}", leg + 1, k == spr_tripod::CylinderBody(leg) ? "cyl" : "rod");
     const int found = mechanism.FindBody(name);
     if (found < 0) return {};
     body[static_cast<size_t>(found)] = k;

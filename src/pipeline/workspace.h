@@ -15,7 +15,7 @@ struct WorkspaceOutcome {
   RunSummary summary;       ///< kUnsupported when the mechanism has no workspace computation
   Diagnostics diagnostics;  ///< parameters that do not suit it
   std::string text;         ///< findings for people
-  bool agree = true;        ///< false: two ways to the same measure differ by more than their errors
+  bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
 };
 

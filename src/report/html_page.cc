@@ -91,6 +91,10 @@ class PageWriter {
   void Verdict() {
     std::string html =
         "<p class=\"reason\">" + Escape(Sentence(report_.comparison.reason)) + "</p>\n";
+    for (const std::string& text : report_.comparison.reservations) {
+      html += "<p class=\"reason\"><span class=\"pill warn\">reservation</span> " +
+              Escape(Sentence(text)) + "</p>\n";
+    }
     const Attribution& attribution = report_.comparison.attribution;
     if (!attribution.text.empty()) {
       html += fmt::format("<p class=\"attribution{}\">{}</p>\n",
@@ -132,16 +136,20 @@ class PageWriter {
   std::string ForceCards(const PairComparison& pair) const {
     std::string html;
     const auto nrmse = pair.metrics.find(Metric::kForceNrmse);
+    const bool is_floored = nrmse != pair.metrics.end() && nrmse->second.floored;
+    const std::string floored = is_floored ? ", floored" : "";
     if (nrmse != pair.metrics.end()) {
       const CheckResult* check = report_.comparison.FindCheck(pair.name() + ".force_nrmse");
       html +=
           Card("Drive force error, RMS", fmt::format("{:.1e}", nrmse->second.value),
                pair.measured + " against " + pair.truth +
                    (check != nullptr && check->limit ? fmt::format(", limit {:.0e}", *check->limit)
-                                                     : ""));
+                                                     : "") +
+                   floored);
     }
     if (std::isfinite(pair.digits)) {
-      html += Card("Matching digits", fmt::format("{:.1f}", pair.digits), "of all drive forces");
+      html += Card("Matching digits", fmt::format("{:.1f}", pair.digits),
+                   "of all drive forces" + floored);
     }
     const auto worst = pair.metrics.find(Metric::kForceMax);
     if (worst != pair.metrics.end()) {

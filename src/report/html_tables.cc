@@ -46,18 +46,19 @@ std::string Margin(const CheckResult& check) {
 std::vector<Cell> CheckRow(const CheckResult& check) {
   const MetricRow& row = RowOf(check.metric);
   const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
-  const std::string pill = !check.limit    ? Pill("off", "off")
-                           : !check.pass   ? Pill("fail", "fail")
-                           : check.follows ? Pill("off", "held")
-                                           : Pill("ok", "ok");
+  const std::string pill = !check.limit           ? Pill("off", "off")
+                           : !check.pass          ? Pill("fail", "fail")
+                           : !check.blind.empty() ? Pill("warn", "verifies nothing")
+                           : check.follows        ? Pill("off", "held")
+                                                  : Pill("ok", "ok");
   std::string where = check.channel;
   if (!where.empty() && std::isfinite(check.time_s)) where += ", " + At(check.time_s);
   return {Text(Spaced(check.subject)),
           Text(row.title + unit),
           Digits(Number(check.value)),
           Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
-          Markup(pill),
-          Markup(Margin(check)),
+          Markup(pill + (check.floored ? " " + Pill("warn", "floored") : "")),
+          Markup(check.blind.empty() ? Margin(check) : ""),
           Text(where)};
 }
 
@@ -111,7 +112,10 @@ std::string DrivesHtml(const Report& report) {
       table.rows.push_back(
           {Text(drive.drive), Digits(fmt::format("{:.6g} {}", drive.rms_truth, drive.unit)),
            Digits(Number(drive.nrmse)), Digits(Number(drive.max_error) + " " + drive.unit),
-           Digits(At(drive.time_s)), Digits(Number(drive.digits, "{:.1f}"))});
+           Digits(At(drive.time_s)),
+           Cell{Number(drive.digits, "{:.1f}") +
+                    (drive.floored ? " " + Pill("warn", "floored") : ""),
+                true, true}});
     }
     const bool first = &pair == main;
     html += first ? ToHtml(table)

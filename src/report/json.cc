@@ -20,6 +20,8 @@ Json ChecksJson(const Comparison& comparison) {
                       {"time_s", Number(check.time_s)},
                       {"channel", check.channel}});
     if (check.stated_limit) checks.back()["stated_limit"] = *check.stated_limit;
+    if (check.floored) checks.back()["floored"] = true;
+    if (!check.blind.empty()) checks.back()["verifies_nothing"] = check.blind;
   }
   return checks;
 }
@@ -95,6 +97,7 @@ Json DrivesJson(const PairComparison& pair) {
                       {"max_error", Number(drive.max_error)},
                       {"max_rel", Number(drive.max_relative)},
                       {"matching_digits", Number(drive.digits)},
+                      {"floored", drive.floored},
                       {"time_s", Number(drive.time_s)}});
   }
   return drives;
@@ -117,6 +120,8 @@ Json MetricsJson(const Comparison& comparison) {
       if (witness.witness == pair.measured) AddMetrics(witness.metrics, &json);
     }
     json["matching_digits"] = Number(pair.digits);
+    const auto nrmse = pair.metrics.find(Metric::kForceNrmse);
+    json["floored"] = nrmse != pair.metrics.end() && nrmse->second.floored;
     json["samples"] = pair.samples;
     json["force_samples"] = pair.force_samples;
     const auto force = pair.metrics.find(Metric::kForceMax);
@@ -222,6 +227,7 @@ Json CountsJson(const Report& report) {
           {"checks", limits},
           {"checks_verified", report.comparison.verified()},
           {"checks_of_a_motion_with_itself", report.comparison.followed()},
+          {"checks_blind", report.comparison.blind()},
           {"checks_off", report.comparison.checks.size() - limits}};
 }
 
@@ -252,6 +258,7 @@ std::string ToJson(const Report& report) {
                {"verdict", ToText(report.comparison.verdict)},
                {"reason", report.comparison.reason},
                {"exit_code", report.exit_code},
+               {"reservations", report.comparison.reservations},
                {"attribution",
                 {{"odd_one_out", report.comparison.attribution.odd_one_out},
                  {"text", report.comparison.attribution.text}}},

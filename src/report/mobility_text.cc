@@ -117,10 +117,10 @@ std::string ForcesText(const Mechanism& mechanism, const MobilityReport& report)
   std::string text =
       drives.empty() ? "  drive forces: all determined by statics\n"
                      : "  drive forces: not determined by statics alone: " + Joined(drives) + "\n";
-  if (report.reactions.empty()) return text + "  joint reactions: all determined by statics\n";
+  if (report.home.reactions_not_unique.empty()) return text + "  joint reactions: all determined by statics\n";
   text += fmt::format("  joint reactions: {} of {} joints not determined by statics alone\n",
-                      report.reactions.size(), mechanism.joints.size());
-  for (const UndeterminedReaction& reaction : report.reactions) {
+                      report.home.reactions_not_unique.size(), mechanism.joints.size());
+  for (const UndeterminedReaction& reaction : report.home.reactions_not_unique) {
     text += fmt::format("    {}: {}\n", reaction.joint, Joined(reaction.components, " "));
   }
   text += "  because\n";
@@ -195,7 +195,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
   json["redundant_constraints"] = GroupsJson(report.redundant);
   json["undetermined_forces"] = GroupsJson(report.undetermined);
   json["undetermined_reactions"] = Json::array();
-  for (const UndeterminedReaction& reaction : report.reactions) {
+  for (const UndeterminedReaction& reaction : report.home.reactions_not_unique) {
     json["undetermined_reactions"].push_back(
         {{"joint", reaction.joint}, {"components", reaction.components}});
   }

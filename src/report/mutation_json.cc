@@ -159,7 +159,7 @@ FaultResult FaultResultOf(const Json& json) {
 // Item k of part i is item k·n + i of all.
 template <typename T>
 std::vector<T> Interleave(std::vector<MutationReport>* parts,
-                          std::vector<T> MutationReport::* items) {
+                          std::vector<T> MutationReport::*items) {
   std::vector<T> all;
   bool any = true;
   for (size_t k = 0; any; ++k) {

@@ -61,8 +61,8 @@ std::string Row(const Mutation& m, bool inverse, bool markdown) {
   const std::string by_inverse = Cell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
   if (markdown) {
     return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {}{} |\n", m.name, m.value, m.unit,
-                       SeenText(m.own), change, smallest,
-                       inverse ? by_inverse + " | " : "", InCell(NoteOf(m)));
+                       SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",
+                       InCell(NoteOf(m)));
   }
   return fmt::format("  {:<22}{:>12g} {:<7}{:<14}{:>9}  {:>8}  {}{}\n", m.name, m.value, m.unit,
                      SeenText(m.own), change, smallest,
@@ -113,9 +113,8 @@ std::string Head(const MutationReport& report, bool inverse) {
       report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
       report.mode, by_force);
   if (inverse) {
-    text += fmt::format("; {} do in inverse mode", count([](const Mutation& m) {
-                          return m.inverse && m.inverse->detected;
-                        }));
+    text += fmt::format("; {} do in inverse mode",
+                        count([](const Mutation& m) { return m.inverse && m.inverse->detected; }));
   }
   if (!report.faults.empty()) {
     size_t applicable = 0, detected = 0;

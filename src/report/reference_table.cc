@@ -60,8 +60,9 @@ std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
          Digits(Number(column->error_rms)), Digits(Number(column->tube_rms)),
          Digits(Number(column->error_max)), Digits(Number(column->tube_max)),
          Digits(Number(column->time_s, "{:.4g} s")),
-         Markup(fmt::format("<span class=\"pill {}\">{}</span>", inside ? "ok" : "fail",
-                            inside ? "inside" : "outside"))});
+         Markup(fmt::format("<span class=\"pill {}\">{}</span>",
+                            inside ? "ok" : table.judged ? "fail" : "off",
+                            inside ? "inside" : table.judged ? "outside" : "not judged"))});
   }
   return ToHtml(html);
 }
@@ -166,7 +167,7 @@ std::vector<std::string> ReferenceTableLines(const Comparison& comparison, bool 
           column->channel, width, column->rms, SourceOf(table, *column).channel.unit,
           column->standard, column->error_rms, Number(column->tube_rms, "{:.1e}"),
           column->error_max, Number(column->tube_max, "{:.1e}"),
-          column->inside() ? "inside" : "OUTSIDE"));
+          column->inside() ? "inside" : table.judged ? "OUTSIDE" : "not judged"));
       const std::string parts = UncertaintyText(table.uncertainty[column->column]);
       if (verbose && !parts.empty()) lines.push_back("      uncertainty: " + parts);
     }

@@ -60,6 +60,9 @@ class Writer {
                        report.start_window_s));
     }
     Line("  " + report.comparison.reason);
+    for (const std::string& text : report.comparison.reservations) {
+      Line("  " + Painted("reservation", Paint::kDoubt) + ": " + text);
+    }
     const Attribution& attribution = report.comparison.attribution;
     if (!attribution.text.empty()) Line("  " + attribution.text);
     for (const Finding& finding : report.findings.findings()) Line("  " + ToText(finding));
@@ -89,7 +92,7 @@ class Writer {
     Line("  " + TitleOf(checks.front().subject));
     size_t folded = 0;
     for (const CheckResult& check : checks) {
-      if (!options_.verbose && check.limit && check.pass && !IsKey(check)) {
+      if (!options_.verbose && check.limit && check.pass && check.blind.empty() && !IsKey(check)) {
         ++folded;
       } else {
         Line(CheckLine(check));
@@ -125,6 +128,8 @@ class Writer {
       case Metric::kVelocity:
       case Metric::kAcceleration:
       case Metric::kReaction:
+      case Metric::kReactionOwn:
+      case Metric::kBaseForce:
       case Metric::kClosureRad:
       case Metric::kDerivatives:
         return false;
@@ -143,13 +148,16 @@ class Writer {
     const MetricRow& row = RowOf(check.metric);
     const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
     const std::string limit = check.limit ? fmt::format("{:.1e}", *check.limit) : "off";
-    const std::string word = !check.limit    ? Painted("-   ", Paint::kFaint)
-                             : !check.pass   ? Painted("FAIL", Paint::kBad)
-                             : check.follows ? Painted("held", Paint::kFaint)
-                                             : Painted("ok  ", Paint::kGood);
+    const std::string word = !check.limit           ? Painted("-   ", Paint::kFaint)
+                             : !check.pass          ? Painted("FAIL", Paint::kBad)
+                             : !check.blind.empty() ? Painted("void", Paint::kDoubt)
+                             : check.follows        ? Painted("held", Paint::kFaint)
+                                                    : Painted("ok  ", Paint::kGood);
     std::string line =
         fmt::format("    {:<26}{:>12.2e}{:>11}   {}  ", row.title + unit, check.value, limit, word);
     if (!check.channel.empty()) line += fmt::format("{}, {:.4g} s", check.channel, check.time_s);
+    if (check.floored) line += " (floored)";
+    if (!check.blind.empty()) line += " (" + check.blind + ")";
     if (check.stated_limit) {
       line +=
           fmt::format(" (limit by the table's uncertainty, stated {:.1e})", *check.stated_limit);
@@ -166,6 +174,7 @@ class Writer {
 
   void Drives(const PairComparison& pair) {
     if (pair.drives.empty()) return;
+    bool floored = false;
     size_t width = 12;
     for (const DriveMetrics& drive : pair.drives) width = std::max(width, drive.drive.size());
     Line();
@@ -174,11 +183,18 @@ class Writer {
                     std::max(width, size_t{33}), "RMS force", "NRMSE", "max error", "at", "digits"),
         Paint::kFaint));
     for (const DriveMetrics& drive : pair.drives) {
+      floored = floored || drive.floored;
       Line(fmt::format("  {:<{}}{:>16}{:>12.2e}{:>16}{:>10}{:>9.1f}", drive.drive,
                        std::max(width, size_t{33}),
                        fmt::format("{:.6g} {}", drive.rms_truth, drive.unit), drive.nrmse,
                        fmt::format("{:.2e} {}", drive.max_error, drive.unit),
-                       fmt::format("{:.4g} s", drive.time_s), drive.digits));
+                       fmt::format("{:.4g} s", drive.time_s), drive.digits) +
+           (drive.floored ? "  floored" : ""));
+    }
+    if (floored) {
+      Line(Painted("  floored: relative to 0.1 % of what the drive carries, which is more than its "
+                   "own force",
+                   Paint::kFaint));
     }
   }
 
@@ -280,7 +296,9 @@ std::string VerdictLine(const Report& report, const TableOptions& options) {
     line += fmt::format("  {} vs {} {:.1e}", pair->measured, pair->truth, check->value);
     if (check->limit) line += fmt::format(" (limit {:.1e})", *check->limit);
   }
+  if (check != nullptr && check->floored) line += " floored";
   if (report.comparison.verdict != Verdict::kAgree) line += "  " + report.comparison.reason;
+  for (const std::string& text : report.comparison.reservations) line += "; reservation: " + text;
   return line + "\n";
 }
 

@@ -20,8 +20,8 @@ namespace mbv {
 enum class Metric {
   kForceNrmse,    ///< pair: RMS error of all drive forces of one unit / RMS force
   kForceMax,      ///< pair: largest error / largest force, drives of one unit
-  kForceOwn,      ///< pair: worst drive's RMS error / its own RMS force (at least 0.1 % of the
-                  ///< RMS force of all drives of its unit)
+  kForceOwn,      ///< pair: worst drive's RMS error / its own RMS force (at least 0.1 % of what
+                  ///< it carries, and of drives that carry the same)
   kPositionM,     ///< pair: drive positions [m]
   kPositionRad,   ///< pair: drive positions [rad]
   kVelocity,      ///< pair: drive velocities, RMS error / RMS
@@ -29,6 +29,8 @@ enum class Metric {
   kPoseM,         ///< pair: outputs, distance of origins [m]
   kPoseRad,       ///< pair: outputs, angle of the relative rotation [rad]
   kReaction,      ///< pair: unique joint reactions, RMS error / RMS
+  kReactionOwn,   ///< pair: worst joint's RMS error / its own RMS reaction
+  kBaseForce,     ///< pair: worst prescribed joint's RMS error / its own RMS force
   kCommandM,      ///< commanded lengths against what the witness did [m]
   kCommandRad,    ///< commanded angles against what the witness did [rad]
   kCommandVelocity,      ///< commanded outputs' rates against what the witness did, RMS error / RMS
@@ -40,7 +42,7 @@ enum class Metric {
   kEnergy,        ///< |energy − start − work| / energy turned over, where work is integrated
   kTableTube,     ///< pair with a table: worst column's difference / its tolerance tube
 };
-inline constexpr int kMetrics = 20;
+inline constexpr int kMetrics = 22;
 
 /// Which column of limits applies.
 enum class LimitColumn { kForward, kInverse, kReference };
@@ -74,6 +76,10 @@ struct MetricRow {
   return metric == Metric::kPositionM || metric == Metric::kPositionRad ||
          metric == Metric::kVelocity || metric == Metric::kAcceleration;
 }
+
+/// A relative limit above this verifies nothing; lengths and angles likewise, relative to the size
+/// of the mechanism and to 1 rad.
+inline constexpr double kCoarsestLimit = 0.1;
 
 [[nodiscard]] std::span<const MetricRow> MetricRows();
 [[nodiscard]] const MetricRow& RowOf(Metric metric);

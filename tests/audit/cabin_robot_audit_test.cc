@@ -46,7 +46,8 @@ TEST(CabinAudit, BentLengthsLeaveEquationsUnconfirmed) {
     return equations;
   };
   const auto first = unconfirmed(&Lengths::L1);
-  for (const char* row : {"(1) α, ε", "(1) AF", "(3), (4)", "(9) α, β1, β2, γ", "(14)", "(35), (36)"}) {
+  for (const char* row :
+       {"(1) α, ε", "(1) AF", "(3), (4)", "(9) α, β1, β2, γ", "(14)", "(35), (36)"}) {
     EXPECT_TRUE(first.contains(row)) << row;
   }
   const auto second = unconfirmed(&Lengths::L2);

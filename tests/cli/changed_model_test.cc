@@ -22,7 +22,7 @@ struct Paper {
 constexpr Paper kPapers[] = {{"stabilizing_platform", "static", "L1"},
                              {"spr_tripod", "default", "b"},
                              {"cabin_robot", "static", "L1"},
-                             {"scara_robot", "default", "l_1"}};
+                             {"scara_robot", "default", "l1"}};
 
 class ChangedModelTest : public testing::TestWithParam<Paper> {
  protected:

@@ -24,6 +24,13 @@ bool Fails(const Comparison& comparison, const std::string& check) {
   return found != nullptr && found->limit && !found->pass;
 }
 
+bool IsLeftOut(const Comparison& comparison, const std::string& what) {
+  for (const NotCompared& item : comparison.not_compared) {
+    if (item.what == what) return true;
+  }
+  return false;
+}
+
 TEST(Comparison, StartsPessimistic) {
   const Comparison comparison;
   EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
@@ -34,8 +41,9 @@ TEST(Comparison, EqualWitnessesAgreeInEveryCheck) {
   const Comparison comparison = Case().Run();
   EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
   EXPECT_EQ(comparison.failed(), 0u);
-  // Per pair: three force, one position, velocity, acceleration, two pose, reaction.
-  EXPECT_EQ(comparison.checks.size(), 3u * 9u + 2u * 5u + 4u);
+  // Per pair: three force, one position, velocity, acceleration, two pose, two reaction.
+  EXPECT_EQ(comparison.checks.size(), 3u * 10u + 2u * 5u + 4u);
+  EXPECT_TRUE(comparison.reservations.empty()) << comparison.reservations.front();
   EXPECT_TRUE(comparison.attribution.odd_one_out.empty());
 }
 
@@ -227,7 +235,10 @@ TEST(Comparison, TheForceScaleIsTheLargestOfWeightLoadAndInertia) {
   EXPECT_NEAR(ForceScaleOf(c.Input(), still).force_N, 5000.0, 1e-9);
   c.motion.loads.clear();
   c.mechanism.gravity_W.setZero();
-  EXPECT_NEAR(ForceScaleOf(c.Input(), still).force_N, 50.0 * 1.0, 1e-9);  // at 1 m/s²
+  const ForceScale nothing = ForceScaleOf(c.Input(), still);
+  EXPECT_EQ(nothing.force_N, 0.0);
+  EXPECT_FALSE(nothing.acts);
+  EXPECT_NEAR(nothing.driven[0], 50.0 * 1.0, 1e-9);  // 1 m in the 1 s of the motion
 }
 
 TEST(Comparison, OnlyCommonSampleTimesAreCompared) {
@@ -324,15 +335,23 @@ TEST(Comparison, ReactionsThatStaticsLeavesOpenAreNotJudged) {
   Case c;
   Bend(&c.simulated, "slide1.reaction.fx", 5.0);
   EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
-  c.joints_not_unique = {"slide1"};
+  for (const char* component : {"fx", "fy", "fz", "mx", "my", "mz"}) {
+    c.reactions_not_unique.push_back(std::string("slide1.reaction.") + component);
+  }
   const Comparison comparison = c.Run();
   EXPECT_EQ(comparison.verdict, Verdict::kAgree);
   EXPECT_EQ(comparison.FindCheck("simulated_vs_analytic.reaction_nrmse"), nullptr);
-  bool named = false;
-  for (const NotCompared& item : comparison.not_compared) {
-    named = named || item.what == "slide1.reaction";
-  }
-  EXPECT_TRUE(named);
+  EXPECT_TRUE(IsLeftOut(comparison, "slide1.reaction"));
+}
+
+TEST(Comparison, TheOtherComponentsOfAReactionThatIsPartlyOpenAreJudged) {
+  Case c;
+  c.reactions_not_unique = {"slide1.reaction.fz", "slide1.reaction.my"};
+  Bend(&c.simulated, "slide1.reaction.my", 5.0);
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
+  EXPECT_TRUE(IsLeftOut(c.Run(), "slide1.reaction (fz, my)"));
+  Bend(&c.simulated, "slide1.reaction.fx", 2e-8 * 10.5 * 1.8);
+  EXPECT_TRUE(Fails(c.Run(), "simulated_vs_analytic.reaction_nrmse"));
 }
 
 TEST(Comparison, LimitsOfTheForwardModeApplyToTheSimulationOnly) {

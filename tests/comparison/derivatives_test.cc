@@ -42,5 +42,85 @@ TEST(Derivatives, WrongAccelerationsAreStillSeenBetweenTheJumps) {
   EXPECT_GT(WorstRate(0.05037, 2 * limit), limit);
 }
 
+// d1 follows a sine with so many samples per period, d2 stands still but for what its acceleration
+// claims.
+struct Fast {
+  Mechanism mechanism = synthetic::TwoSliders();
+  Motion motion;
+  Trace trace;
+
+  explicit Fast(double samples, double claimed = 0.0, double amplitude = 0.1) {
+    motion.duration_s = 0.4;
+    motion.sample_s = 0.01;
+    const Profile sine{{SineTerm{amplitude, 1.0 / (samples * motion.sample_s), 0.4}}};
+    motion.commands = {{"d1", {{{Coordinate::Kind::kDrive, 0, 0}, 1.0}}, sine}};
+    trace.witness = "analytic";
+    trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), DriveChannels(mechanism));
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      const Jet jet = Evaluate(sine, trace.time_s[i]);
+      trace.values.row(static_cast<Eigen::Index>(i)) << jet.value, jet.rate, jet.acceleration, 0.0,
+          0.7, 0.0, claimed, 0.0;
+    }
+  }
+  [[nodiscard]] WitnessMetrics Measure() const {
+    ComparisonInput input;
+    input.mechanism = &mechanism;
+    input.motion = &motion;
+    return MeasureWitness(input, trace);
+  }
+  [[nodiscard]] double Worst() const {
+    const WitnessMetrics metrics = Measure();
+    const auto found = metrics.metrics.find(Metric::kDerivatives);
+    return found == metrics.metrics.end() ? 0.0 : found->second.value;
+  }
+};
+
+TEST(Derivatives, SamplesThatDoNotResolveAFastMotionAreNotJudgedAndSaySo) {
+  const double limit = *RowOf(Metric::kDerivatives).limits.reference;
+  for (const double samples : {1.0, 1.3, 2.0, 2.2, 2.5, 3.0, 4.0, 5.0}) {
+    const Fast fast(samples);
+    EXPECT_LT(fast.Worst(), limit) << samples;
+    EXPECT_FALSE(fast.Measure().derivatives_gap.empty()) << samples;
+  }
+  EXPECT_TRUE(Fast(10.0).Measure().derivatives_gap.empty());
+  EXPECT_LT(Fast(10.0).Worst(), limit);
+  Fast wrong(10.0);
+  synthetic::Stretch(&wrong.trace, "d1.acceleration", 1.2);
+  EXPECT_GT(wrong.Worst(), limit);
+}
+
+TEST(Derivatives, ADriveHeldStillIsMeasuredByTheOnesThatMove) {
+  const double limit = *RowOf(Metric::kDerivatives).limits.reference;
+  // 70 m/s² RMS beside it: the floor is 7 cm/s².
+  const double amplitude = 100.0 * std::pow(0.2 / (2.0 * std::numbers::pi), 2);
+  EXPECT_LT(Fast(20.0, 5e-7, amplitude).Worst(), limit);
+  EXPECT_GT(Fast(20.0, 2.0 * limit * 0.0707, amplitude).Worst(), limit);
+}
+
+TEST(Derivatives, AWrongAccelerationOfADriveHeldStillIsMeasuredByGravityWhereNothingMoves) {
+  const double limit = *RowOf(Metric::kDerivatives).limits.reference;
+  EXPECT_GT(Fast(20.0, 0.01, 0.0).Worst(), limit);
+}
+
+TEST(DriveMotion, ADriveHeldStillIsComparedOnTheScaleOfOtherUnitsToo) {
+  synthetic::Case c;
+  c.mechanism.joints[0].kind = JointKind::kRevolute;  // d1 in rad, 14 rad/s² RMS
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    for (const char* signal : {"d2.position", "d2.velocity", "d2.acceleration"}) {
+      synthetic::Stretch(trace, signal, 0.0);
+    }
+    synthetic::Stretch(trace, "d1.acceleration", 10.0);
+  }
+  c.mechanism.gravity_W.setZero();
+  const auto value = [&](double bend) {
+    Trace bent = c.simulated;
+    synthetic::Bend(&bent, "d2.acceleration", bend);
+    const PairComparison pair = ComparePair(c.Input(), bent, c.analytic);
+    return pair.metrics.at(Metric::kAcceleration).value;
+  };
+  EXPECT_NEAR(value(1e-10), 1e-10 / 0.1396, 1e-12);
+  EXPECT_NEAR(value(1e-3), 1e-3 / 0.1396, 1e-5);
+}
+
 }  // namespace
 }  // namespace mbv

@@ -59,7 +59,7 @@ struct Pushed {
             .simulation_limits = LimitColumn::kForward,
             .witnesses = {},
             .driven_by = "reference",
-            .joints_not_unique = {}};
+            .reactions_not_unique = {}};
   }
   [[nodiscard]] EnergyAudit Audit() const { return *AuditEnergy(Input(), trace, kLimit); }
 };
@@ -116,6 +116,19 @@ TEST(EnergyAudit, WithoutIntegratedWorkThePowersAreIntegratedAndNothingIsJudged)
   EXPECT_FALSE(audit.integrated);
   EXPECT_LT(audit.drift.value, 1e-6);  // cubics at 10 ms
   EXPECT_FALSE(MeasureWitness(run.Input(), run.trace).metrics.contains(Metric::kEnergy));
+}
+
+TEST(EnergyAudit, WhatIsNotJudgedNamesNoCulprit) {
+  Pushed run;
+  Stretch(&run.trace, "d1.force", 1.001);
+  for (Channel& channel : run.trace.channels) {
+    if (channel.name.ends_with(".work")) channel.name += "_unknown";
+  }
+  const EnergyAudit audit = run.Audit();
+  EXPECT_GT(audit.drift.value, 1e-4);
+  EXPECT_TRUE(audit.text.empty()) << audit.text;
+  EXPECT_TRUE(audit.culprit.empty());
+  EXPECT_TRUE(std::isnan(audit.from_s));
 }
 
 }  // namespace

@@ -105,7 +105,7 @@ struct Case {
   LimitColumn column = LimitColumn::kInverse;
   CheckLimits limits;
   double start_window_s = 0.0;
-  std::vector<std::string> joints_not_unique;
+  std::vector<std::string> reactions_not_unique;
 
   /// The plate's way is commanded instead of the drives'.
   void CommandPlate() {
@@ -125,7 +125,7 @@ struct Case {
                           {"reference", &reference, reference_summary},
                           {"simulated", &simulated, simulated_summary}},
             .driven_by = "analytic",
-            .joints_not_unique = joints_not_unique};
+            .reactions_not_unique = reactions_not_unique};
   }
   [[nodiscard]] Comparison Run() const { return Compare(Input()); }
 };

@@ -65,7 +65,7 @@ struct TableCase {
                                               {"solver", &solver, RunSummary::Done()},
                                               {"simulated", &base.simulated, RunSummary::Done()}},
                                 .driven_by = "solver",
-                                .joints_not_unique = {},
+                                .reactions_not_unique = {},
                                 .table = &aligned};
     return Compare(input);
   }
@@ -74,6 +74,13 @@ struct TableCase {
 bool Says(const Comparison& comparison, const std::string& text) {
   for (const std::string& diagnosis : comparison.table->diagnoses) {
     if (diagnosis.find(text) != std::string::npos) return true;
+  }
+  return false;
+}
+
+bool Reserves(const Comparison& comparison, const std::string& text) {
+  for (const std::string& sentence : comparison.reservations) {
+    if (sentence.find(text) != std::string::npos) return true;
   }
   return false;
 }
@@ -203,6 +210,56 @@ TEST(TableTube, ATableTooCoarseVerifiesNothing) {
   EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
   EXPECT_NE(comparison.reason.find("too coarse to verify anything"), std::string::npos)
       << comparison.reason;
+}
+
+TEST(TableTube, AStatedToleranceWiderThanTheCoarsestVerifiesNothing) {
+  TableCase c;
+  for (TableColumn& column : c.table.columns) column.tolerance = {.relative = 0.5};
+  c.table.values *= 1.3;
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kNotRun) << All(comparison);
+  EXPECT_NE(comparison.reason.find("stated uncertainty"), std::string::npos) << comparison.reason;
+  for (TableColumn& column : c.table.columns) column.tolerance = {.relative = 0.01};
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+  c.table.values /= 1.3;
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
+}
+
+TEST(TableTube, OneColumnWithAWideToleranceIsAReservation) {
+  TableCase c;
+  c.Print(1e-6);
+  c.table.columns[1].tolerance = {.relative = 0.2};  // of 40 N, beside 100 N
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree) << All(comparison);
+  EXPECT_TRUE(Reserves(comparison, "more than 10 % of the column verifies nothing: d2.force"));
+}
+
+TEST(TableTube, ATableOfHalfTheMotionSaysSo) {
+  TableCase c;
+  c.Print(1e-6);
+  EXPECT_TRUE(c.Run().reservations.empty());
+  c.table.time_s.resize(51);
+  c.table.values = c.table.values.topRows(51).eval();
+  c.table.steps = c.table.steps.topRows(51).eval();
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree) << All(comparison);
+  EXPECT_TRUE(Reserves(comparison, "it covers 0 to 0.5 s only, of a motion of 1 s"));
+}
+
+TEST(TableTube, ATableWithoutForcesSaysSo) {
+  TableCase c;
+  c.table.columns.clear();
+  c.table.values.resize(0, 0);
+  for (const char* drive : {"d1", "d2"}) {
+    const std::string signal = std::string(drive) + ".position";
+    const VecX exact = c.solver.values.col(c.solver.Find(signal));
+    c.AddColumn(signal, [&](double t) { return exact[std::lround(t / 0.01)]; });
+    c.table.columns.back().channel.unit = c.table.columns.back().unit = "m";
+  }
+  c.Print(1e-9);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree) << All(comparison);
+  EXPECT_TRUE(Reserves(comparison, "it has no column of forces"));
 }
 
 TEST(TableTube, ATableWithoutANumberNeverAgrees) {

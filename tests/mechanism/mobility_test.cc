@@ -28,6 +28,43 @@ TEST(Mobility, TheFourBarsMotorIsUniqueAlthoughNoHingeReactionIs) {
   const Mobility mobility = AnalyseMobility(MakeFourBar());
   EXPECT_TRUE(mobility.drive_forces_unique);
   EXPECT_EQ(mobility.joints_not_unique, (std::vector<std::string>{"A", "B", "D", "C"}));
+  // In its plane statics is enough.
+  ASSERT_EQ(mobility.reactions_not_unique.size(), 4u);
+  for (const UndeterminedReaction& reaction : mobility.reactions_not_unique) {
+    EXPECT_EQ(reaction.components, (std::vector<std::string>{"fz", "mx", "my"})) << reaction.joint;
+  }
+}
+
+TEST(Mobility, AComponentThatIsUniqueAtHomeOnlyIsFoundOutByOtherPoses) {
+  // A bar between two hinges about z is held twice along itself: at home along x only.
+  Mechanism m;
+  m.bodies = {{.name = "world", .frames = {}, .shapes = {}},
+              {.name = "table", .mass = 1.0, .frames = {}, .shapes = {}},
+              {.name = "bar", .mass = 1.0, .frames = {}, .shapes = {}}};
+  const auto add = [&](const char* name, JointKind kind, int parent, int child, double x) {
+    Joint joint;
+    joint.name = name;
+    joint.kind = kind;
+    joint.parent = parent;
+    joint.child = child;
+    joint.X_PF = joint.X_CM = Pose(Eigen::Translation3d(x, 0.0, 0.0));
+    m.joints.push_back(joint);
+  };
+  add("turn", JointKind::kRevolute, 0, 1, 0.0);
+  add("near", JointKind::kSpherical, 0, 2, 0.0);
+  add("far", JointKind::kSpherical, 1, 2, 1.0);
+  m.X_WB_home.assign(3, Pose::Identity());
+  // The reaction of `near` is given in the world's axes, that of `far` in those of the table.
+  EXPECT_EQ(ReactionsNotUnique(m, {}),
+            (std::vector<std::string>{"far.reaction.fx", "near.reaction.fx", "turn.reaction.fx"}));
+  std::vector<Pose> turned(3, Pose::Identity());
+  turned[1].linear() = turned[2].linear() =
+      Eigen::AngleAxisd(0.5, Vec3::UnitZ()).toRotationMatrix();
+  EXPECT_EQ(ReactionsNotUnique(m, {turned}),
+            (std::vector<std::string>{"far.reaction.fx", "near.reaction.fx", "near.reaction.fy",
+                                      "turn.reaction.fx", "turn.reaction.fy"}));
+  turned[2].linear().setConstant(kNan);
+  EXPECT_EQ(ReactionsNotUnique(m, {turned}).size(), 3u);
 }
 
 TEST(Mobility, TwoMotorsOnOneFreedomFightEachOther) {

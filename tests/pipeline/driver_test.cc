@@ -52,7 +52,7 @@ struct Tripod {
                                   {"reference", &reference.trace, reference.summary},
                                   {"simulated", &simulated.run.trace, simulated.run.summary}},
                     .driven_by = prepared->driven_by,
-                    .joints_not_unique = {}});
+                    .reactions_not_unique = {}});
   }
 };
 

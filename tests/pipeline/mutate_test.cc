@@ -175,9 +175,8 @@ TEST(Mutate, AFinerResolutionNarrowsTheSearch) {
 }
 
 TEST(Mutate, ParametersThatAreZeroAreBentByAShareOfTheirLike) {
-  const MutationReport report =
-      Mutate("spr_tripod/default_inverse",
-             {.size = 1e-3, .numbers = {"phi_3", "m_rod"}, .progress = {}});
+  const MutationReport report = Mutate(
+      "spr_tripod/default_inverse", {.size = 1e-3, .numbers = {"phi_3", "m_rod"}, .progress = {}});
   const Mutation* zero = Find(report, "phi_3");
   ASSERT_NE(zero, nullptr);
   EXPECT_EQ(zero->value, 0.0);
@@ -219,8 +218,8 @@ TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
 }
 
 TEST(Mutate, WhereAnUnseenEffectGoesIsNamed) {
-  const MutationReport report = Mutate("stabilizing_platform/static",
-                                       {.size = 1e-3, .numbers = {"m_ship"}, .progress = {}});
+  const MutationReport report =
+      Mutate("stabilizing_platform/static", {.size = 1e-3, .numbers = {"m_ship"}, .progress = {}});
   ASSERT_EQ(report.mutations.size(), 1u) << report.diagnostics.Text();
   const std::string& reason = report.mutations[0].reason;
   EXPECT_NE(reason.find("the mass of ship"), std::string::npos) << reason;
@@ -259,7 +258,8 @@ TEST(Mutate, DrivesThatDoTheSameMayBeSwappedUnseenAndSaySo) {
   ASSERT_NE(swap, nullptr);
   EXPECT_EQ(swap->where, "leg1 and leg2");
   EXPECT_FALSE(swap->own.detected);
-  EXPECT_NE(swap->own.reason.find("leg1 and leg2 do the same"), std::string::npos) << swap->own.reason;
+  EXPECT_NE(swap->own.reason.find("leg1 and leg2 do the same"), std::string::npos)
+      << swap->own.reason;
 }
 
 TEST(Mutate, AnotherAssemblyIsSeenByForcesNotOnlyByRanges) {

@@ -153,8 +153,8 @@ TEST(StiffnessMap, PosesBeyondRangesAreLeftOutAndCounted) {
                                    (form ? "" : "analytic: none\n"));
     ASSERT_TRUE(prepared);
     Diagnostics diagnostics;
-    const auto map = ParseMap("x=-0.06:0.06:5,y=-0.06:0.06:5,z=-0.19,phi_deg=10", *prepared,
-                              &diagnostics);
+    const auto map =
+        ParseMap("x=-0.06:0.06:5,y=-0.06:0.06:5,z=-0.19,phi_deg=10", *prepared, &diagnostics);
     ASSERT_TRUE(map) << diagnostics.Text();
     MapResult& result = maps[form ? 0 : 1];
     result = ComputeMap(*prepared, *map);

@@ -58,12 +58,12 @@ class CabinStiffness final : public StiffnessForm {
     if (!SolveInverse(parameters_.planar, &s).ok()) return false;
     for (const Drive& drive : drives_) {
       const auto given = pose.find(drive.name);
-      const double value = drive.name == "X1"        ? s.X1.p
-                           : drive.name == "X2"      ? s.X2.p
-                           : drive.name == "X3"      ? s.X3.p
-                           : given != pose.end()     ? given->second
-                           : drive.name == "d5"      ? d5_
-                                                     : kNan;  // moves nothing here
+      const double value = drive.name == "X1"    ? s.X1.p
+                           : drive.name == "X2"  ? s.X2.p
+                           : drive.name == "X3"  ? s.X3.p
+                           : given != pose.end() ? given->second
+                           : drive.name == "d5"  ? d5_
+                                                 : kNan;  // moves nothing here
       if (value < drive.range.lower || value > drive.range.upper) return false;
     }
     return true;

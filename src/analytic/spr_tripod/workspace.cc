@@ -202,14 +202,16 @@ VoxelCount CountVoxels(const Geometry& geometry, int cells, const Box3& box,
   const Vec3 cell = (box.upper - box.lower) / cells;
   const auto n = static_cast<size_t>(cells);
   std::vector<char> inside(n * n * n, 0);
-  const auto at = [&](size_t i, size_t j, size_t k) -> char& { return inside[(i * n + j) * n + k]; };
+  const auto at = [&](size_t i, size_t j, size_t k) -> char& {
+    return inside[(i * n + j) * n + k];
+  };
   long count = 0, several = 0, filtered = 0, boundary = 0;
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j < n; ++j) {
       for (size_t k = 0; k < n; ++k) {
         const Vec3 steps(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
-        const auto found = PosturesAt(
-            geometry, box.lower + cell.cwiseProduct(steps + Vec3::Constant(0.5)));
+        const auto found =
+            PosturesAt(geometry, box.lower + cell.cwiseProduct(steps + Vec3::Constant(0.5)));
         at(i, j, k) = !found.empty();
         count += !found.empty();
         several += found.size() > 1;

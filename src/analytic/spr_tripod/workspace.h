@@ -104,7 +104,8 @@ struct WorkspaceOptions {
   std::vector<int> mesh_intervals = {5, 10, 25, 50};  ///< refinements; the last one is returned
   int gauss_points = 12;  ///< > 4; the error of a volume is what 4 points fewer change
   int voxels = 80;        ///< cells per side; 0 leaves the count out
-  std::vector<double> heights = {};  ///< of sections [m]; empty: round ones where the z axis is reached
+  std::vector<double> heights =
+      {};  ///< of sections [m]; empty: round ones where the z axis is reached
   int section_azimuths = 180;
   PoseFilter within_ranges = {};  ///< of the joints besides the stroke; empty: there are none
 };
@@ -123,15 +124,15 @@ struct VolumeEstimate {
 /// Everything a command needs: a text for people, the mesh, and the section curves.
 struct WorkspaceReport {
   RunSummary summary;
-  std::string text;           ///< plain text, one finding per line
-  WorkspaceMesh faces;        ///< the finest mesh
-  std::string sections_csv;   ///< section,azimuth_rad,x_m,y_m,z_m
-  SolidProperties exact;      ///< from IntegrateFaces
-  std::vector<double> heights;             ///< of the sections [m]
-  std::vector<VolumeEstimate> volumes;     ///< faces, interior, mesh, voxels
+  std::string text;                         ///< plain text, one finding per line
+  WorkspaceMesh faces;                      ///< the finest mesh
+  std::string sections_csv;                 ///< section,azimuth_rad,x_m,y_m,z_m
+  SolidProperties exact;                    ///< from IntegrateFaces
+  std::vector<double> heights;              ///< of the sections [m]
+  std::vector<VolumeEstimate> volumes;      ///< faces, interior, mesh, voxels
   std::vector<std::string> contradictions;  ///< between them; empty: they agree
-  double mesh_error = kNan;         ///< finest mesh against the smooth faces [m³]
-  double convergence_order = kNan;  ///< of the mesh volume in the step; 2 expected
+  double mesh_error = kNan;                 ///< finest mesh against the smooth faces [m³]
+  double convergence_order = kNan;          ///< of the mesh volume in the step; 2 expected
 };
 [[nodiscard]] WorkspaceReport ReportWorkspace(const Geometry& geometry,
                                               const WorkspaceOptions& options = {});

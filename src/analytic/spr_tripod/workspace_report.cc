@@ -46,8 +46,8 @@ std::string MeshTable(const Geometry& geometry, const WorkspaceOptions& options,
     const double error = volume - report->exact.volume;
     text += fmt::format("{:<10.6g}  {:<19.{}f}  {:+.3e}\n", step, volume, Decimals(std::abs(error)),
                         error);
-    report->convergence_order = std::log((previous - report->exact.volume) / error) /
-                                std::log(previous_step / step);
+    report->convergence_order =
+        std::log((previous - report->exact.volume) / error) / std::log(previous_step / step);
     mesh.value = volume;
     mesh.error = std::abs(std::isnan(previous) ? error : volume - previous);
     report->mesh_error = error;

@@ -1,0 +1,187 @@
+#include "comparison/reservations.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/constraints.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kFewSamples = 5;
+constexpr double kWhole = 0.95;  // of the motion: judged up to the samples at its ends
+
+bool IsCoarse(const ComparisonInput& input, const CheckResult& check) {
+  // A limit that a table's uncertainty widened is judged with the table.
+  if (!check.limit || check.stated_limit) return false;
+  if (check.metric == Metric::kTableTube) return *check.limit > 1.0;
+  const bool metres = std::string(RowOf(check.metric).unit) == "m";
+  const double size = metres ? CharacteristicLength(*input.mechanism) : 1.0;
+  return *check.limit > kCoarsestLimit * size;
+}
+
+const Measured* MeasuredOf(const Comparison& comparison, const CheckResult& check) {
+  const PairComparison* pair = comparison.FindPair(check.subject);
+  if (pair == nullptr) return nullptr;
+  const auto found = pair->metrics.find(check.metric);
+  return found == pair->metrics.end() ? nullptr : &found->second;
+}
+
+// Zero in the place of the measured forces would pass.
+bool ZeroPasses(const Comparison& comparison, const CheckResult& check) {
+  if (!check.limit || !IsDriveForce(check.metric)) return false;
+  const Measured* measured = MeasuredOf(comparison, check);
+  return measured != nullptr && measured->of_zero <= *check.limit;
+}
+
+bool Judges(const ComparisonInput& input, const CheckResult& check) {
+  return check.limit &&
+         (input.motion->free() ? IsTrajectory(check.metric) : IsDriveForce(check.metric));
+}
+
+// All limits that are too wide, with the checks they belong to.
+std::string CoarseLimits(const ComparisonInput& input, const Comparison& comparison) {
+  std::string names;
+  for (const CheckResult& check : comparison.checks) {
+    if (!IsCoarse(input, check)) continue;
+    names += fmt::format("{}{} ({:.2g}{}{})", names.empty() ? "" : ", ", check.name, *check.limit,
+                         *RowOf(check.metric).unit == '\0' ? "" : " ", RowOf(check.metric).unit);
+  }
+  return names;
+}
+
+bool IsWhole(const ComparisonInput& input, double from_s, double to_s) {
+  const Motion& motion = *input.motion;
+  return to_s - from_s >= kWhole * motion.duration_s - motion.sample_s;
+}
+
+// A pair's judged time against the motion's; "" if it is the whole. A table speaks for itself.
+std::string Span(const ComparisonInput& input, const PairComparison& pair) {
+  const bool table =
+      input.table != nullptr && (pair.measured == "reference" || pair.truth == "reference");
+  if (pair.drives.empty() || (table && input.start_window_s == 0.0)) return "";
+  if (IsWhole(input, pair.from_s, pair.to_s)) return "";
+  return fmt::format("forces were judged from {:.4g} to {:.4g} s only, in a motion of {:.4g} s",
+                     pair.from_s, pair.to_s, input.motion->duration_s);
+}
+
+// Sentences that several pairs share are said once, with the pairs.
+class Sentences {
+ public:
+  void Add(const std::string& subject, const std::string& text) {
+    if (text.empty()) return;
+    for (auto& [subjects, known] : all_) {
+      if (known != text) continue;
+      subjects += ", " + subject;
+      return;
+    }
+    all_.emplace_back(subject, text);
+  }
+  [[nodiscard]] std::vector<std::string> Take() const {
+    std::vector<std::string> sentences;
+    for (const auto& [subjects, text] : all_) sentences.push_back(subjects + ": " + text);
+    return sentences;
+  }
+
+ private:
+  std::vector<std::pair<std::string, std::string>> all_;
+};
+
+bool IsForce(const std::string& unit) { return unit == "N" || unit == "N m"; }
+
+// What the table does not say: forces, a part of the motion, or a column closely enough.
+void ReserveTable(const ComparisonInput& input, const Comparison& comparison,
+                  Sentences* sentences) {
+  const AlignedTable& table = *input.table;
+  const std::string name = "the table " + table.name;
+  const auto& channels = table.trace.channels;
+  if (!input.motion->free() &&
+      std::none_of(channels.begin(), channels.end(),
+                   [](const Channel& channel) { return IsForce(channel.unit); })) {
+    sentences->Add(name, "it has no column of forces, so it verifies the motion only");
+  }
+  if (!table.trace.time_s.empty() &&
+      !IsWhole(input, table.trace.time_s.front(), table.trace.time_s.back())) {
+    sentences->Add(name, fmt::format("it covers {:.4g} to {:.4g} s only, of a motion of {:.4g} s",
+                                     table.trace.time_s.front(), table.trace.time_s.back(),
+                                     input.motion->duration_s));
+  }
+  std::string coarse;
+  for (const PairComparison& pair : comparison.pairs) {
+    const std::string& other = pair.measured == "reference" ? pair.truth : pair.measured;
+    if (other != comparison.table->judged_against) continue;
+    for (const TableColumnResult& column : pair.columns) {
+      if (!IsForce(channels[column.column].unit)) continue;
+      if (!(column.tube_rms > table.coarsest * column.rms) || column.rms == 0.0) continue;
+      coarse += (coarse.empty() ? "" : ", ") + column.channel;
+    }
+  }
+  if (!coarse.empty()) {
+    sentences->Add(name, fmt::format("a tube of more than {:g} % of the column verifies nothing: {}",
+                                     100.0 * table.coarsest, coarse));
+  }
+}
+
+}  // namespace
+
+void MarkBlind(const ComparisonInput& input, Comparison* comparison) {
+  for (CheckResult& check : comparison->checks) {
+    const PairComparison* pair = comparison->FindPair(check.subject);
+    if (IsCoarse(input, check)) {
+      check.blind = "a limit so wide verifies nothing";
+    } else if (pair != nullptr && !pair->forces_act && ZeroPasses(*comparison, check)) {
+      check.blind = "nothing asks for drive forces";
+    }
+  }
+}
+
+std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& comparison) {
+  bool any = false, coarse = true;
+  for (const CheckResult& check : comparison.checks) {
+    if (!Judges(input, check)) continue;
+    if (check.blind.empty()) return "";
+    any = true;
+    coarse = coarse && IsCoarse(input, check);
+  }
+  const char* what = input.motion->free() ? "position and pose" : "force";
+  if (!any) return fmt::format("every {} check is switched off, so nothing was verified", what);
+  if (coarse) {
+    return fmt::format("every {} limit is so wide that it verifies nothing: {}", what,
+                       CoarseLimits(input, comparison));
+  }
+  return "nothing moves, weighs or pushes: the drive forces vanish whatever the masses are, so "
+         "nothing was verified";
+}
+
+std::vector<std::string> Reservations(const ComparisonInput& input, const Comparison& comparison) {
+  Sentences sentences;
+  for (const PairComparison& pair : comparison.pairs) {
+    if (!pair.compared) continue;
+    const CheckResult* force = comparison.FindCheck(pair.name() + ".force_nrmse");
+    if (force != nullptr && pair.forces_act && ZeroPasses(comparison, *force)) {
+      sentences.Add(pair.name(), "the drive forces are so small that zero would pass, too: "
+                                 "verified is only that they cancel out");
+    }
+    if (!pair.drives.empty() && pair.force_samples < kFewSamples) {
+      sentences.Add(pair.name(), fmt::format("forces were judged at {} sample{} only",
+                                             pair.force_samples,
+                                             pair.force_samples == 1 ? "" : "s"));
+    }
+    sentences.Add(pair.name(), Span(input, pair));
+  }
+  if (input.table != nullptr) ReserveTable(input, comparison, &sentences);
+  for (const WitnessMetrics& witness : comparison.witnesses) {
+    if (witness.derivatives_gap.empty()) continue;
+    sentences.Add(witness.witness, "rates were not checked against positions: " +
+                                       witness.derivatives_gap);
+  }
+  std::vector<std::string> all = sentences.Take();
+  if (const std::string coarse = CoarseLimits(input, comparison); !coarse.empty()) {
+    all.insert(all.begin(), "limits so wide that they verify nothing: " + coarse);
+  }
+  return all;
+}
+
+}  // namespace mbv

@@ -1,0 +1,26 @@
+// What keeps an agreement from meaning what it seems to mean.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "comparison/comparison.h"
+
+namespace mbv {
+
+/// Sets `blind` of the checks that verify nothing although they may pass: limits coarser than
+/// kCoarsestLimit, and drive forces that vanish because nothing moves, weighs or pushes.
+void MarkBlind(const ComparisonInput& input, Comparison* comparison);
+
+/// Why no check of drive forces (of a free motion: of where it leads) verified anything; "" if one
+/// did.
+[[nodiscard]] std::string WhyNothingVerified(const ComparisonInput& input,
+                                             const Comparison& comparison);
+
+/// One sentence each, loud in every report: limits that verify nothing, forces that only cancel
+/// out, few samples, a part of the motion that was not judged, a table without forces, rates that
+/// could not be checked against positions.
+[[nodiscard]] std::vector<std::string> Reservations(const ComparisonInput& input,
+                                                    const Comparison& comparison);
+
+}  // namespace mbv

@@ -1,0 +1,135 @@
+// Agreements that verify nothing are not told as such, and those that verify less say so.
+#include "comparison/reservations.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/comparison/carried.h"
+
+namespace mbv {
+namespace {
+
+using synthetic::Bend;
+using synthetic::Case;
+using synthetic::Stretch;
+
+bool Has(const std::vector<std::string>& sentences, const std::string& part) {
+  for (const std::string& sentence : sentences) {
+    if (sentence.find(part) != std::string::npos) return true;
+  }
+  return false;
+}
+
+void Widen(Case* c, Metric metric, double limit) { c->limits[metric] = {limit, limit, limit}; }
+
+TEST(Reservations, LimitsWiderThanATenthVerifyNothing) {
+  Case c;
+  for (const Metric metric : {Metric::kForceNrmse, Metric::kForceMax, Metric::kForceOwn}) {
+    Widen(&c, metric, 1e9);
+  }
+  Stretch(&c.simulated, "d1.force", 3.0);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
+  EXPECT_NE(comparison.reason.find("every force limit is so wide"), std::string::npos)
+      << comparison.reason;
+  EXPECT_FALSE(comparison.FindCheck("simulated_vs_analytic.force_nrmse")->blind.empty());
+}
+
+TEST(Reservations, OneWideLimitIsNamedAndNotCountedAsVerified) {
+  Case c;
+  const size_t all = c.Run().verified();
+  Widen(&c, Metric::kVelocity, 0.2);
+  Widen(&c, Metric::kPoseM, 0.2);  // metres, in a mechanism of 1 m
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kAgree);
+  EXPECT_EQ(comparison.verified(), all - 6);
+  EXPECT_EQ(comparison.blind(), 6u);
+  EXPECT_NE(comparison.reason.find("6 more verify nothing"), std::string::npos);
+  EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.velocity_nrmse (0.2)"));
+  EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.pose_m (0.2 m)"));
+  Widen(&c, Metric::kVelocity, 0.1);
+  Widen(&c, Metric::kPoseM, 0.1);
+  EXPECT_TRUE(c.Run().reservations.empty());
+}
+
+TEST(Reservations, AWideLimitThatIsExceededStillDisagrees) {
+  Case c;
+  for (const Metric metric : {Metric::kForceNrmse, Metric::kForceMax, Metric::kForceOwn}) {
+    Widen(&c, metric, 0.5);
+  }
+  Stretch(&c.simulated, "d1.force", 3.0);
+  EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
+}
+
+TEST(Reservations, AStartWindowThatLeavesOneSampleVerifiesNothing) {
+  Case c;
+  c.start_window_s = 0.995;
+  EXPECT_EQ(c.Run().verdict, Verdict::kNotRun);
+  EXPECT_NE(c.Run().reason.find("leaves 1 sample to judge"), std::string::npos) << c.Run().reason;
+  c.start_window_s = 0.5;
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
+  EXPECT_TRUE(Has(c.Run().reservations, "judged from 0.5 to 1 s only, in a motion of 1 s"));
+  c.start_window_s = 0.02;
+  EXPECT_TRUE(c.Run().reservations.empty());
+}
+
+// The traces shortened to `rows`.
+Case Short(Eigen::Index rows) {
+  Case c;
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    trace->time_s.resize(static_cast<size_t>(rows));
+    trace->values = trace->values.topRows(rows).eval();
+  }
+  c.motion.duration_s = 0.01 * static_cast<double>(rows - 1);
+  return c;
+}
+
+TEST(Reservations, FewSamplesAndTheDerivativesTheyDoNotAllowAreSaid) {
+  const Comparison seven = Short(7).Run();
+  EXPECT_TRUE(seven.reservations.empty()) << seven.reservations.front();
+  const Comparison six = Short(6).Run();
+  EXPECT_EQ(six.verdict, Verdict::kAgree);
+  EXPECT_TRUE(Has(six.reservations, "rates were not checked against positions: 6 samples"));
+  EXPECT_FALSE(Has(six.reservations, "forces were judged at"));
+  EXPECT_TRUE(Has(Short(2).Run().reservations, "forces were judged at 2 samples only"));
+}
+
+// At rest, without gravity: forces are zero whatever the masses are.
+Case Weightless() {
+  Case c;
+  c.mechanism.gravity_W.setZero();
+  for (Command& command : c.motion.commands) command.profile = Constant(0.0);
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    for (const char* drive : {"d1", "d2"}) {
+      for (const char* signal : {".position", ".velocity", ".acceleration", ".force"}) {
+        Stretch(trace, std::string(drive) + signal, 0.0);
+      }
+    }
+  }
+  return c;
+}
+
+TEST(Reservations, NothingMovesAndNothingWeighsVerifiesNothing) {
+  const Comparison comparison = Weightless().Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
+  EXPECT_NE(comparison.reason.find("nothing moves, weighs or pushes"), std::string::npos)
+      << comparison.reason;
+  Case round = Weightless();
+  Bend(&round.simulated, "d1.force", 1e-16);  // round-off
+  EXPECT_EQ(round.Run().verdict, Verdict::kNotRun);
+  Case bent = Weightless();
+  Bend(&bent.simulated, "d1.force", 0.5);  // a force out of nothing
+  EXPECT_EQ(bent.Run().verdict, Verdict::kDisagree);
+}
+
+TEST(Reservations, ForcesThatCancelOutAgreeWithAReservation) {
+  Case c;
+  for (Trace* trace : {&c.analytic, &c.reference, &c.simulated}) {
+    Stretch(trace, "d1.force", 0.0);
+    Stretch(trace, "d2.force", 0.0);
+  }
+  EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
+  EXPECT_TRUE(Has(c.Run().reservations, "verified is only that they cancel out"));
+}
+
+}  // namespace
+}  // namespace mbv
