@@ -181,11 +181,13 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, 
   SetReference(v, at, guidance);
   std::copy(warm_.begin(), warm_.end(), d_->qacc_warmstart);
   mj_fwdAcceleration(m_, d_);
+  // MuJoCo starts from here where that is cheaper than the warm start: as far off as that one.
+  if (d_->nefc > 0) Eigen::Map<VecX>(d_->qacc_smooth, m_->nv).array() += kNudge;
   SolveConstraints();
 }
 
-// MuJoCo's constraint stage, from a warm start that is a little off: it takes no Newton step
-// shorter than 1e-15, and what that leaves undone in the acceleration is divided by R in the force.
+// MuJoCo's constraint stage, from a start that is a little off: it takes no Newton step shorter
+// than 1e-15, and what that leaves undone in the acceleration is divided by R in the force.
 void Integrator::SolveConstraints() {
   Eigen::Map<VecX>(d_->qacc_warmstart, m_->nv).array() += kNudge;
   mj_fwdConstraint(m_, d_);
