@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/driven.h"
 
 namespace mbv {
 namespace {
@@ -242,8 +243,12 @@ std::string AgreementText(const Comparison& comparison) {
 
 Attribution Attribute(const ComparisonInput& input, const Comparison& comparison) {
   if (comparison.verdict == Verdict::kNotRun) return {};
-  if (comparison.verdict == Verdict::kAgree) return {"", AgreementText(comparison)};
+  const Attribution driven = AttributeDriven(input, comparison);
+  if (comparison.verdict == Verdict::kAgree) {
+    return driven.text.empty() ? Attribution{"", AgreementText(comparison)} : driven;
+  }
   Attribution attribution = ByDerivatives(comparison);
+  if (attribution.text.empty()) attribution = driven;
   if (attribution.text.empty()) attribution = ByCommand(input, comparison);
   if (attribution.text.empty()) attribution = ByDistance(input, comparison);
   if (attribution.text.empty()) attribution = BySingleCheck(comparison);

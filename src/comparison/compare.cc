@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/driven.h"
 #include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
 
@@ -46,9 +47,28 @@ LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) 
   return measured == "simulated" ? input.simulation_limits : LimitColumn::kReference;
 }
 
-// `tubes`: what a table's own uncertainty allows; the wider of it and the limit counts.
+// Limits that do not come from the scenario.
+struct OtherLimits {
+  std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
+  std::map<Metric, double> growth;  ///< where bent forces lead: counts instead of the limit
+};
+
+void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check) {
+  const auto tube = other.tubes.find(check->metric), growth = other.growth.find(check->metric);
+  if (!check->limit) return;
+  if (tube != other.tubes.end() && tube->second > *check->limit) {
+    check->stated_limit = check->limit;
+    check->limit = tube->second;
+    check->limit_by = "the table's uncertainty";
+  } else if (growth != other.growth.end()) {
+    check->stated_limit = check->limit;
+    check->limit = growth->second;
+    check->limit_by = fmt::format("forces bent by {:.0e}", input.bend);
+  }
+}
+
 void AddChecks(const ComparisonInput& input, const std::string& subject, LimitColumn column,
-               const std::map<Metric, Measured>& metrics, const std::map<Metric, double>& tubes,
+               const std::map<Metric, Measured>& metrics, const OtherLimits& other,
                Comparison* comparison) {
   for (const auto& [metric, measured] : metrics) {
     CheckResult check{.name = subject + "." + RowOf(metric).key,
@@ -57,13 +77,10 @@ void AddChecks(const ComparisonInput& input, const std::string& subject, LimitCo
                       .value = measured.value,
                       .limit = input.limits[metric].Of(column),
                       .stated_limit = {},
+                      .limit_by = {},
                       .time_s = measured.time_s,
                       .channel = measured.channel};
-    const auto tube = tubes.find(metric);
-    if (check.limit && tube != tubes.end() && tube->second > *check.limit) {
-      check.stated_limit = check.limit;
-      check.limit = tube->second;
-    }
+    ApplyOther(other, input, &check);
     check.pass = check.limit && check.value <= *check.limit;  // false for NaN
     comparison->checks.push_back(std::move(check));
   }
@@ -94,12 +111,18 @@ void AddPair(const ComparisonInput& input, const char* measured, const char* tru
   pair.truth = truth;
   pair.reason = WhyNot(*a, *b);
   if (pair.reason.empty()) pair = ComparePair(input, *a->trace, *b->trace);
-  std::map<Metric, double> tubes;
+  LeaveOutReachedMotion(&pair);
+  OtherLimits other;
+  if (pair.compared && SharesForces(input, measured, truth)) {
+    other.growth = GrowthLimits(input, *a->trace);
+  }
   if (Ran(*a) && Ran(*b) && (IsTable(input, measured) || IsTable(input, truth))) {
-    tubes = JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
+    other.tubes =
+        JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
   }
   if (!pair.compared) comparison->not_compared.push_back({pair.name(), pair.reason});
-  AddChecks(input, pair.name(), ColumnOf(input, measured), pair.metrics, tubes, comparison);
+  AddChecks(input, pair.name(), ColumnOfPair(input, measured, truth), pair.metrics, other,
+            comparison);
   comparison->pairs.push_back(std::move(pair));
 }
 
@@ -146,6 +169,11 @@ void AddCommandNotes(const ComparisonInput& input, Comparison* comparison) {
 
 // Given forces are the same in every witness.
 void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
+  if (input.drive_by == DriveBy::kForces) {
+    comparison->not_compared.push_back(
+        {"simulated drive forces",
+         "they are the " + input.driven_by + " forces; the motion that they cause is compared"});
+  }
   for (const DriveForce& force : input.motion->forces) {
     comparison->not_compared.push_back({input.mechanism->drives[force.drive].name + ".force",
                                         "it is given by the scenario; the motion it causes is "
@@ -218,15 +246,15 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     if (!comparison->pairs.empty()) comparison->reason += ": " + comparison->pairs.front().reason;
     return;
   }
-  const bool free = input.motion->free();
-  const auto judges = [&](const CheckResult& check) {
-    return check.limit && (free ? IsTrajectory(check.metric) : IsDriveForce(check.metric));
-  };
+  const auto judges = [&](const CheckResult& check) { return IsEvidence(input, check); };
   if (std::none_of(comparison->checks.begin(), comparison->checks.end(), judges)) {
+    const bool motion = input.motion->free() || input.drive_by == DriveBy::kForces;
     comparison->reason = fmt::format("every {} check is switched off, so nothing was verified",
-                                     free ? "position and pose" : "force");
+                                     motion ? "position and pose" : "force");
     return;
   }
+  comparison->reason = WhyHorizonTooLong(input, *comparison);
+  if (!comparison->reason.empty()) return;
   const size_t failed = comparison->failed();
   if (input.table != nullptr && failed == 0) {
     comparison->reason = WhyTableVerifiesNothing(*comparison);
@@ -277,6 +305,28 @@ size_t Comparison::verified() const {
                                            [](const CheckResult& c) { return c.limit && c.pass; }));
 }
 
+namespace {
+
+// What a witness shows by itself. Servos follow their commands as well as their gains let them.
+void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison* comparison) {
+  WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
+  OtherLimits other;
+  if (IsTable(input, witness.name)) other.tubes = CommandTubes(input);
+  const bool simulated = witness.name == "simulated";
+  if (simulated) other.growth = CommandGrowth(GrowthLimits(input, *witness.trace));
+  std::map<Metric, Measured> commands, others = metrics.metrics;
+  for (const Metric metric : {Metric::kCommandM, Metric::kCommandRad}) {
+    if (auto found = others.extract(metric)) commands.insert(std::move(found));
+  }
+  const LimitColumn column = ColumnOf(input, witness.name);
+  const bool servo = simulated && input.drive_by == DriveBy::kServos;
+  AddChecks(input, witness.name, servo ? LimitColumn::kServo : column, commands, other, comparison);
+  AddChecks(input, witness.name, column, others, other, comparison);
+  comparison->witnesses.push_back(std::move(metrics));
+}
+
+}  // namespace
+
 Comparison Compare(const ComparisonInput& input) {
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
@@ -286,14 +336,9 @@ Comparison Compare(const ComparisonInput& input) {
   // The generic solver takes part by its own name where a table has the reference's place.
   AddPair(input, "simulated", "solver", &comparison);
   AddPair(input, "reference", "solver", &comparison);
+  AddPair(input, "simulated", "reached", &comparison);
   for (const Witness& witness : input.witnesses) {
-    if (!Ran(witness)) continue;
-    WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
-    const auto tubes =
-        IsTable(input, witness.name) ? CommandTubes(input) : std::map<Metric, double>();
-    AddChecks(input, witness.name, ColumnOf(input, witness.name), metrics.metrics, tubes,
-              &comparison);
-    comparison.witnesses.push_back(std::move(metrics));
+    if (Ran(witness) && witness.name != "reached") AddWitness(input, witness, &comparison);
   }
   AddMissingNotes(input, &comparison);
   AddReactionNotes(input, &comparison);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/driven.h"
 #include "comparison/force_scale.h"
 #include "core/spatial.h"
 #include "mechanism/channels.h"
@@ -97,9 +98,12 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
   std::map<std::string, ErrorSum> pooled;
   std::vector<std::pair<std::string, ErrorSum>> drives;  // unit and sums, as pair->drives
   const ForceScale scale = ForceScaleOf(input, reader.truth);
+  const bool shared = SharesForces(input, reader.measured.witness, reader.truth.witness);
   size_t wanted = 0;
   for (size_t d = 0; d < input.mechanism->drives.size(); ++d) {
-    if (input.motion->FindForce(static_cast<int>(d)) >= 0) continue;  // given to both
+    // Given to both.
+    if (input.motion->FindForce(static_cast<int>(d)) >= 0) continue;
+    if (shared) continue;
     const Drive& drive = input.mechanism->drives[d];
     ++wanted;
     const std::string channel = drive.name + ".force";
@@ -128,7 +132,8 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
   const bool table = input.table != nullptr && (reader.measured.witness == "reference" ||
                                                 reader.truth.witness == "reference");
   const bool all = pair->drives.size() == wanted || (table && !pair->drives.empty());
-  pair->compared = all && (!pair->drives.empty() || (input.motion->free() && pair->samples > 0));
+  pair->compared =
+      all && (!pair->drives.empty() || ((input.motion->free() || shared) && pair->samples > 0));
   if (pair->compared) {
     pair->reason.clear();
     if (!pair->drives.empty()) {

@@ -169,7 +169,8 @@ BentRun MutationBench::Run(const Mechanism& wrong) const {
     *sample = driven_[next++];
     return next == driven_.size() ? driven_summary_ : RunSummary::Done();
   };
-  SimulatedWitness witness = RunSimulation(scenario(), wrong, driven, Engine::kCorrected, {});
+  SimulatedWitness witness = RunSimulation(scenario(), wrong, driven,
+                                           OptionsOf(scenario(), wrong, Engine::kCorrected), {});
   if (witness.diagnostics.has_errors()) {
     bent.failure = witness.diagnostics.findings().front().message;
     return bent;

@@ -15,6 +15,12 @@ const PairComparison* MainPair(const Comparison& comparison) {
   return nullptr;
 }
 
+const char* EngineComparison::NameOf(const std::string& engine) {
+  if (engine == "defaults") return "MuJoCo, default softness, position targets";
+  if (engine == "stock") return "MuJoCo, best recipe from outside";
+  return "with the corrections";
+}
+
 std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& comparison) {
   std::vector<SignalSheet> sheets;
   for (const Drive& drive : mechanism.drives) sheets.push_back(SheetOf(mechanism, drive));
