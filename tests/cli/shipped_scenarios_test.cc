@@ -54,7 +54,7 @@ std::string Culprits(const nlohmann::json& summary) {
 // What the documents quote of a scenario is what it gives.
 void CheckDocuments(const std::string& scenario, const std::string& summary) {
   for (const char* document : {"README.md", "docs/simulation.md"}) {
-    const std::string text = ReadAll(fs::path(MBV_SOURCE_DIR) / document);
+    const std::string text = ReadAll(fs::path(kSourceDir) / document);
     for (const AccuracyCell& cell : AccuracyCells(text)) {
       if (cell.scenario != scenario) continue;
       const auto measured = AccuracyText(cell.heading, summary);
@@ -99,7 +99,7 @@ INSTANTIATE_TEST_SUITE_P(Shipped, ShippedScenario, testing::ValuesIn(ShippedScen
                          [](const auto& info) { return NameOf(info.param); });
 
 TEST(ShippedScenarios, DocumentsQuoteScenariosThatExist) {
-  const fs::path root = MBV_SOURCE_DIR;
+  const fs::path root = kSourceDir;
   size_t quoted = 0;
   for (const char* document : {"README.md", "docs/simulation.md"}) {
     for (const AccuracyCell& cell : AccuracyCells(ReadAll(root / document))) {

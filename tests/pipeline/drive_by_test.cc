@@ -2,12 +2,13 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 std::string Scenario(const std::string& name) {
-  return std::string(MBV_SOURCE_DIR) + "/scenarios/" + name + ".yaml";
+  return SourcePath("/scenarios/" + name + ".yaml");
 }
 
 RunOutcome Run(const std::string& scenario, std::vector<SetValue> set = {}) {

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -17,7 +18,7 @@ RunOutcome Run(const std::string& scenario, std::vector<SetValue> set) {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = std::move(set);
-  return RunScenario(std::string(MBV_SOURCE_DIR) + "/scenarios/" + scenario + ".yaml", options);
+  return RunScenario(SourcePath("/scenarios/" + scenario + ".yaml"), options);
 }
 
 std::string ReadText(const fs::path& path) {
@@ -29,7 +30,7 @@ std::string ReadText(const fs::path& path) {
 
 // At rest without weight MuJoCo has the solution from the start, and must be made to refine it.
 TEST(Weightless, EveryStaticScenarioAgrees) {
-  const fs::path source = MBV_SOURCE_DIR;
+  const fs::path source = kSourceDir;
   const fs::path folder = fs::path(testing::TempDir()) / "weightless";
   size_t ran = 0;
   for (const auto& entry : fs::directory_iterator(source / "scenarios")) {
