@@ -19,7 +19,7 @@ struct MjcfOptions {
   double time_constant_steps = kMjcfTimeConstantSteps;  ///< of every equality (solref), in steps
   bool default_softness = false;  ///< equalities as soft as MuJoCo makes them unasked
   bool guided = true;             ///< false: the equalities that guide drives are switched off
-  std::vector<double> kp, kv;     ///< servos: per drive, a position and a velocity actuator
+  std::vector<double> kp = {}, kv = {};  ///< servos: per drive, a position and a velocity actuator
 };
 
 /// The MJCF of a mechanism in its home pose: bodies along the spanning tree (mjcf/plan.h),

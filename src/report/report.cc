@@ -7,8 +7,8 @@
 namespace mbv {
 
 const PairComparison* MainPair(const Comparison& comparison) {
-  for (const char* name :
-       {"simulated_vs_analytic", "simulated_vs_reference", "reference_vs_analytic"}) {
+  for (const char* name : {"simulated_vs_reached", "simulated_vs_analytic",
+                           "simulated_vs_reference", "reference_vs_analytic"}) {
     const PairComparison* pair = comparison.FindPair(name);
     if (pair != nullptr && pair->compared) return pair;
   }

@@ -100,8 +100,8 @@ struct RunCounts {
 /// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
 [[nodiscard]] std::string CountLine(const RunCounts& counts);
 
-/// The pair a reader looks at first: simulated vs analytic if compared, else simulated vs
-/// reference, else reference vs analytic; null if none was compared.
+/// The pair a reader looks at first: of servos simulated vs reached; simulated vs analytic if
+/// compared, else simulated vs reference, else reference vs analytic; null if none was compared.
 [[nodiscard]] const PairComparison* MainPair(const Comparison& comparison);
 
 /// mechanisms' force signals and the reactions that were compared.
