@@ -89,6 +89,8 @@ void AddOutputOptions(CLI::App* app, RegressArguments* arguments) {
   app->add_flag("--no-history", arguments->no_history, "do not keep or judge the history");
   app->add_option("--junit", options.junit, "JUnit XML file (OUT/junit.xml)");
   app->add_option("--markdown", options.markdown, "Markdown file (OUT/summary.md)");
+  app->add_option("--tables", options.tables,
+                  "documents whose accuracy tables are filled with the results");
   app->add_option("--label", options.label, "text kept with the run, e.g. a commit");
   app->add_flag("--fail-on-drift", arguments->fail_on_drift, "exit code 1 if a metric drifted");
   app->add_flag("-q,--quiet", arguments->quiet, "only what failed or drifted, and the counts");

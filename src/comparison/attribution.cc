@@ -13,6 +13,7 @@
 #include <optional>
 
 #include "comparison/attribution_parts.h"
+#include "comparison/driven.h"
 #include "comparison/metrics.h"
 
 namespace mbv {
@@ -283,8 +284,11 @@ bool Failed(const CheckResult* check) { return check != nullptr && check->limit 
 
 Attribution Attribute(const ComparisonInput& input, const Comparison& comparison) {
   if (comparison.verdict == Verdict::kNotRun) return {};
-  if (comparison.verdict == Verdict::kAgree) return {"", AgreementText(input, comparison)};
-  Attribution attribution = OfDisagreement(input, comparison);
+  const Attribution driven = AttributeDriven(input, comparison);
+  if (comparison.verdict == Verdict::kAgree) {
+    return driven.text.empty() ? Attribution{"", AgreementText(input, comparison)} : driven;
+  }
+  Attribution attribution = driven.text.empty() ? OfDisagreement(input, comparison) : driven;
   if (comparison.table) {
     for (const std::string& diagnosis : comparison.table->diagnoses) {
       attribution.text += (attribution.text.empty() ? "" : "; ") + diagnosis;

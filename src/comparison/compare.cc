@@ -6,6 +6,7 @@
 
 #include "comparison/comparison.h"
 #include "comparison/drive_motion.h"
+#include "comparison/driven.h"
 #include "comparison/force_scale.h"
 #include "comparison/reservations.h"
 #include "comparison/table_diagnosis.h"
@@ -50,9 +51,28 @@ LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) 
   return measured == "simulated" ? input.simulation_limits : LimitColumn::kReference;
 }
 
-// `tubes`: what a table's own uncertainty allows; the wider of it and the limit counts.
+// Limits that do not come from the scenario.
+struct OtherLimits {
+  std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
+  std::map<Metric, double> growth;  ///< where bent forces lead: counts instead of the limit
+};
+
+void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check) {
+  const auto tube = other.tubes.find(check->metric), growth = other.growth.find(check->metric);
+  if (!check->limit) return;
+  if (tube != other.tubes.end() && tube->second > *check->limit) {
+    check->stated_limit = check->limit;
+    check->limit = tube->second;
+    check->limit_by = "the table's uncertainty";
+  } else if (growth != other.growth.end()) {
+    check->stated_limit = check->limit;
+    check->limit = growth->second;
+    check->limit_by = fmt::format("forces bent by {:.0e}", input.bend);
+  }
+}
+
 void AddChecks(const ComparisonInput& input, const std::string& subject, LimitColumn column,
-               const std::map<Metric, Measured>& metrics, const std::map<Metric, double>& tubes,
+               const std::map<Metric, Measured>& metrics, const OtherLimits& other,
                Comparison* comparison) {
   for (const auto& [metric, measured] : metrics) {
     CheckResult check{.name = subject + "." + RowOf(metric).key,
@@ -61,14 +81,11 @@ void AddChecks(const ComparisonInput& input, const std::string& subject, LimitCo
                       .value = measured.value,
                       .limit = input.limits[metric].Of(column),
                       .stated_limit = {},
+                      .limit_by = {},
                       .time_s = measured.time_s,
                       .channel = measured.channel,
                       .floored = measured.floored};
-    const auto tube = tubes.find(metric);
-    if (check.limit && tube != tubes.end() && tube->second > *check.limit) {
-      check.stated_limit = check.limit;
-      check.limit = tube->second;
-    }
+    ApplyOther(other, input, &check);
     check.pass = check.limit && check.value <= *check.limit;  // false for NaN
     check.follows = ComparesMotionWithItself(input, subject, metric);
     comparison->checks.push_back(std::move(check));
@@ -100,12 +117,18 @@ void AddPair(const ComparisonInput& input, const char* measured, const char* tru
   pair.truth = truth;
   pair.reason = WhyNot(*a, *b);
   if (pair.reason.empty()) pair = ComparePair(input, *a->trace, *b->trace);
-  std::map<Metric, double> tubes;
+  LeaveOutReachedMotion(&pair);
+  OtherLimits other;
+  if (pair.compared && SharesForces(input, measured, truth)) {
+    other.growth = GrowthLimits(input, *a->trace);
+  }
   if (Ran(*a) && Ran(*b) && (IsTable(input, measured) || IsTable(input, truth))) {
-    tubes = JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
+    other.tubes =
+        JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
   }
   if (!pair.compared) comparison->not_compared.push_back({pair.name(), pair.reason});
-  AddChecks(input, pair.name(), ColumnOf(input, measured), pair.metrics, tubes, comparison);
+  AddChecks(input, pair.name(), ColumnOfPair(input, measured, truth), pair.metrics, other,
+            comparison);
   comparison->pairs.push_back(std::move(pair));
 }
 
@@ -170,6 +193,11 @@ void AddCommandNotes(const ComparisonInput& input, Comparison* comparison) {
 
 // Given forces are the same in every witness.
 void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
+  if (input.drive_by == DriveBy::kForces) {
+    comparison->not_compared.push_back(
+        {"simulated drive forces",
+         "they are the " + input.driven_by + " forces; the motion that they cause is compared"});
+  }
   for (const DriveForce& force : input.motion->forces) {
     comparison->not_compared.push_back({input.mechanism->drives[force.drive].name + ".force",
                                         "it is given by the scenario; the motion it causes is "
@@ -259,6 +287,8 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     if (!comparison->pairs.empty()) comparison->reason += ": " + comparison->pairs.front().reason;
     return;
   }
+  comparison->reason = WhyHorizonTooLong(input, *comparison);
+  if (!comparison->reason.empty()) return;
   const std::string nothing = WhyNothingVerified(input, *comparison);
   const size_t failed = comparison->failed();
   if (failed == 0 && !nothing.empty()) {
@@ -324,6 +354,28 @@ size_t Comparison::blind() const {
   }));
 }
 
+namespace {
+
+// What a witness shows by itself. Servos follow their commands as well as their gains let them.
+void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison* comparison) {
+  WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
+  OtherLimits other;
+  if (IsTable(input, witness.name)) other.tubes = CommandTubes(input);
+  const bool simulated = witness.name == "simulated";
+  if (simulated) other.growth = CommandGrowth(GrowthLimits(input, *witness.trace));
+  std::map<Metric, Measured> commands, others = metrics.metrics;
+  for (const Metric metric : {Metric::kCommandM, Metric::kCommandRad}) {
+    if (auto found = others.extract(metric)) commands.insert(std::move(found));
+  }
+  const LimitColumn column = ColumnOf(input, witness.name);
+  const bool servo = simulated && input.drive_by == DriveBy::kServos;
+  AddChecks(input, witness.name, servo ? LimitColumn::kServo : column, commands, other, comparison);
+  AddChecks(input, witness.name, column, others, other, comparison);
+  comparison->witnesses.push_back(std::move(metrics));
+}
+
+}  // namespace
+
 Comparison Compare(const ComparisonInput& given) {
   ComparisonInput input = given;
   const DrivenTwists twists = TwistsFor(input);
@@ -337,14 +389,9 @@ Comparison Compare(const ComparisonInput& given) {
   // The generic solver takes part by its own name where a table has the reference's place.
   AddPair(input, "simulated", "solver", &comparison);
   AddPair(input, "reference", "solver", &comparison);
+  AddPair(input, "simulated", "reached", &comparison);
   for (const Witness& witness : input.witnesses) {
-    if (!Ran(witness)) continue;
-    WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
-    const auto tubes =
-        IsTable(input, witness.name) ? CommandTubes(input) : std::map<Metric, double>();
-    AddChecks(input, witness.name, ColumnOf(input, witness.name), metrics.metrics, tubes,
-              &comparison);
-    comparison.witnesses.push_back(std::move(metrics));
+    if (Ran(witness) && witness.name != "reached") AddWitness(input, witness, &comparison);
   }
   AddMissingNotes(input, &comparison);
   AddReactionNotes(input, &comparison);

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/driven.h"
 #include "comparison/force_scale.h"
 #include "comparison/pair_reader.h"
 
@@ -74,7 +75,9 @@ std::vector<DriveError> DriveErrors(const ComparisonInput& input, const PairRead
                                     size_t* wanted) {
   std::vector<DriveError> errors;
   for (size_t d = 0; d < input.mechanism->drives.size(); ++d) {
-    if (input.motion->FindForce(static_cast<int>(d)) >= 0) continue;  // given to both
+    // Given to both.
+    if (input.motion->FindForce(static_cast<int>(d)) >= 0) continue;
+    if (SharesForces(input, reader.measured.witness, reader.truth.witness)) continue;
     const Drive& drive = input.mechanism->drives[d];
     ++*wanted;
     const std::string channel = drive.name + ".force";
@@ -102,7 +105,9 @@ std::string WhyNot(const ComparisonInput& input, const PairReader& reader, size_
   const bool table = input.table != nullptr && (reader.measured.witness == "reference" ||
                                                 reader.truth.witness == "reference");
   if (reader.samples.empty()) return "the two have no sample time in common";
-  if (pair.drives.empty() && !(input.motion->free() && wanted == 0)) {
+  const bool motion_only =
+      input.motion->free() || SharesForces(input, reader.measured.witness, reader.truth.witness);
+  if (pair.drives.empty() && !(motion_only && wanted == 0)) {
     return "no drive force is in both, or no sample is in the judged window";
   }
   if (pair.drives.size() != wanted && !table) {

@@ -20,6 +20,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
+#include "scenario/scenario.h"
 #include "scenario/table.h"
 
 namespace mbv {
@@ -29,7 +30,7 @@ enum class Verdict { kNotRun, kAgree, kDisagree };
 
 /// One witness as handed to the comparison.
 struct Witness {
-  std::string name;              ///< "analytic", "reference" or "simulated"
+  std::string name;              ///< "analytic", "reference", "simulated", "solver", "reached"
   const Trace* trace = nullptr;  ///< null if there is none; summary says why
   RunSummary summary;            ///< the trace is compared only if this is ok
 };
@@ -46,6 +47,9 @@ struct ComparisonInput {
   std::vector<std::string> reactions_not_unique;
   const AlignedTable* table = nullptr;  ///< what the witness "reference" is, if it is a table
   const DrivenTwists* twists = nullptr;  ///< TwistsFor() this; found where needed if null
+  DriveBy drive_by = DriveBy::kMotion;  ///< what moves the simulation's drives (driven.h)
+  const Trace* bent = nullptr;  ///< force-driven: the same run with bent forces, witness "bent"
+  double bend = kNan;           ///< by this share of their RMS
 };
 
 /// Judges where a free motion leads.
@@ -147,8 +151,10 @@ struct CheckResult {
   Metric metric = Metric::kForceNrmse;
   double value = kNan;
   std::optional<double> limit;  ///< empty: switched off in the scenario
-  /// Set where `limit` is not the scenario's own but what a table's uncertainty allows.
+  /// Set where `limit` is not the scenario's own but what a table's uncertainty allows, or how far
+  /// bent forces lead.
   std::optional<double> stated_limit;
+  std::string limit_by;  ///< what `limit` comes from then
   bool pass = false;
   /// Compares a drive motion with itself: it can fail, but that it passes verifies nothing.
   bool follows = false;

@@ -90,6 +90,17 @@ std::string DrivingText(const ComparisonInput& input) {
     return "free motion: the simulation starts from the state that the reference computes from the "
            "initial values; then forces alone move it";
   }
+  if (input.drive_by != DriveBy::kMotion) {
+    const char* driver = input.driven_by == "analytic" ? "closed form" : "reference";
+    if (input.drive_by == DriveBy::kServos) {
+      return fmt::format("MuJoCo's servos follow the drive motion that the {} computes; nothing else "
+                         "guides the simulation's drives",
+                         driver);
+    }
+    return fmt::format("the drive forces that the {} computes push the simulation in open loop from "
+                       "the commanded start; nothing guides its drives",
+                       driver);
+  }
   const std::vector<bool> commanded = CommandedDrives(input);
   if (std::find(commanded.begin(), commanded.end(), false) == commanded.end()) {
     return "commanded in joint space, every computation is given the same drive motion";
@@ -109,6 +120,9 @@ bool ComparesMotionWithItself(const ComparisonInput& input, const std::string& s
     return subject.starts_with(witness) || subject.ends_with(witness);
   };
   const bool table = input.table != nullptr && involves("reference");
+  // Pushed drives and servos go where forces lead them.
+  const bool by_forces = input.drive_by != DriveBy::kMotion && involves("simulated");
+  if (by_forces && metric != Metric::kDerivatives) return false;
   switch (metric) {
     case Metric::kPositionM:
     case Metric::kPositionRad:

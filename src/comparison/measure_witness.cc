@@ -127,7 +127,7 @@ void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, const
   for (const auto& [angle, sum] : sums) {
     const double floor =
         std::max(kSlowestRate * length_m, kIdle * fastest) / (angle ? length_m : 1.0);
-    KeepWorst(&out->metrics[metric], sum.Nrmse(floor), sum.worst_time_s(), sum.worst_channel());
+    KeepWorst(&out->metrics[metric], sum.MeasuredNrmse(floor));
   }
 }
 

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/driven.h"
 #include "mechanism/constraints.h"
 
 namespace mbv {
@@ -37,8 +38,7 @@ bool ZeroPasses(const Comparison& comparison, const CheckResult& check) {
 }
 
 bool Judges(const ComparisonInput& input, const CheckResult& check) {
-  return check.limit &&
-         (input.motion->free() ? IsTrajectory(check.metric) : IsDriveForce(check.metric));
+  return IsEvidence(input, check);
 }
 
 // All limits that are too wide, with the checks they belong to.
@@ -145,7 +145,8 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
     any = true;
     coarse = coarse && IsCoarse(input, check);
   }
-  const char* what = input.motion->free() ? "position and pose" : "force";
+  const bool motion = input.motion->free() || input.drive_by == DriveBy::kForces;
+  const char* what = motion ? "position and pose" : "force";
   if (!any) return fmt::format("every {} check is switched off, so nothing was verified", what);
   if (coarse) {
     return fmt::format("every {} limit is so wide that it verifies nothing: {}", what,

@@ -30,7 +30,7 @@ class MjcfWriter {
     WriteTree();
     WriteTendons();
     WriteEqualities();
-    WriteMotors();
+    WriteActuators();
     WriteSensors();
     xml_.Close();
     return xml_.Text();
@@ -75,16 +75,10 @@ class MjcfWriter {
 
   void WriteDefaults() {
     xml_.Open("default");
-    xml_.Open("equality");
-    xml_.Set("solref", std::array<double, 2>{options_.time_constant_steps * options_.step_s, 1.0});
-    xml_.Set("solimp", std::array<double, 5>{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0});
-    xml_.Close();
-    xml_.Open("joint");
-    xml_.Set("limited", "false");
-    xml_.Close();
-    xml_.Open("tendon");
-    xml_.Set("limited", "false");
-    xml_.Close();
+    if (!options_.default_softness) WriteSoftness();
+    Option("joint", "limited", "false");
+    Option("tendon", "limited", "false");
+    // Of all actuators: MuJoCo keeps one default for them.
     xml_.Open("motor");
     xml_.Set("ctrllimited", "false");
     xml_.Set("forcelimited", "false");
@@ -97,6 +91,13 @@ class MjcfWriter {
     xml_.Set("group", "3");
     xml_.Set("size", "0.005");
     xml_.Close();
+    xml_.Close();
+  }
+
+  void WriteSoftness() {
+    xml_.Open("equality");
+    xml_.Set("solref", std::array<double, 2>{options_.time_constant_steps * options_.step_s, 1.0});
+    xml_.Set("solimp", std::array<double, 5>{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0});
     xml_.Close();
   }
 
@@ -263,15 +264,16 @@ class MjcfWriter {
       const auto* driven = std::get_if<JointDrive>(&drive.kind);
       const std::string name = mjcf::DriveEqualityName(drive);
       if (driven == nullptr) {
-        WriteGuide("tendon", name, "tendon1", drive.name);
+        WriteOn("tendon", name, "tendon1", drive.name, options_.guided);
       } else if (IsGuided(driven->joint)) {
-        WriteGuide("joint", name, "joint1",
-                   mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
+        WriteOn("joint", name, "joint1",
+                mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate),
+                options_.guided);
       }
     }
     for (const Prescribed& base : mechanism_.prescribed) {
-      WriteGuide("joint", mjcf::BaseEqualityName(base), "joint1",
-                 mjcf::JointName(mechanism_.joints[base.joint], 0));
+      WriteOn("joint", mjcf::BaseEqualityName(base), "joint1",
+              mjcf::JointName(mechanism_.joints[base.joint], 0));
     }
     xml_.Close();
   }
@@ -300,37 +302,43 @@ class MjcfWriter {
     xml_.Close();
   }
 
-  void WriteGuide(const char* element, const std::string& name, const char* object_key,
-                  const std::string& object) {
+  // An equality or sensor on one object.
+  void WriteOn(const char* element, const std::string& name, const char* object_key,
+               const std::string& object, bool active = true) {
     xml_.Open(element);
     xml_.Set("name", name);
+    if (!active) xml_.Set("active", "false");
     xml_.Set(object_key, object);
     xml_.Close();
   }
 
-  void WriteMotors() {
+  // One actuator on a drive's tendon or joint; `gain` is an attribute, or nullptr.
+  void WriteActuator(const char* element, const std::string& name, const Drive& drive,
+                     const char* gain, double value) {
+    const auto* driven = std::get_if<JointDrive>(&drive.kind);
+    if (driven != nullptr && !IsGuided(driven->joint)) return;
+    xml_.Open(element);
+    xml_.Set("name", name);
+    if (driven == nullptr) {
+      xml_.Set("tendon", drive.name);
+    } else {
+      xml_.Set("joint", mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
+    }
+    if (gain != nullptr) xml_.Set(gain, value);
+    xml_.Close();
+  }
+
+  void WriteActuators() {
     if (mechanism_.drives.empty()) return;
     xml_.Open("actuator");
     for (const Drive& drive : mechanism_.drives) {
-      const auto* driven = std::get_if<JointDrive>(&drive.kind);
-      if (driven != nullptr && !IsGuided(driven->joint)) continue;
-      xml_.Open("motor");
-      xml_.Set("name", drive.name);
-      if (driven == nullptr) {
-        xml_.Set("tendon", drive.name);
-      } else {
-        xml_.Set("joint", mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
-      }
-      xml_.Close();
+      WriteActuator("motor", drive.name, drive, nullptr, 0.0);
     }
-    xml_.Close();
-  }
-
-  void WriteSensor(const char* element, const std::string& name, const char* object_key,
-                   const std::string& object) {
-    xml_.Open(element);
-    xml_.Set("name", name);
-    xml_.Set(object_key, object);
+    for (size_t k = 0; k < options_.kp.size(); ++k) {
+      const Drive& drive = mechanism_.drives[k];
+      WriteActuator("position", drive.name + mjcf::kPositionServo, drive, "kp", options_.kp[k]);
+      WriteActuator("velocity", drive.name + mjcf::kVelocityServo, drive, "kv", options_.kv[k]);
+    }
     xml_.Close();
   }
 
@@ -340,14 +348,14 @@ class MjcfWriter {
     for (const Drive& drive : mechanism_.drives) {
       const auto* driven = std::get_if<JointDrive>(&drive.kind);
       if (driven == nullptr) {
-        WriteSensor("tendonpos", drive.name + ".position", "tendon", drive.name);
+        WriteOn("tendonpos", drive.name + ".position", "tendon", drive.name);
       } else if (IsGuided(driven->joint)) {
-        WriteSensor("jointpos", drive.name + ".position", "joint",
-                    mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
+        WriteOn("jointpos", drive.name + ".position", "joint",
+                mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
       } else {
         continue;
       }
-      WriteSensor("actuatorfrc", drive.name + ".force", "actuator", drive.name);
+      WriteOn("actuatorfrc", drive.name + ".force", "actuator", drive.name);
     }
     for (const PlannedClosure& closure : plan_.closures) WriteClosureSensors(closure);
     xml_.Close();
@@ -365,8 +373,8 @@ class MjcfWriter {
     xml_.Set("refname", name + ".F");
     xml_.Close();
     if (closure.type != PlannedClosure::Type::kSplit) return;
-    WriteSensor("force", name + ".closure_force", "site", name + ".F");
-    WriteSensor("torque", name + ".closure_torque", "site", name + ".F");
+    WriteOn("force", name + ".closure_force", "site", name + ".F");
+    WriteOn("torque", name + ".closure_torque", "site", name + ".F");
   }
 
   const Mechanism& mechanism_;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "mechanism/mechanism.h"
 
@@ -13,15 +14,19 @@ inline constexpr double kMjcfImpedance = 0.9999;
 inline constexpr double kMjcfTimeConstantSteps = 2.0;
 
 struct MjcfOptions {
-  double step_s = 1e-3;  ///< <option timestep>
-  bool pictures = true;  ///< geoms, lights and scene assets
+  double step_s = 1e-3;                                 ///< <option timestep>
+  bool pictures = true;                                 ///< geoms, lights and scene assets
   double time_constant_steps = kMjcfTimeConstantSteps;  ///< of every equality (solref), in steps
+  bool default_softness = false;  ///< equalities as soft as MuJoCo makes them unasked
+  bool guided = true;             ///< false: the equalities that guide drives are switched off
+  std::vector<double> kp = {}, kv = {};  ///< servos: per drive, a position and a velocity actuator
 };
 
 /// The MJCF of a mechanism in its home pose: bodies along the spanning tree (mjcf/plan.h),
 /// `connect`/`weld` equalities "close:JOINT" for the closures, `joint`/`tendon` equalities
 /// "drive:DRIVE" and "base:PRESCRIBED" that guide drives and prescribed joints (at home until the
-/// first polynomial coefficient is changed), motors and sensors for stock tools, sites "JOINT.F"
+/// first polynomial coefficient is changed), motors and sensors for stock tools, with gains also
+/// servos "DRIVE.position_servo" and "DRIVE.velocity_servo", sites "JOINT.F"
 /// (on the parent) and "JOINT.M" (on the child) at closures and sites named like the outputs.
 /// Every number reads back as the same double. Loads in MuJoCo 2.2.2 and later.
 [[nodiscard]] std::string WriteMjcf(const Mechanism& mechanism, const MjcfOptions& options = {});

@@ -80,4 +80,8 @@ inline constexpr double kTinyMassFraction = 1e-11;
 [[nodiscard]] std::string DriveEqualityName(const Drive& drive);     // "drive:DRIVE"
 [[nodiscard]] std::string BaseEqualityName(const Prescribed& base);  // "base:PRESCRIBED"
 
+/// Endings of the names of a drive's servo actuators.
+inline constexpr const char* kPositionServo = ".position_servo";
+inline constexpr const char* kVelocityServo = ".velocity_servo";
+
 }  // namespace mbv::mjcf

@@ -80,6 +80,9 @@ const Direction& BendSearch::Weaker() const {
   const Direction &up = ways_[0], &down = ways_[1];
   if (up.ran != down.ran) return up.ran ? up : down;
   if (up.detected != down.detected) return up.detected ? down : up;
+  if (!up.detected && std::isnan(up.smallest) && std::isnan(down.smallest)) {
+    return down.unseen > up.unseen ? down : up;
+  }
   return down.smallest > up.smallest ? down : up;
 }
 

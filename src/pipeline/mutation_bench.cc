@@ -186,7 +186,10 @@ DrivenMotion MutationBench::Remembered() const {
 BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario,
                            const DrivenMotion& driven) const {
   BentRun bent;
-  SimulatedWitness witness = RunSimulation(scenario, wrong, driven, EngineOf(scenario), {});
+  // Drives are held on their motion: what they are bent by must not move the motion as well.
+  SimulationOptions options = OptionsOf(scenario, wrong, EngineOf(scenario));
+  options.drives = DriveMode::kGuided;
+  SimulatedWitness witness = RunSimulation(scenario, wrong, driven, options, {});
   if (witness.diagnostics.has_errors()) {
     bent.failure = witness.diagnostics.findings().front().message;
     return bent;

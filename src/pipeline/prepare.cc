@@ -40,4 +40,14 @@ DrivenMotion Prepared::MakeDrivenMotion() const {
   return DriveByClosedForm(scenario.motion, std::move(fresh.closed_form));
 }
 
+DriveForces Prepared::MakeDriveForces() const {
+  const SimulationSettings& settings = scenario.simulation;
+  const bool servo = settings.drive_by == DriveBy::kServos && settings.servo.feedforward;
+  if (!settings.forward || (settings.drive_by != DriveBy::kForces && !servo)) return {};
+  if (driven_by != "analytic") return ForcesByReference(mechanisms.reference, scenario.motion);
+  Diagnostics known;
+  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);
+  return ForcesByClosedForm(scenario.motion, std::move(fresh.closed_form));
+}
+
 }  // namespace mbv

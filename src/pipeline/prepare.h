@@ -20,6 +20,9 @@ struct Prepared {
 
   /// The commanded motion of everything driven; refers to this object.
   [[nodiscard]] DrivenMotion MakeDrivenMotion() const;
+  /// The drive forces for it, by the same witness; refers to this object. Empty where the
+  /// simulation is given none.
+  [[nodiscard]] DriveForces MakeDriveForces() const;
 };
 
 /// Loads a scenario with everything it needs. Empty after bad input; warnings may remain.

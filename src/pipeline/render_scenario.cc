@@ -83,9 +83,11 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
     return request.progress ? [&request, stage](double f) { request.progress(stage, f); }
                             : std::function<void(double)>();
   };
+  SimulationOptions options = OptionsOf(scenario, prepared->base, Engine::kCorrected);
+  options.forces = prepared->MakeDriveForces();
   const SimulatedWitness witness =
-      RunSimulation(scenario, prepared->mechanisms.simulated, prepared->MakeDrivenMotion(),
-                    Engine::kCorrected, progress("simulation"));
+      RunSimulation(scenario, prepared->mechanisms.simulated, prepared->MakeDrivenMotion(), options,
+                    progress("simulation"));
   outcome.diagnostics.Append(witness.diagnostics);
   if (!witness.run.summary.ok()) {
     AddError(file, witness.run.summary, &outcome.diagnostics);

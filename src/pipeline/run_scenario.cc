@@ -8,6 +8,8 @@
 
 #include "core/demand.h"
 #include "mechanism/mobility.h"
+#include "pipeline/drive_by.h"
+#include "pipeline/engine_errors.h"
 #include "pipeline/free_motion_text.h"
 #include "pipeline/not_run.h"
 #include "pipeline/output_folder.h"
@@ -25,6 +27,10 @@
 
 namespace mbv {
 namespace {
+
+int ExitCodeOf(Verdict verdict) {
+  return verdict == Verdict::kAgree ? 0 : verdict == Verdict::kDisagree ? 1 : 3;
+}
 
 class ScenarioRun {
  public:
@@ -44,7 +50,7 @@ class ScenarioRun {
     DrawPictures();
     report_.timing.total_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    report_.exit_code = ExitCode();
+    report_.exit_code = ExitCodeOf(report_.comparison.verdict);
     outcome_.exit_code = report_.exit_code;
     WriteFiles();
     outcome_.report = std::move(report_);
@@ -73,37 +79,16 @@ class ScenarioRun {
     report_.model_file = scenario().model_file;
     report_.description = scenario().description;
     for (const Drive& drive : base().drives) report_.drives.push_back(drive.name);
-    report_.mode = !simulation.on ? "off" : simulation.forward ? "forward" : "inverse";
+    report_.mode = ModeText(simulation);
     report_.engine = simulation.stock_engine ? "stock" : "corrected";
     report_.step_s = simulation.step_s;
     report_.duration_s = scenario().motion.duration_s;
     report_.sample_s = scenario().motion.sample_s;
     report_.start_window_s = scenario().start_window_s;
     report_.driven_by = prepared_->driven_by;
-    report_.simulation = SimulationLine();
+    report_.simulation = SimulationLine(*prepared_);
     report_.findings = outcome_.diagnostics;
     report_.versions = Versions();
-  }
-
-  std::string SimulationLine() const {
-    const SimulationSettings& simulation = scenario().simulation;
-    if (!simulation.on) return "no simulation";
-    std::string line = simulation.forward
-                           ? fmt::format("forward simulation, step {:g} ms, {} engine",
-                                         1e3 * simulation.step_s, report_.engine)
-                           : std::string("inverse dynamics at each sample");
-    const std::string motion = scenario().motion.free() ? FreeMotionText(base(), scenario().motion)
-                                                        : report_.driven_by + " drive motion";
-    line += fmt::format(", {}, {:g} s sampled every {:g} ms", motion, report_.duration_s,
-                        1e3 * report_.sample_s);
-    if (simulation.extrapolate) {
-      line += fmt::format(
-          "; forces extrapolated in {} from {:g} and {:g} to {:g}",
-          simulation.extrapolate->parameter, simulation.extrapolate->from[0],
-          simulation.extrapolate->from[1],
-          prepared_->mechanisms.simulated.ParameterValue(simulation.extrapolate->parameter));
-    }
-    return line;
   }
 
   void AddWitness(const std::string& name, RunSummary summary, Trace trace) {
@@ -196,19 +181,51 @@ class ScenarioRun {
       return;
     }
     const Engine engine = scenario().simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
-    SimulatedWitness witness =
-        RunSimulation(scenario(), prepared_->mechanisms.simulated, prepared_->MakeDrivenMotion(),
-                      engine, ProgressOf("simulation"));
+    SimulationOptions options = OptionsOf(scenario(), base(), engine);
+    options.forces = prepared_->MakeDriveForces();
+    SimulatedWitness witness = Simulated(options, "simulation");
     outcome_.diagnostics.Append(witness.diagnostics);
     report_.timing.simulation_s = witness.run.summary.wall_s;
     report_.timing.loop_s = witness.run.loop_wall_s;
     report_.timing.steps = witness.run.steps;
     AddWarnings(witness.run.warnings);
     report_.simulated_not_unique = witness.run.not_unique;
+    for (const std::string& note : witness.run.notes) AddWarning(note);
     CheckJoints(&witness.run);
     AddWitness("simulated", witness.run.summary, witness.run.trace);
     simulation_ = std::move(witness.run);
-    RunOtherEngine(engine == Engine::kStock ? Engine::kCorrected : Engine::kStock);
+    if (!simulation_->summary.ok()) return;
+    switch (scenario().simulation.drive_by) {
+      case DriveBy::kMotion:
+        return RunOtherEngines(engine);
+      case DriveBy::kForces:
+        return RunBent(options);
+      case DriveBy::kServos:
+        return RunReachedWitness();
+    }
+  }
+
+  SimulatedWitness Simulated(const SimulationOptions& options, const std::string& stage) {
+    return RunSimulation(scenario(), prepared_->mechanisms.simulated, prepared_->MakeDrivenMotion(),
+                         options, ProgressOf(stage));
+  }
+
+  // Open loop: the same run with wrong forces shows how errors grow.
+  void RunBent(SimulationOptions options) {
+    const std::optional<double>& limit = scenario().checks[Metric::kForceNrmse].forward;
+    bend_ = limit.value_or(*RowOf(Metric::kForceNrmse).limits.forward);
+    options.forces = Bent(prepared_->MakeDriveForces(), base(), Driver().trace, bend_);
+    SimulatedWitness bent = Simulated(options, "bent forces");
+    if (!bent.run.summary.ok()) return AddWarning("bent forces: " + bent.run.summary.message);
+    bent_ = std::move(bent.run.trace);
+    bent_->witness = "bent";
+  }
+
+  // The reference where the servos went.
+  void RunReachedWitness() {
+    ReferenceRun run =
+        RunReached(prepared_->mechanisms.reference, scenario().motion, simulation_->trace);
+    AddWitness("reached", std::move(run.summary), std::move(run.trace));
   }
 
   void AddWarning(const std::string& text) {
@@ -231,17 +248,26 @@ class ScenarioRun {
     run->summary = LimitSummary(violations);
   }
 
-  // The simulator's own modelling error: the same run by the other engine.
-  void RunOtherEngine(Engine other) {
+  // The simulator's own modelling error: the same run by the other engines.
+  void RunOtherEngines(Engine judged) {
     const SimulationSettings& settings = scenario().simulation;
     // Its error is stated in drive forces, which a free motion does not compare.
-    if (scenario().motion.free()) return;
-    if (!settings.forward || !settings.stock_too || !simulation_->summary.ok()) return;
-    SimulatedWitness witness = RunSimulation(
-        scenario(), prepared_->mechanisms.simulated, prepared_->MakeDrivenMotion(), other,
-        ProgressOf(other == Engine::kStock ? "stock engine" : "corrected engine"));
-    report_.timing.stock_s = witness.run.summary.wall_s;
-    other_engine_ = std::move(witness.run);
+    if (scenario().motion.free() || !settings.forward || !settings.stock_too) return;
+    for (const Engine engine : {Engine::kDefaults, Engine::kStock, Engine::kCorrected}) {
+      EngineRun& run = other_engines_.emplace_back();
+      run.engine = engine;
+      if (engine == judged) {
+        run.trace = simulation_->trace;
+        run.summary = simulation_->summary;
+        continue;
+      }
+      SimulatedWitness witness =
+          Simulated(OptionsOf(scenario(), base(), engine),
+                    engine == Engine::kCorrected ? "corrected engine" : "stock engine");
+      report_.timing.stock_s += witness.run.summary.wall_s;
+      run.trace = std::move(witness.run.trace);
+      run.summary = std::move(witness.run.summary);
+    }
   }
 
   ComparisonInput MakeComparisonInput() const {
@@ -257,7 +283,11 @@ class ScenarioRun {
                           .reactions_not_unique = ReactionsNotUnique(
                               base(), simulation_ ? simulation_->X_WB
                                                   : std::vector<std::vector<Pose>>()),
-                          .table = table_ ? &*table_ : nullptr};
+                          .table = table_ ? &*table_ : nullptr,
+                          .drive_by = scenario().simulation.forward ? scenario().simulation.drive_by
+                                                                    : DriveBy::kMotion,
+                          .bent = bent_ ? &*bent_ : nullptr,
+                          .bend = bend_};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
           {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});
@@ -276,7 +306,7 @@ class ScenarioRun {
     report_.comparison = Compare(input);
     DoubtGravity();
     report_.sheets = SheetsOf(base(), report_.comparison);
-    if (other_engine_) CompareEngines(input);
+    if (!other_engines_.empty()) CompareEngines(input);
   }
 
   // A table that was made with another value of g agrees within any usual tolerance.
@@ -291,26 +321,7 @@ class ScenarioRun {
     // The computation that drives the simulation; else the other one.
     const bool driver = Driver().summary.ok();
     const WitnessRecord& truth = driver ? Driver() : report_.witnesses[1];
-    const auto error = [&](const SimulationRun& run) {
-      const PairComparison pair = ComparePair(input, run.trace, truth.trace);
-      const WitnessMetrics own = MeasureWitness(input, run.trace);
-      const auto value = [](const std::map<Metric, Measured>& metrics, Metric metric) {
-        const auto found = metrics.find(metric);
-        return found == metrics.end() ? kNan : found->second.value;
-      };
-      return EngineError{value(pair.metrics, Metric::kForceNrmse),
-                         value(pair.metrics, Metric::kForceMax),
-                         value(own.metrics, Metric::kClosureM)};
-    };
-    EngineComparison engines{.truth = truth.name, .stock = {}, .corrected = {}, .failure = {}};
-    const bool judged_stock = scenario().simulation.stock_engine;
-    (judged_stock ? engines.stock : engines.corrected) = error(*simulation_);
-    if (other_engine_->summary.ok()) {
-      (judged_stock ? engines.corrected : engines.stock) = error(*other_engine_);
-    } else {
-      engines.failure = other_engine_->summary.message;
-    }
-    report_.engine_comparison = std::move(engines);
+    report_.engine_comparison = mbv::CompareEngines(input, truth.trace, other_engines_);
   }
 
   void DrawPictures() {
@@ -329,18 +340,6 @@ class ScenarioRun {
       report_.findings.Add(std::move(finding));
     }
     for (const PictureFile& picture : pictures_) report_.pictures.push_back(picture.name);
-  }
-
-  int ExitCode() const {
-    switch (report_.comparison.verdict) {
-      case Verdict::kAgree:
-        return 0;
-      case Verdict::kDisagree:
-        return 1;
-      case Verdict::kNotRun:
-        return 3;
-    }
-    return 4;
   }
 
   void WriteFiles() {
@@ -376,8 +375,11 @@ class ScenarioRun {
   RunOutcome outcome_;
   std::optional<Prepared> prepared_;
   Report report_;
-  std::optional<SimulationRun> simulation_, other_engine_;
-  std::optional<AlignedTable> table_;  // in the reference's place
+  std::optional<SimulationRun> simulation_;
+  std::vector<EngineRun> other_engines_;  // with the judged one
+  std::optional<AlignedTable> table_;     // in the reference's place
+  std::optional<Trace> bent_;             // pushed with wrong forces
+  double bend_ = kNan;
   std::vector<PictureFile> pictures_;
 };
 

@@ -7,6 +7,7 @@
 
 #include "core/demand.h"
 #include "mechanism/load_model.h"
+#include "pipeline/drive_by.h"
 #include "reference/forward.h"
 #include "reference/reference.h"
 
@@ -63,15 +64,22 @@ std::string Decline(const Scenario& scenario, const Mechanism& mechanism, const 
   return reason;
 }
 
-SimulationOptions OptionsOf(const Scenario& scenario, Engine engine) {
+}  // namespace
+
+SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism, Engine engine) {
+  const SimulationSettings& settings = scenario.simulation;
   SimulationOptions options;
-  options.mode = scenario.simulation.forward ? SimulationMode::kForward : SimulationMode::kInverse;
+  options.mode = settings.forward ? SimulationMode::kForward : SimulationMode::kInverse;
   options.engine = engine;
-  options.step_s = scenario.simulation.step_s;
+  options.step_s = settings.step_s;
+  if (!settings.forward || engine == Engine::kStock) return options;
+  if (settings.drive_by == DriveBy::kForces) options.drives = DriveMode::kPushed;
+  if (settings.drive_by == DriveBy::kServos) {
+    options.drives = DriveMode::kServo;
+    options.servo = GainsOf(settings.servo, mechanism);
+  }
   return options;
 }
-
-}  // namespace
 
 WitnessMechanisms LoadWitnessMechanisms(const Scenario& scenario, const Mechanism& base,
                                         Diagnostics* diagnostics) {
@@ -130,6 +138,17 @@ DrivenMotion DriveByClosedForm(const Motion& motion, std::shared_ptr<ClosedForm>
       };
 }
 
+DriveForces ForcesByClosedForm(const Motion& motion, std::shared_ptr<ClosedForm> closed_form) {
+  auto command = std::make_shared<CommandSample>();
+  auto sample = std::make_shared<ClosedFormSample>();
+  return [&motion, command, sample, closed_form = std::move(closed_form)](double t_s, VecX* force) {
+    EvaluateMotion(motion, t_s, command.get());
+    RunSummary summary = closed_form->Dynamics(*command, sample.get());
+    if (summary.ok()) *force = sample->force;
+    return summary;
+  };
+}
+
 DrivenMotion DriveByCommands(const Mechanism& mechanism, const Motion& motion) {
   const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
   const auto all = drives + static_cast<Eigen::Index>(mechanism.prescribed.size());
@@ -148,13 +167,30 @@ DrivenMotion DriveByCommands(const Mechanism& mechanism, const Motion& motion) {
   };
 }
 
-DrivenMotion DriveByReference(const Mechanism& mechanism, const Motion& motion) {
-  struct State {
-    ReferenceSolver solver;
-    CommandSample command;
-    ReferenceSample sample;
+namespace {
+
+struct ReferenceState {
+  ReferenceSolver solver;
+  CommandSample command;
+  ReferenceSample sample;
+};
+
+}  // namespace
+
+DriveForces ForcesByReference(const Mechanism& mechanism, const Motion& motion) {
+  auto state =
+      std::make_shared<ReferenceState>(ReferenceState{ReferenceSolver(mechanism, motion), {}, {}});
+  return [&motion, state](double t_s, VecX* force) {
+    EvaluateMotion(motion, t_s, &state->command);
+    RunSummary summary = state->solver.Dynamics(state->command, &state->sample);
+    if (summary.ok()) *force = state->sample.drive_force;
+    return summary;
   };
-  auto state = std::make_shared<State>(State{ReferenceSolver(mechanism, motion), {}, {}});
+}
+
+DrivenMotion DriveByReference(const Mechanism& mechanism, const Motion& motion) {
+  auto state =
+      std::make_shared<ReferenceState>(ReferenceState{ReferenceSolver(mechanism, motion), {}, {}});
   return [&motion, state](double t_s, DrivenSample* driven) {
     EvaluateMotion(motion, t_s, &state->command);
     RunSummary summary = state->solver.Kinematics(state->command, &state->sample);
@@ -182,12 +218,6 @@ Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, doub
     }
   }
   return trace;
-}
-
-SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
-                               const DrivenMotion& driven, Engine engine,
-                               const std::function<void(double)>& progress) {
-  return RunSimulation(scenario, mechanism, driven, OptionsOf(scenario, engine), progress);
 }
 
 SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,

@@ -41,15 +41,20 @@ struct ClosedFormChoice {
 [[nodiscard]] DrivenMotion DriveByCommands(const Mechanism& mechanism, const Motion& motion);
 [[nodiscard]] DrivenMotion DriveByReference(const Mechanism& mechanism, const Motion& motion);
 
+/// Drive forces for the commanded motion, computed by the closed form or by the reference.
+[[nodiscard]] DriveForces ForcesByClosedForm(const Motion& motion,
+                                             std::shared_ptr<ClosedForm> closed_form);
+[[nodiscard]] DriveForces ForcesByReference(const Mechanism& mechanism, const Motion& motion);
+
+/// The engine's options as the scenario has them; forces are left to the caller.
+[[nodiscard]] SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism,
+                                          Engine engine);
+
 /// Simulates, extrapolating if the scenario asks for it.
 struct SimulatedWitness {
   SimulationRun run;        ///< trace extrapolated; poses and MJCF of the first run
   Diagnostics diagnostics;  ///< bad input found on the way
 };
-[[nodiscard]] SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
-                                             const DrivenMotion& driven, Engine engine,
-                                             const std::function<void(double)>& progress);
-/// The same with the engine's options given instead of taken from the scenario.
 [[nodiscard]] SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
                                              const DrivenMotion& driven,
                                              const SimulationOptions& options,

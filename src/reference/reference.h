@@ -6,6 +6,7 @@
 // indeterminate. No MuJoCo and no paper formula.
 #pragma once
 
+#include <functional>
 #include <memory>
 
 #include "core/run_summary.h"
@@ -71,7 +72,10 @@ struct ReferenceRun {
   Trace trace;  ///< drive, output, prescribed, reaction, audit and energy channels
   RunSummary summary;
 };
-[[nodiscard]] ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
-                                        const ReferenceOptions& options = {});
+/// `commands` fills the values of the motion's commands at sample i, where they do not follow from
+/// its profiles (a motion that something else reached).
+[[nodiscard]] ReferenceRun RunReference(
+    const Mechanism& mechanism, const Motion& motion, const ReferenceOptions& options = {},
+    const std::function<void(size_t i, CommandSample* command)>& commands = {});
 
 }  // namespace mbv

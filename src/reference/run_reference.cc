@@ -6,7 +6,8 @@
 namespace mbv {
 
 ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
-                          const ReferenceOptions& options) {
+                          const ReferenceOptions& options,
+                          const std::function<void(size_t i, CommandSample* command)>& commands) {
   const auto start = std::chrono::steady_clock::now();
   ReferenceRun run;
   run.trace.witness = "reference";
@@ -18,6 +19,7 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
   run.summary = RunSummary::Done();
   for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
     EvaluateMotion(motion, run.trace.time_s[i], &command);
+    if (commands) commands(i, &command);
     run.summary = solver.Dynamics(command, &sample);
     if (!run.summary.ok()) break;
     Eigen::RowVectorXd row(run.trace.values.cols());

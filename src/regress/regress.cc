@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 
+#include "regress/accuracy.h"
 #include "regress/files.h"
 #include "regress/history.h"
 #include "regress/judge.h"
@@ -61,6 +62,16 @@ void Finish(const RegressOptions& options, const RunFolder& folder, RegressOutco
         ToJUnit(report));
   write(options.markdown.empty() ? folder.path() / "summary.md" : fs::path(options.markdown),
         ToMarkdown(report));
+  const auto summary = [&](const std::string& scenario) {
+    return ReadWholeFile(folder.path() / scenario / "summary.json");
+  };
+  for (const std::string& document : options.tables) {
+    if (const auto text = ReadWholeFile(document)) {
+      write(document, FillAccuracyTables(*text, summary));
+    } else {
+      outcome->trouble = document + ": cannot be read";
+    }
+  }
   write(folder.path() / "index.html", ToIndexHtml(report, thumbnails));
   write(folder.path() / "regress.json", ToJson(report));
   outcome->exit_code = outcome->trouble.empty() ? ExitCodeOf(report) : 2;

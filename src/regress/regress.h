@@ -17,11 +17,12 @@ namespace mbv {
 struct RegressOptions {
   std::vector<std::string> paths = {"scenarios"};
   std::string out = "out/regress";
-  std::string history;   ///< SQLite file; "" writes none
-  std::string junit;     ///< "" is OUT/junit.xml
-  std::string markdown;  ///< "" is OUT/summary.md
-  std::string label;     ///< kept with the run, e.g. a commit
-  std::string program;   ///< version text; its file's fingerprint is added
+  std::string history;                   ///< SQLite file; "" writes none
+  std::string junit;                     ///< "" is OUT/junit.xml
+  std::string markdown;                  ///< "" is OUT/summary.md
+  std::vector<std::string> tables = {};  ///< documents whose accuracy tables are filled
+  std::string label;                     ///< kept with the run, e.g. a commit
+  std::string program;                   ///< version text; its file's fingerprint is added
   Shard shard;
   bool resume = false;
   bool pictures = true;

@@ -128,28 +128,23 @@ std::string DrivesHtml(const Report& report) {
 std::string EngineHtml(const Report& report) {
   if (!report.engine_comparison) return "";
   const EngineComparison& engine = *report.engine_comparison;
-  if (!engine.failure.empty()) {
-    return "<p>The second run gave no result: " + Escape(engine.failure) + ".</p>\n";
+  Table table{.caption = "The same run by each engine, against " + engine.truth,
+              .head = {Text("engine"), Digits("force error, RMS"),
+                       Digits(fmt::format("from {:g} s", engine.later_s)),
+                       Digits("force error, largest"), Digits("loop gap")},
+              .rows = {}};
+  std::string failures;
+  for (const EngineError& e : engine.engines) {
+    const std::string name = EngineComparison::NameOf(e.engine);
+    if (!e.failure.empty()) failures += Note(name + ": no result: " + Escape(e.failure));
+    table.rows.push_back({Text(name), Digits(Number(e.force_nrmse)),
+                          Digits(Number(e.force_nrmse_later)), Digits(Number(e.force_max_rel)),
+                          Digits(Number(e.closure_max_m) + " m")});
   }
-  const auto row = [](const char* name, const EngineError& error) {
-    return std::vector<Cell>{Text(name), Digits(Number(error.force_nrmse)),
-                             Digits(Number(error.force_max_rel)),
-                             Digits(Number(error.closure_max_m) + " m")};
-  };
-  std::string html =
-      ToHtml(Table{.caption = "The same run by both engines, against " + engine.truth,
-                   .head = {Text("engine"), Digits("force error, RMS"),
-                            Digits("force error, largest"), Digits("loop gap")},
-                   .rows = {row("MuJoCo as it is (stock)", engine.stock),
-                            row("with the corrections", engine.corrected)}});
-  const double gain = engine.stock.force_nrmse / engine.corrected.force_nrmse;
-  if (std::isfinite(gain)) {
-    html +=
-        Note(fmt::format("What stock MuJoCo is off by is its own modelling error, not the "
-                         "equations': the corrections reduce it {:.1e}-fold.",
-                         gain));
-  }
-  return html;
+  return ToHtml(table) + failures +
+         Note(
+             "What MuJoCo as it is is off by is its own modelling error, not the equations'. Most "
+             "of it are the first moments, in which its soft constraints take up the load.");
 }
 
 Work WorkOf(const Trace& trace, const std::vector<std::string>& drives) {

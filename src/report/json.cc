@@ -19,7 +19,10 @@ Json ChecksJson(const Comparison& comparison) {
                       {"verifies", !check.follows},
                       {"time_s", Number(check.time_s)},
                       {"channel", check.channel}});
-    if (check.stated_limit) checks.back()["stated_limit"] = *check.stated_limit;
+    if (check.stated_limit) {
+      checks.back()["stated_limit"] = *check.stated_limit;
+      checks.back()["limit_by"] = check.limit_by;
+    }
     if (check.floored) checks.back()["floored"] = true;
     if (!check.blind.empty()) checks.back()["verifies_nothing"] = check.blind;
   }
@@ -191,15 +194,14 @@ Json SheetsJson(const std::vector<SignalSheet>& sheets) {
 }
 
 Json EngineJson(const EngineComparison& engine) {
-  const auto error = [](const EngineError& e) {
-    return Json{{"force_nrmse", Number(e.force_nrmse)},
-                {"force_max_rel", Number(e.force_max_rel)},
-                {"closure_max_m", Number(e.closure_max_m)}};
-  };
-  Json json = {{"truth", engine.truth},
-               {"stock", error(engine.stock)},
-               {"corrected", error(engine.corrected)}};
-  if (!engine.failure.empty()) json["failure"] = engine.failure;
+  Json json = {{"truth", engine.truth}, {"later_s", engine.later_s}};
+  for (const EngineError& e : engine.engines) {
+    json[e.engine] = {{"force_nrmse", Number(e.force_nrmse)},
+                      {"force_nrmse_later", Number(e.force_nrmse_later)},
+                      {"force_max_rel", Number(e.force_max_rel)},
+                      {"closure_max_m", Number(e.closure_max_m)}};
+    if (!e.failure.empty()) json[e.engine]["failure"] = e.failure;
+  }
   return json;
 }
 

@@ -7,12 +7,18 @@
 namespace mbv {
 
 const PairComparison* MainPair(const Comparison& comparison) {
-  for (const char* name :
-       {"simulated_vs_analytic", "simulated_vs_reference", "reference_vs_analytic"}) {
+  for (const char* name : {"simulated_vs_reached", "simulated_vs_analytic",
+                           "simulated_vs_reference", "reference_vs_analytic"}) {
     const PairComparison* pair = comparison.FindPair(name);
     if (pair != nullptr && pair->compared) return pair;
   }
   return nullptr;
+}
+
+const char* EngineComparison::NameOf(const std::string& engine) {
+  if (engine == "defaults") return "MuJoCo, default softness, position targets";
+  if (engine == "stock") return "MuJoCo, best recipe from outside";
+  return "with the corrections";
 }
 
 std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& comparison) {

@@ -1,6 +1,7 @@
 // Report: everything one run gave, and its writers (value → text).
 //
-// The formats are described in docs/scenario_format.md; summary.json carries its version in `schema`.
+// The formats are described in docs/scenario_format.md; summary.json carries its version in
+// `schema`.
 #pragma once
 
 #include <optional>
@@ -23,16 +24,22 @@ struct WitnessRecord {
   Trace trace;         ///< empty if it did not run
 };
 
-/// An engine's error against the same truth.
+/// One engine's error against the truth that all are judged by.
 struct EngineError {
+  std::string engine;  ///< "defaults", "stock" or "corrected"
   double force_nrmse = kNan, force_max_rel = kNan, closure_max_m = kNan;
+  double force_nrmse_later = kNan;  ///< without the first EngineComparison::later_s
+  std::string failure = {};         ///< why it gave nothing; "" if it ran
 };
-/// The simulator's own modelling error: MuJoCo as it is, and with the corrections, judged against
-/// another witness.
+/// The simulator's own modelling error: MuJoCo as it is, by default and by the best recipe from
+/// outside, and with the corrections, judged against another witness.
 struct EngineComparison {
-  std::string truth;  ///< witness both are judged by
-  EngineError stock, corrected;
-  std::string failure;  ///< why the second run gave nothing; "" if it ran
+  std::string truth;     ///< witness by which all are judged
+  double later_s = 0.1;  ///< when soft constraints have taken up the load
+  std::vector<EngineError> engines;
+
+  /// What an engine is called for people.
+  [[nodiscard]] static const char* NameOf(const std::string& engine);
 };
 
 struct Timing {
@@ -46,7 +53,7 @@ struct Report {
   std::string scenario, scenario_file, mechanism, model_file, description;
   std::vector<std::string> drives;   ///< model order
   std::string simulation;            ///< one line: mode, step, engine
-  std::string mode;                  ///< "forward", "inverse" or "off"
+  std::string mode;                  ///< "forward", "inverse", "force_driven", "servo", "off"
   std::string engine = "corrected";  ///< or "stock"
   double step_s = kNan;
   double duration_s = kNan, sample_s = kNan;
@@ -95,8 +102,8 @@ struct RunCounts {
 /// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
 [[nodiscard]] std::string CountLine(const RunCounts& counts);
 
-/// The pair a reader looks at first: simulated vs analytic if compared, else simulated vs
-/// reference, else reference vs analytic; null if none was compared.
+/// The pair a reader looks at first: of servos simulated vs reached; simulated vs analytic if
+/// compared, else simulated vs reference, else reference vs analytic; null if none was compared.
 [[nodiscard]] const PairComparison* MainPair(const Comparison& comparison);
 
 /// mechanisms' force signals and the reactions that were compared.

@@ -159,8 +159,7 @@ class Writer {
     if (check.floored) line += " (floored)";
     if (!check.blind.empty()) line += " (" + check.blind + ")";
     if (check.stated_limit) {
-      line +=
-          fmt::format(" (limit by the table's uncertainty, stated {:.1e})", *check.stated_limit);
+      line += fmt::format(" (limit by {}, stated {:.1e})", check.limit_by, *check.stated_limit);
     }
     while (line.back() == ' ') line.pop_back();
     return line;
@@ -202,16 +201,20 @@ class Writer {
     if (!report.engine_comparison) return;
     const EngineComparison& engine = *report.engine_comparison;
     Line();
-    if (!engine.failure.empty()) {
-      Line("  the simulator's own error: stock MuJoCo gave no result: " + engine.failure);
-      return;
+    const std::string later = fmt::format("from {:g} s", engine.later_s);
+    Line(Painted(fmt::format("  {:<44}{:>12}{:>12}{:>12}",
+                             "the simulator's own error (against " + engine.truth + ")",
+                             "force, RMS", later, "loop gap"),
+                 Paint::kFaint));
+    for (const EngineError& e : engine.engines) {
+      const std::string name = EngineComparison::NameOf(e.engine);
+      if (!e.failure.empty()) {
+        Line(fmt::format("    {}: no result: {}", name, e.failure));
+        continue;
+      }
+      Line(fmt::format("    {:<42}{:>12.2e}{:>12.2e}{:>12}", name, e.force_nrmse,
+                       e.force_nrmse_later, fmt::format("{:.2e} m", e.closure_max_m)));
     }
-    Line(
-        fmt::format("  the simulator's own error (drive force against {}, RMS): stock MuJoCo "
-                    "{:.2e}, corrected {:.2e};",
-                    engine.truth, engine.stock.force_nrmse, engine.corrected.force_nrmse));
-    Line(fmt::format("    loop gap: stock {:.2e} m, corrected {:.2e} m", engine.stock.closure_max_m,
-                     engine.corrected.closure_max_m));
   }
 
   // Where the energy came from and went; zeros are left out.
@@ -252,7 +255,7 @@ class Writer {
     line += fmt::format(" all {:.3f} s", timing.total_s);
     if (timing.loop_s > 0.0 && timing.steps > 0) {
       line += fmt::format("; {} {}, {:.0f}/s", timing.steps,
-                          report.mode == "forward" ? "steps" : "samples",
+                          report.mode == "inverse" ? "samples" : "steps",
                           static_cast<double>(timing.steps) / timing.loop_s);
     }
     Line(line);

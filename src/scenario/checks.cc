@@ -163,6 +163,8 @@ std::optional<double> MetricLimits::Of(LimitColumn column) const {
       return inverse;
     case LimitColumn::kReference:
       return reference;
+    case LimitColumn::kServo:
+      return servo;
   }
   return {};
 }

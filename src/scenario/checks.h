@@ -6,6 +6,7 @@
 //   checks: {force_nrmse: 1e-7}                               both simulation modes
 //           {force_nrmse: {forward: 1e-7, inverse: 1e-10}}    each mode
 //           {reference_force_nrmse: 1e-10}                    reference against closed form
+//           {force_nrmse: {servo: 1e-3}}                      servos against the commanded motion
 //           {force_max: null}                                 switched off, and reported as such
 #pragma once
 
@@ -45,11 +46,13 @@ enum class Metric {
 inline constexpr int kMetrics = 22;
 
 /// Which column of limits applies.
-enum class LimitColumn { kForward, kInverse, kReference };
+enum class LimitColumn { kForward, kInverse, kReference, kServo };
 
 /// Limits of one metric; an empty one is switched off.
 struct MetricLimits {
   std::optional<double> forward, inverse, reference;
+  /// Of what servos do to what they are commanded: depends on their gains, so there is no default.
+  std::optional<double> servo = std::nullopt;
 
   [[nodiscard]] std::optional<double> Of(LimitColumn column) const;
 };

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 
@@ -101,6 +102,7 @@ class Loader {
         ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s, *mechanism_);
     CheckParameterNames(map);
     if (!yaml_.has_errors()) CheckTogether(*motion, map.Find("simulation"));
+    if (!yaml_.has_errors()) CheckDriveBy(*motion, map.Find("simulation"));
   }
 
   // Of another kind, nothing else in the file is of use here.
@@ -245,6 +247,53 @@ class Loader {
                 fmt::format("at most {:g} samples for {}: choose motion.sample_s >= {:.3g}",
                             std::floor(kMostValues / signals), mechanism_->name,
                             scenario_.motion.duration_s * signals / kMostValues));
+  }
+
+  // Drives that are pushed or servos need forces or commands for all freedoms, and the engine whose
+  // constraints hold moving loops.
+  void CheckDriveBy(const YamlNode& motion, const YamlNode* simulation) {
+    const SimulationSettings& settings = scenario_.simulation;
+    if (!settings.on || settings.drive_by == DriveBy::kMotion) return;
+    const bool servo = settings.drive_by == DriveBy::kServos;
+    const std::string mode = servo ? "simulation.mode = servo" : "simulation.mode = force_driven";
+    if (scenario_.motion.free()) {
+      yaml_.Error(*simulation, mode + ": every freedom needs a command",
+                  "forces that the scenario gives itself work with mode: forward");
+    }
+    if (settings.stock_engine) yaml_.Error(*simulation, mode + " runs with engine: corrected only");
+    if (settings.extrapolate) yaml_.Error(*simulation, mode + " does not extrapolate");
+    if (scenario_.reference.table != nullptr) {
+      yaml_.Error(*simulation, mode + ": a table of forces belongs to the commanded motion",
+                  "compare the table with mode: forward");
+    }
+    if (!servo) return;
+    CheckGain(*simulation, "kp", settings.servo.kp);
+    CheckGain(*simulation, "kv", settings.servo.kv);
+    const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
+    const auto drives = mechanism_->drives.size(), bases = mechanism_->prescribed.size();
+    if (!scenario_.motion.free() && static_cast<int>(drives + bases) != rank.freedoms) {
+      yaml_.Error(motion,
+                  fmt::format("{}: {} drives and {} prescribed joints for {} freedoms; a servo "
+                              "needs its own",
+                              mode, drives, bases, rank.freedoms));
+    }
+  }
+
+  void CheckGain(const YamlNode& simulation, const std::string& key, const Gain& gain) {
+    std::vector<std::string> names, missing;
+    for (const Drive& drive : mechanism_->drives) {
+      names.push_back(drive.name);
+      if (!gain.all && !gain.by_drive.contains(drive.name)) missing.push_back(drive.name);
+    }
+    const YamlNode& node = *simulation.Find(key);
+    if (!missing.empty()) {
+      yaml_.Error(node, fmt::format("simulation.{} gives nothing for {}", key, JoinWords(missing)));
+    }
+    for (const auto& [name, value] : gain.by_drive) {
+      if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+      yaml_.Error(node, fmt::format("simulation.{}: there is no drive '{}'", key, name),
+                  "drives: " + JoinWords(names));
+    }
   }
 
   // Every freedom needs one command, or a start value where it moves by forces.

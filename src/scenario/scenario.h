@@ -44,14 +44,42 @@ struct Extrapolation {
   std::array<double, 2> from{1.0, 0.5};
 };
 
+/// What moves the drives of a forward simulation.
+enum class DriveBy {
+  kMotion,  ///< `mode: forward`: constraints hold them on the commanded motion
+  kForces,  ///< `mode: force_driven`: the drive forces of the equations push in open loop
+  kServos,  ///< `mode: servo`: MuJoCo's actuators follow the commanded motion
+};
+
+/// A servo gain: one number for all drives, or one per drive by name.
+struct Gain {
+  std::optional<double> all;
+  std::map<std::string, double> by_drive;
+
+  /// 0 for a drive without one.
+  [[nodiscard]] double Of(const std::string& drive) const {
+    const auto found = by_drive.find(drive);
+    return found != by_drive.end() ? found->second : all.value_or(0.0);
+  }
+};
+
+/// Position and velocity servos: force = kp (x_cmd − x) + kv (ẋ_cmd − ẋ) + feed-forward.
+struct ServoSettings {
+  Gain kp;                   ///< [N/m or N m/rad], > 0
+  Gain kv;                   ///< [N s/m or N m s/rad], > 0
+  bool feedforward = false;  ///< add the drive forces of the equations for the commanded motion
+};
+
 /// The simulation's part.
 struct SimulationSettings {
   bool on = true;
-  bool forward = true;         ///< time integration; false: inverse dynamics per sample
-  bool stock_engine = false;   ///< judge MuJoCo as it is instead of the corrected engine
-  bool stock_too = true;       ///< forward only: run stock MuJoCo too and report its error
-  double step_s = 1e-3;        ///< > 0
-  bool ignore_ranges = false;  ///< simulate beyond drive and joint ranges
+  bool forward = true;                  ///< time integration; false: inverse dynamics per sample
+  DriveBy drive_by = DriveBy::kMotion;  ///< forward only
+  ServoSettings servo;                  ///< kServos only
+  bool stock_engine = false;            ///< judge MuJoCo as it is instead of the corrected engine
+  bool stock_too = true;                ///< forward only: run stock MuJoCo too and report its error
+  double step_s = 1e-3;                 ///< > 0
+  bool ignore_ranges = false;           ///< simulate beyond drive and joint ranges
   Overrides parameters;
   std::optional<Extrapolation> extrapolate;
 };

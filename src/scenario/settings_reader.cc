@@ -39,12 +39,13 @@ void ReadCheck(ValueReader* values, const YamlEntry& entry, CheckLimits* limits)
   if (row == nullptr) return;  // reported as unknown key
   MetricLimits& target = (*limits)[row->metric];
   if (entry.value->is_map() && !reference) {
-    YamlMap map(&values->yaml(), entry.value.get(), path, {"forward", "inverse"});
+    YamlMap map(&values->yaml(), entry.value.get(), path, {"forward", "inverse", "servo"});
     for (const YamlEntry& mode : entry.value->entries) {
       const LimitValue value = ReadLimit(values, *mode.value, JoinPath(path, mode.key));
       if (!value.valid) continue;
       if (mode.key == "forward") target.forward = value.limit;
       if (mode.key == "inverse") target.inverse = value.limit;
+      if (mode.key == "servo") target.servo = value.limit;
     }
     return;
   }
@@ -115,6 +116,52 @@ Extrapolation ReadExtrapolation(ValueReader* values, const YamlNode& node) {
   return extrapolation;
 }
 
+// `kp: 2e5`, or `kp: {DRIVE: 2e5, …}`.
+Gain ReadGain(ValueReader* values, const YamlNode& node, const std::string& path) {
+  Gain gain;
+  if (!node.is_map()) {
+    gain.all = values->Positive(node, path);
+    return gain;
+  }
+  for (const YamlEntry& entry : values->yaml().Entries(node, path)) {
+    const auto number = values->Positive(*entry.value, JoinPath(path, entry.key));
+    if (number) gain.by_drive[entry.key] = *number;
+  }
+  return gain;
+}
+
+const std::vector<std::string> kModes = {"forward", "inverse", "force_driven", "servo"};
+
+// The mode and what belongs to it.
+void ReadMode(ValueReader* values, YamlMap* map, SimulationSettings* settings) {
+  YamlReader& yaml = values->yaml();
+  if (const YamlNode* mode = map->Find("mode")) {
+    const auto choice = yaml.Choice(*mode, "simulation.mode", kModes).value_or(0);
+    settings->forward = choice != 1;
+    settings->drive_by = choice == 2   ? DriveBy::kForces
+                         : choice == 3 ? DriveBy::kServos
+                                       : DriveBy::kMotion;
+  }
+  if (settings->drive_by == DriveBy::kServos) {
+    if (const YamlNode* kp = map->Required("kp")) {
+      settings->servo.kp = ReadGain(values, *kp, "simulation.kp");
+    }
+    if (const YamlNode* kv = map->Required("kv")) {
+      settings->servo.kv = ReadGain(values, *kv, "simulation.kv");
+    }
+    if (const YamlNode* node = map->Find("feedforward")) {
+      settings->servo.feedforward =
+          yaml.Choice(*node, "simulation.feedforward", {"none", "forces"}) == 1;
+    }
+    return;
+  }
+  for (const char* key : {"kp", "kv", "feedforward"}) {
+    const YamlNode* node = map->Find(key);
+    if (node == nullptr) continue;
+    yaml.Warn(*node, fmt::format("simulation.{} is of no use without mode: servo", key));
+  }
+}
+
 }  // namespace
 
 SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node) {
@@ -125,12 +172,10 @@ SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node) {
     return settings;
   }
   YamlReader& yaml = values->yaml();
-  YamlMap map(
-      &yaml, node, "simulation",
-      {"mode", "step_s", "engine", "stock_too", "parameters", "extrapolate", "ignore_ranges"});
-  if (const YamlNode* mode = map.Find("mode")) {
-    settings.forward = yaml.Choice(*mode, "simulation.mode", {"forward", "inverse"}) != 1;
-  }
+  YamlMap map(&yaml, node, "simulation",
+              {"mode", "step_s", "engine", "stock_too", "parameters", "extrapolate",
+               "ignore_ranges", "kp", "kv", "feedforward"});
+  ReadMode(values, &map, &settings);
   if (const YamlNode* engine = map.Find("engine")) {
     settings.stock_engine = yaml.Choice(*engine, "simulation.engine", {"corrected", "stock"}) == 1;
   }

@@ -112,6 +112,23 @@ void ReleaseForcedDrives(const Motion& motion, EngineModel* engine) {
   }
 }
 
+void GuideDrives(bool on, EngineModel* engine) {
+  for (size_t k = 0; k < engine->mechanism->drives.size(); ++k) {
+    engine->driven[k].forced = !on;
+    engine->m->eq_active[engine->driven[k].equality] = on ? 1 : 0;
+  }
+}
+
+void FindServos(EngineModel* engine) {
+  const mjModel& m = *engine->m;
+  for (size_t k = 0; k < engine->mechanism->drives.size(); ++k) {
+    DrivenPlace& place = engine->driven[k];
+    place.motor = IdOf(m, mjOBJ_ACTUATOR, place.name);
+    place.position_servo = IdOf(m, mjOBJ_ACTUATOR, place.name + mjcf::kPositionServo);
+    place.velocity_servo = IdOf(m, mjOBJ_ACTUATOR, place.name + mjcf::kVelocityServo);
+  }
+}
+
 Pose PoseOf(const mjData& d, int body_id) {
   Pose X = Pose::Identity();
   X.linear() = Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(d.xmat + 9 * body_id);

@@ -17,10 +17,11 @@ struct DrivenPlace {
   std::string name;
   int equality = -1;  ///< of its guiding constraint
   bool is_tendon = false;
-  int object = -1;    ///< tendon or joint
-  int dof = -1;       ///< joints only
-  double home = 0.0;  ///< the constraint's residual is position − home − eq_data[0]
+  int object = -1;      ///< tendon or joint
+  int dof = -1;         ///< joints only
+  double home = 0.0;    ///< the constraint's residual is position − home − eq_data[0]
   bool forced = false;  ///< moves by a given force: its guiding constraint is switched off
+  int position_servo = -1, velocity_servo = -1, motor = -1;  ///< actuators of a servo
 };
 
 struct EngineModel {
@@ -46,6 +47,11 @@ struct EngineModel {
 
 /// Switches off the guiding constraints of the drives whose force the motion gives.
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);
+/// Switches the guiding constraints of all drives on or off.
+void GuideDrives(bool on, EngineModel* engine);
+/// Finds the actuators of every drive, of a model written with servos. Throws EngineError if there
+/// are none.
+void FindServos(EngineModel* engine);
 
 /// Poses of all mechanism bodies in the world from the data's current kinematics; merged bodies
 /// from the joint coordinates of their chain.

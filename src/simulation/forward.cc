@@ -4,8 +4,10 @@
 #include <chrono>
 #include <cmath>
 #include <ctime>
+#include <numbers>
 
 #include "mjcf/mjcf.h"
+#include "simulation/fastest_rate.h"
 #include "simulation/integrator.h"
 #include "simulation/session.h"
 #include "simulation/steps.h"
@@ -47,6 +49,7 @@ RunSummary Failure(const std::string& message, double t_s) {
 // Home to the first driven sample, with consistent velocities and accelerations.
 RunSummary PutAtStart(Session* s, const DrivenSample& first) {
   if (s->motion.free()) return PutAtFreeStart(s, first);
+  if (s->options.drives != DriveMode::kGuided) return PutAtCommandedStart(s, first);
   if (RunSummary summary = s->solver.Follow(HomePositions(s->engine), first.position);
       !summary.ok()) {
     summary.time_s = 0.0;
@@ -55,6 +58,34 @@ RunSummary PutAtStart(Session* s, const DrivenSample& first) {
   s->solver.SolveVelocity(first.velocity);
   s->solver.SolveAcceleration(first.acceleration);
   return RunSummary::Done();
+}
+
+// Springs, dampers and servos against the step: a coarse step is told, one that cannot follow them
+// is refused before it gives numbers.
+RunSummary CheckStep(Session* s) {
+  const FastestRate fastest = FastestRateOf(s->system, s->options.servo);
+  const double step_s = AdjustedStep(s->motion, s->options.step_s);
+  const double per_period = 2.0 * std::numbers::pi / (fastest.per_s * step_s);
+  if (fastest.per_s == 0.0 || per_period >= kStepsPerPeriod) return RunSummary::Done();
+  // Rounded down to one digit.
+  double wanted_s = 2.0 * std::numbers::pi / (fastest.per_s * kStepsPerPeriod);
+  const double digit = std::pow(10.0, std::floor(std::log10(wanted_s)));
+  wanted_s = digit * std::floor(wanted_s / digit);
+  const std::string text = fmt::format(
+      "{} has a rate of {:.3g} rad/s at the start, a period of {:.2g} s: a step of {:g} s divides "
+      "it by {:.2g}; simulation.step_s = {:.1g} or less is needed",
+      fastest.part, fastest.per_s, 2.0 * std::numbers::pi / fastest.per_s, step_s, per_period,
+      wanted_s);
+  if (per_period >= kLeastStepsPerPeriod) {
+    s->run->notes.push_back(text);
+    return RunSummary::Done();
+  }
+  return {.stop = Stop::kEngineFailure,
+          .message = text,
+          .time_s = 0.0,
+          .where = fastest.part,
+          .amount = wanted_s,
+          .unit = "s"};
 }
 
 double ExtentOf(const Mechanism& mechanism) {
@@ -74,18 +105,23 @@ RunSummary CheckSample(const Session& s, double largest_gap_m, double t_s) {
 
 RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   const std::vector<Step> steps = MakeSteps(s->motion, s->options.step_s);
-  // The commanded motion is evaluated before the loop.
-  std::vector<DrivenSample> ends(steps.size()), middles(steps.size());
-  DrivenSample first;
-  if (RunSummary summary = driven(0.0, &first); !summary.ok()) return summary;
+  // What is commanded is evaluated before the loop.
+  const auto command = [&](double t_s, Commanded* at) {
+    RunSummary summary = driven(t_s, &at->motion);
+    return summary.ok() && s->options.forces ? s->options.forces(t_s, &at->force) : summary;
+  };
+  std::vector<Commanded> ends(steps.size()), middles(steps.size());
+  Commanded first;
+  if (RunSummary summary = command(0.0, &first); !summary.ok()) return summary;
   for (size_t i = 0; i < steps.size(); ++i) {
     if (steps[i].uniform < 4) {
       const double middle = 0.5 * (steps[i].from_s + steps[i].to_s);
-      if (RunSummary summary = driven(middle, &middles[i]); !summary.ok()) return summary;
+      if (RunSummary summary = command(middle, &middles[i]); !summary.ok()) return summary;
     }
-    if (RunSummary summary = driven(steps[i].to_s, &ends[i]); !summary.ok()) return summary;
+    if (RunSummary summary = command(steps[i].to_s, &ends[i]); !summary.ok()) return summary;
   }
-  if (RunSummary summary = PutAtStart(s, first); !summary.ok()) return summary;
+  if (RunSummary summary = PutAtStart(s, first.motion); !summary.ok()) return summary;
+  if (RunSummary summary = CheckStep(s); !summary.ok()) return summary;
   const double largest_gap = kApart * ExtentOf(*s->engine.mechanism);
   Integrator integrator(s, AdjustedStep(s->motion, s->options.step_s));
   const LoopClock clock;
@@ -124,8 +160,10 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     }
   }
   if (RunSummary summary = PutAtStart(s, samples[0]); !summary.ok()) return summary;
+  if (RunSummary summary = CheckStep(s); !summary.ok()) return summary;
   // The reference of MuJoCo's row is aref = −b J q̇ − k d (x − target): the target is moved so that
   // aref is the commanded acceleration where position and velocity are as commanded.
+  const bool rates = s->options.engine == Engine::kStock;
   const double d = kMjcfImpedance, tc = s->options.stock_time_constant_steps * h;
   const double b = 2.0 / (d * tc), k_d = d / (d * d * tc * tc);
   s->FindShared();
@@ -135,10 +173,11 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
   const LoopClock clock;
   for (long n = 0; n <= last; ++n) {
     const DrivenSample& at = samples[n];
-    target = at.position + (b * at.velocity + at.acceleration) / k_d;
+    target = at.position;
+    if (rates) target += (b * at.velocity + at.acceleration) / k_d;
     s->system.SetTargets(target);
     if (s->system.has_given_forces()) s->system.EvaluatePosition();
-    s->ApplyForces(static_cast<double>(n) * h);
+    s->ApplyForces(static_cast<double>(n) * h, {});
     if (n % per_sample == 0) {
       mj_forward(m, data);
       s->Record(static_cast<size_t>(n / per_sample));

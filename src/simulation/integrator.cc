@@ -41,14 +41,14 @@ Integrator::Integrator(Session* session, double h)
   session->engine.m->opt.tolerance = 1e-12;
 }
 
-void Integrator::Start(const DrivenSample& first) {
+void Integrator::Start(const Commanded& first) {
   warm_ = qacc();
   Evaluate(q_, v_, first, 0.0);
   for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
   RememberNode();
 }
 
-void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
+void Integrator::MultiStep(double h, const Commanded& end, double end_s) {
   const double c = h / 24.0, e = h / 360.0;
   // (2), (3)
   v_p_ = v_ + c * (55.0 * a_[0] - 59.0 * a_[1] + 37.0 * a_[2] - 9.0 * a_[3]);
@@ -68,7 +68,7 @@ void Integrator::MultiStep(double h, const DrivenSample& end, double end_s) {
   v_.swap(v_p_);
 }
 
-void Integrator::RungeKutta(double h, const DrivenSample& middle, const DrivenSample& end,
+void Integrator::RungeKutta(double h, const Commanded& middle, const Commanded& end,
                             double from_s) {
   nodes_ = 3;  // what the first multistep finds, but one
   const double half = 0.5 * h;
@@ -93,7 +93,7 @@ void Integrator::RungeKutta(double h, const DrivenSample& middle, const DrivenSa
 // The power half way, at the state that the cubic through the velocities and accelerations of both
 // ends has there: that of a stage is only of second order.
 void Integrator::MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const VecX& a_1,
-                               const DrivenSample& middle, double t_s) {
+                               const Commanded& middle, double t_s) {
   const VecX force = s_.system.force();
   v_p_ = 0.5 * (v_0 + v_) + h / 8.0 * (a_0 - a_1);
   mean_ = (13.0 * v_0 + 3.0 * v_) / 16.0 + h / 96.0 * (11.0 * a_0 - 5.0 * a_1);
@@ -108,7 +108,7 @@ void Integrator::MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const
 }
 
 // Acceleration at q ⊕ u.
-VecX Integrator::Stage(const VecX& u, const VecX& v, const DrivenSample& at, double t_s) {
+VecX Integrator::Stage(const VecX& u, const VecX& v, const Commanded& at, double t_s) {
   q_p_ = q_;
   mj_integratePos(m_, q_p_.data(), u.data(), 1.0);
   expected_ = s_.system.force();
@@ -165,27 +165,29 @@ void Integrator::RememberNode() {
 }
 
 // MuJoCo's stages at one state.
-void Integrator::Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s,
+void Integrator::Evaluate(const VecX& q, const VecX& v, const Commanded& at, double t_s,
                           Guidance guidance) {
   std::copy(q.begin(), q.end(), d_->qpos);
   std::copy(v.begin(), v.end(), d_->qvel);
   d_->time = t_s;
-  s_.system.SetTargets(at.position);
+  s_.system.SetTargets(at.motion.position);
   s_.system.EvaluatePosition();
   mj_crb(m_, d_);
   mj_factorM(m_, d_);
   mj_comVel(m_, d_);
   s_.system.EvaluatePassive();
   mj_rne(m_, d_, 0, d_->qfrc_bias);
-  s_.ApplyForces(t_s);
-  SetReference(v, at, guidance);
+  s_.ApplyForces(t_s, at);
+  SetReference(v, at.motion, guidance);
   std::copy(warm_.begin(), warm_.end(), d_->qacc_warmstart);
   mj_fwdAcceleration(m_, d_);
+  // MuJoCo starts from here where that is cheaper than the warm start: as far off as that one.
+  if (d_->nefc > 0) Eigen::Map<VecX>(d_->qacc_smooth, m_->nv).array() += kNudge;
   SolveConstraints();
 }
 
-// MuJoCo's constraint stage, from a warm start that is a little off: it takes no Newton step
-// shorter than 1e-15, and what that leaves undone in the acceleration is divided by R in the force.
+// MuJoCo's constraint stage, from a start that is a little off: it takes no Newton step shorter
+// than 1e-15, and what that leaves undone in the acceleration is divided by R in the force.
 void Integrator::SolveConstraints() {
   Eigen::Map<VecX>(d_->qacc_warmstart, m_->nv).array() += kNudge;
   mj_fwdConstraint(m_, d_);

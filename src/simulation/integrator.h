@@ -38,18 +38,18 @@ class Integrator {
   Integrator(Session* session, double h);
 
   /// Evaluates the first node, t = 0.
-  void Start(const DrivenSample& first);
+  void Start(const Commanded& first);
   /// One evaluation; needs four uniform nodes behind it.
-  void MultiStep(double h, const DrivenSample& end, double end_s);
+  void MultiStep(double h, const Commanded& end, double end_s);
   /// Four evaluations and one at the end.
-  void RungeKutta(double h, const DrivenSample& middle, const DrivenSample& end, double from_s);
+  void RungeKutta(double h, const Commanded& middle, const Commanded& end, double from_s);
 
   /// False once the accelerations have diverged.
   [[nodiscard]] bool healthy() const { return IsSane(d_->qacc, m_->nv); }
 
  private:
   enum class Guidance { kNew, kOfTheNode };  // by the present state, or as at the last node
-  void Evaluate(const VecX& q, const VecX& v, const DrivenSample& at, double t_s,
+  void Evaluate(const VecX& q, const VecX& v, const Commanded& at, double t_s,
                 Guidance guidance = Guidance::kNew);
   void SetReference(const VecX& v, const DrivenSample& at, Guidance guidance);
   void ApplyReference();
@@ -59,8 +59,8 @@ class Integrator {
   [[nodiscard]] bool PassesSingularPose();
   void Coast();
   void MeasureMiddle(double h, const VecX& v_0, const VecX& a_0, const VecX& a_1,
-                     const DrivenSample& middle, double t_s);
-  VecX Stage(const VecX& u, const VecX& v, const DrivenSample& at, double t_s);
+                     const Commanded& middle, double t_s);
+  VecX Stage(const VecX& u, const VecX& v, const Commanded& at, double t_s);
   [[nodiscard]] VecX Rate(const VecX& u, const VecX& v) const;
   [[nodiscard]] Eigen::Map<const VecX> qacc() const { return {d_->qacc, m_->nv}; }
 

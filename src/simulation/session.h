@@ -13,6 +13,17 @@
 
 namespace mbv::simulation {
 
+/// What is commanded at one instant.
+struct Commanded {
+  DrivenSample motion;  ///< of everything driven
+  VecX force;           ///< of the drives: pushed or fed forward; empty if nothing is given
+};
+
+/// A state of MuJoCo.
+struct EngineState {
+  VecX qpos, qvel;
+};
+
 /// Everything one run needs. Members are used in place: a Session is not copied or moved.
 struct Session {
   Session(EngineModel model, const Motion& motion_, const SimulationOptions& options_,
@@ -26,8 +37,9 @@ struct Session {
   [[nodiscard]] const VecX& WorkRates();
   /// Decides, at the present configuration, whether the drives share their forces.
   void FindShared();
-  /// Loads and given drive forces at t, for the data's current position, into qfrc_applied.
-  void ApplyForces(double t_s);
+  /// Loads and given drive forces at t, for the data's current position and velocity, into
+  /// qfrc_applied; forces of servos into qfrc_actuator.
+  void ApplyForces(double t_s, const Commanded& at);
 
   const EngineModel engine;
   const DataHandle data;
@@ -40,8 +52,10 @@ struct Session {
   Recorder recorder;
   WorkMeter work;
   VecX work_rates;      ///< of the state that was asked for last
+  EngineState start;    ///< of a mechanism whose drives are pushed or servos
   bool shared = false;  ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
+  VecX given;                 ///< forces that the driven coordinates are given
   Eigen::RowVectorXd record;  ///< one row of the trace
 };
 
@@ -54,8 +68,19 @@ struct Session {
 /// Start of a free motion: options.start on the loops, guided coordinates at `first`.
 [[nodiscard]] RunSummary PutAtFreeStart(Session* session, const DrivenSample& first);
 
+/// Start of a pushed or servo-driven mechanism: every drive and base on its command. Needs the
+/// guiding constraints of all drives; leaves them switched on.
+[[nodiscard]] RunSummary FindCommandedStart(EngineModel* engine, const DrivenSample& first,
+                                            EngineState* start);
+/// Puts the session there, closed once more without the guides.
+[[nodiscard]] RunSummary PutAtCommandedStart(Session* session, const DrivenSample& first);
+
 /// Positions of everything driven at home.
 [[nodiscard]] VecX HomePositions(const EngineModel& engine);
+
+/// MuJoCo's servos of all drives at the data's position and velocity: qfrc_actuator, and the force
+/// of every drive.
+void RunServos(const EngineModel& engine, const Commanded& at, mjData* d, VecX* force);
 
 /// True if every entry is finite and below the size that MuJoCo itself takes for divergence.
 [[nodiscard]] bool IsSane(const double* x, int n);

@@ -84,18 +84,41 @@ VecX HomePositions(const EngineModel& engine) {
   return home;
 }
 
-void Session::ApplyForces(double t_s) {
+void Session::ApplyForces(double t_s, const Commanded& at) {
   loads.Evaluate(t_s, *data);
   if (loads.world().empty() && !system.has_given_forces()) return;
   mju_zero(data->qfrc_applied, engine.m->nv);
   loads.AddGeneralized(data.get(), data->qfrc_applied);
   if (!system.has_given_forces()) return;
-  VecX given = VecX::Zero(static_cast<Eigen::Index>(engine.driven.size()));
+  given.setZero(static_cast<Eigen::Index>(engine.driven.size()));
   for (const DriveForce& force : motion.forces) {
     given[force.drive] = Evaluate(force.force, t_s).value;
   }
+  if (options.drives == DriveMode::kPushed) given.head(at.force.size()) = at.force;
+  if (options.drives == DriveMode::kServo) RunServos(engine, at, data.get(), &given);
   system.SetGivenForces(given);
-  system.AddGivenForces(data->qfrc_applied);
+  if (options.drives != DriveMode::kServo) system.AddGivenForces(data->qfrc_applied);
+}
+
+// MuJoCo's actuation stage at the data's position (tendons evaluated) and velocity. The motors
+// carry the feed-forward.
+void RunServos(const EngineModel& engine, const Commanded& at, mjData* d, VecX* force) {
+  const mjModel* m = engine.m.get();
+  const auto drives = static_cast<Eigen::Index>(engine.mechanism->drives.size());
+  for (Eigen::Index k = 0; k < drives; ++k) {
+    const DrivenPlace& place = engine.driven[static_cast<size_t>(k)];
+    d->ctrl[place.motor] = at.force.size() > 0 ? at.force[k] : 0.0;
+    d->ctrl[place.position_servo] = at.motion.position[k];
+    d->ctrl[place.velocity_servo] = at.motion.velocity[k];
+  }
+  mj_transmission(m, d);
+  mju_mulMatVec(d->actuator_velocity, d->actuator_moment, d->qvel, m->nu, m->nv);
+  mj_fwdActuation(m, d);
+  for (Eigen::Index k = 0; k < drives; ++k) {
+    const DrivenPlace& place = engine.driven[static_cast<size_t>(k)];
+    (*force)[k] = d->actuator_force[place.motor] + d->actuator_force[place.position_servo] +
+                  d->actuator_force[place.velocity_servo];
+  }
 }
 
 bool IsSane(const double* x, int n) {
@@ -120,8 +143,8 @@ namespace {
 
 RunSummary RunMode(Session* session, const DrivenMotion& driven) {
   if (session->options.mode == SimulationMode::kInverse) return RunInverse(session, driven);
-  if (session->options.engine == Engine::kStock) return RunStock(session, driven);
-  return RunCorrected(session, driven);
+  if (session->options.engine == Engine::kCorrected) return RunCorrected(session, driven);
+  return RunStock(session, driven);
 }
 
 void ReportUniqueness(const Session& session, SimulationRun* run) {
@@ -134,18 +157,40 @@ void ReportUniqueness(const Session& session, SimulationRun* run) {
   }
 }
 
+MjcfOptions MjcfOptionsOf(const Motion& motion, const SimulationOptions& options) {
+  MjcfOptions mjcf{.step_s = AdjustedStep(motion, options.step_s),
+                   .time_constant_steps = options.stock_time_constant_steps,
+                   .default_softness = options.engine == Engine::kDefaults,
+                   .guided = options.drives == DriveMode::kGuided};
+  if (options.drives == DriveMode::kServo) {
+    mjcf.kp.assign(options.servo.kp.begin(), options.servo.kp.end());
+    mjcf.kv.assign(options.servo.kv.begin(), options.servo.kv.end());
+  }
+  return mjcf;
+}
+
 RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
                const SimulationOptions& options, const std::function<void(double)>& progress,
                SimulationRun* run) {
-  run->mjcf = WriteMjcf(mechanism, {.step_s = AdjustedStep(motion, options.step_s),
-                                    .time_constant_steps = options.stock_time_constant_steps});
+  run->mjcf = WriteMjcf(mechanism, MjcfOptionsOf(motion, options));
   EngineModel engine;
   if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
     return summary;
   }
   if (RunSummary summary = CheckLoads(engine, motion); !summary.ok()) return summary;
   ReleaseForcedDrives(motion, &engine);
+  EngineState start;
+  if (options.drives != DriveMode::kGuided) {
+    DrivenSample first;
+    if (RunSummary summary = driven(0.0, &first); !summary.ok()) return summary;
+    if (RunSummary summary = FindCommandedStart(&engine, first, &start); !summary.ok()) {
+      return summary;
+    }
+    GuideDrives(false, &engine);
+  }
+  if (options.drives == DriveMode::kServo) FindServos(&engine);
   Session session(std::move(engine), motion, options, run);
+  session.start = std::move(start);
   session.progress = progress;
   RunSummary summary = RunMode(&session, driven);
   if (summary.ok()) ReportUniqueness(session, run);

@@ -17,7 +17,23 @@ namespace mbv {
 enum class SimulationMode { kForward, kInverse };
 enum class Engine {
   kCorrected,  ///< J̇q̇ and exact drive references supplied (see docs/simulation.md)
-  kStock,      ///< MuJoCo as it is
+  kStock,      ///< MuJoCo as it is, by the best recipe from outside (stiff, rates in the targets)
+  kDefaults,   ///< MuJoCo as it is by default: soft constraints, positions as targets
+};
+
+/// What moves the drives in forward mode.
+enum class DriveMode {
+  kGuided,  ///< constraints hold them on the commanded motion; the force is the constraint's
+  kPushed,  ///< given forces push them in open loop, from the commanded start
+  kServo,   ///< MuJoCo's own position and velocity actuators follow the commanded motion
+};
+
+/// Forces of all drives, in model order [N or N m], at any time of the scenario.
+using DriveForces = std::function<RunSummary(double t_s, VecX* force)>;
+
+/// Gains of every drive, in model order: [N/m or N m/rad], [N s/m or N m s/rad].
+struct ServoGains {
+  VecX kp, kv;
 };
 
 struct SimulationOptions {
@@ -31,6 +47,10 @@ struct SimulationOptions {
   /// Time constant of the generated file's equality constraints (stock engine), in steps, >= 2:
   /// MuJoCo itself raises smaller ones.
   double stock_time_constant_steps = 2.0;
+  /// Other than kGuided: forward mode of the corrected engine, and every freedom commanded.
+  DriveMode drives = DriveMode::kGuided;
+  DriveForces forces = {};  ///< kPushed: what pushes; kServo: feed-forward, or empty
+  ServoGains servo = {};    ///< kServo only
   /// Free motion only: poses and twists of all bodies at t = 0. They are put onto the loops of the
   /// simulated model, with the guided coordinates where they are commanded.
   BodyStates start = {};
@@ -50,6 +70,7 @@ struct SimulationRun {
   double loop_wall_s = 0.0;           ///< time in the step loop
   double loop_cpu_s = 0.0;            ///< processor time of this thread in the step loop
   std::vector<std::string> warnings;  ///< MuJoCo's warnings
+  std::vector<std::string> notes;     ///< what a reader must know of the step
   /// Drives and prescribed joints whose force is not unique (a self-stress of the mechanism acts
   /// on them): what is reported is one choice of many.
   std::vector<std::string> not_unique;
@@ -58,10 +79,11 @@ struct SimulationRun {
 /// `motion` gives duration, sample times, loads, forces of drives and the times at which profiles
 /// break (the integration steps onto them); of a free motion `driven` counts for the commanded
 /// drives and prescribed joints only; `driven` gives the commanded motion, evaluated before the
-/// loop. Fails with what `driven` returned; kNoConvergence (the loops do not close with the
-/// commanded drive positions); kUnsupported (undriven freedoms or a free motion in inverse mode, a
-/// load on a merged body, a drive on a ball); kEngineFailure (MuJoCo's errors, motion not finite,
-/// loops apart). Samples up to the failure are filled, the others NaN.
+/// loop, as are the forces. Fails with what `driven` returned; kNoConvergence (the loops do not
+/// close with the commanded drive positions); kUnsupported (undriven freedoms or a free motion in
+/// inverse mode, a load on a merged body, a drive on a ball); kEngineFailure (MuJoCo's errors,
+/// motion not finite, loops apart, a step that springs or servos cannot be followed with). Samples
+/// up to the failure are filled, the others NaN.
 [[nodiscard]] SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion,
                                      const DrivenMotion& driven, const SimulationOptions& options,
                                      const std::function<void(double)>& progress = {});

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
+#include "regress/accuracy.h"
 #include "scenario/load_scenario.h"
 #include "tests/cli/program.h"
 #include "tests/source_dir.h"
@@ -50,6 +51,21 @@ std::string Culprits(const nlohmann::json& summary) {
   return text;
 }
 
+// What the documents quote of a scenario is what it gives.
+void CheckDocuments(const std::string& scenario, const std::string& summary) {
+  for (const char* document : {"README.md", "docs/simulation.md"}) {
+    const std::string text = ReadAll(fs::path(kSourceDir) / document);
+    for (const AccuracyCell& cell : AccuracyCells(text)) {
+      if (cell.scenario != scenario) continue;
+      const auto measured = AccuracyText(cell.heading, summary);
+      ASSERT_TRUE(measured) << document << ": no such heading: " << cell.heading;
+      EXPECT_TRUE(SameAccuracy(cell.text, *measured))
+          << document << ", " << scenario << ", " << cell.heading << ": " << cell.text
+          << ", measured " << *measured << "; renew it with mbverify regress --tables";
+    }
+  }
+}
+
 class ShippedScenario : public testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedScenario, GivesWhatItExpects) {
@@ -71,6 +87,8 @@ TEST_P(ShippedScenario, GivesWhatItExpects) {
   const auto json = nlohmann::json::parse(ReadAll(summary));
   EXPECT_EQ(json["verdict"], expect.verdict);
   EXPECT_EQ(json["exit_code"], expect.exit_code);
+  CheckDocuments(fs::path(GetParam()).lexically_relative("scenarios").replace_extension(),
+                 ReadAll(summary));
   const std::string text = printed + Culprits(json);
   EXPECT_NE(text.find(expect.mentions), std::string::npos)
       << "'" << expect.mentions << "' is missing in\n"
@@ -79,6 +97,18 @@ TEST_P(ShippedScenario, GivesWhatItExpects) {
 
 INSTANTIATE_TEST_SUITE_P(Shipped, ShippedScenario, testing::ValuesIn(ShippedScenarios()),
                          [](const auto& info) { return NameOf(info.param); });
+
+TEST(ShippedScenarios, DocumentsQuoteScenariosThatExist) {
+  const fs::path root = kSourceDir;
+  size_t quoted = 0;
+  for (const char* document : {"README.md", "docs/simulation.md"}) {
+    for (const AccuracyCell& cell : AccuracyCells(ReadAll(root / document))) {
+      EXPECT_TRUE(fs::exists(root / "scenarios" / (cell.scenario + ".yaml"))) << cell.scenario;
+      ++quoted;
+    }
+  }
+  EXPECT_GE(quoted, 100U);
+}
 
 TEST(ShippedScenarios, EachFileBelowMustFailExpectsAFailure) {
   for (const std::string& file : ShippedScenarios()) {

@@ -1,0 +1,48 @@
+// Judging simulations whose drives are pushed by given forces or follow servos.
+//
+// * Force-driven: the drive forces of the simulation are another witness' own, so the motion is
+//   judged. In open loop errors grow by themselves: the limit of every metric of motion is how far
+//   the same run leads when its forces are bent by ComparisonInput::bend of their RMS.
+// * Servo: the forces are judged by the reference evaluated on the motion that was reached (witness
+//   "reached"). Against what is commanded they differ by what the servo's error costs: reported,
+//   and judged where the scenario states a limit (column `servo`).
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "comparison/comparison.h"
+
+namespace mbv {
+
+/// The drive forces of this pair are the same by construction.
+[[nodiscard]] bool SharesForces(const ComparisonInput& input, const std::string& measured,
+                                const std::string& truth);
+
+/// The column by which a pair is judged.
+[[nodiscard]] LimitColumn ColumnOfPair(const ComparisonInput& input, const std::string& measured,
+                                       const std::string& truth);
+
+/// Per metric of motion, how far the bent forces lead `simulated` astray; empty unless
+/// force-driven.
+[[nodiscard]] std::map<Metric, double> GrowthLimits(const ComparisonInput& input,
+                                                    const Trace& simulated);
+
+/// The same for the commands of one witness.
+[[nodiscard]] std::map<Metric, double> CommandGrowth(const std::map<Metric, double>& growth);
+
+/// Metrics of drive motion that the reference on the reached motion has by construction.
+void LeaveOutReachedMotion(PairComparison* pair);
+
+/// Whether a check counts as evidence of what the simulation is for.
+[[nodiscard]] bool IsEvidence(const ComparisonInput& input, const CheckResult& check);
+
+/// Why the horizon of a force-driven run is too long to tell anything; "" if it is not.
+[[nodiscard]] std::string WhyHorizonTooLong(const ComparisonInput& input,
+                                            const Comparison& comparison);
+
+/// What a force-driven or servo run tells; an empty text where it tells nothing.
+[[nodiscard]] Attribution AttributeDriven(const ComparisonInput& input,
+                                          const Comparison& comparison);
+
+}  // namespace mbv

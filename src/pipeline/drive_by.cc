@@ -1,0 +1,152 @@
+#include "pipeline/drive_by.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "core/demand.h"
+#include "mechanism/channels.h"
+#include "pipeline/free_motion_text.h"
+
+namespace mbv {
+namespace {
+
+// Every drive by itself, and the commands of prescribed joints.
+Motion CommandDrives(const Mechanism& mechanism, const Motion& motion) {
+  Motion drives = motion;
+  drives.commands.clear();
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    Command command;
+    command.name = mechanism.drives[d].name;
+    command.terms.push_back(
+        {.coordinate = {.kind = Coordinate::Kind::kDrive, .index = static_cast<int>(d)}});
+    drives.commands.push_back(std::move(command));
+  }
+  for (const Command& command : motion.commands) {
+    const bool base = std::all_of(command.terms.begin(), command.terms.end(), [](const auto& term) {
+      return term.coordinate.kind == Coordinate::Kind::kPrescribed;
+    });
+    if (base) drives.commands.push_back(command);
+  }
+  return drives;
+}
+
+std::string GainText(const Gain& gain) {
+  if (gain.all) return fmt::format("{:g}", *gain.all);
+  double least = kNan, most = kNan;
+  for (const auto& [name, value] : gain.by_drive) {
+    least = std::fmin(least, value);
+    most = std::fmax(most, value);
+  }
+  return fmt::format("{:g} … {:g}", least, most);
+}
+
+}  // namespace
+
+ReferenceRun RunReached(const Mechanism& mechanism, const Motion& motion, const Trace& simulated) {
+  const Motion drives = CommandDrives(mechanism, motion);
+  const auto commands = [&](size_t i, CommandSample* command) {
+    for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+      const auto row = static_cast<Eigen::Index>(i), k = static_cast<Eigen::Index>(d);
+      const int position = simulated.Find(mechanism.drives[d].name + ".position");
+      MBV_DEMAND(position >= 0, mechanism.drives[d].name);
+      // Position, velocity and acceleration are neighbours (DriveChannels).
+      command->position[k] = simulated.values(row, position);
+      command->velocity[k] = simulated.values(row, position + 1);
+      command->acceleration[k] = simulated.values(row, position + 2);
+    }
+  };
+  ReferenceRun run = RunReference(mechanism, drives, {}, commands);
+  run.trace.witness = "reached";
+  return run;
+}
+
+DriveForces Bent(const DriveForces& forces, const Mechanism& mechanism, const Trace& truth,
+                 double bend) {
+  std::map<std::string, std::pair<double, double>> square;  // per unit: sum and count
+  for (const Drive& drive : mechanism.drives) {
+    const int column = truth.Find(drive.name + ".force");
+    MBV_DEMAND(column >= 0, drive.name);
+    auto& [sum, count] = square[ForceUnit(mechanism, drive)];
+    sum += truth.values.col(column).squaredNorm();
+    count += static_cast<double>(truth.values.rows());
+  }
+  VecX offset(static_cast<Eigen::Index>(mechanism.drives.size()));
+  for (Eigen::Index d = 0; d < offset.size(); ++d) {
+    const auto& [sum, count] =
+        square[ForceUnit(mechanism, mechanism.drives[static_cast<size_t>(d)])];
+    offset[d] = (d % 2 == 0 ? bend : -bend) * std::sqrt(sum / count);
+  }
+  return [forces, offset](double t_s, VecX* force) {
+    RunSummary summary = forces(t_s, force);
+    if (summary.ok()) *force += offset;
+    return summary;
+  };
+}
+
+ServoGains GainsOf(const ServoSettings& settings, const Mechanism& mechanism) {
+  const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+  ServoGains gains{.kp = VecX(drives), .kv = VecX(drives)};
+  for (Eigen::Index d = 0; d < drives; ++d) {
+    const std::string& name = mechanism.drives[static_cast<size_t>(d)].name;
+    gains.kp[d] = settings.kp.Of(name);
+    gains.kv[d] = settings.kv.Of(name);
+  }
+  return gains;
+}
+
+const char* ModeText(const SimulationSettings& settings) {
+  if (!settings.on) return "off";
+  if (!settings.forward) return "inverse";
+  switch (settings.drive_by) {
+    case DriveBy::kMotion:
+      return "forward";
+    case DriveBy::kForces:
+      return "force_driven";
+    case DriveBy::kServos:
+      return "servo";
+  }
+  return "";
+}
+
+std::string DriveText(const SimulationSettings& settings, const std::string& driven_by) {
+  switch (settings.drive_by) {
+    case DriveBy::kMotion:
+      return driven_by + " drive motion";
+    case DriveBy::kForces:
+      return "pushed in open loop by the " + driven_by + " drive forces";
+    case DriveBy::kServos:
+      return fmt::format("servos on the {} drive motion, kp {}, kv {}, feed-forward: {}", driven_by,
+                         GainText(settings.servo.kp), GainText(settings.servo.kv),
+                         settings.servo.feedforward ? "its forces" : "none");
+  }
+  return "";
+}
+
+std::string SimulationLine(const Prepared& prepared) {
+  const Scenario& scenario = prepared.scenario;
+  const SimulationSettings& simulation = scenario.simulation;
+  if (!simulation.on) return "no simulation";
+  std::string line =
+      simulation.forward
+          ? fmt::format("forward simulation, step {:g} ms, {} engine", 1e3 * simulation.step_s,
+                        simulation.stock_engine ? "stock" : "corrected")
+          : std::string("inverse dynamics at each sample");
+  const std::string drives = simulation.forward ? DriveText(simulation, prepared.driven_by)
+                                                : prepared.driven_by + " drive motion";
+  line +=
+      fmt::format(", {}, {:g} s sampled every {:g} ms",
+                  scenario.motion.free() ? FreeMotionText(prepared.base, scenario.motion) : drives,
+                  scenario.motion.duration_s, 1e3 * scenario.motion.sample_s);
+  if (simulation.extrapolate) {
+    const Extrapolation& extrapolation = *simulation.extrapolate;
+    line += fmt::format("; forces extrapolated in {} from {:g} and {:g} to {:g}",
+                        extrapolation.parameter, extrapolation.from[0], extrapolation.from[1],
+                        prepared.mechanisms.simulated.ParameterValue(extrapolation.parameter));
+  }
+  return line;
+}
+
+}  // namespace mbv

@@ -1,0 +1,149 @@
+// Force-driven and servo simulations, and the engines beside each other, through all stages.
+#include <gtest/gtest.h>
+
+#include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+std::string Scenario(const std::string& name) {
+  return SourcePath("/scenarios/" + name + ".yaml");
+}
+
+RunOutcome Run(const std::string& scenario, std::vector<SetValue> set = {}) {
+  RunOptions options;
+  options.pictures = false;
+  options.scenario.set = std::move(set);
+  return RunScenario(Scenario(scenario), options);
+}
+
+// A tripod that goes 0.1 s, which is enough to see everything.
+std::vector<SetValue> Short(std::vector<SetValue> more = {}) {
+  std::vector<SetValue> set = {{"motion",
+                                "{duration_s: 0.2, sample_s: 0.002, commands: {platform.x: {sine: "
+                                "{amplitude: 0.05, period_s: 0.8}}, platform.y: 0, platform.z: "
+                                "0.57}}"}};
+  set.insert(set.end(), more.begin(), more.end());
+  return set;
+}
+
+double ValueOf(const Report& report, const std::string& check) {
+  const CheckResult* found = report.comparison.FindCheck(check);
+  return found == nullptr ? kNan : found->value;
+}
+
+TEST(ForceDriven, TheMotionIsJudgedByWhereBentForcesLead) {
+  const RunOutcome outcome = Run("spr_tripod/force_driven", Short());
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
+  const CheckResult* position =
+      outcome.report->comparison.FindCheck("simulated_vs_analytic.position_m");
+  ASSERT_NE(position, nullptr);
+  EXPECT_EQ(position->limit_by, "forces bent by 1e-06");
+  // A constant error of 1e-6 of some 150 N on 15 kg moves a leg by ½ a t² ~ 2e-7 m in 0.2 s.
+  EXPECT_GT(*position->limit, 2e-8);
+  EXPECT_LT(*position->limit, 2e-6);
+  EXPECT_LT(position->value, 1e-3 * *position->limit);
+  // The forces are the analytic ones: they are no evidence.
+  EXPECT_EQ(outcome.report->comparison.FindCheck("simulated_vs_analytic.force_nrmse"), nullptr);
+  EXPECT_NE(outcome.report->comparison.attribution.text.find("stays within"), std::string::npos);
+}
+
+TEST(ForceDriven, NamesWhatIsWrong) {
+  const RunOutcome simulated =
+      Run("spr_tripod/force_driven", Short({{"simulation.parameters", "{m_platform: 30.0001}"}}));
+  ASSERT_TRUE(simulated.report) << simulated.diagnostics.Text();
+  EXPECT_EQ(simulated.exit_code, 1);
+  EXPECT_EQ(simulated.report->comparison.attribution.odd_one_out, "simulated");
+  const RunOutcome analytic =
+      Run("spr_tripod/force_driven", Short({{"analytic", "{parameters: {m_platform: 30.0001}}"}}));
+  ASSERT_TRUE(analytic.report) << analytic.diagnostics.Text();
+  EXPECT_EQ(analytic.exit_code, 1);
+  EXPECT_EQ(analytic.report->comparison.attribution.odd_one_out, "analytic");
+}
+
+TEST(ForceDriven, WorksWithTheReferencesForces) {
+  const RunOutcome outcome = Run("spr_tripod/force_driven", Short({{"analytic", "none"}}));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
+  EXPECT_EQ(outcome.report->driven_by, "reference");
+}
+
+TEST(ForceDriven, AHorizonOverWhichErrorsGrowTooFarVerifiesNothing) {
+  const RunOutcome outcome =
+      Run("spr_tripod/force_driven", Short({{"checks.force_nrmse", "{forward: 0.05}"}}));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.report->comparison.reason.find("too long to push"), std::string::npos)
+      << outcome.report->comparison.reason;
+}
+
+TEST(Servo, ForcesAreJudgedOnTheMotionReached) {
+  const RunOutcome outcome = Run("spr_tripod/servo", Short());
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  const Report& report = *outcome.report;
+  EXPECT_EQ(outcome.exit_code, 0) << report.comparison.reason;
+  EXPECT_LT(ValueOf(report, "simulated_vs_reached.force_nrmse"), 1e-9);
+  // The servos sag by weight over stiffness, F/kp ~ 150 N / 5e5 N/m, and that is reported only.
+  const CheckResult* tracking = report.comparison.FindCheck("simulated_vs_analytic.position_m");
+  ASSERT_NE(tracking, nullptr);
+  EXPECT_GT(tracking->value, 1e-4);
+  EXPECT_LT(tracking->value, 2e-3);
+  EXPECT_FALSE(tracking->limit);
+  // Drive motion is taken from the simulation: no evidence.
+  EXPECT_EQ(report.comparison.FindCheck("simulated_vs_reached.position_m"), nullptr);
+}
+
+TEST(Servo, FeedForwardTakesTheErrorAway) {
+  const RunOutcome outcome = Run("spr_tripod/servo", Short({{"simulation.feedforward", "forces"}}));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
+  EXPECT_LT(ValueOf(*outcome.report, "simulated_vs_analytic.position_m"), 1e-9);
+  EXPECT_LT(ValueOf(*outcome.report, "simulated_vs_analytic.force_nrmse"), 1e-6);
+}
+
+TEST(Servo, AStatedLimitOnTheCommandIsJudged) {
+  const RunOutcome outcome =
+      Run("spr_tripod/servo", Short({{"checks.position_m", "{servo: 1e-4}"}}));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 1);
+}
+
+TEST(Servo, NamesWhatIsWrong) {
+  const RunOutcome simulated =
+      Run("spr_tripod/servo", Short({{"simulation.parameters", "{m_platform: 30.001}"}}));
+  ASSERT_TRUE(simulated.report) << simulated.diagnostics.Text();
+  EXPECT_EQ(simulated.exit_code, 1);
+  EXPECT_EQ(simulated.report->comparison.attribution.odd_one_out, "simulated");
+  const RunOutcome analytic =
+      Run("spr_tripod/servo", Short({{"analytic", "{parameters: {m_platform: 30.001}}"}}));
+  ASSERT_TRUE(analytic.report) << analytic.diagnostics.Text();
+  EXPECT_EQ(analytic.exit_code, 1);
+  EXPECT_EQ(analytic.report->comparison.attribution.odd_one_out, "analytic");
+}
+
+TEST(Servo, AStepThatCannotFollowTheGainsIsRefusedWithTheStepNeeded) {
+  const RunOutcome outcome =
+      Run("spr_tripod/servo", Short({{"simulation.kp", "1e9"}, {"simulation.kv", "1"}}));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.report->comparison.reason.find("simulation.step_s = "), std::string::npos)
+      << outcome.report->comparison.reason;
+}
+
+TEST(EngineErrors, DefaultsAndTheBestRecipeAreNamedWithAndWithoutTheFirstMoments) {
+  const RunOutcome outcome = Run("spr_tripod/default", Short({{"simulation.stock_too", "true"}}));
+  ASSERT_TRUE(outcome.report && outcome.report->engine_comparison) << outcome.diagnostics.Text();
+  const std::vector<EngineError>& engines = outcome.report->engine_comparison->engines;
+  ASSERT_EQ(engines.size(), 3U);
+  EXPECT_EQ(engines[0].engine, "defaults");
+  EXPECT_EQ(engines[1].engine, "stock");
+  EXPECT_EQ(engines[2].engine, "corrected");
+  EXPECT_GT(engines[0].force_nrmse, 3.0 * engines[1].force_nrmse);
+  EXPECT_GT(engines[1].force_nrmse, 10.0 * engines[1].force_nrmse_later);
+  EXPECT_GT(engines[1].force_nrmse, 1e3 * engines[2].force_nrmse);
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,57 @@
+// Statics without weight: every force is zero, and no witness may make something of it.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <regex>
+#include <sstream>
+
+#include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+RunOutcome Run(const std::string& scenario, std::vector<SetValue> set) {
+  RunOptions options;
+  options.pictures = false;
+  options.scenario.set = std::move(set);
+  return RunScenario(SourcePath("/scenarios/" + scenario + ".yaml"), options);
+}
+
+std::string ReadText(const fs::path& path) {
+  std::ifstream stream(path, std::ios::binary);
+  std::stringstream text;
+  text << stream.rdbuf();
+  return text.str();
+}
+
+// At rest without weight MuJoCo has the solution from the start, and must be made to refine it.
+TEST(Weightless, EveryStaticScenarioAgrees) {
+  const fs::path source = kSourceDir;
+  const fs::path folder = fs::path(testing::TempDir()) / "weightless";
+  size_t ran = 0;
+  for (const auto& entry : fs::directory_iterator(source / "scenarios")) {
+    const std::string name = entry.path().filename();
+    if (!fs::exists(entry.path() / "static.yaml")) continue;
+    // The same model with its gravity taken away.
+    fs::create_directories(folder / name);
+    const std::string text = ReadText(source / "models" / name / "model.yaml");
+    const std::regex gravity(R"(\ngravity: *\[[^\]]*\])");
+    ASSERT_TRUE(std::regex_search(text, gravity)) << name;
+    const fs::path model = folder / name / "model.yaml";
+    std::ofstream(model) << std::regex_replace(text, gravity, "\ngravity: [0, 0, 0]");
+    const RunOutcome outcome = Run(name + "/static", {{"mechanism", model.string()}});
+    ASSERT_TRUE(outcome.report) << name << ": " << outcome.diagnostics.Text();
+    EXPECT_EQ(outcome.exit_code, 0) << name << ": " << outcome.report->comparison.reason << "\n"
+                                    << outcome.report->comparison.attribution.text;
+    ++ran;
+  }
+  EXPECT_GE(ran, 7U);
+  EXPECT_EQ(Run("cabin_robot/static", {{"parameters", "{g: 0}"}}).exit_code, 0);
+}
+
+}  // namespace
+}  // namespace mbv
