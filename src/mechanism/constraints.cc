@@ -243,27 +243,6 @@ double RotationGap(const Joint& joint, const Pose& X_FM) {
   return LogRotation(X_nearest.linear().transpose() * X_FM.linear()).norm();
 }
 
-double CharacteristicLength(const Mechanism& mechanism) {
-  double sum = 0.0;
-  int count = 0;
-  const auto add = [&](const Vec3& p) {
-    if (p.norm() < 1e-9) return;
-    sum += p.squaredNorm();
-    ++count;
-  };
-  for (const Joint& joint : mechanism.joints) {
-    add(joint.X_PF.translation());
-    add(joint.X_CM.translation());
-  }
-  for (const Drive& drive : mechanism.drives) {
-    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
-      add(leg->p_from);
-      add(leg->p_to);
-    }
-  }
-  return count == 0 ? 1.0 : std::sqrt(sum / count);
-}
-
 std::vector<Pose> TreePoses(const Mechanism& mechanism,
                             const std::vector<std::array<double, 6>>& q) {
   std::vector<Pose> X_FM(mechanism.joints.size(), Pose::Identity());

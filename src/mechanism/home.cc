@@ -1,9 +1,7 @@
 // Levenberg–Marquardt on the loop closures in tree coordinates.
 //
 // With lengths divided by a characteristic length L, each step solves
-//   min |r + J s|² + μ |s|²
-// by QR of the stacked matrix [J; √μ 1], which keeps full accuracy as μ → 0 and tolerates
-// redundant closure rows and free motions alike.
+//   min |r + J s|² + μ |s|²                                                   (DampedStep)
 #include "mechanism/home.h"
 
 #include <fmt/format.h>
@@ -13,13 +11,17 @@
 #include <random>
 
 #include "core/demand.h"
+#include "mechanism/closure_residual.h"
 #include "mechanism/constraints.h"
 #include "mechanism/frame_pair.h"
+#include "mechanism/reach.h"
 #include "mechanism/tree_motion.h"
 
 namespace mbv {
 namespace {
 
+using internal::ClosureResidual;
+using internal::DampedStep;
 using internal::TreeMotion;
 using Coordinates = std::vector<std::array<double, 6>>;
 
@@ -53,46 +55,6 @@ double LargestGap(const Mechanism& mechanism, const BodyStates& states, double l
   return largest;
 }
 
-// Closure rows, lengths relative to `length`; with their Jacobian when J is given.
-VecX Residual(const Mechanism& mechanism, const TreeMotion& tree, const BodyStates& states,
-              double length, MatX* J) {
-  std::vector<ConstraintRows> all;
-  int count = 0;
-  for (const Joint& joint : mechanism.joints) {
-    if (!joint.closure) continue;
-    all.push_back(RowsOf(joint, states, false));
-    count += all.back().rows;
-  }
-  VecX r(count);
-  MatX J_bodies;
-  if (J != nullptr) {
-    J->resize(count, tree.freedoms());
-    J_bodies = tree.Jacobian(states);
-  }
-  int at = 0;
-  for (const ConstraintRows& rows : all) {
-    VecX scale = VecX::Ones(rows.rows);
-    scale.head(rows.translation_rows).setConstant(1.0 / length);
-    r.segment(at, rows.rows) = scale.cwiseProduct(rows.residual.head(rows.rows));
-    if (J != nullptr) {
-      J->middleRows(at, rows.rows) =
-          scale.asDiagonal() *
-          (rows.J_parent.topRows(rows.rows) * J_bodies.middleRows<6>(6 * rows.parent) +
-           rows.J_child.topRows(rows.rows) * J_bodies.middleRows<6>(6 * rows.child));
-    }
-    at += rows.rows;
-  }
-  return r;
-}
-
-VecX DampedStep(const MatX& J, const VecX& r, double mu) {
-  MatX stacked(J.rows() + J.cols(), J.cols());
-  stacked << J, std::sqrt(mu) * MatX::Identity(J.cols(), J.cols());
-  VecX right = VecX::Zero(stacked.rows());
-  right.head(r.size()) = -r;
-  return stacked.householderQr().solve(right);
-}
-
 Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
               const Coordinates& start) {
   constexpr int kMaxIterations = 100;
@@ -108,7 +70,7 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
   }
   now.states = tree.States(now.X_FM);
   MatX J;
-  VecX r = Residual(mechanism, tree, now.states, length, &J);
+  VecX r = ClosureResidual(mechanism, tree, now.states, length, &J);
   double mu = 1e-4;
   for (; now.iterations < kMaxIterations && r.size() > 0 && tree.freedoms() > 0; ++now.iterations) {
     if (r.cwiseAbs().maxCoeff() < 1e-16) break;
@@ -120,7 +82,7 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
     tree.Step(unit.cwiseProduct(s), &next.X_FM);
     next.states = tree.States(next.X_FM);
     MatX J_next;
-    const VecX r_next = Residual(mechanism, tree, next.states, length, &J_next);
+    const VecX r_next = ClosureResidual(mechanism, tree, next.states, length, &J_next);
     if (r_next.norm() < r.norm()) {
       now.X_FM = std::move(next.X_FM);
       now.states = std::move(next.states);
@@ -164,10 +126,17 @@ Coordinates Disturbed(const Mechanism& mechanism, const Coordinates& guess,
   return out;
 }
 
+// kHomeTolerance, or what rounding leaves of coordinates that are large beside the mechanism.
+double ToleranceAt(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
+  const double reach = Reach(LongestLever(mechanism), X_WB);
+  return std::max(kHomeTolerance, GapRounding(reach) / CharacteristicLength(mechanism));
+}
+
 Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeResult* result) {
   const std::vector<bool> driven = DrivenJoints(mechanism);
   const std::vector<bool> none(mechanism.joints.size(), false);
   Attempt best = Close(mechanism, driven, guess);
+  const auto open = [&] { return best.gap > ToleranceAt(mechanism, best.states.X_WB); };
   const auto try_from = [&](const std::vector<bool>& locked, const Coordinates& start) {
     Attempt attempt = Close(mechanism, locked, start);
     attempt.iterations += best.iterations;
@@ -177,10 +146,10 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
     return true;
   };
   const bool any_driven = std::find(driven.begin(), driven.end(), true) != driven.end();
-  if (best.gap > kHomeTolerance && any_driven) result->drives_moved = try_from(none, guess);
+  if (open() && any_driven) result->drives_moved = try_from(none, guess);
 
   std::mt19937_64 random(20220101);
-  for (int i = 0; i < 12 && best.gap > kHomeTolerance; ++i) {
+  for (int i = 0; i < 12 && open(); ++i) {
     const std::vector<bool>& locked = i % 2 == 0 ? driven : none;
     const double amplitude = 0.05 * (1 + i);
     if (try_from(locked, Disturbed(mechanism, guess, locked, amplitude, &random))) {
@@ -245,7 +214,8 @@ HomeResult SolveHome(Mechanism* mechanism) {
                    [&](const LoopGap& a, const LoopGap& b) { return size(a) > size(b); });
   result.gap = best.gap;
   result.gap_at_guess = LargestGap(*mechanism, at_guess, length);
-  result.closed = best.gap <= kHomeTolerance;
+  result.tolerance = ToleranceAt(*mechanism, best.states.X_WB);
+  result.closed = best.gap <= result.tolerance;
   result.iterations = best.iterations;
   return result;
 }

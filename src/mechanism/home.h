@@ -9,6 +9,9 @@
 
 namespace mbv {
 
+/// Loops count as closed below this gap [characteristic lengths, rad], or where it is rounding.
+inline constexpr double kHomeTolerance = 1e-12;
+
 /// Gap of one loop closure at the end of the home solution.
 struct LoopGap {
   int joint = -1;              ///< index of the closure joint
@@ -18,8 +21,9 @@ struct LoopGap {
 
 struct HomeResult {
   bool closed = false;
-  /// Largest gap of all closures [m or rad], at the solution and at the guesses.
+  /// Largest gap of all closures [characteristic lengths, rad], at the solution and at the guesses.
   double gap = kNan, gap_at_guess = kNan;
+  double tolerance = kHomeTolerance;  ///< for `gap`
   bool drives_moved = false;   ///< driven joints had to leave their guesses to close the loops
   bool guesses_moved = false;  ///< closed only from disturbed guesses: may be another assembly
   int iterations = 0;
@@ -28,9 +32,6 @@ struct HomeResult {
   /// One line for people: "limb1.S is open by 0.12 m and 0.3 rad; …" (at most three loops).
   [[nodiscard]] std::string Text(const Mechanism& mechanism) const;
 };
-
-/// Loops count as closed below this gap [m per m of size, rad].
-inline constexpr double kHomeTolerance = 1e-12;
 
 /// Solves all loop closures in the coordinates of the spanning tree (BuildSpanningTree first), from
 /// Joint::guess: Levenberg–Marquardt, first with driven and prescribed joints held at their

@@ -7,7 +7,9 @@
 #include <numeric>
 
 #include "mechanism/constraints.h"
+#include "mechanism/data_projection.h"
 #include "mechanism/home.h"
+#include "mechanism/impossible_inertia.h"
 #include "mechanism/mobility.h"
 #include "mechanism/model_reader.h"
 #include "mechanism/tilted_axis.h"
@@ -19,6 +21,8 @@ namespace {
 // Beside larger ones, usual masses and lengths are lost in a sum.
 constexpr double kLargestMass_kg = 1e15;
 constexpr double kLargestLength_m = 1e12;
+// Joint frames may have to move farther than the gap that they leave at home is wide.
+constexpr double kProjectionReach = 10.0;
 
 struct Reason {
   std::string text;  // empty: nothing wrong
@@ -37,14 +41,7 @@ Reason WhyNotPhysical(const Body& body) {
             "give the inertia about the centre of mass"};
   }
   const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
-  const std::string shown = fmt::format("principal inertias {:.6g}, {:.6g}, {:.6g} kg m²",
-                                        principal[0], principal[1], principal[2]);
-  if (!(principal[0] > 0.0)) return {shown + " violate I > 0", ""};
-  if (principal[0] + principal[1] < principal[2] * (1.0 - 1e-9)) {
-    return {shown + " violate I1 + I2 >= I3",
-            "no distribution of mass has such inertias; look for exchanged or missing digits, and "
-            "that they are about the centre of mass"};
-  }
+  if (!(principal[0] > 0.0)) return {PrincipalInertiaText(principal) + " violate I > 0", ""};
   return {};
 }
 
@@ -73,16 +70,37 @@ void ModelReader::CheckMasses() {
     if (!std::isfinite(body.mass)) continue;  // already reported
     Reason reason = WhyTooLarge(body);
     if (reason.text.empty()) reason = WhyNotPhysical(body);
-    if (reason.text.empty()) continue;
-    if (const YamlEntry* at = body_places_[b]; at != nullptr) {
-      yaml_.SetNote(body.name == at->key ? "" : fmt::format(" (body {})", body.name));
-      yaml_.Error(*at, body_paths_[b] + ": " + reason.text, reason.hint);
-    } else {
-      other_findings_.Add({Severity::kError, body_paths_[b], 0, 0,
-                           fmt::format("link '{}': {}", body.name, reason.text), reason.hint});
+    if (!reason.text.empty()) {
+      AddBodyFinding(Severity::kError, b, reason.text, reason.hint);
+    } else if (const std::string violation = TriangleViolation(body); !violation.empty()) {
+      CheckImpossibleInertia(b, violation);
     }
   }
   yaml_.SetNote("");
+}
+
+void ModelReader::AddBodyFinding(Severity severity, size_t b, const std::string& text,
+                                 const std::string& hint) {
+  const Body& body = mechanism_.bodies[b];
+  if (const YamlEntry* at = body_places_[b]; at != nullptr) {
+    yaml_.SetNote(body.name == at->key ? "" : fmt::format(" (body {})", body.name));
+    yaml_.AddAt(severity, at->line, at->column, body_paths_[b] + ": " + text, hint);
+  } else {
+    other_findings_.Add(
+        {severity, body_paths_[b], 0, 0, fmt::format("link '{}': {}", body.name, text), hint});
+  }
+}
+
+void ModelReader::CheckImpossibleInertia(size_t b, const std::string& violation) {
+  if (!impossible_inertia_allowed_) {
+    AddBodyFinding(Severity::kError, b, violation,
+                   "no distribution of mass has such inertias; look for exchanged or missing "
+                   "digits, and that they are about the centre of mass; `allow: "
+                   "impossible_inertia` in the model takes them as they are");
+    return;
+  }
+  AddBodyFinding(Severity::kWarning, b, "IMPOSSIBLE INERTIA, allowed by the model: " + violation,
+                 "");
 }
 
 bool ModelReader::CheckTree() {
@@ -97,15 +115,47 @@ void ModelReader::CloseLoops() {
     if (home.guesses_moved) WarnAboutAssembly(home);
     return;
   }
+  const double gap_m = home.gap * CharacteristicLength(mechanism_);
+  const int redundant = CountNearlyRedundant(mechanism_, home.gap);
+  if (redundant > 0 && gap_m <= closure_tolerance_m_ && ProjectRoundedData(home)) return;
+  std::string hint = "improve the guesses of the loop's joints, or look for a wrong length or axis";
+  if (redundant > 0) {
+    hint = fmt::format(
+        "the loops are overconstrained by {} and closed except for {:.2g} m: rounded data? More "
+        "digits close them; `closure_tolerance: {:.0e}` in the model moves the joint frames by as "
+        "little as closes them",
+        redundant, gap_m, 2 * gap_m);
+  }
   CheckAxes(false);
+  ReportGaps(home, hint);
+}
+
+bool ModelReader::ProjectRoundedData(const HomeResult& home) {
+  const DataProjection projection = ProjectData(&mechanism_, home.gap);
+  if (!projection.closed) return false;
+  const double moved_m =
+      std::max(projection.moved_m, projection.turned_rad * CharacteristicLength(mechanism_));
+  if (moved_m > kProjectionReach * closure_tolerance_m_) return false;
+  const std::string text = fmt::format(
+      "the loops are overconstrained by {} and their data close them except for {:.2g} m: joint "
+      "frames moved by up to {:.2g} m and {:.2g} rad (closure_tolerance {:g} m)",
+      projection.redundant, home.gap * CharacteristicLength(mechanism_), projection.moved_m,
+      projection.turned_rad, closure_tolerance_m_);
+  yaml_.SetNote("");
+  yaml_.AddAt(Severity::kWarning, 0, 0, text);
+  return true;
+}
+
+void ModelReader::ReportGaps(const HomeResult& home, const std::string& hint) {
+  const double tolerance_m = home.tolerance * CharacteristicLength(mechanism_);
   for (const LoopGap& gap : home.gaps) {
-    if (gap.position_m <= kHomeTolerance && gap.rotation_rad <= kHomeTolerance) continue;
+    const bool in_place = gap.position_m <= tolerance_m;
+    const bool turned = !(gap.rotation_rad <= home.tolerance);
+    if (in_place && !turned) continue;
     const Joint& joint = mechanism_.joints[gap.joint];
     std::string text = fmt::format("the loop at joint '{}' does not close: gap", joint.name);
-    if (!(gap.position_m <= kHomeTolerance)) text += fmt::format(" {:.3g} m", gap.position_m);
-    if (!(gap.rotation_rad <= kHomeTolerance)) text += fmt::format(" {:.3g} rad", gap.rotation_rad);
-    const std::string hint =
-        "improve the guesses of the loop's joints, or look for a wrong length or axis";
+    if (!in_place) text += fmt::format(" {:.3g} m", gap.position_m);
+    if (turned) text += fmt::format(" {:.3g} rad", gap.rotation_rad);
     const YamlEntry* at = joint_places_[gap.joint];
     yaml_.SetNote("");
     if (const auto urdf = urdf_places_.find(joint.name);
@@ -231,14 +281,18 @@ void ModelReader::CheckAxes(bool closed_at_home) {
 void ModelReader::CheckHome() {
   yaml_.SetNote("");
   CheckAxes(true);
-  const double slack = 1e-9;
-  const auto outside = [&](double value, const CoordinateRange& range) {
+  const double length = CharacteristicLength(mechanism_);
+  const auto outside = [&](double value, const CoordinateRange& range, bool is_length) {
+    const double slack = 1e-9 * (is_length ? length : 1.0);
     return value < range.lower - slack || value > range.upper + slack;
   };
   for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
     const Joint& joint = mechanism_.joints[j];
     for (int k = 0; k < FreedomsOf(joint.kind); ++k) {
-      if (joint_places_[j] == nullptr || !outside(joint.home[k], joint.range[k])) continue;
+      if (joint_places_[j] == nullptr ||
+          !outside(joint.home[k], joint.range[k], IsLength(joint.kind, k))) {
+        continue;
+      }
       yaml_.AddAt(
           Severity::kWarning, joint_places_[j]->line, joint_places_[j]->column,
           fmt::format("joint '{}' is at {:.6g} at home, its range is {:.6g} … {:.6g}", joint.name,
@@ -251,10 +305,10 @@ void ModelReader::CheckHome() {
   for (const Drive& drive : mechanism_.drives) {
     const double value = DriveRow(mechanism_, drive, states).value;
     const YamlEntry& at = *signal_places_[drive.name].front().entry;
-    if (std::holds_alternative<DistanceDrive>(drive.kind) && value < 1e-9) {
+    if (std::holds_alternative<DistanceDrive>(drive.kind) && value < 1e-9 * length) {
       yaml_.Error(at,
                   fmt::format("drive '{}': its two ends are the same point at home", drive.name));
-    } else if (outside(value, drive.range)) {
+    } else if (outside(value, drive.range, PositionUnit(mechanism_, drive) == "m")) {
       yaml_.AddAt(Severity::kWarning, at.line, at.column,
                   fmt::format("drive '{}' is at {:.6g} at home, its range is {:.6g} … {:.6g}",
                               drive.name, value, drive.range.lower, drive.range.upper));

@@ -9,10 +9,13 @@
 namespace mbv {
 namespace {
 
+// clang-format off
 const std::vector<std::string> kModelKeys = {
     "name",   "description", "parameters", "gravity",   "world",    "bodies",         "joints",
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
-    "urdf",   "attach",      "up",         "materials", "sections", "parameters_from"};
+    "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
+    "closure_tolerance", "closure_tolerance_mm"};
+// clang-format on
 const std::vector<std::string> kPartKeys = {"parameters", "attach",      "bodies",    "joints",
                                             "drives",     "prescribed",  "outputs",   "springs",
                                             "instances",  "description", "materials", "sections"};
@@ -45,6 +48,29 @@ void ModelReader::ReadHead() {
   }
   ReadUp(model, map.Find("up"));
   if (options_.gravity_W) mechanism_.gravity_W = *options_.gravity_W;
+  ReadAllowances(model, map);
+}
+
+void ModelReader::ReadAllowances(const Block& model, const YamlMap& map) {
+  static const std::vector<std::string> kAllowances = {"impossible_inertia"};
+  if (const YamlNode* allow = map.Find("allow")) {
+    std::vector<const YamlNode*> items = {allow};
+    if (allow->is_sequence()) {
+      items = yaml_.Items(*allow, "allow").value_or(std::vector<const YamlNode*>{});
+    }
+    for (const YamlNode* item : items) {
+      if (yaml_.Choice(*item, "allow", kAllowances)) impossible_inertia_allowed_ = true;
+    }
+  }
+  const std::string key = "closure_tolerance";
+  const auto tolerance = Number(model, map, key, {kPlain, kMm});
+  if (!tolerance) return;
+  if (*tolerance >= 0.0) {
+    closure_tolerance_m_ = *tolerance;
+  } else {
+    yaml_.Error(*map.FindInUnit(key, {kPlain, kMm}).node,
+                fmt::format("{} = {} violates {} >= 0", key, *tolerance, key));
+  }
 }
 
 // Which way is up in pictures; gravity says it unless a scenario switches it off.

@@ -47,11 +47,12 @@ struct FrameRef {
 
 class ModelReader {
  public:
-  /// Bounds on what a file may ask for; beyond them the file is refused, not computed.
-  static constexpr size_t kMaxBodies = 200;
-  static constexpr size_t kMaxBlocks = 400;
-  static constexpr size_t kMaxJoints = 400;
-  static constexpr size_t kMaxItems = 2000;  ///< of frames, shapes, drives, …
+  /// Bounds on what a file may ask for; beyond them the file is refused, not computed. The largest
+  /// models take a gigabyte for their rank.
+  static constexpr size_t kMaxBodies = 2000;
+  static constexpr size_t kMaxBlocks = 4000;
+  static constexpr size_t kMaxJoints = 4000;
+  static constexpr size_t kMaxItems = 10000;  ///< of frames, shapes, drives, …
 
   ModelReader(std::string file, const LoadOptions& options)
       : yaml_(std::move(file)), options_(options) {}
@@ -65,6 +66,7 @@ class ModelReader {
   // model_parts.cc
   void ReadHead();
   void ReadUp(const Block& model, const YamlNode* node);
+  void ReadAllowances(const Block& model, const YamlMap& map);
   void ExpandInstances(const Block& block);
   void AddInstance(const Block& block, const YamlEntry& entry);
   void ReadInstance(const Block& block, const YamlEntry& entry, const YamlNode& part,
@@ -169,9 +171,14 @@ class ModelReader {
 
   // model_checks.cc
   void CheckMasses();
+  void AddBodyFinding(Severity severity, size_t b, const std::string& text,
+                      const std::string& hint);
+  void CheckImpossibleInertia(size_t b, const std::string& violation);
   bool CheckTree();
   void CloseLoops();
   void WarnAboutAssembly(const HomeResult& home);
+  bool ProjectRoundedData(const HomeResult& home);
+  void ReportGaps(const HomeResult& home, const std::string& hint);
   void ReportTree(const SpanningTreeResult& tree);
   void CheckAxes(bool closed_at_home);
   void CheckHome();
@@ -227,6 +234,8 @@ class ModelReader {
   std::deque<Scope> scopes_;  // stable addresses
   std::deque<Block> blocks_;  // blocks_[0] is the model itself
   Mechanism mechanism_;
+  bool impossible_inertia_allowed_ = false;
+  double closure_tolerance_m_ = 0.0;            // up to which rounded data are projected
   ClosureHints hints_;                          // per joint
   std::vector<const YamlEntry*> body_places_;   // per body; null: the world, URDF links
   std::vector<const YamlEntry*> joint_places_;  // per joint

@@ -47,6 +47,7 @@ struct RankFinding {
   MatX motion;       ///< columns × (columns − rank): null space
 };
 enum class NullSpaces { kNone, kSelfStress, kMotion };
-[[nodiscard]] RankFinding FindRank(const MatX& J, NullSpaces wanted);
+[[nodiscard]] RankFinding FindRank(const MatX& J, NullSpaces wanted,
+                                   double tolerance = kRankTolerance);
 
 }  // namespace mbv::internal

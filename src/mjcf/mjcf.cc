@@ -62,6 +62,7 @@ class MjcfWriter {
     xml_.Set("energy", "enable");
     xml_.Close();
     xml_.Close();
+    WriteSizes();
     WriteDefaults();
     if (!options_.pictures) return;
     xml_.Open("visual");
@@ -71,6 +72,19 @@ class MjcfWriter {
     xml_.Close();
     xml_.Close();
     mjcf::WriteMaterials(mechanism_, &xml_);
+  }
+
+  // MuJoCo has room for 500 constraint rows and leaves out the rest.
+  void WriteSizes() {
+    constexpr size_t kRoom = 500;
+    size_t rows = mechanism_.drives.size() + mechanism_.prescribed.size();
+    for (const PlannedClosure& closure : plan_.closures) {
+      rows += closure.type == PlannedClosure::Type::kConnect ? 3 : 6;
+    }
+    if (rows <= kRoom) return;
+    xml_.Open("size");
+    xml_.Set("njmax", std::to_string(rows));
+    xml_.Close();
   }
 
   void WriteDefaults() {

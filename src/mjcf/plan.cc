@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/demand.h"
+#include "mechanism/constraints.h"
 
 namespace mbv::mjcf {
 namespace {
@@ -202,7 +203,7 @@ class Planner {
                             .joints = JointsOf(closure->joint, closure->split_parent, other)});
   }
 
-  // Diagonal of the box around all joint origins at home.
+  // Diagonal of the box around all joint origins at home, or the characteristic length.
   double Extent() const {
     Vec3 low = Vec3::Constant(1e300), high = -low;
     for (const Joint& joint : mechanism_.joints) {
@@ -210,7 +211,8 @@ class Planner {
       low = low.cwiseMin(p);
       high = high.cwiseMax(p);
     }
-    return mechanism_.joints.empty() ? 1.0 : std::max((high - low).norm(), 1e-3);
+    const double least = CharacteristicLength(mechanism_);
+    return mechanism_.joints.empty() ? least : std::max((high - low).norm(), least);
   }
 
   void AssignMasses() {
@@ -220,7 +222,7 @@ class Planner {
     for (const Body& body : mechanism_.bodies) total += body.mass;
     const double tiny = kTinyMassFraction * (total > 0.0 ? total : 1.0);
     const double gyration_m = 0.1 * Extent();
-    constexpr double kSmallest = 1e-13;  // MuJoCo refuses less than 1e-15 kg and kg m²
+    constexpr double kSmallest = 2e-15;  // MuJoCo refuses less than 1e-15 kg and kg m²
     for (size_t i = 1; i < plan_.bodies.size(); ++i) {
       PlannedBody& planned = plan_.bodies[i];
       const Body& body = mechanism_.bodies[planned.body];

@@ -16,9 +16,8 @@ namespace {
 // A Newton solution farther than this from its prediction [rad, characteristic lengths] may lie on
 // another branch; the way there is then divided into steps.
 constexpr double kTrustedCorrection = 0.2;
-// Near a singular pose loops closed to 1e-13 leave the pose open to its square root, 3e-7, and the
-// singular value with it; ten times that cannot be told from zero.
-constexpr double kSingularValue = 3e-6;
+// Redundant rows may miss by this [rad, characteristic lengths] and rounding.
+constexpr double kOpen = 1e-9;
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -97,6 +96,7 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
     : mechanism_(mechanism),
       options_(options),
       length_(CharacteristicLength(mechanism)),
+      lever_(LongestLever(mechanism)),
       commands_(AllCommands(mechanism, motion)),
       system_(mechanism.bodies.size(), length_) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
@@ -120,6 +120,23 @@ VecX ClosureSolver::Residual(const VecX& target) const {
   VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
   r.tail(target.size()) -= target;
   return r;
+}
+
+double ClosureSolver::Openness(const VecX& residual, const VecX& target,
+                               const std::vector<Pose>& X_WB) const {
+  const double closed_m = std::max(options_.closure_tolerance_m * length_, Rounding(X_WB));
+  double openness = 0.0;
+  for (int k = 0; k < system_.size(); ++k) {
+    const int row = selection_[k];
+    const double coordinate = row < joint_rows_ ? 0.0 : std::abs(target[row - joint_rows_]);
+    // Angles count turns, and both they and lengths may be large beside the mechanism.
+    const double tolerance = std::max(rows_.angular[row] ? options_.closure_tolerance_m : closed_m,
+                                      32 * kEps * coordinate);
+    const double open = std::abs(residual[k]) / tolerance;
+    if (std::isnan(open)) return open;
+    openness = std::max(openness, open);
+  }
+  return openness;
 }
 
 RunSummary ClosureSolver::SelectRows() {
@@ -161,10 +178,9 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
     const VecX r_all = Residual(target);
     VecX r(system_.size());
     for (int k = 0; k < system_.size(); ++k) r[k] = r_all[selection_[k]];
-    const double largest = r.size() == 0 ? 0.0 : r.cwiseAbs().maxCoeff();
+    const double largest = Openness(r, target, trial->states.X_WB);
     if (!std::isfinite(largest)) return Step::kSlow;
-    // Round-off of the largest coordinates may exceed the asked tolerance.
-    const bool small = largest < std::max(options_.closure_tolerance_m, 32 * kEps * length_);
+    const bool small = largest < 1.0;
     if (!factored || (!small && largest > 0.01 * previous)) {
       if (!system_.Factor(rows_, selection_, selection_is_new_)) return Step::kSingular;
       selection_is_new_ = false;
@@ -234,7 +250,8 @@ RunSummary ClosureSolver::CheckPose() {
     gap = std::max(gap, std::abs(rows_.value[i]));
     if (std::abs(rows_.value[i]) > std::abs(rows_.value[worst])) worst = i;
   }
-  if (gap_position_m_ > 1e-9 * length_ || gap_rotation_rad_ > 1e-9) {
+  const double rounding = Rounding(states_.X_WB);
+  if (gap_position_m_ > kOpen * length_ + rounding || gap_rotation_rad_ > kOpen) {
     RunSummary summary = Failed(
         Stop::kNoConvergence,
         "a constraint that was redundant at the home pose is violated: the loops close there only");
@@ -251,12 +268,12 @@ RunSummary ClosureSolver::CheckPose() {
     return summary;
   }
   const double sigma = system_.SmallestSingularValue(1);
-  if (sigma < kSingularValue) {
+  if (sigma < SingularValueLimit(rounding / length_)) {
     RunSummary summary = Singular(fmt::format(
         "the commands do not hold the mechanism at this pose (smallest singular value {:.1e})",
         sigma));
     summary.amount = sigma;
-    summary.unit = "1";
+    summary.unit = std::string("1");
     return summary;
   }
   return RunSummary::Done();
@@ -266,7 +283,12 @@ VecX ClosureSolver::Refined(const VecX& rates, bool* accurate) {
   // The factors belong to a pose nearby; refinement against the true rows restores all digits.
   VecX V = VecX::Zero(system_.size());
   std::vector<Vec6> per_body(mechanism_.bodies.size(), Vec6::Zero());
-  const double scale = std::max(rates.cwiseAbs().maxCoeff(), 1e-3);
+  VecX unit(system_.size());
+  for (int k = 0; k < system_.size(); ++k) unit[k] = system_.RateUnit(rows_.angular[selection_[k]]);
+  double scale = 0.0;
+  for (int k = 0; k < system_.size(); ++k) {
+    scale = std::max(scale, std::abs(rates[selection_[k]]) / unit[k]);
+  }
   double previous = std::numeric_limits<double>::infinity();
   *accurate = false;
   for (int i = 0; i < 12; ++i) {
@@ -275,8 +297,8 @@ VecX ClosureSolver::Refined(const VecX& rates, bool* accurate) {
     for (int k = 0; k < system_.size(); ++k) {
       missing[k] = rates[selection_[k]] - have[selection_[k]];
     }
-    const double largest = missing.size() == 0 ? 0.0 : missing.cwiseAbs().maxCoeff();
-    *accurate = largest < 1e-9 * scale;
+    const double largest = missing.cwiseQuotient(unit).lpNorm<Eigen::Infinity>();
+    *accurate = largest <= 1e-9 * scale;
     if (largest == 0.0 || (largest < 1e-12 * scale && largest > 0.1 * previous)) break;
     V += system_.SolveTransposed(missing);
     Unstack(V, &per_body);
@@ -291,7 +313,8 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
     if (refactor) {
       if (!system_.Factor(rows_, selection_, false)) break;
       if (system_.determinant_sign() != orientation_) break;
-      if (system_.SmallestSingularValue(3) < kSingularValue) break;
+      const double rounding = Rounding(states_.X_WB) / length_;
+      if (system_.SmallestSingularValue(3) < SingularValueLimit(rounding)) break;
     }
     const size_t count = commands_.size();
     VecX rates = VecX::Zero(rows_.size());
@@ -312,7 +335,7 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
                            "singular value {:.1e})",
                            sigma));
   summary.amount = sigma;
-  summary.unit = "1";
+  summary.unit = std::string("1");
   return summary;
 }
 

@@ -12,6 +12,7 @@
 #include "mechanism/constraints.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "mechanism/reach.h"
 #include "reference/reference.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"
@@ -42,6 +43,13 @@ class ClosureSolver {
   [[nodiscard]] RunSummary Prepare();
   void EvaluateRows(Trial* trial);
   [[nodiscard]] VecX Residual(const VecX& target) const;
+  /// Largest of the selected residuals as a multiple of its tolerance; NaN if one is.
+  [[nodiscard]] double Openness(const VecX& residual, const VecX& target,
+                                const std::vector<Pose>& X_WB) const;
+  /// Gap that rounding leaves at these poses [m].
+  [[nodiscard]] double Rounding(const std::vector<Pose>& X_WB) const {
+    return GapRounding(Reach(lever_, X_WB));
+  }
   [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
   [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
   [[nodiscard]] RunSummary SelectRows();
@@ -53,7 +61,7 @@ class ClosureSolver {
 
   const Mechanism& mechanism_;
   const ReferenceOptions options_;
-  const double length_;
+  const double length_, lever_;
   std::vector<Command> commands_;  ///< of the motion, then prescribed joints held at home
   SquareSystem system_;
   RowSet rows_;  ///< all joint rows, then the command rows

@@ -6,6 +6,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "mechanism/reach.h"
 #include "reference/closure_failure.h"
 #include "reference/least_forces.h"
 
@@ -14,8 +15,6 @@ namespace {
 
 // Forces must satisfy the equations of motion to this share of the largest wrench.
 constexpr double kBalanceTolerance = 1e-9;
-// Scaled singular value of a pose that the drives do not hold; see ClosureSolver.
-constexpr double kSingularValue = 3e-6;
 
 bool IsAngularJoint(const Joint& joint) { return joint.kind != JointKind::kPrismatic; }
 
@@ -35,6 +34,7 @@ void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSe
 ForceSolver::ForceSolver(const Mechanism& mechanism)
     : mechanism_(mechanism),
       length_(CharacteristicLength(mechanism)),
+      lever_(LongestLever(mechanism)),
       system_(mechanism.bodies.size(), length_) {}
 
 void ForceSolver::FillRows(const BodyStates& states) {
@@ -101,12 +101,13 @@ RunSummary ForceSolver::CheckControl(const BodyStates& states) {
   // With forces left over, another choice of basis would have another sign.
   const bool crossed = rest_.empty() && orientation_ != 0 && orientation != orientation_;
   orientation_ = orientation;
-  if (!crossed && sigma > kSingularValue) return RunSummary::Done();
+  const double rounding = GapRounding(Reach(lever_, states.X_WB)) / length_;
+  if (!crossed && sigma > SingularValueLimit(rounding)) return RunSummary::Done();
   RunSummary summary;
   summary.stop = Stop::kSingular;
   summary.where = MostMovingJoint(mechanism_, states, system_.SoftMotion());
   summary.amount = sigma;
-  summary.unit = "1";
+  summary.unit = std::string("1");
   summary.message =
       fmt::format("the drives lose control of {}{} (smallest singular value {:.1e})", summary.where,
                   crossed ? " between the last sample and this one" : "", sigma);

@@ -32,7 +32,7 @@ class ForceSolver {
   void Report(const VecX& force, ReferenceSample* sample) const;
 
   const Mechanism& mechanism_;
-  const double length_;
+  const double length_, lever_;
   SquareSystem system_;
   RowSet rows_;           ///< reaction rows of all joints, drives, prescribed joints
   int first_driven_ = 0;  ///< row of the first drive

@@ -11,7 +11,7 @@
 namespace mbv::internal {
 namespace {
 
-// Points of an elastic body nearer than this are one node [m].
+// Points of an elastic body nearer than this are one node [characteristic lengths].
 constexpr double kSamePoint = 1e-8;
 
 // F = rootᵀ root of a beam clamped at `from`: deformation [rotation; displacement] of its end in
@@ -62,7 +62,7 @@ void FrameModel::AddNodes() {
   }
   const auto add = [&](int body, const Vec3& p) {
     const bool known = std::any_of(nodes_.begin(), nodes_.end(), [&](const Node& node) {
-      return node.body == body && (node.p_B - p).norm() < kSamePoint;
+      return node.body == body && (node.p_B - p).norm() < kSamePoint * length_;
     });
     if (!known) nodes_.push_back({body, p});
   };
@@ -76,7 +76,7 @@ int FrameModel::NodeAt(int body, const Vec3& p_B, const std::string& what) {
   if (body == 0) return -1;
   for (size_t n = 0; n < nodes_.size(); ++n) {
     if (nodes_[n].body != body) continue;
-    if (!is_elastic_[body] || (nodes_[n].p_B - p_B).norm() < kSamePoint) {
+    if (!is_elastic_[body] || (nodes_[n].p_B - p_B).norm() < kSamePoint * length_) {
       return static_cast<int>(n);
     }
   }
@@ -201,7 +201,7 @@ std::string FrameModel::MostMovingJoint(const VecX& twists) const {
   const auto rate = [&](int body, const Vec3& p_B, const Vec6& J) {
     for (size_t n = 0; n < nodes_.size(); ++n) {
       if (nodes_[n].body != body) continue;
-      if (is_elastic_[body] && (nodes_[n].p_B - p_B).norm() >= kSamePoint) continue;
+      if (is_elastic_[body] && (nodes_[n].p_B - p_B).norm() >= kSamePoint * length_) continue;
       const auto V = twists.segment<6>(6 * static_cast<Eigen::Index>(n));
       return J.head<3>().dot(V.head<3>()) + length_ * J.tail<3>().dot(V.tail<3>());
     }

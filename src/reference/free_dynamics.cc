@@ -7,6 +7,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "mechanism/reach.h"
 #include "reference/closure_failure.h"
 #include "reference/closure_solver.h"
 #include "reference/force_solver.h"
@@ -24,6 +25,24 @@ constexpr double kFirm = 1e-5;
 // A row beyond the expected rank with a larger pivot contradicts it; closed loops leave 1e-11.
 constexpr double kExtra = 1e-6;
 constexpr int kMostCorrections = 12;
+// Poses are closed to this [rad, characteristic lengths] or to rounding; where Newton no longer
+// helps, to this many times that.
+constexpr double kClosed = 1e-13, kStalled = 100.0;
+
+// The forces with columns · force = wrenches as well as can be; TakeLeastForces() of them.
+VecX LeastForces(const MatX& columns, Eigen::Index first_driven, const VecX& wrenches) {
+  if (columns.cols() == 0) return VecX();
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kLost);
+  cod.compute(columns);
+  VecX force = cod.solve(wrenches);
+  force += cod.solve(wrenches - columns * force);  // refinement
+  if (cod.rank() < columns.cols()) {
+    const MatX Q = Eigen::ColPivHouseholderQR<MatX>(columns.transpose()).householderQ();
+    TakeLeastForces(Q.rightCols(columns.cols() - cod.rank()), first_driven, &force);
+  }
+  return force;
+}
 
 // The rotation [rad] or translation [L] of the largest twist.
 double SizeOf(const VecX& twists, double length) {
@@ -40,6 +59,7 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
     : mechanism_(mechanism),
       motion_(motion),
       length_(CharacteristicLength(mechanism)),
+      lever_(LongestLever(mechanism)),
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
       freedoms_(static_cast<int>(motion.initial.size())) {
   body_scale_.setOnes(size_);
@@ -74,9 +94,14 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
           row_scale_[i] * body_scale_.segment<6>(at).cwiseProduct(rows_.J[p]);
     }
   }
+  const Eigen::Index rank = size_ - freedoms_;
+  if (rows_.size() == 0) {  // nothing to factor: every body floats
+    Q_ = MatX::Identity(size_, size_);
+    pivot_ = rank == 0 ? 1.0 : 0.0;
+    return;
+  }
   qr_.compute(columns);
   Q_ = qr_.householderQ();
-  const Eigen::Index rank = size_ - freedoms_;
   const auto pivots = qr_.matrixQR().diagonal();
   if (rank == 0) {
     pivot_ = 1.0;
@@ -86,6 +111,7 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
 }
 
 Eigen::Index FreeDynamics::FirmRank() const {
+  if (rows_.size() == 0) return 0;
   const auto pivots = qr_.matrixQR().diagonal();
   Eigen::Index rank = std::min<Eigen::Index>(size_ - freedoms_, pivots.size());
   while (rank > 0 && std::abs(pivots[rank - 1]) < kFirm * std::abs(pivots[0])) --rank;
@@ -116,7 +142,7 @@ RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
   summary.time_s = t_s;
   summary.where = SoftJoint(states);
   summary.amount = pivot_;
-  summary.unit = "1";
+  summary.unit = std::string("1");
   summary.message = fmt::format(
       "the loops lose a constraint at this pose: besides the {} freedom{} of the mechanism, {} "
       "moves freely there, so the way on is not determined (relative pivot {:.1e})",
@@ -126,6 +152,7 @@ RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
 }
 
 RunSummary FreeDynamics::CheckFreedoms(double t_s) const {
+  if (rows_.size() == 0) return RunSummary::Done();
   const auto pivots = qr_.matrixQR().diagonal();
   const Eigen::Index rank = size_ - freedoms_;
   if (rank >= pivots.size() || !(std::abs(pivots[rank]) > kExtra * std::abs(pivots[0]))) {
@@ -135,7 +162,7 @@ RunSummary FreeDynamics::CheckFreedoms(double t_s) const {
   summary.stop = Stop::kUnsupported;
   summary.time_s = t_s;
   summary.amount = std::abs(pivots[rank]) / std::abs(pivots[0]);
-  summary.unit = "1";
+  summary.unit = std::string("1");
   summary.message = fmt::format(
       "the loops and commands leave fewer than the {} freedoms that have initial values: the home "
       "pose was singular, or a command contradicts another (relative pivot {:.1e})",
@@ -195,15 +222,15 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
 }
 
 RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) {
-  const double tolerance = std::max(1e-13, 32 * kEps * length_);
   if (moved != nullptr) *moved = 0.0;
   double open = kNan, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMostCorrections; ++i) {
     Factor(t_s, *states);
     const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
-    open = r.size() == 0 ? 0.0 : r.cwiseAbs().maxCoeff();
+    open = LargestOpen();
     if (!std::isfinite(open)) break;
-    if (open < tolerance || (open < 1e-11 && open > 0.5 * previous)) {
+    const double tolerance = std::max(kClosed, Rounding(*states));
+    if (open < tolerance || (open < kStalled * tolerance && open > 0.5 * previous)) {
       VecX rates = VecX::Zero(rows_.size());
       rates.tail(command_.velocity.size()) = command_.velocity;
       rates -= rows_.Rates(states->V_WB);
@@ -218,10 +245,30 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
   RunSummary summary;
   summary.stop = Stop::kNoConvergence;
   summary.time_s = t_s;
-  summary.amount = open;
-  summary.unit = "m or rad";
-  summary.message = fmt::format("the loops cannot be closed again (open by {:.3g})", open);
+  summary.amount = open * length_;
+  summary.unit = std::string("m");
+  summary.message = fmt::format("the loops cannot be closed again (open by {:.3g} m or {:.3g} rad)",
+                                summary.amount, open);
   return summary;
+}
+
+double FreeDynamics::LargestOpen() const {
+  double open = 0.0;
+  for (int i = 0; i < rows_.size(); ++i) {
+    const double size = std::abs(rows_.value[i]) / (rows_.angular[i] ? 1.0 : length_);
+    if (std::isnan(size)) return size;
+    open = std::max(open, size);
+  }
+  return open;
+}
+
+double FreeDynamics::Rounding(const BodyStates& states) const {
+  double largest_angle = 0.0;
+  for (Eigen::Index k = 0; k < command_.position.size(); ++k) {
+    if (!rows_.angular[joint_rows_ + k]) continue;
+    largest_angle = std::max(largest_angle, std::abs(command_.position[k]));
+  }
+  return std::max(GapRounding(Reach(lever_, states.X_WB)) / length_, 32 * kEps * largest_angle);
 }
 
 void FreeDynamics::Gaps(const BodyStates& states, double* position_m, double* rotation_rad) const {
@@ -275,16 +322,7 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
       columns.col(i).segment<6>(at) = scale[i] * body_scale_.segment<6>(at).cwiseProduct(rows.J[p]);
     }
   }
-  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
-  cod.setThreshold(kLost);
-  cod.compute(columns);
-  VecX force = cod.solve(wrenches);
-  force += cod.solve(wrenches - columns * force);  // refinement
-  if (cod.rank() < columns.cols()) {
-    const MatX Q = Eigen::ColPivHouseholderQR<MatX>(columns.transpose()).householderQ();
-    TakeLeastForces(Q.rightCols(columns.cols() - cod.rank()), first_driven, &force);
-  }
-  force = force.cwiseProduct(scale);
+  VecX force = LeastForces(columns, first_driven, wrenches).cwiseProduct(scale);
   MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == first_driven,
              first_driven);
   sample->drive_force = GivenOr(t_s, force.segment(first_driven, first_prescribed - first_driven));

@@ -64,6 +64,10 @@ class FreeDynamics {
   [[nodiscard]] MatX Motions() const;
 
  private:
+  /// Largest residual [rad, characteristic lengths] of the rows last factored; NaN if one is.
+  [[nodiscard]] double LargestOpen() const;
+  /// What rounding leaves of them at these poses.
+  [[nodiscard]] double Rounding(const BodyStates& states) const;
   /// Least-norm twists with J V = rates, from the first `rank` pivots.
   [[nodiscard]] VecX LeastMotion(const VecX& rates, Eigen::Index rank) const;
   [[nodiscard]] Eigen::Index FirmRank() const;
@@ -76,7 +80,7 @@ class FreeDynamics {
 
   const Mechanism& mechanism_;
   const Motion& motion_;
-  const double length_;
+  const double length_, lever_;
   const int size_, freedoms_;
   VecX body_scale_;
   RowSet rows_;

@@ -59,6 +59,9 @@ FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double 
       dt_(std::min({motion.sample_s, largest_step_s, 1e-3})) {
   now_.states.Resize(mechanism.bodies.size());
   work_states_ = sampled_ = now_.states;
+  double mass = 0.0;
+  for (const Body& body : mechanism.bodies) mass += body.mass;
+  if (mass > 0.0) work_unit_ = mass * dynamics_.length() * dynamics_.length();
 }
 
 FreeMotion::~FreeMotion() = default;
@@ -67,28 +70,32 @@ FreeMotion::State FreeMotion::Pack(const Node& node) const {
   State x(kPerBody * (node.states.X_WB.size() - 1));
   double* out = x.data();
   for (size_t b = 1; b < node.states.X_WB.size(); ++b, out += kPerBody) {
-    Eigen::Map<Vec3>{out} = node.states.X_WB[b].translation();
+    Eigen::Map<Vec3>{out} = (node.states.X_WB[b].translation() - start_W_[b]) / dynamics_.length();
     const Eigen::Quaterniond q(Mat3(node.states.X_WB[b].linear()));
     Eigen::Map<Eigen::Vector4d>(out + 3) << q.w(), q.x(), q.y(), q.z();
     Eigen::Map<Vec6>{out + 7} = node.states.V_WB[b];
+    Eigen::Map<Vec3>(out + 10) /= dynamics_.length();
   }
-  x.insert(x.end(), node.work.begin(), node.work.end());
+  for (const double work : node.work) x.push_back(work / work_unit_);
   return x;
 }
 
 void FreeMotion::Unpack(const State& x, BodyStates* states, VecX* work) const {
   const double* in = x.data();
   for (size_t b = 1; b < states->X_WB.size(); ++b, in += kPerBody) {
-    states->X_WB[b].translation() = Eigen::Map<const Vec3>(in);
+    states->X_WB[b].translation() = start_W_[b] + dynamics_.length() * Eigen::Map<const Vec3>(in);
     const Eigen::Quaterniond q(in[3], in[4], in[5], in[6]);
     states->X_WB[b].linear() = q.normalized().toRotationMatrix();
     states->V_WB[b] = Eigen::Map<const Vec6>(in + 7);
+    states->V_WB[b].tail<3>() *= dynamics_.length();
   }
-  if (work != nullptr) *work = Eigen::Map<const VecX>(in, dynamics_.works());
+  if (work != nullptr) *work = work_unit_ * Eigen::Map<const VecX>(in, dynamics_.works());
 }
 
 RunSummary FreeMotion::Start(const BodyStates& states) {
   now_.states = states;
+  start_W_.clear();
+  for (const Pose& X_WB : states.X_WB) start_W_.push_back(X_WB.translation());
   now_.work.setZero(dynamics_.works());
   now_.time_s = 0.0;
   nodes_.clear();
@@ -108,15 +115,16 @@ void FreeMotion::Rates(const State& x, State* rates, double t_s) {
   double* out = rates->data();
   const double* in = x.data();
   for (size_t b = 1; b < work_states_.X_WB.size(); ++b, out += kPerBody, in += kPerBody) {
-    Eigen::Map<Vec3>{out} = work_states_.V_WB[b].tail<3>();
+    Eigen::Map<Vec3>{out} = work_states_.V_WB[b].tail<3>() / dynamics_.length();
     const Eigen::Quaterniond q(in[3], in[4], in[5], in[6]);
     const Vec3 w = work_states_.V_WB[b].head<3>();
     const Eigen::Quaterniond q_rate = Eigen::Quaterniond(0.0, w.x(), w.y(), w.z()) * q;
     Eigen::Map<Eigen::Vector4d>(out + 3) << q_rate.w(), q_rate.x(), q_rate.y(), q_rate.z();
     Eigen::Map<Eigen::Vector4d>(out + 3) *= 0.5;
     Eigen::Map<Vec6>{out + 7} = work_states_.A_WB[b];
+    Eigen::Map<Vec3>(out + 10) /= dynamics_.length();
   }
-  Eigen::Map<VecX>(out, dynamics_.works()) = dynamics_.WorkRates(t_s, work_states_);
+  Eigen::Map<VecX>(out, dynamics_.works()) = dynamics_.WorkRates(t_s, work_states_) / work_unit_;
 }
 
 RunSummary FreeMotion::Accept(const State& x, double t_s) {
@@ -140,15 +148,15 @@ RunSummary FreeMotion::NoWayOn(double dt_s) const {
   summary.time_s = now_.time_s;
   if (!singular) {
     summary.stop = Stop::kNoConvergence;
-    summary.message = "the step of the integration became too small";
+    summary.message = std::string("the step of the integration became too small");
     summary.amount = dt_s;
-    summary.unit = "s";
+    summary.unit = std::string("s");
     return summary;
   }
   summary.stop = Stop::kSingular;
   summary.where = dynamics_.SoftJoint(now_.states);
   summary.amount = now_.pivot / largest_pivot_;
-  summary.unit = "1";
+  summary.unit = std::string("1");
   summary.message = fmt::format(
       "the motion runs into a singular pose: the loops lose a constraint, {} could move by itself "
       "(weakest constraint {:.1e} of its usual size), and the way on is not determined",
@@ -173,7 +181,7 @@ RunSummary FreeMotion::TooManySteps() const {
 // One smooth piece, or a bridge beyond its end.
 RunSummary FreeMotion::Segment(double to_s) {
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
-  while (to_s - now_.time_s > 1e-14 * std::max(1.0, to_s)) {
+  while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
     if (++tried_steps_ > effort_.most_steps) return TooManySteps();
     if (effort_.progress && tried_steps_ % kTold == 0) effort_.progress(now_.time_s / duration_s_);
     double t = now_.time_s;
@@ -206,7 +214,7 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
     nodes_.clear();
   }
   if (RunSummary summary = Segment(t_s); !summary.ok()) return summary;
-  on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(1.0, t_s);
+  on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(duration_s_, t_s);
   if (on_bridge_) return SampleBridge(t_s);
   return dynamics_.Accelerate(now_.time_s, &now_.states);
 }
@@ -219,6 +227,7 @@ RunSummary FreeMotion::SampleBridge(double t_s) {
   const double* in = rates.data();
   for (size_t b = 1; b < sampled_.A_WB.size(); ++b, in += kPerBody) {
     sampled_.A_WB[b] = Eigen::Map<const Vec6>(in + 7);
+    sampled_.A_WB[b].tail<3>() *= dynamics_.length();
   }
   return dynamics_.Project(t_s, &sampled_);
 }

@@ -62,6 +62,9 @@ class FreeMotion {
     Hermite way;
   };
 
+  // What is integrated has no units but radians and seconds, so that the tolerance means the same
+  // for mechanisms of any size and anywhere: positions are displacements since the start in
+  // characteristic lengths L, work is in M L²/s² with the mass M of all bodies.
   [[nodiscard]] State Pack(const Node& node) const;
   void Unpack(const State& x, BodyStates* states, VecX* work) const;
   void Rates(const State& x, State* rates, double t_s);
@@ -84,6 +87,8 @@ class FreeMotion {
   const double duration_s_, largest_step_s_;
   const Effort effort_;
   FreeDynamics dynamics_;
+  double work_unit_ = 1.0;     ///< [J]
+  std::vector<Vec3> start_W_;  ///< body origins at the start
   std::unique_ptr<Stepper> stepper_;
   std::vector<double> breaks_;
   std::deque<Node> nodes_;  ///< before now_, since the last break or bridge

@@ -8,6 +8,8 @@
 
 #include <Eigen/SparseCore>
 #include <Eigen/SparseLU>
+#include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "core/types.h"
@@ -46,6 +48,8 @@ class SquareSystem {
 
   /// Scale of row i's unknown: 1 for lengths, L for angles.
   [[nodiscard]] double RowScale(bool angular) const { return angular ? length_ : 1.0; }
+  /// Unit of row i's rate that is of the order one: 1/s for angles, L/s for lengths.
+  [[nodiscard]] double RateUnit(bool angular) const { return angular ? 1.0 : length_; }
   [[nodiscard]] const VecX& body_scale() const { return body_scale_; }
 
  private:
@@ -64,6 +68,14 @@ class SquareSystem {
   int determinant_sign_ = 0;
   VecX soft_force_, soft_motion_;
 };
+
+/// Scaled singular values below this cannot be told from zero. Near a singular pose loops closed to
+/// 1e-13 leave the pose open to its square root, 3e-7, and the singular value with it; ten times
+/// that. Loops that coordinates far from the origin close less well, to `rounding` [characteristic
+/// lengths, GapRounding()], leave more open; a typical rounding is a tenth of the bound.
+[[nodiscard]] inline double SingularValueLimit(double rounding) {
+  return std::max(3e-6, 10 * std::sqrt(0.1 * rounding));
+}
 
 /// Stacks the moving bodies' entries of `per_body` and back.
 [[nodiscard]] VecX Stack(const std::vector<Vec6>& per_body);

@@ -5,27 +5,28 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/constraints.h"
-
 namespace mbv::simulation {
 namespace {
 
 constexpr int kMaxNewton = 15;
-// Newton stops when its step is round-off, or must be after a step whose square is.
-constexpr double kSmallStep = 1e-14;
+// All in the units of ConstraintSystem::ScaledJ(): characteristic lengths, radians.
+//
+// Newton stops after a step whose square is round-off. A start that needs no step at all is kept.
 constexpr double kSmallSquare = 1e-8;
+constexpr double kNoStep = 1e-14;
 // Below this step the factors of the previous iterate serve on, with refinement.
 constexpr double kChordStep = 1e-5;
 // Each refinement shrinks the error of factors that are kChordStep old by about kChordStep times
 // the condition: one leaves up to 1e-9 of the forces, three leave round-off.
 constexpr int kRefinements = 3;
-// A solution of Newton must be closed to this [m or rad].
+// A solution of Newton must be closed to this and rounding.
 constexpr double kClosed = 1e-10;
-// Relative rank tolerance, columns of J having the natural scale of metres and radians.
+// Relative rank tolerance.
 constexpr double kRankTolerance = 1e-9;
 
 // The shortest x with A x = b as well as can be, refined once.
 VecX LeastNorm(const MatX& A, const VecX& b) {
+  if (A.size() == 0) return VecX::Zero(A.cols());
   Eigen::CompleteOrthogonalDecomposition<MatX> cod;
   cod.setThreshold(kRankTolerance);
   cod.compute(A);
@@ -37,8 +38,7 @@ VecX LeastNorm(const MatX& A, const VecX& b) {
 
 }  // namespace
 
-ClosureSolver::ClosureSolver(ConstraintSystem* system)
-    : system_(system), length_(CharacteristicLength(*system->engine().mechanism)) {
+ClosureSolver::ClosureSolver(ConstraintSystem* system) : system_(system) {
   const int rows = system->rows(), nv = system->nv();
   rhs_.setZero(rows);
   step_.setZero(nv);
@@ -48,8 +48,11 @@ ClosureSolver::ClosureSolver(ConstraintSystem* system)
 
 void ClosureSolver::Factor() {
   stale_ = false;
+  regular_ = false;
+  rank_ = 0;
+  if (system_->rows() == 0) return;
   if (system_->rows() == system_->nv()) {
-    lu_.compute(system_->J());
+    lu_.compute(system_->ScaledJ());
     // The ratio of the pivots is a cheap warning sign of rank deficiency.
     const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
     if (pivots.minCoeff() > kRankTolerance * pivots.maxCoeff()) {
@@ -58,36 +61,55 @@ void ClosureSolver::Factor() {
       return;
     }
   }
-  regular_ = false;
   cod_.setThreshold(kRankTolerance);
-  cod_.compute(system_->J());
+  cod_.compute(system_->ScaledJ());
   rank_ = static_cast<int>(cod_.rank());
 }
 
+// J = R J' D⁻¹ with the factored J', units R of the rows and D of the velocities.
 void ClosureSolver::SolveInto(const VecX& b, VecX* x) {
-  if (!regular_) {
-    *x = cod_.solve(b);
+  const VecX &row = system_->row_unit(), &dof = system_->dof_unit();
+  if (rank_ == 0) {
+    x->setZero(system_->nv());
     return;
   }
-  *x = lu_.solve(b);
+  scaled_ = b.cwiseQuotient(row);
+  if (!regular_) {
+    *x = cod_.solve(scaled_);
+    x->array() *= dof.array();
+    return;
+  }
+  *x = lu_.solve(scaled_);
+  x->array() *= dof.array();
   for (int i = 0; stale_ && i < kRefinements; ++i) {
     refinement_ = b;
     refinement_.noalias() -= system_->J() * *x;
-    *x += lu_.solve(refinement_);
+    scaled_ = refinement_.cwiseQuotient(row);
+    refinement_ = lu_.solve(scaled_);
+    x->array() += dof.array() * refinement_.array();
   }
 }
 
 void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
-  if (!regular_) {
-    *x = cod_.transpose().solve(b);
+  const VecX &row = system_->row_unit(), &dof = system_->dof_unit();
+  if (rank_ == 0) {
+    x->setZero(system_->rows());
     return;
   }
-  *x = lu_.transpose().solve(b);
+  scaled_ = b.cwiseProduct(dof);
+  if (!regular_) {
+    *x = cod_.transpose().solve(scaled_);
+    x->array() /= row.array();
+    return;
+  }
+  *x = lu_.transpose().solve(scaled_);
+  x->array() /= row.array();
   for (int i = 0; stale_ && i < kRefinements; ++i) {
     refinement_ = b;
     refinement_.noalias() -= system_->J().transpose() * *x;
-    step_ = lu_.transpose().solve(refinement_);
-    *x += step_;
+    scaled_ = refinement_.cwiseProduct(dof);
+    step_ = lu_.transpose().solve(scaled_);
+    x->array() += step_.array() / row.array();
   }
 }
 
@@ -99,14 +121,16 @@ RunSummary ClosureSolver::Close(const VecX& to) {
   for (int iteration = 0; iteration < kMaxNewton; ++iteration) {
     system_->EvaluatePosition();
     rhs_ = -system_->residual();
-    const bool closed = rhs_.lpNorm<Eigen::Infinity>() < kClosed;
+    const double open = rhs_.cwiseQuotient(system_->row_unit()).lpNorm<Eigen::Infinity>();
+    const bool closed = open < kClosed + system_->Rounding();
     stale_ = iteration > 0 && size < kChordStep && regular_;
-    if (stale_ && size < kSmallSquare && closed) return RunSummary::Done();
+    const bool done = iteration > 0 && size < kSmallSquare && closed;
     if (!stale_) Factor();
+    if (done) return RunSummary::Done();
     SolveInto(rhs_, &step_);
-    size = step_.lpNorm<Eigen::Infinity>();
+    size = step_.cwiseQuotient(system_->dof_unit()).lpNorm<Eigen::Infinity>();
     if (!std::isfinite(size) || size > 1e3) break;
-    if (size < kSmallStep && closed) return RunSummary::Done();
+    if (size < kNoStep && closed) return RunSummary::Done();
     mj_integratePos(m, d->qpos, step_.data(), 1.0);
   }
   const double open = system_->residual().lpNorm<Eigen::Infinity>();
@@ -175,35 +199,33 @@ void ClosureSolver::SolveForces(const VecX& tau) {
 
 void ClosureSolver::RemoveSelfStress(VecX* force) const {
   if (redundant() == 0) return;
-  const Eigen::ColPivHouseholderQR<MatX> qr(system_->J());
-  VecX y = qr.householderQ().adjoint() * *force;
+  const VecX& unit = system_->row_unit();
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
+  VecX y = qr.householderQ().adjoint() * force->cwiseProduct(unit);
   y.tail(redundant()).setZero();
-  *force = qr.householderQ() * y;
+  *force = (qr.householderQ() * y).cwiseQuotient(unit);
 }
 
 void ClosureSolver::SolveForcesHere(const VecX& tau) {
-  system_->force() = LeastNorm(system_->J().transpose(), tau);
+  const VecX force =
+      LeastNorm(system_->ScaledJ().transpose(), tau.cwiseProduct(system_->dof_unit()));
+  system_->force() = force.cwiseQuotient(system_->row_unit());
 }
 
 double ClosureSolver::WeakestPivot() const {
   if (rank_ == 0) return 1.0;
-  const Eigen::ColPivHouseholderQR<MatX> qr(system_->J().transpose());
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ().transpose());
   const auto pivots = qr.matrixQR().diagonal();
   return std::abs(pivots[rank_ - 1]) / std::abs(pivots[0]);
 }
 
 void ClosureSolver::SolveLeastDriven(const VecX& tau) {
-  const EngineModel& engine = system_->engine();
   const int nv = system_->nv(), closures = system_->first_driven_row();
   const int driven = system_->driven_rows();
-  VecX scale = VecX::Ones(driven);
-  for (size_t k = 0; k < engine.driven.size(); ++k) {
-    const int row = system_->driven_row(static_cast<int>(k)) - closures;
-    const DrivenPlace& place = engine.driven[k];
-    const bool angle = !place.is_tendon && engine.m->jnt_type[place.object] == mjJNT_HINGE;
-    if (row >= 0 && angle) scale[row] = length_;
-  }
-  const MatX J_c = system_->J().topRows(closures), J_u = system_->J().bottomRows(driven);
+  // In these units a force counts as its moment at the characteristic length.
+  const MatX J = system_->ScaledJ();
+  const VecX scaled_tau = tau.cwiseProduct(system_->dof_unit());
+  const MatX J_c = J.topRows(closures), J_u = J.bottomRows(driven);
   MatX N = MatX::Identity(nv, nv);
   if (closures > 0) {
     Eigen::ColPivHouseholderQR<MatX> qr;
@@ -212,21 +234,20 @@ void ClosureSolver::SolveLeastDriven(const VecX& tau) {
     const MatX Q = qr.householderQ();
     N = Q.rightCols(nv - qr.rank());
   }
-  const MatX B = (J_u * N).transpose() * scale.asDiagonal();
-  const VecX u = scale.cwiseProduct(LeastNorm(B, N.transpose() * tau));
   VecX lambda(closures + driven);
+  const VecX u = LeastNorm((J_u * N).transpose(), N.transpose() * scaled_tau);
   lambda.tail(driven) = u;
   if (closures > 0) {
-    lambda.head(closures) = LeastNorm(J_c.transpose(), tau - J_u.transpose() * u);
+    lambda.head(closures) = LeastNorm(J_c.transpose(), scaled_tau - J_u.transpose() * u);
   }
-  system_->force() = lambda;
+  system_->force() = lambda.cwiseQuotient(system_->row_unit());
 }
 
 std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
   std::vector<int> rows;
   if (redundant() == 0) return rows;
   // Self-stress: the null space of Jᵀ, from the Q factor behind the rank.
-  const Eigen::ColPivHouseholderQR<MatX> qr(system_->J());
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
   const MatX Q = qr.householderQ();
   const MatX self_stress = Q.rightCols(redundant());
   for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {

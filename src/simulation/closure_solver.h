@@ -1,5 +1,5 @@
 // Solutions of the constraint system: positions by Newton, then velocities, accelerations and
-// forces from the same Jacobian.
+// forces from the same Jacobian, factored in units that suit the mechanism's size.
 #pragma once
 
 #include <string>
@@ -59,13 +59,12 @@ class ClosureSolver {
   void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b
 
   ConstraintSystem* const system_;
-  const double length_;
   bool regular_ = false;  // square and of full rank: lu_ is valid, otherwise cod_
   bool stale_ = false;    // factors belong to a configuration nearby: solves are refined
   int rank_ = 0;
   Eigen::PartialPivLU<MatX> lu_;
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
-  VecX rhs_, step_, bias_, refinement_;
+  VecX rhs_, step_, bias_, refinement_, scaled_;
   std::vector<double> reached_;  // last closed configuration on the way of Follow
 };
 

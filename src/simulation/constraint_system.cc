@@ -1,8 +1,11 @@
 #include "simulation/constraint_system.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/spatial.h"
+#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv::simulation {
 namespace {
@@ -18,7 +21,11 @@ Eigen::Quaterniond Pure(const Vec3& v) { return Eigen::Quaterniond(0, v.x(), v.y
 
 }  // namespace
 
-ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d) : engine_(engine), d_(d) {
+ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d)
+    : engine_(engine),
+      d_(d),
+      length_(CharacteristicLength(*engine.mechanism)),
+      lever_(LongestLever(*engine.mechanism)) {
   for (const PlannedClosure& closure : engine.plan.closures) {
     closure_row_.push_back(closure_rows_);
     closure_rows_ += closure.type == PlannedClosure::Type::kConnect ? 3 : 6;
@@ -33,6 +40,36 @@ ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d) : engin
     if (!place.is_tendon) unit_(place.dof, k) = 1.0;
   }
   A0_.setZero(6, engine.m->nbody);
+  FindUnits();
+}
+
+void ConstraintSystem::FindUnits() {
+  const mjModel& m = *engine_.m;
+  dof_unit_.setOnes(m.nv);
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_type[j] == mjJNT_SLIDE) dof_unit_[m.jnt_dofadr[j]] = length_;
+    if (m.jnt_type[j] == mjJNT_FREE) dof_unit_.segment<3>(m.jnt_dofadr[j]).setConstant(length_);
+  }
+  row_unit_.setOnes(rows_);
+  for (const int row : closure_row_) row_unit_.segment<3>(row).setConstant(length_);
+  for (size_t k = 0; k < engine_.driven.size(); ++k) {
+    const DrivenPlace& place = engine_.driven[k];
+    if (driven_row_[k] < 0) continue;
+    row_unit_[driven_row_[k]] = place.is_tendon ? length_ : dof_unit_[place.dof];
+  }
+}
+
+double ConstraintSystem::Rounding() const {
+  const mjModel& m = *engine_.m;
+  double reach_m = lever_, angle = 0.0;
+  for (int b = 1; b < m.nbody; ++b) {
+    reach_m = std::max(reach_m, ConstVec3(d_->xpos + 3 * b).norm());
+  }
+  for (int j = 0; j < m.njnt; ++j) {
+    if (m.jnt_type[j] != mjJNT_HINGE) continue;
+    angle = std::max(angle, std::abs(d_->qpos[m.jnt_qposadr[j]]));
+  }
+  return std::max(GapRounding(reach_m) / length_, 32 * kEps * angle);
 }
 
 void ConstraintSystem::SetTargets(const VecX& position) {

@@ -1,8 +1,8 @@
 // MuJoCo's equality constraints as a system r(q) = 0 with Jacobian J and bias J̇q̇.
 //
 // Rows: the closures in plan order, then the guided coordinates (drives without a given force,
-// prescribed joints). The residual of a guided row is position − target. MuJoCo 2.2.2 has no J̇q̇ in its reference
-// accelerations; it is computed here from MuJoCo's own cvel and cdof_dot:
+// prescribed joints). The residual of a guided row is position − target. MuJoCo 2.2.2 has no J̇q̇ in
+// its reference accelerations; it is computed here from MuJoCo's own cvel and cdof_dot:
 //
 //   bias acceleration of body b (spatial, about the root's centre of mass c):
 //     A0_b = A0_parent + Σ_j cdof_dot_j q̇_j                                                   (1)
@@ -64,6 +64,20 @@ class ConstraintSystem {
   [[nodiscard]] Eigen::Map<const RowMajor> J() const { return {d_->efc_J, rows_, engine_.m->nv}; }
   [[nodiscard]] Eigen::Map<VecX> force() const { return {d_->efc_force, rows_}; }
 
+  /// Characteristic length L [m].
+  [[nodiscard]] double length() const { return length_; }
+  /// Units of the rows' residuals and of the velocities in which both are of the order one,
+  /// whatever the mechanism's size: L for lengths, 1 for angles.
+  [[nodiscard]] const VecX& row_unit() const { return row_unit_; }
+  [[nodiscard]] const VecX& dof_unit() const { return dof_unit_; }
+  /// J in these units.
+  [[nodiscard]] MatX ScaledJ() const {
+    return row_unit_.cwiseInverse().asDiagonal() * J() * dof_unit_.asDiagonal();
+  }
+  /// Rounding of residuals in these units: positions far from the world's origin and angles of many
+  /// turns have few digits behind the point.
+  [[nodiscard]] double Rounding() const;
+
   /// Forces of the springs at d.qpos, d.qvel into qfrc_passive.
   void EvaluatePassive();
 
@@ -89,8 +103,12 @@ class ConstraintSystem {
   [[nodiscard]] double TendonBias(int tendon) const;
   void ClosureBias(int closure, VecX* bias) const;
 
+  void FindUnits();
+
   const EngineModel& engine_;
   mjData* const d_;
+  const double length_, lever_;
+  VecX row_unit_, dof_unit_;
   int rows_ = 0, closure_rows_ = 0;
   std::vector<int> closure_row_, driven_row_;
   VecX given_;

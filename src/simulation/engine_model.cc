@@ -3,6 +3,7 @@
 #include <array>
 
 #include "mechanism/constraints.h"
+#include "mechanism/impossible_inertia.h"
 
 namespace mbv::simulation {
 namespace {
@@ -74,10 +75,25 @@ RunSummary FindDriven(EngineModel* engine) {
   return RunSummary::Done();
 }
 
+// MuJoCo compiles no body whose inertia violates the triangle inequality.
+RunSummary CheckInertias(const Mechanism& mechanism) {
+  for (const Body& body : mechanism.bodies) {
+    const std::string violation = TriangleViolation(body);
+    if (violation.empty()) continue;
+    return {.stop = Stop::kUnsupported,
+            .message = "MuJoCo cannot follow: it refuses body '" + body.name + "', whose " +
+                       violation + "; the other witnesses take it as it is",
+            .where = body.name,
+            .unit = {}};
+  }
+  return RunSummary::Done();
+}
+
 }  // namespace
 
 RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                            EngineModel* engine) {
+  if (RunSummary summary = CheckInertias(mechanism); !summary.ok()) return summary;
   engine->mechanism = &mechanism;
   engine->plan = mjcf::MakePlan(mechanism);
   engine->m = CompileMjcf(mjcf);

@@ -1,11 +1,14 @@
 // Forward mode: the step loops of the corrected and of the stock engine.
 #include <fmt/format.h>
 
+#include <Eigen/Geometry>
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <ctime>
 #include <numbers>
 
+#include "mechanism/constraints.h"
 #include "mjcf/mjcf.h"
 #include "simulation/fastest_rate.h"
 #include "simulation/integrator.h"
@@ -88,10 +91,13 @@ RunSummary CheckStep(Session* s) {
           .unit = "s"};
 }
 
+// Diagonal of the box around all bodies at home, or the characteristic length.
 double ExtentOf(const Mechanism& mechanism) {
-  double extent = 1e-3;
-  for (const Pose& X : mechanism.X_WB_home) extent = std::max(extent, X.translation().norm());
-  return extent;
+  Eigen::AlignedBox3d box;
+  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
+    box.extend(mechanism.X_WB_home[b].translation());
+  }
+  return std::max(box.isEmpty() ? 0.0 : box.diagonal().norm(), CharacteristicLength(mechanism));
 }
 
 // After a recorded sample: the motion must be finite and the loops closed.

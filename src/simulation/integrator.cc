@@ -31,7 +31,9 @@ Integrator::Integrator(Session* session, double h)
   const int rows = s_.system.rows();
   for (VecX* x : {&bias_, &rate_, &guidance_, &aref_, &expected_}) x->setZero(rows);
   f_.fill(VecX::Zero(rows));
-  largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_));
+  // Rotation rows: of that mass at a characteristic length.
+  largest_R_ = s_.system.row_unit() / s_.system.length();
+  largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_)) * largest_R_.cwiseAbs2();
   q_ = Eigen::Map<const VecX>(d_->qpos, m_->nq);
   v_ = Eigen::Map<const VecX>(d_->qvel, m_->nv);
   a_.fill(VecX::Zero(m_->nv));

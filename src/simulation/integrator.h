@@ -68,7 +68,7 @@ class Integrator {
   const mjModel* const m_;
   mjData* const d_;
   double b_ = 0.0, k_ = 0.0;  // of (1)
-  double largest_R_ = 0.0;    // [1/kg]; rotation rows: of a lever of one metre
+  VecX largest_R_;            // per row [1/kg], [1/(kg m²)]
   VecX q_, v_;                // corrected state at the present node
   VecX q_p_, v_p_, mean_, work_, warm_;
   VecX bias_, rate_, guidance_, aref_, expected_;

@@ -215,9 +215,9 @@ TEST(LoadModelFindings, OverridesMustNameAParameterAndBeFinite) {
 
 TEST(LoadModelFindings, AModelThatIsTooLargeToComputeIsRefused) {
   std::string text = "name: t\nbodies:\n";
-  for (int i = 0; i < 201; ++i) text += "  b" + std::to_string(i) + ": {}\n";
-  EXPECT_NE(FindingsOf(text).find("m.yaml:203:"), std::string::npos);
-  EXPECT_NE(FindingsOf(text).find("the model has more than 201 bodies"), std::string::npos)
+  for (int i = 0; i < 2001; ++i) text += "  b" + std::to_string(i) + ": {}\n";
+  EXPECT_NE(FindingsOf(text).find("m.yaml:2003:"), std::string::npos);
+  EXPECT_NE(FindingsOf(text).find("the model has more than 2001 bodies"), std::string::npos)
       << FindingsOf(text);
 }
 
@@ -229,7 +229,7 @@ TEST(LoadModelFindings, PartsThatMultiplyWithoutEndAreRefused) {
             "}, b: {part: " + next + "}}}\n";
   }
   text += "  p20: {bodies: {x: {}}}\ninstances: {top: {part: p0}}\n";
-  EXPECT_NE(FindingsOf(text).find("more than 400 instances"), std::string::npos);
+  EXPECT_NE(FindingsOf(text).find("more than 4000 instances"), std::string::npos);
 }
 
 // Each file in data/malformed has its findings beside it.

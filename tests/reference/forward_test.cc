@@ -171,6 +171,45 @@ TEST(Forward, APairOfDrivesSharesATorqueByLeastNorm) {
   EXPECT_GT(std::abs(f), 1.0);
 }
 
+TEST(Forward, AFloatingBodyFliesAParabolaAndKeepsItsSpin) {
+  const Mechanism m = MakeFloater();
+  Vec6 rates;
+  rates << 0.3, -0.2, 4.0, 0.0, 0.0, 2.0;
+  const ForwardRun run = RunForwardReference(m, FloatFree(rates, 0.5));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const Eigen::Index last = run.trace.values.rows() - 1;
+  EXPECT_NEAR(At(run.trace, last, "body.x"), 0.15, kIntegrated);
+  EXPECT_NEAR(At(run.trace, last, "body.z"), 2.0 - 0.5 * 9.81 * 0.25, kIntegrated);
+  EXPECT_NEAR(At(run.trace, last, "body.yaw"), 1.0, kIntegrated);
+  const VecX energy = ColumnOf(run.trace, "energy.kinetic") + ColumnOf(run.trace, "energy.gravity");
+  EXPECT_LT((energy.array() - energy[0]).abs().maxCoeff(), kIntegrated);
+}
+
+TEST(Forward, AFloatingBodyHangsOnASpringAndIsPushedByALeg) {
+  Mechanism m = MakeFloater();
+  m.gravity_W.setZero();
+  const double k = 50.0, w = std::sqrt(k / 2.0), push = 0.5;
+  m.springs = {{.name = "spring",
+                .body_from = 0,
+                .p_from = Vec3(-0.4, 0, 0),
+                .body_to = 1,
+                .stiffness = k,
+                .free_length_m = 0.4}};
+  Drive leg;
+  leg.name = "leg";
+  leg.kind = DistanceDrive{0, Vec3(-1, 0, 0), 1, Vec3::Zero()};
+  m.drives = {leg};
+  Motion motion = FloatFree(Vec6::Zero(), 1.0);
+  motion.forces = {{0, Constant(push)}};
+  const ForwardRun run = RunForwardReference(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const VecX x = ColumnOf(run.trace, "body.x");
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    EXPECT_NEAR(x[i], push / k * (1 - std::cos(w * run.trace.time_s[i])), kIntegrated) << i;
+  }
+  EXPECT_NEAR(ColumnOf(run.trace, "leg.work").tail<1>()[0], push * x.tail<1>()[0], kIntegrated);
+}
+
 TEST(Forward, APendulumReturnsAfterThePeriodOfTheEllipticIntegral) {
   const double length = 1.2, g = 9.81, amplitude = 2.5;
   Mechanism m;

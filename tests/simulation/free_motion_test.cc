@@ -73,6 +73,39 @@ TEST(FreeMotion, ADampedMassOnASpringFollowsItsClosedForm) {
       kIntegrated);
 }
 
+TEST(FreeMotion, AFloatingBodyFliesAParabolaAndKeepsItsSpin) {
+  const Mechanism m = testing::MakeFloater();
+  Vec6 rates;
+  rates << 0.3, -0.2, 4.0, 0.0, 0.0, 2.0;
+  const SimulationRun run = RunFree(m, testing::FloatFree(rates, 0.5));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_NEAR(Column(run, "body.x").tail<1>()[0], 0.15, kIntegrated);
+  EXPECT_NEAR(Column(run, "body.z").tail<1>()[0], 2.0 - 0.5 * 9.81 * 0.25, kIntegrated);
+  EXPECT_NEAR(Column(run, "body.yaw").tail<1>()[0], 1.0, kIntegrated);
+}
+
+TEST(FreeMotion, AFloatingBodyHangsOnASpringAndIsPushedByALeg) {
+  Mechanism m = testing::MakeFloater();
+  m.gravity_W.setZero();
+  const double k = 50.0, w = std::sqrt(k / 2.0), push = 0.5;
+  m.springs = {{.name = "spring",
+                .body_from = 0,
+                .p_from = {-0.4, 0, 0},
+                .body_to = 1,
+                .stiffness = k,
+                .free_length_m = 0.4}};
+  m.drives.push_back(
+      {.name = "leg", .kind = DistanceDrive{0, {-1, 0, 0}, 1, {0, 0, 0}}, .range = {}});
+  Motion motion = testing::FloatFree(Vec6::Zero(), 1.0);
+  motion.forces = {{0, Constant(push)}};
+  const SimulationRun run = RunFree(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const VecX x = Column(run, "body.x");
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    EXPECT_NEAR(x[i], push / k * (1 - std::cos(w * run.trace.time_s[i])), kIntegrated) << i;
+  }
+}
+
 TEST(FreeMotion, APendulumReturnsAfterThePeriodOfTheEllipticIntegral) {
   const double length = 1.2, g = 9.81, amplitude = 2.5;
   Mechanism m;

@@ -188,6 +188,35 @@ inline Motion FreeMotion(const Mechanism& m, double position, double rate, doubl
   return motion;
 }
 
+/// One body that floats: no joint and no command makes a constraint row.
+inline Mechanism MakeFloater() {
+  Mechanism m;
+  m.name = "floater";
+  m.gravity_W = Vec3(0, 0, -9.81);
+  Body world;
+  world.name = "world";
+  m.bodies = {world, MakeBody("body", 2.0, Vec3::Zero(), Vec3(0.03, 0.05, 0.07))};
+  m.joints = {MakeJoint("float", JointKind::kFree, 0, Vec3::Zero(), 1, Vec3::Zero())};
+  AddTree(&m);
+  m.X_WB_home.assign(2, Pose::Identity());
+  Output output;
+  output.name = "body";
+  output.body = 1;
+  m.outputs = {output};
+  return m;
+}
+
+/// Starts a floater at the origin with the rates of x, y, z, roll, pitch, yaw.
+inline Motion FloatFree(const Vec6& rates, double duration_s) {
+  Motion motion;
+  motion.duration_s = duration_s;
+  motion.sample_s = 0.01;
+  for (int c = 0; c < 6; ++c) {
+    motion.initial.push_back({"float", {Coordinate::Kind::kJoint, 0, c}, 0.0, rates[c]});
+  }
+  return motion;
+}
+
 /// Everything driven stays at these positions.
 inline auto HoldStill(std::vector<double> positions) {
   return [positions](double, DrivenSample* driven) {

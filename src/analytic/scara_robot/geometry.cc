@@ -11,8 +11,9 @@
 namespace mbv::scara {
 namespace {
 
-constexpr double kMaxNewtonShift_m = 0.010, kMaxNewtonTurn = 10.0 * std::numbers::pi / 180.0;
-constexpr double kMaxStepShift_m = 0.015, kMaxStepTurn = 15.0 * std::numbers::pi / 180.0;
+// Shifts in arm lengths l1.
+constexpr double kMaxNewtonShift = 0.10, kMaxNewtonTurn = 10.0 * std::numbers::pi / 180.0;
+constexpr double kMaxStepShift = 0.15, kMaxStepTurn = 15.0 * std::numbers::pi / 180.0;
 constexpr int kMaxNewton = 40;
 constexpr double kSmallestFraction = 1e-5;  // of a commanded step of the drives
 
@@ -152,8 +153,8 @@ RunSummary SolveForwardPosition(const Parameters& parameters, const Vec4& theta,
     }
     Vec4 step = -DirectJacobian(*position).partialPivLu().solve(residual_m);
     if (!step.allFinite()) break;
-    const double excess =
-        std::max(step.head<3>().norm() / kMaxNewtonShift_m, std::abs(step[3]) / kMaxNewtonTurn);
+    const double excess = std::max(step.head<3>().norm() / (kMaxNewtonShift * parameters.l1),
+                                   std::abs(step[3]) / kMaxNewtonTurn);
     if (excess > 1.0) step /= excess;
     X += step;
     // Newton is quadratic: the round after a step of 1e-9 is at round-off.
@@ -176,8 +177,8 @@ double RodTilt(const Position& position, int limb) {
 bool ForwardTracker::TryStep(const Vec4& theta, Position* position) const {
   if (!SolveForwardPosition(parameters_, theta, last_.X, position).ok()) return false;
   const Vec4 moved = position->X - last_.X;
-  return moved.head<3>().norm() < kMaxStepShift_m && std::abs(moved[3]) < kMaxStepTurn &&
-         (parameters_.branch * position->V).minCoeff() > 0.0 &&
+  return moved.head<3>().norm() < kMaxStepShift * parameters_.l1 &&
+         std::abs(moved[3]) < kMaxStepTurn && (parameters_.branch * position->V).minCoeff() > 0.0 &&
          DirectJacobian(*position).determinant() * DirectJacobian(last_).determinant() > 0.0;
 }
 

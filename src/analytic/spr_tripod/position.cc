@@ -190,7 +190,7 @@ RunSummary SolveForward(const Geometry& geometry, const PerLeg<double>& q, Postu
     if (!step.allFinite()) break;
     unknown -= step;
     if (iterations != nullptr) *iterations = i + 1;
-    if (step.lpNorm<1>() > kLastStep) continue;
+    if (step.head<2>().lpNorm<1>() + std::abs(step[2]) / geometry.b > kLastStep) continue;
     const Tilt settled{unknown[0], unknown[1]};
     FillPosture(geometry, CentreOf(geometry, settled, unknown[2]), settled, posture);
     if (settled.X * settled.X + settled.Y * settled.Y < 1.0 && unknown[2] > 0.0) {

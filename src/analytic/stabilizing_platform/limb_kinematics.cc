@@ -186,8 +186,8 @@ Amplification::Amplification(const PlatformParameters& p)
 double Amplification::operator()(const LimbMotion& limb) const {
   const double dR = limb.side[0].R.value - R_0_;
   // Near neutral the secant loses its digits: 0/0 becomes the mean of the end slopes, whose error
-  // is dR² l'''(R)/12 < 1e-10.
-  if (std::abs(dR) < 1e-5) return 0.5 * (ratio_0_ + LengthPerDrive(p_, limb.side[0]));
+  // is dR² l'''(R)/12, of the order (dR/R)²/12.
+  if (std::abs(dR) < 2.5e-6 * R_0_) return 0.5 * (ratio_0_ + LengthPerDrive(p_, limb.side[0]));
   return (limb.length.value - l_0_) / dR;
 }
 

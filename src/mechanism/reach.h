@@ -1,0 +1,26 @@
+// How large the coordinates are that a mechanism is computed with, and what that leaves of small
+// differences.
+//
+// CharacteristicLength() (constraints.h) measures the mechanism itself: the root mean square
+// distance of two points of one body (the world included) where joints, drives or springs are
+// attached. It depends neither on where the mechanism stands nor on where its bodies have their
+// origins. Where all attachments of a body fall together, centres of mass count as points, too;
+// then radii of gyration.
+#pragma once
+
+#include <vector>
+
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// The largest coordinate [m] of joint frames and drive ends in their bodies (the world included).
+/// Gaps are differences of this or of Reach(), and keep the rounding of the larger one.
+[[nodiscard]] double LongestLever(const Mechanism& mechanism);
+/// The larger of `longest_lever` and the distance of the farthest body from the world's origin [m].
+[[nodiscard]] double Reach(double longest_lever, const std::vector<Pose>& X_WB);
+/// Rounding [m] that a gap between frames may have: a few ten operations with coordinates that
+/// large.
+[[nodiscard]] inline double GapRounding(double reach_m) { return 32 * kEps * reach_m; }
+
+}  // namespace mbv

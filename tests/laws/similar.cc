@@ -1,0 +1,150 @@
+#include "tests/laws/similar.h"
+
+#include <type_traits>
+
+namespace mbv::laws {
+namespace {
+
+void Scale(double scale, Pose* X) { X->translation() *= scale; }
+
+void ScaleCoordinate(const Joint& joint, double scale, std::array<double, 6>* q) {
+  for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    if (IsLength(joint.kind, c)) (*q)[c] *= scale;
+  }
+}
+
+Profile Scaled(Profile profile, double scale) {
+  for (ProfileTerm& term : profile.terms) {
+    std::visit(
+        [scale](auto& t) {
+          using T = std::decay_t<decltype(t)>;
+          if constexpr (std::is_same_v<T, ConstantTerm>) {
+            t.value *= scale;
+          } else if constexpr (std::is_same_v<T, RampTerm>) {
+            t.rate *= scale;
+          } else if constexpr (std::is_same_v<T, SineTerm>) {
+            t.amplitude *= scale;
+          } else if constexpr (std::is_same_v<T, BumpTerm>) {
+            t.height *= scale;
+          } else {
+            t.delta *= scale;
+          }
+        },
+        term);
+  }
+  return profile;
+}
+
+bool IsLengthCoordinate(const Mechanism& m, const Coordinate& c) {
+  switch (c.kind) {
+    case Coordinate::Kind::kPrescribed:
+      return IsLength(m.joints[m.prescribed[c.index].joint].kind, 0);
+    case Coordinate::Kind::kDrive:
+      return PositionUnit(m, m.drives[c.index]) == "m";
+    case Coordinate::Kind::kOutput:
+      return c.component < 3;
+    case Coordinate::Kind::kJoint:
+      return IsLength(m.joints[c.index].kind, c.component);
+  }
+  return false;
+}
+
+// Points and frames on bodies: those on the world move with it.
+class Placer {
+ public:
+  explicit Placer(const Similarity& similarity) : similarity_(similarity) {}
+
+  void Put(int body, Pose* X) const {
+    if (body == 0) *X = similarity_.X_NW * *X;
+    Scale(similarity_.scale, X);
+  }
+  void Put(int body, Vec3* p) const {
+    if (body == 0) *p = similarity_.X_NW * *p;
+    *p *= similarity_.scale;
+  }
+
+ private:
+  const Similarity& similarity_;
+};
+
+}  // namespace
+
+Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
+  const double s = similarity.scale;
+  const Placer placer(similarity);
+  Mechanism m = mechanism;
+  m.gravity_W = s * (similarity.X_NW.linear() * m.gravity_W);
+  m.up_W = similarity.X_NW.linear() * m.up_W;
+  for (size_t b = 0; b < m.bodies.size(); ++b) {
+    Body& body = m.bodies[b];
+    body.shapes.clear();
+    body.p_BoBcm_B *= s;
+    body.I_Bcm_B *= s * s;
+    for (NamedFrame& frame : body.frames) placer.Put(static_cast<int>(b), &frame.X_BF);
+    Pose& X_WB = m.X_WB_home[b];
+    if (b > 0) placer.Put(0, &X_WB);
+  }
+  for (Joint& joint : m.joints) {
+    placer.Put(joint.parent, &joint.X_PF);
+    placer.Put(joint.child, &joint.X_CM);
+    ScaleCoordinate(joint, s, &joint.guess);
+    ScaleCoordinate(joint, s, &joint.home);
+    joint.range = {};
+  }
+  for (Drive& drive : m.drives) {
+    drive.range = {};
+    if (auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+      placer.Put(leg->body_from, &leg->p_from);
+      placer.Put(leg->body_to, &leg->p_to);
+    }
+  }
+  for (Output& output : m.outputs) {
+    placer.Put(output.body, &output.X_BO);
+    placer.Put(output.reference_body, &output.X_RbR);
+  }
+  for (SpringDamper& spring : m.springs) {
+    placer.Put(spring.body_from, &spring.p_from);
+    placer.Put(spring.body_to, &spring.p_to);
+    spring.free_length_m *= s;
+  }
+  return m;
+}
+
+Motion Similar(const Mechanism& mechanism, const Motion& motion, const Similarity& similarity) {
+  const double s = similarity.scale;
+  Motion out = motion;
+  for (Command& command : out.commands) {
+    const bool length = IsLengthCoordinate(mechanism, command.terms.front().coordinate);
+    if (length) command.profile = Scaled(command.profile, s);
+  }
+  for (InitialValue& value : out.initial) {
+    if (!IsLengthCoordinate(mechanism, value.coordinate)) continue;
+    value.position *= s;
+    value.rate *= s;
+  }
+  for (DriveForce& force : out.forces) {
+    const bool torque = ForceUnit(mechanism, mechanism.drives[force.drive]) == "N m";
+    force.force = Scaled(force.force, torque ? s * s : s);
+  }
+  for (Load& load : out.loads) {
+    load.p_BoQ_B *= s;
+    const auto old_force = load.force, old_moment = load.moment;
+    for (int i = 0; i < 3; ++i) {
+      load.force[i].terms.clear();
+      load.moment[i].terms.clear();
+      for (int k = 0; k < 3; ++k) {
+        const double R_ik = load.in_body_axes ? (i == k ? 1.0 : 0.0) : similarity.X_NW(i, k);
+        if (R_ik == 0.0) continue;
+        for (const auto& term : Scaled(old_force[k], s * R_ik).terms) {
+          load.force[i].terms.push_back(term);
+        }
+        for (const auto& term : Scaled(old_moment[k], s * s * R_ik).terms) {
+          load.moment[i].terms.push_back(term);
+        }
+      }
+    }
+  }
+  return out;
+}
+
+}  // namespace mbv::laws

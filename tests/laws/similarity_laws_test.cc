@@ -1,0 +1,158 @@
+// Neither the place of a mechanism, nor the direction of its world's axes, nor its size changes
+// what is found out about it.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "comparison/comparison.h"
+#include "core/demand.h"
+#include "core/spatial.h"
+#include "mechanism/mobility.h"
+#include "pipeline/witnesses.h"
+#include "reference/forward.h"
+#include "reference/reference.h"
+#include "scenario/load_scenario.h"
+#include "tests/laws/similar.h"
+#include "tests/source_dir.h"
+
+namespace mbv::laws {
+namespace {
+
+// One motion of every shipped model.
+const char* const kScenarios[] = {
+    "andrews_squeezer/benchmark", "bricard/turn_inverse", "bricard/fall",
+    "cabin_robot/wrench",         "floating_loop/tumble", "floating_loop/steered",
+    "four_bar/turn_inverse",      "n_four_bar/rock",      "redundant_five_bar/circle_inverse",
+    "scara_robot/tool_load",      "slider_crank/press",   "spr_tripod/tool_load_inverse",
+    "spring_cart/swing",          "stewart/wave",         "stabilizing_platform/sea_state"};
+
+struct Case {
+  Scenario scenario;
+  Mechanism mechanism;
+
+  explicit Case(const std::string& name) {
+    ScenarioResult loaded = LoadScenario(SourcePath("/scenarios/" + name + ".yaml"));
+    MBV_DEMAND(loaded.scenario && loaded.mechanism, loaded.diagnostics.Text());
+    scenario = *std::move(loaded.scenario);
+    mechanism = *std::move(loaded.mechanism);
+    // Enough to move; the whole motions are run elsewhere.
+    const double steps = scenario.motion.free() ? 10.0 : 30.0;
+    Motion& motion = scenario.motion;
+    motion.duration_s = std::min(motion.duration_s, steps * motion.sample_s);
+    scenario.simulation.forward = motion.free();
+  }
+};
+
+struct Answer {
+  Comparison comparison;
+  Trace reference;
+};
+
+// Reference and simulation, judged by the scenario's limits; lengths of `scale` times the size.
+Answer Judge(const Case& c, const Similarity& similarity) {
+  Scenario scenario = c.scenario;
+  const Mechanism m = Similar(c.mechanism, similarity);
+  scenario.motion = Similar(c.mechanism, c.scenario.motion, similarity);
+  const Motion& motion = scenario.motion;
+  for (const MetricRow& row : MetricRows()) {
+    if (std::string(row.unit) != "m") continue;
+    MetricLimits& limits = scenario.checks[row.metric];
+    for (std::optional<double>* limit : {&limits.forward, &limits.inverse, &limits.reference}) {
+      if (*limit) **limit *= similarity.scale;
+    }
+  }
+  Answer answer;
+  ReferenceRun reference;
+  if (motion.free()) {
+    ForwardRun run = RunForwardReference(m, motion, {.measure_trust = false});
+    reference.trace = std::move(run.trace);
+    reference.summary = std::move(run.summary);
+  } else {
+    reference = RunReference(m, motion);
+  }
+  const DrivenMotion driven =
+      motion.free() ? DriveByCommands(m, motion) : DriveByReference(m, motion);
+  const SimulatedWitness simulated = RunSimulation(scenario, m, driven, Engine::kCorrected, {});
+  const ComparisonInput input{
+      .mechanism = &m,
+      .motion = &motion,
+      .limits = scenario.checks,
+      .simulation_limits = motion.free() ? LimitColumn::kForward : LimitColumn::kInverse,
+      .witnesses = {{"reference", &reference.trace, reference.summary},
+                    {"simulated", &simulated.run.trace, simulated.run.summary}},
+      .driven_by = "reference",
+      .joints_not_unique = AnalyseMobility(m).joints_not_unique};
+  answer.comparison = Compare(input);
+  answer.reference = std::move(reference.trace);
+  return answer;
+}
+
+std::string Failures(const Comparison& comparison) {
+  std::string text = comparison.reason;
+  for (const CheckResult& check : comparison.checks) {
+    if (check.pass || !check.limit) continue;
+    text += "\n  " + check.name + " = " + std::to_string(check.value) + " of " +
+            std::to_string(*check.limit) + " at " + check.channel;
+  }
+  return text;
+}
+
+// Largest difference of the drive forces, each relative to its largest, after scaling back.
+double ForceChange(const Mechanism& m, const Trace& base, const Trace& other, double scale) {
+  double worst = 0.0, size = 0.0;
+  for (const Drive& drive : m.drives) {
+    const double factor = ForceUnit(m, drive) == "N m" ? scale * scale : scale;
+    const int column = base.Find(drive.name + ".force");
+    const VecX x = base.values.col(column), y = other.values.col(column) / factor;
+    size = std::max(size, x.lpNorm<Eigen::Infinity>());
+    worst = std::max(worst, (x - y).lpNorm<Eigen::Infinity>());
+  }
+  return size > 0.0 ? worst / size : worst;
+}
+
+class Similarities : public ::testing::TestWithParam<const char*> {
+ protected:
+  // `force`: allowed change of the reference's drive forces.
+  void ExpectSame(const Similarity& similarity, double force) const {
+    const Case c(GetParam());
+    const Answer base = Judge(c, {}), other = Judge(c, similarity);
+    ASSERT_EQ(base.comparison.verdict, Verdict::kAgree) << Failures(base.comparison);
+    EXPECT_EQ(other.comparison.verdict, Verdict::kAgree) << Failures(other.comparison);
+    EXPECT_LT(ForceChange(c.mechanism, base.reference, other.reference, similarity.scale), force);
+  }
+};
+
+Similarity Moved(const Vec3& p) {
+  Similarity similarity;
+  similarity.X_NW.translation() = p;
+  return similarity;
+}
+
+// Coordinates of 1e4 m have a rounding of 2e-12 m, which poses near singular ones amplify.
+constexpr double kFar = 1e-7;
+constexpr double kSimilar = 1e-9;
+
+TEST_P(Similarities, TenKilometresAwayTheVerdictIsTheSame) {
+  ExpectSame(Moved(1e4 * Vec3(0.6, -0.7, 0.4).normalized()), kFar);
+}
+TEST_P(Similarities, AThousandTimesSmallerTheVerdictIsTheSame) {
+  ExpectSame({.scale = 1e-3}, kSimilar);
+}
+TEST_P(Similarities, AThousandTimesLargerTheVerdictIsTheSame) {
+  ExpectSame({.scale = 1e3}, kSimilar);
+}
+TEST_P(Similarities, InATurnedWorldTheVerdictIsTheSame) {
+  Similarity similarity;
+  similarity.X_NW.linear() = RotRpy({0.4, -1.1, 2.3});
+  ExpectSame(similarity, kSimilar);
+}
+
+INSTANTIATE_TEST_SUITE_P(Shipped, Similarities, ::testing::ValuesIn(kScenarios),
+                         [](const auto& info) {
+                           std::string name = info.param;
+                           std::replace(name.begin(), name.end(), '/', '_');
+                           return name;
+                         });
+
+}  // namespace
+}  // namespace mbv::laws
