@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/inputs.h"
+
 namespace mbv {
 
 /// Scenario files: files as given; a folder stands for all scenarios below it, sorted, except those
@@ -13,14 +15,17 @@ namespace mbv {
 [[nodiscard]] std::vector<std::string> ExpandScenarios(const std::vector<std::string>& arguments,
                                                        std::string* trouble);
 
-/// All .yaml files below a folder, sorted; a file stands for itself.
-[[nodiscard]] std::vector<std::string> ExpandYaml(const std::string& argument);
+/// All .yaml files below a folder, sorted; a file stands for itself. Folders that cannot be read
+/// are told, one line each.
+[[nodiscard]] std::vector<std::string> ExpandYaml(const std::string& argument,
+                                                  std::vector<std::string>* unread);
 
 /// "key=value" → pair; empty if there is no '=' or no key.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& text);
 
-/// Writes a file whole or not at all (temporary file, then rename). Exit code: 0, or 2 after saying
-/// on standard error what went wrong.
-[[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content);
+/// Writes a file whole or not at all (see WriteFile in core/files.h), but not one of `inputs`. Exit
+/// code: 0, or 2 after saying on standard error what went wrong.
+[[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content,
+                                 const std::vector<InputFile>& inputs);
 
 }  // namespace mbv

@@ -50,12 +50,14 @@ int Mutate(const MutateArguments& arguments) {
       progress.Show(parameter, fraction);
     };
   }
+  const InputWatch inputs;
   const MutationReport report = MutateScenario(arguments.scenario, options);
   progress.Clear();
   fmt::print(stderr, "{}", report.diagnostics.Text());
   if (report.mutations.empty() && report.faults.empty()) return report.exit_code;
   if (!arguments.json.empty()) {
-    if (const int code = WriteWholeFile(arguments.json, ToJson(report)); code != 0) return code;
+    const int code = WriteWholeFile(arguments.json, ToJson(report), inputs.files());
+    if (code != 0) return code;
   }
   fmt::print("{}", ToText(report, arguments.markdown));
   return report.exit_code;

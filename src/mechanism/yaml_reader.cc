@@ -8,6 +8,8 @@
 #include <fstream>
 #include <iterator>
 
+#include "core/inputs.h"
+
 namespace mbv {
 
 const YamlNode* YamlNode::Find(std::string_view key) const {
@@ -77,6 +79,7 @@ std::optional<std::string> YamlReader::ReadFile() {
           "check the name; paths are relative to the current folder");
     return std::nullopt;
   }
+  NoteInput(file_, text);
   return text;
 }
 

@@ -55,6 +55,7 @@ class Loader {
   }
 
   ScenarioResult LoadFile() {
+    from_file_ = true;
     const auto text = yaml_.ReadFile();
     if (text) return Load(*text);
     return {{}, {}, yaml_.diagnostics()};
@@ -149,6 +150,7 @@ class Loader {
     if (!loaded.mechanism) return;
     mechanism_ = std::move(loaded.mechanism);
     scenario_.name = CaseName(file_, mechanism_->name);
+    if (from_file_) CheckCaseName(scenario_.name, &yaml_);
   }
 
   // Overrides of single witnesses must name parameters of the model, too.
@@ -244,6 +246,7 @@ class Loader {
   }
 
   std::string file_;
+  bool from_file_ = false;  // and not a made-up name
   const ScenarioOptions& options_;
   YamlReader yaml_;
   Scope scope_;
