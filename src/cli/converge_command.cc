@@ -2,14 +2,13 @@
 #include <fmt/format.h>
 
 #include <cstdio>
-#include <filesystem>
 #include <memory>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
+#include "core/output_folder.h"
 #include "pipeline/converge.h"
-#include "pipeline/output_folder.h"
 #include "report/convergence_report.h"
 
 namespace mbv {
@@ -23,9 +22,7 @@ struct ConvergeArguments {
 
 // "" or what went wrong.
 std::string WriteFolder(const std::string& out, const ConvergenceReport& report) {
-  OutputFolder folder(
-      std::filesystem::path(out) / report.mechanism / "convergence" / report.scenario,
-      "converge.json");
+  OutputFolder folder(out, report.mechanism + "/convergence/" + report.scenario);
   std::string trouble = folder.Create();
   const auto write = [&](const std::string& name, const std::string& content) {
     if (trouble.empty()) trouble = folder.Write(name, content);

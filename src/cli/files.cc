@@ -1,14 +1,10 @@
 #include "cli/files.h"
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <algorithm>
-#include <cerrno>
-#include <cstring>
 #include <filesystem>
-#include <fstream>
 
+#include "core/files.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {
@@ -25,22 +21,15 @@ bool InMustFail(const fs::path& file, const fs::path& below) {
 
 }  // namespace
 
-std::vector<std::string> ExpandYaml(const std::string& argument) {
+std::vector<std::string> ExpandYaml(const std::string& argument, std::vector<std::string>* unread) {
   std::error_code error;
   if (!fs::is_directory(argument, error)) return {argument};
-  std::vector<std::string> files;
-  for (const auto& entry : fs::recursive_directory_iterator(argument, error)) {
-    if (entry.is_regular_file(error) && entry.path().extension() == ".yaml") {
-      files.push_back(entry.path());
-    }
-  }
-  std::sort(files.begin(), files.end());
-  return files;
+  return FilesBelow(argument, ".yaml", unread);
 }
 
 std::vector<std::string> ExpandScenarios(const std::vector<std::string>& arguments,
                                          std::string* trouble) {
-  std::vector<std::string> scenarios;
+  std::vector<std::string> scenarios, unread;
   for (const std::string& argument : arguments) {
     std::error_code error;
     if (!fs::is_directory(argument, error)) {
@@ -48,12 +37,14 @@ std::vector<std::string> ExpandScenarios(const std::vector<std::string>& argumen
       continue;
     }
     const size_t before = scenarios.size();
-    for (const std::string& file : ExpandYaml(argument)) {
+    for (const std::string& file : ExpandYaml(argument, &unread)) {
       if (InMustFail(file, argument) || !ReadScenarioHead(file).is_scenario) continue;
       scenarios.push_back(file);
     }
-    if (scenarios.size() == before) *trouble = argument + ": error: no scenario in this folder";
+    if (scenarios.size() == before)
+      unread.push_back(argument + ": error: no scenario in this folder");
   }
+  for (const std::string& line : unread) *trouble += (trouble->empty() ? "" : "\n") + line;
   return scenarios;
 }
 
@@ -63,18 +54,17 @@ std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& t
   return std::pair{text.substr(0, at), text.substr(at + 1)};
 }
 
-int WriteWholeFile(const std::string& path, const std::string& content) {
-  const std::string temporary = path + ".tmp-" + std::to_string(getpid());
-  errno = 0;
-  std::ofstream stream(temporary, std::ios::binary);
-  stream.write(content.data(), static_cast<std::streamsize>(content.size()));
-  stream.close();
-  std::error_code error;
-  if (stream) fs::rename(temporary, path, error);
-  if (stream && !error) return 0;
-  const std::string reason = error ? error.message() : std::strerror(errno);
-  fs::remove(temporary, error);
-  fmt::print(stderr, "error: cannot write {}: {}\n", path, reason);
+int WriteWholeFile(const std::string& path, const std::string& content,
+                   const std::vector<InputFile>& inputs) {
+  std::string trouble;
+  if (const std::string input = SameFile(path, inputs); !input.empty()) {
+    trouble = fmt::format("{} is {}, which was read for it: choose another file", path,
+                          input == path ? "a file" : input);
+  } else {
+    trouble = WriteFile(path, content);
+  }
+  if (trouble.empty()) return 0;
+  fmt::print(stderr, "error: {}\n", trouble);
   return 2;
 }
 

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "core/inputs.h"
+
 namespace mbv {
 
 struct LoadOptions;
@@ -15,8 +17,10 @@ struct LoadOptions;
 [[nodiscard]] std::vector<std::string> ExpandScenarios(const std::vector<std::string>& arguments,
                                                        std::string* trouble);
 
-/// All .yaml files below a folder, sorted; a file stands for itself.
-[[nodiscard]] std::vector<std::string> ExpandYaml(const std::string& argument);
+/// All .yaml files below a folder, sorted; a file stands for itself. Folders that cannot be read
+/// are told, one line each.
+[[nodiscard]] std::vector<std::string> ExpandYaml(const std::string& argument,
+                                                  std::vector<std::string>* unread);
 
 /// "key=value" → pair; empty if there is no '=' or no key.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& text);
@@ -24,8 +28,9 @@ struct LoadOptions;
 /// "m_p=1000" of --set → overrides; false after saying what is wrong with one.
 [[nodiscard]] bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options);
 
-/// Writes a file whole or not at all (temporary file, then rename). Exit code: 0, or 2 after saying
-/// on standard error what went wrong.
-[[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content);
+/// Writes a file whole or not at all (see WriteFile in core/files.h), but not one of `inputs`. Exit
+/// code: 0, or 2 after saying on standard error what went wrong.
+[[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content,
+                                 const std::vector<InputFile>& inputs);
 
 }  // namespace mbv

@@ -25,7 +25,7 @@ int Show(const HistoryText& answer) {
 int Export(const HistoryArguments& arguments) {
   const HistoryText answer = HistoryCsv(arguments.history);
   if (arguments.csv.empty() || !answer.trouble.empty()) return Show(answer);
-  return WriteWholeFile(arguments.csv, answer.text);
+  return WriteWholeFile(arguments.csv, answer.text, {{arguments.history, ""}});
 }
 
 }  // namespace

@@ -58,6 +58,7 @@ int Model(const ModelArguments& arguments) {
     if (!near.empty()) fmt::print(stderr, "  hint: did you mean '{}'?\n", near);
     return 2;
   }
+  const InputWatch inputs;
   const LoadResult loaded = LoadModel(*file, options);
   fmt::print(stderr, "{}", loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
@@ -74,14 +75,17 @@ int Model(const ModelArguments& arguments) {
     fmt::print("{}", text);
     return 0;
   }
-  return WriteWholeFile(arguments.out, text);
+  return WriteWholeFile(arguments.out, text, inputs.files());
 }
 
 int CheckFiles(const std::vector<std::string>& arguments) {
   int exit_code = 0;
   FindingPrinter findings(stdout);
   for (const std::string& argument : arguments) {
-    const std::vector<std::string> files = ExpandYaml(argument);
+    std::vector<std::string> unread;
+    const std::vector<std::string> files = ExpandYaml(argument, &unread);
+    for (const std::string& line : unread) fmt::print("{}\n", line);
+    if (!unread.empty()) exit_code = 2;
     if (files.empty()) {
       fmt::print("{}: error: no *.yaml file in this folder\n", argument);
       exit_code = 2;
@@ -114,7 +118,8 @@ void ListScenarios() {
   const auto folder = ScenariosFolder();
   if (!folder) return;
   fmt::print("scenarios\n");
-  for (const std::string& file : ExpandYaml(*folder)) {
+  std::vector<std::string> unread;
+  for (const std::string& file : ExpandYaml(*folder, &unread)) {
     const ScenarioHead head = ReadScenarioHead(file);
     if (!head.is_scenario) continue;
     fmt::print("  {}\n      {}\n", file,

@@ -179,13 +179,17 @@ int Mutate(MutateArguments arguments) {
   if (!options->numbers.empty()) {
     arguments.jobs = std::min(arguments.jobs, static_cast<int>(options->numbers.size()));
   }
+  const InputWatch watch;
   const bool shared = arguments.jobs > 1 && arguments.part.empty();
   const MutationReport report = shared ? Workers(arguments).Run() : RunHere(arguments, *options);
   fmt::print(stderr, "{}", report.diagnostics.Text());
   const bool nothing = report.mutations.empty() && report.faults.empty();
   if (report.exit_code > 1 || (nothing && arguments.part.empty())) return report.exit_code;
   if (!arguments.json.empty()) {
-    if (const int code = WriteWholeFile(arguments.json, ToJson(report)); code != 0) return code;
+    std::vector<InputFile> inputs = watch.files();
+    inputs.push_back({arguments.scenario, ""});  // workers read it
+    const int code = WriteWholeFile(arguments.json, ToJson(report), inputs);
+    if (code != 0) return code;
   }
   if (arguments.part.empty()) fmt::print("{}", ToText(report, arguments.markdown));
   return report.exit_code;

@@ -13,6 +13,8 @@
 #include "pipeline/version.h"
 #include "regress/regress.h"
 #include "regress/summaries.h"
+#include "report/html_assets.h"
+#include "report/html_report.h"
 
 namespace mbv {
 namespace {
@@ -21,11 +23,25 @@ struct RegressArguments {
   RegressOptions options;
   std::vector<std::string> folders;  // of merge
   std::string shard, worker;
-  bool no_pictures = false, no_history = false, quiet = false, fail_on_drift = false;
+  bool no_reports = false, embed = false, no_pictures = false, no_history = false, quiet = false,
+       fail_on_drift = false;
 };
 
 volatile std::sig_atomic_t interrupted = 0;
 void Interrupt(int) { interrupted = 1; }
+
+// Reports of a night share one script unless each is to be sent alone.
+void ShareScript(const RegressArguments& arguments, RegressOptions* options) {
+  if (arguments.no_reports) {
+    options->worker_options.emplace_back("--no-report");
+    return;
+  }
+  if (arguments.embed) return;
+  const std::string name = SharedScriptName();
+  options->shared_files[name] = std::string(PageScript());
+  options->worker_options.insert(options->worker_options.end(),
+                                 {"--report-script", "{up}/" + name});
+}
 
 // Options that follow from others; false after a message.
 bool Complete(RegressArguments* arguments) {
@@ -45,6 +61,7 @@ bool Complete(RegressArguments* arguments) {
     options.history = (std::filesystem::path(options.out) / "history.sqlite").string();
   }
   options.pictures = !arguments->no_pictures;
+  ShareScript(*arguments, &options);
   options.program = std::string("mbverify ") + kVersion;
   if (!arguments->worker.empty()) options.worker = {arguments->worker};
   options.stop = &interrupted;
@@ -115,6 +132,9 @@ void AddRegressCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   regress->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
+  regress->add_flag("--no-reports", arguments->no_reports, "do not write a report.html for each");
+  regress->add_flag("--embed", arguments->embed,
+                    "each report.html with its script inside, to be sent alone");
   regress->add_option("--worker", arguments->worker, "program run instead of this one")->group("");
   regress->footer(
       "Examples:\n"

@@ -26,15 +26,9 @@ std::string SizeText(const std::string& size) {
   return "[" + size.substr(0, at) + ", " + size.substr(at + 1) + "]";
 }
 
-int Save(const std::string& path, const std::string& content) {
-  std::error_code error;
-  const std::filesystem::path folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty()) std::filesystem::create_directories(folder, error);
-  if (error) {
-    fmt::print(stderr, "error: cannot make folder {}: {}\n", folder.string(), error.message());
-    return 2;
-  }
-  if (const int code = WriteWholeFile(path, content); code != 0) return code;
+int Save(const std::string& path, const std::string& content,
+         const std::vector<InputFile>& inputs) {
+  if (const int code = WriteWholeFile(path, content, inputs); code != 0) return code;
   fmt::print("{}\n", path);
   return 0;
 }
@@ -55,16 +49,17 @@ int Render(const RenderArguments& arguments) {
       progress.Show(stage, fraction);
     };
   }
+  const InputWatch inputs;
   const RenderOutcome outcome = RenderScenario(arguments.scenario, request);
   progress.Clear();
   fmt::print(stderr, "{}", outcome.diagnostics.Text());
   if (outcome.exit_code != 0) return outcome.exit_code;
-  if (!arguments.video.empty()) return Save(arguments.video, outcome.video);
+  if (!arguments.video.empty()) return Save(arguments.video, outcome.video, inputs.files());
   const std::filesystem::path folder =
       std::filesystem::path(arguments.out) / outcome.mechanism / outcome.scenario;
   int exit_code = 0;
   for (const PictureFile& picture : outcome.pictures) {
-    exit_code = WorseExit(exit_code, Save(folder / picture.name, picture.content));
+    exit_code = WorseExit(exit_code, Save(folder / picture.name, picture.content, inputs.files()));
   }
   return exit_code;
 }

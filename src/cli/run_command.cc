@@ -18,8 +18,8 @@ namespace {
 
 struct RunArguments {
   std::vector<std::string> scenarios, set;
-  std::string out = "out", mode;
-  bool no_pictures = false, quiet = false, verbose = false;
+  std::string out = "out", mode, report_script;
+  bool no_report = false, no_pictures = false, quiet = false, verbose = false;
 };
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
@@ -58,6 +58,8 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
 bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->out_dir = arguments.out;
   options->pictures = !arguments.no_pictures;
+  options->page = !arguments.no_report;
+  options->script_link = arguments.report_script;
   for (const std::string& text : arguments.set) {
     const auto set = SplitSet(text);
     if (!set) {
@@ -115,6 +117,9 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
                   "key=value: overrides a value of the scenario (repeatable)")
       ->allow_extra_args(false);
   run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
+  run->add_flag("--no-report", arguments->no_report, "do not write report.html");
+  // How regress shares one script among the reports of a night.
+  run->add_option("--report-script", arguments->report_script)->group("");
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");
   run->add_flag("-v,--verbose", arguments->verbose,
                 "also how to read each signal, and what could not be compared");

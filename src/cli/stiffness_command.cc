@@ -2,13 +2,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <filesystem>
 #include <memory>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
-#include "pipeline/output_folder.h"
+#include "core/output_folder.h"
 #include "pipeline/stiffness.h"
 #include "pipeline/stiffness_map.h"
 #include "scenario/motion_reader.h"
@@ -128,7 +127,7 @@ std::string CommandOf(const StiffnessArguments& arguments) {
 std::string WriteFolder(const StiffnessArguments& arguments, const StiffnessRun& run,
                         const std::vector<std::pair<std::string, std::string>>& maps) {
   const std::string out = arguments.out.empty() ? "out" : arguments.out;
-  OutputFolder folder(std::filesystem::path(out) / run.report.mechanism / run.report.scenario);
+  OutputFolder folder(out, run.report.mechanism + "/" + run.report.scenario);
   std::string trouble = folder.Create();
   for (const auto& [name, content] : StiffnessFiles(run)) {
     if (trouble.empty()) trouble = folder.Write(name, content);

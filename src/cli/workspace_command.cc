@@ -1,13 +1,12 @@
 // mbverify workspace
 #include <fmt/format.h>
 
-#include <filesystem>
 #include <memory>
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "core/output_folder.h"
 #include "mechanism/load_model.h"
-#include "pipeline/output_folder.h"
 #include "pipeline/workspace.h"
 #include "scenario/find_model.h"
 
@@ -39,7 +38,7 @@ int Workspace(const WorkspaceArguments& arguments) {
     fmt::print(stderr, "error: {}\n", outcome.summary.message);
     return outcome.summary.stop == Stop::kUnsupported ? 2 : 3;
   }
-  OutputFolder folder(std::filesystem::path(arguments.out) / loaded.mechanism->name / "workspace");
+  OutputFolder folder(arguments.out, loaded.mechanism->name + "/workspace");
   std::string trouble = folder.Create();
   for (const auto& [name, content] : outcome.files) {
     if (trouble.empty()) trouble = folder.Write(name, content);

@@ -51,26 +51,6 @@ LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) 
   return measured == "simulated" ? input.simulation_limits : LimitColumn::kReference;
 }
 
-// Limits that do not come from the scenario.
-struct OtherLimits {
-  std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
-  std::map<Metric, double> growth;  ///< where bent forces lead: counts instead of the limit
-};
-
-void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check) {
-  const auto tube = other.tubes.find(check->metric), growth = other.growth.find(check->metric);
-  if (!check->limit) return;
-  if (tube != other.tubes.end() && tube->second > *check->limit) {
-    check->stated_limit = check->limit;
-    check->limit = tube->second;
-    check->limit_by = "the table's uncertainty";
-  } else if (growth != other.growth.end()) {
-    check->stated_limit = check->limit;
-    check->limit = growth->second;
-    check->limit_by = fmt::format("forces bent by {:.0e}", input.bend);
-  }
-}
-
 void AddChecks(const ComparisonInput& input, const std::string& subject, LimitColumn column,
                const std::map<Metric, Measured>& metrics, const OtherLimits& other,
                Comparison* comparison) {
@@ -362,10 +342,10 @@ void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison
   OtherLimits other;
   if (IsTable(input, witness.name)) other.tubes = CommandTubes(input);
   const bool simulated = witness.name == "simulated";
-  if (simulated) other.growth = CommandGrowth(GrowthLimits(input, *witness.trace));
-  std::map<Metric, Measured> commands, others = metrics.metrics;
-  for (const Metric metric : {Metric::kCommandM, Metric::kCommandRad}) {
-    if (auto found = others.extract(metric)) commands.insert(std::move(found));
+  if (simulated) other.growth = CommandGrowth(input, metrics);
+  std::map<Metric, Measured> commands, others;
+  for (const auto& [metric, measured] : metrics.metrics) {
+    (IsCommand(metric) ? commands : others)[metric] = measured;
   }
   const LimitColumn column = ColumnOf(input, witness.name);
   const bool servo = simulated && input.drive_by == DriveBy::kServos;

@@ -15,7 +15,8 @@ constexpr const char* kBent = "bent";
 
 bool IsMotion(Metric metric) {
   return IsTrajectory(metric) || metric == Metric::kVelocity || metric == Metric::kAcceleration ||
-         metric == Metric::kReaction;
+         metric == Metric::kReaction || metric == Metric::kReactionOwn ||
+         metric == Metric::kBaseForce;
 }
 
 std::string Amount(const CheckResult& check) {
@@ -30,9 +31,10 @@ const CheckResult* WorstMotion(const Comparison& comparison) {
   const CheckResult* worst = nullptr;
   double most = -1.0;
   for (const CheckResult& check : comparison.checks) {
-    const bool command = check.metric == Metric::kCommandM || check.metric == Metric::kCommandRad;
     if (!check.subject.starts_with("simulated") || check.subject.ends_with(kReached)) continue;
-    if (!check.limit || (!IsTrajectory(check.metric) && !command)) continue;
+    const bool place = IsTrajectory(check.metric) || check.metric == Metric::kCommandM ||
+                       check.metric == Metric::kCommandRad;
+    if (!check.limit || !place) continue;
     const double ratio = std::isnan(check.value) ? 1e300 : check.value / *check.limit;
     if (ratio <= most) continue;
     worst = &check;
@@ -143,11 +145,33 @@ std::map<Metric, double> GrowthLimits(const ComparisonInput& input, const Trace&
   return limits;
 }
 
-std::map<Metric, double> CommandGrowth(const std::map<Metric, double>& growth) {
-  if (growth.empty()) return {};
-  const auto larger = [&](Metric a, Metric b) { return std::fmax(growth.at(a), growth.at(b)); };
-  return {{Metric::kCommandM, larger(Metric::kPositionM, Metric::kPoseM)},
-          {Metric::kCommandRad, larger(Metric::kPositionRad, Metric::kPoseRad)}};
+std::map<Metric, double> CommandGrowth(const ComparisonInput& input,
+                                       const WitnessMetrics& simulated) {
+  std::map<Metric, double> limits;
+  if (input.drive_by != DriveBy::kForces) return limits;
+  WitnessMetrics bent;
+  if (input.bent != nullptr) bent = MeasureWitness(input, *input.bent);
+  for (const auto& [metric, measured] : simulated.metrics) {
+    if (!IsCommand(metric)) continue;
+    const auto found = bent.metrics.find(metric);
+    limits[metric] =
+        found == bent.metrics.end() ? kNan : std::abs(found->second.value - measured.value);
+  }
+  return limits;
+}
+
+void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check) {
+  const auto tube = other.tubes.find(check->metric), growth = other.growth.find(check->metric);
+  if (!check->limit) return;
+  if (tube != other.tubes.end() && tube->second > *check->limit) {
+    check->stated_limit = check->limit;
+    check->limit = tube->second;
+    check->limit_by = "the table's uncertainty";
+  } else if (growth != other.growth.end()) {
+    check->stated_limit = check->limit;
+    check->limit = growth->second;
+    check->limit_by = fmt::format("forces bent by {:.0e}", input.bend);
+  }
 }
 
 void LeaveOutReachedMotion(PairComparison* pair) {

@@ -28,8 +28,22 @@ namespace mbv {
 [[nodiscard]] std::map<Metric, double> GrowthLimits(const ComparisonInput& input,
                                                     const Trace& simulated);
 
-/// The same for the commands of one witness.
-[[nodiscard]] std::map<Metric, double> CommandGrowth(const std::map<Metric, double>& growth);
+/// The same for what is held against the command; `simulated`: what it shows by itself.
+[[nodiscard]] std::map<Metric, double> CommandGrowth(const ComparisonInput& input,
+                                                     const WitnessMetrics& simulated);
+
+/// Compares a witness with the command.
+[[nodiscard]] constexpr bool IsCommand(Metric metric) {
+  return metric == Metric::kCommandM || metric == Metric::kCommandRad ||
+         metric == Metric::kCommandVelocity || metric == Metric::kCommandAcceleration;
+}
+
+/// Limits that do not come from the scenario.
+struct OtherLimits {
+  std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
+  std::map<Metric, double> growth;  ///< where bent forces lead: counts instead of the limit
+};
+void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check);
 
 /// Metrics of drive motion that the reference on the reached motion has by construction.
 void LeaveOutReachedMotion(PairComparison* pair);

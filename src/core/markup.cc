@@ -1,5 +1,8 @@
 #include "core/markup.h"
 
+#include <algorithm>
+#include <cstdint>
+
 #include "core/text.h"
 
 namespace mbv {
@@ -37,6 +40,48 @@ std::string EscapeMarkup(std::string_view text) {
     }
   }
   return escaped;
+}
+
+std::string EncodeLink(std::string_view path) {
+  static constexpr char kDigits[] = "0123456789ABCDEF";
+  std::string link;
+  for (const char c : path) {
+    const auto u = static_cast<unsigned char>(c);
+    const bool plain = (u >= 'a' && u <= 'z') || (u >= 'A' && u <= 'Z') || (u >= '0' && u <= '9') ||
+                       std::string_view("-_.~/").find(c) != std::string_view::npos;
+    if (plain) {
+      link += c;
+    } else {
+      link += {'%', kDigits[u >> 4U], kDigits[u & 15U]};
+    }
+  }
+  return link;
+}
+
+std::string EscapeScript(std::string json) {
+  constexpr std::string_view kLess = "\\u003c";
+  for (size_t at = 0; (at = json.find('<', at)) != std::string::npos; at += kLess.size()) {
+    json.replace(at, 1, kLess);
+  }
+  return json;
+}
+
+std::string EncodeBase64(std::string_view bytes) {
+  static constexpr char kDigits[] =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  text.reserve((bytes.size() + 2) / 3 * 4);
+  for (size_t i = 0; i < bytes.size(); i += 3) {
+    const size_t count = std::min<size_t>(3, bytes.size() - i);
+    std::uint32_t word = 0;
+    for (size_t k = 0; k < 3; ++k) {
+      word = word << 8U | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0U);
+    }
+    for (size_t k = 0; k < 4; ++k) {
+      text += k <= count ? kDigits[word >> (18 - 6 * k) & 63U] : '=';
+    }
+  }
+  return text;
 }
 
 }  // namespace mbv

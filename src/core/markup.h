@@ -10,4 +10,14 @@ namespace mbv {
 /// (core/text.h) becomes U+FFFD.
 [[nodiscard]] std::string EscapeMarkup(std::string_view text);
 
+/// A relative link to a file: every byte but letters, digits, '-', '_', '.', '~' and '/' as %XX, so
+/// that no name is taken as a scheme, a query or a fragment, or ends an attribute.
+[[nodiscard]] std::string EncodeLink(std::string_view path);
+
+/// JSON inside a script element: '<' as \u003c, so that nothing in it ends or opens an element.
+[[nodiscard]] std::string EscapeScript(std::string json);
+
+/// RFC 4648, with padding.
+[[nodiscard]] std::string EncodeBase64(std::string_view bytes);
+
 }  // namespace mbv

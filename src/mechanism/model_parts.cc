@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/names.h"
 #include "mechanism/model_reader.h"
 
 namespace mbv {
@@ -19,6 +20,16 @@ const std::vector<std::string> kModelKeys = {
 const std::vector<std::string> kPartKeys = {"parameters", "attach",      "bodies",    "joints",
                                             "drives",     "prescribed",  "outputs",   "springs",
                                             "instances",  "description", "materials", "sections"};
+
+// Names of models become names of folders.
+std::string ReadName(const YamlNode& node, YamlReader* yaml) {
+  const std::string name = yaml->Text(node, "name").value_or("");
+  if (!node.is_scalar() || IsName(name)) return name;
+  const std::string near = NearestName(name);
+  yaml->Error(node, fmt::format("name = {} violates: {}", Describe(node), kNameRule),
+              near.empty() ? "for example my_linkage" : fmt::format("for example {}", near));
+  return name;
+}
 
 }  // namespace
 
@@ -36,7 +47,7 @@ void ModelReader::ReadHead() {
   if (!map.valid()) return;
   Block& model = blocks_.front();
   if (const YamlNode* name = map.Required("name")) {
-    mechanism_.name = yaml_.Text(*name, "name").value_or("");
+    mechanism_.name = ReadName(*name, &yaml_);
   }
   if (const YamlNode* text = map.Find("description")) {
     mechanism_.description = yaml_.Text(*text, "description").value_or("");

@@ -16,10 +16,7 @@ namespace {
 std::string YamlName(std::string name) {
   std::replace_if(
       name.begin(), name.end(),
-      [](char c) {
-        return std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '_' && c != '-';
-      },
-      '_');
+      [](char c) { return std::isalnum(static_cast<unsigned char>(c)) == 0 && c != '_'; }, '_');
   return name;
 }
 

@@ -11,6 +11,8 @@
 #include <map>
 #include <utility>
 
+#include "core/inputs.h"
+
 namespace mbv {
 
 const YamlNode* YamlNode::Find(std::string_view key) const {
@@ -109,6 +111,7 @@ std::optional<std::string> YamlReader::ReadFile() {
     return std::nullopt;
   }
   if (kept != nullptr) *kept = text;
+  NoteInput(file_, text);
   return text;
 }
 

@@ -5,47 +5,22 @@
 #include <stdio.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <system_error>
 
 #include "analytic/closed_form.h"
+#include "core/files.h"
+#include "core/names.h"
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr size_t kLongestName = 64;
 constexpr const char* kPlace = "@NAME@";
-
-bool IsNameCharacter(char c) {
-  const auto u = static_cast<unsigned char>(c);
-  return u < 0x80 && (std::isalnum(u) != 0 || c == '_');
-}
-
-bool IsName(const std::string& name) {
-  return !name.empty() && name.size() <= kLongestName &&
-         std::isalpha(static_cast<unsigned char>(name[0])) != 0 &&
-         std::all_of(name.begin(), name.end(), IsNameCharacter);
-}
-
-// "My arm-2" → "My_arm_2"; "" when nothing is left.
-std::string NearestName(const std::string& name) {
-  std::string near;
-  for (const char c : name.substr(0, kLongestName)) {
-    near += IsNameCharacter(c) ? c : '_';
-  }
-  while (!near.empty() && std::isalpha(static_cast<unsigned char>(near[0])) == 0) {
-    near.erase(near.begin());
-  }
-  while (!near.empty() && near.back() == '_') near.pop_back();
-  return near;
-}
 
 std::string Filled(std::string text, const std::string& name) {
   for (size_t at = 0; (at = text.find(kPlace, at)) != std::string::npos; at += name.size()) {
@@ -58,13 +33,10 @@ std::string Filled(std::string text, const std::string& name) {
 class NewFolder {
  public:
   NewFolder(fs::path target, std::string file, std::string content)
-      : target_(std::move(target)), file_(std::move(file)), content_(std::move(content)) {
-    temporary_ =
-        target_.parent_path() / fmt::format(".{}.tmp-{}", target_.filename().string(), getpid());
-  }
+      : target_(std::move(target)), file_(std::move(file)), content_(std::move(content)) {}
   ~NewFolder() {
     std::error_code error;
-    fs::remove_all(temporary_, error);
+    if (!temporary_.empty()) fs::remove_all(temporary_, error);
     // Folders made on the way, if nothing came to lie in them.
     for (const fs::path& made : made_) {
       if (!kept_) fs::remove(made, error);
@@ -82,16 +54,19 @@ class NewFolder {
          folder = folder.parent_path()) {
       made_.push_back(folder);
     }
-    fs::create_directories(temporary_, error);
+    fs::create_directories(target_.parent_path(), error);
     if (error) return Trouble("make folder", target_, error.message());
-    errno = 0;
-    std::ofstream stream(temporary_ / file_, std::ios::binary);
-    stream << content_;
-    stream.close();
-    return stream ? "" : Trouble("write", path(), std::strerror(errno));
+    std::string pattern =
+        target_.parent_path() / fmt::format(".{}.mbverify-XXXXXX", target_.filename().string());
+    if (mkdtemp(pattern.data()) == nullptr) {
+      return Trouble("make folder", target_, std::strerror(errno));
+    }
+    temporary_ = pattern;
+    return WriteFile(temporary_ / "new" / file_, content_);
   }
   [[nodiscard]] std::string Commit() {
-    if (renameat2(AT_FDCWD, temporary_.c_str(), AT_FDCWD, target_.c_str(), RENAME_NOREPLACE) == 0) {
+    const fs::path made = temporary_ / "new";
+    if (renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, target_.c_str(), RENAME_NOREPLACE) == 0) {
       kept_ = true;
       return "";
     }
@@ -146,9 +121,7 @@ class Initialiser {
     const std::string& name = options_.name;
     if (!IsName(name)) {
       const std::string near = NearestName(name);
-      Add(fmt::format("name = '{}' violates: a letter, then letters, digits and '_', at most {} "
-                      "characters",
-                      name, kLongestName),
+      Add(fmt::format("name = '{}' violates: {}", name, kNameRule),
           near.empty() ? "for example my_linkage" : fmt::format("for example {}", near));
       return;
     }

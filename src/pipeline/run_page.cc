@@ -98,14 +98,15 @@ std::map<std::string, HtmlPaint> PaintsOf(const Mechanism& mechanism) {
 
 std::string RunPage(const Report& report, const Mechanism& mechanism,
                     const SimulationRun* simulation, const std::vector<PictureFile>& pictures,
-                    const ScenarioOptions& options) {
+                    const ScenarioOptions& options, const std::string& script_link) {
   HtmlInput input{.report = &report,
                   .mechanism = &mechanism,
                   .X_WB = simulation == nullptr ? nullptr : &simulation->X_WB,
                   .paints = PaintsOf(mechanism),
                   .pictures = {},
                   .audit = AuditOf(report),
-                  .arguments = {}};
+                  .arguments = {},
+                  .script_link = script_link};
   size_t bytes = 0;
   for (const PictureFile& picture : pictures) {
     bytes += picture.preview.size();

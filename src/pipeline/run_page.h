@@ -11,10 +11,11 @@
 
 namespace mbv {
 
-/// `simulation` may be null (it did not run); `mechanism` is the one it simulated.
+/// `simulation` may be null (it did not run); `mechanism` is the one it simulated; `script_link` as
+/// in RunOptions.
 [[nodiscard]] std::string RunPage(const Report& report, const Mechanism& mechanism,
                                   const SimulationRun* simulation,
                                   const std::vector<PictureFile>& pictures,
-                                  const ScenarioOptions& options);
+                                  const ScenarioOptions& options, const std::string& script_link);
 
 }  // namespace mbv

@@ -4,15 +4,15 @@
 
 #include <algorithm>
 #include <chrono>
-#include <filesystem>
 
 #include "core/demand.h"
+#include "core/inputs.h"
+#include "core/output_folder.h"
 #include "mechanism/mobility.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/engine_errors.h"
 #include "pipeline/free_motion_text.h"
 #include "pipeline/not_run.h"
-#include "pipeline/output_folder.h"
 #include "pipeline/pictures.h"
 #include "pipeline/prepare.h"
 #include "pipeline/ranges.h"
@@ -23,6 +23,7 @@
 #include "pipeline/version.h"
 #include "reference/reference.h"
 #include "report/csv.h"
+#include "report/inputs_json.h"
 #include "scenario/table.h"
 
 namespace mbv {
@@ -344,7 +345,7 @@ class ScenarioRun {
 
   void WriteFiles() {
     if (options_.out_dir.empty()) return;
-    OutputFolder folder(std::filesystem::path(options_.out_dir) / base().name / scenario().name);
+    OutputFolder folder(options_.out_dir, base().name + "/" + scenario().name);
     std::string trouble = folder.Create();
     const auto write = [&](const std::string& name, const auto& content) {
       if (trouble.empty()) trouble = folder.Write(name, content);
@@ -354,10 +355,13 @@ class ScenarioRun {
     for (const PictureFile& picture : pictures_) {
       write("snapshots/" + picture.name, picture.content);
     }
+    write("inputs.json", ToJson(inputs_.files()));
     write("summary.json", ToJson(report_));
-    write("report.html",
-          RunPage(report_, prepared_->mechanisms.simulated, simulation_ ? &*simulation_ : nullptr,
-                  pictures_, options_.scenario));
+    if (options_.page) {
+      write("report.html",
+            RunPage(report_, prepared_->mechanisms.simulated, simulation_ ? &*simulation_ : nullptr,
+                    pictures_, options_.scenario, options_.script_link));
+    }
     if (trouble.empty()) trouble = folder.Commit();
     if (trouble.empty()) {
       outcome_.folder = folder.target();
@@ -372,6 +376,7 @@ class ScenarioRun {
 
   const std::string file_;
   const RunOptions& options_;
+  InputWatch inputs_;
   RunOutcome outcome_;
   std::optional<Prepared> prepared_;
   Report report_;

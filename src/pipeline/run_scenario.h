@@ -19,8 +19,10 @@ using ProgressFunction = std::function<void(const std::string& stage, double fra
 
 struct RunOptions {
   ScenarioOptions scenario;
-  std::string out_dir;   ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
-  bool pictures = true;  ///< needs out_dir
+  std::string out_dir;      ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
+  bool pictures = true;     ///< needs out_dir
+  bool page = true;         ///< report.html; needs out_dir
+  std::string script_link;  ///< the page's script, relative to the result's folder; "": in the page
   ProgressFunction progress;
 };
 
@@ -29,7 +31,7 @@ struct RunOutcome {
   Diagnostics diagnostics;       ///< bad input and warnings
   std::optional<Report> report;  ///< of a motion; empty after bad input
   std::shared_ptr<const StiffnessReport> stiffness;  ///< of a stiffness; null after bad input
-  std::string folder;            ///< what was written; "" if nothing
+  std::string folder;                                ///< what was written; "" if nothing
 };
 
 /// Runs a scenario file. Bad input and numerical trouble are in the outcome; only our own bugs

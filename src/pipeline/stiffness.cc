@@ -3,14 +3,15 @@
 #include <fmt/format.h>
 
 #include <chrono>
-#include <filesystem>
 
 #include "core/demand.h"
+#include "core/inputs.h"
+#include "core/output_folder.h"
 #include "pipeline/not_run.h"
-#include "pipeline/output_folder.h"
 #include "pipeline/version.h"
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
+#include "report/inputs_json.h"
 #include "scenario/motion_reader.h"
 #include "simulation/compliant.h"
 
@@ -257,6 +258,7 @@ std::vector<std::pair<std::string, std::string>> StiffnessFiles(const StiffnessR
 
 RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& options) {
   RunOutcome outcome;
+  const InputWatch inputs;
   const auto prepared = PrepareStiffnessFile(file, options.scenario, &outcome.diagnostics);
   if (!prepared) {
     outcome.exit_code = 2;
@@ -270,10 +272,11 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
   }
   outcome.exit_code = run.report.exit_code;
   if (!options.out_dir.empty()) {
-    OutputFolder folder(std::filesystem::path(options.out_dir) / prepared->base.name /
-                        prepared->scenario.name);
+    OutputFolder folder(options.out_dir, prepared->base.name + "/" + prepared->scenario.name);
     std::string trouble = folder.Create();
+    if (trouble.empty()) trouble = folder.Write("inputs.json", ToJson(inputs.files()));
     for (const auto& [name, content] : StiffnessFiles(run)) {
+      if (name == "report.html" && !options.page) continue;
       if (trouble.empty()) trouble = folder.Write(name, content);
     }
     if (trouble.empty()) trouble = folder.Commit();

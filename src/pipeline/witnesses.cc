@@ -72,7 +72,7 @@ SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism
   options.mode = settings.forward ? SimulationMode::kForward : SimulationMode::kInverse;
   options.engine = engine;
   options.step_s = settings.step_s;
-  if (!settings.forward || engine == Engine::kStock) return options;
+  if (!settings.forward || engine != Engine::kCorrected) return options;
   if (settings.drive_by == DriveBy::kForces) options.drives = DriveMode::kPushed;
   if (settings.drive_by == DriveBy::kServos) {
     options.drives = DriveMode::kServo;
@@ -218,6 +218,13 @@ Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, doub
     }
   }
   return trace;
+}
+
+SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
+                               const DrivenMotion& driven, Engine engine,
+                               const std::function<void(double)>& progress) {
+  return RunSimulation(scenario, mechanism, driven, OptionsOf(scenario, mechanism, engine),
+                       progress);
 }
 
 SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,

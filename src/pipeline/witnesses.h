@@ -50,11 +50,15 @@ struct ClosedFormChoice {
 [[nodiscard]] SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism,
                                           Engine engine);
 
-/// Simulates, extrapolating if the scenario asks for it.
+/// Simulates, extrapolating if the scenario asks for it. Drives by forces or servos need options.
 struct SimulatedWitness {
   SimulationRun run;        ///< trace extrapolated; poses and MJCF of the first run
   Diagnostics diagnostics;  ///< bad input found on the way
 };
+[[nodiscard]] SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
+                                             const DrivenMotion& driven, Engine engine,
+                                             const std::function<void(double)>& progress);
+/// The same with the engine's options given instead of taken from the scenario.
 [[nodiscard]] SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechanism,
                                              const DrivenMotion& driven,
                                              const SimulationOptions& options,

@@ -1,17 +1,22 @@
 // Appends a run to the history, judging it against the runs before.
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <chrono>
+#include <cstring>
 #include <filesystem>
 #include <thread>
 
-#include "regress/files.h"
+#include "core/files.h"
 #include "regress/history.h"
 #include "regress/history_schema.h"
 
 namespace mbv {
 namespace {
+
+namespace fs = std::filesystem;
 
 class Appender {
  public:
@@ -36,12 +41,13 @@ class Appender {
  private:
   void InsertRun(RegressReport* report) {
     const RunInfo& run = report->run;
+    const long known = run.uid.empty() ? 0 : ForgetRun(run.uid);
     Statement(db_,
-              "INSERT INTO run(started_utc, finished_utc, wall_s, jobs, label, host, program, "
-              "shard, exit_code, total, as_expected, ran, compared, verified, drifted) "
-              "VALUES(?,?,?,?,?,?,?,?,0,0,0,0,0,0,0)")
-        .Bind(run.started_utc, run.finished_utc, run.wall_s, run.jobs, run.label, run.host,
-              run.program, run.shard)
+              "INSERT OR REPLACE INTO run(id, uid, started_utc, finished_utc, wall_s, jobs, label, "
+              "host, program, shard, exit_code, total, as_expected, ran, compared, verified, "
+              "drifted) VALUES(NULLIF(?,0),NULLIF(?,''),?,?,?,?,?,?,?,?,0,0,0,0,0,0,0)")
+        .Bind(known, run.uid, run.started_utc, run.finished_utc, run.wall_s, run.jobs, run.label,
+              run.host, run.program, run.shard)
         .Execute();
     report->run.id = db_->last_id();
     std::map<std::string, std::string> versions;
@@ -52,6 +58,24 @@ class Appender {
     for (const auto& [name, version] : versions) {
       insert.Bind(report->run.id, name, version).Execute();
     }
+  }
+
+  // Number of the run that is in the history already, whose results go; 0 if it is new.
+  long ForgetRun(const std::string& uid) {
+    Statement find(db_, "SELECT id FROM run WHERE uid = ?");
+    if (!find.Bind(uid).Step()) return 0;
+    const long run = find.Integer(0);
+    for (const char* table : {"golden", "metric", "drift"}) {
+      Statement(db_, fmt::format("DELETE FROM {} WHERE result IN (SELECT id FROM result WHERE "
+                                 "run = ?)",
+                                 table))
+          .Bind(run)
+          .Execute();
+    }
+    for (const char* table : {"result", "version"}) {
+      Statement(db_, fmt::format("DELETE FROM {} WHERE run = ?", table)).Bind(run).Execute();
+    }
+    return run;
   }
 
   void FinishRun(const RegressReport& report) {
@@ -223,7 +247,8 @@ std::string AppendOnce(const std::string& path, const std::map<std::string, Gold
   Database database(path, Database::Mode::kCreate);
   database.Run("PRAGMA journal_mode = WAL");
   database.Run("PRAGMA synchronous = NORMAL");
-  database.Run("PRAGMA foreign_keys = ON");
+  // Not while a run is entered anew: what was accepted refers to its number, which stays.
+  database.Run("PRAGMA foreign_keys = OFF");
   database.Run("BEGIN IMMEDIATE");
   if (!database.ok()) return database.trouble();
   if (std::string trouble = PrepareSchema(path, &database); !trouble.empty()) return trouble;
@@ -237,11 +262,36 @@ std::string AppendOnce(const std::string& path, const std::map<std::string, Gold
 
 }  // namespace
 
+std::string CheckHistory(const std::string& path) {
+  std::error_code error;
+  if (path.empty()) return "";
+  if (!fs::exists(path, error)) {
+    fs::path folder = fs::absolute(path, error).parent_path();
+    while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+    if (fs::is_directory(folder, error) && access(folder.c_str(), W_OK) == 0) return "";
+    return fmt::format("history {}: cannot be made in {}", path, folder.string());
+  }
+  if (!fs::is_regular_file(path, error)) return fmt::format("history {}: is no file", path);
+  if (access(path.c_str(), W_OK) != 0) {
+    return fmt::format("history {}: {}", path, std::strerror(errno));
+  }
+  Database database(path, Database::Mode::kWrite);
+  const auto busy = [&] { return database.trouble().ends_with("locked"); };  // it will be free
+  Statement check(&database, "PRAGMA quick_check(1)");
+  const std::string state = check.Step() ? check.Text(0) : "";
+  if (!database.ok()) return busy() ? "" : database.trouble();
+  if (state != "ok") return fmt::format("history {}: is damaged: {}", path, state);
+  if (std::string trouble = CheckWritable(path, &database); !trouble.empty()) return trouble;
+  database.Run("BEGIN IMMEDIATE");
+  database.Run("ROLLBACK");
+  return busy() ? "" : database.trouble();
+}
+
 std::string AppendRun(const std::string& path, const std::map<std::string, GoldenTraces>& goldens,
                       RegressReport* report, const HistoryOptions& options) {
   std::error_code error;
-  const auto folder = std::filesystem::path(path).parent_path();
-  if (!folder.empty()) std::filesystem::create_directories(folder, error);
+  const fs::path folder = fs::path(path).parent_path();
+  if (!folder.empty()) fs::create_directories(folder, error);
   // SQLite does not wait where waiting could be a deadlock, e.g. when two programs make the file.
   std::string trouble;
   for (int attempt = 0; attempt < 50; ++attempt) {

@@ -65,7 +65,12 @@ Json CaseJson(const CaseResult& result) {
     json["not_compared"].push_back({{"what", item.what}, {"why", item.why}});
   }
   json["versions"] = result.versions;
+  json["input_files"] = Json::array();
+  for (const InputFile& input : result.input_files) {
+    json["input_files"].push_back({{"file", input.file}, {"fingerprint", input.fingerprint}});
+  }
   json["has_folder"] = result.has_folder;
+  json["has_report"] = result.has_report;
   json["cost"] = {{"wall_s", result.cost.wall_s},
                   {"cpu_s", result.cost.cpu_s},
                   {"peak_kib", result.cost.peak_kib}};
@@ -106,7 +111,11 @@ CaseResult CaseOf(const Json& json) {
     result.not_compared.push_back({item.at("what"), item.at("why")});
   }
   result.versions = json.at("versions").get<std::map<std::string, std::string>>();
+  for (const Json& input : json.value("input_files", Json::array())) {
+    result.input_files.push_back({input.at("file"), input.at("fingerprint")});
+  }
   result.has_folder = json.at("has_folder");
+  result.has_report = json.value("has_report", result.has_folder);
   result.cost.wall_s = json.at("cost").at("wall_s");
   result.cost.cpu_s = json.at("cost").at("cpu_s");
   result.cost.peak_kib = json.at("cost").at("peak_kib");
@@ -133,7 +142,8 @@ std::string ToJson(const RegressReport& report) {
   const Counts counts = CountCases(report);
   Json json = {{"schema", kSchema},
                {"run",
-                {{"id", report.run.id},
+                {{"uid", report.run.uid},
+                 {"id", report.run.id},
                  {"started_utc", report.run.started_utc},
                  {"finished_utc", report.run.finished_utc},
                  {"label", report.run.label},
@@ -172,6 +182,7 @@ std::optional<RegressReport> ReportFromJson(const std::string& text) {
     if (json.at("schema") != kSchema) return std::nullopt;
     RegressReport report;
     const Json& run = json.at("run");
+    report.run.uid = run.value("uid", "");
     report.run.id = run.at("id");
     report.run.started_utc = run.at("started_utc");
     report.run.finished_utc = run.at("finished_utc");

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/inputs.h"
 #include "core/types.h"
 #include "scenario/scenario.h"
 
@@ -61,8 +62,9 @@ struct CaseResult {
   std::string file;  ///< as found
   std::string description;
   Expectation expected;
-  std::string inputs;       ///< fingerprint of the scenario and its model
-  std::string fingerprint;  ///< of these, the program and the options that change results
+  std::vector<InputFile> input_files;  ///< what was read for the result; empty without one
+  std::string inputs;                  ///< fingerprint of these; without them of the scenario
+  std::string fingerprint;             ///< of scenario, program and the options that change results
 
   CaseStatus status = CaseStatus::kNotRun;
   std::string reason = "was not run";  ///< one sentence for people
@@ -77,6 +79,7 @@ struct CaseResult {
   std::vector<Unmeasured> not_compared;
   std::map<std::string, std::string> versions;
   bool has_folder = false;  ///< OUT/<key>/ holds a result
+  bool has_report = false;  ///< and a report.html in it
   Cost cost;
   std::string log_tail;  ///< last lines the worker printed; only of failed scenarios
   bool kept = false;     ///< taken over from the interrupted run (--resume)
@@ -96,6 +99,7 @@ struct CaseResult {
 
 /// A whole regression run.
 struct RunInfo {
+  std::string uid;                        ///< the same run everywhere, resumed or not
   long id = 0;                            ///< in the history; 0 without one
   std::string started_utc, finished_utc;  ///< "2026-01-31T02:00:00Z"
   std::string label;                      ///< free text, e.g. a commit

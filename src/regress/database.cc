@@ -4,6 +4,7 @@
 #include <sqlite3.h>
 
 #include <cmath>
+#include <filesystem>
 
 #include "core/types.h"
 
@@ -11,12 +12,44 @@ namespace mbv {
 
 void Database::Closer::operator()(sqlite3* db) const { sqlite3_close(db); }
 
+namespace {
+
+// A file name as a URI: what has a meaning there is encoded.
+std::string UriOf(const std::string& path) {
+  std::string uri = "file:";
+  for (const char c : path) {
+    uri += c == '%' || c == '?' || c == '#' ? fmt::format("%{:02X}", static_cast<unsigned>(c))
+                                            : std::string(1, c);
+  }
+  return uri;
+}
+
+}  // namespace
+
 Database::Database(const std::string& path, Mode mode, double busy_s) : path_(path) {
   const int flags = mode == Mode::kRead    ? SQLITE_OPEN_READONLY
                     : mode == Mode::kWrite ? SQLITE_OPEN_READWRITE
                                            : SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE;
+  Open(path, flags, busy_s);
+  if (mode != Mode::kRead || !ok() || CanRead()) return;
+  // A write-ahead log needs files beside the database, which a folder that cannot be written does
+  // not take; without anything in the log the database alone is whole.
+  std::error_code error;
+  const auto log = std::filesystem::file_size(path + "-wal", error);
+  if (!error && log > 0) return;
+  Open(UriOf(path) + "?immutable=1", flags | SQLITE_OPEN_URI, busy_s);
+}
+
+bool Database::CanRead() {
+  const int status =
+      sqlite3_exec(db_.get(), "SELECT COUNT(*) FROM sqlite_master", nullptr, nullptr, nullptr);
+  const int kind = status & 0xFF;
+  return kind != SQLITE_CANTOPEN && kind != SQLITE_READONLY;
+}
+
+void Database::Open(const std::string& name, int flags, double busy_s) {
   sqlite3* db = nullptr;
-  const int status = sqlite3_open_v2(path.c_str(), &db, flags, nullptr);
+  const int status = sqlite3_open_v2(name.c_str(), &db, flags, nullptr);
   db_.reset(db);
   if (status != SQLITE_OK) {
     Fail();

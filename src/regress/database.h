@@ -22,7 +22,8 @@ class Database {
  public:
   enum class Mode { kRead, kWrite, kCreate };
 
-  /// Opens; waits up to `busy_s` for other writers at each later step.
+  /// Opens; waits up to `busy_s` for other writers at each later step. kRead takes a file in a
+  /// folder that cannot be written, too, unless it has changes that were never joined with it.
   Database(const std::string& path, Mode mode, double busy_s = 60.0);
 
   [[nodiscard]] bool ok() const { return trouble_.empty(); }
@@ -35,6 +36,8 @@ class Database {
 
  private:
   friend class Statement;
+  void Open(const std::string& name, int flags, double busy_s);
+  [[nodiscard]] bool CanRead();
   void Fail();
 
   struct Closer {

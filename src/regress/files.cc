@@ -1,76 +1,49 @@
 #include "regress/files.h"
 
-#include <fcntl.h>
 #include <fmt/chrono.h>
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <cerrno>
-#include <cstring>
 #include <ctime>
-#include <fstream>
-#include <iterator>
+
+#include "core/files.h"
 
 namespace mbv {
-namespace {
 
 namespace fs = std::filesystem;
 
-bool WriteAll(int descriptor, const std::string& content) {
-  size_t done = 0;
-  while (done < content.size()) {
-    const ssize_t n = write(descriptor, content.data() + done, content.size() - done);
-    if (n < 0 && errno == EINTR) continue;
-    if (n <= 0) return false;
-    done += static_cast<size_t>(n);
+namespace {
+
+std::string Copy(const fs::path& from, const fs::path& to, const std::set<std::string>& wanted,
+                 const std::string& folder) {
+  std::error_code error;
+  for (fs::directory_iterator entry(from / folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename();
+    const std::string path = folder.empty() ? name : folder + "/" + name;
+    const fs::file_type type = entry->symlink_status(error).type();
+    std::string trouble;
+    if (type == fs::file_type::directory && !name.starts_with('.')) {
+      trouble = Copy(from, to, wanted, path);
+    } else if (type == fs::file_type::regular &&
+               (wanted.empty() ? !name.starts_with('.') : wanted.contains(path))) {
+      const auto content = ReadWholeFile(entry->path());
+      trouble = content ? WriteFile(to / path, *content, false)
+                        : fmt::format("cannot read {}", entry->path().string());
+    }
+    if (!trouble.empty()) return trouble;
   }
-  return fsync(descriptor) == 0;
+  return error ? fmt::format("cannot read {}: {}", (from / folder).string(), error.message()) : "";
 }
 
 }  // namespace
 
-std::string WriteDurably(const fs::path& path, const std::string& content) {
+std::string CopyPlainFiles(const fs::path& from, const fs::path& to,
+                           const std::set<std::string>& wanted) {
   std::error_code error;
-  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  const std::string temporary = fmt::format("{}.tmp-{}", path.string(), getpid());
-  errno = 0;
-  const int descriptor = open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-  const bool written = descriptor >= 0 && WriteAll(descriptor, content);
-  std::string reason = written ? "" : std::strerror(errno);
-  if (descriptor >= 0) close(descriptor);
-  if (reason.empty()) {
-    fs::rename(temporary, path, error);
-    if (!error) return "";
-    reason = error.message();
-  }
-  fs::remove(temporary, error);
-  return fmt::format("cannot write {}: {}", path.string(), reason);
+  fs::create_directories(to, error);
+  if (error) return fmt::format("cannot make folder {}: {}", to.string(), error.message());
+  return Copy(from, to, wanted, "");
 }
-
-std::optional<std::string> ReadWholeFile(const fs::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) return std::nullopt;
-  return std::string(std::istreambuf_iterator<char>(stream), {});
-}
-
-void Fingerprint::Mix(const char* bytes, size_t count) {
-  for (size_t i = 0; i < count; ++i) {
-    hash_ = (hash_ ^ static_cast<unsigned char>(bytes[i])) * 1099511628211ULL;
-  }
-}
-
-void Fingerprint::Add(const std::string& bytes) {
-  const std::uint64_t size = bytes.size();
-  Mix(reinterpret_cast<const char*>(&size), sizeof size);
-  Mix(bytes.data(), bytes.size());
-}
-
-void Fingerprint::AddFile(const fs::path& path) {
-  Add(path.filename().string());
-  Add(ReadWholeFile(path).value_or("(no such file)"));
-}
-
-std::string Fingerprint::Text() const { return fmt::format("{:016x}", hash_); }
 
 std::string WithoutControls(const std::string& text) {
   std::string clean;

@@ -2,54 +2,104 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <charconv>
 #include <filesystem>
 #include <map>
+#include <nlohmann/json.hpp>
 
-#include "regress/files.h"
+#include "core/files.h"
+#include "core/names.h"
+#include "regress/in_children.h"
 #include "scenario/find_model.h"
+#include "scenario/stiffness_scenario.h"
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
 
-bool NamesMechanism(const std::string& file) {
-  const std::string text = "\n" + ReadWholeFile(file).value_or("");
-  return text.find("\nmechanism:") != std::string::npos;
+constexpr double kHeadTimeout_s = 30.0;
+
+bool NamesMechanism(const std::string& text) {
+  return ("\n" + text).find("\nmechanism:") != std::string::npos;
 }
 
-std::vector<fs::path> FilesBelow(const fs::path& folder, const std::string& extension) {
-  std::vector<fs::path> files;
-  std::error_code error;
-  for (const auto& entry : fs::recursive_directory_iterator(folder, error)) {
-    if (!entry.is_regular_file(error)) continue;
-    if (extension.empty() || entry.path().extension() == extension) files.push_back(entry.path());
-  }
-  std::sort(files.begin(), files.end());
-  return files;
-}
-
-// Everything in the model's folder counts: model, URDF, meshes.
-std::string InputsOf(const std::string& file, const ScenarioHead& head) {
+// Runs in a child: what the parent has to know of a file.
+std::string HeadJson(const std::string& file) {
+  const std::string text = ReadWholeFile(file).value_or("");
+  const ScenarioHead head = ReadScenarioHead(file);
+  const std::string folder = fs::path(file).parent_path().string();
+  std::string why;
+  const auto model = FindModel(head.mechanism, folder);
+  const auto elastic = FindElasticModel(head.mechanism, folder, &why);
   Fingerprint fingerprint;
-  fingerprint.AddFile(file);
-  const auto model = FindModel(head.mechanism, fs::path(file).parent_path());
-  if (head.mechanism.empty() || !model) return fingerprint.Text();
-  for (const fs::path& path : FilesBelow(fs::path(*model).parent_path(), "")) {
-    fingerprint.AddFile(path);
-  }
-  return fingerprint.Text();
+  fingerprint.Add(fs::path(file).filename().string());
+  fingerprint.Add(text);
+  const Json json = {{"counts", head.is_scenario || NamesMechanism(text)},
+                     {"kind", head.kind},
+                     {"mechanism", head.mechanism},
+                     {"description", head.description},
+                     {"verdict", head.expect.verdict},
+                     {"exit_code", head.expect.exit_code},
+                     {"mentions", head.expect.mentions},
+                     {"inputs", fingerprint.Text()},
+                     {"models", model.value_or("") + "\n" + elastic.value_or("")}};
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-void AddFolder(const std::string& folder, std::vector<std::string>* files,
-               std::vector<std::string>* troubles) {
-  const size_t before = files->size();
-  for (const fs::path& file : FilesBelow(folder, ".yaml")) {
-    if (ReadScenarioHead(file).is_scenario || NamesMechanism(file)) files->push_back(file);
+struct Found {
+  bool counts = true;  // as a scenario
+  CaseFile file;
+};
+
+// A file that cannot be read to its end counts: its worker will say why.
+Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
+  Found found;
+  found.file.file = file;
+  const Json json = text ? Json::parse(*text, nullptr, false) : Json();
+  if (!json.is_object()) return found;
+  ScenarioHead& head = found.file.head;
+  found.counts = json.value("counts", true);
+  head.is_scenario = found.counts;
+  head.kind = json.value("kind", "");
+  head.mechanism = json.value("mechanism", "");
+  head.description = json.value("description", "");
+  head.expect.verdict = json.value("verdict", "agree");
+  head.expect.exit_code = json.value("exit_code", 0);
+  head.expect.mentions = json.value("mentions", "");
+  found.file.inputs = json.value("inputs", "");
+  found.file.models = json.value("models", "");
+  return found;
+}
+
+// Reads the heads of `files`; a folder's files count only if they are scenarios.
+void AddFiles(const std::vector<std::string>& files, bool all, std::vector<CaseFile>* cases) {
+  const auto texts =
+      InChildren(files.size(), kHeadTimeout_s, [&](size_t i) { return HeadJson(files[i]); });
+  for (size_t i = 0; i < files.size(); ++i) {
+    Found found = FoundOf(files[i], texts[i]);
+    if (all || found.counts) cases->push_back(std::move(found.file));
   }
-  if (files->size() == before) troubles->push_back(folder + ": error: no scenario in this folder");
+}
+
+void AddPath(const std::string& path, std::vector<CaseFile>* cases, FoundCases* found) {
+  std::error_code error;
+  if (fs::is_regular_file(path, error)) {
+    AddFiles({path}, true, cases);
+    return;
+  }
+  if (!fs::is_directory(path, error)) {
+    found->troubles.push_back(path + ": error: no such file or folder");
+    return;
+  }
+  const size_t before = cases->size(), unread = found->unread.size();
+  AddFiles(FilesBelow(path, ".yaml", &found->unread), false, cases);
+  if (cases->size() > before) return;
+  // Nothing was found; what could not be read may be why.
+  found->troubles.insert(found->troubles.end(), found->unread.begin() + static_cast<long>(unread),
+                         found->unread.end());
+  found->troubles.push_back(path + ": error: no scenario in this folder");
 }
 
 }  // namespace
@@ -72,36 +122,25 @@ std::string CaseKey(const std::string& file) {
       if (part != ".." && part != "/") below /= part;
     }
   }
-  return (below / absolute.stem()).generic_string();
+  return NearestPlainPath((below / absolute.stem()).generic_string());
 }
 
 FoundCases FindCases(const std::vector<std::string>& paths) {
   FoundCases found;
-  std::vector<std::string> files;
-  for (const std::string& path : paths) {
+  std::vector<CaseFile> cases;
+  for (const std::string& path : paths) AddPath(path, &cases, &found);
+  std::map<std::string, CaseFile> by_key;
+  for (CaseFile& file : cases) {
+    file.key = CaseKey(file.file);
+    const std::string name = file.file;
     std::error_code error;
-    if (fs::is_directory(path, error)) {
-      AddFolder(path, &files, &found.troubles);
-    } else if (fs::is_regular_file(path, error)) {
-      files.push_back(path);
-    } else {
-      found.troubles.push_back(path + ": error: no such file or folder");
+    const auto [other, is_new] = by_key.emplace(file.key, file);
+    if (!is_new && !fs::equivalent(other->second.file, name, error)) {
+      found.troubles.push_back(fmt::format("{}: error: {} would use the same name '{}'", name,
+                                           other->second.file, file.key));
     }
   }
-  std::map<std::string, std::string> file_of;  // by key
-  for (const std::string& file : files) {
-    const std::string key = CaseKey(file);
-    std::error_code error;
-    const auto [other, is_new] = file_of.emplace(key, file);
-    if (!is_new && !fs::equivalent(other->second, file, error)) {
-      found.troubles.push_back(
-          fmt::format("{}: error: {} would use the same name '{}'", file, other->second, key));
-    }
-  }
-  for (const auto& [key, file] : file_of) {
-    const ScenarioHead head = ReadScenarioHead(file);
-    found.cases.push_back({key, file, InputsOf(file, head), head});
-  }
+  for (auto& [key, file] : by_key) found.cases.push_back(std::move(file));
   return found;
 }
 

@@ -20,11 +20,16 @@ struct HistoryOptions {
   int golden_runs = 50;  ///< runs whose golden traces are kept
 };
 
-/// Judges a run against the history and appends it: fills the report's run id, drifts and courses.
-/// `goldens` by scenario key. "" or what went wrong; then nothing was appended.
+/// Judges a run against the history and appends it; an entry of the same uid is replaced. Fills the
+/// report's run id, drifts and courses. `goldens` by scenario key. "" or what went wrong; then
+/// nothing was appended.
 [[nodiscard]] std::string AppendRun(const std::string& path,
                                     const std::map<std::string, GoldenTraces>& goldens,
                                     RegressReport* report, const HistoryOptions& options = {});
+
+/// Whether AppendRun() could append: "" or why not. Changes nothing; a file that is not there yet
+/// is fine if it can be made.
+[[nodiscard]] std::string CheckHistory(const std::string& path);
 
 /// Text and what went wrong with it.
 struct HistoryText {

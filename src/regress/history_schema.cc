@@ -9,7 +9,7 @@ namespace {
 
 constexpr const char* kTables = R"sql(
 CREATE TABLE IF NOT EXISTS run(
-  id INTEGER PRIMARY KEY AUTOINCREMENT,
+  id INTEGER PRIMARY KEY AUTOINCREMENT, uid TEXT,
   started_utc TEXT NOT NULL, finished_utc TEXT NOT NULL, wall_s REAL, jobs INTEGER,
   label TEXT NOT NULL, host TEXT NOT NULL, program TEXT NOT NULL, shard TEXT NOT NULL,
   exit_code INTEGER NOT NULL, total INTEGER NOT NULL, as_expected INTEGER NOT NULL,
@@ -54,21 +54,37 @@ long Version(Database* database) {
   return statement.Step() ? statement.Integer(0) : 0;
 }
 
+bool HasTables(Database* database) {
+  Statement statement(database, "SELECT COUNT(*) FROM sqlite_master");
+  return statement.Step() && statement.Integer(0) > 0;
+}
+
 }  // namespace
 
 std::string CheckSchema(const std::string& path, Database* database) {
   const long version = Version(database);
   if (!database->ok()) return database->trouble();
-  if (version == kHistoryVersion) return "";
+  if (version == kHistoryVersion || version == 1) return "";
   return version == 0 ? fmt::format("history {}: holds no runs", path)
                       : fmt::format("history {}: has schema {}, this program knows {}", path,
                                     version, kHistoryVersion);
 }
 
-std::string PrepareSchema(const std::string& path, Database* database) {
+std::string CheckWritable(const std::string& path, Database* database) {
   const long version = Version(database);
   if (database->ok() && version != 0) return CheckSchema(path, database);
+  if (database->ok() && HasTables(database)) {
+    return fmt::format("history {}: is another program's database", path);
+  }
+  return database->trouble();
+}
+
+std::string PrepareSchema(const std::string& path, Database* database) {
+  const long version = Version(database);
+  if (std::string trouble = CheckWritable(path, database); !trouble.empty()) return trouble;
   database->Run(kTables);
+  if (version == 1) database->Run("ALTER TABLE run ADD COLUMN uid TEXT");
+  database->Run("CREATE UNIQUE INDEX IF NOT EXISTS run_uid ON run(uid)");
   database->Run(fmt::format("PRAGMA user_version = {}", kHistoryVersion));
   return database->trouble();
 }

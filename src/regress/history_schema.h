@@ -8,11 +8,15 @@
 
 namespace mbv {
 
-inline constexpr int kHistoryVersion = 1;  ///< PRAGMA user_version
+inline constexpr int kHistoryVersion = 2;  ///< PRAGMA user_version; 1 had no uid of runs
 
-/// Makes the tables where they are missing; a newer program's file is trouble. Call inside a write
+/// Makes the tables where they are missing, or what an older file lacks; a newer program's file and
+/// a file with other tables are trouble. Call inside a write
 /// transaction. "" or what went wrong.
 [[nodiscard]] std::string PrepareSchema(const std::string& path, Database* database);
+
+/// Whether PrepareSchema() would take the file; changes nothing.
+[[nodiscard]] std::string CheckWritable(const std::string& path, Database* database);
 
 /// The same check for readers, which change nothing.
 [[nodiscard]] std::string CheckSchema(const std::string& path, Database* database);

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/markup.h"
+#include "core/sha256.h"
 #include "regress/summaries.h"
 
 namespace mbv {
@@ -125,14 +127,10 @@ std::string Notes(const CaseResult& result) {
 }
 
 std::string Links(const CaseResult& result) {
-  const std::string key = EscapeXml(result.key);
+  const std::string key = EncodeLink(result.key);
   std::string text;
-  if (result.has_folder) {
-    text += fmt::format(
-        "<a href=\"{0}/report.html\">report</a> <a href=\"{0}/summary.json\">"
-        "numbers</a> ",
-        key);
-  }
+  if (result.has_report) text += fmt::format("<a href=\"{}/report.html\">report</a> ", key);
+  if (result.has_folder) text += fmt::format("<a href=\"{}/summary.json\">numbers</a> ", key);
   return text + fmt::format("<a href=\"logs/{}.txt\">log</a>", key);
 }
 
@@ -143,7 +141,7 @@ std::string Row(const CaseResult& result, const std::string& thumbnail) {
                                   : fmt::format(
                                         "<img src=\"{}\" alt=\"Mechanism at the first snapshot\" "
                                         "loading=\"lazy\">",
-                                        thumbnail);
+                                        EscapeXml(thumbnail));
   std::string row = fmt::format("<tr data-kind=\"{}\"><td>{}</td>", KindOf(result), picture);
   row += fmt::format("<th scope=\"row\">{}<br><span class=\"soft\">{}</span><br>{}</th>",
                      EscapeXml(result.key), EscapeXml(result.description), Links(result));
@@ -174,8 +172,8 @@ std::string Head(const RegressReport& report) {
   text += fmt::format("<p class=\"soft\">{}{}{}{}, started {}, {:.1f} s with {} worker{}</p>\n",
                       run.id == 0 ? "" : fmt::format("run {}, ", run.id),
                       run.label.empty() ? "" : EscapeXml(run.label) + ", ", EscapeXml(run.program),
-                      run.shard.empty() ? "" : ", shard " + EscapeXml(run.shard), run.started_utc,
-                      run.wall_s, run.jobs, run.jobs == 1 ? "" : "s");
+                      run.shard.empty() ? "" : ", shard " + EscapeXml(run.shard),
+                      EscapeXml(run.started_utc), run.wall_s, run.jobs, run.jobs == 1 ? "" : "s");
   for (const std::string& note : report.notes) {
     text += "<p class=\"warn\">" + EscapeXml(note) + "</p>\n";
   }
@@ -204,8 +202,10 @@ std::string ToIndexHtml(const RegressReport& report,
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
+      "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
+      "style-src {}; script-src {}\">"
       "<title>mbverify regression {}</title><style>{}</style></head><body>\n<main>\n",
-      EscapeXml(report.run.started_utc), kStyle);
+      CspHash(kStyle), CspHash(kScript), EscapeXml(report.run.started_utc), kStyle);
   html += Head(report) + kControls;
   for (const CaseResult& result : report.cases) {
     const auto thumbnail = thumbnails.find(result.key);

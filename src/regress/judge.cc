@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include <cstring>
+#include <filesystem>
 #include <nlohmann/json.hpp>
 
+#include "core/files.h"
 #include "regress/files.h"
 
 namespace mbv {
@@ -34,11 +36,9 @@ struct SummaryText {
   std::string culprits;  ///< failed checks and where witnesses broke down, one per line
 };
 
-// What summary.json says; nothing if it is not one.
-SummaryText ReadSummary(const std::string& text, CaseResult* result) {
+// What a summary.json says; throws where it is none of ours.
+SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
   SummaryText words;
-  const Json json = Json::parse(text, nullptr, false);
-  if (!json.is_object()) return words;
   words.reason = Word(json, "reason");
   if (const std::string verdict = Word(json, "verdict"); !verdict.empty()) {
     result->verdict = verdict;
@@ -67,6 +67,17 @@ SummaryText ReadSummary(const std::string& text, CaseResult* result) {
     if (version.is_string()) result->versions[name] = version;
   }
   return words;
+}
+
+// The same from text; nothing if it is no summary.
+SummaryText ReadSummary(const std::string& text, CaseResult* result) {
+  const Json json = Json::parse(text, nullptr, false);
+  if (!json.is_object()) return {};
+  try {
+    return ReadSummaryJson(json, result);
+  } catch (const Json::exception&) {
+    return {};
+  }
 }
 
 // The line that tells what went wrong: the last one with "error:", else the last one.
@@ -161,6 +172,19 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
   }
   if (result.failed()) result.log_tail = LastLines(output, kTailLines);
   return result;
+}
+
+void AddInputs(const std::string& inputs, CaseResult* result) {
+  const Json json = Json::parse(inputs, nullptr, false);
+  if (!json.is_object()) return;
+  Fingerprint fingerprint;
+  for (const Json& input : Part(json, "inputs")) {
+    if (!input.is_object()) continue;
+    result->input_files.push_back({Word(input, "file"), Word(input, "fingerprint")});
+    fingerprint.Add(std::filesystem::path(result->input_files.back().file).filename().string());
+    fingerprint.Add(result->input_files.back().fingerprint);
+  }
+  if (!result->input_files.empty()) result->inputs = fingerprint.Text();
 }
 
 }  // namespace mbv

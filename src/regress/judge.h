@@ -16,4 +16,7 @@ namespace mbv {
                                    const std::string& output,
                                    const std::optional<std::string>& summary);
 
+/// Puts what a worker's inputs.json says into its result.
+void AddInputs(const std::string& inputs, CaseResult* result);
+
 }  // namespace mbv

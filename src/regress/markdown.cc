@@ -17,6 +17,41 @@ std::string Plain(const std::string& text) {
   return plain;
 }
 
+// Job pages take 1 MiB in all (GitHub's limit of a step's summary): every part has its share.
+constexpr size_t kFailedBytes = 450'000, kDriftBytes = 150'000, kNoteBytes = 30'000,
+                 kGapBytes = 100'000, kTableBytes = 250'000;
+constexpr size_t kLineBytes = 2'000;
+
+// Lines up to a number of bytes; then how many are left out.
+class Lines {
+ public:
+  Lines(size_t most, std::string rest) : most_(most), rest_(std::move(rest)) {}
+
+  void Add(std::string line) {
+    if (line.size() > kLineBytes) {
+      size_t end = kLineBytes;
+      while ((static_cast<unsigned char>(line[end]) & 0xC0) == 0x80) --end;  // whole characters
+      line = line.substr(0, end) + " …\n";
+    }
+    if (left_out_ > 0 || text_.size() + line.size() > most_) {
+      ++left_out_;
+    } else {
+      text_ += line;
+    }
+  }
+
+  [[nodiscard]] std::string Text() const {
+    if (left_out_ == 0) return text_;
+    return text_ + fmt::format(fmt::runtime(rest_), left_out_);
+  }
+
+ private:
+  size_t most_, left_out_ = 0;
+  std::string rest_, text_;
+};
+
+constexpr const char* kMore = "* … and {} more: see index.html\n";
+
 std::string Row(const CaseResult& result) {
   return fmt::format("| {} | {}{} | {} | {:.1f} | {:.1f} | {:.0f} |\n", Plain(result.key),
                      result.failed()         ? "❌ "
@@ -27,34 +62,37 @@ std::string Row(const CaseResult& result) {
 }
 
 std::string Failed(const RegressReport& report) {
-  std::string text;
+  Lines lines(kFailedBytes, kMore);
   for (const CaseResult& result : report.cases) {
     if (!result.failed()) continue;
-    text += fmt::format("* **{}**: {}: {}\n", Plain(result.key), Plain(WordOf(result)),
-                        Plain(result.reason));
+    lines.Add(fmt::format("* **{}**: {}: {}\n", Plain(result.key), Plain(WordOf(result)),
+                          Plain(result.reason)));
   }
+  const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Not as expected\n\n" + text;
 }
 
 std::string Drifted(const RegressReport& report) {
-  std::string text;
+  Lines lines(kDriftBytes, kMore);
   for (const CaseResult& result : report.cases) {
     for (const Drift& drift : result.drifts) {
-      text += fmt::format("* **{}**: {}", Plain(result.key), Plain(drift.text));
-      if (!drift.since.empty()) text += fmt::format("; since {}", Plain(drift.since));
-      text += "\n";
+      const std::string since = drift.since.empty() ? "" : "; since " + Plain(drift.since);
+      lines.Add(fmt::format("* **{}**: {}{}\n", Plain(result.key), Plain(drift.text), since));
     }
   }
+  const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Drift\n\n" + text;
 }
 
 std::string NotCompared(const RegressReport& report) {
-  std::string text;
+  Lines lines(kGapBytes, kMore);
   for (const CaseResult& result : report.cases) {
     if (result.compared || result.not_compared.empty()) continue;
     const Unmeasured& first = result.not_compared.front();
-    text += fmt::format("* {}: {}: {}\n", Plain(result.key), Plain(first.what), Plain(first.why));
+    lines.Add(
+        fmt::format("* {}: {}: {}\n", Plain(result.key), Plain(first.what), Plain(first.why)));
   }
+  const std::string text = lines.Text();
   if (text.empty()) return "";
   return "\n<details><summary>Not compared, and why</summary>\n\n" + text + "\n</details>\n";
 }
@@ -73,15 +111,17 @@ std::string ToMarkdown(const RegressReport& report) {
       report.run.shard.empty() ? "" : ", shard " + report.run.shard,
       report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
   text += Failed(report) + Drifted(report);
-  for (const std::string& note : report.notes) text += "\nNote: " + Plain(note) + "\n";
-  text += NotCompared(report);
+  Lines notes(kNoteBytes, "\nNote: and {} more\n");
+  for (const std::string& note : report.notes) notes.Add("\nNote: " + Plain(note) + "\n");
+  text += notes.Text() + NotCompared(report);
   text +=
       "\n<details><summary>All scenarios</summary>\n\n"
       "| scenario | result | drive force error, RMS (or stiffness) | wall [s] | CPU [s] | memory "
       "[MiB] |\n"
       "|---|---|---|---:|---:|---:|\n";
-  for (const CaseResult& result : report.cases) text += Row(result);
-  return text + "\n</details>\n";
+  Lines rows(kTableBytes, "| … and {} more: see index.html | | | | | |\n");
+  for (const CaseResult& result : report.cases) rows.Add(Row(result));
+  return text + rows.Text() + "\n</details>\n";
 }
 
 }  // namespace mbv

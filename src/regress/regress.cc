@@ -8,12 +8,11 @@
 #include <filesystem>
 #include <map>
 
-#include "regress/accuracy.h"
+#include "core/files.h"
 #include "regress/files.h"
+#include "regress/finish.h"
 #include "regress/history.h"
 #include "regress/judge.h"
-#include "regress/run_folder.h"
-#include "regress/summaries.h"
 #include "regress/workers.h"
 
 namespace mbv {
@@ -32,49 +31,6 @@ std::string ProgramText(const RegressOptions& options) {
   fingerprint.AddFile(options.worker.front());
   return fmt::format("{} build {}", options.program.empty() ? "mbverify" : options.program,
                      fingerprint.Text().substr(0, 8));
-}
-
-// Everything after the scenarios ran: history, summaries, files.
-void Finish(const RegressOptions& options, const RunFolder& folder, RegressOutcome* outcome) {
-  RegressReport& report = outcome->report;
-  std::sort(report.cases.begin(), report.cases.end(),
-            [](const CaseResult& a, const CaseResult& b) { return a.key < b.key; });
-  std::map<std::string, std::string> thumbnails;
-  std::map<std::string, GoldenTraces> goldens;
-  for (const CaseResult& result : report.cases) {
-    if (!result.has_folder) continue;
-    if (options.pictures) thumbnails[result.key] = folder.Thumbnail(result.key);
-    if (!options.history.empty()) goldens[result.key] = folder.Golden(result.key);
-  }
-  if (!options.history.empty()) {
-    const std::string trouble = AppendRun(options.history, goldens, &report);
-    if (!trouble.empty()) report.notes.push_back("not in the history: " + trouble);
-  }
-  const auto write = [&](const fs::path& path, const std::string& content) {
-    const std::string trouble = WriteDurably(path, content);
-    if (trouble.empty()) {
-      outcome->files.push_back(path);
-    } else {
-      outcome->trouble = trouble;
-    }
-  };
-  write(options.junit.empty() ? folder.path() / "junit.xml" : fs::path(options.junit),
-        ToJUnit(report));
-  write(options.markdown.empty() ? folder.path() / "summary.md" : fs::path(options.markdown),
-        ToMarkdown(report));
-  const auto summary = [&](const std::string& scenario) {
-    return ReadWholeFile(folder.path() / scenario / "summary.json");
-  };
-  for (const std::string& document : options.tables) {
-    if (const auto text = ReadWholeFile(document)) {
-      write(document, FillAccuracyTables(*text, summary));
-    } else {
-      outcome->trouble = document + ": cannot be read";
-    }
-  }
-  write(folder.path() / "index.html", ToIndexHtml(report, thumbnails));
-  write(folder.path() / "regress.json", ToJson(report));
-  outcome->exit_code = outcome->trouble.empty() ? ExitCodeOf(report) : 2;
 }
 
 class Run {
@@ -100,7 +56,9 @@ class Run {
       outcome_.exit_code = 3;
       return std::move(outcome_);
     }
-    Finish(options_, folder_, &outcome_);
+    for (const std::string& unread : unread_) AddTrouble(unread, &outcome_);
+    for (const std::string& trouble : unpublished_) AddTrouble(trouble, &outcome_);
+    FinishNight(options_, folder_, &outcome_);
     // A finished run is not resumed: the next --resume starts anew.
     if (outcome_.trouble.empty()) folder_.ForgetStates();
     return std::move(outcome_);
@@ -116,13 +74,15 @@ class Run {
 
   bool Prepare() {
     FoundCases found = FindCases(options_.paths);
-    for (const std::string& trouble : found.troubles) {
-      outcome_.trouble += (outcome_.trouble.empty() ? "" : "\n") + trouble;
-    }
+    for (const std::string& trouble : found.troubles) AddTrouble(trouble, &outcome_);
     if (!found.troubles.empty()) return false;
     cases_ = std::move(found.cases);
+    unread_ = std::move(found.unread);
     KeepShard(options_.shard, &cases_);
-    outcome_.trouble = folder_.Open();
+    outcome_.trouble = FindClash(options_, cases_);
+    if (outcome_.trouble.empty()) outcome_.trouble = folder_.Open();
+    if (outcome_.trouble.empty()) outcome_.trouble = CheckHistory(options_.history);
+    if (outcome_.trouble.empty()) outcome_.trouble = Claim();
     if (!outcome_.trouble.empty()) return false;
     report().run.label = options_.label;
     report().run.host = HostName();
@@ -134,27 +94,47 @@ class Run {
     return true;
   }
 
-  // Inputs, program and options decide a result.
+  std::string Claim() {
+    std::vector<std::string> keys;
+    for (const CaseFile& file : cases_) keys.push_back(file.key);
+    return folder_.Claim(NightFiles(options_, keys));
+  }
+
+  // Scenario, program and options decide a result; and what else was read, see SameInputs().
   std::string FingerprintOf(const CaseFile& file) {
     Fingerprint fingerprint;
     fingerprint.Add(file.inputs);
+    fingerprint.Add(file.models);
     fingerprint.Add(report().run.program);
     fingerprint.Add(options_.pictures ? "pictures" : "no pictures");
+    for (const std::string& word : options_.worker_options) fingerprint.Add(word);
     return fingerprint.Text();
+  }
+
+  // Every file that was read for the result is as it was. Without a result nothing is known.
+  bool SameInputs(const CaseResult& state) {
+    for (const InputFile& input : state.input_files) {
+      auto [known, is_new] = fingerprints_.try_emplace(input.file);
+      if (is_new) {
+        const auto content = ReadWholeFile(input.file);
+        known->second = content ? ContentFingerprint(*content) : "";
+      }
+      if (known->second != input.fingerprint) return false;
+    }
+    return !state.input_files.empty();
   }
 
   // --resume: results of the interrupted run whose inputs are the same. What crashed or hung is
   // tried again.
   void KeepFinished() {
-    if (!options_.resume) {
-      folder_.ForgetStates();
-      return;
-    }
+    if (!options_.resume) folder_.ForgetStates();
+    report().run.uid = folder_.RunId();
+    if (!options_.resume) return;
     std::vector<CaseFile> rest;
     for (CaseFile& file : cases_) {
       auto state = folder_.LoadState(file.key);
       const bool usable =
-          state && state->fingerprint == FingerprintOf(file) &&
+          state && state->fingerprint == FingerprintOf(file) && SameInputs(*state) &&
           state->status != CaseStatus::kCrashed && state->status != CaseStatus::kTimedOut &&
           state->status != CaseStatus::kInternal &&
           (!state->has_folder || fs::exists(folder_.Result(file.key) / "summary.json"));
@@ -184,12 +164,13 @@ class Run {
   bool RunWorkers() {
     std::vector<WorkerJob> jobs;
     for (size_t i = 0; i < cases_.size(); ++i) {
-      WorkerJob job{options_.worker, folder_.Log(cases_[i].key)};
+      WorkerJob job{options_.worker, folder_.StagedLog(i)};
       for (const std::string& word : {std::string("run"), cases_[i].file, std::string("--out"),
                                       folder_.Staging(i).string()}) {
         job.argv.push_back(word);
       }
       if (!options_.pictures) job.argv.emplace_back("--no-pictures");
+      for (const std::string& word : WorkerOptions(cases_[i].key)) job.argv.push_back(word);
       jobs.push_back(std::move(job));
     }
     WorkerPool pool;
@@ -204,17 +185,35 @@ class Run {
     return pool.Run(jobs);
   }
 
+  // "{up}" stands for the way from the result's folder to --out.
+  std::vector<std::string> WorkerOptions(const std::string& key) const {
+    std::string up = "..";
+    for (const char c : key) up += c == '/' ? "/.." : "";
+    std::vector<std::string> words = options_.worker_options;
+    for (std::string& word : words) {
+      const size_t at = word.find("{up}");
+      if (at != std::string::npos) word.replace(at, 4, up);
+    }
+    return words;
+  }
+
   void Collect(size_t i, const WorkerEnd& end) {
     const CaseFile& file = cases_[i];
-    const std::string output = ReadWholeFile(folder_.Log(file.key)).value_or("");
+    const std::string output = ReadWholeFile(folder_.StagedLog(i)).value_or("");
     const auto staged = folder_.FindStaged(i);
     const auto summary = staged ? ReadWholeFile(*staged / "summary.json") : std::nullopt;
     CaseResult result = JudgeCase(file, end, options_.timeout_s, output, summary);
     result.fingerprint = FingerprintOf(file);
     if (staged) {
+      AddInputs(ReadWholeFile(*staged / "inputs.json").value_or(""), &result);
+      result.has_report = fs::exists(*staged / "report.html");
       const std::string trouble = folder_.Publish(*staged, file.key);
       result.has_folder = trouble.empty();
-      if (!trouble.empty()) report().notes.push_back(trouble);
+      if (!trouble.empty()) unpublished_.push_back(trouble);
+    }
+    if (const std::string trouble = folder_.Write(RunFolder::Log(file.key), output);
+        !trouble.empty()) {
+      unpublished_.push_back(trouble);
     }
     folder_.RemoveStaging(i);
     if (const std::string trouble = folder_.SaveState(result); !trouble.empty()) {
@@ -228,74 +227,23 @@ class Run {
   const RegressOptions& options_;
   const RegressProgress& progress_;
   RunFolder folder_;
-  std::vector<CaseFile> cases_;  ///< still to run
+  std::vector<CaseFile> cases_;           ///< still to run
+  std::vector<std::string> unread_;       ///< folders that may hold more scenarios
+  std::vector<std::string> unpublished_;  ///< results that could not be put in their place
+  std::map<std::string, std::string> fingerprints_;  ///< of input files, by name
   size_t done_ = 0;
   RegressOutcome outcome_;
 };
 
-// Adds one run's cases; "" or what is wrong with it.
-std::string Join(const fs::path& from, const RunFolder& folder, RegressReport* report) {
-  const auto text = ReadWholeFile(from / "regress.json");
-  if (!text) return fmt::format("{}: no regress.json in this folder", from.string());
-  auto part = ReportFromJson(*text);
-  if (!part) return fmt::format("{}: is no regress.json of this version", from.string());
-  RunInfo& run = report->run;
-  const bool first = report->cases.empty() && run.started_utc.empty();
-  if (first) {
-    run = part->run;
-    run.id = 0;
-    run.shard.clear();
-  } else {
-    run.started_utc = std::min(run.started_utc, part->run.started_utc);
-    run.finished_utc = std::max(run.finished_utc, part->run.finished_utc);
-    run.wall_s = std::max(run.wall_s, part->run.wall_s);  // shards run side by side
-    run.jobs += part->run.jobs;
-    if (part->run.program != run.program) {
-      report->notes.push_back(fmt::format("{} was made by {}", from.string(), part->run.program));
-    }
-  }
-  for (const std::string& note : part->notes) report->notes.push_back(note);
-  for (CaseResult& result : part->cases) {
-    const auto same = [&](const CaseResult& other) { return other.key == result.key; };
-    if (std::any_of(report->cases.begin(), report->cases.end(), same)) {
-      return fmt::format("{}: {} is in another folder, too", from.string(), result.key);
-    }
-    std::error_code error;
-    if (result.has_folder) {
-      fs::create_directories(folder.Result(result.key), error);
-      fs::copy(from / result.key, folder.Result(result.key),
-               fs::copy_options::recursive | fs::copy_options::overwrite_existing, error);
-      if (error) return fmt::format("cannot copy {}: {}", result.key, error.message());
-    }
-    const fs::path log = folder.Log(result.key);
-    fs::create_directories(log.parent_path(), error);
-    fs::copy_file(from / "logs" / (result.key + ".txt"), log, fs::copy_options::overwrite_existing,
-                  error);
-    result.drifts.clear();  // judged anew against the history given
-    result.course.clear();
-    report->cases.push_back(std::move(result));
-  }
-  return "";
-}
-
 }  // namespace
+
+bool IsSharedScript(const std::string& name) {
+  return name.starts_with("report-") && name.ends_with(".js") && name.size() == 26 &&
+         name.find_first_not_of("0123456789abcdef", 7) == 23;
+}
 
 RegressOutcome Regress(const RegressOptions& options, const RegressProgress& progress) {
   return Run(options, progress).Do();
-}
-
-RegressOutcome MergeRuns(const std::vector<std::string>& folders, const RegressOptions& options) {
-  RegressOutcome outcome;
-  outcome.exit_code = 2;
-  RunFolder folder(options.out);
-  outcome.trouble = folder.Open();
-  for (const std::string& from : folders) {
-    if (outcome.trouble.empty()) outcome.trouble = Join(from, folder, &outcome.report);
-  }
-  if (!outcome.trouble.empty()) return outcome;
-  if (!options.label.empty()) outcome.report.run.label = options.label;
-  Finish(options, folder, &outcome);
-  return outcome;
 }
 
 }  // namespace mbv

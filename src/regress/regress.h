@@ -1,11 +1,13 @@
 // The nightly regression: all scenarios in worker processes, judged, summarised, remembered.
 //
 // OUT/ holds: <key>/ result folders, logs/<key>.txt, regress.json, junit.xml, summary.md,
-// index.html, history.sqlite, and .state/ for --resume.
+// index.html, history.sqlite, scripts that reports share, and .mbverify/ with the list of these and
+// the states for --resume. Nothing else in OUT is touched.
 #pragma once
 
 #include <csignal>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -28,8 +30,11 @@ struct RegressOptions {
   bool pictures = true;
   int jobs = 1;              ///< worker processes at once, >= 1
   double timeout_s = 300.0;  ///< of one scenario, > 0
-  /// Program and arguments; "run FILE --out DIR" is added.
+  /// Program and arguments; "run FILE --out DIR" is added, and the options.
   std::vector<std::string> worker = {"/proc/self/exe"};
+  /// "{up}" in them is the way from a result's folder to OUT.
+  std::vector<std::string> worker_options;
+  std::map<std::string, std::string> shared_files;   ///< further files in OUT: content by name
   const volatile std::sig_atomic_t* stop = nullptr;  ///< not 0: stop the workers and return
 };
 
@@ -51,6 +56,9 @@ struct RegressOutcome {
 /// Runs and writes everything. Never throws for what scenarios or workers do.
 [[nodiscard]] RegressOutcome Regress(const RegressOptions& options,
                                      const RegressProgress& progress);
+
+/// Names of scripts that reports share: "report-0123456789abcdef.js".
+[[nodiscard]] bool IsSharedScript(const std::string& name);
 
 /// Joins the folders of shards (or of any runs of different scenarios) into one: result folders are
 /// copied, and all summaries are written as if one run had done it.

@@ -1,9 +1,9 @@
-// The folder of a regression run: its files, its state for --resume, its lock.
+// The folder of a regression run: results, summaries, and .mbverify/ for everything else.
 #pragma once
 
 #include <filesystem>
-#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -24,28 +24,42 @@ class RunFolder {
 
   [[nodiscard]] const std::filesystem::path& path() const { return out_; }
   [[nodiscard]] std::filesystem::path Result(const std::string& key) const { return out_ / key; }
-  [[nodiscard]] std::filesystem::path Log(const std::string& key) const;
-  /// Where a worker writes, until its result is moved to its place.
+  /// Where a worker writes, until its result is moved to its place; and what it prints.
   [[nodiscard]] std::filesystem::path Staging(size_t job) const;
+  [[nodiscard]] std::filesystem::path StagedLog(size_t job) const;
 
   /// The folder with a summary.json below Staging(job); empty if there is none.
   [[nodiscard]] std::optional<std::filesystem::path> FindStaged(size_t job) const;
-  /// Puts a staged folder in its place, replacing an older one. "" or what went wrong.
+  /// Puts a staged folder in its place whole, replacing an older result. "" or what went wrong.
   [[nodiscard]] std::string Publish(const std::filesystem::path& staged,
                                     const std::string& key) const;
   void RemoveStaging(size_t job) const;
 
+  /// Name of a scenario's log, relative to the folder.
+  [[nodiscard]] static std::string Log(const std::string& key) { return "logs/" + key + ".txt"; }
+  /// Files of the night itself (relative names). Claim() is called with all of them before anything
+  /// is written: "" or which of them are there already and are not ours.
+  [[nodiscard]] std::string Claim(const std::vector<std::string>& names);
+  /// "" or what went wrong; only claimed files are written.
+  [[nodiscard]] std::string Write(const std::string& name, const std::string& content) const;
+
+  /// Identifies the run: kept with the states, so that a resumed run is the same run.
+  [[nodiscard]] std::string RunId();
   // State of single scenarios, whole or not at all.
   [[nodiscard]] std::string SaveState(const CaseResult& result) const;
   [[nodiscard]] std::optional<CaseResult> LoadState(const std::string& key) const;
   void ForgetStates() const;
 
   [[nodiscard]] GoldenTraces Golden(const std::string& key) const;
-  /// Data URI of the first snapshot; "" if there is none.
-  [[nodiscard]] std::string Thumbnail(const std::string& key) const;
+  /// The first snapshot; empty if there is none.
+  [[nodiscard]] std::optional<std::filesystem::path> Snapshot(const std::string& key) const;
 
  private:
+  [[nodiscard]] std::filesystem::path Own() const;
+  [[nodiscard]] std::filesystem::path StateFile(const std::string& key) const;
+
   std::filesystem::path out_;
+  std::set<std::string> claimed_;  ///< the night's own files
   int lock_ = -1;
 };
 

@@ -5,10 +5,13 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/markup.h"
 #include "regress/summaries.h"
 
 namespace mbv {
 namespace {
+
+constexpr std::uint64_t kMostPixels = 1ULL << 26;  // 8192 × 8192, the largest that is drawn
 
 struct Image {
   unsigned width = 0, height = 0;
@@ -19,6 +22,10 @@ bool Decode(const std::string& png, Image* image) {
   png_image reader{};
   reader.version = PNG_IMAGE_VERSION;
   if (png_image_begin_read_from_memory(&reader, png.data(), png.size()) == 0) return false;
+  if (std::uint64_t{reader.width} * reader.height > kMostPixels) {
+    png_image_free(&reader);
+    return false;
+  }
   reader.format = PNG_FORMAT_RGB;
   image->width = reader.width;
   image->height = reader.height;
@@ -66,29 +73,13 @@ std::string EncodeImage(const Image& image) {
   return png;
 }
 
-std::string Base64(const std::string& bytes) {
-  static constexpr char kDigits[] =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    unsigned group = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      group = (group << 8) | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    }
-    for (size_t k = 0; k < 4; ++k) {
-      text += i + k > bytes.size() ? '=' : kDigits[(group >> (18 - 6 * k)) & 63];
-    }
-  }
-  return text;
-}
-
 }  // namespace
 
 std::string ThumbnailUri(const std::string& png, int width_px) {
   Image image;
   if (width_px < 1 || !Decode(png, &image)) return "";
   const std::string small = EncodeImage(Shrink(image, static_cast<unsigned>(width_px)));
-  return small.empty() ? "" : "data:image/png;base64," + Base64(small);
+  return small.empty() ? "" : "data:image/png;base64," + EncodeBase64(small);
 }
 
 }  // namespace mbv

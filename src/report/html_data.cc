@@ -5,6 +5,7 @@
 #include <set>
 
 #include "comparison/metrics.h"
+#include "core/markup.h"
 #include "report/html_replay.h"
 #include "report/html_report.h"
 #include "report/html_text.h"
@@ -107,12 +108,7 @@ class DataWriter {
       json["pairs"] = Pairs();
     }
     json["replay"] = ReplayJson(input_);
-    std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-    // "</script" in a name would end the element.
-    for (size_t at = 0; (at = text.find("</", at)) != std::string::npos; at += 3) {
-      text.replace(at, 2, "<\\/");
-    }
-    return text;
+    return EscapeScript(json.dump(-1, ' ', false, Json::error_handler_t::replace));
   }
 
  private:

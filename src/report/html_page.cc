@@ -5,6 +5,9 @@
 #include <cctype>
 #include <cmath>
 
+#include "core/inputs.h"
+#include "core/markup.h"
+#include "core/sha256.h"
 #include "report/html_assets.h"
 #include "report/html_plots.h"
 #include "report/html_report.h"
@@ -184,9 +187,9 @@ class PageWriter {
     for (const HtmlPicture& picture : input_.pictures) {
       const std::string name = Escape(picture.name);
       html += fmt::format(
-          "<a href=\"snapshots/{0}\"><img loading=\"lazy\" alt=\"The mechanism in the simulation, "
+          "<a href=\"snapshots/{2}\"><img loading=\"lazy\" alt=\"The mechanism in the simulation, "
           "{0}\" src=\"data:image/png;base64,{1}\"></a>\n",
-          name, Base64(std::string_view(picture.png)));
+          name, Base64(std::string_view(picture.png)), EncodeLink(picture.name));
     }
     if (html.empty()) return;
     Add("Snapshots", "Snapshots",
@@ -195,12 +198,27 @@ class PageWriter {
             "this page.</p>\n");
   }
 
-  // The policy forbids every request: what is shown is in this file.
+  // Only our own script runs: the one in the page by its hash, a shared one by its origin.
+  [[nodiscard]] std::string ScriptSource() const {
+    static const std::string hash = CspHash(PageScript());
+    return input_.script_link.empty() ? hash : "'self'";
+  }
+
+  [[nodiscard]] std::string ScriptElement() const {
+    if (input_.script_link.empty()) {
+      return fmt::format("<script>{}</script>", PageScript());
+    }
+    return fmt::format("<script src=\"{}\"></script>", EncodeLink(input_.script_link));
+  }
+
+  // The policy forbids every other request: what is shown is in this file.
   std::string Assemble() const {
     return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
            "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
            "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src "
-           "data:; style-src 'unsafe-inline'; script-src 'unsafe-inline'\">\n"
+           "data:; style-src 'unsafe-inline'; script-src " +
+           ScriptSource() +
+           "\">\n"
            "<meta name=\"color-scheme\" content=\"light dark\">\n"
            "<link rel=\"icon\" href=\"data:,\">\n<title>" +
            Escape(Title()) + ": " + WordsOf(report_.comparison.verdict).word +
@@ -211,8 +229,7 @@ class PageWriter {
            "</main>\n<footer>Written by mbverify. Forces, errors and poses are embedded; "
            "all digits are in traces.csv and summary.json.</footer>\n"
            "<script type=\"application/json\" id=\"page-data\">" +
-           PageData(input_) + "</script>\n<script>" + std::string(PageScript()) +
-           "</script>\n</body>\n</html>\n";
+           PageData(input_) + "</script>\n" + ScriptElement() + "\n</body>\n</html>\n";
   }
 
   const HtmlInput& input_;
@@ -221,6 +238,10 @@ class PageWriter {
 };
 
 }  // namespace
+
+std::string SharedScriptName() {
+  return fmt::format("report-{}.js", ContentFingerprint(std::string(PageScript())));
+}
 
 std::string ToHtml(const HtmlInput& input) { return PageWriter(input).Write(); }
 

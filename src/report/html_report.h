@@ -1,5 +1,6 @@
-// report.html: one page with everything a run gave. It needs no other file and no network; without
-// JavaScript it still shows the verdict, the tables and the pictures.
+// report.html: one page with everything a run gave. It needs no network, and no other file unless
+// its script is shared with other pages; without JavaScript it still shows the verdict, the tables
+// and the pictures.
 #pragma once
 
 #include <array>
@@ -45,13 +46,17 @@ struct HtmlInput {
   std::vector<HtmlPicture> pictures;                     ///< a few hundred kB in total
   std::optional<HtmlAudit> audit;
   std::vector<std::string> arguments;  ///< of the command line, after the scenario file
+  std::string script_link;             ///< where the page's script is; "": in the page
 };
+
+/// Name of a file with the script that pages may share: its content decides it.
+[[nodiscard]] std::string SharedScriptName();
 
 /// The whole page.
 [[nodiscard]] std::string ToHtml(const HtmlInput& input);
 
 /// The data that the page's script reads: signals, errors and the replay (JSON; arrays of
-/// little-endian 32-bit floats in base64). No "</" occurs in it.
+/// little-endian 32-bit floats in base64). No '<' occurs in it.
 [[nodiscard]] std::string PageData(const HtmlInput& input);
 
 }  // namespace mbv

@@ -20,23 +20,7 @@ std::string CellHtml(const Cell& cell, const char* tag, const char* scope) {
 
 std::string Escape(std::string_view text) { return EscapeMarkup(text); }
 
-std::string Base64(std::string_view bytes) {
-  static constexpr char kDigits[] =
-      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (size_t i = 0; i < bytes.size(); i += 3) {
-    const size_t count = std::min<size_t>(3, bytes.size() - i);
-    std::uint32_t word = 0;
-    for (size_t k = 0; k < 3; ++k) {
-      word = word << 8U | (k < count ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    }
-    for (size_t k = 0; k < 4; ++k) {
-      text += k <= count ? kDigits[word >> (18 - 6 * k) & 63U] : '=';
-    }
-  }
-  return text;
-}
+std::string Base64(std::string_view bytes) { return EncodeBase64(bytes); }
 
 std::string Base64(std::span<const float> values) {
   std::string bytes;

@@ -2,17 +2,31 @@
 
 #include <fmt/format.h>
 
+#include "core/names.h"
+
 namespace mbv {
 
 namespace fs = std::filesystem;
 
-std::string CaseName(const fs::path& file, const std::string& mechanism) {
+std::string CaseName(const fs::path& path, const std::string& mechanism) {
+  const fs::path file = path.lexically_normal();
   fs::path name = file.stem();
   for (fs::path folder = file.parent_path(); folder.has_filename(); folder = folder.parent_path()) {
     if (folder.filename() == mechanism) return name;
     name = folder.filename() / name;
   }
   return file.stem();
+}
+
+void CheckCaseName(const std::string& name, YamlReader* yaml) {
+  for (const fs::path& part : fs::path(name)) {
+    if (IsName(part.string())) continue;
+    const std::string near = NearestName(part.string());
+    yaml->AddAt(Severity::kError, 0, 0,
+                fmt::format("the scenario's name '{}' violates: {}", part.string(), kNameRule),
+                near.empty() ? "rename the file" : fmt::format("rename it, e.g. {}", near));
+    return;
+  }
 }
 
 std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& file,

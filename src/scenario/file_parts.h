@@ -18,6 +18,10 @@ namespace mbv {
 /// "sea_state", or "must_fail/wrong_mass" for a file in a folder below one named as the mechanism.
 [[nodiscard]] std::string CaseName(const std::filesystem::path& file, const std::string& mechanism);
 
+/// A finding if a part of a scenario's name breaks the rule of names (core/names.h): it becomes a
+/// folder.
+void CheckCaseName(const std::string& name, YamlReader* yaml);
+
 /// Where each entry of a map was written: in `file`, or on the command line by --set.
 [[nodiscard]] std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& file,
                                                       const std::vector<SetValue>& set);

@@ -63,6 +63,7 @@ class Loader {
   }
 
   ScenarioResult LoadFile() {
+    from_file_ = true;
     const auto text = yaml_.ReadFile();
     if (text) return Load(*text);
     return {{}, {}, yaml_.diagnostics()};
@@ -179,6 +180,7 @@ class Loader {
     if (!loaded.mechanism) return;
     mechanism_ = std::move(loaded.mechanism);
     scenario_.name = CaseName(file_, mechanism_->name);
+    if (from_file_) CheckCaseName(scenario_.name, &yaml_);
   }
 
   // Parameters given in degrees or millimetres: what follows knows SI only.
@@ -267,8 +269,8 @@ class Loader {
                   "compare the table with mode: forward");
     }
     if (!servo) return;
-    CheckGain(*simulation, "kp", settings.servo.kp);
-    CheckGain(*simulation, "kv", settings.servo.kv);
+    CheckGain(*simulation->Find("kp"), "simulation.kp", settings.servo.kp, *mechanism_, &yaml_);
+    CheckGain(*simulation->Find("kv"), "simulation.kv", settings.servo.kv, *mechanism_, &yaml_);
     const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
     const auto drives = mechanism_->drives.size(), bases = mechanism_->prescribed.size();
     if (!scenario_.motion.free() && static_cast<int>(drives + bases) != rank.freedoms) {
@@ -276,23 +278,6 @@ class Loader {
                   fmt::format("{}: {} drives and {} prescribed joints for {} freedoms; a servo "
                               "needs its own",
                               mode, drives, bases, rank.freedoms));
-    }
-  }
-
-  void CheckGain(const YamlNode& simulation, const std::string& key, const Gain& gain) {
-    std::vector<std::string> names, missing;
-    for (const Drive& drive : mechanism_->drives) {
-      names.push_back(drive.name);
-      if (!gain.all && !gain.by_drive.contains(drive.name)) missing.push_back(drive.name);
-    }
-    const YamlNode& node = *simulation.Find(key);
-    if (!missing.empty()) {
-      yaml_.Error(node, fmt::format("simulation.{} gives nothing for {}", key, JoinWords(missing)));
-    }
-    for (const auto& [name, value] : gain.by_drive) {
-      if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-      yaml_.Error(node, fmt::format("simulation.{}: there is no drive '{}'", key, name),
-                  "drives: " + JoinWords(names));
     }
   }
 
@@ -347,6 +332,7 @@ class Loader {
   }
 
   std::string file_;
+  bool from_file_ = false;  // and not a made-up name
   const ScenarioOptions& options_;
   YamlReader yaml_;
   Scope scope_;

@@ -1,7 +1,9 @@
 #include "scenario/settings_reader.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "scenario/file_parts.h"
@@ -193,6 +195,23 @@ SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node) {
     settings.extrapolate = ReadExtrapolation(values, *extrapolate);
   }
   return settings;
+}
+
+void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
+               const Mechanism& mechanism, YamlReader* yaml) {
+  std::vector<std::string> names, missing;
+  for (const Drive& drive : mechanism.drives) {
+    names.push_back(drive.name);
+    if (!gain.all && !gain.by_drive.contains(drive.name)) missing.push_back(drive.name);
+  }
+  if (!missing.empty()) {
+    yaml->Error(node, fmt::format("{} gives nothing for {}", path, fmt::join(missing, ", ")));
+  }
+  for (const auto& [name, value] : gain.by_drive) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    yaml->Error(node, fmt::format("{}: there is no drive '{}'", path, name),
+                fmt::format("drives: {}", fmt::join(names, ", ")));
+  }
 }
 
 CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, double* start_window_s) {

@@ -12,6 +12,9 @@ inline constexpr double kMaxSteps = 1e7;
 [[nodiscard]] AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node);
 [[nodiscard]] ReferenceSettings ReadReference(ValueReader* values, const YamlNode* node);
 [[nodiscard]] SimulationSettings ReadSimulation(ValueReader* values, const YamlNode* node);
+/// Findings if a gain leaves drives out or names what is none.
+void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
+               const Mechanism& mechanism, YamlReader* yaml);
 /// Limits, and `start_window_s` if it is given.
 [[nodiscard]] CheckLimits ReadChecks(ValueReader* values, const YamlNode* node,
                                      double* start_window_s);

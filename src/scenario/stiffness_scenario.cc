@@ -55,6 +55,7 @@ class Loader {
   }
 
   StiffnessScenarioResult LoadFile() {
+    from_file_ = true;
     const auto text = yaml_.ReadFile();
     if (text) return Load(*text);
     return {{}, {}, yaml_.diagnostics()};
@@ -105,6 +106,7 @@ class Loader {
     LoadWith(scenario_.parameters);
     if (!mechanism_) return;
     scenario_.name = CaseName(file_, mechanism_->name);
+    if (from_file_) CheckCaseName(scenario_.name, &yaml_);
     if (mechanism_->beams.empty() && !HasServos()) {
       yaml_.Error(node, fmt::format("mechanism: {} is rigid: it has no beams and no drive with a "
                                     "stiffness",
@@ -209,6 +211,7 @@ class Loader {
   }
 
   std::string file_;
+  bool from_file_ = false;  // and not a made-up name
   const ScenarioOptions& options_;
   YamlReader yaml_;
   Scope scope_;

@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "core/inputs.h"
 #include "scenario/table_columns.h"
 #include "scenario/table_grid.h"
 #include "scenario/table_noise.h"
@@ -334,6 +335,7 @@ std::shared_ptr<const ReferenceTable> LoadTable(const TableSettings& settings,
   std::string text(bytes, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(bytes));
   text.resize(static_cast<size_t>(stream.gcount()));
+  NoteInput(settings.file, text);
   return LoadTableText(text, settings, mechanism, yaml, diagnostics);
 }
 

@@ -231,5 +231,75 @@ TEST_F(HistoryTest, AForeignOrNewerFileIsRefusedAndLeftAlone) {
   EXPECT_NE(ListRuns("missing.sqlite").trouble, "");
 }
 
+TEST_F(HistoryTest, ARunOfTheSameIdIsEnteredOnce) {
+  RegressReport first = OneRun({AgreeingCase("model/case", 1e-9), AgreeingCase("model/b", 1e-9)});
+  first.run.uid = "night1";
+  RegressReport again = OneRun({AgreeingCase("model/case", 2e-9)});
+  again.run.uid = "night1";
+  RegressReport other = OneRun({AgreeingCase("model/case", 3e-9)});
+  other.run.uid = "night2";
+  ASSERT_EQ(AppendRun(kFile, {{"model/case", Forces(1.0, 1.0)}}, &first), "");
+  ASSERT_EQ(AcceptRun(kFile, "1", "", "meant").trouble, "");
+  ASSERT_EQ(AppendRun(kFile, {{"model/case", Forces(1.0, 1.0)}}, &again), "");
+  ASSERT_EQ(AppendRun(kFile, {}, &other), "");
+  EXPECT_EQ(again.run.id, 1);
+  EXPECT_EQ(other.run.id, 2);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM run"), 2);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM result"), 2);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM golden"), 2);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM accepted WHERE run = 1"), 2);
+  EXPECT_EQ(other.cases.front().course, (std::vector<double>{2e-9, 3e-9}));
+}
+
+TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
+  Night(1e-9);
+  {
+    Database database(kFile, Database::Mode::kWrite);
+    database.Run("DROP INDEX run_uid");
+    database.Run("ALTER TABLE run DROP COLUMN uid");
+    database.Run("PRAGMA user_version = 1");
+    ASSERT_EQ(database.trouble(), "");
+  }
+  EXPECT_EQ(ListRuns(kFile).trouble, "");
+  EXPECT_EQ(CheckHistory(kFile), "");
+  EXPECT_EQ(Night(2e-9).run.id, 2);
+  EXPECT_EQ(Count("PRAGMA user_version"), 2);
+}
+
+TEST_F(HistoryTest, AnotherProgramsDatabaseIsLeftAlone) {
+  {
+    Database database(kFile, Database::Mode::kCreate);
+    database.Run("CREATE TABLE run(a)");
+  }
+  RegressReport report = OneRun({AgreeingCase("model/case", 1e-9)});
+  EXPECT_NE(AppendRun(kFile, {}, &report).find("another program's"), std::string::npos);
+  EXPECT_NE(CheckHistory(kFile).find("another program's"), std::string::npos);
+  EXPECT_EQ(Count("SELECT COUNT(*) FROM sqlite_master"), 1);
+}
+
+// On a medium that cannot be written, as another user.
+TEST_F(HistoryTest, CanBeListedWhereItCannotBeWritten) {
+  Night(1e-9);
+  std::filesystem::create_directories("read only #1");
+  std::filesystem::rename(kFile, "read only #1/history?.sqlite");
+  const std::string path = (folder_ / "read only #1" / "history?.sqlite").string();
+  std::filesystem::permissions("read only #1", std::filesystem::perms(0555));
+  std::filesystem::permissions(path, std::filesystem::perms(0444));
+  std::filesystem::permissions(folder_, std::filesystem::perms(0755));
+  const pid_t pid = fork();
+  if (pid == 0) {
+    if (geteuid() == 0 && setuid(65534) != 0) _exit(9);
+    const HistoryText runs = ListRuns(path);
+    RegressReport report = OneRun({AgreeingCase("model/case", 1e-9)});
+    const bool refused = !AppendRun(path, {}, &report).empty() && !CheckHistory(path).empty();
+    const bool listed = runs.trouble.empty() && runs.text.find("1/1") != std::string::npos;
+    _exit((listed ? 0 : 1) + (refused ? 0 : 2));
+  }
+  int status = 0;
+  waitpid(pid, &status, 0);
+  EXPECT_EQ(WEXITSTATUS(status), 0);
+  std::filesystem::permissions("read only #1", std::filesystem::perms::owner_all);
+}
+
 }  // namespace
 }  // namespace mbv

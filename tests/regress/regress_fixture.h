@@ -8,8 +8,8 @@
 #include <fstream>
 #include <string>
 
+#include "core/files.h"
 #include "regress/case_result.h"
-#include "regress/files.h"
 
 namespace mbv {
 
@@ -30,7 +30,7 @@ class FolderTest : public testing::Test {
     std::filesystem::remove_all(folder_);
   }
   static void Write(const std::string& path, const std::string& text) {
-    ASSERT_EQ(WriteDurably(path, text), "");
+    ASSERT_EQ(WriteFile(path, text), "");
   }
   static std::string Read(const std::string& path) { return ReadWholeFile(path).value_or(""); }
 
@@ -48,7 +48,8 @@ inline CaseResult AgreeingCase(const std::string& key, double nrmse) {
   result.reason = "all checks are within their limits";
   result.verdict = "agree";
   result.exit_code = 0;
-  result.ran = result.compared = result.verified = result.has_folder = true;
+  result.ran = result.compared = result.verified = true;
+  result.has_folder = result.has_report = true;
   result.metrics["simulated_vs_analytic.force_nrmse"] = {nrmse, 1e-6, nrmse <= 1e-6};
   result.versions["mbverify"] = "0.1.0";
   result.cost = {1.5, 1.25, 51200};

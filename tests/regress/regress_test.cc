@@ -1,72 +1,14 @@
 // Whole regressions with a fake worker: what it does is written in the scenario's file name.
 #include "regress/regress.h"
 
-#include <sys/wait.h>
-
 #include <cmath>
 
+#include "fake_worker.h"
 #include "regress/history.h"
-#include "regress_fixture.h"
+#include "tests/kill_at_calls.h"
 
 namespace mbv {
 namespace {
-
-// worker run FILE --out DIR [--no-pictures]
-constexpr const char* kWorker = R"sh(#!/bin/sh
-name=$(basename "$2" .yaml)
-echo "$name" >> calls.txt
-result() {
-  mkdir -p "$dir/m/$name"
-  echo "{\"verdict\": \"$1\", \"reason\": \"made up\", \"exit_code\": $2, \"witnesses\":
-    [{\"name\": \"analytic\", \"ran\": true}], \"counts\": {\"pairs_compared\": 1}, \"checks\":
-    [{\"name\": \"simulated_vs_analytic.force_nrmse\", \"value\": 1e-9, \"limit\": 1e-6,
-    \"pass\": true}, {\"name\": \"simulated.closure_m\", \"value\": 1, \"limit\": 0.1,
-    \"pass\": false}], \"versions\": {\"mbverify\": \"0.1.0\"}}" > "$dir/m/$name/summary.json"
-  printf 'time_s,leg.force.analytic\n0,1\n1,2\n' > "$dir/m/$name/traces.csv"
-}
-dir=$4
-case $name in
-  agree*) result agree 0; echo "all is well"; exit 0;;
-  disagree*) result disagree 1; echo "mass is wrong"; exit 1;;
-  not_run*) result not_run 3; echo "out of reach"; exit 3;;
-  bad*) echo "x.yaml:1: error: bad input" >&2; exit 2;;
-  crash*) result agree 0; kill -SEGV $$; sleep 5;;
-  hang*) sleep 60 & sleep 60;;
-  internal*) echo "internal error: demand failed" >&2; exit 4;;
-  silent*) exit 0;;
-esac
-)sh";
-
-class RegressTest : public FolderTest {
- protected:
-  void SetUp() override {
-    FolderTest::SetUp();
-    Write("worker", kWorker);
-    std::filesystem::permissions("worker", std::filesystem::perms::owner_all);
-    options_.out = "out";
-    options_.worker = {(folder_ / "worker").string()};
-    options_.jobs = 2;
-    options_.timeout_s = 20.0;
-  }
-  // Adds a scenario of the fake model m.
-  static void Scenario(const std::string& name, const std::string& expect = "verdict: agree") {
-    Write("scenarios/m/" + name + ".yaml",
-          "mechanism: m\ndescription: made up\nexpect: {" + expect + "}\n");
-  }
-  RegressOutcome RunAll() { return Regress(options_, {}); }
-  static const CaseResult& CaseOf(const RegressOutcome& outcome, const std::string& key) {
-    for (const CaseResult& result : outcome.report.cases) {
-      if (result.key == key) return result;
-    }
-    ADD_FAILURE() << "no case " << key;
-    return outcome.report.cases.front();
-  }
-  static int Calls() {
-    const std::string calls = Read("calls.txt");
-    return static_cast<int>(std::count(calls.begin(), calls.end(), '\n'));
-  }
-  RegressOptions options_;
-};
 
 TEST_F(RegressTest, EverythingAsExpectedIsExitCode0WithAllFiles) {
   Scenario("agree");
@@ -84,7 +26,7 @@ TEST_F(RegressTest, EverythingAsExpectedIsExitCode0WithAllFiles) {
                            "out/m/agree/summary.json", "out/logs/m/must_fail/bad.txt"}) {
     EXPECT_TRUE(std::filesystem::exists(file)) << file;
   }
-  EXPECT_FALSE(std::filesystem::exists("out/.work"));
+  EXPECT_FALSE(std::filesystem::exists("out/.mbverify/night"));
   EXPECT_GT(CaseOf(outcome, "m/agree").cost.peak_kib, 0);
   EXPECT_EQ(CaseOf(outcome, "m/must_fail/bad").not_compared.size(), 1U);
 }
@@ -201,7 +143,8 @@ TEST_F(RegressTest, ResumeAfterKill9KeepsWhatWasFinished) {
     (void)RunAll();
     _exit(0);
   }
-  for (int i = 0; i < 400 && !std::filesystem::exists("out/.state/m/agree2.json"); ++i) {
+  for (int i = 0; i < 400 && !std::filesystem::exists("out/.mbverify/night/state/m/agree2.json");
+       ++i) {
     usleep(10000);
   }
   kill(pid, SIGKILL);
@@ -215,6 +158,66 @@ TEST_F(RegressTest, ResumeAfterKill9KeepsWhatWasFinished) {
   EXPECT_TRUE(CaseOf(outcome, "m/agree1").kept);
   EXPECT_TRUE(CaseOf(outcome, "m/agree2").kept);
   EXPECT_FALSE(CaseOf(outcome, "m/agree3").kept);
+}
+
+TEST_F(RegressTest, ResumeRunsAgainWhatReadAFileThatHasChanged) {
+  for (const char* name : {"agree1", "agree2", "agree3"}) Scenario(name);
+  const auto stopped = [&] {
+    volatile std::sig_atomic_t stop = 0;
+    RegressOptions options = options_;
+    options.stop = &stop;
+    options.jobs = 1;
+    int ended = 0;
+    RegressProgress progress;
+    progress.ended = [&](const CaseResult&) { stop = ++ended == 2 ? 1 : 0; };
+    EXPECT_EQ(Regress(options, progress).exit_code, 3);
+  };
+  const auto kept = [&] {
+    options_.resume = true;
+    const RegressOutcome outcome = RunAll();
+    options_.resume = false;
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.trouble;
+    return std::count_if(outcome.report.cases.begin(), outcome.report.cases.end(),
+                         [](const CaseResult& result) { return result.kept; });
+  };
+  stopped();
+  EXPECT_EQ(kept(), 2);
+  // A table that only the scenarios' text names.
+  stopped();
+  Table("t,f,g");
+  EXPECT_EQ(kept(), 0);
+  stopped();
+  std::filesystem::remove("table.csv");
+  EXPECT_EQ(kept(), 0);
+  Table("t,f");
+  // A model that is found before the one that was taken.
+  stopped();
+  Write("scenarios/models/m/model.yaml", "name: m\n");
+  EXPECT_EQ(kept(), 0);
+  // Results that lie below the scenarios change nothing.
+  options_.out = "scenarios/m/out";
+  stopped();
+  EXPECT_EQ(kept(), 2);
+}
+
+TEST_F(RegressTest, ARunThatIsResumedIsOneRunInTheHistory) {
+  Scenario("agree");
+  Scenario("crash");
+  options_.history = "history.sqlite";
+  // Killed between its entry in the history and its end, at any call.
+  for (int call = 1;; call += 7) {
+    std::filesystem::remove_all("out");
+    std::filesystem::remove("history.sqlite");
+    KillAtCalls killer([&] { _exit(RunAll().exit_code); });
+    const bool ended = killer.EndsBefore(call);
+    EXPECT_TRUE(!ended || killer.exit_code == 3) << killer.exit_code;
+    if (ended) break;
+    options_.resume = true;
+    EXPECT_EQ(RunAll().exit_code, 3);
+    options_.resume = false;
+    const std::string runs = ListRuns("history.sqlite").text;
+    EXPECT_EQ(std::count(runs.begin(), runs.end(), '\n'), 2) << call << "\n" << runs;
+  }
 }
 
 // What must not depend on how the work was split: everything but times and the shard's name.
@@ -252,6 +255,10 @@ TEST_F(RegressTest, ShardsMergedEqualOneRun) {
   EXPECT_NE(ListRuns("joined.sqlite").text.find("3/6"), std::string::npos);
   EXPECT_NE(MergeRuns({"shard1", "shard1"}, options_).trouble.find("too"), std::string::npos);
   EXPECT_EQ(MergeRuns({"nowhere"}, options_).exit_code, 2);
+  // The same shards joined again are the same run.
+  EXPECT_EQ(MergeRuns(folders, options_).exit_code, whole.exit_code);
+  const std::string runs = ListRuns("joined.sqlite").text;
+  EXPECT_EQ(std::count(runs.begin(), runs.end(), '\n'), 2) << runs;
 }
 
 TEST_F(RegressTest, TwoRunsInOneFolderAreRefused) {

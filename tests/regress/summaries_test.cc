@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/sha256.h"
 #include "regress_fixture.h"
 #include "tests/source_dir.h"
 
@@ -54,7 +55,7 @@ RegressReport Mixed() {
 void ExpectGolden(const std::string& name, const std::string& text) {
   const std::string path = kGoldenFolder + name;
   if (std::getenv("MBV_UPDATE_GOLDEN") != nullptr) {
-    ASSERT_EQ(WriteDurably(path, text), "");
+    ASSERT_EQ(WriteFile(path, text), "");
   }
   EXPECT_EQ(ReadWholeFile(path).value_or("(missing)"), text);
 }
@@ -171,6 +172,30 @@ TEST(EscapeXml, DropsWhatXmlCannotHold) {
 
 TEST(Markdown, IsTheGoldenFile) { ExpectGolden("summary.md", ToMarkdown(Mixed())); }
 
+// GitHub takes 1 MiB of a step's summary and shows nothing of a larger one.
+TEST(Markdown, OfTenThousandScenariosIsBelowOneMebibyte) {
+  for (const bool failed : {false, true}) {
+    std::vector<CaseResult> cases;
+    for (int i = 0; i < 10'000; ++i) {
+      cases.push_back(AgreeingCase("a_model/of_a_long_name/scenario_" + std::to_string(i), 2e-9));
+      cases.back().not_compared.push_back({"reactions of every joint", std::string(300, 'x')});
+      cases.back().compared = false;
+      if (!failed) continue;
+      cases.back().status = CaseStatus::kUnexpected;
+      cases.back().reason = std::string(i == 0 ? 100'000 : 500, '|') + "ä";
+      cases.back().drifts.push_back({"force", std::string(500, 'y'), 1.0, 1.0, 7, "run 7"});
+    }
+    RegressReport report = OneRun(cases);
+    for (int i = 0; i < 1000; ++i) report.notes.push_back(std::string(500, 'n'));
+    const std::string text = ToMarkdown(report);
+    EXPECT_LT(text.size(), 1U << 20U);
+    EXPECT_GT(text.size(), 1U << 18U);
+    EXPECT_NE(text.find(" more: see index.html"), std::string::npos);
+    EXPECT_NE(text.find("10000 scenarios"), std::string::npos);
+    EXPECT_EQ(EscapeXml(text).size() >= text.size(), true) << "whole characters only";
+  }
+}
+
 TEST(RegressJson, ComesBackTheSame) {
   const std::string json = ToJson(Mixed());
   const auto back = ReportFromJson(json);
@@ -217,6 +242,48 @@ TEST(IndexHtml, HasOneRowPerScenarioAndNeedsNothingElse) {
   for (const char* foreign : {"http://", "https://", "<link", "@import", "src=\"/"}) {
     EXPECT_EQ(html.find(foreign), std::string::npos) << foreign;
   }
+}
+
+std::string Between(const std::string& text, const std::string& before, const std::string& after) {
+  const size_t at = text.find(before);
+  if (at == std::string::npos) return "(nothing)";
+  const size_t begin = at + before.size();
+  return text.substr(begin, text.find(after, begin) - begin);
+}
+
+TEST(IndexHtml, RunsNoScriptButItsOwn) {
+  const std::string html = ToIndexHtml(Mixed(), {});
+  const std::string policy = Between(html, "Content-Security-Policy\" content=\"", "\"");
+  EXPECT_EQ(policy, "default-src 'none'; img-src data:; style-src " +
+                        CspHash(Between(html, "<style>", "</style>")) + "; script-src " +
+                        CspHash(Between(html, "<script>", "</script>")));
+  EXPECT_EQ(html.find(" style="), std::string::npos) << "the policy would ignore it";
+}
+
+TEST(IndexHtml, LinksLeadToTheFileWhateverItsName) {
+  const std::string key = "javascript:alert(1)/a#b?c%d\"<!--<script>";
+  const std::string html = ToIndexHtml(OneRun({AgreeingCase(key, 1e-9)}), {});
+  const std::string link =
+      "javascript%3Aalert%281%29/a%23b%3Fc%25d%22%3C%21--%3Cscript%3E/report.html";
+  EXPECT_EQ(Between(html, "<a href=\"", "\""), link);
+  EXPECT_EQ(html.find("href=\"javascript:"), std::string::npos);
+  EXPECT_EQ(html.find("<!--"), std::string::npos);
+}
+
+TEST(IndexHtml, DoesNotLinkToReportsThatWereNotWritten) {
+  CaseResult result = AgreeingCase("model/case", 1e-9);
+  result.has_report = false;
+  const std::string html = ToIndexHtml(OneRun({result}), {});
+  EXPECT_EQ(html.find("report.html"), std::string::npos);
+  EXPECT_NE(html.find("model/case/summary.json"), std::string::npos);
+}
+
+// The head of a PNG that claims 60000 × 60000 pixels.
+TEST(Thumbnail, OfAPictureTooLargeIsNotMade) {
+  std::string png = "\x89PNG\r\n\x1a\n";
+  png += std::string("\0\0\0\x0dIHDR\0\0\xea\x60\0\0\xea\x60\x08\x02\0\0\0", 25);
+  png += std::string("\0\0\0\0", 4);
+  EXPECT_EQ(ThumbnailUri(png, 100), "");
 }
 
 TEST(Thumbnail, WhatIsNoPngHasNone) { EXPECT_EQ(ThumbnailUri("no picture", 100), ""); }

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
+#include "core/sha256.h"
+#include "report/html_assets.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
 #include "tests/comparison/synthetic.h"
@@ -148,8 +150,24 @@ TEST(HtmlData, NoNameEndsTheScript) {
   Page page;
   page.report.scenario = "x</script><b>";
   const std::string data = PageData(page.input());
-  EXPECT_EQ(data.find("</"), std::string::npos);
+  EXPECT_EQ(data.find('<'), std::string::npos);
   EXPECT_EQ(Json::parse(data)["title"], "two_sliders / x</script><b>");
+  page.report.scenario = "<!--<script>";
+  EXPECT_EQ(PageData(page.input()).find('<'), std::string::npos);
+}
+
+TEST(HtmlPage, RunsNoScriptButItsOwn) {
+  const Page page;
+  HtmlInput input = page.input();
+  const std::string alone = ToHtml(input);
+  EXPECT_NE(alone.find("script-src " + CspHash(PageScript()) + "\""), std::string::npos);
+  EXPECT_NE(alone.find("<script>" + std::string(PageScript()) + "</script>"), std::string::npos);
+  input.script_link = "../../" + SharedScriptName();
+  const std::string shared = ToHtml(input);
+  EXPECT_NE(shared.find("script-src 'self'\""), std::string::npos);
+  EXPECT_NE(shared.find("<script src=\"../../" + SharedScriptName() + "\"></script>"),
+            std::string::npos);
+  EXPECT_LT(shared.size() + PageScript().size(), alone.size() + 1000);
 }
 
 TEST(HtmlTables, WorkIsForceTimesWay) {

@@ -1,0 +1,16 @@
+// SHA-256 [FIPS 180-4], for the hashes of a Content-Security-Policy.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string>
+#include <string_view>
+
+namespace mbv {
+
+[[nodiscard]] std::array<std::uint8_t, 32> Sha256(std::string_view bytes);
+
+/// "'sha256-…'": a policy's source for an inline script or style of this text.
+[[nodiscard]] std::string CspHash(std::string_view text);
+
+}  // namespace mbv

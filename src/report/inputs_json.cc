@@ -1,0 +1,17 @@
+#include "report/inputs_json.h"
+
+#include <nlohmann/json.hpp>
+
+namespace mbv {
+
+using Json = nlohmann::ordered_json;
+
+std::string ToJson(const std::vector<InputFile>& inputs) {
+  Json json = {{"schema", "mbverify.inputs/1"}, {"inputs", Json::array()}};
+  for (const InputFile& input : inputs) {
+    json["inputs"].push_back({{"file", input.file}, {"fingerprint", input.fingerprint}});
+  }
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace mbv
