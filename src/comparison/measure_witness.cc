@@ -6,15 +6,9 @@
 #include "comparison/derivatives.h"
 #include "comparison/energy_audit.h"
 #include "comparison/force_scale.h"
-#include "mechanism/constraints.h"
 
 namespace mbv {
 namespace {
-
-// Commanded rates below this, per second and per second², hold still.
-constexpr double kSlowestRate = 1e-3;
-// Share of the fastest motion below which a commanded rate counts as holding still.
-constexpr double kIdle = 1e-3;
 
 // `signal`: "" for the value itself, or "velocity", "acceleration".
 std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate,
@@ -71,38 +65,8 @@ void MeasureCommands(const ComparisonInput& input, const Trace& trace, WitnessMe
   }
 }
 
-// The fastest RMS rate of anything that is commanded or driven, lengths [m] per time; angles count
-// at the characteristic length.
-double FastestRate(const ComparisonInput& input, const Trace& trace, const std::string& signal,
-                   double length_m) {
-  double fastest = 0.0;
-  const auto keep = [&](const ErrorSum& sum, bool angle) {
-    const double rms = sum.rms_truth() * (angle ? length_m : 1.0);
-    if (std::isfinite(rms)) fastest = std::max(fastest, rms);
-  };
-  for (const Drive& drive : input.mechanism->drives) {
-    const int column = trace.Find(drive.name + "." + signal);
-    if (column < 0) continue;
-    ErrorSum sum;
-    for (const double value : trace.values.col(column)) sum.Add(0.0, value, 0.0, drive.name);
-    keep(sum, PositionUnit(*input.mechanism, drive) == "rad");
-  }
-  for (const Command& command : input.motion->commands) {
-    const Coordinate& first = command.terms.front().coordinate;
-    if (first.kind != Coordinate::Kind::kPrescribed) continue;
-    ErrorSum sum;
-    for (const double t_s : trace.time_s) {
-      const Jet jet = Evaluate(command.profile, t_s);
-      sum.Add(0.0, signal == "velocity" ? jet.rate : jet.acceleration, t_s, command.name);
-    }
-    const Joint& joint = input.mechanism->joints[input.mechanism->prescribed[first.index].joint];
-    keep(sum, joint.kind != JointKind::kPrismatic);
-  }
-  return fastest;
-}
-
 // Rates or accelerations of commanded outputs against their commands, pooled per unit. A command
-// that holds still is judged by 0.1 % of what moves elsewhere.
+// that holds still is judged by what counts as rest beside the drives' motion.
 void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, const char* signal,
                          Metric metric, WitnessMetrics* out) {
   std::map<bool, ErrorSum> sums;  // by angle
@@ -118,16 +82,11 @@ void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, const
       sum.Add(value - wanted, wanted, trace.time_s[i], command.name);
     }
   }
-  if (sums.empty()) return;
-  const double length_m = CharacteristicLength(*input.mechanism);
-  double fastest = FastestRate(input, trace, signal, length_m);
   for (const auto& [angle, sum] : sums) {
-    fastest = std::max(fastest, sum.rms_truth() * (angle ? length_m : 1.0));
-  }
-  for (const auto& [angle, sum] : sums) {
-    const double floor =
-        std::max(kSlowestRate * length_m, kIdle * fastest) / (angle ? length_m : 1.0);
-    KeepWorst(&out->metrics[metric], sum.MeasuredNrmse(floor));
+    const RestFloor rest = RestFloorOf(input, angle ? "rad" : "m", trace);
+    const bool velocity = metric == Metric::kCommandVelocity;
+    KeepWorst(&out->metrics[metric],
+              sum.MeasuredNrmse(velocity ? rest.velocity : rest.acceleration));
   }
 }
 
@@ -201,8 +160,8 @@ double PowerScale(const ComparisonInput& input, const Trace& trace) {
     const int f = trace.Find(drive.name + ".force"), v = trace.Find(drive.name + ".velocity");
     scale = std::max(scale, rest * largest(drive.name + ".force"));
     if (f < 0 || v < 0) continue;
-    carried = std::max(
-        carried, trace.values.col(f).cwiseProduct(trace.values.col(v)).cwiseAbs().maxCoeff());
+    carried = std::max(carried,
+                       trace.values.col(f).cwiseProduct(trace.values.col(v)).cwiseAbs().maxCoeff());
   }
   return std::max(scale, std::min(flow, carried));
 }
