@@ -1,4 +1,4 @@
-// Unknown are the small motions ξ of all frames M in their bodies (lengths in characteristic
+// Unknown are the small motions ξ of all frames F and M in their bodies (lengths in characteristic
 // lengths L) and the tree's coordinates q_k at K poses, home among them:
 //   r(ξ, q_k) = 0,  k = 1 … K
 // solved from ξ = 0 by Levenberg–Marquardt, whose steps are of least norm. The poses lie some way
@@ -52,7 +52,7 @@ class Projector {
       : mechanism_(mechanism),
         length_(CharacteristicLength(mechanism)),
         tree_(mechanism_, std::vector<bool>(mechanism.joints.size(), false)),
-        frames_(static_cast<Eigen::Index>(6 * mechanism.joints.size())),
+        frames_(static_cast<Eigen::Index>(12 * mechanism.joints.size())),
         xi_(VecX::Zero(frames_)) {
     unit_.setOnes(tree_.freedoms());
     for (int c = 0; c < tree_.freedoms(); ++c) {
@@ -106,7 +106,10 @@ class Projector {
   }
 
   void MakePoses(double gap) {
-    for (const Joint& joint : mechanism_.joints) X_CM_.push_back(joint.X_CM);
+    for (const Joint& joint : mechanism_.joints) {
+      given_.push_back(joint.X_PF);
+      given_.push_back(joint.X_CM);
+    }
     const MatX motion = internal::FindRank(ScaledRows(mechanism_), internal::NullSpaces::kMotion,
                                            RankTolerance(gap))
                             .motion;
@@ -157,12 +160,14 @@ class Projector {
 
   void SetFrames(const VecX& xi) {
     xi_ = xi;
-    for (size_t j = 0; j < X_CM_.size(); ++j) MoveFrame(j, xi.segment<6>(6 * j));
+    for (size_t i = 0; i < given_.size(); ++i) MoveFrame(i, xi.segment<6>(6 * i));
   }
-  void MoveFrame(size_t j, const Vec6& xi) {
-    Pose& X_CM = mechanism_.joints[j].X_CM;
-    X_CM.linear() = X_CM_[j].linear() * ExpRotation(xi.head<3>());
-    X_CM.translation() = X_CM_[j].translation() + X_CM_[j].linear() * (length_ * xi.tail<3>());
+  // F of joint i/2 for even i, M for odd.
+  void MoveFrame(size_t i, const Vec6& xi) {
+    Joint& joint = mechanism_.joints[i / 2];
+    Pose& X = i % 2 == 0 ? joint.X_PF : joint.X_CM;
+    X.linear() = given_[i].linear() * ExpRotation(xi.head<3>());
+    X.translation() = given_[i].translation() + given_[i].linear() * (length_ * xi.tail<3>());
   }
 
   void Apply(const VecX& s) {
@@ -211,7 +216,7 @@ class Projector {
   const TreeMotion tree_;
   const Eigen::Index frames_;
   VecX xi_, unit_;
-  std::vector<Pose> X_CM_;                // as given
+  std::vector<Pose> given_;               // X_PF, X_CM of each joint
   std::vector<std::vector<Pose>> poses_;  // X_FM per joint
 };
 

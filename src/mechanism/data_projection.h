@@ -24,7 +24,7 @@ struct DataProjection {
 /// pose of least gap.
 [[nodiscard]] int CountNearlyRedundant(const Mechanism& mechanism, double gap);
 
-/// Moves the joint frames X_CM of a mechanism whose home solution left `gap`.
+/// Moves the joint frames X_PF, X_CM of a mechanism whose home solution left `gap`.
 [[nodiscard]] DataProjection ProjectData(Mechanism* mechanism, double gap);
 
 }  // namespace mbv
