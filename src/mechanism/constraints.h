@@ -71,8 +71,8 @@ struct ScalarRow {
 /// cosines of RowsOf it does not vanish when an axis points backwards.
 [[nodiscard]] double RotationGap(const Joint& joint, const Pose& X_FM);
 
-/// A length typical of the mechanism, to weigh metres against radians: the root mean square
-/// distance of the joint frames and drive ends from their body origins [m]; 1 if all vanish.
+/// A length typical of the mechanism [m], to weigh metres against radians: the root mean square
+/// distance of two attachments of one body, wherever the bodies' origins lie (reach.h).
 [[nodiscard]] double CharacteristicLength(const Mechanism& mechanism);
 
 /// Body poses of the spanning tree for joint coordinates `q[joint]` (entries of closures unused).
