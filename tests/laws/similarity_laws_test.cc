@@ -2,6 +2,7 @@
 // what is found out about it.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "comparison/comparison.h"
@@ -81,7 +82,7 @@ Answer Judge(const Case& c, const Similarity& similarity) {
       .witnesses = {{"reference", &reference.trace, reference.summary},
                     {"simulated", &simulated.run.trace, simulated.run.summary}},
       .driven_by = "reference",
-      .joints_not_unique = AnalyseMobility(m).joints_not_unique};
+      .reactions_not_unique = ReactionsNotUnique(m, {})};
   answer.comparison = Compare(input);
   answer.reference = std::move(reference.trace);
   return answer;
