@@ -27,31 +27,6 @@ std::string TemporaryPrefix(const fs::path& path) {
   return fmt::format(".{}.mbverify-", path.filename().string().substr(0, 200));
 }
 
-// Removes what killed writers of the same file left: nobody holds its lock any more.
-void SweepTemporaries(const fs::path& path) {
-  const std::string prefix = TemporaryPrefix(path);
-  const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
-  std::vector<fs::path> found;
-  std::error_code error;
-  for (fs::directory_iterator entry(folder, error), end; !error && entry != end;
-       entry.increment(error)) {
-    const std::string name = entry->path().filename();
-    if (name.starts_with(prefix) && name.size() == prefix.size() + 6) {
-      found.push_back(entry->path());
-    }
-  }
-  for (const fs::path& stale : found) {
-    const int file = open(stale.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
-    if (file < 0) continue;
-    struct stat status {};
-    if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
-        flock(file, LOCK_EX | LOCK_NB) == 0) {
-      unlink(stale.c_str());
-    }
-    close(file);
-  }
-}
-
 // A new file beside `path`, locked as long as it is open; -1 with errno.
 int MakeTemporary(const fs::path& path, mode_t mode, std::string* name) {
   const fs::path folder = path.parent_path();
@@ -142,6 +117,30 @@ std::vector<std::string> FilesBelow(const fs::path& folder, const std::string& e
   return files;
 }
 
+void SweepTemporaries(const fs::path& folder) {
+  std::vector<fs::path> found;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder.empty() ? "." : folder, error), end;
+       !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename();
+    const size_t mark = name.size() < 16 ? 0 : name.size() - 16;  // ".mbverify-" and six letters
+    if (name.starts_with('.') && mark > 0 && name.compare(mark, 10, ".mbverify-") == 0) {
+      found.push_back(entry->path());
+    }
+  }
+  for (const fs::path& stale : found) {
+    const int file = open(stale.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+    if (file < 0) continue;
+    // Nobody holds the lock of what a killed writer left.
+    struct stat status {};
+    if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
+        flock(file, LOCK_EX | LOCK_NB) == 0) {
+      unlink(stale.c_str());
+    }
+    close(file);
+  }
+}
+
 bool WriteBytes(int descriptor, std::string_view bytes) {
   while (!bytes.empty()) {
     const ssize_t n = write(descriptor, bytes.data(), bytes.size());
@@ -181,7 +180,7 @@ std::string WriteFile(const fs::path& path, const std::string& content, bool swe
   if (exists && !S_ISREG(status.st_mode)) {
     reason = WriteThrough(path, content);
   } else {
-    if (sweep) SweepTemporaries(path);
+    if (sweep) SweepTemporaries(path.parent_path());
     reason = Replace(path, content, exists ? &status : nullptr);
   }
   return reason.empty() ? "" : fmt::format("cannot write {}: {}", path.string(), reason);

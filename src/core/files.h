@@ -15,10 +15,13 @@ namespace mbv {
 
 /// Writes a file; folders are made. Where nothing or a regular file is, the content is made durable
 /// in a temporary file beside it, which then takes its name: a kill at any moment leaves the old
-/// file or the new one. Anything else (a device, a FIFO, a link) is opened and written. `sweep`
-/// removes temporary files of killed writers of the same file. "" or what went wrong.
+/// file or the new one. Anything else (a device, a FIFO, a link) is opened and written. `sweep`:
+/// SweepTemporaries() of its folder first. "" or what went wrong.
 [[nodiscard]] std::string WriteFile(const std::filesystem::path& path, const std::string& content,
                                     bool sweep = true);
+
+/// Removes temporary files of killed writers from a folder.
+void SweepTemporaries(const std::filesystem::path& folder);
 
 /// Writes all bytes; false with errno.
 [[nodiscard]] bool WriteBytes(int descriptor, std::string_view bytes);

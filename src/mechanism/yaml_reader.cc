@@ -96,7 +96,10 @@ std::optional<std::string> YamlReader::ReadFile() {
     return std::nullopt;
   }
   std::optional<std::string>* kept = KeptText(file_);
-  if (kept != nullptr && *kept) return **kept;
+  if (kept != nullptr && *kept) {
+    NoteInput(file_, **kept);
+    return **kept;
+  }
   std::ifstream stream(file_, std::ios::binary);
   std::string text;
   if (stream) {

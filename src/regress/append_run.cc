@@ -1,4 +1,5 @@
 // Appends a run to the history, judging it against the runs before.
+#include <fcntl.h>
 #include <fmt/format.h>
 #include <unistd.h>
 
@@ -268,8 +269,16 @@ std::string CheckHistory(const std::string& path) {
   if (!fs::exists(path, error)) {
     fs::path folder = fs::absolute(path, error).parent_path();
     while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-    if (fs::is_directory(folder, error) && access(folder.c_str(), W_OK) == 0) return "";
-    return fmt::format("history {}: cannot be made in {}", path, folder.string());
+    if (!fs::is_directory(folder, error) || access(folder.c_str(), W_OK) != 0) {
+      return fmt::format("history {}: cannot be made in {}", path, folder.string());
+    }
+    // Another file than the history itself, which another night may be making.
+    const fs::path trial = folder / fmt::format(".history.mbverify-{}", RandomLetters());
+    const int file = open(trial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+    if (file < 0) return fmt::format("history {}: {}", path, std::strerror(errno));
+    unlink(trial.c_str());
+    close(file);
+    return "";
   }
   if (!fs::is_regular_file(path, error)) return fmt::format("history {}: is no file", path);
   if (access(path.c_str(), W_OK) != 0) {

@@ -110,6 +110,9 @@ std::string RunFolder::Claim(const std::vector<std::string>& names) {
     claimed_.insert(name);
   }
   if (!trouble.empty()) return trouble;
+  std::set<fs::path> folders;
+  for (const std::string& name : names) folders.insert((out_ / name).parent_path());
+  for (const fs::path& folder : folders) SweepTemporaries(folder);
   std::string text = fmt::format("{}\n", kFilesSchema);
   for (const std::string& name : claimed_) {
     if (IsPlainPath(name)) text += fmt::format("{}\n", name);
@@ -149,6 +152,7 @@ void RunFolder::ForgetStates() const {
   std::error_code error;
   fs::remove_all(Own() / "state", error);
   fs::remove(Own() / "run", error);
+  SweepTemporaries(Own());
 }
 
 GoldenTraces RunFolder::Golden(const std::string& key) const {

@@ -29,11 +29,11 @@ class UserFilesTest : public testing::Test {
   }
   // The shipped slider crank under another name, with a scenario of its own.
   void PutModel(const std::string& folder, const std::string& name) const {
-    std::string text = ReadAll(MBV_SOURCE_DIR "/models/slider_crank/model.yaml");
+    std::string text = ReadAll(SourcePath("/models/slider_crank/model.yaml"));
     const std::string head = "name: slider_crank";
     text.replace(text.find(head), head.size(), "name: " + name);
     Put(folder + "/model.yaml", text);
-    std::string scenario = ReadAll(std::string(MBV_SOURCE_DIR "/") + kScenario);
+    std::string scenario = ReadAll(SourcePath("/") + kScenario);
     const std::string line = "mechanism: slider_crank";
     scenario.replace(scenario.find(line), line.size(), "mechanism: ./model.yaml");
     Put(folder + "/turn.yaml", scenario);
@@ -170,7 +170,8 @@ TEST_F(UserFilesTest, ReportsOfANightShareOneScript) {
 
 // Before every third change of a file, so that it takes seconds; tests/core kills before each.
 TEST_F(UserFilesTest, ARunKilledAtAnyCallLeavesTheOldOrTheNewResult) {
-  const std::string scenario = std::string(MBV_SOURCE_DIR "/") + kScenario;
+  const std::string scenario = SourcePath("/") + kScenario;
+  const std::string binary = std::string(kBinaryDir) + "/mbverify";
   const auto run = [&](const char* duration) {
     return mbverify(Run("'" + scenario + "' --set motion.duration_s=" + duration)).exit_code;
   };
@@ -180,8 +181,8 @@ TEST_F(UserFilesTest, ARunKilledAtAnyCallLeavesTheOldOrTheNewResult) {
   const auto program = [&] {
     const int nothing = open("/dev/null", O_RDWR);
     for (int stream : {0, 1, 2}) dup2(nothing, stream);
-    execl(MBV_BINARY_DIR "/mbverify", "mbverify", "run", scenario.c_str(), "--no-pictures", "-q",
-          "--out", mbverify.Out().c_str(), "--set", "motion.duration_s=1.5", nullptr);
+    execl(binary.c_str(), "mbverify", "run", scenario.c_str(), "--no-pictures", "-q", "--out",
+          mbverify.Out().c_str(), "--set", "motion.duration_s=1.5", nullptr);
     _exit(9);
   };
   for (int call = 1;; call += 3) {

@@ -1,4 +1,5 @@
 // What a night and a merge write into a folder that holds other things, too, and what they do not.
+#include <sys/resource.h>
 #include <sys/stat.h>
 
 #include <nlohmann/json.hpp>
@@ -17,7 +18,7 @@ class PublishingTest : public RegressTest {};
 
 TEST_F(PublishingTest, AFolderFullOfTheUsersFilesKeepsThem) {
   Scenario("agree");
-  Scenario("agree/fast");  // its result lies in the folder of the other one
+  Scenario("agree/agree_fast");  // its result lies in the folder of the other one
   const std::vector<std::string> mine = {".work/a",
                                          ".state/b",
                                          ".lock",
@@ -34,7 +35,7 @@ TEST_F(PublishingTest, AFolderFullOfTheUsersFilesKeepsThem) {
     for (const std::string& file : mine) EXPECT_EQ(Read(file), "mine") << file;
   }
   for (const char* file : {"index.html", "regress.json", "m/agree/summary.json",
-                           "m/agree/fast/summary.json", "logs/m/agree/fast.txt"}) {
+                           "m/agree/agree_fast/summary.json", "logs/m/agree/agree_fast.txt"}) {
     EXPECT_TRUE(fs::exists(file)) << file;
   }
 }
