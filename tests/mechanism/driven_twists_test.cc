@@ -5,6 +5,7 @@
 
 #include "mechanism/load_model.h"
 #include "tests/two_sliders.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -52,7 +53,7 @@ TEST(DrivenTwists, AFreeBodyGivesWayByItsInertia) {
 }
 
 TEST(DrivenTwists, ACrankTurnsItsLinkageAndNothingOfTheVehicle) {
-  const LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/vehicle_linkage/model.yaml");
+  const LoadResult loaded = LoadModel(SourcePath("/models/vehicle_linkage/model.yaml"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
   const DrivenTwists twists = TwistsOfDriven(m, {true});

@@ -52,8 +52,8 @@ TEST(MobilityReport, APlanarFourBarHasThreeRedundantConstraintsInOneLoop) {
   EXPECT_EQ(report.redundant[0].joints, (Names{"A", "B", "C", "D"}));
   // Forces along the axes and bending moments of the pins fight each other; forces in the plane and
   // the motor's torque are definite.
-  ASSERT_EQ(report.reactions.size(), 4u);
-  for (const UndeterminedReaction& reaction : report.reactions) {
+  ASSERT_EQ(report.home.reactions_not_unique.size(), 4u);
+  for (const UndeterminedReaction& reaction : report.home.reactions_not_unique) {
     EXPECT_EQ(reaction.components, (Names{"fz", "mx", "my"})) << reaction.joint;
   }
   EXPECT_TRUE(report.home.drive_forces_unique);
@@ -67,7 +67,7 @@ TEST(MobilityReport, TheSpatialSliderCrankIsStaticallyDeterminate) {
   EXPECT_EQ(report.loops[0].screw_rank, 6);
   EXPECT_TRUE(report.redundant.empty());
   EXPECT_TRUE(report.undetermined.empty());
-  EXPECT_TRUE(report.reactions.empty());
+  EXPECT_TRUE(report.home.reactions_not_unique.empty());
 }
 
 TEST(MobilityReport, ABallAtBothEndsLetsTheRodSpin) {
@@ -85,7 +85,7 @@ TEST(MobilityReport, TheStewartPlatformHasSixFreedomsAndNothingRedundant) {
   EXPECT_EQ(report.freedoms(), 6);
   EXPECT_EQ(report.loops.size(), 6u);
   EXPECT_TRUE(report.redundant.empty());
-  EXPECT_TRUE(report.reactions.empty());
+  EXPECT_TRUE(report.home.reactions_not_unique.empty());
 }
 
 TEST(MobilityReport, RedundancyIsSharedOutAmongTheLoopsThatHaveIt) {

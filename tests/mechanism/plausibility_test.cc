@@ -6,6 +6,7 @@
 #include "four_bar.h"
 #include "mechanism/load_model.h"
 #include "slip.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -85,7 +86,7 @@ TEST(Plausibility, WhatIsRareButPossibleRaisesNoDoubt) {
 TEST(Plausibility, NoShippedModelRaisesADoubt) {
   int models = 0;
   for (const auto& entry :
-       std::filesystem::directory_iterator(std::string(MBV_SOURCE_DIR) + "/models")) {
+       std::filesystem::directory_iterator(SourcePath("/models"))) {
     const auto file = entry.path() / "model.yaml";
     if (!std::filesystem::exists(file)) continue;
     ++models;

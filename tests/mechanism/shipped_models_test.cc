@@ -77,7 +77,9 @@ TEST(StabilizingPlatformModel, HasSixFreedomsOnTheShipAndTwoRedundantConstraints
 
 TEST(StabilizingPlatformModel, LoadsWithMasslessLinks) {
   const Mechanism m = LoadShipped("stabilizing_platform",
-                                  {.overrides = {{"link_mass_scale", 0.0}}, .override_places = {}});
+                                  {.overrides = {{"link_mass_scale", 0.0}},
+                                   .override_places = {},
+                                   .gravity_W = {}});
   for (const Body& body : m.bodies) {
     if (body.name.find("link") == std::string::npos) continue;
     EXPECT_EQ(body.mass, 0.0) << body.name;

@@ -27,6 +27,7 @@ SimulationRun RunFree(const Mechanism& m, const Motion& motion) {
             .X_WB = {},
             .mjcf = {},
             .warnings = {},
+            .notes = {},
             .not_unique = {}};
   }
   return Simulate(m, motion, testing::HoldStill(std::vector<double>(m.drives.size(), 0.0)),
