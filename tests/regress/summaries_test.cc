@@ -2,6 +2,7 @@
 #include "regress/summaries.h"
 
 #include <tinyxml2.h>
+#include <zlib.h>
 
 #include <functional>
 #include <map>
@@ -278,11 +279,26 @@ TEST(IndexHtml, DoesNotLinkToReportsThatWereNotWritten) {
   EXPECT_NE(html.find("model/case/summary.json"), std::string::npos);
 }
 
-// The head of a PNG that claims 60000 × 60000 pixels.
+// A chunk of a PNG: length, type, data and their check sum.
+std::string Chunk(const std::string& type, const std::string& data) {
+  const auto number = [](unsigned long value) {
+    std::string bytes;
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += static_cast<char>(value >> shift & 255U);
+    return bytes;
+  };
+  std::string body = type;
+  body += data;
+  const auto* bytes = reinterpret_cast<const Bytef*>(body.data());
+  return number(data.size())
+      .append(body)
+      .append(number(crc32(0, bytes, static_cast<uInt>(body.size()))));
+}
+
+// It claims 60000 × 60000 pixels, 10 GB, in a few bytes.
 TEST(Thumbnail, OfAPictureTooLargeIsNotMade) {
+  std::string head("\0\0\xea\x60\0\0\xea\x60\x08\x02\0\0\0", 13);
   std::string png = "\x89PNG\r\n\x1a\n";
-  png += std::string("\0\0\0\x0dIHDR\0\0\xea\x60\0\0\xea\x60\x08\x02\0\0\0", 25);
-  png += std::string("\0\0\0\0", 4);
+  png.append(Chunk("IHDR", head)).append(Chunk("IDAT", "x")).append(Chunk("IEND", ""));
   EXPECT_EQ(ThumbnailUri(png, 100), "");
 }
 
