@@ -84,7 +84,9 @@ test('A second run gives each compared scenario a curve of its past', async () =
   assert.match(await page.getAttribute('tbody svg', 'aria-label'), /last 2 runs/);
 });
 
-test('Every report of the run opens without errors and without any request', async () => {
+test('Every report of the run opens without errors and requests nothing but the night\'s script', async () => {
+  const script = fs.readdirSync(night).filter((name) => /^report-[0-9a-f]{16}\.js$/.test(name));
+  assert.equal(script.length, 1, 'one for all reports');
   const links = await page.$$eval('tbody a', (all) => all.map((a) => a.getAttribute('href')).filter(
       (href) => href.endsWith('report.html')));
   assert.ok(links.length >= 4, links.join());
@@ -97,7 +99,8 @@ test('Every report of the run opens without errors and without any request', asy
     const word = {agree: 'Agree', disagree: 'Disagree', not_run: 'Not run'}[summary.verdict];
     assert.ok((await report.innerText('.verdict')).includes(word), link);
     assert.deepEqual(found.trouble, [], link);
-    assert.deepEqual(found.requests.filter((url) => !url.startsWith('data:')), [pathToFileURL(file).href]);
+    assert.deepEqual(found.requests.filter((url) => !url.startsWith('data:')),
+        [file, path.join(night, script[0])].map((name) => pathToFileURL(name).href), link);
     assert.ok(fs.statSync(file).size < 3e6, link);
     await report.close();
   }
