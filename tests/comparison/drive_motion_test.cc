@@ -7,6 +7,7 @@
 #include <iterator>
 
 #include "tests/comparison/synthetic.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -128,7 +129,7 @@ TEST(DriveMotion, TheDocumentsSayTheSame) {
       "ommanded in task space, the simulation follows the drive positions, rates and accelerations "
       "that the closed form (else the reference) computes";
   for (const char* file : {"README.md", "docs/architecture.md", "docs/simulation.md"}) {
-    std::ifstream stream(std::string(MBV_SOURCE_DIR) + "/" + file);
+    std::ifstream stream(SourcePath(std::string("/") + file));
     std::string text{std::istreambuf_iterator<char>(stream), {}};
     for (char& c : text) {
       if (c == '\n') c = ' ';

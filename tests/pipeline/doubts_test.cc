@@ -13,15 +13,14 @@
 #include "pipeline/run_scenario.h"
 #include "reference/reference.h"
 #include "report/report.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
 
-std::string Shipped(const std::string& name) {
-  return std::string(MBV_SOURCE_DIR) + "/scenarios/" + name + ".yaml";
-}
+std::string Shipped(const std::string& name) { return SourcePath("/scenarios/" + name + ".yaml"); }
 
 std::string ReadText(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
@@ -42,8 +41,8 @@ struct Folder {
   }
 };
 
-RunOutcome Run(const std::string& file, std::vector<SetValue> set = {},
-               const std::string& out = "") {
+RunOutcome RunFile(const std::string& file, std::vector<SetValue> set = {},
+                   const std::string& out = "") {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = std::move(set);
@@ -88,7 +87,7 @@ TEST(Doubts, ForcesThatMuJoCoFindsNotUniqueAreNamed) {
       "lean.yaml",
       "mechanism: held_twice.yaml\nmotion: {duration_s: 1, sample_s: 0.02, commands: {lean: {sine: "
       "{amplitude: 0.2, period_s: 1}}}}\nanalytic: none\nsimulation: {mode: inverse}\n");
-  const RunOutcome outcome = Run(scenario, {}, (folder.path / "out").string());
+  const RunOutcome outcome = RunFile(scenario, {}, (folder.path / "out").string());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.report->simulated_not_unique, (std::vector<std::string>{"leg", "lean"}));
   ExpectSaidEverywhere(outcome, "the forces of leg, lean are not unique");
@@ -97,7 +96,7 @@ TEST(Doubts, ForcesThatMuJoCoFindsNotUniqueAreNamed) {
 }
 
 TEST(Doubts, UniqueForcesRaiseNone) {
-  const RunOutcome outcome = Run(Shipped("four_bar/turn_inverse"));
+  const RunOutcome outcome = RunFile(Shipped("four_bar/turn_inverse"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_TRUE(outcome.report->simulated_not_unique.empty());
   EXPECT_TRUE(outcome.report->findings.empty()) << outcome.report->findings.Text();
@@ -105,7 +104,7 @@ TEST(Doubts, UniqueForcesRaiseNone) {
 
 TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
   const Folder folder("disturbed");
-  std::string model = ReadText(std::string(MBV_SOURCE_DIR) + "/models/four_bar/model.yaml");
+  std::string model = ReadText(SourcePath("/models/four_bar/model.yaml"));
   // No pose near these closes the loop.
   const auto replace = [&](const std::string& from, const std::string& to) {
     ASSERT_TRUE(Has(model, from));
@@ -119,13 +118,14 @@ TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
       folder.Write("still.yaml",
                    "mechanism: disturbed.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: "
                    "{motor: home}}\nanalytic: none\nsimulation: {mode: inverse}\n");
-  const RunOutcome outcome = Run(scenario, {}, (folder.path / "out").string());
+  const RunOutcome outcome = RunFile(scenario, {}, (folder.path / "out").string());
   ExpectSaidEverywhere(outcome, "the loops close only from disturbed guesses");
 }
 
 TEST(Doubts, TheDriverIsNamedEverywhere) {
   const Folder folder("driver");
-  const RunOutcome outcome = Run(Shipped("spr_tripod/default_inverse"), {}, folder.path.string());
+  const RunOutcome outcome =
+      RunFile(Shipped("spr_tripod/default_inverse"), {}, folder.path.string());
   ExpectSaidEverywhere(outcome,
                        "ommanded in task space, the simulation follows the drive positions, rates "
                        "and accelerations that the closed form computes");
@@ -133,7 +133,7 @@ TEST(Doubts, TheDriverIsNamedEverywhere) {
 }
 
 TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
-  const RunOutcome outcome = Run(Shipped("spring_cart/swing"), {{"simulation.step_s", "0.01"}});
+  const RunOutcome outcome = RunFile(Shipped("spring_cart/swing"), {{"simulation.step_s", "0.01"}});
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Comparison& comparison = outcome.report->comparison;
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
@@ -143,7 +143,7 @@ TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
 }
 
 TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
-  const RunOutcome outcome = Run(Shipped("spring_cart/must_fail/stiffer_spring"));
+  const RunOutcome outcome = RunFile(Shipped("spring_cart/must_fail/stiffer_spring"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Attribution& attribution = outcome.report->comparison.attribution;
   EXPECT_FALSE(Has(attribution.text, "step_s")) << attribution.text;
@@ -152,7 +152,7 @@ TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
 
 // A free motion against a table of it: solver and simulation stand together against a wrong one.
 TEST(Doubts, InFreeMotionTwoComputationsStandAgainstATable) {
-  const RunOutcome run = Run(Shipped("spring_cart/swing"));
+  const RunOutcome run = RunFile(Shipped("spring_cart/swing"));
   ASSERT_TRUE(run.report) << run.diagnostics.Text();
   const Trace& trace = run.report->witnesses[1].trace;
   ASSERT_EQ(trace.witness, "reference");
@@ -166,8 +166,8 @@ TEST(Doubts, InFreeMotionTwoComputationsStandAgainstATable) {
     }
     const std::string csv = folder.Write("cart.csv", table);
     const RunOutcome outcome =
-        Run(Shipped("spring_cart/swing"),
-            {{"reference", "{csv: '" + csv + "', columns: {time: t, motor.position: x}}"}});
+        RunFile(Shipped("spring_cart/swing"),
+                {{"reference", "{csv: '" + csv + "', columns: {time: t, motor.position: x}}"}});
     ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
     const Comparison& comparison = outcome.report->comparison;
     if (off == 0.0) {
@@ -201,7 +201,7 @@ std::string GravityDoubtOf(double g, double density, Verdict* verdict) {
         fmt::format("{:.17g},{:.17g}\n", run.trace.time_s[i],
                     run.trace.values(static_cast<Eigen::Index>(i), run.trace.Find("motor.force")));
   }
-  const RunOutcome outcome = Run(
+  const RunOutcome outcome = RunFile(
       Shipped("four_bar/turn"),
       {{"reference", "{csv: '" + folder.Write("torque.csv", table) +
                          "', columns: {time: t, motor.force: T}, tolerance: {relative: 1e-3}}"}});

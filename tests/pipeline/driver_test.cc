@@ -4,6 +4,7 @@
 
 #include "pipeline/prepare.h"
 #include "reference/reference.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -20,8 +21,7 @@ struct Tripod {
     Diagnostics findings;
     ScenarioOptions options;
     options.set = {{"simulation.mode", mode}, {"motion.sample_s", "0.05"}};
-    prepared = Prepare(std::string(MBV_SOURCE_DIR) + "/scenarios/spr_tripod/default.yaml", options,
-                       &findings);
+    prepared = Prepare(SourcePath("/scenarios/spr_tripod/default.yaml"), options, &findings);
     if (!prepared) return;
     const Scenario& scenario = prepared->scenario;
     analytic = RunClosedForm(prepared->mechanisms.analytic, scenario.motion,
