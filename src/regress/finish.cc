@@ -40,6 +40,20 @@ std::map<std::string, std::string> Thumbnails(const RunFolder& folder,
   return thumbnails;
 }
 
+// A file that the user named; not one that a scenario was computed from. "" or what went wrong.
+std::string WriteElsewhere(const std::string& path, const std::string& text,
+                           const RegressReport& report) {
+  std::map<std::string, InputFile> inputs;  // models are read by many
+  for (const CaseResult& result : report.cases) {
+    for (const InputFile& input : result.input_files) inputs.emplace(input.file, input);
+  }
+  for (const auto& [file, input] : inputs) {
+    if (SameFile(path, {input}).empty()) continue;
+    return fmt::format("{} was read for a scenario: choose another output", path);
+  }
+  return WriteFile(path, text);
+}
+
 }  // namespace
 
 void AddTrouble(const std::string& text, RegressOutcome* outcome) {
@@ -78,7 +92,7 @@ void FinishNight(const RegressOptions& options, const RunFolder& folder, Regress
     keep(folder.path() / name, folder.Write(name, content));
   };
   const auto write_at = [&](const std::string& given, const char* name, const std::string& text) {
-    given.empty() ? write(name, text) : keep(given, WriteFile(given, text));
+    given.empty() ? write(name, text) : keep(given, WriteElsewhere(given, text, report));
   };
   for (const auto& [name, content] : options.shared_files) {
     AddTrouble(folder.Write(name, content), outcome);

@@ -75,6 +75,10 @@ TEST_F(PublishingTest, OutputsThatAreScenariosAreRefused) {
     (options_.*output).clear();
   }
   EXPECT_EQ(Calls(), 0);
+  // What a scenario reads is known when it has run.
+  options_.junit = "table.csv";
+  EXPECT_EQ(RunAll().exit_code, 2);
+  EXPECT_EQ(Read("table.csv"), "t,f");
 }
 
 // Each result whole: of the night before or of this one.
