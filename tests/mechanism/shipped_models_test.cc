@@ -79,6 +79,7 @@ TEST(StabilizingPlatformModel, LoadsWithMasslessLinks) {
   const Mechanism m = LoadShipped("stabilizing_platform",
                                   {.overrides = {{"link_mass_scale", 0.0}},
                                    .override_places = {},
+                                   .literals = {},
                                    .gravity_W = {}});
   for (const Body& body : m.bodies) {
     if (body.name.find("link") == std::string::npos) continue;
