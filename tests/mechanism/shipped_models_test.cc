@@ -79,8 +79,8 @@ TEST(StabilizingPlatformModel, LoadsWithMasslessLinks) {
   const Mechanism m = LoadShipped("stabilizing_platform",
                                   {.overrides = {{"link_mass_scale", 0.0}},
                                    .override_places = {},
-                                   .literals = {},
-                                   .gravity_W = {}});
+                                   .gravity_W = {},
+                                   .literals = {}});
   for (const Body& body : m.bodies) {
     if (body.name.find("link") == std::string::npos) continue;
     EXPECT_EQ(body.mass, 0.0) << body.name;
