@@ -117,7 +117,7 @@ double SampleClasses::Remains(double time_constant_s) const {
   return std::sqrt(after / (1.25 - after) * (static_cast<double>(near_break.size()) - n) / n);
 }
 
-MatX DriveForces(const Mechanism& mechanism, const Trace& trace) {
+MatX DriveForceTable(const Mechanism& mechanism, const Trace& trace) {
   MatX forces(trace.values.rows(), static_cast<Eigen::Index>(mechanism.drives.size()));
   for (size_t k = 0; k < mechanism.drives.size(); ++k) {
     const int column = trace.Find(mechanism.drives[k].name + ".force");

@@ -40,7 +40,7 @@ struct SampleClasses {
 };
 
 /// Forces of all drives: samples × drives. Every drive must have its channel.
-[[nodiscard]] MatX DriveForces(const Mechanism& mechanism, const Trace& trace);
+[[nodiscard]] MatX DriveForceTable(const Mechanism& mechanism, const Trace& trace);
 
 /// RMS of a force difference over the RMS of the true forces at all samples, worst unit [1]; NaN
 /// for a class without samples.

@@ -120,7 +120,7 @@ class Study {
     SimulatedWitness inverse = Simulate({.mode = SimulationMode::kInverse}, "inverse mode");
     if (!inverse.run.summary.ok()) return Fail("inverse mode: " + inverse.run.summary.message);
     truth_ = std::move(inverse.run.trace);
-    truth_forces_ = DriveForces(mechanism(), truth_);
+    truth_forces_ = DriveForceTable(mechanism(), truth_);
     for (const Output& output : mechanism().outputs) {
       const MatX positions = OutputPositions(output, truth_);
       extent_m_ = std::max(extent_m_, positions.cwiseAbs().maxCoeff());
@@ -173,7 +173,7 @@ class Study {
     }
     if (!run.point.failure.empty()) return run;
     const Trace& trace = witness.run.trace;
-    run.forces = DriveForces(mechanism(), trace);
+    run.forces = DriveForceTable(mechanism(), trace);
     run.point.steps = witness.run.steps;
     run.point.cpu_s = witness.run.loop_cpu_s;
     run.point.error = Error(run.forces - truth_forces_);
@@ -208,7 +208,7 @@ class Study {
 
   void RunCorrected() {
     const std::vector<double>& steps = options_.steps_s;
-    constexpr double kUsual = SimulationOptions{}.guidance_steps;
+    const double kUsual = SimulationOptions{}.guidance_steps;
     const std::vector<MatX> forces = AddSeries(
         {.name = "corrected_both",
          .title = fmt::format("corrected engine, step and time constant = {:g} steps", kUsual)},
@@ -232,7 +232,7 @@ class Study {
 
   void RunStock() {
     const std::vector<double>& steps = options_.steps_s;
-    constexpr double kUsual = SimulationOptions{}.stock_time_constant_steps;
+    const double kUsual = SimulationOptions{}.stock_time_constant_steps;
     AddSeries({.name = "stock_both",
                .title = fmt::format("stock engine, step and time constant = {:g} steps", kUsual),
                .stock = true},
