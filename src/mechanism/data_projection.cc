@@ -29,7 +29,7 @@ constexpr double kGapFactor = 30.0;
 constexpr double kLargestGap = 3e-3;
 constexpr int kPoses = 12;
 constexpr double kReach = 0.3;  // of the poses from home [rad, L]
-constexpr Eigen::Index kMostUnknowns = 1500;
+constexpr Eigen::Index kMostUnknowns = 800;
 
 BodyStates StatesAt(const std::vector<Pose>& X_WB) {
   BodyStates states;
