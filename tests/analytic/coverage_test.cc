@@ -11,6 +11,7 @@
 #include "mechanism/load_model.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -25,8 +26,8 @@ std::string TextOf(const std::vector<Finding>& findings) {
   return text;
 }
 
-Mechanism Load(const std::string& file) {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/" + file);
+Mechanism Shipped(const std::string& file) {
+  LoadResult loaded = LoadModel(SourcePath("/models/" + file));
   EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   return *std::move(loaded.mechanism);
 }
@@ -38,8 +39,8 @@ bool Mentions(const std::vector<Finding>& findings, const std::string& what) {
 class CoverageOfModel : public testing::TestWithParam<Case> {
  protected:
   CoverageOfModel()
-      : loaded_(LoadScenario(std::string(MBV_SOURCE_DIR "/scenarios/") + GetParam().model + "/" +
-                             GetParam().scenario)),
+      : loaded_(LoadScenario(
+            SourcePath("/scenarios/" + std::string(GetParam().model) + "/" + GetParam().scenario))),
         mechanism_(*loaded_.mechanism) {}
 
   // Drive forces of the reference at some instant of the scenario.
@@ -172,7 +173,7 @@ INSTANTIATE_TEST_SUITE_P(ClosedForms, CoverageOfModel,
                          [](const auto& c) { return std::string(c.param.model); });
 
 TEST(Coverage, NamesTheBodyTheNumberAndTheAssumption) {
-  Mechanism m = Load("stabilizing_platform/model.yaml");
+  Mechanism m = Shipped("stabilizing_platform/model.yaml");
   m.bodies[size_t(m.FindBody("limb2.link1"))].p_BoBcm_B.x() = 0.1;
   const std::vector<Finding> findings = FindUncovered(m);
   ASSERT_EQ(findings.size(), 1u) << TextOf(findings);
@@ -185,21 +186,21 @@ TEST(Coverage, NamesTheBodyTheNumberAndTheAssumption) {
 
 TEST(Coverage, NamesAnotherAssembly) {
   // The elbow of the platform's limb 2 inside instead of outside.
-  Mechanism m = Load("stabilizing_platform/model.yaml");
+  Mechanism m = Shipped("stabilizing_platform/model.yaml");
   const int link1 = m.FindBody("limb2.link1"), link2 = m.FindBody("limb2.link2");
   m.X_WB_home[size_t(link2)].linear() =
       m.X_WB_home[size_t(link1)].linear() * Eigen::AngleAxisd(-1.0, Vec3::UnitX());
   EXPECT_TRUE(Mentions(FindUncovered(m), "body limb2.link2: branch at home is -1"));
-  Mechanism scara = Load("scara_robot/model.yaml");
+  Mechanism scara = Shipped("scara_robot/model.yaml");
   for (Parameter& p : scara.parameters) p.value = p.name == "branch" ? -1.0 : p.value;
   EXPECT_TRUE(Mentions(FindUncovered(scara), "body limb3.rod: branch at home is -1"));
-  Mechanism cabin = Load("cabin_robot/model.yaml");
+  Mechanism cabin = Shipped("cabin_robot/model.yaml");
   cabin.X_WB_home[size_t(cabin.FindBody("EF"))].linear() = Mat3::Identity();
   EXPECT_TRUE(Mentions(FindUncovered(cabin), "body EF: branch at home is -1"));
 }
 
 TEST(Coverage, KinematicsDoesNotAskForMasses) {
-  Mechanism m = Load("spr_tripod/model.yaml");
+  Mechanism m = Shipped("spr_tripod/model.yaml");
   m.bodies[1].mass *= 2;
   const Coverage coverage = FindClosedForm(m.name)->coverage(m);
   EXPECT_EQ(FindUncovered(coverage, m, Concern::kDynamics).size(), 1u);
@@ -207,7 +208,7 @@ TEST(Coverage, KinematicsDoesNotAskForMasses) {
 }
 
 TEST(Coverage, TakesABodyWithoutMassAtTheEndOfAJoint) {
-  Mechanism m = Load("scara_robot/model.yaml");
+  Mechanism m = Shipped("scara_robot/model.yaml");
   m.bodies.push_back({.name = "camera", .frames = {}, .shapes = {}});
   Joint mount;
   mount.name = "mount";
@@ -221,7 +222,7 @@ TEST(Coverage, TakesABodyWithoutMassAtTheEndOfAJoint) {
 
 TEST(StiffnessCoverage, HoldsTheElasticModelsAndNamesABeamAServoAndAHinge) {
   for (const StiffnessFormRow& row : StiffnessForms()) {
-    const Mechanism m = Load(row.mechanism + "/elastic.yaml");
+    const Mechanism m = Shipped(row.mechanism + "/elastic.yaml");
     const auto uncovered = [&](const Mechanism& mechanism) {
       return FindUncovered(row.coverage(mechanism), mechanism, Concern::kStiffness);
     };
@@ -249,7 +250,7 @@ TEST(StiffnessCoverage, HoldsTheElasticModelsAndNamesABeamAServoAndAHinge) {
       EXPECT_TRUE(Mentions(uncovered(bent), "joint " + m.joints[k].name + ": centre"));
     }
   }
-  const Mechanism balls = Load("scara_robot/elastic_crossbar.yaml");
+  const Mechanism balls = Shipped("scara_robot/elastic_crossbar.yaml");
   EXPECT_TRUE(Mentions(
       FindUncovered(FindStiffnessForm(balls.name)->coverage(balls), balls, Concern::kStiffness),
       "limb1.cross_bar"));

@@ -10,12 +10,13 @@
 #include "analytic/scara_robot/reactions.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
 
 ScenarioResult Load(const std::string& scenario, const std::vector<SetValue>& set = {}) {
-  ScenarioResult loaded = LoadScenario(MBV_SOURCE_DIR "/scenarios/" + scenario, {.set = set});
+  ScenarioResult loaded = LoadScenario(SourcePath("/scenarios/" + scenario), {.set = set});
   EXPECT_TRUE(loaded.scenario && loaded.mechanism) << loaded.diagnostics.Text();
   return loaded;
 }

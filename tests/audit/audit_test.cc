@@ -56,7 +56,7 @@ TEST(AuditVerdict, TellsAnApproximationFromAnErrorByHowNearItIs) {
 // A corrected form whose limit is as large as the quantity itself is not confirmed by it.
 TEST(AuditTables, NoLimitExceedsTwoPercentOfItsQuantity) {
   for (const AuditEntry& entry : Audits()) {
-    for (const AuditRow& row : entry.run(MBV_SOURCE_DIR "/models").rows) {
+    for (const AuditRow& row : entry.run(SourcePath("/models")).rows) {
       if (row.verdict == AuditVerdict::kNotTestable) continue;
       EXPECT_LE(row.limit, 0.02 * row.scale) << entry.mechanism << " " << row.equation;
     }

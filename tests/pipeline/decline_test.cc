@@ -11,6 +11,7 @@
 #include "pipeline/check_file.h"
 #include "pipeline/run_scenario.h"
 #include "pipeline/workspace.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -18,7 +19,7 @@ namespace {
 namespace fs = std::filesystem;
 
 std::string ReadShipped(const std::string& file) {
-  std::ifstream stream(std::string(MBV_SOURCE_DIR) + "/" + file);
+  std::ifstream stream(SourcePath("/" + file));
   std::ostringstream text;
   text << stream.rdbuf();
   return text.str();
@@ -100,7 +101,7 @@ TEST(Decline, ACentreOfMassBesideTheLink) {
   EXPECT_NE(check.Text().find("the closed form will decline: body limb3.link1: centre of mass x"),
             std::string::npos)
       << check.Text();
-  EXPECT_TRUE(CheckFile(MBV_SOURCE_DIR "/models/stabilizing_platform/model.yaml").empty());
+  EXPECT_TRUE(CheckFile(SourcePath("/models/stabilizing_platform/model.yaml")).empty());
 }
 
 TEST(Decline, AMissingFractionIsNotTakenAsOneHalf) {
@@ -163,7 +164,7 @@ TEST(Decline, AnotherMechanismOfTheSameName) {
 }
 
 TEST(Decline, TheWorkspaceOfAnotherMechanismIsRefused) {
-  LoadResult loaded = LoadModel(MBV_SOURCE_DIR "/models/scara_robot/model.yaml");
+  LoadResult loaded = LoadModel(SourcePath("/models/scara_robot/model.yaml"));
   ASSERT_TRUE(loaded.mechanism);
   Mechanism bent = *loaded.mechanism;
   bent.joints[size_t(bent.FindJoint("limb3.motor"))].X_PF.translation().x() += 0.01;
@@ -183,7 +184,7 @@ TEST(Decline, AnElasticModelWithAnotherBeam) {
   const Copy copy("beam");
   std::string model = ReadShipped("models/scara_robot/elastic.yaml");
   Replace("parameters_from: model.yaml",
-          "parameters_from: \"" MBV_SOURCE_DIR "/models/scara_robot/model.yaml\"", &model);
+          "parameters_from: \"" + SourcePath("/models/scara_robot/model.yaml") + "\"", &model);
   Replace("beams: {bar: {from: D, to: B, section: rod,",
           "beams: {bar: {from: D, to: B, section: stout,", &model);
   Replace("sections: {rod:", "sections: {stout: {round: {diameter: 0.012}}, rod:", &model);

@@ -9,6 +9,7 @@
 #include "mechanism/load_model.h"
 #include "mechanism/urdf.h"
 #include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -60,8 +61,7 @@ Trace TraceOf(const RunOutcome& outcome, const std::string& witness) {
 class ExportedModel : public testing::TestWithParam<Case> {};
 
 TEST_P(ExportedModel, RunsAgainWithTheSameDriveForces) {
-  const std::string shipped =
-      fmt::format("{}/models/{}/model.yaml", MBV_SOURCE_DIR, GetParam().model);
+  const std::string shipped = SourcePath(fmt::format("/models/{}/model.yaml", GetParam().model));
   const LoadResult loaded = LoadModel(shipped);
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const fs::path folder = fs::path(testing::TempDir()) / "mbv_urdf_run" / GetParam().model;
