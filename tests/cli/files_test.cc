@@ -79,7 +79,8 @@ TEST_F(UserFilesTest, TheResultNamesEveryFileThatWasRead) {
     std::vector<std::string> files;
     for (const auto& entry : fs::recursive_directory_iterator(mbverify.Out())) {
       if (entry.path().filename() != "inputs.json") continue;
-      for (const auto& input : nlohmann::json::parse(ReadAll(entry.path()))["inputs"]) {
+      const auto json = nlohmann::json::parse(ReadAll(entry.path()));
+      for (const auto& input : json["inputs"]) {
         files.push_back(fs::path(input["file"].get<std::string>()).filename());
         EXPECT_EQ(input["fingerprint"].get<std::string>().size(), 16u);
       }
@@ -92,6 +93,7 @@ TEST_F(UserFilesTest, TheResultNamesEveryFileThatWasRead) {
   };
   const auto plain = inputs(kScenario);
   EXPECT_TRUE(has(plain, "turn.yaml") && has(plain, "model.yaml"));
+  EXPECT_TRUE(has(inputs("scenarios/four_bar/table_adams.yaml"), "adams.tab"));
   // An elastic model takes its parameters from the rigid one.
   const auto elastic = inputs("scenarios/scara_robot/stiffness.yaml");
   EXPECT_TRUE(has(elastic, "elastic.yaml") && has(elastic, "model.yaml"));
