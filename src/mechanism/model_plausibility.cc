@@ -20,7 +20,7 @@ constexpr double kThinnest = 22600e-9;   // [kg/m³], mass / extent³
 constexpr double kThinnestCloud = 1e-3;  // [kg/m³], mass / (radius of gyration)³
 constexpr double kFarOut = 10.0;         // lengths of the body, or of the mechanism
 constexpr double kNoMass = 1e-6;         // share of the heaviest body: stands in for nothing
-constexpr double kTooWide = 1.2;         // second moment over the largest that the extent allows
+constexpr double kTooWide = 1.05;         // second moment over the largest that the extent allows
 constexpr size_t kMostNames = 4;
 
 struct Points {

@@ -110,7 +110,7 @@ constexpr MetricRow kRows[] = {
     {Metric::kCommandAcceleration,
      "command_acceleration",
      "command_acceleration_nrmse",
-     "commanded acceleration, RMS",
+     "commanded acceleration",
      "",
      false,
      {1e-4, 1e-8, 1e-8}},

@@ -37,16 +37,16 @@ TEST(Reservations, LimitsWiderThanATenthVerifyNothing) {
 TEST(Reservations, OneWideLimitIsNamedAndNotCountedAsVerified) {
   Case c;
   const size_t all = c.Run().verified();
-  Widen(&c, Metric::kVelocity, 0.2);
+  Widen(&c, Metric::kReaction, 0.2);
   Widen(&c, Metric::kPoseM, 0.2);  // metres, in a mechanism of 1 m
   const Comparison comparison = c.Run();
   EXPECT_EQ(comparison.verdict, Verdict::kAgree);
   EXPECT_EQ(comparison.verified(), all - 6);
   EXPECT_EQ(comparison.blind(), 6u);
   EXPECT_NE(comparison.reason.find("6 more verify nothing"), std::string::npos);
-  EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.velocity_nrmse (0.2)"));
+  EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.reaction_nrmse (0.2)"));
   EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.pose_m (0.2 m)"));
-  Widen(&c, Metric::kVelocity, 0.1);
+  Widen(&c, Metric::kReaction, 0.1);
   Widen(&c, Metric::kPoseM, 0.1);
   EXPECT_TRUE(c.Run().reservations.empty());
 }

@@ -2,6 +2,8 @@
 #include <gtest/gtest.h>
 
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 
 #include "four_bar.h"
 #include "mechanism/load_model.h"
@@ -41,7 +43,8 @@ const Slip kDoubts[] = {
      "inertia: {xx: 1e2, yy: 2e6*crank^2/12, zz: 2e6*crank^2/12}", "are they in kg mm²"},
     {"InertiaAboutTheOrigin", "inertia: {xx: 1e-4, yy: 2*crank^2/12, zz: 2*crank^2/12}",
      "inertia: {xx: 1e-4, yy: 2*crank^2/3, zz: 2*crank^2/3}",
-     "m.yaml:11:3: warning: bodies.crank: its inertia about the centre of mass is 1.2"},
+     "m.yaml:11:3: warning: bodies.crank: its inertia about the centre of mass is 1.09 "
+     "times the largest"},
     {"CentreOfMassInMillimetres", "com: [crank/2, 0, 0]", "com: [100, 0, 0]",
      "is the centre of mass in millimetres?"},
     {"GuessInDegrees", "child: crank.foot, axis: z, guess_deg: 60",
@@ -85,8 +88,7 @@ TEST(Plausibility, WhatIsRareButPossibleRaisesNoDoubt) {
 
 TEST(Plausibility, NoShippedModelRaisesADoubt) {
   int models = 0;
-  for (const auto& entry :
-       std::filesystem::directory_iterator(SourcePath("/models"))) {
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
     const auto file = entry.path() / "model.yaml";
     if (!std::filesystem::exists(file)) continue;
     ++models;
@@ -97,14 +99,15 @@ TEST(Plausibility, NoShippedModelRaisesADoubt) {
   EXPECT_GE(models, 10);
 }
 
-// Guesses from which no loop closes: the program finds a closed pose by chance and says so.
+// Links in one line, folded back: no small motion of a joint narrows the gap, so that only chance
+// leads out of it.
 TEST(Plausibility, APoseFoundFromDisturbedGuessesIsSaidToBeChance) {
-  std::string text = Replaced(Slender(), "child: crank.foot, axis: z, guess_deg: 60",
-                              "child: crank.foot, axis: z, guess_deg: 90");
-  text = Replaced(text, "child: rocker.foot, axis: z, guess_deg: 60",
-                  "child: rocker.foot, axis: z, guess_deg: -90");
-  text = Replaced(text, "child: coupler.start, axis: z, guess_deg: -60",
-                  "child: coupler.start, axis: z, guess_deg: 90");
+  std::ifstream stream(SourcePath("/models/four_bar/model.yaml"));
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_EQ(WarningsOf(text), "");
+  text = Replaced(text, "guess_deg: 90}", "guess_deg: 0}");
+  text = Replaced(text, "guess_deg: -70}", "guess_deg: 180}");
+  text = Replaced(text, "guess_deg: 100}", "guess_deg: 0}");
   const std::string said = WarningsOf(text);
   EXPECT_NE(said.find("the loops close only from disturbed guesses"), std::string::npos) << said;
   EXPECT_NE(said.find("another assembly than meant"), std::string::npos) << said;
