@@ -114,12 +114,12 @@ bool JudgesMotion(const Comparison& comparison, Metric motion) {
 
 std::string OtherText(const Comparison& comparison, const Opinions& opinions) {
   const bool table = comparison.table && opinions.other == "reference";
-  return fmt::format(
-      "{}{} {} that differ by {} (worst at {})", table ? "" : "the ",
-      NameOf(comparison, opinions.other),
-      table ? std::string("gives ") + DriveNoun(opinions.differ->metric)
-            : std::string("which meets the command, needs ") + DriveNoun(opinions.differ->metric),
-      AmountOf(*opinions.differ), Place(opinions.differ->channel, opinions.differ->time_s));
+  const std::string who =
+      table ? NameOf(comparison, opinions.other) + " gives"
+            : "the " + NameOf(comparison, opinions.other) + ", which meets the command, needs";
+  return fmt::format("{} {} that differ by {} (worst at {})", who,
+                     DriveNoun(opinions.differ->metric), AmountOf(*opinions.differ),
+                     Place(opinions.differ->channel, opinions.differ->time_s));
 }
 
 // The opinions differ, and the simulation meets the command with the driver's.
