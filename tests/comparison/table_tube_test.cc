@@ -369,5 +369,25 @@ TEST(TableDiagnosis, ADifferenceThatNoneOfThemExplainsHasNoDiagnosis) {
   EXPECT_TRUE(comparison.table->diagnoses.empty()) << All(comparison);
 }
 
+// A signal that no metric of the pair is about: solver and simulation are measured in it too, in
+// its own unit, and stand against the table.
+TEST(TableTube, TwoComputationsStandAgainstAColumnInItsOwnUnit) {
+  TableCase c;
+  c.AddColumn("plate.x", [](double t) { return 0.3 * t + 8e-4 * std::sin(kOmega * t); });
+  c.table.columns.back().channel.unit = c.table.columns.back().unit = "m";
+  c.Print(1e-9);
+  synthetic::Bend(&c.base.simulated, "plate.x", 1e-9);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+  const std::string& text = comparison.attribution.text;
+  EXPECT_EQ(comparison.attribution.odd_one_out, "reference") << text;
+  EXPECT_NE(text.find("simulation and the generic solver agree to 1e-09 m, the table forces.csv "
+                      "differs by 0.00056 m in plate.x, RMS"),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("times its tolerance"), std::string::npos) << text;
+  EXPECT_EQ(text.find('%'), std::string::npos) << text;
+}
+
 }  // namespace
 }  // namespace mbv
