@@ -26,10 +26,12 @@ TEST(ConvergeCommand, PrintsTheTableAndWritesTheFiles) {
   // A second call replaces the first one's result.
   EXPECT_EQ(program(call).exit_code, 0);
   // Something else is not replaced.
-  fs::remove(folder / "converge.json");
+  fs::remove(folder / ".mbverify-files");
+  std::ofstream(folder / "converge.json") << "mine";
   const ProgramResult refused = program(call);
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_NE(refused.err.find("no mbverify result"), std::string::npos) << refused.err;
+  EXPECT_NE(refused.err.find("which mbverify did not write"), std::string::npos) << refused.err;
+  EXPECT_EQ(ReadAll(folder / "converge.json"), "mine");
 }
 
 TEST(ConvergeCommand, RefusesBadInputWithExitCode2AndWritesNothing) {
