@@ -216,6 +216,11 @@ class Scales {
   // Where nothing acts, forces are round-off, as of masses that go their own length in the time.
   void TakeRound() {
     const double acceleration = scale_.length_m / (motion_.duration_s * motion_.duration_s);
+    for (size_t b = 1; b < bodies_.size(); ++b) {
+      bodies_[b].acceleration = std::max(bodies_[b].acceleration, acceleration);
+      if (!twists_.moved[b]) continue;
+      scale_.force_N = std::max(scale_.force_N, mechanism_.bodies[b].mass * acceleration);
+    }
     for (size_t k = 0; k < rates_.size(); ++k) {
       for (size_t b = 1; b < bodies_.size(); ++b) {
         const Body& body = mechanism_.bodies[b];

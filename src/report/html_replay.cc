@@ -82,7 +82,12 @@ class ReplayWriter {
   void ChooseFrames() {
     if (input_.X_WB == nullptr || input_.X_WB->empty()) return;
     size_t good = 0;
-    while (good < input_.X_WB->size() && AllFinite((*input_.X_WB)[good])) ++good;
+    // A run that broke down has no poses from there on.
+    while (good < input_.X_WB->size() &&
+           (*input_.X_WB)[good].size() == mechanism_.bodies.size() &&
+           AllFinite((*input_.X_WB)[good])) {
+      ++good;
+    }
     const size_t numbers = 7 * std::max<size_t>(1, mechanism_.bodies.size() - 1);
     const size_t most = std::clamp<size_t>(kMaxNumbers / numbers, 2, kMaxFrames);
     const size_t stride = good == 0 ? 1 : (good - 1) / most + 1;
