@@ -76,11 +76,22 @@ class Scanner {
     const bool item = levels.size() > 1 || content.empty();
     const size_t colon = KeyEnd(content);
     const bool has_key = colon != std::string_view::npos;
+    if (has_key && lone_line_ > 0 && indent >= lone_indent_) {
+      NoKey(lone_, lone_line_, lone_indent_);  // it was no value of the key above
+      return;
+    }
+    lone_line_ = 0;
     if (!CheckLevel(indent, has_key || item)) return;
     for (size_t k = 1; k < levels.size(); ++k) levels_.push_back(levels[k]);
     if (!has_key && !item && !expects_value_ && !continues_) {
-      NoKey(content, indent);
+      NoKey(content, line_, indent);
       return;
+    }
+    if (!has_key && !item && expects_value_ && !content.starts_with('[') &&
+        !content.starts_with('{')) {
+      lone_ = content;
+      lone_line_ = line_;
+      lone_indent_ = indent;
     }
     Characters(line, at == std::string::npos ? line.size() : at);
     const std::string_view value =
@@ -127,13 +138,13 @@ class Scanner {
     return false;
   }
 
-  void NoKey(std::string_view content, int indent) {
+  void NoKey(std::string_view content, int line, int indent) {
     const size_t colon = content.find(':');
     if (colon != std::string_view::npos && colon > 0) {
-      Tell(line_, indent + static_cast<int>(colon) + 1, "there is no space after the colon",
+      Tell(line, indent + static_cast<int>(colon) + 1, "there is no space after the colon",
            "write KEY: VALUE");
     } else {
-      Tell(line_, indent + 1, "the line has no ': '", "write KEY: VALUE, or - VALUE in a list");
+      Tell(line, indent + 1, "the line has no ': '", "write KEY: VALUE, or - VALUE in a list");
     }
   }
 
@@ -205,6 +216,8 @@ class Scanner {
   int line_ = 0, last_line_ = 0;
   std::vector<int> levels_;  // columns at which the open levels start
   bool expects_value_ = false, continues_ = false;
+  std::string lone_;  // a line without key where a value was expected
+  int lone_line_ = 0, lone_indent_ = 0;
   int block_indent_ = -1;  // of the key whose text after | or > goes on; -1: none
   char quote_ = 0;
   int quote_line_ = 0, quote_column_ = 0;

@@ -277,6 +277,20 @@ class Aligner {
   size_t left_out_ = 0;
 };
 
+// Equal steps but for a few that leave rows out.
+bool HasHoles(const std::vector<int64_t>& counts) {
+  constexpr size_t kStepsPerHole = 20;
+  std::vector<int64_t> steps;
+  for (size_t i = 1; i < counts.size(); ++i) steps.push_back(counts[i] - counts[i - 1]);
+  std::vector<int64_t> sorted = steps;
+  std::sort(sorted.begin(), sorted.end());
+  const int64_t usual = sorted[sorted.size() / 2];
+  const auto others = static_cast<size_t>(
+      std::count_if(steps.begin(), steps.end(), [&](int64_t step) { return step != usual; }));
+  return usual > 0 && others > 0 && others * kStepsPerHole <= steps.size() &&
+         std::all_of(steps.begin(), steps.end(), [&](int64_t step) { return step % usual == 0; });
+}
+
 }  // namespace
 
 void DescribeTimes(ReferenceTable* table) {
@@ -298,6 +312,10 @@ void DescribeTimes(ReferenceTable* table) {
     const int64_t step = stamps.counts[i] - stamps.counts[i - 1];
     common = std::gcd(common, step);
     equal = equal && step == stamps.counts[1] - stamps.counts[0];
+  }
+  if (HasHoles(stamps.counts)) {
+    table->spacing_s = MedianStep(time_s);
+    return;
   }
   // Stamps rounded to `unit` around equal steps are off by one unit at most, endpoints included.
   table->uniform = equal || unevenness <= 1.01 / unit;

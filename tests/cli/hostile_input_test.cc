@@ -157,12 +157,12 @@ TEST_F(HostileInputTest, NamesOfAUrdfAreTextOrItIsRefused) {
 }
 
 TEST_F(HostileInputTest, ARunThatDoesNotFitIntoMemoryCouldNotRunAndSaysWhatIsLarge) {
-  // Found between what the program needs itself and what the samples need.
+  // Between what the program needs itself and what the samples need.
   const std::string run =
       "\"$mbverify\" run -q --no-pictures --set motion.sample_s=0.00002 --set "
       "simulation.mode=inverse --out '" +
       mbverify.Out() + "' scenarios/slider_crank/turn.yaml";
-  const ProgramResult result = mbverify.Script("ulimit -v 700000; " + run);
+  const ProgramResult result = mbverify.Script("ulimit -v 400000; " + run);
   EXPECT_EQ(result.exit_code, 3) << result.out << result.err;
   EXPECT_NE(result.err.find("out of memory: 100000 samples of"), std::string::npos) << result.err;
 }
@@ -171,7 +171,7 @@ TEST_F(HostileInputTest, SamplesTimesSignalsAreBounded) {
   const ProgramResult result = mbverify("check scenarios/slider_crank/turn.yaml");
   EXPECT_EQ(result.exit_code, 0);
   const ProgramResult large =
-      mbverify("run --no-pictures --set motion.sample_s=1e-6 scenarios/slider_crank/turn.yaml");
+      mbverify("run --no-pictures --set motion.sample_s=4e-6 scenarios/slider_crank/turn.yaml");
   EXPECT_EQ(large.exit_code, 2);
   EXPECT_NE(large.err.find("violate samples · signals <= 1e+07"), std::string::npos) << large.err;
   EXPECT_NE(large.err.find("choose motion.sample_s >="), std::string::npos) << large.err;

@@ -374,7 +374,7 @@ std::vector<Golden> Goldens() {
        At("16:22", "snapshots.times_s = 13 violates 0 <= t <= 12")},
       {"NegativeLimit", complete("checks: {force_max: -1}\n"),
        At("16:21", "checks.force_max = -1 violates checks.force_max > 0")},
-      {"SyntaxError", "mechanism: [\n", At("2:1", "YAML syntax: end of sequence flow not found")},
+      {"SyntaxError", "mechanism: [\n", At("1:12", "YAML syntax: the bracket [ is never closed")},
   };
 }
 
