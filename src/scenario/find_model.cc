@@ -59,7 +59,9 @@ std::vector<fs::path> ModelFolders(const fs::path& start) {
 std::optional<std::string> FindModel(const std::string& name, const fs::path& start) {
   if (name.find('/') != std::string::npos || name.ends_with(".yaml")) {
     const fs::path path = fs::path(name).is_absolute() ? fs::path(name) : start / name;
-    if (IsFile(path)) return Shown(path);
+    std::error_code error;
+    // A pipe will do.
+    if (fs::exists(path, error) && !IsFolder(path)) return Shown(path);
     return std::nullopt;
   }
   for (const fs::path& folder : ModelFolders(start)) {
