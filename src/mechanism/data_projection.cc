@@ -28,7 +28,7 @@ constexpr double kGapFactor = 30.0;
 // Larger gaps [L, rad] are no rounding.
 constexpr double kLargestGap = 3e-3;
 constexpr int kPoses = 12;
-constexpr double kReach = 0.3;  // of the poses from home [rad, L]
+constexpr double kReach = 0.8;  // of the poses from home [rad, L]
 constexpr Eigen::Index kMostUnknowns = 800;
 
 BodyStates StatesAt(const std::vector<Pose>& X_WB) {
@@ -93,6 +93,7 @@ class Projector {
   }
 
   [[nodiscard]] const Mechanism& mechanism() const { return mechanism_; }
+  [[nodiscard]] std::vector<Pose> HomePoses() const { return tree_.States(poses_[0]).X_WB; }
   [[nodiscard]] double moved_m() const { return length_ * Largest(3); }
   [[nodiscard]] double turned_rad() const { return Largest(0); }
 
@@ -138,6 +139,10 @@ class Projector {
         X_FM.push_back(JointPose(mechanism_.joints[j], q[j]));
       }
       CloseAsGiven(&X_FM);
+      // Beyond the range of the motion: no rounding.
+      if (k > 0 && At(X_FM, nullptr).lpNorm<Eigen::Infinity>() > kGapFactor * gap) {
+        poses_.pop_back();
+      }
     }
   }
 
@@ -146,15 +151,20 @@ class Projector {
     MatX J;
     VecX r = At(*X_FM, &J);
     for (int i = 0; i < 50; ++i) {
-      const VecX s = DampedStep(J * unit_.asDiagonal(), r, std::max(r.squaredNorm(), 1e-26));
-      std::vector<Pose> next = *X_FM;
-      tree_.Step(unit_.cwiseProduct(s), &next);
-      MatX J_next;
-      const VecX r_next = At(next, &J_next);
-      if (!(r_next.norm() < (1 - 1e-6) * r.norm())) return;
-      *X_FM = std::move(next);
-      r = r_next;
-      J = J_next;
+      const double before = r.norm();
+      double mu = std::max(r.squaredNorm(), 1e-26);
+      for (int attempt = 0; attempt < 12 && !(r.norm() < before); ++attempt, mu *= 30) {
+        const VecX s = DampedStep(J * unit_.asDiagonal(), r, mu);
+        std::vector<Pose> next = *X_FM;
+        tree_.Step(unit_.cwiseProduct(s), &next);
+        MatX J_next;
+        const VecX r_next = At(next, &J_next);
+        if (!(r_next.norm() < before)) continue;
+        *X_FM = std::move(next);
+        r = r_next;
+        J = J_next;
+      }
+      if (!(r.norm() < (1 - 1e-6) * before)) return;
     }
   }
 
@@ -236,7 +246,14 @@ DataProjection ProjectData(Mechanism* mechanism, double gap) {
   Projector projector(*mechanism, gap);
   if (projector.unknowns() > kMostUnknowns || !projector.Solve()) return projection;
   Mechanism projected = projector.mechanism();
-  if (!SolveHome(&projected).closed) return projection;
+  // Home is where it closes now; the guesses stay as they are.
+  std::vector<std::array<double, 6>> near;
+  for (const Joint& joint : mechanism->joints) near.push_back(joint.guess);
+  const auto home = JointCoordinatesAt(projected, projector.HomePoses(), near);
+  for (size_t j = 0; j < home.size(); ++j) projected.joints[j].guess = home[j];
+  const bool closed = SolveHome(&projected).closed;
+  for (size_t j = 0; j < home.size(); ++j) projected.joints[j].guess = near[j];
+  if (!closed) return projection;
   // What was redundant but for the gap must be so now.
   if (AnalyseMobility(projected).redundant != projection.redundant) return projection;
   *mechanism = std::move(projected);
