@@ -58,6 +58,7 @@ TEST(ServoSettings, WhatDoesNotGoTogetherIsSaid) {
   const ScenarioResult free = LoadScenarioText(
       "mechanism: spring_cart\n"
       "motion: {duration_s: 1, sample_s: 0.01, initial: {motor: 0.1}}\n"
+      "forces: {motor: 0}\n"
       "simulation: {mode: force_driven}\n",
       "scenarios/spring_cart/t.yaml");
   EXPECT_TRUE(Says(free.diagnostics.Text(), "every freedom needs a command"));
