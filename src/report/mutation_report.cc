@@ -89,6 +89,23 @@ std::string Row(const FaultResult& f, bool inverse, bool markdown) {
                      inverse ? fmt::format("{:<9}", by_inverse) : "", note);
 }
 
+// An instance's number of which forces know nothing: part of a long list, told together.
+bool IsIdle(const Mutation& m) {
+  return m.kind == NumberKind::kInstance && !m.own.detected && !std::isnan(m.proved_to);
+}
+
+std::string IdleText(const MutationReport& report, bool markdown) {
+  std::string names;
+  size_t count = 0;
+  for (const Mutation& m : report.mutations) {
+    if (!IsIdle(m)) continue;
+    names += (count++ == 0 ? "" : ", ") + (markdown ? "`" + m.name + "`" : m.name);
+  }
+  if (count == 0) return "";
+  return fmt::format("\n{}Numbers of instances that change no drive force ({}): {}.\n",
+                     markdown ? "" : "  ", count, names);
+}
+
 std::string CountText(const MutationReport& report) {
   const auto of_kind = [&](NumberKind kind) {
     return std::count_if(report.mutations.begin(), report.mutations.end(),
@@ -160,7 +177,10 @@ void SortBySensitivity(MutationReport* report) {
 std::string ToText(const MutationReport& report, bool markdown) {
   const bool inverse = HasInverse(report);
   std::string text = Head(report, inverse) + NumberHead(report, inverse, markdown);
-  for (const Mutation& m : report.mutations) text += Row(m, inverse, markdown);
+  for (const Mutation& m : report.mutations) {
+    if (!IsIdle(m)) text += Row(m, inverse, markdown);
+  }
+  text += IdleText(report, markdown);
   text += fmt::format(
       "\n{}The smallest relative error is the smallest one that was detected both ways; one {:g} % "
       "smaller was not.\n",

@@ -37,8 +37,9 @@ std::string LineOf(const std::string& text, const std::string& start) {
 }
 
 Mechanism Loaded(const std::string& text, const std::map<std::string, double>& overrides = {}) {
-  const LoadResult result =
-      LoadModelText(text, kModelFile, {.overrides = overrides, .override_places = {}});
+  LoadOptions options;
+  options.overrides = overrides;
+  const LoadResult result = LoadModelText(text, kModelFile, options);
   EXPECT_TRUE(result.mechanism) << result.diagnostics.Text();
   return result.mechanism.value_or(Mechanism{});
 }
@@ -195,8 +196,9 @@ TEST(ScaraModel, BentConstantsOfTheModelAreSeen) {
 }
 
 TEST(ScaraModel, UnreachableHomeIsRefused) {
-  const LoadResult result = LoadModelText(ModelText(), kModelFile,
-                                          {.overrides = {{"home_z", -0.4}}, .override_places = {}});
+  LoadOptions options;
+  options.overrides = {{"home_z", -0.4}};
+  const LoadResult result = LoadModelText(ModelText(), kModelFile, options);
   EXPECT_FALSE(result.mechanism);
   EXPECT_TRUE(result.diagnostics.has_errors());
 }

@@ -250,19 +250,24 @@ TEST(SprTripodWorkspace, StrokesThatReachBelowHalfTheBaseAreCountedWhole) {
 }
 
 TEST(SprTripodWorkspace, TwoWaysThatDifferAreAContradiction) {
-  // A filter cannot hide half of the workspace: the count is compared with the faces as it is, but
-  // strokes beyond a singular pose fold the faces.
-  Geometry folded = PaperGeometry();
-  folded.q_min = 0.26;
-  folded.q_max = 0.75;
-  WorkspaceOptions options;
-  options.mesh_intervals = {5, 10};
-  options.voxels = 30;
-  options.section_azimuths = 12;
-  const WorkspaceReport report = ReportWorkspace(folded, options);
-  ASSERT_TRUE(report.summary.ok()) << report.summary.message;
-  EXPECT_FALSE(report.contradictions.empty()) << report.text;
-  EXPECT_NE(report.text.find("DISAGREE: "), std::string::npos) << report.text;
+  WorkspaceReport report;
+  report.volumes = {
+      {"smooth faces", 1.0, 1e-9}, {"mesh", 1.0 - 1e-4, 2e-4}, {"voxels", 0.29, 0.01}};
+  report.mesh_error = -1e-4;
+  report.convergence_order = 2.01;
+  const Range regular{0.9, 1.9};
+  std::vector<std::string> found = Contradictions(report, regular);
+  ASSERT_EQ(found.size(), 1u);
+  EXPECT_EQ(found[0], "the volume by voxels is 71 % smaller than that by smooth faces");
+  report.volumes[2].value = 0.995;
+  EXPECT_TRUE(Contradictions(report, regular).empty());
+  report.convergence_order = 0.47;
+  EXPECT_EQ(Contradictions(report, regular).size(), 1u);
+  report.volumes[0].error = 1e-4;  // what the meshes are off by can no longer be told
+  EXPECT_TRUE(Contradictions(report, regular).empty());
+  EXPECT_EQ(Contradictions(report, {-0.1, 1.9}).size(), 1u);
+  report.volumes[1].value = kNan;
+  EXPECT_EQ(Contradictions(report, regular).size(), 1u);
 }
 
 TEST(SprTripodWorkspace, DigitsFollowTheErrorAndSectionsTheDimensions) {

@@ -5,6 +5,7 @@
 
 #include "audit/cabin_audit.h"
 #include "mechanism/load_model.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -15,7 +16,7 @@ constexpr double kBend = 1.0 + 1e-6;
 
 const Mechanism& Robot() {
   static const Mechanism mechanism =
-      *LoadModel(MBV_SOURCE_DIR "/models/cabin_robot/model.yaml").mechanism;
+      *LoadModel(SourcePath("/models/cabin_robot/model.yaml")).mechanism;
   return mechanism;
 }
 

@@ -78,7 +78,7 @@ joints: {hinge: {kind: revolute, parent: world, child: a, axis: z}}
 TEST(LoadModel, NumbersWrittenInPlaceAreListedAndMayBeReplaced) {
   const std::string text = R"(
 name: two
-parameters: {m: 3}
+parameters: {m: 1.5}
 parts:
   link:
     parameters: {length: 0.5}

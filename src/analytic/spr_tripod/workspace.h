@@ -134,6 +134,10 @@ struct WorkspaceReport {
   double mesh_error = kNan;                 ///< finest mesh against the smooth faces [m³]
   double convergence_order = kNan;          ///< of the mesh volume in the step; 2 expected
 };
+/// Volumes that differ by more than both errors, and signs that the faces are no boundary: det J
+/// (`det`: its range over the stroke) not positive, meshes that do not converge with order 2.
+[[nodiscard]] std::vector<std::string> Contradictions(const WorkspaceReport& report,
+                                                      const Range& det);
 [[nodiscard]] WorkspaceReport ReportWorkspace(const Geometry& geometry,
                                               const WorkspaceOptions& options = {});
 

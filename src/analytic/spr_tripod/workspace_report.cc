@@ -96,35 +96,6 @@ std::string AddVoxels(const Geometry& geometry, const WorkspaceOptions& options,
   return text;
 }
 
-// Two ways that differ by more than both errors, and signs that the faces are no boundary.
-void FindContradictions(const WorkspaceRanges& ranges, WorkspaceReport* report) {
-  const VolumeEstimate& faces = report->volumes.front();
-  for (const VolumeEstimate& other : report->volumes) {
-    const double difference = std::abs(other.value - faces.value);
-    if (difference <= other.error + faces.error) continue;
-    if (std::isnan(difference)) {
-      report->contradictions.push_back("some leg triples within the stroke have no regular pose");
-      continue;
-    }
-    report->contradictions.push_back(
-        fmt::format("the volume by {} is {:.2g} % {} than that by {}", other.way,
-                    100.0 * difference / std::abs(faces.value),
-                    other.value < faces.value ? "smaller" : "larger", faces.way));
-  }
-  if (!(ranges.det.lower > 0.0)) {
-    report->contradictions.push_back(
-        fmt::format("det J is not positive all over the stroke ({:.3g} … {:.3g}): the six faces "
-                    "need not bound the workspace",
-                    ranges.det.lower, ranges.det.upper));
-  }
-  const bool measurable = std::abs(report->mesh_error) > 10.0 * faces.error;
-  if (measurable && !(std::abs(report->convergence_order - 2.0) < kOrderTolerance)) {
-    report->contradictions.push_back(
-        fmt::format("the meshes converge with order {:.3f} instead of 2: the faces are not smooth",
-                    report->convergence_order));
-  }
-}
-
 std::string VerdictText(const WorkspaceReport& report) {
   if (report.contradictions.empty()) {
     return fmt::format("AGREE: {} ways to the volume differ by less than their errors\n",
@@ -205,6 +176,35 @@ std::string SectionsCsv(const Geometry& geometry, const WorkspaceOptions& option
 
 }  // namespace
 
+std::vector<std::string> Contradictions(const WorkspaceReport& report, const Range& det) {
+  std::vector<std::string> found;
+  const VolumeEstimate& faces = report.volumes.front();
+  for (const VolumeEstimate& other : report.volumes) {
+    const double difference = std::abs(other.value - faces.value);
+    if (difference <= other.error + faces.error) continue;
+    if (std::isnan(difference)) {
+      found.emplace_back("some leg triples within the stroke have no regular pose");
+      continue;
+    }
+    found.push_back(fmt::format("the volume by {} is {:.2g} % {} than that by {}", other.way,
+                                100.0 * difference / std::abs(faces.value),
+                                other.value < faces.value ? "smaller" : "larger", faces.way));
+  }
+  if (!(det.lower > 0.0)) {
+    found.push_back(
+        fmt::format("det J is not positive all over the stroke ({:.3g} … {:.3g}): the six faces "
+                    "need not bound the workspace",
+                    det.lower, det.upper));
+  }
+  const bool measurable = std::abs(report.mesh_error) > 10.0 * faces.error;
+  if (measurable && !(std::abs(report.convergence_order - 2.0) < kOrderTolerance)) {
+    found.push_back(
+        fmt::format("the meshes converge with order {:.3f} instead of 2: the faces are not smooth",
+                    report.convergence_order));
+  }
+  return found;
+}
+
 WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions& options) {
   MBV_DEMAND(options.gauss_points > kFewerPoints, options.gauss_points);
   WorkspaceReport report;
@@ -221,7 +221,9 @@ WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions
   const WorkspaceRanges ranges = RangesOf(geometry, 20);
   std::string within;
   if (options.voxels > 0) within = AddVoxels(geometry, options, ranges, &report);
-  FindContradictions(ranges, &report);
+  for (std::string& text : Contradictions(report, ranges.det)) {
+    report.contradictions.push_back(std::move(text));
+  }
   report.heights = options.heights.empty() ? RoundHeights(geometry) : options.heights;
   report.text = fmt::format("Reachable workspace of O_A, legs {} … {} m, home branch\n\n",
                             geometry.q_min, geometry.q_max);
