@@ -17,8 +17,12 @@ function pagesBelow(folder) {
 
 // Plots without a coloured curve, as [title].
 const emptyPlots = (page) => page.evaluate(() => {
+  // A copy that is made for reading: the browser warns about reading from others.
+  const copy = document.createElement('canvas').getContext('2d', {willReadFrequently: true});
   const coloured = (canvas) => {
-    const {data} = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
+    [copy.canvas.width, copy.canvas.height] = [canvas.width, canvas.height];
+    copy.drawImage(canvas, 0, 0);
+    const {data} = copy.getImageData(0, 0, canvas.width, canvas.height);
     let count = 0;
     for (let i = 0; i < data.length; i += 4) {
       const [r, g, b, a] = data.subarray(i, i + 4);
@@ -38,7 +42,11 @@ const settled = (page) => page.evaluate(() => new Promise((done) => {
 // Elements that reach beyond the right edge of the window.
 const tooWide = (page) => page.evaluate(() => {
   const {scrollWidth, clientWidth} = document.documentElement;
-  return scrollWidth > clientWidth ? [`${scrollWidth} px in a window of ${clientWidth} px`] : [];
+  if (scrollWidth <= clientWidth) return [];
+  const wide = [...document.querySelectorAll('body *')].filter((node) =>
+      !node.closest('.scroll, nav, svg') && node.scrollWidth > Math.max(node.clientWidth, clientWidth) + 1);
+  return [`${scrollWidth} px in a window of ${clientWidth} px, ` +
+          (last ? `${last.tagName} "${last.textContent.trim().slice(0, 60)}"` : 'cause not found')];
 });
 
 async function openOnce(browser, file) {

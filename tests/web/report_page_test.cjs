@@ -144,6 +144,17 @@ test('A click into a plot sets the time, a drag zooms all plots', async () => {
   for (const [min, max] of ranges) {
     assert.ok(Math.abs(max - min - 0.25 * (end - start)) < 0.02 * (end - start), `${min} ${max}`);
   }
+  // Every playhead stands where its own axis has the time of the click.
+  await frame();
+  const off = await page.evaluate(() => {
+    const {plots, timeline} = globalThis.mbverify;
+    return plots.views.filter((view) => view.plot).map((view) => {
+      const at = new DOMMatrix(getComputedStyle(view.head).transform).m41;
+      const {min, max} = view.plot.scales.x;
+      return Math.abs(at - (timeline.time - min) / (max - min) * view.plot.over.clientWidth);
+    });
+  });
+  assert.ok(off.length > 3 && off.every((pixels) => pixels < 1.5), off.join());
   await page.keyboard.press('0');
 });
 

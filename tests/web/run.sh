@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|night
+# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|night|gate
 set -eu
 mbverify=$1 source=$2 work=$3 node=$4 chromium=$5 what=$6
 cd "$source"
@@ -10,6 +10,17 @@ report)
     --set 'snapshots.times_s=[1.42]' --set 'snapshots.size_px=[640, 480]'
   MBV_PAGE=$work/page/stabilizing_platform/sea_state/report.html \
     exec "$node" --test tests/web/report_page_test.cjs
+  ;;
+gate)
+  # Errors far below round-off, a table, a motion at rest, one that fails, and forces given.
+  rm -rf "$work/gate"
+  for scenario in four_bar/static four_bar/table_matlab slider_crank/press stewart/wave \
+    spring_cart/swing spr_tripod/must_fail/simulated_com; do
+    "$mbverify" run "scenarios/$scenario.yaml" --quiet --no-pictures --out "$work/gate" >/dev/null ||
+      [ $? = 1 ]
+  done
+  "$node" --test tests/web/log_axis_test.mjs
+  exec "$node" tests/web/page_gate.cjs "$work/gate"
   ;;
 night)
   # Agree, disagree, could not run, bad input, and one that is not what its file says; run twice.
