@@ -12,7 +12,7 @@ namespace {
 
 using cabin_audit::Lengths;
 
-constexpr double kBend = 1.0 + 1e-6;
+constexpr double kBend = 1.0 + 1e-6, kBend_m = 1e-6;
 
 const Mechanism& Robot() {
   static const Mechanism mechanism =
@@ -40,7 +40,7 @@ TEST(CabinAudit, BentLengthsLeaveEquationsUnconfirmed) {
   const Lengths truth = cabin_audit::LengthsOf(Robot());
   const auto unconfirmed = [&](double Lengths::*length) {
     Lengths bent = truth;
-    bent.*length *= kBend;
+    bent.*length += kBend_m;  // some are zero
     std::set<std::string> equations = Unconfirmed(PositionRows(bent, truth));
     equations.merge(Unconfirmed(VelocityRows(bent, truth)));
     equations.merge(Unconfirmed(WristRows(bent, truth)));
