@@ -264,7 +264,13 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     comparison->verdict = Verdict::kNotRun;
     comparison->reason = input.motion->free() ? "no free motion could be compared"
                                               : "no drive force could be compared";
-    if (!comparison->pairs.empty()) comparison->reason += ": " + comparison->pairs.front().reason;
+    if (!comparison->pairs.empty()) {
+      // Rather of a pair that ran than of a witness that was switched off.
+      const auto ran = std::find_if(comparison->pairs.begin(), comparison->pairs.end(),
+                                    [](const PairComparison& p) { return p.samples > 0; });
+      comparison->reason +=
+          ": " + (ran == comparison->pairs.end() ? comparison->pairs.front() : *ran).reason;
+    }
     return;
   }
   comparison->reason = WhyHorizonTooLong(input, *comparison);

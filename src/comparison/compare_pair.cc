@@ -75,11 +75,13 @@ void ComparePoses(const ComparisonInput& input, const PairReader& reader, PairCo
       const Vec3 p_error = Pick(reader.measured, i, *a, 0) - Pick(reader.truth, j, *b, 0);
       const Mat3 R_a = RotRpy(Pick(reader.measured, i, *a, 3));
       const Mat3 R_b = RotRpy(Pick(reader.truth, j, *b, 3));
-      KeepWorst(&pair->metrics, Metric::kPoseM, {.value = p_error.norm(), .time_s = time_s, .channel = output.name});
+      KeepWorst(&pair->metrics, Metric::kPoseM,
+                {.value = p_error.norm(), .time_s = time_s, .channel = output.name});
       // A NaN matrix has no angle; the sum keeps the NaN.
       const Mat3 R_error = R_b.transpose() * R_a;
       const double angle = R_error.allFinite() ? LogRotation(R_error).norm() : kNan;
-      KeepWorst(&pair->metrics, Metric::kPoseRad, {.value = angle, .time_s = time_s, .channel = output.name});
+      KeepWorst(&pair->metrics, Metric::kPoseRad,
+                {.value = angle, .time_s = time_s, .channel = output.name});
     }
   }
 }

@@ -50,7 +50,7 @@ double LocalForce(const ComparisonInput& input, const ForceScale& scale,
   double smallest = kNan;
   for (const int body : {joint.parent, joint.child}) {
     const auto b = static_cast<size_t>(body);
-    if (!scale.moved[b]) continue;
+    if (b == 0) continue;
     double local = input.mechanism->bodies[b].mass * scale.acceleration[b];
     for (const JointError& error : errors) {
       if (error.joint->parent != body && error.joint->child != body) continue;

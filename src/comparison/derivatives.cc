@@ -142,10 +142,11 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
     const RestFloor rest = RestFloorOf(input, drive.unit, trace);
     const double velocity = std::max(rest.velocity, Rms(trace, drive.velocity));
     const double acceleration = std::max(rest.acceleration, Rms(trace, drive.acceleration));
-    const double judged =
-        std::min(MeasureDerivative(trace, drive.position, drive.velocity, velocity, out),
-                 MeasureDerivative(trace, drive.velocity, drive.acceleration, acceleration, out));
-    if (judged < 0.5) coarse += (coarse.empty() ? "" : ", ") + drive.name;
+    const double first =
+        MeasureDerivative(trace, drive.position, drive.velocity, velocity, out);
+    const double second =
+        MeasureDerivative(trace, drive.velocity, drive.acceleration, acceleration, out);
+    if (std::min(first, second) < 0.5) coarse += (coarse.empty() ? "" : ", ") + drive.name;
   }
   if (!coarse.empty()) {
     out->derivatives_gap = "the samples do not resolve the motion of " + coarse;

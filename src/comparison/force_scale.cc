@@ -89,7 +89,6 @@ class Scales {
     FindCarries(heaviest);
     FindForce();
     if (!scale_.acts) TakeRound();
-    scale_.moved = twists_.moved;
     for (const BodyMotion& body : bodies_) scale_.acceleration.push_back(body.acceleration);
     return std::move(scale_);
   }
@@ -177,9 +176,9 @@ class Scales {
     double largest = 0.0;
     for (size_t l = 0; l < loads_.size(); ++l) {
       const auto b = static_cast<size_t>(motion_.loads[l].body);
-      largest = std::max(
-          largest, loads_[l].force_N * VelocityOf(k, b, motion_.loads[l].p_BoQ_B).norm() +
-                       loads_[l].moment_Nm * twists_.V_WB[k][b].head<3>().norm());
+      largest =
+          std::max(largest, loads_[l].force_N * VelocityOf(k, b, motion_.loads[l].p_BoQ_B).norm() +
+                                loads_[l].moment_Nm * twists_.V_WB[k][b].head<3>().norm());
     }
     return largest;
   }
@@ -248,8 +247,8 @@ class Scales {
     }
     for (size_t l = 0; l < loads_.size(); ++l) {
       if (!twists_.moved[static_cast<size_t>(motion_.loads[l].body)]) continue;
-      scale_.force_N = std::max(
-          {scale_.force_N, loads_[l].force_N, loads_[l].moment_Nm / scale_.length_m});
+      scale_.force_N =
+          std::max({scale_.force_N, loads_[l].force_N, loads_[l].moment_Nm / scale_.length_m});
     }
     scale_.force_N = std::max(scale_.force_N, spring_N_);
     scale_.power_W = mechanism_.prescribed.empty() ? std::numeric_limits<double>::infinity()
@@ -261,8 +260,8 @@ class Scales {
   const Motion& motion_;
   const DrivenTwists& twists_;
   std::vector<Pose> X_WB_;
-  std::vector<Rates> rates_;         // drives, then prescribed joints
-  std::vector<LargestLoad> loads_;   // as motion_.loads
+  std::vector<Rates> rates_;        // drives, then prescribed joints
+  std::vector<LargestLoad> loads_;  // as motion_.loads
   std::vector<BodyMotion> bodies_;
   double spring_N_ = 0.0;
   bool acts_ = false;
@@ -309,7 +308,8 @@ RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_
     const double size = unit == position_unit ? 1.0 : unit == "rad" ? length_m : 1.0 / length_m;
     const Rates rates = DriveRates(drive, trace);
     floor.velocity = std::max(floor.velocity, ForceScale::kIdle * size * rates.velocity);
-    floor.acceleration = std::max(floor.acceleration, ForceScale::kIdle * size * rates.acceleration);
+    floor.acceleration =
+        std::max(floor.acceleration, ForceScale::kIdle * size * rates.acceleration);
   }
   return floor;
 }

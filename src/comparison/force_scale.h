@@ -22,7 +22,6 @@ struct ForceScale {
   std::map<std::string, double> of_unit;  ///< the largest of the compared drives by unit
   /// Gravity, motion, a load or a spring acts in the direction of some compared drive.
   bool acts = false;
-  std::vector<bool> moved;           ///< per body: drives can move it
   std::vector<double> acceleration;  ///< per body: gravity or what the motion asks for [m/s²]
   /// `force_N` at the fastest such body; infinite where no joint is prescribed [W].
   double power_W = 0.0;

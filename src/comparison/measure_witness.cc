@@ -139,7 +139,12 @@ std::optional<VecX> InputOf(const Mechanism& mechanism, const Trace& trace) {
 // and springs exchange with the motion, and the kinetic energy per duration. A base that moves
 // bodies which no drive carries has power of its own, which must not hide what the drives do: flows
 // count up to what the carried bodies can take.
-double PowerScale(const ComparisonInput& input, const Trace& trace) {
+struct PowerSize {
+  double scale = 0.0;     // of the balance [W]
+  double roundoff = 0.0;  // that the base's power leaves
+};
+PowerSize SizeOfPower(const ComparisonInput& input, const Trace& trace) {
+  constexpr double kRoundings = 16.0;
   const ForceScale force = ForceScaleOf(input, trace);
   const auto largest = [&](const std::string& name) {
     const int column = trace.Find(name);
@@ -163,21 +168,22 @@ double PowerScale(const ComparisonInput& input, const Trace& trace) {
     carried = std::max(carried,
                        trace.values.col(f).cwiseProduct(trace.values.col(v)).cwiseAbs().maxCoeff());
   }
-  return std::max(scale, std::min(flow, carried));
+  const bool base = !input.mechanism->prescribed.empty();
+  return {std::max(scale, std::min(flow, carried)), base ? kRoundings * kEps * flow : 0.0};
 }
 
 void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
   const int in = trace.Find("power.input"), rate = trace.Find("power.energy_rate");
   if (in < 0 || rate < 0 || trace.time_s.empty()) return;
-  const double scale = PowerScale(input, trace);
+  const PowerSize size = SizeOfPower(input, trace);
   std::vector<VecX> inputs = {trace.values.col(in)};
   if (auto recorded = InputOf(*input.mechanism, trace)) inputs.push_back(*std::move(recorded));
   for (const VecX& power : inputs) {
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i);
-      const double error = std::abs(power[row] - trace.values(row, rate));
-      KeepWorst(&out->metrics[Metric::kPower], error == 0.0 ? 0.0 : error / scale, trace.time_s[i],
-                "power.input");
+      const double error = std::abs(power[row] - trace.values(row, rate)) - size.roundoff;
+      KeepWorst(&out->metrics[Metric::kPower], error <= 0.0 ? 0.0 : error / size.scale,
+                trace.time_s[i], "power.input");
     }
   }
 }

@@ -34,7 +34,7 @@ const Measured* MeasuredOf(const Comparison& comparison, const CheckResult& chec
 bool ZeroPasses(const Comparison& comparison, const CheckResult& check) {
   if (!check.limit || !IsDriveForce(check.metric)) return false;
   const Measured* measured = MeasuredOf(comparison, check);
-  return measured != nullptr && measured->of_zero <= *check.limit;
+  return measured != nullptr && measured->of_zero < 1.0 && measured->of_zero <= *check.limit;
 }
 
 bool Judges(const ComparisonInput& input, const CheckResult& check) {
@@ -119,8 +119,9 @@ void ReserveTable(const ComparisonInput& input, const Comparison& comparison,
     }
   }
   if (!coarse.empty()) {
-    sentences->Add(name, fmt::format("a tube of more than {:g} % of the column verifies nothing: {}",
-                                     100.0 * table.coarsest, coarse));
+    sentences->Add(name,
+                   fmt::format("a tube of more than {:g} % of the column verifies nothing: {}",
+                               100.0 * table.coarsest, coarse));
   }
 }
 
@@ -162,21 +163,22 @@ std::vector<std::string> Reservations(const ComparisonInput& input, const Compar
     if (!pair.compared) continue;
     const CheckResult* force = comparison.FindCheck(pair.name() + ".force_nrmse");
     if (force != nullptr && pair.forces_act && ZeroPasses(comparison, *force)) {
-      sentences.Add(pair.name(), "the drive forces are so small that zero would pass, too: "
-                                 "verified is only that they cancel out");
+      sentences.Add(pair.name(),
+                    "the drive forces are so small that zero would pass, too: "
+                    "verified is only that they cancel out");
     }
     if (!pair.drives.empty() && pair.force_samples < kFewSamples) {
-      sentences.Add(pair.name(), fmt::format("forces were judged at {} sample{} only",
-                                             pair.force_samples,
-                                             pair.force_samples == 1 ? "" : "s"));
+      sentences.Add(pair.name(),
+                    fmt::format("forces were judged at {} sample{} only", pair.force_samples,
+                                pair.force_samples == 1 ? "" : "s"));
     }
     sentences.Add(pair.name(), Span(input, pair));
   }
   if (input.table != nullptr) ReserveTable(input, comparison, &sentences);
   for (const WitnessMetrics& witness : comparison.witnesses) {
     if (witness.derivatives_gap.empty()) continue;
-    sentences.Add(witness.witness, "rates were not checked against positions: " +
-                                       witness.derivatives_gap);
+    sentences.Add(witness.witness,
+                  "rates were not checked against positions: " + witness.derivatives_gap);
   }
   std::vector<std::string> all = sentences.Take();
   if (const std::string coarse = CoarseLimits(input, comparison); !coarse.empty()) {

@@ -118,8 +118,8 @@ TEST(DriveMotion, ADriveHeldStillIsComparedOnTheScaleOfOtherUnitsToo) {
     const PairComparison pair = ComparePair(c.Input(), bent, c.analytic);
     return pair.metrics.at(Metric::kAcceleration).value;
   };
-  EXPECT_NEAR(value(1e-10), 1e-10 / 0.1396, 1e-12);
-  EXPECT_NEAR(value(1e-3), 1e-3 / 0.1396, 1e-5);
+  EXPECT_NEAR(value(1e-10), 1e-10 / 0.13889, 1e-12);
+  EXPECT_NEAR(value(1e-3), 1e-3 / 0.13889, 1e-5);
 }
 
 }  // namespace

@@ -114,5 +114,16 @@ TEST(PowerScale, ThePowerOfTheBaseDoesNotHideTheDrives) {
   EXPECT_TRUE(Fails(c.Run(), "simulated.power_balance"));
 }
 
+TEST(PowerScale, RoundOffOfAHeavyBaseIsNoImbalance) {
+  Lifted c;
+  for (const char* name : {"power.input", "power.energy_rate", "power.base"}) {
+    Bend(&c.simulated, name, 1e11);
+  }
+  Bend(&c.simulated, "power.energy_rate", 1e-4);  // ten units in the last place
+  EXPECT_FALSE(Fails(c.Run(), "simulated.power_balance"));
+  Bend(&c.simulated, "power.energy_rate", 1e-3);
+  EXPECT_TRUE(Fails(c.Run(), "simulated.power_balance"));
+}
+
 }  // namespace
 }  // namespace mbv

@@ -175,7 +175,7 @@ TEST(Report, CountsTellRanComparedAndVerifiedApart) {
 
 TEST(Report, TheShortLineNamesVerdictValueAndLimit) {
   EXPECT_EQ(VerdictLine(MakeReport(BentCase()), {}),
-            "two_sliders / bent: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 17 "
+            "two_sliders / bent: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 18 "
             "checks exceed their limits\n");
 }
 
