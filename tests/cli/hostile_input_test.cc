@@ -16,7 +16,7 @@ class HostileInputTest : public testing::Test {
   Program mbverify{std::string("hostile_") +
                    testing::UnitTest::GetInstance()->current_test_info()->name()};
 
-  [[nodiscard]] std::string Write(const std::string& name, const std::string& content) const {
+  std::string Write(const std::string& name, const std::string& content) const {
     const fs::path path = mbverify.folder() / name;
     std::ofstream(path, std::ios::binary) << content;
     return path.string();
