@@ -58,6 +58,7 @@ TEST(AuditTables, NoLimitExceedsTwoPercentOfItsQuantity) {
   for (const AuditEntry& entry : Audits()) {
     for (const AuditRow& row : entry.run(SourcePath("/models")).rows) {
       if (row.verdict == AuditVerdict::kNotTestable) continue;
+      if (row.scale == 0.0) continue;  // said to vanish: nothing to measure the limit by
       EXPECT_LE(row.limit, 0.02 * row.scale) << entry.mechanism << " " << row.equation;
     }
   }

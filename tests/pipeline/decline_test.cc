@@ -58,7 +58,7 @@ struct Outcome {
   bool others_ran = false;
 };
 
-Outcome Run(const std::string& scenario, std::vector<SetValue> set = {}) {
+Outcome RunFile(const std::string& scenario, std::vector<SetValue> set = {}) {
   RunOptions options;
   options.pictures = false;
   set.emplace_back("simulation.mode", "inverse");
@@ -92,8 +92,9 @@ TEST(Decline, ACentreOfMassBesideTheLink) {
   Replace("com: [c_1_x, c_1*L1, c_1_z]", "com: [0.4, c_1*L1, c_1_z]", &model);
   const std::string file = copy.Model(model);
   const std::string scenario = copy.Scenario(
-      ReadShipped("scenarios/stabilizing_platform/static.yaml"), "stabilizing_platform");
-  ExpectDeclined(Run(scenario), "body limb1.link1: centre of mass x is 0.4 m",
+      ReadShipped("scenarios/stabilizing_platform/sea_state.yaml"), "stabilizing_platform");
+  ExpectDeclined(RunFile(scenario, {{"motion.sample_s", "0.1"}}),
+                 "body limb1.link1: centre of mass x is 0.4 m",
                  "the closed form of the stabilizing platform takes 0 m");
   // `check` says so for the model alone, too.
   const Diagnostics check = CheckFile(file);
@@ -112,9 +113,10 @@ TEST(Decline, AMissingFractionIsNotTakenAsOneHalf) {
   Replace("c_1*L1", "0.4*L1", &model);
   Replace("c_1*L1", "0.4*L1", &model);
   copy.Model(model);
-  ExpectDeclined(Run(copy.Scenario(ReadShipped("scenarios/stabilizing_platform/static.yaml"),
-                                   "stabilizing_platform")),
-                 "parameter c_1 is missing", "reads it by this name");
+  const std::string scenario = copy.Scenario(
+      ReadShipped("scenarios/stabilizing_platform/sea_state.yaml"), "stabilizing_platform");
+  ExpectDeclined(RunFile(scenario, {{"motion.sample_s", "0.1"}}), "parameter c_1 is missing",
+                 "reads it by this name");
 }
 
 TEST(Decline, ASpringOnTheCabinRobotAndTheTripod) {
@@ -125,7 +127,7 @@ TEST(Decline, ASpringOnTheCabinRobotAndTheTripod) {
                "\nsprings:\n  buffer: {from: " + from + ", to: " + to +
                ", stiffness: 1000, damping: 20, free_length: 0.1}\n");
     const std::string file = std::string("scenarios/") + name + "/static.yaml";
-    ExpectDeclined(Run(copy.Scenario(ReadShipped(file), name)),
+    ExpectDeclined(RunFile(copy.Scenario(ReadShipped(file), name)),
                    "spring-damper buffer of 1000 N/m and 20 N s/m", "has no springs");
   }
 }
@@ -141,11 +143,11 @@ TEST(Decline, ALoadOnABodyThatTheEquationsDoNotKnow) {
       copy.Scenario(ReadShipped("scenarios/cabin_robot/static.yaml") +
                         "\nloads: {cable: {on: camera, force: [10, -20, 5]}}\n",
                     "cabin_robot");
-  ExpectDeclined(Run(scenario), "load cable acts on camera", "takes loads on carriage");
+  ExpectDeclined(RunFile(scenario), "load cable acts on camera", "takes loads on carriage");
   // Without the load, a body without mass changes nothing.
   const std::string bare =
       copy.Scenario(ReadShipped("scenarios/cabin_robot/static.yaml"), "cabin_robot");
-  EXPECT_EQ(Run(bare).reason, "");
+  EXPECT_EQ(RunFile(bare).reason, "");
 }
 
 TEST(Decline, AnotherMechanismOfTheSameName) {
@@ -157,7 +159,7 @@ TEST(Decline, AnotherMechanismOfTheSameName) {
     copy.Model(model);
     std::string turn = ReadShipped("scenarios/four_bar/turn_inverse.yaml");
     Replace("analytic: none\n", "", &turn);
-    const Outcome outcome = Run(copy.Scenario(turn, "four_bar"));
+    const Outcome outcome = RunFile(copy.Scenario(turn, "four_bar"));
     EXPECT_EQ(outcome.exit_code, 0) << outcome.findings;
     EXPECT_NE(outcome.reason.find("is missing"), std::string::npos) << outcome.reason;
   }
