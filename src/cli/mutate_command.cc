@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <limits>
@@ -40,7 +41,8 @@ std::optional<double> ReadPercent(std::string text) {
   while (!text.empty() && (text.back() == '%' || text.back() == ' ')) text.pop_back();
   double value = 0.0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (error != std::errc() || end != text.data() + text.size() || !(value > 0.0)) return {};
+  if (error != std::errc() || end != text.data() + text.size()) return {};
+  if (!(value > 0.0) || !std::isfinite(value)) return {};
   return value / 100.0;
 }
 
