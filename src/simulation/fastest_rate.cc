@@ -1,6 +1,7 @@
 #include "simulation/fastest_rate.h"
 
 #include <Eigen/Eigenvalues>
+#include <cmath>
 
 namespace mbv::simulation {
 namespace {
@@ -41,9 +42,24 @@ MatX FreeMotions(const ConstraintSystem& system) {
   return Q.rightCols(nv - qr.rank());
 }
 
+// The part with most of the energy of a mode of velocities x.
+std::string PartOf(const std::vector<Elastic>& parts, const Eigen::VectorXcd& x, double rate) {
+  std::string name;
+  double most = -1.0;
+  for (const Elastic& part : parts) {
+    const std::complex<double> along = (part.u.cast<std::complex<double>>().transpose() * x)(0);
+    const double share = (part.k + part.c * rate) * std::norm(along);
+    if (share <= most) continue;
+    most = share;
+    name = part.name;
+  }
+  return name;
+}
+
 }  // namespace
 
-FastestRate FastestRateOf(const ConstraintSystem& system, const ServoGains& servo) {
+FastestRate FastestRateOf(const ConstraintSystem& system, const ServoGains& servo,
+                          double duration_s) {
   FastestRate fastest;
   const std::vector<Elastic> parts = ElasticParts(system, servo);
   if (parts.empty()) return fastest;
@@ -66,19 +82,26 @@ FastestRate FastestRateOf(const ConstraintSystem& system, const ServoGains& serv
   A.topRightCorner(n, n).setIdentity();
   A.bottomLeftCorner(n, n) = -M_N.solve(K);
   A.bottomRightCorner(n, n) = -M_N.solve(C);
-  // (2)
+  // (2), (3)
   const Eigen::EigenSolver<MatX> modes(A);
-  Eigen::Index worst = 0;
-  fastest.per_s = modes.eigenvalues().cwiseAbs().maxCoeff(&worst);
-  const Eigen::VectorXcd x = N * modes.eigenvectors().col(worst).head(n);
-  double most = -1.0;
-  for (const Elastic& part : parts) {
-    const double share = (part.k + part.c * fastest.per_s) *
-                         std::norm((part.u.cast<std::complex<double>>().transpose() * x)(0));
-    if (share <= most) continue;
-    most = share;
-    fastest.part = part.name;
+  Eigen::Index fast = 0, worst = 0;
+  fastest.per_s = modes.eigenvalues().cwiseAbs().maxCoeff(&fast);
+  for (Eigen::Index k = 0; k < modes.eigenvalues().size(); ++k) {
+    const double rate = std::abs(modes.eigenvalues()[k]);
+    const double damping = std::abs(modes.eigenvalues()[k].real());
+    const double lasts = damping * duration_s > 1.0 ? 1.0 / damping : duration_s;
+    const double drift = 1e-3 * std::pow(rate, 5) * lasts;
+    if (drift <= fastest.drift) continue;
+    fastest.drift = drift;
+    fastest.drift_per_s = rate;
+    worst = k;
   }
+  const auto part_of = [&](Eigen::Index k) {
+    const Eigen::VectorXcd x = N * modes.eigenvectors().col(k).head(n);
+    return PartOf(parts, x, std::abs(modes.eigenvalues()[k]));
+  };
+  fastest.part = part_of(fast);
+  fastest.drift_part = part_of(worst);
   return fastest;
 }
 

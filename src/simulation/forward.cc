@@ -63,35 +63,40 @@ RunSummary PutAtStart(Session* s, const DrivenSample& first) {
   return RunSummary::Done();
 }
 
+// A number rounded down to one digit.
+double Rounded(double x) {
+  const double digit = std::pow(10.0, std::floor(std::log10(x)));
+  return digit * std::floor(x / digit);
+}
+
 // Springs, dampers and servos against the step: a coarse step is told, one that cannot follow them
 // is refused before it gives numbers.
 RunSummary CheckStep(Session* s) {
-  const FastestRate fastest = FastestRateOf(s->system, s->options.servo);
-  const double step_s = AdjustedStep(s->motion, s->options.step_s);
-  const double per_period = 2.0 * std::numbers::pi / (fastest.per_s * step_s);
-  if (fastest.per_s == 0.0 || per_period >= kStepsPerPeriod) return RunSummary::Done();
-  // Rounded down to one digit.
-  double wanted_s = 2.0 * std::numbers::pi / (fastest.per_s * kStepsPerPeriod);
-  const double digit = std::pow(10.0, std::floor(std::log10(wanted_s)));
-  wanted_s = digit * std::floor(wanted_s / digit);
-  const std::string text = fmt::format(
-      "{} has a rate of {:.3g} rad/s at the start, a period of {:.2g} s: a step of {:g} s divides "
-      "it by {:.2g}; simulation.step_s = {:.1g} or less is needed",
-      fastest.part, fastest.per_s, 2.0 * std::numbers::pi / fastest.per_s, step_s, per_period,
-      wanted_s);
-  if (per_period >= kLeastStepsPerPeriod) {
-    s->run->notes.push_back(text);
-    return RunSummary::Done();
+  const FastestRate fastest = FastestRateOf(s->system, s->options.servo, s->motion.duration_s);
+  const double h = AdjustedStep(s->motion, s->options.step_s);
+  const double per_period = 2.0 * std::numbers::pi / (fastest.per_s * h);
+  if (fastest.per_s > 0.0 && per_period < kLeastStepsPerPeriod) {
+    const double wanted_s = Rounded(0.2 / fastest.per_s);
+    return {
+        .stop = Stop::kEngineFailure,
+        .message = fmt::format("{} has a rate of {:.3g} rad/s at the start, which a step of {:g} "
+                               "s cannot follow: simulation.step_s = {:.1g} or less is needed",
+                               fastest.part, fastest.per_s, h, wanted_s),
+        .time_s = 0.0,
+        .where = fastest.part,
+        .amount = wanted_s,
+        .unit = "s"};
   }
-  return {.stop = Stop::kEngineFailure,
-          .message = text,
-          .time_s = 0.0,
-          .where = fastest.part,
-          .amount = wanted_s,
-          .unit = "s"};
+  const double drift = fastest.drift * std::pow(h, 4);
+  if (drift <= kMostDrift) return RunSummary::Done();
+  s->run->notes.push_back(fmt::format(
+      "{} vibrates at {:.3g} rad/s at the start: with a step of {:g} s that drifts by about {:.0e} "
+      "of its amplitude; simulation.step_s = {:.1g} or less is needed",
+      fastest.drift_part, fastest.drift_per_s, h, drift,
+      Rounded(h * std::pow(kMostDrift / drift, 0.25))));
+  return RunSummary::Done();
 }
 
-// Diagonal of the box around all bodies at home, or the characteristic length.
 double ExtentOf(const Mechanism& mechanism) {
   Eigen::AlignedBox3d box;
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {

@@ -7,11 +7,9 @@
 namespace mbv {
 namespace {
 
-std::string Scenario(const std::string& name) {
-  return SourcePath("/scenarios/" + name + ".yaml");
-}
+std::string Scenario(const std::string& name) { return SourcePath("/scenarios/" + name + ".yaml"); }
 
-RunOutcome Run(const std::string& scenario, std::vector<SetValue> set = {}) {
+RunOutcome RunOf(const std::string& scenario, std::vector<SetValue> set = {}) {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = std::move(set);
@@ -24,6 +22,7 @@ std::vector<SetValue> Short(std::vector<SetValue> more = {}) {
                                 "{duration_s: 0.2, sample_s: 0.002, commands: {platform.x: {sine: "
                                 "{amplitude: 0.05, period_s: 0.8}}, platform.y: 0, platform.z: "
                                 "0.57}}"}};
+  set.emplace_back("snapshots.times_s", "[0]");
   set.insert(set.end(), more.begin(), more.end());
   return set;
 }
@@ -34,7 +33,7 @@ double ValueOf(const Report& report, const std::string& check) {
 }
 
 TEST(ForceDriven, TheMotionIsJudgedByWhereBentForcesLead) {
-  const RunOutcome outcome = Run("spr_tripod/force_driven", Short());
+  const RunOutcome outcome = RunOf("spr_tripod/force_driven", Short());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
   const CheckResult* position =
@@ -52,19 +51,19 @@ TEST(ForceDriven, TheMotionIsJudgedByWhereBentForcesLead) {
 
 TEST(ForceDriven, NamesWhatIsWrong) {
   const RunOutcome simulated =
-      Run("spr_tripod/force_driven", Short({{"simulation.parameters", "{m_platform: 30.0001}"}}));
+      RunOf("spr_tripod/force_driven", Short({{"simulation.parameters", "{m_platform: 30.0001}"}}));
   ASSERT_TRUE(simulated.report) << simulated.diagnostics.Text();
   EXPECT_EQ(simulated.exit_code, 1);
   EXPECT_EQ(simulated.report->comparison.attribution.odd_one_out, "simulated");
-  const RunOutcome analytic =
-      Run("spr_tripod/force_driven", Short({{"analytic", "{parameters: {m_platform: 30.0001}}"}}));
+  const RunOutcome analytic = RunOf("spr_tripod/force_driven",
+                                    Short({{"analytic", "{parameters: {m_platform: 30.0001}}"}}));
   ASSERT_TRUE(analytic.report) << analytic.diagnostics.Text();
   EXPECT_EQ(analytic.exit_code, 1);
   EXPECT_EQ(analytic.report->comparison.attribution.odd_one_out, "analytic");
 }
 
 TEST(ForceDriven, WorksWithTheReferencesForces) {
-  const RunOutcome outcome = Run("spr_tripod/force_driven", Short({{"analytic", "none"}}));
+  const RunOutcome outcome = RunOf("spr_tripod/force_driven", Short({{"analytic", "none"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
   EXPECT_EQ(outcome.report->driven_by, "reference");
@@ -72,7 +71,7 @@ TEST(ForceDriven, WorksWithTheReferencesForces) {
 
 TEST(ForceDriven, AHorizonOverWhichErrorsGrowTooFarVerifiesNothing) {
   const RunOutcome outcome =
-      Run("spr_tripod/force_driven", Short({{"checks.force_nrmse", "{forward: 0.05}"}}));
+      RunOf("spr_tripod/force_driven", Short({{"checks.force_nrmse", "{forward: 0.05}"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_NE(outcome.report->comparison.reason.find("too long to push"), std::string::npos)
@@ -80,7 +79,7 @@ TEST(ForceDriven, AHorizonOverWhichErrorsGrowTooFarVerifiesNothing) {
 }
 
 TEST(Servo, ForcesAreJudgedOnTheMotionReached) {
-  const RunOutcome outcome = Run("spr_tripod/servo", Short());
+  const RunOutcome outcome = RunOf("spr_tripod/servo", Short());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Report& report = *outcome.report;
   EXPECT_EQ(outcome.exit_code, 0) << report.comparison.reason;
@@ -96,7 +95,8 @@ TEST(Servo, ForcesAreJudgedOnTheMotionReached) {
 }
 
 TEST(Servo, FeedForwardTakesTheErrorAway) {
-  const RunOutcome outcome = Run("spr_tripod/servo", Short({{"simulation.feedforward", "forces"}}));
+  const RunOutcome outcome =
+      RunOf("spr_tripod/servo", Short({{"simulation.feedforward", "forces"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
   EXPECT_LT(ValueOf(*outcome.report, "simulated_vs_analytic.position_m"), 1e-9);
@@ -105,19 +105,19 @@ TEST(Servo, FeedForwardTakesTheErrorAway) {
 
 TEST(Servo, AStatedLimitOnTheCommandIsJudged) {
   const RunOutcome outcome =
-      Run("spr_tripod/servo", Short({{"checks.position_m", "{servo: 1e-4}"}}));
+      RunOf("spr_tripod/servo", Short({{"checks.position_m", "{servo: 1e-4}"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 1);
 }
 
 TEST(Servo, NamesWhatIsWrong) {
   const RunOutcome simulated =
-      Run("spr_tripod/servo", Short({{"simulation.parameters", "{m_platform: 30.001}"}}));
+      RunOf("spr_tripod/servo", Short({{"simulation.parameters", "{m_platform: 30.001}"}}));
   ASSERT_TRUE(simulated.report) << simulated.diagnostics.Text();
   EXPECT_EQ(simulated.exit_code, 1);
   EXPECT_EQ(simulated.report->comparison.attribution.odd_one_out, "simulated");
   const RunOutcome analytic =
-      Run("spr_tripod/servo", Short({{"analytic", "{parameters: {m_platform: 30.001}}"}}));
+      RunOf("spr_tripod/servo", Short({{"analytic", "{parameters: {m_platform: 30.001}}"}}));
   ASSERT_TRUE(analytic.report) << analytic.diagnostics.Text();
   EXPECT_EQ(analytic.exit_code, 1);
   EXPECT_EQ(analytic.report->comparison.attribution.odd_one_out, "analytic");
@@ -125,15 +125,34 @@ TEST(Servo, NamesWhatIsWrong) {
 
 TEST(Servo, AStepThatCannotFollowTheGainsIsRefusedWithTheStepNeeded) {
   const RunOutcome outcome =
-      Run("spr_tripod/servo", Short({{"simulation.kp", "1e9"}, {"simulation.kv", "1"}}));
+      RunOf("spr_tripod/servo", Short({{"simulation.kp", "1e9"}, {"simulation.kv", "1"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 3);
   EXPECT_NE(outcome.report->comparison.reason.find("simulation.step_s = "), std::string::npos)
       << outcome.report->comparison.reason;
 }
 
+TEST(StiffSpring, TheStepThatIsNeededIsSaidBeforeTheMotionIsOff) {
+  std::vector<SetValue> set = {{"motion.duration_s", "0.5"}, {"snapshots.times_s", "[0]"}};
+  set.emplace_back("parameters.k", "8e4");
+  const RunOutcome coarse = RunOf("spring_cart/swing", set);
+  ASSERT_TRUE(coarse.report) << coarse.diagnostics.Text();
+  EXPECT_NE(coarse.report->findings.Text().find("simulation.step_s = 0.0005 or less is needed"),
+            std::string::npos)
+      << coarse.report->findings.Text();
+  set.back().second = "8e6";
+  const RunOutcome refused = RunOf("spring_cart/swing", set);
+  ASSERT_TRUE(refused.report) << refused.diagnostics.Text();
+  EXPECT_EQ(refused.exit_code, 3);
+  EXPECT_NE(refused.report->comparison.reason.find("or less is needed"), std::string::npos)
+      << refused.report->comparison.reason;
+  set.back().second = "80";
+  EXPECT_EQ(RunOf("spring_cart/swing", set).report->findings.Text().find("step_s"),
+            std::string::npos);
+}
+
 TEST(EngineErrors, DefaultsAndTheBestRecipeAreNamedWithAndWithoutTheFirstMoments) {
-  const RunOutcome outcome = Run("spr_tripod/default", Short({{"simulation.stock_too", "true"}}));
+  const RunOutcome outcome = RunOf("spr_tripod/default", Short({{"simulation.stock_too", "true"}}));
   ASSERT_TRUE(outcome.report && outcome.report->engine_comparison) << outcome.diagnostics.Text();
   const std::vector<EngineError>& engines = outcome.report->engine_comparison->engines;
   ASSERT_EQ(engines.size(), 3U);

@@ -50,13 +50,20 @@ FastestRate RateOf(const Mechanism& m) {
   const DataHandle data = MakeData(*engine.m);
   ConstraintSystem system(engine, data.get());
   system.EvaluatePosition();
-  return FastestRateOf(system, {});
+  return FastestRateOf(system, {}, 6.0);
 }
 
 TEST(FastestRate, OfASpringIsTheSquareRootOfStiffnessOverMass) {
   const FastestRate rate = RateOf(Cart(8e4, 0.0));
   EXPECT_NEAR(rate.per_s, 200.0, 1e-6);
   EXPECT_EQ(rate.part, "spring 'spring'");
+}
+
+// The drift that a cart on a spring of 200 rad/s was measured to have in 6 s at 1 ms.
+TEST(FastestRate, TellsHowFarASpringDrifts) {
+  const FastestRate rate = RateOf(Cart(8e4, 0.0));
+  EXPECT_NEAR(rate.drift * 1e-12, 1.9e-3, 1e-4);
+  EXPECT_EQ(rate.drift_part, "spring 'spring'");
 }
 
 TEST(FastestRate, OfAStrongDamperIsDampingOverMass) {
