@@ -59,7 +59,9 @@ void AddRounding(const Mechanism& m, CheckLimits* limits) {
   const double gap_m = GapRounding(Reach(LongestLever(m), m.X_WB_home));
   for (const MetricRow& row : MetricRows()) {
     const bool length = std::string(row.unit) == "m";
-    const double more = length ? gap_m : kAmplified * gap_m / CharacteristicLength(m);
+    // Moments of reactions are judged at an arm of a millimetre.
+    const double arm_m = row.metric == Metric::kReaction ? 1e-3 : CharacteristicLength(m);
+    const double more = length ? gap_m : kAmplified * gap_m / arm_m;
     MetricLimits& of = (*limits)[row.metric];
     for (std::optional<double>* limit : {&of.forward, &of.inverse, &of.reference}) {
       if (*limit) **limit += more;
