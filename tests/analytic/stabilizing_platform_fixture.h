@@ -62,6 +62,7 @@ inline Mechanism MechanismOfNames(const std::map<std::string, double>& parameter
   m.name = "stabilizing_platform";
   for (const auto& [name, value] : parameters) {
     m.parameters.push_back({.name = name, .value = value, .unit = "", .note = ""});
+    if (name == "g") m.gravity_W = Vec3(0, 0, -value);
   }
   auto add_body = [&](const std::string& name) {
     Body body;
