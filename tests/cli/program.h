@@ -2,6 +2,7 @@
 #pragma once
 
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <cstdlib>
 #include <filesystem>
@@ -25,11 +26,12 @@ struct ProgramResult {
   std::string out, err;  ///< stdout, stderr
 };
 
-/// A temporary folder with a program run in the project's folder.
+/// A temporary folder of this process' own with a program run in the project's folder.
 class Program {
  public:
   explicit Program(const std::string& name)
-      : folder_(std::filesystem::temp_directory_path() / ("mbv_cli_" + name)) {
+      : folder_(std::filesystem::temp_directory_path() /
+                ("mbv_cli_" + name + "_" + std::to_string(getpid()))) {
     std::filesystem::remove_all(folder_);
     std::filesystem::create_directories(folder_);
   }
