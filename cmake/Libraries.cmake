@@ -1,9 +1,11 @@
 # Finds the libraries that mbverify links; the installed package uses this file too. What is missing
 # is listed in MBV_MISSING with the Debian package that brings it.
 set(MBV_MISSING "")
+set(MBV_DEBIAN_PACKAGES liburdfdom-dev libosmesa6-dev)
 
 macro(mbv_find package debian_package)
   find_package(${package} QUIET ${ARGN})
+  list(APPEND MBV_DEBIAN_PACKAGES ${debian_package})
   if(NOT ${package}_FOUND)
     list(APPEND MBV_MISSING "${package} (${debian_package})")
   endif()

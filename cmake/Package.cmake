@@ -3,8 +3,7 @@
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME mbverify)
 set(CPACK_PACKAGE_VENDOR mbverify)
-set(CPACK_PACKAGE_CONTACT "mbverify developers <mbverify@localhost>")
-set(CPACK_PACKAGE_HOMEPAGE_URL "")
+set(CPACK_PACKAGE_CONTACT "mbverify developers <mbverify@users.noreply.github.com>")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_COMPONENTS_ALL runtime development)
@@ -27,8 +26,11 @@ set(CPACK_COMPONENT_RUNTIME_DESCRIPTION
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libmbverify-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(linked ${MBV_DEBIAN_PACKAGES})
+list(REMOVE_ITEM linked libgtest-dev libbenchmark-dev)
+list(JOIN linked ", " linked)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS
-    "mbverify (= ${PROJECT_VERSION}-1), cmake, pkg-config, ${MBV_DEVELOPMENT_PACKAGES}")
+    "mbverify (= ${PROJECT_VERSION}-1), cmake, ${linked}")
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION
 "verifier of the dynamics of closed-loop mechanisms (development files)
  Headers, static libraries and the CMake package of mbverify, for programs with
