@@ -5,7 +5,7 @@
 //   M_N ẍ + C_N ẋ + K_N x = 0,   A_N = Nᵀ A N,
 //   K = Σ k u uᵀ, C = Σ c u uᵀ   (u: gradient of a spring's length or of a servo's coordinate)  (1)
 // and the rates are |λ| of [0 I; −M_N⁻¹K_N −M_N⁻¹C_N].                                        (2)
-// The fourth-order scheme lets a mode drift, as measured on springs of many stiffnesses, by about
+// The fourth-order scheme lets a mode drift, as measured on one spring, by about
 //   1e-3 (|λ| h)⁴ |λ| min(T, 1/|Re λ|)                                                        (3)
 // of its amplitude over a motion of length T.
 // Geometric stiffness (loads, gravity) is left out: it is slow beside what is asked for here.
