@@ -1,21 +1,12 @@
 #include "analytic/stiffness_form_checks.h"
+#include "core/text.h"
 
 #include <fmt/format.h>
 
 #include <algorithm>
 
 namespace mbv {
-namespace {
-
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint = {}) {
-  diagnostics->Add({.file = {}, .message = std::move(message), .hint = std::move(hint)});
-}
-
-bool Contains(std::span<const std::string> names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-}  // namespace
+namespace {}  // namespace
 
 void CheckPoseNames(const Mechanism& mechanism, const PoseNames& names, const PoseCoordinates& pose,
                     Diagnostics* diagnostics) {
@@ -28,7 +19,7 @@ void CheckPoseNames(const Mechanism& mechanism, const PoseNames& names, const Po
   }
   for (const std::string& name : names.needed) {
     if (!pose.contains(name)) {
-      AddError(diagnostics, fmt::format("{} is not given", name), names.hint);
+      diagnostics->AddError("", fmt::format("{} is not given", name), names.hint);
     }
   }
 }
@@ -38,15 +29,16 @@ void CheckStiffnessParameters(const Mechanism& mechanism, std::span<const std::s
   for (const auto& names : {positive, others}) {
     for (const std::string& name : names) {
       if (mechanism.HasParameter(name)) continue;
-      AddError(diagnostics, fmt::format("the model has no parameter \"{}\"", name),
-               fmt::format("the stiffness of {0} needs models/{0}/elastic.yaml", mechanism.name));
+      diagnostics->AddError(
+          "", fmt::format("the model has no parameter \"{}\"", name),
+          fmt::format("the stiffness of {0} needs models/{0}/elastic.yaml", mechanism.name));
     }
   }
   for (const std::string& name : positive) {
     if (!mechanism.HasParameter(name)) continue;
     const double value = mechanism.ParameterValue(name);
     if (value > 0.0) continue;
-    AddError(diagnostics, fmt::format("{} = {:g} violates {} > 0", name, value, name));
+    diagnostics->AddError("", fmt::format("{} = {:g} violates {} > 0", name, value, name));
   }
 }
 
@@ -55,8 +47,8 @@ int IndexOfModel(std::span<const std::string> models, const std::string& model,
   if (model.empty()) return 0;
   const auto found = std::find(models.begin(), models.end(), model);
   if (found != models.end()) return static_cast<int>(found - models.begin());
-  AddError(diagnostics, fmt::format("unknown model \"{}\"", model),
-           fmt::format("models: {}", fmt::join(models, ", ")));
+  diagnostics->AddError("", fmt::format("unknown model \"{}\"", model),
+                        fmt::format("models: {}", fmt::join(models, ", ")));
   return -1;
 }
 

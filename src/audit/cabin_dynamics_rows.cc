@@ -13,7 +13,8 @@ namespace {
 constexpr double kForceLimit =
     1e-8;  // of up to 4 kN; closure 1e-13 m and conditioning of the loops
 
-AuditRow Texts(const char* equation, const char* printed, const char* corrected, const char* note) {
+AuditRow DynamicsTexts(const char* equation, const char* printed, const char* corrected,
+                       const char* note) {
   return TextRow(equation, printed, corrected, "N, N m", kForceLimit, note);
 }
 
@@ -77,16 +78,19 @@ Mechanism WithoutCarriageAndPayload(Mechanism mechanism) {
 }  // namespace
 
 std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism, const Mechanism& truth) {
-  RowMeter bodies(Texts("(47)", "T, U over platform, three drive branches and four wrist bodies",
-                        "carriage and payload added; branches are slider + link",
-                        "drive forces against the generic reference solver; how much the print "
-                        "leaves out rests on masses assumed here: the paper prints none of the "
-                        "carriage and the payload"));
-  RowMeter lagrange(Texts("(48), (50)–(52)", "Lagrange's equation and virtual work", "",
-                          "drive forces with an end-effector wrench against the reference solver"));
-  RowMeter wrench(Texts("(53)", "τ = JᵀQ", "τ = −JᵀW for a wrench W acting on the end effector",
-                        "right for Q exerted by the end effector; difference of forces with and "
-                        "without the wrench"));
+  RowMeter bodies(
+      DynamicsTexts("(47)", "T, U over platform, three drive branches and four wrist bodies",
+                    "carriage and payload added; branches are slider + link",
+                    "drive forces against the generic reference solver; how much the print "
+                    "leaves out rests on masses assumed here: the paper prints none of the "
+                    "carriage and the payload"));
+  RowMeter lagrange(
+      DynamicsTexts("(48), (50)–(52)", "Lagrange's equation and virtual work", "",
+                    "drive forces with an end-effector wrench against the reference solver"));
+  RowMeter wrench(
+      DynamicsTexts("(53)", "τ = JᵀQ", "τ = −JᵀW for a wrench W acting on the end effector",
+                    "right for Q exerted by the end effector; difference of forces with and "
+                    "without the wrench"));
   const Motion bare = HarmonicMotion(mechanism);
   Motion loaded = bare;
   loaded.loads.push_back(ToolLoad(mechanism));
@@ -106,8 +110,8 @@ std::vector<AuditRow> DynamicsRows(const Mechanism& mechanism, const Mechanism& 
       wrench.Add(force_loaded[d] - force[d], -share, share);
     }
   }
-  AuditRow seven =
-      Texts("(49)", "sum to τ7 δq7", "sum to τ8 δq8", "seven drives printed, the robot has eight");
+  AuditRow seven = DynamicsTexts("(49)", "sum to τ7 δq7", "sum to τ8 δq8",
+                                 "seven drives printed, the robot has eight");
   seven.verdict = AuditVerdict::kNotTestable;
   return {bodies.Finish(), lagrange.Finish(), seven, wrench.Finish()};
 }

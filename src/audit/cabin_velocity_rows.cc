@@ -17,8 +17,9 @@ using Vec4 = Eigen::Vector4d;
 constexpr double kRateStep = 5e-4, kAccelerationStep = 2e-3;
 constexpr double kRateLimit = 2e-10, kAccelerationLimit = 1e-8;
 
-AuditRow Texts(const char* equation, const char* printed, const char* corrected, const char* unit,
-               const char* note = "differences of Newton-closed pins", double limit = kRateLimit) {
+AuditRow VelocityTexts(const char* equation, const char* printed, const char* corrected,
+                       const char* unit, const char* note = "differences of Newton-closed pins",
+                       double limit = kRateLimit) {
   return TextRow(equation, printed, corrected, unit, limit, note);
 }
 
@@ -98,27 +99,28 @@ std::vector<AuditRow> JacobianRows(const Lengths& l, const Lengths& truth,
     RowMeter meter;
   };
   std::vector<Element> elements = {
-      {0, 0, RowMeter(Texts("(24), (25) J11", "1", "", "1", "needs V2, V3 relative to A"))},
+      {0, 0, RowMeter(VelocityTexts("(24), (25) J11", "1", "", "1", "needs V2, V3 relative to A"))},
       {0, 1,
-       RowMeter(Texts("(25) J12", "cos ε sin(α−γ) [cos λ − cot(γ+β) sin γ]/sin(α+β), λ undefined",
-                      "cos ε/sin(α+ε) · [sin α + sin(α−γ) sin β/sin(β+γ)]", "1",
-                      "print read with λ = γ; half of V_B is missing"))},
+       RowMeter(VelocityTexts("(25) J12",
+                              "cos ε sin(α−γ) [cos λ − cot(γ+β) sin γ]/sin(α+β), λ undefined",
+                              "cos ε/sin(α+ε) · [sin α + sin(α−γ) sin β/sin(β+γ)]", "1",
+                              "print read with λ = γ; half of V_B is missing"))},
       {0, 2,
-       RowMeter(
-           Texts("(25) J13", "cos β sin γ/sin(γ+β)", "half of it", "1", "factor 1/2 missing"))},
+       RowMeter(VelocityTexts("(25) J13", "cos β sin γ/sin(γ+β)", "half of it", "1",
+                              "factor 1/2 missing"))},
       {1, 1,
-       RowMeter(Texts("(25) J22", "−cos β cos γ/(2 sin(γ+β))",
-                      "cos ε/sin(α+ε) · [−cos α + sin(α−γ) cos β/sin(β+γ)]", "1",
-                      "J22 and J23 are interchanged"))},
+       RowMeter(VelocityTexts("(25) J22", "−cos β cos γ/(2 sin(γ+β))",
+                              "cos ε/sin(α+ε) · [−cos α + sin(α−γ) cos β/sin(β+γ)]", "1",
+                              "J22 and J23 are interchanged"))},
       {1, 2,
-       RowMeter(Texts("(25) J23", "cos ε sin(α−γ)[sin γ + cos γ cot(γ+β)]/sin(α+ε)",
-                      "−cos β cos γ/(2 sin(β+γ))", "1", "J22 and J23 are interchanged"))},
+       RowMeter(VelocityTexts("(25) J23", "cos ε sin(α−γ)[sin γ + cos γ cot(γ+β)]/sin(α+ε)",
+                              "−cos β cos γ/(2 sin(β+γ))", "1", "J22 and J23 are interchanged"))},
       {2, 1,
-       RowMeter(Texts("(25) J32", "2 cos ε [cos(α−γ) − sin(α−γ) cot(β+γ)]/(L2 sin(α+ε))",
-                      "the same with + in the bracket", "1/m", "sign"))},
+       RowMeter(VelocityTexts("(25) J32", "2 cos ε [cos(α−γ) − sin(α−γ) cot(β+γ)]/(L2 sin(α+ε))",
+                              "the same with + in the bracket", "1/m", "sign"))},
       {2, 2,
-       RowMeter(Texts("(25) J33", "cos β/(L2 sin(γ+β))", "−cos β/(L2 sin(β+γ))", "1/m",
-                      "sense of rotation opposite to γ"))}};
+       RowMeter(VelocityTexts("(25) J33", "cos β/(L2 sin(γ+β))", "−cos β/(L2 sin(β+γ))", "1/m",
+                              "sense of rotation opposite to γ"))}};
   for (const SliderMotion& m : motions) {
     const Mat3 J = TrueJacobian(truth, m);
     const JacobianForms forms = JacobianOf(l, RatesAt(truth, m));
@@ -134,9 +136,9 @@ std::vector<AuditRow> JacobianRows(const Lengths& l, const Lengths& truth,
 
 AuditRow AccelerationRow(const Lengths& l, const Lengths& truth,
                          const std::vector<SliderMotion>& motions) {
-  RowMeter meter(Texts("(35), (36)", "A = J̇ V + J V̇ = q̇ᵀ H q̇ + G q̈", "", "m/s², rad/s²",
-                       "form, with the corrected J; second differences of Newton-closed pins",
-                       kAccelerationLimit));
+  RowMeter meter(VelocityTexts(
+      "(35), (36)", "A = J̇ V + J V̇ = q̇ᵀ H q̇ + G q̈", "", "m/s², rad/s²",
+      "form, with the corrected J; second differences of Newton-closed pins", kAccelerationLimit));
   for (const SliderMotion& m : motions) {
     const auto pose = [&](double t) {
       const Pins q = Close(truth, m, t);
@@ -157,25 +159,29 @@ AuditRow AccelerationRow(const Lengths& l, const Lengths& truth,
 }  // namespace
 
 std::vector<AuditRow> VelocityRows(const Lengths& l, const Lengths& truth) {
-  RowMeter ep14(Texts("(14)", "ε = asin(L1 sin α/(2 L4))", "", "rad"));
-  RowMeter ef15(Texts("(15)", "V_EF = V2 cos ε", "", "m/s", "V2 is the speed of F relative to A"));
-  RowMeter e16(
-      Texts("(16)", "V_E = V_EF/cos δ, δ = α + β − 90°", "δ = α + ε − 90°", "m/s", "wrong index"));
-  RowMeter b17(Texts("(17)", "V_E = V2 cos ε/sin(α+ε), V_B = 2 V_E", "", "m/s"));
-  RowMeter bc18(Texts("(18), (19)", "V_BC^n = V_B sin(α−γ), V_BC^t = V_B cos(α−γ)", "", "m/s"));
-  RowMeter cd20(
-      Texts("(20)", "V_CD^n = V3 cos β, V_CD^t = V3 sin β", "", "m/s",
-            "the velocity of D relative to A, from that of C and the turning of the rigid CD"));
-  RowMeter m20(Texts("below (20): m", "m⃗ = (m sin γ, m cos γ)", "m⃗ = (m sin γ, −m cos γ)", "m/s",
-                     "the printed vector is not normal to BC; (21) uses the corrected one"));
-  RowMeter m22(Texts("(21), (22)", "m = −V_B sin(α−γ) cot(β+γ) + V3 cos β/sin(β+γ)", "", "m/s"));
-  RowMeter x23(Texts("(23) V_X", "½ (m sin γ + V_BC^n cos γ) + V0",
-                     "V0 + V_BC^n cos γ + ½ (m + V_BC^t) sin γ", "m/s",
-                     "half of the velocity of C instead of the mean of B and C"));
-  RowMeter y23(Texts("(23) V_Y", "½ (V_BC^n sin γ − m cos γ)",
-                     "V_BC^n sin γ − ½ (m + V_BC^t) cos γ", "m/s"));
-  RowMeter w23(
-      Texts("(23) W_γ", "(m − V_BC^t)/L2", "(V_BC^t − m)/L2", "rad/s", "wrong sense of rotation"));
+  RowMeter ep14(VelocityTexts("(14)", "ε = asin(L1 sin α/(2 L4))", "", "rad"));
+  RowMeter ef15(
+      VelocityTexts("(15)", "V_EF = V2 cos ε", "", "m/s", "V2 is the speed of F relative to A"));
+  RowMeter e16(VelocityTexts("(16)", "V_E = V_EF/cos δ, δ = α + β − 90°", "δ = α + ε − 90°", "m/s",
+                             "wrong index"));
+  RowMeter b17(VelocityTexts("(17)", "V_E = V2 cos ε/sin(α+ε), V_B = 2 V_E", "", "m/s"));
+  RowMeter bc18(
+      VelocityTexts("(18), (19)", "V_BC^n = V_B sin(α−γ), V_BC^t = V_B cos(α−γ)", "", "m/s"));
+  RowMeter cd20(VelocityTexts(
+      "(20)", "V_CD^n = V3 cos β, V_CD^t = V3 sin β", "", "m/s",
+      "the velocity of D relative to A, from that of C and the turning of the rigid CD"));
+  RowMeter m20(
+      VelocityTexts("below (20): m", "m⃗ = (m sin γ, m cos γ)", "m⃗ = (m sin γ, −m cos γ)", "m/s",
+                    "the printed vector is not normal to BC; (21) uses the corrected one"));
+  RowMeter m22(
+      VelocityTexts("(21), (22)", "m = −V_B sin(α−γ) cot(β+γ) + V3 cos β/sin(β+γ)", "", "m/s"));
+  RowMeter x23(VelocityTexts("(23) V_X", "½ (m sin γ + V_BC^n cos γ) + V0",
+                             "V0 + V_BC^n cos γ + ½ (m + V_BC^t) sin γ", "m/s",
+                             "half of the velocity of C instead of the mean of B and C"));
+  RowMeter y23(VelocityTexts("(23) V_Y", "½ (V_BC^n sin γ − m cos γ)",
+                             "V_BC^n sin γ − ½ (m + V_BC^t) cos γ", "m/s"));
+  RowMeter w23(VelocityTexts("(23) W_γ", "(m − V_BC^t)/L2", "(V_BC^t − m)/L2", "rad/s",
+                             "wrong sense of rotation"));
   const std::vector<SliderMotion> motions = RandomMotions(truth, 100);
   for (const SliderMotion& m : motions) {
     const PlanarRates s = RatesAt(truth, m);
@@ -212,9 +218,10 @@ std::vector<AuditRow> VelocityRows(const Lengths& l, const Lengths& truth) {
                                 x23.Finish(),  y23.Finish(),  w23.Finish()};
   for (AuditRow& row : JacobianRows(l, truth, motions)) rows.push_back(std::move(row));
   rows.push_back(AccelerationRow(l, truth, motions));
-  AuditRow shapes = Texts("(37)–(40)", "rows and columns of ν, α_ij, H transposed at places",
-                          "ν is 1×3, α_ij is 3×1, H is 3×3×3", "",
-                          "definitions of the influence coefficients; only shapes to correct");
+  AuditRow shapes =
+      VelocityTexts("(37)–(40)", "rows and columns of ν, α_ij, H transposed at places",
+                    "ν is 1×3, α_ij is 3×1, H is 3×3×3", "",
+                    "definitions of the influence coefficients; only shapes to correct");
   shapes.verdict = AuditVerdict::kNotTestable;
   rows.push_back(shapes);
   return rows;

@@ -10,7 +10,7 @@
 namespace mbv::cabin_audit {
 namespace {
 
-using Vec4 = Eigen::Vector4d;
+using WristRates = Eigen::Vector4d;
 using Mat64 = Eigen::Matrix<double, 6, 4>;
 constexpr double kQuarter = std::numbers::pi / 2;
 constexpr double kStep = 1e-3;
@@ -27,29 +27,29 @@ Pose Link(double alpha, double a, double theta, double d) {
 }
 
 // The wrist from {3} at th3 = 0 without d3; q = (θ1, θ2, d2, θ3) of the paper's serial section.
-Pose Wrist(const Lengths& l, const Vec4& q) {
+Pose Wrist(const Lengths& l, const WristRates& q) {
   return Pose(RotZ(q[0])) * Link(-kQuarter, l.a3, q[1], 0) *
          Link(-kQuarter, l.a4, -kQuarter, q[2]) * Link(-kQuarter, 0, q[3], l.d6);
 }
 
 // The complete chain; `planar` = (d1, X, Y, γ).
-Pose Chain(const Lengths& l, const Vec4& planar, const Vec4& q) {
+Pose Chain(const Lengths& l, const WristRates& planar, const WristRates& q) {
   Pose X = Pose::Identity();
   X.linear() = RotZ(planar[3]);
   X.translation() = Vec3(planar[1], planar[2], planar[0]);
   return X * Link(-kQuarter, l.a2, 0, l.d3) * Wrist(l, q);
 }
 
-struct State {
-  Vec4 planar, planar_v, planar_a, q, v, a;
+struct WristState {
+  WristRates planar, planar_v, planar_a, q, v, a;
 };
 
-std::vector<State> RandomStates(int count) {
+std::vector<WristState> RandomStates(int count) {
   std::mt19937_64 random(4711);
   std::uniform_real_distribution<double> unit(-1.0, 1.0);
   const double deg = std::numbers::pi / 180;
-  std::vector<State> states(count);
-  for (State& s : states) {
+  std::vector<WristState> states(count);
+  for (WristState& s : states) {
     s.planar << 0.5 + 0.4 * unit(random), 0.08 * unit(random), 0.35 + 0.06 * unit(random),
         20 * deg * unit(random);
     s.q << 105 * deg * unit(random), -35 * deg + 50 * deg * unit(random),
@@ -81,7 +81,7 @@ Vec6 ToolTwist(const F& pose) {
 }
 
 // (32) corrected and as printed, in the tool frame.
-Mat64 SerialJacobian(const Lengths& l, const Vec4& q, bool printed) {
+Mat64 SerialJacobian(const Lengths& l, const WristRates& q, bool printed) {
   const double c2 = std::cos(q[1]), s2 = std::sin(q[1]), c3 = std::cos(q[3]), s3 = std::sin(q[3]);
   const double e = l.d6 + l.a4, d2 = q[2], H = l.a3 + c2 * e - d2 * s2;
   Mat64 J;
@@ -96,8 +96,8 @@ Mat64 SerialJacobian(const Lengths& l, const Vec4& q, bool printed) {
   return J;
 }
 
-void SerialPositionRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
-                        std::vector<AuditRow>* rows) {
+void SerialPositionRows(const Lengths& l, const Lengths& truth,
+                        const std::vector<WristState>& states, std::vector<AuditRow>* rows) {
   RowMeter m6(
       TextRow("(5), (6)", "elements of the wrist's transform", "", "1, m", kPoseLimit, kChain));
   RowMeter t2(TextRow("(7) θ2, d2", "θ2 = asin(−a_z), d2 = −(p_z + (a2+d3) sin θ2)/cos θ2", "",
@@ -106,7 +106,7 @@ void SerialPositionRows(const Lengths& l, const Lengths& truth, const std::vecto
                       "wrong quadrant for |θ6| > 90°"));
   RowMeter t1(TextRow("(7) θ1", "acos(a_x/cos θ2)", "atan2(a_y, a_x)", "rad", 1e-13,
                       "wrong sign for θ1 < 0"));
-  for (const State& s : states) {
+  for (const WristState& s : states) {
     const Pose X = Wrist(truth, s.q);
     const Mat3 R = X.linear();
     const Vec3 p = X.translation();
@@ -140,7 +140,7 @@ struct Element {
   double value_printed, value_corrected;
 };
 
-std::array<Element, 12> ChainElements(const Lengths& l, const State& s) {
+std::array<Element, 12> ChainElements(const Lengths& l, const WristState& s) {
   const double ca = std::cos(s.planar[3]), sa = std::sin(s.planar[3]);
   const double c3 = std::cos(s.q[0]), s3 = std::sin(s.q[0]), c4 = std::cos(s.q[1]);
   const double s4 = std::sin(s.q[1]), c6 = std::cos(s.q[3]), s6 = std::sin(s.q[3]), d5 = s.q[2];
@@ -174,8 +174,8 @@ std::array<Element, 12> ChainElements(const Lengths& l, const State& s) {
            {"p_z", "as printed", "", "m", pz, pz}}};
 }
 
-void ChainRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
-               std::vector<AuditRow>* rows) {
+void WristChainRows(const Lengths& l, const Lengths& truth, const std::vector<WristState>& states,
+                    std::vector<AuditRow>* rows) {
   rows->push_back(TextRow("(10), (11)", "chain of transforms, ¹₂T = trans(X, Y, 0) rot(Z, α)", "",
                           "", 0.0,
                           "α here is the platform's tilt γ; tested element by element in (13)"));
@@ -186,7 +186,7 @@ void ChainRows(const Lengths& l, const Lengths& truth, const std::vector<State>&
     row.equation = std::string("(12), (13) ") + e.name;
     meters.emplace_back(row);
   }
-  for (const State& s : states) {
+  for (const WristState& s : states) {
     const Pose X = Chain(truth, s.planar, s.q);
     const auto elements = ChainElements(l, s);
     for (int k = 0; k < 12; ++k) {
@@ -197,8 +197,8 @@ void ChainRows(const Lengths& l, const Lengths& truth, const std::vector<State>&
   for (RowMeter& meter : meters) rows->push_back(meter.Finish());
 }
 
-void JacobianRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
-                  std::vector<AuditRow>* rows) {
+void WristJacobianRows(const Lengths& l, const Lengths& truth,
+                       const std::vector<WristState>& states, std::vector<AuditRow>* rows) {
   constexpr const char* kTruth = "tool-frame twist from differences of the wrist's transform";
   RowMeter first(
       TextRow("(28), (29)", "(p×n)_z = c2c3(d3+a2) + a1c3, (p×o)_z = −c2s3(d3+a2) + a1s3",
@@ -209,10 +209,11 @@ void JacobianRows(const Lengths& l, const Lengths& truth, const std::vector<Stat
   RowMeter all(TextRow("(26), (27), (32)", "J2 with the columns (28)–(31)",
                        "J2 with corrected columns", "m, 1", kRateLimit,
                        "inherits the errors of (29) and (30)"));
-  for (const State& s : states) {
+  for (const WristState& s : states) {
     const Mat64 printed = SerialJacobian(l, s.q, true), corrected = SerialJacobian(l, s.q, false);
     for (int k = 0; k < 4; ++k) {
-      const Vec6 twist = ToolTwist([&](double t) { return Wrist(truth, s.q + t * Vec4::Unit(k)); });
+      const Vec6 twist =
+          ToolTwist([&](double t) { return Wrist(truth, s.q + t * WristRates::Unit(k)); });
       RowMeter* own[] = {&first, &second, &third, nullptr};
       for (int r = 0; r < 6; ++r) {
         if (own[k] != nullptr && k == 2) own[k]->Add(twist[r], printed(r, k));
@@ -224,7 +225,7 @@ void JacobianRows(const Lengths& l, const Lengths& truth, const std::vector<Stat
   for (RowMeter* m : {&first, &second, &third, &all}) rows->push_back(m->Finish());
 }
 
-void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<State>& states,
+void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<WristState>& states,
                 std::vector<AuditRow>* rows) {
   RowMeter hybrid(TextRow(
       "(33), (34)", "J1 and J2 stacked (shapes do not fit; no rail, no rotation)",
@@ -234,7 +235,7 @@ void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<State>
                                 "J̇2 q̇ + J2 q̈ + ω_tool × v_tool (translation)", "m/s²",
                                 kAccelerationLimit,
                                 "positions for rates, rates for accelerations"));
-  for (const State& s : states) {
+  for (const WristState& s : states) {
     const auto pose = [&](double t) {
       return Chain(truth, s.planar + t * s.planar_v + 0.5 * t * t * s.planar_a,
                    s.q + t * s.v + 0.5 * t * t * s.a);
@@ -253,7 +254,7 @@ void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<State>
         spin + R * wrist.tail<3>();
     for (int c = 0; c < 6; ++c) hybrid.Add(twist[c], printed[c], corrected[c]);
 
-    const auto q = [&](double t) { return Vec4(s.q + t * s.v + 0.5 * t * t * s.a); };
+    const auto q = [&](double t) { return WristRates(s.q + t * s.v + 0.5 * t * t * s.a); };
     const auto J = [&](double t) { return SerialJacobian(l, q(t), false); };
     const Mat64 Jdot = FirstDifference(J, kStep);
     const Mat3 Rw = Wrist(truth, s.q).linear();
@@ -271,11 +272,11 @@ void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<State>
 }  // namespace
 
 std::vector<AuditRow> WristRows(const Lengths& lengths, const Lengths& truth) {
-  const std::vector<State> states = RandomStates(100);
+  const std::vector<WristState> states = RandomStates(100);
   std::vector<AuditRow> rows;
   SerialPositionRows(lengths, truth, states, &rows);
-  ChainRows(lengths, truth, states, &rows);
-  JacobianRows(lengths, truth, states, &rows);
+  WristChainRows(lengths, truth, states, &rows);
+  WristJacobianRows(lengths, truth, states, &rows);
   HybridRows(lengths, truth, states, &rows);
   return rows;
 }

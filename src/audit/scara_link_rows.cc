@@ -158,8 +158,8 @@ std::vector<AuditRow> RotationRows(const scara::Parameters& p, const std::vector
   return {across.Finish(), spin.Finish(), third.Finish()};
 }
 
-std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
-                                       const std::vector<State>& states) {
+std::vector<AuditRow> LinkAccelerationRows(const scara::Parameters& p,
+                                           const std::vector<State>& states) {
   // Differences of the Jacobians: 1e-9 of their rates.
   const double limit = 1e-7;
   RowMeter eps({.equation = "(39)",
@@ -211,7 +211,7 @@ std::vector<AuditRow> LinkRows(const scara::Parameters& parameters,
                                const std::vector<State>& states) {
   std::vector<AuditRow> rows = CentreRows(parameters, states);
   for (AuditRow& row : RotationRows(parameters, states)) rows.push_back(std::move(row));
-  for (AuditRow& row : AccelerationRows(parameters, states)) rows.push_back(std::move(row));
+  for (AuditRow& row : LinkAccelerationRows(parameters, states)) rows.push_back(std::move(row));
   return rows;
 }
 

@@ -50,6 +50,8 @@ struct NamedIndex {
 
 /// "rx", "ry", "rz", "x", "y", "z": names of the rows of K and C.
 [[nodiscard]] const char* AxisName(int row);
+/// Rows of a wrench: moments first.
+inline constexpr const char* kWrenchNames[] = {"mx", "my", "mz", "fx", "fy", "fz"};
 /// Unit of an entry of K ("N m/rad", "N/rad", "N m/m", "N/m") and of C.
 [[nodiscard]] const char* StiffnessUnit(int row, int column);
 [[nodiscard]] const char* ComplianceUnit(int row, int column);

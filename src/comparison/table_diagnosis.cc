@@ -32,11 +32,6 @@ struct Series {
   VecX table, other;
 };
 
-double Rms(const VecX& values) {
-  return values.size() == 0 ? kNan
-                            : std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
-}
-
 double RmsDeviation(const VecX& values) { return Rms((values.array() - values.mean()).matrix()); }
 
 // "limb1.drive.force" → "force": only like signals are exchanged.

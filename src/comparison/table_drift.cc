@@ -12,10 +12,6 @@ constexpr Eigen::Index kFewest = 16;  // samples
 constexpr double kLine = 0.1;         // of the difference, left beside a line
 constexpr double kGrowth = 1.5;       // from each quarter of the samples to the next
 
-double Rms(const VecX& values) {
-  return std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
-}
-
 }  // namespace
 
 std::optional<Drift> FindDrift(const VecX& time_s, const VecX& difference,

@@ -27,6 +27,10 @@ size_t EditDistance(const std::string& a, const std::string& b) {
 }  // namespace
 
 // Files that are read for several purposes give their findings once.
+void Diagnostics::AddError(const std::string& file, std::string message, std::string hint) {
+  Add({.file = file, .message = std::move(message), .hint = std::move(hint)});
+}
+
 void Diagnostics::Append(const Diagnostics& other) {
   const auto parts = [](const Finding& f) {
     return std::tie(f.severity, f.file, f.line, f.column, f.message, f.hint);
@@ -75,6 +79,12 @@ std::string ClosestWord(const std::string& word, const std::vector<std::string>&
     }
   }
   return best;
+}
+
+std::string DidYouMean(const std::string& word, const std::vector<std::string>& candidates) {
+  constexpr size_t kLongest = 64;  // longer words are no slips of the pen
+  const std::string near = word.size() > kLongest ? "" : ClosestWord(word, candidates);
+  return near.empty() ? "" : fmt::format("did you mean '{}'?", near);
 }
 
 }  // namespace mbv

@@ -14,8 +14,8 @@ enum class Severity { kWarning, kError };
 struct Finding {
   Severity severity = Severity::kError;
   std::string file;
-  int line = 0;    ///< 1-based; 0 when the finding has no place in the file
-  int column = 0;  ///< 1-based
+  int line = 0;         ///< 1-based; 0 when the finding has no place in the file
+  int column = 0;       ///< 1-based
   std::string message;  ///< names the key, the value and the broken rule
   std::string hint;     ///< how to mend it; may be empty
 };
@@ -24,6 +24,8 @@ struct Finding {
 class Diagnostics {
  public:
   void Add(Finding finding) { findings_.push_back(std::move(finding)); }
+  /// An error without a place in `file`.
+  void AddError(const std::string& file, std::string message, std::string hint = {});
   void Append(const Diagnostics& other);
   [[nodiscard]] const std::vector<Finding>& findings() const { return findings_; }
   [[nodiscard]] bool empty() const { return findings_.empty(); }
@@ -39,5 +41,9 @@ class Diagnostics {
 /// The candidate closest to `word` by edit distance, or "" when none is near (for "did you mean").
 [[nodiscard]] std::string ClosestWord(const std::string& word,
                                       const std::vector<std::string>& candidates);
+
+/// "did you mean 'candidate'?", or "" when none is near.
+[[nodiscard]] std::string DidYouMean(const std::string& word,
+                                     const std::vector<std::string>& candidates);
 
 }  // namespace mbv

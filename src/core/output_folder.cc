@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kListSchema = "mbverify.files/1";
 
-std::string Trouble(const char* what, const fs::path& path, const std::string& reason) {
+std::string TroubleWith(const char* what, const fs::path& path, const std::string& reason) {
   return fmt::format("cannot {} {}: {}", what, path.string(), reason);
 }
 
@@ -78,18 +78,18 @@ OutputFolder::~OutputFolder() {
 
 // Where the result goes really, and which folder the stage is made in.
 std::string OutputFolder::Locate() {
-  if (!IsPlainPath(name_)) return Trouble("make", target_, "this is no name of a result");
+  if (!IsPlainPath(name_)) return TroubleWith("make", target_, "this is no name of a result");
   std::error_code error;
   fs::create_directories(target_.parent_path(), error);
-  if (error) return Trouble("make folder", target_.parent_path(), error.message());
+  if (error) return TroubleWith("make folder", target_.parent_path(), error.message());
   place_ = fs::absolute(target_, error);
   struct stat status {};
   if (lstat(place_.c_str(), &status) != 0) return "";
   if (S_ISLNK(status.st_mode)) {
     place_ = fs::canonical(place_, error);
-    if (error) return Trouble("follow the link", target_, error.message());
+    if (error) return TroubleWith("follow the link", target_, error.message());
   }
-  if (!fs::is_directory(place_, error)) return Trouble("replace", target_, "it is no folder");
+  if (!fs::is_directory(place_, error)) return TroubleWith("replace", target_, "it is no folder");
   return "";
 }
 
@@ -102,16 +102,16 @@ std::string OutputFolder::Create() {
   SweepStages(state.folder());
   std::string pattern = (state.folder() / "stage-XXXXXX").string();
   if (mkdtemp(pattern.data()) == nullptr) {
-    return Trouble("make folder", pattern, std::strerror(errno));
+    return TroubleWith("make folder", pattern, std::strerror(errno));
   }
   stage_ = pattern;
   if (mkdir((stage_ / "new").c_str(), 0777) != 0) {
     const std::string reason = std::strerror(errno);
     rmdir(stage_.c_str());
-    return Trouble("make folder", stage_ / "new", reason);
+    return TroubleWith("make folder", stage_ / "new", reason);
   }
   lock_ = LockFolder(stage_);
-  return lock_ >= 0 ? "" : Trouble("lock", stage_, std::strerror(errno));
+  return lock_ >= 0 ? "" : TroubleWith("lock", stage_, std::strerror(errno));
 }
 
 std::string OutputFolder::Write(const std::string& name, const std::string& content) {
@@ -135,7 +135,7 @@ std::string OutputFolder::Write(const std::string& name, const FileContent& cont
     check(Sync(file));
   }
   if (file >= 0) close(file);
-  if (!reason.empty()) return Trouble("write", target_ / name, reason);
+  if (!reason.empty()) return TroubleWith("write", target_ / name, reason);
   files_.insert(name);
   return "";
 }
@@ -144,7 +144,7 @@ std::string OutputFolder::Adopt(const fs::path& folder) {
   MBV_DEMAND(lock_ >= 0 && files_.empty(), folder.string());
   const fs::path content = stage_ / "new";
   if (rmdir(content.c_str()) != 0 || rename(folder.c_str(), content.c_str()) != 0) {
-    return Trouble("move", folder, std::strerror(errno));
+    return TroubleWith("move", folder, std::strerror(errno));
   }
   std::error_code error;
   for (fs::recursive_directory_iterator entry(content, error), end; !error && entry != end;
@@ -153,15 +153,15 @@ std::string OutputFolder::Adopt(const fs::path& folder) {
     const bool link = entry->is_symlink(error);
     if (name == kFileList || (!link && entry->is_directory(error))) continue;
     if (link || !entry->is_regular_file(error) || !IsPlainPath(name)) {
-      return Trouble("publish", target_ / name, "it is no plain file");
+      return TroubleWith("publish", target_ / name, "it is no plain file");
     }
     const int file = open(entry->path().c_str(), O_RDONLY | O_NOFOLLOW | O_CLOEXEC);
-    if (file < 0) return Trouble("read", entry->path(), std::strerror(errno));
+    if (file < 0) return TroubleWith("read", entry->path(), std::strerror(errno));
     (void)fsync(file);
     close(file);
     files_.insert(name);
   }
-  return error ? Trouble("read", content, error.message()) : "";
+  return error ? TroubleWith("read", content, error.message()) : "";
 }
 
 std::string OutputFolder::WriteList() {

@@ -59,4 +59,14 @@ std::string Printable(std::string_view text) {
   return shown += text.substr(from);
 }
 
+std::string Joined(const std::vector<std::string>& words, size_t most) {
+  std::string text;
+  for (size_t i = 0; i < words.size() && i < most; ++i) text += (i == 0 ? "" : ", ") + words[i];
+  return words.size() > most ? text + ", …" : text;
+}
+
+bool Contains(const std::vector<std::string>& words, std::string_view word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
 }  // namespace mbv

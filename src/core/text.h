@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace mbv {
 
@@ -17,5 +18,11 @@ namespace mbv {
 
 /// `text` with "\x1b" for each byte that is no text: nothing that a terminal obeys.
 [[nodiscard]] std::string Printable(std::string_view text);
+
+/// "a, b, c"; of more than `most` words the first ones and "…".
+[[nodiscard]] std::string Joined(const std::vector<std::string>& words,
+                                 size_t most = static_cast<size_t>(-1));
+
+[[nodiscard]] bool Contains(const std::vector<std::string>& words, std::string_view word);
 
 }  // namespace mbv

@@ -21,4 +21,10 @@ using Pose = Eigen::Isometry3d;
 inline constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 inline constexpr double kEps = std::numeric_limits<double>::epsilon();
 
+/// Root of the mean square; NaN of nothing.
+[[nodiscard]] inline double Rms(const VecX& values) {
+  return values.size() == 0 ? kNan
+                            : std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
+}
+
 }  // namespace mbv

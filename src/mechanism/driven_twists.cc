@@ -19,7 +19,7 @@ constexpr double kSeen = 1e-3;
 // Twists below this share of the largest one are round-off.
 constexpr double kMoves = 1e-9;
 
-BodyStates HomeStates(const Mechanism& mechanism) {
+BodyStates HomeOrFirstStates(const Mechanism& mechanism) {
   BodyStates states;
   states.Resize(mechanism.bodies.size());
   if (!mechanism.X_WB_home.empty()) states.X_WB = mechanism.X_WB_home;
@@ -68,8 +68,7 @@ MatX MassMatrix(const Mechanism& mechanism, const BodyStates& states,
       w.col(k) = V.head<3>();
       v.col(k) = V.tail<3>() + V.head<3>().cross(r_W);
     }
-    M += body.mass * v.transpose() * v +
-         w.transpose() * R_WB * body.I_Bcm_B * R_WB.transpose() * w;
+    M += body.mass * v.transpose() * v + w.transpose() * R_WB * body.I_Bcm_B * R_WB.transpose() * w;
   }
   const double least = kMassless * M.trace();
   M.diagonal().array() += least > 0.0 ? least : 1.0;
@@ -113,7 +112,7 @@ std::vector<bool> Movable(const MatX& N, const MatX& prescribed, size_t bodies) 
 DrivenTwists TwistsOfDriven(const Mechanism& mechanism, const std::vector<bool>& held) {
   const size_t bodies = mechanism.bodies.size();
   const double length = CharacteristicLength(mechanism);
-  const BodyStates states = HomeStates(mechanism);
+  const BodyStates states = HomeOrFirstStates(mechanism);
   RowStack joints(bodies, length);
   joints.AddJoints(mechanism, states, false);
   const MatX N = FindRank(joints.Matrix(), NullSpaces::kMotion).motion;
@@ -125,18 +124,18 @@ DrivenTwists TwistsOfDriven(const Mechanism& mechanism, const std::vector<bool>&
     out.V_WB.assign(static_cast<size_t>(D.rows()), std::vector<Vec6>(bodies, Vec6::Zero()));
     return out;
   }
-  const MatX X = N * MoveAlone(D, [&] {
-                   return MassMatrix(mechanism, states, Twists(N, bodies, length));
-                 });
+  const MatX X =
+      N * MoveAlone(D, [&] { return MassMatrix(mechanism, states, Twists(N, bodies, length)); });
   out.V_WB = Twists(X, bodies, length);
   // The rows of lengths were divided by L: their unit rate is 1 m/s, not L.
   for (size_t k = 0; k < out.V_WB.size(); ++k) {
     const bool is_drive = k < mechanism.drives.size();
     const bool metres =
-        is_drive ? PositionUnit(mechanism, mechanism.drives[k]) == "m"
-                 : IsLength(mechanism.joints[mechanism.prescribed[k - mechanism.drives.size()].joint]
-                                .kind,
-                            0);
+        is_drive
+            ? PositionUnit(mechanism, mechanism.drives[k]) == "m"
+            : IsLength(
+                  mechanism.joints[mechanism.prescribed[k - mechanism.drives.size()].joint].kind,
+                  0);
     for (Vec6& V : out.V_WB[k]) V *= metres ? 1.0 / length : 1.0;
   }
   return out;

@@ -54,11 +54,6 @@ std::vector<UsedName> NamesIn(const std::string& text) {
   return names;
 }
 
-std::string DidYouMean(const std::string& word, const std::vector<std::string>& candidates) {
-  const std::string near = ClosestWord(word, candidates);
-  return near.empty() ? "" : fmt::format("did you mean '{}'?", near);
-}
-
 std::vector<std::string> FunctionNames() {
   std::vector<std::string> names;
   for (const auto& [name, callback] : TheParser().GetFunDef()) names.push_back(name);

@@ -19,7 +19,7 @@ using internal::kStressTolerance;
 using internal::NullSpaces;
 using internal::RowStack;
 
-BodyStates StatesAt(const std::vector<Pose>& X_WB) {
+BodyStates StatesOfPoses(const std::vector<Pose>& X_WB) {
   BodyStates states;
   states.Resize(X_WB.size());
   states.X_WB = X_WB;
@@ -121,7 +121,7 @@ std::vector<std::string> FreeBodies(const Mechanism& mechanism, const BodyStates
 std::optional<BodyStates> RandomPose(const Mechanism& mechanism, double step,
                                      std::mt19937_64* random) {
   const double length = CharacteristicLength(mechanism);
-  const BodyStates home = StatesAt(mechanism.X_WB_home);
+  const BodyStates home = StatesOfPoses(mechanism.X_WB_home);
   RowStack stack(mechanism.bodies.size(), length);
   stack.AddJoints(mechanism, home, false);
   const MatX motion = FindRank(stack.Matrix(), NullSpaces::kMotion).motion;
@@ -144,7 +144,7 @@ std::optional<BodyStates> RandomPose(const Mechanism& mechanism, double step,
   const auto guess = JointCoordinatesAt(mechanism, X_WB, near);
   for (size_t j = 0; j < guess.size(); ++j) moved.joints[j].guess = guess[j];
   if (!SolveHome(&moved).closed) return std::nullopt;
-  return StatesAt(moved.X_WB_home);
+  return StatesOfPoses(moved.X_WB_home);
 }
 
 int Least(const MobilityReport& report, int Mobility::*count) {
@@ -162,7 +162,7 @@ int MobilityReport::redundant_count() const { return Least(*this, &Mobility::red
 MobilityReport ReportMobility(const Mechanism& mechanism, int poses) {
   MobilityReport report;
   report.home = AnalyseMobility(mechanism);
-  const BodyStates home = StatesAt(mechanism.X_WB_home);
+  const BodyStates home = StatesOfPoses(mechanism.X_WB_home);
 
   // Small enough to stay in reach, large against the tolerance of a rank.
   report.nearby_step = 0.02;

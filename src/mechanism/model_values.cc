@@ -231,12 +231,6 @@ std::vector<std::string> NamesOf(const std::vector<T>& items) {
   return names;
 }
 
-std::string DidYouMean(const std::string& word, const std::vector<std::string>& candidates) {
-  if (word.size() > 64) return "";
-  const std::string near = ClosestWord(word, candidates);
-  return near.empty() ? "" : fmt::format("did you mean '{}'?", near);
-}
-
 }  // namespace
 
 std::optional<int> ModelReader::BodyRef(const Block& block, const YamlNode& node,

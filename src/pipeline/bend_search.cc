@@ -9,7 +9,7 @@
 namespace mbv {
 namespace {
 
-constexpr double kRoundoff = 1.0 + 1e-9;  // of a ratio of sizes
+constexpr double kRatioRoundoff = 1.0 + 1e-9;  // of a ratio of sizes
 
 bool FailsByForce(const BentRun& run) {
   return std::any_of(run.comparison.checks.begin(), run.comparison.checks.end(),
@@ -134,7 +134,7 @@ void BendSearch::FindSmallest(const Bendable& number, double seen, double ratio,
   // Where proportion puts the limit, a little beyond; 0 where nothing is proportional.
   double guess = std::isfinite(ratio) && ratio > 1.0 ? seen / ratio * std::sqrt(fine) : 0.0;
   if (known > 0.0) guess = known;
-  while ((unseen == 0.0 || seen / unseen > fine * kRoundoff) && seen > kSmallestBend) {
+  while ((unseen == 0.0 || seen / unseen > fine * kRatioRoundoff) && seen > kSmallestBend) {
     double size = 0.0;
     if (guess > unseen && guess < seen) {
       size = guess;

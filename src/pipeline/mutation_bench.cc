@@ -18,24 +18,16 @@ namespace {
 constexpr double kRoundoff = 1e-12;
 constexpr double kAboveBase = 5.0;
 
-void AddError(const std::string& file, const std::string& message, const std::string& hint,
-              Diagnostics* diagnostics) {
-  Finding finding;
-  finding.file = file;
-  finding.message = message;
-  finding.hint = hint;
-  diagnostics->Add(std::move(finding));
-}
-
 // There is a motion to hold, and a simulation.
 bool CanBeBent(const Scenario& scenario, Diagnostics* diagnostics) {
   if (scenario.motion.free()) {
-    AddError(scenario.file,
-             "the motion follows from forces, so there is none to hold while a model is bent",
-             "command the drives or the outputs", diagnostics);
+    diagnostics->AddError(
+        scenario.file,
+        "the motion follows from forces, so there is none to hold while a model is bent",
+        "command the drives or the outputs");
   } else if (!scenario.simulation.on) {
-    AddError(scenario.file, "has no simulation to bend", "e.g. simulation: {mode: forward}",
-             diagnostics);
+    diagnostics->AddError(scenario.file, "has no simulation to bend",
+                          "e.g. simulation: {mode: forward}");
   } else {
     return true;
   }
@@ -61,7 +53,7 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   ScenarioOptions options;
   if (mode == BenchMode::kInverse) options.set = {{"simulation.mode", "inverse"}};
   if (ReadScenarioHead(file).is_stiffness()) {
-    AddError(file, "is a stiffness scenario", "mutate bends the model of a motion", diagnostics);
+    diagnostics->AddError(file, "is a stiffness scenario", "mutate bends the model of a motion");
     return nullptr;
   }
   std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
@@ -77,10 +69,10 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
     return bench;
   }
   *exit_code = base.ran && base.comparison.verdict == Verdict::kDisagree ? 1 : 3;
-  AddError(file,
-           "does not agree before anything is bent: " +
-               (base.ran ? base.comparison.reason : base.failure),
-           "mbverify run shows why", diagnostics);
+  diagnostics->AddError(file,
+                        "does not agree before anything is bent: " +
+                            (base.ran ? base.comparison.reason : base.failure),
+                        "mbverify run shows why");
   return nullptr;
 }
 
@@ -121,9 +113,8 @@ ComparisonInput MutationBench::Input() const {
   ComparisonInput input{.mechanism = &prepared_.base,
                         .motion = &scenario().motion,
                         .limits = scenario().checks,
-                        .simulation_limits = scenario().simulation.forward
-                                                 ? LimitColumn::kForward
-                                                 : LimitColumn::kInverse,
+                        .simulation_limits = scenario().simulation.forward ? LimitColumn::kForward
+                                                                           : LimitColumn::kInverse,
                         .start_window_s = scenario().start_window_s,
                         .witnesses = {},
                         .driven_by = prepared_.driven_by,

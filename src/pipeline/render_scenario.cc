@@ -9,13 +9,6 @@
 namespace mbv {
 namespace {
 
-void AddError(const std::string& file, const RunSummary& summary, Diagnostics* diagnostics) {
-  Finding finding;
-  finding.file = file;
-  finding.message = summary.message;
-  diagnostics->Add(std::move(finding));
-}
-
 // Times of a video's frames.
 std::vector<double> FrameTimes(double duration_s, double frames_per_s) {
   std::vector<double> times;
@@ -90,7 +83,7 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
                     progress("simulation"));
   outcome.diagnostics.Append(witness.diagnostics);
   if (!witness.run.summary.ok()) {
-    AddError(file, witness.run.summary, &outcome.diagnostics);
+    &outcome.diagnostics->AddError(file, witness.run.summary.message);
     return outcome;
   }
   const Caption caption{
@@ -102,7 +95,7 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
           : DrawVideo(scenario, prepared->mechanisms.simulated, witness.run, caption, request,
                       progress("video"), &outcome.video);
   if (!drawn.ok()) {
-    AddError(file, drawn, &outcome.diagnostics);
+    &outcome.diagnostics->AddError(file, drawn.message);
     return outcome;
   }
   outcome.exit_code = 0;

@@ -4,20 +4,11 @@
 
 #include <algorithm>
 
+#include "core/text.h"
 #include "mechanism/constraints.h"
 
 namespace mbv {
 namespace {
-
-bool Contains(const std::vector<std::string>& names, const std::string& name) {
-  return std::find(names.begin(), names.end(), name) != names.end();
-}
-
-std::string Joined(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + name;
-  return text;
-}
 
 std::string DrivesText(const Mechanism& mechanism, const std::vector<std::string>& drives) {
   bool moments = false, forces = false;
@@ -57,10 +48,10 @@ std::vector<std::string> SharedForceTexts(const Mechanism& mechanism,
     if (!Contains(drives, name)) more.push_back(name);
   }
   if (!more.empty()) {
-    texts.push_back(fmt::format("simulation: the force{} of {} {} not unique, a self-stress acts "
-                                "there; of all that fit, those of least norm are recorded",
-                                more.size() == 1 ? "" : "s", Joined(more),
-                                more.size() == 1 ? "is" : "are"));
+    texts.push_back(
+        fmt::format("simulation: the force{} of {} {} not unique, a self-stress acts "
+                    "there; of all that fit, those of least norm are recorded",
+                    more.size() == 1 ? "" : "s", Joined(more), more.size() == 1 ? "is" : "are"));
   }
   return texts;
 }

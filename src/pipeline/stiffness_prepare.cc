@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "core/demand.h"
+#include "core/text.h"
 #include "mechanism/load_model.h"
 #include "pipeline/stiffness.h"
 
@@ -11,21 +12,6 @@ namespace mbv {
 namespace {
 
 constexpr const char* kPrintedModel = "as_printed";
-
-void AddError(const StiffnessScenario& scenario, const std::string& message,
-              const std::string& hint, Diagnostics* diagnostics) {
-  Finding finding;
-  finding.file = scenario.file;
-  finding.message = message;
-  finding.hint = hint;
-  diagnostics->Add(std::move(finding));
-}
-
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
 
 Mechanism WithParameters(const PreparedStiffness& prepared, const Overrides& own,
                          const char* witness, Diagnostics* diagnostics) {
@@ -35,9 +21,9 @@ Mechanism WithParameters(const PreparedStiffness& prepared, const Overrides& own
   LoadResult loaded = LoadModel(prepared.scenario.model_file, options);
   if (loaded.mechanism) return *std::move(loaded.mechanism);
   diagnostics->Append(loaded.diagnostics);
-  AddError(prepared.scenario,
-           fmt::format("the model cannot be loaded with the parameters of the {} witness", witness),
-           "", diagnostics);
+  diagnostics->AddError(
+      prepared.scenario.file,
+      fmt::format("the model cannot be loaded with the parameters of the {} witness", witness), "");
   return prepared.base;
 }
 
@@ -50,12 +36,12 @@ void ResolveOutput(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   if (prepared->output >= 0) return;
   std::vector<std::string> known;
   for (const Output& output : prepared->base.outputs) known.push_back(output.name);
-  AddError(prepared->scenario,
-           name.empty() ? fmt::format("output is not given, and {} has {}", prepared->base.name,
-                                      known.empty() ? "none" : "several")
-                        : fmt::format("there is no output '{}'", name),
-           known.empty() ? "declare one under outputs: in the model" : "outputs: " + Joined(known),
-           diagnostics);
+  diagnostics->AddError(
+      prepared->scenario.file,
+      name.empty() ? fmt::format("output is not given, and {} has {}", prepared->base.name,
+                                 known.empty() ? "none" : "several")
+                   : fmt::format("there is no output '{}'", name),
+      known.empty() ? "declare one under outputs: in the model" : "outputs: " + Joined(known));
 }
 
 void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
@@ -68,7 +54,7 @@ void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   prepared->pose_note = "no pose is given: this is the model's home pose";
   const PoseFault fault = CheckPose(prepared->base, pose);
   if (!fault.message.empty()) {
-    AddError(prepared->scenario, fault.message, fault.hint, diagnostics);
+    diagnostics->AddError(prepared->scenario.file, fault.message, fault.hint);
   }
 }
 
@@ -109,7 +95,8 @@ void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   if (row == nullptr) {
     prepared->form_reason = "there is no closed form of the stiffness of " + prepared->base.name;
     if (!settings.model.empty()) {
-      AddError(prepared->scenario, "analytic.model: " + prepared->form_reason, "", diagnostics);
+      diagnostics->AddError(prepared->scenario.file, "analytic.model: " + prepared->form_reason,
+                            "");
     }
     return;
   }
@@ -122,9 +109,9 @@ void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   const auto& models = row->models;
   prepared->form_model = settings.model.empty() ? models.front() : settings.model;
   if (std::find(models.begin(), models.end(), prepared->form_model) == models.end()) {
-    AddError(prepared->scenario,
-             fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(models)),
-             "", diagnostics);
+    diagnostics->AddError(
+        prepared->scenario.file,
+        fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(models)), "");
     return;
   }
   prepared->form_reason = Decline(*prepared, *row, diagnostics);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/demand.h"
+#include "core/text.h"
 #include "mechanism/load_model.h"
 #include "pipeline/drive_by.h"
 #include "reference/forward.h"
@@ -14,15 +15,6 @@
 namespace mbv {
 namespace {
 
-void AddError(const Scenario& scenario, const std::string& message, const std::string& hint,
-              Diagnostics* diagnostics) {
-  Finding finding;
-  finding.file = scenario.file;
-  finding.message = message;
-  finding.hint = hint;
-  diagnostics->Add(std::move(finding));
-}
-
 // The base mechanism, or the model loaded again with a witness' own overrides.
 Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Overrides& own,
                       const std::string& witness, Diagnostics* diagnostics) {
@@ -30,20 +22,10 @@ Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Ove
   LoadResult loaded = LoadModel(scenario.model_file, ModelOptions(scenario, own));
   if (loaded.mechanism) return *std::move(loaded.mechanism);
   diagnostics->Append(loaded.diagnostics);
-  AddError(scenario,
-           fmt::format("the model cannot be loaded with the parameters of the {} witness", witness),
-           "", diagnostics);
+  diagnostics->AddError(
+      scenario.file,
+      fmt::format("the model cannot be loaded with the parameters of the {} witness", witness), "");
   return base;
-}
-
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
-bool Contains(const std::vector<std::string>& words, const std::string& word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
 }
 
 // Why the closed form does not take this mechanism and its loads; "" if it does. One warning each.
@@ -99,18 +81,18 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
   const AnalyticSettings& settings = scenario.analytic;
   bool fits = true;
   if (!settings.model.empty() && !Contains(row->models, settings.model)) {
-    AddError(
-        scenario,
+    diagnostics->AddError(
+        scenario.file,
         fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(row->models)),
-        "", diagnostics);
+        "");
     fits = false;
   }
   for (const std::string& erratum : settings.as_printed) {
     if (Contains(row->errata, erratum)) continue;
-    AddError(
-        scenario,
+    diagnostics->AddError(
+        scenario.file,
         fmt::format("analytic.as_printed: '{}' is not one of: {}", erratum, Joined(row->errata)),
-        "", diagnostics);
+        "");
     fits = false;
   }
   if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
@@ -233,7 +215,7 @@ SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechan
   SimulatedWitness witness;
   const Diagnostics option_findings = Check(options);
   for (const Finding& finding : option_findings.findings()) {
-    AddError(scenario, "simulation: " + finding.message, finding.hint, &witness.diagnostics);
+    &witness.diagnostics->AddError(scenario.file, "simulation: " + finding.message, finding.hint);
   }
   if (witness.diagnostics.has_errors()) return witness;
   if (!scenario.simulation.extrapolate) {

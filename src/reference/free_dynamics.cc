@@ -45,7 +45,7 @@ VecX LeastForces(const MatX& columns, Eigen::Index first_driven, const VecX& wre
 }
 
 // The rotation [rad] or translation [L] of the largest twist.
-double SizeOf(const VecX& twists, double length) {
+double SizeOfTwists(const VecX& twists, double length) {
   double size = 0.0;
   for (Eigen::Index i = 0; i < twists.size(); i += 6) {
     size = std::max({size, twists.segment<3>(i).norm(), twists.segment<3>(i + 3).norm() / length});
@@ -239,7 +239,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
     }
     previous = open;
     const VecX step = LeastMotion(-r, FirmRank());
-    if (moved != nullptr) *moved += SizeOf(step, length_);
+    if (moved != nullptr) *moved += SizeOfTwists(step, length_);
     MoveBodies(step, states);
   }
   RunSummary summary;

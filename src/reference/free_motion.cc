@@ -16,8 +16,8 @@ namespace {
 
 namespace odeint = boost::numeric::odeint;
 
-constexpr size_t kPerBody = 13;          // position, quaternion (w, x, y, z), twist
-constexpr double kSmallestStep = 1e-10;  // of the duration
+constexpr size_t kPerBody = 13;               // position, quaternion (w, x, y, z), twist
+constexpr double kSmallestStepShare = 1e-10;  // of the duration
 // A pose counts as near singular while its pivot is below this share of the largest of the run, and
 // as passed if the search between the nodes brings it below the second.
 constexpr double kNear = 0.03, kPassed = 1e-3;
@@ -196,13 +196,13 @@ RunSummary FreeMotion::Segment(double to_s) {
         stepper_->controlled.try_step(rates, x, t, dt) == odeint::success && trouble_.ok();
     if (!accepted) {
       dt_ = trouble_.ok() ? dt : 0.25 * tried;
-      if (dt_ > kSmallestStep * duration_s_) continue;
+      if (dt_ > kSmallestStepShare * duration_s_) continue;
       return NoWayOn(dt_);
     }
     dt_ = clipped ? std::max(natural, dt) : dt;
     if (to_the_end) t = to_s;
     if (RunSummary summary = Accept(x, t); !summary.ok()) return summary;
-    if (tried < kSmallestStep * duration_s_ && !to_the_end) return NoWayOn(tried);
+    if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
   }
   return RunSummary::Done();
 }

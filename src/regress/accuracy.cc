@@ -17,14 +17,14 @@ constexpr const char* kEnd = "<!-- accuracy: end -->";
 constexpr const char* kNothing = "–";
 
 // A heading and the places in summary.json where its number may stand, the first that has one.
-struct Column {
+struct AccuracyColumn {
   const char* heading;
   std::vector<const char*> places;  // JSON pointers, or CHECK:value, CHECK:limit
   const char* unit = "";
 };
 
-const std::vector<Column>& Columns() {
-  static const std::vector<Column> kColumns = {
+const std::vector<AccuracyColumn>& AccuracyColumns() {
+  static const std::vector<AccuracyColumn> kColumns = {
       {"reference vs analytic", {"/metrics/reference_vs_analytic/force_nrmse"}},
       {"simulation vs analytic", {"/metrics/simulated_vs_analytic/force_nrmse"}},
       {"largest error", {"/metrics/simulated_vs_analytic/force_max_rel"}},
@@ -125,7 +125,7 @@ std::string ForEachRow(const std::string& document,
 
 std::vector<std::string> AccuracyHeadings() {
   std::vector<std::string> headings = {"step"};
-  for (const Column& column : Columns()) headings.emplace_back(column.heading);
+  for (const AccuracyColumn& column : AccuracyColumns()) headings.emplace_back(column.heading);
   return headings;
 }
 
@@ -144,9 +144,9 @@ std::optional<std::string> AccuracyText(const std::string& heading, const std::s
   const Json json = Json::parse(summary, nullptr, false);
   if (!json.is_object()) return {};
   if (heading == "step") return StepText(json);
-  const auto& columns = Columns();
+  const auto& columns = AccuracyColumns();
   const auto column = std::find_if(columns.begin(), columns.end(),
-                                   [&](const Column& c) { return heading == c.heading; });
+                                   [&](const AccuracyColumn& c) { return heading == c.heading; });
   if (column == columns.end()) return {};
   for (const char* place : column->places) {
     const double number = NumberAt(json, place);

@@ -17,20 +17,20 @@ namespace {
 constexpr const char* kMagic = "mbvgold1";
 constexpr int kDroppedBits = 52 - 36;
 
-struct Column {
+struct GoldenColumn {
   std::string witness, drive;
 };
 
 // "limb1.drive.force.analytic" → {analytic, limb1.drive}; no witness: not a drive force.
-Column ColumnOf(std::string_view name) {
+GoldenColumn ColumnOf(std::string_view name) {
   const size_t dot = name.rfind('.');
   constexpr std::string_view kForce = ".force";
   if (dot == std::string_view::npos || !name.substr(0, dot).ends_with(kForce)) return {};
   return {std::string(name.substr(dot + 1)), std::string(name.substr(0, dot - kForce.size()))};
 }
 
-std::vector<Column> ReadHeader(std::string_view line) {
-  std::vector<Column> columns;
+std::vector<GoldenColumn> ReadHeader(std::string_view line) {
+  std::vector<GoldenColumn> columns;
   for (size_t at = 0; at <= line.size();) {
     const size_t comma = std::min(line.find(',', at), line.size());
     columns.push_back(ColumnOf(line.substr(at, comma - at)));
@@ -94,13 +94,13 @@ GoldenTraces ReadForces(const std::string& csv, size_t max_samples) {
     at = end + 1;
   }
   if (lines.size() < 2) return {};
-  const std::vector<Column> columns = ReadHeader(lines[0]);
+  const std::vector<GoldenColumn> columns = ReadHeader(lines[0]);
   const size_t all = lines.size() - 1;
   const size_t stride = (all + max_samples - 1) / max_samples;
   const auto samples = static_cast<Eigen::Index>((all + stride - 1) / stride);
   GoldenTraces traces;
   std::vector<double*> target(columns.size(), nullptr);
-  for (const Column& column : columns) {
+  for (const GoldenColumn& column : columns) {
     if (!column.witness.empty()) traces[column.witness].drives.push_back(column.drive);
   }
   for (auto& [witness, trace] : traces) {

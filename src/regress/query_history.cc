@@ -11,7 +11,7 @@
 namespace mbv {
 namespace {
 
-struct Row {
+struct HistoryRow {
   long result = 0;
   std::string status;
   double key_value = kNan;
@@ -31,12 +31,12 @@ std::string KeyMetricQuery() {
       names, ranks);
 }
 
-std::map<std::string, Row> RowsOf(Database* database, long run) {
+std::map<std::string, HistoryRow> RowsOf(Database* database, long run) {
   Statement select(database, fmt::format("SELECT s.key, r.id, r.status, {}, r.wall_s FROM result r "
                                          "JOIN scenario s ON s.id = r.scenario WHERE r.run = ?",
                                          KeyMetricQuery()));
   select.Bind(run);
-  std::map<std::string, Row> rows;
+  std::map<std::string, HistoryRow> rows;
   while (select.Step()) {
     rows[select.Text(0)] = {select.Integer(1), select.Text(2), select.Real(3), select.Real(4)};
   }
@@ -53,7 +53,8 @@ std::string RunLine(Database* database, long run) {
                      select.Text(2));
 }
 
-std::string CompareRow(Database* database, const std::string& key, const Row& a, const Row& b) {
+std::string CompareRow(Database* database, const std::string& key, const HistoryRow& a,
+                       const HistoryRow& b) {
   const std::string moved =
       AttributeMovement(LoadGolden(database, a.result), LoadGolden(database, b.result));
   const double ratio = b.key_value / a.key_value;

@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "mbverify.convergence/1";
+constexpr const char* kConvergenceSchema = "mbverify.convergence/1";
 
 Json PairJson(const ErrorPair& pair) {
   return {{"smooth", Number(pair.smooth)}, {"breaks", Number(pair.breaks)}};
@@ -145,7 +145,7 @@ std::string ToCsv(const ConvergenceReport& report) {
 std::string ToJson(const ConvergenceReport& report) {
   Json series = Json::array();
   for (const ConvergenceSeries& s : report.series) series.push_back(SeriesJson(s));
-  const Json json = {{"schema", kSchema},
+  const Json json = {{"schema", kConvergenceSchema},
                      {"scenario", report.scenario},
                      {"mechanism", report.mechanism},
                      {"verdict", report.finding() ? "finding" : "as_expected"},

@@ -3,13 +3,10 @@
 #include <cmath>
 
 #include "report/convergence_report.h"
+#include "report/number_text.h"
 
 namespace mbv {
 namespace {
-
-std::string Cell(double value, const char* format = "{:.2e}") {
-  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "-";
-}
 
 const char* VerdictOf(const ConvergenceSeries& series) {
   if (series.verdict.finding || series.pose_verdict.finding) return "FINDING";
@@ -29,12 +26,12 @@ std::string SeriesText(const ConvergenceSeries& series) {
   for (size_t i = 0; i < series.points.size(); ++i) {
     const ConvergencePoint& p = series.points[i];
     text += fmt::format("  {:>10.4g}{:>12.4g}", p.step_s, p.time_constant_s);
-    text +=
-        p.failure.empty()
-            ? fmt::format("{:>9}{:>9.3f}{:>10}{:>10}{:>10}{:>7}{:>10}{:>10}\n", p.steps, p.cpu_s,
-                          Cell(p.error.smooth), Cell(p.error.breaks), Cell(p.change.smooth),
-                          Cell(series.fit.pairwise[i], "{:.2f}"), Cell(p.pose_m), Cell(p.closure_m))
-            : "  no result\n";
+    text += p.failure.empty() ? fmt::format("{:>9}{:>9.3f}{:>10}{:>10}{:>10}{:>7}{:>10}{:>10}\n",
+                                            p.steps, p.cpu_s, NumberCell(p.error.smooth),
+                                            NumberCell(p.error.breaks), NumberCell(p.change.smooth),
+                                            NumberCell(series.fit.pairwise[i], "{:.2f}"),
+                                            NumberCell(p.pose_m), NumberCell(p.closure_m))
+                              : "  no result\n";
   }
   return text;
 }

@@ -33,11 +33,6 @@ VerdictWords WordsOf(Verdict verdict) {
   return {"?", "?"};
 }
 
-std::string Card(const std::string& title, const std::string& value, const std::string& detail) {
-  return fmt::format("<div class=\"card\"><dt>{}</dt><dd><b>{}</b>{}</dd></div>\n", Escape(title),
-                     Escape(value), detail.empty() ? "" : "<span>" + Escape(detail) + "</span>");
-}
-
 // With a capital letter and a full stop.
 std::string Sentence(std::string text) {
   if (text.empty()) return text;

@@ -15,13 +15,6 @@ namespace {
 // More points than a picture this wide can show are thinned; extremes of each bin are kept.
 constexpr size_t kBins = 240;
 
-const Trace* TraceOf(const Report& report, const std::string& witness) {
-  for (const WitnessRecord& record : report.witnesses) {
-    if (record.name == witness && !record.trace.time_s.empty()) return &record.trace;
-  }
-  return nullptr;
-}
-
 // At common times: a table has fewer rows, a shorter trace ended early.
 PlotPoints ErrorOf(const Trace& measured, int column, const Trace& truth, int truth_column) {
   PlotPoints points;

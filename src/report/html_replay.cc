@@ -15,7 +15,7 @@ using Json = nlohmann::ordered_json;
 constexpr size_t kMaxFrames = 600;
 constexpr size_t kMaxNumbers = 120000;  // of all poses: 0.64 MB as base64
 
-Json Vector(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
+Json VectorJson(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
 std::array<double, 7> PoseNumbers(const Pose& X) {
   const Eigen::Quaterniond q(X.linear());
@@ -32,21 +32,21 @@ Json ShapeJson(const Shape& shape) {
   struct Visitor {
     Json operator()(const Capsule& s) const {
       return {{"type", "capsule"},
-              {"from", Vector(s.p_from)},
-              {"to", Vector(s.p_to)},
+              {"from", VectorJson(s.p_from)},
+              {"to", VectorJson(s.p_to)},
               {"radius", s.radius}};
     }
     Json operator()(const Cylinder& s) const {
       return {{"type", "cylinder"},
-              {"from", Vector(s.p_from)},
-              {"to", Vector(s.p_to)},
+              {"from", VectorJson(s.p_from)},
+              {"to", VectorJson(s.p_to)},
               {"radius", s.radius}};
     }
     Json operator()(const Box& s) const {
-      return {{"type", "box"}, {"pose", PoseNumbers(s.X_BG)}, {"size", Vector(s.size)}};
+      return {{"type", "box"}, {"pose", PoseNumbers(s.X_BG)}, {"size", VectorJson(s.size)}};
     }
     Json operator()(const Ball& s) const {
-      return {{"type", "ball"}, {"at", Vector(s.p_centre)}, {"radius", s.radius}};
+      return {{"type", "ball"}, {"at", VectorJson(s.p_centre)}, {"radius", s.radius}};
     }
   };
   Json json = std::visit(Visitor{}, shape.geometry);
@@ -83,8 +83,7 @@ class ReplayWriter {
     if (input_.X_WB == nullptr || input_.X_WB->empty()) return;
     size_t good = 0;
     // A run that broke down has no poses from there on.
-    while (good < input_.X_WB->size() &&
-           (*input_.X_WB)[good].size() == mechanism_.bodies.size() &&
+    while (good < input_.X_WB->size() && (*input_.X_WB)[good].size() == mechanism_.bodies.size() &&
            AllFinite((*input_.X_WB)[good])) {
       ++good;
     }
@@ -94,7 +93,7 @@ class ReplayWriter {
     for (size_t i = 0; i < good; i += stride) frames_.push_back(i);
   }
 
-  Json Up() const { return Vector(mechanism_.up_W); }
+  Json Up() const { return VectorJson(mechanism_.up_W); }
 
   Json Times() const {
     Json times = Json::array();
@@ -167,9 +166,9 @@ class ReplayWriter {
       if (const auto* distance = std::get_if<DistanceDrive>(&drive.kind)) {
         drives.push_back({{"type", "distance"},
                           {"from", distance->body_from},
-                          {"p_from", Vector(distance->p_from)},
+                          {"p_from", VectorJson(distance->p_from)},
                           {"to", distance->body_to},
-                          {"p_to", Vector(distance->p_to)},
+                          {"p_to", VectorJson(distance->p_to)},
                           {"radius", drive.radius}});
       } else {
         drives.push_back(JointDriveJson(std::get<JointDrive>(drive.kind)));
@@ -189,10 +188,10 @@ class ReplayWriter {
     const Pose& X = second ? joint.X_CM : joint.X_PF;
     return {{"type", IsLength(joint.kind, drive.coordinate) ? "slide" : "turn"},
             {"body", second ? joint.child : joint.parent},
-            {"p", Vector(X.translation())},
-            {"axis", Vector(X.linear() * axis)},
+            {"p", VectorJson(X.translation())},
+            {"axis", VectorJson(X.linear() * axis)},
             {"child", joint.child},
-            {"p_child", Vector(joint.X_CM.translation())}};
+            {"p_child", VectorJson(joint.X_CM.translation())}};
   }
 
   Json Closures() const {
@@ -203,9 +202,9 @@ class ReplayWriter {
       if (std::find(tree.begin(), tree.end(), static_cast<int>(j)) != tree.end()) continue;
       closures.push_back({{"name", joint.name},
                           {"parent", joint.parent},
-                          {"p_parent", Vector(joint.X_PF.translation())},
+                          {"p_parent", VectorJson(joint.X_PF.translation())},
                           {"child", joint.child},
-                          {"p_child", Vector(joint.X_CM.translation())}});
+                          {"p_child", VectorJson(joint.X_CM.translation())}});
     }
     return closures;
   }
@@ -215,9 +214,9 @@ class ReplayWriter {
     for (const SpringDamper& spring : mechanism_.springs) {
       springs.push_back({{"name", spring.name},
                          {"from", spring.body_from},
-                         {"p_from", Vector(spring.p_from)},
+                         {"p_from", VectorJson(spring.p_from)},
                          {"to", spring.body_to},
-                         {"p_to", Vector(spring.p_to)}});
+                         {"p_to", VectorJson(spring.p_to)}});
     }
     return springs;
   }

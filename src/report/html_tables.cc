@@ -11,23 +11,12 @@
 namespace mbv {
 namespace {
 
-std::string Spaced(std::string text) {
-  std::replace(text.begin(), text.end(), '_', ' ');
-  return text;
-}
-
-std::string Number(double value, const char* format = "{:.2e}") {
+std::string NumberOrDash(double value, const char* format = "{:.2e}") {
   return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "–";
 }
 
 std::string At(double time_s) {
   return std::isfinite(time_s) ? fmt::format("{:.4g} s", time_s) : "";
-}
-
-std::string Note(const std::string& text) { return "<p class=\"faint\">" + text + "</p>\n"; }
-
-std::string Pill(const char* kind, const std::string& text) {
-  return fmt::format("<span class=\"pill {}\">{}</span>", kind, Escape(text));
 }
 
 // Limit over value as a factor, with a bar of its decimal digits (ten fill it).
@@ -55,7 +44,7 @@ std::vector<Cell> CheckRow(const CheckResult& check) {
   if (!where.empty() && std::isfinite(check.time_s)) where += ", " + At(check.time_s);
   return {Text(Spaced(check.subject)),
           Text(row.title + unit),
-          Digits(Number(check.value)),
+          Digits(NumberOrDash(check.value)),
           Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
           Markup(pill + (check.floored ? " " + Pill("warn", "floored") : "")),
           Markup(check.blind.empty() ? Margin(check) : ""),
@@ -111,9 +100,9 @@ std::string DrivesHtml(const Report& report) {
     for (const DriveMetrics& drive : pair.drives) {
       table.rows.push_back(
           {Text(drive.drive), Digits(fmt::format("{:.6g} {}", drive.rms_truth, drive.unit)),
-           Digits(Number(drive.nrmse)), Digits(Number(drive.max_error) + " " + drive.unit),
-           Digits(At(drive.time_s)),
-           Cell{Number(drive.digits, "{:.1f}") +
+           Digits(NumberOrDash(drive.nrmse)),
+           Digits(NumberOrDash(drive.max_error) + " " + drive.unit), Digits(At(drive.time_s)),
+           Cell{NumberOrDash(drive.digits, "{:.1f}") +
                     (drive.floored ? " " + Pill("warn", "floored") : ""),
                 true, true}});
     }
@@ -137,9 +126,9 @@ std::string EngineHtml(const Report& report) {
   for (const EngineError& e : engine.engines) {
     const std::string name = EngineComparison::NameOf(e.engine);
     if (!e.failure.empty()) failures += Note(name + ": no result: " + Escape(e.failure));
-    table.rows.push_back({Text(name), Digits(Number(e.force_nrmse)),
-                          Digits(Number(e.force_nrmse_later)), Digits(Number(e.force_max_rel)),
-                          Digits(Number(e.closure_max_m) + " m")});
+    table.rows.push_back(
+        {Text(name), Digits(NumberOrDash(e.force_nrmse)), Digits(NumberOrDash(e.force_nrmse_later)),
+         Digits(NumberOrDash(e.force_max_rel)), Digits(NumberOrDash(e.closure_max_m) + " m")});
   }
   return ToHtml(table) + failures +
          Note(
@@ -193,15 +182,16 @@ std::string EnergyAuditHtml(const Comparison& comparison) {
   for (const EnergyPart& part : audits.back()->parts) {
     add((part.stored ? "change: " : "work: ") + part.name, [&](const EnergyAudit& audit) {
       for (const EnergyPart& own : audit.parts) {
-        if (own.name == part.name) return Number(own.end_J, "{:.6g}");
+        if (own.name == part.name) return NumberOrDash(own.end_J, "{:.6g}");
       }
-      return Number(kNan);
+      return NumberOrDash(kNan);
     });
   }
-  add("drift: change − work", [](const EnergyAudit& audit) { return Number(audit.end_drift_J); });
-  add("largest drift", [](const EnergyAudit& audit) { return Number(audit.drift_J); });
+  add("drift: change − work",
+      [](const EnergyAudit& audit) { return NumberOrDash(audit.end_drift_J); });
+  add("largest drift", [](const EnergyAudit& audit) { return NumberOrDash(audit.drift_J); });
   add("largest drift / energy turned over",
-      [](const EnergyAudit& audit) { return Number(audit.drift.value); });
+      [](const EnergyAudit& audit) { return NumberOrDash(audit.drift.value); });
   add("work by", [](const EnergyAudit& audit) {
     return std::string(audit.integrated ? "integration" : "samples");
   });
@@ -231,7 +221,8 @@ std::string EnergyHtml(const Report& report) {
   const auto add = [&](const std::string& title, const std::function<double(const Work&)>& value,
                        double peak_w) {
     std::vector<Cell> row = {Text(title)};
-    for (const auto& [name, work] : works) row.push_back(Digits(Number(value(work), "{:.6g}")));
+    for (const auto& [name, work] : works)
+      row.push_back(Digits(NumberOrDash(value(work), "{:.6g}")));
     row.push_back(Digits(std::isfinite(peak_w) ? fmt::format("{:.0f}", peak_w) : ""));
     table.rows.push_back(std::move(row));
   };

@@ -1,5 +1,8 @@
 #include "report/html_text.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <bit>
 #include <cstdint>
 
@@ -47,6 +50,22 @@ std::string ToHtml(const Table& table) {
     html += "</tr>\n";
   }
   return html + "</tbody></table></div>\n";
+}
+
+std::string Note(const std::string& text) { return "<p class=\"faint\">" + text + "</p>\n"; }
+
+std::string Pill(const char* kind, const std::string& text) {
+  return fmt::format("<span class=\"pill {}\">{}</span>", kind, Escape(text));
+}
+
+std::string Card(const std::string& title, const std::string& value, const std::string& detail) {
+  return fmt::format("<div class=\"card\"><dt>{}</dt><dd><b>{}</b>{}</dd></div>\n", Escape(title),
+                     Escape(value), detail.empty() ? "" : "<span>" + Escape(detail) + "</span>");
+}
+
+std::string Spaced(std::string text) {
+  std::replace(text.begin(), text.end(), '_', ' ');
+  return text;
 }
 
 }  // namespace mbv

@@ -34,4 +34,14 @@ struct Table {
 };
 [[nodiscard]] std::string ToHtml(const Table& table);
 
+/// A faint remark.
+[[nodiscard]] std::string Note(const std::string& text);
+/// A word on coloured ground: kind is ok, warn, fail or off.
+[[nodiscard]] std::string Pill(const char* kind, const std::string& text);
+/// A number with its title, and what it is about below.
+[[nodiscard]] std::string Card(const std::string& title, const std::string& value,
+                               const std::string& detail);
+/// "force_nrmse" → "force nrmse".
+[[nodiscard]] std::string Spaced(std::string text);
+
 }  // namespace mbv

@@ -6,7 +6,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "mbverify.summary/1";
+constexpr const char* kSummarySchema = "mbverify.summary/1";
 
 Json ChecksJson(const Comparison& comparison) {
   Json checks = Json::array();
@@ -251,7 +251,7 @@ Json TimingJson(const Timing& timing) {
 }  // namespace
 
 std::string ToJson(const Report& report) {
-  Json json = {{"schema", kSchema},
+  Json json = {{"schema", kSummarySchema},
                {"scenario", report.scenario},
                {"scenario_file", report.scenario_file},
                {"mechanism", report.mechanism},

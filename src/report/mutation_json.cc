@@ -11,7 +11,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr const char* kSchema = "mbverify.mutate/2";
+constexpr const char* kMutationSchema = "mbverify.mutate/2";
 constexpr const char* kKinds[] = {"parameter", "instance", "literal"};
 
 // One list of fields per struct serves both directions.
@@ -177,7 +177,7 @@ std::vector<T> Interleave(std::vector<MutationReport>* parts,
 
 std::string ToJson(const MutationReport& report) {
   ToFields field;
-  field("schema", kSchema);
+  field("schema", kMutationSchema);
   ReportFields(field, report);
   Json& json = field.json;
   json["numbers"] = Json::array();
@@ -190,7 +190,7 @@ std::string ToJson(const MutationReport& report) {
 std::optional<MutationReport> MutationReportOf(const std::string& text) {
   try {
     const Json json = Json::parse(text);
-    if (json.at("schema") != kSchema) return {};
+    if (json.at("schema") != kMutationSchema) return {};
     MutationReport report;
     const FromFields field{json};
     ReportFields(field, report);

@@ -1,4 +1,5 @@
 #include "report/mutation_report.h"
+#include "report/number_text.h"
 
 #include <fmt/format.h>
 
@@ -7,10 +8,6 @@
 
 namespace mbv {
 namespace {
-
-std::string Cell(double value, const char* format) {
-  return std::isnan(value) ? "-" : fmt::format(fmt::runtime(format), value);
-}
 
 // "|" would end a cell of a Markdown table.
 std::string InCell(std::string text) {
@@ -56,9 +53,9 @@ bool HasInverse(const MutationReport& report) {
 }
 
 std::string Row(const Mutation& m, bool inverse, bool markdown) {
-  const std::string change = Cell(m.own.force_change, "{:.1e}");
-  const std::string smallest = Cell(m.own.smallest, "{:.1e}");
-  const std::string by_inverse = Cell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
+  const std::string change = NumberCell(m.own.force_change, "{:.1e}");
+  const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
+  const std::string by_inverse = NumberCell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
   if (markdown) {
     return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {}{} |\n", m.name, m.value, m.unit,
                        SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",

@@ -14,7 +14,7 @@ namespace {
 
 constexpr size_t kMostPlots = 8;  // columns, the worst first
 
-std::string Number(double value, const char* format = "{:.2e}") {
+std::string NumberOrOff(double value, const char* format = "{:.2e}") {
   if (std::isinf(value)) return "off";
   return std::isnan(value) ? "–" : fmt::format(fmt::runtime(format), value);
 }
@@ -36,13 +36,6 @@ std::vector<const TableColumnResult*> ByRatio(const PairComparison& pair) {
   return columns;
 }
 
-const Trace* TraceOf(const Report& report, const std::string& witness) {
-  for (const WitnessRecord& record : report.witnesses) {
-    if (record.name == witness && !record.trace.time_s.empty()) return &record.trace;
-  }
-  return nullptr;
-}
-
 std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
   Table html{.caption = fmt::format("Columns of {} against {}, worst first", table.name,
                                     table.judged_against),
@@ -55,14 +48,19 @@ std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
     const bool inside = column->inside();
     html.rows.push_back(
         {Text(column->channel), Text(source.heading),
-         Digits(Number(column->rms, "{:.6g} ") + source.channel.unit),
-         Digits(Number(column->standard)), Text(UncertaintyText(table.uncertainty[column->column])),
-         Digits(Number(column->error_rms)), Digits(Number(column->tube_rms)),
-         Digits(Number(column->error_max)), Digits(Number(column->tube_max)),
-         Digits(Number(column->time_s, "{:.4g} s")),
+         Digits(NumberOrOff(column->rms, "{:.6g} ") + source.channel.unit),
+         Digits(NumberOrOff(column->standard)),
+         Text(UncertaintyText(table.uncertainty[column->column])),
+         Digits(NumberOrOff(column->error_rms)), Digits(NumberOrOff(column->tube_rms)),
+         Digits(NumberOrOff(column->error_max)), Digits(NumberOrOff(column->tube_max)),
+         Digits(NumberOrOff(column->time_s, "{:.4g} s")),
          Markup(fmt::format("<span class=\"pill {}\">{}</span>",
-                            inside ? "ok" : table.judged ? "fail" : "off",
-                            inside ? "inside" : table.judged ? "outside" : "not judged"))});
+                            inside         ? "ok"
+                            : table.judged ? "fail"
+                                           : "off",
+                            inside         ? "inside"
+                            : table.judged ? "outside"
+                                           : "not judged"))});
   }
   return ToHtml(html);
 }
@@ -165,9 +163,11 @@ std::vector<std::string> ReferenceTableLines(const Comparison& comparison, bool 
           "  {:<{}}  RMS {:.5g} {}, uncertainty {:.1e}, differs by {:.1e} (tube {}), at most "
           "{:.1e} (tube {}): {}",
           column->channel, width, column->rms, SourceOf(table, *column).channel.unit,
-          column->standard, column->error_rms, Number(column->tube_rms, "{:.1e}"),
-          column->error_max, Number(column->tube_max, "{:.1e}"),
-          column->inside() ? "inside" : table.judged ? "OUTSIDE" : "not judged"));
+          column->standard, column->error_rms, NumberOrOff(column->tube_rms, "{:.1e}"),
+          column->error_max, NumberOrOff(column->tube_max, "{:.1e}"),
+          column->inside() ? "inside"
+          : table.judged   ? "OUTSIDE"
+                           : "not judged"));
       const std::string parts = UncertaintyText(table.uncertainty[column->column]);
       if (verbose && !parts.empty()) lines.push_back("      uncertainty: " + parts);
     }

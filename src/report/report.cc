@@ -61,4 +61,11 @@ std::string CountLine(const RunCounts& counts) {
   return text + "\n";
 }
 
+const Trace* TraceOf(const Report& report, const std::string& witness) {
+  for (const WitnessRecord& record : report.witnesses) {
+    if (record.name == witness && !record.trace.time_s.empty()) return &record.trace;
+  }
+  return nullptr;
+}
+
 }  // namespace mbv

@@ -102,6 +102,9 @@ struct RunCounts {
 /// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
 [[nodiscard]] std::string CountLine(const RunCounts& counts);
 
+/// What a witness recorded; null if it did not run.
+[[nodiscard]] const Trace* TraceOf(const Report& report, const std::string& witness);
+
 /// The pair a reader looks at first: of servos simulated vs reached; simulated vs analytic if
 /// compared, else simulated vs reference, else reference vs analytic; null if none was compared.
 [[nodiscard]] const PairComparison* MainPair(const Comparison& comparison);

@@ -12,23 +12,9 @@
 namespace mbv {
 namespace {
 
-std::string Card(const std::string& title, const std::string& value, const std::string& detail) {
-  return fmt::format("<div class=\"card\"><dt>{}</dt><dd><b>{}</b><span>{}</span></dd></div>\n",
-                     Escape(title), Escape(value), Escape(detail));
-}
-
-std::string Pill(const char* kind, const char* text) {
-  return fmt::format("<span class=\"pill {}\">{}</span>", kind, text);
-}
-
-std::string Spaced(std::string text) {
-  std::replace(text.begin(), text.end(), '_', ' ');
-  return text;
-}
-
-class PageWriter {
+class StiffnessPageWriter {
  public:
-  explicit PageWriter(const StiffnessReport& report) : report_(report) {}
+  explicit StiffnessPageWriter(const StiffnessReport& report) : report_(report) {}
 
   std::string Write() {
     Add("Verdict", "Verdict", VerdictHtml());
@@ -224,6 +210,6 @@ class PageWriter {
 
 }  // namespace
 
-std::string ToHtml(const StiffnessReport& report) { return PageWriter(report).Write(); }
+std::string ToHtml(const StiffnessReport& report) { return StiffnessPageWriter(report).Write(); }
 
 }  // namespace mbv

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/stiffness_measures.h"
 #include "report/html_text.h"
 #include "report/stiffness_report.h"
 #include "report/svg_plot.h"
@@ -11,13 +12,9 @@
 namespace mbv {
 namespace {
 
-constexpr const char* kWrenchNames[] = {"mx", "my", "mz", "fx", "fy", "fz"};
-
 std::string Details(const std::string& title, const std::string& content) {
   return "<details><summary>" + Escape(title) + "</summary>" + content + "</details>\n";
 }
-
-std::string Note(const std::string& text) { return "<p class=\"faint\">" + text + "</p>\n"; }
 
 Table MatrixTable(const std::string& caption, const Mat6& M, bool stiffness) {
   Table table{.caption = caption, .head = {Text("")}, .rows = {}};

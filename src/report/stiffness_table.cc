@@ -4,12 +4,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/stiffness_measures.h"
 #include "report/stiffness_report.h"
 
 namespace mbv {
 namespace {
-
-constexpr const char* kWrenchNames[] = {"mx", "my", "mz", "fx", "fy", "fz"};
 
 std::string Vector(const Vec3& v, const char* format = "{:.4f}") {
   std::string text;
@@ -30,9 +29,9 @@ std::string PoseText(const StiffnessReport& report) {
   return text;
 }
 
-class Writer {
+class StiffnessTableWriter {
  public:
-  explicit Writer(const TableOptions& options) : options_(options) {}
+  explicit StiffnessTableWriter(const TableOptions& options) : options_(options) {}
 
   std::string VerdictWord(Verdict verdict) const {
     switch (verdict) {
@@ -238,7 +237,7 @@ class Writer {
 std::string VerdictLine(const StiffnessReport& report, const TableOptions& options) {
   const StiffnessComparison& comparison = report.comparison;
   std::string line = fmt::format("{} / {}: {}", report.mechanism, report.scenario,
-                                 Writer(options).VerdictWord(comparison.verdict));
+                                 StiffnessTableWriter(options).VerdictWord(comparison.verdict));
   const StiffnessPair* pair = comparison.MainPair();
   if (pair != nullptr && comparison.verdict != Verdict::kNotRun) {
     const StiffnessCheck* check = comparison.FindCheck(pair->name() + ".stiffness_entry");
@@ -250,7 +249,7 @@ std::string VerdictLine(const StiffnessReport& report, const TableOptions& optio
 }
 
 std::string ToTable(const StiffnessReport& report, const TableOptions& options) {
-  return Writer(options).Write(report);
+  return StiffnessTableWriter(options).Write(report);
 }
 
 }  // namespace mbv

@@ -12,9 +12,9 @@ namespace {
 
 enum class Paint { kPlain, kGood, kBad, kDoubt, kTitle, kFaint };
 
-class Writer {
+class VerdictTableWriter {
  public:
-  explicit Writer(const TableOptions& options) : options_(options) {}
+  explicit VerdictTableWriter(const TableOptions& options) : options_(options) {}
 
   std::string VerdictWord(Verdict verdict) const {
     switch (verdict) {
@@ -191,9 +191,10 @@ class Writer {
            (drive.floored ? "  floored" : ""));
     }
     if (floored) {
-      Line(Painted("  floored: relative to 0.1 % of what the drive carries, which is more than its "
-                   "own force",
-                   Paint::kFaint));
+      Line(
+          Painted("  floored: relative to 0.1 % of what the drive carries, which is more than its "
+                  "own force",
+                  Paint::kFaint));
     }
   }
 
@@ -290,8 +291,9 @@ class Writer {
 }  // namespace
 
 std::string VerdictLine(const Report& report, const TableOptions& options) {
-  std::string line = fmt::format("{} / {}: {}", report.mechanism, report.scenario,
-                                 Writer(options).VerdictWord(report.comparison.verdict));
+  std::string line =
+      fmt::format("{} / {}: {}", report.mechanism, report.scenario,
+                  VerdictTableWriter(options).VerdictWord(report.comparison.verdict));
   const PairComparison* pair = MainPair(report.comparison);
   const CheckResult* check =
       pair == nullptr ? nullptr : report.comparison.FindCheck(pair->name() + ".force_nrmse");
@@ -306,7 +308,7 @@ std::string VerdictLine(const Report& report, const TableOptions& options) {
 }
 
 std::string ToTable(const Report& report, const TableOptions& options) {
-  return Writer(options).Write(report);
+  return VerdictTableWriter(options).Write(report);
 }
 
 }  // namespace mbv

@@ -14,8 +14,12 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 
 namespace mbv {
+
+/// Before a check's key: its limit between closed form and reference.
+inline constexpr std::string_view kReferencePrefix = "reference_";
 
 /// A judged quantity. Those of a pair compare two witnesses; the others need one witness only.
 enum class Metric {

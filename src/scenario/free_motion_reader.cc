@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/text.h"
 #include "mechanism/command_rank.h"
 #include "mechanism/mobility_report.h"
 #include "scenario/motion_reader.h"
@@ -12,11 +13,7 @@
 namespace mbv {
 namespace {
 
-std::string Joined(const std::vector<std::string>& words, size_t most = 12) {
-  std::string text;
-  for (size_t i = 0; i < words.size() && i < most; ++i) text += (i == 0 ? "" : ", ") + words[i];
-  return words.size() > most ? text + ", …" : text;
-}
+constexpr size_t kMostNames = 12;  // in one message
 
 // Joint coordinates by name: JOINT, or JOINT.0, JOINT.1 … where a joint has several.
 struct NamedCoordinate {
@@ -40,9 +37,9 @@ Command AsCommand(const std::string& name, const Coordinate& coordinate) {
   return {.name = name, .terms = {{coordinate, 1.0}}, .profile = {}};
 }
 
-class Reader {
+class FreeMotionReader {
  public:
-  Reader(ValueReader* values, const Mechanism& mechanism, Motion* motion)
+  FreeMotionReader(ValueReader* values, const Mechanism& mechanism, Motion* motion)
       : values_(values), mechanism_(mechanism), motion_(motion) {
     for (NamedCoordinate& named : StartCoordinates(mechanism)) known_.push_back(std::move(named));
   }
@@ -98,9 +95,9 @@ class Reader {
       const int drive = mechanism_.FindDrive(entry.key);
       if (drive < 0) {
         const std::string near = ClosestWord(entry.key, names);
-        yaml().Error(
-            entry, fmt::format("forces: {} has no drive '{}'", mechanism_.name, entry.key),
-            near.empty() ? "known: " + Joined(names) : fmt::format("did you mean '{}'?", near));
+        yaml().Error(entry, fmt::format("forces: {} has no drive '{}'", mechanism_.name, entry.key),
+                     near.empty() ? "known: " + Joined(names, kMostNames)
+                                  : fmt::format("did you mean '{}'?", near));
         continue;
       }
       const ProfileContext context{.unit = ForceUnit(mechanism_, mechanism_.drives[drive]),
@@ -202,12 +199,12 @@ class Reader {
     if (rank.redundant > 0 || static_cast<int>(motion_->initial.size()) > free) {
       std::vector<std::string> names;
       for (const int k : rank.dependent) names.push_back(given[static_cast<size_t>(k)].name);
-      yaml().Error(
-          node,
-          fmt::format("start values and commands depend on each other: {}",
-                      names.empty() ? "more are given than there are freedoms" : Joined(names)),
-          fmt::format("{} has {} freedoms, {} of them commanded: leave out {}", mechanism_.name,
-                      freedoms, commands, rank.redundant));
+      yaml().Error(node,
+                   fmt::format("start values and commands depend on each other: {}",
+                               names.empty() ? "more are given than there are freedoms"
+                                             : Joined(names, kMostNames)),
+                   fmt::format("{} has {} freedoms, {} of them commanded: leave out {}",
+                               mechanism_.name, freedoms, commands, rank.redundant));
       return;
     }
     std::vector<Command> candidates;
@@ -240,7 +237,7 @@ bool IsFree(const YamlNode* motion, const YamlNode* forces) {
 
 void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
                     const YamlNode* forces, Motion* motion) {
-  Reader(values, mechanism, motion).Read(motion_node, forces);
+  FreeMotionReader(values, mechanism, motion).Read(motion_node, forces);
 }
 
 }  // namespace mbv

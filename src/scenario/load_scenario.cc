@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 
 constexpr double kMostValues = 1e7;  // of one witness: 80 MB
 
-const std::vector<std::string> kKeys = {
+const std::vector<std::string> kMotionScenarioKeys = {
     "kind",   "mechanism", "description", "parameters", "gravity", "motion",    "loads",
     "forces", "analytic",  "reference",   "simulation", "checks",  "snapshots", "expect"};
 
@@ -39,13 +39,13 @@ std::string JoinWords(std::vector<std::string> words) {
   return text;
 }
 
-std::string WithoutUnit(const std::string& key) {
+std::string NameWithoutUnit(const std::string& key) {
   return ParameterIn(key, [&](const std::string& plain) { return plain != key; }).name;
 }
 
-class Loader {
+class ScenarioLoader {
  public:
-  Loader(const std::string& file, const ScenarioOptions& options)
+  ScenarioLoader(const std::string& file, const ScenarioOptions& options)
       : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
 
   ScenarioResult Load(const std::string& text) {
@@ -72,7 +72,7 @@ class Loader {
  private:
   void Read(const YamlNode& root) {
     if (const YamlNode* kind = root.Find("kind"); kind != nullptr && !IsMotion(*kind)) return;
-    YamlMap map(&yaml_, &root, "", kKeys);
+    YamlMap map(&yaml_, &root, "", kMotionScenarioKeys);
     scenario_.file = file_;
     if (const YamlNode* description = map.Find("description")) {
       scenario_.description = yaml_.Text(*description, "description").value_or("");
@@ -153,7 +153,7 @@ class Loader {
     for (const YamlEntry& option : node->entries) {
       if (option.line >= 0) continue;
       for (const YamlEntry& entry : node->entries) {
-        if (entry.line < 0 || WithoutUnit(entry.key) != WithoutUnit(option.key)) continue;
+        if (entry.line < 0 || NameWithoutUnit(entry.key) != NameWithoutUnit(option.key)) continue;
         scenario_.parameters.erase(entry.key);
       }
     }
@@ -360,12 +360,12 @@ LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more) {
 }
 
 ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& options) {
-  return Loader(file, options).LoadFile();
+  return ScenarioLoader(file, options).LoadFile();
 }
 
 ScenarioResult LoadScenarioText(const std::string& text, const std::string& file,
                                 const ScenarioOptions& options) {
-  return Loader(file, options).Load(text);
+  return ScenarioLoader(file, options).Load(text);
 }
 
 ScenarioHead ReadScenarioHead(const std::string& file) {

@@ -20,9 +20,9 @@ bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
   return a.kind == b.kind && a.index == b.index && a.component == b.component;
 }
 
-class Reader {
+class MotionReader {
  public:
-  Reader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise)
+  MotionReader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise)
       : values_(values),
         mechanism_(mechanism),
         otherwise_(otherwise),
@@ -383,7 +383,7 @@ double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
 
 Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
                   const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise) {
-  return Reader(values, mechanism, otherwise).Read(motion, loads, forces);
+  return MotionReader(values, mechanism, otherwise).Read(motion, loads, forces);
 }
 
 }  // namespace mbv

@@ -5,9 +5,10 @@
 namespace mbv {
 namespace {
 
-class Reader {
+class ProfileReader {
  public:
-  Reader(ValueReader* values, const ProfileContext& context) : values_(values), context_(context) {}
+  ProfileReader(ValueReader* values, const ProfileContext& context)
+      : values_(values), context_(context) {}
 
   void Read(const YamlNode& node, const std::string& path, Profile* profile) {
     if (node.is_sequence()) {
@@ -142,7 +143,7 @@ class Reader {
 Profile ReadProfile(ValueReader* values, const YamlNode& node, const std::string& path,
                     const ProfileContext& context) {
   Profile profile;
-  Reader(values, context).Read(node, path, &profile);
+  ProfileReader(values, context).Read(node, path, &profile);
   return profile;
 }
 

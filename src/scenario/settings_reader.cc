@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scenario/checks.h"
 #include "scenario/file_parts.h"
 
 namespace mbv {
@@ -22,7 +23,6 @@ LimitValue ReadLimit(ValueReader* values, const YamlNode& node, const std::strin
   return {number.has_value(), number};
 }
 
-constexpr std::string_view kReferencePrefix = "reference_";
 
 std::vector<std::string> CheckKeys() {
   std::vector<std::string> keys = {"start_window_s"};

@@ -7,7 +7,7 @@ namespace {
 
 // Two linear computations differ by rounding only. The simulated stiffness is extrapolated to zero
 // load; its finite displacements also contain the geometric non-linearity of the load itself.
-constexpr StiffnessMetricRow kRows[] = {
+constexpr StiffnessMetricRow kStiffnessRows[] = {
     {StiffnessMetric::kStiffnessEntry,
      "stiffness_entry",
      "stiffness, worst entry",
@@ -44,27 +44,27 @@ constexpr StiffnessMetricRow kRows[] = {
      false,
      {1e-5, 1e-5}},
 };
-static_assert(std::size(kRows) == kStiffnessMetrics);
+static_assert(std::size(kStiffnessRows) == kStiffnessMetrics);
 
 }  // namespace
 
-std::span<const StiffnessMetricRow> StiffnessMetricRows() { return kRows; }
+std::span<const StiffnessMetricRow> StiffnessMetricRows() { return kStiffnessRows; }
 
 const StiffnessMetricRow& RowOf(StiffnessMetric metric) {
-  const StiffnessMetricRow& row = kRows[static_cast<int>(metric)];
+  const StiffnessMetricRow& row = kStiffnessRows[static_cast<int>(metric)];
   MBV_DEMAND(row.metric == metric, row.key);
   return row;
 }
 
 const StiffnessMetricRow* FindStiffnessMetric(const std::string& key) {
-  for (const StiffnessMetricRow& row : kRows) {
+  for (const StiffnessMetricRow& row : kStiffnessRows) {
     if (key == row.key) return &row;
   }
   return nullptr;
 }
 
 StiffnessLimits::StiffnessLimits() {
-  for (const StiffnessMetricRow& row : kRows) (*this)[row.metric] = row.limit;
+  for (const StiffnessMetricRow& row : kStiffnessRows) (*this)[row.metric] = row.limit;
 }
 
 }  // namespace mbv

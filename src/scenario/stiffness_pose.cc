@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/demand.h"
+#include "core/text.h"
 #include "mechanism/mobility.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
@@ -25,12 +26,6 @@ std::string ElasticBeside(const std::string& model_file) {
   std::error_code error;
   const fs::path file = fs::path(model_file).parent_path() / kElasticFile;
   return fs::is_regular_file(file, error) ? file.string() : "";
-}
-
-std::string Joined(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/text.h"
 #include "mechanism/load_model.h"
 #include "scenario/file_parts.h"
 #include "scenario/motion_reader.h"
@@ -18,13 +19,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kKeys = {
+const std::vector<std::string> kStiffnessScenarioKeys = {
     "kind",      "mechanism",  "description", "parameters",      "pose",   "output", "analytic",
     "reference", "simulation", "loads",       "compare_printed", "checks", "expect"};
-
-bool Contains(const std::vector<std::string>& words, const std::string& word) {
-  return std::find(words.begin(), words.end(), word) != words.end();
-}
 
 // "platform.x" and 1e-3 from "platform.x_mm".
 std::pair<std::string, double> WithoutUnit(const std::string& key) {
@@ -36,9 +33,9 @@ std::pair<std::string, double> WithoutUnit(const std::string& key) {
   return {key, 1.0};
 }
 
-class Loader {
+class StiffnessLoader {
  public:
-  Loader(const std::string& file, const ScenarioOptions& options)
+  StiffnessLoader(const std::string& file, const ScenarioOptions& options)
       : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
 
   StiffnessScenarioResult Load(const std::string& text) {
@@ -63,7 +60,7 @@ class Loader {
 
  private:
   void Read(const YamlNode& root) {
-    YamlMap map(&yaml_, &root, "", kKeys);
+    YamlMap map(&yaml_, &root, "", kStiffnessScenarioKeys);
     scenario_.file = file_;
     if (const YamlNode* kind = map.Required("kind")) {
       (void)yaml_.Choice(*kind, "kind", {"stiffness"});
@@ -225,12 +222,12 @@ class Loader {
 
 StiffnessScenarioResult LoadStiffnessScenario(const std::string& file,
                                               const ScenarioOptions& options) {
-  return Loader(file, options).LoadFile();
+  return StiffnessLoader(file, options).LoadFile();
 }
 
 StiffnessScenarioResult LoadStiffnessScenarioText(const std::string& text, const std::string& file,
                                                   const ScenarioOptions& options) {
-  return Loader(file, options).Load(text);
+  return StiffnessLoader(file, options).Load(text);
 }
 
 }  // namespace mbv

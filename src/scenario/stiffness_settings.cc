@@ -4,13 +4,13 @@
 
 #include <charconv>
 
+#include "scenario/checks.h"
 #include "scenario/file_parts.h"
 
 namespace mbv {
 namespace {
 
 constexpr int kMostLoads = 10000;
-constexpr std::string_view kReferencePrefix = "reference_";
 
 std::optional<double> NotNegative(ValueReader* values, const YamlNode& node,
                                   const std::string& path) {

@@ -8,9 +8,9 @@
 namespace mbv {
 namespace {
 
-const std::vector<std::string> kKeys = {"csv",          "delimiter", "decimal",
-                                        "heading_rows", "time_unit", "time_offset_s",
-                                        "columns",      "tolerance", "witness"};
+const std::vector<std::string> kTableKeys = {"csv",          "delimiter", "decimal",
+                                             "heading_rows", "time_unit", "time_offset_s",
+                                             "columns",      "tolerance", "witness"};
 
 TableTolerance ReadTolerance(ValueReader* values, const YamlMap& map) {
   TableTolerance tolerance;
@@ -147,7 +147,7 @@ void ReadTolerances(ValueReader* values, const YamlMap& map, TableSettings* sett
 TableSettings ReadTableSettings(ValueReader* values, const YamlNode* node) {
   TableSettings settings;
   YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "reference", kKeys);
+  YamlMap map(&yaml, node, "reference", kTableKeys);
   const YamlNode* csv = map.Required("csv");
   if (csv == nullptr) return settings;
   settings.csv = yaml.Text(*csv, "reference.csv").value_or("");

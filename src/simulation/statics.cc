@@ -17,7 +17,7 @@ constexpr int kMaxStalls = 2;
 constexpr double kNewtonMerit = 1e-3;  // of the limits of a converged state
 // Scaled eigenvalues below this are idle freedoms and redundant rows: those of the shipped
 // mechanisms are below 1e-13, all others above 1e-5.
-constexpr double kRankTolerance = 1e-10;
+constexpr double kStaticsRankTolerance = 1e-10;
 // A first-order answer must satisfy its equations to this.
 constexpr double kLinearTolerance = 1e-6;
 // Differences for the tangent; largest rotation of one Newton step [rad].
@@ -41,7 +41,7 @@ MatX PseudoInverse(const MatX& A) {
   const VecX s = Equilibration(A);
   const Eigen::SelfAdjointEigenSolver<MatX> eigen(MatX(s.asDiagonal() * A * s.asDiagonal()));
   VecX inverse = eigen.eigenvalues();
-  const double threshold = kRankTolerance * inverse.cwiseAbs().maxCoeff();
+  const double threshold = kStaticsRankTolerance * inverse.cwiseAbs().maxCoeff();
   for (double& x : inverse) x = std::abs(x) > threshold ? 1.0 / x : 0.0;
   const MatX Q = s.asDiagonal() * eigen.eigenvectors();
   return Q * inverse.asDiagonal() * Q.transpose();
@@ -219,7 +219,7 @@ void Statics::NewtonStep(const State& state, const Target& target, VecX* dq, Vec
   b << -f_, -r_;
   const VecX s = Equilibration(A);
   Eigen::CompleteOrthogonalDecomposition<MatX> solver;
-  solver.setThreshold(kRankTolerance);
+  solver.setThreshold(kStaticsRankTolerance);
   solver.compute(s.asDiagonal() * A * s.asDiagonal());
   VecX x = s.asDiagonal() * VecX(solver.solve(VecX(s.asDiagonal() * b)));
   // Rotations do not add up like vectors: short steps far away.

@@ -128,7 +128,8 @@ void StateRodJoints(const ParameterReader& read, int limb, Coverage* c) {
   AddBall(Named(limb, ".ball_B"), rod, "platform", read("l3") * kX, read("r") * Radial(limb), c);
 }
 
-void AddBeam(const ParameterReader& read, const std::string& name, double length, Coverage* c) {
+void AddCoveredBeam(const ParameterReader& read, const std::string& name, double length,
+                    Coverage* c) {
   const double r = read("section_diameter") / 2, E = read("E");
   const double area = EIGEN_PI * r * r, I = area * r * r / 4;
   c->beams.push_back({.name = name,
@@ -158,8 +159,8 @@ void StateElasticParallelogram(const ParameterReader& read, int limb, Coverage* 
   hinge(".hinge_D_b", rod_b, hub_D, tip, -half, kZ);
   hinge(".hinge_D", hub_D, bar, zero, zero, kY);
   hinge(".pivot", bar, "platform", -read("e") * kZ, read("r") * Radial(limb), kZ);
-  for (const std::string& rod : {rod_a, rod_b}) AddBeam(read, rod, read("l2"), c);
-  AddBeam(read, bar, read("e"), c);
+  for (const std::string& rod : {rod_a, rod_b}) AddCoveredBeam(read, rod, read("l2"), c);
+  AddCoveredBeam(read, bar, read("e"), c);
 }
 
 }  // namespace
@@ -200,14 +201,14 @@ Coverage StiffnessCoverageOf(const Mechanism& mechanism) {
   c.bodies.push_back({.name = "platform", .why = {}});
   for (int limb = 0; limb < kLimbs; ++limb) {
     AddMotor(read, limb, read("K_act"), &c);
-    AddBeam(read, Named(limb, ".arm"), read("l1"), &c);
+    AddCoveredBeam(read, Named(limb, ".arm"), read("l1"), &c);
     if (limb < 2) {
       StateElasticParallelogram(read, limb, &c);
       continue;
     }
     c.bodies.push_back({.name = Named(limb, ".arm"), .why = {}});
     c.bodies.push_back({.name = Named(limb, ".rod"), .why = {}});
-    AddBeam(read, Named(limb, ".rod"), read("l3"), &c);
+    AddCoveredBeam(read, Named(limb, ".rod"), read("l3"), &c);
     StateRodJoints(read, limb, &c);
   }
   c.outputs = {{.name = "platform", .body = "platform"}};

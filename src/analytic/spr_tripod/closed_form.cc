@@ -25,10 +25,6 @@ struct Wiring {
   PerLeg<int> command{};   // entries of CommandSample in the order x, y, z or 1, 2, 3
 };
 
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint) {
-  diagnostics->Add({Severity::kError, "", 0, 0, std::move(message), std::move(hint)});
-}
-
 // Finds joints, bodies and drives of the three legs by the joints' names.
 void WireLegs(const Mechanism& mechanism, Wiring* wiring, Diagnostics* diagnostics) {
   for (int leg = 0; leg < 3; ++leg) {
@@ -107,7 +103,7 @@ void WireCommands(const Motion& motion, Wiring* wiring, Diagnostics* diagnostics
 void CheckLoads(const Motion& motion, const Wiring& wiring, Diagnostics* diagnostics) {
   for (const Load& load : motion.loads) {
     if (std::find(wiring.body.begin(), wiring.body.end(), load.body) == wiring.body.end()) {
-      AddError(diagnostics, "load '" + load.name + "' acts on a body that does not move", "");
+      diagnostics->AddError("", "load '" + load.name + "' acts on a body that does not move", "");
     }
   }
 }
