@@ -6,14 +6,12 @@
 #include <algorithm>
 
 namespace mbv {
-namespace {}  // namespace
-
 void CheckPoseNames(const Mechanism& mechanism, const PoseNames& names, const PoseCoordinates& pose,
                     Diagnostics* diagnostics) {
   for (const auto& [name, value] : pose) {
     if (Contains(names.needed, name) || Contains(names.accepted, name)) continue;
-    AddError(
-        diagnostics,
+    diagnostics->AddError(
+        "",
         fmt::format("the stiffness of {} cannot take the coordinate \"{}\"", mechanism.name, name),
         names.hint);
   }
