@@ -15,7 +15,7 @@ using Mat64 = Eigen::Matrix<double, 6, 4>;
 constexpr double kQuarter = std::numbers::pi / 2;
 constexpr double kStep = 1e-3;
 
-constexpr double kPoseLimit = 1e-14, kRateLimit = 1e-11, kAccelerationLimit = 2e-8;
+constexpr double kPoseLimit = 1e-14, kWristRateLimit = 1e-11, kWristAccelerationLimit = 2e-8;
 constexpr const char* kChain = "product of elementary rotations and translations";
 
 // Modified Denavit–Hartenberg: Rx(α) Tx(a) Rz(θ) Tz(d).
@@ -202,12 +202,12 @@ void WristJacobianRows(const Lengths& l, const Lengths& truth,
   constexpr const char* kTruth = "tool-frame twist from differences of the wrist's transform";
   RowMeter first(
       TextRow("(28), (29)", "(p×n)_z = c2c3(d3+a2) + a1c3, (p×o)_z = −c2s3(d3+a2) + a1s3",
-              "c3 H, −s3 H with H = a1 + c2(a2+d3) − d2 s2", "m, 1", kRateLimit, kTruth));
+              "c3 H, −s3 H with H = a1 + c2(a2+d3) − d2 s2", "m, 1", kWristRateLimit, kTruth));
   RowMeter second(TextRow("(30)", "[−s3(d3+a2), −c3(d3+a2), 0, c2, −s3, 0]", "third −d2, fourth c3",
-                          "m, 1", kRateLimit, kTruth));
-  RowMeter third(TextRow("(31)", "[−s3, −c3, 0, 0, 0, 0]", "", "1", kRateLimit, kTruth));
+                          "m, 1", kWristRateLimit, kTruth));
+  RowMeter third(TextRow("(31)", "[−s3, −c3, 0, 0, 0, 0]", "", "1", kWristRateLimit, kTruth));
   RowMeter all(TextRow("(26), (27), (32)", "J2 with the columns (28)–(31)",
-                       "J2 with corrected columns", "m, 1", kRateLimit,
+                       "J2 with corrected columns", "m, 1", kWristRateLimit,
                        "inherits the errors of (29) and (30)"));
   for (const WristState& s : states) {
     const Mat64 printed = SerialJacobian(l, s.q, true), corrected = SerialJacobian(l, s.q, false);
@@ -230,10 +230,10 @@ void HybridRows(const Lengths& l, const Lengths& truth, const std::vector<WristS
   RowMeter hybrid(TextRow(
       "(33), (34)", "J1 and J2 stacked (shapes do not fit; no rail, no rotation)",
       "v = ḋ1 e_z + (V_X, V_Y, 0) + W_γ e_z×r + R06 J2v q̇, ω = W_γ e_z + R06 J2ω q̇", "m/s, rad/s",
-      kRateLimit, "print read as v = (V_X, V_Y, 0) + J2v q̇, ω = W_γ e_z + J2ω q̇"));
+      kWristRateLimit, "print read as v = (V_X, V_Y, 0) + J2v q̇, ω = W_γ e_z + J2ω q̇"));
   RowMeter acceleration(TextRow("(41)–(46)", "J̇2 (θ1, θ2, d1, θ3) + J2 (θ̇1, θ̇2, ḋ1, θ̇3)",
                                 "J̇2 q̇ + J2 q̈ + ω_tool × v_tool (translation)", "m/s²",
-                                kAccelerationLimit,
+                                kWristAccelerationLimit,
                                 "positions for rates, rates for accelerations"));
   for (const WristState& s : states) {
     const auto pose = [&](double t) {

@@ -172,10 +172,6 @@ class ScaraClosedForm final : public ClosedForm {
   double last_det_ = 0.0;
 };
 
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint = {}) {
-  diagnostics->Add({.file = {}, .message = std::move(message), .hint = std::move(hint)});
-}
-
 /// Finds the four commanded coordinates, or explains what does not suit.
 CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnostics* diagnostics) {
   const int output = mechanism.FindOutput("platform");
@@ -195,8 +191,8 @@ CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnos
       task[at - kTaskComponents.begin()] = static_cast<int>(c);
       continue;
     }
-    AddError(
-        diagnostics,
+    diagnostics->AddError(
+        "",
         fmt::format("the closed form of scara_robot cannot take the command \"{}\"", command.name),
         "command all four drives, or platform.x, platform.y, platform.z and platform.yaw");
   }
@@ -206,15 +202,15 @@ CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnos
   map.in_joint_space = given(drives) > 0;
   map.command = map.in_joint_space ? drives : task;
   if (given(drives) > 0 && given(task) > 0) {
-    AddError(diagnostics, "drives and platform coordinates are both commanded",
-             "use either the four drives or the four platform coordinates");
+    diagnostics->AddError("", "drives and platform coordinates are both commanded",
+                          "use either the four drives or the four platform coordinates");
   }
   for (int i = 0; i < kLimbs; ++i) {
     if (map.command[i] >= 0) continue;
-    AddError(diagnostics,
-             fmt::format("{} is not commanded", map.in_joint_space
-                                                    ? mechanism.drives[i].name
-                                                    : std::string("platform.") + kTaskNames[i]));
+    diagnostics->AddError(
+        "", fmt::format("{} is not commanded", map.in_joint_space
+                                                   ? mechanism.drives[i].name
+                                                   : std::string("platform.") + kTaskNames[i]));
   }
   return map;
 }
@@ -230,22 +226,23 @@ std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism, const Mot
   const int platform = mechanism.FindBody("platform");
   for (const Load& load : motion.loads) {
     if (load.body == platform) continue;
-    AddError(&findings,
-             fmt::format("the closed form of scara_robot cannot take the load \"{}\" on {}",
-                         load.name, mechanism.bodies[load.body].name),
-             "loads act on the platform only");
+    findings.AddError(
+        "",
+        fmt::format("the closed form of scara_robot cannot take the load \"{}\" on {}", load.name,
+                    mechanism.bodies[load.body].name),
+        "loads act on the platform only");
   }
   if (!mechanism.springs.empty()) {
-    AddError(&findings, "the closed form of scara_robot has no springs");
+    findings.AddError("", "the closed form of scara_robot has no springs");
   }
   const RodModel rod_model = options.model == "thin_rods" ? RodModel::kThin : RodModel::kFull;
   if (!options.model.empty() && options.model != "full" && options.model != "thin_rods") {
-    AddError(&findings, fmt::format("unknown model \"{}\"", options.model),
-             "models: full, thin_rods");
+    findings.AddError("", fmt::format("unknown model \"{}\"", options.model),
+                      "models: full, thin_rods");
   }
   for (const std::string& erratum : options.as_printed) {
-    AddError(&findings, fmt::format("no printed form \"{}\" to run", erratum),
-             "the printed equations are measured by the equation audit");
+    findings.AddError("", fmt::format("no printed form \"{}\" to run", erratum),
+                      "the printed equations are measured by the equation audit");
   }
   diagnostics->Append(findings);
   if (findings.has_errors()) return nullptr;

@@ -32,9 +32,9 @@ void WireLegs(const Mechanism& mechanism, Wiring* wiring, Diagnostics* diagnosti
     const int ball = mechanism.FindJoint(name + ".S"), slide = mechanism.FindJoint(name + ".P"),
               hinge = mechanism.FindJoint(name + ".R");
     if (ball < 0 || slide < 0 || hinge < 0) {
-      AddError(diagnostics,
-               fmt::format("{} lacks joint {}.S, {}.P or {}.R", mechanism.name, name, name, name),
-               "the closed form needs the shipped model's joint names");
+      diagnostics->AddError(
+          "", fmt::format("{} lacks joint {}.S, {}.P or {}.R", mechanism.name, name, name, name),
+          "the closed form needs the shipped model's joint names");
       continue;
     }
     wiring->body[CylinderBody(leg)] = mechanism.joints[slide].parent;
@@ -48,9 +48,9 @@ void WireLegs(const Mechanism& mechanism, Wiring* wiring, Diagnostics* diagnosti
                             ? std::get_if<JointDrive>(&mechanism.drives[leg].kind)
                             : nullptr;
     if (drive == nullptr || drive->joint != slide || mechanism.drives.size() != 3) {
-      AddError(diagnostics,
-               fmt::format("drive {} must act on {}.P, and there are three drives", leg + 1, name),
-               "");
+      diagnostics->AddError(
+          "", fmt::format("drive {} must act on {}.P, and there are three drives", leg + 1, name),
+          "");
     }
   }
   // The output that is O_A's pose in the world.
@@ -80,8 +80,8 @@ void WireCommands(const Motion& motion, Wiring* wiring, Diagnostics* diagnostics
   for (size_t k = 0; k < motion.commands.size(); ++k) {
     const int slot = SlotOf(motion.commands[k], *wiring);
     if (slot < 0) {
-      AddError(diagnostics,
-               "the closed form does not cover command '" + motion.commands[k].name + "'", hint);
+      diagnostics->AddError(
+          "", "the closed form does not cover command '" + motion.commands[k].name + "'", hint);
       return;
     }
     slots[slot] = static_cast<int>(k);
@@ -91,10 +91,10 @@ void WireCommands(const Motion& motion, Wiring* wiring, Diagnostics* diagnostics
   };
   wiring->task_space = complete(0);
   if (motion.commands.size() != 3 || (!complete(0) && !complete(3))) {
-    AddError(diagnostics,
-             "the commands do not fix the three freedoms in a way the closed form "
-             "covers",
-             hint);
+    diagnostics->AddError("",
+                          "the commands do not fix the three freedoms in a way the closed form "
+                          "covers",
+                          hint);
     return;
   }
   std::copy_n(&slots[wiring->task_space ? 0 : 3], 3, wiring->command.begin());

@@ -16,17 +16,13 @@ constexpr PerLeg<double> kTheta = {pi / 6, 5 * pi / 6, pi / 2};
 // Azimuths are typed as fractions of π; anything beyond rounding is another mechanism.
 constexpr double kAngleTolerance = 1e-9;
 
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint) {
-  diagnostics->Add({Severity::kError, "", 0, 0, std::move(message), std::move(hint)});
-}
-
 // Value of a parameter; a missing one is an error, or `fallback` where one is given.
 double Read(const Mechanism& mechanism, const std::string& name, Diagnostics* diagnostics,
             double fallback = kNan) {
   if (mechanism.HasParameter(name)) return mechanism.ParameterValue(name);
   if (std::isnan(fallback)) {
-    AddError(diagnostics, mechanism.name + " has no parameter '" + name + "'",
-             "the closed form reads its constants from the model's parameters");
+    diagnostics->AddError("", mechanism.name + " has no parameter '" + name + "'",
+                          "the closed form reads its constants from the model's parameters");
   }
   return fallback;
 }
@@ -66,22 +62,22 @@ Geometry ReadGeometry(const Mechanism& mechanism, Diagnostics* diagnostics) {
   g.q_max = Read(mechanism, "q_max", diagnostics);
   for (const auto& [name, length] : {std::pair{"a", g.a}, std::pair{"b", g.b}}) {
     if (length <= 0.0) {
-      AddError(diagnostics, fmt::format("{} = {} violates {} > 0", name, length, name),
-               "it is the radius of a circle of joint centres");
+      diagnostics->AddError("", fmt::format("{} = {} violates {} > 0", name, length, name),
+                            "it is the radius of a circle of joint centres");
     }
   }
   for (int i = 0; i < 3; ++i) {
     const double phi = Read(mechanism, fmt::format("phi_{}", i + 1), diagnostics);
     const double theta = Read(mechanism, fmt::format("theta_{}", i + 1), diagnostics);
     if (!(std::abs(std::remainder(phi - kPhi[i], 2 * pi)) < kAngleTolerance)) {
-      AddError(diagnostics,
-               fmt::format("phi_{} = {} rad is not the paper's {}", i + 1, phi, kPhi[i]),
-               "the closed form holds for joints at 120, -120 and 0 deg only; use analytic: none");
+      diagnostics->AddError(
+          "", fmt::format("phi_{} = {} rad is not the paper's {}", i + 1, phi, kPhi[i]),
+          "the closed form holds for joints at 120, -120 and 0 deg only; use analytic: none");
     }
     if (!(std::abs(std::cos(theta - kPhi[i])) < kAngleTolerance)) {
-      AddError(diagnostics,
-               fmt::format("theta_{} = {} rad is not tangential (phi ± pi/2)", i + 1, theta),
-               "the closed form holds for hinges perpendicular to O_A A_i; use analytic: none");
+      diagnostics->AddError(
+          "", fmt::format("theta_{} = {} rad is not tangential (phi ± pi/2)", i + 1, theta),
+          "the closed form holds for hinges perpendicular to O_A A_i; use analytic: none");
     }
     g.c[i] = Direction(theta);
   }

@@ -71,22 +71,22 @@ void FindDriven(const Mechanism& mechanism, CommandMap* map, Diagnostics* diagno
     const std::string name = fmt::format("limb{}.drive{}", i / 2 + 1, i % 2 == 0 ? "" : "_p");
     map->drives[i] = mechanism.FindDrive(name);
     if (map->drives[i] < 0) {
-      AddError(diagnostics, fmt::format("drives: \"{}\" is missing", name),
-               "the closed form finds the drives by name");
+      diagnostics->AddError("", fmt::format("drives: \"{}\" is missing", name),
+                            "the closed form finds the drives by name");
     }
   }
   if (mechanism.drives.size() != 6) {
-    AddError(diagnostics,
-             fmt::format("drives: {} drives violate the closed form's 6", mechanism.drives.size()),
-             "the limbs have two drives each");
+    diagnostics->AddError(
+        "", fmt::format("drives: {} drives violate the closed form's 6", mechanism.drives.size()),
+        "the limbs have two drives each");
   }
   for (int k = 0; k < 3; ++k) {
     for (size_t j = 0; j < mechanism.prescribed.size(); ++j) {
       if (mechanism.prescribed[j].name == kShip[k]) map->prescribed[k] = static_cast<int>(j);
     }
     if (map->prescribed[k] < 0) {
-      AddError(diagnostics, fmt::format("prescribed: \"{}\" is missing", kShip[k]),
-               "the closed form finds the ship's motions by name");
+      diagnostics->AddError("", fmt::format("prescribed: \"{}\" is missing", kShip[k]),
+                            "the closed form finds the ship's motions by name");
     }
   }
 }
@@ -98,7 +98,7 @@ CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnos
   Diagnostics names;
   FindDriven(mechanism, &map, &names);
   if (mechanism.FindOutput("platform") < 0) {
-    AddError(&names, "outputs: \"platform\" is missing", "it is the frame {p}");
+    names.AddError("", "outputs: \"platform\" is missing", "it is the frame {p}");
   }
   diagnostics->Append(names);
   if (!names.empty()) return map;
@@ -106,15 +106,15 @@ CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnos
   for (size_t k = 0; k < motion.commands.size(); ++k) {
     const Command& command = motion.commands[k];
     if (Place(mechanism, command, static_cast<int>(k), &map)) continue;
-    AddError(diagnostics,
-             fmt::format("motion: the closed form has no use for the command \"{}\"", command.name),
-             kHint);
+    diagnostics->AddError(
+        "", fmt::format("motion: the closed form has no use for the command \"{}\"", command.name),
+        kHint);
   }
   const bool whole_pose = map.platform[0] >= 0 || map.platform[1] >= 0 || map.platform[5] >= 0;
   map.pairs = whole_pose ? DrivePairs::kIndependent : DrivePairs::kSynchronous;
   auto require = [&](int index, const std::string& name) {
     if (index >= 0) return;
-    AddError(diagnostics, fmt::format("motion: \"{}\" is not commanded", name), kHint);
+    diagnostics->AddError("", fmt::format("motion: \"{}\" is not commanded", name), kHint);
   };
   for (int k = 0; k < 3; ++k) require(map.ship[k], kShip[k]);
   for (int c = 0; c < 6; ++c) {
@@ -125,8 +125,8 @@ CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnos
     const std::string pair = fmt::format("limb{0}.drive - limb{0}.drive_p", i + 1);
     if (!whole_pose) require(map.pair[i], pair);
     if (whole_pose && map.pair[i] >= 0) {
-      AddError(diagnostics, fmt::format("motion: \"{}\" is commanded besides the pose", pair),
-               kHint);
+      diagnostics->AddError("", fmt::format("motion: \"{}\" is commanded besides the pose", pair),
+                            kHint);
     }
   }
   return map;
@@ -172,9 +172,9 @@ std::vector<LoadPlace> MapLoads(const Mechanism& mechanism, const Motion& motion
       }
     }
     if (!known) {
-      AddError(diagnostics,
-               fmt::format("loads: {}: the closed form knows no body \"{}\"", load.name, body),
-               "loads may act on the platform, on links of the limbs and on the ship");
+      diagnostics->AddError(
+          "", fmt::format("loads: {}: the closed form knows no body \"{}\"", load.name, body),
+          "loads may act on the platform, on links of the limbs and on the ship");
     }
     places.push_back(place);
   }

@@ -7,10 +7,6 @@
 
 namespace mbv::stabilizing_platform {
 
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint) {
-  diagnostics->Add({.file = {}, .message = std::move(message), .hint = std::move(hint)});
-}
-
 namespace {
 
 // Reads one parameter, or reports that it is missing.
@@ -21,8 +17,8 @@ class Reader {
 
   double Get(const std::string& name) const {
     if (mechanism_.HasParameter(name)) return mechanism_.ParameterValue(name);
-    AddError(diagnostics_, fmt::format("parameters: \"{}\" is missing", name),
-             "the closed form of the stabilizing platform reads it by this name");
+    diagnostics_->AddError("", fmt::format("parameters: \"{}\" is missing", name),
+                           "the closed form of the stabilizing platform reads it by this name");
     return kNan;
   }
   double Get(const std::string& name, double fallback) const {
@@ -42,8 +38,8 @@ class Reader {
 
 void CheckPositive(const char* name, double value, Diagnostics* diagnostics) {
   if (value > 0) return;
-  AddError(diagnostics, fmt::format("parameters: {} = {} violates {} > 0", name, value, name),
-           "lengths and radii are positive, in metres");
+  diagnostics->AddError("", fmt::format("parameters: {} = {} violates {} > 0", name, value, name),
+                        "lengths and radii are positive, in metres");
 }
 
 // |angle| to the nearest multiple of `period`.
@@ -55,20 +51,22 @@ void CheckAzimuths(const PlatformParameters& p, Diagnostics* diagnostics) {
   using std::numbers::pi;
   constexpr double kMargin = 1e-3;  // rad; nearer, (5) loses more than six digits
   if (DistanceToMultiple(p.theta_1 - p.theta_2, 2 * pi) < kMargin) {
-    AddError(diagnostics,
-             fmt::format("parameters: theta_1 = {} and theta_2 = {} are the same azimuth, and the "
-                         "parasitic motion is 0/0",
-                         p.theta_1, p.theta_2),
-             "the print gives 120 degrees twice; theta_2 = 240 degrees is meant");
+    diagnostics->AddError(
+        "",
+        fmt::format("parameters: theta_1 = {} and theta_2 = {} are the same azimuth, and the "
+                    "parasitic motion is 0/0",
+                    p.theta_1, p.theta_2),
+        "the print gives 120 degrees twice; theta_2 = 240 degrees is meant");
   }
   for (const auto& [name, theta] :
        {std::pair{"theta_1", p.theta_1}, std::pair{"theta_2", p.theta_2}}) {
     if (DistanceToMultiple(theta, pi / 2) < kMargin) {
-      AddError(diagnostics,
-               fmt::format("parameters: {} = {} is a multiple of 90 degrees, where tan({}) of the "
-                           "parasitic motion is 0 or infinite",
-                           name, theta, name),
-               "renumber the limbs, so that none of limbs 2 and 3 lies on an axis");
+      diagnostics->AddError(
+          "",
+          fmt::format("parameters: {} = {} is a multiple of 90 degrees, where tan({}) of the "
+                      "parasitic motion is 0 or infinite",
+                      name, theta, name),
+          "renumber the limbs, so that none of limbs 2 and 3 lies on an axis");
     }
   }
 }
@@ -78,20 +76,22 @@ void CheckReach(const PlatformParameters& p, Diagnostics* diagnostics) {
   const double stretched = p.L1 + p.L3;
   const double reach = std::hypot(p.L5, l_0);
   if (reach >= stretched) {
-    AddError(diagnostics,
-             fmt::format("parameters: the limbs need {:.6g} m from foot to tip in the neutral "
-                         "pose, and L1 + L3 = {:.6g} m",
-                         reach, stretched),
-             "lengthen the links or lower z_0");
+    diagnostics->AddError(
+        "",
+        fmt::format("parameters: the limbs need {:.6g} m from foot to tip in the neutral "
+                    "pose, and L1 + L3 = {:.6g} m",
+                    reach, stretched),
+        "lengthen the links or lower z_0");
   }
   // Links 2 and 2' in one straight line: the tip at the height of the elbows.
   const double toggle_squared = p.L1 * p.L1 - (p.L3 + p.L5) * (p.L3 + p.L5);
   if (l_0 * l_0 <= toggle_squared || reach <= std::abs(p.L1 - p.L3)) {
-    AddError(diagnostics,
-             fmt::format("parameters: the neutral limb length {:.6g} m lies at or beyond the "
-                         "toggle of links 2 and 2'",
-                         l_0),
-             "shorten the links or raise z_0");
+    diagnostics->AddError(
+        "",
+        fmt::format("parameters: the neutral limb length {:.6g} m lies at or beyond the "
+                    "toggle of links 2 and 2'",
+                    l_0),
+        "shorten the links or raise z_0");
   }
 }
 

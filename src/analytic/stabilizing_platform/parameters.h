@@ -10,9 +10,6 @@
 
 namespace mbv::stabilizing_platform {
 
-/// Adds an error without a place in a file (the caller knows it).
-void AddError(Diagnostics* diagnostics, std::string message, std::string hint);
-
 /// Sides of a limb: +1 is the unprimed one (foot at y = −L5 of {A_i}), −1 the primed one.
 inline constexpr std::array<double, 2> kSides = {+1.0, -1.0};
 

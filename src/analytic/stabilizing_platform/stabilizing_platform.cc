@@ -156,8 +156,8 @@ std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism, const Mot
   } else if (options.model == "paper_text") {
     model = Model::kPaperText;
   } else if (!options.model.empty() && options.model != "full") {
-    AddError(&findings, fmt::format("analytic: model \"{}\" is unknown", options.model),
-             "full, massless or paper_text");
+    findings.AddError("", fmt::format("analytic: model \"{}\" is unknown", options.model),
+                      "full, massless or paper_text");
   }
   SignInM sign = SignInM::kCorrected;
   for (const std::string& erratum : options.as_printed) {
@@ -165,8 +165,8 @@ std::unique_ptr<ClosedForm> MakeClosedForm(const Mechanism& mechanism, const Mot
       sign = SignInM::kPrinted;
       continue;
     }
-    AddError(&findings, fmt::format("analytic: as_printed: \"{}\" is not offered", erratum),
-             "E2, the sign in M of equation (6)");
+    findings.AddError("", fmt::format("analytic: as_printed: \"{}\" is not offered", erratum),
+                      "E2, the sign in M of equation (6)");
   }
   diagnostics->Append(findings);
   if (findings.has_errors()) return nullptr;
