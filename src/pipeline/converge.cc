@@ -22,7 +22,7 @@ constexpr double kWindowSteps = 12.0;
 constexpr std::array<double, 5> kCorrectedConstants = {400, 200, 100, 50, 25};
 constexpr std::array<double, 5> kStockConstants = {32, 16, 8, 4, 2};
 
-struct ForwardRun {
+struct SteppedRun {
   ConvergencePoint point;
   MatX forces;  // empty if it failed
 };
@@ -157,13 +157,13 @@ class Study {
     };
   }
 
-  ForwardRun RunForward(const ConvergenceSeries& series, double step_s, double constant_steps) {
+  SteppedRun RunForward(const ConvergenceSeries& series, double step_s, double constant_steps) {
     SimulationOptions options{.engine = series.stock ? Engine::kStock : Engine::kCorrected,
                               .step_s = step_s};
     (series.stock ? options.stock_time_constant_steps : options.guidance_steps) = constant_steps;
     const SimulatedWitness witness =
         Simulate(options, fmt::format("{}, step {:g} s", series.title, step_s));
-    ForwardRun run;
+    SteppedRun run;
     run.point.step_s = step_s;
     run.point.time_constant_s = constant_steps * step_s;
     if (witness.diagnostics.has_errors()) {
@@ -193,7 +193,7 @@ class Study {
                               const std::vector<std::pair<double, double>>& grid) {
     std::vector<MatX> forces;
     for (const auto& [step_s, constant_steps] : grid) {
-      ForwardRun run = RunForward(series, step_s, constant_steps);
+      SteppedRun run = RunForward(series, step_s, constant_steps);
       if (!forces.empty() && forces.back().size() > 0 && run.forces.size() > 0) {
         run.point.change = Error(run.forces - forces.back());
       }

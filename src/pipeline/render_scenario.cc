@@ -83,7 +83,7 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
                     progress("simulation"));
   outcome.diagnostics.Append(witness.diagnostics);
   if (!witness.run.summary.ok()) {
-    &outcome.diagnostics->AddError(file, witness.run.summary.message);
+    outcome.diagnostics.AddError(file, witness.run.summary.message);
     return outcome;
   }
   const Caption caption{
@@ -95,7 +95,7 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
           : DrawVideo(scenario, prepared->mechanisms.simulated, witness.run, caption, request,
                       progress("video"), &outcome.video);
   if (!drawn.ok()) {
-    &outcome.diagnostics->AddError(file, drawn.message);
+    outcome.diagnostics.AddError(file, drawn.message);
     return outcome;
   }
   outcome.exit_code = 0;

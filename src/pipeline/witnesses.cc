@@ -215,7 +215,7 @@ SimulatedWitness RunSimulation(const Scenario& scenario, const Mechanism& mechan
   SimulatedWitness witness;
   const Diagnostics option_findings = Check(options);
   for (const Finding& finding : option_findings.findings()) {
-    &witness.diagnostics->AddError(scenario.file, "simulation: " + finding.message, finding.hint);
+    witness.diagnostics.AddError(scenario.file, "simulation: " + finding.message, finding.hint);
   }
   if (witness.diagnostics.has_errors()) return witness;
   if (!scenario.simulation.extrapolate) {

@@ -10,7 +10,7 @@
 namespace mbv {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 constexpr const char* kBegin = "<!-- accuracy: written by mbverify regress --tables -->";
 constexpr const char* kEnd = "<!-- accuracy: end -->";

@@ -12,7 +12,7 @@
 namespace mbv {
 namespace {
 
-using Json = nlohmann::json;
+using Json = nlohmann::ordered_json;
 
 constexpr int kTailLines = 12;
 
