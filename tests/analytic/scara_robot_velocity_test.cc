@@ -8,7 +8,7 @@ namespace {
 
 /// Sixth-order central difference of f at 0; its round-off is about eps·|f|/h.
 template <typename F>
-auto Difference(const F& f, double h) {
+auto CentralDifference(const F& f, double h) {
   return ((45.0 * (f(h) - f(-h)) - 9.0 * (f(2 * h) - f(-2 * h)) + (f(3 * h) - f(-3 * h))) /
           (60.0 * h))
       .eval();
@@ -32,7 +32,7 @@ TEST(ScaraVelocity, JacobianIsTheDerivativeOfTheInversePosition) {
         return moved.theta;
       };
       const double scale = c == 3 ? 1.0 : 1.0 / p.l1;
-      EXPECT_LT((Difference(theta, h) - J.col(c)).cwiseAbs().maxCoeff(),
+      EXPECT_LT((CentralDifference(theta, h) - J.col(c)).cwiseAbs().maxCoeff(),
                 scale * kDifferenceTolerance);
     }
   }
@@ -55,7 +55,7 @@ TEST(ScaraVelocity, AccelerationFormIsTheSecondDerivativeAlongAStraightPath) {
     };
     DriveRates(p, at.position, &at.rates);
     const double scale = std::max(1.0, at.rates.dtheta.cwiseAbs().maxCoeff());
-    EXPECT_LT((Difference(rate, kStep) - at.rates.ddtheta).cwiseAbs().maxCoeff(),
+    EXPECT_LT((CentralDifference(rate, kStep) - at.rates.ddtheta).cwiseAbs().maxCoeff(),
               10 * scale * kDifferenceTolerance);
   }
 }

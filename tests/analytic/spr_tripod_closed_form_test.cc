@@ -19,7 +19,7 @@ namespace {
 using std::numbers::pi;
 using namespace spr_tripod;
 
-constexpr double kDeg = pi / 180.0;
+constexpr double kDegree = pi / 180.0;
 // Forces of some 600 N through matrices of condition 2.2 and sums of 50 terms.
 constexpr double kForceRoundoff_N = 1e4 * kEps * 600;
 
@@ -66,7 +66,7 @@ TEST(SprTripodClosedForm, DefaultPathReachesTheTabulatedExtremes) {
   expect("leg3.velocity", -0.623449, 0.46967, 5e-5);
   expect("leg1.force", -372.78, 14.52, 0.03);
   expect("leg3.force", -538.79, 195.12, 0.03);
-  expect("tilt", 0.0, 13.14637 * kDeg, 1e-6);
+  expect("tilt", 0.0, 13.14637 * kDegree, 1e-6);
   EXPECT_NEAR(ColumnOf(run.trace, "jacobian.det").minCoeff(), 1.147, 1e-3);
   double acceleration = 0.0, spin = 0.0;
   for (const char* leg : {"leg1", "leg2", "leg3"}) {
@@ -86,7 +86,7 @@ Mechanism ShippedModel() {
 }
 
 TEST(SprTripodClosedForm, ShippedModelGivesTheDriveForcesOfTheOneMadeByHand) {
-  const Motion motion = PathMotion(50 * kDeg, 0.12, 0.06, 0.57, 0.01);
+  const Motion motion = PathMotion(50 * kDegree, 0.12, 0.06, 0.57, 0.01);
   const Trace shipped = RunTripod(ShippedModel(), motion).trace;
   const Trace by_hand = RunTripod(TripodByHand(), motion).trace;
   for (const Channel& channel : by_hand.channels) {
@@ -98,7 +98,7 @@ TEST(SprTripodClosedForm, ShippedModelGivesTheDriveForcesOfTheOneMadeByHand) {
 
 TEST(SprTripodClosedForm, ReferenceAgreesOnEveryChannelTheyShare) {
   const Mechanism mechanism = ShippedModel();
-  const Motion motion = PathMotion(50 * kDeg, 0.12, 0.06, 0.57, 0.02);
+  const Motion motion = PathMotion(50 * kDegree, 0.12, 0.06, 0.57, 0.02);
   const Trace analytic = RunTripod(mechanism, motion).trace;
   const ReferenceRun reference = RunReference(mechanism, motion);
   ASSERT_TRUE(reference.summary.ok()) << reference.summary.message;
@@ -125,7 +125,7 @@ TEST(SprTripodClosedForm, PathOfTheSymmetryPlaneDrivesTwoLegsAlike) {
 
 TEST(SprTripodClosedForm, PathsAtMirrorAzimuthsRunBackwardsWithLegsExchanged) {
   const auto lengths = [](double gamma_deg) {
-    Motion motion = PathMotion(gamma_deg * kDeg);
+    Motion motion = PathMotion(gamma_deg * kDegree);
     motion.sample_s = motion.duration_s / 500;
     return RunTripod(TripodByHand(), motion).trace;
   };
@@ -319,7 +319,7 @@ TEST(SprTripodClosedForm, DimensionsItDoesNotCoverAreAllReported) {
 
 TEST(SprTripodClosedForm, HingeSenseDoesNotMatterForSymmetricLegs) {
   Mechanism mechanism = TripodByHand();
-  const Motion motion = PathMotion(50 * kDeg, 0.12, 0.06, 0.57, 0.01);
+  const Motion motion = PathMotion(50 * kDegree, 0.12, 0.06, 0.57, 0.01);
   const Trace printed = RunTripod(mechanism, motion).trace;
   for (Parameter& p : mechanism.parameters) p.value += p.name == "theta_3" ? pi : 0.0;
   const Trace symmetric = RunTripod(mechanism, motion).trace;

@@ -16,7 +16,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kDeg = pi / 180.0;
+constexpr double kDegDynamics = pi / 180.0;
 constexpr double kGravity = 9.81;
 
 // Everything at one instant.
@@ -40,7 +40,8 @@ State StateAt(const Geometry& g, const Masses& masses, const Vec3& r, const Vec3
 }
 
 State GeneralState() {
-  const Vec3 r = CentreOf(PaperGeometry(), Tilt::FromEuler(40 * kDeg, 15 * kDeg), 0.55);
+  const Vec3 r =
+      CentreOf(PaperGeometry(), Tilt::FromEuler(40 * kDegDynamics, 15 * kDegDynamics), 0.55);
   return StateAt(PaperGeometry(), DefaultMasses(), r, {0.3, -0.2, 0.1}, {1, 2, -3});
 }
 

@@ -14,7 +14,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kDeg = pi / 180.0;
+constexpr double kDegWorkspace = pi / 180.0;
 constexpr double kVolume = 0.01243676143457;  // m³
 constexpr double kVolumeDigit = 5e-15;        // half of its last one
 
@@ -75,7 +75,7 @@ TEST(SprTripodWorkspace, CornersMatchTabulatedPositionsAndTilts) {
     Posture p;
     ASSERT_TRUE(SolveForward(PaperGeometry(), row.q, &p).ok());
     EXPECT_LT((p.r - row.r).cwiseAbs().maxCoeff(), 6e-10) << p.r.transpose();
-    EXPECT_NEAR(p.tilt.Angle() / kDeg, row.tilt_deg, 6e-7);
+    EXPECT_NEAR(p.tilt.Angle() / kDegWorkspace, row.tilt_deg, 6e-7);
   }
 }
 
@@ -205,10 +205,10 @@ TEST(SprTripodWorkspace, RangesMatchTabulatedExtremes) {
   // At home poses (12) has singular values z √1.5 (twice) and b √3: condition 1 at z = b √2.
   EXPECT_GE(r.cond_c.lower, 1.0);
   EXPECT_LT(r.cond_c.lower, 1.02);
-  EXPECT_NEAR(r.ball_swing.upper / kDeg, 21.24, 0.01);
-  EXPECT_NEAR(r.ball_twist.upper / kDeg, 9.80, 0.01);
-  EXPECT_NEAR(r.ball_twist.lower / kDeg, -9.80, 0.01);
-  expect({r.lean.lower / kDeg, r.lean.upper / kDeg}, -9.26, 6.26, 0.01);
+  EXPECT_NEAR(r.ball_swing.upper / kDegWorkspace, 21.24, 0.01);
+  EXPECT_NEAR(r.ball_twist.upper / kDegWorkspace, 9.80, 0.01);
+  EXPECT_NEAR(r.ball_twist.lower / kDegWorkspace, -9.80, 0.01);
+  expect({r.lean.lower / kDegWorkspace, r.lean.upper / kDegWorkspace}, -9.26, 6.26, 0.01);
 }
 
 TEST(SprTripodWorkspace, ReportNamesVolumeOrderAndSections) {

@@ -13,11 +13,6 @@
 namespace mbv::stabilizing_platform {
 namespace {
 
-const PlatformParameters& Default() {
-  static const PlatformParameters p = ParametersOf(DefaultParameters());
-  return p;
-}
-
 // Loop closure by Newton: the platform's (x, y, yaw) with the tips in the radial planes of their
 // feet, Eqs. (3), (4).
 Vec3 ClosedPose(const PlatformParameters& p, const PoseCommand& c) {

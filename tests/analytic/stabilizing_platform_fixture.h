@@ -107,6 +107,11 @@ inline PlatformParameters ParametersOf(const std::map<std::string, double>& valu
   return p;
 }
 
+inline const PlatformParameters& Default() {
+  static const PlatformParameters p = ParametersOf(DefaultParameters());
+  return p;
+}
+
 /// Kinematics and dynamics at one instant; fails the demand when the pose cannot be computed.
 inline Evaluation Evaluate(const PlatformEquations& equations, const PoseCommand& command,
                            std::span<const BodyLoad> loads = {}) {

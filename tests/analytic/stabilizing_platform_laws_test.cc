@@ -10,11 +10,6 @@
 namespace mbv::stabilizing_platform {
 namespace {
 
-const PlatformParameters& Default() {
-  static const PlatformParameters p = ParametersOf(DefaultParameters());
-  return p;
-}
-
 Evaluation At(double t, Model model = Model::kFull) {
   return Evaluate(PlatformEquations(Default(), DrivePairs::kSynchronous, model), SeaState(t));
 }

@@ -11,11 +11,6 @@
 namespace mbv::stabilizing_platform {
 namespace {
 
-const PlatformParameters& Default() {
-  static const PlatformParameters p = ParametersOf(DefaultParameters());
-  return p;
-}
-
 // Pose of a link's frame in the earth frame.
 Pose LinkPose(const PlatformEquations& equations, double t, int limb, int link) {
   Evaluation e;

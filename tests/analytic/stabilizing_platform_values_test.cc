@@ -10,9 +10,9 @@
 namespace mbv::stabilizing_platform {
 namespace {
 
-Evaluation At(const PoseCommand& command, Model model = Model::kFull,
-              DrivePairs pairs = DrivePairs::kSynchronous,
-              const std::map<std::string, double>& values = DefaultParameters()) {
+Evaluation AtCommand(const PoseCommand& command, Model model = Model::kFull,
+                     DrivePairs pairs = DrivePairs::kSynchronous,
+                     const std::map<std::string, double>& values = DefaultParameters()) {
   return Evaluate(PlatformEquations(ParametersOf(values), pairs, model), command);
 }
 
@@ -30,7 +30,7 @@ constexpr double kTable1e3N = 0.5001;  // table in kN with three decimals
 constexpr double kHalf = 0.5001;
 
 TEST(StabilizingPlatformAtRest, MatchesTheMasslessHandCalculation) {
-  const Evaluation e = At(Level(), Model::kMassless);
+  const Evaluation e = AtCommand(Level(), Model::kMassless);
   for (int i = 0; i < 3; ++i) {
     const LimbMotion& limb = e.limbs[i];
     EXPECT_NEAR(limb.length.value, std::sqrt(0.12 * 0.12 + 3.275 * 3.275), 4 * kEps * 3.3);
@@ -53,7 +53,7 @@ TEST(StabilizingPlatformAtRest, MatchesTheMasslessHandCalculation) {
 }
 
 TEST(StabilizingPlatformAtRest, MatchesTheFullMassesAndReactions) {
-  const Evaluation e = At(Level());
+  const Evaluation e = AtCommand(Level());
   for (int i = 0; i < 3; ++i) {
     EXPECT_NEAR(e.forces[i].drive[0], 211431.5987, kHalf * 1e-4);
     EXPECT_NEAR(e.forces[i].drive[1], 211778.5751, kHalf * 1e-4);
@@ -78,7 +78,7 @@ TEST(StabilizingPlatformAtRest, MatchesTheFullMassesAndReactions) {
 
 TEST(StabilizingPlatformAtRest, DrivesFollowTheClosedFormOfMasslessLinks) {
   // drive± = [f_i/(2 sin q2) ± f_{3+i}/(2 cos q2)] L1 sin(q2 − q1) R/((L4 + L5) L2 sin q12).
-  const Evaluation e = At(SeaState(1.5), Model::kMassless);
+  const Evaluation e = AtCommand(SeaState(1.5), Model::kMassless);
   const PlatformParameters p = ParametersOf(DefaultParameters());
   for (int i = 0; i < 3; ++i) {
     const SideMotion& s = e.limbs[i].side[0];
@@ -92,7 +92,8 @@ TEST(StabilizingPlatformAtRest, DrivesFollowTheClosedFormOfMasslessLinks) {
 }
 
 TEST(StabilizingPlatformAt1500ms, MatchesTheIndependentModel) {
-  const Evaluation full = At(SeaState(1.5)), massless = At(SeaState(1.5), Model::kMassless);
+  const Evaluation full = AtCommand(SeaState(1.5)),
+                   massless = AtCommand(SeaState(1.5), Model::kMassless);
   const double full_kN[] = {219.071860, 283.191986, 443.530049, 443.038605, 274.127772, 206.593123};
   const double massless_kN[] = {197.334224, 247.811860, 398.969413,
                                 397.401981, 239.170276, 185.866082};
@@ -111,7 +112,7 @@ TEST(StabilizingPlatformAt1500ms, MatchesTheIndependentModel) {
 }
 
 TEST(StabilizingPlatformHoldingStill, MatchesTheIndependentModelAt1500ms) {
-  const Evaluation e = At(SeaState(1.5), Model::kFull, DrivePairs::kIndependent);
+  const Evaluation e = AtCommand(SeaState(1.5), Model::kFull, DrivePairs::kIndependent);
   const double R[] = {2.140116, 2.564337, 2.121647, 1.914318, 2.627146, 2.256524};
   const double force_kN[] = {316.046, 220.433, 365.631, 600.117, 215.656, 286.461};
   for (int d = 0; d < 6; ++d) {
@@ -180,7 +181,8 @@ TEST(StabilizingPlatformFigures, MatchTheTableOfEverySecond) {
   EXPECT_NEAR(amplification.neutral_ratio(), 2.284131, kHalf * 1e-6);
   EXPECT_NEAR(amplification.neutral_length(), 3.277197735871, kHalf * 1e-12);
   for (const TableRow& row : kTable) {
-    const Evaluation full = At(SeaState(row.t)), massless = At(SeaState(row.t), Model::kMassless);
+    const Evaluation full = AtCommand(SeaState(row.t)),
+                     massless = AtCommand(SeaState(row.t), Model::kMassless);
     for (int i = 0; i < 3; ++i) {
       EXPECT_NEAR(amplification(full.limbs[i]), row.amplification[i], kHalf * 1e-4)
           << "t = " << row.t << ", limb " << i + 1;
@@ -222,7 +224,7 @@ TEST(StabilizingPlatformFigures, ReachTheExtremesOfTheDrives) {
   double difference_max = 0, difference_squares = 0, force_squares = 0;
   for (int k = 0; k < 600; ++k) {
     const double t = 0.02 * k;
-    const Evaluation a = At(SeaState(t), Model::kMassless), b = At(SeaState(t));
+    const Evaluation a = AtCommand(SeaState(t), Model::kMassless), b = AtCommand(SeaState(t));
     for (int d = 0; d < 6; ++d) {
       of_massless[d].Add(t, Drive(a, d) / 1e3);
       of_full[d].Add(t, Drive(b, d) / 1e3);
@@ -260,7 +262,7 @@ TEST(StabilizingPlatformFigures, ReachTheExtremesOfTheLimbs) {
   Extremes x, y, yaw, f_X, f_Y, f_Z;
   for (int k = 0; k < 600; ++k) {
     const double t = 0.02 * k;
-    const Evaluation e = At(SeaState(t));
+    const Evaluation e = AtCommand(SeaState(t));
     for (int i = 0; i < 3; ++i) {
       l[i].Add(t, e.limbs[i].length.value);
       R[i].Add(t, e.limbs[i].side[0].R.value);
@@ -301,9 +303,10 @@ TEST(StabilizingPlatformModels, DifferAsTheIndependentModelSays) {
   light["link1_inertia_scale"] = 0.1;
   double text_max = 0, text_squares = 0, light_max = 0, light_squares = 0;
   for (int k = 0; k < 600; ++k) {
-    const Evaluation full = At(SeaState(0.02 * k));
-    const Evaluation text = At(SeaState(0.02 * k), Model::kPaperText);
-    const Evaluation tenth = At(SeaState(0.02 * k), Model::kFull, DrivePairs::kSynchronous, light);
+    const Evaluation full = AtCommand(SeaState(0.02 * k));
+    const Evaluation text = AtCommand(SeaState(0.02 * k), Model::kPaperText);
+    const Evaluation tenth =
+        AtCommand(SeaState(0.02 * k), Model::kFull, DrivePairs::kSynchronous, light);
     for (int d = 0; d < 6; ++d) {
       const double by_text = (Drive(text, d) - Drive(full, d)) / 1e3;
       const double by_light = (Drive(tenth, d) - Drive(full, d)) / 1e3;

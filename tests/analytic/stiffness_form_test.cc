@@ -14,13 +14,13 @@
 namespace mbv {
 namespace {
 
-struct Case {
+struct StiffnessCase {
   Mechanism mechanism;
   PoseCoordinates pose;
 };
 
-Case ScaraCase() {
-  Case c{
+StiffnessCase ScaraCase() {
+  StiffnessCase c{
       scara::PaperMechanism(),
       {{"platform.x", -0.05}, {"platform.y", -0.05}, {"platform.z", -0.15}, {"platform.yaw", 0.2}}};
   for (const auto& [name, value] : {std::pair{"d", 0.05},
@@ -33,8 +33,8 @@ Case ScaraCase() {
   return c;
 }
 
-Case CabinCase() {
-  Case c;
+StiffnessCase CabinCase() {
+  StiffnessCase c;
   c.mechanism.name = "cabin_robot";
   for (const auto& [name, value] :
        {std::pair{"L1", 0.52}, {"L2", 0.42},    {"L3", 0.5},        {"L4", 0.28},
@@ -52,7 +52,7 @@ Case CabinCase() {
   return c;
 }
 
-std::unique_ptr<StiffnessForm> Make(const Case& c, const std::string& model,
+std::unique_ptr<StiffnessForm> Make(const StiffnessCase& c, const std::string& model,
                                     Diagnostics* diagnostics) {
   const StiffnessFormRow* row = FindStiffnessForm(c.mechanism.name);
   EXPECT_NE(row, nullptr);
@@ -65,7 +65,7 @@ double ScaledDifference(const Mat6& A, const Mat6& B) {
   return (size.asDiagonal() * (A - B) * size.asDiagonal()).eval().cwiseAbs().maxCoeff();
 }
 
-void ExpectLaws(const Case& c, const std::string& model, int elements) {
+void ExpectLaws(const StiffnessCase& c, const std::string& model, int elements) {
   Diagnostics diagnostics;
   const auto form = Make(c, model, &diagnostics);
   ASSERT_NE(form, nullptr) << diagnostics.Text();
@@ -119,7 +119,7 @@ TEST(StiffnessForm, EveryScaraModelIsWhole) {
 
 TEST(StiffnessForm, ServosSofteningIsTheirShare) {
   // C is linear in neither, but dC/dln(1/K_act) is the servos' share (Castigliano).
-  Case c = ScaraCase();
+  StiffnessCase c = ScaraCase();
   Diagnostics diagnostics;
   const StiffnessResult result = Make(c, "", &diagnostics)->Evaluate(c.pose);
   Mat6 servos = Mat6::Zero();
@@ -128,7 +128,7 @@ TEST(StiffnessForm, ServosSofteningIsTheirShare) {
   }
   constexpr double h = 1e-4;
   const auto with = [&](double factor) {
-    Case softer = c;
+    StiffnessCase softer = c;
     for (Parameter& p : softer.mechanism.parameters) {
       if (p.name == "K_act") p.value /= factor;
     }
@@ -142,7 +142,7 @@ TEST(StiffnessForm, ServosSofteningIsTheirShare) {
 
 TEST(StiffnessForm, RodsOfAParallelogramShareItsCompliance) {
   Diagnostics diagnostics;
-  const Case c = ScaraCase();
+  const StiffnessCase c = ScaraCase();
   const StiffnessResult result = Make(c, "", &diagnostics)->Evaluate(c.pose);
   const auto share = [&](const std::string& name) {
     const auto at = std::find_if(result.shares.begin(), result.shares.end(),
@@ -156,7 +156,7 @@ TEST(StiffnessForm, RodsOfAParallelogramShareItsCompliance) {
 }
 
 TEST(StiffnessForm, CabinTakesTheSlideFromThePoseOrTheModel) {
-  Case c = CabinCase();
+  StiffnessCase c = CabinCase();
   Diagnostics diagnostics;
   const StiffnessResult from_model = Make(c, "", &diagnostics)->Evaluate(c.pose);
   c.pose["d5"] = -0.2;
@@ -174,7 +174,7 @@ TEST(StiffnessForm, CabinTakesTheSlideFromThePoseOrTheModel) {
 
 TEST(StiffnessForm, CabinIndicesAreTheDiagonalOfC) {
   Diagnostics diagnostics;
-  const Case c = CabinCase();
+  const StiffnessCase c = CabinCase();
   const auto form = Make(c, "", &diagnostics);
   const StiffnessResult result = form->Evaluate(c.pose);
   std::vector<double> values(6);
@@ -187,7 +187,7 @@ TEST(StiffnessForm, CabinIndicesAreTheDiagonalOfC) {
 
 TEST(StiffnessForm, PrintedCabinIsNotSymmetricAndHasNoShares) {
   Diagnostics diagnostics;
-  const Case c = CabinCase();
+  const StiffnessCase c = CabinCase();
   const StiffnessResult result = Make(c, "as_printed", &diagnostics)->Evaluate(c.pose);
   EXPECT_TRUE(result.summary.ok());
   EXPECT_TRUE(result.shares.empty());
@@ -195,7 +195,7 @@ TEST(StiffnessForm, PrintedCabinIsNotSymmetricAndHasNoShares) {
 }
 
 TEST(StiffnessForm, FindingsNameWhatDoesNotSuit) {
-  Case c = ScaraCase();
+  StiffnessCase c = ScaraCase();
   c.pose.erase("platform.yaw");
   c.pose["limb1.drive"] = 0.3;
   c.mechanism.parameters.back().value = -1.0;  // K_act
@@ -208,7 +208,7 @@ TEST(StiffnessForm, FindingsNameWhatDoesNotSuit) {
     EXPECT_NE(text.find(part), std::string::npos) << part << "\n" << text;
   }
 
-  Case cabin = CabinCase();
+  StiffnessCase cabin = CabinCase();
   cabin.pose.erase("th3");
   cabin.pose["tool.x"] = 0.0;
   std::erase_if(cabin.mechanism.parameters,
@@ -227,7 +227,7 @@ TEST(StiffnessForm, FindingsNameWhatDoesNotSuit) {
 }
 
 TEST(StiffnessForm, UnreachableAndSingularPosesAreInTheSummary) {
-  Case c = ScaraCase();
+  StiffnessCase c = ScaraCase();
   Diagnostics diagnostics;
   const auto form = Make(c, "", &diagnostics);
   c.pose["platform.x"] = 0.3;
@@ -244,7 +244,7 @@ TEST(StiffnessForm, UnreachableAndSingularPosesAreInTheSummary) {
 }
 
 TEST(StiffnessForm, SweepsTakeNoMemory) {
-  for (Case c : {ScaraCase(), CabinCase()}) {
+  for (StiffnessCase c : {ScaraCase(), CabinCase()}) {
     Diagnostics diagnostics;
     const auto form = Make(c, "", &diagnostics);
     std::vector<double> values(form->indices().size());

@@ -16,15 +16,15 @@
 namespace mbv {
 namespace {
 
-const std::string kModels = SourcePath("/models");
+const std::string kModelFolder = SourcePath("/models");
 
-const AuditTable& Table() {
-  static const AuditTable table = AuditScaraRobot(kModels);
+const AuditTable& ScaraTable() {
+  static const AuditTable table = AuditScaraRobot(kModelFolder);
   return table;
 }
 
 TEST(ScaraAudit, EveryCorrectedFormIsConfirmed) {
-  for (const AuditRow& row : Table().rows) {
+  for (const AuditRow& row : ScaraTable().rows) {
     EXPECT_NE(row.verdict, AuditVerdict::kWrongAndUnfixed) << row.equation;
     EXPECT_LE(row.residual_corrected, row.limit) << row.equation;
     EXPECT_GT(row.scale, 0.0) << row.equation;
@@ -59,7 +59,7 @@ TEST(ScaraAudit, RightEquationsAreTheseAndNoOthers) {
                                        "(19), (21) κ_f",
                                        "Fig. 9, symmetry"};
   std::set<std::string> found;
-  for (const AuditRow& row : Table().rows) {
+  for (const AuditRow& row : ScaraTable().rows) {
     if (row.verdict == AuditVerdict::kOk) found.insert(row.equation);
     EXPECT_EQ(row.verdict == AuditVerdict::kWrong, !row.erratum.empty()) << row.equation;
   }
@@ -67,7 +67,7 @@ TEST(ScaraAudit, RightEquationsAreTheseAndNoOthers) {
 }
 
 TEST(ScaraAudit, EveryErratumIsLargeComparedWithItsLimit) {
-  for (const AuditRow& row : Table().rows) {
+  for (const AuditRow& row : ScaraTable().rows) {
     if (row.verdict != AuditVerdict::kWrong || row.equation.starts_with("Table")) continue;
     if (std::isnan(row.residual_printed)) continue;  // not computable: its shapes do not fit
     EXPECT_GT(row.residual_printed, 1e-2 * row.scale) << row.equation;
@@ -75,7 +75,7 @@ TEST(ScaraAudit, EveryErratumIsLargeComparedWithItsLimit) {
 }
 
 TEST(ScaraAudit, BentConstantsLeaveEquationsUnconfirmed) {
-  const LoadResult model = LoadModel(std::string(kModels) + "/scara_robot/model.yaml");
+  const LoadResult model = LoadModel(std::string(kModelFolder) + "/scara_robot/model.yaml");
   ASSERT_TRUE(model.mechanism) << model.diagnostics.Text();
   const std::vector<scara_audit::State> states = scara_audit::Sweep(*model.mechanism);
   const auto unconfirmed = [&](double scara::Parameters::*member) {

@@ -10,13 +10,13 @@
 namespace mbv {
 namespace {
 
-const AuditTable& Table() {
+const AuditTable& TripodTable() {
   static const AuditTable table = AuditSprTripod(SourcePath("/models"));
   return table;
 }
 
 const AuditRow& RowFor(const std::string& equation) {
-  const auto& rows = Table().rows;
+  const auto& rows = TripodTable().rows;
   const auto at = std::find_if(rows.begin(), rows.end(),
                                [&](const AuditRow& row) { return row.equation == equation; });
   EXPECT_NE(at, rows.end()) << equation;
@@ -27,14 +27,14 @@ const AuditRow& RowFor(const std::string& equation) {
 TEST(SprTripodAudit, HasARowForEveryNumberedEquation) {
   for (int n = 1; n <= 22; ++n) {
     const std::string number = "(" + std::to_string(n) + ")";
-    EXPECT_TRUE(std::any_of(Table().rows.begin(), Table().rows.end(), [&](const AuditRow& row) {
-      return row.equation.starts_with(number);
-    })) << number;
+    EXPECT_TRUE(std::any_of(TripodTable().rows.begin(), TripodTable().rows.end(),
+                            [&](const AuditRow& row) { return row.equation.starts_with(number); }))
+        << number;
   }
 }
 
 TEST(SprTripodAudit, ConfirmsEveryCorrectedForm) {
-  for (const AuditRow& row : Table().rows) {
+  for (const AuditRow& row : TripodTable().rows) {
     EXPECT_NE(row.verdict, AuditVerdict::kWrongAndUnfixed)
         << row.equation << ": " << row.residual_corrected << " > " << row.limit;
   }
@@ -42,7 +42,7 @@ TEST(SprTripodAudit, ConfirmsEveryCorrectedForm) {
 
 TEST(SprTripodAudit, FindsTheKnownErrorsAndNoOthers) {
   std::vector<std::string> wrong;
-  for (const AuditRow& row : Table().rows) {
+  for (const AuditRow& row : TripodTable().rows) {
     if (row.verdict == AuditVerdict::kWrong) wrong.push_back(row.equation);
   }
   const std::vector<std::string> known = {

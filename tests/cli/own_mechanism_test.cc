@@ -24,7 +24,7 @@ joints:
 drives: {motor: {kind: joint, joint: A}}
 outputs: {tool: coupler.end}
 )";
-constexpr const char* kScenario = R"(mechanism: ./four_bar.yaml
+constexpr const char* kOwnScenario = R"(mechanism: ./four_bar.yaml
 motion:
   duration_s: 1
   commands: {motor: [home, {sine: {amplitude_deg: 20, period_s: 1}}]}
@@ -36,7 +36,7 @@ class OwnMechanism : public testing::Test {
  protected:
   void SetUp() override {
     std::ofstream(mbverify.folder() / "four_bar.yaml") << kModel;
-    std::ofstream(mbverify.folder() / "swing.yaml") << kScenario;
+    std::ofstream(mbverify.folder() / "swing.yaml") << kOwnScenario;
   }
   ProgramResult Run(const std::string& more) const {
     return mbverify("run " + (mbverify.folder() / "swing.yaml").string() + " --out " +

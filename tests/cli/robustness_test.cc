@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kScenario = "scenarios/slider_crank/turn.yaml";
+constexpr const char* kSoundScenario = "scenarios/slider_crank/turn.yaml";
 
 class RobustnessTest : public testing::Test {
  protected:
@@ -28,10 +28,10 @@ class RobustnessTest : public testing::Test {
   [[nodiscard]] ProgramResult Shell(const std::string& script) const {
     const std::string out = (mbverify.folder() / "shell_out").string();
     const std::string err = (mbverify.folder() / "shell_err").string();
-    const int status =
-        std::system(("cd '" + std::string(kSourceDir) + "' && mbverify='" + std::string(kBinaryDir) + "/mbverify' && (" +
-                     script + ") >'" + out + "' 2>'" + err + "'")
-                        .c_str());
+    const int status = std::system(("cd '" + std::string(kSourceDir) + "' && mbverify='" +
+                                    std::string(kBinaryDir) + "/mbverify' && (" + script + ") >'" +
+                                    out + "' 2>'" + err + "'")
+                                       .c_str());
     return {WIFEXITED(status) ? WEXITSTATUS(status) : 128, ReadAll(out), ReadAll(err)};
   }
   [[nodiscard]] std::string Run(const std::string& arguments) const {
@@ -66,12 +66,13 @@ TEST_F(RobustnessTest, NumbersBeyondAllBoundsAreRefusedWithTheirKey) {
            {"simulation.step_s=1e-310", "violates motion.duration_s / step_s <= 1e+07"},
            {"simulation.step_s=1e12", "n · step_s"},
        }) {
-    const ProgramResult result = mbverify(Run(std::string(kScenario) + " --set " + set));
+    const ProgramResult result = mbverify(Run(std::string(kSoundScenario) + " --set " + set));
     EXPECT_EQ(result.exit_code, 2) << set << "\n" << result.err;
     EXPECT_NE(result.err.find(message), std::string::npos) << set << "\n" << result.err;
   }
   EXPECT_FALSE(fs::exists(mbverify.Out()));
-  const ProgramResult steps = mbverify(std::string("converge --steps 4e-9,2e-9,1e-9 ") + kScenario);
+  const ProgramResult steps =
+      mbverify(std::string("converge --steps 4e-9,2e-9,1e-9 ") + kSoundScenario);
   EXPECT_EQ(steps.exit_code, 2);
   EXPECT_NE(steps.err.find("1e-09 s violates motion.duration_s / step"), std::string::npos)
       << steps.err;
@@ -79,7 +80,7 @@ TEST_F(RobustnessTest, NumbersBeyondAllBoundsAreRefusedWithTheirKey) {
 
 TEST_F(RobustnessTest, AMassTooSmallForTheEngineIsNamedAndNothingIsCompared) {
   const ProgramResult result = mbverify("run --no-pictures --out '" + mbverify.Out() + "' " +
-                                        kScenario + " --set parameters.m_crank=1e-310");
+                                        kSoundScenario + " --set parameters.m_crank=1e-310");
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_NE(result.out.find("mass and inertia of moving bodies must be larger"), std::string::npos)
       << result.out;
@@ -132,10 +133,10 @@ TEST_F(RobustnessTest, WhatCannotBeReadIsBadInput) {
 TEST_F(RobustnessTest, EveryCommandNamesAFolderThatCannotBeMade) {
   const std::string file = Write("file", "x");
   for (const std::string& command :
-       {"run --no-pictures --out '" + file + "/out' " + kScenario,
-        "converge --steps 0.004,0.002,0.001 --out '" + file + "/out' " + kScenario,
-        "render --at 0 --size 64x64 --out '" + file + "/out' " + kScenario,
-        "regress --no-pictures --out '" + file + "/out' " + kScenario,
+       {"run --no-pictures --out '" + file + "/out' " + kSoundScenario,
+        "converge --steps 0.004,0.002,0.001 --out '" + file + "/out' " + kSoundScenario,
+        "render --at 0 --size 64x64 --out '" + file + "/out' " + kSoundScenario,
+        "regress --no-pictures --out '" + file + "/out' " + kSoundScenario,
         "model slider_crank --format mjcf --out '" + file + "/model.xml'"}) {
     const ProgramResult result = mbverify(command);
     EXPECT_EQ(result.exit_code, 2) << command << "\n" << result.err;
@@ -147,7 +148,7 @@ TEST_F(RobustnessTest, EveryCommandNamesAFolderThatCannotBeMade) {
 // A file-size limit stands in for a full disk: writes end short in the same way, with another
 // reason. The shell ignores the signal that would come with it.
 TEST_F(RobustnessTest, AFullDiskIsNamedAndTheOldResultStays) {
-  const std::string run = "\"$mbverify\" " + Run(kScenario);
+  const std::string run = "\"$mbverify\" " + Run(kSoundScenario);
   ASSERT_EQ(Shell(run).exit_code, 0);
   const std::vector<std::string> before = FilesBelow(mbverify.Out());
   const fs::path summary = fs::path(mbverify.Out()) / "slider_crank" / "turn" / "summary.json";
@@ -179,8 +180,8 @@ TEST_F(RobustnessTest, AFullDiskLeavesNoHalfOfASingleFile) {
 }
 
 TEST_F(RobustnessTest, ResultsThatCannotBePrintedAreAnError) {
-  for (const std::string& command :
-       {std::string("list"), Run(kScenario), std::string("model slider_crank --format mjcf")}) {
+  for (const std::string& command : {std::string("list"), Run(kSoundScenario),
+                                     std::string("model slider_crank --format mjcf")}) {
     const ProgramResult result = Shell("\"$mbverify\" " + command + " >/dev/full");
     EXPECT_EQ(result.exit_code, 2) << command << "\n" << result.err;
     EXPECT_NE(result.err.find("cannot write to standard output"), std::string::npos)
@@ -188,13 +189,13 @@ TEST_F(RobustnessTest, ResultsThatCannotBePrintedAreAnError) {
         << result.err;
   }
   // Nobody to complain to either.
-  EXPECT_EQ(Shell("\"$mbverify\" " + Run(kScenario) + " >/dev/full 2>/dev/full").exit_code, 2);
+  EXPECT_EQ(Shell("\"$mbverify\" " + Run(kSoundScenario) + " >/dev/full 2>/dev/full").exit_code, 2);
 }
 
 TEST_F(RobustnessTest, ARegressionOnAFullDiskTellsWhyEachScenarioFailed) {
   const ProgramResult full =
       Shell("trap '' XFSZ; ulimit -f 40; \"$mbverify\" regress --no-pictures --out '" +
-            mbverify.Out() + "' " + kScenario);
+            mbverify.Out() + "' " + kSoundScenario);
   EXPECT_EQ(full.exit_code, 2);
   EXPECT_NE(full.out.find("exit code 2, expected 0: "), std::string::npos) << full.out;
   EXPECT_NE(full.out.find("File too large"), std::string::npos) << full.out;
@@ -215,8 +216,8 @@ TEST_F(RobustnessTest, AFolderWithoutFilesIsNotFoundInOrder) {
 TEST_F(RobustnessTest, PictureSizesAreWholeNumbersWithinBounds) {
   for (const std::string& size : {std::string("640.5x480"), std::string("10x480"),
                                   std::string("1e9x480"), std::string("480x9000")}) {
-    const ProgramResult result =
-        mbverify("render --at 0 --out '" + mbverify.Out() + "' --size " + size + " " + kScenario);
+    const ProgramResult result = mbverify("render --at 0 --out '" + mbverify.Out() + "' --size " +
+                                          size + " " + kSoundScenario);
     EXPECT_EQ(result.exit_code, 2) << size;
     EXPECT_NE(result.err.find("is not a whole number from 64 to 8192"), std::string::npos)
         << size << result.err;

@@ -14,7 +14,7 @@ using synthetic::Case;
 using synthetic::OnVehicle;
 using synthetic::Stretch;
 
-bool Fails(const Comparison& comparison, const std::string& check) {
+bool CheckFails(const Comparison& comparison, const std::string& check) {
   const CheckResult* found = comparison.FindCheck(check);
   return found != nullptr && found->limit && !found->pass;
 }
@@ -24,10 +24,10 @@ TEST(ForceScale, APrescribedBodyDoesNotHideWhatItCarries) {
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
   const ForceScale scale = ForceScaleOf(c.Input(), c.analytic);
   EXPECT_NEAR(scale.force_N, 2.0 * 9.81, 1e-9);
-  EXPECT_NEAR(scale.driven[0], 2.0 * 9.81, 1e-9);        // d2
-  EXPECT_NEAR(scale.driven[1], 1e7 * 9.81, 1e-2);        // the vehicle's own
+  EXPECT_NEAR(scale.driven[0], 2.0 * 9.81, 1e-9);  // d2
+  EXPECT_NEAR(scale.driven[1], 1e7 * 9.81, 1e-2);  // the vehicle's own
   Stretch(&c.simulated, "d2.force", 1.0 + 2e-10);  // twice the limit
-  EXPECT_TRUE(Fails(c.Run(), "simulated_vs_analytic.force_nrmse"));
+  EXPECT_TRUE(CheckFails(c.Run(), "simulated_vs_analytic.force_nrmse"));
 }
 
 TEST(ForceScale, ADrivenBodyDoesNotHideWhatAnotherDriveCarries) {
@@ -35,8 +35,8 @@ TEST(ForceScale, ADrivenBodyDoesNotHideWhatAnotherDriveCarries) {
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
   Stretch(&c.simulated, "d2.force", 1.0001);
   const Comparison comparison = c.Run();
-  EXPECT_FALSE(Fails(comparison, "simulated_vs_analytic.force_nrmse"));  // of both together
-  EXPECT_TRUE(Fails(comparison, "simulated_vs_analytic.force_nrmse_own"));
+  EXPECT_FALSE(CheckFails(comparison, "simulated_vs_analytic.force_nrmse"));  // of both together
+  EXPECT_TRUE(CheckFails(comparison, "simulated_vs_analytic.force_nrmse_own"));
   EXPECT_NEAR(comparison.FindPair("simulated_vs_analytic")->drives[1].nrmse, 1e-4, 1e-9);
   EXPECT_FALSE(comparison.FindPair("simulated_vs_analytic")->drives[1].floored);
 }
@@ -111,7 +111,7 @@ TEST(PowerScale, ThePowerOfTheBaseDoesNotHideTheDrives) {
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree) << c.Run().reason;
   // Twice the limit of what the cart's weight takes at 1 m/s and its own speed.
   Bend(&c.simulated, "power.energy_rate", 2e-8 * 19.62 * (1.0 + 0.4 * std::numbers::pi));
-  EXPECT_TRUE(Fails(c.Run(), "simulated.power_balance"));
+  EXPECT_TRUE(CheckFails(c.Run(), "simulated.power_balance"));
 }
 
 TEST(PowerScale, RoundOffOfAHeavyBaseIsNoImbalance) {
@@ -120,9 +120,9 @@ TEST(PowerScale, RoundOffOfAHeavyBaseIsNoImbalance) {
     Bend(&c.simulated, name, 1e11);
   }
   Bend(&c.simulated, "power.energy_rate", 1e-4);  // ten units in the last place
-  EXPECT_FALSE(Fails(c.Run(), "simulated.power_balance"));
+  EXPECT_FALSE(CheckFails(c.Run(), "simulated.power_balance"));
   Bend(&c.simulated, "power.energy_rate", 1e-3);
-  EXPECT_TRUE(Fails(c.Run(), "simulated.power_balance"));
+  EXPECT_TRUE(CheckFails(c.Run(), "simulated.power_balance"));
 }
 
 }  // namespace

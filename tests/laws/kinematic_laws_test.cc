@@ -10,7 +10,7 @@ namespace {
 class Kinematics : public EveryMechanism {};
 
 // Commands divided by their scales.
-VecX Scaled(const Subject& s, VecX commands) {
+VecX ScaledCommands(const Subject& s, VecX commands) {
   for (size_t k = 0; k < s.motion.commands.size(); ++k) {
     commands[static_cast<Eigen::Index>(k)] /= s.ScaleOf(k);
   }
@@ -47,12 +47,12 @@ Residual InverseThenForward(const Subject& s, const State& state, double bend) {
   if (!r.trouble.empty()) return r;
   const CommandSample back = CommandsAt(s, sample.states, state.command);
   const CommandSample& there = state.command;
-  r.error = Scaled(s, back.position - there.position).lpNorm<Eigen::Infinity>();
+  r.error = ScaledCommands(s, back.position - there.position).lpNorm<Eigen::Infinity>();
   // Rates carry their own size.
-  r.error =
-      std::max(r.error, RelativeError(Scaled(s, back.velocity), Scaled(s, there.velocity), 1));
-  r.error = std::max(r.error,
-                     RelativeError(Scaled(s, back.acceleration), Scaled(s, there.acceleration), 1));
+  r.error = std::max(r.error, RelativeError(ScaledCommands(s, back.velocity),
+                                            ScaledCommands(s, there.velocity), 1));
+  r.error = std::max(r.error, RelativeError(ScaledCommands(s, back.acceleration),
+                                            ScaledCommands(s, there.acceleration), 1));
   return r;
 }
 
@@ -160,9 +160,7 @@ INSTANTIATE_TEST_SUITE_P(Laws, Kinematics,
                                                               Regime::kNearSingular)),
                          RegimeName);
 
-TEST(LawList, EveryClosedFormHasAModel) {
-  EXPECT_EQ(ModelNames().size(), ClosedForms().size());
-}
+TEST(LawList, EveryClosedFormHasAModel) { EXPECT_EQ(ModelNames().size(), ClosedForms().size()); }
 
 TEST(LawList, DrivesDetermineEveryMechanism) {
   for (const std::string& name : SubjectNames()) {

@@ -56,7 +56,7 @@ Section SectionOf(const std::string& described) {
   return m.beams.size() == 3 ? m.beams[2].section : Section{};
 }
 
-constexpr double kRoundoff = 32 * kEps;  // of a few operations, relative
+constexpr double kFewRoundings = 32 * kEps;  // of a few operations, relative
 
 TEST(ElasticModel, BeamsHaveTheirPlacesAxesAndMaterials) {
   const Mechanism m = Loaded(kBracket);
@@ -70,11 +70,11 @@ TEST(ElasticModel, BeamsHaveTheirPlacesAxesAndMaterials) {
   // x along the beam; z as given, made perpendicular; right-handed.
   Mat3 axes;
   axes << 0, 0, 1, 1, 0, 0, 0, 1, 0;
-  EXPECT_LT((up.R_BE - axes).norm(), kRoundoff);
+  EXPECT_LT((up.R_BE - axes).norm(), kFewRoundings);
   for (const Beam& beam : m.beams) {
-    EXPECT_LT((beam.R_BE.transpose() * beam.R_BE - Mat3::Identity()).norm(), kRoundoff);
-    EXPECT_NEAR(beam.R_BE.determinant(), 1.0, kRoundoff);
-    EXPECT_LT((beam.p_from + beam.length() * beam.R_BE.col(0) - beam.p_to).norm(), kRoundoff);
+    EXPECT_LT((beam.R_BE.transpose() * beam.R_BE - Mat3::Identity()).norm(), kFewRoundings);
+    EXPECT_NEAR(beam.R_BE.determinant(), 1.0, kFewRoundings);
+    EXPECT_LT((beam.p_from + beam.length() * beam.R_BE.col(0) - beam.p_to).norm(), kFewRoundings);
   }
   EXPECT_DOUBLE_EQ(up.youngs_modulus, 210e9);
   EXPECT_DOUBLE_EQ(up.shear_modulus, 210e9 / 2.6);
@@ -83,23 +83,23 @@ TEST(ElasticModel, BeamsHaveTheirPlacesAxesAndMaterials) {
 
 TEST(ElasticModel, SectionsHaveTheirTextbookValues) {
   const Section rod = SectionOf("{round: {diameter: 2}}");
-  EXPECT_NEAR(rod.area, std::numbers::pi, kRoundoff * 4);
-  EXPECT_NEAR(rod.I_y, std::numbers::pi / 4, kRoundoff);
-  EXPECT_NEAR(rod.I_z, std::numbers::pi / 4, kRoundoff);
-  EXPECT_NEAR(rod.torsion, std::numbers::pi / 2, kRoundoff);
+  EXPECT_NEAR(rod.area, std::numbers::pi, kFewRoundings * 4);
+  EXPECT_NEAR(rod.I_y, std::numbers::pi / 4, kFewRoundings);
+  EXPECT_NEAR(rod.I_z, std::numbers::pi / 4, kFewRoundings);
+  EXPECT_NEAR(rod.torsion, std::numbers::pi / 2, kFewRoundings);
   const Section pipe = SectionOf("{tube: {outer_diameter: 4, inner_diameter: 2}}");
-  EXPECT_NEAR(pipe.area, 3 * std::numbers::pi, kRoundoff * 10);
-  EXPECT_NEAR(pipe.I_y, 15 * std::numbers::pi / 4, kRoundoff * 12);
+  EXPECT_NEAR(pipe.area, 3 * std::numbers::pi, kFewRoundings * 10);
+  EXPECT_NEAR(pipe.I_y, 15 * std::numbers::pi / 4, kFewRoundings * 12);
   const Section own = Loaded(kBracket).beams[1].section;
   EXPECT_EQ(own.area + 10 * own.I_y + 100 * own.I_z + 1000 * own.torsion, 4321);
 }
 
 TEST(ElasticModel, ARectangleBendsEasierAcrossItsShortEdge) {
   const Section bar = Loaded(kBracket).beams[0].section;
-  EXPECT_NEAR(bar.area, 2e-4, 1e-4 * kRoundoff);
-  EXPECT_NEAR(bar.I_y, 0.01 * std::pow(0.02, 3) / 12, 1e-8 * kRoundoff);
-  EXPECT_NEAR(bar.I_z, 0.02 * std::pow(0.01, 3) / 12, 1e-8 * kRoundoff);
-  EXPECT_NEAR(bar.torsion, 0.02 * 1e-6 * (1.0 / 3 - 0.105), 1e-8 * kRoundoff);
+  EXPECT_NEAR(bar.area, 2e-4, 1e-4 * kFewRoundings);
+  EXPECT_NEAR(bar.I_y, 0.01 * std::pow(0.02, 3) / 12, 1e-8 * kFewRoundings);
+  EXPECT_NEAR(bar.I_z, 0.02 * std::pow(0.01, 3) / 12, 1e-8 * kFewRoundings);
+  EXPECT_NEAR(bar.torsion, 0.02 * 1e-6 * (1.0 / 3 - 0.105), 1e-8 * kFewRoundings);
 }
 
 TEST(ElasticModel, TorsionOfARectangleIsThatOfTheTables) {
@@ -165,7 +165,7 @@ TEST_P(BracketWith, ASlipIsReported) {
   EXPECT_EQ(result.mechanism.has_value(), warning) << text;
 }
 
-const Slip kSlips[] = {
+const Slip kElasticSlips[] = {
     {"NoSuchSection", "section: bar", "section: bra",
      "m.yaml:15:37: error: bodies.bracket.beams.up.section = 'bra': there is no such section\n"
      "  hint: did you mean 'bar'?"},
@@ -226,7 +226,7 @@ const Slip kSlips[] = {
     {"MaterialName", "alloy: {youngs", "al loy: {youngs", "materials: 'al loy' is no name"},
 };
 
-INSTANTIATE_TEST_SUITE_P(Slips, BracketWith, testing::ValuesIn(kSlips),
+INSTANTIATE_TEST_SUITE_P(Slips, BracketWith, testing::ValuesIn(kElasticSlips),
                          [](const auto& info) { return std::string(info.param.name); });
 
 // Files in a folder of their own, removed afterwards.
@@ -296,14 +296,14 @@ TEST_F(OtherFiles, ThatCannotBeReadAreReported) {
       << text;
 }
 
-Mechanism LoadShipped(const std::string& name) {
+Mechanism LoadElastic(const std::string& name) {
   const LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + name);
   EXPECT_EQ(result.diagnostics.Text(), "");
   return result.mechanism.value_or(Mechanism{});
 }
 
 TEST(ElasticScara, IsOverconstrainedByItsParallelogramsOnly) {
-  const Mechanism m = LoadShipped("scara_robot/elastic.yaml");
+  const Mechanism m = LoadElastic("scara_robot/elastic.yaml");
   EXPECT_EQ(m.name, "scara_robot");
   EXPECT_EQ(m.beams.size(), 12u);
   const Mobility mobility = AnalyseMobility(m);
@@ -319,7 +319,7 @@ TEST(ElasticScara, IsOverconstrainedByItsParallelogramsOnly) {
 }
 
 TEST(ElasticCabin, CarriesItsPlatformOnTwoLinkages) {
-  const Mechanism m = LoadShipped("cabin_robot/elastic.yaml");
+  const Mechanism m = LoadElastic("cabin_robot/elastic.yaml");
   EXPECT_EQ(m.name, "cabin_robot");
   EXPECT_EQ(m.beams.size(), 12u);
   const Mobility mobility = AnalyseMobility(m);

@@ -9,8 +9,8 @@
 namespace mbv {
 namespace {
 
-using ::mbv::testing::FourBar;
-using ::mbv::testing::MakeFourBar;
+using ::mbv::fixtures::FourBar;
+using ::mbv::fixtures::MakeFourBar;
 
 enum { kA, kB, kD, kC };  // joint indices of MakeFourBar: ground A, B, ground D, C
 

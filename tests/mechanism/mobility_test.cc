@@ -10,7 +10,7 @@
 namespace mbv {
 namespace {
 
-using ::mbv::testing::MakeFourBar;
+using ::mbv::fixtures::MakeFourBar;
 
 TEST(Mobility, APlanarFourBarMovesAlthoughKutzbachSaysMinusTwo) {
   const Mobility mobility = AnalyseMobility(MakeFourBar());

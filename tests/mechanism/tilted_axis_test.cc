@@ -12,7 +12,7 @@ namespace mbv {
 namespace {
 
 // A four-bar whose joints lie in their frames as drawn: closed at home with any axis of D.
-std::string FourBar(const std::string& axis_of_c, const std::string& axis_of_d) {
+std::string TiltedFourBar(const std::string& axis_of_c, const std::string& axis_of_d) {
   return "name: four_bar\n"
          "world: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}\n"
          "bodies:\n"
@@ -37,7 +37,7 @@ TEST(TiltedAxis, ALinkageThatItFreezesSaysSo) {
            {"z", "[0, 0.01, 1]", "'D'", "0.573 deg"},
            {"[0.001, 0, 1]", "z", "'C'", "0.0573 deg"},
            {"[0, 0.05, 1]", "z", "'C'", "2.86 deg"}}) {
-    const LoadResult loaded = LoadModelText(FourBar(c, d), "m.yaml");
+    const LoadResult loaded = LoadModelText(TiltedFourBar(c, d), "m.yaml");
     ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
     const std::string text = loaded.diagnostics.Text();
     EXPECT_NE(text.find("warning: the axis of joint " + joint + " is tilted by " + angle),

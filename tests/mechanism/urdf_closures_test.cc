@@ -14,7 +14,7 @@ namespace mbv {
 namespace {
 
 // A four-bar linkage of lengths 0.2, 0.5, 0.4, 0.5 cut at C; `closure` closes it.
-std::string FourBar(const std::string& closure) {
+std::string FourBarUrdf(const std::string& closure) {
   return R"(<robot name="four_bar">
 <link name="world"/><link name="crank"/><link name="coupler"/><link name="rocker"/>
 <joint name="A" type="continuous"><parent link="world"/><child link="crank"/><axis xyz="0 0 1"/></joint>
@@ -30,7 +30,7 @@ constexpr const char* kConstraint = R"(<constraint name="C" type="revolute">
 </constraint>
 )";
 
-std::string WriteFile(const std::string& name, const std::string& text) {
+std::string WriteClosureFile(const std::string& name, const std::string& text) {
   const std::filesystem::path folder =
       std::filesystem::path(testing::TempDir()) / "mbv_urdf_closures";
   std::filesystem::create_directories(folder);
@@ -39,10 +39,11 @@ std::string WriteFile(const std::string& name, const std::string& text) {
 }
 
 LoadResult LoadFourBar(const std::string& name, const std::string& closure) {
-  WriteFile(name + ".urdf", FourBar(closure));
-  return LoadModel(WriteFile(name + ".yaml", "name: m\nurdf: {file: " + name +
-                                                 ".urdf, guess_deg: {A: 60, B: -50, D: 70}}\n"
-                                                 "drives: {motor: {kind: joint, joint: A}}\n"));
+  WriteClosureFile(name + ".urdf", FourBarUrdf(closure));
+  return LoadModel(
+      WriteClosureFile(name + ".yaml", "name: m\nurdf: {file: " + name +
+                                           ".urdf, guess_deg: {A: 60, B: -50, D: 70}}\n"
+                                           "drives: {motor: {kind: joint, joint: A}}\n"));
 }
 
 // Where C is at home, seen from the rocker and from the coupler.
@@ -57,9 +58,9 @@ void ExpectClosed(const LoadResult& loaded, JointKind kind) {
   EXPECT_TRUE(m.joints.at(3).closure);
 }
 
-std::string Findings(const std::string& closure) {
+std::string ClosureFindings(const std::string& closure) {
   Diagnostics diagnostics;
-  EXPECT_TRUE(ReadUrdf(FourBar(closure), "r.urdf", &diagnostics).bodies.empty());
+  EXPECT_TRUE(ReadUrdf(FourBarUrdf(closure), "r.urdf", &diagnostics).bodies.empty());
   return diagnostics.Text();
 }
 
@@ -111,7 +112,7 @@ TEST(UrdfConstraint, AxesOfDifferentComponentsOnTheTwoSidesAreTheSameLine) {
 
 TEST(UrdfConstraint, AUniversalJointTakesOneAxisFromEachSide) {
   Diagnostics diagnostics;
-  const UrdfTree tree = ReadUrdf(FourBar(R"(<constraint name="U" type="universal">
+  const UrdfTree tree = ReadUrdf(FourBarUrdf(R"(<constraint name="U" type="universal">
 <parent link="rocker"/><parent_axis xyz="0 0 2"/><child link="coupler"/><child_axis xyz="0 3 0"/>
 </constraint>)"),
                                  "r.urdf", &diagnostics);
@@ -121,28 +122,29 @@ TEST(UrdfConstraint, AUniversalJointTakesOneAxisFromEachSide) {
 }
 
 TEST(UrdfConstraint, FindingsNameTheLineTheValueAndTheRule) {
-  EXPECT_EQ(Findings("<constraint name=\"C\" type=\"hinge\"><parent link=\"rocker\"/>"
-                     "<child link=\"coupler\"/></constraint>\n"),
+  EXPECT_EQ(ClosureFindings("<constraint name=\"C\" type=\"hinge\"><parent link=\"rocker\"/>"
+                            "<child link=\"coupler\"/></constraint>\n"),
             "r.urdf:6:1: error: <constraint 'C'>: type = 'hinge' is no kind of closure\n"
             "  hint: fixed, revolute, continuous, prismatic, cylindrical, universal, spherical, "
             "ball or planar\n");
-  EXPECT_EQ(Findings("<constraint name=\"C\" type=\"ball\"><parent link=\"rokcer\"/>"
-                     "<child link=\"coupler\"/></constraint>\n"),
+  EXPECT_EQ(ClosureFindings("<constraint name=\"C\" type=\"ball\"><parent link=\"rokcer\"/>"
+                            "<child link=\"coupler\"/></constraint>\n"),
             "r.urdf:6:1: error: closure 'C': there is no link 'rokcer'\n"
             "  hint: did you mean 'rocker'?\n");
-  EXPECT_NE(Findings("\n<loop name=\"C\" type=\"ball\"><successor link=\"coupler\"/></loop>")
+  EXPECT_NE(ClosureFindings("\n<loop name=\"C\" type=\"ball\"><successor link=\"coupler\"/></loop>")
                 .find("r.urdf:7:1: error: <loop 'C'>: <predecessor link=\"…\"> is missing"),
             std::string::npos);
-  EXPECT_NE(Findings("<loop_joint name=\"C\" type=\"ball\"><link1 link=\"rocker\" xyz=\"1 2\"/>"
-                     "<link2 link=\"coupler\"/></loop_joint>")
-                .find("xyz = '1 2' is not three numbers"),
-            std::string::npos);
-  EXPECT_NE(Findings("<constraint name=\"C\" type=\"universal\"><parent link=\"rocker\"/>"
-                     "<child link=\"coupler\"/></constraint>")
+  EXPECT_NE(
+      ClosureFindings("<loop_joint name=\"C\" type=\"ball\"><link1 link=\"rocker\" xyz=\"1 2\"/>"
+                      "<link2 link=\"coupler\"/></loop_joint>")
+          .find("xyz = '1 2' is not three numbers"),
+      std::string::npos);
+  EXPECT_NE(ClosureFindings("<constraint name=\"C\" type=\"universal\"><parent link=\"rocker\"/>"
+                            "<child link=\"coupler\"/></constraint>")
                 .find("a universal joint needs an axis on each side"),
             std::string::npos);
-  EXPECT_NE(Findings("<constraint name=\"A\" type=\"ball\"><parent link=\"rocker\"/>"
-                     "<child link=\"coupler\"/></constraint>")
+  EXPECT_NE(ClosureFindings("<constraint name=\"A\" type=\"ball\"><parent link=\"rocker\"/>"
+                            "<child link=\"coupler\"/></constraint>")
                 .find("a joint of this name is there already"),
             std::string::npos);
 }
@@ -160,7 +162,7 @@ TEST(UrdfConstraint, ALoopThatDoesNotCloseIsFoundAtItsLine) {
 TEST(UrdfConstraint, WhatIsNotReadIsSaid) {
   Diagnostics diagnostics;
   const UrdfTree tree = ReadUrdf(
-      FourBar(
+      FourBarUrdf(
           "<gazebo><joint name=\"C\" type=\"revolute\"/></gazebo>\n<coupling name=\"g\"/>\n"
           "<link name=\"l\"><visual><geometry><mesh filename=\"a.stl\"/></geometry></visual>"
           "<visual><geometry><mesh filename=\"b.stl\"/></geometry></visual></link>\n"
@@ -182,12 +184,12 @@ TEST(UrdfExport, TheConstraintsAloneCloseTheLoopsAgain) {
     const LoadResult loaded =
         LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
     ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
-    WriteFile("alone.urdf", WriteUrdf(*loaded.mechanism));
+    WriteClosureFile("alone.urdf", WriteUrdf(*loaded.mechanism));
     // The companion's guesses; closures from the URDF.
     std::string companion = WriteUrdfCompanion(*loaded.mechanism, "alone.urdf");
     companion.erase(companion.find("  constraints: false\n"), 21);
     companion = companion.substr(0, companion.find("attach:\n"));
-    const LoadResult back = LoadModel(WriteFile("alone.yaml", companion));
+    const LoadResult back = LoadModel(WriteClosureFile("alone.yaml", companion));
     ASSERT_TRUE(back.mechanism) << name << ": " << back.diagnostics.Text();
     const Mobility before = AnalyseMobility(*loaded.mechanism);
     const Mobility after = AnalyseMobility(*back.mechanism);
@@ -203,12 +205,12 @@ constexpr const char* kMarks = R"(<link name="loop1_A"/><link name="loop1_B"/>
 )";
 
 LoadResult LoadWithClosures(const std::string& name, const std::string& closures) {
-  WriteFile(name + ".urdf", FourBar(kMarks));
-  WriteFile(name + "_robot.yaml", closures);
-  return LoadModel(WriteFile(name + ".yaml", "name: m\nurdf: {file: " + name +
-                                                 ".urdf, closures: " + name +
-                                                 "_robot.yaml,\n  guess_deg: "
-                                                 "{A: 60, B: -50, D: 70}}\n"));
+  WriteClosureFile(name + ".urdf", FourBarUrdf(kMarks));
+  WriteClosureFile(name + "_robot.yaml", closures);
+  return LoadModel(WriteClosureFile(name + ".yaml", "name: m\nurdf: {file: " + name +
+                                                        ".urdf, closures: " + name +
+                                                        "_robot.yaml,\n  guess_deg: "
+                                                        "{A: 60, B: -50, D: 70}}\n"));
 }
 
 TEST(ClosureFile, PairsOfFramesCloseTheLoopAndMotorsBecomeDrives) {
@@ -241,15 +243,15 @@ TEST(ClosureFile, JointsBecomeSphericalUniversalOrFixed) {
   ASSERT_FALSE(loaded.mechanism);  // guesses of one number do not fit a ball
   EXPECT_NE(loaded.diagnostics.Text().find("urdf.guess_deg.B"), std::string::npos)
       << loaded.diagnostics.Text();
-  WriteFile("kinds2.urdf", FourBar(kMarks));
-  WriteFile("kinds2_robot.yaml",
-            "closed_loop: [[loop1_B, loop1_A]]\ntype: [6d]\n"
-            "joint_name: [B, D]\njoint_type: [SPHERICAL, UJOINT_ZX]\n");
+  WriteClosureFile("kinds2.urdf", FourBarUrdf(kMarks));
+  WriteClosureFile("kinds2_robot.yaml",
+                   "closed_loop: [[loop1_B, loop1_A]]\ntype: [6d]\n"
+                   "joint_name: [B, D]\njoint_type: [SPHERICAL, UJOINT_ZX]\n");
   const LoadResult good =
-      LoadModel(WriteFile("kinds2.yaml",
-                          "name: m\nurdf: {file: kinds2.urdf, closures: kinds2_robot.yaml,\n"
-                          "  guess_deg: {A: 60, B: [0, 0, -50], D: [70, 0]}}\n"
-                          "drives: {motor: {kind: joint, joint: A}}\n"));
+      LoadModel(WriteClosureFile("kinds2.yaml",
+                                 "name: m\nurdf: {file: kinds2.urdf, closures: kinds2_robot.yaml,\n"
+                                 "  guess_deg: {A: 60, B: [0, 0, -50], D: [70, 0]}}\n"
+                                 "drives: {motor: {kind: joint, joint: A}}\n"));
   ASSERT_TRUE(good.mechanism) << good.diagnostics.Text();
   const Mechanism& m = *good.mechanism;
   EXPECT_EQ(m.joints[m.FindJoint("B")].kind, JointKind::kSpherical);

@@ -17,7 +17,7 @@ namespace {
 
 using std::numbers::pi;
 
-constexpr double kRoundoff = 64 * kEps;
+constexpr double kUrdfRoundoff = 64 * kEps;
 
 UrdfTree MustRead(const std::string& text) {
   Diagnostics diagnostics;
@@ -46,7 +46,7 @@ TEST(UrdfConventions, RpyIsYawAfterPitchAfterRollAndTheAxisIsInTheJointFrame) {
   EXPECT_EQ(joint.kind, JointKind::kRevolute);
   EXPECT_EQ(joint.parent, -1);
   EXPECT_EQ(joint.X_PF.translation(), Vec3(1, 2, 3));
-  EXPECT_LT((joint.X_PF.linear() - RotRpy({0.1, 0.2, 0.3})).norm(), kRoundoff);
+  EXPECT_LT((joint.X_PF.linear() - RotRpy({0.1, 0.2, 0.3})).norm(), kUrdfRoundoff);
   EXPECT_EQ(joint.axis, Vec3::UnitY());                // made a unit vector, not turned by rpy
   EXPECT_TRUE(joint.X_CM.isApprox(Pose::Identity()));  // the link frame is the joint frame
   EXPECT_FALSE(std::isfinite(joint.range[0].upper));
@@ -71,7 +71,7 @@ TEST(UrdfConventions, InertiaIsAboutTheCentreOfMassInTheAxesOfItsOrigin) {
   // Turned by 90° about z: x of the inertia frame is y of the link, y is -x.
   Mat3 expected;
   expected << 3, -0.1, -0.3, -0.1, 1, 0.2, -0.3, 0.2, 3.5;
-  EXPECT_LT((body.I_Bcm_B - expected).norm(), kRoundoff) << body.I_Bcm_B;
+  EXPECT_LT((body.I_Bcm_B - expected).norm(), kUrdfRoundoff) << body.I_Bcm_B;
 }
 
 TEST(UrdfConventions, LimitsAreReadAndMimicIsLeftOutAloud) {
@@ -178,11 +178,12 @@ void ExpectRoundTrip(const Mechanism& m) {
     EXPECT_EQ(before.mass, after.mass);
     if (before.mass == 0.0) continue;
     const Pose &X_before = m.X_WB_home[a], &X_after = n.X_WB_home[b];
-    EXPECT_LT((X_before * before.p_BoBcm_B - X_after * after.p_BoBcm_B).norm(), kRoundoff * size)
+    EXPECT_LT((X_before * before.p_BoBcm_B - X_after * after.p_BoBcm_B).norm(),
+              kUrdfRoundoff * size)
         << before.name;
     const Mat3 I_before = X_before.linear() * before.I_Bcm_B * X_before.linear().transpose();
     const Mat3 I_after = X_after.linear() * after.I_Bcm_B * X_after.linear().transpose();
-    EXPECT_LT((I_before - I_after).norm(), kRoundoff * I_before.norm()) << before.name;
+    EXPECT_LT((I_before - I_after).norm(), kUrdfRoundoff * I_before.norm()) << before.name;
   }
   ASSERT_EQ(m.outputs.size(), n.outputs.size());
   for (size_t i = 0; i < m.outputs.size(); ++i) {
@@ -190,7 +191,8 @@ void ExpectRoundTrip(const Mechanism& m) {
     const Pose X_before = m.X_WB_home[before.body] * before.X_BO;
     const Pose X_after = n.X_WB_home[after.body] * after.X_BO;
     // Each of the two home solutions has its own rounding.
-    EXPECT_LT((X_before.matrix() - X_after.matrix()).norm(), 2 * kRoundoff * size) << before.name;
+    EXPECT_LT((X_before.matrix() - X_after.matrix()).norm(), 2 * kUrdfRoundoff * size)
+        << before.name;
   }
   const Mobility mobility = AnalyseMobility(m), again = AnalyseMobility(n);
   EXPECT_EQ(mobility.freedoms, again.freedoms);
@@ -245,7 +247,7 @@ outputs: {o: e}
     const Body& after = back.mechanism->bodies[b];
     EXPECT_LT(
         (m.X_WB_home[a] * body.p_BoBcm_B - back.mechanism->X_WB_home[b] * after.p_BoBcm_B).norm(),
-        4 * kRoundoff)
+        4 * kUrdfRoundoff)
         << body.name;
   }
   const Joint& slide = back.mechanism->joints[back.mechanism->FindJoint("pipe.slide")];
@@ -286,7 +288,7 @@ drives: {motor: {kind: joint, joint: A}}
   EXPECT_LT((loaded.mechanism->X_WB_home[coupler].translation() -
              0.2 * Vec3(std::cos(pi / 3), std::sin(pi / 3), 0))
                 .norm(),
-            kRoundoff);
+            kUrdfRoundoff);
 }
 
 TEST(UrdfKey, ARootLinkThatIsNotTheWorldIsFixedToItUnlessAJointCarriesIt) {

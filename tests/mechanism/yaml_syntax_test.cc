@@ -9,7 +9,7 @@
 namespace mbv {
 namespace {
 
-std::string FindingsOf(const std::string& text) {
+std::string SyntaxFindings(const std::string& text) {
   return LoadModelText(text, "m.yaml").diagnostics.Text();
 }
 
@@ -17,12 +17,12 @@ class IndentedWrongly : public testing::TestWithParam<Slip> {};
 
 TEST_P(IndentedWrongly, TheCauseIsNamedAtItsPlace) {
   const Slip& slip = GetParam();
-  const std::string text = FindingsOf(Replaced(kFourBar, slip.from, slip.to));
+  const std::string text = SyntaxFindings(Replaced(kFourBar, slip.from, slip.to));
   EXPECT_NE(text.find(slip.said), std::string::npos) << text;
   EXPECT_EQ(text.find("end of map not found"), std::string::npos) << text;
 }
 
-const Slip kSlips[] = {
+const Slip kSyntaxSlips[] = {
     {"Tab", "    mass: 2\n", "\tmass: 2\n",
      "m.yaml:12:1: error: YAML syntax: the line is indented by a tab\n"
      "  hint: YAML takes spaces only"},
@@ -52,11 +52,11 @@ const Slip kSlips[] = {
     {"ABodyInsideABody", "  coupler:\n", "    coupler:\n", ""},
 };
 
-INSTANTIATE_TEST_SUITE_P(YamlSyntax, IndentedWrongly, testing::ValuesIn(kSlips),
+INSTANTIATE_TEST_SUITE_P(YamlSyntax, IndentedWrongly, testing::ValuesIn(kSyntaxSlips),
                          [](const auto& info) { return std::string(info.param.name); });
 
 TEST(YamlSyntax, WhatTheFileSaysInsideTextIsNoCause) {
-  const std::string text = FindingsOf(
+  const std::string text = SyntaxFindings(
       "name: a\n"
       "description: |\n"
       "  a [ { \" '\n"
@@ -73,7 +73,7 @@ TEST(YamlSyntax, WhatTheFileSaysInsideTextIsNoCause) {
 }
 
 TEST(YamlSyntax, AnEntryBesideItsSectionIsToldToBeIndented) {
-  const std::string text = FindingsOf(
+  const std::string text = SyntaxFindings(
       "name: a\nbodies: {bar: {mass: 1, inertia: [1, 1, 1]}}\n"
       "joints:\npivot: {kind: fixed, parent: world, child: bar}\n");
   EXPECT_NE(text.find("unknown key 'pivot'\n  hint: if it belongs into 'joints', indent it deeper"),
@@ -82,7 +82,7 @@ TEST(YamlSyntax, AnEntryBesideItsSectionIsToldToBeIndented) {
 }
 
 TEST(YamlSyntax, AKeyOfAnEntryBesideItIsToldToBeIndented) {
-  const std::string text = FindingsOf("name: a\nbodies:\n  bar:\n  mass: 1\n");
+  const std::string text = SyntaxFindings("name: a\nbodies:\n  bar:\n  mass: 1\n");
   EXPECT_NE(text.find("'mass' belongs into an entry of bodies: indent it deeper"),
             std::string::npos)
       << text;
@@ -90,7 +90,7 @@ TEST(YamlSyntax, AKeyOfAnEntryBesideItIsToldToBeIndented) {
 
 TEST(YamlSyntax, AnEntryInsideAnotherIsToldToBeIndentedLess) {
   const std::string text =
-      FindingsOf("name: a\nbodies:\n  bar:\n    mass: 1\n    rod:\n      mass: 1\n");
+      SyntaxFindings("name: a\nbodies:\n  bar:\n    mass: 1\n    rod:\n      mass: 1\n");
   EXPECT_NE(text.find("bodies.bar: unknown key 'rod'\n  hint: it looks like another entry of the "
                       "level above: indent it less"),
             std::string::npos)

@@ -11,7 +11,7 @@ ConvergeOutcome Study(const std::string& scenario, ConvergeOptions options = {})
   return Converge(std::string(kSourceDir) + "/scenarios/" + scenario + ".yaml", options);
 }
 
-const ConvergenceSeries& Find(const ConvergeOutcome& outcome, const std::string& name) {
+const ConvergenceSeries& FindSeries(const ConvergeOutcome& outcome, const std::string& name) {
   for (const ConvergenceSeries& series : outcome.report.series) {
     if (series.name == name) return series;
   }
@@ -24,15 +24,15 @@ TEST(Converge, OnTheSliderCrankEachSchemeShowsItsOrder) {
   EXPECT_EQ(outcome.report.series.size(), 6u);
   for (const char* name :
        {"corrected_both", "corrected_step", "stock_both", "stock_step", "stock_time_constant"}) {
-    EXPECT_TRUE(Find(outcome, name).verdict.judged) << name;
+    EXPECT_TRUE(FindSeries(outcome, name).verdict.judged) << name;
   }
   // Half an order apart from the neighbours is what tells them apart.
-  EXPECT_NEAR(Find(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
-  EXPECT_NEAR(Find(outcome, "stock_step").fit.order, 1.0, kOrderTolerance);
-  EXPECT_NEAR(Find(outcome, "stock_time_constant").fit.order, 2.0, kOrderTolerance);
+  EXPECT_NEAR(FindSeries(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
+  EXPECT_NEAR(FindSeries(outcome, "stock_step").fit.order, 1.0, kOrderTolerance);
+  EXPECT_NEAR(FindSeries(outcome, "stock_time_constant").fit.order, 2.0, kOrderTolerance);
   // The study is not a list of zeros: the stock engine is that far off, the corrected one is not.
-  EXPECT_GT(Find(outcome, "stock_both").points.back().error.smooth, 1e-8);
-  EXPECT_LT(Find(outcome, "corrected_both").points.back().error.smooth, 1e-10);
+  EXPECT_GT(FindSeries(outcome, "stock_both").points.back().error.smooth, 1e-8);
+  EXPECT_LT(FindSeries(outcome, "corrected_both").points.back().error.smooth, 1e-10);
   const ForceExtrapolation& e = outcome.report.extrapolation;
   EXPECT_TRUE(e.pass);
   ASSERT_EQ(e.drives.size(), 1u);
@@ -45,17 +45,17 @@ TEST(Converge, BreaksOfTheMotionAreKeptApart) {
   EXPECT_EQ(outcome.exit_code, 0) << outcome.failure;
   EXPECT_EQ(outcome.report.breaks, 4u);
   EXPECT_LT(outcome.report.smooth_samples, outcome.report.samples);
-  EXPECT_NEAR(Find(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
+  EXPECT_NEAR(FindSeries(outcome, "corrected_both").fit.order, 4.0, kOrderTolerance);
   // The Runge–Kutta steps after a break are as good as the others.
-  EXPECT_NEAR(Find(outcome, "corrected_both").breaks_fit.order, 4.0, kOrderTolerance);
+  EXPECT_NEAR(FindSeries(outcome, "corrected_both").breaks_fit.order, 4.0, kOrderTolerance);
 }
 
 TEST(Converge, AtRestThereIsNothingButRoundOff) {
   for (const char* scenario : {"cabin_robot/static", "spr_tripod/static"}) {
     const ConvergeOutcome outcome = Study(scenario);
     EXPECT_EQ(outcome.exit_code, 0) << scenario << outcome.failure;
-    EXPECT_FALSE(Find(outcome, "corrected_both").verdict.judged) << scenario;
-    for (const ConvergencePoint& point : Find(outcome, "corrected_both").points) {
+    EXPECT_FALSE(FindSeries(outcome, "corrected_both").verdict.judged) << scenario;
+    for (const ConvergencePoint& point : FindSeries(outcome, "corrected_both").points) {
       EXPECT_LT(point.error.smooth, 1e-12) << scenario << " " << point.step_s;
       EXPECT_LT(point.error.breaks, 1e-12) << scenario << " " << point.step_s;
     }
@@ -72,9 +72,9 @@ TEST(Converge, AMotionTooFastForATimeConstantEndsInAFinding) {
   const ConvergeOutcome outcome = Study("slider_crank/turn", options);
   EXPECT_EQ(outcome.exit_code, 1) << outcome.failure << outcome.diagnostics.Text();
   EXPECT_TRUE(outcome.report.finding());
-  EXPECT_TRUE(Find(outcome, "stock_time_constant").verdict.finding);
+  EXPECT_TRUE(FindSeries(outcome, "stock_time_constant").verdict.finding);
   // The corrected engine keeps its order, so the finding is of that series alone.
-  EXPECT_FALSE(Find(outcome, "corrected_both").verdict.finding);
+  EXPECT_FALSE(FindSeries(outcome, "corrected_both").verdict.finding);
   EXPECT_TRUE(outcome.report.extrapolation.pass);
 }
 

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 std::string Shipped(const std::string& name) { return SourcePath("/scenarios/" + name + ".yaml"); }
 
-std::string ReadText(const fs::path& path) {
+std::string TextOf(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -41,8 +41,8 @@ struct Folder {
   }
 };
 
-RunOutcome RunFile(const std::string& file, std::vector<SetValue> set = {},
-                   const std::string& out = "") {
+RunOutcome RunScenarioFile(const std::string& file, std::vector<SetValue> set = {},
+                           const std::string& out = "") {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = std::move(set);
@@ -58,8 +58,8 @@ bool Has(const std::string& text, const std::string& part) {
 void ExpectSaidEverywhere(const RunOutcome& outcome, const std::string& part) {
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_TRUE(Has(ToTable(*outcome.report, {}), part)) << ToTable(*outcome.report, {});
-  EXPECT_TRUE(Has(ReadText(fs::path(outcome.folder) / "summary.json"), part));
-  EXPECT_TRUE(Has(ReadText(fs::path(outcome.folder) / "report.html"), part));
+  EXPECT_TRUE(Has(TextOf(fs::path(outcome.folder) / "summary.json"), part));
+  EXPECT_TRUE(Has(TextOf(fs::path(outcome.folder) / "report.html"), part));
 }
 
 // An arm turned by a prescribed hinge and a leg: one of them would do.
@@ -87,16 +87,16 @@ TEST(Doubts, ForcesThatMuJoCoFindsNotUniqueAreNamed) {
       "lean.yaml",
       "mechanism: held_twice.yaml\nmotion: {duration_s: 1, sample_s: 0.02, commands: {lean: {sine: "
       "{amplitude: 0.2, period_s: 1}}}}\nanalytic: none\nsimulation: {mode: inverse}\n");
-  const RunOutcome outcome = RunFile(scenario, {}, (folder.path / "out").string());
+  const RunOutcome outcome = RunScenarioFile(scenario, {}, (folder.path / "out").string());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.report->simulated_not_unique, (std::vector<std::string>{"leg", "lean"}));
   ExpectSaidEverywhere(outcome, "the forces of leg, lean are not unique");
-  const auto json = nlohmann::json::parse(ReadText(fs::path(outcome.folder) / "summary.json"));
+  const auto json = nlohmann::json::parse(TextOf(fs::path(outcome.folder) / "summary.json"));
   EXPECT_EQ(json["simulation"]["forces_not_unique"].size(), 2u);
 }
 
 TEST(Doubts, UniqueForcesRaiseNone) {
-  const RunOutcome outcome = RunFile(Shipped("four_bar/turn_inverse"));
+  const RunOutcome outcome = RunScenarioFile(Shipped("four_bar/turn_inverse"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_TRUE(outcome.report->simulated_not_unique.empty());
   EXPECT_TRUE(outcome.report->findings.empty()) << outcome.report->findings.Text();
@@ -104,7 +104,7 @@ TEST(Doubts, UniqueForcesRaiseNone) {
 
 TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
   const Folder folder("disturbed");
-  std::string model = ReadText(SourcePath("/models/four_bar/model.yaml"));
+  std::string model = TextOf(SourcePath("/models/four_bar/model.yaml"));
   // Links in one line, folded back: no small motion narrows the gap.
   const auto replace = [&](const std::string& from, const std::string& to) {
     ASSERT_TRUE(Has(model, from));
@@ -118,14 +118,14 @@ TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
       folder.Write("still.yaml",
                    "mechanism: disturbed.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: "
                    "{motor: home}}\nanalytic: none\nsimulation: {mode: inverse}\n");
-  const RunOutcome outcome = RunFile(scenario, {}, (folder.path / "out").string());
+  const RunOutcome outcome = RunScenarioFile(scenario, {}, (folder.path / "out").string());
   ExpectSaidEverywhere(outcome, "the loops close only from disturbed guesses");
 }
 
 TEST(Doubts, TheDriverIsNamedEverywhere) {
   const Folder folder("driver");
   const RunOutcome outcome =
-      RunFile(Shipped("spr_tripod/default_inverse"), {}, folder.path.string());
+      RunScenarioFile(Shipped("spr_tripod/default_inverse"), {}, folder.path.string());
   ExpectSaidEverywhere(outcome,
                        "ommanded in task space, the simulation follows the drive positions, rates "
                        "and accelerations that the closed form computes");
@@ -133,7 +133,8 @@ TEST(Doubts, TheDriverIsNamedEverywhere) {
 }
 
 TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
-  const RunOutcome outcome = RunFile(Shipped("spring_cart/swing"), {{"simulation.step_s", "0.01"}});
+  const RunOutcome outcome =
+      RunScenarioFile(Shipped("spring_cart/swing"), {{"simulation.step_s", "0.01"}});
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Comparison& comparison = outcome.report->comparison;
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
@@ -143,7 +144,7 @@ TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
 }
 
 TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
-  const RunOutcome outcome = RunFile(Shipped("spring_cart/must_fail/stiffer_spring"));
+  const RunOutcome outcome = RunScenarioFile(Shipped("spring_cart/must_fail/stiffer_spring"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const Attribution& attribution = outcome.report->comparison.attribution;
   EXPECT_FALSE(Has(attribution.text, "step_s")) << attribution.text;
@@ -152,7 +153,7 @@ TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
 
 // A free motion against a table of it: solver and simulation stand together against a wrong one.
 TEST(Doubts, InFreeMotionTwoComputationsStandAgainstATable) {
-  const RunOutcome run = RunFile(Shipped("spring_cart/swing"));
+  const RunOutcome run = RunScenarioFile(Shipped("spring_cart/swing"));
   ASSERT_TRUE(run.report) << run.diagnostics.Text();
   const Trace& trace = run.report->witnesses[1].trace;
   ASSERT_EQ(trace.witness, "reference");
@@ -165,9 +166,9 @@ TEST(Doubts, InFreeMotionTwoComputationsStandAgainstATable) {
       table += fmt::format("{:.17g},{:.17g}\n", t, x + off * std::sin(t));
     }
     const std::string csv = folder.Write("cart.csv", table);
-    const RunOutcome outcome =
-        RunFile(Shipped("spring_cart/swing"),
-                {{"reference", "{csv: '" + csv + "', columns: {time: t, motor.position: x}}"}});
+    const RunOutcome outcome = RunScenarioFile(
+        Shipped("spring_cart/swing"),
+        {{"reference", "{csv: '" + csv + "', columns: {time: t, motor.position: x}}"}});
     ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
     const Comparison& comparison = outcome.report->comparison;
     if (off == 0.0) {
@@ -200,7 +201,7 @@ std::string GravityDoubtOf(double g, double density, Verdict* verdict) {
         fmt::format("{:.17g},{:.17g}\n", run.trace.time_s[i],
                     run.trace.values(static_cast<Eigen::Index>(i), run.trace.Find("motor.force")));
   }
-  const RunOutcome outcome = RunFile(
+  const RunOutcome outcome = RunScenarioFile(
       Shipped("four_bar/turn"),
       {{"reference", "{csv: '" + folder.Write("torque.csv", table) +
                          "', columns: {time: t, motor.force: T}, tolerance: {relative: 1e-3}}"}});

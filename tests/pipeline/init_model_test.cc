@@ -17,7 +17,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string ReadText(const fs::path& path) {
+std::string WrittenText(const fs::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::stringstream text;
   text << stream.rdbuf();
@@ -71,7 +71,7 @@ TEST_F(InitModelTest, AStarterIsTheShippedModelWithComments) {
       if (!line.starts_with("#")) plain += line + "\n";
     }
     EXPECT_EQ(plain,
-              ReadText(std::string(kSourceDir) + "/models/" + starter.name + "/model.yaml"));
+              WrittenText(std::string(kSourceDir) + "/models/" + starter.name + "/model.yaml"));
   }
 }
 
@@ -79,7 +79,7 @@ TEST_F(InitModelTest, WhatIsCommentedOutInAScenarioLoadsToo) {
   for (const Starter& starter : Starters()) {
     const InitResult result = Init("mine_" + std::string(starter.name), starter.name);
     ASSERT_EQ(result.files.size(), 2u);
-    const std::string first = ReadText(result.files[1]);
+    const std::string first = WrittenText(result.files[1]);
     // Loads and the table; a command that stands instead of the drive's.
     std::string text = std::regex_replace(first, std::regex("# (loads|reference): "), "$1: ");
     EXPECT_NE(text, first);
@@ -103,7 +103,7 @@ TEST_F(InitModelTest, NothingIsOverwritten) {
   EXPECT_TRUE(again.files.empty());
   EXPECT_EQ(again.diagnostics.findings().size(), 2u) << again.diagnostics.Text();
   EXPECT_NE(again.diagnostics.Text().find("already there"), std::string::npos);
-  EXPECT_EQ(ReadText(model), "my work\n");
+  EXPECT_EQ(WrittenText(model), "my work\n");
 }
 
 TEST_F(InitModelTest, WithOneOfTheTwoInTheWayNeitherIsWritten) {

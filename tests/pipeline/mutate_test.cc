@@ -48,7 +48,7 @@ long CountOf(const MutationReport& report, NumberKind kind) {
                        [kind](const Mutation& m) { return m.kind == kind; });
 }
 
-const Mutation* Find(const MutationReport& report, const std::string& name) {
+const Mutation* FindMutation(const MutationReport& report, const std::string& name) {
   for (const Mutation& m : report.mutations) {
     if (m.name == name) return &m;
   }
@@ -80,7 +80,7 @@ TEST(Mutate, OnTheTripodOnlyWhatCannotActStaysUnseen) {
             }));
   // Home and the strokes that define it turn the axes in which reactions are reported.
   for (const char* name : {"q_home", "z_home", "q_min", "q_max"}) {
-    const Mutation* m = Find(report, name);
+    const Mutation* m = FindMutation(report, name);
     ASSERT_NE(m, nullptr) << name;
     EXPECT_FALSE(m->own.by_force) << name;
     EXPECT_EQ(m->own.best_check, "simulated_vs_analytic.reaction_nrmse") << name;
@@ -103,12 +103,12 @@ TEST(Mutate, OnTheScaraRobotOnlyWhatCannotActStaysUnseen) {
                                 }));
   // A flat bar's inertias obey x = y + z; x alone may become smaller only, y alone hardly larger.
   for (const char* name : {"I_bar_x", "I_bar_y"}) {
-    const Mutation* bar = Find(report, name);
+    const Mutation* bar = FindMutation(report, name);
     ASSERT_NE(bar, nullptr) << name;
     EXPECT_TRUE(bar->own.ran) << name;
     EXPECT_EQ(bar->proved_to, kLargestBend) << bar->reason;
   }
-  EXPECT_EQ(Find(report, "I_bar_x")->own.only, "smaller");
+  EXPECT_EQ(FindMutation(report, "I_bar_x")->own.only, "smaller");
 }
 
 TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
@@ -178,13 +178,13 @@ TEST(Mutate, AFinerResolutionNarrowsTheSearch) {
 TEST(Mutate, ParametersThatAreZeroAreBentByAShareOfTheirLike) {
   const MutationReport report = Mutate(
       "spr_tripod/default_inverse", {.size = 1e-3, .numbers = {"phi_3", "m_rod"}, .progress = {}});
-  const Mutation* zero = Find(report, "phi_3");
+  const Mutation* zero = FindMutation(report, "phi_3");
   ASSERT_NE(zero, nullptr);
   EXPECT_EQ(zero->value, 0.0);
   EXPECT_NEAR(zero->relative_to, 150.0 / 180.0 * 3.14159265358979, 1e-12);  // theta_2
   EXPECT_TRUE(zero->own.by_force);
   EXPECT_NE(ToText(report, false).find("relative to 2.61799 rad; "), std::string::npos);
-  const Mutation* other = Find(report, "m_rod");
+  const Mutation* other = FindMutation(report, "m_rod");
   ASSERT_NE(other, nullptr);
   EXPECT_EQ(other->relative_to, other->value);
 }
@@ -207,14 +207,14 @@ TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
     EXPECT_NE(m.reason.find("10 % too large changes no drive force"), std::string::npos)
         << m.reason;
   }
-  const Mutation* inertia = Find(report, "I_platform_zz");
+  const Mutation* inertia = FindMutation(report, "I_platform_zz");
   ASSERT_NE(inertia, nullptr);
   EXPECT_NE(
       inertia->reason.find("it changes the inertia of platform; the motion calls for the same "
                            "inertia forces"),
       std::string::npos)
       << inertia->reason;
-  const Mutation* tool = Find(report, "tool_z");
+  const Mutation* tool = FindMutation(report, "tool_z");
   ASSERT_NE(tool, nullptr);
   EXPECT_NE(tool->reason.find("no mass, joint, drive or output depends on it"), std::string::npos);
 }
@@ -358,12 +358,12 @@ TEST(Mutate, NumbersOfInstancesAndNumbersWrittenInPlaceAreBent) {
         std::pair{"leg6.top", NumberKind::kInstance},
         std::pair{"parts.leg.bodies.cyl.inertia[0]", NumberKind::kLiteral},
         std::pair{"parts.leg.bodies.rod.inertia[2]", NumberKind::kLiteral}}) {
-    const Mutation* m = Find(report, name);
+    const Mutation* m = FindMutation(report, name);
     ASSERT_NE(m, nullptr) << name;
     EXPECT_EQ(m->kind, kind) << name;
     EXPECT_TRUE(m->own.by_force) << name;
   }
-  EXPECT_EQ(Find(report, "parts.leg.bodies.rod.inertia[2]")->unit, "kg m^2");
+  EXPECT_EQ(FindMutation(report, "parts.leg.bodies.rod.inertia[2]")->unit, "kg m^2");
   // Ranges and pictures are no numbers that could act; zeros are structure.
   for (const Mutation& m : report.mutations) {
     EXPECT_EQ(m.name.find("range"), std::string::npos) << m.name;

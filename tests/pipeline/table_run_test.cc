@@ -12,11 +12,11 @@
 namespace mbv {
 namespace {
 
-std::string Scenario(const std::string& name) {
+std::string TableScenario(const std::string& name) {
   return std::string(kSourceDir) + "/scenarios/" + name + ".yaml";
 }
 
-std::string ReadText(const std::filesystem::path& path) {
+std::string ResultText(const std::filesystem::path& path) {
   std::ifstream stream(path, std::ios::binary);
   std::stringstream text;
   text << stream.rdbuf();
@@ -32,7 +32,7 @@ RunOptions WithoutPictures(std::vector<SetValue> set = {}, const std::string& ou
 }
 
 TEST(TableRun, WithoutClosedFormTheSolverTakesPartUnderItsOwnName) {
-  const RunOutcome outcome = RunScenario(Scenario("four_bar/table_adams"), WithoutPictures());
+  const RunOutcome outcome = RunScenario(TableScenario("four_bar/table_adams"), WithoutPictures());
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 0);
   EXPECT_EQ(outcome.report->driven_by, "solver");
@@ -45,8 +45,8 @@ TEST(TableRun, WithoutClosedFormTheSolverTakesPartUnderItsOwnName) {
 }
 
 TEST(TableRun, WithAClosedFormTheTableIsJudgedByIt) {
-  const RunOutcome outcome =
-      RunScenario(Scenario("spr_tripod/table"), WithoutPictures({{"analytic", "{model: full}"}}));
+  const RunOutcome outcome = RunScenario(TableScenario("spr_tripod/table"),
+                                         WithoutPictures({{"analytic", "{model: full}"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 0) << outcome.report->comparison.reason;
   EXPECT_EQ(outcome.report->driven_by, "analytic");
@@ -60,7 +60,7 @@ TEST(TableRun, WithAClosedFormTheTableIsJudgedByIt) {
 }
 
 TEST(TableRun, AParameterThatIsOnePercentOffIsSeenThroughTheTable) {
-  const RunOutcome outcome = RunScenario(Scenario("four_bar/table_matlab"),
+  const RunOutcome outcome = RunScenario(TableScenario("four_bar/table_matlab"),
                                          WithoutPictures({{"parameters", "{rho: 2.02}"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 1);
@@ -71,7 +71,7 @@ TEST(TableRun, AParameterThatIsOnePercentOffIsSeenThroughTheTable) {
 }
 
 TEST(TableRun, ATableOutsideTheMotionIsNotRunAndSaysSo) {
-  const RunOutcome outcome = RunScenario(Scenario("four_bar/table_adams"),
+  const RunOutcome outcome = RunScenario(TableScenario("four_bar/table_adams"),
                                          WithoutPictures({{"reference.time_offset_s", "100"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 3);
@@ -85,7 +85,7 @@ TEST(TableRun, ATableOutsideTheMotionIsNotRunAndSaysSo) {
 
 TEST(TableRun, ATableOfAnotherMotionIsSaidToBe) {
   const RunOutcome outcome = RunScenario(
-      Scenario("four_bar/table_matlab"),
+      TableScenario("four_bar/table_matlab"),
       WithoutPictures(
           {{"motion.commands.motor", "[\"pi/2\", {cycloid: {duration_s: 2, delta: pi}}]"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
@@ -97,7 +97,7 @@ TEST(TableRun, ATableOfAnotherMotionIsSaidToBe) {
 
 TEST(TableRun, DurationAndSamplesFollowTheTableWhereTheyAreLeftOut) {
   const RunOutcome outcome =
-      RunScenario(Scenario("four_bar/table_noisy"),
+      RunScenario(TableScenario("four_bar/table_noisy"),
                   WithoutPictures({{"motion",
                                     "{commands: {motor: [\"pi/2\", {cycloid: {duration_s: 2, "
                                     "delta: 2*pi}}]}}"}}));
@@ -111,10 +111,10 @@ TEST(TableRun, FilesHoldTheTableItsTubeAndItsGaps) {
   const auto out = std::filesystem::temp_directory_path() / "mbv_table_run";
   std::filesystem::remove_all(out);
   const RunOutcome outcome =
-      RunScenario(Scenario("four_bar/table_adams"), WithoutPictures({}, out.string()));
+      RunScenario(TableScenario("four_bar/table_adams"), WithoutPictures({}, out.string()));
   ASSERT_EQ(outcome.exit_code, 0);
   const std::filesystem::path folder = outcome.folder;
-  const auto json = nlohmann::json::parse(ReadText(folder / "summary.json"));
+  const auto json = nlohmann::json::parse(ResultText(folder / "summary.json"));
   const auto& table = json["reference_table"];
   EXPECT_EQ(table["name"], "adams.tab");
   EXPECT_EQ(table["judged_against"], "solver");
@@ -133,7 +133,7 @@ TEST(TableRun, FilesHoldTheTableItsTubeAndItsGaps) {
   for (const auto& check : json["checks"]) widened = widened || check.contains("stated_limit");
   EXPECT_TRUE(widened);
   // Every second sample has a row: one number, one gap.
-  std::istringstream csv(ReadText(folder / "traces.csv"));
+  std::istringstream csv(ResultText(folder / "traces.csv"));
   std::string head, first, second;
   std::getline(csv, head);
   std::getline(csv, first);
@@ -141,7 +141,7 @@ TEST(TableRun, FilesHoldTheTableItsTubeAndItsGaps) {
   ASSERT_NE(head.find("motor.force.reference"), std::string::npos) << head;
   EXPECT_EQ(first.find("nan"), std::string::npos) << first;
   EXPECT_NE(second.find("nan"), std::string::npos) << second;
-  const std::string page = ReadText(folder / "report.html");
+  const std::string page = ResultText(folder / "report.html");
   for (const char* text : {"The table in the reference's place",
                            "Columns of adams.tab against "
                            "solver",

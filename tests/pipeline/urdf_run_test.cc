@@ -34,7 +34,7 @@ std::string Write(const fs::path& file, const std::string& text) {
 }
 
 // All drives swing about home, what is prescribed stays there.
-std::string Scenario(const std::string& model, const Mechanism& mechanism, double amplitude) {
+std::string UrdfScenario(const std::string& model, const Mechanism& mechanism, double amplitude) {
   std::string text = fmt::format(
       "mechanism: {}\nmotion:\n  duration_s: 1\n  sample_s: 0.05\n"
       "  commands:\n",
@@ -74,10 +74,10 @@ TEST_P(ExportedModel, RunsAgainWithTheSameDriveForces) {
   RunOptions options;
   options.pictures = false;
   const RunOutcome before = RunScenario(
-      Write(folder / "before.yaml", Scenario(shipped, *loaded.mechanism, GetParam().amplitude)),
+      Write(folder / "before.yaml", UrdfScenario(shipped, *loaded.mechanism, GetParam().amplitude)),
       options);
   const RunOutcome after = RunScenario(
-      Write(folder / "after.yaml", Scenario(model, *back.mechanism, GetParam().amplitude)),
+      Write(folder / "after.yaml", UrdfScenario(model, *back.mechanism, GetParam().amplitude)),
       options);
   for (const char* witness : {"reference", "simulated"}) {
     const Trace a = TraceOf(before, witness), b = TraceOf(after, witness);

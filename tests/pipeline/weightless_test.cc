@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-RunOutcome RunOf(const std::string& scenario, std::vector<SetValue> set) {
+RunOutcome RunWeightless(const std::string& scenario, std::vector<SetValue> set) {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = std::move(set);
@@ -42,7 +42,7 @@ TEST(Weightless, NoStaticScenarioDisagrees) {
     const std::regex gravity(R"(\ngravity: *\[[^\]]*\])");
     const fs::path model = folder / name / "model.yaml";
     std::ofstream(model) << std::regex_replace(text, gravity, "\n") << "\ngravity: [0, 0, 0]\n";
-    const RunOutcome outcome = RunOf(name + "/static", {{"mechanism", model.string()}});
+    const RunOutcome outcome = RunWeightless(name + "/static", {{"mechanism", model.string()}});
     ASSERT_TRUE(outcome.report) << name << ": " << outcome.diagnostics.Text();
     // Where nothing pushes either, nothing is verified; nothing may be found wrong.
     const Comparison& comparison = outcome.report->comparison;
@@ -52,7 +52,7 @@ TEST(Weightless, NoStaticScenarioDisagrees) {
     ++ran;
   }
   EXPECT_GE(ran, 7U);
-  EXPECT_NE(RunOf("cabin_robot/static", {{"parameters", "{g: 0}"}}).exit_code, 1);
+  EXPECT_NE(RunWeightless("cabin_robot/static", {{"parameters", "{g: 0}"}}).exit_code, 1);
 }
 
 }  // namespace

@@ -8,7 +8,7 @@
 namespace mbv {
 namespace {
 
-using namespace ::mbv::testing;
+using namespace ::mbv::fixtures;
 using std::cos;
 using std::sin;
 
@@ -260,8 +260,8 @@ TEST(Reference, SpringDamperAndGravityPowersHaveTheirSigns) {
     EXPECT_NEAR(At(run.trace, row, "motor.force"), torque, 1e-8);  // by differences
     EXPECT_NEAR(At(run.trace, row, "power.springs"), -pull * dL * q.rate, 1e-11);
     EXPECT_NEAR(At(run.trace, row, "power.dampers"), -drag * dL * q.rate, 1e-11);
-    EXPECT_NEAR(At(run.trace, row, "power.gravity"),
-                -FourBar::Torque(q.value, 0.0, 0.0) * q.rate, 1e-8);
+    EXPECT_NEAR(At(run.trace, row, "power.gravity"), -FourBar::Torque(q.value, 0.0, 0.0) * q.rate,
+                1e-8);
     EXPECT_NEAR(At(run.trace, row, "energy.gravity"), FourBar(q.value).V(), 1e-11);
     EXPECT_NEAR(At(run.trace, row, "energy.springs"), 100.0 * (L - 0.3) * (L - 0.3), 1e-11);
   }

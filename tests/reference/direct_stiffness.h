@@ -12,7 +12,7 @@
 #include "mechanism/constraints.h"
 #include "mechanism/mechanism.h"
 
-namespace mbv::testing {
+namespace mbv::fixtures {
 
 /// Forces [f_a; m_a; f_b; m_b] per displacements [u_a; θ_a; u_b; θ_b] in beam axes.
 inline Eigen::Matrix<double, 12, 12> TextbookBeam(const Beam& beam) {
@@ -146,4 +146,4 @@ class DirectStiffness {
   MatX K_;
 };
 
-}  // namespace mbv::testing
+}  // namespace mbv::fixtures

@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kDeg = std::numbers::pi / 180.0;
 // Relative, of solutions with condition numbers up to 1e5.
-constexpr double kAlgebra = 1e6 * kEps;
+constexpr double kRobotAlgebra = 1e6 * kEps;
 // Relative, against the displacement method, which loses digits to its stiff members.
 constexpr double kDirect = 1e-8;
 
@@ -177,7 +177,7 @@ TEST(ElasticScara, HasTheTabulatedIndicesInTheCentreWhereItsYawIsFree) {
     EXPECT_EQ(result.summary.stop, Stop::kSingular);
     EXPECT_NEAR(Kappa(result.K, 0), at.kappa_m, 0.51);
     EXPECT_NEAR(Kappa(result.K, 3), at.kappa_f, at.half_digit);
-    EXPECT_LT(std::abs(result.K(2, 2)), kAlgebra * result.K.norm());
+    EXPECT_LT(std::abs(result.K(2, 2)), kRobotAlgebra * result.K.norm());
   }
 }
 
@@ -195,7 +195,7 @@ TEST(ElasticScara, IsTheSumOfItsLimbsOfRankTwoAndOne) {
     EXPECT_EQ(result.rank, limb < 2 ? 2 : 1);
     sum += result.K;
   }
-  EXPECT_LT(RelativeDifference(sum, FrameStiffness(m, X_WB, 0).K), kAlgebra);
+  EXPECT_LT(RelativeDifference(sum, FrameStiffness(m, X_WB, 0).K), kRobotAlgebra);
 }
 
 TEST(ElasticScara, WithRigidLinksIsHeldByItsServosThroughTheJacobian) {
@@ -232,7 +232,7 @@ TEST(ElasticScara, WithItsCrossBarsIsSlightlySofter) {
   const Mat6 rpar = StiffnessAt(LoadShipped("scara_robot/elastic.yaml"), kTabulated).K;
   const Mat6 balls = StiffnessAt(LoadShipped("scara_robot/elastic_crossbar.yaml"), kTabulated).K;
   EXPECT_GT(Eigen::SelfAdjointEigenSolver<Mat6>(rpar - balls).eigenvalues()[0],
-            -kAlgebra * rpar.norm())
+            -kRobotAlgebra * rpar.norm())
       << "releasing the rods' ends cannot stiffen";
   EXPECT_GT(RelativeDifference(balls, rpar), 4e-4);
   EXPECT_LT(RelativeDifference(balls, rpar), 3.2e-2);
@@ -248,7 +248,7 @@ TEST(ElasticScara, MirrorsAtThePlaneBetweenLimbs1And2) {
   Mat6 mirror = Mat6::Zero();
   mirror.topLeftCorner<3, 3>() = -swap;  // rotations are axial vectors
   mirror.bottomRightCorner<3, 3>() = swap;
-  EXPECT_LT(RelativeDifference(K_mirrored, mirror * K * mirror), kAlgebra);
+  EXPECT_LT(RelativeDifference(K_mirrored, mirror * K * mirror), kRobotAlgebra);
 }
 
 TEST(ElasticCabin, HasTheTabulatedComplianceAndFirstDisplacement) {
@@ -299,7 +299,7 @@ TEST(ElasticCabin, ServosWithComplianceAddToTheLockedOnes) {
   // Serial: th3 turns about world y through the column, 0.545 m in front of which the tool is.
   Vec6 turn;
   turn << 0, 1, 0, Vec3::UnitY().cross(Vec3(0, 0.461, -0.545));
-  EXPECT_LT(RelativeDifference(C - locked, 1e-6 * turn * turn.transpose()), kAlgebra);
+  EXPECT_LT(RelativeDifference(C - locked, 1e-6 * turn * turn.transpose()), kRobotAlgebra);
 }
 
 // Laws on every model and pose.
@@ -393,7 +393,7 @@ TEST(ElasticRobots, DoNotDependOnWhereTheyStand) {
     turn.topLeftCorner<3, 3>() = turn.bottomRightCorner<3, 3>() = X.linear();
     const Mat6 C = FrameStiffness(s.mechanism, s.X_WB, s.output).C;
     const Mat6 C_moved = FrameStiffness(moved, X_WB, s.output).C;
-    EXPECT_LT(RelativeDifference(C_moved, turn * C * turn.transpose()), kAlgebra) << s.name;
+    EXPECT_LT(RelativeDifference(C_moved, turn * C * turn.transpose()), kRobotAlgebra) << s.name;
   }
 }
 

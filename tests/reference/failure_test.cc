@@ -8,7 +8,7 @@
 namespace mbv {
 namespace {
 
-using namespace ::mbv::testing;
+using namespace ::mbv::fixtures;
 
 TEST(ReferenceFailure, ARockerCommandedBeyondItsReachIsUnreachable) {
   Mechanism m = MakeFourBar();

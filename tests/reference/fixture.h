@@ -9,7 +9,7 @@
 #include "reference/reference.h"
 #include "tests/simulation/test_mechanisms.h"
 
-namespace mbv::testing {
+namespace mbv::fixtures {
 
 inline Command Commanded(const std::string& name, Coordinate::Kind kind, int index, int component,
                          Profile profile) {
@@ -60,4 +60,4 @@ inline Eigen::VectorXd ColumnOf(const Trace& trace, const std::string& channel) 
   return trace.values.col(column);
 }
 
-}  // namespace mbv::testing
+}  // namespace mbv::fixtures

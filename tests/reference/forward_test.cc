@@ -9,7 +9,7 @@
 
 #include "tests/reference/fixture.h"
 
-namespace mbv::testing {
+namespace mbv::fixtures {
 namespace {
 
 // A point that slides along x on a spring to the origin's left; free length 0.4 m.
@@ -236,4 +236,4 @@ TEST(Forward, APendulumReturnsAfterThePeriodOfTheEllipticIntegral) {
 }
 
 }  // namespace
-}  // namespace mbv::testing
+}  // namespace mbv::fixtures

@@ -12,7 +12,7 @@
 namespace mbv {
 namespace {
 
-using namespace ::mbv::testing;
+using namespace ::mbv::fixtures;
 
 constexpr double kDegree = std::numbers::pi / 180;
 

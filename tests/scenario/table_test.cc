@@ -17,8 +17,8 @@
 #include "scenario/table_noise.h"
 #include "scenario/table_settings.h"
 #include "scenario/table_units.h"
-#include "tests/two_sliders.h"
 #include "tests/source_dir.h"
+#include "tests/two_sliders.h"
 
 namespace mbv {
 namespace {
@@ -32,7 +32,7 @@ struct Loaded {
 };
 
 // `yaml` is what stands below `reference:`.
-Loaded Load(const std::string& csv, const std::string& yaml = "{csv: t.csv}") {
+Loaded LoadTable(const std::string& csv, const std::string& yaml = "{csv: t.csv}") {
   YamlReader reader("s.yaml");
   const YamlNodePtr root = reader.Parse(yaml);
   EXPECT_NE(root, nullptr) << yaml;
@@ -71,73 +71,79 @@ void ExpectTheTable(const Loaded& loaded) {
 }
 
 TEST(Table, CommasAreFound) {
-  ExpectTheTable(Load("t,d1.force,d2.force\n0,1,10\n0.5,2.5,11\n1,-3,12\n1.5,4,13\n"));
+  ExpectTheTable(LoadTable("t,d1.force,d2.force\n0,1,10\n0.5,2.5,11\n1,-3,12\n1.5,4,13\n"));
 }
 
 TEST(Table, TabsAreFound) {
-  ExpectTheTable(Load("t\td1.force\td2.force\n0\t1\t10\n0.5\t2.5\t11\n1\t-3\t12\n1.5\t4\t13\n"));
+  ExpectTheTable(
+      LoadTable("t\td1.force\td2.force\n0\t1\t10\n0.5\t2.5\t11\n1\t-3\t12\n1.5\t4\t13\n"));
 }
 
 TEST(Table, SemicolonsAndDecimalCommasAreFound) {
-  ExpectTheTable(Load("t;d1.force;d2.force\n0;1;10\n0,5;2,5;11\n1;-3;12\n1,5;4;13\n"));
+  ExpectTheTable(LoadTable("t;d1.force;d2.force\n0;1;10\n0,5;2,5;11\n1;-3;12\n1,5;4;13\n"));
 }
 
 TEST(Table, BlanksAreFound) {
-  ExpectTheTable(Load("  t  d1.force d2.force\n 0 1 10\n 0.5  2.5  11\n 1 -3 12 \n 1.5 4 13\n"));
+  ExpectTheTable(
+      LoadTable("  t  d1.force d2.force\n 0 1 10\n 0.5  2.5  11\n 1 -3 12 \n 1.5 4 13\n"));
 }
 
 TEST(Table, TabsMayCarryDecimalCommas) {
-  ExpectTheTable(Load("t\td1.force\td2.force\n0\t1\t10\n0,5\t2,5\t11\n1\t-3\t12\n1,5\t4\t13\n"));
+  ExpectTheTable(
+      LoadTable("t\td1.force\td2.force\n0\t1\t10\n0,5\t2,5\t11\n1\t-3\t12\n1,5\t4\t13\n"));
 }
 
 TEST(Table, AByteOrderMarkAndWindowsLineEndsAreNoContent) {
-  ExpectTheTable(
-      Load("\xEF\xBB\xBFt,d1.force,d2.force\r\n0,1,10\r\n0.5,2.5,11\r\n1,-3,12\r\n1.5,4,13\r\n"));
+  ExpectTheTable(LoadTable(
+      "\xEF\xBB\xBFt,d1.force,d2.force\r\n0,1,10\r\n0.5,2.5,11\r\n1,-3,12\r\n1.5,4,13\r\n"));
 }
 
 TEST(Table, ALastLineWithoutEndCountsAndBlankLinesDoNot) {
-  ExpectTheTable(Load("t,d1.force,d2.force\n\n0,1,10\n0.5,2.5,11\n\n1,-3,12\n1.5,4,13"));
+  ExpectTheTable(LoadTable("t,d1.force,d2.force\n\n0,1,10\n0.5,2.5,11\n\n1,-3,12\n1.5,4,13"));
 }
 
 TEST(Table, QuotedHeadingsMayHoldTheDelimiter) {
-  ExpectTheTable(Load("\"time, s\",\"d1, F\",\"d2, F\"\n0,1,10\n0.5,2.5,11\n1,-3,12\n1.5,4,13\n",
-                      "{csv: t.csv, columns: {time: 'time, s', d1.force: 'd1, F', "
-                      "d2.force: 'd2, F'}}"));
+  ExpectTheTable(
+      LoadTable("\"time, s\",\"d1, F\",\"d2, F\"\n0,1,10\n0.5,2.5,11\n1,-3,12\n1.5,4,13\n",
+                "{csv: t.csv, columns: {time: 'time, s', d1.force: 'd1, F', "
+                "d2.force: 'd2, F'}}"));
 }
 
 TEST(Table, CommentsAndTitleLinesAreSkipped) {
-  ExpectTheTable(Load(
+  ExpectTheTable(LoadTable(
       "# made by hand\nA title\nt,d1.force,d2.force\n0,1,10\n0.5,2.5,11\n1,-3,12\n1.5,4,13\n"));
 }
 
 TEST(Table, FortranAndExponentFormsAreNumbers) {
   ExpectTheTable(
-      Load("t,d1.force,d2.force\n0,1.D0,1e1\n5.0E-1,2.5d+00,1.1E+1\n1,-3.,12\n+1.5,4,13\n"));
+      LoadTable("t,d1.force,d2.force\n0,1.D0,1e1\n5.0E-1,2.5d+00,1.1E+1\n1,-3.,12\n+1.5,4,13\n"));
 }
 
 TEST(Table, AUnitRowScales) {
   ExpectTheTable(
-      Load("Time\tF1\tF2\n(msec)\t(kN)\t(mN)\n0\t0.001\t10000\n500\t0.0025\t11000\n"
-           "1000\t-0.003\t12000\n1500\t0.004\t13000\n",
-           "{csv: t.csv, columns: {d1.force: F1, d2.force: F2}}"));
+      LoadTable("Time\tF1\tF2\n(msec)\t(kN)\t(mN)\n0\t0.001\t10000\n500\t0.0025\t11000\n"
+                "1000\t-0.003\t12000\n1500\t0.004\t13000\n",
+                "{csv: t.csv, columns: {d1.force: F1, d2.force: F2}}"));
 }
 
 TEST(Table, UnitsInHeadingsScale) {
   for (const char* heading : {"t (ms),F1 (kN),F2 [daN]", "t/ms,F1/kN,F2/daN"}) {
-    ExpectTheTable(Load(std::string(heading) + "\n0,0.001,1\n500,0.0025,1.1\n1000,-0.003,1.2\n"
-                                               "1500,0.004,1.3\n",
-                        "{csv: t.csv, columns: {time: t, d1.force: F1, d2.force: F2}}"));
+    ExpectTheTable(LoadTable(std::string(heading) + "\n0,0.001,1\n500,0.0025,1.1\n1000,-0.003,1.2\n"
+                                                    "1500,0.004,1.3\n",
+                             "{csv: t.csv, columns: {time: t, d1.force: F1, d2.force: F2}}"));
   }
 }
 
 TEST(Table, ColumnsMayBeNumberedShiftedScaledAndTurnedRound) {
   // value = sign · scale · number + offset, all in the unit, then SI; time by its offset.
-  ExpectTheTable(Load("3,5,-0.5\n3.5,5.5,-1.25\n4,6,1.5\n4.5,6.5,-2\n",
-                      "{csv: t.csv, time_offset_s: -3, columns: {time: 1, d1.force: {column: 3, "
-                      "sign: -1, scale: 2}, d2.force: {column: 2, scale: 2, offset: 0}}}"));
-  const Loaded shifted = Load("0,1\n1,2\n2,3\n3,4\n",
-                              "{csv: t.csv, columns: {d1.force: {column: 2, unit: kN, sign: -1, "
-                              "offset: 0.5}}}");
+  ExpectTheTable(
+      LoadTable("3,5,-0.5\n3.5,5.5,-1.25\n4,6,1.5\n4.5,6.5,-2\n",
+                "{csv: t.csv, time_offset_s: -3, columns: {time: 1, d1.force: {column: 3, "
+                "sign: -1, scale: 2}, d2.force: {column: 2, scale: 2, offset: 0}}}"));
+  const Loaded shifted =
+      LoadTable("0,1\n1,2\n2,3\n3,4\n",
+                "{csv: t.csv, columns: {d1.force: {column: 2, unit: kN, sign: -1, "
+                "offset: 0.5}}}");
   ASSERT_NE(shifted.table, nullptr) << shifted.text;
   EXPECT_NEAR(shifted.table->values(0, 0), -500.0, kTiny * 1000);
 }
@@ -145,18 +151,19 @@ TEST(Table, ColumnsMayBeNumberedShiftedScaledAndTurnedRound) {
 TEST(Table, OurOwnTracesAreReadByWitness) {
   const std::string csv =
       "time_s,d1.force.analytic,d1.force.simulated\n0,1,5\n1,2,6\n2,3,7\n3,4,8\n";
-  const Loaded analytic = Load(csv, "{csv: t.csv, witness: analytic}");
+  const Loaded analytic = LoadTable(csv, "{csv: t.csv, witness: analytic}");
   ASSERT_NE(analytic.table, nullptr) << analytic.text;
   EXPECT_EQ(analytic.table->values(3, 0), 4.0);
-  const Loaded simulated = Load(csv, "{csv: t.csv, witness: simulated}");
+  const Loaded simulated = LoadTable(csv, "{csv: t.csv, witness: simulated}");
   ASSERT_NE(simulated.table, nullptr) << simulated.text;
   EXPECT_EQ(simulated.table->values(3, 0), 8.0);
-  EXPECT_TRUE(Has(Load(csv).text, "or state witness: analytic | simulated")) << Load(csv).text;
+  EXPECT_TRUE(Has(LoadTable(csv).text, "or state witness: analytic | simulated"))
+      << LoadTable(csv).text;
 }
 
 TEST(Table, OffLeavesAColumnOutThatHasASignalsName) {
-  const Loaded loaded = Load("t,d1.force,d2.force\n0,1,10\n1,2,11\n2,3,12\n3,4,13\n",
-                             "{csv: t.csv, columns: {d2.force: off}}");
+  const Loaded loaded = LoadTable("t,d1.force,d2.force\n0,1,10\n1,2,11\n2,3,12\n3,4,13\n",
+                                  "{csv: t.csv, columns: {d2.force: off}}");
   ASSERT_NE(loaded.table, nullptr) << loaded.text;
   ASSERT_EQ(loaded.table->columns.size(), 1u);
   EXPECT_EQ(loaded.table->columns[0].channel.name, "d1.force");
@@ -165,8 +172,8 @@ TEST(Table, OffLeavesAColumnOutThatHasASignalsName) {
 // Findings: each with file, line and column.
 
 TEST(TableFindings, AMissingColumnIsNamedAtItsKeyWithTheNearestHeading) {
-  const std::string text = Load("t,F_one,F2\n0,1,10\n1,2,11\n2,3,12\n3,4,13\n",
-                                "{csv: t.csv, columns: {d1.force: F_ome}}")
+  const std::string text = LoadTable("t,F_one,F2\n0,1,10\n1,2,11\n2,3,12\n3,4,13\n",
+                                     "{csv: t.csv, columns: {d1.force: F_ome}}")
                                .text;
   EXPECT_TRUE(Has(text,
                   "s.yaml:1:24: error: reference.columns.d1.force: t.csv has no column "
@@ -177,18 +184,19 @@ TEST(TableFindings, AMissingColumnIsNamedAtItsKeyWithTheNearestHeading) {
 
 TEST(TableFindings, AnUnknownSignalIsNamedWithTheNearestOne) {
   const std::string text =
-      Load("t,F\n0,1\n1,2\n2,3\n3,4\n", "{csv: t.csv, columns: {d1.forse: F}}").text;
+      LoadTable("t,F\n0,1\n1,2\n2,3\n3,4\n", "{csv: t.csv, columns: {d1.forse: F}}").text;
   EXPECT_TRUE(Has(text, "two_sliders has no signal 'd1.forse'")) << text;
   EXPECT_TRUE(Has(text, "did you mean 'd1.force'?")) << text;
 }
 
 TEST(TableFindings, AShortRowHasLineAndCounts) {
-  const std::string text = Load("t,d1.force,d2.force\n0,1,10\n1,2\n2,3,12\n3,4,13\n4,5,14\n").text;
+  const std::string text =
+      LoadTable("t,d1.force,d2.force\n0,1,10\n1,2\n2,3,12\n3,4,13\n4,5,14\n").text;
   EXPECT_TRUE(Has(text, "t.csv:3:1: error: row of 2 cells in a table of 3 columns")) << text;
 }
 
 TEST(TableFindings, ALongRowPointsAtTheFirstCellTooMany) {
-  const std::string text = Load("t,d1.force\n0,1\n1,2,9\n2,3\n3,4\n4,5\n5,6\n").text;
+  const std::string text = LoadTable("t,d1.force\n0,1\n1,2,9\n2,3\n3,4\n4,5\n5,6\n").text;
   EXPECT_TRUE(Has(text, "t.csv:3:5: error: row of 3 cells in a table of 2 columns")) << text;
   EXPECT_TRUE(Has(text, "are commas decimal signs?")) << text;
 }
@@ -196,7 +204,7 @@ TEST(TableFindings, ALongRowPointsAtTheFirstCellTooMany) {
 TEST(TableFindings, NotANumberIsRefusedWithLineAndColumn) {
   for (const char* cell : {"NaN", "-inf", "#N/A", "1.#QNAN", "1e999"}) {
     const std::string text =
-        Load(std::string("t,d1.force\n0,1\n1,") + cell + "\n2,3\n3,4\n4,5\n").text;
+        LoadTable(std::string("t,d1.force\n0,1\n1,") + cell + "\n2,3\n3,4\n4,5\n").text;
     EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = ")) << cell << "\n" << text;
     EXPECT_TRUE(Has(text, "violates: a finite number")) << cell << "\n" << text;
   }
@@ -204,19 +212,20 @@ TEST(TableFindings, NotANumberIsRefusedWithLineAndColumn) {
 
 TEST(TableFindings, TextAndEmptyCellsAreRefusedWithLineAndColumn) {
   const std::string text =
-      Load("t,d1.force,d2.force\n0,1,10\n1,two,11\n2,,12\n3,4,13\n4,5,14\n").text;
+      LoadTable("t,d1.force,d2.force\n0,1,10\n1,two,11\n2,,12\n3,4,13\n4,5,14\n").text;
   EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = 'two' is no number")) << text;
   EXPECT_TRUE(Has(text, "t.csv:4:3: error: d1.force: the cell is empty")) << text;
 }
 
 TEST(TableFindings, ThousandsSeparatorsAreExplained) {
-  const std::string text = Load("t;d1.force\n0;1.5\n1;1,234.5\n2;3.5\n3;4.5\n4;5.5\n5;6.5\n").text;
+  const std::string text =
+      LoadTable("t;d1.force\n0;1.5\n1;1,234.5\n2;3.5\n3;4.5\n4;5.5\n5;6.5\n").text;
   EXPECT_TRUE(Has(text, "t.csv:3:3: error: d1.force = '1,234.5' is no number")) << text;
   EXPECT_TRUE(Has(text, "without thousands separators")) << text;
 }
 
 TEST(TableFindings, TimesThatGoBackOrRepeatAreRefused) {
-  const std::string text = Load("t,d1.force\n0,1\n2,2\n1,3\n3,4\n3,5\n4,6\n").text;
+  const std::string text = LoadTable("t,d1.force\n0,1\n2,2\n1,3\n3,4\n3,5\n4,6\n").text;
   EXPECT_TRUE(Has(text, "t.csv:4:1: error: t = 1 goes back from 2")) << text;
   EXPECT_TRUE(Has(text, "t.csv:6:1: error: t = 3 is repeated")) << text;
 }
@@ -233,7 +242,7 @@ std::string ModelicaTable(const std::map<int, std::string>& more) {
 
 TEST(TableTimes, TheLastTimeMayBeWrittenTwice) {
   const std::string last = fmt::format("4.00,{:.3f},{:.3f}\n", std::sin(4.0), std::cos(4.0));
-  const Loaded loaded = Load(ModelicaTable({{40, last}}));
+  const Loaded loaded = LoadTable(ModelicaTable({{40, last}}));
   ASSERT_NE(loaded.table, nullptr) << loaded.text;
   EXPECT_EQ(loaded.table->time_s.size(), 41u);
   EXPECT_TRUE(loaded.table->uniform);
@@ -241,9 +250,9 @@ TEST(TableTimes, TheLastTimeMayBeWrittenTwice) {
 }
 
 TEST(TableTimes, EventsAreLeftOutAndTheRestStaysOnItsGrid) {
-  const Loaded loaded = Load(ModelicaTable({{12, "1.23,0.9,0.3\n1.23,0.5,0.3\n"},
-                                            {20, "2.00,0.1,0.2\n"},
-                                            {31, "3.17,0,-1\n3.17,0,-1\n3.17,0,-1\n"}}));
+  const Loaded loaded = LoadTable(ModelicaTable({{12, "1.23,0.9,0.3\n1.23,0.5,0.3\n"},
+                                                 {20, "2.00,0.1,0.2\n"},
+                                                 {31, "3.17,0,-1\n3.17,0,-1\n3.17,0,-1\n"}}));
   ASSERT_NE(loaded.table, nullptr) << loaded.text;
   EXPECT_EQ(loaded.table->time_s.size(), 40u);
   EXPECT_EQ(SuggestSample(*loaded.table), 0.1);
@@ -257,7 +266,7 @@ TEST(TableTimes, EventsAreLeftOutAndTheRestStaysOnItsGrid) {
 }
 
 TEST(TableTimes, ALateStartIsToldWithTheOffsetThatMendsIt) {
-  const Loaded loaded = Load("t,d1.force\n3.5,1\n3.6,2\n3.7,3\n3.8,5\n3.9,4\n");
+  const Loaded loaded = LoadTable("t,d1.force\n3.5,1\n3.6,2\n3.7,3\n3.8,5\n3.9,4\n");
   ASSERT_NE(loaded.table, nullptr) << loaded.text;
   Motion motion;
   motion.duration_s = 0.4;
@@ -274,7 +283,7 @@ TEST(TableTimes, ALateStartIsToldWithTheOffsetThatMendsIt) {
 TEST(TableFindings, AllOfThemAreGivenAtOnceUpToALimit) {
   std::string csv = "t,d1.force\n";
   for (int i = 0; i < 60; ++i) csv += std::to_string(i) + (i >= 20 && i < 50 ? ",x\n" : ",1\n");
-  const std::string text = Load(csv).text;
+  const std::string text = LoadTable(csv).text;
   EXPECT_TRUE(Has(text, "t.csv:22:4: error")) << text;
   EXPECT_TRUE(Has(text, "t.csv:41:4: error")) << text;
   EXPECT_TRUE(Has(text, "10 more findings")) << text;
@@ -282,11 +291,11 @@ TEST(TableFindings, AllOfThemAreGivenAtOnceUpToALimit) {
 
 TEST(TableFindings, AUnitOfAnotherKindIsRefusedInHeadingAndScenario) {
   const std::string csv = "t,F (mm)\n0,1\n1,2\n2,3\n3,4\n";
-  const std::string heading = Load(csv, "{csv: t.csv, columns: {d1.force: F}}").text;
+  const std::string heading = LoadTable(csv, "{csv: t.csv, columns: {d1.force: F}}").text;
   EXPECT_TRUE(Has(heading, "t.csv:1:3: error: F (mm): 'mm' is no unit of d1.force, which is in N"))
       << heading;
   const std::string stated =
-      Load(csv, "{csv: t.csv, columns: {d1.force: {column: F, unit: kNewton}}}").text;
+      LoadTable(csv, "{csv: t.csv, columns: {d1.force: {column: F, unit: kNewton}}}").text;
   EXPECT_TRUE(Has(stated,
                   "s.yaml:1:52: error: reference.columns.d1.force.unit: 'kNewton' is no "
                   "known unit"))
@@ -294,8 +303,8 @@ TEST(TableFindings, AUnitOfAnotherKindIsRefusedInHeadingAndScenario) {
 }
 
 TEST(TableFindings, AStatedUnitThatContradictsTheHeadingIsAWarning) {
-  const Loaded loaded = Load("t,F (N)\n0,1\n1,2\n2,3\n3,4\n",
-                             "{csv: t.csv, columns: {d1.force: {column: F, unit: kN}}}");
+  const Loaded loaded = LoadTable("t,F (N)\n0,1\n1,2\n2,3\n3,4\n",
+                                  "{csv: t.csv, columns: {d1.force: {column: F, unit: kN}}}");
   ASSERT_NE(loaded.table, nullptr);
   EXPECT_EQ(loaded.table->values(0, 0), 1000.0);
   EXPECT_TRUE(Has(loaded.text,
@@ -306,23 +315,24 @@ TEST(TableFindings, AStatedUnitThatContradictsTheHeadingIsAWarning) {
 
 TEST(TableFindings, ASettingThatIsNoneIsNamed) {
   const std::string csv = "t,d1.force\n0,1\n1,2\n2,3\n3,4\n";
-  EXPECT_TRUE(Has(Load(csv, "{csv: t.csv, delimeter: tab}").text, "delimeter"));
-  EXPECT_TRUE(Has(Load(csv, "{csv: t.csv, columns: {d1.force: {column: 2, sign: 2}}}").text,
+  EXPECT_TRUE(Has(LoadTable(csv, "{csv: t.csv, delimeter: tab}").text, "delimeter"));
+  EXPECT_TRUE(Has(LoadTable(csv, "{csv: t.csv, columns: {d1.force: {column: 2, sign: 2}}}").text,
                   "sign = 2 is neither 1 nor -1"));
-  EXPECT_TRUE(Has(Load(csv, "{csv: t.csv, columns: {d1.force: {column: 2, scale: 0}}}").text,
+  EXPECT_TRUE(Has(LoadTable(csv, "{csv: t.csv, columns: {d1.force: {column: 2, scale: 0}}}").text,
                   "scale = 0 would make the column zero"));
-  EXPECT_TRUE(Has(Load(csv, "{csv: t.csv, columns: {d1.force: 7}}").text,
+  EXPECT_TRUE(Has(LoadTable(csv, "{csv: t.csv, columns: {d1.force: 7}}").text,
                   "column 7 of t.csv violates 1 … 2"));
-  EXPECT_TRUE(Has(Load(csv, "{csv: t.csv, tolerance: {relative: -1}}").text, "violates >= 0"));
+  EXPECT_TRUE(Has(LoadTable(csv, "{csv: t.csv, tolerance: {relative: -1}}").text, "violates >= 0"));
 }
 
 TEST(TableFindings, WhatIsNoTableSaysSo) {
-  EXPECT_TRUE(Has(Load("").text, "t.csv: error: holds no numbers"));
-  EXPECT_TRUE(Has(Load("just\nsome\nwords\n").text, "no table of numbers was found"));
-  EXPECT_TRUE(Has(Load(std::string("\xFF\xFE t", 4)).text, "is UTF-16 text"));
-  EXPECT_TRUE(Has(Load(std::string("1\0,2", 4)).text, "holds zero bytes"));
-  EXPECT_TRUE(Has(Load("t,d1.force\n0,1\n1,2\n").text, "has 2 rows of numbers, at least 4"));
-  EXPECT_TRUE(Has(Load("t,d1.force\n0,1\n1,\"2\n2,3\n3,4\n4,5\n").text, "a quote is not closed"));
+  EXPECT_TRUE(Has(LoadTable("").text, "t.csv: error: holds no numbers"));
+  EXPECT_TRUE(Has(LoadTable("just\nsome\nwords\n").text, "no table of numbers was found"));
+  EXPECT_TRUE(Has(LoadTable(std::string("\xFF\xFE t", 4)).text, "is UTF-16 text"));
+  EXPECT_TRUE(Has(LoadTable(std::string("1\0,2", 4)).text, "holds zero bytes"));
+  EXPECT_TRUE(Has(LoadTable("t,d1.force\n0,1\n1,2\n").text, "has 2 rows of numbers, at least 4"));
+  EXPECT_TRUE(
+      Has(LoadTable("t,d1.force\n0,1\n1,\"2\n2,3\n3,4\n4,5\n").text, "a quote is not closed"));
 }
 
 TEST(TableFindings, AMissingFileIsNamedAtItsKey) {
@@ -369,7 +379,7 @@ ReferenceTable Sampled(int rows, double step_s, const std::string& format_digits
                   f(i * step_s));
     csv += line.data();
   }
-  const Loaded loaded = Load(csv);
+  const Loaded loaded = LoadTable(csv);
   EXPECT_NE(loaded.table, nullptr) << loaded.text;
   return *loaded.table;
 }
@@ -437,7 +447,7 @@ TEST(TableGrid, RowsOutsideTheMotionAreLeftOutAndNamed) {
   bool named = false;
   for (const std::string& note : aligned.notes) named = named || Has(note, "50 of 101 rows");
   EXPECT_TRUE(named);
-  const Loaded late = Load("5,1\n6,2\n7,3\n8,4\n", "{csv: t.csv, columns: {d1.force: 2}}");
+  const Loaded late = LoadTable("5,1\n6,2\n7,3\n8,4\n", "{csv: t.csv, columns: {d1.force: 2}}");
   ASSERT_NE(late.table, nullptr) << late.text;
   EXPECT_TRUE(AlignTable(*late.table, Seconds(1.0, 0.01)).trace.time_s.empty());
 }
@@ -450,7 +460,7 @@ TEST(TableGrid, RoundedTimeStampsCountAsUncertainty) {
     std::snprintf(line.data(), line.size(), "%.3f,%.9f\n", i / 300.0, Sine(i / 300.0));
     csv += line.data();
   }
-  const Loaded loaded = Load(csv);
+  const Loaded loaded = LoadTable(csv);
   ASSERT_NE(loaded.table, nullptr) << loaded.text;
   EXPECT_TRUE(loaded.table->uniform);
   EXPECT_GT(loaded.table->stamp_error_s, 3e-4);
@@ -458,13 +468,13 @@ TEST(TableGrid, RoundedTimeStampsCountAsUncertainty) {
 }
 
 TEST(TableGrid, AStatedToleranceReplacesTheEstimate) {
-  const Loaded loaded = Load("t,d1.force\n0,1\n1,2\n2,3\n3,-4\n",
-                             "{csv: t.csv, tolerance: {relative: 0.01, "
-                             "absolute: 0.02}, coverage: 2}");
+  const Loaded loaded = LoadTable("t,d1.force\n0,1\n1,2\n2,3\n3,-4\n",
+                                  "{csv: t.csv, tolerance: {relative: 0.01, "
+                                  "absolute: 0.02}, coverage: 2}");
   // `coverage` belongs below `tolerance`.
   EXPECT_TRUE(Has(loaded.text, "coverage")) << loaded.text;
-  const Loaded stated = Load("t,d1.force\n0,1\n1,2\n2,3\n3,-4\n",
-                             "{csv: t.csv, tolerance: {relative: 0.01, absolute: 0.02}}");
+  const Loaded stated = LoadTable("t,d1.force\n0,1\n1,2\n2,3\n3,-4\n",
+                                  "{csv: t.csv, tolerance: {relative: 0.01, absolute: 0.02}}");
   ASSERT_NE(stated.table, nullptr) << stated.text;
   const AlignedTable aligned = AlignTable(*stated.table, Seconds(3.0, 1.0));
   ASSERT_TRUE(aligned.uncertainty[0].stated);

@@ -11,7 +11,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 
-namespace mbv::testing {
+namespace mbv::fixtures {
 
 inline Pose PoseAt(const Vec3& p, const Mat3& R = Mat3::Identity()) {
   Pose X = Pose::Identity();
@@ -268,4 +268,4 @@ inline Mechanism MakeJointZoo(bool reversed) {
   return m;
 }
 
-}  // namespace mbv::testing
+}  // namespace mbv::fixtures
