@@ -5,7 +5,7 @@
 
 #include "audit/platform_audit.h"
 #include "core/demand.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 
 namespace mbv::platform_audit {
 namespace {

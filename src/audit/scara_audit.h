@@ -14,7 +14,6 @@
 #include "analytic/scara_robot/stiffness.h"
 #include "audit/audit.h"
 #include "audit/row_meter.h"
-#include "mechanism/constraints.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

@@ -5,7 +5,7 @@
 
 #include "analytic/scara_robot/workspace.h"
 #include "audit/scara_audit.h"
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
 
 namespace mbv::scara_audit {
 namespace {

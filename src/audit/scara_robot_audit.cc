@@ -3,7 +3,7 @@
 #include "audit/scara_audit.h"
 #include "audit/stiffness_truth.h"
 #include "core/demand.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 
 namespace mbv {
 

@@ -3,6 +3,7 @@
 
 #include "audit/scara_audit.h"
 #include "core/demand.h"
+#include "mechanism/body_states.h"
 #include "reference/reference.h"
 
 namespace mbv::scara_audit {

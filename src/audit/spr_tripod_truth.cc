@@ -3,7 +3,7 @@
 
 #include "audit/spr_tripod_audit.h"
 #include "core/demand.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "reference/reference.h"
 
 namespace mbv::spr_tripod_audit {

@@ -4,7 +4,7 @@
 #include <array>
 
 #include "core/demand.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
 

@@ -7,7 +7,7 @@
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/check_file.h"
 #include "pipeline/model_text.h"
 #include "scenario/find_model.h"

@@ -6,7 +6,7 @@
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "core/output_folder.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/workspace.h"
 #include "scenario/find_model.h"
 

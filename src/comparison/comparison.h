@@ -16,12 +16,12 @@
 #include "comparison/metrics.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
-#include "mechanism/driven_twists.h"
+#include "kinematics/driven_twists.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
 #include "scenario/scenario.h"
-#include "scenario/table.h"
+#include "table/table.h"
 
 namespace mbv {
 
@@ -45,9 +45,9 @@ struct ComparisonInput {
   std::string driven_by;           ///< the witness whose kinematics the simulation follows
   /// Channels of reactions that statics leaves open ("hinge.reaction.fz").
   std::vector<std::string> reactions_not_unique;
-  const AlignedTable* table = nullptr;  ///< what the witness "reference" is, if it is a table
+  const AlignedTable* table = nullptr;   ///< what the witness "reference" is, if it is a table
   const DrivenTwists* twists = nullptr;  ///< TwistsFor() this; found where needed if null
-  DriveBy drive_by = DriveBy::kMotion;  ///< what moves the simulation's drives (driven.h)
+  DriveBy drive_by = DriveBy::kMotion;   ///< what moves the simulation's drives (driven.h)
   const Trace* bent = nullptr;  ///< force-driven: the same run with bent forces, witness "bent"
   double bend = kNan;           ///< by this share of their RMS
 };
@@ -160,8 +160,8 @@ struct CheckResult {
   bool follows = false;
   double time_s = kNan;
   std::string channel;
-  bool floored = false;           ///< the value relates to a floor above the quantity itself
-  std::string blind = {};         ///< why passing verifies nothing; "" if it does
+  bool floored = false;    ///< the value relates to a floor above the quantity itself
+  std::string blind = {};  ///< why passing verifies nothing; "" if it does
 };
 
 /// What the witnesses say about each other.

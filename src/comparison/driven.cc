@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {

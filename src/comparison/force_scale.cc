@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {

@@ -6,19 +6,19 @@
 #include <vector>
 
 #include "comparison/comparison.h"
-#include "mechanism/driven_twists.h"
+#include "kinematics/driven_twists.h"
 
 namespace mbv {
 
 /// What a run has anyway, by virtual work at the home pose: while a driven coordinate moves alone
-/// by 1 m (or 1 rad) it does work on the bodies that it carries, against their weight, their inertia
-/// at the RMS accelerations of all driven coordinates, the loads on them and the springs between
-/// them; the largest of these works is its scale [N or N m]. What only prescribed joints carry, and
-/// what is fixed, does not count for drives.
+/// by 1 m (or 1 rad) it does work on the bodies that it carries, against their weight, their
+/// inertia at the RMS accelerations of all driven coordinates, the loads on them and the springs
+/// between them; the largest of these works is its scale [N or N m]. What only prescribed joints
+/// carry, and what is fixed, does not count for drives.
 struct ForceScale {
-  double length_m = 1.0;            ///< characteristic length of the mechanism
-  double force_N = 0.0;             ///< largest such force on a body that drives can move
-  std::vector<double> driven;       ///< per drive, then per prescribed joint [N or N m]
+  double length_m = 1.0;                  ///< characteristic length of the mechanism
+  double force_N = 0.0;                   ///< largest such force on a body that drives can move
+  std::vector<double> driven;             ///< per drive, then per prescribed joint [N or N m]
   std::map<std::string, double> of_unit;  ///< the largest of the compared drives by unit
   /// Gravity, motion, a load or a spring acts in the direction of some compared drive.
   bool acts = false;

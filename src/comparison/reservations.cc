@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "comparison/driven.h"
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "comparison/comparison.h"
-#include "scenario/table.h"
+#include "table/table.h"
 
 namespace mbv {
 

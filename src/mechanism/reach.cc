@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/constraints.h"
-
 namespace mbv {
 namespace {
 

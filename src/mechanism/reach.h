@@ -1,11 +1,10 @@
 // How large the coordinates are that a mechanism is computed with, and what that leaves of small
 // differences.
 //
-// CharacteristicLength() (constraints.h) measures the mechanism itself: the root mean square
-// distance of two points of one body (the world included) where joints, drives or springs are
-// attached. It depends neither on where the mechanism stands nor on where its bodies have their
-// origins. Where all attachments of a body fall together, centres of mass count as points, too;
-// then radii of gyration.
+// CharacteristicLength() measures the mechanism itself: the root mean square distance of two points
+// of one body (the world included) where joints, drives or springs are attached. It depends neither
+// on where the mechanism stands nor on where its bodies have their origins. Where all attachments
+// of a body fall together, centres of mass count as points, too; then radii of gyration.
 #pragma once
 
 #include <vector>
@@ -13,6 +12,10 @@
 #include "mechanism/mechanism.h"
 
 namespace mbv {
+
+/// A length typical of the mechanism [m], to weigh metres against radians: the root mean square
+/// distance of two attachments of one body, wherever the bodies' origins lie.
+[[nodiscard]] double CharacteristicLength(const Mechanism& mechanism);
 
 /// The largest coordinate [m] of joint frames and drive ends in their bodies (the world included).
 /// Gaps are differences of this or of Reach(), and keep the rounding of the larger one.

@@ -9,7 +9,7 @@
 #include <numeric>
 
 #include "core/demand.h"
-#include "mechanism/constraints.h"
+#include "mechanism/joint_pose.h"
 #include "mechanism/spanning_tree.h"
 #include "mjcf/mjcf.h"
 #include "mjcf/plan.h"

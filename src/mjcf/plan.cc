@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "core/demand.h"
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv::mjcf {
 namespace {

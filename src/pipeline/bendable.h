@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/mutation_bench.h"
 #include "report/mutation_report.h"
 

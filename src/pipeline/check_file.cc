@@ -1,7 +1,7 @@
 #include "pipeline/check_file.h"
 
 #include "analytic/closed_form.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/prepare.h"
 #include "pipeline/stiffness.h"
 

@@ -1,7 +1,7 @@
 #include "pipeline/model_text.h"
 
-#include "mechanism/urdf.h"
 #include "mjcf/mjcf.h"
+#include "model_file/urdf.h"
 #include "report/mobility_text.h"
 
 namespace mbv {

@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "core/demand.h"
+#include "kinematics/mobility.h"
 #include "mechanism/channels.h"
-#include "mechanism/load_model.h"
-#include "mechanism/mobility.h"
+#include "model_file/load_model.h"
 #include "pipeline/ranges.h"
 #include "reference/reference.h"
 

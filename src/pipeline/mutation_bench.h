@@ -8,9 +8,9 @@
 #include <string>
 
 #include "comparison/comparison.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/prepare.h"
-#include "scenario/table.h"
+#include "table/table.h"
 
 namespace mbv {
 

@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "mechanism/body_states.h"
 #include "mechanism/channels.h"
 #include "reference/reference.h"
 

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/demand.h"
-#include "mechanism/home.h"
+#include "kinematics/home.h"
 
 namespace mbv {
 namespace {

@@ -8,7 +8,7 @@
 #include "core/demand.h"
 #include "core/inputs.h"
 #include "core/output_folder.h"
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/engine_errors.h"
 #include "pipeline/free_motion_text.h"
@@ -24,7 +24,7 @@
 #include "reference/reference.h"
 #include "report/csv.h"
 #include "report/inputs_json.h"
-#include "scenario/table.h"
+#include "table/table.h"
 
 namespace mbv {
 namespace {
@@ -272,23 +272,22 @@ class ScenarioRun {
   }
 
   ComparisonInput MakeComparisonInput() const {
-    ComparisonInput input{.mechanism = &base(),
-                          .motion = &scenario().motion,
-                          .limits = scenario().checks,
-                          .simulation_limits = scenario().simulation.forward
-                                                   ? LimitColumn::kForward
-                                                   : LimitColumn::kInverse,
-                          .start_window_s = scenario().start_window_s,
-                          .witnesses = {},
-                          .driven_by = report_.driven_by,
-                          .reactions_not_unique = ReactionsNotUnique(
-                              base(), simulation_ ? simulation_->X_WB
-                                                  : std::vector<std::vector<Pose>>()),
-                          .table = table_ ? &*table_ : nullptr,
-                          .drive_by = scenario().simulation.forward ? scenario().simulation.drive_by
-                                                                    : DriveBy::kMotion,
-                          .bent = bent_ ? &*bent_ : nullptr,
-                          .bend = bend_};
+    ComparisonInput input{
+        .mechanism = &base(),
+        .motion = &scenario().motion,
+        .limits = scenario().checks,
+        .simulation_limits =
+            scenario().simulation.forward ? LimitColumn::kForward : LimitColumn::kInverse,
+        .start_window_s = scenario().start_window_s,
+        .witnesses = {},
+        .driven_by = report_.driven_by,
+        .reactions_not_unique = ReactionsNotUnique(
+            base(), simulation_ ? simulation_->X_WB : std::vector<std::vector<Pose>>()),
+        .table = table_ ? &*table_ : nullptr,
+        .drive_by =
+            scenario().simulation.forward ? scenario().simulation.drive_by : DriveBy::kMotion,
+        .bent = bent_ ? &*bent_ : nullptr,
+        .bend = bend_};
     for (const WitnessRecord& record : report_.witnesses) {
       input.witnesses.push_back(
           {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "core/text.h"
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {

@@ -9,7 +9,7 @@
 #include <limits>
 #include <numbers>
 
-#include "mechanism/yaml_reader.h"
+#include "input/yaml_reader.h"
 #include "pipeline/ranges.h"
 #include "reference/frame_stiffness.h"
 #include "report/svg_plot.h"

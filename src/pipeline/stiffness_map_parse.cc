@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mechanism/yaml_reader.h"
+#include "input/yaml_reader.h"
 #include "pipeline/stiffness_map.h"
 #include "scenario/motion_reader.h"
 

@@ -5,7 +5,7 @@
 
 #include "core/demand.h"
 #include "core/text.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/stiffness.h"
 
 namespace mbv {

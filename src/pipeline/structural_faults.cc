@@ -7,8 +7,8 @@
 #include <map>
 #include <random>
 
-#include "mechanism/home.h"
-#include "mechanism/mobility.h"
+#include "kinematics/home.h"
+#include "kinematics/mobility.h"
 #include "mechanism/spanning_tree.h"
 
 namespace mbv {

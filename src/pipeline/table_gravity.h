@@ -5,7 +5,7 @@
 
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
-#include "scenario/table.h"
+#include "table/table.h"
 
 namespace mbv {
 

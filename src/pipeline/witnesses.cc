@@ -7,7 +7,7 @@
 
 #include "core/demand.h"
 #include "core/text.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/drive_by.h"
 #include "reference/forward.h"
 #include "reference/reference.h"

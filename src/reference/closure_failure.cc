@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/spatial.h"
+#include "mechanism/reach.h"
 #include "reference/closure_solver.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/run_summary.h"
-#include "mechanism/constraints.h"
+#include "mechanism/body_states.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "mechanism/reach.h"

@@ -13,7 +13,7 @@
 
 #include "core/run_summary.h"
 #include "core/trace.h"
-#include "mechanism/constraints.h"
+#include "mechanism/body_states.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

@@ -7,6 +7,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "mechanism/reach.h"
 
 namespace mbv::internal {
 namespace {

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "core/run_summary.h"
-#include "mechanism/constraints.h"
+#include "kinematics/constraints.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv::internal {

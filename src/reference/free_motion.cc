@@ -6,6 +6,7 @@
 #include <boost/numeric/odeint.hpp>
 #include <cmath>
 
+#include "mechanism/body_states.h"
 #include "mechanism/break_times.h"
 #include "reference/closure_solver.h"
 #include "reference/force_solver.h"

@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "core/run_summary.h"
+#include "mechanism/body_states.h"
 #include "reference/forward.h"
 #include "reference/free_dynamics.h"
 #include "reference/hermite.h"

@@ -1,5 +1,6 @@
 // Newton–Euler at the body origins in world axes, and the energy balance from the same states.
 #include "core/spatial.h"
+#include "kinematics/constraints.h"
 #include "reference/force_solver.h"
 
 namespace mbv::internal {

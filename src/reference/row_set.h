@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "core/types.h"
-#include "mechanism/constraints.h"
+#include "kinematics/constraints.h"
 #include "mechanism/motion.h"
 
 namespace mbv::internal {

@@ -5,6 +5,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "mechanism/body_states.h"
 #include "mechanism/channels.h"
 #include "reference/closure_solver.h"
 #include "reference/force_solver.h"

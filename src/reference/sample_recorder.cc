@@ -1,6 +1,7 @@
 #include "reference/sample_recorder.h"
 
 #include "core/demand.h"
+#include "kinematics/constraints.h"
 #include "mechanism/channels.h"
 
 namespace mbv::internal {

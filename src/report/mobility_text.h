@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "mechanism/mobility_report.h"
+#include "kinematics/mobility_report.h"
 
 namespace mbv {
 

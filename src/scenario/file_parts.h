@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "core/diagnostics.h"
-#include "mechanism/load_model.h"
+#include "input/yaml_reader.h"
 #include "mechanism/mechanism.h"
-#include "mechanism/yaml_reader.h"
+#include "model_file/load_model.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {

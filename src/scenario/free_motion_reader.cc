@@ -5,8 +5,8 @@
 #include <algorithm>
 
 #include "core/text.h"
-#include "mechanism/command_rank.h"
-#include "mechanism/mobility_report.h"
+#include "kinematics/command_rank.h"
+#include "kinematics/mobility_report.h"
 #include "scenario/motion_reader.h"
 #include "scenario/profile_reader.h"
 

@@ -1,9 +1,9 @@
 // Forward dynamics in scenario files: `forces:`, `motion.initial` and `motion.initial_rates`.
 #pragma once
 
+#include "input/value_reader.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
-#include "scenario/value_reader.h"
 
 namespace mbv {
 

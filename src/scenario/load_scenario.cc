@@ -6,16 +6,16 @@
 #include <cmath>
 #include <filesystem>
 
+#include "kinematics/command_rank.h"
+#include "kinematics/mobility_report.h"
 #include "mechanism/channel_count.h"
-#include "mechanism/command_rank.h"
-#include "mechanism/load_model.h"
-#include "mechanism/mobility_report.h"
+#include "model_file/load_model.h"
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/set_values.h"
 #include "scenario/settings_reader.h"
-#include "scenario/table_settings.h"
+#include "table/settings.h"
 
 namespace mbv {
 namespace {

@@ -12,7 +12,7 @@
 
 namespace mbv {
 
-struct LoadOptions;  // mechanism/load_model.h
+struct LoadOptions;  // model_file/load_model.h
 
 /// How the scenario's model is loaded: with its parameters, `more` on top, and its gravity.
 [[nodiscard]] LoadOptions ModelOptions(const Scenario& scenario, const Overrides& more = {});

@@ -3,9 +3,9 @@
 
 #include <optional>
 
+#include "input/value_reader.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
-#include "scenario/value_reader.h"
 
 namespace mbv {
 

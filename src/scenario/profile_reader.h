@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/profile.h"
-#include "scenario/value_reader.h"
+#include "input/value_reader.h"
 
 namespace mbv {
 

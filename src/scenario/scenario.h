@@ -12,15 +12,13 @@
 
 #include "core/diagnostics.h"
 #include "core/types.h"
+#include "input/overrides.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
 
 namespace mbv {
 
-struct ReferenceTable;  // scenario/table.h
-
-/// Model parameters by name.
-using Overrides = std::map<std::string, double>;
+struct ReferenceTable;  // table/table.h
 
 /// The closed form's part in a scenario.
 struct AnalyticSettings {

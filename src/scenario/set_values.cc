@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "scenario/value_reader.h"
+#include "input/value_reader.h"
 
 namespace mbv {
 namespace {

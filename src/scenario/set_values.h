@@ -1,8 +1,8 @@
 // `--set key=value`: replacing values of a YAML tree from the command line.
 #pragma once
 
-#include "mechanism/load_model.h"
-#include "mechanism/yaml_reader.h"
+#include "input/yaml_reader.h"
+#include "model_file/load_model.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {

@@ -1,8 +1,8 @@
 // The sections of a scenario file that do not concern motion.
 #pragma once
 
+#include "input/value_reader.h"
 #include "scenario/scenario.h"
-#include "scenario/value_reader.h"
 
 namespace mbv {
 

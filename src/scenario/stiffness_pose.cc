@@ -6,7 +6,7 @@
 
 #include "core/demand.h"
 #include "core/text.h"
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/stiffness_scenario.h"

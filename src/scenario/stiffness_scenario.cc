@@ -7,7 +7,7 @@
 #include <filesystem>
 
 #include "core/text.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "scenario/file_parts.h"
 #include "scenario/motion_reader.h"
 #include "scenario/set_values.h"

@@ -1,8 +1,8 @@
 // The sections of a stiffness scenario that do not need its mechanism.
 #pragma once
 
+#include "input/value_reader.h"
 #include "scenario/stiffness_scenario.h"
-#include "scenario/value_reader.h"
 
 namespace mbv {
 

@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "core/spatial.h"
-#include "mechanism/constraints.h"
 #include "mechanism/reach.h"
 
 namespace mbv::simulation {

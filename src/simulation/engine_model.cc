@@ -2,8 +2,8 @@
 
 #include <array>
 
-#include "mechanism/constraints.h"
 #include "mechanism/impossible_inertia.h"
+#include "mechanism/joint_pose.h"
 
 namespace mbv::simulation {
 namespace {

@@ -8,7 +8,7 @@
 #include <ctime>
 #include <numbers>
 
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 #include "mjcf/mjcf.h"
 #include "simulation/fastest_rate.h"
 #include "simulation/integrator.h"

@@ -1,8 +1,8 @@
 // The start of a free motion: body states → MuJoCo's coordinates, then onto its own loops.
 #include <cmath>
 
-#include "mechanism/constraints.h"
-#include "mechanism/home.h"
+#include "kinematics/constraints.h"
+#include "kinematics/home.h"
 #include "simulation/session.h"
 
 namespace mbv::simulation {

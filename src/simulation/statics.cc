@@ -6,7 +6,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
-#include "mechanism/constraints.h"
+#include "mechanism/reach.h"
 
 namespace mbv::simulation {
 namespace {

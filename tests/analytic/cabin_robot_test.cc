@@ -8,7 +8,7 @@
 
 #include "analytic/cabin_robot/cabin_dynamics.h"
 #include "core/spatial.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/source_dir.h"
 
 namespace mbv {

@@ -8,7 +8,7 @@
 
 #include "analytic/closed_form.h"
 #include "analytic/stiffness_form.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
 #include "tests/source_dir.h"

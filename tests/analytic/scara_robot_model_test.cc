@@ -4,8 +4,8 @@
 #include <sstream>
 
 #include "analytic/scara_robot/closed_form.h"
-#include "mechanism/load_model.h"
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
+#include "model_file/load_model.h"
 #include "reference/reference.h"
 #include "tests/analytic/scara_robot_fixture.h"
 #include "tests/source_dir.h"

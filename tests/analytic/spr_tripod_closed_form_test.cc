@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "reference/reference.h"
 #include "spr_tripod_model.h"
 #include "tests/analytic/allocation_counter.h"

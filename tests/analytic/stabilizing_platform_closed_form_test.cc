@@ -2,7 +2,7 @@
 // that cannot be computed, extra channels, and no allocation per sample.
 #include <gtest/gtest.h>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/analytic/allocation_counter.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 #include "tests/source_dir.h"

@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 #include "tests/source_dir.h"
 

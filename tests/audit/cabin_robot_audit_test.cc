@@ -4,7 +4,7 @@
 #include <set>
 
 #include "audit/cabin_audit.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/source_dir.h"
 
 namespace mbv {

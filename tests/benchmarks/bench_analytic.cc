@@ -3,7 +3,7 @@
 
 #include "analytic/stiffness_form.h"
 #include "core/demand.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 #include "tests/source_dir.h"
 

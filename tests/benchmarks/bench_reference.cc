@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
 #include "tests/source_dir.h"

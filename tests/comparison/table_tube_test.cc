@@ -9,7 +9,7 @@
 #include <random>
 
 #include "comparison/table_diagnosis.h"
-#include "scenario/table_noise.h"
+#include "table/noise.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {

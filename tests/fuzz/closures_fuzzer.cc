@@ -1,7 +1,7 @@
 // Any text as the closure file of a URDF.
 #include <string>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

@@ -1,7 +1,7 @@
 // Any text as model.yaml.
 #include <string>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, size_t size) {

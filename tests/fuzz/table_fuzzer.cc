@@ -1,8 +1,8 @@
 // Any text as table of forces. The first character chooses what the scenario states about it.
 #include <string>
 
-#include "mechanism/load_model.h"
-#include "scenario/table_settings.h"
+#include "model_file/load_model.h"
+#include "table/settings.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

@@ -1,9 +1,9 @@
 // Any text as URDF with closures, alone and as the tree of a model.
-#include "mechanism/urdf.h"
+#include "model_file/urdf.h"
 
 #include <string>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, size_t size) {

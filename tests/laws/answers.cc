@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "core/demand.h"
+#include "kinematics/constraints.h"
 #include "mechanism/channels.h"
 #include "tests/laws/subject.h"
 

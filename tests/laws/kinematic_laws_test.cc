@@ -1,7 +1,8 @@
 // Laws of positions, velocities and accelerations.
 #include <cmath>
 
-#include "mechanism/mobility.h"
+#include "kinematics/constraints.h"
+#include "kinematics/mobility.h"
 #include "tests/laws/fixture.h"
 
 namespace mbv::laws {

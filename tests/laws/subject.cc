@@ -8,7 +8,8 @@
 
 #include "core/demand.h"
 #include "mechanism/channels.h"
-#include "mechanism/load_model.h"
+#include "mechanism/reach.h"
+#include "model_file/load_model.h"
 #include "tests/source_dir.h"
 
 namespace mbv::laws {

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "analytic/closed_form.h"
-#include "mechanism/constraints.h"
+#include "mechanism/body_states.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
 #include "simulation/simulation.h"

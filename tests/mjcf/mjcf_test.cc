@@ -8,8 +8,9 @@
 #include <regex>
 #include <sstream>
 
-#include "mechanism/load_model.h"
+#include "mechanism/joint_pose.h"
 #include "mjcf/plan.h"
+#include "model_file/load_model.h"
 #include "simulation/engine_model.h"
 #include "tests/simulation/test_mechanisms.h"
 #include "tests/source_dir.h"

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <sstream>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/check_file.h"
 #include "pipeline/run_scenario.h"
 #include "pipeline/workspace.h"

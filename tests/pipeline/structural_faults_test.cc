@@ -6,8 +6,8 @@
 #include <map>
 #include <set>
 
-#include "mechanism/load_model.h"
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
+#include "model_file/load_model.h"
 #include "tests/source_dir.h"
 
 namespace mbv {

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
-#include "mechanism/load_model.h"
-#include "mechanism/urdf.h"
+#include "model_file/load_model.h"
+#include "model_file/urdf.h"
 #include "pipeline/run_scenario.h"
 #include "tests/source_dir.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/source_dir.h"
 
 namespace mbv {

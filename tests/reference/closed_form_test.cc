@@ -3,6 +3,7 @@
 
 #include <numbers>
 
+#include "mechanism/reach.h"
 #include "tests/reference/fixture.h"
 
 namespace mbv {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/spatial.h"
-#include "mechanism/constraints.h"
+#include "kinematics/constraints.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv::fixtures {

@@ -6,7 +6,7 @@
 
 #include "analytic/stiffness_form.h"
 #include "core/spatial.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
 #include "tests/reference/direct_stiffness.h"

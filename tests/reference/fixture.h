@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "mechanism/joint_pose.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/reference.h"

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mechanism/reach.h"
 #include "tests/reference/fixture.h"
 
 namespace mbv::fixtures {

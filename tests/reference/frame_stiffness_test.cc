@@ -8,7 +8,7 @@
 #include <random>
 
 #include "core/spatial.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/reference/direct_stiffness.h"
 
 namespace mbv {

@@ -5,7 +5,7 @@
 #include <numbers>
 
 #include "core/spatial.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "tests/reference/fixture.h"
 #include "tests/source_dir.h"
 

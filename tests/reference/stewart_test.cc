@@ -7,7 +7,7 @@
 #include <random>
 
 #include "core/spatial.h"
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "reference/reference.h"
 #include "tests/source_dir.h"
 

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "scenario/motion_reader.h"
 #include "tests/source_dir.h"
 

@@ -5,8 +5,8 @@
 
 #include <random>
 
-#include "mechanism/load_model.h"
 #include "mjcf/mjcf.h"
+#include "model_file/load_model.h"
 #include "tests/simulation/test_mechanisms.h"
 #include "tests/source_dir.h"
 

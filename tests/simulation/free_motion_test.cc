@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mechanism/reach.h"
 #include "reference/forward.h"
 #include "simulation/simulation.h"
 #include "tests/simulation/test_mechanisms.h"

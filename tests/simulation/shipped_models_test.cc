@@ -6,7 +6,7 @@
 
 #include "analytic/closed_form.h"
 #include "core/demand.h"
-#include "mechanism/mobility.h"
+#include "kinematics/mobility.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
 #include "simulation/simulation.h"

@@ -5,7 +5,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "mechanism/tree_motion.h"
+#include "kinematics/tree_motion.h"
+#include "mechanism/joint_pose.h"
 #include "simulation/simulation.h"
 #include "tests/simulation/test_mechanisms.h"
 

@@ -7,7 +7,7 @@
 
 #include "core/run_summary.h"
 #include "core/spatial.h"
-#include "mechanism/constraints.h"
+#include "mechanism/joint_pose.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

@@ -10,7 +10,7 @@
 #include <utility>
 #include <vector>
 
-#include "mechanism/yaml_reader.h"
+#include "input/yaml_reader.h"
 
 namespace mbv::fuzz {
 namespace {

@@ -1,0 +1,46 @@
+// Values of a scenario file: numbers may be expressions of the model's parameters.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "core/types.h"
+#include "input/expressions.h"
+#include "input/overrides.h"
+#include "input/yaml_reader.h"
+
+namespace mbv {
+
+/// Reads numbers with a scope of parameters. Every reader reports a finding and returns nothing
+/// when the value does not fit.
+class ValueReader {
+ public:
+  ValueReader(YamlReader* yaml, Scope* scope) : yaml_(yaml), scope_(scope) {}
+
+  std::optional<double> Number(const YamlNode& node, const std::string& path);
+  /// With a rule: "simulation.step_s = 0 violates > 0".
+  std::optional<double> Positive(const YamlNode& node, const std::string& path);
+  std::optional<std::vector<double>> Numbers(const YamlNode& node, const std::string& path,
+                                             int count = -1);
+  std::optional<Vec3> Vector(const YamlNode& node, const std::string& path);
+
+  /// A number under `key` in one of several units, in SI; `otherwise` if left out.
+  std::optional<double> InUnit(const YamlMap& map, const std::string& key,
+                               std::initializer_list<UnitSuffix> units);
+  /// Required positive number of a map.
+  std::optional<double> RequiredPositive(const YamlMap& map, const std::string& key);
+
+  [[nodiscard]] YamlReader& yaml() { return *yaml_; }
+
+ private:
+  YamlReader* yaml_;
+  Scope* scope_;
+};
+
+/// Parameters by name, as given in `parameters:` (numbers or expressions of numbers).
+[[nodiscard]] Overrides ReadOverrides(ValueReader* values, const YamlNode* node,
+                                      const std::string& path);
+
+}  // namespace mbv

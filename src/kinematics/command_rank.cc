@@ -1,0 +1,111 @@
+#include "kinematics/command_rank.h"
+
+#include <algorithm>
+
+#include "kinematics/constraints.h"
+#include "kinematics/row_stack.h"
+#include "mechanism/reach.h"
+
+namespace mbv {
+namespace {
+
+using internal::FindRank;
+using internal::NullSpaces;
+using internal::RowStack;
+
+BodyStates HomeStates(const Mechanism& mechanism) {
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  states.X_WB = mechanism.X_WB_home;
+  return states;
+}
+
+MatX JointRows(const Mechanism& mechanism, const BodyStates& states) {
+  RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  stack.AddJoints(mechanism, states, false);
+  return stack.Matrix();
+}
+
+// The gradient of a command, scaled as the joint rows.
+Eigen::RowVectorXd CommandRow(const Mechanism& mechanism, const BodyStates& states,
+                              const Command& command) {
+  RowStack terms(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  for (const Command::Term& term : command.terms) {
+    ScalarRow row = CoordinateRow(mechanism, term.coordinate, states);
+    row.J_parent *= term.factor;
+    row.J_child *= term.factor;
+    const bool turns = row.J_parent.tail<3>().isZero(0.0) && row.J_child.tail<3>().isZero(0.0);
+    terms.Add(row, !turns);
+  }
+  return terms.Matrix().colwise().sum();
+}
+
+MatX WithRow(const MatX& J, const Eigen::RowVectorXd& row) {
+  MatX more(J.rows() + 1, J.cols());
+  more << J, row;
+  return more;
+}
+
+// Names of the joints that some column of `motion` moves.
+std::vector<std::string> MovingJoints(const Mechanism& mechanism, const BodyStates& states,
+                                      const MatX& motion) {
+  std::vector<std::string> names;
+  if (motion.cols() == 0) return names;
+  for (const Joint& joint : mechanism.joints) {
+    RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
+    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      stack.Add(JointCoordinateRow(joint, c, states), IsLength(joint.kind, c));
+    }
+    if (stack.size() == 0) continue;
+    const MatX rates = stack.Matrix() * motion;
+    if (rates.cwiseAbs().maxCoeff() > internal::kStressTolerance) names.push_back(joint.name);
+  }
+  return names;
+}
+
+}  // namespace
+
+CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>& commands) {
+  const BodyStates home = HomeStates(mechanism);
+  MatX J = JointRows(mechanism, home);
+  const auto joint_rows = J.rows();
+  const auto columns = static_cast<int>(J.cols());
+  CommandRank out;
+  out.freedoms = columns - FindRank(J, NullSpaces::kNone).rank;
+  for (const Command& command : commands) J = WithRow(J, CommandRow(mechanism, home, command));
+
+  const internal::RankFinding all = FindRank(J, NullSpaces::kMotion);
+  out.undriven = columns - all.rank;
+  out.redundant = static_cast<int>(commands.size()) - (out.freedoms - out.undriven);
+  out.free_joints = MovingJoints(mechanism, home, all.motion);
+  if (out.redundant <= 0) return out;
+  const MatX stress = FindRank(J, NullSpaces::kSelfStress).self_stress;
+  for (size_t k = 0; k < commands.size(); ++k) {
+    const auto row = joint_rows + static_cast<Eigen::Index>(k);
+    if (stress.row(row).cwiseAbs().maxCoeff() > internal::kStressTolerance) {
+      out.dependent.push_back(static_cast<int>(k));
+    }
+  }
+  return out;
+}
+
+std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
+                                        const std::vector<Command>& commands,
+                                        const std::vector<Command>& candidates, size_t count) {
+  const BodyStates home = HomeStates(mechanism);
+  MatX J = JointRows(mechanism, home);
+  for (const Command& command : commands) J = WithRow(J, CommandRow(mechanism, home, command));
+  int rank = FindRank(J, NullSpaces::kNone).rank;
+  std::vector<size_t> chosen;
+  for (size_t k = 0; k < candidates.size() && chosen.size() < count; ++k) {
+    MatX more = WithRow(J, CommandRow(mechanism, home, candidates[k]));
+    const int new_rank = FindRank(more, NullSpaces::kNone).rank;
+    if (new_rank == rank) continue;
+    rank = new_rank;
+    J = std::move(more);
+    chosen.push_back(k);
+  }
+  return chosen;
+}
+
+}  // namespace mbv

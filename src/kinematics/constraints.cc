@@ -1,0 +1,170 @@
+#include "kinematics/constraints.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "core/demand.h"
+#include "kinematics/frame_pair.h"
+#include "mechanism/joint_coordinate.h"
+#include "mechanism/joint_pose.h"
+
+namespace mbv {
+namespace {
+
+using internal::Along;
+using internal::Cosine;
+using internal::FramePair;
+using internal::MakePair;
+using internal::PairScalar;
+
+// Collects scalars as rows; `offset` is what the scalar should be.
+class RowWriter {
+ public:
+  explicit RowWriter(ConstraintRows* rows) : rows_(*rows) {}
+
+  void Add(const PairScalar& scalar, double offset = 0.0) {
+    const int i = rows_.rows++;
+    rows_.residual[i] = scalar.value - offset;
+    rows_.J_parent.row(i) = scalar.J_parent.transpose();
+    rows_.J_child.row(i) = scalar.J_child.transpose();
+    rows_.bias[i] = scalar.bias;
+  }
+  void Translation(const PairScalar& scalar) {
+    Add(scalar);
+    ++rows_.translation_rows;
+  }
+
+ private:
+  ConstraintRows& rows_;
+};
+
+// Directions in F along which the joint allows no translation.
+int LockedDirections(const Joint& joint, Mat3* directions) {
+  switch (joint.kind) {
+    case JointKind::kFixed:
+    case JointKind::kRevolute:
+    case JointKind::kUniversal:
+    case JointKind::kSpherical:
+      *directions = Mat3::Identity();
+      return 3;
+    case JointKind::kPrismatic:
+    case JointKind::kCylindrical:
+      *directions = JointBasis(joint);
+      return 2;
+    case JointKind::kPlanar:
+      directions->col(0) = joint.axis;
+      return 1;
+    case JointKind::kFree:
+      return 0;
+  }
+  return 0;
+}
+
+void AddRotationRows(const Joint& joint, const FramePair& pair, RowWriter* out) {
+  const Mat3 E = JointBasis(joint);
+  switch (joint.kind) {
+    case JointKind::kSpherical:
+    case JointKind::kFree:
+      return;
+    case JointKind::kUniversal:
+      out->Add(Cosine(pair, joint.axis, joint.axis2), joint.axis.dot(joint.axis2));
+      return;
+    case JointKind::kRevolute:
+    case JointKind::kCylindrical:
+    case JointKind::kPlanar:
+      out->Add(Cosine(pair, E.col(0), E.col(2)));
+      out->Add(Cosine(pair, E.col(1), E.col(2)));
+      return;
+    case JointKind::kFixed:
+    case JointKind::kPrismatic:
+      out->Add(Cosine(pair, E.col(0), E.col(2)));
+      out->Add(Cosine(pair, E.col(1), E.col(2)));
+      out->Add(Cosine(pair, E.col(1), E.col(0)));
+      return;
+  }
+}
+
+ScalarRow ToRow(const PairScalar& scalar, int parent, int child) {
+  return {.parent = parent,
+          .child = child,
+          .value = scalar.value,
+          .J_parent = scalar.J_parent,
+          .J_child = scalar.J_child,
+          .bias = scalar.bias};
+}
+
+void TurnNear(double near_value, double* angle) {
+  constexpr double kTurn = 2 * std::numbers::pi;
+  *angle += kTurn * std::round((near_value - *angle) / kTurn);
+}
+
+Pose At(const Vec3& point) { return Pose(Eigen::Translation3d(point)); }
+
+}  // namespace
+
+ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions) {
+  const FramePair pair = MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM);
+  ConstraintRows rows;
+  rows.parent = joint.parent;
+  rows.child = joint.child;
+  RowWriter out(&rows);
+  Mat3 directions;
+  const int locked = LockedDirections(joint, &directions);
+  for (int i = 0; i < locked; ++i) out.Translation(Along(pair, directions.col(i)));
+  if (!(reactions && joint.transmits_force_only)) AddRotationRows(joint, pair, &out);
+  return rows;
+}
+
+ScalarRow JointCoordinateRow(const Joint& joint, int coordinate, const BodyStates& states,
+                             double near_value) {
+  const FramePair pair = MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM);
+  ScalarRow row =
+      ToRow(internal::JointCoordinate(joint, coordinate, pair), joint.parent, joint.child);
+  if (internal::IsAngle(joint.kind, coordinate)) TurnNear(near_value, &row.value);
+  return row;
+}
+
+ScalarRow DriveRow(const Mechanism& mechanism, const Drive& drive, const BodyStates& states,
+                   double near_value) {
+  if (const auto* on_joint = std::get_if<JointDrive>(&drive.kind)) {
+    return JointCoordinateRow(mechanism.joints[on_joint->joint], on_joint->coordinate, states,
+                              near_value);
+  }
+  const auto& leg = std::get<DistanceDrive>(drive.kind);
+  const FramePair pair = MakePair(states, leg.body_from, At(leg.p_from), leg.body_to, At(leg.p_to));
+  return ToRow(internal::Distance(pair), leg.body_from, leg.body_to);
+}
+
+ScalarRow OutputRow(const Output& output, int component, const BodyStates& states,
+                    double near_value) {
+  const FramePair pair =
+      MakePair(states, output.reference_body, output.X_RbR, output.body, output.X_BO);
+  MBV_DEMAND(component >= 0 && component < 6, component);
+  if (component < 3) {
+    return ToRow(Along(pair, Vec3::Unit(component)), output.reference_body, output.body);
+  }
+  ScalarRow row =
+      ToRow(internal::RollPitchYaw(pair, component - 3), output.reference_body, output.body);
+  TurnNear(near_value, &row.value);
+  return row;
+}
+
+ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate,
+                        const BodyStates& states, double near_value) {
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kPrescribed:
+      return JointCoordinateRow(mechanism.joints[mechanism.prescribed[coordinate.index].joint], 0,
+                                states, near_value);
+    case Coordinate::Kind::kDrive:
+      return DriveRow(mechanism, mechanism.drives[coordinate.index], states, near_value);
+    case Coordinate::Kind::kOutput:
+      return OutputRow(mechanism.outputs[coordinate.index], coordinate.component, states,
+                       near_value);
+    case Coordinate::Kind::kJoint:
+      return JointCoordinateRow(mechanism.joints[coordinate.index], coordinate.component, states,
+                                near_value);
+  }
+  ThrowDemand("known coordinate kind", __FILE__, __LINE__, "?");
+}
+
+}  // namespace mbv

@@ -1,0 +1,106 @@
+#include "kinematics/frame_pair.h"
+
+#include <cmath>
+
+#include "mechanism/joint_coordinate.h"
+
+namespace mbv::internal {
+
+FramePair MakePair(const BodyStates& states, int parent, const Pose& X_PF, int child,
+                   const Pose& X_CM) {
+  const Pose& X_WP = states.X_WB[parent];
+  const Pose& X_WC = states.X_WB[child];
+  const Vec6& V_WP = states.V_WB[parent];
+  const Vec6& V_WC = states.V_WB[child];
+  FramePair pair;
+  pair.R_WF = X_WP.linear() * X_PF.linear();
+  pair.R_WM = X_WC.linear() * X_CM.linear();
+  pair.r_F = X_WP.linear() * X_PF.translation();
+  pair.r_M = X_WC.linear() * X_CM.translation();
+  pair.w_P = V_WP.head<3>();
+  pair.w_C = V_WC.head<3>();
+  // Differences of origins first: with parent and child far from the world's origin this keeps
+  // the digits of the small distance.
+  pair.d = (X_WC.translation() - X_WP.translation()) + (pair.r_M - pair.r_F);
+  const Vec3 v_F = pair.w_P.cross(pair.r_F);
+  const Vec3 v_M = pair.w_C.cross(pair.r_M);
+  pair.d_rate = (V_WC.tail<3>() - V_WP.tail<3>()) + (v_M - v_F);
+  pair.centripetal = pair.w_C.cross(v_M) - pair.w_P.cross(v_F);
+  return pair;
+}
+
+PairScalar Along(const FramePair& pair, const Vec3& n_F) {
+  const Vec3 n = pair.R_WF * n_F;
+  const Vec3 n_rate = pair.w_P.cross(n);
+  PairScalar out;
+  out.value = n.dot(pair.d);
+  out.J_child << pair.r_M.cross(n), n;
+  out.J_parent << n.cross(pair.r_F + pair.d), -n;
+  out.bias =
+      n.dot(pair.centripetal) + 2 * n_rate.dot(pair.d_rate) + pair.w_P.cross(n_rate).dot(pair.d);
+  out.rate = n.dot(pair.d_rate) + n_rate.dot(pair.d);
+  return out;
+}
+
+PairScalar Cosine(const FramePair& pair, const Vec3& f_F, const Vec3& m_M) {
+  const Vec3 f = pair.R_WF * f_F;
+  const Vec3 m = pair.R_WM * m_M;
+  const Vec3 f_rate = pair.w_P.cross(f);
+  const Vec3 m_rate = pair.w_C.cross(m);
+  const Vec3 turn = m.cross(f);  // ċ = (ω_C − ω_P)·(m × f)
+  PairScalar out;
+  out.value = f.dot(m);
+  out.J_child << turn, Vec3::Zero();
+  out.J_parent << -turn, Vec3::Zero();
+  out.bias = pair.w_P.cross(f_rate).dot(m) + 2 * f_rate.dot(m_rate) + f.dot(pair.w_C.cross(m_rate));
+  out.rate = f_rate.dot(m) + f.dot(m_rate);
+  return out;
+}
+
+PairScalar Distance(const FramePair& pair) {
+  PairScalar out;
+  out.value = pair.d.norm();
+  const Vec3 u = pair.d / out.value;
+  out.J_child << pair.r_M.cross(u), u;
+  out.J_parent << u.cross(pair.r_F), -u;
+  out.rate = u.dot(pair.d_rate);
+  out.bias = u.dot(pair.centripetal) + (pair.d_rate - out.rate * u).squaredNorm() / out.value;
+  return out;
+}
+
+PairScalar Angle(const PairScalar& s, const PairScalar& c) {
+  const double rho2 = s.value * s.value + c.value * c.value;
+  const double ks = c.value / rho2, kc = -s.value / rho2;
+  PairScalar out;
+  out.value = std::atan2(s.value, c.value);
+  out.J_child = ks * s.J_child + kc * c.J_child;
+  out.J_parent = ks * s.J_parent + kc * c.J_parent;
+  out.rate = ks * s.rate + kc * c.rate;
+  // ρ² φ̈ = c s̈ − s c̈ − 2 (s ṡ + c ċ) φ̇
+  out.bias =
+      ks * s.bias + kc * c.bias - 2 * (s.value * s.rate + c.value * c.rate) / rho2 * out.rate;
+  return out;
+}
+
+PairScalar RollPitchYaw(const FramePair& pair, int component) {
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  if (component == 0) return Angle(Cosine(pair, z, y), Cosine(pair, z, z));
+  if (component == 2) return Angle(Cosine(pair, y, x), Cosine(pair, x, x));
+  // R20 = −sin p, hence cos p ṗ = −Ṙ20 and cos p p̈ = sin p ṗ² − R̈20.
+  const PairScalar R20 = Cosine(pair, z, x);
+  const double cos_p = std::hypot((pair.R_WF.col(2)).dot(pair.R_WM.col(1)),
+                                  (pair.R_WF.col(2)).dot(pair.R_WM.col(2)));
+  PairScalar out;
+  out.value = std::atan2(-R20.value, cos_p);
+  out.J_child = -R20.J_child / cos_p;
+  out.J_parent = -R20.J_parent / cos_p;
+  out.rate = -R20.rate / cos_p;
+  out.bias = (-R20.value * out.rate * out.rate - R20.bias) / cos_p;
+  return out;
+}
+
+PairScalar JointCoordinate(const Joint& joint, int coordinate, const FramePair& pair) {
+  return CoordinateBetween(joint, coordinate, pair);
+}
+
+}  // namespace mbv::internal

@@ -1,0 +1,45 @@
+// Two body-fixed frames in motion, and the scalars between them that constraints are made of.
+//
+// Internal to kinematics/. F lies on the parent body P, M on the child body C. All vectors are in
+// world axes. Each scalar c comes with its exact derivatives, ċ = J V and c̈ = J A + b.
+#pragma once
+
+#include "core/types.h"
+#include "mechanism/body_states.h"
+
+namespace mbv::internal {
+
+struct FramePair {
+  Mat3 R_WF, R_WM;
+  Vec3 r_F, r_M;     ///< from the body origins Po, Co to the frame origins
+  Vec3 d, d_rate;    ///< from F's origin to M's, and its time derivative
+  Vec3 w_P, w_C;     ///< angular velocities
+  Vec3 centripetal;  ///< ω_C×(ω_C×r_M) − ω_P×(ω_P×r_F)
+};
+
+[[nodiscard]] FramePair MakePair(const BodyStates& states, int parent, const Pose& X_PF, int child,
+                                 const Pose& X_CM);
+
+/// A scalar without the indices of its bodies.
+struct PairScalar {
+  double value;
+  Vec6 J_parent, J_child;
+  double bias;
+  double rate = 0.0;  ///< ċ, where the caller needs it
+};
+
+/// n·d with n fixed in F (components n_F).
+[[nodiscard]] PairScalar Along(const FramePair& pair, const Vec3& n_F);
+/// f·m with f fixed in F and m fixed in M (components f_F, m_M).
+[[nodiscard]] PairScalar Cosine(const FramePair& pair, const Vec3& f_F, const Vec3& m_M);
+/// |d|, which must not vanish.
+[[nodiscard]] PairScalar Distance(const FramePair& pair);
+/// atan2(s, c).
+[[nodiscard]] PairScalar Angle(const PairScalar& s, const PairScalar& c);
+
+/// Roll, pitch or yaw (0, 1, 2) of R_FM = Rz Ry Rx.
+[[nodiscard]] PairScalar RollPitchYaw(const FramePair& pair, int component);
+/// Coordinate of a joint kind.
+[[nodiscard]] PairScalar JointCoordinate(const Joint& joint, int coordinate, const FramePair& pair);
+
+}  // namespace mbv::internal

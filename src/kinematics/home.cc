@@ -1,0 +1,225 @@
+// Levenberg–Marquardt on the loop closures in tree coordinates.
+//
+// With lengths divided by a characteristic length L, each step solves
+//   min |r + J s|² + μ |s|²                                                   (DampedStep)
+#include "kinematics/home.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "core/demand.h"
+#include "kinematics/closure_residual.h"
+#include "kinematics/constraints.h"
+#include "kinematics/frame_pair.h"
+#include "kinematics/tree_motion.h"
+#include "mechanism/joint_coordinate.h"
+#include "mechanism/joint_pose.h"
+#include "mechanism/reach.h"
+
+namespace mbv {
+namespace {
+
+using internal::ClosureResidual;
+using internal::DampedStep;
+using internal::TreeMotion;
+using Coordinates = std::vector<std::array<double, 6>>;
+
+struct Attempt {
+  std::vector<Pose> X_FM;
+  BodyStates states;
+  double gap = std::numeric_limits<double>::infinity();
+  int iterations = 0;
+};
+
+LoopGap GapOf(const Mechanism& mechanism, int j, const BodyStates& states) {
+  const Joint& joint = mechanism.joints[j];
+  const ConstraintRows rows = RowsOf(joint, states, false);
+  const Pose X_FM =
+      (states.X_WB[joint.parent] * joint.X_PF).inverse() * (states.X_WB[joint.child] * joint.X_CM);
+  LoopGap gap{.joint = j, .position_m = 0.0, .rotation_rad = RotationGap(joint, X_FM)};
+  if (rows.translation_rows > 0) {
+    gap.position_m = rows.residual.head(rows.translation_rows).cwiseAbs().maxCoeff();
+  }
+  return gap;
+}
+
+// Largest gap, lengths relative to `length`.
+double LargestGap(const Mechanism& mechanism, const BodyStates& states, double length) {
+  double largest = 0.0;
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    if (!mechanism.joints[j].closure) continue;
+    const LoopGap gap = GapOf(mechanism, static_cast<int>(j), states);
+    largest = std::max({largest, gap.position_m / length, gap.rotation_rad});
+  }
+  return largest;
+}
+
+Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
+              const Coordinates& start) {
+  constexpr int kMaxIterations = 100;
+  constexpr double kLargestStep = 0.5;  // rad, or characteristic lengths
+  const double length = CharacteristicLength(mechanism);
+  const TreeMotion tree(mechanism, locked);
+  VecX unit(tree.freedoms());
+  for (int c = 0; c < tree.freedoms(); ++c) unit[c] = tree.angular()[c] ? 1.0 : length;
+
+  Attempt now;
+  for (size_t j = 0; j < start.size(); ++j) {
+    now.X_FM.push_back(JointPose(mechanism.joints[j], start[j]));
+  }
+  now.states = tree.States(now.X_FM);
+  MatX J;
+  VecX r = ClosureResidual(mechanism, tree, now.states, length, &J);
+  double mu = 1e-4;
+  for (; now.iterations < kMaxIterations && r.size() > 0 && tree.freedoms() > 0; ++now.iterations) {
+    if (r.cwiseAbs().maxCoeff() < 1e-16) break;
+    VecX s = DampedStep(J * unit.asDiagonal(), r, mu);
+    if (const double largest = s.cwiseAbs().maxCoeff(); largest > kLargestStep) {
+      s *= kLargestStep / largest;
+    }
+    Attempt next = now;
+    tree.Step(unit.cwiseProduct(s), &next.X_FM);
+    next.states = tree.States(next.X_FM);
+    MatX J_next;
+    const VecX r_next = ClosureResidual(mechanism, tree, next.states, length, &J_next);
+    if (r_next.norm() < r.norm()) {
+      now.X_FM = std::move(next.X_FM);
+      now.states = std::move(next.states);
+      r = r_next;
+      J = J_next;
+      mu = std::max(mu * 0.1, 1e-24);
+    } else {
+      // At round-off no step helps any more.
+      if (r.cwiseAbs().maxCoeff() < 0.1 * kHomeTolerance || mu > 1e8) break;
+      mu *= 30.0;
+    }
+  }
+  now.gap = LargestGap(mechanism, now.states, length);
+  return now;
+}
+
+std::vector<bool> DrivenJoints(const Mechanism& mechanism) {
+  std::vector<bool> driven(mechanism.joints.size(), false);
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* d = std::get_if<JointDrive>(&drive.kind)) {
+      // A joint with undriven freedoms beside the driven one cannot be locked as a whole.
+      driven[d->joint] = FreedomsOf(mechanism.joints[d->joint].kind) == 1;
+    }
+  }
+  for (const Prescribed& p : mechanism.prescribed) driven[p.joint] = true;
+  return driven;
+}
+
+Coordinates Disturbed(const Mechanism& mechanism, const Coordinates& guess,
+                      const std::vector<bool>& locked, double amplitude, std::mt19937_64* random) {
+  const double length = CharacteristicLength(mechanism);
+  std::uniform_real_distribution<double> uniform(-amplitude, amplitude);
+  Coordinates out = guess;
+  for (const int j : mechanism.tree_joints) {
+    if (locked[j]) continue;
+    const Joint& joint = mechanism.joints[j];
+    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      out[j][c] += uniform(*random) * (internal::IsAngle(joint.kind, c) ? 1.0 : length);
+    }
+  }
+  return out;
+}
+
+// kHomeTolerance, or what rounding leaves of coordinates that are large beside the mechanism.
+double ToleranceAt(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
+  const double reach = Reach(LongestLever(mechanism), X_WB);
+  return std::max(kHomeTolerance, GapRounding(reach) / CharacteristicLength(mechanism));
+}
+
+Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeResult* result) {
+  const std::vector<bool> driven = DrivenJoints(mechanism);
+  const std::vector<bool> none(mechanism.joints.size(), false);
+  Attempt best = Close(mechanism, driven, guess);
+  const auto open = [&] { return best.gap > ToleranceAt(mechanism, best.states.X_WB); };
+  const auto try_from = [&](const std::vector<bool>& locked, const Coordinates& start) {
+    Attempt attempt = Close(mechanism, locked, start);
+    attempt.iterations += best.iterations;
+    best.iterations = attempt.iterations;
+    if (attempt.gap >= best.gap) return false;
+    best = std::move(attempt);
+    return true;
+  };
+  const bool any_driven = std::find(driven.begin(), driven.end(), true) != driven.end();
+  if (open() && any_driven) result->drives_moved = try_from(none, guess);
+
+  std::mt19937_64 random(20220101);
+  for (int i = 0; i < 12 && open(); ++i) {
+    const std::vector<bool>& locked = i % 2 == 0 ? driven : none;
+    const double amplitude = 0.05 * (1 + i);
+    if (try_from(locked, Disturbed(mechanism, guess, locked, amplitude, &random))) {
+      result->guesses_moved = true;
+      result->drives_moved = any_driven && i % 2 == 1;
+    }
+  }
+  return best;
+}
+
+}  // namespace
+
+std::string HomeResult::Text(const Mechanism& mechanism) const {
+  if (closed) return fmt::format("all loops close within {:.1e}", gap);
+  std::string text;
+  for (size_t i = 0; i < std::min<size_t>(gaps.size(), 3); ++i) {
+    text +=
+        fmt::format("{}{} is open by {:.4g} m and {:.4g} rad", i == 0 ? "" : "; ",
+                    mechanism.joints[gaps[i].joint].name, gaps[i].position_m, gaps[i].rotation_rad);
+  }
+  return text;
+}
+
+std::vector<std::array<double, 6>> JointCoordinatesAt(const Mechanism& mechanism,
+                                                      const std::vector<Pose>& X_WB,
+                                                      const Coordinates& near) {
+  BodyStates states;
+  states.Resize(X_WB.size());
+  states.X_WB = X_WB;
+  Coordinates q(mechanism.joints.size());
+  for (size_t j = 0; j < q.size(); ++j) {
+    q[j].fill(0.0);
+    for (int c = 0; c < FreedomsOf(mechanism.joints[j].kind); ++c) {
+      q[j][c] = JointCoordinateRow(mechanism.joints[j], c, states, near[j][c]).value;
+    }
+  }
+  return q;
+}
+
+HomeResult SolveHome(Mechanism* mechanism) {
+  const double length = CharacteristicLength(*mechanism);
+  Coordinates guess;
+  for (const Joint& joint : mechanism->joints) guess.push_back(joint.guess);
+
+  HomeResult result;
+  const Attempt best = BestAttempt(*mechanism, guess, &result);
+  mechanism->X_WB_home = best.states.X_WB;
+  const Coordinates home = JointCoordinatesAt(*mechanism, best.states.X_WB, guess);
+  BodyStates at_guess;
+  at_guess.Resize(mechanism->bodies.size());
+  at_guess.X_WB = TreePoses(*mechanism, guess);
+  for (size_t j = 0; j < home.size(); ++j) {
+    mechanism->joints[j].home = home[j];
+    if (mechanism->joints[j].closure) {
+      result.gaps.push_back(GapOf(*mechanism, static_cast<int>(j), best.states));
+    }
+  }
+  const auto size = [&](const LoopGap& g) {
+    return std::max(g.position_m / length, g.rotation_rad);
+  };
+  std::stable_sort(result.gaps.begin(), result.gaps.end(),
+                   [&](const LoopGap& a, const LoopGap& b) { return size(a) > size(b); });
+  result.gap = best.gap;
+  result.gap_at_guess = LargestGap(*mechanism, at_guess, length);
+  result.tolerance = ToleranceAt(*mechanism, best.states.X_WB);
+  result.closed = best.gap <= result.tolerance;
+  result.iterations = best.iterations;
+  return result;
+}
+
+}  // namespace mbv

@@ -1,0 +1,155 @@
+// Rank analysis of the scaled constraint Jacobian.
+#include "kinematics/mobility.h"
+
+#include <algorithm>
+#include <set>
+
+#include "core/demand.h"
+#include "kinematics/row_stack.h"
+#include "mechanism/reach.h"
+
+namespace mbv {
+namespace {
+
+using internal::FindRank;
+using internal::kStressTolerance;
+using internal::NullSpaces;
+using internal::RankFinding;
+using internal::RowStack;
+
+bool ActsOn(const MatX& self_stress, int first_row, int rows) {
+  return rows > 0 && self_stress.cols() > 0 &&
+         self_stress.middleRows(first_row, rows).cwiseAbs().maxCoeff() > kStressTolerance;
+}
+
+// The rows that transmit reactions (isostatic rule applied), then those of everything driven.
+struct ReactionStack {
+  RowStack stack;
+  std::vector<ConstraintRows> rows;  // per joint
+  std::vector<int> first_row;        // per joint, then of the first drive
+
+  ReactionStack(const Mechanism& mechanism, const BodyStates& states, double length)
+      : stack(mechanism.bodies.size(), length) {
+    for (const Joint& joint : mechanism.joints) {
+      first_row.push_back(stack.size());
+      rows.push_back(RowsOf(joint, states, true));
+      stack.Add(rows.back());
+    }
+    first_row.push_back(stack.size());
+  }
+};
+
+// The components of a joint's reaction that self-stresses can change. A row that is scaled by s
+// acts with s times its Jacobian.
+UndeterminedReaction OpenComponents(const Joint& joint, const ConstraintRows& rows,
+                                    const BodyStates& states, double length,
+                                    const MatX& self_stress, int first_row) {
+  static constexpr const char* kNames[] = {"fx", "fy", "fz", "mx", "my", "mz"};
+  const Mat3 R_FW = (states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
+  const Vec3 r_M = states.X_WB[joint.child].linear() * joint.X_CM.translation();
+  Vec6 most = Vec6::Zero();  // [f; m / L]
+  for (Eigen::Index k = 0; k < self_stress.cols(); ++k) {
+    Vec6 F = Vec6::Zero();  // [m about Co; f] on the child
+    for (int i = 0; i < rows.rows; ++i) {
+      const double scale = i < rows.translation_rows ? 1.0 : length;
+      F += self_stress(first_row + i, k) * scale * rows.J_child.row(i).transpose();
+    }
+    const Vec3 f = R_FW * F.tail<3>();
+    const Vec3 m = R_FW * (F.head<3>() - r_M.cross(F.tail<3>()));
+    most.head<3>() = most.head<3>().cwiseMax(f.cwiseAbs());
+    most.tail<3>() = most.tail<3>().cwiseMax(m.cwiseAbs() / length);
+  }
+  UndeterminedReaction reaction{joint.name, {}};
+  for (Eigen::Index c = 0; c < 6; ++c) {
+    if (most[c] > kStressTolerance) reaction.components.emplace_back(kNames[c]);
+  }
+  return reaction;
+}
+
+// Which forces a self-stress of the locked mechanism can change.
+void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, double length,
+                         Mobility* mobility) {
+  ReactionStack reactions(mechanism, states, length);
+  mobility->isostatic_rule_sound =
+      FindRank(reactions.stack.Matrix(), NullSpaces::kNone).rank == mobility->constraint_rank;
+  reactions.stack.AddDriven(mechanism, states);
+  const MatX self_stress = FindRank(reactions.stack.Matrix(), NullSpaces::kSelfStress).self_stress;
+  const std::vector<int>& first_row = reactions.first_row;
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    if (!ActsOn(self_stress, first_row[j], first_row[j + 1] - first_row[j])) continue;
+    mobility->joints_not_unique.push_back(mechanism.joints[j].name);
+    mobility->reactions_not_unique.push_back(OpenComponents(
+        mechanism.joints[j], reactions.rows[j], states, length, self_stress, first_row[j]));
+  }
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    if (ActsOn(self_stress, first_row.back() + static_cast<int>(d), 1)) {
+      mobility->drives_not_unique.push_back(mechanism.drives[d].name);
+    }
+  }
+  mobility->drive_forces_unique = mobility->drives_not_unique.empty();
+}
+
+}  // namespace
+
+Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
+  MBV_DEMAND(states.X_WB.size() == mechanism.bodies.size(), mechanism.name);
+  const double length = CharacteristicLength(mechanism);
+  Mobility mobility;
+  mobility.body_coordinates = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
+  mobility.drives = static_cast<int>(mechanism.drives.size());
+  mobility.prescribed = static_cast<int>(mechanism.prescribed.size());
+
+  RowStack stack(mechanism.bodies.size(), length);
+  stack.AddJoints(mechanism, states, false);
+  const RankFinding joints = FindRank(stack.Matrix(), NullSpaces::kNone);
+  mobility.constraint_rows = stack.size();
+  mobility.constraint_rank = joints.rank;
+  mobility.freedoms = mobility.body_coordinates - joints.rank;
+  mobility.redundant = stack.size() - joints.rank;
+  mobility.kutzbach = mobility.body_coordinates - stack.size();
+  mobility.smallest_kept = joints.smallest_kept;
+  mobility.largest_dropped = joints.largest_dropped;
+
+  stack.AddDriven(mechanism, states);
+  mobility.undriven = mobility.body_coordinates - FindRank(stack.Matrix(), NullSpaces::kNone).rank;
+  mobility.drives_determine_motion = mobility.undriven == 0;
+  FindForcesNotUnique(mechanism, states, length, &mobility);
+  return mobility;
+}
+
+Mobility AnalyseMobility(const Mechanism& mechanism) {
+  MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  states.X_WB = mechanism.X_WB_home;
+  return AnalyseMobility(mechanism, states);
+}
+
+std::vector<std::string> ReactionsNotUnique(const Mechanism& mechanism,
+                                            const std::vector<std::vector<Pose>>& X_WB) {
+  constexpr size_t kPoses = 5;
+  std::set<std::string> open;
+  const auto add = [&](const Mobility& mobility) {
+    for (const UndeterminedReaction& reaction : mobility.reactions_not_unique) {
+      for (const std::string& component : reaction.components) {
+        open.insert(reaction.joint + ".reaction." + component);
+      }
+    }
+  };
+  add(AnalyseMobility(mechanism));
+  const size_t count = open.empty() ? 0 : std::min(kPoses, X_WB.size());
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  for (size_t k = 0; k < count; ++k) {
+    states.X_WB = X_WB[(2 * k + 1) * X_WB.size() / (2 * count)];
+    const auto finite = [](const Pose& X) { return X.matrix().allFinite(); };
+    if (states.X_WB.size() != mechanism.bodies.size() ||
+        !std::all_of(states.X_WB.begin(), states.X_WB.end(), finite)) {
+      continue;  // the simulation broke down before
+    }
+    add(AnalyseMobility(mechanism, states));
+  }
+  return {open.begin(), open.end()};
+}
+
+}  // namespace mbv

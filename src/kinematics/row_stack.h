@@ -1,0 +1,53 @@
+// Constraint rows of a whole mechanism as one scaled matrix, and its rank. Internal to kinematics/.
+//
+// Scaled so that the entries are pure numbers: lengths are measured in characteristic lengths L, so
+// a translation row is r/L with ṙ/L = J_ω ω/L + J_v v/L.
+#pragma once
+
+#include <vector>
+
+#include "kinematics/constraints.h"
+
+namespace mbv::internal {
+
+/// A singular value below this times the largest counts as zero. Home poses close to 1e-12.
+inline constexpr double kRankTolerance = 1e-9;
+/// A self-stress with a smaller share than this in a row does not act there.
+inline constexpr double kStressTolerance = 1e-7;
+
+/// Scaled rows over the moving bodies.
+class RowStack {
+ public:
+  RowStack(size_t bodies, double length)
+      : columns_(6 * (static_cast<Eigen::Index>(bodies) - 1)), length_(length) {}
+
+  void Add(int parent, const Vec6& J_parent, int child, const Vec6& J_child, bool translation);
+  void Add(const ConstraintRows& rows);
+  void Add(const ScalarRow& row, bool translation) {
+    Add(row.parent, row.J_parent, row.child, row.J_child, translation);
+  }
+  /// The true rows of all joints; with `reactions`, the isostatic rule is applied.
+  void AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions);
+  /// Every drive and prescribed joint, locked.
+  void AddDriven(const Mechanism& mechanism, const BodyStates& states);
+
+  [[nodiscard]] int size() const { return static_cast<int>(rows_.size()); }
+  [[nodiscard]] MatX Matrix() const;
+
+ private:
+  Eigen::Index columns_;
+  double length_;
+  std::vector<VecX> rows_;
+};
+
+struct RankFinding {
+  int rank = 0;
+  double smallest_kept = 0.0, largest_dropped = 0.0;
+  MatX self_stress;  ///< rows × (rows − rank): null space of the transpose
+  MatX motion;       ///< columns × (columns − rank): null space
+};
+enum class NullSpaces { kNone, kSelfStress, kMotion };
+[[nodiscard]] RankFinding FindRank(const MatX& J, NullSpaces wanted,
+                                   double tolerance = kRankTolerance);
+
+}  // namespace mbv::internal

@@ -1,0 +1,36 @@
+// Poses and Jacobian of the spanning tree. Internal to kinematics/.
+//
+// The state is X_FM of every tree joint, not its coordinates, so that balls have no gimbal lock.
+#pragma once
+
+#include <vector>
+
+#include "mechanism/body_states.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv::internal {
+
+class TreeMotion {
+ public:
+  /// Joints with locked[j] get no columns.
+  TreeMotion(const Mechanism& mechanism, const std::vector<bool>& locked);
+
+  [[nodiscard]] int freedoms() const { return freedoms_; }
+  /// True per column when it is an angle.
+  [[nodiscard]] const std::vector<bool>& angular() const { return angular_; }
+
+  /// Body poses; velocities zero. `X_FM` by joint index.
+  [[nodiscard]] BodyStates States(const std::vector<Pose>& X_FM) const;
+  /// 6·bodies × freedoms: twist of every body (world axes, body origins) per unit rate.
+  [[nodiscard]] MatX Jacobian(const BodyStates& states) const;
+  /// Moves every joint by the finite step `dq`.
+  void Step(const VecX& dq, std::vector<Pose>* X_FM) const;
+
+ private:
+  const Mechanism& mechanism_;
+  std::vector<int> first_column_;  ///< by joint, -1 without columns
+  std::vector<bool> angular_;
+  int freedoms_ = 0;
+};
+
+}  // namespace mbv::internal

@@ -1,0 +1,203 @@
+// Doubts about a model that is possible but hardly meant: lengths in millimetres, inertias in
+// kg mm² or about another point than the centre of mass, gravity in mm/s². All are warnings.
+//
+// What tells them is density. Nothing solid is denser than osmium (22 600 kg/m³), so a body whose
+// lengths are millimetres taken for metres has less than 2.3e-5 kg per cubic metre of its extent,
+// and one whose inertia is in kg mm² less than 1e-3 kg per cubic metre of its radius of gyration:
+// ships and flywheels do not come near either.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "mechanism/reach.h"
+#include "model_file/model_reader.h"
+
+namespace mbv {
+namespace {
+
+constexpr double kThinnest = 22600e-9;   // [kg/m³], mass / extent³
+constexpr double kThinnestCloud = 1e-3;  // [kg/m³], mass / (radius of gyration)³
+constexpr double kFarOut = 10.0;         // lengths of the body, or of the mechanism
+constexpr double kNoMass = 1e-6;         // share of the heaviest body: stands in for nothing
+constexpr double kTooWide = 1.05;        // second moment over the largest that the extent allows
+constexpr size_t kMostNames = 4;
+
+struct Points {
+  std::vector<Vec3> p;
+
+  void Add(const Vec3& point) {
+    if (point.allFinite()) p.push_back(point);
+  }
+  void AddBall(const Vec3& centre, double radius) {
+    Add(centre - Vec3::Constant(radius));
+    Add(centre + Vec3::Constant(radius));
+  }
+  void Add(const Shape& shape) {
+    if (const auto* box = std::get_if<Box>(&shape.geometry)) {
+      const Vec3 half = 0.5 * (box->X_BG.linear().cwiseAbs() * box->size);
+      Add(box->X_BG.translation() - half);
+      Add(box->X_BG.translation() + half);
+    } else if (const auto* ball = std::get_if<Ball>(&shape.geometry)) {
+      AddBall(ball->p_centre, ball->radius);
+    } else if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
+      AddBall(capsule->p_from, capsule->radius);
+      AddBall(capsule->p_to, capsule->radius);
+    } else if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
+      AddBall(cylinder->p_from, cylinder->radius);
+      AddBall(cylinder->p_to, cylinder->radius);
+    }
+  }
+  [[nodiscard]] Vec3 low() const {
+    Vec3 value = p.front();
+    for (const Vec3& point : p) value = value.cwiseMin(point);
+    return value;
+  }
+  [[nodiscard]] Vec3 high() const {
+    Vec3 value = p.front();
+    for (const Vec3& point : p) value = value.cwiseMax(point);
+    return value;
+  }
+  /// Diagonal of the bounding box [m].
+  [[nodiscard]] double extent() const { return p.empty() ? 0.0 : (high() - low()).norm(); }
+};
+
+// Everything that is known to be on a body: named frames, joints, ends of drives and springs,
+// shapes.
+Points PointsOf(const Mechanism& mechanism, int body) {
+  Points points;
+  const Body& described = mechanism.bodies[static_cast<size_t>(body)];
+  for (const NamedFrame& frame : described.frames) points.Add(frame.X_BF.translation());
+  for (const Shape& shape : described.shapes) points.Add(shape);
+  for (const Joint& joint : mechanism.joints) {
+    if (joint.parent == body) points.Add(joint.X_PF.translation());
+    if (joint.child == body) points.Add(joint.X_CM.translation());
+  }
+  const auto add_ends = [&](const auto& line) {
+    if (line.body_from == body) points.Add(line.p_from);
+    if (line.body_to == body) points.Add(line.p_to);
+  };
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) add_ends(*leg);
+  }
+  for (const SpringDamper& spring : mechanism.springs) add_ends(spring);
+  return points;
+}
+
+struct Doubt {
+  std::string text, hint;
+};
+
+double Cubed(double x) { return x * x * x; }
+
+std::optional<Doubt> DoubtCentreOfMass(const Body& body, const Points& points, double length_m) {
+  if (points.p.empty()) return {};
+  const Vec3 c = body.p_BoBcm_B;
+  const double away = (c - c.cwiseMax(points.low()).cwiseMin(points.high())).norm();
+  if (away <= kFarOut * length_m || body.mass >= kThinnestCloud * Cubed(away)) return {};
+  return Doubt{
+      fmt::format("its centre of mass is {:.4g} m away from the rest of it, which measures "
+                  "{:.4g} m",
+                  away, length_m),
+      "lengths are in metres; is the centre of mass in millimetres?"};
+}
+
+std::optional<Doubt> DoubtInertia(const Body& body, double length_m) {
+  const double largest =
+      Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B, Eigen::EigenvaluesOnly).eigenvalues()[2];
+  const double k = std::sqrt(largest / body.mass);
+  if (!(k > kFarOut * length_m) || body.mass >= kThinnestCloud * Cubed(k)) return {};
+  return Doubt{
+      fmt::format("its radius of gyration is {:.4g} m, the body measures {:.4g} m", k, length_m),
+      "inertias are in kg m²; are they in kg mm² (1e-6 kg m²)?"};
+}
+
+// The second moments about the centre of mass, Σ m (p − c)², are largest when all mass sits at the
+// ends of the body: m (high − c)(c − low) per axis. Inertias about the body's origin exceed that,
+// and what is left without the share m |c|² of the shift does not.
+std::optional<Doubt> DoubtPoint(const Body& body, Points points) {
+  const Vec3 c = body.p_BoBcm_B;
+  points.Add(c);
+  const double possible = body.mass * (points.high() - c).dot(c - points.low());
+  const double given = 0.5 * body.I_Bcm_B.trace(), shift = body.mass * c.squaredNorm();
+  if (!(given > kTooWide * possible) || !(given - shift < possible / kTooWide)) return {};
+  const Mat3 moved =
+      body.I_Bcm_B - body.mass * (c.squaredNorm() * Mat3::Identity() - c * c.transpose());
+  const Vec3 principal =
+      Eigen::SelfAdjointEigenSolver<Mat3>(moved, Eigen::EigenvaluesOnly).eigenvalues();
+  if (!(principal[0] >= -1e-9 * principal[2])) return {};
+  if (principal[0] + principal[1] < principal[2] * (1.0 - 1e-6)) return {};
+  return Doubt{
+      fmt::format("its inertia about the centre of mass is {:.3g} times the largest that a body of "
+                  "this extent can have",
+                  given / possible),
+      "inertias are about the centre of mass, in body axes; are these about the body's origin?"};
+}
+
+}  // namespace
+
+void ModelReader::WarnAboutBody(int body, const std::string& text, const std::string& hint) {
+  const auto b = static_cast<size_t>(body);
+  const std::string& name = mechanism_.bodies[b].name;
+  if (const YamlEntry* at = body_places_[b]; at != nullptr) {
+    yaml_.SetNote(name == at->key ? "" : fmt::format(" (body {})", name));
+    yaml_.AddAt(Severity::kWarning, at->line, at->column, body_paths_[b] + ": " + text, hint);
+    yaml_.SetNote("");
+  } else {
+    other_findings_.Add(
+        {Severity::kWarning, body_paths_[b], 0, 0, fmt::format("link '{}': {}", name, text), hint});
+  }
+}
+
+void ModelReader::CheckPlausible() {
+  double heaviest_kg = 0.0;
+  for (const Body& body : mechanism_.bodies) heaviest_kg = std::max(heaviest_kg, body.mass);
+  const double mechanism_m = CharacteristicLength(mechanism_);
+  std::vector<int> thin;
+  double extent_m = 0.0;
+  for (int b = 1; b < static_cast<int>(mechanism_.bodies.size()); ++b) {
+    const Body& body = mechanism_.bodies[static_cast<size_t>(b)];
+    if (!(body.mass > kNoMass * heaviest_kg)) continue;
+    const Points points = PointsOf(mechanism_, b);
+    const double extent = points.extent();
+    if (body.mass < kThinnest * Cubed(extent)) {
+      if (thin.empty()) extent_m = extent;
+      thin.push_back(b);
+      continue;  // the rest would be its consequences
+    }
+    const double length_m = std::max(extent, extent > 0.0 ? 0.0 : mechanism_m);
+    for (const auto& doubt : {DoubtCentreOfMass(body, points, length_m),
+                              DoubtInertia(body, length_m), DoubtPoint(body, points)}) {
+      if (!doubt) continue;
+      WarnAboutBody(b, doubt->text, doubt->hint);
+      break;
+    }
+  }
+  WarnAboutLengths(thin, extent_m);
+  WarnAboutGravity();
+}
+
+void ModelReader::WarnAboutLengths(const std::vector<int>& thin, double extent_m) {
+  if (thin.empty()) return;
+  const Body& first = mechanism_.bodies[static_cast<size_t>(thin.front())];
+  std::string others;
+  for (size_t k = 1; k < std::min(thin.size(), kMostNames); ++k) {
+    others += (k == 1 ? "" : ", ") + mechanism_.bodies[static_cast<size_t>(thin[k])].name;
+  }
+  if (thin.size() > kMostNames) others += fmt::format(" and {} more", thin.size() - kMostNames);
+  WarnAboutBody(thin.front(),
+                fmt::format("it has {:.4g} kg and measures {:.4g} m, thinner than any solid{}",
+                            first.mass, extent_m, others.empty() ? "" : "; so do " + others),
+                "lengths are in metres; are these millimetres?");
+}
+
+void ModelReader::WarnAboutGravity() {
+  constexpr double kLeast = 500.0, kMost = 3e4;  // [m/s²]: 9810 mm/s², and less on the moon
+  const double g = mechanism_.gravity_W.norm();
+  if (g < kLeast || g > kMost) return;
+  yaml_.AddAt(Severity::kWarning, 0, 0,
+              fmt::format("gravity is {:.6g} m/s², {:.3g} times that of the earth", g, g / 9.81),
+              "gravity is in m/s²; is it in mm/s²?");
+}
+
+}  // namespace mbv

@@ -1,0 +1,197 @@
+// The file beside a URDF tree that names its closed loops, as used with Pinocchio
+// (example-parallel-robots): pairs of frames in contact, motors, and joints of other kinds.
+//
+//   closed_loop: [[A1, B1], …]   links (or joints) whose frames coincide
+//   type: [6d, 3d, …]            6d: they are one frame; 3d: their origins meet
+//   name_mot: [JOINT, …]         motors
+//   joint_name: [JOINT, …]       joints that are not what URDF says
+//   joint_type: [SPHERICAL, UJOINT_XY, FIXED, …]
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+
+#include "model_file/model_reader.h"
+
+namespace mbv {
+namespace {
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// "closedloop1" of closedloop1_A and closedloop1_B, else both names.
+std::string NameOfPair(const std::string& a, const std::string& b, const UrdfTree& tree) {
+  std::string name(a.begin(), std::mismatch(a.begin(), a.end(), b.begin(), b.end()).first);
+  while (!name.empty() && (name.back() == '_' || name.back() == '.')) name.pop_back();
+  const bool taken = std::any_of(tree.joints.begin(), tree.joints.end(),
+                                 [&](const Joint& joint) { return joint.name == name; });
+  return name.size() < 3 || taken ? a + "_" + b : name;
+}
+
+class ClosureFile {
+ public:
+  ClosureFile(YamlReader* yaml, UrdfTree* tree) : yaml_(*yaml), tree_(*tree) {}
+
+  void Read(const YamlNode& root, std::vector<std::string>* motors) {
+    const YamlMap map(&yaml_, &root, "",
+                      {"closed_loop", "type", "name_mot", "joint_name", "joint_type"});
+    if (!map.valid()) return;
+    ReadKinds(map);
+    ReadLoops(map);
+    for (const YamlNode* node : ListOf(map, "name_mot")) {
+      const auto index = JointNamed(*node, "name_mot");
+      if (!index) continue;
+      if (FreedomsOf(tree_.joints[*index].kind) != 1) {
+        yaml_.Error(*node, fmt::format("name_mot: joint '{}' has {} freedoms, a motor drives one",
+                                       node->text, FreedomsOf(tree_.joints[*index].kind)));
+      } else {
+        motors->push_back(node->text);
+      }
+    }
+  }
+
+ private:
+  std::vector<const YamlNode*> ListOf(const YamlMap& map, const std::string& key) {
+    const YamlNode* node = map.Find(key);
+    if (node == nullptr) return {};
+    return yaml_.Items(*node, key).value_or(std::vector<const YamlNode*>{});
+  }
+
+  std::optional<int> JointNamed(const YamlNode& node, const std::string& path) {
+    const auto name = yaml_.Text(node, path);
+    if (!name) return std::nullopt;
+    std::vector<std::string> names;
+    for (size_t j = 0; j < tree_.joints.size(); ++j) {
+      if (tree_.joints[j].name == *name) return static_cast<int>(j);
+      names.push_back(tree_.joints[j].name);
+    }
+    const std::string near = ClosestWord(*name, names);
+    yaml_.Error(node, fmt::format("{}: there is no joint '{}' in the URDF file", path, *name),
+                near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+    return std::nullopt;
+  }
+
+  // A link, or the link that a joint carries: their frames are the same in URDF.
+  std::optional<int> FrameNamed(const YamlNode& node, const std::string& path) {
+    const auto name = yaml_.Text(node, path);
+    if (!name) return std::nullopt;
+    if (const int link = tree_.FindLink(*name); link > -2) return link;
+    std::vector<std::string> names;
+    for (const Joint& joint : tree_.joints) {
+      if (joint.name == *name) return joint.child;
+      names.push_back(joint.name);
+    }
+    for (const Body& body : tree_.bodies) names.push_back(body.name);
+    const std::string near = ClosestWord(*name, names);
+    yaml_.Error(node,
+                fmt::format("{}: there is no link or joint '{}' in the URDF file", path, *name),
+                near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+    return std::nullopt;
+  }
+
+  void ReadKinds(const YamlMap& map) {
+    const auto names = ListOf(map, "joint_name"), types = ListOf(map, "joint_type");
+    if (names.size() != types.size()) {
+      yaml_.Error(*map.node(), fmt::format("joint_name has {} entries, joint_type {}", names.size(),
+                                           types.size()));
+      return;
+    }
+    for (size_t i = 0; i < names.size(); ++i) {
+      const auto index = JointNamed(*names[i], fmt::format("joint_name[{}]", i));
+      const auto type = yaml_.Text(*types[i], fmt::format("joint_type[{}]", i));
+      if (!index || !type) continue;
+      Joint& joint = tree_.joints[*index];
+      const auto axis = [&](size_t from_end) -> Vec3 {
+        return Vec3::Unit(std::string("XYZ").find((*type)[type->size() - from_end]));
+      };
+      const bool universal = type->size() == 9 && type->starts_with("UJOINT_") &&
+                             std::string("XYZ").find((*type)[7]) != std::string::npos &&
+                             std::string("XYZ").find((*type)[8]) != std::string::npos &&
+                             (*type)[7] != (*type)[8];
+      joint.range = {};
+      if (*type == "SPHERICAL") {
+        joint.kind = JointKind::kSpherical;
+      } else if (*type == "FIXED") {
+        joint.kind = JointKind::kFixed;
+      } else if (universal) {
+        joint.kind = JointKind::kUniversal;
+        joint.axis = axis(2);
+        joint.axis2 = axis(1);
+      } else {
+        yaml_.Error(*types[i],
+                    fmt::format("joint_type[{}] = {} is not known", i, Describe(*types[i])),
+                    "SPHERICAL, FIXED, or UJOINT_ with two of X, Y, Z, e.g. UJOINT_XY");
+      }
+    }
+  }
+
+  void ReadLoops(const YamlMap& map) {
+    const auto loops = ListOf(map, "closed_loop"), types = ListOf(map, "type");
+    if (!types.empty() && types.size() != loops.size()) {
+      yaml_.Error(*map.node(),
+                  fmt::format("closed_loop has {} entries, type {}", loops.size(), types.size()));
+      return;
+    }
+    for (size_t i = 0; i < loops.size(); ++i) {
+      const std::string path = fmt::format("closed_loop[{}]", i);
+      const auto pair = yaml_.Items(*loops[i], path, 2);
+      if (!pair) continue;
+      const auto a = FrameNamed(*(*pair)[0], path), b = FrameNamed(*(*pair)[1], path);
+      std::string type = "6d";
+      if (!types.empty()) {
+        type = Lower(yaml_.Text(*types[i], fmt::format("type[{}]", i)).value_or("6d"));
+      }
+      if (type != "6d" && type != "3d") {
+        yaml_.Error(*types[i], fmt::format("type[{}] = '{}' is neither 6d nor 3d", i, type));
+      }
+      if (!a || !b) continue;
+      if (*a == *b) {
+        yaml_.Error(*loops[i], fmt::format("{} connects a link with itself", path));
+        continue;
+      }
+      Joint joint;
+      joint.name = NameOfPair((*pair)[0]->text, (*pair)[1]->text, tree_);
+      joint.kind = type == "3d" ? JointKind::kSpherical : JointKind::kFixed;
+      joint.parent = *a;
+      joint.child = *b;
+      joint.closure = true;
+      tree_.joints.push_back(joint);
+      tree_.joint_lines.push_back(0);
+    }
+  }
+
+  YamlReader& yaml_;
+  UrdfTree& tree_;
+};
+
+}  // namespace
+
+void ModelReader::DropClosures(UrdfTree* tree) {
+  while (!tree->joints.empty() && tree->joints.back().closure) {
+    tree->joints.pop_back();
+    tree->joint_lines.pop_back();
+  }
+}
+
+bool ModelReader::ReadClosureFile(const YamlNode& node, UrdfTree* tree,
+                                  std::vector<std::string>* motors) {
+  const auto file = yaml_.Text(node, "urdf.closures");
+  if (!file) return false;
+  const std::filesystem::path path = std::filesystem::path(yaml_.file()).parent_path() / *file;
+  YamlReader reader(path.string());
+  const auto text = reader.ReadFile();
+  if (!text) {
+    yaml_.Error(node, fmt::format("urdf.closures = {} cannot be read", Describe(node)),
+                "the path is relative to this file");
+    return false;
+  }
+  const YamlNodePtr root = reader.Parse(*text);
+  if (root != nullptr) ClosureFile(&reader, tree).Read(*root, motors);
+  other_findings_.Append(reader.diagnostics());
+  return !reader.has_errors();
+}
+
+}  // namespace mbv

@@ -1,0 +1,299 @@
+// Numbers, vectors, poses and names of a model file.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/spatial.h"
+#include "model_file/model_reader.h"
+
+namespace mbv {
+
+std::optional<double> ModelReader::Number(const Block& block, const YamlNode& node,
+                                          const std::string& path, double factor) {
+  if (!node.is_scalar()) {
+    yaml_.Error(node,
+                fmt::format("{} is {}, a number or an expression is needed", path, Describe(node)));
+    return std::nullopt;
+  }
+  const ExpressionResult result = block.scope->Evaluate(node.text);
+  if (result.value) {
+    const double value = *result.value * factor;
+    return IsWrittenOut(node.text) ? LiteralAt(path, value) : value;
+  }
+  // An empty text: a parameter failed whose own place already carries the finding.
+  if (!result.error.empty()) {
+    yaml_.Error(node, fmt::format("{} = {} {}", path, Describe(node), result.error), result.hint);
+  }
+  return std::nullopt;
+}
+
+double ModelReader::LiteralAt(const std::string& place, double value) {
+  // An instance's literal is read once, its part's as often as there are instances.
+  if (literal_places_.insert(place).second) literals_.push_back({place, value});
+  const auto other = options_.literals.find(place);
+  return other == options_.literals.end() ? value : other->second;
+}
+
+std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlNode& node,
+                                        const std::string& path, double factor) {
+  const auto items = yaml_.Items(node, path, 3);
+  if (!items) return std::nullopt;
+  Vec3 vector;
+  bool good = true;
+  for (int k = 0; k < 3; ++k) {
+    const auto value = Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), factor);
+    good = good && value.has_value();
+    vector[k] = value.value_or(kNan);
+  }
+  return good ? std::optional<Vec3>(vector) : std::nullopt;
+}
+
+std::optional<double> ModelReader::Number(const Block& block, const YamlMap& map,
+                                          const std::string& key,
+                                          std::initializer_list<UnitSuffix> units) {
+  const YamlMap::InUnit found = map.FindInUnit(key, units);
+  if (found.node == nullptr) return std::nullopt;
+  return Number(block, *found.node, map.PathOf(found.key), found.unit.factor);
+}
+
+std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlMap& map,
+                                        const std::string& key,
+                                        std::initializer_list<UnitSuffix> units) {
+  const YamlMap::InUnit found = map.FindInUnit(key, units);
+  if (found.node == nullptr) return std::nullopt;
+  return Vector(block, *found.node, map.PathOf(found.key), found.unit.factor);
+}
+
+std::optional<Vec3> ModelReader::Axis(const Block& block, const YamlNode& node,
+                                      const std::string& path) {
+  if (node.is_sequence()) {
+    const auto vector = Vector(block, node, path);
+    if (!vector) return std::nullopt;
+    const double length = vector->stableNorm();
+    if (length > 1e-9 && std::isfinite(length)) return *vector / length;
+    yaml_.Error(node, fmt::format("{} has the length {}, an axis needs a direction", path, length));
+    return std::nullopt;
+  }
+  static const std::vector<std::string> names = {"x", "y", "z", "-x", "-y", "-z"};
+  const auto name = yaml_.Choice(node, path, names);
+  if (!name) return std::nullopt;
+  Vec3 axis = Vec3::Zero();
+  axis[*name % 3] = *name < 3 ? 1.0 : -1.0;
+  return axis;
+}
+
+std::optional<Mat3> ModelReader::RotationFromAxes(const Block& block, const YamlNode& node,
+                                                  const std::string& path) {
+  const YamlMap map(&yaml_, &node, path, {"x", "y", "z"});
+  if (!map.valid()) return std::nullopt;
+  if (node.entries.size() != 2) {
+    yaml_.Error(node, fmt::format("{} gives {} axes, two are needed", path, node.entries.size()),
+                "the first is kept, the second made perpendicular, the third follows");
+    return std::nullopt;
+  }
+  int index[2];
+  Vec3 axis[2];
+  for (int k = 0; k < 2; ++k) {
+    const YamlEntry& entry = node.entries[k];
+    index[k] = entry.key.empty() ? 3 : entry.key[0] - 'x';
+    const auto value = Axis(block, *entry.value, map.PathOf(entry.key));
+    if (!value || index[k] < 0 || index[k] > 2) return std::nullopt;
+    axis[k] = *value;
+  }
+  const Vec3 second = axis[1] - axis[0] * axis[0].dot(axis[1]);
+  if (second.norm() < 1e-9) {
+    yaml_.Error(node, fmt::format("{}: its two axes are parallel", path));
+    return std::nullopt;
+  }
+  Mat3 R;
+  R.col(index[0]) = axis[0];
+  R.col(index[1]) = second.normalized();
+  const int third = 3 - index[0] - index[1];
+  R.col(third) = R.col((third + 1) % 3).cross(R.col((third + 2) % 3));
+  return R;
+}
+
+std::optional<Mat3> ModelReader::Rotation(const Block& block, const YamlNode& node,
+                                          const std::string& path) {
+  const YamlMap map(&yaml_, &node, path, {"rpy", "rpy_deg", "axes", "axis", "angle", "angle_deg"});
+  if (!map.valid()) return std::nullopt;
+  const bool by_rpy = map.Has("rpy") || map.Has("rpy_deg");
+  const bool by_axis = map.Has("axis") || map.Has("angle") || map.Has("angle_deg");
+  if (int{by_rpy} + int{by_axis} + int{map.Has("axes")} != 1) {
+    yaml_.Error(
+        node, fmt::format("{} is given in {} ways", path, node.entries.empty() ? "no" : "several"),
+        "give one of: rpy, axes, axis with angle");
+    return std::nullopt;
+  }
+  if (by_rpy) {
+    const auto rpy = Vector(block, map, "rpy", {kPlain, kDeg});
+    return rpy ? std::optional<Mat3>(RotRpy(*rpy)) : std::nullopt;
+  }
+  if (!by_axis) return RotationFromAxes(block, *map.Find("axes"), map.PathOf("axes"));
+  const YamlNode* axis_node = map.Required("axis");
+  const auto axis =
+      axis_node == nullptr ? std::nullopt : Axis(block, *axis_node, map.PathOf("axis"));
+  if (map.FindInUnit("angle", {kPlain, kDeg}).node == nullptr) (void)map.Required("angle");
+  const auto angle = Number(block, map, "angle", {kPlain, kDeg});
+  if (!axis || !angle) return std::nullopt;
+  return Eigen::AngleAxisd(*angle, *axis).toRotationMatrix();
+}
+
+std::optional<Pose> ModelReader::PoseOf(const Block& block, const YamlNode& node,
+                                        const std::string& path) {
+  Pose pose = Pose::Identity();
+  if (node.is_null()) return pose;
+  if (node.is_sequence()) {  // short form: the position alone
+    const auto position = Vector(block, node, path);
+    if (!position) return std::nullopt;
+    pose.translation() = *position;
+    return pose;
+  }
+  const YamlMap map(&yaml_, &node, path, {"position", "position_mm", "rotation"});
+  if (!map.valid()) return std::nullopt;
+  bool good = true;
+  if (map.Has("position") || map.Has("position_mm")) {
+    const auto position = Vector(block, map, "position", {kPlain, kMm});
+    good = position.has_value();
+    if (position) pose.translation() = *position;
+  }
+  if (const YamlNode* rotation = map.Find("rotation")) {
+    const auto R = Rotation(block, *rotation, map.PathOf("rotation"));
+    good = good && R.has_value();
+    if (R) pose.linear() = *R;
+  }
+  return good ? std::optional<Pose>(pose) : std::nullopt;
+}
+
+std::optional<CoordinateRange> ModelReader::Range(const Block& block, const YamlNode& node,
+                                                  const std::string& path, double factor) {
+  CoordinateRange range;
+  if (node.is_null()) return range;
+  const auto items = yaml_.Items(node, path, 2);
+  if (!items) return std::nullopt;
+  bool good = true;
+  for (int k = 0; k < 2; ++k) {
+    const YamlNode& item = *(*items)[k];
+    if (item.is_null()) continue;  // no limit on this side
+    const auto value = Number(block, item, fmt::format("{}[{}]", path, k), factor);
+    good = good && value.has_value();
+    if (value) (k == 0 ? range.lower : range.upper) = *value;
+  }
+  if (!good) return std::nullopt;
+  if (range.lower < range.upper) return range;
+  yaml_.Error(node, fmt::format("{} = [{}, {}] violates lower < upper", path, (*items)[0]->text,
+                                (*items)[1]->text));
+  return std::nullopt;
+}
+
+bool ModelReader::CheckNewName(const YamlEntry& entry, const std::string& path) {
+  const bool good = std::all_of(entry.key.begin(), entry.key.end(), [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
+  });
+  if (good && entry.key.size() <= 64) return true;
+  yaml_.Error(entry, fmt::format("{}: '{}' is no name", path, entry.key.substr(0, 64)),
+              "names are made of letters, digits, _ and -; dots come from instances");
+  return false;
+}
+
+bool ModelReader::Room(const YamlNode& at, size_t size, size_t limit, const char* what) {
+  if (size < limit) return true;
+  yaml_.Error(at, fmt::format("the model has more than {} {}", limit, what));
+  return false;
+}
+
+std::optional<Pose> ModelReader::FrameOn(const Block& block, int body,
+                                         const std::string& name) const {
+  for (const std::string& level : block.levels) {
+    const NamedFrame* frame = mechanism_.FindFrame(body, level + name);
+    if (frame != nullptr) return frame->X_BF;
+  }
+  return std::nullopt;
+}
+
+namespace {
+
+// The part of a name that a block at `levels` may leave out: "limb1.link1" is "link1" inside.
+std::vector<std::string> ShortNames(const std::vector<std::string>& names,
+                                    const std::vector<std::string>& levels) {
+  std::vector<std::string> result = names;
+  for (const std::string& name : names) {
+    if (name.starts_with(levels.front())) result.push_back(name.substr(levels.front().size()));
+  }
+  return result;
+}
+
+template <typename T>
+std::vector<std::string> NamesOf(const std::vector<T>& items) {
+  std::vector<std::string> names;
+  for (const T& item : items) names.push_back(item.name);
+  return names;
+}
+
+}  // namespace
+
+std::optional<int> ModelReader::BodyRef(const Block& block, const YamlNode& node,
+                                        const std::string& path) {
+  const auto name = yaml_.Text(node, path);
+  if (!name) return std::nullopt;
+  for (const std::string& level : block.levels) {
+    if (const int body = mechanism_.FindBody(level + *name); body >= 0) return body;
+  }
+  yaml_.Error(node, fmt::format("{} = {}: there is no such body", path, Describe(node)),
+              DidYouMean(*name, ShortNames(NamesOf(mechanism_.bodies), block.levels)));
+  return std::nullopt;
+}
+
+std::optional<int> ModelReader::JointRef(const Block& block, const YamlNode& node,
+                                         const std::string& path) {
+  const auto name = yaml_.Text(node, path);
+  if (!name) return std::nullopt;
+  for (const std::string& level : block.levels) {
+    if (const int joint = mechanism_.FindJoint(level + *name); joint >= 0) return joint;
+    if (refused_joints_.count(level + *name) > 0) return std::nullopt;  // has its own finding
+  }
+  std::vector<std::string> names = NamesOf(mechanism_.joints);
+  names.insert(names.end(), refused_joints_.begin(), refused_joints_.end());
+  yaml_.Error(node, fmt::format("{} = {}: there is no such joint", path, Describe(node)),
+              DidYouMean(*name, ShortNames(names, block.levels)));
+  return std::nullopt;
+}
+
+std::optional<FrameRef> ModelReader::Frame(const Block& block, const YamlNode& node,
+                                           const std::string& path) {
+  auto name = yaml_.Text(node, path);
+  if (!name) return std::nullopt;
+  if (name->size() > 256) name->resize(256);  // no name is that long
+  int body_without_frame = -1;
+  std::string missing_frame;
+  for (const std::string& level : block.levels) {
+    // Dots may belong to the body's or to the frame's name: try the longest body name first.
+    for (size_t dot = name->size();; dot = name->rfind('.', dot - 1)) {
+      if (dot == std::string::npos) break;
+      const int body = mechanism_.FindBody(level + name->substr(0, dot));
+      if (body >= 0 && dot == name->size()) return FrameRef{body, Pose::Identity()};
+      if (body >= 0) {
+        const std::string frame = name->substr(dot + 1);
+        if (const auto pose = FrameOn(block, body, frame)) return FrameRef{body, *pose};
+        body_without_frame = body;
+        missing_frame = frame;
+      }
+      if (dot == 0) break;
+    }
+  }
+  if (body_without_frame >= 0) {
+    const Body& body = mechanism_.bodies[body_without_frame];
+    yaml_.Error(node,
+                fmt::format("{} = {}: body '{}' has no frame '{}'", path, Describe(node), body.name,
+                            missing_frame),
+                DidYouMean(missing_frame, ShortNames(NamesOf(body.frames), block.levels)));
+    return std::nullopt;
+  }
+  const std::string body = name->substr(0, name->find('.'));
+  yaml_.Error(node, fmt::format("{} = {}: there is no body '{}'", path, Describe(node), body),
+              DidYouMean(body, ShortNames(NamesOf(mechanism_.bodies), block.levels)));
+  return std::nullopt;
+}
+
+}  // namespace mbv

@@ -1,0 +1,48 @@
+// URDF: the spanning tree of a mechanism as URDF text, and a URDF file as bodies and joints.
+//
+// Conventions of URDF (as urdfdom reads it, pinned by tests/model_file/urdf_test.cc): a link's
+// frame is the frame of the joint that carries it; `rpy` is Rz(yaw) Ry(pitch) Rx(roll); a joint's
+// axis is given in the joint frame; an inertia is about the centre of mass, in the axes of its own
+// `origin`.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// The spanning tree as URDF text. Joints with several coordinates become chains of single ones
+/// with massless links between ("JOINT.yaw", "JOINT.pitch", …), a ball's all zero at home. Closures
+/// follow as <constraint> elements, which readers of plain URDF pass over. What is left (drives,
+/// guesses of the home pose) stands in a comment as a model.yaml that reads this file back: cut the
+/// comment out, name the URDF file in its `urdf:` key, and the same mechanism results (dots in the
+/// names of drives and closures become _). It states the closures itself, exactly, and skips those
+/// of the URDF.
+[[nodiscard]] std::string WriteUrdf(const Mechanism& mechanism);
+
+/// The model.yaml in that comment.
+[[nodiscard]] std::string WriteUrdfCompanion(const Mechanism& mechanism,
+                                             const std::string& urdf_file);
+
+/// What a URDF file holds.
+struct UrdfTree {
+  std::string name;
+  std::vector<Body> bodies;   ///< without a root link named "world"
+  std::vector<Joint> joints;  ///< body indices count `bodies`; -1 is the world; closures last
+  std::vector<int> body_lines, joint_lines;  ///< in the file; 0: unknown
+  int root = -1;                             ///< index of the root link; -1 if it is the world
+
+  /// Index of a link (-1: the world), or -2.
+  [[nodiscard]] int FindLink(const std::string& link) const;
+};
+
+/// Reads URDF text; everything urdfdom says is a finding, with the line where it is known. Closures
+/// are read in the forms listed in urdf_closures.h. Mimic joints, meshes, gears and joints inside
+/// <gazebo> are left out with a warning. The tree is empty after an error.
+[[nodiscard]] UrdfTree ReadUrdf(const std::string& text, const std::string& file,
+                                Diagnostics* diagnostics);
+
+}  // namespace mbv

@@ -1,0 +1,47 @@
+// Loop closures written into URDF files, by the conventions in use. Internal to model_file/.
+//
+// URDF proper has none; urdfdom passes over these elements. Read are, below <robot>:
+//
+//   <constraint name type> <parent link/> <parent_origin xyz rpy/> <parent_axis xyz/>
+//                          <child link/> <child_origin/> <child_axis/>    the proposal for urdfdom
+//   <loop name type> <predecessor link> <origin/> </predecessor>
+//                    <successor link> <origin/> </successor> <axis/>      URDF+
+//   <loop_joint name type> <link1 link xyz rpy/> <link2 …/> [<axis/>]     Drake's old form, Isaac
+//   Sim <drake:ball_constraint> body_A, body_B, p_AP, p_BQ                    Drake
+//
+// Each origin is a frame on its link, each axis is given in that frame; where only one axis is
+// given it has the same components in both frames. Types: fixed, revolute (continuous), prismatic,
+// cylindrical, universal (parent_axis on the parent, child_axis on the child), spherical (ball),
+// planar.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv::internal {
+
+struct UrdfClosure {
+  Joint joint;                ///< closure; parent and child are not filled
+  std::string parent, child;  ///< names of the links
+  int line = 0;
+};
+
+/// What urdfdom does not tell.
+struct UrdfDetails {
+  std::vector<UrdfClosure> closures;
+  std::map<std::string, int> link_lines, joint_lines;  ///< by name
+};
+
+/// Reads them; findings carry the line. Empty if the text is no XML (urdfdom says so).
+[[nodiscard]] UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
+                                          Diagnostics* diagnostics);
+
+/// The closures of a mechanism as <constraint> elements, for its exported URDF.
+[[nodiscard]] std::string ConstraintText(const Mechanism& mechanism,
+                                         const std::vector<Pose>& link_frames);
+
+}  // namespace mbv::internal

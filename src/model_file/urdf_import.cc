@@ -1,0 +1,366 @@
+#include <console_bridge/console.h>
+#include <fmt/format.h>
+#include <urdf_parser/urdf_parser.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/spatial.h"
+#include "core/text.h"
+#include "input/yaml_reader.h"
+#include "model_file/urdf.h"
+#include "model_file/urdf_closures.h"
+#include "model_file/urdf_frames.h"
+
+namespace mbv {
+namespace {
+
+// urdfdom talks through console_bridge; while this lives, its words become findings.
+class LogCapture : public console_bridge::OutputHandler {
+ public:
+  LogCapture(std::string file, Diagnostics* diagnostics)
+      : file_(std::move(file)), diagnostics_(diagnostics), level_(console_bridge::getLogLevel()) {
+    console_bridge::useOutputHandler(this);
+    console_bridge::setLogLevel(console_bridge::CONSOLE_BRIDGE_LOG_WARN);
+  }
+  ~LogCapture() override {
+    console_bridge::restorePreviousOutputHandler();
+    console_bridge::setLogLevel(level_);
+  }
+  LogCapture(const LogCapture&) = delete;
+  LogCapture& operator=(const LogCapture&) = delete;
+
+  void log(const std::string& text, console_bridge::LogLevel level, const char*, int) override {
+    const bool error = level >= console_bridge::CONSOLE_BRIDGE_LOG_ERROR;
+    diagnostics_->Add({.severity = error ? Severity::kError : Severity::kWarning,
+                       .file = file_,
+                       .message = "urdfdom: " + text,
+                       .hint = ""});
+  }
+
+ private:
+  std::string file_;
+  Diagnostics* diagnostics_;
+  console_bridge::LogLevel level_;
+};
+
+Vec3 ToVec(const urdf::Vector3& v) { return {v.x, v.y, v.z}; }
+
+Pose ToPose(const urdf::Pose& p) {
+  Pose X = Pose::Identity();
+  X.translation() = ToVec(p.position);
+  X.linear() = Eigen::Quaterniond(p.rotation.w, p.rotation.x, p.rotation.y, p.rotation.z)
+                   .normalized()
+                   .toRotationMatrix();
+  return X;
+}
+
+class Importer {
+ public:
+  Importer(const std::string& file, const internal::UrdfDetails& details, Diagnostics* diagnostics)
+      : file_(file), details_(details), diagnostics_(diagnostics) {}
+
+  UrdfTree Run(const urdf::ModelInterface& model) {
+    tree_.name = model.getName();
+    CheckName("robot", tree_.name, 0);
+    const urdf::LinkConstSharedPtr root = model.getRoot();
+    // Depth first in name order: the order in the file is lost in urdfdom's maps.
+    AddLink(*root);
+    if (root->name == "world") {
+      if (root->inertial) {
+        Warn(LineOf(details_.link_lines, "world"),
+             "the inertia of the link 'world' has no meaning");
+      }
+      tree_.root = -1;
+    } else {
+      tree_.root = 0;
+    }
+    for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
+    WarnOfMeshes();
+    WarnOfLosses("damping", damped_);
+    WarnOfLosses("friction", rubbing_);
+    return std::move(tree_);
+  }
+
+ private:
+  static int LineOf(const std::map<std::string, int>& lines, const std::string& name) {
+    const auto it = lines.find(name);
+    return it == lines.end() ? 0 : it->second;
+  }
+  void Add(Severity severity, int line, const std::string& text, const std::string& hint) {
+    diagnostics_->Add({severity, file_, line, line > 0 ? 1 : 0, text, hint});
+  }
+  void Error(int line, const std::string& text, const std::string& hint = "") {
+    Add(Severity::kError, line, text, hint);
+  }
+  void Warn(int line, const std::string& text, const std::string& hint = "") {
+    Add(Severity::kWarning, line, text, hint);
+  }
+
+  // Character references (&#27;) can write what the file itself must not hold.
+  void CheckName(const char* what, const std::string& name, int line) {
+    if (FindNonName(name) == std::string::npos) return;
+    Error(line, fmt::format("{} '{}': the name holds control characters", what, name));
+  }
+
+  void AddLink(const urdf::Link& start) {
+    std::vector<const urdf::Link*> waiting = {&start};
+    while (!waiting.empty()) {
+      const urdf::Link& link = *waiting.back();
+      waiting.pop_back();
+      if (&link == &start && link.name == "world") {
+        index_[link.name] = -1;
+      } else {
+        index_[link.name] = static_cast<int>(tree_.bodies.size());
+        tree_.body_lines.push_back(LineOf(details_.link_lines, link.name));
+        CheckName("link", link.name, tree_.body_lines.back());
+        tree_.bodies.push_back(BodyOf(link));
+        if (link.parent_joint) AddJoint(*link.parent_joint);
+      }
+      for (auto it = link.child_links.rbegin(); it != link.child_links.rend(); ++it) {
+        waiting.push_back(it->get());
+      }
+    }
+  }
+
+  Body BodyOf(const urdf::Link& link) {
+    Body body{.name = link.name, .frames = {}, .shapes = {}};
+    if (const auto& inertial = link.inertial) {
+      const Pose X_BI = ToPose(inertial->origin);
+      Mat3 I;
+      I << inertial->ixx, inertial->ixy, inertial->ixz, inertial->ixy, inertial->iyy, inertial->iyz,
+          inertial->ixz, inertial->iyz, inertial->izz;
+      body.mass = inertial->mass;
+      body.p_BoBcm_B = X_BI.translation();
+      body.I_Bcm_B = X_BI.linear() * I * X_BI.linear().transpose();
+      if (!std::isfinite(body.mass) || !body.p_BoBcm_B.allFinite() || !body.I_Bcm_B.allFinite() ||
+          body.mass < 0.0) {
+        Error(
+            tree_.body_lines.back(),
+            fmt::format("link '{}': its inertial values violate mass >= 0 and finite", link.name));
+      }
+    }
+    for (const urdf::VisualSharedPtr& visual : link.visual_array) AddShape(*visual, &body);
+    return body;
+  }
+
+  void AddShape(const urdf::Visual& visual, Body* body) {
+    if (!visual.geometry) return;
+    const Pose X = ToPose(visual.origin);
+    if (!X.matrix().allFinite()) return;
+    Shape shape;
+    if (const auto* box = dynamic_cast<const urdf::Box*>(visual.geometry.get())) {
+      shape.geometry = Box{X, ToVec(box->dim)};
+    } else if (const auto* c = dynamic_cast<const urdf::Cylinder*>(visual.geometry.get())) {
+      const Vec3 half(0, 0, 0.5 * c->length);
+      shape.geometry = Cylinder{X * Vec3(-half), X * half, c->radius};
+    } else if (const auto* s = dynamic_cast<const urdf::Sphere*>(visual.geometry.get())) {
+      shape.geometry = Ball{X.translation(), s->radius};
+    } else {
+      if (meshes_++ == 0) first_mesh_ = body->name;
+      return;
+    }
+    if (visual.material) {
+      const urdf::Color& c = visual.material->color;
+      const auto byte = [](float x) {
+        return static_cast<int>(std::lround(255.0 * std::clamp(double{x}, 0.0, 1.0)));
+      };
+      shape.color =
+          fmt::format("#{:02x}{:02x}{:02x}{:02x}", byte(c.r), byte(c.g), byte(c.b), byte(c.a));
+    }
+    body->shapes.push_back(shape);
+  }
+
+  // Joints with a value that is left out.
+  struct Losses {
+    int joints = 0, line = 0;
+    std::string text;
+  };
+  static void AddLoss(const std::string& joint, double value, int line, Losses* losses) {
+    constexpr int kMost = 8;
+    if (value == 0.0) return;
+    if (losses->joints++ == 0) losses->line = line;
+    if (losses->joints > kMost) return;
+    losses->text += fmt::format("{}{} ({:g})", losses->joints == 1 ? "" : ", ", joint, value);
+    if (losses->joints == kMost) losses->text += ", …";
+  }
+  void WarnOfLosses(const char* what, const Losses& losses) {
+    if (losses.joints == 0) return;
+    Warn(losses.line,
+         fmt::format("{} in {} joint{} is left out: {}", what, losses.joints,
+                     losses.joints == 1 ? "" : "s", losses.text),
+         "drive forces are computed without it");
+  }
+
+  // One finding for all: robots have hundreds.
+  void WarnOfMeshes() {
+    if (meshes_ == 0) return;
+    Warn(LineOf(details_.link_lines, first_mesh_),
+         fmt::format("link '{}'{}: meshes are left out of the pictures", first_mesh_,
+                     meshes_ == 1 ? "" : fmt::format(" and {} more visuals", meshes_ - 1)),
+         "boxes, cylinders and spheres are drawn");
+  }
+
+  void AddClosure(const internal::UrdfClosure& closure) {
+    Joint joint = closure.joint;
+    CheckName("closure", joint.name, closure.line);
+    std::vector<std::string> links = {"world"};
+    for (const auto& [name, index] : index_) links.push_back(name);
+    const auto find = [&](const std::string& link) {
+      if (link == "world") return -1;
+      if (const auto it = index_.find(link); it != index_.end()) return it->second;
+      const std::string near = ClosestWord(link, links);
+      Error(closure.line, fmt::format("closure '{}': there is no link '{}'", joint.name, link),
+            near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+      return -2;
+    };
+    joint.parent = find(closure.parent);
+    joint.child = find(closure.child);
+    if (joint.parent == -2 || joint.child == -2) return;
+    if (joint.parent == joint.child) {
+      Error(closure.line,
+            fmt::format("closure '{}' connects link '{}' with itself", joint.name, closure.parent));
+      return;
+    }
+    for (const Joint& other : tree_.joints) {
+      if (other.name != joint.name) continue;
+      Error(closure.line,
+            fmt::format("closure '{}': a joint of this name is there already", joint.name));
+      return;
+    }
+    tree_.joints.push_back(joint);
+    tree_.joint_lines.push_back(closure.line);
+  }
+
+  void AddJoint(const urdf::Joint& from) {
+    const int line = LineOf(details_.joint_lines, from.name);
+    CheckName("joint", from.name, line);
+    Joint joint;
+    joint.name = from.name;
+    joint.parent = index_[from.parent_link_name];
+    joint.child = index_[from.child_link_name];
+    joint.X_PF = ToPose(from.parent_to_joint_origin_transform);
+    if (!joint.X_PF.matrix().allFinite()) {
+      Error(line, fmt::format("joint '{}': its origin is not finite", from.name));
+    }
+    bool has_axis = true;
+    switch (from.type) {
+      case urdf::Joint::REVOLUTE:
+      case urdf::Joint::CONTINUOUS:
+        joint.kind = JointKind::kRevolute;
+        break;
+      case urdf::Joint::PRISMATIC:
+        joint.kind = JointKind::kPrismatic;
+        break;
+      case urdf::Joint::PLANAR:
+        joint.kind = JointKind::kPlanar;
+        break;
+      case urdf::Joint::FLOATING:
+        joint.kind = JointKind::kFree;
+        has_axis = false;
+        break;
+      case urdf::Joint::FIXED:
+        joint.kind = JointKind::kFixed;
+        has_axis = false;
+        break;
+      case urdf::Joint::UNKNOWN:
+        Error(line, fmt::format("joint '{}' has no known type", from.name));
+        break;
+    }
+    const Vec3 axis = ToVec(from.axis);
+    if (has_axis && !(axis.norm() > 1e-9 && std::isfinite(axis.norm()))) {
+      Error(line, fmt::format("joint '{}': the axis ({}, {}, {}) has no direction", from.name,
+                              axis.x(), axis.y(), axis.z()));
+    } else if (has_axis) {
+      joint.axis = axis.normalized();
+    }
+    ReadLimits(from, &joint);
+    if (from.dynamics) {
+      AddLoss(from.name, from.dynamics->damping, line, &damped_);
+      AddLoss(from.name, from.dynamics->friction, line, &rubbing_);
+    }
+    if (from.mimic) {
+      Warn(line,
+           fmt::format("joint '{}': mimic of '{}' is left out, the joint is free", from.name,
+                       from.mimic->joint_name),
+           "where it stands for a closed loop, state the loop by a closure; gears are commanded: "
+           "drive both joints and couple them by `equal` in the scenario");
+    }
+    tree_.joints.push_back(joint);
+    tree_.joint_lines.push_back(line);
+  }
+
+  void ReadLimits(const urdf::Joint& from, Joint* joint) {
+    const bool limited =
+        from.limits && (from.type == urdf::Joint::REVOLUTE || from.type == urdf::Joint::PRISMATIC);
+    if (!limited || from.limits->lower >= from.limits->upper) return;
+    if (from.limits->lower > -kUrdfNoLimit) joint->range[0].lower = from.limits->lower;
+    if (from.limits->upper < kUrdfNoLimit) joint->range[0].upper = from.limits->upper;
+  }
+
+  std::string file_;
+  const internal::UrdfDetails& details_;
+  Diagnostics* diagnostics_;
+  UrdfTree tree_;
+  std::map<std::string, int> index_;
+  Losses damped_, rubbing_;
+  int meshes_ = 0;
+  std::string first_mesh_;
+};
+
+// TinyXML reads nested elements by recursion: refuse what would exhaust the stack.
+bool NestsDeeperThan(const std::string& xml, int limit) {
+  int depth = 0;
+  for (size_t i = 0; i + 1 < xml.size(); ++i) {
+    if (xml[i] == '<' && xml.compare(i, 4, "<!--") == 0) {
+      i = xml.find("-->", i);
+      if (i == std::string::npos) return false;
+    } else if (xml[i] == '<' && xml[i + 1] == '/') {
+      --depth;
+    } else if (xml[i] == '<' && xml[i + 1] != '?' && xml[i + 1] != '!') {
+      if (++depth > limit) return true;
+    } else if (xml[i] == '/' && xml[i + 1] == '>') {
+      --depth;
+    }
+  }
+  return false;
+}
+
+}  // namespace
+
+int UrdfTree::FindLink(const std::string& link) const {
+  if (root == -1 && link == "world") return -1;
+  for (size_t b = 0; b < bodies.size(); ++b) {
+    if (bodies[b].name == link) return static_cast<int>(b);
+  }
+  return -2;
+}
+
+UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics* diagnostics) {
+  const auto fail = [&](const std::string& message) {
+    diagnostics->Add({Severity::kError, file, 0, 0, message, ""});
+    return UrdfTree{};
+  };
+  if (FindNonText(text) != std::string::npos) return fail("the file is not UTF-8 text");
+  if (NestsDeeperThan(text, 100)) return fail("XML elements are nested deeper than 100 levels");
+  Diagnostics said;
+  urdf::ModelInterfaceSharedPtr model;
+  try {
+    const LogCapture capture(file, &said);
+    model = urdf::parseURDF(text);
+  } catch (const std::exception& e) {
+    said.Add({Severity::kError, file, 0, 0, std::string("urdfdom: ") + e.what(), ""});
+  }
+  diagnostics->Append(said);
+  if (said.has_errors()) return {};
+  if (model == nullptr || model->getRoot() == nullptr) return fail("urdfdom finds no robot");
+  Diagnostics read;
+  const internal::UrdfDetails details = internal::ReadUrdfDetails(text, file, &read);
+  UrdfTree tree = Importer(file, details, &read).Run(*model);
+  diagnostics->Append(read);
+  return read.has_errors() ? UrdfTree{} : tree;
+}
+
+}  // namespace mbv

@@ -1,0 +1,130 @@
+// Mobility counts that can be checked by hand.
+#include "kinematics/mobility.h"
+
+#include <gtest/gtest.h>
+
+#include "model_file/load_model.h"
+#include "tests/simulation/test_mechanisms.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+using ::mbv::fixtures::MakeFourBar;
+
+TEST(Mobility, APlanarFourBarMovesAlthoughKutzbachSaysMinusTwo) {
+  const Mobility mobility = AnalyseMobility(MakeFourBar());
+  EXPECT_EQ(mobility.body_coordinates, 18);
+  EXPECT_EQ(mobility.constraint_rows, 20);
+  EXPECT_EQ(mobility.constraint_rank, 17);
+  EXPECT_EQ(mobility.kutzbach, -2);
+  EXPECT_EQ(mobility.freedoms, 1);
+  EXPECT_EQ(mobility.redundant, 3);
+  EXPECT_EQ(mobility.undriven, 0);
+  EXPECT_TRUE(mobility.drives_determine_motion);
+}
+
+TEST(Mobility, TheFourBarsMotorIsUniqueAlthoughNoHingeReactionIs) {
+  const Mobility mobility = AnalyseMobility(MakeFourBar());
+  EXPECT_TRUE(mobility.drive_forces_unique);
+  EXPECT_EQ(mobility.joints_not_unique, (std::vector<std::string>{"A", "B", "D", "C"}));
+  // In its plane statics is enough.
+  ASSERT_EQ(mobility.reactions_not_unique.size(), 4u);
+  for (const UndeterminedReaction& reaction : mobility.reactions_not_unique) {
+    EXPECT_EQ(reaction.components, (std::vector<std::string>{"fz", "mx", "my"})) << reaction.joint;
+  }
+}
+
+TEST(Mobility, AComponentThatIsUniqueAtHomeOnlyIsFoundOutByOtherPoses) {
+  // A bar between two hinges about z is held twice along itself: at home along x only.
+  Mechanism m;
+  m.bodies = {{.name = "world", .frames = {}, .shapes = {}},
+              {.name = "table", .mass = 1.0, .frames = {}, .shapes = {}},
+              {.name = "bar", .mass = 1.0, .frames = {}, .shapes = {}}};
+  const auto add = [&](const char* name, JointKind kind, int parent, int child, double x) {
+    Joint joint;
+    joint.name = name;
+    joint.kind = kind;
+    joint.parent = parent;
+    joint.child = child;
+    joint.X_PF = joint.X_CM = Pose(Eigen::Translation3d(x, 0.0, 0.0));
+    m.joints.push_back(joint);
+  };
+  add("turn", JointKind::kRevolute, 0, 1, 0.0);
+  add("near", JointKind::kSpherical, 0, 2, 0.0);
+  add("far", JointKind::kSpherical, 1, 2, 1.0);
+  m.X_WB_home.assign(3, Pose::Identity());
+  // The reaction of `near` is given in the world's axes, that of `far` in those of the table.
+  EXPECT_EQ(ReactionsNotUnique(m, {}),
+            (std::vector<std::string>{"far.reaction.fx", "near.reaction.fx", "turn.reaction.fx"}));
+  std::vector<Pose> turned(3, Pose::Identity());
+  turned[1].linear() = turned[2].linear() =
+      Eigen::AngleAxisd(0.5, Vec3::UnitZ()).toRotationMatrix();
+  EXPECT_EQ(ReactionsNotUnique(m, {turned}),
+            (std::vector<std::string>{"far.reaction.fx", "near.reaction.fx", "near.reaction.fy",
+                                      "turn.reaction.fx", "turn.reaction.fy"}));
+  turned[2].linear().setConstant(kNan);
+  EXPECT_EQ(ReactionsNotUnique(m, {turned}).size(), 3u);
+}
+
+TEST(Mobility, TwoMotorsOnOneFreedomFightEachOther) {
+  Mechanism m = MakeFourBar();
+  m.drives.push_back({.name = "second", .kind = JointDrive{2, 0}, .range = {}});
+  const Mobility mobility = AnalyseMobility(m);
+  EXPECT_EQ(mobility.undriven, 0);
+  EXPECT_FALSE(mobility.drive_forces_unique);
+  EXPECT_EQ(mobility.drives_not_unique, (std::vector<std::string>{"motor", "second"}));
+}
+
+TEST(Mobility, WithoutItsMotorTheFourBarIsFree) {
+  Mechanism m = MakeFourBar();
+  m.drives.clear();
+  const Mobility mobility = AnalyseMobility(m);
+  EXPECT_EQ(mobility.undriven, 1);
+  EXPECT_FALSE(mobility.drives_determine_motion);
+}
+
+TEST(Mobility, ABallRemovesTwoOfTheThreeRedundancies) {
+  const Mobility mobility = AnalyseMobility(MakeFourBar(JointKind::kSpherical));
+  EXPECT_EQ(mobility.kutzbach, 0);
+  EXPECT_EQ(mobility.freedoms, 1);
+  EXPECT_EQ(mobility.redundant, 1);
+}
+
+TEST(Mobility, AnIsostaticRuleThatFreesALinkIsFoundOut) {
+  Mechanism m = MakeFourBar(JointKind::kRevolute, true);
+  EXPECT_TRUE(AnalyseMobility(m).isostatic_rule_sound);
+  m.joints[1].transmits_force_only = true;  // a coupler between two balls can spin
+  EXPECT_FALSE(AnalyseMobility(m).isostatic_rule_sound);
+}
+
+TEST(Mobility, TheStabilizingPlatformHasTwoRedundantConstraintsPerLimb) {
+  LoadResult loaded = LoadModel(SourcePath("/models/stabilizing_platform/model.yaml"));
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mobility mobility = AnalyseMobility(*loaded.mechanism);
+  EXPECT_EQ(mobility.redundant, 6);
+  EXPECT_EQ(mobility.freedoms, 3 + 6);  // the ship's and the platform's
+  EXPECT_EQ(mobility.undriven, 0);
+  EXPECT_TRUE(mobility.isostatic_rule_sound);
+  EXPECT_TRUE(mobility.drive_forces_unique);
+  EXPECT_TRUE(mobility.joints_not_unique.empty());  // by the isostatic rule
+  EXPECT_GT(mobility.smallest_kept, 1e6 * mobility.largest_dropped);
+
+  // Without the rule the five joints of each limb's planar loop share two self-stresses.
+  for (Joint& joint : loaded.mechanism->joints) joint.transmits_force_only = false;
+  const Mobility without = AnalyseMobility(*loaded.mechanism);
+  EXPECT_EQ(without.joints_not_unique.size(), 15u);
+  EXPECT_TRUE(without.drive_forces_unique);
+}
+
+TEST(Mobility, TheTripodHasThreeFreedomsAndNoRedundancy) {
+  const LoadResult loaded = LoadModel(SourcePath("/models/spr_tripod/model.yaml"));
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mobility mobility = AnalyseMobility(*loaded.mechanism);
+  EXPECT_EQ(mobility.freedoms, 3);
+  EXPECT_EQ(mobility.redundant, 0);
+  EXPECT_EQ(mobility.undriven, 0);
+}
+
+}  // namespace
+}  // namespace mbv

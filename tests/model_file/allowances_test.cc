@@ -1,0 +1,109 @@
+// What a model can make the loader accept: rounded data of overconstrained loops, impossible
+// inertias; and models of many bodies.
+#include <gtest/gtest.h>
+
+#include <fmt/format.h>
+
+#include <fstream>
+#include <iterator>
+
+#include "four_bar.h"
+#include "kinematics/home.h"
+#include "kinematics/mobility_report.h"
+#include "model_file/load_model.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+LoadResult Load(const std::string& text) { return LoadModelText(text, "m.yaml", {}); }
+
+// The four-bar with its second pivot out of the plane and its axis askew by `size`.
+std::string RoundedFourBar(double size, const std::string& head = "") {
+  return head +
+         Replaced(kFourBar, "D: {position: [ground, 0, 0]}",
+                  fmt::format("D: {{position: [ground, 0, {0}], rotation: {{rpy: [{0}, 0, 0]}}}}",
+                              size));
+}
+
+// Bricard's linkage with the ends of two bars displaced by about `size`.
+std::string RoundedBricard(double size, const std::string& head = "") {
+  std::ifstream file(SourcePath("/models/bricard/model.yaml"));
+  const std::string text{std::istreambuf_iterator<char>(file), {}};
+  return head + Replaced(Replaced(text, "end: [0, -length, 0]",
+                                  fmt::format("end: [{0}, -length - {0}/2, {0}/3]", size)),
+                         "end: [0, length, 0]",
+                         fmt::format("end: [-{0}/4, length - {0}/3, {0}]", size));
+}
+
+std::string Tolerance(double size) { return fmt::format("closure_tolerance: {}\n", 3 * size); }
+
+TEST(RoundedData, AreNamedAsThatAndRefusedWithoutATolerance) {
+  for (const double size : {1e-10, 1e-6, 1e-3}) {
+    const std::string four_bar = Load(RoundedFourBar(size)).diagnostics.Text();
+    EXPECT_NE(four_bar.find("overconstrained by 3 and closed except for"), std::string::npos)
+        << size << ": " << four_bar;
+    EXPECT_NE(four_bar.find("rounded data?"), std::string::npos) << four_bar;
+    const std::string bricard = Load(RoundedBricard(size)).diagnostics.Text();
+    EXPECT_NE(bricard.find("overconstrained by 1 and closed except for"), std::string::npos)
+        << size << ": " << bricard;
+    // A tolerance that is too small changes nothing.
+    EXPECT_FALSE(Load(RoundedFourBar(size, "closure_tolerance: 1e-12\n")).mechanism);
+  }
+}
+
+void ExpectProjected(const LoadResult& loaded, double size, int redundant) {
+  ASSERT_TRUE(loaded.mechanism) << size << ": " << loaded.diagnostics.Text();
+  EXPECT_NE(loaded.diagnostics.Text().find("joint frames moved by up to"), std::string::npos);
+  const Mechanism& m = *loaded.mechanism;
+  // It moves as the ideal mechanism does: at home and nearby.
+  const MobilityReport report = ReportMobility(m, 4);
+  EXPECT_EQ(report.home.freedoms, 1);
+  EXPECT_EQ(report.home.redundant, redundant);
+  EXPECT_EQ(report.nearby.size(), 4u);
+  EXPECT_EQ(report.freedoms(), 1);
+  EXPECT_EQ(report.redundant_count(), redundant);
+}
+
+TEST(RoundedData, AreProjectedUpToTheStatedTolerance) {
+  for (const double size : {1e-10, 1e-8, 1e-6, 1e-4, 1e-3}) {
+    ExpectProjected(Load(RoundedFourBar(size, Tolerance(size))), size, 3);
+    if (size < 1e-3) ExpectProjected(Load(RoundedBricard(size, Tolerance(size))), size, 1);
+  }
+}
+
+TEST(RoundedData, AWrongLengthIsNoRounding) {
+  const std::string text = Replaced(kFourBar, "rocker:\n    frames: {foot: {}, end: [crank, 0, 0]}",
+                                    "rocker:\n    frames: {foot: {}, end: [crank, 0, 0.05]}");
+  const std::string said = Load("closure_tolerance: 1\n" + text).diagnostics.Text();
+  EXPECT_NE(said.find("does not close"), std::string::npos) << said;
+  EXPECT_EQ(said.find("rounded"), std::string::npos) << said;
+}
+
+TEST(ImpossibleInertia, IsTakenIfTheModelAllowsItAndNamedLoudly) {
+  const std::string text = Replaced(kFourBar, "zz: 0.02", "zz: 0.2");
+  EXPECT_FALSE(Load(text).mechanism);
+  for (const char* allow : {"allow: impossible_inertia\n", "allow: [impossible_inertia]\n"}) {
+    const LoadResult loaded = Load(allow + text);
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    EXPECT_NE(loaded.diagnostics.Text().find("bodies.crank: IMPOSSIBLE INERTIA"), std::string::npos)
+        << loaded.diagnostics.Text();
+    EXPECT_EQ(loaded.mechanism->bodies[1].I_Bcm_B(2, 2), 0.2);
+  }
+  const std::string said = Load("allow: impossible_mass\n" + text).diagnostics.Text();
+  EXPECT_NE(said.find("impossible_inertia"), std::string::npos) << said;
+}
+
+TEST(ManyBodies, FiveHundredAreRead) {
+  std::string text =
+      "name: t\nparts:\n  pendulum:\n    bodies: {bob: {mass: 1, inertia: [1, 1, 1]}}\n"
+      "    joints: {hinge: {kind: revolute, parent: world, child: bob, axis: x}}\n"
+      "instances:\n";
+  for (int i = 0; i < 500; ++i) text += fmt::format("  p{}: {{part: pendulum}}\n", i);
+  const LoadResult loaded = Load(text);
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_EQ(loaded.mechanism->bodies.size(), 501u);
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,117 @@
+// Models that load but are hardly meant: a doubt each, and none about what is right.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+
+#include "four_bar.h"
+#include "model_file/load_model.h"
+#include "slip.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+std::string WarningsOf(const std::string& text) {
+  const LoadResult result = LoadModelText(text, "m.yaml");
+  EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
+  return result.diagnostics.Text();
+}
+
+// The slender crank's inertia about its centre of mass, and a coupler of the same kind.
+std::string Slender() {
+  return Replaced(Replaced(kFourBar, "inertia: {xx: 0.01, yy: 0.02, zz: 0.02}",
+                           "inertia: {xx: 1e-4, yy: 2*crank^2/12, zz: 2*crank^2/12}"),
+                  "  coupler:\n",
+                  "  coupler:\n    mass: 3\n    com: [ground/2, 0.02, 0]\n"
+                  "    inertia: {xx: 1e-3, yy: 3*ground^2/12, zz: 3*ground^2/12 + 5e-4}\n");
+}
+
+TEST(Plausibility, ARightModelRaisesNoDoubt) { EXPECT_EQ(WarningsOf(Slender()), ""); }
+
+class Doubtful : public testing::TestWithParam<Slip> {};
+
+TEST_P(Doubtful, IsSaid) {
+  const Slip& slip = GetParam();
+  const std::string text = WarningsOf(Replaced(Slender(), slip.from, slip.to));
+  EXPECT_NE(text.find(slip.said), std::string::npos) << text;
+}
+
+const Slip kDoubts[] = {
+    {"InertiaInKgSquareMillimetres", "inertia: {xx: 1e-4, yy: 2*crank^2/12, zz: 2*crank^2/12}",
+     "inertia: {xx: 1e2, yy: 2e6*crank^2/12, zz: 2e6*crank^2/12}", "are they in kg mm²"},
+    {"InertiaAboutTheOrigin", "inertia: {xx: 1e-4, yy: 2*crank^2/12, zz: 2*crank^2/12}",
+     "inertia: {xx: 1e-4, yy: 2*crank^2/3, zz: 2*crank^2/3}",
+     "m.yaml:11:3: warning: bodies.crank: its inertia about the centre of mass is 1.09 "
+     "times the largest"},
+    {"CentreOfMassInMillimetres", "com: [crank/2, 0, 0]", "com: [100, 0, 0]",
+     "is the centre of mass in millimetres?"},
+    {"GuessInDegrees", "child: crank.foot, axis: z, guess_deg: 60",
+     "child: crank.foot, axis: z, guess: 60",
+     "joints.A.guess = 60 rad is more than a turn\n  hint: angles are in radians"},
+    {"GravityInMillimetres", "gravity: [0, -9.81, 0]", "gravity: [0, -9810, 0]", "is it in mm/s²?"},
+};
+INSTANTIATE_TEST_SUITE_P(Slips, Doubtful, testing::ValuesIn(kDoubts),
+                         [](const auto& info) { return std::string(info.param.name); });
+
+TEST(Plausibility, LengthsInMillimetresAreSaidOnceForAllBodies) {
+  std::string text = Replaced(Slender(), "crank: 0.2", "crank: 200");
+  text = Replaced(text, "{value_mm: 500,", "{value: 500,");
+  text = Replaced(text, "[ground/2, 0.1, 0]", "[ground/2, 100, 0]");
+  const std::string said = WarningsOf(text);
+  EXPECT_NE(said.find("bodies.crank: it has 2 kg and measures 200 m, thinner than any solid; so "
+                      "do coupler"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("are these millimetres?"), std::string::npos) << said;
+  EXPECT_EQ(said.find("kg mm²"), std::string::npos)
+      << "a consequence, not a second doubt: " << said;
+}
+
+TEST(Plausibility, WhatIsRareButPossibleRaisesNoDoubt) {
+  // A ship of 1e7 kg, 30 m in radius of gyration, of which only one point is known.
+  EXPECT_EQ(WarningsOf("name: t\nbodies: {ship: {mass: 1e7, com: [12, 0, 3], inertia: [2e9, 9e9, "
+                       "9e9]}}\njoints: {roll: {kind: revolute, parent: world, child: ship, axis: "
+                       "x}}\ndrives: {roll: {kind: joint, joint: roll}}\n"),
+            "");
+  // A flywheel on a short crank.
+  EXPECT_EQ(
+      WarningsOf(Replaced(Slender(), "inertia: {xx: 1e-4, yy: 2*crank^2/12, zz: 2*crank^2/12}",
+                          "inertia: {xx: 0.4, yy: 0.4, zz: 0.8}")),
+      "");
+  // Two turns, stated in degrees.
+  EXPECT_EQ(WarningsOf(Replaced(Slender(), "child: crank.foot, axis: z, guess_deg: 60",
+                                "child: crank.foot, axis: z, guess_deg: 780")),
+            "");
+}
+
+TEST(Plausibility, NoShippedModelRaisesADoubt) {
+  int models = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
+    const auto file = entry.path() / "model.yaml";
+    if (!std::filesystem::exists(file)) continue;
+    ++models;
+    const LoadResult loaded = LoadModel(file.string());
+    ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+    EXPECT_EQ(loaded.diagnostics.Text(), "") << file;
+  }
+  EXPECT_GE(models, 10);
+}
+
+// Links in one line, folded back: no small motion of a joint narrows the gap, so that only chance
+// leads out of it.
+TEST(Plausibility, APoseFoundFromDisturbedGuessesIsSaidToBeChance) {
+  std::ifstream stream(SourcePath("/models/four_bar/model.yaml"));
+  std::string text{std::istreambuf_iterator<char>(stream), {}};
+  EXPECT_EQ(WarningsOf(text), "");
+  text = Replaced(text, "guess_deg: 90}", "guess_deg: 0}");
+  text = Replaced(text, "guess_deg: -70}", "guess_deg: 180}");
+  text = Replaced(text, "guess_deg: 100}", "guess_deg: 0}");
+  const std::string said = WarningsOf(text);
+  EXPECT_NE(said.find("the loops close only from disturbed guesses"), std::string::npos) << said;
+  EXPECT_NE(said.find("another assembly than meant"), std::string::npos) << said;
+}
+
+}  // namespace
+}  // namespace mbv

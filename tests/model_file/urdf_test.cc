@@ -1,0 +1,329 @@
+#include "model_file/urdf.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "core/spatial.h"
+#include "four_bar.h"
+#include "kinematics/mobility.h"
+#include "model_file/load_model.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+using std::numbers::pi;
+
+constexpr double kUrdfRoundoff = 64 * kEps;
+
+UrdfTree MustRead(const std::string& text) {
+  Diagnostics diagnostics;
+  UrdfTree tree = ReadUrdf(text, "r.urdf", &diagnostics);
+  EXPECT_EQ(diagnostics.Text(), "");
+  return tree;
+}
+
+std::string Findings(const std::string& text) {
+  Diagnostics diagnostics;
+  (void)ReadUrdf(text, "r.urdf", &diagnostics);
+  return diagnostics.Text();
+}
+
+std::string Robot(const std::string& content) {
+  return "<robot name=\"r\"><link name=\"world\"/>" + content + "</robot>";
+}
+
+TEST(UrdfConventions, RpyIsYawAfterPitchAfterRollAndTheAxisIsInTheJointFrame) {
+  const UrdfTree tree = MustRead(
+      Robot("<link name=\"a\"/><joint name=\"j\" type=\"continuous\"><parent link=\"world\"/>"
+            "<child link=\"a\"/><origin xyz=\"1 2 3\" rpy=\"0.1 0.2 0.3\"/><axis xyz=\"0 2 "
+            "0\"/></joint>"));
+  ASSERT_EQ(tree.joints.size(), 1u);
+  const Joint& joint = tree.joints[0];
+  EXPECT_EQ(joint.kind, JointKind::kRevolute);
+  EXPECT_EQ(joint.parent, -1);
+  EXPECT_EQ(joint.X_PF.translation(), Vec3(1, 2, 3));
+  EXPECT_LT((joint.X_PF.linear() - RotRpy({0.1, 0.2, 0.3})).norm(), kUrdfRoundoff);
+  EXPECT_EQ(joint.axis, Vec3::UnitY());                // made a unit vector, not turned by rpy
+  EXPECT_TRUE(joint.X_CM.isApprox(Pose::Identity()));  // the link frame is the joint frame
+  EXPECT_FALSE(std::isfinite(joint.range[0].upper));
+}
+
+TEST(UrdfConventions, TheDefaultAxisIsX) {
+  const UrdfTree tree = MustRead(
+      Robot("<link name=\"a\"/><joint name=\"j\" type=\"continuous\"><parent link=\"world\"/>"
+            "<child link=\"a\"/></joint>"));
+  EXPECT_EQ(tree.joints.at(0).axis, Vec3::UnitX());
+}
+
+TEST(UrdfConventions, InertiaIsAboutTheCentreOfMassInTheAxesOfItsOrigin) {
+  const UrdfTree tree = MustRead(Robot(
+      "<link name=\"a\"><inertial><origin xyz=\"1 0 0\" rpy=\"0 0 1.5707963267948966\"/>"
+      "<mass value=\"2\"/><inertia ixx=\"1\" ixy=\"0.1\" ixz=\"0.2\" iyy=\"3\" iyz=\"0.3\" "
+      "izz=\"3.5\"/></inertial></link><joint name=\"j\" type=\"fixed\"><parent link=\"world\"/>"
+      "<child link=\"a\"/></joint>"));
+  const Body& body = tree.bodies.at(0);
+  EXPECT_EQ(body.mass, 2.0);
+  EXPECT_EQ(body.p_BoBcm_B, Vec3(1, 0, 0));
+  // Turned by 90° about z: x of the inertia frame is y of the link, y is -x.
+  Mat3 expected;
+  expected << 3, -0.1, -0.3, -0.1, 1, 0.2, -0.3, 0.2, 3.5;
+  EXPECT_LT((body.I_Bcm_B - expected).norm(), kUrdfRoundoff) << body.I_Bcm_B;
+}
+
+TEST(UrdfConventions, LimitsAreReadAndMimicIsLeftOutAloud) {
+  const std::string text = Robot(
+      "<link name=\"a\"/><link name=\"b\"/>"
+      "<joint name=\"j\" type=\"prismatic\"><parent link=\"world\"/><child link=\"a\"/>"
+      "<axis xyz=\"0 0 1\"/><limit lower=\"-0.1\" upper=\"0.4\" effort=\"1\" "
+      "velocity=\"1\"/></joint>"
+      "<joint name=\"k\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/>"
+      "<limit effort=\"1\" velocity=\"1\"/><mimic joint=\"j\"/></joint>");
+  Diagnostics diagnostics;
+  const UrdfTree tree = ReadUrdf(text, "r.urdf", &diagnostics);
+  EXPECT_EQ(diagnostics.Text(),
+            "r.urdf:1:1: warning: joint 'k': mimic of 'j' is left out, the joint is free\n"
+            "  hint: where it stands for a closed loop, state the loop by a closure; gears are "
+            "commanded: drive both joints and couple them by `equal` in the scenario\n");
+  EXPECT_EQ(tree.joints.at(0).range[0].lower, -0.1);
+  EXPECT_EQ(tree.joints.at(0).range[0].upper, 0.4);
+  // lower = upper = 0 is urdfdom's word for "not given".
+  EXPECT_FALSE(std::isfinite(tree.joints.at(1).range[0].upper));
+}
+
+TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {
+  const auto joint = [](const std::string& name, const std::string& inner) {
+    return "<link name=\"" + name + "_link\"/>\n<joint name=\"" + name +
+           "\" type=\"continuous\"><parent link=\"world\"/><child link=\"" + name + "_link\"/>" +
+           inner + "</joint>\n";
+  };
+  const std::string text = Robot(
+      "\n" + joint("a", "<dynamics damping=\"0.5\"/>") +
+      joint("b", "<dynamics friction=\"0.1\"/>") +
+      joint("c", "<dynamics damping=\"2\" friction=\"0.2\"/>") +
+      joint("d", "<dynamics damping=\"0\" friction=\"0\"/>") +
+      "<transmission name=\"t1\"><joint name=\"a\"/><actuator name=\"m\">"
+      "<mechanicalReduction>50</mechanicalReduction></actuator></transmission>\n"
+      "<transmission name=\"t2\"><joint name=\"b\"><mechanicalReduction>-1"
+      "</mechanicalReduction></joint></transmission>\n"
+      "<transmission name=\"t3\"><mechanicalReduction>1.0</mechanicalReduction></transmission>\n");
+  Diagnostics diagnostics;
+  (void)ReadUrdf(text, "r.urdf", &diagnostics);
+  const std::string said = diagnostics.Text();
+  for (const char* part :
+       {"r.urdf:3:1: warning: damping in 2 joints is left out: a (0.5), c (2)\n"
+        "  hint: drive forces are computed without it\n",
+        "r.urdf:5:1: warning: friction in 2 joints is left out: b (0.1), c (0.2)\n",
+        "r.urdf:10:1: warning: transmission 't1': the reduction 50 is left out\n"
+        "  hint: positions and forces are those of the joint, not of the motor\n",
+        "r.urdf:11:1: warning: transmission 't2': the reduction -1 is left out\n"}) {
+    EXPECT_NE(said.find(part), std::string::npos) << part << said;
+  }
+  EXPECT_EQ(diagnostics.findings().size(), 4u) << said;
+}
+
+TEST(UrdfImport, FindingsReplaceUrdfdomsTalk) {
+  testing::internal::CaptureStderr();
+  EXPECT_NE(Findings("<robot").find("r.urdf: error:"), std::string::npos);
+  EXPECT_NE(Findings("").find("error"), std::string::npos);
+  EXPECT_NE(Findings("<robot name=\"r\"/>").find("error"), std::string::npos);
+  EXPECT_NE(Findings(Robot("<joint name=\"j\" type=\"fixed\"><parent link=\"world\"/>"
+                           "<child link=\"nobody\"/></joint>"))
+                .find("nobody"),
+            std::string::npos);
+  EXPECT_NE(Findings(Robot("<link name=\"a\"/><joint name=\"j\" type=\"continuous\">"
+                           "<parent link=\"world\"/><child link=\"a\"/><axis xyz=\"0 0 0\"/>"
+                           "</joint>"))
+                .find("joint 'j': the axis (0, 0, 0) has no direction"),
+            std::string::npos);
+  EXPECT_NE(Findings(Robot("<link name=\"a\"><inertial><mass value=\"-1\"/><inertia ixx=\"1\" "
+                           "ixy=\"0\" ixz=\"0\" iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>"
+                           "<joint name=\"j\" type=\"fixed\"><parent link=\"world\"/>"
+                           "<child link=\"a\"/></joint>"))
+                .find("mass >= 0"),
+            std::string::npos);
+  std::string deep = "<robot name=\"r\">";
+  for (int i = 0; i < 100'000; ++i) deep += "<link>";
+  EXPECT_NE(Findings(deep).find("nested deeper"), std::string::npos);
+  EXPECT_NE(Findings(std::string("\x00\x01", 2)).find("UTF-8"), std::string::npos);
+  EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
+}
+
+// Writes text into the test's folder and gives the path.
+std::string WriteFile(const std::string& name, const std::string& text) {
+  const std::filesystem::path folder = std::filesystem::path(testing::TempDir()) / "mbv_urdf";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder / name) << text;
+  return (folder / name).string();
+}
+
+// Exports, reads back, and compares masses, centres of mass and inertias at home. A URDF link frame
+// is its joint's frame, so that body origins may move; masses may not.
+void ExpectRoundTrip(const Mechanism& m) {
+  const std::string urdf = m.name + ".urdf";
+  WriteFile(urdf, WriteUrdf(m));
+  const LoadResult back = LoadModel(WriteFile(m.name + ".yaml", WriteUrdfCompanion(m, urdf)));
+  EXPECT_EQ(back.diagnostics.Text(), "");
+  ASSERT_TRUE(back.mechanism);
+  const Mechanism& n = *back.mechanism;
+  double size = 1.0;
+  for (const Pose& X : m.X_WB_home) size = std::max(size, X.translation().norm());
+  for (size_t a = 0; a < m.bodies.size(); ++a) {
+    const int b = n.FindBody(m.bodies[a].name);
+    ASSERT_GE(b, 0) << m.bodies[a].name;
+    const Body &before = m.bodies[a], &after = n.bodies[b];
+    EXPECT_EQ(before.mass, after.mass);
+    if (before.mass == 0.0) continue;
+    const Pose &X_before = m.X_WB_home[a], &X_after = n.X_WB_home[b];
+    EXPECT_LT((X_before * before.p_BoBcm_B - X_after * after.p_BoBcm_B).norm(),
+              kUrdfRoundoff * size)
+        << before.name;
+    const Mat3 I_before = X_before.linear() * before.I_Bcm_B * X_before.linear().transpose();
+    const Mat3 I_after = X_after.linear() * after.I_Bcm_B * X_after.linear().transpose();
+    EXPECT_LT((I_before - I_after).norm(), kUrdfRoundoff * I_before.norm()) << before.name;
+  }
+  ASSERT_EQ(m.outputs.size(), n.outputs.size());
+  for (size_t i = 0; i < m.outputs.size(); ++i) {
+    const Output &before = m.outputs[i], &after = n.outputs[i];
+    const Pose X_before = m.X_WB_home[before.body] * before.X_BO;
+    const Pose X_after = n.X_WB_home[after.body] * after.X_BO;
+    // Each of the two home solutions has its own rounding.
+    EXPECT_LT((X_before.matrix() - X_after.matrix()).norm(), 2 * kUrdfRoundoff * size)
+        << before.name;
+  }
+  const Mobility mobility = AnalyseMobility(m), again = AnalyseMobility(n);
+  EXPECT_EQ(mobility.freedoms, again.freedoms);
+  EXPECT_EQ(mobility.redundant, again.redundant);
+  EXPECT_EQ(again.undriven, 0);
+  EXPECT_EQ(m.drives.size(), n.drives.size());
+}
+
+class ShippedModel : public testing::TestWithParam<const char*> {};
+
+TEST_P(ShippedModel, SurvivesTheRoundTripThroughUrdf) {
+  const LoadResult loaded =
+      LoadModel(std::string(kSourceDir) + "/models/" + GetParam() + "/model.yaml");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  ExpectRoundTrip(*loaded.mechanism);
+}
+
+INSTANTIATE_TEST_SUITE_P(Urdf, ShippedModel,
+                         testing::Values("stabilizing_platform", "spr_tripod", "cabin_robot",
+                                         "scara_robot", "four_bar", "slider_crank", "stewart"),
+                         [](const auto& name) { return std::string(name.param); });
+
+TEST(UrdfExport, ChainsReversedJointsOffsetFramesAndRangesSurviveTheRoundTrip) {
+  // `cut` takes the tree through `ball` backwards: from d to c.
+  const LoadResult loaded = LoadModelText(R"(name: chain
+bodies:
+  a: {mass: 1, inertia: [1, 1, 1], frames: {j: {position: [0.1, 0.2, 0.3], rotation: {rpy_deg: [10, 90, 20]}}}}
+  b: {mass: 2, com: [0.1, 0, 0], inertia: {xx: 1, yy: 2, zz: 2.5, xy: 0.1, xz: -0.2, yz: 0.05}, frames: {j: [0, 0, 0.2]}}
+  c: {mass: 3, inertia: [1, 1, 1], frames: {j: {rotation: {axis: y, angle: 1}}}}
+  d: {mass: 4, inertia: [1, 1, 1]}
+  e: {mass: 5, inertia: [1, 1, 1]}
+joints:
+  pipe: {kind: cylindrical, parent: world, child: a.j, axis: [1, 2, 2], guess: [0.5, 0.3], range: [[0, 1], null]}
+  cross: {kind: universal, parent: c.j, child: b.j, axis: y, axis2: x, guess: [0.4, -0.7]}
+  ball: {kind: spherical, parent: c.j, child: d, guess: [0.1, 0.2, 0.3]}
+  table: {kind: planar, parent: a.j, child: b, axis: y, guess: [0.1, -0.2, 0.6]}
+  float: {kind: free, parent: e, child: d, guess: [1, 2, 3, 0.3, 0.2, 0.1]}
+outputs: {o: e}
+)",
+                                          "m.yaml");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  bool any_reversed = false;
+  for (const bool reversed : m.tree_reversed) any_reversed = any_reversed || reversed;
+  EXPECT_TRUE(any_reversed);
+  WriteFile("chain.urdf", WriteUrdf(m));
+  const LoadResult back = LoadModel(WriteFile("chain.yaml", WriteUrdfCompanion(m, "chain.urdf")));
+  ASSERT_TRUE(back.mechanism) << back.diagnostics.Text();
+  for (const Body& body : m.bodies) {
+    if (body.mass == 0.0) continue;
+    const int a = m.FindBody(body.name), b = back.mechanism->FindBody(body.name);
+    const Body& after = back.mechanism->bodies[b];
+    EXPECT_LT(
+        (m.X_WB_home[a] * body.p_BoBcm_B - back.mechanism->X_WB_home[b] * after.p_BoBcm_B).norm(),
+        4 * kUrdfRoundoff)
+        << body.name;
+  }
+  const Joint& slide = back.mechanism->joints[back.mechanism->FindJoint("pipe.slide")];
+  EXPECT_EQ(slide.range[0].upper, 1.0);
+}
+
+TEST(UrdfExport, TheCommentHoldsTheCompanion) {
+  const LoadResult loaded = LoadModelText(kFourBar, "m.yaml");
+  ASSERT_TRUE(loaded.mechanism);
+  const std::string text = WriteUrdf(*loaded.mechanism);
+  EXPECT_NE(text.find(WriteUrdfCompanion(*loaded.mechanism, "four_bar.urdf")), std::string::npos);
+  EXPECT_NE(text.find("C: {kind: revolute"), std::string::npos);
+}
+
+TEST(UrdfKey, AUrdfTreeWithAClosureInTheModelFileIsAClosedMechanism) {
+  WriteFile(
+      "arms.urdf",
+      Robot(
+          "<link name=\"crank\"/><link name=\"coupler\"/><link name=\"rocker\"/>"
+          "<joint name=\"A\" type=\"continuous\"><parent link=\"world\"/><child link=\"crank\"/>"
+          "<axis xyz=\"0 0 1\"/></joint>"
+          "<joint name=\"B\" type=\"continuous\"><parent link=\"crank\"/><child link=\"coupler\"/>"
+          "<origin xyz=\"0.2 0 0\"/><axis xyz=\"0 0 1\"/></joint>"
+          "<joint name=\"D\" type=\"continuous\"><parent link=\"world\"/><child link=\"rocker\"/>"
+          "<origin xyz=\"0.5 0 0\"/><axis xyz=\"0 0 1\"/></joint>"));
+  const LoadResult loaded = LoadModel(WriteFile("arms.yaml", R"(name: arms
+urdf: {file: arms.urdf, guess_deg: {A: 60, B: -60, D: 60}}
+attach:
+  rocker: {end: [0.2, 0, 0]}
+  coupler: {end: [0.5, 0, 0]}
+joints:
+  C: {kind: revolute, parent: rocker.end, child: coupler.end, axis: z}
+drives: {motor: {kind: joint, joint: A}}
+)"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_EQ(AnalyseMobility(*loaded.mechanism).freedoms, 1);
+  const int coupler = loaded.mechanism->FindBody("coupler");
+  EXPECT_LT((loaded.mechanism->X_WB_home[coupler].translation() -
+             0.2 * Vec3(std::cos(pi / 3), std::sin(pi / 3), 0))
+                .norm(),
+            kUrdfRoundoff);
+}
+
+TEST(UrdfKey, ARootLinkThatIsNotTheWorldIsFixedToItUnlessAJointCarriesIt) {
+  WriteFile("base.urdf", "<robot name=\"r\"><link name=\"base\"/></robot>");
+  const LoadResult fixed = LoadModel(WriteFile("fixed.yaml", "name: m\nurdf: base.urdf\n"));
+  ASSERT_TRUE(fixed.mechanism) << fixed.diagnostics.Text();
+  EXPECT_EQ(fixed.mechanism->joints.at(0).kind, JointKind::kFixed);
+  const LoadResult moved = LoadModel(WriteFile(
+      "moved.yaml",
+      "name: m\nurdf: base.urdf\njoints: {j: {kind: free, parent: world, child: base}}\n"));
+  ASSERT_TRUE(moved.mechanism) << moved.diagnostics.Text();
+  EXPECT_EQ(moved.mechanism->joints.size(), 1u);
+}
+
+TEST(UrdfKey, FindingsNameTheUrdfFile) {
+  WriteFile(
+      "heavy.urdf",
+      Robot("<link name=\"a\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" "
+            "iyy=\"1\" iyz=\"0\" izz=\"5\"/></inertial></link><joint name=\"j\" type=\"fixed\">"
+            "<parent link=\"world\"/><child link=\"a\"/></joint>"));
+  const std::string heavy =
+      LoadModel(WriteFile("heavy.yaml", "name: m\nurdf: heavy.urdf\n")).diagnostics.Text();
+  EXPECT_NE(heavy.find("heavy.urdf:1: error: link 'a': principal inertias 1, 1, 5 kg m² violate"),
+            std::string::npos)
+      << heavy;
+  const std::string missing =
+      LoadModel(WriteFile("missing.yaml", "name: m\nurdf: nothing.urdf\n")).diagnostics.Text();
+  EXPECT_NE(missing.find("missing.yaml:2:7: error: urdf = 'nothing.urdf' cannot be read"),
+            std::string::npos)
+      << missing;
+  const std::string guess =
+      LoadModel(WriteFile("guess.yaml", "name: m\nurdf: {file: base.urdf, guess: {k: 1}}\n"))
+          .diagnostics.Text();
+  EXPECT_NE(guess.find("urdf.guess.k: there is no such joint"), std::string::npos) << guess;
+}
+
+}  // namespace
+}  // namespace mbv
