@@ -59,12 +59,13 @@ using ClosedFormFactory = std::unique_ptr<ClosedForm> (*)(const Mechanism&, cons
                                                           Diagnostics* diagnostics);
 
 struct ClosedFormRow {
-  std::string mechanism;             ///< Mechanism::name
-  std::vector<std::string> models;   ///< accepted formulations, the default first
-  std::vector<std::string> errata;   ///< accepted entries of `as_printed`
+  std::string mechanism;            ///< Mechanism::name
+  std::vector<std::string> models;  ///< accepted formulations, the default first
+  std::vector<std::string> errata;  ///< accepted entries of `as_printed`
   ClosedFormFactory factory = nullptr;
-  /// What the equations take for granted. Checked against the mechanism before the factory is asked:
-  /// outside, there is no closed form, and the other witnesses go on. nullptr: nothing is checked.
+  /// What the equations take for granted. Checked against the mechanism before the factory is
+  /// asked: outside, there is no closed form, and the other witnesses go on. nullptr: nothing is
+  /// checked.
   CoverageFunction coverage = nullptr;
 };
 

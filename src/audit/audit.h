@@ -18,11 +18,12 @@ enum class AuditVerdict {
 
 /// One row of the audit table.
 struct AuditRow {
-  std::string equation{};           ///< "(6) M", "(17)", "section 4 data"
-  std::string erratum{};            ///< "E2" or ""
-  std::string printed{};            ///< the form as printed, in plain text
-  std::string corrected{};          ///< the corrected form; "" when the print is right
-  double residual_printed = 0.0;    ///< largest |difference| of the print; NaN if it cannot be evaluated
+  std::string equation{};   ///< "(6) M", "(17)", "section 4 data"
+  std::string erratum{};    ///< "E2" or ""
+  std::string printed{};    ///< the form as printed, in plain text
+  std::string corrected{};  ///< the corrected form; "" when the print is right
+  double residual_printed =
+      0.0;  ///< largest |difference| of the print; NaN if it cannot be evaluated
   double residual_corrected = 0.0;  ///< largest |difference| of the corrected form (of the print
                                     ///< when it is right)
   double scale = 1.0;               ///< largest |value| of the quantity, same unit

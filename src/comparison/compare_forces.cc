@@ -116,8 +116,8 @@ std::string WhyNot(const ComparisonInput& input, const PairReader& reader, size_
   if (input.start_window_s > 0.0 && !pair.drives.empty() &&
       pair.force_samples < kFewestBehindWindow) {
     return fmt::format("the start window of {:g} s leaves {} sample{} to judge, fewer than {}",
-                       input.start_window_s, pair.force_samples,
-                       pair.force_samples == 1 ? "" : "s", kFewestBehindWindow);
+                       input.start_window_s, pair.force_samples, pair.force_samples == 1 ? "" : "s",
+                       kFewestBehindWindow);
   }
   return "";
 }

@@ -74,8 +74,7 @@ void ComparePooled(const ForceScale& scale, const std::vector<JointError>& error
     KeepWorst(&pair->metrics, Metric::kReaction, forces.MeasuredNrmse(least));
   }
   if (moments.count() > 0) {
-    const double floor =
-        std::max(OrZero(forces.rms_truth()), least) * kMomentArm * scale.length_m;
+    const double floor = std::max(OrZero(forces.rms_truth()), least) * kMomentArm * scale.length_m;
     KeepWorst(&pair->metrics, Metric::kReaction, moments.MeasuredNrmse(floor));
   }
 }

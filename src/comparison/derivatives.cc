@@ -67,8 +67,8 @@ double LargestPhase(const Mechanism& mechanism, const Motion& motion, double h) 
       fastest = std::max(fastest, std::abs(jet.rate));
     }
     if (rate2 > 0.0) largest = std::max(largest, h * std::sqrt(acceleration2 / rate2));
-    const bool turns = !command.terms.empty() &&
-                       IsAngle(mechanism, command.terms.front().coordinate);
+    const bool turns =
+        !command.terms.empty() && IsAngle(mechanism, command.terms.front().coordinate);
     if (turns) largest = std::max(largest, h * fastest);
   }
   return largest;
@@ -100,8 +100,7 @@ double MeasureDerivative(const Trace& trace, int position, int rate, double scal
     const double sixth = differences[static_cast<size_t>(i)].sixth;
     const double error = std::abs(sixth - trace.values(i, rate)) - kTruncation * truncation;
     KeepWorst(&out->metrics[Metric::kDerivatives], error <= 0.0 ? 0.0 : error / scale,
-              trace.time_s[static_cast<size_t>(i)],
-              trace.channels[static_cast<size_t>(rate)].name);
+              trace.time_s[static_cast<size_t>(i)], trace.channels[static_cast<size_t>(rate)].name);
   }
   return judged / inner;
 }
@@ -142,8 +141,7 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
     const RestFloor rest = RestFloorOf(input, drive.unit, trace);
     const double velocity = std::max(rest.velocity, Rms(trace, drive.velocity));
     const double acceleration = std::max(rest.acceleration, Rms(trace, drive.acceleration));
-    const double first =
-        MeasureDerivative(trace, drive.position, drive.velocity, velocity, out);
+    const double first = MeasureDerivative(trace, drive.position, drive.velocity, velocity, out);
     const double second =
         MeasureDerivative(trace, drive.velocity, drive.acceleration, acceleration, out);
     if (std::min(first, second) < 0.5) coarse += (coarse.empty() ? "" : ", ") + drive.name;

@@ -93,13 +93,15 @@ std::string DrivingText(const ComparisonInput& input) {
   if (input.drive_by != DriveBy::kMotion) {
     const char* driver = input.driven_by == "analytic" ? "closed form" : "reference";
     if (input.drive_by == DriveBy::kServos) {
-      return fmt::format("MuJoCo's servos follow the drive motion that the {} computes; nothing else "
-                         "guides the simulation's drives",
-                         driver);
+      return fmt::format(
+          "MuJoCo's servos follow the drive motion that the {} computes; nothing else "
+          "guides the simulation's drives",
+          driver);
     }
-    return fmt::format("the drive forces that the {} computes push the simulation in open loop from "
-                       "the commanded start; nothing guides its drives",
-                       driver);
+    return fmt::format(
+        "the drive forces that the {} computes push the simulation in open loop from "
+        "the commanded start; nothing guides its drives",
+        driver);
   }
   const std::vector<bool> commanded = CommandedDrives(input);
   if (std::find(commanded.begin(), commanded.end(), false) == commanded.end()) {

@@ -26,8 +26,8 @@ void KeepWorst(Measured* worst, double value, double time_s, const std::string& 
 }
 
 void KeepWorst(Measured* worst, const Measured& measured) {
-  const double of_zero = std::isnan(worst->of_zero) ? measured.of_zero
-                                                    : std::max(worst->of_zero, measured.of_zero);
+  const double of_zero =
+      std::isnan(worst->of_zero) ? measured.of_zero : std::max(worst->of_zero, measured.of_zero);
   const bool first = worst->channel.empty() && std::isnan(worst->value);
   if (first || (!std::isnan(worst->value) && !(measured.value <= worst->value))) *worst = measured;
   worst->of_zero = of_zero;

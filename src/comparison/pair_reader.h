@@ -36,7 +36,6 @@ inline void KeepWorst(std::map<Metric, Measured>* metrics, Metric metric,
 void CompareForces(const ComparisonInput& input, const PairReader& reader, PairComparison* pair);
 /// Joint reactions that both give in the same frame and that statics determines, and the forces of
 /// prescribed joints.
-void CompareReactions(const ComparisonInput& input, const PairReader& reader,
-                      PairComparison* pair);
+void CompareReactions(const ComparisonInput& input, const PairReader& reader, PairComparison* pair);
 
 }  // namespace mbv::internal

@@ -16,9 +16,9 @@ namespace {
 // Signals without a limit on their largest difference get this multiple of the RMS one.
 constexpr double kPeakOverRms = 10.0;
 
-constexpr Metric kRmsMetrics[] = {Metric::kForceNrmse, Metric::kForceOwn, Metric::kVelocity,
-                                  Metric::kAcceleration, Metric::kReaction,
-                                  Metric::kReactionOwn, Metric::kBaseForce};
+constexpr Metric kRmsMetrics[] = {Metric::kForceNrmse,   Metric::kForceOwn, Metric::kVelocity,
+                                  Metric::kAcceleration, Metric::kReaction, Metric::kReactionOwn,
+                                  Metric::kBaseForce};
 constexpr Metric kMaxMetrics[] = {Metric::kForceMax, Metric::kPositionM, Metric::kPositionRad,
                                   Metric::kPoseM, Metric::kPoseRad};
 

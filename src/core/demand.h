@@ -28,8 +28,8 @@ std::string DemandText(const T& v) {
 
 }  // namespace mbv
 
-#define MBV_DEMAND(condition, value)                                                     \
-  do {                                                                                   \
-    if (!(condition))                                                                    \
-      ::mbv::ThrowDemand(#condition, __FILE__, __LINE__, ::mbv::DemandText(value));      \
+#define MBV_DEMAND(condition, value)                                                \
+  do {                                                                              \
+    if (!(condition))                                                               \
+      ::mbv::ThrowDemand(#condition, __FILE__, __LINE__, ::mbv::DemandText(value)); \
   } while (false)

@@ -22,26 +22,36 @@ enum class Stop {
 struct [[nodiscard]] RunSummary {
   Stop stop = Stop::kNotRun;
   std::string message = "was not run";  ///< one sentence for people, with numbers
-  double time_s = kNan;    ///< scenario time of the trouble [s]
-  std::string where;       ///< limb, drive or joint in trouble
-  double amount = kNan;    ///< by how much (see unit), e.g. the missing reach
-  std::string unit;        ///< of `amount`
-  double wall_s = 0.0;     ///< time spent computing [s]
+  double time_s = kNan;                 ///< scenario time of the trouble [s]
+  std::string where;                    ///< limb, drive or joint in trouble
+  double amount = kNan;                 ///< by how much (see unit), e.g. the missing reach
+  std::string unit;                     ///< of `amount`
+  double wall_s = 0.0;                  ///< time spent computing [s]
 
   [[nodiscard]] bool ok() const { return stop == Stop::kDone; }
-  static RunSummary Done() { return {.stop = Stop::kDone, .message = "done", .where = {}, .unit = {}}; }
+  static RunSummary Done() {
+    return {.stop = Stop::kDone, .message = "done", .where = {}, .unit = {}};
+  }
 };
 
 [[nodiscard]] inline const char* ToText(Stop stop) {
   switch (stop) {
-    case Stop::kNotRun: return "not run";
-    case Stop::kDone: return "done";
-    case Stop::kUnreachable: return "unreachable pose";
-    case Stop::kSingular: return "singular pose";
-    case Stop::kLimit: return "limit violated";
-    case Stop::kNoConvergence: return "no convergence";
-    case Stop::kEngineFailure: return "engine failure";
-    case Stop::kUnsupported: return "not supported";
+    case Stop::kNotRun:
+      return "not run";
+    case Stop::kDone:
+      return "done";
+    case Stop::kUnreachable:
+      return "unreachable pose";
+    case Stop::kSingular:
+      return "singular pose";
+    case Stop::kLimit:
+      return "limit violated";
+    case Stop::kNoConvergence:
+      return "no convergence";
+    case Stop::kEngineFailure:
+      return "engine failure";
+    case Stop::kUnsupported:
+      return "not supported";
   }
   return "?";
 }

@@ -23,9 +23,9 @@ struct ComplianceShare {
 };
 
 struct StiffnessResult {
-  Mat6 K = Mat6::Constant(kNan);  ///< symmetric
-  Mat6 C = Mat6::Constant(kNan);  ///< K⁻¹; NaN where K is singular
-  int rank = -1;                  ///< of K made dimensionless with the mechanism's size
+  Mat6 K = Mat6::Constant(kNan);        ///< symmetric
+  Mat6 C = Mat6::Constant(kNan);        ///< K⁻¹; NaN where K is singular
+  int rank = -1;                        ///< of K made dimensionless with the mechanism's size
   std::vector<ComplianceShare> shares;  ///< empty where a computation does not give them or K is
                                         ///< singular
   RunSummary summary;

@@ -19,10 +19,10 @@ struct Channel {
 /// Samples of channels on a common time grid. Witnesses sample at the same times, so traces are
 /// compared without interpolation.
 struct Trace {
-  std::string witness;           ///< "analytic", "reference" or "simulated"
-  std::vector<double> time_s;    ///< n sample times [s], increasing
-  std::vector<Channel> channels; ///< m channels
-  MatX values;                   ///< n × m
+  std::string witness;            ///< "analytic", "reference" or "simulated"
+  std::vector<double> time_s;     ///< n sample times [s], increasing
+  std::vector<Channel> channels;  ///< m channels
+  MatX values;                    ///< n × m
 
   /// Column of the channel with this name, or -1.
   [[nodiscard]] int Find(const std::string& name) const;

@@ -23,12 +23,19 @@ bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
 
 bool IsLength(JointKind kind, int coordinate) {
   switch (kind) {
-    case JointKind::kPrismatic: return true;
-    case JointKind::kCylindrical: return coordinate == 0;
-    case JointKind::kPlanar: return coordinate < 2;
-    case JointKind::kFree: return coordinate < 3;
-    case JointKind::kFixed: case JointKind::kRevolute: case JointKind::kUniversal:
-    case JointKind::kSpherical: return false;
+    case JointKind::kPrismatic:
+      return true;
+    case JointKind::kCylindrical:
+      return coordinate == 0;
+    case JointKind::kPlanar:
+      return coordinate < 2;
+    case JointKind::kFree:
+      return coordinate < 3;
+    case JointKind::kFixed:
+    case JointKind::kRevolute:
+    case JointKind::kUniversal:
+    case JointKind::kSpherical:
+      return false;
   }
   return false;
 }
@@ -63,8 +70,12 @@ std::string ForceUnit(const Mechanism& mechanism, const Drive& drive) {
 }
 
 SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive) {
-  SignalSheet sheet{.signal = drive.name + ".force", .acts_on = {}, .exerted_by = {}, .frame = {},
-                    .positive = {}, .unit = ForceUnit(mechanism, drive)};
+  SignalSheet sheet{.signal = drive.name + ".force",
+                    .acts_on = {},
+                    .exerted_by = {},
+                    .frame = {},
+                    .positive = {},
+                    .unit = ForceUnit(mechanism, drive)};
   if (const auto* distance = std::get_if<DistanceDrive>(&drive.kind)) {
     sheet.acts_on = mechanism.bodies[distance->body_to].name + " (and, opposite, on " +
                     mechanism.bodies[distance->body_from].name + ")";
@@ -80,8 +91,8 @@ SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive) {
   sheet.exerted_by = mechanism.bodies[joint.parent].name + " through the drive of " + joint.name;
   sheet.frame = std::string(translation ? "along" : "about") + " the axis of " + joint.name +
                 ", positive along the axis given on " + mechanism.bodies[joint.parent].name;
-  sheet.positive = translation ? "push: towards a larger coordinate" :
-                                 "turns the child towards a larger angle";
+  sheet.positive =
+      translation ? "push: towards a larger coordinate" : "turns the child towards a larger angle";
   return sheet;
 }
 

@@ -67,9 +67,9 @@ struct Shape {
 
 struct Body {
   std::string name;
-  double mass = 0.0;            ///< [kg], >= 0; 0 is a massless connecting piece
+  double mass = 0.0;              ///< [kg], >= 0; 0 is a massless connecting piece
   Vec3 p_BoBcm_B = Vec3::Zero();  ///< centre of mass [m]
-  Mat3 I_Bcm_B = Mat3::Zero();  ///< about the centre of mass, body axes [kg m²]
+  Mat3 I_Bcm_B = Mat3::Zero();    ///< about the centre of mass, body axes [kg m²]
   std::vector<NamedFrame> frames;
   std::vector<Shape> shapes;
 };
@@ -98,17 +98,32 @@ struct Beam {
 };
 
 enum class JointKind {
-  kFixed, kRevolute, kPrismatic, kCylindrical, kUniversal, kSpherical, kPlanar, kFree
+  kFixed,
+  kRevolute,
+  kPrismatic,
+  kCylindrical,
+  kUniversal,
+  kSpherical,
+  kPlanar,
+  kFree
 };
 
 /// Number of coordinates = degrees of freedom of a joint kind.
 [[nodiscard]] constexpr int FreedomsOf(JointKind kind) {
   switch (kind) {
-    case JointKind::kFixed: return 0;
-    case JointKind::kRevolute: case JointKind::kPrismatic: return 1;
-    case JointKind::kCylindrical: case JointKind::kUniversal: return 2;
-    case JointKind::kSpherical: case JointKind::kPlanar: return 3;
-    case JointKind::kFree: return 6;
+    case JointKind::kFixed:
+      return 0;
+    case JointKind::kRevolute:
+    case JointKind::kPrismatic:
+      return 1;
+    case JointKind::kCylindrical:
+    case JointKind::kUniversal:
+      return 2;
+    case JointKind::kSpherical:
+    case JointKind::kPlanar:
+      return 3;
+    case JointKind::kFree:
+      return 6;
   }
   return -1;
 }
@@ -124,16 +139,16 @@ struct CoordinateRange {
 struct Joint {
   std::string name;
   JointKind kind = JointKind::kFixed;
-  int parent = 0;                 ///< body index; 0 is the world
-  Pose X_PF = Pose::Identity();   ///< joint frame on the parent
+  int parent = 0;                ///< body index; 0 is the world
+  Pose X_PF = Pose::Identity();  ///< joint frame on the parent
   int child = 0;
-  Pose X_CM = Pose::Identity();   ///< joint frame on the child
-  Vec3 axis = Vec3::UnitZ();      ///< unit; see the table above
-  Vec3 axis2 = Vec3::UnitX();     ///< unit; universal only
-  std::array<double, 6> guess{};  ///< coordinates to start the home solution from
-  std::array<double, 6> home{};   ///< coordinates at the solved home pose
+  Pose X_CM = Pose::Identity();          ///< joint frame on the child
+  Vec3 axis = Vec3::UnitZ();             ///< unit; see the table above
+  Vec3 axis2 = Vec3::UnitX();            ///< unit; universal only
+  std::array<double, 6> guess{};         ///< coordinates to start the home solution from
+  std::array<double, 6> home{};          ///< coordinates at the solved home pose
   std::array<CoordinateRange, 6> range;  ///< limits, for reports and range checks
-  bool closure = false;           ///< true: cut by the spanning tree (a loop closure)
+  bool closure = false;                  ///< true: cut by the spanning tree (a loop closure)
   /// Isostatic rule: this revolute/universal joint transmits a force only (as a ball would), which
   /// makes the reactions of an overconstrained loop definite. Kinematics of the mechanism must not
   /// change by it; the loader checks that by rank.
@@ -176,7 +191,7 @@ struct Output {
   std::string name;
   int body = 0;
   Pose X_BO = Pose::Identity();
-  int reference_body = 0;         ///< frame R lies on this body (0: the world)
+  int reference_body = 0;  ///< frame R lies on this body (0: the world)
   Pose X_RbR = Pose::Identity();
 };
 
@@ -187,17 +202,17 @@ struct SpringDamper {
   Vec3 p_from = Vec3::Zero();
   int body_to = 0;
   Vec3 p_to = Vec3::Zero();
-  double stiffness = 0.0;      ///< [N/m]
-  double damping = 0.0;        ///< [N s/m]
+  double stiffness = 0.0;  ///< [N/m]
+  double damping = 0.0;    ///< [N s/m]
   double free_length_m = 0.0;
 };
 
 struct Mechanism {
   std::string name;
-  std::string file;         ///< model.yaml it came from, as given
+  std::string file;  ///< model.yaml it came from, as given
   std::string description;
   Vec3 gravity_W = Vec3(0, 0, -9.81);  ///< [m/s²]
-  Vec3 up_W = Vec3::UnitZ();  ///< unit, for pictures: stated, or against gravity, or z
+  Vec3 up_W = Vec3::UnitZ();           ///< unit, for pictures: stated, or against gravity, or z
   std::vector<Parameter> parameters;   ///< with overrides applied
   std::vector<Body> bodies;            ///< bodies[0] is the world
   std::vector<Joint> joints;
@@ -207,12 +222,12 @@ struct Mechanism {
   std::vector<SpringDamper> springs;
   std::vector<Beam> beams;  ///< of the elastic bodies; empty in most models
 
-  std::vector<int> tree_joints;    ///< indices of the spanning tree's joints, parents first (every
-                                   ///< non-world body is the outboard body of exactly one)
-  std::vector<bool> tree_reversed; ///< per tree joint: true if its child is the inboard body
-  std::vector<Pose> X_WB_home;     ///< per body, the closed home pose
+  std::vector<int> tree_joints;     ///< indices of the spanning tree's joints, parents first (every
+                                    ///< non-world body is the outboard body of exactly one)
+  std::vector<bool> tree_reversed;  ///< per tree joint: true if its child is the inboard body
+  std::vector<Pose> X_WB_home;      ///< per body, the closed home pose
 
-  [[nodiscard]] int FindBody(const std::string& body_name) const;    ///< index or -1
+  [[nodiscard]] int FindBody(const std::string& body_name) const;  ///< index or -1
   [[nodiscard]] int FindJoint(const std::string& joint_name) const;
   [[nodiscard]] int FindDrive(const std::string& drive_name) const;
   [[nodiscard]] int FindOutput(const std::string& output_name) const;
@@ -224,11 +239,11 @@ struct Mechanism {
 
 /// How to read a force signal: printed in every report.
 struct SignalSheet {
-  std::string signal;      ///< channel name without the witness
+  std::string signal;  ///< channel name without the witness
   std::string acts_on;
   std::string exerted_by;
-  std::string frame;       ///< frame and axis of the components
-  std::string positive;    ///< what a positive value means
+  std::string frame;     ///< frame and axis of the components
+  std::string positive;  ///< what a positive value means
   std::string unit;
 };
 

@@ -117,7 +117,8 @@ std::string ForcesText(const Mechanism& mechanism, const MobilityReport& report)
   std::string text =
       drives.empty() ? "  drive forces: all determined by statics\n"
                      : "  drive forces: not determined by statics alone: " + Joined(drives) + "\n";
-  if (report.home.reactions_not_unique.empty()) return text + "  joint reactions: all determined by statics\n";
+  if (report.home.reactions_not_unique.empty())
+    return text + "  joint reactions: all determined by statics\n";
   text += fmt::format("  joint reactions: {} of {} joints not determined by statics alone\n",
                       report.home.reactions_not_unique.size(), mechanism.joints.size());
   for (const UndeterminedReaction& reaction : report.home.reactions_not_unique) {

@@ -6,8 +6,9 @@ namespace mbv {
 namespace {
 
 // Forward limits hold for the corrected engine at 1 ms on the shipped motions: most come to 1e-10
-// or less, the fastest (pick_place) to 4.3e-7. The others are far above what double precision leaves
-// after a 20-unknown linear solve, 1e-14 there: a user's mechanism may stand near a singular pose.
+// or less, the fastest (pick_place) to 4.3e-7. The others are far above what double precision
+// leaves after a 20-unknown linear solve, 1e-14 there: a user's mechanism may stand near a singular
+// pose.
 constexpr MetricRow kRows[] = {
     {Metric::kForceNrmse,
      "force_nrmse",

@@ -23,29 +23,29 @@ inline constexpr std::string_view kReferencePrefix = "reference_";
 
 /// A judged quantity. Those of a pair compare two witnesses; the others need one witness only.
 enum class Metric {
-  kForceNrmse,    ///< pair: RMS error of all drive forces of one unit / RMS force
-  kForceMax,      ///< pair: largest error / largest force, drives of one unit
-  kForceOwn,      ///< pair: worst drive's RMS error / its own RMS force (at least 0.1 % of what
-                  ///< it carries, and of drives that carry the same)
-  kPositionM,     ///< pair: drive positions [m]
-  kPositionRad,   ///< pair: drive positions [rad]
-  kVelocity,      ///< pair: drive velocities, RMS error / RMS
-  kAcceleration,  ///< pair: drive accelerations, RMS error / RMS
-  kPoseM,         ///< pair: outputs, distance of origins [m]
-  kPoseRad,       ///< pair: outputs, angle of the relative rotation [rad]
-  kReaction,      ///< pair: unique joint reactions, RMS error / RMS
-  kReactionOwn,   ///< pair: worst joint's RMS error / its own RMS reaction
-  kBaseForce,     ///< pair: worst prescribed joint's RMS error / its own RMS force
-  kCommandM,      ///< commanded lengths against what the witness did [m]
-  kCommandRad,    ///< commanded angles against what the witness did [rad]
-  kCommandVelocity,      ///< commanded outputs' rates against what the witness did, RMS error / RMS
+  kForceNrmse,       ///< pair: RMS error of all drive forces of one unit / RMS force
+  kForceMax,         ///< pair: largest error / largest force, drives of one unit
+  kForceOwn,         ///< pair: worst drive's RMS error / its own RMS force (at least 0.1 % of what
+                     ///< it carries, and of drives that carry the same)
+  kPositionM,        ///< pair: drive positions [m]
+  kPositionRad,      ///< pair: drive positions [rad]
+  kVelocity,         ///< pair: drive velocities, RMS error / RMS
+  kAcceleration,     ///< pair: drive accelerations, RMS error / RMS
+  kPoseM,            ///< pair: outputs, distance of origins [m]
+  kPoseRad,          ///< pair: outputs, angle of the relative rotation [rad]
+  kReaction,         ///< pair: unique joint reactions, RMS error / RMS
+  kReactionOwn,      ///< pair: worst joint's RMS error / its own RMS reaction
+  kBaseForce,        ///< pair: worst prescribed joint's RMS error / its own RMS force
+  kCommandM,         ///< commanded lengths against what the witness did [m]
+  kCommandRad,       ///< commanded angles against what the witness did [rad]
+  kCommandVelocity,  ///< commanded outputs' rates against what the witness did, RMS error / RMS
   kCommandAcceleration,  ///< their accelerations, the same way
-  kClosureM,      ///< loop gap [m]
-  kClosureRad,    ///< loop twist gap [rad]
-  kPower,         ///< |input power − energy rate| / largest power
-  kDerivatives,   ///< drive velocity and acceleration against differences of the positions
-  kEnergy,        ///< |energy − start − work| / energy turned over, where work is integrated
-  kTableTube,     ///< pair with a table: worst column's difference / its tolerance tube
+  kClosureM,             ///< loop gap [m]
+  kClosureRad,           ///< loop twist gap [rad]
+  kPower,                ///< |input power − energy rate| / largest power
+  kDerivatives,          ///< drive velocity and acceleration against differences of the positions
+  kEnergy,     ///< |energy − start − work| / energy turned over, where work is integrated
+  kTableTube,  ///< pair with a table: worst column's difference / its tolerance tube
 };
 inline constexpr int kMetrics = 22;
 

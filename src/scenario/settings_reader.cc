@@ -23,7 +23,6 @@ LimitValue ReadLimit(ValueReader* values, const YamlNode& node, const std::strin
   return {number.has_value(), number};
 }
 
-
 std::vector<std::string> CheckKeys() {
   std::vector<std::string> keys = {"start_window_s"};
   for (const MetricRow& row : MetricRows()) {

@@ -33,9 +33,8 @@ scara::StiffnessParameters Scara() {
 
 TEST(StiffnessAudit, CabinsEquationsAreRightOrMended) {
   const auto rows = cabin_audit::StiffnessRows(kModels, Cabin());
-  EXPECT_EQ(
-      With(rows, AuditVerdict::kOk),
-      (std::set<std::string>{"(54)", "(55)", "(62)–(64), (66)–(68)", "(69)–(75)"}));
+  EXPECT_EQ(With(rows, AuditVerdict::kOk),
+            (std::set<std::string>{"(54)", "(55)", "(62)–(64), (66)–(68)", "(69)–(75)"}));
   EXPECT_EQ(With(rows, AuditVerdict::kWrong),
             (std::set<std::string>{"(56)–(61)", "(65) K_AB", "(65) K_CD", "Table 2"}));
   EXPECT_EQ(With(rows, AuditVerdict::kApproximation), std::set<std::string>{"(54) I_p"});

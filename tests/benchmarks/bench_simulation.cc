@@ -23,8 +23,8 @@ struct Platform {
   CommandSample command;
 
   Platform() {
-    ScenarioResult result = LoadScenario(std::string(kSourceDir) +
-                                         "/scenarios/stabilizing_platform/sea_state.yaml");
+    ScenarioResult result =
+        LoadScenario(std::string(kSourceDir) + "/scenarios/stabilizing_platform/sea_state.yaml");
     MBV_DEMAND(result.mechanism.has_value(), result.diagnostics.Text());
     mechanism = *std::move(result.mechanism);
     motion = result.scenario->motion;

@@ -95,7 +95,9 @@ TEST_F(CliTest, MutateTakesPercentAndWritesJson) {
   const ProgramResult result = mbverify(
       "mutate scenarios/four_bar/turn_inverse.yaml --parameter rho --size 1% --json " + json);
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  EXPECT_NE(result.out.find("1 of 1 numbers (1 parameters), each 1 % too large and too small"), std::string::npos) << result.out;
+  EXPECT_NE(result.out.find("1 of 1 numbers (1 parameters), each 1 % too large and too small"),
+            std::string::npos)
+      << result.out;
   const auto parsed = nlohmann::json::parse(ReadAll(json), nullptr, false);
   ASSERT_FALSE(parsed.is_discarded());
   EXPECT_EQ(parsed["size"], 0.01);
@@ -120,8 +122,8 @@ TEST_F(CliTest, MutateSharesItsWorkOutToProcesses) {
   alone.erase("wall_s");
   shared.erase("wall_s");
   EXPECT_EQ(alone, shared);
-  const ProgramResult bad =
-      mbverify("mutate scenarios/four_bar/turn_inverse.yaml --jobs 2 --parameter roh --parameter x");
+  const ProgramResult bad = mbverify(
+      "mutate scenarios/four_bar/turn_inverse.yaml --jobs 2 --parameter roh --parameter x");
   EXPECT_EQ(bad.exit_code, 2);
   EXPECT_NE(bad.err.find("did you mean 'rho'?"), std::string::npos) << bad.err;
 }
@@ -185,9 +187,10 @@ TEST_F(CliTest, AKilledRunLeavesTheOldResultWhole) {
   const std::string before = ReadAll(summary);
   // Killed somewhere on the way; the time is meant to hit different stages.
   for (const char* limit : {"0.05", "0.1", "0.15", "0.2"}) {
-    const std::string command = std::string("cd '" + std::string(kSourceDir) + "' && timeout -s KILL ") + limit +
-                                " '" + std::string(kBinaryDir) + "/mbverify' " + RunArguments(mbverify, kGood) +
-                                " >/dev/null 2>&1";
+    const std::string command =
+        std::string("cd '" + std::string(kSourceDir) + "' && timeout -s KILL ") + limit + " '" +
+        std::string(kBinaryDir) + "/mbverify' " + RunArguments(mbverify, kGood) +
+        " >/dev/null 2>&1";
     const int status = std::system(command.c_str());
     (void)status;  // whole or killed, the summary must be one of a complete run
     const auto json = nlohmann::json::parse(ReadAll(summary), nullptr, false);

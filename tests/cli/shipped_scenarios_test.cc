@@ -69,8 +69,7 @@ void CheckDocuments(const std::string& scenario, const std::string& summary) {
 class ShippedScenario : public testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedScenario, GivesWhatItExpects) {
-  const Expectation expect =
-      ReadScenarioHead(std::string(kSourceDir) + "/" + GetParam()).expect;
+  const Expectation expect = ReadScenarioHead(std::string(kSourceDir) + "/" + GetParam()).expect;
   const Program mbverify(NameOf(GetParam()));
   const ProgramResult result =
       mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());

@@ -33,7 +33,9 @@ TEST(Text, ControlCharactersAndWhatIsNoUtf8AreFound) {
 }
 
 TEST(Text, NothingThatATerminalObeysIsPrinted) {
-  EXPECT_EQ(Printable("a\x1b[31mb\x9b" "c\n"), "a\\x1b[31mb\\x9bc\n");
+  EXPECT_EQ(Printable("a\x1b[31mb\x9b"
+                      "c\n"),
+            "a\\x1b[31mb\\x9bc\n");
   const Finding finding{Severity::kError, "\x1b]0;x\x07.yaml", 0, 0, "key '\r'\b", ""};
   EXPECT_EQ(ToText(finding).find_first_of("\x1b\x07\b"), std::string::npos);
 }

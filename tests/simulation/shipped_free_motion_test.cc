@@ -10,8 +10,8 @@
 namespace mbv {
 namespace {
 
-// beta, its rate and gamma at 0.03 s [Mazzia, Magherini: Test set for initial value problem solvers,
-// release 2.4, University of Bari 2008, II-7], computed there with tolerance 1e-14.
+// beta, its rate and gamma at 0.03 s [Mazzia, Magherini: Test set for initial value problem
+// solvers, release 2.4, University of Bari 2008, II-7], computed there with tolerance 1e-14.
 constexpr double kBeta = 15.81077119629904, kBetaRate = 1139.920302151208;
 constexpr double kGamma = 0.04082224013073101;
 // Loops closed to 1e-13 m leave 1.4e-11 rad of the crank of 7 mm open; the reference finds that
@@ -25,8 +25,8 @@ struct Benchmark {
   double step_s;
 
   Benchmark() {
-    ScenarioResult result = LoadScenario(std::string(kSourceDir) +
-                                         "/scenarios/andrews_squeezer/benchmark.yaml");
+    ScenarioResult result =
+        LoadScenario(std::string(kSourceDir) + "/scenarios/andrews_squeezer/benchmark.yaml");
     MBV_DEMAND(result.scenario.has_value() && result.mechanism.has_value(),
                result.diagnostics.Text());
     mechanism = *std::move(result.mechanism);

@@ -58,7 +58,7 @@ HingeForces HingeForcesOf(const CabinGeometry& geometry,
   const Vec3 CB = 2.0 * half, DC = g.L3 * CD.R.col(0), FE = g.L4 * EF.R.col(0);
   HingeForces h;
   h.C = ForceOf(DC, -demands[kCD].moment.z(), CB, P.moment.z());  // (R1)
-  h.B = P.force - h.C;                                             // (R2)
+  h.B = P.force - h.C;                                            // (R2)
   h.E = ForceOf(FE, -demands[kEF].moment.z(), g.L1 / 2.0 * u,     // (R3)
                 demands[kAB].moment.z() + Planar(g.L1 * u, h.B));
   h.A = demands[kAB].force + h.B - h.E;  // (R4)

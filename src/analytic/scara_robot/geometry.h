@@ -58,7 +58,7 @@ struct Parameters {
   double m_rods = kNan;   ///< both rods of a limb 1, 2, or the one rod of a limb 3, 4
   double rod_radius = kNan;
   double pivot_mass = 0.0;  ///< of m_p, borne by the bars at B_1 and B_2; reactions only
-  double branch = 1.0;  ///< +1: arms outward, V_i > 0, minus sign in (10); −1: the other one
+  double branch = 1.0;      ///< +1: arms outward, V_i > 0, minus sign in (10); −1: the other one
   Vec3 gravity_W = Vec3::Zero();
   Vec4 home_X = Vec4::Constant(kNan);  ///< start of the forward position problem
 
