@@ -11,10 +11,9 @@
 #include "model_file/load_model.h"
 #include "tests/source_dir.h"
 
-namespace mbv {
+namespace mbv::cabin {
 namespace {
 
-using namespace cabin;
 constexpr double kDeg = std::numbers::pi / 180.0;
 
 constexpr PlanarGeometry kLinks{0.520, 0.420, 0.500, 0.280};
@@ -335,4 +334,4 @@ TEST(CabinRobot, AMotionThatCommandsHalfOfASetIsExplained) {
 }
 
 }  // namespace
-}  // namespace mbv
+}  // namespace mbv::cabin

@@ -13,11 +13,10 @@
 #include "tests/analytic/allocation_counter.h"
 #include "tests/source_dir.h"
 
-namespace mbv {
+namespace mbv::spr_tripod {
 namespace {
 
 using std::numbers::pi;
-using namespace spr_tripod;
 
 constexpr double kDegree = pi / 180.0;
 // Forces of some 600 N through matrices of condition 2.2 and sums of 50 terms.
@@ -364,4 +363,4 @@ TEST(SprTripodClosedForm, SamplesCostNoAllocation) {
 }
 
 }  // namespace
-}  // namespace mbv
+}  // namespace mbv::spr_tripod

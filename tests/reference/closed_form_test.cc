@@ -6,10 +6,9 @@
 #include "mechanism/reach.h"
 #include "tests/reference/fixture.h"
 
-namespace mbv {
+namespace mbv::fixtures {
 namespace {
 
-using namespace ::mbv::fixtures;
 using std::cos;
 using std::sin;
 
@@ -325,4 +324,4 @@ TEST(Reference, PowerBalancesWithSpringsDampersAndLoads) {
 }
 
 }  // namespace
-}  // namespace mbv
+}  // namespace mbv::fixtures

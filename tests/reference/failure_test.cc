@@ -5,10 +5,8 @@
 
 #include "tests/reference/fixture.h"
 
-namespace mbv {
+namespace mbv::fixtures {
 namespace {
-
-using namespace ::mbv::fixtures;
 
 TEST(ReferenceFailure, ARockerCommandedBeyondItsReachIsUnreachable) {
   Mechanism m = MakeFourBar();
@@ -115,4 +113,4 @@ TEST(ReferenceFailure, CoarseSamplesStayOnTheBranch) {
 }
 
 }  // namespace
-}  // namespace mbv
+}  // namespace mbv::fixtures

@@ -9,10 +9,8 @@
 #include "tests/reference/fixture.h"
 #include "tests/source_dir.h"
 
-namespace mbv {
+namespace mbv::fixtures {
 namespace {
-
-using namespace ::mbv::fixtures;
 
 constexpr double kDegree = std::numbers::pi / 180;
 
@@ -228,4 +226,4 @@ TEST(ReferenceTripod, HangsStillOnThePrintedTension) {
 }
 
 }  // namespace
-}  // namespace mbv
+}  // namespace mbv::fixtures

@@ -8,10 +8,8 @@
 #include "analytic/cabin_robot/tool_inverse.h"
 #include "core/spatial.h"
 
-namespace mbv {
+namespace mbv::cabin {
 namespace {
-
-using namespace cabin;
 
 constexpr std::array<const char*, 3> kTaskNames = {"platform.x", "platform.y", "platform.yaw"};
 constexpr std::array<const char*, 6> kToolNames = {"tool.x",    "tool.y",     "tool.z",
@@ -210,9 +208,13 @@ class CabinRobot final : public ClosedForm {
 };
 
 }  // namespace
+}  // namespace mbv::cabin
+
+namespace mbv {
 
 std::unique_ptr<ClosedForm> MakeCabinRobot(const Mechanism& mechanism, const Motion& motion,
                                            const ClosedFormOptions&, Diagnostics* diagnostics) {
+  using namespace cabin;
   if (SpaceOf(motion) == Space::kNone) {
     std::string commanded;
     for (const Command& command : motion.commands) {

@@ -10,10 +10,8 @@
 #include "core/spatial.h"
 #include "mechanism/channels.h"
 
-namespace mbv {
+namespace mbv::spr_tripod {
 namespace {
-
-using namespace spr_tripod;
 
 // Where the closed form's bodies, joints and inputs are in the Mechanism and the Motion.
 struct Wiring {
@@ -224,10 +222,14 @@ class SprTripod final : public ClosedForm {
 };
 
 }  // namespace
+}  // namespace mbv::spr_tripod
+
+namespace mbv {
 
 std::unique_ptr<ClosedForm> MakeSprTripod(const Mechanism& mechanism, const Motion& motion,
                                           const ClosedFormOptions& /*options*/,
                                           Diagnostics* diagnostics) {
+  using namespace spr_tripod;
   Diagnostics found;
   Geometry geometry = ReadGeometry(mechanism, &found);
   const Masses masses = ReadMasses(mechanism, &found);

@@ -1,0 +1,128 @@
+// Sources are compiled several at a time (CMake's unity build): names in unnamed namespaces must
+// differ within each src/<layer> and tests/<folder>, and so must tests; no file opens a namespace
+// for those compiled after it (but within a namespace of its room, which all its files share).
+//   node check_names.mjs ROOT
+import { readdirSync, readFileSync } from 'node:fs';
+import { join } from 'node:path';
+
+// What the lines from `i` on declare at the left margin of an unnamed namespace: {name, shape}, or
+// null. Two declarations of one name may live together when both are functions with different
+// parameters, or the same alias; their `shape` tells. Forward declarations of types count for
+// nothing: the definition follows.
+function declared(lines, i) {
+  const line = lines[i];
+  if (/^(return|using namespace|namespace|TEST|INSTANTIATE|MATCHER|else|#)/.test(line)) return null;
+  const alias = /^using (\w+) = (.*)/.exec(line);
+  if (alias) return { name: alias[1], shape: `= ${alias[2]}` };
+  const patterns = [
+    /^(?:template <.*> )?(?:struct|class|enum(?: class)?) (\w+)\b[^;]*\{/,
+    /^(?:inline |static )*constexpr [^(]*?(\w+)(?:\[[^\]]*\])*(?:\s*[={]|$)/,
+    /^(?:const|static|thread_local) [^(]*?\b(\w+)(?:\[[^\]]*\])*\s*[={]/,
+  ];
+  for (const pattern of patterns) {
+    const match = pattern.exec(line);
+    if (match) return { name: match[1], shape: '' };
+  }
+  const call = /^[A-Za-z][\w:<>,&*\s[\]]*?[\s&*>](\w+)\((.*)/.exec(line);
+  if (!call) return null;
+  let parameters = call[2];
+  for (let next = i + 1; !parameters.includes(')') && next < lines.length; ++next) parameters += lines[next];
+  const types = parameters.split(')')[0].split(',').map((one) => one.trim().replace(/\s*=.*/, '').replace(/\s*\w+$/, ''));
+  return { name: call[1], shape: `(${types.join(', ')})` };
+}
+
+// [{name, kind, shape}] of one source: `name` with the namespaces around it.
+function namesOf(text) {
+  const names = [];
+  const around = [];  // open namespaces, '' for unnamed ones
+  const lines = text.split('\n');
+  for (const [i, line] of lines.entries()) {
+    const open = /^(?:inline )?namespace (?:([\w:]+) )?\{$/.exec(line);
+    if (open) {
+      around.push(open[1] ?? '');
+      continue;
+    }
+    if (/^\}  \/\/ namespace/.test(line)) {
+      around.pop();
+      continue;
+    }
+    const outer = around.filter((name) => name !== '').join('::');
+    const test = /^TEST(?:_[FP])?\((\w+), (\w+)\)/.exec(line);
+    if (test) names.push({ name: `${outer}::${test[1]}.${test[2]}`, kind: 'test' });
+    const directive = /^using namespace ([\w:]+);/.exec(line);
+    if (directive && (outer === '' || outer === 'mbv')) names.push({ name: directive[1], kind: 'directive' });
+    if (!around.includes('')) continue;
+    const found = declared(lines, i);
+    if (found) names.push({ name: `${outer}::${found.name}`, kind: 'unnamed', shape: found.shape });
+  }
+  return names;
+}
+
+function clash(one, other) {
+  if (one.path === other.path) return false;
+  const alias = one.shape?.startsWith('=') && one.shape === other.shape;
+  const overload = one.shape?.startsWith('(') && other.shape?.startsWith('(') && one.shape !== other.shape;
+  return !alias && !overload;
+}
+
+// `sources`: path → text. Only *.cc: headers are guarded.
+function check(sources) {
+  const places = {};  // folder and name → declarations
+  const found = [];
+  for (const [path, text] of Object.entries(sources)) {
+    const folder = path.split('/').slice(0, 2).join('/');
+    for (const { name, kind, shape } of namesOf(text)) {
+      if (kind === 'directive') {
+        found.push(`${path}: using namespace ${name} reaches the files compiled after it`);
+      } else {
+        (places[`${folder} ${name}`] ??= []).push({ path, shape });
+      }
+    }
+  }
+  for (const [key, all] of Object.entries(places)) {
+    const files = all.filter((one) => all.some((other) => clash(one, other))).map(({ path }) => path);
+    if (files.length > 0) found.push(`${key.split(' ')[1]} is in ${[...new Set(files)].join(', ')}`);
+  }
+  return found;
+}
+
+function selfTest() {
+  const file = (inside, after = '') => `namespace mbv {\nnamespace {\n\n${inside}\n\n}  // namespace\n${after}\n}  // namespace mbv\n`;
+  const both = (inside, after) => check({ 'src/a/x.cc': file(inside, after), 'src/a/y.cc': file(inside, after) });
+  const clashing = {
+    Twice: 'double Twice(double x) {\n  return 2 * x;\n}', kLimit: 'constexpr double kLimit = 2.0;',
+    kTable: 'constexpr JointKind kTable[] = {', Row: 'struct Row {', Columns: 'class Columns final : public Base {',
+    Shape: 'enum class Shape { kRound };',     kWords: 'const std::map<int, std::string> kWords = {', Pick: 'template <typename T>\nT Pick(const T& value) {',
+  };
+  for (const [name, text] of Object.entries(clashing)) {
+    const found = both(text).join();
+    if (found !== `mbv::${name} is in src/a/x.cc, src/a/y.cc`) return `${name} twice: ${found || 'nothing found'}`;
+  }
+  if (both('', 'TEST(Sum, Adds) {\n}').join() !== 'mbv::Sum.Adds is in src/a/x.cc, src/a/y.cc') return 'a test twice';
+  if (check({ 'tests/a/x.cc': 'using namespace std;\n' }).length !== 1) return 'a using-directive';
+  if (check({ 'src/a/x.cc': 'namespace mbv::room {\nusing namespace other;\n' }).length !== 0) return 'a directive within a room';
+  const same = file('int Once() {');
+  if (check({ 'src/a/x.cc': same, 'src/b/x.cc': same }).length !== 0) return 'one name in two layers';
+  if (both('struct Row;\nusing internal::Row;\nusing Json = nlohmann::json;', 'int Shared(int x);').length !== 0) return 'declarations that may occur twice';
+  if (check({ 'src/a/x.cc': file('int Of(int x) {'), 'src/a/y.cc': file('int Of(const Row& x,\n       int y) {') }).length !== 0) return 'overloads';
+  if (check({ 'src/a/x.cc': file('using Row = int;'), 'src/a/y.cc': file('using Row = double;') }).length !== 1) return 'two aliases';
+  return '';
+}
+
+const failure = selfTest();
+if (failure) {
+  console.log(`check_names: the self-test failed: ${failure}`);
+  process.exit(1);
+}
+const root = process.argv[2];
+const sources = {};
+for (const top of ['src', 'tests']) {
+  for (const path of readdirSync(join(root, top), { recursive: true }).sort()) {
+    if (path.endsWith('.cc') && path.includes('/') && !/^(fuzz|benchmarks|install)\//.test(path)) {
+      sources[`${top}/${path}`] = readFileSync(join(root, top, path), 'utf8');
+    }
+  }
+}
+const found = check(sources);
+console.log(found.length > 0 ? found.join('\n') : `names differ in ${Object.keys(sources).length} sources`);
+process.exit(found.length > 0 ? 1 : 0);
