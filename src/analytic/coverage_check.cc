@@ -29,28 +29,6 @@ const Named* Find(const std::vector<Named>& all, const std::string& name) {
   return found == all.end() ? nullptr : &*found;
 }
 
-const char* NameOf(JointKind kind) {
-  switch (kind) {
-    case JointKind::kFixed:
-      return "fixed";
-    case JointKind::kRevolute:
-      return "revolute";
-    case JointKind::kPrismatic:
-      return "prismatic";
-    case JointKind::kCylindrical:
-      return "cylindrical";
-    case JointKind::kUniversal:
-      return "universal";
-    case JointKind::kSpherical:
-      return "spherical";
-    case JointKind::kPlanar:
-      return "planar";
-    case JointKind::kFree:
-      return "free";
-  }
-  return "";
-}
-
 class Checker {
  public:
   Checker(const Coverage& coverage, const Mechanism& mechanism, Concern concern)
@@ -169,8 +147,8 @@ class Checker {
     }
     const Joint& joint = mechanism_.joints[size_t(index)];
     if (joint.kind != assumed.kind) {
-      Add(fmt::format("{} is {}", subject, NameOf(joint.kind)),
-          fmt::format("takes it as {}", NameOf(assumed.kind)));
+      Add(fmt::format("{} is {}", subject, WordOf(joint.kind)),
+          fmt::format("takes it as {}", WordOf(assumed.kind)));
       return;
     }
     const std::string& parent = mechanism_.bodies[size_t(joint.parent)].name;

@@ -38,21 +38,6 @@ double Rms(const Trace& trace, int column) {
                    static_cast<double>(trace.values.rows()));
 }
 
-bool IsAngle(const Mechanism& mechanism, const Coordinate& coordinate) {
-  const auto index = static_cast<size_t>(coordinate.index);
-  switch (coordinate.kind) {
-    case Coordinate::Kind::kDrive:
-      return PositionUnit(mechanism, mechanism.drives[index]) == "rad";
-    case Coordinate::Kind::kPrescribed:
-      return !IsLength(mechanism.joints[mechanism.prescribed[index].joint].kind, 0);
-    case Coordinate::Kind::kOutput:
-      return coordinate.component >= 3;
-    case Coordinate::Kind::kJoint:
-      return false;  // start values only
-  }
-  return false;
-}
-
 // Phase by which the fastest command goes on between two samples.
 double LargestPhase(const Mechanism& mechanism, const Motion& motion, double h) {
   constexpr int kBetween = 4, kMost = 20000;
@@ -68,7 +53,7 @@ double LargestPhase(const Mechanism& mechanism, const Motion& motion, double h) 
     }
     if (rate2 > 0.0) largest = std::max(largest, h * std::sqrt(acceleration2 / rate2));
     const bool turns =
-        !command.terms.empty() && IsAngle(mechanism, command.terms.front().coordinate);
+        !command.terms.empty() && !IsLength(mechanism, command.terms.front().coordinate);
     if (turns) largest = std::max(largest, h * fastest);
   }
   return largest;

@@ -1,11 +1,11 @@
 #include "kinematics/constraints.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
 #include "core/demand.h"
 #include "kinematics/frame_pair.h"
-#include "mechanism/joint_coordinate.h"
 #include "mechanism/joint_pose.h"
 
 namespace mbv {
@@ -38,52 +38,6 @@ class RowWriter {
   ConstraintRows& rows_;
 };
 
-// Directions in F along which the joint allows no translation.
-int LockedDirections(const Joint& joint, Mat3* directions) {
-  switch (joint.kind) {
-    case JointKind::kFixed:
-    case JointKind::kRevolute:
-    case JointKind::kUniversal:
-    case JointKind::kSpherical:
-      *directions = Mat3::Identity();
-      return 3;
-    case JointKind::kPrismatic:
-    case JointKind::kCylindrical:
-      *directions = JointBasis(joint);
-      return 2;
-    case JointKind::kPlanar:
-      directions->col(0) = joint.axis;
-      return 1;
-    case JointKind::kFree:
-      return 0;
-  }
-  return 0;
-}
-
-void AddRotationRows(const Joint& joint, const FramePair& pair, RowWriter* out) {
-  const Mat3 E = JointBasis(joint);
-  switch (joint.kind) {
-    case JointKind::kSpherical:
-    case JointKind::kFree:
-      return;
-    case JointKind::kUniversal:
-      out->Add(Cosine(pair, joint.axis, joint.axis2), joint.axis.dot(joint.axis2));
-      return;
-    case JointKind::kRevolute:
-    case JointKind::kCylindrical:
-    case JointKind::kPlanar:
-      out->Add(Cosine(pair, E.col(0), E.col(2)));
-      out->Add(Cosine(pair, E.col(1), E.col(2)));
-      return;
-    case JointKind::kFixed:
-    case JointKind::kPrismatic:
-      out->Add(Cosine(pair, E.col(0), E.col(2)));
-      out->Add(Cosine(pair, E.col(1), E.col(2)));
-      out->Add(Cosine(pair, E.col(1), E.col(0)));
-      return;
-  }
-}
-
 ScalarRow ToRow(const PairScalar& scalar, int parent, int child) {
   return {.parent = parent,
           .child = child,
@@ -111,7 +65,11 @@ ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactio
   Mat3 directions;
   const int locked = LockedDirections(joint, &directions);
   for (int i = 0; i < locked; ++i) out.Translation(Along(pair, directions.col(i)));
-  if (!(reactions && joint.transmits_force_only)) AddRotationRows(joint, pair, &out);
+  if (reactions && joint.transmits_force_only) return rows;
+  std::array<LockedCosine, 3> cosines;
+  const int turns = LockedCosines(joint, &cosines);
+  for (int i = 0; i < turns; ++i)
+    out.Add(Cosine(pair, cosines[i].f_F, cosines[i].m_M), cosines[i].value);
   return rows;
 }
 
@@ -120,7 +78,7 @@ ScalarRow JointCoordinateRow(const Joint& joint, int coordinate, const BodyState
   const FramePair pair = MakePair(states, joint.parent, joint.X_PF, joint.child, joint.X_CM);
   ScalarRow row =
       ToRow(internal::JointCoordinate(joint, coordinate, pair), joint.parent, joint.child);
-  if (internal::IsAngle(joint.kind, coordinate)) TurnNear(near_value, &row.value);
+  if (!IsLength(joint.kind, coordinate)) TurnNear(near_value, &row.value);
   return row;
 }
 

@@ -15,7 +15,6 @@
 #include "kinematics/constraints.h"
 #include "kinematics/frame_pair.h"
 #include "kinematics/tree_motion.h"
-#include "mechanism/joint_coordinate.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 
@@ -122,7 +121,7 @@ Coordinates Disturbed(const Mechanism& mechanism, const Coordinates& guess,
     if (locked[j]) continue;
     const Joint& joint = mechanism.joints[j];
     for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
-      out[j][c] += uniform(*random) * (internal::IsAngle(joint.kind, c) ? 1.0 : length);
+      out[j][c] += uniform(*random) * (IsLength(joint.kind, c) ? length : 1.0);
     }
   }
   return out;

@@ -5,7 +5,6 @@
 #include <numeric>
 
 #include "kinematics/frame_pair.h"
-#include "mechanism/joint_coordinate.h"
 
 namespace mbv::internal {
 
@@ -40,7 +39,7 @@ void RowStack::AddDriven(const Mechanism& mechanism, const BodyStates& states) {
   }
   for (const Prescribed& prescribed : mechanism.prescribed) {
     const Joint& joint = mechanism.joints[prescribed.joint];
-    Add(JointCoordinateRow(joint, 0, states), !IsAngle(joint.kind, 0));
+    Add(JointCoordinateRow(joint, 0, states), IsLength(joint.kind, 0));
   }
 }
 

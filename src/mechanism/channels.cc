@@ -47,7 +47,7 @@ std::vector<Channel> PrescribedChannels(const Mechanism& mechanism) {
   std::vector<Channel> channels;
   for (const Prescribed& prescribed : mechanism.prescribed) {
     const Joint& joint = mechanism.joints[prescribed.joint];
-    const char* unit = joint.kind == JointKind::kPrismatic ? "N" : "N m";
+    const char* unit = IsLength(joint.kind, 0) ? "N" : "N m";
     channels.push_back({prescribed.name + ".force", unit, ""});
   }
   return channels;

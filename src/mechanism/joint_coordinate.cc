@@ -9,23 +9,4 @@ double RollPitchYaw(const RestingPair& pair, int component) {
   return std::atan2(-Cosine(pair, z, x), std::hypot(Cosine(pair, z, y), Cosine(pair, z, z)));
 }
 
-bool IsAngle(JointKind kind, int coordinate) {
-  switch (kind) {
-    case JointKind::kFixed:
-    case JointKind::kPrismatic:
-      return false;
-    case JointKind::kRevolute:
-    case JointKind::kUniversal:
-    case JointKind::kSpherical:
-      return true;
-    case JointKind::kCylindrical:
-      return coordinate == 1;
-    case JointKind::kPlanar:
-      return coordinate == 2;
-    case JointKind::kFree:
-      return coordinate >= 3;
-  }
-  return false;
-}
-
 }  // namespace mbv::internal

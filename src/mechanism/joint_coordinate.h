@@ -77,7 +77,4 @@ template <typename Pair>
   ThrowDemand("joint has this coordinate", __FILE__, __LINE__, joint.name);
 }
 
-/// True when the coordinate is an angle.
-[[nodiscard]] bool IsAngle(JointKind kind, int coordinate);
-
 }  // namespace mbv::internal

@@ -77,6 +77,125 @@ double RotationGap(const Joint& joint, const Pose& X_FM) {
   return LogRotation(X_nearest.linear().transpose() * X_FM.linear()).norm();
 }
 
+JointTwists UnitTwists(const Joint& joint, const Mat3& R_WF, const Mat3& R_WM) {
+  JointTwists S = JointTwists::Zero(6, FreedomsOf(joint.kind));
+  const Vec3 axis = R_WF * joint.axis;
+  switch (joint.kind) {
+    case JointKind::kFixed:
+      break;
+    case JointKind::kRevolute:
+      S.col(0).head<3>() = axis;
+      break;
+    case JointKind::kPrismatic:
+      S.col(0).tail<3>() = axis;
+      break;
+    case JointKind::kCylindrical:
+      S.col(0).tail<3>() = axis;
+      S.col(1).head<3>() = axis;
+      break;
+    case JointKind::kUniversal:
+      S.col(0).head<3>() = axis;
+      S.col(1).head<3>() = R_WM * joint.axis2;
+      break;
+    case JointKind::kSpherical:
+      S.topRows<3>() = R_WM;
+      break;
+    case JointKind::kPlanar:
+      S.bottomLeftCorner<3, 2>() = R_WF * JointBasis(joint).leftCols<2>();
+      S.col(2).head<3>() = axis;
+      break;
+    case JointKind::kFree:
+      S.bottomLeftCorner<3, 3>() = R_WF;
+      S.topRightCorner<3, 3>() = R_WM;
+      break;
+  }
+  return S;
+}
+
+void StepJoint(const Joint& joint, const double* dq, Pose* X_FM) {
+  const auto turn = [](const Vec3& axis, double angle) {
+    return Eigen::AngleAxisd(angle, axis).toRotationMatrix();
+  };
+  Mat3 R = X_FM->linear();
+  Vec3 p = X_FM->translation();
+  switch (joint.kind) {
+    case JointKind::kFixed:
+      break;
+    case JointKind::kRevolute:
+      R = R * turn(joint.axis, dq[0]);
+      break;
+    case JointKind::kPrismatic:
+      p += dq[0] * joint.axis;
+      break;
+    case JointKind::kCylindrical:
+      p += dq[0] * joint.axis;
+      R = R * turn(joint.axis, dq[1]);
+      break;
+    case JointKind::kUniversal:
+      R = turn(joint.axis, dq[0]) * R * turn(joint.axis2, dq[1]);
+      break;
+    case JointKind::kSpherical:
+      R = R * ExpRotation({dq[0], dq[1], dq[2]});
+      break;
+    case JointKind::kPlanar:
+      p += JointBasis(joint).leftCols<2>() * Eigen::Vector2d(dq[0], dq[1]);
+      R = R * turn(joint.axis, dq[2]);
+      break;
+    case JointKind::kFree:
+      p += Vec3(dq[0], dq[1], dq[2]);
+      R = R * ExpRotation({dq[3], dq[4], dq[5]});
+      break;
+  }
+  X_FM->linear() = R;
+  X_FM->translation() = p;
+}
+
+int LockedDirections(const Joint& joint, Mat3* directions) {
+  switch (joint.kind) {
+    case JointKind::kFixed:
+    case JointKind::kRevolute:
+    case JointKind::kUniversal:
+    case JointKind::kSpherical:
+      *directions = Mat3::Identity();
+      return 3;
+    case JointKind::kPrismatic:
+    case JointKind::kCylindrical:
+      *directions = JointBasis(joint);
+      return 2;
+    case JointKind::kPlanar:
+      directions->col(0) = joint.axis;
+      return 1;
+    case JointKind::kFree:
+      return 0;
+  }
+  return 0;
+}
+
+int LockedCosines(const Joint& joint, std::array<LockedCosine, 3>* cosines) {
+  const Mat3 E = JointBasis(joint);
+  const auto perpendicular = [&](int f, int m) {
+    return LockedCosine{.f_F = E.col(f), .m_M = E.col(m), .value = 0.0};
+  };
+  switch (joint.kind) {
+    case JointKind::kSpherical:
+    case JointKind::kFree:
+      return 0;
+    case JointKind::kUniversal:
+      (*cosines)[0] = {.f_F = joint.axis, .m_M = joint.axis2, .value = joint.axis.dot(joint.axis2)};
+      return 1;
+    case JointKind::kRevolute:
+    case JointKind::kCylindrical:
+    case JointKind::kPlanar:
+      *cosines = {perpendicular(0, 2), perpendicular(1, 2), {}};
+      return 2;
+    case JointKind::kFixed:
+    case JointKind::kPrismatic:
+      *cosines = {perpendicular(0, 2), perpendicular(1, 2), perpendicular(1, 0)};
+      return 3;
+  }
+  return 0;
+}
+
 std::vector<Pose> TreePoses(const Mechanism& mechanism,
                             const std::vector<std::array<double, 6>>& q) {
   std::vector<Pose> X_FM(mechanism.joints.size(), Pose::Identity());

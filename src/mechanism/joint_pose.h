@@ -22,6 +22,24 @@ namespace mbv {
 /// cosines of a constraint's rows it does not vanish when an axis points backwards.
 [[nodiscard]] double RotationGap(const Joint& joint, const Pose& X_FM);
 
+/// Unit twists [ω; v of Mo] of M in F, one column per freedom.
+using JointTwists = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
+/// In world axes. Balls and free joints turn about M's own axes.
+[[nodiscard]] JointTwists UnitTwists(const Joint& joint, const Mat3& R_WF, const Mat3& R_WM);
+/// Moves a joint by small steps `dq` of the freedoms that UnitTwists() has columns for.
+void StepJoint(const Joint& joint, const double* dq, Pose* X_FM);
+
+/// The first columns (their number is returned) are the directions in F along which the joint
+/// allows no translation.
+[[nodiscard]] int LockedDirections(const Joint& joint, Mat3* directions);
+/// A direction f of F and m of M whose f·m the joint keeps.
+struct LockedCosine {
+  Vec3 f_F = Vec3::Zero(), m_M = Vec3::Zero();
+  double value = 0.0;
+};
+/// The first entries (their number is returned) are what locks the joint's rotation.
+[[nodiscard]] int LockedCosines(const Joint& joint, std::array<LockedCosine, 3>* cosines);
+
 /// Body poses of the spanning tree for joint coordinates `q[joint]` (entries of closures unused).
 [[nodiscard]] std::vector<Pose> TreePoses(const Mechanism& mechanism,
                                           const std::vector<std::array<double, 6>>& q);

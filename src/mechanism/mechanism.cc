@@ -21,25 +21,6 @@ bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
 
 }  // namespace
 
-bool IsLength(JointKind kind, int coordinate) {
-  switch (kind) {
-    case JointKind::kPrismatic:
-      return true;
-    case JointKind::kCylindrical:
-      return coordinate == 0;
-    case JointKind::kPlanar:
-      return coordinate < 2;
-    case JointKind::kFree:
-      return coordinate < 3;
-    case JointKind::kFixed:
-    case JointKind::kRevolute:
-    case JointKind::kUniversal:
-    case JointKind::kSpherical:
-      return false;
-  }
-  return false;
-}
-
 int Mechanism::FindBody(const std::string& n) const { return FindNamed(bodies, n); }
 int Mechanism::FindJoint(const std::string& n) const { return FindNamed(joints, n); }
 int Mechanism::FindDrive(const std::string& n) const { return FindNamed(drives, n); }

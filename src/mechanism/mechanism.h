@@ -3,18 +3,7 @@
 // The description is what all witnesses share. It is made by the loader (load_model.h) and then
 // only read. Bodies are rigid; joints connect a frame F on the parent body to a frame M on the
 // child body; F and M coincide when all joint coordinates are zero.
-//
-// Joint kinds and their coordinates (X_FM as a function of q; `axis` in F, same components in M):
-//   fixed        –                    X_FM = 1
-//   revolute     θ                    Rot(axis, θ)
-//   prismatic    s                    translation s·axis
-//   cylindrical  s, θ                 translation s·axis, Rot(axis, θ)
-//   universal    θ1, θ2               Rot(axis, θ1) Rot(axis2, θ2); axis fixed in F, axis2 in M
-//   spherical    roll, pitch, yaw     Rz(yaw) Ry(pitch) Rx(roll) (coordinates for guesses only)
-//   planar       u, v, θ              translation u·e1 + v·e2, Rot(axis, θ); e1, e2, axis
-//                                     right-handed (axis z: x, y; axis x: y, z; axis y: z, x;
-//                                     else e1 = the axis' unitOrthogonal())
-//   free         x, y, z, roll, pitch, yaw
+// The joint kinds and their coordinates: joint_kinds.h.
 #pragma once
 
 #include <array>
@@ -24,6 +13,7 @@
 #include <vector>
 
 #include "core/types.h"
+#include "mechanism/joint_kinds.h"
 
 namespace mbv {
 
@@ -97,40 +87,6 @@ struct Beam {
   [[nodiscard]] double length() const { return (p_to - p_from).norm(); }
 };
 
-enum class JointKind {
-  kFixed,
-  kRevolute,
-  kPrismatic,
-  kCylindrical,
-  kUniversal,
-  kSpherical,
-  kPlanar,
-  kFree
-};
-
-/// Number of coordinates = degrees of freedom of a joint kind.
-[[nodiscard]] constexpr int FreedomsOf(JointKind kind) {
-  switch (kind) {
-    case JointKind::kFixed:
-      return 0;
-    case JointKind::kRevolute:
-    case JointKind::kPrismatic:
-      return 1;
-    case JointKind::kCylindrical:
-    case JointKind::kUniversal:
-      return 2;
-    case JointKind::kSpherical:
-    case JointKind::kPlanar:
-      return 3;
-    case JointKind::kFree:
-      return 6;
-  }
-  return -1;
-}
-
-/// True when a coordinate of a joint is a length (else it is an angle).
-[[nodiscard]] bool IsLength(JointKind kind, int coordinate);
-
 struct CoordinateRange {
   double lower = -std::numeric_limits<double>::infinity();
   double upper = std::numeric_limits<double>::infinity();
@@ -143,7 +99,7 @@ struct Joint {
   Pose X_PF = Pose::Identity();  ///< joint frame on the parent
   int child = 0;
   Pose X_CM = Pose::Identity();          ///< joint frame on the child
-  Vec3 axis = Vec3::UnitZ();             ///< unit; see the table above
+  Vec3 axis = Vec3::UnitZ();             ///< unit; see joint_kinds.h
   Vec3 axis2 = Vec3::UnitX();            ///< unit; universal only
   std::array<double, 6> guess{};         ///< coordinates to start the home solution from
   std::array<double, 6> home{};          ///< coordinates at the solved home pose

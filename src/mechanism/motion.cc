@@ -2,6 +2,26 @@
 
 namespace mbv {
 
+bool IsLength(const Mechanism& mechanism, const Coordinate& coordinate) {
+  const auto index = static_cast<size_t>(coordinate.index);
+  switch (coordinate.kind) {
+    case Coordinate::Kind::kDrive:
+      return PositionUnit(mechanism, mechanism.drives[index]) == "m";
+    case Coordinate::Kind::kPrescribed:
+      return IsLength(mechanism.joints[static_cast<size_t>(mechanism.prescribed[index].joint)].kind,
+                      0);
+    case Coordinate::Kind::kOutput:
+      return coordinate.component < 3;
+    case Coordinate::Kind::kJoint:
+      return IsLength(mechanism.joints[index].kind, coordinate.component);
+  }
+  return false;
+}
+
+std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate) {
+  return IsLength(mechanism, coordinate) ? "m" : "rad";
+}
+
 int Motion::FindCommand(const std::string& command_name) const {
   for (size_t i = 0; i < commands.size(); ++i) {
     if (commands[i].name == command_name) return static_cast<int>(i);

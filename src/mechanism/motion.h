@@ -25,6 +25,11 @@ struct Coordinate {
   int component = 0;
 };
 
+/// True when it is a length (else it is an angle).
+[[nodiscard]] bool IsLength(const Mechanism& mechanism, const Coordinate& coordinate);
+/// "m" or "rad".
+[[nodiscard]] std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate);
+
 /// Σ factor · coordinate = profile(t). Most commands have one term with factor 1; a coupling such
 /// as "these two drives are equally long" is a difference commanded to zero.
 struct Command {

@@ -293,10 +293,7 @@ class MjcfWriter {
   }
 
   // Balls and free joints have no scalar coordinate in MuJoCo.
-  bool IsGuided(int joint) const {
-    const JointKind kind = mechanism_.joints[joint].kind;
-    return kind != JointKind::kSpherical && kind != JointKind::kFree;
-  }
+  bool IsGuided(int joint) const { return !HasBall(mechanism_.joints[joint].kind); }
 
   void WriteClosure(const PlannedClosure& closure) {
     const bool connect = closure.type == PlannedClosure::Type::kConnect;

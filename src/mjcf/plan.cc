@@ -3,22 +3,13 @@
 #include <algorithm>
 
 #include "core/demand.h"
+#include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 
 namespace mbv::mjcf {
 namespace {
 
 using Type = PlannedJoint::Type;
-
-// e1, e2 of a planar joint (mechanism.h).
-std::array<Vec3, 2> PlanarAxes(const Vec3& axis) {
-  const std::array<Vec3, 3> e{Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()};
-  for (int i = 0; i < 3; ++i) {
-    if (axis == e[i]) return {e[(i + 1) % 3], e[(i + 2) % 3]};
-  }
-  const Vec3 e1 = axis.unitOrthogonal();
-  return {e1, axis.cross(e1)};
-}
 
 // The motions of a joint in the order in which X_FM composes them: type, axis at home in world
 // axes, coordinate.
@@ -42,9 +33,10 @@ std::vector<Motion1> MotionsOf(const Joint& joint, const Mat3& R_WF, const Mat3&
     case JointKind::kUniversal:
       return {{Type::kHinge, axis_W, 0}, {Type::kHinge, R_WM * joint.axis2, 1}};
     case JointKind::kPlanar: {
-      const auto [e1, e2] = PlanarAxes(joint.axis);
-      return {
-          {Type::kSlide, R_WF * e1, 0}, {Type::kSlide, R_WF * e2, 1}, {Type::kHinge, axis_W, 2}};
+      const Mat3 E = JointBasis(joint);
+      return {{Type::kSlide, R_WF * E.col(0), 0},
+              {Type::kSlide, R_WF * E.col(1), 1},
+              {Type::kHinge, axis_W, 2}};
     }
     case JointKind::kSpherical:
       return {{Type::kBall, Vec3::UnitZ(), -1}};

@@ -10,26 +10,14 @@
 namespace mbv {
 namespace {
 
-const std::vector<std::string> kKinds = {"fixed",     "revolute",  "prismatic", "cylindrical",
-                                         "universal", "spherical", "planar",    "free"};
 const std::vector<std::string> kJointKeys = {
     "kind",     "parent", "child",     "axis",     "axis2",   "guess",    "guess_deg",
     "guess_mm", "range",  "range_deg", "range_mm", "closure", "transmits"};
 
-bool HasAxis(JointKind kind) {
-  switch (kind) {
-    case JointKind::kRevolute:
-    case JointKind::kPrismatic:
-    case JointKind::kCylindrical:
-    case JointKind::kUniversal:
-    case JointKind::kPlanar:
-      return true;
-    case JointKind::kFixed:
-    case JointKind::kSpherical:
-    case JointKind::kFree:
-      return false;
-  }
-  return false;
+std::vector<std::string> KindWords() {
+  std::vector<std::string> words;
+  for (const JointKindRow& row : kJointKindRows) words.emplace_back(row.word);
+  return words;
 }
 
 // Factor of one coordinate when the key carries a unit: _deg scales angles, _mm lengths.
@@ -70,15 +58,12 @@ void ModelReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   const YamlNode* kind = map.Required("kind");
   const YamlNode* parent = map.Required("parent");
   const YamlNode* child = map.Required("child");
-  const auto choice = kind ? yaml_.Choice(*kind, map.PathOf("kind"), kKinds) : std::nullopt;
+  const auto choice = kind ? yaml_.Choice(*kind, map.PathOf("kind"), KindWords()) : std::nullopt;
   const auto on_parent = parent ? Frame(block, *parent, map.PathOf("parent")) : std::nullopt;
   const auto on_child = child ? Frame(block, *child, map.PathOf("child")) : std::nullopt;
   bool good = choice && on_parent && on_child;
   if (choice) {
-    joint.kind = std::vector<JointKind>{JointKind::kFixed,     JointKind::kRevolute,
-                                        JointKind::kPrismatic, JointKind::kCylindrical,
-                                        JointKind::kUniversal, JointKind::kSpherical,
-                                        JointKind::kPlanar,    JointKind::kFree}[*choice];
+    joint.kind = kJointKindRows[static_cast<size_t>(*choice)].kind;
     good = ReadAxes(block, map, &joint) && good;
     if (const auto guess = map.FindInUnit("guess", {kPlain, kDeg, kMm}); guess.node != nullptr) {
       ReadGuess(block, *guess.node, map.PathOf(guess.key), guess.unit, &joint);
@@ -118,8 +103,8 @@ bool ModelReader::ReadAxes(const Block& block, const YamlMap& map, Joint* joint)
       (void)map.Required(key);
       good = false;
     } else if (!needed && node != nullptr) {
-      yaml_.Error(*node, fmt::format("{}: a {} joint has no {}", map.path(),
-                                     kKinds[static_cast<int>(joint->kind)], key));
+      yaml_.Error(*node,
+                  fmt::format("{}: a {} joint has no {}", map.path(), WordOf(joint->kind), key));
       good = false;
     } else if (needed) {
       const auto value = Axis(block, *node, map.PathOf(key));
@@ -127,10 +112,10 @@ bool ModelReader::ReadAxes(const Block& block, const YamlMap& map, Joint* joint)
       if (value) *axis = *value;
     }
   };
-  const bool universal = joint->kind == JointKind::kUniversal;
-  read("axis", HasAxis(joint->kind), &joint->axis);
-  read("axis2", universal, &joint->axis2);
-  if (!good || !universal) return good;
+  const int axes = RowOf(joint->kind).axes;
+  read("axis", axes > 0, &joint->axis);
+  read("axis2", axes > 1, &joint->axis2);
+  if (!good || axes < 2) return good;
   // At zero coordinates the two joint frames coincide, so the components can be compared.
   if (joint->axis.cross(joint->axis2).norm() > 1e-6) return true;
   yaml_.Error(*map.Find("axis2"), fmt::format("{}: axis and axis2 are parallel", map.path()),
@@ -193,14 +178,11 @@ bool ModelReader::ReadFreeChoices(const YamlMap& map, Joint* joint) {
   const auto choice = yaml_.Choice(*transmits, map.PathOf("transmits"), {"all", "force"});
   if (!choice) return false;
   joint->transmits_force_only = *choice == 1;
-  if (*choice == 0 || joint->kind == JointKind::kRevolute || joint->kind == JointKind::kUniversal ||
-      joint->kind == JointKind::kSpherical) {
-    return true;
-  }
-  yaml_.Error(*transmits,
-              fmt::format("{}: a {} joint cannot transmit a force only", map.path(),
-                          kKinds[static_cast<int>(joint->kind)]),
-              "only revolute, universal and spherical joints can");
+  if (*choice == 0 || RowOf(joint->kind).may_transmit_force_only) return true;
+  yaml_.Error(
+      *transmits,
+      fmt::format("{}: a {} joint cannot transmit a force only", map.path(), WordOf(joint->kind)),
+      "only revolute, universal and spherical joints can");
   return false;
 }
 

@@ -98,9 +98,7 @@ std::optional<JointDrive> ModelReader::ReadJointDrive(const Block& block, const 
                 "coordinates are counted from 0");
     return std::nullopt;
   }
-  const bool ball = joint.kind == JointKind::kSpherical ||
-                    (joint.kind == JointKind::kFree && drive.coordinate >= 3);
-  if (ball) {
+  if (IsOfBall(joint.kind, drive.coordinate)) {
     yaml_.Error(
         *joint_node,
         fmt::format("{}: a rotation of joint '{}' has no axis to drive", map.path(), joint.name),

@@ -14,19 +14,14 @@ namespace {
 
 using tinyxml2::XMLElement;
 
+// The words in use for kinds of closures; a free joint closes nothing.
 std::optional<JointKind> KindOf(const std::string& type) {
-  static const std::map<std::string, JointKind> kinds = {
-      {"fixed", JointKind::kFixed},         {"revolute", JointKind::kRevolute},
-      {"continuous", JointKind::kRevolute}, {"prismatic", JointKind::kPrismatic},
-      {"universal", JointKind::kUniversal}, {"cylindrical", JointKind::kCylindrical},
-      {"spherical", JointKind::kSpherical}, {"ball", JointKind::kSpherical},
-      {"planar", JointKind::kPlanar}};
-  const auto it = kinds.find(type);
-  return it == kinds.end() ? std::nullopt : std::optional(it->second);
-}
-
-bool HasAxis(JointKind kind) {
-  return kind != JointKind::kFixed && kind != JointKind::kSpherical && kind != JointKind::kFree;
+  if (type == "continuous") return JointKind::kRevolute;
+  if (type == "ball") return JointKind::kSpherical;
+  for (const JointKindRow& row : kJointKindRows) {
+    if (row.word == type && row.kind != JointKind::kFree) return row.kind;
+  }
+  return std::nullopt;
 }
 
 const char* Attribute(const XMLElement* element, const char* name) {
@@ -124,7 +119,7 @@ class ClosureReader {
   void SetAxes(const XMLElement& element, const std::optional<Vec3>& on_parent,
                const std::optional<Vec3>& on_child, UrdfClosure* closure) {
     Joint& joint = closure->joint;
-    if (!good_ || !HasAxis(joint.kind)) return;
+    if (!good_ || RowOf(joint.kind).axes == 0) return;
     if (joint.kind == JointKind::kUniversal) {
       if (!on_parent || !on_child) {
         Error(element,
@@ -275,30 +270,25 @@ UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
 }
 
 std::string ConstraintText(const Mechanism& mechanism, const std::vector<Pose>& link_frames) {
-  static const std::map<JointKind, const char*> types = {
-      {JointKind::kFixed, "fixed"},         {JointKind::kRevolute, "revolute"},
-      {JointKind::kPrismatic, "prismatic"}, {JointKind::kCylindrical, "cylindrical"},
-      {JointKind::kUniversal, "universal"}, {JointKind::kSpherical, "spherical"},
-      {JointKind::kPlanar, "planar"}};
   std::string text;
   for (const Joint& joint : mechanism.joints) {
-    const auto type = types.find(joint.kind);
-    if (!joint.closure || type == types.end()) continue;  // a free joint closes nothing
+    if (!joint.closure || joint.kind == JointKind::kFree) continue;  // a free joint closes nothing
     const auto side = [&](const char* name, int body, const Pose& X_BF, const Vec3& axis) {
       const Pose X = link_frames[body].inverse() * X_BF;
       std::string lines =
           fmt::format("    <{0} link=\"{1}\"/><{0}_origin xyz=\"{2}\" rpy=\"{3}\"/>", name,
                       Escaped(mechanism.bodies[body].name), Numbers(X.translation()),
                       Numbers(RpyOf(X.linear())));
-      if (HasAxis(joint.kind)) lines += fmt::format("<{}_axis xyz=\"{}\"/>", name, Numbers(axis));
+      if (RowOf(joint.kind).axes > 0)
+        lines += fmt::format("<{}_axis xyz=\"{}\"/>", name, Numbers(axis));
       return lines + "\n";
     };
-    const bool universal = joint.kind == JointKind::kUniversal;
-    text +=
-        fmt::format("  <constraint name=\"{}\" type=\"{}\">\n", Escaped(joint.name), type->second) +
-        side("parent", joint.parent, joint.X_PF, joint.axis) +
-        side("child", joint.child, joint.X_CM, universal ? joint.axis2 : joint.axis) +
-        "  </constraint>\n";
+    const bool universal = RowOf(joint.kind).axes > 1;
+    text += fmt::format("  <constraint name=\"{}\" type=\"{}\">\n", Escaped(joint.name),
+                        WordOf(joint.kind)) +
+            side("parent", joint.parent, joint.X_PF, joint.axis) +
+            side("child", joint.child, joint.X_CM, universal ? joint.axis2 : joint.axis) +
+            "  </constraint>\n";
   }
   return text;
 }

@@ -33,28 +33,6 @@ bool IsLimited(const CoordinateRange& range) {
   return std::isfinite(range.lower) || std::isfinite(range.upper);
 }
 
-const char* KindWord(JointKind kind) {
-  switch (kind) {
-    case JointKind::kFixed:
-      return "fixed";
-    case JointKind::kRevolute:
-      return "revolute";
-    case JointKind::kPrismatic:
-      return "prismatic";
-    case JointKind::kCylindrical:
-      return "cylindrical";
-    case JointKind::kUniversal:
-      return "universal";
-    case JointKind::kSpherical:
-      return "spherical";
-    case JointKind::kPlanar:
-      return "planar";
-    case JointKind::kFree:
-      return "free";
-  }
-  return "";
-}
-
 class Companion {
  public:
   explicit Companion(const Mechanism& mechanism)
@@ -113,15 +91,12 @@ class Companion {
       if (!joint.closure) continue;
       const std::string name = YamlName(joint.name);
       std::string line =
-          fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, KindWord(joint.kind),
+          fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, WordOf(joint.kind),
                       Attach(joint.parent, name + "_parent", joint.X_PF),
                       Attach(joint.child, name + "_child", joint.X_CM));
-      const bool universal = joint.kind == JointKind::kUniversal;
-      if (joint.kind != JointKind::kFixed && joint.kind != JointKind::kSpherical &&
-          joint.kind != JointKind::kFree) {
-        line += ", axis: " + List(joint.axis);
-      }
-      if (universal) line += ", axis2: " + List(joint.axis2);
+      const int axes = RowOf(joint.kind).axes;
+      if (axes > 0) line += ", axis: " + List(joint.axis);
+      if (axes > 1) line += ", axis2: " + List(joint.axis2);
       const int n = FreedomsOf(joint.kind);
       std::string guess, range;
       bool limited = false;

@@ -27,24 +27,8 @@ void Visit(double value, double time_s, RangeViolation* worst) {
   worst->time_s = time_s;
 }
 
-// Unit of a joint coordinate.
 const char* UnitOf(const Joint& joint, int coordinate) {
-  switch (joint.kind) {
-    case JointKind::kPrismatic:
-      return "m";
-    case JointKind::kCylindrical:
-      return coordinate == 0 ? "m" : "rad";
-    case JointKind::kPlanar:
-      return coordinate < 2 ? "m" : "rad";
-    case JointKind::kFree:
-      return coordinate < 3 ? "m" : "rad";
-    case JointKind::kFixed:
-    case JointKind::kRevolute:
-    case JointKind::kUniversal:
-    case JointKind::kSpherical:
-      return "rad";
-  }
-  return "";
+  return IsLength(joint.kind, coordinate) ? "m" : "rad";
 }
 
 std::string JointText(const Joint& joint, int coordinate) {

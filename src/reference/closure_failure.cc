@@ -130,7 +130,7 @@ void NameWorst(const Mechanism& mechanism, const std::vector<Command>& commands,
     row += rows.rows;
   }
   for (const Command& command : commands) {
-    const bool angle = IsAngle(mechanism, command.terms.front().coordinate);
+    const bool angle = !IsLength(mechanism, command.terms.front().coordinate);
     const double miss = std::abs(r[row++]);
     offer(command.name, miss, angle ? miss : miss * length, angle ? "rad" : "m");
   }

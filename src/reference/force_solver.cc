@@ -16,8 +16,6 @@ namespace {
 // Forces must satisfy the equations of motion to this share of the largest wrench.
 constexpr double kBalanceTolerance = 1e-9;
 
-bool IsAngularJoint(const Joint& joint) { return joint.kind != JointKind::kPrismatic; }
-
 int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
   return joint.transmits_force_only ? rows.translation_rows : rows.rows;
 }
@@ -46,7 +44,7 @@ void ForceSolver::FillRows(const BodyStates& states) {
   }
   for (const Prescribed& prescribed : mechanism_.prescribed) {
     const Joint& joint = mechanism_.joints[prescribed.joint];
-    rows_.Add(JointCoordinateRow(joint, 0, states), IsAngularJoint(joint));
+    rows_.Add(JointCoordinateRow(joint, 0, states), !IsLength(joint.kind, 0));
   }
 }
 

@@ -60,7 +60,7 @@ void RowSet::Add(const Mechanism& mechanism, const Command& command, const BodyS
     AddPiece(row.child, factor * row.J_child);
     sum += factor * row.value;
     sum_bias += factor * row.bias;
-    is_angle = is_angle && IsAngle(mechanism, coordinate);
+    is_angle = is_angle && !IsLength(mechanism, coordinate);
   }
   CloseRow(sum, sum_bias, is_angle);
 }
@@ -77,22 +77,6 @@ void RowSet::AddWrenches(const VecX& force, std::vector<Vec6>* wrench_W) const {
   for (int i = 0; i < size(); ++i) {
     for (int p = start[i]; p < start[i + 1]; ++p) (*wrench_W)[body[p]] += force[i] * J[p];
   }
-}
-
-bool IsAngle(const Mechanism& mechanism, const Coordinate& coordinate) {
-  switch (coordinate.kind) {
-    case Coordinate::Kind::kPrescribed: {
-      const int joint = mechanism.prescribed[coordinate.index].joint;
-      return mechanism.joints[joint].kind != JointKind::kPrismatic;
-    }
-    case Coordinate::Kind::kDrive:
-      return PositionUnit(mechanism, mechanism.drives[coordinate.index]) == "rad";
-    case Coordinate::Kind::kOutput:
-      return coordinate.component >= 3;
-    case Coordinate::Kind::kJoint:
-      return !IsLength(mechanism.joints[coordinate.index].kind, coordinate.component);
-  }
-  return false;
 }
 
 }  // namespace mbv::internal

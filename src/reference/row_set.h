@@ -38,7 +38,4 @@ struct RowSet {
   void CloseRow(double row_value, double row_bias, bool is_angle);
 };
 
-/// True when the coordinate is an angle.
-[[nodiscard]] bool IsAngle(const Mechanism& mechanism, const Coordinate& coordinate);
-
 }  // namespace mbv::internal

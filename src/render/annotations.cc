@@ -194,10 +194,7 @@ void AddClosure(const Mechanism& mechanism, const Joint& joint, const PictureFra
   } else {
     same->radius = std::max(same->radius, r);
   }
-  const bool may_slide = joint.kind == JointKind::kPrismatic ||
-                         joint.kind == JointKind::kCylindrical ||
-                         joint.kind == JointKind::kPlanar || joint.kind == JointKind::kFree;
-  if (!may_slide && (p_F - p_M).norm() > 0.5 * r) {
+  if (!MaySlide(joint.kind) && (p_F - p_M).norm() > 0.5 * r) {
     items->push_back(Between(Solid::kCapsule, p_F, p_M, 0.3 * r, MaterialOf("gap")));
   }
 }

@@ -333,23 +333,6 @@ Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
   return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
 }
 
-std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate) {
-  const auto index = static_cast<size_t>(coordinate.index);
-  switch (coordinate.kind) {
-    case Coordinate::Kind::kDrive:
-      return PositionUnit(mechanism, mechanism.drives[index]);
-    case Coordinate::Kind::kPrescribed: {
-      const auto joint = static_cast<size_t>(mechanism.prescribed[index].joint);
-      return mechanism.joints[joint].kind == JointKind::kPrismatic ? "m" : "rad";
-    }
-    case Coordinate::Kind::kOutput:
-      return coordinate.component < 3 ? "m" : "rad";
-    case Coordinate::Kind::kJoint:
-      return IsLength(mechanism.joints[index].kind, coordinate.component) ? "m" : "rad";
-  }
-  return "";
-}
-
 double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
   const auto index = static_cast<size_t>(coordinate.index);
   const auto home_of = [&](int joint, int c) {

@@ -26,9 +26,6 @@ struct MotionTimes {
 /// The k-th of these names as a coordinate.
 [[nodiscard]] Coordinate CoordinateAt(const Mechanism& mechanism, size_t k);
 
-/// "m" or "rad".
-[[nodiscard]] std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate);
-
 /// Value of a coordinate at the mechanism's home pose [m or rad].
 [[nodiscard]] double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate);
 

@@ -59,7 +59,7 @@ RunSummary FindDriven(EngineModel* engine) {
       continue;
     }
     const JointKind kind = mechanism.joints[driven->joint].kind;
-    if (kind == JointKind::kSpherical || kind == JointKind::kFree) {
+    if (HasBall(kind)) {
       return {.stop = Stop::kUnsupported,
               .message = "drive '" + drive.name +
                          "' acts on a coordinate of the ball or free joint '" +
