@@ -1,5 +1,5 @@
-// Adds a closed form from outside this source tree: a namespace-scope object in any source file of
-// a program that links mbverify::main.
+// Adds closed forms (motion, stiffness, workspace) from outside this source tree: a namespace-scope
+// object in any source file of a program that links mbverify::main.
 //
 //   const mbv::ClosedFormRegistration kMine({.mechanism = "my_arm", .models = {"full"},
 //                                            .errata = {}, .factory = &MakeMyArm,
@@ -7,6 +7,8 @@
 #pragma once
 
 #include "analytic/closed_form.h"
+#include "analytic/stiffness_form.h"
+#include "analytic/workspace_form.h"
 
 namespace mbv {
 
@@ -14,6 +16,14 @@ namespace mbv {
 /// main() or before the first look-up only.
 struct ClosedFormRegistration {
   explicit ClosedFormRegistration(ClosedFormRow row);
+};
+/// The same for StiffnessForms().
+struct StiffnessFormRegistration {
+  explicit StiffnessFormRegistration(StiffnessFormRow row);
+};
+/// The same for WorkspaceForms().
+struct WorkspaceFormRegistration {
+  explicit WorkspaceFormRegistration(WorkspaceFormRow row);
 };
 
 }  // namespace mbv

@@ -1,14 +1,18 @@
-// One row per mechanism with closed-form equations.
+// What the mechanisms' papers give, one row each: motion, stiffness, workspace.
 #include <vector>
 
 #include "analytic/cabin_robot/cabin_robot.h"
 #include "analytic/cabin_robot/coverage.h"
+#include "analytic/cabin_robot/stiffness_form.h"
 #include "analytic/closed_form.h"
 #include "analytic/register_closed_form.h"
 #include "analytic/scara_robot/closed_form.h"
 #include "analytic/scara_robot/coverage.h"
+#include "analytic/scara_robot/stiffness_form.h"
+#include "analytic/scara_robot/workspace_form.h"
 #include "analytic/spr_tripod/closed_form.h"
 #include "analytic/spr_tripod/coverage.h"
+#include "analytic/spr_tripod/workspace_form.h"
 #include "analytic/stabilizing_platform/coverage.h"
 #include "analytic/stabilizing_platform/stabilizing_platform.h"
 #include "core/demand.h"
@@ -17,7 +21,7 @@ namespace mbv {
 
 namespace {
 
-std::vector<ClosedFormRow>& Rows() {
+std::vector<ClosedFormRow>& ClosedFormRows() {
   static std::vector<ClosedFormRow> rows = {
       {"stabilizing_platform",
        {"full", "massless", "paper_text"},
@@ -31,22 +35,69 @@ std::vector<ClosedFormRow>& Rows() {
   return rows;
 }
 
+std::vector<StiffnessFormRow>& StiffnessFormRows() {
+  static std::vector<StiffnessFormRow> rows = {
+      {"scara_robot", "platform", scara::StiffnessModels(), &scara::MakeStiffnessForm,
+       &scara::StiffnessCoverageOf, scara::ExampleStiffnessPose(), scara::UsualStiffnessMaps()},
+      {"cabin_robot", "tool", cabin::StiffnessModels(), &cabin::MakeStiffnessForm,
+       &cabin::StiffnessCoverageOf, cabin::ExampleStiffnessPose(), cabin::UsualStiffnessMaps()},
+  };
+  return rows;
+}
+
+std::vector<WorkspaceFormRow>& WorkspaceFormRows() {
+  static std::vector<WorkspaceFormRow> rows = {
+      {"scara_robot", &scara::ComputeWorkspaceForm},
+      {"spr_tripod", &spr_tripod::ComputeWorkspaceForm},
+  };
+  return rows;
+}
+
+// One row per mechanism: a later one takes the place of an earlier one.
+template <typename Row>
+void Replace(std::vector<Row>* rows, Row row) {
+  std::erase_if(*rows, [&](const Row& old) { return old.mechanism == row.mechanism; });
+  rows->push_back(std::move(row));
+}
+
+template <typename Row>
+const Row* FindRow(const std::vector<Row>& rows, const std::string& mechanism) {
+  for (const Row& row : rows) {
+    if (row.mechanism == mechanism) return &row;
+  }
+  return nullptr;
+}
+
 }  // namespace
 
 ClosedFormRegistration::ClosedFormRegistration(ClosedFormRow row) {
   MBV_DEMAND(!row.mechanism.empty() && !row.models.empty() && row.factory != nullptr,
              row.mechanism);
-  std::erase_if(Rows(), [&](const ClosedFormRow& old) { return old.mechanism == row.mechanism; });
-  Rows().push_back(std::move(row));
+  Replace(&ClosedFormRows(), std::move(row));
+}
+StiffnessFormRegistration::StiffnessFormRegistration(StiffnessFormRow row) {
+  MBV_DEMAND(!row.mechanism.empty() && !row.output.empty() && !row.models.empty() &&
+                 row.factory != nullptr,
+             row.mechanism);
+  Replace(&StiffnessFormRows(), std::move(row));
+}
+WorkspaceFormRegistration::WorkspaceFormRegistration(WorkspaceFormRow row) {
+  MBV_DEMAND(!row.mechanism.empty() && row.compute != nullptr, row.mechanism);
+  Replace(&WorkspaceFormRows(), std::move(row));
 }
 
-std::span<const ClosedFormRow> ClosedForms() { return Rows(); }
+std::span<const ClosedFormRow> ClosedForms() { return ClosedFormRows(); }
+std::span<const StiffnessFormRow> StiffnessForms() { return StiffnessFormRows(); }
+std::span<const WorkspaceFormRow> WorkspaceForms() { return WorkspaceFormRows(); }
 
 const ClosedFormRow* FindClosedForm(const std::string& mechanism) {
-  for (const ClosedFormRow& row : ClosedForms()) {
-    if (row.mechanism == mechanism) return &row;
-  }
-  return nullptr;
+  return FindRow(ClosedFormRows(), mechanism);
+}
+const StiffnessFormRow* FindStiffnessForm(const std::string& mechanism) {
+  return FindRow(StiffnessFormRows(), mechanism);
+}
+const WorkspaceFormRow* FindWorkspaceForm(const std::string& mechanism) {
+  return FindRow(WorkspaceFormRows(), mechanism);
 }
 
 std::vector<Finding> FindUncovered(const Mechanism& mechanism) {

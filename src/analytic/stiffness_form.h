@@ -1,7 +1,8 @@
 // StiffnessForm: a paper's stiffness model of one mechanism.
 //
 // Like ClosedForm (closed_form.h): reads its constants from Mechanism::parameters and knows nothing
-// of beams, finite elements or MuJoCo. A model is added by one row in stiffness_registry.cc.
+// of beams, finite elements or MuJoCo. A form is added by one row in registry.cc, or from outside
+// by register_closed_form.h.
 #pragma once
 
 #include <map>
@@ -60,6 +61,9 @@ struct StiffnessFormRow {
                                     ///< own ("as_printed") among them
   StiffnessFormFactory factory = nullptr;
   CoverageFunction coverage = nullptr;  ///< what it takes for granted; see ClosedFormRow
+  PoseCoordinates example_pose = {};    ///< where a scenario gives none; empty: the home pose
+  std::vector<std::string> usual_maps =
+      {};  ///< of `--map usual`, the first one's ranges the default
 };
 
 [[nodiscard]] std::span<const StiffnessFormRow> StiffnessForms();

@@ -6,6 +6,7 @@
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "core/output_folder.h"
+#include "core/text.h"
 #include "model_file/load_model.h"
 #include "pipeline/workspace.h"
 #include "scenario/find_model.h"
@@ -59,7 +60,8 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   CLI::App* workspace =
       app->add_subcommand("workspace", "Reachable workspace: measures, meshes, sections, pictures");
   workspace
-      ->add_option("model", arguments->model, "scara_robot, spr_tripod, or a model.yaml of one")
+      ->add_option("model", arguments->model,
+                   Joined(WorkspaceMechanisms()) + ", or a model.yaml of one")
       ->required();
   workspace->add_option("--set", arguments->set, "PARAMETER=VALUE of the model (repeatable)")
       ->allow_extra_args(false);

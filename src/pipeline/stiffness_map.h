@@ -36,8 +36,8 @@ struct StiffnessMap {
                                                    const PreparedStiffness& prepared,
                                                    Diagnostics* diagnostics);
 
-/// The maps of a mechanism's paper (scara_robot: Figs 9–11), or one over the plane for the cabin
-/// robot; empty for others. In the text form of ParseMap().
+/// The maps that belong to a mechanism's closed form; empty without one. In the text form of
+/// ParseMap().
 [[nodiscard]] std::vector<std::string> UsualMaps(const std::string& mechanism);
 
 struct MapResult {

@@ -160,13 +160,8 @@ std::optional<StiffnessMap> ParseMap(const std::string& text, const PreparedStif
 }
 
 std::vector<std::string> UsualMaps(const std::string& mechanism) {
-  if (mechanism == "scara_robot") {
-    const std::string disc = "x=-0.1:0.1:101,y=-0.1:0.1:101,within=0.1,";
-    return {disc + "z=-0.1,yaw_deg=0", disc + "z=-0.23,yaw_deg=0", disc + "z=-0.23,yaw_deg=45",
-            disc + "z=-0.23,yaw_deg=-45"};
-  }
-  if (mechanism == "cabin_robot") return {"x=-0.1:0.1:81,y=0.25:0.45:81"};
-  return {};
+  const StiffnessFormRow* row = FindStiffnessForm(mechanism);
+  return row == nullptr ? std::vector<std::string>{} : row->usual_maps;
 }
 
 }  // namespace mbv

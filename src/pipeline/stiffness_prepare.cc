@@ -125,17 +125,8 @@ void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
 }  // namespace
 
 PoseValues ExamplePose(const std::string& mechanism) {
-  if (mechanism == "scara_robot") {
-    return {{"platform.x", -0.050},
-            {"platform.y", -0.050},
-            {"platform.z", -0.150},
-            {"platform.yaw", 0.2}};
-  }
-  if (mechanism == "cabin_robot") {
-    return {{"d1", 0.5},           {"platform.x", 0.0}, {"platform.y", 0.36}, {"platform.yaw", 0.0},
-            {"th3", EIGEN_PI / 2}, {"th4", 0.0},        {"th6", 0.0}};  // d5: the model's
-  }
-  return {};
+  const StiffnessFormRow* row = FindStiffnessForm(mechanism);
+  return row == nullptr ? PoseValues{} : row->example_pose;
 }
 
 std::optional<PreparedStiffness> PrepareStiffness(StiffnessScenario scenario, Mechanism base,

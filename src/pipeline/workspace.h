@@ -22,8 +22,8 @@ struct WorkspaceOutcome {
 /// Mechanism names that ComputeWorkspace() supports.
 [[nodiscard]] std::vector<std::string> WorkspaceMechanisms();
 
-/// spr_tripod: the six faces (STL, PLY), sections (CSV, SVG), pictures with the mechanism inside.
-/// scara_robot: the paper's cylinder point by point, volumes, singularity maps (CSV, SVG), picture.
+/// What the mechanism's form computes (analytic/workspace_form.h), and with `pictures` the
+/// mechanism inside its mesh.
 [[nodiscard]] WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures);
 
 }  // namespace mbv

@@ -1,36 +1,14 @@
-// Small self-contained SVG figures for documents: line plots and coloured maps.
+// Small self-contained SVG figures for documents.
 #pragma once
 
 #include <string>
-#include <utility>
-#include <vector>
+
+#include "core/plot.h"
 
 namespace mbv {
 
-struct PlotLine {
-  std::string label;                              ///< empty: not in the legend
-  std::vector<std::pair<double, double>> points;  ///< NaN breaks the line
-  bool markers = false;                           ///< dots at the points
-  bool closed = false;
-};
-
-struct LinePlot {
-  std::string title, x_label, y_label;  ///< labels carry the unit
-  bool log_x = false, log_y = false;    ///< logarithmic axes; points that are not > 0 are left out
-  bool equal_scale = false;             ///< one unit is as long on x as on y (sections, paths)
-  std::vector<PlotLine> lines;
-};
 [[nodiscard]] std::string ToSvg(const LinePlot& plot);
-
-/// Values on a regular grid of cells, drawn from dark (low) to bright (high).
-struct MapPlot {
-  std::string title, x_label, y_label, value_label;
-  double x_min = 0, x_max = 1, y_min = 0, y_max = 1;  ///< outer edges of the grid
-  int columns = 0, rows = 0;                          ///< row 0 at y_min
-  std::vector<double> values;                         ///< rows × columns; NaN is left blank
-  bool log_scale = false;
-  int contours = 0;  ///< number of contour lines, in equal steps of the colour scale
-};
+/// Drawn from dark (low) to bright (high).
 [[nodiscard]] std::string ToSvg(const MapPlot& plot);
 
 }  // namespace mbv

@@ -171,4 +171,11 @@ std::unique_ptr<StiffnessForm> MakeStiffnessForm(const Mechanism& mechanism,
                                           d5, mechanism.drives);
 }
 
+PoseCoordinates ExampleStiffnessPose() {
+  return {{"d1", 0.5},           {"platform.x", 0.0}, {"platform.y", 0.36}, {"platform.yaw", 0.0},
+          {"th3", EIGEN_PI / 2}, {"th4", 0.0},        {"th6", 0.0}};
+}
+
+std::vector<std::string> UsualStiffnessMaps() { return {"x=-0.1:0.1:81,y=0.25:0.45:81"}; }
+
 }  // namespace mbv::cabin

@@ -21,4 +21,9 @@ namespace mbv::cabin {
 /// The constants by their names in models/cabin_robot/elastic.yaml; they must exist.
 [[nodiscard]] StiffnessParameters StiffnessParametersOf(const Mechanism& mechanism);
 
+/// A pose for scenarios that give none; d5 stays the model's.
+[[nodiscard]] PoseCoordinates ExampleStiffnessPose();
+/// One map over the plane.
+[[nodiscard]] std::vector<std::string> UsualStiffnessMaps();
+
 }  // namespace mbv::cabin

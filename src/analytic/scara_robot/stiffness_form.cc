@@ -200,4 +200,17 @@ std::unique_ptr<StiffnessForm> MakeStiffnessForm(const Mechanism& mechanism,
                                           Models()[static_cast<size_t>(found)].printed);
 }
 
+PoseCoordinates ExampleStiffnessPose() {
+  return {{"platform.x", -0.050},
+          {"platform.y", -0.050},
+          {"platform.z", -0.150},
+          {"platform.yaw", 0.2}};
+}
+
+std::vector<std::string> UsualStiffnessMaps() {
+  const std::string disc = "x=-0.1:0.1:101,y=-0.1:0.1:101,within=0.1,";
+  return {disc + "z=-0.1,yaw_deg=0", disc + "z=-0.23,yaw_deg=0", disc + "z=-0.23,yaw_deg=45",
+          disc + "z=-0.23,yaw_deg=-45"};
+}
+
 }  // namespace mbv::scara

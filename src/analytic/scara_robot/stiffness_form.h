@@ -21,4 +21,9 @@ namespace mbv::scara {
 /// The constants by their names in models/scara_robot/elastic.yaml; they must exist.
 [[nodiscard]] StiffnessParameters StiffnessParametersOf(const Mechanism& mechanism);
 
+/// A pose for scenarios that give none.
+[[nodiscard]] PoseCoordinates ExampleStiffnessPose();
+/// Maps of Figs 9–11.
+[[nodiscard]] std::vector<std::string> UsualStiffnessMaps();
+
 }  // namespace mbv::scara

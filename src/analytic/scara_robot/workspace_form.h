@@ -1,0 +1,12 @@
+// The workspace of scara_robot for the workspace command.
+#pragma once
+
+#include "analytic/workspace_form.h"
+
+namespace mbv::scara {
+
+/// The paper's cylinder point by point, volumes, singularity maps (CSV, SVG).
+[[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
+                                                 const RangeFilter& within_ranges);
+
+}  // namespace mbv::scara

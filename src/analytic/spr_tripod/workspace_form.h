@@ -1,0 +1,12 @@
+// The workspace of spr_tripod for the workspace command.
+#pragma once
+
+#include "analytic/workspace_form.h"
+
+namespace mbv::spr_tripod {
+
+/// The six faces (STL, PLY) and sections (CSV, SVG).
+[[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
+                                                 const RangeFilter& within_ranges);
+
+}  // namespace mbv::spr_tripod

@@ -1,0 +1,51 @@
+// WorkspaceForm: where a mechanism can go, from its paper's equations.
+//
+// Results are data: text, files, figures and a mesh; nothing is drawn here. A form is added by one
+// row in registry.cc, or from outside by register_closed_form.h.
+#pragma once
+
+#include <functional>
+#include <span>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "analytic/triangle_mesh.h"
+#include "core/diagnostics.h"
+#include "core/plot.h"
+#include "core/run_summary.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv {
+
+/// Says whether no joint and no drive is beyond its range at these body poses X_WB, by body index;
+/// empty where the mechanism has no ranges.
+using RangeFilter = std::function<bool(const std::vector<Pose>& X_WB)>;
+
+struct WorkspaceFile {
+  std::string name;  ///< with its ending: .svg for figures
+  std::variant<std::string, LinePlot, MapPlot> content;
+};
+
+struct WorkspaceForm {
+  RunSummary summary;
+  Diagnostics diagnostics;  ///< parameters that do not suit it
+  std::string text;         ///< findings for people
+  bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
+  std::vector<WorkspaceFile> files;
+  TriangleMesh mesh;         ///< its boundary, for pictures; empty: none
+  std::string mesh_caption;  ///< "spr_tripod / workspace of the platform centre"
+};
+
+using WorkspaceFunction = WorkspaceForm (*)(const Mechanism&, const RangeFilter& within_ranges);
+
+struct WorkspaceFormRow {
+  std::string mechanism;  ///< Mechanism::name
+  WorkspaceFunction compute = nullptr;
+};
+
+[[nodiscard]] std::span<const WorkspaceFormRow> WorkspaceForms();
+/// The row for a mechanism name, or nullptr.
+[[nodiscard]] const WorkspaceFormRow* FindWorkspaceForm(const std::string& mechanism);
+
+}  // namespace mbv
