@@ -1,6 +1,7 @@
 #include "pipeline/animation.h"
 
-#include <array>
+#include <zlib.h>
+
 #include <cmath>
 #include <cstdint>
 #include <string_view>
@@ -27,25 +28,12 @@ std::string U16(std::uint32_t value) {
   return {static_cast<char>(value >> 8), static_cast<char>(value)};
 }
 
-// CRC-32 of type and data, as PNG asks for.
-std::uint32_t Crc(std::string_view bytes) {
-  static const auto table = [] {
-    std::array<std::uint32_t, 256> entries{};
-    for (std::uint32_t n = 0; n < 256; ++n) {
-      std::uint32_t c = n;
-      for (int k = 0; k < 8; ++k) c = (c & 1) != 0 ? 0xedb88320u ^ (c >> 1) : c >> 1;
-      entries[n] = c;
-    }
-    return entries;
-  }();
-  std::uint32_t crc = 0xffffffffu;
-  for (const char byte : bytes)
-    crc = table[(crc ^ static_cast<unsigned char>(byte)) & 0xff] ^ (crc >> 8);
-  return ~crc;
-}
-
 std::string Chunk(const std::string& type, const std::string& data) {
-  return U32(static_cast<std::uint32_t>(data.size())) + type + data + U32(Crc(type + data));
+  const std::string checked = type + data;
+  const uLong crc =
+      crc32(0, reinterpret_cast<const Bytef*>(checked.data()), static_cast<uInt>(checked.size()));
+  return U32(static_cast<std::uint32_t>(data.size())) + checked +
+         U32(static_cast<std::uint32_t>(crc));
 }
 
 // The data of all chunks of one type.

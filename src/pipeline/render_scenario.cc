@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "image/png.h"
 #include "pipeline/animation.h"
 #include "pipeline/prepare.h"
 #include "pipeline/video.h"

@@ -5,6 +5,7 @@
 #include "analytic/closed_form.h"
 #include "analytic/workspace_form.h"
 #include "core/text.h"
+#include "image/png.h"
 #include "pipeline/ranges.h"
 #include "render/render.h"
 #include "report/svg_plot.h"

@@ -15,16 +15,11 @@
 #include "core/diagnostics.h"
 #include "core/run_summary.h"
 #include "core/types.h"
+#include "image/png.h"
 #include "mechanism/mechanism.h"
 #include "simulation/simulation.h"
 
 namespace mbv {
-
-/// An RGB image, top row first, 3 bytes per pixel.
-struct Picture {
-  int width = 0, height = 0;
-  std::vector<std::uint8_t> rgb = {};
-};
 
 /// Where the camera stands; what is left empty is chosen so that every frame's mechanism fits.
 struct CameraView {
@@ -95,8 +90,5 @@ using PictureSink = std::function<bool(int index, Picture picture)>;
                                         const std::vector<PictureFrame>& frames,
                                         const Overlay& overlay, const PictureOptions& options,
                                         const PictureSink& sink);
-
-/// PNG file content of a picture (the caller writes the file).
-[[nodiscard]] std::string EncodePng(const Picture& picture);
 
 }  // namespace mbv

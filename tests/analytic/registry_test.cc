@@ -8,8 +8,13 @@
 namespace mbv {
 namespace {
 
-WorkspaceForm FirstWorkspace(const Mechanism&, const RangeFilter&) { return {.text = "first"}; }
-WorkspaceForm SecondWorkspace(const Mechanism&, const RangeFilter&) { return {.text = "second"}; }
+WorkspaceForm Saying(const char* text) {
+  WorkspaceForm form;
+  form.text = text;
+  return form;
+}
+WorkspaceForm FirstWorkspace(const Mechanism&, const RangeFilter&) { return Saying("first"); }
+WorkspaceForm SecondWorkspace(const Mechanism&, const RangeFilter&) { return Saying("second"); }
 std::unique_ptr<StiffnessForm> NoStiffness(const Mechanism&, const PoseCoordinates&,
                                            const std::string&, Diagnostics*) {
   return nullptr;

@@ -1,8 +1,9 @@
-// PNG encoding by libpng's simplified interface.
+// By libpng's simplified interface.
+#include "image/png.h"
+
 #include <png.h>
 
 #include "core/demand.h"
-#include "render/render.h"
 
 namespace mbv {
 
@@ -22,6 +23,21 @@ std::string EncodePng(const Picture& picture) {
   MBV_DEMAND(ok != 0, std::string(image.message));
   png.resize(bytes);
   return png;
+}
+
+bool DecodePng(const std::string& png, std::uint64_t most_pixels, Picture* picture) {
+  png_image image{};
+  image.version = PNG_IMAGE_VERSION;
+  if (png_image_begin_read_from_memory(&image, png.data(), png.size()) == 0) return false;
+  if (std::uint64_t{image.width} * image.height > most_pixels) {
+    png_image_free(&image);
+    return false;
+  }
+  image.format = PNG_FORMAT_RGB;
+  picture->width = static_cast<int>(image.width);
+  picture->height = static_cast<int>(image.height);
+  picture->rgb.resize(PNG_IMAGE_SIZE(image));
+  return png_image_finish_read(&image, nullptr, picture->rgb.data(), 0, nullptr) != 0;
 }
 
 }  // namespace mbv
