@@ -13,6 +13,12 @@ function(mbv_compile_options target)
       -fstack-protector-strong -ffile-prefix-map=${CMAKE_SOURCE_DIR}/=
       $<$<CONFIG:Release>:-U_FORTIFY_SOURCE> $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
   target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
+  # GCC collects its own garbage from 128 MB on, again and again where Eigen's templates fill 1 GB.
+  # Without, a quarter of the compiler's time is saved for a fifth more memory (1.2 → 1.4 GB).
+  if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
+    target_compile_options(${target} PRIVATE
+        "SHELL:--param ggc-min-expand=300" "SHELL:--param ggc-min-heapsize=1048576")
+  endif()
   target_link_options(${target} PRIVATE LINKER:-z,relro,-z,now)
 endfunction()
 
