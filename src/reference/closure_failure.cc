@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/spatial.h"
+#include "kinematics/closure_residual.h"
 #include "mechanism/reach.h"
 #include "reference/closure_solver.h"
 #include "reference/row_set.h"
@@ -69,28 +70,29 @@ class OpenLoops {
 
   // Levenberg–Marquardt from `states`, which end at the best compromise.
   void Minimise(BodyStates* states) {
+    constexpr int kMostSteps = 60;
+    constexpr double kLargestStep = 0.3;  // rad, or characteristic lengths: assemblies stay apart
+    constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-12, kMostDamping = 1e12;
+    constexpr double kSettled = 1e-9;    // a smaller share of the residual is no progress
+    constexpr double kRounding = 1e-12;  // of scaled rows
     MatX J;
     VecX r = Evaluate(*states, true, &J);
-    double mu = 1e-3;
-    for (int i = 0; i < 60 && mu < 1e12; ++i) {
-      MatX stacked(J.rows() + J.cols(), J.cols());
-      stacked << J, std::sqrt(mu) * MatX::Identity(J.cols(), J.cols());
-      VecX right = VecX::Zero(stacked.rows());
-      right.head(r.size()) = -r;
-      VecX step = stacked.householderQr().solve(right);
+    double mu = kFirstDamping;
+    for (int i = 0; i < kMostSteps && mu < kMostDamping; ++i) {
+      VecX step = DampedStep(J, r, mu);
       const double largest = step.cwiseAbs().maxCoeff();
-      if (largest > 0.3) step *= 0.3 / largest;
+      if (largest > kLargestStep) step *= kLargestStep / largest;
       BodyStates next = *states;
       MoveBodies(Unscaled(step), &next);
       MatX J_next;
       const VecX r_next = Evaluate(next, true, &J_next);
       if (r_next.norm() < r.norm()) {
-        const bool settled = r_next.norm() > (1 - 1e-9) * r.norm();
+        const bool settled = r_next.norm() > (1 - kSettled) * r.norm();
         *states = next;
         r = r_next;
         J = J_next;
-        mu = std::max(mu * 0.1, 1e-12);
-        if (settled || r.norm() < 1e-12) break;
+        mu = std::max(mu * 0.1, kLeastDamping);
+        if (settled || r.norm() < kRounding) break;
       } else {
         mu *= 10;
       }
