@@ -5,6 +5,7 @@
 #include <filesystem>
 
 #include "core/files.h"
+#include "pipeline/check_file.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {
@@ -17,6 +18,13 @@ bool InMustFail(const fs::path& file, const fs::path& below) {
     if (part == "must_fail") return true;
   }
   return false;
+}
+
+std::string WhyRefused(const std::string& path, const std::vector<InputFile>& inputs) {
+  const std::string input = SameFile(path, inputs);
+  if (input.empty()) return "";
+  return fmt::format("{} is {}, which was read for it: choose another file", path,
+                     input == path ? "a file" : input);
 }
 
 }  // namespace
@@ -54,15 +62,27 @@ std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& t
   return std::pair{text.substr(0, at), text.substr(at + 1)};
 }
 
+std::vector<InputFile> InputsOf(const std::string& scenario) {
+  const InputWatch watch;
+  (void)CheckFile(scenario);
+  std::vector<InputFile> inputs = watch.files();
+  inputs.push_back({scenario, ""});  // read or not
+  return inputs;
+}
+
+int RefuseInput(const std::string& path, const std::string& scenario) {
+  std::error_code error;
+  if (path.empty() || !fs::exists(path, error)) return 0;  // nothing that could be lost
+  const std::string trouble = WhyRefused(path, InputsOf(scenario));
+  if (trouble.empty()) return 0;
+  fmt::print(stderr, "error: {}\n", trouble);
+  return 2;
+}
+
 int WriteWholeFile(const std::string& path, const std::string& content,
                    const std::vector<InputFile>& inputs) {
-  std::string trouble;
-  if (const std::string input = SameFile(path, inputs); !input.empty()) {
-    trouble = fmt::format("{} is {}, which was read for it: choose another file", path,
-                          input == path ? "a file" : input);
-  } else {
-    trouble = WriteFile(path, content);
-  }
+  std::string trouble = WhyRefused(path, inputs);
+  if (trouble.empty()) trouble = WriteFile(path, content);
   if (trouble.empty()) return 0;
   fmt::print(stderr, "error: {}\n", trouble);
   return 2;

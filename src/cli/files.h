@@ -28,6 +28,13 @@ struct LoadOptions;
 /// "m_p=1000" of --set → overrides; false after saying what is wrong with one.
 [[nodiscard]] bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options);
 
+/// Every file that a scenario is computed from, which is loaded for it.
+[[nodiscard]] std::vector<InputFile> InputsOf(const std::string& scenario);
+
+/// Before anything is computed: exit code 0, or 2 after saying that `path` (if not "") is one of
+/// the files that `scenario` is computed from.
+[[nodiscard]] int RefuseInput(const std::string& path, const std::string& scenario);
+
 /// Writes a file whole or not at all (see WriteFile in core/files.h), but not one of `inputs`. Exit
 /// code: 0, or 2 after saying on standard error what went wrong.
 [[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content,

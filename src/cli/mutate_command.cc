@@ -181,6 +181,7 @@ int Mutate(MutateArguments arguments) {
   if (!options->numbers.empty()) {
     arguments.jobs = std::min(arguments.jobs, static_cast<int>(options->numbers.size()));
   }
+  if (const int code = RefuseInput(arguments.json, arguments.scenario); code != 0) return code;
   const InputWatch watch;
   const bool shared = arguments.jobs > 1 && arguments.part.empty();
   const MutationReport report = shared ? Workers(arguments).Run() : RunHere(arguments, *options);

@@ -49,6 +49,7 @@ int Render(const RenderArguments& arguments) {
       progress.Show(stage, fraction);
     };
   }
+  if (const int code = RefuseInput(arguments.video, arguments.scenario); code != 0) return code;
   const InputWatch inputs;
   const RenderOutcome outcome = RenderScenario(arguments.scenario, request);
   progress.Clear();

@@ -49,6 +49,10 @@ void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSe
 int FillReactions(const Mechanism& mechanism, const BodyStates& states, const VecX& force,
                   MatX* reactions);
 
+/// A spring's length and its gradient.
+[[nodiscard]] ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
+                                  const BodyStates& states);
+
 /// Wrench [m about Bo; f] that each body needs beyond gravity, springs and loads, in world axes:
 /// m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,

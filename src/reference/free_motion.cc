@@ -10,6 +10,7 @@
 #include "mechanism/break_times.h"
 #include "reference/closure_solver.h"
 #include "reference/force_solver.h"
+#include "reference/spring_mode.h"
 #include "reference/square_system.h"
 
 namespace mbv::internal {
@@ -35,6 +36,10 @@ constexpr double kSpacing = 1.0;
 constexpr double kMoved = 1e-7, kUnbalanced = 1e-8;
 constexpr size_t kMostNodes = 600;
 constexpr long kTold = 64;  // steps from one word about the progress to the next
+// Steps from one look ahead to the next; and how far above what is left the estimate must be, which
+// is good to some percent.
+constexpr long kLook = 1000;
+constexpr double kSurely = 1.1;
 
 }  // namespace
 
@@ -179,12 +184,33 @@ RunSummary FreeMotion::TooManySteps() const {
   return summary;
 }
 
+RunSummary FreeMotion::LookAhead() {
+  const double step_s = (now_.time_s - looked_s_) / static_cast<double>(kLook);
+  looked_s_ = now_.time_s;
+  dynamics_.Factor(now_.time_s, now_.states);
+  const SpringMode mode = FastestSpringMode(mechanism_, now_.states, dynamics_.Motions());
+  const double ahead = StepsToFollow(mode, step_s, duration_s_ - now_.time_s);
+  const auto left = static_cast<double>(effort_.most_steps - tried_steps_);
+  if (ahead <= kSurely * left) return RunSummary::Done();
+  RunSummary summary = TooManySteps();
+  summary.message = fmt::format(
+      "spring '{}' lets the mechanism move at {:.2g} rad/s: {} steps reach t = {:.3g} s of {:g} s, "
+      "and about {:.2g} more would be needed where {} are left; make it softer, or the motion "
+      "shorter",
+      mode.spring, mode.rate_per_s, tried_steps_, now_.time_s, duration_s_, ahead,
+      effort_.most_steps - tried_steps_);
+  return summary;
+}
+
 // One smooth piece, or a bridge beyond its end.
 RunSummary FreeMotion::Segment(double to_s) {
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
     if (++tried_steps_ > effort_.most_steps) return TooManySteps();
     if (effort_.progress && tried_steps_ % kTold == 0) effort_.progress(now_.time_s / duration_s_);
+    if (tried_steps_ % kLook == 0) {
+      if (RunSummary summary = LookAhead(); !summary.ok()) return summary;
+    }
     double t = now_.time_s;
     State x = Pack(now_);
     const double natural = dt_;

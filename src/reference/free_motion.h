@@ -80,6 +80,8 @@ class FreeMotion {
   void Watch();
   [[nodiscard]] RunSummary NoWayOn(double dt_s) const;
   [[nodiscard]] RunSummary TooManySteps() const;
+  /// Every so many steps: whether the springs let the rest be done with the steps that are left.
+  [[nodiscard]] RunSummary LookAhead();
   template <typename StatesAt>
   [[nodiscard]] SingularPassage Closest(double first_s, double last_s, const StatesAt& states_at);
 
@@ -102,6 +104,7 @@ class FreeMotion {
   BodyStates work_states_;
   RunSummary trouble_;  ///< of the last Rates()
   long steps_ = 0, tried_steps_ = 0, evaluations_ = 0;
+  double looked_s_ = 0.0;  ///< time of the last LookAhead()
   double largest_pivot_ = 0.0;
   std::vector<SingularPassage> passages_;
 };

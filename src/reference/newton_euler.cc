@@ -37,18 +37,18 @@ LoadInWorld InWorld(const LoadSample& load, const Pose& X_WB) {
   return {R * load.force, R * load.moment, R * load.p_BoQ_B};
 }
 
+double RateOf(const ScalarRow& row, const std::vector<Vec6>& V) {
+  return row.J_parent.dot(V[row.parent]) + row.J_child.dot(V[row.child]);
+}
+
+}  // namespace
+
 ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
                     const BodyStates& states) {
   Drive leg;
   leg.kind = DistanceDrive{spring.body_from, spring.p_from, spring.body_to, spring.p_to};
   return DriveRow(mechanism, leg, states);
 }
-
-double RateOf(const ScalarRow& row, const std::vector<Vec6>& V) {
-  return row.J_parent.dot(V[row.parent]) + row.J_child.dot(V[row.child]);
-}
-
-}  // namespace
 
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W) {

@@ -5,19 +5,23 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <sstream>
 
 #include "core/files.h"
 #include "regress/accuracy.h"
 #include "regress/history.h"
 #include "regress/in_children.h"
 #include "regress/summaries.h"
+#include "scenario/load_scenario.h"
+#include "scenario/stiffness_scenario.h"
 
 namespace mbv {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kThumbnailTimeout_s = 20.0;
+constexpr double kThumbnailTimeout_s = 20.0, kLoadTimeout_s = 30.0;
 constexpr int kThumbnailPx = 144;
 
 // Pictures may be anybody's (merge): children decode them.
@@ -63,12 +67,34 @@ void AddTrouble(const std::string& text, RegressOutcome* outcome) {
 
 std::vector<std::string> NightFiles(const RegressOptions& options,
                                     const std::vector<std::string>& keys) {
-  std::vector<std::string> names = {"index.html", "regress.json"};
+  std::vector<std::string> names = {"index.html", "regress.json", kUnfinished};
   if (options.junit.empty()) names.emplace_back("junit.xml");
   if (options.markdown.empty()) names.emplace_back("summary.md");
   for (const auto& [name, content] : options.shared_files) names.push_back(name);
   for (const std::string& key : keys) names.push_back(RunFolder::Log(key));
   return names;
+}
+
+std::string FindTaken(const RegressOptions& options, const std::vector<std::string>& keys) {
+  std::vector<std::string> names = NightFiles(options, keys);
+  for (const std::string& file : {options.history, options.junit, options.markdown}) {
+    if (file.empty()) continue;
+    names.push_back(fs::path(file).lexically_relative(options.out).generic_string());
+  }
+  const std::set<std::string> taken(names.begin(), names.end());
+  std::string trouble;
+  for (const std::string& key : keys) {
+    for (size_t end = key.find('/');; end = key.find('/', end + 1)) {
+      if (const std::string part = key.substr(0, end); taken.contains(part)) {
+        trouble += fmt::format(
+            "{}{}: error: its results would lie at {}, where the night writes a file of its own; "
+            "rename the scenario or its folder",
+            trouble.empty() ? "" : "\n", key, part);
+      }
+      if (end == std::string::npos) break;
+    }
+  }
+  return trouble;
 }
 
 void FinishNight(const RegressOptions& options, const RunFolder& folder, RegressOutcome* outcome) {
@@ -84,8 +110,10 @@ void FinishNight(const RegressOptions& options, const RunFolder& folder, Regress
     }
     AddTrouble(AppendRun(options.history, goldens, &report), outcome);
   }
+  bool whole = true;  // every file of the night is of this one
   const auto keep = [&](const fs::path& path, const std::string& trouble) {
     if (trouble.empty()) outcome->files.push_back(path);
+    whole = whole && trouble.empty();
     AddTrouble(trouble, outcome);
   };
   const auto write = [&](const std::string& name, const std::string& content) {
@@ -109,17 +137,62 @@ void FinishNight(const RegressOptions& options, const RunFolder& folder, Regress
   }
   write("index.html", ToIndexHtml(report, thumbnails));
   write("regress.json", ToJson(report));  // last: what merge reads is about whole results
+  if (whole) folder.Finished();
   outcome->exit_code = outcome->trouble.empty() ? ExitCodeOf(report) : 2;
 }
 
+namespace {
+
+// Runs in a child: the files that loading a scenario reads, one per line.
+std::string FilesRead(const CaseFile& file) {
+  const InputWatch watch;
+  if (file.head.is_stiffness()) {
+    (void)LoadStiffnessScenario(file.file);
+  } else {
+    (void)LoadScenario(file.file);
+  }
+  std::string names;
+  for (const InputFile& input : watch.files()) names += input.file + "\n";
+  return names;
+}
+
+// What an earlier night left there is nobody's input.
+bool IsOfANight(const std::string& path) {
+  const std::string start = ReadWholeFile(path).value_or("").substr(0, 200);
+  return start.starts_with(kMarkdownTitle) || start.find(kJUnitRoot) != std::string::npos;
+}
+
+}  // namespace
+
 std::string FindClash(const RegressOptions& options, const std::vector<CaseFile>& cases) {
+  const auto clash = [](const std::string& output, const std::string& input) {
+    std::error_code error;
+    return fs::equivalent(output, input, error) && !error;
+  };
   for (const std::string& output : {options.junit, options.markdown, options.history}) {
     if (output.empty()) continue;
     for (const CaseFile& file : cases) {
-      std::error_code error;
-      if (fs::equivalent(output, file.file, error) && !error) {
-        return fmt::format("{}: error: is a scenario that is to be run; choose another output",
-                           output);
+      if (!clash(output, file.file)) continue;
+      return fmt::format("{}: error: is a scenario that is to be run; choose another output",
+                         output);
+    }
+  }
+  // Other inputs are known after loading, which costs; so only for files that could be lost.
+  std::vector<std::string> endangered;
+  for (const std::string& output : {options.junit, options.markdown}) {
+    std::error_code error;
+    if (fs::is_regular_file(output, error) && !IsOfANight(output)) endangered.push_back(output);
+  }
+  if (endangered.empty()) return "";
+  const auto texts =
+      InChildren(cases.size(), kLoadTimeout_s, [&](size_t i) { return FilesRead(cases[i]); });
+  for (size_t i = 0; i < cases.size(); ++i) {
+    std::istringstream names(texts[i].value_or(""));
+    for (std::string name; std::getline(names, name);) {
+      for (const std::string& output : endangered) {
+        if (!clash(output, name)) continue;
+        return fmt::format("{}: error: is read for {}; choose another output", output,
+                           cases[i].file);
       }
     }
   }

@@ -17,9 +17,14 @@ void AddTrouble(const std::string& text, RegressOutcome* outcome);
 [[nodiscard]] std::vector<std::string> NightFiles(const RegressOptions& options,
                                                   const std::vector<std::string>& keys);
 
-/// Outputs that are inputs, too: "" or which.
+/// Outputs that are inputs, too, as far as loading tells: "" or which.
 [[nodiscard]] std::string FindClash(const RegressOptions& options,
                                     const std::vector<CaseFile>& cases);
+
+/// Keys whose results would lie where a file of the night belongs (a folder of scenarios named
+/// "index.html"): "" or which.
+[[nodiscard]] std::string FindTaken(const RegressOptions& options,
+                                    const std::vector<std::string>& keys);
 
 /// Everything after the scenarios ran: history, summaries, files, exit code.
 void FinishNight(const RegressOptions& options, const RunFolder& folder, RegressOutcome* outcome);

@@ -204,9 +204,9 @@ std::string ToIndexHtml(const RegressReport& report,
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
       "style-src {}; script-src {}\">"
-      "<title>mbverify regression {}</title><style>{}</style></head><body>\n<main>\n",
+      "<title>mbverify regression {}</title><style>{}</style></head><body>\n",
       CspHash(kStyle), CspHash(kScript), EscapeXml(report.run.started_utc), kStyle);
-  html += Head(report) + kControls;
+  html += kIndexMain + Head(report) + kControls;
   for (const CaseResult& result : report.cases) {
     const auto thumbnail = thumbnails.find(result.key);
     html += Row(result, thumbnail == thumbnails.end() ? "" : thumbnail->second);

@@ -78,9 +78,8 @@ std::string ToJUnit(const RegressReport& report) {
     all.Add(result);
     text += TestCase(result, suite, test);
   }
-  std::string xml = fmt::format(
-      "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<testsuites name=\"mbverify regress\" {}>\n",
-      all.Attributes());
+  std::string xml = fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{} {}>\n", kJUnitRoot,
+                                all.Attributes());
   std::string timestamp = report.run.started_utc;  // ISO 8601 without zone, as the schema asks
   if (timestamp.ends_with('Z')) timestamp.pop_back();
   for (const auto& [name, suite] : suites) {

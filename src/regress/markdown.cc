@@ -102,7 +102,7 @@ std::string NotCompared(const RegressReport& report) {
 std::string ToMarkdown(const RegressReport& report) {
   const bool good = ExitCodeOf(report) == 0;
   std::string text =
-      fmt::format("## mbverify regression: {}\n\n{}.\n\n",
+      fmt::format("{}: {}\n\n{}.\n\n", kMarkdownTitle,
                   good ? "all as expected" : "❌ not as expected", CountsText(CountCases(report)));
   text += fmt::format(
       "Started {}, {:.1f} s with {} worker{}; {}{}{}{}.\n", report.run.started_utc,

@@ -62,7 +62,9 @@ class Merger {
     for (const CaseResult& result : report().cases) keys.push_back(result.key);
     std::vector<std::string> names = NightFiles(options_, keys);
     for (const auto& [name, content] : scripts_) names.push_back(name);
-    std::string trouble = folder_.Claim(names);
+    std::string trouble = FindTaken(options_, keys);
+    if (trouble.empty()) trouble = folder_.Claim(names);
+    if (trouble.empty()) trouble = folder_.Begin(UtcNow());
     for (const auto& [name, content] : scripts_) {
       if (trouble.empty()) trouble = folder_.Write(name, content);
     }
@@ -89,6 +91,18 @@ class Merger {
 
   // Adds one run's cases; "" or what is wrong with it. What it says is a stranger's.
   std::string Read(const std::string& from) {
+    std::error_code error;
+    if (fs::exists(fs::path(from) / kUnfinished, error)) {
+      return fmt::format(
+          "{}: its night has not finished, so that results and regress.json may be of two nights: "
+          "run it again, with --resume if it was interrupted",
+          from);
+    }
+    const std::string report_file = (fs::path(from) / "regress.json").string();
+    for (const std::string& output : {options_.junit, options_.markdown, options_.history}) {
+      if (output.empty() || SameFile(output, {{report_file, ""}}).empty()) continue;
+      return fmt::format("{}: error: is read for the merge; choose another output", output);
+    }
     const auto text = ReadWholeFile(fs::path(from) / "regress.json");
     if (!text) return fmt::format("{}: no regress.json in this folder", from);
     auto part = ReportFromJson(*text);

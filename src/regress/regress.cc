@@ -42,6 +42,8 @@ class Run {
     if (!Prepare()) return BadInput();
     const auto start = std::chrono::steady_clock::now();
     report().run.started_utc = UtcNow();
+    outcome_.trouble = folder_.Begin(report().run.started_utc);
+    if (!outcome_.trouble.empty()) return BadInput();
     KeepFinished();
     SortByCost();
     if (progress_.begin) progress_.begin(cases_.size(), report().cases.size());
@@ -97,7 +99,8 @@ class Run {
   std::string Claim() {
     std::vector<std::string> keys;
     for (const CaseFile& file : cases_) keys.push_back(file.key);
-    return folder_.Claim(NightFiles(options_, keys));
+    std::string trouble = FindTaken(options_, keys);
+    return trouble.empty() ? folder_.Claim(NightFiles(options_, keys)) : trouble;
   }
 
   // Scenario, program and options decide a result; and what else was read, see SameInputs().

@@ -125,6 +125,32 @@ std::string RunFolder::Write(const std::string& name, const std::string& content
   return WriteFile(out_ / name, content, false);
 }
 
+std::string RunFolder::Begin(const std::string& started_utc) const {
+  const std::string trouble =
+      Write(kUnfinished,
+            fmt::format("A night that began at {} has not finished. Until it has, result folders "
+                        "may be of it, while index.html, summary.md, junit.xml and regress.json "
+                        "are of the night before.\n`mbverify regress --resume` with the same --out "
+                        "goes on with it; without --resume it starts anew.\n",
+                        started_utc));
+  // The page of the night before is what people open.
+  std::string page = ReadWholeFile(out_ / "index.html").value_or("");
+  const size_t at = page.find(kIndexMain);
+  if (!trouble.empty() || at == std::string::npos || page.find(kUnfinished) != std::string::npos) {
+    return trouble;
+  }
+  page.insert(at, fmt::format("<p class=\"bad\">A later night began at {} and has not finished: "
+                              "results that this page links to may be of it ({}).</p>\n",
+                              started_utc, kUnfinished));
+  return Write("index.html", page);
+}
+
+void RunFolder::Finished() const {
+  std::error_code error;
+  fs::remove(out_ / kUnfinished, error);
+  SyncFolder(out_);
+}
+
 std::string RunFolder::RunId() {
   const fs::path file = Own() / "run";
   std::string id = ReadWholeFile(file).value_or("");

@@ -12,6 +12,9 @@
 
 namespace mbv {
 
+/// In a folder whose night has not finished, or was killed.
+inline constexpr const char* kUnfinished = "night_unfinished.txt";
+
 class RunFolder {
  public:
   explicit RunFolder(std::filesystem::path out) : out_(std::move(out)) {}
@@ -42,6 +45,11 @@ class RunFolder {
   [[nodiscard]] std::string Claim(const std::vector<std::string>& names);
   /// "" or what went wrong; only claimed files are written.
   [[nodiscard]] std::string Write(const std::string& name, const std::string& content) const;
+
+  /// From here on until Finished() the folder may hold results of this run beside summaries of an
+  /// earlier one: a file says so, and merge takes no such folder. "" or what went wrong.
+  [[nodiscard]] std::string Begin(const std::string& started_utc) const;
+  void Finished() const;
 
   /// Identifies the run: kept with the states, so that a resumed run is the same run.
   [[nodiscard]] std::string RunId();

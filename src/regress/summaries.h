@@ -8,6 +8,12 @@
 
 namespace mbv {
 
+/// How the files begin (JUnit: after the XML declaration).
+inline constexpr const char* kMarkdownTitle = "## mbverify regression";
+inline constexpr const char* kJUnitRoot = "<testsuites name=\"mbverify regress\"";
+/// index.html: before this, RunFolder::Begin() says that the page is an earlier night's.
+inline constexpr const char* kIndexMain = "<main>\n";
+
 /// JUnit XML as GitHub, GitLab and Jenkins read it: one testsuite per model, one testcase per
 /// scenario; <failure> for wrong results, <error> for what could not run, crashed or hung.
 [[nodiscard]] std::string ToJUnit(const RegressReport& report);

@@ -140,6 +140,68 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefused) {
   EXPECT_EQ(ReadAll(scenario), text);
 }
 
+// The scenario cannot run: the output is refused before anything is computed, or not at all.
+TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefusedBeforeAnythingIsComputed) {
+  PutModel("own", "own");
+  const auto replace = [&](const std::string& file, const std::string& from,
+                           const std::string& to) {
+    std::string text = ReadAll(In(file));
+    ASSERT_NE(text.find(from), std::string::npos) << from;
+    Put(file, text.replace(text.find(from), from.size(), to));
+  };
+  // The rod is too short for the far side of the turn.
+  replace("own/model.yaml", "rod: {value: 0.65", "rod: {value: 0.30");
+  replace("own/model.yaml", "guess_deg: 90", "guess_deg: 0");
+  replace("own/turn.yaml", "analytic: none",
+          "analytic: none\nreference: {csv: table.csv, columns: {time: t, motor.force: f}}");
+  Put("own/table.csv", "t,f\n0,0\n1,0\n2,0\n");
+  const std::string scenario = "'" + In("own/turn.yaml").string() + "'";
+  const ProgramResult stuck = mbverify(Run(scenario));
+  ASSERT_EQ(stuck.exit_code, 3) << stuck.out << stuck.err;
+  for (const char* name : {"model.yaml", "turn.yaml", "table.csv"}) {
+    const fs::path input = In("own") / name;
+    const std::string text = ReadAll(input);
+    // A video's name tells its format: a link.
+    fs::remove(In("own/link.png"));
+    fs::create_symlink(name, In("own/link.png"));
+    for (const std::string& call :
+         {"mutate " + scenario + " --jobs 1 --json '" + input.string() + "'",
+          "mutate " + scenario + " --jobs 2 --json '" + input.string() + "'",
+          "render " + scenario + " --video '" + In("own/link.png").string() + "'"}) {
+      const ProgramResult result = mbverify(call);
+      EXPECT_EQ(result.exit_code, 2) << call << result.err;
+      EXPECT_NE(result.err.find("which was read for it"), std::string::npos) << result.err;
+      EXPECT_EQ(result.out, "");
+    }
+    for (const char* option : {"--junit", "--markdown"}) {
+      const ProgramResult result = mbverify("regress --no-history --out '" + mbverify.Out() + "' " +
+                                            scenario + " " + option + " '" + input.string() + "'");
+      EXPECT_EQ(result.exit_code, 2) << option << result.err;
+      EXPECT_NE(result.err.find("choose another output"), std::string::npos) << result.err;
+      EXPECT_FALSE(fs::exists(In("out/turn"))) << option;
+      EXPECT_FALSE(fs::exists(In("out/own"))) << option;
+    }
+    EXPECT_EQ(ReadAll(input), text);
+  }
+  // What merge and history read.
+  ASSERT_EQ(mbverify("regress --quiet --no-pictures --out '" + mbverify.Out() + "' " + kScenario)
+                .exit_code,
+            0);
+  const std::string report = In("out/regress.json").string(), text = ReadAll(report);
+  for (const char* option : {"--junit", "--markdown"}) {
+    const ProgramResult result =
+        mbverify("merge '" + mbverify.Out() + "' --no-history --out '" + In("joined").string() +
+                 "' " + option + " '" + report + "'");
+    EXPECT_EQ(result.exit_code, 2) << option;
+    EXPECT_NE(result.err.find("choose another output"), std::string::npos) << result.err;
+  }
+  EXPECT_EQ(ReadAll(report), text);
+  const std::string history = In("out/history.sqlite").string(), bytes = ReadAll(history);
+  EXPECT_EQ(
+      mbverify("history export --history '" + history + "' --csv '" + history + "'").exit_code, 2);
+  EXPECT_EQ(ReadAll(history), bytes);
+}
+
 TEST_F(UserFilesTest, ReportsOfANightShareOneScript) {
   const std::string night =
       "regress --quiet --no-history --no-pictures --out '" + mbverify.Out() + "' " + kScenario;

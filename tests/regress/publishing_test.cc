@@ -64,6 +64,47 @@ TEST_F(PublishingTest, AResultThatCannotTakeItsPlaceIsExitCode2) {
   EXPECT_EQ(Read("out/m/agree/traces.csv"), "measured on the rig");
 }
 
+TEST_F(PublishingTest, ScenariosNamedLikeFilesOfTheNightAreRefused) {
+  options_.history = "out/history.sqlite";
+  options_.shared_files["report-0123456789abcdef.js"] = "script";
+  for (const std::string name :
+       {"index.html", "regress.json", "junit.xml", "summary.md", "night_unfinished.txt",
+        "history.sqlite", "report-0123456789abcdef.js", "logs/m/agree.txt"}) {
+    Scenario("agree");
+    Write("scenarios/" + name + "/agree.yaml", "mechanism: m\nexpect: {verdict: agree}\n");
+    for (const std::string file : {"/agree", ""}) {
+      const RegressOutcome outcome = RunAll();
+      EXPECT_EQ(outcome.exit_code, 2) << name;
+      EXPECT_NE(outcome.trouble.find(name + file + ": error: its results would lie at " + name),
+                std::string::npos)
+          << name << outcome.trouble;
+      EXPECT_FALSE(fs::exists("out/m")) << name;
+      // The same with a scenario of that name.
+      fs::remove_all("scenarios/" + name);
+      Write("scenarios/" + name + ".yaml", "mechanism: m\nexpect: {verdict: agree}\n");
+    }
+    fs::remove_all("scenarios");
+  }
+  EXPECT_EQ(Calls(), 0);
+}
+
+// A folder called "logs" is the night's and a model's at once, and nobody loses anything.
+TEST_F(PublishingTest, ScenariosInAFolderCalledLogsHaveLogsOfTheirOwn) {
+  Scenario("agree");
+  for (const std::string file : {"scenarios/logs/agree.yaml", "scenarios/logs/m/agree.yaml"}) {
+    Write(file, "mechanism: m\nexpect: {verdict: agree}\n");
+    Write(file + ".print", ContentFingerprint(Read(file)));
+  }
+  for (int night = 0; night < 2; ++night) {
+    const RegressOutcome outcome = RunAll();
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.trouble;
+    for (const std::string key : {"m/agree", "logs/agree", "logs/m/agree"}) {
+      EXPECT_TRUE(nlohmann::json::accept(Read("out/" + key + "/summary.json"))) << key;
+      EXPECT_EQ(Read("out/logs/" + key + ".txt"), "all is well\n") << key;
+    }
+  }
+}
+
 TEST_F(PublishingTest, OutputsThatAreScenariosAreRefused) {
   Scenario("agree");
   const std::string file = "scenarios/m/agree.yaml", text = Read(file);
@@ -81,14 +122,17 @@ TEST_F(PublishingTest, OutputsThatAreScenariosAreRefused) {
   EXPECT_EQ(Read("table.csv"), "t,f");
 }
 
-// Each result whole: of the night before or of this one.
+// Each result whole: of the night before or of this one. Where both are in the folder, or results
+// are newer than the summaries, it says so and is not joined with others.
 TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
   Scenario("agree1");
   Scenario("agree2");
   options_.jobs = 1;
+  options_.label = "1";
   ASSERT_EQ(RunAll().exit_code, 0);
+  EXPECT_FALSE(fs::exists("out/night_unfinished.txt"));
   Write("out/m/agree1/notes.txt", "mine");
-  Write("night.txt", "2");
+  int mixed = 0, night = 1;
   const auto check = [&](int call) {
     for (const std::string name : {"agree1", "agree2"}) {
       const std::string folder = "out/m/" + name + "/";
@@ -101,9 +145,23 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     for (const char* file : {"out/regress.json", "out/index.html", "out/junit.xml"}) {
       EXPECT_GT(Read(file).size(), 100U) << call << file;
     }
-    EXPECT_TRUE(nlohmann::json::accept(Read("out/regress.json"))) << call;
+    const auto report = nlohmann::json::parse(Read("out/regress.json"), nullptr, false);
+    ASSERT_TRUE(report.is_object()) << call;
+    std::set<std::string> nights = {report["run"]["label"]};
+    for (const char* file : {"out/m/agree1/night.txt", "out/m/agree2/night.txt"}) {
+      nights.insert(Read(file));
+    }
+    if (nights.size() == 1) return;
+    ++mixed;
+    EXPECT_TRUE(fs::exists("out/night_unfinished.txt")) << call;
+    EXPECT_NE(Read("out/index.html").find("has not finished"), std::string::npos) << call;
+    RegressOptions join = options_;
+    join.out = "joined";
+    EXPECT_NE(MergeRuns({"out"}, join).trouble.find("may be of two nights"), std::string::npos);
   };
   for (int call = 1; !HasFailure(); call += 3) {
+    options_.label = std::to_string(++night);
+    Write("night.txt", options_.label);
     KillAtCalls killer([&] { _exit(RunAll().exit_code); });
     const bool ended = killer.EndsBefore(call);
     check(call);
@@ -118,7 +176,10 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     options_.resume = false;
     check(call);
     EXPECT_FALSE(fs::exists("out/.mbverify/night")) << call;
+    EXPECT_FALSE(fs::exists("out/night_unfinished.txt")) << call;
+    EXPECT_EQ(Read("out/index.html").find("has not finished"), std::string::npos) << call;
   }
+  EXPECT_GT(mixed, 3);
 }
 
 TEST_F(PublishingTest, AKeyOfAStrangersShardStaysInItsFolder) {

@@ -1,0 +1,33 @@
+// How fast springs and dampers let a mechanism vibrate or creep, and what following that costs.
+// Internal to reference/.
+//
+// With R the motions that all constraints leave, small motions V = R x obey
+//   RᵀMR ẍ + RᵀCR ẋ + RᵀKR x = 0,  K = Σ k u uᵀ, C = Σ c u uᵀ  (u: gradient of a spring's length)
+// and the rates are |λ| of [0 I; −(RᵀMR)⁻¹RᵀKR −(RᵀMR)⁻¹RᵀCR]. Geometric stiffness is left out.
+#pragma once
+
+#include <string>
+
+#include "mechanism/constraints.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv::internal {
+
+/// The fastest of a mechanism's spring modes.
+struct SpringMode {
+  double rate_per_s = 0.0;   ///< |λ|; 0 without springs, or where nothing is free
+  double decay_per_s = 0.0;  ///< −Re λ: the amplitude falls as exp(−decay t)
+  std::string spring;        ///< has most of its energy
+};
+
+/// At a pose; `motions` (6·bodies × freedoms) is a basis of what the constraints leave there.
+[[nodiscard]] SpringMode FastestSpringMode(const Mechanism& mechanism, const BodyStates& states,
+                                           const MatX& motions);
+
+/// Steps that an error-controlled integration of order 8 needs to follow the mode for `ahead_s`
+/// when its steps are `step_s` now: they cover a fixed angle while the mode rings, and grow by the
+/// eighth root as it fades, until they are as long as is stable. 0 where it is not the mode that
+/// makes the steps short.
+[[nodiscard]] double StepsToFollow(const SpringMode& mode, double step_s, double ahead_s);
+
+}  // namespace mbv::internal
