@@ -30,6 +30,7 @@ using internal::TreeMotion;
 constexpr double kGapFactor = 30.0;
 // Larger gaps [L, rad] are no rounding.
 constexpr double kLargestGap = 3e-3;
+constexpr double kLeastDamping = 1e-12;  // over the residual
 constexpr int kPoses = 12;
 constexpr double kReach = 0.8;  // of the poses from home [rad, L]
 constexpr Eigen::Index kMostUnknowns = 800;
@@ -72,12 +73,14 @@ class Projector {
   bool Solve() {
     MatX J;
     VecX r = Evaluate(poses_, &J);
+    // Damping that vanishes with the residual keeps the convergence quadratic. Rows that only this
+    // residual makes independent have singular values of the gap's size: more damping than their
+    // squares would hold the steps along them back for good, so each iteration begins far below.
+    double mu = kLeastDamping;
     for (int i = 0; i < 60 && r.lpNorm<Eigen::Infinity>() > 1e-15; ++i) {
-      // Damping that vanishes with the residual keeps the convergence quadratic, and steps short
-      // where only that residual makes a row independent.
-      double mu = std::max(r.norm(), 1e-26);
+      mu = std::max(0.01 * mu, kLeastDamping * r.norm());
       bool better = false;
-      for (int attempt = 0; attempt < 8 && !better; ++attempt, mu *= 30) {
+      for (int attempt = 0; attempt < 16 && !better; ++attempt, mu *= better ? 1 : 30) {
         const VecX s = DampedStep(J, r, mu);
         const std::vector<std::vector<Pose>> old_poses = poses_;
         const VecX old_xi = xi_;

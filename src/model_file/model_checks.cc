@@ -11,6 +11,7 @@
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
 #include "kinematics/tilted_axis.h"
+#include "mechanism/concession.h"
 #include "mechanism/impossible_inertia.h"
 #include "mechanism/reach.h"
 #include "model_file/model_reader.h"
@@ -24,6 +25,9 @@ constexpr double kLargestMass_kg = 1e15;
 constexpr double kLargestLength_m = 1e12;
 // Joint frames may have to move farther than the gap that they leave at home is wide.
 constexpr double kProjectionReach = 10.0;
+// Guesses are given to some digits; a driven joint that home moves farther is told [rad,
+// characteristic lengths].
+constexpr double kMovedDrive = 1e-3;
 
 struct Reason {
   std::string text;  // empty: nothing wrong
@@ -100,7 +104,9 @@ void ModelReader::CheckImpossibleInertia(size_t b, const std::string& violation)
                    "impossible_inertia` in the model takes them as they are");
     return;
   }
-  AddBodyFinding(Severity::kWarning, b, "IMPOSSIBLE INERTIA, allowed by the model: " + violation,
+  AddBodyFinding(Severity::kWarning, b,
+                 fmt::format("{}impossible inertia of {}: {}", kConcession,
+                             mechanism_.bodies[b].name, violation),
                  "");
 }
 
@@ -113,7 +119,11 @@ bool ModelReader::CheckTree() {
 void ModelReader::CloseLoops() {
   const HomeResult home = SolveHome(&mechanism_);
   if (home.closed) {
-    if (home.guesses_moved) WarnAboutAssembly(home);
+    if (home.guesses_moved) {
+      WarnAboutAssembly(home);
+    } else if (home.drives_moved) {
+      WarnAboutMovedDrives();
+    }
     return;
   }
   const double gap_m = home.gap * CharacteristicLength(mechanism_);
@@ -138,10 +148,11 @@ bool ModelReader::ProjectRoundedData(const HomeResult& home) {
       std::max(projection.moved_m, projection.turned_rad * CharacteristicLength(mechanism_));
   if (moved_m > kProjectionReach * closure_tolerance_m_) return false;
   const std::string text = fmt::format(
-      "the loops are overconstrained by {} and their data close them except for {:.2g} m: joint "
-      "frames moved by up to {:.2g} m and {:.2g} rad (closure_tolerance {:g} m)",
-      projection.redundant, home.gap * CharacteristicLength(mechanism_), projection.moved_m,
-      projection.turned_rad, closure_tolerance_m_);
+      "{}joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
+      "overconstrained "
+      "by {} and their data close them except for {:.2g} m (closure_tolerance {:g} m)",
+      kConcession, projection.moved_m, projection.turned_rad, projection.redundant,
+      home.gap * CharacteristicLength(mechanism_), closure_tolerance_m_);
   yaml_.SetNote("");
   yaml_.AddAt(Severity::kWarning, 0, 0, text);
   return true;
@@ -175,6 +186,33 @@ void ModelReader::ReportGaps(const HomeResult& home, const std::string& hint) {
 }
 
 // Only guesses that were disturbed led to closed loops: which assembly they led to is chance.
+// The drives that home could not leave at their guesses: commands that count from home do so from
+// elsewhere.
+void ModelReader::WarnAboutMovedDrives() {
+  const double length_m = CharacteristicLength(mechanism_);
+  std::string text;
+  const YamlEntry* at = nullptr;
+  const auto add = [&](int j, const std::string& name) {
+    const Joint& joint = mechanism_.joints[j];
+    const bool is_length = IsLength(joint.kind, 0);
+    const double moved = std::abs(joint.home[0] - joint.guess[0]) / (is_length ? length_m : 1.0);
+    if (FreedomsOf(joint.kind) != 1 || !(moved > kMovedDrive)) return;
+    if (at == nullptr) at = joint_places_[j];
+    text += fmt::format("{}{} from {:.5g} to {:.5g} {}", text.empty() ? "" : ", ", name,
+                        joint.guess[0], joint.home[0], is_length ? "m" : "rad");
+  };
+  for (const Drive& drive : mechanism_.drives) {
+    if (const auto* d = std::get_if<JointDrive>(&drive.kind)) add(d->joint, drive.name);
+  }
+  for (const Prescribed& p : mechanism_.prescribed) add(p.joint, p.name);
+  if (text.empty()) return;
+  yaml_.SetNote("");
+  yaml_.AddAt(Severity::kWarning, at ? at->line : 0, at ? at->column : 0,
+              "the loops do not close with the driven joints at their guesses: home has " + text,
+              "if that is not the pose you mean, look for a wrong length, or give guesses that "
+              "close the loops");
+}
+
 void ModelReader::WarnAboutAssembly(const HomeResult& home) {
   constexpr size_t kMostJoints = 4;
   std::vector<std::pair<double, int>> moved;  // by how much, tree joint

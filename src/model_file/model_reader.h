@@ -177,6 +177,7 @@ class ModelReader {
   bool CheckTree();
   void CloseLoops();
   void WarnAboutAssembly(const HomeResult& home);
+  void WarnAboutMovedDrives();
   bool ProjectRoundedData(const HomeResult& home);
   void ReportGaps(const HomeResult& home, const std::string& hint);
   void ReportTree(const SpanningTreeResult& tree);

@@ -9,6 +9,7 @@
 #include "core/inputs.h"
 #include "core/output_folder.h"
 #include "kinematics/mobility.h"
+#include "mechanism/concession.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/engine_errors.h"
 #include "pipeline/free_motion_text.h"
@@ -304,9 +305,18 @@ class ScenarioRun {
     }
     const ComparisonInput input = MakeComparisonInput();
     report_.comparison = Compare(input);
+    NameConcessions();
     DoubtGravity();
     report_.sheets = SheetsOf(base(), report_.comparison);
     if (!other_engines_.empty()) CompareEngines(input);
+  }
+
+  // Whatever the verdict is, it is about a mechanism that the model describes with an exception.
+  void NameConcessions() {
+    std::string& text = report_.comparison.attribution.text;
+    for (const std::string& concession : ConcessionsIn(outcome_.diagnostics)) {
+      text += fmt::format("{}allowed by the model: {}", text.empty() ? "" : "; ", concession);
+    }
   }
 
   // A table that was made with another value of g agrees within any usual tolerance.
