@@ -11,7 +11,7 @@ namespace mbv::internal {
 namespace {
 
 // Moments count as small when the joint's forces would make them at this share of the
-// characteristic length.
+// characteristic length, and forces when this share of its moments would make them at that length.
 constexpr double kMomentArm = 1e-3;
 // Reactions below this share of the RMS of all of them are round-off of the whole mechanism.
 constexpr double kRoundoff = 1e-9;
@@ -44,7 +44,17 @@ std::vector<JointError> JointErrors(const ComparisonInput& input, const PairRead
   return errors;
 }
 
-// What the joint's bodies have anyway: the smaller one's weight and the forces of its joints.
+// What the joint's bodies have anyway: the smaller moment that turning one of them takes.
+double LocalMoment(const ForceScale& scale, const Joint& joint) {
+  double smallest = kNan;
+  for (const int body : {joint.parent, joint.child}) {
+    const auto b = static_cast<size_t>(body);
+    if (b > 0 && !(smallest <= scale.moment[b])) smallest = scale.moment[b];
+  }
+  return OrZero(smallest);
+}
+
+// The same for forces: the smaller one's weight and the forces of its joints.
 double LocalForce(const ComparisonInput& input, const ForceScale& scale,
                   const std::vector<JointError>& errors, const Joint& joint) {
   double smallest = kNan;
@@ -69,12 +79,15 @@ void ComparePooled(const ForceScale& scale, const std::vector<JointError>& error
     forces.Merge(error.force);
     moments.Merge(error.moment);
   }
-  const double least = ForceScale::kIdle * scale.force_N;
+  const double least =
+      ForceScale::kIdle * std::max(scale.force_N, kMomentArm * scale.moment_Nm / scale.length_m);
   if (forces.count() > 0) {
     KeepWorst(&pair->metrics, Metric::kReaction, forces.MeasuredNrmse(least));
   }
   if (moments.count() > 0) {
-    const double floor = std::max(OrZero(forces.rms_truth()), least) * kMomentArm * scale.length_m;
+    const double floor =
+        std::max(std::max(OrZero(forces.rms_truth()), least) * kMomentArm * scale.length_m,
+                 ForceScale::kIdle * scale.moment_Nm);
     KeepWorst(&pair->metrics, Metric::kReaction, moments.MeasuredNrmse(floor));
   }
 }
@@ -86,7 +99,9 @@ void CompareOwn(const ComparisonInput& input, const ForceScale& scale,
   for (const JointError& error : errors) all.Merge(error.force);
   const double roundoff = kRoundoff * OrZero(all.rms_truth());
   for (const JointError& error : errors) {
-    const double local = LocalForce(input, scale, errors, *error.joint);
+    const double turned = LocalMoment(scale, *error.joint);
+    const double local = std::max(LocalForce(input, scale, errors, *error.joint),
+                                  kMomentArm * turned / scale.length_m);
     const double least = std::max(ForceScale::kIdle * local, roundoff);
     if (error.force.count() > 0) {
       KeepWorst(&pair->metrics, Metric::kReactionOwn, error.force.MeasuredNrmse(least));
@@ -95,7 +110,8 @@ void CompareOwn(const ComparisonInput& input, const ForceScale& scale,
     const double floor =
         std::max(OrZero(error.force.rms_truth()), local) * kMomentArm * scale.length_m;
     KeepWorst(&pair->metrics, Metric::kReactionOwn,
-              error.moment.MeasuredNrmse(std::max(floor, roundoff * scale.length_m)));
+              error.moment.MeasuredNrmse(
+                  std::max({floor, roundoff * scale.length_m, ForceScale::kIdle * turned})));
   }
 }
 

@@ -78,6 +78,26 @@ bool AddWorks(const Mechanism& mechanism, const Trace& trace, std::vector<Curve>
   return integrated;
 }
 
+// A base that moves bodies which no drive carries turns over energy of its own, which must not hide
+// what the drives do: the energy turned over counts up to what the carried bodies can take in this
+// time, or the drives have done. Of the rest rounding is left.
+struct EnergySize {
+  double scale_J = 0.0, roundoff_J = 0.0;
+};
+EnergySize SizeOfEnergy(const ComparisonInput& input, const Trace& trace,
+                        const std::vector<Curve>& curves, double turned_over_J) {
+  constexpr double kRoundings = 16.0;
+  const ForceScale force = ForceScaleOf(input, trace);
+  const double least = kShortest * force.length_m * force.force_N;
+  if (input.mechanism->prescribed.empty()) return {std::max(turned_over_J, least), 0.0};
+  double carried = force.power_W * (trace.time_s.back() - trace.time_s.front());
+  for (const Curve& curve : curves) {
+    if (input.mechanism->FindDrive(curve.name) < 0) continue;
+    carried = std::max(carried, curve.values.cwiseAbs().maxCoeff());
+  }
+  return {std::max(std::min(turned_over_J, carried), least), kRoundings * kEps * turned_over_J};
+}
+
 // The parts that the drift is proportional to: drift = share · part.
 void NameCulprit(const std::vector<Curve>& curves, const VecX& drift, EnergyAudit* audit) {
   const double size = drift.norm();
@@ -133,12 +153,11 @@ std::optional<EnergyAudit> AuditEnergy(const ComparisonInput& input, const Trace
     audit.parts.push_back(
         {curve.name, curve.stored, curve.values[n - 1], curve.values.cwiseAbs().maxCoeff()});
   }
-  const ForceScale force = ForceScaleOf(input, trace);
-  audit.scale_J = std::max({kinetic->maxCoeff(), work.cwiseAbs().maxCoeff(),
-                            kShortest * force.length_m * force.force_N});
-  if (!drift.allFinite()) audit.scale_J = kNan;
+  const EnergySize size =
+      SizeOfEnergy(input, trace, curves, std::max(kinetic->maxCoeff(), work.cwiseAbs().maxCoeff()));
+  audit.scale_J = drift.allFinite() ? size.scale_J : kNan;
   for (Eigen::Index i = 0; i < n; ++i) {
-    const double value = std::abs(drift[i]) / audit.scale_J,
+    const double value = std::max(0.0, std::abs(drift[i]) - size.roundoff_J) / audit.scale_J,
                  t_s = trace.time_s[static_cast<size_t>(i)];
     KeepWorst(&audit.drift, value, t_s, "energy");
     if (limit && value > *limit && std::isnan(audit.from_s)) audit.from_s = t_s;

@@ -13,6 +13,8 @@ namespace {
 constexpr double kTurning = 1e-2;
 // Parts below this share of the largest are round-off.
 constexpr double kRoundoff = 1e-9;
+// Forces through an axis are felt about it as with this lever, in characteristic lengths.
+constexpr double kLever = 1e-3;
 
 // RMS rates of a driven coordinate, and its largest velocity.
 struct Rates {
@@ -89,7 +91,10 @@ class Scales {
     FindCarries(heaviest);
     FindForce();
     if (!scale_.acts) TakeRound();
-    for (const BodyMotion& body : bodies_) scale_.acceleration.push_back(body.acceleration);
+    for (size_t b = 0; b < bodies_.size(); ++b) {
+      scale_.acceleration.push_back(bodies_[b].acceleration);
+      scale_.moment.push_back(MomentOf(b));
+    }
     return std::move(scale_);
   }
 
@@ -142,6 +147,30 @@ class Scales {
     return motion;
   }
 
+  // A balanced body that turns evenly, or rests, needs none; rounding leaves some.
+  [[nodiscard]] double MomentOf(size_t b) const {
+    double turning = bodies_[b].turning;
+    for (size_t k = 0; k < rates_.size(); ++k) {
+      const double w = twists_.V_WB[k][b].head<3>().norm() * rates_[k].velocity;
+      turning = std::max(turning, kTurning * w * w);
+    }
+    turning = std::max(turning, 1.0 / (motion_.duration_s * motion_.duration_s));
+    return mechanism_.bodies[b].I_Bcm_B.norm() * turning;
+  }
+
+  // What a prescribed joint whose bodies are balanced about it feels all the same.
+  [[nodiscard]] double CrossWork(size_t k) const {
+    double largest = 0.0;
+    for (size_t b = 1; b < bodies_.size(); ++b) {
+      const Body& body = mechanism_.bodies[b];
+      const double w = twists_.V_WB[k][b].head<3>().norm();
+      largest =
+          std::max({largest, w * kLever * scale_.length_m * body.mass * bodies_[b].acceleration,
+                    w * MomentOf(b)});
+    }
+    return largest;
+  }
+
   // Scale of one driven coordinate; returns the body that weighs most on it.
   size_t FindDriven(size_t k) {
     size_t heaviest = 0;
@@ -160,7 +189,8 @@ class Scales {
     }
     const double pushed = std::max(LoadWork(k), SpringWork(k));
     acts_ = acts_ || (IsCompared(k) && pushed > 0.0);
-    scale_.driven[k] = std::max(largest, pushed);
+    const double crossed = k >= mechanism_.drives.size() ? CrossWork(k) : 0.0;
+    scale_.driven[k] = std::max({largest, pushed, crossed});
     if (IsCompared(k)) {
       double& of_unit = scale_.of_unit[ForceUnit(mechanism_, mechanism_.drives[k])];
       of_unit = std::max(of_unit, scale_.driven[k]);
@@ -238,9 +268,11 @@ class Scales {
     const double still = kRoundoff / (motion_.duration_s * motion_.duration_s);
     double fastest = 0.0;
     for (size_t b = 1; b < bodies_.size(); ++b) {
-      if (!twists_.moved[b]) continue;
+      if (!twists_.moved[b] && !mechanism_.drives.empty()) continue;
       const Body& body = mechanism_.bodies[b];
       scale_.force_N = std::max(scale_.force_N, body.mass * bodies_[b].acceleration);
+      scale_.moment_Nm = std::max(scale_.moment_Nm, MomentOf(b));
+      if (!twists_.moved[b]) continue;
       acts_ = acts_ || (body.mass > 0.0 && bodies_[b].inertial > still * scale_.length_m) ||
               (!body.I_Bcm_B.isZero(0.0) && bodies_[b].turning > still);
       fastest = std::max(fastest, bodies_[b].speed);
@@ -251,8 +283,8 @@ class Scales {
           std::max({scale_.force_N, loads_[l].force_N, loads_[l].moment_Nm / scale_.length_m});
     }
     scale_.force_N = std::max(scale_.force_N, spring_N_);
-    scale_.power_W = mechanism_.prescribed.empty() ? std::numeric_limits<double>::infinity()
-                                                   : scale_.force_N * fastest;
+    const bool alike = mechanism_.prescribed.empty() || mechanism_.drives.empty();
+    scale_.power_W = alike ? std::numeric_limits<double>::infinity() : scale_.force_N * fastest;
     scale_.acts = acts_;
   }
 

@@ -16,14 +16,17 @@ namespace mbv {
 /// between them; the largest of these works is its scale [N or N m]. What only prescribed joints
 /// carry, and what is fixed, does not count for drives.
 struct ForceScale {
-  double length_m = 1.0;                  ///< characteristic length of the mechanism
-  double force_N = 0.0;                   ///< largest such force on a body that drives can move
-  std::vector<double> driven;             ///< per drive, then per prescribed joint [N or N m]
+  double length_m = 1.0;       ///< characteristic length of the mechanism
+  double force_N = 0.0;        ///< largest such force on a body that drives can move, or,
+                               ///< without drives, on any
+  double moment_Nm = 0.0;      ///< largest moment that turning such a body takes
+  std::vector<double> driven;  ///< per drive, then per prescribed joint [N or N m]
   std::map<std::string, double> of_unit;  ///< the largest of the compared drives by unit
   /// Gravity, motion, a load or a spring acts in the direction of some compared drive.
   bool acts = false;
   std::vector<double> acceleration;  ///< per body: gravity or what the motion asks for [m/s²]
-  /// `force_N` at the fastest such body; infinite where no joint is prescribed [W].
+  std::vector<double> moment;        ///< per body: to turn it so, or by 1 rad in the time [N m]
+  /// `force_N` at the fastest such body; infinite where no joint is prescribed, or all are [W].
   double power_W = 0.0;
   /// carries[c][d]: drive d moves the body that weighs most on drive c.
   std::vector<std::vector<bool>> carries;

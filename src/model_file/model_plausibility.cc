@@ -21,6 +21,9 @@ constexpr double kThinnestCloud = 1e-3;  // [kg/m³], mass / (radius of gyration
 constexpr double kFarOut = 10.0;         // lengths of the body, or of the mechanism
 constexpr double kNoMass = 1e-6;         // share of the heaviest body: stands in for nothing
 constexpr double kTooWide = 1.05;        // second moment over the largest that the extent allows
+// The same where the shift to the origin would explain it: bodies drawn with thick ends could be so
+// wide, but then not by chance what an even body has about its origin, to this share.
+constexpr double kHardlySoWide = 0.7, kExplained = 0.1;
 constexpr size_t kMostNames = 4;
 
 struct Points {
@@ -114,13 +117,21 @@ std::optional<Doubt> DoubtInertia(const Body& body, double length_m) {
 
 // The second moments about the centre of mass, Σ m (p − c)², are largest when all mass sits at the
 // ends of the body: m (high − c)(c − low) per axis. Inertias about the body's origin exceed that,
-// and what is left without the share m |c|² of the shift does not.
+// and what is left without the share m |c|² of the shift does not, or is an even body's.
 std::optional<Doubt> DoubtPoint(const Body& body, Points points) {
   const Vec3 c = body.p_BoBcm_B;
   points.Add(c);
   const double possible = body.mass * (points.high() - c).dot(c - points.low());
   const double given = 0.5 * body.I_Bcm_B.trace(), shift = body.mass * c.squaredNorm();
-  if (!(given > kTooWide * possible) || !(given - shift < possible / kTooWide)) return {};
+  const bool impossible = given > kTooWide * possible && given - shift < possible / kTooWide;
+  // An even box of this extent, with and without the thickness of what is drawn.
+  const Vec3 sides = points.high() - points.low();
+  const Vec3 spine = (sides.array() - sides.minCoeff()).matrix();
+  const bool explained =
+      given > kHardlySoWide * possible &&
+      given - shift > (1.0 - kExplained) * body.mass * spine.squaredNorm() / 12.0 &&
+      given - shift < (1.0 + kExplained) * body.mass * sides.squaredNorm() / 12.0;
+  if (!impossible && !explained) return {};
   const Mat3 moved =
       body.I_Bcm_B - body.mass * (c.squaredNorm() * Mat3::Identity() - c * c.transpose());
   const Vec3 principal =

@@ -9,6 +9,7 @@
 #include <unordered_map>
 
 #include "mechanism/break_times.h"
+#include "pipeline/drive_by.h"
 #include "pipeline/prepare.h"
 #include "scenario/settings_reader.h"
 
@@ -88,10 +89,23 @@ class Study {
       finding.message = fmt::format("--steps: {:g} s violates motion.duration_s / step <= {:g}",
                                     options_.steps_s.back(), kMaxSteps);
     } else {
+      TellThatDrivesAreHeld();
       return true;
     }
     outcome_.diagnostics.Add(std::move(finding));
     return false;
+  }
+
+  void TellThatDrivesAreHeld() {
+    const SimulationSettings& settings = prepared_->scenario.simulation;
+    if (!settings.forward || settings.drive_by == DriveBy::kMotion) return;
+    Finding finding;
+    finding.severity = Severity::kWarning;
+    finding.file = file_;
+    finding.message = fmt::format(
+        "mode {}: what is refined is the simulation with its drives held on their motion",
+        ModeText(settings));
+    outcome_.diagnostics.Add(std::move(finding));
   }
 
   // All runs are sampled at the same times, which lie on steps of every run.

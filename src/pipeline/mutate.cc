@@ -9,6 +9,7 @@
 
 #include "pipeline/bend_search.h"
 #include "pipeline/bendable.h"
+#include "pipeline/drive_by.h"
 #include "pipeline/mutation_bench.h"
 #include "pipeline/mutation_reason.h"
 #include "pipeline/structural_faults.h"
@@ -202,10 +203,14 @@ std::vector<Bendable> NumbersOf(const MutationBench& bench) {
 }
 
 // In inverse mode, if the scenario has another one and allows it; a reason not to is a warning.
+// Where drives are pushed or servos, their forces tell nothing of an error by themselves: inverse
+// dynamics does, whatever modes are asked for.
 std::unique_ptr<MutationBench> InverseBench(const MutationBench& own, const std::string& file,
                                             const MutationOptions& options,
                                             Diagnostics* diagnostics) {
-  if (!own.scenario().simulation.forward || options.modes != MutationModes::kBoth) return nullptr;
+  const SimulationSettings& simulation = own.scenario().simulation;
+  const bool held = simulation.drive_by == DriveBy::kMotion;
+  if (!simulation.forward || (options.modes != MutationModes::kBoth && held)) return nullptr;
   Diagnostics findings;
   int ignored = 0;
   auto bench = MutationBench::Make(file, BenchMode::kInverse, &findings, &ignored);
@@ -230,7 +235,7 @@ MutationReport MutateScenario(const std::string& file, const MutationOptions& op
       options.modes == MutationModes::kInverse ? BenchMode::kInverse : BenchMode::kAsIs;
   const auto own = MutationBench::Make(file, mode, &report.diagnostics, &report.exit_code);
   if (own == nullptr) return report;
-  report.mode = own->scenario().simulation.forward ? "forward" : "inverse";
+  report.mode = ModeText(own->scenario().simulation);
   const std::vector<Bendable> numbers = Chosen(options, NumbersOf(*own), &report);
   if (report.exit_code != 0) return report;
   const auto exact = InverseBench(*own, file, options, &report.diagnostics);

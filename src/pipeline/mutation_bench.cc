@@ -9,6 +9,7 @@
 #include "kinematics/mobility.h"
 #include "mechanism/channels.h"
 #include "model_file/load_model.h"
+#include "pipeline/drive_by.h"
 #include "pipeline/ranges.h"
 #include "reference/reference.h"
 
@@ -100,7 +101,42 @@ void MutationBench::RunTruths() {
   truth_ = analytic ? "analytic" : "reference";
 }
 
+DriveForces MutationBench::GivenForces() const {
+  if (!forces_source_) return {};
+  return [this](double t_s, VecX* force) {
+    const auto found = forces_.find(t_s);
+    if (found != forces_.end()) {
+      *force = found->second;
+      return RunSummary::Done();
+    }
+    RunSummary summary = forces_source_(t_s, force);
+    if (summary.ok()) forces_[t_s] = *force;
+    return summary;
+  };
+}
+
+// In open loop the limits of motion are how far wrong forces lead.
+void MutationBench::RunGrowth() {
+  const SimulationSettings& settings = scenario().simulation;
+  if (!settings.forward || settings.drive_by != DriveBy::kForces) return;
+  const auto truth = std::find_if(traces_.begin(), traces_.end(), [&](const Trace& trace) {
+    return trace.witness == prepared_.driven_by;
+  });
+  MBV_DEMAND(truth != traces_.end(), prepared_.driven_by);
+  growth_bend_ = scenario().checks[Metric::kForceNrmse].forward.value_or(
+      *RowOf(Metric::kForceNrmse).limits.forward);
+  SimulationOptions options = OptionsOf(scenario(), mechanism(), EngineOf(scenario()));
+  options.forces = Bent(GivenForces(), prepared_.base, *truth, growth_bend_);
+  SimulatedWitness wrong =
+      RunSimulation(scenario(), mechanism(), prepared_.MakeDrivenMotion(), options, {});
+  if (!wrong.run.summary.ok()) return;
+  growth_ = std::move(wrong.run.trace);
+  growth_->witness = "bent";
+}
+
 void MutationBench::RunUnbent() {
+  forces_source_ = prepared_.MakeDriveForces();
+  RunGrowth();
   const DrivenMotion driven = prepared_.MakeDrivenMotion();
   base_ = Run(mechanism(), scenario(), [&](double t_s, DrivenSample* sample) {
     RunSummary summary = driven(t_s, sample);
@@ -110,16 +146,20 @@ void MutationBench::RunUnbent() {
 }
 
 ComparisonInput MutationBench::Input() const {
-  ComparisonInput input{.mechanism = &prepared_.base,
-                        .motion = &scenario().motion,
-                        .limits = scenario().checks,
-                        .simulation_limits = scenario().simulation.forward ? LimitColumn::kForward
-                                                                           : LimitColumn::kInverse,
-                        .start_window_s = scenario().start_window_s,
-                        .witnesses = {},
-                        .driven_by = prepared_.driven_by,
-                        .reactions_not_unique = reactions_not_unique_,
-                        .table = table_ ? &*table_ : nullptr};
+  ComparisonInput input{
+      .mechanism = &prepared_.base,
+      .motion = &scenario().motion,
+      .limits = scenario().checks,
+      .simulation_limits =
+          scenario().simulation.forward ? LimitColumn::kForward : LimitColumn::kInverse,
+      .start_window_s = scenario().start_window_s,
+      .witnesses = {},
+      .driven_by = prepared_.driven_by,
+      .reactions_not_unique = reactions_not_unique_,
+      .table = table_ ? &*table_ : nullptr,
+      .drive_by = scenario().simulation.forward ? scenario().simulation.drive_by : DriveBy::kMotion,
+      .bent = growth_ ? &*growth_ : nullptr,
+      .bend = growth_bend_};
   for (size_t k = 0; k < traces_.size(); ++k) {
     input.witnesses.push_back({summaries_[k].first, &traces_[k], summaries_[k].second});
   }
@@ -177,9 +217,9 @@ DrivenMotion MutationBench::Remembered() const {
 BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario,
                            const DrivenMotion& driven) const {
   BentRun bent;
-  // Drives are held on their motion: what they are bent by must not move the motion as well.
+  // Forces and servos are those of the unbent model: only the simulated side is wrong.
   SimulationOptions options = OptionsOf(scenario, wrong, EngineOf(scenario));
-  options.drives = DriveMode::kGuided;
+  options.forces = GivenForces();
   SimulatedWitness witness = RunSimulation(scenario, wrong, driven, options, {});
   if (witness.diagnostics.has_errors()) {
     bent.failure = witness.diagnostics.findings().front().message;
@@ -200,6 +240,16 @@ BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario,
   bent.trace.witness = "simulated";
   ComparisonInput input = Input();
   input.witnesses.push_back({"simulated", &bent.trace, RunSummary::Done()});
+  // Servos: the reference where they went.
+  ReferenceRun reached;
+  if (input.drive_by == DriveBy::kServos) {
+    reached = RunReached(prepared_.mechanisms.reference, scenario.motion, bent.trace);
+    if (!reached.summary.ok()) {
+      bent.failure = "on the motion that was reached: " + reached.summary.message;
+      return bent;
+    }
+    input.witnesses.push_back({"reached", &reached.trace, reached.summary});
+  }
   bent.comparison = Compare(input);
   bent.ran = true;
   return bent;

@@ -40,10 +40,10 @@ enum class BenchMode { kAsIs, kInverse };
 
 class MutationBench {
  public:
-  /// Loads and runs the unbent scenario as it is, or with inverse dynamics per sample (round-off
-  /// accuracy); its limits for that mode judge. The generic reference takes part only where no
-  /// closed form does. Null after bad input, or when the unbent scenario does not agree;
-  /// `exit_code` as of `run`.
+  /// Loads and runs the unbent scenario as it is (pushed by the unbent forces, or by servos, if it
+  /// is), or with inverse dynamics per sample (round-off accuracy); its limits for that mode judge.
+  /// The generic reference takes part only where no closed form does. Null after bad input, or when
+  /// the unbent scenario does not agree; `exit_code` as of `run`.
   [[nodiscard]] static std::unique_ptr<MutationBench> Make(const std::string& file, BenchMode mode,
                                                            Diagnostics* diagnostics,
                                                            int* exit_code);
@@ -75,9 +75,12 @@ class MutationBench {
   explicit MutationBench(Prepared prepared) : prepared_(std::move(prepared)) {}
   void RunTruths();
   void RunUnbent();
+  void RunGrowth();
   [[nodiscard]] BentRun Run(const Mechanism& wrong, const Scenario& scenario,
                             const DrivenMotion& driven) const;
   [[nodiscard]] DrivenMotion Remembered() const;
+  /// The drive forces that the unbent simulation is given, each computed once.
+  [[nodiscard]] DriveForces GivenForces() const;
   [[nodiscard]] ComparisonInput Input() const;
   [[nodiscard]] LoadOptions SimulatedOptions() const;
 
@@ -86,7 +89,11 @@ class MutationBench {
   std::vector<std::pair<std::string, RunSummary>> summaries_;  // of traces_
   std::vector<Trace> traces_;
   std::optional<AlignedTable> table_;
-  DrivenSamples driven_;  // at every time that the unbent run asks for; bent ones ask the same
+  DrivenSamples driven_;       // at every time that the unbent run asks for; bent ones ask the same
+  DriveForces forces_source_;  // empty where the simulation is given none
+  mutable std::map<double, VecX> forces_;
+  std::optional<Trace> growth_;  // force-driven: unbent, with forces wrong by growth_bend_
+  double growth_bend_ = kNan;
   std::string truth_;
   std::vector<std::string> reactions_not_unique_;
   BentRun base_;

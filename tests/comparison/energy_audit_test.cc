@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "mechanism/channels.h"
+#include "tests/comparison/carried.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv::synthetic {
@@ -129,6 +130,51 @@ TEST(EnergyAudit, WhatIsNotJudgedNamesNoCulprit) {
   EXPECT_TRUE(audit.text.empty()) << audit.text;
   EXPECT_TRUE(audit.culprit.empty());
   EXPECT_TRUE(std::isnan(audit.from_s));
+}
+
+// A vehicle of 1e7 kg takes 1e9 J from what moves it; the cart on it has 9 J.
+struct OnMovingVehicle : OnVehicle {
+  OnMovingVehicle() : OnVehicle(true) {
+    std::vector<Channel> channels = DriveChannels(mechanism);
+    for (const auto& more : {AuditChannels(), EnergyChannels(), WorkChannels(mechanism)}) {
+      channels.insert(channels.end(), more.begin(), more.end());
+    }
+    trace.witness = "simulated";
+    trace.Reset(SampleTimes(1.0, 0.01), channels);
+    trace.values.setZero();
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      const double t = trace.time_s[i];
+      const auto set = [&](const std::string& name, double value) {
+        trace.values(static_cast<Eigen::Index>(i), trace.Find(name)) = value;
+      };
+      const double vehicle = 1e9 * std::sin(t), cart = 9 * std::pow(std::sin(3 * t), 2);
+      set("energy.kinetic", vehicle + cart);
+      set("vehicle.work", vehicle);
+      set("d2.work", cart);
+    }
+  }
+  [[nodiscard]] EnergyAudit Audit() const {
+    return *AuditEnergy({.mechanism = &mechanism,
+                         .motion = &motion,
+                         .limits = {},
+                         .simulation_limits = LimitColumn::kForward,
+                         .witnesses = {},
+                         .driven_by = "reference",
+                         .reactions_not_unique = {}},
+                        trace, kLimit);
+  }
+  Trace trace;
+};
+
+TEST(EnergyAudit, EnergyOfABaseHidesNothing) {
+  OnMovingVehicle run;
+  EXPECT_EQ(run.Audit().drift.value, 0.0) << "what rounding 1e9 J leaves is no drift";
+  EXPECT_LT(run.Audit().scale_J, 1e4);
+  run.trace.values.col(run.trace.Find("d2.work")) *= 1.01;
+  const EnergyAudit audit = run.Audit();
+  EXPECT_NEAR(audit.drift.value * audit.scale_J, 0.09, 0.01);
+  EXPECT_GT(audit.drift.value, 1e3 * kLimit);
+  EXPECT_EQ(audit.culprit, "d2");
 }
 
 }  // namespace

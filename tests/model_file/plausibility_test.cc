@@ -1,4 +1,5 @@
 // Models that load but are hardly meant: a doubt each, and none about what is right.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -86,6 +87,27 @@ TEST(Plausibility, WhatIsRareButPossibleRaisesNoDoubt) {
             "");
 }
 
+// m l²/3 instead of m l²/12, of a bar that is drawn longer by its round ends.
+TEST(Plausibility, InertiaAboutTheEndOfAThickBarIsSaid) {
+  for (const double radius : {0.001, 0.006, 0.012, 0.02, 0.03}) {
+    for (const char* share : {"/3", "/12"}) {
+      const std::string said = WarningsOf(fmt::format(
+          "name: t\nbodies:\n  bar:\n    mass: 2\n    com: [0.1, 0, 0]\n    inertia: [2*{0}^2/2, "
+          "2*0.2^2{1}, 2*0.2^2{1}]\n    frames: {{end: [0.2, 0, 0]}}\n    shapes: [{{capsule: "
+          "{{to: "
+          "end, radius: {0}}}}}]\njoints: {{hinge: {{kind: revolute, parent: world, child: bar, "
+          "axis: y}}}}\ndrives: {{hinge: {{kind: joint, joint: hinge}}}}\n",
+          radius, share));
+      if (std::string(share) == "/3") {
+        EXPECT_NE(said.find("are these about the body's origin?"), std::string::npos)
+            << radius << said;
+      } else {
+        EXPECT_EQ(said, "") << radius;
+      }
+    }
+  }
+}
+
 TEST(Plausibility, NoShippedModelRaisesADoubt) {
   int models = 0;
   for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
@@ -111,6 +133,20 @@ TEST(Plausibility, APoseFoundFromDisturbedGuessesIsSaidToBeChance) {
   const std::string said = WarningsOf(text);
   EXPECT_NE(said.find("the loops close only from disturbed guesses"), std::string::npos) << said;
   EXPECT_NE(said.find("another assembly than meant"), std::string::npos) << said;
+}
+
+// Commands that count from home count from another place than the model says.
+TEST(Plausibility, ADriveThatHomeHadToMoveIsNamed) {
+  const std::string wide =
+      Replaced(Slender(), "D: {position: [ground, 0, 0]}", "D: {position: [ground + 0.1, 0, 0]}");
+  const std::string hinge = "child: crank.foot, axis: z, guess_deg: ";
+  const std::string said = WarningsOf(Replaced(wide, hinge + "60", hinge + "165"));
+  EXPECT_NE(said.find("the loops do not close with the driven joints at their guesses: home has "
+                      "motor from 2.8798 to "),
+            std::string::npos)
+      << said;
+  // Where the others can follow, the drive stays.
+  EXPECT_EQ(WarningsOf(Replaced(wide, hinge + "60", hinge + "70")), "");
 }
 
 }  // namespace
