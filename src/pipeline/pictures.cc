@@ -52,12 +52,18 @@ Picture Shrunk(const Picture& picture) {
   return small;
 }
 
-// The path of an output's origin through the run, in the world.
+// A run that broke off has no poses from there on.
+bool HasPoses(const Mechanism& mechanism, const SimulationRun& run, size_t sample) {
+  return sample < run.X_WB.size() && run.X_WB[sample].size() == mechanism.bodies.size();
+}
+
+// The path of an output's origin through the run, as far as it came, in the world.
 PolylineOverlay PathOf(const Mechanism& mechanism, const SimulationRun& run, int output_index) {
   const Output& output = mechanism.outputs[static_cast<size_t>(output_index)];
   PolylineOverlay path;
-  for (const std::vector<Pose>& X_WB : run.X_WB) {
-    path.points_W.push_back(X_WB[static_cast<size_t>(output.body)] * output.X_BO.translation());
+  for (size_t i = 0; HasPoses(mechanism, run, i); ++i) {
+    path.points_W.push_back(run.X_WB[i][static_cast<size_t>(output.body)] *
+                            output.X_BO.translation());
   }
   return path;
 }
@@ -102,7 +108,8 @@ RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
   if (frames.size() > kFewPictures) options.passes = kVideoPasses;
   Overlay overlay;
   if (scenario.snapshots.path_output >= 0) {
-    overlay.paths.push_back(PathOf(mechanism, run, scenario.snapshots.path_output));
+    PolylineOverlay path = PathOf(mechanism, run, scenario.snapshots.path_output);
+    if (path.points_W.size() > 1) overlay.paths.push_back(std::move(path));
   }
   RunSummary summary = RenderPictures(mechanism, frames, overlay, options, sink);
   summary.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -113,7 +120,11 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
                          const SimulationRun& run, const Caption& caption,
                          const std::function<void(double)>& progress,
                          std::vector<PictureFile>* files) {
-  const std::vector<double>& times_s = scenario.snapshots.times_s;
+  std::vector<double> times_s = scenario.snapshots.times_s;
+  std::erase_if(times_s, [&](double t_s) {
+    return !HasPoses(mechanism, run, static_cast<size_t>(NearestSample(run.trace.time_s, t_s)));
+  });
+  if (times_s.empty()) return RunSummary::Done();
   for (const double t_s : times_s) {
     const int sample = NearestSample(run.trace.time_s, t_s);
     const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];

@@ -3,6 +3,12 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
+
+#include "mechanism/load_model.h"
+#include "pipeline/run_scenario.h"
+#include "tests/source_dir.h"
+
 namespace mbv {
 namespace {
 
@@ -31,6 +37,33 @@ TEST(Caption, TellsTheForceErrorOrElseThatOfTheMotion) {
   caption = CaptionOf(With({{Metric::kPoseM, place}}));
   EXPECT_EQ(caption.detail, "motion: simulated against reference, outputs within 8.2e-12 m");
   EXPECT_EQ(CaptionOf(With({})).detail, "");
+}
+
+// A run that ends on the way has no poses from there on: its path and pictures end, too.
+TEST(Pictures, ARunThatBreaksOffIsDrawnAsFarAsItCame) {
+  const LoadResult loaded = LoadModel(SourcePath("/models/slider_crank/model.yaml"));
+  ASSERT_TRUE(loaded.mechanism);
+  const Mechanism& m = *loaded.mechanism;
+  SimulationRun run;
+  run.trace.Reset({0.0, 1.0, 2.0, 3.0}, {});
+  run.X_WB = {m.X_WB_home, m.X_WB_home, {}, {}};
+  Scenario scenario;
+  scenario.snapshots = {.times_s = {0.0, 3.0}, .size_px = {64, 48}, .path_output = 0};
+  std::vector<PictureFile> files;
+  const RunSummary drawn = DrawSnapshots(scenario, m, run, {}, {}, &files);
+  ASSERT_TRUE(drawn.ok()) << drawn.message;
+  ASSERT_EQ(files.size(), 1U);
+  EXPECT_EQ(files[0].name, "t_0.000s.png");
+  // Ended at its start, at steps that servos do not bear: nothing to draw.
+  RunOptions options;
+  options.out_dir = (std::filesystem::path(testing::TempDir()) / "mbv_broken_off").string();
+  options.page = false;
+  options.scenario.set = {{"simulation.step_s", "0.005"}, {"snapshots.size_px", "[64, 48]"}};
+  const RunOutcome outcome = RunScenario(SourcePath("/scenarios/cabin_robot/servo.yaml"), options);
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_LE(outcome.report->pictures.size(), 1U);
+  std::filesystem::remove_all(options.out_dir);
 }
 
 }  // namespace
