@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <iterator>
 
 #include "comparison/comparison.h"
 #include "core/demand.h"
@@ -26,7 +28,8 @@ const char* const kScenarios[] = {
     "cabin_robot/wrench",         "floating_loop/tumble", "floating_loop/steered",
     "four_bar/turn_inverse",      "n_four_bar/rock",      "redundant_five_bar/circle_inverse",
     "scara_robot/tool_load",      "slider_crank/press",   "spr_tripod/tool_load_inverse",
-    "spring_cart/swing",          "stewart/wave",         "stabilizing_platform/sea_state"};
+    "spring_cart/swing",          "stewart/wave",         "stabilizing_platform/sea_state",
+    "vehicle_linkage/drive"};
 
 struct Case {
   Scenario scenario;
@@ -68,8 +71,24 @@ void AddRounding(const Mechanism& m, CheckLimits* limits) {
   }
 }
 
+// One side with more gravity and a heavier body.
+Mechanism Wrong(Mechanism m) {
+  m.gravity_W *= 1.01;
+  size_t heaviest = 1;
+  for (size_t b = 1; b < m.bodies.size(); ++b) {
+    const bool carried =
+        std::none_of(m.prescribed.begin(), m.prescribed.end(), [&](const Prescribed& p) {
+          return m.joints[static_cast<size_t>(p.joint)].child == static_cast<int>(b);
+        });
+    if (carried && m.bodies[b].mass > m.bodies[heaviest].mass) heaviest = b;
+  }
+  m.bodies[heaviest].mass *= 1.05;
+  m.bodies[heaviest].I_Bcm_B *= 1.05;
+  return m;
+}
+
 // Reference and simulation, judged by the scenario's limits; lengths of `scale` times the size.
-Answer Judge(const Case& c, const Similarity& similarity) {
+Answer Judge(const Case& c, const Similarity& similarity, bool wrong = false) {
   Scenario scenario = c.scenario;
   const Mechanism m = Similar(c.mechanism, similarity);
   scenario.motion = Similar(c.mechanism, c.scenario.motion, similarity);
@@ -93,7 +112,8 @@ Answer Judge(const Case& c, const Similarity& similarity) {
   }
   const DrivenMotion driven =
       motion.free() ? DriveByCommands(m, motion) : DriveByReference(m, motion);
-  const SimulatedWitness simulated = RunSimulation(scenario, m, driven, Engine::kCorrected, {});
+  const SimulatedWitness simulated =
+      RunSimulation(scenario, wrong ? Wrong(m) : m, driven, Engine::kCorrected, {});
   const ComparisonInput input{
       .mechanism = &m,
       .motion = &motion,
@@ -152,6 +172,8 @@ class Similarities : public ::testing::TestWithParam<const char*> {
     if (ReferenceOnly(GetParam(), similarity)) return;
     EXPECT_EQ(other.comparison.verdict, Verdict::kAgree) << Failures(other.comparison);
     EXPECT_LT(ForceChange(c.mechanism, base.reference, other.reference, similarity.scale), force);
+    // And what is wrong stays so.
+    EXPECT_EQ(Judge(c, similarity, true).comparison.verdict, Verdict::kDisagree);
   }
 };
 
@@ -178,6 +200,17 @@ TEST_P(Similarities, InATurnedWorldTheVerdictIsTheSame) {
   Similarity similarity;
   similarity.X_NW.linear() = RotRpy({0.4, -1.1, 2.3});
   ExpectSame(similarity, kSimilar);
+}
+
+TEST(SimilarScenarios, AreOfEveryShippedModel) {
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
+    const std::string name = entry.path().filename();
+    if (!std::filesystem::exists(entry.path() / "model.yaml")) continue;
+    EXPECT_TRUE(
+        std::any_of(std::begin(kScenarios), std::end(kScenarios),
+                    [&](const std::string& scenario) { return scenario.starts_with(name + "/"); }))
+        << name;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(Shipped, Similarities, ::testing::ValuesIn(kScenarios),
