@@ -266,6 +266,22 @@ TEST_F(CliTest, ListNamesModelsAndScenarios) {
   }
 }
 
+TEST_F(CliTest, WorkspaceTakesParameters) {
+  const std::string call = "workspace spr_tripod --no-pictures --out '" + mbverify.Out() + "'";
+  const ProgramResult shipped = mbverify(call);
+  EXPECT_EQ(shipped.exit_code, 0) << shipped.err;
+  EXPECT_NE(shipped.out.find("legs 0.5 … 0.75 m"), std::string::npos) << shipped.out;
+  const ProgramResult longer = mbverify(call + " --set q_min=0.45 --set 'q_max=0.45 + 0.2'");
+  EXPECT_EQ(longer.exit_code, 0) << longer.err;
+  EXPECT_NE(longer.out.find("legs 0.45 … 0.65 m"), std::string::npos) << longer.out;
+  EXPECT_NE(longer.out.find("AGREE: 4 ways"), std::string::npos) << longer.out;
+  for (const char* bad : {"q_min", "q_min=abc", "q_mni=0.4", "q_min=0.8"}) {
+    EXPECT_EQ(mbverify(call + " --set " + bad).exit_code, 2) << bad;
+  }
+  // Strokes beyond what can be assembled have no workspace to measure.
+  EXPECT_EQ(mbverify(call + " --set q_min=0.1").exit_code, 3);
+}
+
 TEST_F(CliTest, RenderWritesPicturesAndVideos) {
   const std::string size = std::string(kGood) + " --size 64x64 ";
   const ProgramResult pictures = mbverify("render " + size + "--at 0,0.25 --out " + mbverify.Out());

@@ -132,7 +132,8 @@ struct WorkspaceReport {
   std::vector<VolumeEstimate> volumes;      ///< faces, interior, mesh, voxels
   std::vector<std::string> contradictions;  ///< between them; empty: they agree
   double mesh_error = kNan;                 ///< finest mesh against the smooth faces [m³]
-  double convergence_order = kNan;          ///< of the mesh volume in the step; 2 expected
+  double convergence_order = kNan;          ///< of the mesh volume in the step, 2 expected; NaN
+                                            ///< where the faces' own error hides it
 };
 /// Volumes that differ by more than both errors, and signs that the faces are no boundary: det J
 /// (`det`: its range over the stroke) not positive, meshes that do not converge with order 2.
