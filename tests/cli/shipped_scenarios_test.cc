@@ -1,8 +1,12 @@
 // Every scenario file in the project does what its `expect:` says.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "regress/accuracy.h"
 #include "scenario/load_scenario.h"
@@ -96,6 +100,67 @@ TEST_P(ShippedScenario, GivesWhatItExpects) {
 
 INSTANTIATE_TEST_SUITE_P(Shipped, ShippedScenario, testing::ValuesIn(ShippedScenarios()),
                          [](const auto& info) { return NameOf(info.param); });
+
+// The cells of a Markdown table's row, without blanks and backticks.
+std::vector<std::string> CellsOf(const std::string& row) {
+  std::vector<std::string> cells;
+  std::istringstream line(row.substr(1));
+  for (std::string cell; std::getline(line, cell, '|');) {
+    std::erase(cell, '`');
+    const size_t first = cell.find_first_not_of(' ');
+    cells.push_back(first == std::string::npos
+                        ? ""
+                        : cell.substr(first, cell.find_last_not_of(' ') + 1 - first));
+  }
+  return cells;
+}
+
+// Drive force error of a scenario with another step; "–" where the step is refused.
+std::string ErrorAtStep(const Program& mbverify, const std::string& scenario, double step_s) {
+  const ProgramResult result =
+      mbverify(fmt::format("run scenarios/{}.yaml -q --no-pictures --no-report --out '{}' --set "
+                           "simulation.step_s={:g} --set simulation.stock_too=false",
+                           scenario, mbverify.Out(), step_s));
+  if (result.exit_code == 2) return "–";
+  const auto json = nlohmann::json::parse(ReadAll(FindSummary(mbverify.Out())));
+  fs::remove_all(mbverify.Out());
+  return fmt::format("{:.1e}",
+                     json["metrics"]["simulated_vs_analytic"]["force_nrmse"].get<double>());
+}
+
+TEST(ShippedScenarios, TheStepStudyIsWhatTheyGive) {
+  const std::string text = ReadAll(fs::path(kSourceDir) / "docs/simulation.md");
+  const std::string mark = "<!-- step study: held by a test -->\n";
+  const size_t begin = text.find(mark), end = text.find("<!-- step study: end -->");
+  ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
+  std::istringstream table(text.substr(begin + mark.size(), end - begin - mark.size()));
+  std::string line;
+  std::getline(table, line);
+  const std::vector<std::string> headings = CellsOf(line);
+  std::getline(table, line);
+  const Program mbverify("step_study");
+  size_t rows = 0;
+  for (; std::getline(table, line); ++rows) {
+    const std::vector<std::string> cells = CellsOf(line);
+    ASSERT_EQ(cells.size(), headings.size()) << line;
+    std::map<double, double> errors;  // by step in ms
+    for (size_t c = 1; c < cells.size(); ++c) {
+      if (!headings[c].ends_with(" ms") || headings[c].starts_with("order")) continue;
+      const double step_ms = std::stod(headings[c]);
+      const std::string measured = ErrorAtStep(mbverify, cells[0], 1e-3 * step_ms);
+      EXPECT_TRUE(SameAccuracy(cells[c], measured))
+          << cells[0] << ", " << headings[c] << ": " << cells[c] << ", measured " << measured;
+      if (cells[c] != "–") errors[step_ms] = std::stod(cells[c]);
+    }
+    // The order follows from two cells, where both are above round-off.
+    if (cells.back() == "–") {
+      EXPECT_LT(errors[0.5], 1e-12) << line;
+    } else {
+      EXPECT_NEAR(std::stod(cells.back()), std::log2(errors[1.0] / errors[0.5]), 0.1) << line;
+    }
+  }
+  EXPECT_EQ(rows, 5U);
+}
 
 TEST(ShippedScenarios, DocumentsQuoteScenariosThatExist) {
   const fs::path root = kSourceDir;
