@@ -8,7 +8,7 @@
 
 #include <string>
 
-#include "mechanism/constraints.h"
+#include "kinematics/constraints.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv::internal {

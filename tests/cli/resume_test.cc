@@ -3,8 +3,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "mechanism/load_model.h"
-#include "mechanism/urdf.h"
+#include "model_file/load_model.h"
+#include "model_file/urdf.h"
 #include "tests/cli/program.h"
 
 namespace mbv {

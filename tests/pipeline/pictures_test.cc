@@ -5,7 +5,7 @@
 
 #include <filesystem>
 
-#include "mechanism/load_model.h"
+#include "model_file/load_model.h"
 #include "pipeline/run_scenario.h"
 #include "tests/source_dir.h"
 

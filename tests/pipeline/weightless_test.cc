@@ -91,7 +91,8 @@ RunOutcome RunRotor(const std::string& rotor, const std::string& gravity,
 TEST(Weightless, ABalancedRotorDisagreesNowhere) {
   for (const std::string& rotor : kRotors) {
     for (const char* gravity : {"0", "-9.81"}) {
-      for (const char* profile : {"0.3", "{sine: {amplitude: 0.5, period_s: 1}}", "{ramp: {rate: 3}}"}) {
+      for (const char* profile :
+           {"0.3", "{sine: {amplitude: 0.5, period_s: 1}}", "{ramp: {rate: 3}}"}) {
         for (const char* mode : {"forward", "inverse"}) {
           const RunOutcome outcome = RunRotor(rotor, gravity, profile, mode, 0.0);
           const std::string which = rotor + " " + gravity + " " + profile + " " + mode;
