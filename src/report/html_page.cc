@@ -53,6 +53,7 @@ class PageWriter {
     Add("Checks", "Checks", ChecksHtml(report_));
     Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
     Add("Drives", "Drives", DrivesHtml(report_));
+    Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     Add("The simulator's own error", "Engine", EngineHtml(report_));
     Add("Energy", "Energy", EnergyHtml(report_));
     Add("What could not be compared", "Gaps", NotComparedHtml(report_));

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 
 #include "report/html_text.h"
 
@@ -51,15 +50,6 @@ std::vector<Cell> CheckRow(const CheckResult& check) {
           Text(where)};
 }
 
-double Trapezoid(const std::vector<double>& time_s, const std::function<double(Eigen::Index)>& f) {
-  double sum = 0.0;
-  for (size_t i = 1; i < time_s.size(); ++i) {
-    const auto k = static_cast<Eigen::Index>(i);
-    sum += 0.5 * (f(k - 1) + f(k)) * (time_s[i] - time_s[i - 1]);
-  }
-  return sum;
-}
-
 }  // namespace
 
 std::string FindingsHtml(const Report& report) {
@@ -74,8 +64,8 @@ std::string FindingsHtml(const Report& report) {
 std::string ChecksHtml(const Report& report) {
   if (report.comparison.checks.empty()) return "";
   Table table{.caption = "Checks, failed ones first",
-              .head = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"), Text(""),
-                       Text("margin"), Text("worst at")},
+              .head = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
+                       Text("result"), Text("margin"), Text("worst at")},
               .rows = {}};
   for (const bool failed : {true, false}) {
     for (const CheckResult& check : report.comparison.checks) {
@@ -136,38 +126,10 @@ std::string EngineHtml(const Report& report) {
              "of it are the first moments, in which its soft constraints take up the load.");
 }
 
-Work WorkOf(const Trace& trace, const std::vector<std::string>& drives) {
-  Work work;
-  for (const std::string& drive : drives) {
-    const int force = trace.Find(drive + ".force"), velocity = trace.Find(drive + ".velocity");
-    double sum = kNan, peak = kNan;
-    if (force >= 0 && velocity >= 0) {
-      const auto power = [&](Eigen::Index i) {
-        return trace.values(i, force) * trace.values(i, velocity);
-      };
-      sum = Trapezoid(trace.time_s, power);
-      peak =
-          (trace.values.col(force).array() * trace.values.col(velocity).array()).abs().maxCoeff();
-    }
-    work.drives.push_back(sum);
-    work.peak_w.push_back(peak);
-  }
-  const auto integral = [&](const char* channel) {
-    const int column = trace.Find(channel);
-    if (column < 0) return kNan;
-    return Trapezoid(trace.time_s, [&](Eigen::Index i) { return trace.values(i, column); });
-  };
-  work.input = integral("power.input");
-  work.energy = integral("power.energy_rate");
-  return work;
-}
-
-namespace {
-
 // One column per witness that recorded its energies.
-std::string EnergyAuditHtml(const Comparison& comparison) {
+std::string EnergyHtml(const Report& report) {
   std::vector<const EnergyAudit*> audits;
-  for (const WitnessMetrics& witness : comparison.witnesses) {
+  for (const WitnessMetrics& witness : report.comparison.witnesses) {
     if (witness.energy) audits.push_back(&*witness.energy);
   }
   if (audits.empty()) return "";
@@ -203,48 +165,6 @@ std::string EnergyAuditHtml(const Comparison& comparison) {
   return html + Note(
                     "Work that a witness does not integrate with its motion is the integral of "
                     "cubics through the samples; the drift then holds their error.");
-}
-
-}  // namespace
-
-std::string EnergyHtml(const Report& report) {
-  if (std::string html = EnergyAuditHtml(report.comparison); !html.empty()) return html;
-  std::vector<std::pair<std::string, Work>> works;
-  for (const WitnessRecord& record : report.witnesses) {
-    if (!record.summary.ok() || record.trace.time_s.size() < 2) continue;
-    works.emplace_back(record.name, WorkOf(record.trace, report.drives));
-  }
-  if (works.empty()) return "";
-  Table table{.caption = "Work over the run [J]", .head = {Text("of")}, .rows = {}};
-  for (const auto& [name, work] : works) table.head.push_back(Digits(name));
-  table.head.push_back(Digits("peak power [W]"));
-  const auto add = [&](const std::string& title, const std::function<double(const Work&)>& value,
-                       double peak_w) {
-    std::vector<Cell> row = {Text(title)};
-    for (const auto& [name, work] : works)
-      row.push_back(Digits(NumberOrDash(value(work), "{:.6g}")));
-    row.push_back(Digits(std::isfinite(peak_w) ? fmt::format("{:.0f}", peak_w) : ""));
-    table.rows.push_back(std::move(row));
-  };
-  const auto drives_sum = [](const Work& work) {
-    double sum = 0.0;
-    for (const double drive : work.drives) sum += drive;
-    return sum;
-  };
-  for (size_t i = 0; i < report.drives.size(); ++i) {
-    add(
-        report.drives[i], [i](const Work& work) { return work.drives[i]; },
-        works.back().second.peak_w[i]);
-  }
-  add("all drives", drives_sum, kNan);
-  add(
-      "base and loads", [&](const Work& work) { return work.input - drives_sum(work); }, kNan);
-  add(
-      "change of energy", [](const Work& work) { return work.energy; }, kNan);
-  add(
-      "drift: input − change", [](const Work& work) { return work.input - work.energy; }, kNan);
-  return ToHtml(table) + Note("Trapezoidal rule over the samples; peak power of " +
-                              Escape(works.back().first) + ".");
 }
 
 std::string NotComparedHtml(const Report& report) {
@@ -320,7 +240,7 @@ std::string ReproduceHtml(const HtmlInput& input) {
   const Report& report = *input.report;
   std::string command = "mbverify run " + report.scenario_file;
   for (const std::string& argument : input.arguments) command += " " + argument;
-  std::string html = "<pre><code>" + Escape(command) + "</code></pre>\n";
+  std::string html = "<pre tabindex=\"0\"><code>" + Escape(command) + "</code></pre>\n";
   Table table{.caption = "Inputs and versions", .head = {Text("what"), Text("is")}, .rows = {}};
   table.rows.push_back({Text("scenario"), Text(report.scenario_file)});
   table.rows.push_back({Text("model"), Text(report.model_file)});

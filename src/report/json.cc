@@ -1,4 +1,5 @@
 #include "report/json_number.h"
+#include "report/load_figures.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -180,6 +181,37 @@ Json WitnessesJson(const Report& report) {
   return witnesses;
 }
 
+Json FiguresJson(const Figures& figures) {
+  return {{"unit", figures.unit},
+          {"peak", Number(figures.peak)},
+          {"peak_time_s", Number(figures.time_s)},
+          {"rms", Number(figures.rms)},
+          {"mean", Number(figures.mean)}};
+}
+
+Json LoadsJson(const Report& report) {
+  const LoadFigures loads = LoadFiguresOf(report);
+  Json drives = Json::array(), joints = Json::array();
+  for (const DriveLoad& load : loads.drives) {
+    Json json = {
+        {"drive", load.drive}, {"witness", load.witness}, {"force", FiguresJson(load.force)}};
+    if (!load.power.unit.empty()) json["power"] = FiguresJson(load.power);
+    if (!load.speed.unit.empty()) json["speed"] = FiguresJson(load.speed);
+    if (!load.stroke_unit.empty()) {
+      json["stroke"] = {{"unit", load.stroke_unit}, {"value", Number(load.stroke)}};
+    }
+    drives.push_back(std::move(json));
+  }
+  for (const JointLoad& load : loads.joints) {
+    Json json = {{"joint", load.joint}, {"witness", load.witness}};
+    if (!load.force.unit.empty()) json["force"] = FiguresJson(load.force);
+    if (!load.moment.unit.empty()) json["moment"] = FiguresJson(load.moment);
+    json["unique"] = !load.not_unique;
+    joints.push_back(std::move(json));
+  }
+  return {{"drives", std::move(drives)}, {"joints", std::move(joints)}};
+}
+
 Json SheetsJson(const std::vector<SignalSheet>& sheets) {
   Json json = Json::array();
   for (const SignalSheet& sheet : sheets) {
@@ -284,6 +316,7 @@ std::string ToJson(const Report& report) {
                {"start_window_s", report.start_window_s}};
   if (report.comparison.table) json["reference_table"] = ReferenceTableJson(report.comparison);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
+  json["loads"] = LoadsJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);
   json["pictures"] = report.pictures;

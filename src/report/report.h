@@ -62,6 +62,8 @@ struct Report {
   std::vector<std::string> drives_not_unique;  ///< they share their forces by least norm
   /// Drives and prescribed joints whose force MuJoCo finds not unique; one choice is recorded.
   std::vector<std::string> simulated_not_unique;
+  /// Channels of reactions that statics leaves open.
+  std::vector<std::string> reactions_not_unique;
   std::vector<WitnessRecord> witnesses;
   Comparison comparison;
   int exit_code = 3;

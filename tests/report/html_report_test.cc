@@ -170,20 +170,6 @@ TEST(HtmlPage, RunsNoScriptButItsOwn) {
   EXPECT_LT(shared.size() + PageScript().size(), alone.size() + 1000);
 }
 
-TEST(HtmlTables, WorkIsForceTimesWay) {
-  Trace trace;
-  trace.Reset({0.0, 1.0, 2.0}, {{"d1.velocity", "m/s", ""},
-                                {"d1.force", "N", ""},
-                                {"power.input", "W", ""},
-                                {"power.energy_rate", "W", ""}});
-  trace.values << 1, 10, 10, 9, 1, 10, 10, 9, 1, 10, 10, 9;
-  const Work work = WorkOf(trace, {"d1", "d2"});
-  EXPECT_DOUBLE_EQ(work.drives[0], 20.0);
-  EXPECT_TRUE(std::isnan(work.drives[1]));
-  EXPECT_DOUBLE_EQ(work.peak_w[0], 10.0);
-  EXPECT_DOUBLE_EQ(work.input - work.energy, 2.0);
-}
-
 TEST(HtmlTables, FailedChecksComeFirst) {
   const Page page;
   const std::string html = ChecksHtml(page.report);
