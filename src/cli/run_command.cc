@@ -18,7 +18,7 @@ namespace {
 
 struct RunArguments {
   std::vector<std::string> scenarios, set;
-  std::string out = "out", mode, report_script;
+  std::string out = "out", mode, report_script, kept_audits;
   bool no_report = false, no_pictures = false, quiet = false, verbose = false;
 };
 
@@ -60,6 +60,7 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->pictures = !arguments.no_pictures;
   options->page = !arguments.no_report;
   options->script_link = arguments.report_script;
+  options->kept_audits = arguments.kept_audits;
   for (const std::string& text : arguments.set) {
     const auto set = SplitSet(text);
     if (!set) {
@@ -118,8 +119,9 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
       ->allow_extra_args(false);
   run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
   run->add_flag("--no-report", arguments->no_report, "do not write report.html");
-  // How regress shares one script among the reports of a night.
+  // How regress shares one script, and what the papers' audits gave, among the reports of a night.
   run->add_option("--report-script", arguments->report_script)->group("");
+  run->add_option("--kept-audits", arguments->kept_audits)->group("");
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");
   run->add_flag("-v,--verbose", arguments->verbose,
                 "also how to read each signal, and what could not be compared");

@@ -7,7 +7,9 @@
 #include <iterator>
 
 #include "audit/audit.h"
+#include "core/files.h"
 #include "render/palette.h"
+#include "report/audit_json.h"
 #include "report/html_report.h"
 #include "scenario/find_model.h"
 
@@ -52,10 +54,23 @@ HtmlAudit ToHtmlAudit(const AuditTable& table) {
   return audit;
 }
 
+// Computed by the first run that asks, and kept for the others of its night: it is the same for
+// all. A file that is damaged or cannot be written costs time only.
+HtmlAudit RunAudit(const AuditEntry& entry, const fs::path& models, const std::string& kept) {
+  const fs::path file = fs::path(kept) / (entry.mechanism + ".json");
+  if (!kept.empty()) {
+    const auto text = ReadWholeFile(file);
+    if (auto audit = text ? AuditFromJson(*text) : std::nullopt) return *std::move(audit);
+  }
+  HtmlAudit audit = ToHtmlAudit(entry.run(models.string()));
+  if (!kept.empty()) (void)WriteFile(file, ToJson(audit), false);
+  return audit;
+}
+
 // The audit of the mechanism's paper; none for mechanisms of one's own. It is about the models that
 // the program came with, so a run of a model that was changed only says where it is. A run that is
 // compared does not end because its page lacks a section.
-std::optional<HtmlAudit> AuditOf(const Report& report) {
+std::optional<HtmlAudit> AuditOf(const Report& report, const std::string& kept) {
   for (const AuditEntry& entry : Audits()) {
     if (entry.mechanism != report.mechanism) continue;
     const auto note = [&](const std::string& why) {
@@ -72,7 +87,7 @@ std::optional<HtmlAudit> AuditOf(const Report& report) {
       return note(model.string() + " is not the shipped model");
     }
     try {
-      return ToHtmlAudit(entry.run(shipped->string()));
+      return RunAudit(entry, *shipped, kept);
     } catch (const std::exception& error) {
       return note(std::string("The audit failed: ") + error.what());
     }
@@ -98,15 +113,15 @@ std::map<std::string, HtmlPaint> PaintsOf(const Mechanism& mechanism) {
 
 std::string RunPage(const Report& report, const Mechanism& mechanism,
                     const SimulationRun* simulation, const std::vector<PictureFile>& pictures,
-                    const ScenarioOptions& options, const std::string& script_link) {
+                    const ScenarioOptions& options, const PageOptions& page) {
   HtmlInput input{.report = &report,
                   .mechanism = &mechanism,
                   .X_WB = simulation == nullptr ? nullptr : &simulation->X_WB,
                   .paints = PaintsOf(mechanism),
                   .pictures = {},
-                  .audit = AuditOf(report),
+                  .audit = AuditOf(report, page.kept_audits),
                   .arguments = {},
-                  .script_link = script_link};
+                  .script_link = page.script_link};
   size_t bytes = 0;
   for (const PictureFile& picture : pictures) {
     bytes += picture.preview.size();

@@ -11,11 +11,15 @@
 
 namespace mbv {
 
-/// `simulation` may be null (it did not run); `mechanism` is the one it simulated; `script_link` as
-/// in RunOptions.
+/// Both as in RunOptions.
+struct PageOptions {
+  std::string script_link = {}, kept_audits = {};
+};
+
+/// `simulation` may be null (it did not run); `mechanism` is the one it simulated.
 [[nodiscard]] std::string RunPage(const Report& report, const Mechanism& mechanism,
                                   const SimulationRun* simulation,
                                   const std::vector<PictureFile>& pictures,
-                                  const ScenarioOptions& options, const std::string& script_link);
+                                  const ScenarioOptions& options, const PageOptions& page);
 
 }  // namespace mbv

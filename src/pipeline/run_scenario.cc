@@ -304,6 +304,7 @@ class ScenarioRun {
       AddWarning(text);
     }
     const ComparisonInput input = MakeComparisonInput();
+    report_.reactions_not_unique = input.reactions_not_unique;
     report_.comparison = Compare(input);
     NameConcessions();
     DoubtGravity();
@@ -369,7 +370,7 @@ class ScenarioRun {
     if (options_.page) {
       write("report.html",
             RunPage(report_, prepared_->mechanisms.simulated, simulation_ ? &*simulation_ : nullptr,
-                    pictures_, options_.scenario, options_.script_link));
+                    pictures_, options_.scenario, {options_.script_link, options_.kept_audits}));
     }
     if (trouble.empty()) trouble = folder.Commit();
     if (trouble.empty()) {

@@ -23,6 +23,9 @@ struct RunOptions {
   bool pictures = true;     ///< needs out_dir
   bool page = true;         ///< report.html; needs out_dir
   std::string script_link;  ///< the page's script, relative to the result's folder; "": in the page
+  /// Folder that the runs of one night share: each paper's equations are audited once for all their
+  /// pages; "": by every run.
+  std::string kept_audits;
   ProgressFunction progress;
 };
 

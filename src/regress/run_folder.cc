@@ -64,6 +64,8 @@ fs::path RunFolder::StagedLog(size_t job) const {
   return Own() / "work" / fmt::format("{}.log", job);
 }
 
+fs::path RunFolder::Shared() const { return Own() / "work" / "shared"; }
+
 std::optional<fs::path> RunFolder::FindStaged(size_t job) const {
   std::error_code error;
   for (fs::recursive_directory_iterator entry(Staging(job), error), end; !error && entry != end;

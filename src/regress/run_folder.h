@@ -30,6 +30,8 @@ class RunFolder {
   /// Where a worker writes, until its result is moved to its place; and what it prints.
   [[nodiscard]] std::filesystem::path Staging(size_t job) const;
   [[nodiscard]] std::filesystem::path StagedLog(size_t job) const;
+  /// Where workers keep what all of them need; it is new in each run.
+  [[nodiscard]] std::filesystem::path Shared() const;
 
   /// The folder with a summary.json below Staging(job); empty if there is none.
   [[nodiscard]] std::optional<std::filesystem::path> FindStaged(size_t job) const;
