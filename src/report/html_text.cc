@@ -39,7 +39,10 @@ std::string ToHtml(const Table& table) {
   std::string html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"" +
                      Escape(table.caption) + "\"><table><caption>" + Escape(table.caption) +
                      "</caption><thead><tr>";
-  for (const Cell& cell : table.head) html += CellHtml(cell, "th", " scope=\"col\"");
+  for (const Cell& cell : table.head) {
+    // An empty heading names nothing.
+    html += cell.text.empty() ? "<td></td>" : CellHtml(cell, "th", " scope=\"col\"");
+  }
   html += "</tr></thead><tbody>\n";
   for (const std::vector<Cell>& row : table.rows) {
     html += "<tr>";

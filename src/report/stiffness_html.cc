@@ -176,7 +176,8 @@ class StiffnessPageWriter {
         {Text("time taken"),
          Text(fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
                           timing.analytic_s, timing.reference_s, timing.simulation_s))});
-    return "<pre><code>" + Escape(report_.command) + "</code></pre>\n" + ToHtml(table) +
+    return "<pre tabindex=\"0\"><code>" + Escape(report_.command) + "</code></pre>\n" +
+           ToHtml(table) +
            "<p class=\"faint\">Files beside this page: summary.json (every number), stiffness.csv, "
            "loads.csv and contributions.csv (17 digits), model.xml (the compliant MJCF as "
            "simulated).</p>\n";

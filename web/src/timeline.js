@@ -104,7 +104,7 @@ export function timelineBar(timeline) {
     play.firstChild.firstChild.setAttribute('d', timeline.playing ? kPause : kPlay);
     play.setAttribute('aria-label', timeline.playing ? 'Pause' : 'Play');
   });
-  return element('div', {class: 'timeline', role: 'group', 'aria-label': 'Timeline'}, play, clock,
+  return element('div', {class: 'timeline', role: 'region', 'aria-label': 'Timeline'}, play, clock,
                  element('div', {class: 'track'}, slider, marks), speed,
                  ...(timeline.worst.length ? [worst] : []), help);
 }

@@ -1,0 +1,82 @@
+// Accessibility by axe-core: node axe_gate.cjs FOLDER opens each report.html and index.html below
+// FOLDER in a real browser (MBV_CHROMIUM), light and dark, wide and narrow, and prints what axe finds.
+// Exit code 1 if it finds anything, if there is no page, or if it does not find a fault that is
+// planted into each page: a check that cannot fail says nothing.
+'use strict';
+const fs = require('node:fs');
+const path = require('node:path');
+
+const {launch, openPage} = require('./browser.cjs');
+
+const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
+
+function pagesBelow(folder) {
+  return fs.readdirSync(folder, {withFileTypes: true, recursive: true})
+      .filter((entry) => entry.isFile() && ['report.html', 'index.html'].includes(entry.name))
+      .map((entry) => path.join(entry.parentPath ?? entry.path, entry.name)).sort();
+}
+
+// Faults as [rule, element: text].
+async function violations(page) {
+  const {violations: found} = await page.evaluate(() => globalThis.axe.run(document, {
+    resultTypes: ['violations'],
+    rules: {'target-size': {enabled: true}},
+  }));
+  return found.flatMap(({id, help, nodes}) => nodes.map(({target, failureSummary}) =>
+    `${id} (${help}): ${target.join(' ')}: ${failureSummary.replace(/\s+/g, ' ').slice(0, 200)}`));
+}
+
+// What axe must find: a picture without text, and text that is hardly seen.
+const plant = (page) => page.evaluate(() => {
+  const image = document.createElement('img');
+  image.src = 'data:image/gif;base64,R0lGODlhAQABAAAAACw=';
+  const faint = document.createElement('p');
+  faint.textContent = 'hardly seen';
+  faint.style.setProperty('color', '#777');
+  faint.style.setProperty('background-color', '#888');
+  document.querySelector('main').append(image, faint);
+});
+
+async function faultsOf(browser, file) {
+  const page = await openPage(browser, file, {trouble: [], requests: []});
+  const script = await page.locator('#page-data').count() > 0;
+  if (script) await page.waitForSelector('html[data-ready]', {timeout: 20000});
+  // Folded parts are content, too.
+  await page.evaluate(() => document.querySelectorAll('details').forEach((part) => { part.open = true; }));
+  await page.evaluate(axe);
+  const faults = [];
+  for (const colorScheme of ['light', 'dark']) {
+    await page.emulateMedia({colorScheme, reducedMotion: 'reduce'});
+    for (const width of [1400, 390]) {
+      await page.setViewportSize({width, height: 900});
+      for (const fault of await violations(page)) faults.push(`${colorScheme}, ${width} px: ${fault}`);
+    }
+  }
+  await plant(page);
+  const planted = await violations(page);
+  for (const rule of ['image-alt', 'color-contrast']) {
+    if (!planted.some((fault) => fault.startsWith(rule))) faults.push(`a planted fault of ${rule} is not found`);
+  }
+  await page.close();
+  return faults;
+}
+
+async function main(folder) {
+  const pages = pagesBelow(folder);
+  if (pages.length === 0) {
+    console.error(`no page below ${folder}`);
+    return 1;
+  }
+  const browser = await launch();
+  let failed = 0;
+  for (const file of pages) {
+    const faults = await faultsOf(browser, file);
+    if (faults.length) ++failed;
+    for (const fault of faults) console.error(`${path.relative(folder, file)}: ${fault}`);
+  }
+  await browser.close();
+  console.log(`${pages.length - failed} of ${pages.length} pages are without violations`);
+  return failed ? 1 : 0;
+}
+
+main(process.argv[2]).then((code) => { process.exitCode = code; });
