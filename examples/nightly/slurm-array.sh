@@ -1,7 +1,7 @@
 #!/bin/bash
 # One task per shard, then the merge:
 #   job=$(sbatch --parsable slurm-array.sh)
-#   sbatch --dependency=afterany:$job --wrap 'mbverify merge night/shard* --out night/all --history history.sqlite'
+#   sbatch --dependency=afterany:$job --wrap 'mbverify merge night/shard* --out night/all --history history.sqlite --fail-on-missing'
 #SBATCH --job-name=mbverify
 #SBATCH --array=1-8
 #SBATCH --cpus-per-task=2
