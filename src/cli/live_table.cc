@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "regress/summaries.h"
+#include "regress/trouble_text.h"
 
 namespace mbv {
 
@@ -35,7 +36,7 @@ void LiveTable::Ended(const CaseResult& result) {
              fmt::formatted_size("{}", cases_), cases_, start, WordOf(result),
              color_ ? "\x1b[0m" : "", result.key, result.cost.wall_s,
              static_cast<double>(result.cost.peak_kib) / 1024.0,
-             result.failed() ? result.reason : KeyText(result));
+             result.failed() ? FailureLine(result) : KeyText(result));
   Draw();
 }
 

@@ -60,6 +60,12 @@ bool Complete(RegressArguments* arguments) {
   } else if (options.history.empty() && options.shard.count == 1) {
     options.history = (std::filesystem::path(options.out) / "history.sqlite").string();
   }
+  if (options.fail_on_missing && options.history.empty()) {
+    fmt::print(stderr,
+               "--fail-on-missing: error: needs a history: --history FILE says what there was{}\n",
+               options.shard.count > 1 ? "; or give it to merge" : "");
+    return false;
+  }
   options.pictures = !arguments->no_pictures;
   ShareScript(*arguments, &options);
   options.program = std::string("mbverify ") + kVersion;
@@ -110,6 +116,8 @@ void AddOutputOptions(CLI::App* app, RegressArguments* arguments) {
                   "documents whose accuracy tables are filled with the results");
   app->add_option("--label", options.label, "text kept with the run, e.g. a commit");
   app->add_flag("--fail-on-drift", arguments->fail_on_drift, "exit code 1 if a metric drifted");
+  app->add_flag("--fail-on-missing", options.fail_on_missing,
+                "exit code 1 if a scenario that an earlier run had is gone");
   app->add_flag("-q,--quiet", arguments->quiet, "only what failed or drifted, and the counts");
 }
 
@@ -150,7 +158,13 @@ void AddMergeCommand(CLI::App* app, int* exit_code) {
   CLI::App* merge = app->add_subcommand("merge", "Join the folders of regress --shard into one");
   merge->add_option("folder", arguments->folders, "folders of regress")->required();
   AddOutputOptions(merge, arguments.get());
-  merge->footer("Example:\n  mbverify merge shard1 shard2 --out night --history nightly.sqlite");
+  merge->add_flag("--partial", arguments->options.partial,
+                  "join what there is: not all shards, or of different runs");
+  merge->footer(
+      "Example:\n"
+      "  mbverify merge shard1 shard2 --out night --history nightly.sqlite\n"
+      "Exit codes: 0 all as expected, 1 some not, 2 bad input (also: shards of different nights),\n"
+      "3 some could not run, or a shard is missing");
   merge->callback([arguments, exit_code] { *exit_code = RunMerge(arguments.get()); });
 }
 

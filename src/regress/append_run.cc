@@ -13,6 +13,7 @@
 #include "core/files.h"
 #include "regress/history.h"
 #include "regress/history_schema.h"
+#include "regress/missing.h"
 
 namespace mbv {
 namespace {
@@ -32,9 +33,11 @@ class Appender {
       const auto golden = goldens.find(result.key);
       if (golden != goldens.end()) FindMovement(scenario, since, golden->second, &result);
       FillCourse(scenario, &result);
+      FillPast(scenario, report->run.id, &result);
       const long id = InsertResult(report->run.id, scenario, result);
       if (golden != goldens.end()) InsertGolden(id, golden->second);
     }
+    report->missing = FindMissing(db_, report->run.id);
     FinishRun(*report);
     DropOldGolden();
   }
@@ -45,10 +48,11 @@ class Appender {
     const long known = run.uid.empty() ? 0 : ForgetRun(run.uid);
     Statement(db_,
               "INSERT OR REPLACE INTO run(id, uid, started_utc, finished_utc, wall_s, jobs, label, "
-              "host, program, shard, exit_code, total, as_expected, ran, compared, verified, "
-              "drifted) VALUES(NULLIF(?,0),NULLIF(?,''),?,?,?,?,?,?,?,?,0,0,0,0,0,0,0)")
+              "host, program, shard, covers, exit_code, total, as_expected, ran, compared, "
+              "verified, drifted) "
+              "VALUES(NULLIF(?,0),NULLIF(?,''),?,?,?,?,?,?,?,?,NULLIF(?,''),0,0,0,0,0,0,0)")
         .Bind(known, run.uid, run.started_utc, run.finished_utc, run.wall_s, run.jobs, run.label,
-              run.host, run.program, run.shard)
+              run.host, run.program, run.shard, CoversText(run))
         .Execute();
     report->run.id = db_->last_id();
     std::map<std::string, std::string> versions;
@@ -128,7 +132,7 @@ class Appender {
       const auto found = FindDrift(past, metric.value, RuleAfter(since));
       if (!found) continue;
       Drift drift{name, "", metric.value, found->baseline, found->since_run, ""};
-      if (found->since_run != 0) drift.since = DescribeRun(found->since_run);
+      if (found->since_run != 0) drift.since = DescribeRun(db_, found->since_run);
       drift.text = fmt::format(
           "{} is {:.2e}, {:.0f} times the median {:.2e} of {} good runs (reported above {:.1e}{})",
           name, metric.value, metric.value / found->baseline, found->baseline, found->good_runs,
@@ -145,14 +149,6 @@ class Appender {
     return rule;
   }
 
-  std::string DescribeRun(long run) {
-    Statement find(db_, "SELECT started_utc, label, program FROM run WHERE id = ?");
-    if (!find.Bind(run).Step()) return "";
-    const std::string label = find.Text(1);
-    return fmt::format("run {} of {}{}, {}", run, find.Text(0), label.empty() ? "" : ", " + label,
-                       find.Text(2));
-  }
-
   // Against the last good run with traces: a step is told once, in the run that took it.
   void FindMovement(long scenario, long since, const GoldenTraces& now, CaseResult* result) {
     if (result->failed()) return;
@@ -167,7 +163,7 @@ class Appender {
     Drift drift;
     drift.metric = "traces";
     drift.text = fmt::format(
-        "drive forces: {} since {}; {}", who, DescribeRun(last.Integer(1)),
+        "drive forces: {} since {}; {}", who, DescribeRun(db_, last.Integer(1)),
         changed ? "the scenario or model file changed" : "scenario and model files are the same");
     result->drifts.push_back(std::move(drift));
   }
@@ -183,6 +179,26 @@ class Appender {
     while (select.Step()) result->course.push_back(select.Real(0));
     std::reverse(result->course.begin(), result->course.end());
     result->course.push_back(key->second.value);
+  }
+
+  // When a scenario that failed was last as expected, and what its failed checks were then.
+  void FillPast(long scenario, long run, CaseResult* result) {
+    result->past = {};
+    if (!result->failed()) return;
+    Statement count(db_, "SELECT COUNT(*) FROM result WHERE scenario = ? AND run < ?");
+    if (count.Bind(scenario, run).Step()) result->past.runs = count.Integer(0);
+    Statement good(db_,
+                   "SELECT id, run FROM result WHERE scenario = ? AND run < ? AND "
+                   "status = 'as_expected' ORDER BY run DESC LIMIT 1");
+    if (!good.Bind(scenario, run).Step()) return;
+    result->past.good_run = good.Integer(1);
+    result->past.when = DescribeRun(db_, good.Integer(1));
+    Statement value(db_, "SELECT value FROM metric WHERE result = ? AND name = ?");
+    for (const auto* check : FailedChecks(*result)) {
+      if (value.Bind(good.Integer(0), check->first).Step()) {
+        result->past.values[check->first] = value.Real(0);
+      }
+    }
   }
 
   long InsertResult(long run, long scenario, const CaseResult& result) {

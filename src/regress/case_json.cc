@@ -23,6 +23,8 @@ Json MetricsJson(const CaseResult& result) {
       json["limit"] = *metric.limit;
       json["pass"] = metric.pass;
     }
+    if (!metric.channel.empty()) json["channel"] = metric.channel;
+    if (std::isfinite(metric.time_s)) json["time_s"] = metric.time_s;
     metrics[name] = std::move(json);
   }
   return metrics;
@@ -39,6 +41,32 @@ Json DriftsJson(const CaseResult& result) {
                       {"since", drift.since}});
   }
   return drifts;
+}
+
+Json PastJson(const PastOfFailure& past) {
+  Json values = Json::object();
+  for (const auto& [name, value] : past.values) values[name] = Number(value);
+  return {{"runs", past.runs},
+          {"good_run", past.good_run},
+          {"when", past.when},
+          {"values", std::move(values)}};
+}
+
+PastOfFailure PastOf(const Json& json) {
+  PastOfFailure past;
+  past.runs = json.at("runs");
+  past.good_run = json.at("good_run");
+  past.when = json.at("when");
+  for (const auto& [name, value] : json.at("values").items()) past.values[name] = NumberOf(value);
+  return past;
+}
+
+Json MissingJson(const RegressReport& report) {
+  Json missing = Json::array();
+  for (const MissingCase& item : report.missing) {
+    missing.push_back({{"key", item.key}, {"last_run", item.last_run}, {"when", item.when}});
+  }
+  return missing;
 }
 
 Json CaseJson(const CaseResult& result) {
@@ -77,6 +105,7 @@ Json CaseJson(const CaseResult& result) {
   json["log_tail"] = result.log_tail;
   json["kept"] = result.kept;
   json["drifts"] = DriftsJson(result);
+  if (result.past.runs > 0) json["past"] = PastJson(result.past);
   json["course"] = Json::array();
   for (double value : result.course) json["course"].push_back(Number(value));
   return json;
@@ -103,6 +132,8 @@ CaseResult CaseOf(const Json& json) {
   for (const auto& [name, metric] : json.at("metrics").items()) {
     MetricValue& value = result.metrics[name];
     value.value = NumberOf(metric.at("value"));
+    value.channel = metric.value("channel", "");
+    value.time_s = NumberOf(metric.value("time_s", Json()));
     if (!metric.contains("limit")) continue;
     value.limit = metric.at("limit").get<double>();
     value.pass = metric.at("pass");
@@ -126,6 +157,7 @@ CaseResult CaseOf(const Json& json) {
                              NumberOf(drift.at("baseline")), drift.at("since_run"),
                              drift.at("since")});
   }
+  if (json.contains("past")) result.past = PastOf(json.at("past"));
   for (const Json& value : json.at("course")) result.course.push_back(NumberOf(value));
   return result;
 }
@@ -150,6 +182,9 @@ std::string ToJson(const RegressReport& report) {
                  {"host", report.run.host},
                  {"program", report.run.program},
                  {"shard", report.run.shard},
+                 {"covers", report.run.covers},
+                 {"found", report.run.found},
+                 {"partial", report.run.partial},
                  {"wall_s", report.run.wall_s},
                  {"jobs", report.run.jobs}}},
                {"exit_code", ExitCodeOf(report)},
@@ -160,8 +195,11 @@ std::string ToJson(const RegressReport& report) {
                  {"compared", counts.compared},
                  {"verified", counts.verified},
                  {"must_fail_as_expected", counts.must_fail},
-                 {"drifted", counts.drifted}}},
+                 {"drifted", counts.drifted},
+                 {"missing", counts.missing}}},
                {"notes", report.notes},
+               {"fail_on_missing", report.fail_on_missing},
+               {"missing", MissingJson(report)},
                {"cases", Json::array()}};
   for (const CaseResult& result : report.cases) json["cases"].push_back(CaseJson(result));
   return Dump(json);
@@ -190,9 +228,16 @@ std::optional<RegressReport> ReportFromJson(const std::string& text) {
     report.run.host = run.at("host");
     report.run.program = run.at("program");
     report.run.shard = run.at("shard");
+    report.run.covers = run.value("covers", std::vector<std::string>{});
+    report.run.found = run.value("found", size_t{0});
+    report.run.partial = run.value("partial", false);
     report.run.wall_s = run.at("wall_s");
     report.run.jobs = run.at("jobs");
     report.notes = json.at("notes").get<std::vector<std::string>>();
+    report.fail_on_missing = json.value("fail_on_missing", false);
+    for (const Json& item : json.value("missing", Json::array())) {
+      report.missing.push_back({item.at("key"), item.at("last_run"), item.at("when")});
+    }
     for (const Json& item : json.at("cases")) report.cases.push_back(CaseOf(item));
     return report;
   } catch (const Json::exception&) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 namespace mbv {
 namespace {
@@ -57,6 +58,21 @@ const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& res
   return nullptr;
 }
 
+std::vector<const std::pair<const std::string, MetricValue>*> FailedChecks(
+    const CaseResult& result) {
+  std::vector<const std::pair<const std::string, MetricValue>*> failed;
+  for (const auto& check : result.metrics) {
+    if (check.second.limit && !check.second.pass) failed.push_back(&check);
+  }
+  const auto excess = [](const auto* check) {
+    const double ratio = check->second.value / *check->second.limit;
+    return std::isfinite(ratio) ? ratio : HUGE_VAL;
+  };
+  std::stable_sort(failed.begin(), failed.end(),
+                   [&](const auto* a, const auto* b) { return excess(a) > excess(b); });
+  return failed;
+}
+
 Counts CountCases(const RegressReport& report) {
   Counts counts;
   for (const CaseResult& result : report.cases) {
@@ -69,12 +85,13 @@ Counts CountCases(const RegressReport& report) {
     counts.must_fail += fine && result.expected.verdict != "agree" ? 1 : 0;
     counts.drifted += result.drifts.empty() ? 0 : 1;
   }
+  counts.missing = static_cast<int>(report.missing.size());
   return counts;
 }
 
 int ExitCodeOf(const RegressReport& report) {
   static constexpr std::array<int, 4> kBadness = {0, 1, 3, 2};  // of exit codes 0 … 3
-  int worst = 0;
+  int worst = report.fail_on_missing && !report.missing.empty() ? 1 : 0;
   for (const CaseResult& result : report.cases) {
     const int code = ExitCodeOf(result.status);
     if (kBadness[static_cast<size_t>(code)] > kBadness[static_cast<size_t>(worst)]) worst = code;

@@ -35,6 +35,8 @@ struct MetricValue {
   double value = kNan;
   std::optional<double> limit;  ///< empty: measured, not judged
   bool pass = false;
+  std::string channel = {};  ///< where the value was found: a signal, an entry; "" if unknown
+  double time_s = kNan;      ///< and when
 };
 
 struct Unmeasured {
@@ -55,6 +57,21 @@ struct Drift {
   double baseline = kNan;  ///< median of the good runs before
   long since_run = 0;      ///< first run of the unbroken stretch; 0: this one
   std::string since;       ///< that run's date, label and versions
+};
+
+/// What the history knows of a scenario that failed.
+struct PastOfFailure {
+  long runs = 0;      ///< earlier runs that have it
+  long good_run = 0;  ///< the newest of them in which it was as expected; 0: none
+  std::string when;   ///< that run's date, label and build
+  std::map<std::string, double> values;  ///< then, of the checks that fail now
+};
+
+/// A scenario that an earlier run had and this one should have had.
+struct MissingCase {
+  std::string key;
+  long last_run = 0;  ///< the newest run that has it
+  std::string when;   ///< its date, label and build
 };
 
 struct CaseResult {
@@ -84,6 +101,7 @@ struct CaseResult {
   std::string log_tail;  ///< last lines the worker printed; only of failed scenarios
   bool kept = false;     ///< taken over from the interrupted run (--resume)
 
+  PastOfFailure past;          ///< filled from the history, of failed scenarios
   std::vector<Drift> drifts;   ///< filled from the history
   std::vector<double> course;  ///< key metric of the last runs, oldest first, this one included
 
@@ -97,6 +115,10 @@ struct CaseResult {
 /// The first of these that was measured; null if nothing of the kind was compared.
 [[nodiscard]] const std::pair<const std::string, MetricValue>* KeyMetric(const CaseResult& result);
 
+/// Failed checks with a limit, worst first (value over limit; a value that is no number is worst).
+[[nodiscard]] std::vector<const std::pair<const std::string, MetricValue>*> FailedChecks(
+    const CaseResult& result);
+
 /// A whole regression run.
 struct RunInfo {
   std::string uid;                        ///< the same run everywhere, resumed or not
@@ -105,25 +127,31 @@ struct RunInfo {
   std::string label;                      ///< free text, e.g. a commit
   std::string host, program;              ///< program: version and fingerprint
   std::string shard;                      ///< "2/3"; "" for all
+  /// Beginnings of names ("spr_tripod/", "" for all) of which it runs every scenario there is.
+  std::vector<std::string> covers;
+  size_t found = 0;      ///< scenarios of all shards together; 0: unknown
+  bool partial = false;  ///< joined although something is missing
   double wall_s = 0.0;
   int jobs = 1;
 };
 
 struct RegressReport {
   RunInfo run;
-  std::vector<CaseResult> cases;   ///< sorted by key
-  std::vector<std::string> notes;  ///< trouble with history, pictures, …
+  std::vector<CaseResult> cases;     ///< sorted by key
+  std::vector<std::string> notes;    ///< trouble with history, pictures, …
+  std::vector<MissingCase> missing;  ///< filled from the history
+  bool fail_on_missing = false;      ///< a missing scenario is not as expected
 };
 
 /// "ran", "compared" and "verified" are counted separately.
 struct Counts {
   int total = 0, as_expected = 0, ran = 0, compared = 0, verified = 0;
   int must_fail = 0;  ///< as expected, and what is expected is not "agree"
-  int drifted = 0;
+  int drifted = 0, missing = 0;
 };
 [[nodiscard]] Counts CountCases(const RegressReport& report);
 
-/// Worst of all scenarios, in the order 2, 3, 1, 0.
+/// Worst of all scenarios, in the order 2, 3, 1, 0; missing ones count as 1 if they are to.
 [[nodiscard]] int ExitCodeOf(const RegressReport& report);
 
 /// regress.json and the state files of single scenarios.

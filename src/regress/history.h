@@ -21,7 +21,9 @@ struct HistoryOptions {
 };
 
 /// Judges a run against the history and appends it; an entry of the same uid is replaced. Fills the
-/// report's run id, drifts and courses. `goldens` by scenario key. "" or what went wrong; then
+/// report's run id, drifts, courses, the past of what failed, and what is missing: scenarios that
+/// the run covers and does not have, but an earlier run had (of runs that do not say what they
+/// cover, the newest one counts). `goldens` by scenario key. "" or what went wrong; then
 /// nothing was appended.
 [[nodiscard]] std::string AppendRun(const std::string& path,
                                     const std::map<std::string, GoldenTraces>& goldens,
@@ -44,7 +46,8 @@ struct HistoryText {
                                       const std::string& run_b);
 /// One line per run, scenario and metric.
 [[nodiscard]] HistoryText HistoryCsv(const std::string& path);
-/// Takes what run `run` measured as right: baselines start there. `key` "" means all scenarios.
+/// Takes what run `run` measured as right: baselines start there; what was missing in it is meant
+/// to be. `key` "" means all scenarios.
 [[nodiscard]] HistoryText AcceptRun(const std::string& path, const std::string& run,
                                     const std::string& key, const std::string& note);
 

@@ -14,7 +14,7 @@ CREATE TABLE IF NOT EXISTS run(
   label TEXT NOT NULL, host TEXT NOT NULL, program TEXT NOT NULL, shard TEXT NOT NULL,
   exit_code INTEGER NOT NULL, total INTEGER NOT NULL, as_expected INTEGER NOT NULL,
   ran INTEGER NOT NULL, compared INTEGER NOT NULL, verified INTEGER NOT NULL,
-  drifted INTEGER NOT NULL);
+  drifted INTEGER NOT NULL, covers TEXT);
 CREATE TABLE IF NOT EXISTS scenario(
   id INTEGER PRIMARY KEY, key TEXT NOT NULL UNIQUE);
 CREATE TABLE IF NOT EXISTS result(
@@ -64,7 +64,7 @@ bool HasTables(Database* database) {
 std::string CheckSchema(const std::string& path, Database* database) {
   const long version = Version(database);
   if (!database->ok()) return database->trouble();
-  if (version == kHistoryVersion || version == 1) return "";
+  if (version >= 1 && version <= kHistoryVersion) return "";
   return version == 0 ? fmt::format("history {}: holds no runs", path)
                       : fmt::format("history {}: has schema {}, this program knows {}", path,
                                     version, kHistoryVersion);
@@ -84,6 +84,7 @@ std::string PrepareSchema(const std::string& path, Database* database) {
   if (std::string trouble = CheckWritable(path, database); !trouble.empty()) return trouble;
   database->Run(kTables);
   if (version == 1) database->Run("ALTER TABLE run ADD COLUMN uid TEXT");
+  if (version == 1 || version == 2) database->Run("ALTER TABLE run ADD COLUMN covers TEXT");
   database->Run("CREATE UNIQUE INDEX IF NOT EXISTS run_uid ON run(uid)");
   database->Run(fmt::format("PRAGMA user_version = {}", kHistoryVersion));
   return database->trouble();

@@ -8,7 +8,8 @@
 
 namespace mbv {
 
-inline constexpr int kHistoryVersion = 2;  ///< PRAGMA user_version; 1 had no uid of runs
+/// PRAGMA user_version; 1 had no uid of runs, 2 not what they cover.
+inline constexpr int kHistoryVersion = 3;
 
 /// Makes the tables where they are missing, or what an older file lacks; a newer program's file and
 /// a file with other tables are trouble. Call inside a write

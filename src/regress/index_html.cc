@@ -6,56 +6,12 @@
 
 #include "core/markup.h"
 #include "core/sha256.h"
+#include "regress/index_assets.h"
 #include "regress/summaries.h"
+#include "regress/trouble_text.h"
 
 namespace mbv {
 namespace {
-
-constexpr const char* kStyle = R"css(
-:root{color-scheme:light dark;--text:#1b1f24;--soft:#57606a;--back:#fff;--line:#d0d7de;--head:#f6f8fa;
---good:#1a7f37;--bad:#cf222e;--warn:#9a6700;--link:#0550ae}
-@media (prefers-color-scheme:dark){:root{--text:#e6edf3;--soft:#9aa4af;--back:#0d1117;--line:#30363d;
---head:#161b22;--good:#3fb950;--bad:#ff7b72;--warn:#d29922;--link:#79c0ff}}
-body{margin:1.5rem auto;max-width:100rem;padding:0 1rem;background:var(--back);color:var(--text);
-font:15px/1.45 system-ui,sans-serif}
-h1{font-size:1.5rem;margin:0}p{margin:.4rem 0}a{color:var(--link)}.soft{color:var(--soft)}
-.counts{font-size:1.1rem}.scroll{overflow-x:auto}
-form{display:flex;flex-wrap:wrap;gap:.75rem;align-items:end;margin:1rem 0}
-input,select{font:inherit;padding:.3rem .5rem;border:1px solid var(--line);border-radius:6px;
-background:var(--back);color:inherit}label{display:flex;flex-direction:column;font-size:.85rem}
-table{border-collapse:collapse;width:100%}th,td{border-top:1px solid var(--line);padding:.45rem .6rem;
-text-align:left;vertical-align:top}thead th{background:var(--head);position:sticky;top:0}
-th button{all:unset;cursor:pointer;font-weight:600}th button:focus-visible{outline:2px solid var(--link)}
-th[aria-sort=ascending] button::after{content:" ▲"}th[aria-sort=descending] button::after{content:" ▼"}
-tbody th{font-weight:600;min-width:14rem;overflow-wrap:anywhere}th .soft,caption{font-weight:400}caption{text-align:left}
-.notes{min-width:12rem;overflow-wrap:anywhere}.notes p{margin:0 0 .3rem}.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-.good{color:var(--good)}.bad{color:var(--bad)}.warn{color:var(--warn)}.word{font-weight:600}
-img{display:block;border-radius:4px;max-width:144px;height:auto}svg{display:block}
-.curve{fill:none;stroke:var(--link);stroke-width:1.5}.limit{stroke:var(--bad);stroke-dasharray:3 3}
-.now{fill:var(--link)}pre{white-space:pre-wrap;font-size:.8rem;margin:.3rem 0}
-)css";
-
-constexpr const char* kScript = R"js(
-'use strict';
-const body=document.querySelector('tbody'),rows=[...body.rows];
-const find=document.getElementById('find'),kind=document.getElementById('kind'),
-shown=document.getElementById('shown');
-function filter(){let n=0;const words=find.value.toLowerCase().split(/\s+/);
-for(const r of rows){const text=r.textContent.toLowerCase();
-r.hidden=!(words.every(w=>text.includes(w))&&(!kind.value||r.dataset.kind===kind.value));n+=r.hidden?0:1;}
-shown.textContent=n+' of '+rows.length+' scenarios';}
-find.addEventListener('input',filter);kind.addEventListener('change',filter);
-document.querySelector('form').addEventListener('submit',e=>e.preventDefault());
-document.querySelectorAll('thead button').forEach(button=>button.addEventListener('click',()=>{
-const th=button.parentElement,i=th.cellIndex,up=th.getAttribute('aria-sort')!=='ascending';
-const value=r=>{const s=r.cells[i].dataset.sort;return s===undefined?r.cells[i].textContent:s===''?Infinity:+s;};
-document.querySelectorAll('thead th').forEach(h=>h.removeAttribute('aria-sort'));
-th.setAttribute('aria-sort',up?'ascending':'descending');
-rows.sort((a,b)=>{const x=value(a),y=value(b);
-const c=typeof x==='number'?(x<y?-1:x>y?1:0):x.localeCompare(y);return up?c:-c;});
-rows.forEach(r=>body.append(r));}));
-filter();
-)js";
 
 // Kind for the filter and colour: "bad", "warn" or "good".
 const char* KindOf(const CaseResult& result) {
@@ -99,14 +55,30 @@ std::string Sparkline(const CaseResult& result) {
       std::pow(10.0, levels.back()), limit, points, x, y(levels.back()));
 }
 
+constexpr size_t kChecksOfACase = 5, kCasesInABox = 30;
+
+// Where a case's row is: a name without anything that an address would encode.
+std::string RowId(const CaseResult& result) {
+  std::string id = EncodeLink(result.key);
+  std::replace(id.begin(), id.end(), '%', '~');
+  return "case/" + id;
+}
+
+std::string ListOf(const std::vector<std::string>& texts) {
+  std::string html;
+  for (const std::string& text : texts) html += "<li>" + EscapeXml(text) + "</li>";
+  return html.empty() ? "" : "<ul>" + html + "</ul>";
+}
+
 // What a reader should know beyond the numbers.
 std::string Notes(const CaseResult& result) {
   std::string text;
-  if (result.failed()) text += "<p class=\"bad\">" + EscapeXml(result.reason) + "</p>";
-  for (const Drift& drift : result.drifts) {
-    text += "<p class=\"warn\">" + EscapeXml(drift.text);
-    if (!drift.since.empty()) text += "; since " + EscapeXml(drift.since);
-    text += "</p>";
+  if (result.failed()) {
+    text += "<p class=\"bad\">" + EscapeXml(result.reason) + "</p>" +
+            ListOf(FailureTexts(result, kChecksOfACase));
+  }
+  if (!result.drifts.empty()) {
+    text += "<p class=\"warn\">" + EscapeXml(DriftLine(result)) + "</p>";
   }
   if (!result.failed() && !result.verified) {
     text += "<p class=\"soft\">" + EscapeXml(result.reason) + "</p>";
@@ -120,8 +92,8 @@ std::string Notes(const CaseResult& result) {
     text += "</ul></details>";
   }
   if (!result.log_tail.empty()) {
-    text += "<details><summary>last output</summary><pre>" + EscapeXml(result.log_tail) +
-            "</pre></details>";
+    text += "<details><summary>last output</summary><pre tabindex=\"0\">" +
+            EscapeXml(result.log_tail) + "</pre></details>";
   }
   return text;
 }
@@ -134,7 +106,8 @@ std::string Links(const CaseResult& result) {
   return text + fmt::format("<a href=\"logs/{}.txt\">log</a>", key);
 }
 
-std::string Row(const CaseResult& result, const std::string& thumbnail) {
+// `severity` is the row's place in the usual order.
+std::string Row(const CaseResult& result, const std::string& thumbnail, size_t severity) {
   const auto* key = KeyMetric(result);
   const std::string picture = thumbnail.empty()
                                   ? ""
@@ -142,24 +115,72 @@ std::string Row(const CaseResult& result, const std::string& thumbnail) {
                                         "<img src=\"{}\" alt=\"Mechanism at the first snapshot\" "
                                         "loading=\"lazy\">",
                                         EscapeXml(thumbnail));
-  std::string row = fmt::format("<tr data-kind=\"{}\"><td>{}</td>", KindOf(result), picture);
+  std::string row = fmt::format(
+      "<tr id=\"{}\" data-kind=\"{}\"{}><td class=\"picture\">{}</td>", EscapeXml(RowId(result)),
+      KindOf(result), result.expected.verdict == "agree" ? "" : " data-must-fail", picture);
   row += fmt::format("<th scope=\"row\">{}<br><span class=\"soft\">{}</span><br>{}</th>",
                      EscapeXml(result.key), EscapeXml(result.description), Links(result));
-  row += fmt::format("<td class=\"word {}\">{}</td>", KindOf(result), EscapeXml(WordOf(result)));
-  row += fmt::format("<td class=\"n\" data-sort=\"{}\">{}</td>",
+  row += fmt::format("<td class=\"word {}\" data-sort=\"{}\">{}</td>", KindOf(result), severity,
+                     EscapeXml(WordOf(result)));
+  row += fmt::format("<td class=\"n\" data-label=\"error\" data-sort=\"{}\">{}</td>",
                      key == nullptr || !std::isfinite(key->second.value)
                          ? ""
                          : fmt::format("{:.6g}", key->second.value),
                      key == nullptr ? "–" : fmt::format("{:.1e}", key->second.value));
   row += fmt::format(
-      "<td class=\"n\" data-sort=\"{0}\">{0}</td>",
+      "<td class=\"n\" data-label=\"limit\" data-sort=\"{0}\">{0}</td>",
       key == nullptr || !key->second.limit ? "" : fmt::format("{:.1e}", *key->second.limit));
-  row += "<td>" + Sparkline(result) + "</td><td class=\"notes\">" + Notes(result) + "</td>";
-  const double mib = static_cast<double>(result.cost.peak_kib) / 1024.0;
-  for (const double value : {result.cost.wall_s, result.cost.cpu_s}) {
-    row += fmt::format("<td class=\"n\" data-sort=\"{0:.3f}\">{0:.1f}</td>", value);
+  row += "<td class=\"course\">" + Sparkline(result) + "</td><td class=\"notes\">" + Notes(result) +
+         "</td>";
+  for (const auto& [label, value] :
+       {std::pair{"wall [s]", result.cost.wall_s}, std::pair{"CPU [s]", result.cost.cpu_s}}) {
+    row += fmt::format("<td class=\"n\" data-label=\"{0}\" data-sort=\"{1:.3f}\">{1:.1f}</td>",
+                       label, value);
   }
-  return row + fmt::format("<td class=\"n\" data-sort=\"{0:.1f}\">{0:.0f}</td></tr>\n", mib);
+  return row + fmt::format(
+                   "<td class=\"n\" data-label=\"memory [MiB]\" data-sort=\"{0:.1f}\">{0:.0f}</td>"
+                   "</tr>\n",
+                   static_cast<double>(result.cost.peak_kib) / 1024.0);
+}
+
+// A list with a title; what is beyond kCasesInABox is folded away.
+std::string Box(const char* kind, const char* id, const std::string& title,
+                const std::vector<std::string>& items) {
+  if (items.empty()) return "";
+  std::string html = fmt::format(
+      "<section class=\"box {0}\" aria-labelledby=\"{1}\"><h2 id=\"{1}\">{2} {3}</h2>\n"
+      "<ul>",
+      kind, id, items.size(), title);
+  for (size_t i = 0; i < items.size(); ++i) {
+    if (i == kCasesInABox) {
+      html += fmt::format("</ul><details><summary>{} more</summary><ul>", items.size() - i);
+    }
+    html += "<li>" + items[i] + "</li>\n";
+  }
+  return html + (items.size() > kCasesInABox ? "</ul></details>" : "</ul>") + "</section>\n";
+}
+
+// What went wrong, what is gone, what drifted: each in one place, the worst first.
+std::string Boxes(const RegressReport& report, const std::vector<const CaseResult*>& cases) {
+  std::vector<std::string> failed, missing, drifted;
+  for (const CaseResult* result : cases) {
+    const std::string link =
+        fmt::format("<a href=\"#{}\">{}</a>", EscapeXml(RowId(*result)), EscapeXml(result->key));
+    if (result->failed()) {
+      failed.push_back(fmt::format("{} <span class=\"word bad\">{}</span>: {}{}", link,
+                                   EscapeXml(WordOf(*result)), EscapeXml(result->reason),
+                                   ListOf(FailureTexts(*result, kChecksOfACase))));
+    } else if (!result->drifts.empty()) {
+      drifted.push_back(link + ": " + EscapeXml(DriftLine(*result)));
+    }
+  }
+  for (const MissingCase& item : report.missing) {
+    missing.push_back(
+        fmt::format("<b>{}</b>: {}", EscapeXml(item.key), EscapeXml(MissingText(item))));
+  }
+  return Box("bad", "failed", "not as expected", failed) +
+         Box(report.fail_on_missing ? "bad" : "warn", "missing", "missing", missing) +
+         Box("warn", "drifted", "drifted", drifted);
 }
 
 std::string Head(const RegressReport& report) {
@@ -183,15 +204,21 @@ std::string Head(const RegressReport& report) {
 constexpr const char* kControls = R"html(<form role="search">
 <label>Find<input id="find" type="search" placeholder="model, scenario, text"></label>
 <label>Show<select id="kind"><option value="">all</option><option value="bad">not as expected</option>
-<option value="warn">drift</option><option value="good">as expected</option></select></label>
+<option value="warn">drift</option><option value="good">as expected</option>
+<option value="must_fail">must fail</option></select></label>
 <span id="shown" class="soft" role="status"></span></form>
-<div class="scroll"><table><caption class="soft">Error: drive forces, RMS over all drives of one
+<table><caption class="soft">Error: drive forces, RMS over all drives of one
 unit; the worst entry of a stiffness; the largest of an output's place [m] in a
-free motion; simulated against analytic where both ran. Click a column to sort.</caption><thead><tr>
-<td></td><th scope="col"><button>scenario</button></th><th scope="col"><button>result</button></th>
-<th scope="col"><button>error</button></th><th scope="col"><button>limit</button></th>
-<th scope="col">last runs</th><th scope="col">notes</th><th scope="col"><button>wall [s]</button></th>
-<th scope="col"><button>CPU [s]</button></th><th scope="col"><button>memory [MiB]</button></th>
+free motion; simulated against analytic where both ran. The worst results come first; a column's
+name sorts by it.</caption><thead><tr>
+<td class="plain"></td><th scope="col" data-key="scenario"><button>scenario</button></th>
+<th scope="col" data-key="result" aria-sort="ascending"><button>result</button></th>
+<th scope="col" data-key="error"><button>error</button></th>
+<th scope="col" data-key="limit"><button>limit</button></th>
+<th scope="col" class="plain">last runs</th><th scope="col" class="plain">notes</th>
+<th scope="col" data-key="wall"><button>wall [s]</button></th>
+<th scope="col" data-key="cpu"><button>CPU [s]</button></th>
+<th scope="col" data-key="memory"><button>memory [MiB]</button></th>
 </tr></thead><tbody>
 )html";
 
@@ -199,19 +226,21 @@ free motion; simulated against analytic where both ran. Click a column to sort.<
 
 std::string ToIndexHtml(const RegressReport& report,
                         const std::map<std::string, std::string>& thumbnails) {
+  const std::vector<const CaseResult*> cases = BySeverity(report);
   std::string html = fmt::format(
       "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
       "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
       "style-src {}; script-src {}\">"
-      "<title>mbverify regression {}</title><style>{}</style></head><body>\n",
-      CspHash(kStyle), CspHash(kScript), EscapeXml(report.run.started_utc), kStyle);
-  html += kIndexMain + Head(report) + kControls;
-  for (const CaseResult& result : report.cases) {
-    const auto thumbnail = thumbnails.find(result.key);
-    html += Row(result, thumbnail == thumbnails.end() ? "" : thumbnail->second);
+      "<title>mbverify regression {}: {}</title><style>{}</style></head><body>\n",
+      CspHash(kIndexStyle), CspHash(kIndexScript), EscapeXml(report.run.started_utc),
+      ExitCodeOf(report) == 0 ? "all as expected" : "not as expected", kIndexStyle);
+  html += kIndexMain + Head(report) + Boxes(report, cases) + kControls;
+  for (size_t i = 0; i < cases.size(); ++i) {
+    const auto thumbnail = thumbnails.find(cases[i]->key);
+    html += Row(*cases[i], thumbnail == thumbnails.end() ? "" : thumbnail->second, i);
   }
-  return html + "</tbody></table></div>\n</main>\n<script>" + kScript + "</script></body></html>\n";
+  return html + "</tbody></table>\n</main>\n<script>" + kIndexScript + "</script></body></html>\n";
 }
 
 }  // namespace mbv

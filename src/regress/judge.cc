@@ -53,6 +53,8 @@ SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
     for (const Json& check : Part(json, list)) {
       MetricValue& metric = result->metrics[Word(check, "name")];
       metric.value = Number(check, "value");
+      metric.channel = Word(check, "channel");
+      metric.time_s = Number(check, "time_s");
       if (!check.contains("limit")) continue;
       metric.limit = Number(check, "limit");
       metric.pass = check.value("pass", false);

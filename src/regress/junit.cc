@@ -3,6 +3,7 @@
 #include <map>
 
 #include "regress/summaries.h"
+#include "regress/trouble_text.h"
 
 namespace mbv {
 namespace {
@@ -18,6 +19,8 @@ bool IsError(CaseStatus status) {
   return status != CaseStatus::kUnexpected && status != CaseStatus::kAsExpected;
 }
 
+constexpr size_t kChecksOfATest = 20;  // named in a failure's text
+
 struct Totals {
   int tests = 0, failures = 0, errors = 0;
   double time_s = 0.0;
@@ -27,6 +30,10 @@ struct Totals {
     failures += result.status == CaseStatus::kUnexpected ? 1 : 0;
     errors += IsError(result.status) ? 1 : 0;
     time_s += result.cost.wall_s;
+  }
+  void AddMissing(bool fails) {
+    ++tests;
+    failures += fails ? 1 : 0;
   }
   [[nodiscard]] std::string Attributes() const {
     return fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\"", tests,
@@ -41,10 +48,7 @@ std::string Output(const CaseResult& result) {
   if (const std::string key = KeyText(result); !key.empty()) {
     text += KeyTitle(result) + ": " + key + "\n";
   }
-  for (const Drift& drift : result.drifts) {
-    text += "drift: " + drift.text + "\n";
-    if (!drift.since.empty()) text += "  since " + drift.since + "\n";
-  }
+  if (!result.drifts.empty()) text += "drift: " + DriftLine(result) + "\n";
   for (const Unmeasured& item : result.not_compared) {
     text += fmt::format("not compared: {}: {}\n", item.what, item.why);
   }
@@ -58,12 +62,24 @@ std::string TestCase(const CaseResult& result, const std::string& suite, const s
                                  EscapeXml(test), EscapeXml(suite), result.cost.wall_s);
   if (result.failed()) {
     const char* element = IsError(result.status) ? "error" : "failure";
-    text +=
-        fmt::format("      <{0} message=\"{1}\" type=\"{2}\">{1}\n{3}</{0}>\n", element,
-                    EscapeXml(result.reason), ToText(result.status), EscapeXml(result.log_tail));
+    std::string body = result.reason + "\n";
+    for (const std::string& line : FailureTexts(result, kChecksOfATest)) body += line + "\n";
+    text += fmt::format("      <{0} message=\"{1}\" type=\"{2}\">{3}{4}</{0}>\n", element,
+                        EscapeXml(FailureLine(result)), ToText(result.status), EscapeXml(body),
+                        EscapeXml(result.log_tail));
   }
   text += fmt::format("      <system-out>{}</system-out>\n", EscapeXml(Output(result)));
   return text + "    </testcase>\n";
+}
+
+// Skipped, or a failure if the run was asked to fail then.
+std::string MissingTest(const MissingCase& missing, bool fails, const std::string& suite,
+                        const std::string& test) {
+  const std::string text = EscapeXml(MissingText(missing));
+  return fmt::format(
+      "    <testcase name=\"{}\" classname=\"{}\" time=\"0.000\">\n      <{} message=\"{}\" "
+      "type=\"missing\"/>\n    </testcase>\n",
+      EscapeXml(test), EscapeXml(suite), fails ? "failure" : "skipped", text);
 }
 
 }  // namespace
@@ -77,6 +93,13 @@ std::string ToJUnit(const RegressReport& report) {
     totals.Add(result);
     all.Add(result);
     text += TestCase(result, suite, test);
+  }
+  for (const MissingCase& missing : report.missing) {
+    const auto [suite, test] = SplitKey(missing.key);
+    auto& [totals, text] = suites[suite];
+    totals.AddMissing(report.fail_on_missing);
+    all.AddMissing(report.fail_on_missing);
+    text += MissingTest(missing, report.fail_on_missing, suite, test);
   }
   std::string xml = fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{} {}>\n", kJUnitRoot,
                                 all.Attributes());

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include "regress/summaries.h"
+#include "regress/trouble_text.h"
 
 namespace mbv {
 namespace {
@@ -18,8 +19,8 @@ std::string Plain(const std::string& text) {
 }
 
 // Job pages take 1 MiB in all (GitHub's limit of a step's summary): every part has its share.
-constexpr size_t kFailedBytes = 450'000, kDriftBytes = 150'000, kNoteBytes = 30'000,
-                 kGapBytes = 100'000, kTableBytes = 250'000;
+constexpr size_t kFailedBytes = 430'000, kDriftBytes = 130'000, kMissingBytes = 60'000,
+                 kNoteBytes = 30'000, kGapBytes = 90'000, kTableBytes = 240'000;
 constexpr size_t kLineBytes = 2'000;
 
 // Lines up to a number of bytes; then how many are left out.
@@ -50,6 +51,8 @@ class Lines {
   std::string rest_, text_;
 };
 
+constexpr size_t kChecksOfALine = 3;
+
 constexpr const char* kMore = "* … and {} more: see index.html\n";
 
 std::string Row(const CaseResult& result) {
@@ -63,10 +66,14 @@ std::string Row(const CaseResult& result) {
 
 std::string Failed(const RegressReport& report) {
   Lines lines(kFailedBytes, kMore);
-  for (const CaseResult& result : report.cases) {
-    if (!result.failed()) continue;
-    lines.Add(fmt::format("* **{}**: {}: {}\n", Plain(result.key), Plain(WordOf(result)),
-                          Plain(result.reason)));
+  for (const CaseResult* result : BySeverity(report)) {
+    if (!result->failed()) continue;
+    std::string item = fmt::format("* **{}**: {}: {}\n", Plain(result->key), Plain(WordOf(*result)),
+                                   Plain(result->reason));
+    for (const std::string& text : FailureTexts(*result, kChecksOfALine)) {
+      item += "  * " + Plain(text) + "\n";
+    }
+    lines.Add(item);
   }
   const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Not as expected\n\n" + text;
@@ -74,14 +81,22 @@ std::string Failed(const RegressReport& report) {
 
 std::string Drifted(const RegressReport& report) {
   Lines lines(kDriftBytes, kMore);
-  for (const CaseResult& result : report.cases) {
-    for (const Drift& drift : result.drifts) {
-      const std::string since = drift.since.empty() ? "" : "; since " + Plain(drift.since);
-      lines.Add(fmt::format("* **{}**: {}{}\n", Plain(result.key), Plain(drift.text), since));
-    }
+  for (const CaseResult* result : BySeverity(report)) {
+    if (result->drifts.empty()) continue;
+    lines.Add(fmt::format("* **{}**: {}\n", Plain(result->key), Plain(DriftLine(*result))));
   }
   const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Drift\n\n" + text;
+}
+
+std::string Missing(const RegressReport& report) {
+  Lines lines(kMissingBytes, kMore);
+  for (const MissingCase& missing : report.missing) {
+    lines.Add(fmt::format("* {}**{}**: {}\n", report.fail_on_missing ? "❌ " : "",
+                          Plain(missing.key), Plain(MissingText(missing))));
+  }
+  const std::string text = lines.Text();
+  return text.empty() ? "" : "\n### Missing\n\n" + text;
 }
 
 std::string NotCompared(const RegressReport& report) {
@@ -110,7 +125,7 @@ std::string ToMarkdown(const RegressReport& report) {
       Plain(report.run.program), report.run.label.empty() ? "" : ", " + Plain(report.run.label),
       report.run.shard.empty() ? "" : ", shard " + report.run.shard,
       report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
-  text += Failed(report) + Drifted(report);
+  text += Failed(report) + Missing(report) + Drifted(report);
   Lines notes(kNoteBytes, "\nNote: and {} more\n");
   for (const std::string& note : report.notes) notes.Add("\nNote: " + Plain(note) + "\n");
   text += notes.Text() + NotCompared(report);

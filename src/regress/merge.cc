@@ -12,6 +12,7 @@
 #include "regress/files.h"
 #include "regress/finish.h"
 #include "regress/history.h"
+#include "regress/one_night.h"
 
 namespace mbv {
 namespace {
@@ -40,6 +41,7 @@ class Merger {
     for (const std::string& from : folders) {
       if (outcome_.trouble.empty()) outcome_.trouble = Read(from);
     }
+    if (outcome_.trouble.empty()) CheckParts();
     if (outcome_.trouble.empty()) outcome_.trouble = Claim();
     for (const auto& [key, from] : from_) {
       if (outcome_.trouble.empty()) outcome_.trouble = Copy(key, from);
@@ -50,6 +52,7 @@ class Merger {
     Fingerprint fingerprint;
     for (const std::string& uid : uids_) fingerprint.Add(uid);
     report().run.uid = fmt::format("merge-{}", fingerprint.Text());
+    report().fail_on_missing = options_.fail_on_missing;
     FinishNight(options_, folder_, &outcome_);
     return std::move(outcome_);
   }
@@ -71,7 +74,25 @@ class Merger {
     return trouble;
   }
 
-  void JoinInfo(const std::string& from, const RunInfo& part) {
+  // Whether the folders are all of one night; else with --partial a note on every summary.
+  void CheckParts() {
+    const PartTroubles troubles = FindPartTroubles(parts_, unfinished_);
+    if (troubles.empty()) return;
+    if (options_.partial && !parts_.empty()) {
+      report().run.partial = true;
+      for (const auto* list : {&troubles.missing, &troubles.foreign}) {
+        report().notes.insert(report().notes.end(), list->begin(), list->end());
+      }
+      return;
+    }
+    for (const auto* list : {&troubles.foreign, &troubles.missing}) {
+      for (const std::string& text : *list) AddTrouble(text, &outcome_);
+    }
+    AddTrouble("nothing was joined; --partial joins what there is", &outcome_);
+    outcome_.exit_code = troubles.foreign.empty() ? 3 : 2;
+  }
+
+  void JoinInfo(const RunInfo& part) {
     RunInfo& run = report().run;
     uids_.insert(part.uid.empty() ? part.started_utc + part.host + part.shard : part.uid);
     if (uids_.size() == 1 && report().cases.empty()) {
@@ -80,13 +101,11 @@ class Merger {
       run.shard.clear();
       return;
     }
+    if (part.covers != run.covers) run.covers.clear();
     run.started_utc = std::min(run.started_utc, part.started_utc);
     run.finished_utc = std::max(run.finished_utc, part.finished_utc);
     run.wall_s = std::max(run.wall_s, part.wall_s);  // shards run side by side
     run.jobs += part.jobs;
-    if (part.program != run.program) {
-      report().notes.push_back(fmt::format("{} was made by {}", from, part.program));
-    }
   }
 
   // Adds one run's cases; "" or what is wrong with it. What it says is a stranger's.
@@ -104,10 +123,14 @@ class Merger {
       return fmt::format("{}: error: is read for the merge; choose another output", output);
     }
     const auto text = ReadWholeFile(fs::path(from) / "regress.json");
-    if (!text) return fmt::format("{}: no regress.json in this folder", from);
+    if (!text) {
+      unfinished_.push_back(from);
+      return "";
+    }
     auto part = ReportFromJson(*text);
     if (!part) return fmt::format("{}: is no regress.json of this version", from);
-    JoinInfo(from, part->run);
+    parts_.push_back({from, part->run, part->cases.size()});
+    JoinInfo(part->run);
     for (const std::string& note : part->notes) report().notes.push_back(note);
     for (CaseResult& result : part->cases) {
       if (!IsPlainPath(result.key)) {
@@ -119,6 +142,7 @@ class Merger {
       }
       result.drifts.clear();  // judged anew against the history given
       result.course.clear();
+      result.past = {};
       report().cases.push_back(std::move(result));
     }
     return ReadScripts(from);
@@ -162,6 +186,8 @@ class Merger {
   std::map<std::string, std::string> from_;     // folder of each key
   std::map<std::string, std::string> scripts_;  // by name
   std::set<std::string> uids_;
+  std::vector<NightPart> parts_;
+  std::vector<std::string> unfinished_;  // folders without a regress.json
 };
 
 }  // namespace

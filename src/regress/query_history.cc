@@ -7,6 +7,7 @@
 #include "regress/files.h"
 #include "regress/history.h"
 #include "regress/history_schema.h"
+#include "regress/missing.h"
 
 namespace mbv {
 namespace {
@@ -155,6 +156,7 @@ HistoryText AcceptRun(const std::string& path, const std::string& run, const std
   Database database(path, Database::Mode::kWrite);
   if (auto trouble = CheckSchema(path, &database); !trouble.empty()) return {"", trouble};
   database.Run("BEGIN IMMEDIATE");
+  if (auto trouble = PrepareSchema(path, &database); !trouble.empty()) return {"", trouble};
   const long id = FindRun(&database, run);
   if (id == 0) return {"", fmt::format("history {}: there is no run '{}'", path, run)};
   Statement insert(
@@ -164,13 +166,24 @@ HistoryText AcceptRun(const std::string& path, const std::string& run, const std
   insert.Bind(UtcNow(), note, id, key, key).Execute();
   Statement count(&database, "SELECT changes()");
   const long accepted = count.Step() ? count.Integer(0) : 0;
-  if (accepted == 0) {
+  long gone = 0;
+  Statement insert_gone(&database,
+                        "INSERT OR REPLACE INTO accepted SELECT id, ?, ?, ? FROM scenario WHERE "
+                        "key = ?");
+  for (const MissingCase& missing : FindMissing(&database, id)) {
+    if (!key.empty() && missing.key != key) continue;
+    insert_gone.Bind(id, UtcNow(), note, missing.key).Execute();
+    ++gone;
+  }
+  if (accepted + gone == 0) {
     return {"", fmt::format("history {}: run {} has no scenario '{}'", path, id, key)};
   }
   database.Run("COMMIT");
-  return {fmt::format("baselines of {} scenario{} start with run {}\n", accepted,
-                      accepted == 1 ? "" : "s", id),
-          database.trouble()};
+  std::string text = fmt::format("baselines of {} scenario{} start with run {}\n", accepted,
+                                 accepted == 1 ? "" : "s", id);
+  if (gone > 0)
+    text += fmt::format("{} missing in it {} meant to be\n", gone, gone == 1 ? "is" : "are");
+  return {text, database.trouble()};
 }
 
 std::map<std::string, double> LastWallTimes(const std::string& path) {

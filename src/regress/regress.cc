@@ -13,6 +13,7 @@
 #include "regress/finish.h"
 #include "regress/history.h"
 #include "regress/judge.h"
+#include "regress/missing.h"
 #include "regress/workers.h"
 
 namespace mbv {
@@ -80,6 +81,9 @@ class Run {
     if (!found.troubles.empty()) return false;
     cases_ = std::move(found.cases);
     unread_ = std::move(found.unread);
+    report().run.covers = CoversOf(options_.paths);
+    report().run.found = cases_.size();
+    report().fail_on_missing = options_.fail_on_missing;
     KeepShard(options_.shard, &cases_);
     outcome_.trouble = FindClash(options_, cases_);
     if (outcome_.trouble.empty()) outcome_.trouble = folder_.Open();
@@ -172,6 +176,7 @@ class Run {
                                       folder_.Staging(i).string()}) {
         job.argv.push_back(word);
       }
+      job.argv.insert(job.argv.end(), {"--kept-audits", folder_.Shared().string()});
       if (!options_.pictures) job.argv.emplace_back("--no-pictures");
       for (const std::string& word : WorkerOptions(cases_[i].key)) job.argv.push_back(word);
       jobs.push_back(std::move(job));

@@ -28,8 +28,10 @@ struct RegressOptions {
   Shard shard;
   bool resume = false;
   bool pictures = true;
-  int jobs = 1;              ///< worker processes at once, >= 1
-  double timeout_s = 300.0;  ///< of one scenario, > 0
+  int jobs = 1;                  ///< worker processes at once, >= 1
+  double timeout_s = 300.0;      ///< of one scenario, > 0
+  bool fail_on_missing = false;  ///< exit code 1 if a scenario of an earlier run is gone
+  bool partial = false;          ///< merge joins what there is
   /// Program and arguments; "run FILE --out DIR" is added, and the options.
   std::vector<std::string> worker = {"/proc/self/exe"};
   /// "{up}" in them is the way from a result's folder to OUT.
@@ -60,8 +62,10 @@ struct RegressOutcome {
 /// Names of scripts that reports share: "report-0123456789abcdef.js".
 [[nodiscard]] bool IsSharedScript(const std::string& name);
 
-/// Joins the folders of shards (or of any runs of different scenarios) into one: result folders are
-/// copied, and all summaries are written as if one run had done it.
+/// Joins the folders of shards into one: result folders are copied, and all summaries are written
+/// as if one run had done it. They must be all shards of one night: exit code 3 if some is missing,
+/// 2 if they are of different nights, labels or programs. RegressOptions::partial joins whatever
+/// runs of different scenarios there are, and notes what is missing.
 [[nodiscard]] RegressOutcome MergeRuns(const std::vector<std::string>& folders,
                                        const RegressOptions& options);
 

@@ -7,6 +7,7 @@
 
 #include "core/markup.h"
 #include "regress/summaries.h"
+#include "regress/trouble_text.h"
 
 namespace mbv {
 namespace {
@@ -32,6 +33,8 @@ size_t SequenceLength(const std::string& text, size_t at) {
                          code == 0xFFFE || code == 0xFFFF || code > 0x10FFFF;
   return forbidden ? 0 : length;
 }
+
+constexpr size_t kChecksOnTerminal = 3;
 
 struct KeyWords {
   std::string_view ending, title, prefix;  // of the metric's name; of the text
@@ -66,6 +69,7 @@ std::string CountsText(const Counts& counts) {
   text += fmt::format(", {} ran, {} compared, {} verified", counts.ran, counts.compared,
                       counts.verified);
   if (counts.drifted > 0) text += fmt::format(", {} drifted", counts.drifted);
+  if (counts.missing > 0) text += fmt::format(", {} missing", counts.missing);
   return text;
 }
 
@@ -97,15 +101,20 @@ std::string KeyText(const CaseResult& result) {
 
 std::string ToSummaryText(const RegressReport& report) {
   std::string text;
-  for (const CaseResult& result : report.cases) {
-    if (!result.failed()) continue;
-    text += fmt::format("{}: {}\n    {}\n", result.key, WordOf(result), result.reason);
-  }
-  for (const CaseResult& result : report.cases) {
-    for (const Drift& drift : result.drifts) {
-      text += fmt::format("{}: drift\n    {}\n", result.key, drift.text);
-      if (!drift.since.empty()) text += fmt::format("    since {}\n", drift.since);
+  const std::vector<const CaseResult*> cases = BySeverity(report);
+  for (const CaseResult* result : cases) {
+    if (!result->failed()) continue;
+    text += fmt::format("{}: {}\n    {}\n", result->key, WordOf(*result), result->reason);
+    for (const std::string& line : FailureTexts(*result, kChecksOnTerminal)) {
+      text += "    " + line + "\n";
     }
+  }
+  for (const MissingCase& missing : report.missing) {
+    text += fmt::format("{}: missing\n    {}\n", missing.key, MissingText(missing));
+  }
+  for (const CaseResult* result : cases) {
+    if (result->drifts.empty()) continue;
+    text += fmt::format("{}: drift\n    {}\n", result->key, DriftLine(*result));
   }
   for (const std::string& note : report.notes) text += "note: " + note + "\n";
   long peak = 0;

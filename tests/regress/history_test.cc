@@ -257,13 +257,92 @@ TEST_F(HistoryTest, FilesOfTheFirstSchemaGoOn) {
     Database database(kFile, Database::Mode::kWrite);
     database.Run("DROP INDEX run_uid");
     database.Run("ALTER TABLE run DROP COLUMN uid");
+    database.Run("ALTER TABLE run DROP COLUMN covers");
     database.Run("PRAGMA user_version = 1");
     ASSERT_EQ(database.trouble(), "");
   }
   EXPECT_EQ(ListRuns(kFile).trouble, "");
   EXPECT_EQ(CheckHistory(kFile), "");
   EXPECT_EQ(Night(2e-9).run.id, 2);
-  EXPECT_EQ(Count("PRAGMA user_version"), 2);
+  EXPECT_EQ(Count("PRAGMA user_version"), 3);
+}
+
+// A night over whole folders, of scenarios that agree.
+RegressReport NightOf(const std::vector<std::string>& keys,
+                      const std::vector<std::string>& covers = {""}) {
+  std::vector<CaseResult> cases;
+  for (const std::string& key : keys) cases.push_back(AgreeingCase(key, 1e-9));
+  RegressReport report = OneRun(cases);
+  report.run.covers = covers;
+  EXPECT_EQ(AppendRun(kFile, {}, &report), "");
+  return report;
+}
+
+std::vector<std::string> MissingOf(const RegressReport& report) {
+  std::vector<std::string> keys;
+  for (const MissingCase& missing : report.missing) keys.push_back(missing.key);
+  return keys;
+}
+
+using Keys = std::vector<std::string>;
+
+TEST_F(HistoryTest, AScenarioThatIsGoneIsMissingUntilItIsBack) {
+  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y", "b/z"})), Keys{});
+  const RegressReport second = NightOf({"a/x", "b/z"});
+  ASSERT_EQ(MissingOf(second), Keys{"a/y"});
+  EXPECT_EQ(second.missing[0].last_run, 1);
+  EXPECT_NE(second.missing[0].when.find("run 1 of 2026-01-31"), std::string::npos);
+  EXPECT_EQ(MissingOf(NightOf({"a/x", "b/z"})), Keys{"a/y"}) << "not forgotten after one night";
+  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y", "b/z"})), Keys{});
+  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y", "b/z"})), Keys{});
+}
+
+TEST_F(HistoryTest, ARunOfAPartMissesNothingElse) {
+  NightOf({"a/x", "a/y", "b/z"});
+  EXPECT_EQ(MissingOf(NightOf({"a/x"}, {"a/"})), Keys{"a/y"});
+  EXPECT_EQ(MissingOf(NightOf({"a/x"}, {})), Keys{}) << "single files";
+  RegressReport shard = OneRun({AgreeingCase("a/x", 1e-9)});
+  shard.run.covers = {""};
+  shard.run.shard = "1/2";
+  ASSERT_EQ(AppendRun(kFile, {}, &shard), "");
+  EXPECT_EQ(MissingOf(shard), Keys{});
+  EXPECT_EQ(MissingOf(NightOf({"a/x", "a/y"})), Keys{"b/z"});
+}
+
+TEST_F(HistoryTest, WhatIsMissingCanBeAccepted) {
+  NightOf({"a/x", "a/y", "b/z"});
+  NightOf({"a/x"});
+  EXPECT_NE(AcceptRun(kFile, "last", "a/none", "").trouble, "");
+  const HistoryText accepted = AcceptRun(kFile, "last", "a/y", "renamed");
+  EXPECT_EQ(accepted.trouble, "");
+  EXPECT_NE(accepted.text.find("1 missing in it is meant to be"), std::string::npos);
+  EXPECT_EQ(MissingOf(NightOf({"a/x"})), Keys{"b/z"});
+  ASSERT_EQ(AcceptRun(kFile, "last", "", "").trouble, "");
+  EXPECT_EQ(MissingOf(NightOf({"a/x"})), Keys{});
+  NightOf({"a/x", "a/y"});
+  EXPECT_EQ(MissingOf(NightOf({"a/x"})), Keys{"a/y"}) << "it came back, and went again";
+}
+
+TEST_F(HistoryTest, AFailureTellsWhenItWasLastAsExpected) {
+  Night(1e-9);
+  Night(2e-9, "good-one");
+  const auto wrong = [] {
+    CaseResult result = AgreeingCase("model/case", 1e-3);
+    result.status = CaseStatus::kUnexpected;
+    RegressReport report = OneRun({result});
+    EXPECT_EQ(AppendRun(kFile, {}, &report), "");
+    return report.cases.front().past;
+  };
+  const PastOfFailure first = wrong(), second = wrong();
+  for (const PastOfFailure& past : {first, second}) {
+    EXPECT_EQ(past.good_run, 2);
+    EXPECT_NE(past.when.find("good-one"), std::string::npos);
+    ASSERT_TRUE(past.values.contains("simulated_vs_analytic.force_nrmse"));
+    EXPECT_EQ(past.values.at("simulated_vs_analytic.force_nrmse"), 2e-9);
+  }
+  EXPECT_EQ(first.runs, 2);
+  EXPECT_EQ(second.runs, 3);
+  EXPECT_EQ(Night(1e-9).cases.front().past.runs, 0) << "nothing to tell of what is as expected";
 }
 
 TEST_F(HistoryTest, AnotherProgramsDatabaseIsLeftAlone) {

@@ -2,6 +2,8 @@
 #include "regress/regress.h"
 
 #include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
 
 #include "fake_worker.h"
 #include "regress/history.h"
@@ -262,6 +264,102 @@ TEST_F(RegressTest, ShardsMergedEqualOneRun) {
   EXPECT_EQ(MergeRuns(folders, options_).exit_code, whole.exit_code);
   const std::string runs = ListRuns("joined.sqlite").text;
   EXPECT_EQ(std::count(runs.begin(), runs.end(), '\n'), 2) << runs;
+}
+
+class MergeTest : public RegressTest {
+ protected:
+  // Three shards of four scenarios in shard1 … shard3.
+  void SetUp() override {
+    RegressTest::SetUp();
+    for (const char* name : {"agree1", "agree2", "agree3", "agree4"}) Scenario(name);
+    for (int i = 1; i <= 3; ++i) {
+      options_.shard = {i, 3};
+      options_.out = "shard" + std::to_string(i);
+      ASSERT_EQ(RunAll().exit_code, 0);
+    }
+    options_.shard = {};
+    options_.out = "joined";
+  }
+  // Changes a run's description of itself.
+  static void Change(const std::string& folder, const std::string& key, const std::string& value) {
+    auto json = nlohmann::ordered_json::parse(Read(folder + "/regress.json"));
+    json["run"][key] = value;
+    Write(folder + "/regress.json", json.dump());
+  }
+  RegressOutcome Merge(const std::vector<std::string>& folders) const {
+    return MergeRuns(folders, options_);
+  }
+};
+
+TEST_F(MergeTest, AMissingShardIsExitCodeThreeUnlessToldOtherwise) {
+  options_.history = "history.sqlite";
+  const RegressOutcome outcome = Merge({"shard1", "shard3"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.trouble.find("shard 2/3 missing"), std::string::npos) << outcome.trouble;
+  EXPECT_FALSE(std::filesystem::exists("joined/regress.json"));
+  EXPECT_FALSE(std::filesystem::exists("history.sqlite"));
+  options_.partial = true;
+  const RegressOutcome partial = Merge({"shard1", "shard3"});
+  EXPECT_EQ(partial.exit_code, 0) << partial.trouble;
+  EXPECT_NE(Read("joined/summary.md").find("shard 2/3 missing"), std::string::npos);
+  EXPECT_NE(Read("joined/index.html").find("shard 2/3 missing"), std::string::npos);
+  EXPECT_TRUE(partial.report.missing.empty());
+  options_.partial = false;
+  const RegressOutcome whole = Merge({"shard1", "shard2", "shard3"});
+  EXPECT_EQ(whole.exit_code, 0) << whole.trouble;
+  EXPECT_EQ(whole.report.cases.size(), 4U);
+}
+
+TEST_F(MergeTest, AShardThatDidNotEndIsMissing) {
+  std::filesystem::remove("shard2/regress.json");
+  const RegressOutcome outcome = Merge({"shard1", "shard2", "shard3"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  for (const char* part : {"shard2: no regress.json", "shard 2/3 missing"}) {
+    EXPECT_NE(outcome.trouble.find(part), std::string::npos) << outcome.trouble;
+  }
+}
+
+TEST_F(MergeTest, PartsOfDifferentNightsAreRefused) {
+  const std::string kept = Read("shard2/regress.json");
+  const std::map<std::string, std::pair<std::string, std::string>> changes = {
+      {"label", {"another", "has label 'another'"}},
+      {"program", {"mbverify 0.0.1", "has program"}},
+      {"started_utc", {"2026-01-01T02:00:00Z", "two nights"}},
+      {"shard", {"2/4", "others are parts of 3"}}};
+  for (const auto& [key, change] : changes) {
+    Change("shard2", key, change.first);
+    options_.partial = false;
+    const RegressOutcome outcome = Merge({"shard1", "shard2", "shard3"});
+    EXPECT_EQ(outcome.exit_code, 2) << key;
+    EXPECT_NE(outcome.trouble.find(change.second), std::string::npos) << outcome.trouble;
+    options_.partial = true;
+    EXPECT_EQ(Merge({"shard1", "shard2", "shard3"}).exit_code, 0) << key;
+    Write("shard2/regress.json", kept);
+  }
+}
+
+TEST_F(MergeTest, AScenarioThatNoShardHasIsMissing) {
+  auto json = nlohmann::ordered_json::parse(Read("shard1/regress.json"));
+  json["cases"].erase(json["cases"].begin());
+  Write("shard1/regress.json", json.dump());
+  const RegressOutcome outcome = Merge({"shard1", "shard2", "shard3"});
+  EXPECT_EQ(outcome.exit_code, 3);
+  EXPECT_NE(outcome.trouble.find("the shards hold 3 scenarios, 4 were found"), std::string::npos)
+      << outcome.trouble;
+}
+
+TEST_F(MergeTest, AVanishedScenarioIsMissingAndFailsIfAsked) {
+  options_.history = "history.sqlite";
+  ASSERT_EQ(Merge({"shard1", "shard2", "shard3"}).exit_code, 0);
+  std::filesystem::remove("scenarios/m/agree3.yaml");
+  options_.out = "again";
+  const RegressOutcome silent = RunAll();
+  EXPECT_EQ(silent.exit_code, 0);
+  ASSERT_EQ(silent.report.missing.size(), 1U);
+  EXPECT_EQ(silent.report.missing[0].key, "m/agree3");
+  options_.fail_on_missing = true;
+  EXPECT_EQ(RunAll().exit_code, 1);
+  EXPECT_NE(Read("again/junit.xml").find("<failure message=\"was in run 1"), std::string::npos);
 }
 
 TEST_F(RegressTest, TwoRunsInOneFolderAreRefused) {

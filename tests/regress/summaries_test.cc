@@ -10,6 +10,7 @@
 #include <set>
 
 #include "core/sha256.h"
+#include "regress/trouble_text.h"
 #include "regress_fixture.h"
 #include "tests/source_dir.h"
 
@@ -37,6 +38,10 @@ RegressReport Mixed() {
   wrong.exit_code = 1;
   wrong.verified = false;
   wrong.reason = "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ\x01";
+  wrong.metrics["simulated_vs_analytic.force_nrmse"] = {1e-3, 1e-6, false, "limb2.drive.force",
+                                                        7.16};
+  wrong.past = {7, 6, "run 6 of 2026-01-29T02:00:00Z, abc122", {}};
+  wrong.past.values["simulated_vs_analytic.force_nrmse"] = 1.7e-13;
   wrong.log_tail = "line 1\nline 2 \xff <b>";
   CaseResult hung = AgreeingCase("other/hung", kNan);
   hung.metrics.clear();
@@ -59,6 +64,99 @@ void ExpectGolden(const std::string& name, const std::string& text) {
     ASSERT_EQ(WriteFile(path, text), "");
   }
   EXPECT_EQ(ReadWholeFile(path).value_or("(missing)"), text);
+}
+
+std::map<std::string, std::string> AllSummaries(const RegressReport& report) {
+  return {{"JUnit", ToJUnit(report)},
+          {"Markdown", ToMarkdown(report)},
+          {"terminal", ToSummaryText(report)},
+          {"page", ToIndexHtml(report, {})}};
+}
+
+std::string WithoutBackslashes(std::string text) {
+  std::erase(text, '\\');
+  return text;
+}
+
+TEST(Summaries, AFailureNamesCheckValueLimitPlaceAndTheLastGoodRun) {
+  for (const auto& [where, text] : AllSummaries(Mixed())) {
+    for (const char* part :
+         {"simulated_vs_analytic.force_nrmse is 1.00e-03, limit 1.0e-06, at limb2.drive.force, "
+          "7.16 s; was 1.70e-13 in run 6",
+          "was ok in run 6 of 2026-01-29T02:00:00Z, abc122"}) {
+      EXPECT_NE(WithoutBackslashes(text).find(part), std::string::npos) << where << "\n" << text;
+    }
+  }
+}
+
+TEST(Summaries, FailedChecksComeWorstFirst) {
+  CaseResult result = AgreeingCase("m/x", 1e-9);
+  result.status = CaseStatus::kUnexpected;
+  result.metrics["a"] = {2e-6, 1e-6, false};
+  result.metrics["b"] = {5e-3, 1e-3, false};
+  result.metrics["c"] = {kNan, 1.0, false};
+  result.metrics["fine"] = {1e-9, 1e-6, true};
+  result.metrics["off"] = {1.0, {}, false};
+  ASSERT_EQ(FailedChecks(result).size(), 3U);
+  EXPECT_EQ(FailedChecks(result)[0]->first, "c");
+  EXPECT_EQ(FailedChecks(result)[1]->first, "b");
+  EXPECT_EQ(FailedChecks(result)[2]->first, "a");
+  EXPECT_EQ(FailureTexts(result, 2).size(), 3U);
+  EXPECT_EQ(FailureTexts(result, 2).back(), "and 1 more failed checks");
+  result.past.runs = 3;
+  EXPECT_EQ(FailureTexts(result, 3).back(), "was never ok in 3 earlier runs");
+  result.status = CaseStatus::kAsExpected;
+  EXPECT_TRUE(FailureTexts(result, 3).empty()) << "a case that must fail";
+}
+
+TEST(Summaries, AllDriftsOfAScenarioAreOneLineWithTheWorstFirst) {
+  CaseResult result = AgreeingCase("m/x", 1e-9);
+  result.drifts.push_back({"a", "a is 12 times its median", 12e-9, 1e-9, 0, ""});
+  result.drifts.push_back({"b", "b is 400 times its median", 400e-9, 1e-9, 7, "run 7"});
+  result.drifts.push_back({"c", "c is 30 times its median", 30e-9, 1e-9, 0, ""});
+  result.drifts.push_back({"traces", "drive forces: simulation moved"});
+  EXPECT_EQ(DriftLine(result),
+            "b is 400 times its median; also c 30 times, a 12 times; drive forces: simulation "
+            "moved; since run 7");
+  for (const auto& [where, text] : AllSummaries(OneRun({result}))) {
+    const size_t at = text.find("400 times");
+    ASSERT_NE(at, std::string::npos) << where;
+    const size_t line_end = text.find('\n', at);
+    EXPECT_LT(text.find("a 12 times"), line_end) << where;
+    EXPECT_EQ(text.find("12 times its median"), std::string::npos) << where;
+  }
+}
+
+TEST(Summaries, WhatIsMissingIsSaidEverywhere) {
+  RegressReport report = OneRun({AgreeingCase("model/good", 2e-9)});
+  for (const auto& [where, text] : AllSummaries(report)) {
+    EXPECT_EQ(text.find("gone"), std::string::npos) << where;
+  }
+  report.missing.push_back({"model/gone", 6, "run 6 of 2026-01-29T02:00:00Z"});
+  EXPECT_EQ(ExitCodeOf(report), 0);
+  for (const bool fails : {false, true}) {
+    report.fail_on_missing = fails;
+    for (const auto& [where, text] : AllSummaries(report)) {
+      for (const char* part : {"gone", "was in run 6 of 2026-01-29T02:00:00Z"}) {
+        EXPECT_NE(text.find(part), std::string::npos) << where << part;
+      }
+    }
+    EXPECT_NE(CountsText(CountCases(report)).find("1 missing"), std::string::npos);
+  }
+  EXPECT_EQ(ExitCodeOf(report), 1);
+  EXPECT_NE(ToMarkdown(report).find("not as expected"), std::string::npos);
+  EXPECT_NE(ToJUnit(report).find("tests=\"2\" failures=\"1\""), std::string::npos);
+  report.fail_on_missing = false;
+  EXPECT_NE(ToJUnit(report).find("tests=\"2\" failures=\"0\""), std::string::npos);
+  EXPECT_NE(ToJUnit(report).find("<skipped message="), std::string::npos);
+}
+
+TEST(Summaries, SeverityOrdersTheWorstFirst) {
+  std::vector<std::string> keys;
+  const RegressReport report = Mixed();
+  for (const CaseResult* result : BySeverity(report)) keys.push_back(result->key);
+  EXPECT_EQ(keys, (std::vector<std::string>{"other/hung", "other/wrong", "model/drifted",
+                                            "model/good", "model/must_fail/mass"}));
 }
 
 TEST(JUnit, IsTheGoldenFile) { ExpectGolden("junit.xml", ToJUnit(Mixed())); }
@@ -128,10 +226,13 @@ TEST(JUnit, HasTheAttributesOfTheSchemaOnly) {
       {"testsuite", {"name", "time", "tests", "failures", "errors", "timestamp", "hostname"}},
       {"testcase", {"name", "time", "classname"}},
       {"failure", {"type", "message"}},
+      {"skipped", {"type", "message"}},
       {"error", {"type", "message"}},
       {"system-out", {}}};
   tinyxml2::XMLDocument document;
-  ASSERT_EQ(document.Parse(ToJUnit(Mixed()).c_str()), tinyxml2::XML_SUCCESS);
+  RegressReport report = Mixed();
+  report.missing.push_back({"model/gone", 6, "run 6"});
+  ASSERT_EQ(document.Parse(ToJUnit(report).c_str()), tinyxml2::XML_SUCCESS);
   int elements = 0;
   const std::function<void(const tinyxml2::XMLElement&)> visit = [&](const auto& element) {
     ++elements;
@@ -147,7 +248,7 @@ TEST(JUnit, HasTheAttributesOfTheSchemaOnly) {
     }
   };
   visit(*document.RootElement());
-  EXPECT_EQ(elements, 1 + 2 + 5 + 2 + 5);  // root, suites, cases, failure and error, outputs
+  EXPECT_EQ(elements, 1 + 2 + 6 + 3 + 5);  // root, suites, cases, failure, error, skipped, outputs
 }
 
 TEST(JUnit, AwkwardTextArrivesUnchanged) {
@@ -157,7 +258,9 @@ TEST(JUnit, AwkwardTextArrivesUnchanged) {
   const auto* failure = suite->LastChildElement("testcase")->FirstChildElement("failure");
   ASSERT_NE(failure, nullptr);
   EXPECT_STREQ(failure->Attribute("message"),
-               "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ");
+               "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ; "
+               "simulated_vs_analytic.force_nrmse is 1.00e-03, limit 1.0e-06, at "
+               "limb2.drive.force, 7.16 s; was 1.70e-13 in run 6");
 }
 
 TEST(EscapeXml, DropsWhatXmlCannotHold) {
@@ -198,7 +301,15 @@ TEST(Markdown, OfTenThousandScenariosIsBelowOneMebibyte) {
 }
 
 TEST(RegressJson, ComesBackTheSame) {
-  const std::string json = ToJson(Mixed());
+  RegressReport report = Mixed();
+  report.run.covers = {"", "model/"};
+  report.run.found = 5;
+  report.fail_on_missing = report.run.partial = true;
+  report.missing.push_back({"model/gone", 6, "run 6"});
+  const std::string json = ToJson(report);
+  for (const char* part : {"limb2.drive.force", "7.16", "abc122", "model/gone"}) {
+    EXPECT_NE(json.find(part), std::string::npos) << part;
+  }
   const auto back = ReportFromJson(json);
   ASSERT_TRUE(back);
   EXPECT_EQ(ToJson(*back), json);
@@ -231,8 +342,8 @@ TEST(ExitCode, IsTheWorstOfAllScenarios) {
 TEST(IndexHtml, HasOneRowPerScenarioAndNeedsNothingElse) {
   const std::string html = ToIndexHtml(Mixed(), {{"model/good", "data:image/png;base64,AAAA"}});
   size_t rows = 0;
-  for (size_t at = html.find("<tr data-kind"); at != std::string::npos;
-       at = html.find("<tr data-kind", at + 1)) {
+  for (size_t at = html.find("<tr id="); at != std::string::npos;
+       at = html.find("<tr id=", at + 1)) {
     ++rows;
   }
   EXPECT_EQ(rows, 5U);
@@ -267,6 +378,7 @@ TEST(IndexHtml, LinksLeadToTheFileWhateverItsName) {
   const std::string link =
       "javascript%3Aalert%281%29/a%23b%3Fc%25d%22%3C%21--%3Cscript%3E/report.html";
   EXPECT_EQ(Between(html, "<a href=\"", "\""), link);
+  EXPECT_EQ(Between(html, "<tr id=\"", "\"").find_first_of("%#?<& "), std::string::npos);
   EXPECT_EQ(html.find("href=\"javascript:"), std::string::npos);
   EXPECT_EQ(html.find("<!--"), std::string::npos);
 }

@@ -28,8 +28,8 @@ const numbers = (column) => page.$$eval('tbody tr', (rows, i) => rows.map((row) 
     .filter((text) => text !== '').map(Number), column);
 
 test('One row per scenario, without errors and without any request', async () => {
-  assert.equal((await names()).length, 5);
-  assert.equal(await page.textContent('#shown'), '5 of 5 scenarios');
+  assert.equal((await names()).length, 6);
+  assert.equal(await page.textContent('#shown'), '6 of 6 scenarios');
   assert.deepEqual(trouble, []);
   assert.deepEqual(requests.filter((url) => !url.startsWith('data:')), [pathToFileURL(index_file).href]);
   assert.match(await page.textContent('h1'), /not as expected/);
@@ -39,24 +39,105 @@ test('Words find scenarios by name and by text, all of them must occur', async (
   await page.fill('#find', 'TRIPOD');
   const tripod = await names();
   assert.ok(tripod.length > 1 && tripod.every((name) => name.startsWith('spr_tripod/')), tripod.join());
-  assert.equal(await page.textContent('#shown'), `${tripod.length} of 5 scenarios`);
+  assert.equal(await page.textContent('#shown'), `${tripod.length} of 6 scenarios`);
   await page.fill('#find', 'tripod must_fail');
   assert.ok((await names()).every((name) => name.includes('must_fail')));
   await page.fill('#find', 'no such words');
   assert.deepEqual(await names(), []);
   await page.fill('#find', '');
-  assert.equal((await names()).length, 5);
+  assert.equal((await names()).length, 6);
 });
 
 test('What failed can be shown alone, with its reason', async () => {
   await page.selectOption('#kind', 'bad');
   const bad = await names();
-  assert.equal(bad.length, 1);
-  assert.match(bad[0], /wrong_expectation/);
-  assert.match(await page.innerText('tbody tr:not([hidden])'), /exit code 0, expected 1/);
+  assert.deepEqual(bad.map((name) => name.split('/').at(-1)), ['tight', 'wrong_expectation']);
+  assert.match(await page.innerText('tbody tr:not([hidden]):nth-of-type(2)'), /exit code 0, expected 1/);
   await page.selectOption('#kind', 'good');
   assert.equal((await names()).length, 4);
   await page.selectOption('#kind', '');
+});
+
+test('What went wrong stands above the table: check, value, limit, place, and when it was well', async () => {
+  const boxes = await page.$$eval('.box h2', (all) => all.map((h) => h.textContent));
+  assert.deepEqual(boxes, ['2 not as expected', '1 missing']);
+  const text = (await page.innerText('.box.bad')).replace(/\s+/g, ' ');
+  assert.match(text, /wrong_expectation: unexpected|wrong_expectation unexpected/);
+  assert.match(text, /exit code 0, expected 1/);
+  // tight: its limits were made smaller after the first run.
+  assert.match(text, /simulated_vs_analytic\.force_nrmse is [\d.]+e-\d+, limit 1\.0e-2\d/);
+  assert.match(text, /, at leg\d\.drive\.force|, at \w+\.force/);
+  assert.match(text, /; was [\d.]+e-\d+ in run 1/);
+  assert.match(text, /was ok in run 1 of /);
+  assert.match(await page.innerText('.box:last-of-type'), /gone: was in run 1 of/);
+});
+
+test('The worst comes first, and links of the box lead to its row', async () => {
+  const kinds = () => page.$$eval('tbody tr', (rows) => rows.map((row) => row.dataset.kind));
+  assert.deepEqual(await kinds(), ['bad', 'bad', 'good', 'good', 'good', 'good']);
+  assert.equal(await page.getAttribute('thead th[data-key=result]', 'aria-sort'), 'ascending');
+  await page.selectOption('#kind', 'good');
+  const href = await page.getAttribute('.box.bad a', 'href');
+  await page.click('.box.bad a');
+  assert.equal(await page.evaluate(() => decodeURIComponent(location.hash)), href);
+  const seen = await page.$eval(':target', (row) => {
+    const {top, bottom} = row.getBoundingClientRect();
+    return !row.hidden && top >= 0 && bottom <= innerHeight + row.offsetHeight;
+  });
+  assert.ok(seen, 'a hidden row is shown again');
+  await page.goto(pathToFileURL(index_file).href);
+});
+
+test('Filter and order are in the address, and the way back leads through them', async () => {
+  const fresh = pathToFileURL(index_file).href;
+  await page.goto(fresh);
+  await page.selectOption('#kind', 'must_fail');
+  const must_fail = await names();
+  assert.ok(must_fail.length >= 2 && must_fail.every((name) => /must_fail|literal|wrong_exp/.test(name)), must_fail.join());
+  await sortBy('error');
+  await sortBy('error');
+  await page.fill('#find', 'tripod');
+  const [state, shown] = [page.url(), await names()];
+  assert.match(state, /#\?.*show=must_fail/);
+  assert.match(state, /sort=-error/);
+  assert.match(state, /find=tripod/);
+  const other = await openPage(browser, index_file, {trouble, requests: []});
+  await other.goto('about:blank');
+  await other.goto(state);
+  assert.deepEqual(await other.$$eval('tbody tr:not([hidden]) th', (cells) => cells.map(
+      (cell) => cell.firstChild.textContent)), shown);
+  assert.equal(await other.inputValue('#find'), 'tripod');
+  await other.close();
+  await page.goBack();
+  assert.equal(await page.inputValue('#find'), '');
+  assert.equal(await page.getAttribute('thead th[data-key=error]', 'aria-sort'), 'descending');
+  await page.goBack();
+  await page.goBack();
+  assert.equal(await page.getAttribute('thead th[data-key=result]', 'aria-sort'), 'ascending');
+  assert.deepEqual(await names(), must_fail);
+  await page.goBack();
+  assert.equal(await page.inputValue('#kind'), '');
+  assert.equal((await names()).length, 6);
+  await page.goForward();
+  assert.deepEqual(await names(), must_fail);
+  await page.goto('about:blank');
+  await page.goto(fresh);
+});
+
+test('The head of the table stays in sight', async () => {
+  for (const width of [1400, 390]) {
+    await page.setViewportSize({width, height: 300});
+    await page.evaluate(() => scrollTo(0, document.body.scrollHeight));
+    const top = await page.$eval('thead', (head) => head.getBoundingClientRect().top);
+    assert.ok(Math.abs(top) <= 1, `${width} px: ${top}`);
+    const button = await page.$eval('thead button', (node) => {
+      const {left, top, width, height} = node.getBoundingClientRect();
+      return document.elementFromPoint(left + width / 2, top + height / 2) === node;
+    });
+    assert.ok(button, `${width} px: the buttons can be reached`);
+  }
+  await page.evaluate(() => scrollTo(0, 0));
+  await page.setViewportSize({width: 1280, height: 900});
 });
 
 test('A click on a column sorts by it, a second one the other way', async () => {
@@ -69,7 +150,7 @@ test('A click on a column sorts by it, a second one the other way', async () => 
   await sortBy('wall [s]');
   const column = await page.$eval('thead button:text-is("wall [s]")', (button) => button.parentElement.cellIndex);
   const walls = await numbers(column);
-  assert.equal(walls.length, 5);
+  assert.equal(walls.length, 6);
   assert.deepEqual(walls, [...walls].sort((a, b) => a - b));
   // Scenarios without an error come last.
   await sortBy('error');
@@ -107,10 +188,13 @@ test('Every report of the run opens without errors and requests nothing but the 
 });
 
 test('A phone needs no horizontal scrolling of the page', async () => {
-  await page.setViewportSize({width: 360, height: 740});
+  await page.setViewportSize({width: 390, height: 740});
   const {scroll, client} = await page.evaluate(() => ({scroll: document.documentElement.scrollWidth,
                                                        client: document.documentElement.clientWidth}));
   assert.ok(scroll <= client, `${scroll} > ${client}`);
+  const cut = await page.$$eval('tbody tr > *', (cells) => cells.filter(
+      (cell) => cell.offsetWidth > 0 && cell.getBoundingClientRect().right > innerWidth + 1).map((cell) => cell.textContent));
+  assert.deepEqual(cut, [], 'cells beyond the edge');
 });
 
 test('Nothing went wrong on the way', () => assert.deepEqual(trouble, []));

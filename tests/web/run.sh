@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|night|gate
+# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|night|gate|axe
 set -eu
 mbverify=$1 source=$2 work=$3 node=$4 chromium=$5 what=$6
 cd "$source"
@@ -22,19 +22,40 @@ gate)
   "$node" --test tests/web/log_axis_test.mjs
   exec "$node" tests/web/page_gate.cjs "$work/gate"
   ;;
+axe)
+  # A motion with pictures, a failure, a table, a stiffness, one that could not run, and a night.
+  rm -rf "$work/axe"
+  "$mbverify" regress --quiet --no-history --out "$work/axe" --jobs 2 \
+    scenarios/four_bar/table_matlab.yaml scenarios/spr_tripod/static.yaml \
+    scenarios/spr_tripod/must_fail/simulated_com.yaml scenarios/scara_robot/stiffness.yaml \
+    scenarios/spr_tripod/must_fail/below_base.yaml scenarios/four_bar/must_fail/wrong_mass.yaml
+  exec "$node" tests/web/axe_gate.cjs "$work/axe"
+  ;;
 night)
-  # Agree, disagree, could not run, bad input, and one that is not what its file says; run twice.
+  # Agree, disagree, could not run, bad input, one that is not what its file says, and one whose
+  # limit becomes too tight after the first of two runs; another is gone then.
   rm -rf "$work/night" "$work/own"
-  mkdir -p "$work/own"
+  mkdir -p "$work/own/scenarios/own"
+  own=$work/own/scenarios/own
   sed -e "s|^mechanism:.*|mechanism: $source/models/scara_robot/model.yaml|" -e '/^expect:/d' \
-    scenarios/scara_robot/static.yaml >"$work/own/wrong_expectation.yaml"
-  echo 'expect: {verdict: disagree, exit_code: 1}' >>"$work/own/wrong_expectation.yaml"
+    scenarios/scara_robot/static.yaml >"$own/wrong_expectation.yaml"
+  echo 'expect: {verdict: disagree, exit_code: 1}' >>"$own/wrong_expectation.yaml"
+  for copy in tight gone; do
+    sed -e "s|^mechanism:.*|mechanism: $source/models/spr_tripod/model.yaml|" \
+      scenarios/spr_tripod/static.yaml >"$own/$copy.yaml"
+  done
   for run in 1 2; do
     "$mbverify" regress --quiet --no-pictures --out "$work/night" scenarios/spr_tripod/static.yaml \
       scenarios/spr_tripod/must_fail/simulated_com.yaml scenarios/spr_tripod/literal.yaml \
-      scenarios/stabilizing_platform/must_fail/no_yaml.yaml "$work/own/wrong_expectation.yaml" \
+      scenarios/stabilizing_platform/must_fail/no_yaml.yaml "$own" \
       >/dev/null && exit 1 || [ $? = 1 ]
+    [ $run = 2 ] && break
+    rm "$own/gone.yaml"
+    sed -i 's/inverse: 1.0e-11/inverse: 1.0e-25/' "$own/tight.yaml"
   done
-  MBV_NIGHT=$work/night exec "$node" --test tests/web/index_page_test.cjs
+  MBV_NIGHT=$work/night "$node" --test tests/web/index_page_test.cjs
+  # The page of a red night, with all its boxes.
+  mkdir -p "$work/red_night" && cp "$work/night/index.html" "$work/red_night"
+  exec "$node" tests/web/axe_gate.cjs "$work/red_night"
   ;;
 esac
