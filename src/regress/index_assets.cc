@@ -28,7 +28,7 @@ background:var(--back);color:inherit;max-width:100%}
 label{display:flex;flex-direction:column;font-size:.85rem}
 table{border-collapse:collapse;width:100%}th,td{border-top:1px solid var(--line);padding:.45rem .6rem;
 text-align:left;vertical-align:top}
-thead{position:sticky;top:0;z-index:1;background:var(--head)}
+thead{position:sticky;top:0;z-index:1;background:var(--head)}thead th,thead td{background:var(--head)}
 th button{all:unset;cursor:pointer;font-weight:600}
 th button:focus-visible,a:focus-visible{outline:2px solid var(--link);outline-offset:2px}
 th[aria-sort=ascending] button::after{content:" ▲"}th[aria-sort=descending] button::after{content:" ▼"}
@@ -53,7 +53,7 @@ border-top:1px solid var(--line);padding:.7rem 0}
 tbody tr[hidden]{display:none}
 tbody td,tbody th{border:0;padding:0;min-width:0}
 tbody th,tbody .picture,tbody .notes,tbody .course{grid-column:1/-1}
-tbody .picture:empty,tbody .course:empty,tbody .notes:empty{display:none}
+tbody td:empty{display:none}
 tbody td[data-label]{text-align:left}
 tbody td[data-label]::before{content:attr(data-label);display:block;color:var(--soft);font-size:.8rem;
 font-weight:400}

@@ -55,7 +55,7 @@ std::string Sparkline(const CaseResult& result) {
       std::pow(10.0, levels.back()), limit, points, x, y(levels.back()));
 }
 
-constexpr size_t kChecksOfACase = 5, kCasesInABox = 30;
+constexpr size_t kChecksOfACase = 5, kChecksOfARow = 1, kCasesInABox = 30;
 
 // Where a case's row is: a name without anything that an address would encode.
 std::string RowId(const CaseResult& result) {
@@ -75,7 +75,7 @@ std::string Notes(const CaseResult& result) {
   std::string text;
   if (result.failed()) {
     text += "<p class=\"bad\">" + EscapeXml(result.reason) + "</p>" +
-            ListOf(FailureTexts(result, kChecksOfACase));
+            ListOf(FailureTexts(result, kChecksOfARow));
   }
   if (!result.drifts.empty()) {
     text += "<p class=\"warn\">" + EscapeXml(DriftLine(result)) + "</p>";

@@ -123,7 +123,7 @@ std::string DriftLine(const CaseResult& result) {
 }
 
 std::string MissingText(const MissingCase& missing) {
-  return fmt::format("was in {} and was not found any more", missing.when);
+  return fmt::format("was in {}, and was not found now", missing.when);
 }
 
 std::vector<const CaseResult*> BySeverity(const RegressReport& report) {

@@ -24,7 +24,7 @@ namespace mbv {
 /// All drifts of a scenario in one line, the worst metric first; "" without any.
 [[nodiscard]] std::string DriftLine(const CaseResult& result);
 
-/// "was in run 6 of …, and is no more".
+/// "was in run 6 of …, and was not found now".
 [[nodiscard]] std::string MissingText(const MissingCase& missing);
 
 /// Cases by severity: what ended badly, what is not as expected (by how much), what drifted (by how
