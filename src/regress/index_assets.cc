@@ -28,7 +28,7 @@ background:var(--back);color:inherit;max-width:100%}
 label{display:flex;flex-direction:column;font-size:.85rem}
 table{border-collapse:collapse;width:100%}th,td{border-top:1px solid var(--line);padding:.45rem .6rem;
 text-align:left;vertical-align:top}
-thead{position:sticky;top:0;z-index:1;background:var(--head)}thead th,thead td{background:var(--head)}
+thead{position:sticky;top:-1px;z-index:1;background:var(--head)}thead th,thead td{background:var(--head)}
 th button{all:unset;cursor:pointer;font-weight:600}
 th button:focus-visible,a:focus-visible{outline:2px solid var(--link);outline-offset:2px}
 th[aria-sort=ascending] button::after{content:" ▲"}th[aria-sort=descending] button::after{content:" ▼"}
