@@ -8,7 +8,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "core/demand.h"
 #include "kinematics/closure_residual.h"
@@ -112,21 +111,6 @@ std::vector<bool> DrivenJoints(const Mechanism& mechanism) {
   return driven;
 }
 
-Coordinates Disturbed(const Mechanism& mechanism, const Coordinates& guess,
-                      const std::vector<bool>& locked, double amplitude, std::mt19937_64* random) {
-  const double length = CharacteristicLength(mechanism);
-  std::uniform_real_distribution<double> uniform(-amplitude, amplitude);
-  Coordinates out = guess;
-  for (const int j : mechanism.tree_joints) {
-    if (locked[j]) continue;
-    const Joint& joint = mechanism.joints[j];
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
-      out[j][c] += uniform(*random) * (IsLength(joint.kind, c) ? length : 1.0);
-    }
-  }
-  return out;
-}
-
 // kHomeTolerance, or what rounding leaves of coordinates that are large beside the mechanism.
 double ToleranceAt(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
   const double reach = Reach(LongestLever(mechanism), X_WB);
@@ -149,14 +133,33 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
   const bool any_driven = std::find(driven.begin(), driven.end(), true) != driven.end();
   if (open() && any_driven) result->drives_moved = try_from(none, guess);
 
-  std::mt19937_64 random(20220101);
-  for (int i = 0; i < 12 && open(); ++i) {
-    const std::vector<bool>& locked = i % 2 == 0 ? driven : none;
-    const double amplitude = 0.05 * (1 + i);
-    if (try_from(locked, Disturbed(mechanism, guess, locked, amplitude, &random))) {
-      result->guesses_moved = true;
-      result->drives_moved = any_driven && i % 2 == 1;
+  if (!open()) return best;
+
+  // Loops that are open at the best pose so far, each group by itself; then all from there.
+  Coordinates start = guess;
+  const Coordinates at_best = JointCoordinatesAt(mechanism, best.states.X_WB, guess);
+  bool any = false, drives_moved = false;
+  for (const LoopGroup& group : LoopGroups(mechanism)) {
+    double gap = 0.0;
+    for (const int c : group.closures) {
+      const LoopGap at = GapOf(mechanism, c, best.states);
+      gap = std::max({gap, at.position_m / CharacteristicLength(mechanism), at.rotation_rad});
     }
+    const bool is_open = gap > ToleranceAt(mechanism, best.states.X_WB);
+    GroupAssemblies found;
+    if (is_open) found = FindAssemblies(mechanism, group, driven, guess);
+    const Coordinates& way = found.assemblies.empty() ? found.best : found.assemblies.front().q;
+    for (size_t k = 0; k < group.joints.size(); ++k) {
+      start[group.joints[k]] = k < way.size() ? way[k] : at_best[group.joints[k]];
+    }
+    if (!is_open) continue;
+    any = true;
+    drives_moved = drives_moved || found.drives_moved;
+    result->searched.push_back(std::move(found));
+  }
+  if (any && try_from(none, start)) {
+    result->guesses_moved = true;
+    result->drives_moved = result->drives_moved || drives_moved;
   }
   return best;
 }

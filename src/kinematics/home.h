@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "kinematics/assembly.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -25,7 +26,9 @@ struct HomeResult {
   double gap = kNan, gap_at_guess = kNan;
   double tolerance = kHomeTolerance;  ///< for `gap`
   bool drives_moved = false;   ///< driven joints had to leave their guesses to close the loops
-  bool guesses_moved = false;  ///< closed only from disturbed guesses: may be another assembly
+  bool guesses_moved = false;  ///< closed only by a search: may be another assembly than meant
+  /// Of the groups of loops that had to be searched: the ways to close them.
+  std::vector<GroupAssemblies> searched;
   int iterations = 0;
   std::vector<LoopGap> gaps;  ///< per closure joint, worst first
 
@@ -35,7 +38,8 @@ struct HomeResult {
 
 /// Solves all loop closures in the coordinates of the spanning tree (BuildSpanningTree first), from
 /// Joint::guess: Levenberg–Marquardt, first with driven and prescribed joints held at their
-/// guesses, then with them free, then from guesses disturbed by a fixed random sequence. Fills
+/// guesses, then with them free; loops that stay open are searched (assembly.h), and the way to
+/// close them that is nearest to the guesses is taken. Fills
 /// X_WB_home and Joint::home of every joint, closures included (angles within π of their guess);
 /// with the best pose found if the loops do not close.
 HomeResult SolveHome(Mechanism* mechanism);

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "model_file/model_reader.h"
+#include "model_file/urdf_model.h"
 
 namespace mbv {
 namespace {
@@ -21,6 +22,16 @@ Diagnostics InFileOrder(const Diagnostics& diagnostics) {
   return sorted;
 }
 
+// Places in a model file that nobody wrote.
+Diagnostics WithoutPlaces(const Diagnostics& diagnostics) {
+  Diagnostics result;
+  for (Finding finding : diagnostics.findings()) {
+    finding.line = finding.column = 0;
+    result.Add(std::move(finding));
+  }
+  return result;
+}
+
 }  // namespace
 
 LoadResult ModelReader::Load(const std::string& text) {
@@ -31,7 +42,8 @@ LoadResult ModelReader::Load(const std::string& text) {
   root_ = yaml_.Parse(text);
   if (root_ != nullptr) ReadAll();
   LoadResult result;
-  result.diagnostics.Append(InFileOrder(yaml_.diagnostics()));
+  result.diagnostics.Append(
+      InFileOrder(bare_urdf_ ? WithoutPlaces(yaml_.diagnostics()) : yaml_.diagnostics()));
   result.diagnostics.Append(other_findings_);
   result.literals = std::move(literals_);
   if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism_);
@@ -83,6 +95,9 @@ void ModelReader::ReadAll() {
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
                          const LoadOptions& options) {
+  if (internal::IsUrdfFile(file)) {
+    return ModelReader(file, options).LoadBareUrdf(internal::UrdfModelText(file, text));
+  }
   return ModelReader(file, options).Load(text);
 }
 

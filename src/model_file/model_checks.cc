@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "kinematics/assembly.h"
 #include "kinematics/constraints.h"
 #include "kinematics/data_projection.h"
 #include "kinematics/home.h"
@@ -185,7 +186,6 @@ void ModelReader::ReportGaps(const HomeResult& home, const std::string& hint) {
     yaml_.AddAt(Severity::kError, 0, 0, "the home pose was not found");
 }
 
-// Only guesses that were disturbed led to closed loops: which assembly they led to is chance.
 // The drives that home could not leave at their guesses: commands that count from home do so from
 // elsewhere.
 void ModelReader::WarnAboutMovedDrives() {
@@ -213,6 +213,7 @@ void ModelReader::WarnAboutMovedDrives() {
               "close the loops");
 }
 
+// Only a search led to closed loops: which assembly is meant is not known.
 void ModelReader::WarnAboutAssembly(const HomeResult& home) {
   constexpr size_t kMostJoints = 4;
   std::vector<std::pair<double, int>> moved;  // by how much, tree joint
@@ -233,14 +234,16 @@ void ModelReader::WarnAboutAssembly(const HomeResult& home) {
     text += fmt::format("{}{} from {:.4g} to {:.4g}", i == 0 ? "" : ", ", joint.name,
                         joint.guess[0], joint.home[0]);
   }
+  for (const GroupAssemblies& group : home.searched) {
+    if (!group.assemblies.empty()) text += "; " + AssemblyText(mechanism_, group);
+  }
   const YamlEntry* at = moved.empty() ? nullptr : joint_places_[moved.front().second];
   yaml_.SetNote("");
-  yaml_.AddAt(
-      Severity::kWarning, at ? at->line : 0, at ? at->column : 0,
-      fmt::format("the loops close only from disturbed guesses (gap {:.2g} at the guesses): "
-                  "this may be another assembly than meant; {}",
-                  home.gap_at_guess, text),
-      "look at a picture of the home pose, and guess nearer to the pose that is meant");
+  yaml_.AddAt(Severity::kWarning, at ? at->line : 0, at ? at->column : 0,
+              fmt::format("the loops close only by a search (gap {:.2g} at the guesses): "
+                          "this may be another assembly than meant; {}",
+                          home.gap_at_guess, text),
+              "look at a picture of the home pose, and guess nearer to the pose that is meant");
 }
 
 namespace {

@@ -59,6 +59,11 @@ class ModelReader {
 
   /// Runs all stages on the text.
   LoadResult Load(const std::string& text);
+  /// The same with the text that stands for a URDF file: no finding points into it.
+  LoadResult LoadBareUrdf(const std::string& text) {
+    bare_urdf_ = true;
+    return Load(text);
+  }
 
  private:
   void ReadAll();
@@ -204,6 +209,8 @@ class ModelReader {
                              std::initializer_list<UnitSuffix> units);
   std::optional<Vec3> Axis(const Block& block, const YamlNode& node, const std::string& path);
   std::optional<Mat3> Rotation(const Block& block, const YamlNode& node, const std::string& path);
+  std::optional<Mat3> RotationMatrix(const Block& block, const YamlNode& node,
+                                     const std::string& path);
   std::optional<Mat3> RotationFromAxes(const Block& block, const YamlNode& node,
                                        const std::string& path);
   std::optional<Pose> PoseOf(const Block& block, const YamlNode& node, const std::string& path);
@@ -235,6 +242,7 @@ class ModelReader {
   std::deque<Scope> scopes_;  // stable addresses
   std::deque<Block> blocks_;  // blocks_[0] is the model itself
   Mechanism mechanism_;
+  bool bare_urdf_ = false;  // the text stands for a URDF file
   bool impossible_inertia_allowed_ = false;
   double closure_tolerance_m_ = 0.0;            // up to which rounded data are projected
   ClosureHints hints_;                          // per joint
@@ -251,12 +259,13 @@ class ModelReader {
   // By full name; empty: badly described, which has its own finding.
   std::map<std::string, std::optional<Material>> materials_;
   std::map<std::string, std::optional<Section>> sections_;
-  std::vector<const YamlEntry*> beam_places_;   // per beam
-  bool beams_good_ = true;                      // false: their frame is not worth checking
-  std::deque<ParameterFile> parameter_files_;   // stable addresses; innermost base first
-  int urdf_root_ = -1;                          // body that needs a joint to the world
-  std::map<std::string, Finding> urdf_places_;  // of the URDF's joints, closures included
-  std::deque<YamlEntry> urdf_drives_;           // places of drives that a closure file names
+  std::vector<const YamlEntry*> beam_places_;    // per beam
+  bool beams_good_ = true;                       // false: their frame is not worth checking
+  std::deque<ParameterFile> parameter_files_;    // stable addresses; innermost base first
+  int urdf_root_ = -1;                           // body that needs a joint to the world
+  std::map<std::string, FrameRef> urdf_frames_;  // links of the URDF that became frames
+  std::map<std::string, Finding> urdf_places_;   // of the URDF's joints, closures included
+  std::deque<YamlEntry> urdf_drives_;            // places of drives that a closure file names
   std::map<std::string, bool> override_used_;
   std::map<std::string, std::string> overridden_;  // full name of a parameter → name as given
   Diagnostics other_findings_;                     // of other files: overrides, URDF, parameters

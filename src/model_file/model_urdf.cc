@@ -5,6 +5,7 @@
 
 #include "model_file/model_reader.h"
 #include "model_file/urdf.h"
+#include "model_file/urdf_frame_links.h"
 
 namespace mbv {
 
@@ -34,6 +35,11 @@ void ModelReader::ImportUrdf(const YamlNode& node) {
   std::vector<std::string> motors;
   const YamlNode* closures = map.Find("closures");
   if (closures != nullptr && !ReadClosureFile(*closures, &tree, &motors)) return;
+  std::set<std::string> keep;  // bodies that the model file writes on
+  if (const YamlNode* attach = blocks_.front().Section("attach")) {
+    for (const YamlEntry& entry : attach->entries) keep.insert(entry.key);
+  }
+  internal::FoldFrameLinks(keep, motors, path.string(), &tree, &other_findings_);
   if (!Room(node, tree.bodies.size(), kMaxBodies + 1, "bodies")) return;
   joints_good_ = true;
   AddUrdf(tree, path.string());
@@ -80,6 +86,9 @@ void ModelReader::AddUrdf(const UrdfTree& tree, const std::string& file) {
     urdf_places_[joint.name] = {Severity::kError, file, tree.joint_lines[j], 1, "", ""};
   }
   if (tree.root >= 0) urdf_root_ = first + tree.root;
+  for (const auto& [name, frame] : tree.frames) {
+    urdf_frames_[name] = {index(frame.body), frame.X_BF};
+  }
 }
 
 void ModelReader::ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& joints) {
@@ -124,6 +133,12 @@ void ModelReader::WeldUrdfRoot() {
   Joint weld;
   weld.name = mechanism_.bodies[urdf_root_].name + ".weld";
   weld.child = urdf_root_;
+  if (bare_urdf_) {
+    other_findings_.Add({Severity::kWarning, yaml_.file(), 0, 0,
+                         fmt::format("the root link '{}' is held: it is fixed to the world",
+                                     mechanism_.bodies[urdf_root_].name),
+                         ""});
+  }
   mechanism_.joints.push_back(weld);
   joint_places_.push_back(nullptr);
   hints_.resize(mechanism_.joints.size());

@@ -6,6 +6,14 @@
 //   name_mot: [JOINT, …]         motors
 //   joint_name: [JOINT, …]       joints that are not what URDF says
 //   joint_type: [SPHERICAL, UJOINT_XY, FIXED, …]
+//
+// or, as CAD exporters write it (config/loop_closures.yaml), one entry per cut joint:
+//
+//   closures: [{link_a: A, link_b: B, point: [x, y, z], axis: [x, y, z]}, …]
+//   independent: [JOINT, …]      joints that are not solved from the loops
+//
+// with point and axis in the frame of the root link while all joints are at zero. With an axis the
+// cut joint is a hinge, without one a ball.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -36,6 +44,10 @@ class ClosureFile {
   ClosureFile(YamlReader* yaml, UrdfTree* tree) : yaml_(*yaml), tree_(*tree) {}
 
   void Read(const YamlNode& root, std::vector<std::string>* motors) {
+    if (root.Find("closures") != nullptr) {
+      ReadCuts(root, motors);
+      return;
+    }
     const YamlMap map(&yaml_, &root, "",
                       {"closed_loop", "type", "name_mot", "joint_name", "joint_type"});
     if (!map.valid()) return;
@@ -161,6 +173,90 @@ class ClosureFile {
       tree_.joints.push_back(joint);
       tree_.joint_lines.push_back(0);
     }
+  }
+
+  void ReadCuts(const YamlNode& root, std::vector<std::string>* motors) {
+    const auto closures = yaml_.Items(*root.Find("closures"), "closures");
+    if (!closures) return;
+    const std::vector<Pose> X_RL = PosesAtZero();
+    for (size_t i = 0; i < closures->size(); ++i) {
+      ReadCut(*(*closures)[i], fmt::format("closures[{}]", i), X_RL);
+    }
+    const YamlNode* independent = root.Find("independent");
+    if (independent == nullptr || independent->is_null()) return;
+    const auto names = yaml_.Items(*independent, "independent");
+    for (const YamlNode* node : names.value_or(std::vector<const YamlNode*>{})) {
+      const auto index = JointNamed(*node, "independent");
+      if (index && FreedomsOf(tree_.joints[*index].kind) == 1) motors->push_back(node->text);
+    }
+  }
+
+  void ReadCut(const YamlNode& node, const std::string& path, const std::vector<Pose>& X_RL) {
+    std::optional<int> links[2];
+    for (int side = 0; side < 2; ++side) {
+      const std::string key = side == 0 ? "link_a" : "link_b";
+      const YamlNode* link = node.Find(key);
+      if (link == nullptr) {
+        yaml_.Error(node, fmt::format("{}.{} is missing", path, key),
+                    "link_a, link_b, point, and axis for a hinge");
+      } else {
+        links[side] = FrameNamed(*link, JoinPath(path, key));
+      }
+    }
+    const auto point = CutVector(node, "point", path, true);
+    const auto axis = CutVector(node, "axis", path, false);
+    if (!links[0] || !links[1] || !point || yaml_.has_errors()) return;
+    if (*links[0] == *links[1]) {
+      yaml_.Error(node, fmt::format("{} connects a link with itself", path));
+      return;
+    }
+    Joint joint;
+    const std::string a = node.Find("link_a")->text, b = node.Find("link_b")->text;
+    joint.name = NameOfPair(a, b, tree_);
+    joint.kind = axis ? JointKind::kRevolute : JointKind::kSpherical;
+    if (axis) joint.axis = axis->normalized();
+    Pose X_RF = Pose::Identity();
+    X_RF.translation() = *point;
+    const auto pose = [&](int link) { return link < 0 ? Pose::Identity() : X_RL[link]; };
+    joint.parent = *links[0];
+    joint.X_PF = pose(*links[0]).inverse() * X_RF;
+    joint.child = *links[1];
+    joint.X_CM = pose(*links[1]).inverse() * X_RF;
+    joint.closure = true;
+    tree_.joints.push_back(joint);
+    tree_.joint_lines.push_back(0);
+  }
+
+  std::optional<Vec3> CutVector(const YamlNode& node, const std::string& key,
+                                const std::string& path, bool required) {
+    const YamlNode* found = node.Find(key);
+    if (found == nullptr || found->is_null()) {
+      if (required) yaml_.Error(node, fmt::format("{}.{} is missing", path, key));
+      return std::nullopt;
+    }
+    const auto items = yaml_.Items(*found, JoinPath(path, key), 3);
+    if (!items) return std::nullopt;
+    Vec3 v = Vec3::Zero();
+    for (int k = 0; k < 3; ++k) {
+      const auto value = yaml_.Number(*(*items)[k], fmt::format("{}.{}[{}]", path, key, k));
+      if (!value) return std::nullopt;
+      v[k] = *value;
+    }
+    if (required || v.norm() > 1e-9) return v;
+    yaml_.Error(*found, fmt::format("{}.{} has no direction", path, key));
+    return std::nullopt;
+  }
+
+  // Links in the frame of the root link (or the world) while all joints are at zero; parents come
+  // first.
+  [[nodiscard]] std::vector<Pose> PosesAtZero() const {
+    std::vector<Pose> X_RL(tree_.bodies.size(), Pose::Identity());
+    for (const Joint& joint : tree_.joints) {
+      if (joint.closure || joint.child < 0) continue;
+      const Pose X_RP = joint.parent < 0 ? Pose::Identity() : X_RL[joint.parent];
+      X_RL[joint.child] = X_RP * joint.X_PF * joint.X_CM.inverse();
+    }
+    return X_RL;
   }
 
   YamlReader& yaml_;

@@ -71,6 +71,8 @@ std::optional<Vec3> ModelReader::Axis(const Block& block, const YamlNode& node,
     const auto vector = Vector(block, node, path);
     if (!vector) return std::nullopt;
     const double length = vector->stableNorm();
+    // A unit vector stays as it is written, to the last bit.
+    if (std::abs(length - 1.0) < 4 * kEps) return *vector;
     if (length > 1e-9 && std::isfinite(length)) return *vector / length;
     yaml_.Error(node, fmt::format("{} has the length {}, an axis needs a direction", path, length));
     return std::nullopt;
@@ -114,17 +116,42 @@ std::optional<Mat3> ModelReader::RotationFromAxes(const Block& block, const Yaml
   return R;
 }
 
+// Rows of a rotation matrix, taken as they are.
+std::optional<Mat3> ModelReader::RotationMatrix(const Block& block, const YamlNode& node,
+                                                const std::string& path) {
+  constexpr double kTolerance = 1e-9;
+  const auto rows = yaml_.Items(node, path, 3);
+  if (!rows) return std::nullopt;
+  Mat3 R;
+  for (int i = 0; i < 3; ++i) {
+    const auto row = Vector(block, *(*rows)[i], fmt::format("{}[{}]", path, i));
+    if (!row) return std::nullopt;
+    R.row(i) = row->transpose();
+  }
+  if ((R * R.transpose()).isIdentity(kTolerance) && R.determinant() > 0.0) return R;
+  yaml_.Error(node,
+              fmt::format("{} is no rotation: its rows are not a right-handed set of "
+                          "perpendicular unit vectors",
+                          path),
+              "give its numbers with ten digits, or use rpy, axes or axis with angle");
+  return std::nullopt;
+}
+
 std::optional<Mat3> ModelReader::Rotation(const Block& block, const YamlNode& node,
                                           const std::string& path) {
-  const YamlMap map(&yaml_, &node, path, {"rpy", "rpy_deg", "axes", "axis", "angle", "angle_deg"});
+  const YamlMap map(&yaml_, &node, path,
+                    {"rpy", "rpy_deg", "axes", "axis", "angle", "angle_deg", "matrix"});
   if (!map.valid()) return std::nullopt;
   const bool by_rpy = map.Has("rpy") || map.Has("rpy_deg");
   const bool by_axis = map.Has("axis") || map.Has("angle") || map.Has("angle_deg");
-  if (int{by_rpy} + int{by_axis} + int{map.Has("axes")} != 1) {
+  if (int{by_rpy} + int{by_axis} + int{map.Has("axes")} + int{map.Has("matrix")} != 1) {
     yaml_.Error(
         node, fmt::format("{} is given in {} ways", path, node.entries.empty() ? "no" : "several"),
-        "give one of: rpy, axes, axis with angle");
+        "give one of: rpy, axes, axis with angle, matrix");
     return std::nullopt;
+  }
+  if (const YamlNode* matrix = map.Find("matrix")) {
+    return RotationMatrix(block, *matrix, map.PathOf("matrix"));
   }
   if (by_rpy) {
     const auto rpy = Vector(block, map, "rpy", {kPlain, kDeg});
@@ -282,6 +309,7 @@ std::optional<FrameRef> ModelReader::Frame(const Block& block, const YamlNode& n
       if (dot == 0) break;
     }
   }
+  if (const auto link = urdf_frames_.find(*name); link != urdf_frames_.end()) return link->second;
   if (body_without_frame >= 0) {
     const Body& body = mechanism_.bodies[body_without_frame];
     yaml_.Error(node,

@@ -6,6 +6,7 @@
 // `origin`.
 #pragma once
 
+#include <map>
 #include <string>
 #include <vector>
 
@@ -34,6 +35,19 @@ struct UrdfTree {
   std::vector<Joint> joints;  ///< body indices count `bodies`; -1 is the world; closures last
   std::vector<int> body_lines, joint_lines;  ///< in the file; 0: unknown
   int root = -1;                             ///< index of the root link; -1 if it is the world
+  /// A link that became a frame of another one (urdf_frame_links.h).
+  struct Frame {
+    int body = -1;
+    Pose X_BF = Pose::Identity();
+  };
+  std::map<std::string, Frame> frames;           ///< by the link's name
+  std::vector<std::string> transmission_joints;  ///< joints that a <transmission> drives
+  /// position = multiplier · (position of the joint `of`) + offset
+  struct Mimic {
+    std::string joint, of;
+    double multiplier = 1.0, offset = 0.0;
+  };
+  std::vector<Mimic> mimics;
 
   /// Index of a link (-1: the world), or -2.
   [[nodiscard]] int FindLink(const std::string& link) const;

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "core/spatial.h"
+#include "core/text.h"
 
 namespace mbv::internal {
 namespace {
@@ -265,6 +266,15 @@ UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
       if (const auto closure = reader.Read(*e)) details.closures.push_back(*closure);
     }
     WarnOfOthers(*e, file, diagnostics);
+    if (tag == "transmission") {
+      for (const XMLElement* j = e->FirstChildElement("joint"); j != nullptr;
+           j = j->NextSiblingElement("joint")) {
+        const char* driven = j->Attribute("name");
+        if (driven != nullptr && !Contains(details.transmission_joints, driven)) {
+          details.transmission_joints.emplace_back(driven);
+        }
+      }
+    }
   }
   return details;
 }

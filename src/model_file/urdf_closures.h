@@ -34,6 +34,7 @@ struct UrdfClosure {
 struct UrdfDetails {
   std::vector<UrdfClosure> closures;
   std::map<std::string, int> link_lines, joint_lines;  ///< by name
+  std::vector<std::string> transmission_joints;        ///< in file order, each once
 };
 
 /// Reads them; findings carry the line. Empty if the text is no XML (urdfdom says so).

@@ -78,6 +78,8 @@ class Importer {
       tree_.root = 0;
     }
     for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
+    tree_.transmission_joints = details_.transmission_joints;
+    WarnOfMimics();
     WarnOfMeshes();
     WarnOfLosses("damping", damped_);
     WarnOfLosses("friction", rubbing_);
@@ -194,6 +196,18 @@ class Importer {
          "drive forces are computed without it");
   }
 
+  void WarnOfMimics() {
+    if (tree_.mimics.empty()) return;
+    const UrdfTree::Mimic& first = tree_.mimics.front();
+    const size_t more = tree_.mimics.size() - 1;
+    Warn(LineOf(details_.joint_lines, first.joint),
+         fmt::format("joint '{}': mimic of '{}'{} left out, the joint{} free", first.joint,
+                     first.of, more == 0 ? " is" : fmt::format(" and {} more are", more),
+                     more == 0 ? " is" : "s are"),
+         "where it stands for a closed loop, state the loop by a closure; gears are commanded: "
+         "drive both joints and couple them by `equal` in the scenario");
+  }
+
   // One finding for all: robots have hundreds.
   void WarnOfMeshes() {
     if (meshes_ == 0) return;
@@ -282,11 +296,8 @@ class Importer {
       AddLoss(from.name, from.dynamics->friction, line, &rubbing_);
     }
     if (from.mimic) {
-      Warn(line,
-           fmt::format("joint '{}': mimic of '{}' is left out, the joint is free", from.name,
-                       from.mimic->joint_name),
-           "where it stands for a closed loop, state the loop by a closure; gears are commanded: "
-           "drive both joints and couple them by `equal` in the scenario");
+      tree_.mimics.push_back(
+          {from.name, from.mimic->joint_name, from.mimic->multiplier, from.mimic->offset});
     }
     tree_.joints.push_back(joint);
     tree_.joint_lines.push_back(line);

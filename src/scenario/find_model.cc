@@ -57,7 +57,7 @@ std::vector<fs::path> ModelFolders(const fs::path& start) {
 }
 
 std::optional<std::string> FindModel(const std::string& name, const fs::path& start) {
-  if (name.find('/') != std::string::npos || name.ends_with(".yaml")) {
+  if (name.find('/') != std::string::npos || name.ends_with(".yaml") || name.ends_with(".urdf")) {
     const fs::path path = fs::path(name).is_absolute() ? fs::path(name) : start / name;
     std::error_code error;
     // A pipe will do.

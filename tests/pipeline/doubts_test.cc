@@ -119,7 +119,7 @@ TEST(Doubts, GuessesThatHadToBeDisturbedAreSaidEverywhere) {
                    "mechanism: disturbed.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: "
                    "{motor: home}}\nanalytic: none\nsimulation: {mode: inverse}\n");
   const RunOutcome outcome = RunScenarioFile(scenario, {}, (folder.path / "out").string());
-  ExpectSaidEverywhere(outcome, "the loops close only from disturbed guesses");
+  ExpectSaidEverywhere(outcome, "the loops close only by a search");
 }
 
 TEST(Doubts, TheDriverIsNamedEverywhere) {

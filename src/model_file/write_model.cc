@@ -1,0 +1,302 @@
+#include "model_file/write_model.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "core/names.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kLongestModelName = 64;
+
+// A name that model files take, unlike all in `taken`.
+std::string FreshName(const std::string& name, std::set<std::string>* taken) {
+  std::string plain;
+  for (const char c : name) {
+    const auto u = static_cast<unsigned char>(c);
+    plain += u < 0x80 && (std::isalnum(u) != 0 || c == '_' || c == '-') ? c : '_';
+  }
+  if (plain.empty() || plain == "null" || plain == "Null" || plain == "NULL") plain += "_";
+  plain.resize(std::min(plain.size(), kLongestModelName - 4));
+  std::string fresh = plain;
+  for (int i = 2; !taken->insert(fresh).second; ++i) fresh = fmt::format("{}_{}", plain, i);
+  return fresh;
+}
+
+template <typename T>
+std::vector<std::string> FreshNames(const std::vector<T>& items, std::set<std::string>* taken) {
+  std::vector<std::string> names;
+  for (const T& item : items) names.push_back(FreshName(item.name, taken));
+  return names;
+}
+
+std::string Triple(const Vec3& v) { return fmt::format("[{}, {}, {}]", v.x(), v.y(), v.z()); }
+
+std::string RangePair(const CoordinateRange& range) {
+  const auto bound = [](double x) { return std::isfinite(x) ? fmt::format("{}", x) : "null"; };
+  return fmt::format("[{}, {}]", bound(range.lower), bound(range.upper));
+}
+
+bool HasBound(const CoordinateRange& range) {
+  return std::isfinite(range.lower) || std::isfinite(range.upper);
+}
+
+bool IsIdentity(const Pose& X) { return X.matrix() == Pose::Identity().matrix(); }
+
+std::string PoseText(const Pose& X) {
+  if (X.linear() == Mat3::Identity()) return Triple(X.translation());
+  const Mat3 R = X.linear();
+  return fmt::format("{{position: {}, rotation: {{matrix: [{}, {}, {}]}}}}",
+                     Triple(X.translation()), Triple(R.row(0)), Triple(R.row(1)), Triple(R.row(2)));
+}
+
+const char* WordOfKind(JointKind kind) {
+  switch (kind) {
+    case JointKind::kFixed:
+      return "fixed";
+    case JointKind::kRevolute:
+      return "revolute";
+    case JointKind::kPrismatic:
+      return "prismatic";
+    case JointKind::kCylindrical:
+      return "cylindrical";
+    case JointKind::kUniversal:
+      return "universal";
+    case JointKind::kSpherical:
+      return "spherical";
+    case JointKind::kPlanar:
+      return "planar";
+    case JointKind::kFree:
+      return "free";
+  }
+  return "";
+}
+
+struct ShapeText {
+  std::string operator()(const Capsule& s) const { return Rod("capsule", s); }
+  std::string operator()(const Cylinder& s) const { return Rod("cylinder", s); }
+  std::string operator()(const Box& s) const {
+    return fmt::format("box: {{size: {}, at: {}}}", Triple(s.size), PoseText(s.X_BG));
+  }
+  std::string operator()(const Ball& s) const {
+    return fmt::format("ball: {{at: {}, radius: {}}}", Triple(s.p_centre), s.radius);
+  }
+  template <typename T>
+  static std::string Rod(const char* word, const T& s) {
+    return fmt::format("{}: {{from: {}, to: {}, radius: {}}}", word, Triple(s.p_from),
+                       Triple(s.p_to), s.radius);
+  }
+};
+
+class ModelWriter {
+ public:
+  explicit ModelWriter(const Mechanism& mechanism)
+      : m_(mechanism), names_(NamesInModel(mechanism)), frames_(mechanism.bodies.size()) {
+    for (size_t b = 0; b < m_.bodies.size(); ++b) {
+      for (const NamedFrame& frame : m_.bodies[b].frames) {
+        AddFrame(static_cast<int>(b), frame.name, frame.X_BF);
+      }
+    }
+  }
+
+  std::string Text() {
+    // What refers to frames comes first, because it adds them.
+    const std::string joints = Joints(), rest = Drives() + Others();
+    std::string text = "name: " + ModelName() + "\n";
+    if (!m_.description.empty()) text += "description: " + QuotedYaml(m_.description) + "\n";
+    text += "gravity: " + Triple(m_.gravity_W) + "\n";
+    const double g = m_.gravity_W.norm();
+    if (!(g > 0.0) || !(m_.up_W + m_.gravity_W / g).isZero(1e-12)) {
+      text += "up: " + Triple(m_.up_W) + "\n";
+    }
+    if (!frames_[0].lines.empty() || !m_.bodies[0].shapes.empty()) {
+      text += "world:\n" + FramesAndShapes(0, "  ");
+    }
+    text += "bodies:\n";
+    for (size_t b = 1; b < m_.bodies.size(); ++b) text += BodyText(b);
+    return text + joints + rest;
+  }
+
+ private:
+  struct Frames {
+    std::set<std::string> names;
+    std::vector<std::pair<std::string, Pose>> lines;
+  };
+
+  std::string ModelName() const {
+    const std::string name = NearestName(m_.name);
+    return name.empty() ? "mechanism" : name;
+  }
+
+  std::string AddFrame(int body, const std::string& name, const Pose& X) {
+    Frames& frames = frames_[body];
+    frames.lines.emplace_back(FreshName(name, &frames.names), X);
+    return frames.lines.back().first;
+  }
+
+  // "BODY" or "BODY.FRAME" for a pose on a body.
+  std::string Ref(int body, const Pose& X, const std::string& wish) {
+    if (body != 0 && IsIdentity(X)) return names_.bodies[body];
+    for (const auto& [name, known] : frames_[body].lines) {
+      if (known.matrix() == X.matrix()) return names_.bodies[body] + "." + name;
+    }
+    return names_.bodies[body] + "." + AddFrame(body, wish, X);
+  }
+  std::string PointRef(int body, const Vec3& p, const std::string& wish) {
+    Pose X = Pose::Identity();
+    X.translation() = p;
+    return Ref(body, X, wish);
+  }
+
+  std::string FramesAndShapes(int body, const std::string& indent) const {
+    std::string text;
+    if (!frames_[body].lines.empty()) text += indent + "frames:\n";
+    for (const auto& [name, X] : frames_[body].lines) {
+      text += fmt::format("{}  {}: {}\n", indent, name, PoseText(X));
+    }
+    if (!m_.bodies[body].shapes.empty()) text += indent + "shapes:\n";
+    for (const Shape& shape : m_.bodies[body].shapes) {
+      text += fmt::format("{}  - {{{}, color: {}}}\n", indent,
+                          std::visit(ShapeText{}, shape.geometry), QuotedYaml(shape.color));
+    }
+    return text;
+  }
+
+  std::string BodyText(size_t b) const {
+    const Body& body = m_.bodies[b];
+    std::string text = "  " + names_.bodies[b] + ":\n";
+    const Mat3& I = body.I_Bcm_B;
+    text += fmt::format("    mass: {}\n", body.mass);
+    if (body.mass != 0.0 || !I.isZero(0.0)) {
+      text += fmt::format(
+          "    com: {}\n    inertia: {{xx: {}, yy: {}, zz: {}, xy: {}, xz: {}, yz: {}}}\n",
+          Triple(body.p_BoBcm_B), I(0, 0), I(1, 1), I(2, 2), I(0, 1), I(0, 2), I(1, 2));
+    }
+    return text + FramesAndShapes(static_cast<int>(b), "    ");
+  }
+
+  std::string Joints() {
+    std::string text = "joints:\n";
+    for (size_t j = 0; j < m_.joints.size(); ++j) {
+      const Joint& joint = m_.joints[j];
+      const std::string& name = names_.joints[j];
+      text += fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, WordOfKind(joint.kind),
+                          Ref(joint.parent, joint.X_PF, name + "_F"),
+                          Ref(joint.child, joint.X_CM, name + "_M"));
+      const bool has_axis = joint.kind != JointKind::kFixed &&
+                            joint.kind != JointKind::kSpherical && joint.kind != JointKind::kFree;
+      if (has_axis) text += ", axis: " + Triple(joint.axis);
+      if (joint.kind == JointKind::kUniversal) text += ", axis2: " + Triple(joint.axis2);
+      text += GuessAndRange(joint);
+      if (joint.transmits_force_only) text += ", transmits: force";
+      if (joint.closure) text += ", closure: true";
+      text += "}\n";
+    }
+    return m_.joints.empty() ? "" : text;
+  }
+
+  static std::string GuessAndRange(const Joint& joint) {
+    const int n = FreedomsOf(joint.kind);
+    std::string guess, range;
+    bool limited = false;
+    for (int k = 0; k < n; ++k) {
+      guess += fmt::format("{}{}", k == 0 ? "" : ", ", joint.home[k]);
+      range += (k == 0 ? "" : ", ") + RangePair(joint.range[k]);
+      limited = limited || HasBound(joint.range[k]);
+    }
+    std::string text;
+    if (n == 1) text = ", guess: " + guess + (limited ? ", range: " + range : "");
+    if (n > 1) text = ", guess: [" + guess + "]" + (limited ? ", range: [" + range + "]" : "");
+    return text;
+  }
+
+  std::string Drives() {
+    std::string text = "drives:\n";
+    for (size_t d = 0; d < m_.drives.size(); ++d) {
+      const Drive& drive = m_.drives[d];
+      const std::string& name = names_.drives[d];
+      text += "  " + name + ": {";
+      if (const auto* on_joint = std::get_if<JointDrive>(&drive.kind)) {
+        text += "kind: joint, joint: " + names_.joints[on_joint->joint];
+        if (on_joint->coordinate != 0) {
+          text += fmt::format(", coordinate: {}", on_joint->coordinate);
+        }
+      } else {
+        const auto& leg = std::get<DistanceDrive>(drive.kind);
+        text += fmt::format("kind: distance, from: {}, to: {}",
+                            PointRef(leg.body_from, leg.p_from, name + "_from"),
+                            PointRef(leg.body_to, leg.p_to, name + "_to"));
+        if (drive.radius > 0.0) text += fmt::format(", radius: {}", drive.radius);
+      }
+      if (HasBound(drive.range)) text += ", range: " + RangePair(drive.range);
+      if (std::isfinite(drive.stiffness)) text += fmt::format(", stiffness: {}", drive.stiffness);
+      text += "}\n";
+    }
+    return m_.drives.empty() ? "" : text;
+  }
+
+  std::string Others() {
+    std::string text;
+    if (!m_.prescribed.empty()) text += "prescribed:\n";
+    std::set<std::string> taken;
+    for (const Prescribed& p : m_.prescribed) {
+      text +=
+          fmt::format("  {}: {{joint: {}}}\n", FreshName(p.name, &taken), names_.joints[p.joint]);
+    }
+    if (!m_.outputs.empty()) text += "outputs:\n";
+    for (size_t o = 0; o < m_.outputs.size(); ++o) {
+      const Output& output = m_.outputs[o];
+      const std::string& name = names_.outputs[o];
+      text +=
+          fmt::format("  {}: {{frame: {}, in: {}}}\n", name, Ref(output.body, output.X_BO, name),
+                      Ref(output.reference_body, output.X_RbR, name + "_in"));
+    }
+    if (!m_.springs.empty()) text += "springs:\n";
+    for (const SpringDamper& s : m_.springs) {
+      const std::string name = FreshName(s.name, &taken);
+      text += fmt::format(
+          "  {}: {{from: {}, to: {}, stiffness: {}, damping: {}, free_length: {}}}\n", name,
+          PointRef(s.body_from, s.p_from, name + "_from"),
+          PointRef(s.body_to, s.p_to, name + "_to"), s.stiffness, s.damping, s.free_length_m);
+    }
+    return text;
+  }
+
+  const Mechanism& m_;
+  const WrittenNames names_;
+  std::vector<Frames> frames_;
+};
+
+}  // namespace
+
+std::string QuotedYaml(const std::string& text) {
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"' || c == '\\') quoted += '\\';
+    if (c == '\n') {
+      quoted += "\\n";
+    } else {
+      quoted += c;
+    }
+  }
+  return quoted + "\"";
+}
+
+WrittenNames NamesInModel(const Mechanism& mechanism) {
+  WrittenNames names;
+  std::set<std::string> bodies = {}, joints, signals;
+  names.bodies = FreshNames(mechanism.bodies, &bodies);
+  names.joints = FreshNames(mechanism.joints, &joints);
+  names.drives = FreshNames(mechanism.drives, &signals);
+  names.outputs = FreshNames(mechanism.outputs, &signals);
+  return names;
+}
+
+std::string WriteModel(const Mechanism& mechanism) { return ModelWriter(mechanism).Text(); }
+
+}  // namespace mbv

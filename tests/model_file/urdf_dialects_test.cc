@@ -1,0 +1,201 @@
+// URDF files as exporters write them: frames as links, closure files beside them.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "model_file/load_model.h"
+#include "kinematics/mobility.h"
+
+namespace mbv {
+namespace {
+
+std::string Link(const std::string& name, double mass, double inertia, double x = 0.0) {
+  return fmt::format(
+      R"(<link name="{0}"><inertial><origin xyz="{3} 0 0"/><mass value="{1}"/>)"
+      R"(<inertia ixx="{2}" iyy="{2}" izz="{2}" ixy="0" ixz="0" iyz="0"/></inertial></link>)"
+      "\n",
+      name, mass, inertia, x);
+}
+std::string Hinge(const std::string& name, const std::string& parent, const std::string& child,
+                  double x) {
+  return fmt::format(R"(<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/>)"
+                     R"(<origin xyz="{} 0 0"/><axis xyz="0 0 1"/></joint>)"
+                     "\n",
+                     name, parent, child, x);
+}
+std::string Fixed(const std::string& parent, const std::string& child, double x) {
+  return fmt::format(
+      R"(<joint name="{1}_frame" type="fixed"><parent link="{0}"/><child link="{1}"/>)"
+      R"(<origin xyz="{2} 0 0"/></joint>)"
+      "\n",
+      parent, child, x);
+}
+
+// A four-bar linkage 0.2, 0.5, 0.4, 0.5 in a row, cut at C, whose ends are frames of 1e-9 kg.
+std::string CutFourBar(const std::string& more = "") {
+  return "<robot name=\"cut four-bar\">\n" + Link("base", 5, 0.1) + Link("crank", 1, 1e-3, 0.1) +
+         Link("coupler", 1, 2e-2, 0.25) + Link("rocker", 1, 1e-2, 0.2) + Link("C_A", 1e-9, 0) +
+         Link("C_B", 1e-9, 0) + Hinge("A", "base", "crank", 0) +
+         Hinge("B", "crank", "coupler", 0.2) + Hinge("D", "base", "rocker", 0.5) +
+         Fixed("coupler", "C_A", 0.5) + Fixed("rocker", "C_B", 0.4) + more + "</robot>\n";
+}
+
+class RobotFolder {
+ public:
+  explicit RobotFolder(const std::string& name)
+      : path_(std::filesystem::path(testing::TempDir()) / ("mbv_dialects_" + name)) {
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_ / "config");
+  }
+  ~RobotFolder() { std::filesystem::remove_all(path_); }
+  std::string Write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name) << text;
+    return (path_ / name).string();
+  }
+
+ private:
+  std::filesystem::path path_;
+};
+
+constexpr const char* kClosures = "closed_loop: [[C_A, C_B]]\ntype: [3d]\nname_mot: [A]\n";
+
+TEST(UrdfDialects, ARobotWithItsClosureFileIsReadFromTheUrdfAlone) {
+  const RobotFolder folder("bare");
+  folder.Write("robot.yaml", kClosures);
+  const LoadResult loaded = LoadModel(folder.Write("arm.urdf", CutFourBar()));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  EXPECT_EQ(m.name, "cut_four_bar");
+  EXPECT_EQ(m.bodies.size(), 5u);  // the frames are no bodies
+  ASSERT_EQ(m.drives.size(), 1u);
+  EXPECT_EQ(m.drives[0].name, "A");
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  const Vec3 a = m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0);
+  const Vec3 b = m.X_WB_home[m.FindBody("rocker")] * Vec3(0.4, 0, 0);
+  EXPECT_LT((a - b).norm(), 1e-12);
+
+  // One warning says how many, and where the mass went; another that the base is held.
+  const std::string said = loaded.diagnostics.Text();
+  EXPECT_NE(said.find("2 links are taken as frames of the bodies that carry them (C_A, C_B), their "
+                      "2e-09 kg went to coupler, rocker"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("the root link 'base' is held"), std::string::npos) << said;
+  double mass = 0.0;
+  for (const Body& body : m.bodies) mass += body.mass;
+  EXPECT_NEAR(mass, 8.0 + 2e-9, 1e-15);
+  ASSERT_NE(m.FindFrame(m.FindBody("coupler"), "C_A"), nullptr);
+}
+
+TEST(UrdfDialects, CutJointsOfCadExportersCloseLoopsAsHinges) {
+  const RobotFolder folder("cuts");
+  // At zero the loop is open: the point is where the coupler's end lies.
+  folder.Write(
+      "config/loop_closures.yaml",
+      "closures:\n  - {link_a: coupler, link_b: rocker, point: [0.7, 0, 0], axis: [0, 0, 1]}\n"
+      "independent: [A]\n");
+  const LoadResult loaded = LoadModel(folder.Write("arm.urdf", CutFourBar()));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  EXPECT_EQ(
+      m.joints.back().kind == JointKind::kRevolute || m.joints[3].kind == JointKind::kRevolute,
+      true);
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(m).redundant, 3);
+  EXPECT_EQ(m.drives.size(), 1u);
+}
+
+TEST(UrdfDialects, AMisspeltNameGetsTheNearestOne) {
+  const RobotFolder folder("slip");
+  folder.Write("robot.yaml", "closed_loop: [[C_A, C_BB]]\nname_mot: [AA]\n");
+  const LoadResult loaded = LoadModel(folder.Write("arm.urdf", CutFourBar()));
+  EXPECT_FALSE(loaded.mechanism);
+  const std::string said = loaded.diagnostics.Text();
+  EXPECT_NE(said.find("there is no link or joint 'C_BB'"), std::string::npos) << said;
+  EXPECT_NE(said.find("did you mean 'C_B'?"), std::string::npos) << said;
+  EXPECT_NE(said.find("robot.yaml:1:"), std::string::npos) << said;
+
+  folder.Write("robot.yaml", "closed_loop: []\n");
+  folder.Write("cut.yaml", "closures: [{link_a: coupler, link_b: roker, point: [0, 0, 0]}]\n");
+  const LoadResult cut = LoadModel(folder.Write("cut.urdf", CutFourBar()));
+  EXPECT_NE(cut.diagnostics.Text().find("did you mean 'rocker'?"), std::string::npos)
+      << cut.diagnostics.Text();
+}
+
+TEST(UrdfDialects, AChainOfFramesEndsOnItsCarrier) {
+  const RobotFolder folder("chain");
+  const LoadResult loaded = LoadModel(folder.Write(
+      "r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) + Link("arm", 1, 1) + Link("f1", 0, 0) +
+                    Link("f2", 1e-9, 0) + Hinge("A", "base", "arm", 0) + Fixed("arm", "f1", 1) +
+                    Fixed("f1", "f2", 0.5) + "</robot>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  const NamedFrame* frame = m.FindFrame(m.FindBody("arm"), "f2");
+  ASSERT_NE(frame, nullptr);
+  EXPECT_EQ(frame->X_BF.translation(), Vec3(1.5, 0, 0));
+  EXPECT_EQ(m.bodies.size(), 3u);
+}
+
+TEST(UrdfDialects, ALightLinkWithoutInertiaIsAMassPointAndAHeavyOneAnError) {
+  const RobotFolder folder("point");
+  const auto robot = [&](double mass) {
+    return LoadModel(folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) +
+                                                Link("arm", 1, 1) + Link("tool", mass, 0) +
+                                                Hinge("A", "base", "arm", 0) +
+                                                Fixed("arm", "tool", 2) + "</robot>"));
+  };
+  const LoadResult light = robot(1e-3);
+  ASSERT_TRUE(light.mechanism) << light.diagnostics.Text();
+  const Body& arm = light.mechanism->bodies[light.mechanism->FindBody("arm")];
+  EXPECT_DOUBLE_EQ(arm.mass, 1.001);
+  EXPECT_NEAR(arm.p_BoBcm_B.x(), 2e-3 / 1.001, 1e-15);
+  // Steiner: 1 + μ d² with the reduced mass μ.
+  EXPECT_NEAR(arm.I_Bcm_B(2, 2), 1.0 + 1e-3 / 1.001 * 4.0, 1e-14);
+  EXPECT_NEAR(arm.I_Bcm_B(0, 0), 1.0, 1e-14);
+  EXPECT_NE(light.diagnostics.Text().find("mass point: tool (0.001 kg)"), std::string::npos)
+      << light.diagnostics.Text();
+
+  const LoadResult heavy = robot(0.1);
+  EXPECT_FALSE(heavy.mechanism);
+  EXPECT_NE(heavy.diagnostics.Text().find("link 'tool': mass = 0.1 without inertia"),
+            std::string::npos)
+      << heavy.diagnostics.Text();
+}
+
+TEST(UrdfDialects, NextToNothingBetweenTwoJointsIsAConnectingPiece) {
+  const RobotFolder folder("piece");
+  const LoadResult loaded = LoadModel(
+      folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) + Link("cross", 1e-9, 0) +
+                                 Link("arm", 1, 1) + Link("marker", 1e-9, 0) +
+                                 Hinge("A", "base", "cross", 0) + Hinge("B", "cross", "arm", 1) +
+                                 Hinge("idle", "arm", "marker", 1) + "</robot>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  EXPECT_EQ(m.bodies[m.FindBody("cross")].mass, 0.0);
+  EXPECT_EQ(m.FindBody("marker"), -1);  // moves nothing of mass
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 2);
+  const std::string said = loaded.diagnostics.Text();
+  EXPECT_NE(said.find("the joints idle move nothing of mass and are held at zero"),
+            std::string::npos)
+      << said;
+  EXPECT_NE(said.find("massless connecting piece (cross)"), std::string::npos) << said;
+}
+
+TEST(UrdfDialects, LinksThatAModelFileWritesOnStayBodies) {
+  const RobotFolder folder("keep");
+  folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) + Link("tip", 0, 0) +
+                             Fixed("base", "tip", 1) + "</robot>");
+  const LoadResult loaded =
+      LoadModel(folder.Write("m.yaml", "name: m\nurdf: r.urdf\nattach: {tip: {f: [0, 0, 1]}}\n"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_GE(loaded.mechanism->FindBody("tip"), 0);
+  // Otherwise the frame is found under the link's name.
+  const LoadResult output =
+      LoadModel(folder.Write("o.yaml", "name: m\nurdf: r.urdf\noutputs: {tool: tip}\n"));
+  ASSERT_TRUE(output.mechanism) << output.diagnostics.Text();
+  EXPECT_EQ(output.mechanism->outputs[0].X_BO.translation(), Vec3(1, 0, 0));
+}
+
+}  // namespace
+}  // namespace mbv
