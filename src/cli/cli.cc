@@ -81,6 +81,7 @@ int RunCli(int argc, char** argv) {
   AddStiffnessCommand(&app, &exit_code);
   AddMutateCommand(&app, &exit_code);
   AddConvergeCommand(&app, &exit_code);
+  AddSurveyCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);

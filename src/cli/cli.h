@@ -30,6 +30,7 @@ void AddMutateCommand(CLI::App* app, int* exit_code);
 void AddConvergeCommand(CLI::App* app, int* exit_code);
 void AddRegressCommand(CLI::App* app, int* exit_code);
 void AddMergeCommand(CLI::App* app, int* exit_code);
+void AddSurveyCommand(CLI::App* app, int* exit_code);
 void AddHistoryCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

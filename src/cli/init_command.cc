@@ -28,13 +28,15 @@ void AddInitCommand(CLI::App* app, int* exit_code) {
   }
   CLI::App* init = app->add_subcommand("init", "Write a model and a scenario to start from");
   init->add_option("name", options->name, "name of your mechanism")->required();
-  init->add_option("--from", options->from, "mechanism to start from: " + names)
+  init->add_option("--from", options->from,
+                   "mechanism to start from: " + names + "; or a robot: FILE.urdf")
       ->capture_default_str();
   init->add_option("--into", options->into, "folder that gets models/ and scenarios/")
       ->capture_default_str();
   init->footer(
       "Example:\n"
       "  mbverify init my_linkage && mbverify run scenarios/my_linkage/first.yaml\n"
+      "  mbverify init my_robot --from my_robot.urdf\n"
       "Nothing that exists is overwritten.");
   init->callback([options, exit_code] { *exit_code = Init(*options); });
 }

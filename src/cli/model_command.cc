@@ -43,6 +43,7 @@ struct ModelArguments {
 ModelFormat FormatOf(const std::string& word) {
   return word == "mjcf"   ? ModelFormat::kMjcf
          : word == "urdf" ? ModelFormat::kUrdf
+         : word == "yaml" ? ModelFormat::kYaml
          : word == "json" ? ModelFormat::kJson
                           : ModelFormat::kMobility;
 }
@@ -62,15 +63,18 @@ int Model(const ModelArguments& arguments) {
   const LoadResult loaded = LoadModel(*file, options);
   fmt::print(stderr, "{}", loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
-  if (FormatOf(arguments.format) == ModelFormat::kUrdf && !loaded.mechanism->beams.empty()) {
+  const ModelFormat format = FormatOf(arguments.format);
+  if ((format == ModelFormat::kUrdf || format == ModelFormat::kYaml) &&
+      !loaded.mechanism->beams.empty()) {
     Finding finding;
     finding.severity = Severity::kWarning;
     finding.file = *file;
-    finding.message = fmt::format("URDF has rigid links only: {} beams are left out",
+    finding.message = fmt::format("{} has rigid links only: {} beams are left out",
+                                  format == ModelFormat::kUrdf ? "URDF" : "what is written",
                                   loaded.mechanism->beams.size());
     fmt::print(stderr, "{}", ToText(finding) + "\n");
   }
-  const std::string text = ModelText(*loaded.mechanism, FormatOf(arguments.format));
+  const std::string text = ModelText(*loaded.mechanism, format);
   if (arguments.out.empty()) {
     fmt::print("{}", text);
     return 0;
@@ -132,12 +136,12 @@ void ListScenarios() {
 void AddModelCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<ModelArguments>();
   CLI::App* model = app->add_subcommand("model", "Mobility report, or the generated MJCF or URDF");
-  model->add_option("model", arguments->model, "model name or model.yaml")->required();
+  model->add_option("model", arguments->model, "model name, model.yaml or .urdf file")->required();
   model
       ->add_option("--format", arguments->format,
-                   "text (mobility report), json (the same for programs), or the model as mjcf or "
-                   "urdf")
-      ->check(CLI::IsMember({"text", "json", "mjcf", "urdf"}));
+                   "text (mobility report), json (the same for programs), or the model as mjcf, "
+                   "urdf or yaml (a model file with the numbers that the parameters give)")
+      ->check(CLI::IsMember({"text", "json", "mjcf", "urdf", "yaml"}));
   model->add_option("--out", arguments->out, "write to this file instead of stdout");
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);

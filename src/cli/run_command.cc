@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 #include <new>
 
@@ -9,6 +10,8 @@
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "core/demand.h"
+#include "core/files.h"
+#include "pipeline/default_setup.h"
 #include "pipeline/out_of_memory.h"
 #include "pipeline/run_scenario.h"
 #include "report/stiffness_report.h"
@@ -75,6 +78,30 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   return true;
 }
 
+// A robot's file is run by a first motion; its model and scenario are left to go on from.
+bool SetUpRobot(const std::string& robot, const RunArguments& arguments, FindingPrinter* findings,
+                std::string* scenario) {
+  const DefaultSetupResult made = MakeDefaultSetup(robot, "", "./model.yaml");
+  findings->Print(made.diagnostics);
+  if (!made.setup) return false;
+  const std::filesystem::path folder =
+      std::filesystem::path(arguments.out) / made.setup->mechanism.name / "setup";
+  const std::filesystem::path model = folder / "model.yaml", first = folder / "first.yaml";
+  for (const auto& [path, text] :
+       {std::pair(model, made.setup->model), std::pair(first, made.setup->scenario)}) {
+    const std::string trouble = WriteFile(path, text);
+    if (!trouble.empty()) {
+      fmt::print(stderr, "error: {}\n", trouble);
+      return false;
+    }
+  }
+  if (!arguments.quiet) {
+    fmt::print(stderr, "{} is run by {}; go on from there\n", robot, first.string());
+  }
+  *scenario = first.string();
+  return true;
+}
+
 int Run(const RunArguments& arguments) {
   RunOptions options;
   if (!MakeOptions(arguments, &options)) return 2;
@@ -88,7 +115,13 @@ int Run(const RunArguments& arguments) {
   FindingPrinter findings(stderr);
   RunCounts counts;
   int exit_code = 0;
-  for (const std::string& file : files) {
+  for (const std::string& given : files) {
+    std::string file = given;
+    if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
+      exit_code = WorseExit(exit_code, 2);
+      counts += RunCounts{.scenarios = 1, .bad_input = 1};
+      continue;
+    }
     if (progress.active()) {
       options.progress = [&](const std::string& stage, double fraction) {
         progress.Show(file + ": " + stage, fraction);
@@ -109,7 +142,8 @@ int Run(const RunArguments& arguments) {
 void AddRunCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* run = app->add_subcommand("run", "Compare analytic, reference and simulated forces");
-  run->add_option("scenario", arguments->scenarios, "scenario files, or folders of them")
+  run->add_option("scenario", arguments->scenarios,
+                  "scenario files, folders of them, or robots (.urdf)")
       ->required();
   run->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   run->add_option("--mode", arguments->mode, "overrides the scenario's simulation mode")
@@ -128,6 +162,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   run->footer(
       "Examples:\n"
       "  mbverify run scenarios/stabilizing_platform/sea_state.yaml\n"
+      "  mbverify run my_robot.urdf\n"
       "  mbverify run scenarios/spr_tripod --mode inverse --quiet\n"
       "  mbverify run my.yaml --set parameters.m_p=45000 --set simulation.step_s=0.0005\n"
       "Exit codes: 0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");

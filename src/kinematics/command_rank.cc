@@ -108,4 +108,68 @@ std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
   return chosen;
 }
 
+namespace {
+
+Command HeldAt(const Coordinate& coordinate) {
+  return {.name = "", .terms = {{coordinate, 1.0}}, .profile = {}};
+}
+
+}  // namespace
+
+CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
+                                   const std::vector<Coordinate>& candidates, size_t preferred) {
+  constexpr double kIndependent = 1e-5;  // share of a gradient that others do not hold
+  const BodyStates home = HomeStates(mechanism);
+  const MatX motion = FindRank(JointRows(mechanism, home), NullSpaces::kMotion).motion;
+  CoordinateChoice choice{
+      .freedoms = static_cast<int>(motion.cols()), .chosen = {}, .dependent = {}};
+  // Gradients in the freedoms; what is chosen is taken out of those that are left.
+  MatX gradients(static_cast<Eigen::Index>(candidates.size()), motion.cols());
+  for (size_t k = 0; k < candidates.size(); ++k) {
+    gradients.row(static_cast<Eigen::Index>(k)) =
+        CommandRow(mechanism, home, HeldAt(candidates[k])) * motion;
+  }
+  const VecX lengths = gradients.rowwise().norm();
+  const auto take = [&](Eigen::Index k) {
+    choice.chosen.push_back(static_cast<size_t>(k));
+    const Eigen::RowVectorXd direction = gradients.row(k).normalized();
+    gradients -= (gradients * direction.transpose()) * direction;
+  };
+  for (size_t k = 0; k < preferred && choice.left() >= 0; ++k) {
+    const auto row = static_cast<Eigen::Index>(k);
+    if (gradients.row(row).norm() > kIndependent * std::max(lengths[row], kIndependent)) {
+      take(row);
+    } else {
+      choice.dependent.push_back(k);
+    }
+  }
+  while (choice.left() > 0 && gradients.rows() > 0) {
+    Eigen::Index best = 0;
+    const double most = gradients.rowwise().norm().maxCoeff(&best);
+    if (most <= kIndependent) break;
+    take(best);
+  }
+  return choice;
+}
+
+std::vector<Vec6> FreeMotion(const Mechanism& mechanism, const std::vector<Coordinate>& held) {
+  const BodyStates home = HomeStates(mechanism);
+  MatX J = JointRows(mechanism, home);
+  const auto rows = J.rows();
+  J.conservativeResize(rows + static_cast<Eigen::Index>(held.size()), J.cols());
+  for (size_t k = 0; k < held.size(); ++k) {
+    J.row(rows + static_cast<Eigen::Index>(k)) = CommandRow(mechanism, home, HeldAt(held[k]));
+  }
+  const MatX motion = FindRank(J, NullSpaces::kMotion).motion;
+  if (motion.cols() == 0) return {};
+  const VecX first = motion.col(0) / motion.col(0).cwiseAbs().maxCoeff();
+  std::vector<Vec6> twists(mechanism.bodies.size(), Vec6::Zero());
+  const double length = CharacteristicLength(mechanism);
+  for (size_t b = 1; b < twists.size(); ++b) {
+    twists[b] = first.segment<6>(6 * (static_cast<Eigen::Index>(b) - 1));
+    twists[b].tail<3>() *= length;
+  }
+  return twists;
+}
+
 }  // namespace mbv

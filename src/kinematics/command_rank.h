@@ -29,4 +29,23 @@ struct CommandRank {
                                                       const std::vector<Command>& candidates,
                                                       size_t count);
 
+/// A set of coordinates that holds each freedom once.
+struct CoordinateChoice {
+  int freedoms = 0;               ///< of the mechanism, at home
+  std::vector<size_t> chosen;     ///< of the candidates, by index
+  std::vector<size_t> dependent;  ///< of the first ones, what depends on others before it
+  [[nodiscard]] int left() const { return freedoms - static_cast<int>(chosen.size()); }
+};
+
+/// Takes the first `preferred` candidates in their order, as far as they are independent at home,
+/// then of the rest what moves most while those before are held.
+[[nodiscard]] CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
+                                                 const std::vector<Coordinate>& candidates,
+                                                 size_t preferred);
+
+/// A freedom that stays when these coordinates are held: twists [ω; v] per body, world axes, the
+/// largest entry 1. Empty if none stays.
+[[nodiscard]] std::vector<Vec6> FreeMotion(const Mechanism& mechanism,
+                                           const std::vector<Coordinate>& held);
+
 }  // namespace mbv

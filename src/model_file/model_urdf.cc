@@ -44,8 +44,14 @@ void ModelReader::ImportUrdf(const YamlNode& node) {
   joints_good_ = true;
   AddUrdf(tree, path.string());
   ReadUrdfGuesses(map, tree.joints);
+  if (bare_urdf_ && motors.empty()) {
+    for (const std::string& name : tree.transmission_joints) {
+      const int index = mechanism_.FindJoint(name);
+      if (index >= 0 && FreedomsOf(mechanism_.joints[index].kind) == 1) motors.push_back(name);
+    }
+  }
   // The model file's own drives are the better ones.
-  if (blocks_.front().Section("drives") == nullptr) AddUrdfDrives(motors, closures);
+  if (blocks_.front().Section("drives") == nullptr) AddUrdfDrives(motors, &node);
 }
 
 void ModelReader::TakeUrdfLiterals(Body* body) {

@@ -14,6 +14,7 @@
 #include "analytic/closed_form.h"
 #include "core/files.h"
 #include "core/names.h"
+#include "pipeline/default_setup.h"
 
 namespace mbv {
 namespace {
@@ -95,7 +96,8 @@ class Initialiser {
 
   InitResult Run() {
     CheckName();
-    const Starter* starter = FindStarter();
+    const bool from_file = IsRobotFile(options_.from);
+    const Starter* starter = from_file ? nullptr : FindStarter();
     const fs::path into = fs::path(options_.into).lexically_normal();
     const fs::path model = into / "models" / options_.name;
     const fs::path scenario = into / "scenarios" / options_.name;
@@ -105,7 +107,12 @@ class Initialiser {
     }
     CheckFolder(into);
     if (result_.diagnostics.has_errors()) return std::move(result_);
-    Write(*starter, model, scenario);
+    if (from_file) {
+      WriteFromFile(model, scenario);
+    } else {
+      Write(Filled(starter->model, options_.name), Filled(starter->first, options_.name), model,
+            scenario);
+    }
     return std::move(result_);
   }
 
@@ -157,9 +164,19 @@ class Initialiser {
     Add(fmt::format("--into {} is no folder", into.string()), "");
   }
 
-  void Write(const Starter& starter, const fs::path& model, const fs::path& scenario) {
-    NewFolder a(model, "model.yaml", Filled(starter.model, options_.name));
-    NewFolder b(scenario, "first.yaml", Filled(starter.first, options_.name));
+  void WriteFromFile(const fs::path& model, const fs::path& scenario) {
+    DefaultSetupResult made = MakeDefaultSetup(options_.from, options_.name, options_.name);
+    result_.diagnostics.Append(made.diagnostics);
+    if (!made.setup) return;
+    const std::string head =
+        fmt::format("# Made by mbverify from {}.\n", fs::path(options_.from).filename().string());
+    Write(head + made.setup->model, made.setup->scenario, model, scenario);
+  }
+
+  void Write(const std::string& model_text, const std::string& first_text, const fs::path& model,
+             const fs::path& scenario) {
+    NewFolder a(model, "model.yaml", model_text);
+    NewFolder b(scenario, "first.yaml", first_text);
     std::string trouble = a.Fill();
     if (trouble.empty()) trouble = b.Fill();
     if (trouble.empty()) trouble = a.Commit();

@@ -2,6 +2,7 @@
 
 #include "mjcf/mjcf.h"
 #include "model_file/urdf.h"
+#include "model_file/write_model.h"
 #include "report/mobility_text.h"
 
 namespace mbv {
@@ -16,6 +17,8 @@ std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
       return WriteMjcf(mechanism);
     case ModelFormat::kUrdf:
       return WriteUrdf(mechanism);
+    case ModelFormat::kYaml:
+      return WriteModel(mechanism);
   }
   return "";
 }

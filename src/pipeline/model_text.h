@@ -7,8 +7,8 @@
 
 namespace mbv {
 
-/// Mobility report for people or as JSON, or the generated MJCF or URDF.
-enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf };
+/// Mobility report for people or as JSON, or the generated MJCF, URDF or model.yaml.
+enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf, kYaml };
 [[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format);
 
 }  // namespace mbv

@@ -1,0 +1,113 @@
+// mbverify survey
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <filesystem>
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "core/files.h"
+#include "pipeline/survey.h"
+#include "regress/in_children.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct SurveyArguments {
+  std::string folder, out;
+  double timeout_s = 300.0;
+};
+
+// A folder for the children's files that goes with this object.
+class ScratchFolder {
+ public:
+  ScratchFolder() {
+    std::error_code error;
+    fs::path base = fs::temp_directory_path(error);
+    std::string pattern = (error ? fs::path("/tmp") : base) / "mbverify-survey-XXXXXX";
+    if (mkdtemp(pattern.data()) != nullptr) path_ = pattern;
+  }
+  ~ScratchFolder() {
+    std::error_code error;
+    if (!path_.empty()) fs::remove_all(path_, error);
+  }
+  ScratchFolder(const ScratchFolder&) = delete;
+  ScratchFolder& operator=(const ScratchFolder&) = delete;
+  [[nodiscard]] const std::string& path() const { return path_; }
+
+ private:
+  std::string path_;
+};
+
+SurveyRow RowOf(const std::string& file, const std::string& scratch, double timeout_s) {
+  const auto texts =
+      InChildren(1, timeout_s, [&](size_t) { return RowText(SurveyFile(file, scratch)); });
+  SurveyRow row;
+  row.file = file;
+  if (!texts[0]) {
+    row.message = fmt::format("ended by a crash, or not finished after {:g} s", timeout_s);
+  } else if (!ReadRowText(*texts[0], &row)) {
+    row.message = "gave no readable result";
+  }
+  return row;
+}
+
+int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& rows) {
+  const fs::path out(arguments.out);
+  int exit_code = WriteWholeFile((out / "survey.csv").string(), SurveyCsv(rows), {});
+  exit_code = WorseExit(exit_code, WriteWholeFile((out / "survey.html").string(),
+                                                  SurveyHtml(rows, arguments.folder), {}));
+  if (exit_code == 0) {
+    fmt::print(stderr, "wrote {0}/survey.csv and {0}/survey.html\n", out.string());
+  }
+  return exit_code;
+}
+
+int Survey(const SurveyArguments& arguments) {
+  std::vector<std::string> unread;
+  const std::vector<std::string> files = FilesBelow(arguments.folder, ".urdf", &unread);
+  for (const std::string& line : unread) fmt::print(stderr, "{}\n", line);
+  if (files.empty()) {
+    fmt::print(stderr, "{}: error: no *.urdf file in this folder\n", arguments.folder);
+    return 2;
+  }
+  const ScratchFolder scratch;
+  if (scratch.path().empty()) {
+    fmt::print(stderr, "error: no folder for temporary files can be made\n");
+    return 3;
+  }
+  std::vector<SurveyRow> rows;
+  for (size_t i = 0; i < files.size(); ++i) {
+    rows.push_back(RowOf(files[i], (fs::path(scratch.path()) / fmt::format("{}", i)).string(),
+                         arguments.timeout_s));
+    rows.back().file = fs::path(files[i]).lexically_relative(arguments.folder).string();
+    fmt::print(stderr, "{} of {}: {} {}\n", i + 1, files.size(), rows.back().file,
+               rows.back().status);
+  }
+  fmt::print("{}", SurveyTable(rows));
+  const int exit_code = SurveyExit(rows);
+  return arguments.out.empty() ? exit_code : WorseExit(exit_code, WriteSurvey(arguments, rows));
+}
+
+}  // namespace
+
+void AddSurveyCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<SurveyArguments>();
+  CLI::App* survey = app->add_subcommand(
+      "survey", "All robots below a folder: do they load, close and agree in a first motion?");
+  survey->add_option("folder", arguments->folder, "folder with .urdf files")->required();
+  survey->add_option("--out", arguments->out, "folder for survey.csv and survey.html");
+  survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  survey->footer(
+      "Example:\n  mbverify survey my_robots --out out\n"
+      "Exit codes: 0 all ok, or refused for a fault of the file itself; 1 some disagree or do not "
+      "close; 3 some failed");
+  survey->callback([arguments, exit_code] { *exit_code = Survey(*arguments); });
+}
+
+}  // namespace mbv

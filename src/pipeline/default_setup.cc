@@ -1,0 +1,310 @@
+#include "pipeline/default_setup.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/text.h"
+#include "kinematics/command_rank.h"
+#include "kinematics/constraints.h"
+#include "mechanism/reach.h"
+#include "model_file/load_model.h"
+#include "model_file/write_model.h"
+#include "pipeline/ranges.h"
+#include "reference/reference.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kMostNames = 6;
+
+bool CanBeDriven(JointKind kind, int coordinate) {
+  if (kind == JointKind::kSpherical) return false;
+  return kind != JointKind::kFree || coordinate < 3;
+}
+
+// The drives' coordinates, then all others that can be driven.
+std::vector<Coordinate> Candidates(const Mechanism& m) {
+  std::vector<Coordinate> candidates;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    candidates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+  }
+  for (size_t j = 0; j < m.joints.size(); ++j) {
+    for (int c = 0; c < FreedomsOf(m.joints[j].kind); ++c) {
+      const bool driven = std::any_of(m.drives.begin(), m.drives.end(), [&](const Drive& drive) {
+        const auto* on = std::get_if<JointDrive>(&drive.kind);
+        return on != nullptr && on->joint == static_cast<int>(j) && on->coordinate == c;
+      });
+      if (!driven && CanBeDriven(m.joints[j].kind, c)) {
+        candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
+      }
+    }
+  }
+  return candidates;
+}
+
+Drive DriveOn(const Mechanism& m, const Coordinate& coordinate) {
+  const Joint& joint = m.joints[coordinate.index];
+  Drive drive{.name = joint.name,
+              .kind = JointDrive{coordinate.index, coordinate.component},
+              .range = joint.range[coordinate.component]};
+  if (FreedomsOf(joint.kind) > 1) drive.name += fmt::format("_{}", coordinate.component);
+  return drive;
+}
+
+// A ball that turns in this motion becomes a universal joint that does not; empty without one.
+std::string HoldSpin(const std::vector<Vec6>& motion, Mechanism* m) {
+  for (Joint& joint : m->joints) {
+    if (joint.kind != JointKind::kSpherical) continue;
+    const Vec3 turn = motion[joint.child].head<3>() - motion[joint.parent].head<3>();
+    if (turn.norm() < 1e-3) continue;
+    Mat3 E;
+    E.col(2) = turn.normalized();
+    E.col(0) = E.col(2).unitOrthogonal();
+    E.col(1) = E.col(2).cross(E.col(0));
+    joint.kind = JointKind::kUniversal;
+    joint.axis = Vec3::UnitX();
+    joint.axis2 = Vec3::UnitY();
+    joint.X_PF.linear() = m->X_WB_home[joint.parent].linear().transpose() * E;
+    joint.X_CM.linear() = m->X_WB_home[joint.child].linear().transpose() * E;
+    joint.guess = joint.home = {};
+    joint.range = {};
+    return joint.name;
+  }
+  return "";
+}
+
+// How fast the bodies are against the drives.
+double Quickness(const Mechanism& m, const ReferenceSample& sample, double length) {
+  double fastest = 0.0;
+  for (const Vec6& V : sample.states.V_WB) {
+    fastest = std::max({fastest, V.head<3>().norm(), V.tail<3>().norm() / length});
+  }
+  double drives = 0.0;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    const double rate = sample.driven.velocity[static_cast<Eigen::Index>(d)];
+    drives = std::max(drives, std::abs(rate) / (PositionUnit(m, m.drives[d]) == "m" ? length : 1));
+  }
+  return drives > 0.0 ? fastest / drives : 0.0;
+}
+
+class MotionSearch {
+ public:
+  MotionSearch(const Mechanism& m, const std::vector<std::string>& resting)
+      : m_(m), length_(CharacteristicLength(m)) {
+    BodyStates home;
+    home.Resize(m.bodies.size());
+    home.X_WB = m.X_WB_home;
+    motion_.beyond_ranges = !IsWithinRanges(m, m.X_WB_home);
+    motion_.duration_s = 1.0;
+    for (size_t d = 0; d < m.drives.size(); ++d) {
+      motion_.strokes.push_back(
+          FullStroke(d, DriveRow(m, m.drives[d], home).value, Contains(resting, m.drives[d].name)));
+    }
+  }
+
+  FirstMotion Run() {
+    const std::vector<DriveStroke> full = motion_.strokes;
+    constexpr int kHalvings = 7;
+    // At the smallest motion the bodies are as fast as at home.
+    const auto scaled = [&](double scale) {
+      for (size_t d = 0; d < full.size(); ++d) {
+        motion_.strokes[d].height = scale * full[d].height;
+      }
+    };
+    scaled(std::ldexp(1.0, -kHalvings));
+    double at_home = 0.0;
+    if (!Follow(std::numeric_limits<double>::infinity(), &at_home)) return motion_;
+    for (int i = 0; i <= kHalvings; ++i) {
+      scaled(std::ldexp(1.0, -i));
+      double most = 0.0;
+      if (!Follow(kMostQuicker * at_home, &most)) continue;
+      motion_.found = true;
+      break;
+    }
+    return motion_;
+  }
+
+ private:
+  static constexpr double kMostQuicker = 3.0;
+
+  DriveStroke FullStroke(size_t d, double home, bool rests) const {
+    const Drive& drive = m_.drives[d];
+    DriveStroke stroke{.home = home, .height = 0.0};
+    // Not all at once, so that forces can be told apart.
+    stroke.start_s = 0.05 * static_cast<double>(d % 4);
+    stroke.duration_s = motion_.duration_s - 0.2;
+    if (rests) return stroke;
+    const double usual = PositionUnit(m_, drive) == "m" ? 0.1 * length_ : 0.2;
+    const double up = drive.range.upper - home, down = home - drive.range.lower;
+    const double sign = up >= down || up >= usual ? 1.0 : -1.0;
+    const double room = sign > 0.0 ? up : down;
+    stroke.height = sign * std::min(usual, room > 0.0 ? 0.6 * room : usual);
+    return stroke;
+  }
+
+  Motion Commands() const {
+    Motion motion{.duration_s = motion_.duration_s, .sample_s = 0.02, .commands = {}, .loads = {}};
+    for (size_t d = 0; d < m_.drives.size(); ++d) {
+      const DriveStroke& stroke = motion_.strokes[d];
+      Profile profile{{ConstantTerm{stroke.home}}};
+      profile.terms.emplace_back(BumpTerm{stroke.start_s, stroke.duration_s, stroke.height});
+      const Coordinate coordinate{Coordinate::Kind::kDrive, static_cast<int>(d), 0};
+      motion.commands.push_back({m_.drives[d].name, {{coordinate, 1.0}}, profile});
+    }
+    return motion;
+  }
+
+  // False where the motion cannot be followed, leaves a range or gets quicker than `limit`.
+  bool Follow(double limit, double* quickest) const {
+    const Motion motion = Commands();
+    ReferenceSolver solver(m_, motion);
+    ReferenceSample sample;
+    CommandSample command;
+    const int samples = static_cast<int>(std::lround(motion.duration_s / motion.sample_s));
+    for (int i = 0; i <= samples; ++i) {
+      EvaluateMotion(motion, i * motion.sample_s, &command);
+      if (!solver.Kinematics(command, &sample).ok()) return false;
+      const double quick = Quickness(m_, sample, length_);
+      if (!std::isfinite(quick) || quick > limit) return false;
+      *quickest = std::max(*quickest, quick);
+      if (!motion_.beyond_ranges && !IsWithinRanges(m_, sample.states.X_WB)) return false;
+    }
+    return true;
+  }
+
+  const Mechanism& m_;
+  const double length_;
+  FirstMotion motion_;
+};
+
+std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
+                         const std::string& model_ref, const std::vector<std::string>& notes) {
+  const WrittenNames names = NamesInModel(m);
+  std::string text =
+      "# A first motion, made by mbverify: each drive goes out and back again.\n"
+      "# All keys: docs/scenario_format.md.\n";
+  for (const std::string& note : notes) text += "# " + note + "\n";
+  text += fmt::format(
+      "mechanism: {}\ndescription: Each drive out and back, from rest to rest\nmotion:\n"
+      "  duration_s: {}\n  sample_s: 0.01\n  commands:\n",
+      QuotedYaml(model_ref), motion.duration_s);
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    const DriveStroke& stroke = motion.strokes[d];
+    if (stroke.height == 0.0) {
+      text += fmt::format("    {}: home\n", names.drives[d]);
+    } else {
+      text += fmt::format(
+          "    {}: [home, {{bump: {{start_s: {:g}, duration_s: {:g}, height: {:.6g}}}}}]\n",
+          names.drives[d], stroke.start_s, stroke.duration_s, stroke.height);
+    }
+  }
+  return text + fmt::format(
+                    "analytic: none\n"
+                    "simulation: {{mode: forward, step_s: 0.001, stock_too: false{}}}\n"
+                    "checks: {{force_nrmse: {{forward: 1.0e-6, inverse: 1.0e-10}}}}\n"
+                    "snapshots: {{times_s: [0, {:g}]}}\n",
+                    motion.beyond_ranges ? ", ignore_ranges: true" : "", 0.5 * motion.duration_s);
+}
+
+}  // namespace
+
+bool IsRobotFile(const std::string& file) { return file.ends_with(".urdf"); }
+
+Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::string>* notes) {
+  Mechanism m = mechanism;
+  std::vector<std::string> held;
+  for (;;) {
+    const std::vector<Coordinate> candidates = Candidates(m);
+    const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
+    std::vector<Coordinate> taken;
+    for (const size_t k : choice.chosen) taken.push_back(candidates[k]);
+    if (choice.left() > 0) {
+      const std::string ball = HoldSpin(FreeMotion(m, taken), &m);
+      if (!ball.empty()) {
+        held.push_back(ball);
+        continue;
+      }
+      notes->push_back(
+          fmt::format("{} freedoms cannot be held by a drive on a joint", choice.left()));
+    }
+    std::vector<Drive> drives;
+    std::vector<std::string> dropped, added;
+    for (size_t d = 0; d < m.drives.size(); ++d) {
+      if (std::find(choice.dependent.begin(), choice.dependent.end(), d) ==
+          choice.dependent.end()) {
+        drives.push_back(m.drives[d]);
+      } else {
+        dropped.push_back(m.drives[d].name);
+      }
+    }
+    for (const Coordinate& coordinate : taken) {
+      if (coordinate.kind != Coordinate::Kind::kJoint) continue;
+      drives.push_back(DriveOn(m, coordinate));
+      added.push_back(drives.back().name);
+    }
+    if (!held.empty()) {
+      notes->push_back(
+          fmt::format("these balls are universal joints here, so that rods do not spin "
+                      "about their own axes: {}",
+                      Joined(held, kMostNames)));
+    }
+    if (!dropped.empty()) {
+      notes->push_back(fmt::format("these drives depend on the others and are left out: {}",
+                                   Joined(dropped, kMostNames)));
+    }
+    if (!added.empty()) {
+      notes->push_back(
+          fmt::format("{} freedom{} without a drive {} held by added drives, chosen by rank: {}",
+                      added.size(), added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are",
+                      Joined(added, kMostNames)));
+    }
+    m.drives = std::move(drives);
+    return m;
+  }
+}
+
+FirstMotion FindFirstMotion(const Mechanism& mechanism, const std::vector<std::string>& resting) {
+  return MotionSearch(mechanism, resting).Run();
+}
+
+DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
+                                    const std::string& model_ref) {
+  DefaultSetupResult result;
+  LoadResult loaded = LoadModel(file);
+  result.diagnostics = loaded.diagnostics;
+  if (!loaded.mechanism) return result;
+  DefaultSetup setup;
+  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &setup.notes);
+  if (!name.empty()) m.name = name;
+  if (m.drives.empty()) {
+    result.diagnostics.AddError(file, "the mechanism has no freedom: there is nothing to move");
+    return result;
+  }
+  // Added drives hold what the robot's own ones leave free; without own ones all move.
+  std::vector<std::string> resting;
+  for (const Drive& drive : m.drives) {
+    if (!loaded.mechanism->drives.empty() && loaded.mechanism->FindDrive(drive.name) < 0) {
+      resting.push_back(drive.name);
+    }
+  }
+  const FirstMotion motion = FindFirstMotion(m, resting);
+  if (!motion.found) {
+    setup.notes.emplace_back(
+        "no motion was found that stays away from singular poses: the smallest is taken");
+  }
+  if (motion.beyond_ranges) {
+    setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
+  }
+  setup.model = WriteModel(m);
+  setup.scenario = ScenarioText(m, motion, model_ref, setup.notes);
+  setup.mechanism = std::move(m);
+  for (const std::string& note : setup.notes) {
+    result.diagnostics.Add({Severity::kWarning, file, 0, 0, note, ""});
+  }
+  result.setup = std::move(setup);
+  return result;
+}
+
+}  // namespace mbv

@@ -1,0 +1,259 @@
+#include "pipeline/survey.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+
+#include "core/files.h"
+#include "core/text.h"
+#include "kinematics/constraints.h"
+#include "kinematics/mobility.h"
+#include "model_file/load_model.h"
+#include "pipeline/default_setup.h"
+#include "pipeline/run_scenario.h"
+#include "report/html_text.h"
+
+namespace mbv {
+namespace {
+
+constexpr char kBetween = '\x1f';  // between the fields of a row's text
+
+std::string FirstError(const Diagnostics& diagnostics) {
+  for (const Finding& finding : diagnostics.findings()) {
+    if (finding.severity != Severity::kError) continue;
+    return finding.message + (finding.hint.empty() ? "" : " (" + finding.hint + ")");
+  }
+  return "";
+}
+
+std::string AllWarnings(const Diagnostics& diagnostics) {
+  std::string text;
+  for (const Finding& finding : diagnostics.findings()) {
+    text += (text.empty() ? "" : "; ") + finding.message;
+  }
+  return text;
+}
+
+void MeasureHome(const Mechanism& m, SurveyRow* row) {
+  row->bodies = static_cast<int>(m.bodies.size()) - 1;
+  BodyStates home;
+  home.Resize(m.bodies.size());
+  home.X_WB = m.X_WB_home;
+  row->loops = 0;
+  row->gap_m = row->gap_rad = 0.0;
+  for (const Joint& joint : m.joints) {
+    if (!joint.closure) continue;
+    ++row->loops;
+    const ConstraintRows rows = RowsOf(joint, home, false);
+    if (rows.translation_rows > 0) {
+      row->gap_m =
+          std::max(row->gap_m, rows.residual.head(rows.translation_rows).cwiseAbs().maxCoeff());
+    }
+    const Pose X_FM =
+        (home.X_WB[joint.parent] * joint.X_PF).inverse() * (home.X_WB[joint.child] * joint.X_CM);
+    row->gap_rad = std::max(row->gap_rad, RotationGap(joint, X_FM));
+  }
+  const Mobility mobility = AnalyseMobility(m);
+  row->freedoms = mobility.freedoms;
+  row->redundant = mobility.redundant;
+}
+
+// Agreement of one mode; false with the reason in the row where it does not agree.
+bool RunMode(const std::string& scenario, const char* mode, double* nrmse, SurveyRow* row) {
+  RunOptions options;
+  options.pictures = options.page = false;
+  options.scenario.set.emplace_back("simulation.mode", mode);
+  const RunOutcome outcome = RunScenario(scenario, options);
+  if (!outcome.report) {
+    row->status = "failed";
+    row->message = fmt::format("{}: {}", mode, FirstError(outcome.diagnostics));
+    return false;
+  }
+  const Comparison& comparison = outcome.report->comparison;
+  if (const PairComparison* pair = comparison.FindPair("simulated_vs_reference")) {
+    const auto force = pair->metrics.find(Metric::kForceNrmse);
+    if (force != pair->metrics.end()) *nrmse = force->second.value;
+  }
+  if (comparison.verdict == Verdict::kAgree) return true;
+  row->status = comparison.verdict == Verdict::kDisagree ? "disagree" : "failed";
+  row->message = fmt::format("{}: {}", mode, comparison.reason);
+  return false;
+}
+
+void Survey(const std::string& file, const std::string& scratch, SurveyRow* row) {
+  // The robot as it is, before drives are added to it.
+  LoadResult loaded = LoadModel(file);
+  if (!loaded.mechanism) {
+    row->message = FirstError(loaded.diagnostics);
+    const bool open = row->message.find("does not close") != std::string::npos;
+    row->status = open ? "not_closed" : "refused";
+    return;
+  }
+  MeasureHome(*loaded.mechanism, row);
+  DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
+  if (!made.setup) {
+    row->message = FirstError(made.diagnostics);
+    row->status = "failed";
+    return;
+  }
+  const std::filesystem::path folder(scratch);
+  for (const auto& [name, text] : {std::pair("model.yaml", made.setup->model),
+                                   std::pair("first.yaml", made.setup->scenario)}) {
+    if (const std::string trouble = WriteFile(folder / name, text); !trouble.empty()) {
+      row->message = trouble;
+      return;
+    }
+  }
+  const std::string scenario = (folder / "first.yaml").string();
+  const bool inverse = RunMode(scenario, "inverse", &row->inverse_nrmse, row);
+  const std::string said = row->message, status = row->status;
+  const bool forward = RunMode(scenario, "forward", &row->forward_nrmse, row);
+  if (!inverse) {
+    row->message = said;
+    row->status = status;
+  } else if (forward) {
+    row->status = "ok";
+    row->message = AllWarnings(made.diagnostics);
+  }
+}
+
+std::string CsvField(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  if (text.find_first_of("\",") == std::string::npos) return text;
+  std::string quoted = "\"";
+  for (const char c : text) {
+    if (c == '"') quoted += '"';
+    quoted += c;
+  }
+  return quoted + "\"";
+}
+
+std::string Count(int n) { return n < 0 ? "" : fmt::format("{}", n); }
+std::string Small(double x) { return std::isfinite(x) ? fmt::format("{:.2g}", x) : ""; }
+std::string Seconds(double x) { return std::isfinite(x) ? fmt::format("{:.1f}", x) : ""; }
+
+std::vector<std::string> Fields(const SurveyRow& row) {
+  return {row.file,
+          row.status,
+          Count(row.bodies),
+          Count(row.loops),
+          Count(row.freedoms),
+          Count(row.redundant),
+          Small(row.gap_m),
+          Small(row.gap_rad),
+          Small(row.inverse_nrmse),
+          Small(row.forward_nrmse),
+          Seconds(row.seconds),
+          row.message};
+}
+
+const std::vector<std::string> kSurveyColumns = {
+    "file",  "status",  "bodies",        "loops",         "freedoms", "redundant",
+    "gap_m", "gap_rad", "inverse_nrmse", "forward_nrmse", "seconds",  "message"};
+
+}  // namespace
+
+SurveyRow SurveyFile(const std::string& file, const std::string& scratch) {
+  const auto start = std::chrono::steady_clock::now();
+  SurveyRow row;
+  row.file = file;
+  Survey(file, scratch, &row);
+  row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return row;
+}
+
+std::string RowText(const SurveyRow& row) {
+  std::string message = row.message;
+  std::erase(message, kBetween);
+  return fmt::format("{1}{0}{2}{0}{3}{0}{4}{0}{5}{0}{6}{0}{7}{0}{8}{0}{9}{0}{10}{0}{11}", kBetween,
+                     row.status, row.bodies, row.loops, row.freedoms, row.redundant, row.gap_m,
+                     row.gap_rad, row.inverse_nrmse, row.forward_nrmse, row.seconds, message);
+}
+
+bool ReadRowText(const std::string& text, SurveyRow* row) {
+  std::vector<std::string> fields;
+  std::istringstream stream(text);
+  for (std::string field; std::getline(stream, field, kBetween);) fields.push_back(field);
+  if (text.ends_with(kBetween)) fields.emplace_back();
+  if (fields.size() != 11) return false;
+  row->status = fields[0];
+  int* counts[] = {&row->bodies, &row->loops, &row->freedoms, &row->redundant};
+  for (size_t i = 0; i < 4; ++i) *counts[i] = std::atoi(fields[1 + i].c_str());
+  double* values[] = {&row->gap_m, &row->gap_rad, &row->inverse_nrmse, &row->forward_nrmse,
+                      &row->seconds};
+  for (size_t i = 0; i < 5; ++i) *values[i] = std::strtod(fields[5 + i].c_str(), nullptr);
+  row->message = fields[10];
+  return true;
+}
+
+std::string SurveyCsv(const std::vector<SurveyRow>& rows) {
+  std::string text;
+  for (const std::string& column : kSurveyColumns) text += (text.empty() ? "" : ",") + column;
+  for (const SurveyRow& row : rows) {
+    std::string line;
+    for (const std::string& field : Fields(row)) line += "," + CsvField(field);
+    text += "\n" + line.substr(1);
+  }
+  return text + "\n";
+}
+
+std::string SurveyTable(const std::vector<SurveyRow>& rows) {
+  size_t wide = 5;
+  for (const SurveyRow& row : rows) wide = std::max(wide, row.file.size());
+  std::string text =
+      fmt::format("{:<{}}  {:<10} {:>6} {:>5} {:>8} {:>9} {:>8} {:>8} {:>8} {:>8} {:>6}\n", "file",
+                  wide, "status", "bodies", "loops", "freedoms", "redundant", "gap m", "gap rad",
+                  "inverse", "forward", "s");
+  size_t ok = 0;
+  for (const SurveyRow& row : rows) {
+    const std::vector<std::string> f = Fields(row);
+    text += fmt::format("{:<{}}  {:<10} {:>6} {:>5} {:>8} {:>9} {:>8} {:>8} {:>8} {:>8} {:>6}\n",
+                        f[0], wide, f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10]);
+    if (row.status == "ok") {
+      ++ok;
+    } else {
+      text += fmt::format("    {}\n", Printable(row.message));
+    }
+  }
+  return text + fmt::format("{} of {} ok\n", ok, rows.size());
+}
+
+std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& folder) {
+  Table table{.caption = "Robots", .head = {}, .rows = {}};
+  for (const std::string& column : kSurveyColumns) table.head.push_back(Text(Spaced(column)));
+  for (const SurveyRow& row : rows) {
+    std::vector<Cell> cells;
+    const std::vector<std::string> fields = Fields(row);
+    for (size_t k = 0; k < fields.size(); ++k) {
+      const char* kind = row.status == "ok" ? "ok" : row.status == "refused" ? "off" : "fail";
+      if (k == 1) {
+        cells.push_back(Markup(Pill(kind, fields[k])));
+      } else {
+        cells.push_back(k >= 2 && k <= 10 ? Digits(fields[k]) : Text(fields[k]));
+      }
+    }
+    table.rows.push_back(std::move(cells));
+  }
+  return fmt::format(
+      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Survey of "
+      "{0}</title>\n"
+      "<style>body{{font:15px/1.4 sans-serif;margin:2em}}table{{border-collapse:collapse}}"
+      "td,th{{border-bottom:1px solid #ccc;padding:4px 8px;text-align:left;vertical-align:top}}"
+      "</style></head>\n<body><h1>Survey of {0}</h1>\n{1}</body></html>\n",
+      Escape(folder), ToHtml(table));
+}
+
+int SurveyExit(const std::vector<SurveyRow>& rows) {
+  int exit_code = 0;
+  for (const SurveyRow& row : rows) {
+    if (row.status == "failed") return 3;
+    if (row.status != "ok" && row.status != "refused") exit_code = 1;
+  }
+  return exit_code;
+}
+
+}  // namespace mbv

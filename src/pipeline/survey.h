@@ -1,0 +1,39 @@
+// A folder of robots, one after the other: does each load, close and agree?
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "core/types.h"
+
+namespace mbv {
+
+/// What came of one robot.
+struct SurveyRow {
+  std::string file;
+  /// ok, disagree, not_closed (loops do not close), refused (a fault of the file), failed
+  std::string status = "failed";
+  int bodies = -1, loops = -1, freedoms = -1, redundant = -1;  ///< -1: not known
+  double gap_m = kNan, gap_rad = kNan;                ///< at home, the largest of all loops
+  double inverse_nrmse = kNan, forward_nrmse = kNan;  ///< drive forces, simulation and reference
+  double seconds = kNan;
+  std::string message = "ended before it said anything";
+};
+
+/// Loads a robot, gives it a first motion and runs that forward and inverse. Writes only below
+/// `scratch`.
+[[nodiscard]] SurveyRow SurveyFile(const std::string& file, const std::string& scratch);
+
+/// One row as text between processes, and back; false if it is none.
+[[nodiscard]] std::string RowText(const SurveyRow& row);
+[[nodiscard]] bool ReadRowText(const std::string& text, SurveyRow* row);
+
+/// survey.csv, survey.html, and the table for a terminal.
+[[nodiscard]] std::string SurveyCsv(const std::vector<SurveyRow>& rows);
+[[nodiscard]] std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& folder);
+[[nodiscard]] std::string SurveyTable(const std::vector<SurveyRow>& rows);
+
+/// 0: all are ok, or refused for a fault of the file itself; 1 otherwise; 3 where something failed.
+[[nodiscard]] int SurveyExit(const std::vector<SurveyRow>& rows);
+
+}  // namespace mbv
