@@ -14,7 +14,7 @@
 namespace mbv {
 namespace {
 
-constexpr JointKind kKinds[] = {
+constexpr JointKind kEveryKind[] = {
     JointKind::kFixed,     JointKind::kRevolute,  JointKind::kPrismatic, JointKind::kCylindrical,
     JointKind::kUniversal, JointKind::kSpherical, JointKind::kPlanar,    JointKind::kFree};
 
@@ -114,7 +114,7 @@ void ExpectDerivatives(const ScalarRow& row, const BodyStates& s,
 
 TEST(Constraints, RowsCountWhatTheJointLocks) {
   Random random(1);
-  for (const JointKind kind : kKinds) {
+  for (const JointKind kind : kEveryKind) {
     const Joint joint = MakeJoint(kind, &random);
     const ConstraintRows rows = RowsOf(joint, MakeStates(joint, {}, 0.0, &random), false);
     EXPECT_EQ(rows.rows, 6 - FreedomsOf(kind));
@@ -146,7 +146,7 @@ TEST(Constraints, AHingeOpenedByAMillimetreShowsAMillimetre) {
 
 TEST(Constraints, RowsVanishExactlyOnTheJointsOwnMotions) {
   Random random(3);
-  for (const JointKind kind : kKinds) {
+  for (const JointKind kind : kEveryKind) {
     for (int trial = 0; trial < 10; ++trial) {
       const Joint joint = MakeJoint(kind, &random);
       std::array<double, 6> q{};
@@ -160,7 +160,7 @@ TEST(Constraints, RowsVanishExactlyOnTheJointsOwnMotions) {
 
 TEST(Constraints, RowsMoveAsTheirJacobianAndBiasSay) {
   Random random(4);
-  for (const JointKind kind : kKinds) {
+  for (const JointKind kind : kEveryKind) {
     for (int trial = 0; trial < 5; ++trial) {
       const Joint joint = MakeJoint(kind, &random);
       const BodyStates s = MakeStates(joint, {0.3, -0.2, 0.4, 0.1, 0.2, -0.5}, 0.3, &random);
@@ -190,7 +190,7 @@ TEST(Constraints, AWrongBiasWouldBeSeen) {
 
 TEST(Constraints, CoordinatesUndoTheJointPose) {
   Random random(6);
-  for (const JointKind kind : kKinds) {
+  for (const JointKind kind : kEveryKind) {
     const Joint joint = MakeJoint(kind, &random);
     const std::array<double, 6> q = {0.7, -0.4, 1.1, 0.3, -0.9, 2.0};
     const std::array<double, 6> back = CoordinatesOf(joint, JointPose(joint, q));
@@ -200,7 +200,7 @@ TEST(Constraints, CoordinatesUndoTheJointPose) {
 
 TEST(Constraints, JointCoordinatesMoveAsTheirJacobianAndBiasSay) {
   Random random(7);
-  for (const JointKind kind : kKinds) {
+  for (const JointKind kind : kEveryKind) {
     const Joint joint = MakeJoint(kind, &random);
     const BodyStates s = MakeStates(joint, {0.3, -0.2, 0.4, 0.1, 0.2, -0.5}, 0.2, &random);
     for (int c = 0; c < FreedomsOf(kind); ++c) {
