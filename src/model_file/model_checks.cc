@@ -130,7 +130,9 @@ void ModelReader::CloseLoops() {
   const double gap_m = home.gap * CharacteristicLength(mechanism_);
   const int redundant = CountNearlyRedundant(mechanism_, home.gap);
   if (redundant > 0 && gap_m <= closure_tolerance_m_ && ProjectRoundedData(home)) return;
+  if (TakeNamedBalls()) return;
   std::string hint = "improve the guesses of the loop's joints, or look for a wrong length or axis";
+  if (bare_urdf_) hint += "; " + WhatWouldClose(home);
   if (redundant > 0) {
     hint = fmt::format(
         "the loops are overconstrained by {} and closed except for {:.2g} m: rounded data? More "

@@ -184,6 +184,9 @@ class ModelReader {
   void WarnAboutAssembly(const HomeResult& home);
   void WarnAboutMovedDrives();
   bool ProjectRoundedData(const HomeResult& home);
+  // model_relax.cc
+  bool TakeNamedBalls();
+  [[nodiscard]] std::string WhatWouldClose(const HomeResult& home) const;
   void ReportGaps(const HomeResult& home, const std::string& hint);
   void ReportTree(const SpanningTreeResult& tree);
   void CheckAxes(bool closed_at_home);

@@ -180,7 +180,8 @@ class MotionSearch {
 };
 
 std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
-                         const std::string& model_ref, const std::vector<std::string>& notes) {
+                         const std::string& model_ref, const std::vector<std::string>& notes,
+                         bool holding) {
   const WrittenNames names = NamesInModel(m);
   std::string text =
       "# A first motion, made by mbverify: each drive goes out and back again.\n"
@@ -203,9 +204,14 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
   return text + fmt::format(
                     "analytic: none\n"
                     "simulation: {{mode: forward, step_s: 0.001, stock_too: false{}}}\n"
-                    "checks: {{force_nrmse: {{forward: 1.0e-6, inverse: 1.0e-10}}}}\n"
+                    "{}checks: {{force_nrmse: {{forward: 1.0e-6, inverse: 1.0e-10}}{}}}\n"
                     "snapshots: {{times_s: [0, {:g}]}}\n",
-                    motion.beyond_ranges ? ", ignore_ranges: true" : "", 0.5 * motion.duration_s);
+                    motion.beyond_ranges ? ", ignore_ranges: true" : "",
+                    holding
+                        ? "# Drives that only hold a freedom carry next to nothing: no scale of "
+                          "their own to judge them by.\n"
+                        : "",
+                    holding ? ", force_nrmse_own: off" : "", 0.5 * motion.duration_s);
 }
 
 }  // namespace
@@ -298,7 +304,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
   }
   setup.model = WriteModel(m);
-  setup.scenario = ScenarioText(m, motion, model_ref, setup.notes);
+  setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, !resting.empty());
   setup.mechanism = std::move(m);
   for (const std::string& note : setup.notes) {
     result.diagnostics.Add({Severity::kWarning, file, 0, 0, note, ""});

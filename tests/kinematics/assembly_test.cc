@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "core/spatial.h"
+#include "mechanism/joint_pose.h"
 #include "model_file/load_model.h"
 
 namespace mbv {

@@ -90,10 +90,10 @@ TEST(UrdfDialects, ARobotWithItsClosureFileIsReadFromTheUrdfAlone) {
 
 TEST(UrdfDialects, CutJointsOfCadExportersCloseLoopsAsHinges) {
   const RobotFolder folder("cuts");
-  // At zero the loop is open: the point is where the coupler's end lies.
+  // Where the cut hinge is while all joints are at zero.
   folder.Write(
       "config/loop_closures.yaml",
-      "closures:\n  - {link_a: coupler, link_b: rocker, point: [0.7, 0, 0], axis: [0, 0, 1]}\n"
+      "closures:\n  - {link_a: coupler, link_b: rocker, point: [0.6, 0.3, 0], axis: [0, 0, 1]}\n"
       "independent: [A]\n");
   const LoadResult loaded = LoadModel(folder.Write("arm.urdf", CutFourBar()));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
