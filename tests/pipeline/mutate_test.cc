@@ -339,6 +339,33 @@ TEST(Mutate, AForwardScenarioIsBentInItsOwnModeAndLimitsAndInInverseMode) {
   EXPECT_NE(between.mutations[0].reason.find("below the limit"), std::string::npos);
 }
 
+// Pushed by the right forces a wrong mass goes elsewhere; servos need other forces on the way that
+// they went. Held on its motion neither would be what the scenario does.
+TEST(Mutate, PushedAndServoDrivesAreBentAsTheyAreDriven) {
+  MutationOptions options = WithFaults();
+  options.numbers = {"m_platform"};
+  for (const MutationModes modes : {MutationModes::kBoth, MutationModes::kOwn}) {
+    options.modes = modes;
+    const MutationReport pushed = Mutate("spr_tripod/force_driven", options);
+    ASSERT_EQ(pushed.mutations.size(), 1u) << pushed.diagnostics.Text();
+    EXPECT_EQ(pushed.exit_code, 0) << pushed.diagnostics.Text();
+    EXPECT_EQ(pushed.mode, "force_driven");
+    const Mutation& m = pushed.mutations.front();
+    EXPECT_TRUE(m.own.detected);
+    EXPECT_FALSE(m.own.by_force) << "the forces are given";
+    EXPECT_EQ(m.own.best_check.find("force"), std::string::npos) << m.own.best_check;
+    ASSERT_TRUE(m.inverse);
+    EXPECT_TRUE(m.inverse->by_force);
+  }
+  options.modes = MutationModes::kBoth;
+  const MutationReport servo = Mutate("spr_tripod/servo_feedforward", options);
+  ASSERT_EQ(servo.mutations.size(), 1u) << servo.diagnostics.Text();
+  EXPECT_EQ(servo.mode, "servo");
+  const Mutation& m = servo.mutations.front();
+  EXPECT_TRUE(m.own.detected && m.own.by_force);
+  EXPECT_NE(m.own.best_check.find("reached"), std::string::npos) << m.own.best_check;
+}
+
 TEST(Mutate, ForwardPickAndPlaceSeesWhatInverseModeSees) {
   MutationOptions options = WithFaults();
   options.structural = false;
