@@ -220,5 +220,35 @@ TEST(Doubts, ATableOfAnotherGravityAgreesButNotWithoutAWord) {
   EXPECT_EQ(GravityDoubtOf(9.81, 9.80665 / 9.81, &verdict), "");
 }
 
+// A shipped scenario of a model that is changed and allows it.
+RunOutcome RunAllowed(const Folder& folder, const std::string& scenario, const std::string& allow,
+                      const std::vector<std::pair<std::string, std::string>>& changes) {
+  const std::string name = scenario.substr(0, scenario.find('/'));
+  std::string text = TextOf(SourcePath("/models/" + name + "/model.yaml"));
+  for (const auto& [from, to] : changes) {
+    EXPECT_TRUE(Has(text, from)) << from;
+    text.replace(text.find(from), from.size(), to);
+  }
+  const std::string model = folder.Write("model.yaml", allow + "\n" + text);
+  return RunScenarioFile(Shipped(scenario), {{"mechanism", model}}, folder.path.string());
+}
+
+// A warning below would be overlooked: the sentence of the verdict says what the model lets pass.
+TEST(Concession, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
+  const Folder rounded("rounded_bricard");
+  const RunOutcome projected =
+      RunAllowed(rounded, "bricard/turn_inverse", "closure_tolerance: 3e-3",
+                 {{"end: [0, -length, 0]", "end: [1e-3, -length - 5e-4, 3e-4]"}});
+  ExpectSaidEverywhere(projected, "allowed by the model: joint frames moved by up to");
+  EXPECT_EQ(projected.exit_code, 0) << projected.report->comparison.reason;
+  const Folder impossible("impossible_crank");
+  const RunOutcome allowed =
+      RunAllowed(impossible, "four_bar/turn_inverse", "allow: impossible_inertia",
+                 {{"inertia: [rho*crank*bar^2/2, rho*crank*crank^2/12, rho*crank*crank^2/12]",
+                   "inertia: [rho*crank*bar^2/2, rho*crank*crank^2/12, rho*crank*crank^2/3]"}});
+  ExpectSaidEverywhere(allowed, "allowed by the model: impossible inertia of crank");
+  EXPECT_NE(allowed.exit_code, 0) << "MuJoCo does not take it";
+}
+
 }  // namespace
 }  // namespace mbv
