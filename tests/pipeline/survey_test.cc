@@ -1,0 +1,193 @@
+// Robots from files: drives for every freedom, a first motion, and what a survey makes of them.
+#include "pipeline/survey.h"
+
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "kinematics/mobility.h"
+#include "model_file/load_model.h"
+#include "pipeline/default_setup.h"
+
+namespace mbv {
+namespace {
+
+class RobotsFolder {
+ public:
+  explicit RobotsFolder(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / ("mbv_survey_" + name)) {
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_);
+  }
+  ~RobotsFolder() { std::filesystem::remove_all(path_); }
+  std::string Write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name) << text;
+    return (path_ / name).string();
+  }
+  [[nodiscard]] std::string Scratch() const { return (path_ / "scratch").string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+std::string UrdfLink(const std::string& name, double length) {
+  return fmt::format(
+      R"(<link name="{}"><inertial><origin xyz="{} 0 0"/><mass value="1"/>)"
+      R"(<inertia ixx="0.001" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>)"
+      "\n",
+      name, 0.5 * length);
+}
+std::string UrdfJoint(const std::string& type, const std::string& parent, const std::string& child,
+                      double x) {
+  return fmt::format(R"(<joint name="{1}_{2}" type="{0}"><parent link="{1}"/><child link="{2}"/>)"
+                     R"(<origin xyz="{3} 0 0"/><axis xyz="0 1 0"/></joint>)"
+                     "\n",
+                     type, parent, child, x);
+}
+// A cut four-bar; with a crank of 0.2 m it closes, with one of 2 m it cannot.
+std::string CutLinkage(double crank) {
+  return "<robot name=\"linkage\">" + UrdfLink("base", 0.5) + UrdfLink("crank", crank) +
+         UrdfLink("coupler", 0.5) + UrdfLink("rocker", 0.4) +
+         UrdfJoint("continuous", "base", "crank", 0) +
+         UrdfJoint("continuous", "crank", "coupler", crank) +
+         UrdfJoint("continuous", "base", "rocker", 0.5) + "<link name=\"A\"/><link name=\"B\"/>" +
+         UrdfJoint("fixed", "coupler", "A", 0.5) + UrdfJoint("fixed", "rocker", "B", 0.4) +
+         "</robot>";
+}
+constexpr const char* kLoop = "closed_loop: [[A, B]]\ntype: [3d]\nname_mot: [base_crank]\n";
+
+TEST(Survey, ARobotThatClosesAgreesInBothModes) {
+  const RobotsFolder folder("ok");
+  folder.Write("robot.yaml", kLoop);
+  const SurveyRow row = SurveyFile(folder.Write("r.urdf", CutLinkage(0.2)), folder.Scratch());
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_EQ(row.bodies, 4);
+  EXPECT_EQ(row.loops, 1);
+  EXPECT_EQ(row.freedoms, 1);
+  EXPECT_EQ(row.redundant, 0 + 1);  // a ball in a planar loop holds what the hinges hold, too
+  EXPECT_LT(row.gap_m, 1e-10);
+  EXPECT_LT(row.gap_rad, 1e-10);
+  EXPECT_LT(row.inverse_nrmse, 1e-10);
+  EXPECT_LT(row.forward_nrmse, 1e-6);
+  EXPECT_GT(row.seconds, 0.0);
+}
+
+TEST(Survey, EachFaultHasItsStatus) {
+  const RobotsFolder folder("faults");
+  folder.Write("robot.yaml", kLoop);
+  const SurveyRow open = SurveyFile(folder.Write("r.urdf", CutLinkage(2.0)), folder.Scratch());
+  EXPECT_EQ(open.status, "not_closed") << open.message;
+  EXPECT_NE(open.message.find("would have to move by"), std::string::npos) << open.message;
+
+  folder.Write("robot.yaml", "closed_loop: [[A, BB]]\n");
+  const SurveyRow slip = SurveyFile(folder.Write("r.urdf", CutLinkage(0.2)), folder.Scratch());
+  EXPECT_EQ(slip.status, "refused");
+  EXPECT_NE(slip.message.find("did you mean 'B'?"), std::string::npos) << slip.message;
+
+  const SurveyRow broken = SurveyFile(folder.Write("x.urdf", "<robot"), folder.Scratch());
+  EXPECT_EQ(broken.status, "refused");
+}
+
+TEST(Survey, TheExitCodeTellsFaultsOfTheFileFromOthers) {
+  const auto exit_of = [](std::vector<std::string> states) {
+    std::vector<SurveyRow> rows;
+    for (const std::string& status : states) {
+      rows.emplace_back();
+      rows.back().status = status;
+    }
+    return SurveyExit(rows);
+  };
+  EXPECT_EQ(exit_of({"ok", "refused", "ok"}), 0);
+  EXPECT_EQ(exit_of({"ok", "disagree"}), 1);
+  EXPECT_EQ(exit_of({"not_closed", "ok"}), 1);
+  EXPECT_EQ(exit_of({"disagree", "failed"}), 3);
+  EXPECT_EQ(SurveyRow{}.status, "failed");  // until something is known
+}
+
+TEST(Survey, ARowGoesThroughTextUnchanged) {
+  SurveyRow row{.file = "a.urdf", .status = "ok", .bodies = 3, .loops = 1, .freedoms = 2};
+  row.gap_m = 1.0 / 3.0;
+  row.message = "a, \"b\"\nc";
+  SurveyRow back;
+  ASSERT_TRUE(ReadRowText(RowText(row), &back));
+  EXPECT_EQ(back.status, "ok");
+  EXPECT_EQ(back.bodies, 3);
+  EXPECT_EQ(back.redundant, -1);
+  EXPECT_EQ(back.gap_m, row.gap_m);
+  EXPECT_TRUE(std::isnan(back.inverse_nrmse));
+  EXPECT_EQ(back.message, row.message);
+  row.message.clear();
+  EXPECT_TRUE(ReadRowText(RowText(row), &back));
+  EXPECT_FALSE(ReadRowText("nonsense", &back));
+
+  row.message = "a, \"b\"\nc";
+  const std::string csv = SurveyCsv({row});
+  EXPECT_EQ(csv.substr(0, csv.find('\n')),
+            "file,status,bodies,loops,freedoms,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
+            "seconds,message");
+  EXPECT_NE(csv.find("a.urdf,ok,3,1,2,,0.33,,,,,\"a, \"\"b\"\" c\"\n"), std::string::npos) << csv;
+  row.message = "<script>";
+  EXPECT_EQ(SurveyHtml({row}, "x").find("<script>"), std::string::npos);
+}
+
+// A rod between two balls, whose spin nothing holds, and a drive too many.
+constexpr const char* kRod = R"(name: rod
+world: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}
+bodies:
+  crank: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.2, 0, 0]}}
+  rod: {mass: 1, com: [0.25, 0, 0], inertia: [0.001, 0.01, 0.01], frames: {end: [0.5, 0, 0]}}
+  rocker: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.4, 0, 0]}}
+joints:
+  A: {kind: revolute, parent: world.A, child: crank, axis: z, guess: 1.1}
+  B: {kind: spherical, parent: crank.end, child: rod}
+  C: {kind: spherical, parent: rocker.end, child: rod.end}
+  D: {kind: revolute, parent: world.D, child: rocker, axis: z, guess: 1.2}
+drives: {m: {kind: joint, joint: A}, n: {kind: joint, joint: D}}
+)";
+
+TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
+  const LoadResult loaded = LoadModelText(kRod, "rod.yaml");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  std::vector<std::string> notes;
+  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes);
+  const Mobility mobility = AnalyseMobility(m);
+  EXPECT_EQ(mobility.undriven, 0);
+  EXPECT_EQ(mobility.freedoms, 1);  // the spin is held, not driven
+  ASSERT_EQ(m.drives.size(), 1u);
+  EXPECT_EQ(m.drives[0].name, "m");
+  ASSERT_EQ(notes.size(), 2u);
+  EXPECT_NE(notes[0].find("universal joints here"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[1].find("left out: n"), std::string::npos) << notes[1];
+
+  Mechanism without = *loaded.mechanism;
+  without.drives.clear();
+  notes.clear();
+  const Mechanism chosen = WithDriveForEachFreedom(without, &notes);
+  ASSERT_EQ(chosen.drives.size(), 1u);
+  EXPECT_EQ(AnalyseMobility(chosen).undriven, 0);
+  EXPECT_NE(notes.back().find("chosen by rank"), std::string::npos) << notes.back();
+}
+
+TEST(DefaultSetup, TheFirstMotionKeepsToTheRanges) {
+  LoadResult loaded = LoadModelText(kRod, "rod.yaml");
+  ASSERT_TRUE(loaded.mechanism);
+  std::vector<std::string> notes;
+  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes);
+  const FirstMotion wide = FindFirstMotion(m, {});
+  EXPECT_TRUE(wide.found);
+  EXPECT_FALSE(wide.beyond_ranges);
+  EXPECT_NEAR(wide.strokes[0].height, 0.2, 1e-12);
+  // The rocker may hardly move.
+  Joint& rocker = m.joints[m.FindJoint("D")];
+  rocker.range[0] = {rocker.home[0] - 0.01, rocker.home[0] + 0.01};
+  const FirstMotion narrow = FindFirstMotion(m, {});
+  EXPECT_TRUE(narrow.found);
+  EXPECT_LT(narrow.strokes[0].height, 0.06);
+  rocker.range[0] = {rocker.home[0] + 0.01, rocker.home[0] + 0.02};
+  EXPECT_TRUE(FindFirstMotion(m, {}).beyond_ranges);
+  EXPECT_EQ(FindFirstMotion(m, {"m"}).strokes[0].height, 0.0);
+}
+
+}  // namespace
+}  // namespace mbv
