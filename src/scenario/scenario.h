@@ -75,9 +75,9 @@ struct SimulationSettings {
   DriveBy drive_by = DriveBy::kMotion;  ///< forward only
   ServoSettings servo;                  ///< kServos only
   bool stock_engine = false;            ///< judge MuJoCo as it is instead of the corrected engine
-  bool stock_too = true;                ///< forward only: run stock MuJoCo too and report its error
-  double step_s = 1e-3;                 ///< > 0
-  bool ignore_ranges = false;           ///< simulate beyond drive and joint ranges
+  bool stock_too = false;      ///< forward only: run MuJoCo as it is, too, and report its error
+  double step_s = 1e-3;        ///< > 0
+  bool ignore_ranges = false;  ///< simulate beyond drive and joint ranges
   Overrides parameters;
   std::optional<Extrapolation> extrapolate;
 };
