@@ -15,6 +15,7 @@
 #include "comparison/attribution_parts.h"
 #include "comparison/driven.h"
 #include "comparison/metrics.h"
+#include "comparison/verdict.h"
 
 namespace mbv {
 namespace {
@@ -24,9 +25,6 @@ using internal::AmountOf;
 using internal::Failed;
 using internal::NameOf;
 using internal::Place;
-
-// The third witness must be this much farther from the other two than they are from each other.
-constexpr double kClearlyFarther = 10.0;
 
 // What a wrong force looks like: opposite sign or a constant factor.
 std::string Hint(const PairComparison& pair) {
@@ -68,9 +66,12 @@ struct Yardstick {
   std::string column = {};  // of a table; "" measures the metric itself
 };
 
-struct Distance {
+struct Distance : PairDistance {
+  Distance(const PairComparison& of, Measured by)
+      : PairDistance{of.measured, of.truth, by.value}, pair(&of), where(std::move(by)) {}
+
   const PairComparison* pair;
-  Measured measured;
+  Measured where;
 };
 
 const Trace* TraceOf(const ComparisonInput& input, const std::string& witness) {
@@ -107,17 +108,13 @@ std::vector<Distance> Distances(const ComparisonInput& input, const Comparison& 
   for (const PairComparison& pair : comparison.pairs) {
     if (!yardstick.column.empty()) {
       const auto distance = SignalDistance(input, pair, yardstick.column);
-      if (distance) distances.push_back({&pair, *distance});
+      if (distance) distances.emplace_back(pair, *distance);
       continue;
     }
     const auto found = pair.metrics.find(yardstick.metric);
-    if (pair.compared && found != pair.metrics.end()) distances.push_back({&pair, found->second});
+    if (pair.compared && found != pair.metrics.end()) distances.emplace_back(pair, found->second);
   }
-  const auto key = [](const Distance& d) {
-    return std::isnan(d.measured.value) ? 1e300 : d.measured.value;
-  };
-  std::stable_sort(distances.begin(), distances.end(),
-                   [&](const Distance& a, const Distance& b) { return key(a) < key(b); });
+  SortByDistance(&distances);
   return distances;
 }
 
@@ -133,16 +130,6 @@ Yardstick YardstickOf(const ComparisonInput& input, const CheckResult& check) {
   yardstick.unit = input.table->trace.channels[static_cast<size_t>(column)].unit;
   yardstick.title = check.channel + ", RMS";
   return yardstick;
-}
-
-// The witness of the compared pairs that is not in this one.
-std::string ThirdOf(const std::vector<Distance>& distances, const PairComparison& pair) {
-  for (const Distance& distance : distances) {
-    for (const std::string& name : {distance.pair->measured, distance.pair->truth}) {
-      if (pair.measured != name && pair.truth != name) return name;
-    }
-  }
-  return "";
 }
 
 // Why two computations that differ do not tell which of them is wrong, or that they do.
@@ -182,27 +169,26 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
   const CheckResult* check = WorstPairCheck(comparison);
   if (check == nullptr) return {};
   const Yardstick yardstick = YardstickOf(input, *check);
-  const auto amount = [&](const Distance& d) { return Amount(d.measured.value, yardstick.unit); };
+  const auto amount = [&](const Distance& d) { return Amount(d.value, yardstick.unit); };
   const std::vector<Distance> distances = Distances(input, comparison, yardstick);
   const bool followed = IsDriveMotion(check->metric) && !input.motion->free();
   if (distances.size() < 3 || followed) {
     return TwoDiffer(input, comparison, *check, distances.size() >= 3);
   }
   const Distance &near = distances[0], &far = distances[1];
-  if (!(far.measured.value >= kClearlyFarther * near.measured.value ||
-        std::isnan(far.measured.value))) {
+  const std::string odd = OddOneOut(distances);
+  if (odd.empty()) {
     return {"", fmt::format("no two witnesses stand clearly against the third: {} {}, {} {}, {} {} "
                             "({})",
                             near.pair->name(), amount(near), far.pair->name(), amount(far),
                             distances[2].pair->name(), amount(distances[2]), yardstick.title)};
   }
-  const std::string odd = ThirdOf(distances, *near.pair);
   const std::string tube = yardstick.column.empty() ? "" : " (" + AmountOf(*check) + ")";
   return {odd,
           fmt::format("{} and {} agree to {}, {} differs by {} in {}{}: worst at {}{}",
                       NameOf(comparison, near.pair->measured), NameOf(comparison, near.pair->truth),
                       amount(near), NameOf(comparison, odd), amount(far), yardstick.title, tube,
-                      Place(far.measured.channel, far.measured.time_s), Hint(*far.pair))};
+                      Place(far.where.channel, far.where.time_s), Hint(*far.pair))};
 }
 
 // 4. A check of the simulation alone (loop gap, power) that fails while all pairs agree.
@@ -226,7 +212,7 @@ std::string AgreementText(const ComparisonInput& input, const Comparison& compar
       text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",
                           NameOf(comparison, distance.pair->measured),
                           NameOf(comparison, distance.pair->truth),
-                          Amount(distance.measured.value, yardstick.unit));
+                          Amount(distance.value, yardstick.unit));
     }
     if (!text.empty()) break;
   }

@@ -11,17 +11,11 @@
 #include "comparison/reservations.h"
 #include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
+#include "comparison/verdict.h"
 #include "mechanism/channels.h"
 
 namespace mbv {
 namespace {
-
-const Witness* FindWitness(const ComparisonInput& input, const std::string& name) {
-  for (const Witness& witness : input.witnesses) {
-    if (witness.name == name) return &witness;
-  }
-  return nullptr;
-}
 
 // "reference: the commands do not hold the mechanism at this pose (near limb2.R12; t = 3.22 s)".
 std::string Explain(const Witness& witness) {
@@ -66,7 +60,7 @@ void AddChecks(const ComparisonInput& input, const std::string& subject, LimitCo
                       .channel = measured.channel,
                       .floored = measured.floored};
     ApplyOther(other, input, &check);
-    check.pass = check.limit && check.value <= *check.limit;  // false for NaN
+    check.pass = Passes(check.value, check.limit);
     check.follows = ComparesMotionWithItself(input, subject, metric);
     comparison->checks.push_back(std::move(check));
   }
@@ -89,8 +83,8 @@ std::map<Metric, double> JudgeTablePair(const ComparisonInput& input, const Witn
 
 void AddPair(const ComparisonInput& input, const char* measured, const char* truth,
              Comparison* comparison) {
-  const Witness* a = FindWitness(input, measured);
-  const Witness* b = FindWitness(input, truth);
+  const Witness* a = FindNamed(input.witnesses, measured);
+  const Witness* b = FindNamed(input.witnesses, truth);
   if (a == nullptr || b == nullptr) return;
   PairComparison pair;
   pair.measured = measured;
@@ -233,7 +227,7 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
     const CheckResult* tube = comparison->FindCheck(pair->name() + ".table_tube");
     table.judged = tube != nullptr && tube->limit;
     if (!table.judged) return;  // nothing to explain
-    const Witness* other = FindWitness(input, table.judged_against);
+    const Witness* other = FindNamed(input.witnesses, table.judged_against);
     table.diagnoses = DiagnoseTable(input, *other->trace, pair->columns);
     return;
   }
@@ -304,40 +298,25 @@ const char* ToText(Verdict verdict) {
 }
 
 const PairComparison* Comparison::FindPair(const std::string& name) const {
-  for (const PairComparison& pair : pairs) {
-    if (pair.name() == name) return &pair;
-  }
-  return nullptr;
+  return FindPairNamed(pairs, name);
 }
 
 const CheckResult* Comparison::FindCheck(const std::string& name) const {
-  for (const CheckResult& check : checks) {
-    if (check.name == name) return &check;
-  }
-  return nullptr;
+  return FindNamed(checks, name);
 }
 
-size_t Comparison::failed() const {
-  return static_cast<size_t>(std::count_if(
-      checks.begin(), checks.end(), [](const CheckResult& c) { return c.limit && !c.pass; }));
-}
+size_t Comparison::failed() const { return CountFailed(checks); }
 
 size_t Comparison::verified() const {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
-    return c.limit && c.pass && !c.follows && c.blind.empty();
-  }));
+  return CountPassed(checks, [](const CheckResult& c) { return !c.follows && c.blind.empty(); });
 }
 
 size_t Comparison::followed() const {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
-    return c.limit && c.pass && c.follows;
-  }));
+  return CountPassed(checks, [](const CheckResult& c) { return c.follows; });
 }
 
 size_t Comparison::blind() const {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [](const CheckResult& c) {
-    return c.limit && c.pass && !c.follows && !c.blind.empty();
-  }));
+  return CountPassed(checks, [](const CheckResult& c) { return !c.follows && !c.blind.empty(); });
 }
 
 namespace {
@@ -369,9 +348,9 @@ Comparison Compare(const ComparisonInput& given) {
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
   comparison.driving = DrivingText(input);
-  AddPair(input, "simulated", "analytic", &comparison);
-  AddPair(input, "reference", "analytic", &comparison);
-  AddPair(input, "simulated", "reference", &comparison);
+  for (const auto& [measured, truth] : kWitnessPairs) {
+    AddPair(input, measured, truth, &comparison);
+  }
   // The generic solver takes part by its own name where a table has the reference's place.
   AddPair(input, "simulated", "solver", &comparison);
   AddPair(input, "reference", "solver", &comparison);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "comparison/stiffness_measures.h"
+#include "comparison/verdict.h"
 
 namespace mbv {
 namespace {
@@ -118,21 +119,14 @@ void AddCheck(const StiffnessInput& input, const std::string& subject, Stiffness
                        .value = measured.value,
                        .limit = subject.starts_with("simulated") ? limit.simulated : limit.computed,
                        .where = measured.where};
-  check.pass = check.limit && check.value <= *check.limit;  // false for NaN
+  check.pass = Passes(check.value, check.limit);
   comparison->checks.push_back(std::move(check));
-}
-
-const StiffnessWitness* FindWitness(const StiffnessInput& input, const std::string& name) {
-  for (const StiffnessWitness& witness : input.witnesses) {
-    if (witness.name == name) return &witness;
-  }
-  return nullptr;
 }
 
 void AddPair(const StiffnessInput& input, const char* measured, const char* truth,
              StiffnessComparison* comparison) {
-  const StiffnessWitness* a = FindWitness(input, measured);
-  const StiffnessWitness* b = FindWitness(input, truth);
+  const StiffnessWitness* a = FindNamed(input.witnesses, measured);
+  const StiffnessWitness* b = FindNamed(input.witnesses, truth);
   if (a == nullptr || b == nullptr) return;
   StiffnessPair pair = CompareStiffnessPair(*a, *b);
   const auto note = [&](const std::string& what, const std::string& why) {
@@ -216,73 +210,54 @@ double DistanceOf(const StiffnessComparison& comparison, const std::string& pair
   return found->metrics.at(StiffnessMetric::kStiffnessEntry).value;
 }
 
-// The two that are closest by far stand against the third.
+// Two against one, by the worst entry of K.
 Attribution Attribute(const StiffnessComparison& comparison) {
-  struct Side {
-    const char *odd, *pair, *others[2];
-    double distance;
-  };
-  std::vector<Side> sides = {{"simulated",
-                              "reference_vs_analytic",
-                              {"simulated_vs_analytic", "simulated_vs_reference"},
-                              0},
-                             {"reference",
-                              "simulated_vs_analytic",
-                              {"reference_vs_analytic", "simulated_vs_reference"},
-                              0},
-                             {"analytic",
-                              "simulated_vs_reference",
-                              {"simulated_vs_analytic", "reference_vs_analytic"},
-                              0}};
-  for (Side& side : sides) side.distance = DistanceOf(comparison, side.pair);
   const StiffnessPair* main = comparison.MainPair();
   if (main == nullptr) return {};
-  if (std::any_of(sides.begin(), sides.end(),
-                  [](const Side& side) { return std::isnan(side.distance); })) {
-    return {"", fmt::format("only two computations were compared: K differs by {} at most",
-                            Amount(main->metrics.at(StiffnessMetric::kStiffnessEntry).value))};
+  std::vector<PairDistance> distances;
+  for (const auto& [measured, truth] : kWitnessPairs) {
+    PairDistance distance{measured, truth};
+    distance.value = DistanceOf(comparison, distance.name());
+    if (std::isnan(distance.value)) {
+      return {"", fmt::format("only two computations were compared: K differs by {} at most",
+                              Amount(main->metrics.at(StiffnessMetric::kStiffnessEntry).value))};
+    }
+    distances.push_back(std::move(distance));
   }
   const bool stiffness_fails =
       std::any_of(comparison.checks.begin(), comparison.checks.end(),
                   [](const StiffnessCheck& c) { return JudgesStiffness(c) && !c.pass; });
-  std::sort(sides.begin(), sides.end(),
-            [](const Side& a, const Side& b) { return a.distance < b.distance; });
   if (!stiffness_fails) {
     return {"", fmt::format("all three agree: K to {} between closed form and frame elements, to "
                             "{} with the simulation",
                             Amount(DistanceOf(comparison, "reference_vs_analytic")),
                             Amount(DistanceOf(comparison, "simulated_vs_analytic")))};
   }
-  const Side& closest = sides.front();
-  constexpr double kClearlyFarther = 10.0;
-  if (!(sides[1].distance > kClearlyFarther * closest.distance)) {
+  SortByDistance(&distances);
+  const std::string odd = OddOneOut(distances);
+  if (odd.empty()) {
     return {"", "the three computations differ among each other; none stands out"};
   }
-  const std::string far = closest.others[0];
-  const StiffnessPair* pair = comparison.FindPair(far);
-  const WorstEntry& worst = pair->metrics.at(StiffnessMetric::kStiffnessEntry);
-  std::string names = closest.pair;
-  const size_t at = names.find("_vs_");
-  return {closest.odd,
-          fmt::format("{} and {} agree on K to {}; {} differs from them by {}, most at {}",
-                      names.substr(0, at), names.substr(at + 4), Amount(closest.distance),
-                      closest.odd, Amount(worst.value), worst.where)};
+  // Shown is the first pair that it takes part in.
+  const auto takes_part = [&](const WitnessPair& pair) {
+    return odd == pair.measured || odd == pair.truth;
+  };
+  const WitnessPair& shown = *std::find_if(kWitnessPairs.begin(), kWitnessPairs.end(), takes_part);
+  const WorstEntry& worst = comparison.FindPair(PairDistance{shown.measured, shown.truth}.name())
+                                ->metrics.at(StiffnessMetric::kStiffnessEntry);
+  return {odd, fmt::format("{} and {} agree on K to {}; {} differs from them by {}, most at {}",
+                           distances[0].measured, distances[0].truth, Amount(distances[0].value),
+                           odd, Amount(worst.value), worst.where)};
 }
 
 }  // namespace
 
 const StiffnessPair* StiffnessComparison::FindPair(const std::string& name) const {
-  for (const StiffnessPair& pair : pairs) {
-    if (pair.name() == name) return &pair;
-  }
-  return nullptr;
+  return FindPairNamed(pairs, name);
 }
 
 const StiffnessCheck* StiffnessComparison::FindCheck(const std::string& name) const {
-  for (const StiffnessCheck& check : checks) {
-    if (check.name == name) return &check;
-  }
-  return nullptr;
+  return FindNamed(checks, name);
 }
 
 const StiffnessPair* StiffnessComparison::MainPair() const {
@@ -294,14 +269,10 @@ const StiffnessPair* StiffnessComparison::MainPair() const {
   return nullptr;
 }
 
-size_t StiffnessComparison::failed() const {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(),
-                                           [](const auto& c) { return c.limit && !c.pass; }));
-}
+size_t StiffnessComparison::failed() const { return CountFailed(checks); }
 
 size_t StiffnessComparison::verified() const {
-  return static_cast<size_t>(
-      std::count_if(checks.begin(), checks.end(), [](const auto& c) { return c.limit && c.pass; }));
+  return CountPassed(checks, [](const StiffnessCheck&) { return true; });
 }
 
 StiffnessPair CompareStiffnessPair(const StiffnessWitness& measured,
@@ -349,9 +320,9 @@ std::vector<Vec6> Displacements(const StiffnessResult& result, const std::vector
 
 StiffnessComparison CompareStiffness(const StiffnessInput& input) {
   StiffnessComparison comparison;
-  AddPair(input, "simulated", "analytic", &comparison);
-  AddPair(input, "reference", "analytic", &comparison);
-  AddPair(input, "simulated", "reference", &comparison);
+  for (const auto& [measured, truth] : kWitnessPairs) {
+    AddPair(input, measured, truth, &comparison);
+  }
   for (const StiffnessWitness& witness : input.witnesses) {
     if (witness.ran()) AddOwnChecks(input, witness, &comparison);
   }

@@ -1,0 +1,63 @@
+// What every comparison judges alike, by hand.
+#include "comparison/verdict.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+namespace mbv {
+namespace {
+
+constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+
+std::vector<PairDistance> SortedDistances(double simulated_analytic, double reference_analytic,
+                                          double simulated_reference) {
+  std::vector<PairDistance> distances = {{"simulated", "analytic", simulated_analytic},
+                                         {"reference", "analytic", reference_analytic},
+                                         {"simulated", "reference", simulated_reference}};
+  SortByDistance(&distances);
+  return distances;
+}
+
+TEST(Verdict, TheOneFarFromTwoThatAreCloseIsOdd) {
+  EXPECT_EQ(OddOneOut(SortedDistances(1.0, 1e-6, 1.0)), "simulated");
+  EXPECT_EQ(OddOneOut(SortedDistances(1e-6, 1.0, 1.0)), "reference");
+  EXPECT_EQ(OddOneOut(SortedDistances(1.0, 1.0, 1e-6)), "analytic");
+}
+
+TEST(Verdict, NobodyIsOddUnlessClearlyFarther) {
+  EXPECT_EQ(OddOneOut(SortedDistances(9.9, 1.0, 9.9)), "");
+  EXPECT_EQ(OddOneOut(SortedDistances(10.0, 1.0, 10.0)), "simulated");
+  EXPECT_EQ(OddOneOut(SortedDistances(1.0, 1.0, 1.0)), "");
+}
+
+TEST(Verdict, WhatIsNoNumberIsFarthest) {
+  const std::vector<PairDistance> sorted = SortedDistances(kNothing, 1.0, kNothing);
+  EXPECT_EQ(sorted[0].name(), "reference_vs_analytic");
+  EXPECT_EQ(OddOneOut(sorted), "simulated");
+}
+
+TEST(Verdict, TwoWitnessesDoNotTellWhoIsOdd) {
+  EXPECT_EQ(OddOneOut(std::vector<PairDistance>{{"simulated", "analytic", 1.0}}), "");
+}
+
+TEST(Verdict, OnlyANumberWithinALimitPasses) {
+  EXPECT_TRUE(Passes(1.0, 1.0));
+  EXPECT_FALSE(Passes(1.0 + 1e-15, 1.0));
+  EXPECT_FALSE(Passes(kNothing, 1.0));
+  EXPECT_FALSE(Passes(0.0, std::nullopt));
+}
+
+TEST(Verdict, SwitchedOffChecksNeitherFailNorPass) {
+  struct Check {
+    std::optional<double> limit;
+    bool pass;
+  };
+  const std::vector<Check> checks = {{1.0, true}, {1.0, false}, {std::nullopt, false}, {1.0, true}};
+  EXPECT_EQ(CountFailed(checks), 1u);
+  EXPECT_EQ(CountPassed(checks, [](const Check&) { return true; }), 2u);
+  EXPECT_EQ(CountPassed(checks, [](const Check&) { return false; }), 0u);
+}
+
+}  // namespace
+}  // namespace mbv
