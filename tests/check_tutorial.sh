@@ -1,71 +1,125 @@
 #!/bin/bash
-# docs/tutorial.md builds exactly the shipped files, and the program says what it quotes.
-#   check_tutorial.sh SOURCE_DIR PROGRAM
-# A block below `<!-- FILE -->` is a piece of FILE; pieces follow one another (blank lines apart). Of
-# a ```console block, the first line is run and each further one must occur in what it prints.
+# Does what a document says, in an empty folder and in its order, and compares what the program
+# answers with what the document quotes.
+#   check_tutorial.sh DOCUMENT PROGRAM [SOURCE_DIR]
+# A ```yaml block below a line `FILE` (or `FILE`, continued) is a piece of FILE. Of a ```console
+# block, lines with $ are run and what follows must be what they print; "…" stands for lines left
+# out. A command fails the test with its exit code unless `echo $?` asks for it. With SOURCE_DIR, the
+# files must be those that are shipped, and the values found by hand must be in the results.
 set -u
-source_dir=$1 program=$2
+document=$(realpath "$1") program=$(realpath "$2") source_dir=${3:+$(realpath "$3")}
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
-cd "$source_dir" || exit 2
+mkdir "$work/bin" "$work/blocks" "$work/here"
+# Away from the shipped models: what the document does not write is not there.
+cp "$program" "$work/bin/mbverify"
+unset MBVERIFY_MODELS COLUMNS
+export PATH="$work/bin:$PATH" NO_COLOR=1
+cd "$work/here" || exit 2
 
-awk -v work="$work" '
-  /^<!-- [a-z_\/]+\.yaml -->$/ { file = $2; next }
-  /^```yaml$/ && file != "" { out = work "/" file; dir = out; sub(/\/[^\/]*$/, "", dir)
-                              system("mkdir -p " dir); inside = 1; next }
-  /^```console$/ { ++n; out = work "/console." n; inside = 1; next }
-  /^```$/ { if (inside) { close(out) } inside = 0; file = ""; next }
-  inside { print >> out }
-' docs/tutorial.md
-
-failed=0 files=0
+failed=0
 fail() { echo "$1"; failed=1; }
-for file in $(cd "$work" && find models scenarios -name '*.yaml' | sort); do
-  files=$((files + 1))
-  diff -B "$work/$file" "$file" || fail "docs/tutorial.md and $file differ"
-done
-[ "$files" -ge 11 ] || fail "only $files files found in docs/tutorial.md"
 
-consoles=0
-for block in "$work"/console.*; do
-  consoles=$((consoles + 1))
-  command=$(sed -n '1s/^\$ mbverify //p' "$block")
-  [ -n "$command" ] || { fail "$block: the first line is no command"; continue; }
-  case $command in run*) command="$command --no-pictures --out $work/out" ;; esac
-  # shellcheck disable=SC2086
-  NO_COLOR= "$program" $command >"$work/printed" 2>&1
-  while IFS= read -r line; do
-    grep -qF -- "$line" "$work/printed" || fail "mbverify $command does not print: $line"
-  done < <(sed 1d "$block")
-done
-[ "$consoles" -ge 6 ] || fail "only $consoles commands found in docs/tutorial.md"
+# blocks/NNN.FILE_WITH_%_FOR_/.yaml and blocks/NNN.console; other blocks are not for typing.
+awk -v blocks="$work/blocks" '
+  /^`[a-z_\/]+\.yaml`(, continued)?$/ { file = $0; gsub(/`|, continued/, "", file); next }
+  !inside && /^```/ { inside = 1; out = ""
+                      if ($0 == "```yaml") { gsub("/", "%", file); kind = file == "" ? "none.yaml" : file }
+                      else if ($0 == "```console") kind = "console"
+                      else if ($0 == "```text" || $0 == "```xml") next
+                      else kind = "unknown"
+                      out = sprintf("%s/%03d.%s", blocks, ++n, kind); printf "" > out; next }
+  inside && /^```$/ { if (out != "") close(out); inside = 0; file = ""; next }
+  inside { if (out != "") print >> out; next }
+  /[^ ]/ { file = "" }
+' "$document"
 
-# The values found by hand.
-holds() {  # SCENARIO CHANNEL VALUE, of the last run
-  awk -F, -v channel="$2" -v value="$3" '
-    NR == 1 { for (i = 1; i <= NF; ++i) if ($i == channel) column = i }
-    NR == 2 { found = column > 0 && ($column - value)^2 <= (1e-9)^2 }
-    END { exit !found }' "$work/out/$1/traces.csv" || fail "$1: $2 is not $3"
+# The lines of $expected are those of $printed, where … is any number of lines.
+same_lines() {
+  local expected=$1 printed=$2
+  awk -v expected="$expected" '
+    { printed[++m] = $0 }
+    END {
+      while ((getline line < expected) > 0) want[++n] = line
+      if (n == 0) exit 0
+      k = 1
+      for (i = 1; i <= n; ++i) {
+        if (want[i] == "…") { skip = 1; continue }
+        while (skip && k <= m && printed[k] != want[i]) ++k
+        if (k > m || printed[k] != want[i]) { print "  quoted:  " want[i]; print "  printed: " printed[k]; exit 1 }
+        ++k
+        skip = 0
+      }
+      if (!skip && k <= m) { print "  not quoted: " printed[k]; exit 1 }
+    }' "$printed"
 }
-run() { "$program" run -q "scenarios/$1.yaml" --no-pictures --out "$work/out" "${@:2}" >/dev/null 2>&1; }
-expect() {  # SCENARIO CHANNEL VALUE
-  run "$1" || fail "$1 does not agree"
-  holds "$@"
-}
-for witness in reference simulated; do
-  expect four_bar/static "motor.force.$witness" 0.5886
-  expect slider_crank/static "motor.force.$witness" -1.4090500577288894
-  expect stewart/static "leg4.length.force.$witness" 37.3393125
-done
-# In its dead centres the torque vanishes; the witnesses still agree.
-expect_at() {  # SCENARIO CHANNEL VALUE ARGUMENTS…
-  run "$1" "${@:4}" || fail "$1 ${*:4} does not agree"
-  holds "$1" "$2" "$3"
-}
-expect_at slider_crank/static slider.z.reference 0.60 --set motion.commands.motor=0
-expect_at slider_crank/static slider.z.reference 0.52 --set motion.commands.motor=pi
-# Closed inverse kinematics of a leg: |p + R b − a|.
-expect stewart/static leg1.length.position.reference 0.5
 
-[ $failed = 0 ] && echo "$files files, $consoles commands and all values by hand are right"
+commands=0 status=0 command=
+finish() {  # of the command before, now that its quoted answer is known
+  [ -n "$command" ] || return
+  same_lines "$work/expected" "$work/printed" || fail "\$ $command: the document quotes something else"
+}
+begin() {
+  if [ "$status" -ne 0 ] && [ "$1" != 'echo $?' ]; then
+    fail "\$ $command: exit code $status"; cat "$work/printed"
+  fi
+  command=$1
+  commands=$((commands + 1))
+  bash -c "(exit $status); $command" >"$work/printed" 2>&1 </dev/null
+  status=$?
+  : >"$work/expected"
+}
+for block in "$work"/blocks/*; do
+  kind=${block##*/} kind=${kind#*.}
+  case $kind in
+    unknown|none.yaml) fail "a block that is neither file nor commands: $(head -1 "$block")" ;;
+    console)
+      while IFS= read -r line || [ -n "$line" ]; do
+        case $line in
+          '$ '*) finish; begin "${line#\$ }" ;;
+          *) echo "$line" >>"$work/expected" ;;
+        esac
+      done <"$block"
+      finish
+      begin :
+      commands=$((commands - 1)) command= ;;
+    *)
+      file=${kind//%//}
+      mkdir -p "$(dirname "$file")"
+      [ -e "$file" ] && echo >>"$file"
+      cat "$block" >>"$file" ;;
+  esac
+done
+files=$(find . -name '*.yaml' -not -path './out/*' | wc -l)
+
+if [ -n "$source_dir" ]; then
+  [ "$files" -ge 14 ] || fail "only $files files found in $document"
+  [ "$commands" -ge 20 ] || fail "only $commands commands found in $document"
+  for file in $(find models scenarios -name '*.yaml' | sort); do
+    diff -B "$file" "$source_dir/$file" || fail "$document and $file differ"
+  done
+  holds() {  # SCENARIO CHANNEL VALUE, of the last run
+    awk -F, -v channel="$2" -v value="$3" '
+      NR == 1 { for (i = 1; i <= NF; ++i) if ($i == channel) column = i }
+      NR == 2 { found = column > 0 && ($column - value)^2 <= (1e-9)^2 }
+      END { exit !found }' "out/$1/traces.csv" || fail "$1: $2 is not $3"
+  }
+  expect() {  # SCENARIO CHANNEL VALUE ARGUMENTS…
+    mbverify run -q "scenarios/$1.yaml" --no-pictures --no-report "${@:4}" >/dev/null 2>&1 ||
+      fail "$1 ${*:4} does not agree"
+    holds "$1" "$2" "$3"
+  }
+  for witness in reference simulated; do
+    expect four_bar/static "motor.force.$witness" 0.5886
+    expect slider_crank/static "motor.force.$witness" -1.4090500577288894
+    expect stewart/static "leg4.length.force.$witness" 37.3393125
+  done
+  # In its dead centres the torque vanishes; the witnesses still agree.
+  expect slider_crank/static slider.z.reference 0.60 --set motion.commands.motor=0
+  expect slider_crank/static slider.z.reference 0.52 --set motion.commands.motor=pi
+  # Closed inverse kinematics of a leg: |p + R b − a|.
+  expect stewart/static leg1.length.position.reference 0.5
+fi
+
+[ $failed = 0 ] && echo "$files files and $commands commands do what the document says"
 exit $failed
