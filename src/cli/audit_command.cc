@@ -8,6 +8,8 @@
 #include "cli/cli.h"
 #include "cli/terminal.h"
 #include "core/diagnostics.h"
+#include "core/text.h"
+#include "core/word_hints.h"
 #include "scenario/find_model.h"
 
 namespace mbv {
@@ -28,34 +30,37 @@ std::string Word(AuditVerdict verdict, bool color) {
   return color ? fmt::format("\x1b[{}m{}\x1b[0m", code, text) : text;
 }
 
-void PrintRow(const AuditRow& row, bool color) {
-  fmt::print("  {:<28} {:<5} {}\n", row.equation, row.erratum, Word(row.verdict, color));
-  if (!row.printed.empty()) fmt::print("      printed:   {}\n", row.printed);
-  if (!row.corrected.empty()) fmt::print("      corrected: {}\n", row.corrected);
+std::string RowText(const AuditRow& row, bool color) {
+  std::string text =
+      fmt::format("  {:<28} {:<5} {}\n", row.equation, row.erratum, Word(row.verdict, color));
+  if (!row.printed.empty()) text += fmt::format("      printed:   {}\n", row.printed);
+  if (!row.corrected.empty()) text += fmt::format("      corrected: {}\n", row.corrected);
   if (row.verdict != AuditVerdict::kNotTestable) {
-    fmt::print("      residual: ");
+    text += "      residual: ";
     if (!row.corrected.empty()) {
-      fmt::print("printed {}, corrected ", std::isnan(row.residual_printed)
-                                               ? "not evaluated"
-                                               : fmt::format("{:.2e}", row.residual_printed));
+      text +=
+          fmt::format("printed {}, corrected ", std::isnan(row.residual_printed)
+                                                    ? "not evaluated"
+                                                    : fmt::format("{:.2e}", row.residual_printed));
     }
-    fmt::print("{:.2e} (limit {:.1e}) {} of {:.3g}\n", row.residual_corrected, row.limit, row.unit,
-               row.scale);
+    text += fmt::format("{:.2e} (limit {:.1e}) {} of {:.3g}\n", row.residual_corrected, row.limit,
+                        row.unit, row.scale);
   }
-  if (!row.note.empty()) fmt::print("      {}\n", row.note);
+  if (!row.note.empty()) text += fmt::format("      {}\n", row.note);
+  return text;
 }
 
 void PrintTable(const AuditTable& table, bool color) {
-  fmt::print("{}: {}\n", table.mechanism, table.source);
+  Say(stdout, "{}: {}\n", table.mechanism, table.source);
   size_t ok = 0, near = 0, wrong = 0, unfixed = 0;
   for (const AuditRow& row : table.rows) {
-    PrintRow(row, color);
+    SayText(stdout, RowText(row, color));
     ok += row.verdict == AuditVerdict::kOk ? 1 : 0;
     near += row.verdict == AuditVerdict::kApproximation ? 1 : 0;
     wrong += row.verdict == AuditVerdict::kWrong ? 1 : 0;
     unfixed += row.verdict == AuditVerdict::kWrongAndUnfixed ? 1 : 0;
   }
-  fmt::print(
+  Say(stdout,
       "  {} rows: {} right as printed, {} approximations, {} wrong as printed and corrected, {} "
       "unexplained, {} without a residual\n\n",
       table.rows.size(), ok, near, wrong, unfixed, table.rows.size() - ok - near - wrong - unfixed);
@@ -73,7 +78,7 @@ int Audit(const AuditArguments& arguments) {
     // A model of the same name in the current folder may be another one.
     const auto models_dir = ShippedModels();
     if (!models_dir) {
-      fmt::print(stderr, "error: the models that come with the program are not found\n");
+      Say(stderr, "error: the models that come with the program are not found\n");
       return 2;
     }
     const AuditTable table = entry.run(models_dir->string());
@@ -87,10 +92,8 @@ int Audit(const AuditArguments& arguments) {
     }
   }
   if (found) return exit_code;
-  const std::string near = ClosestWord(arguments.model, names);
-  fmt::print(stderr, "error: there is no equation audit of '{}'\n", arguments.model);
-  if (!near.empty()) fmt::print(stderr, "  hint: did you mean '{}'?\n", near);
-  return 2;
+  return Refuse(fmt::format("there is no equation audit of '{}'", arguments.model),
+                DidYouMean(arguments.model, names, "audited: " + Joined(names)));
 }
 
 }  // namespace
@@ -101,6 +104,8 @@ void AddAuditCommand(CLI::App* app, int* exit_code) {
       app->add_subcommand("audit", "Each equation of a paper, as printed and as corrected");
   audit->add_option("model", arguments->model, "model name; all without it");
   audit->add_flag("--markdown", arguments->markdown, "print a Markdown table");
+  SetFooter(audit, {"audit scara_robot", "audit --markdown"},
+            "0 every corrected form holds, 1 one does not, 2 bad input");
   audit->callback([arguments, exit_code] { *exit_code = Audit(*arguments); });
 }
 

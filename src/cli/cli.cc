@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cerrno>
 #include <cmath>
@@ -9,8 +10,13 @@
 #include <cstdlib>
 #include <cstring>
 #include <new>
+#include <sstream>
 #include <system_error>
 
+#include "cli/terminal.h"
+#include "core/text.h"
+#include "core/word_hints.h"
+#include "core/wrapped.h"
 #include "pipeline/version.h"
 
 namespace mbv {
@@ -47,7 +53,101 @@ void RequireFiniteNumbers(CLI::App* app) {
   }
 }
 
+constexpr size_t kHelpColumns = 80;  // where there is no terminal
+
+size_t HelpColumns() {
+  if (const size_t columns = TerminalColumns(stdout); columns > 0) return columns;
+  const char* text = std::getenv("COLUMNS");
+  const unsigned long columns = text == nullptr ? 0 : std::strtoul(text, nullptr, 10);
+  return columns >= 40 ? columns : kHelpColumns;
+}
+
+// Examples stay commands that a shell takes when their lines are broken.
+std::string HelpFor(const std::string& text, size_t columns) {
+  std::string help;
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) {
+    const bool example = line.starts_with("  mbverify ") && line.size() > columns;
+    std::string fitted = Wrapped(line, example ? columns - 2 : columns);
+    for (size_t at = fitted.find('\n'); example && at != std::string::npos;
+         at = fitted.find('\n', at + 3)) {
+      fitted.insert(at, " \\");
+    }
+    help += fitted + "\n";
+  }
+  return help;
+}
+
+std::string CommandPath(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  if (parent == nullptr) return command.get_name();
+  return CommandPath(*parent) + " " + command.get_name();
+}
+
+// The message and hint about the first word that the command has no use for; "" if all have one.
+std::pair<std::string, std::string> AboutUnknownWord(const CLI::App& app) {
+  const CLI::App* command = &app;
+  while (!command->get_subcommands().empty()) command = command->get_subcommands().back();
+  // A command that lets its parent try leaves the word there.
+  std::vector<std::string> words;
+  for (const CLI::App* at = command; at != nullptr && words.empty(); at = at->get_parent()) {
+    words = at->remaining();
+  }
+  if (words.empty()) return {};
+  const std::string word = words.front().substr(0, words.front().find('='));
+  std::vector<std::string> names;
+  if (word.starts_with("-")) {
+    for (const CLI::Option* option : command->get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+    return {fmt::format("{} has no option '{}'", CommandPath(*command), Printable(word)),
+            DidYouMean(word, names, "see " + CommandPath(*command) + " --help")};
+  }
+  for (const CLI::App* known : command->get_subcommands([](const CLI::App*) { return true; })) {
+    names.push_back(known->get_name());
+  }
+  if (names.empty()) return {};
+  return {fmt::format("there is no command '{} {}'", CommandPath(*command), Printable(word)),
+          DidYouMean(word, names, "commands: " + Joined(names))};
+}
+
+// Help and version, or what is wrong with the command line. Returns the exit code.
+int AnswerParse(const CLI::App& app, const CLI::ParseError& error) {
+  const auto [message, hint] = AboutUnknownWord(app);
+  if (error.get_exit_code() != 0 && !message.empty()) return Refuse(message, hint);
+  std::ostringstream out, err;
+  const int code = app.exit(error, out, err);
+  fmt::print("{}", HelpFor(out.str(), HelpColumns()));
+  SayText(stderr, err.str());
+  return code == 0 ? 0 : 2;
+}
+
 }  // namespace
+
+void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
+               const std::string& exit_codes) {
+  std::string text = examples.size() == 1 ? "Example:\n" : "Examples:\n";
+  for (const std::string& example : examples) text += "  mbverify " + example + "\n";
+  command->footer(text + "Exit codes: " + exit_codes);
+}
+
+CLI::Validator OneOf(const std::vector<std::string>& words) {
+  const std::string list = Joined(words);
+  return CLI::Validator(
+      [words, list](const std::string& word) {
+        if (Contains(words, word)) return std::string();
+        const std::string hint = DidYouMean(word, words);
+        return fmt::format("'{}' is none of {}{}", Printable(word), list,
+                           hint.empty() ? "" : "\n  hint: " + hint);
+      },
+      "one of " + list);
+}
+
+int Refuse(const std::string& message, const std::string& hint) {
+  Say(stderr, "error: {}\n", message);
+  if (!hint.empty()) Say(stderr, "  hint: {}\n", hint);
+  return 2;
+}
 
 int WorseExit(int a, int b) {
   static constexpr std::array<int, 5> kBadness = {0, 1, 3, 2, 4};  // of exit codes 0 … 4
@@ -61,14 +161,12 @@ int RunCli(int argc, char** argv) {
   app.name("mbverify");
   app.set_version_flag("--version", VersionText());
   app.require_subcommand(1);
-  app.footer(
-      "Examples:\n"
-      "  mbverify init my_linkage\n"
-      "  mbverify run scenarios/stabilizing_platform/sea_state.yaml\n"
-      "  mbverify check my_model.yaml my_scenario.yaml\n"
-      "  mbverify model spr_tripod --format mjcf\n"
-      "  mbverify audit scara_robot\n"
-      "Exit codes: 0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
+  app.get_formatter()->column_width(std::min<size_t>(30, HelpColumns() / 3));
+  SetFooter(&app,
+            {"init my_linkage", "run scenarios/stabilizing_platform/sea_state.yaml",
+             "check my_model.yaml my_scenario.yaml", "model spr_tripod --format mjcf",
+             "audit scara_robot"},
+            "0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
   int exit_code = 4;
   AddInitCommand(&app, &exit_code);
   AddRunCommand(&app, &exit_code);
@@ -90,7 +188,7 @@ int RunCli(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    exit_code = app.exit(error) == 0 ? 0 : 2;
+    exit_code = AnswerParse(app, error);
   } catch (const std::system_error& error) {
     // This is how printing reports that it failed.
     if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) return InternalError(error);

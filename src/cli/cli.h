@@ -16,6 +16,16 @@ namespace mbv {
 /// The worse of two exit codes.
 [[nodiscard]] int WorseExit(int a, int b);
 
+/// Ends a command's help with examples (what follows "mbverify ") and the meaning of exit codes.
+void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
+               const std::string& exit_codes);
+
+/// A check that a value is one of some words.
+[[nodiscard]] CLI::Validator OneOf(const std::vector<std::string>& words);
+
+/// Says "error: message" and the hint, if there is one. Exit code 2.
+[[nodiscard]] int Refuse(const std::string& message, const std::string& hint);
+
 // One function per command: adds it to the app; when chosen, its callback sets *exit_code.
 void AddInitCommand(CLI::App* app, int* exit_code);
 void AddRunCommand(CLI::App* app, int* exit_code);

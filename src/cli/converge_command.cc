@@ -10,6 +10,7 @@
 #include "core/output_folder.h"
 #include "pipeline/converge.h"
 #include "report/convergence_report.h"
+#include "scenario/find_model.h"
 
 namespace mbv {
 namespace {
@@ -31,7 +32,7 @@ std::string WriteFolder(const std::string& out, const ConvergenceReport& report)
   write("converge.csv", ToCsv(report));
   for (const auto& [name, content] : ConvergencePlots(report)) write(name, content);
   if (trouble.empty()) trouble = folder.Commit();
-  if (trouble.empty()) fmt::print(stderr, "results in {}\n", folder.target().string());
+  if (trouble.empty()) Say(stderr, "results in {}\n", folder.target().string());
   return trouble;
 }
 
@@ -41,7 +42,7 @@ int RunConverge(const ConvergeArguments& arguments) {
   for (const std::string& text : arguments.set) {
     const auto value = SplitSet(text);
     if (!value) {
-      fmt::print(stderr, "--set {}: error: write KEY=VALUE, e.g. parameters.link_mass=0.5\n", text);
+      Say(stderr, "--set {}: error: write KEY=VALUE, e.g. parameters.link_mass=0.5\n", text);
       return 2;
     }
     options.scenario.set.push_back(*value);
@@ -52,15 +53,15 @@ int RunConverge(const ConvergeArguments& arguments) {
       progress.Show(what, fraction);
     };
   }
-  const ConvergeOutcome outcome = Converge(arguments.scenario, options);
+  const ConvergeOutcome outcome = Converge(FindScenario(arguments.scenario), options);
   progress.Clear();
-  fmt::print(stderr, "{}", outcome.diagnostics.Text());
-  if (outcome.exit_code == 3) fmt::print(stderr, "error: could not run: {}\n", outcome.failure);
+  SayText(stderr, outcome.diagnostics.Text());
+  if (outcome.exit_code == 3) Say(stderr, "error: could not run: {}\n", outcome.failure);
   if (outcome.exit_code > 1) return outcome.exit_code;
-  fmt::print("{}", ToText(outcome.report));
+  SayText(stdout, ToText(outcome.report));
   std::fflush(stdout);
   if (const std::string trouble = WriteFolder(arguments.out, outcome.report); !trouble.empty()) {
-    fmt::print(stderr, "error: {}\n", trouble);
+    Say(stderr, "error: {}\n", trouble);
     return 2;
   }
   return outcome.exit_code;
@@ -80,10 +81,9 @@ void AddConvergeCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   converge->add_option("--set", arguments->set, "replace a value of the scenario: KEY=VALUE");
   converge->add_option("--out", arguments->out, "folder for results")->capture_default_str();
-  converge->footer(
-      "Example:\n"
-      "  mbverify converge scenarios/slider_crank/turn.yaml --steps 0.004,0.002,0.001,0.0005\n"
-      "Exit codes: 0 orders as expected, 1 a finding, 2 bad input, 3 could not run");
+  SetFooter(converge,
+            {"converge scenarios/slider_crank/turn.yaml --steps 0.004,0.002,0.001,0.0005"},
+            "0 orders as expected, 1 a finding, 2 bad input, 3 could not run");
   converge->callback([arguments, exit_code] { *exit_code = RunConverge(*arguments); });
 }
 

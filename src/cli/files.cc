@@ -1,4 +1,5 @@
 #include "cli/files.h"
+#include "cli/terminal.h"
 
 #include <fmt/format.h>
 
@@ -6,6 +7,7 @@
 
 #include "core/files.h"
 #include "pipeline/check_file.h"
+#include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {
@@ -38,7 +40,8 @@ std::vector<std::string> ExpandYaml(const std::string& argument, std::vector<std
 std::vector<std::string> ExpandScenarios(const std::vector<std::string>& arguments,
                                          std::string* trouble) {
   std::vector<std::string> scenarios, unread;
-  for (const std::string& argument : arguments) {
+  for (const std::string& given : arguments) {
+    const std::string argument = FindScenario(given);
     std::error_code error;
     if (!fs::is_directory(argument, error)) {
       scenarios.push_back(argument);
@@ -75,7 +78,7 @@ int RefuseInput(const std::string& path, const std::string& scenario) {
   if (path.empty() || !fs::exists(path, error)) return 0;  // nothing that could be lost
   const std::string trouble = WhyRefused(path, InputsOf(scenario));
   if (trouble.empty()) return 0;
-  fmt::print(stderr, "error: {}\n", trouble);
+  Say(stderr, "error: {}\n", trouble);
   return 2;
 }
 
@@ -84,7 +87,7 @@ int WriteWholeFile(const std::string& path, const std::string& content,
   std::string trouble = WhyRefused(path, inputs);
   if (trouble.empty()) trouble = WriteFile(path, content);
   if (trouble.empty()) return 0;
-  fmt::print(stderr, "error: {}\n", trouble);
+  Say(stderr, "error: {}\n", trouble);
   return 2;
 }
 

@@ -5,6 +5,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/terminal.h"
 #include "regress/history.h"
 
 namespace mbv {
@@ -16,15 +17,19 @@ struct HistoryArguments {
 };
 
 int Show(const HistoryText& answer) {
-  fmt::print("{}", answer.text);
+  SayText(stdout, answer.text);
   if (answer.trouble.empty()) return 0;
-  fmt::print(stderr, "error: {}\n", answer.trouble);
+  Say(stderr, "error: {}\n", answer.trouble);
   return 2;
 }
 
 int Export(const HistoryArguments& arguments) {
   const HistoryText answer = HistoryCsv(arguments.history);
-  if (arguments.csv.empty() || !answer.trouble.empty()) return Show(answer);
+  if (!answer.trouble.empty()) return Show(answer);
+  if (arguments.csv.empty()) {
+    fmt::print("{}", answer.text);
+    return 0;
+  }
   return WriteWholeFile(arguments.csv, answer.text, {{arguments.history, ""}});
 }
 
@@ -36,9 +41,8 @@ void AddHistoryCommand(CLI::App* app, int* exit_code) {
   history->add_option("--history", arguments->history, "SQLite file")->capture_default_str();
   history->require_subcommand(1);
   history->fallthrough();
-  history->add_subcommand("list", "All runs")->callback([arguments, exit_code] {
-    *exit_code = Show(ListRuns(arguments->history));
-  });
+  CLI::App* list = history->add_subcommand("list", "All runs");
+  list->callback([arguments, exit_code] { *exit_code = Show(ListRuns(arguments->history)); });
   CLI::App* compare = history->add_subcommand("compare", "What differs between two runs");
   compare->add_option("run1", arguments->run_a, "number, last or last~1")->required();
   compare->add_option("run2", arguments->run_b, "number, last or last~1")->required();
@@ -57,11 +61,16 @@ void AddHistoryCommand(CLI::App* app, int* exit_code) {
     *exit_code =
         Show(AcceptRun(arguments->history, arguments->run_a, arguments->scenario, arguments->note));
   });
-  history->footer(
-      "Examples:\n"
-      "  mbverify history list\n"
-      "  mbverify history compare last~1 last --history nightly.sqlite\n"
-      "  mbverify history export --csv metrics.csv");
+  const char* codes = "0 done, 2 bad input";
+  SetFooter(list, {"history list", "history list --history nightly.sqlite"}, codes);
+  SetFooter(compare, {"history compare last~1 last", "history compare 3 7"}, codes);
+  SetFooter(csv, {"history export --csv metrics.csv"}, codes);
+  SetFooter(accept, {"history accept last --scenario spr_tripod/default --note \"stiffer legs\""},
+            codes);
+  SetFooter(history,
+            {"history list", "history compare last~1 last --history nightly.sqlite",
+             "history export --csv metrics.csv"},
+            codes);
 }
 
 }  // namespace mbv

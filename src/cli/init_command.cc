@@ -4,6 +4,7 @@
 #include <memory>
 
 #include "cli/cli.h"
+#include "cli/terminal.h"
 #include "pipeline/init_model.h"
 
 namespace mbv {
@@ -11,10 +12,10 @@ namespace {
 
 int Init(const InitOptions& options) {
   const InitResult result = InitModel(options);
-  fmt::print(stderr, "{}", result.diagnostics.Text());
+  SayText(stderr, result.diagnostics.Text());
   if (result.files.empty()) return 2;
   for (const std::string& file : result.files) fmt::print("wrote {}\n", file);
-  fmt::print("next: mbverify run {}\n", result.files.back());
+  Say(stdout, "next: mbverify run {}\n", result.files.back());
   return 0;
 }
 
@@ -33,11 +34,10 @@ void AddInitCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   init->add_option("--into", options->into, "folder that gets models/ and scenarios/")
       ->capture_default_str();
-  init->footer(
-      "Example:\n"
-      "  mbverify init my_linkage && mbverify run scenarios/my_linkage/first.yaml\n"
-      "  mbverify init my_robot --from my_robot.urdf\n"
-      "Nothing that exists is overwritten.");
+  SetFooter(init,
+            {"init my_linkage && mbverify run scenarios/my_linkage/first.yaml",
+             "init my_crank --from slider_crank", "init my_robot --from my_robot.urdf"},
+            "0 written, 2 bad input. Nothing that exists is overwritten.");
   init->callback([options, exit_code] { *exit_code = Init(*options); });
 }
 

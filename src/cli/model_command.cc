@@ -21,13 +21,13 @@ bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options)
   for (const std::string& text : texts) {
     const auto set = SplitSet(text);
     if (!set) {
-      fmt::print(stderr, "--set {}: error: write PARAMETER=NUMBER, e.g. m_p=45000\n", text);
+      Say(stderr, "--set {}: error: write PARAMETER=NUMBER, e.g. m_p=45000\n", text);
       return false;
     }
     values.push_back(*set);
   }
   const Diagnostics findings = ReadParameterOptions(values, options);
-  fmt::print(stderr, "{}", findings.Text());
+  SayText(stderr, findings.Text());
   return !findings.has_errors();
 }
 
@@ -48,20 +48,19 @@ ModelFormat FormatOf(const std::string& word) {
                           : ModelFormat::kMobility;
 }
 
+bool IsForPeople(const std::string& format) { return FormatOf(format) == ModelFormat::kMobility; }
+
 int Model(const ModelArguments& arguments) {
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
   const auto file = FindModel(arguments.model, ".");
   if (!file) {
-    const std::vector<std::string> names = ModelNames(".");
-    const std::string near = ClosestWord(arguments.model, names);
-    fmt::print(stderr, "error: there is no model '{}'\n", arguments.model);
-    if (!near.empty()) fmt::print(stderr, "  hint: did you mean '{}'?\n", near);
-    return 2;
+    return Refuse(fmt::format("there is no model '{}'", arguments.model),
+                  ModelHint(arguments.model, "."));
   }
   const InputWatch inputs;
   const LoadResult loaded = LoadModel(*file, options);
-  fmt::print(stderr, "{}", loaded.diagnostics.Text());
+  SayText(stderr, loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
   const ModelFormat format = FormatOf(arguments.format);
   if ((format == ModelFormat::kUrdf || format == ModelFormat::kYaml) &&
@@ -72,11 +71,15 @@ int Model(const ModelArguments& arguments) {
     finding.message = fmt::format("{} has rigid links only: {} beams are left out",
                                   format == ModelFormat::kUrdf ? "URDF" : "what is written",
                                   loaded.mechanism->beams.size());
-    fmt::print(stderr, "{}", ToText(finding) + "\n");
+    SayText(stderr, ToText(finding) + "\n");
   }
   const std::string text = ModelText(*loaded.mechanism, format);
   if (arguments.out.empty()) {
-    fmt::print("{}", text);
+    if (!IsForPeople(arguments.format)) {
+      fmt::print("{}", text);
+    } else {
+      SayText(stdout, text);
+    }
     return 0;
   }
   return WriteWholeFile(arguments.out, text, inputs.files());
@@ -87,11 +90,11 @@ int CheckFiles(const std::vector<std::string>& arguments) {
   FindingPrinter findings(stdout);
   for (const std::string& argument : arguments) {
     std::vector<std::string> unread;
-    const std::vector<std::string> files = ExpandYaml(argument, &unread);
-    for (const std::string& line : unread) fmt::print("{}\n", line);
+    const std::vector<std::string> files = ExpandYaml(FindScenario(argument), &unread);
+    for (const std::string& line : unread) Say(stdout, "{}\n", line);
     if (!unread.empty()) exit_code = 2;
     if (files.empty()) {
-      fmt::print("{}: error: no *.yaml file in this folder\n", argument);
+      Say(stdout, "{}: error: no *.yaml file in this folder\n", argument);
       exit_code = 2;
     }
     for (const std::string& file : files) {
@@ -100,7 +103,7 @@ int CheckFiles(const std::vector<std::string>& arguments) {
       if (diagnostics.has_errors()) {
         exit_code = 2;
       } else {
-        fmt::print("{}: ok\n", file);
+        Say(stdout, "{}: ok\n", file);
       }
     }
   }
@@ -112,9 +115,9 @@ void ListModels() {
   for (const std::string& name : ModelNames(".")) {
     const auto file = FindModel(name, ".");
     const LoadResult loaded = LoadModel(*file);
-    fmt::print("  {:<24}{}\n", name,
-               loaded.mechanism ? loaded.mechanism->description
-                                : "(has errors: mbverify check " + *file + ")");
+    Say(stdout, "  {:<24}{}\n", name,
+        loaded.mechanism ? loaded.mechanism->description
+                         : "(has errors: mbverify check " + *file + ")");
   }
 }
 
@@ -126,8 +129,8 @@ void ListScenarios() {
   for (const std::string& file : ExpandYaml(*folder, &unread)) {
     const ScenarioHead head = ReadScenarioHead(file);
     if (!head.is_scenario) continue;
-    fmt::print("  {}\n      {}\n", file,
-               head.description.empty() ? "(no description)" : head.description);
+    Say(stdout, "  {}\n      {}\n", file,
+        head.description.empty() ? "(no description)" : head.description);
   }
 }
 
@@ -141,14 +144,14 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
       ->add_option("--format", arguments->format,
                    "text (mobility report), json (the same for programs), or the model as mjcf, "
                    "urdf or yaml (a model file with the numbers that the parameters give)")
-      ->check(CLI::IsMember({"text", "json", "mjcf", "urdf", "yaml"}));
+      ->check(OneOf({"text", "json", "mjcf", "urdf", "yaml"}));
   model->add_option("--out", arguments->out, "write to this file instead of stdout");
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);
-  model->footer(
-      "Examples:\n"
-      "  mbverify model stabilizing_platform\n"
-      "  mbverify model spr_tripod --format mjcf --out spr_tripod.xml");
+  SetFooter(model,
+            {"model stabilizing_platform", "model four_bar --set crank=0.16",
+             "model spr_tripod --format mjcf --out spr_tripod.xml"},
+            "0 done, 2 bad input");
   model->callback([arguments, exit_code] { *exit_code = Model(*arguments); });
 }
 
@@ -156,11 +159,14 @@ void AddCheckCommand(CLI::App* app, int* exit_code) {
   auto files = std::make_shared<std::vector<std::string>>();
   CLI::App* check = app->add_subcommand("check", "Validate model and scenario files");
   check->add_option("file", *files, "files, or folders of them")->required();
+  SetFooter(check, {"check my_model.yaml my_scenario.yaml", "check scenarios/spr_tripod"},
+            "0 no errors, 2 bad input");
   check->callback([files, exit_code] { *exit_code = CheckFiles(*files); });
 }
 
 void AddListCommand(CLI::App* app, int* exit_code) {
   CLI::App* list = app->add_subcommand("list", "List models and scenarios");
+  SetFooter(list, {"list"}, "0 done");
   list->callback([exit_code] {
     ListModels();
     ListScenarios();

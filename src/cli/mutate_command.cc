@@ -20,6 +20,7 @@
 #include "pipeline/mutate.h"
 #include "regress/find_cases.h"
 #include "regress/workers.h"
+#include "scenario/find_model.h"
 
 namespace mbv {
 namespace {
@@ -51,8 +52,7 @@ std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
   MutationOptions options;
   const auto size = ReadPercent(arguments.size);
   if (!size) {
-    fmt::print(stderr, "--size {}: error: violates: a percentage above 0, e.g. 1%\n",
-               arguments.size);
+    Say(stderr, "--size {}: error: violates: a percentage above 0, e.g. 1%\n", arguments.size);
     return {};
   }
   options.size = *size;
@@ -66,7 +66,7 @@ std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
   if (arguments.part.empty()) return options;
   const auto part = ParseShard(arguments.part);
   if (!part) {
-    fmt::print(stderr, "--part {}: error: write i/n with 1 <= i <= n, e.g. 2/3\n", arguments.part);
+    Say(stderr, "--part {}: error: write i/n with 1 <= i <= n, e.g. 2/3\n", arguments.part);
     return {};
   }
   options.part = static_cast<size_t>(part->index - 1);
@@ -150,9 +150,9 @@ class Workers {
     // All workers find the same in the files.
     if (std::exchange(told_, true) && (good || failure_ > 0)) return;
     progress_.Clear();
-    fmt::print(stderr, "{}", ReadAll(Place(part, "log")));
+    SayText(stderr, ReadAll(Place(part, "log")));
     if (good) return;
-    if (end.signal != 0) fmt::print(stderr, "a worker was ended by signal {}\n", end.signal);
+    if (end.signal != 0) Say(stderr, "a worker was ended by signal {}\n", end.signal);
     failure_ = std::max(failure_, end.exit_code > 0 ? end.exit_code : 3);
   }
 
@@ -176,6 +176,7 @@ MutationReport RunHere(const MutateArguments& arguments, MutationOptions options
 }
 
 int Mutate(MutateArguments arguments) {
+  arguments.scenario = FindScenario(arguments.scenario);
   const auto options = OptionsOf(arguments);
   if (!options) return 2;
   if (!options->numbers.empty()) {
@@ -185,7 +186,7 @@ int Mutate(MutateArguments arguments) {
   const InputWatch watch;
   const bool shared = arguments.jobs > 1 && arguments.part.empty();
   const MutationReport report = shared ? Workers(arguments).Run() : RunHere(arguments, *options);
-  fmt::print(stderr, "{}", report.diagnostics.Text());
+  SayText(stderr, report.diagnostics.Text());
   const bool nothing = report.mutations.empty() && report.faults.empty();
   if (report.exit_code > 1 || (nothing && arguments.part.empty())) return report.exit_code;
   if (!arguments.json.empty()) {
@@ -194,7 +195,13 @@ int Mutate(MutateArguments arguments) {
     const int code = WriteWholeFile(arguments.json, ToJson(report), inputs);
     if (code != 0) return code;
   }
-  if (arguments.part.empty()) fmt::print("{}", ToText(report, arguments.markdown));
+  if (!arguments.part.empty()) return report.exit_code;
+  const std::string text = ToText(report, arguments.markdown);
+  if (arguments.markdown) {
+    fmt::print("{}", text);
+  } else {
+    SayText(stdout, text);
+  }
   return report.exit_code;
 }
 
@@ -226,7 +233,7 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
   mutate
       ->add_option("--mode", arguments->mode,
                    "of a forward scenario: its own, inverse dynamics, or both side by side")
-      ->check(CLI::IsMember({"both", "own", "inverse"}))
+      ->check(OneOf({"both", "own", "inverse"}))
       ->capture_default_str();
   mutate->add_option("--jobs", arguments->jobs, "worker processes at once")
       ->check(CLI::Range(1, 1024))
@@ -234,10 +241,11 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
   mutate->add_option("--part", arguments->part, "i/n: a worker's share")->group("");
   mutate->add_flag("--markdown", arguments->markdown, "print Markdown tables");
   mutate->add_option("--json", arguments->json, "write the results to this file, too");
-  mutate->footer(
-      "Example:\n"
-      "  mbverify mutate scenarios/stabilizing_platform/sea_state.yaml --size 1%\n"
-      "Exit codes: 0 everything that matters is detected, 1 some is missed");
+  SetFooter(
+      mutate,
+      {"mutate scenarios/stabilizing_platform/sea_state.yaml --size 1%",
+       "mutate scenarios/four_bar/turn_inverse.yaml --parameter rho --no-search"},
+      "0 everything that matters is detected, 1 some is missed, 2 bad input, 3 could not run");
   mutate->callback([arguments, exit_code] { *exit_code = Mutate(*arguments); });
 }
 

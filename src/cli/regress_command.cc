@@ -49,8 +49,7 @@ bool Complete(RegressArguments* arguments) {
   if (!arguments->shard.empty()) {
     const auto shard = ParseShard(arguments->shard);
     if (!shard) {
-      fmt::print(stderr, "--shard {}: error: write i/n with 1 <= i <= n, e.g. 2/3\n",
-                 arguments->shard);
+      Say(stderr, "--shard {}: error: write i/n with 1 <= i <= n, e.g. 2/3\n", arguments->shard);
       return false;
     }
     options.shard = *shard;
@@ -61,9 +60,8 @@ bool Complete(RegressArguments* arguments) {
     options.history = (std::filesystem::path(options.out) / "history.sqlite").string();
   }
   if (options.fail_on_missing && options.history.empty()) {
-    fmt::print(stderr,
-               "--fail-on-missing: error: needs a history: --history FILE says what there was{}\n",
-               options.shard.count > 1 ? "; or give it to merge" : "");
+    Say(stderr, "--fail-on-missing: error: needs a history: --history FILE says what there was{}\n",
+        options.shard.count > 1 ? "; or give it to merge" : "");
     return false;
   }
   options.pictures = !arguments->no_pictures;
@@ -75,11 +73,11 @@ bool Complete(RegressArguments* arguments) {
 }
 
 int Conclude(const RegressArguments& arguments, const RegressOutcome& outcome) {
-  if (!outcome.trouble.empty()) fmt::print(stderr, "{}\n", outcome.trouble);
+  if (!outcome.trouble.empty()) Say(stderr, "{}\n", outcome.trouble);
   if (outcome.files.empty()) return outcome.exit_code;
-  fmt::print("{}", ToSummaryText(outcome.report));
+  SayText(stdout, ToSummaryText(outcome.report));
   if (!arguments.quiet) {
-    for (const std::string& file : outcome.files) fmt::print(stderr, "wrote {}\n", file);
+    for (const std::string& file : outcome.files) Say(stderr, "wrote {}\n", file);
   }
   const bool drifted = CountCases(outcome.report).drifted > 0;
   return outcome.exit_code == 0 && drifted && arguments.fail_on_drift ? 1 : outcome.exit_code;
@@ -144,12 +142,10 @@ void AddRegressCommand(CLI::App* app, int* exit_code) {
   regress->add_flag("--embed", arguments->embed,
                     "each report.html with its script inside, to be sent alone");
   regress->add_option("--worker", arguments->worker, "program run instead of this one")->group("");
-  regress->footer(
-      "Examples:\n"
-      "  mbverify regress\n"
-      "  mbverify regress scenarios/spr_tripod --no-pictures --junit junit.xml\n"
-      "  mbverify regress --shard 1/4 --out shard1\n"
-      "Exit codes: 0 all as expected, 1 some not, 2 bad input, 3 some could not run");
+  SetFooter(regress,
+            {"regress", "regress scenarios/spr_tripod --no-pictures --junit junit.xml",
+             "regress --shard 1/4 --out shard1"},
+            "0 all as expected, 1 some not, 2 bad input, 3 some could not run");
   regress->callback([arguments, exit_code] { *exit_code = RunRegress(arguments.get()); });
 }
 
@@ -160,11 +156,9 @@ void AddMergeCommand(CLI::App* app, int* exit_code) {
   AddOutputOptions(merge, arguments.get());
   merge->add_flag("--partial", arguments->options.partial,
                   "join what there is: not all shards, or of different runs");
-  merge->footer(
-      "Example:\n"
-      "  mbverify merge shard1 shard2 --out night --history nightly.sqlite\n"
-      "Exit codes: 0 all as expected, 1 some not, 2 bad input (also: shards of different nights),\n"
-      "3 some could not run, or a shard is missing");
+  SetFooter(merge, {"merge shard1 shard2 --out night --history nightly.sqlite"},
+            "0 all as expected, 1 some not, 2 bad input (also: shards of different nights), 3 some "
+            "could not run, or a shard is missing");
   merge->callback([arguments, exit_code] { *exit_code = RunMerge(arguments.get()); });
 }
 

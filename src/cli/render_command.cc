@@ -10,12 +10,14 @@
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "pipeline/render_scenario.h"
+#include "scenario/find_model.h"
 
 namespace mbv {
 namespace {
 
 struct RenderArguments {
   std::string scenario, at, size, video, out = "pictures";
+  std::vector<std::string> set;
   double frames_per_s = 25.0;
 };
 
@@ -35,6 +37,13 @@ int Save(const std::string& path, const std::string& content,
 
 int Render(const RenderArguments& arguments) {
   RenderRequest request;
+  for (const std::string& text : arguments.set) {
+    const auto set = SplitSet(text);
+    if (!set) {
+      return Refuse(fmt::format("--set {}: write key=value", text), "e.g. parameters.m_p=45000");
+    }
+    request.scenario.set.push_back(*set);
+  }
   if (!arguments.at.empty()) {
     request.scenario.set.emplace_back("snapshots.times_s", "[" + arguments.at + "]");
   }
@@ -51,9 +60,9 @@ int Render(const RenderArguments& arguments) {
   }
   if (const int code = RefuseInput(arguments.video, arguments.scenario); code != 0) return code;
   const InputWatch inputs;
-  const RenderOutcome outcome = RenderScenario(arguments.scenario, request);
+  const RenderOutcome outcome = RenderScenario(FindScenario(arguments.scenario), request);
   progress.Clear();
-  fmt::print(stderr, "{}", outcome.diagnostics.Text());
+  SayText(stderr, outcome.diagnostics.Text());
   if (outcome.exit_code != 0) return outcome.exit_code;
   if (!arguments.video.empty()) return Save(arguments.video, outcome.video, inputs.files());
   const std::filesystem::path folder =
@@ -80,11 +89,15 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   render->add_option("--out", arguments->out, "folder for pictures")->capture_default_str();
-  render->footer(
-      "Examples:\n"
-      "  mbverify render scenarios/stabilizing_platform/sea_state.yaml --at 0,1.42 --size "
-      "1920x1080\n"
-      "  mbverify render scenarios/spr_tripod/default.yaml --video tripod.mp4");
+  render
+      ->add_option("--set", arguments->set,
+                   "key=value: overrides a value of the scenario (repeatable)")
+      ->allow_extra_args(false);
+  SetFooter(render,
+            {"render scenarios/stabilizing_platform/sea_state.yaml --at 0,1.42 --size 1920x1080",
+             "render four_bar/turn --set parameters.crank=0.16",
+             "render scenarios/spr_tripod/default.yaml --video tripod.mp4"},
+            "0 drawn, 2 bad input, 3 could not run");
   render->callback([arguments, exit_code] { *exit_code = Render(*arguments); });
 }
 

@@ -35,23 +35,23 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
     outcome = OutOfMemory(file, options.scenario);
   } catch (const std::exception& error) {
     progress->Clear();
-    fmt::print(stderr, "{}: internal error: {}\n", file, error.what());
+    Say(stderr, "{}: internal error: {}\n", file, error.what());
     return {};
   }
   progress->Clear();
   findings->Print(outcome.diagnostics);
   if (outcome.report) {
     const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
-    fmt::print("{}", arguments.quiet ? VerdictLine(*outcome.report, table)
-                                     : ToTable(*outcome.report, table) + "\n");
+    SayText(stdout, arguments.quiet ? VerdictLine(*outcome.report, table)
+                                    : ToTable(*outcome.report, table) + "\n");
   }
   if (outcome.stiffness != nullptr) {
     const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
-    fmt::print("{}", arguments.quiet ? VerdictLine(*outcome.stiffness, table)
-                                     : ToTable(*outcome.stiffness, table) + "\n");
+    SayText(stdout, arguments.quiet ? VerdictLine(*outcome.stiffness, table)
+                                    : ToTable(*outcome.stiffness, table) + "\n");
   }
   if (!outcome.folder.empty() && !arguments.quiet) {
-    fmt::print(stderr, "results in {}\n", outcome.folder);
+    Say(stderr, "results in {}\n", outcome.folder);
   }
   std::fflush(stdout);
   return outcome;
@@ -67,7 +67,7 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   for (const std::string& text : arguments.set) {
     const auto set = SplitSet(text);
     if (!set) {
-      fmt::print(stderr, "--set {}: error: write key=value, e.g. simulation.step_s=0.002\n", text);
+      Say(stderr, "--set {}: error: write key=value, e.g. simulation.step_s=0.002\n", text);
       return false;
     }
     options->scenario.set.push_back(*set);
@@ -91,12 +91,12 @@ bool SetUpRobot(const std::string& robot, const RunArguments& arguments, Finding
        {std::pair(model, made.setup->model), std::pair(first, made.setup->scenario)}) {
     const std::string trouble = WriteFile(path, text);
     if (!trouble.empty()) {
-      fmt::print(stderr, "error: {}\n", trouble);
+      Say(stderr, "error: {}\n", trouble);
       return false;
     }
   }
   if (!arguments.quiet) {
-    fmt::print(stderr, "{} is run by {}; go on from there\n", robot, first.string());
+    Say(stderr, "{} is run by {}; go on from there\n", robot, first.string());
   }
   *scenario = first.string();
   return true;
@@ -108,7 +108,7 @@ int Run(const RunArguments& arguments) {
   std::string trouble;
   const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
   if (!trouble.empty()) {
-    fmt::print(stderr, "{}\n", trouble);
+    Say(stderr, "{}\n", trouble);
     return 2;
   }
   ProgressLine progress(!arguments.quiet);
@@ -133,7 +133,7 @@ int Run(const RunArguments& arguments) {
               : outcome.stiffness ? CountOf(*outcome.stiffness)
                                   : RunCounts{.scenarios = 1, .bad_input = 1};
   }
-  if (files.size() > 1) fmt::print("{}", CountLine(counts));
+  if (files.size() > 1) SayText(stdout, CountLine(counts));
   return exit_code;
 }
 
@@ -147,7 +147,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
       ->required();
   run->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   run->add_option("--mode", arguments->mode, "overrides the scenario's simulation mode")
-      ->check(CLI::IsMember({"forward", "inverse"}));
+      ->check(OneOf({"forward", "inverse"}));
   run->add_option("--set", arguments->set,
                   "key=value: overrides a value of the scenario (repeatable)")
       ->allow_extra_args(false);
@@ -159,13 +159,11 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");
   run->add_flag("-v,--verbose", arguments->verbose,
                 "also how to read each signal, and what could not be compared");
-  run->footer(
-      "Examples:\n"
-      "  mbverify run scenarios/stabilizing_platform/sea_state.yaml\n"
-      "  mbverify run my_robot.urdf\n"
-      "  mbverify run scenarios/spr_tripod --mode inverse --quiet\n"
-      "  mbverify run my.yaml --set parameters.m_p=45000 --set simulation.step_s=0.0005\n"
-      "Exit codes: 0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
+  SetFooter(run,
+            {"run scenarios/stabilizing_platform/sea_state.yaml", "run my_robot.urdf",
+             "run scenarios/spr_tripod --mode inverse --quiet", "run four_bar/turn",
+             "run my.yaml --set parameters.m_p=45000 --set simulation.step_s=0.0005"},
+            "0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
   run->callback([arguments, exit_code] { *exit_code = Run(*arguments); });
 }
 

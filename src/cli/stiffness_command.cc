@@ -30,7 +30,7 @@ bool AddAssignments(const std::vector<std::string>& texts, const char* option, c
   for (const std::string& text : texts) {
     const auto assignment = SplitSet(text);
     if (!assignment) {
-      fmt::print(stderr, "{} {}: error: write NAME=VALUE, e.g. {}\n", option, text, example);
+      Say(stderr, "{} {}: error: write NAME=VALUE, e.g. {}\n", option, text, example);
       return false;
     }
     set->emplace_back(std::string(section) + assignment->first, assignment->second);
@@ -136,7 +136,7 @@ std::string WriteFolder(const StiffnessArguments& arguments, const StiffnessRun&
     if (trouble.empty()) trouble = folder.Write("maps/" + name, content);
   }
   if (trouble.empty()) trouble = folder.Commit();
-  if (trouble.empty()) fmt::print(stderr, "results in {}\n", folder.target().string());
+  if (trouble.empty()) Say(stderr, "results in {}\n", folder.target().string());
   return trouble;
 }
 
@@ -182,7 +182,7 @@ MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness&
 int Stiffness(const StiffnessArguments& arguments) {
   Diagnostics diagnostics;
   const auto prepared = PrepareRequest(arguments, &diagnostics);
-  fmt::print(stderr, "{}", InOwnWords(diagnostics.Text()));
+  SayText(stderr, InOwnWords(diagnostics.Text()));
   if (!prepared) return 2;
   ProgressLine progress_line(true);
   ProgressFunction progress;
@@ -197,16 +197,20 @@ int Stiffness(const StiffnessArguments& arguments) {
   Diagnostics map_diagnostics;
   const MapFolder maps = DrawMaps(arguments, *prepared, progress, &map_diagnostics);
   progress_line.Clear();
-  fmt::print(stderr, "{}", map_diagnostics.Text());
+  SayText(stderr, map_diagnostics.Text());
   if (map_diagnostics.has_errors()) return 2;
   const bool json = arguments.format == "json";
   const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
-  fmt::print("{}", json ? ToJson(run.report) : ToTable(run.report, table));
-  if (!maps.text.empty()) fmt::print(json ? stderr : stdout, "\n{}", maps.text);
+  if (json) {
+    fmt::print("{}", ToJson(run.report));
+  } else {
+    SayText(stdout, ToTable(run.report, table));
+  }
+  if (!maps.text.empty()) Say(json ? stderr : stdout, "\n{}", maps.text);
   if (!arguments.out.empty() || !maps.files.empty()) {
     const std::string trouble = WriteFolder(arguments, run, maps.files);
     if (!trouble.empty()) {
-      fmt::print(stderr, "error: {}\n  hint: choose another folder with --out\n", trouble);
+      Say(stderr, "error: {}\n  hint: choose another folder with --out\n", trouble);
       return 2;
     }
   }
@@ -247,18 +251,17 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
       ->allow_extra_args(false);
   stiffness->add_option("--out", arguments->out, "folder for results (maps: default out)");
   stiffness->add_option("--format", arguments->format, "of what is printed")
-      ->check(CLI::IsMember({"text", "json"}))
+      ->check(OneOf({"text", "json"}))
       ->capture_default_str();
   stiffness->add_flag("--no-simulation", arguments->no_simulation, "leave MuJoCo out");
   stiffness->add_flag("-v,--verbose", arguments->verbose, "also what could not be compared");
-  stiffness->footer(
-      "Examples:\n"
-      "  mbverify stiffness scara_robot\n"
-      "  mbverify stiffness scara_robot --at platform.x_mm=-60 platform.yaw_deg=10 --out out\n"
-      "  mbverify stiffness scara_robot --map z=-0.1 phi=0 --map z=-0.23 phi_deg=45\n"
-      "  mbverify stiffness scara_robot --map usual --index kappa_f\n"
-      "  mbverify stiffness cabin_robot --at d5=-0.3 --loads 50\n"
-      "Exit codes: 0 the computations agree, 1 they do not, 2 bad input, 3 could not run");
+  SetFooter(stiffness,
+            {"stiffness scara_robot",
+             "stiffness scara_robot --at platform.x_mm=-60 platform.yaw_deg=10 --out out",
+             "stiffness scara_robot --map z=-0.1 phi=0 --map z=-0.23 phi_deg=45",
+             "stiffness scara_robot --map usual --index kappa_f",
+             "stiffness cabin_robot --at d5=-0.3 --loads 50"},
+            "0 the computations agree, 1 they do not, 2 bad input, 3 could not run");
   stiffness->callback([arguments, exit_code] { *exit_code = Stiffness(*arguments); });
 }
 

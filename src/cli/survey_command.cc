@@ -7,6 +7,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/terminal.h"
 #include "core/files.h"
 #include "pipeline/survey.h"
 #include "regress/in_children.h"
@@ -61,7 +62,7 @@ int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& 
   exit_code = WorseExit(exit_code, WriteWholeFile((out / "survey.html").string(),
                                                   SurveyHtml(rows, arguments.folder), {}));
   if (exit_code == 0) {
-    fmt::print(stderr, "wrote {0}/survey.csv and {0}/survey.html\n", out.string());
+    Say(stderr, "wrote {0}/survey.csv and {0}/survey.html\n", out.string());
   }
   return exit_code;
 }
@@ -69,14 +70,14 @@ int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& 
 int Survey(const SurveyArguments& arguments) {
   std::vector<std::string> unread;
   const std::vector<std::string> files = FilesBelow(arguments.folder, ".urdf", &unread);
-  for (const std::string& line : unread) fmt::print(stderr, "{}\n", line);
+  for (const std::string& line : unread) Say(stderr, "{}\n", line);
   if (files.empty()) {
-    fmt::print(stderr, "{}: error: no *.urdf file in this folder\n", arguments.folder);
+    Say(stderr, "{}: error: no *.urdf file in this folder\n", arguments.folder);
     return 2;
   }
   const ScratchFolder scratch;
   if (scratch.path().empty()) {
-    fmt::print(stderr, "error: no folder for temporary files can be made\n");
+    Say(stderr, "error: no folder for temporary files can be made\n");
     return 3;
   }
   std::vector<SurveyRow> rows;
@@ -84,10 +85,9 @@ int Survey(const SurveyArguments& arguments) {
     rows.push_back(RowOf(files[i], (fs::path(scratch.path()) / fmt::format("{}", i)).string(),
                          arguments.timeout_s));
     rows.back().file = fs::path(files[i]).lexically_relative(arguments.folder).string();
-    fmt::print(stderr, "{} of {}: {} {}\n", i + 1, files.size(), rows.back().file,
-               rows.back().status);
+    Say(stderr, "{} of {}: {} {}\n", i + 1, files.size(), rows.back().file, rows.back().status);
   }
-  fmt::print("{}", SurveyTable(rows));
+  SayText(stdout, SurveyTable(rows));
   const int exit_code = SurveyExit(rows);
   return arguments.out.empty() ? exit_code : WorseExit(exit_code, WriteSurvey(arguments, rows));
 }
@@ -103,10 +103,10 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  survey->footer(
-      "Example:\n  mbverify survey my_robots --out out\n"
-      "Exit codes: 0 all ok, or refused for a fault of the file itself; 1 some disagree or do not "
-      "close; 3 some failed");
+  SetFooter(
+      survey, {"survey my_robots --out out"},
+      "0 all ok, or refused for a fault of the file itself; 1 some disagree or do not close; 2 "
+      "bad input; 3 some failed");
   survey->callback([arguments, exit_code] { *exit_code = Survey(*arguments); });
 }
 

@@ -1,33 +1,67 @@
 #include "cli/terminal.h"
 
 #include <fmt/format.h>
+#include <sys/ioctl.h>
 #include <unistd.h>
 
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
+
+#include "core/wrapped.h"
 
 namespace mbv {
+namespace {
+
+constexpr size_t kNarrowest = 20;  // below that, a width is a mistake
+
+bool IsTerminal(std::FILE* to) { return isatty(fileno(to)) != 0; }
+
+}  // namespace
+
+size_t TerminalColumns(std::FILE* to) {
+  if (!IsTerminal(to)) return 0;
+  size_t columns = 0;
+  if (const char* text = std::getenv("COLUMNS")) columns = std::strtoul(text, nullptr, 10);
+  winsize size = {};
+  if (columns < kNarrowest && ioctl(fileno(to), TIOCGWINSZ, &size) == 0) columns = size.ws_col;
+  return columns < kNarrowest ? 0 : columns;
+}
+
+bool ObeysEscapes(std::FILE* to) {
+  const char* kind = std::getenv("TERM");
+  return IsTerminal(to) && (kind == nullptr || std::strcmp(kind, "dumb") != 0);
+}
+
+bool WantsColor(std::FILE* to) {
+  const char* no_color = std::getenv("NO_COLOR");
+  return ObeysEscapes(to) && (no_color == nullptr || *no_color == '\0');
+}
+
+void SayText(std::FILE* to, std::string_view text) {
+  if (to != stdout) std::fflush(stdout);
+  fmt::print(to, "{}", Wrapped(text, TerminalColumns(to)));
+}
 
 void FindingPrinter::Print(const Diagnostics& diagnostics) {
   for (const Finding& finding : diagnostics.findings()) {
     const std::string text = ToText(finding);
-    if (told_.insert(text).second) fmt::print(to_, "{}\n", text);
+    if (told_.insert(text).second) SayText(to_, text + "\n");
   }
 }
 
-bool WantsColor() {
-  const char* no_color = std::getenv("NO_COLOR");
-  return isatty(STDOUT_FILENO) != 0 && (no_color == nullptr || *no_color == '\0');
-}
-
-ProgressLine::ProgressLine(bool wanted) : active_(wanted && isatty(STDERR_FILENO) != 0) {}
+ProgressLine::ProgressLine(bool wanted) : active_(wanted && ObeysEscapes(stderr)) {}
 
 void ProgressLine::Show(const std::string& what, double fraction) {
   const int percent = static_cast<int>(100.0 * fraction);
   if (!active_ || (percent == last_percent_ && what == last_what_)) return;
   last_percent_ = percent;
   last_what_ = what;
-  std::fprintf(stderr, "\r\x1b[K%s %d %%", what.c_str(), percent);
+  // A line that the terminal breaks cannot be taken back: its beginning is left out.
+  const size_t columns = TerminalColumns(stderr), room = columns > 8 ? columns - 8 : what.size();
+  std::string shown = what;
+  while (PrintedWidth(shown) > room) shown.erase(0, 1);
+  std::fprintf(stderr, "\r\x1b[K%s %d %%", shown.c_str(), percent);
   std::fflush(stderr);
   shown_ = true;
 }

@@ -1,13 +1,35 @@
-// What the terminal is like, and progress on it.
+// What the terminal is like, text that fits it, and progress on it.
 #pragma once
+
+#include <fmt/format.h>
 
 #include <cstdio>
 #include <set>
 #include <string>
+#include <string_view>
 
 #include "core/diagnostics.h"
 
 namespace mbv {
+
+/// Columns of the terminal that `to` is: COLUMNS if it is set, else what the terminal says; 0 where
+/// `to` is none.
+[[nodiscard]] size_t TerminalColumns(std::FILE* to);
+
+/// A terminal that moves its cursor when told: TERM is not dumb.
+[[nodiscard]] bool ObeysEscapes(std::FILE* to);
+
+/// Colour: such a terminal, and NO_COLOR is not set.
+[[nodiscard]] bool WantsColor(std::FILE* to = stdout);
+
+/// Prints text for people, broken into lines that fit the terminal. What was printed to stdout
+/// before comes before.
+void SayText(std::FILE* to, std::string_view text);
+
+template <typename... T>
+void Say(std::FILE* to, fmt::format_string<T...> format, T&&... values) {
+  SayText(to, fmt::format(format, std::forward<T>(values)...));
+}
 
 /// Prints findings, each once while the program runs: scenarios of one model share its warnings.
 class FindingPrinter {
@@ -20,10 +42,7 @@ class FindingPrinter {
   std::set<std::string> told_;
 };
 
-/// Colour on stdout: a terminal, and NO_COLOR is not set.
-[[nodiscard]] bool WantsColor();
-
-/// One line on stderr that rewrites itself; does nothing unless stderr is a terminal.
+/// One line on stderr that rewrites itself; does nothing unless stderr is a terminal that can.
 class ProgressLine {
  public:
   explicit ProgressLine(bool wanted);

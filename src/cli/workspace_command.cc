@@ -5,6 +5,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/terminal.h"
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "model_file/load_model.h"
@@ -23,20 +24,20 @@ struct WorkspaceArguments {
 int Workspace(const WorkspaceArguments& arguments) {
   const auto file = FindModel(arguments.model, ".");
   if (!file) {
-    fmt::print(stderr, "error: there is no model '{}'\n", arguments.model);
-    return 2;
+    return Refuse(fmt::format("there is no model '{}'", arguments.model),
+                  ModelHint(arguments.model, "."));
   }
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
   const LoadResult loaded = LoadModel(*file, options);
-  fmt::print(stderr, "{}", loaded.diagnostics.Text());
+  SayText(stderr, loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
   const WorkspaceOutcome outcome = ComputeWorkspace(*loaded.mechanism, !arguments.no_pictures);
-  fmt::print(stderr, "{}", outcome.diagnostics.Text());
+  SayText(stderr, outcome.diagnostics.Text());
   if (outcome.diagnostics.has_errors()) return 2;
-  fmt::print("{}", outcome.text);
+  SayText(stdout, outcome.text);
   if (!outcome.summary.ok()) {
-    fmt::print(stderr, "error: {}\n", outcome.summary.message);
+    Say(stderr, "error: {}\n", outcome.summary.message);
     return outcome.summary.stop == Stop::kUnsupported ? 2 : 3;
   }
   OutputFolder folder(arguments.out, loaded.mechanism->name + "/workspace");
@@ -46,10 +47,10 @@ int Workspace(const WorkspaceArguments& arguments) {
   }
   if (trouble.empty()) trouble = folder.Commit();
   if (!trouble.empty()) {
-    fmt::print(stderr, "error: {}\n", trouble);
+    Say(stderr, "error: {}\n", trouble);
     return 2;
   }
-  fmt::print(stderr, "results in {}\n", folder.target().string());
+  Say(stderr, "results in {}\n", folder.target().string());
   return outcome.agree ? 0 : 1;
 }
 
@@ -67,10 +68,9 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
       ->allow_extra_args(false);
   workspace->add_option("--out", arguments->out, "result folder")->capture_default_str();
   workspace->add_flag("--no-pictures", arguments->no_pictures, "data files only");
-  workspace->footer(
-      "Example:\n"
-      "  mbverify workspace spr_tripod --set q_min=0.45 --set q_max=0.65\n"
-      "Exit codes: 0 the ways to a measure agree, 1 they contradict each other");
+  SetFooter(workspace, {"workspace spr_tripod --set q_min=0.45 --set q_max=0.65"},
+            "0 the ways to a measure agree, 1 they contradict each other, 2 bad input, 3 could not "
+            "run");
   workspace->callback([arguments, exit_code] { *exit_code = Workspace(*arguments); });
 }
 

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "core/inputs.h"
+#include "core/word_hints.h"
 
 namespace mbv {
 
@@ -110,7 +111,7 @@ std::optional<std::string> YamlReader::ReadFile() {
   // A folder opens but cannot be read.
   if (!stream && !stream.eof()) {
     AddAt(Severity::kError, 0, 0, "the file cannot be read",
-          "check the name; paths are relative to the current folder");
+          DidYouMeanPath(file_, "check the name; paths are relative to the current folder"));
     return std::nullopt;
   }
   if (kept != nullptr) *kept = text;
@@ -188,9 +189,8 @@ std::optional<int> YamlReader::Choice(const YamlNode& node, const std::string& p
   }
   std::string list;
   for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
-  const std::string near = ClosestWord(Shortened(*text), words);
   Error(node, fmt::format("{} = {} is not one of: {}", path, Describe(node), list),
-        near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+        DidYouMean(Shortened(*text), words));
   return std::nullopt;
 }
 
@@ -240,7 +240,7 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
   for (const YamlEntry& entry : node_->entries) {
     const YamlEntry* above = std::exchange(before, &entry);
     if (is_known(entry.key)) continue;
-    const std::string near = ClosestWord(Shortened(entry.key), keys);
+    const std::string near = DidYouMean(Shortened(entry.key), keys);
     const std::vector<YamlEntry>& inner = entry.value->entries;
     const bool like_this = !inner.empty() && !path_.empty() &&
                            std::all_of(inner.begin(), inner.end(),
@@ -253,7 +253,7 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
     } else if (near.empty() && above != nullptr && above->value->is_null()) {
       hint = fmt::format("if it belongs into '{}', indent it deeper", Shortened(above->key));
     } else if (!near.empty()) {
-      hint = fmt::format("did you mean '{}'?", near);
+      hint = near;
     } else {
       for (const std::string& key : keys) hint += (hint.empty() ? "known keys: " : ", ") + key;
     }

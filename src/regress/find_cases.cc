@@ -9,6 +9,7 @@
 
 #include "core/files.h"
 #include "core/names.h"
+#include "core/word_hints.h"
 #include "regress/in_children.h"
 #include "scenario/find_model.h"
 #include "scenario/stiffness_scenario.h"
@@ -83,7 +84,8 @@ void AddFiles(const std::vector<std::string>& files, bool all, std::vector<CaseF
   }
 }
 
-void AddPath(const std::string& path, std::vector<CaseFile>* cases, FoundCases* found) {
+void AddPath(const std::string& given, std::vector<CaseFile>* cases, FoundCases* found) {
+  const std::string path = FindScenario(given);
   std::error_code error;
   if (fs::is_regular_file(path, error)) {
     AddFiles({path}, true, cases);
@@ -91,6 +93,8 @@ void AddPath(const std::string& path, std::vector<CaseFile>* cases, FoundCases* 
   }
   if (!fs::is_directory(path, error)) {
     found->troubles.push_back(path + ": error: no such file or folder");
+    const std::string hint = DidYouMeanPath(path);
+    if (!hint.empty()) found->troubles.back() += "\n  hint: " + hint;
     return;
   }
   const size_t before = cases->size(), unread = found->unread.size();

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "core/names.h"
+#include "core/word_hints.h"
 
 namespace mbv {
 
@@ -67,9 +68,8 @@ void CheckParameterName(const YamlEntry& entry, const std::string& path, const M
   if (mechanism.HasParameter(PlainName(entry.key, mechanism).name)) return;
   std::vector<std::string> known;
   for (const Parameter& p : mechanism.parameters) known.push_back(p.name);
-  const std::string near = ClosestWord(entry.key, known);
   yaml->Error(entry, fmt::format("{}: {} has no parameter '{}'", path, mechanism.name, entry.key),
-              near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+              DidYouMean(entry.key, known));
 }
 
 std::optional<bool> AsSwitch(const YamlNode& node) {

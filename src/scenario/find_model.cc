@@ -3,6 +3,10 @@
 #include <cstdlib>
 #include <set>
 
+#include "core/diagnostics.h"
+#include "core/text.h"
+#include "core/word_hints.h"
+
 namespace mbv {
 namespace {
 
@@ -32,6 +36,10 @@ std::optional<fs::path> ShippedFolder() {
   }
 }
 
+bool IsModelPath(const std::string& name) {
+  return name.find('/') != std::string::npos || name.ends_with(".yaml") || name.ends_with(".urdf");
+}
+
 fs::path Absolute(const fs::path& path) {
   std::error_code error;
   const fs::path absolute = fs::absolute(path, error);
@@ -57,7 +65,7 @@ std::vector<fs::path> ModelFolders(const fs::path& start) {
 }
 
 std::optional<std::string> FindModel(const std::string& name, const fs::path& start) {
-  if (name.find('/') != std::string::npos || name.ends_with(".yaml") || name.ends_with(".urdf")) {
+  if (IsModelPath(name)) {
     const fs::path path = fs::path(name).is_absolute() ? fs::path(name) : start / name;
     std::error_code error;
     // A pipe will do.
@@ -80,6 +88,27 @@ std::vector<std::string> ModelNames(const fs::path& start) {
     }
   }
   return {names.begin(), names.end()};
+}
+
+std::string ModelHint(const std::string& name, const fs::path& start) {
+  if (IsModelPath(name)) {
+    const fs::path path = fs::path(name).is_absolute() ? fs::path(name) : start / name;
+    return DidYouMeanPath(path.lexically_normal().string());
+  }
+  constexpr size_t kMost = 8;
+  const std::vector<std::string> names = ModelNames(start);
+  return DidYouMean(name, names, names.empty() ? "" : "known models: " + Joined(names, kMost));
+}
+
+std::string FindScenario(const std::string& argument) {
+  std::error_code error;
+  const auto folder = ScenariosFolder();
+  if (fs::exists(argument, error) || argument.ends_with(".yaml") || argument.ends_with(".urdf") ||
+      argument.empty() || !folder || fs::path(argument).is_absolute()) {
+    return argument;
+  }
+  const fs::path named = *folder / argument;
+  return IsFolder(named) ? named.string() : named.string() + ".yaml";
 }
 
 std::optional<fs::path> ScenariosFolder() {

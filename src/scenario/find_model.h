@@ -17,6 +17,14 @@ namespace mbv {
 [[nodiscard]] std::optional<std::string> FindModel(const std::string& name,
                                                    const std::filesystem::path& start);
 
+/// What to say about a name that FindModel() does not find.
+[[nodiscard]] std::string ModelHint(const std::string& name, const std::filesystem::path& start);
+
+/// A scenario or folder of them named on a command line: a path, or a name below ScenariosFolder()
+/// without its ending ("four_bar/turn", "four_bar"). What is neither is returned as it could be
+/// spelt, for the reader to complain about.
+[[nodiscard]] std::string FindScenario(const std::string& argument);
+
 /// Names of all models in ModelFolders(start), sorted, each once.
 [[nodiscard]] std::vector<std::string> ModelNames(const std::filesystem::path& start);
 

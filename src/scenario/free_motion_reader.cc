@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "core/text.h"
+#include "core/word_hints.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility_report.h"
 #include "scenario/motion_reader.h"
@@ -94,10 +95,8 @@ class FreeMotionReader {
     for (const YamlEntry& entry : yaml().Entries(node, "forces")) {
       const int drive = mechanism_.FindDrive(entry.key);
       if (drive < 0) {
-        const std::string near = ClosestWord(entry.key, names);
         yaml().Error(entry, fmt::format("forces: {} has no drive '{}'", mechanism_.name, entry.key),
-                     near.empty() ? "known: " + Joined(names, kMostNames)
-                                  : fmt::format("did you mean '{}'?", near));
+                     DidYouMean(entry.key, names, "known: " + Joined(names, kMostNames)));
         continue;
       }
       const ProfileContext context{.unit = ForceUnit(mechanism_, mechanism_.drives[drive]),
@@ -113,12 +112,11 @@ class FreeMotionReader {
       if (named.name == entry.key) return &named;
       names.push_back(named.name);
     }
-    const std::string near = ClosestWord(entry.key, names);
     yaml().Error(entry,
                  fmt::format("{}: {} has no coordinate '{}'", path, mechanism_.name, entry.key),
-                 near.empty() ? "known: drives, OUTPUT.x … OUTPUT.yaw, joints (JOINT.0, JOINT.1 … "
-                                "where they have several coordinates)"
-                              : fmt::format("did you mean '{}'?", near));
+                 DidYouMean(entry.key, names,
+                            "known: drives, OUTPUT.x … OUTPUT.yaw, joints (JOINT.0, JOINT.1 … "
+                            "where they have several coordinates)"));
     return nullptr;
   }
 

@@ -165,10 +165,8 @@ class ScenarioLoader {
     const fs::path folder = fs::path(file_).parent_path();
     const auto model_file = FindModel(*name, folder);
     if (!model_file) {
-      const std::string near = ClosestWord(*name, ModelNames(folder));
       yaml_.Error(node, fmt::format("mechanism = '{}': there is no such model", *name),
-                  !near.empty() ? fmt::format("did you mean '{}'?", near)
-                                : "known models: " + JoinWords(ModelNames(folder)));
+                  ModelHint(*name, folder));
       return;
     }
     scenario_.model_file = *model_file;

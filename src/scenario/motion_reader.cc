@@ -7,6 +7,8 @@
 #include <cmath>
 
 #include "core/spatial.h"
+#include "core/text.h"
+#include "core/word_hints.h"
 #include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
 
@@ -77,18 +79,11 @@ class MotionReader {
     if (found != names_.end()) {
       return CoordinateAt(mechanism_, static_cast<size_t>(found - names_.begin()));
     }
-    const std::string near = ClosestWord(entry.key, names_);
-    std::string hint;
-    if (!near.empty()) {
-      hint = fmt::format("did you mean '{}'?", near);
-    } else {
-      hint = "known: prescribed joints, drives, and OUTPUT.x … OUTPUT.yaw: ";
-      for (size_t i = 0; i < names_.size() && i < 12; ++i) hint += (i == 0 ? "" : ", ") + names_[i];
-      if (names_.size() > 12) hint += ", …";
-    }
     yaml().Error(entry,
                  fmt::format("{}: {} has no coordinate '{}'", path, mechanism_.name, entry.key),
-                 hint);
+                 DidYouMean(entry.key, names_,
+                            "known: prescribed joints, drives, and OUTPUT.x … OUTPUT.yaw: " +
+                                Joined(names_, 12)));
     return {};
   }
 
@@ -294,11 +289,10 @@ class MotionReader {
       load->p_BoQ_B = output.X_BO.translation();
     }
     if (load->body > 0) return;
-    const std::string near = ClosestWord(*text, known);
     yaml().Error(
         node,
         fmt::format("{}.on = '{}' is no body, frame or output of {}", path, *text, mechanism_.name),
-        near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+        DidYouMean(*text, known));
   }
 
   ValueReader* values_;

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/word_hints.h"
 #include "scenario/checks.h"
 #include "scenario/file_parts.h"
 
@@ -209,7 +210,7 @@ void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
   for (const auto& [name, value] : gain.by_drive) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
     yaml->Error(node, fmt::format("{}: there is no drive '{}'", path, name),
-                fmt::format("drives: {}", fmt::join(names, ", ")));
+                DidYouMean(name, names, fmt::format("drives: {}", fmt::join(names, ", "))));
   }
 }
 

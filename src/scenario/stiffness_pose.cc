@@ -6,6 +6,7 @@
 
 #include "core/demand.h"
 #include "core/text.h"
+#include "core/word_hints.h"
 #include "kinematics/mobility.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
@@ -42,14 +43,12 @@ std::optional<std::string> FindElasticModel(const std::string& name, const std::
     const auto file = FindModel(known, start);
     if (file && !ElasticBeside(*file).empty()) elastic_models.push_back(known);
   }
-  const std::string near = ClosestWord(name, elastic_models);
   *why = model ? fmt::format("{} has no {} with its beams and servos", name, kElasticFile)
                : "there is no such model";
-  if (!near.empty() && near != name) {
-    *why += fmt::format("; did you mean '{}'?", near);
-  } else if (!elastic_models.empty()) {
-    *why += "; elastic models: " + Joined(elastic_models);
-  }
+  const std::string hint =
+      DidYouMean(name, elastic_models,
+                 elastic_models.empty() ? "" : "elastic models: " + Joined(elastic_models));
+  if (!hint.empty()) *why += "; " + hint;
   return std::nullopt;
 }
 
@@ -84,10 +83,8 @@ PoseFault CheckPose(const Mechanism& mechanism, const PoseValues& pose) {
   const std::vector<std::string> names = CoordinateNames(mechanism);
   for (const auto& [name, value] : pose) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    const std::string near = ClosestWord(name, names);
     return {fmt::format("pose: {} has no coordinate '{}'", mechanism.name, name),
-            near.empty() ? "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw"
-                         : fmt::format("did you mean '{}'?", near)};
+            DidYouMean(name, names, "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw")};
   }
   const int freedoms = AnalyseMobility(mechanism).freedoms;
   if (static_cast<int>(pose.size()) == freedoms) return {};

@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "core/text.h"
+#include "core/word_hints.h"
 #include "model_file/load_model.h"
 #include "scenario/file_parts.h"
 #include "scenario/motion_reader.h"
@@ -180,11 +181,10 @@ class StiffnessLoader {
   void UnknownName(const YamlEntry& entry, const std::string& name,
                    std::vector<std::string> known) {
     for (const Parameter& p : mechanism_->parameters) known.push_back(p.name);
-    const std::string near = ClosestWord(name, known);
     yaml_.Error(entry,
                 fmt::format("pose: {} has no coordinate or parameter '{}'", mechanism_->name, name),
-                near.empty() ? "known: drives, OUTPUT.x … OUTPUT.yaw, and the model's parameters"
-                             : fmt::format("did you mean '{}'?", near));
+                DidYouMean(name, known,
+                           "known: drives, OUTPUT.x … OUTPUT.yaw, and the model's parameters"));
   }
 
   void ReadOutput(const YamlNode& node) {

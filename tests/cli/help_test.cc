@@ -1,0 +1,251 @@
+// Help, hints and terminals, for every subcommand that the program has.
+#include <gtest/gtest.h>
+
+#include <regex>
+#include <set>
+
+#include "core/wrapped.h"
+#include "tests/cli/program.h"
+#include "tests/source_dir.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> LinesOf(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();  // a terminal's
+    lines.push_back(line);
+  }
+  return lines;
+}
+
+class HelpTest : public testing::Test {
+ protected:
+  // Names below "Subcommands:" of a command's help, with the command before them.
+  std::vector<std::string> Below(const std::string& command) const {
+    std::vector<std::string> names;
+    bool inside = false;
+    for (const std::string& line : LinesOf(mbverify(command + " --help").out)) {
+      inside = line == "Subcommands:" || (inside && line.starts_with("  "));
+      const bool is_name = inside && line.size() > 2 && line[2] != ' ';
+      if (is_name) {
+        names.push_back((command.empty() ? "" : command + " ") +
+                        line.substr(2, line.find(' ', 2) - 2));
+      }
+    }
+    return names;
+  }
+  std::vector<std::string> Commands() const {
+    std::vector<std::string> all = Below("");
+    for (const std::string& command : Below("")) {
+      for (const std::string& inner : Below(command)) all.push_back(inner);
+    }
+    return all;
+  }
+  ProgramResult WithColumns(int columns, const std::string& arguments) const {
+    return mbverify.Script("COLUMNS=" + std::to_string(columns) + " \"$mbverify\" " + arguments);
+  }
+  // On a terminal of this width; `variables` are set for the program.
+  std::string OnTerminal(int columns, const std::string& variables,
+                         const std::string& arguments) const {
+    return mbverify
+        .Script("script --quiet --return --command \"stty cols " + std::to_string(columns) +
+                "; env -u COLUMNS " + variables + " '$mbverify' " + arguments +
+                "\" /dev/null </dev/null")
+        .out;
+  }
+
+  Program mbverify{testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(HelpTest, FindsTheCommands) {
+  const std::vector<std::string> commands = Commands();
+  EXPECT_GE(commands.size(), 18u);
+  for (const char* known : {"run", "merge", "history accept"}) {
+    EXPECT_NE(std::find(commands.begin(), commands.end(), known), commands.end()) << known;
+  }
+}
+
+TEST_F(HelpTest, EveryCommandShowsItsOwnExamplesAndExitCodes) {
+  for (const std::string& command : Commands()) {
+    const std::string help = mbverify(command + " --help").out;
+    EXPECT_NE(help.find("\n  mbverify " + command), std::string::npos) << command << "\n" << help;
+    EXPECT_NE(help.find("Exit codes: 0 "), std::string::npos) << command;
+  }
+}
+
+TEST_F(HelpTest, ExamplesNameFilesThatAreThere) {
+  const std::regex path("scenarios/[a-z_/]+(\\.yaml)?");
+  std::set<std::string> seen;
+  for (const std::string& command : Commands()) {
+    const std::string help =
+        mbverify.Script("COLUMNS=400 \"$mbverify\" " + command + " --help").out;
+    for (std::sregex_iterator it(help.begin(), help.end(), path), end; it != end; ++it) {
+      if (it->str().find("my_") != std::string::npos) continue;  // the reader's own
+      seen.insert(it->str());
+      EXPECT_TRUE(fs::exists(SourcePath("/" + it->str()))) << command << ": " << it->str();
+    }
+  }
+  EXPECT_GE(seen.size(), 5u);
+}
+
+TEST_F(HelpTest, NoLineOfAnyHelpIsLongerThanTheTerminal) {
+  std::vector<std::string> commands = Commands();
+  commands.emplace_back("");
+  for (const std::string& command : commands) {
+    for (const int columns : {50, 72, 80, 132}) {
+      const ProgramResult help = WithColumns(columns, command + " --help");
+      EXPECT_EQ(help.exit_code, 0);
+      for (const std::string& line : LinesOf(help.out)) {
+        EXPECT_LE(PrintedWidth(line), static_cast<size_t>(columns)) << command << ": " << line;
+      }
+    }
+    // Without a terminal and without COLUMNS: 80.
+    for (const std::string& line :
+         LinesOf(mbverify.Script("env -u COLUMNS \"$mbverify\" " + command + " --help").out)) {
+      EXPECT_LE(PrintedWidth(line), 80u) << command << ": " << line;
+    }
+  }
+}
+
+TEST_F(HelpTest, BrokenExamplesAreStillCommands) {
+  const std::string help = WithColumns(50, "stiffness --help").out;
+  EXPECT_NE(help.find(" \\\n      "), std::string::npos) << help;
+}
+
+TEST_F(HelpTest, EveryCommandIsFoundFromAMisspelling) {
+  for (const std::string& command : Commands()) {
+    std::string misspelt = command;
+    misspelt.insert(misspelt.size() - 1, "x");
+    const ProgramResult result = mbverify(misspelt);
+    const std::string name = command.substr(command.rfind(' ') + 1);
+    EXPECT_EQ(result.exit_code, 2) << misspelt;
+    EXPECT_TRUE(result.out.empty()) << result.out;
+    EXPECT_NE(result.err.find("error: there is no command 'mbverify " + misspelt + "'"),
+              std::string::npos)
+        << result.err;
+    EXPECT_NE(result.err.find("did you mean '" + name + "'?"), std::string::npos) << result.err;
+  }
+  EXPECT_NE(mbverify("quite_another").err.find("commands: init, run"), std::string::npos);
+}
+
+TEST_F(HelpTest, EveryLongOptionIsFoundFromAMisspelling) {
+  const std::regex option("\n +(-[a-z],)?(--[a-z-]+)");
+  for (const std::string& command : Commands()) {
+    const std::string help = "\n" + mbverify(command + " --help").out;
+    for (std::sregex_iterator it(help.begin(), help.end(), option), end; it != end; ++it) {
+      const std::string name = it->str(2), misspelt = name + "q";
+      const ProgramResult result = mbverify(command + " " + misspelt);
+      EXPECT_EQ(result.exit_code, 2) << command << " " << misspelt;
+      EXPECT_NE(result.err.find("has no option '" + misspelt + "'"), std::string::npos)
+          << command << ": " << result.err;
+      EXPECT_NE(result.err.find("did you mean '--"), std::string::npos) << result.err;
+    }
+  }
+}
+
+// Each command that takes a model or a scenario, by its help; nothing is computed.
+TEST_F(HelpTest, ModelsAndScenariosAreFoundFromAMisspellingInEveryCommandThatTakesOne) {
+  int models = 0, scenarios = 0;
+  for (const std::string& command : Commands()) {
+    const std::string help = mbverify(command + " --help").out;
+    const std::string usage = LinesOf(help)[1];
+    if (help.find("\n  model TEXT") != std::string::npos) {
+      ++models;
+      const ProgramResult result = mbverify(command + " scara_robt");
+      EXPECT_EQ(result.exit_code, 2) << command;
+      EXPECT_NE(result.err.find("did you mean 'scara_robot'?"), std::string::npos)
+          << command << ": " << result.err;
+    }
+    if (help.find("\n  scenario TEXT") != std::string::npos ||
+        help.find("\n  path TEXT") != std::string::npos ||
+        help.find("\n  file TEXT") != std::string::npos) {
+      ++scenarios;
+      for (const char* misspelt :
+           {"scenarios/four_bar/tun.yaml", "four_baar/turn", "four_bar/tun"}) {
+        const ProgramResult result =
+            mbverify(command + " " + misspelt +
+                     (command == "regress" ? " --no-history --out " + mbverify.Out() : ""));
+        EXPECT_EQ(result.exit_code, 2) << command;
+        EXPECT_NE((result.err + result.out).find("did you mean 'scenarios/four_bar/turn.yaml'?"),
+                  std::string::npos)
+            << command << ": " << result.err << result.out;
+      }
+    }
+  }
+  EXPECT_GE(models, 4);     // model, audit, workspace, stiffness
+  EXPECT_GE(scenarios, 6);  // run, render, check, mutate, converge, regress
+}
+
+TEST_F(HelpTest, ParametersAndOutputsAreFoundFromAMisspelling) {
+  for (const auto& [arguments, hint] : std::vector<std::pair<std::string, std::string>>{
+           {"model four_bar --set cranc=0.1", "crank"},
+           {"workspace spr_tripod --set q_mim=0.4", "q_min"},
+           {"stiffness scara_robot --set K_acd=1", "K_act"},
+           {"stiffness scara_robot --output platfrom", "platform"},
+           {"stiffness scara_robot --at platfrm.x=0", "platform.x"},
+           {"mutate four_bar/turn_inverse --parameter roh", "rho"},
+           {"run four_bar/turn --set parameters.cranc=0.1", "crank"},
+           {"run four_bar/turn --set motion.commands.moter=0", "motor"},
+           {"render four_bar/turn --set parameters.cranc=0.1", "crank"},
+           {"converge four_bar/turn --set parameters.cranc=0.1", "crank"},
+           {"run four_bar/turn --mode inverze", "inverse"},
+           {"init mine --from four_baar", "four_bar"}}) {
+    const ProgramResult result = mbverify(arguments);
+    EXPECT_EQ(result.exit_code, 2) << arguments;
+    EXPECT_NE(result.err.find("did you mean '" + hint + "'?"), std::string::npos)
+        << arguments << ": " << result.err;
+  }
+}
+
+TEST_F(HelpTest, ScenariosAreFoundByTheirNames) {
+  EXPECT_EQ(mbverify("check four_bar/turn_inverse").out,
+            "scenarios/four_bar/turn_inverse.yaml: ok\n");
+}
+
+// Lines of one word, such as a path, cannot be broken.
+TEST_F(HelpTest, TablesFitTheTerminal) {
+  for (const std::string arguments :
+       {"list", "model stabilizing_platform", "audit spr_tripod",
+        "run four_bar/turn_inverse -v --no-pictures --no-report --out "}) {
+    const std::string call = arguments.ends_with(" ") ? arguments + mbverify.Out() : arguments;
+    for (const int columns : {60, 100}) {
+      for (const std::string& line : LinesOf(OnTerminal(columns, "", call))) {
+        const std::string words = line.substr(std::min(line.find_first_not_of(' '), line.size()));
+        if (words.find(' ') == std::string::npos) continue;
+        EXPECT_LE(PrintedWidth(line), static_cast<size_t>(columns)) << arguments << ": " << line;
+      }
+    }
+  }
+}
+
+TEST_F(HelpTest, ColumnsOverridesTheTerminal) {
+  for (const std::string& line : LinesOf(OnTerminal(200, "COLUMNS=64", "model four_bar"))) {
+    EXPECT_LE(PrintedWidth(line), 64u) << line;
+  }
+}
+
+TEST_F(HelpTest, DumbTerminalsAndNoColorGetNoEscapes) {
+  const std::string run =
+      "run four_bar/turn_inverse --no-pictures --no-report --out " + mbverify.Out();
+  const std::string dumb = OnTerminal(80, "-u NO_COLOR TERM=dumb", run);
+  EXPECT_EQ(dumb.find('\x1b'), std::string::npos) << dumb;
+  EXPECT_NE(dumb.find("AGREE"), std::string::npos) << dumb;
+  const std::string colored = OnTerminal(80, "-u NO_COLOR TERM=xterm", run);
+  EXPECT_NE(colored.find("\x1b[32m"), std::string::npos) << colored;
+  const std::string plain = OnTerminal(80, "NO_COLOR=1 TERM=xterm", run);
+  EXPECT_EQ(plain.find("\x1b[3"), std::string::npos) << plain;
+  const std::string regress = OnTerminal(
+      80, "-u NO_COLOR TERM=dumb",
+      "regress four_bar/static --no-pictures --no-reports --out " + mbverify.Out() + "r");
+  EXPECT_EQ(regress.find('\x1b'), std::string::npos) << regress;
+  EXPECT_NE(regress.find("four_bar/static"), std::string::npos) << regress;
+  fs::remove_all(mbverify.Out() + "r");
+}
+
+}  // namespace
+}  // namespace mbv
