@@ -36,7 +36,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct ModelArguments {
-  std::string model, format, out;
+  std::string model, format, out, drives;
   std::vector<std::string> set;
 };
 
@@ -48,9 +48,18 @@ ModelFormat FormatOf(const std::string& word) {
                           : ModelFormat::kMobility;
 }
 
+ModelDrives DrivesOf(const std::string& word) {
+  return word == "free"    ? ModelDrives::kFree
+         : word == "servo" ? ModelDrives::kServo
+                           : ModelDrives::kHeld;
+}
+
 bool IsForPeople(const std::string& format) { return FormatOf(format) == ModelFormat::kMobility; }
 
 int Model(const ModelArguments& arguments) {
+  if (!arguments.drives.empty() && FormatOf(arguments.format) != ModelFormat::kMjcf) {
+    return Refuse("--drives says what holds the drives of an MJCF", "add --format mjcf");
+  }
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
   const auto file = FindModel(arguments.model, ".");
@@ -73,7 +82,16 @@ int Model(const ModelArguments& arguments) {
                                   loaded.mechanism->beams.size());
     SayText(stderr, ToText(finding) + "\n");
   }
-  const std::string text = ModelText(*loaded.mechanism, format);
+  std::string text;
+  if (format == ModelFormat::kMjcf) {
+    MjcfText mjcf = MjcfFor(*loaded.mechanism, DrivesOf(arguments.drives));
+    if (!mjcf.trouble.empty()) {
+      return Refuse("--drives " + arguments.drives + ": " + mjcf.trouble, "");
+    }
+    text = std::move(mjcf.text);
+  } else {
+    text = ModelText(*loaded.mechanism, format);
+  }
   if (arguments.out.empty()) {
     if (!IsForPeople(arguments.format)) {
       fmt::print("{}", text);
@@ -145,12 +163,18 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
                    "text (mobility report), json (the same for programs), or the model as mjcf, "
                    "urdf or yaml (a model file with the numbers that the parameters give)")
       ->check(OneOf({"text", "json", "mjcf", "urdf", "yaml"}));
+  model
+      ->add_option("--drives", arguments->drives,
+                   "of an mjcf: free (nothing holds them), held (at home, by equalities; the "
+                   "default) or servo (position and velocity servos, tuned for the home pose)")
+      ->check(OneOf({"free", "held", "servo"}));
   model->add_option("--out", arguments->out, "write to this file instead of stdout");
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);
   SetFooter(model,
             {"model stabilizing_platform", "model four_bar --set crank=0.16",
-             "model spr_tripod --format mjcf --out spr_tripod.xml"},
+             "model spr_tripod --format mjcf --out spr_tripod.xml",
+             "model scara_robot --format mjcf --drives servo --out scara_robot.xml"},
             "0 done, 2 bad input");
   model->callback([arguments, exit_code] { *exit_code = Model(*arguments); });
 }

@@ -375,7 +375,7 @@ class Expander {
       if (!spring.is_tendon) on_joint[spring.object] = &spring;
     }
     tinyxml2::XMLDocument document;
-    const std::string text = WriteMjcf(model_.mechanism, {.pictures = false});
+    const std::string text = WriteMjcf(model_.mechanism, {.pictures = false, .statics = true});
     MBV_DEMAND(document.Parse(text.c_str(), text.size()) == tinyxml2::XML_SUCCESS, text);
     SetSprings(document.RootElement(), on_joint);
     tinyxml2::XMLPrinter printer;

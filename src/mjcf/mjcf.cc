@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
+#include "mjcf/head_comment.h"
 #include "mjcf/plan.h"
 #include "mjcf/scene.h"
 #include "mjcf/writer.h"
@@ -32,6 +35,7 @@ class MjcfWriter {
     WriteEqualities();
     WriteActuators();
     WriteSensors();
+    if (!options_.statics) WriteHomeKey();
     xml_.Close();
     return xml_.Text();
   }
@@ -44,7 +48,7 @@ class MjcfWriter {
   }
 
   void WriteHead() {
-    xml_.Comment(" Written by mbverify. SI units, radians. ");
+    xml_.Comment(mjcf::HeadComment(mechanism_, options_));
     xml_.Open("compiler");
     xml_.Set("angle", "radian");
     xml_.Set("autolimits", "false");
@@ -151,6 +155,7 @@ class MjcfWriter {
 
   void WriteJoint(const PlannedJoint& joint, const Pose& X_WB) {
     using Type = PlannedJoint::Type;
+    AppendHome(joint, X_WB);
     if (joint.type == Type::kFree) {
       xml_.Open("freejoint");
       xml_.Set("name", joint.name);
@@ -166,6 +171,23 @@ class MjcfWriter {
     if (joint.ref != 0.0) xml_.Set("ref", joint.ref);
     if (!ball && joint.coordinate >= 0) WriteRange(joint);
     xml_.Close();
+  }
+
+  // The joint's coordinates in MuJoCo's qpos, which follows the order of the file.
+  void AppendHome(const PlannedJoint& joint, const Pose& X_WB) {
+    using Type = PlannedJoint::Type;
+    const auto append = [this](const auto& numbers) {
+      home_qpos_.insert(home_qpos_.end(), numbers.begin(), numbers.end());
+    };
+    if (joint.type == Type::kFree) append(Vec3(X_WB.translation()));
+    if (joint.type == Type::kFree) {
+      append(mjcf::QuatOf(X_WB.linear()));
+    } else if (joint.type == Type::kBall) {
+      append(std::array<double, 4>{1.0, 0.0, 0.0, 0.0});
+    } else {
+      home_qpos_.push_back(joint.ref);
+      home_of_joint_[joint.name] = joint.ref;
+    }
   }
 
   // The range is stated but not enforced: a limit force would be mistaken for the drive's.
@@ -337,6 +359,36 @@ class MjcfWriter {
     }
     if (gain != nullptr) xml_.Set(gain, value);
     xml_.Close();
+    const auto k = static_cast<size_t>(&drive - mechanism_.drives.data());
+    const bool feeds = gain == nullptr && k < options_.motor_home.size();
+    home_ctrl_.push_back(feeds ? options_.motor_home[k]
+                         : gain != nullptr && std::string_view(gain) == "kp" ? HomeOf(drive)
+                                                                             : 0.0);
+  }
+
+  [[nodiscard]] double HomeOf(const Drive& drive) const {
+    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+      return (mechanism_.X_WB_home[leg->body_to] * leg->p_to -
+              mechanism_.X_WB_home[leg->body_from] * leg->p_from)
+          .norm();
+    }
+    const auto& driven = std::get<JointDrive>(drive.kind);
+    const auto home =
+        home_of_joint_.find(mjcf::JointName(mechanism_.joints[driven.joint], driven.coordinate));
+    return home == home_of_joint_.end() ? 0.0 : home->second;
+  }
+
+  void WriteHomeKey() {
+    if (home_qpos_.empty()) return;
+    xml_.Open("keyframe");
+    xml_.Open("key");
+    xml_.Set("name", "home");
+    xml_.Set("qpos", std::span<const double>(home_qpos_));
+    const bool any = std::any_of(home_ctrl_.begin(), home_ctrl_.end(),
+                                 [](double value) { return value != 0.0; });
+    if (any) xml_.Set("ctrl", std::span<const double>(home_ctrl_));
+    xml_.Close();
+    xml_.Close();
   }
 
   void WriteActuators() {
@@ -392,6 +444,8 @@ class MjcfWriter {
   const MjcfOptions options_;
   const Plan plan_;
   XmlWriter xml_;
+  std::vector<double> home_qpos_, home_ctrl_;  // in the order of the file
+  std::map<std::string, double> home_of_joint_;
 };
 
 }  // namespace

@@ -13,7 +13,15 @@ double Clean(double x) { return std::abs(x) < kRounding ? 0.0 : x; }
 
 }  // namespace
 
-std::string NumberText(double x) { return fmt::format("{}", x == 0.0 ? 0.0 : x); }
+std::string NumberText(double x) {
+  std::string text = fmt::format("{}", x == 0.0 ? 0.0 : x);
+  // "1e-05" → "1e-5"
+  const size_t exponent = text.find('e');
+  if (exponent != std::string::npos && exponent + 2 < text.size() && text[exponent + 2] == '0') {
+    text.erase(exponent + 2, 1);
+  }
+  return text;
+}
 
 std::string NumbersText(std::span<const double> numbers) {
   std::string text;

@@ -1,11 +1,123 @@
 #include "pipeline/model_text.h"
 
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <numbers>
+
 #include "mjcf/mjcf.h"
 #include "model_file/urdf.h"
 #include "model_file/write_model.h"
 #include "report/mobility_text.h"
+#include "simulation/engine_model.h"
 
 namespace mbv {
+namespace {
+
+constexpr double kServoRank = 1e-10;      // singular values below this share are zero
+constexpr double kServoImbalance = 1e-6;  // of the load, which the drives leave unbalanced
+
+// The rows of MuJoCo's constraint Jacobian at home, those of the drives apart.
+struct HomeRows {
+  MatX held;    // closures and prescribed joints
+  MatX drives;  // one row each
+};
+
+HomeRows RowsAtHome(const simulation::EngineModel& engine, const mjData& d) {
+  const int nv = engine.m->nv;
+  const auto drives = static_cast<Eigen::Index>(engine.mechanism->drives.size());
+  HomeRows rows{.held = MatX(0, nv), .drives = MatX::Zero(drives, nv)};
+  for (int i = 0; i < d.nefc; ++i) {
+    if (d.efc_type[i] != mjCNSTR_EQUALITY) continue;
+    const Eigen::Map<const Eigen::RowVectorXd> row(d.efc_J + static_cast<long>(i) * nv, nv);
+    Eigen::Index drive = 0;
+    while (drive < drives && engine.driven[static_cast<size_t>(drive)].equality != d.efc_id[i]) {
+      ++drive;
+    }
+    if (drive < drives) {
+      rows.drives.row(drive) = row;
+    } else {
+      rows.held.conservativeResize(rows.held.rows() + 1, nv);
+      rows.held.bottomRows(1) = row;
+    }
+  }
+  return rows;
+}
+
+void SetGains(const MatX& M, const HomeRows& rows, double frequency_hz, HomeServos* servos) {
+  const double omega = 2.0 * std::numbers::pi * frequency_hz;
+  const Eigen::LLT<MatX> llt(M);
+  const MatX held = llt.matrixL().solve(MatX(rows.held.transpose()));
+  Eigen::ColPivHouseholderQR<MatX> qr;
+  qr.setThreshold(kServoRank);
+  qr.compute(held);
+  const MatX Q = MatX(qr.householderQ()).leftCols(qr.rank());
+  for (Eigen::Index k = 0; k < rows.drives.rows(); ++k) {
+    // Acceleration of the drive per force on it: what the held rows leave of M⁻¹.
+    VecX y = llt.matrixL().solve(VecX(rows.drives.row(k).transpose()));
+    y -= Q * (Q.transpose() * y);
+    y -= Q * (Q.transpose() * y);
+    const double mobility = y.squaredNorm();
+    const double inertia = mobility > 0.0 ? 1.0 / mobility : 0.0;
+    servos->kp.push_back(omega * omega * inertia);
+    servos->kv.push_back(2.0 * omega * inertia);
+  }
+}
+
+RunSummary SetForces(const VecX& load, const HomeRows& rows, HomeServos* servos) {
+  MatX A(load.size(), rows.held.rows() + rows.drives.rows());
+  A << rows.held.transpose(), rows.drives.transpose();
+  Eigen::CompleteOrthogonalDecomposition<MatX> solver;
+  solver.setThreshold(kServoRank);
+  solver.compute(A);
+  const VecX forces = solver.solve(load);
+  if ((A * forces - load).norm() > kServoImbalance * load.norm()) {
+    return {.stop = Stop::kUnsupported,
+            .message =
+                "the drives cannot hold the home pose: a freedom that they do not drive "
+                "gives way to gravity or springs",
+            .where = {},
+            .unit = {}};
+  }
+  const VecX drives = forces.tail(rows.drives.rows());
+  servos->force.assign(drives.begin(), drives.end());
+  return RunSummary::Done();
+}
+
+RunSummary TuneInEngine(const Mechanism& mechanism, double frequency_hz, HomeServos* servos) {
+  simulation::EngineModel engine;
+  RunSummary summary =
+      simulation::MakeEngineModel(mechanism, WriteMjcf(mechanism, {.pictures = false}), &engine);
+  if (!summary.ok()) return summary;
+  const mjModel& m = *engine.m;
+  const simulation::DataHandle data = simulation::MakeData(m);
+  mj_forward(&m, data.get());
+  const HomeRows rows = RowsAtHome(engine, *data);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> M(m.nv, m.nv);
+  mj_fullM(&m, M.data(), data->qM);
+  SetGains(M, rows, frequency_hz, servos);
+  const VecX load = Eigen::Map<const VecX>(data->qfrc_bias, m.nv) -
+                    Eigen::Map<const VecX>(data->qfrc_passive, m.nv);
+  return SetForces(load, rows, servos);
+}
+
+}  // namespace
+
+HomeServos TuneHomeServos(const Mechanism& mechanism, double frequency_hz) {
+  HomeServos servos;
+  std::vector<std::string> warnings;
+  const simulation::EngineSession session(&warnings);
+  try {
+    servos.summary = TuneInEngine(mechanism, frequency_hz, &servos);
+  } catch (const simulation::EngineError& error) {
+    servos.summary = {.stop = Stop::kEngineFailure,
+                      .message = std::string("MuJoCo: ") + error.what(),
+                      .where = {},
+                      .unit = {}};
+  }
+  return servos;
+}
 
 std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
   switch (format) {
@@ -21,6 +133,19 @@ std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
       return WriteModel(mechanism);
   }
   return "";
+}
+
+MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
+  MjcfOptions options;
+  options.guided = drives == ModelDrives::kHeld;
+  if (drives == ModelDrives::kServo) {
+    HomeServos servos = TuneHomeServos(mechanism);
+    if (!servos.summary.ok()) return {.text = {}, .trouble = servos.summary.message};
+    options.kp = std::move(servos.kp);
+    options.kv = std::move(servos.kv);
+    options.motor_home = std::move(servos.force);
+  }
+  return {.text = WriteMjcf(mechanism, options), .trouble = {}};
 }
 
 }  // namespace mbv

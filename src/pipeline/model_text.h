@@ -2,7 +2,9 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
+#include "core/run_summary.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -10,5 +12,25 @@ namespace mbv {
 /// Mobility report for people or as JSON, or the generated MJCF, URDF or model.yaml.
 enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf, kYaml };
 [[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format);
+
+/// Servos that hold a mechanism in its home pose.
+struct HomeServos {
+  std::vector<double> kp, kv;  ///< per drive [N/m, N s/m or N m/rad, N m s/rad]
+  std::vector<double> force;   ///< per drive: what holds home [N or N m]; the least where shared
+  RunSummary summary;          ///< kUnsupported: drives cannot hold home, or MuJoCo lacks one
+};
+
+/// Gains by each drive's inertia at home, the others free to move: with `frequency_hz` and critical
+/// damping all together are no faster than the number of drives times that.
+[[nodiscard]] HomeServos TuneHomeServos(const Mechanism& mechanism, double frequency_hz = 5.0);
+
+/// What holds the drives of a generated MJCF: nothing, their equalities, or servos tuned for it.
+enum class ModelDrives { kFree, kHeld, kServo };
+
+struct MjcfText {
+  std::string text;     ///< "" when there is trouble
+  std::string trouble;  ///< why there are no servos
+};
+[[nodiscard]] MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives);
 
 }  // namespace mbv

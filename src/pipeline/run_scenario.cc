@@ -361,7 +361,11 @@ class ScenarioRun {
       if (trouble.empty()) trouble = folder.Write(name, content);
     };
     write("traces.csv", FileContent([&](const auto& piece) { WriteCsv(report_, piece); }));
-    if (simulation_ && !simulation_->mjcf.empty()) write("model.xml", simulation_->mjcf);
+    if (simulation_ && !simulation_->mjcf.empty()) {
+      write("model.xml",
+            WithKeys(simulation_->mjcf,
+                     SnapshotKeys(scenario(), prepared_->mechanisms.simulated, *simulation_)));
+    }
     for (const PictureFile& picture : pictures_) {
       write("snapshots/" + picture.name, picture.content);
     }

@@ -230,6 +230,94 @@ TEST(Mjcf, AnyClosingJointIsRepresentedWithItsOwnFreedoms) {
   EXPECT_DOUBLE_EQ(m.body_mass[half], 0.5 * testing::FourBar::m3);
 }
 
+TEST(Mjcf, TheHeadSaysHowToUseTheFileInEachForm) {
+  const Mechanism m = testing::MakeFourBar();
+  const auto head = [&](const MjcfOptions& options) {
+    const std::string text = WriteMjcf(m, options);
+    return text.substr(0, text.find("<compiler"));
+  };
+  const std::string held = head({}), free = head({.guided = false});
+  const std::string servo = head({.guided = false, .kp = {1.0}, .kv = {1.0}});
+  for (const std::string& text : {held, free, servo, head({.statics = true})}) {
+    EXPECT_NE(text.find("Two ways to use it:"), std::string::npos) << text;
+    EXPECT_NE(text.find("\n1. "), std::string::npos) << text;
+    EXPECT_NE(text.find("\n2. "), std::string::npos) << text;
+  }
+  EXPECT_NE(held.find("hold the drives at home"), std::string::npos);
+  EXPECT_NE(free.find("nothing holds the drives"), std::string::npos);
+  EXPECT_NE(servo.find("position and a velocity servo"), std::string::npos);
+}
+
+TEST(Mjcf, StaticsModelsSayThatTheyAreNotForStepping) {
+  const Mechanism m = testing::MakeFourBar();
+  const std::string statics = WriteMjcf(m, {.statics = true});
+  EXPECT_NE(statics.find("not for stepping in time"), std::string::npos);
+  EXPECT_EQ(statics.find("<keyframe>"), std::string::npos);
+  EXPECT_EQ(WriteMjcf(m).find("not for stepping"), std::string::npos);
+}
+
+TEST(Mjcf, ADescriptionCannotEndTheComment) {
+  Mechanism m = testing::MakeFourBar();
+  m.description = "a --> b --- c\x01";
+  const Compiled compiled(m);
+  EXPECT_TRUE(compiled.warnings.empty());
+  EXPECT_EQ(compiled.mjcf.find("-->"), compiled.mjcf.rfind("-->"));
+}
+
+TEST(Mjcf, TheHomeKeyIsTheReferencePoseOfEveryModel) {
+  for (const Mechanism& mechanism : AllMechanisms()) {
+    const Compiled compiled(mechanism);
+    const mjModel& m = *compiled.engine.m;
+    ASSERT_EQ(m.nkey, 1) << mechanism.name;
+    for (int i = 0; i < m.nq; ++i) {
+      EXPECT_NEAR(m.key_qpos[i], m.qpos0[i], 1e-15) << mechanism.name << " " << i;
+    }
+  }
+}
+
+TEST(Mjcf, MoreKeysComeBehindHome) {
+  const Mechanism mechanism = testing::MakeFourBar();
+  const Compiled plain(mechanism);
+  std::vector<double> qpos(plain.engine.m->qpos0, plain.engine.m->qpos0 + plain.engine.m->nq);
+  qpos[0] += 0.125;
+  const std::string servos = WriteMjcf(mechanism, {.guided = false, .kp = {2.0}, .kv = {1.0}});
+  for (const std::string& text : {plain.mjcf, servos}) {
+    std::vector<std::string> warnings;
+    const EngineSession session(&warnings);
+    const simulation::ModelHandle m = simulation::CompileMjcf(WithKeys(
+        text, {{.name = "t_0.500s", .time_s = 0.5, .qpos = qpos, .drive_position = {1.125}}}));
+    ASSERT_EQ(m->nkey, 2);
+    EXPECT_TRUE(warnings.empty());
+    EXPECT_EQ(m->key_time[1], 0.5);
+    EXPECT_EQ(m->key_qpos[m->nq], qpos[0]);
+    if (m->nu == 3) EXPECT_EQ(m->key_ctrl[m->nu + 1], 1.125);
+  }
+}
+
+// Every number is the shortest text that reads back as the same double.
+TEST(Mjcf, NumbersAreShortAndExact) {
+  const std::regex number("[ \"](-?[0-9][0-9.e+-]*)");
+  size_t count = 0;
+  for (const char* name : {"four_bar", "stabilizing_platform"}) {
+    const std::string text = WriteMjcf(Load(name));
+    for (std::sregex_iterator it(text.begin(), text.end(), number), end; it != end; ++it, ++count) {
+      const std::string shown = it->str(1);
+      char* stop = nullptr;
+      const double value = std::strtod(shown.c_str(), &stop);
+      if (*stop != '\0') continue;  // a name
+      for (int digits = 1; digits < 17; ++digits) {
+        std::ostringstream shorter;
+        shorter.precision(digits);
+        shorter << value;
+        if (std::strtod(shorter.str().c_str(), nullptr) != value) continue;
+        EXPECT_LE(shown.size(), shorter.str().size()) << shown << " " << shorter.str();
+        break;
+      }
+    }
+  }
+  EXPECT_GT(count, 500u);
+}
+
 TEST(PrincipalInertia, ReproducesAFullMatrixToRoundOff) {
   const Mat3 R = RotRpy({0.3, -0.7, 1.9});
   const Mat3 I = R * Vec3(3.0, 2.0, 1.5).asDiagonal() * R.transpose();
