@@ -1,14 +1,19 @@
 // mbverify render
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
+#include <sstream>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
+#include "core/text.h"
+#include "core/word_hints.h"
 #include "pipeline/render_scenario.h"
 #include "scenario/find_model.h"
 
@@ -16,8 +21,9 @@ namespace mbv {
 namespace {
 
 struct RenderArguments {
-  std::string scenario, at, size, video, out = "pictures";
+  std::string scenario, at, size, camera, background, video, out = "pictures";
   std::vector<std::string> set;
+  bool no_caption = false, labels = false;
   double frames_per_s = 25.0;
 };
 
@@ -26,6 +32,70 @@ std::string SizeText(const std::string& size) {
   const size_t at = size.find('x');
   if (at == std::string::npos) return "[" + size + "]";
   return "[" + size.substr(0, at) + ", " + size.substr(at + 1) + "]";
+}
+
+struct NamedView {
+  const char* name;
+  const char* angles;  // azimuth, elevation [deg]
+};
+constexpr NamedView kViews[] = {{"front", "-90,0"}, {"back", "90,0"},   {"left", "180,0"},
+                                {"right", "0,0"},   {"top", "-90,90"},  {"bottom", "-90,-90"},
+                                {"iso", "-45,35"},  {"usual", "-60,16"}};
+
+std::vector<std::string> ViewNames() {
+  std::vector<std::string> names;
+  for (const NamedView& view : kViews) names.emplace_back(view.name);
+  return names;
+}
+
+// A view's name or azimuth,elevation[,distance] as values of the scenario; false after a message.
+bool SetCamera(const std::string& camera, ScenarioOptions* options) {
+  std::string text = camera;
+  for (const NamedView& view : kViews) {
+    if (camera == view.name) text = view.angles;
+  }
+  const char* keys[] = {"azimuth_deg", "elevation_deg", "distance"};
+  std::vector<std::string> parts;
+  std::istringstream words(text);
+  for (std::string part; std::getline(words, part, ',');) parts.push_back(part);
+  const bool numbers = std::ranges::all_of(parts, [](const std::string& part) {
+    double value = 0.0;
+    const auto [end, error] = std::from_chars(part.data(), part.data() + part.size(), value);
+    return error == std::errc() && end == part.data() + part.size() && std::isfinite(value);
+  });
+  if (!numbers || parts.size() < 2 || parts.size() > 3) {
+    return Refuse(
+               fmt::format("--camera {} is no view and not AZIMUTH,ELEVATION[,DISTANCE]", camera),
+               DidYouMean(camera, ViewNames(), "views: " + Joined(ViewNames()))) == 0;
+  }
+  for (size_t i = 0; i < parts.size(); ++i) {
+    options->set.emplace_back(std::string("snapshots.camera.") + keys[i], parts[i]);
+  }
+  return true;
+}
+
+// What the options set in the scenario; false after a message.
+bool ReadRequest(const RenderArguments& arguments, RenderRequest* request) {
+  ScenarioOptions& options = request->scenario;
+  for (const std::string& text : arguments.set) {
+    const auto set = SplitSet(text);
+    if (!set) {
+      return Refuse(fmt::format("--set {}: write key=value", text), "e.g. parameters.m_p=45000") ==
+             0;
+    }
+    options.set.push_back(*set);
+  }
+  if (!arguments.at.empty()) {
+    options.set.emplace_back("snapshots.times_s", "[" + arguments.at + "]");
+  }
+  if (!arguments.size.empty()) {
+    options.set.emplace_back("snapshots.size_px", SizeText(arguments.size));
+  }
+  if (!arguments.camera.empty() && !SetCamera(arguments.camera, &options)) return false;
+  request->style = {.background = arguments.background,
+                    .caption = !arguments.no_caption,
+                    .labels = arguments.labels};
+  return true;
 }
 
 int Save(const std::string& path, const std::string& content,
@@ -37,19 +107,7 @@ int Save(const std::string& path, const std::string& content,
 
 int Render(const RenderArguments& arguments) {
   RenderRequest request;
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) {
-      return Refuse(fmt::format("--set {}: write key=value", text), "e.g. parameters.m_p=45000");
-    }
-    request.scenario.set.push_back(*set);
-  }
-  if (!arguments.at.empty()) {
-    request.scenario.set.emplace_back("snapshots.times_s", "[" + arguments.at + "]");
-  }
-  if (!arguments.size.empty()) {
-    request.scenario.set.emplace_back("snapshots.size_px", SizeText(arguments.size));
-  }
+  if (!ReadRequest(arguments, &request)) return 2;
   request.video_file = arguments.video;
   request.frames_per_s = arguments.frames_per_s;
   ProgressLine progress(true);
@@ -82,6 +140,17 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
   render->add_option("scenario", arguments->scenario, "scenario file")->required();
   render->add_option("--at", arguments->at, "times [s], separated by commas");
   render->add_option("--size", arguments->size, "WIDTHxHEIGHT in pixels");
+  render->add_option("--camera", arguments->camera,
+                     "front, back, left, right, top, bottom, iso, usual, or "
+                     "AZIMUTH,ELEVATION[,DISTANCE] in degrees and metres");
+  render->add_option("--background", arguments->background,
+                     "a colour instead of sky and ground, e.g. white or #f4f4f4");
+  render->add_flag("--no-caption", arguments->no_caption, "the picture alone");
+  render->add_flag("--labels", arguments->labels, "names of outputs, drives and joints");
+  render
+      ->add_option("--set", arguments->set,
+                   "key=value: overrides a value of the scenario (repeatable)")
+      ->allow_extra_args(false);
   render->add_option("--video", arguments->video,
                      "write a video of the whole motion: .mp4, .mkv, .webm, .gif (by ffmpeg), or "
                      "an animated .png, which needs nothing");
@@ -89,13 +158,10 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   render->add_option("--out", arguments->out, "folder for pictures")->capture_default_str();
-  render
-      ->add_option("--set", arguments->set,
-                   "key=value: overrides a value of the scenario (repeatable)")
-      ->allow_extra_args(false);
   SetFooter(render,
             {"render scenarios/stabilizing_platform/sea_state.yaml --at 0,1.42 --size 1920x1080",
-             "render four_bar/turn --set parameters.crank=0.16",
+             "render spr_tripod/default --camera iso --background white --no-caption",
+             "render scenarios/four_bar/turn.yaml --camera -90,0 --labels",
              "render scenarios/spr_tripod/default.yaml --video tripod.mp4"},
             "0 drawn, 2 bad input, 3 could not run");
   render->callback([arguments, exit_code] { *exit_code = Render(*arguments); });

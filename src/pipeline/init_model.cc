@@ -14,6 +14,7 @@
 #include "analytic/closed_form.h"
 #include "core/files.h"
 #include "core/names.h"
+#include "core/word_hints.h"
 #include "pipeline/default_setup.h"
 
 namespace mbv {
@@ -145,9 +146,8 @@ class Initialiser {
       if (starter.name == options_.from) return &starter;
       names.emplace_back(starter.name);
     }
-    const std::string near = ClosestWord(options_.from, names);
     Add(fmt::format("--from {} is none of {}", options_.from, fmt::join(names, ", ")),
-        near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+        DidYouMean(options_.from, names));
     return nullptr;
   }
 

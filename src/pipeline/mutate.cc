@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/word_hints.h"
 #include "pipeline/bend_search.h"
 #include "pipeline/bendable.h"
 #include "pipeline/drive_by.h"
@@ -185,8 +186,7 @@ std::vector<Bendable> Chosen(const MutationOptions& options, std::vector<Bendabl
     Finding finding;
     finding.file = report->scenario;
     finding.message = fmt::format("the model has no number '{}' to bend", wanted);
-    const std::string near = ClosestWord(wanted, names);
-    if (!near.empty()) finding.hint = fmt::format("did you mean '{}'?", near);
+    finding.hint = DidYouMean(wanted, names);
     report->diagnostics.Add(std::move(finding));
     report->exit_code = 2;
   }

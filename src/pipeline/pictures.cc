@@ -6,6 +6,7 @@
 #include <chrono>
 #include <cmath>
 #include <numbers>
+#include <set>
 
 namespace mbv {
 namespace {
@@ -27,12 +28,6 @@ PictureOptions OptionsOf(const SnapshotSettings& settings) {
                     .distance_m = settings.camera.distance_m,
                     .lookat_W = settings.camera.lookat_W};
   return options;
-}
-
-// Index of the sample nearest to a time.
-int NearestSample(const std::vector<double>& times, double t_s) {
-  const auto nearer = [&](double a, double b) { return std::abs(a - t_s) < std::abs(b - t_s); };
-  return static_cast<int>(std::min_element(times.begin(), times.end(), nearer) - times.begin());
 }
 
 // Averages squares of pixels so that the width is at most 640.
@@ -61,6 +56,7 @@ bool HasPoses(const Mechanism& mechanism, const SimulationRun& run, size_t sampl
 PolylineOverlay PathOf(const Mechanism& mechanism, const SimulationRun& run, int output_index) {
   const Output& output = mechanism.outputs[static_cast<size_t>(output_index)];
   PolylineOverlay path;
+  path.name = "path of " + output.name;
   for (size_t i = 0; HasPoses(mechanism, run, i); ++i) {
     path.points_W.push_back(run.X_WB[i][static_cast<size_t>(output.body)] *
                             output.X_BO.translation());
@@ -68,7 +64,41 @@ PolylineOverlay PathOf(const Mechanism& mechanism, const SimulationRun& run, int
   return path;
 }
 
+std::string SnapshotName(double t_s) { return fmt::format("t_{:.3f}s", t_s); }
+
 }  // namespace
+
+int NearestSample(const std::vector<double>& times_s, double t_s) {
+  const auto nearer = [&](double a, double b) { return std::abs(a - t_s) < std::abs(b - t_s); };
+  return static_cast<int>(std::min_element(times_s.begin(), times_s.end(), nearer) -
+                          times_s.begin());
+}
+
+std::vector<MjcfKey> SnapshotKeys(const Scenario& scenario, const Mechanism& mechanism,
+                                  const SimulationRun& run) {
+  std::vector<MjcfKey> keys;
+  std::set<int> written;
+  for (const double t_s : scenario.snapshots.times_s) {
+    if (run.trace.time_s.empty()) break;
+    const int sample = NearestSample(run.trace.time_s, t_s);
+    if (sample >= run.qpos.rows() || !run.qpos.row(sample).allFinite()) continue;
+    if (!written.insert(sample).second) continue;
+    MjcfKey key;
+    key.time_s = run.trace.time_s[static_cast<size_t>(sample)];
+    key.name = SnapshotName(key.time_s);
+    for (const double x : run.qpos.row(sample)) key.qpos.push_back(x);
+    const auto value = [&](const std::string& channel) {
+      const int column = run.trace.Find(channel);
+      const double x = column < 0 ? 0.0 : run.trace.values(sample, column);
+      return std::isfinite(x) ? x : 0.0;
+    };
+    for (const Drive& drive : mechanism.drives) {
+      key.drive_position.push_back(value(drive.name + ".position"));
+    }
+    keys.push_back(std::move(key));
+  }
+  return keys;
+}
 
 Caption CaptionOf(const Report& report) {
   Caption caption{.title = report.mechanism + " / " + report.scenario,
@@ -94,18 +124,22 @@ Caption CaptionOf(const Report& report) {
 
 RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
                   const Mechanism& mechanism, const SimulationRun& run, const Caption& caption,
-                  const PictureSink& sink) {
+                  const PictureSink& sink, const PictureStyle& style) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<PictureFrame> frames;
   for (const double t_s : times_s) {
     const int sample = NearestSample(run.trace.time_s, t_s);
     frames.push_back(SampleFrame(mechanism, run, sample));
+    if (!style.caption) continue;
     frames.back().caption = caption;
     frames.back().caption.detail = fmt::format(
         "t = {:.3f} s   {}", run.trace.time_s[static_cast<size_t>(sample)], caption.detail);
   }
   PictureOptions options = OptionsOf(scenario.snapshots);
   if (frames.size() > kFewPictures) options.passes = kVideoPasses;
+  // The shapes' white is that of paint; paper is whiter.
+  options.background = style.background == "white" ? "#ffffff" : style.background;
+  options.labels = style.labels;
   Overlay overlay;
   if (scenario.snapshots.path_output >= 0) {
     PolylineOverlay path = PathOf(mechanism, run, scenario.snapshots.path_output);
@@ -119,7 +153,7 @@ RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
 RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
                          const SimulationRun& run, const Caption& caption,
                          const std::function<void(double)>& progress,
-                         std::vector<PictureFile>* files) {
+                         std::vector<PictureFile>* files, const PictureStyle& style) {
   std::vector<double> times_s = scenario.snapshots.times_s;
   std::erase_if(times_s, [&](double t_s) {
     return !HasPoses(mechanism, run, static_cast<size_t>(NearestSample(run.trace.time_s, t_s)));
@@ -128,16 +162,18 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
   for (const double t_s : times_s) {
     const int sample = NearestSample(run.trace.time_s, t_s);
     const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
-    files->push_back({fmt::format("t_{:.3f}s.png", sample_s), "", ""});
+    files->push_back({SnapshotName(sample_s) + ".png", "", ""});
   }
-  RunSummary summary =
-      DrawAt(times_s, scenario, mechanism, run, caption, [&](int index, Picture picture) {
+  RunSummary summary = DrawAt(
+      times_s, scenario, mechanism, run, caption,
+      [&](int index, Picture picture) {
         PictureFile& file = (*files)[static_cast<size_t>(index)];
         file.content = EncodePng(picture);
         file.preview = EncodePng(Shrunk(picture));
         if (progress) progress((index + 1.0) / static_cast<double>(times_s.size()));
         return true;
-      });
+      },
+      style);
   if (!summary.ok()) files->clear();
   return summary;
 }

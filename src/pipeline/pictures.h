@@ -7,6 +7,7 @@
 
 #include "core/run_summary.h"
 #include "mechanism/mechanism.h"
+#include "mjcf/mjcf.h"
 #include "render/render.h"
 #include "report/report.h"
 #include "scenario/scenario.h"
@@ -20,19 +21,36 @@ struct PictureFile {
   std::string preview;  ///< PNG, at most 640 pixels wide
 };
 
+/// How pictures look, beyond what a scenario says of them.
+struct PictureStyle {
+  std::string background = {};  ///< as PictureOptions::background
+  bool caption = true, labels = false;
+};
+
 /// Title and status of a run's pictures; the time is added to the detail of each.
 [[nodiscard]] Caption CaptionOf(const Report& report);
+
+/// Index of the sample nearest to a time.
+[[nodiscard]] int NearestSample(const std::vector<double>& times_s, double t_s);
+
+/// The simulation's poses at the scenario's snapshot times as keyframes (at rest) of its MJCF,
+/// named like the pictures.
+[[nodiscard]] std::vector<MjcfKey> SnapshotKeys(const Scenario& scenario,
+                                                const Mechanism& mechanism,
+                                                const SimulationRun& run);
 
 /// Draws the simulation at the scenario's snapshot times (nearest sample each).
 [[nodiscard]] RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
                                        const SimulationRun& run, const Caption& caption,
                                        const std::function<void(double)>& progress,
-                                       std::vector<PictureFile>* files);
+                                       std::vector<PictureFile>* files,
+                                       const PictureStyle& style = {});
 
 /// Draws the simulation at these times (nearest sample each), a little less smooth if there are
 /// many.
 [[nodiscard]] RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
                                 const Mechanism& mechanism, const SimulationRun& run,
-                                const Caption& caption, const PictureSink& sink);
+                                const Caption& caption, const PictureSink& sink,
+                                const PictureStyle& style = {});
 
 }  // namespace mbv

@@ -9,6 +9,8 @@
 #include <limits>
 #include <numbers>
 
+#include "core/text.h"
+#include "core/word_hints.h"
 #include "input/yaml_reader.h"
 #include "pipeline/ranges.h"
 #include "reference/frame_stiffness.h"
@@ -196,11 +198,7 @@ std::vector<std::pair<std::string, std::string>> MapFiles(const StiffnessMap& ma
       Finding finding;
       finding.file = "--index " + name;
       finding.message = "there is no such index";
-      const std::string near = ClosestWord(name, known);
-      for (const std::string& word : known) {
-        finding.hint += (finding.hint.empty() ? "known: " : ", ") + word;
-      }
-      if (!near.empty()) finding.hint = fmt::format("did you mean '{}'?", near);
+      finding.hint = DidYouMean(name, known, known.empty() ? "" : "known: " + Joined(known));
       diagnostics->Add(std::move(finding));
       continue;
     }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/word_hints.h"
 #include "input/yaml_reader.h"
 #include "pipeline/stiffness_map.h"
 #include "scenario/motion_reader.h"
@@ -71,10 +72,8 @@ class Parser {
       if (coordinate.ends_with(component)) ends.push_back(coordinate);
     }
     if (ends.size() == 1) return ends[0];
-    const std::string near = ClosestWord(name, known);
     Error(fmt::format("'{}' is no coordinate of the pose", name),
-          near.empty() ? fmt::format("coordinates: {}", fmt::join(known, ", "))
-                       : fmt::format("did you mean '{}'?", near));
+          DidYouMean(name, known, fmt::format("coordinates: {}", fmt::join(known, ", "))));
     return "";
   }
 

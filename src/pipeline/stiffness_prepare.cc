@@ -5,6 +5,7 @@
 
 #include "core/demand.h"
 #include "core/text.h"
+#include "core/word_hints.h"
 #include "model_file/load_model.h"
 #include "pipeline/stiffness.h"
 
@@ -36,12 +37,13 @@ void ResolveOutput(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   if (prepared->output >= 0) return;
   std::vector<std::string> known;
   for (const Output& output : prepared->base.outputs) known.push_back(output.name);
-  diagnostics->AddError(
-      prepared->scenario.file,
-      name.empty() ? fmt::format("output is not given, and {} has {}", prepared->base.name,
-                                 known.empty() ? "none" : "several")
-                   : fmt::format("there is no output '{}'", name),
-      known.empty() ? "declare one under outputs: in the model" : "outputs: " + Joined(known));
+  diagnostics->AddError(prepared->scenario.file,
+                        name.empty()
+                            ? fmt::format("output is not given, and {} has {}", prepared->base.name,
+                                          known.empty() ? "none" : "several")
+                            : fmt::format("there is no output '{}'", name),
+                        known.empty() ? "declare one under outputs: in the model"
+                                      : DidYouMean(name, known, "outputs: " + Joined(known)));
 }
 
 void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {

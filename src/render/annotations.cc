@@ -11,6 +11,7 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 constexpr double kFullArc = 300.0 / 180.0 * kPi;  // sweep of the largest torque [rad]
 constexpr double kSmallestShare = 0.02;           // forces below this share get no arrow
+constexpr double kSmallestArc = 0.05;             // torques no arc: it would be a lone head
 constexpr float kGhost = 0.5F;                    // opacity of what bodies hide
 
 std::array<float, 4> WithAlpha(const Material& material, float alpha) {
@@ -144,7 +145,7 @@ class ForceMarks {
     }
     if (scale_.longest_torque_Nm <= 0.0) return;
     const double share = force / scale_.longest_torque_Nm;
-    if (std::abs(share) < kSmallestShare) return;
+    if (std::abs(share) < kSmallestArc) return;
     AddTorqueArc({.centre = X_WF.translation(),
                   .R = ArcAxes(axis, forward_W_),
                   .radius = 0.3 * scale_.arrow_m,
@@ -291,6 +292,7 @@ Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame, cons
               &out.flats);
     }
   }
+  for (Item& item : out.items) item.casts_shadow = false;
   return out;
 }
 
@@ -328,6 +330,7 @@ Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale, const
     flat.depth = FlatMesh::Depth::kHidden;
     out.flats.push_back(std::move(flat));
   }
+  for (Item& item : out.items) item.casts_shadow = false;
   return out;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "render/annotations.h"
+#include "render/best_view.h"
 
 namespace mbv::render {
 namespace {
@@ -22,6 +23,8 @@ std::string WithUnit(double value, const std::string& unit) {
   if (value >= 1e3) return fmt::format("{:.3g} k{}", value * 1e-3, unit);
   return fmt::format("{:.3g} {}", value, unit);
 }
+
+constexpr double kNear = 0.1;  // share of the mechanism's diagonal
 
 // Collects what the pictures show, in the drawing frame.
 class Extent {
@@ -45,12 +48,12 @@ class Extent {
     fit_->Include(p_D);
   }
 
-  // Parts of the world count if they lie within a quarter of the diagonal around the rest.
+  // Parts of the world count if they lie close around the rest: what is shown is the mechanism.
   void Close() {
     Eigen::AlignedBox3d reach = framed_;
     if (!reach.isEmpty()) {
-      reach.min().array() -= 0.25 * framed_.diagonal().norm();
-      reach.max().array() += 0.25 * framed_.diagonal().norm();
+      reach.min().array() -= kNear * framed_.diagonal().norm();
+      reach.max().array() += kNear * framed_.diagonal().norm();
     }
     for (const Item& item : near_) {
       std::vector<Vec3> corners = Corners(item);
@@ -89,7 +92,7 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
     bar_px = std::max(bar_px, BarHeight(frame.caption, options.size_px));
   }
   const double width = options.size_px[0], height = options.size_px[1];
-  CameraFit fit(options.camera, width / height,
+  CameraFit fit(BestView(mechanism, frames, set.scale, options, set.R_DW), width / height,
                 {.side = 0.05, .top = 0.045, .bottom = 0.045 + bar_px / height}, set.R_DW);
 
   Extent extent(set.R_DW, &fit);
@@ -123,11 +126,15 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
                .sea = sea.has_value(),
                .most_items = static_cast<int>(most_items + overlaid.items.size()),
                .grid_m = RoundLength(0.14 * size)};
+  if (!options.background.empty()) {
+    const auto rgba = MaterialOf(options.background).rgba;
+    set.stage.background = std::array<float, 3>{rgba[0], rgba[1], rgba[2]};
+  }
   return set;
 }
 
 std::vector<LegendEntry> LegendOf(const Mechanism& mechanism, const Arrangement& arrangement,
-                                  const PictureOptions& options) {
+                                  const Overlay& overlay, const PictureOptions& options) {
   std::vector<LegendEntry> legend;
   const double force = arrangement.scale.longest_force_N;
   const double torque = arrangement.scale.longest_torque_Nm;
@@ -137,13 +144,24 @@ std::vector<LegendEntry> LegendOf(const Mechanism& mechanism, const Arrangement&
     if (force > 0.0) legend.push_back({"", "arrows linear, longest = " + WithUnit(force, "N")});
     if (torque > 0.0) legend.push_back({"", "arcs linear, 300 deg = " + WithUnit(torque, "N m")});
   }
+  const size_t second_row = legend.size();
   const bool any_closure =
       std::ranges::any_of(mechanism.joints, [](const Joint& joint) { return joint.closure; });
   if (options.closures && any_closure) legend.push_back({"closure", "loop closure"});
   const bool ground_seen = arrangement.camera.position_D().z() >= arrangement.stage.ground_m;
-  if (!arrangement.stage.sea && ground_seen) {
+  if (options.output_frames && !mechanism.outputs.empty()) {
+    legend.push_back({"x_axis", "x"});
+    legend.push_back({"y_axis", "y"});
+    legend.push_back({"z_axis", mechanism.outputs.size() == 1 ? "z of " + mechanism.outputs[0].name
+                                                              : "z of the outputs"});
+  }
+  for (const PolylineOverlay& path : overlay.paths) {
+    if (!path.name.empty()) legend.push_back({path.color, path.name});
+  }
+  if (!arrangement.stage.sea && ground_seen && !arrangement.stage.background) {
     legend.push_back({"", fmt::format("grid {:g} m", arrangement.stage.grid_m)});
   }
+  for (size_t i = second_row; i < legend.size(); ++i) legend[i].row = 1;
   return legend;
 }
 

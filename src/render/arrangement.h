@@ -27,6 +27,7 @@ struct Arrangement {
 /// What the marks in the pictures mean.
 [[nodiscard]] std::vector<LegendEntry> LegendOf(const Mechanism& mechanism,
                                                 const Arrangement& arrangement,
+                                                const Overlay& overlay,
                                                 const PictureOptions& options);
 
 }  // namespace mbv::render

@@ -44,8 +44,8 @@ double CameraFit::Side::middle(double cz) const {
 CameraFit::CameraFit(const CameraView& view, double aspect, const Margins& margins,
                      const Mat3& R_DW)
     : view_(view) {
-  camera_.azimuth_deg = view.azimuth_deg.value_or(-60.0);
-  camera_.elevation_deg = view.elevation_deg.value_or(16.0);
+  camera_.azimuth_deg = view.azimuth_deg.value_or(kUsualAzimuth_deg);
+  camera_.elevation_deg = view.elevation_deg.value_or(kUsualElevation_deg);
   if (view.lookat_W) camera_.lookat_D = R_DW * *view.lookat_W;
   const double t = std::tan(0.5 * kFieldOfView_deg * kRadPerDeg);
   across_.t_plus = across_.t_minus = aspect * t * (1.0 - 2.0 * margins.side);

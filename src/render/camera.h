@@ -11,6 +11,9 @@ namespace mbv::render {
 /// Vertical field of view [deg]; small, so that parallel edges stay nearly parallel.
 inline constexpr double kFieldOfView_deg = 26.0;
 
+/// From where is looked unless told otherwise [deg].
+inline constexpr double kUsualAzimuth_deg = -60.0, kUsualElevation_deg = 16.0;
+
 struct Camera {
   double azimuth_deg = 0.0, elevation_deg = 0.0;  ///< as in CameraView
   double distance_m = 1.0;

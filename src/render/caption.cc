@@ -114,24 +114,29 @@ struct Layout {
     detail = caption.detail.empty() ? -pad : 0.0245 * unit;  // without its gap, too
     legend = 0.0215 * unit;
   }
-  [[nodiscard]] double bar() const { return 4.6 * pad + title + detail + legend; }
+  [[nodiscard]] double bar() const { return 5.3 * pad + title + detail + 2.0 * legend; }
 };
 
 void WriteLegend(const std::vector<LegendEntry>& legend, const Writer& writer, double top,
                  const Layout& layout, Picture* picture) {
-  double left = 2.0 * layout.pad;
   const double h = layout.legend;
+  std::array<double, 2> lefts = {2.0 * layout.pad, 2.0 * layout.pad};
+  const bool any_above =
+      std::ranges::any_of(legend, [](const LegendEntry& entry) { return entry.row == 0; });
   for (const LegendEntry& entry : legend) {
+    const int row = any_above ? entry.row : 0;
+    double& left = lefts[static_cast<size_t>(row)];
+    const double y = top + row * (h + 0.7 * layout.pad);
     const double mark = entry.color.empty() ? 0.0 : 1.5 * h;
     const std::string text = PlainText(entry.text);
     const double width = writer.Width(text, h);
-    if (left + mark + width > picture->width - 2.0 * layout.pad) return;
+    if (left + mark + width > picture->width - 2.0 * layout.pad) continue;
     if (!entry.color.empty()) {
       const auto rgba = MaterialOf(entry.color).rgba;
-      Fill(picture, static_cast<int>(left), static_cast<int>(top + 0.22 * h),
+      Fill(picture, static_cast<int>(left), static_cast<int>(y + 0.22 * h),
            static_cast<int>(1.1 * h), static_cast<int>(0.56 * h), {rgba[0], rgba[1], rgba[2]});
     }
-    writer.Write(text, left + mark, top, h, kSoftInk);
+    writer.Write(text, left + mark, y, h, kSoftInk);
     left += mark + width + 1.6 * h;
   }
 }
@@ -197,6 +202,42 @@ void PaintCaption(const Caption& caption, const std::vector<LegendEntry>& legend
   }
   y += layout.detail + layout.pad;
   WriteLegend(legend, writer, y, layout, picture);
+}
+
+void PaintLabels(const std::vector<Label>& labels, const Caption& caption,
+                 const std::vector<Glyph>& font, Picture* picture) {
+  const std::array<int, 2> size{picture->width, picture->height};
+  const Layout layout(Caption{}, size);
+  const Writer writer(font, picture);
+  const double h = layout.legend, floor = picture->height - BarHeight(caption, size);
+  std::vector<Eigen::AlignedBox2d> taken;
+  for (const Label& label : labels) {
+    const std::string text = PlainText(label.text);
+    const double x = label.x * picture->width, y = label.y * picture->height;
+    const double width = writer.Width(text, h) + 0.6 * h, height = 1.1 * h;
+    // Right of the place, or left, above and below of it.
+    const std::array<Eigen::Vector2d, 4> shifts = {
+        Eigen::Vector2d(0.6 * h, -0.5 * height), Eigen::Vector2d(-0.6 * h - width, -0.5 * height),
+        Eigen::Vector2d(-0.5 * width, -height - 0.6 * h), Eigen::Vector2d(-0.5 * width, 0.6 * h)};
+    for (const Eigen::Vector2d& shift : shifts) {
+      const Eigen::Vector2d corner = Eigen::Vector2d(x, y) + shift;
+      const Eigen::AlignedBox2d box(corner, corner + Eigen::Vector2d(width, height));
+      const bool outside = box.min().x() < 0.0 || box.min().y() < 0.0 ||
+                           box.max().x() > picture->width || box.max().y() > floor;
+      const bool over = std::ranges::any_of(
+          taken, [&](const Eigen::AlignedBox2d& other) { return other.intersects(box); });
+      if (outside || over) continue;
+      taken.push_back(box);
+      for (int row = static_cast<int>(box.min().y()); row < box.max().y(); ++row) {
+        for (int column = static_cast<int>(box.min().x()); column < box.max().x(); ++column) {
+          Blend(picture, column, row, kPaper, 0.72F);
+        }
+      }
+      Fill(picture, static_cast<int>(x) - 1, static_cast<int>(y) - 1, 3, 3, kInk);
+      writer.Write(text, corner.x() + 0.3 * h, corner.y() + 0.05 * h, h, kInk);
+      break;
+    }
+  }
 }
 
 }  // namespace mbv::render

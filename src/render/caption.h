@@ -12,8 +12,9 @@ namespace mbv::render {
 
 /// One entry of the legend: a coloured mark and its meaning.
 struct LegendEntry {
-  std::string color;  ///< material name; empty: text alone
-  std::string text;
+  std::string color = {};  ///< material name; empty: text alone
+  std::string text = {};
+  int row = 0;  ///< 0 or 1
 };
 
 /// True when there is nothing to write.
@@ -27,5 +28,16 @@ struct LegendEntry {
 /// shortened with "...".
 void PaintCaption(const Caption& caption, const std::vector<LegendEntry>& legend,
                   const std::vector<Glyph>& font, Picture* picture);
+
+/// A name to be written at a place in the picture.
+struct Label {
+  double x = 0.0, y = 0.0;  ///< of what is named, fractions of width and height
+  std::string text = {};
+};
+
+/// Writes names beside their places on a pale ground, the first ones first; what would lie over
+/// another, leave the picture or lie in the caption is left out.
+void PaintLabels(const std::vector<Label>& labels, const Caption& caption,
+                 const std::vector<Glyph>& font, Picture* picture);
 
 }  // namespace mbv::render

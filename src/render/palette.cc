@@ -12,8 +12,8 @@ const std::map<std::string, std::array<float, 4>>& Marks() {
   static const std::map<std::string, std::array<float, 4>> marks = {
       {"closure", {0.80F, 0.10F, 0.55F, 1.0F}}, {"gap", {1.00F, 0.05F, 0.05F, 1.0F}},
       {"pull", {0.10F, 0.35F, 0.85F, 1.0F}},    {"push", {0.88F, 0.12F, 0.10F, 1.0F}},
-      {"x_axis", {0.85F, 0.15F, 0.15F, 1.0F}},  {"y_axis", {0.15F, 0.62F, 0.20F, 1.0F}},
-      {"z_axis", {0.15F, 0.30F, 0.85F, 1.0F}},
+      {"x_axis", {0.95F, 0.68F, 0.00F, 1.0F}},  {"y_axis", {0.16F, 0.60F, 0.20F, 1.0F}},
+      {"z_axis", {0.00F, 0.62F, 0.68F, 1.0F}},  {"path", {0.45F, 0.20F, 0.65F, 1.0F}},
   };
   return marks;
 }

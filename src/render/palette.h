@@ -15,7 +15,7 @@ struct Material {
 };
 
 /// The material of a shape's colour (mechanism/colors.h) or of a mark: closure, gap, pull, push,
-/// x_axis, y_axis, z_axis.
+/// x_axis, y_axis, z_axis, path.
 [[nodiscard]] Material MaterialOf(const std::string& color);
 
 /// Shapes of these materials ("sea", "hull", "deck") are surroundings: drawn, but the automatic

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/demand.h"
+#include "mechanism/colors.h"
 #include "render/annotations.h"
 #include "render/arrangement.h"
 #include "render/caption.h"
@@ -59,6 +60,34 @@ RunSummary CheckInput(const Mechanism& mechanism, const std::vector<PictureFrame
   return RunSummary::Done();
 }
 
+// Names of outputs, drives and joints where they are, in this order.
+std::vector<rn::Label> LabelsOf(const Mechanism& mechanism, const PictureFrame& frame,
+                                const rn::Arrangement& set, const PictureOptions& options) {
+  std::vector<rn::Label> labels;
+  const double aspect = static_cast<double>(options.size_px[0]) / options.size_px[1];
+  const auto add = [&](const std::string& name, const Vec3& p_W) {
+    const Eigen::Vector2d at = rn::Project(set.camera, aspect, set.R_DW * p_W);
+    labels.push_back({.x = at.x(), .y = at.y(), .text = name});
+  };
+  for (const Output& output : mechanism.outputs) {
+    add(output.name, frame.X_WB[output.body] * Vec3(output.X_BO.translation()));
+  }
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+      add(drive.name,
+          0.5 * (frame.X_WB[leg->body_from] * leg->p_from + frame.X_WB[leg->body_to] * leg->p_to));
+    } else {
+      const Joint& joint = mechanism.joints[std::get<JointDrive>(drive.kind).joint];
+      add(drive.name, frame.X_WB[joint.child] * Vec3(joint.X_CM.translation()));
+    }
+  }
+  for (const Joint& joint : mechanism.joints) {
+    if (joint.kind == JointKind::kFree) continue;
+    add(joint.name, frame.X_WB[joint.child] * Vec3(joint.X_CM.translation()));
+  }
+  return labels;
+}
+
 }  // namespace
 
 Diagnostics Check(const PictureOptions& options) {
@@ -72,6 +101,9 @@ Diagnostics Check(const PictureOptions& options) {
   }
   demand(options.passes >= 1 && options.passes <= 64,
          fmt::format("passes = {} violates 1 <= passes <= 64", options.passes));
+  demand(
+      options.background.empty() || IsShapeColor(options.background),
+      fmt::format("background = '{}' is neither a colour's name nor #rrggbb", options.background));
   const CameraView& view = options.camera;
   demand(!view.azimuth_deg || std::isfinite(*view.azimuth_deg),
          "camera.azimuth_deg is not a finite number");
@@ -113,10 +145,10 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
   std::vector<rn::Glyph> font;
   const bool any_caption = std::ranges::any_of(
       frames, [](const PictureFrame& frame) { return !rn::IsEmpty(frame.caption); });
-  if (any_caption) {
+  if (any_caption || options.labels) {
     if (RunSummary got = stage->Font(&font); !got.ok()) return got;
   }
-  const std::vector<rn::LegendEntry> legend = rn::LegendOf(mechanism, set, options);
+  const std::vector<rn::LegendEntry> legend = rn::LegendOf(mechanism, set, overlay, options);
   const rn::Annotations overlaid = rn::OverlayAnnotations(overlay, set.scale, set.forward_W);
   for (std::size_t f = 0; f < frames.size(); ++f) {
     std::vector<rn::Item> items = rn::MechanismItems(mechanism, frames[f], set.scale, options);
@@ -132,6 +164,10 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
     Picture picture;
     RunSummary drawn = stage->Draw(items, marks.flats, set.R_DW, set.camera, &picture);
     if (!drawn.ok()) return drawn;
+    if (options.labels) {
+      rn::PaintLabels(LabelsOf(mechanism, frames[f], set, options), frames[f].caption, font,
+                      &picture);
+    }
     rn::PaintCaption(frames[f].caption, legend, font, &picture);
     if (!sink(static_cast<int>(f), std::move(picture))) break;
   }

@@ -23,6 +23,7 @@ namespace mbv {
 
 /// Where the camera stands; what is left empty is chosen so that every frame's mechanism fits.
 struct CameraView {
+  // Without an azimuth, the direction from which most joints are seen, best near -60°, 16°.
   std::optional<double> azimuth_deg = {};  ///< from the look-at point to the camera, about up; 0 is
                                            ///< the world's x axis (its z axis where x is vertical)
   std::optional<double> elevation_deg = {};  ///< height of the camera above the horizon, -90 … 90
@@ -33,13 +34,16 @@ struct CameraView {
 struct PictureOptions {
   std::array<int, 2> size_px{1280, 960};  ///< each 64 … 8192
   int passes =
-      8;  ///< averaged passes, 1 … 64: smoother edges and softer shadows; time grows with it
+      12;  ///< averaged passes, 1 … 64: smoother edges and softer shadows; time grows with it
   CameraView camera;
   bool shadows = true;
   bool joints = true;         ///< joints as small balls and cylinders
   bool closures = true;       ///< rings around the joints that close loops
   bool drive_forces = true;   ///< arrows, where the frame has forces
-  bool output_frames = true;  ///< triads at the outputs and at the world's origin
+  bool output_frames = true;  ///< triads at the outputs
+  bool labels = false;        ///< names of outputs, drives and joints, where there is room
+  std::string background =
+      {};  ///< a colour instead of sky and ground ("white", "#rrggbb"); "": none
 };
 [[nodiscard]] Diagnostics Check(const PictureOptions& options);
 
@@ -60,9 +64,10 @@ struct PictureFrame {
 
 /// Additions drawn into every frame.
 struct PolylineOverlay {
-  std::vector<Vec3> points_W;     ///< [m]
-  std::string color = "#d81b60";  ///< a material name or "#rrggbb[aa]"
-  double radius_m = 0.0;          ///< 0: chosen to fit the picture
+  std::vector<Vec3> points_W = {};  ///< [m]
+  std::string color = "path";       ///< a material name or "#rrggbb[aa]"
+  std::string name = {};            ///< in the legend; "": not there
+  double radius_m = 0.0;            ///< 0: chosen to fit the picture
 };
 struct MeshOverlay {
   std::vector<Vec3> vertices_W;               ///< [m]

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 namespace mbv::render {
 
@@ -73,6 +74,10 @@ std::vector<Vec3> TouchPoints(const Mechanism& mechanism, int body) {
       if (leg->body_from == body) add(leg->p_from);
       if (leg->body_to == body) add(leg->p_to);
     }
+  }
+  for (const SpringDamper& spring : mechanism.springs) {
+    if (spring.body_from == body) add(spring.p_from);
+    if (spring.body_to == body) add(spring.p_to);
   }
   return points;
 }
@@ -214,11 +219,44 @@ void AddLeg(const Drive& drive, const DistanceDrive& leg, double barrel_m,
   for (const Vec3& end : {p, q}) items->push_back(BallAt(end, 1.25 * r, MaterialOf("brass")));
 }
 
+// A helix between its ends, around a telescoping damper if there is damping.
+void AddSpring(const SpringDamper& spring, const PictureFrame& frame, const Scale& scale,
+               std::vector<Item>* items) {
+  const Vec3 p = frame.X_WB[spring.body_from] * spring.p_from;
+  const Vec3 q = frame.X_WB[spring.body_to] * spring.p_to;
+  const double length = (q - p).norm(), r = scale.leg_m;
+  if (length <= 0.0) return;
+  const Mat3 R = FrameAlong(q - p);
+  const Vec3 e = R.col(2);
+  const double plain = std::min(0.1 * length, 3.0 * r);  // straight ends
+  if (spring.damping > 0.0) {
+    const Vec3 mouth = p + 0.55 * length * e;
+    items->push_back(Between(Solid::kCylinder, p + plain * e, mouth, 0.8 * r, MaterialOf("grey")));
+    items->push_back(Between(Solid::kCylinder, p, q, 0.3 * r, MaterialOf("dark_steel")));
+  }
+  for (const Vec3& end : {p, q}) items->push_back(BallAt(end, 0.8 * r, MaterialOf("brass")));
+  if (spring.stiffness == 0.0) return;
+  constexpr int kTurns = 7, kPerTurn = 14;
+  const double coil = 1.7 * r, wire = 0.28 * r;
+  const auto point = [&](int i) {
+    const double angle = 2.0 * std::numbers::pi * i / kPerTurn;
+    const double along = plain + (length - 2.0 * plain) * i / (kTurns * kPerTurn);
+    return Vec3(p + R * Vec3(coil * std::cos(angle), coil * std::sin(angle), along));
+  };
+  const Material steel = MaterialOf("steel");
+  for (int i = 0; i < kTurns * kPerTurn; ++i) {
+    items->push_back(Between(Solid::kCapsule, point(i), point(i + 1), wire, steel));
+  }
+  items->push_back(Between(Solid::kCapsule, p, point(0), wire, steel));
+  items->push_back(Between(Solid::kCapsule, point(kTurns * kPerTurn), q, wire, steel));
+}
+
 void AddTriad(const Pose& X_WO, double length, std::vector<Item>* items) {
   const char* names[] = {"x_axis", "y_axis", "z_axis"};
   for (int i = 0; i < 3; ++i) {
     const Vec3 p = X_WO.translation(), q = p + length * X_WO.linear().col(i);
     items->push_back(Between(Solid::kArrow, p, q, 0.035 * length, MaterialOf(names[i])));
+    items->back().casts_shadow = false;
   }
 }
 
@@ -261,6 +299,12 @@ Scale ScaleOf(const Mechanism& mechanism, const std::vector<PictureFrame>& frame
     if (std::isfinite(lower) && lower > 0.0) shortest = std::min(shortest, lower);
     if (std::isfinite(shortest)) scale.barrel_m[d] = 0.62 * shortest;
   }
+  // Rounding is no force: against the weight of a kilogram where there is no other.
+  double mass = 0.0;
+  for (const Body& body : mechanism.bodies) mass += body.mass;
+  const double floor_N = 1e-9 * 9.81 * (mass > 0.0 ? mass : 1.0);
+  if (scale.longest_force_N < floor_N) scale.longest_force_N = 0.0;
+  if (scale.longest_torque_Nm < floor_N * scale.extent_m) scale.longest_torque_Nm = 0.0;
   return scale;
 }
 
@@ -288,6 +332,7 @@ std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame&
       AddLeg(mechanism.drives[d], *leg, scale.barrel_m[d], frame, scale, &items);
     }
   }
+  for (const SpringDamper& spring : mechanism.springs) AddSpring(spring, frame, scale, &items);
   if (options.joints) {
     for (std::size_t j = 0; j < mechanism.joints.size(); ++j) {
       const bool moves_base = std::ranges::any_of(mechanism.prescribed, [j](const Prescribed& p) {

@@ -33,6 +33,7 @@ struct Item {
   Vec3 size = Vec3::Ones();      ///< [m]
   Material material;
   Framing framing = Framing::kAlways;
+  bool casts_shadow = true;  ///< marks do not
 };
 
 /// The two unit vectors that complete `axis` to a right-handed frame (axis last).

@@ -17,7 +17,8 @@ namespace {
 
 constexpr int kTexture_px = 1024;
 // Light that falls on a surface facing each source; a level white floor gets about 1.
-constexpr double kKey = 0.50, kSky = 0.16, kFill = 0.27, kAmbient = 0.35;
+constexpr double kKey = 0.52, kSky = 0.14, kFill = 0.27, kAmbient = 0.35;
+constexpr double kSun_deg = 2.5;  // width of the key light, which makes shadows soft
 
 RunSummary Failure(const std::string& message) {
   RunSummary summary;
@@ -36,11 +37,16 @@ Eigen::Vector2d EvenPoint(int i) {
 std::string StageMjcf(const StageOptions& o) {
   const double repeat = o.sea ? 0.35 / o.radius_m : 1.0 / (5.0 * o.grid_m);
   const std::string haze = o.sea ? "0.80 0.86 0.91 1" : "0.93 0.945 0.96 1";
-  const std::string zenith = o.sea ? "0.50 0.66 0.82" : "0.70 0.78 0.87";
+  std::string zenith = o.sea ? "0.50 0.66 0.82" : "0.70 0.78 0.87";
+  std::string horizon = o.sea ? "0.80 0.86 0.91" : "0.93 0.945 0.96";
+  if (o.background) {
+    const auto& rgb = *o.background;
+    zenith = horizon = fmt::format("{:.9g} {:.9g} {:.9g}", rgb[0], rgb[1], rgb[2]);
+  }
   return fmt::format(
       "<mujoco><statistic extent='{0:.9g}' center='0 0 0'/>"
       "<visual><global offwidth='{1}' offheight='{2}' fovy='{3}'/>"
-      "<quality offsamples='0' shadowsize='1024' numslices='32' numstacks='6' numquads='2'/>"
+      "<quality offsamples='0' shadowsize='2048' numslices='32' numstacks='16' numquads='2'/>"
       "<map znear='0.05' zfar='40' shadowclip='1.0' haze='0.35'/><rgba haze='{4}'/>"
       "<headlight active='0'/></visual>"
       "<asset><texture name='sky' type='skybox' builtin='gradient' rgb1='{5}' rgb2='{6}' "
@@ -50,9 +56,8 @@ std::string StageMjcf(const StageOptions& o) {
       "reflectance='{9}' specular='{10}' shininess='0.7'/></asset>"
       "<worldbody><geom type='plane' size='0 0 1' pos='0 0 {11:.9g}' material='ground'/>"
       "</worldbody></mujoco>",
-      o.radius_m, o.width, o.height, kFieldOfView_deg, haze, zenith,
-      o.sea ? "0.80 0.86 0.91" : "0.93 0.945 0.96", kTexture_px, repeat, o.sea ? 0.2 : 0.0,
-      o.sea ? 0.5 : 0.1, o.ground_m);
+      o.radius_m, o.width, o.height, kFieldOfView_deg, haze, zenith, horizon, kTexture_px, repeat,
+      o.sea ? 0.2 : 0.0, o.sea ? 0.5 : 0.1, o.ground_m);
 }
 
 // Unit vector with an azimuth from x about z and a height above the horizon [deg].
@@ -161,7 +166,8 @@ class OsMesaStage final : public Stage {
       mjv_updateScene(model_.get(), data_.get(), &show, nullptr, &from, mjCAT_ALL, &scene_);
     }
     // Seen from below, the ground would be a veil before everything.
-    if (camera.position_D().z() < options_.ground_m) scene_.ngeom = 0;
+    const bool plain = options_.background.has_value();
+    if (plain || camera.position_D().z() < options_.ground_m) scene_.ngeom = 0;
     if (scene_.ngeom + static_cast<int>(items.size()) > scene_.maxgeom) {
       return Failure(
           fmt::format("{} solids are more than the {} that fit", items.size(), scene_.maxgeom));
@@ -169,9 +175,9 @@ class OsMesaStage final : public Stage {
     for (const Item& item : items) AppendGeom(item, R_DW);
     std::ranges::fill(scene_.flags, 0);
     scene_.flags[mjRND_SHADOW] = options_.shadows;
-    scene_.flags[mjRND_REFLECTION] = options_.sea;
+    scene_.flags[mjRND_REFLECTION] = options_.sea && !plain;
     scene_.flags[mjRND_SKYBOX] = 1;
-    scene_.flags[mjRND_HAZE] = 1;
+    scene_.flags[mjRND_HAZE] = !plain;
     scene_.flags[mjRND_CULL_FACE] = 1;
     return RunSummary::Done();
   }
@@ -188,7 +194,7 @@ class OsMesaStage final : public Stage {
     geom.size[1] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.y());
     geom.size[2] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.z());
     if (item.solid == Solid::kArrow) geom.size[2] *= 2.0F;  // arrows are drawn half as long
-    geom.category = mjCAT_DYNAMIC;                          // decoration would cast no shadow
+    geom.category = item.casts_shadow ? mjCAT_DYNAMIC : mjCAT_DECOR;  // decoration casts none
     geom.specular = item.material.specular;
     geom.shininess = item.material.shininess;
     geom.emission = item.material.emission;
@@ -200,8 +206,8 @@ class OsMesaStage final : public Stage {
   void SetLights(const Camera& camera, int pass) {
     const Eigen::Vector2d u = EvenPoint(pass), w = EvenPoint(pass + 1000);
     const double spread = options_.passes > 1 ? 1.0 : 0.0;
-    const Vec3 key = Direction(camera.azimuth_deg - 50.0 + spread * 4.0 * (u.x() - 0.5),
-                               52.0 + spread * 4.0 * (u.y() - 0.5));
+    const Vec3 key = Direction(camera.azimuth_deg - 50.0 + spread * kSun_deg * (u.x() - 0.5),
+                               52.0 + spread * kSun_deg * (u.y() - 0.5));
     // Cosine-weighted over the upper hemisphere, none below 48°.
     const double r = spread * std::sqrt(0.45 * w.x()), angle = 2.0 * std::numbers::pi * w.y();
     const Vec3 sky(r * std::cos(angle), r * std::sin(angle), std::sqrt(1.0 - r * r));
@@ -209,7 +215,8 @@ class OsMesaStage final : public Stage {
     const Vec3 fill = Direction(camera.azimuth_deg + 50.0, fill_height);
     scene_.nlight = 3;
     SetLight(&scene_.lights[0], key, kKey, 0.35, 0.0, true);
-    SetLight(&scene_.lights[1], sky, kSky, 0.0, 0.0, true);
+    // Its shadows would be as many faint copies as there are passes.
+    SetLight(&scene_.lights[1], sky, kSky, 0.0, 0.0, false);
     SetLight(&scene_.lights[2], fill, kFill, 0.1, kAmbient,
              false);  // a light with shadows has its ambient part shadowed, too
   }

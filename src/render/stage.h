@@ -5,6 +5,7 @@
 // soft shadows and darkened corners with a renderer that knows only hard ones.
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <string>
@@ -26,8 +27,9 @@ struct StageOptions {
   double radius_m = 1.0;         ///< shadows are cast within this radius of the centre
   double ground_m = 0.0;         ///< height of the ground plane or the water
   bool sea = false;
-  int most_items = 1000;  ///< room for so many solids in one picture
-  double grid_m = 0.1;    ///< spacing of the ground's grid lines
+  int most_items = 1000;                                ///< room for so many solids in one picture
+  double grid_m = 0.1;                                  ///< spacing of the ground's grid lines
+  std::optional<std::array<float, 3>> background = {};  ///< instead of sky and ground
 };
 
 /// One character of the renderer's font as coverage 0 … 255.

@@ -192,6 +192,7 @@ TEST_F(HelpTest, ParametersAndOutputsAreFoundFromAMisspelling) {
            {"run four_bar/turn --set parameters.cranc=0.1", "crank"},
            {"run four_bar/turn --set motion.commands.moter=0", "motor"},
            {"render four_bar/turn --set parameters.cranc=0.1", "crank"},
+           {"render four_bar/turn --camera tob", "top"},
            {"converge four_bar/turn --set parameters.cranc=0.1", "crank"},
            {"run four_bar/turn --mode inverze", "inverse"},
            {"init mine --from four_baar", "four_bar"}}) {

@@ -1,0 +1,144 @@
+#include "render/best_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "render/camera.h"
+
+namespace mbv::render {
+namespace {
+
+constexpr std::size_t kMostPoints = 48, kMostFrames = 3;
+// What a view has to show more to be preferred: a half turn, and looking from 24° higher.
+constexpr double kTurnCost = 0.12, kHeightCost = 0.10;
+
+// A solid as a box in its own frame.
+struct Blocker {
+  Pose X_GW;
+  Vec3 low, high;
+
+  // Whether a ray from p meets it further away than `near`.
+  [[nodiscard]] bool Hides(const Vec3& p_W, const Vec3& direction_W, double near) const {
+    const Vec3 p = X_GW * p_W, d = X_GW.linear() * direction_W;
+    double enter = -std::numeric_limits<double>::infinity(), leave = -enter;
+    for (int i = 0; i < 3; ++i) {
+      if (std::abs(d[i]) < 1e-12) {
+        if (p[i] < low[i] || p[i] > high[i]) return false;
+        continue;
+      }
+      const double a = (low[i] - p[i]) / d[i], b = (high[i] - p[i]) / d[i];
+      enter = std::max(enter, std::min(a, b));
+      leave = std::min(leave, std::max(a, b));
+    }
+    return enter <= leave && enter > near;
+  }
+};
+
+// What hides and what is to be seen, of some of the frames.
+class Sight {
+ public:
+  Sight(const Mechanism& mechanism, const std::vector<PictureFrame>& frames, const Scale& scale,
+        const PictureOptions& options)
+      : near_(3.0 * scale.joint_m) {
+    const std::size_t count = std::min(frames.size(), kMostFrames);
+    for (std::size_t k = 0; k < count; ++k) {
+      const PictureFrame& frame = frames[count < 2 ? 0 : k * (frames.size() - 1) / (count - 1)];
+      AddFrame(mechanism, frame, scale, options);
+    }
+  }
+
+  [[nodiscard]] double Share(const Vec3& to_camera_W) const {
+    std::size_t seen = 0, all = 0;
+    for (const Scene& scene : scenes_) {
+      for (const Vec3& p : scene.points) {
+        ++all;
+        seen += std::ranges::none_of(
+                    scene.blockers,
+                    [&](const Blocker& blocker) { return blocker.Hides(p, to_camera_W, near_); })
+                    ? 1
+                    : 0;
+      }
+    }
+    return all == 0 ? 1.0 : static_cast<double>(seen) / static_cast<double>(all);
+  }
+
+ private:
+  struct Scene {
+    std::vector<Blocker> blockers;
+    std::vector<Vec3> points;
+  };
+
+  void AddFrame(const Mechanism& mechanism, const PictureFrame& frame, const Scale& scale,
+                const PictureOptions& options) {
+    Scene scene;
+    PictureOptions plain = options;
+    plain.output_frames = false;
+    for (const Item& item : MechanismItems(mechanism, frame, scale, plain)) {
+      if (item.material.rgba[3] < 0.5F || item.framing == Framing::kNever) continue;
+      Vec3 high = item.size;
+      if (item.solid == Solid::kCapsule) high.z() += item.size.x();
+      scene.blockers.push_back({.X_GW = item.X_WG.inverse(), .low = -high, .high = high});
+    }
+    std::vector<Vec3> points;
+    for (const Joint& joint : mechanism.joints) {
+      if (joint.kind == JointKind::kFree || joint.kind == JointKind::kFixed) continue;
+      points.emplace_back(frame.X_WB[joint.child] * Vec3(joint.X_CM.translation()));
+    }
+    for (const Drive& drive : mechanism.drives) {
+      if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+        points.emplace_back(frame.X_WB[leg->body_from] * leg->p_from);
+        points.emplace_back(frame.X_WB[leg->body_to] * leg->p_to);
+      }
+    }
+    const std::size_t step = points.size() / kMostPoints + 1;
+    for (std::size_t i = 0; i < points.size(); i += step) scene.points.push_back(points[i]);
+    scenes_.push_back(std::move(scene));
+  }
+
+  double near_;  // what touches the point does not hide it
+  std::vector<Scene> scenes_;
+};
+
+}  // namespace
+
+double VisibleShare(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
+                    const Scale& scale, const PictureOptions& options, const Vec3& to_camera_W) {
+  return Sight(mechanism, frames, scale, options).Share(to_camera_W);
+}
+
+CameraView BestView(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
+                    const Scale& scale, const PictureOptions& options, const Mat3& R_DW) {
+  const Camera usual{.azimuth_deg = kUsualAzimuth_deg, .elevation_deg = kUsualElevation_deg};
+  CameraView best = options.camera;
+  if (!best.azimuth_deg) best.azimuth_deg = usual.azimuth_deg;
+  if (!best.elevation_deg) best.elevation_deg = usual.elevation_deg;
+  // A stated place to look at or distance belongs to the usual direction.
+  if (options.camera.azimuth_deg || options.camera.lookat_W || options.camera.distance_m) {
+    return best;
+  }
+  const Sight sight(mechanism, frames, scale, options);
+  double best_score = -1.0;
+  const std::vector<double> heights =
+      options.camera.elevation_deg ? std::vector<double>{*options.camera.elevation_deg}
+                                   : std::vector<double>{usual.elevation_deg, 24.0, 32.0, 40.0};
+  for (const double height : heights) {
+    for (int turn = 0; turn < 24; ++turn) {
+      const double by = turn % 2 == 0 ? -7.5 * turn : 7.5 * (turn + 1);  // 0, 15, -15, 30 …
+      Camera camera = usual;
+      camera.azimuth_deg += by;
+      camera.elevation_deg = height;
+      const Vec3 to_camera_W = -(R_DW.transpose() * camera.forward_D());
+      const double score = sight.Share(to_camera_W) - kTurnCost * std::abs(by) / 180.0 -
+                           kHeightCost * std::abs(height - heights.front()) / 24.0;
+      if (score <= best_score) continue;
+      best_score = score;
+      best.azimuth_deg = camera.azimuth_deg;
+      best.elevation_deg = height;
+    }
+  }
+  return best;
+}
+
+}  // namespace mbv::render
