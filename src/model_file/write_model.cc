@@ -55,28 +55,6 @@ std::string PoseText(const Pose& X) {
                      Triple(X.translation()), Triple(R.row(0)), Triple(R.row(1)), Triple(R.row(2)));
 }
 
-const char* WordOfKind(JointKind kind) {
-  switch (kind) {
-    case JointKind::kFixed:
-      return "fixed";
-    case JointKind::kRevolute:
-      return "revolute";
-    case JointKind::kPrismatic:
-      return "prismatic";
-    case JointKind::kCylindrical:
-      return "cylindrical";
-    case JointKind::kUniversal:
-      return "universal";
-    case JointKind::kSpherical:
-      return "spherical";
-    case JointKind::kPlanar:
-      return "planar";
-    case JointKind::kFree:
-      return "free";
-  }
-  return "";
-}
-
 struct ShapeText {
   std::string operator()(const Capsule& s) const { return Rod("capsule", s); }
   std::string operator()(const Cylinder& s) const { return Rod("cylinder", s); }
@@ -185,13 +163,12 @@ class ModelWriter {
     for (size_t j = 0; j < m_.joints.size(); ++j) {
       const Joint& joint = m_.joints[j];
       const std::string& name = names_.joints[j];
-      text += fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, WordOfKind(joint.kind),
+      text += fmt::format("  {}: {{kind: {}, parent: {}, child: {}", name, WordOf(joint.kind),
                           Ref(joint.parent, joint.X_PF, name + "_F"),
                           Ref(joint.child, joint.X_CM, name + "_M"));
-      const bool has_axis = joint.kind != JointKind::kFixed &&
-                            joint.kind != JointKind::kSpherical && joint.kind != JointKind::kFree;
-      if (has_axis) text += ", axis: " + Triple(joint.axis);
-      if (joint.kind == JointKind::kUniversal) text += ", axis2: " + Triple(joint.axis2);
+      const int axes = RowOf(joint.kind).axes;
+      if (axes > 0) text += ", axis: " + Triple(joint.axis);
+      if (axes > 1) text += ", axis2: " + Triple(joint.axis2);
       text += GuessAndRange(joint);
       if (joint.transmits_force_only) text += ", transmits: force";
       if (joint.closure) text += ", closure: true";
