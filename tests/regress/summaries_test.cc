@@ -114,7 +114,7 @@ TEST(Summaries, AllDriftsOfAScenarioAreOneLineWithTheWorstFirst) {
   result.drifts.push_back({"a", "a is 12 times its median", 12e-9, 1e-9, 0, ""});
   result.drifts.push_back({"b", "b is 400 times its median", 400e-9, 1e-9, 7, "run 7"});
   result.drifts.push_back({"c", "c is 30 times its median", 30e-9, 1e-9, 0, ""});
-  result.drifts.push_back({"traces", "drive forces: simulation moved"});
+  result.drifts.push_back({"traces", "drive forces: simulation moved", kNan, kNan, 0, ""});
   EXPECT_EQ(DriftLine(result),
             "b is 400 times its median; also c 30 times, a 12 times; drive forces: simulation "
             "moved; since run 7");
