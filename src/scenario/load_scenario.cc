@@ -13,7 +13,7 @@
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
-#include "scenario/set_values.h"
+#include "scenario/scenario_file.h"
 #include "scenario/settings_reader.h"
 #include "table/settings.h"
 
@@ -43,49 +43,22 @@ std::string NameWithoutUnit(const std::string& key) {
   return ParameterIn(key, [&](const std::string& plain) { return plain != key; }).name;
 }
 
-class ScenarioLoader {
+class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioResult> {
  public:
-  ScenarioLoader(const std::string& file, const ScenarioOptions& options)
-      : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
-
-  ScenarioResult Load(const std::string& text) {
-    YamlNodePtr root = yaml_.Parse(text);
-    if (root != nullptr) root = SetValues(root, options_.set, &yaml_);
-    if (root != nullptr) Read(*root);
-    ScenarioResult result;
-    result.diagnostics = PlaceSetFindings(yaml_.diagnostics(), options_.set);
-    result.diagnostics.Append(model_findings_);
-    result.diagnostics.Append(table_findings_);
-    if (result.diagnostics.has_errors() || !mechanism_) return result;
-    result.scenario = std::move(scenario_);
-    result.mechanism = std::move(mechanism_);
-    return result;
-  }
-
-  ScenarioResult LoadFile() {
-    from_file_ = true;
-    const auto text = yaml_.ReadFile();
-    if (text) return Load(*text);
-    return {{}, {}, yaml_.diagnostics()};
-  }
+  using ScenarioFile::ScenarioFile;
 
  private:
-  void Read(const YamlNode& root) {
+  void Read(const YamlNode& root) override {
     if (const YamlNode* kind = root.Find("kind"); kind != nullptr && !IsMotion(*kind)) return;
     YamlMap map(&yaml_, &root, "", kMotionScenarioKeys);
     scenario_.file = file_;
-    if (const YamlNode* description = map.Find("description")) {
-      scenario_.description = yaml_.Text(*description, "description").value_or("");
-    }
+    ReadDescription(map);
     ReadParameters(map.Find("parameters"));
     if (const YamlNode* gravity = map.Find("gravity")) {
       scenario_.gravity_W = values_.Vector(*gravity, "gravity");
     }
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     // Numbers from here on may be expressions of the model's parameters.
-    if (mechanism_) {
-      for (const Parameter& p : mechanism_->parameters) scope_.Set(p.name, p.value);
-    }
     scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
     scenario_.reference = ReadReference(&values_, map.Find("reference"));
     scenario_.simulation = ReadSimulation(&values_, map.Find("simulation"));
@@ -170,46 +143,25 @@ class ScenarioLoader {
       return;
     }
     scenario_.model_file = *model_file;
-    const LoadOptions options = ModelOptions(scenario_);
-    LoadResult loaded = LoadModel(*model_file, options);
-    model_findings_ = loaded.diagnostics;
-    // Wrong overrides alone must not hide what else is wrong with the scenario.
-    if (!loaded.mechanism && !options.overrides.empty()) loaded = LoadModel(*model_file);
-    if (!loaded.mechanism) return;
-    mechanism_ = std::move(loaded.mechanism);
-    scenario_.name = CaseName(file_, mechanism_->name);
-    if (from_file_) CheckCaseName(scenario_.name, &yaml_);
+    LoadModelWith(ModelOptions(scenario_));
+    if (mechanism_) NameTheCase();
   }
 
   // Parameters given in degrees or millimetres: what follows knows SI only.
   void UsePlainNames() {
-    for (Overrides* overrides :
-         {&scenario_.parameters, &scenario_.analytic.parameters, &scenario_.reference.parameters,
-          &scenario_.simulation.parameters}) {
-      *overrides = InPlainUnits(*overrides, *mechanism_);
-    }
+    UseSiOverrides();
     for (const auto& [name, place] : std::map(scenario_.parameter_places)) {
       scenario_.parameter_places[PlainName(name, *mechanism_).name] = place;
     }
   }
 
-  // Overrides of single witnesses must name parameters of the model, too.
   void CheckParameterNames(const YamlMap& map) {
-    const auto check = [&](const YamlEntry& entry, const std::string& path) {
-      CheckParameterName(entry, path, *mechanism_, &yaml_);
-    };
-    for (const char* section : {"analytic", "reference", "simulation"}) {
-      const YamlNode* node = map.Find(section);
-      const YamlNode* parameters = node == nullptr ? nullptr : node->Find("parameters");
-      if (parameters == nullptr) continue;
-      for (const YamlEntry& entry : parameters->entries) {
-        check(entry, std::string(section) + ".parameters");
-      }
-    }
+    CheckWitnessParameters(map);
     if (!scenario_.simulation.extrapolate) return;
     const YamlNode* node = map.Find("simulation")->Find("extrapolate")->Find("parameter");
     if (node != nullptr) {
-      check({node->text, node->line, node->column, nullptr}, "simulation.extrapolate.parameter");
+      CheckParameterName({node->text, node->line, node->column, nullptr},
+                         "simulation.extrapolate.parameter", *mechanism_, &yaml_);
     }
   }
 
@@ -328,16 +280,6 @@ class ScenarioLoader {
     }
     return hint;
   }
-
-  std::string file_;
-  bool from_file_ = false;  // and not a made-up name
-  const ScenarioOptions& options_;
-  YamlReader yaml_;
-  Scope scope_;
-  ValueReader values_;
-  Diagnostics model_findings_, table_findings_;
-  Scenario scenario_;
-  std::optional<Mechanism> mechanism_;
 };
 
 // The value of a first line "# expect: {…}", or nothing.

@@ -11,7 +11,7 @@
 #include "model_file/load_model.h"
 #include "scenario/file_parts.h"
 #include "scenario/motion_reader.h"
-#include "scenario/set_values.h"
+#include "scenario/scenario_file.h"
 #include "scenario/settings_reader.h"
 #include "scenario/stiffness_settings.h"
 
@@ -34,41 +34,19 @@ std::pair<std::string, double> WithoutUnit(const std::string& key) {
   return {key, 1.0};
 }
 
-class StiffnessLoader {
+class StiffnessLoader final
+    : public internal::ScenarioFile<StiffnessScenario, StiffnessScenarioResult> {
  public:
-  StiffnessLoader(const std::string& file, const ScenarioOptions& options)
-      : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
-
-  StiffnessScenarioResult Load(const std::string& text) {
-    YamlNodePtr root = yaml_.Parse(text);
-    if (root != nullptr) root = SetValues(root, options_.set, &yaml_);
-    if (root != nullptr) Read(*root);
-    StiffnessScenarioResult result;
-    result.diagnostics = PlaceSetFindings(yaml_.diagnostics(), options_.set);
-    result.diagnostics.Append(model_findings_);
-    if (result.diagnostics.has_errors() || !mechanism_) return result;
-    result.scenario = std::move(scenario_);
-    result.mechanism = std::move(mechanism_);
-    return result;
-  }
-
-  StiffnessScenarioResult LoadFile() {
-    from_file_ = true;
-    const auto text = yaml_.ReadFile();
-    if (text) return Load(*text);
-    return {{}, {}, yaml_.diagnostics()};
-  }
+  using ScenarioFile::ScenarioFile;
 
  private:
-  void Read(const YamlNode& root) {
+  void Read(const YamlNode& root) override {
     YamlMap map(&yaml_, &root, "", kStiffnessScenarioKeys);
     scenario_.file = file_;
     if (const YamlNode* kind = map.Required("kind")) {
       (void)yaml_.Choice(*kind, "kind", {"stiffness"});
     }
-    if (const YamlNode* description = map.Find("description")) {
-      scenario_.description = yaml_.Text(*description, "description").value_or("");
-    }
+    ReadDescription(map);
     if (const YamlNode* parameters = map.Find("parameters")) {
       scenario_.parameters = ReadOverrides(&values_, parameters, "parameters");
       scenario_.parameter_places = PlacesOf(*parameters, file_, options_.set);
@@ -76,14 +54,10 @@ class StiffnessLoader {
     if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
     ReadSettings(map);
     if (!mechanism_) return;
-    for (Overrides* overrides :
-         {&scenario_.parameters, &scenario_.analytic.parameters, &scenario_.reference.parameters,
-          &scenario_.simulation.parameters}) {
-      *overrides = InPlainUnits(*overrides, *mechanism_);
-    }
+    UseSiOverrides();
     if (const YamlNode* pose = map.Find("pose")) ReadPose(*pose);
     if (const YamlNode* output = map.Find("output")) ReadOutput(*output);
-    CheckParameters(map);
+    if (mechanism_) CheckWitnessParameters(map);
     if (!scenario_.analytic.on && !scenario_.reference.on && !scenario_.simulation.on) {
       yaml_.Error(root, "analytic, reference and simulation are all off");
     }
@@ -103,8 +77,7 @@ class StiffnessLoader {
     scenario_.model_file = *model;
     LoadWith(scenario_.parameters);
     if (!mechanism_) return;
-    scenario_.name = CaseName(file_, mechanism_->name);
-    if (from_file_) CheckCaseName(scenario_.name, &yaml_);
+    NameTheCase();
     if (mechanism_->beams.empty() && !HasServos()) {
       yaml_.Error(node, fmt::format("mechanism: {} is rigid: it has no beams and no drive with a "
                                     "stiffness",
@@ -116,13 +89,7 @@ class StiffnessLoader {
     LoadOptions options;
     options.overrides = overrides;
     options.override_places = scenario_.parameter_places;
-    LoadResult loaded = LoadModel(scenario_.model_file, options);
-    model_findings_ = loaded.diagnostics;
-    // Wrong overrides alone must not hide what else is wrong with the scenario.
-    if (!loaded.mechanism && !overrides.empty()) loaded = LoadModel(scenario_.model_file);
-    mechanism_ = std::move(loaded.mechanism);
-    if (!mechanism_) return;
-    for (const Parameter& p : mechanism_->parameters) scope_.Set(p.name, p.value);
+    LoadModelWith(options);
   }
 
   bool HasServos() const {
@@ -193,29 +160,6 @@ class StiffnessLoader {
     const auto choice = yaml_.Choice(node, "output", names);
     if (choice) scenario_.output = names[static_cast<size_t>(*choice)];
   }
-
-  // Overrides of single witnesses must name parameters of the model, too.
-  void CheckParameters(const YamlMap& map) {
-    if (!mechanism_) return;
-    for (const char* section : {"analytic", "reference", "simulation"}) {
-      const YamlNode* node = map.Find(section);
-      const YamlNode* parameters = node == nullptr ? nullptr : node->Find("parameters");
-      if (parameters == nullptr) continue;
-      for (const YamlEntry& entry : parameters->entries) {
-        CheckParameterName(entry, std::string(section) + ".parameters", *mechanism_, &yaml_);
-      }
-    }
-  }
-
-  std::string file_;
-  bool from_file_ = false;  // and not a made-up name
-  const ScenarioOptions& options_;
-  YamlReader yaml_;
-  Scope scope_;
-  ValueReader values_;
-  Diagnostics model_findings_;
-  StiffnessScenario scenario_;
-  std::optional<Mechanism> mechanism_;
 };
 
 }  // namespace
