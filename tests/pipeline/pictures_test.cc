@@ -48,7 +48,9 @@ TEST(Pictures, ARunThatBreaksOffIsDrawnAsFarAsItCame) {
   run.trace.Reset({0.0, 1.0, 2.0, 3.0}, {});
   run.X_WB = {m.X_WB_home, m.X_WB_home, {}, {}};
   Scenario scenario;
-  scenario.snapshots = {.times_s = {0.0, 3.0}, .size_px = {64, 48}, .path_output = 0};
+  scenario.snapshots.times_s = {0.0, 3.0};
+  scenario.snapshots.size_px = {64, 48};
+  scenario.snapshots.path_output = 0;
   std::vector<PictureFile> files;
   const RunSummary drawn = DrawSnapshots(scenario, m, run, {}, {}, &files);
   ASSERT_TRUE(drawn.ok()) << drawn.message;
