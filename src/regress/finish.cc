@@ -9,9 +9,9 @@
 #include <sstream>
 
 #include "core/files.h"
+#include "core/in_children.h"
 #include "regress/accuracy.h"
 #include "regress/history.h"
-#include "regress/in_children.h"
 #include "regress/summaries.h"
 #include "scenario/load_scenario.h"
 #include "scenario/stiffness_scenario.h"
@@ -135,8 +135,9 @@ void FinishNight(const RegressOptions& options, const RunFolder& folder, Regress
     keep(document, text ? WriteFile(document, FillAccuracyTables(*text, summary))
                         : fmt::format("{}: cannot be read", document));
   }
+  // What merge reads is about whole results; the page says so as long as the rest is not.
+  write("regress.json", ToJson(report));
   write("index.html", ToIndexHtml(report, thumbnails));
-  write("regress.json", ToJson(report));  // last: what merge reads is about whole results
   if (whole) folder.Finished();
   outcome->exit_code = outcome->trouble.empty() ? ExitCodeOf(report) : 2;
 }
