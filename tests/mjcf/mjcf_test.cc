@@ -290,7 +290,7 @@ TEST(Mjcf, MoreKeysComeBehindHome) {
     EXPECT_TRUE(warnings.empty());
     EXPECT_EQ(m->key_time[1], 0.5);
     EXPECT_EQ(m->key_qpos[m->nq], qpos[0]);
-    if (m->nu == 3) EXPECT_EQ(m->key_ctrl[m->nu + 1], 1.125);
+    EXPECT_TRUE(m->nu == 1 || m->key_ctrl[m->nu + 1] == 1.125);
   }
 }
 
