@@ -9,6 +9,7 @@
 #include "cli/terminal.h"
 #include "model_file/load_model.h"
 #include "pipeline/check_file.h"
+#include "pipeline/load_robot.h"
 #include "pipeline/model_text.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
@@ -68,7 +69,7 @@ int Model(const ModelArguments& arguments) {
                   ModelHint(arguments.model, "."));
   }
   const InputWatch inputs;
-  const LoadResult loaded = LoadModel(*file, options);
+  const LoadResult loaded = LoadRobot(*file, options);
   SayText(stderr, loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
   const ModelFormat format = FormatOf(arguments.format);
@@ -157,7 +158,8 @@ void ListScenarios() {
 void AddModelCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<ModelArguments>();
   CLI::App* model = app->add_subcommand("model", "Mobility report, or the generated MJCF or URDF");
-  model->add_option("model", arguments->model, "model name, model.yaml or .urdf file")->required();
+  model->add_option("model", arguments->model, "model name, model.yaml, .urdf or MJCF (.xml) file")
+      ->required();
   model
       ->add_option("--format", arguments->format,
                    "text (mobility report), json (the same for programs), or the model as mjcf, "

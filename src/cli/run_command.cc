@@ -12,6 +12,7 @@
 #include "core/demand.h"
 #include "core/files.h"
 #include "pipeline/default_setup.h"
+#include "pipeline/load_robot.h"
 #include "pipeline/out_of_memory.h"
 #include "pipeline/run_scenario.h"
 #include "report/stiffness_report.h"
@@ -143,7 +144,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<RunArguments>();
   CLI::App* run = app->add_subcommand("run", "Compare analytic, reference and simulated forces");
   run->add_option("scenario", arguments->scenarios,
-                  "scenario files, folders of them, or robots (.urdf)")
+                  "scenario files, folders of them, or robots (.urdf, MJCF as .xml)")
       ->required();
   run->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   run->add_option("--mode", arguments->mode, "overrides the scenario's simulation mode")

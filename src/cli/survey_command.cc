@@ -9,8 +9,8 @@
 #include "cli/files.h"
 #include "cli/terminal.h"
 #include "core/files.h"
+#include "core/in_children.h"
 #include "pipeline/survey.h"
-#include "regress/in_children.h"
 
 namespace mbv {
 namespace {
@@ -67,12 +67,25 @@ int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& 
   return exit_code;
 }
 
+// Not all XML is MJCF; parts of models that others include are no robots either.
+bool IsModel(const std::string& file) {
+  if (!file.ends_with(".xml")) return true;
+  const auto text = ReadWholeFile(file);
+  return text && text->find("<mujoco") != std::string::npos &&
+         text->find("<worldbody") != std::string::npos;
+}
+
 int Survey(const SurveyArguments& arguments) {
   std::vector<std::string> unread;
-  const std::vector<std::string> files = FilesBelow(arguments.folder, ".urdf", &unread);
+  std::vector<std::string> files;
+  for (const char* ending : {".urdf", ".xml"}) {
+    for (const std::string& file : FilesBelow(arguments.folder, ending, &unread)) {
+      if (IsModel(file)) files.push_back(file);
+    }
+  }
   for (const std::string& line : unread) Say(stderr, "{}\n", line);
   if (files.empty()) {
-    Say(stderr, "{}: error: no *.urdf file in this folder\n", arguments.folder);
+    Say(stderr, "{}: error: no *.urdf and no MJCF file in this folder\n", arguments.folder);
     return 2;
   }
   const ScratchFolder scratch;
@@ -98,7 +111,7 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<SurveyArguments>();
   CLI::App* survey = app->add_subcommand(
       "survey", "All robots below a folder: do they load, close and agree in a first motion?");
-  survey->add_option("folder", arguments->folder, "folder with .urdf files")->required();
+  survey->add_option("folder", arguments->folder, "folder with .urdf and MJCF files")->required();
   survey->add_option("--out", arguments->out, "folder for survey.csv and survey.html");
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
       ->check(CLI::PositiveNumber)

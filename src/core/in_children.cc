@@ -1,4 +1,4 @@
-#include "regress/in_children.h"
+#include "core/in_children.h"
 
 #include <fcntl.h>
 #include <poll.h>

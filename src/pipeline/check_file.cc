@@ -2,6 +2,7 @@
 
 #include "analytic/closed_form.h"
 #include "model_file/load_model.h"
+#include "pipeline/load_robot.h"
 #include "pipeline/prepare.h"
 #include "pipeline/stiffness.h"
 
@@ -10,7 +11,7 @@ namespace {
 
 // The model, and whether the closed form of its name covers it.
 Diagnostics CheckModel(const std::string& file) {
-  LoadResult loaded = LoadModel(file);
+  LoadResult loaded = LoadRobot(file);
   if (!loaded.mechanism) return std::move(loaded.diagnostics);
   for (Finding& finding : FindUncovered(*loaded.mechanism)) {
     finding.file = file;

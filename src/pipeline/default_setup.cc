@@ -9,8 +9,8 @@
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
 #include "mechanism/reach.h"
-#include "model_file/load_model.h"
 #include "model_file/write_model.h"
+#include "pipeline/load_robot.h"
 #include "pipeline/ranges.h"
 #include "reference/reference.h"
 
@@ -216,8 +216,6 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
 
 }  // namespace
 
-bool IsRobotFile(const std::string& file) { return file.ends_with(".urdf"); }
-
 Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::string>* notes) {
   Mechanism m = mechanism;
   std::vector<std::string> held;
@@ -278,7 +276,7 @@ FirstMotion FindFirstMotion(const Mechanism& mechanism, const std::vector<std::s
 DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
                                     const std::string& model_ref) {
   DefaultSetupResult result;
-  LoadResult loaded = LoadModel(file);
+  LoadResult loaded = LoadRobot(file);
   result.diagnostics = loaded.diagnostics;
   if (!loaded.mechanism) return result;
   DefaultSetup setup;

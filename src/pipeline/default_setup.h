@@ -35,9 +35,6 @@ struct FirstMotion {
 [[nodiscard]] FirstMotion FindFirstMotion(const Mechanism& mechanism,
                                           const std::vector<std::string>& resting);
 
-/// Whether a file is a robot of a foreign format, by its name.
-[[nodiscard]] bool IsRobotFile(const std::string& file);
-
 /// The files to go on from.
 struct DefaultSetup {
   std::string model;     ///< model.yaml
@@ -49,7 +46,7 @@ struct DefaultSetupResult {
   std::optional<DefaultSetup> setup;  ///< empty after errors
   Diagnostics diagnostics;
 };
-/// `file`: anything LoadModel() takes. `name`: of the model; "": its own. `model_ref`: how the
+/// `file`: anything LoadRobot() takes. `name`: of the model; "": its own. `model_ref`: how the
 /// scenario names the model.
 [[nodiscard]] DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
                                                   const std::string& model_ref);

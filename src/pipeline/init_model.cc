@@ -16,6 +16,7 @@
 #include "core/names.h"
 #include "core/word_hints.h"
 #include "pipeline/default_setup.h"
+#include "pipeline/load_robot.h"
 
 namespace mbv {
 namespace {

@@ -12,8 +12,9 @@
 #include "core/text.h"
 #include "kinematics/constraints.h"
 #include "kinematics/mobility.h"
-#include "model_file/load_model.h"
+#include "mechanism/joint_pose.h"
 #include "pipeline/default_setup.h"
+#include "pipeline/load_robot.h"
 #include "pipeline/run_scenario.h"
 #include "report/html_text.h"
 
@@ -86,7 +87,7 @@ bool RunMode(const std::string& scenario, const char* mode, double* nrmse, Surve
 
 void Survey(const std::string& file, const std::string& scratch, SurveyRow* row) {
   // The robot as it is, before drives are added to it.
-  LoadResult loaded = LoadModel(file);
+  LoadResult loaded = LoadRobot(file);
   if (!loaded.mechanism) {
     row->message = FirstError(loaded.diagnostics);
     const bool open = row->message.find("does not close") != std::string::npos;

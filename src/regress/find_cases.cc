@@ -8,9 +8,9 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/in_children.h"
 #include "core/names.h"
 #include "core/word_hints.h"
-#include "regress/in_children.h"
 #include "scenario/find_model.h"
 #include "scenario/stiffness_scenario.h"
 

@@ -37,7 +37,8 @@ std::optional<fs::path> ShippedFolder() {
 }
 
 bool IsModelPath(const std::string& name) {
-  return name.find('/') != std::string::npos || name.ends_with(".yaml") || name.ends_with(".urdf");
+  return name.find('/') != std::string::npos || name.ends_with(".yaml") ||
+         name.ends_with(".urdf") || name.ends_with(".xml");
 }
 
 fs::path Absolute(const fs::path& path) {

@@ -4,9 +4,9 @@
 
 #include <nlohmann/json.hpp>
 
+#include "core/in_children.h"
 #include "fake_worker.h"
 #include "regress/history.h"
-#include "regress/in_children.h"
 #include "tests/kill_at_calls.h"
 
 namespace mbv {

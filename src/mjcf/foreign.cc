@@ -1,0 +1,248 @@
+#include "mjcf/foreign.h"
+
+#include <fmt/format.h>
+#include <tinyxml2.h>
+
+#include <regex>
+#include <set>
+#include <vector>
+
+#include "core/files.h"
+
+namespace mbv::mjcf {
+namespace {
+
+namespace fs = std::filesystem;
+using tinyxml2::XMLDocument;
+using tinyxml2::XMLElement;
+
+constexpr int kDeepest = 200;  // nesting of elements
+
+// Calls visit(element) on all elements below, deepest last.
+template <typename Visit>
+void ForEach(XMLElement* element, const Visit& visit) {
+  for (XMLElement* e = element->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
+    visit(e);
+    ForEach(e, visit);
+  }
+}
+
+bool IsTag(const XMLElement* element, const char* tag) {
+  return std::string_view(element->Name()) == tag;
+}
+
+int DepthOf(const XMLElement* element) {
+  int deepest = 0;
+  for (const XMLElement* e = element->FirstChildElement(); e != nullptr;
+       e = e->NextSiblingElement()) {
+    deepest = std::max(deepest, 1 + DepthOf(e));
+  }
+  return deepest;
+}
+
+}  // namespace
+
+struct ForeignMjcf::Impl {
+  XMLDocument document;
+  fs::path file, folder;
+  Diagnostics* diagnostics = nullptr;
+  bool good = false;
+
+  void Add(Severity severity, int line, const std::string& text, const std::string& hint = "") {
+    diagnostics->Add({severity, file.string(), line, line > 0 ? 1 : 0, text, hint});
+    if (severity == Severity::kError) good = false;
+  }
+
+  XMLElement* root() { return document.RootElement(); }
+
+  // The path of a file that the model names, if it lies below the model's folder.
+  [[nodiscard]] bool IsBelow(const fs::path& path) const {
+    std::error_code error;
+    const fs::path base = fs::weakly_canonical(folder, error);
+    const fs::path inside = fs::weakly_canonical(path, error).lexically_relative(base);
+    return !error && !inside.empty() && *inside.begin() != "..";
+  }
+
+  void Parse(const std::string& text) {
+    good = true;
+    if (document.Parse(text.c_str(), text.size()) != tinyxml2::XML_SUCCESS) {
+      Add(Severity::kError, document.ErrorLineNum(),
+          fmt::format("no XML: {}", document.ErrorName()));
+      return;
+    }
+    if (root() == nullptr || !IsTag(root(), "mujoco")) {
+      Add(Severity::kError, 0, "no MJCF: the root element is not <mujoco>");
+      return;
+    }
+    if (DepthOf(root()) > kDeepest) {
+      Add(Severity::kError, 0, fmt::format("elements are nested deeper than {}", kDeepest));
+    }
+  }
+
+  void TakeIncludes() {
+    constexpr int kMost = 100;
+    for (int taken = 0; good && taken <= kMost; ++taken) {
+      XMLElement* found = nullptr;
+      ForEach(root(), [&](XMLElement* e) {
+        if (found == nullptr && IsTag(e, "include")) found = e;
+      });
+      if (found == nullptr) return;
+      if (taken == kMost) {
+        Add(Severity::kError, found->GetLineNum(), fmt::format("more than {} includes", kMost));
+        return;
+      }
+      TakeInclude(found);
+    }
+  }
+
+  void TakeInclude(XMLElement* include) {
+    const char* name = include->Attribute("file");
+    const fs::path path = folder / (name == nullptr ? "" : name);
+    const auto text = IsBelow(path) ? ReadWholeFile(path) : std::nullopt;
+    XMLDocument other;
+    if (!text || other.Parse(text->c_str(), text->size()) != tinyxml2::XML_SUCCESS ||
+        other.RootElement() == nullptr || DepthOf(other.RootElement()) > kDeepest) {
+      Add(Severity::kError, include->GetLineNum(),
+          fmt::format("include '{}' cannot be read", name == nullptr ? "" : name),
+          "it must be an XML file in the model's folder or below");
+      return;
+    }
+    tinyxml2::XMLNode* parent = include->Parent();
+    tinyxml2::XMLNode* last = include;
+    for (const XMLElement* e = other.RootElement()->FirstChildElement(); e != nullptr;
+         e = e->NextSiblingElement()) {
+      last = parent->InsertAfterChild(last, e->DeepClone(&document));
+    }
+    document.DeleteNode(include);
+  }
+
+  // Sections that dynamics do not need.
+  void DropPictures() {
+    std::vector<XMLElement*> geoms, others;
+    int meshes = 0;
+    ForEach(root(), [&](XMLElement* e) {
+      for (const char* attribute : {"material", "texture"}) e->DeleteAttribute(attribute);
+      if (IsTag(e, "geom") && e->Attribute("mesh") != nullptr) {
+        const auto* body = e->Parent()->ToElement();
+        if (body != nullptr && body->FirstChildElement("inertial") != nullptr) geoms.push_back(e);
+      }
+      const bool in_assets = e->Parent() != nullptr && e->Parent()->ToElement() != nullptr &&
+                             IsTag(e->Parent()->ToElement(), "asset");
+      if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
+        others.push_back(e);
+      }
+      if (e->Parent() == root() && (IsTag(e, "visual") || IsTag(e, "sensor"))) others.push_back(e);
+    });
+    meshes = static_cast<int>(geoms.size());
+    for (XMLElement* e : geoms) document.DeleteNode(e);
+    for (XMLElement* e : others) document.DeleteNode(e);
+    if (meshes > 0) {
+      Add(Severity::kWarning, 0, fmt::format("{} meshes are left out of the pictures", meshes),
+          "boxes, cylinders, capsules and spheres are drawn");
+    }
+    DropUnusedMeshes();
+  }
+
+  void DropUnusedMeshes() {
+    std::set<std::string> used;
+    std::vector<XMLElement*> unused;
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "geom") && e->Attribute("mesh") != nullptr) used.insert(e->Attribute("mesh"));
+    });
+    ForEach(root(), [&](XMLElement* e) {
+      const auto* parent = e->Parent()->ToElement();
+      if (!IsTag(e, "mesh") || parent == nullptr || !IsTag(parent, "asset")) return;
+      std::string name = e->Attribute("name") == nullptr ? "" : e->Attribute("name");
+      const char* from = e->Attribute("file");
+      if (name.empty() && from != nullptr) name = fs::path(from).stem().string();
+      if (used.count(name) == 0) {
+        unused.push_back(e);
+      } else if (from != nullptr && !IsBelow(MeshFolder() / from)) {
+        Add(Severity::kError, e->GetLineNum(),
+            fmt::format("mesh '{}' lies outside the model's folder", from));
+      }
+    });
+    for (XMLElement* e : unused) document.DeleteNode(e);
+  }
+
+  fs::path MeshFolder() {
+    const XMLElement* compiler = root()->FirstChildElement("compiler");
+    const char* meshes = compiler == nullptr ? nullptr : compiler->Attribute("meshdir");
+    return meshes == nullptr ? folder : folder / meshes;
+  }
+
+  void MakeFoldersAbsolute() {
+    std::error_code error;
+    const std::string meshes = fs::absolute(MeshFolder(), error).lexically_normal().string();
+    XMLElement* compiler = root()->FirstChildElement("compiler");
+    if (compiler == nullptr) {
+      compiler = document.NewElement("compiler");
+      root()->InsertFirstChild(compiler);
+    }
+    compiler->SetAttribute("meshdir", meshes.c_str());
+  }
+};
+
+ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnostics* diagnostics)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->file = file;
+  impl_->folder = file.parent_path();
+  impl_->diagnostics = diagnostics;
+  impl_->Parse(text);
+  if (ok()) impl_->TakeIncludes();
+  if (ok()) impl_->DropPictures();
+  if (ok()) impl_->MakeFoldersAbsolute();
+}
+
+ForeignMjcf::~ForeignMjcf() = default;
+
+bool ForeignMjcf::ok() const { return impl_->good; }
+
+std::string ForeignMjcf::Text() const {
+  tinyxml2::XMLPrinter printer;
+  impl_->document.Print(&printer);
+  return printer.CStr();
+}
+
+std::string ForeignMjcf::ModelName() const {
+  const char* name = impl_->root()->Attribute("model");
+  return name == nullptr ? "" : name;
+}
+
+bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
+  static const std::regex attribute_is("unrecognized attribute: '([^']*)'");
+  static const std::regex element_is("Element '([^']*)'");
+  std::smatch element, attribute;
+  if (!std::regex_search(message, element, element_is)) return false;
+  const std::string tag = element[1];
+  if (std::regex_search(message, attribute, attribute_is)) {
+    const std::string name = attribute[1];
+    int count = 0, line = 0;
+    ForEach(impl_->root(), [&](XMLElement* e) {
+      if (!IsTag(e, tag.c_str()) || e->Attribute(name.c_str()) == nullptr) return;
+      // Ranges limit where this is said to be so by default.
+      if (count++ == 0) line = e->GetLineNum();
+      e->DeleteAttribute(name.c_str());
+    });
+    if (count == 0) return false;
+    impl_->Add(
+        Severity::kWarning, line,
+        fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left out", name,
+                    tag, count));
+    return true;
+  }
+  if (message.find("unrecognized element") == std::string::npos) return false;
+  std::vector<XMLElement*> dropped;
+  ForEach(impl_->root(), [&](XMLElement* e) {
+    if (IsTag(e, tag.c_str())) dropped.push_back(e);
+  });
+  if (dropped.empty()) return false;
+  impl_->Add(Severity::kWarning, dropped.front()->GetLineNum(),
+             fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out", tag,
+                         dropped.size()));
+  // One at a time: an element may lie inside another of its kind.
+  impl_->document.DeleteNode(dropped.front());
+  return true;
+}
+
+}  // namespace mbv::mjcf
