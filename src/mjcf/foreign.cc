@@ -116,7 +116,7 @@ struct ForeignMjcf::Impl {
     document.DeleteNode(include);
   }
 
-  // Sections that dynamics do not need.
+  // What dynamics without contacts do not need.
   void DropPictures() {
     std::vector<XMLElement*> geoms, others;
     int meshes = 0;
@@ -131,7 +131,10 @@ struct ForeignMjcf::Impl {
       if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
         others.push_back(e);
       }
-      if (e->Parent() == root() && (IsTag(e, "visual") || IsTag(e, "sensor"))) others.push_back(e);
+      if (e->Parent() != root()) return;
+      for (const char* section : {"visual", "sensor", "contact"}) {
+        if (IsTag(e, section)) others.push_back(e);
+      }
     });
     meshes = static_cast<int>(geoms.size());
     for (XMLElement* e : geoms) document.DeleteNode(e);
@@ -171,6 +174,8 @@ struct ForeignMjcf::Impl {
     return meshes == nullptr ? folder : folder / meshes;
   }
 
+  bool DropWeightlessGeoms(const std::string& message);
+
   void MakeFoldersAbsolute() {
     std::error_code error;
     const std::string meshes = fs::absolute(MeshFolder(), error).lexically_normal().string();
@@ -209,7 +214,32 @@ std::string ForeignMjcf::ModelName() const {
   return name == nullptr ? "" : name;
 }
 
+// MuJoCo 2.2 wants mass of every geom of a body that does not state its own.
+bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& message) {
+  static const std::regex body_is("body mass is too small.*\\n?.*Object name = ([^,]*),");
+  std::smatch name;
+  if (!std::regex_search(message, name, body_is)) return false;
+  std::vector<XMLElement*> geoms;
+  int line = 0;
+  ForEach(root(), [&](XMLElement* e) {
+    if (!IsTag(e, "body") || e->Attribute("name") == nullptr || name[1] != e->Attribute("name")) {
+      return;
+    }
+    line = e->GetLineNum();
+    for (XMLElement* g = e->FirstChildElement("geom"); g != nullptr;
+         g = g->NextSiblingElement("geom")) {
+      geoms.push_back(g);
+    }
+  });
+  for (XMLElement* geom : geoms) document.DeleteNode(geom);
+  if (geoms.empty()) return false;
+  Add(Severity::kWarning, line,
+      fmt::format("body '{}' has no mass: its {} geoms are left out", name[1].str(), geoms.size()));
+  return true;
+}
+
 bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
+  if (impl_->DropWeightlessGeoms(message)) return true;
   static const std::regex attribute_is("unrecognized attribute: '([^']*)'");
   static const std::regex element_is("Element '([^']*)'");
   std::smatch element, attribute;
@@ -220,7 +250,6 @@ bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
     int count = 0, line = 0;
     ForEach(impl_->root(), [&](XMLElement* e) {
       if (!IsTag(e, tag.c_str()) || e->Attribute(name.c_str()) == nullptr) return;
-      // Ranges limit where this is said to be so by default.
       if (count++ == 0) line = e->GetLineNum();
       e->DeleteAttribute(name.c_str());
     });

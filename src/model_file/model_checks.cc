@@ -168,6 +168,8 @@ void ModelReader::ReportGaps(const HomeResult& home, const std::string& hint) {
     const bool turned = !(gap.rotation_rad <= home.tolerance);
     if (in_place && !turned) continue;
     const Joint& joint = mechanism_.joints[gap.joint];
+    // Of a whole robot's loops the worst one tells what to do.
+    const bool told = bare_urdf_ && &gap != home.gaps.data();
     std::string text = fmt::format("the loop at joint '{}' does not close: gap", joint.name);
     if (!in_place) text += fmt::format(" {:.3g} m", gap.position_m);
     if (turned) text += fmt::format(" {:.3g} rad", gap.rotation_rad);
@@ -178,7 +180,8 @@ void ModelReader::ReportGaps(const HomeResult& home, const std::string& hint) {
       Finding finding = urdf->second;
       finding.message = text;
       finding.hint =
-          hint + "; guesses of URDF joints stand in the model file under `urdf: {guess: …}`";
+          told ? ""
+               : hint + "; guesses of URDF joints stand in the model file under `urdf: {guess: …}`";
       other_findings_.Add(finding);
     } else {
       yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0, text, hint);

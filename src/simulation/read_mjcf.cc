@@ -130,6 +130,7 @@ class MjcfImporter {
                             m_.jnt_range[2 * j + 1] - m_.qpos0[at]};
         }
         if (m_.qpos0[at] != 0.0) shifted_.push_back(joint.name);
+        if (m_.nkey == 0) StartInside(&joint);
         break;
       case mjJNT_BALL: {
         joint.kind = JointKind::kSpherical;
@@ -149,6 +150,18 @@ class MjcfImporter {
     joint.guess = joint.home;
     joint_index_[static_cast<size_t>(j)] = static_cast<int>(mechanism_.joints.size());
     mechanism_.joints.push_back(joint);
+  }
+
+  // Without a pose of the file, the zero of a joint may be far from where it works: a stretched
+  // leg.
+  void StartInside(Joint* joint) {
+    constexpr double kShare = 0.2;  // of the range, from its near end
+    const CoordinateRange& range = joint->range[0];
+    const double width = range.upper - range.lower;
+    if (joint->home[0] >= range.lower && joint->home[0] <= range.upper) return;
+    joint->home[0] =
+        joint->home[0] < range.lower ? range.lower + kShare * width : range.upper - kShare * width;
+    moved_.push_back(joint->name);
   }
 
   void AddEquality(int e) {
@@ -290,6 +303,10 @@ class MjcfImporter {
       Say("positions of these joints count from the file's reference (ref): " +
           Joined(shifted_, kMost));
     }
+    if (!moved_.empty()) {
+      Say("zero is beyond the range of these joints, the loops are closed from inside it: " +
+          Joined(moved_, kMost));
+    }
     if (touching_) Say("there are no contacts here: geoms do not touch");
     if (m_.nkey > 0) {
       Say(fmt::format("the loops are closed from the keyframe '{}'",
@@ -304,7 +321,7 @@ class MjcfImporter {
   const mjtNum* qpos_ = nullptr;  // pose of the file
   std::vector<int> index_;        // per MuJoCo body
   std::vector<int> joint_index_;  // per MuJoCo joint
-  std::vector<std::string> held_, geared_, shifted_;
+  std::vector<std::string> held_, geared_, shifted_, moved_;
   bool touching_ = false;
 };
 
