@@ -16,7 +16,7 @@
 namespace mbv {
 namespace {
 
-LoadResult Load(const std::string& text) { return LoadModelText(text, "m.yaml", {}); }
+LoadResult LoadText(const std::string& text) { return LoadModelText(text, "m.yaml", {}); }
 
 // The four-bar with its second pivot out of the plane and its axis askew by `size`.
 std::string RoundedFourBar(double size, const std::string& head = "") {
@@ -40,15 +40,15 @@ std::string Tolerance(double size) { return fmt::format("closure_tolerance: {}\n
 
 TEST(RoundedData, AreNamedAsThatAndRefusedWithoutATolerance) {
   for (const double size : {1e-10, 1e-6, 1e-3}) {
-    const std::string four_bar = Load(RoundedFourBar(size)).diagnostics.Text();
+    const std::string four_bar = LoadText(RoundedFourBar(size)).diagnostics.Text();
     EXPECT_NE(four_bar.find("overconstrained by 3 and closed except for"), std::string::npos)
         << size << ": " << four_bar;
     EXPECT_NE(four_bar.find("rounded data?"), std::string::npos) << four_bar;
-    const std::string bricard = Load(RoundedBricard(size)).diagnostics.Text();
+    const std::string bricard = LoadText(RoundedBricard(size)).diagnostics.Text();
     EXPECT_NE(bricard.find("overconstrained by 1 and closed except for"), std::string::npos)
         << size << ": " << bricard;
     // A tolerance that is too small changes nothing.
-    EXPECT_FALSE(Load(RoundedFourBar(size, "closure_tolerance: 1e-12\n")).mechanism);
+    EXPECT_FALSE(LoadText(RoundedFourBar(size, "closure_tolerance: 1e-12\n")).mechanism);
   }
 }
 
@@ -67,26 +67,26 @@ void ExpectProjected(const LoadResult& loaded, double size, int redundant) {
 
 TEST(RoundedData, AreProjectedUpToTheStatedTolerance) {
   for (const double size : {1e-10, 1e-8, 1e-6, 1e-4, 1e-3}) {
-    ExpectProjected(Load(RoundedFourBar(size, Tolerance(size))), size, 3);
+    ExpectProjected(LoadText(RoundedFourBar(size, Tolerance(size))), size, 3);
   }
   for (const double size : {1e-10, 1e-8, 1e-6, 1e-5, 1e-4, 3e-4, 1e-3, 3e-3}) {
-    ExpectProjected(Load(RoundedBricard(size, Tolerance(size))), size, 1);
+    ExpectProjected(LoadText(RoundedBricard(size, Tolerance(size))), size, 1);
   }
 }
 
 TEST(RoundedData, AWrongLengthIsNoRounding) {
   const std::string text = Replaced(kFourBar, "rocker:\n    frames: {foot: {}, end: [crank, 0, 0]}",
                                     "rocker:\n    frames: {foot: {}, end: [crank, 0, 0.05]}");
-  const std::string said = Load("closure_tolerance: 1\n" + text).diagnostics.Text();
+  const std::string said = LoadText("closure_tolerance: 1\n" + text).diagnostics.Text();
   EXPECT_NE(said.find("does not close"), std::string::npos) << said;
   EXPECT_EQ(said.find("rounded"), std::string::npos) << said;
 }
 
 TEST(ImpossibleInertia, IsTakenIfTheModelAllowsItAndNamedLoudly) {
   const std::string text = Replaced(kFourBar, "zz: 0.02", "zz: 0.2");
-  EXPECT_FALSE(Load(text).mechanism);
+  EXPECT_FALSE(LoadText(text).mechanism);
   for (const char* allow : {"allow: impossible_inertia\n", "allow: [impossible_inertia]\n"}) {
-    const LoadResult loaded = Load(allow + text);
+    const LoadResult loaded = LoadText(allow + text);
     ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
     EXPECT_NE(loaded.diagnostics.Text().find(
                   "bodies.crank: ALLOWED BY THE MODEL: impossible inertia of crank"),
@@ -94,7 +94,7 @@ TEST(ImpossibleInertia, IsTakenIfTheModelAllowsItAndNamedLoudly) {
         << loaded.diagnostics.Text();
     EXPECT_EQ(loaded.mechanism->bodies[1].I_Bcm_B(2, 2), 0.2);
   }
-  const std::string said = Load("allow: impossible_mass\n" + text).diagnostics.Text();
+  const std::string said = LoadText("allow: impossible_mass\n" + text).diagnostics.Text();
   EXPECT_NE(said.find("impossible_inertia"), std::string::npos) << said;
 }
 
@@ -104,7 +104,7 @@ TEST(ManyBodies, FiveHundredAreRead) {
       "    joints: {hinge: {kind: revolute, parent: world, child: bob, axis: x}}\n"
       "instances:\n";
   for (int i = 0; i < 500; ++i) text += fmt::format("  p{}: {{part: pendulum}}\n", i);
-  const LoadResult loaded = Load(text);
+  const LoadResult loaded = LoadText(text);
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   EXPECT_EQ(loaded.mechanism->bodies.size(), 501u);
 }
