@@ -1,0 +1,215 @@
+// MJCF files as mechanisms.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+
+#include "core/spatial.h"
+#include "kinematics/mobility.h"
+#include "model_file/write_model.h"
+#include "pipeline/default_setup.h"
+#include "pipeline/load_robot.h"
+#include "pipeline/survey.h"
+
+namespace mbv {
+namespace {
+
+class MjcfFolder {
+ public:
+  explicit MjcfFolder(const std::string& name)
+      : path_(std::filesystem::temp_directory_path() / ("mbv_mjcf_" + name)) {
+    std::filesystem::remove_all(path_);
+    std::filesystem::create_directories(path_);
+  }
+  ~MjcfFolder() { std::filesystem::remove_all(path_); }
+  std::string Write(const std::string& name, const std::string& text) const {
+    std::ofstream(path_ / name) << text;
+    return (path_ / name).string();
+  }
+  [[nodiscard]] std::string Scratch() const { return (path_ / "scratch").string(); }
+
+ private:
+  std::filesystem::path path_;
+};
+
+// A four-bar linkage of sides 0.3, 0.5, 0.3, 0.5 m, upright at zero; `more` goes into <mujoco>,
+// `joint` into the crank's joint.
+std::string Linkage(const std::string& more = "", const std::string& joint = "",
+                    const std::string& base = "") {
+  return R"(<mujoco model="linkage"><compiler angle="radian"/><worldbody>
+<body name="base">)" +
+         base + R"(<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<body name="crank"><joint name="A" axis="0 1 0" )" +
+         joint + R"(/><inertial pos="0 0 0.15" mass="1" diaginertia="0.01 0.01 0.001"/>
+<site name="mark" pos="0 0 0.1"/>
+<body name="coupler" pos="0 0 0.3"><joint name="B" axis="0 1 0"/>
+<inertial pos="0.25 0 0" mass="1" diaginertia="0.001 0.02 0.02"/><geom type="box" size="0.25 0.01 0.01" pos="0.25 0 0"/></body></body>
+<body name="rocker" pos="0.5 0 0"><joint name="D" axis="0 1 0"/>
+<inertial pos="0 0 0.15" mass="1" diaginertia="0.01 0.01 0.001"/></body></body></worldbody>
+<equality><connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.3"/></equality>
+<actuator><motor name="m" joint="A"/></actuator>)" +
+         more + "</mujoco>\n";
+}
+
+LoadResult LoadText(const MjcfFolder& folder, const std::string& text) {
+  return LoadRobot(folder.Write("robot.xml", text));
+}
+
+TEST(MjcfImport, ALinkageClosedByConnectIsAMechanism) {
+  const MjcfFolder folder("linkage");
+  const LoadResult loaded = LoadText(folder, Linkage());
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  EXPECT_EQ(m.name, "linkage");
+  ASSERT_EQ(m.bodies.size(), 5u);
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  ASSERT_EQ(m.drives.size(), 1u);
+  EXPECT_EQ(m.drives[0].name, "m");
+  const Body& coupler = m.bodies[m.FindBody("coupler")];
+  EXPECT_EQ(coupler.mass, 1.0);
+  EXPECT_EQ(coupler.p_BoBcm_B, Vec3(0.25, 0, 0));
+  EXPECT_NEAR(coupler.I_Bcm_B(1, 1), 0.02, 1e-15);
+  ASSERT_EQ(coupler.shapes.size(), 1u);
+  const NamedFrame* mark = m.FindFrame(m.FindBody("crank"), "mark");
+  ASSERT_NE(mark, nullptr);
+  EXPECT_EQ(mark->X_BF.translation(), Vec3(0, 0, 0.1));
+  const Vec3 at_coupler = m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0);
+  EXPECT_LT((at_coupler - Vec3(0.5, 0, 0.3)).norm(), 1e-12);
+}
+
+TEST(MjcfImport, ItAgreesInBothModes) {
+  const MjcfFolder folder("agrees");
+  const SurveyRow row = SurveyFile(folder.Write("robot.xml", Linkage()), folder.Scratch());
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_LT(row.inverse_nrmse, 1e-10);
+  EXPECT_LT(row.forward_nrmse, 1e-6);
+}
+
+TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {
+  const MjcfFolder folder("lost");
+  const LoadResult loaded = LoadText(
+      folder,
+      Linkage("<tendon><fixed name='t'><joint joint='A' coef='1'/></fixed></tendon>",
+              "armature='0.1' damping='2' frictionloss='3' stiffness='4'", "<joint type='free'/>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const std::string said = loaded.diagnostics.Text();
+  for (const char* lost : {"armature of 1 joint is left out: A", "damping of 1 joint",
+                           "friction loss of 1 joint", "stiffness of 1 joint", "1 tendons are left",
+                           "free bodies are held where they are, fixed to the world: base"}) {
+    EXPECT_NE(said.find(lost), std::string::npos) << lost << "\n" << said;
+  }
+  const LoadResult plain = LoadText(folder, Linkage());
+  EXPECT_EQ(plain.diagnostics.Text().find("left out"), std::string::npos)
+      << plain.diagnostics.Text();
+}
+
+// What later versions know: attribute, its element, and what the finding says.
+TEST(MjcfImport, WhatOnlyNewerMuJoCoKnowsIsDroppedWithAFinding) {
+  const MjcfFolder folder("newer");
+  struct Newer {
+    const char *more, *joint, *says;
+  };
+  for (const Newer& newer :
+       {Newer{"", "actuatorfrcrange='-1 1'", "attribute 'actuatorfrcrange' of <joint> (1 times)"},
+        Newer{"<option><flag island='disable'/></option>", "", "attribute 'island' of <flag>"},
+        Newer{"<deformable/>", "", "element <deformable> (1 times)"}}) {
+    const LoadResult loaded = LoadText(folder, Linkage(newer.more, newer.joint));
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    EXPECT_NE(loaded.diagnostics.Text().find(newer.says), std::string::npos)
+        << newer.says << "\n"
+        << loaded.diagnostics.Text();
+  }
+}
+
+TEST(MjcfImport, JointsOfOneBodyBallsWeldsAndKeyframesAreRead) {
+  const MjcfFolder folder("joints");
+  const LoadResult loaded = LoadText(folder, R"(<mujoco model="arm"><compiler angle="radian"/>
+<worldbody><body name="a" pos="0 0 1" euler="0.3 0.2 -0.4">
+<joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" axis="0 0 1" pos="0 0.1 0"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="b" pos="0 0 0.5"><joint name="ball" type="ball" pos="0 0 -0.1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
+<body name="c" pos="2 0 0"><joint name="lone" axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="d" pos="0 0 0.2"><joint name="inner" axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
+</worldbody>
+<equality><weld name="w" body1="c" body2="d"/></equality>
+<keyframe><key name="home" qpos="0.2 0.5 0.9238795325112867 0 0.3826834323650898 0 0 0"/></keyframe></mujoco>)");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  // MuJoCo's kinematics by hand: the slide along the body's x, the turn about the anchor, the ball.
+  const Mat3 R0 = RotX(0.3) * RotY(0.2) * RotZ(-0.4);
+  const Vec3 anchor(0, 0.1, 0);
+  const Vec3 slid = Vec3(0, 0, 1) + R0 * Vec3(0.2, 0, 0);
+  const Vec3 p_a = slid + R0 * (anchor - RotZ(0.5) * anchor);
+  const Mat3 R_a = R0 * RotZ(0.5);
+  const Pose& X_a = m.X_WB_home[m.FindBody("a")];
+  EXPECT_LT((X_a.translation() - p_a).norm(), 1e-12);
+  EXPECT_LT((X_a.linear() - R_a).norm(), 1e-12);
+  const Mat3 R_b = R_a * RotY(std::numbers::pi / 4);
+  const Vec3 p_b = p_a + R_a * Vec3(0, 0, 0.4) + R_b * Vec3(0, 0, 0.1);
+  const Pose& X_b = m.X_WB_home[m.FindBody("b")];
+  EXPECT_LT((X_b.translation() - p_b).norm(), 1e-12);
+  EXPECT_LT((X_b.linear() - R_b).norm(), 1e-12);
+  // The weld holds the two as they are at the reference.
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 2 + 3 + 1);
+  EXPECT_NE(loaded.diagnostics.Text().find("the keyframe 'home'"), std::string::npos);
+}
+
+TEST(MjcfImport, IncludesStayInTheFolder) {
+  const MjcfFolder folder("include");
+  folder.Write("arm.xml",
+               "<mujoco><worldbody><body name='x'><joint name='j' axis='0 0 1'/><inertial pos='0 0 "
+               "0' mass='1' diaginertia='1 1 1'/></body></worldbody></mujoco>");
+  const LoadResult loaded =
+      LoadText(folder, "<mujoco model='i'><include file='arm.xml'/></mujoco>");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_GE(loaded.mechanism->FindBody("x"), 0);
+  for (const char* outside : {"../arm.xml", "/etc/hostname", "missing.xml"}) {
+    const LoadResult bad =
+        LoadText(folder, fmt::format("<mujoco model='i'><include file='{}'/></mujoco>", outside));
+    EXPECT_FALSE(bad.mechanism) << outside;
+    EXPECT_NE(bad.diagnostics.Text().find("cannot be read"), std::string::npos)
+        << bad.diagnostics.Text();
+  }
+}
+
+TEST(MjcfImport, HostileFilesAreBadInput) {
+  const MjcfFolder folder("hostile");
+  std::string deep = "<mujoco>";
+  for (int i = 0; i < 5000; ++i) deep += "<a>";
+  for (const std::string& text :
+       {std::string("<mujoco"), std::string("<robot/>"), deep, std::string("<mujoco model='x'/>"),
+        std::string("<mujoco><worldbody><body><joint type='hinge' axis='0 0 0'/></body></worldbody>"
+                    "</mujoco>"),
+        std::string("<mujoco><worldbody><geom type='sphere' size='nan'/></worldbody></mujoco>"),
+        std::string("<mujoco><equality><weld body1='q'/></equality></mujoco>")}) {
+    const LoadResult loaded = LoadText(folder, text);
+    if (!loaded.mechanism) {
+      EXPECT_TRUE(loaded.diagnostics.has_errors()) << text.substr(0, 80);
+    }
+  }
+  EXPECT_FALSE(LoadText(folder, deep).mechanism);
+}
+
+TEST(MjcfImport, TheModelThatIsWrittenReadsBackToTheSameNumbers) {
+  const MjcfFolder folder("bits");
+  const LoadResult first = LoadText(folder, Linkage("", "range='-1 1' limited='true'"));
+  ASSERT_TRUE(first.mechanism) << first.diagnostics.Text();
+  const LoadResult second = LoadModelText(WriteModel(*first.mechanism), "m.yaml");
+  ASSERT_TRUE(second.mechanism) << second.diagnostics.Text();
+  for (size_t b = 0; b < first.mechanism->bodies.size(); ++b) {
+    EXPECT_EQ(first.mechanism->bodies[b].I_Bcm_B, second.mechanism->bodies[b].I_Bcm_B);
+    EXPECT_EQ(first.mechanism->bodies[b].p_BoBcm_B, second.mechanism->bodies[b].p_BoBcm_B);
+  }
+  for (size_t j = 0; j < first.mechanism->joints.size(); ++j) {
+    const Joint &a = first.mechanism->joints[j], &b = second.mechanism->joints[j];
+    EXPECT_TRUE(a.X_PF.matrix() == b.X_PF.matrix()) << a.name;
+    EXPECT_TRUE(a.X_CM.matrix() == b.X_CM.matrix()) << a.name;
+    EXPECT_EQ(a.axis, b.axis) << a.name;
+    EXPECT_EQ(a.range[0].upper, b.range[0].upper) << a.name;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
