@@ -1,6 +1,7 @@
 // Sources are compiled several at a time (CMake's unity build): names in unnamed namespaces must
-// differ within each src/<layer> and tests/<folder>, and so must tests; no file opens a namespace
-// for those compiled after it (but within a namespace of its room, which all its files share).
+// differ within each src/<layer> and tests/<folder>, and so must tests; none is a type of a
+// header that one of the files includes, and no file opens a namespace for those compiled after it
+// (but within a namespace of its room, which all its files share).
 //   node check_names.mjs ROOT
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
@@ -65,10 +66,46 @@ function clash(one, other) {
   return !alias && !overload;
 }
 
-// `sources`: path → text. Only *.cc: headers are guarded.
-function check(sources) {
+// Types that headers declare: "mbv::Load" → header.
+function typesIn(headers) {
+  const types = {};
+  for (const [path, text] of Object.entries(headers)) {
+    let outer = '';
+    for (const line of text.split('\n')) {
+      const open = /^namespace ([\w:]+) \{$/.exec(line);
+      if (open) outer = open[1];
+      const type = /^(?:struct|class|enum(?: class)?) (\w+)\b[^;]*\{/.exec(line);
+      if (type) types[`${outer}::${type[1]}`] = path;
+    }
+  }
+  return types;
+}
+
+// The headers of src/ that a folder's sources reach, by folder.
+function reachedHeaders(sources, headers) {
+  const includes = (text) => [...text.matchAll(/^#include "([^"]+)"/gm)].map((match) => `src/${match[1]}`);
+  const reached = {};
+  for (const [path, text] of Object.entries(sources)) {
+    const folder = path.split('/').slice(0, 2).join('/');
+    const seen = (reached[folder] ??= new Set());
+    const open = includes(text);
+    while (open.length > 0) {
+      const header = open.pop();
+      if (seen.has(header) || !(header in headers)) continue;
+      seen.add(header);
+      open.push(...includes(headers[header]));
+    }
+  }
+  return reached;
+}
+
+// `sources`: path → text. Only *.cc: headers are guarded. `headers`: whose types an unnamed name
+// must leave alone, since files compiled after it may use them.
+function check(sources, headers = {}) {
   const places = {};  // folder and name → declarations
   const found = [];
+  const types = typesIn(headers);
+  const reached = reachedHeaders(sources, headers);
   for (const [path, text] of Object.entries(sources)) {
     const folder = path.split('/').slice(0, 2).join('/');
     for (const { name, kind, shape } of namesOf(text)) {
@@ -76,6 +113,7 @@ function check(sources) {
         found.push(`${path}: using namespace ${name} reaches the files compiled after it`);
       } else {
         (places[`${folder} ${name}`] ??= []).push({ path, shape });
+        if (kind === 'unnamed' && reached[folder].has(types[name])) found.push(`${path}: ${name} is a type of ${types[name]}`);
       }
     }
   }
@@ -101,6 +139,10 @@ function selfTest() {
   if (both('', 'TEST(Sum, Adds) {\n}').join() !== 'mbv::Sum.Adds is in src/a/x.cc, src/a/y.cc') return 'a test twice';
   if (check({ 'tests/a/x.cc': 'using namespace std;\n' }).length !== 1) return 'a using-directive';
   if (check({ 'src/a/x.cc': 'namespace mbv::room {\nusing namespace other;\n' }).length !== 0) return 'a directive within a room';
+  const header = { 'src/b/y.h': 'namespace mbv {\nstruct Load {\n};\n' };
+  const other = { 'src/a/z.cc': '#include "b/y.h"\n' };
+  if (check({ 'src/a/x.cc': file('int Load(int x) {'), ...other }, header).length !== 1) return 'a type of a header';
+  if (check({ 'src/a/x.cc': file('int Load(int x) {') }, header).length !== 0) return 'a type that nobody includes';
   const same = file('int Once() {');
   if (check({ 'src/a/x.cc': same, 'src/b/x.cc': same }).length !== 0) return 'one name in two layers';
   if (both('struct Row;\nusing internal::Row;\nusing Json = nlohmann::json;', 'int Shared(int x);').length !== 0) return 'declarations that may occur twice';
@@ -115,14 +157,15 @@ if (failure) {
   process.exit(1);
 }
 const root = process.argv[2];
-const sources = {};
+const sources = {}, headers = {};
 for (const top of ['src', 'tests']) {
   for (const path of readdirSync(join(root, top), { recursive: true }).sort()) {
-    if (path.endsWith('.cc') && path.includes('/') && !/^(fuzz|benchmarks|install)\//.test(path)) {
-      sources[`${top}/${path}`] = readFileSync(join(root, top, path), 'utf8');
-    }
+    const text = () => readFileSync(join(root, top, path), 'utf8');
+    if (/^(fuzz|benchmarks|install)\//.test(path) || !path.includes('/')) continue;
+    if (path.endsWith('.cc')) sources[`${top}/${path}`] = text();
+    if (top === 'src' && path.endsWith('.h')) headers[`${top}/${path}`] = text();
   }
 }
-const found = check(sources);
+const found = check(sources, headers);
 console.log(found.length > 0 ? found.join('\n') : `names differ in ${Object.keys(sources).length} sources`);
 process.exit(found.length > 0 ? 1 : 0);

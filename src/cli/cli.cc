@@ -33,7 +33,7 @@ std::string VersionText() {
 // Does not throw: standard error may be full, too.
 void Complain(const std::string& text) { std::fputs((text + "\n").c_str(), stderr); }
 
-int InternalError(const std::exception& error) {
+int SayInternalError(const std::exception& error) {
   Complain(std::string("internal error: ") + error.what());
   return 4;
 }
@@ -191,13 +191,13 @@ int RunCli(int argc, char** argv) {
     exit_code = AnswerParse(app, error);
   } catch (const std::system_error& error) {
     // This is how printing reports that it failed.
-    if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) return InternalError(error);
+    if (std::ferror(stdout) == 0 && std::ferror(stderr) == 0) return SayInternalError(error);
     lost = error.code().message();
   } catch (const std::bad_alloc&) {
     Complain("error: could not run: out of memory");
     exit_code = 3;
   } catch (const std::exception& error) {
-    return InternalError(error);
+    return SayInternalError(error);
   }
   if (std::fflush(stdout) != 0) lost = std::strerror(errno);
   if (lost.empty() && std::ferror(stdout) == 0) return exit_code;

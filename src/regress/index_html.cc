@@ -144,8 +144,8 @@ std::string Row(const CaseResult& result, const std::string& thumbnail, size_t s
 }
 
 // A list with a title; what is beyond kCasesInABox is folded away.
-std::string Box(const char* kind, const char* id, const std::string& title,
-                const std::vector<std::string>& items) {
+std::string Framed(const char* kind, const char* id, const std::string& title,
+                   const std::vector<std::string>& items) {
   if (items.empty()) return "";
   std::string html = fmt::format(
       "<section class=\"box {0}\" aria-labelledby=\"{1}\"><h2 id=\"{1}\">{2} {3}</h2>\n"
@@ -178,9 +178,9 @@ std::string Boxes(const RegressReport& report, const std::vector<const CaseResul
     missing.push_back(
         fmt::format("<b>{}</b>: {}", EscapeXml(item.key), EscapeXml(MissingText(item))));
   }
-  return Box("bad", "failed", "not as expected", failed) +
-         Box(report.fail_on_missing ? "bad" : "warn", "missing", "missing", missing) +
-         Box("warn", "drifted", "drifted", drifted);
+  return Framed("bad", "failed", "not as expected", failed) +
+         Framed(report.fail_on_missing ? "bad" : "warn", "missing", "missing", missing) +
+         Framed("warn", "drifted", "drifted", drifted);
 }
 
 std::string Head(const RegressReport& report) {

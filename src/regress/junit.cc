@@ -41,7 +41,7 @@ struct Totals {
   }
 };
 
-std::string Output(const CaseResult& result) {
+std::string OutputOf(const CaseResult& result) {
   std::string text =
       fmt::format("{}\nverdict {}, exit code {} (expected {}, {})\n", result.file, result.verdict,
                   result.exit_code, result.expected.verdict, result.expected.exit_code);
@@ -68,7 +68,7 @@ std::string TestCase(const CaseResult& result, const std::string& suite, const s
                         EscapeXml(FailureLine(result)), ToText(result.status), EscapeXml(body),
                         EscapeXml(result.log_tail));
   }
-  text += fmt::format("      <system-out>{}</system-out>\n", EscapeXml(Output(result)));
+  text += fmt::format("      <system-out>{}</system-out>\n", EscapeXml(OutputOf(result)));
   return text + "    </testcase>\n";
 }
 

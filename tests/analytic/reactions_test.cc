@@ -15,7 +15,7 @@
 namespace mbv {
 namespace {
 
-ScenarioResult Load(const std::string& scenario, const std::vector<SetValue>& set = {}) {
+ScenarioResult LoadedScenario(const std::string& scenario, const std::vector<SetValue>& set = {}) {
   ScenarioResult loaded = LoadScenario(SourcePath("/scenarios/" + scenario), {.set = set});
   EXPECT_TRUE(loaded.scenario && loaded.mechanism) << loaded.diagnostics.Text();
   return loaded;
@@ -73,7 +73,7 @@ constexpr double kAgreement = 1e-10;
 TEST(CabinReactions, EveryComponentIsTheReferences) {
   for (const char* scenario : {"default.yaml", "wrench.yaml", "sliders.yaml"}) {
     const ScenarioResult loaded =
-        Load(std::string("cabin_robot/") + scenario, {{"motion.sample_s", "0.25"}});
+        LoadedScenario(std::string("cabin_robot/") + scenario, {{"motion.sample_s", "0.25"}});
     const Difference d =
         CompareReactions(*loaded.mechanism, *loaded.mechanism, loaded.scenario->motion);
     EXPECT_LT(d.worst, kAgreement) << scenario << " " << d.where;
@@ -84,7 +84,8 @@ TEST(CabinReactions, EveryComponentIsTheReferences) {
 }
 
 TEST(CabinReactions, ABentLinkIsSeen) {
-  const ScenarioResult loaded = Load("cabin_robot/default.yaml", {{"motion.sample_s", "0.25"}});
+  const ScenarioResult loaded =
+      LoadedScenario("cabin_robot/default.yaml", {{"motion.sample_s", "0.25"}});
   for (const char* name : {"m_CD", "c_EF_x", "I_AB_z", "m_payload", "I_slewing_z"}) {
     Mechanism bent = *loaded.mechanism;
     for (Parameter& p : bent.parameters) {
@@ -123,7 +124,7 @@ TEST(CabinReactions, StrutAndHingesOfAMasslessLinkageByHand) {
 TEST(ScaraReactions, EveryComponentIsTheReferences) {
   for (const char* scenario : {"pick_place.yaml", "tool_load.yaml", "default.yaml"}) {
     const ScenarioResult loaded =
-        Load(std::string("scara_robot/") + scenario, {{"motion.sample_s", "0.01"}});
+        LoadedScenario(std::string("scara_robot/") + scenario, {{"motion.sample_s", "0.01"}});
     Motion motion = loaded.scenario->motion;
     motion.duration_s = std::min(motion.duration_s, 0.4);
     const Difference d = CompareReactions(*loaded.mechanism, *loaded.mechanism, motion);
@@ -134,7 +135,8 @@ TEST(ScaraReactions, EveryComponentIsTheReferences) {
 }
 
 TEST(ScaraReactions, ABentConstantIsSeen) {
-  const ScenarioResult loaded = Load("scara_robot/pick_place.yaml", {{"motion.sample_s", "0.01"}});
+  const ScenarioResult loaded =
+      LoadedScenario("scara_robot/pick_place.yaml", {{"motion.sample_s", "0.01"}});
   for (const char* name : {"m_p", "m_rods", "m_arm", "pivot_mass", "I_p_z"}) {
     Mechanism bent = *loaded.mechanism;
     for (Parameter& p : bent.parameters) {
@@ -148,7 +150,7 @@ TEST(ScaraReactions, ABentConstantIsSeen) {
 
 TEST(ScaraReactions, RodTensionsAtRestByHand) {
   // Half of each rod's weight goes to each end; force and yaw balance give the four tensions.
-  const ScenarioResult loaded = Load("scara_robot/static.yaml");
+  const ScenarioResult loaded = LoadedScenario("scara_robot/static.yaml");
   const scara::Parameters p = scara::ParametersOf(*loaded.mechanism);
   scara::Position position;
   ASSERT_TRUE(scara::InversePosition(p, p.home_X, &position).ok());
@@ -164,7 +166,7 @@ TEST(ScaraReactions, RodTensionsAtRestByHand) {
 
 // The bearing's force and the torque balance the arm: another way to (48).
 TEST(ScaraReactions, TorquesFollowFromTheForcesOnTheArms) {
-  const ScenarioResult loaded = Load("scara_robot/pick_place.yaml");
+  const ScenarioResult loaded = LoadedScenario("scara_robot/pick_place.yaml");
   const scara::Parameters p = scara::ParametersOf(*loaded.mechanism);
   CommandSample command;
   for (const double share : {0.2, 0.5, 0.9}) {

@@ -13,7 +13,7 @@
 namespace mbv::stabilizing_platform {
 namespace {
 
-Mechanism Load(const std::map<std::string, double>& overrides = {}) {
+Mechanism LoadWith(const std::map<std::string, double>& overrides = {}) {
   LoadOptions options;
   options.overrides = overrides;
   LoadResult loaded = LoadModel(SourcePath("/models/stabilizing_platform/model.yaml"), options);
@@ -80,51 +80,51 @@ Motion Coarse(const Mechanism& mechanism, bool hold_still) {
 }
 
 TEST(StabilizingPlatformAgainstReference, AgreesOnDrivesPosesAndReactions) {
-  const Mechanism mechanism = Load();
+  const Mechanism mechanism = LoadWith();
   ExpectAgreement(Compare(mechanism, Coarse(mechanism, false)), kChannels);
 }
 
 TEST(StabilizingPlatformAgainstReference, AgreesWithSixIndependentDrives) {
-  const Mechanism mechanism = Load();
+  const Mechanism mechanism = LoadWith();
   ExpectAgreement(Compare(mechanism, Coarse(mechanism, true)), kChannels);
 }
 
 TEST(StabilizingPlatformAgainstReference, AgreesWithMasslessLinks) {
-  const Mechanism mechanism = Load({{"link_mass_scale", 0}});
+  const Mechanism mechanism = LoadWith({{"link_mass_scale", 0}});
   ExpectAgreement(Compare(mechanism, Coarse(mechanism, false), "massless"), kChannels);
 }
 
 TEST(StabilizingPlatformAgainstReference, AgreesWithOtherParameters) {
-  const Mechanism mechanism = Load({{"theta_1", 110 * kDegree},
-                                    {"theta_2", 235 * kDegree},
-                                    {"r_a", 7.6},
-                                    {"L3", 2.3},
-                                    {"c_1", 0.4},
-                                    {"c_2", 0.6},
-                                    {"link1_inertia_scale", 0.1},
-                                    {"s_r_so", 0.3}});
+  const Mechanism mechanism = LoadWith({{"theta_1", 110 * kDegree},
+                                        {"theta_2", 235 * kDegree},
+                                        {"r_a", 7.6},
+                                        {"L3", 2.3},
+                                        {"c_1", 0.4},
+                                        {"c_2", 0.6},
+                                        {"link1_inertia_scale", 0.1},
+                                        {"s_r_so", 0.3}});
   ExpectAgreement(Compare(mechanism, Coarse(mechanism, false)), kChannels);
 }
 
 TEST(StabilizingPlatformAgainstReference, AgreesWithCentresOfMassOffTheAxes) {
-  const Mechanism mechanism = Load({{"c_p_x", 0.4},
-                                    {"c_p_y", -0.3},
-                                    {"c_p_z", 1.2},
-                                    {"c_1_x", 0.15},
-                                    {"c_1_z", -0.2},
-                                    {"c_1p_x", -0.05},
-                                    {"c_1p_z", 0.1},
-                                    {"c_2_x", 0.1},
-                                    {"c_2_z", 0.08},
-                                    {"c_2p_x", 0.12},
-                                    {"c_2p_z", -0.06}});
+  const Mechanism mechanism = LoadWith({{"c_p_x", 0.4},
+                                        {"c_p_y", -0.3},
+                                        {"c_p_z", 1.2},
+                                        {"c_1_x", 0.15},
+                                        {"c_1_z", -0.2},
+                                        {"c_1p_x", -0.05},
+                                        {"c_1p_z", 0.1},
+                                        {"c_2_x", 0.1},
+                                        {"c_2_z", 0.08},
+                                        {"c_2p_x", 0.12},
+                                        {"c_2p_z", -0.06}});
   for (bool hold_still : {false, true}) {
     ExpectAgreement(Compare(mechanism, Coarse(mechanism, hold_still)), kChannels);
   }
 }
 
 TEST(StabilizingPlatformAgainstReference, AgreesWithLoadsOnPlatformAndLinks) {
-  const Mechanism mechanism = Load();
+  const Mechanism mechanism = LoadWith();
   for (bool hold_still : {false, true}) {
     Motion motion = Coarse(mechanism, hold_still);
     auto add = [&](const char* body, const Vec3& point, bool in_body_axes) {
@@ -150,7 +150,7 @@ TEST(StabilizingPlatformAgainstReference, AgreesWithLoadsOnPlatformAndLinks) {
 
 TEST(StabilizingPlatformAgainstReference, NoticesAPlatformHeavierByAMilligram) {
   // 1 mg is 1e-5 N of weight, a fifth of it on a drive: 6 limits.
-  const Mechanism mechanism = Load();
+  const Mechanism mechanism = LoadWith();
   Mechanism bent = mechanism;
   for (Parameter& parameter : bent.parameters) {
     if (parameter.name == "m_p") parameter.value += 1e-6;
@@ -161,7 +161,7 @@ TEST(StabilizingPlatformAgainstReference, NoticesAPlatformHeavierByAMilligram) {
 }
 
 TEST(StabilizingPlatformAgainstReference, DisagreesWithThePaperText) {
-  const Mechanism mechanism = Load();
+  const Mechanism mechanism = LoadWith();
   const Motion motion = Coarse(mechanism, false);
   EXPECT_NEAR(Compare(mechanism, motion, "paper_text").by_unit.at("N"), 9.7e3, 50);
 }

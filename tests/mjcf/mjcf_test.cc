@@ -61,7 +61,7 @@ const char* const kShipped[] = {
     "stabilizing_platform", "spr_tripod", "scara_robot", "cabin_robot", "four_bar",
     "slider_crank",         "stewart"};
 
-Mechanism Load(const std::string& name) {
+Mechanism LoadNamed(const std::string& name) {
   LoadResult result = LoadModel(kModels + name + "/model.yaml");
   EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
   return result.mechanism.has_value() ? *std::move(result.mechanism) : testing::MakeFourBar();
@@ -70,7 +70,7 @@ Mechanism Load(const std::string& name) {
 // Every mechanism these tests run on.
 std::vector<Mechanism> AllMechanisms() {
   std::vector<Mechanism> all;
-  for (const char* name : kShipped) all.push_back(Load(name));
+  for (const char* name : kShipped) all.push_back(LoadNamed(name));
   all.push_back(testing::MakeFourBar());
   all.push_back(testing::MakeFourBar(JointKind::kSpherical));
   all.push_back(testing::MakeFourBar(JointKind::kRevolute, true));
@@ -108,12 +108,12 @@ TEST(Mjcf, TheGoldenComparisonNoticesAChangedNumberAndAChangedWord) {
 
 TEST(Mjcf, ShippedModelsAreInStepWithTheirCommittedMjcf) {
   for (const char* name : kShipped) {
-    ExpectGolden(WriteMjcf(Load(name)), kModels + name + "/" + name + ".xml");
+    ExpectGolden(WriteMjcf(LoadNamed(name)), kModels + name + "/" + name + ".xml");
   }
 }
 
 TEST(Mjcf, IsDeterministic) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadNamed("stabilizing_platform");
   EXPECT_EQ(WriteMjcf(m), WriteMjcf(m));
 }
 
@@ -198,7 +198,7 @@ TEST(Mjcf, JointPositionsAreTheMechanismsCoordinates) {
 }
 
 TEST(Mjcf, MasslessConnectingPiecesAreMergedIntoOneBody) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadNamed("stabilizing_platform");
   const mjcf::Plan plan = mjcf::MakePlan(m);
   EXPECT_LT(plan.body_of[m.FindBody("ship_heave")], 0);
   EXPECT_LT(plan.body_of[m.FindBody("ship_roll")], 0);
@@ -299,7 +299,7 @@ TEST(Mjcf, NumbersAreShortAndExact) {
   const std::regex number("[ \"](-?[0-9][0-9.e+-]*)");
   size_t count = 0;
   for (const char* name : {"four_bar", "stabilizing_platform"}) {
-    const std::string text = WriteMjcf(Load(name));
+    const std::string text = WriteMjcf(LoadNamed(name));
     for (std::sregex_iterator it(text.begin(), text.end(), number), end; it != end; ++it, ++count) {
       const std::string shown = it->str(1);
       char* stop = nullptr;

@@ -7,13 +7,15 @@
 namespace mbv {
 namespace {
 
-std::string Scenario(const std::string& name) { return SourcePath("/scenarios/" + name + ".yaml"); }
+std::string ShippedScenario(const std::string& name) {
+  return SourcePath("/scenarios/" + name + ".yaml");
+}
 
 RunOutcome RunOf(const std::string& scenario, std::vector<SetValue> set = {}) {
   RunOptions options;
   options.pictures = false;
   options.scenario.set = std::move(set);
-  return RunScenario(Scenario(scenario), options);
+  return RunScenario(ShippedScenario(scenario), options);
 }
 
 // A tripod that goes 0.1 s, which is enough to see everything.

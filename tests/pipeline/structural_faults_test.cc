@@ -13,7 +13,7 @@
 namespace mbv {
 namespace {
 
-Mechanism Load(const std::string& name) {
+Mechanism LoadNamed(const std::string& name) {
   LoadResult loaded = LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
   if (!loaded.mechanism.has_value()) throw std::runtime_error(loaded.diagnostics.Text());
   return *std::move(loaded.mechanism);
@@ -37,7 +37,7 @@ constexpr const char* kKinds[] = {"swapped drives",
 
 TEST(StructuralFaults, EveryKindIsThereOrSaysWhyNot) {
   for (const char* model : {"four_bar", "slider_crank", "stewart", "spr_tripod"}) {
-    const std::vector<StructuralFault> faults = StructuralFaults(Load(model));
+    const std::vector<StructuralFault> faults = StructuralFaults(LoadNamed(model));
     for (const char* kind : kKinds) {
       bool found = false;
       for (const StructuralFault& fault : faults) {
@@ -51,7 +51,7 @@ TEST(StructuralFaults, EveryKindIsThereOrSaysWhyNot) {
 }
 
 TEST(StructuralFaults, SwappedDrivesActOnEachOthersJoints) {
-  const Mechanism stewart = Load("stewart");
+  const Mechanism stewart = LoadNamed("stewart");
   const std::vector<StructuralFault> faults = Of(stewart, "swapped drives");
   ASSERT_EQ(faults.size(), 5u);  // six legs, each with the next
   const auto joint = [](const Mechanism& m, size_t d) {
@@ -61,11 +61,11 @@ TEST(StructuralFaults, SwappedDrivesActOnEachOthersJoints) {
   EXPECT_EQ(joint(faults[0].wrong[0], 0), joint(stewart, 1));
   EXPECT_EQ(joint(faults[0].wrong[0], 1), joint(stewart, 0));
   EXPECT_EQ(joint(faults[0].wrong[0], 2), joint(stewart, 2));
-  EXPECT_NE(Of(Load("four_bar"), "swapped drives")[0].not_applicable, "");
+  EXPECT_NE(Of(LoadNamed("four_bar"), "swapped drives")[0].not_applicable, "");
 }
 
 TEST(StructuralFaults, AFlippedAxisKeepsTheHomePoseAndTurnsTheCoordinate) {
-  const Mechanism stewart = Load("stewart");
+  const Mechanism stewart = LoadNamed("stewart");
   const std::vector<StructuralFault> faults = Of(stewart, "flipped axis");
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_EQ(faults[0].alike, 5u);  // the other legs
@@ -78,18 +78,18 @@ TEST(StructuralFaults, AFlippedAxisKeepsTheHomePoseAndTurnsTheCoordinate) {
 }
 
 TEST(StructuralFaults, ExchangedUniversalAxesCloseAgain) {
-  const Mechanism crank = Load("slider_crank");
+  const Mechanism crank = LoadNamed("slider_crank");
   const std::vector<StructuralFault> faults = Of(crank, "exchanged universal-joint axes");
   ASSERT_EQ(faults.size(), 1u);
   const auto j = static_cast<size_t>(crank.FindJoint("C"));
   EXPECT_EQ(faults[0].wrong[0].joints[j].axis, crank.joints[j].axis2);
   EXPECT_EQ(faults[0].wrong[0].joints[j].axis2, crank.joints[j].axis);
   EXPECT_EQ(AnalyseMobility(faults[0].wrong[0]).freedoms, 1);
-  EXPECT_NE(Of(Load("four_bar"), "exchanged universal-joint axes")[0].not_applicable, "");
+  EXPECT_NE(Of(LoadNamed("four_bar"), "exchanged universal-joint axes")[0].not_applicable, "");
 }
 
 TEST(StructuralFaults, ProductsOfInertiaChangeTheirSignAndNothingElse) {
-  Mechanism bar = Load("four_bar");
+  Mechanism bar = LoadNamed("four_bar");
   EXPECT_EQ(Of(bar, "sign of products of inertia")[0].not_applicable,
             "every body's inertia is given in its principal axes");
   Mat3& I = bar.bodies[2].I_Bcm_B;
@@ -103,7 +103,7 @@ TEST(StructuralFaults, ProductsOfInertiaChangeTheirSignAndNothingElse) {
 }
 
 TEST(StructuralFaults, TheOtherAssemblyOfAFourBarIsItsMirrorImage) {
-  const Mechanism bar = Load("four_bar");
+  const Mechanism bar = LoadNamed("four_bar");
   const std::vector<StructuralFault> faults = Of(bar, "wrong elbow branch");
   ASSERT_EQ(faults.size(), 1u);
   ASSERT_EQ(faults[0].wrong.size(), 1u);  // a four-bar has two assemblies
@@ -125,7 +125,7 @@ TEST(StructuralFaults, TheOtherAssemblyOfAFourBarIsItsMirrorImage) {
 
 TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
   for (const char* model : {"four_bar", "slider_crank", "stewart", "spr_tripod"}) {
-    const Mechanism mechanism = Load(model);
+    const Mechanism mechanism = LoadNamed(model);
     const int freedoms = AnalyseMobility(mechanism).freedoms;
     for (const StructuralFault& fault : Of(mechanism, "missing closure")) {
       ASSERT_FALSE(fault.wrong.empty()) << model;
@@ -149,10 +149,10 @@ TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
 }
 
 TEST(StructuralFaults, StandardGravityKeepsItsDirection) {
-  const std::vector<StructuralFault> faults = Of(Load("four_bar"), "9.80665 for 9.81");
+  const std::vector<StructuralFault> faults = Of(LoadNamed("four_bar"), "9.80665 for 9.81");
   ASSERT_EQ(faults.size(), 1u);
   EXPECT_LT((faults[0].wrong[0].gravity_W - Vec3(0, -9.80665, 0)).norm(), 4 * kEps * 9.81);
-  Mechanism weightless = Load("four_bar");
+  Mechanism weightless = LoadNamed("four_bar");
   weightless.gravity_W.setZero();
   EXPECT_EQ(Of(weightless, "9.80665 for 9.81")[0].not_applicable, "it has no gravity");
   weightless.gravity_W = Vec3(0, 0, -1.62);

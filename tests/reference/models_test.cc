@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
 
-Mechanism Load(const std::string& name, std::map<std::string, double> overrides = {}) {
+Mechanism LoadModelOf(const std::string& name, std::map<std::string, double> overrides = {}) {
   LoadOptions options;
   options.overrides = std::move(overrides);
   LoadResult loaded = LoadModel(SourcePath("/models/") + name + "/model.yaml", options);
@@ -60,7 +60,7 @@ Eigen::VectorXd Forces(const Mechanism& m, const Trace& trace, Eigen::Index samp
 }
 
 TEST(ReferencePlatform, HoldsItsLoadWithTheForceComputedByHand) {
-  const Mechanism m = Load("stabilizing_platform", {{"link_mass_scale", 0.0}});
+  const Mechanism m = LoadModelOf("stabilizing_platform", {{"link_mass_scale", 0.0}});
   const ReferenceRun run = RunReference(m, SeaState(m, 0.0, 0.0, 0.1));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const Eigen::VectorXd forces = Forces(m, run.trace, 0);
@@ -69,7 +69,7 @@ TEST(ReferencePlatform, HoldsItsLoadWithTheForceComputedByHand) {
 }
 
 TEST(ReferencePlatform, StandsStillWithItsLinksWeights) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadModelOf("stabilizing_platform");
   const ReferenceRun run = RunReference(m, SeaState(m, 0.0, 0.0, 0.1));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const Eigen::VectorXd forces = Forces(m, run.trace, 0);
@@ -97,7 +97,7 @@ TEST(ReferencePlatform, StandsStillWithItsLinksWeights) {
 }
 
 TEST(ReferencePlatform, RidesTheSeaWithTheForcesOfTheIndependentModel) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadModelOf("stabilizing_platform");
   const ReferenceRun run = RunReference(m, SeaState(m, 1.0, 1.5, 0.02));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const Eigen::Index last = run.trace.values.rows() - 1;
@@ -114,7 +114,7 @@ TEST(ReferencePlatform, RidesTheSeaWithTheForcesOfTheIndependentModel) {
 }
 
 TEST(ReferencePlatform, BalancesPowerClosesLoopsAndRepeatsAfterItsPeriod) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadModelOf("stabilizing_platform");
   const ReferenceRun run = RunReference(m, SeaState(m, 1.0, 12.0, 0.05));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const Eigen::VectorXd input = ColumnOf(run.trace, "power.input");
@@ -129,9 +129,9 @@ TEST(ReferencePlatform, BalancesPowerClosesLoopsAndRepeatsAfterItsPeriod) {
 }
 
 TEST(ReferencePlatform, ForcesAreLinearInTheLinkMasses) {
-  const Motion motion = SeaState(Load("stabilizing_platform"), 1.0, 1.0, 0.1);
+  const Motion motion = SeaState(LoadModelOf("stabilizing_platform"), 1.0, 1.0, 0.1);
   const auto forces = [&](double scale) {
-    const Mechanism m = Load("stabilizing_platform", {{"link_mass_scale", scale}});
+    const Mechanism m = LoadModelOf("stabilizing_platform", {{"link_mass_scale", scale}});
     return Forces(m, RunReference(m, motion).trace, 10);
   };
   const Eigen::VectorXd none = forces(0.0), half = forces(0.5), full = forces(1.0);
@@ -145,7 +145,7 @@ double TimeAtLimbLength(double l, double direction) {
 }
 
 TEST(ReferencePlatform, WhenElbowsMeetTheLimbsTurnAboutThem) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadModelOf("stabilizing_platform");
   Motion motion = SeaState(m, 0.0, 4.0, 0.02);
   motion.commands[3].profile = Profile{{ConstantTerm{3.5}, RampTerm{1.0}}};
   const RunSummary summary = RunReference(m, motion).summary;
@@ -157,7 +157,7 @@ TEST(ReferencePlatform, WhenElbowsMeetTheLimbsTurnAboutThem) {
 }
 
 TEST(ReferencePlatform, AtTheToggleTheDrivesLoseControl) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadModelOf("stabilizing_platform");
   Motion motion = SeaState(m, 0.0, 4.0, 0.02);
   motion.commands[3].profile = Profile{{ConstantTerm{3.5}, RampTerm{-1.0}}};
   const RunSummary summary = RunReference(m, motion).summary;
@@ -167,7 +167,7 @@ TEST(ReferencePlatform, AtTheToggleTheDrivesLoseControl) {
 }
 
 TEST(ReferencePlatform, ATiltTheLimbsCannotReachNamesALimb) {
-  const Mechanism m = Load("stabilizing_platform");
+  const Mechanism m = LoadModelOf("stabilizing_platform");
   Motion motion = SeaState(m, 0.0, 4.0, 0.02);
   motion.commands[5].profile = Profile{{RampTerm{0.4}}};
   const RunSummary summary = RunReference(m, motion).summary;
@@ -176,7 +176,7 @@ TEST(ReferencePlatform, ATiltTheLimbsCannotReachNamesALimb) {
 }
 
 TEST(ReferenceTripod, MeetsAGeneralPoseWithVelocityAndAcceleration) {
-  const Mechanism m = Load("spr_tripod");
+  const Mechanism m = LoadModelOf("spr_tripod");
   Motion motion;
   for (int c = 0; c < 3; ++c) {
     motion.commands.push_back(
@@ -208,7 +208,7 @@ TEST(ReferenceTripod, MeetsAGeneralPoseWithVelocityAndAcceleration) {
 }
 
 TEST(ReferenceTripod, HangsStillOnThePrintedTension) {
-  const Mechanism m = Load("spr_tripod");
+  const Mechanism m = LoadModelOf("spr_tripod");
   Motion motion;
   motion.duration_s = 0.0;
   const double home[] = {0, 0, 0.57};

@@ -9,7 +9,7 @@
 namespace mbv {
 namespace {
 
-ScenarioResult Load(const std::string& simulation, const std::string& more = "") {
+ScenarioResult LoadWith(const std::string& simulation, const std::string& more = "") {
   std::filesystem::current_path(kSourceDir);
   return LoadScenarioText(
       "mechanism: spr_tripod\n"
@@ -20,7 +20,7 @@ ScenarioResult Load(const std::string& simulation, const std::string& more = "")
 }
 
 std::string Messages(const std::string& simulation, const std::string& more = "") {
-  return Load(simulation, more).diagnostics.Text();
+  return LoadWith(simulation, more).diagnostics.Text();
 }
 
 bool Says(const std::string& text, const std::string& part) {
@@ -28,7 +28,7 @@ bool Says(const std::string& text, const std::string& part) {
 }
 
 TEST(ServoSettings, GainsAreOneNumberOrOnePerDrive) {
-  const ScenarioResult one = Load("{mode: servo, kp: 2e5, kv: 100*m_rod, feedforward: forces}");
+  const ScenarioResult one = LoadWith("{mode: servo, kp: 2e5, kv: 100*m_rod, feedforward: forces}");
   ASSERT_TRUE(one.scenario) << one.diagnostics.Text();
   const SimulationSettings& settings = one.scenario->simulation;
   EXPECT_TRUE(settings.forward);
@@ -37,7 +37,7 @@ TEST(ServoSettings, GainsAreOneNumberOrOnePerDrive) {
   EXPECT_EQ(settings.servo.kv.Of("leg2"), 400.0);
   EXPECT_TRUE(settings.servo.feedforward);
   const ScenarioResult each =
-      Load("{mode: servo, kp: {leg1: 1, leg2: 2, leg3: 3}, kv: 4, feedforward: none}");
+      LoadWith("{mode: servo, kp: {leg1: 1, leg2: 2, leg3: 3}, kv: 4, feedforward: none}");
   ASSERT_TRUE(each.scenario) << each.diagnostics.Text();
   EXPECT_EQ(each.scenario->simulation.servo.kp.Of("leg2"), 2.0);
   EXPECT_FALSE(each.scenario->simulation.servo.feedforward);
@@ -67,7 +67,7 @@ TEST(ServoSettings, WhatDoesNotGoTogetherIsSaid) {
 TEST(ServoSettings, LimitsAgainstTheCommandHaveNoDefault) {
   EXPECT_FALSE(CheckLimits()[Metric::kPositionM].servo);
   const ScenarioResult result =
-      Load("{mode: servo, kp: 1, kv: 1}", "checks: {position_m: {servo: 1e-4}}\n");
+      LoadWith("{mode: servo, kp: 1, kv: 1}", "checks: {position_m: {servo: 1e-4}}\n");
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   EXPECT_EQ(result.scenario->checks[Metric::kPositionM].servo, 1e-4);
   EXPECT_EQ(result.scenario->checks[Metric::kPositionM].forward, 1e-6);
