@@ -68,9 +68,8 @@ std::string HeadComment(const Mechanism& mechanism, const MjcfOptions& options) 
     text += std::string("Two ways to use it:\n") + DrivesText(options);
   }
   text +=
-      "To look only: pause, and load a key; other keys than \"home\" are poses at rest. Loops are "
-      "closed by the equalities close:JOINT;\n"
-      "sensors JOINT.gap say how well.\n";
+      "To look only: pause, and load a key; other keys than \"home\" are poses at rest.\n"
+      "Loops are closed by the equalities close:JOINT; sensors JOINT.gap say how well.\n";
   return text;
 }
 

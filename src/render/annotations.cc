@@ -296,6 +296,56 @@ Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame, cons
   return out;
 }
 
+FlatMesh MarkMesh(const Item& mark) {
+  FlatMesh mesh{.rgba = mark.material.rgba, .shaded = true};
+  // Profile (radius, height) along z, turned about z.
+  std::vector<std::pair<double, double>> profile;
+  const double r = mark.size.x(), half = mark.size.z();
+  constexpr int kCap = 5, kSides = 18;
+  const auto cap = [&](double centre, double from, double to) {
+    for (int i = 0; i <= kCap; ++i) {
+      const double angle = from + (to - from) * i / kCap;
+      profile.emplace_back(r * std::cos(angle), centre + r * std::sin(angle));
+    }
+  };
+  switch (mark.solid) {
+    case Solid::kBall:
+      cap(0.0, -0.5 * kPi, 0.0);
+      cap(0.0, 0.0, 0.5 * kPi);
+      break;
+    case Solid::kCapsule:
+      cap(-half, -0.5 * kPi, 0.0);
+      cap(half, 0.0, 0.5 * kPi);
+      break;
+    case Solid::kCylinder:
+      profile = {{0.0, -half}, {r, -half}, {r, half}, {0.0, half}};
+      break;
+    case Solid::kArrow: {
+      // As AddArrowGhost() draws its outline; `half` is the whole length.
+      const double neck = half - std::min(6.0 * r, 0.5 * half);
+      profile = {{0.0, 0.0}, {r, 0.0}, {r, neck}, {2.0 * r, neck}, {0.0, half}};
+      break;
+    }
+    case Solid::kBox:
+      return GlassBox(mark);
+  }
+  for (const auto& [radius, height] : profile) {
+    for (int i = 0; i < kSides; ++i) {
+      const double angle = 2.0 * kPi * i / kSides;
+      mesh.vertices_W.emplace_back(
+          mark.X_WG * Vec3(radius * std::cos(angle), radius * std::sin(angle), height));
+    }
+  }
+  for (int ring = 0; ring + 1 < static_cast<int>(profile.size()); ++ring) {
+    for (int i = 0; i < kSides; ++i) {
+      const int a = ring * kSides + i, b = ring * kSides + (i + 1) % kSides;
+      mesh.triangles.push_back({a, b, a + kSides});
+      mesh.triangles.push_back({b, b + kSides, a + kSides});
+    }
+  }
+  return mesh;
+}
+
 FlatMesh GlassBox(const Item& box) {
   // Corner i has the signs of i's three bits; two triangles per face.
   return {.vertices_W = Corners(box),

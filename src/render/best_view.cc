@@ -12,12 +12,14 @@ namespace {
 
 constexpr std::size_t kMostPoints = 48, kMostFrames = 3;
 // What a view has to show more to be preferred: a half turn, and looking from 24° higher.
+constexpr double kVeil = 0.35;  // what glass takes from what is seen through it
 constexpr double kTurnCost = 0.12, kHeightCost = 0.10;
 
 // A solid as a box in its own frame.
 struct Blocker {
   Pose X_GW;
   Vec3 low, high;
+  double share = 1.0;  ///< of what is behind it that it hides: glass veils
 
   // Whether a ray from p meets it further away than `near`.
   [[nodiscard]] bool Hides(const Vec3& p_W, const Vec3& direction_W, double near) const {
@@ -50,18 +52,18 @@ class Sight {
   }
 
   [[nodiscard]] double Share(const Vec3& to_camera_W) const {
-    std::size_t seen = 0, all = 0;
+    double seen = 0.0, all = 0.0;
     for (const Scene& scene : scenes_) {
       for (const Vec3& p : scene.points) {
-        ++all;
-        seen += std::ranges::none_of(
-                    scene.blockers,
-                    [&](const Blocker& blocker) { return blocker.Hides(p, to_camera_W, near_); })
-                    ? 1
-                    : 0;
+        all += 1.0;
+        double left = 1.0;
+        for (const Blocker& blocker : scene.blockers) {
+          if (left > 0.0 && blocker.Hides(p, to_camera_W, near_)) left *= 1.0 - blocker.share;
+        }
+        seen += left;
       }
     }
-    return all == 0 ? 1.0 : static_cast<double>(seen) / static_cast<double>(all);
+    return all == 0.0 ? 1.0 : seen / all;
   }
 
  private:
@@ -76,10 +78,12 @@ class Sight {
     PictureOptions plain = options;
     plain.output_frames = false;
     for (const Item& item : MechanismItems(mechanism, frame, scale, plain)) {
-      if (item.material.rgba[3] < 0.5F || item.framing == Framing::kNever) continue;
+      if (item.framing == Framing::kNever) continue;
       Vec3 high = item.size;
       if (item.solid == Solid::kCapsule) high.z() += item.size.x();
-      scene.blockers.push_back({.X_GW = item.X_WG.inverse(), .low = -high, .high = high});
+      const bool glass = item.material.rgba[3] < 0.5F;
+      scene.blockers.push_back(
+          {.X_GW = item.X_WG.inverse(), .low = -high, .high = high, .share = glass ? kVeil : 1.0});
     }
     std::vector<Vec3> points;
     for (const Joint& joint : mechanism.joints) {

@@ -172,7 +172,9 @@ class OsMesaStage final : public Stage {
       return Failure(
           fmt::format("{} solids are more than the {} that fit", items.size(), scene_.maxgeom));
     }
-    for (const Item& item : items) AppendGeom(item, R_DW);
+    for (const Item& item : items) {
+      if (item.casts_shadow) AppendGeom(item, R_DW);
+    }
     std::ranges::fill(scene_.flags, 0);
     scene_.flags[mjRND_SHADOW] = options_.shadows;
     scene_.flags[mjRND_REFLECTION] = options_.sea && !plain;
@@ -194,7 +196,7 @@ class OsMesaStage final : public Stage {
     geom.size[1] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.y());
     geom.size[2] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.z());
     if (item.solid == Solid::kArrow) geom.size[2] *= 2.0F;  // arrows are drawn half as long
-    geom.category = item.casts_shadow ? mjCAT_DYNAMIC : mjCAT_DECOR;  // decoration casts none
+    geom.category = mjCAT_DYNAMIC;
     geom.specular = item.material.specular;
     geom.shininess = item.material.shininess;
     geom.emission = item.material.emission;
@@ -241,6 +243,10 @@ class OsMesaStage final : public Stage {
   RunSummary DrawInMujoco(const std::vector<Item>& items, const std::vector<FlatMesh>& flats,
                           const Mat3& R_DW, const Camera& camera, Picture* picture) {
     if (RunSummary filled = FillScene(items, R_DW, camera); !filled.ok()) return filled;
+    std::vector<FlatMesh> meshes = flats;
+    for (const Item& item : items) {
+      if (!item.casts_shadow) meshes.push_back(MarkMesh(item));
+    }
     const mjrRect view{0, 0, options_.width, options_.height};
     // Both eyes of the stereo pair alike.
     const mjvGLCamera centred = mjv_averageCamera(&scene_.camera[0], &scene_.camera[1]);
@@ -260,7 +266,7 @@ class OsMesaStage final : public Stage {
       scene_.camera[0] = scene_.camera[1] = shifted;
       SetLights(camera, pass);
       mjr_render(view, &scene_, &context_);
-      DrawFlats(flats, R_DW, {shifted, options_.width, options_.height});
+      DrawFlats(meshes, R_DW, {shifted, options_.width, options_.height});
       mjr_readPixels(pass_rgb.data(), nullptr, view, &context_);
       for (std::size_t i = 0; i < bytes; ++i) sum[i] += pass_rgb[i];
     }
