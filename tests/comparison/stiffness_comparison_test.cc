@@ -68,13 +68,13 @@ TEST(StiffnessComparison, EqualWitnessesAgree) {
   EXPECT_TRUE(comparison.not_compared.empty());
 }
 
-struct Bend {
+struct BentEntry {
   const char* check;
   std::function<void(StiffnessWitness*)> bend;  // by twice the limit
 };
-void PrintTo(const Bend& bend, std::ostream* out) { *out << bend.check; }
+void PrintTo(const BentEntry& bend, std::ostream* out) { *out << bend.check; }
 
-class BentCompliance : public testing::TestWithParam<Bend> {};
+class BentCompliance : public testing::TestWithParam<BentEntry> {};
 
 TEST_P(BentCompliance, FailsItsCheckOnly) {
   StiffnessInput input = MakeInput();
@@ -91,7 +91,7 @@ TEST_P(BentCompliance, FailsItsCheckOnly) {
   EXPECT_TRUE(other->pass);
 }
 
-const Bend kBends[] = {
+const BentEntry kEntries[] = {
     {"simulated_vs_analytic.stiffness_entry",
      [](StiffnessWitness* w) { w->result.K(3, 3) *= 1 + 2e-4; }},
     {"simulated_vs_reference.stiffness_entry",
@@ -126,7 +126,7 @@ const Bend kBends[] = {
     {"simulated.residual", [](StiffnessWitness* w) { w->residual = 2e-8; }},
     {"simulated.extrapolation", [](StiffnessWitness* w) { w->extrapolation_error = 2e-5; }},
 };
-INSTANTIATE_TEST_SUITE_P(All, BentCompliance, testing::ValuesIn(kBends), [](const auto& info) {
+INSTANTIATE_TEST_SUITE_P(All, BentCompliance, testing::ValuesIn(kEntries), [](const auto& info) {
   std::string name = info.param.check;
   std::replace(name.begin(), name.end(), '.', '_');
   return name;
@@ -134,7 +134,7 @@ INSTANTIATE_TEST_SUITE_P(All, BentCompliance, testing::ValuesIn(kBends), [](cons
 
 TEST(StiffnessComparison, EveryMetricIsBentInATest) {
   for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
-    EXPECT_TRUE(std::any_of(std::begin(kBends), std::end(kBends), [&](const Bend& bend) {
+    EXPECT_TRUE(std::any_of(std::begin(kEntries), std::end(kEntries), [&](const BentEntry& bend) {
       return std::string(bend.check).ends_with(std::string(".") + row.key);
     })) << row.key;
   }

@@ -48,7 +48,7 @@ struct Case {
   }
 };
 
-struct Answer {
+struct ScaledAnswer {
   Comparison comparison;
   Trace reference;
 };
@@ -88,7 +88,7 @@ Mechanism Wrong(Mechanism m) {
 }
 
 // Reference and simulation, judged by the scenario's limits; lengths of `scale` times the size.
-Answer Judge(const Case& c, const Similarity& similarity, bool wrong = false) {
+ScaledAnswer Judge(const Case& c, const Similarity& similarity, bool wrong = false) {
   Scenario scenario = c.scenario;
   const Mechanism m = Similar(c.mechanism, similarity);
   scenario.motion = Similar(c.mechanism, c.scenario.motion, similarity);
@@ -101,7 +101,7 @@ Answer Judge(const Case& c, const Similarity& similarity, bool wrong = false) {
     }
   }
   if (!similarity.X_NW.translation().isZero(0.0)) AddRounding(m, &scenario.checks);
-  Answer answer;
+  ScaledAnswer answer;
   ReferenceRun reference;
   if (motion.free()) {
     ForwardRun run = RunForwardReference(m, motion, {.measure_trust = false});
@@ -166,7 +166,7 @@ class Similarities : public ::testing::TestWithParam<const char*> {
   // `force`: allowed change of the reference's drive forces.
   void ExpectSame(const Similarity& similarity, double force) const {
     const Case c(GetParam());
-    const Answer base = Judge(c, {}), other = Judge(c, similarity);
+    const ScaledAnswer base = Judge(c, {}), other = Judge(c, similarity);
     ASSERT_EQ(base.comparison.verdict, Verdict::kAgree) << Failures(base.comparison);
     EXPECT_TRUE(other.reference.values.allFinite());
     if (ReferenceOnly(GetParam(), similarity)) return;

@@ -64,18 +64,18 @@ const char* const kShipped[] = {
 Mechanism LoadNamed(const std::string& name) {
   LoadResult result = LoadModel(kModels + name + "/model.yaml");
   EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
-  return result.mechanism.has_value() ? *std::move(result.mechanism) : testing::MakeFourBar();
+  return result.mechanism.has_value() ? *std::move(result.mechanism) : fixtures::MakeFourBar();
 }
 
 // Every mechanism these tests run on.
 std::vector<Mechanism> AllMechanisms() {
   std::vector<Mechanism> all;
   for (const char* name : kShipped) all.push_back(LoadNamed(name));
-  all.push_back(testing::MakeFourBar());
-  all.push_back(testing::MakeFourBar(JointKind::kSpherical));
-  all.push_back(testing::MakeFourBar(JointKind::kRevolute, true));
-  all.push_back(testing::MakeJointZoo(false));
-  all.push_back(testing::MakeJointZoo(true));
+  all.push_back(fixtures::MakeFourBar());
+  all.push_back(fixtures::MakeFourBar(JointKind::kSpherical));
+  all.push_back(fixtures::MakeFourBar(JointKind::kRevolute, true));
+  all.push_back(fixtures::MakeJointZoo(false));
+  all.push_back(fixtures::MakeJointZoo(true));
   return all;
 }
 
@@ -94,16 +94,16 @@ struct Compiled {
 };
 
 TEST(Mjcf, AFourBarIsWrittenAsCommitted) {
-  ExpectGolden(WriteMjcf(testing::MakeFourBar()),
+  ExpectGolden(WriteMjcf(fixtures::MakeFourBar()),
                std::string(kSourceDir) + "/tests/mjcf/four_bar.xml");
 }
 
 TEST(Mjcf, TheGoldenComparisonNoticesAChangedNumberAndAChangedWord) {
-  const std::string text = WriteMjcf(testing::MakeFourBar());
-  Mechanism bent = testing::MakeFourBar();
+  const std::string text = WriteMjcf(fixtures::MakeFourBar());
+  Mechanism bent = fixtures::MakeFourBar();
   bent.bodies[1].mass *= 1.0 + 1e-9;
   EXPECT_NE(FirstDifference(text, WriteMjcf(bent)), "");
-  EXPECT_NE(FirstDifference(text, WriteMjcf(testing::MakeFourBar(JointKind::kSpherical))), "");
+  EXPECT_NE(FirstDifference(text, WriteMjcf(fixtures::MakeFourBar(JointKind::kSpherical))), "");
 }
 
 TEST(Mjcf, ShippedModelsAreInStepWithTheirCommittedMjcf) {
@@ -171,7 +171,7 @@ TEST(Mjcf, MassesAndInertiasAddUpToTheDescription) {
 // Free and ball joints have no coordinates in common with the mechanism; all others must agree.
 TEST(Mjcf, JointPositionsAreTheMechanismsCoordinates) {
   for (const bool reversed : {false, true}) {
-    const Mechanism m = testing::MakeJointZoo(reversed);
+    const Mechanism m = fixtures::MakeJointZoo(reversed);
     const Compiled compiled(m);
     std::vector<std::array<double, 6>> q(m.joints.size());
     for (size_t j = 0; j < m.joints.size(); ++j) {
@@ -211,7 +211,7 @@ TEST(Mjcf, MasslessConnectingPiecesAreMergedIntoOneBody) {
 }
 
 TEST(Mjcf, AMasslessBodyInALoopGetsATinyMass) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.bodies[2].mass = 0.0;
   m.bodies[2].I_Bcm_B.setZero();
   const Compiled compiled(m);
@@ -221,7 +221,7 @@ TEST(Mjcf, AMasslessBodyInALoopGetsATinyMass) {
 
 TEST(Mjcf, AnyClosingJointIsRepresentedWithItsOwnFreedoms) {
   // A hinge that closes the loop is kept as a hinge, between two welded halves of the rocker.
-  const Compiled compiled(testing::MakeFourBar());
+  const Compiled compiled(fixtures::MakeFourBar());
   const mjModel& m = *compiled.engine.m;
   EXPECT_EQ(m.nv, 4);
   ASSERT_EQ(compiled.engine.plan.closures.size(), 1u);
@@ -231,7 +231,7 @@ TEST(Mjcf, AnyClosingJointIsRepresentedWithItsOwnFreedoms) {
 }
 
 TEST(Mjcf, TheHeadSaysHowToUseTheFileInEachForm) {
-  const Mechanism m = testing::MakeFourBar();
+  const Mechanism m = fixtures::MakeFourBar();
   const auto head = [&](const MjcfOptions& options) {
     const std::string text = WriteMjcf(m, options);
     return text.substr(0, text.find("<compiler"));
@@ -249,7 +249,7 @@ TEST(Mjcf, TheHeadSaysHowToUseTheFileInEachForm) {
 }
 
 TEST(Mjcf, StaticsModelsSayThatTheyAreNotForStepping) {
-  const Mechanism m = testing::MakeFourBar();
+  const Mechanism m = fixtures::MakeFourBar();
   const std::string statics = WriteMjcf(m, {.statics = true});
   EXPECT_NE(statics.find("not for stepping in time"), std::string::npos);
   EXPECT_EQ(statics.find("<keyframe>"), std::string::npos);
@@ -257,7 +257,7 @@ TEST(Mjcf, StaticsModelsSayThatTheyAreNotForStepping) {
 }
 
 TEST(Mjcf, ADescriptionCannotEndTheComment) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.description = "a --> b --- c\x01";
   const Compiled compiled(m);
   EXPECT_TRUE(compiled.warnings.empty());
@@ -276,7 +276,7 @@ TEST(Mjcf, TheHomeKeyIsTheReferencePoseOfEveryModel) {
 }
 
 TEST(Mjcf, MoreKeysComeBehindHome) {
-  const Mechanism mechanism = testing::MakeFourBar();
+  const Mechanism mechanism = fixtures::MakeFourBar();
   const Compiled plain(mechanism);
   std::vector<double> qpos(plain.engine.m->qpos0, plain.engine.m->qpos0 + plain.engine.m->nq);
   qpos[0] += 0.125;

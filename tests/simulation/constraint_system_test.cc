@@ -16,7 +16,7 @@ namespace {
 // Connect, tendon and joint rows with balls, free and merged joints (platform, tripod, SCARA), and
 // welds between turning bodies (four-bar).
 std::vector<Mechanism> Mechanisms() {
-  std::vector<Mechanism> all{testing::MakeFourBar()};
+  std::vector<Mechanism> all{fixtures::MakeFourBar()};
   for (const char* name : {"stabilizing_platform", "spr_tripod", "scara_robot"}) {
     LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
     if (result.mechanism.has_value()) all.push_back(*std::move(result.mechanism));
@@ -64,7 +64,7 @@ TEST(ConstraintSystem, BiasIsTheRateOfChangeOfTheJacobian) {
 }
 
 TEST(ConstraintSystem, ResidualOfADrivenRowIsPositionMinusTarget) {
-  const Mechanism mechanism = testing::MakeFourBar();
+  const Mechanism mechanism = fixtures::MakeFourBar();
   std::vector<std::string> warnings;
   EngineSession session(&warnings);
   EngineModel engine;

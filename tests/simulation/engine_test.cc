@@ -43,7 +43,7 @@ TEST(Engine, ARefusedModelSaysWhy) {
 }
 
 TEST(Engine, AModelThatMuJoCoRefusesIsAnEngineFailure) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.bodies[1].mass = 1e-16;  // less than it takes for a mass
   const SimulationRun run = Simulate(m, {}, testing::HoldStill({1.0}), {});
   EXPECT_EQ(run.summary.stop, Stop::kEngineFailure);
@@ -51,7 +51,7 @@ TEST(Engine, AModelThatMuJoCoRefusesIsAnEngineFailure) {
 }
 
 TEST(Engine, MotionThatIsNotANumberIsAnEngineFailureAndLeavesNoNumbersBehind) {
-  const Mechanism m = testing::MakeFourBar();
+  const Mechanism m = fixtures::MakeFourBar();
   Motion motion{.duration_s = 0.1, .sample_s = 0.01, .commands = {}, .loads = {}};
   const DrivenMotion broken = [](double t, DrivenSample* driven) {
     driven->position = VecX::Constant(1, 1.0);
@@ -70,7 +70,7 @@ TEST(Engine, MotionThatIsNotANumberIsAnEngineFailureAndLeavesNoNumbersBehind) {
 
 TEST(Engine, AnExplodingSpringIsAnEngineFailure) {
   // A free coupler tip on a spring far too stiff for the step: h ω is about 1000.
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.joints.pop_back();
   m.springs.push_back({.name = "spring",
                        .body_from = 0,
@@ -87,7 +87,7 @@ TEST(Engine, AnExplodingSpringIsAnEngineFailure) {
 
 TEST(Engine, ADriveThatCannotBeReachedIsNoConvergence) {
   // The crank of a four-bar that is a double rocker cannot turn to this angle.
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.drives[0].kind = JointDrive{2, 0};  // drive the rocker instead
   const SimulationRun run = Simulate(m, {}, testing::HoldStill({0.2}), {});
   EXPECT_EQ(run.summary.stop, Stop::kNoConvergence);
@@ -99,7 +99,7 @@ TEST(Engine, TroubleOfTheCommandedMotionIsPassedOn) {
     return RunSummary{
         .stop = Stop::kUnreachable, .message = "too far", .time_s = t, .where = {}, .unit = {}};
   };
-  const SimulationRun run = Simulate(testing::MakeFourBar(), {}, unreachable, {});
+  const SimulationRun run = Simulate(fixtures::MakeFourBar(), {}, unreachable, {});
   EXPECT_EQ(run.summary.stop, Stop::kUnreachable);
   EXPECT_EQ(run.summary.message, "too far");
 }

@@ -12,7 +12,7 @@ namespace {
 // The joint zoo with every coordinate driven, and an output of its last body seen from its second,
 // both in skew frames: the reference frame turns and accelerates too.
 Mechanism DrivenZoo(bool reversed) {
-  Mechanism m = testing::MakeJointZoo(reversed);
+  Mechanism m = fixtures::MakeJointZoo(reversed);
   for (size_t j = 0; j < m.joints.size(); ++j) {
     for (int k = 0; k < FreedomsOf(m.joints[j].kind); ++k) {
       Drive drive;
@@ -88,7 +88,7 @@ TEST(OutputRates, AreTheDerivativesOfTheRecordedPose) {
 }
 
 TEST(OutputRates, AreNoneWhereAnAngleHasNone) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   // Pitch of 90°: roll and yaw turn about one axis.
   m.outputs[0].X_BO.linear() = RotY(0.5 * std::numbers::pi);
   const Motion motion{.duration_s = 0.1, .sample_s = 0.01, .commands = {}, .loads = {}};

@@ -58,7 +58,7 @@ TEST(FourBarTruth, TorqueAtRestIsTheGradientOfThePotential) {
 
 TEST(Inverse, AgreesWithTheClosedFormToRoundOff) {
   for (const JointKind closing : kClosings) {
-    const SimulationRun run = Simulate(testing::MakeFourBar(closing), OneSecond(), Swing,
+    const SimulationRun run = Simulate(fixtures::MakeFourBar(closing), OneSecond(), Swing,
                                        {.mode = SimulationMode::kInverse});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     EXPECT_TRUE(run.warnings.empty());
@@ -69,7 +69,7 @@ TEST(Inverse, AgreesWithTheClosedFormToRoundOff) {
 }
 
 TEST(Inverse, NoticesAMassThatIsWrongByOnePartInABillion) {
-  Mechanism bent = testing::MakeFourBar();
+  Mechanism bent = fixtures::MakeFourBar();
   bent.bodies[2].mass *= 1.0 + 1e-9;
   const SimulationRun run = Simulate(bent, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
   EXPECT_GT(TorqueError(run), 1e-11);
@@ -112,7 +112,7 @@ constexpr double kTenThousandTurns = 1e-9;
 
 TEST(Inverse, ACrankTurnsTenThousandTimes) {
   const Turns turns{.turns = 1e4};
-  const SimulationRun run = Simulate(testing::MakeFourBar(JointKind::kSpherical), turns.Sampled(),
+  const SimulationRun run = Simulate(fixtures::MakeFourBar(JointKind::kSpherical), turns.Sampled(),
                                      turns, {.mode = SimulationMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message << " at " << run.summary.time_s;
   EXPECT_LT(turns.Error(run), kTenThousandTurns);
@@ -121,7 +121,7 @@ TEST(Inverse, ACrankTurnsTenThousandTimes) {
 
 // The hinge as closure is redundant and costs more; it starts 10 000 turns from zero.
 Mechanism TurnedFourBar(double turns) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.joints[0].home[0] += turns * 2 * std::numbers::pi;
   m.joints[0].guess[0] = m.joints[0].home[0];
   return m;
@@ -145,7 +145,7 @@ TEST(Forward, ACrankTurnsOnAfterTenThousandTurns) {
 // MuJoCo has room for 500 constraint rows unless the file asks for more; each hinge takes six.
 TEST(Inverse, NinetyHingesMayCloseLoops) {
   const int count = 90;
-  const Mechanism one = testing::MakeFourBar();
+  const Mechanism one = fixtures::MakeFourBar();
   Mechanism m = one;
   for (int k = 1; k < count; ++k) {
     const auto name = [k](const std::string& of) { return of + std::to_string(k); };
@@ -182,7 +182,7 @@ TEST(Inverse, NinetyHingesMayCloseLoops) {
 }
 
 TEST(Inverse, AnImpossibleInertiaIsNamedAsWhatMuJoCoRefuses) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.bodies[2].I_Bcm_B = Vec3(0.01, 0.01, 0.04).asDiagonal();
   const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
@@ -192,7 +192,7 @@ TEST(Inverse, AnImpossibleInertiaIsNamedAsWhatMuJoCoRefuses) {
 }
 
 TEST(Inverse, RefusesUndrivenFreedoms) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.joints.pop_back();  // open chain: coupler and rocker swing freely
   const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
@@ -203,7 +203,7 @@ TEST(Forward, ConvergesWithFourthOrder) {
   double coarse = 0.0, fine = 0.0;
   for (const auto& [step, error] : {std::pair{0.01, &coarse}, std::pair{0.005, &fine}}) {
     const SimulationRun run =
-        Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.step_s = step});
+        Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.step_s = step});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     *error = Largest(run, "closure.position");
   }
@@ -216,7 +216,7 @@ TEST(Forward, AgreesWithTheClosedFormAtEveryUsualStep) {
     for (const auto& [step, limit] :
          {std::pair{0.005, 5e-8}, std::pair{0.001, 1e-8}, std::pair{0.0002, 1e-8}}) {
       const SimulationRun run =
-          Simulate(testing::MakeFourBar(closing), OneSecond(), Swing, {.step_s = step});
+          Simulate(fixtures::MakeFourBar(closing), OneSecond(), Swing, {.step_s = step});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       EXPECT_LT(TorqueError(run), limit) << step;
     }
@@ -224,14 +224,14 @@ TEST(Forward, AgreesWithTheClosedFormAtEveryUsualStep) {
 }
 
 TEST(Forward, NoticesATorqueThatIsWrongByOnePartInAMillion) {
-  const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
   EXPECT_LT(TorqueError(run), 1e-8);
   EXPECT_GT(TorqueError(run, 1.0 + 1e-6), 0.9e-6);
 }
 
 TEST(Forward, StockEngineIsManyTimesWorse) {
   const SimulationRun stock =
-      Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.engine = Engine::kStock});
+      Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.engine = Engine::kStock});
   ASSERT_TRUE(stock.summary.ok()) << stock.summary.message;
   EXPECT_GT(TorqueError(stock), 1e-4);
   EXPECT_LT(TorqueError(stock), 0.1);
@@ -240,7 +240,7 @@ TEST(Forward, StockEngineIsManyTimesWorse) {
 // Gravity puts in what the potential loses.
 TEST(Forward, PowerOfGravityHasItsSignInBothModes) {
   for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
-    const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.mode = mode});
+    const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.mode = mode});
     ASSERT_TRUE(run.summary.ok());
     const VecX power = run.trace.values.col(run.trace.Find("power.gravity"));
     const VecX energy = run.trace.values.col(run.trace.Find("energy.gravity"));
@@ -256,7 +256,7 @@ TEST(Forward, PowerOfGravityHasItsSignInBothModes) {
 }
 
 TEST(Forward, PowerOfTheDriveIsTheRateOfEnergy) {
-  const SimulationRun run = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun run = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
   const VecX input = run.trace.values.col(run.trace.Find("power.input"));
   const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
   EXPECT_GT(input.norm(), 1.0);
@@ -267,8 +267,8 @@ TEST(Forward, PowerOfTheDriveIsTheRateOfEnergy) {
 TEST(Forward, ClosureReactionsDoNotDependOnHowTheClosureIsRepresented) {
   // In the plane: split hinge (weld of halves) against ball (connect).
   const SimulationRun split =
-      Simulate(testing::MakeFourBar(), OneSecond(), Swing, {.mode = SimulationMode::kInverse});
-  const SimulationRun ball = Simulate(testing::MakeFourBar(JointKind::kSpherical), OneSecond(),
+      Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  const SimulationRun ball = Simulate(fixtures::MakeFourBar(JointKind::kSpherical), OneSecond(),
                                       Swing, {.mode = SimulationMode::kInverse});
   for (const char* joint : {"A", "B", "C", "D"}) {
     for (const char* c : {".reaction.fx", ".reaction.fy", ".reaction.mz"}) {
@@ -282,7 +282,7 @@ TEST(Forward, ClosureReactionsDoNotDependOnHowTheClosureIsRepresented) {
 
 TEST(Forward, ReactionsCarryTheWeightAtRest) {
   const SimulationRun run =
-      Simulate(testing::MakeFourBar(), OneSecond(), testing::HoldStill({1.0}), {});
+      Simulate(fixtures::MakeFourBar(), OneSecond(), testing::HoldStill({1.0}), {});
   ASSERT_TRUE(run.summary.ok());
   const auto at = [&](const char* channel) {
     return run.trace.values(50, run.trace.Find(channel));
@@ -305,7 +305,7 @@ TEST(Forward, ALoadActsAtItsPointAndInItsAxes) {
   motion.loads.push_back(load);
   for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
     const SimulationRun run =
-        Simulate(testing::MakeFourBar(), motion, testing::HoldStill({1.0}), {.mode = mode});
+        Simulate(fixtures::MakeFourBar(), motion, testing::HoldStill({1.0}), {.mode = mode});
     ASSERT_TRUE(run.summary.ok());
     // Virtual work of the load: its power per crank rate.
     const FourBar at(1.0);
@@ -350,7 +350,7 @@ TEST(Forward, AMomentInBodyAxesTurnsWithItsBody) {
 }
 
 TEST(Forward, ASpringDamperPullsAndDissipates) {
-  Mechanism m = testing::MakeFourBar();
+  Mechanism m = fixtures::MakeFourBar();
   m.springs.push_back({.name = "spring",
                        .body_from = 0,
                        .p_from = {FourBar::d, 0, 0},
@@ -421,8 +421,8 @@ TEST(Forward, AFreeTopKeepsItsMomentum) {
 }
 
 TEST(Forward, RunsAreIdentical) {
-  const SimulationRun a = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
-  const SimulationRun b = Simulate(testing::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun a = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
+  const SimulationRun b = Simulate(fixtures::MakeFourBar(), OneSecond(), Swing, {});
   EXPECT_EQ(a.trace.values, b.trace.values);
   EXPECT_EQ(a.qpos, b.qpos);
 }
