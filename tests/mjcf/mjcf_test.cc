@@ -227,7 +227,7 @@ TEST(Mjcf, AnyClosingJointIsRepresentedWithItsOwnFreedoms) {
   ASSERT_EQ(compiled.engine.plan.closures.size(), 1u);
   EXPECT_EQ(m.eq_type[compiled.engine.closure_equality[0]], mjEQ_WELD);
   const int half = mj_name2id(&m, mjOBJ_BODY, "C.half");
-  EXPECT_DOUBLE_EQ(m.body_mass[half], 0.5 * testing::FourBar::m3);
+  EXPECT_DOUBLE_EQ(m.body_mass[half], 0.5 * fixtures::FourBar::m3);
 }
 
 TEST(Mjcf, TheHeadSaysHowToUseTheFileInEachForm) {

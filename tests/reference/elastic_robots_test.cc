@@ -274,7 +274,7 @@ TEST(ElasticCabin, MissesTheFirstDisplacementWhenOneBeamIsOnePercentTooStiff) {
   const Mechanism m = CabinAt(false, true);
   const std::vector<Pose> X_WB = PosesAt(m, kCabinFirst);
   const int tool = m.FindOutput("tool");
-  const Mat6 C_direct = testing::DirectStiffness(m, X_WB).Compliance(tool);
+  const Mat6 C_direct = fixtures::DirectStiffness(m, X_WB).Compliance(tool);
   Vec6 load;
   load << 0.245263, 0.700674, 0.332428, 872.199362, 873.529244, 700.172153;
   for (size_t b = 0; b < m.beams.size(); ++b) {
@@ -332,7 +332,7 @@ TEST(ElasticRobots, AgreeWithTheDirectStiffnessMethod) {
   for (const Subject& s : Subjects()) {
     const StiffnessResult result = FrameStiffness(s.mechanism, s.X_WB, s.output);
     ASSERT_TRUE(result.summary.ok()) << s.name << ": " << result.summary.message;
-    const Mat6 C = testing::DirectStiffness(s.mechanism, s.X_WB).Compliance(s.output);
+    const Mat6 C = fixtures::DirectStiffness(s.mechanism, s.X_WB).Compliance(s.output);
     EXPECT_LT(RelativeDifference(result.C, C), kDirect) << s.name;
   }
 }

@@ -308,7 +308,7 @@ TEST(FrameStiffness, AgreesWithTheDirectStiffnessMethodOnRandomFrames) {
     const Mechanism m = Loaded(all);
     const StiffnessResult result = AtHome(m);
     ASSERT_TRUE(result.summary.ok()) << result.summary.message << " trial " << trial;
-    ExpectNear(result.C, testing::DirectStiffness(m, m.X_WB_home).Compliance(0), all.c_str());
+    ExpectNear(result.C, fixtures::DirectStiffness(m, m.X_WB_home).Compliance(0), all.c_str());
   }
 }
 

@@ -12,9 +12,9 @@
 namespace mbv {
 namespace {
 
-using testing::MakeBody;
-using testing::MakeJoint;
-using testing::PoseAt;
+using fixtures::MakeBody;
+using fixtures::MakeJoint;
+using fixtures::PoseAt;
 
 constexpr double kE = 210e9, kG = 80e9;
 

@@ -45,7 +45,7 @@ TEST(Engine, ARefusedModelSaysWhy) {
 TEST(Engine, AModelThatMuJoCoRefusesIsAnEngineFailure) {
   Mechanism m = fixtures::MakeFourBar();
   m.bodies[1].mass = 1e-16;  // less than it takes for a mass
-  const SimulationRun run = Simulate(m, {}, testing::HoldStill({1.0}), {});
+  const SimulationRun run = Simulate(m, {}, fixtures::HoldStill({1.0}), {});
   EXPECT_EQ(run.summary.stop, Stop::kEngineFailure);
   EXPECT_NE(run.summary.message.find("mass"), std::string::npos) << run.summary.message;
 }
@@ -81,7 +81,7 @@ TEST(Engine, AnExplodingSpringIsAnEngineFailure) {
                        .damping = 0.0,
                        .free_length_m = 0.1});
   Motion motion{.duration_s = 1.0, .sample_s = 0.01, .commands = {}, .loads = {}};
-  const SimulationRun run = Simulate(m, motion, testing::HoldStill({1.0}), {});
+  const SimulationRun run = Simulate(m, motion, fixtures::HoldStill({1.0}), {});
   EXPECT_EQ(run.summary.stop, Stop::kEngineFailure) << run.summary.message;
 }
 
@@ -89,7 +89,7 @@ TEST(Engine, ADriveThatCannotBeReachedIsNoConvergence) {
   // The crank of a four-bar that is a double rocker cannot turn to this angle.
   Mechanism m = fixtures::MakeFourBar();
   m.drives[0].kind = JointDrive{2, 0};  // drive the rocker instead
-  const SimulationRun run = Simulate(m, {}, testing::HoldStill({0.2}), {});
+  const SimulationRun run = Simulate(m, {}, fixtures::HoldStill({0.2}), {});
   EXPECT_EQ(run.summary.stop, Stop::kNoConvergence);
   EXPECT_EQ(run.summary.time_s, 0.0);
 }

@@ -17,7 +17,7 @@ Mechanism Cart(double stiffness, double damping) {
   Mechanism m;
   m.name = "cart";
   m.gravity_W = Vec3::Zero();
-  m.bodies = {Body{}, testing::MakeBody("cart", 2.0, Vec3::Zero(), Vec3::Constant(0.01))};
+  m.bodies = {Body{}, fixtures::MakeBody("cart", 2.0, Vec3::Zero(), Vec3::Constant(0.01))};
   m.bodies[0].name = "world";
   Joint rail;
   rail.name = "rail";
@@ -25,7 +25,7 @@ Mechanism Cart(double stiffness, double damping) {
   rail.parent = 0;
   rail.child = 1;
   rail.X_PF = rail.X_CM =
-      testing::PoseAt(Vec3::Zero(), Mat3(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitY())));
+      fixtures::PoseAt(Vec3::Zero(), Mat3(Eigen::AngleAxisd(std::numbers::pi / 2, Vec3::UnitY())));
   m.joints = {rail};
   m.tree_joints = {0};
   m.tree_reversed = {false};

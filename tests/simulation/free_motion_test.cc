@@ -31,7 +31,7 @@ SimulationRun RunFree(const Mechanism& m, const Motion& motion) {
             .notes = {},
             .not_unique = {}};
   }
-  return Simulate(m, motion, testing::HoldStill(std::vector<double>(m.drives.size(), 0.0)),
+  return Simulate(m, motion, fixtures::HoldStill(std::vector<double>(m.drives.size(), 0.0)),
                   options);
 }
 
@@ -42,10 +42,10 @@ TEST(FreeMotion, ADampedMassOnASpringFollowsItsClosedForm) {
   m.gravity_W.setZero();
   Body world;
   world.name = "world";
-  m.bodies = {world, testing::MakeBody("mass", mass, {0, 0, 0}, {0.01, 0.01, 0.01})};
-  m.joints = {testing::MakeJoint("slide", JointKind::kPrismatic, 0, {0, 0, 0}, 1, {0, 0, 0})};
+  m.bodies = {world, fixtures::MakeBody("mass", mass, {0, 0, 0}, {0.01, 0.01, 0.01})};
+  m.joints = {fixtures::MakeJoint("slide", JointKind::kPrismatic, 0, {0, 0, 0}, 1, {0, 0, 0})};
   m.joints[0].axis = Vec3::UnitX();
-  testing::AddTree(&m);
+  fixtures::AddTree(&m);
   m.X_WB_home.assign(2, Pose::Identity());
   m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
   m.springs = {{.name = "spring",
@@ -55,7 +55,7 @@ TEST(FreeMotion, ADampedMassOnASpringFollowsItsClosedForm) {
                 .stiffness = k,
                 .damping = c,
                 .free_length_m = 0.4}};
-  const SimulationRun run = RunFree(m, testing::FreeMotion(m, x0, v0, 3.0));
+  const SimulationRun run = RunFree(m, fixtures::FreeMotion(m, x0, v0, 3.0));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const double d = c / (2 * mass), w = std::sqrt(k / mass - d * d);
   const VecX x = Column(run, "motor.position");
@@ -76,10 +76,10 @@ TEST(FreeMotion, ADampedMassOnASpringFollowsItsClosedForm) {
 }
 
 TEST(FreeMotion, AFloatingBodyFliesAParabolaAndKeepsItsSpin) {
-  const Mechanism m = testing::MakeFloater();
+  const Mechanism m = fixtures::MakeFloater();
   Vec6 rates;
   rates << 0.3, -0.2, 4.0, 0.0, 0.0, 2.0;
-  const SimulationRun run = RunFree(m, testing::FloatFree(rates, 0.5));
+  const SimulationRun run = RunFree(m, fixtures::FloatFree(rates, 0.5));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_NEAR(Column(run, "body.x").tail<1>()[0], 0.15, kIntegrated);
   EXPECT_NEAR(Column(run, "body.z").tail<1>()[0], 2.0 - 0.5 * 9.81 * 0.25, kIntegrated);
@@ -87,7 +87,7 @@ TEST(FreeMotion, AFloatingBodyFliesAParabolaAndKeepsItsSpin) {
 }
 
 TEST(FreeMotion, AFloatingBodyHangsOnASpringAndIsPushedByALeg) {
-  Mechanism m = testing::MakeFloater();
+  Mechanism m = fixtures::MakeFloater();
   m.gravity_W.setZero();
   const double k = 50.0, w = std::sqrt(k / 2.0), push = 0.5;
   m.springs = {{.name = "spring",
@@ -98,7 +98,7 @@ TEST(FreeMotion, AFloatingBodyHangsOnASpringAndIsPushedByALeg) {
                 .free_length_m = 0.4}};
   m.drives.push_back(
       {.name = "leg", .kind = DistanceDrive{0, {-1, 0, 0}, 1, {0, 0, 0}}, .range = {}});
-  Motion motion = testing::FloatFree(Vec6::Zero(), 1.0);
+  Motion motion = fixtures::FloatFree(Vec6::Zero(), 1.0);
   motion.forces = {{0, Constant(push)}};
   const SimulationRun run = RunFree(m, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -115,15 +115,15 @@ TEST(FreeMotion, APendulumReturnsAfterThePeriodOfTheEllipticIntegral) {
   m.gravity_W = Vec3(0, 0, -g);
   Body world;
   world.name = "world";
-  m.bodies = {world, testing::MakeBody("bob", 1.0, {0, 0, -length}, {1e-4, 1e-4, 1e-4})};
-  m.joints = {testing::MakeJoint("pivot", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0})};
+  m.bodies = {world, fixtures::MakeBody("bob", 1.0, {0, 0, -length}, {1e-4, 1e-4, 1e-4})};
+  m.joints = {fixtures::MakeJoint("pivot", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0})};
   m.joints[0].axis = Vec3::UnitY();
-  testing::AddTree(&m);
+  fixtures::AddTree(&m);
   m.X_WB_home.assign(2, Pose::Identity());
   m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
   const double w = std::sqrt(g * length / (length * length + 1e-4));
   const double period = 4.0 / w * std::comp_ellint_1(std::sin(amplitude / 2));
-  Motion motion = testing::FreeMotion(m, amplitude, 0.0, 3 * period);
+  Motion motion = fixtures::FreeMotion(m, amplitude, 0.0, 3 * period);
   motion.sample_s = period / 100;
   const SimulationRun run = RunFree(m, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -138,8 +138,8 @@ TEST(FreeMotion, APendulumReturnsAfterThePeriodOfTheEllipticIntegral) {
 
 TEST(FreeMotion, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
   const double start = 1.0, rate = 2.5;
-  const Mechanism m = testing::MakeParallelogram(start);
-  const SimulationRun run = RunFree(m, testing::FreeMotion(m, start, rate, 5.0));
+  const Mechanism m = fixtures::MakeParallelogram(start);
+  const SimulationRun run = RunFree(m, fixtures::FreeMotion(m, start, rate, 5.0));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   const VecX angle = Column(run, "motor.position");
   double worst = 0.0;
@@ -151,7 +151,7 @@ TEST(FreeMotion, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
 }
 
 TEST(SharedDrives, APairSharesATorqueByLeastNormInBothModes) {
-  const Mechanism m = testing::MakeSharedArm();
+  const Mechanism m = fixtures::MakeSharedArm();
   const double L = CharacteristicLength(m), torque = 3.0;
   const double f = 0.5 * torque / (L * L + 0.25);
   Motion motion;

@@ -24,9 +24,9 @@ Mechanism DrivenZoo(bool reversed) {
   Output output;
   output.name = "tip";
   output.body = 6;
-  output.X_BO = testing::PoseAt({0.1, -0.2, 0.3}, RotRpy({0.4, 0.5, -0.6}));
+  output.X_BO = fixtures::PoseAt({0.1, -0.2, 0.3}, RotRpy({0.4, 0.5, -0.6}));
   output.reference_body = 2;
-  output.X_RbR = testing::PoseAt({-0.2, 0.1, 0.2}, RotRpy({-0.3, 0.2, 0.9}));
+  output.X_RbR = fixtures::PoseAt({-0.2, 0.1, 0.2}, RotRpy({-0.3, 0.2, 0.9}));
   m.outputs = {output};
   return m;
 }
@@ -92,8 +92,9 @@ TEST(OutputRates, AreNoneWhereAnAngleHasNone) {
   // Pitch of 90°: roll and yaw turn about one axis.
   m.outputs[0].X_BO.linear() = RotY(0.5 * std::numbers::pi);
   const Motion motion{.duration_s = 0.1, .sample_s = 0.01, .commands = {}, .loads = {}};
-  const SimulationRun run = Simulate(m, motion, testing::HoldStill({testing::FourBar::kHomeAngle}),
-                                     {.mode = SimulationMode::kInverse});
+  const SimulationRun run =
+      Simulate(m, motion, fixtures::HoldStill({fixtures::FourBar::kHomeAngle}),
+               {.mode = SimulationMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
   EXPECT_TRUE(std::isnan(run.trace.values(0, run.trace.Find("tip.yaw.velocity"))));
   EXPECT_EQ(run.trace.values(0, run.trace.Find("tip.x.velocity")), 0.0);

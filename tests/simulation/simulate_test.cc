@@ -13,7 +13,7 @@
 namespace mbv {
 namespace {
 
-using testing::FourBar;
+using fixtures::FourBar;
 
 Motion OneSecond() { return {.duration_s = 1.0, .sample_s = 0.01, .commands = {}, .loads = {}}; }
 
@@ -165,7 +165,7 @@ TEST(Inverse, NinetyHingesMayCloseLoops) {
   }
   m.tree_joints.clear();
   m.tree_reversed.clear();
-  testing::AddTree(&m);
+  fixtures::AddTree(&m);
   const auto swing = [count](double t, DrivenSample* driven) {
     DrivenSample one_crank;
     (void)Swing(t, &one_crank);
@@ -282,7 +282,7 @@ TEST(Forward, ClosureReactionsDoNotDependOnHowTheClosureIsRepresented) {
 
 TEST(Forward, ReactionsCarryTheWeightAtRest) {
   const SimulationRun run =
-      Simulate(fixtures::MakeFourBar(), OneSecond(), testing::HoldStill({1.0}), {});
+      Simulate(fixtures::MakeFourBar(), OneSecond(), fixtures::HoldStill({1.0}), {});
   ASSERT_TRUE(run.summary.ok());
   const auto at = [&](const char* channel) {
     return run.trace.values(50, run.trace.Find(channel));
@@ -305,7 +305,7 @@ TEST(Forward, ALoadActsAtItsPointAndInItsAxes) {
   motion.loads.push_back(load);
   for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
     const SimulationRun run =
-        Simulate(fixtures::MakeFourBar(), motion, testing::HoldStill({1.0}), {.mode = mode});
+        Simulate(fixtures::MakeFourBar(), motion, fixtures::HoldStill({1.0}), {.mode = mode});
     ASSERT_TRUE(run.summary.ok());
     // Virtual work of the load: its power per crank rate.
     const FourBar at(1.0);
@@ -324,10 +324,10 @@ TEST(Forward, AMomentInBodyAxesTurnsWithItsBody) {
   m.gravity_W.setZero();
   Body world;
   world.name = "world";
-  m.bodies = {world, testing::MakeBody("arm", 1.0, {0.1, 0, 0}, {0.1, 0.1, 0.1})};
-  m.joints = {testing::MakeJoint("hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, 0.3)};
+  m.bodies = {world, fixtures::MakeBody("arm", 1.0, {0.1, 0, 0}, {0.1, 0.1, 0.1})};
+  m.joints = {fixtures::MakeJoint("hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, 0.3)};
   m.joints[0].X_CM.linear() = RotX(-std::numbers::pi / 2);  // body y along the hinge
-  testing::AddTree(&m);
+  fixtures::AddTree(&m);
   m.X_WB_home = TreePoses(m, {m.joints[0].home});
   m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
   Motion motion = OneSecond();
@@ -341,7 +341,7 @@ TEST(Forward, AMomentInBodyAxesTurnsWithItsBody) {
   for (const bool in_body_axes : {true, false}) {
     motion.loads[0].in_body_axes = in_body_axes;
     for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
-      const SimulationRun run = Simulate(m, motion, testing::HoldStill({0.3}), {.mode = mode});
+      const SimulationRun run = Simulate(m, motion, fixtures::HoldStill({0.3}), {.mode = mode});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       EXPECT_NEAR(run.trace.values(5, run.trace.Find("motor.force")), in_body_axes ? -2.0 : -4.0,
                   1e-9);
@@ -392,11 +392,11 @@ TEST(Forward, AFreeTopKeepsItsMomentum) {
   m.gravity_W.setZero();
   Body world;
   world.name = "world";
-  m.bodies = {world, testing::MakeBody("arm", 1.0, {0, 0, 0}, {1, 1, 1}),
-              testing::MakeBody("top", 2.0, {0, 0, 0}, {0.02, 0.03, 0.045})};
-  m.joints = {testing::MakeJoint("arm_hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}),
-              testing::MakeJoint("ball", JointKind::kSpherical, 1, {0, 0, 0}, 2, {0, 0, 0})};
-  testing::AddTree(&m);
+  m.bodies = {world, fixtures::MakeBody("arm", 1.0, {0, 0, 0}, {1, 1, 1}),
+              fixtures::MakeBody("top", 2.0, {0, 0, 0}, {0.02, 0.03, 0.045})};
+  m.joints = {fixtures::MakeJoint("arm_hinge", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}),
+              fixtures::MakeJoint("ball", JointKind::kSpherical, 1, {0, 0, 0}, 2, {0, 0, 0})};
+  fixtures::AddTree(&m);
   m.X_WB_home.assign(3, Pose::Identity());
   m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
   m.springs.push_back({.name = "kick",  // sets the top spinning about a skew axis
@@ -409,7 +409,8 @@ TEST(Forward, AFreeTopKeepsItsMomentum) {
                        .free_length_m = 0.1});
   m.outputs.push_back({.name = "top", .body = 2, .X_BO = Pose::Identity(), .X_RbR = {}});
   const auto end = [&](double step) {
-    const SimulationRun run = Simulate(m, OneSecond(), testing::HoldStill({0.0}), {.step_s = step});
+    const SimulationRun run =
+        Simulate(m, OneSecond(), fixtures::HoldStill({0.0}), {.step_s = step});
     EXPECT_TRUE(run.summary.ok()) << run.summary.message;
     return LogRotation(run.X_WB.back()[2].linear());
   };
