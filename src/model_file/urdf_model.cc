@@ -6,8 +6,8 @@
 #include <filesystem>
 
 #include "core/names.h"
-#include "model_file/write_model.h"
 #include "input/yaml_reader.h"
+#include "model_file/write_model.h"
 
 namespace mbv::internal {
 namespace {
