@@ -44,7 +44,7 @@ struct LoadResult {
   std::vector<Literal> literals;       ///< in the order of reading, each place once
 };
 
-/// Loads `file` (model.yaml or .urdf), evaluates its expressions, builds the joint graph and spanning
+/// Loads `file` (model.yaml or .urdf), evaluates expressions, builds the joint graph and spanning
 /// tree, solves the home pose and checks that all loops close. Never throws for bad input.
 [[nodiscard]] LoadResult LoadModel(const std::string& file, const LoadOptions& options = {});
 
