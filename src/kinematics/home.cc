@@ -145,7 +145,9 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
       const LoopGap at = GapOf(mechanism, c, best.states);
       gap = std::max({gap, at.position_m / CharacteristicLength(mechanism), at.rotation_rad});
     }
-    const bool is_open = gap > ToleranceAt(mechanism, best.states.X_WB);
+    // What is open by as little is rounded data: another way to close it is none.
+    constexpr double kRounded = 5e-3;  // characteristic lengths, rad
+    const bool is_open = gap > kRounded;
     GroupAssemblies found;
     if (is_open) found = FindAssemblies(mechanism, group, driven, guess);
     const Coordinates& way = found.assemblies.empty() ? found.best : found.assemblies.front().q;
