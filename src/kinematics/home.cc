@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <random>
 
 #include "core/demand.h"
 #include "kinematics/closure_residual.h"
@@ -111,6 +112,21 @@ std::vector<bool> DrivenJoints(const Mechanism& mechanism) {
   return driven;
 }
 
+Coordinates Disturbed(const Mechanism& mechanism, const Coordinates& guess,
+                      const std::vector<bool>& locked, double amplitude, std::mt19937_64* random) {
+  const double length = CharacteristicLength(mechanism);
+  std::uniform_real_distribution<double> uniform(-amplitude, amplitude);
+  Coordinates out = guess;
+  for (const int j : mechanism.tree_joints) {
+    if (locked[j]) continue;
+    const Joint& joint = mechanism.joints[j];
+    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      out[j][c] += uniform(*random) * (IsLength(joint.kind, c) ? length : 1.0);
+    }
+  }
+  return out;
+}
+
 // kHomeTolerance, or what rounding leaves of coordinates that are large beside the mechanism.
 double ToleranceAt(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
   const double reach = Reach(LongestLever(mechanism), X_WB);
@@ -162,6 +178,16 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
   if (any && try_from(none, start)) {
     result->guesses_moved = true;
     result->drives_moved = result->drives_moved || drives_moved;
+  }
+  // Rounded data: the least gap near the guesses.
+  std::mt19937_64 random(20220101);
+  for (int i = 0; i < 12 && !any && open(); ++i) {
+    const std::vector<bool>& locked = i % 2 == 0 ? driven : none;
+    const double amplitude = 0.05 * (1 + i);
+    if (try_from(locked, Disturbed(mechanism, guess, locked, amplitude, &random))) {
+      result->guesses_moved = true;
+      result->drives_moved = any_driven && i % 2 == 1;
+    }
   }
   return best;
 }
