@@ -28,7 +28,8 @@ std::string WrappedLine(std::string_view line, size_t width) {
     const size_t end = std::min(line.find(' ', word), line.size());
     const std::string_view blanks = line.substr(at, word - at),
                            text = line.substr(word, end - word);
-    if (at > 0 && column > hang && column + blanks.size() + PrintedWidth(text) > width) {
+    if (at > 0 && column + blanks.size() > hang &&
+        column + blanks.size() + PrintedWidth(text) > width) {
       if (text.empty()) break;
       wrapped += "\n" + std::string(hang, ' ');
       column = hang;

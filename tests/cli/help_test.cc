@@ -31,7 +31,7 @@ class HelpTest : public testing::Test {
     bool inside = false;
     for (const std::string& line : LinesOf(mbverify(command + " --help").out)) {
       inside = line == "Subcommands:" || (inside && line.starts_with("  "));
-      const bool is_name = inside && line.size() > 2 && line[2] != ' ';
+      const bool is_name = inside && line.starts_with("  ") && line.size() > 2 && line[2] != ' ';
       if (is_name) {
         names.push_back((command.empty() ? "" : command + " ") +
                         line.substr(2, line.find(' ', 2) - 2));

@@ -22,7 +22,7 @@ TEST(Wrapped, ContinuesUnderTheSecondColumnOrIndentedByFour) {
 
 TEST(Wrapped, KeepsWordsThatAreLongerThanTheLine) {
   EXPECT_EQ(Wrapped("see /a/very/long/path/indeed now", 12),
-            "see\n    /a/very/long/path/indeed\n    now");
+            "see /a/very/long/path/indeed\n    now");
 }
 
 TEST(Wrapped, CountsCharactersAndNotEscapeSequencesOrBytes) {

@@ -209,7 +209,7 @@ TEST(Pictures, WriteTheCaptionIntoABarOnWhiteAndNoneWithoutText) {
   const auto bar = [](const Picture& picture) {
     int white = 0, dark = 0;
     for (int x = 0; x < picture.width; ++x) {
-      for (int y = picture.height - 20; y < picture.height; ++y) {
+      for (int y = picture.height - 40; y < picture.height; ++y) {
         const std::uint8_t* p =
             &picture.rgb[3UL * (static_cast<std::size_t>(y) * picture.width + x)];
         white += p[0] == 255 && p[1] == 255 && p[2] == 255;
