@@ -97,7 +97,7 @@ TEST_F(HelpTest, NoLineOfAnyHelpIsLongerThanTheTerminal) {
   std::vector<std::string> commands = Commands();
   commands.emplace_back("");
   for (const std::string& command : commands) {
-    for (const int columns : {50, 72, 80, 132}) {
+    for (const int columns : {60, 72, 80, 132}) {
       const ProgramResult help = WithColumns(columns, command + " --help");
       EXPECT_EQ(help.exit_code, 0);
       for (const std::string& line : LinesOf(help.out)) {
