@@ -247,7 +247,7 @@ class Scales {
     const double acceleration = scale_.length_m / (motion_.duration_s * motion_.duration_s);
     for (size_t b = 1; b < bodies_.size(); ++b) {
       bodies_[b].acceleration = std::max(bodies_[b].acceleration, acceleration);
-      if (!twists_.moved[b]) continue;
+      if (!twists_.moved[b] && !mechanism_.drives.empty()) continue;
       scale_.force_N = std::max(scale_.force_N, mechanism_.bodies[b].mass * acceleration);
     }
     for (size_t k = 0; k < rates_.size(); ++k) {

@@ -133,6 +133,18 @@ double ToleranceAt(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
   return std::max(kHomeTolerance, GapRounding(reach) / CharacteristicLength(mechanism));
 }
 
+// Of a body, from one pose to another [rad].
+double LargestTurn(const BodyStates& from, const BodyStates& to) {
+  double largest = 0.0;
+  for (size_t b = 1; b < from.X_WB.size(); ++b) {
+    const Mat3 R = from.X_WB[b].linear().transpose() * to.X_WB[b].linear();
+    largest = std::max(largest, Eigen::AngleAxisd(R).angle());
+  }
+  return largest;
+}
+// A pose with a body turned farther is another assembly, not the least gap of rounded data.
+constexpr double kElsewhere = 0.3;
+
 Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeResult* result) {
   const std::vector<bool> driven = DrivenJoints(mechanism);
   const std::vector<bool> none(mechanism.joints.size(), false);
@@ -184,10 +196,14 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
   for (int i = 0; i < 12 && !any && open(); ++i) {
     const std::vector<bool>& locked = i % 2 == 0 ? driven : none;
     const double amplitude = 0.05 * (1 + i);
-    if (try_from(locked, Disturbed(mechanism, guess, locked, amplitude, &random))) {
-      result->guesses_moved = true;
-      result->drives_moved = any_driven && i % 2 == 1;
+    const Attempt before = best;
+    if (!try_from(locked, Disturbed(mechanism, guess, locked, amplitude, &random))) continue;
+    if (LargestTurn(before.states, best.states) > kElsewhere) {
+      best = before;
+      continue;
     }
+    result->guesses_moved = true;
+    result->drives_moved = any_driven && i % 2 == 1;
   }
   return best;
 }

@@ -154,7 +154,7 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefusedBeforeAnythingIsComputed) {
   replace("own/model.yaml", "guess_deg: 90", "guess_deg: 0");
   replace("own/turn.yaml", "analytic: none",
           "analytic: none\nreference: {csv: table.csv, columns: {time: t, motor.force: f}}");
-  Put("own/table.csv", "t,f\n0,0\n1,0\n2,0\n");
+  Put("own/table.csv", "t,f\n0,0\n0.5,0\n1,0\n1.5,0\n2,0\n");
   const std::string scenario = "'" + In("own/turn.yaml").string() + "'";
   const ProgramResult stuck = mbverify(Run(scenario));
   ASSERT_EQ(stuck.exit_code, 3) << stuck.out << stuck.err;

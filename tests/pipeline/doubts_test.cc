@@ -240,7 +240,7 @@ TEST(Concession, RoundedDataAndImpossibleInertiasStandInTheVerdict) {
       RunAllowed(rounded, "bricard/turn_inverse", "closure_tolerance: 3e-3",
                  {{"end: [0, -length, 0]", "end: [1e-3, -length - 5e-4, 3e-4]"}});
   ExpectSaidEverywhere(projected, "allowed by the model: joint frames moved by up to");
-  EXPECT_EQ(projected.exit_code, 0) << projected.report->comparison.reason;
+  EXPECT_EQ(projected.exit_code, 0) << projected.diagnostics.Text();
   const Folder impossible("impossible_crank");
   const RunOutcome allowed =
       RunAllowed(impossible, "four_bar/turn_inverse", "allow: impossible_inertia",

@@ -49,7 +49,7 @@ TEST(Pictures, ARunThatBreaksOffIsDrawnAsFarAsItCame) {
   run.X_WB = {m.X_WB_home, m.X_WB_home, {}, {}};
   Scenario scenario;
   scenario.snapshots.times_s = {0.0, 3.0};
-  scenario.snapshots.size_px = {64, 48};
+  scenario.snapshots.size_px = {64, 64};
   scenario.snapshots.path_output = 0;
   std::vector<PictureFile> files;
   const RunSummary drawn = DrawSnapshots(scenario, m, run, {}, {}, &files);
@@ -60,7 +60,7 @@ TEST(Pictures, ARunThatBreaksOffIsDrawnAsFarAsItCame) {
   RunOptions options;
   options.out_dir = (std::filesystem::path(testing::TempDir()) / "mbv_broken_off").string();
   options.page = false;
-  options.scenario.set = {{"simulation.step_s", "0.005"}, {"snapshots.size_px", "[64, 48]"}};
+  options.scenario.set = {{"simulation.step_s", "0.005"}, {"snapshots.size_px", "[64, 64]"}};
   const RunOutcome outcome = RunScenario(SourcePath("/scenarios/cabin_robot/servo.yaml"), options);
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 3);
