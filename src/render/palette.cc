@@ -13,7 +13,7 @@ const std::map<std::string, std::array<float, 4>>& Marks() {
       {"closure", {0.80F, 0.10F, 0.55F, 1.0F}}, {"gap", {1.00F, 0.05F, 0.05F, 1.0F}},
       {"pull", {0.10F, 0.35F, 0.85F, 1.0F}},    {"push", {0.88F, 0.12F, 0.10F, 1.0F}},
       {"x_axis", {0.95F, 0.68F, 0.00F, 1.0F}},  {"y_axis", {0.16F, 0.60F, 0.20F, 1.0F}},
-      {"z_axis", {0.00F, 0.62F, 0.68F, 1.0F}},  {"path", {0.42F, 0.18F, 0.70F, 1.0F}},
+      {"z_axis", {0.00F, 0.68F, 0.64F, 1.0F}},  {"path", {0.42F, 0.18F, 0.70F, 1.0F}},
   };
   return marks;
 }
