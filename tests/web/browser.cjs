@@ -22,6 +22,7 @@ async function launch() {
 // Opens a file; errors and warnings of the console go to `trouble`, addresses to `requests`.
 async function openPage(browser, file, {trouble, requests}) {
   const page = await browser.newPage({viewport: {width: 1280, height: 900}, reducedMotion: 'reduce'});
+  page.setDefaultTimeout(120000);  // on a busy machine
   page.on('console', (message) => {
     if (['error', 'warning'].includes(message.type()) && !/GPU stall|GL Driver/.test(message.text())) {
       trouble.push(message.text());
