@@ -48,11 +48,13 @@ HomeRows RowsAtHome(const simulation::EngineModel& engine, const mjData& d) {
 void SetGains(const MatX& M, const HomeRows& rows, double frequency_hz, HomeServos* servos) {
   const double omega = 2.0 * std::numbers::pi * frequency_hz;
   const Eigen::LLT<MatX> llt(M);
-  const MatX held = llt.matrixL().solve(MatX(rows.held.transpose()));
-  Eigen::ColPivHouseholderQR<MatX> qr;
-  qr.setThreshold(kServoRank);
-  qr.compute(held);
-  const MatX Q = MatX(qr.householderQ()).leftCols(qr.rank());
+  MatX Q(M.rows(), 0);  // what the held rows take; Eigen decomposes no empty matrix
+  if (rows.held.rows() > 0) {
+    Eigen::ColPivHouseholderQR<MatX> qr;
+    qr.setThreshold(kServoRank);
+    qr.compute(llt.matrixL().solve(MatX(rows.held.transpose())));
+    Q = MatX(qr.householderQ()).leftCols(qr.rank());
+  }
   for (Eigen::Index k = 0; k < rows.drives.rows(); ++k) {
     // Acceleration of the drive per force on it: what the held rows leave of M⁻¹.
     VecX y = llt.matrixL().solve(VecX(rows.drives.row(k).transpose()));
@@ -68,10 +70,13 @@ void SetGains(const MatX& M, const HomeRows& rows, double frequency_hz, HomeServ
 RunSummary SetForces(const VecX& load, const HomeRows& rows, HomeServos* servos) {
   MatX A(load.size(), rows.held.rows() + rows.drives.rows());
   A << rows.held.transpose(), rows.drives.transpose();
-  Eigen::CompleteOrthogonalDecomposition<MatX> solver;
-  solver.setThreshold(kServoRank);
-  solver.compute(A);
-  const VecX forces = solver.solve(load);
+  VecX forces = VecX::Zero(A.cols());
+  if (A.size() > 0) {
+    Eigen::CompleteOrthogonalDecomposition<MatX> solver;
+    solver.setThreshold(kServoRank);
+    solver.compute(A);
+    forces = solver.solve(load);
+  }
   if ((A * forces - load).norm() > kServoImbalance * load.norm()) {
     return {.stop = Stop::kUnsupported,
             .message =
