@@ -12,10 +12,13 @@
 namespace mbv::internal {
 namespace {
 
-constexpr double kOrder = 8.0;
-// Angle λh [rad] that a step of Runge–Kutta–Fehlberg 7(8) can cover before it is unstable, about;
-// and one so small that no tolerance above round-off asks for it.
-constexpr double kStable = 3.0, kTooFine = 0.02;
+// Steps grow by this root of the amplitude: the scheme of order 7 is the one whose error is
+// controlled.
+constexpr double kOrder = 7.0;
+// Angle λh [rad] beyond which a step of Runge–Kutta–Fehlberg 7(8) is unstable for sure, so that the
+// estimate is no larger than what is needed; and one so small that no tolerance above round-off
+// asks for it.
+constexpr double kStable = 10.0, kTooFine = 0.02;
 
 // Mᵇ R per body.
 MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R) {

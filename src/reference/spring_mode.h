@@ -24,9 +24,9 @@ struct SpringMode {
 [[nodiscard]] SpringMode FastestSpringMode(const Mechanism& mechanism, const BodyStates& states,
                                            const MatX& motions);
 
-/// Steps that an error-controlled integration of order 8 needs to follow the mode for `ahead_s`
+/// Steps that an error-controlled integration of order 7(8) needs to follow the mode for `ahead_s`
 /// when its steps are `step_s` now: they cover a fixed angle while the mode rings, and grow by the
-/// eighth root as it fades, until they are as long as is stable. 0 where it is not the mode that
+/// seventh root as it fades, until they are as long as is stable. 0 where it is not the mode that
 /// makes the steps short.
 [[nodiscard]] double StepsToFollow(const SpringMode& mode, double step_s, double ahead_s);
 

@@ -158,6 +158,7 @@ TEST_F(UserFilesTest, AnOutputThatIsAnInputIsRefusedBeforeAnythingIsComputed) {
   const std::string scenario = "'" + In("own/turn.yaml").string() + "'";
   const ProgramResult stuck = mbverify(Run(scenario));
   ASSERT_EQ(stuck.exit_code, 3) << stuck.out << stuck.err;
+  fs::remove_all(mbverify.Out());
   for (const char* name : {"model.yaml", "turn.yaml", "table.csv"}) {
     const fs::path input = In("own") / name;
     const std::string text = ReadAll(input);
