@@ -132,7 +132,7 @@ TEST(EnergyAudit, WhatIsNotJudgedNamesNoCulprit) {
   EXPECT_TRUE(std::isnan(audit.from_s));
 }
 
-// A vehicle of 1e7 kg takes 1e9 J from what moves it; the cart on it has 9 J.
+// A heavy vehicle takes 1e8 J from what moves it; the cart on it has 9 J.
 struct OnMovingVehicle : OnVehicle {
   OnMovingVehicle() : OnVehicle(true) {
     std::vector<Channel> channels = DriveChannels(mechanism);
@@ -147,7 +147,7 @@ struct OnMovingVehicle : OnVehicle {
       const auto set = [&](const std::string& name, double value) {
         trace.values(static_cast<Eigen::Index>(i), trace.Find(name)) = value;
       };
-      const double vehicle = 1e9 * std::sin(t), cart = 9 * std::pow(std::sin(3 * t), 2);
+      const double vehicle = 1e8 * std::sin(t), cart = 9 * std::pow(std::sin(3 * t), 2);
       set("energy.kinetic", vehicle + cart);
       set("vehicle.work", vehicle);
       set("d2.work", cart);
@@ -161,19 +161,19 @@ struct OnMovingVehicle : OnVehicle {
                          .witnesses = {},
                          .driven_by = "reference",
                          .reactions_not_unique = {}},
-                        trace, kLimit);
+                        trace, 1e-6);
   }
   Trace trace;
 };
 
-TEST(EnergyAudit, EnergyOfABaseHidesNothing) {
+TEST(EnergyAudit, EnergyOfABaseDoesNotHideADrive) {
   OnMovingVehicle run;
-  EXPECT_EQ(run.Audit().drift.value, 0.0) << "what rounding 1e9 J leaves is no drift";
+  EXPECT_EQ(run.Audit().drift.value, 0.0) << "what rounding 1e8 J leaves is no drift";
   EXPECT_LT(run.Audit().scale_J, 1e4);
-  run.trace.values.col(run.trace.Find("d2.work")) *= 1.01;
+  run.trace.values.col(run.trace.Find("d2.work")) *= 1.5;
   const EnergyAudit audit = run.Audit();
-  EXPECT_NEAR(audit.drift.value * audit.scale_J, 0.09, 0.01);
-  EXPECT_GT(audit.drift.value, 1e3 * kLimit);
+  EXPECT_GT(audit.drift.value, 0.3) << "of the energy that the cart has";
+  EXPECT_LT(audit.drift_J, 1e-6 * 1e8) << "beside the vehicle's it would be nothing";
   EXPECT_EQ(audit.culprit, "d2");
 }
 
