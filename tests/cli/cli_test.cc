@@ -80,7 +80,7 @@ TEST_F(CliTest, TheJsonGoesToAFileWholeOrNotAtAll) {
       mbverify("model spr_tripod --format json --set m_rod=-1 --out " + file + ".bad");
   EXPECT_EQ(bad.exit_code, 2);
   EXPECT_FALSE(fs::exists(file + ".bad"));
-  EXPECT_EQ(mbverify("model spr_tripod --format yaml").exit_code, 2);
+  EXPECT_EQ(mbverify("model spr_tripod --format toml").exit_code, 2);
 }
 
 TEST_F(CliTest, UrdfLeavesBeamsOutWithAWarning) {
