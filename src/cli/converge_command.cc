@@ -24,14 +24,10 @@ struct ConvergeArguments {
 // "" or what went wrong.
 std::string WriteFolder(const std::string& out, const ConvergenceReport& report) {
   OutputFolder folder(out, report.mechanism + "/convergence/" + report.scenario);
-  std::string trouble = folder.Create();
-  const auto write = [&](const std::string& name, const std::string& content) {
-    if (trouble.empty()) trouble = folder.Write(name, content);
-  };
-  write("converge.json", ToJson(report));
-  write("converge.csv", ToCsv(report));
-  for (const auto& [name, content] : ConvergencePlots(report)) write(name, content);
-  if (trouble.empty()) trouble = folder.Commit();
+  std::vector<std::pair<std::string, std::string>> files = {{"converge.json", ToJson(report)},
+                                                            {"converge.csv", ToCsv(report)}};
+  for (auto& plot : ConvergencePlots(report)) files.push_back(std::move(plot));
+  std::string trouble = folder.WriteAll(files);
   if (trouble.empty()) Say(stderr, "results in {}\n", folder.target().string());
   return trouble;
 }

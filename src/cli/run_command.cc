@@ -15,6 +15,7 @@
 #include "pipeline/load_robot.h"
 #include "pipeline/out_of_memory.h"
 #include "pipeline/run_scenario.h"
+#include "report/report.h"
 #include "report/stiffness_report.h"
 
 namespace mbv {
@@ -41,16 +42,13 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   }
   progress->Clear();
   findings->Print(outcome.diagnostics);
-  if (outcome.report) {
+  const auto tell = [&](const auto& report) {
     const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
-    SayText(stdout, arguments.quiet ? VerdictLine(*outcome.report, table)
-                                    : ToTable(*outcome.report, table) + "\n");
-  }
-  if (outcome.stiffness != nullptr) {
-    const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
-    SayText(stdout, arguments.quiet ? VerdictLine(*outcome.stiffness, table)
-                                    : ToTable(*outcome.stiffness, table) + "\n");
-  }
+    SayText(stdout,
+            arguments.quiet ? VerdictLine(ViewOf(report), table) : ToTable(report, table) + "\n");
+  };
+  if (outcome.report) tell(*outcome.report);
+  if (outcome.stiffness != nullptr) tell(*outcome.stiffness);
   if (!outcome.folder.empty() && !arguments.quiet) {
     Say(stderr, "results in {}\n", outcome.folder);
   }
@@ -130,8 +128,8 @@ int Run(const RunArguments& arguments) {
     }
     const RunOutcome outcome = RunOne(file, options, arguments, &progress, &findings);
     exit_code = WorseExit(exit_code, outcome.exit_code);
-    counts += outcome.report      ? CountOf(*outcome.report)
-              : outcome.stiffness ? CountOf(*outcome.stiffness)
+    counts += outcome.report      ? CountOf(ViewOf(*outcome.report))
+              : outcome.stiffness ? CountOf(ViewOf(*outcome.stiffness))
                                   : RunCounts{.scenarios = 1, .bad_input = 1};
   }
   if (files.size() > 1) SayText(stdout, CountLine(counts));

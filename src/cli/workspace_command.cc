@@ -41,12 +41,7 @@ int Workspace(const WorkspaceArguments& arguments) {
     return outcome.summary.stop == Stop::kUnsupported ? 2 : 3;
   }
   OutputFolder folder(arguments.out, loaded.mechanism->name + "/workspace");
-  std::string trouble = folder.Create();
-  for (const auto& [name, content] : outcome.files) {
-    if (trouble.empty()) trouble = folder.Write(name, content);
-  }
-  if (trouble.empty()) trouble = folder.Commit();
-  if (!trouble.empty()) {
+  if (const std::string trouble = folder.WriteAll(outcome.files); !trouble.empty()) {
     Say(stderr, "error: {}\n", trouble);
     return 2;
   }

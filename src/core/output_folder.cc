@@ -179,4 +179,12 @@ std::string OutputFolder::Commit() {
   return ExchangeFolders({stage_, place_, files_});
 }
 
+std::string OutputFolder::WriteAll(const std::vector<std::pair<std::string, std::string>>& files) {
+  std::string trouble = Create();
+  for (const auto& [name, content] : files) {
+    if (trouble.empty()) trouble = Write(name, content);
+  }
+  return trouble.empty() ? Commit() : trouble;
+}
+
 }  // namespace mbv

@@ -6,6 +6,8 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
+#include <vector>
 
 namespace mbv {
 
@@ -38,6 +40,9 @@ class OutputFolder {
   /// Takes a folder that is already filled, on the same file system; all in it counts as ours.
   [[nodiscard]] std::string Adopt(const std::filesystem::path& folder);
   [[nodiscard]] std::string Commit();
+
+  /// All at once: creates the folder, writes files (name, content) and commits.
+  [[nodiscard]] std::string WriteAll(const std::vector<std::pair<std::string, std::string>>& files);
 
   [[nodiscard]] const std::filesystem::path& target() const { return target_; }
 

@@ -6,6 +6,7 @@
 
 #include "core/markup.h"
 #include "core/sha256.h"
+#include "core/svg.h"
 #include "regress/index_assets.h"
 #include "regress/summaries.h"
 #include "regress/trouble_text.h"
@@ -37,8 +38,9 @@ std::string Sparkline(const CaseResult& result) {
     return kMargin + (kHeight - 2.0 * kMargin) * (top - level) / (top - bottom);
   };
   if (key->second.limit && *key->second.limit > 0.0) {
-    limit = fmt::format("<path class=\"limit\" d=\"M0 {0:.1f}H{1:g}\"/>",
-                        y(std::log10(*key->second.limit)), kWidth);
+    const std::string line =
+        fmt::format("M0 {:.1f}H{:g}", y(std::log10(*key->second.limit)), kWidth);
+    limit = SvgShape("path", {{"class", "limit"}, {"d", line}});
   }
   std::string points;
   double x = 0.0;
@@ -47,12 +49,19 @@ std::string Sparkline(const CaseResult& result) {
         (kWidth - 2.0 * kMargin) * static_cast<double>(i) / static_cast<double>(levels.size() - 1);
     points += fmt::format("{}{:.1f},{:.1f}", i == 0 ? "" : " ", x, y(levels[i]));
   }
-  return fmt::format(
-      "<svg width=\"{0:g}\" height=\"{1:g}\" viewBox=\"0 0 {0:g} {1:g}\" role=\"img\" "
-      "aria-label=\"last {2} runs: {3:.1e} to {4:.1e}, now {5:.1e}\">{6}<polyline class=\"curve\" "
-      "points=\"{7}\"/><circle class=\"now\" cx=\"{8:.1f}\" cy=\"{9:.1f}\" r=\"2.5\"/></svg>",
-      kWidth, kHeight, levels.size(), std::pow(10.0, *low), std::pow(10.0, *high),
-      std::pow(10.0, levels.back()), limit, points, x, y(levels.back()));
+  const std::string label =
+      fmt::format("last {} runs: {:.1e} to {:.1e}, now {:.1e}", levels.size(), std::pow(10.0, *low),
+                  std::pow(10.0, *high), std::pow(10.0, levels.back()));
+  return SvgElement(
+      "svg",
+      {{"width", kWidth},
+       {"height", kHeight},
+       {"viewBox", fmt::format("0 0 {:g} {:g}", kWidth, kHeight)},
+       {"role", "img"},
+       {"aria-label", label}},
+      limit + SvgShape("polyline", {{"class", "curve"}, {"points", points}}) +
+          SvgShape("circle",
+                   {{"class", "now"}, {"cx", x, 1}, {"cy", y(levels.back()), 1}, {"r", "2.5"}}));
 }
 
 constexpr size_t kChecksOfACase = 5, kChecksOfARow = 1, kCasesInABox = 30;

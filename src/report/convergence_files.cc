@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "report/convergence_report.h"
-#include "report/json_number.h"
+#include "report/json_text.h"
 #include "report/svg_plot.h"
 
 namespace mbv {
@@ -157,7 +157,7 @@ std::string ToJson(const ConvergenceReport& report) {
                      {"smooth_samples", report.smooth_samples},
                      {"series", std::move(series)},
                      {"extrapolation", ExtrapolationJson(report.extrapolation)}};
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return Dump(json);
 }
 
 std::vector<std::pair<std::string, std::string>> ConvergencePlots(const ConvergenceReport& report) {

@@ -4,6 +4,7 @@
 
 #include "report/convergence_report.h"
 #include "report/number_text.h"
+#include "report/text_table.h"
 
 namespace mbv {
 namespace {
@@ -20,18 +21,30 @@ std::string SeriesText(const ConvergenceSeries& series) {
     text += fmt::format("  {} (of the poses)\n", series.pose_verdict.text);
   }
   for (const std::string& note : series.notes) text += "  note: " + note + "\n";
-  text += fmt::format("  {:>10}{:>12}{:>9}{:>9}{:>10}{:>10}{:>10}{:>7}{:>10}{:>10}\n", "step s",
-                      "constant s", "steps", "cpu s", "smooth", "breaks", "change", "order",
-                      "pose m", "gap m");
+  const TextTable table("  ", {{"step s", 10},
+                               {"constant s", 12},
+                               {"steps", 9},
+                               {"cpu s", 9},
+                               {"smooth", 10},
+                               {"breaks", 10},
+                               {"change", 10},
+                               {"order", 7},
+                               {"pose m", 10},
+                               {"gap m", 10}});
+  text += table.Head() + "\n";
   for (size_t i = 0; i < series.points.size(); ++i) {
     const ConvergencePoint& p = series.points[i];
-    text += fmt::format("  {:>10.4g}{:>12.4g}", p.step_s, p.time_constant_s);
-    text += p.failure.empty() ? fmt::format("{:>9}{:>9.3f}{:>10}{:>10}{:>10}{:>7}{:>10}{:>10}\n",
-                                            p.steps, p.cpu_s, NumberCell(p.error.smooth),
-                                            NumberCell(p.error.breaks), NumberCell(p.change.smooth),
-                                            NumberCell(series.fit.pairwise[i], "{:.2f}"),
-                                            NumberCell(p.pose_m), NumberCell(p.closure_m))
-                              : "  no result\n";
+    const std::string step = fmt::format("{:.4g}", p.step_s);
+    const std::string constant = fmt::format("{:.4g}", p.time_constant_s);
+    if (!p.failure.empty()) {
+      text += table.Row({step, constant}) + "  no result\n";
+      continue;
+    }
+    text += table.Row({step, constant, fmt::format("{}", p.steps), fmt::format("{:.3f}", p.cpu_s),
+                       NumberCell(p.error.smooth), NumberCell(p.error.breaks),
+                       NumberCell(p.change.smooth), NumberCell(series.fit.pairwise[i], "{:.2f}"),
+                       NumberCell(p.pose_m), NumberCell(p.closure_m)}) +
+            "\n";
   }
   return text;
 }
@@ -45,11 +58,13 @@ std::string ExtrapolationText(const ForceExtrapolation& e) {
         "from steps {:g} s and {:g} s with order {:.2f} and safety factor {:g}: grid convergence "
         "index {:.1e} of the RMS force\n",
         e.coarse_s, e.fine_s, e.richardson.order, e.richardson.safety, e.index);
-    text += fmt::format("  {:<24}{:>20}{:>13}{:>19}\n", "drive", "RMS force", "uncertainty",
-                        "from inverse mode");
+    const TextTable table(
+        "  ", {{"drive", -24}, {"RMS force", 20}, {"uncertainty", 13}, {"from inverse mode", 19}});
+    text += table.Head() + "\n";
     for (const ExtrapolatedDrive& d : e.drives) {
-      text += fmt::format("  {:<24}{:>20}{:>13.1e}{:>19.1e}\n", d.drive,
-                          fmt::format("{:.9g} {}", d.rms, d.unit), d.uncertainty, d.error);
+      text += table.Row({d.drive, fmt::format("{:.9g} {}", d.rms, d.unit),
+                         fmt::format("{:.1e}", d.uncertainty), fmt::format("{:.1e}", d.error)}) +
+              "\n";
     }
   }
   return text + fmt::format("  inverse mode: {:.1e} off (allowed {:.1e}): {}\n", e.error, e.allowed,

@@ -64,11 +64,9 @@ Table JointTable(const std::vector<JointLoad>& loads, const std::string& witness
   return table;
 }
 
-std::string Folded(const Table& table, bool open) {
+std::string Shown(const Table& table, bool open) {
   if (table.rows.empty()) return "";
-  if (open) return ToHtml(table);
-  return "<details><summary>" + Escape(table.caption) + "</summary>" + ToHtml(table) +
-         "</details>\n";
+  return open ? ToHtml(table) : Folded(table.caption, ToHtml(table));
 }
 
 // What the others are measured against the main pair's first witness; else the first that ran.
@@ -84,14 +82,14 @@ std::string LoadsHtml(const Report& report) {
   if (loads.drives.empty() && loads.joints.empty()) return "";
   const std::string main =
       loads.drives.empty() ? loads.joints.front().witness : MainWitness(report, loads);
-  std::string html = Folded(DriveTable(loads.drives, main), true);
+  std::string html = Shown(DriveTable(loads.drives, main), true);
   const Table joints = JointTable(loads.joints, main);
-  html += Folded(joints, joints.rows.size() <= kOpenRows);
+  html += Shown(joints, joints.rows.size() <= kOpenRows);
   bool open = false;
   for (const WitnessRecord& record : report.witnesses) {
     if (record.name == main) continue;
-    html += Folded(DriveTable(loads.drives, record.name), false);
-    html += Folded(JointTable(loads.joints, record.name), false);
+    html += Shown(DriveTable(loads.drives, record.name), false);
+    html += Shown(JointTable(loads.joints, record.name), false);
   }
   for (const JointLoad& load : loads.joints) open = open || load.not_unique;
   return html +

@@ -1,8 +1,7 @@
-// The page of report.html: verdict, tables and pictures as HTML, data and script behind them.
+// report.html of a motion: what its page has beyond those of other kinds, data and script behind
+// it.
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
 #include <cmath>
 
 #include "core/inputs.h"
@@ -14,94 +13,42 @@
 #include "report/html_tables.h"
 #include "report/html_text.h"
 #include "report/reference_table.h"
+#include "report/result_html.h"
 
 namespace mbv {
 namespace {
 
-struct VerdictWords {
-  const char *word, *sign;
-};
-VerdictWords WordsOf(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::kAgree:
-      return {"Agree", "✓"};
-    case Verdict::kDisagree:
-      return {"Disagree", "✗"};
-    case Verdict::kNotRun:
-      return {"Not run", "?"};
-  }
-  return {"?", "?"};
-}
-
-// With a capital letter and a full stop.
-std::string Sentence(std::string text) {
-  if (text.empty()) return text;
-  text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
-  if (text.back() != '.') text += '.';
-  return text;
-}
+constexpr const char* kHowToReadChecks =
+    "The margin is the limit over the value; a full bar is ten decimal digits. Held: a drive "
+    "motion compared with itself, which verifies nothing.";
 
 class PageWriter {
  public:
-  explicit PageWriter(const HtmlInput& input) : input_(input), report_(*input.report) {}
+  explicit PageWriter(const HtmlInput& input)
+      : input_(input), report_(*input.report), view_(ViewOf(report_)) {}
 
   std::string Write() {
-    Head();
-    Verdict();
+    page_.Add("Verdict", "Verdict", VerdictHtml(view_, Cards(), About()));
     Interactive();
     Pictures();
-    Add("Checks", "Checks", ChecksHtml(report_));
-    Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
-    Add("Drives", "Drives", DrivesHtml(report_));
-    Add("What drives and joints bear", "Loads", LoadsHtml(report_));
-    Add("The simulator's own error", "Engine", EngineHtml(report_));
-    Add("Energy", "Energy", EnergyHtml(report_));
-    Add("What could not be compared", "Gaps", NotComparedHtml(report_));
-    Add("The paper's equations", "Equations", AuditHtml(input_.audit));
-    Add("How to read the force signals", "Signals", SignalsHtml(report_));
-    Add("Parameters", "Parameters", ParametersHtml(*input_.mechanism));
-    Add("Reproduce this run", "Reproduce", ReproduceHtml(input_));
-    return Assemble();
+    page_.Add("Checks", "Checks", ChecksHtml(view_, kHowToReadChecks));
+    page_.Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
+    page_.Add("Drives", "Drives", DrivesHtml(report_));
+    page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
+    page_.Add("The simulator's own error", "Engine", EngineHtml(report_));
+    page_.Add("Energy", "Energy", EnergyHtml(report_));
+    page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
+    page_.Add("The paper's equations", "Equations", AuditHtml(input_.audit));
+    page_.Add("How to read the force signals", "Signals", SignalsHtml(report_));
+    page_.Add("Parameters", "Parameters", ParametersHtml(input_.mechanism->parameters, true));
+    page_.Add("Reproduce this run", "Reproduce", Reproduce());
+    return page_.Write(Head());
   }
 
  private:
-  std::string Title() const { return report_.mechanism + " / " + report_.scenario; }
-
-  // `link` names the section in the navigation; its lower case is the anchor.
-  void Add(const std::string& title, const std::string& link, const std::string& content) {
-    if (content.empty()) return;
-    std::string id = link;
-    id[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(id[0])));
-    nav_ += fmt::format("<a href=\"#{}\">{}</a>\n", id, link);
-    main_ +=
-        fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n", id, Escape(title), content);
-  }
-
-  void Head() {
-    const VerdictWords words = WordsOf(report_.comparison.verdict);
-    header_ = fmt::format(
-        "<header class=\"top\"><div><p class=\"kicker\">mbverify report</p><h1>{}</h1>"
-        "<p class=\"lead\">{}</p></div><div class=\"badges\"><span class=\"verdict {}\">"
-        "<span aria-hidden=\"true\">{}</span> {}</span></div></header>\n",
-        Escape(Title()), Escape(report_.description), ToText(report_.comparison.verdict),
-        words.sign, words.word);
-  }
-
-  void Verdict() {
-    std::string html =
-        "<p class=\"reason\">" + Escape(Sentence(report_.comparison.reason)) + "</p>\n";
-    for (const std::string& text : report_.comparison.reservations) {
-      html += "<p class=\"reason\"><span class=\"pill warn\">reservation</span> " +
-              Escape(Sentence(text)) + "</p>\n";
-    }
-    const Attribution& attribution = report_.comparison.attribution;
-    if (!attribution.text.empty()) {
-      html += fmt::format("<p class=\"attribution{}\">{}</p>\n",
-                          attribution.odd_one_out.empty() ? "" : " odd",
-                          Escape(Sentence(attribution.text)));
-    }
-    html += "<dl class=\"cards\">\n" + Cards() + "</dl>\n";
-    html += "<p class=\"faint\">" + Escape(Sentence(report_.simulation));
+  // How it was simulated, and what drives it.
+  std::string About() const {
+    std::string html = Escape(Sentence(report_.simulation));
     if (!report_.comparison.driving.empty()) {
       html += " " + Escape(Sentence(report_.comparison.driving));
     }
@@ -109,8 +56,7 @@ class PageWriter {
       html += fmt::format(" Start-up window: forces before {:g} s are not judged.",
                           report_.start_window_s);
     }
-    html += "</p>\n" + FindingsHtml(report_);
-    Add("Verdict", "Verdict", html);
+    return html;
   }
 
   std::string Cards() const {
@@ -159,23 +105,20 @@ class PageWriter {
   }
 
   std::string CountCards() const {
-    size_t ran = 0, compared = 0, limits = 0;
-    for (const WitnessRecord& witness : report_.witnesses) ran += witness.summary.ok() ? 1 : 0;
-    for (const PairComparison& pair : report_.comparison.pairs) compared += pair.compared ? 1 : 0;
-    for (const CheckResult& check : report_.comparison.checks) limits += check.limit ? 1 : 0;
     return Card("Ran · compared · verified",
-                fmt::format("{} · {} · {}", ran, compared, report_.comparison.verified()),
-                fmt::format("witnesses of 3 · pairs of 3 · checks of {}", limits));
+                fmt::format("{} · {} · {}", view_.ran(), view_.pairs_compared, view_.verified),
+                fmt::format("witnesses of 3 · pairs of 3 · checks of {}", view_.limits()));
   }
 
   // Filled by the script; without it, plots that do not move.
   void Interactive() {
-    Add("Replay", "Replay",
+    page_.Add(
+        "Replay", "Replay",
         "<noscript><p class=\"faint\">The replay needs JavaScript; the pictures below do not.</p>"
         "</noscript>\n<div id=\"replay-view\"></div>\n");
-    Add("Signals over time", "Plots",
-        "<noscript><p class=\"faint\">Without JavaScript the plots do not zoom.</p>\n" +
-            StaticPlotsHtml(report_) + "</noscript>\n<div id=\"plot-view\"></div>\n");
+    page_.Add("Signals over time", "Plots",
+              "<noscript><p class=\"faint\">Without JavaScript the plots do not zoom.</p>\n" +
+                  StaticPlotsHtml(report_) + "</noscript>\n<div id=\"plot-view\"></div>\n");
   }
 
   void Pictures() {
@@ -188,10 +131,10 @@ class PageWriter {
           name, Base64(std::string_view(picture.png)), EncodeLink(picture.name));
     }
     if (html.empty()) return;
-    Add("Snapshots", "Snapshots",
-        "<div class=\"pictures\">\n" + html +
-            "</div>\n<p class=\"faint\">Small copies; the originals are in snapshots/ beside "
-            "this page.</p>\n");
+    page_.Add("Snapshots", "Snapshots",
+              "<div class=\"pictures\">\n" + html +
+                  "</div>\n<p class=\"faint\">Small copies; the originals are in snapshots/ beside "
+                  "this page.</p>\n");
   }
 
   // Only our own script runs: the one in the page by its hash, a shared one by its origin.
@@ -207,30 +150,30 @@ class PageWriter {
     return fmt::format("<script src=\"{}\"></script>", EncodeLink(input_.script_link));
   }
 
-  // The policy forbids every other request: what is shown is in this file.
-  std::string Assemble() const {
-    return "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n"
-           "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
-           "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src "
-           "data:; style-src 'unsafe-inline'; script-src " +
-           ScriptSource() +
-           "\">\n"
-           "<meta name=\"color-scheme\" content=\"light dark\">\n"
-           "<link rel=\"icon\" href=\"data:,\">\n<title>" +
-           Escape(Title()) + ": " + WordsOf(report_.comparison.verdict).word +
-           " – mbverify</title>\n<style>" + std::string(PageStyle()) +
-           "</style>\n</head>\n<body>\n<a class=\"skip\" href=\"#main\">Skip to the verdict</a>\n" +
-           header_ + "<nav aria-label=\"Sections\">\n" + nav_ + "</nav>\n<main id=\"main\">\n" +
-           main_ +
-           "</main>\n<footer>Written by mbverify. Forces, errors and poses are embedded; "
-           "all digits are in traces.csv and summary.json.</footer>\n"
-           "<script type=\"application/json\" id=\"page-data\">" +
-           PageData(input_) + "</script>\n" + ScriptElement() + "\n</body>\n</html>\n";
+  [[nodiscard]] PageHead Head() const {
+    PageHead head = HeadOf(view_);
+    head.kicker = "mbverify report";
+    head.footer =
+        "Written by mbverify. Forces, errors and poses are embedded; all digits are in traces.csv "
+        "and summary.json.";
+    head.script_source = ScriptSource();
+    head.scripts = "<script type=\"application/json\" id=\"page-data\">" + PageData(input_) +
+                   "</script>\n" + ScriptElement() + "\n";
+    return head;
+  }
+
+  [[nodiscard]] std::string Reproduce() const {
+    std::string command = "mbverify run " + report_.scenario_file;
+    for (const std::string& argument : input_.arguments) command += " " + argument;
+    return ReproduceHtml(view_, command, TimesText(report_),
+                         "Files beside this page: summary.json (every number), traces.csv (17 "
+                         "digits), model.xml (the MJCF as simulated).");
   }
 
   const HtmlInput& input_;
   const Report& report_;
-  std::string header_, nav_, main_;
+  const ResultView view_;
+  Page page_;
 };
 
 }  // namespace

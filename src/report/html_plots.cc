@@ -7,6 +7,7 @@
 #include <map>
 
 #include "comparison/metrics.h"
+#include "report/html_text.h"
 #include "report/svg_plot.h"
 
 namespace mbv {
@@ -77,7 +78,7 @@ std::string StaticPlotsHtml(const Report& report) {
     LinePlot& error = errors[unit];
     error.title = fmt::format("Drive forces, |{} − {}|", pair->measured, pair->truth);
     error.log_y = true;
-    html += "<figure>" + ToSvg(plot) + "</figure>\n<figure>" + ToSvg(error) + "</figure>\n";
+    html += FigureHtml(ToSvg(plot)) + FigureHtml(ToSvg(error));
   }
   return html.empty() ? "" : "<div class=\"static-plots\">\n" + html + "</div>\n";
 }

@@ -10,73 +10,11 @@
 namespace mbv {
 namespace {
 
-std::string NumberOrDash(double value, const char* format = "{:.2e}") {
-  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "–";
-}
-
 std::string At(double time_s) {
   return std::isfinite(time_s) ? fmt::format("{:.4g} s", time_s) : "";
 }
 
-// Limit over value as a factor, with a bar of its decimal digits (ten fill it).
-std::string Margin(const CheckResult& check) {
-  if (!check.limit || !std::isfinite(check.value)) return "";
-  if (check.value <= 0.0) return "exact";
-  const double digits = std::log10(*check.limit / check.value);
-  const double filled = std::clamp(10.0 * std::abs(digits), 2.0, 100.0);
-  const std::string factor = digits >= 0.0
-                                 ? fmt::format("{:.3g}×", *check.limit / check.value)
-                                 : fmt::format("{:.3g}× over", check.value / *check.limit);
-  return fmt::format("<span class=\"margin{}\"><i style=\"width:{:.0f}%\"></i></span> {}",
-                     check.pass ? "" : " over", filled, factor);
-}
-
-std::vector<Cell> CheckRow(const CheckResult& check) {
-  const MetricRow& row = RowOf(check.metric);
-  const std::string unit = *row.unit == '\0' ? "" : fmt::format(" [{}]", row.unit);
-  const std::string pill = !check.limit           ? Pill("off", "off")
-                           : !check.pass          ? Pill("fail", "fail")
-                           : !check.blind.empty() ? Pill("warn", "verifies nothing")
-                           : check.follows        ? Pill("off", "held")
-                                                  : Pill("ok", "ok");
-  std::string where = check.channel;
-  if (!where.empty() && std::isfinite(check.time_s)) where += ", " + At(check.time_s);
-  return {Text(Spaced(check.subject)),
-          Text(row.title + unit),
-          Digits(NumberOrDash(check.value)),
-          Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
-          Markup(pill + (check.floored ? " " + Pill("warn", "floored") : "")),
-          Markup(check.blind.empty() ? Margin(check) : ""),
-          Text(where)};
-}
-
 }  // namespace
-
-std::string FindingsHtml(const Report& report) {
-  if (report.findings.empty()) return "";
-  std::string html = "<ul class=\"findings\">\n";
-  for (const Finding& finding : report.findings.findings()) {
-    html += "<li>" + Escape(ToText(finding)) + "</li>\n";
-  }
-  return html + "</ul>\n";
-}
-
-std::string ChecksHtml(const Report& report) {
-  if (report.comparison.checks.empty()) return "";
-  Table table{.caption = "Checks, failed ones first",
-              .head = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
-                       Text("result"), Text("margin"), Text("worst at")},
-              .rows = {}};
-  for (const bool failed : {true, false}) {
-    for (const CheckResult& check : report.comparison.checks) {
-      if ((check.limit && !check.pass) == failed) table.rows.push_back(CheckRow(check));
-    }
-  }
-  return ToHtml(table) +
-         Note(
-             "The margin is the limit over the value; a full bar is ten decimal digits. Held: a "
-             "drive motion compared with itself, which verifies nothing.");
-}
 
 std::string DrivesHtml(const Report& report) {
   std::string html;
@@ -97,9 +35,7 @@ std::string DrivesHtml(const Report& report) {
                 true, true}});
     }
     const bool first = &pair == main;
-    html += first ? ToHtml(table)
-                  : "<details><summary>" + Escape(table.caption) + "</summary>" + ToHtml(table) +
-                        "</details>\n";
+    html += first ? ToHtml(table) : Folded(table.caption, ToHtml(table));
   }
   return html;
 }
@@ -167,19 +103,6 @@ std::string EnergyHtml(const Report& report) {
                     "cubics through the samples; the drift then holds their error.");
 }
 
-std::string NotComparedHtml(const Report& report) {
-  std::string html;
-  for (const WitnessRecord& record : report.witnesses) {
-    if (record.summary.ok()) continue;
-    html += "<li><b>" + Escape(record.name) + "</b>: " + Escape(ToText(record.summary.stop)) +
-            ". " + Escape(record.summary.message) + "</li>\n";
-  }
-  for (const NotCompared& item : report.comparison.not_compared) {
-    html += "<li><b>" + Escape(item.what) + "</b>: " + Escape(item.why) + "</li>\n";
-  }
-  return html.empty() ? "" : "<ul>\n" + html + "</ul>\n";
-}
-
 std::string AuditHtml(const std::optional<HtmlAudit>& audit) {
   if (!audit) return "";
   if (!audit->note.empty()) return "<p>" + Escape(audit->note) + "</p>\n";
@@ -203,7 +126,7 @@ std::string AuditHtml(const std::optional<HtmlAudit>& audit) {
              "printed and corrected here, {} are labels, choices or claims that no "
              "residual decides.</p>\n",
              right, audit->rows.size(), corrected, open) +
-         "<details><summary>All rows</summary>" + ToHtml(table) + "</details>\n";
+         Folded("All rows", ToHtml(table));
 }
 
 std::string SignalsHtml(const Report& report) {
@@ -219,34 +142,7 @@ std::string SignalsHtml(const Report& report) {
   return ToHtml(table);
 }
 
-std::string ParametersHtml(const Mechanism& mechanism) {
-  if (mechanism.parameters.empty()) return "";
-  Table table{.caption = "Parameters with the scenario's overrides",
-              .head = {Text("name"), Digits("value"), Text("unit"), Text("source"), Text("note")},
-              .rows = {}};
-  for (const Parameter& parameter : mechanism.parameters) {
-    const char* source = parameter.source == Source::kPrinted     ? "printed"
-                         : parameter.source == Source::kAssumed   ? "assumed"
-                         : parameter.source == Source::kCorrected ? "corrected"
-                                                                  : "";
-    table.rows.push_back({Text(parameter.name), Digits(fmt::format("{:.10g}", parameter.value)),
-                          Text(parameter.unit), Text(source), Text(parameter.note)});
-  }
-  return "<details><summary>" + fmt::format("{} parameters", mechanism.parameters.size()) +
-         "</summary>" + ToHtml(table) + "</details>\n";
-}
-
-std::string ReproduceHtml(const HtmlInput& input) {
-  const Report& report = *input.report;
-  std::string command = "mbverify run " + report.scenario_file;
-  for (const std::string& argument : input.arguments) command += " " + argument;
-  std::string html = "<pre tabindex=\"0\"><code>" + Escape(command) + "</code></pre>\n";
-  Table table{.caption = "Inputs and versions", .head = {Text("what"), Text("is")}, .rows = {}};
-  table.rows.push_back({Text("scenario"), Text(report.scenario_file)});
-  table.rows.push_back({Text("model"), Text(report.model_file)});
-  for (const auto& [name, version] : report.versions) {
-    table.rows.push_back({Text(name), Text(version)});
-  }
+std::string TimesText(const Report& report) {
   const Timing& timing = report.timing;
   std::string times = fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
                                   timing.analytic_s, timing.reference_s, timing.simulation_s);
@@ -257,11 +153,7 @@ std::string ReproduceHtml(const HtmlInput& input) {
                          report.mode == "forward" ? "steps" : "samples",
                          static_cast<double>(timing.steps) / timing.loop_s);
   }
-  table.rows.push_back({Text("time taken"), Text(times)});
-  return html + ToHtml(table) +
-         Note(
-             "Files beside this page: summary.json (every number), traces.csv (17 digits), "
-             "model.xml (the MJCF as simulated).");
+  return times;
 }
 
 }  // namespace mbv

@@ -4,6 +4,8 @@
 
 #include <algorithm>
 #include <bit>
+#include <cctype>
+#include <cmath>
 #include <cstdint>
 
 #include "core/demand.h"
@@ -54,6 +56,23 @@ std::string ToHtml(const Table& table) {
   }
   return html + "</tbody></table></div>\n";
 }
+
+std::string NumberOrDash(double value, const char* format) {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "–";
+}
+
+std::string Sentence(std::string text) {
+  if (text.empty()) return text;
+  text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  if (text.back() != '.') text += '.';
+  return text;
+}
+
+std::string Folded(const std::string& title, const std::string& content) {
+  return "<details><summary>" + Escape(title) + "</summary>" + content + "</details>\n";
+}
+
+std::string FigureHtml(const std::string& svg) { return "<figure>" + svg + "</figure>\n"; }
 
 std::string Note(const std::string& text) { return "<p class=\"faint\">" + text + "</p>\n"; }
 

@@ -34,6 +34,17 @@ struct Table {
 };
 [[nodiscard]] std::string ToHtml(const Table& table);
 
+/// "–" for what is no number.
+[[nodiscard]] std::string NumberOrDash(double value, const char* format = "{:.2e}");
+
+/// With a capital letter and a full stop.
+[[nodiscard]] std::string Sentence(std::string text);
+
+/// HTML that is seen when its title is clicked.
+[[nodiscard]] std::string Folded(const std::string& title, const std::string& content);
+/// A picture beside others.
+[[nodiscard]] std::string FigureHtml(const std::string& svg);
+
 /// A faint remark.
 [[nodiscard]] std::string Note(const std::string& text);
 /// A word on coloured ground: kind is ok, warn, fail or off.

@@ -1,6 +1,6 @@
 #include "report/inputs_json.h"
 
-#include <nlohmann/json.hpp>
+#include "report/json_text.h"
 
 namespace mbv {
 
@@ -11,7 +11,7 @@ std::string ToJson(const std::vector<InputFile>& inputs) {
   for (const InputFile& input : inputs) {
     json["inputs"].push_back({{"file", input.file}, {"fingerprint", input.fingerprint}});
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return Dump(json);
 }
 
 }  // namespace mbv

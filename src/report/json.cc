@@ -1,34 +1,12 @@
-#include "report/json_number.h"
+#include "report/json_text.h"
 #include "report/load_figures.h"
 #include "report/report.h"
+#include "report/result_json.h"
 
 namespace mbv {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr const char* kSummarySchema = "mbverify.summary/1";
-
-Json ChecksJson(const Comparison& comparison) {
-  Json checks = Json::array();
-  for (const CheckResult& check : comparison.checks) {
-    if (!check.limit) continue;
-    checks.push_back({{"name", check.name},
-                      {"value", Number(check.value)},
-                      {"limit", *check.limit},
-                      {"pass", check.pass},
-                      {"verifies", !check.follows},
-                      {"time_s", Number(check.time_s)},
-                      {"channel", check.channel}});
-    if (check.stated_limit) {
-      checks.back()["stated_limit"] = *check.stated_limit;
-      checks.back()["limit_by"] = check.limit_by;
-    }
-    if (check.floored) checks.back()["floored"] = true;
-    if (!check.blind.empty()) checks.back()["verifies_nothing"] = check.blind;
-  }
-  return checks;
-}
 
 Json TableColumnJson(const TableColumnResult& column) {
   return {{"standard", Number(column.standard)},
@@ -80,14 +58,6 @@ Json ReferenceTableJson(const Comparison& comparison) {
           {"diagnoses", table.diagnoses},
           {"notes", table.notes},
           {"columns", std::move(columns)}};
-}
-
-Json ChecksOffJson(const Comparison& comparison) {
-  Json checks = Json::array();
-  for (const CheckResult& check : comparison.checks) {
-    if (!check.limit) checks.push_back({{"name", check.name}, {"value", Number(check.value)}});
-  }
-  return checks;
 }
 
 Json DrivesJson(const PairComparison& pair) {
@@ -158,19 +128,11 @@ Json EnergyJson(const EnergyAudit& audit) {
           {"drift", std::move(drift)}};
 }
 
-Json WitnessesJson(const Report& report) {
+Json WitnessesJson(const Report& report, const ResultView& view) {
   Json witnesses = Json::array();
   for (const WitnessRecord& record : report.witnesses) {
-    Json json = {{"name", record.name},
-                 {"ran", record.summary.ok()},
-                 {"stop", ToText(record.summary.stop)},
-                 {"message", record.summary.message}};
-    if (!record.summary.ok() && record.summary.stop != Stop::kNotRun) {
-      json["time_s"] = Number(record.summary.time_s);
-      json["where"] = record.summary.where;
-      json["amount"] = Number(record.summary.amount);
-      json["unit"] = record.summary.unit;
-    }
+    Json json = WitnessHead(record.name, record.summary);
+    AddBreakdown(view, record.summary, &json);
     for (const WitnessMetrics& metrics : report.comparison.witnesses) {
       if (metrics.witness != record.name) continue;
       AddMetrics(metrics.metrics, &json);
@@ -237,93 +199,34 @@ Json EngineJson(const EngineComparison& engine) {
   return json;
 }
 
-Json FindingsJson(const Diagnostics& diagnostics) {
-  Json json = Json::array();
-  for (const Finding& finding : diagnostics.findings()) json.push_back(ToText(finding));
-  return json;
-}
-
-Json NotComparedJson(const Comparison& comparison) {
-  Json json = Json::array();
-  for (const NotCompared& item : comparison.not_compared) {
-    json.push_back({{"what", item.what}, {"why", item.why}});
-  }
-  return json;
-}
-
-Json CountsJson(const Report& report) {
-  size_t ran = 0, compared = 0, limits = 0;
-  for (const WitnessRecord& witness : report.witnesses) ran += witness.summary.ok() ? 1 : 0;
-  for (const PairComparison& pair : report.comparison.pairs) compared += pair.compared ? 1 : 0;
-  for (const CheckResult& check : report.comparison.checks) limits += check.limit ? 1 : 0;
-  return {{"witnesses_ran", ran},
-          {"pairs_compared", compared},
-          {"checks", limits},
-          {"checks_verified", report.comparison.verified()},
-          {"checks_of_a_motion_with_itself", report.comparison.followed()},
-          {"checks_blind", report.comparison.blind()},
-          {"checks_off", report.comparison.checks.size() - limits}};
-}
-
-Json TimingJson(const Timing& timing) {
-  Json json = {{"analytic_s", timing.analytic_s},
-               {"reference_s", timing.reference_s},
-               {"simulation_s", timing.simulation_s},
-               {"render_s", timing.render_s},
-               {"stock_s", timing.stock_s},
-               {"total_s", timing.total_s},
-               {"loop_s", timing.loop_s},
-               {"steps", timing.steps}};
-  if (timing.loop_s > 0.0) {
-    json["steps_per_s"] = static_cast<double>(timing.steps) / timing.loop_s;
-  }
-  return json;
-}
-
 }  // namespace
 
 std::string ToJson(const Report& report) {
-  Json json = {{"schema", kSummarySchema},
-               {"scenario", report.scenario},
-               {"scenario_file", report.scenario_file},
-               {"mechanism", report.mechanism},
-               {"model_file", report.model_file},
-               {"description", report.description},
-               {"verdict", ToText(report.comparison.verdict)},
-               {"reason", report.comparison.reason},
-               {"exit_code", report.exit_code},
-               {"reservations", report.comparison.reservations},
-               {"attribution",
-                {{"odd_one_out", report.comparison.attribution.odd_one_out},
-                 {"text", report.comparison.attribution.text}}},
-               {"checks", ChecksJson(report.comparison)},
-               {"checks_off", ChecksOffJson(report.comparison)},
-               {"drives", report.drives},
-               {"drives_not_unique", report.drives_not_unique},
-               {"metrics", MetricsJson(report.comparison)},
-               {"witnesses", WitnessesJson(report)},
-               {"not_compared", NotComparedJson(report.comparison)},
-               {"counts", CountsJson(report)},
-               {"simulation",
-                {{"mode", report.mode},
-                 {"engine", report.engine},
-                 {"step_s", Number(report.step_s)},
-                 {"driven_by", report.driven_by},
-                 {"driving", report.comparison.driving},
-                 {"forces_not_unique", report.simulated_not_unique}}},
-               {"duration_s", Number(report.duration_s)},
-               {"sample_s", Number(report.sample_s)},
-               {"start_window_s", report.start_window_s}};
+  const ResultView view = ViewOf(report);
+  Json json = SummaryHead(view);
+  json["drives"] = report.drives;
+  json["drives_not_unique"] = report.drives_not_unique;
+  json["metrics"] = MetricsJson(report.comparison);
+  json["witnesses"] = WitnessesJson(report, view);
+  json["not_compared"] = NotComparedJson(view);
+  json["counts"] = CountsJson(view);
+  json["simulation"] = {{"mode", report.mode},
+                        {"engine", report.engine},
+                        {"step_s", Number(report.step_s)},
+                        {"driven_by", report.driven_by},
+                        {"driving", report.comparison.driving},
+                        {"forces_not_unique", report.simulated_not_unique}};
+  json["duration_s"] = Number(report.duration_s);
+  json["sample_s"] = Number(report.sample_s);
+  json["start_window_s"] = report.start_window_s;
   if (report.comparison.table) json["reference_table"] = ReferenceTableJson(report.comparison);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
   json["loads"] = LoadsJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);
   json["pictures"] = report.pictures;
-  json["timing"] = TimingJson(report.timing);
-  json["versions"] = Json::object();
-  for (const auto& [name, version] : report.versions) json["versions"][name] = version;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  AddSummaryEnd(view, &json);
+  return Dump(json);
 }
 
 }  // namespace mbv

@@ -3,7 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
+
+#include "report/json_text.h"
 
 namespace mbv {
 namespace {
@@ -200,7 +201,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
     json["undetermined_reactions"].push_back(
         {{"joint", reaction.joint}, {"components", reaction.components}});
   }
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return Dump(json);
 }
 
 }  // namespace mbv

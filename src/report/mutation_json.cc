@@ -1,9 +1,8 @@
 // Mutation reports as JSON, and back: workers hand their parts over in this form.
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
-#include "report/json_number.h"
+#include "report/json_text.h"
 #include "report/mutation_report.h"
 
 namespace mbv {
@@ -184,7 +183,7 @@ std::string ToJson(const MutationReport& report) {
   for (const Mutation& m : report.mutations) json["numbers"].push_back(JsonOf(m));
   json["faults"] = Json::array();
   for (const FaultResult& f : report.faults) json["faults"].push_back(JsonOf(f));
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  return Dump(json);
 }
 
 std::optional<MutationReport> MutationReportOf(const std::string& text) {

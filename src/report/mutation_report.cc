@@ -1,5 +1,6 @@
 #include "report/mutation_report.h"
 #include "report/number_text.h"
+#include "report/text_table.h"
 
 #include <fmt/format.h>
 
@@ -52,6 +53,22 @@ bool HasInverse(const MutationReport& report) {
                      [](const FaultResult& f) { return f.inverse.has_value(); });
 }
 
+// `inverse`: also by inverse dynamics.
+TextTable NumberTable(bool inverse) {
+  std::vector<TextColumn> columns = {{"number", -22},   {"value", 12}, {"", -8},
+                                     {"detected", -14}, {"force", 9},  {"smallest", 10}};
+  if (inverse) columns.push_back({"inverse", 10});
+  columns.push_back({"  seen first by, or why not", 0});
+  return {"  ", std::move(columns)};
+}
+
+TextTable FaultTable(bool inverse) {
+  std::vector<TextColumn> columns = {{"structural fault", -31}, {"where", -38}, {"detected", -15}};
+  if (inverse) columns.push_back({"inverse", -9});
+  columns.push_back({"how, or why not", 0});
+  return {"  ", std::move(columns)};
+}
+
 std::string Row(const Mutation& m, bool inverse, bool markdown) {
   const std::string change = NumberCell(m.own.force_change, "{:.1e}");
   const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
@@ -61,9 +78,11 @@ std::string Row(const Mutation& m, bool inverse, bool markdown) {
                        SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",
                        InCell(NoteOf(m)));
   }
-  return fmt::format("  {:<22}{:>12g} {:<7}{:<14}{:>9}  {:>8}  {}{}\n", m.name, m.value, m.unit,
-                     SeenText(m.own), change, smallest,
-                     inverse ? fmt::format("{:>8}  ", by_inverse) : "", NoteOf(m));
+  std::vector<std::string> cells = {
+      m.name, fmt::format("{:g}", m.value), " " + m.unit, SeenText(m.own), change, smallest};
+  if (inverse) cells.push_back(by_inverse);
+  cells.push_back("  " + NoteOf(m));
+  return NumberTable(inverse).Row(cells) + "\n";
 }
 
 std::string SeenText(const FaultSighting& s) { return s.detected ? "yes" : "no"; }
@@ -82,8 +101,10 @@ std::string Row(const FaultResult& f, bool inverse, bool markdown) {
     return fmt::format("| {} | {} | {} | {}{} |\n", f.kind, where, seen,
                        inverse ? by_inverse + " | " : "", InCell(note));
   }
-  return fmt::format("  {:<31}{:<38}{:<15}{}{}\n", f.kind, where, seen,
-                     inverse ? fmt::format("{:<9}", by_inverse) : "", note);
+  std::vector<std::string> cells = {f.kind, where, seen};
+  if (inverse) cells.push_back(by_inverse);
+  cells.push_back(note);
+  return FaultTable(inverse).Row(cells) + "\n";
 }
 
 // An instance's number of which forces know nothing: part of a long list, told together.
@@ -149,9 +170,7 @@ std::string NumberHead(const MutationReport& report, bool inverse, bool markdown
         "by, or why not |\n|---|---|---|---|---|{}---|\n",
         report.mode, inverse ? "inverse | " : "", inverse ? "---|" : "");
   }
-  return fmt::format("  {:<22}{:>12} {:<7}{:<14}{:>9}  {:>8}  {}{}\n", "number", "value", "",
-                     "detected", "force", "smallest", inverse ? " inverse  " : "",
-                     "seen first by, or why not");
+  return NumberTable(inverse).Head() + "\n";
 }
 
 std::string FaultHead(bool inverse, bool markdown) {
@@ -160,8 +179,7 @@ std::string FaultHead(bool inverse, bool markdown) {
         "\n| structural fault | where | detected | {}how, or why not |\n|---|---|---|{}---|\n",
         inverse ? "inverse | " : "", inverse ? "---|" : "");
   }
-  return fmt::format("\n  {:<31}{:<38}{:<15}{}{}\n", "structural fault", "where", "detected",
-                     inverse ? "inverse  " : "", "how, or why not");
+  return "\n" + FaultTable(inverse).Head() + "\n";
 }
 
 }  // namespace

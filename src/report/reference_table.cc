@@ -54,13 +54,9 @@ std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
          Digits(NumberOrOff(column->error_rms)), Digits(NumberOrOff(column->tube_rms)),
          Digits(NumberOrOff(column->error_max)), Digits(NumberOrOff(column->tube_max)),
          Digits(NumberOrOff(column->time_s, "{:.4g} s")),
-         Markup(fmt::format("<span class=\"pill {}\">{}</span>",
-                            inside         ? "ok"
-                            : table.judged ? "fail"
-                                           : "off",
-                            inside         ? "inside"
-                            : table.judged ? "outside"
-                                           : "not judged"))});
+         Markup(inside         ? Pill("ok", "inside")
+                : table.judged ? Pill("fail", "outside")
+                               : Pill("off", "not judged"))});
   }
   return ToHtml(html);
 }
@@ -109,11 +105,10 @@ std::string PlotsHtml(const Report& report, const PairComparison& pair) {
                    {.label = fmt::format("tube ±{:.2g}", column.tube_max),
                     .points = {{from, column.tube_max}, {to, column.tube_max}}},
                    {.label = "", .points = {{from, -column.tube_max}, {to, -column.tube_max}}}};
-    html += "<figure>" + ToSvg(signal) + "</figure>\n<figure>" + ToSvg(error) + "</figure>\n";
+    html += FigureHtml(ToSvg(signal)) + FigureHtml(ToSvg(error));
   }
   if (columns.size() > kMostPlots) {
-    html += fmt::format("<p class=\"faint\">The {} worst of {} columns.</p>\n", kMostPlots,
-                        columns.size());
+    html += Note(fmt::format("The {} worst of {} columns.", kMostPlots, columns.size()));
   }
   return html;
 }
@@ -190,16 +185,16 @@ std::string ReferenceTableHtml(const Report& report) {
   }
   if (const PairComparison* pair = TablePair(report.comparison)) {
     html += ColumnsHtml(table, *pair);
-    html += fmt::format(
-        "<p class=\"faint\">The tube is {:g} times the column's uncertainty or the scenario's "
-        "limit, whichever is wider.</p>\n",
-        table.coverage);
+    html += Note(fmt::format(
+        "The tube is {:g} times the column's uncertainty or the scenario's limit, whichever is "
+        "wider.",
+        table.coverage));
     html += PlotsHtml(report, *pair);
   }
   if (!table.notes.empty()) {
-    html += "<details><summary>How the file was read</summary><ul>\n";
-    for (const std::string& note : table.notes) html += "<li>" + Escape(note) + "</li>\n";
-    html += "</ul></details>\n";
+    std::string notes;
+    for (const std::string& note : table.notes) notes += "<li>" + Escape(note) + "</li>\n";
+    html += Folded("How the file was read", "<ul>\n" + notes + "</ul>");
   }
   return html;
 }

@@ -5,6 +5,44 @@
 #include <set>
 
 namespace mbv {
+namespace {
+
+// Whether a reader wants to see it even if it passes.
+bool IsKey(const CheckResult& check) {
+  const bool simulated = check.subject.starts_with("simulated");
+  switch (check.metric) {
+    case Metric::kForceNrmse:
+    case Metric::kTableTube:
+      return true;
+    case Metric::kForceMax:
+    case Metric::kForceOwn:
+    case Metric::kPoseM:
+    case Metric::kPoseRad:
+      return check.subject == "simulated_vs_analytic";
+    case Metric::kCommandM:
+    case Metric::kCommandRad:
+    case Metric::kCommandVelocity:
+    case Metric::kCommandAcceleration:
+    case Metric::kClosureM:
+    case Metric::kPower:
+      return simulated;
+    case Metric::kPositionM:
+    case Metric::kPositionRad:
+    case Metric::kVelocity:
+    case Metric::kAcceleration:
+    case Metric::kReaction:
+    case Metric::kReactionOwn:
+    case Metric::kBaseForce:
+    case Metric::kClosureRad:
+    case Metric::kDerivatives:
+      return false;
+    case Metric::kEnergy:
+      return simulated;
+  }
+  return true;
+}
+
+}  // namespace
 
 const PairComparison* MainPair(const Comparison& comparison) {
   for (const char* name : {"simulated_vs_reached", "simulated_vs_analytic",
@@ -34,31 +72,38 @@ std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& 
   return sheets;
 }
 
-RunCounts& RunCounts::operator+=(const RunCounts& other) {
-  scenarios += other.scenarios;
-  ran += other.ran;
-  compared += other.compared;
-  verified += other.verified;
-  bad_input += other.bad_input;
-  return *this;
-}
-
-RunCounts CountOf(const Report& report) {
-  RunCounts counts{.scenarios = 1};
-  for (const WitnessRecord& witness : report.witnesses) {
-    if (witness.summary.ok()) counts.ran = 1;
+ResultView ViewOf(const Report& report) {
+  const Comparison& comparison = report.comparison;
+  ResultView view = ViewOfComparison(report, comparison);
+  view.reservations = comparison.reservations;
+  for (const CheckResult& check : comparison.checks) {
+    const MetricRow& row = RowOf(check.metric);
+    view.checks.push_back(
+        {.name = check.name,
+         .subject = check.subject,
+         .title = *row.unit == '\0' ? row.title : fmt::format("{} [{}]", row.title, row.unit),
+         .value = check.value,
+         .limit = check.limit,
+         .pass = check.pass,
+         .where = check.channel,
+         .time_s = check.time_s,
+         .key = IsKey(check),
+         .verifies = !check.follows,
+         .blind = check.blind,
+         .floored = check.floored,
+         .stated_limit = check.stated_limit,
+         .limit_by = check.limit_by});
   }
-  counts.compared = MainPair(report.comparison) != nullptr ? 1 : 0;
-  counts.verified = report.comparison.verdict == Verdict::kAgree ? 1 : 0;
-  return counts;
-}
-
-std::string CountLine(const RunCounts& counts) {
-  std::string text =
-      fmt::format("{} scenario{}: {} ran, {} compared, {} verified", counts.scenarios,
-                  counts.scenarios == 1 ? "" : "s", counts.ran, counts.compared, counts.verified);
-  if (counts.bad_input > 0) text += fmt::format(", {} with bad input", counts.bad_input);
-  return text + "\n";
+  for (const WitnessRecord& witness : report.witnesses) {
+    view.witnesses.emplace_back(witness.name, witness.summary);
+  }
+  view.empty_counts = {{"checks_of_a_motion_with_itself", comparison.followed()},
+                       {"checks_blind", comparison.blind()}};
+  if (const PairComparison* pair = MainPair(comparison)) {
+    view.main_pair = pair->measured + " vs " + pair->truth;
+    view.main_check = pair->name() + ".force_nrmse";
+  }
+  return view;
 }
 
 const Trace* TraceOf(const Report& report, const std::string& witness) {

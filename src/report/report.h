@@ -6,14 +6,13 @@
 
 #include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "comparison/comparison.h"
-#include "core/diagnostics.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
 #include "mechanism/mechanism.h"
+#include "report/result.h"
 
 namespace mbv {
 
@@ -42,15 +41,8 @@ struct EngineComparison {
   [[nodiscard]] static const char* NameOf(const std::string& engine);
 };
 
-struct Timing {
-  double analytic_s = 0.0, reference_s = 0.0, simulation_s = 0.0, stock_s = 0.0, render_s = 0.0;
-  double total_s = 0.0;
-  double loop_s = 0.0;  ///< inside the step loop of the judged simulation
-  long steps = 0;
-};
-
-struct Report {
-  std::string scenario, scenario_file, mechanism, model_file, description;
+/// Of a motion.
+struct Report : ResultFrame {
   std::vector<std::string> drives;   ///< model order
   std::string simulation;            ///< one line: mode, step, engine
   std::string mode;                  ///< "forward", "inverse", "force_driven", "servo", "off"
@@ -66,12 +58,8 @@ struct Report {
   std::vector<std::string> reactions_not_unique;
   std::vector<WitnessRecord> witnesses;
   Comparison comparison;
-  int exit_code = 3;
-  Diagnostics findings;  ///< warnings, range violations
   std::vector<SignalSheet> sheets;
   std::optional<EngineComparison> engine_comparison;
-  Timing timing;
-  std::vector<std::pair<std::string, std::string>> versions;
   std::vector<std::string> pictures;  ///< file names below snapshots/
 };
 
@@ -82,27 +70,10 @@ struct Report {
 /// channels. 17 significant digits, "nan" for missing values.
 [[nodiscard]] std::string ToCsv(const Report& report);
 
-struct TableOptions {
-  bool color = false;
-  bool verbose = false;  ///< also how to read each signal, and what could not be compared
-};
 /// The verdict table for a terminal.
 [[nodiscard]] std::string ToTable(const Report& report, const TableOptions& options);
 
-/// "stabilizing_platform / sea_state: AGREE  simulated vs analytic 4.2e-08 (limit 1.0e-07)".
-[[nodiscard]] std::string VerdictLine(const Report& report, const TableOptions& options);
-
-/// What several runs came to.
-struct RunCounts {
-  size_t scenarios = 0, ran = 0, compared = 0, verified = 0;
-  size_t bad_input = 0;  ///< not even loaded
-
-  RunCounts& operator+=(const RunCounts& other);
-};
-[[nodiscard]] RunCounts CountOf(const Report& report);
-
-/// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
-[[nodiscard]] std::string CountLine(const RunCounts& counts);
+[[nodiscard]] ResultView ViewOf(const Report& report);
 
 /// What a witness recorded; null if it did not run.
 [[nodiscard]] const Trace* TraceOf(const Report& report, const std::string& witness);

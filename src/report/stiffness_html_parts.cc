@@ -12,10 +12,6 @@
 namespace mbv {
 namespace {
 
-std::string Details(const std::string& title, const std::string& content) {
-  return "<details><summary>" + Escape(title) + "</summary>" + content + "</details>\n";
-}
-
 Table MatrixTable(const std::string& caption, const Mat6& M, bool stiffness) {
   Table table{.caption = caption, .head = {Text("")}, .rows = {}};
   for (int j = 0; j < 6; ++j) {
@@ -65,40 +61,14 @@ std::string PairHtml(const StiffnessPair& pair) {
   return html;
 }
 
-// Horizontal bars, one per element and column.
-std::string BarsSvg(const std::vector<Contribution>& rows) {
-  constexpr double kRow = 20, kName = 190, kColumn = 230, kTop = 24;
-  const size_t shown = std::min<size_t>(rows.size(), 24);
-  const double height = kTop + kRow * static_cast<double>(shown) + 6;
-  std::string svg = fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
-      "height=\"{1:.0f}\" style=\"max-width:100%;height:auto\" font-size=\"12\" "
-      "fill=\"currentColor\" role=\"img\" aria-label=\"Compliance caused by each element\">\n",
-      kName + 2 * kColumn + 20, height);
-  double most = 1e-12;
+BarPlot BarsOf(const std::vector<Contribution>& rows) {
+  BarPlot plot{.title = "Compliance caused by each element",
+               .columns = {"against the weakest force", "against the weakest moment"},
+               .rows = {}};
   for (const Contribution& row : rows) {
-    most = std::max({most, std::abs(row.translation), std::abs(row.rotation)});
+    plot.rows.push_back({row.element, {row.translation, row.rotation}});
   }
-  const double scale = (kColumn - 70) / most;
-  svg += fmt::format(
-      "<text x=\"{}\" y=\"14\">against the weakest force</text>"
-      "<text x=\"{}\" y=\"14\">against the weakest moment</text>\n",
-      kName, kName + kColumn);
-  for (size_t k = 0; k < shown; ++k) {
-    const double y = kTop + kRow * static_cast<double>(k);
-    svg += fmt::format("<text x=\"{:.0f}\" y=\"{:.0f}\" text-anchor=\"end\">{}</text>\n", kName - 8,
-                       y + 13, Escape(rows[k].element));
-    for (const auto& [left, value, color] :
-         {std::tuple{kName, rows[k].translation, "#0072b2"},
-          std::tuple{kName + kColumn, rows[k].rotation, "#d55e00"}}) {
-      const double width = std::max(0.5, scale * std::abs(value));
-      svg += fmt::format(
-          "<rect x=\"{:.0f}\" y=\"{:.0f}\" width=\"{:.1f}\" height=\"14\" fill=\"{}\"/>"
-          "<text x=\"{:.1f}\" y=\"{:.0f}\">{:.2f} %</text>\n",
-          left, y + 2, width, color, left + width + 5, y + 13, 100 * value);
-    }
-  }
-  return svg + "</svg>\n";
+  return plot;
 }
 
 // As the paper's Fig. 17: theory and simulation per load, one figure per direction.
@@ -211,20 +181,19 @@ std::string StiffnessMatricesHtml(const StiffnessReport& report) {
       if (witness.result.C.allFinite()) {
         tables += ToHtml(MatrixTable("C = K⁻¹, " + witness.name, witness.result.C, false));
       }
-      html += &witness == shown ? tables : Details("K and C, " + witness.name, tables);
+      html += &witness == shown ? tables : Folded("K and C, " + witness.name, tables);
     }
   }
   std::string differences;
   for (const StiffnessPair& pair : report.comparison.pairs) differences += PairHtml(pair);
-  if (!differences.empty()) html += Details("Differences, every entry", differences);
+  if (!differences.empty()) html += Folded("Differences, every entry", differences);
   for (const StiffnessPair& pair : report.printed_pairs) {
     if (!pair.compared) continue;
     const WorstEntry& worst = pair.metrics.at(StiffnessMetric::kStiffnessEntry);
     html += "<p>The paper's own model differs by up to " +
             fmt::format("<b>{:.3g} %</b> of √(K<sub>ii</sub> K<sub>jj</sub>) at {}",
                         100 * worst.value, Escape(worst.where)) +
-            "; this is stated, not judged.</p>\n" +
-            Details("The paper's own model", PairHtml(pair));
+            "; this is stated, not judged.</p>\n" + Folded("The paper's own model", PairHtml(pair));
   }
   return html;
 }
@@ -287,7 +256,7 @@ std::string ContributionsHtml(const StiffnessReport& report) {
     for (int i = 0; i < 6; ++i) cells.push_back(Digits(fmt::format("{:.2f}", 100 * row.axis[i])));
     table.rows.push_back(std::move(cells));
   }
-  return BarsSvg(rows) + ToHtml(table) +
+  return ToSvg(BarsOf(rows)) + ToHtml(table) +
          Note(
              "The column of an axis is the share of C<sub>ii</sub>: stiffening an element by a "
              "factor takes that part of its share away.");
@@ -309,10 +278,10 @@ std::string LoadsHtml(const StiffnessReport& report) {
   if (main == nullptr || !main->loads) return html;
   html += "<div class=\"pictures static-plots\">\n";
   for (int axis = 3; axis < 6; ++axis) {
-    html += "<figure>" + ToSvg(LoadPlot(report, *main, axis)) + "</figure>\n";
+    html += FigureHtml(ToSvg(LoadPlot(report, *main, axis)));
   }
-  html += "<figure>" + ToSvg(ErrorPlot(report, *main)) + "</figure>\n</div>\n";
-  return html + Details("Every load", ToHtml(DisplacementTable(report, *main)));
+  html += FigureHtml(ToSvg(ErrorPlot(report, *main))) + "</div>\n";
+  return html + Folded("Every load", ToHtml(DisplacementTable(report, *main)));
 }
 
 }  // namespace mbv

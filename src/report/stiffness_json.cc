@@ -1,14 +1,13 @@
 #include <cmath>
 
-#include "report/json_number.h"
+#include "report/json_text.h"
+#include "report/result_json.h"
 #include "report/stiffness_report.h"
 
 namespace mbv {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-constexpr const char* kSchema = "mbverify.summary/1";
 
 template <typename Matrix>
 Json VectorJson(const Matrix& values) {
@@ -21,22 +20,6 @@ Json MatrixJson(const Mat6& M) {
   Json json = Json::array();
   for (int i = 0; i < 6; ++i) json.push_back(VectorJson(Vec6(M.row(i))));
   return json;
-}
-
-Json ChecksJson(const StiffnessComparison& comparison, bool on) {
-  Json checks = Json::array();
-  for (const StiffnessCheck& check : comparison.checks) {
-    if (check.limit.has_value() != on) continue;
-    Json json = {{"name", check.name}, {"value", Number(check.value)}};
-    if (on) {
-      json["limit"] = *check.limit;
-      json["pass"] = check.pass;
-      json["time_s"] = nullptr;
-      json["channel"] = check.where;
-    }
-    checks.push_back(std::move(json));
-  }
-  return checks;
 }
 
 Json LoadErrorsJson(const LoadErrors& errors) {
@@ -77,20 +60,13 @@ Json ContributionsJson(const StiffnessResult& result) {
   return json;
 }
 
-Json WitnessJson(const StiffnessWitness& witness) {
+Json WitnessJson(const StiffnessWitness& witness, const ResultView& view) {
   const StiffnessResult& result = witness.result;
-  Json json = {{"name", witness.name},
-               {"ran", result.summary.ok()},
-               {"stop", ToText(result.summary.stop)},
-               {"message", result.summary.message},
-               {"rank", result.rank},
-               {"K", MatrixJson(result.K)},
-               {"C", MatrixJson(result.C)}};
-  if (!result.summary.ok() && result.summary.stop != Stop::kNotRun) {
-    json["where"] = result.summary.where;
-    json["amount"] = Number(result.summary.amount);
-    json["unit"] = result.summary.unit;
-  }
+  Json json = WitnessHead(witness.name, result.summary);
+  json["rank"] = result.rank;
+  json["K"] = MatrixJson(result.K);
+  json["C"] = MatrixJson(result.C);
+  AddBreakdown(view, result.summary, &json);
   if (std::isfinite(witness.residual)) json["residual"] = witness.residual;
   if (std::isfinite(witness.extrapolation_error)) {
     json["extrapolation"] = witness.extrapolation_error;
@@ -99,9 +75,9 @@ Json WitnessJson(const StiffnessWitness& witness) {
   return json;
 }
 
-Json WitnessesJson(const std::vector<StiffnessWitness>& witnesses) {
+Json WitnessesJson(const std::vector<StiffnessWitness>& witnesses, const ResultView& view) {
   Json json = Json::array();
-  for (const StiffnessWitness& witness : witnesses) json.push_back(WitnessJson(witness));
+  for (const StiffnessWitness& witness : witnesses) json.push_back(WitnessJson(witness, view));
   return json;
 }
 
@@ -132,18 +108,6 @@ Json WeakestJson(const Mat6& C) {
             {"pitch_m", Number(screw.pitch_m)}}}};
 }
 
-Json CountsJson(const StiffnessReport& report) {
-  size_t ran = 0, compared = 0, limits = 0;
-  for (const StiffnessWitness& witness : report.witnesses) ran += witness.result.summary.ok();
-  for (const StiffnessPair& pair : report.comparison.pairs) compared += pair.compared ? 1 : 0;
-  for (const StiffnessCheck& check : report.comparison.checks) limits += check.limit ? 1 : 0;
-  return {{"witnesses_ran", ran},
-          {"pairs_compared", compared},
-          {"checks", limits},
-          {"checks_verified", report.comparison.verified()},
-          {"checks_off", report.comparison.checks.size() - limits}};
-}
-
 Json PoseJson(const StiffnessReport& report) {
   Json json = Json::object();
   for (const PoseEntry& entry : report.pose) json[entry.name] = Number(entry.value);
@@ -153,30 +117,13 @@ Json PoseJson(const StiffnessReport& report) {
 }  // namespace
 
 std::string ToJson(const StiffnessReport& report) {
-  const StiffnessComparison& comparison = report.comparison;
-  Json json = {{"schema", kSchema},
-               {"kind", "stiffness"},
-               {"scenario", report.scenario},
-               {"scenario_file", report.scenario_file},
-               {"mechanism", report.mechanism},
-               {"model_file", report.model_file},
-               {"description", report.description},
-               {"verdict", ToText(comparison.verdict)},
-               {"reason", comparison.reason},
-               {"exit_code", report.exit_code},
-               {"attribution",
-                {{"odd_one_out", comparison.attribution.odd_one_out},
-                 {"text", comparison.attribution.text}}},
-               {"checks", ChecksJson(comparison, true)},
-               {"checks_off", ChecksJson(comparison, false)},
-               {"metrics", MetricsJson(report)},
-               {"witnesses", WitnessesJson(report.witnesses)},
-               {"printed", WitnessesJson(report.printed)}};
-  json["not_compared"] = Json::array();
-  for (const NotCompared& item : comparison.not_compared) {
-    json["not_compared"].push_back({{"what", item.what}, {"why", item.why}});
-  }
-  json["counts"] = CountsJson(report);
+  const ResultView view = ViewOf(report);
+  Json json = SummaryHead(view);
+  json["metrics"] = MetricsJson(report);
+  json["witnesses"] = WitnessesJson(report.witnesses, view);
+  json["printed"] = WitnessesJson(report.printed, view);
+  json["not_compared"] = NotComparedJson(view);
+  json["counts"] = CountsJson(view);
   json["output"] = report.output;
   json["pose"] = PoseJson(report);
   json["analytic_model"] = report.model;
@@ -184,18 +131,9 @@ std::string ToJson(const StiffnessReport& report) {
   json["indices"] = IndicesJson(report);
   if (const StiffnessWitness* shown = report.Shown())
     json["weakest"] = WeakestJson(shown->result.C);
-  json["findings"] = Json::array();
-  for (const Finding& finding : report.findings.findings()) {
-    json["findings"].push_back(ToText(finding));
-  }
-  json["timing"] = {{"analytic_s", report.timing.analytic_s},
-                    {"reference_s", report.timing.reference_s},
-                    {"simulation_s", report.timing.simulation_s},
-                    {"render_s", report.timing.render_s},
-                    {"total_s", report.timing.total_s}};
-  json["versions"] = Json::object();
-  for (const auto& [name, version] : report.versions) json["versions"][name] = version;
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+  json["findings"] = FindingsJson(report.findings);
+  AddSummaryEnd(view, &json);
+  return Dump(json);
 }
 
 }  // namespace mbv

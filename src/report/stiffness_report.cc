@@ -31,14 +31,29 @@ const StiffnessWitness* StiffnessReport::WithShares() const {
   return nullptr;
 }
 
-RunCounts CountOf(const StiffnessReport& report) {
-  RunCounts counts{.scenarios = 1};
-  for (const StiffnessWitness& witness : report.witnesses) {
-    if (witness.result.summary.ok()) counts.ran = 1;
+ResultView ViewOf(const StiffnessReport& report) {
+  const StiffnessComparison& comparison = report.comparison;
+  ResultView view = ViewOfComparison(report, comparison);
+  view.kind = "stiffness";
+  view.look = {
+      .signs = false, .capitals = false, .margins = false, .steps = false, .title_width = 32};
+  for (const StiffnessCheck& check : comparison.checks) {
+    view.checks.push_back({.name = check.name,
+                           .subject = check.subject,
+                           .title = RowOf(check.metric).title,
+                           .value = check.value,
+                           .limit = check.limit,
+                           .pass = check.pass,
+                           .where = check.where});
   }
-  counts.compared = report.comparison.MainPair() != nullptr ? 1 : 0;
-  counts.verified = report.comparison.verdict == Verdict::kAgree ? 1 : 0;
-  return counts;
+  for (const StiffnessWitness& witness : report.witnesses) {
+    view.witnesses.emplace_back(witness.name, witness.result.summary);
+  }
+  if (const StiffnessPair* pair = comparison.MainPair()) {
+    view.main_pair = fmt::format("K {} vs {}", pair->measured, pair->truth);
+    view.main_check = pair->name() + ".stiffness_entry";
+  }
+  return view;
 }
 
 std::string StiffnessCsv(const StiffnessReport& report) {

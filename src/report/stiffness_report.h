@@ -2,14 +2,12 @@
 #pragma once
 
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "comparison/stiffness_comparison.h"
 #include "comparison/stiffness_measures.h"
-#include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
-#include "report/report.h"
+#include "report/result.h"
 
 namespace mbv {
 
@@ -25,8 +23,7 @@ struct PoseEntry {
   std::string unit;  ///< "m" or "rad"
 };
 
-struct StiffnessReport {
-  std::string scenario, scenario_file, mechanism, model_file, description;
+struct StiffnessReport : ResultFrame {
   std::string output;
   std::vector<PoseEntry> pose;
   std::string pose_note;                    ///< where the pose comes from, if not from the scenario
@@ -39,10 +36,6 @@ struct StiffnessReport {
   std::vector<Vec6> loads;
   std::string loads_text;
   StiffnessComparison comparison;
-  int exit_code = 3;
-  Diagnostics findings;
-  Timing timing;
-  std::vector<std::pair<std::string, std::string>> versions;
   std::vector<Parameter> parameters;
   std::vector<std::string> arguments;  ///< of the command line, after the scenario file
   std::string command;                 ///< "mbverify run FILE …"
@@ -65,9 +58,8 @@ struct StiffnessReport {
 
 /// For a terminal.
 [[nodiscard]] std::string ToTable(const StiffnessReport& report, const TableOptions& options);
-[[nodiscard]] std::string VerdictLine(const StiffnessReport& report, const TableOptions& options);
 
-[[nodiscard]] RunCounts CountOf(const StiffnessReport& report);
+[[nodiscard]] ResultView ViewOf(const StiffnessReport& report);
 
 /// report.html: one page that needs no other file and no script.
 [[nodiscard]] std::string ToHtml(const StiffnessReport& report);

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/svg.h"
 #include "report/html_text.h"
 #include "report/svg_contours.h"
 
@@ -20,6 +21,8 @@ constexpr double kWidth = 720, kHeight = 520;
 constexpr double kRoundOff = 1e-9;  // a smaller relative range is shown as a constant
 constexpr int kMostTicks = 16;
 constexpr double kLeft = 84, kRight = 24, kTop = 44, kBottom = 60;
+constexpr double kOverlap = 0.3;  // of neighbouring cells, or the ground would shine through
+constexpr const char* kGridColor = "#dddddd";
 
 struct Axis {
   double low = std::numeric_limits<double>::infinity();
@@ -74,14 +77,22 @@ struct Axis {
   }
 };
 
-std::string Header(const std::string& title, double height = kHeight) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0} {1}\" width=\"{0}\" "
-      "height=\"{1}\" font-family=\"sans-serif\" font-size=\"13\" "
-      "role=\"img\">\n<title>{2}</title>\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"#ffffff\"/>\n"
-      "<text x=\"{3}\" y=\"26\" font-size=\"16\">{2}</text>\n",
-      kWidth, height, Escape(title), kLeft);
+// The whole picture: on white, with a title.
+std::string Picture(const std::string& title, const std::string& content, double height = kHeight) {
+  return SvgElement(
+             "svg",
+             {{"xmlns", kSvgNamespace},
+              {"viewBox", fmt::format("0 0 {:g} {:g}", kWidth, height)},
+              {"width", kWidth},
+              {"height", height},
+              {"font-family", "sans-serif"},
+              {"font-size", "13"},
+              {"role", "img"}},
+             "\n" + SvgElement("title", {}, Escape(title)) + "\n" +
+                 SvgShape("rect", {{"width", "100%"}, {"height", "100%"}, {"fill", "#ffffff"}}) +
+                 "\n" + SvgText({{"x", kLeft}, {"y", "26"}, {"font-size", "16"}}, title) + "\n" +
+                 content) +
+         "\n";
 }
 
 std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
@@ -90,25 +101,38 @@ std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
   std::string svg;
   for (double v : x.Ticks()) {
     const double px = x.Px(v);
-    svg += fmt::format(
-        "<line x1=\"{0:.1f}\" x2=\"{0:.1f}\" y1=\"{1:.1f}\" y2=\"{2:.1f}\" stroke=\"#dddddd\"/>"
-        "<text x=\"{0:.1f}\" y=\"{3:.1f}\" text-anchor=\"middle\">{4:g}</text>\n",
-        px, top, bottom, bottom + 18, v);
+    svg += SvgShape("line", {{"x1", px, 1},
+                             {"x2", px, 1},
+                             {"y1", top, 1},
+                             {"y2", bottom, 1},
+                             {"stroke", kGridColor}}) +
+           SvgText({{"x", px, 1}, {"y", bottom + 18, 1}, {"text-anchor", "middle"}},
+                   fmt::format("{:g}", v)) +
+           "\n";
   }
   for (double v : y.Ticks()) {
     const double px = y.Px(v);
-    svg += fmt::format(
-        "<line x1=\"{1:.1f}\" x2=\"{2:.1f}\" y1=\"{0:.1f}\" y2=\"{0:.1f}\" stroke=\"#dddddd\"/>"
-        "<text x=\"{3:.1f}\" y=\"{4:.1f}\" text-anchor=\"end\">{5:g}</text>\n",
-        px, left, right, left - 8, px + 4, v);
+    svg += SvgShape("line", {{"x1", left, 1},
+                             {"x2", right, 1},
+                             {"y1", px, 1},
+                             {"y2", px, 1},
+                             {"stroke", kGridColor}}) +
+           SvgText({{"x", left - 8, 1}, {"y", px + 4, 1}, {"text-anchor", "end"}},
+                   fmt::format("{:g}", v)) +
+           "\n";
   }
-  svg += fmt::format(
-      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"none\" "
-      "stroke=\"#444444\"/>\n<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>\n"
-      "<text transform=\"translate(18 {:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-      left, top, right - left, bottom - top, 0.5 * (left + right), bottom + 42, Escape(x_label),
-      0.5 * (top + bottom), Escape(y_label));
-  return svg;
+  const std::string turned = fmt::format("translate(18 {:.1f}) rotate(-90)", 0.5 * (top + bottom));
+  return svg +
+         SvgShape("rect", {{"x", left, 1},
+                           {"y", top, 1},
+                           {"width", right - left, 1},
+                           {"height", bottom - top, 1},
+                           {"fill", "none"},
+                           {"stroke", "#444444"}}) +
+         "\n" +
+         SvgText({{"x", 0.5 * (left + right), 1}, {"y", bottom + 42, 1}, {"text-anchor", "middle"}},
+                 x_label) +
+         "\n" + SvgText({{"transform", turned}, {"text-anchor", "middle"}}, y_label) + "\n";
 }
 
 // Widens the axis whose unit would be longer, so that both have one scale.
@@ -132,14 +156,16 @@ std::string Curve(const PlotLine& line, const char* color, const Axis& x, const 
     }
     path += fmt::format("{}{:.2f} {:.2f}", pen_down ? " L" : " M", x.Px(u), y.Px(v));
     if (line.markers) {
-      dots += fmt::format("<circle cx=\"{:.2f}\" cy=\"{:.2f}\" r=\"3.5\" fill=\"{}\"/>\n", x.Px(u),
-                          y.Px(v), color);
+      dots += SvgShape("circle",
+                       {{"cx", x.Px(u), 2}, {"cy", y.Px(v), 2}, {"r", "3.5"}, {"fill", color}}) +
+              "\n";
     }
     pen_down = true;
   }
   if (line.closed && !path.empty()) path += " Z";
-  return fmt::format("<path d=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"1.8\"/>\n{}", path,
-                     color, dots);
+  return SvgShape("path",
+                  {{"d", path}, {"fill", "none"}, {"stroke", color}, {"stroke-width", "1.8"}}) +
+         "\n" + dots;
 }
 
 struct LegendEntry {
@@ -159,10 +185,13 @@ std::string Legend(const std::vector<LegendEntry>& entries, double* height) {
   for (size_t i = 0; i < entries.size(); ++i) {
     const double left = kLeft + kColumn * static_cast<double>(i % columns);
     const double y = kHeight + 4 + kRow * static_cast<double>(i / columns);
-    svg += fmt::format(
-        "<line x1=\"{0}\" x2=\"{1}\" y1=\"{2}\" y2=\"{2}\" stroke=\"{3}\" stroke-width=\"2.5\"/>"
-        "<text x=\"{4}\" y=\"{5}\">{6}</text>\n",
-        left, left + 22, y - 4, entries[i].color, left + 28, y, Escape(entries[i].label));
+    svg += SvgShape("line", {{"x1", left},
+                             {"x2", left + 22},
+                             {"y1", y - 4},
+                             {"y2", y - 4},
+                             {"stroke", entries[i].color},
+                             {"stroke-width", "2.5"}}) +
+           SvgText({{"x", left + 28}, {"y", y}}, entries[i].label) + "\n";
   }
   *height += kRow * static_cast<double>((entries.size() + columns - 1) / columns);
   return svg;
@@ -202,10 +231,40 @@ std::string Contours(const MapPlot& plot, const Axis& x, const Axis& y, const Ax
       path += "M" + at(piece.from) + "L" + at(piece.to);
     }
   }
-  return path.empty() ? ""
-                      : "<path d=\"" + path +
-                            "\" fill=\"none\" stroke=\"#ffffff\" stroke-width=\"1\" "
-                            "stroke-opacity=\"0.7\"/>\n";
+  if (path.empty()) return "";
+  return SvgShape("path", {{"d", path},
+                           {"fill", "none"},
+                           {"stroke", "#ffffff"},
+                           {"stroke-width", "1"},
+                           {"stroke-opacity", "0.7"}}) +
+         "\n";
+}
+
+// What the colours stand for, to the right of the map.
+std::string ColorBar(const Axis& value, const std::string& label) {
+  constexpr int kSteps = 50;
+  const double left = kWidth - kRight - 60, cell = (kHeight - kBottom - kTop) / kSteps;
+  std::string svg;
+  for (int i = 0; i < kSteps; ++i) {
+    svg += SvgShape("rect", {{"x", left, 1},
+                             {"y", kHeight - kBottom - (i + 1) * cell, 2},
+                             {"width", "16"},
+                             {"height", cell + kOverlap, 2},
+                             {"fill", MapColor((i + 0.5) / kSteps)}}) +
+           "\n";
+  }
+  for (double v : value.Ticks()) {
+    svg += SvgText({{"x", left + 20, 1}, {"y", value.Px(v) + 4, 1}, {"font-size", "11"}},
+                   fmt::format("{:g}", v)) +
+           "\n";
+  }
+  return svg +
+         SvgText({{"x", kWidth - 8, 1},
+                  {"y", kTop - 8, 1},
+                  {"font-size", "12"},
+                  {"text-anchor", "end"}},
+                 label) +
+         "\n";
 }
 
 }  // namespace
@@ -232,8 +291,7 @@ std::string ToSvg(const LinePlot& plot) {
   }
   double height = kHeight;
   const std::string below = Legend(legend, &height);
-  return Header(plot.title, height) + Frame(x, y, plot.x_label, plot.y_label) + curves + below +
-         "</svg>\n";
+  return Picture(plot.title, Frame(x, y, plot.x_label, plot.y_label) + curves + below, height);
 }
 
 std::string ToSvg(const MapPlot& plot) {
@@ -245,38 +303,26 @@ std::string ToSvg(const MapPlot& plot) {
   if (!(value.low <= value.high)) value.low = 0, value.high = 1;
   if (value.low == value.high) value.high = value.low + 1;
 
-  std::string svg = Header(plot.title);
+  std::string cells;
   const double w = std::abs(x.Px(plot.x_max) - x.Px(plot.x_min)) / plot.columns;
   const double h = std::abs(y.Px(plot.y_max) - y.Px(plot.y_min)) / plot.rows;
-  svg += "<g shape-rendering=\"crispEdges\">\n";
   for (int r = 0; r < plot.rows; ++r) {
     for (int c = 0; c < plot.columns; ++c) {
       const double v = plot.values[static_cast<size_t>(r) * plot.columns + c];
       if (!value.Shows(v)) continue;
       const double t = (value.Inner(v) - value.low) / (value.high - value.low);
-      svg += fmt::format(
-          "<rect x=\"{:.2f}\" y=\"{:.2f}\" width=\"{:.2f}\" height=\"{:.2f}\" fill=\"{}\"/>\n",
-          x.Px(plot.x_min) + c * w, y.Px(plot.y_min) - (r + 1) * h, w + 0.3, h + 0.3, MapColor(t));
+      cells += SvgShape("rect", {{"x", x.Px(plot.x_min) + c * w, 2},
+                                 {"y", y.Px(plot.y_min) - (r + 1) * h, 2},
+                                 {"width", w + kOverlap, 2},
+                                 {"height", h + kOverlap, 2},
+                                 {"fill", MapColor(t)}}) +
+               "\n";
     }
   }
-  svg += "</g>\n";
+  std::string svg = SvgElement("g", {{"shape-rendering", "crispEdges"}}, "\n" + cells) + "\n";
   if (plot.contours > 0) svg += Contours(plot, x, y, value);
   svg += Frame(x, y, plot.x_label, plot.y_label);
-  const double bar_x = kWidth - kRight - 60;
-  for (int i = 0; i < 50; ++i) {
-    const double cell = (kHeight - kBottom - kTop) / 50;
-    svg += fmt::format(
-        "<rect x=\"{:.1f}\" y=\"{:.2f}\" width=\"16\" height=\"{:.2f}\" fill=\"{}\"/>\n", bar_x,
-        kHeight - kBottom - (i + 1) * cell, cell + 0.3, MapColor((i + 0.5) / 50));
-  }
-  for (double v : value.Ticks()) {
-    svg += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\">{:g}</text>\n", bar_x + 20,
-                       value.Px(v) + 4, v);
-  }
-  svg += fmt::format(
-      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"12\" text-anchor=\"end\">{}</text>\n",
-      kWidth - 8, kTop - 8, Escape(plot.value_label));
-  return svg + "</svg>\n";
+  return Picture(plot.title, svg + ColorBar(value, plot.value_label));
 }
 
 }  // namespace mbv

@@ -13,6 +13,7 @@
 #include "report/html_assets.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
+#include "report/result_html.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {
@@ -22,12 +23,12 @@ using Json = nlohmann::json;
 using synthetic::Case;
 
 // Two sliders, simulation 1 % off on d1; three frames in which body b moves along x.
-struct Page {
+struct BentPage {
   Case c;
   Report report;
   std::vector<std::vector<Pose>> poses;
 
-  Page() {
+  BentPage() {
     c.column = LimitColumn::kForward;
     synthetic::Stretch(&c.simulated, "d1.force", 1.01);
     report.scenario = "bent";
@@ -91,7 +92,7 @@ TEST(HtmlText, FloatsComeBackAsTheyWere) {
 }
 
 TEST(HtmlData, TheErrorIsRelativeToTheLargestForceOfItsUnit) {
-  const Page page;
+  const BentPage page;
   const Json data = Json::parse(PageData(page.input()));
   const Json& pair = data["pairs"][0];
   ASSERT_EQ(pair["name"], "simulated_vs_analytic");
@@ -103,7 +104,7 @@ TEST(HtmlData, TheErrorIsRelativeToTheLargestForceOfItsUnit) {
 }
 
 TEST(HtmlData, ThinningKeepsTheWorstSample) {
-  Page page;
+  BentPage page;
   // One wrong sample among 10001.
   Trace exact;
   exact.Reset(SampleTimes(100.0, 0.01), DriveChannels(page.c.mechanism));
@@ -119,7 +120,7 @@ TEST(HtmlData, ThinningKeepsTheWorstSample) {
 }
 
 TEST(HtmlData, PosesAreThoseOfTheSimulation) {
-  const Page page;
+  const BentPage page;
   const Json replay = Json::parse(PageData(page.input()))["replay"];
   EXPECT_TRUE(replay["simulated"]);
   EXPECT_EQ(replay["bodies"][1]["poses"].size(), 7U);  // at rest: one pose
@@ -131,14 +132,14 @@ TEST(HtmlData, PosesAreThoseOfTheSimulation) {
 }
 
 TEST(HtmlData, PosesEndWhereTheSimulationFailed) {
-  Page page;
+  BentPage page;
   page.poses[2][2].translation().setConstant(kNan);
   const Json replay = Json::parse(PageData(page.input()))["replay"];
   EXPECT_EQ(replay["time"].size(), 2U);
 }
 
 TEST(HtmlData, WithoutASimulationThereIsTheHomePose) {
-  const Page page;
+  const BentPage page;
   HtmlInput input = page.input();
   input.X_WB = nullptr;
   const Json replay = Json::parse(PageData(input))["replay"];
@@ -147,7 +148,7 @@ TEST(HtmlData, WithoutASimulationThereIsTheHomePose) {
 }
 
 TEST(HtmlData, NoNameEndsTheScript) {
-  Page page;
+  BentPage page;
   page.report.scenario = "x</script><b>";
   const std::string data = PageData(page.input());
   EXPECT_EQ(data.find('<'), std::string::npos);
@@ -157,7 +158,7 @@ TEST(HtmlData, NoNameEndsTheScript) {
 }
 
 TEST(HtmlPage, RunsNoScriptButItsOwn) {
-  const Page page;
+  const BentPage page;
   HtmlInput input = page.input();
   const std::string alone = ToHtml(input);
   EXPECT_NE(alone.find("script-src " + CspHash(PageScript()) + "\""), std::string::npos);
@@ -171,8 +172,8 @@ TEST(HtmlPage, RunsNoScriptButItsOwn) {
 }
 
 TEST(HtmlTables, FailedChecksComeFirst) {
-  const Page page;
-  const std::string html = ChecksHtml(page.report);
+  const BentPage page;
+  const std::string html = ChecksHtml(ViewOf(page.report), "");
   const size_t fail = html.rfind("pill fail"), ok = html.find("pill ok");
   ASSERT_NE(fail, std::string::npos);
   ASSERT_NE(ok, std::string::npos);
@@ -180,7 +181,7 @@ TEST(HtmlTables, FailedChecksComeFirst) {
 }
 
 TEST(HtmlPage, IsOneFileThatAsksForNothing) {
-  const Page page;
+  const BentPage page;
   const std::string html = ToHtml(page.input());
   EXPECT_TRUE(html.starts_with("<!doctype html>"));
   EXPECT_NE(html.find("default-src 'none'"), std::string::npos);

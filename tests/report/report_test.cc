@@ -169,12 +169,12 @@ TEST(Report, CountsTellRanComparedAndVerifiedApart) {
   alone.reference_summary = alone.simulated_summary = {.message = "off", .where = {}, .unit = {}};
   const Report ran_only = MakeReport(alone);
   RunCounts counts{.scenarios = 1, .bad_input = 1};
-  for (const Report* report : {&agreed, &disagreed, &ran_only}) counts += CountOf(*report);
+  for (const Report* report : {&agreed, &disagreed, &ran_only}) counts += CountOf(ViewOf(*report));
   EXPECT_EQ(CountLine(counts), "4 scenarios: 3 ran, 2 compared, 1 verified, 1 with bad input\n");
 }
 
 TEST(Report, TheShortLineNamesVerdictValueAndLimit) {
-  EXPECT_EQ(VerdictLine(MakeReport(BentCase()), {}),
+  EXPECT_EQ(VerdictLine(ViewOf(MakeReport(BentCase())), {}),
             "two_sliders / bent: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 18 "
             "checks exceed their limits\n");
 }

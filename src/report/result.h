@@ -1,0 +1,128 @@
+// What results of all kinds have in common. A kind (motion, stiffness, …) brings measurements and
+// one function
+//
+//   ResultView ViewOf(const KindReport&)
+//
+// From it the page (page.h, result_html.h), the text for a terminal (terminal_text.h) and
+// summary.json (result_json.h) take what every kind tells: title, verdict, findings, checks, what
+// was not compared, inputs and versions. Its own sections, tables and fields it adds there.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "comparison/comparison.h"
+#include "core/diagnostics.h"
+#include "core/run_summary.h"
+
+namespace mbv {
+
+struct Timing {
+  double analytic_s = 0.0, reference_s = 0.0, simulation_s = 0.0, stock_s = 0.0, render_s = 0.0;
+  double total_s = 0.0;
+  double loop_s = 0.0;  ///< inside the step loop of the judged simulation
+  long steps = 0;
+};
+
+/// What was run, of what, and with what.
+struct ResultFrame {
+  std::string scenario, scenario_file, mechanism, model_file, description;
+  int exit_code = 3;
+  Diagnostics findings;  ///< warnings, range violations
+  Timing timing;
+  std::vector<std::pair<std::string, std::string>> versions;
+
+  [[nodiscard]] std::string title() const { return mechanism + " / " + scenario; }
+};
+
+/// A check as it is shown.
+struct ShownCheck {
+  std::string name, subject;  ///< "simulated_vs_analytic.force_nrmse" and its first part
+  std::string title;          ///< for people, with unit
+  double value = kNan;
+  std::optional<double> limit;  ///< empty: switched off
+  bool pass = false;
+  std::string where = {};             ///< channel or entry that is worst
+  double time_s = kNan;               ///< of that; NaN: not a matter of time
+  bool key = true;                    ///< a reader wants it even if it passes
+  std::optional<bool> verifies = {};  ///< false: it passes by itself; empty: all of the kind do
+  std::string blind = {};             ///< why passing verifies nothing; "" if it does
+  bool floored = false;               ///< relative to a floor above the quantity
+  std::optional<double> stated_limit = {};  ///< the scenario's, where another one was taken
+  std::string limit_by = {};                ///< from where then
+};
+
+/// How a check ended.
+enum class CheckEnd { kOff, kFail, kVoid, kHeld, kOk };
+[[nodiscard]] CheckEnd EndOf(const ShownCheck& check);
+/// "d1.force, 0.25 s"; "" without a place.
+[[nodiscard]] std::string WhereOf(const ShownCheck& check);
+
+/// Where kinds look different.
+struct ResultLook {
+  bool signs = true;        ///< ✓, ✗ or ? before the page's verdict
+  bool capitals = true;     ///< the page's sentences start with one
+  bool margins = true;      ///< limit over value, on the page
+  bool steps = true;        ///< simulated in time: steps and other engines are timed
+  size_t title_width = 26;  ///< of checks on a terminal
+};
+
+/// A result of any kind, as it is shown.
+struct ResultView {
+  const ResultFrame* frame = nullptr;
+  const char* kind = "";  ///< in summary.json; "" for motions, which came first
+  ResultLook look = {};
+
+  Verdict verdict = Verdict::kNotRun;
+  std::string reason = {};
+  std::optional<std::vector<std::string>> reservations = {};  ///< empty: the kind knows none
+  Attribution attribution = {};
+  std::vector<ShownCheck> checks = {};  ///< off ones included
+  std::vector<NotCompared> not_compared = {};
+  std::vector<std::pair<std::string, RunSummary>> witnesses = {};  ///< all, run or not
+  size_t pairs_compared = 0, verified = 0;
+  /// How many checks passed and verify nothing, and why; in summary.json.
+  std::vector<std::pair<const char*, size_t>> empty_counts = {};
+  /// The pair that a reader looks at first, and the name of its first check; "" without one.
+  std::string main_pair = {}, main_check = {};
+
+  [[nodiscard]] const ShownCheck* FindCheck(const std::string& name) const;
+  [[nodiscard]] size_t ran() const;     ///< witnesses
+  [[nodiscard]] size_t limits() const;  ///< checks that are not off
+};
+
+/// What any comparison says (comparison/verdict.h); the kind adds checks and witnesses.
+template <typename Judged>
+[[nodiscard]] ResultView ViewOfComparison(const ResultFrame& frame, const Judged& comparison) {
+  ResultView view{.frame = &frame,
+                  .verdict = comparison.verdict,
+                  .reason = comparison.reason,
+                  .attribution = comparison.attribution,
+                  .not_compared = comparison.not_compared,
+                  .verified = comparison.verified()};
+  for (const auto& pair : comparison.pairs) view.pairs_compared += pair.compared ? 1 : 0;
+  return view;
+}
+
+/// What several runs came to.
+struct RunCounts {
+  size_t scenarios = 0, ran = 0, compared = 0, verified = 0;
+  size_t bad_input = 0;  ///< not even loaded
+
+  RunCounts& operator+=(const RunCounts& other);
+};
+[[nodiscard]] RunCounts CountOf(const ResultView& view);
+
+/// The last line over several runs: "5 scenarios: 5 ran, 4 compared, 4 verified".
+[[nodiscard]] std::string CountLine(const RunCounts& counts);
+
+struct TableOptions {
+  bool color = false;
+  bool verbose = false;  ///< also how to read each signal, and what could not be compared
+};
+/// "stabilizing_platform / sea_state: AGREE  simulated vs analytic 4.2e-08 (limit 1.0e-07)".
+[[nodiscard]] std::string VerdictLine(const ResultView& view, const TableOptions& options);
+
+}  // namespace mbv
