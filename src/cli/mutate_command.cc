@@ -1,22 +1,21 @@
 // mbverify mutate
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
-#include <fstream>
 #include <limits>
 #include <memory>
 #include <optional>
-#include <sstream>
 #include <thread>
 #include <utility>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
+#include "core/files.h"
+#include "core/scratch_folder.h"
 #include "pipeline/mutate.h"
 #include "regress/find_cases.h"
 #include "regress/workers.h"
@@ -74,13 +73,6 @@ std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
   return options;
 }
 
-std::string ReadAll(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  std::stringstream content;
-  content << in.rdbuf();
-  return content.str();
-}
-
 // What a worker is started with: these arguments, for one part.
 std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
                                    const std::string& json) {
@@ -110,15 +102,13 @@ class Workers {
  public:
   explicit Workers(const MutateArguments& arguments)
       : arguments_(arguments), parts_(static_cast<size_t>(arguments.jobs)) {}
-  ~Workers() {
-    std::error_code ignored;
-    fs::remove_all(folder_, ignored);
-  }
-  Workers(const Workers&) = delete;
-  Workers& operator=(const Workers&) = delete;
 
   // Where a worker fails, the report has its exit code and nothing else, and what it said is told.
   MutationReport Run() {
+    if (!folder_.trouble().empty()) {
+      Say(stderr, "error: {}\n", folder_.trouble());
+      return Failed(3);
+    }
     std::vector<WorkerJob> jobs;
     for (size_t k = 0; k < parts_.size(); ++k) {
       jobs.push_back(
@@ -130,34 +120,37 @@ class Workers {
     pool.ended = [this](size_t part, const WorkerEnd& end) { Take(part, end); };
     (void)pool.Run(jobs);
     progress_.Clear();
-    if (failure_ == 0) return MergeParts(std::move(parts_));
-    MutationReport report;
-    report.exit_code = failure_;
-    return report;
+    return failure_ == 0 ? MergeParts(std::move(parts_)) : Failed(failure_);
   }
 
  private:
   [[nodiscard]] fs::path Place(size_t part, const char* ending) const {
-    return folder_ / fmt::format("{}.{}", part, ending);
+    return folder_.path() / fmt::format("{}.{}", part, ending);
+  }
+
+  static MutationReport Failed(int exit_code) {
+    MutationReport report;
+    report.exit_code = exit_code;
+    return report;
   }
 
   void Take(size_t part, const WorkerEnd& end) {
     progress_.Show(fmt::format("{} workers", arguments_.jobs),
                    static_cast<double>(++done_) / static_cast<double>(parts_.size()));
-    auto report = MutationReportOf(ReadAll(Place(part, "json")));
+    auto report = MutationReportOf(ReadWholeFile(Place(part, "json")).value_or(""));
     const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
     if (good) parts_[part] = *std::move(report);
     // All workers find the same in the files.
     if (std::exchange(told_, true) && (good || failure_ > 0)) return;
     progress_.Clear();
-    SayText(stderr, ReadAll(Place(part, "log")));
+    SayText(stderr, ReadWholeFile(Place(part, "log")).value_or(""));
     if (good) return;
     if (end.signal != 0) Say(stderr, "a worker was ended by signal {}\n", end.signal);
     failure_ = std::max(failure_, end.exit_code > 0 ? end.exit_code : 3);
   }
 
   const MutateArguments& arguments_;
-  const fs::path folder_ = fs::temp_directory_path() / fmt::format("mbverify_mutate_{}", getpid());
+  const ScratchFolder folder_{"mutate"};
   ProgressLine progress_{true};
   std::vector<MutationReport> parts_;
   size_t done_ = 0;

@@ -1,6 +1,5 @@
 // mbverify survey
 #include <fmt/format.h>
-#include <unistd.h>
 
 #include <filesystem>
 #include <memory>
@@ -10,6 +9,7 @@
 #include "cli/terminal.h"
 #include "core/files.h"
 #include "core/in_children.h"
+#include "core/scratch_folder.h"
 #include "pipeline/survey.h"
 
 namespace mbv {
@@ -20,27 +20,6 @@ namespace fs = std::filesystem;
 struct SurveyArguments {
   std::string folder, out;
   double timeout_s = 300.0;
-};
-
-// A folder for the children's files that goes with this object.
-class ScratchFolder {
- public:
-  ScratchFolder() {
-    std::error_code error;
-    fs::path base = fs::temp_directory_path(error);
-    std::string pattern = (error ? fs::path("/tmp") : base) / "mbverify-survey-XXXXXX";
-    if (mkdtemp(pattern.data()) != nullptr) path_ = pattern;
-  }
-  ~ScratchFolder() {
-    std::error_code error;
-    if (!path_.empty()) fs::remove_all(path_, error);
-  }
-  ScratchFolder(const ScratchFolder&) = delete;
-  ScratchFolder& operator=(const ScratchFolder&) = delete;
-  [[nodiscard]] const std::string& path() const { return path_; }
-
- private:
-  std::string path_;
 };
 
 SurveyRow RowOf(const std::string& file, const std::string& scratch, double timeout_s) {
@@ -88,15 +67,15 @@ int Survey(const SurveyArguments& arguments) {
     Say(stderr, "{}: error: no *.urdf and no MJCF file in this folder\n", arguments.folder);
     return 2;
   }
-  const ScratchFolder scratch;
-  if (scratch.path().empty()) {
-    Say(stderr, "error: no folder for temporary files can be made\n");
+  const ScratchFolder scratch("survey");
+  if (!scratch.trouble().empty()) {
+    Say(stderr, "error: {}\n", scratch.trouble());
     return 3;
   }
   std::vector<SurveyRow> rows;
   for (size_t i = 0; i < files.size(); ++i) {
-    rows.push_back(RowOf(files[i], (fs::path(scratch.path()) / fmt::format("{}", i)).string(),
-                         arguments.timeout_s));
+    rows.push_back(
+        RowOf(files[i], (scratch.path() / fmt::format("{}", i)).string(), arguments.timeout_s));
     rows.back().file = fs::path(files[i]).lexically_relative(arguments.folder).string();
     Say(stderr, "{} of {}: {} {}\n", i + 1, files.size(), rows.back().file, rows.back().status);
   }

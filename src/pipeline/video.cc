@@ -11,12 +11,12 @@
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <map>
 #include <sstream>
 #include <vector>
 
 #include "core/demand.h"
+#include "core/files.h"
 
 extern char** environ;
 
@@ -47,11 +47,6 @@ bool IsInstalled(const std::string& program) {
     if (!folder.empty() && access((folder + "/" + program).c_str(), X_OK) == 0) return true;
   }
   return false;
-}
-
-std::string ReadFile(const fs::path& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
 }
 
 }  // namespace
@@ -94,19 +89,13 @@ VideoEncoder::~VideoEncoder() {
     kill(pid_, SIGKILL);
     waitpid(pid_, nullptr, 0);
   }
-  std::error_code error;
-  if (!folder_.empty()) fs::remove_all(folder_, error);
   std::signal(SIGPIPE, old_sigpipe_);
 }
 
 bool VideoEncoder::Start(const Picture& picture) {
-  std::error_code error;
-  std::string pattern = (fs::temp_directory_path(error) / "mbverify-video-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) {
-    trouble_ = fmt::format("cannot make a folder {}: {}", pattern, std::strerror(errno));
-    return false;
-  }
-  folder_ = pattern;
+  folder_.emplace("video");
+  trouble_ = folder_->trouble();
+  if (!trouble_.empty()) return false;
   std::vector<std::string> words = {
       "ffmpeg",    "-hide_banner",
       "-loglevel", "error",
@@ -117,7 +106,7 @@ bool VideoEncoder::Start(const Picture& picture) {
       "-i",        "-"};
   const auto& codec = kCodecs.at(EndingOf(file_));
   words.insert(words.end(), codec.begin(), codec.end());
-  words.push_back(folder_ + "/video" + EndingOf(file_));
+  words.push_back(Film());
   std::vector<char*> argv;
   for (std::string& word : words) argv.push_back(word.data());
   argv.push_back(nullptr);
@@ -130,7 +119,7 @@ bool VideoEncoder::Start(const Picture& picture) {
   posix_spawn_file_actions_init(&actions);
   posix_spawn_file_actions_adddup2(&actions, ends[0], STDIN_FILENO);
   posix_spawn_file_actions_addopen(&actions, STDOUT_FILENO, "/dev/null", O_WRONLY, 0);
-  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, (folder_ + "/log").c_str(),
+  posix_spawn_file_actions_addopen(&actions, STDERR_FILENO, (folder_->path() / "log").c_str(),
                                    O_WRONLY | O_CREAT, 0600);
   const int failure = posix_spawnp(&pid_, "ffmpeg", &actions, nullptr, argv.data(), environ);
   posix_spawn_file_actions_destroy(&actions);
@@ -155,8 +144,10 @@ bool VideoEncoder::Add(const Picture& picture) {
   return true;
 }
 
+fs::path VideoEncoder::Film() const { return folder_->path() / ("video" + EndingOf(file_)); }
+
 std::string VideoEncoder::LogTail() const {
-  const std::string log = ReadFile(folder_ + "/log");
+  const std::string log = ReadWholeFile(folder_->path() / "log").value_or("");
   return log.empty() ? "no message" : log.substr(log.size() - std::min<size_t>(log.size(), 400));
 }
 
@@ -169,7 +160,7 @@ std::string VideoEncoder::Finish(std::string* content) {
   waitpid(pid_, &status, 0);
   pid_ = -1;
   if (!WIFEXITED(status) || WEXITSTATUS(status) != 0) return "ffmpeg failed: " + LogTail();
-  *content = ReadFile(folder_ + "/video" + EndingOf(file_));
+  *content = ReadWholeFile(Film()).value_or("");
   return content->empty() ? "ffmpeg wrote nothing: " + LogTail() : "";
 }
 

@@ -3,8 +3,11 @@
 
 #include <sys/types.h>
 
+#include <filesystem>
+#include <optional>
 #include <string>
 
+#include "core/scratch_folder.h"
 #include "render/render.h"
 
 namespace mbv {
@@ -34,11 +37,12 @@ class VideoEncoder {
 
  private:
   [[nodiscard]] bool Start(const Picture& picture);
+  [[nodiscard]] std::filesystem::path Film() const;  // where ffmpeg writes
   [[nodiscard]] std::string LogTail() const;
 
   const std::string file_;
   const double frames_per_s_;
-  std::string folder_;  // temporary: the video and ffmpeg's log
+  std::optional<ScratchFolder> folder_;  // the video and ffmpeg's log
   std::string trouble_;
   int pipe_ = -1;
   pid_t pid_ = -1;

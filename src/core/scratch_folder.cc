@@ -1,0 +1,35 @@
+#include "core/scratch_folder.h"
+
+#include <fmt/format.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <system_error>
+
+namespace mbv {
+
+namespace fs = std::filesystem;
+
+ScratchFolder::ScratchFolder(const std::string& purpose) {
+  std::error_code error;
+  const fs::path below = fs::temp_directory_path(error);
+  if (error) {
+    trouble_ =
+        fmt::format("no folder for temporary files ({}): {}", below.string(), error.message());
+    return;
+  }
+  std::string pattern = below / fmt::format("mbverify-{}-XXXXXX", purpose);
+  if (mkdtemp(pattern.data()) != nullptr) {
+    path_ = pattern;
+  } else {
+    trouble_ = fmt::format("cannot make a folder in {}: {}", below.string(), std::strerror(errno));
+  }
+}
+
+ScratchFolder::~ScratchFolder() {
+  std::error_code error;
+  if (!path_.empty()) fs::remove_all(path_, error);
+}
+
+}  // namespace mbv
