@@ -1,122 +1,22 @@
 #include "kinematics/assembly.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numbers>
-#include <numeric>
 #include <random>
 
 #include "core/spatial.h"
-#include "kinematics/closure_residual.h"
-#include "kinematics/constraints.h"
+#include "kinematics/assembly_residual.h"
+#include "kinematics/damped_search.h"
 #include "kinematics/home.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
+#include "mechanism/spanning_tree.h"
 
 namespace mbv {
-namespace internal {
-namespace {
-
-// d log(R)/dt = L ω for Ṙ = [ω]× R, the inverse left Jacobian of SO(3).
-Mat3 LogDerivative(const Vec3& r) {
-  const double angle = r.norm();
-  const Mat3 S = Skew(r);
-  double k = 1.0 / 12.0;
-  if (angle > 1e-3) k = (1.0 - 0.5 * angle / std::tan(0.5 * angle)) / (angle * angle);
-  return Mat3::Identity() - 0.5 * S + k * S * S;
-}
-
-// Rotation vector that turns the unit vector a onto m by the shortest way, and its derivative by
-// the angular velocity of m.
-void Alignment(const Vec3& a, const Vec3& m, Vec3* r, Mat3* J) {
-  const Vec3 cross = a.cross(m);
-  const double sine = cross.norm(), angle = std::atan2(sine, a.dot(m));
-  if (sine < 1e-12 && angle < 1.0) {
-    r->setZero();
-    *J = Mat3::Identity() - a * a.transpose();
-    return;
-  }
-  // Against each other any way is as short: some perpendicular axis.
-  const Vec3 n = sine < 1e-12 ? Vec3(a.unitOrthogonal()) : Vec3(cross / sine);
-  constexpr double kSteepest = 10.0;  // where the shortest way jumps from one side to the other
-  const double k = sine < angle / kSteepest ? kSteepest : angle / sine;
-  *r = angle * n;
-  *J = n * n.transpose() + k * a.cross(n) * m.cross(n).transpose();
-}
-
-// Rows of the rotation, in F, and their derivative by the angular velocity of M against F.
-void RotationRows(const Joint& joint, const Mat3& R_FM, VecX* r, MatX* J) {
-  switch (joint.kind) {
-    case JointKind::kSpherical:
-    case JointKind::kFree:
-      r->resize(0);
-      J->resize(0, 3);
-      return;
-    case JointKind::kFixed:
-    case JointKind::kPrismatic: {
-      const Vec3 log = LogRotation(R_FM);
-      *r = log;
-      *J = LogDerivative(log);
-      return;
-    }
-    case JointKind::kRevolute:
-    case JointKind::kCylindrical:
-    case JointKind::kPlanar: {
-      Vec3 v;
-      Mat3 D;
-      Alignment(joint.axis, R_FM * joint.axis, &v, &D);
-      *r = v;
-      *J = D;
-      return;
-    }
-    case JointKind::kUniversal: {
-      const Vec3 m = R_FM * joint.axis2;
-      const Vec3 cross = joint.axis.cross(m);
-      const double sine = cross.norm();
-      const Vec3 n = sine < 1e-12 ? Vec3(joint.axis.unitOrthogonal()) : Vec3(cross / sine);
-      r->resize(1);
-      (*r)[0] = std::atan2(sine, joint.axis.dot(m)) -
-                std::atan2(joint.axis.cross(joint.axis2).norm(), joint.axis.dot(joint.axis2));
-      *J = n.transpose();
-      return;
-    }
-  }
-}
-
-}  // namespace
-
-ClosureGap AssemblyResidual(const Joint& joint, const ClosureFrames& frames, double length) {
-  BodyStates states;
-  states.Resize(2);
-  states.X_WB = {frames.X_WP, frames.X_WC};
-  Joint alone = joint;
-  alone.parent = 0;
-  alone.child = 1;
-  const ConstraintRows rows = RowsOf(alone, states, false);
-  const int n = rows.translation_rows;
-
-  const Mat3 R_WF = frames.X_WP.linear() * joint.X_PF.linear();
-  VecX r;
-  MatX D;
-  RotationRows(joint, R_WF.transpose() * frames.X_WC.linear() * joint.X_CM.linear(), &r, &D);
-  ClosureGap gap;
-  gap.residual.resize(n + r.size());
-  gap.residual << rows.residual.head(n) / length, r;
-  gap.J_parent = gap.J_child = MatX::Zero(n + r.size(), 6);
-  gap.J_parent.topRows(n) = rows.J_parent.topRows(n) / length;
-  gap.J_child.topRows(n) = rows.J_child.topRows(n) / length;
-  if (r.size() == 0) return gap;
-  gap.J_child.bottomLeftCorner(r.size(), 3) = D * R_WF.transpose();
-  gap.J_parent.bottomLeftCorner(r.size(), 3) = -D * R_WF.transpose();
-  return gap;
-}
-
-}  // namespace internal
-
 namespace {
 
 using internal::TreeMotion;
@@ -126,15 +26,6 @@ struct PartOfTree {
   Mechanism mechanism;
   double length = 1.0;
 };
-
-int Inboard(const Mechanism& m, size_t t) {
-  const Joint& joint = m.joints[m.tree_joints[t]];
-  return m.tree_reversed[t] ? joint.child : joint.parent;
-}
-int Outboard(const Mechanism& m, size_t t) {
-  const Joint& joint = m.joints[m.tree_joints[t]];
-  return m.tree_reversed[t] ? joint.parent : joint.child;
-}
 
 PartOfTree Extract(const Mechanism& whole, const LoopGroup& group) {
   PartOfTree part;
@@ -148,8 +39,8 @@ PartOfTree Extract(const Mechanism& whole, const LoopGroup& group) {
   for (const int j : group.joints) {
     const auto at = std::find(whole.tree_joints.begin(), whole.tree_joints.end(), j);
     const auto t = static_cast<size_t>(at - whole.tree_joints.begin());
-    add(Inboard(whole, t));  // the first one becomes the world
-    add(Outboard(whole, t));
+    add(InboardBody(whole, t));  // the first one becomes the world
+    add(OutboardBody(whole, t));
     m.tree_joints.push_back(static_cast<int>(m.joints.size()));
     m.tree_reversed.push_back(whole.tree_reversed[t]);
     m.joints.push_back(whole.joints[j]);
@@ -177,44 +68,40 @@ class GroupSolver {
   }
 
   [[nodiscard]] Closed Run(const JointCoordinates& start) const {
-    constexpr int kMaxIterations = 150;
-    constexpr double kLargestStep = 0.7;  // rad, or characteristic lengths
     std::vector<Pose> X_FM;
     for (size_t j = 0; j < m_.joints.size(); ++j) {
       X_FM.push_back(JointPose(m_.joints[j], start[j]));
     }
-    MatX J;
-    VecX r = Residual(tree_.States(X_FM), &J);
-    double mu = 1e-2;
+    const auto evaluate = [&](std::vector<Pose>* at, MatX* J) {
+      VecX r = Residual(tree_.States(*at), J);
+      *J = *J * unit_.asDiagonal();
+      return r;
+    };
+    const auto move = [&](const VecX& s, std::vector<Pose>* at) {
+      tree_.Step(unit_.cwiseProduct(s), at);
+    };
     int stalled = 0;
-    for (int i = 0; i < kMaxIterations && tree_.freedoms() > 0; ++i) {
-      if (r.norm() < kDone || stalled > 12) break;
-      VecX s = internal::DampedStep(J * unit_.asDiagonal(), r, mu);
-      if (const double largest = s.cwiseAbs().maxCoeff(); largest > kLargestStep) {
-        s *= kLargestStep / largest;
-      }
-      std::vector<Pose> next = X_FM;
-      tree_.Step(unit_.cwiseProduct(s), &next);
-      MatX J_next;
-      const VecX r_next = Residual(tree_.States(next), &J_next);
-      if (r_next.norm() < r.norm()) {
-        stalled = r_next.norm() > (1.0 - 1e-4) * r.norm() ? stalled + 1 : 0;
-        X_FM = std::move(next);
-        r = r_next;
-        J = J_next;
-        mu = std::max(0.2 * mu, 1e-14);
-      } else if (mu > 1e8) {
-        break;
-      } else {
-        mu *= 8.0;
-      }
-    }
+    const auto enough = [&](const internal::DampedStepMade& step) {
+      constexpr double kStalls = 1e-4;  // share of the residual that a step must win
+      const double now = step.r.norm();
+      if (step.better) stalled = now > (1.0 - kStalls) * step.before ? stalled + 1 : 0;
+      return now < kDone || stalled > 12;
+    };
+    const VecX r = internal::DampedSearch(kDamping, &X_FM, evaluate, move, enough);
     Closed closed{.q = start, .gap = r.norm()};
     const std::vector<Pose> X_WB = tree_.States(X_FM).X_WB;
     closed.q = JointCoordinatesAt(m_, X_WB, start);
     return closed;
   }
 
+  // Steps in rad, or characteristic lengths.
+  static constexpr internal::DampingRule kDamping{.most_steps = 150,
+                                                  .largest_step = 0.7,
+                                                  .first = 1e-2,
+                                                  .least = 1e-14,
+                                                  .most = 8e8,
+                                                  .easier = 0.2,
+                                                  .stronger = 8.0};
   /// Below this norm of the residual loops count as closed; the caller refines them.
   static constexpr double kDone = 1e-9;
 
@@ -384,99 +271,10 @@ class AssemblySearch {
 
 }  // namespace
 
-std::vector<LoopGroup> LoopGroups(const Mechanism& mechanism) {
-  const size_t n = mechanism.joints.size();
-  // Tree joint that carries each body.
-  std::vector<int> carrier(mechanism.bodies.size(), -1), inboard(mechanism.bodies.size(), 0);
-  std::vector<int> depth(mechanism.bodies.size(), 0);
-  for (size_t t = 0; t < mechanism.tree_joints.size(); ++t) {
-    const int out = Outboard(mechanism, t), in = Inboard(mechanism, t);
-    carrier[out] = mechanism.tree_joints[t];
-    inboard[out] = in;
-    depth[out] = depth[in] + 1;
-  }
-  // Union-find over tree joints and closures.
-  std::vector<size_t> root(n);
-  std::iota(root.begin(), root.end(), size_t{0});
-  const auto find = [&](size_t j) {
-    while (root[j] != j) j = root[j] = root[root[j]];
-    return j;
-  };
-  std::vector<bool> in_loop(n, false);
-  for (size_t c = 0; c < n; ++c) {
-    if (!mechanism.joints[c].closure) continue;
-    in_loop[c] = true;
-    int a = mechanism.joints[c].parent, b = mechanism.joints[c].child;
-    while (a != b) {
-      int& deeper = depth[a] >= depth[b] ? a : b;
-      const auto j = static_cast<size_t>(carrier[deeper]);
-      in_loop[j] = true;
-      root[find(j)] = find(c);
-      deeper = inboard[deeper];
-    }
-  }
-  std::vector<LoopGroup> groups;
-  std::map<size_t, size_t> group_of;
-  for (size_t c = 0; c < n; ++c) {
-    if (!mechanism.joints[c].closure) continue;
-    const auto [at, fresh] = group_of.emplace(find(c), groups.size());
-    if (fresh) groups.emplace_back();
-    groups[at->second].closures.push_back(static_cast<int>(c));
-  }
-  for (const int j : mechanism.tree_joints) {
-    if (in_loop[j]) groups[group_of.at(find(static_cast<size_t>(j)))].joints.push_back(j);
-  }
-  return groups;
-}
-
 GroupAssemblies FindAssemblies(const Mechanism& mechanism, const LoopGroup& group,
                                const std::vector<bool>& driven, const JointCoordinates& guess) {
   if (group.joints.empty()) return {.group = group, .assemblies = {}, .best = {}};
   return AssemblySearch(mechanism, group, driven, guess).Run();
-}
-
-std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& found) {
-  constexpr size_t kMostJoints = 4, kMostWays = 4;
-  // The joints in which the ways differ most, or which moved most.
-  std::vector<std::pair<double, size_t>> moved;
-  for (size_t k = 0; k < found.group.joints.size(); ++k) {
-    const Joint& joint = mechanism.joints[found.group.joints[k]];
-    if (FreedomsOf(joint.kind) == 0) continue;
-    double most = std::abs(found.assemblies.front().q[k][0] - joint.guess[0]);
-    for (const Assembly& way : found.assemblies) {
-      most = std::max(most, std::abs(way.q[k][0] - found.assemblies.front().q[k][0]));
-    }
-    moved.emplace_back(-most, k);
-  }
-  std::stable_sort(moved.begin(), moved.end());
-  moved.resize(std::min(moved.size(), kMostJoints));
-  const auto angles = [&](const Assembly& way) {
-    std::string text;
-    for (const auto& [change, k] : moved) {
-      const Joint& joint = mechanism.joints[found.group.joints[k]];
-      std::string values;
-      for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
-        values += fmt::format("{}{:.4g}", c == 0 ? "" : " ", way.q[k][c]);
-      }
-      text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", joint.name, values);
-    }
-    return text;
-  };
-  std::string text;
-  for (size_t i = 0; i < std::min<size_t>(found.group.closures.size(), 3); ++i) {
-    text += (i == 0 ? "" : ", ") + mechanism.joints[found.group.closures[i]].name;
-  }
-  if (found.group.closures.size() > 3) text += ", …";
-  text += fmt::format(": {} found, taken is {}",
-                      found.assemblies.size() == 1
-                          ? "1 way to close"
-                          : fmt::format("{} ways to close", found.assemblies.size()),
-                      angles(found.assemblies.front()));
-  for (size_t i = 1; i < std::min(found.assemblies.size(), kMostWays); ++i) {
-    text += (i == 1 ? "; others: " : " / ") + angles(found.assemblies[i]);
-  }
-  if (found.assemblies.size() > kMostWays) text += " / …";
-  return text;
 }
 
 }  // namespace mbv

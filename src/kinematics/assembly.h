@@ -10,21 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "kinematics/loop_groups.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
 
 /// Coordinates of every joint, by joint index.
 using JointCoordinates = std::vector<std::array<double, 6>>;
-
-/// Loops that share joints of the spanning tree, directly or by others.
-struct LoopGroup {
-  std::vector<int> closures;  ///< joints that close them
-  std::vector<int> joints;    ///< tree joints around them, inboard first
-};
-
-/// The groups of the spanning tree (BuildSpanningTree first), in the order of their first closure.
-[[nodiscard]] std::vector<LoopGroup> LoopGroups(const Mechanism& mechanism);
 
 /// One way to close a group.
 struct Assembly {
@@ -51,19 +43,4 @@ struct GroupAssemblies {
 /// "knee.A, knee.B: 3 ways to close; taken: knee = 0.42, …; also: knee = -1.2, …" for people.
 [[nodiscard]] std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& found);
 
-namespace internal {
-
-/// What is left open at a closure, and its derivative by the twists of its two bodies. Lengths are
-/// relative to `length`.
-struct ClosureGap {
-  VecX residual;
-  MatX J_parent, J_child;  ///< rows × 6
-};
-struct ClosureFrames {
-  Pose X_WP, X_WC;  ///< of parent and child body
-};
-[[nodiscard]] ClosureGap AssemblyResidual(const Joint& joint, const ClosureFrames& frames,
-                                          double length);
-
-}  // namespace internal
 }  // namespace mbv

@@ -6,6 +6,7 @@
 
 #include "core/types.h"
 #include "mechanism/body_states.h"
+#include "mechanism/mechanism.h"
 
 namespace mbv::internal {
 

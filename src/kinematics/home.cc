@@ -1,7 +1,6 @@
 // Levenberg–Marquardt on the loop closures in tree coordinates.
 //
-// With lengths divided by a characteristic length L, each step solves
-//   min |r + J s|² + μ |s|²                                                   (DampedStep)
+// Lengths are divided by a characteristic length L (kinematics/damped_search.h).
 #include "kinematics/home.h"
 
 #include <fmt/format.h>
@@ -13,6 +12,7 @@
 #include "core/demand.h"
 #include "kinematics/closure_residual.h"
 #include "kinematics/constraints.h"
+#include "kinematics/damped_search.h"
 #include "kinematics/frame_pair.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/joint_pose.h"
@@ -22,7 +22,6 @@ namespace mbv {
 namespace {
 
 using internal::ClosureResidual;
-using internal::DampedStep;
 using internal::TreeMotion;
 using Coordinates = std::vector<std::array<double, 6>>;
 
@@ -30,7 +29,6 @@ struct Attempt {
   std::vector<Pose> X_FM;
   BodyStates states;
   double gap = std::numeric_limits<double>::infinity();
-  int iterations = 0;
 };
 
 LoopGap GapOf(const Mechanism& mechanism, int j, const BodyStates& states) {
@@ -56,10 +54,17 @@ double LargestGap(const Mechanism& mechanism, const BodyStates& states, double l
   return largest;
 }
 
+// Steps in rad, or characteristic lengths.
+constexpr internal::DampingRule kDamping{.most_steps = 100,
+                                         .largest_step = 0.5,
+                                         .first = 1e-4,
+                                         .least = 1e-24,
+                                         .most = 3e9,
+                                         .easier = 0.1,
+                                         .stronger = 30.0};
+
 Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
               const Coordinates& start) {
-  constexpr int kMaxIterations = 100;
-  constexpr double kLargestStep = 0.5;  // rad, or characteristic lengths
   const double length = CharacteristicLength(mechanism);
   const TreeMotion tree(mechanism, locked);
   VecX unit(tree.freedoms());
@@ -69,33 +74,21 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
   for (size_t j = 0; j < start.size(); ++j) {
     now.X_FM.push_back(JointPose(mechanism.joints[j], start[j]));
   }
-  now.states = tree.States(now.X_FM);
-  MatX J;
-  VecX r = ClosureResidual(mechanism, tree, now.states, length, &J);
-  double mu = 1e-4;
-  for (; now.iterations < kMaxIterations && r.size() > 0 && tree.freedoms() > 0; ++now.iterations) {
-    if (r.cwiseAbs().maxCoeff() < 1e-16) break;
-    VecX s = DampedStep(J * unit.asDiagonal(), r, mu);
-    if (const double largest = s.cwiseAbs().maxCoeff(); largest > kLargestStep) {
-      s *= kLargestStep / largest;
-    }
-    Attempt next = now;
-    tree.Step(unit.cwiseProduct(s), &next.X_FM);
-    next.states = tree.States(next.X_FM);
-    MatX J_next;
-    const VecX r_next = ClosureResidual(mechanism, tree, next.states, length, &J_next);
-    if (r_next.norm() < r.norm()) {
-      now.X_FM = std::move(next.X_FM);
-      now.states = std::move(next.states);
-      r = r_next;
-      J = J_next;
-      mu = std::max(mu * 0.1, 1e-24);
-    } else {
-      // At round-off no step helps any more.
-      if (r.cwiseAbs().maxCoeff() < 0.1 * kHomeTolerance || mu > 1e8) break;
-      mu *= 30.0;
-    }
-  }
+  const auto evaluate = [&](Attempt* at, MatX* J) {
+    at->states = tree.States(at->X_FM);
+    MatX J_q;
+    VecX r = ClosureResidual(mechanism, tree, at->states, length, &J_q);
+    *J = J_q * unit.asDiagonal();
+    return r;
+  };
+  const auto move = [&](const VecX& s, Attempt* at) { tree.Step(unit.cwiseProduct(s), &at->X_FM); };
+  const auto enough = [](const internal::DampedStepMade& step) {
+    if (step.r.size() == 0) return true;
+    const double largest = step.r.cwiseAbs().maxCoeff();
+    // At round-off no step helps any more.
+    return largest < 1e-16 || (!step.better && largest < 0.1 * kHomeTolerance);
+  };
+  internal::DampedSearch(kDamping, &now, evaluate, move, enough);
   now.gap = LargestGap(mechanism, now.states, length);
   return now;
 }
@@ -152,8 +145,6 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
   const auto open = [&] { return best.gap > ToleranceAt(mechanism, best.states.X_WB); };
   const auto try_from = [&](const std::vector<bool>& locked, const Coordinates& start) {
     Attempt attempt = Close(mechanism, locked, start);
-    attempt.iterations += best.iterations;
-    best.iterations = attempt.iterations;
     if (attempt.gap >= best.gap) return false;
     best = std::move(attempt);
     return true;
@@ -264,7 +255,6 @@ HomeResult SolveHome(Mechanism* mechanism) {
   result.gap_at_guess = LargestGap(*mechanism, at_guess, length);
   result.tolerance = ToleranceAt(*mechanism, best.states.X_WB);
   result.closed = best.gap <= result.tolerance;
-  result.iterations = best.iterations;
   return result;
 }
 

@@ -29,7 +29,6 @@ struct HomeResult {
   bool guesses_moved = false;  ///< closed only by a search: may be another assembly than meant
   /// Of the groups of loops that had to be searched: the ways to close them.
   std::vector<GroupAssemblies> searched;
-  int iterations = 0;
   std::vector<LoopGap> gaps;  ///< per closure joint, worst first
 
   /// One line for people: "limb1.S is open by 0.12 m and 0.3 rad; …" (at most three loops).

@@ -4,6 +4,7 @@
 #include "kinematics/constraints.h"
 #include "kinematics/row_stack.h"
 #include "mechanism/reach.h"
+#include "mechanism/spanning_tree.h"
 
 namespace mbv {
 namespace {
@@ -13,10 +14,9 @@ std::vector<int> PathToWorld(const Mechanism& mechanism, int body) {
   std::vector<int> path;
   while (body != 0) {
     for (size_t t = 0; t < mechanism.tree_joints.size(); ++t) {
-      const Joint& joint = mechanism.joints[mechanism.tree_joints[t]];
-      if ((mechanism.tree_reversed[t] ? joint.parent : joint.child) != body) continue;
+      if (OutboardBody(mechanism, t) != body) continue;
       path.push_back(mechanism.tree_joints[t]);
-      body = mechanism.tree_reversed[t] ? joint.child : joint.parent;
+      body = InboardBody(mechanism, t);
       break;
     }
   }

@@ -32,4 +32,14 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
 /// The same with the hints that Joint::closure itself can carry: true = cut here, false = free.
 SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism);
 
+/// Body on the world's side of the t-th tree joint, and the one that this joint carries.
+[[nodiscard]] inline int InboardBody(const Mechanism& mechanism, size_t t) {
+  const Joint& joint = mechanism.joints[mechanism.tree_joints[t]];
+  return mechanism.tree_reversed[t] ? joint.child : joint.parent;
+}
+[[nodiscard]] inline int OutboardBody(const Mechanism& mechanism, size_t t) {
+  const Joint& joint = mechanism.joints[mechanism.tree_joints[t]];
+  return mechanism.tree_reversed[t] ? joint.parent : joint.child;
+}
+
 }  // namespace mbv

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <map>
 
-#include "mjcf/head_comment.h"
 #include "mjcf/plan.h"
 #include "mjcf/scene.h"
+#include "mjcf/sections.h"
 #include "mjcf/writer.h"
 
 namespace mbv {
@@ -29,96 +29,19 @@ class MjcfWriter {
   std::string Write() {
     xml_.Open("mujoco");
     xml_.Set("model", mechanism_.name);
-    WriteHead();
+    const mjcf::Sections sections{mechanism_, options_, plan_, &xml_};
+    mjcf::WriteHead(sections);
     WriteTree();
-    WriteTendons();
-    WriteEqualities();
+    mjcf::WriteTendons(sections);
+    mjcf::WriteEqualities(sections);
     WriteActuators();
-    WriteSensors();
+    mjcf::WriteSensors(sections);
     if (!options_.statics) WriteHomeKey();
     xml_.Close();
     return xml_.Text();
   }
 
  private:
-  void Option(const char* element, const char* name, const char* value) {
-    xml_.Open(element);
-    xml_.Set(name, value);
-    xml_.Close();
-  }
-
-  void WriteHead() {
-    xml_.Comment(mjcf::HeadComment(mechanism_, options_));
-    xml_.Open("compiler");
-    xml_.Set("angle", "radian");
-    xml_.Set("autolimits", "false");
-    xml_.Set("inertiafromgeom", "false");
-    xml_.Close();
-    xml_.Open("option");
-    xml_.Set("timestep", options_.step_s);
-    xml_.Set("gravity", mechanism_.gravity_W);
-    xml_.Set("integrator", "Euler");
-    xml_.Set("solver", "Newton");
-    xml_.Set("tolerance", "1e-14");
-    xml_.Set("jacobian", "dense");
-    xml_.Open("flag");
-    xml_.Set("contact", "disable");
-    xml_.Set("energy", "enable");
-    xml_.Close();
-    xml_.Close();
-    WriteSizes();
-    WriteDefaults();
-    if (!options_.pictures) return;
-    xml_.Open("visual");
-    xml_.Open("global");
-    xml_.Set("offwidth", "2560");
-    xml_.Set("offheight", "1920");
-    xml_.Close();
-    xml_.Close();
-    mjcf::WriteMaterials(mechanism_, &xml_);
-  }
-
-  // MuJoCo has room for 500 constraint rows and leaves out the rest.
-  void WriteSizes() {
-    constexpr size_t kRoom = 500;
-    size_t rows = mechanism_.drives.size() + mechanism_.prescribed.size();
-    for (const PlannedClosure& closure : plan_.closures) {
-      rows += closure.type == PlannedClosure::Type::kConnect ? 3 : 6;
-    }
-    if (rows <= kRoom) return;
-    xml_.Open("size");
-    xml_.Set("njmax", std::to_string(rows));
-    xml_.Close();
-  }
-
-  void WriteDefaults() {
-    xml_.Open("default");
-    if (!options_.default_softness) WriteSoftness();
-    Option("joint", "limited", "false");
-    Option("tendon", "limited", "false");
-    // Of all actuators: MuJoCo keeps one default for them.
-    xml_.Open("motor");
-    xml_.Set("ctrllimited", "false");
-    xml_.Set("forcelimited", "false");
-    xml_.Close();
-    xml_.Open("geom");
-    xml_.Set("contype", "0");
-    xml_.Set("conaffinity", "0");
-    xml_.Close();
-    xml_.Open("site");
-    xml_.Set("group", "3");
-    xml_.Set("size", "0.005");
-    xml_.Close();
-    xml_.Close();
-  }
-
-  void WriteSoftness() {
-    xml_.Open("equality");
-    xml_.Set("solref", std::array<double, 2>{options_.time_constant_steps * options_.step_s, 1.0});
-    xml_.Set("solimp", std::array<double, 5>{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0});
-    xml_.Close();
-  }
-
   void WriteTree() {
     xml_.Open("worldbody");
     if (options_.pictures) mjcf::WriteSurroundings(mechanism_, &xml_);
@@ -253,103 +176,11 @@ class MjcfWriter {
     }
   }
 
-  void WriteTendon(const std::string& name, double width) {
-    xml_.Open("spatial");
-    xml_.Set("name", name);
-    if (width > 0.0) xml_.Set("width", width);
-  }
-
-  void FinishTendon(const std::string& name) {
-    for (const char* end : {".from", ".to"}) {
-      xml_.Open("site");
-      xml_.Set("site", name + end);
-      xml_.Close();
-    }
-    xml_.Close();
-  }
-
-  void WriteTendons() {
-    bool any = !mechanism_.springs.empty();
-    for (const Drive& drive : mechanism_.drives) {
-      any = any || std::holds_alternative<DistanceDrive>(drive.kind);
-    }
-    if (!any) return;
-    xml_.Open("tendon");
-    for (const Drive& drive : mechanism_.drives) {
-      if (!std::holds_alternative<DistanceDrive>(drive.kind)) continue;
-      WriteTendon(drive.name, drive.radius);
-      FinishTendon(drive.name);
-    }
-    for (const SpringDamper& spring : mechanism_.springs) {
-      WriteTendon(spring.name, 0.0);
-      xml_.Set("stiffness", spring.stiffness);
-      xml_.Set("damping", spring.damping);
-      xml_.Set("springlength", spring.free_length_m);
-      FinishTendon(spring.name);
-    }
-    xml_.Close();
-  }
-
-  void WriteEqualities() {
-    if (plan_.closures.empty() && mechanism_.drives.empty() && mechanism_.prescribed.empty()) {
-      return;
-    }
-    xml_.Open("equality");
-    for (const PlannedClosure& closure : plan_.closures) WriteClosure(closure);
-    for (const Drive& drive : mechanism_.drives) {
-      const auto* driven = std::get_if<JointDrive>(&drive.kind);
-      const std::string name = mjcf::DriveEqualityName(drive);
-      if (driven == nullptr) {
-        WriteOn("tendon", name, "tendon1", drive.name, options_.guided);
-      } else if (IsGuided(driven->joint)) {
-        WriteOn("joint", name, "joint1",
-                mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate),
-                options_.guided);
-      }
-    }
-    for (const Prescribed& base : mechanism_.prescribed) {
-      WriteOn("joint", mjcf::BaseEqualityName(base), "joint1",
-              mjcf::JointName(mechanism_.joints[base.joint], 0));
-    }
-    xml_.Close();
-  }
-
-  // Balls and free joints have no scalar coordinate in MuJoCo.
-  bool IsGuided(int joint) const { return !HasBall(mechanism_.joints[joint].kind); }
-
-  void WriteClosure(const PlannedClosure& closure) {
-    const bool connect = closure.type == PlannedClosure::Type::kConnect;
-    const Joint& joint = mechanism_.joints[closure.joint];
-    xml_.Open(connect ? "connect" : "weld");
-    xml_.Set("name", closure.name);
-    xml_.Set("body1", plan_.bodies[closure.body1].name);
-    xml_.Set("body2", plan_.bodies[closure.body2].name);
-    if (connect) {
-      xml_.Set("anchor", Vec3(joint.X_CM.translation()));
-    } else {
-      // A weld's anchor lies on its second body; the relative pose is taken from home.
-      const bool split = closure.type == PlannedClosure::Type::kSplit;
-      const bool on_child = split && !closure.split_parent;
-      xml_.Set("anchor", Vec3((on_child ? joint.X_CM : joint.X_PF).translation()));
-    }
-    xml_.Close();
-  }
-
-  // An equality or sensor on one object.
-  void WriteOn(const char* element, const std::string& name, const char* object_key,
-               const std::string& object, bool active = true) {
-    xml_.Open(element);
-    xml_.Set("name", name);
-    if (!active) xml_.Set("active", "false");
-    xml_.Set(object_key, object);
-    xml_.Close();
-  }
-
   // One actuator on a drive's tendon or joint; `gain` is an attribute, or nullptr.
   void WriteActuator(const char* element, const std::string& name, const Drive& drive,
                      const char* gain, double value) {
     const auto* driven = std::get_if<JointDrive>(&drive.kind);
-    if (driven != nullptr && !IsGuided(driven->joint)) return;
+    if (driven != nullptr && !mjcf::IsGuided(mechanism_.joints[driven->joint])) return;
     xml_.Open(element);
     xml_.Set("name", name);
     if (driven == nullptr) {
@@ -403,41 +234,6 @@ class MjcfWriter {
       WriteActuator("velocity", drive.name + mjcf::kVelocityServo, drive, "kv", options_.kv[k]);
     }
     xml_.Close();
-  }
-
-  void WriteSensors() {
-    if (mechanism_.drives.empty() && plan_.closures.empty()) return;
-    xml_.Open("sensor");
-    for (const Drive& drive : mechanism_.drives) {
-      const auto* driven = std::get_if<JointDrive>(&drive.kind);
-      if (driven == nullptr) {
-        WriteOn("tendonpos", drive.name + ".position", "tendon", drive.name);
-      } else if (IsGuided(driven->joint)) {
-        WriteOn("jointpos", drive.name + ".position", "joint",
-                mjcf::JointName(mechanism_.joints[driven->joint], driven->coordinate));
-      } else {
-        continue;
-      }
-      WriteOn("actuatorfrc", drive.name + ".force", "actuator", drive.name);
-    }
-    for (const PlannedClosure& closure : plan_.closures) WriteClosureSensors(closure);
-    xml_.Close();
-  }
-
-  // The gap of every closure; its force only for split closures, where it is a tree force (MuJoCo
-  // 2.2.2 has no sensor for the force of a constraint).
-  void WriteClosureSensors(const PlannedClosure& closure) {
-    const std::string& name = mechanism_.joints[closure.joint].name;
-    xml_.Open("framepos");
-    xml_.Set("name", name + ".gap");
-    xml_.Set("objtype", "site");
-    xml_.Set("objname", name + ".M");
-    xml_.Set("reftype", "site");
-    xml_.Set("refname", name + ".F");
-    xml_.Close();
-    if (closure.type != PlannedClosure::Type::kSplit) return;
-    WriteOn("force", name + ".closure_force", "site", name + ".F");
-    WriteOn("torque", name + ".closure_torque", "site", name + ".F");
   }
 
   const Mechanism& mechanism_;

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "core/spatial.h"
-#include "kinematics/closure_residual.h"
+#include "kinematics/damped_search.h"
 #include "mechanism/reach.h"
 #include "reference/closure_solver.h"
 #include "reference/row_set.h"
@@ -18,6 +18,14 @@ namespace {
 
 constexpr double kHard = 1e3;      // weight of rows that should hold, against 1 of the others
 constexpr double kReached = 1e-6;  // residual [1] of a pose that closes after all
+// Steps in rad, or characteristic lengths: short, so that assemblies stay apart.
+constexpr DampingRule kDamping{.most_steps = 60,
+                               .largest_step = 0.3,
+                               .first = 1e-3,
+                               .least = 1e-12,
+                               .most = 1e12,
+                               .easier = 0.1,
+                               .stronger = 10.0};
 
 // All joint rows and commands as a weighted dense least-squares problem, lengths per L.
 class OpenLoops {
@@ -68,35 +76,17 @@ class OpenLoops {
     return twists;
   }
 
-  // Levenberg–Marquardt from `states`, which end at the best compromise.
+  // From `states`, which end at the best compromise.
   void Minimise(BodyStates* states) {
-    constexpr int kMostSteps = 60;
-    constexpr double kLargestStep = 0.3;  // rad, or characteristic lengths: assemblies stay apart
-    constexpr double kFirstDamping = 1e-3, kLeastDamping = 1e-12, kMostDamping = 1e12;
     constexpr double kSettled = 1e-9;    // a smaller share of the residual is no progress
     constexpr double kRounding = 1e-12;  // of scaled rows
-    MatX J;
-    VecX r = Evaluate(*states, true, &J);
-    double mu = kFirstDamping;
-    for (int i = 0; i < kMostSteps && mu < kMostDamping; ++i) {
-      VecX step = DampedStep(J, r, mu);
-      const double largest = step.cwiseAbs().maxCoeff();
-      if (largest > kLargestStep) step *= kLargestStep / largest;
-      BodyStates next = *states;
-      MoveBodies(Unscaled(step), &next);
-      MatX J_next;
-      const VecX r_next = Evaluate(next, true, &J_next);
-      if (r_next.norm() < r.norm()) {
-        const bool settled = r_next.norm() > (1 - kSettled) * r.norm();
-        *states = next;
-        r = r_next;
-        J = J_next;
-        mu = std::max(mu * 0.1, kLeastDamping);
-        if (settled || r.norm() < kRounding) break;
-      } else {
-        mu *= 10;
-      }
-    }
+    const auto evaluate = [&](BodyStates* at, MatX* J) { return Evaluate(*at, true, J); };
+    const auto move = [&](const VecX& s, BodyStates* at) { MoveBodies(Unscaled(s), at); };
+    const auto enough = [](const internal::DampedStepMade& step) {
+      const double now = step.r.norm();
+      return step.better && (now > (1 - kSettled) * step.before || now < kRounding);
+    };
+    internal::DampedSearch(kDamping, states, evaluate, move, enough);
   }
 
   [[nodiscard]] double length() const { return length_; }

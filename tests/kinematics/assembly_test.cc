@@ -1,6 +1,8 @@
 // Ways to put loops together.
 #include "kinematics/assembly.h"
+#include "kinematics/assembly_residual.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
