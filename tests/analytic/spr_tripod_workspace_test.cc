@@ -23,6 +23,14 @@ TriangleMesh UnitTetrahedron() {
           {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}};
 }
 
+WorkspaceOptions Coarse(std::vector<int> mesh_intervals, int voxels) {
+  WorkspaceOptions options;
+  options.mesh_intervals = std::move(mesh_intervals);
+  options.voxels = voxels;
+  options.section_azimuths = 12;
+  return options;
+}
+
 TEST(TriangleMesh, TetrahedronHasItsVolumeAreaAndCentroid) {
   const TriangleMesh mesh = UnitTetrahedron();
   ASSERT_TRUE(IsClosed(mesh));
@@ -212,11 +220,7 @@ TEST(SprTripodWorkspace, RangesMatchTabulatedExtremes) {
 }
 
 TEST(SprTripodWorkspace, ReportNamesVolumeOrderAndSections) {
-  WorkspaceOptions options;
-  options.mesh_intervals = {5, 10, 20};
-  options.voxels = 40;
-  options.section_azimuths = 12;
-  const WorkspaceReport report = ReportWorkspace(PaperGeometry(), options);
+  const WorkspaceReport report = ReportWorkspace(PaperGeometry(), Coarse({5, 10, 20}, 40));
   ASSERT_TRUE(report.summary.ok());
   EXPECT_NEAR(report.exact.volume, kVolume, 1e-14);
   ASSERT_EQ(report.volumes.size(), 4u);
@@ -239,11 +243,7 @@ TEST(SprTripodWorkspace, StrokesThatReachBelowHalfTheBaseAreCountedWhole) {
   Geometry low = PaperGeometry();
   low.q_min = 0.30;
   low.q_max = 0.40;
-  WorkspaceOptions options;
-  options.mesh_intervals = {5, 10, 20};
-  options.voxels = 40;
-  options.section_azimuths = 12;
-  const WorkspaceReport report = ReportWorkspace(low, options);
+  const WorkspaceReport report = ReportWorkspace(low, Coarse({5, 10, 20}, 40));
   ASSERT_TRUE(report.summary.ok()) << report.summary.message;
   EXPECT_LT(AxisRange(low).lower, 0.5 * low.b);
   EXPECT_TRUE(report.contradictions.empty()) << report.text;
@@ -276,11 +276,7 @@ TEST(SprTripodWorkspace, AnOrderThatTheFacesCannotShowIsNotStated) {
   Geometry wide = PaperGeometry(0.4, 0.455);
   wide.q_min = 0.30;
   wide.q_max = 0.75;
-  WorkspaceOptions options;
-  options.mesh_intervals = {25, 50};
-  options.voxels = 0;
-  options.section_azimuths = 12;
-  const WorkspaceReport report = ReportWorkspace(wide, options);
+  const WorkspaceReport report = ReportWorkspace(wide, Coarse({25, 50}, 0));
   ASSERT_TRUE(report.summary.ok()) << report.summary.message;
   EXPECT_GT(report.volumes.front().error, std::abs(report.mesh_error));
   EXPECT_TRUE(std::isnan(report.convergence_order)) << report.convergence_order;
@@ -292,11 +288,7 @@ TEST(SprTripodWorkspace, DigitsFollowTheErrorAndSectionsTheDimensions) {
   Geometry twice = PaperGeometry(0.42, 0.91);
   twice.q_min = 1.0;
   twice.q_max = 1.5;
-  WorkspaceOptions options;
-  options.mesh_intervals = {5, 10};
-  options.voxels = 20;
-  options.section_azimuths = 12;
-  const WorkspaceReport report = ReportWorkspace(twice, options);
+  const WorkspaceReport report = ReportWorkspace(twice, Coarse({5, 10}, 20));
   ASSERT_TRUE(report.summary.ok());
   EXPECT_TRUE(report.contradictions.empty()) << report.text;
   EXPECT_EQ(report.text.find("nan"), std::string::npos) << report.text;

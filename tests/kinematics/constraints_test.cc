@@ -112,6 +112,15 @@ void ExpectDerivatives(const ScalarRow& row, const BodyStates& s,
       << what;
 }
 
+std::pair<Joint, BodyStates> HingeOnTheWorld() {
+  Joint joint;
+  joint.kind = JointKind::kRevolute;
+  joint.child = 1;
+  BodyStates states;
+  states.Resize(2);
+  return {joint, states};
+}
+
 TEST(Constraints, RowsCountWhatTheJointLocks) {
   Random random(1);
   for (const JointKind kind : kEveryKind) {
@@ -132,11 +141,8 @@ TEST(Constraints, AForceOnlyJointReactsWithThreeForcesButStillGuides) {
 }
 
 TEST(Constraints, AHingeOpenedByAMillimetreShowsAMillimetre) {
-  Joint joint;
-  joint.kind = JointKind::kRevolute;
-  joint.child = 1;
-  BodyStates s;
-  s.Resize(2);
+  const auto [joint, at_home] = HingeOnTheWorld();
+  BodyStates s = at_home;
   s.X_WB[1].translation() = Vec3(0, 1e-3, 0);
   const ConstraintRows rows = RowsOf(joint, s, false);
   EXPECT_EQ(rows.translation_rows, 3);
@@ -262,11 +268,8 @@ TEST(Constraints, APointTwoMetresAboveAnotherIsTwoMetresAway) {
 }
 
 TEST(Constraints, TheRotationGapSeesABackwardAxisThatTheCosinesMiss) {
-  Joint joint;
-  joint.kind = JointKind::kRevolute;
-  joint.child = 1;
-  BodyStates s;
-  s.Resize(2);
+  const auto [joint, at_home] = HingeOnTheWorld();
+  BodyStates s = at_home;
   s.X_WB[1].linear() = RotX(std::numbers::pi);
   EXPECT_LT(RowsOf(joint, s, false).residual.norm(), 1e-15);
   EXPECT_NEAR(RotationGap(joint, s.X_WB[1]), std::numbers::pi, 1e-12);
