@@ -15,8 +15,9 @@ ScratchFolder::ScratchFolder(const std::string& purpose) {
   std::error_code error;
   const fs::path below = fs::temp_directory_path(error);
   if (error) {
-    trouble_ =
-        fmt::format("no folder for temporary files ({}): {}", below.string(), error.message());
+    const char* place = std::getenv("TMPDIR");
+    trouble_ = fmt::format("no folder for temporary files (TMPDIR={}): {}",
+                           place == nullptr ? "" : place, error.message());
     return;
   }
   std::string pattern = below / fmt::format("mbverify-{}-XXXXXX", purpose);
