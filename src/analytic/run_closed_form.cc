@@ -1,6 +1,7 @@
 #include <chrono>
 
 #include "analytic/closed_form.h"
+#include "core/roles.h"
 #include "mechanism/channels.h"
 
 namespace mbv {
@@ -10,7 +11,7 @@ ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
   ClosedFormRun run;
   std::vector<Channel> channels = DriveChannels(mechanism);
   for (Channel& channel : closed_form->extra_channels()) channels.push_back(std::move(channel));
-  run.trace.witness = "analytic";
+  run.trace.witness = role::kAnalytic.name;
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
 
   const auto start = std::chrono::steady_clock::now();

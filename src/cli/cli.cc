@@ -17,6 +17,7 @@
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "core/wrapped.h"
+#include "input/parsed_documents.h"
 #include "pipeline/version.h"
 
 namespace mbv {
@@ -185,6 +186,7 @@ int RunCli(int argc, char** argv) {
   AddHistoryCommand(&app, &exit_code);
   RequireFiniteNumbers(&app);
   std::string lost;  // why output was lost
+  const ParsedDocuments documents;
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -136,8 +136,8 @@ Yardstick YardstickOf(const ComparisonInput& input, const CheckResult& check) {
 Attribution WhyUndecided(const ComparisonInput& input, const Comparison& comparison,
                          const CheckResult& check, bool third) {
   const PairComparison& pair = *comparison.FindPair(check.subject);
-  if (check.follows && pair.measured == "simulated" && pair.truth == input.driven_by) {
-    if (third) return {"simulated", "the simulation does not follow the motion that it is given"};
+  if (check.follows && IsEngine(pair.measured) && pair.truth == input.driven_by) {
+    if (third) return {pair.measured, "the simulation does not follow the motion that it is given"};
     return {"",
             "either the simulation does not follow the motion that it is given, or that motion "
             "contradicts itself"};
@@ -227,12 +227,13 @@ Attribution OfDisagreement(const ComparisonInput& input, const Comparison& compa
     Attribution found = ByDistance(input, comparison);
     if (found.text.empty()) found = BySingleCheck(comparison);
     const bool said = found.text.find("step_s") != std::string::npos;
-    if (found.odd_one_out == "simulated" && !said) found.text += internal::EnergyHint(comparison);
+    if (found.odd_one_out == role::kSimulated && !said)
+      found.text += internal::EnergyHint(comparison);
     return found;
   }
-  if (motion.odd_one_out != "simulated") return motion;
+  if (!IsEngine(motion.odd_one_out)) return motion;
   const Attribution distance = ByDistance(input, comparison);
-  if (distance.odd_one_out.empty() || distance.odd_one_out == "simulated") return motion;
+  if (distance.odd_one_out.empty() || distance.odd_one_out == motion.odd_one_out) return motion;
   return {distance.odd_one_out, distance.text + "; besides, " + motion.text};
 }
 
@@ -259,9 +260,9 @@ std::string Place(const std::string& channel, double time_s) {
 }
 
 std::string NameOf(const Comparison& comparison, const std::string& witness) {
-  if (witness == "simulated") return "simulation";
-  if (witness == "reference" && comparison.table) return "the table " + comparison.table->name;
-  return witness == "solver" ? "the generic solver" : witness;
+  if (witness == role::kReference && comparison.table) return "the table " + comparison.table->name;
+  const Role* role = FindRole(witness);
+  return role == nullptr ? witness : role->called;
 }
 
 bool Failed(const CheckResult* check) { return check != nullptr && check->limit && !check->pass; }

@@ -15,13 +15,15 @@ constexpr double kOrder = 4.0;
 
 // The energy check of a witness, if it is judged.
 const CheckResult* EnergyCheck(const Comparison& comparison, const std::string& witness) {
-  const CheckResult* check = comparison.FindCheck(witness + ".energy_drift");
+  const CheckResult* check = comparison.FindCheck(witness + "." + RowOf(Metric::kEnergy).key);
   return check != nullptr && check->limit ? check : nullptr;
 }
 
 // Forces and accelerations that do not fit at an instant are no matter of the step.
 bool IsOfTheStep(const Comparison& comparison, const CheckResult& drift) {
-  return drift.subject == "simulated" && !Failed(comparison.FindCheck("simulated.power_balance"));
+  const Role* role = FindRole(drift.subject);
+  return role != nullptr && role->is_engine() &&
+         !Failed(comparison.FindCheck(*role, Metric::kPower));
 }
 
 // "power balances at every sample, so simulation.step_s is too coarse: try a step about 3 times
@@ -51,7 +53,7 @@ Attribution AttributeByEnergy(const Comparison& comparison, const PairComparison
 }
 
 std::string EnergyHint(const Comparison& comparison) {
-  const CheckResult* drift = EnergyCheck(comparison, "simulated");
+  const CheckResult* drift = EnergyCheck(comparison, role::kSimulated.name);
   if (!Failed(drift) || !IsOfTheStep(comparison, *drift)) return "";
   return fmt::format("; the simulated energy drifts by {:.1e} of what is turned over and {}",
                      drift->value, StepText(*drift));

@@ -16,22 +16,22 @@
 namespace mbv::internal {
 namespace {
 
+// Computations whose own motion can be wrong.
+constexpr const Role* kComputed[] = {&role::kAnalytic, &role::kReference, &role::kSolver};
+// The generic ones before a paper's: a table does not follow another motion by one equation.
+constexpr const Role* kGenericFirst[] = {&role::kReference, &role::kAnalytic, &role::kSolver};
+
 constexpr Metric kCommandMetrics[] = {Metric::kCommandM, Metric::kCommandRad,
                                       Metric::kCommandVelocity, Metric::kCommandAcceleration};
 constexpr Metric kMotionMetrics[] = {Metric::kPositionM, Metric::kPositionRad, Metric::kVelocity,
                                      Metric::kAcceleration};
-
-const CheckResult* FindCheck(const Comparison& comparison, const std::string& subject,
-                             Metric metric) {
-  return comparison.FindCheck(subject + "." + RowOf(metric).key);
-}
 
 // The first failed check of some metrics: positions before rates before accelerations.
 template <size_t n>
 const CheckResult* FirstFailed(const Comparison& comparison, const std::string& subject,
                                const Metric (&metrics)[n]) {
   for (const Metric metric : metrics) {
-    const CheckResult* check = FindCheck(comparison, subject, metric);
+    const CheckResult* check = comparison.FindCheck(subject + "." + RowOf(metric).key);
     if (Failed(check)) return check;
   }
   return nullptr;
@@ -54,8 +54,9 @@ std::string MissText(const CheckResult& check) {
 }
 
 Attribution ByDerivatives(const Comparison& comparison) {
-  for (const char* name : {"analytic", "reference", "solver"}) {
-    const CheckResult* check = FindCheck(comparison, name, Metric::kDerivatives);
+  for (const Role* role : kComputed) {
+    const char* name = role->name;
+    const CheckResult* check = comparison.FindCheck(*role, Metric::kDerivatives);
     if (!Failed(check)) continue;
     return {name, fmt::format("{}: its drive rates are not the time derivatives of its drive "
                               "positions; they differ by {} at {}",
@@ -66,10 +67,11 @@ Attribution ByDerivatives(const Comparison& comparison) {
 
 // A computation that does not do what is commanded, whatever the simulation does.
 Attribution ByOwnCommand(const Comparison& comparison) {
-  for (const char* name : {"reference", "analytic", "solver"}) {
+  for (const Role* role : kGenericFirst) {
+    const char* name = role->name;
     const CheckResult* check = FirstFailed(comparison, name, kCommandMetrics);
     if (check == nullptr) continue;
-    if (comparison.table && check->subject == "reference") {
+    if (comparison.table && role == &role::kReference) {
       return {name, fmt::format("the table {} does not follow the commanded motion: {} off at {}; "
                                 "does it belong to another motion?",
                                 comparison.table->name, AmountOf(*check),
@@ -88,9 +90,9 @@ struct Opinions {
 };
 
 Opinions OpinionsOf(const ComparisonInput& input, const Comparison& comparison) {
-  Opinions opinions{.driver = input.driven_by, .other = "reference"};
-  if (opinions.driver == "reference") return opinions;
-  const PairComparison* pair = comparison.FindPair("reference_vs_" + opinions.driver);
+  Opinions opinions{.driver = input.driven_by, .other = role::kReference.name};
+  if (opinions.driver == opinions.other) return opinions;
+  const PairComparison* pair = comparison.FindPair(PairName(opinions.other, opinions.driver));
   if (pair == nullptr || !pair->compared) return opinions;
   // A table of forces alone has no opinion on motion.
   bool any = false;
@@ -104,7 +106,7 @@ Opinions OpinionsOf(const ComparisonInput& input, const Comparison& comparison) 
 // The simulated output is judged against a command that it does not merely follow.
 bool JudgesMotion(const Comparison& comparison, Metric motion) {
   const auto judged = [&](Metric metric) {
-    const CheckResult* check = FindCheck(comparison, "simulated", metric);
+    const CheckResult* check = comparison.FindCheck(role::kSimulated, metric);
     return check != nullptr && check->limit && !check->follows;
   };
   if (motion == Metric::kVelocity) return judged(Metric::kCommandVelocity);
@@ -113,7 +115,7 @@ bool JudgesMotion(const Comparison& comparison, Metric motion) {
 }
 
 std::string OtherText(const Comparison& comparison, const Opinions& opinions) {
-  const bool table = comparison.table && opinions.other == "reference";
+  const bool table = comparison.table && opinions.other == role::kReference;
   const std::string who =
       table ? NameOf(comparison, opinions.other) + " gives"
             : "the " + NameOf(comparison, opinions.other) + ", which meets the command, needs";
@@ -143,10 +145,10 @@ Attribution OtherIsWrong(const Comparison& comparison, const Opinions& opinions)
 Attribution AttributeByKinematics(const ComparisonInput& input, const Comparison& comparison) {
   if (Attribution found = ByDerivatives(comparison); !found.text.empty()) return found;
   if (Attribution found = ByOwnCommand(comparison); !found.text.empty()) return found;
-  const CheckResult* miss = FirstFailed(comparison, "simulated", kCommandMetrics);
+  const CheckResult* miss = FirstFailed(comparison, role::kSimulated.name, kCommandMetrics);
   if (input.motion->free()) {
     return miss == nullptr ? Attribution{}
-                           : Attribution{"simulated", "the simulation " + MissText(*miss)};
+                           : Attribution{miss->subject, "the simulation " + MissText(*miss)};
   }
   const Opinions opinions = OpinionsOf(input, comparison);
   if (miss == nullptr) {
@@ -161,7 +163,7 @@ Attribution AttributeByKinematics(const ComparisonInput& input, const Comparison
                             input.driven_by, MissText(*miss))};
   }
   if (opinions.differ == nullptr) {
-    return {"simulated",
+    return {miss->subject,
             fmt::format("{} and {} agree on the drive motion, but under it the "
                         "simulation {}",
                         opinions.driver, NameOf(comparison, opinions.other), MissText(*miss))};

@@ -42,15 +42,20 @@ std::string WhyNot(const Witness& a, const Witness& b) {
 }
 
 LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) {
-  return measured == "simulated" ? input.simulation_limits : LimitColumn::kReference;
+  return IsEngine(measured) ? input.simulation_limits : LimitColumn::kReference;
 }
 
-void AddChecks(const ComparisonInput& input, const std::string& subject, LimitColumn column,
+// Of the pair `measured` against `truth`; of one witness by itself, `truth` is "".
+void AddChecks(const ComparisonInput& input, const std::string& measured_by,
+               const std::string& truth, LimitColumn column,
                const std::map<Metric, Measured>& metrics, const OtherLimits& other,
                Comparison* comparison) {
+  const std::string subject = truth.empty() ? measured_by : PairName(measured_by, truth);
   for (const auto& [metric, measured] : metrics) {
     CheckResult check{.name = subject + "." + RowOf(metric).key,
                       .subject = subject,
+                      .measured = measured_by,
+                      .truth = truth,
                       .metric = metric,
                       .value = measured.value,
                       .limit = input.limits[metric].Of(column),
@@ -61,13 +66,13 @@ void AddChecks(const ComparisonInput& input, const std::string& subject, LimitCo
                       .floored = measured.floored};
     ApplyOther(other, input, &check);
     check.pass = Passes(check.value, check.limit);
-    check.follows = ComparesMotionWithItself(input, subject, metric);
+    check.follows = ComparesMotionWithItself(input, check);
     comparison->checks.push_back(std::move(check));
   }
 }
 
 bool IsTable(const ComparisonInput& input, const std::string& witness) {
-  return input.table != nullptr && witness == "reference";
+  return input.table != nullptr && witness == role::kReference;
 }
 
 // A pair with a table: its columns judged one by one, and the tubes of its metrics.
@@ -81,8 +86,8 @@ std::map<Metric, double> JudgeTablePair(const ComparisonInput& input, const Witn
   return tubes;
 }
 
-void AddPair(const ComparisonInput& input, const char* measured, const char* truth,
-             Comparison* comparison) {
+void AddPair(const ComparisonInput& input, const RolePair& roles, Comparison* comparison) {
+  const std::string measured = roles.measured->name, truth = roles.truth->name;
   const Witness* a = FindNamed(input.witnesses, measured);
   const Witness* b = FindNamed(input.witnesses, truth);
   if (a == nullptr || b == nullptr) return;
@@ -101,7 +106,7 @@ void AddPair(const ComparisonInput& input, const char* measured, const char* tru
         JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
   }
   if (!pair.compared) comparison->not_compared.push_back({pair.name(), pair.reason});
-  AddChecks(input, pair.name(), ColumnOfPair(input, measured, truth), pair.metrics, other,
+  AddChecks(input, measured, truth, ColumnOfPair(input, measured, truth), pair.metrics, other,
             comparison);
   comparison->pairs.push_back(std::move(pair));
 }
@@ -121,14 +126,16 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
     }
   }
   for (const WitnessMetrics& witness : comparison->witnesses) {
-    if (witness.witness == "analytic") continue;  // has no bodies to close and no energy
+    const Role* role = FindRole(witness.witness);
+    if (role != nullptr && !role->has_bodies()) continue;
     if (IsTable(input, witness.witness)) continue;
     if (!witness.metrics.contains(Metric::kClosureM))
       note(witness.witness + ".closure", "not recorded");
     if (!witness.metrics.contains(Metric::kPower)) note(witness.witness + ".power", "not recorded");
-    if (witness.witness == "simulated" && IsTaskSpace(*input.motion) &&
+    if (IsEngine(witness.witness) && IsTaskSpace(*input.motion) &&
         !witness.metrics.contains(Metric::kCommandVelocity)) {
-      note("simulated.command_velocity", "the rates of the commanded outputs are not recorded");
+      note(witness.witness + "." + RowOf(Metric::kCommandVelocity).key,
+           "the rates of the commanded outputs are not recorded");
     }
   }
   for (const WitnessMetrics& witness : comparison->witnesses) {
@@ -169,7 +176,7 @@ void AddCommandNotes(const ComparisonInput& input, Comparison* comparison) {
 void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
   if (input.drive_by == DriveBy::kForces) {
     comparison->not_compared.push_back(
-        {"simulated drive forces",
+        {role::kSimulated.name + std::string(" drive forces"),
          "they are the " + input.driven_by + " forces; the motion that they cause is compared"});
   }
   for (const DriveForce& force : input.motion->forces) {
@@ -219,12 +226,13 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
     comparison->not_compared.push_back({drive.name + ".force", "it is not in the table"});
   }
   // The computation that the simulation does not depend on tells more than the simulation.
-  for (const char* name :
-       {"reference_vs_analytic", "reference_vs_solver", "simulated_vs_reference"}) {
-    const PairComparison* pair = comparison->FindPair(name);
+  for (const auto& [measured, truth] : {RolePair{&role::kReference, &role::kAnalytic},
+                                        {&role::kReference, &role::kSolver},
+                                        {&role::kSimulated, &role::kReference}}) {
+    const PairComparison* pair = comparison->FindPair(PairName(*measured, *truth));
     if (pair == nullptr || pair->columns.empty()) continue;
-    table.judged_against = pair->measured == "reference" ? pair->truth : pair->measured;
-    const CheckResult* tube = comparison->FindCheck(pair->name() + ".table_tube");
+    table.judged_against = pair->measured == role::kReference ? pair->truth : pair->measured;
+    const CheckResult* tube = comparison->FindCheck(*measured, *truth, Metric::kTableTube);
     table.judged = tube != nullptr && tube->limit;
     if (!table.judged) return;  // nothing to explain
     const Witness* other = FindNamed(input.witnesses, table.judged_against);
@@ -305,6 +313,15 @@ const CheckResult* Comparison::FindCheck(const std::string& name) const {
   return FindNamed(checks, name);
 }
 
+const CheckResult* Comparison::FindCheck(const Role& witness, Metric metric) const {
+  return FindCheck(witness.name + std::string(".") + RowOf(metric).key);
+}
+
+const CheckResult* Comparison::FindCheck(const Role& measured, const Role& truth,
+                                         Metric metric) const {
+  return FindCheck(PairName(measured, truth) + "." + RowOf(metric).key);
+}
+
 size_t Comparison::failed() const { return CountFailed(checks); }
 
 size_t Comparison::verified() const {
@@ -326,16 +343,17 @@ void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison
   WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
   OtherLimits other;
   if (IsTable(input, witness.name)) other.tubes = CommandTubes(input);
-  const bool simulated = witness.name == "simulated";
-  if (simulated) other.growth = CommandGrowth(input, metrics);
+  const bool engine = IsEngine(witness.name);
+  if (engine) other.growth = CommandGrowth(input, metrics);
   std::map<Metric, Measured> commands, others;
   for (const auto& [metric, measured] : metrics.metrics) {
     (IsCommand(metric) ? commands : others)[metric] = measured;
   }
   const LimitColumn column = ColumnOf(input, witness.name);
-  const bool servo = simulated && input.drive_by == DriveBy::kServos;
-  AddChecks(input, witness.name, servo ? LimitColumn::kServo : column, commands, other, comparison);
-  AddChecks(input, witness.name, column, others, other, comparison);
+  const bool servo = engine && input.drive_by == DriveBy::kServos;
+  AddChecks(input, witness.name, "", servo ? LimitColumn::kServo : column, commands, other,
+            comparison);
+  AddChecks(input, witness.name, "", column, others, other, comparison);
   comparison->witnesses.push_back(std::move(metrics));
 }
 
@@ -348,15 +366,11 @@ Comparison Compare(const ComparisonInput& given) {
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
   comparison.driving = DrivingText(input);
-  for (const auto& [measured, truth] : kWitnessPairs) {
-    AddPair(input, measured, truth, &comparison);
-  }
-  // The generic solver takes part by its own name where a table has the reference's place.
-  AddPair(input, "simulated", "solver", &comparison);
-  AddPair(input, "reference", "solver", &comparison);
-  AddPair(input, "simulated", "reached", &comparison);
+  for (const RolePair& pair : kRolePairs) AddPair(input, pair, &comparison);
   for (const Witness& witness : input.witnesses) {
-    if (Ran(witness) && witness.name != "reached") AddWitness(input, witness, &comparison);
+    const Role* role = FindRole(witness.name);
+    const bool alone = role == nullptr || role->judged_alone();
+    if (Ran(witness) && alone) AddWitness(input, witness, &comparison);
   }
   AddMissingNotes(input, &comparison);
   AddReactionNotes(input, &comparison);

@@ -102,8 +102,7 @@ void FindSpan(const ComparisonInput& input, const PairReader& reader, PairCompar
 // Says why the pair's forces were not compared; "" if they were. A table need not hold every drive.
 std::string WhyNot(const ComparisonInput& input, const PairReader& reader, size_t wanted,
                    const PairComparison& pair) {
-  const bool table = input.table != nullptr && (reader.measured.witness == "reference" ||
-                                                reader.truth.witness == "reference");
+  const bool table = input.table != nullptr && pair.Involves(role::kReference);
   if (reader.samples.empty()) return "the two have no sample time in common";
   const bool motion_only =
       input.motion->free() || SharesForces(input, reader.measured.witness, reader.truth.witness);

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "comparison/metrics.h"
+#include "core/roles.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
 #include "kinematics/driven_twists.h"
@@ -30,7 +31,7 @@ enum class Verdict { kNotRun, kAgree, kDisagree };
 
 /// One witness as handed to the comparison.
 struct Witness {
-  std::string name;              ///< "analytic", "reference", "simulated", "solver", "reached"
+  std::string name;              ///< of its role (core/roles.h)
   const Trace* trace = nullptr;  ///< null if there is none; summary says why
   RunSummary summary;            ///< the trace is compared only if this is ok
 };
@@ -41,15 +42,15 @@ struct ComparisonInput {
   CheckLimits limits;
   LimitColumn simulation_limits = LimitColumn::kForward;
   double start_window_s = 0.0;     ///< force samples before it are left out (named in the scenario)
-  std::vector<Witness> witnesses;  ///< in the order analytic, reference, simulated
+  std::vector<Witness> witnesses;  ///< in the order in which they are shown
   std::string driven_by;           ///< the witness whose kinematics the simulation follows
   /// Channels of reactions that statics leaves open ("hinge.reaction.fz").
   std::vector<std::string> reactions_not_unique;
-  const AlignedTable* table = nullptr;   ///< what the witness "reference" is, if it is a table
+  const AlignedTable* table = nullptr;   ///< what the reference is, if it is a table
   const DrivenTwists* twists = nullptr;  ///< TwistsFor() this; found where needed if null
   DriveBy drive_by = DriveBy::kMotion;   ///< what moves the simulation's drives (driven.h)
-  const Trace* bent = nullptr;  ///< force-driven: the same run with bent forces, witness "bent"
-  double bend = kNan;           ///< by this share of their RMS
+  const Trace* bent = nullptr;           ///< force-driven: the same run with bent forces (kBent)
+  double bend = kNan;                    ///< by this share of their RMS
 };
 
 /// Judges where a free motion leads.
@@ -112,7 +113,8 @@ struct PairComparison {
   double digits = kNan;                    ///< matching digits of all forces
   std::vector<TableColumnResult> columns;  ///< where one of the two is a table
 
-  [[nodiscard]] std::string name() const { return measured + "_vs_" + truth; }
+  [[nodiscard]] std::string name() const { return PairName(measured, truth); }
+  [[nodiscard]] bool Involves(const Role& role) const { return measured == role || truth == role; }
 };
 
 /// One place where energy came from or went.
@@ -147,7 +149,8 @@ struct WitnessMetrics {
 
 struct CheckResult {
   std::string name;     ///< "simulated_vs_analytic.force_nrmse", "simulated.closure_m"
-  std::string subject;  ///< the part before the point
+  std::string subject;  ///< the part before the point: a witness or a pair
+  std::string measured = {}, truth = {};  ///< the pair; of one witness by itself, `truth` is ""
   Metric metric = Metric::kForceNrmse;
   double value = kNan;
   std::optional<double> limit;  ///< empty: switched off in the scenario
@@ -162,6 +165,9 @@ struct CheckResult {
   std::string channel;
   bool floored = false;    ///< the value relates to a floor above the quantity itself
   std::string blind = {};  ///< why passing verifies nothing; "" if it does
+
+  [[nodiscard]] bool of_pair() const { return !truth.empty(); }
+  [[nodiscard]] bool Involves(const Role& role) const { return measured == role || truth == role; }
 };
 
 /// What the witnesses say about each other.
@@ -198,6 +204,10 @@ struct Comparison {
 
   [[nodiscard]] const PairComparison* FindPair(const std::string& name) const;
   [[nodiscard]] const CheckResult* FindCheck(const std::string& name) const;
+  /// The check of a witness by itself, and of a pair; null if there is none.
+  [[nodiscard]] const CheckResult* FindCheck(const Role& witness, Metric metric) const;
+  [[nodiscard]] const CheckResult* FindCheck(const Role& measured, const Role& truth,
+                                             Metric metric) const;
   [[nodiscard]] size_t failed() const;    ///< checks that have a limit and did not pass
   [[nodiscard]] size_t verified() const;  ///< checks that passed and verify something
   [[nodiscard]] size_t followed() const;  ///< checks that passed and compare a motion with itself

@@ -84,14 +84,15 @@ bool IsTaskSpace(const Motion& motion) {
 std::string DrivingText(const ComparisonInput& input) {
   const auto simulated =
       std::find_if(input.witnesses.begin(), input.witnesses.end(),
-                   [](const Witness& witness) { return witness.name == "simulated"; });
+                   [](const Witness& witness) { return IsEngine(witness.name); });
   if (simulated == input.witnesses.end() || simulated->trace == nullptr) return "";
   if (input.motion->free()) {
     return "free motion: the simulation starts from the state that the reference computes from the "
            "initial values; then forces alone move it";
   }
   if (input.drive_by != DriveBy::kMotion) {
-    const char* driver = input.driven_by == "analytic" ? "closed form" : "reference";
+    const char* driver =
+        (input.driven_by == role::kAnalytic ? role::kAnalytic : role::kReference).method;
     if (input.drive_by == DriveBy::kServos) {
       return fmt::format(
           "MuJoCo's servos follow the drive motion that the {} computes; nothing else "
@@ -107,30 +108,27 @@ std::string DrivingText(const ComparisonInput& input) {
   if (std::find(commanded.begin(), commanded.end(), false) == commanded.end()) {
     return "commanded in joint space, every computation is given the same drive motion";
   }
+  const Role* driver = FindRole(input.driven_by);
   return fmt::format(
       "commanded in {} space, the simulation follows the drive positions, rates and accelerations "
       "that the {} computes",
       IsTaskSpace(*input.motion) ? "task" : "joint",
-      input.driven_by == "analytic"    ? "closed form"
-      : input.driven_by == "reference" ? "reference"
-                                       : "generic solver");
+      (driver == nullptr ? role::kSolver : *driver).method);
 }
 
-bool ComparesMotionWithItself(const ComparisonInput& input, const std::string& subject,
-                              Metric metric) {
-  const auto involves = [&](const char* witness) {
-    return subject.starts_with(witness) || subject.ends_with(witness);
-  };
-  const bool table = input.table != nullptr && involves("reference");
+bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& check) {
+  const Metric metric = check.metric;
+  const bool table = input.table != nullptr && check.Involves(role::kReference);
+  const bool engine = IsEngine(check.measured) || IsEngine(check.truth);
   // Pushed drives and servos go where forces lead them.
-  const bool by_forces = input.drive_by != DriveBy::kMotion && involves("simulated");
+  const bool by_forces = input.drive_by != DriveBy::kMotion && engine;
   if (by_forces && metric != Metric::kDerivatives) return false;
   switch (metric) {
     case Metric::kPositionM:
     case Metric::kPositionRad:
     case Metric::kVelocity:
     case Metric::kAcceleration:
-      if (!input.motion->free() && involves("simulated")) return true;
+      if (!input.motion->free() && engine) return true;
       return !table && AllCommanded(input, metric);
     case Metric::kDerivatives:
       return AllCommanded(input, metric);

@@ -15,8 +15,7 @@ namespace mbv {
 
 /// True when a check compares a drive motion with itself: the simulation's with what it was told
 /// to follow, or a drive that the scenario commands with its command. Such a check can fail; that
-/// it passes verifies nothing. `subject` as in CheckResult.
-[[nodiscard]] bool ComparesMotionWithItself(const ComparisonInput& input,
-                                            const std::string& subject, Metric metric);
+/// it passes verifies nothing.
+[[nodiscard]] bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& check);
 
 }  // namespace mbv

@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/attribution_parts.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
 namespace {
 
-constexpr const char* kReached = "reached";
-constexpr const char* kBent = "bent";
+using internal::Failed;
 
 bool IsMotion(Metric metric) {
   return IsTrajectory(metric) || metric == Metric::kVelocity || metric == Metric::kAcceleration ||
@@ -24,14 +24,12 @@ std::string Amount(const CheckResult& check) {
   return fmt::format("{:.1e}{}{}", check.value, *unit == '\0' ? "" : " ", unit);
 }
 
-bool Failed(const CheckResult* check) { return check != nullptr && check->limit && !check->pass; }
-
 // The simulation's check of lengths and angles that is worst against its limit.
 const CheckResult* WorstMotion(const Comparison& comparison) {
   const CheckResult* worst = nullptr;
   double most = -1.0;
   for (const CheckResult& check : comparison.checks) {
-    if (!check.subject.starts_with("simulated") || check.subject.ends_with(kReached)) continue;
+    if (!IsEngine(check.measured) || check.truth == role::kReached) continue;
     const bool place = IsTrajectory(check.metric) || check.metric == Metric::kCommandM ||
                        check.metric == Metric::kCommandRad;
     if (!check.limit || !place) continue;
@@ -62,33 +60,36 @@ Attribution AttributePushed(const ComparisonInput& input, const Comparison& comp
       "pushed by the {} forces, the simulation leaves the commanded motion by {} at "
       "{}, t = {:.4g} s; {}",
       input.driven_by, Amount(*worst), worst->channel, worst->time_s, Astray(input, *worst));
-  const CheckResult* forces = comparison.FindCheck("reference_vs_analytic.force_nrmse");
+  const CheckResult* forces =
+      comparison.FindCheck(role::kReference, role::kAnalytic, Metric::kForceNrmse);
   if (forces == nullptr) {
     return {"", leaves +
                     "; a third witness would tell whether the forces or the simulated model "
                     "are wrong"};
   }
   if (!Failed(forces)) {
-    return {"simulated", fmt::format("analytic and reference agree on the drive forces to {}, but "
-                                     "{}",
-                                     Amount(*forces), leaves)};
+    return {worst->measured,
+            fmt::format("analytic and reference agree on the drive forces to {}, but {}",
+                        Amount(*forces), leaves)};
   }
-  return {input.driven_by == "analytic" ? "analytic" : "",
+  return {input.driven_by == role::kAnalytic ? input.driven_by : "",
           fmt::format("{}; the reference's forces differ from the analytic ones by {}, worst at "
                       "{}, t = {:.4g} s",
                       leaves, Amount(*forces), forces->channel, forces->time_s)};
 }
 
 Attribution AttributeServo(const Comparison& comparison) {
-  const CheckResult* reached = comparison.FindCheck("simulated_vs_reached.force_nrmse");
-  const CheckResult* forces = comparison.FindCheck("reference_vs_analytic.force_nrmse");
+  const CheckResult* reached =
+      comparison.FindCheck(role::kSimulated, role::kReached, Metric::kForceNrmse);
+  const CheckResult* forces =
+      comparison.FindCheck(role::kReference, role::kAnalytic, Metric::kForceNrmse);
   if (reached == nullptr) return {};
   if (comparison.verdict != Verdict::kAgree && !Failed(reached) && !Failed(forces)) return {};
   const std::string differ =
       fmt::format("worst at {}, t = {:.4g} s", reached->channel, reached->time_s);
   if (Failed(reached)) {
     const bool sure = forces != nullptr && !Failed(forces);
-    return {sure ? "simulated" : "",
+    return {sure ? reached->measured : "",
             fmt::format(
                 "on the motion that the servos reached, the actuator forces differ from "
                 "the reference by {}: {}{}",
@@ -99,16 +100,17 @@ Attribution AttributeServo(const Comparison& comparison) {
       fmt::format("on the motion that the servos reached, simulation and reference agree to {}",
                   Amount(*reached));
   if (Failed(forces)) {
-    return {"analytic", fmt::format("{}; analytic differs by {}, worst at {}, t = {:.4g} s", agree,
-                                    Amount(*forces), forces->channel, forces->time_s)};
+    return {forces->truth, fmt::format("{}; analytic differs by {}, worst at {}, t = {:.4g} s",
+                                       agree, Amount(*forces), forces->channel, forces->time_s)};
   }
   std::string text = agree;
-  for (const char* pair : {"simulated_vs_analytic", "simulated_vs_reference"}) {
-    const CheckResult* tracking = comparison.FindCheck(std::string(pair) + ".position_m");
-    if (tracking == nullptr) {
-      tracking = comparison.FindCheck(std::string(pair) + ".position_rad");
-    }
-    const CheckResult* cost = comparison.FindCheck(std::string(pair) + ".force_nrmse");
+  for (const Role* truth : {&role::kAnalytic, &role::kReference}) {
+    const auto find = [&](Metric metric) {
+      return comparison.FindCheck(role::kSimulated, *truth, metric);
+    };
+    const CheckResult* tracking = find(Metric::kPositionM);
+    if (tracking == nullptr) tracking = find(Metric::kPositionRad);
+    const CheckResult* cost = find(Metric::kForceNrmse);
     if (tracking == nullptr || cost == nullptr) continue;
     return {"", fmt::format("{}; they follow the command to {}, with forces that differ from the "
                             "commanded motion's by {}",
@@ -121,14 +123,13 @@ Attribution AttributeServo(const Comparison& comparison) {
 
 bool SharesForces(const ComparisonInput& input, const std::string& measured,
                   const std::string& truth) {
-  return input.drive_by == DriveBy::kForces && (measured == "simulated" || measured == kBent) &&
-         truth != kReached;
+  return input.drive_by == DriveBy::kForces && IsEngine(measured) && truth != role::kReached;
 }
 
 LimitColumn ColumnOfPair(const ComparisonInput& input, const std::string& measured,
                          const std::string& truth) {
-  if (measured != "simulated") return LimitColumn::kReference;
-  const bool servo = input.drive_by == DriveBy::kServos && truth != kReached;
+  if (!IsEngine(measured)) return LimitColumn::kReference;
+  const bool servo = input.drive_by == DriveBy::kServos && truth != role::kReached;
   return servo ? LimitColumn::kServo : input.simulation_limits;
 }
 
@@ -175,7 +176,7 @@ void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckRes
 }
 
 void LeaveOutReachedMotion(PairComparison* pair) {
-  if (pair->truth != kReached) return;
+  if (pair->truth != role::kReached) return;
   for (const Metric metric :
        {Metric::kPositionM, Metric::kPositionRad, Metric::kVelocity, Metric::kAcceleration}) {
     pair->metrics.erase(metric);
@@ -187,9 +188,9 @@ bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
   if (input.motion->free()) return IsTrajectory(check.metric);
   switch (input.drive_by) {
     case DriveBy::kForces:
-      return IsTrajectory(check.metric) && check.subject.starts_with("simulated_vs_");
+      return IsTrajectory(check.metric) && check.of_pair() && IsEngine(check.measured);
     case DriveBy::kServos:
-      return IsDriveForce(check.metric) && check.subject == "simulated_vs_reached";
+      return IsDriveForce(check.metric) && check.truth == role::kReached;
     case DriveBy::kMotion:
       return IsDriveForce(check.metric);
   }
@@ -203,7 +204,7 @@ std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& co
   const double length_m = CharacteristicLength(*input.mechanism);
   for (const CheckResult& check : comparison.checks) {
     if (!check.limit || !IsTrajectory(check.metric)) continue;
-    if (!check.subject.starts_with("simulated_vs_")) continue;
+    if (!check.of_pair() || !IsEngine(check.measured)) continue;
     const double size = *RowOf(check.metric).unit == 'm' ? length_m : 1.0;
     if (!(*check.limit > kMost * size)) continue;  // one that is no number fails its check
     return fmt::format(

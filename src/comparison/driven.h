@@ -4,7 +4,7 @@
 //   judged. In open loop errors grow by themselves: the limit of every metric of motion is how far
 //   the same run leads when its forces are bent by ComparisonInput::bend of their RMS.
 // * Servo: the forces are judged by the reference evaluated on the motion that was reached (witness
-//   "reached"). Against what is commanded they differ by what the servo's error costs: reported,
+//   kReached). Against what is commanded they differ by what the servo's error costs: reported,
 //   and judged where the scenario states a limit (column `servo`).
 #pragma once
 

@@ -194,21 +194,21 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   WitnessMetrics metrics{.witness = trace.witness, .metrics = {}};
   MeasureCommands(input, trace, &metrics);
   // A table follows a motion; it has no bodies, and its digits leave no derivatives to check.
-  if (input.table != nullptr && trace.witness == "reference") return metrics;
+  if (input.table != nullptr && trace.witness == role::kReference) return metrics;
   MeasureCommandRates(input, trace, "velocity", Metric::kCommandVelocity, &metrics);
   MeasureCommandRates(input, trace, "acceleration", Metric::kCommandAcceleration, &metrics);
   MeasureClosure(trace, &metrics);
   MeasurePower(input, trace, &metrics);
   if (input.motion->free()) MeasureStart(input, trace, &metrics);
-  const LimitColumn column =
-      trace.witness == "simulated" ? input.simulation_limits : LimitColumn::kReference;
+  const bool engine = IsEngine(trace.witness);
+  const LimitColumn column = engine ? input.simulation_limits : LimitColumn::kReference;
   metrics.energy = AuditEnergy(input, trace, input.limits[Metric::kEnergy].Of(column));
   // Work from samples has their error; only integrated work is judged.
   if (metrics.energy && metrics.energy->integrated) {
     metrics.metrics[Metric::kEnergy] = metrics.energy->drift;
   }
   // An integrated velocity carries the integrator's error; only computed ones are checked.
-  if (trace.witness != "simulated") MeasureDerivatives(input, trace, &metrics);
+  if (!engine) MeasureDerivatives(input, trace, &metrics);
   return metrics;
 }
 

@@ -59,8 +59,7 @@ bool IsWhole(const ComparisonInput& input, double from_s, double to_s) {
 
 // A pair's judged time against the motion's; "" if it is the whole. A table speaks for itself.
 std::string Span(const ComparisonInput& input, const PairComparison& pair) {
-  const bool table =
-      input.table != nullptr && (pair.measured == "reference" || pair.truth == "reference");
+  const bool table = input.table != nullptr && pair.Involves(role::kReference);
   if (pair.drives.empty() || (table && input.start_window_s == 0.0)) return "";
   if (IsWhole(input, pair.from_s, pair.to_s)) return "";
   return fmt::format("forces were judged from {:.4g} to {:.4g} s only, in a motion of {:.4g} s",
@@ -110,7 +109,7 @@ void ReserveTable(const ComparisonInput& input, const Comparison& comparison,
   }
   std::string coarse;
   for (const PairComparison& pair : comparison.pairs) {
-    const std::string& other = pair.measured == "reference" ? pair.truth : pair.measured;
+    const std::string& other = pair.measured == role::kReference ? pair.truth : pair.measured;
     if (other != comparison.table->judged_against) continue;
     for (const TableColumnResult& column : pair.columns) {
       if (!IsForce(channels[column.column].unit)) continue;

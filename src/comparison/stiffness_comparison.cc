@@ -110,23 +110,23 @@ std::string Explain(const StiffnessWitness& witness) {
   return witness.name + ": " + witness.result.summary.message;
 }
 
-void AddCheck(const StiffnessInput& input, const std::string& subject, StiffnessMetric metric,
-              const WorstEntry& measured, StiffnessComparison* comparison) {
+// `subject`: a witness, or a pair in which it is measured.
+void AddCheck(const StiffnessInput& input, const std::string& witness, const std::string& subject,
+              StiffnessMetric metric, const WorstEntry& measured, StiffnessComparison* comparison) {
   const StiffnessLimit& limit = input.limits[metric];
   StiffnessCheck check{.name = subject + "." + RowOf(metric).key,
                        .subject = subject,
                        .metric = metric,
                        .value = measured.value,
-                       .limit = subject.starts_with("simulated") ? limit.simulated : limit.computed,
+                       .limit = IsEngine(witness) ? limit.simulated : limit.computed,
                        .where = measured.where};
   check.pass = Passes(check.value, check.limit);
   comparison->checks.push_back(std::move(check));
 }
 
-void AddPair(const StiffnessInput& input, const char* measured, const char* truth,
-             StiffnessComparison* comparison) {
-  const StiffnessWitness* a = FindNamed(input.witnesses, measured);
-  const StiffnessWitness* b = FindNamed(input.witnesses, truth);
+void AddPair(const StiffnessInput& input, const RolePair& roles, StiffnessComparison* comparison) {
+  const StiffnessWitness* a = FindNamed(input.witnesses, roles.measured->name);
+  const StiffnessWitness* b = FindNamed(input.witnesses, roles.truth->name);
   if (a == nullptr || b == nullptr) return;
   StiffnessPair pair = CompareStiffnessPair(*a, *b);
   const auto note = [&](const std::string& what, const std::string& why) {
@@ -144,7 +144,7 @@ void AddPair(const StiffnessInput& input, const char* measured, const char* trut
     if (!pair.loads && !input.loads.empty()) note(".loads", "not both give displacements");
   }
   for (const auto& [metric, worst] : pair.metrics) {
-    AddCheck(input, pair.name(), metric, worst, comparison);
+    AddCheck(input, pair.measured, pair.name(), metric, worst, comparison);
   }
   comparison->pairs.push_back(std::move(pair));
 }
@@ -154,7 +154,7 @@ void AddOwnChecks(const StiffnessInput& input, const StiffnessWitness& witness,
                   StiffnessComparison* comparison) {
   const StiffnessResult& result = witness.result;
   const auto add = [&](StiffnessMetric metric, const WorstEntry& worst) {
-    AddCheck(input, witness.name, metric, worst, comparison);
+    AddCheck(input, witness.name, witness.name, metric, worst, comparison);
   };
   const Vec6 scale = ScaleOf(result.K);
   add(StiffnessMetric::kSymmetry, WorstOf(Scaled(result.K - result.K.transpose(), scale), "K"));
@@ -166,7 +166,7 @@ void AddOwnChecks(const StiffnessInput& input, const StiffnessWitness& witness,
     for (const ComplianceShare& share : result.shares) rest += share.C;
     add(StiffnessMetric::kSharesSum, WorstOf(Scaled(rest, ScaleOf(result.C)), "C"));
   }
-  if (witness.name != "simulated") return;
+  if (!IsEngine(witness.name)) return;
   add(StiffnessMetric::kResidual, {witness.residual, ""});
   add(StiffnessMetric::kExtrapolation, {witness.extrapolation_error, ""});
 }
@@ -204,10 +204,9 @@ std::string Amount(double value) {
   return value >= 1e-3 ? fmt::format("{:.2g} %", 100 * value) : fmt::format("{:.1e}", value);
 }
 
-double DistanceOf(const StiffnessComparison& comparison, const std::string& pair) {
-  const StiffnessPair* found = comparison.FindPair(pair);
-  if (found == nullptr || !found->compared) return kNan;
-  return found->metrics.at(StiffnessMetric::kStiffnessEntry).value;
+double DistanceOf(const StiffnessPair* pair) {
+  if (pair == nullptr || !pair->compared) return kNan;
+  return pair->metrics.at(StiffnessMetric::kStiffnessEntry).value;
 }
 
 // Two against one, by the worst entry of K.
@@ -215,23 +214,24 @@ Attribution Attribute(const StiffnessComparison& comparison) {
   const StiffnessPair* main = comparison.MainPair();
   if (main == nullptr) return {};
   std::vector<PairDistance> distances;
-  for (const auto& [measured, truth] : kWitnessPairs) {
-    PairDistance distance{measured, truth};
-    distance.value = DistanceOf(comparison, distance.name());
-    if (std::isnan(distance.value)) {
-      return {"", fmt::format("only two computations were compared: K differs by {} at most",
-                              Amount(main->metrics.at(StiffnessMetric::kStiffnessEntry).value))};
-    }
-    distances.push_back(std::move(distance));
+  for (const StiffnessPair& pair : comparison.pairs) {
+    const double distance = DistanceOf(&pair);
+    if (!std::isnan(distance)) distances.push_back({pair.measured, pair.truth, distance});
+  }
+  if (distances.size() < 3) {
+    return {"", fmt::format("only two computations were compared: K differs by {} at most",
+                            Amount(DistanceOf(main)))};
   }
   const bool stiffness_fails =
       std::any_of(comparison.checks.begin(), comparison.checks.end(),
                   [](const StiffnessCheck& c) { return JudgesStiffness(c) && !c.pass; });
   if (!stiffness_fails) {
+    const auto amount = [&](const Role& measured) {
+      return Amount(DistanceOf(comparison.FindPair(PairName(measured, role::kAnalytic))));
+    };
     return {"", fmt::format("all three agree: K to {} between closed form and frame elements, to "
                             "{} with the simulation",
-                            Amount(DistanceOf(comparison, "reference_vs_analytic")),
-                            Amount(DistanceOf(comparison, "simulated_vs_analytic")))};
+                            amount(role::kReference), amount(role::kSimulated))};
   }
   SortByDistance(&distances);
   const std::string odd = OddOneOut(distances);
@@ -239,12 +239,12 @@ Attribution Attribute(const StiffnessComparison& comparison) {
     return {"", "the three computations differ among each other; none stands out"};
   }
   // Shown is the first pair that it takes part in.
-  const auto takes_part = [&](const WitnessPair& pair) {
+  const auto takes_part = [&](const StiffnessPair& pair) {
     return odd == pair.measured || odd == pair.truth;
   };
-  const WitnessPair& shown = *std::find_if(kWitnessPairs.begin(), kWitnessPairs.end(), takes_part);
-  const WorstEntry& worst = comparison.FindPair(PairDistance{shown.measured, shown.truth}.name())
-                                ->metrics.at(StiffnessMetric::kStiffnessEntry);
+  const WorstEntry& worst =
+      std::find_if(comparison.pairs.begin(), comparison.pairs.end(), takes_part)
+          ->metrics.at(StiffnessMetric::kStiffnessEntry);
   return {odd, fmt::format("{} and {} agree on K to {}; {} differs from them by {}, most at {}",
                            distances[0].measured, distances[0].truth, Amount(distances[0].value),
                            odd, Amount(worst.value), worst.where)};
@@ -260,14 +260,7 @@ const StiffnessCheck* StiffnessComparison::FindCheck(const std::string& name) co
   return FindNamed(checks, name);
 }
 
-const StiffnessPair* StiffnessComparison::MainPair() const {
-  for (const char* name :
-       {"simulated_vs_analytic", "simulated_vs_reference", "reference_vs_analytic"}) {
-    const StiffnessPair* pair = FindPair(name);
-    if (pair != nullptr && pair->compared) return pair;
-  }
-  return nullptr;
-}
+const StiffnessPair* StiffnessComparison::MainPair() const { return MainPairOf(pairs); }
 
 size_t StiffnessComparison::failed() const { return CountFailed(checks); }
 
@@ -320,9 +313,7 @@ std::vector<Vec6> Displacements(const StiffnessResult& result, const std::vector
 
 StiffnessComparison CompareStiffness(const StiffnessInput& input) {
   StiffnessComparison comparison;
-  for (const auto& [measured, truth] : kWitnessPairs) {
-    AddPair(input, measured, truth, &comparison);
-  }
+  for (const RolePair& pair : kRolePairs) AddPair(input, pair, &comparison);
   for (const StiffnessWitness& witness : input.witnesses) {
     if (witness.ran()) AddOwnChecks(input, witness, &comparison);
   }

@@ -18,7 +18,7 @@ namespace mbv {
 
 /// One computation's part.
 struct StiffnessWitness {
-  std::string name;  ///< "analytic", "reference", "simulated"; "printed" for the paper's own
+  std::string name;  ///< of its role (core/roles.h); "printed" for the paper's own
   StiffnessResult result;
   std::vector<Vec6> displacements;  ///< [Δγ; Δε] per load; empty if K is singular or none is given
   double residual = kNan;           ///< simulation only
@@ -59,7 +59,7 @@ struct StiffnessPair {
   std::map<StiffnessMetric, WorstEntry> metrics;
   std::optional<LoadErrors> loads;
 
-  [[nodiscard]] std::string name() const { return measured + "_vs_" + truth; }
+  [[nodiscard]] std::string name() const { return PairName(measured, truth); }
 };
 
 struct StiffnessCheck {

@@ -1,27 +1,21 @@
 // What is judged alike, whatever is compared: motions, stiffnesses, or what comes next. A
 // comparison brings measurements (pairs with named metrics, checks) and words; this decides.
 //
-//   pairs            of the three witnesses, in the order in which they are shown
+//   pairs            of witnesses: kRolePairs (core/roles.h)
 //   a check          passes only if its value is a number at or below its limit
 //   two against one  the two that are closest by far stand against the third
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
 
-namespace mbv {
+#include "core/roles.h"
 
-/// `measured` is held against `truth`.
-struct WitnessPair {
-  const char *measured, *truth;
-};
-inline constexpr std::array<WitnessPair, 3> kWitnessPairs = {
-    {{"simulated", "analytic"}, {"reference", "analytic"}, {"simulated", "reference"}}};
+namespace mbv {
 
 /// The entry with this name, or nullptr: witnesses and checks have `name`.
 template <typename Named>
@@ -36,6 +30,16 @@ template <typename Pair>
   const auto found = std::find_if(pairs.begin(), pairs.end(),
                                   [&](const Pair& pair) { return pair.name() == name; });
   return found == pairs.end() ? nullptr : &*found;
+}
+
+/// Of the pairs that were compared, the one that a reader looks at first; null if there is none.
+template <typename Pair>
+[[nodiscard]] const Pair* MainPairOf(const std::vector<Pair>& pairs) {
+  for (const auto& [measured, truth] : kMainPairs) {
+    const Pair* pair = FindPairNamed(pairs, PairName(*measured, *truth));
+    if (pair != nullptr && pair->compared) return pair;
+  }
+  return nullptr;
 }
 
 /// False for NaN, and without a limit.
@@ -62,7 +66,7 @@ struct PairDistance {
   std::string measured, truth;
   double value = 0.0;  ///< NaN is farthest
 
-  [[nodiscard]] std::string name() const { return measured + "_vs_" + truth; }
+  [[nodiscard]] std::string name() const { return PairName(measured, truth); }
 };
 
 /// Nearest first.

@@ -19,7 +19,7 @@ struct Channel {
 /// Samples of channels on a common time grid. Witnesses sample at the same times, so traces are
 /// compared without interpolation.
 struct Trace {
-  std::string witness;            ///< "analytic", "reference" or "simulated"
+  std::string witness;            ///< name of its role (core/roles.h)
   std::vector<double> time_s;     ///< n sample times [s], increasing
   std::vector<Channel> channels;  ///< m channels
   MatX values;                    ///< n × m

@@ -10,6 +10,7 @@
 #include <sstream>
 
 #include "core/text.h"
+#include "input/parsed_documents.h"
 #include "input/yaml_reader.h"
 #include "input/yaml_syntax.h"
 
@@ -162,6 +163,7 @@ class TreeBuilder : public YAML::EventHandler {
 size_t FindNonText(const std::string& text) { return FindNonText(std::string_view(text)); }
 
 YamlNodePtr YamlReader::Parse(const std::string& text) {
+  if (YamlNodePtr known = ParsedDocuments::Find(text)) return known;
   if (text.size() > kMaxBytes) {
     AddAt(Severity::kError, 0, 0, fmt::format("the file is larger than {} bytes", kMaxBytes));
     return nullptr;
@@ -199,6 +201,7 @@ YamlNodePtr YamlReader::Parse(const std::string& text) {
     AddAt(Severity::kError, 0, 0, std::string("YAML syntax: ") + e.what());
     return nullptr;
   }
+  if (diagnostics_.findings().empty()) ParsedDocuments::Keep(text, builder.root());
   return builder.root();
 }
 

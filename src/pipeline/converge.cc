@@ -6,11 +6,12 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <unordered_map>
 
+#include "input/parsed_documents.h"
 #include "mechanism/break_times.h"
+#include "pipeline/computed_once.h"
 #include "pipeline/drive_by.h"
-#include "pipeline/prepare.h"
+#include "pipeline/run_witnesses.h"
 #include "scenario/settings_reader.h"
 
 namespace mbv {
@@ -148,27 +149,11 @@ class Study {
     return false;
   }
 
+  // The driven motion is computed once for all runs, at each instant that one of them asks for.
   SimulatedWitness Simulate(const SimulationOptions& options, const std::string& what) {
-    const auto show = [&](double fraction) {
-      if (options_.progress) options_.progress(what, fraction);
-    };
-    return RunSimulation(prepared_->scenario, prepared_->mechanisms.simulated, Remembered(),
-                         options, show);
-  }
-
-  // The driven motion, each instant computed once for all runs.
-  DrivenMotion Remembered() {
-    return [this, driven = prepared_->MakeDrivenMotion()](double t_s, DrivenSample* sample) {
-      const auto [entry, added] = driven_.try_emplace(std::llround(t_s * 1e12));
-      if (added) {
-        if (RunSummary summary = driven(t_s, &entry->second); !summary.ok()) {
-          driven_.erase(entry);
-          return summary;
-        }
-      }
-      *sample = entry->second;
-      return RunSummary::Done();
-    };
+    const WitnessRunner runner(*prepared_, {.driven = driven_.Of(prepared_->MakeDrivenMotion())},
+                               options_.progress);
+    return runner.Simulate(options, what);
   }
 
   SteppedRun RunForward(const ConvergenceSeries& series, double step_s, double constant_steps) {
@@ -288,7 +273,7 @@ class Study {
   const ConvergeOptions& options_;
   ConvergeOutcome outcome_;
   std::optional<Prepared> prepared_;
-  std::unordered_map<long long, DrivenSample> driven_;  // by time in ps
+  ComputedOnce<DrivenSample> driven_{1e12};  // by time in ps
   SampleClasses classes_;
   Trace truth_;
   MatX truth_forces_;
@@ -320,6 +305,7 @@ Diagnostics Check(const ConvergeOptions& options) {
 }
 
 ConvergeOutcome Converge(const std::string& file, const ConvergeOptions& options) {
+  const ParsedDocuments documents;
   return Study(file, options).Run();
 }
 

@@ -11,7 +11,7 @@
 
 #include "comparison/convergence.h"
 #include "core/diagnostics.h"
-#include "pipeline/run_scenario.h"
+#include "pipeline/progress.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {

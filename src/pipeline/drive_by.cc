@@ -59,7 +59,7 @@ ReferenceRun RunReached(const Mechanism& mechanism, const Motion& motion, const 
     }
   };
   ReferenceRun run = RunReference(mechanism, drives, {}, commands);
-  run.trace.witness = "reached";
+  run.trace.witness = role::kReached.name;
   return run;
 }
 
@@ -134,8 +134,9 @@ std::string SimulationLine(const Prepared& prepared) {
           ? fmt::format("forward simulation, step {:g} ms, {} engine", 1e3 * simulation.step_s,
                         simulation.stock_engine ? "stock" : "corrected")
           : std::string("inverse dynamics at each sample");
-  const std::string drives = simulation.forward ? DriveText(simulation, prepared.driven_by)
-                                                : prepared.driven_by + " drive motion";
+  const std::string drives = simulation.forward
+                                 ? DriveText(simulation, prepared.driver().name)
+                                 : std::string(prepared.driver().name) + " drive motion";
   line +=
       fmt::format(", {}, {:g} s sampled every {:g} ms",
                   scenario.motion.free() ? FreeMotionText(prepared.base, scenario.motion) : drives,

@@ -12,7 +12,7 @@
 namespace mbv {
 
 /// The reference on the motion that a simulation reached: every drive commanded where `simulated`
-/// has it, prescribed joints by their commands. Witness "reached".
+/// has it, prescribed joints by their commands. The trace of kReached.
 [[nodiscard]] ReferenceRun RunReached(const Mechanism& mechanism, const Motion& motion,
                                       const Trace& simulated);
 

@@ -8,6 +8,7 @@
 #include <optional>
 
 #include "core/word_hints.h"
+#include "input/parsed_documents.h"
 #include "pipeline/bend_search.h"
 #include "pipeline/bendable.h"
 #include "pipeline/drive_by.h"
@@ -226,6 +227,7 @@ std::unique_ptr<MutationBench> InverseBench(const MutationBench& own, const std:
 }  // namespace
 
 MutationReport MutateScenario(const std::string& file, const MutationOptions& options) {
+  const ParsedDocuments documents;
   const auto start = std::chrono::steady_clock::now();
   MutationReport report;
   report.scenario = file;

@@ -1,17 +1,9 @@
 #include "pipeline/mutation_bench.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
-#include <cmath>
 
 #include "core/demand.h"
 #include "kinematics/mobility.h"
-#include "mechanism/channels.h"
-#include "model_file/load_model.h"
-#include "pipeline/drive_by.h"
-#include "pipeline/ranges.h"
-#include "reference/reference.h"
 
 namespace mbv {
 namespace {
@@ -35,8 +27,16 @@ bool CanBeBent(const Scenario& scenario, Diagnostics* diagnostics) {
   return false;
 }
 
-Engine EngineOf(const Scenario& scenario) {
-  return scenario.simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
+// Why there is nothing to compare; "" if there is.
+std::string WhyNothing(const WitnessRuns& runs, bool ignore_ranges) {
+  if (runs.bad_input.has_errors()) return runs.bad_input.findings().front().message;
+  if (!ignore_ranges && !runs.violations.empty()) return runs.violations.front().Text();
+  if (const RunSummary& summary = runs.Find(role::kSimulated)->summary; !summary.ok()) {
+    return summary.message;
+  }
+  const WitnessRecord* reached = runs.Find(role::kReached);
+  if (reached == nullptr || reached->summary.ok()) return "";
+  return "on the motion that was reached: " + reached->summary.message;
 }
 
 }  // namespace
@@ -63,7 +63,7 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   bench->reactions_not_unique_ = ReactionsNotUnique(bench->prepared_.base, {});
   bench->literals_ = LoadModel(bench->scenario().model_file, bench->SimulatedOptions()).literals;
   bench->RunTruths();
-  bench->RunUnbent();
+  bench->base_ = bench->Run(bench->mechanism());
   const BentRun& base = bench->base_;
   if (base.ran && base.comparison.verdict == Verdict::kAgree) {
     *exit_code = 0;
@@ -77,93 +77,23 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   return nullptr;
 }
 
+std::string MutationBench::ForceCheck() const {
+  return PairName(role::kSimulated, truth()) + "." + RowOf(Metric::kForceNrmse).key;
+}
+
+// The generic solver takes part only where no closed form does.
 void MutationBench::RunTruths() {
-  const auto add = [this](const std::string& name, RunSummary summary, Trace trace) {
-    trace.witness = name;
-    summaries_.emplace_back(name, std::move(summary));
-    traces_.push_back(std::move(trace));
-  };
-  const Motion& motion = scenario().motion;
-  const bool analytic = prepared_.closed_form.closed_form != nullptr;
-  if (analytic) {
-    ClosedFormRun run = RunClosedForm(prepared_.mechanisms.analytic, motion,
-                                      prepared_.closed_form.closed_form.get());
-    add("analytic", std::move(run.summary), std::move(run.trace));
-  }
-  if (scenario().reference.table != nullptr) {
-    table_ = AlignTable(*scenario().reference.table, motion);
-    add("reference", RunSummary::Done(), table_->trace);
-  }
-  if (!analytic) {
-    ReferenceRun run = RunReference(prepared_.mechanisms.reference, motion);
-    add(table_ ? "solver" : "reference", std::move(run.summary), std::move(run.trace));
-  }
-  truth_ = analytic ? "analytic" : "reference";
-}
-
-DriveForces MutationBench::GivenForces() const {
-  if (!forces_source_) return {};
-  return [this](double t_s, VecX* force) {
-    const auto found = forces_.find(t_s);
-    if (found != forces_.end()) {
-      *force = found->second;
-      return RunSummary::Done();
-    }
-    RunSummary summary = forces_source_(t_s, force);
-    if (summary.ok()) forces_[t_s] = *force;
-    return summary;
-  };
-}
-
-// In open loop the limits of motion are how far wrong forces lead.
-void MutationBench::RunGrowth() {
+  driven_ = known_motion_.Of(prepared_.MakeDrivenMotion());
+  if (DriveForces forces = prepared_.MakeDriveForces()) forces_ = known_forces_.Of(forces);
+  const bool analytic = prepared_.has_closed_form();
+  WitnessRunner runner(prepared_, {.forces = forces_});
+  if (analytic) runner.Run(role::kAnalytic);
+  if (!analytic || prepared_.has_table()) runner.Run(role::kReference);
+  if (runner.TakesPart(role::kSolver)) runner.Run(role::kSolver);
+  // In open loop the limits of motion are how far wrong forces lead.
   const SimulationSettings& settings = scenario().simulation;
-  if (!settings.forward || settings.drive_by != DriveBy::kForces) return;
-  const auto truth = std::find_if(traces_.begin(), traces_.end(), [&](const Trace& trace) {
-    return trace.witness == prepared_.driven_by;
-  });
-  MBV_DEMAND(truth != traces_.end(), prepared_.driven_by);
-  growth_bend_ = scenario().checks[Metric::kForceNrmse].forward.value_or(
-      *RowOf(Metric::kForceNrmse).limits.forward);
-  SimulationOptions options = OptionsOf(scenario(), mechanism(), EngineOf(scenario()));
-  options.forces = Bent(GivenForces(), prepared_.base, *truth, growth_bend_);
-  SimulatedWitness wrong =
-      RunSimulation(scenario(), mechanism(), prepared_.MakeDrivenMotion(), options, {});
-  if (!wrong.run.summary.ok()) return;
-  growth_ = std::move(wrong.run.trace);
-  growth_->witness = "bent";
-}
-
-void MutationBench::RunUnbent() {
-  forces_source_ = prepared_.MakeDriveForces();
-  RunGrowth();
-  const DrivenMotion driven = prepared_.MakeDrivenMotion();
-  base_ = Run(mechanism(), scenario(), [&](double t_s, DrivenSample* sample) {
-    RunSummary summary = driven(t_s, sample);
-    if (summary.ok()) driven_[t_s] = *sample;
-    return summary;
-  });
-}
-
-ComparisonInput MutationBench::Input() const {
-  ComparisonInput input{
-      .mechanism = &prepared_.base,
-      .motion = &scenario().motion,
-      .limits = scenario().checks,
-      .simulation_limits =
-          scenario().simulation.forward ? LimitColumn::kForward : LimitColumn::kInverse,
-      .start_window_s = scenario().start_window_s,
-      .witnesses = {},
-      .driven_by = prepared_.driven_by,
-      .reactions_not_unique = reactions_not_unique_,
-      .table = table_ ? &*table_ : nullptr,
-      .drive_by = scenario().simulation.forward ? scenario().simulation.drive_by : DriveBy::kMotion,
-      .bent = growth_ ? &*growth_ : nullptr,
-      .bend = growth_bend_};
-  for (size_t k = 0; k < traces_.size(); ++k) {
-    input.witnesses.push_back({summaries_[k].first, &traces_[k], summaries_[k].second});
-  }
-  return input;
+  if (settings.forward && settings.drive_by == DriveBy::kForces) runner.RunBent();
+  truths_ = runner.Take();
 }
 
 LoadOptions MutationBench::SimulatedOptions() const {
@@ -198,59 +128,29 @@ BentRun MutationBench::Run(const Replacement& replacement) const {
   MBV_DEMAND(!replacement.literal, replacement.name);
   Scenario wrong = scenario();
   wrong.simulation.parameters[replacement.name] = replacement.value;
-  return Run(*mechanism, wrong, Remembered());
+  return Run(*mechanism, wrong);
 }
 
-BentRun MutationBench::Run(const Mechanism& wrong) const {
-  return Run(wrong, scenario(), Remembered());
-}
+BentRun MutationBench::Run(const Mechanism& wrong) const { return Run(wrong, scenario()); }
 
-DrivenMotion MutationBench::Remembered() const {
-  return [this](double t_s, DrivenSample* sample) {
-    const auto found = driven_.find(t_s);
-    MBV_DEMAND(found != driven_.end(), t_s);
-    *sample = found->second;
-    return RunSummary::Done();
-  };
-}
-
-BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario,
-                           const DrivenMotion& driven) const {
+// Motion, forces and servos are those of the unbent model: only the simulated side is wrong.
+BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario) const {
+  WitnessRunner runner(prepared_, {.scenario = &scenario,
+                                   .mechanism = &wrong,
+                                   .ranges = &wrong,
+                                   .driven = driven_,
+                                   .forces = forces_});
+  runner.RunFollowing();
+  WitnessRuns runs = runner.Take();
   BentRun bent;
-  // Forces and servos are those of the unbent model: only the simulated side is wrong.
-  SimulationOptions options = OptionsOf(scenario, wrong, EngineOf(scenario));
-  options.forces = GivenForces();
-  SimulatedWitness witness = RunSimulation(scenario, wrong, driven, options, {});
-  if (witness.diagnostics.has_errors()) {
-    bent.failure = witness.diagnostics.findings().front().message;
-    return bent;
-  }
-  if (!witness.run.summary.ok()) {
-    bent.failure = witness.run.summary.message;
-    return bent;
-  }
-  if (!scenario.simulation.ignore_ranges) {
-    const auto violations = JointViolations(wrong, witness.run.trace.time_s, witness.run.X_WB);
-    if (!violations.empty()) {
-      bent.failure = violations.front().Text();
-      return bent;
-    }
-  }
-  bent.trace = std::move(witness.run.trace);
-  bent.trace.witness = "simulated";
-  ComparisonInput input = Input();
-  input.witnesses.push_back({"simulated", &bent.trace, RunSummary::Done()});
-  // Servos: the reference where they went.
-  ReferenceRun reached;
-  if (input.drive_by == DriveBy::kServos) {
-    reached = RunReached(prepared_.mechanisms.reference, scenario.motion, bent.trace);
-    if (!reached.summary.ok()) {
-      bent.failure = "on the motion that was reached: " + reached.summary.message;
-      return bent;
-    }
-    input.witnesses.push_back({"reached", &reached.trace, reached.summary});
-  }
+  bent.failure = WhyNothing(runs, scenario.simulation.ignore_ranges);
+  if (!bent.failure.empty()) return bent;
+  ComparisonInput input = InputOf(prepared_);
+  input.reactions_not_unique = reactions_not_unique_;
+  truths_.HandOver(&input);
+  runs.HandOver(&input);
   bent.comparison = Compare(input);
+  bent.trace = std::move(runs.records.front().trace);
   bent.ran = true;
   return bent;
 }

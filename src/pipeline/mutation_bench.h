@@ -2,15 +2,14 @@
 // once.
 #pragma once
 
-#include <map>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "comparison/comparison.h"
 #include "model_file/load_model.h"
-#include "pipeline/prepare.h"
-#include "table/table.h"
+#include "pipeline/computed_once.h"
+#include "pipeline/run_witnesses.h"
 
 namespace mbv {
 
@@ -54,9 +53,12 @@ class MutationBench {
   /// Numbers that its file writes out where they are used.
   [[nodiscard]] const std::vector<Literal>& literals() const { return literals_; }
   [[nodiscard]] const BentRun& base() const { return base_; }
-  /// "analytic", "reference" (a table, too) or "solver": what the simulation is judged by first.
-  [[nodiscard]] const std::string& truth() const { return truth_; }
-  [[nodiscard]] std::string ForceCheck() const { return "simulated_vs_" + truth_ + ".force_nrmse"; }
+  /// What the simulation is judged by first.
+  [[nodiscard]] const Role& truth() const {
+    return prepared_.has_closed_form() ? role::kAnalytic : role::kReference;
+  }
+  /// Name of the check of its drive forces.
+  [[nodiscard]] std::string ForceCheck() const;
 
   /// The simulated side with one number replaced.
   [[nodiscard]] BentRun Run(const Replacement& replacement) const;
@@ -69,32 +71,19 @@ class MutationBench {
   [[nodiscard]] static double Visible(double base);
 
  private:
-  /// The commanded motion of everything driven, by time.
-  using DrivenSamples = std::map<double, DrivenSample>;
-
   explicit MutationBench(Prepared prepared) : prepared_(std::move(prepared)) {}
   void RunTruths();
-  void RunUnbent();
-  void RunGrowth();
-  [[nodiscard]] BentRun Run(const Mechanism& wrong, const Scenario& scenario,
-                            const DrivenMotion& driven) const;
-  [[nodiscard]] DrivenMotion Remembered() const;
-  /// The drive forces that the unbent simulation is given, each computed once.
-  [[nodiscard]] DriveForces GivenForces() const;
-  [[nodiscard]] ComparisonInput Input() const;
+  [[nodiscard]] BentRun Run(const Mechanism& wrong, const Scenario& scenario) const;
   [[nodiscard]] LoadOptions SimulatedOptions() const;
 
   Prepared prepared_;
   std::vector<Literal> literals_;
-  std::vector<std::pair<std::string, RunSummary>> summaries_;  // of traces_
-  std::vector<Trace> traces_;
-  std::optional<AlignedTable> table_;
-  DrivenSamples driven_;       // at every time that the unbent run asks for; bent ones ask the same
-  DriveForces forces_source_;  // empty where the simulation is given none
-  mutable std::map<double, VecX> forces_;
-  std::optional<Trace> growth_;  // force-driven: unbent, with forces wrong by growth_bend_
-  double growth_bend_ = kNan;
-  std::string truth_;
+  // What the unbent run asks for; bent ones ask the same.
+  ComputedOnce<DrivenSample> known_motion_;
+  ComputedOnce<VecX> known_forces_;
+  DrivenMotion driven_;
+  DriveForces forces_;  // empty where the simulation is given none
+  WitnessRuns truths_;  // with the unbent model under wrong forces, where it is pushed
   std::vector<std::string> reactions_not_unique_;
   BentRun base_;
 };

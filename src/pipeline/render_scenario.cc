@@ -9,7 +9,7 @@
 #include "image/png.h"
 #include "mechanism/colors.h"
 #include "pipeline/animation.h"
-#include "pipeline/prepare.h"
+#include "pipeline/run_witnesses.h"
 #include "pipeline/video.h"
 
 namespace mbv {
@@ -89,15 +89,9 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
   outcome.scenario = scenario.name;
   outcome.exit_code = 3;
   scenario.simulation.extrapolate.reset();  // changes forces, not poses
-  const auto progress = [&](const std::string& stage) {
-    return request.progress ? [&request, stage](double f) { request.progress(stage, f); }
-                            : std::function<void(double)>();
-  };
-  SimulationOptions options = OptionsOf(scenario, prepared->base, Engine::kCorrected);
-  options.forces = prepared->MakeDriveForces();
+  const auto progress = [&](const std::string& stage) { return StageOf(request.progress, stage); };
   const SimulatedWitness witness =
-      RunSimulation(scenario, prepared->mechanisms.simulated, prepared->MakeDrivenMotion(), options,
-                    progress("simulation"));
+      WitnessRunner(*prepared, {}, request.progress).Simulate(Engine::kCorrected, "simulation");
   outcome.diagnostics.Append(witness.diagnostics);
   if (!witness.run.summary.ok()) {
     outcome.diagnostics.AddError(file, witness.run.summary.message);

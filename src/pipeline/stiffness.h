@@ -7,7 +7,7 @@
 
 #include "analytic/stiffness_form.h"
 #include "core/diagnostics.h"
-#include "pipeline/run_scenario.h"
+#include "pipeline/run_options.h"
 #include "report/stiffness_report.h"
 #include "scenario/stiffness_scenario.h"
 

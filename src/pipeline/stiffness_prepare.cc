@@ -137,9 +137,12 @@ std::optional<PreparedStiffness> PrepareStiffness(StiffnessScenario scenario, Me
   prepared.scenario = std::move(scenario);
   prepared.base = std::move(base);
   const StiffnessScenario& s = prepared.scenario;
-  prepared.analytic = WithParameters(prepared, s.analytic.parameters, "analytic", diagnostics);
-  prepared.reference = WithParameters(prepared, s.reference.parameters, "reference", diagnostics);
-  prepared.simulated = WithParameters(prepared, s.simulation.parameters, "simulated", diagnostics);
+  prepared.analytic =
+      WithParameters(prepared, s.analytic.parameters, role::kAnalytic.name, diagnostics);
+  prepared.reference =
+      WithParameters(prepared, s.reference.parameters, role::kReference.name, diagnostics);
+  prepared.simulated =
+      WithParameters(prepared, s.simulation.parameters, role::kSimulated.name, diagnostics);
   ResolveOutput(&prepared, diagnostics);
   ResolvePose(&prepared, diagnostics);
   if (diagnostics->has_errors()) return {};

@@ -4,6 +4,7 @@
 #include <optional>
 
 #include "core/demand.h"
+#include "core/roles.h"
 #include "core/spatial.h"
 #include "mechanism/body_states.h"
 #include "mechanism/channels.h"
@@ -189,7 +190,7 @@ ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
   MBV_DEMAND(options.tolerance > 0.0, options.tolerance);
   const auto begin = std::chrono::steady_clock::now();
   ForwardRun run;
-  run.trace.witness = "reference";
+  run.trace.witness = role::kReference.name;
   std::vector<Channel> channels = internal::ReferenceChannels(mechanism, options.reactions);
   for (Channel& channel : WorkChannels(mechanism)) channels.push_back(std::move(channel));
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));

@@ -1,5 +1,6 @@
 #include <chrono>
 
+#include "core/roles.h"
 #include "reference/reference.h"
 #include "reference/sample_recorder.h"
 
@@ -10,7 +11,7 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
                           const std::function<void(size_t i, CommandSample* command)>& commands) {
   const auto start = std::chrono::steady_clock::now();
   ReferenceRun run;
-  run.trace.witness = "reference";
+  run.trace.witness = role::kReference.name;
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s),
                   internal::ReferenceChannels(mechanism, options.reactions));
   ReferenceSolver solver(mechanism, motion, options);

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "core/demand.h"
+#include "core/roles.h"
 
 namespace mbv {
 namespace {
@@ -183,22 +184,20 @@ Movement Compare(const ForceTrace& before, const ForceTrace& now) {
 
 std::string AttributeMovement(const GoldenTraces& before, const GoldenTraces& now) {
   struct Part {
-    const char* witness;
-    const char* word;
+    const Role& role;
     bool moved = false;
   };
-  std::vector<Part> parts = {
-      {"analytic", "analytic"}, {"simulated", "simulation"}, {"reference", "reference"}};
+  std::vector<Part> parts = {{role::kAnalytic}, {role::kSimulated}, {role::kReference}};
   std::string amounts, worst;
   double largest = -1.0;
   for (Part& part : parts) {
-    const auto a = before.find(part.witness), b = now.find(part.witness);
+    const auto a = before.find(part.role.name), b = now.find(part.role.name);
     if (a == before.end() || b == now.end()) continue;
     const Movement movement = Compare(a->second, b->second);
     if (!movement.moved()) continue;
     part.moved = true;
-    amounts +=
-        fmt::format("{}{} by {:.1e}", amounts.empty() ? "" : ", ", part.word, movement.relative);
+    amounts += fmt::format("{}{} by {:.1e}", amounts.empty() ? "" : ", ", part.role.called,
+                           movement.relative);
     if (!(movement.relative <= largest)) {
       largest = movement.relative;
       worst = movement.worst;
@@ -210,7 +209,7 @@ std::string AttributeMovement(const GoldenTraces& before, const GoldenTraces& no
     who = "both moved";
   } else {
     for (const Part& part : parts) {
-      if (part.moved) who += (who.empty() ? "" : " and ") + std::string(part.word);
+      if (part.moved) who += (who.empty() ? "" : " and ") + std::string(part.role.called);
     }
     who += " moved";
   }

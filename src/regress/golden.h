@@ -18,7 +18,7 @@ struct ForceTrace {
   std::vector<std::string> drives;  ///< m names
   MatX force;                       ///< n samples × m [N or N m]; NaN where missing
 };
-/// By witness: "analytic", "reference", "simulated".
+/// By witness (core/roles.h).
 using GoldenTraces = std::map<std::string, ForceTrace>;
 
 /// Columns DRIVE.force.WITNESS of a traces.csv; the largest sizes are thinned to at most

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/roles.h"
 #include "mjcf/mjcf.h"
 #include "simulation/session.h"
 #include "simulation/steps.h"
@@ -49,7 +50,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       solver(&system),
       loads(engine, motion_),
       recorder(&system, Integrates(options_)) {
-  run->trace.witness = "simulated";
+  run->trace.witness = role::kSimulated.name;
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
   run->X_WB.assign(run->trace.time_s.size(), {});

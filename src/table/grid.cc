@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <numeric>
 
+#include "core/roles.h"
 #include "table/grid.h"
 #include "table/table.h"
 
@@ -105,7 +106,7 @@ class Aligner {
     out_.coarsest = table_.coarsest;
     out_.columns = table_.columns;
     out_.notes = table_.notes;
-    out_.trace.witness = "reference";
+    out_.trace.witness = role::kReference.name;
     if (!TakeRows()) InterpolateRows();
     AddUncertainty();
     AddRangeNotes();

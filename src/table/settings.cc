@@ -157,7 +157,8 @@ TableSettings ReadTableSettings(ValueReader* values, const YamlNode* node) {
   ReadFormat(values, map, &settings.format);
   ReadTolerances(values, map, &settings);
   if (const YamlNode* witness = map.Find("witness")) {
-    const std::vector<std::string> words = {"reference", "analytic", "simulated", "solver"};
+    const std::vector<std::string> words = {role::kReference.name, role::kAnalytic.name,
+                                            role::kSimulated.name, role::kSolver.name};
     const auto choice = yaml.Choice(*witness, "reference.witness", words);
     if (choice) settings.witness = words[static_cast<size_t>(*choice)];
   }

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/roles.h"
 #include "input/value_reader.h"
 #include "table/table.h"
 #include "table/text.h"
@@ -30,7 +31,7 @@ struct TableSettings {
   std::string file;  ///< path, relative ones taken from the scenario's folder
   YamlEntry place;   ///< of `csv`
   TableFormat format;
-  std::string witness = "reference";  ///< which witness' columns of a traces.csv
+  std::string witness = role::kReference.name;  ///< which witness' columns of a traces.csv
   std::string time_unit;
   int time_unit_line = 0, time_unit_character = 0;
   double time_offset_s = 0.0;

@@ -65,7 +65,7 @@ struct TableUncertainty {
 /// The table on a scenario's grid, as a witness.
 struct AlignedTable {
   std::string name;  ///< file name
-  Trace trace;       ///< witness "reference"; rows at samples of the grid only
+  Trace trace;       ///< of the reference; rows at samples of the grid only
   MatX standard;     ///< as trace.values: standard uncertainty
   MatX bound;        ///< as trace.values: how far a single sample may be off
   double coverage = 2.0;

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/prepare.h"
+#include "pipeline/simulate_scenario.h"
 #include "reference/reference.h"
 #include "tests/source_dir.h"
 
@@ -51,7 +52,7 @@ struct Tripod {
                     .witnesses = {{"analytic", &analytic.trace, analytic.summary},
                                   {"reference", &reference.trace, reference.summary},
                                   {"simulated", &simulated.run.trace, simulated.run.summary}},
-                    .driven_by = prepared->driven_by,
+                    .driven_by = prepared->driver().name,
                     .reactions_not_unique = {}});
   }
 };

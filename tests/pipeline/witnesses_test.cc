@@ -1,4 +1,4 @@
-#include "pipeline/witnesses.h"
+#include "pipeline/simulate_scenario.h"
 
 #include <gtest/gtest.h>
 

@@ -1,0 +1,38 @@
+// What a run of a scenario is asked for, and what it gives, whatever the kind of scenario.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "core/diagnostics.h"
+#include "pipeline/progress.h"
+#include "report/report.h"
+#include "scenario/load_scenario.h"
+
+namespace mbv {
+
+struct StiffnessReport;  // report/stiffness_report.h
+
+struct RunOptions {
+  ScenarioOptions scenario;
+  std::string out_dir;      ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
+  bool pictures = true;     ///< needs out_dir
+  bool page = true;         ///< report.html; needs out_dir
+  std::string script_link;  ///< the page's script, relative to the result's folder; "": in the page
+  /// Folder that the runs of one night share: each paper's equations are audited once for all their
+  /// pages; "": by every run.
+  std::string kept_audits;
+  ProgressFunction progress;
+};
+
+struct RunOutcome {
+  int exit_code = 4;             ///< 0 agree, 1 disagree, 2 bad input, 3 could not run
+  Diagnostics diagnostics;       ///< bad input and warnings
+  std::optional<Report> report;  ///< of a motion; empty after bad input
+  std::shared_ptr<const StiffnessReport> stiffness;  ///< of a stiffness; null after bad input
+  std::string folder;                                ///< what was written; "" if nothing
+};
+
+}  // namespace mbv

@@ -1,0 +1,263 @@
+#include "pipeline/run_witnesses.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/demand.h"
+#include "pipeline/drive_by.h"
+#include "pipeline/free_motion_text.h"
+#include "pipeline/not_run.h"
+#include "reference/forward.h"
+#include "reference/reference.h"
+
+namespace mbv {
+namespace {
+
+constexpr const char* kSwitchedOff = "switched off in the scenario";
+
+bool Always(const Prepared&) { return true; }
+
+// The generic solver takes part beside a table where no closed form does: it gives the drive
+// motion, and a third opinion.
+bool SolvesBesideTable(const Prepared& prepared) {
+  return prepared.has_table() && prepared.scenario.reference.on && !prepared.has_closed_form();
+}
+
+bool HasServos(const Prepared& prepared) {
+  return prepared.scenario.simulation.drive_by == DriveBy::kServos;
+}
+
+}  // namespace
+
+// A witness' row: when it takes part and what it computes.
+struct WitnessRunner::Computation {
+  const Role& role;
+  bool (*takes_part)(const Prepared&);
+  void (WitnessRunner::*run)();
+
+  // Needs the motion that another one computes.
+  [[nodiscard]] bool follows() const {
+    return role.is_engine() || role.kind == RoleKind::kAfterwards;
+  }
+};
+
+const std::vector<WitnessRunner::Computation>& WitnessRunner::Computations() {
+  static const std::vector<Computation> kComputations = {
+      {role::kAnalytic, &Always, &WitnessRunner::RunAnalytic},
+      {role::kReference, &Always, &WitnessRunner::RunReferenceOrTable},
+      {role::kSolver, &SolvesBesideTable, &WitnessRunner::RunSolver},
+      {role::kSimulated, &Always, &WitnessRunner::RunSimulated},
+      {role::kReached, &HasServos, &WitnessRunner::RunReached}};
+  return kComputations;
+}
+
+const WitnessRecord* WitnessRuns::Find(const Role& role) const {
+  const auto found = std::find_if(records.begin(), records.end(),
+                                  [&](const WitnessRecord& w) { return w.name == role; });
+  return found == records.end() ? nullptr : &*found;
+}
+
+void WitnessRuns::HandOver(ComparisonInput* input) const {
+  for (const WitnessRecord& record : records) {
+    input->witnesses.push_back(
+        {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});
+  }
+  if (table) input->table = &*table;
+  if (bent) input->bent = &*bent;
+  if (!std::isnan(bend)) input->bend = bend;
+}
+
+WitnessRunner::WitnessRunner(const Prepared& prepared, SimulatedSide side,
+                             ProgressFunction progress)
+    : prepared_(prepared), side_(std::move(side)), progress_(std::move(progress)) {}
+
+const Scenario& WitnessRunner::scenario() const {
+  return side_.scenario == nullptr ? prepared_.scenario : *side_.scenario;
+}
+
+const Mechanism& WitnessRunner::simulated() const {
+  return side_.mechanism == nullptr ? prepared_.mechanisms.simulated : *side_.mechanism;
+}
+
+DrivenMotion WitnessRunner::Driven() const {
+  return side_.driven ? side_.driven : prepared_.MakeDrivenMotion();
+}
+
+DriveForces WitnessRunner::Forces() const {
+  return side_.forces ? side_.forces : prepared_.MakeDriveForces();
+}
+
+Engine WitnessRunner::judged_engine() const {
+  return prepared_.scenario.simulation.stock_engine ? Engine::kStock : Engine::kCorrected;
+}
+
+bool WitnessRunner::TakesPart(const Role& role) const {
+  const auto& rows = Computations();
+  const auto row = std::find_if(rows.begin(), rows.end(),
+                                [&](const Computation& c) { return &c.role == &role; });
+  return row != rows.end() && row->takes_part(prepared_);
+}
+
+void WitnessRunner::Run(const Role& role) {
+  for (const Computation& computation : Computations()) {
+    if (&computation.role == &role) (this->*computation.run)();
+  }
+}
+
+void WitnessRunner::RunThose(bool following) {
+  for (const Computation& computation : Computations()) {
+    if (computation.follows() != following || !computation.takes_part(prepared_)) continue;
+    (this->*computation.run)();
+  }
+}
+
+void WitnessRunner::RunComputed() { RunThose(false); }
+
+void WitnessRunner::RunFollowing() { RunThose(true); }
+
+const WitnessRecord& WitnessRunner::driver() const {
+  const WitnessRecord* record = runs_.Find(prepared_.driver());
+  MBV_DEMAND(record != nullptr, prepared_.driver().name);
+  return *record;
+}
+
+bool WitnessRunner::CheckStrokes() {
+  const auto violations = DriveViolations(prepared_.base, driver().trace);
+  if (violations.empty()) return true;
+  const bool ignore = scenario().simulation.ignore_ranges;
+  AddFindings(violations, scenario().file, ignore ? Severity::kWarning : Severity::kError,
+              &runs_.findings);
+  if (ignore) return true;
+  LeaveOut(role::kSimulated, LimitSummary(violations));
+  return false;
+}
+
+void WitnessRunner::Add(const Role& role, RunSummary summary, Trace trace) {
+  trace.witness = role.name;
+  runs_.records.push_back({role.name, std::move(summary), std::move(trace)});
+}
+
+void WitnessRunner::LeaveOut(const Role& role, RunSummary why) { Add(role, std::move(why), {}); }
+
+void WitnessRunner::Warn(const std::string& text) {
+  Finding finding;
+  finding.severity = Severity::kWarning;
+  finding.message = text;
+  runs_.findings.Add(std::move(finding));
+}
+
+void WitnessRunner::RunAnalytic() {
+  if (!prepared_.has_closed_form()) {
+    return LeaveOut(role::kAnalytic, NotRun(prepared_.closed_form.reason));
+  }
+  ClosedFormRun run = RunClosedForm(prepared_.mechanisms.analytic, scenario().motion,
+                                    prepared_.closed_form.closed_form.get());
+  runs_.timing.analytic_s = run.summary.wall_s;
+  Add(role::kAnalytic, std::move(run.summary), std::move(run.trace));
+}
+
+// The generic solver, or a table in its place.
+void WitnessRunner::RunReferenceOrTable() {
+  if (!scenario().reference.on) return LeaveOut(role::kReference, NotRun(kSwitchedOff));
+  if (!prepared_.has_table()) return Solve(role::kReference);
+  runs_.table = AlignTable(*scenario().reference.table, scenario().motion);
+  const bool any = !runs_.table->trace.time_s.empty();
+  Add(role::kReference, any ? RunSummary::Done() : NotRun(runs_.table->grid), runs_.table->trace);
+}
+
+void WitnessRunner::RunSolver() { Solve(role::kSolver); }
+
+void WitnessRunner::Solve(const Role& role) {
+  if (scenario().motion.free()) return SolveFree(role);
+  ReferenceRun run = RunReference(prepared_.mechanisms.reference, scenario().motion);
+  runs_.timing.reference_s = run.summary.wall_s;
+  Add(role, std::move(run.summary), std::move(run.trace));
+}
+
+void WitnessRunner::SolveFree(const Role& role) {
+  ForwardRun run = RunForwardReference(prepared_.mechanisms.reference, scenario().motion,
+                                       {.progress = StageOf(progress_, role::kReference.called)});
+  runs_.timing.reference_s = run.summary.wall_s;
+  runs_.trust = TrustLine(run);
+  for (const std::string& text : PassageTexts(run, scenario().motion.duration_s)) Warn(text);
+  Add(role, std::move(run.summary), std::move(run.trace));
+}
+
+void WitnessRunner::RunSimulated() {
+  const Role& role = role::kSimulated;
+  if (!scenario().simulation.on) return LeaveOut(role, NotRun(kSwitchedOff));
+  const bool needs_driver = !side_.driven && (!scenario().motion.free() || scenario().reference.on);
+  if (needs_driver && !driver().summary.ok()) {
+    return LeaveOut(
+        role, NotRun(fmt::format("there is no drive motion, because {} failed", driver().name)));
+  }
+  SimulatedWitness witness = Simulate(judged_engine(), role.called);
+  runs_.bad_input.Append(witness.diagnostics);
+  runs_.timing.simulation_s = witness.run.summary.wall_s;
+  runs_.timing.loop_s = witness.run.loop_wall_s;
+  runs_.timing.steps = witness.run.steps;
+  for (const std::string& warning : witness.run.warnings) Warn("MuJoCo: " + warning);
+  for (const std::string& note : witness.run.notes) Warn(note);
+  CheckRanges(&witness.run);
+  Add(role, witness.run.summary, witness.run.trace);
+  runs_.simulation = std::move(witness.run);
+}
+
+// Joint ranges along the simulated motion.
+void WitnessRunner::CheckRanges(SimulationRun* run) {
+  if (!run->summary.ok()) return;
+  const bool ignore = scenario().simulation.ignore_ranges;
+  const Mechanism& mechanism = side_.ranges == nullptr ? prepared_.base : *side_.ranges;
+  runs_.violations = JointViolations(mechanism, run->trace.time_s, run->X_WB);
+  AddFindings(runs_.violations, scenario().file, ignore ? Severity::kWarning : Severity::kError,
+              &runs_.findings);
+  if (!runs_.violations.empty() && !ignore) run->summary = LimitSummary(runs_.violations);
+}
+
+// The reference where the servos went.
+void WitnessRunner::RunReached() {
+  if (!runs_.simulation || !runs_.simulation->summary.ok()) return;
+  ReferenceRun run =
+      mbv::RunReached(prepared_.mechanisms.reference, scenario().motion, runs_.simulation->trace);
+  Add(role::kReached, std::move(run.summary), std::move(run.trace));
+}
+
+void WitnessRunner::RunBent() {
+  const std::optional<double>& limit = scenario().checks[Metric::kForceNrmse].forward;
+  runs_.bend = limit.value_or(*RowOf(Metric::kForceNrmse).limits.forward);
+  SimulationOptions options = OptionsOf(scenario(), simulated(), judged_engine());
+  options.forces = Bent(Forces(), prepared_.base, driver().trace, runs_.bend);
+  SimulatedWitness bent = Simulate(options, "bent forces");
+  if (!bent.run.summary.ok()) return Warn("bent forces: " + bent.run.summary.message);
+  runs_.bent = std::move(bent.run.trace);
+  runs_.bent->witness = role::kBent.name;
+}
+
+SimulatedWitness WitnessRunner::Simulate(Engine engine, const std::string& stage) const {
+  SimulationOptions options = OptionsOf(scenario(), simulated(), engine);
+  if (engine == judged_engine()) options.forces = Forces();
+  return Simulate(options, stage);
+}
+
+SimulatedWitness WitnessRunner::Simulate(const SimulationOptions& options,
+                                         const std::string& stage) const {
+  return RunSimulation(scenario(), simulated(), Driven(), options, StageOf(progress_, stage));
+}
+
+ComparisonInput InputOf(const Prepared& prepared) {
+  const Scenario& scenario = prepared.scenario;
+  const SimulationSettings& simulation = scenario.simulation;
+  return {.mechanism = &prepared.base,
+          .motion = &scenario.motion,
+          .limits = scenario.checks,
+          .simulation_limits = simulation.forward ? LimitColumn::kForward : LimitColumn::kInverse,
+          .start_window_s = scenario.start_window_s,
+          .witnesses = {},
+          .driven_by = prepared.driver().name,
+          .reactions_not_unique = {},
+          .drive_by = simulation.forward ? simulation.drive_by : DriveBy::kMotion};
+}
+
+}  // namespace mbv
