@@ -118,16 +118,14 @@ std::string WhyNoParameterName(const std::string& name) {
   return "";
 }
 
-void Scope::Define(const std::string& name, std::string expression, double factor) {
-  entries_[name] = Entry{.expression = std::move(expression),
-                         .factor = factor,
-                         .state = State::kWaiting,
-                         .result = {}};
+void Scope::Define(const std::string& name, std::string expression, const UnitSuffix& unit) {
+  entries_[name] = Entry{
+      .expression = std::move(expression), .unit = unit, .state = State::kWaiting, .result = {}};
 }
 
 void Scope::Set(const std::string& name, double value) {
   entries_[name] = Entry{.expression = "",
-                         .factor = 1.0,
+                         .unit = kPlain,
                          .state = State::kDone,
                          .result = {.value = value, .error = "", .hint = ""}};
 }
@@ -142,7 +140,7 @@ void Scope::EvaluateEntry(const std::string& name, Entry* entry) {
                              .hint = ""}
           : Evaluate(entry->expression);
   evaluating_.pop_back();
-  if (result.value) *result.value *= entry->factor;
+  if (result.value) result.value = entry->unit.to_si(*result.value);
   // A cycle has already marked this entry and holds its text.
   if (entry->state == State::kFailed) return;
   entry->state = result.value ? State::kDone : State::kFailed;

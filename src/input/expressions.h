@@ -10,6 +10,8 @@
 #include <string>
 #include <vector>
 
+#include "input/units.h"
+
 namespace mbv {
 
 /// A value, or why there is none. `error` is empty when the cause is a parameter whose own error is
@@ -25,9 +27,9 @@ class Scope {
  public:
   explicit Scope(Scope* outer = nullptr) : outer_(outer) {}
 
-  /// Defines name = factor · (expression), evaluated when first asked for. Replaces an earlier
-  /// definition.
-  void Define(const std::string& name, std::string expression, double factor = 1.0);
+  /// Defines the name as the value of an expression, which is in `unit`, evaluated when first asked
+  /// for. Replaces an earlier definition.
+  void Define(const std::string& name, std::string expression, const UnitSuffix& unit = kPlain);
   void Set(const std::string& name, double value);
 
   /// Value of a parameter of this level or further out. A failed parameter gives its error the
@@ -43,7 +45,7 @@ class Scope {
   enum class State { kWaiting, kEvaluating, kDone, kFailed };
   struct Entry {
     std::string expression;
-    double factor = 1.0;
+    UnitSuffix unit = kPlain;
     State state = State::kWaiting;
     ExpressionResult result;
   };

@@ -50,7 +50,7 @@ std::optional<double> ValueReader::InUnit(const YamlMap& map, const std::string&
   if (found.node == nullptr) return {};
   const auto number = Number(*found.node, map.PathOf(found.key));
   if (!number) return {};
-  return *number * found.unit.factor;
+  return found.unit.to_si(*number);
 }
 
 std::optional<double> ValueReader::RequiredPositive(const YamlMap& map, const std::string& key) {

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "core/diagnostics.h"
+#include "input/units.h"
 
 namespace mbv {
 
@@ -109,15 +110,6 @@ class YamlReader {
   std::set<std::string> given_;  // place and message of each finding
 };
 
-/// A unit suffix of a key and the factor to SI: {"_deg", π/180}.
-struct UnitSuffix {
-  std::string_view suffix;
-  double factor = 1.0;
-};
-inline constexpr UnitSuffix kPlain{"", 1.0};
-inline constexpr UnitSuffix kDeg{"_deg", 0.017453292519943295};
-inline constexpr UnitSuffix kMm{"_mm", 1e-3};
-
 /// A map whose keys are known.
 class YamlMap {
  public:
@@ -140,7 +132,7 @@ class YamlMap {
   struct InUnit {
     const YamlNode* node = nullptr;
     std::string key;
-    UnitSuffix unit;
+    UnitSuffix unit = kPlain;
   };
   /// The one that is given (node null when none); a finding when two are.
   [[nodiscard]] InUnit FindInUnit(const std::string& key,

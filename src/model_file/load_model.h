@@ -1,7 +1,6 @@
 // model.yaml (and URDF) → Mechanism.
 #pragma once
 
-#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -20,7 +19,7 @@ struct Literal {
 
 struct LoadOptions {
   /// Parameter overrides by name; an unknown name is an error. Names may end in a unit:
-  /// ParameterIn().
+  /// SplitUnit().
   std::map<std::string, double> overrides;
   /// Where the overrides were written, for messages ("scenario.yaml:7:3").
   std::map<std::string, Finding> override_places;
@@ -28,15 +27,6 @@ struct LoadOptions {
   /// Other values of literals, by place.
   std::map<std::string, double> literals;
 };
-
-/// The parameter that an override sets: "alpha_deg" is alpha in degrees, "l_mm" is l in
-/// millimetres, where the model has no parameter of the whole name.
-struct ParameterInUnit {
-  std::string name;     ///< as given if no parameter fits
-  double factor = 1.0;  ///< to SI and radians
-};
-[[nodiscard]] ParameterInUnit ParameterIn(
-    const std::string& given, const std::function<bool(const std::string&)>& is_parameter);
 
 struct LoadResult {
   std::optional<Mechanism> mechanism;  ///< empty when there are errors

@@ -307,8 +307,8 @@ void ModelReader::CheckAxes(bool closed_at_home) {
       "the axis of joint '{}' is tilted by {:.3g} deg against that of joint '{}' on {}: with {} "
       "axes "
       "{}",
-      joint.name, tilted->angle_rad / kDeg.factor, other.name, mechanism_.bodies[tilted->body].name,
-      like ? "parallel" : "perpendicular",
+      joint.name, tilted->angle_rad / FromDegrees(1.0), other.name,
+      mechanism_.bodies[tilted->body].name, like ? "parallel" : "perpendicular",
       closed_at_home ? fmt::format("the mechanism has {} freedoms instead of {}",
                                    tilted->freedoms_aligned, tilted->freedoms)
                      : "the loops close");

@@ -40,7 +40,7 @@ std::optional<double> ModelReader::Positive(const Block& block, const YamlMap& m
     (void)map.Required(key);
     return std::nullopt;
   }
-  const auto value = Number(block, *found.node, map.PathOf(found.key), found.unit.factor);
+  const auto value = Number(block, *found.node, map.PathOf(found.key), found.unit);
   if (!value || *value > 0.0) return value;
   yaml_.Error(*found.node,
               fmt::format("{} = {} violates {} > 0", map.PathOf(found.key), *value, key));

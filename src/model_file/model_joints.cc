@@ -20,11 +20,9 @@ std::vector<std::string> KindWords() {
   return words;
 }
 
-// Factor of one coordinate when the key carries a unit: _deg scales angles, _mm lengths.
-double FactorOf(const UnitSuffix& unit, JointKind kind, int coordinate) {
-  if (unit.suffix == kDeg.suffix && !IsLength(kind, coordinate)) return unit.factor;
-  if (unit.suffix == kMm.suffix && IsLength(kind, coordinate)) return unit.factor;
-  return 1.0;
+// Of one coordinate when the key carries a unit: _deg is that of angles, _mm of lengths.
+UnitSuffix UnitOf(const UnitSuffix& unit, JointKind kind, int coordinate) {
+  return unit.Suits(IsLength(kind, coordinate) ? "m" : "rad") ? unit : kPlain;
 }
 
 }  // namespace
@@ -127,7 +125,7 @@ void ModelReader::ReadGuess(const Block& block, const YamlNode& node, const std:
                             const UnitSuffix& unit, Joint* joint) {
   const int n = FreedomsOf(joint->kind);
   if (n == 1 && node.is_scalar()) {
-    joint->guess[0] = Number(block, node, path, FactorOf(unit, joint->kind, 0)).value_or(0.0);
+    joint->guess[0] = Number(block, node, path, UnitOf(unit, joint->kind, 0)).value_or(0.0);
     WarnAboutGuess(node, path, unit, *joint, 0);
     return;
   }
@@ -135,7 +133,7 @@ void ModelReader::ReadGuess(const Block& block, const YamlNode& node, const std:
   if (!items) return;
   for (int k = 0; k < n; ++k) {
     joint->guess[k] =
-        Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), FactorOf(unit, joint->kind, k))
+        Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), UnitOf(unit, joint->kind, k))
             .value_or(0.0);
     WarnAboutGuess(*(*items)[k], fmt::format("{}[{}]", path, k), unit, *joint, k);
   }
@@ -159,7 +157,7 @@ void ModelReader::ReadJointRange(const Block& block, const YamlMap& map, Joint* 
   const bool one_pair = n == 1 && range.node->is_sequence() && !range.node->items.empty() &&
                         !range.node->items.front()->is_sequence();
   if (one_pair) {
-    joint->range[0] = Range(block, *range.node, path, FactorOf(range.unit, joint->kind, 0))
+    joint->range[0] = Range(block, *range.node, path, UnitOf(range.unit, joint->kind, 0))
                           .value_or(CoordinateRange{});
     return;
   }
@@ -167,7 +165,7 @@ void ModelReader::ReadJointRange(const Block& block, const YamlMap& map, Joint* 
   if (!items) return;
   for (int k = 0; k < n; ++k) {
     joint->range[k] = Range(block, *(*items)[k], fmt::format("{}[{}]", path, k),
-                            FactorOf(range.unit, joint->kind, k))
+                            UnitOf(range.unit, joint->kind, k))
                           .value_or(CoordinateRange{});
   }
 }

@@ -98,14 +98,14 @@ void ModelReader::ReadParameters(YamlReader* yaml, const Block& block, const Yam
       continue;
     }
     const YamlNode* value = entry.value.get();
-    double factor = 1.0;
+    UnitSuffix unit = kPlain;
     if (value->is_map()) {
       const YamlMap map(yaml, value, where,
                         {"value", "value_deg", "value_mm", "unit", "source", "note"});
       const auto found = map.FindInUnit("value", {kPlain, kDeg, kMm});
       if (found.node == nullptr) (void)map.Required("value");
       value = found.node;
-      factor = found.unit.factor;
+      unit = found.unit;
     }
     if (value == nullptr) continue;
     if (!value->is_scalar()) {
@@ -113,7 +113,7 @@ void ModelReader::ReadParameters(YamlReader* yaml, const Block& block, const Yam
                                       Describe(*value)));
       continue;
     }
-    block.scope->Define(entry.key, value->text, factor);
+    block.scope->Define(entry.key, value->text, unit);
   }
 }
 
@@ -155,25 +155,14 @@ void ModelReader::EvaluateParameters(YamlReader* yaml, const Block& block, const
   }
 }
 
-ParameterInUnit ParameterIn(const std::string& given,
-                            const std::function<bool(const std::string&)>& is_parameter) {
-  if (is_parameter(given)) return {given, 1.0};
-  for (const UnitSuffix& unit : {kDeg, kMm}) {
-    if (!given.ends_with(unit.suffix)) continue;
-    std::string plain = given.substr(0, given.size() - unit.suffix.size());
-    if (is_parameter(plain)) return {std::move(plain), unit.factor};
-  }
-  return {given, 1.0};
-}
-
 void ModelReader::ApplyOverrides(const Block& block) {
   for (const auto& [name, value] : options_.overrides) {
     if (!name.starts_with(block.prefix)) continue;
-    const auto [inner, factor] =
-        ParameterIn(name.substr(block.prefix.size()),
-                    [&](const std::string& known) { return block.scope->Has(known); });
+    const auto [inner, unit] =
+        SplitUnit(name.substr(block.prefix.size()),
+                  [&](const std::string& known) { return block.scope->Has(known); });
     if (!block.scope->Has(inner)) continue;
-    block.scope->Set(inner, factor * value);
+    block.scope->Set(inner, unit.to_si(value));
     override_used_[name] = true;
     if (const auto [other, first] = overridden_.emplace(block.prefix + inner, name); !first) {
       Finding finding = PlaceOfOverride(name);

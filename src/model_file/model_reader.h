@@ -203,9 +203,9 @@ class ModelReader {
   /// The value, or what LoadOptions::literals puts in its place.
   double LiteralAt(const std::string& place, double value);
   std::optional<double> Number(const Block& block, const YamlNode& node, const std::string& path,
-                               double factor = 1.0);
+                               const UnitSuffix& unit = kPlain);
   std::optional<Vec3> Vector(const Block& block, const YamlNode& node, const std::string& path,
-                             double factor = 1.0);
+                             const UnitSuffix& unit = kPlain);
   std::optional<double> Number(const Block& block, const YamlMap& map, const std::string& key,
                                std::initializer_list<UnitSuffix> units);
   std::optional<Vec3> Vector(const Block& block, const YamlMap& map, const std::string& key,
@@ -218,7 +218,7 @@ class ModelReader {
                                        const std::string& path);
   std::optional<Pose> PoseOf(const Block& block, const YamlNode& node, const std::string& path);
   std::optional<CoordinateRange> Range(const Block& block, const YamlNode& node,
-                                       const std::string& path, double factor);
+                                       const std::string& path, const UnitSuffix& unit);
 
   // Names (model_values.cc). The resolvers look in the block, then outwards.
   bool CheckNewName(const YamlEntry& entry, const std::string& path);

@@ -45,14 +45,13 @@ void ModelReader::ReadDrive(const Block& block, const YamlEntry& entry) {
     }
   }
   if (const auto range = map.FindInUnit("range", {kPlain, kDeg, kMm}); range.node != nullptr) {
-    const bool is_length = PositionUnit(mechanism_, drive) == "m";
-    if ((range.unit.suffix == kDeg.suffix && is_length) ||
-        (range.unit.suffix == kMm.suffix && !is_length)) {
+    const std::string unit = PositionUnit(mechanism_, drive);
+    if (!range.unit.Suits(unit)) {
       yaml_.Error(*range.node, fmt::format("{}: the drive's position is {}", map.PathOf(range.key),
-                                           is_length ? "a length" : "an angle"));
+                                           unit == "m" ? "a length" : "an angle"));
     }
-    drive.range = Range(block, *range.node, map.PathOf(range.key), range.unit.factor)
-                      .value_or(CoordinateRange{});
+    drive.range =
+        Range(block, *range.node, map.PathOf(range.key), range.unit).value_or(CoordinateRange{});
   }
   drive.stiffness = ReadDriveStiffness(block, map);
   mechanism_.drives.push_back(drive);

@@ -10,7 +10,7 @@
 namespace mbv {
 
 std::optional<double> ModelReader::Number(const Block& block, const YamlNode& node,
-                                          const std::string& path, double factor) {
+                                          const std::string& path, const UnitSuffix& unit) {
   if (!node.is_scalar()) {
     yaml_.Error(node,
                 fmt::format("{} is {}, a number or an expression is needed", path, Describe(node)));
@@ -18,7 +18,7 @@ std::optional<double> ModelReader::Number(const Block& block, const YamlNode& no
   }
   const ExpressionResult result = block.scope->Evaluate(node.text);
   if (result.value) {
-    const double value = *result.value * factor;
+    const double value = unit.to_si(*result.value);
     return IsWrittenOut(node.text) ? LiteralAt(path, value) : value;
   }
   // An empty text: a parameter failed whose own place already carries the finding.
@@ -36,13 +36,13 @@ double ModelReader::LiteralAt(const std::string& place, double value) {
 }
 
 std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlNode& node,
-                                        const std::string& path, double factor) {
+                                        const std::string& path, const UnitSuffix& unit) {
   const auto items = yaml_.Items(node, path, 3);
   if (!items) return std::nullopt;
   Vec3 vector;
   bool good = true;
   for (int k = 0; k < 3; ++k) {
-    const auto value = Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), factor);
+    const auto value = Number(block, *(*items)[k], fmt::format("{}[{}]", path, k), unit);
     good = good && value.has_value();
     vector[k] = value.value_or(kNan);
   }
@@ -54,7 +54,7 @@ std::optional<double> ModelReader::Number(const Block& block, const YamlMap& map
                                           std::initializer_list<UnitSuffix> units) {
   const YamlMap::InUnit found = map.FindInUnit(key, units);
   if (found.node == nullptr) return std::nullopt;
-  return Number(block, *found.node, map.PathOf(found.key), found.unit.factor);
+  return Number(block, *found.node, map.PathOf(found.key), found.unit);
 }
 
 std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlMap& map,
@@ -62,7 +62,7 @@ std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlMap& map,
                                         std::initializer_list<UnitSuffix> units) {
   const YamlMap::InUnit found = map.FindInUnit(key, units);
   if (found.node == nullptr) return std::nullopt;
-  return Vector(block, *found.node, map.PathOf(found.key), found.unit.factor);
+  return Vector(block, *found.node, map.PathOf(found.key), found.unit);
 }
 
 std::optional<Vec3> ModelReader::Axis(const Block& block, const YamlNode& node,
@@ -194,7 +194,7 @@ std::optional<Pose> ModelReader::PoseOf(const Block& block, const YamlNode& node
 }
 
 std::optional<CoordinateRange> ModelReader::Range(const Block& block, const YamlNode& node,
-                                                  const std::string& path, double factor) {
+                                                  const std::string& path, const UnitSuffix& unit) {
   CoordinateRange range;
   if (node.is_null()) return range;
   const auto items = yaml_.Items(node, path, 2);
@@ -203,7 +203,7 @@ std::optional<CoordinateRange> ModelReader::Range(const Block& block, const Yaml
   for (int k = 0; k < 2; ++k) {
     const YamlNode& item = *(*items)[k];
     if (item.is_null()) continue;  // no limit on this side
-    const auto value = Number(block, item, fmt::format("{}[{}]", path, k), factor);
+    const auto value = Number(block, item, fmt::format("{}[{}]", path, k), unit);
     good = good && value.has_value();
     if (value) (k == 0 ? range.lower : range.upper) = *value;
   }

@@ -6,6 +6,8 @@
 #include <array>
 #include <cmath>
 
+#include "input/units.h"
+
 namespace mbv {
 namespace {
 
@@ -36,9 +38,8 @@ std::vector<std::string> KeysOf(const std::string& place) {
 
 // A key of this word, whatever unit it is written in.
 bool Has(const std::vector<std::string>& keys, const std::string& word) {
-  return std::any_of(keys.begin(), keys.end(), [&](const std::string& key) {
-    return key == word || key == word + "_deg" || key == word + "_mm";
-  });
+  return std::any_of(keys.begin(), keys.end(),
+                     [&](const std::string& key) { return SplitUnit(key).name == word; });
 }
 
 bool CanAct(const Literal& literal) {

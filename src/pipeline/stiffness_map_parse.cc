@@ -77,13 +77,8 @@ class Parser {
     return "";
   }
 
-  void Add(std::string key, const std::string& value) {
-    double factor = 1.0;
-    for (const UnitSuffix& unit : {kDeg, kMm}) {
-      if (!key.ends_with(unit.suffix)) continue;
-      key.resize(key.size() - unit.suffix.size());
-      factor = unit.factor;
-    }
+  void Add(const std::string& given, const std::string& value) {
+    const auto [key, unit] = SplitUnit(given);
     const bool within = key == "within";
     const std::string name = within ? key : Resolve(key);
     if (name.empty()) return;
@@ -97,18 +92,18 @@ class Parser {
       numbers.push_back(*number);
     }
     if (numbers.size() == 1 && within) {
-      map_.within = factor * numbers[0];
+      map_.within = unit.to_si(numbers[0]);
     } else if (numbers.size() == 1) {
-      map_.fixed.push_back({name, units_[name], factor * numbers[0]});
+      map_.fixed.push_back({name, units_[name], unit.to_si(numbers[0])});
     } else if (numbers.size() == 3 && !within) {
-      AddRange(name, value, numbers, factor);
+      AddRange(name, value, numbers, unit);
     } else {
       Error(fmt::format("{} = {} is no LOW:HIGH:POINTS", key, value));
     }
   }
 
   void AddRange(const std::string& name, const std::string& value,
-                const std::vector<double>& numbers, double factor) {
+                const std::vector<double>& numbers, const UnitSuffix& unit) {
     if (!(numbers[0] < numbers[1]) || numbers[2] < 2 || numbers[2] > kMostPoints ||
         numbers[2] != std::round(numbers[2])) {
       Error(fmt::format("{} = {} violates LOW < HIGH and 2 <= POINTS <= {}", name, value,
@@ -116,8 +111,9 @@ class Parser {
       return;
     }
     if (axes_ < 2) {
-      map_.axes[static_cast<size_t>(axes_)] = {name, units_[name], factor * numbers[0],
-                                               factor * numbers[1], static_cast<int>(numbers[2])};
+      map_.axes[static_cast<size_t>(axes_)] = {name, units_[name], unit.to_si(numbers[0]),
+                                               unit.to_si(numbers[1]),
+                                               static_cast<int>(numbers[2])};
     }
     ++axes_;
   }

@@ -50,15 +50,15 @@ std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& 
   return places;
 }
 
-ParameterInUnit PlainName(const std::string& name, const Mechanism& mechanism) {
-  return ParameterIn(name, [&](const std::string& known) { return mechanism.HasParameter(known); });
+NameInUnit PlainName(const std::string& name, const Mechanism& mechanism) {
+  return SplitUnit(name, [&](const std::string& known) { return mechanism.HasParameter(known); });
 }
 
 Overrides InPlainUnits(const Overrides& overrides, const Mechanism& mechanism) {
   Overrides plain;
   for (const auto& [given, value] : overrides) {
-    const auto [name, factor] = PlainName(given, mechanism);
-    plain[name] = factor * value;
+    const auto [name, unit] = PlainName(given, mechanism);
+    plain[name] = unit.to_si(value);
   }
   return plain;
 }

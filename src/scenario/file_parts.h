@@ -27,7 +27,7 @@ void CheckCaseName(const std::string& name, YamlReader* yaml);
                                                       const std::vector<SetValue>& set);
 
 /// The parameter of the mechanism that a name in a file means, with its unit.
-[[nodiscard]] ParameterInUnit PlainName(const std::string& name, const Mechanism& mechanism);
+[[nodiscard]] NameInUnit PlainName(const std::string& name, const Mechanism& mechanism);
 /// Overrides whose names may end in a unit, by the parameters' own names in SI.
 [[nodiscard]] Overrides InPlainUnits(const Overrides& overrides, const Mechanism& mechanism);
 

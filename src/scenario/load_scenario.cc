@@ -39,10 +39,6 @@ std::string JoinWords(std::vector<std::string> words) {
   return text;
 }
 
-std::string NameWithoutUnit(const std::string& key) {
-  return ParameterIn(key, [&](const std::string& plain) { return plain != key; }).name;
-}
-
 class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioResult> {
  public:
   using ScenarioFile::ScenarioFile;
@@ -126,7 +122,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     for (const YamlEntry& option : node->entries) {
       if (option.line >= 0) continue;
       for (const YamlEntry& entry : node->entries) {
-        if (entry.line < 0 || NameWithoutUnit(entry.key) != NameWithoutUnit(option.key)) continue;
+        if (entry.line < 0 || SplitUnit(entry.key).name != SplitUnit(option.key).name) continue;
         scenario_.parameters.erase(entry.key);
       }
     }

@@ -191,8 +191,8 @@ class MotionReader {
                                             axes == 0 ? -1 : static_cast<int>(axes));
       if (!numbers) return {};
       points.push_back(
-          found.unit.factor *
-          Eigen::Map<const VecX>(numbers->data(), static_cast<Eigen::Index>(numbers->size())));
+          Eigen::Map<const VecX>(numbers->data(), static_cast<Eigen::Index>(numbers->size()))
+              .unaryExpr(found.unit.to_si));
     }
     return points;
   }

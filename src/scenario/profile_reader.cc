@@ -104,7 +104,7 @@ class ProfileReader {
   // A term's map; `amount` is the key that may be given in several units.
   YamlMap Map(const YamlNode* node, const std::string& path, const std::string& amount,
               std::vector<std::string> keys) {
-    for (const char* suffix : {"", "_deg", "_mm"}) keys.push_back(amount + suffix);
+    for (std::string& key : InEveryUnit(amount)) keys.push_back(std::move(key));
     return {&values_->yaml(), node, path, keys};
   }
 
@@ -112,8 +112,7 @@ class ProfileReader {
   std::optional<double> Amount(const YamlMap& map, const std::string& key) {
     const YamlMap::InUnit found = map.FindInUnit(key, {kPlain, kDeg, kMm});
     if (found.node == nullptr) return {};
-    const std::string suffix(found.unit.suffix);
-    if ((suffix == "_deg" && context_.unit != "rad") || (suffix == "_mm" && context_.unit != "m")) {
+    if (!found.unit.Suits(context_.unit)) {
       values_->yaml().Error(
           *found.node,
           fmt::format("{} is given, but this value is in {}", map.PathOf(found.key), context_.unit),
@@ -122,7 +121,7 @@ class ProfileReader {
     }
     const auto number = values_->Number(*found.node, map.PathOf(found.key));
     if (!number) return {};
-    return *number * found.unit.factor;
+    return found.unit.to_si(*number);
   }
 
   std::optional<double> RequiredAmount(const YamlMap& map, const std::string& key) {

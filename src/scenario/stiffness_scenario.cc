@@ -24,16 +24,6 @@ const std::vector<std::string> kStiffnessScenarioKeys = {
     "kind",      "mechanism",  "description", "parameters",      "pose",   "output", "analytic",
     "reference", "simulation", "loads",       "compare_printed", "checks", "expect"};
 
-// "platform.x" and 1e-3 from "platform.x_mm".
-std::pair<std::string, double> WithoutUnit(const std::string& key) {
-  for (const UnitSuffix& unit : {kDeg, kMm}) {
-    if (key.ends_with(unit.suffix)) {
-      return {key.substr(0, key.size() - unit.suffix.size()), unit.factor};
-    }
-  }
-  return {key, 1.0};
-}
-
 class StiffnessLoader final
     : public internal::ScenarioFile<StiffnessScenario, StiffnessScenarioResult> {
  public:
@@ -119,7 +109,7 @@ class StiffnessLoader final
     const std::vector<std::string> coordinates = CoordinateNames(*mechanism_);
     Overrides parameters;
     for (const YamlEntry& entry : yaml_.Entries(node, "pose")) {
-      const auto [name, factor] = WithoutUnit(entry.key);
+      const auto [name, unit] = SplitUnit(entry.key);
       const auto number = values_.Number(*entry.value, JoinPath("pose", entry.key));
       const bool coordinate = Contains(coordinates, name);
       const bool parameter = mechanism_->HasParameter(name);
@@ -131,8 +121,8 @@ class StiffnessLoader final
         yaml_.Error(entry, fmt::format("pose: {} is given twice", name));
       }
       if (!number) continue;
-      if (coordinate) scenario_.pose[name] = factor * *number;
-      if (parameter) parameters[name] = factor * *number;
+      if (coordinate) scenario_.pose[name] = unit.to_si(*number);
+      if (parameter) parameters[name] = unit.to_si(*number);
       if (parameter)
         scenario_.parameter_places[name] = PlacesOf(node, file_, options_.set)[entry.key];
     }

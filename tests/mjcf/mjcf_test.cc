@@ -112,6 +112,12 @@ TEST(Mjcf, ShippedModelsAreInStepWithTheirCommittedMjcf) {
   }
 }
 
+TEST(Mjcf, MillimetresAreTheDecimalsThatWereTyped) {
+  const std::string text = WriteMjcf(LoadNamed("four_bar"));  // bar: {value_mm: 9}
+  EXPECT_NE(text.find("size=\"0.009\""), std::string::npos) << text;
+  EXPECT_EQ(text.find("0.00900"), std::string::npos) << text;
+}
+
 TEST(Mjcf, IsDeterministic) {
   const Mechanism m = LoadNamed("stabilizing_platform");
   EXPECT_EQ(WriteMjcf(m), WriteMjcf(m));
