@@ -48,8 +48,11 @@ namespace {
 // Long or many-line values are cut in messages.
 std::string Shortened(const std::string& text) {
   std::string line = text.substr(0, text.find('\n'));
-  if (line.size() > 60) line.resize(57);
-  while (!line.empty() && (line.back() & 0xC0) == 0x80) line.pop_back();  // whole characters only
+  if (line.size() > 60) {
+    size_t end = 57;
+    while (end > 0 && (line[end] & 0xC0) == 0x80) --end;  // whole characters only
+    line.resize(end);
+  }
   return line.size() < text.size() ? line + "..." : line;
 }
 

@@ -29,6 +29,8 @@ class TreeBuilder : public YAML::EventHandler {
  public:
   explicit TreeBuilder(YamlReader* reader) : reader_(reader) {}
   [[nodiscard]] YamlNodePtr root() const { return root_; }
+  /// Where the last text in quotes starts; null when there is none.
+  [[nodiscard]] const YAML::Mark& last_quoted() const { return last_quoted_; }
 
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
@@ -40,6 +42,7 @@ class TreeBuilder : public YAML::EventHandler {
     auto node = MakeNode(Kind::kScalar, mark);
     node->text = value;
     node->quoted = tag == "!";
+    if (node->quoted) last_quoted_ = mark;
     CheckTag(mark, tag);
     CheckText(mark, value);
     Leaf(node, anchor);
@@ -154,9 +157,27 @@ class TreeBuilder : public YAML::EventHandler {
 
   YamlReader* reader_;
   YamlNodePtr root_;
+  YAML::Mark last_quoted_ = YAML::Mark::null_mark();
   std::vector<Level> levels_;
   std::map<YAML::anchor_t, YamlNodePtr> anchors_;
 };
+
+// A quote that nobody closes takes the rest of the file as its text, and yaml-cpp does not mind.
+bool IsNeverClosed(const std::string& text, const YAML::Mark& start) {
+  if (start.is_null() || static_cast<size_t>(start.pos) >= text.size()) return false;
+  const auto at = static_cast<size_t>(start.pos);
+  const char quote = text[at];
+  if (quote != '"' && quote != '\'') return false;
+  for (size_t i = at + 1; i < text.size(); ++i) {
+    const bool escaped = quote == '"' ? text[i] == '\\' : text.compare(i, 2, "''") == 0;
+    if (escaped) {
+      ++i;
+    } else if (text[i] == quote) {
+      return false;
+    }
+  }
+  return true;
+}
 
 }  // namespace
 
@@ -183,6 +204,12 @@ YamlNodePtr YamlReader::Parse(const std::string& text) {
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(builder) || builder.root() == nullptr) {
       AddAt(Severity::kError, 1, 1, "the file is empty");
+      return nullptr;
+    }
+    if (const YAML::Mark& mark = builder.last_quoted(); IsNeverClosed(text, mark)) {
+      AddAt(Severity::kError, mark.line + 1, mark.column + 1,
+            fmt::format("YAML syntax: the quote {} is never closed",
+                        text[static_cast<size_t>(mark.pos)]));
       return nullptr;
     }
     if (parser) AddAt(Severity::kWarning, 0, 0, "only the first YAML document is read");

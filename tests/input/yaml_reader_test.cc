@@ -1,8 +1,16 @@
 #include "input/yaml_reader.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
+#include <cmath>
+#include <fstream>
 #include <random>
+#include <thread>
+
+#include "core/inputs.h"
+#include "tests/test_folder.h"
 
 namespace mbv {
 namespace {
@@ -41,12 +49,20 @@ TEST(YamlReader, ReadersReportTheWrongTypeAndGoOn) {
             "a.yaml:7:6: error: big = '.inf' is not a finite number\n");
 }
 
-TEST(YamlReader, UnknownKeysAreFindingsWithTheNearestKnownOne) {
+// What is said about a map that may have these keys and lacks the required one.
+std::string SaidOfMap(const std::string& text, const std::string& path,
+                      const std::vector<std::string>& keys, const char* required = nullptr) {
   YamlReader reader("a.yaml");
-  const YamlNodePtr root = reader.Parse("motoin: 1\nzzz: 2\n");
-  const YamlMap map(&reader, root.get(), "", {"name", "motion"});
-  EXPECT_EQ(map.Required("name"), nullptr);
-  EXPECT_EQ(reader.diagnostics().Text(),
+  const YamlNodePtr root = reader.Parse(text);
+  const YamlMap map(&reader, root.get(), path, keys);
+  if (required != nullptr) {
+    EXPECT_EQ(map.Required(required), nullptr);
+  }
+  return reader.diagnostics().Text();
+}
+
+TEST(YamlReader, UnknownKeysAreFindingsWithTheNearestKnownOne) {
+  EXPECT_EQ(SaidOfMap("motoin: 1\nzzz: 2\n", "", {"name", "motion"}, "name"),
             "a.yaml:1:1: error: the file: unknown key 'motoin'\n"
             "  hint: did you mean 'motion'?\n"
             "a.yaml:2:1: error: the file: unknown key 'zzz'\n"
@@ -55,10 +71,7 @@ TEST(YamlReader, UnknownKeysAreFindingsWithTheNearestKnownOne) {
 }
 
 TEST(YamlReader, ATextWithACommaInBracesIsExplained) {
-  YamlReader reader("a.yaml");
-  const YamlNodePtr root = reader.Parse("{value: 1, note: a plate, 12 mm thick}");
-  const YamlMap map(&reader, root.get(), "p", {"value", "note"});
-  EXPECT_EQ(reader.diagnostics().Text(),
+  EXPECT_EQ(SaidOfMap("{value: 1, note: a plate, 12 mm thick}", "p", {"value", "note"}),
             "a.yaml:1:27: error: p: unknown key '12 mm thick'\n"
             "  hint: inside { } a text with a comma needs quotes\n");
 }
@@ -175,6 +188,140 @@ TEST(YamlReader, RandomBytesNeverThrow) {
     YamlReader reader("a.yaml");
     EXPECT_TRUE(reader.Parse(text) != nullptr || reader.has_errors()) << text;
   }
+}
+
+TEST(YamlReader, PlainNumbersAreDecimal) {
+  for (const auto& [text, value] :
+       {std::pair{"1", 1.0}, {"+1.5", 1.5}, {"-.5", -0.5}, {"2.", 2.0}, {"1E3", 1000.0}}) {
+    EXPECT_EQ(PlainNumber(text), value) << text;
+  }
+  for (const char* text : {"", "+", "1 ", " 1", "0x10", "1_000", "1,5", "1e", "one", "--1"}) {
+    EXPECT_FALSE(PlainNumber(text)) << text;
+  }
+  EXPECT_EQ(PlainNumber("-.INF"), -HUGE_VAL);
+  EXPECT_TRUE(std::isnan(*PlainNumber(".NaN")));
+  EXPECT_EQ(PlainNumber("1e999"), HUGE_VAL);
+}
+
+TEST(YamlReader, WholeNumbersAreSmallOnes) {
+  YamlReader reader("a.yaml");
+  const YamlNodePtr root = reader.Parse("[3.0, -2, 1e9, 1e-9]\n");
+  ASSERT_TRUE(root);
+  EXPECT_EQ(reader.Integer(*root->items[0], "a"), 3);
+  EXPECT_EQ(reader.Integer(*root->items[1], "b"), -2);
+  EXPECT_FALSE(reader.Integer(*root->items[2], "c"));
+  EXPECT_FALSE(reader.Integer(*root->items[3], "d"));
+  EXPECT_EQ(reader.diagnostics().Text(),
+            "a.yaml:1:11: error: c = 1e9 is not a whole number\n"
+            "a.yaml:1:16: error: d = 1e-9 is not a whole number\n");
+}
+
+TEST(YamlReader, LongValuesAreCutBetweenCharacters) {
+  std::string key;
+  for (int i = 0; i < 50; ++i) key += "ä";
+  std::string shown = "x";
+  for (int i = 0; i < 28; ++i) shown += "ä";
+  EXPECT_EQ(
+      SaidOfMap("x" + key + ": 1\n", "", {"name"}),
+      "a.yaml:1:1: error: the file: unknown key '" + shown + "...'\n  hint: known keys: name\n");
+  EXPECT_EQ(SaidOfMap("\"two\\nlines\"\n", "", {"name"}),
+            "a.yaml:1:1: error: the file is 'two...', a map is needed\n");
+  EXPECT_EQ(SaidOfMap("Fuß\n", "", {"name"}),
+            "a.yaml:1:1: error: the file is 'Fuß', a map is needed\n");
+}
+
+TEST(YamlReader, AKeyAtTheWrongLevelIsToldWhereItBelongs) {
+  // Too far out, too far in, and an entry that its section lost.
+  EXPECT_EQ(SaidOfMap("1", "bodies.mass", {"mass", "com"}),
+            "a.yaml:1:1: error: bodies.mass is '1', a map is needed\n"
+            "  hint: 'mass' belongs into an entry of bodies: indent it deeper\n");
+  EXPECT_EQ(SaidOfMap("mass: 1\nrod: {mass: 2}\n", "bodies.bar", {"mass", "com"}),
+            "a.yaml:2:1: error: bodies.bar: unknown key 'rod'\n"
+            "  hint: it looks like another entry of the level above: indent it less\n");
+  EXPECT_EQ(SaidOfMap("joints:\npivot: {kind: fixed}\n", "", {"name", "joints"}),
+            "a.yaml:2:1: error: the file: unknown key 'pivot'\n"
+            "  hint: if it belongs into 'joints', indent it deeper\n");
+}
+
+TEST(YamlReader, TheSameMessageIsGivenOnceWhateverItsNote) {
+  YamlReader reader("a.yaml");
+  const YamlNodePtr root = reader.Parse("a: 1\n");
+  ASSERT_TRUE(root);
+  for (const char* note : {" (in limb1)", " (in limb2)", ""}) {
+    reader.SetNote(note);
+    reader.Warn(*root, "slack");
+  }
+  EXPECT_EQ(reader.diagnostics().Text(), "a.yaml:1:1: warning: slack (in limb1)\n");
+  EXPECT_FALSE(reader.has_errors());
+}
+
+TEST(YamlReader, OddTextsAreToldApart) {
+  const auto said = [](const std::string& text) {
+    YamlReader reader("a.yaml");
+    (void)reader.Parse(text);
+    return reader.diagnostics().Text();
+  };
+  EXPECT_EQ(said("a: \"\\e[31m\"\n"),
+            "a.yaml:1:4: error: the value holds the control character 0x1b\n");
+  EXPECT_EQ(said("a: 1\n---\nb: 2\n"), "a.yaml: warning: only the first YAML document is read\n");
+  EXPECT_EQ(said("# nothing but this\n"), "a.yaml:1:1: error: the file is empty\n");
+  EXPECT_EQ(said("\"\": 1\n"), "a.yaml:1:1: error: a key is \'\', a word is needed\n");
+  EXPECT_EQ(said("a: Fuß\nb: 'ß'\n"), "");
+  EXPECT_EQ(said("a: [1, 2\nb: 3\n"),
+            "a.yaml:1:4: error: YAML syntax: the bracket [ is never closed\n");
+  EXPECT_EQ(said(std::string(YamlReader::kMaxBytes + 1, '#')),
+            "a.yaml: error: the file is larger than 16000000 bytes\n");
+}
+
+// It would take the rest of the file as its text.
+TEST(YamlReader, AQuoteThatIsNeverClosedIsFoundAtItsPlace) {
+  for (const char quote : {'\'', '"'}) {
+    const std::string said =
+        fmt::format("a.yaml:2:4: error: YAML syntax: the quote {} is never closed\n", quote);
+    for (const char* rest : {"it is open\nc: 1\n", "\n", "", "it", "x\n\n", "c: [1]\n# d\n"}) {
+      EXPECT_EQ(OnlyFinding(fmt::format("a: 1\nb: {}{}", quote, rest)), said) << rest;
+    }
+  }
+  EXPECT_EQ(OnlyFinding("a: 'it''s\nb: 1\n"),
+            "a.yaml:1:4: error: YAML syntax: the quote ' is never closed\n");
+  EXPECT_EQ(OnlyFinding("a: \"x\\\"\nb: 1\n"),
+            "a.yaml:1:4: error: YAML syntax: the quote \" is never closed\n");
+  for (const char* good :
+       {"a: 'it''s'\n", "a: \"x\\\"y\"\n", "a: ''\n", "a: ''''", "'a': 1\n", "a: x'\n",
+        "a: \"two\n  lines\"\nb: it's\n", "\xef\xbb\xbf'a': 'b'\n", "a: 'b'  # it's\n"}) {
+    YamlReader reader("a.yaml");
+    EXPECT_TRUE(reader.Parse(good)) << good;
+    EXPECT_EQ(reader.diagnostics().Text(), "") << good;
+  }
+}
+
+TEST(YamlReader, FilesAreNotedWithWhatWasRead) {
+  const test::TestFolder folder("yaml_reader");
+  const std::string file = folder.Write("a.yaml", "a: 1\n");
+  const InputWatch watch;
+  EXPECT_EQ(YamlReader(file).ReadFile(), "a: 1\n");
+  ASSERT_EQ(watch.files().size(), 1u);
+  EXPECT_EQ(watch.files()[0].file, file);
+  EXPECT_EQ(watch.files()[0].fingerprint, ContentFingerprint("a: 1\n"));
+  // A name that a terminal would obey is not opened.
+  YamlReader hostile(folder.Write("b\x1b[2J.yaml", "a: 1\n"));
+  EXPECT_FALSE(hostile.ReadFile());
+  EXPECT_NE(hostile.diagnostics().Text().find("the name of the file holds control characters"),
+            std::string::npos)
+      << hostile.diagnostics().Text();
+  EXPECT_EQ(watch.files().size(), 1u);
+}
+
+// A pipe gives its text once; a scenario is read for its kind, its values and its witnesses.
+TEST(YamlReader, APipeIsReadAsOftenAsItIsAskedFor) {
+  const test::TestFolder folder("yaml_pipe");
+  const std::string pipe = folder.PathOf("pipe.yaml");
+  ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
+  std::thread writer([&] { std::ofstream(pipe) << "a: 1\n"; });
+  const auto first = YamlReader(pipe).ReadFile();
+  writer.join();
+  EXPECT_EQ(first, "a: 1\n");
+  EXPECT_EQ(YamlReader(pipe).ReadFile(), "a: 1\n") << "nobody writes any more";
 }
 
 TEST(YamlReader, AMissingFileAndAFolderAreFindings) {

@@ -1,11 +1,9 @@
 // URDF files as exporters write them: frames as links, closure files beside them.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
+#include "tests/test_folder.h"
 
 namespace mbv {
 namespace {
@@ -41,27 +39,10 @@ std::string CutFourBar(const std::string& more = "") {
          Fixed("coupler", "C_A", 0.5) + Fixed("rocker", "C_B", 0.4) + more + "</robot>\n";
 }
 
-class RobotFolder {
- public:
-  explicit RobotFolder(const std::string& name)
-      : path_(std::filesystem::path(testing::TempDir()) / ("mbv_dialects_" + name)) {
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_ / "config");
-  }
-  ~RobotFolder() { std::filesystem::remove_all(path_); }
-  std::string Write(const std::string& name, const std::string& text) const {
-    std::ofstream(path_ / name) << text;
-    return (path_ / name).string();
-  }
-
- private:
-  std::filesystem::path path_;
-};
-
 constexpr const char* kClosures = "closed_loop: [[C_A, C_B]]\ntype: [3d]\nname_mot: [A]\n";
 
 TEST(UrdfDialects, ARobotWithItsClosureFileIsReadFromTheUrdfAlone) {
-  const RobotFolder folder("bare");
+  const test::TestFolder folder("dialects_bare");
   folder.Write("robot.yaml", kClosures);
   const LoadResult loaded = LoadModel(folder.Write("arm.urdf", CutFourBar()));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
@@ -89,7 +70,7 @@ TEST(UrdfDialects, ARobotWithItsClosureFileIsReadFromTheUrdfAlone) {
 }
 
 TEST(UrdfDialects, CutJointsOfCadExportersCloseLoopsAsHinges) {
-  const RobotFolder folder("cuts");
+  const test::TestFolder folder("dialects_cuts");
   // Where the cut hinge is while all joints are at zero.
   folder.Write(
       "config/loop_closures.yaml",
@@ -108,7 +89,7 @@ TEST(UrdfDialects, CutJointsOfCadExportersCloseLoopsAsHinges) {
 }
 
 TEST(UrdfDialects, AMisspeltNameGetsTheNearestOne) {
-  const RobotFolder folder("slip");
+  const test::TestFolder folder("dialects_slip");
   folder.Write("robot.yaml", "closed_loop: [[C_A, C_BB]]\nname_mot: [AA]\n");
   const LoadResult loaded = LoadModel(folder.Write("arm.urdf", CutFourBar()));
   EXPECT_FALSE(loaded.mechanism);
@@ -125,7 +106,7 @@ TEST(UrdfDialects, AMisspeltNameGetsTheNearestOne) {
 }
 
 TEST(UrdfDialects, AChainOfFramesEndsOnItsCarrier) {
-  const RobotFolder folder("chain");
+  const test::TestFolder folder("dialects_chain");
   const LoadResult loaded = LoadModel(folder.Write(
       "r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) + Link("arm", 1, 1) + Link("f1", 0, 0) +
                     Link("f2", 1e-9, 0) + Hinge("A", "base", "arm", 0) + Fixed("arm", "f1", 1) +
@@ -139,7 +120,7 @@ TEST(UrdfDialects, AChainOfFramesEndsOnItsCarrier) {
 }
 
 TEST(UrdfDialects, ALightLinkWithoutInertiaIsAMassPointAndAHeavyOneAnError) {
-  const RobotFolder folder("point");
+  const test::TestFolder folder("dialects_point");
   const auto robot = [&](double mass) {
     return LoadModel(folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) +
                                                 Link("arm", 1, 1) + Link("tool", mass, 0) +
@@ -165,7 +146,7 @@ TEST(UrdfDialects, ALightLinkWithoutInertiaIsAMassPointAndAHeavyOneAnError) {
 }
 
 TEST(UrdfDialects, NextToNothingBetweenTwoJointsIsAConnectingPiece) {
-  const RobotFolder folder("piece");
+  const test::TestFolder folder("dialects_piece");
   const LoadResult loaded = LoadModel(
       folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) + Link("cross", 1e-9, 0) +
                                  Link("arm", 1, 1) + Link("marker", 1e-9, 0) +
@@ -184,7 +165,7 @@ TEST(UrdfDialects, NextToNothingBetweenTwoJointsIsAConnectingPiece) {
 }
 
 TEST(UrdfDialects, LinksThatAModelFileWritesOnStayBodies) {
-  const RobotFolder folder("keep");
+  const test::TestFolder folder("dialects_keep");
   folder.Write("r.urdf", "<robot name=\"r\">" + Link("base", 1, 1) + Link("tip", 0, 0) +
                              Fixed("base", "tip", 1) + "</robot>");
   const LoadResult loaded =

@@ -1,8 +1,6 @@
 // MJCF files as mechanisms.
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
 #include <numbers>
 
 #include "core/spatial.h"
@@ -11,27 +9,10 @@
 #include "pipeline/default_setup.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/survey.h"
+#include "tests/test_folder.h"
 
 namespace mbv {
 namespace {
-
-class MjcfFolder {
- public:
-  explicit MjcfFolder(const std::string& name)
-      : path_(std::filesystem::temp_directory_path() / ("mbv_mjcf_" + name)) {
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-  }
-  ~MjcfFolder() { std::filesystem::remove_all(path_); }
-  std::string Write(const std::string& name, const std::string& text) const {
-    std::ofstream(path_ / name) << text;
-    return (path_ / name).string();
-  }
-  [[nodiscard]] std::string Scratch() const { return (path_ / "scratch").string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 // A four-bar linkage of sides 0.3, 0.5, 0.3, 0.5 m, upright at zero; `more` goes into <mujoco>,
 // `joint` into the crank's joint.
@@ -52,12 +33,12 @@ std::string Linkage(const std::string& more = "", const std::string& joint = "",
          more + "</mujoco>\n";
 }
 
-LoadResult LoadText(const MjcfFolder& folder, const std::string& text) {
+LoadResult LoadText(const test::TestFolder& folder, const std::string& text) {
   return LoadRobot(folder.Write("robot.xml", text));
 }
 
 TEST(MjcfImport, ALinkageClosedByConnectIsAMechanism) {
-  const MjcfFolder folder("linkage");
+  const test::TestFolder folder("mjcf_linkage");
   const LoadResult loaded = LoadText(folder, Linkage());
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
@@ -79,15 +60,15 @@ TEST(MjcfImport, ALinkageClosedByConnectIsAMechanism) {
 }
 
 TEST(MjcfImport, ItAgreesInBothModes) {
-  const MjcfFolder folder("agrees");
-  const SurveyRow row = SurveyFile(folder.Write("robot.xml", Linkage()), folder.Scratch());
+  const test::TestFolder folder("mjcf_agrees");
+  const SurveyRow row = SurveyFile(folder.Write("robot.xml", Linkage()), folder.PathOf("scratch"));
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_LT(row.inverse_nrmse, 1e-10);
   EXPECT_LT(row.forward_nrmse, 1e-6);
 }
 
 TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {
-  const MjcfFolder folder("lost");
+  const test::TestFolder folder("mjcf_lost");
   const LoadResult loaded = LoadText(
       folder,
       Linkage("<tendon><fixed name='t'><joint joint='A' coef='1'/></fixed></tendon>",
@@ -106,7 +87,7 @@ TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {
 
 // What later versions know: attribute, its element, and what the finding says.
 TEST(MjcfImport, WhatOnlyNewerMuJoCoKnowsIsDroppedWithAFinding) {
-  const MjcfFolder folder("newer");
+  const test::TestFolder folder("mjcf_newer");
   struct Newer {
     const char *more, *joint, *says;
   };
@@ -123,7 +104,7 @@ TEST(MjcfImport, WhatOnlyNewerMuJoCoKnowsIsDroppedWithAFinding) {
 }
 
 TEST(MjcfImport, JointsOfOneBodyBallsWeldsAndKeyframesAreRead) {
-  const MjcfFolder folder("joints");
+  const test::TestFolder folder("mjcf_joints");
   const LoadResult loaded = LoadText(folder, R"(<mujoco model="arm"><compiler angle="radian"/>
 <worldbody><body name="a" pos="0 0 1" euler="0.3 0.2 -0.4">
 <joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" axis="0 0 1" pos="0 0.1 0"/>
@@ -157,7 +138,7 @@ TEST(MjcfImport, JointsOfOneBodyBallsWeldsAndKeyframesAreRead) {
 }
 
 TEST(MjcfImport, IncludesStayInTheFolder) {
-  const MjcfFolder folder("include");
+  const test::TestFolder folder("mjcf_include");
   folder.Write("arm.xml",
                "<mujoco><worldbody><body name='x'><joint name='j' axis='0 0 1'/><inertial pos='0 0 "
                "0' mass='1' diaginertia='1 1 1'/></body></worldbody></mujoco>");
@@ -175,7 +156,7 @@ TEST(MjcfImport, IncludesStayInTheFolder) {
 }
 
 TEST(MjcfImport, HostileFilesAreBadInput) {
-  const MjcfFolder folder("hostile");
+  const test::TestFolder folder("mjcf_hostile");
   std::string deep = "<mujoco>";
   for (int i = 0; i < 5000; ++i) deep += "<a>";
   for (const std::string& text :
@@ -193,7 +174,7 @@ TEST(MjcfImport, HostileFilesAreBadInput) {
 }
 
 TEST(MjcfImport, TheModelThatIsWrittenReadsBackToTheSameNumbers) {
-  const MjcfFolder folder("bits");
+  const test::TestFolder folder("mjcf_bits");
   const LoadResult first = LoadText(folder, Linkage("", "range='-1 1' limited='true'"));
   ASSERT_TRUE(first.mechanism) << first.diagnostics.Text();
   const LoadResult second = LoadModelText(WriteModel(*first.mechanism), "m.yaml");

@@ -3,33 +3,13 @@
 
 #include <gtest/gtest.h>
 
-#include <filesystem>
-#include <fstream>
-
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
 #include "pipeline/default_setup.h"
+#include "tests/test_folder.h"
 
 namespace mbv {
 namespace {
-
-class RobotsFolder {
- public:
-  explicit RobotsFolder(const std::string& name)
-      : path_(std::filesystem::temp_directory_path() / ("mbv_survey_" + name)) {
-    std::filesystem::remove_all(path_);
-    std::filesystem::create_directories(path_);
-  }
-  ~RobotsFolder() { std::filesystem::remove_all(path_); }
-  std::string Write(const std::string& name, const std::string& text) const {
-    std::ofstream(path_ / name) << text;
-    return (path_ / name).string();
-  }
-  [[nodiscard]] std::string Scratch() const { return (path_ / "scratch").string(); }
-
- private:
-  std::filesystem::path path_;
-};
 
 std::string UrdfLink(const std::string& name, double length) {
   return fmt::format(
@@ -58,9 +38,10 @@ std::string CutLinkage(double crank) {
 constexpr const char* kLoop = "closed_loop: [[A, B]]\ntype: [3d]\nname_mot: [base_crank]\n";
 
 TEST(Survey, ARobotThatClosesAgreesInBothModes) {
-  const RobotsFolder folder("ok");
+  const test::TestFolder folder("survey_ok");
   folder.Write("robot.yaml", kLoop);
-  const SurveyRow row = SurveyFile(folder.Write("r.urdf", CutLinkage(0.2)), folder.Scratch());
+  const SurveyRow row =
+      SurveyFile(folder.Write("r.urdf", CutLinkage(0.2)), folder.PathOf("scratch"));
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_EQ(row.bodies, 4);
   EXPECT_EQ(row.loops, 1);
@@ -74,18 +55,20 @@ TEST(Survey, ARobotThatClosesAgreesInBothModes) {
 }
 
 TEST(Survey, EachFaultHasItsStatus) {
-  const RobotsFolder folder("faults");
+  const test::TestFolder folder("survey_faults");
   folder.Write("robot.yaml", kLoop);
-  const SurveyRow open = SurveyFile(folder.Write("r.urdf", CutLinkage(2.0)), folder.Scratch());
+  const SurveyRow open =
+      SurveyFile(folder.Write("r.urdf", CutLinkage(2.0)), folder.PathOf("scratch"));
   EXPECT_EQ(open.status, "not_closed") << open.message;
   EXPECT_NE(open.message.find("would have to move by"), std::string::npos) << open.message;
 
   folder.Write("robot.yaml", "closed_loop: [[A, BB]]\n");
-  const SurveyRow slip = SurveyFile(folder.Write("r.urdf", CutLinkage(0.2)), folder.Scratch());
+  const SurveyRow slip =
+      SurveyFile(folder.Write("r.urdf", CutLinkage(0.2)), folder.PathOf("scratch"));
   EXPECT_EQ(slip.status, "refused");
   EXPECT_NE(slip.message.find("did you mean 'B'?"), std::string::npos) << slip.message;
 
-  const SurveyRow broken = SurveyFile(folder.Write("x.urdf", "<robot"), folder.Scratch());
+  const SurveyRow broken = SurveyFile(folder.Write("x.urdf", "<robot"), folder.PathOf("scratch"));
   EXPECT_EQ(broken.status, "refused");
 }
 

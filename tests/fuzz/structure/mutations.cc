@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "input/yaml_reader.h"
+#include "model_file/write_model.h"
 
 namespace mbv::fuzz {
 namespace {
@@ -49,19 +50,6 @@ Tree ToTree(const YamlNode& node) {
   return tree;
 }
 
-std::string Quoted(const std::string& text) {
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"' || c == '\\') quoted += '\\';
-    if (c == '\n') {
-      quoted += "\\n";
-    } else {
-      quoted += c;
-    }
-  }
-  return quoted + "\"";
-}
-
 // Flow style: nothing depends on indents. One line per entry at the top, for messages.
 void Write(const Tree& tree, int depth, std::string* text) {
   const bool map = tree.kind == YamlNode::Kind::kMap;
@@ -70,7 +58,7 @@ void Write(const Tree& tree, int depth, std::string* text) {
       *text += "null";
       return;
     case YamlNode::Kind::kScalar:
-      *text += Quoted(tree.text);
+      *text += QuotedYaml(tree.text);
       return;
     case YamlNode::Kind::kSequence:
     case YamlNode::Kind::kMap:
@@ -79,7 +67,7 @@ void Write(const Tree& tree, int depth, std::string* text) {
   *text += map ? "{" : "[";
   for (size_t i = 0; i < tree.children.size(); ++i) {
     if (i > 0) *text += depth < 2 ? ",\n" : ", ";
-    if (map) *text += Quoted(tree.children[i].first) + ": ";
+    if (map) *text += QuotedYaml(tree.children[i].first) + ": ";
     Write(tree.children[i].second, depth + 1, text);
   }
   *text += map ? "}" : "]";
