@@ -6,6 +6,7 @@
 #include <cctype>
 #include <optional>
 
+#include "core/word_hints.h"
 #include "mechanism/channels.h"
 #include "table/units.h"
 
@@ -110,15 +111,12 @@ class Mapper {
       if (!heading.full.empty()) names.push_back(heading.full);
       if (!heading.name.empty() && heading.name != heading.full) names.push_back(heading.name);
     }
-    const std::string near = ClosestWord(wanted, names);
-    std::string hint = near.empty() ? "" : fmt::format("did you mean '{}'?", near);
-    if (hint.empty()) {
-      hint = names.empty() ? fmt::format("it has no heading; give one of its {} columns by number",
-                                         text_.columns)
-                           : "its columns: " + Listed(names);
-    }
+    const std::string otherwise =
+        names.empty()
+            ? fmt::format("it has no heading; give one of its {} columns by number", text_.columns)
+            : "its columns: " + Listed(names);
     Fail(settings.place, fmt::format("{}: {} has no column '{}'", path, settings_.csv, wanted),
-         hint);
+         DidYouMean(wanted, names, otherwise));
   }
 
   [[nodiscard]] const TableColumnSettings* TimeSettings() const {
@@ -206,13 +204,12 @@ class Mapper {
     if (signal == signals_.end()) {
       std::vector<std::string> names = {"time"};
       for (const Channel& channel : signals_) names.push_back(channel.name);
-      const std::string near = ClosestWord(settings.signal, names);
       Fail(
           settings.place,
           fmt::format("reference.columns: {} has no signal '{}'", mechanism_.name, settings.signal),
-          near.empty() ? "signals: DRIVE.force, .position, .velocity, .acceleration; OUTPUT.x … "
-                         "OUTPUT.yaw; JOINT.reaction.fx … .mz"
-                       : fmt::format("did you mean '{}'?", near));
+          DidYouMean(settings.signal, names,
+                     "signals: DRIVE.force, .position, .velocity, .acceleration; OUTPUT.x … "
+                     "OUTPUT.yaw; JOINT.reaction.fx … .mz"));
       return;
     }
     if (settings.off) {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <vector>
 
-#include "core/diagnostics.h"
+#include "core/word_hints.h"
 
 namespace mbv {
 namespace {
@@ -206,14 +206,12 @@ std::string UnitHint(const std::string& text, const std::string& si) {
                            "deg/s^2", "rad/s", "rad/s^2"}) {
     names.emplace_back(name);
   }
-  const std::string near = ClosestWord(text, names);
-  if (!near.empty()) return fmt::format("did you mean '{}'?", near);
   std::string known;
   for (const Kind& kind : kKinds) {
     if (si.empty() || si == kind.si)
       known += (known.empty() ? "" : ", ") + std::string(kind.common);
   }
-  return "known units: " + known;
+  return DidYouMean(text, names, "known units: " + known);
 }
 
 }  // namespace mbv
