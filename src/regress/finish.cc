@@ -160,7 +160,8 @@ std::string FilesRead(const CaseFile& file) {
 // What an earlier night left there is nobody's input.
 bool IsOfANight(const std::string& path) {
   const std::string start = ReadWholeFile(path).value_or("").substr(0, 200);
-  return start.starts_with(kMarkdownTitle) || start.find(kJUnitRoot) != std::string::npos;
+  return start.starts_with(kMarkdownTitle) ||
+         start.find(fmt::format("<testsuites name=\"{}\"", kJUnitName)) != std::string::npos;
 }
 
 }  // namespace

@@ -1,12 +1,16 @@
 #include <fmt/format.h>
+#include <tinyxml2.h>
 
 #include <map>
+#include <vector>
 
 #include "regress/summaries.h"
 #include "regress/trouble_text.h"
 
 namespace mbv {
 namespace {
+
+constexpr size_t kChecksOfATest = 20;  // named in a failure's text
 
 // "stabilizing_platform/must_fail/stroke" → suite and test.
 std::pair<std::string, std::string> SplitKey(const std::string& key) {
@@ -19,7 +23,7 @@ bool IsError(CaseStatus status) {
   return status != CaseStatus::kUnexpected && status != CaseStatus::kAsExpected;
 }
 
-constexpr size_t kChecksOfATest = 20;  // named in a failure's text
+std::string SecondsText(double time_s) { return fmt::format("{:.3f}", time_s); }
 
 struct Totals {
   int tests = 0, failures = 0, errors = 0;
@@ -35,10 +39,12 @@ struct Totals {
     ++tests;
     failures += fails ? 1 : 0;
   }
-  [[nodiscard]] std::string Attributes() const {
-    return fmt::format("tests=\"{}\" failures=\"{}\" errors=\"{}\" time=\"{:.3f}\"", tests,
-                       failures, errors, time_s);
-  }
+};
+
+struct Suite {
+  Totals totals;
+  std::vector<const CaseResult*> cases;
+  std::vector<const MissingCase*> missing;
 };
 
 std::string OutputOf(const CaseResult& result) {
@@ -57,61 +63,101 @@ std::string OutputOf(const CaseResult& result) {
   return text;
 }
 
-std::string TestCase(const CaseResult& result, const std::string& suite, const std::string& test) {
-  std::string text = fmt::format("    <testcase name=\"{}\" classname=\"{}\" time=\"{:.3f}\">\n",
-                                 EscapeXml(test), EscapeXml(suite), result.cost.wall_s);
-  if (result.failed()) {
-    const char* element = IsError(result.status) ? "error" : "failure";
-    std::string body = result.reason + "\n";
-    for (const std::string& line : FailureTexts(result, kChecksOfATest)) body += line + "\n";
-    text += fmt::format("      <{0} message=\"{1}\" type=\"{2}\">{3}{4}</{0}>\n", element,
-                        EscapeXml(FailureLine(result)), ToText(result.status), EscapeXml(body),
-                        EscapeXml(result.log_tail));
+class JUnitWriter {
+ public:
+  explicit JUnitWriter(const RegressReport& report) : report_(report) {
+    for (const CaseResult& result : report.cases) {
+      Suite& suite = suites_[SplitKey(result.key).first];
+      suite.cases.push_back(&result);
+      suite.totals.Add(result);
+      all_.Add(result);
+    }
+    for (const MissingCase& missing : report.missing) {
+      Suite& suite = suites_[SplitKey(missing.key).first];
+      suite.missing.push_back(&missing);
+      suite.totals.AddMissing(report.fail_on_missing);
+      all_.AddMissing(report.fail_on_missing);
+    }
   }
-  text += fmt::format("      <system-out>{}</system-out>\n", EscapeXml(OutputOf(result)));
-  return text + "    </testcase>\n";
-}
 
-// Skipped, or a failure if the run was asked to fail then.
-std::string MissingTest(const MissingCase& missing, bool fails, const std::string& suite,
-                        const std::string& test) {
-  const std::string text = EscapeXml(MissingText(missing));
-  return fmt::format(
-      "    <testcase name=\"{}\" classname=\"{}\" time=\"0.000\">\n      <{} message=\"{}\" "
-      "type=\"missing\"/>\n    </testcase>\n",
-      EscapeXml(test), EscapeXml(suite), fails ? "failure" : "skipped", text);
-}
+  std::string Write() {
+    printer_.PushDeclaration("xml version=\"1.0\" encoding=\"UTF-8\"");
+    printer_.OpenElement("testsuites");
+    Set("name", kJUnitName);
+    SetTotals(all_);
+    for (const auto& [name, suite] : suites_) WriteSuite(name, suite);
+    printer_.CloseElement();
+    return printer_.CStr();
+  }
+
+ private:
+  void Set(const char* attribute, const std::string& text) {
+    printer_.PushAttribute(attribute, XmlText(text).c_str());
+  }
+
+  void SetTotals(const Totals& totals) {
+    printer_.PushAttribute("tests", totals.tests);
+    printer_.PushAttribute("failures", totals.failures);
+    printer_.PushAttribute("errors", totals.errors);
+    Set("time", SecondsText(totals.time_s));
+  }
+
+  void WriteSuite(const std::string& name, const Suite& suite) {
+    std::string timestamp = report_.run.started_utc;  // ISO 8601 without zone, as the schema asks
+    if (timestamp.ends_with('Z')) timestamp.pop_back();
+    printer_.OpenElement("testsuite");
+    Set("name", name);
+    SetTotals(suite.totals);
+    Set("timestamp", timestamp);
+    Set("hostname", report_.run.host);
+    for (const CaseResult* result : suite.cases) WriteCase(*result);
+    for (const MissingCase* missing : suite.missing) WriteMissing(*missing);
+    printer_.CloseElement();
+  }
+
+  void OpenTest(const std::string& key, double time_s) {
+    const auto [suite, test] = SplitKey(key);
+    printer_.OpenElement("testcase");
+    Set("name", test);
+    Set("classname", suite);
+    Set("time", SecondsText(time_s));
+  }
+
+  void WriteCase(const CaseResult& result) {
+    OpenTest(result.key, result.cost.wall_s);
+    if (result.failed()) {
+      std::string body = result.reason + "\n";
+      for (const std::string& line : FailureTexts(result, kChecksOfATest)) body += line + "\n";
+      printer_.OpenElement(IsError(result.status) ? "error" : "failure");
+      Set("message", FailureLine(result));
+      Set("type", ToText(result.status));
+      printer_.PushText(XmlText(body + result.log_tail).c_str());
+      printer_.CloseElement();
+    }
+    printer_.OpenElement("system-out");
+    printer_.PushText(XmlText(OutputOf(result)).c_str());
+    printer_.CloseElement();
+    printer_.CloseElement();
+  }
+
+  // Skipped, or a failure if the run was asked to fail then.
+  void WriteMissing(const MissingCase& missing) {
+    OpenTest(missing.key, 0.0);
+    printer_.OpenElement(report_.fail_on_missing ? "failure" : "skipped");
+    Set("message", MissingText(missing));
+    Set("type", "missing");
+    printer_.CloseElement();
+    printer_.CloseElement();
+  }
+
+  const RegressReport& report_;
+  std::map<std::string, Suite> suites_;
+  Totals all_;
+  tinyxml2::XMLPrinter printer_;
+};
 
 }  // namespace
 
-std::string ToJUnit(const RegressReport& report) {
-  std::map<std::string, std::pair<Totals, std::string>> suites;
-  Totals all;
-  for (const CaseResult& result : report.cases) {
-    const auto [suite, test] = SplitKey(result.key);
-    auto& [totals, text] = suites[suite];
-    totals.Add(result);
-    all.Add(result);
-    text += TestCase(result, suite, test);
-  }
-  for (const MissingCase& missing : report.missing) {
-    const auto [suite, test] = SplitKey(missing.key);
-    auto& [totals, text] = suites[suite];
-    totals.AddMissing(report.fail_on_missing);
-    all.AddMissing(report.fail_on_missing);
-    text += MissingTest(missing, report.fail_on_missing, suite, test);
-  }
-  std::string xml = fmt::format("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n{} {}>\n", kJUnitRoot,
-                                all.Attributes());
-  std::string timestamp = report.run.started_utc;  // ISO 8601 without zone, as the schema asks
-  if (timestamp.ends_with('Z')) timestamp.pop_back();
-  for (const auto& [name, suite] : suites) {
-    xml += fmt::format("  <testsuite name=\"{}\" {} timestamp=\"{}\" hostname=\"{}\">\n",
-                       EscapeXml(name), suite.first.Attributes(), EscapeXml(timestamp),
-                       EscapeXml(report.run.host));
-    xml += suite.second + "  </testsuite>\n";
-  }
-  return xml + "</testsuites>\n";
-}
+std::string ToJUnit(const RegressReport& report) { return JUnitWriter(report).Write(); }
 
 }  // namespace mbv

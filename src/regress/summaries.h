@@ -3,14 +3,15 @@
 
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "regress/case_result.h"
 
 namespace mbv {
 
-/// How the files begin (JUnit: after the XML declaration).
+/// How the Markdown begins, and the name of all test suites together.
 inline constexpr const char* kMarkdownTitle = "## mbverify regression";
-inline constexpr const char* kJUnitRoot = "<testsuites name=\"mbverify regress\"";
+inline constexpr const char* kJUnitName = "mbverify regress";
 /// index.html: before this, RunFolder::Begin() says that the page is an earlier night's.
 inline constexpr const char* kIndexMain = "<main>\n";
 
@@ -44,8 +45,10 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// Smaller copy of a PNG as a data URI, at most `width_px` wide; "" if it is no PNG.
 [[nodiscard]] std::string ThumbnailUri(const std::string& png, int width_px);
 
-/// Escapes & < > " ' for XML and HTML and drops what XML 1.0 cannot hold: control characters and
-/// broken UTF-8.
-[[nodiscard]] std::string EscapeXml(const std::string& text);
+/// `text` without what XML 1.0 cannot hold or readers of it change: control characters but line
+/// feeds and tabs, and broken UTF-8.
+[[nodiscard]] std::string XmlText(std::string_view text);
+/// XmlText() with & < > " ' escaped for XML and HTML.
+[[nodiscard]] std::string EscapeXml(std::string_view text);
 
 }  // namespace mbv

@@ -6,33 +6,12 @@
 #include <string_view>
 
 #include "core/markup.h"
+#include "core/text.h"
 #include "regress/summaries.h"
 #include "regress/trouble_text.h"
 
 namespace mbv {
 namespace {
-
-// Bytes of the UTF-8 sequence at `at`, 0 if it is broken or a character XML 1.0 forbids.
-size_t SequenceLength(const std::string& text, size_t at) {
-  const auto byte = [&](size_t i) {
-    return i < text.size() ? static_cast<unsigned char>(text[i]) : 0U;
-  };
-  const unsigned c = byte(at);
-  if (c < 0x80) return c >= 0x20 || c == '\n' || c == '\t' ? 1 : 0;
-  const size_t length = c >= 0xC2 && c < 0xE0   ? 2
-                        : (c & 0xF0) == 0xE0    ? 3
-                        : c >= 0xF0 && c < 0xF5 ? 4
-                                                : 0;
-  unsigned code = length == 2 ? c & 0x1F : length == 3 ? c & 0x0F : c & 0x07;
-  for (size_t k = 1; k < length; ++k) {
-    if ((byte(at + k) & 0xC0) != 0x80) return 0;
-    code = (code << 6) | (byte(at + k) & 0x3F);
-  }
-  static constexpr unsigned kLeast[] = {0, 0, 0x80, 0x800, 0x10000};
-  const bool forbidden = code < kLeast[length] || (code >= 0xD800 && code < 0xE000) ||
-                         code == 0xFFFE || code == 0xFFFF || code > 0x10FFFF;
-  return forbidden ? 0 : length;
-}
 
 constexpr size_t kChecksOnTerminal = 3;
 
@@ -52,15 +31,19 @@ const KeyWords& WordsOf(const std::string& metric) {
 
 }  // namespace
 
-std::string EscapeXml(const std::string& text) {
-  std::string valid;
-  for (size_t i = 0; i < text.size();) {
-    const size_t length = SequenceLength(text, i);
-    valid += text.substr(i, length);
-    i += std::max<size_t>(length, 1);
+std::string XmlText(std::string_view text) {
+  std::string kept;
+  size_t from = 0;
+  for (size_t bad = FindNonText(text); bad < text.size(); bad = FindNonText(text, from)) {
+    kept += text.substr(from, bad - from);
+    from = bad + 1;
   }
-  return EscapeMarkup(valid);
+  kept += text.substr(from);
+  std::erase(kept, '\r');
+  return kept;
 }
+
+std::string EscapeXml(std::string_view text) { return EscapeMarkup(XmlText(text)); }
 
 std::string CountsText(const Counts& counts) {
   std::string text = fmt::format("{} scenario{}: {} as expected", counts.total,

@@ -261,6 +261,14 @@ TEST(JUnit, AwkwardTextArrivesUnchanged) {
                "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ; "
                "simulated_vs_analytic.force_nrmse is 1.00e-03, limit 1.0e-06, at "
                "limb2.drive.force, 7.16 s; was 1.70e-13 in run 6");
+  EXPECT_TRUE(std::string(failure->GetText()).ends_with("line 1\nline 2  <b>"))
+      << failure->GetText();
+  const auto* output = suite->FirstChildElement("testcase")->FirstChildElement("system-out");
+  ASSERT_NE(output, nullptr);
+  EXPECT_STREQ(output->GetText(),
+               "scenarios/other/hung.yaml\nverdict not_run, exit code -1 (expected agree, 0)\n"
+               "not compared: everything: no end after 300 s: killed\n"
+               "cost: 1.50 s wall, 1.25 s CPU, 50.0 MiB\n");
 }
 
 TEST(EscapeXml, DropsWhatXmlCannotHold) {
@@ -272,6 +280,7 @@ TEST(EscapeXml, DropsWhatXmlCannotHold) {
   EXPECT_EQ(EscapeXml("\xed\xa0\x80\xef\xbf\xbf"
                       "x\xe2\x82"),
             "x");
+  EXPECT_EQ(EscapeXml("one\r\n\ttwo\x7f"), "one\n\ttwo");
 }
 
 TEST(Markdown, IsTheGoldenFile) { ExpectGolden("summary.md", ToMarkdown(Mixed())); }
