@@ -3,14 +3,18 @@ include(Libraries)
 mbv_find(GTest libgtest-dev)
 mbv_find(benchmark libbenchmark-dev)
 
-# The script of report.html is bundled with npm's packages (web/).
+# The scripts of the pages (web/) are bundled with npm's packages, and tests check their types.
 find_program(NODE NAMES node nodejs)
 find_program(NPM npm)
+find_program(TSC tsc)
 if(NOT NODE)
   list(APPEND MBV_MISSING "Node.js (nodejs)")
 endif()
 if(NOT NPM)
   list(APPEND MBV_MISSING "npm (npm)")
+endif()
+if(NOT TSC)
+  list(APPEND MBV_MISSING "TypeScript (node-typescript)")
 endif()
 
 if(MBV_MISSING)

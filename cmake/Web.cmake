@@ -1,5 +1,5 @@
-# The script and style of report.html: packages by npm into the build folder (only when the lock
-# file has changed), bundled and minified into one C++ source of mbv_report.
+# Scripts and styles of the pages: packages by npm into the build folder (only when the lock file has
+# changed), bundled and minified into one C++ source for each page.
 set(web ${CMAKE_CURRENT_SOURCE_DIR}/web)
 set(web_build ${CMAKE_BINARY_DIR}/web)
 file(MAKE_DIRECTORY ${web_build})
@@ -11,15 +11,22 @@ add_custom_command(
   COMMAND ${CMAKE_COMMAND} -E touch ${web_build}/packages.stamp
   DEPENDS ${web}/package.json ${web}/package-lock.json
   WORKING_DIRECTORY ${web_build}
-  COMMENT "Fetching the report page's packages (npm ci)"
+  COMMENT "Fetching the pages' packages (npm ci)"
   VERBATIM)
+add_custom_target(web_packages DEPENDS ${web_build}/packages.stamp)
 
-file(GLOB web_sources CONFIGURE_DEPENDS ${web}/src/*.js ${web}/src/*.css)
-add_custom_command(
-  OUTPUT ${web_build}/html_assets.cc
-  COMMAND ${CMAKE_COMMAND} -E env NODE_PATH=${web_build}/node_modules
-          ${NODE} ${web}/build.cjs ${web_build}/html_assets.cc
-  DEPENDS ${web_build}/packages.stamp ${web}/build.cjs ${web_sources}
-  COMMENT "Bundling the report page's script"
-  VERBATIM)
-target_sources(mbv_report PRIVATE ${web_build}/html_assets.cc)
+# The page of web/src/<page> as <output>, a source of mbv_<layer>.
+function(mbv_page page output layer)
+  file(GLOB sources CONFIGURE_DEPENDS ${web}/src/${page}/*.js ${web}/src/${page}/*.css)
+  add_custom_command(
+    OUTPUT ${web_build}/${output}
+    COMMAND ${CMAKE_COMMAND} -E env NODE_PATH=${web_build}/node_modules
+            ${NODE} ${web}/build.cjs ${page} ${web_build}/${output}
+    DEPENDS web_packages ${web_build}/packages.stamp ${web}/build.cjs ${sources}
+    COMMENT "Bundling the script of the ${page} page"
+    VERBATIM)
+  target_sources(mbv_${layer} PRIVATE ${web_build}/${output})
+endfunction()
+
+mbv_page(report html_assets.cc report)
+mbv_page(night index_assets.cc regress)

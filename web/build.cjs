@@ -1,9 +1,16 @@
-// Bundles the report's script and style and writes them as C++ text:
-//   node build.cjs OUTPUT.cc      (NODE_PATH names the node_modules folder)
+// Bundles the script and the style of a page and writes them as C++ text:
+//   node build.cjs report|night OUTPUT.cc      (NODE_PATH names the node_modules folder)
 'use strict';
 const fs = require('node:fs');
 const path = require('node:path');
 const esbuild = require('esbuild');
+
+// A page: its folder and main file in src/, the header that declares its two functions, and the
+// packages that are bundled with it.
+const kPages = {
+  report: {header: 'report/html_assets.h', script: 'PageScript', style: 'PageStyle', packages: ['three', 'uplot']},
+  night: {header: 'regress/index_assets.h', script: 'IndexScript', style: 'IndexStyle', packages: []},
+};
 
 // Literals are joined from pieces that compilers take without complaint.
 function literal(text) {
@@ -13,47 +20,53 @@ function literal(text) {
   return pieces.map((piece) => `R"mbv(${piece})mbv"`).join('\n');
 }
 
-// The licences ask for their text in every copy.
-const packages = process.env.NODE_PATH.split(path.delimiter)[0];
-const licences = ['three', 'uplot'].map((name) =>
-    `${name}\n${fs.readFileSync(path.join(packages, name, 'LICENSE'), 'utf8').trim()}`);
-
-const bundle = esbuild.buildSync({
-  entryPoints: [path.join(__dirname, 'src', 'report.js')],
-  bundle: true,
-  nodePaths: process.env.NODE_PATH.split(path.delimiter),
-  minify: true,
-  charset: 'ascii',
-  legalComments: 'none',
-  banner: {js: `/*\n${licences.join('\n\n')}\n*/`},
-  target: ['es2020'],
-  format: 'iife',
-  outdir: 'bundle',
-  write: false,
-});
-const ending = (suffix) => bundle.outputFiles.find((file) => file.path.endsWith(suffix)).text;
-const script = ending('.js');
-const style = ending('.css');
-if (/<\/script/i.test(script) || /<\/style/i.test(style)) {
-  throw new Error('the bundle would end its own element');
+const textFunction = (name, text) => `std::string_view ${name}() {
+  static constexpr char kText[] =
+${literal(text)};
+  return {kText, sizeof kText - 1};
 }
-fs.writeFileSync(process.argv[2], `// Made by web/build.cjs.
-#include "report/html_assets.h"
+`;
+
+// The licences ask for their text in every copy.
+function licences(names) {
+  const folder = process.env.NODE_PATH.split(path.delimiter)[0];
+  const texts = names.map((name) =>
+    `${name}\n${fs.readFileSync(path.join(folder, name, 'LICENSE'), 'utf8').trim()}`);
+  return texts.length > 0 ? {js: `/*\n${texts.join('\n\n')}\n*/`} : {};
+}
+
+function bundle(name) {
+  const {outputFiles} = esbuild.buildSync({
+    entryPoints: [path.join(__dirname, 'src', name, `${name}.js`)],
+    bundle: true,
+    nodePaths: process.env.NODE_PATH.split(path.delimiter),
+    minify: true,
+    charset: 'ascii',
+    legalComments: 'none',
+    banner: licences(kPages[name].packages),
+    target: ['es2020'],
+    format: 'iife',
+    outdir: 'bundle',
+    write: false,
+  });
+  const ending = (suffix) => outputFiles.find((file) => file.path.endsWith(suffix)).text;
+  const [script, style] = [ending('.js'), ending('.css')];
+  if (/<\/script/i.test(script) || /<\/style/i.test(style)) {
+    throw new Error('the bundle would end its own element');
+  }
+  return {script, style};
+}
+
+const [name, output] = process.argv.slice(2);
+const page = kPages[name];
+const {script, style} = bundle(name);
+fs.writeFileSync(output, `// Made by web/build.cjs.
+#include "${page.header}"
 
 namespace mbv {
 
-std::string_view PageScript() {
-  static constexpr char kScript[] =
-${literal(script)};
-  return {kScript, sizeof kScript - 1};
-}
-
-std::string_view PageStyle() {
-  static constexpr char kStyle[] =
-${literal(style)};
-  return {kStyle, sizeof kStyle - 1};
-}
-
+${textFunction(page.script, script)}
+${textFunction(page.style, style)}
 }  // namespace mbv
 `);
-console.log(`report page: script ${script.length} bytes, style ${style.length} bytes`);
+console.log(`${name} page: script ${script.length} bytes, style ${style.length} bytes`);

@@ -1,9 +1,11 @@
-// Style and script of index.html.
+// The script and the style of index.html, bundled from web/src/night when the program is built.
 #pragma once
+
+#include <string_view>
 
 namespace mbv {
 
-extern const char* const kIndexStyle;
-extern const char* const kIndexScript;
+[[nodiscard]] std::string_view IndexScript();
+[[nodiscard]] std::string_view IndexStyle();
 
 }  // namespace mbv

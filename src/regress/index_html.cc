@@ -242,14 +242,15 @@ std::string ToIndexHtml(const RegressReport& report,
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
       "style-src {}; script-src {}\">"
       "<title>mbverify regression {}: {}</title><style>{}</style></head><body>\n",
-      CspHash(kIndexStyle), CspHash(kIndexScript), EscapeXml(report.run.started_utc),
-      ExitCodeOf(report) == 0 ? "all as expected" : "not as expected", kIndexStyle);
+      CspHash(IndexStyle()), CspHash(IndexScript()), EscapeXml(report.run.started_utc),
+      ExitCodeOf(report) == 0 ? "all as expected" : "not as expected", IndexStyle());
   html += kIndexMain + Head(report) + Boxes(report, cases) + kControls;
   for (size_t i = 0; i < cases.size(); ++i) {
     const auto thumbnail = thumbnails.find(cases[i]->key);
     html += Row(*cases[i], thumbnail == thumbnails.end() ? "" : thumbnail->second, i);
   }
-  return html + "</tbody></table>\n</main>\n<script>" + kIndexScript + "</script></body></html>\n";
+  return html + fmt::format("</tbody></table>\n</main>\n<script>{}</script></body></html>\n",
+                            IndexScript());
 }
 
 }  // namespace mbv

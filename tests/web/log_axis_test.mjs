@@ -2,7 +2,7 @@
 import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
-import {decadeMarks, decades} from '../../web/src/log_axis.js';
+import {decadeMarks, decades} from '../../web/src/report/log_axis.js';
 
 const of = (...values) => [{values}];
 

@@ -19,7 +19,6 @@ gate)
     "$mbverify" run "scenarios/$scenario.yaml" --quiet --no-pictures --out "$work/gate" >/dev/null ||
       [ $? = 1 ]
   done
-  "$node" --test tests/web/log_axis_test.mjs
   exec "$node" tests/web/page_gate.cjs "$work/gate"
   ;;
 axe)

@@ -1,62 +1,11 @@
-// The time that plots and replay share, and the bar that controls it.
-import {element} from './data.js';
+// The bar that controls the time, and the keys of the page.
+import {element} from './dom.js';
+
+/** @typedef {import('./timeline.js').Timeline} Timeline */
 
 const kSpeeds = [0.1, 0.25, 0.5, 1, 2, 4];
 
-export class Timeline {
-  /** start and end [s]; sample: step of the arrow keys [s]; worst: [{time, label}]. */
-  constructor({start, end, sample, worst}) {
-    Object.assign(this, {start, end, sample, worst});
-    this.time = start;
-    this.playing = false;
-    this.speed = 1;
-    this.listeners = [];
-  }
-
-  onChange(listener) {
-    this.listeners.push(listener);
-  }
-
-  set(time) {
-    this.time = Math.min(this.end, Math.max(this.start, time));
-    for (const listener of this.listeners) listener(this.time);
-  }
-
-  play(on = !this.playing) {
-    if (on === this.playing || this.end <= this.start) return;
-    this.playing = on;
-    if (on) {
-      if (this.time >= this.end) this.time = this.start;
-      this.last = performance.now();
-      requestAnimationFrame((now) => this.tick(now));
-    }
-    this.set(this.time);
-  }
-
-  tick(now) {
-    if (!this.playing) return;
-    const elapsed = Math.max(0, Math.min(0.25, (now - this.last) / 1000));
-    this.last = now;
-    const next = this.time + this.speed * elapsed;
-    if (next >= this.end) this.playing = false;
-    this.set(next);
-    if (this.playing) requestAnimationFrame((later) => this.tick(later));
-  }
-
-  /** Moves by whole samples. */
-  step(samples) {
-    this.play(false);
-    this.set(this.start + (Math.round((this.time - this.start) / this.sample) + samples) * this.sample);
-  }
-
-  nextWorst() {
-    if (this.worst.length === 0) return;
-    this.play(false);
-    const after = this.worst.find((worst) => worst.time > this.time + 1e-9);
-    this.set((after ?? this.worst[0]).time);
-  }
-}
-
+/** @param {string} path */
 const icon = (path) => {
   const svg = document.createElementNS('http://www.w3.org/2000/svg', 'svg');
   svg.setAttribute('viewBox', '0 0 16 16');
@@ -68,10 +17,14 @@ const icon = (path) => {
 };
 const kPlay = 'M3 1.5v13l11-6.5z', kPause = 'M3 2h4v12H3zM9 2h4v12H9z';
 
-/** The bar at the bottom of the window. */
+/**
+ * The bar at the bottom of the window.
+ * @param {Timeline} timeline
+ */
 export function timelineBar(timeline) {
+  const sign = icon(kPlay);
   const play = element('button', {type: 'button', id: 'play', class: 'play', 'aria-label': 'Play',
-                                  onclick: () => timeline.play()}, icon(kPlay));
+                                  onclick: () => timeline.play()}, sign);
   const slider = element('input', {type: 'range', id: 'time', min: timeline.start, max: timeline.end,
                                    step: 'any', value: timeline.start, 'aria-label': 'Time'});
   slider.addEventListener('input', () => {
@@ -98,10 +51,10 @@ export function timelineBar(timeline) {
   const help = element('button', {type: 'button', class: 'help', 'aria-label': 'Keyboard shortcuts',
                                   onclick: () => keyboardHelp().showModal()}, '?');
   timeline.onChange((time) => {
-    slider.value = time;
+    slider.value = String(time);
     slider.setAttribute('aria-valuetext', `${time.toFixed(3)} seconds`);
     clock.textContent = `${time.toFixed(2)} s`;
-    play.firstChild.firstChild.setAttribute('d', timeline.playing ? kPause : kPlay);
+    sign.firstElementChild?.setAttribute('d', timeline.playing ? kPause : kPlay);
     play.setAttribute('aria-label', timeline.playing ? 'Pause' : 'Play');
   });
   return element('div', {class: 'timeline', role: 'region', 'aria-label': 'Timeline'}, play, clock,
@@ -117,7 +70,7 @@ const kKeys = [
 ];
 
 function keyboardHelp() {
-  const old = document.getElementById('keys');
+  const old = document.querySelector('dialog');
   if (old) return old;
   const list = element('dl');
   for (const [key, meaning] of kKeys) {
@@ -130,33 +83,39 @@ function keyboardHelp() {
   return dialog;
 }
 
-/** Keys of the page; `plots` and `toggleTheme` may be missing. */
+/**
+ * Keys of the page.
+ * @param {Timeline} timeline
+ * @param {{zoom: (factor: number, around: number) => void, reset: () => void} | undefined} plots
+ * @param {() => void} toggleTheme
+ */
 export function bindKeys(timeline, plots, toggleTheme) {
+  /** @type {Record<string, (many: number) => void>} */
+  const actions = {
+    ' ': () => timeline.play(),
+    ArrowLeft: (many) => timeline.step(-many),
+    ArrowRight: (many) => timeline.step(many),
+    Home: () => timeline.set(timeline.start),
+    End: () => timeline.set(timeline.end),
+    w: () => timeline.nextWorst(),
+    '+': () => plots?.zoom(0.5, timeline.time),
+    '-': () => plots?.zoom(2, timeline.time),
+    '0': () => plots?.reset(),
+    t: () => toggleTheme(),
+    '?': () => keyboardHelp().showModal(),
+  };
   document.addEventListener('keydown', (event) => {
+    const target = /** @type {Element} */ (event.target);
     if (event.ctrlKey || event.metaKey || event.altKey || event.defaultPrevented) {
-      const slider = event.target.id === 'time' && event.defaultPrevented;
+      const slider = target.id === 'time' && event.defaultPrevented;
       if (!slider) return;
     }
-    const tag = event.target.tagName;
+    const tag = target.tagName;
     if (tag === 'SELECT' || tag === 'TEXTAREA' || document.querySelector('dialog[open]')) return;
-    const many = event.shiftKey ? 10 : 1;
-    const actions = {
-      ' ': () => timeline.play(),
-      ArrowLeft: () => timeline.step(-many),
-      ArrowRight: () => timeline.step(many),
-      Home: () => timeline.set(timeline.start),
-      End: () => timeline.set(timeline.end),
-      w: () => timeline.nextWorst(),
-      '+': () => plots?.zoom(0.5, timeline.time),
-      '-': () => plots?.zoom(2, timeline.time),
-      '0': () => plots?.reset(),
-      t: () => toggleTheme(),
-      '?': () => keyboardHelp().showModal(),
-    };
     const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
     if (!action) return;
     if (event.key === ' ' && (tag === 'BUTTON' || tag === 'SUMMARY' || tag === 'A')) return;
     event.preventDefault();
-    action();
+    action(event.shiftKey ? 10 : 1);
   });
 }

@@ -2,12 +2,22 @@
 import {PerspectiveCamera} from 'three';
 import {OrbitControls} from 'three/examples/jsm/controls/OrbitControls.js';
 
-const kFieldOfView = 26;
+const kFieldOfView = 26;  // [deg]
+/** @type {Record<string, [number, number]>} */
+const kTurns = {ArrowLeft: [-6, 0], ArrowRight: [6, 0], ArrowUp: [0, 6], ArrowDown: [0, -6]};  // [deg]
 
 export class View {
-  /** `points` must be in the standard view; `toCamera` is its direction, `up` stands upright in it. */
+  /**
+   * `points` must be in the standard view; `toCamera` is its direction, `up` stands upright in it.
+   * @param {HTMLCanvasElement} canvas
+   * @param {{up: Three, toCamera: Three, radius: number, points: Three[]}} scene
+   * @param {() => void} onChange
+   */
   constructor(canvas, {up, toCamera, radius, points}, onChange) {
-    Object.assign(this, {up, toCamera, points, onChange});
+    this.up = up;
+    this.toCamera = toCamera;
+    this.points = points;
+    this.onChange = onChange;
     this.camera = new PerspectiveCamera(kFieldOfView, 1, 0.01 * radius, 400 * radius);
     this.camera.up.copy(up);
     this.controls = new OrbitControls(this.camera, canvas);
@@ -22,6 +32,7 @@ export class View {
     canvas.addEventListener('dblclick', () => this.reset());
   }
 
+  /** @param {number} width @param {number} height [px] */
   resize(width, height) {
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
@@ -34,7 +45,7 @@ export class View {
     const right = this.up.clone().cross(toCamera).normalize();
     const above = toCamera.clone().cross(right);
     const tanV = Math.tan(kFieldOfView * Math.PI / 360) * 0.92, tanH = tanV * this.camera.aspect;
-    const middle = (axis) => {
+    const middle = (/** @type {Three} */ axis) => {
       const values = this.points.map((point) => point.dot(axis));
       return (Math.min(...values) + Math.max(...values)) / 2;
     };
@@ -51,9 +62,10 @@ export class View {
     this.moved();
   }
 
+  /** @param {KeyboardEvent} event */
   key(event) {
-    const turn = {ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1]}[event.key];
-    if (turn) this.orbit(turn[0] * 6, turn[1] * 6);
+    const turn = kTurns[event.key];
+    if (turn) this.orbit(...turn);
     else if (event.key === '+' || event.key === '=') this.dolly(0.9);
     else if (event.key === '-') this.dolly(1 / 0.9);
     else if (event.key.toLowerCase() === 'r') this.reset();
@@ -62,6 +74,7 @@ export class View {
     event.stopPropagation();
   }
 
+  /** @param {number} azimuth @param {number} elevation by which the camera moves [deg] */
   orbit(azimuth, elevation) {
     const offset = this.camera.position.clone().sub(this.controls.target);
     offset.applyAxisAngle(this.up, azimuth * Math.PI / 180);
@@ -73,6 +86,7 @@ export class View {
     this.moved();
   }
 
+  /** @param {number} factor of the distance */
   dolly(factor) {
     this.camera.position.sub(this.controls.target).multiplyScalar(factor).add(this.controls.target);
     this.moved();

@@ -4,13 +4,17 @@ import {
   Quaternion, SphereGeometry, SRGBColorSpace, Vector3,
 } from 'three';
 
-import {indexAt} from './data.js';
+import {between} from './numbers.js';
 
 const kY = new Vector3(0, 1, 0);
 
 export class Bodies {
+  /** @param {import('./data.js').ReplayData} replay */
   constructor({bodies, paints, time}) {
-    Object.assign(this, {bodies, paints, time, materials: new Map()});
+    this.bodies = bodies;
+    this.paints = paints;
+    this.time = time;
+    this.materials = new Map();
     this.groups = bodies.map((body) => {
       const group = new Group();
       group.name = body.name;
@@ -19,19 +23,27 @@ export class Bodies {
     });
   }
 
-  /** Surroundings move with their bodies but are switched together. */
+  /** Whether anything but the mechanism is drawn. */
+  hasScenery() {
+    return this.bodies.some((body) => body.shapes.some((shape) => this.paints[shape.color]?.scenery));
+  }
+
+  /**
+   * Surroundings move with their bodies but are switched together.
+   * @param {boolean} on
+   */
   showScenery(on) {
     for (const group of this.groups) {
       for (const mesh of group.children) if (mesh.userData.scenery) mesh.visible = on;
     }
   }
 
+  /** @param {string} color a name of the paints */
   material(color) {
     if (!this.materials.has(color)) {
       const paint = this.paints[color] ?? this.paints.grey;
       const [r, g, b, a] = paint.rgba;
-      const sea = color === 'sea';
-      const opacity = sea ? 0.55 * a : a;
+      const opacity = color === 'sea' ? 0.55 * a : a;
       this.materials.set(color, new MeshStandardMaterial({
         color: new Color().setRGB(r, g, b, SRGBColorSpace), roughness: 0.55, metalness: 0.1,
         transparent: opacity < 1, opacity, depthWrite: opacity === 1}));
@@ -39,6 +51,7 @@ export class Bodies {
     return this.materials.get(color);
   }
 
+  /** @param {any} shape of a body */
   mesh(shape) {
     let mesh;
     const material = this.material(shape.color);
@@ -52,12 +65,13 @@ export class Bodies {
     } else {
       mesh = this.rod(shape, material);
     }
-    mesh.userData.scenery = (this.paints[shape.color] ?? {}).scenery === true;
+    mesh.userData.scenery = this.paints[shape.color]?.scenery === true;
     mesh.castShadow = !mesh.userData.scenery;
     mesh.receiveShadow = true;
     return mesh;
   }
 
+  /** @param {any} shape a capsule or a cylinder @param {Three} material */
   rod({type, from, to, radius}, material) {
     const a = new Vector3(...from), axis = new Vector3(...to).sub(a);
     const length = axis.length();
@@ -69,22 +83,31 @@ export class Bodies {
     return mesh;
   }
 
-  /** Puts every body at a time, between two frames if need be. */
+  /**
+   * Puts every body at a time, between two frames if need be.
+   * @param {number} time [s]
+   */
   pose(time) {
-    const {time: times, bodies} = this;
-    const i = indexAt(times, time);
-    const j = Math.min(i + 1, times.length - 1);
-    const share = j === i ? 0 : Math.min(1, Math.max(0, (time - times[i]) / (times[j] - times[i])));
+    const {from, to, share} = between(this.time, time);
     const p = new Vector3(), q = new Quaternion();
-    bodies.forEach(({poses}, b) => {
-      const at = (frame) => poses.length === 7 ? 0 : 7 * frame;
-      const [m, n] = [at(i), at(j)];
+    this.bodies.forEach(({poses}, b) => {
+      const at = (/** @type {number} */ frame) => poses.length === 7 ? 0 : 7 * frame;
+      const [m, n] = [at(from), at(to)];
       this.groups[b].position.set(poses[m], poses[m + 1], poses[m + 2])
           .lerp(p.set(poses[n], poses[n + 1], poses[n + 2]), share);
       this.groups[b].quaternion.set(poses[m + 3], poses[m + 4], poses[m + 5], poses[m + 6])
           .slerp(q.set(poses[n + 3], poses[n + 4], poses[n + 5], poses[n + 6]), share);
       this.groups[b].updateMatrixWorld(true);
     });
+  }
+
+  /**
+   * A point of a body in the world, at the pose shown.
+   * @param {number} body
+   * @param {Three} point
+   */
+  inWorld(body, point) {
+    return point.applyMatrix4(this.groups[body].matrixWorld);
   }
 
   /** Corners of everything but the surroundings over the run, in the world; never empty. */

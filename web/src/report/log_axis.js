@@ -3,7 +3,12 @@
 const kDecades = 16;    // shown at most
 const kLowest = 1e-20;  // values below are drawn here: far under any round-off, and safe for plotting
 
-/** The decades [low, high] that hold the values and the limit; null if no value is above zero. */
+/**
+ * The decades [low, high] that hold the values and the limit; null if no value is above zero.
+ * @param {{values: Iterable<number>}[]} lines
+ * @param {number | null} limit
+ * @returns {[number, number] | null}
+ */
 export function decades(lines, limit = null) {
   let low = Infinity, high = 0;
   for (const line of lines) {
@@ -14,13 +19,18 @@ export function decades(lines, limit = null) {
     }
   }
   if (high === 0) return null;
-  const exponent = (value, round) => round(Math.log10(Math.max(value, kLowest)));
-  const top = exponent(Math.max(high, limit ?? 0), (e) => Math.ceil(e + 0.2));
-  const bottom = exponent(Math.min(low, limit ?? low), Math.floor);
+  const exponent = (/** @type {number} */ value) => Math.log10(Math.max(value, kLowest));
+  const top = Math.ceil(exponent(Math.max(high, limit ?? 0)) + 0.2);
+  const bottom = Math.floor(exponent(Math.min(low, limit ?? low)));
   return [10 ** Math.max(bottom, top - kDecades), 10 ** top];
 }
 
-/** Whole decades between low and high, at most `most` of them, evenly spaced. */
+/**
+ * Whole decades between low and high, at most `most` of them, evenly spaced.
+ * @param {number} low
+ * @param {number} high
+ * @param {number} most
+ */
 export function decadeMarks(low, high, most = 8) {
   const first = Math.ceil(Math.log10(low) - 1e-9), last = Math.floor(Math.log10(high) + 1e-9);
   const step = Math.max(1, Math.ceil((last - first) / most));

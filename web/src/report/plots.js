@@ -2,29 +2,28 @@
 import uPlot from 'uplot';
 import 'uplot/dist/uPlot.min.css';
 
-import {element, formatError, formatValue, isDark, nearest} from './data.js';
+import {byId, element, isDark} from './dom.js';
 import {decadeMarks, decades} from './log_axis.js';
+import {formatError, formatValue, nearest} from './numbers.js';
 import {groupBy, makePanels, nameOf} from './panels.js';
+import {axisLabels, largest, padded, plottable, powerOfTen, spread, zoomed} from './scales.js';
+
+/**
+ * @typedef {import('./panels.js').Panel} Panel
+ * @typedef {import('./panels.js').Line} Line
+ * @typedef {import('./data.js').PageData} PageData
+ * @typedef {import('./timeline.js').Timeline} Timeline
+ *
+ * A panel on the page; no plot where every value is zero on a logarithmic axis.
+ * @typedef {{panel: Panel, legend: HTMLElement, box: HTMLElement, plot?: uPlot, head?: HTMLElement,
+ *            readouts: {key: string, line: Line, readout: HTMLElement, chip: HTMLElement}[]}} PlotView
+ */
 
 const kPaperWidth = 640;  // [px], what A4 leaves between its margins
+const kHeight = 210;      // [px]
+const kFont = 'system-ui, sans-serif';
 
-// NaN is a gap; on a log axis zero is drawn at the lower edge.
-function plottable(values, floor) {
-  return Array.from(values, (value) => !Number.isFinite(value) ? null
-                                       : floor && value < floor ? floor : value);
-}
-
-// Marks spread evenly over what is visible.
-function spread(u, _series, show, indices) {
-  if (!show && !indices) return null;
-  const {min, max} = u.scales.x;
-  const first = u.valToIdx(min), last = u.valToIdx(max);
-  const step = Math.max(1, Math.floor((last - first) / 48));
-  const kept = [];
-  for (let i = first - (first % step); i <= last; i += step) if (i >= first) kept.push(i);
-  return kept;
-}
-
+/** @type {Record<string, {width: number, alpha?: number, spans?: boolean, marks?: boolean}>} */
 const kStyles = {
   solid: {width: 1.6},
   analytic: {width: 4.5, alpha: 0.38},
@@ -32,6 +31,20 @@ const kStyles = {
   simulated: {width: 0, marks: true},
 };
 
+/**
+ * Marks spread evenly over what is visible.
+ * @param {uPlot} u
+ * @param {number} _series
+ * @param {boolean} show
+ * @param {number[][] | null} [gaps]
+ */
+function visibleMarks(u, _series, show, gaps) {
+  const {min, max} = u.scales.x;
+  if ((!show && !gaps) || min == null || max == null) return null;
+  return spread(u.valToIdx(min), u.valToIdx(max));
+}
+
+/** @param {Line} line @param {boolean} log @returns {uPlot.Series} */
 function seriesOf(line, log) {
   const style = log ? {width: 1} : kStyles[line.style] ?? kStyles.solid;
   const color = line.color();
@@ -44,17 +57,29 @@ function seriesOf(line, log) {
     spanGaps: style.spans ?? false,
     paths: style.marks ? () => null : undefined,
     points: {show: Boolean(style.marks), size: 5, width: 1.2, stroke: color,
-             fill: isDark() ? '#14191f' : '#fff', filter: style.marks ? spread : undefined},
+             fill: isDark() ? '#14191f' : '#fff', filter: style.marks ? visibleMarks : undefined},
   };
 }
 
 export class Plots {
+  /** @param {HTMLElement} parent @param {PageData} data @param {Timeline} timeline */
   constructor(parent, data, timeline) {
-    Object.assign(this, {parent, data, timeline});
-    this.hidden = new Set();
+    this.parent = parent;
+    this.data = data;
+    this.timeline = timeline;
+    /** @type {Set<string>} */
+    this.hidden = new Set();  // keys of lines
+    /** @type {PlotView[]} */
+    this.views = [];
+    this.grid = element('div', {class: 'plots'});
+    /** @type {number | null | undefined} */
+    this.reading = undefined;  // the sample to be read at the next frame; null: at the playhead
+    this.zooming = false;
+    this.screenTheme = '';
     this.pair = (data.pairs.find((pair) => pair.name === 'simulated_vs_analytic' && pair.worst) ??
                  data.pairs.find((pair) => pair.worst) ?? data.pairs[0])?.name;
     this.panels = makePanels(data);
+    /** @type {[number, number]} */
     this.range = [timeline.start, timeline.end];
     this.build();
     new ResizeObserver(() => this.resize()).observe(parent);
@@ -80,8 +105,9 @@ export class Plots {
     return this.panels.filter((panel) => !panel.pair || panel.pair === this.pair);
   }
 
-  build(width = null) {
-    for (const view of this.views ?? []) view.plot?.destroy();
+  /** @param {number} [width] of the plots [px]; what the window leaves if not given */
+  build(width) {
+    for (const view of this.views) view.plot?.destroy();
     this.grid = element('div', {class: 'plots'});
     this.views = this.shown().map((panel) => this.addPanel(panel));
     this.parent.replaceChildren(this.toolbar(), this.grid);
@@ -91,13 +117,14 @@ export class Plots {
 
   toolbar() {
     const bar = element('div', {class: 'toolbar'});
+    /** @type {(text: string, title: string, action: () => void) => void} */
     const button = (text, title, action) =>
         bar.append(element('button', {type: 'button', title, onclick: action}, text));
     if (this.data.pairs.length > 1) {
       const select = element('select', {id: 'pair', onchange: () => {
         this.pair = select.value;
         this.build();
-        document.getElementById('pair').focus();
+        byId('pair').focus();
       }});
       for (const pair of this.data.pairs) {
         select.append(element('option', {value: pair.name, selected: pair.name === this.pair},
@@ -116,15 +143,16 @@ export class Plots {
     return bar;
   }
 
+  /** @param {Panel} panel */
   addPanel(panel) {
     const caption = element('figcaption', {}, element('b', {}, panel.title),
                             panel.unit ? ` [${panel.unit}]` : '',
                             element('span', {class: 'faint'}, panel.note ? ` ${panel.note}` : ''));
     const legend = element('div', {class: 'legend'});
     const box = element('div', {class: 'plot'});
-    const figure = element('figure', {class: 'panel'}, caption, legend, box);
-    this.grid.append(figure);
-    const view = {panel, figure, legend, box, readouts: []};
+    this.grid.append(element('figure', {class: 'panel'}, caption, legend, box));
+    /** @type {PlotView} */
+    const view = {panel, legend, box, readouts: []};
     const range = panel.log ? decades(panel.lines, panel.limit) : null;
     this.addLegend(view);
     if (panel.log && !range) {
@@ -139,10 +167,11 @@ export class Plots {
   }
 
   // One entry per key, with the value at the cursor.
+  /** @param {PlotView} view */
   addLegend(view) {
     const {panel} = view;
     for (const [key, lines] of groupBy(panel.lines, (line) => line.key)) {
-      const line = lines.find((candidate) => candidate.style === 'simulated') ?? lines.at(-1);
+      const line = lines.find((candidate) => candidate.style === 'simulated') ?? lines[lines.length - 1];
       const readout = element('span', {class: 'value'});
       const chip = element('button', {type: 'button', class: 'chip', 'aria-pressed': 'true',
                                       title: 'Show or hide', onclick: () => this.toggle(key)},
@@ -152,59 +181,66 @@ export class Plots {
     }
   }
 
-  describe(view) {
-    let worst = {value: -Infinity};
-    for (const line of view.panel.lines) {
-      line.values.forEach((value, i) => {
-        if (Math.abs(value) > worst.value) {
-          worst = {value: Math.abs(value), time: this.data.time[i], key: line.key};
-        }
-      });
-    }
-    view.box.setAttribute('role', 'img');
-    view.box.setAttribute('aria-label', `${view.panel.title} over time. Largest ` +
-        `${formatValue(worst.value, view.panel.unit)}, ${worst.key}, at ${worst.time} s.`);
+  /** @param {PlotView} view */
+  describe({panel, box}) {
+    const worst = largest(panel.lines, this.data.time);
+    box.setAttribute('role', 'img');
+    box.setAttribute('aria-label', `${panel.title} over time. ` + (worst === null ? '' :
+        `Largest ${formatValue(worst.value, panel.unit)}, ${worst.key}, at ${worst.time} s.`));
   }
 
+  /** @param {Panel} panel @param {[number, number] | null} range @returns {uPlot.AlignedData} */
   columns(panel, range) {
     return [Array.from(this.data.time),
             ...panel.lines.map((line) => plottable(line.values, range?.[0]))];
   }
 
+  /**
+   * @param {PlotView} view
+   * @param {[number, number] | null} range of a logarithmic axis
+   * @returns {uPlot.Options}
+   */
   options(view, range) {
     const {panel} = view;
-    const css = getComputedStyle(document.documentElement);
-    const ink = css.getPropertyValue('--faint').trim(), grid = css.getPropertyValue('--grid').trim();
-    const font = '12px system-ui, sans-serif';
-    const axis = {stroke: ink, font, grid: {stroke: grid, width: 1}, ticks: {stroke: grid, width: 1}};
-    // uPlot's own marks of a logarithmic axis do not end where steps fall below its rounding.
-    const marks = panel.log ? {splits: () => decadeMarks(...range), filter: (_u, splits) => splits} : {};
-    const lines = panel.log ? {...marks, grid: {...axis.grid, filter: marks.filter},
-                               ticks: {...axis.ticks, filter: marks.filter}} : {};
-    const labels = panel.log
-        ? (_u, splits) => splits.map(exponent)
-        : (_u, splits) => axisLabels(splits);
     return {
       width: 600,
-      height: 210,
+      height: kHeight,
       legend: {show: false},
       padding: [10, 14, 0, 0],
       cursor: {sync: {key: 'mbverify', setSeries: false, scales: ['x', null]},
                drag: {x: true, y: false, setScale: true}, points: {show: false}, y: false},
       scales: {x: {time: false, min: this.range[0], max: this.range[1]},
-               y: panel.log ? {distr: 3, log: 10, range: () => range} : {range: padded}},
-      axes: [{...axis, size: 34, values: (_u, splits) => axisLabels(splits).map((s) => s && s + ' s')},
-             {...axis, ...lines, size: 62, values: labels}],
-      series: [{}, ...panel.lines.map((line) => ({...seriesOf(line, panel.log), show: !this.hidden.has(line.key)}))],
+               y: range ? {distr: 3, log: 10, range: () => range}
+                        : {range: (_u, min, max) => padded(min, max)}},
+      axes: this.axes(range),
+      series: [{}, ...panel.lines.map((line) => (
+          {...seriesOf(line, panel.log === true), show: !this.hidden.has(line.key)}))],
       hooks: {
-        setScale: [(u, key) => key === 'x' && this.followZoom(u)],
-        setCursor: [(u) => this.readSoon(u.cursor.idx)],
+        setScale: [(u, key) => { if (key === 'x') this.followZoom(u); }],
+        setCursor: [(u) => this.readSoon(u.cursor.idx ?? null)],
         draw: [(u) => { this.drawMarks(u, panel); this.placeHead(view, u); }],
         ready: [(u) => this.clickSetsTime(u)],
       },
     };
   }
 
+  /** @param {[number, number] | null} range of a logarithmic axis @returns {uPlot.Axis[]} */
+  axes(range) {
+    const css = getComputedStyle(document.documentElement);
+    const ink = css.getPropertyValue('--faint').trim(), grid = css.getPropertyValue('--grid').trim();
+    const lines = {stroke: grid, width: 1};
+    const axis = {stroke: ink, font: `12px ${kFont}`, grid: lines, ticks: lines};
+    const times = {...axis, size: 34, values: (/** @type {uPlot} */ _u, /** @type {number[]} */ splits) =>
+      axisLabels(splits).map((text) => text && text + ' s')};
+    if (!range) return [times, {...axis, size: 62, values: (_u, splits) => axisLabels(splits)}];
+    // uPlot's own marks of a logarithmic axis do not end where steps fall below its rounding.
+    const filter = (/** @type {uPlot} */ _u, /** @type {number[]} */ splits) => splits;
+    return [times, {...axis, size: 62, splits: () => decadeMarks(...range), filter,
+                    grid: {...lines, filter}, ticks: {...lines, filter},
+                    values: (_u, splits) => splits.map(powerOfTen)}];
+  }
+
+  /** @param {uPlot} u */
   clickSetsTime(u) {
     let down = 0;
     u.over.addEventListener('mousedown', (event) => { down = event.clientX; });
@@ -214,6 +250,7 @@ export class Plots {
     });
   }
 
+  /** @param {uPlot} u @param {Panel} panel */
   drawMarks(u, panel) {
     const {ctx, bbox} = u;
     const css = getComputedStyle(document.documentElement);
@@ -221,7 +258,7 @@ export class Plots {
     ctx.save();
     ctx.textAlign = 'left';
     ctx.textBaseline = 'alphabetic';
-    ctx.font = `${12 * ratio}px system-ui, sans-serif`;
+    ctx.font = `${12 * ratio}px ${kFont}`;
     if (panel.limit) {
       const y = u.valToPos(panel.limit, 'y', true);
       ctx.strokeStyle = ctx.fillStyle = css.getPropertyValue('--bad').trim();
@@ -233,15 +270,21 @@ export class Plots {
       ctx.stroke();
       ctx.fillText(`limit ${formatError(panel.limit)}`, bbox.left + 8 * ratio, y + 15 * ratio);
     }
-    const {min, max} = u.scales.x;
+    const {min = 0, max = 0} = u.scales.x;
     if (panel.worst && panel.worst.time >= min && panel.worst.time <= max) this.drawWorst(u, panel.worst, ratio, css);
     ctx.restore();
   }
 
+  /**
+   * @param {uPlot} u
+   * @param {import('./data.js').WorstError} worst
+   * @param {number} ratio of pixels
+   * @param {CSSStyleDeclaration} css
+   */
   drawWorst(u, worst, ratio, css) {
     const {ctx, bbox} = u;
     const x = u.valToPos(worst.time, 'x', true);
-    const y = Math.max(bbox.top + 8 * ratio, u.valToPos(worst.value || u.scales.y.min, 'y', true));
+    const y = Math.max(bbox.top + 8 * ratio, u.valToPos(worst.value || (u.scales.y.min ?? 0), 'y', true));
     ctx.setLineDash([]);
     ctx.lineWidth = 2 * ratio;
     ctx.strokeStyle = ctx.fillStyle = css.getPropertyValue('--ink').trim();
@@ -255,20 +298,24 @@ export class Plots {
     ctx.textAlign = 'left';
   }
 
-  // All plots' cursors move together; their values are written once per picture.
+  /**
+   * All plots' cursors move together; their values are written once per picture.
+   * @param {number | null} index
+   */
   readSoon(index) {
     if (this.reading === undefined) {
       requestAnimationFrame(() => {
-        this.read(this.reading);
+        this.read(this.reading ?? null);
         this.reading = undefined;
       });
     }
-    this.reading = index ?? null;
+    this.reading = index;
   }
 
+  /** @param {number | null} index */
   read(index) {
     const at = index ?? nearest(this.data.time, this.timeline.time);
-    for (const view of this.views ?? []) {
+    for (const view of this.views) {
       for (const {line, readout} of view.readouts) {
         const value = line.values[at];
         readout.textContent = view.panel.log ? formatError(value) : formatValue(value, view.panel.unit);
@@ -276,6 +323,7 @@ export class Plots {
     }
   }
 
+  /** @param {string} key */
   toggle(key) {
     if (!this.hidden.delete(key)) this.hidden.add(key);
     for (const view of this.views) {
@@ -288,29 +336,26 @@ export class Plots {
     }
   }
 
+  /** @param {uPlot} source */
   followZoom(source) {
     if (this.zooming) return;
     const {min, max} = source.scales.x;
-    if (min === null || (min === this.range[0] && max === this.range[1])) return;
+    if (min == null || max == null || (min === this.range[0] && max === this.range[1])) return;
     this.setRange(min, max);
   }
 
+  /** @param {number} min @param {number} max [s] */
   setRange(min, max) {
     this.zooming = true;
     this.range = [min, max];
-    for (const view of this.views ?? []) view.plot?.setScale('x', {min, max});
+    for (const view of this.views) view.plot?.setScale('x', {min, max});
     this.zooming = false;
     this.moveHead();
   }
 
-  /** Scales the visible span around a time. */
+  /** @param {number} factor of the visible span @param {number} around a time [s] */
   zoom(factor, around) {
-    const {start, end, sample} = this.timeline;
-    const [min, max] = this.range;
-    const span = Math.min(end - start, Math.max(4 * sample, factor * (max - min)));
-    const centre = around >= min && around <= max ? around : (min + max) / 2;
-    const low = Math.max(start, Math.min(end - span, centre - span * (centre - min) / (max - min)));
-    this.setRange(low, low + span);
+    this.setRange(...zoomed(this.range, factor, around, this.timeline));
   }
 
   reset() {
@@ -319,52 +364,29 @@ export class Plots {
 
   // uPlot takes a new range at its next drawing; that places the heads, too.
   moveHead() {
-    for (const view of this.views ?? []) if (view.plot) this.placeHead(view, view.plot);
-    if (!this.views?.some((view) => view.plot?.cursor.left >= 0)) this.readSoon(null);
+    for (const view of this.views) if (view.plot) this.placeHead(view, view.plot);
+    if (!this.views.some((view) => (view.plot?.cursor.left ?? -1) >= 0)) this.readSoon(null);
   }
 
+  /** @param {PlotView} view @param {uPlot} plot */
   placeHead({head}, plot) {
     if (!head) return;
     const {time} = this.timeline;
-    const {min, max} = plot.scales.x;
+    const {min = 0, max = 0} = plot.scales.x;
     const slack = 1e-9 * (max - min);  // of a time that was rounded
     const inside = time >= min - slack && time <= max + slack;
     head.style.display = inside ? '' : 'none';
     head.style.transform = `translateX(${plot.valToPos(time, 'x')}px)`;
   }
 
-  resize(given = null) {
-    for (const view of this.views ?? []) {
+  /** @param {number} [given] width of the plots [px] */
+  resize(given) {
+    for (const view of this.views) {
       const width = given ?? view.box.clientWidth;
       if (view.plot && width > 0 && width !== view.plot.width) {
-        view.plot.setSize({width, height: 210});
+        view.plot.setSize({width, height: kHeight});
       }
     }
-    if (this.views) this.moveHead();
+    this.moveHead();
   }
-}
-
-const kRaised = {'-': '⁻', 0: '⁰', 1: '¹', 2: '²', 3: '³', 4: '⁴', 5: '⁵', 6: '⁶', 7: '⁷', 8: '⁸', 9: '⁹'};
-function exponent(value) {
-  const digits = String(Math.round(Math.log10(value)));
-  return '10' + [...digits].map((digit) => kRaised[digit]).join('');
-}
-
-function axisLabels(splits) {
-  const largest = Math.max(...splits.map((v) => Math.abs(v ?? 0)));
-  const [scale, suffix] = largest >= 1e6 ? [1e-6, ' M'] : largest >= 1e4 ? [1e-3, ' k'] : [1, ''];
-  return splits.map((v) => {
-    if (v === null) return '';
-    if (largest > 0 && largest < 1e-3) return v === 0 ? '0' : v.toExponential(0).replace('-', '−');
-    return (v === 0 ? '0' : String(Number((v * scale).toPrecision(6))).replace('-', '−') + suffix);
-  });
-}
-
-// Room above and below; a constant signal is not blown up to fill the plot.
-function padded(_u, min, max) {
-  if (min === null) return [0, 1];
-  const size = Math.max(Math.abs(min), Math.abs(max));
-  const span = Math.max(max - min, 1e-3 * size, 1e-9);
-  const middle = (min + max) / 2;
-  return [middle - 0.56 * span, middle + 0.56 * span];
 }
