@@ -5,17 +5,10 @@
 // planted into each page: a check that cannot fail says nothing.
 'use strict';
 const fs = require('node:fs');
-const path = require('node:path');
 
-const {launch, openPage} = require('./browser.cjs');
+const {gate, openPage, resize} = require('./browser.cjs');
 
 const axe = fs.readFileSync(require.resolve('axe-core/axe.min.js'), 'utf8');
-
-function pagesBelow(folder) {
-  return fs.readdirSync(folder, {withFileTypes: true, recursive: true})
-      .filter((entry) => entry.isFile() && ['report.html', 'index.html'].includes(entry.name))
-      .map((entry) => path.join(entry.parentPath ?? entry.path, entry.name)).sort();
-}
 
 // Faults as [rule, element: text].
 async function violations(page, where = 'html') {
@@ -44,14 +37,14 @@ const plant = (page) => page.evaluate(() => {
 async function faultsOf(browser, file) {
   const page = await openPage(browser, file, {trouble: [], requests: []});
   const script = await page.locator('#page-data').count() > 0;
-  if (script) await page.waitForSelector('html[data-ready]', {timeout: 20000});
+  if (script) await page.waitForSelector('html[data-ready]');
   // Folded parts are content, too.
   await page.evaluate(() => document.querySelectorAll('details').forEach((part) => { part.open = true; }));
   await page.evaluate(axe);
   const faults = [];
   for (const [colorScheme, width] of [['light', 1400], ['dark', 390]]) {
     await page.emulateMedia({colorScheme, reducedMotion: 'reduce'});
-    await page.setViewportSize({width, height: 900});
+    await resize(page, width, 900);
     for (const fault of await violations(page)) faults.push(`${colorScheme}, ${width} px: ${fault}`);
   }
   await plant(page);
@@ -63,22 +56,4 @@ async function faultsOf(browser, file) {
   return faults;
 }
 
-async function main(folder) {
-  const pages = pagesBelow(folder);
-  if (pages.length === 0) {
-    console.error(`no page below ${folder}`);
-    return 1;
-  }
-  const browser = await launch();
-  let failed = 0;
-  for (const file of pages) {
-    const faults = await faultsOf(browser, file);
-    if (faults.length) ++failed;
-    for (const fault of faults) console.error(`${path.relative(folder, file)}: ${fault}`);
-  }
-  await browser.close();
-  console.log(`${pages.length - failed} of ${pages.length} pages are without violations`);
-  return failed ? 1 : 0;
-}
-
-main(process.argv[2]).then((code) => { process.exitCode = code; });
+gate(process.argv[2], faultsOf, 'are without violations');

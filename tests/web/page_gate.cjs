@@ -2,18 +2,11 @@
 // and index.html below FOLDER in a real browser (MBV_CHROMIUM), light and dark, wide, narrow and on
 // paper. Prints what fails and exits with 1; a folder without pages fails, too.
 'use strict';
-const fs = require('node:fs');
 const path = require('node:path');
 
-const {launch, openPage} = require('./browser.cjs');
+const {gate, openPage, readyTime, resize, settled} = require('./browser.cjs');
 
-const kReady_ms = 2000, kHeap_bytes = 200e6, kWaiting_ms = 20000;
-
-function pagesBelow(folder) {
-  return fs.readdirSync(folder, {withFileTypes: true, recursive: true})
-      .filter((entry) => entry.isFile() && ['report.html', 'index.html'].includes(entry.name))
-      .map((entry) => path.join(entry.parentPath ?? entry.path, entry.name)).sort();
-}
+const kReady_ms = 2000, kHeap_bytes = 200e6;
 
 // Plots without a coloured curve, as [title].
 const emptyPlots = (page) => page.evaluate(() => {
@@ -35,10 +28,6 @@ const emptyPlots = (page) => page.evaluate(() => {
       .map((view) => view.panel.title);
 });
 
-const settled = (page) => page.evaluate(() => new Promise((done) => {
-  requestAnimationFrame(() => requestAnimationFrame(done));
-}));
-
 // Elements that reach beyond the right edge of the window.
 const tooWide = (page) => page.evaluate(() => {
   const {scrollWidth, clientWidth} = document.documentElement;
@@ -57,10 +46,9 @@ async function openOnce(browser, file) {
   let ready_ms = 0;
   if (report) {
     try {
-      await page.waitForSelector('html[data-ready]', {timeout: kWaiting_ms});
-      ready_ms = Number(await page.getAttribute('html', 'data-ready'));
-    } catch {
-      bad.push(`not ready after ${kWaiting_ms} ms`);
+      ready_ms = await readyTime(page);
+    } catch (error) {
+      bad.push(`is not ready: ${error.message}`);
     }
   }
   return {page, found, bad, ready_ms};
@@ -68,7 +56,7 @@ async function openOnce(browser, file) {
 
 async function faultsOf(browser, file) {
   let {page, found, bad, ready_ms} = await openOnce(browser, file);
-  // A busy machine may hold up one opening; a slow page is slow each time.
+  // One opening may be held up; a slow page is slow each time.
   for (let again = 0; again < 2 && ready_ms > kReady_ms; ++again) {
     await page.close();
     ({page, found, bad, ready_ms} = await openOnce(browser, file));
@@ -77,7 +65,7 @@ async function faultsOf(browser, file) {
     await page.close();
     return [...bad, ...found.trouble];
   }
-  if (ready_ms > kReady_ms) bad.push(`ready after ${ready_ms} ms`);
+  if (ready_ms > kReady_ms) bad.push(`ready after ${Math.round(ready_ms)} ms`);
   const check = async (state) => {
     await settled(page);
     for (const title of await emptyPlots(page)) bad.push(`${state}: empty plot "${title}"`);
@@ -86,12 +74,12 @@ async function faultsOf(browser, file) {
   for (const colorScheme of ['light', 'dark']) {
     await page.emulateMedia({colorScheme});
     for (const width of [1400, 390]) {
-      await page.setViewportSize({width, height: 900});
+      await resize(page, width, 900);
       await check(`${colorScheme}, ${width} px`);
     }
   }
   await page.emulateMedia({media: 'print', colorScheme: 'dark'});
-  await page.setViewportSize({width: 718, height: 1000});  // A4 between margins of 1 cm
+  await resize(page, 718, 1000);  // A4 between margins of 1 cm
   await page.evaluate(() => dispatchEvent(new Event('beforeprint')));
   await check('print');
   const cut = await page.evaluate(() => [...document.querySelectorAll('.plot canvas')]
@@ -104,22 +92,4 @@ async function faultsOf(browser, file) {
   return [...bad, ...found.trouble, ...foreign.map((url) => `asks for ${url}`)];
 }
 
-async function main(folder) {
-  const pages = pagesBelow(folder);
-  if (pages.length === 0) {
-    console.error(`no page below ${folder}`);
-    return 1;
-  }
-  const browser = await launch();
-  let failed = 0;
-  for (const file of pages) {
-    const faults = await faultsOf(browser, file);
-    if (faults.length) ++failed;
-    for (const fault of faults) console.error(`${path.relative(folder, file)}: ${fault}`);
-  }
-  await browser.close();
-  console.log(`${pages.length - failed} of ${pages.length} pages keep their promises`);
-  return failed ? 1 : 0;
-}
-
-main(process.argv[2]).then((code) => { process.exitCode = code; });
+gate(process.argv[2], faultsOf, 'keep their promises');
