@@ -179,25 +179,32 @@ bool IsNeverClosed(const std::string& text, const YAML::Mark& start) {
   return true;
 }
 
+// False after a finding.
+bool IsText(const std::string& text, YamlReader* reader) {
+  if (text.size() > YamlReader::kMaxBytes) {
+    reader->AddAt(Severity::kError, 0, 0,
+                  fmt::format("the file is larger than {} bytes", YamlReader::kMaxBytes));
+    return false;
+  }
+  const size_t at = FindNonText(std::string_view(text));
+  if (at == std::string::npos) return true;
+  const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(at), '\n');
+  const size_t start = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
+  reader->AddAt(
+      Severity::kError, static_cast<int>(line),
+      static_cast<int>(start == std::string::npos ? at + 1 : at - start),
+      fmt::format("byte 0x{:02x} is not UTF-8 text", static_cast<unsigned char>(text[at])),
+      "save the file as UTF-8 text");
+  return false;
+}
+
 }  // namespace
 
 size_t FindNonText(const std::string& text) { return FindNonText(std::string_view(text)); }
 
 YamlNodePtr YamlReader::Parse(const std::string& text) {
   if (YamlNodePtr known = ParsedDocuments::Find(text)) return known;
-  if (text.size() > kMaxBytes) {
-    AddAt(Severity::kError, 0, 0, fmt::format("the file is larger than {} bytes", kMaxBytes));
-    return nullptr;
-  }
-  if (const size_t at = FindNonText(text); at != std::string::npos) {
-    const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(at), '\n');
-    const size_t start = at == 0 ? std::string::npos : text.rfind('\n', at - 1);
-    AddAt(Severity::kError, static_cast<int>(line),
-          static_cast<int>(start == std::string::npos ? at + 1 : at - start),
-          fmt::format("byte 0x{:02x} is not UTF-8 text", static_cast<unsigned char>(text[at])),
-          "save the file as UTF-8 text");
-    return nullptr;
-  }
+  if (!IsText(text, this)) return nullptr;
   TreeBuilder builder(this);
   try {
     std::istringstream stream(text);

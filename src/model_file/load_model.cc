@@ -3,11 +3,22 @@
 #include <algorithm>
 #include <utility>
 
-#include "model_file/model_reader.h"
+#include "model_file/model_bodies.h"
+#include "model_file/model_checks.h"
+#include "model_file/model_drives.h"
+#include "model_file/model_elastic.h"
+#include "model_file/model_head.h"
+#include "model_file/model_instances.h"
+#include "model_file/model_joints.h"
+#include "model_file/model_outputs.h"
+#include "model_file/model_shapes.h"
+#include "model_file/model_urdf.h"
 #include "model_file/urdf_model.h"
 
 namespace mbv {
 namespace {
+
+using internal::Block;
 
 // The stages find things in their own order; people read files from the top.
 Diagnostics InFileOrder(const Diagnostics& diagnostics) {
@@ -32,73 +43,188 @@ Diagnostics WithoutPlaces(const Diagnostics& diagnostics) {
   return result;
 }
 
-}  // namespace
+// One model file on its way to a mechanism: what every stage reads with, nothing that it reads.
+struct Reading {
+  const LoadOptions& options;
+  bool bare_urdf = false;  // the text stands for a URDF file
+  YamlReader yaml;
+  Diagnostics others;  // findings of other files: overrides, URDF, parameters
+  internal::Literals literals;
+};
 
-LoadResult ModelReader::Load(const std::string& text) {
-  mechanism_.file = yaml_.file();
-  mechanism_.bodies.push_back({.name = "world", .frames = {}, .shapes = {}});
-  body_places_.push_back(nullptr);
-  body_paths_.push_back("world");
-  root_ = yaml_.Parse(text);
-  if (root_ != nullptr) ReadAll();
+// What the sections of a model give.
+struct ModelSections {
+  internal::ModelHead head;
+  std::vector<Parameter> parameters;
+  internal::ModelBodies bodies;
+  internal::ModelJoints joints;
+  internal::SignalPlaces signals;
+  std::vector<Drive> drives;
+  std::vector<Prescribed> prescribed;
+  std::vector<Output> outputs;
+  std::vector<SpringDamper> springs;
+  internal::ModelBeams beams;
+  internal::UrdfSection urdf;
+};
+
+// Bodies with all their frames.
+template <typename EachBlock>
+void ReadBodies(const EachBlock& each_block, const internal::BodyNames& names,
+                internal::ModelValues* values, internal::UrdfReader* urdf,
+                ModelSections* sections) {
+  internal::FrameReader frames(values, &sections->bodies);
+  internal::BodyReader bodies(values, &frames, &sections->bodies);
+  each_block([&](const Block& block) {
+    if (block.is_model()) {
+      frames.ReadWorld(block);
+      if (const YamlNode* node = block.Section("urdf")) {
+        sections->urdf = urdf->Read(block, *node,
+                                    {.bodies = &sections->bodies,
+                                     .joints = &sections->joints,
+                                     .places = &sections->signals,
+                                     .drives = &sections->drives});
+      }
+    }
+    bodies.Read(block);
+  });
+  each_block([&](const Block& block) { frames.ReadAttached(block, names); });
+  internal::ShapeReader shapes(values, names, &sections->bodies);
+  each_block([&](const Block& block) { shapes.Read(block); });
+}
+
+// What is driven and watched, and springs.
+template <typename EachBlock>
+void ReadSignals(const EachBlock& each_block, const internal::BodyNames& names,
+                 internal::ModelValues* values, ModelSections* s) {
+  YamlReader* yaml = &values->yaml();
+  internal::DriveReader drives(values, names, s->joints, &s->signals, &s->drives);
+  each_block([&](const Block& block) { drives.Read(block); });
+  each_block([&](const Block& block) {
+    internal::ReadPrescribed(block, s->joints, yaml, &s->signals, &s->prescribed);
+  });
+  each_block([&](const Block& block) {
+    internal::ReadOutputs(block, names, yaml, &s->signals, &s->outputs);
+  });
+  each_block([&](const Block& block) { internal::ReadSprings(block, names, values, &s->springs); });
+}
+
+template <typename EachBlock>
+void ReadElastic(const EachBlock& each_block, const internal::BodyNames& names,
+                 internal::ModelValues* values, ModelSections* s) {
+  internal::Materials materials;
+  internal::Sections sections;
+  each_block([&](const Block& block) { internal::ReadMaterials(block, values, &materials); });
+  each_block([&](const Block& block) { internal::ReadSections(block, values, &sections); });
+  internal::BeamReader beams(values, names, s->bodies, materials, sections, &s->beams);
+  each_block([&](const Block& block) { beams.Read(block); });
+}
+
+// Empty after a finding that leaves nothing to read.
+std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
+  YamlReader& yaml = reading->yaml;
+  const YamlMap file(&yaml, &root, "", internal::kModelKeys);
+  if (!file.valid()) return {};
+  ModelSections s;
+  internal::ModelValues values(&yaml, &reading->literals);
+  internal::ModelBlocks blocks(&root);
+  internal::ParameterReader parameters(reading->options, &yaml, &reading->others);
+  s.head = internal::ReadTitle(file, &yaml);
+  parameters.ReadModel(blocks.model(), file);
+  internal::ReadSurroundings(blocks.model(), file, reading->options.gravity_W, &values, &s.head);
+  if (!root.is_map()) return {};
+  internal::InstanceReader(root, &values, &parameters, &blocks).Expand(blocks.model());
+  parameters.CheckOverrides();
+  s.parameters = parameters.Take();
+
+  // Each stage over all blocks, so that every name it refers to is there.
+  const auto each_block = [&](const auto& stage) {
+    for (const Block& block : blocks.blocks) {
+      yaml.SetNote(block.Note());
+      stage(block);
+    }
+    yaml.SetNote("");
+  };
+  const internal::BodyNames names(s.bodies, &values);
+  internal::UrdfReader urdf(reading->bare_urdf, &values, &reading->literals, &reading->others);
+  ReadBodies(each_block, names, &values, &urdf, &s);
+  internal::JointReader joints(&values, names, s.bodies, &s.joints);
+  each_block([&](const Block& block) { joints.Read(block); });
+  ReadSignals(each_block, names, &values, &s);
+  ReadElastic(each_block, names, &values, &s);
+  urdf.WeldRoot(s.urdf.root, s.bodies, &s.joints);
+  internal::OrderDrives(root, &yaml, &s.drives);
+  s.signals.Check(&yaml);
+  internal::CheckDrivenOnce(s.drives, s.prescribed, s.joints.joints, s.signals, &yaml);
+  return s;
+}
+
+// The mechanism that the sections describe; their places stay.
+Mechanism Assembled(const std::string& file, ModelSections* s) {
+  Mechanism mechanism;
+  mechanism.name = std::move(s->head.name);
+  mechanism.file = file;
+  mechanism.description = std::move(s->head.description);
+  mechanism.gravity_W = s->head.gravity_W;
+  mechanism.up_W = s->head.up_W;
+  mechanism.parameters = std::move(s->parameters);
+  mechanism.bodies = std::move(s->bodies.bodies);
+  mechanism.joints = std::move(s->joints.joints);
+  mechanism.drives = std::move(s->drives);
+  mechanism.prescribed = std::move(s->prescribed);
+  mechanism.outputs = std::move(s->outputs);
+  mechanism.springs = std::move(s->springs);
+  mechanism.beams = std::move(s->beams.beams);
+  return mechanism;
+}
+
+// Checks the whole and solves its home pose.
+void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
+  const internal::ModelPlaces places{.bodies = s.bodies.places,
+                                     .joints = s.joints.places,
+                                     .beams = s.beams.places,
+                                     .signals = s.signals,
+                                     .urdf_joints = s.urdf.joints};
+  internal::ModelReport report(places, &reading->yaml, &reading->others);
+  internal::CheckMasses(*mechanism, s.head.impossible_inertia_allowed, &report);
+  if (s.beams.good) internal::CheckBeams(*mechanism, &report);
+  // With a broken joint, findings about the graph would only be its consequences; with a broken
+  // number, those about the loops.
+  if (!s.joints.good || !internal::CheckTree(s.joints.hints, mechanism, &report)) return;
+  if (report.has_errors()) return;
+  internal::CloseLoops({s.head.closure_tolerance_m, reading->bare_urdf}, mechanism, &report);
+  if (report.has_own_errors()) return;
+  internal::CheckHome(*mechanism, &report);
+  internal::CheckIsostaticRule(*mechanism, &report);
+  internal::CheckPlausible(*mechanism, &report);
+}
+
+LoadResult LoadFrom(const std::string& text, Reading reading) {
   LoadResult result;
-  result.diagnostics.Append(
-      InFileOrder(bare_urdf_ ? WithoutPlaces(yaml_.diagnostics()) : yaml_.diagnostics()));
-  result.diagnostics.Append(other_findings_);
-  result.literals = std::move(literals_);
-  if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism_);
+  std::optional<Mechanism> mechanism;
+  const YamlNodePtr root = reading.yaml.Parse(text);
+  if (auto sections = root == nullptr ? std::nullopt : ReadModel(*root, &reading)) {
+    mechanism = Assembled(reading.yaml.file(), &*sections);
+    Check(*sections, &reading, &*mechanism);
+  }
+  const Diagnostics& own = reading.yaml.diagnostics();
+  result.diagnostics.Append(InFileOrder(reading.bare_urdf ? WithoutPlaces(own) : own));
+  result.diagnostics.Append(reading.others);
+  result.literals = reading.literals.Take();
+  if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism);
   return result;
 }
 
-void ModelReader::ReadAll() {
-  blocks_.push_back({.node = root_.get(),
-                     .scope = &scopes_.emplace_back(),
-                     .path = "",
-                     .prefix = "",
-                     .levels = {""},
-                     .parts = {}});
-  ReadHead();
-  if (!root_->is_map()) return;
-  ExpandInstances(blocks_.front());
-  CheckOverrides();
-
-  // Each stage over all blocks, so that every name it refers to is there.
-  using Stage = void (ModelReader::*)(const Block&);
-  for (const Stage stage :
-       {Stage{&ModelReader::ReadBodies}, Stage{&ModelReader::ReadAttachedFrames},
-        Stage{&ModelReader::ReadShapes}, Stage{&ModelReader::ReadJoints},
-        Stage{&ModelReader::ReadDrives}, Stage{&ModelReader::ReadPrescribed},
-        Stage{&ModelReader::ReadOutputs}, Stage{&ModelReader::ReadSprings},
-        Stage{&ModelReader::ReadMaterials}, Stage{&ModelReader::ReadSections},
-        Stage{&ModelReader::ReadBeams}}) {
-    for (const Block& block : blocks_) {
-      yaml_.SetNote(block.Note());
-      (this->*stage)(block);
-    }
-  }
-  yaml_.SetNote("");
-  WeldUrdfRoot();
-  OrderDrives(*root_);
-  CheckCoordinateNames();
-  CheckMasses();
-  CheckBeams();
-  // With a broken joint, findings about the graph would only be its consequences; with a broken
-  // number, those about the loops.
-  if (!joints_good_ || !CheckTree()) return;
-  if (yaml_.has_errors() || other_findings_.has_errors()) return;
-  CloseLoops();
-  if (yaml_.has_errors()) return;
-  CheckHome();
-  CheckIsostaticRule();
-  CheckPlausible();
-}
+}  // namespace
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
                          const LoadOptions& options) {
-  if (internal::IsUrdfFile(file)) {
-    return ModelReader(file, options).LoadBareUrdf(internal::UrdfModelText(file, text));
-  }
-  return ModelReader(file, options).Load(text);
+  const bool bare_urdf = internal::IsUrdfFile(file);
+  return LoadFrom(bare_urdf ? internal::UrdfModelText(file, text) : text,
+                  {.options = options,
+                   .bare_urdf = bare_urdf,
+                   .yaml = YamlReader(file),
+                   .others = {},
+                   .literals = internal::Literals(options.literals)});
 }
 
 LoadResult LoadModel(const std::string& file, const LoadOptions& options) {

@@ -4,9 +4,9 @@
 #include <algorithm>
 #include <numeric>
 
-#include "model_file/model_reader.h"
+#include "model_file/model_checks.h"
 
-namespace mbv {
+namespace mbv::internal {
 namespace {
 
 // Points nearer than this are one node [m].
@@ -25,22 +25,13 @@ std::string Shown(const Vec3& p) {
   return fmt::format("[{:.6g}, {:.6g}, {:.6g}]", p.x() + 0.0, p.y() + 0.0, p.z() + 0.0);
 }
 
-}  // namespace
-
-void ModelReader::CheckBeams() {
-  yaml_.SetNote("");
-  if (!beams_good_) return;
-  for (size_t b = 0; b < mechanism_.bodies.size(); ++b) CheckFrameOfBeams(static_cast<int>(b));
-  CheckEndsOnBeams();
-}
-
-void ModelReader::CheckFrameOfBeams(int body) {
+void CheckFrameOfBeams(const Mechanism& mechanism, int body, ModelReport* report) {
   std::vector<size_t> own;
-  for (size_t i = 0; i < mechanism_.beams.size(); ++i) {
-    if (mechanism_.beams[i].body == body) own.push_back(i);
+  for (size_t i = 0; i < mechanism.beams.size(); ++i) {
+    if (mechanism.beams[i].body == body) own.push_back(i);
   }
   if (own.empty()) return;
-  const auto& beams = mechanism_.beams;
+  const auto& beams = mechanism.beams;
   std::vector<size_t> reached = {own.front()};  // grows from the first beam
   for (size_t k = 0; k < reached.size(); ++k) {
     const Beam& beam = beams[reached[k]];
@@ -53,28 +44,28 @@ void ModelReader::CheckFrameOfBeams(int body) {
       }
     }
   }
-  const std::string& name = mechanism_.bodies[body].name;
+  const std::string& name = mechanism.bodies[body].name;
   for (const size_t i : own) {
     for (const size_t other : own) {
       for (const Vec3& end : {beams[i].p_from, beams[i].p_to}) {
         if (!IsWithin(beams[other], end)) continue;
-        yaml_.Error(*beam_places_[i],
-                    fmt::format("beam '{}' ends at {} within beam '{}'", beams[i].name, Shown(end),
-                                beams[other].name),
-                    fmt::format("cut '{}' there: beams meet at their ends", beams[other].name));
+        report->At(report->places().beams[i], Severity::kError,
+                   fmt::format("beam '{}' ends at {} within beam '{}'", beams[i].name, Shown(end),
+                               beams[other].name),
+                   fmt::format("cut '{}' there: beams meet at their ends", beams[other].name));
       }
     }
     if (std::find(reached.begin(), reached.end(), i) != reached.end()) continue;
-    yaml_.Error(*beam_places_[i],
-                fmt::format("beam '{}' is not connected with the other beams of body '{}'",
-                            beams[i].name, name),
-                "beams of one body meet at their ends; two pieces are two bodies");
+    report->At(report->places().beams[i], Severity::kError,
+               fmt::format("beam '{}' is not connected with the other beams of body '{}'",
+                           beams[i].name, name),
+               "beams of one body meet at their ends; two pieces are two bodies");
   }
 }
 
-bool ModelReader::IsOnBeamEnd(int body, const Vec3& p) const {
+bool IsOnBeamEnd(const Mechanism& mechanism, int body, const Vec3& p) {
   bool elastic = false;
-  for (const Beam& beam : mechanism_.beams) {
+  for (const Beam& beam : mechanism.beams) {
     if (beam.body != body) continue;
     elastic = true;
     if (Same(p, beam.p_from) || Same(p, beam.p_to)) return true;
@@ -83,31 +74,40 @@ bool ModelReader::IsOnBeamEnd(int body, const Vec3& p) const {
 }
 
 // Joints, legs and springs move with a beam end or with a rigid body.
-void ModelReader::CheckEndsOnBeams() {
-  const auto check = [&](const YamlEntry* at, const std::string& what, int body, const Vec3& p) {
-    if (IsOnBeamEnd(body, p)) return;
-    yaml_.AddAt(Severity::kError, at ? at->line : 0, at ? at->column : 0,
-                fmt::format("{} sits at {} of body '{}', where no beam ends", what, Shown(p),
-                            mechanism_.bodies[body].name),
-                "a body with beams is elastic: what holds it sits on ends of its beams");
+void CheckEndsOnBeams(const Mechanism& mechanism, ModelReport* report) {
+  const auto check = [&](Place at, const std::string& what, int body, const Vec3& p) {
+    if (IsOnBeamEnd(mechanism, body, p)) return;
+    report->At(at, Severity::kError,
+               fmt::format("{} sits at {} of body '{}', where no beam ends", what, Shown(p),
+                           mechanism.bodies[body].name),
+               "a body with beams is elastic: what holds it sits on ends of its beams");
   };
-  for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
-    const Joint& joint = mechanism_.joints[j];
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
     const std::string what = fmt::format("joint '{}'", joint.name);
-    check(joint_places_[j], what, joint.parent, joint.X_PF.translation());
-    check(joint_places_[j], what, joint.child, joint.X_CM.translation());
+    check(report->places().joints[j], what, joint.parent, joint.X_PF.translation());
+    check(report->places().joints[j], what, joint.child, joint.X_CM.translation());
   }
-  for (const Drive& drive : mechanism_.drives) {
+  for (const Drive& drive : mechanism.drives) {
     const auto* leg = std::get_if<DistanceDrive>(&drive.kind);
     if (leg == nullptr) continue;
-    const YamlEntry* at = signal_places_[drive.name].front().entry;
+    const Place at = report->places().signals.Of(drive.name);
     check(at, fmt::format("drive '{}'", drive.name), leg->body_from, leg->p_from);
     check(at, fmt::format("drive '{}'", drive.name), leg->body_to, leg->p_to);
   }
-  for (const SpringDamper& spring : mechanism_.springs) {
-    check(nullptr, fmt::format("spring '{}'", spring.name), spring.body_from, spring.p_from);
-    check(nullptr, fmt::format("spring '{}'", spring.name), spring.body_to, spring.p_to);
+  for (const SpringDamper& spring : mechanism.springs) {
+    check({}, fmt::format("spring '{}'", spring.name), spring.body_from, spring.p_from);
+    check({}, fmt::format("spring '{}'", spring.name), spring.body_to, spring.p_to);
   }
 }
 
-}  // namespace mbv
+}  // namespace
+
+void CheckBeams(const Mechanism& mechanism, ModelReport* report) {
+  for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
+    CheckFrameOfBeams(mechanism, static_cast<int>(b), report);
+  }
+  CheckEndsOnBeams(mechanism, report);
+}
+
+}  // namespace mbv::internal

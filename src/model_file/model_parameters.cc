@@ -1,13 +1,12 @@
-// Parameters of the model and of instances, of other files, and overrides.
+#include "model_file/model_parameters.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 
-#include "model_file/model_reader.h"
-
-namespace mbv {
+namespace mbv::internal {
 namespace {
 
 Source SourceOf(int choice) {
@@ -23,40 +22,43 @@ std::set<std::string> KeysOf(const YamlNode* map) {
 
 }  // namespace
 
-// The model's own parameters after those of the files it takes them from; the nearer file wins.
-void ModelReader::ReadModelParameters(const Block& model, const YamlMap& map) {
+void ParameterReader::ReadModel(const Block& model, const YamlMap& file) {
   std::error_code ignored;
-  OpenParameterFiles(&yaml_, *root_,
-                     {std::filesystem::weakly_canonical(yaml_.file(), ignored).string()});
+  std::deque<File> files;  // innermost base first
+  OpenFiles(&yaml_, *file.node(),
+            {std::filesystem::weakly_canonical(yaml_.file(), ignored).string()}, &files);
   struct Source {
     YamlReader* yaml;
     const YamlNode* node;
   };
   std::vector<Source> sources;
-  for (ParameterFile& file : parameter_files_) {
-    sources.push_back({&file.yaml, file.root->Find("parameters")});
-  }
-  sources.push_back({&yaml_, map.Find("parameters")});
-  for (const Source& source : sources) {
-    ReadParameters(source.yaml, model, source.node, "parameters");
-  }
-  ApplyOverrides(model);
+  for (File& other : files) sources.push_back({&other.yaml, other.root->Find("parameters")});
+  sources.push_back({&yaml_, file.Find("parameters")});
+  for (const Source& source : sources) Define(source.yaml, model, source.node, "parameters");
+  Override(model);
   for (size_t i = 0; i < sources.size(); ++i) {
     std::set<std::string> replaced;
     for (size_t nearer = i + 1; nearer < sources.size(); ++nearer) {
       replaced.merge(KeysOf(sources[nearer].node));
     }
-    EvaluateParameters(sources[i].yaml, model, sources[i].node, "parameters", replaced);
+    Evaluate(sources[i].yaml, model, sources[i].node, "parameters", replaced);
   }
-  for (const ParameterFile& file : parameter_files_) {
-    other_findings_.Append(file.yaml.diagnostics());
-  }
+  for (const File& other : files) others_.Append(other.yaml.diagnostics());
+}
+
+void ParameterReader::DefinePart(const Block& instance, const YamlNode* parameters) {
+  Define(&yaml_, instance, parameters, instance.PathOf("parameters"));
+}
+
+void ParameterReader::FinishPart(const Block& instance, const YamlNode* parameters) {
+  Override(instance);
+  Evaluate(&yaml_, instance, parameters, instance.PathOf("parameters"));
 }
 
 // Opens the file that `root` (read by `yaml`) takes its parameters from, the files behind it first.
 // `chain`: the files on the way here.
-void ModelReader::OpenParameterFiles(YamlReader* yaml, const YamlNode& root,
-                                     const std::vector<std::string>& chain) {
+void ParameterReader::OpenFiles(YamlReader* yaml, const YamlNode& root,
+                                const std::vector<std::string>& chain, std::deque<File>* files) {
   const YamlNode* node = root.Find("parameters_from");
   if (node == nullptr || node->is_null()) return;
   const auto name = yaml->Text(*node, "parameters_from");
@@ -69,7 +71,7 @@ void ModelReader::OpenParameterFiles(YamlReader* yaml, const YamlNode& root,
                                    Describe(*node)));
     return;
   }
-  ParameterFile file{.yaml = YamlReader(path.lexically_normal().string()), .root = nullptr};
+  File file{.yaml = YamlReader(path.lexically_normal().string()), .root = nullptr};
   const auto text = file.yaml.ReadFile();
   if (!text) {
     yaml->Error(*node, fmt::format("parameters_from = {} cannot be read", Describe(*node)),
@@ -79,17 +81,17 @@ void ModelReader::OpenParameterFiles(YamlReader* yaml, const YamlNode& root,
   file.root = file.yaml.Parse(*text);
   if (file.root == nullptr || !file.root->is_map()) {
     yaml->Error(*node, fmt::format("parameters_from = {} is no model file", Describe(*node)));
-    other_findings_.Append(file.yaml.diagnostics());
+    others_.Append(file.yaml.diagnostics());
     return;
   }
   std::vector<std::string> longer = chain;
   longer.push_back(canonical);
-  OpenParameterFiles(&file.yaml, *file.root, longer);
-  parameter_files_.push_back(std::move(file));
+  OpenFiles(&file.yaml, *file.root, longer, files);
+  files->push_back(std::move(file));
 }
 
-void ModelReader::ReadParameters(YamlReader* yaml, const Block& block, const YamlNode* node,
-                                 const std::string& path) {
+void ParameterReader::Define(YamlReader* yaml, const Block& block, const YamlNode* node,
+                             const std::string& path) {
   if (node == nullptr) return;
   for (const YamlEntry& entry : yaml->Entries(*node, path)) {
     const std::string where = JoinPath(path, entry.key);
@@ -119,9 +121,8 @@ void ModelReader::ReadParameters(YamlReader* yaml, const Block& block, const Yam
 
 // Reports what fails, and lists the parameters in the mechanism but those that another file
 // replaces.
-void ModelReader::EvaluateParameters(YamlReader* yaml, const Block& block, const YamlNode* node,
-                                     const std::string& path,
-                                     const std::set<std::string>& replaced) {
+void ParameterReader::Evaluate(YamlReader* yaml, const Block& block, const YamlNode* node,
+                               const std::string& path, const std::set<std::string>& replaced) {
   if (node == nullptr || !node->is_map()) return;
   for (const YamlEntry& entry : node->entries) {
     if (!block.scope->Has(entry.key) || replaced.count(entry.key) > 0) continue;
@@ -151,11 +152,11 @@ void ModelReader::EvaluateParameters(YamlReader* yaml, const Block& block, const
     if (!result.value && !result.error.empty()) {
       yaml->Error(*at, fmt::format("{} = {} {}", where, Describe(*at), result.error), result.hint);
     }
-    mechanism_.parameters.push_back(std::move(parameter));
+    parameters_.push_back(std::move(parameter));
   }
 }
 
-void ModelReader::ApplyOverrides(const Block& block) {
+void ParameterReader::Override(const Block& block) {
   for (const auto& [name, value] : options_.overrides) {
     if (!name.starts_with(block.prefix)) continue;
     const auto [inner, unit] =
@@ -163,40 +164,40 @@ void ModelReader::ApplyOverrides(const Block& block) {
                   [&](const std::string& known) { return block.scope->Has(known); });
     if (!block.scope->Has(inner)) continue;
     block.scope->Set(inner, unit.to_si(value));
-    override_used_[name] = true;
+    used_overrides_.insert(name);
     if (const auto [other, first] = overridden_.emplace(block.prefix + inner, name); !first) {
       Finding finding = PlaceOfOverride(name);
       finding.message = fmt::format("{} and {} are both given", other->second, name);
       finding.hint = "keep one of them";
-      other_findings_.Add(finding);
+      others_.Add(finding);
     }
   }
   for (const std::string& name : block.scope->Names()) {
-    if (block.scope->Has(name)) known_parameters_.push_back(block.prefix + name);
+    if (block.scope->Has(name)) known_.push_back(block.prefix + name);
   }
 }
 
-Finding ModelReader::PlaceOfOverride(const std::string& name) const {
+Finding ParameterReader::PlaceOfOverride(const std::string& name) const {
   const auto place = options_.override_places.find(name);
   Finding finding = place == options_.override_places.end() ? Finding{} : place->second;
   finding.severity = Severity::kError;
   return finding;
 }
 
-void ModelReader::CheckOverrides() {
+void ParameterReader::CheckOverrides() {
   for (const auto& [name, value] : options_.overrides) {
     const std::string why = WhyNoNumber(value);
-    if (override_used_[name] && why.empty()) continue;
+    const bool used = used_overrides_.contains(name);
+    if (used && why.empty()) continue;
     Finding finding = PlaceOfOverride(name);
-    if (override_used_[name]) {
+    if (used) {
       finding.message = fmt::format("parameter {} = {} {}", name, value, why);
     } else {
       finding.message = fmt::format("{} has no parameter '{}'", yaml_.file(), name);
-      const std::string near = ClosestWord(name, known_parameters_);
-      if (!near.empty()) finding.hint = fmt::format("did you mean '{}'?", near);
+      finding.hint = DidYouMean(name, known_);
     }
-    other_findings_.Add(finding);
+    others_.Add(finding);
   }
 }
 
-}  // namespace mbv
+}  // namespace mbv::internal

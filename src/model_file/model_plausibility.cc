@@ -11,9 +11,9 @@
 #include <cmath>
 
 #include "mechanism/reach.h"
-#include "model_file/model_reader.h"
+#include "model_file/model_checks.h"
 
-namespace mbv {
+namespace mbv::internal {
 namespace {
 
 constexpr double kThinnest = 22600e-9;   // [kg/m³], mass / extent³
@@ -145,31 +145,42 @@ std::optional<Doubt> DoubtPoint(const Body& body, Points points) {
       "inertias are about the centre of mass, in body axes; are these about the body's origin?"};
 }
 
-}  // namespace
-
-void ModelReader::WarnAboutBody(int body, const std::string& text, const std::string& hint) {
-  const auto b = static_cast<size_t>(body);
-  const std::string& name = mechanism_.bodies[b].name;
-  if (const YamlEntry* at = body_places_[b]; at != nullptr) {
-    yaml_.SetNote(name == at->key ? "" : fmt::format(" (body {})", name));
-    yaml_.AddAt(Severity::kWarning, at->line, at->column, body_paths_[b] + ": " + text, hint);
-    yaml_.SetNote("");
-  } else {
-    other_findings_.Add(
-        {Severity::kWarning, body_paths_[b], 0, 0, fmt::format("link '{}': {}", name, text), hint});
+void WarnAboutLengths(const Mechanism& mechanism, const std::vector<int>& thin, double extent_m,
+                      ModelReport* report) {
+  if (thin.empty()) return;
+  const Body& first = mechanism.bodies[static_cast<size_t>(thin.front())];
+  std::string others;
+  for (size_t k = 1; k < std::min(thin.size(), kMostNames); ++k) {
+    others += (k == 1 ? "" : ", ") + mechanism.bodies[static_cast<size_t>(thin[k])].name;
   }
+  if (thin.size() > kMostNames) others += fmt::format(" and {} more", thin.size() - kMostNames);
+  report->AtBody(mechanism, static_cast<size_t>(thin.front()), Severity::kWarning,
+                 fmt::format("it has {:.4g} kg and measures {:.4g} m, thinner than any solid{}",
+                             first.mass, extent_m, others.empty() ? "" : "; so do " + others),
+                 "lengths are in metres; are these millimetres?");
 }
 
-void ModelReader::CheckPlausible() {
+void WarnAboutGravity(const Mechanism& mechanism, ModelReport* report) {
+  constexpr double kLeast = 500.0, kMost = 3e4;  // [m/s²]: 9810 mm/s², and less on the moon
+  const double g = mechanism.gravity_W.norm();
+  if (g < kLeast || g > kMost) return;
+  report->AtFile(Severity::kWarning,
+                 fmt::format("gravity is {:.6g} m/s², {:.3g} times that of the earth", g, g / 9.81),
+                 "gravity is in m/s²; is it in mm/s²?");
+}
+
+}  // namespace
+
+void CheckPlausible(const Mechanism& mechanism, ModelReport* report) {
   double heaviest_kg = 0.0;
-  for (const Body& body : mechanism_.bodies) heaviest_kg = std::max(heaviest_kg, body.mass);
-  const double mechanism_m = CharacteristicLength(mechanism_);
+  for (const Body& body : mechanism.bodies) heaviest_kg = std::max(heaviest_kg, body.mass);
+  const double mechanism_m = CharacteristicLength(mechanism);
   std::vector<int> thin;
   double extent_m = 0.0;
-  for (int b = 1; b < static_cast<int>(mechanism_.bodies.size()); ++b) {
-    const Body& body = mechanism_.bodies[static_cast<size_t>(b)];
+  for (int b = 1; b < static_cast<int>(mechanism.bodies.size()); ++b) {
+    const Body& body = mechanism.bodies[static_cast<size_t>(b)];
     if (!(body.mass > kNoMass * heaviest_kg)) continue;
-    const Points points = PointsOf(mechanism_, b);
+    const Points points = PointsOf(mechanism, b);
     const double extent = points.extent();
     if (body.mass < kThinnest * Cubed(extent)) {
       if (thin.empty()) extent_m = extent;
@@ -180,35 +191,13 @@ void ModelReader::CheckPlausible() {
     for (const auto& doubt : {DoubtCentreOfMass(body, points, length_m),
                               DoubtInertia(body, length_m), DoubtPoint(body, points)}) {
       if (!doubt) continue;
-      WarnAboutBody(b, doubt->text, doubt->hint);
+      report->AtBody(mechanism, static_cast<size_t>(b), Severity::kWarning, doubt->text,
+                     doubt->hint);
       break;
     }
   }
-  WarnAboutLengths(thin, extent_m);
-  WarnAboutGravity();
+  WarnAboutLengths(mechanism, thin, extent_m, report);
+  WarnAboutGravity(mechanism, report);
 }
 
-void ModelReader::WarnAboutLengths(const std::vector<int>& thin, double extent_m) {
-  if (thin.empty()) return;
-  const Body& first = mechanism_.bodies[static_cast<size_t>(thin.front())];
-  std::string others;
-  for (size_t k = 1; k < std::min(thin.size(), kMostNames); ++k) {
-    others += (k == 1 ? "" : ", ") + mechanism_.bodies[static_cast<size_t>(thin[k])].name;
-  }
-  if (thin.size() > kMostNames) others += fmt::format(" and {} more", thin.size() - kMostNames);
-  WarnAboutBody(thin.front(),
-                fmt::format("it has {:.4g} kg and measures {:.4g} m, thinner than any solid{}",
-                            first.mass, extent_m, others.empty() ? "" : "; so do " + others),
-                "lengths are in metres; are these millimetres?");
-}
-
-void ModelReader::WarnAboutGravity() {
-  constexpr double kLeast = 500.0, kMost = 3e4;  // [m/s²]: 9810 mm/s², and less on the moon
-  const double g = mechanism_.gravity_W.norm();
-  if (g < kLeast || g > kMost) return;
-  yaml_.AddAt(Severity::kWarning, 0, 0,
-              fmt::format("gravity is {:.6g} m/s², {:.3g} times that of the earth", g, g / 9.81),
-              "gravity is in m/s²; is it in mm/s²?");
-}
-
-}  // namespace mbv
+}  // namespace mbv::internal

@@ -7,9 +7,9 @@
 #include "kinematics/home.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/reach.h"
-#include "model_file/model_reader.h"
+#include "model_file/model_checks.h"
 
-namespace mbv {
+namespace mbv::internal {
 namespace {
 
 bool SaysBall(std::string name) {
@@ -35,9 +35,8 @@ void MakeBall(Joint* joint) {
 
 // CAD exporters know no balls and write hinges of that name, to be mended by hand in the closure
 // file (joint_name, joint_type). Where that was forgotten loops do not close.
-bool ModelReader::TakeNamedBalls() {
-  if (!bare_urdf_) return false;
-  Mechanism balls = mechanism_;
+bool TakeNamedBalls(Mechanism* mechanism, ModelReport* report) {
+  Mechanism balls = *mechanism;
   std::vector<std::string> names;
   for (size_t j = 0; j < balls.joints.size(); ++j) {
     Joint& joint = balls.joints[j];
@@ -49,33 +48,33 @@ bool ModelReader::TakeNamedBalls() {
   if (names.empty()) return false;
   const HomeResult home = SolveHome(&balls);
   if (!home.closed) return false;
-  mechanism_ = std::move(balls);
-  other_findings_.Add(
-      {Severity::kWarning, yaml_.file(), 0, 0,
+  *mechanism = std::move(balls);
+  report->AddOther(
+      {Severity::kWarning, report->file(), 0, 0,
        fmt::format("the loops do not close as they are stated; they do with {} joint{} as ball{} "
                    "whose name{} so, and which the URDF states as hinges: {}",
                    names.size(), names.size() == 1 ? "" : "s", names.size() == 1 ? "" : "s",
                    names.size() == 1 ? " says" : "s say", Joined(names, 4)),
        "list them in the closure file: joint_name: […], joint_type: [SPHERICAL, …]"});
-  if (home.guesses_moved) WarnAboutAssembly(home);
+  if (home.guesses_moved) WarnAboutAssembly(*mechanism, home, report);
   return true;
 }
 
-std::string ModelReader::WhatWouldClose(const HomeResult& home) const {
+std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home) {
   std::string text;
   if (!home.gaps.empty()) {
-    const Joint& joint = mechanism_.joints[home.gaps.front().joint];
-    const Pose X_FM = (mechanism_.X_WB_home[joint.parent] * joint.X_PF).inverse() *
-                      (mechanism_.X_WB_home[joint.child] * joint.X_CM);
+    const Joint& joint = mechanism.joints[home.gaps.front().joint];
+    const Pose X_FM = (mechanism.X_WB_home[joint.parent] * joint.X_PF).inverse() *
+                      (mechanism.X_WB_home[joint.child] * joint.X_CM);
     const Vec3 d = X_FM.translation();
     text = fmt::format(
         "at the pose of least gaps the frame of '{}' on '{}' would have to move by [{:.4g}, "
         "{:.4g}, "
         "{:.4g}] m in its own axes",
-        joint.name, mechanism_.bodies[joint.parent].name, d.x(), d.y(), d.z());
+        joint.name, mechanism.bodies[joint.parent].name, d.x(), d.y(), d.z());
   }
   // Would points do where frames are welded?
-  Mechanism points = mechanism_;
+  Mechanism points = mechanism;
   std::vector<std::string> names;
   for (const LoopGap& gap : home.gaps) {
     Joint& joint = points.joints[gap.joint];
@@ -91,4 +90,4 @@ std::string ModelReader::WhatWouldClose(const HomeResult& home) const {
   return text;
 }
 
-}  // namespace mbv
+}  // namespace mbv::internal

@@ -1,153 +1,172 @@
-// The `urdf:` key of a model file: FILE, or {file, closures, constraints, guess: {JOINT: …}}.
+#include "model_file/model_urdf.h"
+
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <set>
 
-#include "model_file/model_reader.h"
-#include "model_file/urdf.h"
+#include "model_file/model_urdf_closures.h"
 #include "model_file/urdf_frame_links.h"
 
-namespace mbv {
+namespace mbv::internal {
 
-void ModelReader::ImportUrdf(const YamlNode& node) {
+UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Into& into) {
+  YamlReader& yaml = values_.yaml();
   const bool short_form = node.is_scalar();
-  const YamlMap map(&yaml_, short_form ? nullptr : &node, "urdf",
+  const YamlMap map(&yaml, short_form ? nullptr : &node, "urdf",
                     {"file", "closures", "constraints", "guess", "guess_deg"});
   const YamlNode* name = short_form ? &node : map.Required("file");
-  const auto file = name == nullptr ? std::nullopt : yaml_.Text(*name, "urdf");
-  joints_good_ = false;  // until the tree is read
-  if (!file) return;
-  const std::filesystem::path path = std::filesystem::path(yaml_.file()).parent_path() / *file;
+  into.joints->good = false;  // until the tree is read
+  const auto source = name == nullptr ? std::nullopt : ReadSource(model, *name, map);
+  if (!source) return {};
+  if (!HasRoom(node, source->tree.bodies.size(), kMaxBodies + 1, "bodies", &yaml)) return {};
+  into.joints->good = true;
+  UrdfSection urdf = Add(*source, into.bodies, into.joints);
+  ReadGuesses(model, map, into.joints);
+  // The model file's own drives are the better ones.
+  if (model.Section("drives") == nullptr) AddDrives(MotorsOf(*source, *into.joints), node, into);
+  return urdf;
+}
+
+std::optional<UrdfReader::Source> UrdfReader::ReadSource(const Block& model, const YamlNode& name,
+                                                         const YamlMap& map) {
+  YamlReader& yaml = values_.yaml();
+  const auto file = yaml.Text(name, "urdf");
+  if (!file) return std::nullopt;
+  const std::filesystem::path path = std::filesystem::path(yaml.file()).parent_path() / *file;
   YamlReader reader(path.string());
   const auto text = reader.ReadFile();
   if (!text) {
-    yaml_.Error(*name, fmt::format("urdf = {} cannot be read", Describe(*name)),
-                "the path is relative to this file");
-    return;
+    yaml.Error(name, fmt::format("urdf = {} cannot be read", Describe(name)),
+               "the path is relative to this file");
+    return std::nullopt;
   }
   Diagnostics findings;
-  UrdfTree tree = ReadUrdf(*text, path.string(), &findings);
-  other_findings_.Append(findings);
-  if (findings.has_errors()) return;
+  Source source{
+      .file = path.string(), .tree = ReadUrdf(*text, path.string(), &findings), .motors = {}};
+  others_.Append(findings);
+  if (findings.has_errors()) return std::nullopt;
   if (const YamlNode* constraints = map.Find("constraints")) {
-    if (!yaml_.Flag(*constraints, map.PathOf("constraints")).value_or(true)) DropClosures(&tree);
-  }
-  std::vector<std::string> motors;
-  const YamlNode* closures = map.Find("closures");
-  if (closures != nullptr && !ReadClosureFile(*closures, &tree, &motors)) return;
-  std::set<std::string> keep;  // bodies that the model file writes on
-  if (const YamlNode* attach = blocks_.front().Section("attach")) {
-    for (const YamlEntry& entry : attach->entries) keep.insert(entry.key);
-  }
-  internal::FoldFrameLinks(keep, motors, path.string(), &tree, &other_findings_);
-  if (!Room(node, tree.bodies.size(), kMaxBodies + 1, "bodies")) return;
-  joints_good_ = true;
-  AddUrdf(tree, path.string());
-  ReadUrdfGuesses(map, tree.joints);
-  if (bare_urdf_ && motors.empty()) {
-    for (const std::string& name : tree.transmission_joints) {
-      const int index = mechanism_.FindJoint(name);
-      if (index >= 0 && FreedomsOf(mechanism_.joints[index].kind) == 1) motors.push_back(name);
+    if (!yaml.Flag(*constraints, map.PathOf("constraints")).value_or(true)) {
+      DropClosures(&source.tree);
     }
   }
-  // The model file's own drives are the better ones.
-  if (blocks_.front().Section("drives") == nullptr) AddUrdfDrives(motors, &node);
+  const YamlNode* closures = map.Find("closures");
+  if (closures != nullptr &&
+      !ReadClosureFile(*closures, &yaml, &others_, &source.tree, &source.motors)) {
+    return std::nullopt;
+  }
+  std::set<std::string> keep;  // bodies that the model file writes on
+  if (const YamlNode* attach = model.Section("attach")) {
+    for (const YamlEntry& entry : attach->entries) keep.insert(entry.key);
+  }
+  FoldFrameLinks(keep, source.motors, source.file, &source.tree, &others_);
+  return source;
 }
 
-void ModelReader::TakeUrdfLiterals(Body* body) {
+void UrdfReader::TakeLiterals(Body* body) {
   const std::string place = "urdf." + body->name;
-  body->mass = LiteralAt(place + ".mass", body->mass);
+  body->mass = literals_.At(place + ".mass", body->mass);
   for (int row = 0; row < 3; ++row) {
-    body->p_BoBcm_B[row] = LiteralAt(fmt::format("{}.com[{}]", place, row), body->p_BoBcm_B[row]);
+    body->p_BoBcm_B[row] =
+        literals_.At(fmt::format("{}.com[{}]", place, row), body->p_BoBcm_B[row]);
     for (int col = row; col < 3; ++col) {
       const std::string key = {"xyz"[row], "xyz"[col]};
-      const double value = LiteralAt(place + ".inertia." + key, body->I_Bcm_B(row, col));
+      const double value = literals_.At(place + ".inertia." + key, body->I_Bcm_B(row, col));
       body->I_Bcm_B(row, col) = body->I_Bcm_B(col, row) = value;
     }
   }
 }
 
-void ModelReader::AddUrdf(const UrdfTree& tree, const std::string& file) {
-  const int first = static_cast<int>(mechanism_.bodies.size());
+UrdfSection UrdfReader::Add(const Source& source, ModelBodies* bodies, ModelJoints* joints) {
+  const UrdfTree& tree = source.tree;
+  const int first = static_cast<int>(bodies->bodies.size());
   for (size_t b = 0; b < tree.bodies.size(); ++b) {
-    mechanism_.bodies.push_back(tree.bodies[b]);
-    TakeUrdfLiterals(&mechanism_.bodies.back());
-    body_places_.push_back(nullptr);
-    body_paths_.push_back(tree.body_lines[b] > 0 ? fmt::format("{}:{}", file, tree.body_lines[b])
-                                                 : file);
+    bodies->bodies.push_back(tree.bodies[b]);
+    TakeLiterals(&bodies->bodies.back());
+    const int line = tree.body_lines[b];
+    bodies->places.push_back(
+        {.place = {},
+         .path = line > 0 ? fmt::format("{}:{}", source.file, line) : source.file,
+         .note = ""});
   }
+  UrdfSection urdf;
   const auto index = [first](int body) { return body < 0 ? 0 : first + body; };
-  hints_.resize(mechanism_.joints.size());
   for (size_t j = 0; j < tree.joints.size(); ++j) {
     Joint joint = tree.joints[j];
     joint.parent = index(joint.parent);
     joint.child = index(joint.child);
     for (int k = 0; k < 3; ++k) {
       double& offset = joint.X_PF.translation()[k];
-      offset = LiteralAt(fmt::format("urdf.{}.origin[{}]", joint.name, k), offset);
+      offset = literals_.At(fmt::format("urdf.{}.origin[{}]", joint.name, k), offset);
     }
-    hints_.push_back(joint.closure ? std::optional(true) : std::nullopt);
-    mechanism_.joints.push_back(joint);
-    joint_places_.push_back(nullptr);
-    urdf_places_[joint.name] = {Severity::kError, file, tree.joint_lines[j], 1, "", ""};
+    urdf.joints[joint.name] = {Severity::kError, source.file, tree.joint_lines[j], 1, "", ""};
+    const auto hint = joint.closure ? std::optional(true) : std::nullopt;
+    joints->Add(std::move(joint), {}, hint);
   }
-  if (tree.root >= 0) urdf_root_ = first + tree.root;
+  if (tree.root >= 0) urdf.root = first + tree.root;
   for (const auto& [name, frame] : tree.frames) {
-    urdf_frames_[name] = {index(frame.body), frame.X_BF};
+    bodies->links[name] = {index(frame.body), frame.X_BF};
   }
+  return urdf;
 }
 
-void ModelReader::ReadUrdfGuesses(const YamlMap& map, const std::vector<Joint>& joints) {
+void UrdfReader::ReadGuesses(const Block& model, const YamlMap& map, ModelJoints* joints) {
   const auto found = map.FindInUnit("guess", {kPlain, kDeg});
   if (found.node == nullptr) return;
-  const Block& model = blocks_.front();
-  for (const YamlEntry& entry : yaml_.Entries(*found.node, map.PathOf(found.key))) {
+  YamlReader& yaml = values_.yaml();
+  for (const YamlEntry& entry : yaml.Entries(*found.node, map.PathOf(found.key))) {
     const std::string path = JoinPath(map.PathOf(found.key), entry.key);
-    const int index = mechanism_.FindJoint(entry.key);
-    if (index < 0) {
-      std::vector<std::string> names;
-      for (const Joint& joint : joints) names.push_back(joint.name);
-      const std::string near = ClosestWord(entry.key, names);
-      yaml_.Error(entry, fmt::format("{}: there is no such joint in the URDF file", path),
-                  near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+    const int index = joints->Find(entry.key);
+    if (index >= 0) {
+      ReadGuess(model, *entry.value, path, found.unit, &values_, &joints->joints[index]);
       continue;
     }
-    ReadGuess(model, *entry.value, path, found.unit, &mechanism_.joints[index]);
+    std::vector<std::string> names;
+    for (const Joint& joint : joints->joints) names.push_back(joint.name);
+    yaml.Error(entry, fmt::format("{}: there is no such joint in the URDF file", path),
+               DidYouMean(entry.key, names));
   }
 }
 
-void ModelReader::AddUrdfDrives(const std::vector<std::string>& motors, const YamlNode* at) {
+// Those that the closure file names, else, where no model file can name any, the transmissions.
+std::vector<std::string> UrdfReader::MotorsOf(const Source& source,
+                                              const ModelJoints& joints) const {
+  if (!bare_ || !source.motors.empty()) return source.motors;
+  std::vector<std::string> motors;
+  for (const std::string& name : source.tree.transmission_joints) {
+    const int index = joints.Find(name);
+    if (index >= 0 && FreedomsOf(joints.joints[index].kind) == 1) motors.push_back(name);
+  }
+  return motors;
+}
+
+void UrdfReader::AddDrives(const std::vector<std::string>& motors, const YamlNode& at,
+                           const Into& into) {
   for (const std::string& motor : motors) {
-    YamlEntry& place = urdf_drives_.emplace_back();
-    place.key = motor;
-    place.line = at->line;
-    place.column = at->column;
-    if (!Room(*at, mechanism_.drives.size(), kMaxItems, "drives")) return;
-    Drive drive{.name = motor, .kind = JointDrive{mechanism_.FindJoint(motor), 0}, .range = {}};
-    drive.range = mechanism_.joints[mechanism_.FindJoint(motor)].range[0];
-    mechanism_.drives.push_back(drive);
-    signal_places_[motor].push_back({"drive", &place});
+    if (!HasRoom(at, into.drives->size(), kMaxItems, "drives", &values_.yaml())) return;
+    const int joint = into.joints->Find(motor);
+    into.drives->push_back({.name = motor,
+                            .kind = JointDrive{joint, 0},
+                            .range = into.joints->joints[joint].range[0]});
+    into.places->Add(motor, "drive", {at.line, at.column});
   }
 }
 
-// The root link is fixed to the world unless a joint of the model file carries it.
-void ModelReader::WeldUrdfRoot() {
-  if (urdf_root_ < 0) return;
-  for (const Joint& joint : mechanism_.joints) {
-    if (joint.child == urdf_root_ || (joint.parent == urdf_root_ && joint.child == 0)) return;
+void UrdfReader::WeldRoot(int root, const ModelBodies& bodies, ModelJoints* joints) {
+  if (root < 0) return;
+  for (const Joint& joint : joints->joints) {
+    if (joint.child == root || (joint.parent == root && joint.child == 0)) return;
   }
+  const std::string& name = bodies.bodies[root].name;
   Joint weld;
-  weld.name = mechanism_.bodies[urdf_root_].name + ".weld";
-  weld.child = urdf_root_;
-  if (bare_urdf_) {
-    other_findings_.Add({Severity::kWarning, yaml_.file(), 0, 0,
-                         fmt::format("the root link '{}' is held: it is fixed to the world",
-                                     mechanism_.bodies[urdf_root_].name),
-                         ""});
+  weld.name = name + ".weld";
+  weld.child = root;
+  if (bare_) {
+    others_.Add({Severity::kWarning, values_.yaml().file(), 0, 0,
+                 fmt::format("the root link '{}' is held: it is fixed to the world", name), ""});
   }
-  mechanism_.joints.push_back(weld);
-  joint_places_.push_back(nullptr);
-  hints_.resize(mechanism_.joints.size());
+  joints->Add(std::move(weld), {}, std::nullopt);
 }
 
-}  // namespace mbv
+}  // namespace mbv::internal

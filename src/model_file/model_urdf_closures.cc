@@ -14,14 +14,15 @@
 //
 // with point and axis in the frame of the root link while all joints are at zero. With an axis the
 // cut joint is a hinge, without one a ball.
+#include "model_file/model_urdf_closures.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 
-#include "model_file/model_reader.h"
-
-namespace mbv {
+namespace mbv::internal {
 namespace {
 
 std::string Lower(std::string text) {
@@ -80,9 +81,8 @@ class ClosureFile {
       if (tree_.joints[j].name == *name) return static_cast<int>(j);
       names.push_back(tree_.joints[j].name);
     }
-    const std::string near = ClosestWord(*name, names);
     yaml_.Error(node, fmt::format("{}: there is no joint '{}' in the URDF file", path, *name),
-                near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+                DidYouMean(*name, names));
     return std::nullopt;
   }
 
@@ -97,10 +97,9 @@ class ClosureFile {
       names.push_back(joint.name);
     }
     for (const Body& body : tree_.bodies) names.push_back(body.name);
-    const std::string near = ClosestWord(*name, names);
     yaml_.Error(node,
                 fmt::format("{}: there is no link or joint '{}' in the URDF file", path, *name),
-                near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+                DidYouMean(*name, names));
     return std::nullopt;
   }
 
@@ -265,29 +264,29 @@ class ClosureFile {
 
 }  // namespace
 
-void ModelReader::DropClosures(UrdfTree* tree) {
+void DropClosures(UrdfTree* tree) {
   while (!tree->joints.empty() && tree->joints.back().closure) {
     tree->joints.pop_back();
     tree->joint_lines.pop_back();
   }
 }
 
-bool ModelReader::ReadClosureFile(const YamlNode& node, UrdfTree* tree,
-                                  std::vector<std::string>* motors) {
-  const auto file = yaml_.Text(node, "urdf.closures");
+bool ReadClosureFile(const YamlNode& node, YamlReader* yaml, Diagnostics* others, UrdfTree* tree,
+                     std::vector<std::string>* motors) {
+  const auto file = yaml->Text(node, "urdf.closures");
   if (!file) return false;
-  const std::filesystem::path path = std::filesystem::path(yaml_.file()).parent_path() / *file;
+  const std::filesystem::path path = std::filesystem::path(yaml->file()).parent_path() / *file;
   YamlReader reader(path.string());
   const auto text = reader.ReadFile();
   if (!text) {
-    yaml_.Error(node, fmt::format("urdf.closures = {} cannot be read", Describe(node)),
+    yaml->Error(node, fmt::format("urdf.closures = {} cannot be read", Describe(node)),
                 "the path is relative to this file");
     return false;
   }
   const YamlNodePtr root = reader.Parse(*text);
   if (root != nullptr) ClosureFile(&reader, tree).Read(*root, motors);
-  other_findings_.Append(reader.diagnostics());
+  others->Append(reader.diagnostics());
   return !reader.has_errors();
 }
 
-}  // namespace mbv
+}  // namespace mbv::internal

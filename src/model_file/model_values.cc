@@ -1,15 +1,22 @@
-// Numbers, vectors, poses and names of a model file.
+#include "model_file/model_values.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "core/spatial.h"
-#include "model_file/model_reader.h"
 
-namespace mbv {
+namespace mbv::internal {
 
-std::optional<double> ModelReader::Number(const Block& block, const YamlNode& node,
+double Literals::At(const std::string& place, double value) {
+  // An instance's literal is read once, its part's as often as there are instances.
+  if (places_.insert(place).second) literals_.push_back({place, value});
+  const auto other = replaced_.find(place);
+  return other == replaced_.end() ? value : other->second;
+}
+
+std::optional<double> ModelValues::Number(const Block& block, const YamlNode& node,
                                           const std::string& path, const UnitSuffix& unit) {
   if (!node.is_scalar()) {
     yaml_.Error(node,
@@ -19,7 +26,7 @@ std::optional<double> ModelReader::Number(const Block& block, const YamlNode& no
   const ExpressionResult result = block.scope->Evaluate(node.text);
   if (result.value) {
     const double value = unit.to_si(*result.value);
-    return IsWrittenOut(node.text) ? LiteralAt(path, value) : value;
+    return IsWrittenOut(node.text) ? literals_.At(path, value) : value;
   }
   // An empty text: a parameter failed whose own place already carries the finding.
   if (!result.error.empty()) {
@@ -28,14 +35,7 @@ std::optional<double> ModelReader::Number(const Block& block, const YamlNode& no
   return std::nullopt;
 }
 
-double ModelReader::LiteralAt(const std::string& place, double value) {
-  // An instance's literal is read once, its part's as often as there are instances.
-  if (literal_places_.insert(place).second) literals_.push_back({place, value});
-  const auto other = options_.literals.find(place);
-  return other == options_.literals.end() ? value : other->second;
-}
-
-std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlNode& node,
+std::optional<Vec3> ModelValues::Vector(const Block& block, const YamlNode& node,
                                         const std::string& path, const UnitSuffix& unit) {
   const auto items = yaml_.Items(node, path, 3);
   if (!items) return std::nullopt;
@@ -49,7 +49,7 @@ std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlNode& node
   return good ? std::optional<Vec3>(vector) : std::nullopt;
 }
 
-std::optional<double> ModelReader::Number(const Block& block, const YamlMap& map,
+std::optional<double> ModelValues::Number(const Block& block, const YamlMap& map,
                                           const std::string& key,
                                           std::initializer_list<UnitSuffix> units) {
   const YamlMap::InUnit found = map.FindInUnit(key, units);
@@ -57,7 +57,7 @@ std::optional<double> ModelReader::Number(const Block& block, const YamlMap& map
   return Number(block, *found.node, map.PathOf(found.key), found.unit);
 }
 
-std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlMap& map,
+std::optional<Vec3> ModelValues::Vector(const Block& block, const YamlMap& map,
                                         const std::string& key,
                                         std::initializer_list<UnitSuffix> units) {
   const YamlMap::InUnit found = map.FindInUnit(key, units);
@@ -65,7 +65,34 @@ std::optional<Vec3> ModelReader::Vector(const Block& block, const YamlMap& map,
   return Vector(block, *found.node, map.PathOf(found.key), found.unit);
 }
 
-std::optional<Vec3> ModelReader::Axis(const Block& block, const YamlNode& node,
+std::optional<double> ModelValues::Positive(const Block& block, const YamlMap& map,
+                                            const std::string& key,
+                                            std::initializer_list<UnitSuffix> units) {
+  const YamlMap::InUnit found = map.FindInUnit(key, units);
+  if (found.node == nullptr) {
+    (void)map.Required(key);
+    return std::nullopt;
+  }
+  const auto value = Number(block, *found.node, map.PathOf(found.key), found.unit);
+  if (!value || *value > 0.0) return value;
+  yaml_.Error(*found.node,
+              fmt::format("{} = {} violates {} > 0", map.PathOf(found.key), *value, key));
+  return std::nullopt;
+}
+
+std::optional<double> ModelValues::Radius(const Block& block, const YamlMap& map) {
+  if (map.FindInUnit("radius", {kPlain, kMm}).node == nullptr) {
+    (void)map.Required("radius");
+    return std::nullopt;
+  }
+  const auto radius = Number(block, map, "radius", {kPlain, kMm});
+  if (!radius || *radius > 0.0) return radius;
+  yaml_.Error(*map.node(),
+              fmt::format("{} = {} violates radius > 0", map.PathOf("radius"), *radius));
+  return std::nullopt;
+}
+
+std::optional<Vec3> ModelValues::Axis(const Block& block, const YamlNode& node,
                                       const std::string& path) {
   if (node.is_sequence()) {
     const auto vector = Vector(block, node, path);
@@ -85,7 +112,7 @@ std::optional<Vec3> ModelReader::Axis(const Block& block, const YamlNode& node,
   return axis;
 }
 
-std::optional<Mat3> ModelReader::RotationFromAxes(const Block& block, const YamlNode& node,
+std::optional<Mat3> ModelValues::RotationFromAxes(const Block& block, const YamlNode& node,
                                                   const std::string& path) {
   const YamlMap map(&yaml_, &node, path, {"x", "y", "z"});
   if (!map.valid()) return std::nullopt;
@@ -117,7 +144,7 @@ std::optional<Mat3> ModelReader::RotationFromAxes(const Block& block, const Yaml
 }
 
 // Rows of a rotation matrix, taken as they are.
-std::optional<Mat3> ModelReader::RotationMatrix(const Block& block, const YamlNode& node,
+std::optional<Mat3> ModelValues::RotationMatrix(const Block& block, const YamlNode& node,
                                                 const std::string& path) {
   constexpr double kTolerance = 1e-9;
   const auto rows = yaml_.Items(node, path, 3);
@@ -137,7 +164,7 @@ std::optional<Mat3> ModelReader::RotationMatrix(const Block& block, const YamlNo
   return std::nullopt;
 }
 
-std::optional<Mat3> ModelReader::Rotation(const Block& block, const YamlNode& node,
+std::optional<Mat3> ModelValues::Rotation(const Block& block, const YamlNode& node,
                                           const std::string& path) {
   const YamlMap map(&yaml_, &node, path,
                     {"rpy", "rpy_deg", "axes", "axis", "angle", "angle_deg", "matrix"});
@@ -167,7 +194,7 @@ std::optional<Mat3> ModelReader::Rotation(const Block& block, const YamlNode& no
   return Eigen::AngleAxisd(*angle, *axis).toRotationMatrix();
 }
 
-std::optional<Pose> ModelReader::PoseOf(const Block& block, const YamlNode& node,
+std::optional<Pose> ModelValues::PoseOf(const Block& block, const YamlNode& node,
                                         const std::string& path) {
   Pose pose = Pose::Identity();
   if (node.is_null()) return pose;
@@ -193,7 +220,7 @@ std::optional<Pose> ModelReader::PoseOf(const Block& block, const YamlNode& node
   return good ? std::optional<Pose>(pose) : std::nullopt;
 }
 
-std::optional<CoordinateRange> ModelReader::Range(const Block& block, const YamlNode& node,
+std::optional<CoordinateRange> ModelValues::Range(const Block& block, const YamlNode& node,
                                                   const std::string& path, const UnitSuffix& unit) {
   CoordinateRange range;
   if (node.is_null()) return range;
@@ -214,114 +241,4 @@ std::optional<CoordinateRange> ModelReader::Range(const Block& block, const Yaml
   return std::nullopt;
 }
 
-bool ModelReader::CheckNewName(const YamlEntry& entry, const std::string& path) {
-  const bool good = std::all_of(entry.key.begin(), entry.key.end(), [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '-';
-  });
-  if (good && entry.key.size() <= 64) return true;
-  yaml_.Error(entry, fmt::format("{}: '{}' is no name", path, entry.key.substr(0, 64)),
-              "names are made of letters, digits, _ and -; dots come from instances");
-  return false;
-}
-
-bool ModelReader::Room(const YamlNode& at, size_t size, size_t limit, const char* what) {
-  if (size < limit) return true;
-  yaml_.Error(at, fmt::format("the model has more than {} {}", limit, what));
-  return false;
-}
-
-std::optional<Pose> ModelReader::FrameOn(const Block& block, int body,
-                                         const std::string& name) const {
-  for (const std::string& level : block.levels) {
-    const NamedFrame* frame = mechanism_.FindFrame(body, level + name);
-    if (frame != nullptr) return frame->X_BF;
-  }
-  return std::nullopt;
-}
-
-namespace {
-
-// The part of a name that a block at `levels` may leave out: "limb1.link1" is "link1" inside.
-std::vector<std::string> ShortNames(const std::vector<std::string>& names,
-                                    const std::vector<std::string>& levels) {
-  std::vector<std::string> result = names;
-  for (const std::string& name : names) {
-    if (name.starts_with(levels.front())) result.push_back(name.substr(levels.front().size()));
-  }
-  return result;
-}
-
-template <typename T>
-std::vector<std::string> NamesOf(const std::vector<T>& items) {
-  std::vector<std::string> names;
-  for (const T& item : items) names.push_back(item.name);
-  return names;
-}
-
-}  // namespace
-
-std::optional<int> ModelReader::BodyRef(const Block& block, const YamlNode& node,
-                                        const std::string& path) {
-  const auto name = yaml_.Text(node, path);
-  if (!name) return std::nullopt;
-  for (const std::string& level : block.levels) {
-    if (const int body = mechanism_.FindBody(level + *name); body >= 0) return body;
-  }
-  yaml_.Error(node, fmt::format("{} = {}: there is no such body", path, Describe(node)),
-              DidYouMean(*name, ShortNames(NamesOf(mechanism_.bodies), block.levels)));
-  return std::nullopt;
-}
-
-std::optional<int> ModelReader::JointRef(const Block& block, const YamlNode& node,
-                                         const std::string& path) {
-  const auto name = yaml_.Text(node, path);
-  if (!name) return std::nullopt;
-  for (const std::string& level : block.levels) {
-    if (const int joint = mechanism_.FindJoint(level + *name); joint >= 0) return joint;
-    if (refused_joints_.count(level + *name) > 0) return std::nullopt;  // has its own finding
-  }
-  std::vector<std::string> names = NamesOf(mechanism_.joints);
-  names.insert(names.end(), refused_joints_.begin(), refused_joints_.end());
-  yaml_.Error(node, fmt::format("{} = {}: there is no such joint", path, Describe(node)),
-              DidYouMean(*name, ShortNames(names, block.levels)));
-  return std::nullopt;
-}
-
-std::optional<FrameRef> ModelReader::Frame(const Block& block, const YamlNode& node,
-                                           const std::string& path) {
-  auto name = yaml_.Text(node, path);
-  if (!name) return std::nullopt;
-  if (name->size() > 256) name->resize(256);  // no name is that long
-  int body_without_frame = -1;
-  std::string missing_frame;
-  for (const std::string& level : block.levels) {
-    // Dots may belong to the body's or to the frame's name: try the longest body name first.
-    for (size_t dot = name->size();; dot = name->rfind('.', dot - 1)) {
-      if (dot == std::string::npos) break;
-      const int body = mechanism_.FindBody(level + name->substr(0, dot));
-      if (body >= 0 && dot == name->size()) return FrameRef{body, Pose::Identity()};
-      if (body >= 0) {
-        const std::string frame = name->substr(dot + 1);
-        if (const auto pose = FrameOn(block, body, frame)) return FrameRef{body, *pose};
-        body_without_frame = body;
-        missing_frame = frame;
-      }
-      if (dot == 0) break;
-    }
-  }
-  if (const auto link = urdf_frames_.find(*name); link != urdf_frames_.end()) return link->second;
-  if (body_without_frame >= 0) {
-    const Body& body = mechanism_.bodies[body_without_frame];
-    yaml_.Error(node,
-                fmt::format("{} = {}: body '{}' has no frame '{}'", path, Describe(node), body.name,
-                            missing_frame),
-                DidYouMean(missing_frame, ShortNames(NamesOf(body.frames), block.levels)));
-    return std::nullopt;
-  }
-  const std::string body = name->substr(0, name->find('.'));
-  yaml_.Error(node, fmt::format("{} = {}: there is no body '{}'", path, Describe(node), body),
-              DidYouMean(body, ShortNames(NamesOf(mechanism_.bodies), block.levels)));
-  return std::nullopt;
-}
-
-}  // namespace mbv
+}  // namespace mbv::internal

@@ -281,6 +281,14 @@ TEST_F(OtherFiles, ThatCannotBeReadAreReported) {
       << text;
 }
 
+TEST_F(OtherFiles, ThatAreNoModelsAreReported) {
+  const std::string base = Write("base.yaml", "- a\n");
+  const std::string file =
+      Write("own.yaml", std::string("name: x\nparameters_from: base.yaml\n") + kRest);
+  EXPECT_EQ(LoadModel(file).diagnostics.Text(),
+            file + ":2:18: error: parameters_from = 'base.yaml' is no model file\n");
+}
+
 Mechanism LoadElastic(const std::string& name) {
   const LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + name);
   EXPECT_EQ(result.diagnostics.Text(), "");

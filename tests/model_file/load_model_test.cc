@@ -7,6 +7,7 @@
 
 #include "core/spatial.h"
 #include "four_bar.h"
+#include "model_file/write_model.h"
 
 namespace mbv {
 namespace {
@@ -114,6 +115,45 @@ TEST(LoadModel, OverridesReplaceParametersBeforeAnythingIsComputed) {
   EXPECT_EQ(m.ParameterValue("crank"), 0.3);
   EXPECT_EQ(m.bodies[m.FindBody("crank")].p_BoBcm_B.x(), 0.15);
   EXPECT_NEAR(m.X_WB_home[m.FindBody("coupler")].translation().norm(), 0.3, kRoundoff);
+}
+
+TEST(LoadModel, UpIsStatedOrAgainstGravity) {
+  const auto load = [](const std::string& head, std::optional<Vec3> gravity_W = {}) {
+    LoadOptions options;
+    options.gravity_W = gravity_W;
+    return MustLoad("name: t\n" + head +
+                        "bodies: {b: {}}\njoints: {j: {kind: free, parent: world, child: b}}\n",
+                    options);
+  };
+  EXPECT_EQ(load("").up_W, Vec3::UnitZ());
+  EXPECT_EQ(load("").gravity_W, Vec3(0, 0, -9.81));
+  EXPECT_EQ(load("gravity: [0, -2, 0]\n").up_W, Vec3::UnitY());
+  EXPECT_EQ(load("gravity: [0, 0, 0]\n").up_W, Vec3::UnitZ());
+  EXPECT_EQ(load("gravity: [0, -2, 0]\nup: [4, 0, 0]\n").up_W, Vec3::UnitX());
+  // A scenario replaces gravity; pictures stay as they are.
+  const Mechanism replaced = load("gravity: [0, -2, 0]\n", Vec3(0, 0, 3));
+  EXPECT_EQ(replaced.gravity_W, Vec3(0, 0, 3));
+  EXPECT_EQ(replaced.up_W, Vec3::UnitY());
+}
+
+TEST(LoadModel, NumbersInUnitsAreThoseThatAreMeant) {
+  const std::string text = R"(
+name: t
+parameters: {bar: {value_mm: 9}, l: 1, phi: 1, third: {value_deg: 180/3}}
+bodies: {b: {com_mm: [9, 4.1, -201.574], shapes: [{ball: {radius_mm: 9}}]}}
+joints: {j: {kind: free, parent: world, child: b, guess_deg: [0, 0, 0, 30, -90, 180]}}
+)";
+  LoadOptions options;
+  options.overrides = {{"l_mm", 4.1}, {"phi_deg", 45.0}};
+  const Mechanism m = MustLoad(text, options);
+  EXPECT_EQ(m.ParameterValue("bar"), 0.009);
+  EXPECT_EQ(m.ParameterValue("l"), 0.0041);
+  EXPECT_EQ(m.ParameterValue("phi"), pi / 4);
+  EXPECT_EQ(m.ParameterValue("third"), pi / 3);
+  EXPECT_EQ(m.bodies[1].p_BoBcm_B, Vec3(0.009, 0.0041, -0.201574));
+  EXPECT_EQ(m.joints[0].guess, (std::array<double, 6>{0, 0, 0, pi / 6, -pi / 2, pi}));
+  EXPECT_NE(WriteModel(m).find("ball: {at: [0, 0, 0], radius: 0.009}"), std::string::npos)
+      << WriteModel(m);
 }
 
 // Loads one free body with this frame and returns the frame.

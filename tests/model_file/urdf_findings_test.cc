@@ -188,6 +188,67 @@ const Wrong kWrongUrdfs[] = {
 INSTANTIATE_TEST_SUITE_P(UrdfFindings, WrongUrdf, testing::ValuesIn(kWrongUrdfs),
                          [](const auto& info) { return std::string(info.param.name); });
 
+// The linkage with marks where it was cut, alone with its closure file: no model file.
+LoadResult LoadAlone(const std::string& hinge, const std::string& mark, const std::string& type) {
+  const test::TestFolder folder("urdf_findings_alone_" + hinge.substr(0, 1) + type);
+  std::string urdf = OpenLinkage(
+      R"(<link name="C_A"/><link name="C_B"/>
+<joint name="to_A" type="fixed"><parent link="coupler"/><child link="C_A"/><origin xyz="0.5 0 0"/></joint>
+<joint name="to_B" type="fixed"><parent link="rocker"/><child link="C_B"/><origin )" +
+      mark + "/></joint>\n");
+  const std::string plain = R"("B" type="continuous")", axis = R"(<axis xyz="0 0 1"/>)";
+  const size_t at = urdf.find(plain), axis_at = urdf.find(axis, at);
+  urdf.replace(axis_at, axis.size(), hinge == "B" ? axis : R"(<axis xyz="1 0 0"/>)");
+  urdf.replace(at + 1, 1, hinge);
+  (void)folder.Write("r.yaml", "closed_loop: [[C_A, C_B]]\ntype: [" + type + "]\nname_mot: [A]\n");
+  return LoadModel(folder.Write("r.urdf", urdf));
+}
+
+TEST(UrdfFindings, AHingeThatIsNamedABallIsOneWhereThatClosesTheLoops) {
+  // The coupler, held straight by a hinge along it, is too long for the rocker of 0.1 m.
+  const LoadResult ball = LoadAlone("Rotule_B", R"(xyz="0.1 0 0")", "3d");
+  ASSERT_TRUE(ball.mechanism) << ball.diagnostics.Text();
+  const Mechanism& m = *ball.mechanism;
+  EXPECT_EQ(m.joints[m.FindJoint("Rotule_B")].kind, JointKind::kSpherical);
+  EXPECT_EQ(m.joints[m.FindJoint("A")].kind, JointKind::kRevolute);
+  EXPECT_NE(
+      ball.diagnostics.Text().find(
+          "r.urdf: warning: the loops do not close as they are stated; they do with 1 joint "
+          "as ball whose name says so, and which the URDF states as hinges: Rotule_B\n"
+          "  hint: list them in the closure file: joint_name: […], joint_type: [SPHERICAL, …]"),
+      std::string::npos)
+      << ball.diagnostics.Text();
+  EXPECT_LT((m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0) -
+             m.X_WB_home[m.FindBody("rocker")] * Vec3(0.1, 0, 0))
+                .norm(),
+            1e-12);
+  // Without such a name it stays what it is stated as.
+  const LoadResult hinge = LoadAlone("Hinge_B", R"(xyz="0.1 0 0")", "3d");
+  EXPECT_FALSE(hinge.mechanism);
+  EXPECT_NE(hinge.diagnostics.Text().find("the loop at joint 'C_A_C_B' does not close"),
+            std::string::npos)
+      << hinge.diagnostics.Text();
+  EXPECT_EQ(hinge.diagnostics.Text().find("whose name"), std::string::npos);
+}
+
+TEST(UrdfFindings, FramesThatMeetInPointsOnlyAreToldSo) {
+  const char* turned = R"(xyz="0.4 0 0" rpy="1.5707963267948966 0 0")";
+  const LoadResult welded = LoadAlone("B", turned, "6d");
+  EXPECT_FALSE(welded.mechanism);
+  const std::string text = welded.diagnostics.Text();
+  EXPECT_NE(text.find("the loop at joint 'C_A_C_B' does not close: gap"), std::string::npos)
+      << text;
+  EXPECT_NE(text.find("at the pose of least gaps the frame of 'C_A_C_B' on 'coupler' would have to "
+                      "move by ["),
+            std::string::npos)
+      << text;
+  EXPECT_NE(text.find("; all loops close where the welded frames (6d) meet in points only (3d): "
+                      "C_A_C_B; guesses of URDF joints"),
+            std::string::npos)
+      << text;
+  EXPECT_TRUE(LoadAlone("B", turned, "3d").mechanism) << "as it says";
+}
+
 // Its joints stand in the URDF file, so its closures are cut in the links' frames at zero.
 TEST(UrdfFindings, ACutWithAnAxisIsAHingeAndOneWithoutIsABall) {
   const test::TestFolder folder("urdf_findings_cuts");

@@ -254,6 +254,51 @@ outputs: {o: e}
   EXPECT_EQ(slide.range[0].upper, 1.0);
 }
 
+TEST(UrdfExport, ShapesStayWhereTheyAreAndACapsuleBecomesThreeOfThem) {
+  const LoadResult loaded = LoadModelText(R"(name: shapes
+bodies:
+  a:
+    frames: {j: {position: [0.1, 0.2, 0.3], rotation: {rpy_deg: [10, 80, 20]}}}
+    shapes:
+      - {box: {size: [0.1, 0.2, 0.3], at: {position: [1, 2, 3], rotation: {rpy: [0.1, 0.2, 0.3]}}}, color: '#4080c0ff'}
+      - {cylinder: {from: [0.1, 0, 0], to: [0.4, 0.4, 0], radius: 0.05}}
+      - {capsule: {from: j, to: [0, 0, -1], radius_mm: 9}, color: '#ff0000'}
+joints: {pipe: {kind: revolute, parent: world, child: a.j, axis: [1, 2, 2], guess: 0.5}}
+)",
+                                          "m.yaml");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  WriteFile("shapes.urdf", WriteUrdf(m));
+  const LoadResult back = LoadModel(WriteFile("shapes.yaml", WriteUrdfCompanion(m, "shapes.urdf")));
+  ASSERT_TRUE(back.mechanism) << back.diagnostics.Text();
+  const Mechanism& n = *back.mechanism;
+  const auto& after = n.bodies[n.FindBody("a")].shapes;
+  ASSERT_EQ(after.size(), 5u);
+  const Pose &X_before = m.X_WB_home[1], &X_after = n.X_WB_home[n.FindBody("a")];
+  const auto same = [&](const Vec3& before_B, const Vec3& after_B) {
+    return (X_before * before_B - X_after * after_B).norm() < 8 * kUrdfRoundoff;
+  };
+  const auto& shapes = m.bodies[1].shapes;
+  const Box &box = std::get<Box>(shapes[0].geometry), &box2 = std::get<Box>(after[0].geometry);
+  EXPECT_EQ(box.size, box2.size);
+  for (const Vec3& corner : {Vec3(1, 1, 1), Vec3(-1, 1, 2), Vec3(0, 3, -1)}) {
+    EXPECT_TRUE(same(box.X_BG * corner, box2.X_BG * corner)) << corner.transpose();
+  }
+  EXPECT_EQ(after[0].color, "#4080c0ff");
+  const auto& rod = std::get<Cylinder>(after[1].geometry);
+  EXPECT_TRUE(same(Vec3(0.1, 0, 0), rod.p_from));
+  EXPECT_TRUE(same(Vec3(0.4, 0.4, 0), rod.p_to));
+  EXPECT_EQ(rod.radius, 0.05);
+  EXPECT_EQ(after[1].color, "steel");
+  // URDF has no capsules.
+  const auto& capsule = std::get<Capsule>(shapes[2].geometry);
+  EXPECT_TRUE(same(capsule.p_to, std::get<Cylinder>(after[2].geometry).p_to));
+  EXPECT_TRUE(same(capsule.p_from, std::get<Ball>(after[3].geometry).p_centre));
+  EXPECT_TRUE(same(capsule.p_to, std::get<Ball>(after[4].geometry).p_centre));
+  for (size_t k = 2; k < 5; ++k) EXPECT_EQ(after[k].color, "#ff0000ff") << k;
+  EXPECT_EQ(std::get<Ball>(after[4].geometry).radius, 0.009);
+}
+
 TEST(UrdfExport, TheCommentHoldsTheCompanion) {
   const LoadResult loaded = LoadModelText(kFourBar, "m.yaml");
   ASSERT_TRUE(loaded.mechanism);

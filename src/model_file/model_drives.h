@@ -1,0 +1,45 @@
+// `drives`, `drive_order` and `prescribed` of a model file. Internal to the model loader.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mechanism/mechanism.h"
+#include "model_file/model_joints.h"
+#include "model_file/model_names.h"
+#include "model_file/model_signals.h"
+#include "model_file/model_values.h"
+
+namespace mbv::internal {
+
+/// Reads drives on known joints and between frames of known bodies.
+class DriveReader {
+ public:
+  DriveReader(ModelValues* values, const BodyNames& names, const ModelJoints& joints,
+              SignalPlaces* places, std::vector<Drive>* drives)
+      : values_(*values), names_(names), joints_(joints), places_(*places), drives_(*drives) {}
+
+  void Read(const Block& block);
+
+ private:
+  void ReadDrive(const Block& block, const YamlEntry& entry);
+  std::optional<JointDrive> ReadJointDrive(const Block& block, const YamlMap& map);
+  bool ReadDistanceDrive(const Block& block, const YamlMap& map, Drive* drive);
+  void ReadRange(const Block& block, const YamlMap& map, Drive* drive);
+  double ReadStiffness(const Block& block, const YamlMap& map);
+
+  ModelValues& values_;
+  const BodyNames& names_;
+  const ModelJoints& joints_;
+  SignalPlaces& places_;
+  std::vector<Drive>& drives_;
+};
+
+/// Puts the drives into the order of `drive_order`, which lists every one once.
+void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives);
+
+/// Reads prescribed joints.
+void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* yaml,
+                    SignalPlaces* places, std::vector<Prescribed>* prescribed);
+
+}  // namespace mbv::internal

@@ -1,0 +1,55 @@
+// `joints` of a model file. Internal to the model loader.
+#pragma once
+
+#include <set>
+#include <string>
+#include <vector>
+
+#include "mechanism/mechanism.h"
+#include "mechanism/spanning_tree.h"
+#include "model_file/model_block.h"
+#include "model_file/model_names.h"
+#include "model_file/model_values.h"
+
+namespace mbv::internal {
+
+struct ModelJoints {
+  std::vector<Joint> joints;
+  std::vector<Place> places;      ///< per joint; those of a URDF file have none
+  ClosureHints hints;             ///< per joint
+  std::set<std::string> refused;  ///< names of joints that have a finding
+  bool good = true;               ///< false: the graph of joints is not worth checking
+
+  [[nodiscard]] int Find(const std::string& name) const { return IndexOf(joints, name); }
+  void Add(Joint joint, Place place, std::optional<bool> hint);
+};
+
+/// Reads joints between frames of known bodies.
+class JointReader {
+ public:
+  JointReader(ModelValues* values, const BodyNames& names, const ModelBodies& bodies,
+              ModelJoints* joints)
+      : values_(*values), names_(names), bodies_(bodies), joints_(*joints) {}
+
+  void Read(const Block& block);
+
+ private:
+  void ReadJoint(const Block& block, const YamlEntry& entry);
+  [[nodiscard]] bool IsFresh(const YamlEntry& entry, const std::string& path,
+                             const std::string& name);
+  bool ReadCoordinates(const Block& block, const YamlMap& map, Joint* joint);
+  bool ReadAxes(const Block& block, const YamlMap& map, Joint* joint);
+  void ReadRange(const Block& block, const YamlMap& map, Joint* joint);
+  bool ReadFreeChoices(const YamlMap& map, Joint* joint);
+
+  ModelValues& values_;
+  const BodyNames& names_;
+  const ModelBodies& bodies_;
+  ModelJoints& joints_;
+};
+
+/// Reads the coordinates from which home is searched: a number, or one per freedom.
+void ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
+               const UnitSuffix& unit, ModelValues* values, Joint* joint);
+
+}  // namespace mbv::internal

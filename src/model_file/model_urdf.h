@@ -1,0 +1,64 @@
+// The `urdf` key of a model file: FILE, or {file, closures, constraints, guess: {JOINT: …}}.
+// Internal to the model loader.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "mechanism/mechanism.h"
+#include "model_file/model_bodies.h"
+#include "model_file/model_joints.h"
+#include "model_file/model_signals.h"
+#include "model_file/model_values.h"
+#include "model_file/urdf.h"
+
+namespace mbv::internal {
+
+/// What a URDF file gives to a model besides bodies and joints.
+struct UrdfSection {
+  int root = -1;                          ///< body that needs a joint to the world; -1: none
+  std::map<std::string, Finding> joints;  ///< where each joint is described, closures included
+};
+
+/// Reads the links of a URDF file as bodies, its joints and closures, and its motors as drives.
+class UrdfReader {
+ public:
+  /// `bare`: the model file stands for the URDF file, and nobody wrote it.
+  UrdfReader(bool bare, ModelValues* values, Literals* literals, Diagnostics* others)
+      : bare_(bare), values_(*values), literals_(*literals), others_(*others) {}
+
+  /// Where the results go: behind the world, and nothing else there yet.
+  struct Into {
+    ModelBodies* bodies;
+    ModelJoints* joints;  ///< not good after a finding
+    SignalPlaces* places;
+    std::vector<Drive>* drives;
+  };
+  UrdfSection Read(const Block& model, const YamlNode& node, const Into& into);
+
+  /// Fixes the root link to the world unless a joint of the model file carries it.
+  void WeldRoot(int root, const ModelBodies& bodies, ModelJoints* joints);
+
+ private:
+  /// The tree as the file and the closure file have it, links that are frames folded.
+  struct Source {
+    std::string file;
+    UrdfTree tree;
+    std::vector<std::string> motors;
+  };
+  std::optional<Source> ReadSource(const Block& model, const YamlNode& name, const YamlMap& map);
+  UrdfSection Add(const Source& source, ModelBodies* bodies, ModelJoints* joints);
+  void TakeLiterals(Body* body);
+  void ReadGuesses(const Block& model, const YamlMap& map, ModelJoints* joints);
+  std::vector<std::string> MotorsOf(const Source& source, const ModelJoints& joints) const;
+  void AddDrives(const std::vector<std::string>& motors, const YamlNode& at, const Into& into);
+
+  bool bare_;
+  ModelValues& values_;
+  Literals& literals_;
+  Diagnostics& others_;
+};
+
+}  // namespace mbv::internal
