@@ -38,13 +38,6 @@ bool AddAssignments(const std::vector<std::string>& texts, const char* option, c
   return true;
 }
 
-std::string WithoutUnit(std::string name) {
-  for (const char* suffix : {"_mm", "_deg"}) {
-    if (name.ends_with(suffix)) name.resize(name.size() - std::string(suffix).size());
-  }
-  return name;
-}
-
 // Coordinates that --at leaves out keep their values of the usual pose, if it is told by the same
 // coordinates.
 void FillPose(const Mechanism& mechanism, ScenarioOptions* options) {
@@ -54,7 +47,7 @@ void FillPose(const Mechanism& mechanism, ScenarioOptions* options) {
   bool any = false;
   for (const auto& [key, value] : options->set) {
     if (!key.starts_with("pose.")) continue;
-    const std::string name = WithoutUnit(key.substr(5));
+    const std::string name = SplitUnit(key.substr(5)).name;
     if (std::find(coordinates.begin(), coordinates.end(), name) == coordinates.end()) continue;
     any = true;
     if (rest.erase(name) == 0) return;
