@@ -6,6 +6,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "tests/report/golden_file.h"
+
 namespace mbv {
 namespace {
 
@@ -23,6 +25,64 @@ ConvergenceReport WrongOrder() {
   Judge(SampleClasses({0.0, 1.0, 2.0}, {}, 0.05), &series);
   report.series = {series};
   return report;
+}
+
+// Each number is another one.
+ConvergenceReport WithEverything() {
+  ConvergenceReport report = WrongOrder();
+  report.sample_s = 0.01;
+  report.duration_s = 2.5;
+  report.window_s = 0.05;
+  report.breaks = 4;
+  report.samples = 251;
+  report.smooth_samples = 243;
+  ConvergenceSeries stock{.name = "stock_step",
+                          .title = "stock engine",
+                          .stock = true,
+                          .knob = Knob::kStep,
+                          .extent_m = 1.5};
+  for (const double h : {4e-3, 2e-3, 1e-3}) {
+    ConvergencePoint point{.step_s = h,
+                           .time_constant_s = 0.02,
+                           .steps = std::lround(2.5 / h),
+                           .cpu_s = 0.5 / h,
+                           .closure_m = 3e-6,
+                           .pose_m = 5e-6};
+    point.error = {.smooth = 7 * h, .breaks = 11 * h};
+    point.change = {.smooth = 13 * h, .breaks = 17 * h};
+    stock.points.push_back(point);
+  }
+  Judge(SampleClasses({0.0, 1.0, 2.0}, {}, 0.05), &stock);
+  stock.notes = {"the first step is coarse"};
+  report.series.push_back(stock);
+  report.extrapolation = {.coarse_s = 2e-3,
+                          .fine_s = 1e-3,
+                          .richardson = {.order = 3.75, .factor = 0.125, .safety = 1.25},
+                          .index = 2.5e-9,
+                          .error = 3.5e-9,
+                          .allowed = 4.5e-9,
+                          .pass = true,
+                          .drives = {{"d1", "N", 123.456789, 6.5e-8, 7.5e-8}}};
+  return report;
+}
+
+TEST(ConvergenceReport, TextTableAndJsonAreAsWritten) {
+  const ConvergenceReport report = WithEverything();
+  ExpectGolden("converge.txt", ToText(report));
+  ExpectGolden("converge.csv", ToCsv(report));
+  const auto json = nlohmann::ordered_json::parse(ToJson(report));
+  ExpectGolden("converge.json", Rounded(json).dump(2) + "\n");
+}
+
+TEST(ConvergenceReport, ForcesThatCannotBeExtrapolatedAreTold) {
+  ConvergenceReport report = WithEverything();
+  report.extrapolation.fine_s = kNan;
+  report.extrapolation.pass = false;
+  const std::string text = ToText(report);
+  EXPECT_NE(text.find("forces at step zero: nothing to extrapolate, the finest run is taken\n"
+                      "  inverse mode: 3.5e-09 off (allowed 4.5e-09): FINDING\n"),
+            std::string::npos)
+      << text;
 }
 
 TEST(ConvergenceReport, TheTableNamesTheFindingTheOrdersAndTheRunThatFailed) {

@@ -16,13 +16,13 @@ Report LoadedReport() {
   Report report;
   report.drives = {"d1", "d2"};
   WitnessRecord record{"simulated", RunSummary::Done(), {}};
-  record.trace.Reset({0.0, 1.0, 3.0}, {{"d1.position", "m", ""},
-                                       {"d1.velocity", "m/s", ""},
-                                       {"d1.force", "N", ""},
-                                       {"j.reaction.fx", "N", "j"},
-                                       {"j.reaction.fy", "N", "j"},
-                                       {"j.reaction.fz", "N", "j"},
-                                       {"j.reaction.mx", "N m", "j"}});
+  record.trace.Reset(
+      {0.0, 1.0, 3.0},
+      {MakeChannel(Quantity::kPosition, "m", "d1"), MakeChannel(Quantity::kVelocity, "m/s", "d1"),
+       MakeChannel(Quantity::kForce, "N", "d1"), MakeChannel(Quantity::kReaction, "N", "j", "j", 0),
+       MakeChannel(Quantity::kReaction, "N", "j", "j", 1),
+       MakeChannel(Quantity::kReaction, "N", "j", "j", 2),
+       MakeChannel(Quantity::kReaction, "N m", "j", "j", 3)});
   record.trace.values << 0.1, 2, 1, 3, 4, 0, 7,  //
       0.4, 2, 3, 0, -6, 8, 7,                    //
       0.2, 4, -5, 0, 0, 0, 7;

@@ -1,108 +1,34 @@
 // The writers' texts, literally: a report made by hand must give the files in golden/.
-// To renew them after an intended change: MBV_UPDATE_GOLDEN=1 test_report, then read the diff.
 #include "report/report.h"
 
 #include <gtest/gtest.h>
 
-#include <cstdlib>
-#include <fstream>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "tests/comparison/synthetic.h"
-#include "tests/source_dir.h"
+#include "tests/report/golden_file.h"
+#include "tests/report/reports.h"
 
 namespace mbv {
 namespace {
 
-using synthetic::Bend;
 using synthetic::Case;
-
-std::string Golden(const std::string& name, const std::string& actual) {
-  const std::string path = std::string(kSourceDir) + "/tests/report/golden/" + name;
-  if (std::getenv("MBV_UPDATE_GOLDEN") != nullptr) std::ofstream(path) << actual;
-  std::ifstream stream(path);
-  std::stringstream text;
-  text << stream.rdbuf();
-  return text.str();
-}
-
-// Keeps the first three samples.
-Trace Shortened(Trace trace) {
-  trace.time_s.resize(3);
-  trace.values = trace.values.topRows(3).eval();
-  return trace;
-}
-
-Report MakeReport(const Case& c) {
-  Report report;
-  report.scenario = "bent";
-  report.scenario_file = "scenarios/two_sliders/bent.yaml";
-  report.mechanism = "two_sliders";
-  report.model_file = "models/two_sliders/model.yaml";
-  report.description = "Two sliders carry a plate";
-  report.drives = {"d1", "d2"};
-  report.simulation = "forward simulation, step 1 ms, corrected engine";
-  report.mode = "forward";
-  report.step_s = 1e-3;
-  report.duration_s = 1.0;
-  report.sample_s = 0.01;
-  report.driven_by = "analytic";
-  report.comparison = c.Run();
-  report.exit_code = 1;
-  report.witnesses = {{"analytic", c.analytic_summary, Shortened(c.analytic)},
-                      {"reference", c.reference_summary, {}},
-                      {"simulated", c.simulated_summary, Shortened(c.simulated)}};
-  Finding finding;
-  finding.severity = Severity::kWarning;
-  finding.message = "MuJoCo: a warning";
-  report.findings.Add(finding);
-  report.sheets = SheetsOf(c.mechanism, report.comparison);
-  report.engine_comparison =
-      EngineComparison{.truth = "analytic",
-                       .engines = {{"defaults", kNan, kNan, kNan, kNan, "it diverged"},
-                                   {"stock", 1.5e-3, 2e-3, 2.1e-6, 3.4e-6},
-                                   {"corrected", 4.2e-8, 5e-8, 1.7e-9, 4.1e-8}}};
-  report.timing = {.analytic_s = 0.001,
-                   .reference_s = 0.0,
-                   .simulation_s = 0.5,
-                   .stock_s = 0.25,
-                   .render_s = 0.125,
-                   .total_s = 1.0,
-                   .loop_s = 0.4,
-                   .steps = 1000};
-  report.versions = {{"mbverify", "0.1.0"}};
-  report.pictures = {"t_0.000s.png"};
-  return report;
-}
-
-// Simulation 1 % off on d1 only; the reference was switched off; one check is off.
-Case BentCase() {
-  Case c;
-  c.column = LimitColumn::kForward;
-  c.limits[Metric::kForceMax].forward.reset();
-  synthetic::Stretch(&c.simulated, "d1.force", 1.01);
-  c.simulated.values(40, c.simulated.Find("plate.x")) = kNan;
-  c.reference_summary = {.message = "switched off in the scenario", .where = {}, .unit = {}};
-  for (const char* component : {"fx", "fy", "fz", "mx", "my", "mz"}) {
-    c.reactions_not_unique.push_back(std::string("slide2.reaction.") + component);
-  }
-  return c;
-}
+using test::BentCase;
+using test::MakeReport;
 
 TEST(Report, SummaryJsonIsAsWritten) {
   const std::string json = ToJson(MakeReport(BentCase()));
-  EXPECT_EQ(json, Golden("summary.json", json));
+  ExpectGolden("summary.json", json);
 }
 
 TEST(Report, VerdictTableIsAsWritten) {
   const std::string table = ToTable(MakeReport(BentCase()), {});
-  EXPECT_EQ(table, Golden("table.txt", table));
+  ExpectGolden("table.txt", table);
 }
 
 TEST(Report, VerboseTableIsAsWritten) {
   const std::string table = ToTable(MakeReport(BentCase()), {.color = false, .verbose = true});
-  EXPECT_EQ(table, Golden("table_verbose.txt", table));
+  ExpectGolden("table_verbose.txt", table);
 }
 
 TEST(Report, ColourAddsEscapesAndNothingElse) {

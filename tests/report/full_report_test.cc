@@ -1,0 +1,170 @@
+// A motion's page, terminal text and summary with everything that they can show, literally, and
+// that each number counts.
+#include <algorithm>
+#include <functional>
+#include <set>
+
+#include "report/html_report.h"
+#include "report/report.h"
+#include "tests/report/golden_file.h"
+#include "tests/report/reports.h"
+
+namespace mbv {
+namespace {
+
+using FullJson = nlohmann::ordered_json;
+
+std::string PageOf(const test::FullPage& full) { return WithoutAssets(ToHtml(full.input())); }
+std::string TextOf(const Report& report) {
+  return ToTable(report, {.color = false, .verbose = true});
+}
+
+TEST(FullReport, PageIsAsWritten) { ExpectGolden("page.html", PageOf(test::FullPage())); }
+
+TEST(FullReport, TerminalTextIsAsWritten) {
+  ExpectGolden("table_full.txt", TextOf(test::FullReport()));
+}
+
+TEST(FullReport, SummaryIsAsWritten) {
+  const FullJson json = FullJson::parse(ToJson(test::FullReport()));
+  ExpectGolden("summary_full.json", Rounded(json).dump(2) + "\n");
+}
+
+TEST(FullReport, TheShortLineTellsReservations) {
+  const Report report = test::FullReport();
+  EXPECT_EQ(VerdictLine(ViewOf(report), {}),
+            "two_sliders / full: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  the "
+            "masses differ; reservation: only 3 samples were compared; reservation: forces < 1 N "
+            "are all there is.\n");
+}
+
+struct FullBending {
+  const char* what;
+  std::function<void(test::FullPage*)> bend;
+  std::set<std::string> unseen = {};  // where it is not told: it has no place there
+};
+
+PairComparison& PairOf(test::FullPage* f, const char* name) {
+  auto& pairs = f->report.comparison.pairs;
+  return *std::find_if(pairs.begin(), pairs.end(), [&](const auto& p) { return p.name() == name; });
+}
+CheckResult& LastCheck(test::FullPage* f, size_t from_end) {
+  auto& checks = f->report.comparison.checks;
+  return checks[checks.size() - 1 - from_end];
+}
+EnergyAudit& SimulatedEnergy(test::FullPage* f) {
+  for (WitnessMetrics& witness : f->report.comparison.witnesses) {
+    if (witness.witness == "simulated") return *witness.energy;
+  }
+  return *f->report.comparison.witnesses.back().energy;
+}
+
+// The truth, bent in one place: page, terminal text and summary differ.
+TEST(FullReport, NothingThatItHoldsGoesUntold) {
+  using F = test::FullPage;
+  const std::vector<FullBending> bendings = {
+      {"description", [](F* f) { f->report.description = "other"; }},
+      {"simulation", [](F* f) { f->report.simulation = "other"; }, {"json"}},
+      {"mode", [](F* f) { f->report.mode = "inverse"; }},
+      {"engine", [](F* f) { f->report.engine = "stock"; }, {"page", "text"}},
+      {"step", [](F* f) { f->report.step_s = 0.5; }, {"page", "text"}},
+      {"duration", [](F* f) { f->report.duration_s = 0.5; }, {"page", "text"}},
+      {"sample distance", [](F* f) { f->report.sample_s = 0.5; }, {"page", "text"}},
+      {"start-up window", [](F* f) { f->report.start_window_s = 0.5; }},
+      {"driven by", [](F* f) { f->report.driven_by = "other"; }, {"page", "text"}},
+      {"drives not unique", [](F* f) { f->report.drives_not_unique = {}; }, {"page", "text"}},
+      {"not unique for MuJoCo",
+       [](F* f) { f->report.simulated_not_unique = {}; },
+       {"page", "text"}},
+      {"reaction not unique", [](F* f) { f->report.reactions_not_unique = {}; }, {"text"}},
+      {"picture", [](F* f) { f->report.pictures = {}; }, {"page", "text"}},
+      {"reservation", [](F* f) { f->report.comparison.reservations[1] = "other"; }},
+      {"driving", [](F* f) { f->report.comparison.driving = "other"; }},
+      {"a check that follows", [](F* f) { LastCheck(f, 0).follows = true; }},
+      {"a check that is blind", [](F* f) { LastCheck(f, 2).blind = "other"; }, {"page"}},
+      {"a check that is not blind", [](F* f) { LastCheck(f, 2).blind = ""; }},
+      {"a check with a floor", [](F* f) { LastCheck(f, 1).floored = false; }},
+      {"a stated limit", [](F* f) { LastCheck(f, 3).stated_limit = 0.5; }, {"page"}},
+      {"where a limit is from", [](F* f) { LastCheck(f, 3).limit_by = "other"; }, {"page"}},
+      {"when a check is worst", [](F* f) { LastCheck(f, 3).time_s = 0.5; }},
+      {"a check's channel", [](F* f) { LastCheck(f, 3).channel = "other"; }},
+      {"a drive's force", [](F* f) { PairOf(f, "simulated_vs_analytic").drives[1].rms_truth = 5; }},
+      {"a drive's NRMSE", [](F* f) { PairOf(f, "simulated_vs_analytic").drives[1].nrmse = 5; }},
+      {"a drive's error", [](F* f) { PairOf(f, "simulated_vs_analytic").drives[1].max_error = 5; }},
+      {"a drive's time", [](F* f) { PairOf(f, "simulated_vs_analytic").drives[1].time_s = 5; }},
+      {"a drive's digits", [](F* f) { PairOf(f, "simulated_vs_analytic").drives[1].digits = 5; }},
+      {"a drive's floor",
+       [](F* f) { PairOf(f, "simulated_vs_analytic").drives[1].floored = true; }},
+      {"digits of all", [](F* f) { PairOf(f, "simulated_vs_analytic").digits = 5; }, {"text"}},
+      {"samples", [](F* f) { PairOf(f, "simulated_vs_analytic").samples = 5; }, {"page", "text"}},
+      {"a metric",
+       [](F* f) { PairOf(f, "simulated_vs_analytic").metrics[Metric::kForceMax].value = 5; },
+       {"text"}},
+      {"table's name", [](F* f) { f->report.comparison.table->name = "other"; }},
+      {"table's grid", [](F* f) { f->report.comparison.table->grid = "other"; }},
+      {"table's note", [](F* f) { f->report.comparison.table->notes = {"other"}; }},
+      {"table's coverage", [](F* f) { f->report.comparison.table->coverage = 5; }},
+      {"table's diagnosis", [](F* f) { f->report.comparison.table->diagnoses = {}; }, {"text"}},
+      {"table too coarse", [](F* f) { f->report.comparison.table->too_coarse = ""; }, {"text"}},
+      {"table judged", [](F* f) { f->report.comparison.table->judged = false; }, {"json"}},
+      {"column's heading",
+       [](F* f) { f->report.comparison.table->columns[0].heading = "other"; },
+       {"text"}},
+      {"column's factor",
+       [](F* f) { f->report.comparison.table->columns[0].factor = 5; },
+       {"page", "text"}},
+      {"column's noise", [](F* f) { f->report.comparison.table->uncertainty[0].noise = 5; }},
+      {"column's stamps", [](F* f) { f->report.comparison.table->uncertainty[0].stamps = 5; }},
+      {"column's RMS", [](F* f) { PairOf(f, "simulated_vs_reference").columns[1].rms = 5; }},
+      {"column's error",
+       [](F* f) { PairOf(f, "simulated_vs_reference").columns[1].error_rms = 5; }},
+      {"column's largest error",
+       [](F* f) { PairOf(f, "simulated_vs_reference").columns[1].error_max = 5; }},
+      {"column's tube", [](F* f) { PairOf(f, "simulated_vs_reference").columns[1].tube_max = 5; }},
+      {"column's uncertainty",
+       [](F* f) { PairOf(f, "simulated_vs_reference").columns[1].standard = 5; }},
+      {"engine's error", [](F* f) { f->report.engine_comparison->engines[1].force_nrmse = 5; }},
+      {"engine's later error",
+       [](F* f) { f->report.engine_comparison->engines[1].force_nrmse_later = 5; }},
+      {"engine's largest error",
+       [](F* f) { f->report.engine_comparison->engines[1].force_max_rel = 5; },
+       {"text"}},
+      {"engine's gap", [](F* f) { f->report.engine_comparison->engines[1].closure_max_m = 5; }},
+      {"engine's failure", [](F* f) { f->report.engine_comparison->engines[0].failure = "other"; }},
+      {"when it is later", [](F* f) { f->report.engine_comparison->later_s = 5; }},
+      {"energy", [](F* f) { SimulatedEnergy(f).parts[1].end_J = 5; }},
+      {"work", [](F* f) { SimulatedEnergy(f).parts[2].end_J = 5; }},
+      {"drift", [](F* f) { SimulatedEnergy(f).drift_J = 5; }, {"text"}},
+      {"drift at the end", [](F* f) { SimulatedEnergy(f).end_drift_J = 5; }, {"text"}},
+      {"relative drift", [](F* f) { SimulatedEnergy(f).drift.value = 5; }, {"text"}},
+      {"whose drift", [](F* f) { SimulatedEnergy(f).culprit = "other"; }, {"page", "text"}},
+      {"what of the drift", [](F* f) { SimulatedEnergy(f).text = "other"; }},
+      {"how work is found", [](F* f) { SimulatedEnergy(f).integrated = true; }, {"text"}},
+      {"a force over time",
+       [](F* f) { f->report.witnesses[2].trace.values.col(3) *= 2; },
+       {"text"}},
+      {"a signal's sheet", [](F* f) { f->report.sheets[0].positive = "other"; }},
+      {"a frame", [](F* f) { f->report.sheets[0].frame = "other"; }},
+      {"what a force acts on", [](F* f) { f->report.sheets[0].acts_on = "other"; }},
+      {"what exerts a force", [](F* f) { f->report.sheets[0].exerted_by = "other"; }},
+      {"why a witness did not run",
+       [](F* f) { f->report.witnesses[1].summary = {.stop = Stop::kLimit, .message = "other", .where = {}, .unit = {}}; },
+       {"text"}},
+      {"steps", [](F* f) { f->report.timing.steps = 5; }},
+      {"time of the loop", [](F* f) { f->report.timing.loop_s = 5; }},
+      {"time of pictures", [](F* f) { f->report.timing.render_s = 5; }},
+      {"time of the other engine", [](F* f) { f->report.timing.stock_s = 5; }}};
+  const test::FullPage right;
+  for (const FullBending& bending : bendings) {
+    test::FullPage bent;
+    bending.bend(&bent);
+    EXPECT_EQ(ToJson(bent.report) == ToJson(right.report), bending.unseen.contains("json"))
+        << bending.what;
+    EXPECT_EQ(TextOf(bent.report) == TextOf(right.report), bending.unseen.contains("text"))
+        << bending.what;
+    EXPECT_EQ(PageOf(bent) == PageOf(right), bending.unseen.contains("page")) << bending.what;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
