@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "model_file/load_model.h"
+#include "tests/shipped.h"
 #include "tests/source_dir.h"
 
 namespace mbv {
@@ -13,7 +14,7 @@ void ExpectSameFrame(const Pose& a, const Pose& b, const std::string& what) {
   EXPECT_TRUE(a.matrix() == b.matrix()) << what;
 }
 
-class WriteModelOf : public testing::TestWithParam<const char*> {};
+class WriteModelOf : public testing::TestWithParam<std::string> {};
 
 TEST_P(WriteModelOf, ReadsBackToTheLastBit) {
   const LoadResult first = LoadModel(SourcePath(fmt::format("/models/{}/model.yaml", GetParam())));
@@ -57,9 +58,7 @@ TEST_P(WriteModelOf, ReadsBackToTheLastBit) {
     EXPECT_EQ(a.outputs[i].body, b.outputs[i].body);
   }
 }
-INSTANTIATE_TEST_SUITE_P(Shipped, WriteModelOf,
-                         testing::Values("four_bar", "spr_tripod", "scara_robot", "cabin_robot",
-                                         "stabilizing_platform", "slider_crank", "spring_cart"));
+INSTANTIATE_TEST_SUITE_P(Shipped, WriteModelOf, testing::ValuesIn(ShippedModelNames()));
 
 TEST(WriteModel, NamesBecomeSuchAsModelFilesTake) {
   Mechanism m;
