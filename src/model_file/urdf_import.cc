@@ -225,9 +225,8 @@ class Importer {
     const auto find = [&](const std::string& link) {
       if (link == "world") return -1;
       if (const auto it = index_.find(link); it != index_.end()) return it->second;
-      const std::string near = ClosestWord(link, links);
       Error(closure.line, fmt::format("closure '{}': there is no link '{}'", joint.name, link),
-            near.empty() ? "" : fmt::format("did you mean '{}'?", near));
+            DidYouMean(link, links));
       return -2;
     };
     joint.parent = find(closure.parent);
