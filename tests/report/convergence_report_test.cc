@@ -131,5 +131,22 @@ TEST(ConvergenceReport, ThePlotsShowErrorsFittedAndExpectedSlope) {
   }
 }
 
+TEST(ConvergenceReport, ASeriesOfTimeConstantsHasItsOwnPlot) {
+  ConvergenceReport report = WrongOrder();
+  ConvergenceSeries softer = report.series[0];
+  softer.title = "softer constraints";
+  softer.knob = Knob::kTimeConstant;
+  report.series.push_back(softer);
+  const auto plots = ConvergencePlots(report);
+  ASSERT_EQ(plots[1].first, "error_time_constant.svg");
+  for (const auto& [name, svg] : plots) {
+    EXPECT_EQ(svg.find("softer constraints") != std::string::npos, name == plots[1].first) << name;
+  }
+  EXPECT_NE(plots[1].second.find("fitted 2.00"), std::string::npos);
+  EXPECT_NE(plots[1].second.find("time constant [s]"), std::string::npos);
+  // From 0.05 to 0.2 s, what was reached; the run that failed has no point.
+  EXPECT_NE(plots[1].second.find(">0.1</text>"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mbv

@@ -166,5 +166,34 @@ TEST(FullReport, NothingThatItHoldsGoesUntold) {
   }
 }
 
+TEST(FullReport, OfManyColumnsTheWorstArePlotted) {
+  test::FullPage full;
+  EXPECT_EQ(PageOf(full).find("worst of"), std::string::npos);
+  auto& columns = PairOf(&full, "simulated_vs_reference").columns;
+  columns.resize(9, columns[0]);
+  EXPECT_NE(PageOf(full).find("<p class=\"faint\">The 8 worst of 9 columns.</p>"),
+            std::string::npos);
+  columns.clear();
+  const std::string page = PageOf(full);
+  EXPECT_EQ(page.find("Columns of forces.csv"), std::string::npos) << "nothing was judged";
+  EXPECT_NE(page.find("forces.csv: 3 rows meet 3 samples"), std::string::npos);
+}
+
+TEST(FullReport, APartOfTheEnergyThatOneWitnessLacksIsADash) {
+  test::FullPage full;
+  SimulatedEnergy(&full).parts.erase(SimulatedEnergy(&full).parts.begin());
+  EXPECT_NE(PageOf(full).find("change: kinetic energy</th><td class=\"n\">–</td>"),
+            std::string::npos);
+}
+
+TEST(FullReport, WithoutAnAuditThePageSaysWhy) {
+  test::FullPage full;
+  HtmlInput input = full.input();
+  input.audit = HtmlAudit{.source = "", .rows = {}, .note = "the models < were not found"};
+  EXPECT_NE(ToHtml(input).find("<p>the models &lt; were not found</p>"), std::string::npos);
+  input.audit.reset();
+  EXPECT_EQ(ToHtml(input).find("id=\"equations\""), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mbv

@@ -11,6 +11,7 @@
 
 #include "core/sha256.h"
 #include "report/html_assets.h"
+#include "report/html_plots.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
 #include "report/result_html.h"
@@ -189,6 +190,38 @@ TEST(HtmlPage, IsOneFileThatAsksForNothing) {
   EXPECT_NE(html.find("Plates &lt;b&gt;&amp;"), std::string::npos);
   EXPECT_EQ(html.find(" src=\"http"), std::string::npos);
   EXPECT_EQ(html.find("<link rel=\"stylesheet"), std::string::npos);
+}
+
+TEST(StaticPlots, ThinningKeepsTheExtremesInTheirOrder) {
+  PlotPoints points;
+  for (int i = 0; i < 10000; ++i) points.emplace_back(i, std::sin(0.01 * i));
+  points[1234].second = 5.0;
+  points[7654].second = -7.0;
+  const PlotPoints kept = Thinned(points);
+  EXPECT_LE(kept.size(), 480U);
+  EXPECT_GE(kept.size(), 240U);
+  for (const size_t i : {1234U, 7654U}) {
+    EXPECT_NE(std::find(kept.begin(), kept.end(), points[i]), kept.end()) << i;
+  }
+  EXPECT_TRUE(std::is_sorted(kept.begin(), kept.end()));
+  points.resize(480);
+  EXPECT_EQ(Thinned(points), points);
+}
+
+TEST(StaticPlots, ShowForcesAndTheirErrorsByUnit) {
+  BentPage page;
+  const std::string html = StaticPlotsHtml(page.report);
+  size_t figures = 0;
+  for (size_t at = 0; (at = html.find("<figure>", at)) != std::string::npos; ++at) ++figures;
+  EXPECT_EQ(figures, 2U) << "one unit: forces, and errors";
+  EXPECT_NE(html.find("<title>Drive forces, simulated</title>"), std::string::npos);
+  EXPECT_NE(html.find("<title>Drive forces, |simulated − analytic|</title>"), std::string::npos);
+  EXPECT_NE(html.find(">[N]</text>"), std::string::npos);
+  for (const char* drive : {">d1</text>", ">d2</text>"}) {
+    EXPECT_NE(html.find(drive), std::string::npos) << drive;
+  }
+  page.report.witnesses.pop_back();
+  EXPECT_EQ(StaticPlotsHtml(page.report), "") << "the simulation left no trace";
 }
 
 }  // namespace

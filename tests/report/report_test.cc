@@ -105,5 +105,22 @@ TEST(Report, TheShortLineNamesVerdictValueAndLimit) {
             "checks exceed their limits\n");
 }
 
+TEST(Report, CsvOfAnySizeHasARowForEachSample) {
+  Report report = MakeReport(BentCase());
+  Trace& trace = report.witnesses[0].trace;
+  trace.Reset(SampleTimes(50.0, 0.005), DriveChannels(synthetic::TwoSliders()));
+  trace.witness = "analytic";
+  for (Eigen::Index i = 0; i < trace.values.rows(); ++i) trace.values.row(i).setConstant(i);
+  report.witnesses.resize(1);
+  std::istringstream csv(ToCsv(report));
+  std::string line;
+  std::getline(csv, line);
+  for (int i = 0; i <= 10000; ++i) {
+    ASSERT_TRUE(std::getline(csv, line)) << i;
+    ASSERT_TRUE(line.ends_with("," + std::to_string(i))) << i << ": " << line;
+  }
+  EXPECT_FALSE(std::getline(csv, line));
+}
+
 }  // namespace
 }  // namespace mbv

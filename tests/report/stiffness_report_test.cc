@@ -170,5 +170,37 @@ TEST(StiffnessReport, ColourAddsEscapesAndNothingElse) {
   EXPECT_EQ(colored, VerboseTable(test::StiffArm()));
 }
 
+TEST(StiffnessReport, APrintedModelThatCannotBeComparedSaysWhy) {
+  StiffnessReport report = test::StiffArm();
+  report.printed_pairs[0].compared = false;
+  report.printed_pairs[0].reason = "it is singular";
+  EXPECT_NE(VerboseTable(report).find("  the paper's own model: it is singular\n"),
+            std::string::npos);
+}
+
+TEST(StiffnessReport, WhereNothingRanThereAreNoMatrices) {
+  StiffnessReport report = test::StiffArm();
+  report.printed_pairs.clear();
+  report.printed.clear();
+  for (StiffnessWitness& witness : report.witnesses) {
+    witness.result = StiffnessResult{};
+    witness.displacements.clear();
+  }
+  StiffnessInput input;
+  input.loads = report.loads;
+  input.witnesses = report.witnesses;
+  report.comparison = CompareStiffness(input);
+  EXPECT_EQ(report.Shown(), nullptr);
+  EXPECT_EQ(report.WithShares(), nullptr);
+  EXPECT_EQ(VerboseTable(report).find("K ("), std::string::npos);
+  const std::string page = ToHtml(report);
+  for (const char* section : {"id=\"stiffness\"", "id=\"elements\"", "<dt>Rank</dt>"}) {
+    EXPECT_EQ(page.find(section), std::string::npos) << section;
+  }
+  EXPECT_FALSE(OrderedJson::parse(ToJson(report)).contains("weakest"));
+  EXPECT_EQ(StiffnessCsv(report), "witness,matrix,row,column,unit,value\n");
+  EXPECT_EQ(CountLine(CountOf(ViewOf(report))), "1 scenario: 0 ran, 0 compared, 0 verified\n");
+}
+
 }  // namespace
 }  // namespace mbv
