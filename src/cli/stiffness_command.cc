@@ -121,14 +121,9 @@ std::string WriteFolder(const StiffnessArguments& arguments, const StiffnessRun&
                         const std::vector<std::pair<std::string, std::string>>& maps) {
   const std::string out = arguments.out.empty() ? "out" : arguments.out;
   OutputFolder folder(out, run.report.mechanism + "/" + run.report.scenario);
-  std::string trouble = folder.Create();
-  for (const auto& [name, content] : StiffnessFiles(run)) {
-    if (trouble.empty()) trouble = folder.Write(name, content);
-  }
-  for (const auto& [name, content] : maps) {
-    if (trouble.empty()) trouble = folder.Write("maps/" + name, content);
-  }
-  if (trouble.empty()) trouble = folder.Commit();
+  std::vector<std::pair<std::string, std::string>> files = StiffnessFiles(run);
+  for (const auto& [name, content] : maps) files.emplace_back("maps/" + name, content);
+  std::string trouble = folder.WriteAll(files);
   if (trouble.empty()) Say(stderr, "results in {}\n", folder.target().string());
   return trouble;
 }

@@ -273,13 +273,11 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
   outcome.exit_code = run.report.exit_code;
   if (!options.out_dir.empty()) {
     OutputFolder folder(options.out_dir, prepared->base.name + "/" + prepared->scenario.name);
-    std::string trouble = folder.Create();
-    if (trouble.empty()) trouble = folder.Write("inputs.json", ToJson(inputs.files()));
-    for (const auto& [name, content] : StiffnessFiles(run)) {
-      if (name == "report.html" && !options.page) continue;
-      if (trouble.empty()) trouble = folder.Write(name, content);
-    }
-    if (trouble.empty()) trouble = folder.Commit();
+    std::vector<std::pair<std::string, std::string>> files = StiffnessFiles(run);
+    files.emplace_back("inputs.json", ToJson(inputs.files()));
+    std::erase_if(files,
+                  [&](const auto& file) { return file.first == "report.html" && !options.page; });
+    const std::string trouble = folder.WriteAll(files);
     if (trouble.empty()) {
       outcome.folder = folder.target();
     } else {

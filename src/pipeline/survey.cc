@@ -17,6 +17,7 @@
 #include "pipeline/load_robot.h"
 #include "pipeline/run_scenario.h"
 #include "report/html_text.h"
+#include "report/text_table.h"
 
 namespace mbv {
 namespace {
@@ -205,15 +206,21 @@ std::string SurveyCsv(const std::vector<SurveyRow>& rows) {
 std::string SurveyTable(const std::vector<SurveyRow>& rows) {
   size_t wide = 5;
   for (const SurveyRow& row : rows) wide = std::max(wide, row.file.size());
-  std::string text =
-      fmt::format("{:<{}}  {:<10} {:>6} {:>5} {:>8} {:>9} {:>8} {:>8} {:>8} {:>8} {:>6}\n", "file",
-                  wide, "status", "bodies", "loops", "freedoms", "redundant", "gap m", "gap rad",
-                  "inverse", "forward", "s");
+  const TextTable table("", {{"file", -static_cast<int>(wide) - 2},
+                             {"status", -10},
+                             {"bodies", 7},
+                             {"loops", 6},
+                             {"freedoms", 9},
+                             {"redundant", 10},
+                             {"gap m", 9},
+                             {"gap rad", 9},
+                             {"inverse", 9},
+                             {"forward", 9},
+                             {"s", 7}});
+  std::string text = table.Head() + "\n";
   size_t ok = 0;
   for (const SurveyRow& row : rows) {
-    const std::vector<std::string> f = Fields(row);
-    text += fmt::format("{:<{}}  {:<10} {:>6} {:>5} {:>8} {:>9} {:>8} {:>8} {:>8} {:>8} {:>6}\n",
-                        f[0], wide, f[1], f[2], f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10]);
+    text += table.Row(Fields(row)) + "\n";
     if (row.status == "ok") {
       ++ok;
     } else {
