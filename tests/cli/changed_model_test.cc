@@ -1,8 +1,10 @@
 // Shipped models that a user copied, changed or looks for from elsewhere.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <regex>
 
+#include "audit/audit.h"
 #include "tests/cli/program.h"
 
 namespace mbv {
@@ -88,6 +90,14 @@ TEST_P(ChangedModelTest, GravityOfTheScenarioIsThatOfAllWitnesses) {
 
 INSTANTIATE_TEST_SUITE_P(Papers, ChangedModelTest, testing::ValuesIn(kPapers),
                          [](const auto& info) { return std::string(info.param.model); });
+
+TEST(Papers, AreAllThatAreAudited) {
+  for (const AuditEntry& entry : Audits()) {
+    EXPECT_TRUE(std::any_of(std::begin(kPapers), std::end(kPapers), [&](const Paper& paper) {
+      return entry.mechanism == paper.model;
+    })) << entry.mechanism;
+  }
+}
 
 TEST(AnyFolder, ShippedModelsAndScenariosAreFound) {
   const Program mbverify("any_folder");

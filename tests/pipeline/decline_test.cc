@@ -7,6 +7,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "analytic/closed_form.h"
 #include "model_file/load_model.h"
 #include "pipeline/check_file.h"
 #include "pipeline/run_scenario.h"
@@ -153,10 +154,10 @@ TEST(Decline, ALoadOnABodyThatTheEquationsDoNotKnow) {
 
 TEST(Decline, AnotherMechanismOfTheSameName) {
   // A four-bar by the name of each mechanism that has equations.
-  for (const char* name : {"cabin_robot", "scara_robot", "spr_tripod", "stabilizing_platform"}) {
-    const Copy copy(std::string("named_") + name);
+  for (const ClosedFormRow& row : ClosedForms()) {
+    const Copy copy("named_" + row.mechanism);
     std::string model = ReadShipped("models/four_bar/model.yaml");
-    Replace("name: four_bar", std::string("name: ") + name, &model);
+    Replace("name: four_bar", "name: " + row.mechanism, &model);
     copy.Model(model);
     std::string turn = ReadShipped("scenarios/four_bar/turn_inverse.yaml");
     Replace("analytic: none\n", "", &turn);

@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <fstream>
 
+#include "analytic/closed_form.h"
 #include "model_file/load_model.h"
 #include "model_file/urdf.h"
 #include "pipeline/run_scenario.h"
@@ -96,11 +97,21 @@ TEST_P(ExportedModel, RunsAgainWithTheSameDriveForces) {
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Urdf, ExportedModel,
-                         testing::Values(Case{"stabilizing_platform", 0.1},
-                                         Case{"spr_tripod", 0.02}, Case{"cabin_robot", 0.02},
-                                         Case{"scara_robot", 0.1}),
+constexpr Case kExported[] = {{"stabilizing_platform", 0.1},
+                              {"spr_tripod", 0.02},
+                              {"cabin_robot", 0.02},
+                              {"scara_robot", 0.1}};
+
+INSTANTIATE_TEST_SUITE_P(Urdf, ExportedModel, testing::ValuesIn(kExported),
                          [](const auto& c) { return std::string(c.param.model); });
+
+TEST(ExportedModels, AreAllThatHaveClosedForms) {
+  for (const ClosedFormRow& row : ClosedForms()) {
+    EXPECT_TRUE(std::any_of(std::begin(kExported), std::end(kExported), [&](const Case& c) {
+      return row.mechanism == c.model;
+    })) << row.mechanism;
+  }
+}
 
 }  // namespace
 }  // namespace mbv

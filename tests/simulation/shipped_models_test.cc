@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "analytic/closed_form.h"
@@ -76,6 +77,14 @@ const Limit kLimits[] = {
     {"scara_robot/pick_place", 0.4, 1e-13, 5e-9, 2e-4},
     {"cabin_robot/wrench", 2.0, 2e-13, 2e-12, 1e-3},
 };
+
+TEST(ShippedModels, OfEveryClosedFormAreHere) {
+  for (const ClosedFormRow& row : ClosedForms()) {
+    EXPECT_TRUE(std::any_of(std::begin(kLimits), std::end(kLimits), [&](const Limit& limit) {
+      return std::string(limit.scenario).starts_with(row.mechanism + "/");
+    })) << row.mechanism;
+  }
+}
 
 TEST(ShippedModels, InverseModeAgreesWithTheClosedFormsToRoundOff) {
   for (const Limit& limit : kLimits) {
