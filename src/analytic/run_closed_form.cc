@@ -17,18 +17,19 @@ ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
   const auto start = std::chrono::steady_clock::now();
   CommandSample command;
   ClosedFormSample sample;
-  const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
+  const ChannelColumns columns(run.trace.channels);
   run.summary = RunSummary::Done();
   for (size_t i = 0; i < run.trace.time_s.size() && run.summary.ok(); ++i) {
     EvaluateMotion(motion, run.trace.time_s[i], &command);
     run.summary = closed_form->Dynamics(command, &sample);
     if (!run.summary.ok()) break;
     auto row = run.trace.values.row(static_cast<Eigen::Index>(i));
-    for (Eigen::Index d = 0; d < drives; ++d) {
-      row[4 * d] = sample.driven.position[d];
-      row[4 * d + 1] = sample.driven.velocity[d];
-      row[4 * d + 2] = sample.driven.acceleration[d];
-      row[4 * d + 3] = sample.force[d];
+    for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+      const auto k = static_cast<Eigen::Index>(d);
+      row[columns(Quantity::kPosition, d)] = sample.driven.position[k];
+      row[columns(Quantity::kVelocity, d)] = sample.driven.velocity[k];
+      row[columns(Quantity::kAcceleration, d)] = sample.driven.acceleration[k];
+      row[columns(Quantity::kForce, d)] = sample.force[k];
     }
     row.tail(sample.extra.size()) = sample.extra.transpose();
   }

@@ -12,15 +12,15 @@ namespace mbv::stiffness_audit {
 namespace {
 
 Coordinate CoordinateOf(const Mechanism& mechanism, const std::string& name) {
-  static constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
   if (const int drive = mechanism.FindDrive(name); drive >= 0) {
     return {Coordinate::Kind::kDrive, drive, 0};
   }
   const size_t dot = name.rfind('.');
   const int output = mechanism.FindOutput(name.substr(0, dot));
-  const auto component = std::find(kComponents.begin(), kComponents.end(), name.substr(dot + 1));
-  MBV_DEMAND(output >= 0 && component != kComponents.end(), name);
-  return {Coordinate::Kind::kOutput, output, static_cast<int>(component - kComponents.begin())};
+  const auto component =
+      std::find(kPoseComponents.begin(), kPoseComponents.end(), name.substr(dot + 1));
+  MBV_DEMAND(output >= 0 && component != kPoseComponents.end(), name);
+  return {Coordinate::Kind::kOutput, output, static_cast<int>(component - kPoseComponents.begin())};
 }
 
 Joint& JointOf(Mechanism* mechanism, const std::string& name) {

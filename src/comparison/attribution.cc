@@ -175,8 +175,9 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
   if (distances.size() < 3 || followed) {
     return TwoDiffer(input, comparison, *check, distances.size() >= 3);
   }
-  const Distance &near = distances[0], &far = distances[1];
+  const Distance& near = distances[0];
   const std::string odd = OddOneOut(distances);
+  const Distance& far = odd.empty() ? distances[1] : *NearestOf(odd, distances);
   if (odd.empty()) {
     return {"", fmt::format("no two witnesses stand clearly against the third: {} {}, {} {}, {} {} "
                             "({})",

@@ -152,11 +152,11 @@ void AddReactionNotes(const ComparisonInput& input, Comparison* comparison) {
     for (const Channel& channel : ReactionChannels(joint)) {
       const auto& open = input.reactions_not_unique;
       if (std::find(open.begin(), open.end(), channel.name) == open.end()) continue;
-      components += (count++ == 0 ? "" : ", ") + channel.name.substr(channel.name.size() - 2);
+      components += (count++ == 0 ? "" : ", ") + SignalWord(channel);
     }
     if (count == 0) continue;
     comparison->not_compared.push_back(
-        {joint.name + ".reaction" + (count == 6 ? "" : " (" + components + ")"),
+        {ChannelName(Quantity::kReaction, joint.name) + (count == 6 ? "" : " (" + components + ")"),
          "statics alone does not determine it (redundant constraints)"});
   }
 }
@@ -180,7 +180,8 @@ void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
          "they are the " + input.driven_by + " forces; the motion that they cause is compared"});
   }
   for (const DriveForce& force : input.motion->forces) {
-    comparison->not_compared.push_back({input.mechanism->drives[force.drive].name + ".force",
+    const std::string& drive = input.mechanism->drives[force.drive].name;
+    comparison->not_compared.push_back({ChannelName(Quantity::kForce, drive),
                                         "it is given by the scenario; the motion it causes is "
                                         "compared"});
   }
@@ -222,8 +223,9 @@ TableVerdict Introduce(const AlignedTable& table) {
 void FinishTable(const ComparisonInput& input, Comparison* comparison) {
   TableVerdict& table = *comparison->table;
   for (const Drive& drive : input.mechanism->drives) {
-    if (input.table->trace.Find(drive.name + ".force") >= 0) continue;
-    comparison->not_compared.push_back({drive.name + ".force", "it is not in the table"});
+    const std::string force = ChannelName(Quantity::kForce, drive.name);
+    if (input.table->trace.Find(force) >= 0) continue;
+    comparison->not_compared.push_back({force, "it is not in the table"});
   }
   // The computation that the simulation does not depend on tells more than the simulation.
   for (const auto& [measured, truth] : {RolePair{&role::kReference, &role::kAnalytic},

@@ -80,7 +80,7 @@ std::vector<DriveError> DriveErrors(const ComparisonInput& input, const PairRead
     if (SharesForces(input, reader.measured.witness, reader.truth.witness)) continue;
     const Drive& drive = input.mechanism->drives[d];
     ++*wanted;
-    const std::string channel = drive.name + ".force";
+    const std::string channel = ChannelName(Quantity::kForce, drive.name);
     const Columns columns = reader.Find(channel);
     if (!columns.both()) continue;
     const ErrorSum sum = reader.Sum(channel, columns, input.start_window_s, false);
@@ -132,7 +132,7 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
     const Drive& drive = input.mechanism->drives[d];
     const double floor = FloorOf(scale, errors, d, unit);
     pair->drives.push_back(DriveMetricsOf(drive, unit, sum, floor));
-    FitFactor(reader, reader.Find(drive.name + ".force"), input.start_window_s,
+    FitFactor(reader, reader.Find(ChannelName(Quantity::kForce, drive.name)), input.start_window_s,
               &pair->drives.back());
     KeepWorst(&pair->metrics, Metric::kForceOwn, sum.MeasuredNrmse(floor));
     pair->force_samples = sum.count();

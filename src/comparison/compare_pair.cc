@@ -24,13 +24,14 @@ void CompareDriveMotion(const ComparisonInput& input, const PairReader& reader,
   std::map<std::string, ErrorSum> velocity, acceleration;
   for (const Drive& drive : input.mechanism->drives) {
     const std::string unit = PositionUnit(*input.mechanism, drive);
-    const std::string position = drive.name + ".position";
+    const std::string position = ChannelName(Quantity::kPosition, drive.name);
     if (const Columns c = reader.Find(position); c.both()) {
       const ErrorSum sum = reader.Sum(position, c, 0.0, unit == "rad");
       const Metric metric = unit == "rad" ? Metric::kPositionRad : Metric::kPositionM;
       KeepWorst(&pair->metrics, metric, AsMeasured(sum, sum.max_error()));
     }
-    const std::string rate = drive.name + ".velocity", rate2 = drive.name + ".acceleration";
+    const std::string rate = ChannelName(Quantity::kVelocity, drive.name);
+    const std::string rate2 = ChannelName(Quantity::kAcceleration, drive.name);
     if (const Columns c = reader.Find(rate); c.both()) {
       velocity[unit].Merge(reader.Sum(rate, c, 0.0, false));
     }
@@ -53,10 +54,10 @@ using OutputColumns = std::array<int, 6>;
 
 std::optional<OutputColumns> FindOutput(const Trace& trace, const Output& output) {
   OutputColumns columns{};
-  size_t k = 0;
-  for (const char* c : {"x", "y", "z", "roll", "pitch", "yaw"}) {
-    columns[k] = trace.Find(output.name + "." + c);
-    if (columns[k++] < 0) return {};
+  for (int c = 0; c < 6; ++c) {
+    const int column = trace.Find(Quantity::kPose, output.name, c);
+    if (column < 0) return {};
+    columns[static_cast<size_t>(c)] = column;
   }
   return columns;
 }

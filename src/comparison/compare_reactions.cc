@@ -119,7 +119,8 @@ void CompareBase(const ComparisonInput& input, const PairReader& reader, const F
                  PairComparison* pair) {
   const size_t drives = input.mechanism->drives.size();
   for (size_t p = 0; p < input.mechanism->prescribed.size(); ++p) {
-    const std::string channel = input.mechanism->prescribed[p].name + ".force";
+    const std::string channel =
+        ChannelName(Quantity::kBaseForce, input.mechanism->prescribed[p].name);
     const Columns columns = reader.Find(channel);
     if (!columns.both()) continue;
     const ErrorSum sum = reader.Sum(channel, columns, input.start_window_s, false);

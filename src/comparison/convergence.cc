@@ -120,7 +120,7 @@ double SampleClasses::Remains(double time_constant_s) const {
 MatX DriveForceTable(const Mechanism& mechanism, const Trace& trace) {
   MatX forces(trace.values.rows(), static_cast<Eigen::Index>(mechanism.drives.size()));
   for (size_t k = 0; k < mechanism.drives.size(); ++k) {
-    const int column = trace.Find(mechanism.drives[k].name + ".force");
+    const int column = trace.Find(Quantity::kForce, mechanism.drives[k].name);
     MBV_DEMAND(column >= 0, mechanism.drives[k].name);
     forces.col(static_cast<Eigen::Index>(k)) = trace.values.col(column);
   }

@@ -98,9 +98,10 @@ struct DriveColumns {
 std::vector<DriveColumns> FindColumns(const Mechanism& mechanism, const Trace& trace) {
   std::vector<DriveColumns> all;
   for (const Drive& drive : mechanism.drives) {
-    const DriveColumns columns{
-        trace.Find(drive.name + ".position"), trace.Find(drive.name + ".velocity"),
-        trace.Find(drive.name + ".acceleration"), drive.name, PositionUnit(mechanism, drive)};
+    const DriveColumns columns{trace.Find(Quantity::kPosition, drive.name),
+                               trace.Find(Quantity::kVelocity, drive.name),
+                               trace.Find(Quantity::kAcceleration, drive.name), drive.name,
+                               PositionUnit(mechanism, drive)};
     if (columns.position < 0 || columns.velocity < 0 || columns.acceleration < 0) continue;
     all.push_back(columns);
   }

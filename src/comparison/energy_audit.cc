@@ -41,8 +41,8 @@ VecX Integral(const VecX& P, double h) {
   return work;
 }
 
-std::optional<VecX> Column(const Trace& trace, const std::string& name) {
-  const int column = trace.Find(name);
+std::optional<VecX> Column(const Trace& trace, Quantity quantity, const std::string& subject = "") {
+  const int column = trace.Find(quantity, subject);
   if (column < 0) return {};
   return trace.values.col(column);
 }
@@ -51,8 +51,9 @@ std::optional<VecX> Column(const Trace& trace, const std::string& name) {
 bool AddWorks(const Mechanism& mechanism, const Trace& trace, std::vector<Curve>* curves) {
   const double h = trace.time_s[1] - trace.time_s[0];
   bool integrated = true;
-  const auto add = [&](const std::string& name, const std::string& title, const VecX& power) {
-    if (const auto work = Column(trace, name + ".work")) {
+  const auto add = [&](const std::string& title, const std::optional<VecX>& work,
+                       const VecX& power) {
+    if (work) {
       curves->push_back({title, false, *work});
       return;
     }
@@ -61,20 +62,23 @@ bool AddWorks(const Mechanism& mechanism, const Trace& trace, std::vector<Curve>
   };
   const VecX none;
   for (const Drive& drive : mechanism.drives) {
-    const auto force = Column(trace, drive.name + ".force");
-    const auto velocity = Column(trace, drive.name + ".velocity");
-    add(drive.name, drive.name, force && velocity ? VecX(force->cwiseProduct(*velocity)) : none);
+    const auto force = Column(trace, Quantity::kForce, drive.name);
+    const auto velocity = Column(trace, Quantity::kVelocity, drive.name);
+    add(drive.name, Column(trace, Quantity::kWork, drive.name),
+        force && velocity ? VecX(force->cwiseProduct(*velocity)) : none);
   }
   for (const Prescribed& base : mechanism.prescribed) {
-    if (const auto work = Column(trace, base.name + ".work")) {
+    if (const auto work = Column(trace, Quantity::kBaseWork, base.name)) {
       curves->push_back({base.name, false, *work});
     }
   }
   if (!mechanism.prescribed.empty() && !integrated) {
-    add("base", "base motion", Column(trace, "power.base").value_or(none));
+    add("base motion", {}, Column(trace, Quantity::kBasePower).value_or(none));
   }
-  add("loads", "loads", Column(trace, "power.loads").value_or(none));
-  add("dampers", "dampers", Column(trace, "power.dampers").value_or(none));
+  add("loads", Column(trace, Quantity::kLoadWork),
+      Column(trace, Quantity::kLoadPower).value_or(none));
+  add("dampers", Column(trace, Quantity::kDamperWork),
+      Column(trace, Quantity::kDamperPower).value_or(none));
   return integrated;
 }
 
@@ -133,8 +137,9 @@ void NameCulprit(const std::vector<Curve>& curves, const VecX& drift, EnergyAudi
 
 std::optional<EnergyAudit> AuditEnergy(const ComparisonInput& input, const Trace& trace,
                                        std::optional<double> limit) {
-  const auto kinetic = Column(trace, "energy.kinetic"), gravity = Column(trace, "energy.gravity");
-  const auto springs = Column(trace, "energy.springs");
+  const auto kinetic = Column(trace, Quantity::kKineticEnergy);
+  const auto gravity = Column(trace, Quantity::kGravityEnergy);
+  const auto springs = Column(trace, Quantity::kSpringEnergy);
   const auto n = static_cast<Eigen::Index>(trace.time_s.size());
   if (!kinetic || !gravity || !springs || n < 4) return {};
   std::vector<Curve> curves;

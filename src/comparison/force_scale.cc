@@ -23,8 +23,8 @@ struct Rates {
 
 Rates DriveRates(const Drive& drive, const Trace& trace) {
   Rates rates;
-  const auto rms = [&](const std::string& name, double* largest) {
-    const int column = trace.Find(name);
+  const auto rms = [&](Quantity quantity, double* largest) {
+    const int column = trace.Find(quantity, drive.name);
     if (column < 0 || trace.values.rows() == 0) return 0.0;
     const auto values = trace.values.col(column);
     const double value = std::sqrt(values.squaredNorm() / static_cast<double>(values.size()));
@@ -32,8 +32,8 @@ Rates DriveRates(const Drive& drive, const Trace& trace) {
     if (largest != nullptr) *largest = values.cwiseAbs().maxCoeff();
     return value;
   };
-  rates.velocity = rms(drive.name + ".velocity", &rates.fastest);
-  rates.acceleration = rms(drive.name + ".acceleration", nullptr);
+  rates.velocity = rms(Quantity::kVelocity, &rates.fastest);
+  rates.acceleration = rms(Quantity::kAcceleration, nullptr);
   return rates;
 }
 
@@ -58,7 +58,7 @@ Rates PrescribedRates(const Motion& motion, int prescribed, const Trace& trace) 
 
 // From the energy: F = √(2 k E), at most.
 double LargestSpringForce(const Mechanism& mechanism, const Trace& trace) {
-  const int column = trace.Find("energy.springs");
+  const int column = trace.Find(Quantity::kSpringEnergy);
   if (column < 0 || trace.values.rows() == 0) return 0.0;
   double stiffness = 0.0;
   for (const SpringDamper& spring : mechanism.springs) {

@@ -10,31 +10,36 @@
 namespace mbv {
 namespace {
 
-// `signal`: "" for the value itself, or "velocity", "acceleration".
-std::string ChannelOf(const Mechanism& mechanism, const Coordinate& coordinate,
-                      const std::string& signal) {
-  static constexpr const char* kComponents[] = {"x", "y", "z", "roll", "pitch", "yaw"};
+// What a coordinate and its rates are recorded as.
+struct Recorded {
+  Quantity drive, output;
+};
+constexpr Recorded kValue{Quantity::kPosition, Quantity::kPose};
+constexpr Recorded kRate{Quantity::kVelocity, Quantity::kPoseVelocity};
+constexpr Recorded kRate2{Quantity::kAcceleration, Quantity::kPoseAcceleration};
+
+// -1 where it is not recorded.
+int ColumnOf(const Mechanism& mechanism, const Coordinate& coordinate, const Recorded& as,
+             const Trace& trace) {
   const auto index = static_cast<size_t>(coordinate.index);
   switch (coordinate.kind) {
     case Coordinate::Kind::kDrive:
-      return mechanism.drives[index].name + "." + (signal.empty() ? "position" : signal);
-    case Coordinate::Kind::kPrescribed:
-      return mechanism.prescribed[index].name + "." + (signal.empty() ? "position" : signal);
+      return trace.Find(as.drive, mechanism.drives[index].name);
     case Coordinate::Kind::kOutput:
-      return mechanism.outputs[index].name + "." + kComponents[coordinate.component] +
-             (signal.empty() ? "" : "." + signal);
+      return trace.Find(as.output, mechanism.outputs[index].name, coordinate.component);
+    case Coordinate::Kind::kPrescribed:
     case Coordinate::Kind::kJoint:
-      return "";  // not recorded
+      return -1;
   }
-  return "";
+  return -1;
 }
 
 // Columns of all terms of a command, or nothing if one of them is not recorded.
 std::optional<std::vector<int>> ColumnsOf(const Mechanism& mechanism, const Command& command,
-                                          const Trace& trace, const std::string& signal = "") {
+                                          const Trace& trace, const Recorded& as = kValue) {
   std::vector<int> columns;
   for (const Command::Term& term : command.terms) {
-    columns.push_back(trace.Find(ChannelOf(mechanism, term.coordinate, signal)));
+    columns.push_back(ColumnOf(mechanism, term.coordinate, as, trace));
     if (columns.back() < 0) return {};
   }
   return columns;
@@ -67,24 +72,24 @@ void MeasureCommands(const ComparisonInput& input, const Trace& trace, WitnessMe
 
 // Rates or accelerations of commanded outputs against their commands, pooled per unit. A command
 // that holds still is judged by what counts as rest beside the drives' motion.
-void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, const char* signal,
-                         Metric metric, WitnessMetrics* out) {
+void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, Metric metric,
+                         WitnessMetrics* out) {
+  const bool velocity = metric == Metric::kCommandVelocity;
   std::map<bool, ErrorSum> sums;  // by angle
   for (const Command& command : input.motion->commands) {
     if (command.terms.front().coordinate.kind != Coordinate::Kind::kOutput) continue;
-    const auto columns = ColumnsOf(*input.mechanism, command, trace, signal);
+    const auto columns = ColumnsOf(*input.mechanism, command, trace, velocity ? kRate : kRate2);
     if (!columns) continue;
     ErrorSum& sum = sums[command.terms.front().coordinate.component >= 3];
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
       const Jet jet = Evaluate(command.profile, trace.time_s[i]);
-      const double wanted = metric == Metric::kCommandVelocity ? jet.rate : jet.acceleration;
+      const double wanted = velocity ? jet.rate : jet.acceleration;
       const double value = ValueOf(trace, command, *columns, static_cast<Eigen::Index>(i));
       sum.Add(value - wanted, wanted, trace.time_s[i], command.name);
     }
   }
   for (const auto& [angle, sum] : sums) {
     const RestFloor rest = RestFloorOf(input, angle ? "rad" : "m", trace);
-    const bool velocity = metric == Metric::kCommandVelocity;
     KeepWorst(&out->metrics[metric],
               sum.MeasuredNrmse(velocity ? rest.velocity : rest.acceleration));
   }
@@ -94,8 +99,7 @@ void MeasureCommandRates(const ComparisonInput& input, const Trace& trace, const
 void MeasureStart(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
   if (trace.time_s.empty() || trace.time_s.front() != 0.0) return;
   for (const InitialValue& value : input.motion->initial) {
-    if (value.coordinate.kind == Coordinate::Kind::kJoint) continue;  // not recorded
-    const int column = trace.Find(ChannelOf(*input.mechanism, value.coordinate, ""));
+    const int column = ColumnOf(*input.mechanism, value.coordinate, kValue, trace);
     if (column < 0) continue;
     const bool angle = trace.channels[static_cast<size_t>(column)].unit == "rad";
     const double error = angle ? AngleDifference(trace.values(0, column), value.position)
@@ -106,8 +110,9 @@ void MeasureStart(const ComparisonInput& input, const Trace& trace, WitnessMetri
 }
 
 void MeasureClosure(const Trace& trace, WitnessMetrics* out) {
-  for (const auto& [name, metric] : {std::pair{"closure.position", Metric::kClosureM},
-                                     std::pair{"closure.rotation", Metric::kClosureRad}}) {
+  for (const auto& [quantity, metric] : {std::pair{Quantity::kLoopGap, Metric::kClosureM},
+                                         std::pair{Quantity::kLoopTwist, Metric::kClosureRad}}) {
+    const std::string name = ChannelName(quantity);
     const int column = trace.Find(name);
     if (column < 0) continue;
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
@@ -122,12 +127,12 @@ void MeasureClosure(const Trace& trace, WitnessMetrics* out) {
 std::optional<VecX> InputOf(const Mechanism& mechanism, const Trace& trace) {
   VecX input = VecX::Zero(trace.values.rows());
   for (const Drive& drive : mechanism.drives) {
-    const int force = trace.Find(drive.name + ".force");
-    const int velocity = trace.Find(drive.name + ".velocity");
+    const int force = trace.Find(Quantity::kForce, drive.name);
+    const int velocity = trace.Find(Quantity::kVelocity, drive.name);
     if (force < 0 || velocity < 0) return {};
     input += trace.values.col(force).cwiseProduct(trace.values.col(velocity));
   }
-  for (const char* part : {"power.base", "power.loads", "power.dampers"}) {
+  for (const Quantity part : {Quantity::kBasePower, Quantity::kLoadPower, Quantity::kDamperPower}) {
     const int column = trace.Find(part);
     if (column < 0) return {};
     input += trace.values.col(column);
@@ -146,24 +151,26 @@ struct PowerSize {
 PowerSize SizeOfPower(const ComparisonInput& input, const Trace& trace) {
   constexpr double kRoundings = 16.0;
   const ForceScale force = ForceScaleOf(input, trace);
-  const auto largest = [&](const std::string& name) {
-    const int column = trace.Find(name);
+  const auto largest = [&](Quantity quantity, const std::string& subject = "") {
+    const int column = trace.Find(quantity, subject);
     return column < 0 ? 0.0 : trace.values.col(column).cwiseAbs().maxCoeff();
   };
   double flow = 0.0;
-  for (const char* name : {"power.input", "power.energy_rate", "power.base", "power.loads",
-                           "power.dampers", "power.gravity", "power.springs"}) {
-    flow = std::max(flow, largest(name));
+  for (const Quantity power :
+       {Quantity::kInputPower, Quantity::kEnergyRate, Quantity::kBasePower, Quantity::kLoadPower,
+        Quantity::kDamperPower, Quantity::kGravityPower, Quantity::kSpringPower}) {
+    flow = std::max(flow, largest(power));
   }
   const double duration_s = trace.time_s.back() - trace.time_s.front();
-  if (duration_s > 0.0) flow = std::max(flow, largest("energy.kinetic") / duration_s);
+  if (duration_s > 0.0) flow = std::max(flow, largest(Quantity::kKineticEnergy) / duration_s);
   // A mechanism at rest has no power: forces count at the speed of rest.
   double scale = RestFloorOf(input, "m").velocity * ForceScale::kIdle * force.force_N;
   double carried = force.power_W;
   for (const Drive& drive : input.mechanism->drives) {
     const double rest = RestFloorOf(input, PositionUnit(*input.mechanism, drive)).velocity;
-    const int f = trace.Find(drive.name + ".force"), v = trace.Find(drive.name + ".velocity");
-    scale = std::max(scale, rest * largest(drive.name + ".force"));
+    const int f = trace.Find(Quantity::kForce, drive.name);
+    const int v = trace.Find(Quantity::kVelocity, drive.name);
+    scale = std::max(scale, rest * largest(Quantity::kForce, drive.name));
     if (f < 0 || v < 0) continue;
     carried = std::max(carried,
                        trace.values.col(f).cwiseProduct(trace.values.col(v)).cwiseAbs().maxCoeff());
@@ -173,7 +180,8 @@ PowerSize SizeOfPower(const ComparisonInput& input, const Trace& trace) {
 }
 
 void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
-  const int in = trace.Find("power.input"), rate = trace.Find("power.energy_rate");
+  const std::string name = ChannelName(Quantity::kInputPower);
+  const int in = trace.Find(name), rate = trace.Find(Quantity::kEnergyRate);
   if (in < 0 || rate < 0 || trace.time_s.empty()) return;
   const PowerSize size = SizeOfPower(input, trace);
   std::vector<VecX> inputs = {trace.values.col(in)};
@@ -183,7 +191,7 @@ void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetri
       const auto row = static_cast<Eigen::Index>(i);
       const double error = std::abs(power[row] - trace.values(row, rate)) - size.roundoff;
       KeepWorst(&out->metrics[Metric::kPower], error <= 0.0 ? 0.0 : error / size.scale,
-                trace.time_s[i], "power.input");
+                trace.time_s[i], name);
     }
   }
 }
@@ -195,8 +203,8 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   MeasureCommands(input, trace, &metrics);
   // A table follows a motion; it has no bodies, and its digits leave no derivatives to check.
   if (input.table != nullptr && trace.witness == role::kReference) return metrics;
-  MeasureCommandRates(input, trace, "velocity", Metric::kCommandVelocity, &metrics);
-  MeasureCommandRates(input, trace, "acceleration", Metric::kCommandAcceleration, &metrics);
+  MeasureCommandRates(input, trace, Metric::kCommandVelocity, &metrics);
+  MeasureCommandRates(input, trace, Metric::kCommandAcceleration, &metrics);
   MeasureClosure(trace, &metrics);
   MeasurePower(input, trace, &metrics);
   if (input.motion->free()) MeasureStart(input, trace, &metrics);

@@ -34,9 +34,6 @@ struct Series {
 
 double RmsDeviation(const VecX& values) { return Rms((values.array() - values.mean()).matrix()); }
 
-// "limb1.drive.force" → "force": only like signals are exchanged.
-std::string Signal(const std::string& channel) { return channel.substr(channel.rfind('.') + 1); }
-
 // An explanation of one column.
 struct Explanation {
   enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor, kOutliers, kDrift };
@@ -159,14 +156,18 @@ class Diagnosis {
     return finding;
   }
 
+  [[nodiscard]] std::string WordOf(const Series& series) const {
+    return SignalWord(table_.trace.channels[series.result->column]);
+  }
+
   // Another signal of the same kind that the column fits, with either sign.
   [[nodiscard]] std::optional<Explanation> Exchanged(size_t k) const {
     const Series& series = series_[k];
     std::optional<Explanation> best;
     for (size_t other = 0; other < series_.size(); ++other) {
       const Series& candidate = series_[other];
-      if (other == k || candidate.unit != series.unit ||
-          Signal(candidate.result->channel) != Signal(series.result->channel)) {
+      // Only like signals are exchanged.
+      if (other == k || candidate.unit != series.unit || WordOf(candidate) != WordOf(series)) {
         continue;
       }
       for (const double sign : {1.0, -1.0}) {

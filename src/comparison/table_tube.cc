@@ -69,27 +69,6 @@ Trace Bent(const Trace& truth, const MatX& uncertainty) {
   return bent;
 }
 
-enum class Quantity { kForce, kBase, kPosition, kRate, kRate2, kPose, kReaction, kOther };
-
-Quantity QuantityOf(const Mechanism& mechanism, const std::string& channel) {
-  for (const Drive& drive : mechanism.drives) {
-    if (!channel.starts_with(drive.name + ".")) continue;
-    const std::string signal = channel.substr(drive.name.size() + 1);
-    if (signal == "force") return Quantity::kForce;
-    if (signal == "position") return Quantity::kPosition;
-    if (signal == "velocity") return Quantity::kRate;
-    if (signal == "acceleration") return Quantity::kRate2;
-  }
-  if (channel.find(".reaction.") != std::string::npos) return Quantity::kReaction;
-  for (const Prescribed& base : mechanism.prescribed) {
-    if (channel == base.name + ".force") return Quantity::kBase;
-  }
-  for (const Output& output : mechanism.outputs) {
-    if (channel.starts_with(output.name + ".")) return Quantity::kPose;
-  }
-  return Quantity::kOther;
-}
-
 // Limits of a scenario in a column's own unit; empty where they are switched off.
 class StatedLimits {
  public:
@@ -102,11 +81,10 @@ class StatedLimits {
   [[nodiscard]] std::optional<Limits> Of(Eigen::Index c) const {
     const Channel& channel = shared_.table.channels[static_cast<size_t>(c)];
     const bool angle = channel.unit == "rad";
-    const Quantity quantity = QuantityOf(*input_.mechanism, channel.name);
-    const Pooled pooled = Pool(quantity, channel.unit);
+    const Pooled pooled = Pool(channel.quantity, channel.unit);
     const RestFloor rest =
         RestFloorOf(input_, channel.unit.starts_with("rad") ? "rad" : "m", shared_.table);
-    switch (quantity) {
+    switch (channel.quantity) {
       case Quantity::kForce: {
         const auto rms = Limit(Metric::kForceNrmse), max = Limit(Metric::kForceMax);
         if (!rms && !max) return {};
@@ -116,18 +94,17 @@ class StatedLimits {
         return Absolute(angle ? Metric::kPositionRad : Metric::kPositionM);
       case Quantity::kPose:
         return Absolute(angle ? Metric::kPoseRad : Metric::kPoseM);
-      case Quantity::kRate:
+      case Quantity::kVelocity:
         return Relative(Metric::kVelocity, std::max(pooled.rms, rest.velocity));
-      case Quantity::kRate2:
+      case Quantity::kAcceleration:
         return Relative(Metric::kAcceleration, std::max(pooled.rms, rest.acceleration));
       case Quantity::kReaction:
         return Relative(Metric::kReaction, pooled.rms);
-      case Quantity::kBase:
+      case Quantity::kBaseForce:
         return Relative(Metric::kBaseForce, pooled.rms);
-      case Quantity::kOther:
+      default:  // what no metric is about
         return Relative(Metric::kForceNrmse, pooled.rms);
     }
-    return {};
   }
 
  private:
@@ -156,7 +133,7 @@ class StatedLimits {
     Pooled pooled;
     for (Eigen::Index c = 0; c < shared_.table.values.cols(); ++c) {
       const Channel& channel = shared_.table.channels[static_cast<size_t>(c)];
-      if (channel.unit != unit || QuantityOf(*input_.mechanism, channel.name) != quantity) continue;
+      if (channel.unit != unit || channel.quantity != quantity) continue;
       const auto column = shared_.table.values.col(c);
       sum2 += column.squaredNorm();
       count += static_cast<double>(column.size());
@@ -172,15 +149,15 @@ class StatedLimits {
 };
 
 bool IsForceLike(Quantity quantity) {
-  return quantity == Quantity::kForce || quantity == Quantity::kBase ||
-         quantity == Quantity::kReaction || quantity == Quantity::kOther;
+  return quantity == Quantity::kForce || quantity == Quantity::kBaseForce ||
+         quantity == Quantity::kReaction || quantity == Quantity::kOwn;
 }
 
 // Differences of one column; the start-up window is left out of forces.
 TableColumnResult Measure(const ComparisonInput& input, const Shared& shared, Eigen::Index c) {
   const auto k = static_cast<size_t>(c);
   const Channel& channel = shared.table.channels[k];
-  const bool windowed = IsForceLike(QuantityOf(*input.mechanism, channel.name));
+  const bool windowed = IsForceLike(channel.quantity);
   TableColumnResult result{.channel = channel.name, .column = shared.columns[k]};
   ErrorSum difference, standard;
   double bound = 0.0;
@@ -285,7 +262,7 @@ std::string TooCoarse(const ComparisonInput& input, const std::map<Metric, doubl
   const AlignedTable& table = *input.table;
   bool any_force = false, all_coarse = true;
   for (const TableColumnResult& column : columns) {
-    const Quantity quantity = QuantityOf(*input.mechanism, column.channel);
+    const Quantity quantity = table.trace.channels[column.column].quantity;
     any_force = any_force || quantity == Quantity::kForce;
     all_coarse = all_coarse && table.coverage * column.standard > table.coarsest * column.rms;
   }

@@ -3,7 +3,7 @@
 //
 //   pairs            of witnesses: kRolePairs (core/roles.h)
 //   a check          passes only if its value is a number at or below its limit
-//   two against one  the two that are closest by far stand against the third
+//   two against one  those that are closest by far stand against the one that is left
 #pragma once
 
 #include <algorithm>
@@ -77,18 +77,35 @@ void SortByDistance(std::vector<Distance>* distances) {
                    [&](const Distance& a, const Distance& b) { return key(a) < key(b); });
 }
 
-/// The third witness must be this much farther from the other two than they are from each other.
+/// The odd one must be this much farther from each of the others than they are from each other.
 inline constexpr double kClearlyFarther = 10.0;
 
-/// The witness that the other two stand against, of three sorted distances; "" where no two are
-/// clearly closer, or there are fewer than three.
+/// The nearest pair in which a witness takes part, of sorted distances; null if there is none.
+template <typename Distance>
+[[nodiscard]] const Distance* NearestOf(const std::string& witness,
+                                        const std::vector<Distance>& sorted) {
+  const auto found = std::find_if(sorted.begin(), sorted.end(), [&](const Distance& d) {
+    return d.measured == witness || d.truth == witness;
+  });
+  return found == sorted.end() ? nullptr : &*found;
+}
+
+/// The witness that all others stand against, of three or more sorted distances; "" where the
+/// others are not clearly closer to each other.
 template <typename Distance>
 [[nodiscard]] std::string OddOneOut(const std::vector<Distance>& sorted) {
   if (sorted.size() < 3) return "";
-  const PairDistance &near = sorted[0], &far = sorted[1];
-  if (!(far.value >= kClearlyFarther * near.value || std::isnan(far.value))) return "";
-  for (const std::string& name : {far.measured, far.truth}) {
-    if (name != near.measured && name != near.truth) return name;
+  const PairDistance& nearest = sorted.front();
+  for (const Distance& pair : sorted) {
+    for (const std::string& name : {pair.measured, pair.truth}) {
+      if (name == nearest.measured || name == nearest.truth) continue;
+      const double far = NearestOf(name, sorted)->value;
+      double among_others = nearest.value;  // the farthest pair without it
+      for (const Distance& other : sorted) {
+        if (other.measured != name && other.truth != name) among_others = other.value;
+      }
+      if (far >= kClearlyFarther * among_others || std::isnan(far)) return name;
+    }
   }
   return "";
 }

@@ -117,6 +117,14 @@ constexpr auto MakeRolePairs() {
 /// All pairs that are compared, in the order in which they are shown.
 inline constexpr auto kRolePairs = internal::MakeRolePairs();
 
+/// Some pair is about it.
+[[nodiscard]] constexpr bool IsCompared(const Role& role) {
+  for (const RolePair& pair : kRolePairs) {
+    if (pair.measured == &role || pair.truth == &role) return true;
+  }
+  return false;
+}
+
 /// The pairs that a reader looks at first, the most telling one first.
 inline constexpr std::array<RolePair, 4> kMainPairs = {{{&role::kSimulated, &role::kReached},
                                                         {&role::kSimulated, &role::kAnalytic},

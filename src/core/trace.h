@@ -4,17 +4,10 @@
 #include <string>
 #include <vector>
 
+#include "core/channel.h"
 #include "core/types.h"
 
 namespace mbv {
-
-/// One recorded signal.
-struct Channel {
-  std::string name;   ///< e.g. "limb1.drive.force"; the drive channels end in .position .velocity
-                      ///< .acceleration .force
-  std::string unit;   ///< SI: "m", "rad", "m/s", "N", "N m", "W", …; "1" when dimensionless
-  std::string frame;  ///< the frame its components are expressed in; empty for scalars
-};
 
 /// Samples of channels on a common time grid. Witnesses sample at the same times, so traces are
 /// compared without interpolation.
@@ -26,6 +19,10 @@ struct Trace {
 
   /// Column of the channel with this name, or -1.
   [[nodiscard]] int Find(const std::string& name) const;
+  [[nodiscard]] int Find(Quantity quantity, const std::string& subject = "",
+                         int component = -1) const {
+    return Find(ChannelName(quantity, subject, component));
+  }
   /// Sets channels and times and fills the values with NaN.
   void Reset(std::vector<double> times_s, std::vector<Channel> new_channels);
 };

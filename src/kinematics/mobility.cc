@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <set>
 
+#include "core/channel.h"
 #include "core/demand.h"
+#include "core/text.h"
 #include "kinematics/row_stack.h"
 #include "mechanism/reach.h"
 
@@ -44,7 +46,6 @@ struct ReactionStack {
 UndeterminedReaction OpenComponents(const Joint& joint, const ConstraintRows& rows,
                                     const BodyStates& states, double length,
                                     const MatX& self_stress, int first_row) {
-  static constexpr const char* kNames[] = {"fx", "fy", "fz", "mx", "my", "mz"};
   const Mat3 R_FW = (states.X_WB[joint.parent].linear() * joint.X_PF.linear()).transpose();
   const Vec3 r_M = states.X_WB[joint.child].linear() * joint.X_CM.translation();
   Vec6 most = Vec6::Zero();  // [f; m / L]
@@ -60,8 +61,9 @@ UndeterminedReaction OpenComponents(const Joint& joint, const ConstraintRows& ro
     most.tail<3>() = most.tail<3>().cwiseMax(m.cwiseAbs() / length);
   }
   UndeterminedReaction reaction{joint.name, {}};
-  for (Eigen::Index c = 0; c < 6; ++c) {
-    if (most[c] > kStressTolerance) reaction.components.emplace_back(kNames[c]);
+  for (size_t c = 0; c < kReactionComponents.size(); ++c) {
+    const bool open = most[static_cast<Eigen::Index>(c)] > kStressTolerance;
+    if (open) reaction.components.emplace_back(kReactionComponents[c]);
   }
   return reaction;
 }
@@ -131,8 +133,9 @@ std::vector<std::string> ReactionsNotUnique(const Mechanism& mechanism,
   std::set<std::string> open;
   const auto add = [&](const Mobility& mobility) {
     for (const UndeterminedReaction& reaction : mobility.reactions_not_unique) {
-      for (const std::string& component : reaction.components) {
-        open.insert(reaction.joint + ".reaction." + component);
+      for (int c = 0; c < 6; ++c) {
+        if (!Contains(reaction.components, kReactionComponents[static_cast<size_t>(c)])) continue;
+        open.insert(ChannelName(Quantity::kReaction, reaction.joint, c));
       }
     }
   };

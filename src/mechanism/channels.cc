@@ -5,16 +5,26 @@ namespace {
 
 std::string PerTime(const std::string& unit, const char* power) { return unit + "/s" + power; }
 
+const char* PoseUnit(int component) { return component < 3 ? "m" : "rad"; }
+
 }  // namespace
 
 std::vector<Channel> DriveChannels(const Mechanism& mechanism) {
   std::vector<Channel> channels;
   for (const Drive& drive : mechanism.drives) {
     const std::string unit = PositionUnit(mechanism, drive);
-    channels.push_back({drive.name + ".position", unit, ""});
-    channels.push_back({drive.name + ".velocity", PerTime(unit, ""), ""});
-    channels.push_back({drive.name + ".acceleration", PerTime(unit, "^2"), ""});
-    channels.push_back({drive.name + ".force", ForceUnit(mechanism, drive), ""});
+    channels.push_back(MakeChannel(Quantity::kPosition, unit, drive.name));
+    channels.push_back(MakeChannel(Quantity::kVelocity, PerTime(unit, ""), drive.name));
+    channels.push_back(MakeChannel(Quantity::kAcceleration, PerTime(unit, "^2"), drive.name));
+    channels.push_back(MakeChannel(Quantity::kForce, ForceUnit(mechanism, drive), drive.name));
+  }
+  return channels;
+}
+
+std::vector<Channel> PoseChannels(const std::string& output, const std::string& frame) {
+  std::vector<Channel> channels;
+  for (int c = 0; c < 6; ++c) {
+    channels.push_back(MakeChannel(Quantity::kPose, PoseUnit(c), output, frame, c));
   }
   return channels;
 }
@@ -22,22 +32,21 @@ std::vector<Channel> DriveChannels(const Mechanism& mechanism) {
 std::vector<Channel> OutputChannels(const Mechanism& mechanism) {
   std::vector<Channel> channels;
   for (const Output& output : mechanism.outputs) {
-    const std::string frame = mechanism.bodies[output.reference_body].name;
-    for (const char* c : {"x", "y", "z"}) channels.push_back({output.name + "." + c, "m", frame});
-    for (const char* c : {"roll", "pitch", "yaw"}) {
-      channels.push_back({output.name + "." + c, "rad", frame});
+    const std::string& frame = mechanism.bodies[output.reference_body].name;
+    for (Channel& channel : PoseChannels(output.name, frame)) {
+      channels.push_back(std::move(channel));
     }
   }
   return channels;
 }
 
 std::vector<Channel> OutputRateChannels(const Mechanism& mechanism, const Output& output) {
-  const std::string frame = mechanism.bodies[output.reference_body].name;
+  const std::string& frame = mechanism.bodies[output.reference_body].name;
   std::vector<Channel> channels;
-  for (const auto& [signal, power] : {std::pair{".velocity", ""}, {".acceleration", "^2"}}) {
-    for (const char* c : {"x", "y", "z", "roll", "pitch", "yaw"}) {
-      const char* unit = std::string(c).size() == 1 ? "m" : "rad";
-      channels.push_back({output.name + "." + c + signal, PerTime(unit, power), frame});
+  for (const auto& [quantity, power] :
+       {std::pair{Quantity::kPoseVelocity, ""}, std::pair{Quantity::kPoseAcceleration, "^2"}}) {
+    for (int c = 0; c < 6; ++c) {
+      channels.push_back(MakeChannel(quantity, PerTime(PoseUnit(c), power), output.name, frame, c));
     }
   }
   return channels;
@@ -48,41 +57,46 @@ std::vector<Channel> PrescribedChannels(const Mechanism& mechanism) {
   for (const Prescribed& prescribed : mechanism.prescribed) {
     const Joint& joint = mechanism.joints[prescribed.joint];
     const char* unit = IsLength(joint.kind, 0) ? "N" : "N m";
-    channels.push_back({prescribed.name + ".force", unit, ""});
+    channels.push_back(MakeChannel(Quantity::kBaseForce, unit, prescribed.name));
   }
   return channels;
 }
 
 std::vector<Channel> ReactionChannels(const Joint& joint) {
   std::vector<Channel> channels;
-  for (const char* c : {"fx", "fy", "fz"}) {
-    channels.push_back({joint.name + ".reaction." + c, "N", joint.name});
-  }
-  for (const char* c : {"mx", "my", "mz"}) {
-    channels.push_back({joint.name + ".reaction." + c, "N m", joint.name});
+  for (int c = 0; c < 6; ++c) {
+    const char* unit = c < 3 ? "N" : "N m";
+    channels.push_back(MakeChannel(Quantity::kReaction, unit, joint.name, joint.name, c));
   }
   return channels;
 }
 
 std::vector<Channel> AuditChannels() {
-  return {
-      {"closure.position", "m", ""},  {"closure.rotation", "rad", ""}, {"power.input", "W", ""},
-      {"power.energy_rate", "W", ""}, {"power.base", "W", ""},         {"power.loads", "W", ""},
-      {"power.dampers", "W", ""},     {"power.gravity", "W", ""},      {"power.springs", "W", ""}};
+  std::vector<Channel> channels;
+  for (const Quantity quantity :
+       {Quantity::kLoopGap, Quantity::kLoopTwist, Quantity::kInputPower, Quantity::kEnergyRate,
+        Quantity::kBasePower, Quantity::kLoadPower, Quantity::kDamperPower, Quantity::kGravityPower,
+        Quantity::kSpringPower}) {
+    channels.push_back(MakeChannel(quantity));
+  }
+  return channels;
 }
 
 std::vector<Channel> EnergyChannels() {
-  return {{"energy.kinetic", "J", ""}, {"energy.gravity", "J", ""}, {"energy.springs", "J", ""}};
+  return {MakeChannel(Quantity::kKineticEnergy), MakeChannel(Quantity::kGravityEnergy),
+          MakeChannel(Quantity::kSpringEnergy)};
 }
 
 std::vector<Channel> WorkChannels(const Mechanism& mechanism) {
   std::vector<Channel> channels;
-  for (const Drive& drive : mechanism.drives) channels.push_back({drive.name + ".work", "J", ""});
-  for (const Prescribed& base : mechanism.prescribed) {
-    channels.push_back({base.name + ".work", "J", ""});
+  for (const Drive& drive : mechanism.drives) {
+    channels.push_back(MakeChannel(Quantity::kWork, "J", drive.name));
   }
-  channels.push_back({"loads.work", "J", ""});
-  channels.push_back({"dampers.work", "J", ""});
+  for (const Prescribed& base : mechanism.prescribed) {
+    channels.push_back(MakeChannel(Quantity::kBaseWork, "J", base.name));
+  }
+  channels.push_back(MakeChannel(Quantity::kLoadWork));
+  channels.push_back(MakeChannel(Quantity::kDamperWork));
   return channels;
 }
 

@@ -1,4 +1,4 @@
-// Names of the channels that every witness records, so that traces can be matched by name.
+// The channels that every witness records, so that traces can be matched.
 #pragma once
 
 #include <string>
@@ -13,6 +13,9 @@ namespace mbv {
 [[nodiscard]] std::vector<Channel> DriveChannels(const Mechanism& mechanism);
 /// OUTPUT.x, .y, .z [m], .roll, .pitch, .yaw [rad] for every output in model order.
 [[nodiscard]] std::vector<Channel> OutputChannels(const Mechanism& mechanism);
+/// The same of one output, whose reference frame is that of body `frame`.
+[[nodiscard]] std::vector<Channel> PoseChannels(const std::string& output,
+                                                const std::string& frame);
 /// OUTPUT.x.velocity … OUTPUT.yaw.velocity, then OUTPUT.x.acceleration … OUTPUT.yaw.acceleration:
 /// first and second time derivatives of the components of one output.
 [[nodiscard]] std::vector<Channel> OutputRateChannels(const Mechanism& mechanism,

@@ -1,5 +1,6 @@
 #include "mechanism/mechanism.h"
 
+#include "core/channel.h"
 #include "core/demand.h"
 
 namespace mbv {
@@ -51,7 +52,7 @@ std::string ForceUnit(const Mechanism& mechanism, const Drive& drive) {
 }
 
 SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive) {
-  SignalSheet sheet{.signal = drive.name + ".force",
+  SignalSheet sheet{.signal = ChannelName(Quantity::kForce, drive.name),
                     .acts_on = {},
                     .exerted_by = {},
                     .frame = {},
@@ -78,7 +79,7 @@ SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive) {
 }
 
 SignalSheet SheetOf(const Mechanism& mechanism, const Joint& joint) {
-  return {.signal = joint.name + ".reaction",
+  return {.signal = ChannelName(Quantity::kReaction, joint.name),
           .acts_on = mechanism.bodies[joint.child].name,
           .exerted_by = mechanism.bodies[joint.parent].name + " through " + joint.name +
                         " (drive forces excluded)",

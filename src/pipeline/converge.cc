@@ -32,7 +32,7 @@ struct SteppedRun {
 MatX OutputPositions(const Output& output, const Trace& trace) {
   MatX positions(trace.values.rows(), 3);
   for (int c = 0; c < 3; ++c) {
-    positions.col(c) = trace.values.col(trace.Find(output.name + "." + "xyz"[c]));
+    positions.col(c) = trace.values.col(trace.Find(Quantity::kPose, output.name, c));
   }
   return positions;
 }
@@ -177,7 +177,7 @@ class Study {
     run.point.cpu_s = witness.run.loop_cpu_s;
     run.point.error = Error(run.forces - truth_forces_);
     run.point.pose_m = PoseError(mechanism(), trace, truth_, classes_);
-    if (const int gap = trace.Find("closure.position"); gap >= 0) {
+    if (const int gap = trace.Find(Quantity::kLoopGap); gap >= 0) {
       run.point.closure_m = trace.values.col(gap).maxCoeff();
     }
     return run;

@@ -7,7 +7,6 @@
 #include <map>
 
 #include "core/demand.h"
-#include "mechanism/channels.h"
 #include "pipeline/free_motion_text.h"
 
 namespace mbv {
@@ -47,15 +46,13 @@ std::string GainText(const Gain& gain) {
 
 ReferenceRun RunReached(const Mechanism& mechanism, const Motion& motion, const Trace& simulated) {
   const Motion drives = CommandDrives(mechanism, motion);
+  const ChannelColumns columns(simulated.channels);
   const auto commands = [&](size_t i, CommandSample* command) {
     for (size_t d = 0; d < mechanism.drives.size(); ++d) {
       const auto row = static_cast<Eigen::Index>(i), k = static_cast<Eigen::Index>(d);
-      const int position = simulated.Find(mechanism.drives[d].name + ".position");
-      MBV_DEMAND(position >= 0, mechanism.drives[d].name);
-      // Position, velocity and acceleration are neighbours (DriveChannels).
-      command->position[k] = simulated.values(row, position);
-      command->velocity[k] = simulated.values(row, position + 1);
-      command->acceleration[k] = simulated.values(row, position + 2);
+      command->position[k] = simulated.values(row, columns(Quantity::kPosition, d));
+      command->velocity[k] = simulated.values(row, columns(Quantity::kVelocity, d));
+      command->acceleration[k] = simulated.values(row, columns(Quantity::kAcceleration, d));
     }
   };
   ReferenceRun run = RunReference(mechanism, drives, {}, commands);
@@ -67,7 +64,7 @@ DriveForces Bent(const DriveForces& forces, const Mechanism& mechanism, const Tr
                  double bend) {
   std::map<std::string, std::pair<double, double>> square;  // per unit: sum and count
   for (const Drive& drive : mechanism.drives) {
-    const int column = truth.Find(drive.name + ".force");
+    const int column = truth.Find(Quantity::kForce, drive.name);
     MBV_DEMAND(column >= 0, drive.name);
     auto& [sum, count] = square[ForceUnit(mechanism, drive)];
     sum += truth.values.col(column).squaredNorm();

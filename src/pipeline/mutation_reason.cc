@@ -138,13 +138,12 @@ double InertiaEffect(const MutationBench& bench, const Mechanism& bent) {
   return std::max(share(change_force, all_force), share(change_moment, all_moment));
 }
 
-// Largest change of channels that `wanted` names, relative to the largest value among them.
-template <typename F>
-double ChannelChange(const Trace& base, const Trace& bent, F wanted) {
+// Largest change of all channels of a quantity, relative to the largest value among them.
+double ChannelChange(const Trace& base, const Trace& bent, Quantity quantity) {
   double change = 0.0, largest = 0.0;
   for (size_t c = 0; c < base.channels.size(); ++c) {
     const int other = bent.Find(base.channels[c].name);
-    if (other < 0 || !wanted(base.channels[c])) continue;
+    if (other < 0 || base.channels[c].quantity != quantity) continue;
     const VecX a = base.values.col(static_cast<Eigen::Index>(c)), b = bent.values.col(other);
     if (a.size() != b.size() || a.size() == 0) continue;
     change = std::max(change, (a - b).cwiseAbs().maxCoeff());
@@ -161,7 +160,8 @@ double ForceSensitivity(const MutationBench& bench, const Trace& bent) {
   std::map<std::string, std::pair<double, double>> sums;  // unit → Σ f², count
   std::map<std::string, double> changes;
   for (const Drive& drive : m.drives) {
-    const int a = base.Find(drive.name + ".force"), b = bent.Find(drive.name + ".force");
+    const std::string force = ChannelName(Quantity::kForce, drive.name);
+    const int a = base.Find(force), b = bent.Find(force);
     if (a < 0 || b < 0 || base.values.rows() != bent.values.rows()) return kNan;
     const std::string unit = ForceUnit(m, drive);
     sums[unit].first += base.values.col(a).squaredNorm();
@@ -180,8 +180,8 @@ double ForceSensitivity(const MutationBench& bench, const Trace& bent) {
 std::string WhySwapUnseen(const MutationBench& bench, const std::string& a, const std::string& b) {
   const Trace& trace = bench.base().trace;
   double worst = 0.0;
-  for (const char* signal : {".position", ".force"}) {
-    const int i = trace.Find(a + signal), j = trace.Find(b + signal);
+  for (const Quantity quantity : {Quantity::kPosition, Quantity::kForce}) {
+    const int i = trace.Find(quantity, a), j = trace.Find(quantity, b);
     if (i < 0 || j < 0) return "";
     const double largest = trace.values.col(i).cwiseAbs().maxCoeff();
     const double change = (trace.values.col(i) - trace.values.col(j)).cwiseAbs().maxCoeff();
@@ -261,13 +261,9 @@ std::string WhyUnseen(const MutationBench& bench, const Mechanism& bent, const B
     }
     text += fmt::format(", whose inertia forces change by {:.1e}", effect);
   }
-  const double prescribed = ChannelChange(bench.base().trace, run.trace, [&](const Channel& c) {
-    return std::any_of(base.prescribed.begin(), base.prescribed.end(),
-                       [&](const Prescribed& p) { return c.name == p.name + ".force"; });
-  });
-  const double reactions = ChannelChange(bench.base().trace, run.trace, [](const Channel& c) {
-    return c.name.find(".reaction.") != std::string::npos;
-  });
+  const Trace& trace = bench.base().trace;
+  const double prescribed = ChannelChange(trace, run.trace, Quantity::kBaseForce);
+  const double reactions = ChannelChange(trace, run.trace, Quantity::kReaction);
   if (prescribed > kNoChange) {
     text +=
         fmt::format(", carried by the prescribed motion (its forces change by {:.1e})", prescribed);

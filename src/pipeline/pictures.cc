@@ -87,13 +87,13 @@ std::vector<MjcfKey> SnapshotKeys(const Scenario& scenario, const Mechanism& mec
     key.time_s = run.trace.time_s[static_cast<size_t>(sample)];
     key.name = SnapshotName(key.time_s);
     for (const double x : run.qpos.row(sample)) key.qpos.push_back(x);
-    const auto value = [&](const std::string& channel) {
-      const int column = run.trace.Find(channel);
+    const auto position = [&](const Drive& drive) {
+      const int column = run.trace.Find(Quantity::kPosition, drive.name);
       const double x = column < 0 ? 0.0 : run.trace.values(sample, column);
       return std::isfinite(x) ? x : 0.0;
     };
     for (const Drive& drive : mechanism.drives) {
-      key.drive_position.push_back(value(drive.name + ".position"));
+      key.drive_position.push_back(position(drive));
     }
     keys.push_back(std::move(key));
   }

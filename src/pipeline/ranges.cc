@@ -48,7 +48,7 @@ std::string RangeViolation::Text() const {
 std::vector<RangeViolation> DriveViolations(const Mechanism& mechanism, const Trace& trace) {
   std::vector<RangeViolation> violations;
   for (const Drive& drive : mechanism.drives) {
-    const int column = trace.Find(drive.name + ".position");
+    const int column = trace.Find(Quantity::kPosition, drive.name);
     if (column < 0 || !IsBounded(drive.range)) continue;
     RangeViolation worst{.what = "drive " + drive.name,
                          .range = drive.range,

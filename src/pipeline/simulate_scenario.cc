@@ -38,7 +38,7 @@ Trace Extrapolate(const Trace& a, double at_a, const Trace& b, double at_b, doub
     if (channel.unit == "N" || channel.unit == "N m" || channel.unit == "W" ||
         channel.unit == "J") {
       trace.values.col(column) += factor * (b.values.col(column) - a.values.col(column));
-    } else if (channel.name.starts_with("closure.")) {
+    } else if (channel.quantity == Quantity::kLoopGap || channel.quantity == Quantity::kLoopTwist) {
       const auto worse = [](double x, double y) { return std::isnan(x) || x > y ? x : y; };
       trace.values.col(column) =
           a.values.col(column).cwiseAbs().binaryExpr(b.values.col(column).cwiseAbs(), worse);

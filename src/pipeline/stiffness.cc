@@ -93,26 +93,26 @@ class Runner {
 
   void RunAnalytic() {
     if (prepared_.form == nullptr) {
-      AddFailed("analytic", NotRun(prepared_.form_reason));
+      AddFailed(role::kAnalytic.name, NotRun(prepared_.form_reason));
       return;
     }
     const auto start = std::chrono::steady_clock::now();
     StiffnessResult result = prepared_.form->Evaluate(scenario_.pose);
     report().timing.analytic_s = result.summary.wall_s = Since(start);
-    Add("analytic", std::move(result));
+    Add(role::kAnalytic.name, std::move(result));
   }
 
   void RunFrame() {
     if (!scenario_.reference.on) {
-      AddFailed("reference", NotRun("switched off in the scenario"));
+      AddFailed(role::kReference.name, NotRun("switched off in the scenario"));
       return;
     }
     const auto start = std::chrono::steady_clock::now();
     std::vector<Pose> X_WB;
-    if (!Assemble("reference", prepared_.reference, &X_WB)) return;
+    if (!Assemble(role::kReference.name, prepared_.reference, &X_WB)) return;
     StiffnessResult result = FrameStiffness(prepared_.reference, X_WB, prepared_.output);
     report().timing.reference_s = result.summary.wall_s = Since(start);
-    Add("reference", std::move(result));
+    Add(role::kReference.name, std::move(result));
   }
 
   // Poses of all bodies of a witness' mechanism, and where its output is; false after a failure.
@@ -137,22 +137,22 @@ class Runner {
 
   void RunSimulated() {
     if (!scenario_.simulation.on) {
-      AddFailed("simulated", NotRun("switched off in the scenario"));
+      AddFailed(role::kSimulated.name, NotRun("switched off in the scenario"));
       return;
     }
     if (IsSingular()) {
-      AddFailed("simulated", NotRun("the stiffness is singular: nothing can be loaded"));
+      AddFailed(role::kSimulated.name, NotRun("the stiffness is singular: nothing can be loaded"));
       return;
     }
     const auto start = std::chrono::steady_clock::now();
     std::vector<Pose> X_WB;
-    if (!Assemble("simulated", prepared_.simulated, &X_WB)) return;
+    if (!Assemble(role::kSimulated.name, prepared_.simulated, &X_WB)) return;
     CompliantRun run = SimulateStiffness(
         prepared_.simulated, X_WB, prepared_.output, scenario_.loads,
         {.force_N = scenario_.simulation.force_N, .moment_Nm = scenario_.simulation.moment_Nm});
     report().timing.simulation_s = run.result.summary.wall_s = Since(start);
     run_.mjcf = std::move(run.mjcf);
-    StiffnessWitness& witness = Add("simulated", std::move(run.result));
+    StiffnessWitness& witness = Add(role::kSimulated.name, std::move(run.result));
     witness.residual = run.residual;
     witness.extrapolation_error = run.extrapolation_error;
     // Under finite loads, geometry included.

@@ -76,7 +76,8 @@ bool RunMode(const std::string& scenario, const char* mode, double* nrmse, Surve
     return false;
   }
   const Comparison& comparison = outcome.report->comparison;
-  if (const PairComparison* pair = comparison.FindPair("simulated_vs_reference")) {
+  if (const PairComparison* pair =
+          comparison.FindPair(PairName(role::kSimulated, role::kReference))) {
     const auto force = pair->metrics.find(Metric::kForceNrmse);
     if (force != pair->metrics.end()) *nrmse = force->second.value;
   }

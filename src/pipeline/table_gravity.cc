@@ -28,7 +28,9 @@ std::optional<double> Misfit(Mechanism mechanism, const Motion& motion, const Al
   for (size_t c = 0; c < table.trace.channels.size(); ++c) {
     const Channel& channel = table.trace.channels[c];
     const int other = run.trace.Find(channel.name);
-    if (!channel.name.ends_with(".force") || other < 0) continue;
+    const bool force =
+        channel.quantity == Quantity::kForce || channel.quantity == Quantity::kBaseForce;
+    if (!force || other < 0) continue;
     ErrorSum sum;
     for (const auto& [i, j] : samples) {
       const double time_s = table.trace.time_s[static_cast<size_t>(i)];

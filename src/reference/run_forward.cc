@@ -140,14 +140,15 @@ RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
   internal::SampleRecorder recorder(mechanism);
   ReferenceSample sample;
   std::vector<BodyStates> samples;
+  const ChannelColumns columns(run->trace.channels);
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Constant(run->trace.values.cols(), kNan);
   RunSummary summary = RunSummary::Done();
   for (size_t i = 0; i < run->trace.time_s.size() && summary.ok(); ++i) {
     const double t_s = run->trace.time_s[i];
     if (i > 0) summary = free.AdvanceTo(t_s);
     if (!summary.ok()) break;
     Complete(t_s, &free, &recorder, &sample);
-    Eigen::RowVectorXd row(run->trace.values.cols());
-    internal::WriteSample(sample, options.reactions, row);
+    internal::WriteSample(sample, columns, row);
     run->trace.values.row(static_cast<Eigen::Index>(i)) = row;
     samples.push_back(sample.states);
   }

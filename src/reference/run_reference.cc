@@ -17,14 +17,15 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
   ReferenceSolver solver(mechanism, motion, options);
   CommandSample command;
   ReferenceSample sample;
+  const ChannelColumns columns(run.trace.channels);
+  Eigen::RowVectorXd row = Eigen::RowVectorXd::Constant(run.trace.values.cols(), kNan);
   run.summary = RunSummary::Done();
   for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
     EvaluateMotion(motion, run.trace.time_s[i], &command);
     if (commands) commands(i, &command);
     run.summary = solver.Dynamics(command, &sample);
     if (!run.summary.ok()) break;
-    Eigen::RowVectorXd row(run.trace.values.cols());
-    internal::WriteSample(sample, options.reactions, row);
+    internal::WriteSample(sample, columns, row);
     run.trace.values.row(static_cast<Eigen::Index>(i)) = row;
   }
   run.summary.wall_s =

@@ -72,38 +72,60 @@ std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reaction
   return channels;
 }
 
-void WriteSample(const ReferenceSample& sample, bool reactions,
-                 Eigen::Ref<Eigen::RowVectorXd> row) {
-  Eigen::Index at = 0;
-  const auto put = [&](double value) { row[at++] = value; };
-  for (Eigen::Index d = 0; d < sample.drive_force.size(); ++d) {
-    put(sample.driven.position[d]);
-    put(sample.driven.velocity[d]);
-    put(sample.driven.acceleration[d]);
-    put(sample.drive_force[d]);
+namespace {
+
+// Works of drives, prescribed joints, loads and dampers follow each other (WorkChannels).
+void WriteWork(const ReferenceSample& sample, const ChannelColumns& columns,
+               Eigen::Ref<Eigen::RowVectorXd> row) {
+  const Eigen::Index drives = sample.drive_force.size(), bases = sample.prescribed_force.size();
+  MBV_DEMAND(sample.work.size() == drives + bases + 2, sample.work.size());
+  for (Eigen::Index d = 0; d < drives; ++d) {
+    row[columns(Quantity::kWork, static_cast<size_t>(d))] = sample.work[d];
   }
-  const auto put_rows = [&](const MatX& table) {
+  for (Eigen::Index p = 0; p < bases; ++p) {
+    row[columns(Quantity::kBaseWork, static_cast<size_t>(p))] = sample.work[drives + p];
+  }
+  row[columns(Quantity::kLoadWork)] = sample.work[drives + bases];
+  row[columns(Quantity::kDamperWork)] = sample.work[drives + bases + 1];
+}
+
+}  // namespace
+
+void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
+                 Eigen::Ref<Eigen::RowVectorXd> row) {
+  const auto put = [&](Quantity quantity, Eigen::Index k, double value) {
+    row[columns(quantity, static_cast<size_t>(k))] = value;
+  };
+  // Six components per subject.
+  const auto put_rows = [&](Quantity quantity, const MatX& table) {
     for (Eigen::Index i = 0; i < table.rows(); ++i) {
-      for (Eigen::Index c = 0; c < table.cols(); ++c) put(table(i, c));
+      for (Eigen::Index c = 0; c < 6; ++c) put(quantity, 6 * i + c, table(i, c));
     }
   };
-  put_rows(sample.outputs);
+  for (Eigen::Index d = 0; d < sample.drive_force.size(); ++d) {
+    put(Quantity::kPosition, d, sample.driven.position[d]);
+    put(Quantity::kVelocity, d, sample.driven.velocity[d]);
+    put(Quantity::kAcceleration, d, sample.driven.acceleration[d]);
+    put(Quantity::kForce, d, sample.drive_force[d]);
+  }
+  put_rows(Quantity::kPose, sample.outputs);
   for (Eigen::Index p = 0; p < sample.prescribed_force.size(); ++p) {
-    put(sample.prescribed_force[p]);
+    put(Quantity::kBaseForce, p, sample.prescribed_force[p]);
   }
-  if (reactions) put_rows(sample.reactions);
-  put(sample.closure_position_m);
-  put(sample.closure_rotation_rad);
-  const Powers& power = sample.power;
-  for (const double watts : {power.input, power.energy_rate, power.base, power.loads, power.dampers,
-                             power.gravity, power.springs}) {
-    put(watts);
-  }
-  put(sample.energy.kinetic);
-  put(sample.energy.gravity);
-  put(sample.energy.springs);
-  for (const double work : sample.work) put(work);
-  MBV_DEMAND(at == row.size(), at);
+  if (columns.Has(Quantity::kReaction)) put_rows(Quantity::kReaction, sample.reactions);
+  put(Quantity::kLoopGap, 0, sample.closure_position_m);
+  put(Quantity::kLoopTwist, 0, sample.closure_rotation_rad);
+  put(Quantity::kInputPower, 0, sample.power.input);
+  put(Quantity::kEnergyRate, 0, sample.power.energy_rate);
+  put(Quantity::kBasePower, 0, sample.power.base);
+  put(Quantity::kLoadPower, 0, sample.power.loads);
+  put(Quantity::kDamperPower, 0, sample.power.dampers);
+  put(Quantity::kGravityPower, 0, sample.power.gravity);
+  put(Quantity::kSpringPower, 0, sample.power.springs);
+  put(Quantity::kKineticEnergy, 0, sample.energy.kinetic);
+  put(Quantity::kGravityEnergy, 0, sample.energy.gravity);
+  put(Quantity::kSpringEnergy, 0, sample.energy.springs);
+  if (sample.work.size() > 0) WriteWork(sample, columns, row);
 }
 
 }  // namespace mbv::internal

@@ -28,7 +28,9 @@ class SampleRecorder {
 
 /// Channels of the reference's traces.
 [[nodiscard]] std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reactions);
-/// Writes a sample into `row`, in the order of ReferenceChannels(), then the work if there is any.
-void WriteSample(const ReferenceSample& sample, bool reactions, Eigen::Ref<Eigen::RowVectorXd> row);
+/// Writes a sample into `row`: every channel of ReferenceChannels() that `columns` has, and the
+/// work if there is any.
+void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
+                 Eigen::Ref<Eigen::RowVectorXd> row);
 
 }  // namespace mbv::internal

@@ -124,7 +124,7 @@ PictureFrame SampleFrame(const Mechanism& mechanism, const SimulationRun& run, i
   MBV_DEMAND(sample >= 0 && sample < static_cast<int>(run.X_WB.size()), sample);
   PictureFrame frame{.X_WB = run.X_WB[sample], .drive_forces = {}, .caption = {}};
   for (const Drive& drive : mechanism.drives) {
-    const int column = run.trace.Find(drive.name + ".force");
+    const int column = run.trace.Find(Quantity::kForce, drive.name);
     frame.drive_forces.push_back(column < 0 ? kNan : run.trace.values(sample, column));
   }
   return frame;

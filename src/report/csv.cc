@@ -12,8 +12,8 @@
 namespace mbv {
 namespace {
 
-constexpr std::array<const char*, 4> kDriveSignals = {"position", "velocity", "acceleration",
-                                                      "force"};
+constexpr std::array<Quantity, 4> kDriveSignals = {Quantity::kPosition, Quantity::kVelocity,
+                                                   Quantity::kAcceleration, Quantity::kForce};
 
 struct CsvColumn {
   const Trace* trace;
@@ -60,8 +60,8 @@ class Columns {
   void AddDrives(const Report& report) {
     for (const std::string& drive : report.drives) {
       for (size_t w = 0; w < traces_.size(); ++w) {
-        for (const char* signal : kDriveSignals) {
-          const int column = traces_[w]->Find(drive + "." + signal);
+        for (const Quantity signal : kDriveSignals) {
+          const int column = traces_[w]->Find(signal, drive);
           if (column >= 0) Add(w, column);
         }
       }

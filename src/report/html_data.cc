@@ -127,10 +127,11 @@ class DataWriter {
     for (const WitnessRecord& record : report_.witnesses) {
       if (record.trace.time_s.empty()) continue;
       Json json = {{"name", record.name}};
-      for (const char* quantity : {"force", "position"}) {
-        json[quantity] = Json::array();
+      for (const auto& [key, quantity] :
+           {std::pair{"force", Quantity::kForce}, std::pair{"position", Quantity::kPosition}}) {
+        json[key] = Json::array();
         for (const Drive& drive : mechanism_.drives) {
-          json[quantity].push_back(signals_.Plain(record.trace, drive.name + "." + quantity));
+          json[key].push_back(signals_.Plain(record.trace, ChannelName(quantity, drive.name)));
         }
       }
       json["outputs"] = Outputs(record.trace);
@@ -144,8 +145,8 @@ class DataWriter {
     Json outputs = Json::array();
     for (const Output& output : mechanism_.outputs) {
       Json values = Json::array();
-      for (const char* c : {".x", ".y", ".z", ".roll", ".pitch", ".yaw"}) {
-        values.push_back(signals_.Plain(trace, output.name + c));
+      for (int c = 0; c < 6; ++c) {
+        values.push_back(signals_.Plain(trace, ChannelName(Quantity::kPose, output.name, c)));
       }
       const std::string& body = mechanism_.bodies[static_cast<size_t>(output.reference_body)].name;
       outputs.push_back({{"name", output.name}, {"frame", body}, {"values", std::move(values)}});
@@ -155,16 +156,18 @@ class DataWriter {
 
   // Closure and power, with the limits they are judged by.
   void AddAudit(const WitnessRecord& record, Json* json) const {
-    const std::vector<std::pair<const char*, const char*>> channels = {
-        {"closure_m", "closure.position"},
-        {"closure_rad", "closure.rotation"},
-        {"power_input", "power.input"},
-        {"power_rate", "power.energy_rate"}};
+    const std::string in = ChannelName(Quantity::kInputPower);
+    const std::string out = ChannelName(Quantity::kEnergyRate);
+    const std::vector<std::pair<const char*, std::string>> channels = {
+        {"closure_m", ChannelName(Quantity::kLoopGap)},
+        {"closure_rad", ChannelName(Quantity::kLoopTwist)},
+        {"power_input", in},
+        {"power_rate", out}};
     for (const auto& [key, channel] : channels) {
       (*json)[key] = signals_.Plain(record.trace, channel);
     }
-    const std::vector<double> input = signals_.Full(record.trace, "power.input");
-    const std::vector<double> rate = signals_.Full(record.trace, "power.energy_rate");
+    const std::vector<double> input = signals_.Full(record.trace, in);
+    const std::vector<double> rate = signals_.Full(record.trace, out);
     const double largest = std::fmax(Largest(input), Largest(rate));
     (*json)["power_error"] = signals_.Error(input, rate, largest > 0.0 ? 1.0 / largest : 1.0);
     Json limits = Json::object();
@@ -185,7 +188,7 @@ class DataWriter {
       Json errors = Json::array(), scales = Json::array();
       for (const Drive& drive : mechanism_.drives) {
         const double largest = LargestForce(*truth, ForceUnit(mechanism_, drive));
-        const std::string channel = drive.name + ".force";
+        const std::string channel = ChannelName(Quantity::kForce, drive.name);
         scales.push_back(largest);
         errors.push_back(signals_.Error(signals_.Full(*measured, channel),
                                         signals_.Full(*truth, channel),
@@ -206,7 +209,8 @@ class DataWriter {
     double largest = 0.0;
     for (const Drive& drive : mechanism_.drives) {
       if (ForceUnit(mechanism_, drive) != unit) continue;
-      largest = std::fmax(largest, Largest(signals_.Full(truth, drive.name + ".force")));
+      const std::string channel = ChannelName(Quantity::kForce, drive.name);
+      largest = std::fmax(largest, Largest(signals_.Full(truth, channel)));
     }
     return largest;
   }
@@ -216,7 +220,7 @@ class DataWriter {
     if (check == nullptr) return;
     if (check->limit) (*json)["limit"] = *check->limit;
     for (size_t i = 0; i < mechanism_.drives.size(); ++i) {
-      if (mechanism_.drives[i].name + ".force" != check->channel) continue;
+      if (ChannelName(Quantity::kForce, mechanism_.drives[i].name) != check->channel) continue;
       (*json)["worst"] = {
           {"drive", i}, {"time", Finite(check->time_s)}, {"value", Finite(check->value)}};
     }

@@ -65,7 +65,7 @@ class PageWriter {
       html += ForceCards(*pair);
     }
     for (const WitnessMetrics& witness : report_.comparison.witnesses) {
-      if (witness.witness != "simulated") continue;
+      if (!IsEngine(witness.witness)) continue;
       const auto add = [&](Metric metric, const char* title, const char* unit) {
         const auto found = witness.metrics.find(metric);
         if (found == witness.metrics.end()) return;

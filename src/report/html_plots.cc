@@ -61,7 +61,8 @@ std::string StaticPlotsHtml(const Report& report) {
   if (measured == nullptr || truth == nullptr) return "";
   std::map<std::string, LinePlot> forces, errors;  // by unit
   for (const std::string& drive : report.drives) {
-    const int column = measured->Find(drive + ".force"), other = truth->Find(drive + ".force");
+    const int column = measured->Find(Quantity::kForce, drive);
+    const int other = truth->Find(Quantity::kForce, drive);
     if (column < 0 || other < 0) continue;
     const std::string& unit = measured->channels[static_cast<size_t>(column)].unit;
     const auto add = [&](LinePlot* plot, const PlotPoints& points) {

@@ -98,7 +98,7 @@ class ReplayWriter {
   Json Times() const {
     Json times = Json::array();
     for (const WitnessRecord& record : input_.report->witnesses) {
-      if (record.name != "simulated" || record.trace.time_s.empty()) continue;
+      if (record.name != role::kSimulated || record.trace.time_s.empty()) continue;
       for (const size_t i : frames_) times.push_back(record.trace.time_s[i]);
     }
     if (times.empty()) times.push_back(0.0);

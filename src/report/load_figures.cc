@@ -4,18 +4,19 @@
 #include <cmath>
 #include <set>
 
+#include "core/text.h"
+
 namespace mbv {
 namespace {
-
-constexpr const char* kFirstReaction = ".reaction.fx";
 
 // A channel and its unit; empty when the trace has none.
 struct Signal {
   VecX values;
   std::string unit;
 };
-Signal SignalOf(const Trace& trace, const std::string& channel) {
-  const int column = trace.Find(channel);
+Signal SignalOf(const Trace& trace, Quantity quantity, const std::string& subject,
+                int component = -1) {
+  const int column = trace.Find(quantity, subject, component);
   if (column < 0) return {};
   return {trace.values.col(column), trace.channels[static_cast<size_t>(column)].unit};
 }
@@ -23,9 +24,9 @@ Signal SignalOf(const Trace& trace, const std::string& channel) {
 DriveLoad DriveLoadOf(const WitnessRecord& record, const std::string& drive) {
   const Trace& trace = record.trace;
   DriveLoad load{.drive = drive, .witness = record.name};
-  const Signal force = SignalOf(trace, drive + ".force");
-  const Signal velocity = SignalOf(trace, drive + ".velocity");
-  const Signal position = SignalOf(trace, drive + ".position");
+  const Signal force = SignalOf(trace, Quantity::kForce, drive);
+  const Signal velocity = SignalOf(trace, Quantity::kVelocity, drive);
+  const Signal position = SignalOf(trace, Quantity::kPosition, drive);
   load.force = FiguresOf(trace.time_s, force.values, force.unit);
   load.speed = FiguresOf(trace.time_s, velocity.values, velocity.unit);
   if (force.values.size() > 0 && velocity.values.size() > 0) {
@@ -41,12 +42,12 @@ DriveLoad DriveLoadOf(const WitnessRecord& record, const std::string& drive) {
   return load;
 }
 
-// Magnitude of three components; empty unless all are there.
-Signal MagnitudeOf(const Trace& trace, const std::string& joint, const char* quantity) {
+// Magnitude of three components of a reaction from `first` on; empty unless all are there.
+Signal MagnitudeOf(const Trace& trace, const std::string& joint, int first) {
   VecX squares;
   std::string unit;
-  for (const char* axis : {"x", "y", "z"}) {
-    const Signal component = SignalOf(trace, joint + ".reaction." + quantity + axis);
+  for (int c = first; c < first + 3; ++c) {
+    const Signal component = SignalOf(trace, Quantity::kReaction, joint, c);
     if (component.values.size() == 0) return {};
     if (squares.size() == 0) squares = VecX::Zero(component.values.size());
     squares += component.values.cwiseAbs2();
@@ -60,11 +61,9 @@ std::vector<std::string> JointsOf(const Report& report) {
   std::vector<std::string> joints;
   for (const WitnessRecord& record : report.witnesses) {
     for (const Channel& channel : record.trace.channels) {
-      if (!channel.name.ends_with(kFirstReaction)) continue;
-      std::string joint =
-          channel.name.substr(0, channel.name.size() - std::string(kFirstReaction).size());
-      if (std::find(joints.begin(), joints.end(), joint) == joints.end()) {
-        joints.push_back(std::move(joint));
+      if (channel.quantity != Quantity::kReaction || channel.component != 0) continue;
+      if (std::find(joints.begin(), joints.end(), channel.subject) == joints.end()) {
+        joints.push_back(channel.subject);
       }
     }
   }
@@ -72,9 +71,11 @@ std::vector<std::string> JointsOf(const Report& report) {
 }
 
 bool IsOpen(const Report& report, const std::string& joint) {
-  return std::any_of(
-      report.reactions_not_unique.begin(), report.reactions_not_unique.end(),
-      [&](const std::string& channel) { return channel.starts_with(joint + ".reaction."); });
+  for (int c = 0; c < 6; ++c) {
+    const std::string channel = ChannelName(Quantity::kReaction, joint, c);
+    if (Contains(report.reactions_not_unique, channel)) return true;
+  }
+  return false;
 }
 
 }  // namespace
@@ -116,8 +117,8 @@ LoadFigures LoadFiguresOf(const Report& report) {
   for (const std::string& joint : JointsOf(report)) {
     for (const WitnessRecord* record : ran) {
       const Trace& trace = record->trace;
-      const Signal force = MagnitudeOf(trace, joint, "f");
-      const Signal moment = MagnitudeOf(trace, joint, "m");
+      const Signal force = MagnitudeOf(trace, joint, 0);
+      const Signal moment = MagnitudeOf(trace, joint, 3);
       if (force.values.size() + moment.values.size() == 0) continue;
       loads.joints.push_back({.joint = joint,
                               .witness = record->name,

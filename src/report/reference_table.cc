@@ -64,7 +64,7 @@ std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
 // The table's values with their tube on the other witness' curve, and the difference in the tube.
 std::string PlotsHtml(const Report& report, const PairComparison& pair) {
   const TableVerdict& table = *report.comparison.table;
-  const Trace* values = TraceOf(report, "reference");
+  const Trace* values = TraceOf(report, role::kReference.name);
   const Trace* other = TraceOf(report, table.judged_against);
   if (values == nullptr || other == nullptr) return "";
   std::string html;
@@ -118,8 +118,8 @@ std::string PlotsHtml(const Report& report, const PairComparison& pair) {
 const PairComparison* TablePair(const Comparison& comparison) {
   if (!comparison.table || comparison.table->judged_against.empty()) return nullptr;
   for (const PairComparison& pair : comparison.pairs) {
-    const std::string& other = pair.measured == "reference" ? pair.truth : pair.measured;
-    const bool of_table = pair.measured == "reference" || pair.truth == "reference";
+    const std::string& other = pair.measured == role::kReference ? pair.truth : pair.measured;
+    const bool of_table = pair.Involves(role::kReference);
     if (of_table && other == comparison.table->judged_against && !pair.columns.empty()) {
       return &pair;
     }

@@ -4,12 +4,14 @@
 
 #include <set>
 
+#include "comparison/verdict.h"
+
 namespace mbv {
 namespace {
 
 // Whether a reader wants to see it even if it passes.
 bool IsKey(const CheckResult& check) {
-  const bool simulated = check.subject.starts_with("simulated");
+  const bool simulated = IsEngine(check.measured);
   switch (check.metric) {
     case Metric::kForceNrmse:
     case Metric::kTableTube:
@@ -18,7 +20,7 @@ bool IsKey(const CheckResult& check) {
     case Metric::kForceOwn:
     case Metric::kPoseM:
     case Metric::kPoseRad:
-      return check.subject == "simulated_vs_analytic";
+      return simulated && check.truth == role::kAnalytic;
     case Metric::kCommandM:
     case Metric::kCommandRad:
     case Metric::kCommandVelocity:
@@ -45,12 +47,7 @@ bool IsKey(const CheckResult& check) {
 }  // namespace
 
 const PairComparison* MainPair(const Comparison& comparison) {
-  for (const char* name : {"simulated_vs_reached", "simulated_vs_analytic",
-                           "simulated_vs_reference", "reference_vs_analytic"}) {
-    const PairComparison* pair = comparison.FindPair(name);
-    if (pair != nullptr && pair->compared) return pair;
-  }
-  return nullptr;
+  return MainPairOf(comparison.pairs);
 }
 
 const char* EngineComparison::NameOf(const std::string& engine) {

@@ -18,7 +18,7 @@ namespace mbv {
 
 /// One witness' part in a run.
 struct WitnessRecord {
-  std::string name;    ///< "analytic", "reference" or "simulated"
+  std::string name;    ///< of its role (core/roles.h)
   RunSummary summary;  ///< kNotRun with the reason if it was switched off
   Trace trace;         ///< empty if it did not run
 };

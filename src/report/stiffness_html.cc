@@ -50,16 +50,15 @@ class StiffnessPageWriter {
 
   std::string Cards() const {
     std::string html;
-    const auto entry = [&](const char* pair, const char* title) {
-      const StiffnessCheck* check =
-          report_.comparison.FindCheck(std::string(pair) + ".stiffness_entry");
+    const auto entry = [&](const std::string& pair, const char* title) {
+      const StiffnessCheck* check = report_.comparison.FindCheck(pair + ".stiffness_entry");
       if (check == nullptr) return;
       html += Card(title, fmt::format("{:.1e}", check->value),
                    Spaced(pair) + ", worst at " + check->where +
                        (check->limit ? fmt::format(", limit {:.0e}", *check->limit) : ""));
     };
-    entry("simulated_vs_analytic", "Stiffness difference");
-    entry("reference_vs_analytic", "Stiffness difference");
+    entry(PairName(role::kSimulated, role::kAnalytic), "Stiffness difference");
+    entry(PairName(role::kReference, role::kAnalytic), "Stiffness difference");
     if (const StiffnessWitness* shown = report_.Shown()) {
       html += Card("Rank", std::to_string(shown->result.rank), "of K, 6 if the output is held");
       if (shown->result.C.allFinite()) {

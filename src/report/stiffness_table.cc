@@ -49,9 +49,9 @@ class StiffnessTableWriter {
     Printed(report);
     if (out_.verbose()) out_.Gaps(view);
     const Timing& timing = report.timing;
-    out_.Times({{"analytic", timing.analytic_s},
-                {"reference", timing.reference_s},
-                {"simulation", timing.simulation_s}},
+    out_.Times({{role::kAnalytic.called, timing.analytic_s},
+                {role::kReference.called, timing.reference_s},
+                {role::kSimulated.called, timing.simulation_s}},
                timing.total_s);
     return out_.text();
   }
@@ -59,12 +59,12 @@ class StiffnessTableWriter {
  private:
   void Matrix(const StiffnessReport& report, const StiffnessWitness& witness) {
     out_.Line();
-    out_.Line(
-        fmt::format("  K ({}{}), rank {}: [m; f] = K [rotation; displacement] of {}'s origin, "
-                    "world axes, drives held",
-                    witness.name,
-                    witness.name == "analytic" && !report.model.empty() ? ", " + report.model : "",
-                    witness.result.rank, report.output));
+    out_.Line(fmt::format(
+        "  K ({}{}), rank {}: [m; f] = K [rotation; displacement] of {}'s origin, "
+        "world axes, drives held",
+        witness.name,
+        witness.name == role::kAnalytic && !report.model.empty() ? ", " + report.model : "",
+        witness.result.rank, report.output));
     std::vector<TextColumn> columns = {{"", -12}};
     for (int j = 0; j < 6; ++j) {
       columns.push_back({std::string(AxisName(j)) + (j < 3 ? " [1/rad]" : " [1/m]"), 14});

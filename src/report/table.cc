@@ -105,7 +105,7 @@ class VerdictTableWriter {
     for (const WitnessMetrics& witness : comparison.witnesses) {
       if (!witness.energy) continue;
       const EnergyAudit& audit = *witness.energy;
-      if (witness.witness != "simulated" && audit.text.empty()) continue;
+      if (!IsEngine(witness.witness) && audit.text.empty()) continue;
       if (first) out_.Line();
       first = false;
       std::string work, stored;
@@ -125,11 +125,12 @@ class VerdictTableWriter {
 
   void Tail(const Report& report) {
     const Timing& timing = report.timing;
-    std::vector<std::pair<const char*, double>> parts = {{"analytic", timing.analytic_s},
-                                                         {"reference", timing.reference_s},
-                                                         {"simulation", timing.simulation_s},
-                                                         {"other engine", timing.stock_s},
-                                                         {"pictures", timing.render_s}};
+    std::vector<std::pair<const char*, double>> parts = {
+        {role::kAnalytic.called, timing.analytic_s},
+        {role::kReference.called, timing.reference_s},
+        {role::kSimulated.called, timing.simulation_s},
+        {"other engine", timing.stock_s},
+        {"pictures", timing.render_s}};
     std::erase_if(parts, [](const auto& part) { return part.second <= 0.0; });
     std::string rate;
     if (timing.loop_s > 0.0 && timing.steps > 0) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "core/channel.h"
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "kinematics/command_rank.h"
@@ -66,7 +67,7 @@ class FreeMotionReader {
     }
     for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
       int component = 0;
-      for (const char* c : {"x", "y", "z", "roll", "pitch", "yaw"}) {
+      for (const char* c : kPoseComponents) {
         named.push_back({mechanism.outputs[o].name + "." + c,
                          {Coordinate::Kind::kOutput, static_cast<int>(o), component++}});
       }

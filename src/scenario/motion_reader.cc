@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/channel.h"
 #include "core/spatial.h"
 #include "core/text.h"
 #include "core/word_hints.h"
@@ -15,7 +16,6 @@
 namespace mbv {
 namespace {
 
-constexpr std::array<const char*, 6> kComponents = {"x", "y", "z", "roll", "pitch", "yaw"};
 constexpr double kMostSamples = 1e6;
 
 bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
@@ -313,7 +313,7 @@ std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
   for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
   for (const Drive& d : mechanism.drives) names.push_back(d.name);
   for (const Output& o : mechanism.outputs) {
-    for (const char* c : kComponents) names.push_back(o.name + "." + c);
+    for (const char* c : kPoseComponents) names.push_back(o.name + "." + c);
   }
   return names;
 }

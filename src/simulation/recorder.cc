@@ -19,27 +19,28 @@ void Append(const std::vector<Channel>& more, std::vector<Channel>* channels) {
 
 }  // namespace
 
-Recorder::Recorder(ConstraintSystem* system, bool work)
-    : system_(system), engine_(system->engine()) {
+std::vector<Channel> Recorder::MakeChannels(bool work) {
   const Mechanism& mechanism = *engine_.mechanism;
-  const auto column = [this] { return static_cast<int>(channels_.size()); };
-  Append(DriveChannels(mechanism), &channels_);
-  output_column_ = column();
-  Append(OutputChannels(mechanism), &channels_);
-  prescribed_column_ = column();
-  Append(PrescribedChannels(mechanism), &channels_);
-  reaction_column_ = column();
-  for (const Joint& joint : mechanism.joints) Append(ReactionChannels(joint), &channels_);
-  audit_column_ = column();
-  Append(AuditChannels(), &channels_);
-  Append(EnergyChannels(), &channels_);
-  if (work) Append(WorkChannels(mechanism), &channels_);
-  rate_column_ = column();
+  std::vector<Channel> channels = DriveChannels(mechanism);
+  Append(OutputChannels(mechanism), &channels);
+  Append(PrescribedChannels(mechanism), &channels);
+  for (const Joint& joint : mechanism.joints) Append(ReactionChannels(joint), &channels);
+  Append(AuditChannels(), &channels);
+  Append(EnergyChannels(), &channels);
+  if (work) Append(WorkChannels(mechanism), &channels);
   for (const Output& output : mechanism.outputs) {
     if (!HasOutputRates(engine_, output)) continue;
     rated_.push_back(&output);
-    Append(OutputRateChannels(mechanism, output), &channels_);
+    Append(OutputRateChannels(mechanism, output), &channels);
   }
+  return channels;
+}
+
+Recorder::Recorder(ConstraintSystem* system, bool work)
+    : system_(system),
+      engine_(system->engine()),
+      channels_(MakeChannels(work)),
+      columns_(channels_) {
   W_.setZero(6, engine_.m->nbody);
   work_.setZero(engine_.m->nv);
   FindReactionPlaces();
@@ -106,37 +107,37 @@ void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
   for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
     const DrivenPlace& place = engine_.driven[k];
     if (k >= drives) {
-      row[prescribed_column_ + k - drives] = system_->DrivenForce(k);
+      row[columns_(Quantity::kBaseForce, k - drives)] = system_->DrivenForce(k);
       continue;
     }
-    row[4 * k] = place.is_tendon ? d->ten_length[place.object]
-                                 : d->qpos[engine_.m->jnt_qposadr[place.object]];
+    row[columns_(Quantity::kPosition, k)] = place.is_tendon
+                                                ? d->ten_length[place.object]
+                                                : d->qpos[engine_.m->jnt_qposadr[place.object]];
     const auto J = system_->DrivenJacobian(k);
-    row[4 * k + 1] = J.dot(ConstVecX(d->qvel, nv));
-    row[4 * k + 2] = J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k, bias_);
-    row[4 * k + 3] = system_->DrivenForce(k);
+    row[columns_(Quantity::kVelocity, k)] = J.dot(ConstVecX(d->qvel, nv));
+    row[columns_(Quantity::kAcceleration, k)] =
+        J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k, bias_);
+    row[columns_(Quantity::kForce, k)] = system_->DrivenForce(k);
   }
 }
 
 void Recorder::RecordOutputs(const std::vector<Pose>& X_WB,
                              Eigen::Ref<Eigen::RowVectorXd> row) const {
-  int column = output_column_;
-  for (const Output& output : engine_.mechanism->outputs) {
+  const std::vector<Output>& outputs = engine_.mechanism->outputs;
+  for (size_t i = 0; i < outputs.size(); ++i) {
+    const Output& output = outputs[i];
     const Pose X_WR = X_WB[output.reference_body] * output.X_RbR;
     const Pose X_RO = X_WR.inverse(Eigen::Isometry) * X_WB[output.body] * output.X_BO;
-    row.segment<3>(column) = X_RO.translation().transpose();
-    row.segment<3>(column + 3) = RpyOf(X_RO.linear()).transpose();
-    column += 6;
+    row.segment<3>(columns_(Quantity::kPose, 6 * i)) = X_RO.translation().transpose();
+    row.segment<3>(columns_(Quantity::kPose, 6 * i + 3)) = RpyOf(X_RO.linear()).transpose();
   }
 }
 
 void Recorder::RecordOutputRates(Eigen::Ref<Eigen::RowVectorXd> row) const {
-  int column = rate_column_;
-  for (const Output* output : rated_) {
-    const OutputRates rates = OutputRatesOf(engine_, *system_->data(), *output);
-    row.segment<6>(column) = rates.velocity.transpose();
-    row.segment<6>(column + 6) = rates.acceleration.transpose();
-    column += 12;
+  for (size_t i = 0; i < rated_.size(); ++i) {
+    const OutputRates rates = OutputRatesOf(engine_, *system_->data(), *rated_[i]);
+    row.segment<6>(columns_(Quantity::kPoseVelocity, 6 * i)) = rates.velocity.transpose();
+    row.segment<6>(columns_(Quantity::kPoseAcceleration, 6 * i)) = rates.acceleration.transpose();
   }
 }
 
@@ -259,10 +260,10 @@ Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {
 void Recorder::RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
                                Eigen::Ref<Eigen::RowVectorXd> row) {
   TreeWrenches(loads);
-  for (int j = 0; j < static_cast<int>(places_.size()); ++j) {
-    const Vec6 F = ReactionOf(j, X_WB);
-    row.segment<3>(reaction_column_ + 6 * j) = F.tail<3>().transpose();
-    row.segment<3>(reaction_column_ + 6 * j + 3) = F.head<3>().transpose();
+  for (size_t j = 0; j < places_.size(); ++j) {
+    const Vec6 F = ReactionOf(static_cast<int>(j), X_WB);
+    row.segment<3>(columns_(Quantity::kReaction, 6 * j)) = F.tail<3>().transpose();
+    row.segment<3>(columns_(Quantity::kReaction, 6 * j + 3)) = F.head<3>().transpose();
   }
 }
 
@@ -277,10 +278,32 @@ void Recorder::RecordAudit(const Loads& loads, const VecX& work,
   const double energy_rate = ConstVecX(system_->data()->qvel, m.nv).dot(work_) - power.springs;
   const auto drives = static_cast<Eigen::Index>(engine_.mechanism->drives.size());
   const double base = power.driven().tail(power.driven().size() - drives).sum();
-  row.segment<12>(audit_column_) << gap.position_m, gap.rotation_rad,
-      power.driven().sum() + power.loads() + power.dampers(), energy_rate, base, power.loads(),
-      power.dampers(), power.gravity, power.springs, energy.kinetic, energy.gravity, energy.springs;
-  if (work.size() > 0) row.segment(audit_column_ + 12, work.size()) = work.transpose();
+  const auto put = [&](Quantity quantity, double value) { row[columns_(quantity)] = value; };
+  put(Quantity::kLoopGap, gap.position_m);
+  put(Quantity::kLoopTwist, gap.rotation_rad);
+  put(Quantity::kInputPower, power.driven().sum() + power.loads() + power.dampers());
+  put(Quantity::kEnergyRate, energy_rate);
+  put(Quantity::kBasePower, base);
+  put(Quantity::kLoadPower, power.loads());
+  put(Quantity::kDamperPower, power.dampers());
+  put(Quantity::kGravityPower, power.gravity);
+  put(Quantity::kSpringPower, power.springs);
+  put(Quantity::kKineticEnergy, energy.kinetic);
+  put(Quantity::kGravityEnergy, energy.gravity);
+  put(Quantity::kSpringEnergy, energy.springs);
+  if (work.size() > 0) RecordWork(work, row);
+}
+
+// Works of drives, prescribed joints, loads and dampers follow each other (WorkChannels).
+void Recorder::RecordWork(const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row) const {
+  const size_t drives = engine_.mechanism->drives.size();
+  const size_t bases = engine_.mechanism->prescribed.size();
+  MBV_DEMAND(static_cast<size_t>(work.size()) == drives + bases + 2, work.size());
+  Eigen::Index next = 0;
+  for (size_t d = 0; d < drives; ++d) row[columns_(Quantity::kWork, d)] = work[next++];
+  for (size_t p = 0; p < bases; ++p) row[columns_(Quantity::kBaseWork, p)] = work[next++];
+  row[columns_(Quantity::kLoadWork)] = work[next++];
+  row[columns_(Quantity::kDamperWork)] = work[next];
 }
 
 }  // namespace mbv::simulation

@@ -30,6 +30,7 @@ class Recorder {
     int body_id = -1;   // MuJoCo body whose wrench from its parent is the reaction
     double sign = 1.0;  // −1 if that is the wrench of the child on the parent
   };
+  [[nodiscard]] std::vector<Channel> MakeChannels(bool work);
   void FindReactionPlaces();
   void RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row);
   void RecordOutputs(const std::vector<Pose>& X_WB, Eigen::Ref<Eigen::RowVectorXd> row) const;
@@ -37,6 +38,7 @@ class Recorder {
   void RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
                        Eigen::Ref<Eigen::RowVectorXd> row);
   void RecordAudit(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row);
+  void RecordWork(const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row) const;
   void TreeWrenches(const Loads& loads);
   void AddExternal(int body_id, const Vec3& p_W, const Vec3& force, const Vec3& moment);
   void AddTendon(int tendon, double force);
@@ -46,10 +48,9 @@ class Recorder {
 
   ConstraintSystem* const system_;
   const EngineModel& engine_;
-  std::vector<Channel> channels_;
-  int output_column_ = 0, prescribed_column_ = 0, reaction_column_ = 0, audit_column_ = 0;
-  int rate_column_ = 0;
-  std::vector<const Output*> rated_;   // outputs whose rates MuJoCo's bodies give
+  std::vector<const Output*> rated_;  // outputs whose rates MuJoCo's bodies give
+  const std::vector<Channel> channels_;
+  const ChannelColumns columns_;
   std::vector<ReactionPlace> places_;  // per joint
   std::vector<std::vector<std::pair<int, int>>>
       driven_of_;                               // per joint: (driven row, MuJoCo joint)

@@ -157,8 +157,11 @@ TableSettings ReadTableSettings(ValueReader* values, const YamlNode* node) {
   ReadFormat(values, map, &settings.format);
   ReadTolerances(values, map, &settings);
   if (const YamlNode* witness = map.Find("witness")) {
-    const std::vector<std::string> words = {role::kReference.name, role::kAnalytic.name,
-                                            role::kSimulated.name, role::kSolver.name};
+    std::vector<std::string> words = {role::kReference.name};
+    for (const Role* role : kRoles) {
+      if (role == &role::kReference || !role->judged_alone() || !IsCompared(*role)) continue;
+      words.emplace_back(role->name);
+    }
     const auto choice = yaml.Choice(*witness, "reference.witness", words);
     if (choice) settings.witness = words[static_cast<size_t>(*choice)];
   }

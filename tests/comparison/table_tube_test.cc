@@ -39,7 +39,7 @@ struct TableCase {
     table.values.conservativeResize(101, c + 1);
     for (int i = 0; i <= 100; ++i) table.values(i, c) = f(0.01 * i);
     TableColumn column;
-    column.channel = {signal, "N", ""};
+    column.channel = solver.channels.at(static_cast<size_t>(solver.Find(signal)));
     column.heading = signal;
     column.unit = "N";
     table.columns.push_back(column);

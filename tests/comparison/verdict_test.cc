@@ -31,6 +31,25 @@ TEST(Verdict, NobodyIsOddUnlessClearlyFarther) {
   EXPECT_EQ(OddOneOut(SortedDistances(1.0, 1.0, 1.0)), "");
 }
 
+TEST(Verdict, OneOfFourIsOddWhereTheOthersAgree) {
+  const auto distances = [](double among_three, double to_fourth) {
+    std::vector<PairDistance> all = {{"a", "b", among_three}, {"a", "c", among_three},
+                                     {"b", "c", among_three}, {"d", "a", to_fourth},
+                                     {"d", "b", to_fourth},   {"d", "c", to_fourth}};
+    SortByDistance(&all);
+    return all;
+  };
+  EXPECT_EQ(OddOneOut(distances(1e-9, 1e-3)), "d");
+  EXPECT_EQ(OddOneOut(distances(1e-9, kNothing)), "d");
+  EXPECT_EQ(OddOneOut(distances(1e-3, 9e-3)), "");
+  EXPECT_EQ(NearestOf(std::string("d"), distances(1e-9, 1e-3))->value, 1e-3);
+  // Two against two.
+  std::vector<PairDistance> split = {{"a", "b", 1e-9}, {"c", "d", 1e-9}, {"a", "c", 1.0},
+                                     {"a", "d", 1.0},  {"b", "c", 1.0},  {"b", "d", 1.0}};
+  SortByDistance(&split);
+  EXPECT_EQ(OddOneOut(split), "");
+}
+
 TEST(Verdict, WhatIsNoNumberIsFarthest) {
   const std::vector<PairDistance> sorted = SortedDistances(kNothing, 1.0, kNothing);
   EXPECT_EQ(sorted[0].name(), "reference_vs_analytic");

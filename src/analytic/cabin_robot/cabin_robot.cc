@@ -7,6 +7,7 @@
 #include "analytic/cabin_robot/reactions.h"
 #include "analytic/cabin_robot/tool_inverse.h"
 #include "core/spatial.h"
+#include "mechanism/channels.h"
 
 namespace mbv::cabin {
 namespace {
@@ -72,15 +73,8 @@ class CabinRobot final : public ClosedForm {
   }
 
   std::vector<Channel> extra_channels() const override {
-    std::vector<Channel> channels;
-    for (const char* output : {"platform", "tool"}) {
-      for (const char* c : {"x", "y", "z"}) {
-        channels.push_back({std::string(output) + "." + c, "m", "world"});
-      }
-      for (const char* c : {"roll", "pitch", "yaw"}) {
-        channels.push_back({std::string(output) + "." + c, "rad", "world"});
-      }
-    }
+    std::vector<Channel> channels = PoseChannels("platform", "world");
+    for (Channel& channel : PoseChannels("tool", "world")) channels.push_back(std::move(channel));
     for (const char* angle : {"alpha", "beta", "epsilon"}) {
       channels.push_back({std::string("linkage.") + angle, "rad", ""});
     }

@@ -8,6 +8,7 @@
 #include "analytic/scara_robot/reactions.h"
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "mechanism/channels.h"
 
 namespace mbv::scara {
 namespace {
@@ -38,13 +39,7 @@ class ScaraClosedForm final : public ClosedForm {
         tracker_(parameters_) {}
 
   std::vector<Channel> extra_channels() const override {
-    std::vector<Channel> channels;
-    for (const char* c : {"x", "y", "z"}) {
-      channels.push_back({std::string("platform.") + c, "m", "world"});
-    }
-    for (const char* c : {"roll", "pitch", "yaw"}) {
-      channels.push_back({std::string("platform.") + c, "rad", "world"});
-    }
+    std::vector<Channel> channels = PoseChannels("platform", "world");
     channels.push_back({"singularity.s_min", "1", ""});
     channels.push_back({"singularity.det", "1", ""});
     channels.push_back({"singularity.near", "1", ""});

@@ -115,8 +115,8 @@ class SprTripod final : public ClosedForm {
       channels_.assign(all.begin() + 6 * wiring_.output, all.begin() + 6 * wiring_.output + 6);
     }
     for (const std::string& ball : wiring_.ball_name) {
-      for (const char* c : {".reaction.fx", ".reaction.fy", ".reaction.fz"}) {
-        channels_.push_back({ball + c, "N", ball});
+      for (int c = 0; c < 3; ++c) {
+        channels_.push_back(MakeChannel(Quantity::kReaction, "N", ball, ball, c));
       }
     }
     channels_.push_back({"tilt", "rad", ""});

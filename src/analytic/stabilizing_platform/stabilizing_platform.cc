@@ -62,14 +62,12 @@ class StabilizingPlatform final : public ClosedForm {
 
  private:
   void MakeChannels() {
-    auto add_pose = [&](const std::string& output, const char* frame) {
-      for (const char* c : {"x", "y", "z"}) channels_.push_back({output + "." + c, "m", frame});
-      for (const char* c : {"roll", "pitch", "yaw"}) {
-        channels_.push_back({output + "." + c, "rad", frame});
+    channels_ = PoseChannels("platform", "world");
+    if (has_base_output_) {
+      for (Channel& channel : PoseChannels("platform_in_base", "lower_platform")) {
+        channels_.push_back(std::move(channel));
       }
-    };
-    add_pose("platform", "world");
-    if (has_base_output_) add_pose("platform_in_base", "lower_platform");
+    }
     for (int i = 1; i <= 3; ++i) {
       const std::string limb = fmt::format("limb{}", i);
       channels_.push_back({limb + ".length", "m", ""});
