@@ -20,6 +20,13 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Runs of a scenario that are looked at: enough for a window of good ones with failed nights
+// between.
+constexpr int kPastRuns = 400;
+// A database that another program holds is free within 5 s.
+constexpr int kLockedAttempts = 50;
+constexpr std::chrono::milliseconds kLockedPause{100};
+
 class Appender {
  public:
   Appender(Database* database, const HistoryOptions& options) : db_(database), options_(options) {}
@@ -107,13 +114,13 @@ class Appender {
   }
 
   std::vector<PastValue> Past(long scenario, long since, const std::string& metric) {
-    // Newest first and bounded: enough for a window of good runs with failed nights between.
+    // Newest first.
     Statement select(db_,
                      "SELECT r.run, m.value, r.status = 'as_expected' AND m.pass, "
                      "m.drifted AND r.run > ?2 FROM result r JOIN metric m ON m.result = r.id "
                      "WHERE r.scenario = ?1 AND r.run >= ?2 AND m.name = ?3 "
-                     "ORDER BY r.run DESC LIMIT 400");
-    select.Bind(scenario, since, metric);
+                     "ORDER BY r.run DESC LIMIT ?4");
+    select.Bind(scenario, since, metric, kPastRuns);
     std::vector<PastValue> past;
     while (select.Step()) {
       past.push_back(
@@ -212,7 +219,7 @@ class Appender {
     Statement metric(db_, "INSERT INTO metric VALUES(?,?,?,?,?,?)");
     for (const auto& [name, value] : result.metrics) {
       const bool drifted = std::any_of(result.drifts.begin(), result.drifts.end(),
-                                       [&](const Drift& drift) { return drift.metric == name; });
+                                       [&name = name](const Drift& d) { return d.metric == name; });
       metric.Bind(id, name, value.value, value.limit, value.pass || !value.limit, drifted)
           .Execute();
     }
@@ -319,10 +326,10 @@ std::string AppendRun(const std::string& path, const std::map<std::string, Golde
   if (!folder.empty()) fs::create_directories(folder, error);
   // SQLite does not wait where waiting could be a deadlock, e.g. when two programs make the file.
   std::string trouble;
-  for (int attempt = 0; attempt < 50; ++attempt) {
+  for (int attempt = 0; attempt < kLockedAttempts; ++attempt) {
     trouble = AppendOnce(path, goldens, report, options);
     if (!trouble.ends_with("locked")) break;
-    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    std::this_thread::sleep_for(kLockedPause);
   }
   return trouble;
 }

@@ -34,7 +34,7 @@ int ExitCodeOf(CaseStatus status) {
     case CaseStatus::kCouldNotRun:
     case CaseStatus::kCrashed:
     case CaseStatus::kTimedOut:
-    case CaseStatus::kInternal:
+    case CaseStatus::kInternalError:
       return 3;
   }
   return 4;

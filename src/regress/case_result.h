@@ -16,14 +16,14 @@ namespace mbv {
 
 /// How a scenario ended. Everything but kAsExpected is a failed scenario.
 enum class CaseStatus {
-  kNotRun,       ///< pessimistic start value
-  kAsExpected,   ///< verdict, exit code and text are what the file's `expect:` says
-  kUnexpected,   ///< ran, but they are not
-  kBadInput,     ///< the file was refused, unexpectedly
-  kCouldNotRun,  ///< numerical trouble, unexpectedly
-  kCrashed,      ///< killed by a signal, or could not be started
-  kTimedOut,     ///< killed after the time limit
-  kInternal,     ///< exit code 4 or one that mbverify does not have
+  kNotRun,         ///< pessimistic start value
+  kAsExpected,     ///< verdict, exit code and text are what the file's `expect:` says
+  kUnexpected,     ///< ran, but they are not
+  kBadInput,       ///< the file was refused, unexpectedly
+  kCouldNotRun,    ///< numerical trouble, unexpectedly
+  kCrashed,        ///< killed by a signal, or could not be started
+  kTimedOut,       ///< killed after the time limit
+  kInternalError,  ///< exit code 4 or one that mbverify does not have
 };
 [[nodiscard]] const char* ToText(CaseStatus status);  ///< "as_expected", "timed_out", …
 [[nodiscard]] CaseStatus CaseStatusOf(const std::string& text);  ///< kNotRun for unknown words
@@ -47,6 +47,8 @@ struct Unmeasured {
 struct Cost {
   double wall_s = 0.0, cpu_s = 0.0;
   long peak_kib = 0;  ///< largest resident size
+
+  [[nodiscard]] double peak_mib() const { return static_cast<double>(peak_kib) / 1024.0; }
 };
 
 /// A metric that got worse inside its limit, or traces that moved.

@@ -6,25 +6,12 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/markup.h"
 #include "core/types.h"
 
 namespace mbv {
 
 void Database::Closer::operator()(sqlite3* db) const { sqlite3_close(db); }
-
-namespace {
-
-// A file name as a URI: what has a meaning there is encoded.
-std::string UriOf(const std::string& path) {
-  std::string uri = "file:";
-  for (const char c : path) {
-    uri += c == '%' || c == '?' || c == '#' ? fmt::format("%{:02X}", static_cast<unsigned>(c))
-                                            : std::string(1, c);
-  }
-  return uri;
-}
-
-}  // namespace
 
 Database::Database(const std::string& path, Mode mode, double busy_s) : path_(path) {
   const int flags = mode == Mode::kRead    ? SQLITE_OPEN_READONLY
@@ -37,7 +24,7 @@ Database::Database(const std::string& path, Mode mode, double busy_s) : path_(pa
   std::error_code error;
   const auto log = std::filesystem::file_size(path + "-wal", error);
   if (!error && log > 0) return;
-  Open(UriOf(path) + "?immutable=1", flags | SQLITE_OPEN_URI, busy_s);
+  Open("file:" + EncodeLink(path) + "?immutable=1", flags | SQLITE_OPEN_URI, busy_s);
 }
 
 bool Database::CanRead() {

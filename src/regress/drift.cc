@@ -8,6 +8,7 @@ namespace {
 
 // Standard deviation of a normal distribution per median absolute deviation.
 constexpr double kSigmaPerMad = 1.4826;
+constexpr double kLevelRounding = 1e-9;  // of logarithms
 
 double Median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
@@ -32,7 +33,7 @@ std::optional<DriftFinding> FindDrift(const std::vector<PastValue>& past, double
   const double sigma = kSigmaPerMad * Median(deviations);
   const double threshold = median + std::max(std::log10(rule.factor), rule.spread_factor * sigma);
   // A value at the factor counts: 1e-12 from 1e-13 is ten times worse, whatever the last bit says.
-  if (level(now) < threshold - 1e-9) return std::nullopt;
+  if (level(now) < threshold - kLevelRounding) return std::nullopt;
   DriftFinding finding{std::pow(10.0, median), std::pow(10.0, threshold), levels.size(), 0};
   for (auto it = past.rbegin(); it != past.rend(); ++it) {
     if (!it->good) continue;  // a failed night neither ends nor begins a stretch

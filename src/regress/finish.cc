@@ -23,6 +23,7 @@ namespace fs = std::filesystem;
 
 constexpr double kThumbnailTimeout_s = 20.0, kLoadTimeout_s = 30.0;
 constexpr int kThumbnailPx = 144;
+constexpr size_t kHeadBytes = 200;  // of a file, which tell what it is
 
 // Pictures may be anybody's (merge): children decode them.
 std::map<std::string, std::string> Thumbnails(const RunFolder& folder,
@@ -159,7 +160,7 @@ std::string FilesRead(const CaseFile& file) {
 
 // What an earlier night left there is nobody's input.
 bool IsOfANight(const std::string& path) {
-  const std::string start = ReadWholeFile(path).value_or("").substr(0, 200);
+  const std::string start = ReadWholeFile(path).value_or("").substr(0, kHeadBytes);
   return start.starts_with(kMarkdownTitle) ||
          start.find(fmt::format("<testsuites name=\"{}\"", kJUnitName)) != std::string::npos;
 }

@@ -17,6 +17,7 @@ namespace {
 
 constexpr const char* kMagic = "mbvgold1";
 constexpr int kDroppedBits = 52 - 36;
+constexpr double kMostRows = 1e7, kMostDrives = 1e4;  // of traces that are not damaged
 
 struct GoldenColumn {
   std::string witness, drive;
@@ -142,7 +143,9 @@ std::optional<ForceTrace> DecodeForces(const std::string& bytes) {
   if (NextLine(bytes, &at) != kMagic) return std::nullopt;
   const double rows = ReadNumber(NextLine(bytes, &at));
   const double drives = ReadNumber(NextLine(bytes, &at));
-  if (!(rows >= 0.0 && rows < 1e7 && drives >= 0.0 && drives < 1e4)) return std::nullopt;
+  if (!(rows >= 0.0 && rows < kMostRows && drives >= 0.0 && drives < kMostDrives)) {
+    return std::nullopt;
+  }
   ForceTrace trace;
   for (int i = 0; i < static_cast<int>(drives); ++i) trace.drives.push_back(NextLine(bytes, &at));
   if (at > bytes.size()) return std::nullopt;

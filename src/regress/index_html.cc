@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "core/markup.h"
 #include "core/sha256.h"
@@ -19,29 +20,28 @@ const char* KindOf(const CaseResult& result) {
   return result.failed() ? "bad" : result.drifts.empty() ? "good" : "warn";
 }
 
+constexpr double kLowestValue = 1e-17;  // what is smaller is drawn there: below any round-off
+constexpr double kCurveRoom = 0.5, kLimitRoom = 0.3;  // decades above and below
+
 // Course of the key metric on a logarithmic scale, oldest left, with its limit.
 std::string Sparkline(const CaseResult& result) {
   constexpr double kWidth = 120.0, kHeight = 32.0, kMargin = 3.0;
   const auto* key = KeyMetric(result);
   std::vector<double> levels;
-  for (double value : result.course) levels.push_back(std::log10(std::max(value, 1e-17)));
+  for (double value : result.course) levels.push_back(std::log10(std::max(value, kLowestValue)));
   std::erase_if(levels, [](double level) { return !std::isfinite(level); });
   if (key == nullptr || levels.size() < 2) return "";
-  auto [low, high] = std::minmax_element(levels.begin(), levels.end());
-  double bottom = *low - 0.5, top = *high + 0.5;
-  std::string limit;
+  const auto [low, high] = std::minmax_element(levels.begin(), levels.end());
+  double bottom = *low - kCurveRoom, top = *high + kCurveRoom;
+  std::optional<double> limit;
   if (key->second.limit && *key->second.limit > 0.0) {
-    top = std::max(top, std::log10(*key->second.limit) + 0.3);
-    bottom = std::min(bottom, std::log10(*key->second.limit) - 0.3);
+    limit = std::log10(*key->second.limit);
+    top = std::max(top, *limit + kLimitRoom);
+    bottom = std::min(bottom, *limit - kLimitRoom);
   }
   const auto y = [&](double level) {
     return kMargin + (kHeight - 2.0 * kMargin) * (top - level) / (top - bottom);
   };
-  if (key->second.limit && *key->second.limit > 0.0) {
-    const std::string line =
-        fmt::format("M0 {:.1f}H{:g}", y(std::log10(*key->second.limit)), kWidth);
-    limit = SvgShape("path", {{"class", "limit"}, {"d", line}});
-  }
   std::string points;
   double x = 0.0;
   for (size_t i = 0; i < levels.size(); ++i) {
@@ -49,19 +49,22 @@ std::string Sparkline(const CaseResult& result) {
         (kWidth - 2.0 * kMargin) * static_cast<double>(i) / static_cast<double>(levels.size() - 1);
     points += fmt::format("{}{:.1f},{:.1f}", i == 0 ? "" : " ", x, y(levels[i]));
   }
-  const std::string label =
-      fmt::format("last {} runs: {:.1e} to {:.1e}, now {:.1e}", levels.size(), std::pow(10.0, *low),
-                  std::pow(10.0, *high), std::pow(10.0, levels.back()));
+  const std::string content =
+      (limit ? SvgShape("path", {{"class", "limit"},
+                                 {"d", fmt::format("M0 {:.1f}H{:g}", y(*limit), kWidth)}})
+             : "") +
+      SvgShape("polyline", {{"class", "curve"}, {"points", points}}) +
+      SvgShape("circle", {{"class", "now"}, {"cx", x, 1}, {"cy", y(levels.back()), 1}, {"r", 2.5}});
   return SvgElement(
       "svg",
       {{"width", kWidth},
        {"height", kHeight},
        {"viewBox", fmt::format("0 0 {:g} {:g}", kWidth, kHeight)},
        {"role", "img"},
-       {"aria-label", label}},
-      limit + SvgShape("polyline", {{"class", "curve"}, {"points", points}}) +
-          SvgShape("circle",
-                   {{"class", "now"}, {"cx", x, 1}, {"cy", y(levels.back()), 1}, {"r", "2.5"}}));
+       {"aria-label",
+        fmt::format("last {} runs: {:.1e} to {:.1e}, now {:.1e}", levels.size(),
+                    std::pow(10.0, *low), std::pow(10.0, *high), std::pow(10.0, levels.back()))}},
+      content);
 }
 
 constexpr size_t kChecksOfACase = 5, kChecksOfARow = 1, kCasesInABox = 30;
@@ -149,7 +152,7 @@ std::string Row(const CaseResult& result, const std::string& thumbnail, size_t s
   return row + fmt::format(
                    "<td class=\"n\" data-label=\"memory [MiB]\" data-sort=\"{0:.1f}\">{0:.0f}</td>"
                    "</tr>\n",
-                   static_cast<double>(result.cost.peak_kib) / 1024.0);
+                   result.cost.peak_mib());
 }
 
 // A list with a title; what is beyond kCasesInABox is folded away.

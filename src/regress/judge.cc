@@ -7,14 +7,15 @@
 #include <nlohmann/json.hpp>
 
 #include "core/files.h"
-#include "regress/files.h"
+#include "regress/log_text.h"
 
 namespace mbv {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kTailLines = 12;
+constexpr int kTailLines = 12;       // of a log that a failure shows
+constexpr int kSearchedLines = 200;  // of a log, from its end: what went wrong is said there
 
 std::string Word(const Json& json, const char* key) {
   const auto found = json.find(key);
@@ -84,7 +85,7 @@ SummaryText ReadSummary(const std::string& text, CaseResult* result) {
 
 // The line that tells what went wrong: the last one with "error:", else the last one.
 std::string TellingLine(const std::string& output) {
-  const std::string tail = LastLines(output, 200);
+  const std::string tail = LastLines(output, kSearchedLines);
   const size_t error = tail.rfind("error:");
   const size_t at = error == std::string::npos ? tail.size() : error;
   const size_t newline = tail.rfind('\n', at == 0 ? 0 : at - 1);
@@ -133,7 +134,7 @@ bool EndedBadly(const WorkerEnd& end, double timeout_s, const std::string& outpu
     return is(CaseStatus::kCrashed, end.trouble + ": " + TellingLine(output));
   }
   if (end.exit_code < 0 || end.exit_code > 3) {
-    return is(CaseStatus::kInternal,
+    return is(CaseStatus::kInternalError,
               fmt::format("exit code {}: {}", end.exit_code, TellingLine(output)));
   }
   return false;
@@ -158,7 +159,7 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
     const std::string offence = Offence(result, output + words.culprits);
     if (reason.empty()) reason = TellingLine(output);
     if (!summary && end.exit_code != 2) {
-      result.status = CaseStatus::kInternal;
+      result.status = CaseStatus::kInternalError;
       result.reason = fmt::format("exit code {} but no summary.json", end.exit_code);
     } else if (offence.empty()) {
       result.status = CaseStatus::kAsExpected;

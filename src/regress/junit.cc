@@ -59,7 +59,7 @@ std::string OutputOf(const CaseResult& result) {
     text += fmt::format("not compared: {}: {}\n", item.what, item.why);
   }
   text += fmt::format("cost: {:.2f} s wall, {:.2f} s CPU, {:.1f} MiB\n", result.cost.wall_s,
-                      result.cost.cpu_s, static_cast<double>(result.cost.peak_kib) / 1024.0);
+                      result.cost.cpu_s, result.cost.peak_mib());
   return text;
 }
 

@@ -61,7 +61,7 @@ std::string Row(const CaseResult& result) {
                      : result.drifts.empty() ? ""
                                              : "⚠️ ",
                      Plain(WordOf(result)), Plain(KeyText(result)), result.cost.wall_s,
-                     result.cost.cpu_s, static_cast<double>(result.cost.peak_kib) / 1024.0);
+                     result.cost.cpu_s, result.cost.peak_mib());
 }
 
 std::string Failed(const RegressReport& report) {

@@ -9,10 +9,12 @@
 #include "core/files.h"
 #include "core/names.h"
 #include "core/output_folder.h"
-#include "regress/files.h"
 #include "regress/finish.h"
 #include "regress/history.h"
+#include "regress/log_text.h"
 #include "regress/one_night.h"
+#include "regress/plain_files.h"
+#include "regress/utc_time.h"
 
 namespace mbv {
 namespace {

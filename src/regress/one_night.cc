@@ -4,21 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 #include <functional>
 #include <set>
 
 #include "regress/find_cases.h"
+#include "regress/utc_time.h"
 
 namespace mbv {
 namespace {
-
-// Hours since 1970 of "2026-01-31T02:00:00Z"; NaN if it is no such time.
-double HoursOf(const std::string& utc) {
-  std::tm time = {};
-  const char* end = strptime(utc.c_str(), "%Y-%m-%dT%H:%M:%SZ", &time);
-  return end == nullptr ? kNan : static_cast<double>(timegm(&time)) / 3600.0;
-}
 
 // Both parts and what each of them says, where that differs.
 void CompareParts(const std::vector<NightPart>& parts, const char* what,
@@ -38,7 +31,7 @@ void CheckSameNight(const std::vector<NightPart>& parts, std::vector<std::string
     return a.run.started_utc < b.run.started_utc;
   };
   const auto [first, last] = std::minmax_element(parts.begin(), parts.end(), earlier);
-  const double hours = HoursOf(last->run.started_utc) - HoursOf(first->run.started_utc);
+  const double hours = UtcHours(last->run.started_utc) - UtcHours(first->run.started_utc);
   if (hours <= kNightSpan_h) return;
   troubles->push_back(fmt::format("{} started {}, {} started {}: two nights", first->folder,
                                   first->run.started_utc, last->folder, last->run.started_utc));

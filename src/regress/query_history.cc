@@ -4,10 +4,10 @@
 #include <cmath>
 #include <set>
 
-#include "regress/files.h"
 #include "regress/history.h"
 #include "regress/history_schema.h"
 #include "regress/missing.h"
+#include "regress/utc_time.h"
 
 namespace mbv {
 namespace {

@@ -6,14 +6,15 @@
 #include <algorithm>
 #include <chrono>
 #include <filesystem>
+#include <limits>
 #include <map>
 
 #include "core/files.h"
-#include "regress/files.h"
 #include "regress/finish.h"
 #include "regress/history.h"
 #include "regress/judge.h"
 #include "regress/missing.h"
+#include "regress/utc_time.h"
 #include "regress/workers.h"
 
 namespace mbv {
@@ -143,7 +144,7 @@ class Run {
       const bool usable =
           state && state->fingerprint == FingerprintOf(file) && SameInputs(*state) &&
           state->status != CaseStatus::kCrashed && state->status != CaseStatus::kTimedOut &&
-          state->status != CaseStatus::kInternal &&
+          state->status != CaseStatus::kInternalError &&
           (!state->has_folder || fs::exists(folder_.Result(file.key) / "summary.json"));
       if (!usable) {
         rest.push_back(std::move(file));
@@ -162,7 +163,8 @@ class Run {
     const std::map<std::string, double> wall_s = LastWallTimes(options_.history);
     const auto cost = [&](const CaseFile& file) {
       const auto found = wall_s.find(file.key);
-      return found == wall_s.end() ? 1e9 : found->second;  // unknown: may be long
+      return found == wall_s.end() ? std::numeric_limits<double>::infinity()
+                                   : found->second;  // unknown: may be long
     };
     std::stable_sort(cases_.begin(), cases_.end(),
                      [&](const CaseFile& a, const CaseFile& b) { return cost(a) > cost(b); });

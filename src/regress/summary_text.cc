@@ -100,16 +100,15 @@ std::string ToSummaryText(const RegressReport& report) {
     text += fmt::format("{}: drift\n    {}\n", result->key, DriftLine(*result));
   }
   for (const std::string& note : report.notes) text += "note: " + note + "\n";
-  long peak = 0;
-  double cpu_s = 0.0;
+  double peak_mib = 0.0, cpu_s = 0.0;
   for (const CaseResult& result : report.cases) {
-    peak = std::max(peak, result.cost.peak_kib);
+    peak_mib = std::max(peak_mib, result.cost.peak_mib());
     cpu_s += result.cost.cpu_s;
   }
   text += CountsText(CountCases(report)) + "\n";
   text += fmt::format("{:.1f} s wall with {} worker{}, {:.1f} s CPU, largest worker {:.0f} MiB\n",
                       report.run.wall_s, report.run.jobs, report.run.jobs == 1 ? "" : "s", cpu_s,
-                      static_cast<double>(peak) / 1024.0);
+                      peak_mib);
   return text;
 }
 

@@ -28,7 +28,7 @@ std::vector<const Drift*> WorstDriftsFirst(const CaseResult& result) {
 int RankOf(const CaseResult& result) {
   switch (result.status) {
     case CaseStatus::kCrashed:
-    case CaseStatus::kInternal:
+    case CaseStatus::kInternalError:
       return 0;
     case CaseStatus::kTimedOut:
     case CaseStatus::kNotRun:

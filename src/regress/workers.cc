@@ -10,13 +10,16 @@
 #include <cerrno>
 #include <chrono>
 #include <cstring>
+#include <thread>
 
 namespace mbv {
 namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kCannotStart = 127;  // as in shells
+constexpr int kCannotStart = 127;               // as in shells
+constexpr double kTick_s = 0.1;                 // between two looks at the table of what runs
+constexpr std::chrono::milliseconds kPause{5};  // between two looks at the workers
 
 struct Running {
   size_t job = 0;
@@ -136,11 +139,11 @@ bool WorkerPool::Run(const std::vector<WorkerJob>& jobs) const {
       }
       ++i;
     }
-    if (tick && SecondsSince(last_tick) > 0.1) {
+    if (tick && SecondsSince(last_tick) > kTick_s) {
       tick();
       last_tick = Clock::now();
     }
-    if (!any) usleep(5000);
+    if (!any) std::this_thread::sleep_for(kPause);
   }
   return true;
 }

@@ -1,9 +1,6 @@
-#include "regress/files.h"
+#include "regress/plain_files.h"
 
-#include <fmt/chrono.h>
 #include <fmt/format.h>
-
-#include <ctime>
 
 #include "core/files.h"
 
@@ -43,37 +40,6 @@ std::string CopyPlainFiles(const fs::path& from, const fs::path& to,
   fs::create_directories(to, error);
   if (error) return fmt::format("cannot make folder {}: {}", to.string(), error.message());
   return Copy(from, to, wanted, "");
-}
-
-std::string WithoutControls(const std::string& text) {
-  std::string clean;
-  for (size_t i = 0; i < text.size(); ++i) {
-    const auto c = static_cast<unsigned char>(text[i]);
-    if (c == 0x1b && i + 1 < text.size() && text[i + 1] == '[') {  // a terminal's colour
-      i += 2;
-      while (i < text.size() && (text[i] < '@' || text[i] > '~')) ++i;
-      continue;
-    }
-    if (c >= 0x20 || c == '\n' || c == '\t') clean += text[i];
-  }
-  return clean;
-}
-
-std::string LastLines(const std::string& text, int count) {
-  const std::string clean = WithoutControls(text);
-  const size_t end = clean.find_last_not_of("\n ");
-  if (end == std::string::npos) return "";
-  size_t at = end;
-  for (int i = 0; i < count; ++i) {
-    const size_t newline = clean.rfind('\n', at);
-    if (newline == std::string::npos || newline == 0) return clean.substr(0, end + 1);
-    at = newline - 1;
-  }
-  return clean.substr(at + 2, end - at - 1);
-}
-
-std::string UtcNow() {
-  return fmt::format("{:%Y-%m-%dT%H:%M:%SZ}", fmt::gmtime(std::time(nullptr)));
 }
 
 }  // namespace mbv

@@ -1,4 +1,4 @@
-// Text of logs, times, and files found below a folder.
+// Result folders copied without what is hidden or a link.
 #pragma once
 
 #include <filesystem>
@@ -12,12 +12,5 @@ namespace mbv {
 [[nodiscard]] std::string CopyPlainFiles(const std::filesystem::path& from,
                                          const std::filesystem::path& to,
                                          const std::set<std::string>& wanted);
-
-/// The last `count` lines of a text, without control characters (escape sequences go, too).
-[[nodiscard]] std::string LastLines(const std::string& text, int count);
-[[nodiscard]] std::string WithoutControls(const std::string& text);
-
-/// "2026-01-31T02:00:00Z" now.
-[[nodiscard]] std::string UtcNow();
 
 }  // namespace mbv
