@@ -14,8 +14,8 @@ constexpr double kGrowth = 1.5;       // from each quarter of the samples to the
 
 }  // namespace
 
-std::optional<Drift> FindDrift(const VecX& time_s, const VecX& difference,
-                               const std::string& unit) {
+std::optional<GrowingDifference> FindDrift(const VecX& time_s, const VecX& difference,
+                                           const std::string& unit) {
   const Eigen::Index n = difference.size();
   if (n < kFewest) return {};
   const VecX t = time_s.array() - time_s.mean();
@@ -23,10 +23,11 @@ std::optional<Drift> FindDrift(const VecX& time_s, const VecX& difference,
   const VecX line = (difference.mean() + rate * t.array()).matrix();
   const double left = Rms(difference - line), all = Rms(difference);
   if (left <= kLine * all) {
-    return Drift{left, fmt::format("the difference grows by {:.4g} {}/s, from {:.2g} to {:.2g} {}: "
-                                   "a sensor's zero, or an integration? (what is left is {:.2g} "
-                                   "{} RMS)",
-                                   rate, unit, line(0), line(n - 1), unit, left, unit)};
+    return GrowingDifference{
+        left, fmt::format("the difference grows by {:.4g} {}/s, from {:.2g} to {:.2g} {}: "
+                          "a sensor's zero, or an integration? (what is left is {:.2g} "
+                          "{} RMS)",
+                          rate, unit, line(0), line(n - 1), unit, left, unit)};
   }
   std::array<double, 4> quarters;
   for (Eigen::Index k = 0; k < 4; ++k) {
@@ -36,10 +37,11 @@ std::optional<Drift> FindDrift(const VecX& time_s, const VecX& difference,
   for (size_t k = 1; k < 4; ++k) {
     if (!(quarters[k] >= kGrowth * quarters[k - 1])) return {};
   }
-  return Drift{all, fmt::format("the difference grows from {:.2g} {} RMS in the first quarter of "
-                                "the samples to {:.2g} {} in the last: errors of an integration "
-                                "that add up, or a clock of another rate?",
-                                quarters[0], unit, quarters[3], unit)};
+  return GrowingDifference{
+      all, fmt::format("the difference grows from {:.2g} {} RMS in the first quarter of "
+                       "the samples to {:.2g} {} in the last: errors of an integration "
+                       "that add up, or a clock of another rate?",
+                       quarters[0], unit, quarters[3], unit)};
 }
 
 }  // namespace mbv

@@ -8,7 +8,7 @@
 
 namespace mbv {
 
-struct Drift {
+struct GrowingDifference {
   double left = kNan;  ///< RMS without it; the whole RMS where the growth follows no line
   std::string text;    ///< "the difference grows by 0.12 N/s, …"
 };
@@ -17,7 +17,7 @@ struct Drift {
 /// the way without being one.
 /// \param time_s      sample times, increasing
 /// \param difference  at these times, in `unit`
-[[nodiscard]] std::optional<Drift> FindDrift(const VecX& time_s, const VecX& difference,
-                                             const std::string& unit);
+[[nodiscard]] std::optional<GrowingDifference> FindDrift(const VecX& time_s, const VecX& difference,
+                                                         const std::string& unit);
 
 }  // namespace mbv
