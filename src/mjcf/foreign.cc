@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tinyxml2.h>
 
+#include <map>
 #include <regex>
 #include <set>
 #include <vector>
@@ -46,6 +47,7 @@ struct ForeignMjcf::Impl {
   XMLDocument document;
   fs::path file, folder;
   Diagnostics* diagnostics = nullptr;
+  std::map<std::string, SitePair> by_sites;
   bool good = false;
 
   void Add(Severity severity, int line, const std::string& text, const std::string& hint = "") {
@@ -168,6 +170,81 @@ struct ForeignMjcf::Impl {
     for (XMLElement* e : unused) document.DeleteNode(e);
   }
 
+  XMLElement* Compiler() {
+    XMLElement* compiler = root()->FirstChildElement("compiler");
+    if (compiler == nullptr) {
+      compiler = document.NewElement("compiler");
+      root()->InsertFirstChild(compiler);
+    }
+    return compiler;
+  }
+
+  // Since MuJoCo 3.0 a range holds unless the file says otherwise.
+  void LetRangesHold() {
+    int open = 0, line = 0;
+    ForEach(root(), [&](XMLElement* e) {
+      if (e->Attribute("range") == nullptr || e->Attribute("limited") != nullptr) return;
+      if (open++ == 0) line = e->GetLineNum();
+    });
+    bool stated = false;
+    for (XMLElement* e = root()->FirstChildElement("compiler"); e != nullptr;
+         e = e->NextSiblingElement("compiler")) {
+      stated = stated || e->Attribute("autolimits") != nullptr;
+    }
+    if (stated || open == 0) return;
+    Compiler()->SetAttribute("autolimits", "true");
+    Add(Severity::kWarning, line,
+        fmt::format("{} range{} without `limited` hold{}, as since MuJoCo 3", open,
+                    open == 1 ? "" : "s", open == 1 ? "s" : ""),
+        "<compiler autolimits=\"false\"/> if they should not");
+  }
+
+  // The body that carries a site, by its name, which it is given if it has none; empty without one.
+  std::string BodyOfSite(const std::string& site) {
+    XMLElement* body = nullptr;
+    ForEach(root(), [&](XMLElement* e) {
+      const char* name = IsTag(e, "site") ? e->Attribute("name") : nullptr;
+      if (name != nullptr && name == site) body = e->Parent()->ToElement();
+    });
+    if (body == nullptr) return "";
+    if (IsTag(body, "worldbody")) return "world";
+    if (!IsTag(body, "body")) return "";
+    if (body->Attribute("name") == nullptr) {
+      body->SetAttribute("name", ("body_of_" + site).c_str());
+    }
+    return body->Attribute("name");
+  }
+
+  // Since MuJoCo 3.2 a connect or weld may name two sites.
+  void NameBodiesOfSites() {
+    std::vector<XMLElement*> closures;
+    ForEach(root(), [&](XMLElement* e) {
+      if ((IsTag(e, "connect") || IsTag(e, "weld")) && e->Attribute("site1") != nullptr &&
+          e->Attribute("site2") != nullptr) {
+        closures.push_back(e);
+      }
+    });
+    for (XMLElement* e : closures) {
+      const SitePair sites{e->Attribute("site1"), e->Attribute("site2")};
+      const std::string body1 = BodyOfSite(sites.first), body2 = BodyOfSite(sites.second);
+      if (body1.empty() || body2.empty()) {
+        Add(Severity::kError, e->GetLineNum(),
+            fmt::format("<{}> names the site '{}', which no body has", e->Name(),
+                        body1.empty() ? sites.first : sites.second));
+        continue;
+      }
+      std::string name =
+          e->Attribute("name") == nullptr ? sites.first + "_" + sites.second : e->Attribute("name");
+      while (by_sites.contains(name)) name += "_";
+      for (const char* attribute : {"site1", "site2", "relpose"}) e->DeleteAttribute(attribute);
+      e->SetAttribute("name", name.c_str());
+      e->SetAttribute("body1", body1.c_str());
+      e->SetAttribute("body2", body2.c_str());
+      e->SetAttribute("anchor", "0 0 0");
+      by_sites.emplace(name, sites);
+    }
+  }
+
   fs::path MeshFolder() {
     const XMLElement* compiler = root()->FirstChildElement("compiler");
     const char* meshes = compiler == nullptr ? nullptr : compiler->Attribute("meshdir");
@@ -179,12 +256,7 @@ struct ForeignMjcf::Impl {
   void MakeFoldersAbsolute() {
     std::error_code error;
     const std::string meshes = fs::absolute(MeshFolder(), error).lexically_normal().string();
-    XMLElement* compiler = root()->FirstChildElement("compiler");
-    if (compiler == nullptr) {
-      compiler = document.NewElement("compiler");
-      root()->InsertFirstChild(compiler);
-    }
-    compiler->SetAttribute("meshdir", meshes.c_str());
+    Compiler()->SetAttribute("meshdir", meshes.c_str());
   }
 };
 
@@ -196,6 +268,8 @@ ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnost
   impl_->Parse(text);
   if (ok()) impl_->TakeIncludes();
   if (ok()) impl_->DropPictures();
+  if (ok()) impl_->LetRangesHold();
+  if (ok()) impl_->NameBodiesOfSites();
   if (ok()) impl_->MakeFoldersAbsolute();
 }
 
@@ -212,6 +286,10 @@ std::string ForeignMjcf::Text() const {
 std::string ForeignMjcf::ModelName() const {
   const char* name = impl_->root()->Attribute("model");
   return name == nullptr ? "" : name;
+}
+
+const std::map<std::string, SitePair>& ForeignMjcf::closures_by_sites() const {
+  return impl_->by_sites;
 }
 
 // MuJoCo 2.2 wants mass of every geom of a body that does not state its own.

@@ -38,8 +38,9 @@ Pose Shifted(const Vec3& p) {
 
 class MjcfImporter {
  public:
-  MjcfImporter(const mjModel& m, const std::string& file, Diagnostics* diagnostics)
-      : m_(m), file_(file), diagnostics_(diagnostics) {}
+  MjcfImporter(const mjModel& m, const mjcf::ForeignMjcf& foreign, const std::string& file,
+               Diagnostics* diagnostics)
+      : m_(m), foreign_(foreign), file_(file), diagnostics_(diagnostics) {}
 
   Mechanism Run() {
     mechanism_.file = file_;
@@ -185,7 +186,11 @@ class MjcfImporter {
     joint.kind = connect ? JointKind::kSpherical : JointKind::kFixed;
     joint.parent = index_[static_cast<size_t>(m_.eq_obj1id[e])];
     joint.child = index_[static_cast<size_t>(m_.eq_obj2id[e])];
-    if (connect) {
+    const auto sites = foreign_.closures_by_sites().find(name);
+    if (sites != foreign_.closures_by_sites().end()) {
+      joint.X_PF = SitePose(sites->second.first);
+      joint.X_CM = SitePose(sites->second.second);
+    } else if (connect) {
       joint.X_PF = Shifted(VecAt(data));
       joint.X_CM = Shifted(VecAt(data + 3));
     } else {
@@ -197,6 +202,11 @@ class MjcfImporter {
       return;
     }
     mechanism_.joints.push_back(joint);
+  }
+
+  [[nodiscard]] Pose SitePose(const std::string& name) const {
+    const int s = simulation::IdOf(m_, mjOBJ_SITE, name);
+    return PoseAt(m_.site_pos + 3 * s, m_.site_quat + 4 * s);
   }
 
   void AddActuator(int u) {
@@ -315,6 +325,7 @@ class MjcfImporter {
   }
 
   const mjModel& m_;
+  const mjcf::ForeignMjcf& foreign_;
   const std::string& file_;
   Diagnostics* diagnostics_;
   Mechanism mechanism_;
@@ -337,7 +348,7 @@ std::optional<Mechanism> ReadMjcf(const std::string& text, const std::string& fi
   for (int round = 0; round < kMostRounds; ++round) {
     try {
       const ModelHandle model = simulation::CompileMjcf(foreign.Text());
-      Mechanism mechanism = MjcfImporter(*model, file, diagnostics).Run();
+      Mechanism mechanism = MjcfImporter(*model, foreign, file, diagnostics).Run();
       mechanism.name = foreign.ModelName();
       for (const std::string& warning : warnings) {
         diagnostics->Add({Severity::kWarning, file, 0, 0, "MuJoCo: " + warning, ""});

@@ -1,4 +1,5 @@
 // MJCF files as mechanisms.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
@@ -135,6 +136,90 @@ TEST(MjcfImport, JointsOfOneBodyBallsWeldsAndKeyframesAreRead) {
   // The weld holds the two as they are at the reference.
   EXPECT_EQ(AnalyseMobility(m).freedoms, 2 + 3 + 1);
   EXPECT_NE(loaded.diagnostics.Text().find("the keyframe 'home'"), std::string::npos);
+}
+
+// As MuJoCo 3.2 writes closures. The sites are a centimetre apart in the pose of the file: where
+// they meet is in the sites, not in the pose.
+std::string LinkageBySites(const std::string& closure) {
+  std::string text = Linkage();
+  const auto swap = [&](const std::string& from, const std::string& to) {
+    const size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+  };
+  swap(R"(<connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.3"/>)", closure);
+  swap(R"(<body name="rocker" pos="0.5 0 0">)",
+       R"(<body pos="0.5 0 0"><site name="top" pos="0 0 0.3"/>)");
+  swap(R"(<body name="coupler" pos="0 0 0.3">)",
+       R"(<body name="coupler" pos="0 0 0.3"><site name="end" pos="0.49 0 0"/>)");
+  return text;
+}
+
+TEST(MjcfImport, ClosuresByTwoSitesMeetInTheSites) {
+  const test::TestFolder folder("mjcf_sites");
+  for (const char* closure : {R"(<connect site1="top" site2="end"/>)",
+                              R"(<connect name="top_end" site1="end" site2="top"/>)"}) {
+    const LoadResult loaded = LoadText(folder, LinkageBySites(closure));
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    const Mechanism& m = *loaded.mechanism;
+    EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+    ASSERT_GE(m.FindJoint("top_end"), 0);
+    const int rocker = m.FindBody("body_of_top"), coupler = m.FindBody("coupler");
+    ASSERT_GE(rocker, 0);
+    const Vec3 gap =
+        m.X_WB_home[rocker] * Vec3(0, 0, 0.3) - m.X_WB_home[coupler] * Vec3(0.49, 0, 0);
+    EXPECT_LT(gap.norm(), 1e-12) << closure;
+  }
+}
+
+TEST(MjcfImport, AWeldBySitesMakesTheirAxesCoincide) {
+  const test::TestFolder folder("mjcf_weld_sites");
+  const LoadResult loaded = LoadText(folder, R"(<mujoco model="w"><worldbody>
+<site name="hold" pos="0 0 1" quat="0.5 0.5 0.5 0.5"/>
+<body name="a"><joint type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="b" pos="0 0 1"><joint type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<site name="tip" quat="0.6 0 0.8 0"/></body></body></worldbody>
+<equality><weld site1="hold" site2="tip"/></equality></mujoco>)");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  const Joint& weld = m.joints[m.FindJoint("hold_tip")];
+  const Mat3 hold = (m.X_WB_home[weld.parent] * weld.X_PF).linear();
+  const Mat3 tip = (m.X_WB_home[weld.child] * weld.X_CM).linear();
+  EXPECT_LT((hold - tip).norm(), 1e-12);
+  const Mat3 stated = Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5).toRotationMatrix();
+  EXPECT_LT((hold - stated).norm(), 1e-12);
+}
+
+TEST(MjcfImport, ASiteThatIsMissingIsNamedWithItsLine) {
+  const test::TestFolder folder("mjcf_no_site");
+  const LoadResult loaded =
+      LoadText(folder, LinkageBySites(R"(<connect site1="top" site2="endd"/>)"));
+  EXPECT_FALSE(loaded.mechanism);
+  EXPECT_NE(loaded.diagnostics.Text().find("<connect> names the site 'endd', which no body has"),
+            std::string::npos)
+      << loaded.diagnostics.Text();
+}
+
+// Left alone, MuJoCo 2.2 refuses a range that is not called limited.
+TEST(MjcfImport, RangesHoldUnlessTheFileSaysOtherwise) {
+  const test::TestFolder folder("mjcf_ranges");
+  const auto upper = [&](const std::string& text) {
+    const LoadResult loaded = LoadText(folder, text);
+    EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    if (!loaded.mechanism) return kNan;
+    const Joint& crank = loaded.mechanism->joints[loaded.mechanism->FindJoint("A")];
+    const bool said = loaded.diagnostics.Text().find("1 range without") != std::string::npos;
+    EXPECT_EQ(said, text.find("limited") == std::string::npos) << loaded.diagnostics.Text();
+    return crank.range[0].upper;
+  };
+  EXPECT_EQ(upper(Linkage("", "range='-1 1.5'")), 1.5);
+  EXPECT_EQ(upper(Linkage("", "range='-1 1.5' limited='true'")), 1.5);
+  EXPECT_GT(upper(Linkage("", "range='-1 1.5' limited='false'")), 1e3);
+  // The file's own word stays, and MuJoCo's refusal of it.
+  const LoadResult own =
+      LoadText(folder, Linkage("<compiler autolimits='false'/>", "range='-1 1.5'"));
+  EXPECT_FALSE(own.mechanism);
+  EXPECT_NE(own.diagnostics.Text().find("`range` but not `limited`"), std::string::npos);
 }
 
 TEST(MjcfImport, IncludesStayInTheFolder) {
