@@ -1,10 +1,13 @@
 // Kills a process before each of its system calls that change files, one after the other.
 #pragma once
 
+#include <elf.h>
 #include <fcntl.h>
+#include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/ptrace.h>
 #include <sys/syscall.h>
+#include <sys/uio.h>
 #include <sys/user.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -17,6 +20,13 @@
 #include <map>
 
 namespace mbv {
+
+/// What std::filesystem::rename calls.
+#ifdef SYS_rename  // not on newer architectures
+inline constexpr long kRenameCall = SYS_rename;
+#else
+inline constexpr long kRenameCall = SYS_renameat;
+#endif
 
 class KillAtCalls {
  public:
@@ -83,13 +93,18 @@ class KillAtCalls {
 
   // Makes the call it is about to do one that does not exist.
   static void Refuse(pid_t pid) {
-#ifdef __x86_64__
+#if defined(__x86_64__)
     user_regs_struct registers{};
     ptrace(PTRACE_GETREGS, pid, nullptr, &registers);
     registers.orig_rax = static_cast<unsigned long long>(-1);
     ptrace(PTRACE_SETREGS, pid, nullptr, &registers);
+#elif defined(__aarch64__)
+    int none = -1;
+    iovec part{&none, sizeof none};
+    ptrace(PTRACE_SETREGSET, pid, NT_ARM_SYSTEM_CALL, &part);
 #else
     (void)pid;
+    ADD_FAILURE() << "how is a system call refused on this processor?";
 #endif
   }
 

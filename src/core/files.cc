@@ -243,4 +243,14 @@ std::string RandomLetters() {
   return letters;
 }
 
+fs::path MakePrivateFolder(const fs::path& prefix) {
+  constexpr int kTries = 100;
+  for (int i = 0; i < kTries; ++i) {
+    const fs::path folder = prefix.string() + RandomLetters();
+    if (mkdir(folder.c_str(), S_IRWXU) == 0) return folder;
+    if (errno != EEXIST) break;
+  }
+  return {};
+}
+
 }  // namespace mbv

@@ -51,6 +51,10 @@ class Fingerprint {
                                                   const std::string& ending,
                                                   std::vector<std::string>* unread);
 
+/// Makes a new folder that only this user may enter: `prefix` and random letters, which nobody can
+/// lay a link for in advance. Empty, with errno, where none can be made.
+[[nodiscard]] std::filesystem::path MakePrivateFolder(const std::filesystem::path& prefix);
+
 /// Six random letters and digits for names that must not be guessed.
 [[nodiscard]] std::string RandomLetters();
 

@@ -2,7 +2,6 @@
 
 #include <fcntl.h>
 #include <fmt/format.h>
-#include <stdlib.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -100,11 +99,9 @@ std::string OutputFolder::Create() {
   const StateLock state(root);
   if (!state.trouble().empty()) return state.trouble();
   SweepStages(state.folder());
-  std::string pattern = (state.folder() / "stage-XXXXXX").string();
-  if (mkdtemp(pattern.data()) == nullptr) {
-    return TroubleWith("make folder", pattern, std::strerror(errno));
-  }
-  stage_ = pattern;
+  stage_ = MakePrivateFolder(state.folder() / "stage-");
+  if (stage_.empty())
+    return TroubleWith("make folder", state.folder() / "stage", std::strerror(errno));
   if (mkdir((stage_ / "new").c_str(), 0777) != 0) {
     const std::string reason = std::strerror(errno);
     rmdir(stage_.c_str());

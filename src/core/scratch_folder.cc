@@ -7,6 +7,8 @@
 #include <cstring>
 #include <system_error>
 
+#include "core/files.h"
+
 namespace mbv {
 
 namespace fs = std::filesystem;
@@ -20,10 +22,8 @@ ScratchFolder::ScratchFolder(const std::string& purpose) {
                            place == nullptr ? "" : place, error.message());
     return;
   }
-  std::string pattern = below / fmt::format("mbverify-{}-XXXXXX", purpose);
-  if (mkdtemp(pattern.data()) != nullptr) {
-    path_ = pattern;
-  } else {
+  path_ = MakePrivateFolder(below / fmt::format("mbverify-{}-", purpose));
+  if (path_.empty()) {
     trouble_ = fmt::format("cannot make a folder in {}: {}", below.string(), std::strerror(errno));
   }
 }

@@ -6,7 +6,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <system_error>
@@ -59,12 +58,9 @@ class NewFolder {
     }
     fs::create_directories(target_.parent_path(), error);
     if (error) return Trouble("make folder", target_, error.message());
-    std::string pattern =
-        target_.parent_path() / fmt::format(".{}.mbverify-XXXXXX", target_.filename().string());
-    if (mkdtemp(pattern.data()) == nullptr) {
-      return Trouble("make folder", target_, std::strerror(errno));
-    }
-    temporary_ = pattern;
+    temporary_ = MakePrivateFolder(target_.parent_path() /
+                                   fmt::format(".{}.mbverify-", target_.filename().string()));
+    if (temporary_.empty()) return Trouble("make folder", target_, std::strerror(errno));
     return WriteFile(temporary_ / "new" / file_, content_);
   }
   [[nodiscard]] std::string Commit() {

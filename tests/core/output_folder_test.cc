@@ -278,9 +278,6 @@ TEST_F(KilledPublishing, LeavesTheOldOrTheNewResultWithTheUsersFiles) {
 }
 
 TEST_F(KilledPublishing, WithoutExchangeTheNextRunBringsItBack) {
-#ifndef __x86_64__
-  GTEST_SKIP() << "system calls are refused on x86-64 only";
-#endif
   KillAtCalls killer([&] { _exit(TryResult(root_, "case", "new").empty() ? 0 : 1); });
   killer.missing = {{SYS_renameat2, 1}};
   EXPECT_GT(KillEverywhere(&killer, false), 30);
@@ -288,9 +285,6 @@ TEST_F(KilledPublishing, WithoutExchangeTheNextRunBringsItBack) {
 }
 
 TEST_F(KilledPublishing, WithoutSecondNamesTheNextRunBringsItBack) {
-#ifndef __x86_64__
-  GTEST_SKIP() << "system calls are refused on x86-64 only";
-#endif
   KillAtCalls killer([&] { _exit(TryResult(root_, "case", "new").empty() ? 0 : 1); });
   killer.missing = {{SYS_linkat, 1}};
   for (int call = 1; !testing::Test::HasFailure(); ++call) {
@@ -304,22 +298,19 @@ TEST_F(KilledPublishing, WithoutSecondNamesTheNextRunBringsItBack) {
 }
 
 TEST_F(KilledPublishing, AnExchangeThatFailsLeavesTheOldResult) {
-#ifndef __x86_64__
-  GTEST_SKIP() << "system calls are refused on x86-64 only";
-#endif
   Prepare();
   KillAtCalls killer([&] {
     const std::string trouble = TryResult(root_, "case", "new");
     _exit(trouble.find("what was there is as it was") != std::string::npos ? 0 : 1);
   });
   // As on a mount point: neither exchanged nor moved aside.
-  killer.missing = {{SYS_renameat2, 1}, {SYS_rename, 2}};
+  killer.missing = {{SYS_renameat2, 1}, {kRenameCall, 2}};
   ASSERT_TRUE(killer.EndsBefore(1'000'000));
   EXPECT_EQ(killer.exit_code, 0);
   CheckWhole(0, true);
   EXPECT_EQ(Read(root_ / "case" / "summary.json"), "old");
   // Moved aside, but neither the new one in nor the old one back: the next run brings it back.
-  killer.missing = {{SYS_renameat2, 1}, {SYS_rename, 3}};
+  killer.missing = {{SYS_renameat2, 1}, {kRenameCall, 3}};
   ASSERT_TRUE(killer.EndsBefore(1'000'000));
   EXPECT_EQ(killer.exit_code, 0);
   WriteResult("other", "x");

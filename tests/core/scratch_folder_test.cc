@@ -3,11 +3,14 @@
 
 #include <gtest/gtest.h>
 
+#include <cerrno>
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <optional>
 #include <string>
+
+#include "core/files.h"
 
 namespace mbv {
 namespace {
@@ -54,6 +57,15 @@ TEST(ScratchFolder, NamesDiffer) {
   const ScratchFolder one("test"), two("test");
   EXPECT_NE(one.path(), two.path());
   EXPECT_TRUE(one.path().filename().string().starts_with("mbverify-test-"));
+}
+
+TEST(PrivateFolder, SaysByErrnoWhyThereIsNone) {
+  const ScratchFolder outer("test");
+  EXPECT_TRUE(MakePrivateFolder(outer.path() / "missing" / "stage-").empty());
+  EXPECT_EQ(errno, ENOENT);
+  const fs::path made = MakePrivateFolder(outer.path() / "stage-");
+  EXPECT_TRUE(made.filename().string().starts_with("stage-"));
+  EXPECT_EQ(fs::status(made).permissions(), fs::perms::owner_all);
 }
 
 TEST(ScratchFolder, LiesWhereTheSystemWantsTemporaryFiles) {
