@@ -10,7 +10,7 @@
 #include <variant>
 #include <vector>
 
-#include "analytic/triangle_mesh.h"
+#include "core/triangle_mesh.h"
 #include "core/diagnostics.h"
 #include "core/plot.h"
 #include "core/run_summary.h"

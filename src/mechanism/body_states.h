@@ -16,6 +16,10 @@ struct BodyStates {
   std::vector<Vec6> V_WB;
   std::vector<Vec6> A_WB;
 
+  /// Per term of the mechanism's couplings in order: a value of its coordinate within half a turn,
+  /// which says how many turns an angle counts; empty: home (coupling_rows.h).
+  std::vector<double> coupled;
+
   void Resize(size_t bodies);
 };
 

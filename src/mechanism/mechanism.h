@@ -8,10 +8,12 @@
 
 #include <array>
 #include <limits>
+#include <memory>
 #include <string>
 #include <variant>
 #include <vector>
 
+#include "core/triangle_mesh.h"
 #include "core/types.h"
 #include "mechanism/joint_kinds.h"
 
@@ -50,8 +52,15 @@ struct Ball {
   Vec3 p_centre = Vec3::Zero();
   double radius = 0.01;
 };
+/// A surface from a file.
+struct Mesh {
+  Pose X_BG = Pose::Identity();  ///< pose of the file's frame in the body frame
+  std::string file;              ///< as found
+  Vec3 scale = Vec3::Ones();     ///< of the file's numbers, metres per unit; negative mirrors
+  std::shared_ptr<const TriangleMesh> surface = {};  ///< scaled [m], in the file's frame; not null
+};
 struct Shape {
-  std::variant<Capsule, Cylinder, Box, Ball> geometry;
+  std::variant<Capsule, Cylinder, Box, Ball, Mesh> geometry;
   std::string color = "steel";  ///< material name ("steel", "accent", …) or "#rrggbb[aa]"
 };
 
@@ -163,6 +172,20 @@ struct SpringDamper {
   double free_length_m = 0.0;
 };
 
+/// A gear pair, belt, differential or mimic joint: Σ_k P_k(q_k) = 0 between joint coordinates, each
+/// P_k a polynomial. It holds without play, loss or mass; its force λ acts on coordinate k as
+/// λ dP_k/dq_k, exerted by the joint's parent on its child.
+struct Coupling {
+  struct Term {
+    int joint = -1;
+    int coordinate = 0;
+    std::vector<double> polynomial;  ///< coefficients of q, q², …; at least one
+  };
+  std::string name;
+  std::vector<Term> terms;  ///< at least two
+  double constant = 0.0;    ///< of the sum
+};
+
 struct Mechanism {
   std::string name;
   std::string file;  ///< model.yaml it came from, as given
@@ -176,6 +199,7 @@ struct Mechanism {
   std::vector<Prescribed> prescribed;
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
+  std::vector<Coupling> couplings;
   std::vector<Beam> beams;  ///< of the elastic bodies; empty in most models
 
   std::vector<int> tree_joints;     ///< indices of the spanning tree's joints, parents first (every

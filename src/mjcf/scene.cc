@@ -40,6 +40,7 @@ struct ShapeWriter {
     xml->Set("size", b.radius);
     xml->Set("pos", b.p_centre);
   }
+  void operator()(const Mesh&) const {}
 };
 
 // MuJoCo refuses sticks without length and solids without size.
@@ -49,6 +50,7 @@ bool IsDrawable(const Shape& shape) {
     bool operator()(const Cylinder& c) const { return Stick(c.p_from, c.p_to, c.radius); }
     bool operator()(const Box& b) const { return b.size.minCoeff() > 0.0; }
     bool operator()(const Ball& b) const { return b.radius > 0.0; }
+    bool operator()(const Mesh&) const { return false; }
     static bool Stick(const Vec3& p, const Vec3& q, double radius) {
       return radius > 0.0 && (q - p).norm() > 1e-9;
     }

@@ -49,6 +49,8 @@ struct Points {
     } else if (const auto* cylinder = std::get_if<Cylinder>(&shape.geometry)) {
       AddBall(cylinder->p_from, cylinder->radius);
       AddBall(cylinder->p_to, cylinder->radius);
+    } else if (const auto* mesh = std::get_if<Mesh>(&shape.geometry)) {
+      for (const Vec3& vertex : mesh->surface->vertices) Add(mesh->X_BG * vertex);
     }
   }
   [[nodiscard]] Vec3 low() const {

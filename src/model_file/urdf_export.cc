@@ -52,6 +52,7 @@ class ShapeWriter {
     X.translation() = ball.p_centre;
     Write(X, fmt::format("<sphere radius=\"{}\"/>", ball.radius));
   }
+  void operator()(const Mesh&) {}
   std::string text;
 
  private:

@@ -30,6 +30,7 @@ struct MoveShape {
   void operator()(Cylinder& shape) const { MoveEnds(&shape.p_from, &shape.p_to); }
   void operator()(Box& shape) const { shape.X_BG = X * shape.X_BG; }
   void operator()(Ball& shape) const { shape.p_centre = X * shape.p_centre; }
+  void operator()(Mesh& shape) const { shape.X_BG = X * shape.X_BG; }
   void MoveEnds(Vec3* from, Vec3* to) const {
     *from = X * *from;
     *to = X * *to;

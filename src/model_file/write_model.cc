@@ -64,6 +64,7 @@ struct ShapeText {
   std::string operator()(const Ball& s) const {
     return fmt::format("ball: {{at: {}, radius: {}}}", Triple(s.p_centre), s.radius);
   }
+  std::string operator()(const Mesh&) const { return ""; }
   template <typename T>
   static std::string Rod(const char* word, const T& s) {
     return fmt::format("{}: {{from: {}, to: {}, radius: {}}}", word, Triple(s.p_from),

@@ -96,9 +96,10 @@ void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
             .X_WG = X_WB * box->X_BG,
             .size = 0.5 * box->size,
             .material = material};
+  } else if (const auto* ball = std::get_if<Ball>(&shape.geometry)) {
+    item = BallAt(X_WB * ball->p_centre, ball->radius, material);
   } else {
-    const Ball& ball = std::get<Ball>(shape.geometry);
-    item = BallAt(X_WB * ball.p_centre, ball.radius, material);
+    return;
   }
   if (IsScenery(shape.color)) item.framing = Framing::kNever;
   items->push_back(item);

@@ -48,6 +48,7 @@ Json ShapeJson(const Shape& shape) {
     Json operator()(const Ball& s) const {
       return {{"type", "ball"}, {"at", VectorJson(s.p_centre)}, {"radius", s.radius}};
     }
+    Json operator()(const Mesh&) const { return {}; }
   };
   Json json = std::visit(Visitor{}, shape.geometry);
   json["color"] = shape.color;

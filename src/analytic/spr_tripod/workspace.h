@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "analytic/spr_tripod/dynamics.h"
-#include "analytic/triangle_mesh.h"
+#include "core/triangle_mesh.h"
 
 namespace mbv::spr_tripod {
 

@@ -1,4 +1,4 @@
-#include "analytic/triangle_mesh.h"
+#include "core/triangle_mesh.h"
 
 #include <fmt/format.h>
 

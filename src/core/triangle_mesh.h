@@ -1,4 +1,4 @@
-// Triangle meshes of surfaces that closed forms compute (workspaces), and their file texts.
+// Triangle meshes: surfaces that closed forms compute (workspaces) and that files hold.
 #pragma once
 
 #include <array>
