@@ -328,6 +328,9 @@ class Checker {
                       spring.stiffness, spring.damping),
           "has no springs and dampers");
     }
+    for (const Coupling& coupling : mechanism_.couplings) {
+      Add("coupling " + coupling.name, "has no couplings");
+    }
     for (const Drive& drive : mechanism_.drives) {
       if (Find(coverage_.drives, drive.name) != nullptr) continue;
       Add("drive " + drive.name, "does not know it");

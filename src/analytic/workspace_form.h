@@ -10,10 +10,10 @@
 #include <variant>
 #include <vector>
 
-#include "core/triangle_mesh.h"
 #include "core/diagnostics.h"
 #include "core/plot.h"
 #include "core/run_summary.h"
+#include "core/triangle_mesh.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {

@@ -39,13 +39,14 @@ std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& foun
     text += (i == 0 ? "" : ", ") + mechanism.joints[found.group.closures[i]].name;
   }
   if (found.group.closures.size() > 3) text += ", …";
-  text += fmt::format(": {} found, taken is {}",
-                      found.assemblies.size() == 1
-                          ? "1 way to close"
-                          : fmt::format("{} ways to close", found.assemblies.size()),
-                      angles(found.assemblies.front()));
+  text += fmt::format(
+      ": {} found, taken is {}",
+      found.assemblies.size() == 1 ? "1 way to close"
+                                   : fmt::format("{} ways to close", found.assemblies.size()),
+      (found.assemblies.size() == 1 ? "" : "1: ") + angles(found.assemblies.front()));
   for (size_t i = 1; i < std::min(found.assemblies.size(), kMostWays); ++i) {
-    text += (i == 1 ? "; others: " : " / ") + angles(found.assemblies[i]);
+    text +=
+        fmt::format("{}{}: {}", i == 1 ? "; others: " : " / ", i + 1, angles(found.assemblies[i]));
   }
   if (found.assemblies.size() > kMostWays) text += " / …";
   return text;

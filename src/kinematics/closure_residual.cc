@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "kinematics/constraints.h"
+#include "kinematics/coupling_rows.h"
 
 namespace mbv::internal {
 
@@ -16,10 +17,14 @@ VecX ClosureResidual(const Mechanism& mechanism, const TreeMotion& tree, const B
     all.push_back(RowsOf(joint, states, false));
     count += all.back().rows;
   }
-  VecX r(count);
+  std::vector<CouplingRow> coupled;
+  for (const Coupling& coupling : mechanism.couplings) {
+    coupled.push_back(RowOf(mechanism, coupling, states));
+  }
+  VecX r(count + static_cast<Eigen::Index>(coupled.size()));
   MatX J_bodies;
   if (J != nullptr) {
-    J->resize(count, tree.freedoms());
+    J->setZero(r.size(), tree.freedoms());
     J_bodies = tree.Jacobian(states);
   }
   int at = 0;
@@ -34,6 +39,16 @@ VecX ClosureResidual(const Mechanism& mechanism, const TreeMotion& tree, const B
            rows.J_child.topRows(rows.rows) * J_bodies.middleRows<6>(6 * rows.child));
     }
     at += rows.rows;
+  }
+  for (const CouplingRow& row : coupled) {
+    const double scale = row.angular ? 1.0 : 1.0 / length;
+    r[at] = scale * row.value;
+    for (size_t k = 0; J != nullptr && k < row.pieces.size(); ++k) {
+      const ScalarRow& piece = row.pieces[k];
+      J->row(at) += scale * (piece.J_parent.transpose() * J_bodies.middleRows<6>(6 * piece.parent) +
+                             piece.J_child.transpose() * J_bodies.middleRows<6>(6 * piece.child));
+    }
+    ++at;
   }
   return r;
 }

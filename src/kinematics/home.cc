@@ -7,11 +7,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <random>
 
 #include "core/demand.h"
 #include "kinematics/closure_residual.h"
 #include "kinematics/constraints.h"
+#include "kinematics/coupling_rows.h"
 #include "kinematics/damped_search.h"
 #include "kinematics/frame_pair.h"
 #include "kinematics/tree_motion.h"
@@ -51,6 +53,10 @@ double LargestGap(const Mechanism& mechanism, const BodyStates& states, double l
     const LoopGap gap = GapOf(mechanism, static_cast<int>(j), states);
     largest = std::max({largest, gap.position_m / length, gap.rotation_rad});
   }
+  for (const Coupling& coupling : mechanism.couplings) {
+    const CouplingRow row = RowOf(mechanism, coupling, states);
+    largest = std::max(largest, std::abs(row.value) / (row.angular ? 1.0 : length));
+  }
   return largest;
 }
 
@@ -76,6 +82,7 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
   }
   const auto evaluate = [&](Attempt* at, MatX* J) {
     at->states = tree.States(at->X_FM);
+    at->states.coupled = CoupledGuesses(mechanism);
     MatX J_q;
     VecX r = ClosureResidual(mechanism, tree, at->states, length, &J_q);
     *J = J_q * unit.asDiagonal();
@@ -138,7 +145,26 @@ double LargestTurn(const BodyStates& from, const BodyStates& to) {
 // A pose with a body turned farther is another assembly, not the least gap of rounded data.
 constexpr double kElsewhere = 0.3;
 
-Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeResult* result) {
+// Which way to close the group is chosen, from 0; what cannot be met is told.
+std::optional<size_t> Chosen(const Mechanism& mechanism, const GroupAssemblies& found,
+                             const AssemblyChoice& choice, HomeResult* result) {
+  for (const int c : found.group.closures) {
+    const auto at = choice.find(mechanism.joints[c].name);
+    if (at == choice.end()) continue;
+    const int ways = static_cast<int>(found.assemblies.size());
+    if (at->second >= 1 && at->second <= ways) return static_cast<size_t>(at->second - 1);
+    result->unmet.push_back({.closure = at->first, .wanted = at->second, .found = ways});
+  }
+  return {};
+}
+
+bool IsNamed(const Mechanism& mechanism, const LoopGroup& group, const AssemblyChoice& choice) {
+  return std::ranges::any_of(group.closures,
+                             [&](int c) { return choice.contains(mechanism.joints[c].name); });
+}
+
+Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess,
+                    const AssemblyChoice& choice, HomeResult* result) {
   const std::vector<bool> driven = DrivenJoints(mechanism);
   const std::vector<bool> none(mechanism.joints.size(), false);
   Attempt best = Close(mechanism, driven, guess);
@@ -152,12 +178,12 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
   const bool any_driven = std::find(driven.begin(), driven.end(), true) != driven.end();
   if (open() && any_driven) result->drives_moved = try_from(none, guess);
 
-  if (!open()) return best;
+  if (!open() && choice.empty()) return best;
 
   // Loops that are open at the best pose so far, each group by itself; then all from there.
   Coordinates start = guess;
   const Coordinates at_best = JointCoordinatesAt(mechanism, best.states.X_WB, guess);
-  bool any = false, drives_moved = false;
+  bool any = false, drives_moved = false, chosen = false;
   for (const LoopGroup& group : LoopGroups(mechanism)) {
     double gap = 0.0;
     for (const int c : group.closures) {
@@ -166,9 +192,15 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
     }
     // What is open by as little is rounded data: another way to close it is none.
     constexpr double kRounded = 5e-3;  // characteristic lengths, rad
-    const bool is_open = gap > kRounded;
+    const bool is_open = gap > kRounded || IsNamed(mechanism, group, choice);
     GroupAssemblies found;
     if (is_open) found = FindAssemblies(mechanism, group, driven, guess);
+    if (const auto named = Chosen(mechanism, found, choice, result)) {
+      chosen = true;
+      std::rotate(found.assemblies.begin(),
+                  found.assemblies.begin() + static_cast<std::ptrdiff_t>(*named),
+                  found.assemblies.begin() + static_cast<std::ptrdiff_t>(*named) + 1);
+    }
     const Coordinates& way = found.assemblies.empty() ? found.best : found.assemblies.front().q;
     for (size_t k = 0; k < group.joints.size(); ++k) {
       start[group.joints[k]] = k < way.size() ? way[k] : at_best[group.joints[k]];
@@ -178,8 +210,11 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess, HomeRe
     drives_moved = drives_moved || found.drives_moved;
     result->searched.push_back(std::move(found));
   }
-  if (any && try_from(none, start)) {
-    result->guesses_moved = true;
+  if (chosen) best.gap = std::numeric_limits<double>::infinity();  // closed another way
+  bool closer = any && !drives_moved && try_from(driven, start);
+  if (any && open()) closer = try_from(none, start) || closer;
+  if (closer) {
+    result->guesses_moved = !chosen;
     result->drives_moved = result->drives_moved || drives_moved;
   }
   // Rounded data: the least gap near the guesses.
@@ -209,6 +244,12 @@ std::string HomeResult::Text(const Mechanism& mechanism) const {
         fmt::format("{}{} is open by {:.4g} m and {:.4g} rad", i == 0 ? "" : "; ",
                     mechanism.joints[gaps[i].joint].name, gaps[i].position_m, gaps[i].rotation_rad);
   }
+  for (const CouplingGap& missed : couplings) {
+    const Coupling& coupling = mechanism.couplings[missed.coupling];
+    text += fmt::format("{}coupling {} of {} is missed by {:.4g} {}", text.empty() ? "" : "; ",
+                        coupling.name, CoupledJoints(mechanism, coupling), missed.amount,
+                        missed.angular ? "rad" : "m");
+  }
   return text;
 }
 
@@ -228,23 +269,35 @@ std::vector<std::array<double, 6>> JointCoordinatesAt(const Mechanism& mechanism
   return q;
 }
 
-HomeResult SolveHome(Mechanism* mechanism) {
+HomeResult SolveHome(Mechanism* mechanism, const AssemblyChoice& choice) {
   const double length = CharacteristicLength(*mechanism);
   Coordinates guess;
   for (const Joint& joint : mechanism->joints) guess.push_back(joint.guess);
 
   HomeResult result;
-  const Attempt best = BestAttempt(*mechanism, guess, &result);
+  for (const auto& [closure, wanted] : choice) {
+    const int j = mechanism->FindJoint(closure);
+    if (j >= 0 && mechanism->joints[j].closure) continue;
+    result.unmet.push_back({.closure = closure, .wanted = wanted, .found = -1});
+  }
+  const Attempt best = BestAttempt(*mechanism, guess, choice, &result);
   mechanism->X_WB_home = best.states.X_WB;
   const Coordinates home = JointCoordinatesAt(*mechanism, best.states.X_WB, guess);
   BodyStates at_guess;
   at_guess.Resize(mechanism->bodies.size());
   at_guess.X_WB = TreePoses(*mechanism, guess);
+  at_guess.coupled = CoupledGuesses(*mechanism);
   for (size_t j = 0; j < home.size(); ++j) {
     mechanism->joints[j].home = home[j];
     if (mechanism->joints[j].closure) {
       result.gaps.push_back(GapOf(*mechanism, static_cast<int>(j), best.states));
     }
+  }
+  for (size_t c = 0; c < mechanism->couplings.size(); ++c) {
+    const CouplingRow row = RowOf(*mechanism, mechanism->couplings[c], best.states);
+    if (std::abs(row.value) <= kHomeTolerance * (row.angular ? 1.0 : length)) continue;
+    result.couplings.push_back(
+        {.coupling = static_cast<int>(c), .amount = row.value, .angular = row.angular});
   }
   const auto size = [&](const LoopGap& g) {
     return std::max(g.position_m / length, g.rotation_rad);

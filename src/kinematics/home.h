@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,23 @@ struct LoopGap {
   double rotation_rad = kNan;  ///< rotation that is not a motion of the joint
 };
 
+/// Which of the ways to close that are found is meant, by the name of a closure in the group of
+/// loops: 1 is the nearest to the guesses (GroupAssemblies::assemblies).
+using AssemblyChoice = std::map<std::string, int>;
+
+/// A choice that cannot be met.
+struct UnmetChoice {
+  std::string closure;
+  int wanted = 0, found = 0;  ///< found -1: there is no such closure
+};
+
+/// What is left of a coupling that could not be met at home.
+struct CouplingGap {
+  int coupling = -1;
+  double amount = kNan;  ///< [rad] or [m]
+  bool angular = true;
+};
+
 struct HomeResult {
   bool closed = false;
   /// Largest gap of all closures [characteristic lengths, rad], at the solution and at the guesses.
@@ -29,19 +47,22 @@ struct HomeResult {
   bool guesses_moved = false;  ///< closed only by a search: may be another assembly than meant
   /// Of the groups of loops that had to be searched: the ways to close them.
   std::vector<GroupAssemblies> searched;
-  std::vector<LoopGap> gaps;  ///< per closure joint, worst first
+  std::vector<LoopGap> gaps;                ///< per closure joint, worst first
+  std::vector<CouplingGap> couplings = {};  ///< that are missed
+  std::vector<UnmetChoice> unmet = {};
 
   /// One line for people: "limb1.S is open by 0.12 m and 0.3 rad; …" (at most three loops).
   [[nodiscard]] std::string Text(const Mechanism& mechanism) const;
 };
 
-/// Solves all loop closures in the coordinates of the spanning tree (BuildSpanningTree first), from
-/// Joint::guess: Levenberg–Marquardt, first with driven and prescribed joints held at their
-/// guesses, then with them free; loops that stay open are searched (assembly.h), and the way to
-/// close them that is nearest to the guesses is taken. Fills
-/// X_WB_home and Joint::home of every joint, closures included (angles within π of their guess);
-/// with the best pose found if the loops do not close.
-HomeResult SolveHome(Mechanism* mechanism);
+/// Solves all loop closures and couplings in the coordinates of the spanning tree
+/// (BuildSpanningTree first), from Joint::guess: Levenberg–Marquardt, first with driven and
+/// prescribed joints held at their guesses, then with them free; loops that stay open are searched
+/// (assembly.h), and the way to close them that is nearest to the guesses is taken. Fills X_WB_home
+/// and Joint::home of every joint, closures included (angles within π of their guess); with the
+/// best pose found if the loops do not close. Groups that `choice` names are searched however they
+/// close, and the way that it names is taken.
+HomeResult SolveHome(Mechanism* mechanism, const AssemblyChoice& choice = {});
 
 /// Coordinates of every joint at given body poses; angles within π of `near[joint]`.
 [[nodiscard]] std::vector<std::array<double, 6>> JointCoordinatesAt(

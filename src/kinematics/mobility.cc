@@ -28,7 +28,8 @@ bool ActsOn(const MatX& self_stress, int first_row, int rows) {
 struct ReactionStack {
   RowStack stack;
   std::vector<ConstraintRows> rows;  // per joint
-  std::vector<int> first_row;        // per joint, then of the first drive
+  std::vector<int> first_row;        // per joint, then behind the last one
+  int first_drive = 0;
 
   ReactionStack(const Mechanism& mechanism, const BodyStates& states, double length)
       : stack(mechanism.bodies.size(), length) {
@@ -38,6 +39,10 @@ struct ReactionStack {
       stack.Add(rows.back());
     }
     first_row.push_back(stack.size());
+    for (const Coupling& coupling : mechanism.couplings) {
+      stack.Add(RowOf(mechanism, coupling, states));
+    }
+    first_drive = stack.size();
   }
 };
 
@@ -84,7 +89,7 @@ void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, d
         mechanism.joints[j], reactions.rows[j], states, length, self_stress, first_row[j]));
   }
   for (size_t d = 0; d < mechanism.drives.size(); ++d) {
-    if (ActsOn(self_stress, first_row.back() + static_cast<int>(d), 1)) {
+    if (ActsOn(self_stress, reactions.first_drive + static_cast<int>(d), 1)) {
       mobility->drives_not_unique.push_back(mechanism.drives[d].name);
     }
   }

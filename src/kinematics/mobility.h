@@ -17,7 +17,7 @@ struct UndeterminedReaction {
 
 struct Mobility {
   int body_coordinates = 0;  ///< 6 × moving bodies
-  int constraint_rows = 0;   ///< scalar joint constraints (true joint kinds)
+  int constraint_rows = 0;   ///< scalar constraints of joints (true kinds) and couplings
   int constraint_rank = 0;
   int freedoms = 0;   ///< body_coordinates − constraint_rank
   int redundant = 0;  ///< constraint_rows − constraint_rank

@@ -28,9 +28,10 @@ BodyStates StatesOfPoses(const std::vector<Pose>& X_WB) {
   return states;
 }
 
-// Rows of the stack by owner: joints first, then (with drives) drives and prescribed joints.
+// Rows of the stack by owner: joints and couplings first, then (with drives) drives and prescribed
+// joints.
 struct Owner {
-  enum class Kind { kJoint, kDrive, kPrescribed } kind;
+  enum class Kind { kJoint, kCoupling, kDrive, kPrescribed } kind;
   int index = 0;
   int first_row = 0, rows = 0;
 };
@@ -52,6 +53,7 @@ Stresses FindStresses(const Mechanism& mechanism, const BodyStates& states, bool
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
     own(Owner::Kind::kJoint, j, RowsOf(mechanism.joints[j], states, with_drives).rows);
   }
+  for (size_t c = 0; c < mechanism.couplings.size(); ++c) own(Owner::Kind::kCoupling, c, 1);
   if (with_drives) {
     stack.AddDriven(mechanism, states);
     for (size_t d = 0; d < mechanism.drives.size(); ++d) own(Owner::Kind::kDrive, d, 1);
@@ -91,6 +93,9 @@ std::vector<StressGroup> GroupsOf(const Mechanism& mechanism, const Stresses& st
       switch (owners[a].kind) {
         case Owner::Kind::kJoint:
           part.joints.push_back(mechanism.joints[owners[a].index].name);
+          break;
+        case Owner::Kind::kCoupling:
+          part.couplings.push_back(mechanism.couplings[owners[a].index].name);
           break;
         case Owner::Kind::kDrive:
           part.drives.push_back(mechanism.drives[owners[a].index].name);

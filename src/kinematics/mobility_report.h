@@ -13,7 +13,7 @@ namespace mbv {
 /// balance among themselves) acts on. Groups share no joint.
 struct StressGroup {
   int count = 0;  ///< independent self-stresses = constraints too many
-  std::vector<std::string> joints, drives, prescribed;
+  std::vector<std::string> joints, drives, prescribed, couplings = {};
 };
 
 /// A loop of the spanning tree: the joint that closes it and the tree joints around it.

@@ -29,8 +29,16 @@ void RowStack::Add(const ConstraintRows& rows) {
   }
 }
 
+void RowStack::Add(const CouplingRow& row) {
+  const size_t first = rows_.size();
+  for (const ScalarRow& piece : row.pieces) Add(piece, !row.angular);
+  for (size_t i = first + 1; i < rows_.size(); ++i) rows_[first] += rows_[i];
+  rows_.resize(first + 1, VecX::Zero(columns_));
+}
+
 void RowStack::AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions) {
   for (const Joint& joint : mechanism.joints) Add(RowsOf(joint, states, reactions));
+  for (const Coupling& coupling : mechanism.couplings) Add(RowOf(mechanism, coupling, states));
 }
 
 void RowStack::AddDriven(const Mechanism& mechanism, const BodyStates& states) {

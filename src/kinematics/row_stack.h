@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "kinematics/constraints.h"
+#include "kinematics/coupling_rows.h"
 
 namespace mbv::internal {
 
@@ -26,7 +27,9 @@ class RowStack {
   void Add(const ScalarRow& row, bool translation) {
     Add(row.parent, row.J_parent, row.child, row.J_child, translation);
   }
-  /// The true rows of all joints; with `reactions`, the isostatic rule is applied.
+  void Add(const CouplingRow& row);
+  /// The true rows of all joints, then of all couplings; with `reactions`, the isostatic rule is
+  /// applied.
   void AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions);
   /// Every drive and prescribed joint, locked.
   void AddDriven(const Mechanism& mechanism, const BodyStates& states);

@@ -59,10 +59,14 @@ std::vector<bool> IsDriven(const Mechanism& mechanism) {
     if (const auto* d = std::get_if<JointDrive>(&drive.kind)) driven[d->joint] = true;
   }
   for (const Prescribed& p : mechanism.prescribed) driven[p.joint] = true;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) driven[term.joint] = true;
+  }
   return driven;
 }
 
-// The lower, the sooner a joint enters the tree. Driven joints keep their coordinate; a massless
+// The lower, the sooner a joint enters the tree. Driven and coupled joints keep their
+// coordinate; a massless
 // body should not become a leaf; a cut sphere or force-only joint costs three rows, a cut hinge
 // five; a free joint imposes nothing and is the last resort.
 int KeepClass(const Mechanism& mechanism, const Joint& joint, bool driven, Choice choice) {

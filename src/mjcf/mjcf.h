@@ -34,6 +34,7 @@ struct MjcfOptions {
 
 /// The MJCF of a mechanism in its home pose: bodies along the spanning tree (mjcf/plan.h),
 /// `connect`/`weld` equalities "close:JOINT" for the closures, `joint`/`tendon` equalities
+/// "couple:COUPLING" for the couplings (those that MuJoCo knows: mjcf/plan.h) and
 /// "drive:DRIVE" and "base:PRESCRIBED" that guide drives and prescribed joints (at home until the
 /// first polynomial coefficient is changed), motors and sensors for stock tools, with gains also
 /// servos "DRIVE.position_servo" and "DRIVE.velocity_servo", sites "JOINT.F"

@@ -1,6 +1,7 @@
 #include "mjcf/plan.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "core/demand.h"
 #include "mechanism/joint_pose.h"
@@ -248,8 +249,11 @@ bool IsDriven(const Mechanism& mechanism, int joint) {
     const auto* joint_drive = std::get_if<JointDrive>(&drive.kind);
     if (joint_drive != nullptr && joint_drive->joint == joint) return true;
   }
-  return std::any_of(mechanism.prescribed.begin(), mechanism.prescribed.end(),
-                     [joint](const Prescribed& p) { return p.joint == joint; });
+  const auto uses = [joint](const auto& item) { return item.joint == joint; };
+  return std::ranges::any_of(mechanism.prescribed, uses) ||
+         std::ranges::any_of(mechanism.couplings, [&](const Coupling& coupling) {
+           return std::ranges::any_of(coupling.terms, uses);
+         });
 }
 
 std::string JointName(const Joint& joint, int coordinate) {
@@ -263,5 +267,58 @@ std::string JointName(const Joint& joint, int coordinate) {
 std::string ClosureName(const Joint& joint) { return "close:" + joint.name; }
 std::string DriveEqualityName(const Drive& drive) { return "drive:" + drive.name; }
 std::string BaseEqualityName(const Prescribed& base) { return "base:" + base.name; }
+std::string CouplingName(const Coupling& coupling) { return "couple:" + coupling.name; }
+
+namespace {
+
+bool IsLinear(const Coupling::Term& term) { return term.polynomial.size() == 1; }
+
+// The polynomial Σ_i a_i q^i, i ≥ 1, in x = q − ref.
+std::array<double, 5> Shifted(const std::vector<double>& coefficients, double ref) {
+  std::array<double, 5> b{};
+  for (size_t i = coefficients.size(); i-- > 0;) {
+    // b ← (b + a_i) (ref + x), Horner's rule with a polynomial.
+    b[0] += coefficients[i];
+    for (size_t k = 4; k > 0; --k) b[k] = ref * b[k] + b[k - 1];
+    b[0] *= ref;
+  }
+  return b;
+}
+
+}  // namespace
+
+PlannedCoupling PlanCoupling(const Mechanism& mechanism, const Coupling& coupling) {
+  PlannedCoupling out;
+  const auto ref = [&](const Coupling::Term& term) {
+    return mechanism.joints[term.joint].home[term.coordinate];
+  };
+  const std::vector<Coupling::Term>& terms = coupling.terms;
+  // Joint 1 is the one that moves more: MuJoCo makes the row as soft as both joints are light,
+  // whatever their ratio, and its error counts in joint 1.
+  auto linear = std::ranges::find_if(terms, IsLinear);
+  for (auto other = linear; other != terms.end(); ++other) {
+    const bool moves_more =
+        IsLinear(*other) && std::abs(other->polynomial[0]) < std::abs(linear->polynomial[0]);
+    if (moves_more) linear = other;
+  }
+  if (terms.size() <= 2 && linear != terms.end()) {
+    out.type = PlannedCoupling::Type::kJoint;
+    out.first = static_cast<size_t>(linear - terms.begin());
+    out.second = terms.size() - 1 - out.first;
+    const Coupling::Term& one = terms[out.first];
+    const double c = one.polynomial[0];
+    if (terms.size() == 2) {
+      out.polycoef = Shifted(terms[out.second].polynomial, ref(terms[out.second]));
+    }
+    out.polycoef[0] += coupling.constant;
+    for (double& a : out.polycoef) a *= -1.0 / c;
+    out.polycoef[0] -= ref(one);
+  } else if (std::ranges::all_of(terms, IsLinear)) {
+    out.type = PlannedCoupling::Type::kTendon;
+    out.polycoef[0] = -coupling.constant;
+    for (const Coupling::Term& term : terms) out.polycoef[0] -= term.polynomial[0] * ref(term);
+  }
+  return out;
+}
 
 }  // namespace mbv::mjcf

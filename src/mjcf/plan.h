@@ -14,6 +14,7 @@
 //   the closing joint like a tree body, and the halves are welded together.
 #pragma once
 
+#include <array>
 #include <string>
 #include <vector>
 
@@ -69,8 +70,22 @@ inline constexpr double kTinyMassFraction = 1e-11;
 
 [[nodiscard]] Plan MakePlan(const Mechanism& mechanism);
 
-/// True when a drive or prescribed joint uses a coordinate of this joint.
+/// True when a drive, a prescribed joint or a coupling uses a coordinate of this joint.
 [[nodiscard]] bool IsDriven(const Mechanism& mechanism, int joint);
+
+/// How MuJoCo holds a coupling.
+struct PlannedCoupling {
+  enum class Type {
+    kJoint,    ///< equality of two joints (or of one): q_1 − ref_1 = Σ_i a_i (q_2 − ref_2)^i
+    kTendon,   ///< fixed tendon of constant length Σ c_k q_k
+    kUnknown,  ///< neither of them
+  };
+  Type type = Type::kUnknown;
+  size_t first = 0, second = 0;      ///< kJoint: terms of joints 1 and 2; equal: joint 1 alone
+  std::array<double, 5> polycoef{};  ///< kJoint: a; kTendon: the first is the length's difference
+                                     ///< from that at the reference pose
+};
+[[nodiscard]] PlannedCoupling PlanCoupling(const Mechanism& mechanism, const Coupling& coupling);
 
 /// Name of the MuJoCo joint of a joint's coordinate.
 [[nodiscard]] std::string JointName(const Joint& joint, int coordinate);
@@ -79,6 +94,7 @@ inline constexpr double kTinyMassFraction = 1e-11;
 [[nodiscard]] std::string ClosureName(const Joint& joint);           // "close:JOINT"
 [[nodiscard]] std::string DriveEqualityName(const Drive& drive);     // "drive:DRIVE"
 [[nodiscard]] std::string BaseEqualityName(const Prescribed& base);  // "base:PRESCRIBED"
+[[nodiscard]] std::string CouplingName(const Coupling& coupling);    // "couple:COUPLING"
 
 /// Endings of the names of a drive's servo actuators.
 inline constexpr const char* kPositionServo = ".position_servo";

@@ -1,5 +1,6 @@
 #include "mjcf/sections.h"
 
+#include <algorithm>
 #include <string>
 #include <variant>
 
@@ -39,6 +40,38 @@ void WriteClosure(const Sections& s, const PlannedClosure& closure) {
   s.xml->Close();
 }
 
+std::string NameOf(const Sections& s, const Coupling::Term& term) {
+  return JointName(s.mechanism.joints[term.joint], term.coordinate);
+}
+
+void WriteFixedTendon(const Sections& s, const Coupling& coupling) {
+  s.xml->Open("fixed");
+  s.xml->Set("name", CouplingName(coupling));
+  for (const Coupling::Term& term : coupling.terms) {
+    s.xml->Open("joint");
+    s.xml->Set("joint", NameOf(s, term));
+    s.xml->Set("coef", term.polynomial[0]);
+    s.xml->Close();
+  }
+  s.xml->Close();
+}
+
+void WriteCoupling(const Sections& s, const Coupling& coupling) {
+  const PlannedCoupling plan = PlanCoupling(s.mechanism, coupling);
+  if (plan.type == PlannedCoupling::Type::kUnknown) return;
+  const bool joints = plan.type == PlannedCoupling::Type::kJoint;
+  s.xml->Open(joints ? "joint" : "tendon");
+  s.xml->Set("name", CouplingName(coupling));
+  if (joints) {
+    s.xml->Set("joint1", NameOf(s, coupling.terms[plan.first]));
+    if (plan.second != plan.first) s.xml->Set("joint2", NameOf(s, coupling.terms[plan.second]));
+  } else {
+    s.xml->Set("tendon1", CouplingName(coupling));
+  }
+  s.xml->Set("polycoef", plan.polycoef);
+  s.xml->Close();
+}
+
 // An equality or sensor on one object.
 void WriteOn(const Sections& s, const char* element, const std::string& name,
              const char* object_key, const std::string& object, bool active = true) {
@@ -68,7 +101,10 @@ void WriteClosureSensors(const Sections& s, const PlannedClosure& closure) {
 }  // namespace
 
 void WriteTendons(const Sections& s) {
-  bool any = !s.mechanism.springs.empty();
+  const auto fixed = [&](const Coupling& coupling) {
+    return PlanCoupling(s.mechanism, coupling).type == PlannedCoupling::Type::kTendon;
+  };
+  bool any = !s.mechanism.springs.empty() || std::ranges::any_of(s.mechanism.couplings, fixed);
   for (const Drive& drive : s.mechanism.drives) {
     any = any || std::holds_alternative<DistanceDrive>(drive.kind);
   }
@@ -86,15 +122,20 @@ void WriteTendons(const Sections& s) {
     s.xml->Set("springlength", spring.free_length_m);
     FinishTendon(s, spring.name);
   }
+  for (const Coupling& coupling : s.mechanism.couplings) {
+    if (fixed(coupling)) WriteFixedTendon(s, coupling);
+  }
   s.xml->Close();
 }
 
 void WriteEqualities(const Sections& s) {
-  if (s.plan.closures.empty() && s.mechanism.drives.empty() && s.mechanism.prescribed.empty()) {
+  if (s.plan.closures.empty() && s.mechanism.drives.empty() && s.mechanism.prescribed.empty() &&
+      s.mechanism.couplings.empty()) {
     return;
   }
   s.xml->Open("equality");
   for (const PlannedClosure& closure : s.plan.closures) WriteClosure(s, closure);
+  for (const Coupling& coupling : s.mechanism.couplings) WriteCoupling(s, coupling);
   for (const Drive& drive : s.mechanism.drives) {
     const auto* driven = std::get_if<JointDrive>(&drive.kind);
     const std::string name = DriveEqualityName(drive);

@@ -5,6 +5,7 @@
 
 #include "model_file/model_bodies.h"
 #include "model_file/model_checks.h"
+#include "model_file/model_couplings.h"
 #include "model_file/model_drives.h"
 #include "model_file/model_elastic.h"
 #include "model_file/model_head.h"
@@ -63,6 +64,7 @@ struct ModelSections {
   std::vector<Prescribed> prescribed;
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
+  std::vector<Coupling> couplings;
   internal::ModelBeams beams;
   internal::UrdfSection urdf;
 };
@@ -82,7 +84,8 @@ void ReadBodies(const EachBlock& each_block, const internal::BodyNames& names,
                                     {.bodies = &sections->bodies,
                                      .joints = &sections->joints,
                                      .places = &sections->signals,
-                                     .drives = &sections->drives});
+                                     .drives = &sections->drives,
+                                     .couplings = &sections->couplings});
       }
     }
     bodies.Read(block);
@@ -92,7 +95,7 @@ void ReadBodies(const EachBlock& each_block, const internal::BodyNames& names,
   each_block([&](const Block& block) { shapes.Read(block); });
 }
 
-// What is driven and watched, and springs.
+// What is driven and watched, springs and couplings.
 template <typename EachBlock>
 void ReadSignals(const EachBlock& each_block, const internal::BodyNames& names,
                  internal::ModelValues* values, ModelSections* s) {
@@ -106,6 +109,8 @@ void ReadSignals(const EachBlock& each_block, const internal::BodyNames& names,
     internal::ReadOutputs(block, names, yaml, &s->signals, &s->outputs);
   });
   each_block([&](const Block& block) { internal::ReadSprings(block, names, values, &s->springs); });
+  internal::CouplingReader couplings(values, s->joints, &s->signals, &s->couplings);
+  each_block([&](const Block& block) { couplings.Read(block); });
 }
 
 template <typename EachBlock>
@@ -173,6 +178,7 @@ Mechanism Assembled(const std::string& file, ModelSections* s) {
   mechanism.prescribed = std::move(s->prescribed);
   mechanism.outputs = std::move(s->outputs);
   mechanism.springs = std::move(s->springs);
+  mechanism.couplings = std::move(s->couplings);
   mechanism.beams = std::move(s->beams.beams);
   return mechanism;
 }
@@ -191,7 +197,10 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   // number, those about the loops.
   if (!s.joints.good || !internal::CheckTree(s.joints.hints, mechanism, &report)) return;
   if (report.has_errors()) return;
-  internal::CloseLoops({s.head.closure_tolerance_m, reading->bare_urdf}, mechanism, &report);
+  internal::CloseLoops({.tolerance_m = s.head.closure_tolerance_m,
+                        .bare_urdf = reading->bare_urdf,
+                        .assembly = reading->options.assembly},
+                       mechanism, &report);
   if (report.has_own_errors()) return;
   internal::CheckHome(*mechanism, &report);
   internal::CheckIsostaticRule(*mechanism, &report);

@@ -24,6 +24,9 @@ struct LoadOptions {
   /// Where the overrides were written, for messages ("scenario.yaml:7:3").
   std::map<std::string, Finding> override_places;
   std::optional<Vec3> gravity_W;  ///< [m/s²], instead of the model's; its `up` stays
+  /// Which way to close the loops is meant (kinematics/home.h), by the name of a closure; counted
+  /// from 1 in the order in which they are told.
+  std::map<std::string, int> assembly = {};
   /// Other values of literals, by place.
   std::map<std::string, double> literals;
 };

@@ -21,8 +21,9 @@ bool CheckTree(const ClosureHints& hints, Mechanism* mechanism, ModelReport* rep
 
 /// How loops may be closed that their data leave open.
 struct ClosureRules {
-  double tolerance_m = 0.0;  ///< up to which rounded data are projected
-  bool bare_urdf = false;    ///< no model file: joints named as balls are taken for such
+  double tolerance_m = 0.0;      ///< up to which rounded data are projected
+  bool bare_urdf = false;        ///< no model file: joints named as balls are taken for such
+  AssemblyChoice assembly = {};  ///< by option
 };
 /// Solves the home pose. What it had to do for that are warnings; open loops are errors.
 void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* report);

@@ -28,7 +28,7 @@ void DriveReader::ReadDrive(const Block& block, const YamlEntry& entry) {
   Drive drive;
   drive.name = block.prefix + entry.key;
   if (joint_drive) {
-    const auto on_joint = ReadJointDrive(block, map);
+    const auto on_joint = ReadJointCoordinate(joints_, block, map, {}, &values_.yaml());
     if (!on_joint) return;
     drive.kind = *on_joint;
   } else if (!ReadDistanceDrive(block, map, &drive)) {
@@ -85,31 +85,32 @@ double DriveReader::ReadStiffness(const Block& block, const YamlMap& map) {
   return locked;
 }
 
-std::optional<JointDrive> DriveReader::ReadJointDrive(const Block& block, const YamlMap& map) {
-  YamlReader& yaml = values_.yaml();
-  const YamlNode* joint_node = map.Required("joint");
+std::optional<JointDrive> ReadJointCoordinate(const ModelJoints& joints, const Block& block,
+                                              const YamlMap& map, const CoordinateKeys& keys,
+                                              YamlReader* yaml) {
+  const YamlNode* joint_node = map.Required(keys.joint);
   if (joint_node == nullptr) return std::nullopt;
-  const auto index = FindJointNamed(joints_, block, *joint_node, map.PathOf("joint"), &yaml);
+  const auto index = FindJointNamed(joints, block, *joint_node, map.PathOf(keys.joint), yaml);
   JointDrive drive;
-  const YamlNode* coordinate = map.Find("coordinate");
+  const YamlNode* coordinate = map.Find(keys.coordinate);
   if (coordinate != nullptr) {
-    const auto value = yaml.Integer(*coordinate, map.PathOf("coordinate"));
+    const auto value = yaml->Integer(*coordinate, map.PathOf(keys.coordinate));
     if (!value) return std::nullopt;
     drive.coordinate = *value;
   }
   if (!index) return std::nullopt;
   drive.joint = *index;
-  const Joint& joint = joints_.joints[*index];
+  const Joint& joint = joints.joints[*index];
   const int n = FreedomsOf(joint.kind);
   if (drive.coordinate < 0 || drive.coordinate >= n) {
-    yaml.Error(coordinate == nullptr ? *joint_node : *coordinate,
-               fmt::format("{}: coordinate {} of joint '{}', which has {} coordinates", map.path(),
-                           drive.coordinate, joint.name, n),
-               "coordinates are counted from 0");
+    yaml->Error(coordinate == nullptr ? *joint_node : *coordinate,
+                fmt::format("{}: coordinate {} of joint '{}', which has {} coordinates", map.path(),
+                            drive.coordinate, joint.name, n),
+                "coordinates are counted from 0");
     return std::nullopt;
   }
   if (IsOfBall(joint.kind, drive.coordinate)) {
-    yaml.Error(
+    yaml->Error(
         *joint_node,
         fmt::format("{}: a rotation of joint '{}' has no axis to drive", map.path(), joint.name),
         "write the joint as universal and revolute joints with a body between");

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mechanism/mechanism.h"
@@ -23,7 +24,6 @@ class DriveReader {
 
  private:
   void ReadDrive(const Block& block, const YamlEntry& entry);
-  std::optional<JointDrive> ReadJointDrive(const Block& block, const YamlMap& map);
   bool ReadDistanceDrive(const Block& block, const YamlMap& map, Drive* drive);
   void ReadRange(const Block& block, const YamlMap& map, Drive* drive);
   double ReadStiffness(const Block& block, const YamlMap& map);
@@ -34,6 +34,15 @@ class DriveReader {
   SignalPlaces& places_;
   std::vector<Drive>& drives_;
 };
+
+/// Keys of a joint's name and of the number of its coordinate (0 when left out).
+struct CoordinateKeys {
+  std::string joint = "joint", coordinate = "coordinate";
+};
+/// A coordinate that can be driven. Empty after a finding.
+std::optional<JointDrive> ReadJointCoordinate(const ModelJoints& joints, const Block& block,
+                                              const YamlMap& map, const CoordinateKeys& keys,
+                                              YamlReader* yaml);
 
 /// Puts the drives into the order of `drive_order`, which lists every one once.
 void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives);

@@ -9,9 +9,9 @@
 namespace mbv::internal {
 namespace {
 
-const std::vector<std::string> kPartKeys = {"parameters", "attach",      "bodies",    "joints",
-                                            "drives",     "prescribed",  "outputs",   "springs",
-                                            "instances",  "description", "materials", "sections"};
+const std::vector<std::string> kPartKeys = {
+    "parameters", "attach",    "bodies",      "joints",    "drives",   "prescribed", "outputs",
+    "springs",    "instances", "description", "materials", "sections", "couplings"};
 
 }  // namespace
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "kinematics/assembly.h"
+#include "kinematics/coupling_rows.h"
 #include "kinematics/data_projection.h"
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
@@ -60,6 +61,14 @@ void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const Hom
     } else {
       report->AtJoint(gap.joint, Severity::kError, text, hint);
     }
+  }
+  for (const CouplingGap& missed : home.couplings) {
+    const Coupling& coupling = mechanism.couplings[missed.coupling];
+    report->At(report->places().signals.Of(coupling.name), Severity::kError,
+               fmt::format("coupling '{}' of {} does not hold at home: it is missed by {:.3g} {}",
+                           coupling.name, CoupledJoints(mechanism, coupling), missed.amount,
+                           missed.angular ? "rad" : "m"),
+               hint);
   }
   if (!report->has_errors()) {
     report->AtFile(Severity::kError, "the home pose was not found");
@@ -126,8 +135,35 @@ void WarnAboutAssembly(const Mechanism& mechanism, const HomeResult& home, Model
              "look at a picture of the home pose, and guess nearer to the pose that is meant");
 }
 
+namespace {
+
+void ReportUnmet(const Mechanism& mechanism, const HomeResult& home, ModelReport* report) {
+  std::vector<std::string> closures;
+  for (const Joint& joint : mechanism.joints) {
+    if (joint.closure) closures.push_back(joint.name);
+  }
+  for (const UnmetChoice& unmet : home.unmet) {
+    if (unmet.found < 0) {
+      report->AtFile(Severity::kError,
+                     fmt::format("assembly {}={}: there is no closure of this name", unmet.closure,
+                                 unmet.wanted),
+                     DidYouMean(unmet.closure, closures));
+    } else {
+      report->AtFile(Severity::kError,
+                     fmt::format("assembly {}={}: {} to close the loops of '{}' {} found",
+                                 unmet.closure, unmet.wanted,
+                                 unmet.found == 1 ? "1 way" : fmt::format("{} ways", unmet.found),
+                                 unmet.closure, unmet.found == 1 ? "was" : "were"),
+                     "they are counted from 1, the nearest to the guesses");
+    }
+  }
+}
+
+}  // namespace
+
 void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* report) {
-  const HomeResult home = SolveHome(mechanism);
+  const HomeResult home = SolveHome(mechanism, rules.assembly);
+  if (!home.unmet.empty()) return ReportUnmet(*mechanism, home, report);
   if (home.closed) {
     if (home.guesses_moved) {
       WarnAboutAssembly(*mechanism, home, report);

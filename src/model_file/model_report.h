@@ -19,7 +19,7 @@ struct ModelPlaces {
   std::vector<BodyPlace> bodies;               ///< per body
   std::vector<Place> joints;                   ///< per joint
   std::vector<Place> beams;                    ///< per beam
-  SignalPlaces signals;                        ///< drives, prescribed joints, outputs
+  SignalPlaces signals;                        ///< drives, prescribed joints, outputs, couplings
   std::map<std::string, Finding> urdf_joints;  ///< of a URDF file, by name
 };
 

@@ -1,4 +1,5 @@
-// The names by which scenarios command and watch a model: of drives, prescribed joints and outputs.
+// The names by which scenarios command and watch a model: of drives, prescribed joints, outputs and
+// couplings.
 // Internal to the model loader.
 #pragma once
 

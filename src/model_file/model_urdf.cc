@@ -23,6 +23,7 @@ UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Int
   into.joints->good = true;
   UrdfSection urdf = Add(*source, into.bodies, into.joints);
   ReadGuesses(model, map, into.joints);
+  AddMimics(source->tree, node, into);
   // The model file's own drives are the better ones.
   if (model.Section("drives") == nullptr) AddDrives(MotorsOf(*source, *into.joints), node, into);
   return urdf;
@@ -150,6 +151,21 @@ void UrdfReader::AddDrives(const std::vector<std::string>& motors, const YamlNod
                             .kind = JointDrive{joint, 0},
                             .range = into.joints->joints[joint].range[0]});
     into.places->Add(motor, "drive", {at.line, at.column});
+  }
+}
+
+// Names are those of the joints that follow.
+void UrdfReader::AddMimics(const UrdfTree& tree, const YamlNode& at, const Into& into) {
+  for (const UrdfTree::Mimic& mimic : tree.mimics) {
+    const int joint = into.joints->Find(mimic.joint), followed = into.joints->Find(mimic.of);
+    const std::string place = "urdf." + mimic.joint + ".mimic.";
+    const std::string name = mimic.joint + "_mimic";
+    into.couplings->push_back(
+        {.name = name,
+         .terms = {{joint, 0, {-1.0}},
+                   {followed, 0, {literals_.At(place + "multiplier", mimic.multiplier)}}},
+         .constant = literals_.At(place + "offset", mimic.offset)});
+    into.places->Add(name, "coupling", {at.line, at.column});
   }
 }
 

@@ -22,7 +22,8 @@ struct UrdfSection {
   std::map<std::string, Finding> joints;  ///< where each joint is described, closures included
 };
 
-/// Reads the links of a URDF file as bodies, its joints and closures, and its motors as drives.
+/// Reads the links of a URDF file as bodies, its joints and closures, its motors as drives and
+/// its mimic joints as couplings.
 class UrdfReader {
  public:
   /// `bare`: the model file stands for the URDF file, and nobody wrote it.
@@ -35,6 +36,7 @@ class UrdfReader {
     ModelJoints* joints;  ///< not good after a finding
     SignalPlaces* places;
     std::vector<Drive>* drives;
+    std::vector<Coupling>* couplings;
   };
   UrdfSection Read(const Block& model, const YamlNode& node, const Into& into);
 
@@ -53,6 +55,7 @@ class UrdfReader {
   void TakeLiterals(Body* body);
   void ReadGuesses(const Block& model, const YamlMap& map, ModelJoints* joints);
   std::vector<std::string> MotorsOf(const Source& source, const ModelJoints& joints) const;
+  void AddMimics(const UrdfTree& tree, const YamlNode& at, const Into& into);
   void AddDrives(const std::vector<std::string>& motors, const YamlNode& at, const Into& into);
 
   bool bare_;

@@ -54,8 +54,8 @@ struct UrdfTree {
 };
 
 /// Reads URDF text; everything urdfdom says is a finding, with the line where it is known. Closures
-/// are read in the forms listed in urdf_closures.h. Mimic joints, meshes, gears and joints inside
-/// <gazebo> are left out with a warning. The tree is empty after an error.
+/// are read in the forms listed in urdf_closures.h. Meshes, gears and joints inside <gazebo> are
+/// left out with a warning. The tree is empty after an error.
 [[nodiscard]] UrdfTree ReadUrdf(const std::string& text, const std::string& file,
                                 Diagnostics* diagnostics);
 

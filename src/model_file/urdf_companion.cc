@@ -9,6 +9,7 @@
 #include "mechanism/joint_pose.h"
 #include "model_file/urdf.h"
 #include "model_file/urdf_frames.h"
+#include "model_file/write_model.h"
 
 namespace mbv {
 namespace {
@@ -151,6 +152,14 @@ class Companion {
       const std::string frame = Attach(output.body, "output_" + name, output.X_BO);
       const std::string in = Attach(output.reference_body, "reference_" + name, output.X_RbR);
       sections_["outputs"] += fmt::format("  {}: {{frame: {}, in: {}}}\n", name, frame, in);
+    }
+    for (const Coupling& coupling : m_.couplings) {
+      sections_["couplings"] +=
+          fmt::format("  {}: {{{}}}\n", YamlName(coupling.name),
+                      CouplingText(coupling, [this](const Coupling::Term& term) {
+                        const auto [joint, k] = FindCoordinate(term.joint, term.coordinate);
+                        return std::pair('"' + joint + '"', k);
+                      }));
     }
     for (const SpringDamper& s : m_.springs) {
       const std::string name = YamlName(s.name);

@@ -79,7 +79,7 @@ class Importer {
     }
     for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
     tree_.transmission_joints = details_.transmission_joints;
-    WarnOfMimics();
+    CheckMimics();
     WarnOfMeshes();
     WarnOfLosses("damping", damped_);
     WarnOfLosses("friction", rubbing_);
@@ -196,16 +196,25 @@ class Importer {
          "drive forces are computed without it");
   }
 
-  void WarnOfMimics() {
-    if (tree_.mimics.empty()) return;
-    const UrdfTree::Mimic& first = tree_.mimics.front();
-    const size_t more = tree_.mimics.size() - 1;
-    Warn(LineOf(details_.joint_lines, first.joint),
-         fmt::format("joint '{}': mimic of '{}'{} left out, the joint{} free", first.joint,
-                     first.of, more == 0 ? " is" : fmt::format(" and {} more are", more),
-                     more == 0 ? " is" : "s are"),
-         "where it stands for a closed loop, state the loop by a closure; gears are commanded: "
-         "drive both joints and couple them by `equal` in the scenario");
+  void CheckMimics() {
+    for (const UrdfTree::Mimic& mimic : tree_.mimics) {
+      const int line = LineOf(details_.joint_lines, mimic.joint);
+      std::vector<std::string> names;
+      for (const Joint& joint : tree_.joints) {
+        if (FreedomsOf(joint.kind) == 1) names.push_back(joint.name);
+      }
+      const std::string says = fmt::format("joint '{}': mimic of '{}'", mimic.joint, mimic.of);
+      if (!Contains(names, mimic.of)) {
+        Error(line, says + ", which is no joint with one coordinate", DidYouMean(mimic.of, names));
+      } else if (!Contains(names, mimic.joint)) {
+        Error(line, says + ", but it has no coordinate of its own to couple");
+      } else if (mimic.of == mimic.joint) {
+        Error(line, says + ", itself");
+      } else if (mimic.multiplier == 0.0 || !std::isfinite(mimic.multiplier + mimic.offset)) {
+        Error(line, fmt::format("{}: multiplier {} and offset {} couple nothing", says,
+                                mimic.multiplier, mimic.offset));
+      }
+    }
   }
 
   // One finding for all: robots have hundreds.

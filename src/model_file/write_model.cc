@@ -1,6 +1,7 @@
 #include "model_file/write_model.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -234,6 +235,13 @@ class ModelWriter {
           fmt::format("  {}: {{frame: {}, in: {}}}\n", name, Ref(output.body, output.X_BO, name),
                       Ref(output.reference_body, output.X_RbR, name + "_in"));
     }
+    if (!m_.couplings.empty()) text += "couplings:\n";
+    for (const Coupling& coupling : m_.couplings) {
+      text += fmt::format("  {}: {{{}}}\n", FreshName(coupling.name, &taken),
+                          CouplingText(coupling, [this](const Coupling::Term& term) {
+                            return std::pair(names_.joints[term.joint], term.coordinate);
+                          }));
+    }
     if (!m_.springs.empty()) text += "springs:\n";
     for (const SpringDamper& s : m_.springs) {
       const std::string name = FreshName(s.name, &taken);
@@ -251,6 +259,33 @@ class ModelWriter {
 };
 
 }  // namespace
+
+std::string CouplingText(const Coupling& coupling, const CoordinateNames& name_of) {
+  const std::vector<Coupling::Term>& terms = coupling.terms;
+  const auto coordinate = [&](const char* key, const Coupling::Term& term) {
+    const auto [joint, k] = name_of(term);
+    const bool follows = std::string_view(key) == "follows";
+    return fmt::format(
+        "{}: {}{}", key, joint,
+        k == 0 ? "" : fmt::format(", {}: {}", follows ? "follows_coordinate" : "coordinate", k));
+  };
+  std::string text;
+  if (terms.size() == 2 && terms[0].polynomial == std::vector<double>{-1.0}) {
+    const std::vector<double>& p = terms[1].polynomial;
+    text = coordinate("joint", terms[0]) + ", " + coordinate("follows", terms[1]);
+    text += p.size() == 1 ? fmt::format(", ratio: {}", p[0])
+                          : fmt::format(", polynomial: [{}]", fmt::join(p, ", "));
+    if (coupling.constant != 0.0) text += fmt::format(", offset: {}", coupling.constant);
+    return text;
+  }
+  for (const Coupling::Term& term : terms) {
+    text += fmt::format("{}{{{}, factor: {}}}", text.empty() ? "" : ", ", coordinate("joint", term),
+                        term.polynomial[0]);
+  }
+  text = "sum: [" + text + "]";
+  if (coupling.constant != 0.0) text += fmt::format(", offset: {}", -coupling.constant);
+  return text;
+}
 
 std::string QuotedYaml(const std::string& text) {
   std::string quoted = "\"";

@@ -1,7 +1,9 @@
 // A mechanism as the text of a model.yaml.
 #pragma once
 
+#include <functional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "mechanism/mechanism.h"
@@ -18,6 +20,12 @@ struct WrittenNames {
   std::vector<std::string> bodies, joints, drives, outputs;
 };
 [[nodiscard]] WrittenNames NamesInModel(const Mechanism& mechanism);
+
+/// Name and coordinate by which a file calls the joint of a term.
+using CoordinateNames = std::function<std::pair<std::string, int>(const Coupling::Term&)>;
+/// The lines of a coupling as a model file's map, without braces: "joint: …, follows: …, ratio: …",
+/// or a sum of linear terms.
+[[nodiscard]] std::string CouplingText(const Coupling& coupling, const CoordinateNames& name_of);
 
 /// In double quotes, for YAML.
 [[nodiscard]] std::string QuotedYaml(const std::string& text);

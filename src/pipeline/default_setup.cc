@@ -274,9 +274,9 @@ FirstMotion FindFirstMotion(const Mechanism& mechanism, const std::vector<std::s
 }
 
 DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
-                                    const std::string& model_ref) {
+                                    const std::string& model_ref, const LoadOptions& options) {
   DefaultSetupResult result;
-  LoadResult loaded = LoadRobot(file);
+  LoadResult loaded = LoadRobot(file, options);
   result.diagnostics = loaded.diagnostics;
   if (!loaded.mechanism) return result;
   DefaultSetup setup;

@@ -7,6 +7,7 @@
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "model_file/load_model.h"
 
 namespace mbv {
 
@@ -46,9 +47,10 @@ struct DefaultSetupResult {
   std::optional<DefaultSetup> setup;  ///< empty after errors
   Diagnostics diagnostics;
 };
-/// `file`: anything LoadRobot() takes. `name`: of the model; "": its own. `model_ref`: how the
-/// scenario names the model.
+/// `file`: anything LoadRobot() takes, with its options. `name`: of the model; "": its own.
+/// `model_ref`: how the scenario names the model.
 [[nodiscard]] DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
-                                                  const std::string& model_ref);
+                                                  const std::string& model_ref,
+                                                  const LoadOptions& options = {});
 
 }  // namespace mbv

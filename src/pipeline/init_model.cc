@@ -162,7 +162,10 @@ class Initialiser {
   }
 
   void WriteFromFile(const fs::path& model, const fs::path& scenario) {
-    DefaultSetupResult made = MakeDefaultSetup(options_.from, options_.name, options_.name);
+    LoadOptions options;
+    options.assembly = options_.assembly;
+    DefaultSetupResult made =
+        MakeDefaultSetup(options_.from, options_.name, options_.name, options);
     result_.diagnostics.Append(made.diagnostics);
     if (!made.setup) return;
     const std::string head =

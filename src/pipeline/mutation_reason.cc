@@ -61,6 +61,15 @@ std::vector<std::string> Which(const std::vector<T>& a, const std::vector<T>& b,
   return names;
 }
 
+bool SameCoupling(const Coupling& a, const Coupling& b) {
+  const auto same_term = [](const Coupling::Term& s, const Coupling::Term& t) {
+    return s.joint == t.joint && s.coordinate == t.coordinate &&
+           std::ranges::equal(s.polynomial, t.polynomial,
+                              [](double x, double y) { return Same(x, y); });
+  };
+  return Same(a.constant, b.constant) && std::ranges::equal(a.terms, b.terms, same_term);
+}
+
 bool SameDrive(const Drive& a, const Drive& b) {
   const auto* from = std::get_if<DistanceDrive>(&a.kind);
   const auto* to = std::get_if<DistanceDrive>(&b.kind);
@@ -228,6 +237,9 @@ std::string DescribeChange(const Mechanism& base, const Mechanism& bent) {
                !Same(a.free_length_m, b.free_length_m) || !Same(a.p_from, b.p_from) ||
                !Same(a.p_to, b.p_to);
       }));
+  add("the coupling",
+      Which(base.couplings, bent.couplings,
+            [](const Coupling& a, const Coupling& b) { return !SameCoupling(a, b); }));
   if (RangesDiffer(base, bent)) parts.emplace_back("ranges of travel");
   if (StartDiffers(base, bent)) parts.emplace_back("where the home solution starts");
   std::string text;

@@ -137,6 +137,14 @@ std::optional<PreparedStiffness> PrepareStiffness(StiffnessScenario scenario, Me
   prepared.scenario = std::move(scenario);
   prepared.base = std::move(base);
   const StiffnessScenario& s = prepared.scenario;
+  if (!prepared.base.couplings.empty()) {
+    diagnostics->AddError(
+        s.file,
+        fmt::format("model '{}' couples joints ({}), which stiffness does not know",
+                    prepared.base.name, prepared.base.couplings.front().name),
+        "without the coupling, held by drives, the model has a stiffness");
+    return {};
+  }
   prepared.analytic =
       WithParameters(prepared, s.analytic.parameters, role::kAnalytic.name, diagnostics);
   prepared.reference =

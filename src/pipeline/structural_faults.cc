@@ -35,6 +35,7 @@ class Collector {
     ProductsOfInertia();
     OtherAssembly();
     MissingClosures();
+    ReversedCouplings();
     StandardGravity();
     return std::move(faults_);
   }
@@ -86,6 +87,7 @@ class Collector {
       flipped.guess[0] = -flipped.guess[0];
       flipped.home[0] = -flipped.home[0];
       flipped.range[0] = {-joint.range[0].upper, -joint.range[0].lower};
+      for (Coupling& coupling : wrong.couplings) CountBackwards(index, &coupling);
       Add(kind, joint.name, std::move(wrong));
     };
     for (const Drive& drive : m_.drives) {
@@ -94,6 +96,33 @@ class Collector {
     for (const Prescribed& prescribed : m_.prescribed) flip(prescribed.joint);
     if (faults_.size() == before) {
       NotApplicable(kind, "its drives act along distances, which have no axis");
+    }
+  }
+
+  // What is coupled to a joint's coordinate stays so when that counts the other way.
+  static void CountBackwards(int joint, Coupling* coupling) {
+    for (Coupling::Term& term : coupling->terms) {
+      if (term.joint != joint) continue;
+      for (size_t i = 0; i < term.polynomial.size(); i += 2) term.polynomial[i] *= -1.0;
+    }
+  }
+
+  // The last coordinate counts the other way in it: an outer gear for an inner one. Home stays.
+  void ReversedCouplings() {
+    std::map<std::string, size_t> seen;
+    for (size_t c = 0; c < m_.couplings.size(); ++c) {
+      if (!IsFirst(&seen, m_.couplings[c].name)) continue;
+      Mechanism wrong = m_;
+      Coupling& coupling = wrong.couplings[c];
+      Coupling::Term& last = coupling.terms.back();
+      const double q = m_.joints[static_cast<size_t>(last.joint)].home[last.coordinate];
+      double power = q;
+      for (double& coefficient : last.polynomial) {
+        coupling.constant += 2.0 * coefficient * power;
+        coefficient *= -1.0;
+        power *= q;
+      }
+      Add("reversed coupling", m_.couplings[c].name, std::move(wrong));
     }
   }
 
@@ -233,14 +262,17 @@ class Collector {
     return "";
   }
 
+  // By a drive, a prescribed motion or a coupling.
   [[nodiscard]] bool IsDriven(int joint) const {
     const bool by_drive = std::any_of(m_.drives.begin(), m_.drives.end(), [&](const Drive& drive) {
       const auto* of_joint = std::get_if<JointDrive>(&drive.kind);
       return of_joint != nullptr && of_joint->joint == joint;
     });
-    return by_drive ||
-           std::any_of(m_.prescribed.begin(), m_.prescribed.end(),
-                       [&](const Prescribed& prescribed) { return prescribed.joint == joint; });
+    const auto uses = [joint](const auto& item) { return item.joint == joint; };
+    return by_drive || std::ranges::any_of(m_.prescribed, uses) ||
+           std::ranges::any_of(m_.couplings, [&](const Coupling& coupling) {
+             return std::ranges::any_of(coupling.terms, uses);
+           });
   }
 
   // A free joint with `closure: true` only carries the pose of a body.
@@ -259,6 +291,9 @@ class Collector {
       if (auto* of_joint = std::get_if<JointDrive>(&drive.kind)) shift(&of_joint->joint);
     }
     for (Prescribed& prescribed : wrong.prescribed) shift(&prescribed.joint);
+    for (Coupling& coupling : wrong.couplings) {
+      for (Coupling::Term& term : coupling.terms) shift(&term.joint);
+    }
     return wrong;
   }
 

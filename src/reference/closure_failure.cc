@@ -37,7 +37,8 @@ class OpenLoops {
         target_(target),
         near_values_(near_values),
         length_(CharacteristicLength(mechanism)),
-        any_closure_(std::any_of(mechanism.joints.begin(), mechanism.joints.end(),
+        any_closure_(!mechanism.couplings.empty() ||
+                     std::any_of(mechanism.joints.begin(), mechanism.joints.end(),
                                  [](const Joint& joint) { return joint.closure; })) {}
 
   // Weighted residual; with the Jacobian when J is given.
@@ -49,6 +50,10 @@ class OpenLoops {
       rows.Add(joint_rows, joint_rows.rows);
       weight.resize(rows.size(), weighted && !joint.closure ? kHard : 1.0);
     }
+    for (const Coupling& coupling : mechanism_.couplings) {
+      rows.Add(RowOf(mechanism_, coupling, states));
+    }
+    weight.resize(rows.size(), 1.0);
     for (size_t k = 0; k < commands_.size(); ++k) {
       rows.Add(mechanism_, commands_[k], states, &near_values_[k]);
       rows.value.back() -= target_[k];
@@ -81,7 +86,10 @@ class OpenLoops {
     constexpr double kSettled = 1e-9;    // a smaller share of the residual is no progress
     constexpr double kRounding = 1e-12;  // of scaled rows
     const auto evaluate = [&](BodyStates* at, MatX* J) { return Evaluate(*at, true, J); };
-    const auto move = [&](const VecX& s, BodyStates* at) { MoveBodies(Unscaled(s), at); };
+    const auto move = [&](const VecX& s, BodyStates* at) {
+      MoveBodies(Unscaled(s), at);
+      FollowCouplings(mechanism_, at);
+    };
     const auto enough = [](const internal::DampedStepMade& step) {
       const double now = step.r.norm();
       return step.better && (now > (1 - kSettled) * step.before || now < kRounding);
@@ -120,6 +128,11 @@ void NameWorst(const Mechanism& mechanism, const std::vector<Command>& commands,
     offer(joint.name, gap / length, gap, "m");
     offer(joint.name, turn, turn, "rad");
     row += rows.rows;
+  }
+  for (const Coupling& coupling : mechanism.couplings) {
+    const bool angular = RowOf(mechanism, coupling, states).angular;
+    const double miss = std::abs(r[row++]);
+    offer(coupling.name, miss, angular ? miss : miss * length, angular ? "rad" : "m");
   }
   for (const Command& command : commands) {
     const bool angle = !IsLength(mechanism, command.terms.front().coordinate);

@@ -110,6 +110,14 @@ void ClosureSolver::EvaluateRows(Trial* trial) {
     const ConstraintRows rows = RowsOf(joint, trial->states, false);
     rows_.Add(rows, rows.rows);
   }
+  first_coupling_ = rows_.size();
+  FollowCouplings(mechanism_, &trial->states);
+  coupled_size_.clear();
+  for (const Coupling& coupling : mechanism_.couplings) {
+    const CouplingRow row = RowOf(mechanism_, coupling, trial->states);
+    rows_.Add(row);
+    coupled_size_.push_back(row.LargestPiece());
+  }
   joint_rows_ = rows_.size();
   for (size_t k = 0; k < commands_.size(); ++k) {
     rows_.Add(mechanism_, commands_[k], trial->states, &trial->near_values[k]);
@@ -128,7 +136,9 @@ double ClosureSolver::Openness(const VecX& residual, const VecX& target,
   double openness = 0.0;
   for (int k = 0; k < system_.size(); ++k) {
     const int row = selection_[k];
-    const double coordinate = row < joint_rows_ ? 0.0 : std::abs(target[row - joint_rows_]);
+    const double coordinate = row < first_coupling_ ? 0.0
+                              : row < joint_rows_   ? coupled_size_[row - first_coupling_]
+                                                    : std::abs(target[row - joint_rows_]);
     // Angles count turns, and both they and lengths may be large beside the mechanism.
     const double tolerance = std::max(rows_.angular[row] ? options_.closure_tolerance_m : closed_m,
                                       32 * kEps * coordinate);
@@ -242,6 +252,16 @@ RunSummary ClosureSolver::Singular(const std::string& why) const {
   return summary;
 }
 
+std::string ClosureSolver::OwnerOf(int joint_row) const {
+  if (joint_row >= first_coupling_) return mechanism_.couplings[joint_row - first_coupling_].name;
+  int row = 0;
+  for (const Joint& joint : mechanism_.joints) {
+    row += 6 - FreedomsOf(joint.kind);
+    if (joint_row < row) return joint.name;
+  }
+  return "";
+}
+
 RunSummary ClosureSolver::CheckPose() {
   gap_position_m_ = gap_rotation_rad_ = 0.0;
   int worst = 0;
@@ -255,14 +275,7 @@ RunSummary ClosureSolver::CheckPose() {
     RunSummary summary = Failed(
         Stop::kNoConvergence,
         "a constraint that was redundant at the home pose is violated: the loops close there only");
-    int row = 0;
-    for (const Joint& joint : mechanism_.joints) {
-      row += 6 - FreedomsOf(joint.kind);
-      if (worst < row) {
-        summary.where = joint.name;
-        break;
-      }
-    }
+    summary.where = OwnerOf(worst);
     summary.amount = rows_.value[worst];
     summary.unit = rows_.angular[worst] ? "rad" : "m";
     return summary;

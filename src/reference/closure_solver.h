@@ -58,14 +58,16 @@ class ClosureSolver {
   [[nodiscard]] VecX Refined(const VecX& rates, bool* accurate);
   [[nodiscard]] RunSummary Singular(const std::string& why) const;
   void Accept(const VecX& target, Trial&& trial);
+  [[nodiscard]] std::string OwnerOf(int joint_row) const;
 
   const Mechanism& mechanism_;
   const ReferenceOptions options_;
   const double length_, lever_;
   std::vector<Command> commands_;  ///< of the motion, then prescribed joints held at home
   SquareSystem system_;
-  RowSet rows_;  ///< all joint rows, then the command rows
-  int joint_rows_ = 0;
+  RowSet rows_;  ///< all joint rows and couplings, then the command rows
+  int first_coupling_ = 0, joint_rows_ = 0;
+  std::vector<double> coupled_size_;  ///< per coupling: its largest piece, for rounding
   std::vector<int> selection_;
   bool selection_is_new_ = true;
   int orientation_ = 0;  ///< sign of the determinant on this branch

@@ -27,6 +27,9 @@ void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSe
     const ConstraintRows rows = RowsOf(joint, states, true);
     out->Add(rows, ReactionRows(joint, rows));
   }
+  for (const Coupling& coupling : mechanism.couplings) {
+    out->Add(RowOf(mechanism, coupling, states));
+  }
 }
 
 ForceSolver::ForceSolver(const Mechanism& mechanism)
@@ -184,7 +187,7 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ve
     const Vec3 moment = wrench.head<3>() - p_CoMo.cross(wrench.tail<3>());
     reactions->row(j) << (R_FW * wrench.tail<3>()).transpose(), (R_FW * moment).transpose();
   }
-  return row;
+  return row + static_cast<int>(mechanism.couplings.size());
 }
 
 void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {

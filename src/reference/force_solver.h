@@ -34,7 +34,7 @@ class ForceSolver {
   const Mechanism& mechanism_;
   const double length_, lever_;
   SquareSystem system_;
-  RowSet rows_;           ///< reaction rows of all joints, drives, prescribed joints
+  RowSet rows_;           ///< AddReactionRows(), drives, prescribed joints
   int first_driven_ = 0;  ///< row of the first drive
   std::vector<int> basis_, rest_;
   bool basis_is_new_ = true, chosen_ = false;
@@ -42,7 +42,8 @@ class ForceSolver {
   MatX self_stress_;     ///< scaled; basis rows then rest rows
 };
 
-/// Rows of all joints, with the isostatic rule applied: what the joints can transmit.
+/// Rows of all joints, with the isostatic rule applied, then of all couplings: what they can
+/// transmit.
 void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSet* rows);
 /// joints × 6 as ReactionChannels() defines, from the forces of AddReactionRows(), which come
 /// first in `force`; returns their number.

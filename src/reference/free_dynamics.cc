@@ -79,6 +79,9 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
     const ConstraintRows rows = RowsOf(joint, states, false);
     rows_.Add(rows, rows.rows);
   }
+  for (const Coupling& coupling : mechanism_.couplings) {
+    rows_.Add(RowOf(mechanism_, coupling, states));
+  }
   joint_rows_ = rows_.size();
   for (size_t k = 0; k < motion_.commands.size(); ++k) {
     rows_.Add(mechanism_, motion_.commands[k], states, &near_values_[k]);
@@ -181,6 +184,7 @@ void FreeDynamics::AddDriveForces(double t_s, const BodyStates& states,
 }
 
 RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
+  FollowCouplings(mechanism_, states);
   Factor(t_s, *states);
   if (!(pivot_ > kLost)) return Singular(t_s, *states);
   if (RunSummary summary = CheckFreedoms(t_s); !summary.ok()) return summary;
@@ -225,6 +229,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
   if (moved != nullptr) *moved = 0.0;
   double open = kNan, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMostCorrections; ++i) {
+    FollowCouplings(mechanism_, states);
     Factor(t_s, *states);
     const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
     open = LargestOpen();
@@ -268,6 +273,10 @@ double FreeDynamics::Rounding(const BodyStates& states) const {
     if (!rows_.angular[joint_rows_ + k]) continue;
     largest_angle = std::max(largest_angle, std::abs(command_.position[k]));
   }
+  for (const Coupling& coupling : mechanism_.couplings) {
+    const CouplingRow row = RowOf(mechanism_, coupling, states);
+    if (row.angular) largest_angle = std::max(largest_angle, row.LargestPiece());
+  }
   return std::max(GapRounding(Reach(lever_, states.X_WB)) / length_, 32 * kEps * largest_angle);
 }
 
@@ -279,6 +288,11 @@ void FreeDynamics::Gaps(const BodyStates& states, double* position_m, double* ro
       double* gap = i < rows.translation_rows ? position_m : rotation_rad;
       *gap = std::max(*gap, std::abs(rows.residual[i]));
     }
+  }
+  for (const Coupling& coupling : mechanism_.couplings) {
+    const CouplingRow row = RowOf(mechanism_, coupling, states);
+    double* gap = row.angular ? rotation_rad : position_m;
+    *gap = std::max(*gap, std::abs(row.value));
   }
 }
 

@@ -42,6 +42,16 @@ void RowSet::Add(const ConstraintRows& rows, int count) {
   }
 }
 
+void RowSet::Add(const CouplingRow& row) {
+  double bias_sum = 0.0;
+  for (const ScalarRow& piece : row.pieces) {
+    AddPiece(piece.parent, piece.J_parent);
+    AddPiece(piece.child, piece.J_child);
+    bias_sum += piece.bias;
+  }
+  CloseRow(row.value, bias_sum, row.angular);
+}
+
 void RowSet::Add(const ScalarRow& row, bool is_angle) {
   AddPiece(row.parent, row.J_parent);
   AddPiece(row.child, row.J_child);

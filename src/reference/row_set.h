@@ -5,6 +5,7 @@
 
 #include "core/types.h"
 #include "kinematics/constraints.h"
+#include "kinematics/coupling_rows.h"
 #include "mechanism/motion.h"
 
 namespace mbv::internal {
@@ -23,6 +24,7 @@ struct RowSet {
   void Clear();
   /// The first `count` rows of a joint.
   void Add(const ConstraintRows& rows, int count);
+  void Add(const CouplingRow& row);
   void Add(const ScalarRow& row, bool is_angle);
   /// Σ factor · coordinate; angles near `near_values`, which are replaced by the values found.
   void Add(const Mechanism& mechanism, const Command& command, const BodyStates& states,

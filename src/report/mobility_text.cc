@@ -32,14 +32,21 @@ std::string HeadText(const Mechanism& mechanism, const Mobility& m) {
                       closures == 1 ? "closes a loop" : "close loops",
                       Count(m.drives, "drive", "drives"),
                       Count(m.prescribed, "prescribed joint", "prescribed joints"));
+  for (const Coupling& coupling : mechanism.couplings) {
+    std::vector<std::string> joints;
+    for (const Coupling::Term& term : coupling.terms) {
+      joints.push_back(mechanism.joints[term.joint].name);
+    }
+    text += fmt::format("  coupling {}: {}\n", coupling.name, Joined(joints));
+  }
   return text;
 }
 
-std::string FreedomsText(const MobilityReport& report) {
+std::string FreedomsText(const MobilityReport& report, bool coupled) {
   const Mobility& m = report.home;
-  std::string text =
-      fmt::format("  freedoms: {} = {} body coordinates - rank {} of {} joint constraints\n",
-                  m.freedoms, m.body_coordinates, m.constraint_rank, m.constraint_rows);
+  std::string text = fmt::format(
+      "  freedoms: {} = {} body coordinates - rank {} of {} joint{} constraints\n", m.freedoms,
+      m.body_coordinates, m.constraint_rank, m.constraint_rows, coupled ? " and coupling" : "");
   double kept = m.smallest_kept, dropped = m.largest_dropped;
   for (const Mobility& near : report.nearby) {
     kept = std::min(kept, near.smallest_kept);
@@ -65,6 +72,13 @@ std::string FreedomsText(const MobilityReport& report) {
   return text;
 }
 
+// Joints, then couplings.
+std::vector<std::string> SharersOf(const StressGroup& group) {
+  std::vector<std::string> names = group.joints;
+  names.insert(names.end(), group.couplings.begin(), group.couplings.end());
+  return names;
+}
+
 std::string RedundancyText(const MobilityReport& report) {
   const Mobility& m = report.home;
   std::string text = fmt::format(
@@ -74,7 +88,7 @@ std::string RedundancyText(const MobilityReport& report) {
     text = fmt::format("  redundant constraints: 0; Kutzbach's count is right\n");
   }
   for (const StressGroup& group : report.redundant) {
-    text += fmt::format("    {} shared by {}\n", group.count, Joined(group.joints));
+    text += fmt::format("    {} shared by {}\n", group.count, Joined(SharersOf(group)));
   }
   for (const LoopCount& loop : report.loops) {
     text += fmt::format("  loop {}: {}, screws of rank {}{}\n", Joined(loop.joints, " "),
@@ -106,10 +120,10 @@ std::string ReasonText(const StressGroup& group) {
     return fmt::format(
         "    {} hold each other: {} more than the freedoms they share (through {})\n", Joined(all),
         Count(group.count, "drive", "drives"),
-        group.joints.empty() ? "no joint" : Joined(group.joints));
+        SharersOf(group).empty() ? "no joint" : Joined(SharersOf(group)));
   }
   return fmt::format("    {} share {}: forces can act there against each other without any load\n",
-                     Joined(group.joints),
+                     Joined(SharersOf(group)),
                      Count(group.count, "redundant constraint", "redundant constraints"));
 }
 
@@ -137,6 +151,7 @@ Json GroupsJson(const std::vector<StressGroup>& groups) {
   for (const StressGroup& group : groups) {
     list.push_back({{"count", group.count},
                     {"joints", group.joints},
+                    {"couplings", group.couplings},
                     {"drives", group.drives},
                     {"prescribed", group.prescribed}});
   }
@@ -156,8 +171,9 @@ Json PoseJson(const Mobility& m) {
 }  // namespace
 
 std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report) {
-  std::string text = HeadText(mechanism, report.home) + FreedomsText(report) +
-                     RedundancyText(report) + DrivenText(report) + ForcesText(mechanism, report);
+  std::string text = HeadText(mechanism, report.home) +
+                     FreedomsText(report, !mechanism.couplings.empty()) + RedundancyText(report) +
+                     DrivenText(report) + ForcesText(mechanism, report);
   text += "  drives:";
   for (const Drive& drive : mechanism.drives) text += " " + drive.name;
   text += "\n  outputs:";
@@ -181,6 +197,8 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
                {"drives_singular_at_home", report.drives_singular()}};
   json["drives"] = Json::array();
   for (const Drive& drive : mechanism.drives) json["drives"].push_back(drive.name);
+  json["couplings"] = Json::array();
+  for (const Coupling& coupling : mechanism.couplings) json["couplings"].push_back(coupling.name);
   json["outputs"] = Json::array();
   for (const Output& output : mechanism.outputs) json["outputs"].push_back(output.name);
   json["home"] = PoseJson(report.home);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/spatial.h"
+#include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
 
 namespace mbv::simulation {
@@ -29,6 +30,8 @@ ConstraintSystem::ConstraintSystem(const EngineModel& engine, mjData* d)
     closure_row_.push_back(closure_rows_);
     closure_rows_ += closure.type == PlannedClosure::Type::kConnect ? 3 : 6;
   }
+  first_coupling_ = closure_rows_;
+  closure_rows_ += static_cast<int>(engine.coupling_equality.size());
   rows_ = closure_rows_;
   const auto driven = static_cast<Eigen::Index>(engine.driven.size());
   given_.setZero(driven);
@@ -51,11 +54,38 @@ void ConstraintSystem::FindUnits() {
   }
   row_unit_.setOnes(rows_);
   for (const int row : closure_row_) row_unit_.segment<3>(row).setConstant(length_);
+  for (size_t c = 0; c < engine_.coupling_equality.size(); ++c) {
+    coupling_is_length_.push_back(IsLengthCoupling(c));
+    if (coupling_is_length_[c]) row_unit_[coupling_row(static_cast<int>(c))] = length_;
+  }
   for (size_t k = 0; k < engine_.driven.size(); ++k) {
     const DrivenPlace& place = engine_.driven[k];
     if (driven_row_[k] < 0) continue;
     row_unit_[driven_row_[k]] = place.is_tendon ? length_ : dof_unit_[place.dof];
   }
+}
+
+bool ConstraintSystem::IsLengthCoupling(size_t coupling) const {
+  const Mechanism& mechanism = *engine_.mechanism;
+  const Coupling& c = mechanism.couplings[coupling];
+  const mjcf::PlannedCoupling plan = mjcf::PlanCoupling(mechanism, c);
+  const auto is_length = [&](const Coupling::Term& term) {
+    return IsLength(mechanism.joints[term.joint].kind, term.coordinate);
+  };
+  return plan.type == mjcf::PlannedCoupling::Type::kJoint ? is_length(c.terms[plan.first])
+                                                          : std::ranges::any_of(c.terms, is_length);
+}
+
+double ConstraintSystem::CouplingBias(int coupling) const {
+  const mjModel& m = *engine_.m;
+  const int equality = engine_.coupling_equality[coupling];
+  const int second = m.eq_obj2id[equality];
+  if (m.eq_type[equality] != mjEQ_JOINT || second < 0) return 0.0;
+  const double* a = m.eq_data + mjNEQDATA * equality;
+  const int place = m.jnt_qposadr[second];
+  const double x = d_->qpos[place] - m.qpos0[place];
+  const double rate = d_->qvel[m.jnt_dofadr[second]];
+  return -(2.0 * a[2] + x * (6.0 * a[3] + x * 12.0 * a[4])) * rate * rate;
 }
 
 double ConstraintSystem::Rounding() const {
@@ -189,6 +219,9 @@ void ConstraintSystem::Bias(VecX* bias) {
   for (size_t c = 0; c < engine_.plan.closures.size(); ++c) {
     ClosureBias(static_cast<int>(c), bias);
   }
+  for (size_t c = 0; c < engine_.coupling_equality.size(); ++c) {
+    (*bias)[coupling_row(static_cast<int>(c))] = CouplingBias(static_cast<int>(c));
+  }
   for (size_t k = 0; k < engine_.driven.size(); ++k) {
     const DrivenPlace& place = engine_.driven[k];
     if (place.is_tendon && driven_row_[k] >= 0) (*bias)[driven_row_[k]] = TendonBias(place.object);
@@ -204,6 +237,10 @@ ConstraintSystem::Gap ConstraintSystem::LargestGap() const {
     if (engine_.plan.closures[c].type == PlannedClosure::Type::kConnect) continue;
     const double half_sine = std::min(1.0, r.segment<3>(row + 3).norm());
     gap.rotation_rad = std::max(gap.rotation_rad, 2.0 * std::asin(half_sine));
+  }
+  for (size_t c = 0; c < engine_.coupling_equality.size(); ++c) {
+    double& part = coupling_is_length_[c] ? gap.position_m : gap.rotation_rad;
+    part = std::max(part, std::abs(r[coupling_row(static_cast<int>(c))]));
   }
   return gap;
 }

@@ -1,8 +1,9 @@
 // MuJoCo's equality constraints as a system r(q) = 0 with Jacobian J and bias J̇q̇.
 //
-// Rows: the closures in plan order, then the guided coordinates (drives without a given force,
-// prescribed joints). The residual of a guided row is position − target. MuJoCo 2.2.2 has no J̇q̇ in
-// its reference accelerations; it is computed here from MuJoCo's own cvel and cdof_dot:
+// Rows: the closures in plan order, the couplings, then the guided coordinates (drives without a
+// given force, prescribed joints). The residual of a guided row is position − target. MuJoCo 2.2.2
+// has no J̇q̇ in its reference accelerations; it is computed here from MuJoCo's own cvel and
+// cdof_dot:
 //
 //   bias acceleration of body b (spatial, about the root's centre of mass c):
 //     A0_b = A0_parent + Σ_j cdof_dot_j q̇_j                                                   (1)
@@ -14,6 +15,7 @@
 //   tendon of length L from p1 to p2, u = (p2 − p1)/L, w = v_p2 − v_p1:
 //     bias = u·(a0_p2 − a0_p1) + (w·w − (u·w)²)/L                                              (5)
 //   joint: bias = 0.
+//   coupling q1 − ref1 = P(x), x = q2 − ref2: bias = −P″(x) q̇2²; of a fixed tendon 0         (6)
 #pragma once
 
 #include <vector>
@@ -31,6 +33,7 @@ class ConstraintSystem {
   ConstraintSystem(const EngineModel& engine, mjData* d);
 
   [[nodiscard]] int rows() const { return rows_; }
+  /// Of closures and couplings.
   [[nodiscard]] int closure_rows() const { return closure_rows_; }
   [[nodiscard]] int driven_rows() const { return rows_ - closure_rows_; }
   /// Row of driven coordinate k, or -1 if its force is given.
@@ -87,6 +90,7 @@ class ConstraintSystem {
   [[nodiscard]] int first_driven_row() const { return closure_rows_; }
   /// First row of a planned closure.
   [[nodiscard]] int closure_row(int closure) const { return closure_row_[closure]; }
+  [[nodiscard]] int coupling_row(int coupling) const { return first_coupling_ + coupling; }
 
   /// Largest gaps of the closures: |translation| [m] and rotation angle of welds [rad].
   struct Gap {
@@ -103,14 +107,17 @@ class ConstraintSystem {
   [[nodiscard]] double TendonBias(int tendon) const;
   void ClosureBias(int closure, VecX* bias) const;
 
+  [[nodiscard]] bool IsLengthCoupling(size_t coupling) const;
+  [[nodiscard]] double CouplingBias(int coupling) const;
   void FindUnits();
 
   const EngineModel& engine_;
   mjData* const d_;
   const double length_, lever_;
   VecX row_unit_, dof_unit_;
-  int rows_ = 0, closure_rows_ = 0;
+  int rows_ = 0, first_coupling_ = 0, closure_rows_ = 0;
   std::vector<int> closure_row_, driven_row_;
+  std::vector<bool> coupling_is_length_;
   VecX given_;
   MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)

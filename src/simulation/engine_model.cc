@@ -1,5 +1,6 @@
 #include "simulation/engine_model.h"
 
+#include <algorithm>
 #include <array>
 
 #include "mechanism/impossible_inertia.h"
@@ -75,6 +76,29 @@ RunSummary FindDriven(EngineModel* engine) {
   return RunSummary::Done();
 }
 
+// MuJoCo has equalities of two joints, one a polynomial of the other, and fixed tendons.
+RunSummary CheckCouplings(const Mechanism& mechanism) {
+  for (const Coupling& coupling : mechanism.couplings) {
+    const bool known =
+        mjcf::PlanCoupling(mechanism, coupling).type != mjcf::PlannedCoupling::Type::kUnknown;
+    const auto on_ball = std::ranges::find_if(coupling.terms, [&](const Coupling::Term& term) {
+      return HasBall(mechanism.joints[term.joint].kind);
+    });
+    if (known && on_ball == coupling.terms.end()) continue;
+    return {.stop = Stop::kUnsupported,
+            .message = known ? "coupling '" + coupling.name +
+                                   "' uses a coordinate of the ball or free joint '" +
+                                   mechanism.joints[on_ball->joint].name +
+                                   "', which MuJoCo does not have"
+                             : "MuJoCo cannot hold coupling '" + coupling.name +
+                                   "': it is neither linear nor one coordinate as a polynomial of "
+                                   "one other; the other witnesses take it as it is",
+            .where = coupling.name,
+            .unit = {}};
+  }
+  return RunSummary::Done();
+}
+
 // MuJoCo compiles no body whose inertia violates the triangle inequality.
 RunSummary CheckInertias(const Mechanism& mechanism) {
   for (const Body& body : mechanism.bodies) {
@@ -94,6 +118,7 @@ RunSummary CheckInertias(const Mechanism& mechanism) {
 RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                            EngineModel* engine) {
   if (RunSummary summary = CheckInertias(mechanism); !summary.ok()) return summary;
+  if (RunSummary summary = CheckCouplings(mechanism); !summary.ok()) return summary;
   engine->mechanism = &mechanism;
   engine->plan = mjcf::MakePlan(mechanism);
   engine->m = CompileMjcf(mjcf);
@@ -107,6 +132,9 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   }
   for (const mjcf::PlannedClosure& closure : engine->plan.closures) {
     engine->closure_equality.push_back(IdOf(m, mjOBJ_EQUALITY, closure.name));
+  }
+  for (const Coupling& coupling : mechanism.couplings) {
+    engine->coupling_equality.push_back(IdOf(m, mjOBJ_EQUALITY, mjcf::CouplingName(coupling)));
   }
   for (const SpringDamper& spring : mechanism.springs) {
     engine->spring_tendon.push_back(IdOf(m, mjOBJ_TENDON, spring.name));

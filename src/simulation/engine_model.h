@@ -31,6 +31,7 @@ struct EngineModel {
   std::vector<int> body_id;  ///< per planned body
   std::vector<DrivenPlace> driven;
   std::vector<int> closure_equality;        ///< per planned closure
+  std::vector<int> coupling_equality;       ///< per coupling
   std::vector<int> spring_tendon;           ///< per spring
   std::vector<std::vector<int>> joint_ids;  ///< per mechanism joint: MuJoCo joints, inner to outer
   std::vector<bool> dof_is_rotation3;       ///< first of three dofs of a ball (or of a free joint's

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 #include <vector>
 
 #include "core/spatial.h"
@@ -174,10 +175,7 @@ class MjcfImporter {
       return;
     }
     if (!connect && !weld) {
-      Say(fmt::format("equality '{}' couples joints or tendons and is left out: what it couples is "
-                      "free",
-                      name),
-          "couple drives by `equal` in the scenario");
+      AddCoupling(e, name, data);
       return;
     }
     Joint joint;
@@ -202,6 +200,49 @@ class MjcfImporter {
       return;
     }
     mechanism_.joints.push_back(joint);
+  }
+
+  // q_1 = Σ_i a_i q_2^i of two joints or fixed tendons, all counted from the reference pose.
+  void AddCoupling(int e, const std::string& name, const mjtNum* a) {
+    Coupling coupling{.name = name, .terms = {}};
+    bool known = m_.eq_type[e] == mjEQ_JOINT || m_.eq_type[e] == mjEQ_TENDON;
+    const auto add = [&](int object, const std::vector<double>& polynomial) {
+      known = known && AddTerms(m_.eq_type[e], object, polynomial, &coupling);
+    };
+    add(m_.eq_obj1id[e], {-1.0});
+    std::vector<double> polynomial(a + 1, a + 5);
+    while (!polynomial.empty() && polynomial.back() == 0.0) polynomial.pop_back();
+    if (m_.eq_obj2id[e] >= 0 && !polynomial.empty()) add(m_.eq_obj2id[e], polynomial);
+    coupling.constant = a[0];
+    if (known) {
+      mechanism_.couplings.push_back(coupling);
+      return;
+    }
+    Say(fmt::format("equality '{}' is left out: what it couples is free", name),
+        "couplings are known of hinges and slides, by a polynomial or by linear fixed tendons");
+  }
+
+  // A joint's polynomial, or that of a fixed tendon Σ c_k q_k, which must be linear.
+  bool AddTerms(int type, int object, const std::vector<double>& polynomial, Coupling* coupling) {
+    const auto add = [&](int joint, const std::vector<double>& p) {
+      if (m_.jnt_type[joint] != mjJNT_HINGE && m_.jnt_type[joint] != mjJNT_SLIDE) return false;
+      const int at = joint_index_[static_cast<size_t>(joint)];
+      const bool twice = std::ranges::any_of(
+          coupling->terms, [&](const Coupling::Term& term) { return term.joint == at; });
+      coupling->terms.push_back({.joint = at, .coordinate = 0, .polynomial = p});
+      return !twice;
+    };
+    if (type == mjEQ_JOINT) return add(object, polynomial);
+    if (polynomial.size() != 1) return false;
+    if (m_.tendon_stiffness[object] == 0.0 && m_.tendon_damping[object] == 0.0) {
+      coupling_tendons_.insert(object);
+    }
+    const int first = m_.tendon_adr[object];
+    for (int w = first; w < first + m_.tendon_num[object]; ++w) {
+      if (m_.wrap_type[w] != mjWRAP_JOINT) return false;
+      if (!add(m_.wrap_objid[w], {polynomial[0] * m_.wrap_prm[w]})) return false;
+    }
+    return true;
   }
 
   [[nodiscard]] Pose SitePose(const std::string& name) const {
@@ -299,8 +340,9 @@ class MjcfImporter {
       if (m_.jnt_stiffness[j] != 0.0) springs.push_back(JointNameOf(j));
     }
     lost("stiffness", springs, forces);
-    if (m_.ntendon > 0) {
-      Say(fmt::format("{} tendons are left out", m_.ntendon), forces);
+    if (const size_t lost_tendons = static_cast<size_t>(m_.ntendon) - coupling_tendons_.size();
+        lost_tendons > 0) {
+      Say(fmt::format("{} tendons are left out", lost_tendons), forces);
     }
     if (!geared_.empty()) {
       Say("the gears of these actuators are left out: " + Joined(geared_, kMost),
@@ -333,6 +375,7 @@ class MjcfImporter {
   std::vector<int> index_;        // per MuJoCo body
   std::vector<int> joint_index_;  // per MuJoCo joint
   std::vector<std::string> held_, geared_, shifted_, moved_;
+  std::set<int> coupling_tendons_;  // that are nothing but the sum in a coupling
   bool touching_ = false;
 };
 

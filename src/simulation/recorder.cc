@@ -87,6 +87,14 @@ void Recorder::FindReactionPlaces() {
     ++row;
   }
   for (const Prescribed& base : mechanism.prescribed) add(base.joint, row++);
+  coupled_of_.resize(mechanism.joints.size());
+  for (size_t c = 0; c < mechanism.couplings.size(); ++c) {
+    for (const Coupling::Term& term : mechanism.couplings[c].terms) {
+      const std::string name = mjcf::JointName(mechanism.joints[term.joint], term.coordinate);
+      coupled_of_[term.joint].emplace_back(system_->coupling_row(static_cast<int>(c)),
+                                           IdOf(*engine_.m, mjOBJ_JOINT, name));
+    }
+  }
 }
 
 void Recorder::Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
@@ -225,17 +233,16 @@ void Recorder::TreeWrenches(const Loads& loads) {
   W_ += Eigen::Map<const Eigen::Matrix<double, 6, Eigen::Dynamic>>(d->cfrc_int, 6, m.nbody);
 }
 
-// The drive acts along or about the joint's own axis, through M's origin.
+// Drives and couplings act along or about the joint's own axes, through M's origin.
 void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
-  const mjData* d = system_->data();
-  for (const auto& [row, id] : driven_of_[joint]) {
-    const double f = sign * system_->DrivenForce(row);
-    const ConstVec3 axis(d->xaxis + 3 * id);
-    if (engine_.m->jnt_type[id] == mjJNT_SLIDE) {
-      F_W->tail<3>() -= f * axis;
-    } else {
-      F_W->head<3>() -= f * axis;
-    }
+  const auto exclude = [&](int id, double force) {
+    const ConstVec3 axis(system_->data()->xaxis + 3 * id);
+    const bool slide = engine_.m->jnt_type[id] == mjJNT_SLIDE;
+    F_W->segment<3>(slide ? 3 : 0) -= sign * force * axis;
+  };
+  for (const auto& [row, id] : driven_of_[joint]) exclude(id, system_->DrivenForce(row));
+  for (const auto& [row, id] : coupled_of_[joint]) {
+    exclude(id, system_->J()(row, engine_.m->jnt_dofadr[id]) * system_->force()[row]);
   }
 }
 

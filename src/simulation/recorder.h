@@ -53,7 +53,8 @@ class Recorder {
   const ChannelColumns columns_;
   std::vector<ReactionPlace> places_;  // per joint
   std::vector<std::vector<std::pair<int, int>>>
-      driven_of_;                               // per joint: (driven row, MuJoCo joint)
+      driven_of_,                               // per joint: (driven row, MuJoCo joint)
+      coupled_of_;                              // per joint: (constraint row, MuJoCo joint)
   Eigen::Matrix<double, 6, Eigen::Dynamic> W_;  // per MuJoCo body: wrench from its parent about the
                                                 // root's centre of mass, world axes
   VecX bias_, acceleration_, work_;

@@ -102,6 +102,40 @@ TEST(Home, AFourBarWithTooFarAGroundStaysOpenByTheMissingLength) {
   EXPECT_NE(home.Text(m).find("C is open by 0.9"), std::string::npos) << home.Text(m);
 }
 
+TEST(Home, TheWayToCloseThatIsNamedIsTaken) {
+  const FourBar truth(FourBar::kHomeAngle);
+  Mechanism m = MakeFourBar();
+  HomeResult home = SolveHome(&m, {{"C", 1}});
+  EXPECT_TRUE(home.closed);
+  EXPECT_NEAR(m.joints[kD].home[0], truth.t3, 1e-11);
+  ASSERT_EQ(home.searched.size(), 1u);
+  EXPECT_EQ(home.searched[0].assemblies.size(), 2u);
+  // The other one mirrors the dyad of coupler and rocker at the line from B to D.
+  m = MakeFourBar();
+  home = SolveHome(&m, {{"C", 2}});
+  EXPECT_TRUE(home.closed) << home.Text(m);
+  EXPECT_FALSE(home.guesses_moved);  // it is the one that is meant
+  EXPECT_NEAR(m.joints[kA].home[0], truth.t1, 1e-12);
+  const Vec3 B(FourBar::a * std::cos(truth.t1), FourBar::a * std::sin(truth.t1), 0);
+  const Vec3 D(FourBar::d, 0, 0), u = (D - B).normalized();
+  const Vec3 C = D + FourBar::c * Vec3(std::cos(truth.t3), std::sin(truth.t3), 0);
+  const Vec3 mirrored = B + 2.0 * u * u.dot(C - B) - (C - B);
+  const Vec3 is =
+      D + FourBar::c * Vec3(std::cos(m.joints[kD].home[0]), std::sin(m.joints[kD].home[0]), 0);
+  EXPECT_LT((is - mirrored).norm(), 1e-11);
+}
+
+TEST(Home, AWayThatIsNotThereIsToldWithThoseThatAre) {
+  Mechanism m = MakeFourBar();
+  const HomeResult home = SolveHome(&m, {{"C", 3}, {"X", 1}});
+  ASSERT_EQ(home.unmet.size(), 2u);
+  EXPECT_EQ(home.unmet[0].closure, "X");
+  EXPECT_EQ(home.unmet[0].found, -1);
+  EXPECT_EQ(home.unmet[1].closure, "C");
+  EXPECT_EQ(home.unmet[1].wanted, 3);
+  EXPECT_EQ(home.unmet[1].found, 2);
+}
+
 TEST(Home, AMotorGuessThatCannotCloseIsMovedAndToldSo) {
   Mechanism m = MakeFourBar();
   m.joints[kA].X_PF.translation().x() = -0.35;  // ground distance 0.85: closes near θ1 = 0 only

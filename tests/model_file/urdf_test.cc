@@ -75,24 +75,44 @@ TEST(UrdfConventions, InertiaIsAboutTheCentreOfMassInTheAxesOfItsOrigin) {
   EXPECT_LT((body.I_Bcm_B - expected).norm(), kUrdfRoundoff) << body.I_Bcm_B;
 }
 
-TEST(UrdfConventions, LimitsAreReadAndMimicIsLeftOutAloud) {
+TEST(UrdfConventions, LimitsAndMimicAreRead) {
   const std::string text = Robot(
       "<link name=\"a\"/><link name=\"b\"/>"
       "<joint name=\"j\" type=\"prismatic\"><parent link=\"world\"/><child link=\"a\"/>"
       "<axis xyz=\"0 0 1\"/><limit lower=\"-0.1\" upper=\"0.4\" effort=\"1\" "
       "velocity=\"1\"/></joint>"
       "<joint name=\"k\" type=\"revolute\"><parent link=\"a\"/><child link=\"b\"/>"
-      "<limit effort=\"1\" velocity=\"1\"/><mimic joint=\"j\"/></joint>");
-  Diagnostics diagnostics;
-  const UrdfTree tree = ReadUrdf(text, "r.urdf", &diagnostics);
-  EXPECT_EQ(diagnostics.Text(),
-            "r.urdf:1:1: warning: joint 'k': mimic of 'j' is left out, the joint is free\n"
-            "  hint: where it stands for a closed loop, state the loop by a closure; gears are "
-            "commanded: drive both joints and couple them by `equal` in the scenario\n");
+      "<limit effort=\"1\" velocity=\"1\"/><mimic joint=\"j\" multiplier=\"-2\" "
+      "offset=\"0.25\"/></joint>");
+  const UrdfTree tree = MustRead(text);
+  ASSERT_EQ(tree.mimics.size(), 1u);
+  EXPECT_EQ(tree.mimics[0].joint, "k");
+  EXPECT_EQ(tree.mimics[0].of, "j");
+  EXPECT_EQ(tree.mimics[0].multiplier, -2.0);
+  EXPECT_EQ(tree.mimics[0].offset, 0.25);
   EXPECT_EQ(tree.joints.at(0).range[0].lower, -0.1);
   EXPECT_EQ(tree.joints.at(0).range[0].upper, 0.4);
   // lower = upper = 0 is urdfdom's word for "not given".
   EXPECT_FALSE(std::isfinite(tree.joints.at(1).range[0].upper));
+}
+
+TEST(UrdfConventions, AMimicThatMeansNothingIsAFinding) {
+  const auto robot = [](const std::string& mimic) {
+    return Robot(
+        "<link name=\"a\"/><link name=\"b\"/>\n"
+        "<joint name=\"hip\" type=\"continuous\"><parent link=\"world\"/><child "
+        "link=\"a\"/></joint>\n"
+        "<joint name=\"knee\" type=\"continuous\"><parent link=\"a\"/><child link=\"b\"/>" +
+        mimic + "</joint>");
+  };
+  EXPECT_EQ(Findings(robot("<mimic joint=\"hipp\"/>")),
+            "r.urdf:3:1: error: joint 'knee': mimic of 'hipp', which is no joint with one "
+            "coordinate\n  hint: did you mean 'hip'?\n");
+  EXPECT_EQ(Findings(robot("<mimic joint=\"knee\"/>")),
+            "r.urdf:3:1: error: joint 'knee': mimic of 'knee', itself\n");
+  EXPECT_EQ(Findings(robot("<mimic joint=\"hip\" multiplier=\"0\"/>")),
+            "r.urdf:3:1: error: joint 'knee': mimic of 'hip': multiplier 0 and offset 0 couple "
+            "nothing\n");
 }
 
 TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {

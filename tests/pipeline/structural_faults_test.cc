@@ -6,6 +6,7 @@
 #include <map>
 #include <set>
 
+#include "kinematics/home.h"
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
 #include "tests/shipped.h"
@@ -122,6 +123,36 @@ TEST(StructuralFaults, TheOtherAssemblyOfAFourBarIsItsMirrorImage) {
   const Vec3 end(bar.ParameterValue("rocker"), 0, 0);
   const Vec3 C = X(bar, rocker) * end, C_wrong = X(wrong, rocker) * end;
   EXPECT_LT((C_wrong - (B + 2.0 * u * u.dot(C - B) - (C - B))).norm(), 1e-11);
+}
+
+TEST(StructuralFaults, AReversedCouplingHoldsAtHomeAndNowhereElse) {
+  const Mechanism press = LoadNamed("geared_press");
+  const std::vector<StructuralFault> faults = Of(press, "reversed coupling");
+  ASSERT_EQ(faults.size(), 4u);
+  for (size_t c = 0; c < faults.size(); ++c) {
+    EXPECT_EQ(faults[c].where, press.couplings[c].name);
+    Mechanism wrong = faults[c].wrong.at(0);
+    for (Joint& joint : wrong.joints) joint.guess = joint.home;
+    const HomeResult home = SolveHome(&wrong);
+    EXPECT_TRUE(home.closed);
+    EXPECT_LT(home.gap_at_guess, 1e-12) << faults[c].where;  // as it was
+    EXPECT_NE(wrong.couplings[c].terms.back().polynomial,
+              press.couplings[c].terms.back().polynomial);
+  }
+}
+
+// A flipped axis leaves what is coupled to it where it is.
+TEST(StructuralFaults, AFlippedAxisCountsTheOtherWayInItsCouplings) {
+  const Mechanism press = LoadNamed("geared_press");
+  for (const StructuralFault& fault : Of(press, "flipped axis")) {
+    Mechanism wrong = fault.wrong.at(0);
+    for (Joint& joint : wrong.joints) joint.guess = joint.home;
+    (void)SolveHome(&wrong);
+    for (size_t b = 1; b < press.bodies.size(); ++b) {
+      EXPECT_LT((wrong.X_WB_home[b].matrix() - press.X_WB_home[b].matrix()).norm(), 1e-11)
+          << fault.where << press.bodies[b].name;
+    }
+  }
 }
 
 TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {

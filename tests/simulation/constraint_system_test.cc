@@ -14,14 +14,14 @@ namespace mbv::simulation {
 namespace {
 
 // Connect, tendon and joint rows with balls, free and merged joints (platform, tripod, SCARA), and
-// welds between turning bodies (four-bar).
+// welds between turning bodies (four-bar), couplings of joints (geared press).
 std::vector<Mechanism> Mechanisms() {
   std::vector<Mechanism> all{fixtures::MakeFourBar()};
-  for (const char* name : {"stabilizing_platform", "spr_tripod", "scara_robot"}) {
+  for (const char* name : {"stabilizing_platform", "spr_tripod", "scara_robot", "geared_press"}) {
     LoadResult result = LoadModel(std::string(kSourceDir) + "/models/" + name + "/model.yaml");
     if (result.mechanism.has_value()) all.push_back(*std::move(result.mechanism));
   }
-  EXPECT_EQ(all.size(), 4u);
+  EXPECT_EQ(all.size(), 5u);
   return all;
 }
 

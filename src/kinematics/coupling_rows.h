@@ -1,0 +1,36 @@
+// Couplings of joint coordinates as constraint rows.
+//
+// The row Σ_k P_k(q_k) + constant = 0 is differentiated as
+//   ṙ = Σ_k P_k′ q̇_k,  r̈ = Σ_k (P_k′ q̈_k + P_k″ q̇_k²).
+#pragma once
+
+#include <vector>
+
+#include "kinematics/constraints.h"
+
+namespace mbv {
+
+/// A coupling's row: the sum of its pieces.
+struct CouplingRow {
+  std::vector<ScalarRow> pieces;  ///< per term; the constant is in the first
+  bool angular = true;            ///< all coordinates are angles
+  double value = 0.0;             ///< of the sum: in the unit of the coordinates
+
+  [[nodiscard]] double LargestPiece() const;  ///< |P_k(q_k)|, which the sum's rounding follows
+};
+
+/// At poses, with velocities for the bias, in the turns that `states.coupled` tells.
+[[nodiscard]] CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling,
+                                const BodyStates& states);
+
+/// Brings `states->coupled` to the poses, which lie within half a turn of those it was last brought
+/// to (or of home). Does nothing without couplings.
+void FollowCouplings(const Mechanism& mechanism, BodyStates* states);
+
+/// How many turns the coupled coordinates count at the joints' guesses, for poses near them.
+[[nodiscard]] std::vector<double> CoupledGuesses(const Mechanism& mechanism);
+
+/// Names of the coupled joints, for messages: "wheel, pinion".
+[[nodiscard]] std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling);
+
+}  // namespace mbv
