@@ -2,7 +2,7 @@
 # Does what a document says, in an empty folder and in its order, and compares what the program
 # answers with what the document quotes.
 #   check_tutorial.sh DOCUMENT PROGRAM [SOURCE_DIR]
-# A ```yaml block below a line `FILE` (or `FILE`, continued) is a piece of FILE. Of a ```console
+# A ```yaml or ```xml block below a line `FILE` (or `FILE`, continued) is a piece of FILE. Of a ```console
 # block, lines with $ are run and what follows must be what they print; "…" stands for lines left
 # out. A command fails the test with its exit code unless `echo $?` asks for it. With SOURCE_DIR, the
 # files must be those that are shipped, and the values found by hand must be in the results.
@@ -22,9 +22,9 @@ fail() { echo "$1"; failed=1; }
 
 # blocks/NNN.FILE_WITH_%_FOR_/.yaml and blocks/NNN.console; other blocks are not for typing.
 awk -v blocks="$work/blocks" '
-  /^`[a-z_\/]+\.yaml`(, continued)?$/ { file = $0; gsub(/`|, continued/, "", file); next }
+  /^`[a-z_\/]+\.(yaml|urdf|xml)`(, continued)?$/ { file = $0; gsub(/`|, continued/, "", file); next }
   !inside && /^```/ { inside = 1; out = ""
-                      if ($0 == "```yaml") { gsub("/", "%", file); kind = file == "" ? "none.yaml" : file }
+                      if ($0 == "```yaml" || ($0 == "```xml" && file != "")) { gsub("/", "%", file); kind = file == "" ? "none.yaml" : file }
                       else if ($0 == "```console") kind = "console"
                       else if ($0 == "```text" || $0 == "```xml") next
                       else kind = "unknown"

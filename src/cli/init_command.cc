@@ -3,6 +3,7 @@
 
 #include <memory>
 
+#include "cli/assembly_option.h"
 #include "cli/cli.h"
 #include "cli/terminal.h"
 #include "pipeline/init_model.h"
@@ -10,8 +11,14 @@
 namespace mbv {
 namespace {
 
-int Init(const InitOptions& options) {
-  const InitResult result = InitModel(options);
+struct InitArguments {
+  InitOptions options;
+  std::vector<std::string> assembly;
+};
+
+int Init(InitArguments arguments) {
+  if (!ReadAssembly(arguments.assembly, &arguments.options.assembly)) return 2;
+  const InitResult result = InitModel(arguments.options);
   SayText(stderr, result.diagnostics.Text());
   if (result.files.empty()) return 2;
   for (const std::string& file : result.files) fmt::print("wrote {}\n", file);
@@ -22,7 +29,8 @@ int Init(const InitOptions& options) {
 }  // namespace
 
 void AddInitCommand(CLI::App* app, int* exit_code) {
-  auto options = std::make_shared<InitOptions>();
+  auto arguments = std::make_shared<InitArguments>();
+  InitOptions* const options = &arguments->options;
   std::string names;
   for (const Starter& starter : Starters()) {
     names += fmt::format("{}{}", names.empty() ? "" : ", ", starter.name);
@@ -34,11 +42,12 @@ void AddInitCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   init->add_option("--into", options->into, "folder that gets models/ and scenarios/")
       ->capture_default_str();
+  AddAssemblyOption(init, &arguments->assembly);
   SetFooter(init,
             {"init my_linkage && mbverify run scenarios/my_linkage/first.yaml",
              "init my_crank --from slider_crank", "init my_robot --from my_robot.urdf"},
             "0 written, 2 bad input. Nothing that exists is overwritten.");
-  init->callback([options, exit_code] { *exit_code = Init(*options); });
+  init->callback([arguments, exit_code] { *exit_code = Init(*arguments); });
 }
 
 }  // namespace mbv

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <memory>
 
+#include "cli/assembly_option.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
@@ -38,7 +39,7 @@ namespace fs = std::filesystem;
 
 struct ModelArguments {
   std::string model, format, out, drives;
-  std::vector<std::string> set;
+  std::vector<std::string> set, assembly;
 };
 
 ModelFormat FormatOf(const std::string& word) {
@@ -63,6 +64,7 @@ int Model(const ModelArguments& arguments) {
   }
   LoadOptions options;
   if (!ReadParameters(arguments.set, &options)) return 2;
+  if (!ReadAssembly(arguments.assembly, &options.assembly)) return 2;
   const auto file = FindModel(arguments.model, ".");
   if (!file) {
     return Refuse(fmt::format("there is no model '{}'", arguments.model),
@@ -173,6 +175,7 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
   model->add_option("--out", arguments->out, "write to this file instead of stdout");
   model->add_option("--set", arguments->set, "PARAMETER=NUMBER (repeatable)")
       ->allow_extra_args(false);
+  AddAssemblyOption(model, &arguments->assembly);
   SetFooter(model,
             {"model stabilizing_platform", "model four_bar --set crank=0.16",
              "model spr_tripod --format mjcf --out spr_tripod.xml",

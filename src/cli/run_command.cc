@@ -1,11 +1,13 @@
 // mbverify run
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
 #include <new>
 
+#include "cli/assembly_option.h"
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
@@ -22,7 +24,7 @@ namespace mbv {
 namespace {
 
 struct RunArguments {
-  std::vector<std::string> scenarios, set;
+  std::vector<std::string> scenarios, set, assembly;
   std::string out = "out", mode, report_script, kept_audits;
   bool no_report = false, no_pictures = false, quiet = false, verbose = false;
 };
@@ -80,7 +82,9 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
 // A robot's file is run by a first motion; its model and scenario are left to go on from.
 bool SetUpRobot(const std::string& robot, const RunArguments& arguments, FindingPrinter* findings,
                 std::string* scenario) {
-  const DefaultSetupResult made = MakeDefaultSetup(robot, "", "./model.yaml");
+  LoadOptions options;
+  if (!ReadAssembly(arguments.assembly, &options.assembly)) return false;
+  const DefaultSetupResult made = MakeDefaultSetup(robot, "", "./model.yaml", options);
   findings->Print(made.diagnostics);
   if (!made.setup) return false;
   const std::filesystem::path folder =
@@ -114,6 +118,10 @@ int Run(const RunArguments& arguments) {
   FindingPrinter findings(stderr);
   RunCounts counts;
   int exit_code = 0;
+  if (!arguments.assembly.empty() && std::ranges::none_of(files, IsRobotFile)) {
+    return Refuse("--assembly is for robots (.urdf, .xml)",
+                  "in a model file, guesses of the joints say which assembly is meant");
+  }
   for (const std::string& given : files) {
     std::string file = given;
     if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
@@ -150,6 +158,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   run->add_option("--set", arguments->set,
                   "key=value: overrides a value of the scenario (repeatable)")
       ->allow_extra_args(false);
+  AddAssemblyOption(run, &arguments->assembly);
   run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
   run->add_flag("--no-report", arguments->no_report, "do not write report.html");
   // How regress shares one script, and what the papers' audits gave, among the reports of a night.
