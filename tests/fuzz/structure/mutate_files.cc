@@ -1,5 +1,5 @@
-// Feeds structurally changed models, scenarios, URDF files and tables to the whole program: it must
-// end by itself with an exit code from 0 to 3, in time. (scripts/fuzz_structure)
+// Feeds structurally changed models, scenarios, URDF and MJCF files and tables to the whole
+// program: it must end by itself with an exit code from 0 to 3, in time. (scripts/fuzz_structure)
 //   mutate_files --program FILE --source FOLDER --out FOLDER [--count N] [--seed N] [--jobs N]
 // Inputs that break this stay in OUT/found; each has its seed, with which it is made again.
 #include <fmt/format.h>
@@ -65,6 +65,7 @@ class Maker {
       if (text.find("kind: stiffness") != std::string::npos) stiffness_.push_back(file);
     }
     urdfs_ = FilesBelow(source / "tests/fuzz/seeds/urdf", ".urdf");
+    mjcfs_ = FilesBelow(source / "tests/fuzz/seeds/mjcf", ".xml");
     tables_ = FilesBelow(source / "scenarios", ".csv");
   }
 
@@ -73,9 +74,12 @@ class Maker {
     Random random(options_.seed * 1000003UL + k);
     Input input;
     input.folder = fs::path(options_.out) / "work" / std::to_string(k);
-    switch (k % 8) {
+    switch (k % 9) {
       case 0:
         Urdf(&random, &input);
+        break;
+      case 8:
+        Mjcf(&random, &input);
         break;
       case 1:
         Table(&random, &input);
@@ -168,6 +172,13 @@ class Maker {
     input->argv = {"model", (input->folder / "model.yaml").string(), "--format", "mjcf"};
   }
 
+  void Mjcf(Random* random, Input* input) const {
+    const fs::path seed = OneOf(mjcfs_, random);
+    const fs::path file = input->folder / "robot.xml";
+    WriteText(file, MutateXml(Read(seed), random));
+    input->argv = {"model", file.string(), "--format", (*random)() % 2 == 0 ? "yaml" : "mjcf"};
+  }
+
   void Table(Random* random, Input* input) const {
     const fs::path seed = OneOf(tables_, random);
     const fs::path csv = input->folder / "table.csv";
@@ -193,7 +204,7 @@ class Maker {
   }
 
   const Options& options_;
-  std::vector<fs::path> models_, motions_, stiffness_, urdfs_, tables_;
+  std::vector<fs::path> models_, motions_, stiffness_, urdfs_, mjcfs_, tables_;
 };
 
 // Whether the program kept its promise; a reason if not.
