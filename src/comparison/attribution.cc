@@ -145,7 +145,7 @@ Attribution WhyUndecided(const ComparisonInput& input, const Comparison& compari
   if (!third) {
     Attribution energy = internal::AttributeByEnergy(comparison, pair);
     if (!energy.text.empty()) return energy;
-    return {"", "a third witness would tell which one is wrong"};
+    return {"", "a third witness would tell which one is wrong" + internal::EnergyHint(comparison)};
   }
   return {"", fmt::format("the simulation follows the {} drive motion and cannot tell which is "
                           "wrong",

@@ -19,22 +19,33 @@ const CheckResult* EnergyCheck(const Comparison& comparison, const std::string& 
   return check != nullptr && check->limit ? check : nullptr;
 }
 
-// Forces and accelerations that do not fit at an instant are no matter of the step.
-bool IsOfTheStep(const Comparison& comparison, const CheckResult& drift) {
+// Power that is wrong by some share loses at most that share of the energy; of a drift that is this
+// much larger it is no cause. Coarse steps leave the loops open, which costs some power, too.
+constexpr double kNoCause = 0.3;
+
+// The power check of the witness, if what power is off by does not explain the drift; forces and
+// accelerations that do not fit at an instant are no matter of the step.
+const CheckResult* PowerBesideTheStep(const Comparison& comparison, const CheckResult& drift) {
   const Role* role = FindRole(drift.subject);
-  return role != nullptr && role->is_engine() &&
-         !Failed(comparison.FindCheck(*role, Metric::kPower));
+  if (role == nullptr || !role->is_engine()) return nullptr;
+  const CheckResult* power = comparison.FindCheck(*role, Metric::kPower);
+  if (power == nullptr || !(power->value <= kNoCause * drift.value)) return nullptr;
+  return power;
+}
+
+// "a step about 3 times smaller"; the drift falls with the step's order.
+std::string SmallerStep(const CheckResult& drift) {
+  const double times = std::ceil(std::pow(drift.value / *drift.limit, 1.0 / kOrder));
+  if (!std::isfinite(times)) return "a much smaller step";
+  return fmt::format("a step about {:.0f} times smaller", std::max(2.0, times));
 }
 
 // "power balances at every sample, so simulation.step_s is too coarse: try a step about 3 times
 // smaller"
-std::string StepText(const CheckResult& drift) {
-  std::string text = "power balances at every sample, so simulation.step_s is too coarse";
-  const double smaller = std::ceil(std::pow(drift.value / *drift.limit, 1.0 / kOrder));
-  if (std::isfinite(smaller)) {
-    text += fmt::format(": try a step about {:.0f} times smaller", std::max(2.0, smaller));
-  }
-  return text;
+std::string StepText(const CheckResult& power, const CheckResult& drift) {
+  return fmt::format("power balances {}at every sample, so simulation.step_s is too coarse: try {}",
+                     Failed(&power) ? fmt::format("to {:.1e} ", power.value) : "",
+                     SmallerStep(drift));
 }
 
 }  // namespace
@@ -48,15 +59,22 @@ Attribution AttributeByEnergy(const Comparison& comparison, const PairComparison
   std::string text = fmt::format(
       "the energy of the {} drifts by {:.1e} of what is turned over, that of the {} by {:.1e}",
       NameOf(comparison, bad.subject), bad.value, NameOf(comparison, good.subject), good.value);
-  if (IsOfTheStep(comparison, bad)) text += "; " + StepText(bad);
+  if (const CheckResult* power = PowerBesideTheStep(comparison, bad)) {
+    text += "; " + StepText(*power, bad);
+  }
   return {bad.subject, text};
 }
 
 std::string EnergyHint(const Comparison& comparison) {
   const CheckResult* drift = EnergyCheck(comparison, role::kSimulated.name);
-  if (!Failed(drift) || !IsOfTheStep(comparison, *drift)) return "";
-  return fmt::format("; the simulated energy drifts by {:.1e} of what is turned over and {}",
-                     drift->value, StepText(*drift));
+  if (!Failed(drift)) return "";
+  const std::string drifts =
+      fmt::format("; the simulated energy drifts by {:.1e} of what is turned over", drift->value);
+  if (const CheckResult* power = PowerBesideTheStep(comparison, *drift)) {
+    return drifts + " and " + StepText(*power, *drift);
+  }
+  return fmt::format("{}: {} would tell whether simulation.step_s is too coarse", drifts,
+                     SmallerStep(*drift));
 }
 
 }  // namespace mbv::internal

@@ -58,7 +58,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
     scenario_.reference = ReadReference(&values_, map.Find("reference"));
     scenario_.simulation = ReadSimulation(&values_, map.Find("simulation"));
-    scenario_.checks = ReadChecks(&values_, map.Find("checks"), &scenario_.start_window_s);
+    scenario_.checks = ReadChecks(&values_, map.Find("checks"), mechanism_ ? &*mechanism_ : nullptr,
+                                  &scenario_.start_window_s);
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
     if (!mechanism_) return;
     UsePlainNames();

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/word_hints.h"
+#include "mechanism/reach.h"
 #include "scenario/checks.h"
 #include "scenario/file_parts.h"
 
@@ -214,8 +215,23 @@ void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
   }
 }
 
-CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, double* start_window_s) {
+CheckLimits DefaultLimits(const Mechanism& mechanism) {
   CheckLimits limits;
+  const double length_m = CharacteristicLength(mechanism);
+  const double rounding_m = GapRounding(Reach(LongestLever(mechanism), mechanism.X_WB_home));
+  for (const MetricRow& row : MetricRows()) {
+    if (std::string_view(row.unit) != "m") continue;
+    MetricLimits& of = limits[row.metric];
+    for (std::optional<double>* limit : {&of.forward, &of.inverse, &of.reference}) {
+      if (*limit) *limit = **limit * length_m + rounding_m;
+    }
+  }
+  return limits;
+}
+
+CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, const Mechanism* mechanism,
+                       double* start_window_s) {
+  CheckLimits limits = mechanism != nullptr ? DefaultLimits(*mechanism) : CheckLimits();
   YamlMap map(&values->yaml(), node, "checks", CheckKeys());
   if (!map.valid() || node == nullptr) return limits;
   for (const YamlEntry& entry : node->entries) {

@@ -15,9 +15,13 @@ inline constexpr double kMaxSteps = 1e7;
 /// Findings if a gain leaves drives out or names what is none.
 void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
                const Mechanism& mechanism, YamlReader* yaml);
-/// Limits, and `start_window_s` if it is given.
+/// Limits that a scenario leaves out: those of lengths are in proportion to the characteristic
+/// length, and not below what the distance from the origin rounds.
+[[nodiscard]] CheckLimits DefaultLimits(const Mechanism& mechanism);
+/// Limits, and `start_window_s` if it is given; without a mechanism (it could not be read) defaults
+/// are those of a metre.
 [[nodiscard]] CheckLimits ReadChecks(ValueReader* values, const YamlNode* node,
-                                     double* start_window_s);
+                                     const Mechanism* mechanism, double* start_window_s);
 /// Without the section: pictures at the start and half way.
 [[nodiscard]] SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node,
                                              double duration_s, const Mechanism& mechanism);

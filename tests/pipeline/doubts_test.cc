@@ -143,6 +143,31 @@ TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
       << comparison.attribution.text;
 }
 
+// With every freedom commanded the loops open, too, and power is lost with them.
+TEST(Doubts, AStepThatIsTooCoarseForACommandedMotionIsNamedToo) {
+  for (const char* step_s : {"0.01", "0.001"}) {
+    const RunOutcome outcome =
+        RunScenarioFile(Shipped("four_bar/turn"), {{"simulation.step_s", step_s}});
+    ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+    const Comparison& comparison = outcome.report->comparison;
+    const bool coarse = comparison.verdict == Verdict::kDisagree;
+    EXPECT_EQ(coarse, std::string(step_s) == "0.01") << comparison.attribution.text;
+    EXPECT_EQ(Has(comparison.attribution.text, "step_s is too coarse"), coarse)
+        << comparison.attribution.text;
+  }
+}
+
+// Power that is off by 2e-6 does not lose 1e-5 of the energy.
+TEST(Doubts, ACoarseStepIsToldFromPowerThatIsLost) {
+  const RunOutcome outcome = RunScenarioFile(
+      Shipped("four_bar/turn"),
+      {{"motion.commands.motor", "[home, {ramp: {rate: 10*pi}}]"}, {"motion.duration_s", "4"}});
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  EXPECT_TRUE(
+      Has(outcome.report->comparison.attribution.text, "so simulation.step_s is too coarse"))
+      << outcome.report->comparison.attribution.text;
+}
+
 TEST(Doubts, AStifferSpringIsNotPutDownToTheStep) {
   const RunOutcome outcome = RunScenarioFile(Shipped("spring_cart/must_fail/stiffer_spring"));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();

@@ -3,6 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <set>
+#include <string>
+
+#include "mechanism/reach.h"
+#include "scenario/load_scenario.h"
+#include "scenario/settings_reader.h"
+#include "tests/source_dir.h"
 
 namespace mbv {
 namespace {
@@ -23,6 +29,46 @@ TEST(Checks, EveryMetricHasItsOwnKeyAndThreeDefaults) {
   EXPECT_EQ(keys.size(), static_cast<size_t>(kMetrics));
   EXPECT_EQ(names.size(), static_cast<size_t>(kMetrics));
   EXPECT_EQ(FindMetric("nothing"), nullptr);
+}
+
+// A four-bar linkage `scale` times as large, `away` [m] from the origin.
+Mechanism FourBar(double scale, double away) {
+  const ScenarioResult loaded = LoadScenario(SourcePath("/scenarios/four_bar/turn.yaml"));
+  EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  Mechanism m = *loaded.mechanism;
+  for (Joint& joint : m.joints) {
+    for (Pose* X : {&joint.X_PF, &joint.X_CM}) X->translation() *= scale;
+    if (joint.parent == 0) joint.X_PF.translation().x() += away;
+  }
+  for (size_t b = 1; b < m.X_WB_home.size(); ++b) {
+    m.X_WB_home[b].translation() *= scale;
+    m.X_WB_home[b].translation().x() += away;
+  }
+  return m;
+}
+
+TEST(Checks, DefaultLimitsOfLengthsAreInProportionToTheMechanism) {
+  const CheckLimits own = DefaultLimits(FourBar(1.0, 0.0));
+  const double length_m = CharacteristicLength(FourBar(1.0, 0.0));
+  for (const double scale : {1e-3, 1.0, 1e3}) {
+    const CheckLimits scaled = DefaultLimits(FourBar(scale, 0.0));
+    for (const MetricRow& row : MetricRows()) {
+      const double factor = std::string(row.unit) == "m" ? scale : 1.0;
+      for (const LimitColumn column :
+           {LimitColumn::kForward, LimitColumn::kInverse, LimitColumn::kReference}) {
+        EXPECT_DOUBLE_EQ(*scaled[row.metric].Of(column), factor * *own[row.metric].Of(column));
+      }
+    }
+  }
+  EXPECT_NEAR(*own[Metric::kClosureM].forward, 1e-8 * length_m, 1e-13);
+}
+
+TEST(Checks, NoLimitOfALengthIsBelowTheRoundingOfFarPlaces) {
+  const CheckLimits near = DefaultLimits(FourBar(1e-3, 0.0));
+  const CheckLimits far = DefaultLimits(FourBar(1e-3, 1e4));
+  EXPECT_LT(*near[Metric::kClosureM].inverse, 1e-13);
+  EXPECT_GT(*far[Metric::kClosureM].inverse, 1e4 * kEps);
+  EXPECT_EQ(*far[Metric::kClosureRad].inverse, *near[Metric::kClosureRad].inverse);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "scenario/load_scenario.h"
+#include "scenario/settings_reader.h"
 #include "tests/source_dir.h"
 
 namespace mbv {
@@ -70,7 +71,8 @@ TEST(ServoSettings, LimitsAgainstTheCommandHaveNoDefault) {
       LoadWith("{mode: servo, kp: 1, kv: 1}", "checks: {position_m: {servo: 1e-4}}\n");
   ASSERT_TRUE(result.scenario) << result.diagnostics.Text();
   EXPECT_EQ(result.scenario->checks[Metric::kPositionM].servo, 1e-4);
-  EXPECT_EQ(result.scenario->checks[Metric::kPositionM].forward, 1e-6);
+  EXPECT_EQ(result.scenario->checks[Metric::kPositionM].forward,
+            DefaultLimits(*result.mechanism)[Metric::kPositionM].forward);
 }
 
 }  // namespace
