@@ -26,7 +26,7 @@ namespace {
 struct RunArguments {
   std::vector<std::string> scenarios, set, assembly;
   std::string out = "out", mode, report_script, kept_audits;
-  bool no_report = false, no_pictures = false, quiet = false, verbose = false;
+  bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
 };
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
@@ -124,6 +124,7 @@ int Run(const RunArguments& arguments) {
   }
   for (const std::string& given : files) {
     std::string file = given;
+    options.own_file = given.ends_with(".xml") && !arguments.no_own_file ? given : "";
     if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
       counts += RunCounts{.scenarios = 1, .bad_input = 1};
@@ -161,6 +162,8 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   AddAssemblyOption(run, &arguments->assembly);
   run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
   run->add_flag("--no-report", arguments->no_report, "do not write report.html");
+  run->add_flag("--no-own-file", arguments->no_own_file,
+                "do not run a robot's MJCF as it is besides");
   // How regress shares one script, and what the papers' audits gave, among the reports of a night.
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");

@@ -24,6 +24,8 @@ struct RunOptions {
   /// Folder that the runs of one night share: each paper's equations are audited once for all their
   /// pages; "": by every run.
   std::string kept_audits;
+  /// The user's MJCF that the scenario was made of: it is run as it is, besides; "": none.
+  std::string own_file;
   ProgressFunction progress;
 };
 

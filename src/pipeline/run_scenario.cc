@@ -11,6 +11,7 @@
 #include "mechanism/concession.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/engine_errors.h"
+#include "pipeline/own_file_audit.h"
 #include "pipeline/pictures.h"
 #include "pipeline/run_page.h"
 #include "pipeline/run_witnesses.h"
@@ -41,6 +42,7 @@ class ScenarioRun {
     RunWitnesses();
     if (outcome_.diagnostics.has_errors()) return BadInput();
     Judge();
+    RunOwnFile();
     DrawPictures();
     report_.timing.total_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -175,6 +177,16 @@ class ScenarioRun {
     const WitnessRecord& driver = *runs_.Find(prepared_->driver());
     const WitnessRecord& truth = driver.summary.ok() ? driver : *runs_.Find(role::kReference);
     report_.engine_comparison = mbv::CompareEngines(input, truth.trace, other_engines_);
+  }
+
+  // What the user's own settings do. No verdict depends on it.
+  void RunOwnFile() {
+    if (options_.own_file.empty()) return;
+    report_.own_file = std::make_shared<const OwnFileAudit>(
+        AuditOwnFile({.file = options_.own_file,
+                      .prepared = &*prepared_,
+                      .reactions_not_unique = report_.reactions_not_unique,
+                      .progress = options_.progress}));
   }
 
   void DrawPictures() {

@@ -12,6 +12,7 @@
 #include "report/html_report.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
+#include "report/own_file_text.h"
 #include "report/reference_table.h"
 #include "report/result_html.h"
 
@@ -36,6 +37,7 @@ class PageWriter {
     page_.Add("Drives", "Drives", DrivesHtml(report_));
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("The simulator's own error", "Engine", EngineHtml(report_));
+    page_.Add("Your own file, run as it is", "File", OwnFileHtml(report_.own_file.get()));
     page_.Add("Energy", "Energy", EnergyHtml(report_));
     page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
     page_.Add("The paper's equations", "Equations", AuditHtml(input_.audit));

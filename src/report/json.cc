@@ -1,5 +1,6 @@
 #include "report/json_text.h"
 #include "report/load_figures.h"
+#include "report/own_file_text.h"
 #include "report/report.h"
 #include "report/result_json.h"
 
@@ -221,6 +222,7 @@ std::string ToJson(const Report& report) {
   json["start_window_s"] = report.start_window_s;
   if (report.comparison.table) json["reference_table"] = ReferenceTableJson(report.comparison);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
+  if (report.own_file != nullptr) json["own_file"] = OwnFileJson(*report.own_file);
   json["loads"] = LoadsJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);

@@ -4,6 +4,7 @@
 // `schema`.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,6 +16,8 @@
 #include "report/result.h"
 
 namespace mbv {
+
+struct OwnFileAudit;  // report/own_file.h
 
 /// One witness' part in a run.
 struct WitnessRecord {
@@ -60,7 +63,8 @@ struct Report : ResultFrame {
   Comparison comparison;
   std::vector<SignalSheet> sheets;
   std::optional<EngineComparison> engine_comparison;
-  std::vector<std::string> pictures;  ///< file names below snapshots/
+  std::shared_ptr<const OwnFileAudit> own_file;  ///< of a robot's MJCF; null without one
+  std::vector<std::string> pictures;             ///< file names below snapshots/
 };
 
 /// summary.json.

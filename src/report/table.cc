@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "report/html_text.h"
+#include "report/own_file_text.h"
 #include "report/reference_table.h"
 #include "report/report.h"
 #include "report/terminal_text.h"
@@ -23,6 +24,7 @@ class VerdictTableWriter {
     ReferenceTable(report.comparison);
     if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
     Engine(report);
+    if (report.own_file != nullptr) WriteOwnFile(*report.own_file, &out_);
     Energy(report.comparison);
     Tail(report);
     if (out_.verbose()) {

@@ -10,7 +10,7 @@
 #include "core/spatial.h"
 #include "core/text.h"
 #include "mjcf/foreign.h"
-#include "simulation/engine.h"
+#include "simulation/import_mjcf.h"
 
 namespace mbv {
 namespace {
@@ -53,6 +53,7 @@ class MjcfImporter {
     mechanism_.bodies.push_back({.name = "world", .frames = {}, .shapes = {}});
     index_.assign(static_cast<size_t>(m_.nbody), 0);
     joint_index_.assign(static_cast<size_t>(m_.njnt), -1);
+    closure_index_.assign(static_cast<size_t>(m_.neq), -1);
     for (int b = 1; b < m_.nbody; ++b) AddBody(b);
     for (int e = 0; e < m_.neq; ++e) AddEquality(e);
     for (int u = 0; u < m_.nu; ++u) AddActuator(u);
@@ -61,6 +62,10 @@ class MjcfImporter {
     SayWhatIsLost();
     return std::move(mechanism_);
   }
+
+  /// Per joint and equality of MuJoCo: the mechanism's joint, or -1.
+  [[nodiscard]] const std::vector<int>& joint_index() const { return joint_index_; }
+  [[nodiscard]] const std::vector<int>& closure_index() const { return closure_index_; }
 
  private:
   void Say(const std::string& text, const std::string& hint = "") {
@@ -199,6 +204,7 @@ class MjcfImporter {
       Say(fmt::format("equality '{}' connects a body with itself and is left out", name));
       return;
     }
+    closure_index_[static_cast<size_t>(e)] = static_cast<int>(mechanism_.joints.size());
     mechanism_.joints.push_back(joint);
   }
 
@@ -371,9 +377,9 @@ class MjcfImporter {
   const std::string& file_;
   Diagnostics* diagnostics_;
   Mechanism mechanism_;
-  const mjtNum* qpos_ = nullptr;  // pose of the file
-  std::vector<int> index_;        // per MuJoCo body
-  std::vector<int> joint_index_;  // per MuJoCo joint
+  const mjtNum* qpos_ = nullptr;                  // pose of the file
+  std::vector<int> index_;                        // per MuJoCo body
+  std::vector<int> joint_index_, closure_index_;  // per MuJoCo joint, equality
   std::vector<std::string> held_, geared_, shifted_, moved_;
   std::set<int> coupling_tendons_;  // that are nothing but the sum in a coupling
   bool touching_ = false;
@@ -381,22 +387,34 @@ class MjcfImporter {
 
 }  // namespace
 
-std::optional<Mechanism> ReadMjcf(const std::string& text, const std::string& file,
-                                  Diagnostics* diagnostics) {
+namespace simulation {
+
+std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::string& file,
+                                       const std::vector<std::string>& warnings,
+                                       Diagnostics* diagnostics) {
   mjcf::ForeignMjcf foreign(text, file, diagnostics);
   if (!foreign.ok()) return std::nullopt;
-  std::vector<std::string> warnings;
-  const simulation::EngineSession session(&warnings);
   constexpr int kMostRounds = 200;
   for (int round = 0; round < kMostRounds; ++round) {
     try {
-      const ModelHandle model = simulation::CompileMjcf(foreign.Text());
-      Mechanism mechanism = MjcfImporter(*model, foreign, file, diagnostics).Run();
-      mechanism.name = foreign.ModelName();
+      ImportedMjcf imported;
+      imported.text = foreign.Text();
+      imported.model = CompileMjcf(imported.text);
+      const mjModel& m = *imported.model;
+      MjcfImporter importer(m, foreign, file, diagnostics);
+      imported.mechanism = importer.Run();
+      imported.mechanism.name = foreign.ModelName();
+      imported.joint_of = importer.joint_index();
+      imported.closure_of = importer.closure_index();
+      for (int e = 0; e < m.neq; ++e) {
+        const char* name = mj_id2name(&m, mjOBJ_EQUALITY, e);
+        imported.closed_by_sites.push_back(name != nullptr &&
+                                           foreign.closures_by_sites().contains(name));
+      }
       for (const std::string& warning : warnings) {
         diagnostics->Add({Severity::kWarning, file, 0, 0, "MuJoCo: " + warning, ""});
       }
-      return mechanism;
+      return imported;
     } catch (const EngineError& error) {
       if (foreign.DropWhatIsUnknown(error.what())) continue;
       diagnostics->AddError(file, std::string("MuJoCo: ") + error.what());
@@ -405,6 +423,17 @@ std::optional<Mechanism> ReadMjcf(const std::string& text, const std::string& fi
   }
   diagnostics->AddError(file, "too many things in it are unknown to MuJoCo 2.2");
   return std::nullopt;
+}
+
+}  // namespace simulation
+
+std::optional<Mechanism> ReadMjcf(const std::string& text, const std::string& file,
+                                  Diagnostics* diagnostics) {
+  std::vector<std::string> warnings;
+  const simulation::EngineSession session(&warnings);
+  auto imported = simulation::ImportMjcf(text, file, warnings, diagnostics);
+  if (!imported) return std::nullopt;
+  return std::move(imported->mechanism);
 }
 
 }  // namespace mbv

@@ -46,6 +46,33 @@ TEST_F(RobotCommands, RunTakesARobotAsItIs) {
   EXPECT_EQ(mbverify("check " + Path("robot.urdf")).exit_code, 0);
 }
 
+// The file's own settings are information: whatever they do, the verdict and its exit code stay.
+TEST_F(RobotCommands, RunTellsWhatTheFilesOwnSettingsDo) {
+  Write("own.xml", R"(<mujoco model="own"><compiler angle="radian"/>
+<default><equality solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/></default><worldbody>
+<body name="crank"><joint name="A" axis="0 1 0"/><inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.001"/>
+<body name="coupler" pos="0 0 0.2"><joint name="B" axis="0 1 0"/><inertial pos="0.25 0 0.1" mass="1" diaginertia="0.001 0.02 0.02"/></body></body>
+<body name="rocker" pos="0.5 0 0"><joint name="D" axis="0 1 0"/><inertial pos="0 0 0.2" mass="1" diaginertia="0.01 0.01 0.001"/></body></worldbody>
+<equality><connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.4"/></equality>
+<actuator><motor name="m" joint="A"/></actuator></mujoco>)");
+  const std::string command = "run " + Path("own.xml") + " --no-pictures --out " + mbverify.Out();
+  const ProgramResult run = mbverify(command);
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("AGREE"), std::string::npos) << run.out;
+  for (const char* said : {"your file's drive forces are off by", "what makes it wrong",
+                           "paste this before </mujoco>", "<default><equality solref="}) {
+    EXPECT_NE(run.out.find(said), std::string::npos) << said << "\n" << run.out;
+  }
+  const std::filesystem::path folder = mbverify.folder() / "out/own/setup/first";
+  EXPECT_NE(ReadAll(folder / "summary.json").find("\"own_file\""), std::string::npos);
+  EXPECT_NE(ReadAll(folder / "report.html").find("Your own file, run as it is"), std::string::npos);
+
+  const ProgramResult without = mbverify(command + " --no-own-file");
+  EXPECT_EQ(without.exit_code, 0) << without.err;
+  EXPECT_EQ(without.out.find("your file's"), std::string::npos) << without.out;
+  EXPECT_EQ(ReadAll(folder / "summary.json").find("\"own_file\""), std::string::npos);
+}
+
 TEST_F(RobotCommands, InitWritesAModelAndAScenarioThatAgree) {
   const ProgramResult init = mbverify("init my_robot --from " + Path("robot.urdf") + " --into " +
                                       mbverify.folder().string());

@@ -1,0 +1,101 @@
+// What is said about the user's own file.
+#include "report/own_file.h"
+
+#include <gtest/gtest.h>
+
+#include "report/own_file_text.h"
+#include "report/own_file_words.h"
+
+namespace mbv {
+namespace {
+
+OwnError Sound(double force, double gap_m) {
+  OwnError error;
+  error.failure = "";
+  error.force = error.force_all = force;
+  error.gap_m = gap_m;
+  error.gap_rad = 0.0;
+  error.joint = "C";
+  error.gap_at_s = 0.5;
+  return error;
+}
+
+OwnFileAudit Example() {
+  OwnFileAudit audit;
+  audit.file = "robot.xml";
+  audit.length_m = 1.0;
+  audit.as_is = Sound(0.1, 1e-2);
+  audit.causes.push_back({.key = "a",
+                          .title = "loops",
+                          .meaning = "Loops give.",
+                          .without = Sound(0.01, 1e-4),
+                          .alone = Sound(0.09, 1e-2)});
+  audit.causes.push_back({.key = "b",
+                          .title = "steps",
+                          .meaning = "Steps cut.",
+                          .without = Sound(0.08, 1e-2),
+                          .alone = Sound(0.02, 1e-4)});
+  audit.mended = Sound(1e-4, 1e-6);
+  return audit;
+}
+
+TEST(OwnFileWords, TheCauseThatTakesTheErrorWithItIsNamed) {
+  OwnFileAudit audit = Example();
+  ASSERT_EQ(audit.Culprits().size(), 1u);
+  EXPECT_NE(CauseSentence(audit).find("one thing: loops. Loops give."), std::string::npos);
+  audit.causes[1].without.force = 0.03;
+  EXPECT_NE(CauseSentence(audit).find("loops; steps"), std::string::npos);
+  audit.causes[0].without.force = audit.causes[1].without.force = 0.06;
+  EXPECT_NE(CauseSentence(audit).find("No single thing"), std::string::npos);
+}
+
+TEST(OwnFileWords, WhatStaysWithAllMendedIsNoMatterOfSettings) {
+  OwnFileAudit audit = Example();
+  EXPECT_EQ(CauseSentence(audit).find("another mechanism"), std::string::npos);
+  audit.mended.force = 0.05;
+  EXPECT_NE(CauseSentence(audit).find("5 % of the force stays wrong"), std::string::npos);
+}
+
+TEST(OwnFileWords, GoodNeedsForcesAndLoops) {
+  OwnFileAudit audit = Example();
+  audit.as_is = Sound(0.99 * OwnFileAudit::kGoodForce, 0.99 * OwnFileAudit::kGoodGap);
+  EXPECT_TRUE(audit.Good(audit.as_is));
+  EXPECT_NE(OwnFileSentence(audit).find("nothing is wrong"), std::string::npos);
+  audit.as_is.gap_m = 2.0 * OwnFileAudit::kGoodGap;
+  EXPECT_FALSE(audit.Good(audit.as_is));
+  EXPECT_NE(OwnFileSentence(audit).find("agree to 9.9e-03, but its loops open"), std::string::npos);
+  audit.as_is = Sound(2.0 * OwnFileAudit::kGoodForce, 0.0);
+  EXPECT_NE(OwnFileSentence(audit).find("off by 2 %"), std::string::npos) << OwnFileSentence(audit);
+  audit.as_is.force = kNan;
+  EXPECT_FALSE(audit.Good(audit.as_is));
+}
+
+TEST(OwnFileWords, UnsoundNumbersAreNoNumbers) {
+  OwnFileAudit audit = Example();
+  audit.as_is = {};
+  audit.as_is.failure = "MuJoCo reset the simulation at 0.3 s";
+  audit.as_is.time_s = 0.3;
+  EXPECT_NE(OwnFileSentence(audit).find("reset the simulation at 0.3 s"), std::string::npos);
+  EXPECT_EQ(CauseCells(audit)[0][1], "unsound");
+  EXPECT_EQ(CauseCells(audit)[1][2], "-");
+  const nlohmann::ordered_json json = OwnFileJson(audit);
+  EXPECT_EQ(json["as_is"]["failure"], audit.as_is.failure);
+  EXPECT_FALSE(json["as_is"].contains("force_nrmse"));
+  EXPECT_FALSE(json["good"].get<bool>());
+}
+
+TEST(OwnFileWords, NamesOfTheFileAreEscapedOnThePage) {
+  OwnFileAudit audit = Example();
+  audit.as_is.joint = "<script>";
+  audit.done = {"<b>"};
+  audit.lines = "<option timestep=\"0.001\"/>\n";
+  audit.pasted = Sound(1e-3, 1e-5);
+  const std::string html = OwnFileHtml(&audit);
+  EXPECT_EQ(html.find("<script>"), std::string::npos);
+  EXPECT_EQ(html.find("<b>\n"), std::string::npos);
+  EXPECT_NE(html.find("&lt;option timestep="), std::string::npos);
+  EXPECT_EQ(OwnFileHtml(nullptr), "");
+}
+
+}  // namespace
+}  // namespace mbv
