@@ -12,6 +12,7 @@ const LIBRARIES = {
   'MuJoCo': { headers: ['mujoco/'], target: 'mujoco::mujoco' },
   'OSMesa': { headers: ['GL/'], target: 'PkgConfig::OSMESA' },
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
+  'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },
   'libpng': { headers: ['png.h'], target: 'PNG::PNG' },
   'muParser': { headers: ['muParser'], target: 'muparser::muparser' },
   'nlohmann-json': { headers: ['nlohmann/'], target: 'nlohmann_json::nlohmann_json' },

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <new>
 #include <sstream>
 #include <system_error>
@@ -18,6 +19,7 @@
 #include "core/word_hints.h"
 #include "core/wrapped.h"
 #include "input/parsed_documents.h"
+#include "mesh/find_mesh.h"
 #include "pipeline/version.h"
 
 namespace mbv {
@@ -123,6 +125,29 @@ int AnswerParse(const CLI::App& app, const CLI::ParseError& error) {
   return code == 0 ? 0 : 2;
 }
 
+// --package of commands that read robots.
+void AddPackages(CLI::App* command) {
+  command
+      ->add_option_function<std::vector<std::string>>(
+          "--package",
+          [](const std::vector<std::string>& texts) {
+            std::vector<MeshPackage> packages;
+            for (const std::string& text : texts) {
+              const size_t at = text.find('=');
+              std::error_code error;
+              if (at == 0 || at == std::string::npos ||
+                  !std::filesystem::is_directory(text.substr(at + 1), error)) {
+                throw CLI::ValidationError(
+                    "--package", "'" + Printable(text) + "' is not NAME=DIR with a folder DIR");
+              }
+              packages.push_back({text.substr(0, at), text.substr(at + 1)});
+            }
+            UseMeshPackages(std::move(packages));
+          },
+          "NAME=DIR: meshes package://NAME/… lie in DIR (repeatable)")
+      ->allow_extra_args(false);
+}
+
 }  // namespace
 
 void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
@@ -181,9 +206,13 @@ int RunCli(int argc, char** argv) {
   AddMutateCommand(&app, &exit_code);
   AddConvergeCommand(&app, &exit_code);
   AddSurveyCommand(&app, &exit_code);
+  AddInertiaCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);
+  for (const char* command : {"init", "run", "render", "model", "check", "survey", "inertia"}) {
+    AddPackages(app.get_subcommand(command));
+  }
   RequireFiniteNumbers(&app);
   std::string lost;  // why output was lost
   const ParsedDocuments documents;

@@ -42,5 +42,6 @@ void AddRegressCommand(CLI::App* app, int* exit_code);
 void AddMergeCommand(CLI::App* app, int* exit_code);
 void AddSurveyCommand(CLI::App* app, int* exit_code);
 void AddHistoryCommand(CLI::App* app, int* exit_code);
+void AddInertiaCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

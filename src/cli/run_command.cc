@@ -90,8 +90,12 @@ bool SetUpRobot(const std::string& robot, const RunArguments& arguments, Finding
   const std::filesystem::path folder =
       std::filesystem::path(arguments.out) / made.setup->mechanism.name / "setup";
   const std::filesystem::path model = folder / "model.yaml", first = folder / "first.yaml";
-  for (const auto& [path, text] :
-       {std::pair(model, made.setup->model), std::pair(first, made.setup->scenario)}) {
+  std::vector<std::pair<std::filesystem::path, std::string>> files = {
+      {model, made.setup->model}, {first, made.setup->scenario}};
+  for (const ModelMeshFile& mesh : made.setup->meshes) {
+    files.emplace_back(folder / mesh.path, mesh.content);
+  }
+  for (const auto& [path, text] : files) {
     const std::string trouble = WriteFile(path, text);
     if (!trouble.empty()) {
       Say(stderr, "error: {}\n", trouble);

@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "core/files.h"
+#include "mjcf/foreign_meshes.h"
+#include "mjcf/xml_walk.h"
 
 namespace mbv::mjcf {
 namespace {
@@ -18,19 +20,6 @@ using tinyxml2::XMLDocument;
 using tinyxml2::XMLElement;
 
 constexpr int kDeepest = 200;  // nesting of elements
-
-// Calls visit(element) on all elements below, deepest last.
-template <typename Visit>
-void ForEach(XMLElement* element, const Visit& visit) {
-  for (XMLElement* e = element->FirstChildElement(); e != nullptr; e = e->NextSiblingElement()) {
-    visit(e);
-    ForEach(e, visit);
-  }
-}
-
-bool IsTag(const XMLElement* element, const char* tag) {
-  return std::string_view(element->Name()) == tag;
-}
 
 int DepthOf(const XMLElement* element) {
   int deepest = 0;
@@ -48,6 +37,7 @@ struct ForeignMjcf::Impl {
   fs::path file, folder;
   Diagnostics* diagnostics = nullptr;
   std::map<std::string, SitePair> by_sites;
+  std::map<std::string, ForeignMesh> meshes;
   bool good = false;
 
   void Add(Severity severity, int line, const std::string& text, const std::string& hint = "") {
@@ -120,14 +110,16 @@ struct ForeignMjcf::Impl {
 
   // What dynamics without contacts do not need.
   void DropPictures() {
-    std::vector<XMLElement*> geoms, others;
-    int meshes = 0;
+    MeshGeoms geoms = TakeMeshGeoms(
+        MeshFolder(), [this](const fs::path& path) { return IsBelow(path); }, &document);
+    meshes = std::move(geoms.meshes);
+    if (geoms.lost > 0) {
+      Add(Severity::kWarning, 0, fmt::format("{} meshes are left out of the pictures", geoms.lost),
+          "meshes of files in the model's folder or below are drawn");
+    }
+    std::vector<XMLElement*> others;
     ForEach(root(), [&](XMLElement* e) {
       for (const char* attribute : {"material", "texture"}) e->DeleteAttribute(attribute);
-      if (IsTag(e, "geom") && e->Attribute("mesh") != nullptr) {
-        const auto* body = e->Parent()->ToElement();
-        if (body != nullptr && body->FirstChildElement("inertial") != nullptr) geoms.push_back(e);
-      }
       const bool in_assets = e->Parent() != nullptr && e->Parent()->ToElement() != nullptr &&
                              IsTag(e->Parent()->ToElement(), "asset");
       if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
@@ -138,13 +130,7 @@ struct ForeignMjcf::Impl {
         if (IsTag(e, section)) others.push_back(e);
       }
     });
-    meshes = static_cast<int>(geoms.size());
-    for (XMLElement* e : geoms) document.DeleteNode(e);
     for (XMLElement* e : others) document.DeleteNode(e);
-    if (meshes > 0) {
-      Add(Severity::kWarning, 0, fmt::format("{} meshes are left out of the pictures", meshes),
-          "boxes, cylinders, capsules and spheres are drawn");
-    }
     DropUnusedMeshes();
   }
 
@@ -282,6 +268,8 @@ std::string ForeignMjcf::Text() const {
   impl_->document.Print(&printer);
   return printer.CStr();
 }
+
+const std::map<std::string, ForeignMesh>& ForeignMjcf::meshes() const { return impl_->meshes; }
 
 std::string ForeignMjcf::ModelName() const {
   const char* name = impl_->root()->Attribute("model");

@@ -8,17 +8,26 @@
 #include <utility>
 
 #include "core/diagnostics.h"
+#include "core/types.h"
 
 namespace mbv::mjcf {
 
 /// The two sites that a closure makes coincide, the first one on body1.
 using SitePair = std::pair<std::string, std::string>;
 
+/// A mesh that a geom shows, from a file in the model's folder or below.
+struct ForeignMesh {
+  std::string file;              ///< path, or relative to the working folder as the model is
+  Vec3 scale = Vec3::Ones();     ///< of the file's numbers
+  Pose X_GF = Pose::Identity();  ///< the file's frame in the geom's as the model states it
+};
+
 /// An MJCF file on its way to the compiler. Included files are taken in; folders of assets become
-/// absolute. What only serves pictures (mesh geoms of bodies that state their inertia, textures,
-/// materials, meshes that nothing needs) is left out. Files outside the model's folder are refused.
-/// What MuJoCo 3 says differently is translated: closures by two sites, ranges that hold without
-/// being called limited.
+/// absolute. What only serves pictures (textures, materials, meshes that nothing needs) is left
+/// out; mesh geoms of bodies that state their inertia become small spheres of no mass in the same
+/// pose, of others such spheres stand beside them: the compiler moves the frames of meshes, not
+/// theirs. Files outside the model's folder are refused. What MuJoCo 3 says differently is
+/// translated: closures by two sites, ranges that hold without being called limited.
 class ForeignMjcf {
  public:
   ForeignMjcf(const std::string& text, const std::filesystem::path& file, Diagnostics* diagnostics);
@@ -33,6 +42,9 @@ class ForeignMjcf {
   /// Closures by sites, by the equality's name: MuJoCo 2.2 would take their place from the pose of
   /// the file, where the sites may be apart.
   [[nodiscard]] const std::map<std::string, SitePair>& closures_by_sites() const;
+
+  /// Meshes by the name of the sphere that stands where the geom is.
+  [[nodiscard]] const std::map<std::string, ForeignMesh>& meshes() const;
 
   /// Removes what this compiler does not know, as its message says; one finding for each kind of
   /// thing. False if the message is about something else.

@@ -87,7 +87,7 @@ void WriteHead(const Sections& s) {
   s.xml->Set("offheight", "1920");
   s.xml->Close();
   s.xml->Close();
-  WriteMaterials(s.mechanism, s.xml);
+  WriteAssets(s.mechanism, s.surfaces, s.xml);
 }
 
 }  // namespace mbv::mjcf

@@ -24,12 +24,15 @@ using mjcf::XmlWriter;
 class MjcfWriter {
  public:
   MjcfWriter(const Mechanism& mechanism, const MjcfOptions& options)
-      : mechanism_(mechanism), options_(options), plan_(mjcf::MakePlan(mechanism)) {}
+      : mechanism_(mechanism),
+        options_(options),
+        plan_(mjcf::MakePlan(mechanism)),
+        surfaces_(mechanism, options.pictures ? mjcf::kMostTriangles : 0) {}
 
   std::string Write() {
     xml_.Open("mujoco");
     xml_.Set("model", mechanism_.name);
-    const mjcf::Sections sections{mechanism_, options_, plan_, &xml_};
+    const mjcf::Sections sections{mechanism_, options_, plan_, surfaces_, &xml_};
     mjcf::WriteHead(sections);
     WriteTree();
     mjcf::WriteTendons(sections);
@@ -125,7 +128,9 @@ class MjcfWriter {
   void WriteBodyContent(int index) {
     const PlannedBody& body = plan_.bodies[index];
     if (body.half_of < 0) {
-      if (options_.pictures) mjcf::WriteShapes(mechanism_.bodies[body.body], &xml_);
+      if (options_.pictures) {
+        mjcf::WriteShapes(mechanism_.bodies[body.body], surfaces_, &xml_);
+      }
       WriteSites(body.body);
     }
     WriteClosureSites(index);
@@ -239,6 +244,7 @@ class MjcfWriter {
   const Mechanism& mechanism_;
   const MjcfOptions options_;
   const Plan plan_;
+  const DrawnSurfaces surfaces_;
   XmlWriter xml_;
   std::vector<double> home_qpos_, home_ctrl_;  // in the order of the file
   std::map<std::string, double> home_of_joint_;

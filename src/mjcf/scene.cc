@@ -1,5 +1,7 @@
 #include "mjcf/scene.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <set>
@@ -19,7 +21,15 @@ struct Bounds {
   [[nodiscard]] bool empty() const { return low.x() > high.x(); }
 };
 
+std::string MeshName(int index) { return fmt::format("mesh_{}", index); }
+
+// MuJoCo refuses meshes of fewer than four vertices.
+bool IsDrawable(const TriangleMesh& mesh) {
+  return mesh.vertices.size() >= 4 && !mesh.triangles.empty();
+}
+
 struct ShapeWriter {
+  const DrawnSurfaces& surfaces;
   XmlWriter* xml;
 
   void Stick(const char* type, const Vec3& from, const Vec3& to, double radius) const {
@@ -40,22 +50,31 @@ struct ShapeWriter {
     xml->Set("size", b.radius);
     xml->Set("pos", b.p_centre);
   }
-  void operator()(const Mesh&) const {}
+  // The compiler moves the frame of a mesh and the geom against it: here it is still the file's.
+  void operator()(const Mesh& m) const {
+    xml->Set("type", "mesh");
+    xml->Set("mesh", MeshName(surfaces.IndexOf(m)));
+    xml->SetPose(m.X_BG);
+  }
 };
 
 // MuJoCo refuses sticks without length and solids without size.
-bool IsDrawable(const Shape& shape) {
+bool IsDrawable(const Shape& shape, const DrawnSurfaces& surfaces) {
   struct Test {
+    const DrawnSurfaces& surfaces;
     bool operator()(const Capsule& c) const { return Stick(c.p_from, c.p_to, c.radius); }
     bool operator()(const Cylinder& c) const { return Stick(c.p_from, c.p_to, c.radius); }
     bool operator()(const Box& b) const { return b.size.minCoeff() > 0.0; }
     bool operator()(const Ball& b) const { return b.radius > 0.0; }
-    bool operator()(const Mesh&) const { return false; }
+    bool operator()(const Mesh& m) const {
+      const int index = surfaces.IndexOf(m);
+      return index >= 0 && IsDrawable(*surfaces.drawn()[index]);
+    }
     static bool Stick(const Vec3& p, const Vec3& q, double radius) {
       return radius > 0.0 && (q - p).norm() > 1e-9;
     }
   };
-  return std::visit(Test{}, shape.geometry);
+  return std::visit(Test{surfaces}, shape.geometry);
 }
 
 // Origins of all bodies and frames at home.
@@ -72,7 +91,27 @@ Bounds HomeBounds(const Mechanism& mechanism) {
 
 }  // namespace
 
-void WriteMaterials(const Mechanism& mechanism, XmlWriter* xml) {
+namespace {
+
+void WriteMesh(const TriangleMesh& mesh, const std::string& name, XmlWriter* xml) {
+  std::string vertices, triangles;
+  for (const Vec3& p : mesh.vertices) {
+    vertices +=
+        fmt::format("{}{:.6g} {:.6g} {:.6g}", vertices.empty() ? "" : " ", p.x(), p.y(), p.z());
+  }
+  for (const auto& t : mesh.triangles) {
+    triangles += fmt::format("{}{} {} {}", triangles.empty() ? "" : " ", t[0], t[1], t[2]);
+  }
+  xml->Open("mesh");
+  xml->Set("name", name);
+  xml->Set("vertex", vertices);
+  xml->Set("face", triangles);
+  xml->Close();
+}
+
+}  // namespace
+
+void WriteAssets(const Mechanism& mechanism, const DrawnSurfaces& surfaces, XmlWriter* xml) {
   std::set<std::string> names{"ground"};
   for (const Body& body : mechanism.bodies) {
     for (const Shape& shape : body.shapes) names.insert(shape.color);
@@ -84,6 +123,10 @@ void WriteMaterials(const Mechanism& mechanism, XmlWriter* xml) {
     xml->Set("rgba",
              name == "ground" ? std::array<double, 4>{0.87, 0.87, 0.86, 1} : ShapeColor(name));
     xml->Close();
+  }
+  for (size_t i = 0; i < surfaces.drawn().size(); ++i) {
+    const TriangleMesh& mesh = *surfaces.drawn()[i];
+    if (IsDrawable(mesh)) WriteMesh(mesh, MeshName(static_cast<int>(i)), xml);
   }
   xml->Close();
 }
@@ -125,11 +168,11 @@ void WriteSurroundings(const Mechanism& mechanism, XmlWriter* xml) {
   xml->Close();
 }
 
-void WriteShapes(const Body& body, XmlWriter* xml) {
+void WriteShapes(const Body& body, const DrawnSurfaces& surfaces, XmlWriter* xml) {
   for (const Shape& shape : body.shapes) {
-    if (!IsDrawable(shape)) continue;
+    if (!IsDrawable(shape, surfaces)) continue;
     xml->Open("geom");
-    std::visit(ShapeWriter{xml}, shape.geometry);
+    std::visit(ShapeWriter{surfaces, xml}, shape.geometry);
     xml->Set("material", shape.color);
     xml->Close();
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include "mechanism/mechanism.h"
+#include "mesh/decimate.h"
 #include "mjcf/mjcf.h"
 #include "mjcf/plan.h"
 #include "mjcf/writer.h"
@@ -13,6 +14,7 @@ struct Sections {
   const Mechanism& mechanism;
   const MjcfOptions& options;
   const Plan& plan;
+  const DrawnSurfaces& surfaces;  ///< of the meshes
   XmlWriter* xml;
 };
 

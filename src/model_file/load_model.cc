@@ -1,6 +1,9 @@
 #include "model_file/load_model.h"
 
+#include "model_file/load_bodies.h"
+
 #include <algorithm>
+#include <filesystem>
 #include <utility>
 
 #include "model_file/model_bodies.h"
@@ -11,6 +14,7 @@
 #include "model_file/model_head.h"
 #include "model_file/model_instances.h"
 #include "model_file/model_joints.h"
+#include "model_file/model_meshes.h"
 #include "model_file/model_outputs.h"
 #include "model_file/model_shapes.h"
 #include "model_file/model_urdf.h"
@@ -72,8 +76,8 @@ struct ModelSections {
 // Bodies with all their frames.
 template <typename EachBlock>
 void ReadBodies(const EachBlock& each_block, const internal::BodyNames& names,
-                internal::ModelValues* values, internal::UrdfReader* urdf,
-                ModelSections* sections) {
+                internal::ModelValues* values, internal::UrdfReader* urdf, ModelSections* sections,
+                Diagnostics* others) {
   internal::FrameReader frames(values, &sections->bodies);
   internal::BodyReader bodies(values, &frames, &sections->bodies);
   each_block([&](const Block& block) {
@@ -93,6 +97,10 @@ void ReadBodies(const EachBlock& each_block, const internal::BodyNames& names,
   each_block([&](const Block& block) { frames.ReadAttached(block, names); });
   internal::ShapeReader shapes(values, names, &sections->bodies);
   each_block([&](const Block& block) { shapes.Read(block); });
+  const Finding place{
+      .severity = Severity::kWarning, .file = values->yaml().file(), .message = {}, .hint = {}};
+  internal::LoadMeshes(std::filesystem::path(place.file).parent_path(), place,
+                       &sections->bodies.bodies, others);
 }
 
 // What is driven and watched, springs and couplings.
@@ -151,7 +159,7 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   };
   const internal::BodyNames names(s.bodies, &values);
   internal::UrdfReader urdf(reading->bare_urdf, &values, &reading->literals, &reading->others);
-  ReadBodies(each_block, names, &values, &urdf, &s);
+  ReadBodies(each_block, names, &values, &urdf, &s, &reading->others);
   internal::JointReader joints(&values, names, s.bodies, &s.joints);
   each_block([&](const Block& block) { joints.Read(block); });
   ReadSignals(each_block, names, &values, &s);
@@ -207,6 +215,28 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   internal::CheckPlausible(*mechanism, &report);
 }
 
+// What was found, in the order of the file.
+Diagnostics FindingsOf(const Reading& reading) {
+  const Diagnostics& own = reading.yaml.diagnostics();
+  Diagnostics findings;
+  findings.Append(InFileOrder(reading.bare_urdf ? WithoutPlaces(own) : own));
+  findings.Append(reading.others);
+  return findings;
+}
+
+Reading ReadingOf(const std::string& file, const LoadOptions& options) {
+  return {.options = options,
+          .bare_urdf = internal::IsUrdfFile(file),
+          .yaml = YamlReader(file),
+          .others = {},
+          .literals = internal::Literals(options.literals)};
+}
+
+// The model file that a text is or, of a URDF file, stands for.
+std::string ModelFileText(const std::string& text, const std::string& file) {
+  return internal::IsUrdfFile(file) ? internal::UrdfModelText(file, text) : text;
+}
+
 LoadResult LoadFrom(const std::string& text, Reading reading) {
   LoadResult result;
   std::optional<Mechanism> mechanism;
@@ -215,9 +245,7 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
     mechanism = Assembled(reading.yaml.file(), &*sections);
     Check(*sections, &reading, &*mechanism);
   }
-  const Diagnostics& own = reading.yaml.diagnostics();
-  result.diagnostics.Append(InFileOrder(reading.bare_urdf ? WithoutPlaces(own) : own));
-  result.diagnostics.Append(reading.others);
+  result.diagnostics = FindingsOf(reading);
   result.literals = reading.literals.Take();
   if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism);
   return result;
@@ -227,13 +255,24 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
 
 LoadResult LoadModelText(const std::string& text, const std::string& file,
                          const LoadOptions& options) {
-  const bool bare_urdf = internal::IsUrdfFile(file);
-  return LoadFrom(bare_urdf ? internal::UrdfModelText(file, text) : text,
-                  {.options = options,
-                   .bare_urdf = bare_urdf,
-                   .yaml = YamlReader(file),
-                   .others = {},
-                   .literals = internal::Literals(options.literals)});
+  return LoadFrom(ModelFileText(text, file), ReadingOf(file, options));
+}
+
+LoadedBodies LoadBodiesText(const std::string& text, const std::string& file) {
+  const LoadOptions options;
+  Reading reading = ReadingOf(file, options);
+  const YamlNodePtr root = reading.yaml.Parse(ModelFileText(text, file));
+  auto sections = root == nullptr ? std::nullopt : ReadModel(*root, &reading);
+  LoadedBodies loaded{.bodies = {}, .diagnostics = FindingsOf(reading)};
+  if (sections && !loaded.diagnostics.has_errors()) loaded.bodies = sections->bodies.bodies;
+  return loaded;
+}
+
+LoadedBodies LoadBodies(const std::string& file) {
+  YamlReader reader(file);
+  const auto text = reader.ReadFile();
+  if (!text) return {.bodies = {}, .diagnostics = reader.diagnostics()};
+  return LoadBodiesText(*text, file);
 }
 
 LoadResult LoadModel(const std::string& file, const LoadOptions& options) {

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <filesystem>
+
+#include "mesh/find_mesh.h"
+
 namespace mbv::internal {
 namespace {
 
@@ -50,13 +54,16 @@ void ShapeReader::ReadList(const Block& block, const YamlNode& node, const std::
 
 std::optional<Shape> ShapeReader::ReadShape(const Block& block, const YamlNode& node,
                                             const std::string& path, int body) {
-  const YamlMap map(&values_.yaml(), &node, path, {"capsule", "cylinder", "box", "ball", "color"});
+  const YamlMap map(&values_.yaml(), &node, path,
+                    {"capsule", "cylinder", "box", "ball", "mesh", "color"});
   if (!map.valid()) return std::nullopt;
   int kinds = 0;
-  for (const char* kind : {"capsule", "cylinder", "box", "ball"}) kinds += map.Has(kind) ? 1 : 0;
+  for (const char* kind : {"capsule", "cylinder", "box", "ball", "mesh"}) {
+    kinds += map.Has(kind) ? 1 : 0;
+  }
   if (kinds != 1) {
     values_.yaml().Error(node, fmt::format("{} has {} kinds, one is needed", path, kinds),
-                         "one of: capsule, cylinder, box, ball");
+                         "one of: capsule, cylinder, box, ball, mesh");
     return std::nullopt;
   }
   Shape shape;
@@ -80,6 +87,9 @@ std::optional<Shape> ShapeReader::ReadShape(const Block& block, const YamlNode& 
     return put(ReadRod<Cylinder>(block, *n, map.PathOf("cylinder"), body));
   }
   if (const YamlNode* n = map.Find("box")) return put(ReadBox(block, *n, map.PathOf("box"), body));
+  if (const YamlNode* n = map.Find("mesh")) {
+    return put(ReadMesh(block, *n, map.PathOf("mesh"), body));
+  }
   return put(ReadBall(block, *map.Find("ball"), map.PathOf("ball"), body));
 }
 
@@ -112,9 +122,15 @@ std::optional<Box> ShapeReader::ReadBox(const Block& block, const YamlNode& node
         node, fmt::format("{}: an edge of {} violates size > 0", path, size->minCoeff()));
     return std::nullopt;
   }
-  Box box{.X_BG = Pose::Identity(), .size = *size};
+  const auto pose = ReadAt(block, map, body);
+  if (!pose) return std::nullopt;
+  return Box{.X_BG = *pose, .size = *size};
+}
+
+// The key `at`: a pose in the body, or the name of one of its frames.
+std::optional<Pose> ShapeReader::ReadAt(const Block& block, const YamlMap& map, int body) {
   const YamlNode* at = map.Find("at");
-  if (at == nullptr) return box;
+  if (at == nullptr) return Pose::Identity();
   std::optional<Pose> pose;
   if (!at->is_scalar()) {
     pose = values_.PoseOf(block, *at, map.PathOf("at"));
@@ -122,9 +138,44 @@ std::optional<Box> ShapeReader::ReadBox(const Block& block, const YamlNode& node
     values_.yaml().Error(*at, fmt::format("{} = {}: body '{}' has no such frame", map.PathOf("at"),
                                           Describe(*at), bodies_.bodies[body].name));
   }
-  if (!pose) return std::nullopt;
-  box.X_BG = *pose;
-  return box;
+  return pose;
+}
+
+std::optional<Mesh> ShapeReader::ReadMesh(const Block& block, const YamlNode& node,
+                                          const std::string& path, int body) {
+  YamlReader& yaml = values_.yaml();
+  const YamlMap map(&yaml, &node, path, {"file", "scale", "at"});
+  if (!map.valid()) return std::nullopt;
+  const YamlNode* file = map.Required("file");
+  const auto name = file == nullptr ? std::nullopt : yaml.Text(*file, map.PathOf("file"));
+  Mesh mesh;
+  bool good = name.has_value();
+  if (const YamlNode* scale = map.Find("scale")) {
+    if (scale->is_scalar()) {
+      const auto all = values_.Number(block, *scale, map.PathOf("scale"));
+      mesh.scale = Vec3::Constant(all.value_or(kNan));
+    } else {
+      mesh.scale =
+          values_.Vector(block, *scale, map.PathOf("scale")).value_or(Vec3::Constant(kNan));
+    }
+    if (mesh.scale.allFinite() && (mesh.scale.array() == 0.0).any()) {
+      yaml.Error(*scale,
+                 fmt::format("{} = {} violates scale != 0", map.PathOf("scale"), Describe(*scale)));
+    }
+    good = good && mesh.scale.allFinite() && (mesh.scale.array() != 0.0).all();
+  }
+  const auto pose = ReadAt(block, map, body);
+  if (!good || !pose) return std::nullopt;
+  if (FindMesh(*name, std::filesystem::path(yaml.file()).parent_path()).outside) {
+    yaml.Error(*file,
+               fmt::format("{} = {} lies outside the folder of this file", map.PathOf("file"),
+                           Describe(*file)),
+               "move the mesh below it, or name its folder by --package NAME=DIR");
+    return std::nullopt;
+  }
+  mesh.file = *name;
+  mesh.X_BG = *pose;
+  return mesh;
 }
 
 std::optional<Ball> ShapeReader::ReadBall(const Block& block, const YamlNode& node,

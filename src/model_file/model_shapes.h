@@ -11,7 +11,8 @@
 
 namespace mbv::internal {
 
-/// Reads shapes onto bodies whose frames are known.
+/// Reads shapes onto bodies whose frames are known. Meshes name their files: LoadMeshes() reads
+/// them.
 class ShapeReader {
  public:
   ShapeReader(ModelValues* values, const BodyNames& names, ModelBodies* bodies)
@@ -29,6 +30,9 @@ class ShapeReader {
                              int body);
   std::optional<Box> ReadBox(const Block& block, const YamlNode& node, const std::string& path,
                              int body);
+  std::optional<Pose> ReadAt(const Block& block, const YamlMap& map, int body);
+  std::optional<Mesh> ReadMesh(const Block& block, const YamlNode& node, const std::string& path,
+                               int body);
   std::optional<Ball> ReadBall(const Block& block, const YamlNode& node, const std::string& path,
                                int body);
 

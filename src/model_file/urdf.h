@@ -21,7 +21,7 @@ namespace mbv {
 /// guesses of the home pose) stands in a comment as a model.yaml that reads this file back: cut the
 /// comment out, name the URDF file in its `urdf:` key, and the same mechanism results (dots in the
 /// names of drives and closures become _). It states the closures itself, exactly, and skips those
-/// of the URDF.
+/// of the URDF. Meshes are named relative to the folder of Mechanism::file where they lie below it.
 [[nodiscard]] std::string WriteUrdf(const Mechanism& mechanism);
 
 /// The model.yaml in that comment.
@@ -54,8 +54,9 @@ struct UrdfTree {
 };
 
 /// Reads URDF text; everything urdfdom says is a finding, with the line where it is known. Closures
-/// are read in the forms listed in urdf_closures.h. Meshes, gears and joints inside <gazebo> are
-/// left out with a warning. The tree is empty after an error.
+/// are read in the forms listed in urdf_closures.h. Gears, joints inside <gazebo> and
+/// meshes that cannot be read (model_meshes.h) are left out with a warning. The tree is empty
+/// after an error.
 [[nodiscard]] UrdfTree ReadUrdf(const std::string& text, const std::string& file,
                                 Diagnostics* diagnostics);
 

@@ -2,11 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <functional>
 
 #include "core/markup.h"
 #include "core/spatial.h"
 #include "mechanism/joint_pose.h"
+#include "mesh/find_mesh.h"
 #include "model_file/urdf.h"
 #include "model_file/urdf_closures.h"
 #include "model_file/urdf_frames.h"
@@ -34,7 +36,9 @@ Pose StickPose(const Vec3& from, const Vec3& to) {
 
 class ShapeWriter {
  public:
-  ShapeWriter(const Pose& X_LB, const std::string& color) : X_LB_(X_LB), color_(color) {}
+  /// `folder`: of the file.
+  ShapeWriter(const Pose& X_LB, const std::string& color, std::filesystem::path folder)
+      : X_LB_(X_LB), color_(color), folder_(std::move(folder)) {}
   void operator()(const Box& box) {
     Write(box.X_BG, fmt::format("<box size=\"{}\"/>", Xyz(box.size)));
   }
@@ -52,7 +56,10 @@ class ShapeWriter {
     X.translation() = ball.p_centre;
     Write(X, fmt::format("<sphere radius=\"{}\"/>", ball.radius));
   }
-  void operator()(const Mesh&) {}
+  void operator()(const Mesh& mesh) {
+    Write(mesh.X_BG, fmt::format("<mesh filename=\"{}\" scale=\"{}\"/>",
+                                 EscapeMarkup(PathSeenFrom(folder_, mesh.file)), Xyz(mesh.scale)));
+  }
   std::string text;
 
  private:
@@ -67,9 +74,10 @@ class ShapeWriter {
   }
   Pose X_LB_;
   std::string color_;
+  std::filesystem::path folder_;
 };
 
-std::string LinkText(const Body& body, const Pose& X_BL) {
+std::string LinkText(const Body& body, const Pose& X_BL, const std::filesystem::path& folder) {
   const Pose X_LB = X_BL.inverse();
   std::string text = fmt::format("  <link name=\"{}\">\n", EscapeMarkup(body.name));
   if (body.mass > 0.0) {
@@ -82,7 +90,7 @@ std::string LinkText(const Body& body, const Pose& X_BL) {
         I(2, 2));
   }
   for (const Shape& shape : body.shapes) {
-    ShapeWriter writer(X_LB, shape.color);
+    ShapeWriter writer(X_LB, shape.color, folder);
     std::visit(std::ref(writer), shape.geometry);
     text += writer.text;
   }
@@ -226,7 +234,8 @@ std::string WriteUrdf(const Mechanism& original) {
       "<robot name=\"{0}\">\n",
       EscapeMarkup(mechanism.name), comment);
   for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
-    text += LinkText(mechanism.bodies[b], frames[b]);
+    text += LinkText(mechanism.bodies[b], frames[b],
+                     std::filesystem::path(mechanism.file).parent_path());
   }
   for (size_t t = 0; t < mechanism.tree_joints.size(); ++t) {
     text += JointText(mechanism, static_cast<int>(t), frames);

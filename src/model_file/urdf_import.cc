@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <set>
 
 #include "core/spatial.h"
 #include "core/text.h"
 #include "input/yaml_reader.h"
+#include "model_file/model_meshes.h"
 #include "model_file/urdf.h"
 #include "model_file/urdf_closures.h"
 #include "model_file/urdf_frames.h"
@@ -80,7 +82,9 @@ class Importer {
     for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
     tree_.transmission_joints = details_.transmission_joints;
     CheckMimics();
-    WarnOfMeshes();
+    const Finding place{.severity = Severity::kWarning, .file = file_, .message = {}, .hint = {}};
+    internal::LoadMeshes(std::filesystem::path(file_).parent_path(), place, &tree_.bodies,
+                         diagnostics_);
     WarnOfLosses("damping", damped_);
     WarnOfLosses("friction", rubbing_);
     return std::move(tree_);
@@ -160,8 +164,9 @@ class Importer {
       shape.geometry = Cylinder{X * Vec3(-half), X * half, c->radius};
     } else if (const auto* s = dynamic_cast<const urdf::Sphere*>(visual.geometry.get())) {
       shape.geometry = Ball{X.translation(), s->radius};
+    } else if (const auto* m = dynamic_cast<const urdf::Mesh*>(visual.geometry.get())) {
+      shape.geometry = Mesh{.X_BG = X, .file = m->filename, .scale = ToVec(m->scale)};
     } else {
-      if (meshes_++ == 0) first_mesh_ = body->name;
       return;
     }
     if (visual.material) {
@@ -215,15 +220,6 @@ class Importer {
                                 mimic.multiplier, mimic.offset));
       }
     }
-  }
-
-  // One finding for all: robots have hundreds.
-  void WarnOfMeshes() {
-    if (meshes_ == 0) return;
-    Warn(LineOf(details_.link_lines, first_mesh_),
-         fmt::format("link '{}'{}: meshes are left out of the pictures", first_mesh_,
-                     meshes_ == 1 ? "" : fmt::format(" and {} more visuals", meshes_ - 1)),
-         "boxes, cylinders and spheres are drawn");
   }
 
   void AddClosure(const internal::UrdfClosure& closure) {
@@ -325,8 +321,6 @@ class Importer {
   UrdfTree tree_;
   std::map<std::string, int> index_;
   Losses damped_, rubbing_;
-  int meshes_ = 0;
-  std::string first_mesh_;
 };
 
 // TinyXML reads nested elements by recursion: refuse what would exhaust the stack.

@@ -5,10 +5,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <map>
 #include <set>
 
 #include "core/names.h"
+#include "mesh/find_mesh.h"
 
 namespace mbv {
 namespace {
@@ -57,6 +59,7 @@ std::string PoseText(const Pose& X) {
 }
 
 struct ShapeText {
+  std::filesystem::path folder;  // of the model
   std::string operator()(const Capsule& s) const { return Rod("capsule", s); }
   std::string operator()(const Cylinder& s) const { return Rod("cylinder", s); }
   std::string operator()(const Box& s) const {
@@ -65,7 +68,12 @@ struct ShapeText {
   std::string operator()(const Ball& s) const {
     return fmt::format("ball: {{at: {}, radius: {}}}", Triple(s.p_centre), s.radius);
   }
-  std::string operator()(const Mesh&) const { return ""; }
+  std::string operator()(const Mesh& s) const {
+    const bool even = (s.scale.array() == s.scale.x()).all();
+    return fmt::format("mesh: {{file: {}, scale: {}, at: {}}}",
+                       QuotedYaml(PathSeenFrom(folder, s.file)),
+                       even ? fmt::format("{}", s.scale.x()) : Triple(s.scale), PoseText(s.X_BG));
+  }
   template <typename T>
   static std::string Rod(const char* word, const T& s) {
     return fmt::format("{}: {{from: {}, to: {}, radius: {}}}", word, Triple(s.p_from),
@@ -139,10 +147,11 @@ class ModelWriter {
     for (const auto& [name, X] : frames_[body].lines) {
       text += fmt::format("{}  {}: {}\n", indent, name, PoseText(X));
     }
+    const ShapeText writer{std::filesystem::path(m_.file).parent_path()};
     if (!m_.bodies[body].shapes.empty()) text += indent + "shapes:\n";
     for (const Shape& shape : m_.bodies[body].shapes) {
-      text += fmt::format("{}  - {{{}, color: {}}}\n", indent,
-                          std::visit(ShapeText{}, shape.geometry), QuotedYaml(shape.color));
+      text += fmt::format("{}  - {{{}, color: {}}}\n", indent, std::visit(writer, shape.geometry),
+                          QuotedYaml(shape.color));
     }
     return text;
   }

@@ -10,10 +10,20 @@
 
 namespace mbv {
 
-/// Reads back to the same numbers to the last bit; guesses are the home pose, so that loops close
-/// from there. Names become such as model files take (letters, digits, _ and -). Parameters are
-/// written as the numbers they gave; beams are left out.
+/// Reads back to the same numbers to the last bit (meshes: where their files stay); guesses are the
+/// home pose, so that loops close from there. Names become such as model files take (letters,
+/// digits, _ and -). Parameters are written as the numbers they gave; beams are left out. Mesh
+/// files are named relative to the folder of Mechanism::file where they lie below it, else by
+/// absolute paths, which are read back only from folders that are allowed (mesh/find_mesh.h).
 [[nodiscard]] std::string WriteModel(const Mechanism& mechanism);
+
+/// A file that a model names.
+struct ModelMeshFile {
+  std::string path;  ///< relative to the model's folder: "meshes/arm.stl"
+  std::string content;
+};
+/// Gives each mesh a file in a model of its own, wherever that will lie: binary STL in metres.
+[[nodiscard]] std::vector<ModelMeshFile> TakeMeshesAlong(Mechanism* mechanism);
 
 /// The names that WriteModel() gives, by index; the world's body keeps its name.
 struct WrittenNames {

@@ -301,6 +301,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   if (motion.beyond_ranges) {
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
   }
+  setup.meshes = TakeMeshesAlong(&m);
   setup.model = WriteModel(m);
   setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, !resting.empty());
   setup.mechanism = std::move(m);

@@ -8,6 +8,7 @@
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
 #include "model_file/load_model.h"
+#include "model_file/write_model.h"
 
 namespace mbv {
 
@@ -38,8 +39,9 @@ struct FirstMotion {
 
 /// The files to go on from.
 struct DefaultSetup {
-  std::string model;     ///< model.yaml
-  std::string scenario;  ///< first.yaml
+  std::string model;                  ///< model.yaml
+  std::string scenario;               ///< first.yaml
+  std::vector<ModelMeshFile> meshes;  ///< beside model.yaml
   std::vector<std::string> notes;
   Mechanism mechanism;  ///< as `model` describes it
 };

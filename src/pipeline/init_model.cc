@@ -31,11 +31,15 @@ std::string Filled(std::string text, const std::string& name) {
   return text;
 }
 
-// A folder with one file that appears whole, and only where nothing was before.
+// A folder with files that appears whole, and only where nothing was before.
 class NewFolder {
  public:
-  NewFolder(fs::path target, std::string file, std::string content)
-      : target_(std::move(target)), file_(std::move(file)), content_(std::move(content)) {}
+  NewFolder(fs::path target, std::string file, std::string content,
+            std::vector<ModelMeshFile> meshes)
+      : target_(std::move(target)),
+        file_(std::move(file)),
+        content_(std::move(content)),
+        meshes_(std::move(meshes)) {}
   ~NewFolder() {
     std::error_code error;
     if (!temporary_.empty()) fs::remove_all(temporary_, error);
@@ -61,6 +65,10 @@ class NewFolder {
     temporary_ = MakePrivateFolder(target_.parent_path() /
                                    fmt::format(".{}.mbverify-", target_.filename().string()));
     if (temporary_.empty()) return Trouble("make folder", target_, std::strerror(errno));
+    for (const ModelMeshFile& mesh : meshes_) {
+      std::string trouble = WriteFile(temporary_ / "new" / mesh.path, mesh.content);
+      if (!trouble.empty()) return trouble;
+    }
     return WriteFile(temporary_ / "new" / file_, content_);
   }
   [[nodiscard]] std::string Commit() {
@@ -84,6 +92,7 @@ class NewFolder {
 
   fs::path target_, temporary_;
   std::string file_, content_;
+  std::vector<ModelMeshFile> meshes_;
   std::vector<fs::path> made_;  // innermost first
   bool kept_ = false;
 };
@@ -109,7 +118,7 @@ class Initialiser {
       WriteFromFile(model, scenario);
     } else {
       Write(Filled(starter->model, options_.name), Filled(starter->first, options_.name), model,
-            scenario);
+            scenario, {});
     }
     return std::move(result_);
   }
@@ -170,13 +179,14 @@ class Initialiser {
     if (!made.setup) return;
     const std::string head =
         fmt::format("# Made by mbverify from {}.\n", fs::path(options_.from).filename().string());
-    Write(head + made.setup->model, made.setup->scenario, model, scenario);
+    Write(head + made.setup->model, made.setup->scenario, model, scenario,
+          std::move(made.setup->meshes));
   }
 
   void Write(const std::string& model_text, const std::string& first_text, const fs::path& model,
-             const fs::path& scenario) {
-    NewFolder a(model, "model.yaml", model_text);
-    NewFolder b(scenario, "first.yaml", first_text);
+             const fs::path& scenario, std::vector<ModelMeshFile> meshes) {
+    NewFolder a(model, "model.yaml", model_text, std::move(meshes));
+    NewFolder b(scenario, "first.yaml", first_text, {});
     std::string trouble = a.Fill();
     if (trouble.empty()) trouble = b.Fill();
     if (trouble.empty()) trouble = a.Commit();

@@ -56,27 +56,38 @@ std::string ReadAnswer(const std::string& answer, const std::string& file, Diagn
   return at < answer.size() ? answer.substr(at + 1) : "";
 }
 
-LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
+// The model file that an MJCF file stands for; "" after errors.
+std::string ModelOfMjcf(const std::string& file, Diagnostics* findings) {
   constexpr double kTimeout_s = 60.0;
   YamlReader reader(file);
   const auto text = reader.ReadFile();
-  if (!text) return {.mechanism = {}, .diagnostics = reader.diagnostics(), .literals = {}};
-  LoadResult result;
+  findings->Append(reader.diagnostics());
+  if (!text) return "";
   const auto answers = InChildren(1, kTimeout_s, [&](size_t) { return AnswerOf(*text, file); });
   if (!answers[0]) {
-    result.diagnostics.AddError(
-        file,
-        fmt::format("MuJoCo's compiler crashed on it, or took longer than {:g} s", kTimeout_s));
-    return result;
+    findings->AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than "
+                                         "{:g} s",
+                                         kTimeout_s));
+    return "";
   }
-  const std::string model = ReadAnswer(*answers[0], file, &result.diagnostics);
-  if (model.empty() || result.diagnostics.has_errors()) return result;
-  LoadResult loaded = LoadModelText(model, file, options);
-  // Nobody wrote the lines that they point to.
-  for (Finding finding : loaded.diagnostics.findings()) {
+  const std::string model = ReadAnswer(*answers[0], file, findings);
+  return findings->has_errors() ? "" : model;
+}
+
+// Nobody wrote the lines that findings point to.
+void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
+  for (Finding finding : from.findings()) {
     finding.line = finding.column = 0;
-    result.diagnostics.Add(std::move(finding));
+    to->Add(std::move(finding));
   }
+}
+
+LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
+  LoadResult result;
+  const std::string model = ModelOfMjcf(file, &result.diagnostics);
+  if (model.empty()) return result;
+  LoadResult loaded = LoadModelText(model, file, options);
+  AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
   result.mechanism = std::move(loaded.mechanism);
   result.literals = std::move(loaded.literals);
   return result;
@@ -86,6 +97,17 @@ LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
 
 bool IsRobotFile(const std::string& file) {
   return file.ends_with(".urdf") || file.ends_with(".xml");
+}
+
+LoadedBodies LoadRobotBodies(const std::string& file) {
+  if (!file.ends_with(".xml")) return LoadBodies(file);
+  LoadedBodies result;
+  const std::string model = ModelOfMjcf(file, &result.diagnostics);
+  if (model.empty()) return result;
+  LoadedBodies loaded = LoadBodiesText(model, file);
+  AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
+  result.bodies = std::move(loaded.bodies);
+  return result;
 }
 
 LoadResult LoadRobot(const std::string& file, const LoadOptions& options) {

@@ -3,6 +3,7 @@
 
 #include <string>
 
+#include "model_file/load_bodies.h"
 #include "model_file/load_model.h"
 
 namespace mbv {
@@ -12,5 +13,8 @@ namespace mbv {
 
 /// LoadModel(), which takes .urdf, and MJCF (.xml) by MuJoCo's compiler in a process of its own.
 [[nodiscard]] LoadResult LoadRobot(const std::string& file, const LoadOptions& options = {});
+
+/// LoadBodies() of the same files.
+[[nodiscard]] LoadedBodies LoadRobotBodies(const std::string& file);
 
 }  // namespace mbv

@@ -328,6 +328,10 @@ FlatMesh MarkMesh(const Item& mark) {
     }
     case Solid::kBox:
       return GlassBox(mark);
+    case Solid::kMesh:
+      for (const Vec3& p : mark.mesh->vertices) mesh.vertices_W.emplace_back(mark.X_WG * p);
+      mesh.triangles = mark.mesh->triangles;
+      return mesh;
   }
   for (const auto& [radius, height] : profile) {
     for (int i = 0; i < kSides; ++i) {

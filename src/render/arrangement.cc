@@ -97,6 +97,7 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
 
   Extent extent(set.R_DW, &fit);
   std::size_t most_items = 0;
+  std::vector<std::shared_ptr<const TriangleMesh>> meshes;
   for (const PictureFrame& frame : frames) {
     const std::vector<Item> items = MechanismItems(mechanism, frame, set.scale, options);
     // The rings' direction is not known yet; they are small and no items.
@@ -104,6 +105,11 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
     extent.Include(items, &frame == frames.data());
     extent.Include(marks.items, false);
     most_items = std::max(most_items, items.size() + marks.items.size());
+    for (const Item& item : items) {
+      if (item.mesh != nullptr && std::ranges::find(meshes, item.mesh) == meshes.end()) {
+        meshes.push_back(item.mesh);
+      }
+    }
   }
   const Annotations overlaid = OverlayAnnotations(overlay, set.scale, Vec3::UnitX());
   extent.Include(overlaid.items, false);
@@ -125,7 +131,8 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
                .ground_m = sea.value_or(extent.lowest() - 0.01 * size),
                .sea = sea.has_value(),
                .most_items = static_cast<int>(most_items + overlaid.items.size()),
-               .grid_m = RoundLength(0.14 * size)};
+               .grid_m = RoundLength(0.14 * size),
+               .meshes = std::move(meshes)};
   if (!options.background.empty()) {
     const auto rgba = MaterialOf(options.background).rgba;
     set.stage.background = std::array<float, 3>{rgba[0], rgba[1], rgba[2]};

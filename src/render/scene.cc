@@ -40,6 +40,8 @@ std::vector<Vec3> Corners(const Item& item) {
   } else if (item.solid == Solid::kArrow) {
     low.z() = 0.0;
   }
+  low += item.p_GBox;
+  high += item.p_GBox;
   std::vector<Vec3> corners;
   for (int i = 0; i < 8; ++i) {
     const Vec3 p_G((i & 1) != 0 ? high.x() : low.x(), (i & 2) != 0 ? high.y() : low.y(),
@@ -82,6 +84,17 @@ std::vector<Vec3> TouchPoints(const Mechanism& mechanism, int body) {
   return points;
 }
 
+Item MeshItem(const Mesh& mesh, const Pose& X_WB, const Material& material) {
+  Eigen::AlignedBox3d box;
+  for (const Vec3& p : mesh.surface->vertices) box.extend(p);
+  return {.solid = Solid::kMesh,
+          .X_WG = X_WB * mesh.X_BG,
+          .size = 0.5 * box.sizes(),
+          .material = material,
+          .mesh = mesh.surface,
+          .p_GBox = box.center()};
+}
+
 void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
   const Material material = MaterialOf(shape.color);
   Item item;
@@ -98,8 +111,9 @@ void AddShape(const Shape& shape, const Pose& X_WB, std::vector<Item>* items) {
             .material = material};
   } else if (const auto* ball = std::get_if<Ball>(&shape.geometry)) {
     item = BallAt(X_WB * ball->p_centre, ball->radius, material);
-  } else {
-    return;
+  } else if (const auto* mesh = std::get_if<Mesh>(&shape.geometry)) {
+    if (mesh->surface->vertices.empty()) return;
+    item = MeshItem(*mesh, X_WB, material);
   }
   if (IsScenery(shape.color)) item.framing = Framing::kNever;
   items->push_back(item);
@@ -320,7 +334,7 @@ std::vector<Item> MechanismItems(const Mechanism& mechanism, const PictureFrame&
     for (const Shape& shape : body.shapes) {
       if (b == 0 && shape.color == "sea") continue;  // drawn as an endless plane
       AddShape(shape, frame.X_WB[b], &items);
-      if (b == 0 && items.back().framing == Framing::kAlways) {
+      if (b == 0 && !items.empty() && items.back().framing == Framing::kAlways) {
         items.back().framing = Framing::kIfNear;
       }
     }

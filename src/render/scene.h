@@ -2,6 +2,7 @@
 // No OpenGL here.
 #pragma once
 
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -18,6 +19,7 @@ enum class Solid {
   kCylinder,  ///< along z of G, size = (radius, –, half length)
   kBox,       ///< size = half edges
   kArrow,     ///< from G's origin along z, size = (radius, –, length)
+  kMesh,      ///< Item::mesh in G, size = half edges of the box around it
 };
 
 /// Whether the automatic camera has to show an item.
@@ -34,6 +36,8 @@ struct Item {
   Material material;
   Framing framing = Framing::kAlways;
   bool casts_shadow = true;  ///< marks do not
+  std::shared_ptr<const TriangleMesh> mesh = {};
+  Vec3 p_GBox = Vec3::Zero();  ///< middle of the box around a mesh [m]
 };
 
 /// The two unit vectors that complete `axis` to a right-handed frame (axis last).

@@ -9,6 +9,7 @@
 #include <numbers>
 
 #include "render/flat_pass.h"
+#include "render/stage_meshes.h"
 #include "render/textures.h"
 #include "simulation/engine.h"
 
@@ -43,8 +44,9 @@ std::string StageMjcf(const StageOptions& o) {
     const auto& rgb = *o.background;
     zenith = horizon = fmt::format("{:.9g} {:.9g} {:.9g}", rgb[0], rgb[1], rgb[2]);
   }
+  const auto [assets, geoms] = MeshMjcf(o.meshes);
   return fmt::format(
-      "<mujoco><statistic extent='{0:.9g}' center='0 0 0'/>"
+      "<mujoco><compiler inertiafromgeom='false'/><statistic extent='{0:.9g}' center='0 0 0'/>"
       "<visual><global offwidth='{1}' offheight='{2}' fovy='{3}'/>"
       "<quality offsamples='0' shadowsize='2048' numslices='32' numstacks='16' numquads='2'/>"
       "<map znear='0.05' zfar='40' shadowclip='1.0' haze='0.35'/><rgba haze='{4}'/>"
@@ -53,11 +55,11 @@ std::string StageMjcf(const StageOptions& o) {
       "width='256' height='1536'/>"
       "<texture name='ground' type='2d' builtin='flat' width='{7}' height='{7}'/>"
       "<material name='ground' texture='ground' texuniform='true' texrepeat='{8:.9g} {8:.9g}' "
-      "reflectance='{9}' specular='{10}' shininess='0.7'/></asset>"
-      "<worldbody><geom type='plane' size='0 0 1' pos='0 0 {11:.9g}' material='ground'/>"
+      "reflectance='{9}' specular='{10}' shininess='0.7'/>{12}</asset>"
+      "<worldbody>{13}<geom type='plane' size='0 0 1' pos='0 0 {11:.9g}' material='ground'/>"
       "</worldbody></mujoco>",
       o.radius_m, o.width, o.height, kFieldOfView_deg, haze, zenith, horizon, kTexture_px, repeat,
-      o.sea ? 0.2 : 0.0, o.sea ? 0.5 : 0.1, o.ground_m);
+      o.sea ? 0.2 : 0.0, o.sea ? 0.5 : 0.1, o.ground_m, assets, geoms);
 }
 
 // Unit vector with an azimuth from x about z and a height above the horizon [deg].
@@ -79,6 +81,8 @@ mjtGeom TypeOf(Solid solid) {
       return mjGEOM_BOX;
     case Solid::kArrow:
       return mjGEOM_ARROW;
+    case Solid::kMesh:
+      return mjGEOM_MESH;
   }
   return mjGEOM_SPHERE;
 }
@@ -130,6 +134,7 @@ class OsMesaStage final : public Stage {
   RunSummary MakeInMujoco() {
     model_ = simulation::CompileMjcf(StageMjcf(options_));
     PaintGround();
+    X_GM_ = MeshFrames(*model_, options_.meshes.size());
     data_ = simulation::MakeData(*model_);
     mj_forward(model_.get(), data_.get());
     mjv_defaultScene(&scene_);
@@ -184,10 +189,19 @@ class OsMesaStage final : public Stage {
     return RunSummary::Done();
   }
 
+  // Index of an item's mesh in the model; -1: it has none.
+  [[nodiscard]] int MeshOf(const Item& item) const {
+    const auto at = std::ranges::find(options_.meshes, item.mesh);
+    const bool known = item.mesh != nullptr && at != options_.meshes.end();
+    return known ? static_cast<int>(at - options_.meshes.begin()) : -1;
+  }
+
   void AppendGeom(const Item& item, const Mat3& R_DW) {
     mjvGeom& geom = scene_.geoms[scene_.ngeom++];
-    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = R_DW * item.X_WG.linear();
-    const Vec3 p = R_DW * item.X_WG.translation();
+    const int mesh = MeshOf(item);
+    const Pose X_WG = mesh < 0 ? item.X_WG : item.X_WG * X_GM_[mesh];
+    const Eigen::Matrix<double, 3, 3, Eigen::RowMajor> R = R_DW * X_WG.linear();
+    const Vec3 p = R_DW * X_WG.translation();
     mjv_initGeom(&geom, TypeOf(item.solid), item.size.data(), p.data(), R.data(),
                  item.material.rgba.data());
     // mjv_initGeom changes the sizes of some types; ours are meant as they are.
@@ -196,6 +210,10 @@ class OsMesaStage final : public Stage {
     geom.size[1] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.y());
     geom.size[2] = static_cast<float>(item.solid == Solid::kBall ? s.x() : s.z());
     if (item.solid == Solid::kArrow) geom.size[2] *= 2.0F;  // arrows are drawn half as long
+    if (mesh >= 0) {
+      std::ranges::fill(geom.size, 1.0F);
+      geom.dataid = 2 * mesh;  // the odd ones are convex hulls
+    }
     geom.category = mjCAT_DYNAMIC;
     geom.specular = item.material.specular;
     geom.shininess = item.material.shininess;
@@ -317,6 +335,7 @@ class OsMesaStage final : public Stage {
   OSMesaContext mesa_ = nullptr;
   simulation::ModelHandle model_;
   simulation::DataHandle data_;
+  std::vector<Pose> X_GM_;  // per mesh: MuJoCo's frame in ours
   mjvScene scene_{};
   mjrContext context_{};
   bool scene_made_ = false, context_made_ = false;

@@ -30,6 +30,7 @@ struct StageOptions {
   int most_items = 1000;                                ///< room for so many solids in one picture
   double grid_m = 0.1;                                  ///< spacing of the ground's grid lines
   std::optional<std::array<float, 3>> background = {};  ///< instead of sky and ground
+  std::vector<std::shared_ptr<const TriangleMesh>> meshes = {};  ///< that items show
 };
 
 /// One character of the renderer's font as coverage 0 … 255.

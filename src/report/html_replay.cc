@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mesh/decimate.h"
 #include "report/html_text.h"
 
 namespace mbv {
@@ -13,7 +14,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr size_t kMaxFrames = 600;
-constexpr size_t kMaxNumbers = 120000;  // of all poses: 0.64 MB as base64
+constexpr size_t kMaxNumbers = 120000;   // of all poses: 0.64 MB as base64
+constexpr size_t kMaxTriangles = 50000;  // of all meshes: 1.2 MB as base64
 
 Json VectorJson(const Vec3& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -28,8 +30,21 @@ bool AllFinite(const std::vector<Pose>& poses) {
                      [](const Pose& X) { return X.matrix().allFinite(); });
 }
 
-Json ShapeJson(const Shape& shape) {
+// Vertices, and triangles as their numbers: 32-bit floats hold these exactly.
+Json SurfaceJson(const TriangleMesh& mesh) {
+  std::vector<float> vertices, triangles;
+  for (const Vec3& p : mesh.vertices) {
+    for (int k = 0; k < 3; ++k) vertices.push_back(static_cast<float>(p[k]));
+  }
+  for (const auto& t : mesh.triangles) {
+    for (const int corner : t) triangles.push_back(static_cast<float>(corner));
+  }
+  return {{"vertices", Base64(vertices)}, {"triangles", Base64(triangles)}};
+}
+
+Json ShapeJson(const Shape& shape, const DrawnSurfaces& surfaces) {
   struct Visitor {
+    const DrawnSurfaces& surfaces;
     Json operator()(const Capsule& s) const {
       return {{"type", "capsule"},
               {"from", VectorJson(s.p_from)},
@@ -48,16 +63,19 @@ Json ShapeJson(const Shape& shape) {
     Json operator()(const Ball& s) const {
       return {{"type", "ball"}, {"at", VectorJson(s.p_centre)}, {"radius", s.radius}};
     }
-    Json operator()(const Mesh&) const { return {}; }
+    Json operator()(const Mesh& s) const {
+      return {{"type", "mesh"}, {"pose", PoseNumbers(s.X_BG)}, {"surface", surfaces.IndexOf(s)}};
+    }
   };
-  Json json = std::visit(Visitor{}, shape.geometry);
+  Json json = std::visit(Visitor{surfaces}, shape.geometry);
   json["color"] = shape.color;
   return json;
 }
 
 class ReplayWriter {
  public:
-  explicit ReplayWriter(const HtmlInput& input) : input_(input), mechanism_(*input.mechanism) {
+  explicit ReplayWriter(const HtmlInput& input)
+      : input_(input), mechanism_(*input.mechanism), surfaces_(mechanism_, kMaxTriangles) {
     ChooseFrames();
   }
 
@@ -75,6 +93,7 @@ class ReplayWriter {
       paints[color] = {{"rgba", paint.rgba}, {"scenery", paint.scenery}};
     }
     json["paints"] = std::move(paints);
+    if (!surfaces_.drawn().empty()) json["surfaces"] = Surfaces();
     return json;
   }
 
@@ -94,6 +113,12 @@ class ReplayWriter {
     for (size_t i = 0; i < good; i += stride) frames_.push_back(i);
   }
 
+  Json Surfaces() const {
+    Json surfaces = Json::array();
+    for (const auto& mesh : surfaces_.drawn()) surfaces.push_back(SurfaceJson(*mesh));
+    return surfaces;
+  }
+
   Json Up() const { return VectorJson(mechanism_.up_W); }
 
   Json Times() const {
@@ -110,7 +135,9 @@ class ReplayWriter {
     Json bodies = Json::array();
     for (size_t b = 0; b < mechanism_.bodies.size(); ++b) {
       Json shapes = Json::array();
-      for (const Shape& shape : mechanism_.bodies[b].shapes) shapes.push_back(ShapeJson(shape));
+      for (const Shape& shape : mechanism_.bodies[b].shapes) {
+        shapes.push_back(ShapeJson(shape, surfaces_));
+      }
       if (shapes.empty() && b > 0) shapes = Rods(static_cast<int>(b));
       Json json = {{"name", mechanism_.bodies[b].name}, {"shapes", std::move(shapes)}};
       json["poses"] = Poses(b);
@@ -130,7 +157,7 @@ class ReplayWriter {
     for (size_t i = 1; i < points.size(); ++i) {
       const double length = (points[i] - points[0]).norm();
       if (length < 1e-9) continue;
-      rods.push_back(ShapeJson({Capsule{points[0], points[i], 0.03 * length}, "grey"}));
+      rods.push_back(ShapeJson({Capsule{points[0], points[i], 0.03 * length}, "grey"}, surfaces_));
     }
     return rods;
   }
@@ -235,6 +262,7 @@ class ReplayWriter {
 
   const HtmlInput& input_;
   const Mechanism& mechanism_;
+  const DrawnSurfaces surfaces_;
   std::vector<size_t> frames_;
 };
 

@@ -8,7 +8,8 @@
 namespace mbv {
 
 /// Bodies with shapes and poses (at most 600 frames; fewer when there are many bodies), drives,
-/// loop closures, springs and outputs. Positions in metres, rotations as quaternions x, y, z, w.
+/// loop closures, springs and outputs; meshes decimated to 50 000 triangles together. Positions in
+/// metres, rotations as quaternions x, y, z, w.
 [[nodiscard]] nlohmann::ordered_json ReplayJson(const HtmlInput& input);
 
 }  // namespace mbv

@@ -285,10 +285,43 @@ class MjcfImporter {
     }
   }
 
+  void AddMesh(int g, const mjcf::ForeignMesh& mesh) {
+    Shape shape;
+    shape.geometry = Mesh{.X_BG = PoseAt(m_.geom_pos + 3 * g, m_.geom_quat + 4 * g) * mesh.X_GF,
+                          .file = mesh.file,
+                          .scale = mesh.scale,
+                          .surface = std::make_shared<const TriangleMesh>()};
+    const float* rgba = m_.geom_rgba + 4 * g;
+    const auto byte = [](float x) {
+      return static_cast<int>(std::lround(255.0 * std::clamp(double{x}, 0.0, 1.0)));
+    };
+    const bool plain = rgba[0] == 0.5F && rgba[1] == 0.5F && rgba[2] == 0.5F;  // MuJoCo's default
+    if (!plain) {
+      shape.color = fmt::format("#{:02x}{:02x}{:02x}{:02x}", byte(rgba[0]), byte(rgba[1]),
+                                byte(rgba[2]), byte(rgba[3]));
+    }
+    const int b = index_[static_cast<size_t>(m_.geom_bodyid[g])];
+    auto& shapes = mechanism_.bodies[static_cast<size_t>(b)].shapes;
+    const auto& geometry = std::get<Mesh>(shape.geometry);
+    // The same mesh once more, to be touched.
+    const bool again = std::any_of(shapes.begin(), shapes.end(), [&](const Shape& other) {
+      const auto* known = std::get_if<Mesh>(&other.geometry);
+      return known != nullptr && known->file == geometry.file && known->scale == geometry.scale &&
+             known->X_BG.isApprox(geometry.X_BG, 1e-12);
+    });
+    constexpr int kHidden = 3;  // groups from here on are switched off in MuJoCo's viewer
+    if (!again && m_.geom_group[g] < kHidden) shapes.push_back(shape);
+  }
+
   void AddShapes() {
     for (int g = 0; g < m_.ngeom; ++g) {
       if (m_.geom_contype[g] != 0 || m_.geom_conaffinity[g] != 0) touching_ = true;
       const int b = m_.geom_bodyid[g];
+      const auto mesh = foreign_.meshes().find(NameOf(mjOBJ_GEOM, g, "geom"));
+      if (mesh != foreign_.meshes().end()) {
+        AddMesh(g, mesh->second);
+        continue;
+      }
       if (b == 0) continue;  // floors
       const Pose X = PoseAt(m_.geom_pos + 3 * g, m_.geom_quat + 4 * g);
       const mjtNum* size = m_.geom_size + 3 * g;

@@ -6,10 +6,12 @@
 
 #include "core/spatial.h"
 #include "kinematics/mobility.h"
+#include "mesh/inertia_diagnosis.h"
 #include "model_file/write_model.h"
 #include "pipeline/default_setup.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/survey.h"
+#include "tests/mesh/solids.h"
 #include "tests/test_folder.h"
 
 namespace mbv {
@@ -220,6 +222,47 @@ TEST(MjcfImport, RangesHoldUnlessTheFileSaysOtherwise) {
       LoadText(folder, Linkage("<compiler autolimits='false'/>", "range='-1 1.5'"));
   EXPECT_FALSE(own.mechanism);
   EXPECT_NE(own.diagnostics.Text().find("`range` but not `limited`"), std::string::npos);
+}
+
+TEST(MjcfImport, MeshesLieWhereTheFileStatesThem) {
+  const test::TestFolder folder("mjcf_meshes");
+  folder.Write("assets/part.stl", ToStl(test::BracketMesh(200, 120, 30, 60), ""));
+  // The class gives type, pose and group; the asset's class the scale. MuJoCo would move the frame.
+  const std::string text =
+      R"(<mujoco><compiler angle="degree" meshdir="assets" exactmeshinertia="true"/>
+<default><default class="mm"><mesh scale="0.001 0.001 0.001"/></default>
+<default class="visual"><geom type="mesh" euler="0 0 90" group="1"/></default></default>
+<asset><material name="red" rgba="1 0 0 1"/><mesh name="part" class="mm" file="part.stl"/><mesh name="gone" file="gone.stl"/>
+<mesh name="outside" file="../../part.stl"/></asset><worldbody>
+<body name="arm"><joint name="A" axis="0 1 0"/><inertial pos="0 0 0.15" mass="1" diaginertia="0.01 0.01 0.001"/>
+<geom class="visual" mesh="part" pos="1 2 3" material="red"/><geom class="visual" mesh="part" pos="1 2 3"/>
+<geom type="mesh" mesh="part" group="3"/><geom class="visual" mesh="gone"/>
+<geom type="mesh" mesh="outside"/></body>
+<body name="solid" pos="1 0 0"><joint name="B" axis="0 1 0"/><geom type="mesh" mesh="part" density="2700" pos="0 0 1"/></body>
+</worldbody><actuator><motor name="a" joint="A"/><motor name="b" joint="B"/></actuator></mujoco>)";
+  const LoadResult loaded = LoadText(folder, text);
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const std::string said = loaded.diagnostics.Text();
+  EXPECT_NE(said.find("1 meshes are left out of the pictures"), std::string::npos) << said;
+  EXPECT_NE(said.find("1 of 3 meshes is left out: 'assets/gone.stl' is not there"),
+            std::string::npos)
+      << said;
+  const Mechanism& m = *loaded.mechanism;
+  const Body& arm = m.bodies[m.FindBody("arm")];
+  ASSERT_EQ(arm.shapes.size(), 1u);
+  EXPECT_EQ(arm.shapes[0].color, "#ff0000ff");
+  const Mesh& mesh = std::get<Mesh>(arm.shapes[0].geometry);
+  EXPECT_TRUE((mesh.X_BG * Vec3(0.2, 0, 0)).isApprox(Vec3(1, 2.2, 3), 1e-9));
+  EXPECT_NEAR(SolidShape(*mesh.surface).amount, 0.03 * 0.29 * 0.06, 1e-9);
+  // MuJoCo's mass from the same mesh, where the geom stands.
+  const Body& solid = m.bodies[m.FindBody("solid")];
+  ASSERT_EQ(solid.shapes.size(), 1u);
+  const Mesh& heavy = std::get<Mesh>(solid.shapes[0].geometry);
+  EXPECT_NEAR(solid.mass, 2700 * 0.03 * 0.29 * 0.06, 1e-6);
+  EXPECT_TRUE(solid.p_BoBcm_B.isApprox(heavy.X_BG * SolidShape(*heavy.surface).p_cm, 1e-6));
+  // So the check of inertias finds it sound.
+  EXPECT_TRUE(DiagnoseInertia(solid).findings.empty());
+  EXPECT_NEAR(DiagnoseInertia(solid).density, 2700, 0.1);
 }
 
 TEST(MjcfImport, IncludesStayInTheFolder) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "report/html_report.h"
+#include "tests/mesh/solids.h"
 #include "tests/report/golden_file.h"
 #include "tests/report/reports.h"
 
@@ -66,6 +67,35 @@ nlohmann::ordered_json DataOf(const Mechanism& mechanism, const Report& report) 
 
 TEST(ReplayData, IsAsWritten) {
   ExpectGolden("replay.json", DataOf(Furnished(), Report())["replay"].dump(2) + "\n");
+}
+
+TEST(ReplayData, MeshesAreDecimatedAndThoseShownTwiceAreThereOnce) {
+  Mechanism m = Furnished();
+  const auto ball =
+      std::make_shared<const TriangleMesh>(test::EllipsoidMesh(Vec3(0.1, 0.2, 0.3), 300));
+  ASSERT_GT(ball->triangles.size(), 300000U);
+  const auto box = std::make_shared<const TriangleMesh>(test::BoxMesh(1, 2, 3));
+  const Pose X_BG = PoseAt(1, 2, 3);
+  m.bodies[1].shapes = {{Mesh{.X_BG = X_BG, .file = "ball.stl", .surface = ball}, "steel"},
+                        {Mesh{.X_BG = X_BG, .file = "box.stl", .surface = box}, "accent"}};
+  m.bodies[2].shapes = {{Mesh{.file = "ball.stl", .surface = ball}, "steel"}};
+  const auto replay = DataOf(m, Report())["replay"];
+  ASSERT_EQ(replay["surfaces"].size(), 2U);
+  const auto& shape = replay["bodies"][1]["shapes"][0];
+  EXPECT_EQ(shape["type"], "mesh");
+  EXPECT_EQ(shape["surface"], 0);
+  EXPECT_EQ(shape["pose"], nlohmann::ordered_json({1.0, 2.0, 3.0, 0.0, 0.0, 0.0, 1.0}));
+  EXPECT_EQ(replay["bodies"][1]["shapes"][1]["surface"], 1);
+  EXPECT_EQ(replay["bodies"][2]["shapes"][0]["surface"], 0);
+  // Three numbers of four bytes as base64.
+  EXPECT_EQ(replay["surfaces"][1]["triangles"].get<std::string>().size(), 12U * 16U);
+  EXPECT_EQ(replay["surfaces"][1]["vertices"].get<std::string>().size(), 8U * 16U);
+  EXPECT_GT(replay["surfaces"][0]["triangles"].get<std::string>().size(), 10000U * 16U);
+  EXPECT_LT(replay.dump().size(), 1.5e6);
+  // The page with its script stays below 5 MB whatever the meshes.
+  test::FullPage full;
+  full.mechanism.bodies[1].shapes = m.bodies[1].shapes;
+  EXPECT_LT(ToHtml(full.input()).size(), 5e6);
 }
 
 TEST(ReplayData, SignalsHaveTheLimitsAndScalesOfTheirKind) {

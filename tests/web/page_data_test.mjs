@@ -32,6 +32,15 @@ test('Signals are decoded, and stay missing where they are', () => {
   assert.deepEqual(data.replay.bodies[1].poses, [0, 0, 0, 0, 0, 0, 1]);
 });
 
+test('Meshes are decoded as vertices and whole numbers of them', () => {
+  const replay = {time: [0], bodies: [], surfaces: [{vertices: base64(0, 0.5, 1), triangles: base64(0, 1, 70000)}]};
+  const [surface] = page({replay}).replay.surfaces;
+  assert.deepEqual([...surface.vertices], [0, 0.5, 1]);
+  assert.ok(surface.triangles instanceof Uint32Array);
+  assert.deepEqual([...surface.triangles], [0, 1, 70000]);
+  assert.equal(page().replay.surfaces, undefined);
+});
+
 test('A page without signals has a home pose only', () => {
   const data = page({time: undefined, witnesses: undefined, pairs: undefined});
   assert.deepEqual([...data.time], [0]);

@@ -1,17 +1,27 @@
 // The bodies of the replay: meshes by shape and paint, moved by the simulated poses.
 import {
-  BoxGeometry, CapsuleGeometry, Color, CylinderGeometry, Group, Mesh, MeshStandardMaterial,
-  Quaternion, SphereGeometry, SRGBColorSpace, Vector3,
+  BoxGeometry, BufferAttribute, BufferGeometry, CapsuleGeometry, Color, CylinderGeometry, DoubleSide,
+  Group, Mesh, MeshStandardMaterial, Quaternion, SphereGeometry, SRGBColorSpace, Vector3,
 } from 'three';
 
 import {between} from './numbers.js';
 
 const kY = new Vector3(0, 1, 0);
 
+/** @param {import('./data.js').Surface} surface */
+function geometryOf({vertices, triangles}) {
+  const geometry = new BufferGeometry();
+  geometry.setAttribute('position', new BufferAttribute(vertices, 3));
+  geometry.setIndex(new BufferAttribute(triangles, 1));
+  geometry.computeVertexNormals();
+  return geometry;
+}
+
 export class Bodies {
   /** @param {import('./data.js').ReplayData} replay */
-  constructor({bodies, paints, time}) {
+  constructor({bodies, paints, time, surfaces}) {
     this.bodies = bodies;
+    this.surfaces = (surfaces ?? []).map(geometryOf);
     this.paints = paints;
     this.time = time;
     this.materials = new Map();
@@ -38,17 +48,22 @@ export class Bodies {
     }
   }
 
-  /** @param {string} color a name of the paints */
-  material(color) {
-    if (!this.materials.has(color)) {
+  /**
+   * @param {string} color a name of the paints
+   * @param {boolean} faceted of a mesh, whose faces are seen as they are and from both sides
+   */
+  material(color, faceted = false) {
+    const key = `${color} ${faceted}`;
+    if (!this.materials.has(key)) {
       const paint = this.paints[color] ?? this.paints.grey;
       const [r, g, b, a] = paint.rgba;
       const opacity = color === 'sea' ? 0.55 * a : a;
-      this.materials.set(color, new MeshStandardMaterial({
+      this.materials.set(key, new MeshStandardMaterial({
+        ...(faceted ? {flatShading: true, side: DoubleSide} : {}),
         color: new Color().setRGB(r, g, b, SRGBColorSpace), roughness: 0.55, metalness: 0.1,
         transparent: opacity < 1, opacity, depthWrite: opacity === 1}));
     }
-    return this.materials.get(color);
+    return this.materials.get(key);
   }
 
   /** @param {any} shape of a body */
@@ -62,6 +77,10 @@ export class Bodies {
     } else if (shape.type === 'ball') {
       mesh = new Mesh(new SphereGeometry(shape.radius, 24, 16), material);
       mesh.position.set(...shape.at);
+    } else if (shape.type === 'mesh') {
+      mesh = new Mesh(this.surfaces[shape.surface], this.material(shape.color, true));
+      mesh.position.set(...shape.pose.slice(0, 3));
+      mesh.quaternion.set(...shape.pose.slice(3));
     } else {
       mesh = this.rod(shape, material);
     }

@@ -27,9 +27,13 @@ import {floats} from './numbers.js';
  *
  * @typedef {{rgba: number[], scenery: boolean}} Paint
  *
+ * A decimated mesh: three coordinates per vertex [m], three vertices per triangle.
+ * @typedef {{vertices: Float32Array, triangles: Uint32Array}} Surface
+ *
  * Bodies are named by their index.
  * @typedef {{up: number[], time: Float64Array, bodies: Body[], paints: Record<string, Paint>,
- *            drives: any[], closures: any[], springs?: any[], outputs: any[], simulated: boolean}} ReplayData
+ *            surfaces?: Surface[], drives: any[], closures: any[], springs?: any[], outputs: any[],
+ *            simulated: boolean}} ReplayData
  *
  * @typedef {{time: Float64Array, drives: Drive[], witnesses: Witness[], pairs: Pair[],
  *            replay: ReplayData}} PageData
@@ -63,6 +67,8 @@ export function readData(json) {
   data.pairs = (data.pairs ?? []).map((/** @type {any} */ pair) => (
       {...pair, error: decodeAll(pair.error)}));
   data.replay.time = Float64Array.from(data.replay.time);
+  data.replay.surfaces = data.replay.surfaces?.map((/** @type {any} */ surface) => (
+      {vertices: floats(surface.vertices), triangles: Uint32Array.from(floats(surface.triangles))}));
   for (const body of data.replay.bodies) body.poses = decode(body.poses) ?? body.poses;
   return data;
 }

@@ -1,0 +1,179 @@
+#include "mesh/read_mesh.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <fmt/format.h>
+#include <assimp/Importer.hpp>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <map>
+
+#include "core/files.h"
+#include "core/in_children.h"
+#include "core/inputs.h"
+#include "mesh/weld.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kMostBytes = 256UL << 20;
+constexpr size_t kMostPacked = 60'000'000;  // what a child may answer
+constexpr double kReadTimeout_s = 60.0;
+constexpr size_t kMostKnown = 500;  // surfaces
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// Adds the meshes of a node and of those below it.
+void AddNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& above,
+             TriangleMesh* surface) {
+  const aiMatrix4x4 X = above * node.mTransformation;
+  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+    const aiMesh& part = *scene.mMeshes[node.mMeshes[i]];
+    const int first = static_cast<int>(surface->vertices.size());
+    for (unsigned v = 0; v < part.mNumVertices; ++v) {
+      const aiVector3D p = X * part.mVertices[v];
+      surface->vertices.emplace_back(p.x, p.y, p.z);
+    }
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+      const aiFace& face = part.mFaces[f];
+      if (face.mNumIndices != 3) continue;  // points and lines
+      std::array<int, 3> triangle{};
+      for (int k = 0; k < 3; ++k) triangle[k] = first + static_cast<int>(face.mIndices[k]);
+      if (X.Determinant() < 0.0F) std::swap(triangle[1], triangle[2]);
+      surface->triangles.push_back(triangle);
+    }
+  }
+  for (unsigned i = 0; i < node.mNumChildren; ++i) {
+    AddNode(scene, *node.mChildren[i], X, surface);
+  }
+}
+
+// A surface as bytes between processes: "" and numbers, or "!" and the trouble.
+std::string Packed(const MeshText& mesh) {
+  if (!mesh.trouble.empty()) return "!" + mesh.trouble;
+  std::string bytes = " ";
+  const auto append = [&bytes](const void* data, size_t size) {
+    bytes.append(static_cast<const char*>(data), size);
+  };
+  const std::array<size_t, 2> counts{mesh.surface.vertices.size(), mesh.surface.triangles.size()};
+  append(counts.data(), sizeof counts);
+  for (const Vec3& p : mesh.surface.vertices) append(p.data(), sizeof(double) * 3);
+  for (const auto& t : mesh.surface.triangles) append(t.data(), sizeof t);
+  if (bytes.size() <= kMostPacked) return bytes;
+  return fmt::format("!its {} triangles are too many", mesh.surface.triangles.size());
+}
+
+MeshText Unpacked(const std::string& bytes) {
+  MeshText mesh;
+  if (bytes.empty() || bytes[0] == '!') {
+    mesh.trouble = bytes.empty() ? "it gave nothing" : bytes.substr(1);
+    return mesh;
+  }
+  size_t at = 1;
+  const auto take = [&](void* data, size_t size) {
+    std::memcpy(data, bytes.data() + at, size);
+    at += size;
+  };
+  std::array<size_t, 2> counts{};
+  take(counts.data(), sizeof counts);
+  mesh.surface.vertices.resize(counts[0]);
+  mesh.surface.triangles.resize(counts[1]);
+  for (Vec3& p : mesh.surface.vertices) take(p.data(), sizeof(double) * 3);
+  for (auto& t : mesh.surface.triangles) take(t.data(), sizeof t);
+  return mesh;
+}
+
+// Surfaces of this process by content and ending of their files.
+std::map<std::string, MeshFile>& Known() {
+  thread_local std::map<std::string, MeshFile> known;
+  if (known.size() > kMostKnown) known.clear();
+  return known;
+}
+
+}  // namespace
+
+bool IsMeshFile(const std::filesystem::path& file) {
+  const std::string extension = Lower(file.extension().string());
+  return extension == ".stl" || extension == ".obj" || extension == ".dae" || extension == ".ply";
+}
+
+MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
+  MeshText mesh;
+  Assimp::Importer importer;
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  const std::string hint = Lower(extension).substr(extension.starts_with('.') ? 1 : 0);
+  const aiScene* scene =
+      importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_Triangulate, hint.c_str());
+  if (scene == nullptr || scene->mRootNode == nullptr) {
+    mesh.trouble = importer.GetErrorString();
+    if (mesh.trouble.empty()) mesh.trouble = "it holds no mesh";
+    return mesh;
+  }
+  AddNode(*scene, *scene->mRootNode, aiMatrix4x4(), &mesh.surface);
+  const bool finite = std::all_of(mesh.surface.vertices.begin(), mesh.surface.vertices.end(),
+                                  [](const Vec3& p) { return p.allFinite(); });
+  mesh.surface = Welded(mesh.surface, 0.0);
+  if (!finite) mesh.trouble = "a vertex is not finite";
+  if (finite && mesh.surface.triangles.empty()) mesh.trouble = "it holds no triangle";
+  return mesh;
+}
+
+std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& files) {
+  std::vector<MeshFile> result(files.size());
+  std::vector<std::string> contents, keys(files.size()), endings;
+  std::vector<std::string> unknown;  // keys
+  for (size_t i = 0; i < files.size(); ++i) {
+    auto bytes = ReadWholeFile(files[i]);
+    if (!bytes || bytes->size() > kMostBytes) {
+      result[i].trouble = bytes ? "it is larger than 256 MB" : "it cannot be read";
+      continue;
+    }
+    NoteInput(files[i].string(), *bytes);
+    const std::string ending = Lower(files[i].extension().string());
+    keys[i] = ending + ContentFingerprint(*bytes);
+    if (Known().contains(keys[i])) continue;
+    if (std::find(unknown.begin(), unknown.end(), keys[i]) != unknown.end()) continue;
+    unknown.push_back(keys[i]);
+    endings.push_back(ending);
+    contents.push_back(std::move(*bytes));
+  }
+  const auto answers = InChildren(unknown.size(), kReadTimeout_s, [&](size_t k) {
+    return Packed(ReadMeshBytes(contents[k], endings[k]));
+  });
+  for (size_t k = 0; k < unknown.size(); ++k) {
+    MeshText read;
+    if (answers[k]) read = Unpacked(*answers[k]);
+    if (!answers[k]) {
+      read.trouble = fmt::format("reading it crashed, or took longer than {:g} s", kReadTimeout_s);
+    }
+    MeshFile& known = Known()[unknown[k]];
+    known.trouble = read.trouble;
+    if (read.trouble.empty()) {
+      known.surface = std::make_shared<const TriangleMesh>(std::move(read.surface));
+    }
+  }
+  for (size_t i = 0; i < files.size(); ++i) {
+    if (!keys[i].empty()) result[i] = Known()[keys[i]];
+  }
+  return result;
+}
+
+TriangleMesh Scaled(const TriangleMesh& surface, const Vec3& scale) {
+  TriangleMesh scaled = surface;
+  for (Vec3& p : scaled.vertices) p = p.cwiseProduct(scale);
+  if (scale.prod() < 0.0) {
+    for (auto& t : scaled.triangles) std::swap(t[1], t[2]);
+  }
+  return scaled;
+}
+
+}  // namespace mbv

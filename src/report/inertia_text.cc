@@ -1,0 +1,105 @@
+#include "report/inertia_text.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/text.h"
+#include "report/text_table.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Known(double value, double factor, const char* format) {
+  return std::isfinite(value) ? fmt::format(fmt::runtime(format), factor * value) : "-";
+}
+
+std::string WordsOf(const BodyInertia& body) {
+  std::vector<std::string> words;
+  for (const InertiaFinding& finding : body.findings) {
+    const std::string word = WordOf(finding.mistake);
+    if (!Contains(words, word)) words.push_back(word);
+  }
+  if (words.empty()) return body.mass > 0.0 ? "sound" : "no mass stated";
+  return Joined(words);
+}
+
+Json NumberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json PointJson(const Vec3& p) { return {NumberJson(p.x()), NumberJson(p.y()), NumberJson(p.z())}; }
+
+// xx, yy, zz, xy, xz, yz
+Json TensorJson(const Mat3& I) {
+  Json json = Json::array();
+  for (const auto& [i, j] : {std::pair(0, 0), std::pair(1, 1), std::pair(2, 2), std::pair(0, 1),
+                             std::pair(0, 2), std::pair(1, 2)}) {
+    json.push_back(NumberJson(I(i, j)));
+  }
+  return json;
+}
+
+Json BodyJson(const BodyInertia& body) {
+  Json findings = Json::array();
+  for (const InertiaFinding& finding : body.findings) {
+    findings.push_back(
+        {{"mistake", WordOf(finding.mistake)}, {"text", finding.text}, {"hint", finding.hint}});
+  }
+  return {{"name", body.body},
+          {"meshes", body.meshes},
+          {"closed", std::isfinite(body.solid.amount)},
+          {"mass_kg", body.mass},
+          {"volume_m3", NumberJson(body.solid.amount)},
+          {"density_kg_m3", NumberJson(body.density)},
+          {"stated", {{"com_m", PointJson(body.p_stated)}, {"inertia", TensorJson(body.I_stated)}}},
+          {"mesh",
+           {{"com_m", PointJson(body.solid.p_cm)},
+            {"inertia", TensorJson(body.mass * body.solid.G_cm)}}},
+          {"com_off", NumberJson(body.centre_off)},
+          {"inertia_off", NumberJson(body.tensor_off)},
+          {"findings", std::move(findings)}};
+}
+
+}  // namespace
+
+std::string InertiaTable(const std::vector<BodyInertia>& bodies) {
+  size_t wide = 10;
+  for (const BodyInertia& body : bodies) wide = std::max(wide, body.body.size());
+  const TextTable table("", {{"body", -static_cast<int>(wide) - 2},
+                             {"mass kg", 10},
+                             {"volume cm³", 12},
+                             {"kg/m³", 10},
+                             {"centre off mm", 15},
+                             {"tensor off", 12},
+                             {"  finding", 0}});
+  std::string text = table.Head() + "\n", told;
+  size_t bad = 0;
+  for (const BodyInertia& body : bodies) {
+    text += table.Row({Printable(body.body), fmt::format("{:.4g}", body.mass),
+                       Known(body.solid.amount, 1e6, "{:.4g}"), Known(body.density, 1.0, "{:.4g}"),
+                       Known(body.centre_off * body.r_m, 1e3, "{:.3g}"),
+                       Known(body.tensor_off, 100.0, "{:.1f} %"), "  " + WordsOf(body)}) +
+            "\n";
+    bad += body.findings.empty() ? 0 : 1;
+    for (const InertiaFinding& finding : body.findings) {
+      told += fmt::format("{}: {}: {}\n  hint: {}\n", Printable(body.body), WordOf(finding.mistake),
+                          Printable(finding.text), finding.hint);
+    }
+  }
+  return fmt::format("{}{}{}{} of {} bodies with meshes are sound\n", text,
+                     told.empty() ? "" : "\n", told, bodies.size() - bad, bodies.size());
+}
+
+std::string InertiaJson(const std::vector<BodyInertia>& bodies, const std::string& file) {
+  Json json = {{"file", file},
+               {"limit", kInertiaLimit},
+               {"tensor_order", {"xx", "yy", "zz", "xy", "xz", "yz"}},
+               {"bodies", Json::array()}};
+  for (const BodyInertia& body : bodies) json["bodies"].push_back(BodyJson(body));
+  return json.dump(1) + "\n";
+}
+
+}  // namespace mbv
