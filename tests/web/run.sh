@@ -12,10 +12,11 @@ report)
     exec "$node" --test tests/web/report_page_test.cjs
   ;;
 gate)
-  # Errors far below round-off, a table, a motion at rest, one that fails, and forces given.
+  # Errors far below round-off, a table, a motion at rest, one that fails, forces given, and a
+  # stiffness, whose page has no script.
   rm -rf "$work/gate"
   for scenario in four_bar/static four_bar/table_matlab slider_crank/press stewart/wave \
-    spring_cart/swing spr_tripod/must_fail/simulated_com; do
+    spring_cart/swing spr_tripod/must_fail/simulated_com scara_robot/stiffness; do
     "$mbverify" run "scenarios/$scenario.yaml" --quiet --no-pictures --out "$work/gate" >/dev/null ||
       [ $? = 1 ]
   done
