@@ -33,4 +33,24 @@ std::string WithClosureSettings(const std::string& text, const std::string& solr
   return printer.CStr();
 }
 
+std::map<std::string, double> ServoDampings(const std::string& text) {
+  std::map<std::string, double> dampings;
+  tinyxml2::XMLDocument document;
+  if (document.Parse(text.c_str(), text.size()) != tinyxml2::XML_SUCCESS ||
+      document.RootElement() == nullptr) {
+    return dampings;
+  }
+  for (auto* section = document.RootElement()->FirstChildElement("actuator"); section != nullptr;
+       section = section->NextSiblingElement("actuator")) {
+    for (auto* e = section->FirstChildElement("position"); e != nullptr;
+         e = e->NextSiblingElement("position")) {
+      const char* name = e->Attribute("name");
+      if (name == nullptr) name = e->Attribute("joint");
+      const double kv = e->DoubleAttribute("kv");
+      if (name != nullptr && kv > 0.0) dampings[name] = kv;
+    }
+  }
+  return dampings;
+}
+
 }  // namespace mbv::mjcf

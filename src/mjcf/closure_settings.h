@@ -1,6 +1,7 @@
-// Settings of closures, changed in the text of an MJCF file.
+// Settings in the text of an MJCF file: of closures, to change them; of servos, to know them.
 #pragma once
 
+#include <map>
 #include <string>
 
 namespace mbv::mjcf {
@@ -12,5 +13,9 @@ namespace mbv::mjcf {
 /// text itself where it is no XML.
 [[nodiscard]] std::string WithClosureSettings(const std::string& text, const std::string& solref,
                                               const std::string& solimp);
+
+/// `kv` of the `position` actuators that state one, by their name, else by their joint: MuJoCo 2.2
+/// has no such attribute, later versions push with −kv times the velocity.
+[[nodiscard]] std::map<std::string, double> ServoDampings(const std::string& text);
 
 }  // namespace mbv::mjcf

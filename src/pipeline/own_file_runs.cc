@@ -16,7 +16,7 @@
 namespace mbv {
 namespace {
 
-constexpr double kTimeout_s = 60.0;  // of one run
+constexpr double kTimeout_s = 30.0;  // of one run
 
 double MetricOf(const PairComparison& pair, Metric metric) {
   const auto found = pair.metrics.find(metric);

@@ -173,12 +173,20 @@ class Search {
       const OwnError& error = audit_.trials[i].error;
       if (!error.sound() || !(error.force <= most_force) || !(error.gap_m <= most_gap)) continue;
       const int best = audit_.recommended;
-      const bool better =
-          best < 0 || candidates_[i].work < candidates_[static_cast<size_t>(best)].work ||
-          (candidates_[i].work == candidates_[static_cast<size_t>(best)].work && best != 0 &&
-           error.force < audit_.trials[static_cast<size_t>(best)].error.force);
+      const bool better = best < 0 || Work(i) < Work(static_cast<size_t>(best)) ||
+                          (Work(i) == Work(static_cast<size_t>(best)) && best != 0 &&
+                           Merit(i) < Merit(static_cast<size_t>(best)));
       if (better) audit_.recommended = static_cast<int>(i);
     }
+  }
+
+  [[nodiscard]] double Work(size_t trial) const { return candidates_[trial].work; }
+  // The force error; what changes less may err a little more.
+  [[nodiscard]] double Merit(size_t trial) const {
+    constexpr double kPerChange = 1.5;
+    const OwnTrial& t = audit_.trials[trial];
+    return t.error.force * (t.solref.empty() ? 1.0 : kPerChange) *
+           (t.solimp.empty() ? 1.0 : kPerChange);
   }
 
   [[nodiscard]] std::string Lines(const OwnTrial& trial) const {

@@ -125,6 +125,7 @@ void VisitAll(Visit& visit, Run& run) {
   visit(f.step_s), visit(f.integrator), visit(f.solver), visit(f.tolerance), visit(f.iterations);
   visit(f.rough_solver), visit(f.closures), visit(f.solref), visit(f.solimp), visit(f.leads);
   visit(f.motors), visit(f.left_out), visit(f.held), visit(f.couplings), visit(f.pushers);
+  visit(f.damped);
   visit(run.trace.time_s), visit(run.trace.channels), visit(run.trace.values);
   visit(run.gaps), visit(run.tracking), visit(run.notes), visit(run.step_s), visit(run.cost_ms);
 }

@@ -8,14 +8,18 @@ namespace mbv {
 
 double Removed(double as_is, double without) { return 1.0 - without / as_is; }
 
+// Mended by itself it takes most of the error with it, or left by itself it makes most of it: where
+// causes hide each other only one of the two shows.
 std::vector<const OwnCause*> OwnFileAudit::Culprits() const {
   constexpr double kMost = 0.5;
   std::vector<const OwnCause*> culprits;
+  if (!as_is.sound()) return culprits;
+  const double rest = mended.sound() ? mended.force : 0.0;
   for (const OwnCause& cause : causes) {
-    if (cause.without.sound() && as_is.sound() &&
-        Removed(as_is.force, cause.without.force) > kMost) {
-      culprits.push_back(&cause);
-    }
+    const bool removes = cause.without.sound() && Removed(as_is.force, cause.without.force) > kMost;
+    const bool makes = cause.alone.sound() && cause.alone.force * cause.alone.force - rest * rest >
+                                                  kMost * kMost * as_is.force * as_is.force;
+    if (removes || makes) culprits.push_back(&cause);
   }
   return culprits;
 }

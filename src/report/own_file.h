@@ -82,7 +82,7 @@ struct OwnFileAudit {
   [[nodiscard]] bool Good(const OwnError& error) const {
     return error.sound() && error.force <= kGoodForce && error.gap_m <= kGoodGap * length_m;
   }
-  /// The causes each of which takes most of the force error with it, in the order of `causes`.
+  /// The causes each of which makes most of the force error, in the order of `causes`.
   [[nodiscard]] std::vector<const OwnCause*> Culprits() const;
 };
 

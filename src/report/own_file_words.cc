@@ -57,8 +57,8 @@ std::vector<std::string> MeasuredLines(const OwnFileAudit& audit) {
   std::vector<std::string> lines;
   if (std::isfinite(e.force)) {
     lines.push_back(fmt::format(
-        "drive forces: {:.1e} of their size is error from {:g} s on, {:.1e} with the start, in "
-        "which soft loops take up the load",
+        "drive forces: error {:.1e} of their RMS from {:g} s on, {:.1e} with the start, in which "
+        "soft loops take up the load",
         e.force, audit.later_s, e.force_all));
     if (!e.drive.empty()) {
       lines.back() += fmt::format("; most {:.3g} {} ({}, at {:.3g} s)", e.force_most, e.force_unit,
@@ -67,7 +67,7 @@ std::vector<std::string> MeasuredLines(const OwnFileAudit& audit) {
   }
   if (std::isfinite(e.joint_force)) {
     lines.push_back(fmt::format(
-        "forces in the joints that close the loops: {:.1e} of their size is error", e.joint_force));
+        "forces in the joints that close the loops: error {:.1e} of their RMS", e.joint_force));
   }
   return lines;
 }
@@ -83,16 +83,15 @@ std::string CauseSentence(const OwnFileAudit& audit) {
   const std::vector<const OwnCause*> culprits = audit.Culprits();
   std::string text;
   if (culprits.empty()) {
-    text = "No single thing takes most of the force error with it.";
-  } else if (culprits.size() == 1) {
-    text = fmt::format("Most of the force error goes with one thing: {}. {}", culprits[0]->title,
-                       culprits[0]->meaning);
+    text = "No single thing makes most of the force error.";
   } else {
     std::string titles;
     for (const OwnCause* cause : culprits) titles += (titles.empty() ? "" : "; ") + cause->title;
-    text =
-        fmt::format("Each of these mended by itself takes most of the force error with it: {}. {}",
-                    titles, culprits[0]->meaning);
+    text = fmt::format("{}: {}. {}",
+                       culprits.size() == 1
+                           ? "Most of the force error is made by one thing"
+                           : "Most of the force error is made by things that act together",
+                       titles, culprits[0]->meaning);
   }
   if (mended.force > std::max(kUnexplained * own.force, OwnFileAudit::kGoodForce)) {
     text += fmt::format(
@@ -110,9 +109,8 @@ std::string CauseSentence(const OwnFileAudit& audit) {
 }
 
 std::vector<std::string> CauseHead() {
-  return {
-      "what makes it wrong", "force error without it", "removes", "loop gap without it", "removes",
-      "left by it alone"};
+  return {"what makes it wrong", "force error", "removed",
+          "loop gap [m]",        "removed",     "it alone leaves"};
 }
 
 std::vector<std::vector<std::string>> CauseCells(const OwnFileAudit& audit) {
@@ -121,9 +119,9 @@ std::vector<std::vector<std::string>> CauseCells(const OwnFileAudit& audit) {
   cells.push_back(
       {"as your file is", OrUnsound(own, own.force), "", OrUnsound(own, own.gap_m), "", ""});
   for (const OwnCause& cause : audit.causes) {
-    cells.push_back(CauseRowOf(audit, cause.title, cause.without, &cause.alone));
+    cells.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
   }
-  cells.push_back(CauseRowOf(audit, "all of these", audit.mended, nullptr));
+  cells.push_back(CauseRowOf(audit, "without all of these", audit.mended, nullptr));
   return cells;
 }
 

@@ -63,6 +63,7 @@ struct OwnFacts {
   std::vector<std::string> motors;              ///< per drive: its motor in the file, or ""
   std::vector<std::string> left_out;            ///< "armature", "damping", …
   std::vector<std::string> held;                ///< free bodies
+  std::vector<std::string> damped;              ///< servos with a `kv`, which MuJoCo 2.2 drops
   std::vector<std::string> couplings, pushers;  ///< equalities and actuators that are off
 };
 

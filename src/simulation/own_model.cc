@@ -6,6 +6,7 @@
 #include <array>
 
 #include "core/names.h"
+#include "mjcf/closure_settings.h"
 
 namespace mbv::simulation {
 namespace {
@@ -70,6 +71,7 @@ class OwnModelMaker {
     FindClosures();
     FindHome();
     TellSettings();
+    DampServos();
     FindLeads();
     SwitchOff();
     TellLeftOut();
@@ -203,6 +205,21 @@ class OwnModelMaker {
       facts.solref.push_back(fmt::format("{:g} {:g}", ref[0], ref[1]));
       facts.solimp.push_back(
           fmt::format("{:g} {:g} {:g} {:g} {:g}", imp[0], imp[1], imp[2], imp[3], imp[4]));
+    }
+  }
+
+  void DampServos() {
+    const auto dampings = mjcf::ServoDampings(task_.text);
+    for (int u = 0; u < m_->nu; ++u) {
+      const char* own = mj_id2name(m_, mjOBJ_ACTUATOR, u);
+      const int target = m_->actuator_trnid[2 * u];
+      const bool named = own != nullptr && own[0] != '\0';
+      if (!IsServo(*m_, u, true) || (!named && !ActsOn(*m_, u, target))) continue;
+      const std::string name = named ? own : NameAt(*m_, mjOBJ_JOINT, target, "joint");
+      const auto found = dampings.find(name);
+      if (found == dampings.end()) continue;
+      m_->actuator_biasprm[mjNBIAS * u + 2] = -found->second;
+      own_.facts.damped.push_back(name);
     }
   }
 

@@ -156,6 +156,19 @@ TEST_F(OwnFile, ServosThatLagAreNamedAndNoSettingIsBlamed) {
   EXPECT_TRUE(audit.Good(audit.bare));
 }
 
+// MuJoCo 2.2 drops `kv`; run as it is, the servo has it.
+TEST_F(OwnFile, ADampedServoKeepsItsDamping) {
+  const auto servo = [](const char* kv) {
+    return Text({.head = kStiff,
+                 .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", kv)});
+  };
+  const OwnFileAudit damped = Audit(servo("kv='40'")), plain = Audit(servo(""));
+  EXPECT_TRUE(Said(damped.done, "kv is taken over"));
+  EXPECT_FALSE(Said(plain.done, "kv is taken over"));
+  // A servo that brakes lags more.
+  EXPECT_GT(damped.as_is.force, 2.0 * plain.as_is.force);
+}
+
 TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
   const std::string holds = R"(<joint name="hold" joint1="A" polycoef="0 1 0 0 0"/>)";
   Barwork bars{.head = kStiff};

@@ -42,10 +42,13 @@ OwnFileAudit Example() {
 TEST(OwnFileWords, TheCauseThatTakesTheErrorWithItIsNamed) {
   OwnFileAudit audit = Example();
   ASSERT_EQ(audit.Culprits().size(), 1u);
-  EXPECT_NE(CauseSentence(audit).find("one thing: loops. Loops give."), std::string::npos);
+  EXPECT_NE(CauseSentence(audit).find("made by one thing: loops. Loops give."), std::string::npos);
   audit.causes[1].without.force = 0.03;
   EXPECT_NE(CauseSentence(audit).find("loops; steps"), std::string::npos);
+  // One that hides behind others shows when it is alone.
   audit.causes[0].without.force = audit.causes[1].without.force = 0.06;
+  EXPECT_NE(CauseSentence(audit).find("one thing: loops."), std::string::npos);
+  audit.causes[0].alone.force = 0.04;
   EXPECT_NE(CauseSentence(audit).find("No single thing"), std::string::npos);
 }
 
