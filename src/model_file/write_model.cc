@@ -269,7 +269,7 @@ class ModelWriter {
 
 }  // namespace
 
-std::string CouplingText(const Coupling& coupling, const CoordinateNames& name_of) {
+std::string CouplingText(const Coupling& coupling, const TermNames& name_of) {
   const std::vector<Coupling::Term>& terms = coupling.terms;
   const auto coordinate = [&](const char* key, const Coupling::Term& term) {
     const auto [joint, k] = name_of(term);

@@ -32,10 +32,10 @@ struct WrittenNames {
 [[nodiscard]] WrittenNames NamesInModel(const Mechanism& mechanism);
 
 /// Name and coordinate by which a file calls the joint of a term.
-using CoordinateNames = std::function<std::pair<std::string, int>(const Coupling::Term&)>;
+using TermNames = std::function<std::pair<std::string, int>(const Coupling::Term&)>;
 /// The lines of a coupling as a model file's map, without braces: "joint: …, follows: …, ratio: …",
 /// or a sum of linear terms.
-[[nodiscard]] std::string CouplingText(const Coupling& coupling, const CoordinateNames& name_of);
+[[nodiscard]] std::string CouplingText(const Coupling& coupling, const TermNames& name_of);
 
 /// In double quotes, for YAML.
 [[nodiscard]] std::string QuotedYaml(const std::string& text);
