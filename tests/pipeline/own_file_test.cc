@@ -156,6 +156,18 @@ TEST_F(OwnFile, ServosThatLagAreNamedAndNoSettingIsBlamed) {
   EXPECT_TRUE(audit.Good(audit.bare));
 }
 
+TEST_F(OwnFile, WhatCutsAServosCommandOrForceIsTold) {
+  const auto servo = [](const char* range) {
+    return Text({.head = kStiff,
+                 .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", range)});
+  };
+  EXPECT_TRUE(Said(Audit(servo("ctrllimited='true' ctrlrange='-0.05 0.05'")).notes,
+                   "ctrlrange cuts its command, first at 0."));
+  EXPECT_TRUE(Said(Audit(servo("forcelimited='true' forcerange='-0.5 0.5'")).notes,
+                   "as its forcerange allows, first at 0"));
+  EXPECT_TRUE(Audit(servo("")).notes.empty());
+}
+
 // MuJoCo 2.2 drops `kv`; run as it is, the servo has it.
 TEST_F(OwnFile, ADampedServoKeepsItsDamping) {
   const auto servo = [](const char* kv) {
