@@ -26,7 +26,8 @@ struct Surface {
   std::string open;  // files that bound no volume, and where
 };
 
-constexpr double kGap = 1e-5;  // of a mesh's size: numbers in files have about seven digits
+constexpr double kLeastVolume = 1e-9;  // of a mesh's size cubed: no sheet metal is so thin
+constexpr double kGap = 1e-5;          // of a mesh's size: numbers in files have about seven digits
 
 Surface SurfaceOf(const Body& body, std::vector<std::string>* files) {
   Surface surface;
@@ -38,9 +39,13 @@ Surface SurfaceOf(const Body& body, std::vector<std::string>* files) {
     for (Vec3& p : placed.vertices) p = mesh->X_BG * p;
     if (OpenEdges(placed) > 0) placed = Welded(placed, kGap * DiagonalOf(placed));
     const size_t open = OpenEdges(placed);
-    if (open > 0 || placed.triangles.empty()) {
-      surface.open +=
-          fmt::format("{}{} ({} open edges)", surface.open.empty() ? "" : ", ", mesh->file, open);
+    // A sheet with two sides is closed, too.
+    const double diagonal = DiagonalOf(placed);
+    const bool flat =
+        open == 0 && !(SolidShape(placed).amount > kLeastVolume * std::pow(diagonal, 3));
+    if (open > 0 || flat) {
+      surface.open += (surface.open.empty() ? "" : ", ") + mesh->file +
+                      (flat ? " (no volume)" : fmt::format(" ({} open edges)", open));
     }
     for (const TriangleMesh& part : PartsOf(placed)) surface.parts.push_back(SolidShape(part));
     surface.R_BG.emplace_back(mesh->X_BG.linear());

@@ -279,6 +279,13 @@ TEST(InertiaDiagnosis, NamesAMeshThatIsNotClosed) {
   std::get<Mesh>(part.shapes[0].geometry).surface = std::make_shared<const TriangleMesh>(open);
   EXPECT_THAT(MistakesOf(part), ElementsAre(InertiaMistake::kOpenMesh));
   EXPECT_THAT(TextOf(part), testing::HasSubstr("part.stl (3 open edges)"));
+  // A sheet with two sides has no edges that are open, but no volume.
+  const TriangleMesh sheet{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)}, {{0, 1, 2}, {0, 2, 1}}};
+  for (const TriangleMesh& surface : {sheet, TriangleMesh{}}) {
+    std::get<Mesh>(part.shapes[0].geometry).surface = std::make_shared<const TriangleMesh>(surface);
+    EXPECT_THAT(MistakesOf(part), ElementsAre(InertiaMistake::kOpenMesh));
+    EXPECT_THAT(TextOf(part), testing::HasSubstr("part.stl (no volume)"));
+  }
 }
 
 TEST(InertiaDiagnosis, WhatNoMistakeExplainsIsSaidSo) {

@@ -1,5 +1,5 @@
 #!/bin/sh
-# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|night|gate|axe
+# Makes pages and looks at them in a browser: run.sh MBVERIFY SOURCE WORK NODE CHROMIUM report|mesh|night|gate|axe
 set -eu
 mbverify=$1 source=$2 work=$3 node=$4 chromium=$5 what=$6
 cd "$source"
@@ -10,6 +10,36 @@ report)
     --set 'snapshots.times_s=[1.42]' --set 'snapshots.size_px=[640, 480]'
   MBV_PAGE=$work/page/stabilizing_platform/sea_state/report.html \
     exec "$node" --test tests/web/report_page_test.cjs
+  ;;
+mesh)
+  # A robot whose arm is a box of 100 × 200 × 300 mm, from a file.
+  rm -rf "$work/mesh" && mkdir -p "$work/mesh"
+  cat >"$work/mesh/box.obj" <<'EOF'
+v 0 0 0
+v 100 0 0
+v 100 200 0
+v 0 200 0
+v 0 0 300
+v 100 0 300
+v 100 200 300
+v 0 200 300
+f 4 3 2 1
+f 5 6 7 8
+f 1 2 6 5
+f 2 3 7 6
+f 3 4 8 7
+f 4 1 5 8
+EOF
+  cat >"$work/mesh/robot.urdf" <<'EOF'
+<robot name="box_arm"><link name="world"/><link name="arm"><inertial><origin xyz="0.05 0.1 0.25"/>
+<mass value="6"/><inertia ixx="0.065" iyy="0.05" izz="0.025" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><origin xyz="0 0 0.1"/><geometry><mesh filename="box.obj" scale="0.001 0.001 0.001"/></geometry>
+<material name="red"><color rgba="0.9 0 0 1"/></material></visual></link>
+<joint name="hinge" type="continuous"><parent link="world"/><child link="arm"/><axis xyz="0 0 1"/></joint></robot>
+EOF
+  "$mbverify" run "$work/mesh/robot.urdf" --quiet --no-pictures --out "$work/mesh/out" >/dev/null
+  MBV_PAGE=$work/mesh/out/box_arm/setup/first/report.html \
+    exec "$node" --test tests/web/mesh_page_test.cjs
   ;;
 gate)
   # Errors far below round-off, a table, a motion at rest, one that fails, forces given, and a
