@@ -142,6 +142,7 @@ std::vector<TriangleMesh> PartsOf(const TriangleMesh& mesh) {
   std::map<int, std::vector<std::array<int, 3>>> triangles;
   for (const auto& t : mesh.triangles) triangles[find(t[0])].push_back(t);
   std::vector<TriangleMesh> parts;
+  parts.reserve(triangles.size());
   for (const auto& [vertex, of_part] : triangles) {
     parts.push_back(WithUsedVertices(mesh.vertices, of_part));
   }

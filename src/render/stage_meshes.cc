@@ -15,6 +15,7 @@ constexpr double kEdge_rad = 0.6;                // sharper edges stay edges
 std::vector<TriangleMesh> StageMeshes(
     const std::vector<std::shared_ptr<const TriangleMesh>>& surfaces) {
   std::vector<const TriangleMesh*> all;
+  all.reserve(surfaces.size());
   for (const auto& mesh : surfaces) all.push_back(mesh.get());
   const std::vector<std::size_t> shares = SharesOf(all, kMostTriangles);
   std::vector<TriangleMesh> meshes;
