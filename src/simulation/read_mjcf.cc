@@ -220,6 +220,11 @@ class MjcfImporter {
     while (!polynomial.empty() && polynomial.back() == 0.0) polynomial.pop_back();
     if (m_.eq_obj2id[e] >= 0 && !polynomial.empty()) add(m_.eq_obj2id[e], polynomial);
     coupling.constant = a[0];
+    if (known && coupling.terms.size() == 1) {
+      Say(fmt::format("equality '{}' holds joint '{}' alone and is left out: it is driven, or free",
+                      name, mechanism_.joints[static_cast<size_t>(coupling.terms[0].joint)].name));
+      return;
+    }
     if (known) {
       mechanism_.couplings.push_back(coupling);
       return;

@@ -67,6 +67,22 @@ class Placer {
   const Similarity& similarity_;
 };
 
+// A coupling keeps its meaning: Σ P_k(q_k) in the unit of its first coordinate.
+void Scale(const Mechanism& mechanism, double s, Coupling* coupling) {
+  const auto is_length = [&](const Coupling::Term& term) {
+    return IsLength(mechanism.joints[static_cast<size_t>(term.joint)].kind, term.coordinate);
+  };
+  const double unit = is_length(coupling->terms.front()) ? s : 1.0;
+  for (Coupling::Term& term : coupling->terms) {
+    double power = 1.0;
+    for (double& coefficient : term.polynomial) {
+      if (is_length(term)) power *= s;
+      coefficient *= unit / power;
+    }
+  }
+  coupling->constant *= unit;
+}
+
 }  // namespace
 
 Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
@@ -102,6 +118,7 @@ Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
     placer.Put(output.body, &output.X_BO);
     placer.Put(output.reference_body, &output.X_RbR);
   }
+  for (Coupling& coupling : m.couplings) Scale(mechanism, s, &coupling);
   for (SpringDamper& spring : m.springs) {
     placer.Put(spring.body_from, &spring.p_from);
     placer.Put(spring.body_to, &spring.p_to);

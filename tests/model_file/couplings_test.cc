@@ -22,7 +22,7 @@ std::string Model(const std::string& couplings) {
          couplings;
 }
 
-std::string Findings(const std::string& couplings) {
+std::string CouplingFindings(const std::string& couplings) {
   return LoadModelText(Model(couplings), "m.yaml").diagnostics.Text();
 }
 
@@ -49,33 +49,34 @@ TEST(Couplings, OneFollowsAnother) {
 }
 
 TEST(Couplings, WhatMeansNothingIsAFinding) {
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: tern, ratio: 2}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: tern, ratio: 2}\n"),
             "m.yaml:9:29: error: couplings.g.follows = 'tern': there is no such joint\n"
             "  hint: did you mean 'turn'?\n");
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: slide}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: slide}\n"),
             "m.yaml:9:6: error: couplings.g needs either ratio or polynomial\n"
             "  hint: ratio: rate of the joint by the rate of what it follows; polynomial: the "
             "coefficients of q, q², q³, q⁴\n");
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: slide, ratio: 0}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: slide, ratio: 0}\n"),
             "m.yaml:9:43: error: couplings.g.ratio = 0 couples nothing\n"
             "  hint: to hold a joint, make it fixed or prescribed\n");
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: slide, ratio: 1, offset_mm: 2}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: slide, ratio: 1, offset_mm: 2}\n"),
             "m.yaml:9:57: error: couplings.g.offset_mm: the coordinate of 'turn' is an angle\n");
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: turn, ratio: 1}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: turn, ratio: 1}\n"),
             "m.yaml:9:29: error: couplings.g: coordinate 0 of joint 'turn' stands in it twice\n");
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: slide, polynomial: [1, 2, 3, 4, 5]}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: slide, polynomial: [1, 2, 3, 4, 5]}\n"),
             "m.yaml:9:48: error: couplings.g.polynomial has 5 coefficients, at most 4 are "
             "allowed\n");
-  EXPECT_EQ(Findings("  g: {sum: [{joint: turn, factor: 1}]}\n"),
+  EXPECT_EQ(CouplingFindings("  g: {sum: [{joint: turn, factor: 1}]}\n"),
             "m.yaml:9:12: error: couplings.g.sum has 1 term, at least 2 are needed\n");
-  EXPECT_EQ(Findings("  g: {joint: turn, follows: slide, follows_coordinate: 2, ratio: 1}\n"),
-            "m.yaml:9:56: error: couplings.g: coordinate 2 of joint 'slide', which has 2 "
-            "coordinates\n  hint: coordinates are counted from 0\n");
+  EXPECT_EQ(
+      CouplingFindings("  g: {joint: turn, follows: slide, follows_coordinate: 2, ratio: 1}\n"),
+      "m.yaml:9:56: error: couplings.g: coordinate 2 of joint 'slide', which has 2 "
+      "coordinates\n  hint: coordinates are counted from 0\n");
 }
 
 // Two gears between the same wheels with different offsets.
 TEST(Couplings, ThatContradictEachOtherAreToldWithTheirAmount) {
-  const std::string text = Findings(
+  const std::string text = CouplingFindings(
       "  g: {joint: turn, follows: slide, ratio: 2}\n"
       "  h: {joint: turn, follows: slide, ratio: 2, offset_deg: 10}\n");
   EXPECT_NE(text.find("m.yaml:9:3: error: coupling 'g' of turn, slide does not hold at home: it is "

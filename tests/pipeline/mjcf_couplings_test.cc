@@ -21,15 +21,15 @@ std::string Arms(const std::string& equality, const std::string& tendon = "") {
          "</actuator></mujoco>";
 }
 
-LoadResult Load(const test::TestFolder& folder, const std::string& text) {
+LoadResult LoadArms(const test::TestFolder& folder, const std::string& text) {
   return LoadRobot(folder.Write("arms.xml", text));
 }
 
 TEST(MjcfCouplings, AJointEqualityIsAPolynomialFromTheReferencePose) {
   const test::TestFolder folder("mjcf_coupling");
-  const LoadResult loaded =
-      Load(folder,
-           Arms("<joint name='e' joint1='b_hinge' joint2='a_hinge' polycoef='0.1 -2 0.3 0 0'/>"));
+  const LoadResult loaded = LoadArms(
+      folder,
+      Arms("<joint name='e' joint1='b_hinge' joint2='a_hinge' polycoef='0.1 -2 0.3 0 0'/>"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
   ASSERT_EQ(m.couplings.size(), 1u);
@@ -47,7 +47,7 @@ TEST(MjcfCouplings, TendonsThatAddJointsAreASum) {
   const std::string tendons =
       "<tendon><fixed name='t'><joint joint='a_hinge' coef='1'/><joint joint='b_hinge' coef='3'/>"
       "</fixed><fixed name='u'><joint joint='c_hinge' coef='2'/></fixed></tendon>";
-  const LoadResult loaded = Load(
+  const LoadResult loaded = LoadArms(
       folder, Arms("<tendon name='e' tendon1='t' tendon2='u' polycoef='0 0.5 0 0 0'/>", tendons));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const std::vector<Coupling>& couplings = loaded.mechanism->couplings;
@@ -58,12 +58,25 @@ TEST(MjcfCouplings, TendonsThatAddJointsAreASum) {
   EXPECT_EQ(couplings[0].terms[2].polynomial, std::vector<double>{1});
   EXPECT_EQ(loaded.diagnostics.Text().find("tendons are left out"), std::string::npos);
   // A polynomial of a sum is not known.
-  const LoadResult curved = Load(
+  const LoadResult curved = LoadArms(
       folder, Arms("<tendon name='e' tendon1='t' tendon2='u' polycoef='0 0.5 1 0 0'/>", tendons));
   EXPECT_TRUE(!curved.mechanism || curved.mechanism->couplings.empty());
   EXPECT_NE(curved.diagnostics.Text().find("equality 'e' is left out: what it couples is free"),
             std::string::npos)
       << curved.diagnostics.Text();
+}
+
+// What holds one joint alone couples nothing: the drive there takes its place.
+TEST(MjcfCouplings, AnEqualityOfOneJointIsLeftOut) {
+  const test::TestFolder folder("mjcf_held_joint");
+  const LoadResult loaded =
+      LoadArms(folder, Arms("<joint name='e' joint1='b_hinge' polycoef='0.1 0 0 0 0'/>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_TRUE(loaded.mechanism->couplings.empty());
+  EXPECT_NE(
+      loaded.diagnostics.Text().find("equality 'e' holds joint 'b_hinge' alone and is left out"),
+      std::string::npos)
+      << loaded.diagnostics.Text();
 }
 
 TEST(MjcfCouplings, AgreeInBothModes) {
