@@ -17,10 +17,7 @@ VecX ClosureResidual(const Mechanism& mechanism, const TreeMotion& tree, const B
     all.push_back(RowsOf(joint, states, false));
     count += all.back().rows;
   }
-  std::vector<CouplingRow> coupled;
-  for (const Coupling& coupling : mechanism.couplings) {
-    coupled.push_back(RowOf(mechanism, coupling, states));
-  }
+  const std::vector<CouplingRow> coupled = CouplingRows(mechanism, states);
   VecX r(count + static_cast<Eigen::Index>(coupled.size()));
   MatX J_bodies;
   if (J != nullptr) {

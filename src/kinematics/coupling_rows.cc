@@ -31,49 +31,18 @@ double RateOf(const ScalarRow& row, const BodyStates& states) {
   return row.J_parent.dot(states.V_WB[row.parent]) + row.J_child.dot(states.V_WB[row.child]);
 }
 
-// Index in BodyStates::coupled of a coupling's first term.
-size_t FirstTerm(const Mechanism& mechanism, const Coupling& coupling) {
-  size_t first = 0;
-  for (const Coupling& other : mechanism.couplings) {
-    if (&other == &coupling) break;
-    first += other.terms.size();
-  }
-  return first;
-}
-
-double NearValue(const Mechanism& mechanism, const Coupling::Term& term, const BodyStates& states,
-                 size_t index) {
-  if (index < states.coupled.size()) return states.coupled[index];
-  return mechanism.joints[term.joint].home[term.coordinate];
-}
-
-template <typename Value>
-std::vector<double> PerTerm(const Mechanism& mechanism, const Value& value) {
-  std::vector<double> values;
-  for (const Coupling& coupling : mechanism.couplings) {
-    for (const Coupling::Term& term : coupling.terms) values.push_back(value(term, values.size()));
-  }
-  return values;
-}
-
-}  // namespace
-
-double CouplingRow::LargestPiece() const {
-  double largest = 0.0;
-  for (const ScalarRow& piece : pieces) largest = std::max(largest, std::abs(piece.value));
-  return largest;
-}
-
-CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const BodyStates& states) {
+// `near`: per term a value within half a turn.
+CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const BodyStates& states,
+                  const double* near) {
   CouplingRow out;
-  size_t index = FirstTerm(mechanism, coupling);
   out.value = coupling.constant;
   for (const Coupling::Term& term : coupling.terms) {
     const Joint& joint = mechanism.joints[term.joint];
     ScalarRow row = JointCoordinateRow(joint, term.coordinate, states,
-                                       NearValue(mechanism, term, states, index++));
+                                       near == nullptr ? joint.home[term.coordinate] : *near++);
     const double rate = RateOf(row, states);
     const PolynomialJet P = PolynomialAt(term.polynomial, row.value);
+    out.coordinates.push_back(row.value);
     row.value = P.value;
     row.bias = P.slope * row.bias + P.curvature * rate * rate;
     row.J_parent *= P.slope;
@@ -86,19 +55,41 @@ CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const Bo
   return out;
 }
 
-void FollowCouplings(const Mechanism& mechanism, BodyStates* states) {
-  if (mechanism.couplings.empty()) return;
-  states->coupled = PerTerm(mechanism, [&](const Coupling::Term& term, size_t index) {
-    return JointCoordinateRow(mechanism.joints[term.joint], term.coordinate, *states,
-                              NearValue(mechanism, term, *states, index))
-        .value;
-  });
+}  // namespace
+
+double CouplingRow::LargestPiece() const {
+  double largest = 0.0;
+  for (const ScalarRow& piece : pieces) largest = std::max(largest, std::abs(piece.value));
+  return largest;
+}
+
+std::vector<CouplingRow> CouplingRows(const Mechanism& mechanism, const BodyStates& states) {
+  std::vector<CouplingRow> rows;
+  const double* near = states.coupled.empty() ? nullptr : states.coupled.data();
+  for (const Coupling& coupling : mechanism.couplings) {
+    rows.push_back(RowOf(mechanism, coupling, states, near));
+    if (near != nullptr) near += coupling.terms.size();
+  }
+  return rows;
+}
+
+std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states) {
+  std::vector<CouplingRow> rows = CouplingRows(mechanism, *states);
+  states->coupled.clear();
+  for (const CouplingRow& row : rows) {
+    states->coupled.insert(states->coupled.end(), row.coordinates.begin(), row.coordinates.end());
+  }
+  return rows;
 }
 
 std::vector<double> CoupledGuesses(const Mechanism& mechanism) {
-  return PerTerm(mechanism, [&](const Coupling::Term& term, size_t) {
-    return mechanism.joints[term.joint].guess[term.coordinate];
-  });
+  std::vector<double> guesses;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      guesses.push_back(mechanism.joints[term.joint].guess[term.coordinate]);
+    }
+  }
+  return guesses;
 }
 
 std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling) {

@@ -12,20 +12,22 @@ namespace mbv {
 
 /// A coupling's row: the sum of its pieces.
 struct CouplingRow {
-  std::vector<ScalarRow> pieces;  ///< per term; the constant is in the first
-  bool angular = true;            ///< all coordinates are angles
-  double value = 0.0;             ///< of the sum: in the unit of the coordinates
+  std::vector<ScalarRow> pieces;    ///< per term; the constant is in the first
+  std::vector<double> coordinates;  ///< per term: q_k, which counts turns
+  bool angular = true;              ///< all coordinates are angles
+  double value = 0.0;               ///< of the sum: in the unit of the coordinates
 
   [[nodiscard]] double LargestPiece() const;  ///< |P_k(q_k)|, which the sum's rounding follows
 };
 
-/// At poses, with velocities for the bias, in the turns that `states.coupled` tells.
-[[nodiscard]] CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling,
-                                const BodyStates& states);
+/// The rows of all couplings at poses, with velocities for the bias, in the turns that
+/// `states.coupled` tells.
+[[nodiscard]] std::vector<CouplingRow> CouplingRows(const Mechanism& mechanism,
+                                                    const BodyStates& states);
 
-/// Brings `states->coupled` to the poses, which lie within half a turn of those it was last brought
-/// to (or of home). Does nothing without couplings.
-void FollowCouplings(const Mechanism& mechanism, BodyStates* states);
+/// The same, and brings `states->coupled` to the poses, which lie within half a turn of those it
+/// was last brought to (or of home).
+std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states);
 
 /// How many turns the coupled coordinates count at the joints' guesses, for poses near them.
 [[nodiscard]] std::vector<double> CoupledGuesses(const Mechanism& mechanism);

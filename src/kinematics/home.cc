@@ -53,8 +53,7 @@ double LargestGap(const Mechanism& mechanism, const BodyStates& states, double l
     const LoopGap gap = GapOf(mechanism, static_cast<int>(j), states);
     largest = std::max({largest, gap.position_m / length, gap.rotation_rad});
   }
-  for (const Coupling& coupling : mechanism.couplings) {
-    const CouplingRow row = RowOf(mechanism, coupling, states);
+  for (const CouplingRow& row : CouplingRows(mechanism, states)) {
     largest = std::max(largest, std::abs(row.value) / (row.angular ? 1.0 : length));
   }
   return largest;
@@ -293,8 +292,9 @@ HomeResult SolveHome(Mechanism* mechanism, const AssemblyChoice& choice) {
       result.gaps.push_back(GapOf(*mechanism, static_cast<int>(j), best.states));
     }
   }
-  for (size_t c = 0; c < mechanism->couplings.size(); ++c) {
-    const CouplingRow row = RowOf(*mechanism, mechanism->couplings[c], best.states);
+  const std::vector<CouplingRow> coupled = CouplingRows(*mechanism, best.states);
+  for (size_t c = 0; c < coupled.size(); ++c) {
+    const CouplingRow& row = coupled[c];
     if (std::abs(row.value) <= kHomeTolerance * (row.angular ? 1.0 : length)) continue;
     result.couplings.push_back(
         {.coupling = static_cast<int>(c), .amount = row.value, .angular = row.angular});

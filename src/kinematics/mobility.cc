@@ -39,9 +39,7 @@ struct ReactionStack {
       stack.Add(rows.back());
     }
     first_row.push_back(stack.size());
-    for (const Coupling& coupling : mechanism.couplings) {
-      stack.Add(RowOf(mechanism, coupling, states));
-    }
+    for (const CouplingRow& row : CouplingRows(mechanism, states)) stack.Add(row);
     first_drive = stack.size();
   }
 };

@@ -38,7 +38,7 @@ void RowStack::Add(const CouplingRow& row) {
 
 void RowStack::AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions) {
   for (const Joint& joint : mechanism.joints) Add(RowsOf(joint, states, reactions));
-  for (const Coupling& coupling : mechanism.couplings) Add(RowOf(mechanism, coupling, states));
+  for (const CouplingRow& row : CouplingRows(mechanism, states)) Add(row);
 }
 
 void RowStack::AddDriven(const Mechanism& mechanism, const BodyStates& states) {

@@ -53,25 +53,14 @@ void BreadthFirst(const Mechanism& mechanism, const std::vector<bool>& usable, V
   }
 }
 
-std::vector<bool> IsDriven(const Mechanism& mechanism) {
-  std::vector<bool> driven(mechanism.joints.size(), false);
-  for (const Drive& drive : mechanism.drives) {
-    if (const auto* d = std::get_if<JointDrive>(&drive.kind)) driven[d->joint] = true;
-  }
-  for (const Prescribed& p : mechanism.prescribed) driven[p.joint] = true;
-  for (const Coupling& coupling : mechanism.couplings) {
-    for (const Coupling::Term& term : coupling.terms) driven[term.joint] = true;
-  }
-  return driven;
-}
-
 // The lower, the sooner a joint enters the tree. Driven and coupled joints keep their
 // coordinate; a massless
 // body should not become a leaf; a cut sphere or force-only joint costs three rows, a cut hinge
 // five; a free joint imposes nothing and is the last resort.
-int KeepClass(const Mechanism& mechanism, const Joint& joint, bool driven, Choice choice) {
+int KeepClass(const Mechanism& mechanism, int j, Choice choice) {
+  const Joint& joint = mechanism.joints[j];
   if (choice == Choice::kKeep) return 0;
-  if (driven) return 1;
+  if (HasUsedCoordinate(mechanism, j)) return 1;
   if (joint.kind == JointKind::kFree) return 10;
   const auto massless = [&](int body) { return body != 0 && mechanism.bodies[body].mass == 0.0; };
   if (massless(joint.parent) || massless(joint.child)) return 2;
@@ -93,10 +82,9 @@ std::vector<int> KeepOrder(const Mechanism& mechanism, const ClosureHints& hints
   depth[0] = 0;
   BreadthFirst(mechanism, usable,
                [&](int, int inboard, int outboard) { depth[outboard] = depth[inboard] + 1; });
-  const std::vector<bool> driven = IsDriven(mechanism);
   const auto key = [&](int j) {
     const Joint& joint = mechanism.joints[j];
-    return std::tuple(KeepClass(mechanism, joint, driven[j], ChoiceOf(hints, j)),
+    return std::tuple(KeepClass(mechanism, j, ChoiceOf(hints, j)),
                       std::min(depth[joint.parent], depth[joint.child]), j);
   };
   std::vector<int> order(mechanism.joints.size());
@@ -107,6 +95,19 @@ std::vector<int> KeepOrder(const Mechanism& mechanism, const ClosureHints& hints
 }
 
 }  // namespace
+
+bool HasUsedCoordinate(const Mechanism& mechanism, int joint) {
+  const auto uses = [joint](const auto& item) { return item.joint == joint; };
+  return std::ranges::any_of(mechanism.prescribed, uses) ||
+         std::ranges::any_of(mechanism.drives,
+                             [&](const Drive& drive) {
+                               const auto* on = std::get_if<JointDrive>(&drive.kind);
+                               return on != nullptr && uses(*on);
+                             }) ||
+         std::ranges::any_of(mechanism.couplings, [&](const Coupling& coupling) {
+           return std::ranges::any_of(coupling.terms, uses);
+         });
+}
 
 SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& hints) {
   SpanningTreeResult result;

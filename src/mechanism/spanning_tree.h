@@ -32,6 +32,9 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
 /// The same with the hints that Joint::closure itself can carry: true = cut here, false = free.
 SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism);
 
+/// True when a drive, a prescribed joint or a coupling uses a coordinate of this joint.
+[[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);
+
 /// Body on the world's side of the t-th tree joint, and the one that this joint carries.
 [[nodiscard]] inline int InboardBody(const Mechanism& mechanism, size_t t) {
   const Joint& joint = mechanism.joints[mechanism.tree_joints[t]];

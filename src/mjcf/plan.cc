@@ -6,6 +6,7 @@
 #include "core/demand.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
+#include "mechanism/spanning_tree.h"
 
 namespace mbv::mjcf {
 namespace {
@@ -97,7 +98,7 @@ class Planner {
     const Pose X_WF = mechanism_.X_WB_home[joint.parent] * joint.X_PF;
     const Pose X_WM = mechanism_.X_WB_home[joint.child] * joint.X_CM;
     const bool ball = joint.kind == JointKind::kSpherical ||
-                      (joint.transmits_force_only && !IsDriven(mechanism_, j));
+                      (joint.transmits_force_only && !HasUsedCoordinate(mechanism_, j));
     std::vector<Motion1> motions = ball ? std::vector<Motion1>{{Type::kBall, Vec3::UnitZ(), -1}}
                                         : MotionsOf(joint, X_WF.linear(), X_WM.linear());
     if (joint.kind == JointKind::kFree && inboard == 0) {
@@ -163,7 +164,7 @@ class Planner {
 
   void AddClosure(int j) {
     const Joint& joint = mechanism_.joints[j];
-    const bool driven = IsDriven(mechanism_, j);
+    const bool driven = HasUsedCoordinate(mechanism_, j);
     PlannedClosure closure{.name = ClosureName(joint),
                            .joint = j,
                            .body1 = plan_.body_of[joint.child],
@@ -242,18 +243,6 @@ class Planner {
 Plan MakePlan(const Mechanism& mechanism) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.X_WB_home.size());
   return Planner(mechanism).Make();
-}
-
-bool IsDriven(const Mechanism& mechanism, int joint) {
-  for (const Drive& drive : mechanism.drives) {
-    const auto* joint_drive = std::get_if<JointDrive>(&drive.kind);
-    if (joint_drive != nullptr && joint_drive->joint == joint) return true;
-  }
-  const auto uses = [joint](const auto& item) { return item.joint == joint; };
-  return std::ranges::any_of(mechanism.prescribed, uses) ||
-         std::ranges::any_of(mechanism.couplings, [&](const Coupling& coupling) {
-           return std::ranges::any_of(coupling.terms, uses);
-         });
 }
 
 std::string JointName(const Joint& joint, int coordinate) {

@@ -70,9 +70,6 @@ inline constexpr double kTinyMassFraction = 1e-11;
 
 [[nodiscard]] Plan MakePlan(const Mechanism& mechanism);
 
-/// True when a drive, a prescribed joint or a coupling uses a coordinate of this joint.
-[[nodiscard]] bool IsDriven(const Mechanism& mechanism, int joint);
-
 /// How MuJoCo holds a coupling.
 struct PlannedCoupling {
   enum class Type {

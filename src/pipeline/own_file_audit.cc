@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/text.h"
+#include "mjcf/mjcf.h"
 #include "pipeline/own_file_runs.h"
 #include "pipeline/own_file_search.h"
 
@@ -39,7 +40,7 @@ const std::vector<CauseRow>& Rows() {
       {"softness", "soft loops (solref, solimp)", kSoftMeaning, &Always,
        [](const OwnFacts& facts, OwnSettings* s) {
          s->time_constant_s = 2.0 * facts.step_s;
-         s->impedance = 0.9999;
+         s->impedance = kMjcfImpedance;
        }},
       {"integration", "step and integrator",
        "How time is cut into steps: here against the Runge-Kutta method at a quarter of the step.",

@@ -10,6 +10,7 @@
 #include <cmath>
 
 #include "mjcf/closure_settings.h"
+#include "mjcf/mjcf.h"
 
 namespace mbv {
 namespace {
@@ -18,7 +19,7 @@ using Clock = std::chrono::steady_clock;
 
 constexpr std::array<double, 3> kStepFactors = {1.0, 0.5, 0.2};
 constexpr std::array<double, 3> kTimeConstantSteps = {0.0, 5.0, 2.0};  // 0: the file's own
-constexpr std::array<double, 3> kImpedances = {0.0, 0.99, 0.9999};     // 0.9999 is MuJoCo's limit
+constexpr std::array<double, 3> kImpedances = {0.0, 0.99, kMjcfImpedance};
 constexpr double kImpratio = 10.0;
 constexpr double kMostStretched = 10.0;  // wall time on a busy machine, over processor time
 

@@ -203,7 +203,7 @@ class Collector {
       Joint& joint = wrong.joints[j];
       joint.range = {};
       joint.guess = joint.home;
-      if (joint.closure || IsDriven(static_cast<int>(j))) continue;
+      if (joint.closure || HasUsedCoordinate(m_, static_cast<int>(j))) continue;
       for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
         joint.guess[static_cast<size_t>(c)] +=
             IsLength(joint.kind, c) ? size * share(*random) : angle(*random);
@@ -217,7 +217,7 @@ class Collector {
     const size_t before = faults_.size();
     std::map<std::string, size_t> seen;
     for (size_t j = 0; j < m_.joints.size(); ++j) {
-      if (!m_.joints[j].closure || IsDriven(static_cast<int>(j)) || CarriesOutput(j) ||
+      if (!m_.joints[j].closure || HasUsedCoordinate(m_, static_cast<int>(j)) || CarriesOutput(j) ||
           !IsFirst(&seen, m_.joints[j].name)) {
         continue;
       }
@@ -260,19 +260,6 @@ class Collector {
       if (difference > kOtherPose) return a.bodies[k].name;
     }
     return "";
-  }
-
-  // By a drive, a prescribed motion or a coupling.
-  [[nodiscard]] bool IsDriven(int joint) const {
-    const bool by_drive = std::any_of(m_.drives.begin(), m_.drives.end(), [&](const Drive& drive) {
-      const auto* of_joint = std::get_if<JointDrive>(&drive.kind);
-      return of_joint != nullptr && of_joint->joint == joint;
-    });
-    const auto uses = [joint](const auto& item) { return item.joint == joint; };
-    return by_drive || std::ranges::any_of(m_.prescribed, uses) ||
-           std::ranges::any_of(m_.couplings, [&](const Coupling& coupling) {
-             return std::ranges::any_of(coupling.terms, uses);
-           });
   }
 
   // A free joint with `closure: true` only carries the pose of a body.

@@ -50,9 +50,7 @@ class OpenLoops {
       rows.Add(joint_rows, joint_rows.rows);
       weight.resize(rows.size(), weighted && !joint.closure ? kHard : 1.0);
     }
-    for (const Coupling& coupling : mechanism_.couplings) {
-      rows.Add(RowOf(mechanism_, coupling, states));
-    }
+    for (const CouplingRow& row : CouplingRows(mechanism_, states)) rows.Add(row);
     weight.resize(rows.size(), 1.0);
     for (size_t k = 0; k < commands_.size(); ++k) {
       rows.Add(mechanism_, commands_[k], states, &near_values_[k]);
@@ -129,10 +127,11 @@ void NameWorst(const Mechanism& mechanism, const std::vector<Command>& commands,
     offer(joint.name, turn, turn, "rad");
     row += rows.rows;
   }
-  for (const Coupling& coupling : mechanism.couplings) {
-    const bool angular = RowOf(mechanism, coupling, states).angular;
+  const std::vector<CouplingRow> coupled = CouplingRows(mechanism, states);
+  for (size_t c = 0; c < coupled.size(); ++c) {
+    const bool angular = coupled[c].angular;
     const double miss = std::abs(r[row++]);
-    offer(coupling.name, miss, angular ? miss : miss * length, angular ? "rad" : "m");
+    offer(mechanism.couplings[c].name, miss, angular ? miss : miss * length, angular ? "rad" : "m");
   }
   for (const Command& command : commands) {
     const bool angle = !IsLength(mechanism, command.terms.front().coordinate);

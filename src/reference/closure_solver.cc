@@ -111,10 +111,8 @@ void ClosureSolver::EvaluateRows(Trial* trial) {
     rows_.Add(rows, rows.rows);
   }
   first_coupling_ = rows_.size();
-  FollowCouplings(mechanism_, &trial->states);
   coupled_size_.clear();
-  for (const Coupling& coupling : mechanism_.couplings) {
-    const CouplingRow row = RowOf(mechanism_, coupling, trial->states);
+  for (const CouplingRow& row : FollowCouplings(mechanism_, &trial->states)) {
     rows_.Add(row);
     coupled_size_.push_back(row.LargestPiece());
   }

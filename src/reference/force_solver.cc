@@ -27,9 +27,7 @@ void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSe
     const ConstraintRows rows = RowsOf(joint, states, true);
     out->Add(rows, ReactionRows(joint, rows));
   }
-  for (const Coupling& coupling : mechanism.couplings) {
-    out->Add(RowOf(mechanism, coupling, states));
-  }
+  for (const CouplingRow& row : CouplingRows(mechanism, states)) out->Add(row);
 }
 
 ForceSolver::ForceSolver(const Mechanism& mechanism)

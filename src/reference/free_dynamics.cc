@@ -79,9 +79,7 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
     const ConstraintRows rows = RowsOf(joint, states, false);
     rows_.Add(rows, rows.rows);
   }
-  for (const Coupling& coupling : mechanism_.couplings) {
-    rows_.Add(RowOf(mechanism_, coupling, states));
-  }
+  for (const CouplingRow& row : CouplingRows(mechanism_, states)) rows_.Add(row);
   joint_rows_ = rows_.size();
   for (size_t k = 0; k < motion_.commands.size(); ++k) {
     rows_.Add(mechanism_, motion_.commands[k], states, &near_values_[k]);
@@ -273,8 +271,7 @@ double FreeDynamics::Rounding(const BodyStates& states) const {
     if (!rows_.angular[joint_rows_ + k]) continue;
     largest_angle = std::max(largest_angle, std::abs(command_.position[k]));
   }
-  for (const Coupling& coupling : mechanism_.couplings) {
-    const CouplingRow row = RowOf(mechanism_, coupling, states);
+  for (const CouplingRow& row : CouplingRows(mechanism_, states)) {
     if (row.angular) largest_angle = std::max(largest_angle, row.LargestPiece());
   }
   return std::max(GapRounding(Reach(lever_, states.X_WB)) / length_, 32 * kEps * largest_angle);
@@ -289,8 +286,7 @@ void FreeDynamics::Gaps(const BodyStates& states, double* position_m, double* ro
       *gap = std::max(*gap, std::abs(rows.residual[i]));
     }
   }
-  for (const Coupling& coupling : mechanism_.couplings) {
-    const CouplingRow row = RowOf(mechanism_, coupling, states);
+  for (const CouplingRow& row : CouplingRows(mechanism_, states)) {
     double* gap = row.angular ? rotation_rad : position_m;
     *gap = std::max(*gap, std::abs(row.value));
   }

@@ -1,6 +1,7 @@
 #include "simulation/engine.h"
 
 #include <array>
+#include <ctime>
 
 namespace mbv::simulation {
 namespace {
@@ -44,6 +45,17 @@ DataHandle MakeData(const mjModel& m) {
   DataHandle data(mj_makeData(&m));
   if (data == nullptr) throw EngineError("could not make the simulation's data");
   return data;
+}
+
+double ThreadSeconds() {
+  timespec now{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+std::string NameAt(const mjModel& m, mjtObj type, int id, const char* kind) {
+  const char* name = mj_id2name(&m, type, id);
+  return name != nullptr && name[0] != '\0' ? name : std::string(kind) + "_" + std::to_string(id);
 }
 
 int IdOf(const mjModel& m, mjtObj type, const std::string& name) {

@@ -46,6 +46,12 @@ using DataHandle = std::unique_ptr<mjData, DataDeleter>;
 [[nodiscard]] ModelHandle CompileMjcf(const std::string& text);
 [[nodiscard]] DataHandle MakeData(const mjModel& m);
 
+/// Processor time of this thread [s].
+[[nodiscard]] double ThreadSeconds();
+
+/// The object's name, or one like "body_3".
+[[nodiscard]] std::string NameAt(const mjModel& m, mjtObj type, int id, const char* kind);
+
 /// Index of a named object; throws EngineError when there is none.
 [[nodiscard]] int IdOf(const mjModel& m, mjtObj type, const std::string& name);
 

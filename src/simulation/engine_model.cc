@@ -17,23 +17,12 @@ void MakeAnchorsExact(const EngineModel& engine) {
   for (size_t c = 0; c < engine.plan.closures.size(); ++c) {
     const PlannedClosure& closure = engine.plan.closures[c];
     const Joint& joint = engine.mechanism->joints[closure.joint];
-    double* data = engine.m->eq_data + mjNEQDATA * engine.closure_equality[c];
-    Pose X_1 = joint.X_CM, X_2 = joint.X_PF;
+    AnchorFrames frames{joint.X_CM, joint.X_PF};
     if (closure.type == PlannedClosure::Type::kSplit) {
-      X_1 = X_2 = closure.split_parent ? joint.X_PF : joint.X_CM;
+      frames.X_1 = frames.X_2 = closure.split_parent ? joint.X_PF : joint.X_CM;
     }
-    if (closure.type == PlannedClosure::Type::kConnect) {
-      Eigen::Map<Vec3>{data} = X_1.translation();
-      Eigen::Map<Vec3>{data + 3} = X_2.translation();
-      continue;
-    }
-    // Weld: the anchor on the second body comes first, then that on the first body, then the
-    // rotation of body 2 in body 1.
-    Eigen::Map<Vec3>{data} = X_2.translation();
-    Eigen::Map<Vec3>{data + 3} = X_1.translation();
-    const Eigen::Quaterniond q(Mat3(X_1.linear() * X_2.linear().transpose()));
-    const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
-    std::copy(wxyz.begin(), wxyz.end(), data + 6);
+    SetAnchors(closure.type != PlannedClosure::Type::kConnect, frames,
+               engine.m->eq_data + mjNEQDATA * engine.closure_equality[c]);
   }
 }
 
@@ -114,6 +103,16 @@ RunSummary CheckInertias(const Mechanism& mechanism) {
 }
 
 }  // namespace
+
+void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data) {
+  const Pose &X_1 = frames.X_1, &X_2 = frames.X_2;
+  // Of a weld the anchor on the second body comes first.
+  Eigen::Map<Vec3>{eq_data} = (weld ? X_2 : X_1).translation();
+  Eigen::Map<Vec3>{eq_data + 3} = (weld ? X_1 : X_2).translation();
+  if (!weld) return;
+  const Eigen::Quaterniond q(Mat3(X_1.linear() * X_2.linear().transpose()));
+  Eigen::Map<Eigen::Vector4d>(eq_data + 6) << q.w(), q.x(), q.y(), q.z();
+}
 
 RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                            EngineModel* engine) {

@@ -46,6 +46,14 @@ struct EngineModel {
 [[nodiscard]] RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                                          EngineModel* engine);
 
+/// The frames that a closure makes coincide, on its first and on its second body.
+struct AnchorFrames {
+  Pose X_1, X_2;
+};
+/// States both anchors of a `connect` or `weld` in MuJoCo's eq_data, for a weld the rotation of
+/// body 2 in body 1 too: the compiler takes them from the reference pose.
+void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data);
+
 /// Switches off the guiding constraints of the drives whose force the motion gives.
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);
 /// Switches the guiding constraints of all drives on or off.

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <ctime>
 #include <numbers>
 
 #include "mechanism/reach.h"
@@ -23,19 +22,13 @@ class LoopClock {
  public:
   void Stop(SimulationRun* run) const {
     run->loop_wall_s = std::chrono::duration<double>(Clock::now() - wall_).count();
-    run->loop_cpu_s = CpuSeconds() - cpu_s_;
+    run->loop_cpu_s = ThreadSeconds() - cpu_s_;
   }
 
  private:
   using Clock = std::chrono::steady_clock;
-  static double CpuSeconds() {
-    timespec now{};
-    clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-    return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-  }
-
   const Clock::time_point wall_ = Clock::now();
-  const double cpu_s_ = CpuSeconds();
+  const double cpu_s_ = ThreadSeconds();
 };
 
 // A closure open by more than this part of the mechanism's extent has come apart.

@@ -1,6 +1,4 @@
 // What leads the drives of a user's model, and what is switched off.
-#include <fmt/format.h>
-
 #include <algorithm>
 
 #include "core/names.h"
@@ -141,11 +139,6 @@ class LeadFinder {
 };
 
 }  // namespace
-
-std::string NameAt(const mjModel& m, mjtObj type, int id, const char* kind) {
-  const char* name = mj_id2name(&m, type, id);
-  return name != nullptr && name[0] != '\0' ? name : fmt::format("{}_{}", kind, id);
-}
 
 void FindLeads(const OwnTask& task, const ImportedMjcf& imported, OwnModel* own) {
   LeadFinder(task, imported, own).Run();

@@ -5,6 +5,9 @@
 #include <algorithm>
 #include <array>
 
+#include "core/markup.h"
+#include "mjcf/mjcf.h"
+#include "simulation/engine_model.h"
 #include "simulation/own_model_parts.h"
 
 namespace mbv::simulation {
@@ -71,14 +74,11 @@ class OwnModelMaker {
   [[nodiscard]] std::string WithAddedEqualities(const mjModel& m) const {
     std::string lines = "<equality>\n";
     for (size_t k = 0; k < own_.drives.size(); ++k) {
-      std::string joint;
-      for (const char c : std::string(mj_id2name(&m, mjOBJ_JOINT, own_.drives[k].joint))) {
-        joint += c == '&' ? "&amp;" : c == '<' ? "&lt;" : c == '"' ? "&quot;" : std::string(1, c);
-      }
+      const char* name = mj_id2name(&m, mjOBJ_JOINT, own_.drives[k].joint);
       lines += fmt::format(
           "<joint name=\"{}\" joint1=\"{}\" active=\"false\" solref=\"0.02 1\" "
           "solimp=\"{} {} 0.001 0.5 2\"/>\n",
-          AddedName(k), joint, kStiffest, kStiffest);
+          AddedName(k), EscapeMarkup(name), kMjcfImpedance, kMjcfImpedance);
     }
     std::string text = imported_->text;
     const size_t end = text.rfind("</mujoco>");
@@ -112,14 +112,7 @@ class OwnModelMaker {
   // MuJoCo 2.2 would take their place from the pose of the file.
   void PlaceBySites(const OwnClosure& closure) {
     const Joint& joint = imported_->mechanism.joints[static_cast<size_t>(closure.joint)];
-    mjtNum* data = m_->eq_data + mjNEQDATA * closure.equality;
-    const Vec3 p_1 = joint.X_PF.translation(), p_2 = joint.X_CM.translation();
-    Eigen::Map<Vec3>{data} = closure.weld ? p_2 : p_1;
-    Eigen::Map<Vec3>{data + 3} = closure.weld ? p_1 : p_2;
-    if (!closure.weld) return;
-    const Eigen::Quaterniond q(Mat3(joint.X_PF.linear() * joint.X_CM.linear().transpose()));
-    const std::array<double, 4> wxyz{q.w(), q.x(), q.y(), q.z()};
-    std::copy(wxyz.begin(), wxyz.end(), data + 6);
+    SetAnchors(closure.weld, {joint.X_PF, joint.X_CM}, m_->eq_data + mjNEQDATA * closure.equality);
   }
 
   // The mechanism's closed home pose as MuJoCo's configuration.

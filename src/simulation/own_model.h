@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "simulation/import_mjcf.h"
+#include "simulation/imported_mjcf.h"
 #include "simulation/own_file.h"
 
 namespace mbv::simulation {

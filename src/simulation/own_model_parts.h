@@ -8,12 +8,6 @@
 
 namespace mbv::simulation {
 
-/// MuJoCo's limit of the impedance.
-inline constexpr double kStiffest = 0.9999;
-
-/// The object's name, or one like "body_3".
-[[nodiscard]] std::string NameAt(const mjModel& m, mjtObj type, int id, const char* kind);
-
 /// The file's own step, integrator, solver and settings of closures, as facts.
 void TellSettings(OwnModel* own);
 /// Finds what leads each drive; switches off what the mechanism does not have and what would push

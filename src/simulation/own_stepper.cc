@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ctime>
 
 #include "mechanism/channels.h"
 #include "simulation/session.h"
@@ -13,12 +12,6 @@ namespace mbv::simulation {
 namespace {
 
 thread_local OwnStepper* stepping = nullptr;
-
-double CpuSecondsNow() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
-}
 
 RunSummary Unsound(const std::string& what, double t_s) {
   return {.stop = Stop::kEngineFailure,
@@ -223,9 +216,9 @@ RunSummary OwnStepper::Run() {
     const double t = static_cast<double>(n) * h_;
     if (RunSummary summary = Command(n); !summary.ok()) return summary;
     if (n % per_sample == 0) Record(n / per_sample, t);
-    const double from = CpuSecondsNow();
+    const double from = ThreadSeconds();
     mj_step(m_, d_.get());
-    cpu_s += CpuSecondsNow() - from;
+    cpu_s += ThreadSeconds() - from;
     if (RunSummary trouble = Trouble(t); !trouble.ok()) return trouble;
   }
   run_->cost_ms = 1e3 * cpu_s / (static_cast<double>(samples * per_sample + 1) * h_);

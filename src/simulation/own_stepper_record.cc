@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "simulation/engine_model.h"
 #include "simulation/own_stepper.h"
 
 namespace mbv::simulation {

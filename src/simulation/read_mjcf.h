@@ -1,11 +1,12 @@
 // MJCF files as mechanisms, by MuJoCo's own compiler: defaults, classes, includes and inertias from
 // geoms are resolved there.
 //
-// Read are hinges, slides, balls and bodies with several of them, `connect` and `weld` equalities,
-// actuators on joints as drives, sites as frames, boxes, spheres, capsules, cylinders and meshes of
-// files as shapes, the first keyframe as the pose to close the loops from. Free bodies are held.
-// What the mechanism cannot express (armature, damping, springs and friction of joints, tendons,
-// couplings of joints, gears) is a finding each.
+// Read are hinges, slides, balls and bodies with several of them, `connect` and `weld` equalities
+// as closures, `joint` and linear `tendon` equalities as couplings, actuators on joints as drives,
+// sites as frames, boxes, spheres, capsules, cylinders and meshes of files as shapes, the first
+// keyframe as the pose to close the loops from (mjcf_import.h). Free bodies are held. What the
+// mechanism cannot express (armature, damping, springs and friction of joints, tendons, gears) is a
+// finding each.
 #pragma once
 
 #include <optional>
