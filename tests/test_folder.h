@@ -2,6 +2,7 @@
 #pragma once
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -11,9 +12,11 @@ namespace mbv::test {
 
 class TestFolder {
  public:
-  /// `name`: unlike those of all tests that run at the same time.
+  /// No other process has it: tests of one fixture run at the same time. `name`: unlike those of
+  /// other folders of the same test.
   explicit TestFolder(const std::string& name)
-      : path_(std::filesystem::path(testing::TempDir()) / ("mbv_" + name)) {
+      : path_(std::filesystem::path(testing::TempDir()) /
+              ("mbv_" + name + "_" + std::to_string(getpid()))) {
     std::filesystem::remove_all(path_);
     std::filesystem::create_directories(path_);
   }
