@@ -31,8 +31,10 @@ constexpr double kGapFactor = 30.0;
 // Larger gaps [L, rad] are no rounding.
 constexpr double kLargestGap = 3e-3;
 constexpr double kLeastDamping = 1e-12;  // over the residual
-constexpr int kPoses = 12;
-constexpr double kReach = 0.8;  // of the poses from home [rad, L]
+// A paradoxical loop that closes in too few poses, or in a short arc, is open by a ten thousandth
+// of the rounding elsewhere, and its reactions are then noise.
+constexpr Eigen::Index kPoses = 24, kFewestPoses = 12;
+constexpr double kReach = 2.4;  // of the poses from home [rad, L]
 constexpr Eigen::Index kMostUnknowns = 800;
 
 BodyStates StatesAt(const std::vector<Pose>& X_WB) {
@@ -112,6 +114,12 @@ class Projector {
     return largest;
   }
 
+  // As many as the number of unknowns allows.
+  [[nodiscard]] Eigen::Index Poses() const {
+    const Eigen::Index room = (kMostUnknowns - frames_) / std::max(1, tree_.freedoms());
+    return std::clamp(room, kFewestPoses, kPoses);
+  }
+
   void MakePoses(double gap) {
     for (const Joint& joint : mechanism_.joints) {
       given_.push_back(joint.X_PF);
@@ -124,14 +132,15 @@ class Projector {
     std::uniform_real_distribution<double> uniform(-1.0, 1.0);
     std::vector<std::array<double, 6>> near;
     for (const Joint& joint : mechanism_.joints) near.push_back(joint.home);
-    const int poses = motion.cols() == 0 ? 1 : kPoses;
-    for (int k = 0; k < poses; ++k) {
+    const Eigen::Index poses = motion.cols() == 0 ? 1 : Poses();
+    for (Eigen::Index k = 0; k < poses; ++k) {
       VecX dx = VecX::Zero(motion.rows());
       for (Eigen::Index c = 0; c < motion.cols() && k > 0; ++c) {
         dx += uniform(random) * motion.col(c);
       }
       // Spread over both directions of a single freedom, too.
-      const double amplitude = kReach * (2.0 * k / poses - 1.0);
+      const double amplitude =
+          kReach * (2.0 * static_cast<double>(k) / static_cast<double>(poses) - 1.0);
       if (const double size = dx.lpNorm<Eigen::Infinity>(); size > 0.0) dx *= amplitude / size;
       std::vector<Pose> X_WB = mechanism_.X_WB_home;
       for (size_t b = 1; b < X_WB.size(); ++b) {

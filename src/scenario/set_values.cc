@@ -38,6 +38,14 @@ size_t FirstKey(const YamlNode& map, const std::string& path, const std::string&
                                                   : std::min(path.find('.'), path.size());
 }
 
+// A parameter of the model that was meant as such.
+void HintAtParameters(const SetValue& value, Finding* finding) {
+  const bool unknown = finding->message == "the file: unknown key '" + value.first + "'";
+  if (!unknown || value.first.find('.') != std::string::npos) return;
+  finding->hint = "a parameter of the model: --set parameters." + value.first + "=" + value.second +
+                  "; " + finding->hint;
+}
+
 YamlNodePtr SetAt(const YamlNode* node, const std::string& parent, const std::string& path,
                   const YamlNodePtr& value) {
   if (path.empty()) return value;
@@ -97,7 +105,9 @@ Diagnostics PlaceSetFindings(const Diagnostics& diagnostics, const std::vector<S
   std::vector<Finding> findings;
   for (Finding finding : diagnostics.findings()) {
     if (finding.line < 0) {
-      finding.file = OptionText(values[static_cast<size_t>(-finding.line - 1)]);
+      const SetValue& value = values[static_cast<size_t>(-finding.line - 1)];
+      HintAtParameters(value, &finding);
+      finding.file = OptionText(value);
       finding.line = 0;
     }
     findings.push_back(std::move(finding));

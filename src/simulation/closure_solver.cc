@@ -19,8 +19,15 @@ constexpr double kChordStep = 1e-5;
 // Each refinement shrinks the error of factors that are kChordStep old by about kChordStep times
 // the condition: one leaves up to 1e-9 of the forces, three leave round-off.
 constexpr int kRefinements = 3;
+// Reflections mix all equations: without one refinement the force that accelerates a heavy
+// prescribed body leaves its rounding in the drives that do not move it.
+constexpr int kOrthogonalRefinements = 1;
 // A solution of Newton must be closed to this and rounding.
 constexpr double kClosed = 1e-10;
+// What Newton moves further than this, or corrects of a prediction, may be another assembly.
+constexpr double kFarthestStep = 0.5, kFarthestCorrection = 0.1;
+// Of the way between two samples.
+constexpr double kShortestStep = 1e-4;
 // Relative rank tolerance.
 constexpr double kRankTolerance = 1e-9;
 
@@ -96,20 +103,18 @@ void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
     x->setZero(system_->rows());
     return;
   }
+  const auto solve = [&](const VecX& right) -> VecX {
+    if (regular_) return lu_.transpose().solve(right);
+    return cod_.transpose().solve(right);
+  };
   scaled_ = b.cwiseProduct(dof);
-  if (!regular_) {
-    *x = cod_.transpose().solve(scaled_);
-    x->array() /= row.array();
-    return;
-  }
-  *x = lu_.transpose().solve(scaled_);
-  x->array() /= row.array();
-  for (int i = 0; stale_ && i < kRefinements; ++i) {
+  *x = solve(scaled_).cwiseQuotient(row);
+  const int refinements = !regular_ ? kOrthogonalRefinements : stale_ ? kRefinements : 0;
+  for (int i = 0; i < refinements; ++i) {
     refinement_ = b;
     refinement_.noalias() -= system_->J().transpose() * *x;
     scaled_ = refinement_.cwiseProduct(dof);
-    step_ = lu_.transpose().solve(scaled_);
-    x->array() += step_.array() / row.array();
+    *x += solve(scaled_).cwiseQuotient(row);
   }
 }
 
@@ -118,6 +123,7 @@ RunSummary ClosureSolver::Close(const VecX& to) {
   mjData* d = system_->data();
   system_->SetTargets(to);
   double size = kNan;
+  moved_ = 0.0;
   for (int iteration = 0; iteration < kMaxNewton; ++iteration) {
     system_->EvaluatePosition();
     rhs_ = -system_->residual();
@@ -131,6 +137,7 @@ RunSummary ClosureSolver::Close(const VecX& to) {
     size = step_.cwiseQuotient(system_->dof_unit()).lpNorm<Eigen::Infinity>();
     if (!std::isfinite(size) || size > 1e3) break;
     if (size < kNoStep && closed) return RunSummary::Done();
+    moved_ += size;
     mj_integratePos(m, d->qpos, step_.data(), 1.0);
   }
   const double open = system_->residual().lpNorm<Eigen::Infinity>();
@@ -148,23 +155,29 @@ RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
   mjData* d = system_->data();
   reached_.assign(d->qpos, d->qpos + m.nq);
   RunSummary summary = Close(to);
-  if (summary.ok()) return summary;
+  if (summary.ok() && moved_ < kFarthestStep) return summary;
   // Walk there in steps that adapt to what Newton can bridge.
   double s = 0.0, ds = 0.25;
   while (s < 1.0) {
     std::copy(reached_.begin(), reached_.end(), d->qpos);
     const double next = std::min(1.0, s + ds);
     summary = Close(from + next * (to - from));
-    if (summary.ok()) {
+    if (summary.ok() && (moved_ < kFarthestStep || ds < kShortestStep)) {
       s = next;
       ds *= 1.5;
       reached_.assign(d->qpos, d->qpos + m.nq);
     } else {
+      if (ds < kShortestStep) return summary;
       ds *= 0.5;
-      if (ds < 1e-4) return summary;
     }
   }
   return RunSummary::Done();
+}
+
+RunSummary ClosureSolver::FollowPredicted(const VecX& closed, const VecX& from, const VecX& to) {
+  if (Close(to).ok() && moved_ < kFarthestCorrection) return RunSummary::Done();
+  std::copy(closed.begin(), closed.end(), system_->data()->qpos);
+  return Follow(from, to);
 }
 
 void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {

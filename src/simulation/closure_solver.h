@@ -16,8 +16,11 @@ class ClosureSolver {
   explicit ClosureSolver(ConstraintSystem* system);
 
   /// Moves d.qpos from the present (closed) configuration with targets `from` to the targets `to`,
-  /// in as many intermediate steps as it takes.
+  /// in as many intermediate steps as it takes to stay in the same assembly.
   [[nodiscard]] RunSummary Follow(const VecX& from, const VecX& to);
+  /// The same, where d.qpos is a prediction for the targets `to` and `closed` the configuration
+  /// with the targets `from`.
+  [[nodiscard]] RunSummary FollowPredicted(const VecX& closed, const VecX& from, const VecX& to);
 
   /// Newton from d.qpos to the targets `to`. On success MuJoCo's position stage, J and its
   /// factors belong to the final qpos up to round-off.
@@ -65,6 +68,7 @@ class ClosureSolver {
   Eigen::PartialPivLU<MatX> lu_;
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
   VecX rhs_, step_, bias_, refinement_, scaled_;
+  double moved_ = 0.0;  // by the last Close, in the units of ScaledJ(): sum of its largest entries
   std::vector<double> reached_;  // last closed configuration on the way of Follow
 };
 

@@ -87,12 +87,13 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
   }
   mjData* d = s->data.get();
   Predictor predictor(s->engine);
-  VecX tau(s->engine.m->nv);
+  VecX tau(s->engine.m->nv), closed;
   const auto start = std::chrono::steady_clock::now();
   for (size_t i = 0; i < times.size(); ++i) {
+    closed = Eigen::Map<const VecX>(d->qpos, s->engine.m->nq);
     if (i > 0) predictor.Predict(times[i] - times[i - 1], d);
-    if (RunSummary summary = s->solver.Follow(
-            i > 0 ? samples[i - 1].position : HomePositions(s->engine), samples[i].position);
+    const VecX from = i > 0 ? samples[i - 1].position : HomePositions(s->engine);
+    if (RunSummary summary = s->solver.FollowPredicted(closed, from, samples[i].position);
         !summary.ok()) {
       return At(summary, times[i]);
     }

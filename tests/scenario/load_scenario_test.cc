@@ -277,6 +277,9 @@ TEST_F(LoadScenarioTest, FindingsAboutSetValuesNameTheOption) {
   EXPECT_EQ(Messages(Complete(), {{"motion", "{"}}),
             "--set motion={: error: the value is no YAML\n"
             "  hint: write --set key=value, e.g. --set simulation.step_s=0.002\n");
+  EXPECT_NE(Messages(Complete(), {{"m_p", "4"}})
+                .find("hint: a parameter of the model: --set parameters.m_p=4; known keys: kind"),
+            std::string::npos);
 }
 
 struct Golden {

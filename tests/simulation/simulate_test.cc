@@ -119,6 +119,17 @@ TEST(Inverse, ACrankTurnsTenThousandTimes) {
   EXPECT_LT(Largest(run, "closure.position"), 1e-11);
 }
 
+// Prediction from the rates leads far astray there; another assembly would have other torques.
+TEST(Inverse, ACrankTurnsOnceFromSampleToSample) {
+  for (const JointKind kind : {JointKind::kSpherical, JointKind::kRevolute}) {
+    const Turns turns{.turns = 5, .samples = 1};
+    const SimulationRun run = Simulate(fixtures::MakeFourBar(kind), turns.Sampled(), turns,
+                                       {.mode = SimulationMode::kInverse});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message << " at " << run.summary.time_s;
+    EXPECT_LT(turns.Error(run), 1e-12);
+  }
+}
+
 // The hinge as closure is redundant and costs more; it starts 10 000 turns from zero.
 Mechanism TurnedFourBar(double turns) {
   Mechanism m = fixtures::MakeFourBar();
