@@ -1,5 +1,6 @@
 #include "render/best_view.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -14,6 +15,19 @@ constexpr std::size_t kMostPoints = 48, kMostFrames = 3;
 // What a view has to show more to be preferred: a half turn, and looking from 24° higher.
 constexpr double kVeil = 0.35;  // what glass takes from what is seen through it
 constexpr double kTurnCost = 0.12, kHeightCost = 0.10;
+// A view along the plane of a planar mechanism shows nothing of its shape: what each missing tenth
+// of the breadth below this share of the broadest view costs is half of a tenth.
+constexpr double kBroad = 0.7, kNarrowCost = 0.5;
+
+// Points whose second extent, squared, is less than this share of the first lie on a line.
+constexpr double kOnALine = 1e-4;
+
+// Of a symmetric matrix: S adj(S) = det(S) 1.
+Mat3 Adjugate(const Mat3& S) {
+  Mat3 adjugate;
+  adjugate << S.col(1).cross(S.col(2)), S.col(2).cross(S.col(0)), S.col(0).cross(S.col(1));
+  return adjugate;
+}
 
 // A solid as a box in its own frame.
 struct Blocker {
@@ -51,6 +65,25 @@ class Sight {
     }
   }
 
+  // How much of the broadest view's area the points span in this one: 1 for points on a line.
+  [[nodiscard]] double Breadth(const Vec3& to_camera_W) const {
+    double seen = 0.0, all = 0.0;
+    for (const Scene& scene : scenes_) {
+      Mat3 spread = Mat3::Zero();
+      for (const Vec3& p : scene.points) {
+        const Vec3 d = p - scene.middle;
+        spread += d * d.transpose();
+      }
+      const Vec3 sizes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvalues();
+      if (!(sizes[1] > kOnALine * sizes[2])) continue;
+      // The spread seen along u has the determinant uᵀ adj(S) u.
+      const Mat3 adjugate = Adjugate(spread);
+      seen += std::sqrt(std::max(0.0, to_camera_W.dot(adjugate * to_camera_W)));
+      all += std::sqrt(sizes[1] * sizes[2]);
+    }
+    return all == 0.0 ? 1.0 : seen / all;
+  }
+
   [[nodiscard]] double Share(const Vec3& to_camera_W) const {
     double seen = 0.0, all = 0.0;
     for (const Scene& scene : scenes_) {
@@ -70,6 +103,7 @@ class Sight {
   struct Scene {
     std::vector<Blocker> blockers;
     std::vector<Vec3> points;
+    Vec3 middle = Vec3::Zero();  // of the points
   };
 
   void AddFrame(const Mechanism& mechanism, const PictureFrame& frame, const Scale& scale,
@@ -98,6 +132,9 @@ class Sight {
     }
     const std::size_t step = points.size() / kMostPoints + 1;
     for (std::size_t i = 0; i < points.size(); i += step) scene.points.push_back(points[i]);
+    for (const Vec3& p : scene.points) {
+      scene.middle += p / static_cast<double>(scene.points.size());
+    }
     scenes_.push_back(std::move(scene));
   }
 
@@ -134,7 +171,9 @@ CameraView BestView(const Mechanism& mechanism, const std::vector<PictureFrame>&
       camera.azimuth_deg += by;
       camera.elevation_deg = height;
       const Vec3 to_camera_W = -(R_DW.transpose() * camera.forward_D());
-      const double score = sight.Share(to_camera_W) - kTurnCost * std::abs(by) / 180.0 -
+      const double narrow = std::max(0.0, kBroad - sight.Breadth(to_camera_W));
+      const double score = sight.Share(to_camera_W) - kNarrowCost * narrow -
+                           kTurnCost * std::abs(by) / 180.0 -
                            kHeightCost * std::abs(height - heights.front()) / 24.0;
       if (score <= best_score) continue;
       best_score = score;

@@ -333,6 +333,25 @@ TEST(BestView, StaysWhereNothingHidesAndGoesAroundAWall) {
   EXPECT_EQ(*BestView(mechanism, {frame}, scale, options, Mat3::Identity()).azimuth_deg, 10.0);
 }
 
+TEST(BestView, DoesNotLookAlongThePlaneOfAPlanarMechanism) {
+  const Mechanism four_bar = ShippedModel("four_bar");
+  const PictureFrame frame = HomeFrame(four_bar);
+  // Its plane's normal is z: level with the ground, and upright all around.
+  std::vector<Mat3> turns = {Mat3::Identity()};
+  for (double turn_deg = 0.0; turn_deg < 180.0; turn_deg += 30.0) {
+    turns.emplace_back(Eigen::AngleAxisd(turn_deg / 180.0 * std::numbers::pi, Vec3::UnitZ()) *
+                       Eigen::AngleAxisd(std::numbers::pi / 2.0, Vec3::UnitX()));
+  }
+  for (const Mat3& turn : turns) {
+    PictureFrame turned = frame;
+    for (Pose& X_WB : turned.X_WB) X_WB = Pose(turn) * X_WB;
+    const Scale scale = ScaleOf(four_bar, {turned});
+    const CameraView view = BestView(four_bar, {turned}, scale, {}, Mat3::Identity());
+    const Camera camera{.azimuth_deg = *view.azimuth_deg, .elevation_deg = *view.elevation_deg};
+    EXPECT_GT(std::abs(camera.forward_D().dot(turn.col(2))), 0.5) << turn.col(2).transpose();
+  }
+}
+
 TEST(BestView, ShowsAllThreeLimbsOfThePlatform) {
   const Mechanism platform = ShippedModel("stabilizing_platform");
   const PictureFrame frame = HomeFrame(platform);
