@@ -7,6 +7,7 @@
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/terminal.h"
+#include "core/bytes.h"
 #include "core/files.h"
 #include "core/in_children.h"
 #include "core/scratch_folder.h"
@@ -24,15 +25,14 @@ struct SurveyArguments {
 
 SurveyRow RowOf(const std::string& file, const std::string& scratch, double timeout_s) {
   const auto texts =
-      InChildren(1, timeout_s, [&](size_t) { return RowText(SurveyFile(file, scratch)); });
-  SurveyRow row;
-  row.file = file;
+      InChildren(1, timeout_s, [&](size_t) { return ToBytes(SurveyFile(file, scratch)); });
+  SurveyRow lost{.file = file};
   if (!texts[0]) {
-    row.message = fmt::format("ended by a crash, or not finished after {:g} s", timeout_s);
-  } else if (!ReadRowText(*texts[0], &row)) {
-    row.message = "gave no readable result";
+    lost.message = fmt::format("ended by a crash, or not finished after {:g} s", timeout_s);
+    return lost;
   }
-  return row;
+  lost.message = "gave no readable result";
+  return FromBytes<SurveyRow>(*texts[0]).value_or(lost);
 }
 
 int WriteSurvey(const SurveyArguments& arguments, const std::vector<SurveyRow>& rows) {

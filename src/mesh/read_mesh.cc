@@ -8,19 +8,26 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <map>
 
+#include "core/bytes.h"
 #include "core/files.h"
 #include "core/in_children.h"
 #include "core/inputs.h"
 #include "mesh/weld.h"
 
 namespace mbv {
+
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<MeshText>& mesh) {
+  visit(mesh.surface.vertices), visit(mesh.surface.triangles), visit(mesh.trouble);
+}
+
 namespace {
 
 constexpr size_t kMostBytes = 256UL << 20;
-constexpr size_t kMostPacked = 60'000'000;  // what a child may answer
+constexpr size_t kMostBytesOfAnswer = 60'000'000;  // what a child may answer
+constexpr const char* kNothing = "it gave nothing";
 constexpr double kReadTimeout_s = 60.0;
 constexpr size_t kMostKnown = 500;  // surfaces
 
@@ -55,39 +62,12 @@ void AddNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& above,
   }
 }
 
-// A surface as bytes between processes: "" and numbers, or "!" and the trouble.
-std::string Packed(const MeshText& mesh) {
-  if (!mesh.trouble.empty()) return "!" + mesh.trouble;
-  std::string bytes = " ";
-  const auto append = [&bytes](const void* data, size_t size) {
-    bytes.append(static_cast<const char*>(data), size);
-  };
-  const std::array<size_t, 2> counts{mesh.surface.vertices.size(), mesh.surface.triangles.size()};
-  append(counts.data(), sizeof counts);
-  for (const Vec3& p : mesh.surface.vertices) append(p.data(), sizeof(double) * 3);
-  for (const auto& t : mesh.surface.triangles) append(t.data(), sizeof t);
-  if (bytes.size() <= kMostPacked) return bytes;
-  return fmt::format("!its {} triangles are too many", mesh.surface.triangles.size());
-}
-
-MeshText Unpacked(const std::string& bytes) {
-  MeshText mesh;
-  if (bytes.empty() || bytes[0] == '!') {
-    mesh.trouble = bytes.empty() ? "it gave nothing" : bytes.substr(1);
-    return mesh;
-  }
-  size_t at = 1;
-  const auto take = [&](void* data, size_t size) {
-    std::memcpy(data, bytes.data() + at, size);
-    at += size;
-  };
-  std::array<size_t, 2> counts{};
-  take(counts.data(), sizeof counts);
-  mesh.surface.vertices.resize(counts[0]);
-  mesh.surface.triangles.resize(counts[1]);
-  for (Vec3& p : mesh.surface.vertices) take(p.data(), sizeof(double) * 3);
-  for (auto& t : mesh.surface.triangles) take(t.data(), sizeof t);
-  return mesh;
+// What a child answers.
+std::string Answer(MeshText mesh) {
+  std::string bytes = ToBytes(mesh);
+  if (bytes.size() <= kMostBytesOfAnswer) return bytes;
+  const size_t triangles = mesh.surface.triangles.size();
+  return ToBytes(MeshText{{}, fmt::format("its {} triangles are too many", triangles)});
 }
 
 // Surfaces of this process by content and ending of their files.
@@ -147,11 +127,11 @@ std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& fi
     contents.push_back(std::move(*bytes));
   }
   const auto answers = InChildren(unknown.size(), kReadTimeout_s, [&](size_t k) {
-    return Packed(ReadMeshBytes(contents[k], endings[k]));
+    return Answer(ReadMeshBytes(contents[k], endings[k]));
   });
   for (size_t k = 0; k < unknown.size(); ++k) {
-    MeshText read;
-    if (answers[k]) read = Unpacked(*answers[k]);
+    MeshText read =
+        answers[k] ? FromBytes<MeshText>(*answers[k]).value_or(MeshText{{}, kNothing}) : MeshText{};
     if (!answers[k]) {
       read.trouble = fmt::format("reading it crashed, or took longer than {:g} s", kReadTimeout_s);
     }

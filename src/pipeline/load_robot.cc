@@ -2,8 +2,9 @@
 
 #include <fmt/format.h>
 
-#include <sstream>
+#include <optional>
 
+#include "core/bytes.h"
 #include "core/in_children.h"
 #include "core/names.h"
 #include "input/yaml_reader.h"
@@ -11,49 +12,33 @@
 #include "simulation/read_mjcf.h"
 
 namespace mbv {
+
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<Finding>& f) {
+  visit(f.severity), visit(f.file), visit(f.line), visit(f.column), visit(f.message), visit(f.hint);
+}
+
 namespace {
 
-// A child's answer: findings, one per line group, then the model.
-constexpr char kField = '\x1f', kRecord = '\x1e';
+// A child's answer.
+struct ModelAnswer {
+  std::vector<Finding> findings;
+  std::string model;  // "" after errors
+};
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<ModelAnswer>& answer) {
+  visit(answer.findings), visit(answer.model);
+}
 
-std::string AnswerOf(const std::string& text, const std::string& file) {
+ModelAnswer ModelAnswerOf(const std::string& text, const std::string& file) {
   Diagnostics findings;
   auto mechanism = ReadMjcf(text, file, &findings);
-  std::string answer;
-  const auto plain = [](std::string s) {
-    std::erase(s, kField);
-    std::erase(s, kRecord);
-    return s;
-  };
-  for (const Finding& f : findings.findings()) {
-    answer +=
-        fmt::format("{1}{0}{2}{0}{3}{0}{4}{5}", kField, f.severity == Severity::kError ? 1 : 0,
-                    f.line, plain(f.message), plain(f.hint), kRecord);
-  }
-  answer += kRecord;
+  ModelAnswer answer{.findings = findings.findings(), .model = ""};
   if (!mechanism) return answer;
   mechanism->name = NearestName(mechanism->name);
   if (mechanism->name.empty()) mechanism->name = "robot";
-  return answer + WriteModel(*mechanism);
-}
-
-// Reads the findings; the rest is the model, empty after errors.
-std::string ReadAnswer(const std::string& answer, const std::string& file, Diagnostics* findings) {
-  size_t at = 0;
-  while (at < answer.size() && answer[at] != kRecord) {
-    const size_t end = std::min(answer.find(kRecord, at), answer.size());
-    std::istringstream stream(answer.substr(at, end - at));
-    std::string severity, line, message, hint;
-    std::getline(stream, severity, kField);
-    std::getline(stream, line, kField);
-    std::getline(stream, message, kField);
-    std::getline(stream, hint, kField);
-    const int number = std::atoi(line.c_str());
-    findings->Add({severity == "1" ? Severity::kError : Severity::kWarning, file, number,
-                   number > 0 ? 1 : 0, message, hint});
-    at = end + 1;
-  }
-  return at < answer.size() ? answer.substr(at + 1) : "";
+  answer.model = WriteModel(*mechanism);
+  return answer;
 }
 
 // The model file that an MJCF file stands for; "" after errors.
@@ -63,15 +48,17 @@ std::string ModelOfMjcf(const std::string& file, Diagnostics* findings) {
   const auto text = reader.ReadFile();
   findings->Append(reader.diagnostics());
   if (!text) return "";
-  const auto answers = InChildren(1, kTimeout_s, [&](size_t) { return AnswerOf(*text, file); });
-  if (!answers[0]) {
+  const auto answers =
+      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(ModelAnswerOf(*text, file)); });
+  const auto answer = answers[0] ? FromBytes<ModelAnswer>(*answers[0]) : std::nullopt;
+  if (!answer) {
     findings->AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than "
                                          "{:g} s",
                                          kTimeout_s));
     return "";
   }
-  const std::string model = ReadAnswer(*answers[0], file, findings);
-  return findings->has_errors() ? "" : model;
+  for (const Finding& finding : answer->findings) findings->Add(finding);
+  return findings->has_errors() ? "" : answer->model;
 }
 
 // Nobody wrote the lines that findings point to.

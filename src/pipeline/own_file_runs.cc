@@ -72,7 +72,7 @@ void OwnFileRuns::FindCommands() {
 OwnRun OwnFileRuns::InChild(const OwnTask& task) const {
   const auto answers = InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(RunOwnFile(task)); });
   std::optional<OwnRun> run;
-  if (answers[0]) run = OwnRunOf(*answers[0]);
+  if (answers[0]) run = FromBytes<OwnRun>(*answers[0]);
   if (run) return *std::move(run);
   OwnRun failed;
   failed.summary = {

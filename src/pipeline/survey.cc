@@ -6,7 +6,6 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
-#include <sstream>
 
 #include "core/files.h"
 #include "core/text.h"
@@ -21,8 +20,6 @@
 
 namespace mbv {
 namespace {
-
-constexpr char kBetween = '\x1f';  // between the fields of a row's text
 
 std::string FirstError(const Diagnostics& diagnostics) {
   for (const Finding& finding : diagnostics.findings()) {
@@ -167,30 +164,6 @@ SurveyRow SurveyFile(const std::string& file, const std::string& scratch) {
   Survey(file, scratch, &row);
   row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return row;
-}
-
-std::string RowText(const SurveyRow& row) {
-  std::string message = row.message;
-  std::erase(message, kBetween);
-  return fmt::format("{1}{0}{2}{0}{3}{0}{4}{0}{5}{0}{6}{0}{7}{0}{8}{0}{9}{0}{10}{0}{11}", kBetween,
-                     row.status, row.bodies, row.loops, row.freedoms, row.redundant, row.gap_m,
-                     row.gap_rad, row.inverse_nrmse, row.forward_nrmse, row.seconds, message);
-}
-
-bool ReadRowText(const std::string& text, SurveyRow* row) {
-  std::vector<std::string> fields;
-  std::istringstream stream(text);
-  for (std::string field; std::getline(stream, field, kBetween);) fields.push_back(field);
-  if (text.ends_with(kBetween)) fields.emplace_back();
-  if (fields.size() != 11) return false;
-  row->status = fields[0];
-  int* counts[] = {&row->bodies, &row->loops, &row->freedoms, &row->redundant};
-  for (size_t i = 0; i < 4; ++i) *counts[i] = std::atoi(fields[1 + i].c_str());
-  double* values[] = {&row->gap_m, &row->gap_rad, &row->inverse_nrmse, &row->forward_nrmse,
-                      &row->seconds};
-  for (size_t i = 0; i < 5; ++i) *values[i] = std::strtod(fields[5 + i].c_str(), nullptr);
-  row->message = fields[10];
-  return true;
 }
 
 std::string SurveyCsv(const std::vector<SurveyRow>& rows) {

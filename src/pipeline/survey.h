@@ -24,9 +24,13 @@ struct SurveyRow {
 /// `scratch`.
 [[nodiscard]] SurveyRow SurveyFile(const std::string& file, const std::string& scratch);
 
-/// One row as text between processes, and back; false if it is none.
-[[nodiscard]] std::string RowText(const SurveyRow& row);
-[[nodiscard]] bool ReadRowText(const std::string& text, SurveyRow* row);
+/// For the way out of a child process (core/bytes.h).
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<SurveyRow>& row) {
+  visit(row.file), visit(row.status), visit(row.bodies), visit(row.loops), visit(row.freedoms);
+  visit(row.redundant), visit(row.gap_m), visit(row.gap_rad), visit(row.inverse_nrmse);
+  visit(row.forward_nrmse), visit(row.seconds), visit(row.message);
+}
 
 /// survey.csv, survey.html, and the table for a terminal.
 [[nodiscard]] std::string SurveyCsv(const std::vector<SurveyRow>& rows);

@@ -25,7 +25,7 @@ OwnRun ExampleRun() {
 
 TEST(OwnRunBytes, ComeBackAsTheyWere) {
   const OwnRun run = ExampleRun();
-  const auto back = OwnRunOf(ToBytes(run));
+  const auto back = FromBytes<OwnRun>(ToBytes(run));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->summary.stop, run.summary.stop);
   EXPECT_EQ(back->summary.message, run.summary.message);
@@ -45,10 +45,10 @@ TEST(OwnRunBytes, ComeBackAsTheyWere) {
 TEST(OwnRunBytes, PartsAreNoRun) {
   const std::string bytes = ToBytes(ExampleRun());
   for (size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_FALSE(OwnRunOf(bytes.substr(0, size))) << size;
+    EXPECT_FALSE(FromBytes<OwnRun>(bytes.substr(0, size))) << size;
   }
-  EXPECT_FALSE(OwnRunOf(bytes + "x"));
-  EXPECT_FALSE(OwnRunOf(std::string(1000, '\xff')));
+  EXPECT_FALSE(FromBytes<OwnRun>(bytes + "x"));
+  EXPECT_FALSE(FromBytes<OwnRun>(std::string(1000, '\xff')));
 }
 
 }  // namespace

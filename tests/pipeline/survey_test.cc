@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "core/bytes.h"
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
 #include "pipeline/default_setup.h"
@@ -88,23 +89,21 @@ TEST(Survey, TheExitCodeTellsFaultsOfTheFileFromOthers) {
   EXPECT_EQ(SurveyRow{}.status, "failed");  // until something is known
 }
 
-TEST(Survey, ARowGoesThroughTextUnchanged) {
+TEST(Survey, ARowGoesThroughBytesUnchanged) {
   SurveyRow row{.file = "a.urdf", .status = "ok", .bodies = 3, .loops = 1, .freedoms = 2};
   row.gap_m = 1.0 / 3.0;
   row.message = "a, \"b\"\nc";
-  SurveyRow back;
-  ASSERT_TRUE(ReadRowText(RowText(row), &back));
-  EXPECT_EQ(back.status, "ok");
-  EXPECT_EQ(back.bodies, 3);
-  EXPECT_EQ(back.redundant, -1);
-  EXPECT_EQ(back.gap_m, row.gap_m);
-  EXPECT_TRUE(std::isnan(back.inverse_nrmse));
-  EXPECT_EQ(back.message, row.message);
-  row.message.clear();
-  EXPECT_TRUE(ReadRowText(RowText(row), &back));
-  EXPECT_FALSE(ReadRowText("nonsense", &back));
+  const auto back = FromBytes<SurveyRow>(ToBytes(row));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->file, "a.urdf");
+  EXPECT_EQ(back->status, "ok");
+  EXPECT_EQ(back->bodies, 3);
+  EXPECT_EQ(back->redundant, -1);
+  EXPECT_EQ(back->gap_m, row.gap_m);
+  EXPECT_TRUE(std::isnan(back->inverse_nrmse));
+  EXPECT_EQ(back->message, row.message);
+  EXPECT_FALSE(FromBytes<SurveyRow>("nonsense"));
 
-  row.message = "a, \"b\"\nc";
   const std::string csv = SurveyCsv({row});
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
             "file,status,bodies,loops,freedoms,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"

@@ -47,6 +47,22 @@ const settled = (page) => page.evaluate(() => new Promise((done) => {
   requestAnimationFrame(() => requestAnimationFrame(done));
 }));
 
+// What a function of the page says of the pixels of an element: {data (four bytes each), width, height}.
+async function measurePixels(page, selector, measure) {
+  const picture = await page.locator(selector).first().screenshot();
+  const pixels = await page.evaluateHandle(async (png) => {
+    const image = new Image();
+    image.src = 'data:image/png;base64,' + png;
+    await image.decode();
+    const canvas = document.createElement('canvas');
+    [canvas.width, canvas.height] = [image.width, image.height];
+    const context = canvas.getContext('2d');
+    context.drawImage(image, 0, 0);
+    return context.getImageData(0, 0, image.width, image.height);
+  }, picture.toString('base64'));
+  return page.evaluate(measure, pixels);
+}
+
 // The page learns of its window's size a little later than the browser.
 async function resize(page, width, height) {
   await page.setViewportSize({width, height});
@@ -99,4 +115,4 @@ async function gate(folder, faultsOf, promise) {
   process.exitCode = failed || pages.length === 0 ? 1 : 0;
 }
 
-module.exports = {gate, kPatience_ms, launch, openPage, readyTime, resize, settled};
+module.exports = {gate, kPatience_ms, launch, measurePixels, openPage, readyTime, resize, settled};

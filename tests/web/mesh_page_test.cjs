@@ -4,7 +4,7 @@ const assert = require('node:assert/strict');
 const fs = require('node:fs');
 const {after, before, test} = require('node:test');
 
-const {launch, openPage, readyTime, settled} = require('./browser.cjs');
+const {launch, measurePixels, openPage, readyTime, settled} = require('./browser.cjs');
 
 let browser, page;
 const trouble = [], requests = [];
@@ -38,22 +38,13 @@ test('The mesh lies where the robot has it', async () => {
 });
 
 test('The mesh is seen in its colour', async () => {
-  const picture = await page.locator('#scene').first().screenshot();
-  const red = await page.evaluate(async (png) => {
-    const image = new Image();
-    image.src = 'data:image/png;base64,' + png;
-    await image.decode();
-    const canvas = document.createElement('canvas');
-    [canvas.width, canvas.height] = [image.width, image.height];
-    const context = canvas.getContext('2d');
-    context.drawImage(image, 0, 0);
-    const {data} = context.getImageData(0, 0, image.width, image.height);
+  const red = await measurePixels(page, '#scene', ({data, width, height}) => {
     let count = 0;
     for (let i = 0; i < data.length; i += 4) {
       if (data[i] > 90 && data[i] > 2 * data[i + 1] && data[i] > 2 * data[i + 2]) ++count;
     }
-    return count / (image.width * image.height);
-  }, picture.toString('base64'));
+    return count / (width * height);
+  });
   assert.ok(red > 0.02, `${red} of the picture`);
 });
 

@@ -5,7 +5,7 @@ const fs = require('node:fs');
 const {after, before, test} = require('node:test');
 const {pathToFileURL} = require('node:url');
 
-const {launch, openPage, readyTime, resize, settled} = require('./browser.cjs');
+const {launch, measurePixels, openPage, readyTime, resize, settled} = require('./browser.cjs');
 
 const page_file = process.env.MBV_PAGE;
 
@@ -13,20 +13,8 @@ let browser, page, ready_ms;
 const trouble = [], requests = [];
 
 // Different colours on a canvas element: 1 means blank.
-async function coloursOf(selector) {
-  const picture = await page.locator(selector).first().screenshot();
-  return page.evaluate(async (png) => {
-    const image = new Image();
-    image.src = 'data:image/png;base64,' + png;
-    await image.decode();
-    const canvas = document.createElement('canvas');
-    [canvas.width, canvas.height] = [image.width, image.height];
-    const context = canvas.getContext('2d');
-    context.drawImage(image, 0, 0);
-    const data = new Uint32Array(context.getImageData(0, 0, image.width, image.height).data.buffer);
-    return new Set(data).size;
-  }, picture.toString('base64'));
-}
+const coloursOf = (selector) =>
+  measurePixels(page, selector, ({data}) => new Set(new Uint32Array(data.buffer)).size);
 
 const time = () => page.evaluate(() => globalThis.mbverify.timeline.time);
 const frame = () => settled(page);
