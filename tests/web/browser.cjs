@@ -105,7 +105,8 @@ async function gate(folder, faultsOf, promise) {
   if (pages.length === 0) console.error(`no page below ${folder}`);
   const browser = await launch();
   let failed = 0;
-  for (const file of pages) {
+  for (const [done, file] of pages.entries()) {
+    if (done % 20 === 0 && done > 0) console.error(`${done} of ${pages.length} pages opened`);
     const faults = await faultsOf(browser, file);
     if (faults.length) ++failed;
     for (const fault of faults) console.error(`${path.relative(folder, file)}: ${fault}`);
