@@ -5,6 +5,19 @@ include(CMakePackageConfigHelpers)
 install(TARGETS mbverify COMPONENT runtime)
 install(DIRECTORY models scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/mbverify COMPONENT runtime)
 install(DIRECTORY examples docs DESTINATION ${CMAKE_INSTALL_DOCDIR} COMPONENT runtime)
+# The program writes the scripts by which shells complete its commands.
+set(completions ${CMAKE_BINARY_DIR}/completions)
+add_custom_command(TARGET mbverify POST_BUILD COMMAND ${CMAKE_COMMAND} -E make_directory ${completions})
+foreach(shell_file "bash mbverify bash-completion/completions" "zsh _mbverify zsh/vendor-completions"
+                   "fish mbverify.fish fish/vendor_completions.d")
+  separate_arguments(shell_file)
+  list(POP_FRONT shell_file shell file folder)
+  add_custom_command(TARGET mbverify POST_BUILD VERBATIM
+                     COMMAND sh -c "\"$0\" completion ${shell} >'${completions}/${file}'"
+                             $<TARGET_FILE:mbverify>)
+  install(FILES ${completions}/${file} DESTINATION ${CMAKE_INSTALL_DATADIR}/${folder}
+          COMPONENT runtime)
+endforeach()
 install(TARGETS mbv_main EXPORT mbverify ARCHIVE COMPONENT development)
 install(DIRECTORY src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbverify COMPONENT development
         FILES_MATCHING PATTERN "*.h")

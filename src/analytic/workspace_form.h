@@ -27,10 +27,18 @@ struct WorkspaceFile {
   std::variant<std::string, LinePlot, MapPlot> content;
 };
 
+/// A number with its uncertainty (NaN: not known).
+struct WorkspaceMeasure {
+  std::string name;  ///< "volume by voxels"
+  double value = kNan, error = kNan;
+  std::string unit;
+};
+
 struct WorkspaceForm {
   RunSummary summary;
   Diagnostics diagnostics;  ///< parameters that do not suit it
   std::string text;         ///< findings for people
+  std::vector<WorkspaceMeasure> measures;
   bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<WorkspaceFile> files;
   TriangleMesh mesh;         ///< its boundary, for pictures; empty: none

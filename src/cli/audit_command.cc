@@ -6,10 +6,12 @@
 
 #include "audit/audit.h"
 #include "cli/cli.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/diagnostics.h"
 #include "core/text.h"
 #include "core/word_hints.h"
+#include "report/json_text.h"
 #include "scenario/find_model.h"
 
 namespace mbv {
@@ -18,6 +20,7 @@ namespace {
 struct AuditArguments {
   std::string model;
   bool markdown = false;
+  JsonOption json;
 };
 
 std::string Word(AuditVerdict verdict, bool color) {
@@ -50,20 +53,38 @@ std::string RowText(const AuditRow& row, bool color) {
   return text;
 }
 
-void PrintTable(const AuditTable& table, bool color) {
-  Say(stdout, "{}: {}\n", table.mechanism, table.source);
+void PrintTable(const AuditTable& table, std::FILE* to, bool color) {
+  Say(to, "{}: {}\n", table.mechanism, table.source);
   size_t ok = 0, near = 0, wrong = 0, unfixed = 0;
   for (const AuditRow& row : table.rows) {
-    SayText(stdout, RowText(row, color));
+    SayText(to, RowText(row, color));
     ok += row.verdict == AuditVerdict::kOk ? 1 : 0;
     near += row.verdict == AuditVerdict::kApproximation ? 1 : 0;
     wrong += row.verdict == AuditVerdict::kWrong ? 1 : 0;
     unfixed += row.verdict == AuditVerdict::kWrongAndUnfixed ? 1 : 0;
   }
-  Say(stdout,
+  Say(to,
       "  {} rows: {} right as printed, {} approximations, {} wrong as printed and corrected, {} "
       "unexplained, {} without a residual\n\n",
       table.rows.size(), ok, near, wrong, unfixed, table.rows.size() - ok - near - wrong - unfixed);
+}
+
+nlohmann::ordered_json TableJson(const AuditTable& table) {
+  auto rows = nlohmann::ordered_json::array();
+  for (const AuditRow& row : table.rows) {
+    rows.push_back({{"equation", row.equation},
+                    {"erratum", row.erratum},
+                    {"verdict", ToText(row.verdict)},
+                    {"printed", row.printed},
+                    {"corrected", row.corrected},
+                    {"residual_printed", Number(row.residual_printed)},
+                    {"residual_corrected", Number(row.residual_corrected)},
+                    {"limit", Number(row.limit)},
+                    {"scale", Number(row.scale)},
+                    {"unit", row.unit},
+                    {"note", row.note}});
+  }
+  return {{"mechanism", table.mechanism}, {"source", table.source}, {"rows", std::move(rows)}};
 }
 
 // Exit 1 if a corrected form misses its limit: then the corrections are wrong, too.
@@ -71,6 +92,7 @@ int Audit(const AuditArguments& arguments) {
   std::vector<std::string> names;
   int exit_code = 0;
   bool found = false;
+  auto audits = nlohmann::ordered_json::array();
   for (const AuditEntry& entry : Audits()) {
     names.push_back(entry.mechanism);
     if (!arguments.model.empty() && entry.mechanism != arguments.model) continue;
@@ -82,16 +104,19 @@ int Audit(const AuditArguments& arguments) {
       return 2;
     }
     const AuditTable table = entry.run(models_dir->string());
+    audits.push_back(TableJson(table));
     if (arguments.markdown) {
-      fmt::print("{}", ToMarkdown(table));
+      fmt::print(arguments.json.text(), "{}", ToMarkdown(table));
     } else {
-      PrintTable(table, WantsColor());
+      PrintTable(table, arguments.json.text(), WantsColor(arguments.json.text()));
     }
     for (const AuditRow& row : table.rows) {
       if (row.verdict == AuditVerdict::kWrongAndUnfixed) exit_code = 1;
     }
   }
-  if (found) return exit_code;
+  if (found) {
+    return WorseExit(exit_code, arguments.json.Write({{"audits", std::move(audits)}}, {}));
+  }
   return Refuse(fmt::format("there is no equation audit of '{}'", arguments.model),
                 DidYouMean(arguments.model, names, "audited: " + Joined(names)));
 }
@@ -104,6 +129,7 @@ void AddAuditCommand(CLI::App* app, int* exit_code) {
       app->add_subcommand("audit", "Each equation of a paper, as printed and as corrected");
   audit->add_option("model", arguments->model, "model name; all without it");
   audit->add_flag("--markdown", arguments->markdown, "print a Markdown table");
+  arguments->json.AddTo(audit);
   SetFooter(audit, {"audit scara_robot", "audit --markdown"},
             "0 every corrected form holds, 1 one does not, 2 bad input");
   audit->callback([arguments, exit_code] { *exit_code = Audit(*arguments); });

@@ -210,6 +210,7 @@ int RunCli(int argc, char** argv) {
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);
+  AddCompletionCommand(&app, &exit_code);
   for (const char* command : {"init", "run", "render", "model", "check", "survey", "inertia"}) {
     AddPackages(app.get_subcommand(command));
   }

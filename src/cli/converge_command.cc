@@ -6,6 +6,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/output_folder.h"
 #include "pipeline/converge.h"
@@ -19,6 +20,7 @@ struct ConvergeArguments {
   std::string scenario, out = "out";
   std::vector<double> steps_s = ConvergeOptions{}.steps_s;
   std::vector<std::string> set;
+  JsonOption json;
 };
 
 // "" or what went wrong.
@@ -49,18 +51,20 @@ int RunConverge(const ConvergeArguments& arguments) {
       progress.Show(what, fraction);
     };
   }
+  if (const int code = RefuseInput(arguments.json.path(), arguments.scenario); code != 0)
+    return code;
   const ConvergeOutcome outcome = Converge(FindScenario(arguments.scenario), options);
   progress.Clear();
   SayText(stderr, outcome.diagnostics.Text());
   if (outcome.exit_code == 3) Say(stderr, "error: could not run: {}\n", outcome.failure);
   if (outcome.exit_code > 1) return outcome.exit_code;
-  SayText(stdout, ToText(outcome.report));
+  SayText(arguments.json.text(), ToText(outcome.report));
   std::fflush(stdout);
   if (const std::string trouble = WriteFolder(arguments.out, outcome.report); !trouble.empty()) {
     Say(stderr, "error: {}\n", trouble);
     return 2;
   }
-  return outcome.exit_code;
+  return WorseExit(outcome.exit_code, arguments.json.Write(ToJson(outcome.report), {}));
 }
 
 }  // namespace
@@ -77,6 +81,7 @@ void AddConvergeCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   converge->add_option("--set", arguments->set, "replace a value of the scenario: KEY=VALUE");
   converge->add_option("--out", arguments->out, "folder for results")->capture_default_str();
+  arguments->json.AddTo(converge);
   SetFooter(converge,
             {"converge scenarios/slider_crank/turn.yaml --steps 0.004,0.002,0.001,0.0005"},
             "0 orders as expected, 1 a finding, 2 bad input, 3 could not run");

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "cli/cli.h"
-#include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "pipeline/inertia.h"
 #include "report/inertia_text.h"
@@ -14,7 +14,8 @@ namespace mbv {
 namespace {
 
 struct InertiaArguments {
-  std::string model, json;
+  std::string model;
+  JsonOption json;
 };
 
 int Inertia(const InertiaArguments& arguments) {
@@ -27,11 +28,9 @@ int Inertia(const InertiaArguments& arguments) {
   const InertiaCheck check = CheckInertia(*file);
   SayText(stderr, check.diagnostics.Text());
   if (check.diagnostics.has_errors()) return 2;
-  SayText(stdout, InertiaTable(check.bodies));
-  const int exit_code = check.sound() ? 0 : 1;
-  if (arguments.json.empty()) return exit_code;
-  return WorseExit(
-      exit_code, WriteWholeFile(arguments.json, InertiaJson(check.bodies, *file), inputs.files()));
+  SayText(arguments.json.text(), InertiaTable(check.bodies));
+  return WorseExit(check.sound() ? 0 : 1,
+                   arguments.json.Write(InertiaJson(check.bodies, *file), inputs.files()));
 }
 
 }  // namespace
@@ -43,7 +42,7 @@ void AddInertiaCommand(CLI::App* app, int* exit_code) {
   inertia
       ->add_option("model", arguments->model, "model name, model.yaml, .urdf or MJCF (.xml) file")
       ->required();
-  inertia->add_option("--json", arguments->json, "write the numbers to this file, too");
+  arguments->json.AddTo(inertia);
   SetFooter(inertia, {"inertia my_robot.urdf", "inertia my_robot.urdf --package arm=../arm_ws/arm"},
             "0 sound, 1 findings, 2 bad input");
   inertia->callback([arguments, exit_code] { *exit_code = Inertia(*arguments); });

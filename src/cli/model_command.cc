@@ -7,6 +7,7 @@
 #include "cli/assembly_option.h"
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "model_file/load_model.h"
 #include "pipeline/check_file.h"
@@ -106,53 +107,108 @@ int Model(const ModelArguments& arguments) {
   return WriteWholeFile(arguments.out, text, inputs.files());
 }
 
-int CheckFiles(const std::vector<std::string>& arguments) {
+struct CheckArguments {
+  std::vector<std::string> files;
+  JsonOption json;
+};
+
+int CheckFiles(const CheckArguments& arguments) {
   int exit_code = 0;
-  FindingPrinter findings(stdout);
-  for (const std::string& argument : arguments) {
+  std::FILE* const text = arguments.json.text();
+  FindingPrinter findings(text);
+  auto checked = nlohmann::ordered_json::array();
+  std::vector<InputFile> inputs;
+  for (const std::string& argument : arguments.files) {
     std::vector<std::string> unread;
     const std::vector<std::string> files = ExpandYaml(FindScenario(argument), &unread);
-    for (const std::string& line : unread) Say(stdout, "{}\n", line);
+    for (const std::string& line : unread) Say(text, "{}\n", line);
     if (!unread.empty()) exit_code = 2;
     if (files.empty()) {
-      Say(stdout, "{}: error: no *.yaml file in this folder\n", argument);
+      Say(text, "{}: error: no *.yaml file in this folder\n", argument);
       exit_code = 2;
     }
     for (const std::string& file : files) {
+      const InputWatch watch;
       const Diagnostics diagnostics = CheckFile(file);
+      inputs.insert(inputs.end(), watch.files().begin(), watch.files().end());
+      inputs.push_back({file, ""});
+      checked.push_back({{"file", file},
+                         {"ok", !diagnostics.has_errors()},
+                         {"findings", FindingObjects(diagnostics)}});
       findings.Print(diagnostics);
       if (diagnostics.has_errors()) {
         exit_code = 2;
       } else {
-        Say(stdout, "{}: ok\n", file);
+        Say(text, "{}: ok\n", file);
       }
     }
   }
-  return exit_code;
+  return WorseExit(
+      exit_code,
+      arguments.json.Write({{"exit_code", exit_code}, {"files", std::move(checked)}}, inputs));
 }
 
-void ListModels() {
-  fmt::print("models\n");
+nlohmann::ordered_json ListModels(std::FILE* text) {
+  auto models = nlohmann::ordered_json::array();
+  fmt::print(text, "models\n");
   for (const std::string& name : ModelNames(".")) {
     const auto file = FindModel(name, ".");
     const LoadResult loaded = LoadModel(*file);
-    Say(stdout, "  {:<24}{}\n", name,
+    Say(text, "  {:<24}{}\n", name,
         loaded.mechanism ? loaded.mechanism->description
                          : "(has errors: mbverify check " + *file + ")");
+    models.push_back({{"name", name},
+                      {"file", *file},
+                      {"ok", loaded.mechanism.has_value()},
+                      {"description", loaded.mechanism ? loaded.mechanism->description : ""}});
   }
+  return models;
 }
 
-void ListScenarios() {
+nlohmann::ordered_json ListScenarios(std::FILE* text) {
+  auto scenarios = nlohmann::ordered_json::array();
   const auto folder = ScenariosFolder();
-  if (!folder) return;
-  fmt::print("scenarios\n");
+  if (!folder) return scenarios;
+  fmt::print(text, "scenarios\n");
   std::vector<std::string> unread;
   for (const std::string& file : ExpandYaml(*folder, &unread)) {
     const ScenarioHead head = ReadScenarioHead(file);
     if (!head.is_scenario) continue;
-    Say(stdout, "  {}\n      {}\n", file,
+    Say(text, "  {}\n      {}\n", file,
         head.description.empty() ? "(no description)" : head.description);
+    scenarios.push_back({{"file", file}, {"description", head.description}});
   }
+  return scenarios;
+}
+
+// Names alone, one per line: what completion offers.
+int ListNames(const std::string& kind) {
+  if (kind == "models") {
+    for (const std::string& name : ModelNames(".")) fmt::print("{}\n", name);
+    return 0;
+  }
+  const auto folder = ScenariosFolder();
+  if (!folder) return 0;
+  std::vector<std::string> unread;
+  for (const std::string& file : ExpandYaml(*folder, &unread)) {
+    if (!ReadScenarioHead(file).is_scenario) continue;
+    fmt::print("{}\n", fs::path(file).lexically_relative(*folder).replace_extension().string());
+  }
+  return 0;
+}
+
+struct ListArguments {
+  std::string names;
+  JsonOption json;
+};
+
+int List(const ListArguments& arguments) {
+  const JsonOption& json = arguments.json;
+  if (!arguments.names.empty()) return ListNames(arguments.names);
+
+  auto models = ListModels(json.text());
+  auto scenarios = ListScenarios(json.text());
+  return json.Write({{"models", std::move(models)}, {"scenarios", std::move(scenarios)}}, {});
 }
 
 }  // namespace
@@ -185,22 +241,23 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
 }
 
 void AddCheckCommand(CLI::App* app, int* exit_code) {
-  auto files = std::make_shared<std::vector<std::string>>();
+  auto arguments = std::make_shared<CheckArguments>();
   CLI::App* check = app->add_subcommand("check", "Validate model and scenario files");
-  check->add_option("file", *files, "files, or folders of them")->required();
+  check->add_option("file", arguments->files, "files, or folders of them")->required();
+  arguments->json.AddTo(check);
   SetFooter(check, {"check my_model.yaml my_scenario.yaml", "check scenarios/spr_tripod"},
             "0 no errors, 2 bad input");
-  check->callback([files, exit_code] { *exit_code = CheckFiles(*files); });
+  check->callback([arguments, exit_code] { *exit_code = CheckFiles(*arguments); });
 }
 
 void AddListCommand(CLI::App* app, int* exit_code) {
   CLI::App* list = app->add_subcommand("list", "List models and scenarios");
-  SetFooter(list, {"list"}, "0 done");
-  list->callback([exit_code] {
-    ListModels();
-    ListScenarios();
-    *exit_code = 0;
-  });
+  auto arguments = std::make_shared<ListArguments>();
+  list->add_option("--names", arguments->names, "names alone, one per line")
+      ->check(OneOf({"models", "scenarios"}));
+  arguments->json.AddTo(list);
+  SetFooter(list, {"list", "list --json -"}, "0 done, 2 bad input");
+  list->callback([arguments, exit_code] { *exit_code = List(*arguments); });
 }
 
 }  // namespace mbv

@@ -13,6 +13,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/files.h"
 #include "core/scratch_folder.h"
@@ -32,7 +33,8 @@ struct MutateArguments {
   double resolution_percent = 10.0;
   std::vector<std::string> numbers;
   bool markdown = false, no_search = false, no_faults = false;
-  std::string mode = "both", json, part;
+  std::string mode = "both", part;
+  JsonOption json;
   int jobs = 1;
 };
 
@@ -175,25 +177,23 @@ int Mutate(MutateArguments arguments) {
   if (!options->numbers.empty()) {
     arguments.jobs = std::min(arguments.jobs, static_cast<int>(options->numbers.size()));
   }
-  if (const int code = RefuseInput(arguments.json, arguments.scenario); code != 0) return code;
+  if (const int code = RefuseInput(arguments.json.path(), arguments.scenario); code != 0)
+    return code;
   const InputWatch watch;
   const bool shared = arguments.jobs > 1 && arguments.part.empty();
   const MutationReport report = shared ? Workers(arguments).Run() : RunHere(arguments, *options);
   SayText(stderr, report.diagnostics.Text());
   const bool nothing = report.mutations.empty() && report.faults.empty();
   if (report.exit_code > 1 || (nothing && arguments.part.empty())) return report.exit_code;
-  if (!arguments.json.empty()) {
-    std::vector<InputFile> inputs = watch.files();
-    inputs.push_back({arguments.scenario, ""});  // workers read it
-    const int code = WriteWholeFile(arguments.json, ToJson(report), inputs);
-    if (code != 0) return code;
-  }
+  std::vector<InputFile> inputs = watch.files();
+  inputs.push_back({arguments.scenario, ""});  // workers read it
+  if (const int code = arguments.json.Write(ToJson(report), inputs); code != 0) return code;
   if (!arguments.part.empty()) return report.exit_code;
   const std::string text = ToText(report, arguments.markdown);
   if (arguments.markdown) {
-    fmt::print("{}", text);
+    fmt::print(arguments.json.text(), "{}", text);
   } else {
-    SayText(stdout, text);
+    SayText(arguments.json.text(), text);
   }
   return report.exit_code;
 }
@@ -233,7 +233,7 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   mutate->add_option("--part", arguments->part, "i/n: a worker's share")->group("");
   mutate->add_flag("--markdown", arguments->markdown, "print Markdown tables");
-  mutate->add_option("--json", arguments->json, "write the results to this file, too");
+  arguments->json.AddTo(mutate);
   SetFooter(
       mutate,
       {"mutate scenarios/stabilizing_platform/sea_state.yaml --size 1%",

@@ -8,6 +8,7 @@
 #include <thread>
 
 #include "cli/cli.h"
+#include "cli/json_option.h"
 #include "cli/live_table.h"
 #include "cli/terminal.h"
 #include "pipeline/version.h"
@@ -25,6 +26,7 @@ struct RegressArguments {
   std::string shard, worker;
   bool no_reports = false, embed = false, no_pictures = false, no_history = false, quiet = false,
        fail_on_drift = false;
+  JsonOption json;
 };
 
 volatile std::sig_atomic_t interrupted = 0;
@@ -75,7 +77,8 @@ bool Complete(RegressArguments* arguments) {
 int Conclude(const RegressArguments& arguments, const RegressOutcome& outcome) {
   if (!outcome.trouble.empty()) Say(stderr, "{}\n", outcome.trouble);
   if (outcome.files.empty()) return outcome.exit_code;
-  SayText(stdout, ToSummaryText(outcome.report));
+  SayText(arguments.json.text(), ToSummaryText(outcome.report));
+  if (const int code = arguments.json.Write(ToJson(outcome.report), {}); code != 0) return code;
   if (!arguments.quiet) {
     for (const std::string& file : outcome.files) Say(stderr, "wrote {}\n", file);
   }
@@ -112,6 +115,7 @@ void AddOutputOptions(CLI::App* app, RegressArguments* arguments) {
   app->add_option("--markdown", options.markdown, "Markdown file (OUT/summary.md)");
   app->add_option("--tables", options.tables,
                   "documents whose accuracy tables are filled with the results");
+  arguments->json.AddTo(app);
   app->add_option("--label", options.label, "text kept with the run, e.g. a commit");
   app->add_flag("--fail-on-drift", arguments->fail_on_drift, "exit code 1 if a metric drifted");
   app->add_flag("--fail-on-missing", options.fail_on_missing,

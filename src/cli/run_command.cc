@@ -10,6 +10,7 @@
 #include "cli/assembly_option.h"
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/demand.h"
 #include "core/files.h"
@@ -26,6 +27,7 @@ namespace {
 struct RunArguments {
   std::vector<std::string> scenarios, set, assembly;
   std::string out = "out", mode, report_script, kept_audits;
+  JsonOption json;
   bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
 };
 
@@ -45,8 +47,9 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   progress->Clear();
   findings->Print(outcome.diagnostics);
   const auto tell = [&](const auto& report) {
-    const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
-    SayText(stdout,
+    const TableOptions table{.color = WantsColor(arguments.json.text()),
+                             .verbose = arguments.verbose};
+    SayText(arguments.json.text(),
             arguments.quiet ? VerdictLine(ViewOf(report), table) : ToTable(report, table) + "\n");
   };
   if (outcome.report) tell(*outcome.report);
@@ -56,6 +59,17 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   }
   std::fflush(stdout);
   return outcome;
+}
+
+// summary.json of what ran, findings of what did not.
+nlohmann::ordered_json ResultJson(const std::string& file, const RunOutcome& outcome) {
+  if (outcome.report) return nlohmann::ordered_json::parse(ToJson(*outcome.report));
+  if (outcome.stiffness != nullptr) {
+    return nlohmann::ordered_json::parse(ToJson(*outcome.stiffness));
+  }
+  return {{"scenario_file", file},
+          {"exit_code", outcome.exit_code},
+          {"findings", FindingObjects(outcome.diagnostics)}};
 }
 
 // Options of all scenarios; false (after a message) if --set is malformed.
@@ -121,6 +135,8 @@ int Run(const RunArguments& arguments) {
   ProgressLine progress(!arguments.quiet);
   FindingPrinter findings(stderr);
   RunCounts counts;
+  auto results = nlohmann::ordered_json::array();
+  std::vector<InputFile> inputs;
   int exit_code = 0;
   if (!arguments.assembly.empty() && std::ranges::none_of(files, IsRobotFile)) {
     return Refuse("--assembly is for robots (.urdf, .xml)",
@@ -132,6 +148,7 @@ int Run(const RunArguments& arguments) {
     if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
       counts += RunCounts{.scenarios = 1, .bad_input = 1};
+      results.push_back({{"scenario_file", given}, {"exit_code", 2}});
       continue;
     }
     if (progress.active()) {
@@ -141,12 +158,18 @@ int Run(const RunArguments& arguments) {
     }
     const RunOutcome outcome = RunOne(file, options, arguments, &progress, &findings);
     exit_code = WorseExit(exit_code, outcome.exit_code);
+    if (arguments.json.wanted()) {
+      results.push_back(ResultJson(file, outcome));
+      for (InputFile& input : InputsOf(file)) inputs.push_back(std::move(input));
+    }
     counts += outcome.report      ? CountOf(ViewOf(*outcome.report))
               : outcome.stiffness ? CountOf(ViewOf(*outcome.stiffness))
                                   : RunCounts{.scenarios = 1, .bad_input = 1};
   }
-  if (files.size() > 1) SayText(stdout, CountLine(counts));
-  return exit_code;
+  if (files.size() > 1) SayText(arguments.json.text(), CountLine(counts));
+  return WorseExit(
+      exit_code,
+      arguments.json.Write({{"exit_code", exit_code}, {"results", std::move(results)}}, inputs));
 }
 
 }  // namespace
@@ -171,6 +194,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   // How regress shares one script, and what the papers' audits gave, among the reports of a night.
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");
+  arguments->json.AddTo(run);
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");
   run->add_flag("-v,--verbose", arguments->verbose,
                 "also how to read each signal, and what could not be compared");

@@ -6,6 +6,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/output_folder.h"
 #include "pipeline/stiffness.h"
@@ -22,6 +23,7 @@ struct StiffnessArguments {
   int loads = 0;
   double force_max = 1000.0, moment_max = 1.0;
   bool no_simulation = false, verbose = false;
+  JsonOption json;
 };
 
 // "key=value" options as values of a scenario; false after a message.
@@ -188,13 +190,14 @@ int Stiffness(const StiffnessArguments& arguments) {
   SayText(stderr, map_diagnostics.Text());
   if (map_diagnostics.has_errors()) return 2;
   const bool json = arguments.format == "json";
-  const TableOptions table{.color = WantsColor(), .verbose = arguments.verbose};
+  const TableOptions table{.color = WantsColor(arguments.json.text()),
+                           .verbose = arguments.verbose};
   if (json) {
     fmt::print("{}", ToJson(run.report));
   } else {
-    SayText(stdout, ToTable(run.report, table));
+    SayText(arguments.json.text(), ToTable(run.report, table));
   }
-  if (!maps.text.empty()) Say(json ? stderr : stdout, "\n{}", maps.text);
+  if (!maps.text.empty()) Say(json ? stderr : arguments.json.text(), "\n{}", maps.text);
   if (!arguments.out.empty() || !maps.files.empty()) {
     const std::string trouble = WriteFolder(arguments, run, maps.files);
     if (!trouble.empty()) {
@@ -202,7 +205,8 @@ int Stiffness(const StiffnessArguments& arguments) {
       return 2;
     }
   }
-  return run.report.exit_code;
+  return WorseExit(run.report.exit_code,
+                   arguments.json.Write(ToJson(run.report), {{prepared->base.file, ""}}));
 }
 
 }  // namespace
@@ -241,6 +245,7 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
   stiffness->add_option("--format", arguments->format, "of what is printed")
       ->check(OneOf({"text", "json"}))
       ->capture_default_str();
+  arguments->json.AddTo(stiffness);
   stiffness->add_flag("--no-simulation", arguments->no_simulation, "leave MuJoCo out");
   stiffness->add_flag("-v,--verbose", arguments->verbose, "also what could not be compared");
   SetFooter(stiffness,

@@ -6,6 +6,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/bytes.h"
 #include "core/files.h"
@@ -21,6 +22,7 @@ namespace fs = std::filesystem;
 struct SurveyArguments {
   std::string folder, out;
   double timeout_s = 300.0;
+  JsonOption json;
 };
 
 SurveyRow RowOf(const std::string& file, const std::string& scratch, double timeout_s) {
@@ -54,6 +56,12 @@ bool IsModel(const std::string& file) {
          text->find("<worldbody") != std::string::npos;
 }
 
+std::vector<InputFile> RobotFiles(const std::vector<std::string>& files) {
+  std::vector<InputFile> inputs;
+  for (const std::string& file : files) inputs.push_back({file, ""});
+  return inputs;
+}
+
 int Survey(const SurveyArguments& arguments) {
   std::vector<std::string> unread;
   std::vector<std::string> files;
@@ -79,8 +87,9 @@ int Survey(const SurveyArguments& arguments) {
     rows.back().file = fs::path(files[i]).lexically_relative(arguments.folder).string();
     Say(stderr, "{} of {}: {} {}\n", i + 1, files.size(), rows.back().file, rows.back().status);
   }
-  SayText(stdout, SurveyTable(rows));
-  const int exit_code = SurveyExit(rows);
+  SayText(arguments.json.text(), SurveyTable(rows));
+  const int exit_code =
+      WorseExit(SurveyExit(rows), arguments.json.Write(SurveyJson(rows), RobotFiles(files)));
   return arguments.out.empty() ? exit_code : WorseExit(exit_code, WriteSurvey(arguments, rows));
 }
 
@@ -95,6 +104,7 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
+  arguments->json.AddTo(survey);
   SetFooter(
       survey, {"survey my_robots --out out"},
       "0 all ok, or refused for a fault of the file itself; 1 some disagree or do not close; 2 "

@@ -5,11 +5,13 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "model_file/load_model.h"
 #include "pipeline/workspace.h"
+#include "report/json_text.h"
 #include "scenario/find_model.h"
 
 namespace mbv {
@@ -19,7 +21,19 @@ struct WorkspaceArguments {
   std::string model, out = "out";
   std::vector<std::string> set;
   bool no_pictures = false;
+  JsonOption json;
 };
+
+nlohmann::ordered_json OutcomeJson(const std::string& mechanism, const WorkspaceOutcome& outcome) {
+  auto measures = nlohmann::ordered_json::array();
+  for (const WorkspaceMeasure& m : outcome.measures) {
+    measures.push_back({{"name", m.name},
+                        {"value", Number(m.value)},
+                        {"error", Number(m.error)},
+                        {"unit", m.unit}});
+  }
+  return {{"mechanism", mechanism}, {"agree", outcome.agree}, {"measures", std::move(measures)}};
+}
 
 int Workspace(const WorkspaceArguments& arguments) {
   const auto file = FindModel(arguments.model, ".");
@@ -35,7 +49,7 @@ int Workspace(const WorkspaceArguments& arguments) {
   const WorkspaceOutcome outcome = ComputeWorkspace(*loaded.mechanism, !arguments.no_pictures);
   SayText(stderr, outcome.diagnostics.Text());
   if (outcome.diagnostics.has_errors()) return 2;
-  SayText(stdout, outcome.text);
+  SayText(arguments.json.text(), outcome.text);
   if (!outcome.summary.ok()) {
     Say(stderr, "error: {}\n", outcome.summary.message);
     return outcome.summary.stop == Stop::kUnsupported ? 2 : 3;
@@ -46,7 +60,9 @@ int Workspace(const WorkspaceArguments& arguments) {
     return 2;
   }
   Say(stderr, "results in {}\n", folder.target().string());
-  return outcome.agree ? 0 : 1;
+  return WorseExit(
+      outcome.agree ? 0 : 1,
+      arguments.json.Write(OutcomeJson(loaded.mechanism->name, outcome), {{*file, ""}}));
 }
 
 }  // namespace
@@ -62,6 +78,7 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   workspace->add_option("--set", arguments->set, "PARAMETER=VALUE of the model (repeatable)")
       ->allow_extra_args(false);
   workspace->add_option("--out", arguments->out, "result folder")->capture_default_str();
+  arguments->json.AddTo(workspace);
   workspace->add_flag("--no-pictures", arguments->no_pictures, "data files only");
   SetFooter(workspace, {"workspace spr_tripod --set q_min=0.45 --set q_max=0.65"},
             "0 the ways to a measure agree, 1 they contradict each other, 2 bad input, 3 could not "

@@ -16,6 +16,7 @@
 #include "pipeline/load_robot.h"
 #include "pipeline/run_scenario.h"
 #include "report/html_text.h"
+#include "report/json_text.h"
 #include "report/text_table.h"
 
 namespace mbv {
@@ -164,6 +165,28 @@ SurveyRow SurveyFile(const std::string& file, const std::string& scratch) {
   Survey(file, scratch, &row);
   row.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return row;
+}
+
+std::string SurveyJson(const std::vector<SurveyRow>& rows) {
+  auto robots = nlohmann::ordered_json::array();
+  const auto count = [](int n) {
+    return n < 0 ? nlohmann::ordered_json() : nlohmann::ordered_json(n);
+  };
+  for (const SurveyRow& row : rows) {
+    robots.push_back({{"file", row.file},
+                      {"status", row.status},
+                      {"bodies", count(row.bodies)},
+                      {"loops", count(row.loops)},
+                      {"freedoms", count(row.freedoms)},
+                      {"redundant", count(row.redundant)},
+                      {"gap_m", Number(row.gap_m)},
+                      {"gap_rad", Number(row.gap_rad)},
+                      {"inverse_nrmse", Number(row.inverse_nrmse)},
+                      {"forward_nrmse", Number(row.forward_nrmse)},
+                      {"seconds", Number(row.seconds)},
+                      {"message", row.message}});
+  }
+  return Dump({{"robots", std::move(robots)}});
 }
 
 std::string SurveyCsv(const std::vector<SurveyRow>& rows) {

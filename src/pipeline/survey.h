@@ -32,8 +32,9 @@ void VisitMembers(Visit& visit, typename Visit::template Of<SurveyRow>& row) {
   visit(row.forward_nrmse), visit(row.seconds), visit(row.message);
 }
 
-/// survey.csv, survey.html, and the table for a terminal.
+/// survey.csv, survey.html, the same for programs, and the table for a terminal.
 [[nodiscard]] std::string SurveyCsv(const std::vector<SurveyRow>& rows);
+[[nodiscard]] std::string SurveyJson(const std::vector<SurveyRow>& rows);
 [[nodiscard]] std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& folder);
 [[nodiscard]] std::string SurveyTable(const std::vector<SurveyRow>& rows);
 

@@ -87,6 +87,7 @@ WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures) {
   outcome.summary = form.summary;
   outcome.diagnostics.Append(form.diagnostics);
   outcome.text = form.text;
+  outcome.measures = form.measures;
   outcome.agree = form.agree;
   for (const WorkspaceFile& file : form.files) {
     outcome.files.emplace_back(file.name, ContentOf(file));

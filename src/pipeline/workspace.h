@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "analytic/workspace_form.h"
 #include "core/diagnostics.h"
 #include "core/run_summary.h"
 #include "mechanism/mechanism.h"
@@ -15,6 +16,7 @@ struct WorkspaceOutcome {
   RunSummary summary;       ///< kUnsupported when the mechanism has no workspace computation
   Diagnostics diagnostics;  ///< parameters that do not suit it
   std::string text;         ///< findings for people
+  std::vector<WorkspaceMeasure> measures;
   bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
 };

@@ -33,9 +33,9 @@ struct HistoryOptions {
 /// is fine if it can be made.
 [[nodiscard]] std::string CheckHistory(const std::string& path);
 
-/// Text and what went wrong with it.
+/// Text, what went wrong with it, and the same as JSON where there is one.
 struct HistoryText {
-  std::string text, trouble;
+  std::string text, trouble, json = {};
 };
 
 /// A table of the runs, newest last.

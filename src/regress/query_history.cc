@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <set>
 
 #include "regress/history.h"
@@ -11,6 +12,13 @@
 
 namespace mbv {
 namespace {
+
+using Json = nlohmann::ordered_json;
+
+std::string Text(const Json& json) {
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 struct HistoryRow {
   long result = 0;
@@ -70,6 +78,23 @@ std::string CompareRow(Database* database, const std::string& key, const History
   return line + "\n";
 }
 
+// Null where a run does not have the scenario.
+Json ComparedJson(Database* database, const std::string& key, const HistoryRow* a,
+                  const HistoryRow* b) {
+  const auto side = [](const HistoryRow* row) {
+    if (row == nullptr) return Json();
+    return Json({{"status", row->status},
+                 {"force_nrmse", NumberOrNull(row->key_value)},
+                 {"wall_s", NumberOrNull(row->wall_s)}});
+  };
+  Json json = {{"scenario", key}, {"a", side(a)}, {"b", side(b)}};
+  if (a != nullptr && b != nullptr) {
+    json["moved"] =
+        AttributeMovement(LoadGolden(database, a->result), LoadGolden(database, b->result));
+  }
+  return json;
+}
+
 std::string CsvText(const std::string& text) {
   if (text.find_first_of(",\"\n") == std::string::npos) return text;
   std::string quoted = "\"";
@@ -92,8 +117,21 @@ HistoryText ListRuns(const std::string& path) {
   Statement select(&database,
                    "SELECT id, started_utc, as_expected, total, ran, compared, verified, drifted, "
                    "wall_s, label, program, shard FROM run ORDER BY id");
+  Json runs = Json::array();
   while (select.Step()) {
     const std::string label = select.Text(9), shard = select.Text(11);
+    runs.push_back({{"run", select.Integer(0)},
+                    {"started_utc", select.Text(1)},
+                    {"as_expected", select.Integer(2)},
+                    {"total", select.Integer(3)},
+                    {"ran", select.Integer(4)},
+                    {"compared", select.Integer(5)},
+                    {"verified", select.Integer(6)},
+                    {"drifted", select.Integer(7)},
+                    {"wall_s", NumberOrNull(select.Real(8))},
+                    {"label", label},
+                    {"program", select.Text(10)},
+                    {"shard", shard}});
     text += fmt::format("{:>5}  {:<20}  {:>9}  {:>4}  {:>8}  {:>8}  {:>7}  {:>8.1f}  {}{}{}\n",
                         select.Integer(0), select.Text(1),
                         fmt::format("{}/{}", select.Integer(2), select.Integer(3)),
@@ -101,7 +139,7 @@ HistoryText ListRuns(const std::string& path) {
                         select.Real(8), label.empty() ? "" : label + ", ", select.Text(10),
                         shard.empty() ? "" : ", shard " + shard);
   }
-  return {text, database.trouble()};
+  return {text, database.trouble(), Text({{"runs", std::move(runs)}})};
 }
 
 HistoryText CompareRuns(const std::string& path, const std::string& run_a,
@@ -115,15 +153,21 @@ HistoryText CompareRuns(const std::string& path, const std::string& run_a,
   std::string text = RunLine(&database, a) + RunLine(&database, b);
   const auto rows_a = RowsOf(&database, a), rows_b = RowsOf(&database, b);
   text += fmt::format("  {:<52}{:>23}{:>18}\n", "scenario", "force error (RMS)", "wall time");
+  Json scenarios = Json::array();
   for (const auto& [key, row] : rows_b) {
     const auto before = rows_a.find(key);
+    scenarios.push_back(
+        ComparedJson(&database, key, before == rows_a.end() ? nullptr : &before->second, &row));
     text += before == rows_a.end() ? fmt::format("  {:<52}  only in run {}\n", key, b)
                                    : CompareRow(&database, key, before->second, row);
   }
   for (const auto& [key, row] : rows_a) {
-    if (!rows_b.contains(key)) text += fmt::format("  {:<52}  only in run {}\n", key, a);
+    if (rows_b.contains(key)) continue;
+    text += fmt::format("  {:<52}  only in run {}\n", key, a);
+    scenarios.push_back(ComparedJson(&database, key, &row, nullptr));
   }
-  return {text, database.trouble()};
+  return {text, database.trouble(),
+          Text({{"run_a", a}, {"run_b", b}, {"scenarios", std::move(scenarios)}})};
 }
 
 HistoryText HistoryCsv(const std::string& path) {

@@ -10,6 +10,9 @@ mkdir -p "$work"
 cd "$work"
 prefix/bin/mbverify list | grep -q spr_tripod/static
 prefix/bin/mbverify run prefix/share/mbverify/scenarios/spr_tripod/static.yaml --quiet --no-pictures
+grep -q "_mbverify mbverify" prefix/share/bash-completion/completions/mbverify
+grep -q "^#compdef mbverify" prefix/share/zsh/vendor-completions/_mbverify
+grep -q "complete -c mbverify" prefix/share/fish/vendor_completions.d/mbverify.fish
 # The example, copied away from the source tree.
 cp -r "$source/examples/closed_form" example
 "$cmake" -S example -B example/build -G Ninja -DCMAKE_PREFIX_PATH="$work/prefix" >configure.log

@@ -1,0 +1,248 @@
+#include "cli/completion.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+
+namespace mbv {
+namespace {
+
+std::string PathOf(const CLI::App& command) {
+  const CLI::App* parent = command.get_parent();
+  if (parent == nullptr) return "";
+  const std::string above = PathOf(*parent);
+  return above.empty() ? command.get_name() : above + " " + command.get_name();
+}
+
+// The words of a check made by OneOf().
+std::vector<std::string> ValuesOf(const CLI::Option& option) {
+  const std::string type = option.get_type_name(), mark = ":one of ";
+  const size_t at = type.find(mark);
+  if (at == std::string::npos) return {};
+  return CLI::detail::split(type.substr(at + mark.size()), ',');
+}
+
+OptionWords WordsOf(const CLI::Option& option) {
+  OptionWords words;
+  for (const std::string& name : option.get_lnames()) words.names.push_back("--" + name);
+  for (const std::string& name : option.get_snames()) words.names.push_back("-" + name);
+  words.description = option.get_description();
+  words.takes_value = option.get_type_size() != 0;
+  for (std::string value : ValuesOf(option)) words.values.push_back(CLI::detail::trim(value));
+  return words;
+}
+
+void AddWords(const CLI::App& app, std::vector<CommandWords>* commands) {
+  CommandWords words;
+  words.path = PathOf(app);
+  words.description = app.get_description();
+  for (const CLI::Option* option : app.get_options()) {
+    if (option->get_group().empty()) continue;
+    if (!option->get_positional()) {
+      words.options.push_back(WordsOf(*option));
+    } else if (option->get_name() == "model" || option->get_name() == "scenario") {
+      words.names.push_back(option->get_name() + "s");
+    }
+  }
+  commands->push_back(std::move(words));
+  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+    AddWords(*command, commands);
+  }
+}
+
+// The words that follow a command.
+std::vector<std::string> CommandsBelow(const std::string& path,
+                                       const std::vector<CommandWords>& commands) {
+  std::vector<std::string> below;
+  const std::string start = path.empty() ? "" : path + " ";
+  for (const CommandWords& command : commands) {
+    if (command.path.empty() || !command.path.starts_with(start)) continue;
+    const std::string word = command.path.substr(start.size());
+    if (word.find(' ') == std::string::npos) below.push_back(word);
+  }
+  return below;
+}
+
+std::vector<std::string> OptionNames(const CommandWords& command) {
+  std::vector<std::string> names;
+  for (const OptionWords& option : command.options) {
+    names.insert(names.end(), option.names.begin(), option.names.end());
+  }
+  return names;
+}
+
+// In single quotes.
+std::string Quoted(std::string text) {
+  for (size_t at = text.find('\''); at != std::string::npos; at = text.find('\'', at + 4)) {
+    text.replace(at, 1, "'\\''");
+  }
+  return "'" + text + "'";
+}
+
+std::string Bash(const std::vector<CommandWords>& commands) {
+  std::string paths, values, options, below, names;
+  for (const CommandWords& command : commands) {
+    const std::string path = Quoted(command.path);
+    if (!command.path.empty()) {
+      const size_t space = command.path.find(' ');
+      const std::string typed = space == std::string::npos ? " " + command.path : command.path;
+      paths += fmt::format("      {}) command={} ;;\n", Quoted(typed), path);
+    }
+    for (const OptionWords& option : command.options) {
+      if (!option.takes_value) continue;
+      std::vector<std::string> typed;
+      for (const std::string& name : option.names) typed.push_back(command.path + " " + name);
+      for (std::string& pattern : typed) pattern = Quoted(pattern);
+      values += fmt::format("    {}) words={} value=1 ;;\n", fmt::join(typed, "|"),
+                            Quoted(fmt::format("{}", fmt::join(option.values, " "))));
+    }
+    options += fmt::format("      {}) words={} ;;\n", path,
+                           Quoted(fmt::format("{}", fmt::join(OptionNames(command), " "))));
+    const auto words = CommandsBelow(command.path, commands);
+    if (!words.empty()) {
+      below += fmt::format("      {}) words={} ;;\n", path,
+                           Quoted(fmt::format("{}", fmt::join(words, " "))));
+    }
+    for (const std::string& kind : command.names) {
+      names +=
+          fmt::format("      {}) words=$(mbverify list --names {} 2>/dev/null) ;;\n", path, kind);
+    }
+  }
+  return fmt::format(R"(# bash completion for mbverify
+_mbverify() {{
+  local cur=${{COMP_WORDS[COMP_CWORD]}} prev=${{COMP_WORDS[COMP_CWORD-1]}}
+  local command= words= value= word
+  for word in "${{COMP_WORDS[@]:1:COMP_CWORD-1}}"; do
+    case "$command $word" in
+{}    esac
+  done
+  case "$command $prev" in
+{}  esac
+  if [ -z "$value" ] && [[ $cur == -* ]]; then
+    case "$command" in
+{}    esac
+    COMPREPLY=($(compgen -W "$words" -- "$cur"))
+    return
+  fi
+  if [ -z "$value" ]; then
+    case "$command" in
+{}{}    esac
+  fi
+  COMPREPLY=($(compgen -W "$words" -- "$cur"))
+  [ -n "$value" ] && [ -n "$words" ] || COMPREPLY+=($(compgen -f -- "$cur"))
+}}
+complete -o filenames -F _mbverify mbverify
+)",
+                     paths, values, options, below, names);
+}
+
+std::string Fish(const std::vector<CommandWords>& commands) {
+  std::string text = "# fish completion for mbverify\n";
+  for (const CommandWords& command : commands) {
+    const size_t space = command.path.rfind(' ');
+    const std::string above = space == std::string::npos ? "" : command.path.substr(0, space);
+    const std::string last =
+        space == std::string::npos ? command.path : command.path.substr(space + 1);
+    std::string seen = "__fish_use_subcommand";
+    if (!above.empty()) {
+      seen = fmt::format("__fish_seen_subcommand_from {}; and not __fish_seen_subcommand_from {}",
+                         above, fmt::join(CommandsBelow(above, commands), " "));
+    }
+    if (!command.path.empty()) {
+      text += fmt::format("complete -c mbverify -n {} -f -a {} -d {}\n", Quoted(seen), last,
+                          Quoted(command.description));
+    }
+    const std::string here =
+        command.path.empty() ? "__fish_use_subcommand" : "__fish_seen_subcommand_from " + last;
+    for (const OptionWords& option : command.options) {
+      std::string line = fmt::format("complete -c mbverify -n {}", Quoted(here));
+      for (const std::string& name : option.names) {
+        line += name.starts_with("--") ? " -l " + name.substr(2) : " -s " + name.substr(1);
+      }
+      if (option.takes_value) line += " -r";
+      if (!option.values.empty()) {
+        line += " -f -a " + Quoted(fmt::format("{}", fmt::join(option.values, " ")));
+      }
+      text += line + " -d " + Quoted(option.description) + "\n";
+    }
+    for (const std::string& kind : command.names) {
+      text += fmt::format("complete -c mbverify -n {} -a {}\n", Quoted(here),
+                          Quoted("(mbverify list --names " + kind + " 2>/dev/null)"));
+    }
+  }
+  return text;
+}
+
+// zsh gives brackets and colons in descriptions a meaning.
+std::string ForZsh(const std::string& text) {
+  std::string plain;
+  for (const char c : text) {
+    if (c == '[' || c == ']' || c == ':' || c == '\\') plain += '\\';
+    plain += c;
+  }
+  return plain;
+}
+
+std::string ZshArguments(const CommandWords& command) {
+  std::string text = "_arguments";
+  for (const OptionWords& option : command.options) {
+    const std::string value = !option.takes_value ? ""
+                              : option.values.empty()
+                                  ? ":value:_files"
+                                  : fmt::format(":value:({})", fmt::join(option.values, " "));
+    for (const std::string& name : option.names) {
+      text += " \\\n        " + Quoted(name + "[" + ForZsh(option.description) + "]" + value);
+    }
+  }
+  for (const std::string& kind : command.names) {
+    text += " \\\n        " + Quoted("*:" + kind + ":{ compadd $(mbverify list --names " + kind +
+                                     " 2>/dev/null); _files }");
+  }
+  return command.names.empty() ? text + " \\\n        '*:file:_files'" : text;
+}
+
+std::string Zsh(const std::vector<CommandWords>& commands) {
+  std::string listed, cases;
+  for (const CommandWords& command : commands) {
+    if (command.path.empty() || command.path.find(' ') != std::string::npos) continue;
+    listed += "    " + Quoted(command.path + ":" + ForZsh(command.description)) + "\n";
+    cases += fmt::format("    {})\n", command.path);
+    const auto below = CommandsBelow(command.path, commands);
+    if (!below.empty()) {
+      cases += fmt::format("      if (( CURRENT == 3 )); then compadd {}; return; fi\n",
+                           fmt::join(below, " "));
+    }
+    cases += "      " + ZshArguments(command) + " ;;\n";
+  }
+  return fmt::format(R"(#compdef mbverify
+# zsh completion for mbverify
+_mbverify() {{
+  local -a commands=(
+{}  )
+  if (( CURRENT == 2 )); then
+    _describe command commands
+    return
+  fi
+  local command=$words[2]
+  case $command in
+{}  esac
+}}
+if [ "$funcstack[1]" = _mbverify ]; then _mbverify "$@"; else compdef _mbverify mbverify; fi
+)",
+                     listed, cases);
+}
+
+}  // namespace
+
+std::vector<CommandWords> WordsOf(const CLI::App& app) {
+  std::vector<CommandWords> commands;
+  AddWords(app, &commands);
+  return commands;
+}
+
+std::string CompletionScript(const std::string& shell, const std::vector<CommandWords>& commands) {
+  return shell == "bash" ? Bash(commands) : shell == "zsh" ? Zsh(commands) : Fish(commands);
+}
+
+}  // namespace mbv
