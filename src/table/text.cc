@@ -143,19 +143,22 @@ bool IsUnitRow(const CutLine& cut) {
   return filled > 0 && 2 * units >= filled;
 }
 
-// "F1 (kN)", "F1/kN" or "a/(m/s^2)" → name, unit; what is no unit stays in the name.
+// "F1 (kN)", "v (m/s)", "F1/kN" or "a/(m/s^2)" → name, unit; what is no unit stays in the name.
 void SplitHeading(TableHeading* heading) {
   const std::string_view full = Trim(heading->full);
   heading->name = full;
   if (full.empty() || FindUnit(full)) return;
+  const bool bracket = full.back() == ')' || full.back() == ']';
+  const size_t open =
+      bracket ? full.find_last_of(full.back() == ')' ? '(' : '[') : std::string_view::npos;
   const size_t slash = full.find('/');
-  if (slash != std::string_view::npos && slash > 0 && FindUnit(full.substr(slash + 1))) {
+  // A slash in the brackets belongs to the unit: "v (m/s)".
+  if (slash != std::string_view::npos && slash > 0 && slash < open &&
+      FindUnit(full.substr(slash + 1))) {
     heading->name = Trim(full.substr(0, slash));
     heading->unit = StripUnit(full.substr(slash + 1));
     return;
   }
-  if (full.back() != ')' && full.back() != ']') return;
-  const size_t open = full.find_last_of(full.back() == ')' ? '(' : '[');
   if (open == std::string_view::npos || open == 0) return;
   const std::string_view inside = full.substr(open);
   if (!FindUnit(inside)) return;

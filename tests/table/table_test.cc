@@ -85,6 +85,16 @@ TEST(Table, AUnitRowScales) {
                 "{csv: t.csv, columns: {d1.force: F1, d2.force: F2}}"));
 }
 
+// The slash of "mm/s" is not that of "v/s".
+TEST(Table, ASlashInBracketsBelongsToTheUnit) {
+  for (const char* heading : {"v (mm/s)", "v [mm/s]", "v/(mm/s)", "v/mm/s"}) {
+    const Loaded loaded = LoadTable(std::string("t,") + heading + "\n0,1\n1,2\n2,3\n3,5\n",
+                                    "{csv: t.csv, columns: {d1.velocity: v}}");
+    ASSERT_TRUE(loaded.table) << heading << loaded.text;
+    EXPECT_NEAR(loaded.table->values(3, 0), 5e-3, kTiny) << heading;
+  }
+}
+
 TEST(Table, UnitsInHeadingsScale) {
   for (const char* heading : {"t (ms),F1 (kN),F2 [daN]", "t/ms,F1/kN,F2/daN"}) {
     ExpectTheTable(LoadTable(std::string(heading) + "\n0,0.001,1\n500,0.0025,1.1\n1000,-0.003,1.2\n"
