@@ -207,6 +207,7 @@ int RunCli(int argc, char** argv) {
   AddConvergeCommand(&app, &exit_code);
   AddSurveyCommand(&app, &exit_code);
   AddInertiaCommand(&app, &exit_code);
+  AddSizeCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);

@@ -44,5 +44,6 @@ void AddSurveyCommand(CLI::App* app, int* exit_code);
 void AddHistoryCommand(CLI::App* app, int* exit_code);
 void AddInertiaCommand(CLI::App* app, int* exit_code);
 void AddCompletionCommand(CLI::App* app, int* exit_code);
+void AddSizeCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

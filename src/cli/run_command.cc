@@ -29,6 +29,7 @@ struct RunArguments {
   std::string out = "out", mode, report_script, kept_audits;
   JsonOption json;
   bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
+  bool sizing = false;
 };
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
@@ -48,7 +49,8 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   findings->Print(outcome.diagnostics);
   const auto tell = [&](const auto& report) {
     const TableOptions table{.color = WantsColor(arguments.json.text()),
-                             .verbose = arguments.verbose};
+                             .verbose = arguments.verbose,
+                             .sizing = arguments.sizing};
     SayText(arguments.json.text(),
             arguments.quiet ? VerdictLine(ViewOf(report), table) : ToTable(report, table) + "\n");
   };
@@ -195,6 +197,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");
   arguments->json.AddTo(run);
+  run->add_flag("--sizing", arguments->sizing, "all figures of the motors that the model states");
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");
   run->add_flag("-v,--verbose", arguments->verbose,
                 "also how to read each signal, and what could not be compared");

@@ -196,6 +196,12 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
 Attribution BySingleCheck(const Comparison& comparison) {
   for (const CheckResult& check : comparison.checks) {
     if (!Failed(&check) || RowOf(check.metric).of_pair) continue;
+    if (check.metric == Metric::kMotorUse) {
+      return {"", fmt::format("by {}, the motor of {} has a margin of {:.3g} where {:.3g} is "
+                              "required: the witnesses do not disagree about that",
+                              NameOf(comparison, check.subject), check.channel, 1.0 / check.value,
+                              1.0 / *check.limit)};
+    }
     return {check.subject, fmt::format("{}: {} is {} at {}", NameOf(comparison, check.subject),
                                        RowOf(check.metric).title, AmountOf(check),
                                        Place(check.channel, check.time_s))};

@@ -6,6 +6,7 @@
 #include "comparison/derivatives.h"
 #include "comparison/energy_audit.h"
 #include "comparison/force_scale.h"
+#include "comparison/motor_load.h"
 
 namespace mbv {
 namespace {
@@ -196,6 +197,17 @@ void MeasurePower(const ComparisonInput& input, const Trace& trace, WitnessMetri
   }
 }
 
+// The hardest used motor, where a margin is required.
+void MeasureMotors(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
+  if (!input.limits[Metric::kMotorUse].reference) return;
+  for (const Motor& motor : input.mechanism->motors) {
+    const MotorLoad load = MotorLoadOf(*input.mechanism, motor, trace);
+    if (!load.known()) continue;
+    KeepWorst(&out->metrics[Metric::kMotorUse], load.largest_use(), load.largest_use_time_s(),
+              load.drive);
+  }
+}
+
 }  // namespace
 
 WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) {
@@ -207,6 +219,7 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   MeasureCommandRates(input, trace, Metric::kCommandAcceleration, &metrics);
   MeasureClosure(trace, &metrics);
   MeasurePower(input, trace, &metrics);
+  MeasureMotors(input, trace, &metrics);
   if (input.motion->free()) MeasureStart(input, trace, &metrics);
   const bool engine = IsEngine(trace.witness);
   const LimitColumn column = engine ? input.simulation_limits : LimitColumn::kReference;

@@ -17,7 +17,9 @@ constexpr double kWhole = 0.95;  // of the motion: judged up to the samples at i
 bool IsCoarse(const ComparisonInput& input, const CheckResult& check) {
   // A limit that a table's uncertainty widened is judged with the table.
   if (!check.limit || check.stated_limit) return false;
-  if (check.metric == Metric::kTableTube) return *check.limit > 1.0;
+  if (check.metric == Metric::kTableTube || check.metric == Metric::kMotorUse) {
+    return *check.limit > 1.0;
+  }
   const bool metres = std::string(RowOf(check.metric).unit) == "m";
   const double size = metres ? CharacteristicLength(*input.mechanism) : 1.0;
   return *check.limit > kCoarsestLimit * size;

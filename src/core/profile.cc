@@ -28,6 +28,18 @@ Jet Cycloid(double s) {
           2.0 * pi * std::sin(2.0 * pi * s)};
 }
 
+Jet ModifiedSine(double s) {
+  if (s <= 0.0) return {0.0, 0.0, 0.0};
+  if (s >= 1.0) return {1.0, 0.0, 0.0};
+  constexpr double n = 4.0 + pi;
+  const bool middle = s > 0.125 && s < 0.875;
+  const double angle = middle ? (4.0 * pi * s + pi) / 3.0 : 4.0 * pi * s;
+  const double size = middle ? 2.25 : 0.25, rate = middle ? 4.0 * pi / 3.0 : 4.0 * pi;
+  const double constant = middle ? 2.0 : s <= 0.125 ? 0.0 : 4.0;
+  return {(constant + pi * s - size * std::sin(angle)) / n,
+          (pi - size * rate * std::cos(angle)) / n, size * rate * rate * std::sin(angle) / n};
+}
+
 // The chain rule for s = (t − start)/duration and a factor.
 Jet Scale(const Jet& unit, double factor, double duration_s) {
   return {factor * unit.value, factor * unit.rate / duration_s,
@@ -82,6 +94,21 @@ struct Evaluator {
     jet.value += factor * r.v_max * cruise_s;
     return jet;
   }
+  Jet operator()(const ModifiedSineTerm& m) const {
+    return Scale(ModifiedSine((t - m.start_s) / m.duration_s), m.delta, m.duration_s);
+  }
+  Jet operator()(const FourierTerm& f) const {
+    Jet jet{f.offset, 0.0, 0.0};
+    for (size_t k = 0; k < f.a.size(); ++k) {
+      const double w = 2.0 * pi * f.frequency_hz * static_cast<double>(k + 1);
+      const double si = std::sin(w * t), co = std::cos(w * t);
+      jet.value += (f.a[k] * si - f.b[k] * co) / w;
+      jet.rate += f.a[k] * co + f.b[k] * si;
+      jet.acceleration += w * (f.b[k] * co - f.a[k] * si);
+    }
+    return jet;
+  }
+  Jet operator()(const PiecewiseTerm& p) const { return Evaluate(*p.pieces, t); }
 };
 
 struct BreakFinder {
@@ -101,6 +128,14 @@ struct BreakFinder {
     const auto [ramp_s, ramp_length, cruise_s] = TimesOf(r);
     Ends(r.start_s, ramp_s + cruise_s);
     if (cruise_s > 0.0) Ends(r.start_s + 0.5 * ramp_s, cruise_s);
+  }
+  void operator()(const ModifiedSineTerm& m) const {
+    Ends(m.start_s, m.duration_s);
+    Ends(m.start_s + 0.125 * m.duration_s, 0.75 * m.duration_s);
+  }
+  void operator()(const FourierTerm&) const {}
+  void operator()(const PiecewiseTerm& p) const {
+    times->insert(times->end(), p.pieces->breaks.begin(), p.pieces->breaks.end());
   }
 };
 

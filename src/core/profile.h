@@ -1,15 +1,13 @@
 // Time profiles: scalar functions of time with two exact derivatives.
 #pragma once
 
+#include <memory>
 #include <variant>
 #include <vector>
 
-namespace mbv {
+#include "core/piecewise.h"
 
-/// A value with its first and second time derivative.
-struct Jet {
-  double value = 0.0, rate = 0.0, acceleration = 0.0;
-};
+namespace mbv {
 
 /// c
 struct ConstantTerm {
@@ -46,8 +44,27 @@ struct RampCruiseTerm {
   double delta = 0.0;   ///< change of this coordinate over the whole segment
 };
 
-using ProfileTerm = std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, CycloidStepTerm,
-                                 BumpTerm, RampCruiseTerm>;
+/// delta · σ((t − start)/duration), held at 0 before and delta after, with Neklutin's modified sine
+///   (4 + π) σ(s) = π s − sin(4πs)/4               s <= 1/8
+///                  2 + π s − 9/4 sin((4πs + π)/3) s <= 7/8
+///                  4 + π s − sin(4πs)/4           s <= 1
+struct ModifiedSineTerm {
+  double start_s = 0.0, duration_s = 1.0, delta = 0.0;
+};
+/// offset + Σ_k a_k/(kω) sin(kωt) − b_k/(kω) cos(kωt), ω = 2π·frequency, k = 1, 2, …
+/// [Swevers 1997, Eq. 13]: its rate is Σ_k a_k cos(kωt) + b_k sin(kωt).
+struct FourierTerm {
+  double offset = 0.0, frequency_hz = 1.0;
+  std::vector<double> a, b;  ///< amplitudes of the rate; as many b as a
+};
+/// Polynomials on intervals: what core/motion_laws.h makes, and tables.
+struct PiecewiseTerm {
+  std::shared_ptr<const Piecewise> pieces;
+};
+
+using ProfileTerm =
+    std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, CycloidStepTerm, BumpTerm,
+                 RampCruiseTerm, ModifiedSineTerm, FourierTerm, PiecewiseTerm>;
 
 /// The sum of its terms.
 struct Profile {

@@ -16,6 +16,7 @@
 #include "core/triangle_mesh.h"
 #include "core/types.h"
 #include "mechanism/joint_kinds.h"
+#include "mechanism/motor.h"
 
 namespace mbv {
 
@@ -200,7 +201,8 @@ struct Mechanism {
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
-  std::vector<Beam> beams;  ///< of the elastic bodies; empty in most models
+  std::vector<Motor> motors;  ///< at most one per drive; no witness reads them
+  std::vector<Beam> beams;    ///< of the elastic bodies; empty in most models
 
   std::vector<int> tree_joints;     ///< indices of the spanning tree's joints, parents first (every
                                     ///< non-world body is the outboard body of exactly one)

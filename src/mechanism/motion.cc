@@ -1,5 +1,7 @@
 #include "mechanism/motion.h"
 
+#include <algorithm>
+
 namespace mbv {
 
 bool IsLength(const Mechanism& mechanism, const Coordinate& coordinate) {
@@ -20,6 +22,14 @@ bool IsLength(const Mechanism& mechanism, const Coordinate& coordinate) {
 
 std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate) {
   return IsLength(mechanism, coordinate) ? "m" : "rad";
+}
+
+double MotionTable::noise_share() const {
+  const double change = acceleration_change_rms * acceleration_change_rms;
+  const double used = acceleration_rms * acceleration_rms;
+  // The smooth part and what is taken away are nearly orthogonal.
+  const double all = smoothed() ? used + change : used;
+  return all > 0.0 ? std::min(1.0, change / all) : 0.0;
 }
 
 int Motion::FindCommand(const std::string& command_name) const {

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <string>
 #include <vector>
 
@@ -65,6 +66,32 @@ struct InitialValue {
   double position = 0.0, rate = 0.0;  ///< [m] or [rad], per second
 };
 
+/// A table that gives a coordinate (or a load) over time, as a spline.
+struct MotionTable {
+  std::string name;          ///< of what it gives: "crank.drive", "loads.crane.force[0]"
+  std::string file, column;  ///< file name and heading
+  std::string unit;          ///< SI, of the values
+  size_t rows = 0;
+  double from_s = 0.0, to_s = 0.0;  ///< scenario time of the first and the last row
+  double stamp_error_s = 0.0;       ///< rounding of the printed times
+  bool periodic = false, with_rates = false;
+  bool moves = false;              ///< a command: its second derivative makes forces
+  std::string smoothing = "none";  ///< "none", "auto" or "stated"
+  double deviation = 0.0;          ///< standard deviation of the noise: estimated, or as stated
+  /// The smoothing spline less the interpolating one over all rows: that in use, or, without
+  /// smoothing, what `auto` would do. Value and second derivative, and that of the spline in use.
+  double change_rms = 0.0, change_max = 0.0;
+  double acceleration_change_rms = 0.0, acceleration_change_max = 0.0;
+  double acceleration_rms = 0.0;
+  std::shared_ptr<const Piecewise> spline;        ///< in use
+  std::shared_ptr<const Piecewise> interpolated;  ///< through all rows
+  std::vector<std::string> notes = {};            ///< what was found out or assumed of the file
+
+  [[nodiscard]] bool smoothed() const { return smoothing != "none"; }
+  /// The share of the interpolating spline's mean square acceleration that smoothing takes away.
+  [[nodiscard]] double noise_share() const;
+};
+
 struct Motion {
   double duration_s = 1.0;
   double sample_s = 0.01;
@@ -72,6 +99,7 @@ struct Motion {
   std::vector<Load> loads;
   std::vector<DriveForce> forces = {};     ///< free motion only; no drive is commanded and forced
   std::vector<InitialValue> initial = {};  ///< one per freedom that no command holds
+  std::vector<MotionTable> tables = {};    ///< those that profiles above were made of
 
   /// True when some freedoms move by forces (forward dynamics) instead of by commands.
   [[nodiscard]] bool free() const { return !initial.empty(); }

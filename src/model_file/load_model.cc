@@ -15,6 +15,7 @@
 #include "model_file/model_instances.h"
 #include "model_file/model_joints.h"
 #include "model_file/model_meshes.h"
+#include "model_file/model_motors.h"
 #include "model_file/model_outputs.h"
 #include "model_file/model_shapes.h"
 #include "model_file/model_urdf.h"
@@ -69,6 +70,7 @@ struct ModelSections {
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
+  std::vector<Motor> motors;
   internal::ModelBeams beams;
   internal::UrdfSection urdf;
 };
@@ -132,6 +134,14 @@ void ReadElastic(const EachBlock& each_block, const internal::BodyNames& names,
   each_block([&](const Block& block) { beams.Read(block); });
 }
 
+// No witness reads a motor's numbers, so they are none of those that mutate bends.
+void ReadMotors(const Block& model, YamlReader* yaml, ModelSections* s) {
+  const std::map<std::string, double> none;
+  internal::Literals unbent(none);
+  internal::ModelValues values(yaml, &unbent);
+  internal::ReadMotors(model, s->drives, s->joints.joints, &values, &s->motors);
+}
+
 // Empty after a finding that leaves nothing to read.
 std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   YamlReader& yaml = reading->yaml;
@@ -166,6 +176,7 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   ReadElastic(each_block, names, &values, &s);
   urdf.WeldRoot(s.urdf.root, s.bodies, &s.joints);
   internal::OrderDrives(root, &yaml, &s.drives);
+  ReadMotors(blocks.model(), &yaml, &s);
   s.signals.Check(&yaml);
   internal::CheckDrivenOnce(s.drives, s.prescribed, s.joints.joints, s.signals, &yaml);
   return s;
@@ -187,6 +198,7 @@ Mechanism Assembled(const std::string& file, ModelSections* s) {
   mechanism.outputs = std::move(s->outputs);
   mechanism.springs = std::move(s->springs);
   mechanism.couplings = std::move(s->couplings);
+  mechanism.motors = std::move(s->motors);
   mechanism.beams = std::move(s->beams.beams);
   return mechanism;
 }

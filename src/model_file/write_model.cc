@@ -11,6 +11,7 @@
 
 #include "core/names.h"
 #include "mesh/find_mesh.h"
+#include "model_file/model_motors.h"
 
 namespace mbv {
 namespace {
@@ -34,6 +35,7 @@ std::string FreshName(const std::string& name, std::set<std::string>* taken) {
 template <typename T>
 std::vector<std::string> FreshNames(const std::vector<T>& items, std::set<std::string>* taken) {
   std::vector<std::string> names;
+  names.reserve(items.size());
   for (const T& item : items) names.push_back(FreshName(item.name, taken));
   return names;
 }
@@ -258,6 +260,11 @@ class ModelWriter {
           "  {}: {{from: {}, to: {}, stiffness: {}, damping: {}, free_length: {}}}\n", name,
           PointRef(s.body_from, s.p_from, name + "_from"),
           PointRef(s.body_to, s.p_to, name + "_to"), s.stiffness, s.damping, s.free_length_m);
+    }
+    if (!m_.motors.empty()) text += "motors:\n";
+    for (const Motor& motor : m_.motors) {
+      text += fmt::format("  {}: {{{}}}\n", names_.drives[static_cast<size_t>(motor.drive)],
+                          internal::MotorText(motor));
     }
     return text;
   }

@@ -11,11 +11,13 @@
 #include "mechanism/concession.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/engine_errors.h"
+#include "pipeline/load_inertia.h"
 #include "pipeline/own_file_audit.h"
 #include "pipeline/pictures.h"
 #include "pipeline/run_page.h"
 #include "pipeline/run_witnesses.h"
 #include "pipeline/shared_forces.h"
+#include "pipeline/smoothed_forces.h"
 #include "pipeline/stiffness.h"
 #include "pipeline/table_gravity.h"
 #include "pipeline/version.h"
@@ -151,9 +153,12 @@ class ScenarioRun {
     report_.comparison = Compare(input);
     NameConcessions();
     DoubtGravity();
+    report_.tables = scenario().motion.tables;
+    report_.smoothed_forces = SmoothedForces(prepared_->mechanisms.reference, scenario().motion);
     report_.sheets = SheetsOf(base(), report_.comparison);
     if (!other_engines_.empty()) CompareEngines(input);
     report_.witnesses = std::move(runs_.records);
+    SizeMotors();
   }
 
   // Whatever the verdict is, it is about a mechanism that the model describes with an exception.
@@ -161,6 +166,24 @@ class ScenarioRun {
     std::string& text = report_.comparison.attribution.text;
     for (const std::string& concession : ConcessionsIn(outcome_.diagnostics)) {
       text += fmt::format("{}allowed by the model: {}", text.empty() ? "" : "; ", concession);
+    }
+  }
+
+  void SizeMotors() {
+    const Mechanism& mechanism = base();
+    report_.motors = mechanism.motors;
+    std::vector<double> inertias;
+    for (const Motor& motor : mechanism.motors) {
+      const bool needed = motor.rotor_inertia > 0.0;
+      inertias.push_back(needed ? LoadInertia(mechanism, motor.drive) : kNan);
+    }
+    for (const WitnessRecord& record : report_.witnesses) {
+      if (!record.summary.ok() || record.trace.time_s.empty()) continue;
+      for (size_t k = 0; k < mechanism.motors.size(); ++k) {
+        MotorLoad load = MotorLoadOf(mechanism, mechanism.motors[k], record.trace, inertias[k]);
+        load.witness = record.name;
+        if (load.known()) report_.motor_loads.push_back(std::move(load));
+      }
     }
   }
 

@@ -12,9 +12,11 @@
 #include "report/html_report.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
+#include "report/motion_tables.h"
 #include "report/own_file_text.h"
 #include "report/reference_table.h"
 #include "report/result_html.h"
+#include "report/sizing.h"
 
 namespace mbv {
 namespace {
@@ -34,8 +36,10 @@ class PageWriter {
     Pictures();
     page_.Add("Checks", "Checks", ChecksHtml(view_, kHowToReadChecks));
     page_.Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
+    page_.Add("Tables that command the motion", "Tables", MotionTableHtml(report_));
     page_.Add("Drives", "Drives", DrivesHtml(report_));
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
+    page_.Add("Motors", "Motors", SizingHtml(report_));
     page_.Add("The simulator's own error", "Engine", EngineHtml(report_));
     page_.Add("Your own file, run as it is", "File", OwnFileHtml(report_.own_file.get()));
     page_.Add("Energy", "Energy", EnergyHtml(report_));

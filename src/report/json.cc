@@ -1,8 +1,10 @@
 #include "report/json_text.h"
 #include "report/load_figures.h"
+#include "report/motion_tables.h"
 #include "report/own_file_text.h"
 #include "report/report.h"
 #include "report/result_json.h"
+#include "report/sizing.h"
 
 namespace mbv {
 namespace {
@@ -221,9 +223,11 @@ std::string ToJson(const Report& report) {
   json["sample_s"] = Number(report.sample_s);
   json["start_window_s"] = report.start_window_s;
   if (report.comparison.table) json["reference_table"] = ReferenceTableJson(report.comparison);
+  if (!report.tables.empty()) json["motion_tables"] = MotionTableJson(report);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
   if (report.own_file != nullptr) json["own_file"] = OwnFileJson(*report.own_file);
   json["loads"] = LoadsJson(report);
+  if (!report.motors.empty()) json["motors"] = SizingJson(report);
   json["findings"] = FindingsJson(report.findings);
   json["signals"] = SheetsJson(report.sheets);
   json["pictures"] = report.pictures;

@@ -15,6 +15,7 @@ bool IsKey(const CheckResult& check) {
   switch (check.metric) {
     case Metric::kForceNrmse:
     case Metric::kTableTube:
+    case Metric::kMotorUse:
       return true;
     case Metric::kForceMax:
     case Metric::kForceOwn:

@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "comparison/comparison.h"
+#include "comparison/motor_load.h"
 #include "core/run_summary.h"
 #include "core/trace.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
 #include "report/result.h"
 
 namespace mbv {
@@ -44,6 +46,13 @@ struct EngineComparison {
   [[nodiscard]] static const char* NameOf(const std::string& engine);
 };
 
+/// What smoothing the tables of a motion changes of one drive's force, by the reference.
+struct SmoothedForce {
+  std::string drive, unit;
+  double rms = kNan;                            ///< of the force along the smooth motion
+  double change_rms = kNan, change_max = kNan;  ///< against the motion through all rows
+};
+
 /// Of a motion.
 struct Report : ResultFrame {
   std::vector<std::string> drives;   ///< model order
@@ -62,6 +71,10 @@ struct Report : ResultFrame {
   std::vector<WitnessRecord> witnesses;
   Comparison comparison;
   std::vector<SignalSheet> sheets;
+  std::vector<MotionTable> tables;             ///< that command the motion
+  std::vector<SmoothedForce> smoothed_forces;  ///< empty where none is smoothed
+  std::vector<Motor> motors;                   ///< of the model
+  std::vector<MotorLoad> motor_loads;          ///< by witness that ran, then by motor
   std::optional<EngineComparison> engine_comparison;
   std::shared_ptr<const OwnFileAudit> own_file;  ///< of a robot's MJCF; null without one
   std::vector<std::string> pictures;             ///< file names below snapshots/

@@ -121,6 +121,7 @@ struct RunCounts {
 struct TableOptions {
   bool color = false;
   bool verbose = false;  ///< also how to read each signal, and what could not be compared
+  bool sizing = false;   ///< all figures of the motors, not their margins only
 };
 /// "stabilizing_platform / sea_state: AGREE  simulated vs analytic 4.2e-08 (limit 1.0e-07)".
 [[nodiscard]] std::string VerdictLine(const ResultView& view, const TableOptions& options);

@@ -5,9 +5,11 @@
 #include <cmath>
 
 #include "report/html_text.h"
+#include "report/motion_tables.h"
 #include "report/own_file_text.h"
 #include "report/reference_table.h"
 #include "report/report.h"
+#include "report/sizing.h"
 #include "report/terminal_text.h"
 
 namespace mbv {
@@ -21,7 +23,9 @@ class VerdictTableWriter {
     const ResultView view = ViewOf(report);
     out_.Head(view, report.title(), About(report));
     out_.Checks(view);
-    ReferenceTable(report.comparison);
+    AddLines(ReferenceTableLines(report.comparison, out_.verbose()));
+    AddLines(MotionTableLines(report, out_.verbose()));
+    AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
     if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
     Engine(report);
     if (report.own_file != nullptr) WriteOwnFile(*report.own_file, &out_);
@@ -45,8 +49,7 @@ class VerdictTableWriter {
     return about;
   }
 
-  void ReferenceTable(const Comparison& comparison) {
-    const std::vector<std::string> lines = ReferenceTableLines(comparison, out_.verbose());
+  void AddLines(const std::vector<std::string>& lines) {
     if (!lines.empty()) out_.Line();
     for (const std::string& line : lines) out_.Line("  " + line);
   }

@@ -17,6 +17,7 @@ class TerminalText {
   explicit TerminalText(const TableOptions& options) : options_(options) {}
 
   [[nodiscard]] bool verbose() const { return options_.verbose; }
+  [[nodiscard]] bool sizing() const { return options_.sizing; }
   [[nodiscard]] const std::string& text() const { return text_; }
 
   /// Coloured where the terminal is.

@@ -152,6 +152,7 @@ constexpr MetricRow kRows[] = {
      "",
      true,
      {1.0, 1.0, 1.0}},
+    {Metric::kMotorUse, "motor_margin", "motor_use", "motor use, 1 / margin", "", false, {}},
 };
 static_assert(std::size(kRows) == kMetrics);
 

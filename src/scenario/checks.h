@@ -46,8 +46,10 @@ enum class Metric {
   kDerivatives,          ///< drive velocity and acceleration against differences of the positions
   kEnergy,     ///< |energy − start − work| / energy turned over, where work is integrated
   kTableTube,  ///< pair with a table: worst column's difference / its tolerance tube
+  kMotorUse,   ///< motors: the largest share of a limit that is used, 1/margin; judged where a
+               ///< scenario states `motor_margin`, as 1/motor_margin
 };
-inline constexpr int kMetrics = 22;
+inline constexpr int kMetrics = 23;
 
 /// Which column of limits applies.
 enum class LimitColumn { kForward, kInverse, kReference, kServo };

@@ -41,8 +41,9 @@ Command AsCommand(const std::string& name, const Coordinate& coordinate) {
 
 class FreeMotionReader {
  public:
-  FreeMotionReader(ValueReader* values, const Mechanism& mechanism, Motion* motion)
-      : values_(values), mechanism_(mechanism), motion_(motion) {
+  FreeMotionReader(ValueReader* values, const Mechanism& mechanism, ProfileTables* tables,
+                   Motion* motion)
+      : values_(values), mechanism_(mechanism), tables_(tables), motion_(motion) {
     for (NamedCoordinate& named : StartCoordinates(mechanism)) known_.push_back(std::move(named));
   }
 
@@ -101,7 +102,9 @@ class FreeMotionReader {
         continue;
       }
       const ProfileContext context{.unit = ForceUnit(mechanism_, mechanism_.drives[drive]),
-                                   .home = {}};
+                                   .home = {},
+                                   .name = "forces." + entry.key,
+                                   .tables = tables_};
       motion_->forces.push_back(
           {drive, ReadProfile(values_, *entry.value, "forces." + entry.key, context)});
     }
@@ -222,6 +225,7 @@ class FreeMotionReader {
 
   ValueReader* values_;
   const Mechanism& mechanism_;
+  ProfileTables* tables_;
   Motion* motion_;
   std::vector<NamedCoordinate> known_;
 };
@@ -235,8 +239,8 @@ bool IsFree(const YamlNode* motion, const YamlNode* forces) {
 }
 
 void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
-                    const YamlNode* forces, Motion* motion) {
-  FreeMotionReader(values, mechanism, motion).Read(motion_node, forces);
+                    const YamlNode* forces, ProfileTables* tables, Motion* motion) {
+  FreeMotionReader(values, mechanism, tables, motion).Read(motion_node, forces);
 }
 
 }  // namespace mbv

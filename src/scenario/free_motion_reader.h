@@ -4,6 +4,7 @@
 #include "input/value_reader.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "scenario/profile_reader.h"
 
 namespace mbv {
 
@@ -14,6 +15,6 @@ namespace mbv {
 /// the start values: freedoms that are not named start at home, at rest, in joint coordinates in
 /// model order. Findings go to the reader.
 void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
-                    const YamlNode* forces, Motion* motion);
+                    const YamlNode* forces, ProfileTables* tables, Motion* motion);
 
 }  // namespace mbv

@@ -66,8 +66,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     const MotionTimes times = ReadTable(map.Find("reference"));
     const YamlNode* motion = map.Required("motion");
     if (motion == nullptr) return;
-    scenario_.motion =
-        ReadMotion(&values_, *mechanism_, motion, map.Find("loads"), map.Find("forces"), times);
+    scenario_.motion = ReadMotion(&values_, *mechanism_, motion, map.Find("loads"),
+                                  map.Find("forces"), times, &table_findings_);
     FitStep(map.Find("simulation"));
     scenario_.snapshots =
         ReadSnapshots(&values_, map.Find("snapshots"), scenario_.motion.duration_s, *mechanism_);
@@ -179,6 +179,10 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
                   fmt::format("simulation.step_s = {} violates motion.sample_s = {} = n · step_s",
                               settings.step_s, scenario_.motion.sample_s),
                   "samples must fall on whole steps");
+    }
+    if (scenario_.checks[Metric::kMotorUse].reference && mechanism_->motors.empty()) {
+      yaml_.Error(motion, fmt::format("checks.motor_margin: {} has no motors", mechanism_->name),
+                  "state them in the model: motors: {DRIVE: {continuous: …, peak: …}}");
     }
     if (!scenario_.analytic.on && !scenario_.reference.on && !settings.on) {
       yaml_.Error(motion, "analytic, reference and simulation are all off");

@@ -12,6 +12,7 @@
 #include "core/word_hints.h"
 #include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
+#include "table/motion_table.h"
 
 namespace mbv {
 namespace {
@@ -24,11 +25,13 @@ bool SameCoordinate(const Coordinate& a, const Coordinate& b) {
 
 class MotionReader {
  public:
-  MotionReader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise)
+  MotionReader(ValueReader* values, const Mechanism& mechanism, const MotionTimes& otherwise,
+               Diagnostics* files)
       : values_(values),
         mechanism_(mechanism),
         otherwise_(otherwise),
-        names_(CoordinateNames(mechanism)) {}
+        names_(CoordinateNames(mechanism)),
+        tables_{.mechanism = &mechanism, .files = files} {}
 
   Motion Read(const YamlNode* node, const YamlNode* loads, const YamlNode* forces) {
     YamlMap map(
@@ -41,21 +44,43 @@ class MotionReader {
     ReadTimes(map, path_end_s);
     if (loads != nullptr) ReadLoads(*loads);
     if (map.valid() && node != nullptr && IsFree(node, forces)) {
-      ReadFreeMotion(values_, mechanism_, *node, forces, &motion_);
+      ReadFreeMotion(values_, mechanism_, *node, forces, &tables_, &motion_);
     } else if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
       yaml().Error(*node, "motion commands nothing",
                    "give commands, equal or path; or forces and initial values");
     }
+    TakeTables();
     return motion_;
   }
 
  private:
   YamlReader& yaml() { return values_->yaml(); }
 
+  // Every table must last as long as the motion.
+  void TakeTables() {
+    for (size_t i = 0; i < tables_.loaded.size() && times_known_; ++i) {
+      CheckCover(tables_.loaded[i], *tables_.places[i].node, tables_.places[i].path,
+                 motion_.duration_s, &yaml());
+    }
+    motion_.tables = std::move(tables_.loaded);
+  }
+
+  // The shortest of the commands' tables, if any ends.
+  [[nodiscard]] std::optional<double> TableEnd() const {
+    std::optional<double> end_s;
+    if (tables_.failed) end_s = 1.0;  // it is not known, and no second finding
+    for (const MotionTable& table : tables_.loaded) {
+      if (!table.periodic) end_s = std::min(end_s.value_or(table.to_s), table.to_s);
+    }
+    return end_s;
+  }
+
   void ReadTimes(const YamlMap& map, double path_end_s) {
     if (!map.valid() || map.node() == nullptr) return;
     std::optional<double> duration_s = path_end_s;
-    if (std::isnan(path_end_s)) duration_s = otherwise_.duration_s;
+    if (std::isnan(path_end_s)) {
+      duration_s = otherwise_.duration_s ? otherwise_.duration_s : TableEnd();
+    }
     if (!duration_s || map.Has("duration_s")) {
       duration_s = values_->RequiredPositive(map, "duration_s");
     }
@@ -64,6 +89,7 @@ class MotionReader {
       motion_.sample_s = values_->Positive(*sample, "motion.sample_s").value_or(motion_.sample_s);
     }
     if (!duration_s) return;
+    times_known_ = true;
     motion_.duration_s = *duration_s;
     if (motion_.sample_s > motion_.duration_s ||
         motion_.duration_s / motion_.sample_s > kMostSamples) {
@@ -105,7 +131,10 @@ class MotionReader {
       const auto coordinate = FindCoordinate(entry, "motion.commands");
       if (!coordinate) continue;
       const ProfileContext context{.unit = CoordinateUnit(mechanism_, *coordinate),
-                                   .home = HomeValue(mechanism_, *coordinate)};
+                                   .home = HomeValue(mechanism_, *coordinate),
+                                   .name = entry.key,
+                                   .moves = true,
+                                   .tables = &tables_};
       AddCommand(entry, {.name = entry.key,
                          .terms = {{*coordinate, 1.0}},
                          .profile = ReadProfile(values_, *entry.value, path, context)});
@@ -261,8 +290,9 @@ class MotionReader {
     const auto items = yaml().Items(*node, path, 3);
     if (!items) return;
     for (size_t i = 0; i < 3; ++i) {
-      (*profiles)[i] = ReadProfile(values_, *(*items)[i], fmt::format("{}[{}]", path, i),
-                                   {.unit = unit, .home = {}});
+      const std::string name = fmt::format("{}[{}]", path, i);
+      (*profiles)[i] = ReadProfile(values_, *(*items)[i], name,
+                                   {.unit = unit, .home = {}, .name = name, .tables = &tables_});
     }
   }
 
@@ -299,7 +329,9 @@ class MotionReader {
   const Mechanism& mechanism_;
   const MotionTimes otherwise_;
   std::vector<std::string> names_;
+  ProfileTables tables_;
   Motion motion_;
+  bool times_known_ = false;
 };
 
 Pose HomePose(const Mechanism& mechanism, int body) {
@@ -359,8 +391,9 @@ double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
 }
 
 Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
-                  const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise) {
-  return MotionReader(values, mechanism, otherwise).Read(motion, loads, forces);
+                  const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise,
+                  Diagnostics* files) {
+  return MotionReader(values, mechanism, otherwise, files).Read(motion, loads, forces);
 }
 
 }  // namespace mbv

@@ -14,12 +14,12 @@ struct MotionTimes {
   std::optional<double> duration_s, sample_s;
 };
 
-/// Reads the sections against a mechanism. Findings go to the reader; the motion is complete only
-/// if it reported no error.
+/// Reads the sections against a mechanism, with the tables that profiles name. Findings go to the
+/// reader, those about tables' files to `files`; the motion is complete only if there was no error.
 [[nodiscard]] Motion ReadMotion(ValueReader* values, const Mechanism& mechanism,
                                 const YamlNode* motion, const YamlNode* loads,
-                                const YamlNode* forces = nullptr,
-                                const MotionTimes& otherwise = {});
+                                const YamlNode* forces, const MotionTimes& otherwise,
+                                Diagnostics* files);
 
 /// Names a command may use: prescribed joints, drives, output components ("platform.yaw").
 [[nodiscard]] std::vector<std::string> CoordinateNames(const Mechanism& mechanism);

@@ -2,6 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
+#include "core/motion_laws.h"
+#include "table/motion_table.h"
+
 namespace mbv {
 namespace {
 
@@ -37,7 +43,8 @@ class ProfileReader {
 
   void ReadTerm(const YamlNode& node, const std::string& path, Profile* profile) {
     YamlMap map(&values_->yaml(), &node, path,
-                {"value", "value_deg", "value_mm", "sine", "ramp", "poly345", "cycloid", "bump"});
+                {"value", "value_deg", "value_mm", "sine", "ramp", "poly345", "cycloid", "bump",
+                 "modified_sine", "trapezoid", "s_curve", "fourier", "via", "table"});
     if (!map.valid()) return;
     if (node.entries.size() != 1) {
       values_->yaml().Error(node,
@@ -58,7 +65,15 @@ class ProfileReader {
       if (const auto rate = RequiredAmount(term, "rate")) {
         profile->terms.emplace_back(RampTerm{*rate});
       }
-    } else if (key == "poly345" || key == "cycloid" || key == "bump") {
+    } else if (key == "trapezoid" || key == "s_curve") {
+      ReadLimited(key == "s_curve", value, term_path, profile);
+    } else if (key == "fourier") {
+      ReadFourier(value, term_path, profile);
+    } else if (key == "via") {
+      ReadVia(value, term_path, profile);
+    } else if (key == "table") {
+      ReadTable(*value, term_path, profile);
+    } else if (key == "poly345" || key == "cycloid" || key == "bump" || key == "modified_sine") {
       ReadStep(key, value, term_path, profile);
     }
   }
@@ -66,21 +81,140 @@ class ProfileReader {
   void ReadSine(const YamlNode* node, const std::string& path, Profile* profile) {
     YamlMap term = Map(node, path, "amplitude", {"frequency_hz", "period_s", "phase", "phase_deg"});
     if (!term.valid()) return;
-    SineTerm sine;
     const auto amplitude = RequiredAmount(term, "amplitude");
+    const auto frequency_hz = Frequency(term, *node);
+    const double phase_rad = values_->InUnit(term, "phase", {kPlain, kDeg}).value_or(0.0);
+    if (!amplitude || !frequency_hz) return;
+    profile->terms.emplace_back(SineTerm{*amplitude, *frequency_hz, phase_rad});
+  }
+
+  // One of frequency_hz and period_s.
+  std::optional<double> Frequency(const YamlMap& term, const YamlNode& node) {
     const YamlNode *frequency = term.Find("frequency_hz"), *period = term.Find("period_s");
     if ((frequency == nullptr) == (period == nullptr)) {
-      values_->yaml().Error(*node, fmt::format("{} needs one of frequency_hz and period_s", path));
+      values_->yaml().Error(node,
+                            fmt::format("{} needs one of frequency_hz and period_s", term.path()));
+      return {};
+    }
+    if (frequency != nullptr) return values_->Positive(*frequency, term.PathOf("frequency_hz"));
+    const auto period_s = values_->Positive(*period, term.PathOf("period_s"));
+    return period_s ? std::optional(1.0 / *period_s) : std::nullopt;
+  }
+
+  // From rest to rest within limits of rate, acceleration and jerk.
+  void ReadLimited(bool s_curve, const YamlNode* node, const std::string& path, Profile* profile) {
+    std::vector<std::string> keys = {"start_s"};
+    for (const char* limit : {"v_max", "a_max", "j_max"}) {
+      if (!s_curve && *limit == 'j') continue;
+      for (std::string& key : InEveryUnit(limit)) keys.push_back(std::move(key));
+    }
+    YamlMap term = Map(node, path, "delta", keys);
+    if (!term.valid()) return;
+    const auto delta = RequiredAmount(term, "delta");
+    const auto v_max = PositiveAmount(term, "v_max"), a_max = PositiveAmount(term, "a_max");
+    const auto j_max = s_curve ? PositiveAmount(term, "j_max") : 1.0;
+    const double start_s = values_->InUnit(term, "start_s", {kPlain}).value_or(0.0);
+    if (!delta || !v_max || !a_max || !j_max || *delta == 0.0) return;
+    const MotionLimits limits{*v_max, *a_max, *j_max};
+    AddPieces(s_curve ? SCurve(start_s, *delta, limits) : Trapezoid(start_s, *delta, limits),
+              profile);
+  }
+
+  void ReadFourier(const YamlNode* node, const std::string& path, Profile* profile) {
+    std::vector<std::string> keys = {"frequency_hz", "period_s"};
+    for (const char* list : {"a", "b"}) {
+      for (std::string& key : InEveryUnit(list)) keys.push_back(std::move(key));
+    }
+    YamlMap term = Map(node, path, "offset", keys);
+    if (!term.valid()) return;
+    FourierTerm fourier;
+    const auto frequency_hz = Frequency(term, *node);
+    fourier.offset = Amount(term, "offset").value_or(0.0);
+    const auto a = Amounts(term, "a"), b = Amounts(term, "b");
+    if (!frequency_hz || !a || !b) return;
+    if (a->size() != b->size() || a->empty()) {
+      values_->yaml().Error(*node,
+                            fmt::format("{}: {} numbers a and {} numbers b violate 1 <= "
+                                        "count of a = count of b",
+                                        path, a->size(), b->size()),
+                            "write 0 for a harmonic that is left out");
       return;
     }
-    const auto rate = frequency != nullptr
-                          ? values_->Positive(*frequency, term.PathOf("frequency_hz"))
-                          : values_->Positive(*period, term.PathOf("period_s"));
-    sine.phase_rad = values_->InUnit(term, "phase", {kPlain, kDeg}).value_or(0.0);
-    if (!amplitude || !rate) return;
-    sine.amplitude = *amplitude;
-    sine.frequency_hz = frequency != nullptr ? *rate : 1.0 / *rate;
-    profile->terms.emplace_back(sine);
+    fourier.frequency_hz = *frequency_hz;
+    fourier.a = *a;
+    fourier.b = *b;
+    profile->terms.emplace_back(std::move(fourier));
+  }
+
+  void ReadVia(const YamlNode* node, const std::string& path, Profile* profile) {
+    YamlMap term = Map(node, path, "values", {"times_s", "rests_s"});
+    if (!term.valid()) return;
+    const YamlNode* times_node = term.Required("times_s");
+    const auto times = times_node == nullptr
+                           ? std::nullopt
+                           : values_->Numbers(*times_node, term.PathOf("times_s"));
+    const auto amounts = Amounts(term, "values");
+    if (!times || !amounts || !CheckVia(*times_node, path, *times, amounts->size())) return;
+    const auto rest = ReadRests(term, *times);
+    if (rest) AddPieces(Via(*times, *amounts, *rest), profile);
+  }
+
+  bool CheckVia(const YamlNode& node, const std::string& path, const std::vector<double>& times,
+                size_t amounts) {
+    if (times.size() != amounts || amounts < 2) {
+      values_->yaml().Error(node, fmt::format("{}: {} times and {} values violate 2 <= count of "
+                                              "times_s = count of values",
+                                              path, times.size(), amounts));
+      return false;
+    }
+    const auto back = std::adjacent_find(times.begin(), times.end(), std::greater_equal<>());
+    if (back == times.end()) return true;
+    values_->yaml().Error(node, fmt::format("{}.times_s: {} after {} violates increasing times",
+                                            path, *(back + 1), *back));
+    return false;
+  }
+
+  // `all`, or times of points between the first and the last.
+  std::optional<std::vector<bool>> ReadRests(const YamlMap& term,
+                                             const std::vector<double>& times) {
+    const YamlNode* node = term.Find("rests_s");
+    if (node == nullptr) return std::vector<bool>(times.size(), false);
+    if (node->is_scalar() && node->text == "all") return std::vector<bool>(times.size(), true);
+    const auto rests = values_->Numbers(*node, term.PathOf("rests_s"));
+    if (!rests) return {};
+    std::vector<bool> rest(times.size(), false);
+    for (const double at : *rests) {
+      const auto found = std::find(times.begin(), times.end(), at);
+      if (found == times.end()) {
+        values_->yaml().Error(*node,
+                              fmt::format("{} = {} is none of times_s", term.PathOf("rests_s"), at),
+                              "rests_s: all rests at every point");
+        return {};
+      }
+      rest[static_cast<size_t>(found - times.begin())] = true;
+    }
+    return rest;
+  }
+
+  void ReadTable(const YamlNode& node, const std::string& path, Profile* profile) {
+    ProfileTables* tables = context_.tables;
+    if (tables == nullptr) {
+      values_->yaml().Error(node, path + ": a table has no meaning here");
+      return;
+    }
+    auto table =
+        LoadMotionTable(values_, node, path, {context_.name, context_.unit, context_.moves},
+                        *tables->mechanism, tables->files);
+    tables->failed = tables->failed || !table;
+    if (!table) return;
+    profile->terms.emplace_back(PiecewiseTerm{table->spline});
+    tables->places.push_back({node.Find("csv"), path});
+    tables->loaded.push_back(std::move(*table));
+  }
+
+  static void AddPieces(Piecewise pieces, Profile* profile) {
+    profile->terms.emplace_back(
+        PiecewiseTerm{std::make_shared<const Piecewise>(std::move(pieces))});
   }
 
   void ReadStep(const std::string& key, const YamlNode* node, const std::string& path,
@@ -94,6 +228,8 @@ class ProfileReader {
     if (!amount || !duration_s) return;
     if (key == "bump") {
       profile->terms.emplace_back(BumpTerm{start_s, *duration_s, *amount});
+    } else if (key == "modified_sine") {
+      profile->terms.emplace_back(ModifiedSineTerm{start_s, *duration_s, *amount});
     } else if (key == "cycloid") {
       profile->terms.emplace_back(CycloidStepTerm{start_s, *duration_s, *amount});
     } else {
@@ -108,20 +244,46 @@ class ProfileReader {
     return {&values_->yaml(), node, path, keys};
   }
 
-  // A length or angle; the unit must suit the coordinate.
-  std::optional<double> Amount(const YamlMap& map, const std::string& key) {
+  // A length or angle, or its rates; the unit must suit the coordinate. Empty when left out.
+  YamlMap::InUnit FindAmount(const YamlMap& map, const std::string& key) {
     const YamlMap::InUnit found = map.FindInUnit(key, {kPlain, kDeg, kMm});
+    if (found.node == nullptr || found.unit.Suits(context_.unit)) return found;
+    values_->yaml().Error(
+        *found.node,
+        fmt::format("{} is given, but this value is in {}", map.PathOf(found.key), context_.unit),
+        fmt::format("write {}", map.PathOf(key)));
+    return {};
+  }
+
+  std::optional<double> Amount(const YamlMap& map, const std::string& key) {
+    const YamlMap::InUnit found = FindAmount(map, key);
     if (found.node == nullptr) return {};
-    if (!found.unit.Suits(context_.unit)) {
-      values_->yaml().Error(
-          *found.node,
-          fmt::format("{} is given, but this value is in {}", map.PathOf(found.key), context_.unit),
-          fmt::format("write {}", map.PathOf(key)));
-      return {};
-    }
     const auto number = values_->Number(*found.node, map.PathOf(found.key));
     if (!number) return {};
     return found.unit.to_si(*number);
+  }
+
+  // A required list.
+  std::optional<std::vector<double>> Amounts(const YamlMap& map, const std::string& key) {
+    if (map.FindInUnit(key, {kPlain, kDeg, kMm}).node == nullptr) {
+      (void)map.Required(key);  // reports it
+      return {};
+    }
+    const YamlMap::InUnit found = FindAmount(map, key);
+    if (found.node == nullptr) return {};
+    auto numbers = values_->Numbers(*found.node, map.PathOf(found.key));
+    if (!numbers) return {};
+    for (double& number : *numbers) number = found.unit.to_si(number);
+    return numbers;
+  }
+
+  std::optional<double> PositiveAmount(const YamlMap& map, const std::string& key) {
+    const auto amount = RequiredAmount(map, key);
+    if (!amount || *amount > 0.0) return amount;
+    const YamlMap::InUnit found = map.FindInUnit(key, {kPlain, kDeg, kMm});
+    values_->yaml().Error(*found.node, fmt::format("{0} = {1} violates {0} > 0",
+                                                   map.PathOf(found.key), found.node->text));
+    return {};
   }
 
   std::optional<double> RequiredAmount(const YamlMap& map, const std::string& key) {

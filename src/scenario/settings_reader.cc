@@ -29,6 +29,7 @@ std::vector<std::string> CheckKeys() {
   std::vector<std::string> keys = {"start_window_s"};
   for (const MetricRow& row : MetricRows()) {
     keys.emplace_back(row.key);
+    if (row.metric == Metric::kMotorUse) continue;  // the same for all
     keys.push_back(std::string(kReferencePrefix) + row.key);
   }
   return keys;
@@ -41,7 +42,7 @@ void ReadCheck(ValueReader* values, const YamlEntry& entry, CheckLimits* limits)
       FindMetric(reference ? entry.key.substr(kReferencePrefix.size()) : entry.key);
   if (row == nullptr) return;  // reported as unknown key
   MetricLimits& target = (*limits)[row->metric];
-  if (entry.value->is_map() && !reference) {
+  if (entry.value->is_map() && !reference && row->metric != Metric::kMotorUse) {
     YamlMap map(&values->yaml(), entry.value.get(), path, {"forward", "inverse", "servo"});
     for (const YamlEntry& mode : entry.value->entries) {
       const LimitValue value = ReadLimit(values, *mode.value, JoinPath(path, mode.key));
@@ -54,7 +55,11 @@ void ReadCheck(ValueReader* values, const YamlEntry& entry, CheckLimits* limits)
   }
   const LimitValue value = ReadLimit(values, *entry.value, path);
   if (!value.valid) return;
-  if (reference) {
+  if (row->metric == Metric::kMotorUse) {
+    // A margin of at least 1.2 is a use of at most 1/1.2, whoever computed it.
+    const auto use = value.limit ? std::optional(1.0 / *value.limit) : std::nullopt;
+    target = {.forward = use, .inverse = use, .reference = use, .servo = use};
+  } else if (reference) {
     target.reference = value.limit;
   } else {
     target.forward = target.inverse = value.limit;

@@ -43,7 +43,7 @@ class Mapper {
         mechanism_(mechanism),
         yaml_(yaml),
         diagnostics_(diagnostics),
-        signals_(TableSignals(mechanism)),
+        signals_(settings.signals.empty() ? TableSignals(mechanism) : settings.signals),
         used_(text.columns, false) {}
 
   TableMapping Map() {
@@ -51,10 +51,10 @@ class Mapper {
     for (const TableColumnSettings& column : settings_.columns) {
       if (column.signal != "time") MapStated(column);
     }
-    MapByName();
+    if (settings_.signals.empty()) MapByName();
     if (mapping_.columns.empty() && !failed_) ReportNothing();
     NoteUnits();
-    NoteUnused();
+    if (settings_.signals.empty()) NoteUnused();
     return std::move(mapping_);
   }
 
@@ -71,7 +71,7 @@ class Mapper {
 
   // The column that the settings name; nothing after a finding.
   std::optional<size_t> FindStated(const TableColumnSettings& settings) {
-    const std::string path = JoinPath("reference.columns", settings.signal);
+    const std::string& path = settings.path;
     if (settings.number > 0) {
       const auto index = static_cast<size_t>(settings.number - 1);
       if (index < text_.columns) return index;
@@ -175,13 +175,13 @@ class Mapper {
     failed_ = true;
     if (in_columns) {
       yaml_->AddAt(Severity::kError, stated->unit_line, stated->unit_character,
-                   "reference.columns.time.unit: " + message, hint);
+                   stated->path + ".unit: " + message, hint);
     } else if (!settings_.time_unit.empty()) {
       yaml_->AddAt(Severity::kError, settings_.time_unit_line, settings_.time_unit_character,
-                   "reference.time_unit: " + message, hint);
+                   settings_.path + ".time_unit: " + message, hint);
     } else {
       AddFileFinding(Severity::kError, heading, NameOf(mapping_.time_index) + ": " + message,
-                     hint + "; or state reference.time_unit");
+                     hint + fmt::format("; or state {}.time_unit", settings_.path));
     }
   }
 
@@ -255,8 +255,8 @@ class Mapper {
   void Take(size_t index, const Channel& signal, const TableColumnSettings* settings, bool ours) {
     if (used_[index] && settings != nullptr) {
       yaml_->AddAt(Severity::kWarning, settings->place.line, settings->place.column,
-                   fmt::format("reference.columns.{}: column '{}' is used for another signal, too",
-                               settings->signal, NameOf(index)));
+                   fmt::format("{}: column '{}' is used for another signal, too", settings->path,
+                               NameOf(index)));
     }
     used_[index] = true;
     MappedColumn mapped{.index = index, .column = {}, .settings = settings};
@@ -301,13 +301,16 @@ class Mapper {
     const std::string hint = UnitHint(unit ? "" : text, si);
     if (stated) {
       yaml_->AddAt(Severity::kError, mapped->settings->unit_line, mapped->settings->unit_character,
-                   fmt::format("reference.columns.{}.unit: {}", mapped->settings->signal, message),
-                   hint);
+                   fmt::format("{}.unit: {}", mapped->settings->path, message), hint);
     } else {
-      AddFileFinding(
-          Severity::kError, heading, mapped->column.heading + ": " + message,
-          hint + fmt::format("; or state reference.columns.{}.unit", mapped->column.channel.name));
+      AddFileFinding(Severity::kError, heading, mapped->column.heading + ": " + message,
+                     hint + fmt::format("; or state {}.unit", PathOf(*mapped)));
     }
+  }
+
+  static std::string PathOf(const MappedColumn& mapped) {
+    return mapped.settings != nullptr ? mapped.settings->path
+                                      : "reference.columns." + mapped.column.channel.name;
   }
 
   // A stated unit wins over the heading's, but not silently.
@@ -316,8 +319,8 @@ class Mapper {
     const auto written = FindUnit(heading.unit);
     if (!written || (written->si == stated.si && written->factor == stated.factor)) return;
     yaml_->AddAt(Severity::kWarning, mapped.settings->unit_line, mapped.settings->unit_character,
-                 fmt::format("reference.columns.{}.unit = '{}', but the heading of {} says '{}'",
-                             mapped.settings->signal, stated.text, settings_.csv, heading.unit),
+                 fmt::format("{}.unit = '{}', but the heading of {} says '{}'",
+                             mapped.settings->path, stated.text, settings_.csv, heading.unit),
                  "the scenario's unit is used");
   }
 

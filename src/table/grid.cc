@@ -59,16 +59,6 @@ double Unevenness(const std::vector<double>& time_s, double spacing_s) {
   return worst;
 }
 
-// The times at which the rows were taken: evened out where only rounding makes them uneven.
-std::vector<double> TrueTimes(const ReferenceTable& table) {
-  std::vector<double> times = table.time_s;
-  if (!table.uniform) return times;
-  for (size_t i = 0; i < times.size(); ++i) {
-    times[i] = table.time_s[0] + static_cast<double>(i) * table.spacing_s;
-  }
-  return times;
-}
-
 // 1, 2 or 5 times a power of ten, at or below x.
 double RoundDown125(double x) {
   const double power = std::pow(10.0, std::floor(std::log10(x) + 1e-9));
@@ -328,6 +318,15 @@ void DescribeTimes(ReferenceTable* table) {
     table->spacing_s = MedianStep(time_s);
     if (common == 1) table->stamp_error_s = 0.5 / unit;
   }
+}
+
+std::vector<double> TrueTimes(const ReferenceTable& table) {
+  std::vector<double> times = table.time_s;
+  if (!table.uniform) return times;
+  for (size_t i = 0; i < times.size(); ++i) {
+    times[i] = table.time_s[0] + static_cast<double>(i) * table.spacing_s;
+  }
+  return times;
 }
 
 double SuggestSample(const ReferenceTable& table) {

@@ -9,4 +9,7 @@ namespace mbv {
 /// steps rounded to the printed digits, or anything else.
 void DescribeTimes(ReferenceTable* table);
 
+/// The times at which the rows were taken: evened out where only rounding makes them uneven.
+[[nodiscard]] std::vector<double> TrueTimes(const ReferenceTable& table);
+
 }  // namespace mbv

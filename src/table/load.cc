@@ -320,14 +320,15 @@ std::shared_ptr<const ReferenceTable> LoadTable(const TableSettings& settings,
   std::error_code error;
   const auto bytes = std::filesystem::file_size(settings.file, error);
   if (error || !std::filesystem::is_regular_file(settings.file, error)) {
-    yaml->Error(settings.place, fmt::format("reference.csv = '{}' cannot be read", settings.csv),
+    yaml->Error(settings.place,
+                fmt::format("{}.csv = '{}' cannot be read", settings.path, settings.csv),
                 "the path is taken from the scenario's folder: " + settings.file);
     return nullptr;
   }
   if (bytes > kMaxTableBytes) {
     yaml->Error(settings.place,
-                fmt::format("reference.csv = '{}' has {} bytes, at most {} are read", settings.csv,
-                            bytes, kMaxTableBytes),
+                fmt::format("{}.csv = '{}' has {} bytes, at most {} are read", settings.path,
+                            settings.csv, bytes, kMaxTableBytes),
                 "export fewer samples or columns");
     return nullptr;
   }

@@ -8,9 +8,10 @@
 namespace mbv {
 namespace {
 
-const std::vector<std::string> kTableKeys = {"csv",          "delimiter", "decimal",
-                                             "heading_rows", "time_unit", "time_offset_s",
-                                             "columns",      "tolerance", "witness"};
+std::vector<std::string> WithSourceKeys(std::vector<std::string> keys) {
+  keys.insert(keys.end(), kTableSourceKeys.begin(), kTableSourceKeys.end());
+  return keys;
+}
 
 TableTolerance ReadTolerance(ValueReader* values, const YamlMap& map) {
   TableTolerance tolerance;
@@ -49,10 +50,68 @@ void ReadColumnName(ValueReader* values, const YamlNode& node, const std::string
   column->number = static_cast<int>(*number);
 }
 
-void ReadColumnMap(ValueReader* values, const YamlNode& node, const std::string& path,
-                   TableColumnSettings* column) {
-  YamlMap map(&values->yaml(), &node, path,
-              {"column", "unit", "sign", "scale", "offset", "tolerance"});
+TableColumnSettings ReadColumn(ValueReader* values, const YamlEntry& entry) {
+  TableColumnSettings column;
+  column.place = entry;
+  column.path = JoinPath("reference.columns", entry.key);
+  column.signal = entry.key;
+  const YamlNode& node = *entry.value;
+  if (node.is_null() ||
+      (node.is_scalar() && !node.quoted && (node.text == "off" || node.text == "none"))) {
+    column.off = true;
+  } else {
+    ReadTableColumn(values, node, &column);
+  }
+  return column;
+}
+
+void ReadFormat(ValueReader* values, const YamlMap& map, TableFormat* format) {
+  YamlReader& yaml = values->yaml();
+  if (const YamlNode* node = map.Find("delimiter")) {
+    const auto choice =
+        yaml.Choice(*node, map.PathOf("delimiter"), {"tab", "comma", "semicolon", "space"});
+    if (choice) format->delimiter = "\t,; "[*choice];
+  }
+  if (const YamlNode* node = map.Find("decimal")) {
+    const auto choice = yaml.Choice(*node, map.PathOf("decimal"), {"point", "comma"});
+    if (choice) format->decimal_comma = *choice == 1;
+    if (choice == 1 && format->delimiter == ',') {
+      yaml.Error(*node,
+                 map.PathOf("decimal") + ": a comma cannot be both decimal sign and delimiter");
+    }
+  }
+  if (const YamlNode* node = map.Find("heading_rows")) {
+    const auto rows = yaml.Integer(*node, map.PathOf("heading_rows"));
+    if (rows && *rows < 0) {
+      yaml.Error(*node, fmt::format("{} = {} violates >= 0", map.PathOf("heading_rows"), *rows));
+    } else {
+      format->heading_rows = rows;
+    }
+  }
+}
+
+void ReadTolerances(ValueReader* values, const YamlMap& map, TableSettings* settings) {
+  const YamlNode* node = map.Find("tolerance");
+  if (node == nullptr) return;
+  const YamlMap tolerance(&values->yaml(), node, "reference.tolerance",
+                          {"absolute", "relative", "coverage", "coarsest"});
+  if (StatesTolerance(tolerance)) settings->tolerance = ReadTolerance(values, tolerance);
+  if (const YamlNode* coverage = tolerance.Find("coverage")) {
+    settings->coverage =
+        values->Positive(*coverage, "reference.tolerance.coverage").value_or(settings->coverage);
+  }
+  if (const YamlNode* coarsest = tolerance.Find("coarsest")) {
+    settings->coarsest =
+        values->Positive(*coarsest, "reference.tolerance.coarsest").value_or(settings->coarsest);
+  }
+}
+
+}  // namespace
+
+const std::vector<std::string> kTableSourceKeys = {"csv",          "delimiter", "decimal",
+                                                   "heading_rows", "time_unit", "time_offset_s"};
+
+void ReadTableColumnKeys(ValueReader* values, const YamlMap& map, TableColumnSettings* column) {
   if (const YamlNode* name = map.Find("column")) {
     ReadColumnName(values, *name, map.PathOf("column"), column);
   }
@@ -78,6 +137,16 @@ void ReadColumnMap(ValueReader* values, const YamlNode& node, const std::string&
   if (const YamlNode* offset = map.Find("offset")) {
     column->offset = values->Number(*offset, map.PathOf("offset")).value_or(0.0);
   }
+}
+
+void ReadTableColumn(ValueReader* values, const YamlNode& node, TableColumnSettings* column) {
+  if (!node.is_map()) {
+    ReadColumnName(values, node, column->path, column);
+    return;
+  }
+  YamlMap map(&values->yaml(), &node, column->path,
+              {"column", "unit", "sign", "scale", "offset", "tolerance"});
+  ReadTableColumnKeys(values, map, column);
   if (const YamlNode* tolerance = map.Find("tolerance")) {
     const YamlMap limits(&values->yaml(), tolerance, map.PathOf("tolerance"),
                          {"absolute", "relative"});
@@ -85,76 +154,31 @@ void ReadColumnMap(ValueReader* values, const YamlNode& node, const std::string&
   }
 }
 
-TableColumnSettings ReadColumn(ValueReader* values, const YamlEntry& entry) {
-  TableColumnSettings column;
-  const std::string path = JoinPath("reference.columns", entry.key);
-  column.place = entry;
-  column.signal = entry.key;
-  const YamlNode& node = *entry.value;
-  if (node.is_map()) {
-    ReadColumnMap(values, node, path, &column);
-  } else if (node.is_null() ||
-             (node.is_scalar() && !node.quoted && (node.text == "off" || node.text == "none"))) {
-    column.off = true;
-  } else {
-    ReadColumnName(values, node, path, &column);
-  }
-  return column;
-}
-
-void ReadFormat(ValueReader* values, const YamlMap& map, TableFormat* format) {
+void ReadTableSource(ValueReader* values, const YamlMap& map, TableSettings* settings) {
   YamlReader& yaml = values->yaml();
-  if (const YamlNode* node = map.Find("delimiter")) {
-    const auto choice =
-        yaml.Choice(*node, "reference.delimiter", {"tab", "comma", "semicolon", "space"});
-    if (choice) format->delimiter = "\t,; "[*choice];
+  const YamlNode* csv = map.Required("csv");
+  if (csv == nullptr) return;
+  settings->csv = yaml.Text(*csv, map.PathOf("csv")).value_or("");
+  settings->place = {"csv", csv->line, csv->column, nullptr};
+  const std::filesystem::path folder = std::filesystem::path(yaml.file()).parent_path();
+  settings->file = (folder / settings->csv).lexically_normal().string();
+  ReadFormat(values, map, &settings->format);
+  if (const YamlNode* unit = map.Find("time_unit")) {
+    settings->time_unit = yaml.Text(*unit, map.PathOf("time_unit")).value_or("");
+    settings->time_unit_line = unit->line;
+    settings->time_unit_character = unit->column;
   }
-  if (const YamlNode* node = map.Find("decimal")) {
-    const auto choice = yaml.Choice(*node, "reference.decimal", {"point", "comma"});
-    if (choice) format->decimal_comma = *choice == 1;
-    if (choice == 1 && format->delimiter == ',') {
-      yaml.Error(*node, "reference.decimal: a comma cannot be both decimal sign and delimiter");
-    }
-  }
-  if (const YamlNode* node = map.Find("heading_rows")) {
-    const auto rows = yaml.Integer(*node, "reference.heading_rows");
-    if (rows && *rows < 0) {
-      yaml.Error(*node, fmt::format("reference.heading_rows = {} violates >= 0", *rows));
-    } else {
-      format->heading_rows = rows;
-    }
+  if (const YamlNode* offset = map.Find("time_offset_s")) {
+    settings->time_offset_s = values->Number(*offset, map.PathOf("time_offset_s")).value_or(0.0);
   }
 }
-
-void ReadTolerances(ValueReader* values, const YamlMap& map, TableSettings* settings) {
-  const YamlNode* node = map.Find("tolerance");
-  if (node == nullptr) return;
-  const YamlMap tolerance(&values->yaml(), node, "reference.tolerance",
-                          {"absolute", "relative", "coverage", "coarsest"});
-  if (StatesTolerance(tolerance)) settings->tolerance = ReadTolerance(values, tolerance);
-  if (const YamlNode* coverage = tolerance.Find("coverage")) {
-    settings->coverage =
-        values->Positive(*coverage, "reference.tolerance.coverage").value_or(settings->coverage);
-  }
-  if (const YamlNode* coarsest = tolerance.Find("coarsest")) {
-    settings->coarsest =
-        values->Positive(*coarsest, "reference.tolerance.coarsest").value_or(settings->coarsest);
-  }
-}
-
-}  // namespace
 
 TableSettings ReadTableSettings(ValueReader* values, const YamlNode* node) {
   TableSettings settings;
   YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "reference", kTableKeys);
-  const YamlNode* csv = map.Required("csv");
-  if (csv == nullptr) return settings;
-  settings.csv = yaml.Text(*csv, "reference.csv").value_or("");
-  settings.place = {"csv", csv->line, csv->column, nullptr};
-  const std::filesystem::path folder = std::filesystem::path(yaml.file()).parent_path();
-  settings.file = (folder / settings.csv).lexically_normal().string();
-  ReadFormat(values, map, &settings.format);
+  YamlMap map(&yaml, node, settings.path, WithSourceKeys({"columns", "tolerance", "witness"}));
+  ReadTableSource(values, map, &settings);
+  if (settings.file.empty()) return settings;
   ReadTolerances(values, map, &settings);
   if (const YamlNode* witness = map.Find("witness")) {
     std::vector<std::string> words = {role::kReference.name};
@@ -164,14 +188,6 @@ TableSettings ReadTableSettings(ValueReader* values, const YamlNode* node) {
     }
     const auto choice = yaml.Choice(*witness, "reference.witness", words);
     if (choice) settings.witness = words[static_cast<size_t>(*choice)];
-  }
-  if (const YamlNode* unit = map.Find("time_unit")) {
-    settings.time_unit = yaml.Text(*unit, "reference.time_unit").value_or("");
-    settings.time_unit_line = unit->line;
-    settings.time_unit_character = unit->column;
-  }
-  if (const YamlNode* offset = map.Find("time_offset_s")) {
-    settings.time_offset_s = values->Number(*offset, "reference.time_offset_s").value_or(0.0);
   }
   if (const YamlNode* columns = map.Find("columns")) {
     for (const YamlEntry& entry : yaml.Entries(*columns, "reference.columns")) {

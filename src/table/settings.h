@@ -16,6 +16,7 @@ namespace mbv {
 /// One entry of `columns:`.
 struct TableColumnSettings {
   YamlEntry place;     ///< key and place; its value may be dropped
+  std::string path;    ///< for findings: "reference.columns.limb1.drive.force"
   std::string signal;  ///< channel name, or "time"
   bool off = false;    ///< not to be used, though its name may fit
   std::string column;  ///< heading; "" when given by number
@@ -27,6 +28,10 @@ struct TableColumnSettings {
 };
 
 struct TableSettings {
+  std::string path = "reference";  ///< of the section, for findings
+  /// What columns may be, where that is known: then only stated ones are read. Else every signal
+  /// of the mechanism, stated or by its name.
+  std::vector<Channel> signals;
   std::string csv;   ///< as written
   std::string file;  ///< path, relative ones taken from the scenario's folder
   YamlEntry place;   ///< of `csv`
@@ -42,6 +47,15 @@ struct TableSettings {
 
 /// Reads the section; findings go to the reader. `node` has a key `csv`.
 [[nodiscard]] TableSettings ReadTableSettings(ValueReader* values, const YamlNode* node);
+
+/// The keys of a table that say which file it is and how to read it.
+extern const std::vector<std::string> kTableSourceKeys;
+/// Reads these; `map` has been given them.
+void ReadTableSource(ValueReader* values, const YamlMap& map, TableSettings* settings);
+/// Reads a column that is given as a heading, a number or a map.
+void ReadTableColumn(ValueReader* values, const YamlNode& node, TableColumnSettings* column);
+/// Reads the keys column, unit, sign, scale and offset of a map that holds them among others.
+void ReadTableColumnKeys(ValueReader* values, const YamlMap& map, TableColumnSettings* column);
 
 /// Loads the table of a scenario; findings about its settings go to `yaml`, those about the file to
 /// `diagnostics`. Null after an error.

@@ -26,6 +26,19 @@ Profile Scaled(Profile profile, double scale) {
             t.amplitude *= scale;
           } else if constexpr (std::is_same_v<T, BumpTerm>) {
             t.height *= scale;
+          } else if constexpr (std::is_same_v<T, FourierTerm>) {
+            t.offset *= scale;
+            for (size_t k = 0; k < t.a.size(); ++k) {
+              t.a[k] *= scale;
+              t.b[k] *= scale;
+            }
+          } else if constexpr (std::is_same_v<T, PiecewiseTerm>) {
+            auto scaled = std::make_shared<Piecewise>(*t.pieces);
+            for (Piecewise::Polynomial& c : scaled->coefficients) {
+              for (double& coefficient : c) coefficient *= scale;
+            }
+            scaled->advance *= scale;
+            t.pieces = std::move(scaled);
           } else {
             t.delta *= scale;
           }
@@ -91,6 +104,7 @@ Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
   Mechanism m = mechanism;
   m.gravity_W = s * (similarity.X_NW.linear() * m.gravity_W);
   m.up_W = similarity.X_NW.linear() * m.up_W;
+  m.motors.clear();  // they are made for one size
   for (size_t b = 0; b < m.bodies.size(); ++b) {
     Body& body = m.bodies[b];
     body.shapes.clear();

@@ -57,6 +57,14 @@ def rows(step):
         yield (i, t, a, *torque(a, w, acc))
 
 
+def rounds(n):
+    """Angle and speed over one second: a turn with two harmonics."""
+    for i in range(n + 1):
+        p = 2 * math.pi * i / n
+        yield (i, math.pi / 2 + p + 0.3 * math.sin(p) + 0.05 * math.cos(2 * p) - 0.05,
+               2 * math.pi * (1 + 0.3 * math.cos(p) - 0.1 * math.sin(2 * p)))
+
+
 def write(name, lines, end="\n"):
     here = pathlib.Path(__file__).parent
     (here / name).write_bytes((end.join(lines) + end).encode())
@@ -83,6 +91,14 @@ def main():
     # A measurement: 5 mN m of noise.
     write("noisy.csv", [how + "noise of 5 mN m", "time_s,motor.force"] +
           [f"{t:.3f},{m + 5e-3 * noise(i):.5f}" for i, t, _, m, _ in rows(0.01)])
+    # An encoder on the crank: ten bits more than a degree, 0.01 deg of noise, every 5 ms.
+    write("encoder.csv", [how + "angles with noise of 0.01 deg", "time (ms);encoder (deg)"] +
+          [f"{1000 * t:.0f};{math.degrees(a) + 0.01 * noise(i):.4f}"
+           for i, t, a, _, _ in rows(0.005)])
+    # One round of a crank that never stops, as a path planner exports it: angle and speed.
+    write("round.csv", ["# one round of the crank; by tables/make_tables.py, 12 digits",
+                        "t,angle (rad),speed (rad/s)"] +
+          [f"{i / 40:.3f},{a:.12f},{w:.12f}" for i, a, w in rounds(40)])
     # As matlab.csv, one torque in 201 is 2 % off.
     write("one_wrong.csv", [how + "6 digits; the torque at 1.2 s is 2 % too large",
                             '"t (s)","torque (N*m)"'] +

@@ -1,0 +1,118 @@
+// mbverify size
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "cli/terminal.h"
+#include "pipeline/run_scenario.h"
+#include "report/sizing.h"
+
+namespace mbv {
+namespace {
+
+struct SizeArguments {
+  std::vector<std::string> scenarios, set;
+  std::string json;
+  double margin = 1.0;
+};
+
+// The envelopes of one mechanism over its scenarios.
+struct Sized {
+  std::string mechanism;
+  std::vector<std::string> scenarios;
+  std::vector<MotorEnvelope> envelopes;
+  std::vector<InputFile> inputs;
+};
+
+// Runs a scenario without files; its exit code.
+int AddScenario(const std::string& file, const RunOptions& options, Sized* sized) {
+  const RunOutcome outcome = RunScenario(file, options);
+  SayText(stderr, outcome.diagnostics.Text());
+  if (!outcome.report) {
+    if (outcome.exit_code == 2) return 2;
+    return Refuse(file + " is no motion", "size takes scenarios with a motion");
+  }
+  const Report& report = *outcome.report;
+  if (!sized->mechanism.empty() && sized->mechanism != report.mechanism) {
+    return Refuse(fmt::format("{} is about {}, the others about {}", file, report.mechanism,
+                              sized->mechanism),
+                  "size compares scenarios of one mechanism");
+  }
+  if (report.motors.empty()) {
+    return Refuse(fmt::format("{} has no motors", report.mechanism),
+                  "state them in the model: motors: {DRIVE: {continuous: …, peak: …}}");
+  }
+  sized->mechanism = report.mechanism;
+  sized->scenarios.push_back(report.scenario);
+  const std::vector<InputFile> inputs = InputsOf(file);
+  sized->inputs.insert(sized->inputs.end(), inputs.begin(), inputs.end());
+  Widen(report, &sized->envelopes);
+  if (outcome.exit_code != 0) Say(stderr, "{}: {}\n", file, report.comparison.reason);
+  return outcome.exit_code;
+}
+
+bool TooSmall(const Sized& sized, double margin) {
+  bool small = false;
+  for (const MotorEnvelope& e : sized.envelopes)
+    small = small || (e.limited && !(e.margin() >= margin));
+  return small;
+}
+
+int Tell(const SizeArguments& arguments, const Sized& sized, int exit_code) {
+  SayText(stdout, ToText(sized.envelopes));
+  std::fflush(stdout);
+  if (!arguments.json.empty()) {
+    const int written =
+        WriteWholeFile(arguments.json, ToJson(sized.envelopes, sized.scenarios), sized.inputs);
+    if (written != 0) return written;
+  }
+  return WorseExit(exit_code, TooSmall(sized, arguments.margin) ? 1 : 0);
+}
+
+int RunSize(const SizeArguments& arguments) {
+  RunOptions options;
+  options.out_dir.clear();
+  options.pictures = options.page = false;
+  for (const std::string& text : arguments.set) {
+    const auto set = SplitSet(text);
+    if (!set) return Refuse("--set " + text + ": write key=value", "");
+    options.scenario.set.push_back(*set);
+  }
+  std::string trouble;
+  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
+  if (!trouble.empty()) return Refuse(trouble, "");
+  Sized sized;
+  int exit_code = 0;
+  for (const std::string& file : files) {
+    exit_code = WorseExit(exit_code, AddScenario(file, options, &sized));
+  }
+  return sized.envelopes.empty() ? exit_code : Tell(arguments, sized, exit_code);
+}
+
+}  // namespace
+
+void AddSizeCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<SizeArguments>();
+  CLI::App* size = app->add_subcommand(
+      "size", "What several scenarios ask of the motors: the largest of each, and the margin");
+  size->add_option("scenarios", arguments->scenarios, "scenario files or folders of one mechanism")
+      ->required();
+  size->add_option("--margin", arguments->margin, "smaller ones end with exit code 1")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  size->add_option("--json", arguments->json, "also write this file");
+  size->add_option("--set", arguments->set,
+                   "key=value: overrides a value of the scenarios (repeatable)")
+      ->allow_extra_args(false);
+  SetFooter(
+      size,
+      {"size scenarios/slider_crank", "size slow.yaml fast.yaml --margin 1.2 --json size.json"},
+      "0 agree and margins are kept, 1 disagree or a margin is smaller, 2 bad input, 3 could "
+      "not run, 4 internal error");
+  size->callback([arguments, exit_code] { *exit_code = RunSize(*arguments); });
+}
+
+}  // namespace mbv

@@ -1,0 +1,192 @@
+#include "core/quintic_spline.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/demand.h"
+
+namespace mbv {
+namespace {
+
+constexpr int kDegree = Piecewise::kDegree;
+constexpr size_t kOrder = kDegree + 1;  // B-splines that are not zero on an interval
+using Row = std::array<double, kOrder>;
+
+// The B-splines on one interval as polynomials of x = (t − left)/width: basis[j][k] x^k.
+struct Interval {
+  double left = 0.0, width = 0.0;
+  size_t first = 0;  // index of the first B-spline
+  std::array<Row, kOrder> basis{};
+
+  // Their derivatives of an order at t.
+  [[nodiscard]] Row At(double t, int order) const {
+    const double x = (t - left) / width;
+    Row values{};
+    for (size_t j = 0; j < kOrder; ++j) {
+      for (int k = kDegree; k >= order; --k) {
+        double factor = 1.0;
+        for (int d = 0; d < order; ++d) factor *= k - d;
+        values[j] = values[j] * x + factor * basis[j][static_cast<size_t>(k)];
+      }
+      values[j] /= std::pow(width, order);
+    }
+    return values;
+  }
+};
+
+// sum += (a + b x) · p
+void AddProduct(double a, double b, const Row& p, Row* sum) {
+  for (size_t k = 0; k < kOrder; ++k) (*sum)[k] += a * p[k] + (k > 0 ? b * p[k - 1] : 0.0);
+}
+
+// The recursion of Cox and de Boor between the knots τ[m] and τ[m+1], on whole polynomials.
+Interval MakeInterval(const std::vector<double>& tau, size_t m) {
+  Interval interval{.left = tau[m], .width = tau[m + 1] - tau[m], .first = m - kDegree};
+  std::array<Row, kOrder> lower{};
+  lower[0][0] = 1.0;  // of degree 0: only B_m
+  for (size_t degree = 1; degree <= kDegree; ++degree) {
+    std::array<Row, kOrder> next{};
+    for (size_t j = 0; j < degree; ++j) {  // lower[j] is B_i, i = m − degree + 1 + j
+      const size_t i = m + 1 + j - degree;
+      const double span = tau[i + degree] - tau[i];
+      const double a = (tau[m] - tau[i]) / span, b = interval.width / span;
+      AddProduct(a, b, lower[j], &next[j + 1]);
+      AddProduct(1.0 - a, -b, lower[j], &next[j]);
+    }
+    lower = next;
+  }
+  interval.basis = lower;
+  return interval;
+}
+
+// A banded triangle R and its right side, fed with rows in the order of their first column.
+class BandTriangle {
+ public:
+  explicit BandTriangle(size_t columns) : rows_(columns + kOrder), right_(columns + kOrder) {}
+
+  void Add(size_t first, Row row, double right) {
+    for (size_t k = first; k + kOrder < rows_.size(); ++k) {
+      const double r = std::hypot(rows_[k][0], row[0]);
+      if (r != 0.0) Rotate(k, r, &row, &right);
+      for (size_t c = 0; c + 1 < kOrder; ++c) row[c] = row[c + 1];
+      row[kOrder - 1] = 0.0;
+      if (std::all_of(row.begin(), row.end(), [](double x) { return x == 0.0; })) return;
+    }
+  }
+
+  [[nodiscard]] std::vector<double> Solve() const {
+    std::vector<double> x(rows_.size(), 0.0);
+    for (size_t k = rows_.size() - kOrder; k-- > 0;) {
+      double sum = right_[k];
+      for (size_t c = 1; c < kOrder; ++c) sum -= rows_[k][c] * x[k + c];
+      // A B-spline that no datum sees, in times without any scale, has no share.
+      x[k] = rows_[k][0] == 0.0 ? 0.0 : sum / rows_[k][0];
+    }
+    return x;
+  }
+
+ private:
+  // Turns the row into the triangle's row k so that its first element vanishes.
+  void Rotate(size_t k, double r, Row* row, double* right) {
+    const double co = rows_[k][0] / r, si = (*row)[0] / r;
+    for (size_t c = 0; c < kOrder; ++c) {
+      const double upper = rows_[k][c];
+      rows_[k][c] = co * upper + si * (*row)[c];
+      (*row)[c] = co * (*row)[c] - si * upper;
+    }
+    const double upper = right_[k];
+    right_[k] = co * upper + si * *right;
+    *right = co * *right - si * upper;
+  }
+
+  std::vector<Row> rows_;
+  std::vector<double> right_;
+};
+
+// Nodes and weights of Gauss on [0, 1], exact for the square of a third derivative.
+constexpr double kGauss = 0.7745966692414834;
+constexpr std::array<double, 3> kNodes{0.5 - 0.5 * kGauss, 0.5, 0.5 + 0.5 * kGauss};
+constexpr std::array<double, 3> kWeights{5.0 / 18.0, 8.0 / 18.0, 5.0 / 18.0};
+
+void AddRoughness(const Interval& interval, double lambda, BandTriangle* triangle) {
+  for (size_t g = 0; g < kNodes.size(); ++g) {
+    Row row = interval.At(interval.left + kNodes[g] * interval.width, 3);
+    const double factor = std::sqrt(lambda * kWeights[g] * interval.width);
+    for (double& element : row) element *= factor;
+    triangle->Add(interval.first, row, 0.0);
+  }
+}
+
+void AddDatum(const Interval& interval, const SplineDatum& datum, BandTriangle* triangle) {
+  Row row = interval.At(datum.time_s, datum.order);
+  for (double& element : row) element *= datum.weight;
+  triangle->Add(interval.first, row, datum.weight * datum.value);
+}
+
+// The first and the last knot six times.
+std::vector<double> WithEnds(const std::vector<double>& knots) {
+  std::vector<double> tau(kDegree, knots.front());
+  tau.insert(tau.end(), knots.begin(), knots.end());
+  tau.insert(tau.end(), kDegree, knots.back());
+  return tau;
+}
+
+Piecewise PiecesOf(const std::vector<Interval>& intervals, const std::vector<double>& c,
+                   double end_s) {
+  Piecewise pieces;
+  pieces.outside = Piecewise::Outside::kExtend;
+  for (const Interval& interval : intervals) {
+    Piecewise::Polynomial polynomial{};
+    double scale = 1.0;
+    for (size_t k = 0; k < kOrder; ++k, scale /= interval.width) {
+      for (size_t j = 0; j < kOrder; ++j) {
+        polynomial[k] += scale * c[interval.first + j] * interval.basis[j][k];
+      }
+    }
+    pieces.knots.push_back(interval.left);
+    pieces.coefficients.push_back(polynomial);
+  }
+  pieces.knots.push_back(end_s);
+  return pieces;
+}
+
+}  // namespace
+
+std::vector<double> FreeKnots(const std::vector<double>& time_s, bool with_rates) {
+  const size_t n = time_s.size();
+  MBV_DEMAND(n >= (with_rates ? 3 : kOrder), n);
+  std::vector<double> knots = {time_s.front()};
+  for (size_t i = 1; i + 1 < n; ++i) {
+    const bool beside = i == 1 || i + 2 == n;
+    const bool next = i == 2 || i + 3 == n;
+    if (with_rates) {
+      // Of three rows, the only inner knot is beside both ends.
+      if (n > 3) knots.insert(knots.end(), beside ? 1 : 2, time_s[i]);
+    } else if (!beside && !next) {
+      knots.push_back(time_s[i]);
+    }
+  }
+  knots.push_back(time_s.back());
+  return knots;
+}
+
+Piecewise FitSpline(const std::vector<double>& knots, const std::vector<SplineDatum>& data,
+                    double lambda) {
+  const std::vector<double> tau = WithEnds(knots);
+  BandTriangle triangle(tau.size() - kOrder);
+  std::vector<Interval> intervals;
+  auto datum = data.begin();
+  for (size_t m = kDegree; m + kOrder < tau.size(); ++m) {
+    if (tau[m + 1] == tau[m]) continue;
+    intervals.push_back(MakeInterval(tau, m));
+    const bool last = m + kOrder + 1 == tau.size();
+    for (; datum != data.end() && (last || datum->time_s < tau[m + 1]); ++datum) {
+      AddDatum(intervals.back(), *datum, &triangle);
+    }
+    if (lambda > 0.0) AddRoughness(intervals.back(), lambda, &triangle);
+  }
+  return PiecesOf(intervals, triangle.Solve(), knots.back());
+}
+
+}  // namespace mbv

@@ -1,0 +1,45 @@
+// Splines through, or near, the rows of a table.
+//
+// Smoothing minimises, over the quintic splines on the rows' times,
+//   Σ_i ((f(t_i) − y_i)/σ)² + Σ_i ((f'(t_i) − v_i)/σ_v)² + λ ∫ f'''² dt                       (1)
+// with the largest λ for which the first two sums do not exceed the number of data [Reinsch 1967]:
+// as smooth as the noise σ (of the rates: σ_v) allows.
+#pragma once
+
+#include <vector>
+
+#include "core/piecewise.h"
+
+namespace mbv {
+
+/// What a table gives of one coordinate.
+struct SplineRows {
+  std::vector<double> time_s = {};              ///< increasing, 6 or more
+  std::vector<double> values = {}, rates = {};  ///< rates may be empty
+  double deviation = 0.0;                       ///< σ; 0: exact
+  double rate_deviation = 0.0;                  ///< σ_v
+};
+
+/// How often rows occur in time.
+struct Rounds {
+  bool periodic = false;  ///< the last row is the first one of the next round
+  double advance = 0.0;   ///< what each round adds
+};
+
+/// The spline that meets every row: four continuous derivatives, three where rates are given. It
+/// goes on beyond the rows as its last polynomials do, or repeats.
+[[nodiscard]] Piecewise Interpolated(const SplineRows& rows, const Rounds& rounds = {});
+/// The smoothing spline (1); Interpolated() where σ is zero.
+[[nodiscard]] Piecewise Smoothed(const SplineRows& rows, const Rounds& rounds = {});
+
+/// RMS and largest magnitude, of the values and their derivatives.
+struct JetSize {
+  Jet rms, max;
+};
+/// Of a − b over the times of both, four times in each interval of `time_s`.
+[[nodiscard]] JetSize DifferenceOf(const Piecewise& a, const Piecewise& b,
+                                   const std::vector<double>& time_s);
+/// Of a alone.
+[[nodiscard]] JetSize SizeOf(const Piecewise& a, const std::vector<double>& time_s);
+
+}  // namespace mbv
