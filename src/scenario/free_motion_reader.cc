@@ -211,6 +211,7 @@ class FreeMotionReader {
     }
     std::vector<Command> candidates;
     const std::vector<NamedCoordinate> joints = JointCoordinates(mechanism_);
+    candidates.reserve(joints.size());
     for (const NamedCoordinate& joint : joints) {
       candidates.push_back(AsCommand(joint.name, joint.coordinate));
     }

@@ -13,6 +13,7 @@
 #include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
 #include "table/motion_table.h"
+#include "table/pose_table.h"
 
 namespace mbv {
 namespace {
@@ -34,11 +35,12 @@ class MotionReader {
         tables_{.mechanism = &mechanism, .files = files} {}
 
   Motion Read(const YamlNode* node, const YamlNode* loads, const YamlNode* forces) {
-    YamlMap map(
-        &yaml(), node, "motion",
-        {"duration_s", "sample_s", "commands", "equal", "path", "initial", "initial_rates"});
+    YamlMap map(&yaml(), node, "motion",
+                {"duration_s", "sample_s", "commands", "equal", "path", "pose_table", "initial",
+                 "initial_rates"});
     if (const YamlNode* commands = map.Find("commands")) ReadCommands(*commands);
     if (const YamlNode* equal = map.Find("equal")) ReadEqual(*equal);
+    if (const YamlNode* pose = map.Find("pose_table")) ReadPoseTable(*pose);
     double path_end_s = kNan;
     if (const YamlNode* path = map.Find("path")) path_end_s = ReadPath(*path);
     ReadTimes(map, path_end_s);
@@ -47,7 +49,7 @@ class MotionReader {
       ReadFreeMotion(values_, mechanism_, *node, forces, &tables_, &motion_);
     } else if (map.valid() && motion_.commands.empty() && !yaml().has_errors() && node != nullptr) {
       yaml().Error(*node, "motion commands nothing",
-                   "give commands, equal or path; or forces and initial values");
+                   "give commands, equal, path or pose_table; or forces and initial values");
     }
     TakeTables();
     return motion_;
@@ -138,6 +140,20 @@ class MotionReader {
       AddCommand(entry, {.name = entry.key,
                          .terms = {{*coordinate, 1.0}},
                          .profile = ReadProfile(values_, *entry.value, path, context)});
+    }
+  }
+
+  void ReadPoseTable(const YamlNode& node) {
+    PoseTable pose = LoadPoseTable(values_, node, mechanism_, tables_.files);
+    tables_.failed = tables_.failed || pose.components.empty();
+    const YamlEntry place{"pose_table", node.line, node.column, nullptr};
+    for (PoseComponent& part : pose.components) {
+      const Coordinate coordinate{Coordinate::Kind::kOutput, pose.output, part.component};
+      AddCommand(place, {.name = part.table.name,
+                         .terms = {{coordinate, 1.0}},
+                         .profile = {{PiecewiseTerm{part.table.spline}}}});
+      tables_.places.push_back({node.Find("csv"), "motion.pose_table"});
+      tables_.loaded.push_back(std::move(part.table));
     }
   }
 

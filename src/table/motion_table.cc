@@ -4,24 +4,16 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <numbers>
 
 #include "table/grid.h"
 #include "table/noise.h"
-#include "table/row_spline.h"
 #include "table/settings.h"
+#include "table/table_spline.h"
 
 namespace mbv {
 namespace {
 
 constexpr size_t kFewestSplineRows = 6;  // that determine a quintic polynomial
-// More than half of what the interpolating spline's second derivative shows (mean square).
-constexpr double kMostlyNoise = 0.5;
-// What a round may jump by where it begins again, of the largest magnitude inside, beyond what the
-// noise explains.
-constexpr double kPositionJump = 1e-6, kRateJump = 1e-2, kAccelerationJump = 0.1;
-constexpr double kNoiseAllowed = 4.0;  // deviations
 // A column of rates further from the positions' own, of their RMS, belongs to something else.
 constexpr double kRateDoubt = 0.2;
 
@@ -38,10 +30,10 @@ class Loader {
     source_ = LoadTable(settings_, mechanism, &yaml(), files);
     if (source_ == nullptr || !TakeRows()) return {};
     Describe();
-    if (table_.periodic) CheckRounds();
-    if (yaml().has_errors()) return {};
-    MakeSplines();
-    Doubt();
+    const RowsPlace place{&yaml(), settings_.place, path_, settings_.csv,
+                          source_->steps.col(0).maxCoeff()};
+    if (!MakeSplines(place, rows_, &table_)) return {};
+    if (table_.with_rates) DoubtRates();
     return std::move(table_);
   }
 
@@ -142,73 +134,11 @@ class Loader {
     table_.deviation = rows_.deviation;
   }
 
-  // The end of a round against its start, by the spline that knows nothing of rounds.
-  void CheckRounds() {
-    rounds_.periodic = true;
-    const double step = rows_.values.back() - rows_.values.front();
-    constexpr double kTurn = 2.0 * std::numbers::pi;
-    if (use_.unit == "rad") rounds_.advance = kTurn * std::round(step / kTurn);
-    const Piecewise smooth = Smoothed(rows_);
-    const Jet noise = DifferenceOf(Interpolated(rows_), smooth, rows_.time_s).rms;
-    const Jet size = SizeOf(smooth, rows_.time_s).max;
-    const Jet start = Evaluate(smooth, table_.from_s), end = Evaluate(smooth, table_.to_s);
-    const auto [low, high] = std::minmax_element(rows_.values.begin(), rows_.values.end());
-    const double digits = source_->steps.col(0).maxCoeff();
-    Jump("value", "", step - rounds_.advance, rows_.values.front(), rows_.values.back(),
-         kPositionJump * (*high - *low) + kNoiseAllowed * rows_.deviation + digits,
-         Severity::kError);
-    Jump("rate", "/s", end.rate - start.rate, start.rate, end.rate,
-         kRateJump * size.rate + kNoiseAllowed * noise.rate, Severity::kError);
-    Jump("acceleration", "/s²", end.acceleration - start.acceleration, start.acceleration,
-         end.acceleration,
-         kAccelerationJump * size.acceleration + kNoiseAllowed * noise.acceleration,
-         Severity::kWarning);
-  }
-
-  void Jump(const char* what, const char* per, double jump, double start, double end,
-            double allowed, Severity severity) {
-    if (std::abs(jump) <= allowed) return;
-    yaml().AddAt(
-        severity, settings_.place.line, settings_.place.column,
-        fmt::format("{}.periodic: the {} jumps by {:.4g} {}{} where {} begins again (from "
-                    "{:.6g} to {:.6g}); at most {:.2g} is round-off or noise",
-                    path_, what, -jump, use_.unit, per, settings_.csv, end, start, allowed),
-        "the last row repeats the first one, a period later");
-  }
-
-  void MakeSplines() {
-    const Piecewise through = Interpolated(rows_, rounds_), smooth = Smoothed(rows_, rounds_);
-    const JetSize change = DifferenceOf(smooth, through, rows_.time_s);
-    const Piecewise& used = table_.smoothed() ? smooth : through;
-    table_.change_rms = change.rms.value;
-    table_.change_max = change.max.value;
-    table_.acceleration_change_rms = change.rms.acceleration;
-    table_.acceleration_change_max = change.max.acceleration;
-    table_.acceleration_rms = SizeOf(used, rows_.time_s).rms.acceleration;
-    table_.interpolated = std::make_shared<const Piecewise>(through);
-    table_.spline = std::make_shared<const Piecewise>(used);
-  }
-
-  void Doubt() {
-    if (!table_.moves) return;
-    if (table_.with_rates) DoubtRates();
-    const double share = table_.noise_share();
-    if (table_.smoothed() || share <= kMostlyNoise) return;
-    const YamlNode* csv = node_.Find("csv");
-    yaml().Warn(*csv,
-                fmt::format("{}: the second derivative of {} is mostly noise: {:.0f} % of its mean "
-                            "square vanish when {:.2g} {} of noise are smoothed away (RMS {:.3g} "
-                            "of {:.3g} {}/s²)",
-                            path_, settings_.csv, 100.0 * share, table_.deviation, use_.unit,
-                            table_.acceleration_change_rms, table_.acceleration_rms, use_.unit),
-                "drive forces follow it; smoothing: auto takes it out and says what that changes");
-  }
-
   // Rates of another column, sign or unit.
   void DoubtRates() {
     SplineRows alone = rows_;
     alone.rates.clear();
-    const Piecewise spline = Smoothed(alone, rounds_);
+    const Piecewise spline = Smoothed(alone);
     double error = 0.0, size = 0.0;
     for (size_t i = 0; i < rows_.time_s.size(); ++i) {
       const double rate = Evaluate(spline, rows_.time_s[i]).rate;
@@ -231,7 +161,6 @@ class Loader {
   double stated_ = 0.0;  // deviation, in the column's own numbers
   std::shared_ptr<const ReferenceTable> source_;
   SplineRows rows_;
-  Rounds rounds_;
   MotionTable table_;
 };
 

@@ -147,6 +147,11 @@ TEST(MotionTables, WithoutSmoothingTheySayWhatItWouldDo) {
   EXPECT_NE(Joined(MotionTableLines(report, false)).find("smoothing: auto would change it by"),
             std::string::npos);
   EXPECT_DOUBLE_EQ(report.tables[0].noise_share(), 9.0 / 16.0);
+  // What is next to nothing is told on demand.
+  Report exact = WithTable("none");
+  exact.tables[0].acceleration_change_rms = 1e-6;
+  EXPECT_EQ(MotionTableLines(exact, false).size(), 1u);
+  EXPECT_EQ(MotionTableLines(exact, true).size(), 3u);
 }
 
 }  // namespace
