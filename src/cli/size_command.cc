@@ -6,6 +6,7 @@
 
 #include "cli/cli.h"
 #include "cli/files.h"
+#include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "pipeline/run_scenario.h"
 #include "report/sizing.h"
@@ -15,7 +16,7 @@ namespace {
 
 struct SizeArguments {
   std::vector<std::string> scenarios, set;
-  std::string json;
+  JsonOption json;
   double margin = 1.0;
 };
 
@@ -62,13 +63,9 @@ bool TooSmall(const Sized& sized, double margin) {
 }
 
 int Tell(const SizeArguments& arguments, const Sized& sized, int exit_code) {
-  SayText(stdout, ToText(sized.envelopes));
-  std::fflush(stdout);
-  if (!arguments.json.empty()) {
-    const int written =
-        WriteWholeFile(arguments.json, ToJson(sized.envelopes, sized.scenarios), sized.inputs);
-    if (written != 0) return written;
-  }
+  SayText(arguments.json.text(), ToText(sized.envelopes));
+  const std::string json = ToJson(sized.envelopes, sized.scenarios);
+  if (const int code = arguments.json.Write(json, sized.inputs); code != 0) return code;
   return WorseExit(exit_code, TooSmall(sized, arguments.margin) ? 1 : 0);
 }
 
@@ -103,7 +100,7 @@ void AddSizeCommand(CLI::App* app, int* exit_code) {
   size->add_option("--margin", arguments->margin, "smaller ones end with exit code 1")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  size->add_option("--json", arguments->json, "also write this file");
+  arguments->json.AddTo(size);
   size->add_option("--set", arguments->set,
                    "key=value: overrides a value of the scenarios (repeatable)")
       ->allow_extra_args(false);
