@@ -331,6 +331,10 @@ class Checker {
     for (const Coupling& coupling : mechanism_.couplings) {
       Add("coupling " + coupling.name, "has no couplings");
     }
+    for (const ForceElement& element : mechanism_.elements) {
+      Add(fmt::format("element {}, {}", element.name, Described(mechanism_, element)),
+          "has no damping, springs, rotors and friction of joints");
+    }
     for (const Drive& drive : mechanism_.drives) {
       if (Find(coverage_.drives, drive.name) != nullptr) continue;
       Add("drive " + drive.name, "does not know it");

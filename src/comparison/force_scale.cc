@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "comparison/element_force_scale.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -80,6 +81,7 @@ class Scales {
       rates_.push_back(PrescribedRates(motion_, static_cast<int>(p), trace));
     }
     spring_N_ = LargestSpringForce(mechanism_, trace);
+    TakeElements(trace);
     TakeLoads(trace);
     for (size_t b = 0; b < mechanism_.bodies.size(); ++b) bodies_.push_back(MotionOf(b));
   }
@@ -187,7 +189,7 @@ class Scales {
       const double all = mechanism_.gravity_W.norm() * v.norm();
       acts_ = acts_ || (IsCompared(k) && body.mass > 0.0 && weight > kRoundoff * all);
     }
-    const double pushed = std::max(LoadWork(k), SpringWork(k));
+    const double pushed = std::max({LoadWork(k), SpringWork(k), ElementWork(k)});
     acts_ = acts_ || (IsCompared(k) && pushed > 0.0);
     const double crossed = k >= mechanism_.drives.size() ? CrossWork(k) : 0.0;
     scale_.driven[k] = std::max({largest, pushed, crossed});
@@ -222,6 +224,26 @@ class Scales {
       const Vec3 d = X_WB_[to] * spring.p_to - X_WB_[from] * spring.p_from;
       const Vec3 rate = VelocityOf(k, to, spring.p_to) - VelocityOf(k, from, spring.p_from);
       largest = std::max(largest, spring_N_ * std::abs(d.normalized().dot(rate)));
+    }
+    return largest;
+  }
+
+  void TakeElements(const Trace& trace) {
+    std::vector<internal::DrivenSize> driven;
+    for (size_t k = 0; k < rates_.size(); ++k) {
+      driven.push_back({&twists_.V_WB[k], rates_[k].velocity, rates_[k].acceleration});
+    }
+    const int energy = trace.Find(Quantity::kSpringEnergy);
+    const double most =
+        energy < 0 || trace.values.rows() == 0 ? 0.0 : trace.values.col(energy).maxCoeff();
+    elements_ = internal::SizesOfElements(
+        mechanism_, driven, {.duration_s = motion_.duration_s, .most_energy_J = most});
+  }
+
+  [[nodiscard]] double ElementWork(size_t k) const {
+    double largest = 0.0;
+    for (const internal::ElementSize& element : elements_) {
+      largest = std::max(largest, element.force * element.rate[k]);
     }
     return largest;
   }
@@ -296,6 +318,7 @@ class Scales {
   std::vector<LargestLoad> loads_;  // as motion_.loads
   std::vector<BodyMotion> bodies_;
   double spring_N_ = 0.0;
+  std::vector<internal::ElementSize> elements_;  // as mechanism_.elements
   bool acts_ = false;
   ForceScale scale_;
 };

@@ -1,7 +1,10 @@
 #include "mechanism/mechanism.h"
 
+#include <array>
+
 #include "core/channel.h"
 #include "core/demand.h"
+#include "mechanism/reach.h"
 
 namespace mbv {
 namespace {
@@ -49,6 +52,47 @@ std::string PositionUnit(const Mechanism& mechanism, const Drive& drive) {
 
 std::string ForceUnit(const Mechanism& mechanism, const Drive& drive) {
   return IsTranslation(mechanism, drive) ? "N" : "N m";
+}
+
+const char* WordOf(const ForceElement& element) {
+  static constexpr std::array<const char*, std::variant_size_v<decltype(element.law)>> kWords = {
+      "damping", "spring", "rotor", "friction"};
+  return kWords.at(element.law.index());
+}
+
+bool ActsOnLength(const Mechanism& mechanism, const ForceElement& element) {
+  return element.drive >= 0 ||
+         IsLength(mechanism.joints[static_cast<size_t>(element.joint)].kind, element.coordinate);
+}
+
+double RestRate(const Mechanism& mechanism, const ForceElement& element, double duration_s) {
+  constexpr double kRest = 1e-6;
+  return kRest * (ActsOnLength(mechanism, element) ? CharacteristicLength(mechanism) : 1.0) /
+         duration_s;
+}
+
+bool Rubs(const ForceElement& element) {
+  const auto* friction = std::get_if<FrictionLaw>(&element.law);
+  return friction != nullptr && friction->breakaway > 0.0;
+}
+
+std::string FirstFriction(const Mechanism& mechanism) {
+  for (const ForceElement& element : mechanism.elements) {
+    if (Rubs(element)) return element.name;
+  }
+  return "";
+}
+
+std::string Described(const Mechanism& mechanism, const ForceElement& element) {
+  const std::string word = WordOf(element);
+  if (element.drive >= 0) {
+    return word + " of drive '" + mechanism.drives[static_cast<size_t>(element.drive)].name + "'";
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  const std::string of = FreedomsOf(joint.kind) == 1
+                             ? ""
+                             : "coordinate " + std::to_string(element.coordinate) + " of ";
+  return word + " of " + of + "joint '" + joint.name + "'";
 }
 
 SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive) {

@@ -187,6 +187,44 @@ struct Coupling {
   double constant = 0.0;    ///< of the sum
 };
 
+/// Viscous damping: force −c q̇.
+struct DampingLaw {
+  double damping = 0.0;  ///< c [N s/m or N m s/rad], >= 0
+};
+/// A spring: force −(F0 + k x + k2 x² + …), x = q − free.
+struct SpringLaw {
+  std::vector<double> polynomial;  ///< k, k2, … [N/m, N/m², … or N m/rad, …]; at least one
+  double free = 0.0;               ///< [m or rad]
+  double preload = 0.0;            ///< F0 [N or N m]
+};
+/// A motor's rotor behind a gear: force −J n² q̈, known as armature. It turns about an axis of fixed
+/// direction: no gyroscopic coupling.
+struct RotorLaw {
+  double inertia = 0.0;  ///< J about the rotor's axis [kg m²], >= 0
+  double ratio = 1.0;    ///< n: the rotor's rate by that of the coordinate [1 or rad/m], not 0
+
+  [[nodiscard]] double reflected() const { return ratio * ratio * inertia; }  ///< [kg m² or kg]
+};
+
+/// Dry friction, whatever the load: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇,
+/// [Armstrong-Hélouvry 1991]; viscous friction beside it is damping. At rest the force lies
+/// anywhere in ±Fs.
+struct FrictionLaw {
+  double coulomb = 0.0;        ///< Fc [N or N m], >= 0
+  double breakaway = 0.0;      ///< Fs, >= Fc
+  double stribeck_rate = 1.0;  ///< vs [m/s or rad/s], > 0; without meaning where Fs = Fc
+};
+
+/// What acts along one scalar coordinate q of a joint or along the length q of a distance drive;
+/// its force is positive as a drive's there, exerted by the joint's parent on its child. Parts of
+/// the reactions are these forces no more than drive forces are.
+struct ForceElement {
+  std::string name;
+  int joint = -1, coordinate = 0;  ///< the coordinate, or …
+  int drive = -1;                  ///< … the distance drive
+  std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw> law;
+};
+
 struct Mechanism {
   std::string name;
   std::string file;  ///< model.yaml it came from, as given
@@ -201,6 +239,7 @@ struct Mechanism {
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
+  std::vector<ForceElement> elements;
   std::vector<Motor> motors;  ///< at most one per drive; no witness reads them
   std::vector<Beam> beams;    ///< of the elastic bodies; empty in most models
 
@@ -233,6 +272,20 @@ struct SignalSheet {
 [[nodiscard]] std::string PositionUnit(const Mechanism& mechanism, const Drive& drive);
 [[nodiscard]] std::string ForceUnit(const Mechanism& mechanism, const Drive& drive);
 [[nodiscard]] SignalSheet SheetOf(const Mechanism& mechanism, const Drive& drive);
+/// Word of an element's kind in model files.
+[[nodiscard]] const char* WordOf(const ForceElement& element);
+/// True if an element's coordinate is a length, false if it is an angle.
+[[nodiscard]] bool ActsOnLength(const Mechanism& mechanism, const ForceElement& element);
+/// "rotor of joint 'hip'", for messages; with the coordinate's number where there are several.
+[[nodiscard]] std::string Described(const Mechanism& mechanism, const ForceElement& element);
+/// Rate of the coordinate of an element up to which it counts as at rest in a motion of this
+/// length: 1e-6 rad, or of the characteristic length, in the time.
+[[nodiscard]] double RestRate(const Mechanism& mechanism, const ForceElement& element,
+                              double duration_s);
+/// True for dry friction that is not zero.
+[[nodiscard]] bool Rubs(const ForceElement& element);
+/// Name of the first element that rubs, or "".
+[[nodiscard]] std::string FirstFriction(const Mechanism& mechanism);
 /// Sheet of a joint's reaction: the wrench that the parent exerts on the child through the joint,
 /// about M's origin, expressed in F. Channels: JOINT.reaction.{fx,fy,fz,mx,my,mz}.
 [[nodiscard]] SignalSheet SheetOf(const Mechanism& mechanism, const Joint& joint);

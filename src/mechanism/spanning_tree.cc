@@ -53,10 +53,9 @@ void BreadthFirst(const Mechanism& mechanism, const std::vector<bool>& usable, V
   }
 }
 
-// The lower, the sooner a joint enters the tree. Driven and coupled joints keep their
-// coordinate; a massless
-// body should not become a leaf; a cut sphere or force-only joint costs three rows, a cut hinge
-// five; a free joint imposes nothing and is the last resort.
+// The lower, the sooner a joint enters the tree. Joints of which a coordinate is used keep it; a
+// massless body should not become a leaf; a cut sphere or force-only joint costs three rows, a cut
+// hinge five; a free joint imposes nothing and is the last resort.
 int KeepClass(const Mechanism& mechanism, int j, Choice choice) {
   const Joint& joint = mechanism.joints[j];
   if (choice == Choice::kKeep) return 0;
@@ -97,6 +96,13 @@ std::vector<int> KeepOrder(const Mechanism& mechanism, const ClosureHints& hints
 }  // namespace
 
 bool HasUsedCoordinate(const Mechanism& mechanism, int joint) {
+  return HasLedCoordinate(mechanism, joint) ||
+         std::ranges::any_of(mechanism.elements, [joint](const ForceElement& element) {
+           return element.joint == joint;
+         });
+}
+
+bool HasLedCoordinate(const Mechanism& mechanism, int joint) {
   const auto uses = [joint](const auto& item) { return item.joint == joint; };
   return std::ranges::any_of(mechanism.prescribed, uses) ||
          std::ranges::any_of(mechanism.drives,

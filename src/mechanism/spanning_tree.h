@@ -32,7 +32,10 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
 /// The same with the hints that Joint::closure itself can carry: true = cut here, false = free.
 SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism);
 
-/// True when a drive, a prescribed joint or a coupling uses a coordinate of this joint.
+/// True when a drive, a prescribed joint or a coupling leads a coordinate of this joint.
+[[nodiscard]] bool HasLedCoordinate(const Mechanism& mechanism, int joint);
+/// True when one of these or a force element uses a coordinate of this
+/// joint.
 [[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);
 
 /// Body on the world's side of the t-th tree joint, and the one that this joint carries.

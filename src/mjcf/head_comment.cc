@@ -54,6 +54,20 @@ const char* DrivesText(const MjcfOptions& options) {
          "   is the drive force [N, N m].\n";
 }
 
+// Force elements that MuJoCo has no word for.
+std::string LackingText(const Mechanism& mechanism) {
+  std::string names;
+  for (const ForceElement& element : mechanism.elements) {
+    if (IsPlanned(element)) continue;
+    names += fmt::format("   {}: {}\n", InComment(element.name),
+                         InComment(Described(mechanism, element)));
+  }
+  if (names.empty()) return "";
+  return "Not in this file, as MuJoCo 2.2 has no word for them; qfrc_applied can stand for "
+         "them:\n" +
+         names;
+}
+
 }  // namespace
 
 std::string HeadComment(const Mechanism& mechanism, const MjcfOptions& options) {
@@ -67,6 +81,7 @@ std::string HeadComment(const Mechanism& mechanism, const MjcfOptions& options) 
   } else {
     text += std::string("Two ways to use it:\n") + DrivesText(options);
   }
+  text += LackingText(mechanism);
   text +=
       "To look only: pause, and load a key; other keys than \"home\" are poses at rest.\n"
       "Loops are closed by the equalities close:JOINT; sensors JOINT.gap say how well.\n";

@@ -96,7 +96,20 @@ class MjcfWriter {
     if (!ball) xml_.Set("axis", Vec3(X_WB.linear().transpose() * joint.axis_W));
     if (joint.ref != 0.0) xml_.Set("ref", joint.ref);
     if (!ball && joint.coordinate >= 0) WriteRange(joint);
+    if (!ball && joint.coordinate >= 0) WriteForces(joint);
     xml_.Close();
+  }
+
+  // What MuJoCo has of the force elements.
+  void WriteForces(const PlannedJoint& joint) {
+    const mjcf::PlannedForces forces =
+        mjcf::ForcesOfJoint(mechanism_, joint.joint, joint.coordinate);
+    if (forces.stiffness != 0.0) {
+      xml_.Set("stiffness", forces.stiffness);
+      xml_.Set("springref", forces.free);
+    }
+    if (forces.damping != 0.0) xml_.Set("damping", forces.damping);
+    if (forces.armature != 0.0) xml_.Set("armature", forces.armature);
   }
 
   // The joint's coordinates in MuJoCo's qpos, which follows the order of the file.

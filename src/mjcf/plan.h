@@ -84,6 +84,21 @@ struct PlannedCoupling {
 };
 [[nodiscard]] PlannedCoupling PlanCoupling(const Mechanism& mechanism, const Coupling& coupling);
 
+/// What MuJoCo 2.2 has of the force elements along one coordinate: force
+/// −stiffness (q − free) − damping q̇ − armature q̈.
+struct PlannedForces {
+  double damping = 0.0, stiffness = 0.0, armature = 0.0;  ///< SI
+  double free = 0.0;                                      ///< position of no spring force
+
+  [[nodiscard]] bool any() const { return damping != 0.0 || stiffness != 0.0 || armature != 0.0; }
+};
+/// Sums over the elements of a joint's coordinate; a preload moves the free position.
+[[nodiscard]] PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinate);
+/// … of a distance drive, whose tendon has no armature.
+[[nodiscard]] PlannedForces ForcesOfDrive(const Mechanism& mechanism, int drive);
+/// True for what these contain: damping, linear springs, rotors of joints.
+[[nodiscard]] bool IsPlanned(const ForceElement& element);
+
 /// Name of the MuJoCo joint of a joint's coordinate.
 [[nodiscard]] std::string JointName(const Joint& joint, int coordinate);
 

@@ -13,6 +13,12 @@ void WriteTendon(const Sections& s, const std::string& name, double width) {
   if (width > 0.0) s.xml->Set("width", width);
 }
 
+void WriteSpring(const Sections& s, double stiffness, double damping, double free_length_m) {
+  s.xml->Set("stiffness", stiffness);
+  s.xml->Set("damping", damping);
+  s.xml->Set("springlength", free_length_m);
+}
+
 void FinishTendon(const Sections& s, const std::string& name) {
   for (const char* end : {".from", ".to"}) {
     s.xml->Open("site");
@@ -113,13 +119,14 @@ void WriteTendons(const Sections& s) {
   for (const Drive& drive : s.mechanism.drives) {
     if (!std::holds_alternative<DistanceDrive>(drive.kind)) continue;
     WriteTendon(s, drive.name, drive.radius);
+    const PlannedForces forces =
+        ForcesOfDrive(s.mechanism, static_cast<int>(&drive - s.mechanism.drives.data()));
+    if (forces.any()) WriteSpring(s, forces.stiffness, forces.damping, forces.free);
     FinishTendon(s, drive.name);
   }
   for (const SpringDamper& spring : s.mechanism.springs) {
     WriteTendon(s, spring.name, 0.0);
-    s.xml->Set("stiffness", spring.stiffness);
-    s.xml->Set("damping", spring.damping);
-    s.xml->Set("springlength", spring.free_length_m);
+    WriteSpring(s, spring.stiffness, spring.damping, spring.free_length_m);
     FinishTendon(s, spring.name);
   }
   for (const Coupling& coupling : s.mechanism.couplings) {

@@ -11,6 +11,7 @@
 #include "model_file/model_couplings.h"
 #include "model_file/model_drives.h"
 #include "model_file/model_elastic.h"
+#include "model_file/model_elements.h"
 #include "model_file/model_head.h"
 #include "model_file/model_instances.h"
 #include "model_file/model_joints.h"
@@ -71,6 +72,7 @@ struct ModelSections {
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
   std::vector<Motor> motors;
+  std::vector<ForceElement> elements;
   internal::ModelBeams beams;
   internal::UrdfSection urdf;
 };
@@ -91,7 +93,8 @@ void ReadBodies(const EachBlock& each_block, const internal::BodyNames& names,
                                      .joints = &sections->joints,
                                      .places = &sections->signals,
                                      .drives = &sections->drives,
-                                     .couplings = &sections->couplings});
+                                     .couplings = &sections->couplings,
+                                     .elements = &sections->elements});
       }
     }
     bodies.Read(block);
@@ -177,6 +180,8 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   urdf.WeldRoot(s.urdf.root, s.bodies, &s.joints);
   internal::OrderDrives(root, &yaml, &s.drives);
   ReadMotors(blocks.model(), &yaml, &s);
+  internal::ElementReader elements(&values, s.joints, s.drives, &s.elements);
+  each_block([&](const Block& block) { elements.Read(block); });
   s.signals.Check(&yaml);
   internal::CheckDrivenOnce(s.drives, s.prescribed, s.joints.joints, s.signals, &yaml);
   return s;
@@ -199,6 +204,7 @@ Mechanism Assembled(const std::string& file, ModelSections* s) {
   mechanism.springs = std::move(s->springs);
   mechanism.couplings = std::move(s->couplings);
   mechanism.motors = std::move(s->motors);
+  mechanism.elements = std::move(s->elements);
   mechanism.beams = std::move(s->beams.beams);
   return mechanism;
 }

@@ -50,21 +50,9 @@ bool CouplingReader::ReadFollower(const Block& block, const YamlMap& map, Coupli
   }
   const std::string key = map.Has("ratio") ? "ratio" : "polynomial";
   const YamlNode& node = *map.Find(key);
-  std::vector<const YamlNode*> items{&node};
-  if (key == "polynomial") items = yaml.Items(node, map.PathOf(key)).value_or(items);
-  for (const YamlNode* item : items) {
-    const std::string path =
-        items.size() > 1 ? fmt::format("{}[{}]", map.PathOf(key), followed->polynomial.size())
-                         : map.PathOf(key);
-    const auto value = values_.Number(block, *item, path);
-    if (!value) return false;
-    followed->polynomial.push_back(*value);
-  }
-  if (followed->polynomial.size() > kMostPowers) {
-    yaml.Error(node, fmt::format("{} has {} coefficients, at most {} are allowed", map.PathOf(key),
-                                 followed->polynomial.size(), kMostPowers));
-    return false;
-  }
+  const auto coefficients = ReadCoefficients(&values_, block, map, key);
+  if (!coefficients) return false;
+  followed->polynomial = *coefficients;
   if (std::ranges::all_of(followed->polynomial, [](double c) { return c == 0.0; })) {
     yaml.Error(node, fmt::format("{} = 0 couples nothing", map.PathOf(key)),
                "to hold a joint, make it fixed or prescribed");
@@ -122,16 +110,9 @@ std::optional<Coupling::Term> CouplingReader::Coordinate(const Block& block, con
 // In the unit of a coordinate; empty after a finding.
 std::optional<double> CouplingReader::Offset(const Block& block, const YamlMap& map,
                                              const Coupling::Term& of) {
-  const auto found = map.FindInUnit("offset", {kPlain, kDeg, kMm});
-  if (found.node == nullptr) return 0.0;
-  const bool length = IsLength(joints_.joints[of.joint].kind, of.coordinate);
-  if (!found.unit.Suits(length ? "m" : "rad")) {
-    values_.yaml().Error(
-        *found.node, fmt::format("{}: the coordinate of '{}' is {}", map.PathOf(found.key),
-                                 joints_.joints[of.joint].name, length ? "a length" : "an angle"));
-    return std::nullopt;
-  }
-  return values_.Number(block, *found.node, map.PathOf(found.key), found.unit);
+  const Joint& joint = joints_.joints[of.joint];
+  return ReadInCoordinateUnit(&values_, block, map, "offset", IsLength(joint.kind, of.coordinate),
+                              joint.name);
 }
 
 bool CouplingReader::IsNew(const Coupling& coupling, const Coupling::Term& term, const YamlNode& at,

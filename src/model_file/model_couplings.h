@@ -12,9 +12,6 @@
 
 namespace mbv::internal {
 
-/// Highest power of a coordinate in a coupling: MuJoCo's.
-inline constexpr size_t kMostPowers = 4;
-
 /// Reads couplings of coordinates of known joints: one that follows another (gears, belts, screws,
 /// cams), or a weighted sum (differentials).
 class CouplingReader {

@@ -119,6 +119,48 @@ std::optional<JointDrive> ReadJointCoordinate(const ModelJoints& joints, const B
   return drive;
 }
 
+std::optional<std::vector<double>> ReadCoefficients(ModelValues* values, const Block& block,
+                                                    const YamlMap& map, const std::string& key) {
+  YamlReader& yaml = values->yaml();
+  const YamlNode& node = *map.Find(key);
+  std::vector<const YamlNode*> items{&node};
+  if (key == "polynomial") {
+    const auto listed = yaml.Items(node, map.PathOf(key));
+    if (!listed) return std::nullopt;
+    items = *listed;
+  }
+  std::vector<double> coefficients;
+  for (const YamlNode* item : items) {
+    const std::string path = items.size() > 1
+                                 ? fmt::format("{}[{}]", map.PathOf(key), coefficients.size())
+                                 : map.PathOf(key);
+    const auto value = values->Number(block, *item, path);
+    if (!value) return std::nullopt;
+    coefficients.push_back(*value);
+  }
+  if (coefficients.empty() || coefficients.size() > kMostPowers) {
+    yaml.Error(node,
+               fmt::format("{} has {} coefficients, {} are allowed", map.PathOf(key),
+                           coefficients.size(), coefficients.empty() ? "1 to 4" : "at most 4"));
+    return std::nullopt;
+  }
+  return coefficients;
+}
+
+std::optional<double> ReadInCoordinateUnit(ModelValues* values, const Block& block,
+                                           const YamlMap& map, const std::string& key, bool length,
+                                           const std::string& of) {
+  const auto found = map.FindInUnit(key, {kPlain, kDeg, kMm});
+  if (found.node == nullptr) return 0.0;
+  if (!found.unit.Suits(length ? "m" : "rad")) {
+    values->yaml().Error(*found.node,
+                         fmt::format("{}: the coordinate of '{}' is {}", map.PathOf(found.key), of,
+                                     length ? "a length" : "an angle"));
+    return std::nullopt;
+  }
+  return values->Number(block, *found.node, map.PathOf(found.key), found.unit);
+}
+
 void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives) {
   const YamlNode* order = root.is_map() ? root.Find("drive_order") : nullptr;
   if (order == nullptr || order->is_null()) return;

@@ -44,6 +44,19 @@ std::optional<JointDrive> ReadJointCoordinate(const ModelJoints& joints, const B
                                               const YamlMap& map, const CoordinateKeys& keys,
                                               YamlReader* yaml);
 
+/// Highest power of a coordinate in a polynomial: that of MuJoCo's couplings.
+inline constexpr size_t kMostPowers = 4;
+/// One number, or a list of coefficients of a coordinate's powers, the first one that of the first.
+/// Empty after a finding.
+std::optional<std::vector<double>> ReadCoefficients(ModelValues* values, const Block& block,
+                                                    const YamlMap& map, const std::string& key);
+
+/// A number in the unit of a coordinate, a length or an angle, under a key that may carry a unit; 0
+/// where it is left out. Empty after a finding, in which `of` names the coordinate's owner.
+std::optional<double> ReadInCoordinateUnit(ModelValues* values, const Block& block,
+                                           const YamlMap& map, const std::string& key, bool length,
+                                           const std::string& of);
+
 /// Puts the drives into the order of `drive_order`, which lists every one once.
 void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* drives);
 

@@ -11,7 +11,7 @@ namespace {
 
 const std::vector<std::string> kPartKeys = {
     "parameters", "attach",    "bodies",      "joints",    "drives",   "prescribed", "outputs",
-    "springs",    "instances", "description", "materials", "sections", "couplings"};
+    "springs",    "instances", "description", "materials", "sections", "couplings",  "elements"};
 
 }  // namespace
 

@@ -24,6 +24,7 @@ UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Int
   UrdfSection urdf = Add(*source, into.bodies, into.joints);
   ReadGuesses(model, map, into.joints);
   AddMimics(source->tree, node, into);
+  AddDynamics(source->tree, into);
   // The model file's own drives are the better ones.
   if (model.Section("drives") == nullptr) AddDrives(MotorsOf(*source, *into.joints), node, into);
   return urdf;
@@ -166,6 +167,17 @@ void UrdfReader::AddMimics(const UrdfTree& tree, const YamlNode& at, const Into&
                    {followed, 0, {literals_.At(place + "multiplier", mimic.multiplier)}}},
          .constant = literals_.At(place + "offset", mimic.offset)});
     into.places->Add(name, "coupling", {at.line, at.column});
+  }
+}
+
+void UrdfReader::AddDynamics(const UrdfTree& tree, const Into& into) {
+  for (const UrdfTree::Dynamics& dynamics : tree.dynamics) {
+    const int joint = into.joints->Find(dynamics.joint);
+    if (joint < 0) continue;  // refused, with its own finding
+    const std::string place = "urdf." + dynamics.joint + ".dynamics.damping";
+    into.elements->push_back({.name = dynamics.joint + "_damping",
+                              .joint = joint,
+                              .law = DampingLaw{literals_.At(place, dynamics.damping)}});
   }
 }
 

@@ -22,8 +22,8 @@ struct UrdfSection {
   std::map<std::string, Finding> joints;  ///< where each joint is described, closures included
 };
 
-/// Reads the links of a URDF file as bodies, its joints and closures, its motors as drives and
-/// its mimic joints as couplings.
+/// Reads the links of a URDF file as bodies, its joints and closures, its motors as drives,
+/// its mimic joints as couplings and the damping of its joints as force elements.
 class UrdfReader {
  public:
   /// `bare`: the model file stands for the URDF file, and nobody wrote it.
@@ -37,6 +37,7 @@ class UrdfReader {
     SignalPlaces* places;
     std::vector<Drive>* drives;
     std::vector<Coupling>* couplings;
+    std::vector<ForceElement>* elements;
   };
   UrdfSection Read(const Block& model, const YamlNode& node, const Into& into);
 
@@ -56,6 +57,7 @@ class UrdfReader {
   void ReadGuesses(const Block& model, const YamlMap& map, ModelJoints* joints);
   std::vector<std::string> MotorsOf(const Source& source, const ModelJoints& joints) const;
   void AddMimics(const UrdfTree& tree, const YamlNode& at, const Into& into);
+  void AddDynamics(const UrdfTree& tree, const Into& into);
   void AddDrives(const std::vector<std::string>& motors, const YamlNode& at, const Into& into);
 
   bool bare_;

@@ -48,6 +48,12 @@ struct UrdfTree {
     double multiplier = 1.0, offset = 0.0;
   };
   std::vector<Mimic> mimics;
+  /// <dynamics>: viscous damping of joints with one coordinate [N s/m or N m s/rad]
+  struct Dynamics {
+    std::string joint;
+    double damping = 0.0;
+  };
+  std::vector<Dynamics> dynamics;
 
   /// Index of a link (-1: the world), or -2.
   [[nodiscard]] int FindLink(const std::string& link) const;

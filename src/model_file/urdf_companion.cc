@@ -161,6 +161,9 @@ class Companion {
                         return std::pair('"' + joint + '"', k);
                       }));
     }
+    for (const ForceElement& element : m_.elements) {
+      if (!IsUrdfDynamics(m_, element)) WriteElement(element);
+    }
     for (const SpringDamper& s : m_.springs) {
       const std::string name = YamlName(s.name);
       sections_["springs"] += fmt::format(
@@ -168,6 +171,18 @@ class Companion {
           AttachPoint(s.body_from, name + "_from", s.p_from),
           AttachPoint(s.body_to, name + "_to", s.p_to), s.stiffness, s.damping, s.free_length_m);
     }
+  }
+
+  void WriteElement(const ForceElement& element) {
+    std::string place;
+    if (element.drive >= 0) {
+      place = "drive: " + YamlName(m_.drives[static_cast<size_t>(element.drive)].name);
+    } else {
+      const auto [joint, k] = FindCoordinate(element.joint, element.coordinate);
+      place = fmt::format("joint: \"{}\"{}", joint, CoordinateText(k));
+    }
+    sections_["elements"] +=
+        fmt::format("  {}: {{{}}}\n", YamlName(element.name), ElementText(element, place));
   }
 
   const Mechanism m_;

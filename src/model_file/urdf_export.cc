@@ -104,6 +104,16 @@ std::string LimitText(const UrdfStep& step) {
                      bounded(step.range.lower), bounded(step.range.upper));
 }
 
+// Damping of a coordinate.
+std::string DynamicsText(const Mechanism& mechanism, int joint, int coordinate) {
+  double damping = 0.0;
+  for (const ForceElement& element : mechanism.elements) {
+    if (element.joint != joint || element.coordinate != coordinate) continue;
+    if (IsUrdfDynamics(mechanism, element)) damping += std::get<DampingLaw>(element.law).damping;
+  }
+  return damping == 0.0 ? "" : fmt::format("<dynamics damping=\"{}\"/>", damping);
+}
+
 std::string JointText(const Mechanism& mechanism, int tree_index,
                       const std::vector<Pose>& link_frames) {
   const Joint& joint = mechanism.joints[mechanism.tree_joints[tree_index]];
@@ -125,7 +135,9 @@ std::string JointText(const Mechanism& mechanism, int tree_index,
     if (steps[k].type != "fixed" && steps[k].type != "floating") {
       text += fmt::format("<axis xyz=\"{}\"/>", Xyz(steps[k].axis));
     }
-    text += LimitText(steps[k]) + "</joint>\n";
+    text += LimitText(steps[k]) +
+            DynamicsText(mechanism, mechanism.tree_joints[tree_index], steps[k].coordinate) +
+            "</joint>\n";
     parent = child;
   }
   return text;
@@ -192,6 +204,12 @@ std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed) {
   }
   if (reversed) std::reverse(steps.begin(), steps.end());
   return steps;
+}
+
+bool IsUrdfDynamics(const Mechanism& mechanism, const ForceElement& element) {
+  if (element.drive >= 0 || !std::holds_alternative<DampingLaw>(element.law)) return false;
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  return !joint.closure && joint.kind != JointKind::kFree;
 }
 
 std::vector<Pose> UrdfLinkFrames(const Mechanism& mechanism) {

@@ -30,6 +30,9 @@ struct UrdfStep {
 /// The chain, inboard first. `reversed`: the tree runs from the child to the parent.
 [[nodiscard]] std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed);
 
+/// True for an element that <dynamics> of a URDF joint says: damping of a joint in the tree.
+[[nodiscard]] bool IsUrdfDynamics(const Mechanism& mechanism, const ForceElement& element);
+
 /// X_BL per body: the pose of its URDF link frame.
 [[nodiscard]] std::vector<Pose> UrdfLinkFrames(const Mechanism& mechanism);
 

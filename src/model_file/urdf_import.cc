@@ -295,16 +295,23 @@ class Importer {
       joint.axis = axis.normalized();
     }
     ReadLimits(from, &joint);
-    if (from.dynamics) {
-      AddLoss(from.name, from.dynamics->damping, line, &damped_);
-      AddLoss(from.name, from.dynamics->friction, line, &rubbing_);
-    }
+    if (from.dynamics) ReadDynamics(from, joint.kind, line);
     if (from.mimic) {
       tree_.mimics.push_back(
           {from.name, from.mimic->joint_name, from.mimic->multiplier, from.mimic->offset});
     }
     tree_.joints.push_back(joint);
     tree_.joint_lines.push_back(line);
+  }
+
+  void ReadDynamics(const urdf::Joint& from, JointKind kind, int line) {
+    const double damping = from.dynamics->damping;
+    if (damping > 0.0 && std::isfinite(damping) && FreedomsOf(kind) == 1) {
+      tree_.dynamics.push_back({from.name, damping});
+    } else {
+      AddLoss(from.name, damping, line, &damped_);
+    }
+    AddLoss(from.name, from.dynamics->friction, line, &rubbing_);
   }
 
   void ReadLimits(const urdf::Joint& from, Joint* joint) {
@@ -330,12 +337,10 @@ bool NestsDeeperThan(const std::string& xml, int limit) {
     if (xml[i] == '<' && xml.compare(i, 4, "<!--") == 0) {
       i = xml.find("-->", i);
       if (i == std::string::npos) return false;
-    } else if (xml[i] == '<' && xml[i + 1] == '/') {
+    } else if ((xml[i] == '<' && xml[i + 1] == '/') || (xml[i] == '/' && xml[i + 1] == '>')) {
       --depth;
     } else if (xml[i] == '<' && xml[i + 1] != '?' && xml[i + 1] != '!') {
       if (++depth > limit) return true;
-    } else if (xml[i] == '/' && xml[i + 1] == '>') {
-      --depth;
     }
   }
   return false;

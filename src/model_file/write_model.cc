@@ -253,6 +253,11 @@ class ModelWriter {
                             return std::pair(names_.joints[term.joint], term.coordinate);
                           }));
     }
+    if (!m_.elements.empty()) text += "elements:\n";
+    for (const ForceElement& element : m_.elements) {
+      text += fmt::format("  {}: {{{}}}\n", FreshName(element.name, &taken),
+                          ElementText(element, PlaceOf(element)));
+    }
     if (!m_.springs.empty()) text += "springs:\n";
     for (const SpringDamper& s : m_.springs) {
       const std::string name = FreshName(s.name, &taken);
@@ -269,12 +274,46 @@ class ModelWriter {
     return text;
   }
 
+  [[nodiscard]] std::string PlaceOf(const ForceElement& element) const {
+    if (element.drive >= 0) return "drive: " + names_.drives[element.drive];
+    return fmt::format("joint: {}{}", names_.joints[element.joint],
+                       CoordinateText(element.coordinate));
+  }
+
   const Mechanism& m_;
   const WrittenNames names_;
   std::vector<Frames> frames_;
 };
 
+std::string TextOf(const DampingLaw& law) { return fmt::format("damping: {}", law.damping); }
+std::string TextOf(const SpringLaw& law) {
+  const std::vector<double>& p = law.polynomial;
+  std::string text = p.size() == 1 && p[0] >= 0.0
+                         ? fmt::format("stiffness: {}", p[0])
+                         : fmt::format("polynomial: [{}]", fmt::join(p, ", "));
+  if (law.free != 0.0) text += fmt::format(", free: {}", law.free);
+  if (law.preload != 0.0) text += fmt::format(", preload: {}", law.preload);
+  return text;
+}
+std::string TextOf(const RotorLaw& law) {
+  return fmt::format("inertia: {}, ratio: {}", law.inertia, law.ratio);
+}
+std::string TextOf(const FrictionLaw& law) {
+  std::string text = fmt::format("coulomb: {}", law.coulomb);
+  if (law.breakaway == law.coulomb) return text;
+  return text + fmt::format(", breakaway: {}, stribeck_rate: {}", law.breakaway, law.stribeck_rate);
+}
+
 }  // namespace
+
+std::string CoordinateText(int coordinate) {
+  return coordinate == 0 ? "" : fmt::format(", coordinate: {}", coordinate);
+}
+
+std::string ElementText(const ForceElement& element, const std::string& place) {
+  return fmt::format("kind: {}, {}, {}", WordOf(element), place,
+                     std::visit([](const auto& law) { return TextOf(law); }, element.law));
+}
 
 std::string CouplingText(const Coupling& coupling, const TermNames& name_of) {
   const std::vector<Coupling::Term>& terms = coupling.terms;

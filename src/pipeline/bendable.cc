@@ -55,8 +55,26 @@ bool CanAct(const Literal& literal) {
   return literal.value != 0.0 && !(axis && std::abs(literal.value) == 1.0);
 }
 
-std::string UnitOf(const Literal& literal) {
+// Of a force element; `keys` end in what it is, behind the element's name.
+std::string ElementUnit(const Mechanism& mechanism, const std::vector<std::string>& keys) {
+  if (Has(keys, "inertia")) return "kg m^2";
+  for (const ForceElement& element : mechanism.elements) {
+    const std::string name = element.name.substr(element.name.rfind('.') + 1);
+    if (keys.size() < 2 || keys[keys.size() - 2] != name) continue;
+    const bool length = ActsOnLength(mechanism, element);
+    if (Has(keys, "damping")) return length ? "N s/m" : "N m s/rad";
+    if (Has(keys, "stiffness")) return length ? "N/m" : "N m/rad";
+    if (Has(keys, "stribeck_rate")) return length ? "m/s" : "rad/s";
+    if (Has(keys, "preload") || Has(keys, "coulomb") || Has(keys, "breakaway"))
+      return length ? "N" : "N m";
+    if (Has(keys, "free")) return length ? "m" : "rad";
+  }
+  return "";
+}
+
+std::string UnitOf(const Mechanism& mechanism, const Literal& literal) {
   const std::vector<std::string> keys = KeysOf(literal.place);
+  if (Has(keys, "elements")) return ElementUnit(mechanism, keys);
   if (Has(keys, "inertia")) return "kg m^2";
   if (Has(keys, "mass")) return "kg";
   if (Has(keys, "gravity")) return "m/s^2";
@@ -91,8 +109,8 @@ std::vector<Bendable> BendablesOf(const Mechanism& mechanism,
   }
   for (const Literal& literal : literals) {
     if (!CanAct(literal)) continue;
-    all.push_back(
-        {literal.place, UnitOf(literal), NumberKind::kLiteral, literal.value, literal.value});
+    all.push_back({literal.place, UnitOf(mechanism, literal), NumberKind::kLiteral, literal.value,
+                   literal.value});
   }
   return all;
 }

@@ -70,6 +70,27 @@ bool SameCoupling(const Coupling& a, const Coupling& b) {
   return Same(a.constant, b.constant) && std::ranges::equal(a.terms, b.terms, same_term);
 }
 
+bool SameLaw(const DampingLaw& a, const DampingLaw& b) { return Same(a.damping, b.damping); }
+bool SameLaw(const SpringLaw& a, const SpringLaw& b) {
+  return Same(a.free, b.free) && Same(a.preload, b.preload) &&
+         std::ranges::equal(a.polynomial, b.polynomial,
+                            [](double x, double y) { return Same(x, y); });
+}
+bool SameLaw(const RotorLaw& a, const RotorLaw& b) { return Same(a.reflected(), b.reflected()); }
+bool SameLaw(const FrictionLaw& a, const FrictionLaw& b) {
+  return Same(a.coulomb, b.coulomb) && Same(a.breakaway, b.breakaway) &&
+         Same(a.stribeck_rate, b.stribeck_rate);
+}
+
+bool SameElement(const ForceElement& a, const ForceElement& b) {
+  return std::visit(
+      [&b](const auto& law) {
+        const auto* other = std::get_if<std::decay_t<decltype(law)>>(&b.law);
+        return other != nullptr && SameLaw(law, *other);
+      },
+      a.law);
+}
+
 bool SameDrive(const Drive& a, const Drive& b) {
   const auto* from = std::get_if<DistanceDrive>(&a.kind);
   const auto* to = std::get_if<DistanceDrive>(&b.kind);
@@ -240,6 +261,9 @@ std::string DescribeChange(const Mechanism& base, const Mechanism& bent) {
   add("the coupling",
       Which(base.couplings, bent.couplings,
             [](const Coupling& a, const Coupling& b) { return !SameCoupling(a, b); }));
+  add("the element",
+      Which(base.elements, bent.elements,
+            [](const ForceElement& a, const ForceElement& b) { return !SameElement(a, b); }));
   if (RangesDiffer(base, bent)) parts.emplace_back("ranges of travel");
   if (StartDiffers(base, bent)) parts.emplace_back("where the home solution starts");
   std::string text;

@@ -145,6 +145,15 @@ std::optional<PreparedStiffness> PrepareStiffness(StiffnessScenario scenario, Me
         "without the coupling, held by drives, the model has a stiffness");
     return {};
   }
+  if (!prepared.base.elements.empty()) {
+    const ForceElement& element = prepared.base.elements.front();
+    diagnostics->AddError(
+        s.file,
+        fmt::format("model '{}' has element '{}', a {}, which stiffness does not know",
+                    prepared.base.name, element.name, Described(prepared.base, element)),
+        "beams and servos are what stiffness knows");
+    return {};
+  }
   prepared.analytic =
       WithParameters(prepared, s.analytic.parameters, role::kAnalytic.name, diagnostics);
   prepared.reference =

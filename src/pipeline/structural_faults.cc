@@ -36,6 +36,7 @@ class Collector {
     OtherAssembly();
     MissingClosures();
     ReversedCouplings();
+    WrongElements();
     StandardGravity();
     return std::move(faults_);
   }
@@ -64,6 +65,13 @@ class Collector {
         if (PositionUnit(m_, m_.drives[i]) != PositionUnit(m_, m_.drives[j])) continue;
         Mechanism wrong = m_;
         std::swap(wrong.drives[i].kind, wrong.drives[j].kind);
+        for (ForceElement& element : wrong.elements) {
+          if (element.drive == static_cast<int>(i)) {
+            element.drive = static_cast<int>(j);
+          } else if (element.drive == static_cast<int>(j)) {
+            element.drive = static_cast<int>(i);
+          }
+        }
         Add(kind, m_.drives[i].name + " and " + m_.drives[j].name, std::move(wrong));
         faults_.back().first = m_.drives[i].name;
         faults_.back().second = m_.drives[j].name;
@@ -88,6 +96,7 @@ class Collector {
       flipped.home[0] = -flipped.home[0];
       flipped.range[0] = {-joint.range[0].upper, -joint.range[0].lower};
       for (Coupling& coupling : wrong.couplings) CountBackwards(index, &coupling);
+      for (ForceElement& element : wrong.elements) CountBackwards(index, &element);
       Add(kind, joint.name, std::move(wrong));
     };
     for (const Drive& drive : m_.drives) {
@@ -104,6 +113,34 @@ class Collector {
     for (Coupling::Term& term : coupling->terms) {
       if (term.joint != joint) continue;
       for (size_t i = 0; i < term.polynomial.size(); i += 2) term.polynomial[i] *= -1.0;
+    }
+  }
+
+  // A spring pulls the same way when its coordinate counts the other way.
+  static void CountBackwards(int joint, ForceElement* element) {
+    auto* spring = std::get_if<SpringLaw>(&element->law);
+    if (element->joint != joint || spring == nullptr) return;
+    spring->free *= -1.0;
+    spring->preload *= -1.0;
+    for (size_t i = 1; i < spring->polynomial.size(); i += 2) spring->polynomial[i] *= -1.0;
+  }
+
+  // The force of a preload pushes the other way; a gear turns a rotor as if its inertia grew with
+  // the ratio and not with its square.
+  void WrongElements() {
+    std::map<std::string, size_t> pushed, geared;
+    for (size_t e = 0; e < m_.elements.size(); ++e) {
+      const ForceElement& element = m_.elements[e];
+      Mechanism wrong = m_;
+      if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
+        if (spring->preload == 0.0 || !IsFirst(&pushed, element.name)) continue;
+        std::get<SpringLaw>(wrong.elements[e].law).preload *= -1.0;
+        Add("preload the other way", element.name, std::move(wrong));
+      } else if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
+        if (std::abs(rotor->ratio) == 1.0 || !IsFirst(&geared, element.name)) continue;
+        std::get<RotorLaw>(wrong.elements[e].law).ratio = std::sqrt(std::abs(rotor->ratio));
+        Add("ratio of a rotor not squared", element.name, std::move(wrong));
+      }
     }
   }
 
@@ -203,7 +240,7 @@ class Collector {
       Joint& joint = wrong.joints[j];
       joint.range = {};
       joint.guess = joint.home;
-      if (joint.closure || HasUsedCoordinate(m_, static_cast<int>(j))) continue;
+      if (joint.closure || HasLedCoordinate(m_, static_cast<int>(j))) continue;
       for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
         joint.guess[static_cast<size_t>(c)] +=
             IsLength(joint.kind, c) ? size * share(*random) : angle(*random);
@@ -223,7 +260,10 @@ class Collector {
       }
       Add(kind, m_.joints[j].name, Without(j));
     }
-    if (faults_.size() == before) NotApplicable(kind, "it has no loop");
+    if (faults_.size() > before) return;
+    const bool any = std::ranges::any_of(m_.joints, &Joint::closure);
+    NotApplicable(kind, any ? "coordinates or outputs of the joints that close its loops are used"
+                            : "it has no loop");
   }
 
   void StandardGravity() {
@@ -281,6 +321,7 @@ class Collector {
     for (Coupling& coupling : wrong.couplings) {
       for (Coupling::Term& term : coupling.terms) shift(&term.joint);
     }
+    for (ForceElement& element : wrong.elements) shift(&element.joint);
     return wrong;
   }
 

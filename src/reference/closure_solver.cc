@@ -8,6 +8,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "kinematics/element_rows.h"
 #include "reference/closure_failure.h"
 
 namespace mbv::internal {
@@ -116,6 +117,7 @@ void ClosureSolver::EvaluateRows(Trial* trial) {
     rows_.Add(row);
     coupled_size_.push_back(row.LargestPiece());
   }
+  FollowElements(mechanism_, &trial->states);
   joint_rows_ = rows_.size();
   for (size_t k = 0; k < commands_.size(); ++k) {
     rows_.Add(mechanism_, commands_[k], trial->states, &trial->near_values[k]);

@@ -54,10 +54,13 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ve
 [[nodiscard]] ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
                                   const BodyStates& states);
 
-/// Wrench [m about Bo; f] that each body needs beyond gravity, springs and loads, in world axes:
-/// m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
+/// Wrench [m about Bo; f] that each body needs beyond gravity, springs, force elements and loads,
+/// in world axes: m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W);
+
+/// M R per body, of motions R (6·bodies × n), rotors included.
+[[nodiscard]] MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R);
 
 [[nodiscard]] Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states);
 /// Powers but for the base and the input.

@@ -7,6 +7,7 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "kinematics/element_rows.h"
 #include "mechanism/reach.h"
 #include "reference/closure_failure.h"
 #include "reference/closure_solver.h"
@@ -183,6 +184,7 @@ void FreeDynamics::AddDriveForces(double t_s, const BodyStates& states,
 
 RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   FollowCouplings(mechanism_, states);
+  FollowElements(mechanism_, states);
   Factor(t_s, *states);
   if (!(pivot_ > kLost)) return Singular(t_s, *states);
   if (RunSummary summary = CheckFreedoms(t_s); !summary.ok()) return summary;
@@ -195,16 +197,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   RequiredWrenches(mechanism_, *states, command_.loads, &required);
   AddDriveForces(t_s, *states, &drives);
   const MatX R = Motions();
-  MatX MR(size_, freedoms_);
-  for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
-    const Body& body = mechanism_.bodies[b];
-    const Mat3 R_WB = states->X_WB[b].linear();
-    const Mat6 M =
-        SpatialInertia(body.mass, R_WB * body.p_BoBcm_B, R_WB * body.I_Bcm_B * R_WB.transpose());
-    const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
-    MR.middleRows<6>(at) = M * R.middleRows<6>(at);
-  }
-  const MatX inertia = R.transpose() * MR;
+  const MatX inertia = R.transpose() * Momenta(mechanism_, *states, R);
   const Eigen::LDLT<MatX> factors(inertia);
   const VecX D = factors.vectorD();
   if (!(D.minCoeff() > kEps * D.maxCoeff())) {
@@ -228,6 +221,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
   double open = kNan, previous = std::numeric_limits<double>::infinity();
   for (int i = 0; i < kMostCorrections; ++i) {
     FollowCouplings(mechanism_, states);
+    FollowElements(mechanism_, states);
     Factor(t_s, *states);
     const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
     open = LargestOpen();

@@ -6,10 +6,10 @@
 //   J R = 0                                                                                    (1)
 //   A = A_p + R u̇,  A_p = J⁺(ẍ − b)  (least norm)                                             (2)
 //   RᵀM R u̇ = Rᵀ(F − w(A_p))                                                                  (3)
-// with w(A) = M A + … what Newton–Euler asks of each body beyond gravity, springs and loads, and F
-// the wrenches of the forced drives. Reactions drop out of (3); massless bodies need no inertia as
-// long as RᵀM R has it [Udwadia, Kalaba 1996; García de Jalón, Bayo 1994, ch. 5]. Redundant rows
-// cost nothing, and no choice of rows outlives a pose.
+// with w(A) = M A + … what Newton–Euler asks of each body beyond gravity, springs, force elements
+// and loads (rotors count in M and w), and F the wrenches of the forced drives. Reactions drop out
+// of (3); massless bodies need no inertia as long as RᵀM R has it [Udwadia, Kalaba 1996; García de
+// Jalón, Bayo 1994, ch. 5]. Redundant rows cost nothing, and no choice of rows outlives a pose.
 #pragma once
 
 #include <Eigen/QR>

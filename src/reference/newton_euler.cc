@@ -1,6 +1,7 @@
 // Newton–Euler at the body origins in world axes, and the energy balance from the same states.
 #include "core/spatial.h"
 #include "kinematics/constraints.h"
+#include "reference/element_forces.h"
 #include "reference/force_solver.h"
 
 namespace mbv::internal {
@@ -72,6 +73,21 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
     (*wrench_W)[row.parent] -= thrust * row.J_parent;
     (*wrench_W)[row.child] -= thrust * row.J_child;
   }
+  TakeElementForces(mechanism, states, wrench_W);
+}
+
+MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R) {
+  MatX MR(R.rows(), R.cols());
+  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
+    const Body& body = mechanism.bodies[b];
+    const Mat3 R_WB = states.X_WB[b].linear();
+    const Mat6 M =
+        SpatialInertia(body.mass, R_WB * body.p_BoBcm_B, R_WB * body.I_Bcm_B * R_WB.transpose());
+    const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
+    MR.middleRows<6>(at) = M * R.middleRows<6>(at);
+  }
+  AddRotorMomenta(mechanism, states, R, &MR);
+  return MR;
 }
 
 Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
@@ -87,6 +103,7 @@ Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
     const double stretch = LengthRow(spring, mechanism, states).value - spring.free_length_m;
     energy.springs += 0.5 * spring.stiffness * stretch * stretch;
   }
+  AddElementEnergies(mechanism, states, &energy);
   return energy;
 }
 
@@ -112,6 +129,7 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
     power.dampers -= spring.damping * rate * rate;
     power.springs -= spring.stiffness * (row.value - spring.free_length_m) * rate;
   }
+  AddElementPowers(mechanism, states, &power);
   power.energy_rate -= power.springs;
   return power;
 }

@@ -195,6 +195,16 @@ ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
   std::vector<Channel> channels = internal::ReferenceChannels(mechanism, options.reactions);
   for (Channel& channel : WorkChannels(mechanism)) channels.push_back(std::move(channel));
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
+  const std::string friction = FirstFriction(mechanism);
+  if (!friction.empty()) {
+    run.summary = {.stop = Stop::kUnsupported,
+                   .message = "element '" + friction +
+                              "' is dry friction, which is known in commanded motion only",
+                   .time_s = 0.0,
+                   .where = friction,
+                   .unit = {}};
+    return run;
+  }
   run.summary = Integrate(mechanism, motion, options, &run);
   run.summary.wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <complex>
 
-#include "core/spatial.h"
+#include "reference/element_forces.h"
 #include "reference/force_solver.h"
 
 namespace mbv::internal {
@@ -20,28 +20,37 @@ constexpr double kOrder = 7.0;
 // asks for it.
 constexpr double kStable = 10.0, kTooFine = 0.02;
 
-// Mᵇ R per body.
-MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R) {
-  MatX MR(R.rows(), R.cols());
-  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
-    const Body& body = mechanism.bodies[b];
-    const Mat3 R_WB = states.X_WB[b].linear();
-    const Mat6 M =
-        SpatialInertia(body.mass, R_WB * body.p_BoBcm_B, R_WB * body.I_Bcm_B * R_WB.transpose());
-    const auto at = 6 * (static_cast<Eigen::Index>(b) - 1);
-    MR.middleRows<6>(at) = M * R.middleRows<6>(at);
-  }
-  return MR;
-}
+// What yields along a coordinate of gradient u.
+struct Yielding {
+  std::string name;
+  VecX u;
+  double stiffness = 0.0, damping = 0.0;
+};
 
-// The gradient of a spring's length along the motions.
-VecX Along(const SpringDamper& spring, const Mechanism& mechanism, const BodyStates& states,
-           const MatX& R) {
-  const ScalarRow row = LengthRow(spring, mechanism, states);
+// A coordinate's gradient along the motions.
+VecX Along(const ScalarRow& row, const MatX& R) {
   VecX u = VecX::Zero(R.cols());
   if (row.parent > 0) u += R.middleRows<6>(6 * (row.parent - 1)).transpose() * row.J_parent;
   if (row.child > 0) u += R.middleRows<6>(6 * (row.child - 1)).transpose() * row.J_child;
   return u;
+}
+
+// Springs, then force elements.
+std::vector<Yielding> YieldingParts(const Mechanism& mechanism, const BodyStates& states,
+                                    const MatX& motions) {
+  std::vector<Yielding> parts;
+  for (const SpringDamper& spring : mechanism.springs) {
+    const ScalarRow row = LengthRow(spring, mechanism, states);
+    parts.push_back({spring.name, Along(row, motions), spring.stiffness, spring.damping});
+  }
+  const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
+  for (size_t e = 0; e < rows.size(); ++e) {
+    const ForceElement& element = mechanism.elements[e];
+    const ElementSlope slope = SlopeOf(element, rows[e].value);
+    if (slope.stiffness == 0.0 && slope.damping == 0.0) continue;
+    parts.push_back({element.name, Along(rows[e], motions), slope.stiffness, slope.damping});
+  }
+  return parts;
 }
 
 }  // namespace
@@ -50,13 +59,12 @@ SpringMode FastestSpringMode(const Mechanism& mechanism, const BodyStates& state
                              const MatX& motions) {
   SpringMode mode;
   const Eigen::Index n = motions.cols();
-  if (mechanism.springs.empty() || n == 0) return mode;
+  const std::vector<Yielding> parts = YieldingParts(mechanism, states, motions);
+  if (parts.empty() || n == 0) return mode;
   MatX K = MatX::Zero(n, n), C = MatX::Zero(n, n);
-  std::vector<VecX> along;
-  for (const SpringDamper& spring : mechanism.springs) {
-    const VecX& u = along.emplace_back(Along(spring, mechanism, states, motions));
-    K += spring.stiffness * u * u.transpose();
-    C += spring.damping * u * u.transpose();
+  for (const Yielding& part : parts) {
+    K += part.stiffness * part.u * part.u.transpose();
+    C += part.damping * part.u * part.u.transpose();
   }
   const Eigen::LDLT<MatX> inertia(motions.transpose() * Momenta(mechanism, states, motions));
   MatX A = MatX::Zero(2 * n, 2 * n);
@@ -70,13 +78,12 @@ SpringMode FastestSpringMode(const Mechanism& mechanism, const BodyStates& state
   mode.decay_per_s = std::max(0.0, -modes.eigenvalues()[fastest].real());
   const Eigen::VectorXcd x = modes.eigenvectors().col(fastest).head(n);
   double most = -1.0;
-  for (size_t s = 0; s < along.size(); ++s) {
-    const SpringDamper& spring = mechanism.springs[s];
-    const double share = (spring.stiffness + spring.damping * mode.rate_per_s) *
-                         std::norm(along[s].cast<std::complex<double>>().dot(x));
+  for (const Yielding& part : parts) {
+    const double share = (std::abs(part.stiffness) + part.damping * mode.rate_per_s) *
+                         std::norm(part.u.cast<std::complex<double>>().dot(x));
     if (share <= most) continue;
     most = share;
-    mode.spring = spring.name;
+    mode.spring = part.name;
   }
   return mode;
 }

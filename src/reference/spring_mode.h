@@ -1,8 +1,8 @@
-// How fast springs and dampers let a mechanism vibrate or creep, and what following that costs.
-// Internal to reference/.
+// How fast springs, dampers and force elements let a mechanism vibrate or creep, and what following
+// that costs. Internal to reference/.
 //
 // With R the motions that all constraints leave, small motions V = R x obey
-//   RᵀMR ẍ + RᵀCR ẋ + RᵀKR x = 0,  K = Σ k u uᵀ, C = Σ c u uᵀ  (u: gradient of a spring's length)
+//   RᵀMR ẍ + RᵀCR ẋ + RᵀKR x = 0,  K = Σ k u uᵀ, C = Σ c u uᵀ  (u: gradient of a part's coordinate)
 // and the rates are |λ| of [0 I; −(RᵀMR)⁻¹RᵀKR −(RᵀMR)⁻¹RᵀCR]. Geometric stiffness is left out.
 #pragma once
 
@@ -17,7 +17,7 @@ namespace mbv::internal {
 struct SpringMode {
   double rate_per_s = 0.0;   ///< |λ|; 0 without springs, or where nothing is free
   double decay_per_s = 0.0;  ///< −Re λ: the amplitude falls as exp(−decay t)
-  std::string spring;        ///< has most of its energy
+  std::string spring;        ///< or force element that has most of its energy
 };
 
 /// At a pose; `motions` (6·bodies × freedoms) is a basis of what the constraints leave there.

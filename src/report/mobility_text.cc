@@ -39,6 +39,9 @@ std::string HeadText(const Mechanism& mechanism, const Mobility& m) {
     }
     text += fmt::format("  coupling {}: {}\n", coupling.name, Joined(joints));
   }
+  for (const ForceElement& element : mechanism.elements) {
+    text += fmt::format("  element {}: {}\n", element.name, Described(mechanism, element));
+  }
   return text;
 }
 
@@ -199,6 +202,8 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
   for (const Drive& drive : mechanism.drives) json["drives"].push_back(drive.name);
   json["couplings"] = Json::array();
   for (const Coupling& coupling : mechanism.couplings) json["couplings"].push_back(coupling.name);
+  json["elements"] = Json::array();
+  for (const ForceElement& element : mechanism.elements) json["elements"].push_back(element.name);
   json["outputs"] = Json::array();
   for (const Output& output : mechanism.outputs) json["outputs"].push_back(output.name);
   json["home"] = PoseJson(report.home);

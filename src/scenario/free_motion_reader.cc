@@ -49,6 +49,7 @@ class FreeMotionReader {
 
   void Read(const YamlNode& node, const YamlNode* forces) {
     CheckCommands(node);
+    CheckFriction(node);
     if (forces != nullptr) ReadForces(*forces);
     ReadInitial(node.Find("initial"), "motion.initial", false);
     ReadInitial(node.Find("initial_rates"), "motion.initial_rates", true);
@@ -89,6 +90,16 @@ class FreeMotionReader {
                                command.name),
                    "command the drives themselves, or give no forces and no initial values");
     }
+  }
+
+  void CheckFriction(const YamlNode& node) {
+    const std::string friction = FirstFriction(mechanism_);
+    if (friction.empty()) return;
+    yaml().Error(node,
+                 fmt::format("motion: element '{}' of {} is dry friction, which is not known where "
+                             "freedoms move by forces",
+                             friction, mechanism_.name),
+                 "command every freedom, or set its coulomb and breakaway to 0");
   }
 
   void ReadForces(const YamlNode& node) {

@@ -151,7 +151,7 @@ void ConstraintSystem::EvaluatePosition() {
 }
 
 void ConstraintSystem::EvaluatePassive() {
-  if (engine_.spring_tendon.empty()) return;
+  if (engine_.spring_tendon.empty() && engine_.elements.empty()) return;
   const mjModel* m = engine_.m.get();
   Eigen::Map<VecX>(d_->ten_velocity, m->ntendon) =
       Eigen::Map<const RowMajor>(d_->ten_J, m->ntendon, m->nv) *

@@ -81,8 +81,11 @@ class ConstraintSystem {
   /// turns have few digits behind the point.
   [[nodiscard]] double Rounding() const;
 
-  /// Forces of the springs at d.qpos, d.qvel into qfrc_passive.
+  /// Forces of springs and of MuJoCo's own force elements at d.qpos, d.qvel into qfrc_passive.
   void EvaluatePassive();
+
+  /// J̇q̇ of a tendon's length; after Bias() at the same state.
+  [[nodiscard]] double TendonBias(int tendon) const;
 
   /// J̇q̇ of every row, from positions and velocities evaluated by MuJoCo (mj_comVel).
   void Bias(VecX* bias);
@@ -104,7 +107,6 @@ class ConstraintSystem {
   };
   void BodyBiasAccelerations();
   [[nodiscard]] Point PointOn(int body, const Vec3& p_W) const;
-  [[nodiscard]] double TendonBias(int tendon) const;
   void ClosureBias(int closure, VecX* bias) const;
 
   [[nodiscard]] bool IsLengthCoupling(size_t coupling) const;

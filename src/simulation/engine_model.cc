@@ -88,6 +88,33 @@ RunSummary CheckCouplings(const Mechanism& mechanism) {
   return RunSummary::Done();
 }
 
+RunSummary FindElements(EngineModel* engine) {
+  const Mechanism& mechanism = *engine->mechanism;
+  const mjModel& m = *engine->m;
+  for (const ForceElement& element : mechanism.elements) {
+    ElementPlace place;
+    if (element.drive >= 0) {
+      const Drive& drive = mechanism.drives[static_cast<size_t>(element.drive)];
+      place.tendon = IdOf(m, mjOBJ_TENDON, drive.name);
+      engine->elements.push_back(place);
+      continue;
+    }
+    const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+    if (HasBall(joint.kind)) {
+      return {.stop = Stop::kUnsupported,
+              .message = "element '" + element.name + "' acts on a coordinate of the free joint '" +
+                         joint.name + "', which MuJoCo does not have",
+              .where = element.name,
+              .unit = {}};
+    }
+    place.joint = IdOf(m, mjOBJ_JOINT, mjcf::JointName(joint, element.coordinate));
+    place.dof = m.jnt_dofadr[place.joint];
+    place.qpos = m.jnt_qposadr[place.joint];
+    engine->elements.push_back(place);
+  }
+  return RunSummary::Done();
+}
+
 // MuJoCo compiles no body whose inertia violates the triangle inequality.
 RunSummary CheckInertias(const Mechanism& mechanism) {
   for (const Body& body : mechanism.bodies) {
@@ -144,6 +171,7 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
     if (m.jnt_type[j] == mjJNT_FREE) engine->dof_is_rotation3[m.jnt_dofadr[j] + 3] = true;
   }
   MakeAnchorsExact(*engine);
+  if (RunSummary summary = FindElements(engine); !summary.ok()) return summary;
   return FindDriven(engine);
 }
 

@@ -24,6 +24,12 @@ struct DrivenPlace {
   int position_servo = -1, velocity_servo = -1, motor = -1;  ///< actuators of a servo
 };
 
+/// The coordinate of a force element: a joint's, or a tendon's length.
+struct ElementPlace {
+  int joint = -1, dof = -1, qpos = -1;
+  int tendon = -1;
+};
+
 struct EngineModel {
   const Mechanism* mechanism = nullptr;
   mjcf::Plan plan;
@@ -33,6 +39,7 @@ struct EngineModel {
   std::vector<int> closure_equality;        ///< per planned closure
   std::vector<int> coupling_equality;       ///< per coupling
   std::vector<int> spring_tendon;           ///< per spring
+  std::vector<ElementPlace> elements;       ///< per force element
   std::vector<std::vector<int>> joint_ids;  ///< per mechanism joint: MuJoCo joints, inner to outer
   std::vector<bool> dof_is_rotation3;       ///< first of three dofs of a ball (or of a free joint's
                                             ///< rotation): quaternion coordinates
@@ -42,7 +49,8 @@ struct EngineModel {
 };
 
 /// Compiles the MJCF of a mechanism and makes the closures' anchors exact. Throws EngineError when
-/// MuJoCo refuses it; returns kUnsupported for drives that have no scalar coordinate in MuJoCo.
+/// MuJoCo refuses it; returns kUnsupported for drives and force elements that have no scalar
+/// coordinate in MuJoCo.
 [[nodiscard]] RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                                          EngineModel* engine);
 

@@ -3,6 +3,8 @@
 #include <Eigen/Eigenvalues>
 #include <cmath>
 
+#include "simulation/element_forces.h"
+
 namespace mbv::simulation {
 namespace {
 
@@ -21,6 +23,13 @@ std::vector<Elastic> ElasticParts(const ConstraintSystem& system, const ServoGai
     const double* J = system.data()->ten_J + engine.spring_tendon[s] * system.nv();
     parts.push_back({"spring '" + spring.name + "'", Eigen::Map<const VecX>(J, system.nv()),
                      spring.stiffness, spring.damping});
+  }
+  for (size_t e = 0; e < engine.elements.size(); ++e) {
+    const ForceElement& element = engine.mechanism->elements[e];
+    const ElementSlope slope = SlopeOf(element, ElementMotionOf(system, e).position);
+    if (slope.stiffness == 0.0 && slope.damping == 0.0) continue;
+    parts.push_back({"element '" + element.name + "'", ElementGradient(system, e), slope.stiffness,
+                     slope.damping});
   }
   for (Eigen::Index k = 0; k < servo.kp.size(); ++k) {
     const auto drive = static_cast<int>(k);
@@ -48,7 +57,7 @@ std::string PartOf(const std::vector<Elastic>& parts, const Eigen::VectorXcd& x,
   double most = -1.0;
   for (const Elastic& part : parts) {
     const std::complex<double> along = (part.u.cast<std::complex<double>>().transpose() * x)(0);
-    const double share = (part.k + part.c * rate) * std::norm(along);
+    const double share = (std::abs(part.k) + part.c * rate) * std::norm(along);
     if (share <= most) continue;
     most = share;
     name = part.name;

@@ -7,6 +7,7 @@
 #include <array>
 #include <chrono>
 
+#include "simulation/element_forces.h"
 #include "simulation/session.h"
 
 namespace mbv::simulation {
@@ -46,18 +47,20 @@ class Predictor {
   VecX mean_, v_new_, work_;
 };
 
-void SolveDynamics(Session* s, double t_s, VecX* tau) {
+void SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* tau) {
   const mjModel* m = s->engine.m.get();
   mjData* d = s->data.get();
   mj_rne(m, d, 1, tau->data());
   s->system.EvaluatePassive();
   *tau -= Eigen::Map<const VecX>(d->qfrc_passive, m->nv);
+  // mj_rne knows no armature.
+  *tau += Eigen::Map<const VecX>(m->dof_armature, m->nv)
+              .cwiseProduct(Eigen::Map<const VecX>(d->qacc, m->nv));
   s->loads.Evaluate(t_s, *d);
-  if (!s->loads.world().empty()) {
-    *tau = -*tau;
-    s->loads.AddGeneralized(d, tau->data());
-    *tau = -*tau;
-  }
+  *tau = -*tau;
+  s->loads.AddGeneralized(d, tau->data());
+  if (s->lacking) AddLackingForces(s->system, at.acceleration, tau->data());
+  *tau = -*tau;
   if (s->shared) {
     s->solver.SolveLeastDriven(*tau);
   } else {
@@ -110,8 +113,9 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
     if (i == 0) s->FindShared();
     s->solver.SolveVelocity(samples[i].velocity);
     s->solver.SolveAcceleration(samples[i].acceleration);
-    SolveDynamics(s, times[i], &tau);
+    SolveDynamics(s, times[i], samples[i], &tau);
     s->Record(i);
+    if (RunSummary summary = CheckRubbingAt(*s, times[i]); !summary.ok()) return summary;
   }
   s->run->loop_wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

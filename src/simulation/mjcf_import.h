@@ -27,6 +27,11 @@ namespace mbv::simulation {
 }
 [[nodiscard]] inline Pose Shifted(const Vec3& p) { return Pose(Eigen::Translation3d(p)); }
 
+/// Hinges and slides.
+[[nodiscard]] inline bool IsScalar(const mjModel& m, int joint) {
+  return m.jnt_type[joint] == mjJNT_HINGE || m.jnt_type[joint] == mjJNT_SLIDE;
+}
+
 struct MjcfImport {
   const mjModel& m;
   const mjcf::ForeignMjcf& foreign;
@@ -63,6 +68,8 @@ struct MjcfImport {
 void AddTree(MjcfImport* in);
 /// Closures, and couplings of joints.
 void AddEqualities(MjcfImport* in);
+/// Armature, damping and springs of hinges and slides.
+void AddElements(MjcfImport* in);
 /// Actuators on hinges and slides.
 void AddDrives(MjcfImport* in);
 /// Sites as frames, geoms and mesh files as shapes.

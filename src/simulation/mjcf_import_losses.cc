@@ -8,13 +8,14 @@ namespace {
 constexpr size_t kMost = 6;  // names that are told
 constexpr const char* kForces = "drive forces are computed without it";
 
-// Joints of which a number that acts on forces is not zero.
+// Joints of which a number that acts on forces is not zero and has become no force element.
 std::vector<std::string> JointsWith(const MjcfImport& in, const mjtNum* per_dof) {
   std::vector<std::string> names;
   for (int d = 0; d < in.m.nv; ++d) {
     const std::string name = in.JointNameOf(in.m.dof_jntid[d]);
     const bool held = in.m.jnt_type[in.m.dof_jntid[d]] == mjJNT_FREE;
-    if (per_dof[d] != 0.0 && !held && (names.empty() || names.back() != name)) {
+    const bool taken = per_dof != in.m.dof_frictionloss && IsScalar(in.m, in.m.dof_jntid[d]);
+    if (per_dof[d] != 0.0 && !held && !taken && (names.empty() || names.back() != name)) {
       names.push_back(name);
     }
   }
@@ -24,7 +25,7 @@ std::vector<std::string> JointsWith(const MjcfImport& in, const mjtNum* per_dof)
 std::vector<std::string> SprungJoints(const MjcfImport& in) {
   std::vector<std::string> names;
   for (int j = 0; j < in.m.njnt; ++j) {
-    if (in.m.jnt_stiffness[j] != 0.0) names.push_back(in.JointNameOf(j));
+    if (in.m.jnt_stiffness[j] != 0.0 && !IsScalar(in.m, j)) names.push_back(in.JointNameOf(j));
   }
   return names;
 }

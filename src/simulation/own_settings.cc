@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "simulation/mjcf_import.h"
 #include "simulation/own_model_parts.h"
 
 namespace mbv::simulation {
@@ -30,11 +31,14 @@ class SettingsTaker {
   void ForLeftOut(const Visit& visit) {
     for (int dof = 0; dof < m_->nv; ++dof) {
       if (IsHeld(dof)) continue;
+      visit("friction loss", &m_->dof_frictionloss[dof]);
+      if (IsScalar(*m_, m_->dof_jntid[dof])) continue;  // force elements
       visit("armature", &m_->dof_armature[dof]);
       visit("damping", &m_->dof_damping[dof]);
-      visit("friction loss", &m_->dof_frictionloss[dof]);
     }
-    for (int j = 0; j < m_->njnt; ++j) visit("joint springs", &m_->jnt_stiffness[j]);
+    for (int j = 0; j < m_->njnt; ++j) {
+      if (!IsScalar(*m_, j)) visit("springs of balls", &m_->jnt_stiffness[j]);
+    }
     for (int t = 0; t < m_->ntendon; ++t) {
       visit("tendon springs", &m_->tendon_stiffness[t]);
       visit("tendon damping", &m_->tendon_damping[t]);

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "simulation/element_forces.h"
+
 namespace mbv::simulation {
 namespace {
 
@@ -45,6 +47,10 @@ void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) 
     const double rate = SpringRate(system, s);
     (*rates)[driven + 1] -= engine.mechanism->springs[s].damping * rate * rate;
   }
+  for (size_t e = 0; e < engine.elements.size(); ++e) {
+    const ForceElement& element = engine.mechanism->elements[e];
+    if (Dissipates(element)) (*rates)[driven + 1] += PowerOf(element, ElementMotionOf(system, e));
+  }
 }
 
 Powers PowersOf(const ConstraintSystem& system, const Loads& loads) {
@@ -62,6 +68,12 @@ Powers PowersOf(const ConstraintSystem& system, const Loads& loads) {
     power.springs -= spring.stiffness *
                      (d.ten_length[engine.spring_tendon[s]] - spring.free_length_m) *
                      SpringRate(system, s);
+  }
+  for (size_t e = 0; e < engine.elements.size(); ++e) {
+    const ForceElement& element = engine.mechanism->elements[e];
+    const double put_in = PowerOf(element, ElementMotionOf(system, e));
+    if (std::holds_alternative<SpringLaw>(element.law)) power.springs += put_in;
+    if (std::holds_alternative<RotorLaw>(element.law)) power.rotors -= put_in;
   }
   return power;
 }
@@ -84,6 +96,11 @@ Energies EnergiesOf(const ConstraintSystem& system) {
     const SpringDamper& spring = engine.mechanism->springs[s];
     const double stretch = d.ten_length[engine.spring_tendon[s]] - spring.free_length_m;
     energy.springs += 0.5 * spring.stiffness * stretch * stretch;
+  }
+  for (size_t e = 0; e < engine.elements.size(); ++e) {
+    const ElementEnergy of = EnergyOf(engine.mechanism->elements[e], ElementMotionOf(system, e));
+    energy.springs += of.stored;
+    energy.kinetic += of.kinetic;
   }
   return energy;
 }

@@ -12,6 +12,7 @@ namespace mbv::simulation {
 struct Powers {
   VecX rates;  ///< WorkRates()
   double gravity = 0.0, springs = 0.0;
+  double rotors = 0.0;  ///< what goes into the rotors of force elements
 
   /// Per driven coordinate: drives, then prescribed joints.
   [[nodiscard]] auto driven() const { return rates.head(rates.size() - 2); }

@@ -25,6 +25,7 @@ ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
   }
   AddTree(&in);
   AddEqualities(&in);
+  AddElements(&in);
   AddDrives(&in);
   AddSites(&in);
   AddShapes(&in);

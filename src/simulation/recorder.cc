@@ -3,6 +3,7 @@
 #include "core/demand.h"
 #include "core/spatial.h"
 #include "mechanism/channels.h"
+#include "simulation/element_forces.h"
 #include "simulation/output_rates.h"
 #include "simulation/powers.h"
 
@@ -87,6 +88,11 @@ void Recorder::FindReactionPlaces() {
     ++row;
   }
   for (const Prescribed& base : mechanism.prescribed) add(base.joint, row++);
+  elements_of_.resize(mechanism.joints.size());
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
+    const int joint = mechanism.elements[e].joint;
+    if (joint >= 0) elements_of_[joint].push_back(e);
+  }
   coupled_of_.resize(mechanism.joints.size());
   for (size_t c = 0; c < mechanism.couplings.size(); ++c) {
     for (const Coupling::Term& term : mechanism.couplings[c].terms) {
@@ -223,6 +229,10 @@ void Recorder::TreeWrenches(const Loads& loads) {
     AddTendon(tendon, -spring.stiffness * (d->ten_length[tendon] - spring.free_length_m) -
                           spring.damping * rate);
   }
+  for (size_t e = 0; e < engine_.elements.size(); ++e) {
+    const int tendon = engine_.elements[e].tendon;
+    if (tendon >= 0) AddTendon(tendon, ElementForce(e));
+  }
   for (const WorldLoad& load : loads.world()) {
     AddExternal(load.body_id, load.p_WQ, load.force, load.moment);
   }
@@ -233,7 +243,11 @@ void Recorder::TreeWrenches(const Loads& loads) {
   W_ += Eigen::Map<const Eigen::Matrix<double, 6, Eigen::Dynamic>>(d->cfrc_int, 6, m.nbody);
 }
 
-// Drives and couplings act along or about the joint's own axes, through M's origin.
+double Recorder::ElementForce(size_t e) const {
+  return ForceOf(engine_.mechanism->elements[e], ElementMotionOf(*system_, e));
+}
+
+// Drives, couplings and force elements act along or about the joint's own axes, through M's origin.
 void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
   const auto exclude = [&](int id, double force) {
     const ConstVec3 axis(system_->data()->xaxis + 3 * id);
@@ -244,6 +258,7 @@ void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
   for (const auto& [row, id] : coupled_of_[joint]) {
     exclude(id, system_->J()(row, engine_.m->jnt_dofadr[id]) * system_->force()[row]);
   }
+  for (const size_t e : elements_of_[joint]) exclude(engine_.elements[e].joint, ElementForce(e));
 }
 
 Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {
@@ -280,9 +295,10 @@ void Recorder::RecordAudit(const Loads& loads, const VecX& work,
   const ConstraintSystem::Gap gap = system_->LargestGap();
   const Powers power = PowersOf(*system_, loads);
   const Energies energy = EnergiesOf(*system_);
-  // d/dt(kinetic + gravity) = q̇·(M q̈ + bias).
+  // d/dt(kinetic + gravity) = q̇·(M q̈ + bias), M without rotors.
   mj_rne(&m, system_->data(), 1, work_.data());
-  const double energy_rate = ConstVecX(system_->data()->qvel, m.nv).dot(work_) - power.springs;
+  const double energy_rate =
+      ConstVecX(system_->data()->qvel, m.nv).dot(work_) + power.rotors - power.springs;
   const auto drives = static_cast<Eigen::Index>(engine_.mechanism->drives.size());
   const double base = power.driven().tail(power.driven().size() - drives).sum();
   const auto put = [&](Quantity quantity, double value) { row[columns_(quantity)] = value; };

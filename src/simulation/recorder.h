@@ -45,6 +45,7 @@ class Recorder {
   [[nodiscard]] Vec6 ReactionOf(int joint, const std::vector<Pose>& X_WB) const;
   [[nodiscard]] Vec6 ClosureWrench(int closure) const;
   void ExcludeDrives(int joint, double sign, Vec6* F_W) const;
+  [[nodiscard]] double ElementForce(size_t e) const;
 
   ConstraintSystem* const system_;
   const EngineModel& engine_;
@@ -53,8 +54,9 @@ class Recorder {
   const ChannelColumns columns_;
   std::vector<ReactionPlace> places_;  // per joint
   std::vector<std::vector<std::pair<int, int>>>
-      driven_of_,                               // per joint: (driven row, MuJoCo joint)
-      coupled_of_;                              // per joint: (constraint row, MuJoCo joint)
+      driven_of_,                                 // per joint: (driven row, MuJoCo joint)
+      coupled_of_;                                // per joint: (constraint row, MuJoCo joint)
+  std::vector<std::vector<size_t>> elements_of_;  // per joint: force elements
   Eigen::Matrix<double, 6, Eigen::Dynamic> W_;  // per MuJoCo body: wrench from its parent about the
                                                 // root's centre of mass, world axes
   VecX bias_, acceleration_, work_;

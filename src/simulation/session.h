@@ -37,8 +37,8 @@ struct Session {
   [[nodiscard]] const VecX& WorkRates();
   /// Decides, at the present configuration, whether the drives share their forces.
   void FindShared();
-  /// Loads and given drive forces at t, for the data's current position and velocity, into
-  /// qfrc_applied; forces of servos into qfrc_actuator.
+  /// Loads, given drive forces and force elements that MuJoCo lacks at t, for the data's current
+  /// position and velocity, into qfrc_applied; forces of servos into qfrc_actuator.
   void ApplyForces(double t_s, const Commanded& at);
 
   const EngineModel engine;
@@ -51,6 +51,7 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
+  const bool lacking;   ///< there are force elements that MuJoCo has no word for
   VecX work_rates;      ///< of the state that was asked for last
   EngineState start;    ///< of a mechanism whose drives are pushed or servos
   bool shared = false;  ///< drive forces are not unique: the least ones are reported
@@ -74,6 +75,9 @@ struct Session {
                                             EngineState* start);
 /// Puts the session there, closed once more without the guides.
 [[nodiscard]] RunSummary PutAtCommandedStart(Session* session, const DrivenSample& first);
+
+/// CheckRubbing() at a recorded sample, with its time.
+[[nodiscard]] RunSummary CheckRubbingAt(const Session& session, double t_s);
 
 /// Positions of everything driven at home.
 [[nodiscard]] VecX HomePositions(const EngineModel& engine);

@@ -6,6 +6,7 @@
 
 #include "core/roles.h"
 #include "mjcf/mjcf.h"
+#include "simulation/element_forces.h"
 #include "simulation/session.h"
 #include "simulation/steps.h"
 
@@ -49,7 +50,8 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       system(engine, data.get()),
       solver(&system),
       loads(engine, motion_),
-      recorder(&system, Integrates(options_)) {
+      recorder(&system, Integrates(options_)),
+      lacking(HasLacking(*engine.mechanism)) {
   run->trace.witness = role::kSimulated.name;
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
@@ -77,6 +79,12 @@ const VecX& Session::WorkRates() {
   return work_rates;
 }
 
+RunSummary CheckRubbingAt(const Session& session, double t_s) {
+  RunSummary summary = CheckRubbing(session.system, session.motion.duration_s);
+  if (!summary.ok()) summary.time_s = t_s;
+  return summary;
+}
+
 void Session::FindShared() { shared = !solver.DrivenRowsNotUnique().empty(); }
 
 VecX HomePositions(const EngineModel& engine) {
@@ -87,9 +95,10 @@ VecX HomePositions(const EngineModel& engine) {
 
 void Session::ApplyForces(double t_s, const Commanded& at) {
   loads.Evaluate(t_s, *data);
-  if (loads.world().empty() && !system.has_given_forces()) return;
+  if (loads.world().empty() && !system.has_given_forces() && !lacking) return;
   mju_zero(data->qfrc_applied, engine.m->nv);
   loads.AddGeneralized(data.get(), data->qfrc_applied);
+  if (lacking) AddLackingForces(system, at.motion.acceleration, data->qfrc_applied);
   if (!system.has_given_forces()) return;
   given.setZero(static_cast<Eigen::Index>(engine.driven.size()));
   for (const DriveForce& force : motion.forces) {
@@ -190,6 +199,7 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
     GuideDrives(false, &engine);
   }
   if (options.drives == DriveMode::kServo) FindServos(&engine);
+  if (RunSummary summary = CheckElements(engine, motion); !summary.ok()) return summary;
   Session session(std::move(engine), motion, options, run);
   session.start = std::move(start);
   session.progress = progress;

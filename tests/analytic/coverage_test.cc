@@ -111,6 +111,10 @@ TEST_P(CoverageOfModel, NamesWhatTheEquationsDoNotKnow) {
   Mechanism sprung = mechanism_;
   sprung.springs.push_back({.name = "buffer", .body_to = 1, .stiffness = 1e3});
   EXPECT_TRUE(Mentions(FindUncovered(sprung), "spring-damper buffer of 1000 N/m"));
+  Mechanism damped = sprung;
+  damped.springs.clear();
+  damped.elements = {{.name = "oil", .joint = 0, .law = DampingLaw{0.1}}};
+  EXPECT_TRUE(Mentions(FindUncovered(damped), "element oil, damping of "));
 
   Mechanism heavier = mechanism_;
   heavier.bodies.push_back({.name = "ballast", .mass = 3.0, .frames = {}, .shapes = {}});

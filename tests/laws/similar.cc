@@ -96,6 +96,25 @@ void Scale(const Mechanism& mechanism, double s, Coupling* coupling) {
   coupling->constant *= unit;
 }
 
+// Forces grow with s along lengths, with s² about axes, at the same time: masses stay.
+void Scale(const Mechanism& mechanism, double s, ForceElement* element) {
+  const bool length = ActsOnLength(mechanism, *element);
+  const double unit = length ? s : 1.0, force = length ? s : s * s;
+  if (auto* damping = std::get_if<DampingLaw>(&element->law)) damping->damping *= force / unit;
+  if (auto* friction = std::get_if<FrictionLaw>(&element->law)) {
+    friction->coulomb *= force;
+    friction->breakaway *= force;
+    friction->stribeck_rate *= unit;
+  }
+  if (auto* rotor = std::get_if<RotorLaw>(&element->law)) rotor->inertia *= force / unit;
+  auto* spring = std::get_if<SpringLaw>(&element->law);
+  if (spring == nullptr) return;
+  spring->preload *= force;
+  spring->free *= unit;
+  double power = 1.0;
+  for (double& coefficient : spring->polynomial) coefficient *= force / (power *= unit);
+}
+
 }  // namespace
 
 Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
@@ -133,6 +152,7 @@ Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
     placer.Put(output.reference_body, &output.X_RbR);
   }
   for (Coupling& coupling : m.couplings) Scale(mechanism, s, &coupling);
+  for (ForceElement& element : m.elements) Scale(mechanism, s, &element);
   for (SpringDamper& spring : m.springs) {
     placer.Put(spring.body_from, &spring.p_from);
     placer.Put(spring.body_to, &spring.p_to);

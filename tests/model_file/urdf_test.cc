@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <numbers>
@@ -10,6 +11,7 @@
 #include "four_bar.h"
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
+#include "model_file/write_model.h"
 #include "tests/shipped.h"
 #include "tests/source_dir.h"
 
@@ -135,15 +137,14 @@ TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {
   (void)ReadUrdf(text, "r.urdf", &diagnostics);
   const std::string said = diagnostics.Text();
   for (const char* part :
-       {"r.urdf:3:1: warning: damping in 2 joints is left out: a (0.5), c (2)\n"
+       {"r.urdf:5:1: warning: friction in 2 joints is left out: b (0.1), c (0.2)\n"
         "  hint: drive forces are computed without it\n",
-        "r.urdf:5:1: warning: friction in 2 joints is left out: b (0.1), c (0.2)\n",
         "r.urdf:10:1: warning: transmission 't1': the reduction 50 is left out\n"
         "  hint: positions and forces are those of the joint, not of the motor\n",
         "r.urdf:11:1: warning: transmission 't2': the reduction -1 is left out\n"}) {
     EXPECT_NE(said.find(part), std::string::npos) << part << said;
   }
-  EXPECT_EQ(diagnostics.findings().size(), 4u) << said;
+  EXPECT_EQ(diagnostics.findings().size(), 3u) << said;
 }
 
 TEST(UrdfImport, FindingsReplaceUrdfdomsTalk) {
@@ -233,6 +234,53 @@ TEST_P(ShippedModel, SurvivesTheRoundTripThroughUrdf) {
 
 INSTANTIATE_TEST_SUITE_P(Urdf, ShippedModel, testing::ValuesIn(ShippedModelNames()),
                          [](const auto& name) { return name.param; });
+
+TEST(UrdfImport, DampingOfJointsIsAForceElement) {
+  const std::string text = Robot(
+      "<link name=\"arm\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" "
+      "iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>\n<joint name=\"hip\" "
+      "type=\"continuous\"><parent link=\"world\"/><child link=\"arm\"/>"
+      "<dynamics damping=\"0.5\"/></joint>\n");
+  const LoadResult loaded = LoadModel(WriteFile("damped.urdf", text));
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.elements.size(), 1u);
+  EXPECT_EQ(m.elements[0].name, "hip_damping");
+  EXPECT_EQ(m.elements[0].joint, m.FindJoint("hip"));
+  EXPECT_EQ(std::get<DampingLaw>(m.elements[0].law).damping, 0.5);
+}
+
+// Damping of tree joints stands in the URDF, all else in the companion.
+TEST(UrdfExport, ForceElementsComeBack) {
+  LoadResult loaded = LoadModel(SourcePath("/models/rubbing_five_bar/model.yaml"));
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  const std::string urdf = WriteFile("rubbing.urdf", WriteUrdf(m));
+  EXPECT_NE(WriteUrdf(m).find("<dynamics damping=\"0.03\"/>"), std::string::npos);
+  const LoadResult back = LoadModel(WriteFile("rubbing.yaml", WriteUrdfCompanion(m, urdf)));
+  ASSERT_TRUE(back.mechanism.has_value()) << back.diagnostics.Text();
+  ASSERT_EQ(back.mechanism->elements.size(), m.elements.size());
+  const auto sum = [](const Mechanism& of, auto visit) {
+    double total = 0.0;
+    for (const ForceElement& element : of.elements) total += visit(of, element);
+    return total;
+  };
+  const auto damping = [](const Mechanism& of, const ForceElement& element) {
+    const auto* law = std::get_if<DampingLaw>(&element.law);
+    return law == nullptr ? 0.0
+                          : law->damping * (of.joints[element.joint].name == "wrist" ? 10 : 1);
+  };
+  EXPECT_DOUBLE_EQ(sum(*back.mechanism, damping), sum(m, damping));
+  for (const ForceElement& element : m.elements) {
+    if (std::holds_alternative<DampingLaw>(element.law)) continue;
+    const auto same = [&](const ForceElement& other) {
+      return other.name == element.name &&
+             ElementText(other, back.mechanism->joints[other.joint].name) ==
+                 ElementText(element, m.joints[element.joint].name);
+    };
+    EXPECT_TRUE(std::ranges::any_of(back.mechanism->elements, same)) << element.name;
+  }
+}
 
 TEST(UrdfExport, ChainsReversedJointsOffsetFramesAndRangesSurviveTheRoundTrip) {
   // `cut` takes the tree through `ball` backwards: from d to c.

@@ -193,11 +193,19 @@ TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
 }
 
 TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
-  const OwnFileAudit audit = Audit(Text({.head = kStiff, .joint = "damping='1'"}));
+  const OwnFileAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='1'"}));
   EXPECT_EQ(Named(audit), Keys{"left_out"});
   ASSERT_NE(Find(audit, "left_out"), nullptr);
-  EXPECT_NE(Find(audit, "left_out")->title.find("damping"), std::string::npos);
+  EXPECT_NE(Find(audit, "left_out")->title.find("friction loss"), std::string::npos);
   EXPECT_FALSE(audit.searched);
+}
+
+// Damping, armature and springs of hinges are in the reference as well.
+TEST_F(OwnFile, ForceElementsAreNotLeftOut) {
+  const OwnFileAudit audit =
+      Audit(Text({.head = kStiff, .joint = "damping='1' armature='0.2' stiffness='3'"}));
+  EXPECT_EQ(Find(audit, "left_out"), nullptr);
+  EXPECT_LT(audit.mended.force, 1e-3);
 }
 
 TEST_F(OwnFile, AFreeBaseIsHeldAsIfItWereFixed) {

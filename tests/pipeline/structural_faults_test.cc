@@ -155,6 +155,33 @@ TEST(StructuralFaults, AFlippedAxisCountsTheOtherWayInItsCouplings) {
   }
 }
 
+// A spring pulls as before where its coordinate counts the other way.
+TEST(StructuralFaults, AFlippedAxisCountsTheOtherWayInItsElements) {
+  Mechanism bars = LoadNamed("rubbing_five_bar");
+  bars.elements = {
+      {.name = "s", .joint = bars.FindJoint("shoulder1"), .law = SpringLaw{{3, -2, 1}, 0.4, 0.7}}};
+  const auto force = [](const Mechanism& m, double q) {
+    const auto& spring = std::get<SpringLaw>(m.elements[0].law);
+    const double x = q - spring.free;
+    return -(spring.preload + spring.polynomial[0] * x + spring.polynomial[1] * x * x +
+             spring.polynomial[2] * x * x * x);
+  };
+  const Mechanism wrong = Of(bars, "flipped axis").at(0).wrong.at(0);
+  for (const double q : {-0.3, 1.1}) EXPECT_NEAR(force(wrong, -q), -force(bars, q), 1e-14);
+}
+
+TEST(StructuralFaults, PreloadsAndGearsOfRotorsAreMistaken) {
+  const Mechanism bars = LoadNamed("rubbing_five_bar");
+  const std::vector<StructuralFault> pushed = Of(bars, "preload the other way");
+  ASSERT_EQ(pushed.size(), 2u);  // torsion and rubber
+  EXPECT_EQ(pushed[0].where, "torsion");
+  EXPECT_EQ(std::get<SpringLaw>(pushed[0].wrong.at(0).elements.at(6).law).preload, -0.6);
+  const std::vector<StructuralFault> geared = Of(bars, "ratio of a rotor not squared");
+  ASSERT_EQ(geared.size(), 2u);
+  const auto& rotor = std::get<RotorLaw>(geared[1].wrong.at(0).elements.at(1).law);
+  EXPECT_NEAR(rotor.reflected(), 2e-5 * 40, 1e-15);
+}
+
 TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
   for (const std::string& model : ShippedModelNames()) {
     const Mechanism mechanism = LoadNamed(model);

@@ -53,6 +53,17 @@ FastestRate RateOf(const Mechanism& m) {
   return FastestRateOf(system, {}, 6.0);
 }
 
+// A rotor of 6 kg makes the cart heavier; a spring is as stiff as its slope at the start.
+TEST(FastestRate, OfForceElementsIsThatOfTheirSlopes) {
+  Mechanism m = Cart(0.0, 0.0);
+  m.springs.clear();
+  m.elements = {{.name = "k", .joint = 0, .law = SpringLaw{{1e4, 1e5}, -1.0, 0.0}},
+                {.name = "J", .joint = 0, .law = RotorLaw{6e-4, 100.0}}};
+  const FastestRate rate = RateOf(m);
+  EXPECT_NEAR(rate.per_s, std::sqrt((1e4 + 2e5) / 8.0), 1e-6);
+  EXPECT_EQ(rate.part, "element 'k'");
+}
+
 TEST(FastestRate, OfASpringIsTheSquareRootOfStiffnessOverMass) {
   const FastestRate rate = RateOf(Cart(8e4, 0.0));
   EXPECT_NEAR(rate.per_s, 200.0, 1e-6);

@@ -1,0 +1,206 @@
+#include "model_file/model_elements.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "core/text.h"
+#include "model_file/model_drives.h"
+
+namespace mbv::internal {
+namespace {
+
+const std::vector<std::string> kKinds = {"damping", "spring", "rotor", "friction"};
+
+// The keys of a kind beside those of its place.
+const std::vector<std::string>& KeysOf(const std::string& kind) {
+  static const std::map<std::string, std::vector<std::string>> keys = {
+      {"damping", {"damping"}},
+      {"spring", {"stiffness", "polynomial", "free", "free_deg", "free_mm", "preload"}},
+      {"rotor", {"inertia", "ratio"}},
+      {"friction", {"coulomb", "breakaway", "stribeck_rate"}}};
+  return keys.at(kind);
+}
+
+}  // namespace
+
+void ElementReader::Read(const Block& block) {
+  for (const YamlEntry& entry : block.Entries("elements", &values_.yaml())) {
+    ReadElement(block, entry);
+  }
+}
+
+void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
+  YamlReader& yaml = values_.yaml();
+  const std::string section = block.PathOf("elements");
+  if (!IsNewName(entry, section, &yaml)) return;
+  if (!HasRoom(*entry.value, elements_.size(), kMaxItems, "elements", &yaml)) return;
+  const YamlNode* kind = entry.value->is_map() ? entry.value->Find("kind") : nullptr;
+  std::vector<std::string> keys = {"kind", "joint", "coordinate", "drive"};
+  for (const std::string& word : kKinds) {
+    // Of a kind that is not known, any key is.
+    const bool known = kind != nullptr && std::ranges::find(kKinds, kind->text) != kKinds.end();
+    if (known && kind->text != word) continue;
+    keys.insert(keys.end(), KeysOf(word).begin(), KeysOf(word).end());
+  }
+  const YamlMap map(&yaml, entry.value.get(), JoinPath(section, entry.key), keys);
+  if (!map.valid() || map.Required("kind") == nullptr) return;
+  if (!yaml.Choice(*kind, map.PathOf("kind"), kKinds)) return;
+  ForceElement element{.name = block.prefix + entry.key, .law = {}};
+  const bool placed = ReadPlace(block, map, &element);
+  if (ReadLaw(block, map, kind->text, placed ? &element : nullptr) && placed) {
+    elements_.push_back(std::move(element));
+  }
+}
+
+bool ElementReader::ReadPlace(const Block& block, const YamlMap& map, ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  if (map.Has("joint") == map.Has("drive")) {
+    yaml.Error(*map.node(), fmt::format("{} needs either joint or drive", map.path()),
+               "joint: the joint along whose coordinate it acts; drive: along that drive's");
+    return false;
+  }
+  if (map.Has("drive")) return ReadDrive(block, map, element);
+  const auto at = ReadJointCoordinate(joints_, block, map, {}, &yaml);
+  if (!at) return false;
+  element->joint = at->joint;
+  element->coordinate = at->coordinate;
+  return true;
+}
+
+// A joint drive stands for its coordinate.
+bool ElementReader::ReadDrive(const Block& block, const YamlMap& map, ForceElement* element) {
+  YamlReader& yaml = values_.yaml();
+  const YamlNode& node = *map.Find("drive");
+  const auto name = yaml.Text(node, map.PathOf("drive"));
+  if (!name) return false;
+  if (const YamlNode* coordinate = map.Find("coordinate")) {
+    yaml.Error(*coordinate, fmt::format("{}: a drive has one coordinate", map.path()));
+    return false;
+  }
+  int index = -1;
+  for (const std::string& level : block.levels) {
+    if (index < 0) index = IndexOf(drives_, level + *name);
+  }
+  if (index < 0) {
+    std::vector<std::string> names;
+    for (const Drive& drive : drives_) names.push_back(drive.name);
+    yaml.Error(node,
+               fmt::format("{} = {}: there is no such drive", map.PathOf("drive"), Describe(node)),
+               DidYouMean(*name, names));
+    return false;
+  }
+  if (const auto* on = std::get_if<JointDrive>(&drives_[static_cast<size_t>(index)].kind)) {
+    element->joint = on->joint;
+    element->coordinate = on->coordinate;
+  } else {
+    element->drive = index;
+  }
+  return true;
+}
+
+// Reads and checks all numbers, also where the place (null) is wrong.
+bool ElementReader::ReadLaw(const Block& block, const YamlMap& map, const std::string& kind,
+                            ForceElement* element) {
+  const auto take = [element](const auto& law) {
+    if (law && element != nullptr) element->law = *law;
+    return law.has_value();
+  };
+  if (kind == "damping") return take(ReadDamping(block, map));
+  if (kind == "rotor") return take(ReadRotor(block, map));
+  if (kind == "friction") return take(ReadFriction(block, map));
+  return take(ReadSpring(block, map, element));
+}
+
+std::optional<DampingLaw> ElementReader::ReadDamping(const Block& block, const YamlMap& map) {
+  if (map.Required("damping") == nullptr) return std::nullopt;
+  const auto damping = NotNegative(block, map, "damping");
+  if (!damping) return std::nullopt;
+  return DampingLaw{*damping};
+}
+
+std::optional<SpringLaw> ElementReader::ReadSpring(const Block& block, const YamlMap& map,
+                                                   const ForceElement* element) {
+  SpringLaw spring;
+  const auto polynomial = ReadPolynomial(block, map);
+  std::optional<double> free = 0.0;
+  if (element != nullptr) {
+    const bool on_joint = element->drive < 0;
+    const Joint* joint = on_joint ? &joints_.joints[element->joint] : nullptr;
+    free = ReadInCoordinateUnit(
+        &values_, block, map, "free", !on_joint || IsLength(joint->kind, element->coordinate),
+        on_joint ? joint->name : drives_[static_cast<size_t>(element->drive)].name);
+  }
+  std::optional<double> preload = 0.0;
+  if (map.Has("preload")) preload = values_.Number(block, map, "preload", {kPlain});
+  if (!polynomial || !free || !preload) return std::nullopt;
+  return SpringLaw{.polynomial = *polynomial, .free = *free, .preload = *preload};
+}
+
+// k, k2, …
+std::optional<std::vector<double>> ElementReader::ReadPolynomial(const Block& block,
+                                                                 const YamlMap& map) {
+  YamlReader& yaml = values_.yaml();
+  if (map.Has("stiffness") == map.Has("polynomial")) {
+    yaml.Error(*map.node(), fmt::format("{} needs either stiffness or polynomial", map.path()),
+               "stiffness: force by deflection; polynomial: the coefficients of x, x², x³, x⁴");
+    return std::nullopt;
+  }
+  if (map.Has("stiffness")) {
+    const auto stiffness = NotNegative(block, map, "stiffness");
+    if (!stiffness) return std::nullopt;
+    return std::vector<double>{*stiffness};
+  }
+  return ReadCoefficients(&values_, block, map, "polynomial");
+}
+
+std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlMap& map) {
+  const bool stated = map.Required("inertia") != nullptr;
+  const auto inertia = stated ? NotNegative(block, map, "inertia") : std::nullopt;
+  std::optional<double> ratio = 1.0;
+  if (const YamlNode* node = map.Find("ratio")) {
+    ratio = values_.Number(block, map, "ratio", {kPlain});
+    if (ratio == 0.0) {
+      values_.yaml().Error(*node, fmt::format("{} = 0 turns no rotor", map.PathOf("ratio")),
+                           "ratio: the rotor's rate by that of the coordinate");
+      return std::nullopt;
+    }
+  }
+  if (!inertia || !ratio) return std::nullopt;
+  return RotorLaw{.inertia = *inertia, .ratio = *ratio};
+}
+
+std::optional<FrictionLaw> ElementReader::ReadFriction(const Block& block, const YamlMap& map) {
+  YamlReader& yaml = values_.yaml();
+  const bool stated = map.Required("coulomb") != nullptr;
+  const auto coulomb = stated ? NotNegative(block, map, "coulomb") : std::nullopt;
+  if (map.Has("breakaway") != map.Has("stribeck_rate")) {
+    yaml.Error(*map.node(),
+               fmt::format("{} needs both breakaway and stribeck_rate, or neither", map.path()),
+               "breakaway: friction just above rest; stribeck_rate: how fast it falls to coulomb");
+    return std::nullopt;
+  }
+  if (!map.Has("breakaway")) {
+    if (!coulomb) return std::nullopt;
+    return FrictionLaw{.coulomb = *coulomb, .breakaway = *coulomb};
+  }
+  const auto breakaway = values_.Number(block, map, "breakaway", {kPlain});
+  const auto rate = values_.Positive(block, map, "stribeck_rate", {kPlain});
+  if (!coulomb || !breakaway || !rate) return std::nullopt;
+  if (*breakaway >= *coulomb) return FrictionLaw{*coulomb, *breakaway, *rate};
+  yaml.Error(*map.Find("breakaway"), fmt::format("{} = {} violates breakaway >= coulomb = {}",
+                                                 map.PathOf("breakaway"), *breakaway, *coulomb));
+  return std::nullopt;
+}
+
+std::optional<double> ElementReader::NotNegative(const Block& block, const YamlMap& map,
+                                                 const std::string& key) {
+  const auto value = values_.Number(block, map, key, {kPlain});
+  if (!value || *value >= 0.0) return value;
+  values_.yaml().Error(*map.Find(key),
+                       fmt::format("{} = {} violates {} >= 0", map.PathOf(key), *value, key));
+  return std::nullopt;
+}
+
+}  // namespace mbv::internal

@@ -1,0 +1,154 @@
+#include "simulation/element_forces.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbv::simulation {
+namespace {
+
+using ConstVecX = Eigen::Map<const VecX>;
+
+RunSummary FrictionUnsupported(const Mechanism& mechanism, const ForceElement& element) {
+  return {.stop = Stop::kUnsupported,
+          .message = "element '" + element.name + "', " + Described(mechanism, element) +
+                     ": friction is known where every drive is commanded only",
+          .where = element.name,
+          .unit = {}};
+}
+
+// The coordinate's gradient, of a tendon.
+ConstVecX TendonGradient(const ConstraintSystem& system, const ElementPlace& place) {
+  return {system.data()->ten_J + place.tendon * system.nv(), system.nv()};
+}
+
+// Σ_i c_i x^(i+1)
+double PowerSum(const std::vector<double>& c, double x) {
+  double sum = 0.0, power = x;
+  for (const double c_i : c) {
+    sum += c_i * power;
+    power *= x;
+  }
+  return sum;
+}
+
+}  // namespace
+
+ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
+  const ElementPlace& place = system.engine().elements[element];
+  const mjData& d = *system.data();
+  if (place.tendon < 0) return {d.qpos[place.qpos], d.qvel[place.dof], d.qacc[place.dof]};
+  const ConstVecX u = TendonGradient(system, place);
+  return {d.ten_length[place.tendon], u.dot(ConstVecX(d.qvel, system.nv())),
+          u.dot(ConstVecX(d.qacc, system.nv())) + system.TendonBias(place.tendon)};
+}
+
+VecX ElementGradient(const ConstraintSystem& system, size_t element) {
+  const ElementPlace& place = system.engine().elements[element];
+  if (place.tendon >= 0) return TendonGradient(system, place);
+  return VecX::Unit(system.nv(), place.dof);
+}
+
+double ForceOf(const ForceElement& element, const ElementMotion& at) {
+  if (const auto* damping = std::get_if<DampingLaw>(&element.law)) {
+    return -damping->damping * at.rate;
+  }
+  if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
+    return -spring->preload - PowerSum(spring->polynomial, at.position - spring->free);
+  }
+  if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
+    const double ratio = at.rate / friction->stribeck_rate;
+    const double curve = std::exp(-(ratio * ratio));
+    const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
+    return at.rate == 0.0 ? 0.0 : -std::copysign(most, at.rate);
+  }
+  return -std::get<RotorLaw>(element.law).reflected() * at.acceleration;
+}
+
+ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
+  if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
+    return {.kinetic = 0.5 * rotor->reflected() * at.rate * at.rate};
+  }
+  const auto* spring = std::get_if<SpringLaw>(&element.law);
+  if (spring == nullptr) return {};
+  std::vector<double> work = {spring->preload};
+  for (const double k : spring->polynomial) {
+    work.push_back(k / static_cast<double>(work.size() + 1));
+  }
+  return {.stored = PowerSum(work, at.position - spring->free)};
+}
+
+ElementSlope SlopeOf(const ForceElement& element, double position) {
+  if (const auto* damping = std::get_if<DampingLaw>(&element.law)) return {0.0, damping->damping};
+  const auto* spring = std::get_if<SpringLaw>(&element.law);
+  if (spring == nullptr) return {};
+  double slope = 0.0, power = 1.0;
+  for (size_t i = 0; i < spring->polynomial.size(); ++i) {
+    slope += static_cast<double>(i + 1) * spring->polynomial[i] * power;
+    power *= position - spring->free;
+  }
+  return {slope, 0.0};
+}
+
+RunSummary CheckElements(const EngineModel& engine, const Motion& motion) {
+  const bool released =
+      motion.free() ||
+      std::ranges::any_of(engine.driven, [](const DrivenPlace& place) { return place.forced; });
+  for (const ForceElement& element : engine.mechanism->elements) {
+    if (released && Rubs(element)) {
+      return FrictionUnsupported(*engine.mechanism, element);
+    }
+    const bool on_tendon = element.drive >= 0 && std::holds_alternative<RotorLaw>(element.law);
+    if (!on_tendon || !engine.driven[static_cast<size_t>(element.drive)].forced) continue;
+    return {.stop = Stop::kUnsupported,
+            .message = "element '" + element.name + "', a " +
+                       Described(*engine.mechanism, element) +
+                       ", needs that drive's motion commanded: MuJoCo 2.2 has no inertia along a "
+                       "tendon",
+            .where = element.name,
+            .unit = {}};
+  }
+  return RunSummary::Done();
+}
+
+RunSummary CheckRubbing(const ConstraintSystem& system, double duration_s) {
+  const Mechanism& mechanism = *system.engine().mechanism;
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
+    const ForceElement& element = mechanism.elements[e];
+    if (!Rubs(element)) continue;
+    const double rate = ElementMotionOf(system, e).rate;
+    if (std::abs(rate) > RestRate(mechanism, element, duration_s)) continue;
+    return {.stop = Stop::kUnsupported,
+            .message = "the " + Described(mechanism, element) + " ('" + element.name +
+                       "') is at rest: its force lies in a band, and so do the drive forces",
+            .where = element.name,
+            .amount = rate,
+            .unit = ActsOnLength(mechanism, element) ? "m/s" : "rad/s"};
+  }
+  return RunSummary::Done();
+}
+
+bool HasLacking(const Mechanism& mechanism) {
+  return !std::ranges::all_of(mechanism.elements, mjcf::IsPlanned);
+}
+
+void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceleration,
+                      double* qfrc) {
+  const EngineModel& engine = system.engine();
+  const std::vector<ForceElement>& elements = engine.mechanism->elements;
+  for (size_t e = 0; e < elements.size(); ++e) {
+    if (mjcf::IsPlanned(elements[e])) continue;
+    const ElementPlace& place = engine.elements[e];
+    ElementMotion at = ElementMotionOf(system, e);
+    if (elements[e].drive >= 0 && elements[e].drive < driven_acceleration.size()) {
+      at.acceleration = driven_acceleration[elements[e].drive];
+    }
+    const double force = ForceOf(elements[e], at);
+    if (place.tendon < 0) {
+      qfrc[place.dof] += force;
+    } else {
+      Eigen::Map<VecX>(qfrc, system.nv()) += force * TendonGradient(system, place);
+    }
+  }
+}
+
+}  // namespace mbv::simulation

@@ -1,0 +1,31 @@
+// Force elements of an MJCF file.
+#include "simulation/mjcf_import.h"
+
+namespace mbv::simulation {
+namespace {
+
+void AddElementsOf(int j, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const int dof = m.jnt_dofadr[j], at = m.jnt_qposadr[j];
+  const auto add = [&](const char* what, const auto& law) {
+    in->mechanism.elements.push_back({.name = in->JointNameOf(j) + what,
+                                      .joint = in->joint_of[static_cast<size_t>(j)],
+                                      .law = law});
+  };
+  if (m.dof_damping[dof] > 0.0) add("_damping", DampingLaw{m.dof_damping[dof]});
+  if (m.jnt_stiffness[j] != 0.0) {
+    add("_spring",
+        SpringLaw{.polynomial = {m.jnt_stiffness[j]}, .free = m.qpos_spring[at] - m.qpos0[at]});
+  }
+  if (m.dof_armature[dof] > 0.0) add("_rotor", RotorLaw{.inertia = m.dof_armature[dof]});
+}
+
+}  // namespace
+
+void AddElements(MjcfImport* in) {
+  for (int j = 0; j < in->m.njnt; ++j) {
+    if (IsScalar(in->m, j)) AddElementsOf(j, in);
+  }
+}
+
+}  // namespace mbv::simulation

@@ -1,0 +1,138 @@
+// Force elements in the reference against an equation of motion by hand.
+#include <gtest/gtest.h>
+
+#include "reference/forward.h"
+#include "tests/reference/fixture.h"
+#include "tests/rubbing_pendulum.h"
+
+namespace mbv::fixtures {
+namespace {
+
+// Through several turns, and back: 0.2 + 3 t + 7 sin 2t.
+Motion Swinging(const Mechanism& m) {
+  const Profile profile{
+      {ConstantTerm{0.2}, RampTerm{.rate = 3.0}, SineTerm{7.0, 1 / std::numbers::pi, 0}}};
+  return DriveMotion(m, {profile}, 4.0, 0.05);
+}
+
+// Largest error of the torque over the largest torque.
+double PendulumError(const Trace& trace, const RubbingPendulum& truth) {
+  double error = 0.0, size = 0.0;
+  for (Eigen::Index i = 0; i < trace.values.rows(); ++i) {
+    const double torque =
+        truth.Torque(At(trace, i, "motor.position"), At(trace, i, "motor.velocity"),
+                     At(trace, i, "motor.acceleration"));
+    error = std::max(error, std::abs(At(trace, i, "motor.force") - torque));
+    size = std::max(size, std::abs(torque));
+  }
+  return error / size;
+}
+
+TEST(ReferenceElements, TorqueIsThatOfTheEquationOfMotion) {
+  const RubbingPendulum pendulum;
+  const Mechanism m = pendulum.Make();
+  const ReferenceRun run = RunReference(m, Swinging(m));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_LT(PendulumError(run.trace, pendulum), 1e-12);
+  // Every number counts.
+  using P = RubbingPendulum;
+  for (double P::*number : {&P::damping, &P::free, &P::preload, &P::k1, &P::k2, &P::k3, &P::rotor,
+                            &P::ratio, &P::coulomb, &P::breakaway, &P::stribeck}) {
+    RubbingPendulum bent = pendulum;
+    bent.*number *= 1.0 + 1e-6;
+    EXPECT_GT(PendulumError(run.trace, bent), 1e-10);
+  }
+}
+
+TEST(ReferenceElements, AreNoReactionsAndBalanceThePower) {
+  const Mechanism m = RubbingPendulum().Make();
+  const ReferenceRun run = RunReference(m, Swinging(m));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const double power = ColumnOf(run.trace, "power.input").cwiseAbs().maxCoeff();
+  EXPECT_LT((ColumnOf(run.trace, "power.input") - ColumnOf(run.trace, "power.energy_rate"))
+                .cwiseAbs()
+                .maxCoeff(),
+            1e-12 * power);
+  EXPECT_LT(ColumnOf(run.trace, "pivot.reaction.mz").cwiseAbs().maxCoeff(), 1e-12 * power);
+}
+
+TEST(ReferenceElements, EnergiesAreThoseByHand) {
+  const RubbingPendulum p;
+  const Mechanism m = p.Make();
+  const ReferenceRun run = RunReference(m, Swinging(m));
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double q = At(run.trace, i, "motor.position"), rate = At(run.trace, i, "motor.velocity");
+    const double x = q - p.free;
+    const double stored =
+        p.preload * x + p.k1 * x * x / 2 + p.k2 * x * x * x / 3 + p.k3 * x * x * x * x / 4;
+    const double J = p.I + p.m * p.r * p.r + p.rotor * p.ratio * p.ratio;
+    EXPECT_NEAR(At(run.trace, i, "energy.springs"), stored, 1e-12 * std::abs(stored) + 1e-13);
+    EXPECT_NEAR(At(run.trace, i, "energy.kinetic"), 0.5 * J * rate * rate, 1e-10);
+    const double v = rate / p.stribeck;
+    const double dry = p.coulomb + (p.breakaway - p.coulomb) * std::exp(-v * v);
+    EXPECT_NEAR(At(run.trace, i, "power.dampers"), -p.damping * rate * rate - dry * std::abs(rate),
+                1e-10);
+  }
+}
+
+// J q̈ + m g r cos q + c q̇ + spring = 0, and the energy goes into the damper.
+TEST(ReferenceElements, FreeMotionObeysTheEquationOfMotion) {
+  RubbingPendulum p;
+  p.coulomb = p.breakaway = 0.0;
+  const Mechanism m = p.Make();
+  const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 2.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    EXPECT_NEAR(p.Torque(At(run.trace, i, "motor.position"), At(run.trace, i, "motor.velocity"),
+                         At(run.trace, i, "motor.acceleration")),
+                0.0, 1e-9);
+  }
+  const VecX energy = ColumnOf(run.trace, "energy.kinetic") +
+                      ColumnOf(run.trace, "energy.gravity") + ColumnOf(run.trace, "energy.springs");
+  const VecX lost = ColumnOf(run.trace, "dampers.work");
+  EXPECT_LT(((energy.array() - energy[0]).matrix() - lost).cwiseAbs().maxCoeff(), 1e-9);
+  EXPECT_LT(lost[lost.size() - 1], -0.1);
+}
+
+TEST(ReferenceElements, DryFrictionAtRestIsRefusedWithTimeAndCoordinate) {
+  const Mechanism m = RubbingPendulum().Make();
+  // Turns round exactly at t = 0.5 s.
+  const Profile profile{{SineTerm{1.0, 0.5, 0}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.05));
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(run.summary.where, "dry");
+  EXPECT_NEAR(run.summary.time_s, 0.5, 1e-12);
+  EXPECT_NE(run.summary.message.find("anywhere within ±0.6 N m"), std::string::npos)
+      << run.summary.message;
+  const ForwardRun free = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 1.0));
+  EXPECT_EQ(free.summary.stop, Stop::kUnsupported);
+}
+
+// Along a leg's length: a mass of 2 kg on a rail, hung on a distance drive.
+TEST(ReferenceElements, ActAlongADistanceDrive) {
+  Mechanism m;
+  m.name = "cart";
+  m.gravity_W.setZero();
+  m.bodies = {MakeBody("world", 0.0, Vec3::Zero(), Vec3::Zero()),
+              MakeBody("cart", 2.0, Vec3::Zero(), Vec3::Constant(0.01))};
+  m.joints = {MakeJoint("rail", JointKind::kPrismatic, 0, Vec3::Zero(), 1, Vec3::Zero())};
+  m.joints[0].axis = Vec3::UnitX();
+  AddTree(&m);
+  m.X_WB_home.assign(2, Pose::Identity());
+  m.drives = {{.name = "leg", .kind = DistanceDrive{0, {-0.5, 0, 0}, 1, {0, 0, 0}}, .range = {}}};
+  m.elements = {{.name = "c", .drive = 0, .law = DampingLaw{3.0}},
+                {.name = "k", .drive = 0, .law = SpringLaw{{40.0}, 0.3, -2.0}},
+                {.name = "J", .drive = 0, .law = RotorLaw{1e-4, 200.0}}};
+  const Profile profile{{ConstantTerm{0.5}, SineTerm{0.1, 1.0, 0.3}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.05));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double force = (2.0 + 4.0) * At(run.trace, i, "leg.acceleration") +
+                         3.0 * At(run.trace, i, "leg.velocity") +
+                         40.0 * (At(run.trace, i, "leg.position") - 0.3) - 2.0;
+    EXPECT_NEAR(At(run.trace, i, "leg.force"), force, 1e-12);
+  }
+}
+
+}  // namespace
+}  // namespace mbv::fixtures

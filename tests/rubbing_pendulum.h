@@ -1,0 +1,61 @@
+// A pendulum with every kind of force element, and its equation of motion.
+#pragma once
+
+#include <cmath>
+
+#include "tests/simulation/test_mechanisms.h"
+
+namespace mbv::fixtures {
+
+/// About z on the world, gravity along −y, q from x:
+///   τ = (J + J_r n²) q̈ + m g r cos q + c q̇ + F0 + k1 x + k2 x² + k3 x³
+///       + (Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇,  x = q − q0
+/// `linear`: only what MuJoCo itself has.
+struct RubbingPendulum {
+  static constexpr double m = 1.3, r = 0.21, I = 0.012, g = 9.81;
+  double damping = 0.07;
+  double free = 0.4, preload = 0.9, k1 = 2.5, k2 = -0.3, k3 = 0.11;
+  double rotor = 3e-5, ratio = -35.0;
+  double coulomb = 0.25, breakaway = 0.6, stribeck = 1.5;
+  bool linear = false;
+
+  [[nodiscard]] Mechanism Make() const {
+    Mechanism mechanism;
+    mechanism.name = "rubbing_pendulum";
+    mechanism.gravity_W = Vec3(0, -g, 0);
+    mechanism.bodies = {MakeBody("world", 0.0, Vec3::Zero(), Vec3::Zero()),
+                        MakeBody("bob", m, Vec3(r, 0, 0), Vec3(0.01, 0.01, I))};
+    mechanism.joints = {MakeJoint("pivot", JointKind::kRevolute, 0, Vec3::Zero(), 1, Vec3::Zero())};
+    mechanism.drives = {{.name = "motor", .kind = JointDrive{0, 0}, .range = {}}};
+    AddElements(&mechanism);
+    AddTree(&mechanism);
+    mechanism.X_WB_home = TreePoses(mechanism, {mechanism.joints[0].guess});
+    return mechanism;
+  }
+
+  [[nodiscard]] double Torque(double q, double rate, double acceleration) const {
+    const double x = q - free, v = rate / stribeck;
+    const double spring = preload + k1 * x + (linear ? 0.0 : k2 * x * x + k3 * x * x * x);
+    const double dry = coulomb + (breakaway - coulomb) * std::exp(-v * v);
+    return (I + m * r * r + rotor * ratio * ratio) * acceleration + m * g * r * std::cos(q) +
+           damping * rate + spring + (linear ? 0.0 : std::copysign(dry, rate));
+  }
+
+ private:
+  void AddElements(Mechanism* mechanism) const {
+    const auto add = [&](const char* name, const auto& law) {
+      mechanism->elements.push_back({.name = name, .joint = 0, .law = law});
+    };
+    add("oil", DampingLaw{damping});
+    SpringLaw spring{.polynomial = {k1}, .free = free, .preload = preload};
+    if (!linear) spring.polynomial = {k1, k2, k3};
+    add("spring", spring);
+    add("rotor", RotorLaw{.inertia = rotor, .ratio = ratio});
+    if (!linear) {
+      add("dry",
+          FrictionLaw{.coulomb = coulomb, .breakaway = breakaway, .stribeck_rate = stribeck});
+    }
+  }
+};
+
+}  // namespace mbv::fixtures

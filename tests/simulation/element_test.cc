@@ -1,0 +1,163 @@
+// Force elements in MuJoCo against an equation of motion by hand.
+#include <gtest/gtest.h>
+
+#include "mjcf/mjcf.h"
+#include "mjcf/plan.h"
+#include "simulation/simulation.h"
+#include "tests/rubbing_pendulum.h"
+
+namespace mbv {
+namespace {
+
+using fixtures::RubbingPendulum;
+
+// Through several turns: 0.2 + 3 t + 7 sin 2t.
+RunSummary SwingAt(double t, DrivenSample* driven) {
+  driven->position = VecX::Constant(1, 0.2 + 3 * t + 7 * std::sin(2 * t));
+  driven->velocity = VecX::Constant(1, 3 + 14 * std::cos(2 * t));
+  driven->acceleration = VecX::Constant(1, -28 * std::sin(2 * t));
+  return RunSummary::Done();
+}
+
+double PendulumError(const SimulationRun& run, const RubbingPendulum& truth) {
+  const int column = run.trace.Find("motor.force");
+  double error = 0.0, size = 0.0;
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    DrivenSample at;
+    (void)SwingAt(run.trace.time_s[i], &at);
+    const double torque = truth.Torque(at.position[0], at.velocity[0], at.acceleration[0]);
+    error =
+        std::max(error, std::abs(run.trace.values(static_cast<Eigen::Index>(i), column) - torque));
+    size = std::max(size, std::abs(torque));
+  }
+  return error / size;
+}
+
+Motion Swing() { return {.duration_s = 4.0, .sample_s = 0.02, .commands = {}, .loads = {}}; }
+
+void ExpectBalanced(const SimulationRun& run, double tolerance) {
+  const VecX in = run.trace.values.col(run.trace.Find("power.input"));
+  const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
+  const double size = in.cwiseAbs().maxCoeff();
+  EXPECT_LT((in - rate).cwiseAbs().maxCoeff(), tolerance * size);
+  const VecX mz = run.trace.values.col(run.trace.Find("pivot.reaction.mz"));
+  EXPECT_LT(mz.cwiseAbs().maxCoeff(), tolerance * size);
+}
+
+TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
+  for (const bool linear : {true, false}) {
+    RubbingPendulum pendulum;
+    pendulum.linear = linear;
+    const Mechanism m = pendulum.Make();
+    for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+      const bool forward = mode == SimulationMode::kForward;
+      const SimulationRun run = Simulate(m, Swing(), SwingAt, {.mode = mode});
+      ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+      EXPECT_TRUE(run.warnings.empty());
+      EXPECT_LT(PendulumError(run, pendulum), forward ? 1e-7 : 1e-12) << linear;
+      ExpectBalanced(run, forward ? 1e-6 : 1e-12);
+      RubbingPendulum bent = pendulum;
+      bent.preload *= 1.0 + 1e-3;
+      EXPECT_GT(PendulumError(run, bent), 1e-6);
+    }
+  }
+}
+
+TEST(SimulatedElements, DryFrictionAtRestIsRefusedWithTimeAndCoordinate) {
+  const Mechanism m = RubbingPendulum().Make();
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const SimulationRun run = Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = mode});
+    EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+    EXPECT_EQ(run.summary.where, "dry");
+    EXPECT_EQ(run.summary.time_s, 0.0);
+  }
+}
+
+// MuJoCo has these on joints; the file states them, a preload as a moved free position.
+TEST(SimulatedElements, TheFileCarriesWhatMuJoCoHasAndNamesWhatItLacks) {
+  RubbingPendulum pendulum;
+  const std::string all = WriteMjcf(pendulum.Make());
+  EXPECT_NE(all.find("damping=\"0.07\""), std::string::npos) << all;
+  EXPECT_NE(all.find("armature=\"0.03675"), std::string::npos) << all;
+  EXPECT_EQ(all.find("stiffness="), std::string::npos) << all;
+  EXPECT_NE(all.find("spring: spring of joint 'pivot'"), std::string::npos) << all;
+  EXPECT_NE(all.find("dry: friction of joint 'pivot'"), std::string::npos) << all;
+  pendulum.linear = true;
+  const Mechanism m = pendulum.Make();
+  const std::string linear = WriteMjcf(m);
+  EXPECT_NE(linear.find("stiffness=\"2.5\""), std::string::npos) << linear;
+  EXPECT_EQ(linear.find("Not in this file"), std::string::npos) << linear;
+  const mjcf::PlannedForces forces = mjcf::ForcesOfJoint(m, 0, 0);
+  EXPECT_NEAR(forces.free, 0.4 - 0.9 / 2.5, 1e-15);
+  // Two springs act as one at their common rest.
+  Mechanism two = m;
+  two.elements.push_back({.name = "more", .joint = 0, .law = SpringLaw{{7.5}, -0.2, 0.3}});
+  const mjcf::PlannedForces both = mjcf::ForcesOfJoint(two, 0, 0);
+  EXPECT_NEAR(both.stiffness, 10.0, 1e-15);
+  for (const double q : {-1.0, 0.5}) {
+    EXPECT_NEAR(both.stiffness * (q - both.free), 0.9 + 2.5 * (q - 0.4) + 0.3 + 7.5 * (q + 0.2),
+                1e-13);
+  }
+}
+
+// A cart of 2 kg on a rail, held by a leg along it with everything that a tendon can have.
+Mechanism CartOnALeg() {
+  Mechanism m;
+  m.name = "cart";
+  m.gravity_W.setZero();
+  m.bodies = {fixtures::MakeBody("world", 0.0, Vec3::Zero(), Vec3::Zero()),
+              fixtures::MakeBody("cart", 2.0, Vec3::Zero(), Vec3::Constant(0.01))};
+  m.joints = {fixtures::MakeJoint("rail", JointKind::kPrismatic, 0, Vec3::Zero(), 1, Vec3::Zero())};
+  m.joints[0].axis = Vec3::UnitX();
+  fixtures::AddTree(&m);
+  m.X_WB_home.assign(2, Pose::Identity());
+  m.drives = {{.name = "leg", .kind = DistanceDrive{0, {-0.5, 0, 0}, 1, {0, 0, 0}}, .range = {}}};
+  m.elements = {{.name = "c", .drive = 0, .law = DampingLaw{3.0}},
+                {.name = "k", .drive = 0, .law = SpringLaw{{40.0}, 0.3, -2.0}},
+                {.name = "hard", .drive = 0, .law = SpringLaw{{0.0, 5.0}, 0.1, 0.7}},
+                {.name = "J", .drive = 0, .law = RotorLaw{1e-4, 200.0}}};
+  return m;
+}
+
+RunSummary ShakenLeg(double t, DrivenSample* driven) {
+  driven->position = VecX::Constant(1, 0.5 + 0.1 * std::sin(5 * t + 0.3));
+  driven->velocity = VecX::Constant(1, 0.5 * std::cos(5 * t + 0.3));
+  driven->acceleration = VecX::Constant(1, -2.5 * std::sin(5 * t + 0.3));
+  return RunSummary::Done();
+}
+
+TEST(SimulatedElements, ActAlongADistanceDrive) {
+  const Mechanism m = CartOnALeg();
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const SimulationRun run = Simulate(m, Swing(), ShakenLeg, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    const int column = run.trace.Find("leg.force");
+    for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+      DrivenSample at;
+      (void)ShakenLeg(run.trace.time_s[i], &at);
+      const double x = at.position[0], y = x - 0.1;
+      const double force = 6.0 * at.acceleration[0] + 3.0 * at.velocity[0] + 40.0 * (x - 0.3) -
+                           2.0 + 0.7 + 5.0 * y * y;
+      EXPECT_NEAR(run.trace.values(static_cast<Eigen::Index>(i), column), force,
+                  mode == SimulationMode::kForward ? 1e-6 : 1e-11);
+    }
+    const VecX in = run.trace.values.col(run.trace.Find("power.input"));
+    const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
+    EXPECT_LT((in - rate).cwiseAbs().maxCoeff(), 1e-6 * in.cwiseAbs().maxCoeff());
+    const VecX fx = run.trace.values.col(run.trace.Find("rail.reaction.fx"));
+    EXPECT_LT(fx.cwiseAbs().maxCoeff(), 1e-6);
+  }
+}
+
+// Its mass along the leg would be felt before the acceleration is known.
+TEST(SimulatedElements, ARotorOnAFreeDistanceDriveIsRefused) {
+  const Mechanism m = CartOnALeg();
+  const SimulationRun run = Simulate(m, fixtures::FreeMotion(m, 0.0, 0.0, 1.0), ShakenLeg, {});
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(run.summary.where, "J");
+  EXPECT_NE(run.summary.message.find("no inertia along a tendon"), std::string::npos)
+      << run.summary.message;
+}
+
+}  // namespace
+}  // namespace mbv
