@@ -55,7 +55,7 @@ bool HasInverse(const MutationReport& report) {
 
 // `inverse`: also by inverse dynamics.
 TextTable NumberTable(bool inverse) {
-  std::vector<TextColumn> columns = {{"number", -22},   {"value", 12}, {"", -8},
+  std::vector<TextColumn> columns = {{"number", -22},   {"value", 12}, {"", -11},
                                      {"detected", -14}, {"force", 9},  {"smallest", 10}};
   if (inverse) columns.push_back({"inverse", 10});
   columns.push_back({"  seen first by, or why not", 0});
