@@ -86,6 +86,25 @@ class BandTriangle {
     return x;
   }
 
+  // The band of (RᵀR)⁻¹, row by row from the diagonal on. R (RᵀR)⁻¹ = R⁻ᵀ is a lower triangle with
+  // 1/r_kk on its diagonal, which gives each row of the band from those below [Erisman 1975].
+  [[nodiscard]] std::vector<Row> InverseBand() const {
+    std::vector<Row> inverse(rows_.size(), Row{});
+    for (size_t k = rows_.size() - kOrder; k-- > 0;) {
+      const double diagonal = rows_[k][0];
+      if (diagonal == 0.0) continue;
+      for (size_t c = kOrder; c-- > 0;) {
+        double sum = c == 0 ? 1.0 / diagonal : 0.0;
+        for (size_t m = 1; m < kOrder; ++m) {
+          const size_t low = std::min(m, c), high = std::max(m, c);
+          sum -= rows_[k][m] * inverse[k + low][high - low];
+        }
+        inverse[k][c] = sum / diagonal;
+      }
+    }
+    return inverse;
+  }
+
  private:
   // Turns the row into the triangle's row k so that its first element vanishes.
   void Rotate(size_t k, double r, Row* row, double* right) {
@@ -118,10 +137,21 @@ void AddRoughness(const Interval& interval, double lambda, BandTriangle* triangl
   }
 }
 
-void AddDatum(const Interval& interval, const SplineDatum& datum, BandTriangle* triangle) {
+Row WeightedRow(const Interval& interval, const SplineDatum& datum) {
   Row row = interval.At(datum.time_s, datum.order);
   for (double& element : row) element *= datum.weight;
-  triangle->Add(interval.first, row, datum.weight * datum.value);
+  return row;
+}
+
+// a (RᵀR)⁻¹ aᵀ: what a datum counts in its own value.
+double Leverage(const Interval& interval, const Row& a, const std::vector<Row>& inverse) {
+  double sum = 0.0;
+  for (size_t i = 0; i < kOrder; ++i) {
+    const Row& band = inverse[interval.first + i];
+    sum += a[i] * a[i] * band[0];
+    for (size_t j = i + 1; j < kOrder; ++j) sum += 2.0 * a[i] * a[j] * band[j - i];
+  }
+  return sum;
 }
 
 // The first and the last knot six times.
@@ -151,6 +181,57 @@ Piecewise PiecesOf(const std::vector<Interval>& intervals, const std::vector<dou
   return pieces;
 }
 
+// Rows of (1) and what they give.
+class Fitter {
+ public:
+  Fitter(const std::vector<double>& knots, const std::vector<SplineDatum>& data, double lambda)
+      : tau_(WithEnds(knots)), data_(data), triangle_(tau_.size() - kOrder) {
+    size_t datum = 0;
+    for (size_t m = kDegree; m + kOrder < tau_.size(); ++m) {
+      if (tau_[m + 1] == tau_[m]) continue;
+      intervals_.push_back(MakeInterval(tau_, m));
+      const Interval& interval = intervals_.back();
+      const bool last = m + kOrder + 1 == tau_.size();
+      for (; datum < data.size() && (last || data[datum].time_s < tau_[m + 1]); ++datum) {
+        triangle_.Add(interval.first, WeightedRow(interval, data[datum]),
+                      data[datum].weight * data[datum].value);
+      }
+      ends_.push_back(datum);
+      if (lambda > 0.0) AddRoughness(interval, lambda, &triangle_);
+    }
+    coefficients_ = triangle_.Solve();
+  }
+
+  [[nodiscard]] Piecewise spline() const {
+    return PiecesOf(intervals_, coefficients_, tau_.back());
+  }
+
+  [[nodiscard]] SplineFit Measured() const {
+    SplineFit fit{.spline = spline()};
+    const std::vector<Row> inverse = triangle_.InverseBand();
+    size_t datum = 0;
+    for (size_t k = 0; k < intervals_.size(); ++k) {
+      const Interval& interval = intervals_[k];
+      for (; datum < ends_[k]; ++datum) {
+        const Row a = WeightedRow(interval, data_[datum]);
+        double error = -data_[datum].weight * data_[datum].value;
+        for (size_t j = 0; j < kOrder; ++j) error += a[j] * coefficients_[interval.first + j];
+        fit.misfit += error * error;
+        fit.parameters += Leverage(interval, a, inverse);
+      }
+    }
+    return fit;
+  }
+
+ private:
+  const std::vector<double> tau_;
+  const std::vector<SplineDatum>& data_;
+  BandTriangle triangle_;
+  std::vector<Interval> intervals_;
+  std::vector<size_t> ends_;  // of each interval's data
+  std::vector<double> coefficients_;
+};
+
 }  // namespace
 
 std::vector<double> FreeKnots(const std::vector<double>& time_s, bool with_rates) {
@@ -173,20 +254,12 @@ std::vector<double> FreeKnots(const std::vector<double>& time_s, bool with_rates
 
 Piecewise FitSpline(const std::vector<double>& knots, const std::vector<SplineDatum>& data,
                     double lambda) {
-  const std::vector<double> tau = WithEnds(knots);
-  BandTriangle triangle(tau.size() - kOrder);
-  std::vector<Interval> intervals;
-  auto datum = data.begin();
-  for (size_t m = kDegree; m + kOrder < tau.size(); ++m) {
-    if (tau[m + 1] == tau[m]) continue;
-    intervals.push_back(MakeInterval(tau, m));
-    const bool last = m + kOrder + 1 == tau.size();
-    for (; datum != data.end() && (last || datum->time_s < tau[m + 1]); ++datum) {
-      AddDatum(intervals.back(), *datum, &triangle);
-    }
-    if (lambda > 0.0) AddRoughness(intervals.back(), lambda, &triangle);
-  }
-  return PiecesOf(intervals, triangle.Solve(), knots.back());
+  return Fitter(knots, data, lambda).spline();
+}
+
+SplineFit FitSmooth(const std::vector<double>& knots, const std::vector<SplineDatum>& data,
+                    double lambda) {
+  return Fitter(knots, data, lambda).Measured();
 }
 
 }  // namespace mbv

@@ -31,6 +31,16 @@ struct SplineDatum {
 [[nodiscard]] std::vector<double> FreeKnots(const std::vector<double>& time_s, bool with_rates);
 /// The spline (1) on `knots` (from the first to the last time, inner ones at most double); `data`
 /// in the order of time. With rate and acceleration given at both ends, knots are all times.
+struct SplineFit {
+  Piecewise spline;
+  double misfit = 0.0;  ///< the first sum of (1)
+  /// Effective number of parameters: the trace of the matrix that makes f^(k_i)(t_i) of the y_i. As
+  /// many as B-splines without smoothing, 3 for a parabola.
+  double parameters = 0.0;
+};
+[[nodiscard]] SplineFit FitSmooth(const std::vector<double>& knots,
+                                  const std::vector<SplineDatum>& data, double lambda);
+/// Only the spline.
 [[nodiscard]] Piecewise FitSpline(const std::vector<double>& knots,
                                   const std::vector<SplineDatum>& data, double lambda = 0.0);
 

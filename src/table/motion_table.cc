@@ -130,7 +130,8 @@ class Loader {
     table_.stamp_error_s = source_->stamp_error_s;
     table_.moves = use_.moves;
     table_.notes = source_->notes;
-    if (stated_ > 0.0) rows_.deviation = stated_ * std::abs(source_->columns.front().factor);
+    rows_.stated = stated_ > 0.0;
+    if (rows_.stated) rows_.deviation = stated_ * std::abs(source_->columns.front().factor);
     table_.deviation = rows_.deviation;
   }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "core/quintic_spline.h"
 
@@ -13,7 +14,8 @@ constexpr int kLooks = 4;      // in each interval
 
 // Three rounds of a periodic table, the middle one at its own times.
 SplineRows Repeated(const SplineRows& rows, double advance) {
-  SplineRows all{.deviation = rows.deviation, .rate_deviation = rows.rate_deviation};
+  SplineRows all{
+      .deviation = rows.deviation, .rate_deviation = rows.rate_deviation, .stated = rows.stated};
   const size_t last = rows.time_s.size() - 1;
   const double period_s = rows.time_s[last] - rows.time_s[0];
   const auto add = [&](size_t i, double time_s, double more) {
@@ -61,35 +63,90 @@ class RowFit {
 
   [[nodiscard]] Piecewise Through() const { return FitSpline(knots_, data_); }
 
-  // λ between what bends freely within the shortest step and what is a parabola over all rows.
   [[nodiscard]] Piecewise Near() const {
     if (exact_) return Through();
-    const auto allowed = static_cast<double>(data_.size());
-    double shortest_s = rows_.time_s.back() - rows_.time_s.front();
-    double low = 0.0, high = std::log(allowed * data_[0].weight * data_[0].weight);
-    high += 5.0 * std::log(shortest_s) + kBeyond;
-    for (size_t i = 1; i < rows_.time_s.size(); ++i) {
-      shortest_s = std::min(shortest_s, rows_.time_s[i] - rows_.time_s[i - 1]);
-    }
-    low = std::log(data_[0].weight * data_[0].weight) + 5.0 * std::log(shortest_s) - kBeyond;
-    for (int k = 0; k < kHalvings && high - low > 1e-9; ++k) {
-      const double middle = 0.5 * (low + high);
-      (Misfit(FitSpline(knots_, data_, std::exp(middle))) <= allowed ? low : high) = middle;
-    }
-    return FitSpline(knots_, data_, std::exp(low));
+    return FitSpline(knots_, data_, std::exp(rows_.stated ? Allowed() : CrossValidated()));
   }
 
  private:
   static constexpr double kBeyond = 16.0;  // seven decades
+  static constexpr int kGrid = 30;
+  static constexpr double kParabola = 3.0;     // parameters of what ∫ f'''² leaves alone
+  static constexpr double kTraceHolds = 0.02;  // parameters per datum
+  static constexpr double kFewFree = 1e-3;     // of the data: (2) is 0/0 where all are met
 
-  [[nodiscard]] double Misfit(const Piecewise& spline) const {
-    double sum = 0.0;
-    for (const SplineDatum& datum : data_) {
-      const Jet jet = Evaluate(spline, datum.time_s);
-      const double error = datum.weight * ((datum.order == 0 ? jet.value : jet.rate) - datum.value);
-      sum += error * error;
+  struct Span {
+    double low, high;
+  };
+
+  // Logarithms of λ between what bends freely within the shortest step and what is a parabola over
+  // all rows.
+  [[nodiscard]] Span LambdaSpan() const {
+    const double whole_s = rows_.time_s.back() - rows_.time_s.front();
+    double shortest_s = whole_s;
+    for (size_t i = 1; i < rows_.time_s.size(); ++i) {
+      shortest_s = std::min(shortest_s, rows_.time_s[i] - rows_.time_s[i - 1]);
     }
-    return sum;
+    const double weight2 = data_[0].weight * data_[0].weight;
+    const auto count = static_cast<double>(data_.size());
+    return {std::log(weight2) + 5.0 * std::log(shortest_s) - kBeyond,
+            std::log(count * weight2) + 5.0 * std::log(whole_s) + kBeyond};
+  }
+
+  // Reinsch's λ, by halving.
+  [[nodiscard]] double Allowed() const {
+    const auto allowed = static_cast<double>(data_.size());
+    auto [low, high] = LambdaSpan();
+    for (int k = 0; k < kHalvings && high - low > 1e-9; ++k) {
+      const double middle = 0.5 * (low + high);
+      (FitSmooth(knots_, data_, std::exp(middle)).misfit <= allowed ? low : high) = middle;
+    }
+    return low;
+  }
+
+  // The effective number of parameters where round-off leaves it: the trace loses its digits once
+  // a datum counts for little, but there it follows λ^(-1/6) [Wahba 1990, ch. 4].
+  struct Anchor {
+    double log_lambda = 0.0, parameters = 0.0;
+  };
+
+  // (2), infinite where nothing is left to judge by; `anchor` moves to what is less than it.
+  [[nodiscard]] double Score(double log_lambda, Anchor* anchor) const {
+    const SplineFit fit = FitSmooth(knots_, data_, std::exp(log_lambda));
+    const auto n = static_cast<double>(data_.size());
+    double parameters = fit.parameters;
+    const bool first = anchor->parameters == 0.0, beyond = log_lambda > anchor->log_lambda;
+    const bool falls = first || !beyond || parameters < anchor->parameters;
+    if (parameters >= kTraceHolds * n && falls) {
+      if (first || beyond) *anchor = {log_lambda, parameters};
+    } else {
+      parameters = kParabola + (anchor->parameters - kParabola) *
+                                   std::exp((anchor->log_lambda - log_lambda) / 6.0);
+    }
+    const double free = n - parameters;
+    if (!(free > kFewFree * n)) return std::numeric_limits<double>::infinity();
+    return n * fit.misfit / (free * free);
+  }
+
+  // The least of a grid, then by thirds around it.
+  [[nodiscard]] double CrossValidated() const {
+    const auto [low, high] = LambdaSpan();
+    const double step = (high - low) / kGrid;
+    double best = low, least = std::numeric_limits<double>::infinity();
+    Anchor anchor;
+    for (int k = 0; k <= kGrid; ++k) {
+      const double score = Score(low + k * step, &anchor);
+      if (!(score < least)) continue;
+      least = score;
+      best = low + k * step;
+    }
+    double a = best - step, b = best + step;
+    while (b - a > 0.2) {
+      const double c = a + (b - a) / 3.0, d = b - (b - a) / 3.0;
+      const bool left = Score(c, &anchor) < Score(d, &anchor);
+      (left ? b : a) = left ? d : c;
+    }
+    return 0.5 * (a + b);
   }
 
   const SplineRows& rows_;

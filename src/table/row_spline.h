@@ -2,8 +2,11 @@
 //
 // Smoothing minimises, over the quintic splines on the rows' times,
 //   Σ_i ((f(t_i) − y_i)/σ)² + Σ_i ((f'(t_i) − v_i)/σ_v)² + λ ∫ f'''² dt                       (1)
-// with the largest λ for which the first two sums do not exceed the number of data [Reinsch 1967]:
-// as smooth as the noise σ (of the rates: σ_v) allows.
+// Where σ is stated, with the largest λ for which the first two sums do not exceed the number of
+// data [Reinsch 1967]: as smooth as the noise allows. Else with the λ of generalised
+// cross-validation [Craven 1979], which needs no σ but the ratio of σ to σ_v: the least of
+//   n misfit / (n − p)²,                                                                    (2)
+// p the effective number of parameters; misfit/(n − p) then estimates how far σ is off.
 #pragma once
 
 #include <vector>
@@ -18,6 +21,7 @@ struct SplineRows {
   std::vector<double> values = {}, rates = {};  ///< rates may be empty
   double deviation = 0.0;                       ///< σ; 0: exact
   double rate_deviation = 0.0;                  ///< σ_v
+  bool stated = false;                          ///< σ is known; else it is near enough for (2)
 };
 
 /// How often rows occur in time.

@@ -100,6 +100,28 @@ TEST(QuinticSpline, IsAsSmoothAsItSays) {
   }
 }
 
+// The trace of the influence matrix, against bending one datum after the other.
+TEST(QuinticSpline, CountsItsParameters) {
+  const std::vector<double> times = UnevenTimes(15, 1.0);
+  const std::vector<double> knots = FreeKnots(times, false);
+  for (const double lambda : {1e-9, 1e-4, 1e6}) {
+    std::vector<SplineDatum> data;
+    for (const double t : times) data.push_back({t, std::sin(5 * t), 0, 1.0 + t});
+    const SplineFit fit = FitSmooth(knots, data, lambda);
+    double trace = 0.0, misfit = 0.0;
+    for (size_t i = 0; i < data.size(); ++i) {
+      std::vector<SplineDatum> bent = data;
+      bent[i].value += 1.0;
+      const double at = times[i], before = Evaluate(fit.spline, at).value;
+      trace += Evaluate(FitSpline(knots, bent, lambda), at).value - before;
+      misfit += std::pow(data[i].weight * (before - data[i].value), 2);
+    }
+    EXPECT_NEAR(fit.parameters, trace, 1e-8) << lambda;
+    EXPECT_NEAR(fit.misfit, misfit, 1e-12) << lambda;
+    EXPECT_EQ(std::abs(fit.parameters - 3.0) < 1e-3, lambda > 1.0) << lambda;
+  }
+}
+
 // ∫ f'''² vanishes for parabolas only: with a heavy λ, the least-squares parabola is left.
 TEST(QuinticSpline, HeavySmoothingLeavesTheParabola) {
   const std::vector<double> times = UnevenTimes(30, 1.0);

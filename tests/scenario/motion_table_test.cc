@@ -206,7 +206,7 @@ TEST_F(MotionTableTest, WrongTablesAreToldWithPlaceAndHint) {
       "where round.csv begins again (from 6.11046 to 0); at most 6.1e-06 is round-off or noise\n"
       "  hint: the last row repeats the first one, a period later\n"
       "s.yaml:5:26: warning: motion.commands.motor.table.periodic: the acceleration jumps by "
-      "-0.617 rad/s² where round.csv begins again (from 0.617213 to 0.000191461); at most 0.39 "
+      "-1.474 rad/s² where round.csv begins again (from 1.04145 to -0.432486); at most 0.6 "
       "is round-off or noise\n"
       "  hint: the last row repeats the first one, a period later\n");
   EXPECT_EQ(Messages("{table: {csv: a.csv, column: angle, rate: {column: speed, sign: -1}}}"),

@@ -61,7 +61,8 @@ TEST(RowSpline, RatesAreHonoured) {
 // The misfit of the smoothing spline is what the noise allows, and its acceleration is far better.
 TEST(RowSpline, SmoothingTakesTheNoiseOutAndNoMore) {
   const double deviation = 1e-3;
-  const SplineRows rows = SineRows(400, deviation);
+  SplineRows rows = SineRows(400, deviation);
+  rows.stated = true;
   const Piecewise through = Interpolated(rows), smooth = Smoothed(rows);
   double misfit = 0.0;
   for (size_t i = 0; i < rows.time_s.size(); ++i) {
@@ -76,6 +77,18 @@ TEST(RowSpline, SmoothingTakesTheNoiseOutAndNoMore) {
   SplineRows more = rows;
   more.deviation = 2 * deviation;
   EXPECT_GT(ErrorOf(Smoothed(more), 0.0, 1.0).max.value, ErrorOf(smooth, 0.0, 1.0).max.value);
+}
+
+// Cross-validation finds λ by itself, with a deviation that is wrong by half, however many rows
+// there are.
+TEST(RowSpline, CrossValidationNeedsNoExactDeviation) {
+  for (const int n : {100, 1000, 30000}) {
+    SplineRows rows = SineRows(n, 1e-3);
+    const double allowed = n < 1000 ? 1.0 : 0.4;  // of an amplitude of 39
+    EXPECT_LT(ErrorOf(Smoothed(rows), 0.1, 0.9).rms.acceleration, allowed) << n;
+    rows.deviation *= 0.5;
+    EXPECT_LT(ErrorOf(Smoothed(rows), 0.1, 0.9).rms.acceleration, allowed) << n;
+  }
 }
 
 TEST(RowSpline, ExactRowsAreNotSmoothed) {
