@@ -106,6 +106,7 @@ TEST(QuinticSpline, CountsItsParameters) {
   const std::vector<double> knots = FreeKnots(times, false);
   for (const double lambda : {1e-9, 1e-4, 1e6}) {
     std::vector<SplineDatum> data;
+    data.reserve(times.size());
     for (const double t : times) data.push_back({t, std::sin(5 * t), 0, 1.0 + t});
     const SplineFit fit = FitSmooth(knots, data, lambda);
     double trace = 0.0, misfit = 0.0;
