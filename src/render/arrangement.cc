@@ -24,7 +24,7 @@ std::string WithUnit(double value, const std::string& unit) {
   return fmt::format("{:.3g} {}", value, unit);
 }
 
-constexpr double kNear = 0.2;  // share of the mechanism's diagonal
+constexpr double kNear = 0.15;  // share of the mechanism's diagonal
 
 // Collects what the pictures show, in the drawing frame.
 class Extent {

@@ -17,19 +17,6 @@ Motion Turning(const Mechanism& m) {
   return DriveMotion(m, {profile}, 4.0, 0.05);
 }
 
-// Largest error of the torque over the largest torque.
-double TorqueError(const Trace& trace, const CoupledWheels& truth) {
-  double error = 0.0, size = 0.0;
-  for (Eigen::Index i = 0; i < trace.values.rows(); ++i) {
-    const double torque =
-        truth.Torque(At(trace, i, "motor.position"), At(trace, i, "motor.velocity"),
-                     At(trace, i, "motor.acceleration"));
-    error = std::max(error, std::abs(At(trace, i, "motor.force") - torque));
-    size = std::max(size, std::abs(torque));
-  }
-  return error / size;
-}
-
 TEST(ReferenceCoupling, TorqueIsThatOfTheEquationOfMotion) {
   const CoupledWheels wheels;
   const Mechanism m = wheels.Make();

@@ -15,32 +15,19 @@ Motion Swinging(const Mechanism& m) {
   return DriveMotion(m, {profile}, 4.0, 0.05);
 }
 
-// Largest error of the torque over the largest torque.
-double PendulumError(const Trace& trace, const RubbingPendulum& truth) {
-  double error = 0.0, size = 0.0;
-  for (Eigen::Index i = 0; i < trace.values.rows(); ++i) {
-    const double torque =
-        truth.Torque(At(trace, i, "motor.position"), At(trace, i, "motor.velocity"),
-                     At(trace, i, "motor.acceleration"));
-    error = std::max(error, std::abs(At(trace, i, "motor.force") - torque));
-    size = std::max(size, std::abs(torque));
-  }
-  return error / size;
-}
-
 TEST(ReferenceElements, TorqueIsThatOfTheEquationOfMotion) {
   const RubbingPendulum pendulum;
   const Mechanism m = pendulum.Make();
   const ReferenceRun run = RunReference(m, Swinging(m));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-  EXPECT_LT(PendulumError(run.trace, pendulum), 1e-12);
+  EXPECT_LT(TorqueError(run.trace, pendulum), 1e-12);
   // Every number counts.
   using P = RubbingPendulum;
   for (double P::*number : {&P::damping, &P::free, &P::preload, &P::k1, &P::k2, &P::k3, &P::rotor,
                             &P::ratio, &P::coulomb, &P::breakaway, &P::stribeck}) {
     RubbingPendulum bent = pendulum;
     bent.*number *= 1.0 + 1e-6;
-    EXPECT_GT(PendulumError(run.trace, bent), 1e-10);
+    EXPECT_GT(TorqueError(run.trace, bent), 1e-10);
   }
 }
 

@@ -61,4 +61,19 @@ inline Eigen::VectorXd ColumnOf(const Trace& trace, const std::string& channel) 
   return trace.values.col(column);
 }
 
+/// Largest error of the torque of drive "motor" over the largest torque; `truth` knows the equation
+/// of motion: Torque(position, velocity, acceleration).
+template <typename Truth>
+double TorqueError(const Trace& trace, const Truth& truth) {
+  double error = 0.0, size = 0.0;
+  for (Eigen::Index i = 0; i < trace.values.rows(); ++i) {
+    const double torque =
+        truth.Torque(At(trace, i, "motor.position"), At(trace, i, "motor.velocity"),
+                     At(trace, i, "motor.acceleration"));
+    error = std::max(error, std::abs(At(trace, i, "motor.force") - torque));
+    size = std::max(size, std::abs(torque));
+  }
+  return error / size;
+}
+
 }  // namespace mbv::fixtures

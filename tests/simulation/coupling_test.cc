@@ -5,6 +5,7 @@
 #include "mjcf/plan.h"
 #include "simulation/simulation.h"
 #include "tests/coupled_wheels.h"
+#include "tests/simulation/torque_error.h"
 
 namespace mbv {
 namespace {
@@ -21,20 +22,6 @@ RunSummary Turning(double t, DrivenSample* driven) {
   return RunSummary::Done();
 }
 
-double TorqueError(const SimulationRun& run, const CoupledWheels& truth) {
-  const int column = run.trace.Find("motor.force");
-  double error = 0.0, size = 0.0;
-  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
-    DrivenSample at;
-    (void)Turning(run.trace.time_s[i], &at);
-    const double torque = truth.Torque(at.position[0], at.velocity[0], at.acceleration[0]);
-    error =
-        std::max(error, std::abs(run.trace.values(static_cast<Eigen::Index>(i), column) - torque));
-    size = std::max(size, std::abs(torque));
-  }
-  return error / size;
-}
-
 TEST(SimulatedCoupling, TorqueIsThatOfTheEquationOfMotion) {
   const CoupledWheels wheels;
   for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
@@ -42,10 +29,10 @@ TEST(SimulatedCoupling, TorqueIsThatOfTheEquationOfMotion) {
     const SimulationRun run = Simulate(wheels.Make(), FourSeconds(), Turning, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     EXPECT_TRUE(run.warnings.empty());
-    EXPECT_LT(TorqueError(run, wheels), forward ? 1e-8 : 1e-12);
+    EXPECT_LT(fixtures::TorqueError(run, Turning, wheels), forward ? 1e-8 : 1e-12);
     CoupledWheels bent = wheels;
     bent.curve *= 1.0 + 1e-6;
-    EXPECT_GT(TorqueError(run, bent), 2e-8);
+    EXPECT_GT(fixtures::TorqueError(run, Turning, bent), 2e-8);
     // The coupling's moment is no reaction of the hinge.
     const int mz = run.trace.Find("two.reaction.mz");
     ASSERT_GE(mz, 0);

@@ -5,6 +5,7 @@
 #include "mjcf/plan.h"
 #include "simulation/simulation.h"
 #include "tests/rubbing_pendulum.h"
+#include "tests/simulation/torque_error.h"
 
 namespace mbv {
 namespace {
@@ -17,20 +18,6 @@ RunSummary SwingAt(double t, DrivenSample* driven) {
   driven->velocity = VecX::Constant(1, 3 + 14 * std::cos(2 * t));
   driven->acceleration = VecX::Constant(1, -28 * std::sin(2 * t));
   return RunSummary::Done();
-}
-
-double PendulumError(const SimulationRun& run, const RubbingPendulum& truth) {
-  const int column = run.trace.Find("motor.force");
-  double error = 0.0, size = 0.0;
-  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
-    DrivenSample at;
-    (void)SwingAt(run.trace.time_s[i], &at);
-    const double torque = truth.Torque(at.position[0], at.velocity[0], at.acceleration[0]);
-    error =
-        std::max(error, std::abs(run.trace.values(static_cast<Eigen::Index>(i), column) - torque));
-    size = std::max(size, std::abs(torque));
-  }
-  return error / size;
 }
 
 Motion Swing() { return {.duration_s = 4.0, .sample_s = 0.02, .commands = {}, .loads = {}}; }
@@ -54,11 +41,11 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
       const SimulationRun run = Simulate(m, Swing(), SwingAt, {.mode = mode});
       ASSERT_TRUE(run.summary.ok()) << run.summary.message;
       EXPECT_TRUE(run.warnings.empty());
-      EXPECT_LT(PendulumError(run, pendulum), forward ? 1e-7 : 1e-12) << linear;
+      EXPECT_LT(fixtures::TorqueError(run, SwingAt, pendulum), forward ? 1e-7 : 1e-12) << linear;
       ExpectBalanced(run, forward ? 1e-6 : 1e-12);
       RubbingPendulum bent = pendulum;
       bent.preload *= 1.0 + 1e-3;
-      EXPECT_GT(PendulumError(run, bent), 1e-6);
+      EXPECT_GT(fixtures::TorqueError(run, SwingAt, bent), 1e-6);
     }
   }
 }
