@@ -19,8 +19,8 @@ constexpr double kTurnCost = 0.12, kHeightCost = 0.10;
 // of the breadth below this share of the broadest view costs is half of a tenth.
 constexpr double kBroad = 0.7, kNarrowCost = 0.5;
 
-// Points whose second extent, squared, is less than this share of the first lie on a line.
-constexpr double kOnALine = 1e-4;
+// Shares of the next larger extent, squared: below, points lie on a line, or in a plane.
+constexpr double kOnALine = 1e-4, kInAPlane = 2.5e-3;
 
 // Of a symmetric matrix: S adj(S) = det(S) 1.
 Mat3 Adjugate(const Mat3& S) {
@@ -65,7 +65,8 @@ class Sight {
     }
   }
 
-  // How much of the broadest view's area the points span in this one: 1 for points on a line.
+  // How much of the broadest view's area the points of a planar mechanism span in this one; 1 for
+  // others, and for points on a line.
   [[nodiscard]] double Breadth(const Vec3& to_camera_W) const {
     double seen = 0.0, all = 0.0;
     for (const Scene& scene : scenes_) {
@@ -75,7 +76,8 @@ class Sight {
         spread += d * d.transpose();
       }
       const Vec3 sizes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvalues();
-      if (!(sizes[1] > kOnALine * sizes[2])) continue;
+      const bool planar = sizes[1] > kOnALine * sizes[2] && sizes[0] < kInAPlane * sizes[1];
+      if (!planar) continue;
       // The spread seen along u has the determinant uᵀ adj(S) u.
       const Mat3 adjugate = Adjugate(spread);
       seen += std::sqrt(std::max(0.0, to_camera_W.dot(adjugate * to_camera_W)));

@@ -39,23 +39,22 @@ std::string UsesText(const MotorLoad& load) {
 
 Table FiguresTable(const std::vector<const MotorLoad*>& loads) {
   Table html{.caption = "Motors, " + loads.front()->witness,
-             .head = {Text("drive"), Digits("torque, peak"), Digits("RMS"), Digits("mean"),
+             .head = {Text("drive"), Digits("margin"), Text("share of each limit"),
+                      Digits("torque, peak"), Digits("RMS"), Digits("mean"),
                       Digits("continuous limit"), Digits("speed, peak"), Digits("mean"),
                       Digits("power, driving"), Digits("braking"), Digits("energy per cycle"),
-                      Digits("braking"), Digits("duty"), Digits("inertia ratio"),
-                      Text("share of each limit"), Digits("margin")},
+                      Digits("braking"), Digits("duty"), Digits("inertia ratio")},
              .rows = {}};
   for (const MotorLoad* load : loads) {
     const std::string &t = load->torque_unit, &s = load->speed_unit;
     html.rows.push_back(
-        {Text(load->drive), Digits(WithUnit(load->peak_torque, t)),
-         Digits(WithUnit(load->rms_torque, t)), Digits(WithUnit(load->mean_torque, t)),
-         Digits(WithUnit(load->continuous_torque, t)), Digits(WithUnit(load->peak_speed, s)),
-         Digits(WithUnit(load->mean_speed, s)), Digits(WithUnit(load->peak_power, "W")),
-         Digits(WithUnit(load->peak_brake_power, "W")), Digits(WithUnit(load->energy_J, "J")),
-         Digits(WithUnit(load->brake_energy_J, "J")), Digits(Percent(load->duty)),
-         Digits(NumberOrDash(load->inertia_ratio, "{:.3g}")), Text(UsesText(*load)),
-         Digits(NumberOrDash(load->margin(), "{:.3g}"))});
+        {Text(load->drive), Digits(NumberOrDash(load->margin(), "{:.3g}")), Text(UsesText(*load)),
+         Digits(WithUnit(load->peak_torque, t)), Digits(WithUnit(load->rms_torque, t)),
+         Digits(WithUnit(load->mean_torque, t)), Digits(WithUnit(load->continuous_torque, t)),
+         Digits(WithUnit(load->peak_speed, s)), Digits(WithUnit(load->mean_speed, s)),
+         Digits(WithUnit(load->peak_power, "W")), Digits(WithUnit(load->peak_brake_power, "W")),
+         Digits(WithUnit(load->energy_J, "J")), Digits(WithUnit(load->brake_energy_J, "J")),
+         Digits(Percent(load->duty)), Digits(NumberOrDash(load->inertia_ratio, "{:.3g}"))});
   }
   return html;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/spatial.h"
 #include "model_file/load_model.h"
 #include "render/annotations.h"
 #include "render/arrangement.h"
@@ -349,6 +350,20 @@ TEST(BestView, DoesNotLookAlongThePlaneOfAPlanarMechanism) {
     const CameraView view = BestView(four_bar, {turned}, scale, {}, Mat3::Identity());
     const Camera camera{.azimuth_deg = *view.azimuth_deg, .elevation_deg = *view.elevation_deg};
     EXPECT_GT(std::abs(camera.forward_D().dot(turn.col(2))), 0.5) << turn.col(2).transpose();
+  }
+}
+
+// Low and wide is not planar: from above, its own load would hide a limb.
+TEST(BestView, LooksAtALowMechanismFromTheSide) {
+  const Mechanism platform = ShippedModel("stabilizing_platform");
+  // The ship rolls and pitches, all bodies with it.
+  for (const Vec3& turn : {Vec3(0.1, 0, 0), Vec3(-0.1, 0, 0), Vec3(0, 0.1, 0), Vec3(0, -0.1, 0),
+                           Vec3(0.2, 0.1, 0), Vec3(-0.2, 0.1, 0)}) {
+    PictureFrame frame = HomeFrame(platform);
+    for (Pose& X_WB : frame.X_WB) X_WB = Pose(ExpRotation(turn)) * X_WB;
+    const Scale scale = ScaleOf(platform, {frame});
+    const CameraView view = BestView(platform, {frame}, scale, {}, Mat3::Identity());
+    EXPECT_LE(*view.elevation_deg, 24.0) << turn.transpose();
   }
 }
 
