@@ -151,21 +151,31 @@ RunSummary ClosureSolver::Close(const VecX& to) {
 }
 
 RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
-  const mjModel& m = *system_->engine().m;
+  Eigen::Map<VecX> qpos(system_->data()->qpos, system_->engine().m->nq);
+  began_ = qpos;
+  const bool direct = Close(to).ok();
+  if (direct && moved_ < kFarthestStep) return RunSummary::Done();
+  qpos = began_;
+  RunSummary summary = Walk(from, to);
+  if (summary.ok() || !direct) return summary;
+  qpos = began_;
+  return Close(to);
+}
+
+// In steps that adapt to what Newton can bridge.
+RunSummary ClosureSolver::Walk(const VecX& from, const VecX& to) {
   mjData* d = system_->data();
-  reached_.assign(d->qpos, d->qpos + m.nq);
-  RunSummary summary = Close(to);
-  if (summary.ok() && moved_ < kFarthestStep) return summary;
-  // Walk there in steps that adapt to what Newton can bridge.
+  const int nq = system_->engine().m->nq;
+  reached_.assign(d->qpos, d->qpos + nq);
   double s = 0.0, ds = 0.25;
   while (s < 1.0) {
     std::copy(reached_.begin(), reached_.end(), d->qpos);
     const double next = std::min(1.0, s + ds);
-    summary = Close(from + next * (to - from));
+    const RunSummary summary = Close(from + next * (to - from));
     if (summary.ok() && (moved_ < kFarthestStep || ds < kShortestStep)) {
       s = next;
       ds *= 1.5;
-      reached_.assign(d->qpos, d->qpos + m.nq);
+      reached_.assign(d->qpos, d->qpos + nq);
     } else {
       if (ds < kShortestStep) return summary;
       ds *= 0.5;
@@ -175,9 +185,15 @@ RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
 }
 
 RunSummary ClosureSolver::FollowPredicted(const VecX& closed, const VecX& from, const VecX& to) {
-  if (Close(to).ok() && moved_ < kFarthestCorrection) return RunSummary::Done();
-  std::copy(closed.begin(), closed.end(), system_->data()->qpos);
-  return Follow(from, to);
+  Eigen::Map<VecX> qpos(system_->data()->qpos, system_->engine().m->nq);
+  predicted_ = qpos;
+  const bool lands = Close(to).ok();
+  if (lands && moved_ < kFarthestCorrection) return RunSummary::Done();
+  qpos = closed;
+  RunSummary summary = Follow(from, to);
+  if (summary.ok() || !lands) return summary;
+  qpos = predicted_;
+  return Close(to);
 }
 
 void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {

@@ -16,7 +16,8 @@ class ClosureSolver {
   explicit ClosureSolver(ConstraintSystem* system);
 
   /// Moves d.qpos from the present (closed) configuration with targets `from` to the targets `to`,
-  /// in as many intermediate steps as it takes to stay in the same assembly.
+  /// in as many intermediate steps as it takes to stay in the same assembly; at once where no way
+  /// leads there by steps, as between positions of drives that depend on each other.
   [[nodiscard]] RunSummary Follow(const VecX& from, const VecX& to);
   /// The same, where d.qpos is a prediction for the targets `to` and `closed` the configuration
   /// with the targets `from`.
@@ -57,6 +58,7 @@ class ClosureSolver {
   [[nodiscard]] std::vector<int> DrivenRowsNotUnique() const;
 
  private:
+  [[nodiscard]] RunSummary Walk(const VecX& from, const VecX& to);
   void Factor();
   void SolveInto(const VecX& b, VecX* x);            // x = J⁺ b
   void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b
@@ -69,7 +71,8 @@ class ClosureSolver {
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
   VecX rhs_, step_, bias_, refinement_, scaled_;
   double moved_ = 0.0;  // by the last Close, in the units of ScaledJ(): sum of its largest entries
-  std::vector<double> reached_;  // last closed configuration on the way of Follow
+  std::vector<double> reached_;  // last closed configuration on the way of Walk
+  VecX began_, predicted_;       // configurations before Follow and FollowPredicted
 };
 
 }  // namespace mbv::simulation
