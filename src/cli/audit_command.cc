@@ -9,9 +9,9 @@
 #include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/diagnostics.h"
+#include "core/json_text.h"
 #include "core/text.h"
 #include "core/word_hints.h"
-#include "report/json_text.h"
 #include "scenario/find_model.h"
 
 namespace mbv {

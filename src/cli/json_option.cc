@@ -3,7 +3,7 @@
 #include <fmt/format.h>
 
 #include "cli/files.h"
-#include "report/json_text.h"
+#include "core/json_text.h"
 
 namespace mbv {
 

@@ -7,11 +7,11 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/json_text.h"
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "model_file/load_model.h"
 #include "pipeline/workspace.h"
-#include "report/json_text.h"
 #include "scenario/find_model.h"
 
 namespace mbv {

@@ -8,6 +8,7 @@
 #include <filesystem>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "core/text.h"
 #include "kinematics/constraints.h"
 #include "kinematics/mobility.h"
@@ -16,7 +17,6 @@
 #include "pipeline/load_robot.h"
 #include "pipeline/run_scenario.h"
 #include "report/html_text.h"
-#include "report/json_text.h"
 #include "report/text_table.h"
 
 namespace mbv {

@@ -1,8 +1,7 @@
 // regress.json and the state files: CaseResult and RegressReport ↔ JSON.
-#include <cmath>
-#include <nlohmann/json.hpp>
-
 #include "regress/case_result.h"
+
+#include "core/json_text.h"
 
 namespace mbv {
 namespace {
@@ -11,8 +10,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kSchema = "mbverify.regress/1";
 
-// NaN and infinity have no JSON number and become null; null is read as NaN.
-Json Number(double value) { return std::isfinite(value) ? Json(value) : Json(); }
+// Null is read as NaN.
 double NumberOf(const Json& json) { return json.is_number() ? json.get<double>() : kNan; }
 
 Json MetricsJson(const CaseResult& result) {
@@ -162,13 +160,9 @@ CaseResult CaseOf(const Json& json) {
   return result;
 }
 
-std::string Dump(const Json& json) {
-  return json.dump(1, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
 }  // namespace
 
-std::string ToJson(const CaseResult& result) { return Dump(CaseJson(result)); }
+std::string ToJson(const CaseResult& result) { return Dump(CaseJson(result), 1); }
 
 std::string ToJson(const RegressReport& report) {
   const Counts counts = CountCases(report);
@@ -202,7 +196,7 @@ std::string ToJson(const RegressReport& report) {
                {"missing", MissingJson(report)},
                {"cases", Json::array()}};
   for (const CaseResult& result : report.cases) json["cases"].push_back(CaseJson(result));
-  return Dump(json);
+  return Dump(json, 1);
 }
 
 // The library throws at the first thing that is not as written; a damaged file is simply not used.

@@ -2,9 +2,9 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 
+#include "core/json_text.h"
 #include "regress/history.h"
 #include "regress/history_schema.h"
 #include "regress/missing.h"
@@ -14,11 +14,6 @@ namespace mbv {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-std::string Text(const Json& json) {
-  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
 struct HistoryRow {
   long result = 0;
@@ -84,8 +79,8 @@ Json ComparedJson(Database* database, const std::string& key, const HistoryRow* 
   const auto side = [](const HistoryRow* row) {
     if (row == nullptr) return Json();
     return Json({{"status", row->status},
-                 {"force_nrmse", NumberOrNull(row->key_value)},
-                 {"wall_s", NumberOrNull(row->wall_s)}});
+                 {"force_nrmse", Number(row->key_value)},
+                 {"wall_s", Number(row->wall_s)}});
   };
   Json json = {{"scenario", key}, {"a", side(a)}, {"b", side(b)}};
   if (a != nullptr && b != nullptr) {
@@ -128,7 +123,7 @@ HistoryText ListRuns(const std::string& path) {
                     {"compared", select.Integer(5)},
                     {"verified", select.Integer(6)},
                     {"drifted", select.Integer(7)},
-                    {"wall_s", NumberOrNull(select.Real(8))},
+                    {"wall_s", Number(select.Real(8))},
                     {"label", label},
                     {"program", select.Text(10)},
                     {"shard", shard}});
@@ -139,7 +134,7 @@ HistoryText ListRuns(const std::string& path) {
                         select.Real(8), label.empty() ? "" : label + ", ", select.Text(10),
                         shard.empty() ? "" : ", shard " + shard);
   }
-  return {text, database.trouble(), Text({{"runs", std::move(runs)}})};
+  return {text, database.trouble(), Dump({{"runs", std::move(runs)}})};
 }
 
 HistoryText CompareRuns(const std::string& path, const std::string& run_a,
@@ -167,7 +162,7 @@ HistoryText CompareRuns(const std::string& path, const std::string& run_a,
     scenarios.push_back(ComparedJson(&database, key, &row, nullptr));
   }
   return {text, database.trouble(),
-          Text({{"run_a", a}, {"run_b", b}, {"scenarios", std::move(scenarios)}})};
+          Dump({{"run_a", a}, {"run_b", b}, {"scenarios", std::move(scenarios)}})};
 }
 
 HistoryText HistoryCsv(const std::string& path) {

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "core/json_text.h"
 #include "report/convergence_report.h"
-#include "report/json_text.h"
 #include "report/svg_plot.h"
 
 namespace mbv {

@@ -1,6 +1,6 @@
 #include "report/inputs_json.h"
 
-#include "report/json_text.h"
+#include "core/json_text.h"
 
 namespace mbv {
 

@@ -1,4 +1,4 @@
-#include "report/json_text.h"
+#include "core/json_text.h"
 #include "report/load_figures.h"
 #include "report/motion_tables.h"
 #include "report/own_file_text.h"

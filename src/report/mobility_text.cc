@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "report/json_text.h"
+#include "core/json_text.h"
 
 namespace mbv {
 namespace {

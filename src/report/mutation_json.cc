@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/json_text.h"
+#include "core/json_text.h"
 #include "report/mutation_report.h"
 
 namespace mbv {

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "core/json_text.h"
 #include "report/html_text.h"
-#include "report/json_text.h"
 #include "report/own_file_words.h"
 
 namespace mbv {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "report/json_text.h"
+#include "core/json_text.h"
 #include "report/report.h"
 
 namespace mbv {

@@ -1,6 +1,6 @@
 #include <cmath>
 
-#include "report/json_text.h"
+#include "core/json_text.h"
 #include "report/result_json.h"
 #include "report/stiffness_report.h"
 
