@@ -46,9 +46,7 @@ std::vector<ElementSize> SizesOfElements(const Mechanism& mechanism,
     ElementSize size;
     Rates rates{.home = row.value};
     for (const DrivenSize& one : driven) {
-      const std::vector<Vec6>& V = *one.V_WB;
-      const double rate = std::abs(row.J_parent.dot(V[static_cast<size_t>(row.parent)]) +
-                                   row.J_child.dot(V[static_cast<size_t>(row.child)]));
+      const double rate = std::abs(RateOf(row, *one.V_WB));
       size.rate.push_back(rate);
       rates.velocity = std::max(rates.velocity, rate * one.velocity);
       rates.acceleration = std::max(rates.acceleration, rate * one.acceleration);

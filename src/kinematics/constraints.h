@@ -36,6 +36,13 @@ struct ScalarRow {
   double bias = 0.0;
 };
 
+/// J V: the coordinate's rate where `twists` are the bodies' velocities, without b its acceleration
+/// where they are their accelerations.
+[[nodiscard]] inline double RateOf(const ScalarRow& row, const std::vector<Vec6>& twists) {
+  return row.J_parent.dot(twists[static_cast<size_t>(row.parent)]) +
+         row.J_child.dot(twists[static_cast<size_t>(row.child)]);
+}
+
 /// A coordinate of a joint; angles are returned within ±π of `near_value`.
 [[nodiscard]] ScalarRow JointCoordinateRow(const Joint& joint, int coordinate,
                                            const BodyStates& states, double near_value = 0.0);

@@ -27,10 +27,6 @@ PolynomialJet PolynomialAt(const std::vector<double>& coefficients, double q) {
           .curvature = at.curvature * q + 2.0 * at.slope};
 }
 
-double RateOf(const ScalarRow& row, const BodyStates& states) {
-  return row.J_parent.dot(states.V_WB[row.parent]) + row.J_child.dot(states.V_WB[row.child]);
-}
-
 // `near`: per term a value within half a turn.
 CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const BodyStates& states,
                   const double* near) {
@@ -40,7 +36,7 @@ CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const Bo
     const Joint& joint = mechanism.joints[term.joint];
     ScalarRow row = JointCoordinateRow(joint, term.coordinate, states,
                                        near == nullptr ? joint.home[term.coordinate] : *near++);
-    const double rate = RateOf(row, states);
+    const double rate = RateOf(row, states.V_WB);
     const PolynomialJet P = PolynomialAt(term.polynomial, row.value);
     out.coordinates.push_back(row.value);
     row.value = P.value;

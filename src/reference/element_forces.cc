@@ -7,17 +7,12 @@
 namespace mbv::internal {
 namespace {
 
-double Along(const ScalarRow& row, const std::vector<Vec6>& twists) {
-  return row.J_parent.dot(twists[static_cast<size_t>(row.parent)]) +
-         row.J_child.dot(twists[static_cast<size_t>(row.child)]);
-}
-
 struct AlongElement {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
 };
 
 AlongElement MotionOf(const ScalarRow& row, const BodyStates& states) {
-  return {row.value, Along(row, states.V_WB), Along(row, states.A_WB) + row.bias};
+  return {row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias};
 }
 
 // Force, energy and what is lost, of each law.
@@ -124,7 +119,7 @@ RunSummary CheckRubbing(const Mechanism& mechanism, const BodyStates& states, do
   for (size_t e = 0; e < rows.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
     const auto* friction = std::get_if<FrictionLaw>(&element.law);
-    const double rate = Along(rows[e], states.V_WB);
+    const double rate = RateOf(rows[e], states.V_WB);
     if (!Rubs(element)) continue;
     if (!(std::abs(rate) <= RestRate(mechanism, element, duration_s))) continue;
     const bool length = ActsOnLength(mechanism, element);

@@ -351,8 +351,7 @@ VecX FreeDynamics::WorkRates(double t_s, const BodyStates& states) {
   VecX rates(works());
   Eigen::Index next = 0;
   const auto put = [&](double force, const ScalarRow& row) {
-    rates[next++] = force * (row.J_parent.dot(states.V_WB[row.parent]) +
-                             row.J_child.dot(states.V_WB[row.child]));
+    rates[next++] = force * RateOf(row, states.V_WB);
   };
   for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
     put(sample.drive_force[static_cast<Eigen::Index>(d)],

@@ -38,10 +38,6 @@ LoadInWorld InWorld(const LoadSample& load, const Pose& X_WB) {
   return {R * load.force, R * load.moment, R * load.p_BoQ_B};
 }
 
-double RateOf(const ScalarRow& row, const std::vector<Vec6>& V) {
-  return row.J_parent.dot(V[row.parent]) + row.J_child.dot(V[row.child]);
-}
-
 }  // namespace
 
 ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,

@@ -36,12 +36,9 @@ void SampleRecorder::RecordDriven(ReferenceSample* sample) {
     const Coordinate coordinate{is_drive ? Coordinate::Kind::kDrive : Coordinate::Kind::kPrescribed,
                                 index, 0};
     const ScalarRow row = CoordinateRow(mechanism_, coordinate, sample->states, last_driven_[i]);
-    const auto rate = [&](const std::vector<Vec6>& motion) {
-      return row.J_parent.dot(motion[row.parent]) + row.J_child.dot(motion[row.child]);
-    };
     driven.position[i] = last_driven_[i] = row.value;
-    driven.velocity[i] = rate(sample->states.V_WB);
-    driven.acceleration[i] = rate(sample->states.A_WB) + row.bias;
+    driven.velocity[i] = RateOf(row, sample->states.V_WB);
+    driven.acceleration[i] = RateOf(row, sample->states.A_WB) + row.bias;
   }
 }
 

@@ -57,8 +57,7 @@ class Start {
         const Joint& source = mechanism_.joints[joint.joint];
         const ScalarRow row = JointCoordinateRow(source, joint.coordinate, states_);
         *qpos = coordinates_[joint.joint][joint.coordinate];
-        *qvel =
-            row.J_parent.dot(states_.V_WB[row.parent]) + row.J_child.dot(states_.V_WB[row.child]);
+        *qvel = RateOf(row, states_.V_WB);
         return true;
       }
       case PlannedJoint::Type::kBall: {
