@@ -70,18 +70,9 @@ class Sight {
   [[nodiscard]] double Breadth(const Vec3& to_camera_W) const {
     double seen = 0.0, all = 0.0;
     for (const Scene& scene : scenes_) {
-      Mat3 spread = Mat3::Zero();
-      for (const Vec3& p : scene.points) {
-        const Vec3 d = p - scene.middle;
-        spread += d * d.transpose();
-      }
-      const Vec3 sizes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvalues();
-      const bool planar = sizes[1] > kOnALine * sizes[2] && sizes[0] < kInAPlane * sizes[1];
-      if (!planar) continue;
-      // The spread seen along u has the determinant uᵀ adj(S) u.
-      const Mat3 adjugate = Adjugate(spread);
-      seen += std::sqrt(std::max(0.0, to_camera_W.dot(adjugate * to_camera_W)));
-      all += std::sqrt(sizes[1] * sizes[2]);
+      // The spread S seen along u has the determinant uᵀ adj(S) u.
+      seen += std::sqrt(std::max(0.0, to_camera_W.dot(scene.adjugate * to_camera_W)));
+      all += scene.broadest;
     }
     return all == 0.0 ? 1.0 : seen / all;
   }
@@ -105,7 +96,8 @@ class Sight {
   struct Scene {
     std::vector<Blocker> blockers;
     std::vector<Vec3> points;
-    Vec3 middle = Vec3::Zero();  // of the points
+    Mat3 adjugate = Mat3::Zero();  // of the spread of points in a plane
+    double broadest = 0.0;         // its area; 0: they are in none
   };
 
   void AddFrame(const Mechanism& mechanism, const PictureFrame& frame, const Scale& scale,
@@ -134,10 +126,19 @@ class Sight {
     }
     const std::size_t step = points.size() / kMostPoints + 1;
     for (std::size_t i = 0; i < points.size(); i += step) scene.points.push_back(points[i]);
-    for (const Vec3& p : scene.points) {
-      scene.middle += p / static_cast<double>(scene.points.size());
-    }
+    Measure(&scene);
     scenes_.push_back(std::move(scene));
+  }
+
+  static void Measure(Scene* scene) {
+    Vec3 middle = Vec3::Zero();
+    for (const Vec3& p : scene->points) middle += p / static_cast<double>(scene->points.size());
+    Mat3 spread = Mat3::Zero();
+    for (const Vec3& p : scene->points) spread += (p - middle) * (p - middle).transpose();
+    const Vec3 sizes = Eigen::SelfAdjointEigenSolver<Mat3>(spread).eigenvalues();
+    if (!(sizes[1] > kOnALine * sizes[2] && sizes[0] < kInAPlane * sizes[1])) return;
+    scene->adjugate = Adjugate(spread);
+    scene->broadest = std::sqrt(sizes[1] * sizes[2]);
   }
 
   double near_;  // what touches the point does not hide it
