@@ -165,15 +165,23 @@ nlohmann::ordered_json ListModels(std::FILE* text) {
   return models;
 }
 
-nlohmann::ordered_json ListScenarios(std::FILE* text) {
-  auto scenarios = nlohmann::ordered_json::array();
+// Files and heads of all scenarios in ScenariosFolder().
+std::vector<std::pair<std::string, ScenarioHead>> KnownScenarios() {
+  std::vector<std::pair<std::string, ScenarioHead>> scenarios;
   const auto folder = ScenariosFolder();
   if (!folder) return scenarios;
-  fmt::print(text, "scenarios\n");
   std::vector<std::string> unread;
   for (const std::string& file : ExpandYaml(*folder, &unread)) {
-    const ScenarioHead head = ReadScenarioHead(file);
-    if (!head.is_scenario) continue;
+    ScenarioHead head = ReadScenarioHead(file);
+    if (head.is_scenario) scenarios.emplace_back(file, std::move(head));
+  }
+  return scenarios;
+}
+
+nlohmann::ordered_json ListScenarios(std::FILE* text) {
+  auto scenarios = nlohmann::ordered_json::array();
+  if (ScenariosFolder()) fmt::print(text, "scenarios\n");
+  for (const auto& [file, head] : KnownScenarios()) {
     Say(text, "  {}\n      {}\n", file,
         head.description.empty() ? "(no description)" : head.description);
     scenarios.push_back({{"file", file}, {"description", head.description}});
@@ -187,12 +195,9 @@ int ListNames(const std::string& kind) {
     for (const std::string& name : ModelNames(".")) fmt::print("{}\n", name);
     return 0;
   }
-  const auto folder = ScenariosFolder();
-  if (!folder) return 0;
-  std::vector<std::string> unread;
-  for (const std::string& file : ExpandYaml(*folder, &unread)) {
-    if (!ReadScenarioHead(file).is_scenario) continue;
-    fmt::print("{}\n", fs::path(file).lexically_relative(*folder).replace_extension().string());
+  for (const auto& [file, head] : KnownScenarios()) {
+    const fs::path name = fs::path(file).lexically_relative(*ScenariosFolder());
+    fmt::print("{}\n", fs::path(name).replace_extension().string());
   }
   return 0;
 }

@@ -134,11 +134,13 @@ int Run(const RunArguments& arguments) {
     Say(stderr, "{}\n", trouble);
     return 2;
   }
+  for (const std::string& file : files) {
+    if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
+  }
   ProgressLine progress(!arguments.quiet);
   FindingPrinter findings(stderr);
   RunCounts counts;
   auto results = nlohmann::ordered_json::array();
-  std::vector<InputFile> inputs;
   int exit_code = 0;
   if (!arguments.assembly.empty() && std::ranges::none_of(files, IsRobotFile)) {
     return Refuse("--assembly is for robots (.urdf, .xml)",
@@ -160,18 +162,14 @@ int Run(const RunArguments& arguments) {
     }
     const RunOutcome outcome = RunOne(file, options, arguments, &progress, &findings);
     exit_code = WorseExit(exit_code, outcome.exit_code);
-    if (arguments.json.wanted()) {
-      results.push_back(ResultJson(file, outcome));
-      for (InputFile& input : InputsOf(file)) inputs.push_back(std::move(input));
-    }
+    if (arguments.json.wanted()) results.push_back(ResultJson(file, outcome));
     counts += outcome.report      ? CountOf(ViewOf(*outcome.report))
               : outcome.stiffness ? CountOf(ViewOf(*outcome.stiffness))
                                   : RunCounts{.scenarios = 1, .bad_input = 1};
   }
   if (files.size() > 1) SayText(arguments.json.text(), CountLine(counts));
-  return WorseExit(
-      exit_code,
-      arguments.json.Write({{"exit_code", exit_code}, {"results", std::move(results)}}, inputs));
+  return WorseExit(exit_code, arguments.json.Write(
+                                  {{"exit_code", exit_code}, {"results", std::move(results)}}, {}));
 }
 
 }  // namespace

@@ -25,7 +25,6 @@ struct Sized {
   std::string mechanism;
   std::vector<std::string> scenarios;
   std::vector<MotorEnvelope> envelopes;
-  std::vector<InputFile> inputs;
 };
 
 // Runs a scenario without files; its exit code.
@@ -48,8 +47,6 @@ int AddScenario(const std::string& file, const RunOptions& options, Sized* sized
   }
   sized->mechanism = report.mechanism;
   sized->scenarios.push_back(report.scenario);
-  const std::vector<InputFile> inputs = InputsOf(file);
-  sized->inputs.insert(sized->inputs.end(), inputs.begin(), inputs.end());
   Widen(report, &sized->envelopes);
   if (outcome.exit_code != 0) Say(stderr, "{}: {}\n", file, report.comparison.reason);
   return outcome.exit_code;
@@ -65,7 +62,7 @@ bool TooSmall(const Sized& sized, double margin) {
 int Tell(const SizeArguments& arguments, const Sized& sized, int exit_code) {
   SayText(arguments.json.text(), ToText(sized.envelopes));
   const std::string json = ToJson(sized.envelopes, sized.scenarios);
-  if (const int code = arguments.json.Write(json, sized.inputs); code != 0) return code;
+  if (const int code = arguments.json.Write(json, {}); code != 0) return code;
   return WorseExit(exit_code, TooSmall(sized, arguments.margin) ? 1 : 0);
 }
 
@@ -81,6 +78,9 @@ int RunSize(const SizeArguments& arguments) {
   std::string trouble;
   const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
   if (!trouble.empty()) return Refuse(trouble, "");
+  for (const std::string& file : files) {
+    if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
+  }
   Sized sized;
   int exit_code = 0;
   for (const std::string& file : files) {
