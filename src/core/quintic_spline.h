@@ -29,8 +29,7 @@ struct SplineDatum {
 /// left out ("not a knot"); of values and rates (at least 3), knots are double and one beside each
 /// end is simple.
 [[nodiscard]] std::vector<double> FreeKnots(const std::vector<double>& time_s, bool with_rates);
-/// The spline (1) on `knots` (from the first to the last time, inner ones at most double); `data`
-/// in the order of time. With rate and acceleration given at both ends, knots are all times.
+/// A spline (1), and how it lies to the data.
 struct SplineFit {
   Piecewise spline;
   double misfit = 0.0;  ///< the first sum of (1)
@@ -38,6 +37,8 @@ struct SplineFit {
   /// many as B-splines without smoothing, 3 for a parabola.
   double parameters = 0.0;
 };
+/// The spline (1) on `knots` (from the first to the last time, inner ones at most double); `data`
+/// in the order of time. With rate and acceleration given at both ends, knots are all times.
 [[nodiscard]] SplineFit FitSmooth(const std::vector<double>& knots,
                                   const std::vector<SplineDatum>& data, double lambda);
 /// Only the spline.

@@ -34,8 +34,7 @@ SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism);
 
 /// True when a drive, a prescribed joint or a coupling leads a coordinate of this joint.
 [[nodiscard]] bool HasLedCoordinate(const Mechanism& mechanism, int joint);
-/// True when one of these or a force element uses a coordinate of this
-/// joint.
+/// True when one of these or a force element uses a coordinate of this joint.
 [[nodiscard]] bool HasUsedCoordinate(const Mechanism& mechanism, int joint);
 
 /// Body on the world's side of the t-th tree joint, and the one that this joint carries.
