@@ -78,6 +78,19 @@ std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates*
   return rows;
 }
 
+std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism, const BodyStates& states) {
+  std::vector<ScalarRow> rows;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      const Joint& joint = mechanism.joints[term.joint];
+      const double near =
+          states.coupled.empty() ? joint.home[term.coordinate] : states.coupled[rows.size()];
+      rows.push_back(JointCoordinateRow(joint, term.coordinate, states, near));
+    }
+  }
+  return rows;
+}
+
 std::vector<double> CoupledGuesses(const Mechanism& mechanism) {
   std::vector<double> guesses;
   for (const Coupling& coupling : mechanism.couplings) {

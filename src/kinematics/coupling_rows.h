@@ -29,6 +29,10 @@ struct CouplingRow {
 /// was last brought to (or of home).
 std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states);
 
+/// The coordinate of every term of every coupling, in the turns that `states.coupled` tells.
+[[nodiscard]] std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism,
+                                                        const BodyStates& states);
+
 /// How many turns the coupled coordinates count at the joints' guesses, for poses near them.
 [[nodiscard]] std::vector<double> CoupledGuesses(const Mechanism& mechanism);
 

@@ -1,5 +1,9 @@
 #include "kinematics/element_rows.h"
 
+#include <algorithm>
+
+#include "kinematics/coupling_rows.h"
+
 namespace mbv {
 namespace {
 
@@ -14,22 +18,85 @@ ScalarRow RowOf(const Mechanism& mechanism, const ForceElement& element, const B
                             near == nullptr ? joint.home[k] : *near);
 }
 
+double HomeOf(const Mechanism& mechanism, const Drive& drive) {
+  const auto* on = std::get_if<JointDrive>(&drive.kind);
+  if (on == nullptr) return 0.0;
+  return mechanism.joints[static_cast<size_t>(on->joint)].home[static_cast<size_t>(on->coordinate)];
+}
+
+// Where nothing was followed yet, the poses lie within half a turn of home.
+std::vector<double>* TurnsOf(const Mechanism& mechanism, BodyStates* states) {
+  if (!states->turns.empty()) return &states->turns;
+  for (const ForceElement& element : mechanism.elements) {
+    states->turns.push_back(element.drive >= 0
+                                ? 0.0
+                                : mechanism.joints[static_cast<size_t>(element.joint)]
+                                      .home[static_cast<size_t>(element.coordinate)]);
+  }
+  for (const Drive& drive : mechanism.drives) states->turns.push_back(HomeOf(mechanism, drive));
+  for (const Prescribed& base : mechanism.prescribed) {
+    states->turns.push_back(mechanism.joints[static_cast<size_t>(base.joint)].home[0]);
+  }
+  return &states->turns;
+}
+
+void Put(const std::vector<ScalarRow>& rows, size_t first, std::vector<double>* turns) {
+  for (size_t k = 0; k < rows.size(); ++k) (*turns)[first + k] = rows[k].value;
+}
+
+// c + ċ Δt + c̈ Δt²/2
+double Later(const ScalarRow& row, const BodyStates& states, double dt_s) {
+  return row.value +
+         dt_s * (RateOf(row, states.V_WB) + 0.5 * dt_s * (RateOf(row, states.A_WB) + row.bias));
+}
+
 }  // namespace
 
 std::vector<ScalarRow> ElementRows(const Mechanism& mechanism, const BodyStates& states) {
   std::vector<ScalarRow> rows;
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
     rows.push_back(RowOf(mechanism, mechanism.elements[e], states,
-                         states.sprung.empty() ? nullptr : &states.sprung[e]));
+                         states.turns.empty() ? nullptr : &states.turns[e]));
+  }
+  return rows;
+}
+
+std::vector<ScalarRow> DrivenRows(const Mechanism& mechanism, const BodyStates& states) {
+  const double* near =
+      states.turns.empty() ? nullptr : states.turns.data() + mechanism.elements.size();
+  std::vector<ScalarRow> rows;
+  for (const Drive& drive : mechanism.drives) {
+    rows.push_back(
+        DriveRow(mechanism, drive, states, near == nullptr ? HomeOf(mechanism, drive) : *near++));
+  }
+  for (const Prescribed& base : mechanism.prescribed) {
+    const Joint& joint = mechanism.joints[static_cast<size_t>(base.joint)];
+    rows.push_back(JointCoordinateRow(joint, 0, states, near == nullptr ? joint.home[0] : *near++));
   }
   return rows;
 }
 
 void FollowElements(const Mechanism& mechanism, BodyStates* states) {
   if (mechanism.elements.empty()) return;
-  const std::vector<ScalarRow> rows = ElementRows(mechanism, *states);
-  states->sprung.clear();
-  for (const ScalarRow& row : rows) states->sprung.push_back(row.value);
+  Put(ElementRows(mechanism, *states), 0, TurnsOf(mechanism, states));
+}
+
+void FollowDriven(const Mechanism& mechanism, BodyStates* states) {
+  Put(DrivenRows(mechanism, *states), mechanism.elements.size(), TurnsOf(mechanism, states));
+}
+
+void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states) {
+  std::vector<double> turns, coupled;
+  for (auto* rows_of : {&ElementRows, &DrivenRows}) {
+    for (const ScalarRow& row : rows_of(mechanism, *states)) {
+      turns.push_back(Later(row, *states, dt_s));
+    }
+  }
+  for (const ScalarRow& row : CoupledCoordinates(mechanism, *states)) {
+    coupled.push_back(Later(row, *states, dt_s));
+  }
+  states->turns = std::move(turns);
+  states->coupled = std::move(coupled);
 }
 
 }  // namespace mbv

@@ -19,8 +19,8 @@ struct BodyStates {
   /// Per term of the mechanism's couplings in order: a value of its coordinate within half a turn,
   /// which says how many turns an angle counts; empty: home (coupling_rows.h).
   std::vector<double> coupled;
-  /// The same per force element (element_rows.h).
-  std::vector<double> sprung;
+  /// The same per force element, drive and prescribed joint (element_rows.h).
+  std::vector<double> turns;
 
   void Resize(size_t bodies);
 };

@@ -117,7 +117,6 @@ void ClosureSolver::EvaluateRows(Trial* trial) {
     rows_.Add(row);
     coupled_size_.push_back(row.LargestPiece());
   }
-  FollowElements(mechanism_, &trial->states);
   joint_rows_ = rows_.size();
   for (size_t k = 0; k < commands_.size(); ++k) {
     rows_.Add(mechanism_, commands_[k], trial->states, &trial->near_values[k]);
@@ -218,6 +217,8 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
 
 void ClosureSolver::Accept(const VecX& target, Trial&& trial) {
   states_ = std::move(trial.states);
+  FollowElements(mechanism_, &states_);
+  FollowDriven(mechanism_, &states_);
   near_values_ = std::move(trial.near_values);
   target_ = target;
   orientation_ = system_.determinant_sign();
@@ -371,6 +372,7 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   bool done = false;
   if (!first && dt > 0.0 && std::isfinite(dt)) {
     Trial trial{states_, near_values_};
+    PredictTurns(mechanism_, dt, &trial.states);
     MoveBodies(dt * Stack(states_.V_WB) + 0.5 * dt * dt * Stack(states_.A_WB), &trial.states);
     if (Newton(target, true, &trial) == Step::kDone) {
       Accept(target, std::move(trial));

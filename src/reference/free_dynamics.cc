@@ -232,6 +232,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
       rates.tail(command_.velocity.size()) = command_.velocity;
       rates -= rows_.Rates(states->V_WB);
       Unstack(Stack(states->V_WB) + LeastMotion(rates, FirmRank()), &states->V_WB);
+      FollowDriven(mechanism_, states);
       return RunSummary::Done();
     }
     previous = open;

@@ -115,6 +115,8 @@ void FreeMotion::Rates(const State& x, State* rates, double t_s) {
   rates->assign(x.size(), 0.0);
   if (!trouble_.ok()) return;
   ++evaluations_;
+  work_states_.coupled = now_.states.coupled;
+  work_states_.turns = now_.states.turns;
   Unpack(x, &work_states_, nullptr);
   trouble_ = dynamics_.Accelerate(t_s, &work_states_);
   if (!trouble_.ok()) return;
@@ -250,6 +252,7 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
 RunSummary FreeMotion::SampleBridge(double t_s) {
   VecX x, rates;
   bridge_->way.Evaluate(t_s, &x, &rates);
+  sampled_ = now_.states;  // their angles' turns
   Unpack({x.begin(), x.end()}, &sampled_, &sampled_work_);
   const double* in = rates.data();
   for (size_t b = 1; b < sampled_.A_WB.size(); ++b, in += kPerBody) {

@@ -2,6 +2,7 @@
 
 #include "core/demand.h"
 #include "kinematics/constraints.h"
+#include "kinematics/element_rows.h"
 #include "mechanism/channels.h"
 
 namespace mbv::internal {
@@ -12,31 +13,15 @@ void SampleRecorder::Record(ReferenceSample* sample) {
 }
 
 void SampleRecorder::RecordDriven(ReferenceSample* sample) {
-  const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
-  const auto all = drives + static_cast<Eigen::Index>(mechanism_.prescribed.size());
-  const bool first = last_driven_.size() != all;
-  if (first) last_driven_.setZero(all);
+  const std::vector<ScalarRow> rows = DrivenRows(mechanism_, sample->states);
+  const auto count = static_cast<Eigen::Index>(rows.size());
   DrivenSample& driven = sample->driven;
-  driven.position.resize(all);
-  driven.velocity.resize(all);
-  driven.acceleration.resize(all);
-  for (Eigen::Index i = 0; i < all; ++i) {
-    const bool is_drive = i < drives;
-    const auto index = static_cast<int>(is_drive ? i : i - drives);
-    if (first) {
-      // Count angles from the home coordinate.
-      const auto* on_joint =
-          is_drive ? std::get_if<JointDrive>(&mechanism_.drives[index].kind) : nullptr;
-      if (on_joint != nullptr) {
-        last_driven_[i] = mechanism_.joints[on_joint->joint].home[on_joint->coordinate];
-      } else if (!is_drive) {
-        last_driven_[i] = mechanism_.joints[mechanism_.prescribed[index].joint].home[0];
-      }
-    }
-    const Coordinate coordinate{is_drive ? Coordinate::Kind::kDrive : Coordinate::Kind::kPrescribed,
-                                index, 0};
-    const ScalarRow row = CoordinateRow(mechanism_, coordinate, sample->states, last_driven_[i]);
-    driven.position[i] = last_driven_[i] = row.value;
+  driven.position.resize(count);
+  driven.velocity.resize(count);
+  driven.acceleration.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const ScalarRow& row = rows[static_cast<size_t>(i)];
+    driven.position[i] = row.value;
     driven.velocity[i] = RateOf(row, sample->states.V_WB);
     driven.acceleration[i] = RateOf(row, sample->states.A_WB) + row.bias;
   }

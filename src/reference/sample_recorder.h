@@ -8,8 +8,9 @@
 
 namespace mbv::internal {
 
-/// Reads drives, prescribed joints and outputs from body states. It remembers the last sample,
-/// which says which turn an angle is in; the first one counts from home.
+/// Reads drives, prescribed joints and outputs from body states. Drives and prescribed joints count
+/// the turns that the states tell; of an output's angles the last sample says which turn they are
+/// in.
 class SampleRecorder {
  public:
   explicit SampleRecorder(const Mechanism& mechanism) : mechanism_(mechanism) {}
@@ -22,7 +23,6 @@ class SampleRecorder {
   void RecordOutputs(ReferenceSample* sample);
 
   const Mechanism& mechanism_;
-  VecX last_driven_;
   MatX last_outputs_;
 };
 
