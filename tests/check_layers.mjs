@@ -10,6 +10,8 @@ const LIBRARIES = {
   'Boost': { headers: ['boost/'], target: 'Boost::headers' },
   'CLI11': { headers: ['CLI/'], target: 'CLI11::CLI11' },
   'MuJoCo': { headers: ['mujoco/'], target: 'mujoco::mujoco' },
+  'HDF5': { headers: ['hdf5.h'], target: 'PkgConfig::HDF5' },
+  'matio': { headers: ['matio.h'], target: 'PkgConfig::MATIO' },
   'OSMesa': { headers: ['GL/'], target: 'PkgConfig::OSMESA' },
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },

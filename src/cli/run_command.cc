@@ -14,6 +14,7 @@
 #include "cli/terminal.h"
 #include "core/demand.h"
 #include "core/files.h"
+#include "data/data_file.h"
 #include "pipeline/default_setup.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/out_of_memory.h"
@@ -25,12 +26,18 @@ namespace mbv {
 namespace {
 
 struct RunArguments {
-  std::vector<std::string> scenarios, set, assembly;
+  std::vector<std::string> scenarios, set, assembly, data;
   std::string out = "out", mode, report_script, kept_audits;
   JsonOption json;
   bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
   bool sizing = false;
 };
+
+std::vector<std::string> DataWords() {
+  std::vector<std::string> words;
+  for (const DataFormat& format : DataFormats()) words.emplace_back(format.word);
+  return words;
+}
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
 RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunArguments& arguments,
@@ -81,6 +88,7 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->page = !arguments.no_report;
   options->script_link = arguments.report_script;
   options->kept_audits = arguments.kept_audits;
+  options->data = arguments.data;
   for (const std::string& text : arguments.set) {
     const auto set = SplitSet(text);
     if (!set) {
@@ -194,6 +202,10 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   // How regress shares one script, and what the papers' audits gave, among the reports of a night.
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");
+  run->add_option("--data", arguments->data,
+                  "traces of motions also as traces.mat or traces.h5, for MATLAB, Octave, Python …")
+      ->delimiter(',')
+      ->check(OneOf(DataWords()));
   arguments->json.AddTo(run);
   run->add_flag("--sizing", arguments->sizing, "all figures of the motors that the model states");
   run->add_flag("-q,--quiet", arguments->quiet, "one line per scenario");

@@ -20,6 +20,7 @@
 #include "pipeline/smoothed_forces.h"
 #include "pipeline/stiffness.h"
 #include "pipeline/table_gravity.h"
+#include "pipeline/trace_data.h"
 #include "pipeline/version.h"
 #include "report/csv.h"
 #include "report/inputs_json.h"
@@ -238,6 +239,11 @@ class ScenarioRun {
       if (trouble.empty()) trouble = folder.Write(name, content);
     };
     write("traces.csv", FileContent([&](const auto& piece) { WriteCsv(report_, piece); }));
+    std::string no_data;
+    for (const auto& [name, bytes] : DataFilesOf(report_, options_.data, &no_data)) {
+      write(name, bytes);
+    }
+    if (trouble.empty()) trouble = no_data;
     const SimulationRun* simulation = runs_.simulation ? &*runs_.simulation : nullptr;
     if (simulation != nullptr && !simulation->mjcf.empty()) {
       write("model.xml",

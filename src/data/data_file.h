@@ -1,0 +1,42 @@
+// Traces in the binary files of other programs, with units and frames.
+//
+//   mat   traces.mat, MATLAB's version 5, which GNU Octave, SciPy, Julia and others read: the
+//   struct
+//         `info`, and one struct per witness with time_s (n × 1), values (n × m), and cells of m
+//         texts: names, units, quantities, subjects, frames
+//   h5    traces.h5, HDF5: a group per witness with the data sets time_s and one per channel, whose
+//         attributes are unit, quantity, subject and frame; what `info` has, as attributes of the
+//         root
+//
+// The bytes follow from the values alone: no date, no place.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "core/trace.h"
+
+namespace mbv {
+
+/// Of what the traces are, as pairs (key, text): program, mechanism, scenario, verdict, …
+using DataAbout = std::vector<std::pair<std::string, std::string>>;
+
+struct DataFormat {
+  const char* word;  ///< on the command line
+  const char* file;  ///< its name in a result folder
+  /// Writes a file; "" or what went wrong.
+  std::string (*write)(const std::string& path, const DataAbout& about,
+                       const std::vector<const Trace*>& traces);
+};
+
+/// All formats besides traces.csv, which is always written.
+[[nodiscard]] const std::array<DataFormat, 2>& DataFormats();
+/// The row of this word; null if there is none.
+[[nodiscard]] const DataFormat* FindDataFormat(const std::string& word);
+
+/// The bytes of the file; empty, with the reason in `trouble`, where it cannot be made.
+[[nodiscard]] std::string DataBytes(const DataFormat& format, const DataAbout& about,
+                                    const std::vector<const Trace*>& traces, std::string* trouble);
+
+}  // namespace mbv

@@ -1,0 +1,39 @@
+#include "pipeline/trace_data.h"
+
+#include "core/demand.h"
+#include "data/data_file.h"
+
+namespace mbv {
+namespace {
+
+DataAbout AboutOf(const Report& report) {
+  DataAbout about = {
+      {"mechanism", report.mechanism},      {"scenario", report.scenario},
+      {"description", report.description},  {"verdict", ToText(report.comparison.verdict)},
+      {"reason", report.comparison.reason}, {"simulation", report.simulation}};
+  for (const auto& [program, version] : report.versions) {
+    if (program == "mbverify") about.emplace_back(program, version);
+  }
+  return about;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& report,
+                                                             const std::vector<std::string>& words,
+                                                             std::string* trouble) {
+  std::vector<const Trace*> traces;
+  for (const WitnessRecord& witness : report.witnesses) {
+    if (!witness.trace.time_s.empty()) traces.push_back(&witness.trace);
+  }
+  std::vector<std::pair<std::string, std::string>> files;
+  for (const std::string& word : words) {
+    const DataFormat* format = FindDataFormat(word);
+    MBV_DEMAND(format != nullptr, word);
+    files.emplace_back(format->file, DataBytes(*format, AboutOf(report), traces, trouble));
+    if (!trouble->empty()) return {};
+  }
+  return files;
+}
+
+}  // namespace mbv

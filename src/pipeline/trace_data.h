@@ -1,0 +1,17 @@
+// Traces of a run in the binary formats of data/data_file.h.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "report/report.h"
+
+namespace mbv {
+
+/// Names and bytes of the files that these words (DataFormat::word) stand for; "" in `trouble`, or
+/// what went wrong.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> DataFilesOf(
+    const Report& report, const std::vector<std::string>& words, std::string* trouble);
+
+}  // namespace mbv
