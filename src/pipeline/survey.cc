@@ -17,6 +17,7 @@
 #include "pipeline/load_robot.h"
 #include "pipeline/run_scenario.h"
 #include "report/html_text.h"
+#include "report/page.h"
 #include "report/text_table.h"
 
 namespace mbv {
@@ -152,6 +153,18 @@ std::vector<std::string> Fields(const SurveyRow& row) {
           row.message};
 }
 
+std::string CountedOk(const std::vector<SurveyRow>& rows) {
+  const auto ok = std::ranges::count(rows, "ok", &SurveyRow::status);
+  return fmt::format("{} of {} ok", ok, rows.size());
+}
+
+// None where no robot came as far as a comparison.
+Verdict VerdictOf(const std::vector<SurveyRow>& rows) {
+  if (SurveyExit(rows) != 0) return Verdict::kDisagree;
+  const bool any = std::ranges::count(rows, "ok", &SurveyRow::status) > 0;
+  return any ? Verdict::kAgree : Verdict::kNotRun;
+}
+
 const std::vector<std::string> kSurveyColumns = {
     "file",  "status",  "bodies",        "loops",         "freedoms", "redundant",
     "gap_m", "gap_rad", "inverse_nrmse", "forward_nrmse", "seconds",  "message"};
@@ -215,20 +228,15 @@ std::string SurveyTable(const std::vector<SurveyRow>& rows) {
                              {"forward", 9},
                              {"s", 7}});
   std::string text = table.Head() + "\n";
-  size_t ok = 0;
   for (const SurveyRow& row : rows) {
     text += table.Row(Fields(row)) + "\n";
-    if (row.status == "ok") {
-      ++ok;
-    } else {
-      text += fmt::format("    {}\n", Printable(row.message));
-    }
+    if (row.status != "ok") text += fmt::format("    {}\n", Printable(row.message));
   }
-  return text + fmt::format("{} of {} ok\n", ok, rows.size());
+  return text + CountedOk(rows) + "\n";
 }
 
 std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& folder) {
-  Table table{.caption = "Robots", .head = {}, .rows = {}};
+  Table table{.caption = "Robots below " + folder, .head = {}, .rows = {}};
   for (const std::string& column : kSurveyColumns) table.head.push_back(Text(Spaced(column)));
   for (const SurveyRow& row : rows) {
     std::vector<Cell> cells;
@@ -243,13 +251,15 @@ std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& fo
     }
     table.rows.push_back(std::move(cells));
   }
-  return fmt::format(
-      "<!doctype html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>Survey of "
-      "{0}</title>\n"
-      "<style>body{{font:15px/1.4 sans-serif;margin:2em}}table{{border-collapse:collapse}}"
-      "td,th{{border-bottom:1px solid #ccc;padding:4px 8px;text-align:left;vertical-align:top}}"
-      "</style></head>\n<body><h1>Survey of {0}</h1>\n{1}</body></html>\n",
-      Escape(folder), ToHtml(table));
+  Page page;
+  page.Add("Robots", "Robots", ToHtml(table));
+  return page.Write(
+      {.kicker = "mbverify survey",
+       .title = "Survey of " + folder,
+       .lead = CountedOk(rows),
+       .verdict = VerdictOf(rows),
+       .footer = "ok: built, closed, and simulation and reference agree; refused: the file's own "
+                 "faults, which its message names"});
 }
 
 int SurveyExit(const std::vector<SurveyRow>& rows) {
