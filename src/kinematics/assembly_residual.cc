@@ -41,6 +41,8 @@ void Alignment(const Vec3& a, const Vec3& m, Vec3* r, Mat3* J) {
 void RotationRows(const Joint& joint, const Mat3& R_FM, VecX* r, MatX* J) {
   switch (joint.kind) {
     case JointKind::kSpherical:
+    case JointKind::kPointOnLine:
+    case JointKind::kPointOnPlane:
     case JointKind::kFree:
       r->resize(0);
       J->resize(0, 3);

@@ -70,6 +70,11 @@ template <typename Pair>
     case JointKind::kPlanar:
       return coordinate < 2 ? Along(pair, JointBasis(joint).col(coordinate))
                             : AngleAboutAxis(joint, pair);
+    case JointKind::kPointOnLine:
+      return coordinate < 1 ? Along(pair, joint.axis) : RollPitchYaw(pair, coordinate - 1);
+    case JointKind::kPointOnPlane:
+      return coordinate < 2 ? Along(pair, JointBasis(joint).col(coordinate))
+                            : RollPitchYaw(pair, coordinate - 2);
     case JointKind::kFree:
       return coordinate < 3 ? Along(pair, Vec3::Unit(coordinate))
                             : RollPitchYaw(pair, coordinate - 3);

@@ -12,6 +12,12 @@
 //   planar       u, v, θ              translation u·e1 + v·e2, Rot(axis, θ); e1, e2, axis
 //                                     right-handed (axis z: x, y; axis x: y, z; axis y: z, x;
 //                                     else e1 = the axis' unitOrthogonal())
+//   point_on_line   s, roll, pitch, yaw     translation s·axis, turned as a ball: M's origin stays
+//   on
+//                                     the line through F's along axis
+//   point_on_plane  u, v, roll, pitch, yaw  translation u·e1 + v·e2 as planar, turned as a ball:
+//   M's
+//                                     origin stays in the plane through F's across axis
 //   free         x, y, z, roll, pitch, yaw
 #pragma once
 
@@ -29,6 +35,8 @@ enum class JointKind {
   kUniversal,
   kSpherical,
   kPlanar,
+  kPointOnLine,
+  kPointOnPlane,
   kFree
 };
 
@@ -52,6 +60,8 @@ inline constexpr std::array kJointKindRows = {
     JointKindRow{JointKind::kUniversal, "universal", "tt", 2, true},
     JointKindRow{JointKind::kSpherical, "spherical", "bbb", 0, true},
     JointKindRow{JointKind::kPlanar, "planar", "sst", 1, false},
+    JointKindRow{JointKind::kPointOnLine, "point_on_line", "sbbb", 1, false},
+    JointKindRow{JointKind::kPointOnPlane, "point_on_plane", "ssbbb", 1, false},
     JointKindRow{JointKind::kFree, "free", "sssbbb", 0, false}};
 
 namespace internal {
@@ -96,6 +106,12 @@ static_assert(JointKindRowsAreInOrder());
 [[nodiscard]] constexpr bool IsOfBall(JointKind kind, int coordinate) {
   return coordinate < FreedomsOf(kind) &&
          RowOf(kind).coordinates[static_cast<std::size_t>(coordinate)] == 'b';
+}
+
+/// True where an engine has a coordinate of its own for it: not for those of a ball, nor for a free
+/// joint's, which move together.
+[[nodiscard]] constexpr bool IsScalar(JointKind kind, int coordinate) {
+  return kind != JointKind::kFree && !IsOfBall(kind, coordinate);
 }
 
 }  // namespace mbv

@@ -55,6 +55,14 @@ Pose JointPose(const Joint& joint, const std::array<double, 6>& q) {
       X_FM.linear() = turn(joint.axis, q[2]);
       break;
     }
+    case JointKind::kPointOnLine:
+      X_FM.translation() = q[0] * joint.axis;
+      X_FM.linear() = RotRpy({q[1], q[2], q[3]});
+      break;
+    case JointKind::kPointOnPlane:
+      X_FM.translation() = JointBasis(joint).leftCols<2>() * Eigen::Vector2d(q[0], q[1]);
+      X_FM.linear() = RotRpy({q[2], q[3], q[4]});
+      break;
     case JointKind::kFree:
       X_FM.translation() = Vec3(q[0], q[1], q[2]);
       X_FM.linear() = RotRpy({q[3], q[4], q[5]});
@@ -72,7 +80,7 @@ std::array<double, 6> CoordinatesOf(const Joint& joint, const Pose& X_FM) {
 }
 
 double RotationGap(const Joint& joint, const Pose& X_FM) {
-  if (FreedomsOf(joint.kind) == 6 || joint.kind == JointKind::kSpherical) return 0.0;
+  if (HasBall(joint.kind)) return 0.0;
   const Pose X_nearest = JointPose(joint, CoordinatesOf(joint, X_FM));
   return LogRotation(X_nearest.linear().transpose() * X_FM.linear()).norm();
 }
@@ -103,6 +111,14 @@ JointTwists UnitTwists(const Joint& joint, const Mat3& R_WF, const Mat3& R_WM) {
     case JointKind::kPlanar:
       S.bottomLeftCorner<3, 2>() = R_WF * JointBasis(joint).leftCols<2>();
       S.col(2).head<3>() = axis;
+      break;
+    case JointKind::kPointOnLine:
+      S.col(0).tail<3>() = axis;
+      S.topRightCorner<3, 3>() = R_WM;
+      break;
+    case JointKind::kPointOnPlane:
+      S.bottomLeftCorner<3, 2>() = R_WF * JointBasis(joint).leftCols<2>();
+      S.topRightCorner<3, 3>() = R_WM;
       break;
     case JointKind::kFree:
       S.bottomLeftCorner<3, 3>() = R_WF;
@@ -141,6 +157,14 @@ void StepJoint(const Joint& joint, const double* dq, Pose* X_FM) {
       p += JointBasis(joint).leftCols<2>() * Eigen::Vector2d(dq[0], dq[1]);
       R = R * turn(joint.axis, dq[2]);
       break;
+    case JointKind::kPointOnLine:
+      p += dq[0] * joint.axis;
+      R = R * ExpRotation({dq[1], dq[2], dq[3]});
+      break;
+    case JointKind::kPointOnPlane:
+      p += JointBasis(joint).leftCols<2>() * Eigen::Vector2d(dq[0], dq[1]);
+      R = R * ExpRotation({dq[2], dq[3], dq[4]});
+      break;
     case JointKind::kFree:
       p += Vec3(dq[0], dq[1], dq[2]);
       R = R * ExpRotation({dq[3], dq[4], dq[5]});
@@ -160,9 +184,11 @@ int LockedDirections(const Joint& joint, Mat3* directions) {
       return 3;
     case JointKind::kPrismatic:
     case JointKind::kCylindrical:
+    case JointKind::kPointOnLine:
       *directions = JointBasis(joint);
       return 2;
     case JointKind::kPlanar:
+    case JointKind::kPointOnPlane:
       directions->col(0) = joint.axis;
       return 1;
     case JointKind::kFree:
@@ -178,6 +204,8 @@ int LockedCosines(const Joint& joint, std::array<LockedCosine, 3>* cosines) {
   };
   switch (joint.kind) {
     case JointKind::kSpherical:
+    case JointKind::kPointOnLine:
+    case JointKind::kPointOnPlane:
     case JointKind::kFree:
       return 0;
     case JointKind::kUniversal:

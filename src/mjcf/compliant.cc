@@ -303,7 +303,7 @@ class Expander {
     const int index = joint_index_[driven.joint];
     if (index < 0) return;  // rigid
     const Joint& joint = model_.mechanism.joints[index];
-    if (HasBall(joint.kind)) {
+    if (!IsScalar(joint.kind, driven.coordinate)) {
       Fail("drive '" + drive.name + "' holds a coordinate of the ball or free joint '" +
            joint.name + "', which MuJoCo does not have");
     } else if (std::isfinite(drive.stiffness)) {

@@ -198,7 +198,8 @@ class MjcfWriter {
   void WriteActuator(const char* element, const std::string& name, const Drive& drive,
                      const char* gain, double value) {
     const auto* driven = std::get_if<JointDrive>(&drive.kind);
-    if (driven != nullptr && !mjcf::IsGuided(mechanism_.joints[driven->joint])) return;
+    if (driven != nullptr && !IsScalar(mechanism_.joints[driven->joint].kind, driven->coordinate))
+      return;
     xml_.Open(element);
     xml_.Set("name", name);
     if (driven == nullptr) {

@@ -40,6 +40,14 @@ std::vector<Motion1> MotionsOf(const Joint& joint, const Mat3& R_WF, const Mat3&
               {Type::kSlide, R_WF * E.col(1), 1},
               {Type::kHinge, axis_W, 2}};
     }
+    case JointKind::kPointOnLine:
+      return {{Type::kSlide, axis_W, 0}, {Type::kBall, Vec3::UnitZ(), -1}};
+    case JointKind::kPointOnPlane: {
+      const Mat3 E = JointBasis(joint);
+      return {{Type::kSlide, R_WF * E.col(0), 0},
+              {Type::kSlide, R_WF * E.col(1), 1},
+              {Type::kBall, Vec3::UnitZ(), -1}};
+    }
     case JointKind::kSpherical:
       return {{Type::kBall, Vec3::UnitZ(), -1}};
     case JointKind::kFree:

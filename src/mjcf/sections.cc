@@ -148,7 +148,7 @@ void WriteEqualities(const Sections& s) {
     const std::string name = DriveEqualityName(drive);
     if (driven == nullptr) {
       WriteOn(s, "tendon", name, "tendon1", drive.name, s.options.guided);
-    } else if (IsGuided(s.mechanism.joints[driven->joint])) {
+    } else if (IsScalar(s.mechanism.joints[driven->joint].kind, driven->coordinate)) {
       WriteOn(s, "joint", name, "joint1",
               JointName(s.mechanism.joints[driven->joint], driven->coordinate), s.options.guided);
     }
@@ -167,7 +167,7 @@ void WriteSensors(const Sections& s) {
     const auto* driven = std::get_if<JointDrive>(&drive.kind);
     if (driven == nullptr) {
       WriteOn(s, "tendonpos", drive.name + ".position", "tendon", drive.name);
-    } else if (IsGuided(s.mechanism.joints[driven->joint])) {
+    } else if (IsScalar(s.mechanism.joints[driven->joint].kind, driven->coordinate)) {
       WriteOn(s, "jointpos", drive.name + ".position", "joint",
               JointName(s.mechanism.joints[driven->joint], driven->coordinate));
     } else {

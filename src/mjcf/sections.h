@@ -27,7 +27,4 @@ void WriteEqualities(const Sections& s);
 /// Drive positions and forces, gaps of closures, forces of split ones.
 void WriteSensors(const Sections& s);
 
-/// True where MuJoCo has a scalar coordinate for the joint: balls and free joints have none.
-[[nodiscard]] inline bool IsGuided(const Joint& joint) { return !HasBall(joint.kind); }
-
 }  // namespace mbv::mjcf

@@ -124,6 +124,7 @@ void ReadSignals(const EachBlock& each_block, const internal::BodyNames& names,
   each_block([&](const Block& block) { internal::ReadSprings(block, names, values, &s->springs); });
   internal::CouplingReader couplings(values, s->joints, &s->signals, &s->couplings);
   each_block([&](const Block& block) { couplings.Read(block); });
+  couplings.TakeScrews();
 }
 
 template <typename EachBlock>

@@ -15,6 +15,13 @@ void CouplingReader::Read(const Block& block) {
   }
 }
 
+void CouplingReader::TakeScrews() {
+  for (const Coupling& screw : joints_.screws) {
+    places_.Add(screw.name, "coupling", joints_.places[static_cast<size_t>(screw.terms[0].joint)]);
+    couplings_.push_back(screw);
+  }
+}
+
 void CouplingReader::ReadCoupling(const Block& block, const YamlEntry& entry) {
   YamlReader& yaml = values_.yaml();
   const std::string section = block.PathOf("couplings");

@@ -21,6 +21,8 @@ class CouplingReader {
       : values_(*values), joints_(joints), places_(*places), couplings_(*couplings) {}
 
   void Read(const Block& block);
+  /// Those that helical joints are made of.
+  void TakeScrews();
 
  private:
   void ReadCoupling(const Block& block, const YamlEntry& entry);

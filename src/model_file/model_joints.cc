@@ -12,18 +12,44 @@ namespace mbv::internal {
 namespace {
 
 const std::vector<std::string> kJointKeys = {
-    "kind",     "parent", "child",     "axis",     "axis2",   "guess",    "guess_deg",
-    "guess_mm", "range",  "range_deg", "range_mm", "closure", "transmits"};
+    "kind",  "parent",    "child",    "axis",    "axis2",     "guess", "guess_deg", "guess_mm",
+    "range", "range_deg", "range_mm", "closure", "transmits", "lead",  "lead_mm"};
+
+// A cylindrical joint whose travel follows its turn.
+constexpr const char* kHelical = "helical";
 
 std::vector<std::string> KindWords() {
   std::vector<std::string> words;
   for (const JointKindRow& row : kJointKindRows) words.emplace_back(row.word);
+  words.emplace_back(kHelical);
   return words;
+}
+
+JointKind KindOf(size_t choice) {
+  return choice < kJointKindRows.size() ? kJointKindRows.at(choice).kind : JointKind::kCylindrical;
+}
+
+// The joint must be the next one.
+Coupling ScrewOf(const std::string& joint, size_t index, double lead) {
+  const auto j = static_cast<int>(index);
+  return {.name = joint + ".lead",
+          .terms = {{.joint = j, .coordinate = 0, .polynomial = {-1.0}},
+                    {.joint = j, .coordinate = 1, .polynomial = {lead / (2 * std::numbers::pi)}}}};
 }
 
 // Of one coordinate when the key carries a unit: _deg is that of angles, _mm of lengths.
 UnitSuffix UnitOf(const UnitSuffix& unit, JointKind kind, int coordinate) {
   return unit.Suits(IsLength(kind, coordinate) ? "m" : "rad") ? unit : kPlain;
+}
+
+// A travel alone implies the turn, a turn (guess_deg) alone the travel.
+void ReadScrewGuess(const Block& block, const YamlMap& map, const YamlMap::InUnit& guess,
+                    double lead, ModelValues* values, Joint* joint) {
+  const auto value = values->Number(block, *guess.node, map.PathOf(guess.key), guess.unit);
+  const double per_turn = lead / (2 * std::numbers::pi);
+  const bool turn = guess.unit.suffix == kDeg.suffix;
+  joint->guess[0] = value.value_or(0.0) * (turn ? per_turn : 1.0);
+  joint->guess[1] = joint->guess[0] / per_turn;
 }
 
 // More than a turn is no guess; degrees are.
@@ -85,9 +111,12 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   const auto on_parent = parent ? names_.Frame(block, *parent, map.PathOf("parent")) : std::nullopt;
   const auto on_child = child ? names_.Frame(block, *child, map.PathOf("child")) : std::nullopt;
   bool good = choice && on_parent && on_child;
+  std::optional<double> lead;
   if (choice) {
-    joint.kind = kJointKindRows[static_cast<size_t>(*choice)].kind;
-    good = ReadCoordinates(block, map, &joint) && good;
+    joint.kind = KindOf(static_cast<size_t>(*choice));
+    const bool helical = KindWords()[static_cast<size_t>(*choice)] == kHelical;
+    lead = ReadLead(block, map, helical);
+    good = ReadCoordinates(block, map, lead, &joint) && lead.has_value() == helical && good;
   } else if (const YamlNode* axis = map.Find("axis")) {
     (void)values_.Axis(block, *axis, map.PathOf("axis"));  // for its findings
   }
@@ -103,17 +132,39 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   joint.child = on_child->body;
   joint.X_CM = on_child->X_BF;
   joints_.refused.erase(joint.name);
+  if (lead) joints_.screws.push_back(ScrewOf(joint.name, joints_.joints.size(), *lead));
   joints_.Add(std::move(joint), PlaceOf(entry), HintOf(map, &yaml));
 }
 
 // What depends on the kind.
-bool JointReader::ReadCoordinates(const Block& block, const YamlMap& map, Joint* joint) {
+bool JointReader::ReadCoordinates(const Block& block, const YamlMap& map,
+                                  std::optional<double> lead, Joint* joint) {
   const bool good = ReadAxes(block, map, joint);
-  if (const auto guess = map.FindInUnit("guess", {kPlain, kDeg, kMm}); guess.node != nullptr) {
+  const YamlMap::InUnit guess = map.FindInUnit("guess", {kPlain, kDeg, kMm});
+  if (guess.node != nullptr && lead && guess.node->is_scalar()) {
+    ReadScrewGuess(block, map, guess, *lead, &values_, joint);
+  } else if (guess.node != nullptr) {
     ReadGuess(block, *guess.node, map.PathOf(guess.key), guess.unit, &values_, joint);
   }
   ReadRange(block, map, joint);
   return ReadFreeChoices(map, joint) && good;
+}
+
+// Of a helical joint [m per turn]; empty for others, and after a finding.
+std::optional<double> JointReader::ReadLead(const Block& block, const YamlMap& map, bool helical) {
+  const YamlMap::InUnit lead = map.FindInUnit("lead", {kPlain, kMm});
+  if (!helical && lead.node != nullptr) {
+    values_.yaml().Error(*lead.node,
+                         fmt::format("{}: only helical joints have a lead", map.path()));
+  }
+  if (helical && lead.node == nullptr) (void)map.Required("lead");
+  if (!helical || lead.node == nullptr) return std::nullopt;
+  const auto value = values_.Number(block, *lead.node, map.PathOf(lead.key), lead.unit);
+  if (!value || *value != 0.0) return value;
+  values_.yaml().Error(*lead.node,
+                       fmt::format("{} = 0: the joint would not travel", map.PathOf(lead.key)),
+                       "a joint that only turns is revolute");
+  return std::nullopt;
 }
 
 bool JointReader::ReadAxes(const Block& block, const YamlMap& map, Joint* joint) {

@@ -17,6 +17,7 @@ struct ModelJoints {
   std::vector<Joint> joints;
   std::vector<Place> places;      ///< per joint; those of a URDF file have none
   ClosureHints hints;             ///< per joint
+  std::vector<Coupling> screws;   ///< travel by turn, of helical joints
   std::set<std::string> refused;  ///< names of joints that have a finding
   bool good = true;               ///< false: the graph of joints is not worth checking
 
@@ -37,10 +38,12 @@ class JointReader {
   void ReadJoint(const Block& block, const YamlEntry& entry);
   [[nodiscard]] bool IsFresh(const YamlEntry& entry, const std::string& path,
                              const std::string& name);
-  bool ReadCoordinates(const Block& block, const YamlMap& map, Joint* joint);
+  bool ReadCoordinates(const Block& block, const YamlMap& map, std::optional<double> lead,
+                       Joint* joint);
   bool ReadAxes(const Block& block, const YamlMap& map, Joint* joint);
   void ReadRange(const Block& block, const YamlMap& map, Joint* joint);
   bool ReadFreeChoices(const YamlMap& map, Joint* joint);
+  std::optional<double> ReadLead(const Block& block, const YamlMap& map, bool helical);
 
   ModelValues& values_;
   const BodyNames& names_;

@@ -178,6 +178,10 @@ std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed) {
     unit[coordinate] = 1.0;
     return Vec3(JointPose(joint, unit).translation());
   };
+  const auto ball = [&](int first) {
+    return std::vector{step("yaw", first + 2, Vec3::UnitZ()),
+                       step("pitch", first + 1, Vec3::UnitY()), step("roll", first, Vec3::UnitX())};
+  };
   std::vector<UrdfStep> steps;
   switch (joint.kind) {
     case JointKind::kFixed:
@@ -195,11 +199,18 @@ std::vector<UrdfStep> UrdfSteps(const Joint& joint, bool reversed) {
       steps = {step("first", 0, joint.axis), step("second", 1, joint.axis2)};
       break;
     case JointKind::kSpherical:
-      steps = {step("yaw", 2, Vec3::UnitZ()), step("pitch", 1, Vec3::UnitY()),
-               step("roll", 0, Vec3::UnitX())};
+      steps = ball(0);
       break;
     case JointKind::kPlanar:
       steps = {step("u", 0, direction(0)), step("v", 1, direction(1)), step("turn", 2, joint.axis)};
+      break;
+    case JointKind::kPointOnLine:
+      steps = ball(1);
+      steps.insert(steps.begin(), step("slide", 0, joint.axis));
+      break;
+    case JointKind::kPointOnPlane:
+      steps = ball(2);
+      steps.insert(steps.begin(), {step("u", 0, direction(0)), step("v", 1, direction(1))});
       break;
   }
   if (reversed) std::reverse(steps.begin(), steps.end());

@@ -19,11 +19,6 @@ namespace {
 
 constexpr size_t kMostNames = 6;
 
-bool CanBeDriven(JointKind kind, int coordinate) {
-  if (kind == JointKind::kSpherical) return false;
-  return kind != JointKind::kFree || coordinate < 3;
-}
-
 // The drives' coordinates, then all others that can be driven.
 std::vector<Coordinate> Candidates(const Mechanism& m) {
   std::vector<Coordinate> candidates;
@@ -36,7 +31,7 @@ std::vector<Coordinate> Candidates(const Mechanism& m) {
         const auto* on = std::get_if<JointDrive>(&drive.kind);
         return on != nullptr && on->joint == static_cast<int>(j) && on->coordinate == c;
       });
-      if (!driven && CanBeDriven(m.joints[j].kind, c)) {
+      if (!driven && !IsOfBall(m.joints[j].kind, c)) {
         candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
       }
     }

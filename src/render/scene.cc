@@ -213,6 +213,14 @@ void AddJoint(const Mechanism& mechanism, const Joint& joint, const PictureFrame
     case JointKind::kPlanar:
       items->push_back(Between(Solid::kCylinder, p - 0.2 * r * a1, p + 0.2 * r * a1, 2.0 * r, pin));
       break;
+    case JointKind::kPointOnLine:
+      items->push_back(Between(Solid::kCylinder, p - 4.0 * r * a1, p + 4.0 * r * a1, 0.4 * r, pin));
+      items->push_back(BallAt(X_WM.translation(), 1.2 * r, ball));
+      break;
+    case JointKind::kPointOnPlane:
+      items->push_back(Between(Solid::kCylinder, p - 0.2 * r * a1, p + 0.2 * r * a1, 2.5 * r, pin));
+      items->push_back(BallAt(X_WM.translation(), 1.2 * r, ball));
+      break;
     case JointKind::kFixed:
     case JointKind::kFree:
       break;

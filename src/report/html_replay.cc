@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "mechanism/joint_pose.h"
 #include "mesh/decimate.h"
 #include "report/html_text.h"
 
@@ -208,13 +209,11 @@ class ReplayWriter {
   Json JointDriveJson(const JointDrive& drive) const {
     const Joint& joint = mechanism_.joints[static_cast<size_t>(drive.joint)];
     const bool second = joint.kind == JointKind::kUniversal && drive.coordinate == 1;
-    const bool planar_or_free = joint.kind == JointKind::kPlanar || joint.kind == JointKind::kFree;
-    const Vec3 axis = second ? joint.axis2
-                      : planar_or_free && drive.coordinate < 3 && joint.kind == JointKind::kFree
-                          ? Vec3::Unit(drive.coordinate)
-                          : joint.axis;
+    const bool slides = IsLength(joint.kind, drive.coordinate);
+    const Vec6 twist = UnitTwists(joint, Mat3::Identity(), Mat3::Identity()).col(drive.coordinate);
+    const Vec3 axis = slides ? twist.tail<3>() : twist.head<3>();
     const Pose& X = second ? joint.X_CM : joint.X_PF;
-    return {{"type", IsLength(joint.kind, drive.coordinate) ? "slide" : "turn"},
+    return {{"type", slides ? "slide" : "turn"},
             {"body", second ? joint.child : joint.parent},
             {"p", VectorJson(X.translation())},
             {"axis", VectorJson(X.linear() * axis)},

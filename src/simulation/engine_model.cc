@@ -49,7 +49,7 @@ RunSummary FindDriven(EngineModel* engine) {
       continue;
     }
     const JointKind kind = mechanism.joints[driven->joint].kind;
-    if (HasBall(kind)) {
+    if (!IsScalar(kind, driven->coordinate)) {
       return {.stop = Stop::kUnsupported,
               .message = "drive '" + drive.name +
                          "' acts on a coordinate of the ball or free joint '" +
@@ -71,7 +71,7 @@ RunSummary CheckCouplings(const Mechanism& mechanism) {
     const bool known =
         mjcf::PlanCoupling(mechanism, coupling).type != mjcf::PlannedCoupling::Type::kUnknown;
     const auto on_ball = std::ranges::find_if(coupling.terms, [&](const Coupling::Term& term) {
-      return HasBall(mechanism.joints[term.joint].kind);
+      return !IsScalar(mechanism.joints[term.joint].kind, term.coordinate);
     });
     if (known && on_ball == coupling.terms.end()) continue;
     return {.stop = Stop::kUnsupported,
@@ -100,7 +100,7 @@ RunSummary FindElements(EngineModel* engine) {
       continue;
     }
     const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
-    if (HasBall(joint.kind)) {
+    if (!IsScalar(joint.kind, element.coordinate)) {
       return {.stop = Stop::kUnsupported,
               .message = "element '" + element.name + "' acts on a coordinate of the free joint '" +
                          joint.name + "', which MuJoCo does not have",

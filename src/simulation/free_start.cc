@@ -1,4 +1,5 @@
 // The start of a free motion: body states → MuJoCo's coordinates, then onto its own loops.
+#include <algorithm>
 #include <cmath>
 
 #include "kinematics/constraints.h"
@@ -61,14 +62,16 @@ class Start {
         return true;
       }
       case PlannedJoint::Type::kBall: {
-        // The ball turns the body from where it would be carried by its parent.
+        // The ball turns the body from where its parent, and slides, would carry it.
         const Mat3 R_PB_home = mechanism_.X_WB_home[inboard].linear().transpose() *
                                mechanism_.X_WB_home[outboard].linear();
         const Mat3 R_WB_carried = states_.X_WB[inboard].linear() * R_PB_home;
         PutRotation(R_WB_carried.transpose() * X_WB.linear(), qpos);
         Eigen::Map<Vec3>{qvel} =
             X_WB.linear().transpose() * (V.head<3>() - states_.V_WB[inboard].head<3>());
-        return body.joints.size() == 1;
+        return std::ranges::none_of(body.joints, [](const PlannedJoint& other) {
+          return other.type == PlannedJoint::Type::kHinge;
+        });
       }
       case PlannedJoint::Type::kFree:
         Eigen::Map<Vec3>{qpos} = X_WB.translation();
@@ -99,13 +102,14 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
             .unit = {}};
   }
   if (!Start(s->engine, start, s->data.get()).Put()) {
-    return {.stop = Stop::kUnsupported,
-            .message =
-                "a ball or free joint between moving bodies that is not alone on its body "
-                "cannot be started",
-            .time_s = 0.0,
-            .where = {},
-            .unit = {}};
+    return {
+        .stop = Stop::kUnsupported,
+        .message =
+            "a free joint between moving bodies, or a ball beside a hinge on its body, cannot be "
+            "started",
+        .time_s = 0.0,
+        .where = {},
+        .unit = {}};
   }
   if (RunSummary summary = s->solver.Close(first.position); !summary.ok()) {
     summary.time_s = 0.0;

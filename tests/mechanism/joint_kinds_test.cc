@@ -59,13 +59,13 @@ TEST_P(JointKinds, CanTransmitAForceOnlyWhereABallCanStandForThem) {
   EXPECT_EQ(GetParam().may_transmit_force_only, held && FreedomsOf(joint_.kind) > 0);
 }
 
-TEST_P(JointKinds, TurnAsABallWhereNoAxisDescribesTheTurn) {
-  bool ball = false;
-  for (int c = 0; c < FreedomsOf(joint_.kind); ++c) {
-    ball = ball || (!IsLength(joint_.kind, c) && GetParam().axes == 0);
-    EXPECT_EQ(IsOfBall(joint_.kind, c), !IsLength(joint_.kind, c) && GetParam().axes == 0) << c;
-  }
+TEST_P(JointKinds, TurnAsABallWhereNothingOfTheTurnIsLocked) {
+  std::array<LockedCosine, 3> cosines;
+  const bool ball = LockedCosines(joint_, &cosines) == 0;
   EXPECT_EQ(HasBall(joint_.kind), ball);
+  for (int c = 0; c < FreedomsOf(joint_.kind); ++c) {
+    EXPECT_EQ(IsOfBall(joint_.kind, c), ball && !IsLength(joint_.kind, c)) << c;
+  }
 }
 
 INSTANTIATE_TEST_SUITE_P(All, JointKinds, testing::ValuesIn(kJointKindRows),

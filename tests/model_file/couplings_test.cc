@@ -48,6 +48,35 @@ TEST(Couplings, OneFollowsAnother) {
               std::numbers::pi / 2 + 3 * slide[0] - 2 * slide[0] * slide[0], 1e-12);
 }
 
+std::string Helical(const std::string& rest) {
+  return "name: m\nbodies: {b: {mass: 1, inertia: [1, 1, 1]}}\n"
+         "joints: {slide: {kind: helical, parent: world, child: b, axis: z, " +
+         rest + "}}\n";
+}
+
+TEST(Couplings, AHelicalJointIsACylindricalOneWithItsLead) {
+  struct Guess {
+    const char* words;
+    double travel, turn;
+  };
+  const Guess guesses[] = {
+      {"lead_mm: -5, guess_mm: 10", 0.01, -4 * std::numbers::pi},
+      {"lead: -0.005, guess_deg: 180", -0.0025, std::numbers::pi},
+      {"lead: -5e-3, guess: [0.01, -12.56637061]", 0.01, -4 * std::numbers::pi}};
+  for (const Guess& guess : guesses) {
+    const LoadResult loaded = LoadModelText(Helical(guess.words), "m.yaml");
+    ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+    const Mechanism& m = *loaded.mechanism;
+    EXPECT_EQ(m.joints[0].kind, JointKind::kCylindrical);
+    ASSERT_EQ(m.couplings.size(), 1u);
+    EXPECT_EQ(m.couplings[0].name, "slide.lead");
+    EXPECT_DOUBLE_EQ(m.couplings[0].terms[1].polynomial.at(0), -0.005 / (2 * std::numbers::pi));
+    EXPECT_NEAR(m.joints[0].home[0], guess.travel, 1e-5 * std::abs(guess.travel));
+    EXPECT_NEAR(m.joints[0].home[1], guess.turn, 1e-4);
+    EXPECT_NEAR(m.joints[0].home[0], -0.005 / (2 * std::numbers::pi) * m.joints[0].home[1], 1e-16);
+  }
+}
+
 TEST(Couplings, WhatMeansNothingIsAFinding) {
   EXPECT_EQ(CouplingFindings("  g: {joint: turn, follows: tern, ratio: 2}\n"),
             "m.yaml:9:29: error: couplings.g.follows = 'tern': there is no such joint\n"

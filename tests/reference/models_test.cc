@@ -225,5 +225,29 @@ TEST(ReferenceTripod, HangsStillOnThePrintedTension) {
   }
 }
 
+// Points on planes and on a line, and a screw, by plane trigonometry: the pin gives the lever's
+// angle, which sinks the nut by the lead per turn, and the nut's hole the pointer's direction.
+TEST(SlottedScrew, MovesAsItsTrigonometrySays) {
+  const Mechanism m = LoadModelOf("slotted_screw");
+  Motion motion;
+  motion.duration_s = 2.0;
+  motion.sample_s = 0.05;
+  motion.commands = {Commanded("motor", Coordinate::Kind::kDrive, 0, 0,
+                               Profile{{SineTerm{3.2, 1.0, 0}, ConstantTerm{1.2}}})};
+  const ReferenceRun run = RunReference(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const double crank = 0.05, distance = 0.12, lead = 0.06, arm = 0.09;
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double q = At(run.trace, i, "motor.position");
+    const double lever = std::atan2(crank * std::sin(q), distance + crank * std::cos(q));
+    const double height = 0.02 + lead * (1.0 - lever / (2 * std::numbers::pi));
+    EXPECT_NEAR(At(run.trace, i, "lever.yaw"), lever, 1e-13);
+    EXPECT_NEAR(At(run.trace, i, "nut.z"), height, 1e-13);
+    EXPECT_NEAR(At(run.trace, i, "nut.yaw"), 0.0, 1e-13);
+    EXPECT_NEAR(At(run.trace, i, "pointer.pitch"), -std::atan2(height - 0.05, 0.3), 1e-13);
+    EXPECT_NEAR(At(run.trace, i, "nut.y") + arm, arm, 1e-13);
+  }
+}
+
 }  // namespace
 }  // namespace mbv::fixtures

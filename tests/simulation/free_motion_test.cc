@@ -86,6 +86,72 @@ TEST(FreeMotion, AFloatingBodyFliesAParabolaAndKeepsItsSpin) {
   EXPECT_NEAR(Column(run, "body.yaw").tail<1>()[0], 1.0, kIntegrated);
 }
 
+// A body hangs 0.3 m below a bead on a wire along x, or below a ball on a plate across x; reversed,
+// wire and plate are its own and slide through a fixed point.
+Mechanism MakeSlidingBody(JointKind kind, bool reversed) {
+  Mechanism m = fixtures::MakeFloater();
+  m.bodies[1].p_BoBcm_B = Vec3(0.05, 0.02, -0.3);
+  Joint& joint = m.joints[0];
+  joint.kind = kind;
+  joint.axis = Vec3::UnitX();
+  if (reversed) std::swap(joint.parent, joint.child);
+  m.tree_reversed.assign(1, reversed);
+  return m;
+}
+
+// Slides at 0.2 m/s, turned by 0.4, 0.7 and 0.2 rad.
+Motion LetGo(const Mechanism& m) {
+  Motion motion{.duration_s = 1.0, .sample_s = 0.01, .commands = {}, .loads = {}};
+  const Joint& joint = m.joints[0];
+  const int n = FreedomsOf(joint.kind);
+  const double turns[] = {0.4, 0.7, 0.2};
+  for (int c = 0; c < n; ++c) {
+    const bool slides = IsLength(joint.kind, c);
+    motion.initial.push_back({joint.name,
+                              {Coordinate::Kind::kJoint, 0, c},
+                              slides ? 0.1 : turns[c - (n - 3)],
+                              slides ? 0.2 : 0.0});
+  }
+  return motion;
+}
+
+double DistanceFrom(const Trace& truth, const Trace& trace, const std::string& name) {
+  return (truth.values.col(truth.Find(name)) - trace.values.col(trace.Find(name)))
+      .cwiseAbs()
+      .maxCoeff();
+}
+
+TEST(FreeMotion, ABodySlidesAlongAWireAndAPlateAsTheReferenceDoes) {
+  for (const JointKind kind : {JointKind::kPointOnLine, JointKind::kPointOnPlane}) {
+    for (const bool reversed : {false, true}) {
+      const Mechanism m = MakeSlidingBody(kind, reversed);
+      const Motion motion = LetGo(m);
+      const std::string what = std::string(WordOf(kind)) + (reversed ? ", reversed" : "");
+      const SimulationRun run = RunFree(m, motion);
+      ASSERT_TRUE(run.summary.ok()) << what << ": " << run.summary.message;
+      const ForwardRun reference = RunForwardReference(m, motion);
+      ASSERT_TRUE(reference.summary.ok()) << what << ": " << reference.summary.message;
+      for (const char* name : {"body.x", "body.y", "body.z", "body.roll", "body.yaw"}) {
+        EXPECT_LT(DistanceFrom(reference.trace, run.trace, name), 10 * kIntegrated)
+            << what << ", " << name;
+      }
+      const VecX energy = Column(run, "energy.kinetic") + Column(run, "energy.gravity");
+      EXPECT_LT((energy.array() - energy[0]).abs().maxCoeff(), 10 * kIntegrated) << what;
+    }
+  }
+}
+
+// Nothing pushes the body along the wire: its centre of mass goes on as it was let go.
+TEST(FreeMotion, AWireDoesNotPushAlongItself) {
+  const Mechanism m = MakeSlidingBody(JointKind::kPointOnLine, false);
+  const SimulationRun run = RunFree(m, LetGo(m));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const auto centre = [&](size_t i) { return (run.X_WB[i][1] * m.bodies[1].p_BoBcm_B).x(); };
+  for (size_t i = 0; i < run.X_WB.size(); ++i) {
+    EXPECT_NEAR(centre(i) - centre(0), 0.2 * run.trace.time_s[i], kIntegrated) << i;
+  }
+}
+
 TEST(FreeMotion, AFloatingBodyHangsOnASpringAndIsPushedByALeg) {
   Mechanism m = fixtures::MakeFloater();
   m.gravity_W.setZero();
