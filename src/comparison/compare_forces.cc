@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "comparison/driven.h"
+#include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 #include "comparison/pair_reader.h"
 
@@ -46,25 +47,27 @@ DriveMetrics DriveMetricsOf(const Drive& drive, const std::string& unit, const E
           .time_s = force.worst_time_s()};
 }
 
-// RMS of the measured force, and its best fit measured = factor · truth.
+// RMS of the measured force, and its best fit measured = factor · truth, where both are numbers.
 void FitFactor(const PairReader& reader, Columns columns, double start_s, DriveMetrics* metrics) {
-  double aa = 0.0, ab = 0.0, bb = 0.0, count = 0.0;
+  const ForceSignal measured(reader.measured, columns.measured);
+  const ForceSignal truth(reader.truth, columns.truth);
+  double all = 0.0, ab = 0.0, bb = 0.0, count = 0.0;
+  std::vector<std::pair<double, double>> numbers;
   for (const auto& [i, j] : reader.samples) {
     if (reader.measured.time_s[static_cast<size_t>(i)] < start_s) continue;
-    const double a = reader.measured.values(i, columns.measured);
-    const double b = reader.truth.values(j, columns.truth);
-    aa += a * a;
-    ab += a * b;
-    bb += b * b;
+    const ForceBand a = measured.At(i), b = truth.At(j);
+    all += a.middle * a.middle;
     count += 1.0;
+    if (a.open() || b.open()) continue;
+    ab += a.middle * b.middle;
+    bb += b.middle * b.middle;
+    numbers.emplace_back(a.middle, b.middle);
   }
-  metrics->rms_measured = std::sqrt(aa / count);
+  metrics->rms_measured = std::sqrt(all / count);
   metrics->factor = ab / bb;
   double residual2 = 0.0;
-  for (const auto& [i, j] : reader.samples) {
-    if (reader.measured.time_s[static_cast<size_t>(i)] < start_s) continue;
-    const double r = reader.measured.values(i, columns.measured) -
-                     metrics->factor * reader.truth.values(j, columns.truth);
+  for (const auto& [a, b] : numbers) {
+    const double r = a - metrics->factor * b;
     residual2 += r * r;
   }
   metrics->factor_residual = std::sqrt(residual2 / bb);
@@ -83,7 +86,7 @@ std::vector<DriveError> DriveErrors(const ComparisonInput& input, const PairRead
     const std::string channel = ChannelName(Quantity::kForce, drive.name);
     const Columns columns = reader.Find(channel);
     if (!columns.both()) continue;
-    const ErrorSum sum = reader.Sum(channel, columns, input.start_window_s, false);
+    const ErrorSum sum = reader.SumForces(channel, columns, input.start_window_s);
     if (sum.count() > 0) errors.push_back({d, ForceUnit(*input.mechanism, drive), sum});
   }
   return errors;
@@ -97,6 +100,18 @@ void FindSpan(const ComparisonInput& input, const PairReader& reader, PairCompar
     if (std::isnan(pair->from_s)) pair->from_s = time_s;
     pair->to_s = time_s;
   }
+}
+
+// Samples in the judged window at which friction at rest leaves some force open in one of the two.
+size_t CountAtRest(const ComparisonInput& input, const PairReader& reader) {
+  const std::vector<bool> a = AtRest(reader.measured), b = AtRest(reader.truth);
+  size_t count = 0;
+  for (const auto& [i, j] : reader.samples) {
+    const auto row = static_cast<size_t>(i);
+    if (reader.measured.time_s[row] < input.start_window_s) continue;
+    count += a[row] || b[static_cast<size_t>(j)] ? 1 : 0;
+  }
+  return count;
 }
 
 // Says why the pair's forces were not compared; "" if they were. A table need not hold every drive.
@@ -144,6 +159,7 @@ void CompareForces(const ComparisonInput& input, const PairReader& reader, PairC
     KeepWorst(&pair->metrics, Metric::kForceMax, sum.MeasuredMax(floor));
   }
   FindSpan(input, reader, pair);
+  pair->samples_at_rest = CountAtRest(input, reader);
   pair->forces_act = scale.acts;
   pair->reason = WhyNot(input, reader, wanted, *pair);
   pair->compared = pair->reason.empty();

@@ -3,6 +3,7 @@
 #include <array>
 
 #include "comparison/comparison.h"
+#include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 #include "comparison/pair_reader.h"
 #include "core/spatial.h"
@@ -97,6 +98,18 @@ ErrorSum internal::PairReader::Sum(const std::string& name, Columns columns, dou
     if (time_s < start_s) continue;
     const double a = measured.values(i, columns.measured), b = truth.values(j, columns.truth);
     sum.Add(angle ? AngleDifference(a, b) : a - b, b, time_s, name);
+  }
+  return sum;
+}
+
+ErrorSum internal::PairReader::SumForces(const std::string& name, Columns columns,
+                                         double start_s) const {
+  ErrorSum sum;
+  const ForceSignal a(measured, columns.measured), b(truth, columns.truth);
+  for (const auto& [i, j] : samples) {
+    const double time_s = measured.time_s[static_cast<size_t>(i)];
+    if (time_s < start_s) continue;
+    sum.Add(Difference(a.At(i), b.At(j)), b.At(j).middle, time_s, name);
   }
   return sum;
 }

@@ -123,7 +123,7 @@ void CompareBase(const ComparisonInput& input, const PairReader& reader, const F
         ChannelName(Quantity::kBaseForce, input.mechanism->prescribed[p].name);
     const Columns columns = reader.Find(channel);
     if (!columns.both()) continue;
-    const ErrorSum sum = reader.Sum(channel, columns, input.start_window_s, false);
+    const ErrorSum sum = reader.SumForces(channel, columns, input.start_window_s);
     if (sum.count() == 0) continue;
     KeepWorst(&pair->metrics, Metric::kBaseForce, sum.MeasuredNrmse(scale.Floor(drives + p)));
   }

@@ -105,6 +105,7 @@ struct PairComparison {
   std::string reason = "was not compared";  ///< why not, when not compared
   size_t samples = 0;                       ///< common samples
   size_t force_samples = 0;                 ///< of these, inside the judged window
+  size_t samples_at_rest = 0;               ///< of these, with a band instead of some force
   double from_s = kNan, to_s = kNan;        ///< first and last sample that forces were judged at
   bool forces_act = true;                   ///< some load, weight or motion asks for drive forces
   std::map<Metric, Measured> metrics;       ///< those that could be measured

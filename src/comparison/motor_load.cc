@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/force_band.h"
+
 namespace mbv {
 namespace {
 
@@ -28,6 +30,14 @@ double TorqueOf(const Motor& motor, double force, double velocity, double accele
   const bool drives = force * velocity >= 0.0;
   const double gear = drives ? 1.0 / motor.efficiency : motor.efficiency;
   return force / motor.gear_ratio * gear + motor.rotor_inertia * motor.gear_ratio * acceleration;
+}
+
+// The torque at the end of the band that asks for more.
+double WorstTorque(const Motor& motor, const ForceBand& force, double velocity,
+                   double acceleration) {
+  const double low = TorqueOf(motor, force.lower(), velocity, acceleration);
+  const double high = TorqueOf(motor, force.upper(), velocity, acceleration);
+  return std::abs(low) > std::abs(high) ? low : high;
 }
 
 class Meter {
@@ -160,9 +170,11 @@ MotorLoad MotorLoadOf(const Mechanism& mechanism, const Motor& motor, const Trac
   load.time_s = trace.time_s;
   load.speed = motor.gear_ratio * trace.values.col(v);
   load.torque.resize(load.speed.size());
+  const ForceSignal signal(trace, force);
   for (Eigen::Index i = 0; i < load.torque.size(); ++i) {
-    load.torque[i] =
-        TorqueOf(motor, trace.values(i, force), trace.values(i, v), trace.values(i, a));
+    const ForceBand at = signal.At(i);
+    load.torque[i] = WorstTorque(motor, at, trace.values(i, v), trace.values(i, a));
+    load.samples_at_rest += at.open() ? 1 : 0;
   }
   if (motor.rotor_inertia > 0.0) {
     load.inertia_ratio = load_inertia / (motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia);

@@ -10,7 +10,8 @@
 namespace mbv {
 
 /// Over the samples of one witness. RMS and means are over time (trapezoidal rule); the run counts
-/// as one cycle. Torque and speed are the motor's, see Motor.
+/// as one cycle. Torque and speed are the motor's, see Motor. Where friction at rest leaves the
+/// force open, the end of its band counts that asks more of the motor.
 struct MotorLoad {
   /// A limit and the share of it that is used; 1/use is the margin.
   struct Use {
@@ -35,6 +36,7 @@ struct MotorLoad {
   double rms_current = kNan, peak_current = kNan;  ///< where k_t is given [A]
   double peak_voltage = kNan;                      ///< where k_t and resistance are [V]
   double inertia_ratio = kNan;  ///< of the load, reflected to the rotor, to the rotor's own
+  size_t samples_at_rest = 0;   ///< at which the force is open
   std::vector<Use> uses = {};   ///< of every limit that the motor states
 
   [[nodiscard]] bool known() const { return torque.size() > 0; }

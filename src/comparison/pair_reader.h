@@ -25,6 +25,8 @@ struct PairReader {
   /// Error statistics of one channel over the samples from `start_s` on.
   [[nodiscard]] ErrorSum Sum(const std::string& name, Columns columns, double start_s,
                              bool angle) const;
+  /// The same of a force, whose bands count as Difference() says.
+  [[nodiscard]] ErrorSum SumForces(const std::string& name, Columns columns, double start_s) const;
 };
 
 inline void KeepWorst(std::map<Metric, Measured>* metrics, Metric metric,

@@ -7,6 +7,7 @@
 #include <limits>
 #include <optional>
 
+#include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 #include "mechanism/channels.h"
 
@@ -26,18 +27,19 @@ constexpr Metric kMaxMetrics[] = {Metric::kForceMax, Metric::kPositionM, Metric:
 struct Shared {
   Trace table, other;           // same rows and channels
   MatX standard, bound;         // as both
+  MatX half;                    // half-widths of the other's forces
   std::vector<size_t> columns;  // of the table's trace
 };
 
 Shared Share(const AlignedTable& table, const Trace& other) {
   Shared shared;
-  std::vector<int> from_other;
+  std::vector<ForceSignal> from_other;
   std::vector<Channel> channels;
   for (size_t c = 0; c < table.trace.channels.size(); ++c) {
     const int column = other.Find(table.trace.channels[c].name);
     if (column < 0) continue;
     shared.columns.push_back(c);
-    from_other.push_back(column);
+    from_other.emplace_back(other, column);
     channels.push_back(table.trace.channels[c]);
   }
   const CommonSamples samples = AlignSamples(table.trace, other);
@@ -46,7 +48,8 @@ Shared Share(const AlignedTable& table, const Trace& other) {
   shared.table.witness = "table";
   shared.table.Reset(times, channels);
   shared.other = shared.table;
-  shared.standard = shared.bound = shared.table.values;
+  shared.standard = shared.bound = shared.half = shared.table.values;
+  shared.half.setZero();
   for (size_t k = 0; k < samples.size(); ++k) {
     const auto row = static_cast<Eigen::Index>(k);
     const auto [i, j] = samples[k];
@@ -54,7 +57,9 @@ Shared Share(const AlignedTable& table, const Trace& other) {
       const auto to = static_cast<Eigen::Index>(c);
       const auto from = static_cast<Eigen::Index>(shared.columns[c]);
       shared.table.values(row, to) = table.trace.values(i, from);
-      shared.other.values(row, to) = other.values(j, from_other[c]);
+      const ForceBand force = from_other[c].At(j);
+      shared.other.values(row, to) = force.middle;
+      shared.half(row, to) = force.half;
       shared.standard(row, to) = table.standard(i, from);
       shared.bound(row, to) = table.bound(i, from);
     }
@@ -166,7 +171,10 @@ TableColumnResult Measure(const ComparisonInput& input, const Shared& shared, Ei
     if (windowed && time_s < input.start_window_s) continue;
     const auto row = static_cast<Eigen::Index>(i);
     const double a = shared.table.values(row, c), b = shared.other.values(row, c);
-    const double error = channel.unit == "rad" ? AngleDifference(a, b) : a - b;
+    const double error =
+        channel.unit == "rad"
+            ? AngleDifference(a, b)
+            : Difference({.middle = a}, {.middle = b, .half = shared.half(row, c)});
     difference.Add(error, a, time_s, channel.name);
     standard.Add(shared.standard(row, c), 0.0, time_s, channel.name);
     bound = std::max(bound, shared.bound(row, c));

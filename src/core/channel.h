@@ -17,9 +17,11 @@ enum class Quantity {
   kVelocity,
   kAcceleration,
   kForce,
-  kWork,  ///< since the start
+  kForceBand,  ///< half-width of the band that resting friction leaves the force
+  kWork,       ///< since the start
   // Of a prescribed joint.
   kBaseForce,
+  kBaseForceBand,
   kBaseWork,
   // Of an output, in its reference frame, one of kPoseComponents.
   kPose,

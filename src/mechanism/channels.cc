@@ -5,6 +5,10 @@ namespace {
 
 std::string PerTime(const std::string& unit, const char* power) { return unit + "/s" + power; }
 
+std::string ForceUnit(const Mechanism& mechanism, const Prescribed& prescribed) {
+  return IsLength(mechanism.joints[static_cast<size_t>(prescribed.joint)].kind, 0) ? "N" : "N m";
+}
+
 const char* PoseUnit(int component) { return component < 3 ? "m" : "rad"; }
 
 }  // namespace
@@ -55,9 +59,21 @@ std::vector<Channel> OutputRateChannels(const Mechanism& mechanism, const Output
 std::vector<Channel> PrescribedChannels(const Mechanism& mechanism) {
   std::vector<Channel> channels;
   for (const Prescribed& prescribed : mechanism.prescribed) {
-    const Joint& joint = mechanism.joints[prescribed.joint];
-    const char* unit = IsLength(joint.kind, 0) ? "N" : "N m";
-    channels.push_back(MakeChannel(Quantity::kBaseForce, unit, prescribed.name));
+    channels.push_back(
+        MakeChannel(Quantity::kBaseForce, ForceUnit(mechanism, prescribed), prescribed.name));
+  }
+  return channels;
+}
+
+std::vector<Channel> BandChannels(const Mechanism& mechanism) {
+  std::vector<Channel> channels;
+  if (FirstFriction(mechanism).empty()) return channels;
+  for (const Drive& drive : mechanism.drives) {
+    channels.push_back(MakeChannel(Quantity::kForceBand, ForceUnit(mechanism, drive), drive.name));
+  }
+  for (const Prescribed& prescribed : mechanism.prescribed) {
+    channels.push_back(
+        MakeChannel(Quantity::kBaseForceBand, ForceUnit(mechanism, prescribed), prescribed.name));
   }
   return channels;
 }

@@ -208,7 +208,7 @@ struct RotorLaw {
 
 /// Dry friction, whatever the load: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇,
 /// [Armstrong-Hélouvry 1991]; viscous friction beside it is damping. At rest the force lies
-/// anywhere in ±Fs.
+/// anywhere in ±Fs, and with it drive forces within a band.
 struct FrictionLaw {
   double coulomb = 0.0;        ///< Fc [N or N m], >= 0
   double breakaway = 0.0;      ///< Fs, >= Fc

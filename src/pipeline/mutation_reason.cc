@@ -7,6 +7,7 @@
 #include <map>
 #include <vector>
 
+#include "comparison/force_band.h"
 #include "mechanism/body_states.h"
 #include "mechanism/channels.h"
 #include "reference/reference.h"
@@ -196,8 +197,10 @@ double ForceSensitivity(const MutationBench& bench, const Trace& bent) {
     const std::string unit = ForceUnit(m, drive);
     sums[unit].first += base.values.col(a).squaredNorm();
     sums[unit].second += static_cast<double>(base.values.rows());
-    const double change = (base.values.col(a) - bent.values.col(b)).cwiseAbs().maxCoeff();
-    changes[unit] = std::max(changes[unit], change);
+    const ForceSignal before(base, a), after(bent, b);
+    for (Eigen::Index i = 0; i < base.values.rows(); ++i) {
+      changes[unit] = std::max(changes[unit], std::abs(Difference(before.At(i), after.At(i))));
+    }
   }
   double worst = 0.0;
   for (const auto& [unit, change] : changes) {

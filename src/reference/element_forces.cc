@@ -1,7 +1,5 @@
 #include "reference/element_forces.h"
 
-#include <fmt/format.h>
-
 #include <cmath>
 
 namespace mbv::internal {
@@ -9,10 +7,19 @@ namespace {
 
 struct AlongElement {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
+  int rubs = 0;  // sign of the rate, 0 at rest
 };
 
-AlongElement MotionOf(const ScalarRow& row, const BodyStates& states) {
-  return {row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias};
+AlongElement MotionOf(const ScalarRow& row, const BodyStates& states, int rubs) {
+  return {row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias, rubs};
+}
+
+// Of the coordinate, over the motions of all bodies but the world.
+VecX GradientOf(const ScalarRow& row, size_t bodies) {
+  VecX u = VecX::Zero(6 * (static_cast<Eigen::Index>(bodies) - 1));
+  if (row.parent > 0) u.segment<6>(6 * (row.parent - 1)) += row.J_parent;
+  if (row.child > 0) u.segment<6>(6 * (row.child - 1)) += row.J_child;
+  return u;
 }
 
 // Force, energy and what is lost, of each law.
@@ -27,12 +34,10 @@ double ForceOf(const RotorLaw& law, const AlongElement& at) {
   return -law.reflected() * at.acceleration;
 }
 
-// At rest without force: such samples are refused (CheckRubbing()).
 double ForceOf(const FrictionLaw& law, const AlongElement& at) {
-  if (at.rate == 0.0) return 0.0;
   const double slowness = at.rate / law.stribeck_rate;
   const double size = law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness);
-  return at.rate > 0.0 ? -size : size;
+  return -at.rubs * size;
 }
 
 void AddEnergy(const DampingLaw& /*law*/, const AlongElement& /*at*/, Energies* /*energy*/) {}
@@ -78,20 +83,21 @@ ElementSlope Slope(const FrictionLaw& /*law*/, double /*q*/) { return {}; }
 
 // visit(law, motion) of every element.
 template <typename Visit>
-void ForElements(const Mechanism& mechanism, const BodyStates& states, const Visit& visit) {
+void ForElements(const Mechanism& mechanism, const BodyStates& states,
+                 const std::vector<int>& rubbing, const Visit& visit) {
   if (mechanism.elements.empty()) return;
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
   for (size_t e = 0; e < rows.size(); ++e) {
-    std::visit([&](const auto& law) { visit(law, rows[e], MotionOf(rows[e], states)); },
-               mechanism.elements[e].law);
+    const AlongElement at = MotionOf(rows[e], states, rubbing.empty() ? 0 : rubbing[e]);
+    std::visit([&](const auto& law) { visit(law, rows[e], at); }, mechanism.elements[e].law);
   }
 }
 
 }  // namespace
 
 void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
-                       std::vector<Vec6>* wrench_W) {
-  ForElements(mechanism, states,
+                       const std::vector<int>& rubbing, std::vector<Vec6>* wrench_W) {
+  ForElements(mechanism, states, rubbing,
               [&](const auto& law, const ScalarRow& row, const AlongElement& at) {
                 const double force = ForceOf(law, at);
                 (*wrench_W)[static_cast<size_t>(row.parent)] -= force * row.J_parent;
@@ -100,40 +106,46 @@ void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
 }
 
 void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, Energies* energy) {
-  ForElements(mechanism, states,
+  ForElements(mechanism, states, {},
               [&](const auto& law, const ScalarRow& /*row*/, const AlongElement& at) {
                 AddEnergy(law, at, energy);
               });
 }
 
-void AddElementPowers(const Mechanism& mechanism, const BodyStates& states, Powers* power) {
-  ForElements(mechanism, states,
+void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
+                      const std::vector<int>& rubbing, Powers* power) {
+  ForElements(mechanism, states, rubbing,
               [&](const auto& law, const ScalarRow& /*row*/, const AlongElement& at) {
                 AddPower(law, at, power);
               });
 }
 
-RunSummary CheckRubbing(const Mechanism& mechanism, const BodyStates& states, double duration_s) {
-  if (FirstFriction(mechanism).empty()) return RunSummary::Done();
+std::vector<int> RubbingOf(const Mechanism& mechanism, const BodyStates& states,
+                           double duration_s) {
+  if (FirstFriction(mechanism).empty()) return {};
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
+  std::vector<int> rubbing(rows.size(), 0);
   for (size_t e = 0; e < rows.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
-    const auto* friction = std::get_if<FrictionLaw>(&element.law);
-    const double rate = RateOf(rows[e], states.V_WB);
     if (!Rubs(element)) continue;
-    if (!(std::abs(rate) <= RestRate(mechanism, element, duration_s))) continue;
-    const bool length = ActsOnLength(mechanism, element);
-    return {
-        .stop = Stop::kUnsupported,
-        .message = fmt::format(
-            "the {} ('{}') is at rest: its force is anywhere within ±{:g} {}, so that the "
-            "drive forces are not determined",
-            Described(mechanism, element), element.name, friction->breakaway, length ? "N" : "N m"),
-        .where = element.name,
-        .amount = rate,
-        .unit = length ? "m/s" : "rad/s"};
+    const double rate = RateOf(rows[e], states.V_WB);
+    if (std::abs(rate) <= RestRate(mechanism, element, duration_s)) continue;
+    rubbing[e] = rate > 0.0 ? 1 : -1;
   }
-  return RunSummary::Done();
+  return rubbing;
+}
+
+std::vector<VecX> RestingWrenches(const Mechanism& mechanism, const BodyStates& states,
+                                  const std::vector<int>& rubbing) {
+  std::vector<VecX> wrenches;
+  if (rubbing.empty()) return wrenches;
+  const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
+  for (size_t e = 0; e < rows.size(); ++e) {
+    if (rubbing[e] != 0 || !Rubs(mechanism.elements[e])) continue;
+    const double most = std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
+    wrenches.push_back(most * GradientOf(rows[e], mechanism.bodies.size()));
+  }
+  return wrenches;
 }
 
 void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R,
@@ -143,9 +155,7 @@ void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const
   for (size_t e = 0; e < rows.size(); ++e) {
     const auto* rotor = std::get_if<RotorLaw>(&mechanism.elements[e].law);
     if (rotor == nullptr) continue;
-    VecX u = VecX::Zero(R.rows());
-    if (rows[e].parent > 0) u.segment<6>(6 * (rows[e].parent - 1)) += rows[e].J_parent;
-    if (rows[e].child > 0) u.segment<6>(6 * (rows[e].child - 1)) += rows[e].J_child;
+    const VecX u = GradientOf(rows[e], mechanism.bodies.size());
     *MR += rotor->reflected() * u * (u.transpose() * R);
   }
 }

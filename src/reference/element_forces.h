@@ -4,29 +4,38 @@
 //   spring   F = −(F0 + Σ_i k_i x^i),  x = q − free           E = F0 x + Σ_i k_i x^(i+1)/(i+1)  (2)
 //   rotor    F = −J n² q̈                                      E = ½ J n² q̇²                     (3)
 //   friction F = −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇       P = F q̇ to the dampers           (4)
+//
+// At rest friction is taken as 0, the middle of what statics allows: |F| ≤ Fs.
 #pragma once
 
 #include <vector>
 
-#include "core/run_summary.h"
+#include "core/types.h"
 #include "kinematics/element_rows.h"
 #include "reference/reference.h"
 
 namespace mbv::internal {
 
+/// Per force element: the sign of its rate where it rubs; 0 at rest (RestRate()) and for all that
+/// does not rub. Empty of a mechanism in which nothing does.
+[[nodiscard]] std::vector<int> RubbingOf(const Mechanism& mechanism, const BodyStates& states,
+                                         double duration_s);
+
 /// Takes the elements' forces away from the wrenches that bodies need (RequiredWrenches()); that
-/// of rotors at states.A_WB.
+/// of rotors at states.A_WB, that of friction in the directions of RubbingOf().
 void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
-                       std::vector<Vec6>* wrench_W);
+                       const std::vector<int>& rubbing, std::vector<Vec6>* wrench_W);
+
+/// Per element that rests: breakaway force times its coordinate's gradient (6·bodies, without the
+/// world's): the wrenches that statics may add or take.
+[[nodiscard]] std::vector<VecX> RestingWrenches(const Mechanism& mechanism,
+                                                const BodyStates& states,
+                                                const std::vector<int>& rubbing);
 
 void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, Energies* energy);
 /// Of the rotors: the rate of their kinetic energy.
-void AddElementPowers(const Mechanism& mechanism, const BodyStates& states, Powers* power);
-
-/// kUnsupported where an element with friction is at rest (RestRate()): statics leaves its force
-/// open within a band, and with it those of the drives.
-[[nodiscard]] RunSummary CheckRubbing(const Mechanism& mechanism, const BodyStates& states,
-                                      double duration_s);
+void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
+                      const std::vector<int>& rubbing, Powers* power);
 
 /// Adds what motions R (6·bodies × n) call for of rotors: Σ J n² u (uᵀR), u: gradient of the
 /// coordinate.

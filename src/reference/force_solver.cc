@@ -8,6 +8,7 @@
 #include "core/spatial.h"
 #include "mechanism/reach.h"
 #include "reference/closure_failure.h"
+#include "reference/element_forces.h"
 #include "reference/least_forces.h"
 
 namespace mbv::internal {
@@ -15,6 +16,8 @@ namespace {
 
 // Forces must satisfy the equations of motion to this share of the largest wrench.
 constexpr double kBalanceTolerance = 1e-9;
+// A smaller share of the largest that one resting element opens is round-off.
+constexpr double kOpens = 1e-9;
 
 int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
   return joint.transmits_force_only ? rows.translation_rows : rows.rows;
@@ -30,10 +33,11 @@ void AddReactionRows(const Mechanism& mechanism, const BodyStates& states, RowSe
   for (const CouplingRow& row : CouplingRows(mechanism, states)) out->Add(row);
 }
 
-ForceSolver::ForceSolver(const Mechanism& mechanism)
+ForceSolver::ForceSolver(const Mechanism& mechanism, double duration_s)
     : mechanism_(mechanism),
       length_(CharacteristicLength(mechanism)),
       lever_(LongestLever(mechanism)),
+      duration_s_(duration_s),
       system_(mechanism.bodies.size(), length_) {}
 
 void ForceSolver::FillRows(const BodyStates& states) {
@@ -140,7 +144,8 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
 RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample) {
   FillRows(sample->states);
   std::vector<Vec6> required;
-  RequiredWrenches(mechanism_, sample->states, loads, &required);
+  sample->rubbing = RubbingOf(mechanism_, sample->states, duration_s_);
+  RequiredWrenches(mechanism_, sample->states, loads, sample->rubbing, &required);
   const VecX wrenches = Stack(required);
   const double largest =
       system_.size() == 0 ? 0.0 : system_.body_scale().cwiseProduct(wrenches).cwiseAbs().maxCoeff();
@@ -156,6 +161,7 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
     const VecX force = LeastNorm(wrenches);
     if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
     Report(force, sample);
+    FindBands(sample);
     AuditSample(mechanism_, loads, sample);
     return RunSummary::Done();
   }
@@ -193,6 +199,29 @@ void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
   sample->drive_force = force.segment(row, mechanism_.drives.size());
   row += static_cast<int>(mechanism_.drives.size());
   sample->prescribed_force = force.segment(row, mechanism_.prescribed.size());
+}
+
+// Of the driven forces that one element opens, moments divided by the characteristic length.
+void ForceSolver::TakeRoundoff(VecX* driven) const {
+  VecX size = *driven;
+  for (Eigen::Index k = 0; k < size.size(); ++k) {
+    if (rows_.angular[static_cast<size_t>(first_driven_ + k)]) size[k] /= length_;
+  }
+  const double least = size.size() == 0 ? 0.0 : kOpens * size.maxCoeff();
+  *driven = (size.array() > least).select(*driven, 0.0);
+}
+
+void ForceSolver::FindBands(ReferenceSample* sample) {
+  const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
+  const auto bases = static_cast<Eigen::Index>(mechanism_.prescribed.size());
+  VecX band = VecX::Zero(drives + bases);
+  for (const VecX& wrenches : RestingWrenches(mechanism_, sample->states, sample->rubbing)) {
+    VecX part = LeastNorm(wrenches).segment(first_driven_, drives + bases).cwiseAbs();
+    TakeRoundoff(&part);
+    band += part;
+  }
+  sample->drive_band = band.head(drives);
+  sample->prescribed_band = band.tail(bases);
 }
 
 }  // namespace mbv::internal

@@ -16,10 +16,12 @@ namespace mbv::internal {
 
 class ForceSolver {
  public:
-  explicit ForceSolver(const Mechanism& mechanism);
+  /// `duration_s`: of the motion; it says what is at rest.
+  ForceSolver(const Mechanism& mechanism, double duration_s);
 
-  /// Fills forces, reactions and the power audit of `sample` from its states and driven motion.
-  /// Where the equations leave a choice, TakeLeastForces() decides.
+  /// Fills forces, bands, reactions and the power audit of `sample` from its states and driven
+  /// motion. Where the equations leave a choice, TakeLeastForces() decides. Friction at rest is
+  /// zero in forces and reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests.
   [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample);
 
  private:
@@ -30,9 +32,11 @@ class ForceSolver {
   [[nodiscard]] VecX LeastNorm(const VecX& wrenches);
   [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
   void Report(const VecX& force, ReferenceSample* sample) const;
+  void FindBands(ReferenceSample* sample);
+  void TakeRoundoff(VecX* driven) const;
 
   const Mechanism& mechanism_;
-  const double length_, lever_;
+  const double length_, lever_, duration_s_;
   SquareSystem system_;
   RowSet rows_;           ///< AddReactionRows(), drives, prescribed joints
   int first_driven_ = 0;  ///< row of the first drive
@@ -56,8 +60,10 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ve
 
 /// Wrench [m about Bo; f] that each body needs beyond gravity, springs, force elements and loads,
 /// in world axes: m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
+/// `rubbing`: RubbingOf().
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W);
+                      const std::vector<LoadSample>& loads, const std::vector<int>& rubbing,
+                      std::vector<Vec6>* wrench_W);
 
 /// M R per body, of motions R (6·bodies × n), rotors included.
 [[nodiscard]] MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R);
@@ -65,7 +71,8 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
 [[nodiscard]] Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states);
 /// Powers but for the base and the input.
 [[nodiscard]] Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
-                              const std::vector<LoadSample>& loads);
+                              const std::vector<LoadSample>& loads,
+                              const std::vector<int>& rubbing);
 /// Energies and all powers of a sample whose forces and driven motion are known.
 void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& loads,
                  ReferenceSample* sample);

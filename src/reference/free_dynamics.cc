@@ -194,7 +194,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   Unstack(A_p, &states->A_WB);
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
-  RequiredWrenches(mechanism_, *states, command_.loads, &required);
+  RequiredWrenches(mechanism_, *states, command_.loads, {}, &required);
   AddDriveForces(t_s, *states, &drives);
   const MatX R = Motions();
   const MatX inertia = R.transpose() * Momenta(mechanism_, *states, R);
@@ -315,7 +315,7 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   }
 
   std::vector<Vec6> required, given(mechanism_.bodies.size(), Vec6::Zero());
-  RequiredWrenches(mechanism_, states, command_.loads, &required);
+  RequiredWrenches(mechanism_, states, command_.loads, {}, &required);
   AddDriveForces(t_s, states, &given);
   const VecX wrenches = body_scale_.cwiseProduct(Stack(required) - Stack(given));
   MatX columns = MatX::Zero(size_, rows.size());
@@ -362,7 +362,7 @@ VecX FreeDynamics::WorkRates(double t_s, const BodyStates& states) {
     put(sample.prescribed_force[static_cast<Eigen::Index>(p)],
         JointCoordinateRow(mechanism_.joints[mechanism_.prescribed[p].joint], 0, states));
   }
-  const Powers power = PowersOf(mechanism_, states, command_.loads);
+  const Powers power = PowersOf(mechanism_, states, command_.loads, {});
   rates[next++] = power.loads;
   rates[next++] = power.dampers;
   return rates;

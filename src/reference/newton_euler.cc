@@ -48,7 +48,8 @@ ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
 }
 
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<LoadSample>& loads, std::vector<Vec6>* wrench_W) {
+                      const std::vector<LoadSample>& loads, const std::vector<int>& rubbing,
+                      std::vector<Vec6>* wrench_W) {
   wrench_W->assign(mechanism.bodies.size(), Vec6::Zero());
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
@@ -69,7 +70,7 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
     (*wrench_W)[row.parent] -= thrust * row.J_parent;
     (*wrench_W)[row.child] -= thrust * row.J_child;
   }
-  TakeElementForces(mechanism, states, wrench_W);
+  TakeElementForces(mechanism, states, rubbing, wrench_W);
 }
 
 MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R) {
@@ -104,7 +105,7 @@ Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
 }
 
 Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
-                const std::vector<LoadSample>& loads) {
+                const std::vector<LoadSample>& loads, const std::vector<int>& rubbing) {
   Powers power;
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
@@ -125,7 +126,7 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
     power.dampers -= spring.damping * rate * rate;
     power.springs -= spring.stiffness * (row.value - spring.free_length_m) * rate;
   }
-  AddElementPowers(mechanism, states, &power);
+  AddElementPowers(mechanism, states, rubbing, &power);
   power.energy_rate -= power.springs;
   return power;
 }
@@ -133,7 +134,7 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
 void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& loads,
                  ReferenceSample* sample) {
   sample->energy = EnergyOf(mechanism, sample->states);
-  sample->power = PowersOf(mechanism, sample->states, loads);
+  sample->power = PowersOf(mechanism, sample->states, loads, sample->rubbing);
   const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
   const VecX& velocity = sample->driven.velocity;
   Powers& power = sample->power;

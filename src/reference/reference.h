@@ -44,6 +44,9 @@ struct ReferenceSample {
   VecX prescribed_force;  ///< per prescribed joint
   MatX reactions;         ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
   MatX outputs;           ///< outputs × 6
+  /// Per force element, of those that rub: sign of the rate, 0 at rest (RestRate()).
+  std::vector<int> rubbing;
+  VecX drive_band, prescribed_band;  ///< half-widths of what friction at rest leaves open
   double closure_position_m = kNan, closure_rotation_rad = kNan;
   Powers power;
   Energies energy;

@@ -7,7 +7,7 @@ namespace mbv {
 
 struct ReferenceSolver::Impl {
   Impl(const Mechanism& m, const Motion& motion, const ReferenceOptions& options)
-      : closure(m, motion, options), forces(m), recorder(m) {}
+      : closure(m, motion, options), forces(m, motion.duration_s), recorder(m) {}
 
   internal::ClosureSolver closure;
   internal::ForceSolver forces;

@@ -1,7 +1,6 @@
 #include <chrono>
 
 #include "core/roles.h"
-#include "reference/element_forces.h"
 #include "reference/reference.h"
 #include "reference/sample_recorder.h"
 
@@ -25,10 +24,6 @@ ReferenceRun RunReference(const Mechanism& mechanism, const Motion& motion,
     EvaluateMotion(motion, run.trace.time_s[i], &command);
     if (commands) commands(i, &command);
     run.summary = solver.Dynamics(command, &sample);
-    if (run.summary.ok()) {
-      run.summary = internal::CheckRubbing(mechanism, sample.states, motion.duration_s);
-      if (!run.summary.ok()) run.summary.time_s = run.trace.time_s[i];
-    }
     if (!run.summary.ok()) break;
     internal::WriteSample(sample, columns, row);
     run.trace.values.row(static_cast<Eigen::Index>(i)) = row;

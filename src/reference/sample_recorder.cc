@@ -46,6 +46,7 @@ std::vector<Channel> ReferenceChannels(const Mechanism& mechanism, bool reaction
   };
   append(OutputChannels(mechanism));
   append(PrescribedChannels(mechanism));
+  append(BandChannels(mechanism));
   if (reactions) {
     for (const Joint& joint : mechanism.joints) append(ReactionChannels(joint));
   }
@@ -71,6 +72,16 @@ void WriteWork(const ReferenceSample& sample, const ChannelColumns& columns,
   row[columns(Quantity::kDamperWork)] = sample.work[drives + bases + 1];
 }
 
+void WriteBands(const ReferenceSample& sample, const ChannelColumns& columns,
+                Eigen::Ref<Eigen::RowVectorXd> row) {
+  for (Eigen::Index d = 0; d < sample.drive_band.size(); ++d) {
+    row[columns(Quantity::kForceBand, static_cast<size_t>(d))] = sample.drive_band[d];
+  }
+  for (Eigen::Index p = 0; p < sample.prescribed_band.size(); ++p) {
+    row[columns(Quantity::kBaseForceBand, static_cast<size_t>(p))] = sample.prescribed_band[p];
+  }
+}
+
 }  // namespace
 
 void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
@@ -93,6 +104,9 @@ void WriteSample(const ReferenceSample& sample, const ChannelColumns& columns,
   put_rows(Quantity::kPose, sample.outputs);
   for (Eigen::Index p = 0; p < sample.prescribed_force.size(); ++p) {
     put(Quantity::kBaseForce, p, sample.prescribed_force[p]);
+  }
+  if (columns.Has(Quantity::kForceBand) || columns.Has(Quantity::kBaseForceBand)) {
+    WriteBands(sample, columns, row);
   }
   if (columns.Has(Quantity::kReaction)) put_rows(Quantity::kReaction, sample.reactions);
   put(Quantity::kLoopGap, 0, sample.closure_position_m);

@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 
+#include "comparison/force_band.h"
 #include "comparison/metrics.h"
 
 namespace mbv {
@@ -15,9 +16,20 @@ namespace {
 constexpr std::array<Quantity, 4> kDriveSignals = {Quantity::kPosition, Quantity::kVelocity,
                                                    Quantity::kAcceleration, Quantity::kForce};
 
+// What of a force that friction at rest may leave open.
+enum class End { kNumber, kLower, kUpper };
+
 struct CsvColumn {
   const Trace* trace;
-  int column;
+  ForceSignal signal;  // any channel: only forces have bands
+  End end = End::kNumber;
+
+  // The number where there is one, or an end of the band.
+  [[nodiscard]] double At(Eigen::Index row) const {
+    const ForceBand force = signal.At(row);
+    if (end == End::kNumber) return force.open() ? kNan : force.middle;
+    return end == End::kLower ? force.lower() : force.upper();
+  }
 };
 
 // For each sample of the grid the row of a trace; -1 where it has none.
@@ -54,7 +66,20 @@ class Columns {
     used_[w][static_cast<size_t>(column)] = true;
     const Channel& channel = traces_[w]->channels[static_cast<size_t>(column)];
     header_ += "," + channel.name + "." + traces_[w]->witness;
-    columns_.push_back({traces_[w], column});
+    columns_.push_back({traces_[w], ForceSignal(*traces_[w], column)});
+    AddBand(w, channel);
+  }
+
+  // Lower and upper ends beside the force, in place of the half-width.
+  void AddBand(size_t w, const Channel& force) {
+    const Quantity quantity = BandOf(force.quantity);
+    const int band = quantity == Quantity::kOwn ? -1 : traces_[w]->Find(quantity, force.subject);
+    if (band < 0) return;
+    used_[w][static_cast<size_t>(band)] = true;
+    for (const auto& [word, end] : {std::pair{"lower", End::kLower}, {"upper", End::kUpper}}) {
+      header_ += fmt::format(",{}.{}.{}", force.name, word, traces_[w]->witness);
+      columns_.push_back({traces_[w], columns_.back().signal, end});
+    }
   }
 
   void AddDrives(const Report& report) {
@@ -105,7 +130,7 @@ void WriteCsv(const Report& report, const std::function<void(std::string_view)>&
     fmt::format_to(out, "{:.17g}", grid->time_s[i]);
     for (const CsvColumn& c : columns.columns()) {
       const Eigen::Index row = rows[c.trace][i];
-      fmt::format_to(out, ",{:.17g}", row >= 0 ? c.trace->values(row, c.column) : kNan);
+      fmt::format_to(out, ",{:.17g}", row >= 0 ? c.At(row) : kNan);
     }
     text += '\n';
     if (text.size() < kPiece) continue;

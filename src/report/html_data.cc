@@ -134,6 +134,11 @@ class DataWriter {
           json[key].push_back(signals_.Plain(record.trace, ChannelName(quantity, drive.name)));
         }
       }
+      json["band"] = Json::array();
+      for (const Drive& drive : mechanism_.drives) {
+        json["band"].push_back(
+            signals_.Plain(record.trace, ChannelName(Quantity::kForceBand, drive.name)));
+      }
       json["outputs"] = Outputs(record.trace);
       AddAudit(record, &json);
       witnesses.push_back(std::move(json));

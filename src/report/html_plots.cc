@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "comparison/force_band.h"
 #include "comparison/metrics.h"
 #include "report/html_text.h"
 #include "report/svg_plot.h"
@@ -26,10 +27,23 @@ PlotPoints ErrorOf(const Trace& measured, int column, const Trace& truth, int tr
   return points;
 }
 
-PlotPoints ValuesOf(const Trace& trace, int column) {
+PlotPoints ValuesOf(const Trace& trace, const ForceSignal& force) {
   PlotPoints points;
   for (size_t i = 0; i < trace.time_s.size(); ++i) {
-    points.emplace_back(trace.time_s[i], trace.values(static_cast<Eigen::Index>(i), column));
+    points.emplace_back(trace.time_s[i], force.At(static_cast<Eigen::Index>(i)).middle);
+  }
+  return points;
+}
+
+// A stroke from end to end at every sample whose force friction at rest leaves open.
+PlotPoints StrokesOf(const Trace& trace, const ForceSignal& force) {
+  PlotPoints points;
+  for (size_t i = 0; i < trace.time_s.size(); ++i) {
+    const ForceBand at = force.At(static_cast<Eigen::Index>(i));
+    if (!at.open()) continue;
+    for (const double end : {at.lower(), at.upper(), kNan}) {
+      points.emplace_back(trace.time_s[i], end);
+    }
   }
   return points;
 }
@@ -70,7 +84,12 @@ std::string StaticPlotsHtml(const Report& report) {
       plot->y_label = fmt::format("[{}]", unit);
       plot->lines.push_back({.label = drive, .points = Thinned(points)});
     };
-    add(&forces[unit], ValuesOf(*measured, column));
+    const ForceSignal force(*measured, column);
+    add(&forces[unit], ValuesOf(*measured, force));
+    const PlotPoints strokes = StrokesOf(*measured, force);
+    if (!strokes.empty()) {
+      forces[unit].lines.push_back({.label = drive + ", at rest", .points = strokes});
+    }
     add(&errors[unit], ErrorOf(*measured, column, *truth, other));
   }
   std::string html;

@@ -37,6 +37,9 @@ std::string DrivesHtml(const Report& report) {
     const bool first = &pair == main;
     html += first ? ToHtml(table) : Folded(table.caption, ToHtml(table));
   }
+  if (const std::string rest = AtRestText(report.comparison); !rest.empty()) {
+    html += Note(Escape(Sentence(rest)) + " Joint reactions are those without the resting force.");
+  }
   return html;
 }
 

@@ -101,6 +101,7 @@ Json MetricsJson(const Comparison& comparison) {
     json["floored"] = nrmse != pair.metrics.end() && nrmse->second.floored;
     json["samples"] = pair.samples;
     json["force_samples"] = pair.force_samples;
+    json["samples_at_rest"] = pair.samples_at_rest;
     const auto force = pair.metrics.find(Metric::kForceMax);
     if (force != pair.metrics.end()) {
       json["worst"] = {{"channel", force->second.channel},

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <set>
 
+#include "comparison/force_band.h"
 #include "core/text.h"
 
 namespace mbv {
@@ -21,13 +22,19 @@ Signal SignalOf(const Trace& trace, Quantity quantity, const std::string& subjec
   return {trace.values.col(column), trace.channels[static_cast<size_t>(column)].unit};
 }
 
+// A drive's force, at rest the end of its band that is farther from zero; empty without any.
+VecX WorstForce(const Trace& trace, const std::string& drive) {
+  const int column = trace.Find(Quantity::kForce, drive);
+  return column < 0 ? VecX() : ForceSignal(trace, column).Worst();
+}
+
 DriveLoad DriveLoadOf(const WitnessRecord& record, const std::string& drive) {
   const Trace& trace = record.trace;
   DriveLoad load{.drive = drive, .witness = record.name};
   const Signal force = SignalOf(trace, Quantity::kForce, drive);
   const Signal velocity = SignalOf(trace, Quantity::kVelocity, drive);
   const Signal position = SignalOf(trace, Quantity::kPosition, drive);
-  load.force = FiguresOf(trace.time_s, force.values, force.unit);
+  load.force = FiguresOf(trace.time_s, WorstForce(trace, drive), force.unit);
   load.speed = FiguresOf(trace.time_s, velocity.values, velocity.unit);
   if (force.values.size() > 0 && velocity.values.size() > 0) {
     load.power = FiguresOf(trace.time_s, force.values.cwiseProduct(velocity.values), "W");

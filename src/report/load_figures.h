@@ -18,7 +18,8 @@ struct Figures {
   double rms = kNan, mean = kNan;
 };
 
-/// One drive by one witness.
+/// One drive by one witness; where friction at rest leaves the force open, by the end of its band
+/// that is farther from zero.
 struct DriveLoad {
   std::string drive, witness;
   Figures force = {}, power = {},

@@ -51,6 +51,15 @@ const PairComparison* MainPair(const Comparison& comparison) {
   return MainPairOf(comparison.pairs);
 }
 
+std::string AtRestText(const Comparison& comparison) {
+  const PairComparison* pair = MainPair(comparison);
+  if (pair == nullptr || pair->samples_at_rest == 0) return "";
+  return fmt::format(
+      "friction rests at {} of {} samples: forces are bands there, compared by their ends; RMS "
+      "forces count the middle",
+      pair->samples_at_rest, pair->force_samples);
+}
+
 const char* EngineComparison::NameOf(const std::string& engine) {
   if (engine == "defaults") return "MuJoCo, default softness, position targets";
   if (engine == "stock") return "MuJoCo, best recipe from outside";

@@ -99,6 +99,9 @@ struct Report : ResultFrame {
 /// compared, else simulated vs reference, else reference vs analytic; null if none was compared.
 [[nodiscard]] const PairComparison* MainPair(const Comparison& comparison);
 
+/// Says of the main pair how many samples are bands, and how they count; "" if none.
+[[nodiscard]] std::string AtRestText(const Comparison& comparison);
+
 /// mechanisms' force signals and the reactions that were compared.
 [[nodiscard]] std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism,
                                                 const Comparison& comparison);

@@ -37,6 +37,11 @@ std::string UsesText(const MotorLoad& load) {
   return text.empty() ? "–" : text;
 }
 
+std::string AtRestText(const MotorLoad& load) {
+  return fmt::format("friction rests at {} of {} samples: the worse end of the band counts",
+                     load.samples_at_rest, load.time_s.size());
+}
+
 Table FiguresTable(const std::vector<const MotorLoad*>& loads) {
   Table html{.caption = "Motors, " + loads.front()->witness,
              .head = {Text("drive"), Digits("margin"), Text("share of each limit"),
@@ -151,6 +156,7 @@ std::vector<std::string> SizingLines(const Report& report, bool details) {
       lines.push_back(
           fmt::format("  load inertia / rotor inertia at home: {:.3g}", load->inertia_ratio));
     }
+    if (load->samples_at_rest > 0) lines.push_back("  " + AtRestText(*load));
     lines.push_back("  used: " + UsesText(*load));
   }
   return lines;
@@ -162,6 +168,7 @@ std::string SizingHtml(const Report& report) {
   std::string html = ToHtml(FiguresTable(loads));
   for (const MotorLoad* load : loads) {
     const Motor* motor = MotorOf(report, *load);
+    if (load->samples_at_rest > 0) html += Note(load->drive + ": " + AtRestText(*load) + ".");
     if (motor != nullptr && load->known()) html += CloudHtml(*motor, *load);
   }
   return html +
@@ -200,6 +207,7 @@ Json SizingJson(const Report& report) {
          {"current_A", {{"peak", Number(load.peak_current)}, {"rms", Number(load.rms_current)}}},
          {"voltage_V", Number(load.peak_voltage)},
          {"inertia_ratio", Number(load.inertia_ratio)},
+         {"samples_at_rest", load.samples_at_rest},
          {"uses", std::move(uses)},
          {"limited_by", load.limited_by()},
          {"margin", Number(load.margin())}});

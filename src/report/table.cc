@@ -46,6 +46,9 @@ class VerdictTableWriter {
       about.push_back(fmt::format("start-up window: forces before {:g} s are not judged",
                                   report.start_window_s));
     }
+    if (std::string rest = AtRestText(report.comparison); !rest.empty()) {
+      about.push_back(std::move(rest));
+    }
     return about;
   }
 

@@ -36,10 +36,16 @@ double PowerSum(const std::vector<double>& c, double x) {
 ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   const ElementPlace& place = system.engine().elements[element];
   const mjData& d = *system.data();
-  if (place.tendon < 0) return {d.qpos[place.qpos], d.qvel[place.dof], d.qacc[place.dof]};
-  const ConstVecX u = TendonGradient(system, place);
-  return {d.ten_length[place.tendon], u.dot(ConstVecX(d.qvel, system.nv())),
+  ElementMotion at;
+  if (place.tendon < 0) {
+    at = {d.qpos[place.qpos], d.qvel[place.dof], d.qacc[place.dof]};
+  } else {
+    const ConstVecX u = TendonGradient(system, place);
+    at = {d.ten_length[place.tendon], u.dot(ConstVecX(d.qvel, system.nv())),
           u.dot(ConstVecX(d.qacc, system.nv())) + system.TendonBias(place.tendon)};
+  }
+  at.rests = std::abs(at.rate) <= place.rest_rate;
+  return at;
 }
 
 VecX ElementGradient(const ConstraintSystem& system, size_t element) {
@@ -59,9 +65,13 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     const double ratio = at.rate / friction->stribeck_rate;
     const double curve = std::exp(-(ratio * ratio));
     const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
-    return at.rate == 0.0 ? 0.0 : -std::copysign(most, at.rate);
+    return at.rests ? 0.0 : -std::copysign(most, at.rate);
   }
   return -std::get<RotorLaw>(element.law).reflected() * at.acceleration;
+}
+
+double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
+  return at.rests && Rubs(element) ? std::get<FrictionLaw>(element.law).breakaway : 0.0;
 }
 
 ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
@@ -106,23 +116,6 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion) {
                        "tendon",
             .where = element.name,
             .unit = {}};
-  }
-  return RunSummary::Done();
-}
-
-RunSummary CheckRubbing(const ConstraintSystem& system, double duration_s) {
-  const Mechanism& mechanism = *system.engine().mechanism;
-  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
-    const ForceElement& element = mechanism.elements[e];
-    if (!Rubs(element)) continue;
-    const double rate = ElementMotionOf(system, e).rate;
-    if (std::abs(rate) > RestRate(mechanism, element, duration_s)) continue;
-    return {.stop = Stop::kUnsupported,
-            .message = "the " + Described(mechanism, element) + " ('" + element.name +
-                       "') is at rest: its force lies in a band, and so do the drive forces",
-            .where = element.name,
-            .amount = rate,
-            .unit = ActsOnLength(mechanism, element) ? "m/s" : "rad/s"};
   }
   return RunSummary::Done();
 }

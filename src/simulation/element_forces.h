@@ -16,6 +16,7 @@ namespace mbv::simulation {
 /// Motion of an element's coordinate.
 struct ElementMotion {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
+  bool rests = false;  ///< where it may rub: at most at the rest rate
 };
 
 /// At the data's qpos, qvel and qacc; `acceleration` needs ConstraintSystem::Bias() there.
@@ -24,8 +25,12 @@ struct ElementMotion {
 /// dq/dq̇ of MuJoCo's velocities (nv).
 [[nodiscard]] VecX ElementGradient(const ConstraintSystem& system, size_t element);
 
-/// Force of an element along its coordinate [N or N m].
+/// Force of an element along its coordinate [N or N m]; of friction at rest 0, the middle of what
+/// statics allows.
 [[nodiscard]] double ForceOf(const ForceElement& element, const ElementMotion& at);
+
+/// Friction may be anywhere within ± this: the breakaway force at rest, otherwise 0.
+[[nodiscard]] double BreakawayAt(const ForceElement& element, const ElementMotion& at);
 
 /// Force times rate [W].
 [[nodiscard]] inline double PowerOf(const ForceElement& element, const ElementMotion& at) {
@@ -52,8 +57,6 @@ struct ElementSlope {
 /// kUnsupported for a rotor on a distance drive that is not guided, and for friction where some
 /// drive is not.
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion);
-/// kUnsupported where an element with friction is at rest at the data's qvel (RestRate()).
-[[nodiscard]] RunSummary CheckRubbing(const ConstraintSystem& system, double duration_s);
 
 /// True if there is something that MuJoCo lacks.
 [[nodiscard]] bool HasLacking(const Mechanism& mechanism);

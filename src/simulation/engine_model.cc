@@ -175,6 +175,13 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   return FindDriven(engine);
 }
 
+void SetRestRates(double duration_s, EngineModel* engine) {
+  const Mechanism& mechanism = *engine->mechanism;
+  for (size_t e = 0; e < engine->elements.size(); ++e) {
+    engine->elements[e].rest_rate = RestRate(mechanism, mechanism.elements[e], duration_s);
+  }
+}
+
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine) {
   for (const DriveForce& force : motion.forces) {
     DrivenPlace& place = engine->driven[static_cast<size_t>(force.drive)];

@@ -28,6 +28,7 @@ struct DrivenPlace {
 struct ElementPlace {
   int joint = -1, dof = -1, qpos = -1;
   int tendon = -1;
+  double rest_rate = 0.0;  ///< up to which dry friction rests (RestRate())
 };
 
 struct EngineModel {
@@ -61,6 +62,9 @@ struct AnchorFrames {
 /// States both anchors of a `connect` or `weld` in MuJoCo's eq_data, for a weld the rotation of
 /// body 2 in body 1 too: the compiler takes them from the reference pose.
 void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data);
+
+/// What counts as rest in a motion of this length, for every force element.
+void SetRestRates(double duration_s, EngineModel* engine);
 
 /// Switches off the guiding constraints of the drives whose force the motion gives.
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);

@@ -25,6 +25,7 @@ std::vector<Channel> Recorder::MakeChannels(bool work) {
   std::vector<Channel> channels = DriveChannels(mechanism);
   Append(OutputChannels(mechanism), &channels);
   Append(PrescribedChannels(mechanism), &channels);
+  Append(BandChannels(mechanism), &channels);
   for (const Joint& joint : mechanism.joints) Append(ReactionChannels(joint), &channels);
   Append(AuditChannels(), &channels);
   Append(EnergyChannels(), &channels);
@@ -132,6 +133,15 @@ void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
     row[columns_(Quantity::kAcceleration, k)] =
         J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k, bias_);
     row[columns_(Quantity::kForce, k)] = system_->DrivenForce(k);
+  }
+}
+
+void Recorder::RecordBands(const VecX& bands, Eigen::Ref<Eigen::RowVectorXd> row) const {
+  const size_t drives = engine_.mechanism->drives.size();
+  for (size_t k = 0; k < engine_.driven.size(); ++k) {
+    const int column = k < drives ? columns_(Quantity::kForceBand, k)
+                                  : columns_(Quantity::kBaseForceBand, k - drives);
+    row[column] = bands[static_cast<Eigen::Index>(k)];
   }
 }
 

@@ -23,6 +23,13 @@ class Recorder {
   void Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
               std::vector<Pose>* X_WB);
 
+  /// True if something rubs.
+  [[nodiscard]] bool has_bands() const {
+    return columns_.Has(Quantity::kForceBand) || columns_.Has(Quantity::kBaseForceBand);
+  }
+  /// Half-widths of the forces of everything driven.
+  void RecordBands(const VecX& bands, Eigen::Ref<Eigen::RowVectorXd> row) const;
+
  private:
   // Where a joint's reaction is read.
   struct ReactionPlace {

@@ -35,6 +35,9 @@ struct Session {
   void Record(size_t i);
   /// Work rates at the present state, as WorkChannels().
   [[nodiscard]] const VecX& WorkRates();
+  /// Half-widths within which friction at rest leaves the forces of everything driven,
+  /// Σ |∂(force)/∂(friction)| Fs: per element Jᵀλ = −u Fs, as forces are solved for.
+  [[nodiscard]] VecX Bands();
   /// Decides, at the present configuration, whether the drives share their forces.
   void FindShared();
   /// Loads, given drive forces and force elements that MuJoCo lacks at t, for the data's current
@@ -75,9 +78,6 @@ struct Session {
                                             EngineState* start);
 /// Puts the session there, closed once more without the guides.
 [[nodiscard]] RunSummary PutAtCommandedStart(Session* session, const DrivenSample& first);
-
-/// CheckRubbing() at a recorded sample, with its time.
-[[nodiscard]] RunSummary CheckRubbingAt(const Session& session, double t_s);
 
 /// Positions of everything driven at home.
 [[nodiscard]] VecX HomePositions(const EngineModel& engine);

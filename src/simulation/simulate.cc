@@ -66,6 +66,7 @@ void Session::Record(size_t i) {
     const LeastForces least(this);
     recorder.Record(loads, work.work(), record, &run->X_WB[i]);
   }
+  if (recorder.has_bands()) recorder.RecordBands(Bands(), record);
   run->trace.values.row(row) = record;
   run->qpos.row(row) = Eigen::Map<const Eigen::RowVectorXd>(data->qpos, engine.m->nq);
   if (progress && i % 16 == 0) {
@@ -79,10 +80,43 @@ const VecX& Session::WorkRates() {
   return work_rates;
 }
 
-RunSummary CheckRubbingAt(const Session& session, double t_s) {
-  RunSummary summary = CheckRubbing(session.system, session.motion.duration_s);
-  if (!summary.ok()) summary.time_s = t_s;
-  return summary;
+namespace {
+
+// Magnitudes of all driven forces; those below this share of the largest (forces at the
+// characteristic length) are round-off.
+constexpr double kOpened = 1e-9;
+
+VecX OpenedForces(const ConstraintSystem& system) {
+  VecX force(static_cast<Eigen::Index>(system.engine().driven.size())), size = force;
+  for (Eigen::Index k = 0; k < force.size(); ++k) {
+    const int row = system.driven_row(static_cast<int>(k));
+    force[k] = std::abs(system.DrivenForce(static_cast<int>(k)));
+    size[k] = force[k] * (row < 0 ? 0.0 : system.row_unit()[row]);
+  }
+  const double least = size.size() == 0 ? 0.0 : kOpened * size.maxCoeff();
+  return (size.array() > least).select(force, 0.0);
+}
+
+}  // namespace
+
+VecX Session::Bands() {
+  const auto driven = static_cast<Eigen::Index>(engine.driven.size());
+  VecX bands = VecX::Zero(driven);
+  const VecX found = system.force();
+  for (size_t e = 0; e < engine.elements.size(); ++e) {
+    const ElementMotion at = ElementMotionOf(system, e);
+    const double most = BreakawayAt(engine.mechanism->elements[e], at);
+    if (most == 0.0) continue;
+    const VecX tau = -most * ElementGradient(system, e);
+    if (shared) {
+      solver.SolveLeastDriven(tau);
+    } else {
+      solver.SolveForcesHere(tau);
+    }
+    bands += OpenedForces(system);
+  }
+  system.force() = found;
+  return bands;
 }
 
 void Session::FindShared() { shared = !solver.DrivenRowsNotUnique().empty(); }
@@ -188,6 +222,7 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
     return summary;
   }
   if (RunSummary summary = CheckLoads(engine, motion); !summary.ok()) return summary;
+  SetRestRates(motion.duration_s, &engine);
   ReleaseForcedDrives(motion, &engine);
   EngineState start;
   if (options.drives != DriveMode::kGuided) {

@@ -88,6 +88,38 @@ TEST(Report, CsvNumbersReadBackExactly) {
   EXPECT_EQ(std::stod(cell), c.analytic.values(1, c.analytic.Find("d1.force")));
 }
 
+// Where friction rests there is no number; the ends of the band stand beside it.
+TEST(Report, CsvGivesTheEndsOfABandAndNoMiddle) {
+  Report report = MakeReport(BentCase());
+  Trace& trace = report.witnesses[0].trace;
+  trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
+  trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
+  trace.values.rightCols(1) << 0.0, 0.0, 7.5;
+  trace.values(2, trace.Find("d1.force")) = 2.0;
+  std::istringstream csv(ToCsv(report));
+  std::string line, last;
+  std::getline(csv, line);
+  EXPECT_NE(line.find("d1.force.analytic,d1.force.lower.analytic,d1.force.upper.analytic,"),
+            std::string::npos);
+  EXPECT_EQ(line.find("band"), std::string::npos);
+  while (std::getline(csv, line)) last = line;
+  EXPECT_NE(last.find(",nan,-5.5,9.5,"), std::string::npos) << last;
+}
+
+TEST(Report, SamplesAtRestAreTold) {
+  synthetic::Case c = BentCase();
+  Trace& trace = c.simulated;
+  trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
+  trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
+  trace.values.rightCols(1).setZero();
+  trace.values.rightCols(1).bottomRows(4).setConstant(3.0);
+  const Report report = MakeReport(c);
+  EXPECT_NE(ToTable(report, {}).find("friction rests at 4 of 101 samples"), std::string::npos);
+  EXPECT_EQ(
+      nlohmann::json::parse(ToJson(report))["metrics"]["simulated_vs_analytic"]["samples_at_rest"],
+      4);
+}
+
 TEST(Report, CountsTellRanComparedAndVerifiedApart) {
   const Report agreed = MakeReport(Case());
   const Report disagreed = MakeReport(BentCase());

@@ -50,13 +50,21 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
   }
 }
 
-TEST(SimulatedElements, DryFrictionAtRestIsRefusedWithTimeAndCoordinate) {
-  const Mechanism m = RubbingPendulum().Make();
+TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
+  RubbingPendulum p;
+  const Mechanism m = p.Make();
   for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
     const SimulationRun run = Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = mode});
-    EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
-    EXPECT_EQ(run.summary.where, "dry");
-    EXPECT_EQ(run.summary.time_s, 0.0);
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    const VecX band = run.trace.values.col(run.trace.Find("motor.force.band"));
+    EXPECT_LT((band.array() - p.breakaway).abs().maxCoeff(), 1e-12);
+    const VecX middle = run.trace.values.col(run.trace.Find("motor.force"));
+    RubbingPendulum smooth = p;
+    smooth.coulomb = smooth.breakaway = 0.0;
+    EXPECT_LT((middle.array() - smooth.Torque(0.3, 0.0, 0.0)).abs().maxCoeff(), 1e-6);
+    EXPECT_LT(run.trace.values.col(run.trace.Find("power.dampers")).cwiseAbs().maxCoeff(), 1e-12);
+    const SimulationRun moving = Simulate(m, Swing(), SwingAt, {.mode = mode});
+    EXPECT_EQ(moving.trace.values.col(moving.trace.Find("motor.force.band")).maxCoeff(), 0.0);
   }
 }
 

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import {errorPair, readData, shownWitness, worstSamples} from '../../web/src/report/data.js';
-import {groupBy, makePanels} from '../../web/src/report/panels.js';
+import {groupBy, makePanels, withBands} from '../../web/src/report/panels.js';
 
 function base64(...values) {
   const bytes = Buffer.alloc(4 * values.length);
@@ -98,4 +98,15 @@ test('Loop gaps and power carry the limits of the simulation; panels without a n
 
 test('Groups keep the order of their members', () => {
   assert.deepEqual([...groupBy(['b1', 'a1', 'b2'], (text) => text[0])], [['b', ['b1', 'b2']], ['a', ['a1']]]);
+});
+
+test('A force that friction at rest leaves open is a gap with a band', () => {
+  const data = page({witnesses: [witness('reference', {band: [base64(0, 0.5), null]})]});
+  const [line] = makePanels(data)[0].lines;
+  assert.deepEqual([...line.values], [1, NaN]);
+  assert.deepEqual([...line.band.lower], [NaN, 1.5]);
+  assert.deepEqual([...line.band.upper], [NaN, 2.5]);
+  assert.deepEqual(withBands([line], 1, 1), [1, 2.5]);
+  assert.deepEqual(withBands([], null, null), [null, null]);
+  assert.equal(makePanels(data)[1].lines[0].band, undefined);
 });

@@ -10,8 +10,8 @@ import {floats} from './numbers.js';
  * Place [m] and angles [rad] of an output in a frame.
  * @typedef {{name: string, frame: string, values: Signal[]}} OutputSignals
  *
- * `force` and `position` by drive; `limits` by check.
- * @typedef {{name: string, force: Signal[], position: Signal[], outputs: OutputSignals[],
+ * `force`, half-width of its `band` and `position` by drive; `limits` by check.
+ * @typedef {{name: string, force: Signal[], band: Signal[], position: Signal[], outputs: OutputSignals[],
  *            closure_m: Signal, closure_rad: Signal, power_input: Signal, power_rate: Signal,
  *            power_error: Signal, limits: Record<string, number>}} Witness
  *
@@ -55,6 +55,7 @@ export function readData(json) {
   data.witnesses = (data.witnesses ?? []).map((/** @type {any} */ witness) => ({
     ...witness,
     force: decodeAll(witness.force),
+    band: decodeAll(witness.band ?? []),
     position: decodeAll(witness.position),
     outputs: witness.outputs.map((/** @type {any} */ output) => (
         {...output, values: decodeAll(output.values)})),

@@ -8,7 +8,10 @@ import {driveColor} from './dom.js';
  *
  * One curve: `key` groups lines for the legend and for switching; `style` is a witness or "solid".
  * @typedef {{key: string, label: string, style: string, color: () => string, values: Float32Array,
- *            dash?: boolean}} Line
+ *            dash?: boolean, band?: Band}} Line
+ *
+ * Where friction at rest leaves a force open: its ends, NaN elsewhere.
+ * @typedef {{lower: Float32Array, upper: Float32Array}} Band
  *
  * One plot. `pair`: whose errors it shows; `limit` and `worst` are marked in it.
  * @typedef {{title: string, note?: string, unit: string, log?: boolean, lines: Line[], limit?: number,
@@ -52,18 +55,49 @@ const driveLine = ({name}, index, values, witness) => values === null ? [] : [
 export function makePanels(data) {
   return [...forcePanels(data), ...errorPanels(data), ...positionPanels(data), ...outputPanels(data),
           ...auditPanels(data)]
-      .filter((panel) => panel.lines.some((line) => line.values.some(Number.isFinite)));
+      .filter((panel) => panel.lines.some(
+          (line) => line.values.some(Number.isFinite) || line.band?.lower.some(Number.isFinite)));
 }
 
 /** @param {PageData} data */
 const indexed = (data) => data.drives.map((drive, index) => ({drive, index}));
+
+/**
+ * A force that friction at rest leaves open is no number there: a gap in its line, with a band.
+ * @param {Line} line
+ * @param {import('./data.js').Signal | undefined} half width of the band
+ * @returns {Line}
+ */
+export function withBand(line, half) {
+  if (!half || !half.some((h) => h > 0)) return line;
+  /** @type {(value: (v: number, h: number) => number) => Float32Array} */
+  const each = (value) => line.values.map((v, i) => value(v, half[i]));
+  return {...line, values: each((v, h) => (h > 0 ? NaN : v)),
+          band: {lower: each((v, h) => (h > 0 ? v - h : NaN)), upper: each((v, h) => (h > 0 ? v + h : NaN))}};
+}
+
+/**
+ * The least and the largest of values and bands.
+ * @param {Line[]} lines
+ * @param {number | null} min of the values
+ * @param {number | null} max
+ * @returns {[number | null, number | null]}
+ */
+export function withBands(lines, min, max) {
+  const ends = lines.flatMap(({band}) => (band ? [...band.lower, ...band.upper] : []))
+      .filter(Number.isFinite);
+  if (ends.length === 0) return [min, max];
+  return [ends.reduce((a, b) => Math.min(a, b), min ?? Infinity),
+          ends.reduce((a, b) => Math.max(a, b), max ?? -Infinity)];
+}
 
 /** @param {PageData} data @returns {Panel[]} */
 function forcePanels(data) {
   return [...groupBy(indexed(data), ({drive}) => drive.unit)].map(([unit, group]) => (
       {title: unit === 'N' ? 'Drive forces' : 'Drive torques', unit,
        lines: group.flatMap(({drive, index}) => data.witnesses.flatMap(
-           (witness) => driveLine(drive, index, witness.force[index], witness.name)))}));
+           (witness) => driveLine(drive, index, witness.force[index], witness.name)
+               .map((line) => withBand(line, witness.band[index]))))}));
 }
 
 /** @param {PageData} data @returns {Panel[]} */

@@ -5,7 +5,7 @@ import 'uplot/dist/uPlot.min.css';
 import {byId, element, isDark} from './dom.js';
 import {decadeMarks, decades} from './log_axis.js';
 import {formatError, formatValue, nearest} from './numbers.js';
-import {groupBy, makePanels, nameOf} from './panels.js';
+import {groupBy, makePanels, nameOf, withBands} from './panels.js';
 import {axisLabels, largest, padded, plottable, powerOfTen, spread, zoomed} from './scales.js';
 
 /**
@@ -59,6 +59,17 @@ function seriesOf(line, log) {
     points: {show: Boolean(style.marks), size: 5, width: 1.2, stroke: color,
              fill: isDark() ? '#14191f' : '#fff', filter: style.marks ? visibleMarks : undefined},
   };
+}
+
+/**
+ * The part of the run that is shown.
+ * @param {uPlot} u
+ * @param {Float64Array} time
+ */
+function zoomOf(u, time) {
+  const {min, max} = u.scales.x;
+  const whole = time[time.length - 1] - time[0];
+  return min == null || max == null || !(whole > 0) ? 1 : (max - min) / whole;
 }
 
 export class Plots {
@@ -211,14 +222,14 @@ export class Plots {
                drag: {x: true, y: false, setScale: true}, points: {show: false}, y: false},
       scales: {x: {time: false, min: this.range[0], max: this.range[1]},
                y: range ? {distr: 3, log: 10, range: () => range}
-                        : {range: (_u, min, max) => padded(min, max)}},
+                        : {range: (_u, min, max) => padded(...withBands(panel.lines, min, max))}},
       axes: this.axes(range),
       series: [{}, ...panel.lines.map((line) => (
           {...seriesOf(line, panel.log === true), show: !this.hidden.has(line.key)}))],
       hooks: {
         setScale: [(u, key) => { if (key === 'x') this.followZoom(u); }],
         setCursor: [(u) => this.readSoon(u.cursor.idx ?? null)],
-        draw: [(u) => { this.drawMarks(u, panel); this.placeHead(view, u); }],
+        draw: [(u) => { this.drawBands(u, panel); this.drawMarks(u, panel); this.placeHead(view, u); }],
         ready: [(u) => this.clickSetsTime(u)],
       },
     };
@@ -248,6 +259,31 @@ export class Plots {
       if (Math.abs(event.clientX - down) > 3) return;
       this.timeline.set(u.posToVal(event.clientX - u.over.getBoundingClientRect().left, 'x'));
     });
+  }
+
+  // Shades what friction at rest leaves open: one stroke per sample, as wide as the samples are apart.
+  /** @param {uPlot} u @param {Panel} panel */
+  drawBands(u, panel) {
+    const {ctx, bbox} = u, {time} = this.data;
+    ctx.save();
+    ctx.beginPath();
+    ctx.rect(bbox.left, bbox.top, bbox.width, bbox.height);
+    ctx.clip();
+    for (const {key, color, band} of panel.lines) {
+      if (!band || this.hidden.has(key)) continue;
+      ctx.strokeStyle = color();
+      ctx.globalAlpha = 0.22;
+      ctx.lineWidth = Math.max(2, bbox.width / Math.max(1, time.length - 1) / zoomOf(u, time));
+      ctx.beginPath();
+      time.forEach((t, i) => {
+        if (!Number.isFinite(band.lower[i])) return;
+        const x = u.valToPos(t, 'x', true);
+        ctx.moveTo(x, u.valToPos(band.lower[i], 'y', true));
+        ctx.lineTo(x, u.valToPos(band.upper[i], 'y', true));
+      });
+      ctx.stroke();
+    }
+    ctx.restore();
   }
 
   /** @param {uPlot} u @param {Panel} panel */

@@ -1,0 +1,62 @@
+#include "comparison/force_band.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbv {
+namespace {
+
+int BandColumn(const Trace& trace, int column) {
+  const Channel& force = trace.channels[static_cast<size_t>(column)];
+  const Quantity band = BandOf(force.quantity);
+  return band == Quantity::kOwn ? -1 : trace.Find(band, force.subject);
+}
+
+// What a number lies outside a band.
+double Outside(double number, const ForceBand& band) {
+  const double away = number - band.middle;
+  return std::copysign(std::max(0.0, std::abs(away) - band.half), away);
+}
+
+}  // namespace
+
+Quantity BandOf(Quantity force) {
+  if (force == Quantity::kForce) return Quantity::kForceBand;
+  return force == Quantity::kBaseForce ? Quantity::kBaseForceBand : Quantity::kOwn;
+}
+
+ForceSignal::ForceSignal(const Trace& trace, int column)
+    : trace_(trace), column_(column), band_(BandColumn(trace, column)) {}
+
+ForceBand ForceSignal::At(Eigen::Index row) const {
+  return {trace_.values(row, column_), band_ < 0 ? 0.0 : trace_.values(row, band_)};
+}
+
+VecX ForceSignal::Worst() const {
+  VecX worst = trace_.values.col(column_);
+  for (Eigen::Index i = 0; i < worst.size(); ++i) worst[i] = At(i).worst();
+  return worst;
+}
+
+double Difference(const ForceBand& a, const ForceBand& b) {
+  if (a.open() == b.open()) {
+    const double away = a.middle - b.middle;
+    return away + std::copysign(std::abs(a.half - b.half), away);
+  }
+  return b.open() ? Outside(a.middle, b) : -Outside(b.middle, a);
+}
+
+std::vector<bool> AtRest(const Trace& trace) {
+  std::vector<bool> open(trace.time_s.size(), false);
+  for (size_t c = 0; c < trace.channels.size(); ++c) {
+    const Quantity quantity = trace.channels[c].quantity;
+    if (quantity != Quantity::kForceBand && quantity != Quantity::kBaseForceBand) continue;
+    for (size_t i = 0; i < open.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(c);
+      open[i] = open[i] || trace.values(row, column) > 0.0;
+    }
+  }
+  return open;
+}
+
+}  // namespace mbv
