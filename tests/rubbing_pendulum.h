@@ -33,6 +33,14 @@ struct RubbingPendulum {
     return mechanism;
   }
 
+  /// The pivot is a prescribed joint instead of a drive.
+  [[nodiscard]] Mechanism Prescribed() const {
+    Mechanism mechanism = Make();
+    mechanism.drives.clear();
+    mechanism.prescribed = {{.name = "base", .joint = 0}};
+    return mechanism;
+  }
+
   [[nodiscard]] double Torque(double q, double rate, double acceleration) const {
     const double x = q - free, v = rate / stribeck;
     const double spring = preload + k1 * x + (linear ? 0.0 : k2 * x * x + k3 * x * x * x);
@@ -55,6 +63,35 @@ struct RubbingPendulum {
       add("dry",
           FrictionLaw{.coulomb = coulomb, .breakaway = breakaway, .stribeck_rate = stribeck});
     }
+  }
+};
+
+/// The pendulum's body on a rubbing journal whose axis is not level: weight along it is no load.
+struct JournalPendulum {
+  static constexpr double m = RubbingPendulum::m, r = RubbingPendulum::r, g = RubbingPendulum::g;
+  double coefficient = 0.15, radius = 0.04;
+
+  [[nodiscard]] Mechanism Make() const {
+    Mechanism mechanism = RubbingPendulum().Make();
+    mechanism.gravity_W = Vec3(0, -g, -5.0);
+    mechanism.elements = {{.name = "journal",
+                           .joint = 0,
+                           .law = FrictionLaw{.coefficient = coefficient, .radius = radius}}};
+    return mechanism;
+  }
+  /// Held by a second hinge on the same axis, which shares the load.
+  [[nodiscard]] Mechanism OnTwoHinges() const {
+    Mechanism mechanism = Make();
+    const Vec3 above(0, 0, 0.1);
+    mechanism.joints.push_back(MakeJoint("second", JointKind::kRevolute, 0, above, 1, above));
+    mechanism.joints.back().closure = true;
+    return mechanism;
+  }
+  /// At an even rate: weight, and friction by weight and centrifugal force.
+  [[nodiscard]] double Torque(double q, double rate) const {
+    const double x = -rate * rate * r * std::cos(q), y = g - rate * rate * r * std::sin(q);
+    return m * g * r * std::cos(q) +
+           std::copysign(coefficient * radius * m * std::hypot(x, y), rate);
   }
 };
 

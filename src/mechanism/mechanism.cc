@@ -73,7 +73,7 @@ double RestRate(const Mechanism& mechanism, const ForceElement& element, double 
 
 bool Rubs(const ForceElement& element) {
   const auto* friction = std::get_if<FrictionLaw>(&element.law);
-  return friction != nullptr && friction->breakaway > 0.0;
+  return friction != nullptr && (friction->breakaway > 0.0 || friction->per_load() > 0.0);
 }
 
 std::string FirstFriction(const Mechanism& mechanism) {

@@ -206,13 +206,17 @@ struct RotorLaw {
   [[nodiscard]] double reflected() const { return ratio * ratio * inertia; }  ///< [kg m² or kg]
 };
 
-/// Dry friction, whatever the load: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇,
+/// Dry friction: force −(Fc + (Fs − Fc) exp(−(q̇/vs)²) + μ r N) sign q̇, N: what the joint bears
 /// [Armstrong-Hélouvry 1991]; viscous friction beside it is damping. At rest the force lies
-/// anywhere in ±Fs, and with it drive forces within a band.
+/// anywhere in ±(Fs + μ r N), and with it drive forces within a band.
 struct FrictionLaw {
   double coulomb = 0.0;        ///< Fc [N or N m], >= 0
   double breakaway = 0.0;      ///< Fs, >= Fc
   double stribeck_rate = 1.0;  ///< vs [m/s or rad/s], > 0; without meaning where Fs = Fc
+  double coefficient = 0.0;    ///< μ >= 0: adds μ r N, N the joint's reaction across its axis
+  double radius = 1.0;         ///< r of a journal [m], > 0; 1 along lengths
+
+  [[nodiscard]] double per_load() const { return coefficient * radius; }  ///< μ r [m or 1]
 };
 
 /// What acts along one scalar coordinate q of a joint or along the length q of a distance drive;

@@ -19,7 +19,7 @@ const std::vector<std::string>& KeysOf(const std::string& kind) {
       {"damping", {"damping"}},
       {"spring", {"stiffness", "polynomial", "free", "free_deg", "free_mm", "preload"}},
       {"rotor", {"inertia", "ratio"}},
-      {"friction", {"coulomb", "breakaway", "stribeck_rate"}}};
+      {"friction", {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius"}}};
   return keys.at(kind);
 }
 
@@ -109,7 +109,7 @@ bool ElementReader::ReadLaw(const Block& block, const YamlMap& map, const std::s
   };
   if (kind == "damping") return take(ReadDamping(block, map));
   if (kind == "rotor") return take(ReadRotor(block, map));
-  if (kind == "friction") return take(ReadFriction(block, map));
+  if (kind == "friction") return take(ReadFriction(block, map, element));
   return take(ReadSpring(block, map, element));
 }
 
@@ -171,8 +171,56 @@ std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlM
   return RotorLaw{.inertia = *inertia, .ratio = *ratio};
 }
 
-std::optional<FrictionLaw> ElementReader::ReadFriction(const Block& block, const YamlMap& map) {
+std::optional<FrictionLaw> ElementReader::ReadFriction(const Block& block, const YamlMap& map,
+                                                       const ForceElement* element) {
+  const bool loaded = map.Has("coefficient");
+  auto law = ReadDry(block, map, loaded);
+  const bool fits = !loaded || element == nullptr || FitsLoad(map, *element);
+  const auto coefficient = loaded ? NotNegative(block, map, "coefficient") : 0.0;
+  const auto radius = ReadJournal(block, map, element);
+  if (!law || !fits || !coefficient || !radius) return std::nullopt;
+  law->coefficient = *coefficient;
+  law->radius = *radius;
+  return law;
+}
+
+// Only there is it said what carries the load.
+bool ElementReader::FitsLoad(const YamlMap& map, const ForceElement& element) {
+  const JointKind kind = element.joint < 0 ? JointKind::kFree : joints_.joints[element.joint].kind;
+  if (kind == JointKind::kRevolute || kind == JointKind::kPrismatic) return true;
+  values_.yaml().Error(*map.Find("coefficient"),
+                       fmt::format("{}: friction by the joint's load is known of revolute and "
+                                   "prismatic joints only",
+                                   map.PathOf("coefficient")),
+                       "coulomb: friction whatever the load");
+  return false;
+}
+
+// A journal has a radius, a guide has none.
+std::optional<double> ElementReader::ReadJournal(const Block& block, const YamlMap& map,
+                                                 const ForceElement* element) {
+  const YamlNode* node = map.Find("radius");
+  const bool slides = element != nullptr && element->joint >= 0 &&
+                      joints_.joints[element->joint].kind == JointKind::kPrismatic;
+  if (node == nullptr && (!map.Has("coefficient") || slides || element == nullptr)) return 1.0;
+  if (node != nullptr && map.Has("coefficient") && !slides) {
+    return values_.Positive(block, map, "radius", {kPlain});
+  }
+  const bool lacking = node == nullptr;
+  values_.yaml().Error(lacking ? *map.node() : *node,
+                       lacking ? fmt::format("{} needs a radius", map.path())
+                               : fmt::format("{} has no meaning here", map.PathOf("radius")),
+                       "radius: of the journal of a revolute joint whose friction is coefficient "
+                       "times radius times its radial load");
+  return std::nullopt;
+}
+
+std::optional<FrictionLaw> ElementReader::ReadDry(const Block& block, const YamlMap& map,
+                                                  bool loaded) {
   YamlReader& yaml = values_.yaml();
+  if (loaded && !map.Has("coulomb") && !map.Has("breakaway") && !map.Has("stribeck_rate")) {
+    return FrictionLaw{};
+  }
   const bool stated = map.Required("coulomb") != nullptr;
   const auto coulomb = stated ? NotNegative(block, map, "coulomb") : std::nullopt;
   if (map.Has("breakaway") != map.Has("stribeck_rate")) {

@@ -31,7 +31,12 @@ class ElementReader {
   std::optional<SpringLaw> ReadSpring(const Block& block, const YamlMap& map,
                                       const ForceElement* element);
   std::optional<RotorLaw> ReadRotor(const Block& block, const YamlMap& map);
-  std::optional<FrictionLaw> ReadFriction(const Block& block, const YamlMap& map);
+  std::optional<FrictionLaw> ReadFriction(const Block& block, const YamlMap& map,
+                                          const ForceElement* element);
+  std::optional<FrictionLaw> ReadDry(const Block& block, const YamlMap& map, bool loaded);
+  std::optional<double> ReadJournal(const Block& block, const YamlMap& map,
+                                    const ForceElement* element);
+  bool FitsLoad(const YamlMap& map, const ForceElement& element);
   std::optional<std::vector<double>> ReadPolynomial(const Block& block, const YamlMap& map);
   std::optional<double> NotNegative(const Block& block, const YamlMap& map, const std::string& key);
 

@@ -181,8 +181,8 @@ class Companion {
       const auto [joint, k] = FindCoordinate(element.joint, element.coordinate);
       place = fmt::format("joint: \"{}\"{}", joint, CoordinateText(k));
     }
-    sections_["elements"] +=
-        fmt::format("  {}: {{{}}}\n", YamlName(element.name), ElementText(element, place));
+    sections_["elements"] += fmt::format("  {}: {{{}}}\n", YamlName(element.name),
+                                         ElementText(element, place, ActsOnLength(m_, element)));
   }
 
   const Mechanism m_;

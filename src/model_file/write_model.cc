@@ -256,7 +256,7 @@ class ModelWriter {
     if (!m_.elements.empty()) text += "elements:\n";
     for (const ForceElement& element : m_.elements) {
       text += fmt::format("  {}: {{{}}}\n", FreshName(element.name, &taken),
-                          ElementText(element, PlaceOf(element)));
+                          ElementText(element, PlaceOf(element), ActsOnLength(m_, element)));
     }
     if (!m_.springs.empty()) text += "springs:\n";
     for (const SpringDamper& s : m_.springs) {
@@ -300,8 +300,10 @@ std::string TextOf(const RotorLaw& law) {
 }
 std::string TextOf(const FrictionLaw& law) {
   std::string text = fmt::format("coulomb: {}", law.coulomb);
-  if (law.breakaway == law.coulomb) return text;
-  return text + fmt::format(", breakaway: {}, stribeck_rate: {}", law.breakaway, law.stribeck_rate);
+  if (law.breakaway != law.coulomb) {
+    text += fmt::format(", breakaway: {}, stribeck_rate: {}", law.breakaway, law.stribeck_rate);
+  }
+  return law.coefficient == 0.0 ? text : text + fmt::format(", coefficient: {}", law.coefficient);
 }
 
 }  // namespace
@@ -310,9 +312,12 @@ std::string CoordinateText(int coordinate) {
   return coordinate == 0 ? "" : fmt::format(", coordinate: {}", coordinate);
 }
 
-std::string ElementText(const ForceElement& element, const std::string& place) {
-  return fmt::format("kind: {}, {}, {}", WordOf(element), place,
-                     std::visit([](const auto& law) { return TextOf(law); }, element.law));
+std::string ElementText(const ForceElement& element, const std::string& place, bool slides) {
+  const auto* friction = std::get_if<FrictionLaw>(&element.law);
+  const bool journal = friction != nullptr && friction->per_load() > 0.0 && !slides;
+  return fmt::format("kind: {}, {}, {}{}", WordOf(element), place,
+                     std::visit([](const auto& law) { return TextOf(law); }, element.law),
+                     journal ? fmt::format(", radius: {}", friction->radius) : "");
 }
 
 std::string CouplingText(const Coupling& coupling, const TermNames& name_of) {

@@ -36,8 +36,9 @@ using TermNames = std::function<std::pair<std::string, int>(const Coupling::Term
 /// ", coordinate: 1" behind a joint's name, empty for the first coordinate.
 [[nodiscard]] std::string CoordinateText(int coordinate);
 /// The lines of a force element as a model file's map, without braces: "kind: damping, …". `place`:
-/// "joint: …, coordinate: …" or "drive: …".
-[[nodiscard]] std::string ElementText(const ForceElement& element, const std::string& place);
+/// "joint: …, coordinate: …" or "drive: …". `slides`: its coordinate is a length.
+[[nodiscard]] std::string ElementText(const ForceElement& element, const std::string& place,
+                                      bool slides);
 /// The lines of a coupling as a model file's map, without braces: "joint: …, follows: …, ratio: …",
 /// or a sum of linear terms.
 [[nodiscard]] std::string CouplingText(const Coupling& coupling, const TermNames& name_of);

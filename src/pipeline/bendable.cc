@@ -58,6 +58,7 @@ bool CanAct(const Literal& literal) {
 // Of a force element; `keys` end in what it is, behind the element's name.
 std::string ElementUnit(const Mechanism& mechanism, const std::vector<std::string>& keys) {
   if (Has(keys, "inertia")) return "kg m^2";
+  if (Has(keys, "radius")) return "m";
   for (const ForceElement& element : mechanism.elements) {
     const std::string name = element.name.substr(element.name.rfind('.') + 1);
     if (keys.size() < 2 || keys[keys.size() - 2] != name) continue;

@@ -80,7 +80,7 @@ bool SameLaw(const SpringLaw& a, const SpringLaw& b) {
 bool SameLaw(const RotorLaw& a, const RotorLaw& b) { return Same(a.reflected(), b.reflected()); }
 bool SameLaw(const FrictionLaw& a, const FrictionLaw& b) {
   return Same(a.coulomb, b.coulomb) && Same(a.breakaway, b.breakaway) &&
-         Same(a.stribeck_rate, b.stribeck_rate);
+         Same(a.stribeck_rate, b.stribeck_rate) && Same(a.per_load(), b.per_load());
 }
 
 bool SameElement(const ForceElement& a, const ForceElement& b) {

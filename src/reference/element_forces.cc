@@ -14,14 +14,6 @@ AlongElement MotionOf(const ScalarRow& row, const BodyStates& states, int rubs) 
   return {row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias, rubs};
 }
 
-// Of the coordinate, over the motions of all bodies but the world.
-VecX GradientOf(const ScalarRow& row, size_t bodies) {
-  VecX u = VecX::Zero(6 * (static_cast<Eigen::Index>(bodies) - 1));
-  if (row.parent > 0) u.segment<6>(6 * (row.parent - 1)) += row.J_parent;
-  if (row.child > 0) u.segment<6>(6 * (row.child - 1)) += row.J_child;
-  return u;
-}
-
 // Force, energy and what is lost, of each law.
 double ForceOf(const DampingLaw& law, const AlongElement& at) { return -law.damping * at.rate; }
 double ForceOf(const SpringLaw& law, const AlongElement& at) {
@@ -135,17 +127,36 @@ std::vector<int> RubbingOf(const Mechanism& mechanism, const BodyStates& states,
   return rubbing;
 }
 
+VecX GradientOf(const ScalarRow& row, size_t bodies) {
+  VecX u = VecX::Zero(6 * (static_cast<Eigen::Index>(bodies) - 1));
+  if (row.parent > 0) u.segment<6>(6 * (row.parent - 1)) += row.J_parent;
+  if (row.child > 0) u.segment<6>(6 * (row.child - 1)) += row.J_child;
+  return u;
+}
+
 std::vector<VecX> RestingWrenches(const Mechanism& mechanism, const BodyStates& states,
-                                  const std::vector<int>& rubbing) {
+                                  const std::vector<int>& rubbing, const VecX& load_friction) {
   std::vector<VecX> wrenches;
   if (rubbing.empty()) return wrenches;
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
   for (size_t e = 0; e < rows.size(); ++e) {
     if (rubbing[e] != 0 || !Rubs(mechanism.elements[e])) continue;
-    const double most = std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
+    double most = std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
+    if (load_friction.size() > 0) most += load_friction[static_cast<Eigen::Index>(e)];
     wrenches.push_back(most * GradientOf(rows[e], mechanism.bodies.size()));
   }
   return wrenches;
+}
+
+double LoadFrictionLoss(const Mechanism& mechanism, const ReferenceSample& sample) {
+  if (sample.load_friction.size() == 0) return 0.0;
+  const std::vector<ScalarRow> rows = ElementRows(mechanism, sample.states);
+  double loss = 0.0;
+  for (size_t e = 0; e < rows.size(); ++e) {
+    const double size = sample.load_friction[static_cast<Eigen::Index>(e)];
+    loss += sample.rubbing[e] * size * RateOf(rows[e], sample.states.V_WB);
+  }
+  return loss;
 }
 
 void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R,

@@ -5,7 +5,8 @@
 //   rotor    F = −J n² q̈                                      E = ½ J n² q̇²                     (3)
 //   friction F = −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇       P = F q̇ to the dampers           (4)
 //
-// At rest friction is taken as 0, the middle of what statics allows: |F| ≤ Fs.
+// At rest friction is taken as 0, the middle of what statics allows: |F| ≤ Fs. What friction by the
+// joint's load adds to (4), load_friction.h finds.
 #pragma once
 
 #include <vector>
@@ -26,11 +27,16 @@ namespace mbv::internal {
 void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
                        const std::vector<int>& rubbing, std::vector<Vec6>* wrench_W);
 
-/// Per element that rests: breakaway force times its coordinate's gradient (6·bodies, without the
-/// world's): the wrenches that statics may add or take.
+/// Per element that rests: breakaway force (with `load_friction`) times its coordinate's gradient:
+/// the wrenches that statics may add or take.
 [[nodiscard]] std::vector<VecX> RestingWrenches(const Mechanism& mechanism,
                                                 const BodyStates& states,
-                                                const std::vector<int>& rubbing);
+                                                const std::vector<int>& rubbing,
+                                                const VecX& load_friction);
+/// Power that friction by the joints' loads takes [W].
+[[nodiscard]] double LoadFrictionLoss(const Mechanism& mechanism, const ReferenceSample& sample);
+/// Gradient of a coordinate over the motions of all bodies but the world (6·bodies).
+[[nodiscard]] VecX GradientOf(const ScalarRow& row, size_t bodies);
 
 void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, Energies* energy);
 /// Of the rotors: the rate of their kinetic energy.

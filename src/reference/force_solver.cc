@@ -10,6 +10,7 @@
 #include "reference/closure_failure.h"
 #include "reference/element_forces.h"
 #include "reference/least_forces.h"
+#include "reference/load_friction.h"
 
 namespace mbv::internal {
 namespace {
@@ -158,8 +159,9 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
     }
     if (!Factor()) continue;
     if (RunSummary summary = CheckControl(sample->states); !summary.ok()) return summary;
-    const VecX force = LeastNorm(wrenches);
+    VecX force = LeastNorm(wrenches);
     if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
+    if (RunSummary summary = AddLoadFriction(sample, &force); !summary.ok()) return summary;
     Report(force, sample);
     FindBands(sample);
     AuditSample(mechanism_, loads, sample);
@@ -201,6 +203,71 @@ void ForceSolver::Report(const VecX& force, ReferenceSample* sample) const {
   sample->prescribed_force = force.segment(row, mechanism_.prescribed.size());
 }
 
+MatX ForceSolver::ReactionsOf(const VecX& force, const BodyStates& states) const {
+  MatX reactions;
+  (void)FillReactions(mechanism_, states, force, &reactions);
+  return reactions;
+}
+
+// A load that a self-stress changes is no load that friction could follow.
+RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
+                                         const std::vector<size_t>& loaded) const {
+  for (Eigen::Index k = 0; k < self_stress_.cols(); ++k) {
+    VecX force = self_stress_.col(k);
+    for (int i = 0; i < rows_.size(); ++i) force[i] *= system_.RowScale(rows_.angular[i]);
+    const MatX reactions = ReactionsOf(force, sample.states);
+    for (const size_t e : loaded) {
+      if (AcrossAxis(mechanism_, e, reactions).norm() <= kOpens * force.cwiseAbs().maxCoeff()) {
+        continue;
+      }
+      const ForceElement& element = mechanism_.elements[e];
+      return {.stop = Stop::kUnsupported,
+              .message = fmt::format("the load of the {} ('{}') is not determined by statics: "
+                                     "redundant constraints share it",
+                                     Described(mechanism_, element), element.name),
+              .where = element.name,
+              .unit = {}};
+    }
+  }
+  return RunSummary::Done();
+}
+
+// Eqs. 1 and 2 of load_friction.h.
+RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample, VecX* force) {
+  const std::vector<size_t> loaded = LoadedElements(mechanism_);
+  sample->load_friction.resize(0);
+  if (loaded.empty()) return RunSummary::Done();
+  if (RunSummary summary = CheckLoadsUnique(*sample, loaded); !summary.ok()) return summary;
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, sample->states);
+  LoadSystem system;
+  MatX unit(force->size(), static_cast<Eigen::Index>(loaded.size()));  // forces per unit of each
+  const MatX reactions = ReactionsOf(*force, sample->states);
+  for (size_t d = 0; d < loaded.size(); ++d) {
+    const size_t e = loaded[d];
+    unit.col(static_cast<Eigen::Index>(d)) =
+        -LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()));
+    system.p.push_back(AcrossAxis(mechanism_, e, reactions));
+    system.sign.push_back(sample->rubbing[e]);
+    system.per_load.push_back(std::get<FrictionLaw>(mechanism_.elements[e].law).per_load());
+  }
+  for (const size_t e : loaded) {
+    std::vector<Vec3>& row = system.P.emplace_back();
+    for (Eigen::Index d = 0; d < unit.cols(); ++d) {
+      row.push_back(AcrossAxis(mechanism_, e, ReactionsOf(unit.col(d), sample->states)));
+    }
+  }
+  VecX n;
+  if (RunSummary summary = system.Solve(&n); !summary.ok()) return summary;
+  sample->load_friction.setZero(static_cast<Eigen::Index>(mechanism_.elements.size()));
+  for (size_t d = 0; d < loaded.size(); ++d) {
+    const auto k = static_cast<Eigen::Index>(d);
+    const double size = system.per_load[d] * n[k];
+    sample->load_friction[static_cast<Eigen::Index>(loaded[d])] = size;
+    *force -= system.sign[d] * size * unit.col(k);
+  }
+  return RunSummary::Done();
+}
+
 // Of the driven forces that one element opens, moments divided by the characteristic length.
 void ForceSolver::TakeRoundoff(VecX* driven) const {
   VecX size = *driven;
@@ -215,7 +282,8 @@ void ForceSolver::FindBands(ReferenceSample* sample) {
   const auto drives = static_cast<Eigen::Index>(mechanism_.drives.size());
   const auto bases = static_cast<Eigen::Index>(mechanism_.prescribed.size());
   VecX band = VecX::Zero(drives + bases);
-  for (const VecX& wrenches : RestingWrenches(mechanism_, sample->states, sample->rubbing)) {
+  for (const VecX& wrenches :
+       RestingWrenches(mechanism_, sample->states, sample->rubbing, sample->load_friction)) {
     VecX part = LeastNorm(wrenches).segment(first_driven_, drives + bases).cwiseAbs();
     TakeRoundoff(&part);
     band += part;

@@ -21,7 +21,8 @@ class ForceSolver {
 
   /// Fills forces, bands, reactions and the power audit of `sample` from its states and driven
   /// motion. Where the equations leave a choice, TakeLeastForces() decides. Friction at rest is
-  /// zero in forces and reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests.
+  /// zero in forces and reactions; a band is Σ |∂(drive force)/∂(friction)| Fs over what rests, Fs
+  /// by the load of the middle.
   [[nodiscard]] RunSummary Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample);
 
  private:
@@ -33,6 +34,10 @@ class ForceSolver {
   [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
   void Report(const VecX& force, ReferenceSample* sample) const;
   void FindBands(ReferenceSample* sample);
+  [[nodiscard]] RunSummary AddLoadFriction(ReferenceSample* sample, VecX* force);
+  [[nodiscard]] RunSummary CheckLoadsUnique(const ReferenceSample& sample,
+                                            const std::vector<size_t>& loaded) const;
+  [[nodiscard]] MatX ReactionsOf(const VecX& force, const BodyStates& states) const;
   void TakeRoundoff(VecX* driven) const;
 
   const Mechanism& mechanism_;

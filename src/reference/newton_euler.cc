@@ -138,6 +138,7 @@ void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& load
   const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
   const VecX& velocity = sample->driven.velocity;
   Powers& power = sample->power;
+  power.dampers -= LoadFrictionLoss(mechanism, *sample);
   power.base = sample->prescribed_force.dot(velocity.tail(velocity.size() - drives));
   power.input =
       sample->drive_force.dot(velocity.head(drives)) + power.base + power.loads + power.dampers;

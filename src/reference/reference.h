@@ -46,6 +46,8 @@ struct ReferenceSample {
   MatX outputs;           ///< outputs × 6
   /// Per force element, of those that rub: sign of the rate, 0 at rest (RestRate()).
   std::vector<int> rubbing;
+  /// Per force element: friction by its joint's load, μ r N; empty where none depends on it.
+  VecX load_friction;
   VecX drive_band, prescribed_band;  ///< half-widths of what friction at rest leaves open
   double closure_position_m = kNan, closure_rotation_rad = kNan;
   Powers power;

@@ -272,13 +272,22 @@ void ClosureSolver::SolveLeastDriven(const VecX& tau) {
   system_->force() = lambda.cwiseQuotient(system_->row_unit());
 }
 
+// The null space of Jᵀ, from the Q factor behind the rank.
+MatX ClosureSolver::ScaledSelfStress() const {
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
+  const MatX Q = qr.householderQ();
+  return Q.rightCols(redundant());
+}
+
+MatX ClosureSolver::SelfStress() const {
+  if (redundant() == 0) return MatX(system_->rows(), 0);
+  return system_->row_unit().cwiseInverse().asDiagonal() * ScaledSelfStress();
+}
+
 std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
   std::vector<int> rows;
   if (redundant() == 0) return rows;
-  // Self-stress: the null space of Jᵀ, from the Q factor behind the rank.
-  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
-  const MatX Q = qr.householderQ();
-  const MatX self_stress = Q.rightCols(redundant());
+  const MatX self_stress = ScaledSelfStress();
   for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {
     if (self_stress.row(i).norm() > 1e-6) rows.push_back(i);
   }

@@ -52,6 +52,9 @@ class ClosureSolver {
   /// is J x for some x. As many dimensions as rows were redundant when last solved.
   void RemoveSelfStress(VecX* force) const;
 
+  /// Row forces that balance each other at the last configuration solved: rows × redundant().
+  [[nodiscard]] MatX SelfStress() const;
+
   [[nodiscard]] int undriven() const { return system_->nv() - rank_; }
   [[nodiscard]] int redundant() const { return system_->rows() - rank_; }
   /// Rows of guided coordinates whose force is not unique at the present configuration.
@@ -59,6 +62,7 @@ class ClosureSolver {
 
  private:
   [[nodiscard]] RunSummary Walk(const VecX& from, const VecX& to);
+  [[nodiscard]] MatX ScaledSelfStress() const;
   void Factor();
   void SolveInto(const VecX& b, VecX* x);            // x = J⁺ b
   void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b

@@ -95,6 +95,12 @@ class ConstraintSystem {
   [[nodiscard]] int closure_row(int closure) const { return closure_row_[closure]; }
   [[nodiscard]] int coupling_row(int coupling) const { return first_coupling_ + coupling; }
 
+  /// Friction by the joints' loads that force() balances, per force element; empty: none.
+  void SetLoadFriction(const VecX& size) { load_friction_ = size; }
+  [[nodiscard]] double load_friction(size_t element) const {
+    return load_friction_.size() == 0 ? 0.0 : load_friction_[static_cast<Eigen::Index>(element)];
+  }
+
   /// Largest gaps of the closures: |translation| [m] and rotation angle of welds [rad].
   struct Gap {
     double position_m = 0.0, rotation_rad = 0.0;
@@ -120,7 +126,7 @@ class ConstraintSystem {
   int rows_ = 0, first_coupling_ = 0, closure_rows_ = 0;
   std::vector<int> closure_row_, driven_row_;
   std::vector<bool> coupling_is_length_;
-  VecX given_;
+  VecX given_, load_friction_;
   MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)
 };

@@ -45,6 +45,7 @@ ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
           u.dot(ConstVecX(d.qacc, system.nv())) + system.TendonBias(place.tendon)};
   }
   at.rests = std::abs(at.rate) <= place.rest_rate;
+  at.load_friction = system.load_friction(element);
   return at;
 }
 
@@ -65,13 +66,14 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     const double ratio = at.rate / friction->stribeck_rate;
     const double curve = std::exp(-(ratio * ratio));
     const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
-    return at.rests ? 0.0 : -std::copysign(most, at.rate);
+    return at.rests ? 0.0 : -std::copysign(most + at.load_friction, at.rate);
   }
   return -std::get<RotorLaw>(element.law).reflected() * at.acceleration;
 }
 
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
-  return at.rests && Rubs(element) ? std::get<FrictionLaw>(element.law).breakaway : 0.0;
+  if (!at.rests || !Rubs(element)) return 0.0;
+  return std::get<FrictionLaw>(element.law).breakaway + at.load_friction;
 }
 
 ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {

@@ -16,7 +16,8 @@ namespace mbv::simulation {
 /// Motion of an element's coordinate.
 struct ElementMotion {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
-  bool rests = false;  ///< where it may rub: at most at the rest rate
+  bool rests = false;          ///< where it may rub: at most at the rest rate
+  double load_friction = 0.0;  ///< by the joint's load (load_friction.h)
 };
 
 /// At the data's qpos, qvel and qacc; `acceleration` needs ConstraintSystem::Bias() there.

@@ -98,10 +98,17 @@ double ExtentOf(const Mechanism& mechanism) {
   return std::max(box.isEmpty() ? 0.0 : box.diagonal().norm(), CharacteristicLength(mechanism));
 }
 
+// Of what was recorded.
+RunSummary TroubleAt(const Session& s, double t_s) {
+  RunSummary summary = s.trouble;
+  if (!summary.ok()) summary.time_s = t_s;
+  return summary;
+}
+
 // After a recorded sample: the motion must be finite and the loops closed.
 RunSummary CheckSample(const Session& s, double largest_gap_m, double t_s) {
   const ConstraintSystem::Gap gap = s.system.LargestGap();
-  if (gap.position_m < largest_gap_m) return RunSummary::Done();
+  if (gap.position_m < largest_gap_m) return TroubleAt(s, t_s);
   return Failure(fmt::format("the simulated loops came apart by {:.3g} m", gap.position_m), t_s);
 }
 
@@ -133,6 +140,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   s->FindShared();
   s->work.Start(s->WorkRates());
   s->Record(0);
+  if (RunSummary summary = TroubleAt(*s, 0.0); !summary.ok()) return summary;
   for (size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
     const double h = step.to_s - step.from_s;
@@ -185,6 +193,9 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     if (n % per_sample == 0) {
       mj_forward(m, data);
       s->Record(static_cast<size_t>(n / per_sample));
+      if (RunSummary summary = TroubleAt(*s, static_cast<double>(n) * h); !summary.ok()) {
+        return summary;
+      }
     }
     mj_step(m, data);
     if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||

@@ -115,6 +115,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
     s->solver.SolveAcceleration(samples[i].acceleration);
     SolveDynamics(s, times[i], samples[i], &tau);
     s->Record(i);
+    if (!s->trouble.ok()) return At(s->trouble, times[i]);
   }
   s->run->loop_wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -289,6 +289,20 @@ Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {
   return F_F;
 }
 
+std::vector<Vec3> Recorder::ForcesAcross(const std::vector<size_t>& elements, const Loads& loads) {
+  std::vector<Pose> X_WB;
+  BodyPoses(engine_, *system_->data(), &X_WB);
+  TreeWrenches(loads);
+  std::vector<Vec3> forces;
+  for (const size_t e : elements) {
+    const int j = engine_.mechanism->elements[e].joint;
+    const Vec3& a = engine_.mechanism->joints[static_cast<size_t>(j)].axis;
+    const Vec3 R = ReactionOf(j, X_WB).tail<3>();
+    forces.emplace_back(R - a.dot(R) * a);
+  }
+  return forces;
+}
+
 void Recorder::RecordReactions(const Loads& loads, const std::vector<Pose>& X_WB,
                                Eigen::Ref<Eigen::RowVectorXd> row) {
   TreeWrenches(loads);

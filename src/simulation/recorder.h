@@ -23,6 +23,11 @@ class Recorder {
   void Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::RowVectorXd> row,
               std::vector<Pose>* X_WB);
 
+  /// Force across its joint's axis that the parent exerts on the child, per element, in F's axes,
+  /// by the data's accelerations and constraint forces.
+  [[nodiscard]] std::vector<Vec3> ForcesAcross(const std::vector<size_t>& elements,
+                                               const Loads& loads);
+
   /// True if something rubs.
   [[nodiscard]] bool has_bands() const {
     return columns_.Has(Quantity::kForceBand) || columns_.Has(Quantity::kBaseForceBand);

@@ -54,6 +54,8 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
+  const std::vector<size_t> loaded;         ///< elements with friction by their joint's load
+  RunSummary trouble = RunSummary::Done();  ///< in finding it
   const bool lacking;   ///< there are force elements that MuJoCo has no word for
   VecX work_rates;      ///< of the state that was asked for last
   EngineState start;    ///< of a mechanism whose drives are pushed or servos

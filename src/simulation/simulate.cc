@@ -7,6 +7,7 @@
 #include "core/roles.h"
 #include "mjcf/mjcf.h"
 #include "simulation/element_forces.h"
+#include "simulation/load_friction.h"
 #include "simulation/session.h"
 #include "simulation/steps.h"
 
@@ -51,6 +52,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       solver(&system),
       loads(engine, motion_),
       recorder(&system, Integrates(options_)),
+      loaded(LoadedElements(*engine.mechanism)),
       lacking(HasLacking(*engine.mechanism)) {
   run->trace.witness = role::kSimulated.name;
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
@@ -63,10 +65,11 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
 void Session::Record(size_t i) {
   const auto row = static_cast<Eigen::Index>(i);
   {
+    const LoadFriction load_friction(this);
     const LeastForces least(this);
     recorder.Record(loads, work.work(), record, &run->X_WB[i]);
+    if (recorder.has_bands()) recorder.RecordBands(Bands(), record);
   }
-  if (recorder.has_bands()) recorder.RecordBands(Bands(), record);
   run->trace.values.row(row) = record;
   run->qpos.row(row) = Eigen::Map<const Eigen::RowVectorXd>(data->qpos, engine.m->nq);
   if (progress && i % 16 == 0) {
@@ -75,6 +78,7 @@ void Session::Record(size_t i) {
 }
 
 const VecX& Session::WorkRates() {
+  const LoadFriction load_friction(this);
   const LeastForces least(this);
   simulation::WorkRates(system, loads, &work_rates);
   return work_rates;

@@ -105,6 +105,7 @@ void Scale(const Mechanism& mechanism, double s, ForceElement* element) {
     friction->coulomb *= force;
     friction->breakaway *= force;
     friction->stribeck_rate *= unit;
+    if (!length) friction->radius *= s;  // coefficients have no unit
   }
   if (auto* rotor = std::get_if<RotorLaw>(&element->law)) rotor->inertia *= force / unit;
   auto* spring = std::get_if<SpringLaw>(&element->law);

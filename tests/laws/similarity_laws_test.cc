@@ -30,7 +30,8 @@ const char* const kScenarios[] = {
     "four_bar/turn_inverse",      "n_four_bar/rock",      "redundant_five_bar/circle_inverse",
     "scara_robot/tool_load",      "slider_crank/press",   "spr_tripod/tool_load_inverse",
     "spring_cart/swing",          "stewart/wave",         "stabilizing_platform/sea_state",
-    "vehicle_linkage/drive",      "geared_press/inverse", "rubbing_five_bar/draw_inverse"};
+    "vehicle_linkage/drive",      "geared_press/inverse", "rubbing_five_bar/draw_inverse",
+    "journal_crank/press_inverse"};
 
 struct Case {
   Scenario scenario;

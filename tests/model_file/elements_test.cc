@@ -39,13 +39,15 @@ const char* const kAll =
     "  p: {kind: spring, drive: leg, polynomial: [3, -2, 1], free_mm: 20}\n"
     "  r: {kind: rotor, joint: turn, inertia: 2e-5, ratio: -50}\n"
     "  f: {kind: friction, joint: turn, coulomb: 0.2, breakaway: 0.3, stribeck_rate: 0.1}\n"
-    "  d: {kind: friction, joint: slide, coulomb: 5}\n";
+    "  d: {kind: friction, joint: slide, coulomb: 5}\n"
+    "  j: {kind: friction, drive: m, coulomb: 0.1, coefficient: 0.08, radius: 1}\n"
+    "  g: {kind: friction, joint: turn, coefficient: 0.2, radius: 0.03}\n";
 
 TEST(Elements, AreReadOnJointsAndAlongDrives) {
   const LoadResult loaded = LoadModelText(WithElements(kAll), "m.yaml");
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
-  ASSERT_EQ(m.elements.size(), 6u);
+  ASSERT_EQ(m.elements.size(), 8u);
   EXPECT_EQ(m.elements[0].name, "c");
   EXPECT_EQ(m.elements[0].joint, 1);
   EXPECT_EQ(m.elements[0].coordinate, 1);
@@ -62,6 +64,10 @@ TEST(Elements, AreReadOnJointsAndAlongDrives) {
   EXPECT_EQ(LawOf<FrictionLaw>(m, 4).breakaway, 0.3);
   EXPECT_EQ(LawOf<FrictionLaw>(m, 4).stribeck_rate, 0.1);
   EXPECT_EQ(LawOf<FrictionLaw>(m, 5).breakaway, 5);  // as Coulomb's
+  EXPECT_EQ(LawOf<FrictionLaw>(m, 6).per_load(), 0.08);
+  EXPECT_EQ(LawOf<FrictionLaw>(m, 6).coulomb, 0.1);
+  EXPECT_EQ(LawOf<FrictionLaw>(m, 7).per_load(), 0.2 * 0.03);
+  EXPECT_EQ(LawOf<FrictionLaw>(m, 7).breakaway, 0.0);
 }
 
 TEST(Elements, OfPartsNameTheirOwnJointsAndDrives) {
@@ -121,6 +127,23 @@ TEST(Elements, WhatMeansNothingIsAFinding) {
             "m.yaml:10:59: error: elements.g.breakaway = 1 violates breakaway >= coulomb = 2\n");
 }
 
+TEST(Elements, FrictionByLoadNeedsAJournalOrAGuide) {
+  const std::string radius =
+      "  hint: radius: of the journal of a revolute joint whose friction is coefficient times "
+      "radius times its radial load\n";
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: 0.2}\n"),
+            "m.yaml:10:6: error: elements.g needs a radius\n" + radius);
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coulomb: 1, radius: 0.2}\n"),
+            "m.yaml:10:56: error: elements.g.radius has no meaning here\n" + radius);
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: slide, coefficient: 0.2, radius: 1}\n"),
+            "m.yaml:10:50: error: elements.g.coefficient: friction by the joint's load is known of "
+            "revolute and prismatic joints only\n  hint: coulomb: friction whatever the load\n");
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: -1, radius: 1}\n"),
+            "m.yaml:10:49: error: elements.g.coefficient = -1 violates coefficient >= 0\n");
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coefficient: 1, radius: 0}\n"),
+            "m.yaml:10:60: error: elements.g.radius = 0 violates radius > 0\n");
+}
+
 void ExpectSameElements(const Mechanism& a, const Mechanism& b) {
   ASSERT_EQ(a.elements.size(), b.elements.size());
   for (size_t e = 0; e < a.elements.size(); ++e) {
@@ -130,7 +153,7 @@ void ExpectSameElements(const Mechanism& a, const Mechanism& b) {
     EXPECT_EQ(x.coordinate, y.coordinate);
     EXPECT_EQ(x.drive, y.drive);
     ASSERT_EQ(x.law.index(), y.law.index());
-    EXPECT_EQ(ElementText(x, ""), ElementText(y, ""));
+    EXPECT_EQ(ElementText(x, "", false), ElementText(y, "", false));
   }
 }
 

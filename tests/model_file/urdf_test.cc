@@ -275,8 +275,8 @@ TEST(UrdfExport, ForceElementsComeBack) {
     if (std::holds_alternative<DampingLaw>(element.law)) continue;
     const auto same = [&](const ForceElement& other) {
       return other.name == element.name &&
-             ElementText(other, back.mechanism->joints[other.joint].name) ==
-                 ElementText(element, m.joints[element.joint].name);
+             ElementText(other, back.mechanism->joints[other.joint].name, false) ==
+                 ElementText(element, m.joints[element.joint].name, false);
     };
     EXPECT_TRUE(std::ranges::any_of(back.mechanism->elements, same)) << element.name;
   }

@@ -3,6 +3,7 @@
 
 #include "model_file/load_model.h"
 #include "reference/forward.h"
+#include "tests/pushed_block.h"
 #include "tests/reference/fixture.h"
 #include "tests/rubbing_pendulum.h"
 #include "tests/shipped.h"
@@ -102,6 +103,15 @@ TEST(ReferenceElements, DryFrictionAtRestLeavesABand) {
   EXPECT_NEAR(At(run.trace, 10, "power.dampers"), 0.0, 1e-15);
 }
 
+TEST(ReferenceElements, APrescribedJointThatRestsHasABand) {
+  const Mechanism m = RubbingPendulum().Prescribed();
+  Motion hold{.duration_s = 1.0, .sample_s = 0.5, .commands = {}, .loads = {}};
+  hold.commands = {Commanded("base", Coordinate::Kind::kPrescribed, 0, 0, {{ConstantTerm{0.3}}})};
+  const ReferenceRun run = RunReference(m, hold);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_NEAR(At(run.trace, 1, "base.force.band"), 0.6, 1e-12);
+}
+
 TEST(ReferenceElements, FreeMotionWithDryFrictionIsRefused) {
   const Mechanism m = RubbingPendulum().Make();
   const ForwardRun free = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 1.0));
@@ -132,6 +142,66 @@ TEST(ReferenceElements, ABandIsWhatAForceInTheElementsPlaceWouldMove) {
     EXPECT_NEAR(At(run.trace, 0, force + ".band"), band, 1e-12);
     EXPECT_GT(band, 0.25);  // of its own bearing alone 0.32 or 0.24
   }
+}
+
+// At sample 10, of the load that the middle has: m g − F sin θ.
+double BandAt(const PushedBlock& block, const Trace& trace) {
+  const double L = At(trace, 10, "leg.position"), x = std::sqrt(L * L - block.h * block.h);
+  const double load = block.m * block.g - At(trace, 10, "leg.force") * block.h / L;
+  return block.coefficient * load * L / x;
+}
+
+// Turns round at t = 0.5 s, where the block rests.
+TEST(ReferenceElements, FrictionByLoadIsThatOfAPushedBlock) {
+  const PushedBlock block;
+  const Mechanism m = block.Make();
+  const Profile profile{{ConstantTerm{0.55}, SineTerm{0.05, 0.5, 0}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.05));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  PushedBlock bent = block;
+  bent.coefficient *= 1.0 + 1e-6;
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double L = At(run.trace, i, "leg.position");
+    const double rate = i == 10 ? 0.0 : At(run.trace, i, "leg.velocity");
+    const double acceleration = At(run.trace, i, "leg.acceleration");
+    const double force = At(run.trace, i, "leg.force");
+    EXPECT_NEAR(force, block.Force(L, rate, acceleration), 1e-11) << i;
+    const double away = std::abs(force - bent.Force(L, rate, acceleration));
+    EXPECT_GT(away, i == 10 ? -1.0 : 1e-8) << i;
+    EXPECT_NEAR(At(run.trace, i, "leg.force.band"), i == 10 ? BandAt(block, run.trace) : 0.0,
+                1e-11);
+    EXPECT_NEAR(At(run.trace, i, "power.input"), At(run.trace, i, "power.energy_rate"), 1e-11);
+  }
+}
+
+TEST(ReferenceElements, AJournalRubsByItsRadialLoadOnly) {
+  const JournalPendulum p;
+  const Mechanism m = p.Make();
+  const Profile even{{ConstantTerm{0.2}, RampTerm{.rate = -3.0}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {even}, 2.0, 0.1));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double q = At(run.trace, i, "motor.position");
+    EXPECT_NEAR(At(run.trace, i, "motor.force"), p.Torque(q, -3.0), 1e-13);
+  }
+}
+
+TEST(ReferenceElements, FrictionByASharedLoadIsRefused) {
+  const Mechanism m = JournalPendulum().OnTwoHinges();
+  const Profile even{{ConstantTerm{0.2}, RampTerm{.rate = -3.0}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {even}, 1.0, 0.5));
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported) << run.summary.message;
+  EXPECT_EQ(run.summary.where, "journal");
+}
+
+// Where the block is pressed against the guide as fast as it is pushed, no force is determined.
+TEST(ReferenceElements, FrictionByLoadThatFeedsItselfIsRefused) {
+  const Mechanism m = PushedBlock{.coefficient = 2.0}.Make();
+  const Profile profile{{ConstantTerm{0.55}, RampTerm{.rate = 0.05}}};
+  const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.5));
+  EXPECT_EQ(run.summary.stop, Stop::kSingular);
+  EXPECT_EQ(run.summary.time_s, 0.0);
+  EXPECT_NEAR(run.summary.amount, 2.0 * 0.3 / std::sqrt(0.55 * 0.55 - 0.09), 1e-12);
 }
 
 // Along a leg's length: a mass of 2 kg on a rail, hung on a distance drive.

@@ -104,6 +104,31 @@ TEST(HtmlData, TheErrorIsRelativeToTheLargestForceOfItsUnit) {
   EXPECT_EQ(error.size(), data["time"].size());
 }
 
+// d1 rests at the last two samples, within 7 N.
+BentPage RestingPage() {
+  BentPage page;
+  Trace& trace = page.report.witnesses[1].trace;
+  trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
+  trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
+  trace.values.rightCols(1).setZero();
+  trace.values.rightCols(1).bottomRows(2).setConstant(7.0);
+  return page;
+}
+
+TEST(HtmlData, ForcesThatRestLeavesOpenHaveABand) {
+  const Json data = Json::parse(PageData(RestingPage().input()));
+  EXPECT_TRUE(data["witnesses"][0]["band"][0].is_null());
+  const std::vector<float> band = Floats(data["witnesses"][1]["band"][0].get<std::string>());
+  EXPECT_EQ(band[98], 0.0F);
+  EXPECT_EQ(band[100], 7.0F);
+  EXPECT_TRUE(data["witnesses"][1]["band"][1].is_null());
+}
+
+TEST(StaticPlots, StrokeWhatRestLeavesOpen) {
+  EXPECT_EQ(StaticPlotsHtml(BentPage().report).find("d1, at rest"), std::string::npos);
+  EXPECT_NE(StaticPlotsHtml(RestingPage().report).find("d1, at rest"), std::string::npos);
+}
+
 TEST(HtmlData, ThinningKeepsTheWorstSample) {
   BentPage page;
   // One wrong sample among 10001.

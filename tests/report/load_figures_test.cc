@@ -30,6 +30,16 @@ Report LoadedReport() {
   return report;
 }
 
+// d1 rests at 3 s, within 2 N: −7 N may be asked for.
+TEST(LoadFigures, AtRestTheEndFartherFromZeroCounts) {
+  Report report = LoadedReport();
+  Trace& trace = report.witnesses[0].trace;
+  trace.channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d1"));
+  trace.values.conservativeResize(Eigen::NoChange, trace.values.cols() + 1);
+  trace.values.rightCols(1) << 0.0, 0.0, 2.0;
+  EXPECT_EQ(LoadFiguresOf(report).drives.at(0).force.peak, -7.0);
+}
+
 TEST(LoadFigures, OfADriveAreThoseComputedByHand) {
   const LoadFigures loads = LoadFiguresOf(LoadedReport());
   ASSERT_EQ(loads.drives.size(), 1U) << "nothing is known of d2";

@@ -49,6 +49,15 @@ std::string Joined(const std::vector<std::string>& lines) {
   return text;
 }
 
+TEST(Sizing, SamplesAtRestAreTold) {
+  Report report = Sized("a", 3.2, 0.8);
+  report.motor_loads[0].samples_at_rest = 1;
+  const std::string told = "friction rests at 1 of 2 samples: the worse end of the band counts";
+  EXPECT_NE(Joined(SizingLines(report, true)).find("  " + told + "\n"), std::string::npos);
+  EXPECT_NE(SizingHtml(report).find("d1: " + told + "."), std::string::npos);
+  EXPECT_EQ(SizingJson(report)[0]["samples_at_rest"], 1);
+}
+
 TEST(Sizing, ALinePerMotorAndAllFiguresOnDemand) {
   const Report report = Sized("a", 3.2, 0.8);
   EXPECT_EQ(Joined(SizingLines(report, false)), "motor of d1: margin 1.25 (peak)\n");

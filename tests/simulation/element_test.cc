@@ -4,6 +4,7 @@
 #include "mjcf/mjcf.h"
 #include "mjcf/plan.h"
 #include "simulation/simulation.h"
+#include "tests/pushed_block.h"
 #include "tests/rubbing_pendulum.h"
 #include "tests/simulation/torque_error.h"
 
@@ -65,6 +66,80 @@ TEST(SimulatedElements, DryFrictionAtRestLeavesABand) {
     EXPECT_LT(run.trace.values.col(run.trace.Find("power.dampers")).cwiseAbs().maxCoeff(), 1e-12);
     const SimulationRun moving = Simulate(m, Swing(), SwingAt, {.mode = mode});
     EXPECT_EQ(moving.trace.values.col(moving.trace.Find("motor.force.band")).maxCoeff(), 0.0);
+  }
+}
+
+TEST(SimulatedElements, APrescribedJointThatRestsHasABand) {
+  const Mechanism m = RubbingPendulum().Prescribed();
+  const SimulationRun run =
+      Simulate(m, Swing(), fixtures::HoldStill({0.3}), {.mode = SimulationMode::kInverse});
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_NEAR(run.trace.values(1, run.trace.Find("base.force.band")), 0.6, 1e-12);
+}
+
+RunSummary SpinAt(double t, DrivenSample* driven) {
+  driven->position = VecX::Constant(1, 0.2 - 3 * t);
+  driven->velocity = VecX::Constant(1, -3.0);
+  driven->acceleration = VecX::Zero(1);
+  return RunSummary::Done();
+}
+
+TEST(SimulatedElements, FrictionByASharedLoadIsRefused) {
+  const Mechanism m = fixtures::JournalPendulum().OnTwoHinges();
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const SimulationRun run = Simulate(m, Swing(), SpinAt, {.mode = mode});
+    EXPECT_EQ(run.summary.stop, Stop::kUnsupported) << run.summary.message;
+    EXPECT_EQ(run.summary.where, "journal");
+    EXPECT_EQ(run.summary.time_s, 0.0);
+  }
+}
+
+TEST(SimulatedElements, AJournalRubsByItsRadialLoadOnly) {
+  const fixtures::JournalPendulum p;
+  const Mechanism m = p.Make();
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const SimulationRun run = Simulate(m, Swing(), SpinAt, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    const double limit = mode == SimulationMode::kForward ? 1e-7 : 1e-13;
+    for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+      const auto row = static_cast<Eigen::Index>(i);
+      EXPECT_NEAR(run.trace.values(row, run.trace.Find("motor.force")),
+                  p.Torque(0.2 - 3 * run.trace.time_s[i], -3.0), limit);
+    }
+  }
+}
+
+RunSummary PushAt(double t, DrivenSample* driven) {
+  driven->position = VecX::Constant(1, 0.6 + 0.1 * t + 0.02 * std::sin(2 * t));
+  driven->velocity = VecX::Constant(1, 0.1 + 0.04 * std::cos(2 * t));
+  driven->acceleration = VecX::Constant(1, -0.08 * std::sin(2 * t));
+  return RunSummary::Done();
+}
+
+TEST(SimulatedElements, FrictionByLoadIsThatOfAPushedBlock) {
+  const fixtures::PushedBlock block;
+  const Mechanism m = block.Make();
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const bool forward = mode == SimulationMode::kForward;
+    const SimulationRun run = Simulate(m, Swing(), PushAt, {.mode = mode});
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    double worst = 0.0, bent = 0.0;
+    for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+      DrivenSample at;
+      (void)PushAt(run.trace.time_s[i], &at);
+      const auto row = static_cast<Eigen::Index>(i);
+      const double force = run.trace.values(row, run.trace.Find("leg.force"));
+      const auto off = [&](const fixtures::PushedBlock& by) {
+        return std::abs(force - by.Force(at.position[0], at.velocity[0], at.acceleration[0]));
+      };
+      worst = std::max(worst, off(block));
+      bent = std::max(bent, off({.coefficient = 1.001 * block.coefficient}));
+    }
+    EXPECT_LT(worst, forward ? 1e-5 : 1e-11);
+    EXPECT_GT(bent, 1e-3);
+    const VecX in = run.trace.values.col(run.trace.Find("power.input"));
+    const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
+    EXPECT_LT((in - rate).cwiseAbs().maxCoeff(), 1e-6 * in.cwiseAbs().maxCoeff());
   }
 }
 

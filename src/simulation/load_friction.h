@@ -1,0 +1,39 @@
+// Friction that grows with the joint's own reaction, on MuJoCo's forces.
+//
+//   F_e = −c_e n_e sign q̇_e,  n_e = |p_e + Σ_d P_ed F_d|,  c = μ r                             (1)
+// p: reaction force across the axis without such friction, as the recorder reads it; P: what a unit
+// force F_d adds, with Jᵀλ = −u_d. The motion is commanded, so that friction changes forces only:
+// it is found where forces are recorded and is not pushed with. Newton on n.
+#pragma once
+
+#include "simulation/session.h"
+
+namespace mbv::simulation {
+
+/// Indices of the elements with friction by load.
+[[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
+
+/// Adds (1) to the session's constraint forces for as long as it lives. What goes wrong is in
+/// Session::trouble.
+class LoadFriction {
+ public:
+  explicit LoadFriction(Session* session);
+  ~LoadFriction();
+  LoadFriction(const LoadFriction&) = delete;
+  LoadFriction& operator=(const LoadFriction&) = delete;
+
+ private:
+  void FindLoads();
+  void CheckUnique();
+  [[nodiscard]] bool SolveLoads();
+  void Apply();
+
+  Session& s_;
+  VecX found_;                        // constraint forces without
+  std::vector<Vec3> p_;               // per loaded element [N]
+  std::vector<std::vector<Vec3>> P_;  // [e][d]
+  MatX unit_;                         // constraint forces per unit of each
+  VecX signed_c_, n_;                 // sign q̇ c; loads [N]
+};
+
+}  // namespace mbv::simulation
