@@ -107,6 +107,15 @@ ScalarRow OutputRow(const Output& output, int component, const BodyStates& state
   return row;
 }
 
+ScalarRow BushingRow(const Bushing& bushing, int coordinate, const BodyStates& states) {
+  const FramePair pair =
+      MakePair(states, bushing.parent, bushing.X_PF, bushing.child, bushing.X_CM);
+  MBV_DEMAND(coordinate >= 0 && coordinate < 6, coordinate);
+  return ToRow(coordinate < 3 ? Along(pair, Vec3::Unit(coordinate))
+                              : internal::RotationVector(pair, coordinate - 3),
+               bushing.parent, bushing.child);
+}
+
 ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate,
                         const BodyStates& states, double near_value) {
   switch (coordinate.kind) {

@@ -51,6 +51,9 @@ struct ScalarRow {
 /// Component 0…5 (x, y, z, roll, pitch, yaw) of an output.
 [[nodiscard]] ScalarRow OutputRow(const Output& output, int component, const BodyStates& states,
                                   double near_value = 0.0);
+/// Coordinate 0…5 of a bushing (Bushing).
+[[nodiscard]] ScalarRow BushingRow(const Bushing& bushing, int coordinate,
+                                   const BodyStates& states);
 [[nodiscard]] ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate,
                                       const BodyStates& states, double near_value = 0.0);
 

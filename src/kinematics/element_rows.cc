@@ -12,6 +12,10 @@ ScalarRow RowOf(const Mechanism& mechanism, const ForceElement& element, const B
   if (element.drive >= 0) {
     return DriveRow(mechanism, mechanism.drives[static_cast<size_t>(element.drive)], states);
   }
+  if (element.bushing >= 0) {
+    return BushingRow(mechanism.bushings[static_cast<size_t>(element.bushing)], element.coordinate,
+                      states);
+  }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
   const auto k = static_cast<size_t>(element.coordinate);
   return JointCoordinateRow(joint, element.coordinate, states,
@@ -28,10 +32,9 @@ double HomeOf(const Mechanism& mechanism, const Drive& drive) {
 std::vector<double>* TurnsOf(const Mechanism& mechanism, BodyStates* states) {
   if (!states->turns.empty()) return &states->turns;
   for (const ForceElement& element : mechanism.elements) {
-    states->turns.push_back(element.drive >= 0
-                                ? 0.0
-                                : mechanism.joints[static_cast<size_t>(element.joint)]
-                                      .home[static_cast<size_t>(element.coordinate)]);
+    states->turns.push_back(element.joint < 0 ? 0.0
+                                              : mechanism.joints[static_cast<size_t>(element.joint)]
+                                                    .home[static_cast<size_t>(element.coordinate)]);
   }
   for (const Drive& drive : mechanism.drives) states->turns.push_back(HomeOf(mechanism, drive));
   for (const Prescribed& base : mechanism.prescribed) {

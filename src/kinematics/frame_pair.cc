@@ -2,9 +2,32 @@
 
 #include <cmath>
 
+#include "core/spatial.h"
 #include "mechanism/joint_coordinate.h"
 
 namespace mbv::internal {
+namespace {
+
+// c(θ) of RotationVector() and c'(θ)/θ.
+struct LogMap {
+  double c = 1.0 / 12.0, slope = 1.0 / 360.0;
+};
+
+LogMap LogMapAt(double theta) {
+  const double theta2 = theta * theta;
+  constexpr double kSeries = 0.2;  // below, by power series: the next terms are under 1e-15
+  if (theta < kSeries) {
+    return {1.0 / 12.0 + theta2 * (1.0 / 720.0 + theta2 * (1.0 / 30240.0 + theta2 / 1209600.0)) +
+                theta2 * theta2 * theta2 * theta2 / 47900160.0,
+            1.0 / 360.0 + theta2 * (1.0 / 7560.0 + theta2 * (1.0 / 201600.0 + theta2 / 5987520.0))};
+  }
+  const double half = 0.5 * theta, cot = std::cos(half) / std::sin(half);
+  const double s = std::sin(half);
+  const double slope = -2.0 / (theta2 * theta) + cot / (2.0 * theta2) + 1.0 / (4.0 * theta * s * s);
+  return {1.0 / theta2 - cot / (2.0 * theta), slope / theta};
+}
+
+}  // namespace
 
 FramePair MakePair(const BodyStates& states, int parent, const Pose& X_PF, int child,
                    const Pose& X_CM) {
@@ -96,6 +119,29 @@ PairScalar RollPitchYaw(const FramePair& pair, int component) {
   out.J_parent = -R20.J_parent / cos_p;
   out.rate = -R20.rate / cos_p;
   out.bias = (-R20.value * out.rate * out.rate - R20.bias) / cos_p;
+  return out;
+}
+
+PairScalar RotationVector(const FramePair& pair, int component) {
+  const Mat3 R_FW = pair.R_WF.transpose();
+  const Vec3 phi = LogRotation(R_FW * pair.R_WM);
+  const LogMap map = LogMapAt(phi.norm());
+  const Mat3 P = Skew(phi);
+  const Mat3 T = Mat3::Identity() - 0.5 * P + map.c * P * P;
+  const Vec3 w = R_FW * (pair.w_C - pair.w_P);
+  const Vec3 phi_rate = T * w;
+  const Mat3 P_rate = Skew(phi_rate);
+  // φ̈ = T R_WFᵀ (ε_C − ε_P) − T (ω_P × w) + Ṫ w
+  const Mat3 T_rate =
+      -0.5 * P_rate + map.slope * phi.dot(phi_rate) * P * P + map.c * (P_rate * P + P * P_rate);
+  const Vec3 bias = T_rate * w - T * (R_FW * pair.w_P).cross(w);
+  const Vec3 n = pair.R_WF * T.row(component).transpose();
+  PairScalar out;
+  out.value = phi[component];
+  out.J_child << n, Vec3::Zero();
+  out.J_parent << -n, Vec3::Zero();
+  out.rate = phi_rate[component];
+  out.bias = bias[component];
   return out;
 }
 

@@ -40,6 +40,10 @@ struct PairScalar {
 
 /// Roll, pitch or yaw (0, 1, 2) of R_FM = Rz Ry Rx.
 [[nodiscard]] PairScalar RollPitchYaw(const FramePair& pair, int component);
+/// Component of the rotation vector φ = log R_FM in F's axes, |φ| < π:
+///   φ̇ = T(φ) w, w = R_WFᵀ (ω_C − ω_P), T = 1 − ½ [φ]× + c(θ) [φ]×²,
+///   c = 1/θ² − cot(θ/2)/(2θ), θ = |φ|                     [Murray, Li, Sastry 1994, ch. 2]
+[[nodiscard]] PairScalar RotationVector(const FramePair& pair, int component);
 /// Coordinate of a joint kind.
 [[nodiscard]] PairScalar JointCoordinate(const Joint& joint, int coordinate, const FramePair& pair);
 

@@ -61,6 +61,7 @@ const char* WordOf(const ForceElement& element) {
 }
 
 bool ActsOnLength(const Mechanism& mechanism, const ForceElement& element) {
+  if (element.bushing >= 0) return element.coordinate < 3;
   return element.drive >= 0 ||
          IsLength(mechanism.joints[static_cast<size_t>(element.joint)].kind, element.coordinate);
 }
@@ -69,6 +70,17 @@ double RestRate(const Mechanism& mechanism, const ForceElement& element, double 
   constexpr double kRest = 1e-6;
   return kRest * (ActsOnLength(mechanism, element) ? CharacteristicLength(mechanism) : 1.0) /
          duration_s;
+}
+
+bool IsGyroscopic(const ForceElement& element) {
+  const auto* rotor = std::get_if<RotorLaw>(&element.law);
+  return rotor != nullptr && rotor->carrier && rotor->inertia > 0.0;
+}
+
+std::string BushingWord(const ForceElement& element) {
+  static constexpr std::array<const char*, 6> kCoordinates = {"x", "y", "z", "rx", "ry", "rz"};
+  return (std::holds_alternative<DampingLaw>(element.law) ? "c" : "k") +
+         std::string(kCoordinates.at(static_cast<size_t>(element.coordinate)));
 }
 
 bool Rubs(const ForceElement& element) {
@@ -84,7 +96,11 @@ std::string FirstFriction(const Mechanism& mechanism) {
 }
 
 std::string Described(const Mechanism& mechanism, const ForceElement& element) {
-  const std::string word = WordOf(element);
+  const std::string word = IsGyroscopic(element) ? "gyroscopic rotor" : WordOf(element);
+  if (element.bushing >= 0) {
+    return BushingWord(element) + " of bushing '" +
+           mechanism.bushings[static_cast<size_t>(element.bushing)].name + "'";
+  }
   if (element.drive >= 0) {
     return word + " of drive '" + mechanism.drives[static_cast<size_t>(element.drive)].name + "'";
   }

@@ -9,6 +9,7 @@
 #include <array>
 #include <limits>
 #include <memory>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -197,11 +198,18 @@ struct SpringLaw {
   double free = 0.0;               ///< [m or rad]
   double preload = 0.0;            ///< F0 [N or N m]
 };
-/// A motor's rotor behind a gear: force −J n² q̈, known as armature. It turns about an axis of fixed
-/// direction: no gyroscopic coupling.
+/// The axis of a rotor in the body that carries its bearings.
+struct RotorAxis {
+  int body = 0;
+  Vec3 axis_B = Vec3::UnitZ();  ///< unit; the rotor turns about it with n q̇, seen from the body
+};
+/// A motor's rotor behind a gear: force −J n² q̈, known as armature. Without a carrier its axis
+/// keeps its direction. With one, the rotor has the angular momentum J n q̇ a beyond that of a body
+/// at rest in the carrier, whose inertia contains it: kinetic energy ½ J (n q̇)² + J n q̇ a·ω.
 struct RotorLaw {
   double inertia = 0.0;  ///< J about the rotor's axis [kg m²], >= 0
   double ratio = 1.0;    ///< n: the rotor's rate by that of the coordinate [1 or rad/m], not 0
+  std::optional<RotorAxis> carrier = std::nullopt;
 
   [[nodiscard]] double reflected() const { return ratio * ratio * inertia; }  ///< [kg m² or kg]
 };
@@ -219,13 +227,25 @@ struct FrictionLaw {
   [[nodiscard]] double per_load() const { return coefficient * radius; }  ///< μ r [m or 1]
 };
 
-/// What acts along one scalar coordinate q of a joint or along the length q of a distance drive;
-/// its force is positive as a drive's there, exerted by the joint's parent on its child. Parts of
-/// the reactions are these forces no more than drive forces are.
+/// Frames F on the parent and M on the child that a bushing joins. Its six coordinates are the
+/// place of M's origin in F (0…2) [m] and the rotation vector log R_FM (3…5) [rad], both in F's
+/// axes.
+struct Bushing {
+  std::string name;
+  int parent = 0;
+  Pose X_PF = Pose::Identity();
+  int child = 0;
+  Pose X_CM = Pose::Identity();
+};
+
+/// What acts along one scalar coordinate q of a joint or a bushing or along the length q of a
+/// distance drive; its force is positive as a drive's there, exerted by the joint's parent on its
+/// child. Parts of the reactions are these forces no more than drive forces are.
 struct ForceElement {
   std::string name;
   int joint = -1, coordinate = 0;  ///< the coordinate, or …
-  int drive = -1;                  ///< … the distance drive
+  int drive = -1;                  ///< … the distance drive, or …
+  int bushing = -1;                ///< … `coordinate` of this one
   std::variant<DampingLaw, SpringLaw, RotorLaw, FrictionLaw> law;
 };
 
@@ -243,6 +263,7 @@ struct Mechanism {
   std::vector<Output> outputs;
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
+  std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
   std::vector<Motor> motors;  ///< at most one per drive; no witness reads them
   std::vector<Beam> beams;    ///< of the elastic bodies; empty in most models
@@ -286,6 +307,10 @@ struct SignalSheet {
 /// length: 1e-6 rad, or of the characteristic length, in the time.
 [[nodiscard]] double RestRate(const Mechanism& mechanism, const ForceElement& element,
                               double duration_s);
+/// True for a rotor that its carrier turns.
+[[nodiscard]] bool IsGyroscopic(const ForceElement& element);
+/// "kx", "krz", "cry": what an element of a bushing is.
+[[nodiscard]] std::string BushingWord(const ForceElement& element);
 /// True for dry friction that is not zero.
 [[nodiscard]] bool Rubs(const ForceElement& element);
 /// Name of the first element that rubs, or "".

@@ -23,6 +23,10 @@ void VisitAttachments(const Mechanism& mechanism, const Visit& visit) {
     visit(spring.body_from, spring.p_from);
     visit(spring.body_to, spring.p_to);
   }
+  for (const Bushing& bushing : mechanism.bushings) {
+    visit(bushing.parent, bushing.X_PF.translation());
+    visit(bushing.child, bushing.X_CM.translation());
+  }
 }
 
 // Root mean square distance of two points of one body; 0 if it is not above rounding.

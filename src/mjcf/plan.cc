@@ -97,6 +97,12 @@ class Planner {
     for (const SpringDamper& spring : mechanism_.springs) {
       ++count[spring.body_from], ++count[spring.body_to];
     }
+    for (const Bushing& bushing : mechanism_.bushings) {
+      ++count[bushing.parent], ++count[bushing.child];
+    }
+    for (const ForceElement& element : mechanism_.elements) {
+      if (IsGyroscopic(element)) ++count[std::get<RotorLaw>(element.law).carrier->body];
+    }
     return count;
   }
 

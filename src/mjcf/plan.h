@@ -96,7 +96,8 @@ struct PlannedForces {
 [[nodiscard]] PlannedForces ForcesOfJoint(const Mechanism& mechanism, int joint, int coordinate);
 /// … of a distance drive, whose tendon has no armature.
 [[nodiscard]] PlannedForces ForcesOfDrive(const Mechanism& mechanism, int drive);
-/// True for what these contain: damping, linear springs, rotors of joints.
+/// True for what these contain: damping, linear springs, rotors of joints; nothing of a bushing and
+/// no rotor that its carrier turns.
 [[nodiscard]] bool IsPlanned(const ForceElement& element);
 
 /// Name of the MuJoCo joint of a joint's coordinate.

@@ -33,6 +33,7 @@ PlannedForces SumOf(const Mechanism& mechanism, const Acts& acts) {
 }  // namespace
 
 bool IsPlanned(const ForceElement& element) {
+  if (element.bushing >= 0 || IsGyroscopic(element)) return false;
   if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
     return IsPlannedSpring(element, *spring);
   }

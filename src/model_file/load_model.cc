@@ -72,6 +72,7 @@ struct ModelSections {
   std::vector<SpringDamper> springs;
   std::vector<Coupling> couplings;
   std::vector<Motor> motors;
+  std::vector<Bushing> bushings;
   std::vector<ForceElement> elements;
   internal::ModelBeams beams;
   internal::UrdfSection urdf;
@@ -181,7 +182,8 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   urdf.WeldRoot(s.urdf.root, s.bodies, &s.joints);
   internal::OrderDrives(root, &yaml, &s.drives);
   ReadMotors(blocks.model(), &yaml, &s);
-  internal::ElementReader elements(&values, s.joints, s.drives, &s.elements);
+  internal::ElementReader elements(
+      &values, {.names = names, .joints = s.joints, .drives = s.drives}, &s.bushings, &s.elements);
   each_block([&](const Block& block) { elements.Read(block); });
   s.signals.Check(&yaml);
   internal::CheckDrivenOnce(s.drives, s.prescribed, s.joints.joints, s.signals, &yaml);
@@ -205,6 +207,7 @@ Mechanism Assembled(const std::string& file, ModelSections* s) {
   mechanism.springs = std::move(s->springs);
   mechanism.couplings = std::move(s->couplings);
   mechanism.motors = std::move(s->motors);
+  mechanism.bushings = std::move(s->bushings);
   mechanism.elements = std::move(s->elements);
   mechanism.beams = std::move(s->beams.beams);
   return mechanism;

@@ -11,14 +11,15 @@
 namespace mbv::internal {
 namespace {
 
-const std::vector<std::string> kKinds = {"damping", "spring", "rotor", "friction"};
+const std::vector<std::string> kKinds = {"damping", "spring", "rotor", "friction", "bushing"};
 
 // The keys of a kind beside those of its place.
 const std::vector<std::string>& KeysOf(const std::string& kind) {
   static const std::map<std::string, std::vector<std::string>> keys = {
       {"damping", {"damping"}},
       {"spring", {"stiffness", "polynomial", "free", "free_deg", "free_mm", "preload"}},
-      {"rotor", {"inertia", "ratio"}},
+      {"rotor", {"inertia", "ratio", "gyroscopic", "axis_on", "axis"}},
+      {"bushing", {"parent", "child", "stiffness", "damping"}},
       {"friction", {"coulomb", "breakaway", "stribeck_rate", "coefficient", "radius"}}};
   return keys.at(kind);
 }
@@ -37,7 +38,10 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
   if (!IsNewName(entry, section, &yaml)) return;
   if (!HasRoom(*entry.value, elements_.size(), kMaxItems, "elements", &yaml)) return;
   const YamlNode* kind = entry.value->is_map() ? entry.value->Find("kind") : nullptr;
-  std::vector<std::string> keys = {"kind", "joint", "coordinate", "drive"};
+  std::vector<std::string> keys = {"kind"};
+  if (kind == nullptr || kind->text != "bushing") {
+    keys.insert(keys.end(), {"joint", "coordinate", "drive"});
+  }
   for (const std::string& word : kKinds) {
     // Of a kind that is not known, any key is.
     const bool known = kind != nullptr && std::ranges::find(kKinds, kind->text) != kKinds.end();
@@ -47,6 +51,7 @@ void ElementReader::ReadElement(const Block& block, const YamlEntry& entry) {
   const YamlMap map(&yaml, entry.value.get(), JoinPath(section, entry.key), keys);
   if (!map.valid() || map.Required("kind") == nullptr) return;
   if (!yaml.Choice(*kind, map.PathOf("kind"), kKinds)) return;
+  if (kind->text == "bushing") return ReadBushing(block, map, block.prefix + entry.key);
   ForceElement element{.name = block.prefix + entry.key, .law = {}};
   const bool placed = ReadPlace(block, map, &element);
   if (ReadLaw(block, map, kind->text, placed ? &element : nullptr) && placed) {
@@ -108,7 +113,7 @@ bool ElementReader::ReadLaw(const Block& block, const YamlMap& map, const std::s
     return law.has_value();
   };
   if (kind == "damping") return take(ReadDamping(block, map));
-  if (kind == "rotor") return take(ReadRotor(block, map));
+  if (kind == "rotor") return take(ReadRotor(block, map, element));
   if (kind == "friction") return take(ReadFriction(block, map, element));
   return take(ReadSpring(block, map, element));
 }
@@ -155,7 +160,8 @@ std::optional<std::vector<double>> ElementReader::ReadPolynomial(const Block& bl
   return ReadCoefficients(&values_, block, map, "polynomial");
 }
 
-std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlMap& map) {
+std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlMap& map,
+                                                 const ForceElement* element) {
   const bool stated = map.Required("inertia") != nullptr;
   const auto inertia = stated ? NotNegative(block, map, "inertia") : std::nullopt;
   std::optional<double> ratio = 1.0;
@@ -167,8 +173,12 @@ std::optional<RotorLaw> ElementReader::ReadRotor(const Block& block, const YamlM
       return std::nullopt;
     }
   }
-  if (!inertia || !ratio) return std::nullopt;
-  return RotorLaw{.inertia = *inertia, .ratio = *ratio};
+  RotorLaw rotor;
+  const bool carried = ReadCarrier(block, map, element, &rotor);
+  if (!inertia || !ratio || !carried) return std::nullopt;
+  rotor.inertia = *inertia;
+  rotor.ratio = *ratio;
+  return rotor;
 }
 
 std::optional<FrictionLaw> ElementReader::ReadFriction(const Block& block, const YamlMap& map,

@@ -11,13 +11,24 @@
 
 namespace mbv::internal {
 
-/// Reads force elements on coordinates of known joints or along known drives, which are in their
-/// final order.
+/// What elements act on, complete and in its final order.
+struct ElementPlaces {
+  const BodyNames& names;
+  const ModelJoints& joints;
+  const std::vector<Drive>& drives;
+};
+
+/// Reads bushings, and force elements on coordinates of joints or along drives.
 class ElementReader {
  public:
-  ElementReader(ModelValues* values, const ModelJoints& joints, const std::vector<Drive>& drives,
+  ElementReader(ModelValues* values, const ElementPlaces& on, std::vector<Bushing>* bushings,
                 std::vector<ForceElement>* elements)
-      : values_(*values), joints_(joints), drives_(drives), elements_(*elements) {}
+      : values_(*values),
+        names_(on.names),
+        joints_(on.joints),
+        drives_(on.drives),
+        bushings_(*bushings),
+        elements_(*elements) {}
 
   void Read(const Block& block);
 
@@ -30,7 +41,15 @@ class ElementReader {
   std::optional<DampingLaw> ReadDamping(const Block& block, const YamlMap& map);
   std::optional<SpringLaw> ReadSpring(const Block& block, const YamlMap& map,
                                       const ForceElement* element);
-  std::optional<RotorLaw> ReadRotor(const Block& block, const YamlMap& map);
+  std::optional<RotorLaw> ReadRotor(const Block& block, const YamlMap& map,
+                                    const ForceElement* element);
+  bool ReadCarrier(const Block& block, const YamlMap& map, const ForceElement* element,
+                   RotorLaw* rotor);
+  bool ReadJointAsCarrier(const YamlNode& node, const std::string& path,
+                          const ForceElement& element, RotorLaw* rotor);
+  void ReadBushing(const Block& block, const YamlMap& map, const std::string& name);
+  std::optional<Bushing> ReadBushingFrames(const Block& block, const YamlMap& map);
+  std::optional<Vec6> ReadSix(const Block& block, const YamlMap& map, const std::string& key);
   std::optional<FrictionLaw> ReadFriction(const Block& block, const YamlMap& map,
                                           const ForceElement* element);
   std::optional<FrictionLaw> ReadDry(const Block& block, const YamlMap& map, bool loaded);
@@ -41,8 +60,10 @@ class ElementReader {
   std::optional<double> NotNegative(const Block& block, const YamlMap& map, const std::string& key);
 
   ModelValues& values_;
+  const BodyNames& names_;
   const ModelJoints& joints_;
   const std::vector<Drive>& drives_;
+  std::vector<Bushing>& bushings_;
   std::vector<ForceElement>& elements_;
 };
 

@@ -86,6 +86,10 @@ Points PointsOf(const Mechanism& mechanism, int body) {
     if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) add_ends(*leg);
   }
   for (const SpringDamper& spring : mechanism.springs) add_ends(spring);
+  for (const Bushing& bushing : mechanism.bushings) {
+    if (bushing.parent == body) points.Add(bushing.X_PF.translation());
+    if (bushing.child == body) points.Add(bushing.X_CM.translation());
+  }
   return points;
 }
 

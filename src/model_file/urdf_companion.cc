@@ -161,8 +161,9 @@ class Companion {
                         return std::pair('"' + joint + '"', k);
                       }));
     }
+    for (size_t b = 0; b < m_.bushings.size(); ++b) WriteBushing(b);
     for (const ForceElement& element : m_.elements) {
-      if (!IsUrdfDynamics(m_, element)) WriteElement(element);
+      if (element.bushing < 0 && !IsUrdfDynamics(m_, element)) WriteElement(element);
     }
     for (const SpringDamper& s : m_.springs) {
       const std::string name = YamlName(s.name);
@@ -173,6 +174,15 @@ class Companion {
     }
   }
 
+  void WriteBushing(size_t b) {
+    const Bushing& bushing = m_.bushings[b];
+    const std::string name = YamlName(bushing.name);
+    const std::string parent = Attach(bushing.parent, name + "_F", bushing.X_PF);
+    const std::string child = Attach(bushing.child, name + "_M", bushing.X_CM);
+    sections_["elements"] +=
+        fmt::format("  {}: {{{}}}\n", name, BushingText(m_, static_cast<int>(b), parent, child));
+  }
+
   void WriteElement(const ForceElement& element) {
     std::string place;
     if (element.drive >= 0) {
@@ -180,6 +190,13 @@ class Companion {
     } else {
       const auto [joint, k] = FindCoordinate(element.joint, element.coordinate);
       place = fmt::format("joint: \"{}\"{}", joint, CoordinateText(k));
+    }
+    if (IsGyroscopic(element)) {
+      const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;
+      Pose X = Pose::Identity();
+      X.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis.axis_B).matrix();
+      const std::string frame = Attach(axis.body, YamlName(element.name) + "_axis", X);
+      place += CarrierText({.body = axis.body, .axis_B = Vec3::UnitZ()}, frame);
     }
     sections_["elements"] += fmt::format("  {}: {{{}}}\n", YamlName(element.name),
                                          ElementText(element, place, ActsOnLength(m_, element)));

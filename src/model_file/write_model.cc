@@ -254,9 +254,12 @@ class ModelWriter {
                           }));
     }
     if (!m_.elements.empty()) text += "elements:\n";
+    for (size_t b = 0; b < m_.bushings.size(); ++b) text += Written(b, &taken);
     for (const ForceElement& element : m_.elements) {
-      text += fmt::format("  {}: {{{}}}\n", FreshName(element.name, &taken),
-                          ElementText(element, PlaceOf(element), ActsOnLength(m_, element)));
+      if (element.bushing >= 0) continue;
+      text += fmt::format(
+          "  {}: {{{}}}\n", FreshName(element.name, &taken),
+          ElementText(element, PlaceOf(element) + Carrier(element), ActsOnLength(m_, element)));
     }
     if (!m_.springs.empty()) text += "springs:\n";
     for (const SpringDamper& s : m_.springs) {
@@ -272,6 +275,22 @@ class ModelWriter {
                           internal::MotorText(motor));
     }
     return text;
+  }
+
+  std::string Written(size_t b, std::set<std::string>* taken) {
+    const Bushing& bushing = m_.bushings[b];
+    const std::string name = FreshName(bushing.name, taken);
+    return fmt::format(
+        "  {}: {{{}}}\n", name,
+        BushingText(m_, static_cast<int>(b), Ref(bushing.parent, bushing.X_PF, name + "_F"),
+                    Ref(bushing.child, bushing.X_CM, name + "_M")));
+  }
+
+  // Where the bearings of a rotor are.
+  [[nodiscard]] std::string Carrier(const ForceElement& element) const {
+    if (!IsGyroscopic(element)) return "";
+    const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;
+    return CarrierText(axis, names_.bodies[static_cast<size_t>(axis.body)]);
   }
 
   [[nodiscard]] std::string PlaceOf(const ForceElement& element) const {
@@ -318,6 +337,25 @@ std::string ElementText(const ForceElement& element, const std::string& place, b
   return fmt::format("kind: {}, {}, {}{}", WordOf(element), place,
                      std::visit([](const auto& law) { return TextOf(law); }, element.law),
                      journal ? fmt::format(", radius: {}", friction->radius) : "");
+}
+
+std::string CarrierText(const RotorAxis& axis, const std::string& body) {
+  return fmt::format(", axis_on: {}, axis: {}", body, Triple(axis.axis_B));
+}
+
+std::string BushingText(const Mechanism& mechanism, int bushing, const std::string& parent,
+                        const std::string& child) {
+  Vec6 stiffness = Vec6::Zero(), damping = Vec6::Zero();
+  for (const ForceElement& element : mechanism.elements) {
+    if (element.bushing != bushing) continue;
+    const auto* spring = std::get_if<SpringLaw>(&element.law);
+    const auto* damper = std::get_if<DampingLaw>(&element.law);
+    if (spring != nullptr) stiffness[element.coordinate] += spring->polynomial[0];
+    if (damper != nullptr) damping[element.coordinate] += damper->damping;
+  }
+  return fmt::format("kind: bushing, parent: {}, child: {}, stiffness: [{}], damping: [{}]", parent,
+                     child, fmt::join(stiffness.begin(), stiffness.end(), ", "),
+                     fmt::join(damping.begin(), damping.end(), ", "));
 }
 
 std::string CouplingText(const Coupling& coupling, const TermNames& name_of) {

@@ -55,6 +55,14 @@ bool CanAct(const Literal& literal) {
   return literal.value != 0.0 && !(axis && std::abs(literal.value) == 1.0);
 }
 
+// Of a bushing's list; the index of its number is the last character but one of its place.
+std::string BushingUnit(const std::string& place, bool damping) {
+  const char index = place.size() < 2 ? '0' : place[place.size() - 2];
+  const bool length = index < '3';
+  if (damping) return length ? "N s/m" : "N m s/rad";
+  return length ? "N/m" : "N m/rad";
+}
+
 // Of a force element; `keys` end in what it is, behind the element's name.
 std::string ElementUnit(const Mechanism& mechanism, const std::vector<std::string>& keys) {
   if (Has(keys, "inertia")) return "kg m^2";
@@ -75,6 +83,11 @@ std::string ElementUnit(const Mechanism& mechanism, const std::vector<std::strin
 
 std::string UnitOf(const Mechanism& mechanism, const Literal& literal) {
   const std::vector<std::string> keys = KeysOf(literal.place);
+  const bool damping = Has(keys, "damping");
+  if (Has(keys, "elements") && literal.place.ends_with("]") &&
+      (damping || Has(keys, "stiffness"))) {
+    return BushingUnit(literal.place, damping);
+  }
   if (Has(keys, "elements")) return ElementUnit(mechanism, keys);
   if (Has(keys, "inertia")) return "kg m^2";
   if (Has(keys, "mass")) return "kg";

@@ -77,7 +77,13 @@ bool SameLaw(const SpringLaw& a, const SpringLaw& b) {
          std::ranges::equal(a.polynomial, b.polynomial,
                             [](double x, double y) { return Same(x, y); });
 }
-bool SameLaw(const RotorLaw& a, const RotorLaw& b) { return Same(a.reflected(), b.reflected()); }
+bool SameLaw(const RotorLaw& a, const RotorLaw& b) {
+  const auto momentum = [](const RotorLaw& law) -> Vec3 {
+    if (!law.carrier) return Vec3::Zero();
+    return law.inertia * law.ratio * law.carrier->axis_B;
+  };
+  return Same(a.reflected(), b.reflected()) && Same(momentum(a), momentum(b));
+}
 bool SameLaw(const FrictionLaw& a, const FrictionLaw& b) {
   return Same(a.coulomb, b.coulomb) && Same(a.breakaway, b.breakaway) &&
          Same(a.stribeck_rate, b.stribeck_rate) && Same(a.per_load(), b.per_load());
@@ -264,6 +270,10 @@ std::string DescribeChange(const Mechanism& base, const Mechanism& bent) {
   add("the coupling",
       Which(base.couplings, bent.couplings,
             [](const Coupling& a, const Coupling& b) { return !SameCoupling(a, b); }));
+  add("the frames of bushing",
+      Which(base.bushings, bent.bushings, [](const Bushing& a, const Bushing& b) {
+        return !Same(a.X_PF, b.X_PF) || !Same(a.X_CM, b.X_CM);
+      }));
   add("the element",
       Which(base.elements, bent.elements,
             [](const ForceElement& a, const ForceElement& b) { return !SameElement(a, b); }));

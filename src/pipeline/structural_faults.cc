@@ -37,6 +37,8 @@ class Collector {
     MissingClosures();
     ReversedCouplings();
     WrongElements();
+    TurnedRotors();
+    ExchangedBushings();
     StandardGravity();
     return std::move(faults_);
   }
@@ -119,7 +121,9 @@ class Collector {
   // A spring pulls the same way when its coordinate counts the other way.
   static void CountBackwards(int joint, ForceElement* element) {
     auto* spring = std::get_if<SpringLaw>(&element->law);
-    if (element->joint != joint || spring == nullptr) return;
+    if (element->joint != joint) return;
+    if (IsGyroscopic(*element)) std::get<RotorLaw>(element->law).ratio *= -1.0;
+    if (spring == nullptr) return;
     spring->free *= -1.0;
     spring->preload *= -1.0;
     for (size_t i = 1; i < spring->polynomial.size(); i += 2) spring->polynomial[i] *= -1.0;
@@ -141,6 +145,35 @@ class Collector {
         std::get<RotorLaw>(wrong.elements[e].law).ratio = std::sqrt(std::abs(rotor->ratio));
         Add("ratio of a rotor not squared", element.name, std::move(wrong));
       }
+    }
+  }
+
+  // A rotor turns the other way in its carrier: the same reflected inertia, the opposite gyroscopic
+  // moment.
+  void TurnedRotors() {
+    std::map<std::string, size_t> seen;
+    for (size_t e = 0; e < m_.elements.size(); ++e) {
+      if (!IsGyroscopic(m_.elements[e]) || !IsFirst(&seen, m_.elements[e].name)) continue;
+      Mechanism wrong = m_;
+      std::get<RotorLaw>(wrong.elements[e].law).ratio *= -1.0;
+      Add("rotor the other way", m_.elements[e].name, std::move(wrong));
+    }
+  }
+
+  // Stiffnesses along the axes of the child's frame instead of the parent's; for rotations that is
+  // the same.
+  void ExchangedBushings() {
+    std::map<std::string, size_t> seen;
+    for (size_t b = 0; b < m_.bushings.size(); ++b) {
+      const bool pushes = std::ranges::any_of(m_.elements, [&](const ForceElement& element) {
+        return element.bushing == static_cast<int>(b) && element.coordinate < 3;
+      });
+      if (!pushes || !IsFirst(&seen, m_.bushings[b].name)) continue;
+      Mechanism wrong = m_;
+      Bushing& bushing = wrong.bushings[b];
+      std::swap(bushing.parent, bushing.child);
+      std::swap(bushing.X_PF, bushing.X_CM);
+      Add("bushing axes of its child", bushing.name, std::move(wrong));
     }
   }
 

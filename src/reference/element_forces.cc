@@ -7,11 +7,20 @@ namespace {
 
 struct AlongElement {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
-  int rubs = 0;  // sign of the rate, 0 at rest
+  int rubs = 0;                                                    // sign of the rate, 0 at rest
+  Vec3 axis_W = Vec3::Zero(), w = Vec3::Zero(), e = Vec3::Zero();  // of a rotor's carrier
 };
 
-AlongElement MotionOf(const ScalarRow& row, const BodyStates& states, int rubs) {
-  return {row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias, rubs};
+AlongElement MotionOf(const ForceElement& element, const ScalarRow& row, const BodyStates& states,
+                      int rubs) {
+  AlongElement at{row.value, RateOf(row, states.V_WB), RateOf(row, states.A_WB) + row.bias, rubs};
+  if (!IsGyroscopic(element)) return at;
+  const RotorAxis& carrier = *std::get<RotorLaw>(element.law).carrier;
+  const auto b = static_cast<size_t>(carrier.body);
+  at.axis_W = states.X_WB[b].linear() * carrier.axis_B;
+  at.w = states.V_WB[b].head<3>();
+  at.e = states.A_WB[b].head<3>();
+  return at;
 }
 
 // Force, energy and what is lost, of each law.
@@ -23,13 +32,18 @@ double ForceOf(const SpringLaw& law, const AlongElement& at) {
   return -(law.preload + sum);
 }
 double ForceOf(const RotorLaw& law, const AlongElement& at) {
-  return -law.reflected() * at.acceleration;
+  return -law.reflected() * at.acceleration - law.inertia * law.ratio * at.axis_W.dot(at.e);
 }
 
 double ForceOf(const FrictionLaw& law, const AlongElement& at) {
   const double slowness = at.rate / law.stribeck_rate;
   const double size = law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness);
   return -at.rubs * size;
+}
+
+// (5), on the body that carries a rotor.
+Vec3 CarrierMoment(const RotorLaw& law, const AlongElement& at) {
+  return -law.inertia * law.ratio * (at.acceleration * at.axis_W + at.rate * at.w.cross(at.axis_W));
 }
 
 void AddEnergy(const DampingLaw& /*law*/, const AlongElement& /*at*/, Energies* /*energy*/) {}
@@ -42,7 +56,8 @@ void AddEnergy(const SpringLaw& law, const AlongElement& at, Energies* energy) {
   energy->springs += (law.preload + sum) * x;
 }
 void AddEnergy(const RotorLaw& law, const AlongElement& at, Energies* energy) {
-  energy->kinetic += 0.5 * law.reflected() * at.rate * at.rate;
+  energy->kinetic += 0.5 * law.reflected() * at.rate * at.rate +
+                     law.inertia * law.ratio * at.rate * at.axis_W.dot(at.w);
 }
 
 void AddEnergy(const FrictionLaw& /*law*/, const AlongElement& /*at*/, Energies* /*energy*/) {}
@@ -54,7 +69,7 @@ void AddPower(const SpringLaw& law, const AlongElement& at, Powers* power) {
   power->springs += ForceOf(law, at) * at.rate;
 }
 void AddPower(const RotorLaw& law, const AlongElement& at, Powers* power) {
-  power->energy_rate -= ForceOf(law, at) * at.rate;
+  power->energy_rate -= ForceOf(law, at) * at.rate + CarrierMoment(law, at).dot(at.w);
 }
 
 void AddPower(const FrictionLaw& law, const AlongElement& at, Powers* power) {
@@ -80,9 +95,22 @@ void ForElements(const Mechanism& mechanism, const BodyStates& states,
   if (mechanism.elements.empty()) return;
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
   for (size_t e = 0; e < rows.size(); ++e) {
-    const AlongElement at = MotionOf(rows[e], states, rubbing.empty() ? 0 : rubbing[e]);
-    std::visit([&](const auto& law) { visit(law, rows[e], at); }, mechanism.elements[e].law);
+    const ForceElement& element = mechanism.elements[e];
+    const AlongElement at = MotionOf(element, rows[e], states, rubbing.empty() ? 0 : rubbing[e]);
+    std::visit([&](const auto& law) { visit(law, rows[e], at); }, element.law);
   }
+}
+
+void TakeCarrierMoments(const Mechanism& mechanism, const BodyStates& states,
+                        std::vector<Vec6>* wrench_W) {
+  ForElements(mechanism, states, {},
+              [&](const auto& law, const ScalarRow& /*row*/, const AlongElement& at) {
+                if constexpr (std::is_same_v<std::decay_t<decltype(law)>, RotorLaw>) {
+                  if (!law.carrier) return;
+                  auto moment = (*wrench_W)[static_cast<size_t>(law.carrier->body)].head<3>();
+                  moment -= CarrierMoment(law, at);
+                }
+              });
 }
 
 }  // namespace
@@ -95,6 +123,7 @@ void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
                 (*wrench_W)[static_cast<size_t>(row.parent)] -= force * row.J_parent;
                 (*wrench_W)[static_cast<size_t>(row.child)] -= force * row.J_child;
               });
+  TakeCarrierMoments(mechanism, states, wrench_W);
 }
 
 void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, Energies* energy) {
@@ -168,6 +197,13 @@ void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const
     if (rotor == nullptr) continue;
     const VecX u = GradientOf(rows[e], mechanism.bodies.size());
     *MR += rotor->reflected() * u * (u.transpose() * R);
+    if (!rotor->carrier || rotor->carrier->body == 0) continue;
+    // The mixed term J n q̇ a·ω.
+    const auto carrier = static_cast<size_t>(rotor->carrier->body);
+    VecX a = VecX::Zero(R.rows());
+    a.segment<3>(6 * (rotor->carrier->body - 1)) =
+        states.X_WB[carrier].linear() * rotor->carrier->axis_B;
+    *MR += rotor->inertia * rotor->ratio * (u * (a.transpose() * R) + a * (u.transpose() * R));
   }
 }
 

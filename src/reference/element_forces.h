@@ -4,6 +4,9 @@
 //   spring   F = −(F0 + Σ_i k_i x^i),  x = q − free           E = F0 x + Σ_i k_i x^(i+1)/(i+1)  (2)
 //   rotor    F = −J n² q̈                                      E = ½ J n² q̇²                     (3)
 //   friction F = −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇       P = F q̇ to the dampers           (4)
+// A rotor about the axis a of a body that turns with ω and ε has the momentum h = J n q̇ a besides:
+//   M = −dh/dt = −J n (q̈ a + q̇ ω × a) on that body            E += J n q̇ a·ω                    (5)
+//   F = −J n² q̈ − J n a·ε                                                                       (6)
 //
 // At rest friction is taken as 0, the middle of what statics allows: |F| ≤ Fs. What friction by the
 // joint's load adds to (4), load_friction.h finds.
@@ -44,7 +47,7 @@ void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
                       const std::vector<int>& rubbing, Powers* power);
 
 /// Adds what motions R (6·bodies × n) call for of rotors: Σ J n² u (uᵀR), u: gradient of the
-/// coordinate.
+/// coordinate; with a carrier also J n (u aᵀ + a uᵀ) R.
 void AddRotorMomenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R, MatX* MR);
 
 /// An element's slope of force over position and over rate, along `u` the gradient of its

@@ -192,6 +192,12 @@ double ConstraintSystem::TendonBias(int tendon) const {
   return u.dot(to.a0 - from.a0) + (w.squaredNorm() - rate * rate) / L;
 }
 
+Vec3 ConstraintSystem::AngularAcceleration(int body) const {
+  RowMajor J_w(3, nv());
+  mj_jacBody(engine_.m.get(), d_, nullptr, J_w.data(), body);
+  return J_w * Eigen::Map<const VecX>(d_->qacc, nv()) + A0_.col(body).head<3>();
+}
+
 void ConstraintSystem::ClosureBias(int closure, VecX* bias) const {
   const PlannedClosure& planned = engine_.plan.closures[closure];
   const bool connect = planned.type == PlannedClosure::Type::kConnect;

@@ -87,6 +87,10 @@ class ConstraintSystem {
   /// J̇q̇ of a tendon's length; after Bias() at the same state.
   [[nodiscard]] double TendonBias(int tendon) const;
 
+  /// Angular acceleration of a MuJoCo body at the data's qacc, world axes; after Bias() at the same
+  /// state.
+  [[nodiscard]] Vec3 AngularAcceleration(int body) const;
+
   /// J̇q̇ of every row, from positions and velocities evaluated by MuJoCo (mj_comVel).
   void Bias(VecX* bias);
 

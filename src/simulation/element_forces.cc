@@ -1,5 +1,6 @@
 #include "simulation/element_forces.h"
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -7,6 +8,15 @@ namespace mbv::simulation {
 namespace {
 
 using ConstVecX = Eigen::Map<const VecX>;
+
+RunSummary GyroUnsupported(const ForceElement& element, const std::string& described) {
+  return {.stop = Stop::kUnsupported,
+          .message = "element '" + element.name + "', a " + described +
+                     ", needs every drive's motion commanded: MuJoCo 2.2 has no inertia between a "
+                     "joint and a body that turns, and the moment needs accelerations",
+          .where = element.name,
+          .unit = {}};
+}
 
 RunSummary FrictionUnsupported(const Mechanism& mechanism, const ForceElement& element) {
   return {.stop = Stop::kUnsupported,
@@ -19,6 +29,24 @@ RunSummary FrictionUnsupported(const Mechanism& mechanism, const ForceElement& e
 // The coordinate's gradient, of a tendon.
 ConstVecX TendonGradient(const ConstraintSystem& system, const ElementPlace& place) {
   return {system.data()->ten_J + place.tendon * system.nv(), system.nv()};
+}
+
+RowMajor BodyJacobian(const ConstraintSystem& system, int body) {
+  RowMajor J_w(3, system.nv());
+  mj_jacBody(system.engine().m.get(), system.data(), nullptr, J_w.data(), body);
+  return J_w;
+}
+
+void AddCarrier(const ConstraintSystem& system, size_t element, ElementMotion* at) {
+  const int body = system.engine().elements[element].carrier;
+  const auto& law = std::get<RotorLaw>(system.engine().mechanism->elements[element].law);
+  const mjData& d = *system.data();
+  RotorTurning& turning = at->turning;
+  turning.axis = PoseOf(d, body).linear() * law.carrier->axis_B;
+  turning.rate = Eigen::Map<const Vec3>(d.cvel + 6 * body);
+  turning.axis_rate = turning.rate.cross(turning.axis);
+  turning.along = turning.axis.dot(turning.rate);
+  turning.along_rate = turning.axis.dot(system.AngularAcceleration(body));
 }
 
 // Σ_i c_i x^(i+1)
@@ -36,6 +64,7 @@ double PowerSum(const std::vector<double>& c, double x) {
 ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   const ElementPlace& place = system.engine().elements[element];
   const mjData& d = *system.data();
+  if (place.bushing_child >= 0) return BushingMotionOf(system, element);
   ElementMotion at;
   if (place.tendon < 0) {
     at = {d.qpos[place.qpos], d.qvel[place.dof], d.qacc[place.dof]};
@@ -46,11 +75,13 @@ ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   }
   at.rests = std::abs(at.rate) <= place.rest_rate;
   at.load_friction = system.load_friction(element);
+  if (place.carrier >= 0) AddCarrier(system, element, &at);
   return at;
 }
 
 VecX ElementGradient(const ConstraintSystem& system, size_t element) {
   const ElementPlace& place = system.engine().elements[element];
+  if (place.bushing_child >= 0) return BushingGradient(system, element);
   if (place.tendon >= 0) return TendonGradient(system, place);
   return VecX::Unit(system.nv(), place.dof);
 }
@@ -68,7 +99,20 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
     return at.rests ? 0.0 : -std::copysign(most + at.load_friction, at.rate);
   }
-  return -std::get<RotorLaw>(element.law).reflected() * at.acceleration;
+  const auto& rotor = std::get<RotorLaw>(element.law);
+  return -rotor.inertia * rotor.ratio * (rotor.ratio * at.acceleration + at.turning.along_rate);
+}
+
+Vec3 CarrierMoment(const ForceElement& element, const ElementMotion& at) {
+  const auto& rotor = std::get<RotorLaw>(element.law);
+  // The momentum grows along the axis, and the axis turns.
+  return -rotor.inertia * (rotor.ratio * at.acceleration * at.turning.axis +
+                           rotor.ratio * at.rate * at.turning.axis_rate);
+}
+
+double PowerOf(const ForceElement& element, const ElementMotion& at) {
+  const double power = ForceOf(element, at) * at.rate;
+  return IsGyroscopic(element) ? power + CarrierMoment(element, at).dot(at.turning.rate) : power;
 }
 
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
@@ -78,7 +122,9 @@ double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
 
 ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
   if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
-    return {.kinetic = 0.5 * rotor->reflected() * at.rate * at.rate};
+    // ½ J of the square of the whole rate, less what the carrier's inertia contains.
+    const double own = rotor->ratio * at.rate, carried = at.turning.along;
+    return {.kinetic = 0.5 * rotor->inertia * own * (own + 2.0 * carried)};
   }
   const auto* spring = std::get_if<SpringLaw>(&element.law);
   if (spring == nullptr) return {};
@@ -109,6 +155,9 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion) {
     if (released && Rubs(element)) {
       return FrictionUnsupported(*engine.mechanism, element);
     }
+    if (released && IsGyroscopic(element)) {
+      return GyroUnsupported(element, Described(*engine.mechanism, element));
+    }
     const bool on_tendon = element.drive >= 0 && std::holds_alternative<RotorLaw>(element.law);
     if (!on_tendon || !engine.driven[static_cast<size_t>(element.drive)].forced) continue;
     return {.stop = Stop::kUnsupported,
@@ -138,12 +187,29 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
       at.acceleration = driven_acceleration[elements[e].drive];
     }
     const double force = ForceOf(elements[e], at);
-    if (place.tendon < 0) {
+    if (place.dof >= 0) {
       qfrc[place.dof] += force;
     } else {
-      Eigen::Map<VecX>(qfrc, system.nv()) += force * TendonGradient(system, place);
+      Eigen::Map<VecX>(qfrc, system.nv()) += force * ElementGradient(system, e);
     }
+    if (place.carrier < 0) continue;
+    Eigen::Map<VecX>(qfrc, system.nv()) +=
+        BodyJacobian(system, place.carrier).transpose() * CarrierMoment(elements[e], at);
   }
+}
+
+bool HasGyroscopic(const Mechanism& mechanism) {
+  return std::ranges::any_of(mechanism.elements, IsGyroscopic);
+}
+
+void SetCommandedAcceleration(const VecX& driven_acceleration, ConstraintSystem* system) {
+  VecX rates;
+  system->Bias(&rates);
+  rates = -rates;
+  rates.tail(system->driven_rows()) += system->Guided(driven_acceleration);
+  const Eigen::CompleteOrthogonalDecomposition<MatX> J(system->ScaledJ());
+  const VecX scaled = J.solve(rates.cwiseQuotient(system->row_unit()));
+  Eigen::Map<VecX>(system->data()->qacc, system->nv()) = scaled.cwiseProduct(system->dof_unit());
 }
 
 }  // namespace mbv::simulation

@@ -9,18 +9,28 @@
 // guided.
 #pragma once
 
+#include "simulation/bushings.h"
 #include "simulation/constraint_system.h"
 
 namespace mbv::simulation {
+
+/// A rotor's axis a in a body that turns with ω, world axes; zero without a carrier.
+struct RotorTurning {
+  Vec3 axis = Vec3::Zero(), axis_rate = Vec3::Zero();  ///< a, ȧ
+  Vec3 rate = Vec3::Zero();                            ///< ω
+  double along = 0.0, along_rate = 0.0;                ///< a·ω and its derivative a·ω̇
+};
 
 /// Motion of an element's coordinate.
 struct ElementMotion {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
   bool rests = false;          ///< where it may rub: at most at the rest rate
   double load_friction = 0.0;  ///< by the joint's load (load_friction.h)
+  RotorTurning turning = {};
 };
 
-/// At the data's qpos, qvel and qacc; `acceleration` needs ConstraintSystem::Bias() there.
+/// At the data's qpos, qvel and qacc; `acceleration` needs ConstraintSystem::Bias() there, and is
+/// NaN for bushings.
 [[nodiscard]] ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element);
 
 /// dq/dq̇ of MuJoCo's velocities (nv).
@@ -33,10 +43,12 @@ struct ElementMotion {
 /// Friction may be anywhere within ± this: the breakaway force at rest, otherwise 0.
 [[nodiscard]] double BreakawayAt(const ForceElement& element, const ElementMotion& at);
 
-/// Force times rate [W].
-[[nodiscard]] inline double PowerOf(const ForceElement& element, const ElementMotion& at) {
-  return ForceOf(element, at) * at.rate;
-}
+/// Of a rotor on the body that carries it, world axes [N m]:
+///   M = −d/dt (J n q̇ a), where the force along q is −J n (n q̈ + d/dt (a·ω))                    (2)
+[[nodiscard]] Vec3 CarrierMoment(const ForceElement& element, const ElementMotion& at);
+
+/// What an element puts in [W].
+[[nodiscard]] double PowerOf(const ForceElement& element, const ElementMotion& at);
 /// True if the element takes power out of the mechanism for good.
 [[nodiscard]] inline bool Dissipates(const ForceElement& element) {
   return std::holds_alternative<DampingLaw>(element.law) ||
@@ -55,13 +67,19 @@ struct ElementSlope {
 };
 [[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position);
 
-/// kUnsupported for a rotor on a distance drive that is not guided, and for friction where some
-/// drive is not.
+/// kUnsupported for a rotor on a distance drive that is not guided, and for friction and rotors
+/// with a carrier where some drive is not.
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion);
 
 /// True if there is something that MuJoCo lacks.
 [[nodiscard]] bool HasLacking(const Mechanism& mechanism);
-/// (1) of that, added to `qfrc` (nv); `driven_acceleration` is commanded, per driven coordinate.
+/// True if a rotor feels its carrier turn: then AddLackingForces() needs the data's qacc.
+[[nodiscard]] bool HasGyroscopic(const Mechanism& mechanism);
+/// Writes the accelerations to the data's qacc that the commanded ones, per driven coordinate, call
+/// for, at the data's position and velocity (mj_comVel).
+void SetCommandedAcceleration(const VecX& driven_acceleration, ConstraintSystem* system);
+/// (1) and (2) of that, added to `qfrc` (nv); `driven_acceleration` is commanded, per driven
+/// coordinate.
 void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceleration,
                       double* qfrc);
 

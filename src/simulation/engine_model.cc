@@ -88,11 +88,32 @@ RunSummary CheckCouplings(const Mechanism& mechanism) {
   return RunSummary::Done();
 }
 
+int EngineBody(const EngineModel& engine, int body) {
+  return engine.body_id[static_cast<size_t>(engine.PlannedOf(body))];
+}
+
+// The bodies of bushings and rotors are never merged into others (mjcf/plan.cc).
+void FindElementBodies(const EngineModel& engine, const ForceElement& element,
+                       ElementPlace* place) {
+  if (IsGyroscopic(element)) {
+    place->carrier = EngineBody(engine, std::get<RotorLaw>(element.law).carrier->body);
+  }
+  if (element.bushing < 0) return;
+  const Bushing& bushing = engine.mechanism->bushings[static_cast<size_t>(element.bushing)];
+  place->bushing_parent = EngineBody(engine, bushing.parent);
+  place->bushing_child = EngineBody(engine, bushing.child);
+}
+
 RunSummary FindElements(EngineModel* engine) {
   const Mechanism& mechanism = *engine->mechanism;
   const mjModel& m = *engine->m;
   for (const ForceElement& element : mechanism.elements) {
     ElementPlace place;
+    FindElementBodies(*engine, element, &place);
+    if (element.bushing >= 0) {
+      engine->elements.push_back(place);
+      continue;
+    }
     if (element.drive >= 0) {
       const Drive& drive = mechanism.drives[static_cast<size_t>(element.drive)];
       place.tendon = IdOf(m, mjOBJ_TENDON, drive.name);

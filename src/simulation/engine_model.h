@@ -24,11 +24,14 @@ struct DrivenPlace {
   int position_servo = -1, velocity_servo = -1, motor = -1;  ///< actuators of a servo
 };
 
-/// The coordinate of a force element: a joint's, or a tendon's length.
+/// The coordinate of a force element: a joint's, a tendon's length, or one of a bushing between two
+/// of MuJoCo's bodies.
 struct ElementPlace {
   int joint = -1, dof = -1, qpos = -1;
   int tendon = -1;
   double rest_rate = 0.0;  ///< up to which dry friction rests (RestRate())
+  int bushing_parent = -1, bushing_child = -1;
+  int carrier = -1;  ///< MuJoCo's body whose turning a rotor feels
 };
 
 struct EngineModel {

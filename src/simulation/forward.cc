@@ -188,7 +188,10 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     target = at.position;
     if (rates) target += (b * at.velocity + at.acceleration) / k_d;
     s->system.SetTargets(target);
-    if (s->system.has_given_forces() || s->lacking) s->system.EvaluatePosition();
+    if (s->system.has_given_forces() || s->lacking) {
+      s->system.EvaluatePosition();
+      mj_comVel(m, data);
+    }
     s->ApplyForces(static_cast<double>(n) * h, {.motion = at, .force = {}});
     if (n % per_sample == 0) {
       mj_forward(m, data);

@@ -242,6 +242,7 @@ void Recorder::TreeWrenches(const Loads& loads) {
   for (size_t e = 0; e < engine_.elements.size(); ++e) {
     const int tendon = engine_.elements[e].tendon;
     if (tendon >= 0) AddTendon(tendon, ElementForce(e));
+    AddElement(e);
   }
   for (const WorldLoad& load : loads.world()) {
     AddExternal(load.body_id, load.p_WQ, load.force, load.moment);
@@ -251,6 +252,21 @@ void Recorder::TreeWrenches(const Loads& loads) {
     if (m.body_parentid[b] > 0) W_.col(m.body_parentid[b]) += W_.col(b);
   }
   W_ += Eigen::Map<const Eigen::Matrix<double, 6, Eigen::Dynamic>>(d->cfrc_int, 6, m.nbody);
+}
+
+// Bushings, and what a rotor does to its carrier.
+void Recorder::AddElement(size_t e) {
+  const ElementPlace& place = engine_.elements[e];
+  if (place.carrier >= 0) {
+    const Vec3 moment = CarrierMoment(engine_.mechanism->elements[e], ElementMotionOf(*system_, e));
+    AddExternal(place.carrier, Vec3::Zero(), Vec3::Zero(), moment);
+  }
+  if (place.bushing_child < 0) return;
+  const BushingLine line = BushingLineOf(*system_, e);
+  const double force = ElementForce(e);
+  const Vec3 f = force * line.push, m = force * line.turn;
+  AddExternal(place.bushing_child, line.p_WM, f, m);
+  AddExternal(place.bushing_parent, line.p_WM, -f, -m);
 }
 
 double Recorder::ElementForce(size_t e) const {

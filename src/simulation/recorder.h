@@ -54,6 +54,7 @@ class Recorder {
   void TreeWrenches(const Loads& loads);
   void AddExternal(int body_id, const Vec3& p_W, const Vec3& force, const Vec3& moment);
   void AddTendon(int tendon, double force);
+  void AddElement(size_t e);
   [[nodiscard]] Vec6 ReactionOf(int joint, const std::vector<Pose>& X_WB) const;
   [[nodiscard]] Vec6 ClosureWrench(int closure) const;
   void ExcludeDrives(int joint, double sign, Vec6* F_W) const;

@@ -56,10 +56,11 @@ struct Session {
   WorkMeter work;
   const std::vector<size_t> loaded;         ///< elements with friction by their joint's load
   RunSummary trouble = RunSummary::Done();  ///< in finding it
-  const bool lacking;   ///< there are force elements that MuJoCo has no word for
-  VecX work_rates;      ///< of the state that was asked for last
-  EngineState start;    ///< of a mechanism whose drives are pushed or servos
-  bool shared = false;  ///< drive forces are not unique: the least ones are reported
+  const bool lacking;     ///< there are force elements that MuJoCo has no word for
+  const bool gyroscopic;  ///< some of them need accelerations
+  VecX work_rates;        ///< of the state that was asked for last
+  EngineState start;      ///< of a mechanism whose drives are pushed or servos
+  bool shared = false;    ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
   VecX given;                 ///< forces that the driven coordinates are given
   Eigen::RowVectorXd record;  ///< one row of the trace

@@ -53,7 +53,8 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       loads(engine, motion_),
       recorder(&system, Integrates(options_)),
       loaded(LoadedElements(*engine.mechanism)),
-      lacking(HasLacking(*engine.mechanism)) {
+      lacking(HasLacking(*engine.mechanism)),
+      gyroscopic(HasGyroscopic(*engine.mechanism)) {
   run->trace.witness = role::kSimulated.name;
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
@@ -136,6 +137,7 @@ void Session::ApplyForces(double t_s, const Commanded& at) {
   if (loads.world().empty() && !system.has_given_forces() && !lacking) return;
   mju_zero(data->qfrc_applied, engine.m->nv);
   loads.AddGeneralized(data.get(), data->qfrc_applied);
+  if (gyroscopic) SetCommandedAcceleration(at.motion.acceleration, &system);
   if (lacking) AddLackingForces(system, at.motion.acceleration, data->qfrc_applied);
   if (!system.has_given_forces()) return;
   given.setZero(static_cast<Eigen::Index>(engine.driven.size()));

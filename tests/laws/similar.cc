@@ -154,6 +154,10 @@ Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
   }
   for (Coupling& coupling : m.couplings) Scale(mechanism, s, &coupling);
   for (ForceElement& element : m.elements) Scale(mechanism, s, &element);
+  for (Bushing& bushing : m.bushings) {
+    placer.Put(bushing.parent, &bushing.X_PF);
+    placer.Put(bushing.child, &bushing.X_CM);
+  }
   for (SpringDamper& spring : m.springs) {
     placer.Put(spring.body_from, &spring.p_from);
     placer.Put(spring.body_to, &spring.p_to);

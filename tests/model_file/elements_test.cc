@@ -94,7 +94,7 @@ TEST(Elements, OfPartsNameTheirOwnJointsAndDrives) {
 TEST(Elements, WhatMeansNothingIsAFinding) {
   EXPECT_EQ(ElementFindings("  g: {kind: dumping, joint: turn, damping: 2}\n"),
             "m.yaml:10:13: error: elements.g.kind = 'dumping' is not one of: damping, spring, "
-            "rotor, friction\n  hint: did you mean 'damping'?\n");
+            "rotor, friction, bushing\n  hint: did you mean 'damping'?\n");
   EXPECT_EQ(ElementFindings("  g: {kind: damping, joint: tern, damping: 2}\n"),
             "m.yaml:10:29: error: elements.g.joint = 'tern': there is no such joint\n"
             "  hint: did you mean 'turn'?\n");
@@ -168,6 +168,101 @@ TEST(Elements, AreWrittenAsTheyAreRead) {
   const LoadResult five_again = LoadModelText(WriteModel(*five.mechanism), "again.yaml");
   ASSERT_TRUE(five_again.mechanism.has_value()) << five_again.diagnostics.Text();
   ExpectSameElements(*five.mechanism, *five_again.mechanism);
+}
+
+// b hangs on a, so that a turns.
+std::string WithCarried(const std::string& elements) {
+  std::string text = WithElements(elements);
+  const std::string slide = "parent: world, child: b";
+  text.replace(text.find(slide), slide.size(), "parent: a, child: b");
+  return text;
+}
+
+TEST(Bushings, AreSixSpringsAndDampersBetweenTwoFrames) {
+  const std::string line =
+      "  g: {kind: bushing, parent: a, child: b.p, stiffness: [1, 2, 3, 0, 5, 6],"
+      " damping: [0, 0, 0, 0, 0, 7]}\n";
+  const LoadResult loaded = LoadModelText(WithElements(line), "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.bushings.size(), 1u);
+  EXPECT_EQ(m.bushings[0].parent, 1);
+  EXPECT_EQ(m.bushings[0].child, 2);
+  EXPECT_EQ(m.bushings[0].X_CM.translation(), Vec3(0.5, 0, 0));
+  ASSERT_EQ(m.elements.size(), 6u);  // zeros are none
+  EXPECT_EQ(m.elements[2].name, "g.kz");
+  EXPECT_EQ(m.elements[3].name, "g.kry");
+  EXPECT_EQ(m.elements[3].coordinate, 4);
+  EXPECT_EQ(LawOf<SpringLaw>(m, 3).polynomial, std::vector<double>{5});
+  EXPECT_EQ(m.elements[5].name, "g.crz");
+  EXPECT_EQ(LawOf<DampingLaw>(m, 5).damping, 7);
+  EXPECT_EQ(Described(m, m.elements[5]), "crz of bushing 'g'");
+  EXPECT_TRUE(ActsOnLength(m, m.elements[2]));
+  EXPECT_FALSE(ActsOnLength(m, m.elements[5]));
+  // Written and read back.
+  const LoadResult again = LoadModelText(WriteModel(m), "m.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  EXPECT_EQ(WriteModel(*again.mechanism), WriteModel(m));
+  ASSERT_EQ(again.mechanism->elements.size(), 6u);
+  EXPECT_EQ(LawOf<SpringLaw>(*again.mechanism, 4).polynomial, std::vector<double>{6});
+}
+
+TEST(Bushings, WhatMeansNothingIsAFinding) {
+  EXPECT_EQ(ElementFindings("  g: {kind: bushing, parent: a, child: b}\n"),
+            "m.yaml:10:6: error: elements.g has neither stiffness nor damping\n"
+            "  hint: stiffness: [kx, ky, kz, krx, kry, krz]; damping: the same of rates\n");
+  EXPECT_EQ(ElementFindings("  g: {kind: bushing, parent: a, child: a, damping: [0,0,0,1,1,-1]}\n"),
+            "m.yaml:10:40: error: elements.g: parent and child are the same body\n"
+            "m.yaml:10:63: error: elements.g.damping[5] = -1 violates damping >= 0\n");
+  EXPECT_NE(ElementFindings("  g: {kind: bushing, parent: a, child: b, stiffness: [1, 2, 3]}\n")
+                .find("a list of 6 is needed"),
+            std::string::npos)
+      << ElementFindings("  g: {kind: bushing, parent: a, child: b, stiffness: [1, 2, 3]}\n");
+  EXPECT_NE(ElementFindings("  g: {kind: bushing, joint: turn, damping: [1, 1, 1, 1, 1, 1]}\n")
+                .find("joint"),
+            std::string::npos);
+}
+
+TEST(CarriedRotors, StateTheirAxisOrTakeTheJoints) {
+  const std::string lines =
+      "  own: {kind: rotor, drive: leg, inertia: 1, axis_on: b.p, axis: [0, 3, 4]}\n"
+      "  its: {kind: rotor, joint: slide, coordinate: 1, inertia: 1, gyroscopic: true}\n"
+      "  not: {kind: rotor, joint: turn, inertia: 1, gyroscopic: false}\n";
+  const LoadResult loaded = LoadModelText(WithCarried(lines), "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.elements.size(), 3u);
+  ASSERT_TRUE(LawOf<RotorLaw>(m, 0).carrier);
+  EXPECT_EQ(LawOf<RotorLaw>(m, 0).carrier->body, 2);
+  EXPECT_LT((LawOf<RotorLaw>(m, 0).carrier->axis_B - Vec3(0, 0.6, 0.8)).norm(), 1e-15);
+  ASSERT_TRUE(LawOf<RotorLaw>(m, 1).carrier);
+  EXPECT_EQ(LawOf<RotorLaw>(m, 1).carrier->body, 1);  // the joint's parent
+  EXPECT_EQ(LawOf<RotorLaw>(m, 1).carrier->axis_B, Vec3(0, 0, 1));
+  EXPECT_FALSE(LawOf<RotorLaw>(m, 2).carrier);
+  const LoadResult again = LoadModelText(WriteModel(m), "m.yaml");
+  ASSERT_TRUE(again.mechanism.has_value()) << again.diagnostics.Text();
+  EXPECT_EQ(WriteModel(*again.mechanism), WriteModel(m));
+  EXPECT_TRUE(LawOf<RotorLaw>(*again.mechanism, 1).carrier);
+}
+
+TEST(CarriedRotors, WhatMeansNothingIsAFinding) {
+  EXPECT_EQ(
+      ElementFindings("  g: {kind: rotor, joint: turn, inertia: 1, gyroscopic: true}\n"),
+      "m.yaml:10:57: error: elements.g.gyroscopic: the joint's parent is the world, which does "
+      "not turn\n  hint: leave gyroscopic out\n");
+  EXPECT_EQ(
+      ElementFindings("  g: {kind: rotor, joint: slide, inertia: 1, gyroscopic: true}\n"),
+      "m.yaml:10:58: error: elements.g.gyroscopic: the coordinate is no angle about an axis of "
+      "the joint's parent\n  hint: write axis_on: BODY and axis: [x, y, z] instead\n");
+  EXPECT_EQ(
+      ElementFindings("  g: {kind: rotor, joint: turn, inertia: 1, axis_on: a}\n"),
+      "m.yaml:10:6: error: elements.g needs both axis_on and axis, or neither, and then "
+      "gyroscopic is true\n  hint: axis_on: the body, or its frame, that the rotor's bearings "
+      "sit on; axis: there\n");
+  EXPECT_EQ(
+      ElementFindings("  g: {kind: rotor, joint: turn, inertia: 1, axis_on: world, axis: z}\n"),
+      "m.yaml:10:54: error: elements.g.axis_on = world: the world does not turn\n"
+      "  hint: leave axis_on and axis out: a rotor is without gyroscopic moment then\n");
 }
 
 }  // namespace

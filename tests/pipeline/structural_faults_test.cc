@@ -182,6 +182,23 @@ TEST(StructuralFaults, PreloadsAndGearsOfRotorsAreMistaken) {
   EXPECT_NEAR(rotor.reflected(), 2e-5 * 40, 1e-15);
 }
 
+TEST(StructuralFaults, CarriedRotorsAndBushingsAreTurnedRound) {
+  const Mechanism linkage = LoadNamed("bushed_linkage");
+  const std::vector<StructuralFault> turned = Of(linkage, "rotor the other way");
+  ASSERT_EQ(turned.size(), 1u);
+  EXPECT_EQ(std::get<RotorLaw>(turned[0].wrong.at(0).elements.back().law).ratio, -12.0);
+  // The sleeve does not push, so that its frames may be exchanged.
+  const std::vector<StructuralFault> exchanged = Of(linkage, "bushing axes of its child");
+  ASSERT_EQ(exchanged.size(), 1u);
+  EXPECT_EQ(exchanged[0].wrong.at(0).bushings[0].parent, linkage.bushings[0].child);
+  // An axis that points the other way turns the rotor about it the same way.
+  Mechanism geared = linkage;
+  geared.elements.back().joint = geared.FindJoint("A");
+  geared.elements.back().coordinate = 0;
+  const Mechanism wrong = Of(geared, "flipped axis").at(0).wrong.at(0);
+  EXPECT_EQ(std::get<RotorLaw>(wrong.elements.back().law).ratio, -12.0);
+}
+
 TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
   for (const std::string& model : ShippedModelNames()) {
     const Mechanism mechanism = LoadNamed(model);

@@ -1,0 +1,128 @@
+// Bushings and carried rotors in MuJoCo: against the exact model, and against energy.
+#include <gtest/gtest.h>
+
+#include "model_file/load_model.h"
+#include "simulation/simulation.h"
+#include "tests/carried_rotor.h"
+#include "tests/simulation/test_mechanisms.h"
+
+namespace mbv {
+namespace {
+
+Mechanism Loaded(const std::string& text) {
+  LoadResult loaded = LoadModelText(text, "m.yaml");
+  EXPECT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  return loaded.mechanism.value_or(Mechanism{});
+}
+
+// Sines on three drives, the third with a ramp.
+RunSummary TurnThree(double t, DrivenSample* driven) {
+  const Vec3 size(0.8, 0.6, 1.1), w(4.4, 6.9, 5.6), phase(0.3, 1.0, 0.2);
+  const Vec3 angle = w * t + phase;
+  driven->position = size.cwiseProduct(Vec3(angle.array().sin())) + Vec3(0, 0, -2 * t);
+  driven->velocity = size.cwiseProduct(w).cwiseProduct(Vec3(angle.array().cos())) + Vec3(0, 0, -2);
+  driven->acceleration =
+      -size.cwiseProduct(w).cwiseProduct(w).cwiseProduct(Vec3(angle.array().sin()));
+  return RunSummary::Done();
+}
+
+Motion TwoSeconds() { return {.duration_s = 2.0, .sample_s = 0.05, .commands = {}, .loads = {}}; }
+
+VecX Column(const SimulationRun& run, const char* channel) {
+  return run.trace.values.col(run.trace.Find(channel));
+}
+
+double Difference(const SimulationRun& a, const SimulationRun& b, const char* channel) {
+  const VecX truth = Column(b, channel);
+  return (Column(a, channel) - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
+}
+
+TEST(SimulatedRotors, AreTheBodyOnItsBearing) {
+  const fixtures::CarriedRotor rotor;
+  const Mechanism law = Loaded(rotor.AsLaw()), body = Loaded(rotor.AsBody());
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const double tolerance = mode == SimulationMode::kForward ? 1e-6 : 1e-12;
+    const SimulationRun a = Simulate(law, TwoSeconds(), TurnThree, {.mode = mode});
+    const SimulationRun b =
+        Simulate(body, TwoSeconds(), TurnThree, {.mode = SimulationMode::kInverse});
+    ASSERT_TRUE(a.summary.ok()) << a.summary.message;
+    ASSERT_TRUE(b.summary.ok()) << b.summary.message;
+    for (const char* channel :
+         {"m1.force", "m2.force", "m3.force", "energy.kinetic", "yaw.reaction.mx"}) {
+      EXPECT_LT(Difference(a, b, channel), tolerance) << channel;
+    }
+    const VecX in = Column(a, "power.input");
+    EXPECT_LT((in - Column(a, "power.energy_rate")).cwiseAbs().maxCoeff(),
+              tolerance * in.cwiseAbs().maxCoeff());
+  }
+}
+
+TEST(SimulatedRotors, WithACarrierNeedCommands) {
+  const Mechanism m = Loaded(fixtures::CarriedRotor().AsLaw());
+  Motion motion = TwoSeconds();
+  for (int d = 0; d < 3; ++d) {
+    motion.forces.push_back({.drive = d, .force = Constant(0.0)});
+    motion.initial.push_back({.name = m.drives[static_cast<size_t>(d)].name,
+                              .coordinate = {Coordinate::Kind::kDrive, d, 0}});
+  }
+  const SimulationRun run = Simulate(m, motion, TurnThree, {});
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(run.summary.where, "fly");
+  EXPECT_NE(run.summary.message.find("gyroscopic rotor of joint 'roll'"), std::string::npos)
+      << run.summary.message;
+}
+
+std::string Bushed(const std::string& bushing) {
+  std::string text = fixtures::CarriedRotor().AsLaw();
+  text = text.substr(0, text.find("elements:"));
+  return text + "elements:\n  rubber: {kind: bushing, parent: base, child: hand, " + bushing +
+         "}\n";
+}
+
+// Work into springs is their energy; what dampers take is negative.
+TEST(SimulatedBushings, KeepTheBalanceOfPower) {
+  const Mechanism m =
+      Loaded(Bushed("stiffness: [900, 500, 300, 8, 5, 3], damping: [3, 2, 1, 0.1, 0.2, 0.3]"));
+  const SimulationRun run =
+      Simulate(m, TwoSeconds(), TurnThree, {.mode = SimulationMode::kInverse});
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  const VecX in = Column(run, "power.input");
+  EXPECT_LT((in - Column(run, "power.energy_rate")).cwiseAbs().maxCoeff(),
+            1e-12 * in.cwiseAbs().maxCoeff());
+  EXPECT_LT(Column(run, "power.dampers").maxCoeff(), 0.0);
+  EXPECT_GT(Column(run, "energy.springs").minCoeff(), 1.0);
+}
+
+// Where frames differ by one turn about x and one way along it, six numbers do what a joint's
+// spring and damper do.
+TEST(SimulatedBushings, AboutAJointsAxisAreAJointsSpring) {
+  const std::string elements =
+      "elements:\n  k: {kind: spring, joint: roll, stiffness: 8}\n"
+      "  c: {kind: damping, joint: roll, damping: 0.4}\n";
+  std::string text = fixtures::CarriedRotor().AsLaw();
+  text = text.substr(0, text.find("elements:"));
+  const Mechanism joint = Loaded(text + elements);
+  const Mechanism bushing =
+      Loaded(text +
+             "elements:\n  b: {kind: bushing, parent: arm.end, child: hand,"
+             " stiffness: [0, 0, 0, 8, 3, 3], damping: [0, 0, 0, 0.4, 0, 0]}\n");
+  const auto small = [](double t, DrivenSample* driven) {
+    RunSummary summary = TurnThree(t, driven);
+    driven->position[2] += 2 * t;  // within half a turn
+    driven->velocity[2] += 2;
+    return summary;
+  };
+  for (const SimulationMode mode : {SimulationMode::kInverse, SimulationMode::kForward}) {
+    const double tolerance = mode == SimulationMode::kForward ? 1e-9 : 1e-12;
+    const SimulationRun a = Simulate(bushing, TwoSeconds(), small, {.mode = mode});
+    const SimulationRun b = Simulate(joint, TwoSeconds(), small, {.mode = mode});
+    ASSERT_TRUE(a.summary.ok()) << a.summary.message;
+    for (const char* channel : {"m1.force", "m2.force", "m3.force", "energy.springs",
+                                "power.dampers", "pitch.reaction.mz"}) {
+      EXPECT_LT(Difference(a, b, channel), tolerance) << channel;
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mbv
