@@ -56,6 +56,14 @@ std::vector<Finding> FindUncoveredLoads(const Coverage& coverage, const Mechanis
     const bool taken =
         std::any_of(coverage.bodies.begin(), coverage.bodies.end(),
                     [&](const AssumedBody& body) { return body.name == name && body.takes_loads; });
+    if (!load.following.empty()) {
+      findings.push_back(
+          {.severity = Severity::kWarning,
+           .file = {},
+           .message = fmt::format("load {} follows the mechanism's state", load.name),
+           .hint = coverage.form + " takes loads as functions of time"});
+      continue;
+    }
     if (taken) continue;
     findings.push_back({.severity = Severity::kWarning,
                         .file = {},

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "comparison/element_force_scale.h"
+#include "kinematics/state_loads.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -121,16 +122,21 @@ class Scales {
 
   void TakeLoads(const Trace& trace) {
     loads_.resize(motion_.loads.size());
+    BodyStates home;
+    home.Resize(mechanism_.bodies.size());
+    home.X_WB = mechanism_.X_WB_home;
     for (size_t l = 0; l < loads_.size(); ++l) {
       const Load& load = motion_.loads[l];
       for (const double t_s : trace.time_s) {
-        Vec3 force, moment;
+        LoadSample sample{.load = &load, .time_s = t_s};
         for (int c = 0; c < 3; ++c) {
-          force[c] = Evaluate(load.force[c], t_s).value;
-          moment[c] = Evaluate(load.moment[c], t_s).value;
+          sample.force[c] = Evaluate(load.force[c], t_s).value;
+          sample.moment[c] = Evaluate(load.moment[c], t_s).value;
         }
-        loads_[l].force_N = std::max(loads_[l].force_N, force.norm());
-        loads_[l].moment_Nm = std::max(loads_[l].moment_Nm, moment.norm());
+        // What follows the state counts as at home, at rest.
+        sample = AtStates(mechanism_, home, sample);
+        loads_[l].force_N = std::max(loads_[l].force_N, sample.force.norm());
+        loads_[l].moment_Nm = std::max(loads_[l].moment_Nm, sample.moment.norm());
       }
     }
   }

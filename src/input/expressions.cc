@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <mutex>
 #include <numbers>
 
 #include "core/diagnostics.h"
@@ -101,6 +102,35 @@ ExpressionResult Compute(const std::string& text, const std::map<std::string, do
   }
 }
 
+// Witnesses may run at the same time: one at a time computes.
+class MuFormula : public Formula {
+ public:
+  MuFormula(const std::string& text, const std::map<std::string, double>& constants,
+            const std::vector<std::string>& variables)
+      : variables_(variables.size(), 1.0) {
+    parser_.DefineConst("pi", std::numbers::pi);
+    for (const auto& [name, value] : constants) parser_.DefineConst(name, value);
+    for (size_t i = 0; i < variables.size(); ++i) {
+      parser_.DefineVar(variables[i], &variables_[i]);
+    }
+    parser_.SetExpr(text);
+    int count = 0;
+    parser_.Eval(count);  // parses it
+    if (count != 1) throw mu::ParserError("gives several values");
+  }
+
+  [[nodiscard]] double At(std::span<const double> variables) const override {
+    const std::lock_guard lock(mutex_);
+    std::copy(variables.begin(), variables.end(), variables_.begin());
+    return parser_.Eval();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::vector<double> variables_;
+  mu::Parser parser_;
+};
+
 }  // namespace
 
 bool IsWrittenOut(const std::string& expression) {
@@ -184,29 +214,50 @@ ExpressionResult Scope::Evaluate(const std::string& expression) {
     if (why.empty()) return {.value = number, .error = "", .hint = ""};
     return {.value = {}, .error = why, .hint = ""};
   }
-  if (expression.size() > kMaxExpression) {
-    return {.value = {}, .error = "is too long for an expression", .hint = ""};
-  }
+  const Constants constants = ConstantsOf(expression, {});
+  return constants.good ? Compute(expression, constants.values) : constants.failed;
+}
+
+Scope::Constants Scope::ConstantsOf(const std::string& expression,
+                                    const std::vector<std::string>& variables) {
+  const auto refuse = [](const std::string& error, const std::string& hint) {
+    return Constants{.values = {}, .failed = {.value = {}, .error = error, .hint = hint}};
+  };
+  if (expression.size() > kMaxExpression) return refuse("is too long for an expression", "");
   if (HasForeignOperator(expression)) {
-    return {.value = {}, .error = "is no expression: = and \" have no meaning here", .hint = ""};
+    return refuse("is no expression: = and \" have no meaning here", "");
   }
-  std::map<std::string, double> values;
+  Constants constants;
   for (const UsedName& used : NamesIn(expression)) {
-    if (used.name == "pi" || values.count(used.name) > 0) continue;
+    if (used.name == "pi" || constants.values.count(used.name) > 0) continue;
     if (used.is_call) {
       if (TheParser().GetFunDef().count(used.name) > 0) continue;
-      return {.value = {},
-              .error = fmt::format("has the unknown function '{}'", used.name),
-              .hint = DidYouMean(used.name, FunctionNames())};
+      return refuse(fmt::format("has the unknown function '{}'", used.name),
+                    DidYouMean(used.name, FunctionNames()));
     }
-    ExpressionResult result = Use(used.name);
+    if (std::ranges::find(variables, used.name) != variables.end()) continue;
+    const ExpressionResult result = Use(used.name);
     if (!result.value) {
-      if (!result.error.empty()) result.hint = DidYouMean(used.name, Names());
-      return result;
+      return refuse(result.error, result.error.empty() ? "" : DidYouMean(used.name, Names()));
     }
-    values[used.name] = *result.value;
+    constants.values[used.name] = *result.value;
   }
-  return Compute(expression, values);
+  constants.good = true;
+  return constants;
+}
+
+FormulaResult Scope::Compile(const std::string& expression,
+                             const std::vector<std::string>& variables) {
+  const Constants constants = ConstantsOf(expression, variables);
+  if (!constants.good) {
+    return {.formula = {}, .error = constants.failed.error, .hint = constants.failed.hint};
+  }
+  try {
+    auto formula = std::make_shared<MuFormula>(expression, constants.values, variables);
+    return {.formula = std::move(formula), .error = "", .hint = ""};
+  } catch (const mu::ParserError& error) {
+    return {.formula = {}, .error = "is no expression: " + error.GetMsg(), .hint = ""};
+  }
 }
 
 std::vector<std::string> Scope::Names() const {

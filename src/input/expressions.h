@@ -6,7 +6,9 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -18,6 +20,20 @@ namespace mbv {
 /// reported at its own place.
 struct ExpressionResult {
   std::optional<double> value;
+  std::string error;
+  std::string hint;
+};
+
+/// An expression of variables, compiled once.
+class Formula {
+ public:
+  virtual ~Formula() = default;
+  /// Its value; not finite where it has none. `variables` as they were named, in order.
+  [[nodiscard]] virtual double At(std::span<const double> variables) const = 0;
+};
+/// A formula, or why there is none (as ExpressionResult).
+struct FormulaResult {
+  std::shared_ptr<const Formula> formula;
   std::string error;
   std::string hint;
 };
@@ -36,6 +52,8 @@ class Scope {
   /// first time it is asked for by Lookup and no text when an expression refers to it.
   ExpressionResult Lookup(const std::string& name);
   ExpressionResult Evaluate(const std::string& expression);
+  /// An expression of parameters, which are constants, and of variables, which hide parameters.
+  FormulaResult Compile(const std::string& expression, const std::vector<std::string>& variables);
 
   /// All visible names, for "did you mean".
   [[nodiscard]] std::vector<std::string> Names() const;
@@ -49,6 +67,13 @@ class Scope {
     State state = State::kWaiting;
     ExpressionResult result;
   };
+  // The parameters that an expression uses, by name; `variables` are none.
+  struct Constants {
+    std::map<std::string, double> values;
+    ExpressionResult failed;  // without a value: what hinders
+    bool good = false;
+  };
+  Constants ConstantsOf(const std::string& expression, const std::vector<std::string>& variables);
   // The value of a name that an expression uses; kFailed entries stay silent.
   ExpressionResult Use(const std::string& name);
   void EvaluateEntry(const std::string& name, Entry* entry);

@@ -16,6 +16,16 @@ std::optional<double> ValueReader::Number(const YamlNode& node, const std::strin
   return result.value;
 }
 
+std::shared_ptr<const Formula> ValueReader::Compile(const YamlNode& node, const std::string& path,
+                                                    const std::string& expression,
+                                                    const std::vector<std::string>& variables) {
+  const FormulaResult result = scope_->Compile(expression, variables);
+  if (result.formula == nullptr) {
+    yaml_->Error(node, fmt::format("{} = {} {}", path, Describe(node), result.error), result.hint);
+  }
+  return result.formula;
+}
+
 std::optional<double> ValueReader::Positive(const YamlNode& node, const std::string& path) {
   const auto value = Number(node, path);
   if (value && *value <= 0.0) {

@@ -1,6 +1,7 @@
 // Values of a scenario file: numbers may be expressions of the model's parameters.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -25,6 +26,12 @@ class ValueReader {
   std::optional<std::vector<double>> Numbers(const YamlNode& node, const std::string& path,
                                              int count = -1);
   std::optional<Vec3> Vector(const YamlNode& node, const std::string& path);
+
+  /// An expression of parameters and of these variables.
+  std::shared_ptr<const Formula> Compile(const YamlNode& node, const std::string& path,
+                                         const std::string& expression,
+                                         const std::vector<std::string>& variables);
+  [[nodiscard]] bool HasParameter(const std::string& name) const { return scope_->Has(name); }
 
   /// A number under `key` in one of several units, in SI; `otherwise` if left out.
   std::optional<double> InUnit(const YamlMap& map, const std::string& key,

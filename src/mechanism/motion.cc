@@ -65,6 +65,8 @@ void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
     out.body = load.body;
     out.p_BoQ_B = load.p_BoQ_B;
     out.in_body_axes = load.in_body_axes;
+    out.load = &load;
+    out.time_s = t_s;
     for (int c = 0; c < 3; ++c) {
       out.force[c] = Evaluate(load.force[c], t_s).value;
       out.moment[c] = Evaluate(load.moment[c], t_s).value;

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -43,6 +45,17 @@ struct Command {
   Profile profile;
 };
 
+/// A number that follows from time and from coordinates of the mechanism and their rates [SI].
+struct StateFunction {
+  struct Input {
+    Coordinate coordinate;
+    bool rate = false;  ///< its rate instead of its value
+    double near = 0.0;  ///< angles are taken within half a turn of this: at home
+  };
+  std::vector<Input> inputs;
+  std::function<double(double t_s, std::span<const double> inputs)> value;
+};
+
 /// An external wrench on a body, acting at point Q fixed in the body.
 struct Load {
   std::string name;
@@ -51,6 +64,12 @@ struct Load {
   bool in_body_axes = false;      ///< components in body axes instead of world axes
   std::array<Profile, 3> force;   ///< [N]
   std::array<Profile, 3> moment;  ///< [N m], about Q
+  /// What a component (0…2 of the force, 3…5 of the moment) is besides its profile.
+  struct Following {
+    int component = 0;
+    StateFunction function;
+  };
+  std::vector<Following> following = {};
 };
 
 /// A drive that pushes with a given force instead of following a command.
@@ -109,12 +128,14 @@ struct Motion {
   [[nodiscard]] int FindCommand(const std::string& command_name) const;  ///< index or -1
 };
 
-/// A load at one instant.
+/// A load at one instant; what follows the mechanism's state is not in it.
 struct LoadSample {
   int body = 0;
   Vec3 p_BoQ_B = Vec3::Zero();
   bool in_body_axes = false;
   Vec3 force = Vec3::Zero(), moment = Vec3::Zero();
+  const Load* load = nullptr;  ///< whose sample it is
+  double time_s = 0.0;
 };
 
 /// All commands at one instant: entry k belongs to Motion::commands[k].

@@ -1,6 +1,7 @@
 // Newton–Euler at the body origins in world axes, and the energy balance from the same states.
 #include "core/spatial.h"
 #include "kinematics/constraints.h"
+#include "kinematics/state_loads.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
 
@@ -32,8 +33,10 @@ struct LoadInWorld {
   Vec3 force, moment, p_BoQ;
 };
 
-LoadInWorld InWorld(const LoadSample& load, const Pose& X_WB) {
-  const Mat3 R = X_WB.linear();
+LoadInWorld InWorld(const Mechanism& mechanism, const BodyStates& states,
+                    const LoadSample& sample) {
+  const LoadSample load = AtStates(mechanism, states, sample);
+  const Mat3 R = states.X_WB[static_cast<size_t>(load.body)].linear();
   if (!load.in_body_axes) return {load.force, load.moment, R * load.p_BoQ_B};
   return {R * load.force, R * load.moment, R * load.p_BoQ_B};
 }
@@ -59,7 +62,7 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
     (*wrench_W)[b] << moment_cm + x.c.cross(force), force;
   }
   for (const LoadSample& load : loads) {
-    const LoadInWorld f = InWorld(load, states.X_WB[load.body]);
+    const LoadInWorld f = InWorld(mechanism, states, load);
     (*wrench_W)[load.body].head<3>() -= f.moment + f.p_BoQ.cross(f.force);
     (*wrench_W)[load.body].tail<3>() -= f.force;
   }
@@ -115,7 +118,7 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
     power.gravity += body.mass * x.v_cm.dot(mechanism.gravity_W);
   }
   for (const LoadSample& load : loads) {
-    const LoadInWorld f = InWorld(load, states.X_WB[load.body]);
+    const LoadInWorld f = InWorld(mechanism, states, load);
     const Vec3 w = states.V_WB[load.body].head<3>();
     power.loads +=
         f.force.dot(states.V_WB[load.body].tail<3>() + w.cross(f.p_BoQ)) + f.moment.dot(w);

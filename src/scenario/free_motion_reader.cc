@@ -18,10 +18,6 @@ namespace {
 constexpr size_t kMostNames = 12;  // in one message
 
 // Joint coordinates by name: JOINT, or JOINT.0, JOINT.1 … where a joint has several.
-struct NamedCoordinate {
-  std::string name;
-  Coordinate coordinate;
-};
 std::vector<NamedCoordinate> JointCoordinates(const Mechanism& mechanism) {
   std::vector<NamedCoordinate> named;
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
@@ -44,7 +40,7 @@ class FreeMotionReader {
   FreeMotionReader(ValueReader* values, const Mechanism& mechanism, ProfileTables* tables,
                    Motion* motion)
       : values_(values), mechanism_(mechanism), tables_(tables), motion_(motion) {
-    for (NamedCoordinate& named : StartCoordinates(mechanism)) known_.push_back(std::move(named));
+    for (NamedCoordinate& named : StateCoordinates(mechanism)) known_.push_back(std::move(named));
   }
 
   void Read(const YamlNode& node, const YamlNode* forces) {
@@ -60,23 +56,6 @@ class FreeMotionReader {
 
  private:
   YamlReader& yaml() { return values_->yaml(); }
-
-  static std::vector<NamedCoordinate> StartCoordinates(const Mechanism& mechanism) {
-    std::vector<NamedCoordinate> named;
-    for (size_t d = 0; d < mechanism.drives.size(); ++d) {
-      named.push_back(
-          {mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
-    }
-    for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
-      int component = 0;
-      for (const char* c : kPoseComponents) {
-        named.push_back({mechanism.outputs[o].name + "." + c,
-                         {Coordinate::Kind::kOutput, static_cast<int>(o), component++}});
-      }
-    }
-    for (NamedCoordinate& joint : JointCoordinates(mechanism)) named.push_back(std::move(joint));
-    return named;
-  }
 
   // Guided coordinates must be drives or prescribed joints themselves.
   void CheckCommands(const YamlNode& node) {
@@ -243,6 +222,22 @@ class FreeMotionReader {
 };
 
 }  // namespace
+
+std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism) {
+  std::vector<NamedCoordinate> named;
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    named.push_back({mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
+  }
+  for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
+    int component = 0;
+    for (const char* c : kPoseComponents) {
+      named.push_back({mechanism.outputs[o].name + "." + c,
+                       {Coordinate::Kind::kOutput, static_cast<int>(o), component++}});
+    }
+  }
+  for (NamedCoordinate& joint : JointCoordinates(mechanism)) named.push_back(std::move(joint));
+  return named;
+}
 
 bool IsFree(const YamlNode* motion, const YamlNode* forces) {
   if (forces != nullptr) return true;

@@ -12,6 +12,7 @@
 #include "core/word_hints.h"
 #include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
+#include "scenario/state_function_reader.h"
 #include "table/motion_table.h"
 #include "table/pose_table.h"
 
@@ -294,21 +295,28 @@ class MotionReader {
       if (map.valid() && !map.Has("force") && !map.Has("moment")) {
         yaml().Error(entry, path + " has neither force nor moment");
       }
-      ReadComponents(map.Find("force"), path + ".force", "N", &load.force);
-      ReadComponents(map.Find("moment"), path + ".moment", "N m", &load.moment);
+      ReadComponents(map.Find("force"), path + ".force", "N", 0, &load);
+      ReadComponents(map.Find("moment"), path + ".moment", "N m", 3, &load);
       motion_.loads.push_back(std::move(load));
     }
   }
 
-  void ReadComponents(const YamlNode* node, const std::string& path, const char* unit,
-                      std::array<Profile, 3>* profiles) {
+  // Three components; the first is the load's `first`.
+  void ReadComponents(const YamlNode* node, const std::string& path, const char* unit, int first,
+                      Load* load) {
     if (node == nullptr) return;
     const auto items = yaml().Items(*node, path, 3);
     if (!items) return;
     for (size_t i = 0; i < 3; ++i) {
       const std::string name = fmt::format("{}[{}]", path, i);
-      (*profiles)[i] = ReadProfile(values_, *(*items)[i], name,
-                                   {.unit = unit, .home = {}, .name = name, .tables = &tables_});
+      if (FollowsState(*values_, *(*items)[i])) {
+        const auto function = ReadStateFunction(values_, mechanism_, *(*items)[i], name);
+        if (function) load->following.push_back({first + static_cast<int>(i), *function});
+        continue;
+      }
+      Profile& profile = first == 0 ? load->force[i] : load->moment[i];
+      profile = ReadProfile(values_, *(*items)[i], name,
+                            {.unit = unit, .home = {}, .name = name, .tables = &tables_});
     }
   }
 

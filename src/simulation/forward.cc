@@ -188,7 +188,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     target = at.position;
     if (rates) target += (b * at.velocity + at.acceleration) / k_d;
     s->system.SetTargets(target);
-    if (s->system.has_given_forces() || s->lacking) {
+    if (s->system.has_given_forces() || s->lacking || s->loads.follow()) {
       s->system.EvaluatePosition();
       mj_comVel(m, data);
     }

@@ -1,10 +1,17 @@
 #include "simulation/loads.h"
 
+#include <algorithm>
+
+#include "simulation/load_inputs.h"
+
 namespace mbv::simulation {
 
 RunSummary CheckLoads(const EngineModel& engine, const Motion& motion) {
   for (const Load& load : motion.loads) {
-    if (engine.PlannedOf(load.body) >= 0) continue;
+    if (engine.PlannedOf(load.body) >= 0) {
+      if (RunSummary summary = CheckLoadInputs(engine, load); !summary.ok()) return summary;
+      continue;
+    }
     return {.stop = Stop::kUnsupported,
             .message = "load '" + load.name + "' acts on the massless body '" +
                        engine.mechanism->bodies[load.body].name + "'",
@@ -26,10 +33,20 @@ void Loads::Evaluate(double t_s, const mjData& d) {
       out.force[c] = mbv::Evaluate(load.force[c], t_s).value;
       out.moment[c] = mbv::Evaluate(load.moment[c], t_s).value;
     }
+    if (!load.following.empty()) {
+      const Vec6 part = FollowingPart(engine_, d, load, t_s);
+      out.force += part.head<3>();
+      out.moment += part.tail<3>();
+    }
     if (!load.in_body_axes) continue;
     out.force = X_WB.linear() * out.force;
     out.moment = X_WB.linear() * out.moment;
   }
+}
+
+bool Loads::follow() const {
+  return std::ranges::any_of(motion_.loads,
+                             [](const Load& load) { return !load.following.empty(); });
 }
 
 void Loads::AddGeneralized(mjData* d, double* qfrc) const {

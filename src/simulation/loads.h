@@ -24,6 +24,8 @@ class Loads {
   Loads(const EngineModel& engine, const Motion& motion) : engine_(engine), motion_(motion) {}
 
   void Evaluate(double t_s, const mjData& d);
+  /// True if some load follows the state: then Evaluate() needs tendons and mj_comVel.
+  [[nodiscard]] bool follow() const;
   [[nodiscard]] const std::vector<WorldLoad>& world() const { return world_; }
   /// Adds Jᵀ(load) of the loads last evaluated to `qfrc` (nv).
   void AddGeneralized(mjData* d, double* qfrc) const;

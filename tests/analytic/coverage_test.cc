@@ -186,6 +186,20 @@ TEST(Coverage, OfEveryClosedFormIsTestedHere) {
   }
 }
 
+TEST(Coverage, LoadsThatFollowTheMotionAreOutside) {
+  const Mechanism m = Shipped("stabilizing_platform/model.yaml");
+  const Coverage coverage = FindClosedForm(m.name)->coverage(m);
+  Motion motion;
+  Load load{.name = "buffer", .body = m.FindBody("platform"), .force = {}, .moment = {}};
+  motion.loads = {load};
+  EXPECT_TRUE(FindUncoveredLoads(coverage, m, motion).empty());
+  motion.loads[0].following.push_back(
+      {2, {.inputs = {}, .value = [](double t_s, auto) { return t_s; }}});
+  const std::vector<Finding> findings = FindUncoveredLoads(coverage, m, motion);
+  ASSERT_EQ(findings.size(), 1u);
+  EXPECT_EQ(findings[0].message, "load buffer follows the mechanism's state");
+}
+
 TEST(Coverage, NamesTheBodyTheNumberAndTheAssumption) {
   Mechanism m = Shipped("stabilizing_platform/model.yaml");
   m.bodies[size_t(m.FindBody("limb2.link1"))].p_BoBcm_B.x() = 0.1;

@@ -116,6 +116,38 @@ void Scale(const Mechanism& mechanism, double s, ForceElement* element) {
   for (double& coefficient : spring->polynomial) coefficient *= force / (power *= unit);
 }
 
+// Values are scaled back before the function sees them, forces grow with s, moments with s².
+StateFunction Scaled(const Mechanism& mechanism, const StateFunction& function, double s,
+                     double by) {
+  StateFunction out = function;
+  std::vector<double> units;
+  for (StateFunction::Input& input : out.inputs) {
+    units.push_back(IsLength(mechanism, input.coordinate) ? s : 1.0);
+    input.near *= units.back();
+  }
+  out.value = [=, value = function.value](double t_s, std::span<const double> inputs) {
+    std::vector<double> original(inputs.begin(), inputs.end());
+    for (size_t i = 0; i < original.size(); ++i) original[i] /= units[i];
+    return by * value(t_s, original);
+  };
+  return out;
+}
+
+std::vector<Load::Following> Scaled(const Mechanism& mechanism, const Load& load,
+                                    const Similarity& similarity) {
+  std::vector<Load::Following> parts;
+  const double s = similarity.scale;
+  for (const Load::Following& part : load.following) {
+    const int vector = part.component / 3, k = part.component % 3;
+    for (int i = 0; i < 3; ++i) {
+      const double R_ik = load.in_body_axes ? (i == k ? 1.0 : 0.0) : similarity.X_NW(i, k);
+      const double by = R_ik * (vector == 0 ? s : s * s);
+      if (R_ik != 0.0) parts.push_back({3 * vector + i, Scaled(mechanism, part.function, s, by)});
+    }
+  }
+  return parts;
+}
+
 }  // namespace
 
 Mechanism Similar(const Mechanism& mechanism, const Similarity& similarity) {
@@ -184,6 +216,7 @@ Motion Similar(const Mechanism& mechanism, const Motion& motion, const Similarit
   }
   for (Load& load : out.loads) {
     load.p_BoQ_B *= s;
+    load.following = Scaled(mechanism, load, similarity);
     const auto old_force = load.force, old_moment = load.moment;
     for (int i = 0; i < 3; ++i) {
       load.force[i].terms.clear();

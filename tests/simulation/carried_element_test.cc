@@ -1,6 +1,7 @@
 // Bushings and carried rotors in MuJoCo: against the exact model, and against energy.
 #include <gtest/gtest.h>
 
+#include "mjcf/mjcf.h"
 #include "model_file/load_model.h"
 #include "simulation/simulation.h"
 #include "tests/carried_rotor.h"
@@ -91,6 +92,16 @@ TEST(SimulatedBushings, KeepTheBalanceOfPower) {
             1e-12 * in.cwiseAbs().maxCoeff());
   EXPECT_LT(Column(run, "power.dampers").maxCoeff(), 0.0);
   EXPECT_GT(Column(run, "energy.springs").minCoeff(), 1.0);
+}
+
+TEST(SimulatedBushings, AreNamedInTheFile) {
+  const std::string xml = WriteMjcf(Loaded(Bushed("stiffness: [0, 500, 0, 8, 0, 0]")));
+  EXPECT_NE(xml.find("rubber.ky: ky of bushing 'rubber'"), std::string::npos) << xml;
+  EXPECT_NE(xml.find("rubber.krx: krx of bushing 'rubber'"), std::string::npos);
+  EXPECT_EQ(xml.find("rubber.kz"), std::string::npos);
+  const std::string rotor = WriteMjcf(Loaded(fixtures::CarriedRotor().AsLaw()));
+  EXPECT_NE(rotor.find("fly: gyroscopic rotor of joint 'roll'"), std::string::npos);
+  EXPECT_EQ(rotor.find("armature"), std::string::npos);
 }
 
 // Where frames differ by one turn about x and one way along it, six numbers do what a joint's
