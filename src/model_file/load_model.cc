@@ -15,6 +15,7 @@
 #include "model_file/model_head.h"
 #include "model_file/model_instances.h"
 #include "model_file/model_joints.h"
+#include "model_file/model_legs.h"
 #include "model_file/model_meshes.h"
 #include "model_file/model_motors.h"
 #include "model_file/model_outputs.h"
@@ -161,6 +162,7 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   internal::ReadSurroundings(blocks.model(), file, reading->options.gravity_W, &values, &s.head);
   if (!root.is_map()) return {};
   internal::InstanceReader(root, &values, &parameters, &blocks).Expand(blocks.model());
+  internal::ExpandLegs(&values, &blocks);
   parameters.CheckOverrides();
   s.parameters = parameters.Take();
 

@@ -39,6 +39,7 @@ struct Block {
 struct ModelBlocks {
   std::deque<Scope> scopes;
   std::deque<Block> blocks;
+  std::deque<YamlNodePtr> made;  ///< what blocks stand on that no file contains
 
   explicit ModelBlocks(const YamlNode* root);
   [[nodiscard]] const Block& model() const { return blocks.front(); }

@@ -61,7 +61,8 @@ const std::vector<std::string> kModelKeys = {
     "name",   "description", "parameters", "gravity",   "world",    "bodies",         "joints",
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
     "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
-    "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements"};
+    "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements",
+    "legs"};
 // clang-format on
 
 ModelHead ReadTitle(const YamlMap& file, YamlReader* yaml) {

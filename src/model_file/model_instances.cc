@@ -9,9 +9,10 @@
 namespace mbv::internal {
 namespace {
 
-const std::vector<std::string> kPartKeys = {
-    "parameters", "attach",    "bodies",      "joints",    "drives",   "prescribed", "outputs",
-    "springs",    "instances", "description", "materials", "sections", "couplings",  "elements"};
+const std::vector<std::string> kPartKeys = {"parameters", "attach",      "bodies",    "joints",
+                                            "drives",     "prescribed",  "outputs",   "springs",
+                                            "instances",  "description", "materials", "sections",
+                                            "couplings",  "elements",    "legs"};
 
 }  // namespace
 
