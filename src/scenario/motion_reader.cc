@@ -10,6 +10,7 @@
 #include "core/spatial.h"
 #include "core/text.h"
 #include "core/word_hints.h"
+#include "scenario/blended_path_reader.h"
 #include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
 #include "scenario/state_function_reader.h"
@@ -186,9 +187,14 @@ class MotionReader {
 
   // Way points with rest at each; returns when the path ends [s].
   double ReadPath(const YamlNode& node) {
-    YamlMap map(&yaml(), &node, "motion.path",
-                {"outputs", "points", "points_mm", "v_max", "a_max", "law", "start_s"});
+    std::vector<std::string> keys = {"outputs", "points",  "points_mm", "v_max",   "a_max",
+                                     "law",     "start_s", "blend",     "blend_mm"};
+    const bool blends =
+        node.is_map() && (node.Find("blend") != nullptr || node.Find("blend_mm") != nullptr);
+    if (blends) keys.emplace_back("j_max");
+    const YamlMap map(&yaml(), &node, "motion.path", keys);
     if (!map.valid()) return kNan;
+    if (blends) return ReadBlended(map, ReadBlendedPlan(values_, map));
     const std::vector<Command> axes = ReadPathOutputs(map);
     const auto v_max = values_->RequiredPositive(map, "v_max");
     const auto a_max = values_->RequiredPositive(map, "a_max");
@@ -200,6 +206,23 @@ class MotionReader {
     const std::vector<VecX> points = ReadPoints(map, axes.size());
     if (axes.empty() || points.size() < 2 || !v_max || !a_max) return kNan;
     return BuildPath(node, axes, points, *v_max, *a_max, full, start_s);
+  }
+
+  // The corners are rounded; the end of the path, or NaN after a finding.
+  double ReadBlended(const YamlMap& map, std::optional<PolylinePlan> plan) {
+    std::vector<Command> axes = ReadPathOutputs(map);
+    const std::vector<VecX> points = ReadPoints(map, axes.size());
+    if (!plan || axes.empty() || points.size() < 2) return kNan;
+    plan->points = points;
+    const auto paths = PlanPath(&yaml(), *map.node(), *plan);
+    if (paths.empty()) return kNan;
+    const YamlEntry place{"path", map.node()->line, map.node()->column, nullptr};
+    for (size_t k = 0; k < axes.size(); ++k) {
+      axes[k].profile.terms.emplace_back(
+          PiecewiseTerm{std::make_shared<const Piecewise>(paths[k])});
+      AddCommand(place, std::move(axes[k]));
+    }
+    return paths[0].breaks.back();
   }
 
   std::vector<Command> ReadPathOutputs(const YamlMap& map) {

@@ -6,15 +6,17 @@
 #include <cmath>
 
 #include "core/motion_laws.h"
+#include "scenario/cam_reader.h"
+#include "scenario/profile_amounts.h"
 #include "table/motion_table.h"
 
 namespace mbv {
 namespace {
 
-class ProfileReader {
+class ProfileReader : AmountReader {
  public:
   ProfileReader(ValueReader* values, const ProfileContext& context)
-      : values_(values), context_(context) {}
+      : AmountReader(values, context) {}
 
   void Read(const YamlNode& node, const std::string& path, Profile* profile) {
     if (node.is_sequence()) {
@@ -44,7 +46,7 @@ class ProfileReader {
   void ReadTerm(const YamlNode& node, const std::string& path, Profile* profile) {
     YamlMap map(&values_->yaml(), &node, path,
                 {"value", "value_deg", "value_mm", "sine", "ramp", "poly345", "cycloid", "bump",
-                 "modified_sine", "trapezoid", "s_curve", "fourier", "via", "table"});
+                 "modified_sine", "trapezoid", "s_curve", "fourier", "via", "table", "cam"});
     if (!map.valid()) return;
     if (node.entries.size() != 1) {
       values_->yaml().Error(node,
@@ -71,6 +73,8 @@ class ProfileReader {
       ReadFourier(value, term_path, profile);
     } else if (key == "via") {
       ReadVia(value, term_path, profile);
+    } else if (key == "cam") {
+      ReadCam(values_, *value, term_path, context_, profile);
     } else if (key == "table") {
       ReadTable(*value, term_path, profile);
     } else if (key == "poly345" || key == "cycloid" || key == "bump" || key == "modified_sine") {
@@ -228,75 +232,10 @@ class ProfileReader {
     if (!amount || !duration_s) return;
     if (key == "bump") {
       profile->terms.emplace_back(BumpTerm{start_s, *duration_s, *amount});
-    } else if (key == "modified_sine") {
-      profile->terms.emplace_back(ModifiedSineTerm{start_s, *duration_s, *amount});
-    } else if (key == "cycloid") {
-      profile->terms.emplace_back(CycloidStepTerm{start_s, *duration_s, *amount});
     } else {
-      profile->terms.emplace_back(PolyStepTerm{start_s, *duration_s, *amount});
+      profile->terms.push_back(StepTerm(key, start_s, *duration_s, *amount));
     }
   }
-
-  // A term's map; `amount` is the key that may be given in several units.
-  YamlMap Map(const YamlNode* node, const std::string& path, const std::string& amount,
-              std::vector<std::string> keys) {
-    for (std::string& key : InEveryUnit(amount)) keys.push_back(std::move(key));
-    return {&values_->yaml(), node, path, keys};
-  }
-
-  // A length or angle, or its rates; the unit must suit the coordinate. Empty when left out.
-  YamlMap::InUnit FindAmount(const YamlMap& map, const std::string& key) {
-    const YamlMap::InUnit found = map.FindInUnit(key, {kPlain, kDeg, kMm});
-    if (found.node == nullptr || found.unit.Suits(context_.unit)) return found;
-    values_->yaml().Error(
-        *found.node,
-        fmt::format("{} is given, but this value is in {}", map.PathOf(found.key), context_.unit),
-        fmt::format("write {}", map.PathOf(key)));
-    return {};
-  }
-
-  std::optional<double> Amount(const YamlMap& map, const std::string& key) {
-    const YamlMap::InUnit found = FindAmount(map, key);
-    if (found.node == nullptr) return {};
-    const auto number = values_->Number(*found.node, map.PathOf(found.key));
-    if (!number) return {};
-    return found.unit.to_si(*number);
-  }
-
-  // A required list.
-  std::optional<std::vector<double>> Amounts(const YamlMap& map, const std::string& key) {
-    if (map.FindInUnit(key, {kPlain, kDeg, kMm}).node == nullptr) {
-      (void)map.Required(key);  // reports it
-      return {};
-    }
-    const YamlMap::InUnit found = FindAmount(map, key);
-    if (found.node == nullptr) return {};
-    auto numbers = values_->Numbers(*found.node, map.PathOf(found.key));
-    if (!numbers) return {};
-    for (double& number : *numbers) number = found.unit.to_si(number);
-    return numbers;
-  }
-
-  std::optional<double> PositiveAmount(const YamlMap& map, const std::string& key) {
-    const auto amount = RequiredAmount(map, key);
-    if (!amount || *amount > 0.0) return amount;
-    const YamlMap::InUnit found = map.FindInUnit(key, {kPlain, kDeg, kMm});
-    values_->yaml().Error(*found.node, fmt::format("{0} = {1} violates {0} > 0",
-                                                   map.PathOf(found.key), found.node->text));
-    return {};
-  }
-
-  std::optional<double> RequiredAmount(const YamlMap& map, const std::string& key) {
-    if (!map.valid()) return {};
-    if (map.FindInUnit(key, {kPlain, kDeg, kMm}).node == nullptr) {
-      (void)map.Required(key);  // reports it
-      return {};
-    }
-    return Amount(map, key);
-  }
-
-  ValueReader* values_;
-  const ProfileContext& context_;
 };
 
 }  // namespace
