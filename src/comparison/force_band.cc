@@ -12,6 +12,10 @@ int BandColumn(const Trace& trace, int column) {
   return band == Quantity::kOwn ? -1 : trace.Find(band, force.subject);
 }
 
+bool IsBand(const Channel& channel) {
+  return channel.quantity == Quantity::kForceBand || channel.quantity == Quantity::kBaseForceBand;
+}
+
 // What a number lies outside a band.
 double Outside(double number, const ForceBand& band) {
   const double away = number - band.middle;
@@ -46,11 +50,43 @@ double Difference(const ForceBand& a, const ForceBand& b) {
   return b.open() ? Outside(a.middle, b) : -Outside(b.middle, a);
 }
 
+Trace WithEnds(const Trace& trace) {
+  Trace shown;
+  shown.witness = trace.witness;
+  std::vector<Channel> channels;
+  std::vector<VecX> columns;
+  const auto add = [&](Channel channel, const std::string& ending, VecX values) {
+    channel.name += ending;
+    if (!ending.empty()) channel.quantity = Quantity::kOwn;
+    channels.push_back(std::move(channel));
+    columns.push_back(std::move(values));
+  };
+  for (size_t c = 0; c < trace.channels.size(); ++c) {
+    const Channel& channel = trace.channels[c];
+    const auto column = static_cast<int>(c);
+    if (IsBand(channel)) continue;
+    VecX force = trace.values.col(column);
+    const int band = BandColumn(trace, column);
+    if (band < 0) {
+      add(channel, "", std::move(force));
+      continue;
+    }
+    const VecX half = trace.values.col(band);
+    add(channel, "", (half.array() > 0.0).select(kNan, force));
+    add(channel, ".lower", force - half);
+    add(channel, ".upper", force + half);
+  }
+  shown.Reset(trace.time_s, std::move(channels));
+  for (size_t c = 0; c < columns.size(); ++c) {
+    shown.values.col(static_cast<Eigen::Index>(c)) = columns[c];
+  }
+  return shown;
+}
+
 std::vector<bool> AtRest(const Trace& trace) {
   std::vector<bool> open(trace.time_s.size(), false);
   for (size_t c = 0; c < trace.channels.size(); ++c) {
-    const Quantity quantity = trace.channels[c].quantity;
-    if (quantity != Quantity::kForceBand && quantity != Quantity::kBaseForceBand) continue;
+    if (!IsBand(trace.channels[c])) continue;
     for (size_t i = 0; i < open.size(); ++i) {
       const auto row = static_cast<Eigen::Index>(i), column = static_cast<Eigen::Index>(c);
       open[i] = open[i] || trace.values(row, column) > 0.0;

@@ -45,6 +45,10 @@ class ForceSignal {
 /// outside.
 [[nodiscard]] double Difference(const ForceBand& a, const ForceBand& b);
 
+/// The trace as files give it: open forces are NaN, with their ends in NAME.lower and NAME.upper in
+/// place of the half-width; where the force is a number both are it.
+[[nodiscard]] Trace WithEnds(const Trace& trace);
+
 /// Per sample: some force of the trace is open.
 [[nodiscard]] std::vector<bool> AtRest(const Trace& trace);
 

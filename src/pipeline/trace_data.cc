@@ -1,5 +1,6 @@
 #include "pipeline/trace_data.h"
 
+#include "comparison/force_band.h"
 #include "core/demand.h"
 #include "data/data_file.h"
 
@@ -22,10 +23,12 @@ DataAbout AboutOf(const Report& report) {
 std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& report,
                                                              const std::vector<std::string>& words,
                                                              std::string* trouble) {
-  std::vector<const Trace*> traces;
+  std::vector<Trace> shown;
   for (const WitnessRecord& witness : report.witnesses) {
-    if (!witness.trace.time_s.empty()) traces.push_back(&witness.trace);
+    if (!witness.trace.time_s.empty()) shown.push_back(WithEnds(witness.trace));
   }
+  std::vector<const Trace*> traces;
+  for (const Trace& trace : shown) traces.push_back(&trace);
   std::vector<std::pair<std::string, std::string>> files;
   for (const std::string& word : words) {
     const DataFormat* format = FindDataFormat(word);

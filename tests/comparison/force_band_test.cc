@@ -42,6 +42,25 @@ void Rest(Trace* trace, double half) {
   for (size_t i = kFrom; i < kTo; ++i) trace->values(static_cast<Eigen::Index>(i), columns) = half;
 }
 
+TEST(ForceBand, FilesGiveItsEndsAndNoNumber) {
+  synthetic::Case c;
+  const VecX force = c.reference.values.col(c.reference.Find("d1.force"));
+  Rest(&c.reference, kHalf);
+  const Trace shown = WithEnds(c.reference);
+  EXPECT_EQ(shown.Find("d1.force.band"), -1);
+  const auto at = [&](const std::string& name, size_t i) {
+    return shown.values(static_cast<Eigen::Index>(i), shown.Find(name));
+  };
+  for (size_t i = 0; i < shown.time_s.size(); ++i) {
+    const bool open = kFrom <= i && i < kTo;
+    const double middle = force[static_cast<Eigen::Index>(i)], half = open ? kHalf : 0.0;
+    EXPECT_EQ(std::isnan(at("d1.force", i)), open) << i;
+    EXPECT_EQ(at("d1.force.lower", i), middle - half) << i;
+    EXPECT_EQ(at("d1.force.upper", i), middle + half) << i;
+  }
+  EXPECT_EQ(shown.channels.size(), c.reference.channels.size() + 1);
+}
+
 // All three witnesses rest.
 synthetic::Case Resting() {
   synthetic::Case c;

@@ -24,15 +24,30 @@ namespace mbv::laws {
 namespace {
 
 // One motion of every shipped model.
-const char* const kScenarios[] = {
-    "andrews_squeezer/benchmark",  "bricard/turn_inverse", "bricard/fall",
-    "cabin_robot/wrench",          "floating_loop/tumble", "floating_loop/steered",
-    "four_bar/turn_inverse",       "n_four_bar/rock",      "redundant_five_bar/circle_inverse",
-    "scara_robot/tool_load",       "slider_crank/press",   "spr_tripod/tool_load_inverse",
-    "spring_cart/swing",           "stewart/wave",         "stabilizing_platform/sea_state",
-    "vehicle_linkage/drive",       "geared_press/inverse", "rubbing_five_bar/draw_inverse",
-    "bushed_linkage/turn_inverse", "slider_crank/buffer",  "stewart_legs/dance_inverse",
-    "journal_crank/press_inverse", "slotted_screw/turn_inverse", "machine_five_bar/draw_inverse"};
+const char* const kScenarios[] = {"andrews_squeezer/benchmark",
+                                  "bricard/turn_inverse",
+                                  "bricard/fall",
+                                  "cabin_robot/wrench",
+                                  "floating_loop/tumble",
+                                  "floating_loop/steered",
+                                  "four_bar/turn_inverse",
+                                  "n_four_bar/rock",
+                                  "redundant_five_bar/circle_inverse",
+                                  "scara_robot/tool_load",
+                                  "slider_crank/press",
+                                  "spr_tripod/tool_load_inverse",
+                                  "spring_cart/swing",
+                                  "stewart/wave",
+                                  "stabilizing_platform/sea_state",
+                                  "vehicle_linkage/drive",
+                                  "geared_press/inverse",
+                                  "rubbing_five_bar/draw_inverse",
+                                  "bushed_linkage/turn_inverse",
+                                  "slider_crank/buffer",
+                                  "stewart_legs/dance_inverse",
+                                  "journal_crank/press_inverse",
+                                  "slotted_screw/turn_inverse",
+                                  "machine_five_bar/draw_inverse"};
 
 struct Case {
   Scenario scenario;
