@@ -16,10 +16,10 @@ bool IsBand(const Channel& channel) {
   return channel.quantity == Quantity::kForceBand || channel.quantity == Quantity::kBaseForceBand;
 }
 
-// What a number lies outside a band.
+// What a number lies outside a band; NaN stays.
 double Outside(double number, const ForceBand& band) {
   const double away = number - band.middle;
-  return std::copysign(std::max(0.0, std::abs(away) - band.half), away);
+  return std::copysign(std::max(std::abs(away) - band.half, 0.0), away);
 }
 
 }  // namespace
