@@ -100,7 +100,7 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     return at.rests ? 0.0 : -std::copysign(most + at.load_friction, at.rate);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
-  return -rotor.inertia * rotor.ratio * (rotor.ratio * at.acceleration + at.turning.along_rate);
+  return -rotor.reflected() * at.acceleration - rotor.inertia * rotor.ratio * at.turning.along_rate;
 }
 
 Vec3 CarrierMoment(const ForceElement& element, const ElementMotion& at) {
@@ -122,9 +122,8 @@ double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
 
 ElementEnergy EnergyOf(const ForceElement& element, const ElementMotion& at) {
   if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
-    // ½ J of the square of the whole rate, less what the carrier's inertia contains.
-    const double own = rotor->ratio * at.rate, carried = at.turning.along;
-    return {.kinetic = 0.5 * rotor->inertia * own * (own + 2.0 * carried)};
+    return {.kinetic = 0.5 * rotor->reflected() * at.rate * at.rate +
+                       rotor->inertia * rotor->ratio * at.rate * at.turning.along};
   }
   const auto* spring = std::get_if<SpringLaw>(&element.law);
   if (spring == nullptr) return {};
