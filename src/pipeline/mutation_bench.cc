@@ -60,10 +60,14 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
   if (!prepared || !CanBeBent(prepared->scenario, diagnostics)) return nullptr;
   std::unique_ptr<MutationBench> bench(new MutationBench(*std::move(prepared)));
-  bench->reactions_not_unique_ = ReactionsNotUnique(bench->prepared_.base, {});
   bench->literals_ = LoadModel(bench->scenario().model_file, bench->SimulatedOptions()).literals;
   bench->RunTruths();
-  bench->base_ = bench->Run(bench->mechanism());
+  WitnessRuns unbent = bench->Follow(bench->mechanism(), bench->scenario());
+  if (unbent.simulation) {
+    bench->reactions_not_unique_ =
+        ReactionsNotUnique(bench->prepared_.base, unbent.simulation->X_WB);
+  }
+  bench->base_ = bench->Judge(std::move(unbent), bench->scenario());
   const BentRun& base = bench->base_;
   if (base.ran && base.comparison.verdict == Verdict::kAgree) {
     *exit_code = 0;
@@ -134,14 +138,21 @@ BentRun MutationBench::Run(const Replacement& replacement) const {
 BentRun MutationBench::Run(const Mechanism& wrong) const { return Run(wrong, scenario()); }
 
 // Motion, forces and servos are those of the unbent model: only the simulated side is wrong.
-BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario) const {
+WitnessRuns MutationBench::Follow(const Mechanism& wrong, const Scenario& scenario) const {
   WitnessRunner runner(prepared_, {.scenario = &scenario,
                                    .mechanism = &wrong,
                                    .ranges = &wrong,
                                    .driven = driven_,
                                    .forces = forces_});
   runner.RunFollowing();
-  WitnessRuns runs = runner.Take();
+  return runner.Take();
+}
+
+BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario) const {
+  return Judge(Follow(wrong, scenario), scenario);
+}
+
+BentRun MutationBench::Judge(WitnessRuns runs, const Scenario& scenario) const {
   BentRun bent;
   bent.failure = WhyNothing(runs, scenario.simulation.ignore_ranges);
   if (!bent.failure.empty()) return bent;

@@ -74,6 +74,9 @@ class MutationBench {
   explicit MutationBench(Prepared prepared) : prepared_(std::move(prepared)) {}
   void RunTruths();
   [[nodiscard]] BentRun Run(const Mechanism& wrong, const Scenario& scenario) const;
+  /// What follows the unbent motion with this model, and its comparison with the truths.
+  [[nodiscard]] WitnessRuns Follow(const Mechanism& wrong, const Scenario& scenario) const;
+  [[nodiscard]] BentRun Judge(WitnessRuns runs, const Scenario& scenario) const;
   [[nodiscard]] LoadOptions SimulatedOptions() const;
 
   Prepared prepared_;
@@ -84,7 +87,7 @@ class MutationBench {
   DrivenMotion driven_;
   DriveForces forces_;  // empty where the simulation is given none
   WitnessRuns truths_;  // with the unbent model under wrong forces, where it is pushed
-  std::vector<std::string> reactions_not_unique_;
+  std::vector<std::string> reactions_not_unique_;  // along the unbent run
   BentRun base_;
 };
 

@@ -23,7 +23,8 @@ TEST(Channel, EachQuantityHasItsName) {
   for (int q = 1; q < static_cast<int>(Quantity::kCount_); ++q) {
     const auto quantity = static_cast<Quantity>(q);
     // Drives and prescribed joints share words and never a name.
-    const bool base = quantity == Quantity::kBaseForce || quantity == Quantity::kBaseWork;
+    const bool base = quantity == Quantity::kBaseForce || quantity == Quantity::kBaseForceBand ||
+                      quantity == Quantity::kBaseWork;
     EXPECT_TRUE(names.insert(ChannelName(quantity, base ? "base" : "one", 0)).second) << q;
   }
 }

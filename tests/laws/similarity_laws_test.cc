@@ -140,7 +140,7 @@ ScaledAnswer Judge(const Case& c, const Similarity& similarity, bool wrong = fal
       .witnesses = {{"reference", &reference.trace, reference.summary},
                     {"simulated", &simulated.run.trace, simulated.run.summary}},
       .driven_by = "reference",
-      .reactions_not_unique = ReactionsNotUnique(m, {})};
+      .reactions_not_unique = ReactionsNotUnique(m, simulated.run.X_WB)};
   answer.comparison = Compare(input);
   answer.reference = std::move(reference.trace);
   return answer;

@@ -3,7 +3,7 @@ import assert from 'node:assert/strict';
 import {test} from 'node:test';
 
 import {
-  between, errorRange, floats, formatError, formatValue, gridCells, indexAt, largestByUnit, logShare, nearest,
+  between, errorRange, floats, formatError, formatForce, formatValue, gridCells, indexAt, largestByUnit, logShare, nearest,
   rampPlace, smallestPositive,
 } from '../../web/src/report/numbers.js';
 
@@ -61,6 +61,8 @@ test('A ramp of colours is walked from its first stop to its last', () => {
 });
 
 test('Values have four digits, a prefix where it reads better, and a true minus', () => {
+  assert.equal(formatForce(3, 0, 'N m'), '3.000 N m');
+  assert.equal(formatForce(3, 1000, 'N m'), '−997.0 N m … 1.003 kN m');
   assert.equal(formatValue(12.34567, 'N'), '12.35 N');
   assert.equal(formatValue(-1234.6, 'N'), '−1.235 kN');
   assert.equal(formatValue(2.5e6, 'N m'), '2.500 MN m');

@@ -110,6 +110,17 @@ export function formatValue(value, unit = '') {
 }
 
 /**
+ * A force, or both ends of the band that friction at rest leaves it.
+ * @param {number} force the middle of the band
+ * @param {number} half its half-width, 0 where the force is a number
+ * @param {string} unit
+ */
+export function formatForce(force, half, unit) {
+  if (!(half > 0)) return formatValue(force, unit);
+  return `${formatValue(force - half, unit)} … ${formatValue(force + half, unit)}`;
+}
+
+/**
  * The largest absolute value of each unit.
  * @param {{unit: string}[]} drives
  * @param {(Iterable<number> | null)[]} forces by drive

@@ -10,7 +10,7 @@ import {Bodies} from './bodies.js';
 import {errorPair, shownWitness} from './data.js';
 import {driveColor, element} from './dom.js';
 import {
-  errorRange, formatValue, largestByUnit, logShare, nearest, rampPlace, smallestPositive,
+  errorRange, formatForce, formatValue, largestByUnit, logShare, nearest, rampPlace, smallestPositive,
 } from './numbers.js';
 import {ReplaySide} from './replay_side.js';
 import {direction, floorGrid, lights} from './surroundings.js';
@@ -211,7 +211,7 @@ export class Replay {
     if (!hit) return;
     const name = hit.object.parent.name;
     const drive = this.arrows.findIndex((arrow) => arrow.group === hit.object.parent);
-    this.tip.textContent = drive < 0 ? name : `${name} ${formatValue(this.force(drive), this.data.drives[drive].unit)}`;
+    this.tip.textContent = drive < 0 ? name : `${name} ${formatForce(this.force(drive), this.half(drive), this.data.drives[drive].unit)}`;
     this.tip.style.left = `${Math.min(event.clientX - box.left + 14, box.width - 150)}px`;
     this.tip.style.top = `${event.clientY - box.top + 14}px`;
   }
@@ -223,6 +223,14 @@ export class Replay {
   /** @param {number} drive */
   force(drive) {
     return this.witness?.force[drive]?.[this.sample()] ?? NaN;
+  }
+
+  /**
+   * Of the band that friction at rest leaves the force.
+   * @param {number} drive
+   */
+  half(drive) {
+    return this.witness?.band[drive]?.[this.sample()] ?? 0;
   }
 
   /** @param {number} drive */
@@ -249,7 +257,7 @@ export class Replay {
                                    this.bodies.inWorld(spring.to, vector(spring.p_to))]);
     }
     this.side.fill(this.data.drives.map((_drive, i) => (
-        {force: this.force(i), error: this.error(i),
+        {force: this.force(i), half: this.half(i), error: this.error(i),
          position: this.witness?.position[i]?.[this.sample()] ?? NaN})));
     this.side.fillLegend(this.range, this.largest);
     this.caption.textContent = this.captionText();

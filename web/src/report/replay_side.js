@@ -1,6 +1,6 @@
 // What stands beside the replay: switches, the meaning of the arrows, the drives' numbers.
 import {driveColor, element, isDark} from './dom.js';
-import {formatError, formatValue} from './numbers.js';
+import {formatError, formatForce, formatValue} from './numbers.js';
 
 const kColumns = ['drive', 'force', 'error', 'position'];
 
@@ -53,11 +53,11 @@ export class ReplaySide {
     return this.colouring.value === 'error';
   }
 
-  /** @param {{force: number, error: number, position: number}[]} numbers by drive */
+  /** @param {{force: number, half: number, error: number, position: number}[]} numbers by drive */
   fill(numbers) {
     this.drives.forEach(({unit, position_unit}, i) => {
       const [force, error, position] = this.cells[i], now = numbers[i];
-      force.textContent = formatValue(now.force, unit);
+      force.textContent = formatForce(now.force, now.half, unit);
       error.textContent = formatError(now.error);
       position.textContent = formatValue(now.position, position_unit);
     });
