@@ -139,6 +139,14 @@ TEST(Mutate, OnTheCabinRobotOnlyWhatCannotActStaysUnseen) {
   EXPECT_EQ(Undetected(report), expected);
 }
 
+// Screw, gear, rotors, springs, oil and dry friction. At home alone statics determines more of the
+// screw's reactions than along the motion. The bars turn about z only.
+TEST(Mutate, OnAMachineWithItsElementsOnlyTheBarsRadiusStaysUnseen) {
+  const MutationReport report = Mutate("machine_five_bar/draw_inverse", Plain());
+  EXPECT_EQ(report.exit_code, 0) << report.diagnostics.Text();
+  EXPECT_EQ(Undetected(report), Names{"bar"});
+}
+
 TEST(Mutate, ASmallErrorIsMissedAndSaysSo) {
   const MutationReport report = Mutate("spr_tripod/default_inverse",
                                        {.size = 1e-10, .numbers = {"I_rod_zz"}, .progress = {}});
