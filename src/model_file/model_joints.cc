@@ -20,6 +20,7 @@ constexpr const char* kHelical = "helical";
 
 std::vector<std::string> KindWords() {
   std::vector<std::string> words;
+  words.reserve(kJointKindRows.size() + 1);
   for (const JointKindRow& row : kJointKindRows) words.emplace_back(row.word);
   words.emplace_back(kHelical);
   return words;

@@ -28,6 +28,7 @@ std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& repor
     if (!witness.trace.time_s.empty()) shown.push_back(WithEnds(witness.trace));
   }
   std::vector<const Trace*> traces;
+  traces.reserve(shown.size());
   for (const Trace& trace : shown) traces.push_back(&trace);
   std::vector<std::pair<std::string, std::string>> files;
   for (const std::string& word : words) {
