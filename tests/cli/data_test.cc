@@ -17,7 +17,7 @@ TEST(RunData, TracesAreThereForOctaveAndHdf5) {
       "cd " + mbverify.Out() +
       "/four_bar/turn_inverse && octave-cli --no-init-file --quiet --eval '"
       "load traces.mat; k = strcmp(reference.names, \"motor.force\");"
-      "printf(\"%s %s %.17g\\n\", info.verdict, reference.units{k}, reference.values(3, k))' && "
+      "printf(\"%s %s %.17g\\n\", info.verdict, reference.units{k}, reference.values(3, k))'; "
       "h5dump -m %.17g -d /reference/motor.force -s 2 -c 1 traces.h5");
   std::istringstream lines(read.out);
   std::string verdict, newton, metre, force;
