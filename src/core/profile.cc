@@ -28,6 +28,18 @@ Jet Cycloid(double s) {
           2.0 * pi * std::sin(2.0 * pi * s)};
 }
 
+Jet Poly4567(double s) {
+  if (s <= 0.0) return {0.0, 0.0, 0.0};
+  if (s >= 1.0) return {1.0, 0.0, 0.0};
+  if (s > 0.5) {  // σ(s) = 1 − σ(1 − s), without cancellation
+    const Jet mirrored = Poly4567(1.0 - s);
+    return {1.0 - mirrored.value, mirrored.rate, -mirrored.acceleration};
+  }
+  const double r = 1.0 - s, s2 = s * s;
+  return {s2 * s2 * (35.0 - s * (84.0 - s * (70.0 - 20.0 * s))), 140.0 * s2 * s * r * r * r,
+          420.0 * s2 * r * r * (1.0 - 2.0 * s)};
+}
+
 Jet ModifiedSine(double s) {
   if (s <= 0.0) return {0.0, 0.0, 0.0};
   if (s >= 1.0) return {1.0, 0.0, 0.0};
@@ -70,6 +82,9 @@ struct Evaluator {
   }
   Jet operator()(const PolyStepTerm& p) const {
     return Scale(Poly345((t - p.start_s) / p.duration_s), p.delta, p.duration_s);
+  }
+  Jet operator()(const Poly4567StepTerm& p) const {
+    return Scale(Poly4567((t - p.start_s) / p.duration_s), p.delta, p.duration_s);
   }
   Jet operator()(const CycloidStepTerm& c) const {
     return Scale(Cycloid((t - c.start_s) / c.duration_s), c.delta, c.duration_s);
@@ -122,6 +137,7 @@ struct BreakFinder {
   void operator()(const RampTerm&) const {}
   void operator()(const SineTerm&) const {}
   void operator()(const PolyStepTerm& p) const { Ends(p.start_s, p.duration_s); }
+  void operator()(const Poly4567StepTerm& p) const { Ends(p.start_s, p.duration_s); }
   void operator()(const CycloidStepTerm& c) const { Ends(c.start_s, c.duration_s); }
   void operator()(const BumpTerm& b) const { Ends(b.start_s, b.duration_s); }
   void operator()(const RampCruiseTerm& r) const {

@@ -25,6 +25,11 @@ struct SineTerm {
 struct PolyStepTerm {
   double start_s = 0.0, duration_s = 1.0, delta = 0.0;
 };
+/// delta · σ((t − start)/duration), σ(s) = 35s⁴ − 84s⁵ + 70s⁶ − 20s⁷, held at 0 before and delta
+/// after: jerk is continuous, too.
+struct Poly4567StepTerm {
+  double start_s = 0.0, duration_s = 1.0, delta = 0.0;
+};
 /// delta · σ((t − start)/duration), σ(s) = s − sin(2πs)/(2π), held at 0 before and delta after.
 struct CycloidStepTerm {
   double start_s = 0.0, duration_s = 1.0, delta = 0.0;
@@ -63,8 +68,8 @@ struct PiecewiseTerm {
 };
 
 using ProfileTerm =
-    std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, CycloidStepTerm, BumpTerm,
-                 RampCruiseTerm, ModifiedSineTerm, FourierTerm, PiecewiseTerm>;
+    std::variant<ConstantTerm, RampTerm, SineTerm, PolyStepTerm, Poly4567StepTerm, CycloidStepTerm,
+                 BumpTerm, RampCruiseTerm, ModifiedSineTerm, FourierTerm, PiecewiseTerm>;
 
 /// The sum of its terms.
 struct Profile {

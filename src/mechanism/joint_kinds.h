@@ -12,11 +12,9 @@
 //   planar       u, v, θ              translation u·e1 + v·e2, Rot(axis, θ); e1, e2, axis
 //                                     right-handed (axis z: x, y; axis x: y, z; axis y: z, x;
 //                                     else e1 = the axis' unitOrthogonal())
-//   point_on_line   s, roll, pitch, yaw     translation s·axis, turned as a ball: M's origin stays
-//   on
-//                                     the line through F's along axis
-//   point_on_plane  u, v, roll, pitch, yaw  translation u·e1 + v·e2 as planar, turned as a ball:
-//   M's
+//   point_on_line   s, a ball's       translation s·axis, turned as a ball: M's origin stays
+//                                     on the line through F's along axis
+//   point_on_plane  u, v, a ball's    translation u·e1 + v·e2 as planar, turned as a ball: M's
 //                                     origin stays in the plane through F's across axis
 //   free         x, y, z, roll, pitch, yaw
 #pragma once

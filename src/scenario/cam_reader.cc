@@ -47,11 +47,10 @@ class CamReader : AmountReader {
 
  private:
   std::optional<std::string> LawOf(const YamlMap& map, const std::string& otherwise) {
-    static const std::vector<std::string> kLaws = {"poly345", "cycloid", "modified_sine"};
     const YamlNode* node = map.Find("law");
     if (node == nullptr) return otherwise;
-    const auto law = values_->yaml().Choice(*node, map.PathOf("law"), kLaws);
-    return law ? std::optional(kLaws[static_cast<size_t>(*law)]) : std::nullopt;
+    const auto law = values_->yaml().Choice(*node, map.PathOf("law"), StepLaws());
+    return law ? std::optional(StepLaws()[static_cast<size_t>(*law)]) : std::nullopt;
   }
 
   std::optional<int> Cycles(const YamlMap& cam) {
@@ -105,7 +104,13 @@ class CamReader : AmountReader {
 
 }  // namespace
 
+const std::vector<std::string>& StepLaws() {
+  static const std::vector<std::string> kLaws = {"poly345", "poly4567", "cycloid", "modified_sine"};
+  return kLaws;
+}
+
 ProfileTerm StepTerm(const std::string& law, double start_s, double duration_s, double delta) {
+  if (law == "poly4567") return Poly4567StepTerm{start_s, duration_s, delta};
   if (law == "cycloid") return CycloidStepTerm{start_s, duration_s, delta};
   if (law == "modified_sine") return ModifiedSineTerm{start_s, duration_s, delta};
   return PolyStepTerm{start_s, duration_s, delta};

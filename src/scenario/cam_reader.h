@@ -2,12 +2,16 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "scenario/profile_reader.h"
 
 namespace mbv {
 
-/// A step by the law of this word ("poly345", "cycloid", "modified_sine").
+/// Words of the laws from rest to rest.
+[[nodiscard]] const std::vector<std::string>& StepLaws();
+
+/// A step by the law of this word.
 [[nodiscard]] ProfileTerm StepTerm(const std::string& law, double start_s, double duration_s,
                                    double delta);
 

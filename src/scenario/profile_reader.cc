@@ -44,9 +44,10 @@ class ProfileReader : AmountReader {
   }
 
   void ReadTerm(const YamlNode& node, const std::string& path, Profile* profile) {
-    YamlMap map(&values_->yaml(), &node, path,
-                {"value", "value_deg", "value_mm", "sine", "ramp", "poly345", "cycloid", "bump",
-                 "modified_sine", "trapezoid", "s_curve", "fourier", "via", "table", "cam"});
+    std::vector<std::string> keys = {"value",     "value_deg", "value_mm", "sine", "ramp",  "bump",
+                                     "trapezoid", "s_curve",   "fourier",  "via",  "table", "cam"};
+    keys.insert(keys.end(), StepLaws().begin(), StepLaws().end());
+    YamlMap map(&values_->yaml(), &node, path, keys);
     if (!map.valid()) return;
     if (node.entries.size() != 1) {
       values_->yaml().Error(node,
@@ -77,7 +78,7 @@ class ProfileReader : AmountReader {
       ReadCam(values_, *value, term_path, context_, profile);
     } else if (key == "table") {
       ReadTable(*value, term_path, profile);
-    } else if (key == "poly345" || key == "cycloid" || key == "bump" || key == "modified_sine") {
+    } else {
       ReadStep(key, value, term_path, profile);
     }
   }

@@ -60,6 +60,7 @@ TEST(MotionLaws, RatesAndAccelerationsAreDerivatives) {
       Term(Via({0.0, 0.3, 0.5, 1.0, 1.4}, {0.1, -0.2, 0.4, 0.4, 0.0},
                {false, false, true, false, false})),
       ModifiedSineTerm{0.1, 1.2, -0.6},
+      Poly4567StepTerm{0.1, 1.2, -0.6},
       FourierTerm{0.2, 0.7, {0.3, -0.1, 0.05}, {0.1, 0.2, -0.04}},
   };
   for (const ProfileTerm& term : terms) {
@@ -159,6 +160,20 @@ TEST(MotionLaws, ModifiedSineHasItsKnownPeaks) {
     EXPECT_NEAR(before.acceleration, after.acceleration, 1e-9) << t;
   }
   EXPECT_EQ(Evaluate(term, 2.0).value, 1.0);
+}
+
+// Peaks of the 4-5-6-7 polynomial from tables of cam laws: 2.1875 and 7.5132.
+TEST(MotionLaws, Poly4567HasItsKnownPeaksAndStartsWithoutJerk) {
+  const ProfileTerm term = Poly4567StepTerm{0.0, 1.0, 1.0};
+  const Largest largest = LargestOf(term, 1.0);
+  EXPECT_NEAR(largest.rate, 2.1875, 1e-12);
+  EXPECT_NEAR(largest.acceleration, 84.0 / (5.0 * std::sqrt(5.0)), 1e-4);
+  EXPECT_NEAR(Evaluate(term, 0.25).value, (35 - 84 / 4. + 70 / 16. - 20 / 64.) / 256, 1e-15);
+  EXPECT_NEAR(Evaluate(term, 1.0 - 1e-12).value, 1.0, 1e-15);
+  EXPECT_EQ(Evaluate(term, 2.0).value, 1.0);
+  // An acceleration that begins as t² has no jerk at the ends: 420 t² there.
+  EXPECT_NEAR(Evaluate(term, 1e-4).acceleration, 420e-8, 2e-9);
+  EXPECT_NEAR(Evaluate(term, 1 - 1e-4).acceleration, -420e-8, 2e-9);
 }
 
 TEST(MotionLaws, FourierGivesAmplitudesOfTheRate) {

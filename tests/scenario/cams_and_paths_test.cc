@@ -46,6 +46,19 @@ TEST(Cams, RiseDwellReturnAndRepeat) {
   }
 }
 
+TEST(Cams, KnowEveryLawOfSteps) {
+  // The rate at the middle of a step, of its mean.
+  const std::pair<const char*, double> peaks[] = {{"poly345", 1.875},
+                                                  {"poly4567", 2.1875},
+                                                  {"cycloid", 2.0},
+                                                  {"modified_sine", 4 * pi / (4 + pi)}};
+  for (const auto& [law, peak] : peaks) {
+    const Profile cam =
+        Cam(std::string("{law: ") + law + ", segments: [{rise: 0.01, duration_s: 2}]}");
+    EXPECT_NEAR(Evaluate(cam, 1.0).rate, peak * 0.005, 1e-15) << law;
+  }
+}
+
 TEST(Cams, ThatDoNotCloseAreRefused) {
   const std::string text =
       WithCommand("slider_crank",

@@ -266,6 +266,8 @@ TEST_F(MotionTableTest, LawsAreReadInTheirUnits) {
   EXPECT_NEAR(Evaluate(via, 0.4).rate, 0.0, 1e-13);
   EXPECT_NEAR(Evaluate(MotorProfile("{modified_sine: {duration_s: 1, delta: 2}}"), 0.5).value, 1.0,
               1e-15);
+  EXPECT_NEAR(Evaluate(MotorProfile("{poly4567: {duration_s: 2, delta: 2}}"), 1.0).rate, 2.1875,
+              1e-14);
   EXPECT_NEAR(Evaluate(MotorProfile("{trapezoid: {delta: 1, v_max: 2, a_max: 8}}"), 0.25).value,
               0.25, 1e-15);
   // No way, no motion.
