@@ -22,25 +22,39 @@ ScalarRow RowOf(const Mechanism& mechanism, const ForceElement& element, const B
                             near == nullptr ? joint.home[k] : *near);
 }
 
-double HomeOf(const Mechanism& mechanism, const Drive& drive) {
-  const auto* on = std::get_if<JointDrive>(&drive.kind);
-  if (on == nullptr) return 0.0;
-  return mechanism.joints[static_cast<size_t>(on->joint)].home[static_cast<size_t>(on->coordinate)];
+// Drives, then prescribed joints.
+std::vector<Coordinate> Driven(const Mechanism& mechanism) {
+  std::vector<Coordinate> driven;
+  for (size_t k = 0; k < mechanism.drives.size(); ++k) {
+    driven.push_back({Coordinate::Kind::kDrive, static_cast<int>(k), 0});
+  }
+  for (size_t k = 0; k < mechanism.prescribed.size(); ++k) {
+    driven.push_back({Coordinate::Kind::kPrescribed, static_cast<int>(k), 0});
+  }
+  return driven;
 }
 
 // Where nothing was followed yet, the poses lie within half a turn of home.
 std::vector<double>* TurnsOf(const Mechanism& mechanism, BodyStates* states) {
   if (!states->turns.empty()) return &states->turns;
   for (const ForceElement& element : mechanism.elements) {
-    states->turns.push_back(element.joint < 0 ? 0.0
-                                              : mechanism.joints[static_cast<size_t>(element.joint)]
-                                                    .home[static_cast<size_t>(element.coordinate)]);
+    const Coordinate on{Coordinate::Kind::kJoint, element.joint, element.coordinate};
+    states->turns.push_back(element.joint < 0 ? 0.0 : HomeValue(mechanism, on));
   }
-  for (const Drive& drive : mechanism.drives) states->turns.push_back(HomeOf(mechanism, drive));
-  for (const Prescribed& base : mechanism.prescribed) {
-    states->turns.push_back(mechanism.joints[static_cast<size_t>(base.joint)].home[0]);
+  for (const Coordinate& driven : Driven(mechanism)) {
+    states->turns.push_back(HomeValue(mechanism, driven));
   }
   return &states->turns;
+}
+
+ScalarRow DrivenRow(const Mechanism& mechanism, const Coordinate& driven, const BodyStates& states,
+                    double near) {
+  const auto k = static_cast<size_t>(driven.index);
+  if (driven.kind == Coordinate::Kind::kDrive) {
+    return DriveRow(mechanism, mechanism.drives[k], states, near);
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(mechanism.prescribed[k].joint)];
+  return JointCoordinateRow(joint, 0, states, near);
 }
 
 void Put(const std::vector<ScalarRow>& rows, size_t first, std::vector<double>* turns) {
@@ -65,16 +79,11 @@ std::vector<ScalarRow> ElementRows(const Mechanism& mechanism, const BodyStates&
 }
 
 std::vector<ScalarRow> DrivenRows(const Mechanism& mechanism, const BodyStates& states) {
-  const double* near =
-      states.turns.empty() ? nullptr : states.turns.data() + mechanism.elements.size();
   std::vector<ScalarRow> rows;
-  for (const Drive& drive : mechanism.drives) {
-    rows.push_back(
-        DriveRow(mechanism, drive, states, near == nullptr ? HomeOf(mechanism, drive) : *near++));
-  }
-  for (const Prescribed& base : mechanism.prescribed) {
-    const Joint& joint = mechanism.joints[static_cast<size_t>(base.joint)];
-    rows.push_back(JointCoordinateRow(joint, 0, states, near == nullptr ? joint.home[0] : *near++));
+  for (const Coordinate& driven : Driven(mechanism)) {
+    const size_t k = mechanism.elements.size() + rows.size();
+    const double near = states.turns.empty() ? HomeValue(mechanism, driven) : states.turns[k];
+    rows.push_back(DrivenRow(mechanism, driven, states, near));
   }
   return rows;
 }

@@ -32,6 +32,8 @@ struct Coordinate {
 [[nodiscard]] bool IsLength(const Mechanism& mechanism, const Coordinate& coordinate);
 /// "m" or "rad".
 [[nodiscard]] std::string CoordinateUnit(const Mechanism& mechanism, const Coordinate& coordinate);
+/// Its value at the mechanism's home pose [m or rad].
+[[nodiscard]] double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate);
 
 /// Σ factor · coordinate = profile(t). Most commands have one term with factor 1; a coupling such
 /// as "these two drives are equally long" is a difference commanded to zero.

@@ -41,20 +41,8 @@ std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motio
 
 // A value of the coordinate at home that says which turn an angle is in.
 double HomeTurn(const Mechanism& mechanism, const Coordinate& coordinate, double commanded) {
-  const auto home_of = [&](int joint, int c) { return mechanism.joints[joint].home[c]; };
-  switch (coordinate.kind) {
-    case Coordinate::Kind::kPrescribed:
-      return home_of(mechanism.prescribed[coordinate.index].joint, 0);
-    case Coordinate::Kind::kDrive: {
-      const auto* d = std::get_if<JointDrive>(&mechanism.drives[coordinate.index].kind);
-      return d == nullptr ? 0.0 : home_of(d->joint, d->coordinate);
-    }
-    case Coordinate::Kind::kOutput:
-      return commanded;
-    case Coordinate::Kind::kJoint:
-      return home_of(coordinate.index, coordinate.component);
-  }
-  return 0.0;
+  return coordinate.kind == Coordinate::Kind::kOutput ? commanded
+                                                      : HomeValue(mechanism, coordinate);
 }
 
 VecX Extended(const VecX& values, size_t size) {

@@ -381,10 +381,6 @@ class MotionReader {
   bool times_known_ = false;
 };
 
-Pose HomePose(const Mechanism& mechanism, int body) {
-  return mechanism.X_WB_home[static_cast<size_t>(body)];
-}
-
 }  // namespace
 
 std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
@@ -404,37 +400,6 @@ Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
   if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
   k -= mechanism.drives.size();
   return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
-}
-
-double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate) {
-  const auto index = static_cast<size_t>(coordinate.index);
-  const auto home_of = [&](int joint, int c) {
-    return mechanism.joints[static_cast<size_t>(joint)].home[static_cast<size_t>(c)];
-  };
-  switch (coordinate.kind) {
-    case Coordinate::Kind::kPrescribed:
-      return home_of(mechanism.prescribed[index].joint, 0);
-    case Coordinate::Kind::kDrive: {
-      const Drive& drive = mechanism.drives[index];
-      if (const auto* joint = std::get_if<JointDrive>(&drive.kind)) {
-        return home_of(joint->joint, joint->coordinate);
-      }
-      const auto& leg = std::get<DistanceDrive>(drive.kind);
-      return (HomePose(mechanism, leg.body_to) * leg.p_to -
-              HomePose(mechanism, leg.body_from) * leg.p_from)
-          .norm();
-    }
-    case Coordinate::Kind::kOutput: {
-      const Output& output = mechanism.outputs[index];
-      const Pose X_RO = (HomePose(mechanism, output.reference_body) * output.X_RbR).inverse() *
-                        HomePose(mechanism, output.body) * output.X_BO;
-      return coordinate.component < 3 ? X_RO.translation()[coordinate.component]
-                                      : RpyOf(X_RO.linear())[coordinate.component - 3];
-    }
-    case Coordinate::Kind::kJoint:
-      return home_of(coordinate.index, coordinate.component);
-  }
-  return kNan;
 }
 
 Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,

@@ -26,7 +26,4 @@ struct MotionTimes {
 /// The k-th of these names as a coordinate.
 [[nodiscard]] Coordinate CoordinateAt(const Mechanism& mechanism, size_t k);
 
-/// Value of a coordinate at the mechanism's home pose [m or rad].
-[[nodiscard]] double HomeValue(const Mechanism& mechanism, const Coordinate& coordinate);
-
 }  // namespace mbv
