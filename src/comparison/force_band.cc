@@ -30,14 +30,14 @@ Quantity BandOf(Quantity force) {
 }
 
 ForceSignal::ForceSignal(const Trace& trace, int column)
-    : trace_(trace), column_(column), band_(BandColumn(trace, column)) {}
+    : trace_(&trace), column_(column), band_(BandColumn(trace, column)) {}
 
 ForceBand ForceSignal::At(Eigen::Index row) const {
-  return {trace_.values(row, column_), band_ < 0 ? 0.0 : trace_.values(row, band_)};
+  return {trace_->values(row, column_), band_ < 0 ? 0.0 : trace_->values(row, band_)};
 }
 
 VecX ForceSignal::Worst() const {
-  VecX worst = trace_.values.col(column_);
+  VecX worst = trace_->values.col(column_);
   for (Eigen::Index i = 0; i < worst.size(); ++i) worst[i] = At(i).worst();
   return worst;
 }
@@ -50,35 +50,44 @@ double Difference(const ForceBand& a, const ForceBand& b) {
   return b.open() ? Outside(a.middle, b) : -Outside(b.middle, a);
 }
 
-Trace WithEnds(const Trace& trace) {
-  Trace shown;
-  shown.witness = trace.witness;
-  std::vector<Channel> channels;
-  std::vector<VecX> columns;
-  const auto add = [&](Channel channel, const std::string& ending, VecX values) {
-    channel.name += ending;
-    if (!ending.empty()) channel.quantity = Quantity::kOwn;
-    channels.push_back(std::move(channel));
-    columns.push_back(std::move(values));
-  };
+double ShownColumn::At(Eigen::Index row) const {
+  const ForceBand force = signal.At(row);
+  if (part == Part::kNumber) return force.open() ? kNan : force.middle;
+  return part == Part::kLower ? force.lower() : force.upper();
+}
+
+std::vector<ShownColumn> ShownColumns(const Trace& trace) {
+  using Part = ShownColumn::Part;
+  std::vector<ShownColumn> shown;
   for (size_t c = 0; c < trace.channels.size(); ++c) {
     const Channel& channel = trace.channels[c];
-    const auto column = static_cast<int>(c);
     if (IsBand(channel)) continue;
-    VecX force = trace.values.col(column);
-    const int band = BandColumn(trace, column);
-    if (band < 0) {
-      add(channel, "", std::move(force));
-      continue;
+    const auto column = static_cast<int>(c);
+    const ForceSignal signal(trace, column);
+    shown.push_back({channel, column, signal});
+    if (BandColumn(trace, column) < 0) continue;
+    Channel end = channel;
+    end.quantity = Quantity::kOwn;
+    for (const auto& [word, part] : {std::pair{".lower", Part::kLower}, {".upper", Part::kUpper}}) {
+      end.name = channel.name + word;
+      shown.push_back({end, column, signal, part});
     }
-    const VecX half = trace.values.col(band);
-    add(channel, "", (half.array() > 0.0).select(kNan, force));
-    add(channel, ".lower", force - half);
-    add(channel, ".upper", force + half);
   }
+  return shown;
+}
+
+Trace AsShown(const Trace& trace) {
+  const std::vector<ShownColumn> columns = ShownColumns(trace);
+  std::vector<Channel> channels;
+  channels.reserve(columns.size());
+  for (const ShownColumn& column : columns) channels.push_back(column.channel);
+  Trace shown;
+  shown.witness = trace.witness;
   shown.Reset(trace.time_s, std::move(channels));
   for (size_t c = 0; c < columns.size(); ++c) {
-    shown.values.col(static_cast<Eigen::Index>(c)) = columns[c];
+    for (Eigen::Index i = 0; i < shown.values.rows(); ++i) {
+      shown.values(i, static_cast<Eigen::Index>(c)) = columns[c].At(i);
+    }
   }
   return shown;
 }

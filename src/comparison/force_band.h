@@ -33,7 +33,7 @@ class ForceSignal {
   [[nodiscard]] VecX Worst() const;
 
  private:
-  const Trace& trace_;
+  const Trace* trace_;
   int column_, band_;  // band_ < 0: no friction is known of
 };
 
@@ -45,9 +45,23 @@ class ForceSignal {
 /// outside.
 [[nodiscard]] double Difference(const ForceBand& a, const ForceBand& b);
 
-/// The trace as files give it: open forces are NaN, with their ends in NAME.lower and NAME.upper in
+/// A column as files give it: open forces are NaN, with their ends in NAME.lower and NAME.upper in
 /// place of the half-width; where the force is a number both are it.
-[[nodiscard]] Trace WithEnds(const Trace& trace);
+struct ShownColumn {
+  enum class Part { kNumber, kLower, kUpper };
+  Channel channel;
+  int source = 0;  ///< the trace's column that it shows
+  ForceSignal signal;
+  Part part = Part::kNumber;
+
+  [[nodiscard]] double At(Eigen::Index row) const;
+};
+
+/// In the order of the trace's columns. The trace outlives them.
+[[nodiscard]] std::vector<ShownColumn> ShownColumns(const Trace& trace);
+
+/// The trace of these columns.
+[[nodiscard]] Trace AsShown(const Trace& trace);
 
 /// Per sample: some force of the trace is open.
 [[nodiscard]] std::vector<bool> AtRest(const Trace& trace);

@@ -75,16 +75,25 @@ bool HasForeignOperator(const std::string& text) {
   return false;
 }
 
+constexpr const char* kSeveralValues = "gives several values";
+
+std::string NoExpression(const std::string& why) { return "is no expression: " + why; }
+
+void Prepare(const std::string& text, const std::map<std::string, double>& constants,
+             mu::Parser* parser) {
+  parser->ClearConst();
+  parser->DefineConst("pi", std::numbers::pi);
+  for (const auto& [name, value] : constants) parser->DefineConst(name, value);
+  parser->SetExpr(text);
+}
+
 ExpressionResult Compute(const std::string& text, const std::map<std::string, double>& values) {
   mu::Parser& parser = TheParser();
   try {
-    parser.ClearConst();
-    parser.DefineConst("pi", std::numbers::pi);
-    for (const auto& [name, value] : values) parser.DefineConst(name, value);
-    parser.SetExpr(text);
+    Prepare(text, values, &parser);
     int count = 0;
     const double* results = parser.Eval(count);
-    if (count != 1) return {.value = {}, .error = "gives several values", .hint = ""};
+    if (count != 1) return {.value = {}, .error = kSeveralValues, .hint = ""};
     const double value = results[0];
     if (!std::isfinite(value)) {
       return {.value = {},
@@ -96,9 +105,9 @@ ExpressionResult Compute(const std::string& text, const std::map<std::string, do
     }
     return {.value = value, .error = "", .hint = ""};
   } catch (const mu::ParserError& e) {
-    return {.value = {}, .error = "is no expression: " + e.GetMsg(), .hint = ""};
+    return {.value = {}, .error = NoExpression(e.GetMsg()), .hint = ""};
   } catch (const std::exception& e) {
-    return {.value = {}, .error = std::string("is no expression: ") + e.what(), .hint = ""};
+    return {.value = {}, .error = NoExpression(e.what()), .hint = ""};
   }
 }
 
@@ -108,15 +117,13 @@ class MuFormula : public Formula {
   MuFormula(const std::string& text, const std::map<std::string, double>& constants,
             const std::vector<std::string>& variables)
       : variables_(variables.size(), 1.0) {
-    parser_.DefineConst("pi", std::numbers::pi);
-    for (const auto& [name, value] : constants) parser_.DefineConst(name, value);
     for (size_t i = 0; i < variables.size(); ++i) {
       parser_.DefineVar(variables[i], &variables_[i]);
     }
-    parser_.SetExpr(text);
+    Prepare(text, constants, &parser_);
     int count = 0;
     parser_.Eval(count);  // parses it
-    if (count != 1) throw mu::ParserError("gives several values");
+    if (count != 1) throw mu::ParserError(kSeveralValues);
   }
 
   [[nodiscard]] double At(std::span<const double> variables) const override {
@@ -256,7 +263,7 @@ FormulaResult Scope::Compile(const std::string& expression,
     auto formula = std::make_shared<MuFormula>(expression, constants.values, variables);
     return {.formula = std::move(formula), .error = "", .hint = ""};
   } catch (const mu::ParserError& error) {
-    return {.formula = {}, .error = "is no expression: " + error.GetMsg(), .hint = ""};
+    return {.formula = {}, .error = NoExpression(error.GetMsg()), .hint = ""};
   }
 }
 

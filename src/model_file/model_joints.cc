@@ -26,8 +26,10 @@ std::vector<std::string> KindWords() {
   return words;
 }
 
+bool IsHelical(size_t choice) { return choice >= kJointKindRows.size(); }
+
 JointKind KindOf(size_t choice) {
-  return choice < kJointKindRows.size() ? kJointKindRows.at(choice).kind : JointKind::kCylindrical;
+  return IsHelical(choice) ? JointKind::kCylindrical : kJointKindRows.at(choice).kind;
 }
 
 // The joint must be the next one.
@@ -115,7 +117,7 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   std::optional<double> lead;
   if (choice) {
     joint.kind = KindOf(static_cast<size_t>(*choice));
-    const bool helical = KindWords()[static_cast<size_t>(*choice)] == kHelical;
+    const bool helical = IsHelical(static_cast<size_t>(*choice));
     lead = ReadLead(block, map, helical);
     good = ReadCoordinates(block, map, lead, &joint) && lead.has_value() == helical && good;
   } else if (const YamlNode* axis = map.Find("axis")) {

@@ -25,7 +25,7 @@ std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& repor
                                                              std::string* trouble) {
   std::vector<Trace> shown;
   for (const WitnessRecord& witness : report.witnesses) {
-    if (!witness.trace.time_s.empty()) shown.push_back(WithEnds(witness.trace));
+    if (!witness.trace.time_s.empty()) shown.push_back(AsShown(witness.trace));
   }
   std::vector<const Trace*> traces;
   traces.reserve(shown.size());

@@ -16,20 +16,9 @@ namespace {
 constexpr std::array<Quantity, 4> kDriveSignals = {Quantity::kPosition, Quantity::kVelocity,
                                                    Quantity::kAcceleration, Quantity::kForce};
 
-// What of a force that friction at rest may leave open.
-enum class End { kNumber, kLower, kUpper };
-
 struct CsvColumn {
   const Trace* trace;
-  ForceSignal signal;  // any channel: only forces have bands
-  End end = End::kNumber;
-
-  // The number where there is one, or an end of the band.
-  [[nodiscard]] double At(Eigen::Index row) const {
-    const ForceBand force = signal.At(row);
-    if (end == End::kNumber) return force.open() ? kNan : force.middle;
-    return end == End::kLower ? force.lower() : force.upper();
-  }
+  ShownColumn shown;
 };
 
 // For each sample of the grid the row of a trace; -1 where it has none.
@@ -45,8 +34,7 @@ class Columns {
     for (const WitnessRecord& witness : report.witnesses) {
       if (!witness.trace.time_s.empty()) traces_.push_back(&witness.trace);
     }
-    used_.resize(traces_.size());
-    for (size_t w = 0; w < traces_.size(); ++w) used_[w].resize(traces_[w]->channels.size());
+    for (const Trace* trace : traces_) waiting_.push_back(ShownColumns(*trace));
     AddDrives(report);
     AddRest();
   }
@@ -62,32 +50,12 @@ class Columns {
   }
 
  private:
-  void Add(size_t w, int column) {
-    used_[w][static_cast<size_t>(column)] = true;
-    const Channel& channel = traces_[w]->channels[static_cast<size_t>(column)];
-    header_ += "," + channel.name + "." + traces_[w]->witness;
-    columns_.push_back({traces_[w], ForceSignal(*traces_[w], column)});
-    AddBand(w, channel);
-  }
-
-  // Lower and upper ends beside the force, in place of the half-width.
-  void AddBand(size_t w, const Channel& force) {
-    const Quantity quantity = BandOf(force.quantity);
-    const int band = quantity == Quantity::kOwn ? -1 : traces_[w]->Find(quantity, force.subject);
-    if (band < 0) return;
-    used_[w][static_cast<size_t>(band)] = true;
-    for (const auto& [word, end] : {std::pair{"lower", End::kLower}, {"upper", End::kUpper}}) {
-      header_ += fmt::format(",{}.{}.{}", force.name, word, traces_[w]->witness);
-      columns_.push_back({traces_[w], columns_.back().signal, end});
-    }
-  }
-
   void AddDrives(const Report& report) {
     for (const std::string& drive : report.drives) {
       for (size_t w = 0; w < traces_.size(); ++w) {
         for (const Quantity signal : kDriveSignals) {
-          const int column = traces_[w]->Find(signal, drive);
-          if (column >= 0) Add(w, column);
+          const int source = traces_[w]->Find(signal, drive);
+          Add(w, [source](const ShownColumn& shown) { return shown.source == source; });
         }
       }
     }
@@ -95,14 +63,23 @@ class Columns {
 
   void AddRest() {
     for (size_t w = 0; w < traces_.size(); ++w) {
-      for (size_t c = 0; c < traces_[w]->channels.size(); ++c) {
-        if (!used_[w][c]) Add(w, static_cast<int>(c));
-      }
+      Add(w, [](const ShownColumn&) { return true; });
     }
   }
 
+  // Those that wait and are wanted.
+  template <typename Wanted>
+  void Add(size_t w, const Wanted& wanted) {
+    for (const ShownColumn& shown : waiting_[w]) {
+      if (!wanted(shown)) continue;
+      header_ += fmt::format(",{}.{}", shown.channel.name, traces_[w]->witness);
+      columns_.push_back({traces_[w], shown});
+    }
+    std::erase_if(waiting_[w], wanted);
+  }
+
   std::vector<const Trace*> traces_;
-  std::vector<std::vector<bool>> used_;
+  std::vector<std::vector<ShownColumn>> waiting_;
   std::string header_ = "time_s";
   std::vector<CsvColumn> columns_;
 };
@@ -130,7 +107,7 @@ void WriteCsv(const Report& report, const std::function<void(std::string_view)>&
     fmt::format_to(out, "{:.17g}", grid->time_s[i]);
     for (const CsvColumn& c : columns.columns()) {
       const Eigen::Index row = rows[c.trace][i];
-      fmt::format_to(out, ",{:.17g}", row >= 0 ? c.At(row) : kNan);
+      fmt::format_to(out, ",{:.17g}", row >= 0 ? c.shown.At(row) : kNan);
     }
     text += '\n';
     if (text.size() < kPiece) continue;

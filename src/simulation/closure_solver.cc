@@ -150,16 +150,23 @@ RunSummary ClosureSolver::Close(const VecX& to) {
           .unit = "m or rad"};
 }
 
-RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
+template <typename Way>
+RunSummary ClosureSolver::CloseOr(const VecX& to, double farthest, VecX* here, Way&& way) {
   Eigen::Map<VecX> qpos(system_->data()->qpos, system_->engine().m->nq);
-  began_ = qpos;
+  *here = qpos;
   const bool direct = Close(to).ok();
-  if (direct && moved_ < kFarthestStep) return RunSummary::Done();
-  qpos = began_;
-  RunSummary summary = Walk(from, to);
+  if (direct && moved_ < farthest) return RunSummary::Done();
+  RunSummary summary = way(qpos);
   if (summary.ok() || !direct) return summary;
-  qpos = began_;
+  qpos = *here;
   return Close(to);
+}
+
+RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
+  return CloseOr(to, kFarthestStep, &began_, [&](Eigen::Map<VecX>& qpos) {
+    qpos = began_;
+    return Walk(from, to);
+  });
 }
 
 // In steps that adapt to what Newton can bridge.
@@ -185,15 +192,10 @@ RunSummary ClosureSolver::Walk(const VecX& from, const VecX& to) {
 }
 
 RunSummary ClosureSolver::FollowPredicted(const VecX& closed, const VecX& from, const VecX& to) {
-  Eigen::Map<VecX> qpos(system_->data()->qpos, system_->engine().m->nq);
-  predicted_ = qpos;
-  const bool lands = Close(to).ok();
-  if (lands && moved_ < kFarthestCorrection) return RunSummary::Done();
-  qpos = closed;
-  RunSummary summary = Follow(from, to);
-  if (summary.ok() || !lands) return summary;
-  qpos = predicted_;
-  return Close(to);
+  return CloseOr(to, kFarthestCorrection, &predicted_, [&](Eigen::Map<VecX>& qpos) {
+    qpos = closed;
+    return Follow(from, to);
+  });
 }
 
 void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {

@@ -61,6 +61,10 @@ class ClosureSolver {
   [[nodiscard]] std::vector<int> DrivenRowsNotUnique() const;
 
  private:
+  // Close(to) from here; where that does not arrive, or only farther away than `farthest`, `way`;
+  // and the former after all where `way` does not arrive.
+  template <typename Way>
+  [[nodiscard]] RunSummary CloseOr(const VecX& to, double farthest, VecX* here, Way&& way);
   [[nodiscard]] RunSummary Walk(const VecX& from, const VecX& to);
   [[nodiscard]] MatX ScaledSelfStress() const;
   void Factor();

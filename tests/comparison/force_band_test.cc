@@ -46,7 +46,7 @@ TEST(ForceBand, FilesGiveItsEndsAndNoNumber) {
   synthetic::Case c;
   const VecX force = c.reference.values.col(c.reference.Find("d1.force"));
   Rest(&c.reference, kHalf);
-  const Trace shown = WithEnds(c.reference);
+  const Trace shown = AsShown(c.reference);
   EXPECT_EQ(shown.Find("d1.force.band"), -1);
   const auto at = [&](const std::string& name, size_t i) {
     return shown.values(static_cast<Eigen::Index>(i), shown.Find(name));
