@@ -17,9 +17,9 @@
 #include "cli/terminal.h"
 #include "core/files.h"
 #include "core/scratch_folder.h"
+#include "core/worker_pool.h"
 #include "pipeline/mutate.h"
 #include "regress/find_cases.h"
-#include "regress/workers.h"
 #include "scenario/find_model.h"
 
 namespace mbv {

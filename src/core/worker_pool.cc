@@ -1,4 +1,4 @@
-#include "regress/workers.h"
+#include "core/worker_pool.h"
 
 #include <fcntl.h>
 #include <sys/prctl.h>
@@ -36,19 +36,28 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+void Limit(__rlimit_resource resource, double bytes) {
+  const auto most = static_cast<rlim_t>(bytes);
+  const rlimit limit{most, most};
+  if (bytes > 0.0) setrlimit(resource, &limit);
+}
+
 // In the child, between fork and exec: only calls that are safe there.
-[[noreturn]] void BecomeWorker(char* const* argv, int log, pid_t parent) {
+[[noreturn]] void BecomeWorker(const WorkerJob& job, char* const* argv, int log, pid_t parent) {
   setpgid(0, 0);  // its own group, to be killed as a whole
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kCannotStart);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
+  Limit(RLIMIT_DATA, job.data_bytes);
+  Limit(RLIMIT_FSIZE, job.file_bytes);
   signal(SIGINT, SIG_DFL);
   signal(SIGTERM, SIG_DFL);
   const int nothing = open("/dev/null", O_RDONLY);
   dup2(nothing, STDIN_FILENO);
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
+  if (!job.folder.empty() && chdir(job.folder.c_str()) != 0) _exit(kCannotStart);
   execvp(argv[0], argv);
   const char* reason = std::strerror(errno);
   for (const char* text :
@@ -72,7 +81,7 @@ pid_t Start(const WorkerJob& job, std::string* trouble) {
   argv.push_back(nullptr);
   const pid_t parent = getpid();
   const pid_t pid = fork();
-  if (pid == 0) BecomeWorker(argv.data(), log, parent);
+  if (pid == 0) BecomeWorker(job, argv.data(), log, parent);
   if (pid < 0) *trouble = std::string("cannot start a process: ") + std::strerror(errno);
   if (pid > 0) setpgid(pid, pid);  // both sides set it, so that it is set before a kill
   close(log);

@@ -10,13 +10,22 @@
 #include <string>
 #include <vector>
 
-#include "regress/case_result.h"
-
 namespace mbv {
 
+/// What a worker process used.
+struct Cost {
+  double wall_s = 0.0, cpu_s = 0.0;
+  long peak_kib = 0;  ///< largest resident size
+
+  [[nodiscard]] double peak_mib() const { return static_cast<double>(peak_kib) / 1024.0; }
+};
+
 struct WorkerJob {
-  std::vector<std::string> argv;  ///< program and arguments
-  std::filesystem::path log;      ///< stdout and stderr go here
+  std::vector<std::string> argv;      ///< program and arguments
+  std::filesystem::path log;          ///< stdout and stderr go here
+  std::filesystem::path folder = {};  ///< to work in; empty: the present one
+  double data_bytes = 0.0;            ///< memory of its own that it may have; 0: no limit
+  double file_bytes = 0.0;            ///< length of each file that it writes; 0: no limit
 };
 
 /// How a worker ended.

@@ -10,6 +10,7 @@
 
 #include "core/inputs.h"
 #include "core/types.h"
+#include "core/worker_pool.h"
 #include "scenario/scenario.h"
 
 namespace mbv {
@@ -41,14 +42,6 @@ struct MetricValue {
 
 struct Unmeasured {
   std::string what, why;
-};
-
-/// What a worker process used.
-struct Cost {
-  double wall_s = 0.0, cpu_s = 0.0;
-  long peak_kib = 0;  ///< largest resident size
-
-  [[nodiscard]] double peak_mib() const { return static_cast<double>(peak_kib) / 1024.0; }
 };
 
 /// A metric that got worse inside its limit, or traces that moved.

@@ -4,9 +4,9 @@
 #include <optional>
 #include <string>
 
+#include "core/worker_pool.h"
 #include "regress/case_result.h"
 #include "regress/find_cases.h"
-#include "regress/workers.h"
 
 namespace mbv {
 

@@ -10,12 +10,12 @@
 #include <map>
 
 #include "core/files.h"
+#include "core/worker_pool.h"
 #include "regress/finish.h"
 #include "regress/history.h"
 #include "regress/judge.h"
 #include "regress/missing.h"
 #include "regress/utc_time.h"
-#include "regress/workers.h"
 
 namespace mbv {
 namespace {

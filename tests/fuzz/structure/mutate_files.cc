@@ -14,7 +14,7 @@
 #include <map>
 #include <thread>
 
-#include "regress/workers.h"
+#include "core/worker_pool.h"
 #include "tests/fuzz/structure/mutations.h"
 
 namespace mbv::fuzz {
