@@ -205,6 +205,7 @@ int RunCli(int argc, char** argv) {
   AddStiffnessCommand(&app, &exit_code);
   AddMutateCommand(&app, &exit_code);
   AddConvergeCommand(&app, &exit_code);
+  AddCrosscheckCommand(&app, &exit_code);
   AddSurveyCommand(&app, &exit_code);
   AddInertiaCommand(&app, &exit_code);
   AddSizeCommand(&app, &exit_code);

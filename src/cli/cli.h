@@ -38,6 +38,7 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code);
 void AddStiffnessCommand(CLI::App* app, int* exit_code);
 void AddMutateCommand(CLI::App* app, int* exit_code);
 void AddConvergeCommand(CLI::App* app, int* exit_code);
+void AddCrosscheckCommand(CLI::App* app, int* exit_code);
 void AddRegressCommand(CLI::App* app, int* exit_code);
 void AddMergeCommand(CLI::App* app, int* exit_code);
 void AddSurveyCommand(CLI::App* app, int* exit_code);

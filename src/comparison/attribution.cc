@@ -178,6 +178,11 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
   const Distance& near = distances[0];
   const std::string odd = OddOneOut(distances);
   const Distance& far = odd.empty() ? distances[1] : *NearestOf(odd, distances);
+  if (odd.empty() && distances.size() > 3) {
+    std::string all;
+    for (const Distance& d : distances) all += fmt::format(", {} {}", d.pair->name(), amount(d));
+    return {"", fmt::format("no witness stands clearly alone ({}{})", yardstick.title, all)};
+  }
   if (odd.empty()) {
     return {"", fmt::format("no two witnesses stand clearly against the third: {} {}, {} {}, {} {} "
                             "({})",

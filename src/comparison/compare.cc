@@ -42,7 +42,22 @@ std::string WhyNot(const Witness& a, const Witness& b) {
 }
 
 LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) {
+  const Witness* witness = FindNamed(input.witnesses, measured);
+  if (witness != nullptr && witness->foreign) return witness->foreign->limits;
   return IsEngine(measured) ? input.simulation_limits : LimitColumn::kReference;
+}
+
+// The looser one, of a pair with a foreign witness whose own is stated.
+std::optional<double> LimitOf(const ComparisonInput& input, const std::string& measured,
+                              const std::string& truth, LimitColumn column, Metric metric) {
+  std::optional<double> limit = input.limits[metric].Of(column);
+  if (metric != Metric::kForceNrmse || !limit) return limit;
+  for (const Witness& witness : input.witnesses) {
+    const bool of_pair = witness.name == measured || witness.name == truth;
+    if (!of_pair || !witness.foreign || !witness.foreign->force_nrmse) continue;
+    limit = std::max(*limit, *witness.foreign->force_nrmse);
+  }
+  return limit;
 }
 
 // Of the pair `measured` against `truth`; of one witness by itself, `truth` is "".
@@ -58,7 +73,7 @@ void AddChecks(const ComparisonInput& input, const std::string& measured_by,
                       .truth = truth,
                       .metric = metric,
                       .value = measured.value,
-                      .limit = input.limits[metric].Of(column),
+                      .limit = LimitOf(input, measured_by, truth, column, metric),
                       .stated_limit = {},
                       .limit_by = {},
                       .time_s = measured.time_s,
@@ -86,8 +101,8 @@ std::map<Metric, double> JudgeTablePair(const ComparisonInput& input, const Witn
   return tubes;
 }
 
-void AddPair(const ComparisonInput& input, const RolePair& roles, Comparison* comparison) {
-  const std::string measured = roles.measured->name, truth = roles.truth->name;
+void AddPair(const ComparisonInput& input, const std::string& measured, const std::string& truth,
+             Comparison* comparison) {
   const Witness* a = FindNamed(input.witnesses, measured);
   const Witness* b = FindNamed(input.witnesses, truth);
   if (a == nullptr || b == nullptr) return;
@@ -109,6 +124,25 @@ void AddPair(const ComparisonInput& input, const RolePair& roles, Comparison* co
   AddChecks(input, measured, truth, ColumnOfPair(input, measured, truth), pair.metrics, other,
             comparison);
   comparison->pairs.push_back(std::move(pair));
+}
+
+// Every pair that is looked at, by names: those of our own roles, then each foreign witness against
+// those that compute, the simulation against it where both follow the commands, and against those
+// before it.
+std::vector<std::pair<std::string, std::string>> PairsOf(const ComparisonInput& input) {
+  std::vector<std::pair<std::string, std::string>> pairs;
+  for (const auto& [measured, truth] : kRolePairs) pairs.emplace_back(measured->name, truth->name);
+  std::vector<std::string> before;
+  for (const Role* role : {&role::kAnalytic, &role::kReference, &role::kSolver}) {
+    before.emplace_back(role->name);
+  }
+  for (const Witness& witness : input.witnesses) {
+    if (!witness.foreign) continue;
+    if (input.drive_by == DriveBy::kMotion) pairs.emplace_back(role::kSimulated.name, witness.name);
+    for (const std::string& other : before) pairs.emplace_back(witness.name, other);
+    before.push_back(witness.name);
+  }
+  return pairs;
 }
 
 // Quantities that one would expect to be judged but that the traces do not hold.
@@ -136,6 +170,12 @@ void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
         !witness.metrics.contains(Metric::kCommandVelocity)) {
       note(witness.witness + "." + RowOf(Metric::kCommandVelocity).key,
            "the rates of the commanded outputs are not recorded");
+    }
+  }
+  for (const Witness& witness : input.witnesses) {
+    if (!witness.foreign) continue;
+    for (const auto& [what, why] : witness.foreign->declined) {
+      note(witness.name + ": " + what, why.c_str());
     }
   }
   for (const WitnessMetrics& witness : comparison->witnesses) {
@@ -368,7 +408,9 @@ Comparison Compare(const ComparisonInput& given) {
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
   comparison.driving = DrivingText(input);
-  for (const RolePair& pair : kRolePairs) AddPair(input, pair, &comparison);
+  for (const auto& [measured, truth] : PairsOf(input)) {
+    AddPair(input, measured, truth, &comparison);
+  }
   for (const Witness& witness : input.witnesses) {
     const Role* role = FindRole(witness.name);
     const bool alone = role == nullptr || role->judged_alone();

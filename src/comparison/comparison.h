@@ -34,6 +34,15 @@ struct Witness {
   std::string name;              ///< of its role (core/roles.h)
   const Trace* trace = nullptr;  ///< null if there is none; summary says why
   RunSummary summary;            ///< the trace is compared only if this is ok
+  /// Of a program outside (docs/witnesses.md): what it is, the limits it is judged by, and what it
+  /// leaves out, and why.
+  struct Foreign {
+    std::string program;
+    LimitColumn limits = LimitColumn::kReference;
+    std::optional<double> force_nrmse;  ///< instead of that limit
+    std::vector<std::pair<std::string, std::string>> declined;
+  };
+  std::optional<Foreign> foreign = {};
 };
 
 struct ComparisonInput {

@@ -81,7 +81,10 @@ bool IsTaskSpace(const Motion& motion) {
   });
 }
 
-std::string DrivingText(const ComparisonInput& input) {
+namespace {
+
+// How the simulation is driven; "" without one.
+std::string SimulationDriving(const ComparisonInput& input) {
   const auto simulated =
       std::find_if(input.witnesses.begin(), input.witnesses.end(),
                    [](const Witness& witness) { return IsEngine(witness.name); });
@@ -116,9 +119,35 @@ std::string DrivingText(const ComparisonInput& input) {
       (driver == nullptr ? role::kSolver : *driver).method);
 }
 
+// "planar (planar.py 1) is given the same drive motion".
+std::string ForeignDriving(const ComparisonInput& input) {
+  std::string text;
+  for (const Witness& witness : input.witnesses) {
+    if (!witness.foreign || witness.trace == nullptr) continue;
+    text += fmt::format("{}{} ({}) is given the drive motion", text.empty() ? "" : ", ",
+                        witness.name, witness.foreign->program);
+  }
+  return text;
+}
+
+bool IsForeign(const ComparisonInput& input, const std::string& name) {
+  return std::any_of(input.witnesses.begin(), input.witnesses.end(), [&](const Witness& witness) {
+    return witness.foreign && witness.name == name;
+  });
+}
+
+}  // namespace
+
+std::string DrivingText(const ComparisonInput& input) {
+  std::string text = SimulationDriving(input);
+  const std::string foreign = ForeignDriving(input);
+  return text + (text.empty() || foreign.empty() ? "" : "; ") + foreign;
+}
+
 bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& check) {
   const Metric metric = check.metric;
   const bool table = input.table != nullptr && check.Involves(role::kReference);
+  const bool foreign = IsForeign(input, check.measured) || IsForeign(input, check.truth);
   const bool engine = IsEngine(check.measured) || IsEngine(check.truth);
   // Pushed drives and servos go where forces lead them.
   const bool by_forces = input.drive_by != DriveBy::kMotion && engine;
@@ -128,7 +157,7 @@ bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& c
     case Metric::kPositionRad:
     case Metric::kVelocity:
     case Metric::kAcceleration:
-      if (!input.motion->free() && engine) return true;
+      if (!input.motion->free() && (engine || foreign)) return true;
       return !table && AllCommanded(input, metric);
     case Metric::kDerivatives:
       return AllCommanded(input, metric);

@@ -128,6 +128,13 @@ bool SharesForces(const ComparisonInput& input, const std::string& measured,
 
 LimitColumn ColumnOfPair(const ComparisonInput& input, const std::string& measured,
                          const std::string& truth) {
+  for (const Witness& witness : input.witnesses) {
+    const bool of_pair = witness.name == measured || witness.name == truth;
+    // The looser limits of the two.
+    if (of_pair && witness.foreign && witness.foreign->limits != LimitColumn::kReference) {
+      return witness.foreign->limits;
+    }
+  }
   if (!IsEngine(measured)) return LimitColumn::kReference;
   const bool servo = input.drive_by == DriveBy::kServos && truth != role::kReached;
   return servo ? LimitColumn::kServo : input.simulation_limits;

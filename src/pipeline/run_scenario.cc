@@ -92,6 +92,7 @@ class ScenarioRun {
     if (runner.CheckStrokes()) {
       runner.RunFollowing();
       RunBesides(&runner);
+      runner.RunForeign();
     }
     runs_ = runner.Take();
     outcome_.diagnostics.Append(runs_.bad_input);

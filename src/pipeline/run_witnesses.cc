@@ -7,6 +7,7 @@
 
 #include "core/demand.h"
 #include "pipeline/drive_by.h"
+#include "pipeline/foreign_witness.h"
 #include "pipeline/free_motion_text.h"
 #include "pipeline/not_run.h"
 #include "reference/forward.h"
@@ -61,8 +62,8 @@ const WitnessRecord* WitnessRuns::Find(const Role& role) const {
 
 void WitnessRuns::HandOver(ComparisonInput* input) const {
   for (const WitnessRecord& record : records) {
-    input->witnesses.push_back(
-        {record.name, record.trace.time_s.empty() ? nullptr : &record.trace, record.summary});
+    input->witnesses.push_back({record.name, record.trace.time_s.empty() ? nullptr : &record.trace,
+                                record.summary, record.foreign});
   }
   if (table) input->table = &*table;
   if (bent) input->bent = &*bent;
@@ -183,6 +184,16 @@ void WitnessRunner::SolveFree(const Role& role) {
   runs_.trust = TrustLine(run);
   for (const std::string& text : PassageTexts(run, scenario().motion.duration_s)) Warn(text);
   Add(role, std::move(run.summary), std::move(run.trace));
+}
+
+// On the commanded motion, where it is known.
+void WitnessRunner::RunForeign() {
+  for (const ForeignWitness& witness : scenario().witnesses) {
+    if (progress_) progress_(witness.name, 0.0);
+    runs_.records.push_back(
+        mbv::RunForeign(witness, prepared_, prepared_.mechanisms.reference, Driven()));
+    runs_.timing.foreign_s += runs_.records.back().summary.wall_s;
+  }
 }
 
 void WitnessRunner::RunSimulated() {

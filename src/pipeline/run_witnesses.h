@@ -63,6 +63,8 @@ class WitnessRunner {
   /// need them.
   void RunComputed();
   void RunFollowing();
+  /// Programs outside that the scenario names.
+  void RunForeign();
 
   /// Strokes along the motion that was computed. False, and then the simulation must not run, if
   /// drives cannot go there and the scenario does not ignore it.

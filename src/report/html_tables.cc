@@ -149,6 +149,9 @@ std::string TimesText(const Report& report) {
   const Timing& timing = report.timing;
   std::string times = fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
                                   timing.analytic_s, timing.reference_s, timing.simulation_s);
+  if (timing.foreign_s > 0.0) {
+    times += fmt::format(", foreign witnesses {:.3f} s", timing.foreign_s);
+  }
   if (timing.stock_s > 0.0) times += fmt::format(", stock engine {:.3f} s", timing.stock_s);
   if (timing.render_s > 0.0) times += fmt::format(", pictures {:.3f} s", timing.render_s);
   if (timing.loop_s > 0.0 && timing.steps > 0) {

@@ -23,9 +23,10 @@ struct OwnFileAudit;  // report/own_file.h
 
 /// One witness' part in a run.
 struct WitnessRecord {
-  std::string name;    ///< of its role (core/roles.h)
-  RunSummary summary;  ///< kNotRun with the reason if it was switched off
-  Trace trace;         ///< empty if it did not run
+  std::string name;                              ///< of its role (core/roles.h)
+  RunSummary summary;                            ///< kNotRun with the reason if it was switched off
+  Trace trace;                                   ///< empty if it did not run
+  std::optional<Witness::Foreign> foreign = {};  ///< of a program outside
 };
 
 /// One engine's error against the truth that all are judged by.

@@ -21,6 +21,7 @@ namespace mbv {
 
 struct Timing {
   double analytic_s = 0.0, reference_s = 0.0, simulation_s = 0.0, stock_s = 0.0, render_s = 0.0;
+  double foreign_s = 0.0;  ///< programs outside
   double total_s = 0.0;
   double loop_s = 0.0;  ///< inside the step loop of the judged simulation
   long steps = 0;

@@ -68,6 +68,7 @@ void AddSummaryEnd(const ResultView& view, Json* json) {
                 {"simulation_s", timing.simulation_s},
                 {"render_s", timing.render_s}};
   if (view.look.steps) times["stock_s"] = timing.stock_s;
+  if (timing.foreign_s > 0.0) times["foreign_s"] = timing.foreign_s;
   times["total_s"] = timing.total_s;
   if (view.look.steps) {
     times["loop_s"] = timing.loop_s;

@@ -137,6 +137,7 @@ class VerdictTableWriter {
         {role::kAnalytic.called, timing.analytic_s},
         {role::kReference.called, timing.reference_s},
         {role::kSimulated.called, timing.simulation_s},
+        {"foreign witnesses", timing.foreign_s},
         {"other engine", timing.stock_s},
         {"pictures", timing.render_s}};
     std::erase_if(parts, [](const auto& part) { return part.second <= 0.0; });

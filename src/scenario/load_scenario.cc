@@ -15,6 +15,7 @@
 #include "scenario/motion_reader.h"
 #include "scenario/scenario_file.h"
 #include "scenario/settings_reader.h"
+#include "scenario/witness_reader.h"
 #include "table/settings.h"
 
 namespace mbv {
@@ -25,8 +26,9 @@ namespace fs = std::filesystem;
 constexpr double kMostValues = 1e7;  // of one witness: 80 MB
 
 const std::vector<std::string> kMotionScenarioKeys = {
-    "kind",   "mechanism", "description", "parameters", "gravity", "motion",    "loads",
-    "forces", "analytic",  "reference",   "simulation", "checks",  "snapshots", "expect"};
+    "kind",       "mechanism", "description", "parameters", "gravity",
+    "motion",     "loads",     "forces",      "analytic",   "reference",
+    "simulation", "checks",    "snapshots",   "expect",     "witnesses"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -58,6 +60,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
     scenario_.reference = ReadReference(&values_, map.Find("reference"));
     scenario_.simulation = ReadSimulation(&values_, map.Find("simulation"));
+    scenario_.witnesses =
+        ReadWitnesses(&values_, map.Find("witnesses"), fs::path(file_).parent_path().string());
     scenario_.checks = ReadChecks(&values_, map.Find("checks"), mechanism_ ? &*mechanism_ : nullptr,
                                   &scenario_.start_window_s);
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));

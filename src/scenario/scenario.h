@@ -82,6 +82,15 @@ struct SimulationSettings {
   std::optional<Extrapolation> extrapolate;
 };
 
+/// A program outside that computes the scenario as well (docs/witnesses.md).
+struct ForeignWitness {
+  std::string name;
+  std::vector<std::string> command;              ///< program and arguments; not empty
+  LimitColumn limits = LimitColumn::kReference;  ///< that it is judged by
+  std::optional<double> force_nrmse;             ///< > 0, instead of that limit of drive forces
+  double timeout_s = 60.0, memory_mb = 4000.0, output_mb = 500.0;  ///< > 0
+};
+
 struct CameraSettings {
   std::optional<double> azimuth_rad, elevation_rad, distance_m;
   std::optional<Vec3> lookat_W;
@@ -115,6 +124,7 @@ struct Scenario {
   AnalyticSettings analytic;
   ReferenceSettings reference;
   SimulationSettings simulation;
+  std::vector<ForeignWitness> witnesses;
   CheckLimits checks;
   SnapshotSettings snapshots;
   Expectation expect;

@@ -1,0 +1,60 @@
+#include "exchange/motion_text.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Dense>
+#include <iterator>
+
+namespace mbv {
+namespace {
+
+std::vector<std::string> DrivenNames(const Mechanism& mechanism) {
+  std::vector<std::string> names;
+  for (const Drive& drive : mechanism.drives) names.push_back(drive.name);
+  for (const Prescribed& base : mechanism.prescribed) names.push_back(base.name);
+  return names;
+}
+
+void AddNumbers(const Vec3& v, std::string* text) {
+  for (const double number : v) fmt::format_to(std::back_inserter(*text), ",{:.17g}", number);
+}
+
+}  // namespace
+
+std::string MotionCsv(const Mechanism& mechanism, const HandedMotion& motion) {
+  const std::vector<std::string> names = DrivenNames(mechanism);
+  std::string text = "time_s";
+  for (const std::string& name : names) {
+    text += fmt::format(",{0}.position,{0}.velocity,{0}.acceleration", name);
+  }
+  text += '\n';
+  for (size_t i = 0; i < motion.time_s.size(); ++i) {
+    text += fmt::format("{:.17g}", motion.time_s[i]);
+    const DrivenSample& driven = motion.driven[i];
+    for (size_t k = 0; k < names.size(); ++k) {
+      const auto d = static_cast<Eigen::Index>(k);
+      AddNumbers({driven.position[d], driven.velocity[d], driven.acceleration[d]}, &text);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string LoadsCsv(const Mechanism& mechanism, const HandedMotion& motion) {
+  std::string text = "time_s,load,body,px,py,pz,axes,fx,fy,fz,mx,my,mz\n";
+  for (size_t i = 0; i < motion.loads.size(); ++i) {
+    for (size_t k = 0; k < motion.loads[i].size(); ++k) {
+      const LoadSample& load = motion.loads[i][k];
+      text += fmt::format("{:.17g},{},{}", motion.time_s[i], k,
+                          mechanism.bodies[static_cast<size_t>(load.body)].name);
+      AddNumbers(load.p_BoQ_B, &text);
+      text += load.in_body_axes ? ",body" : ",world";
+      AddNumbers(load.force, &text);
+      AddNumbers(load.moment, &text);
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+}  // namespace mbv

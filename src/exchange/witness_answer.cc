@@ -1,0 +1,194 @@
+#include "exchange/witness_answer.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "core/word_hints.h"
+#include "mechanism/channels.h"
+#include "table/columns.h"
+#include "table/numbers.h"
+#include "table/text.h"
+
+namespace mbv {
+namespace {
+
+using Parsed = nlohmann::json;
+
+constexpr const char* kTime = "time_s";
+constexpr const char* kTraces = "traces.csv";
+// Of the sample distance: how far a time stamp may lie from its sample.
+constexpr double kStampShare = 1e-6;
+
+// The text of a key; "" where it is left out. Anything but text is trouble.
+std::string TextAt(const Parsed& json, const char* key, std::string* trouble) {
+  const auto found = json.find(key);
+  if (found == json.end() || found->is_null()) return "";
+  if (found->is_string()) return found->get<std::string>();
+  *trouble = fmt::format("witness.json: {} is no text", key);
+  return "";
+}
+
+void ReadDeclined(const Parsed& json, WitnessAnswer* answer, std::string* trouble) {
+  const auto list = json.find("declined");
+  if (list == json.end() || list->is_null()) return;
+  if (!list->is_array()) {
+    *trouble = "witness.json: declined is no list";
+    return;
+  }
+  for (const Parsed& entry : *list) {
+    if (!entry.is_object()) {
+      *trouble = "witness.json: an entry of declined is no {what, why}";
+      return;
+    }
+    answer->declined.emplace_back(TextAt(entry, "what", trouble), TextAt(entry, "why", trouble));
+  }
+}
+
+// All signals that may be given.
+std::vector<Channel> KnownChannels(const Mechanism& mechanism) {
+  std::vector<Channel> known = TableSignals(mechanism);
+  for (const Output& output : mechanism.outputs) {
+    for (Channel& channel : OutputRateChannels(mechanism, output)) {
+      known.push_back(std::move(channel));
+    }
+  }
+  for (std::vector<Channel> more : {AuditChannels(), EnergyChannels()}) {
+    for (Channel& channel : more) known.push_back(std::move(channel));
+  }
+  return known;
+}
+
+class TraceReader {
+ public:
+  TraceReader(const Mechanism& mechanism, const std::vector<double>& times_s)
+      : known_(KnownChannels(mechanism)), times_s_(times_s) {}
+
+  // "" or what is wrong.
+  std::string Read(std::string_view csv, Trace* trace) {
+    Diagnostics findings;
+    const TableFormat format{.delimiter = ',', .decimal_comma = false, .heading_rows = 1};
+    const auto text = CutTable(csv, kTraces, format, &findings);
+    if (!text)
+      return findings.empty() ? "traces.csv is empty" : findings.findings().front().message;
+    std::string wrong = ReadHeading(*text, trace);
+    return wrong.empty() ? ReadRows(*text, trace) : wrong;
+  }
+
+ private:
+  std::string ReadHeading(const TableText& text, Trace* trace) {
+    std::vector<Channel> channels;
+    for (const TableHeading& heading : text.headings) {
+      if (heading.full == kTime && time_column_ < 0) {
+        time_column_ = static_cast<int>(channels.size());
+        continue;
+      }
+      const auto found = std::find_if(known_.begin(), known_.end(), [&](const Channel& channel) {
+        return channel.name == heading.full;
+      });
+      if (found == known_.end()) return Unknown(heading.full);
+      const bool twice = std::any_of(channels.begin(), channels.end(), [&](const Channel& channel) {
+        return channel.name == heading.full;
+      });
+      if (twice) return fmt::format("traces.csv has two columns '{}'", heading.full);
+      channels.push_back(*found);
+    }
+    if (time_column_ < 0) return "traces.csv has no column time_s";
+    trace->Reset(times_s_, std::move(channels));
+    return "";
+  }
+
+  [[nodiscard]] std::string Unknown(const std::string& name) const {
+    std::vector<std::string> names;
+    names.reserve(known_.size());
+    for (const Channel& channel : known_) names.push_back(channel.name);
+    const std::string hint = DidYouMean(name, names);
+    return fmt::format("traces.csv has a column '{}', which is no signal of the mechanism{}", name,
+                       hint.empty() ? "" : " (" + hint + ")");
+  }
+
+  std::string ReadRows(const TableText& text, Trace* trace) {
+    if (text.rows.size() != times_s_.size()) {
+      return fmt::format("traces.csv has {} rows for {} samples", text.rows.size(),
+                         times_s_.size());
+    }
+    CutLine cut;
+    for (size_t i = 0; i < text.rows.size(); ++i) {
+      CutCells(text.rows[i].text, text.delimiter, &cut);
+      if (cut.cells.size() != trace->channels.size() + 1) {
+        return fmt::format("traces.csv:{} has {} cells for {} columns", text.rows[i].number,
+                           cut.cells.size(), trace->channels.size() + 1);
+      }
+      const std::string wrong = ReadRow(text.rows[i], cut, i, trace);
+      if (!wrong.empty()) return wrong;
+    }
+    return "";
+  }
+
+  std::string ReadRow(const TableLine& line, const CutLine& cut, size_t i, Trace* trace) {
+    int column = 0;
+    for (size_t c = 0; c < cut.cells.size(); ++c) {
+      const CellNumber number = ReadCell(cut.cells[c].text, false);
+      const bool is_time = static_cast<int>(c) == time_column_;
+      if (number.kind != CellNumber::Kind::kNumber) {
+        return fmt::format("traces.csv:{} gives '{}' for {}", line.number, cut.cells[c].text,
+                           is_time ? kTime : trace->channels[static_cast<size_t>(column)].name);
+      }
+      if (!is_time) {
+        trace->values(static_cast<Eigen::Index>(i), column++) = number.value;
+      } else if (!(std::abs(number.value - times_s_[i]) <= kStampShare * Spacing())) {
+        return fmt::format("traces.csv:{} is at t = {:.9g} s where the sample is at {:.9g} s",
+                           line.number, number.value, times_s_[i]);
+      }
+    }
+    return "";
+  }
+
+  [[nodiscard]] double Spacing() const {
+    return times_s_.size() < 2 ? 1.0 : times_s_[1] - times_s_[0];
+  }
+
+  std::vector<Channel> known_;
+  const std::vector<double>& times_s_;
+  int time_column_ = -1;
+};
+
+}  // namespace
+
+std::optional<WitnessAnswer> ReadAnswer(std::string_view json, std::string* trouble) {
+  trouble->clear();
+  const Parsed root = Parsed::parse(json, nullptr, false);
+  if (!root.is_object()) {
+    *trouble = "witness.json is no JSON object";
+    return {};
+  }
+  const std::string schema = TextAt(root, "schema", trouble);
+  if (trouble->empty() && schema != kWitnessSchema) {
+    *trouble = fmt::format("witness.json: schema is '{}', needed is {}", schema, kWitnessSchema);
+  }
+  WitnessAnswer answer{.program = TextAt(root, "program", trouble),
+                       .version = TextAt(root, "version", trouble),
+                       .method = TextAt(root, "method", trouble),
+                       .refused = TextAt(root, "refused", trouble),
+                       .declined = {}};
+  if (const std::string units = TextAt(root, "units", trouble); units != "SI") {
+    *trouble =
+        fmt::format("witness.json gives its units as '{}': SI and radians are needed", units);
+  }
+  ReadDeclined(root, &answer, trouble);
+  if (trouble->empty() && answer.program.empty()) *trouble = "witness.json names no program";
+  if (!trouble->empty()) return {};
+  return answer;
+}
+
+std::optional<Trace> ReadWitnessTrace(std::string_view csv, const Mechanism& mechanism,
+                                      const std::vector<double>& times_s, std::string* trouble) {
+  Trace trace;
+  *trouble = TraceReader(mechanism, times_s).Read(csv, &trace);
+  if (!trouble->empty()) return {};
+  return trace;
+}
+
+}  // namespace mbv

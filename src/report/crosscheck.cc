@@ -1,0 +1,172 @@
+#include "report/crosscheck.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "comparison/verdict.h"
+#include "core/json_text.h"
+#include "report/text_table.h"
+
+namespace mbv {
+namespace {
+
+using Rows = std::vector<CrosscheckRow>;
+
+// A run's time by its samples; the time to start a program and to read and write files is in it.
+double MicrosecondsEach(double seconds, const WitnessRecord& witness) {
+  const auto samples = static_cast<double>(witness.trace.time_s.size());
+  return seconds > 0.0 && samples > 0.0 ? 1e6 * seconds / samples : kNan;
+}
+
+std::string EngineName(const WitnessRecord& witness) {
+  if (witness.foreign)
+    return witness.foreign->program.empty() ? witness.name : witness.foreign->program;
+  const Role* role = FindRole(witness.name);
+  return role == nullptr ? witness.name : role->method;
+}
+
+double GapOf(const Comparison& comparison, const std::string& witness) {
+  for (const WitnessMetrics& metrics : comparison.witnesses) {
+    if (metrics.witness != witness) continue;
+    const auto gap = metrics.metrics.find(Metric::kClosureM);
+    if (gap != metrics.metrics.end()) return gap->second.value;
+  }
+  return kNan;
+}
+
+// Whichever of the two is held against the other.
+const PairComparison* PairWithReference(const Comparison& comparison, const std::string& witness) {
+  const PairComparison* pair = comparison.FindPair(PairName(witness, role::kReference.name));
+  return pair != nullptr ? pair : comparison.FindPair(PairName(role::kReference.name, witness));
+}
+
+CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
+  CrosscheckRow row{.mechanism = report.mechanism,
+                    .scenario = report.scenario,
+                    .engine = EngineName(witness),
+                    .loop_gap_m = GapOf(report.comparison, witness.name),
+                    .sample_us = MicrosecondsEach(witness.summary.wall_s, witness),
+                    .why = witness.summary.ok() ? "" : witness.summary.message};
+  if (!row.why.empty()) return row;
+  const PairComparison* pair = PairWithReference(report.comparison, witness.name);
+  if (pair == nullptr || !pair->compared) {
+    row.why = pair == nullptr ? "is not held against the reference" : pair->reason;
+    return row;
+  }
+  const auto found = pair->metrics.find(Metric::kForceNrmse);
+  if (found != pair->metrics.end()) row.force_nrmse = found->second.value;
+  if (found == pair->metrics.end()) row.why = "has no drive force in common with the reference";
+  return row;
+}
+
+std::string NumberText(const char* format, double number) {
+  return std::isnan(number) ? "–" : fmt::format(fmt::runtime(format), number);
+}
+
+std::string CaseOf(const CrosscheckRow& row) { return row.mechanism + "/" + row.scenario; }
+
+// In the order in which they first come.
+std::vector<std::string> Distinct(const Rows& rows, std::string (*name)(const CrosscheckRow&)) {
+  std::vector<std::string> names;
+  for (const CrosscheckRow& row : rows) {
+    if (std::ranges::find(names, name(row)) == names.end()) names.push_back(name(row));
+  }
+  return names;
+}
+
+std::string EngineOf(const CrosscheckRow& row) { return row.engine; }
+
+int WidthOf(const std::vector<std::string>& words) {
+  size_t width = 8;
+  for (const std::string& word : words) width = std::max(width, word.size());
+  return -static_cast<int>(width);
+}
+
+}  // namespace
+
+Rows CrosscheckRows(const Report& report) {
+  Rows rows;
+  for (const WitnessRecord& witness : report.witnesses) {
+    if (witness.name == role::kReference) continue;
+    rows.push_back(RowOf(report, witness));
+  }
+  if (!report.engine_comparison) return rows;
+  for (const EngineError& error : report.engine_comparison->engines) {
+    if (error.engine == report.engine) continue;
+    rows.push_back({.mechanism = report.mechanism,
+                    .scenario = report.scenario,
+                    .engine = EngineComparison::NameOf(error.engine),
+                    .force_nrmse = error.force_nrmse,
+                    .loop_gap_m = error.closure_max_m,
+                    .why = error.failure});
+  }
+  return rows;
+}
+
+std::string ToText(const Rows& rows) {
+  const TextTable table("", {{"scenario", WidthOf(Distinct(rows, &CaseOf))},
+                             {"  engine", WidthOf(Distinct(rows, &EngineOf)) - 2},
+                             {"drive force, RMS", 18},
+                             {"loop gap", 12},
+                             {"per sample", 14}});
+  std::string text = table.Head() + "\n";
+  for (const CrosscheckRow& row : rows) {
+    text +=
+        table.Row({CaseOf(row), "  " + row.engine, NumberText("{:.1e}", row.force_nrmse),
+                   NumberText("{:.1e} m", row.loop_gap_m), NumberText("{:.3g} us", row.sample_us)});
+    text += (row.why.empty() ? "" : "  " + row.why) + "\n";
+  }
+  return text;
+}
+
+std::string ToMarkdown(const Rows& rows) {
+  const std::vector<std::string> engines = Distinct(rows, &EngineOf);
+  std::string text = "| scenario |", line = "|---|";
+  for (const std::string& engine : engines) {
+    text += fmt::format(" {} |", engine);
+    line += "---|";
+  }
+  text += "\n" + line + "\n";
+  for (const std::string& scenario : Distinct(rows, &CaseOf)) {
+    text += fmt::format("| `{}` |", scenario);
+    for (const std::string& engine : engines) {
+      const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& row) {
+        return CaseOf(row) == scenario && row.engine == engine;
+      });
+      text +=
+          fmt::format(" {} |", found == rows.end() ? "" : NumberText("{:.1e}", found->force_nrmse));
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string ToCsv(const Rows& rows) {
+  std::string text = "mechanism,scenario,engine,force_nrmse,loop_gap_m,sample_us,why\n";
+  for (const CrosscheckRow& row : rows) {
+    std::string why = row.why;
+    for (size_t at = 0; (at = why.find('"', at)) != std::string::npos; at += 2)
+      why.insert(at, "\"");
+    text +=
+        fmt::format("{},{},\"{}\",{:.17g},{:.17g},{:.17g},\"{}\"\n", row.mechanism, row.scenario,
+                    row.engine, row.force_nrmse, row.loop_gap_m, row.sample_us, why);
+  }
+  return text;
+}
+
+std::string ToJson(const Rows& rows) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const CrosscheckRow& row : rows) {
+    list.push_back({{"mechanism", row.mechanism},
+                    {"scenario", row.scenario},
+                    {"engine", row.engine},
+                    {"force_nrmse", Number(row.force_nrmse)},
+                    {"loop_gap_m", Number(row.loop_gap_m)},
+                    {"sample_us", Number(row.sample_us)},
+                    {"why", row.why}});
+  }
+  return Dump({{"schema", "mbverify.crosscheck/1"}, {"rows", std::move(list)}});
+}
+
+}  // namespace mbv

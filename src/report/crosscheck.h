@@ -1,0 +1,32 @@
+// Engines side by side: how far each one's drive forces are from the reference's, and what a sample
+// costs it.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "report/report.h"
+
+namespace mbv {
+
+/// One engine on one scenario.
+struct CrosscheckRow {
+  std::string mechanism, scenario;
+  std::string engine;         ///< "closed form", "MuJoCo, default softness, …", "Simbody 3.7"
+  double force_nrmse = kNan;  ///< of all drive forces, against the generic reference
+  double loop_gap_m = kNan;   ///< its own largest; NaN if it tells none
+  double sample_us = kNan;    ///< wall time of its run by samples; NaN where it is not timed alone
+  std::string why;            ///< why there is no number; "" if there is
+};
+
+/// Every engine of a run but the reference itself.
+[[nodiscard]] std::vector<CrosscheckRow> CrosscheckRows(const Report& report);
+
+[[nodiscard]] std::string ToText(const std::vector<CrosscheckRow>& rows);
+/// A row per scenario, a column per engine: the forces' differences.
+[[nodiscard]] std::string ToMarkdown(const std::vector<CrosscheckRow>& rows);
+[[nodiscard]] std::string ToCsv(const std::vector<CrosscheckRow>& rows);
+/// `schema: mbverify.crosscheck/1`.
+[[nodiscard]] std::string ToJson(const std::vector<CrosscheckRow>& rows);
+
+}  // namespace mbv
