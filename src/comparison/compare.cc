@@ -131,6 +131,7 @@ void AddPair(const ComparisonInput& input, const std::string& measured, const st
 // before it.
 std::vector<std::pair<std::string, std::string>> PairsOf(const ComparisonInput& input) {
   std::vector<std::pair<std::string, std::string>> pairs;
+  pairs.reserve(kRolePairs.size());
   for (const auto& [measured, truth] : kRolePairs) pairs.emplace_back(measured->name, truth->name);
   std::vector<std::string> before;
   for (const Role* role : {&role::kAnalytic, &role::kReference, &role::kSolver}) {

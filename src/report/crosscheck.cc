@@ -20,8 +20,6 @@ double MicrosecondsEach(double seconds, const WitnessRecord& witness) {
 }
 
 std::string EngineName(const WitnessRecord& witness) {
-  if (witness.foreign)
-    return witness.foreign->program.empty() ? witness.name : witness.foreign->program;
   const Role* role = FindRole(witness.name);
   return role == nullptr ? witness.name : role->method;
 }
@@ -45,6 +43,7 @@ CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
   CrosscheckRow row{.mechanism = report.mechanism,
                     .scenario = report.scenario,
                     .engine = EngineName(witness),
+                    .program = witness.foreign ? witness.foreign->program : "",
                     .loop_gap_m = GapOf(report.comparison, witness.name),
                     .sample_us = MicrosecondsEach(witness.summary.wall_s, witness),
                     .why = witness.summary.ok() ? "" : witness.summary.message};
@@ -77,6 +76,11 @@ std::vector<std::string> Distinct(const Rows& rows, std::string (*name)(const Cr
 
 std::string EngineOf(const CrosscheckRow& row) { return row.engine; }
 
+// "simbody (Simbody 3.7)".
+std::string EngineAndProgram(const CrosscheckRow& row) {
+  return row.engine + (row.program.empty() ? "" : " (" + row.program + ")");
+}
+
 int WidthOf(const std::vector<std::string>& words) {
   size_t width = 8;
   for (const std::string& word : words) width = std::max(width, word.size());
@@ -97,6 +101,7 @@ Rows CrosscheckRows(const Report& report) {
     rows.push_back({.mechanism = report.mechanism,
                     .scenario = report.scenario,
                     .engine = EngineComparison::NameOf(error.engine),
+                    .program = {},
                     .force_nrmse = error.force_nrmse,
                     .loop_gap_m = error.closure_max_m,
                     .why = error.failure});
@@ -106,14 +111,14 @@ Rows CrosscheckRows(const Report& report) {
 
 std::string ToText(const Rows& rows) {
   const TextTable table("", {{"scenario", WidthOf(Distinct(rows, &CaseOf))},
-                             {"  engine", WidthOf(Distinct(rows, &EngineOf)) - 2},
+                             {"  engine", WidthOf(Distinct(rows, &EngineAndProgram)) - 2},
                              {"drive force, RMS", 18},
                              {"loop gap", 12},
                              {"per sample", 14}});
   std::string text = table.Head() + "\n";
   for (const CrosscheckRow& row : rows) {
     text +=
-        table.Row({CaseOf(row), "  " + row.engine, NumberText("{:.1e}", row.force_nrmse),
+        table.Row({CaseOf(row), "  " + EngineAndProgram(row), NumberText("{:.1e}", row.force_nrmse),
                    NumberText("{:.1e} m", row.loop_gap_m), NumberText("{:.3g} us", row.sample_us)});
     text += (row.why.empty() ? "" : "  " + row.why) + "\n";
   }
@@ -143,14 +148,14 @@ std::string ToMarkdown(const Rows& rows) {
 }
 
 std::string ToCsv(const Rows& rows) {
-  std::string text = "mechanism,scenario,engine,force_nrmse,loop_gap_m,sample_us,why\n";
+  std::string text = "mechanism,scenario,engine,program,force_nrmse,loop_gap_m,sample_us,why\n";
   for (const CrosscheckRow& row : rows) {
     std::string why = row.why;
     for (size_t at = 0; (at = why.find('"', at)) != std::string::npos; at += 2)
       why.insert(at, "\"");
-    text +=
-        fmt::format("{},{},\"{}\",{:.17g},{:.17g},{:.17g},\"{}\"\n", row.mechanism, row.scenario,
-                    row.engine, row.force_nrmse, row.loop_gap_m, row.sample_us, why);
+    text += fmt::format("{},{},\"{}\",\"{}\",{:.17g},{:.17g},{:.17g},\"{}\"\n", row.mechanism,
+                        row.scenario, row.engine, row.program, row.force_nrmse, row.loop_gap_m,
+                        row.sample_us, why);
   }
   return text;
 }
@@ -161,6 +166,7 @@ std::string ToJson(const Rows& rows) {
     list.push_back({{"mechanism", row.mechanism},
                     {"scenario", row.scenario},
                     {"engine", row.engine},
+                    {"program", row.program},
                     {"force_nrmse", Number(row.force_nrmse)},
                     {"loop_gap_m", Number(row.loop_gap_m)},
                     {"sample_us", Number(row.sample_us)},

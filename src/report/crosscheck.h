@@ -12,7 +12,8 @@ namespace mbv {
 /// One engine on one scenario.
 struct CrosscheckRow {
   std::string mechanism, scenario;
-  std::string engine;         ///< "closed form", "MuJoCo, default softness, …", "Simbody 3.7"
+  std::string engine;         ///< "closed form", "MuJoCo, default softness, …", "simbody"
+  std::string program;        ///< of a foreign witness, as it calls itself: "Simbody 3.7"
   double force_nrmse = kNan;  ///< of all drive forces, against the generic reference
   double loop_gap_m = kNan;   ///< its own largest; NaN if it tells none
   double sample_us = kNan;    ///< wall time of its run by samples; NaN where it is not timed alone

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "core/files.h"
+#include "core/inputs.h"
 #include "core/roles.h"
 
 namespace mbv {
@@ -63,6 +65,7 @@ class WitnessReader {
     const fs::path beside = fs::path(folder_) / word;
     std::error_code error;
     if (word.empty() || !fs::is_regular_file(beside, error)) return word;
+    NoteInput(beside.string(), ReadWholeFile(beside).value_or(""));
     return fs::absolute(beside, error).lexically_normal().string();
   }
 

@@ -22,14 +22,14 @@ TEST(CrosscheckCommand, PutsAnEngineBesideOurs) {
   const auto json = nlohmann::json::parse(ReadAll(folder + "/c.json"));
   bool found = false;
   for (const auto& row : json["rows"]) {
-    if (row["engine"] != "planar.py 1") continue;
+    if (row["program"] != "planar.py 1") continue;
     found = true;
     EXPECT_LT(row["force_nrmse"].get<double>(), 1e-12);
     EXPECT_GT(row["sample_us"].get<double>(), 0.0);
   }
   EXPECT_TRUE(found) << json;
   EXPECT_NE(ReadAll(folder + "/c.md").find("| `four_bar/turn_inverse` |"), std::string::npos);
-  EXPECT_NE(ReadAll(folder + "/c.csv").find("four_bar,turn_inverse,\"planar.py 1\","),
+  EXPECT_NE(ReadAll(folder + "/c.csv").find("four_bar,turn_inverse,\"planar\",\"planar.py 1\","),
             std::string::npos);
 }
 

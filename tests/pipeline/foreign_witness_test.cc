@@ -15,15 +15,15 @@ const std::string kPlanar = SourcePath("/scenarios/four_bar/planar.py");
 RunOutcome RunWith(const std::string& witnesses,
                    const std::string& simulation = "{mode: inverse}") {
   const test::TestFolder folder("foreign");
-  const std::string file =
-      folder.Write("case.yaml", fmt::format(R"(
+  const std::string file = folder.Write(
+      "case.yaml", fmt::format(R"(
 mechanism: {}
 motion: {{duration_s: 0.1, sample_s: 0.01, commands: {{motor: [home, {{ramp: {{rate: 3}}}}]}}}}
 loads: {{push: {{on: rocker.end, force: [30, -5, 0], in: world}}}}
 simulation: {}
 witnesses: {}
 )",
-                                            SourcePath("/models/four_bar/model.yaml"), simulation, witnesses));
+                               SourcePath("/models/four_bar/model.yaml"), simulation, witnesses));
   return RunScenario(file, {});
 }
 

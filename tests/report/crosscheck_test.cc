@@ -65,7 +65,8 @@ TEST(Crosscheck, HasARowPerEngineButTheReference) {
   EXPECT_EQ(rows[1].engine, "MuJoCo");
   EXPECT_EQ(rows[1].force_nrmse, 2e-10);
   EXPECT_EQ(rows[1].loop_gap_m, 5e-12);
-  EXPECT_EQ(rows[2].engine, "Mine 2");
+  EXPECT_EQ(rows[2].engine, "mine");
+  EXPECT_EQ(rows[2].program, "Mine 2");
   EXPECT_EQ(rows[2].force_nrmse, 3e-5);
   EXPECT_EQ(rows[3].engine, "gone");
   EXPECT_EQ(rows[3].why, "could \"not\" be started");
@@ -77,13 +78,14 @@ TEST(Crosscheck, HasARowPerEngineButTheReference) {
 TEST(Crosscheck, WritesTables) {
   const auto rows = CrosscheckRows(FourEngines());
   EXPECT_EQ(ToMarkdown(rows),
-            "| scenario | closed form | MuJoCo | Mine 2 | gone | MuJoCo, default softness, "
+            "| scenario | closed form | MuJoCo | mine | gone | MuJoCo, default softness, "
             "position targets |\n|---|---|---|---|---|---|\n"
             "| `bar/turn` | 1.0e-15 | 2.0e-10 | 3.0e-05 | – | 5.0e-01 |\n");
-  EXPECT_NE(ToCsv(rows).find("bar,turn,\"gone\",nan,nan,nan,\"could \"\"not\"\" be started\"\n"),
-            std::string::npos)
+  EXPECT_NE(
+      ToCsv(rows).find("bar,turn,\"gone\",\"\",nan,nan,nan,\"could \"\"not\"\" be started\"\n"),
+      std::string::npos)
       << ToCsv(rows);
-  EXPECT_NE(ToText(rows).find("3.0e-05"), std::string::npos) << ToText(rows);
+  EXPECT_NE(ToText(rows).find("mine (Mine 2)"), std::string::npos) << ToText(rows);
   const auto json = nlohmann::json::parse(ToJson(rows));
   EXPECT_EQ(json["schema"], "mbverify.crosscheck/1");
   EXPECT_EQ(json["rows"][2]["force_nrmse"], 3e-5);
