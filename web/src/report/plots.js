@@ -23,13 +23,19 @@ const kPaperWidth = 640;  // [px], what A4 leaves between its margins
 const kHeight = 210;      // [px]
 const kFont = 'system-ui, sans-serif';
 
-/** @type {Record<string, {width: number, alpha?: number, spans?: boolean, marks?: boolean}>} */
+/** @typedef {{width: number, alpha?: number, spans?: boolean, marks?: boolean, dash?: number[]}} Style */
+
+/** @type {Record<string, Style>} */
 const kStyles = {
   solid: {width: 1.6},
+  solver: {width: 1.6},
+  reached: {width: 1.6},
   analytic: {width: 4.5, alpha: 0.38},
   reference: {width: 1.3, spans: true},  // a table may have fewer rows than there are samples
   simulated: {width: 0, marks: true},
 };
+/** Of a program outside. @type {Style} */
+const kForeign = {width: 2, dash: [2, 5]};
 
 /**
  * Marks spread evenly over what is visible.
@@ -46,14 +52,15 @@ function visibleMarks(u, _series, show, gaps) {
 
 /** @param {Line} line @param {boolean} log @returns {uPlot.Series} */
 function seriesOf(line, log) {
-  const style = log ? {width: 1} : kStyles[line.style] ?? kStyles.solid;
+  /** @type {Style} */
+  const style = log ? {width: 1} : kStyles[line.style] ?? kForeign;
   const color = line.color();
   return {
     label: line.label,
     stroke: color,
     alpha: style.alpha ?? 1,
     width: style.width,
-    dash: line.dash ? [7, 4] : undefined,
+    dash: line.dash ? [7, 4] : style.dash,
     spanGaps: !line.band && (style.spans ?? false),  // a band's gap is no missing row
     paths: style.marks ? () => null : undefined,
     points: {show: Boolean(style.marks), size: 5, width: 1.2, stroke: color,
@@ -148,7 +155,8 @@ export class Plots {
     button('Whole run', 'Show the whole run (0, or double-click)', () => this.reset());
     const key = element('span', {class: 'styles'});
     for (const witness of this.data.witnesses) {
-      key.append(element('span', {class: `style ${witness.name}`}, element('i'), witness.name));
+      const style = witness.name in kStyles ? witness.name : 'foreign';
+      key.append(element('span', {class: `style ${style}`}, element('i'), witness.name));
     }
     bar.append(key, element('span', {class: 'faint wide'}, 'drag to zoom, click to set the time'));
     return bar;
