@@ -190,8 +190,7 @@ void WitnessRunner::SolveFree(const Role& role) {
 void WitnessRunner::RunForeign() {
   for (const ForeignWitness& witness : scenario().witnesses) {
     if (progress_) progress_(witness.name, 0.0);
-    runs_.records.push_back(
-        mbv::RunForeign(witness, prepared_, prepared_.mechanisms.reference, Driven()));
+    runs_.records.push_back(mbv::RunForeign(witness, prepared_, prepared_.base, Driven()));
     runs_.timing.foreign_s += runs_.records.back().summary.wall_s;
   }
 }
