@@ -42,6 +42,12 @@ mbv_find_module(URDFDOM urdfdom liburdfdom-dev)
 mbv_find_module(OSMESA osmesa libosmesa6-dev)
 mbv_find_module(MATIO matio libmatio-dev)
 mbv_find_module(HDF5 hdf5-serial libhdf5-dev)
+mbv_find_module(CAIRO cairo-pdf libcairo2-dev)
+mbv_find_module(PANGO pangocairo libpango1.0-dev)
+# GLib's -pthread defines a macro, with which no precompiled header would be taken.
+if(PANGO_FOUND)
+  set_target_properties(PkgConfig::PANGO PROPERTIES INTERFACE_COMPILE_OPTIONS "")
+endif()
 
 if(mujoco_FOUND)
   if(NOT mujoco_VERSION VERSION_EQUAL 2.2.2)

@@ -8,10 +8,12 @@ import { join } from 'node:path';
 // everybody's.
 const LIBRARIES = {
   'Boost': { headers: ['boost/'], target: 'Boost::headers' },
+  'cairo': { headers: ['cairo'], target: 'PkgConfig::CAIRO' },
   'CLI11': { headers: ['CLI/'], target: 'CLI11::CLI11' },
   'MuJoCo': { headers: ['mujoco/'], target: 'mujoco::mujoco' },
   'HDF5': { headers: ['hdf5.h'], target: 'PkgConfig::HDF5' },
   'matio': { headers: ['matio.h'], target: 'PkgConfig::MATIO' },
+  'Pango': { headers: ['pango/'], target: 'PkgConfig::PANGO' },
   'OSMesa': { headers: ['GL/'], target: 'PkgConfig::OSMESA' },
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },

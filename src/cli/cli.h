@@ -46,5 +46,6 @@ void AddHistoryCommand(CLI::App* app, int* exit_code);
 void AddInertiaCommand(CLI::App* app, int* exit_code);
 void AddCompletionCommand(CLI::App* app, int* exit_code);
 void AddSizeCommand(CLI::App* app, int* exit_code);
+void AddFiguresCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

@@ -183,13 +183,12 @@ std::string MapName(const StiffnessMap& map) {
   return name;
 }
 
-std::vector<std::pair<std::string, std::string>> MapFiles(const StiffnessMap& map,
-                                                          const MapResult& result,
-                                                          const std::string& mechanism,
-                                                          const std::vector<std::string>& names,
-                                                          Diagnostics* diagnostics) {
-  std::vector<std::pair<std::string, std::string>> files = {
-      {MapName(map) + ".csv", CsvOf(map, result)}};
+std::vector<std::pair<std::string, MapPlot>> MapPlots(const StiffnessMap& map,
+                                                      const MapResult& result,
+                                                      const std::string& mechanism,
+                                                      const std::vector<std::string>& names,
+                                                      Diagnostics* diagnostics) {
+  std::vector<std::pair<std::string, MapPlot>> plots;
   std::vector<std::string> known;
   for (const NamedIndex& index : result.indices) known.push_back(index.name);
   for (const std::string& name : Chosen(result, names)) {
@@ -204,9 +203,21 @@ std::vector<std::pair<std::string, std::string>> MapFiles(const StiffnessMap& ma
     }
     const std::string title =
         fmt::format("{}: {}{}{}", mechanism, name, map.fixed.empty() ? "" : ", ", FixedText(map));
-    files.emplace_back(
-        fmt::format("{}_{}.svg", MapName(map), name),
-        ToSvg(PlotOf(map, result, static_cast<size_t>(found - known.begin()), title)));
+    plots.emplace_back(fmt::format("{}_{}", MapName(map), name),
+                       PlotOf(map, result, static_cast<size_t>(found - known.begin()), title));
+  }
+  return plots;
+}
+
+std::vector<std::pair<std::string, std::string>> MapFiles(const StiffnessMap& map,
+                                                          const MapResult& result,
+                                                          const std::string& mechanism,
+                                                          const std::vector<std::string>& names,
+                                                          Diagnostics* diagnostics) {
+  std::vector<std::pair<std::string, std::string>> files = {
+      {MapName(map) + ".csv", CsvOf(map, result)}};
+  for (const auto& [name, plot] : MapPlots(map, result, mechanism, names, diagnostics)) {
+    files.emplace_back(name + ".svg", ToSvg(plot));
   }
   return files;
 }

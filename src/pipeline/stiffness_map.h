@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "core/plot.h"
 #include "pipeline/stiffness.h"
 
 namespace mbv {
@@ -55,8 +56,13 @@ struct MapResult {
 [[nodiscard]] MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
                                    const ProgressFunction& progress = {});
 
-/// Files (name, content): the CSV of all indices and an SVG for each of `names` (default: the
-/// closed form's first two and the weakest stiffnesses). Unknown names are findings.
+/// A picture of each of `names` (default: the closed form's first two and the weakest stiffnesses)
+/// by the name of its files. Unknown names are findings.
+[[nodiscard]] std::vector<std::pair<std::string, MapPlot>> MapPlots(
+    const StiffnessMap& map, const MapResult& result, const std::string& mechanism,
+    const std::vector<std::string>& names, Diagnostics* diagnostics);
+
+/// Files (name, content): the CSV of all indices and an SVG for each of MapPlots().
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> MapFiles(
     const StiffnessMap& map, const MapResult& result, const std::string& mechanism,
     const std::vector<std::string>& names, Diagnostics* diagnostics);

@@ -10,13 +10,8 @@
 namespace mbv {
 namespace {
 
-// A channel and its unit; empty when the trace has none.
-struct Signal {
-  VecX values;
-  std::string unit;
-};
-Signal SignalOf(const Trace& trace, Quantity quantity, const std::string& subject,
-                int component = -1) {
+LoadSignal SignalOf(const Trace& trace, Quantity quantity, const std::string& subject,
+                    int component = -1) {
   const int column = trace.Find(quantity, subject, component);
   if (column < 0) return {};
   return {trace.values.col(column), trace.channels[static_cast<size_t>(column)].unit};
@@ -31,9 +26,9 @@ VecX WorstForce(const Trace& trace, const std::string& drive) {
 DriveLoad DriveLoadOf(const WitnessRecord& record, const std::string& drive) {
   const Trace& trace = record.trace;
   DriveLoad load{.drive = drive, .witness = record.name};
-  const Signal force = SignalOf(trace, Quantity::kForce, drive);
-  const Signal velocity = SignalOf(trace, Quantity::kVelocity, drive);
-  const Signal position = SignalOf(trace, Quantity::kPosition, drive);
+  const LoadSignal force = SignalOf(trace, Quantity::kForce, drive);
+  const LoadSignal velocity = SignalOf(trace, Quantity::kVelocity, drive);
+  const LoadSignal position = SignalOf(trace, Quantity::kPosition, drive);
   load.force = FiguresOf(trace.time_s, WorstForce(trace, drive), force.unit);
   load.speed = FiguresOf(trace.time_s, velocity.values, velocity.unit);
   if (force.values.size() > 0 && velocity.values.size() > 0) {
@@ -47,20 +42,6 @@ DriveLoad DriveLoadOf(const WitnessRecord& record, const std::string& drive) {
   load.stroke = high - low;
   load.stroke_unit = position.unit;
   return load;
-}
-
-// Magnitude of three components of a reaction from `first` on; empty unless all are there.
-Signal MagnitudeOf(const Trace& trace, const std::string& joint, int first) {
-  VecX squares;
-  std::string unit;
-  for (int c = first; c < first + 3; ++c) {
-    const Signal component = SignalOf(trace, Quantity::kReaction, joint, c);
-    if (component.values.size() == 0) return {};
-    if (squares.size() == 0) squares = VecX::Zero(component.values.size());
-    squares += component.values.cwiseAbs2();
-    unit = component.unit;
-  }
-  return {squares.cwiseSqrt(), unit};
 }
 
 // All joints of which some witness records the reaction, each once.
@@ -86,6 +67,19 @@ bool IsOpen(const Report& report, const std::string& joint) {
 }
 
 }  // namespace
+
+LoadSignal ReactionMagnitude(const Trace& trace, const std::string& joint, int first) {
+  VecX squares;
+  std::string unit;
+  for (int c = first; c < first + 3; ++c) {
+    const LoadSignal component = SignalOf(trace, Quantity::kReaction, joint, c);
+    if (component.values.size() == 0) return {};
+    if (squares.size() == 0) squares = VecX::Zero(component.values.size());
+    squares += component.values.cwiseAbs2();
+    unit = component.unit;
+  }
+  return {squares.cwiseSqrt(), unit};
+}
 
 Figures FiguresOf(const std::vector<double>& time_s, const VecX& values, const std::string& unit) {
   Figures figures{.unit = unit};
@@ -124,8 +118,8 @@ LoadFigures LoadFiguresOf(const Report& report) {
   for (const std::string& joint : JointsOf(report)) {
     for (const WitnessRecord* record : ran) {
       const Trace& trace = record->trace;
-      const Signal force = MagnitudeOf(trace, joint, 0);
-      const Signal moment = MagnitudeOf(trace, joint, 3);
+      const LoadSignal force = ReactionMagnitude(trace, joint, 0);
+      const LoadSignal moment = ReactionMagnitude(trace, joint, 3);
       if (force.values.size() + moment.values.size() == 0) continue;
       loads.joints.push_back({.joint = joint,
                               .witness = record->name,

@@ -42,6 +42,15 @@ struct LoadFigures {
 /// Of all witnesses that ran.
 [[nodiscard]] LoadFigures LoadFiguresOf(const Report& report);
 
+/// A signal and its unit; empty when the trace has none.
+struct LoadSignal {
+  VecX values;
+  std::string unit;
+};
+/// Magnitude of three components of a joint's reaction: the force (`first` = 0) or the moment (3);
+/// empty unless all are there.
+[[nodiscard]] LoadSignal ReactionMagnitude(const Trace& trace, const std::string& joint, int first);
+
 /// Of one signal; `values` as long as `time_s`.
 [[nodiscard]] Figures FiguresOf(const std::vector<double>& time_s, const VecX& values,
                                 const std::string& unit);

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/html_plots.h"
 #include "report/html_text.h"
+#include "report/plot_points.h"
 #include "report/svg_plot.h"
 #include "report/text_table.h"
 

@@ -9,73 +9,16 @@
 
 #include "core/svg.h"
 #include "report/html_text.h"
+#include "report/plot_axis.h"
 #include "report/svg_contours.h"
 
 namespace mbv {
 namespace {
 
-// Colour-blind safe line colours (Okabe and Ito).
-constexpr std::array<const char*, 8> kColors = {"#0072b2", "#d55e00", "#009e73", "#cc79a7",
-                                                "#e69f00", "#56b4e9", "#000000", "#888888"};
 constexpr double kWidth = 720, kHeight = 520;
-constexpr double kRoundOff = 1e-9;  // a smaller relative range is shown as a constant
-constexpr int kMostTicks = 16;
 constexpr double kLeft = 84, kRight = 24, kTop = 44, kBottom = 60;
 constexpr double kOverlap = 0.3;  // of neighbouring cells, or the ground would shine through
 constexpr const char* kGridColor = "#dddddd";
-
-struct Axis {
-  double low = std::numeric_limits<double>::infinity();
-  double high = -std::numeric_limits<double>::infinity();
-  bool log = false;
-  double from_px = 0, to_px = 1;
-
-  [[nodiscard]] bool Shows(double v) const { return std::isfinite(v) && (!log || v > 0); }
-  [[nodiscard]] double Inner(double v) const { return log ? std::log10(v) : v; }
-  void Add(double v) {
-    if (!Shows(v)) return;
-    low = std::min(low, Inner(v));
-    high = std::max(high, Inner(v));
-  }
-  void Pad() {
-    if (!(low <= high)) low = 0, high = 1;
-    // Round-off of a constant is no range to show: between its ends no tick could be told apart.
-    const double largest = std::max(std::abs(low), std::abs(high));
-    const bool constant = log ? high <= low : high - low <= kRoundOff * largest;
-    const double pad = !constant ? 0.04 * (high - low) : log ? 0.5 : std::max(1e-12, largest);
-    low -= pad;
-    high += pad;
-  }
-  [[nodiscard]] double Px(double v) const {
-    return from_px + (Inner(v) - low) / (high - low) * (to_px - from_px);
-  }
-  // Round values inside the range: decades (with their doubles and fivefolds where they are few),
-  // or steps of 1, 2 or 5 times a power of ten.
-  [[nodiscard]] std::vector<double> Ticks() const {
-    std::vector<double> ticks;
-    if (log) {
-      const int step = std::max(1, static_cast<int>(std::ceil((high - low) / 8)));
-      const bool few = high - low < 2.0;
-      for (int d = static_cast<int>(std::floor(low)); d <= high; d += step) {
-        for (const double factor : {1.0, 2.0, 5.0}) {
-          const double tick = factor * std::pow(10.0, d), inner = Inner(tick);
-          if ((factor == 1.0 || few) && inner >= low && inner <= high) ticks.push_back(tick);
-        }
-      }
-      return ticks;
-    }
-    const double raw = (high - low) / 6, power = std::pow(10.0, std::floor(std::log10(raw)));
-    const double unit = raw / power < 1.5   ? power
-                        : raw / power < 3.5 ? 2 * power
-                        : raw / power < 7.5 ? 5 * power
-                                            : 10 * power;
-    const double first = std::ceil(low / unit);
-    for (int k = 0; k <= kMostTicks && (first + k) * unit <= high; ++k) {
-      ticks.push_back((first + k) * unit);
-    }
-    return ticks;
-  }
-};
 
 // The whole picture: on white, with a title.
 std::string Picture(const std::string& title, const std::string& content, double height = kHeight) {
@@ -95,7 +38,7 @@ std::string Picture(const std::string& title, const std::string& content, double
          "\n";
 }
 
-std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
+std::string Frame(const PlotAxis& x, const PlotAxis& y, const std::string& x_label,
                   const std::string& y_label) {
   const double left = x.from_px, right = x.to_px, top = y.to_px, bottom = y.from_px;
   std::string svg;
@@ -135,18 +78,7 @@ std::string Frame(const Axis& x, const Axis& y, const std::string& x_label,
          "\n" + SvgText({{"transform", turned}, {"text-anchor", "middle"}}, y_label) + "\n";
 }
 
-// Widens the axis whose unit would be longer, so that both have one scale.
-void EqualScale(Axis* x, Axis* y) {
-  const double x_px = std::abs(x->to_px - x->from_px), y_px = std::abs(y->to_px - y->from_px);
-  const double scale = std::max((x->high - x->low) / x_px, (y->high - y->low) / y_px);
-  for (auto [axis, px] : {std::pair{x, x_px}, std::pair{y, y_px}}) {
-    const double middle = 0.5 * (axis->low + axis->high);
-    axis->low = middle - 0.5 * scale * px;
-    axis->high = middle + 0.5 * scale * px;
-  }
-}
-
-std::string Curve(const PlotLine& line, const char* color, const Axis& x, const Axis& y) {
+std::string Curve(const PlotLine& line, const char* color, const PlotAxis& x, const PlotAxis& y) {
   std::string path, dots;
   bool pen_down = false;
   for (const auto& [u, v] : line.points) {
@@ -197,22 +129,14 @@ std::string Legend(const std::vector<LegendEntry>& entries, double* height) {
   return svg;
 }
 
-// Dark blue over green to yellow (a short version of viridis).
-std::string MapColor(double t) {
-  constexpr std::array<std::array<double, 3>, 5> stops = {
-      {{68, 1, 84}, {59, 82, 139}, {33, 145, 140}, {94, 201, 98}, {253, 231, 37}}};
-  const double at = std::clamp(t, 0.0, 1.0) * 4;
-  const int k = std::min(3, static_cast<int>(at));
-  std::array<int, 3> rgb{};
-  for (int c = 0; c < 3; ++c) {
-    rgb[c] =
-        static_cast<int>(std::lround(stops[k][c] + (at - k) * (stops[k + 1][c] - stops[k][c])));
-  }
+std::string MapColorText(double t) {
+  const Rgb rgb = MapColor(t);
   return fmt::format("#{:02x}{:02x}{:02x}", rgb[0], rgb[1], rgb[2]);
 }
 
 // Equal steps in what the colours show; they run through the middles of the cells.
-std::string Contours(const MapPlot& plot, const Axis& x, const Axis& y, const Axis& value) {
+std::string Contours(const MapPlot& plot, const PlotAxis& x, const PlotAxis& y,
+                     const PlotAxis& value) {
   std::vector<double> inner(plot.values.size());
   for (size_t k = 0; k < inner.size(); ++k) {
     inner[k] = value.Shows(plot.values[k]) ? value.Inner(plot.values[k])
@@ -241,7 +165,7 @@ std::string Contours(const MapPlot& plot, const Axis& x, const Axis& y, const Ax
 }
 
 // What the colours stand for, to the right of the map.
-std::string ColorBar(const Axis& value, const std::string& label) {
+std::string ColorBar(const PlotAxis& value, const std::string& label) {
   constexpr int kSteps = 50;
   const double left = kWidth - kRight - 60, cell = (kHeight - kBottom - kTop) / kSteps;
   std::string svg;
@@ -250,7 +174,7 @@ std::string ColorBar(const Axis& value, const std::string& label) {
                              {"y", kHeight - kBottom - (i + 1) * cell, 2},
                              {"width", "16"},
                              {"height", cell + kOverlap, 2},
-                             {"fill", MapColor((i + 0.5) / kSteps)}}) +
+                             {"fill", MapColorText((i + 0.5) / kSteps)}}) +
            "\n";
   }
   for (double v : value.Ticks()) {
@@ -270,8 +194,8 @@ std::string ColorBar(const Axis& value, const std::string& label) {
 }  // namespace
 
 std::string ToSvg(const LinePlot& plot) {
-  Axis x{.log = plot.log_x, .from_px = kLeft, .to_px = kWidth - kRight};
-  Axis y{.log = plot.log_y, .from_px = kHeight - kBottom, .to_px = kTop};
+  PlotAxis x{.log = plot.log_x, .from_px = kLeft, .to_px = kWidth - kRight};
+  PlotAxis y{.log = plot.log_y, .from_px = kHeight - kBottom, .to_px = kTop};
   for (const PlotLine& line : plot.lines) {
     for (const auto& [u, v] : line.points) {
       if (!x.Shows(u) || !y.Shows(v)) continue;
@@ -285,7 +209,7 @@ std::string ToSvg(const LinePlot& plot) {
   std::string curves;
   std::vector<LegendEntry> legend;
   for (size_t i = 0; i < plot.lines.size(); ++i) {
-    const char* color = kColors[i % kColors.size()];
+    const char* color = kLineColors[i % kLineColors.size()];
     curves += Curve(plot.lines[i], color, x, y);
     if (!plot.lines[i].label.empty()) legend.push_back({plot.lines[i].label, color});
   }
@@ -295,10 +219,11 @@ std::string ToSvg(const LinePlot& plot) {
 }
 
 std::string ToSvg(const MapPlot& plot) {
-  Axis x{.low = plot.x_min, .high = plot.x_max, .from_px = kLeft, .to_px = kWidth - kRight - 90};
-  Axis y{.low = plot.y_min, .high = plot.y_max, .from_px = kHeight - kBottom, .to_px = kTop};
+  PlotAxis x{
+      .low = plot.x_min, .high = plot.x_max, .from_px = kLeft, .to_px = kWidth - kRight - 90};
+  PlotAxis y{.low = plot.y_min, .high = plot.y_max, .from_px = kHeight - kBottom, .to_px = kTop};
   EqualScale(&x, &y);
-  Axis value{.log = plot.log_scale, .from_px = kHeight - kBottom, .to_px = kTop};
+  PlotAxis value{.log = plot.log_scale, .from_px = kHeight - kBottom, .to_px = kTop};
   for (double v : plot.values) value.Add(v);
   if (!(value.low <= value.high)) value.low = 0, value.high = 1;
   if (value.low == value.high) value.high = value.low + 1;
@@ -315,7 +240,7 @@ std::string ToSvg(const MapPlot& plot) {
                                  {"y", y.Px(plot.y_min) - (r + 1) * h, 2},
                                  {"width", w + kOverlap, 2},
                                  {"height", h + kOverlap, 2},
-                                 {"fill", MapColor(t)}}) +
+                                 {"fill", MapColorText(t)}}) +
                "\n";
     }
   }

@@ -14,6 +14,7 @@
 #include "report/html_plots.h"
 #include "report/html_tables.h"
 #include "report/html_text.h"
+#include "report/plot_points.h"
 #include "report/result_html.h"
 #include "tests/comparison/synthetic.h"
 

@@ -1,0 +1,157 @@
+// mbverify figures
+#include <fmt/format.h>
+
+#include <memory>
+
+#include "cli/cli.h"
+#include "cli/files.h"
+#include "cli/json_option.h"
+#include "cli/terminal.h"
+#include "core/output_folder.h"
+#include "core/text.h"
+#include "figure/style.h"
+#include "figure/words.h"
+#include "pipeline/figures.h"
+
+namespace mbv {
+namespace {
+
+struct FiguresArguments {
+  std::vector<std::string> scenarios, set, formats = {"pdf", "svg"}, only;
+  std::string style = "ieee", language = "en", out = "figures";
+  double width_mm = 0, font_pt = 0;
+  JsonOption json;
+};
+
+constexpr double kNarrowestMm = 30, kWidestMm = 500, kSmallestPt = 4, kLargestPt = 40;
+
+bool MakeFigureOptions(const FiguresArguments& arguments, FigureOptions* options) {
+  options->style = *FindFigureStyle(arguments.style);
+  if (arguments.width_mm > 0) options->style.width_mm = arguments.width_mm;
+  if (arguments.font_pt > 0) options->style.font_pt = arguments.font_pt;
+  options->language = LanguageOf(arguments.language);
+  options->formats = arguments.formats;
+  options->only = arguments.only;
+  for (const std::string& text : arguments.set) {
+    const auto set = SplitSet(text);
+    if (!set) {
+      (void)Refuse("--set " + text + ": write key=value", "");
+      return false;
+    }
+    options->scenario.set.push_back(*set);
+  }
+  return true;
+}
+
+// What was drawn, one figure a line; "" or what went wrong.
+std::string Deliver(const FiguresArguments& arguments, const FigureOutcome& outcome,
+                    std::string* written) {
+  for (const MadeFigure& made : outcome.figures) {
+    Say(arguments.json.text(), "{:<24} {}\n", made.figure.name, Joined(made.files));
+  }
+  for (const std::string& text : outcome.left_out) {
+    Say(arguments.json.text(), "left out: {}\n", text);
+  }
+  if (outcome.files.empty()) return "";
+  OutputFolder folder(arguments.out, outcome.mechanism + "/" + outcome.scenario);
+  if (std::string trouble = folder.WriteAll(outcome.files); !trouble.empty()) return trouble;
+  *written = folder.target().string();
+  Say(stderr, "figures in {}\n", *written);
+  return "";
+}
+
+nlohmann::ordered_json OutcomeJson(const std::string& file, const FigureOutcome& outcome,
+                                   const std::string& folder) {
+  auto figures = nlohmann::ordered_json::array();
+  for (const MadeFigure& made : outcome.figures) {
+    figures.push_back(
+        {{"name", made.figure.name}, {"caption", made.figure.caption}, {"files", made.files}});
+  }
+  return {{"scenario_file", file},
+          {"exit_code", outcome.exit_code},
+          {"verdict", outcome.verdict},
+          {"folder", folder},
+          {"figures", std::move(figures)},
+          {"left_out", outcome.left_out},
+          {"findings", FindingObjects(outcome.diagnostics)}};
+}
+
+int Figures(const FiguresArguments& arguments) {
+  FigureOptions options;
+  if (!MakeFigureOptions(arguments, &options)) return 2;
+  std::string trouble;
+  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
+  if (!trouble.empty()) return Refuse(trouble, "");
+  for (const std::string& file : files) {
+    if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
+  }
+  ProgressLine progress(true);
+  FindingPrinter findings(stderr);
+  auto results = nlohmann::ordered_json::array();
+  int exit_code = 0;
+  for (const std::string& file : files) {
+    if (progress.active()) {
+      options.progress = [&](const std::string& stage, double fraction) {
+        progress.Show(file + ": " + stage, fraction);
+      };
+    }
+    const FigureOutcome outcome = MakeFigures(file, options);
+    progress.Clear();
+    findings.Print(outcome.diagnostics);
+    std::string folder;
+    if (const std::string lost = Deliver(arguments, outcome, &folder); !lost.empty()) {
+      return Refuse(lost, "choose another folder with --out");
+    }
+    exit_code = WorseExit(exit_code, outcome.exit_code);
+    results.push_back(OutcomeJson(file, outcome, folder));
+  }
+  return WorseExit(exit_code, arguments.json.Write(
+                                  {{"exit_code", exit_code}, {"results", std::move(results)}}, {}));
+}
+
+std::vector<std::string> StyleNames() {
+  std::vector<std::string> names;
+  for (const FigureStyle& style : FigureStyles()) names.push_back(style.name);
+  return names;
+}
+
+}  // namespace
+
+void AddFiguresCommand(CLI::App* app, int* exit_code) {
+  auto arguments = std::make_shared<FiguresArguments>();
+  CLI::App* figures = app->add_subcommand(
+      "figures", "Figures for a paper: forces, motion, reactions, power, maps of stiffness");
+  figures->add_option("scenario", arguments->scenarios, "scenario files or folders of them")
+      ->required();
+  figures->add_option("--style", arguments->style, "column width and fonts of")
+      ->check(OneOf(StyleNames()))
+      ->capture_default_str();
+  figures->add_option("--lang", arguments->language, "language of axes and legends")
+      ->check(OneOf(LanguageCodes()))
+      ->capture_default_str();
+  figures->add_option("--formats", arguments->formats, "files of each figure")
+      ->delimiter(',')
+      ->check(OneOf(FigureFormats()))
+      ->capture_default_str();
+  figures->add_option("--only", arguments->only, "names of the figures that are wanted")
+      ->delimiter(',');
+  figures->add_option("--width-mm", arguments->width_mm, "instead of the style's width")
+      ->check(CLI::Range(kNarrowestMm, kWidestMm));
+  figures->add_option("--font-pt", arguments->font_pt, "instead of the style's size of texts")
+      ->check(CLI::Range(kSmallestPt, kLargestPt));
+  figures->add_option("--out", arguments->out, "folder for the figures")->capture_default_str();
+  arguments->json.AddTo(figures);
+  figures
+      ->add_option("--set", arguments->set,
+                   "key=value: overrides a value of the scenario (repeatable)")
+      ->allow_extra_args(false);
+  SetFooter(figures,
+            {"figures scenarios/stabilizing_platform/sea_state.yaml",
+             "figures stewart/wave --style springer --lang de --only drive_forces",
+             "figures scara_robot/stiffness --formats pdf,png --width-mm 120"},
+            "0 agree, 1 disagree (drawn all the same), 2 bad input, 3 could not run, 4 internal "
+            "error");
+  figures->callback([arguments, exit_code] { *exit_code = Figures(*arguments); });
+}
+
+}  // namespace mbv

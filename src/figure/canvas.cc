@@ -1,0 +1,318 @@
+#include "figure/canvas.h"
+
+#include <cairo-pdf.h>
+#include <cairo-svg.h>
+#include <pango/pangocairo.h>
+
+#include <cmath>
+#include <cstdint>
+#include <map>
+#include <numbers>
+
+#include "core/demand.h"
+#include "figure/markup.h"
+#include "image/png.h"
+
+namespace mbv {
+
+namespace internal {
+
+// What cairo and Pango give is given back.
+struct Unref {
+  void operator()(cairo_surface_t* surface) const { cairo_surface_destroy(surface); }
+  void operator()(cairo_t* cairo) const { cairo_destroy(cairo); }
+  void operator()(PangoLayout* layout) const { g_object_unref(layout); }
+  void operator()(PangoFontDescription* font) const { pango_font_description_free(font); }
+  void operator()(cairo_font_options_t* options) const { cairo_font_options_destroy(options); }
+};
+template <typename T>
+using Handle = std::unique_ptr<T, Unref>;
+
+}  // namespace internal
+
+namespace {
+
+using internal::Handle;
+
+constexpr double kPointsPerInch = 72.0;
+
+// Texts are as long on paper as on a screen: nothing is fitted to pixels.
+void LeaveUnhinted(PangoContext* context) {
+  const Handle<cairo_font_options_t> options(cairo_font_options_create());
+  cairo_font_options_set_hint_style(options.get(), CAIRO_HINT_STYLE_NONE);
+  cairo_font_options_set_hint_metrics(options.get(), CAIRO_HINT_METRICS_OFF);
+  cairo_font_options_set_antialias(options.get(), CAIRO_ANTIALIAS_GRAY);
+  pango_cairo_context_set_font_options(context, options.get());
+  pango_context_set_round_glyph_positions(context, FALSE);
+  pango_cairo_context_set_resolution(context, kPointsPerInch);
+}
+
+cairo_status_t Append(void* text, const unsigned char* bytes, unsigned count) {
+  static_cast<std::string*>(text)->append(reinterpret_cast<const char*>(bytes), count);
+  return CAIRO_STATUS_SUCCESS;
+}
+
+// Cairo counts its surfaces through the whole program: "image12" in one drawing is "image19" in
+// the next. Counted anew in the order in which they are named.
+std::string Renumbered(const std::string& svg) {
+  std::string out;
+  std::map<std::string, std::string> names;
+  size_t from = 0;
+  for (size_t at = 0; at < svg.size(); ++at) {
+    for (const std::string word :
+         {"\"image", "#image", "\"surface", "#surface", "\"clip", "#clip"}) {
+      if (svg.compare(at, word.size(), word) != 0) continue;
+      size_t end = at + word.size();
+      while (end < svg.size() && std::isdigit(static_cast<unsigned char>(svg[end])) != 0) ++end;
+      if (end == at + word.size()) continue;
+      const std::string name = svg.substr(at + 1, end - at - 1);
+      const auto known = names.emplace(name, word.substr(1) + std::to_string(names.size())).first;
+      out += svg.substr(from, at + 1 - from) + known->second;
+      from = end;
+    }
+  }
+  return out + svg.substr(from);
+}
+
+std::string PngOf(cairo_surface_t* surface) {
+  cairo_surface_flush(surface);
+  Picture picture{.width = cairo_image_surface_get_width(surface),
+                  .height = cairo_image_surface_get_height(surface)};
+  const unsigned char* row = cairo_image_surface_get_data(surface);
+  for (int y = 0; y < picture.height; ++y, row += cairo_image_surface_get_stride(surface)) {
+    for (int x = 0; x < picture.width; ++x) {
+      const std::uint32_t pixel = reinterpret_cast<const std::uint32_t*>(row)[x];
+      for (const int shift : {16, 8, 0}) {
+        picture.rgb.push_back(static_cast<std::uint8_t>(pixel >> shift));
+      }
+    }
+  }
+  return EncodePng(picture);
+}
+
+void SetColor(cairo_t* cairo, const std::string& color) {
+  const auto [r, g, b] = RgbOf(color);
+  cairo_set_source_rgb(cairo, r, g, b);
+}
+
+bool IsFinite(const std::pair<double, double>& point) {
+  return std::isfinite(point.first) && std::isfinite(point.second);
+}
+
+constexpr const char* kInk = "#000000";
+
+}  // namespace
+
+struct Canvas::Pen {
+  Handle<cairo_surface_t> own_surface;
+  Handle<cairo_t> own_cairo;
+  cairo_t* cairo = nullptr;
+  bool lacks_glyphs = false;
+
+  Handle<PangoLayout> LayOut(const FigureStyle& style, const std::string& text, double scale) {
+    Handle<PangoLayout> layout(pango_cairo_create_layout(cairo));
+    LeaveUnhinted(pango_layout_get_context(layout.get()));
+    const Handle<PangoFontDescription> font(pango_font_description_new());
+    pango_font_description_set_family(font.get(), style.font.c_str());
+    pango_font_description_set_size(
+        font.get(), static_cast<int>(std::lround(scale * style.font_pt * PANGO_SCALE)));
+    pango_layout_set_font_description(layout.get(), font.get());
+    pango_layout_set_markup(layout.get(), ToPango(text, scale * style.font_pt).c_str(), -1);
+    lacks_glyphs = lacks_glyphs || pango_layout_get_unknown_glyphs_count(layout.get()) > 0;
+    return layout;
+  }
+};
+
+Canvas::Canvas(const FigureStyle& style) : pen_(std::make_unique<Pen>()), style_(style) {
+  pen_->own_surface.reset(cairo_recording_surface_create(CAIRO_CONTENT_COLOR_ALPHA, nullptr));
+  pen_->own_cairo.reset(cairo_create(pen_->own_surface.get()));
+  pen_->cairo = pen_->own_cairo.get();
+}
+
+Canvas::Canvas(const FigureStyle& style, void* cairo)
+    : pen_(std::make_unique<Pen>()), style_(style) {
+  pen_->cairo = static_cast<cairo_t*>(cairo);
+}
+
+Canvas::~Canvas() = default;
+
+bool Canvas::lacks_glyphs() const { return pen_->lacks_glyphs; }
+
+TextSize Canvas::Measure(const std::string& text, double scale) const {
+  const Handle<PangoLayout> layout = pen_->LayOut(style_, text, scale);
+  int width = 0, height = 0;
+  pango_layout_get_size(layout.get(), &width, &height);
+  return {static_cast<double>(width) / PANGO_SCALE, static_cast<double>(height) / PANGO_SCALE};
+}
+
+void Canvas::Text(const std::string& text, const TextPlace& place, double scale) const {
+  const TextSize size = Measure(text, scale);
+  const Handle<PangoLayout> layout = pen_->LayOut(style_, text, scale);
+  cairo_t* cairo = pen_->cairo;
+  cairo_save(cairo);
+  SetColor(cairo, kInk);
+  cairo_translate(cairo, place.x, place.y);
+  if (place.upwards) cairo_rotate(cairo, -std::numbers::pi / 2);
+  cairo_move_to(cairo, -place.across * size.width, -place.down * size.height);
+  pango_cairo_show_layout(cairo, layout.get());
+  cairo_restore(cairo);
+}
+
+void Canvas::Line(const FigurePoints& points, const std::string& color, double width_pt,
+                  const std::vector<double>& dashes) const {
+  cairo_t* cairo = pen_->cairo;
+  std::vector<double> lengths;
+  lengths.reserve(dashes.size());
+  for (const double length : dashes) lengths.push_back(length * width_pt);
+  cairo_set_dash(cairo, lengths.data(), static_cast<int>(lengths.size()), 0);
+  cairo_set_line_width(cairo, width_pt);
+  cairo_set_line_join(cairo, CAIRO_LINE_JOIN_ROUND);
+  SetColor(cairo, color);
+  bool down = false;
+  FigurePoints alone;  // between gaps: a stroke would not show them
+  for (size_t k = 0; k < points.size(); ++k) {
+    const auto& [x, y] = points[k];
+    const bool next = k + 1 < points.size() && IsFinite(points[k + 1]);
+    if (IsFinite(points[k])) (down ? cairo_line_to : cairo_move_to)(cairo, x, y);
+    if (IsFinite(points[k]) && !down && !next) alone.push_back(points[k]);
+    down = IsFinite(points[k]);
+  }
+  cairo_stroke(cairo);
+  cairo_set_dash(cairo, nullptr, 0, 0);
+  for (const auto& [x, y] : alone) {
+    cairo_arc(cairo, x, y, width_pt, 0, 2 * std::numbers::pi);
+    cairo_fill(cairo);
+  }
+}
+
+void Canvas::Mark(Marker shape, double x, double y, const std::string& color) const {
+  cairo_t* cairo = pen_->cairo;
+  const double r = 0.5 * style_.marker_pt;
+  cairo_new_path(cairo);
+  const auto polygon = [&](const FigurePoints& corners) {
+    for (const auto& [u, v] : corners) cairo_line_to(cairo, x + r * u, y + r * v);
+    cairo_close_path(cairo);
+  };
+  const auto strokes = [&](const FigurePoints& ends) {
+    for (const auto& [u, v] : ends) {
+      cairo_move_to(cairo, x - r * u, y - r * v);
+      cairo_line_to(cairo, x + r * u, y + r * v);
+    }
+  };
+  switch (shape) {
+    case Marker::kCircle:
+      cairo_arc(cairo, x, y, r, 0, 2 * std::numbers::pi);
+      break;
+    case Marker::kSquare:
+      polygon({{-0.9, -0.9}, {0.9, -0.9}, {0.9, 0.9}, {-0.9, 0.9}});
+      break;
+    case Marker::kTriangle:
+      polygon({{0, -1.2}, {1.1, 0.8}, {-1.1, 0.8}});
+      break;
+    case Marker::kDiamond:
+      polygon({{0, -1.3}, {1.1, 0}, {0, 1.3}, {-1.1, 0}});
+      break;
+    case Marker::kCross:
+      strokes({{0.9, 0.9}, {0.9, -0.9}});
+      break;
+    case Marker::kPlus:
+      strokes({{1.1, 0}, {0, 1.1}});
+      break;
+  }
+  if (shape != Marker::kCross && shape != Marker::kPlus) {
+    SetColor(cairo, "#ffffff");
+    cairo_fill_preserve(cairo);
+  }
+  cairo_set_line_width(cairo, 0.75 * style_.line_pt);
+  SetColor(cairo, color);
+  cairo_stroke(cairo);
+}
+
+void Canvas::Box(double x, double y, double width, double height, double width_pt) const {
+  SetColor(pen_->cairo, kInk);
+  cairo_set_line_width(pen_->cairo, width_pt);
+  cairo_set_line_join(pen_->cairo, CAIRO_LINE_JOIN_MITER);
+  cairo_rectangle(pen_->cairo, x, y, width, height);
+  cairo_stroke(pen_->cairo);
+}
+
+void Canvas::Cells(double x, double y, double width, double height, int columns,
+                   const std::vector<Rgb>& cells) const {
+  const int rows = static_cast<int>(cells.size()) / columns;
+  const Handle<cairo_surface_t> image(
+      cairo_image_surface_create(CAIRO_FORMAT_ARGB32, columns, rows));
+  unsigned char* data = cairo_image_surface_get_data(image.get());
+  const int stride = cairo_image_surface_get_stride(image.get());
+  for (size_t k = 0; k < cells.size(); ++k) {
+    const int r = static_cast<int>(k) / columns, c = static_cast<int>(k) % columns;
+    auto* row = reinterpret_cast<std::uint32_t*>(data + static_cast<ptrdiff_t>(r) * stride);
+    const Rgb& rgb = cells[k];
+    row[c] = rgb[0] < 0 ? 0U
+                        : 0xff000000U | static_cast<std::uint32_t>(rgb[0]) << 16U |
+                              static_cast<std::uint32_t>(rgb[1]) << 8U |
+                              static_cast<std::uint32_t>(rgb[2]);
+  }
+  cairo_surface_mark_dirty(image.get());
+  cairo_save(pen_->cairo);
+  cairo_translate(pen_->cairo, x, y);
+  cairo_scale(pen_->cairo, width / columns, height / rows);
+  cairo_set_source_surface(pen_->cairo, image.get(), 0, 0);
+  cairo_pattern_set_filter(cairo_get_source(pen_->cairo), CAIRO_FILTER_NEAREST);
+  cairo_paint(pen_->cairo);
+  cairo_restore(pen_->cairo);
+}
+
+void Canvas::Clipped(double x, double y, double width, double height,
+                     const std::function<void()>& draw) const {
+  cairo_save(pen_->cairo);
+  cairo_rectangle(pen_->cairo, x, y, width, height);
+  cairo_clip(pen_->cairo);
+  draw();
+  cairo_restore(pen_->cairo);
+}
+
+namespace {
+
+std::string DrawVector(bool pdf, const FigureStyle& style, double width, double height,
+                       const std::string& title, const std::function<void(const Canvas&)>& draw) {
+  std::string bytes;
+  const Handle<cairo_surface_t> surface(
+      pdf ? cairo_pdf_surface_create_for_stream(Append, &bytes, width, height)
+          : cairo_svg_surface_create_for_stream(Append, &bytes, width, height));
+  if (pdf) {
+    cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_TITLE, title.c_str());
+    // No date: the bytes follow from the drawing alone.
+    cairo_pdf_surface_set_metadata(surface.get(), CAIRO_PDF_METADATA_CREATE_DATE, "");
+  }
+  const Handle<cairo_t> cairo(cairo_create(surface.get()));
+  draw(Canvas(style, cairo.get()));
+  cairo_surface_finish(surface.get());
+  const cairo_status_t status = cairo_surface_status(surface.get());
+  MBV_DEMAND(status == CAIRO_STATUS_SUCCESS, cairo_status_to_string(status));
+  return pdf ? bytes : Renumbered(bytes);
+}
+
+std::string DrawPixels(const FigureStyle& style, double width, double height,
+                       const std::function<void(const Canvas&)>& draw) {
+  const double scale = style.dpi / kPointsPerInch;
+  const Handle<cairo_surface_t> surface(
+      cairo_image_surface_create(CAIRO_FORMAT_RGB24, static_cast<int>(std::ceil(width * scale)),
+                                 static_cast<int>(std::ceil(height * scale))));
+  const Handle<cairo_t> cairo(cairo_create(surface.get()));
+  MBV_DEMAND(cairo_status(cairo.get()) == CAIRO_STATUS_SUCCESS, width);
+  cairo_set_source_rgb(cairo.get(), 1, 1, 1);
+  cairo_paint(cairo.get());
+  cairo_scale(cairo.get(), scale, scale);
+  draw(Canvas(style, cairo.get()));
+  return PngOf(surface.get());
+}
+
+}  // namespace
+
+std::string DrawPicture(PictureFormat format, const FigureStyle& style, double width, double height,
+                        const std::string& title, const std::function<void(const Canvas&)>& draw) {
+  if (format == PictureFormat::kPng) return DrawPixels(style, width, height, draw);
+  return DrawVector(format == PictureFormat::kPdf, style, width, height, title, draw);
+}
+
+}  // namespace mbv

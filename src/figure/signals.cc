@@ -1,0 +1,74 @@
+#include "figure/signals.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/roles.h"
+
+namespace mbv {
+
+std::vector<const WitnessRecord*> ShownWitnesses(const Report& report) {
+  std::vector<const WitnessRecord*> shown;
+  for (const WitnessRecord& record : report.witnesses) {
+    const Role* role = FindRole(record.name);
+    if (role == nullptr || !IsCompared(*role) || record.trace.time_s.empty()) continue;
+    shown.push_back(&record);
+  }
+  return shown;
+}
+
+const WitnessRecord* LineWitness(const Report& report) {
+  const std::vector<const WitnessRecord*> shown = ShownWitnesses(report);
+  const PairComparison* pair = MainPair(report.comparison);
+  for (const WitnessRecord* record : shown) {
+    if (pair != nullptr && record->name == pair->truth) return record;
+  }
+  return shown.empty() ? nullptr : shown.front();
+}
+
+FigurePoints Scaled(const PlotPoints& points, const ShownUnit& x, const ShownUnit& y) {
+  FigurePoints scaled;
+  scaled.reserve(points.size());
+  for (const auto& [u, v] : points) scaled.emplace_back(x.factor * u, y.factor * v);
+  return scaled;
+}
+
+PlotPoints Envelope(const PlotPoints& points, size_t spans) {
+  if (points.size() <= spans) return points;
+  PlotPoints upper;
+  const size_t span = (points.size() + spans - 1) / spans;
+  for (size_t from = 0; from < points.size(); from += span) {
+    std::pair<double, double> largest = points[from];
+    for (size_t i = from; i < std::min(from + span, points.size()); ++i) {
+      if (!(points[i].second <= largest.second)) largest = points[i];
+    }
+    upper.push_back(largest);
+  }
+  return upper;
+}
+
+FigurePoints SomeOf(const FigurePoints& points, double shift) {
+  FigurePoints some;
+  const double step = static_cast<double>(points.size()) / static_cast<double>(kMarksAlong);
+  for (size_t k = 0; k < kMarksAlong; ++k) {
+    const auto at = static_cast<size_t>((static_cast<double>(k) + shift) * step);
+    if (at < points.size() && (some.empty() || some.back() != points[at])) {
+      some.push_back(points[at]);
+    }
+  }
+  return some;
+}
+
+double LargestOf(const Report& report, const std::string& channel) {
+  double largest = 0.0;
+  for (const WitnessRecord* record : ShownWitnesses(report)) {
+    const int column = record->trace.Find(channel);
+    if (column < 0) continue;
+    for (const double value : record->trace.values.col(column)) {
+      if (std::isfinite(value)) largest = std::max(largest, std::abs(value));
+    }
+  }
+  return largest;
+}
+
+}  // namespace mbv

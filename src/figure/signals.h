@@ -1,0 +1,34 @@
+// Curves of figures from the traces of a run.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "figure/figure.h"
+#include "figure/units.h"
+#include "report/plot_points.h"
+#include "report/report.h"
+
+namespace mbv {
+
+/// More points than a printer shows across a column are thinned; extremes are kept.
+inline constexpr size_t kFigureBins = 1000;
+/// Markers along one curve.
+inline constexpr size_t kMarksAlong = 11;
+
+/// Witnesses that ran and take part in the comparison, in the order in which they ran.
+[[nodiscard]] std::vector<const WitnessRecord*> ShownWitnesses(const Report& report);
+/// The one whose curves are lines: the main pair's truth, else the first that ran; null if none.
+[[nodiscard]] const WitnessRecord* LineWitness(const Report& report);
+
+/// Times in the x unit and values in the y unit.
+[[nodiscard]] FigurePoints Scaled(const PlotPoints& points, const ShownUnit& x, const ShownUnit& y);
+/// The largest value of each of so many spans, at its time.
+[[nodiscard]] PlotPoints Envelope(const PlotPoints& points, size_t spans);
+/// Some of the points, spread evenly; `shift` (0 … 1) of a spacing later than the first.
+[[nodiscard]] FigurePoints SomeOf(const FigurePoints& points, double shift);
+
+/// The largest magnitude of a channel among the witnesses that record it; 0 without one.
+[[nodiscard]] double LargestOf(const Report& report, const std::string& channel);
+
+}  // namespace mbv

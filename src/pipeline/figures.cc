@@ -1,0 +1,128 @@
+#include "pipeline/figures.h"
+
+#include <fmt/format.h>
+
+#include "core/text.h"
+#include "core/word_hints.h"
+#include "figure/default_figures.h"
+#include "figure/draw.h"
+#include "figure/from_plot.h"
+#include "pipeline/run_scenario.h"
+#include "pipeline/stiffness_map.h"
+
+namespace mbv {
+namespace {
+
+struct FigureFormatRow {
+  const char* word;
+  PictureFormat format;
+};
+constexpr std::array<FigureFormatRow, 3> kFigureFormats = {
+    {{"pdf", PictureFormat::kPdf}, {"svg", PictureFormat::kSvg}, {"png", PictureFormat::kPng}}};
+
+// Figures of a scenario before they are drawn.
+class FigureSource {
+ public:
+  FigureSource(const std::string& file, const FigureOptions& options, FigureOutcome* outcome)
+      : file_(file), options_(options), outcome_(outcome) {}
+
+  FigureSet OfMotion() {
+    RunOptions run;
+    run.scenario = options_.scenario;
+    run.pictures = run.page = false;
+    run.progress = options_.progress;
+    const RunOutcome ran = RunScenario(file_, run);
+    outcome_->exit_code = ran.exit_code;
+    outcome_->diagnostics = ran.diagnostics;
+    if (!ran.report) return {};
+    outcome_->mechanism = ran.report->mechanism;
+    outcome_->scenario = ran.report->scenario;
+    outcome_->verdict = ToText(ran.report->comparison.verdict);
+    return DefaultFigures(*ran.report, options_.language);
+  }
+
+  FigureSet OfStiffness() {
+    FigureSet set;
+    outcome_->exit_code = 2;
+    const auto prepared = PrepareStiffnessFile(file_, options_.scenario, &outcome_->diagnostics);
+    if (!prepared) return set;
+    outcome_->exit_code = 0;
+    outcome_->mechanism = prepared->base.name;
+    outcome_->scenario = prepared->scenario.name;
+    const std::vector<std::string> maps = UsualMaps(prepared->base.name);
+    if (maps.empty()) {
+      set.left_out.push_back(prepared->base.name +
+                             " has no usual maps; mbverify stiffness --map draws any");
+    }
+    for (const std::string& text : maps) AddMap(*prepared, text, &set);
+    return set;
+  }
+
+ private:
+  void AddMap(const PreparedStiffness& prepared, const std::string& text, FigureSet* set) {
+    const auto map = ParseMap(text, prepared, &outcome_->diagnostics);
+    if (!map) return;
+    const MapResult result = ComputeMap(prepared, *map, options_.progress);
+    for (const auto& [name, plot] :
+         MapPlots(*map, result, prepared.base.name, {}, &outcome_->diagnostics)) {
+      set->figures.push_back(FromPlot("map_" + name, plot));
+    }
+  }
+
+  const std::string& file_;
+  const FigureOptions& options_;
+  FigureOutcome* outcome_;
+};
+
+// Those that are wanted; a name that is none of them is bad input.
+void KeepOnly(const std::vector<std::string>& only, FigureSet* set, FigureOutcome* outcome) {
+  std::vector<std::string> names;
+  for (const Figure& figure : set->figures) names.push_back(figure.name);
+  for (const std::string& name : only) {
+    if (Contains(names, name)) continue;
+    outcome->diagnostics.AddError(
+        "--only " + Printable(name), "there is no such figure",
+        DidYouMean(name, names, names.empty() ? "" : "figures: " + Joined(names)));
+    outcome->exit_code = 2;
+  }
+  if (only.empty()) return;
+  std::erase_if(set->figures, [&](const Figure& figure) { return !Contains(only, figure.name); });
+}
+
+void Draw(const Figure& figure, const FigureOptions& options, FigureOutcome* outcome) {
+  if (LacksGlyphs(figure, options.style)) {
+    Finding finding;
+    finding.severity = Severity::kWarning;
+    finding.message = fmt::format("{}: no font here has all its characters", figure.name);
+    finding.hint = "for Chinese install the Debian package fonts-noto-cjk";
+    outcome->diagnostics.Add(std::move(finding));
+  }
+  MadeFigure made{figure, {}};
+  for (const FigureFormatRow& row : kFigureFormats) {
+    if (!Contains(options.formats, row.word)) continue;
+    made.files.push_back(figure.name + "." + row.word);
+    outcome->files.emplace_back(made.files.back(), DrawFigure(figure, options.style, row.format));
+  }
+  outcome->figures.push_back(std::move(made));
+}
+
+}  // namespace
+
+const std::vector<std::string>& FigureFormats() {
+  static const std::vector<std::string> words = {"pdf", "svg", "png"};
+  return words;
+}
+
+FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options) {
+  FigureOutcome outcome;
+  FigureSource source(file, options, &outcome);
+  FigureSet set = ReadScenarioHead(file).is_stiffness() ? source.OfStiffness() : source.OfMotion();
+  if (outcome.diagnostics.has_errors()) return outcome;
+  KeepOnly(options.only, &set, &outcome);
+  if (outcome.diagnostics.has_errors()) return outcome;
+  for (const Figure& figure : set.figures) Draw(figure, options, &outcome);
+  outcome.left_out = std::move(set.left_out);
+  return outcome;
+}
+
+}  // namespace mbv

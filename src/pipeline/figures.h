@@ -1,0 +1,47 @@
+// Figures for papers of a scenario: what it is run for, as files.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "figure/figure.h"
+#include "figure/style.h"
+#include "figure/words.h"
+#include "pipeline/run_options.h"
+
+namespace mbv {
+
+struct FigureOptions {
+  ScenarioOptions scenario;
+  FigureStyle style = FigureStyles().front();
+  Language language = Language::kEnglish;
+  std::vector<std::string> formats = {"pdf"};  ///< words of FigureFormats()
+  std::vector<std::string> only;               ///< names of figures; empty: all
+  ProgressFunction progress;
+};
+
+/// "pdf", "svg", "png".
+[[nodiscard]] const std::vector<std::string>& FigureFormats();
+
+/// A figure and the names of its files.
+struct MadeFigure {
+  Figure figure;
+  std::vector<std::string> files;
+};
+
+struct FigureOutcome {
+  int exit_code = 4;  ///< of the run: a disagreement is drawn, too
+  Diagnostics diagnostics;
+  std::string mechanism, scenario, verdict;  ///< verdict: of a motion; else ""
+  std::vector<MadeFigure> figures;
+  std::vector<std::string> left_out;                       ///< sentences
+  std::vector<std::pair<std::string, std::string>> files;  ///< name, content
+};
+
+/// Runs a motion (RunScenario()) and draws its usual figures; of a stiffness, its mechanism's usual
+/// maps. Findings are bad input.
+[[nodiscard]] FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options);
+
+}  // namespace mbv

@@ -1,0 +1,46 @@
+// Axes and colours that every plot shares, whatever draws it.
+#pragma once
+
+#include <array>
+#include <limits>
+#include <vector>
+
+namespace mbv {
+
+/// Colour-blind safe line colours (Okabe and Ito), "#rrggbb".
+inline constexpr std::array<const char*, 8> kLineColors = {
+    "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#888888"};
+
+/// Red, green, blue: 0 … 255.
+using Rgb = std::array<int, 3>;
+/// Dark blue over green to yellow (a short version of viridis) for 0 … 1: ever brighter.
+[[nodiscard]] Rgb MapColor(double t);
+
+/// The range of an axis, and where it lies on paper or screen.
+struct PlotAxis {
+  /// Logarithms to base 10 of what is shown, on a logarithmic axis.
+  double low = std::numeric_limits<double>::infinity();
+  double high = -std::numeric_limits<double>::infinity();
+  bool log = false;
+  double from_px = 0, to_px = 1;
+
+  /// False of what is not finite, and on a logarithmic axis of what is not positive.
+  [[nodiscard]] bool Shows(double v) const;
+  [[nodiscard]] double Inner(double v) const;
+  /// Widens the range to a value that can be shown.
+  void Add(double v);
+  /// Leaves room at both ends; an empty range becomes 0 … 1.
+  void Pad();
+  [[nodiscard]] double Px(double v) const;
+  /// Round values inside the range: decades (with their doubles and fivefolds where they are few),
+  /// or steps of 1, 2 or 5 times a power of ten, about `wanted` of them.
+  [[nodiscard]] std::vector<double> Ticks(int wanted = 6) const;
+
+ private:
+  [[nodiscard]] std::vector<double> Decades(int wanted) const;
+};
+
+/// Widens the axis whose unit would be longer, so that both have one scale.
+void EqualScale(PlotAxis* x, PlotAxis* y);
+
+}  // namespace mbv

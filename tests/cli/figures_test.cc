@@ -1,0 +1,56 @@
+// The command figures.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "tests/cli/program.h"
+
+namespace mbv {
+namespace {
+
+TEST(FiguresCommand, WritesAFolderAndNothingElse) {
+  const Program mbverify("figures");
+  const std::string folder = mbverify.Out() + "/four_bar/turn_inverse/";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder + "notes.txt") << "mine";
+  const ProgramResult run = mbverify(
+      "figures scenarios/four_bar/turn_inverse.yaml --formats svg,png --only drive_torques "
+      "--json - --out " +
+      mbverify.Out());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("\"files\": [\n            \"drive_torques.svg\","), std::string::npos)
+      << run.out;
+  EXPECT_TRUE(std::filesystem::exists(folder + "drive_torques.svg"));
+  EXPECT_TRUE(std::filesystem::exists(folder + "drive_torques.png"));
+  EXPECT_FALSE(std::filesystem::exists(folder + "drive_angles.svg"));
+  EXPECT_TRUE(std::filesystem::exists(folder + "notes.txt"));
+}
+
+TEST(FiguresCommand, AForeignFileOfThatNameIsNotTouched) {
+  const Program mbverify("figures_foreign");
+  const std::string folder = mbverify.Out() + "/four_bar/turn_inverse/";
+  std::filesystem::create_directories(folder);
+  std::ofstream(folder + "drive_torques.svg") << "mine";
+  const ProgramResult run = mbverify(
+      "figures scenarios/four_bar/turn_inverse.yaml --formats svg --only drive_torques --out " +
+      mbverify.Out());
+  EXPECT_EQ(run.exit_code, 2);
+  std::string text;
+  std::ifstream(folder + "drive_torques.svg") >> text;
+  EXPECT_EQ(text, "mine");
+}
+
+TEST(FiguresCommand, BadOptionsAreRefused) {
+  const Program mbverify("figures_bad");
+  for (const char* options : {"--style iee", "--lang fr", "--formats pdf,doc", "--width-mm 2",
+                              "--font-pt -1", "--only drive_torque"}) {
+    const ProgramResult run = mbverify("figures scenarios/four_bar/turn_inverse.yaml --out " +
+                                       mbverify.Out() + " " + options);
+    EXPECT_EQ(run.exit_code, 2) << options;
+    EXPECT_FALSE(run.err.empty()) << options;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
