@@ -10,6 +10,7 @@
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "figure/style.h"
+#include "figure/style_file.h"
 #include "figure/words.h"
 #include "pipeline/figures.h"
 
@@ -23,10 +24,21 @@ struct FiguresArguments {
   JsonOption json;
 };
 
-constexpr double kNarrowestMm = 30, kWidestMm = 500, kSmallestPt = 4, kLargestPt = 40;
+// A style by its name, or from a file; false after saying what is wrong with it.
+bool ReadStyle(const std::string& name, FigureStyle* style) {
+  if (const FigureStyle* known = FindFigureStyle(name)) {
+    *style = *known;
+    return true;
+  }
+  Diagnostics diagnostics;
+  const auto loaded = LoadFigureStyle(name, &diagnostics);
+  SayText(stderr, diagnostics.Text());
+  if (loaded) *style = *loaded;
+  return loaded.has_value();
+}
 
 bool MakeFigureOptions(const FiguresArguments& arguments, FigureOptions* options) {
-  options->style = *FindFigureStyle(arguments.style);
+  if (!ReadStyle(arguments.style, &options->style)) return false;
   if (arguments.width_mm > 0) options->style.width_mm = arguments.width_mm;
   if (arguments.font_pt > 0) options->style.font_pt = arguments.font_pt;
   options->language = LanguageOf(arguments.language);
@@ -105,14 +117,31 @@ int Figures(const FiguresArguments& arguments) {
     exit_code = WorseExit(exit_code, outcome.exit_code);
     results.push_back(OutcomeJson(file, outcome, folder));
   }
-  return WorseExit(exit_code, arguments.json.Write(
-                                  {{"exit_code", exit_code}, {"results", std::move(results)}}, {}));
+  return WorseExit(exit_code,
+                   arguments.json.Write({{"exit_code", exit_code}, {"results", std::move(results)}},
+                                        {{arguments.style, ""}}));
+}
+
+// What a style file may say, an option may.
+CLI::Validator InRangeOf(const std::string& key) {
+  for (const StyleRange& range : StyleRanges()) {
+    if (key == range.key) return CLI::Range(range.least, range.most);
+  }
+  return {};
 }
 
 std::vector<std::string> StyleNames() {
   std::vector<std::string> names;
   for (const FigureStyle& style : FigureStyles()) names.push_back(style.name);
   return names;
+}
+
+// One of the names, or a file of the user's.
+CLI::Validator StyleOrFile() {
+  const CLI::Validator names = OneOf(StyleNames());
+  return CLI::Validator(
+      [names](std::string& text) { return text.ends_with(".yaml") ? "" : names(text); },
+      "one of " + Joined(StyleNames()));
 }
 
 }  // namespace
@@ -123,8 +152,10 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
       "figures", "Figures for a paper: forces, motion, reactions, power, maps of stiffness");
   figures->add_option("scenario", arguments->scenarios, "scenario files or folders of them")
       ->required();
-  figures->add_option("--style", arguments->style, "column width and fonts of")
-      ->check(OneOf(StyleNames()))
+  figures
+      ->add_option("--style", arguments->style,
+                   "column width, fonts and lines of a journal; or a style FILE.yaml")
+      ->check(StyleOrFile())
       ->capture_default_str();
   figures->add_option("--lang", arguments->language, "language of axes and legends")
       ->check(OneOf(LanguageCodes()))
@@ -136,9 +167,9 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
   figures->add_option("--only", arguments->only, "names of the figures that are wanted")
       ->delimiter(',');
   figures->add_option("--width-mm", arguments->width_mm, "instead of the style's width")
-      ->check(CLI::Range(kNarrowestMm, kWidestMm));
+      ->check(InRangeOf("width_mm"));
   figures->add_option("--font-pt", arguments->font_pt, "instead of the style's size of texts")
-      ->check(CLI::Range(kSmallestPt, kLargestPt));
+      ->check(InRangeOf("font_pt"));
   figures->add_option("--out", arguments->out, "folder for the figures")->capture_default_str();
   arguments->json.AddTo(figures);
   figures
@@ -148,7 +179,7 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
   SetFooter(figures,
             {"figures scenarios/stabilizing_platform/sea_state.yaml",
              "figures stewart/wave --style springer --lang de --only drive_forces",
-             "figures scara_robot/stiffness --formats pdf,png --width-mm 120"},
+             "figures scara_robot/stiffness --formats pdf,pgf --width-mm 120"},
             "0 agree, 1 disagree (drawn all the same), 2 bad input, 3 could not run, 4 internal "
             "error");
   figures->callback([arguments, exit_code] { *exit_code = Figures(*arguments); });

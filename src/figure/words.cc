@@ -17,7 +17,7 @@ constexpr std::array<Translations, static_cast<size_t>(FigureWord::kCount_)> kWo
     {"Drive torque", "驱动力矩", "Antriebsmoment"},
     {"Drive position", "驱动位移", "Antriebsweg"},
     {"Drive angle", "驱动转角", "Antriebswinkel"},
-    {"Drive speed", "驱动速度", "Antriebsgeschwindigkeit"},
+    {"Drive speed", "驱动速度", "Geschwindigkeit"},
     {"Drive speed", "驱动角速度", "Winkelgeschwindigkeit"},
     {"Joint force", "关节力", "Gelenkkraft"},
     {"Joint moment", "关节力矩", "Gelenkmoment"},

@@ -7,6 +7,7 @@
 #include "figure/default_figures.h"
 #include "figure/draw.h"
 #include "figure/from_plot.h"
+#include "figure/pgf.h"
 #include "pipeline/run_scenario.h"
 #include "pipeline/stiffness_map.h"
 
@@ -19,6 +20,8 @@ struct FigureFormatRow {
 };
 constexpr std::array<FigureFormatRow, 3> kFigureFormats = {
     {{"pdf", PictureFormat::kPdf}, {"svg", PictureFormat::kSvg}, {"png", PictureFormat::kPng}}};
+
+constexpr const char* kPgf = "pgf";
 
 // Figures of a scenario before they are drawn.
 class FigureSource {
@@ -98,10 +101,16 @@ void Draw(const Figure& figure, const FigureOptions& options, FigureOutcome* out
     outcome->diagnostics.Add(std::move(finding));
   }
   MadeFigure made{figure, {}};
+  const auto add = [&](const std::string& name, std::string content) {
+    made.files.push_back(name);
+    outcome->files.emplace_back(name, std::move(content));
+  };
   for (const FigureFormatRow& row : kFigureFormats) {
     if (!Contains(options.formats, row.word)) continue;
-    made.files.push_back(figure.name + "." + row.word);
-    outcome->files.emplace_back(made.files.back(), DrawFigure(figure, options.style, row.format));
+    add(figure.name + "." + row.word, DrawFigure(figure, options.style, row.format));
+  }
+  if (Contains(options.formats, kPgf)) {
+    for (auto& [name, content] : PgfFiles(figure, options.style)) add(name, std::move(content));
   }
   outcome->figures.push_back(std::move(made));
 }
@@ -109,7 +118,7 @@ void Draw(const Figure& figure, const FigureOptions& options, FigureOutcome* out
 }  // namespace
 
 const std::vector<std::string>& FigureFormats() {
-  static const std::vector<std::string> words = {"pdf", "svg", "png"};
+  static const std::vector<std::string> words = {"pdf", "svg", "png", kPgf};
   return words;
 }
 

@@ -22,7 +22,7 @@ struct FigureOptions {
   ProgressFunction progress;
 };
 
-/// "pdf", "svg", "png".
+/// "pdf", "svg", "png", "pgf" (source for TeX with its data).
 [[nodiscard]] const std::vector<std::string>& FigureFormats();
 
 /// A figure and the names of its files.
