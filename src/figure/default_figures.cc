@@ -6,7 +6,6 @@
 #include <cmath>
 #include <functional>
 
-#include "comparison/force_band.h"
 #include "figure/markup.h"
 #include "figure/signals.h"
 #include "figure/units.h"
@@ -77,58 +76,13 @@ class FigureMaker {
   // A quantity of drives over time: lines of one witness, markers of the others.
   FigurePanel DrivePanel(Quantity quantity, const std::vector<std::string>& drives,
                          const ShownUnit& unit, bool legend) const {
-    FigurePanel panel;
-    panel.x = TimeAxis();
-    const std::vector<const WitnessRecord*> shown = ShownWitnesses(report_);
-    for (size_t d = 0; d < drives.size(); ++d)
-      AddLine(quantity, drives[d], d, unit, legend, &panel);
-    for (size_t w = 0, m = 0; w < shown.size(); ++w) {
-      if (shown[w] == line_) continue;
-      AddMarks(*shown[w], quantity, drives, unit, static_cast<int>(m++), &panel);
+    FigurePanel panel{.x = TimeAxis()};
+    std::vector<SignalRow> rows;
+    for (const std::string& drive : drives) {
+      rows.push_back({ChannelName(quantity, drive), Verbatim(drive)});
     }
-    if (legend) AddWitnesses(shown, &panel);
+    AddOverTime(rows, ShownWitnesses(report_), line_, {time_, unit, language_, legend}, &panel);
     return panel;
-  }
-
-  void AddLine(Quantity quantity, const std::string& drive, size_t look, const ShownUnit& unit,
-               bool legend, FigurePanel* panel) const {
-    const int column = line_->trace.Find(quantity, drive);
-    if (column < 0) return;
-    const ForceSignal signal(line_->trace, column);
-    const PlotPoints points = Thinned(ValuesOf(line_->trace, signal), kFigureBins);
-    panel->curves.push_back({.label = legend ? Verbatim(drive) : "",
-                             .points = Scaled(points, time_, unit),
-                             .look = static_cast<int>(look)});
-    const PlotPoints strokes = StrokesOf(line_->trace, signal);
-    if (strokes.empty()) return;
-    panel->curves.push_back(
-        {.points = Scaled(strokes, time_, unit), .look = static_cast<int>(look)});
-  }
-
-  void AddMarks(const WitnessRecord& witness, Quantity quantity,
-                const std::vector<std::string>& drives, const ShownUnit& unit, int marker,
-                FigurePanel* panel) const {
-    for (size_t d = 0; d < drives.size(); ++d) {
-      const int column = witness.trace.Find(quantity, drives[d]);
-      if (column < 0) continue;
-      const PlotPoints points = ValuesOf(witness.trace, ForceSignal(witness.trace, column));
-      panel->curves.push_back({.points = SomeOf(Scaled(points, time_, unit), 0.3 + 0.4 * marker),
-                               .look = static_cast<int>(d),
-                               .line = false,
-                               .marker = marker});
-    }
-  }
-
-  // Rows of the legend that say who is a line and who are markers, in black.
-  void AddWitnesses(const std::vector<const WitnessRecord*>& shown, FigurePanel* panel) const {
-    int marker = 0;
-    for (const WitnessRecord* witness : shown) {
-      const bool line = witness == line_;
-      panel->curves.push_back({.label = SayWitness(witness->name, language_),
-                               .look = kBlackLook,
-                               .line = line,
-                               .marker = line ? -1 : marker++});
-    }
   }
 
   // |difference| of all drives together, for each pair that was compared.
@@ -393,9 +347,6 @@ class FigureMaker {
                               turns ? "*τ*" : "*F*", y.shown);
     set_.figures.push_back({.name = name, .panels = {std::move(panel)}});
   }
-
-  static constexpr int kBlackLook = -1;
-  static constexpr size_t kDifferenceSpans = 120;  // noise: how large it becomes is what counts
 
   const Report& report_;
   const Language language_;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/force_band.h"
 #include "core/roles.h"
 
 namespace mbv {
@@ -69,6 +70,79 @@ double LargestOf(const Report& report, const std::string& channel) {
     }
   }
   return largest;
+}
+
+namespace {
+
+constexpr int kBlackLook = -1;
+constexpr double kFirstMark = 0.3, kNextMark = 0.4;  // of a spacing: no two witnesses' marks meet
+
+class OverTimePainter {
+ public:
+  OverTimePainter(const OverTimeOptions& options, FigurePanel* panel)
+      : options_(options), panel_(*panel) {}
+
+  void Line(const Trace& trace, const SignalRow& row, int look) {
+    const int column = trace.Find(row.channel);
+    if (column < 0) return;
+    const ForceSignal signal(trace, column);
+    panel_.curves.push_back({.label = options_.legend ? row.label : "",
+                             .points = Placed(Thinned(ValuesOf(trace, signal), kFigureBins)),
+                             .look = look});
+    const PlotPoints strokes = StrokesOf(trace, signal);
+    if (!strokes.empty()) panel_.curves.push_back({.points = Placed(strokes), .look = look});
+  }
+
+  void Marks(const Trace& trace, const SignalRow& row, int look, int marker) {
+    const int column = trace.Find(row.channel);
+    if (column < 0) return;
+    const FigurePoints points = Placed(ValuesOf(trace, ForceSignal(trace, column)));
+    panel_.curves.push_back({.points = SomeOf(points, kFirstMark + kNextMark * marker),
+                             .look = look,
+                             .line = false,
+                             .marker = marker});
+  }
+
+  // A row of the legend alone.
+  void Name(const WitnessRecord& witness, int marker) {
+    if (!options_.legend) return;
+    panel_.curves.push_back({.label = SayWitness(witness.name, options_.language),
+                             .look = kBlackLook,
+                             .line = marker < 0,
+                             .marker = marker});
+  }
+
+ private:
+  [[nodiscard]] FigurePoints Placed(const PlotPoints& points) const {
+    return Scaled(points, options_.time, options_.unit);
+  }
+
+  const OverTimeOptions& options_;
+  FigurePanel& panel_;
+};
+
+}  // namespace
+
+void AddOverTime(const std::vector<SignalRow>& rows,
+                 const std::vector<const WitnessRecord*>& witnesses, const WitnessRecord* line,
+                 const OverTimeOptions& options, FigurePanel* panel) {
+  if (line == nullptr) return;
+  OverTimePainter painter(options, panel);
+  for (size_t k = 0; k < rows.size(); ++k) {
+    painter.Line(line->trace, rows[k], static_cast<int>(k));
+  }
+  int marker = 0;
+  for (const WitnessRecord* witness : witnesses) {
+    if (witness == line) continue;
+    for (size_t k = 0; k < rows.size(); ++k) {
+      painter.Marks(witness->trace, rows[k], static_cast<int>(k), marker);
+    }
+    ++marker;
+  }
+  marker = 0;
+  for (const WitnessRecord* witness : witnesses) {
+    painter.Name(*witness, witness == line ? -1 : marker++);
+  }
 }
 
 }  // namespace mbv

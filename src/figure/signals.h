@@ -6,6 +6,7 @@
 
 #include "figure/figure.h"
 #include "figure/units.h"
+#include "figure/words.h"
 #include "report/plot_points.h"
 #include "report/report.h"
 
@@ -13,6 +14,8 @@ namespace mbv {
 
 /// More points than a printer shows across a column are thinned; extremes are kept.
 inline constexpr size_t kFigureBins = 1000;
+/// Spans of differences on a logarithmic scale, of which the largest are shown.
+inline constexpr size_t kDifferenceSpans = 120;
 /// Markers along one curve.
 inline constexpr size_t kMarksAlong = 11;
 
@@ -30,5 +33,20 @@ inline constexpr size_t kMarksAlong = 11;
 
 /// The largest magnitude of a channel among the witnesses that record it; 0 without one.
 [[nodiscard]] double LargestOf(const Report& report, const std::string& channel);
+
+/// A signal of a panel, and its row of the legend (markup).
+struct SignalRow {
+  std::string channel, label;
+};
+struct OverTimeOptions {
+  ShownUnit time, unit;
+  Language language = Language::kEnglish;
+  bool legend = true;
+};
+/// Signals over time: of one witness as lines, of the others as markers at some samples; where
+/// friction at rest leaves a force open, a stroke from end to end. The legend says who is what.
+void AddOverTime(const std::vector<SignalRow>& rows,
+                 const std::vector<const WitnessRecord*>& witnesses, const WitnessRecord* line,
+                 const OverTimeOptions& options, FigurePanel* panel);
 
 }  // namespace mbv

@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "core/text.h"
 #include "core/word_hints.h"
+#include "figure/compose.h"
 #include "figure/default_figures.h"
 #include "figure/draw.h"
 #include "figure/from_plot.h"
@@ -41,7 +44,7 @@ class FigureSource {
     outcome_->mechanism = ran.report->mechanism;
     outcome_->scenario = ran.report->scenario;
     outcome_->verdict = ToText(ran.report->comparison.verdict);
-    return DefaultFigures(*ran.report, options_.language);
+    return WithUsual(ComposeFigures(ran.figures, *ran.report, options_.language), *ran.report);
   }
 
   FigureSet OfStiffness() {
@@ -62,6 +65,19 @@ class FigureSource {
   }
 
  private:
+  // The scenario's own figures, then the usual ones; of two of one name the own one.
+  FigureSet WithUsual(FigureSet set, const Report& report) const {
+    FigureSet usual = DefaultFigures(report, options_.language);
+    const size_t own = set.figures.size();
+    for (Figure& figure : usual.figures) {
+      const bool replaced = std::any_of(set.figures.begin(), set.figures.begin() + own,
+                                        [&](const Figure& f) { return f.name == figure.name; });
+      if (!replaced) set.figures.push_back(std::move(figure));
+    }
+    set.left_out.insert(set.left_out.end(), usual.left_out.begin(), usual.left_out.end());
+    return set;
+  }
+
   void AddMap(const PreparedStiffness& prepared, const std::string& text, FigureSet* set) {
     const auto map = ParseMap(text, prepared, &outcome_->diagnostics);
     if (!map) return;

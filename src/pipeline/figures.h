@@ -40,7 +40,8 @@ struct FigureOutcome {
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
 };
 
-/// Runs a motion (RunScenario()) and draws its usual figures; of a stiffness, its mechanism's usual
+/// Runs a motion (RunScenario()) and draws the figures that its scenario composes, and the usual
+/// ones; of a stiffness, its mechanism's usual
 /// maps. Findings are bad input.
 [[nodiscard]] FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options);
 

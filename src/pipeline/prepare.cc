@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include "core/text.h"
+#include "figure/check_figures.h"
+#include "mechanism/channels.h"
 #include "model_file/load_model.h"
 #include "pipeline/drive_sources.h"
 
@@ -35,6 +37,26 @@ WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base
   return {load(scenario.analytic.parameters, role::kAnalytic),
           load(scenario.reference.parameters, role::kReference),
           load(scenario.simulation.parameters, role::kSimulated)};
+}
+
+// Every channel that some witness may record.
+std::vector<Channel> RecordableChannels(const Prepared& prepared) {
+  const Mechanism& mechanism = prepared.base;
+  std::vector<Channel> channels;
+  const auto add = [&](const std::vector<Channel>& more) {
+    channels.insert(channels.end(), more.begin(), more.end());
+  };
+  add(DriveChannels(mechanism));
+  add(OutputChannels(mechanism));
+  for (const Output& output : mechanism.outputs) add(OutputRateChannels(mechanism, output));
+  add(PrescribedChannels(mechanism));
+  add(BandChannels(mechanism));
+  for (const Joint& joint : mechanism.joints) add(ReactionChannels(joint));
+  add(AuditChannels());
+  add(EnergyChannels());
+  add(WorkChannels(mechanism));
+  if (prepared.has_closed_form()) add(prepared.closed_form.closed_form->extra_channels());
+  return channels;
 }
 
 }  // namespace
@@ -114,6 +136,7 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
     finding.hint = "set reference: on";
     diagnostics->Add(std::move(finding));
   }
+  CheckFigures(prepared.scenario.figures, RecordableChannels(prepared), file, diagnostics);
   if (diagnostics->has_errors()) return {};
   return prepared;
 }

@@ -5,10 +5,12 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/diagnostics.h"
 #include "pipeline/progress.h"
 #include "report/report.h"
+#include "scenario/figure_spec.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {
@@ -35,6 +37,7 @@ struct RunOutcome {
   Diagnostics diagnostics;       ///< bad input and warnings
   std::optional<Report> report;  ///< of a motion; empty after bad input
   std::shared_ptr<const StiffnessReport> stiffness;  ///< of a stiffness; null after bad input
+  std::vector<FigureSpec> figures;                   ///< that the scenario of a motion composes
   std::string folder;                                ///< what was written; "" if nothing
 };
 

@@ -41,6 +41,7 @@ class ScenarioRun {
     const auto start = std::chrono::steady_clock::now();
     prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics);
     if (!prepared_) return BadInput();
+    outcome_.figures = scenario().figures;
     Describe();
     RunWitnesses();
     if (outcome_.diagnostics.has_errors()) return BadInput();

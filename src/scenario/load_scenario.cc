@@ -10,6 +10,7 @@
 #include "kinematics/mobility_report.h"
 #include "mechanism/channel_count.h"
 #include "model_file/load_model.h"
+#include "scenario/figures_reader.h"
 #include "scenario/file_parts.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
@@ -28,7 +29,7 @@ constexpr double kMostValues = 1e7;  // of one witness: 80 MB
 const std::vector<std::string> kMotionScenarioKeys = {
     "kind",       "mechanism", "description", "parameters", "gravity",
     "motion",     "loads",     "forces",      "analytic",   "reference",
-    "simulation", "checks",    "snapshots",   "expect",     "witnesses"};
+    "simulation", "checks",    "snapshots",   "expect",     "witnesses", "figures"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
@@ -65,6 +66,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     scenario_.checks = ReadChecks(&values_, map.Find("checks"), mechanism_ ? &*mechanism_ : nullptr,
                                   &scenario_.start_window_s);
     scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
+    scenario_.figures = ReadFigures(&values_, map.Find("figures"));
     if (!mechanism_) return;
     UsePlainNames();
     const MotionTimes times = ReadTable(map.Find("reference"));

@@ -15,6 +15,7 @@
 #include "input/overrides.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
+#include "scenario/figure_spec.h"
 
 namespace mbv {
 
@@ -128,6 +129,7 @@ struct Scenario {
   CheckLimits checks;
   SnapshotSettings snapshots;
   Expectation expect;
+  std::vector<FigureSpec> figures;  ///< that its author composes
 };
 
 /// The sum of two override sets; `over` wins.

@@ -1,0 +1,14 @@
+// Reads `figures:` of a scenario. Channels, units and witnesses are checked where their names are
+// known (figure/check_figures.h).
+#pragma once
+
+#include <vector>
+
+#include "input/value_reader.h"
+#include "scenario/figure_spec.h"
+
+namespace mbv {
+
+[[nodiscard]] std::vector<FigureSpec> ReadFigures(ValueReader* values, const YamlNode* node);
+
+}  // namespace mbv
