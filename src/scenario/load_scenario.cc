@@ -27,9 +27,9 @@ namespace fs = std::filesystem;
 constexpr double kMostValues = 1e7;  // of one witness: 80 MB
 
 const std::vector<std::string> kMotionScenarioKeys = {
-    "kind",       "mechanism", "description", "parameters", "gravity",
-    "motion",     "loads",     "forces",      "analytic",   "reference",
-    "simulation", "checks",    "snapshots",   "expect",     "witnesses", "figures"};
+    "kind",      "mechanism", "description", "parameters", "gravity",    "motion",
+    "loads",     "forces",    "analytic",    "reference",  "simulation", "checks",
+    "snapshots", "expect",    "witnesses",   "figures"};
 
 std::string JoinWords(std::vector<std::string> words) {
   constexpr size_t kMost = 8;
