@@ -14,13 +14,14 @@ constexpr size_t kShownWords = 12;  // of a hint
 
 class FigureChecker {
  public:
-  FigureChecker(const std::vector<Channel>& known, const std::string& file,
-                Diagnostics* diagnostics)
+  FigureChecker(const std::vector<Channel>& known, const std::vector<std::string>& foreign,
+                const std::string& file, Diagnostics* diagnostics)
       : known_(known), file_(file), diagnostics_(diagnostics) {
     for (const Channel& channel : known) names_.push_back(channel.name);
     for (const Role* role : kRoles) {
       if (IsCompared(*role)) roles_.emplace_back(role->name);
     }
+    roles_.insert(roles_.end(), foreign.begin(), foreign.end());
   }
 
   void Check(const PanelSpec& panel) {
@@ -123,8 +124,9 @@ bool FitsPattern(const std::string& name, const std::string& pattern) {
 }
 
 void CheckFigures(const std::vector<FigureSpec>& figures, const std::vector<Channel>& known,
-                  const std::string& file, Diagnostics* diagnostics) {
-  FigureChecker checker(known, file, diagnostics);
+                  const std::vector<std::string>& foreign, const std::string& file,
+                  Diagnostics* diagnostics) {
+  FigureChecker checker(known, foreign, file, diagnostics);
   for (const FigureSpec& figure : figures) {
     for (const PanelSpec& panel : figure.panels) checker.Check(panel);
   }

@@ -136,7 +136,9 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
     finding.hint = "set reference: on";
     diagnostics->Add(std::move(finding));
   }
-  CheckFigures(prepared.scenario.figures, RecordableChannels(prepared), file, diagnostics);
+  std::vector<std::string> foreign;
+  for (const ForeignWitness& witness : prepared.scenario.witnesses) foreign.push_back(witness.name);
+  CheckFigures(prepared.scenario.figures, RecordableChannels(prepared), foreign, file, diagnostics);
   if (diagnostics->has_errors()) return {};
   return prepared;
 }

@@ -67,6 +67,19 @@ std::string FindingsOf(const std::string& figures) {
   return text;
 }
 
+TEST(OwnFigures, KnowForeignWitnesses) {
+  FigureOptions options;
+  options.formats = {"pgf"};
+  options.only = {"outside"};
+  const FigureOutcome outcome = MakeFigures(FigureScenario("four_bar/foreign"), options);
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
+  ASSERT_EQ(outcome.figures.size(), 1u);
+  EXPECT_EQ(outcome.figures[0].figure.panels[0].curves.size(), 2u);
+  options.scenario.set = {{"witnesses", "{other: {command: [x]}}"}};
+  EXPECT_THAT(MakeFigures(FigureScenario("four_bar/foreign"), options).diagnostics.Text(),
+              HasSubstr("= 'planar' is no witness"));
+}
+
 TEST(OwnFigures, AreDrawnBesideTheUsualOnesAndReplaceThoseOfTheirName) {
   const test::TestFolder folder("own_drawn");
   FigureOptions options;
