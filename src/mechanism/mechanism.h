@@ -220,7 +220,7 @@ struct RotorLaw {
 struct FrictionLaw {
   double coulomb = 0.0;        ///< Fc [N or N m], >= 0
   double breakaway = 0.0;      ///< Fs, >= Fc
-  double stribeck_rate = 1.0;  ///< vs [m/s or rad/s], > 0; without meaning where Fs = Fc
+  double stribeck_rate = 1.0;  ///< vs [m/s or rad/s] >= 0; 0: all that slides feels Fc
   double coefficient = 0.0;    ///< μ >= 0: adds μ r N, N the joint's reaction across its axis
   double radius = 1.0;         ///< r of a journal [m], > 0; 1 along lengths
 

@@ -233,10 +233,11 @@ std::optional<FrictionLaw> ElementReader::ReadDry(const Block& block, const Yaml
   }
   const bool stated = map.Required("coulomb") != nullptr;
   const auto coulomb = stated ? NotNegative(block, map, "coulomb") : std::nullopt;
-  if (map.Has("breakaway") != map.Has("stribeck_rate")) {
-    yaml.Error(*map.node(),
-               fmt::format("{} needs both breakaway and stribeck_rate, or neither", map.path()),
-               "breakaway: friction just above rest; stribeck_rate: how fast it falls to coulomb");
+  if (map.Has("stribeck_rate") && !map.Has("breakaway")) {
+    yaml.Error(
+        *map.Find("stribeck_rate"), fmt::format("{} needs breakaway as well", map.path()),
+        "breakaway: friction at rest; stribeck_rate: how fast it falls to coulomb from there "
+        "(left out: at once)");
     return std::nullopt;
   }
   if (!map.Has("breakaway")) {
@@ -244,7 +245,9 @@ std::optional<FrictionLaw> ElementReader::ReadDry(const Block& block, const Yaml
     return FrictionLaw{.coulomb = *coulomb, .breakaway = *coulomb};
   }
   const auto breakaway = values_.Number(block, map, "breakaway", {kPlain});
-  const auto rate = values_.Positive(block, map, "stribeck_rate", {kPlain});
+  const auto rate = map.Has("stribeck_rate")
+                        ? values_.Positive(block, map, "stribeck_rate", {kPlain})
+                        : std::optional<double>(0.0);
   if (!coulomb || !breakaway || !rate) return std::nullopt;
   if (*breakaway >= *coulomb) return FrictionLaw{*coulomb, *breakaway, *rate};
   yaml.Error(*map.Find("breakaway"), fmt::format("{} = {} violates breakaway >= coulomb = {}",

@@ -320,7 +320,8 @@ std::string TextOf(const RotorLaw& law) {
 std::string TextOf(const FrictionLaw& law) {
   std::string text = fmt::format("coulomb: {}", law.coulomb);
   if (law.breakaway != law.coulomb) {
-    text += fmt::format(", breakaway: {}, stribeck_rate: {}", law.breakaway, law.stribeck_rate);
+    text += fmt::format(", breakaway: {}", law.breakaway);
+    if (law.stribeck_rate != 0.0) text += fmt::format(", stribeck_rate: {}", law.stribeck_rate);
   }
   return law.coefficient == 0.0 ? text : text + fmt::format(", coefficient: {}", law.coefficient);
 }

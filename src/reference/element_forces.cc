@@ -36,6 +36,7 @@ double ForceOf(const RotorLaw& law, const AlongElement& at) {
 }
 
 double ForceOf(const FrictionLaw& law, const AlongElement& at) {
+  if (law.stribeck_rate == 0.0) return -at.rubs * law.coulomb;
   const double slowness = at.rate / law.stribeck_rate;
   const double size = law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness);
   return -at.rubs * size;

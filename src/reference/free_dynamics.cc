@@ -11,6 +11,7 @@
 #include "mechanism/reach.h"
 #include "reference/closure_failure.h"
 #include "reference/closure_solver.h"
+#include "reference/element_forces.h"
 #include "reference/force_solver.h"
 #include "reference/least_forces.h"
 #include "reference/square_system.h"
@@ -194,10 +195,11 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   Unstack(A_p, &states->A_WB);
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
-  RequiredWrenches(mechanism_, *states, command_.loads, {}, &required);
+  RequiredWrenches(mechanism_, *states, command_.loads, phase_.sign, &required);
   AddDriveForces(t_s, *states, &drives);
   const MatX R = Motions();
-  const MatX inertia = R.transpose() * Momenta(mechanism_, *states, R);
+  MatX& inertia = rest_.H;
+  inertia = R.transpose() * Momenta(mechanism_, *states, R);
   const Eigen::LDLT<MatX> factors(inertia);
   const VecX D = factors.vectorD();
   if (!(D.minCoeff() > kEps * D.maxCoeff())) {
@@ -211,9 +213,54 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
                     summary.where);
     return summary;
   }
-  const VecX u = factors.solve(R.transpose() * (Stack(drives) - Stack(required)));
+  rest_.f = R.transpose() * (Stack(drives) - Stack(required));
+  FillRest(*states, A_p, R);
+  const VecX u = phase_.held.empty() ? VecX(factors.solve(rest_.f)) : HeldMotion(rest_);
   Unstack(A_p + R * u, &states->A_WB);
   return RunSummary::Done();
+}
+
+MatX FreeDynamics::HeldRows(const BodyStates& states, VecX* gaps) const {
+  MatX gradients(static_cast<Eigen::Index>(phase_.held.size()), size_);
+  gaps->resize(gradients.rows());
+  if (phase_.held.empty()) return gradients;
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, states);
+  for (size_t k = 0; k < phase_.held.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    const ScalarRow& row = rows[phase_.held[k]];
+    gradients.row(at) = GradientOf(row, mechanism_.bodies.size()).transpose();
+    (*gaps)[at] = row.value - phase_.at[k];
+  }
+  return gradients;
+}
+
+VecX FreeDynamics::MotionOfHeld(const MatX& rows, const VecX& amount) const {
+  if (rows.rows() == 0) return VecX::Zero(size_);
+  const MatX R = Motions();
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kLost);
+  cod.compute(rows * R);
+  return R * cod.solve(amount);
+}
+
+void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const MatX& R) {
+  if (phase_.held.empty()) return;
+  VecX gaps;
+  const MatX rows = HeldRows(states, &gaps);
+  const std::vector<ScalarRow> elements = ElementRows(mechanism_, states);
+  rest_.G = rows * R;
+  rest_.d = rows * A_p;
+  rest_.most.resize(rows.rows());
+  for (size_t k = 0; k < phase_.held.size(); ++k) {
+    const auto at = static_cast<Eigen::Index>(k);
+    rest_.d[at] += elements[phase_.held[k]].bias;
+    rest_.most[at] = std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway;
+  }
+}
+
+double FreeDynamics::ShareLeft(const ScalarRow& row) const {
+  const VecX scaled = body_scale_.cwiseProduct(GradientOf(row, mechanism_.bodies.size()));
+  return (Q_.rightCols(freedoms_).transpose() * scaled).norm() / scaled.norm();
 }
 
 RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) {
@@ -224,19 +271,29 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
     FollowElements(mechanism_, states);
     Factor(t_s, *states);
     const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
+    VecX gaps;
+    const MatX held = HeldRows(*states, &gaps);
     open = LargestOpen();
+    for (size_t k = 0; k < phase_.held.size(); ++k) {
+      const bool length = ActsOnLength(mechanism_, mechanism_.elements[phase_.held[k]]);
+      open =
+          std::max(open, std::abs(gaps[static_cast<Eigen::Index>(k)]) / (length ? length_ : 1.0));
+    }
     if (!std::isfinite(open)) break;
     const double tolerance = std::max(kClosed, Rounding(*states));
     if (open < tolerance || (open < kStalled * tolerance && open > 0.5 * previous)) {
       VecX rates = VecX::Zero(rows_.size());
       rates.tail(command_.velocity.size()) = command_.velocity;
       rates -= rows_.Rates(states->V_WB);
-      Unstack(Stack(states->V_WB) + LeastMotion(rates, FirmRank()), &states->V_WB);
+      VecX V = Stack(states->V_WB) + LeastMotion(rates, FirmRank());
+      V -= MotionOfHeld(held, held * V);
+      Unstack(V, &states->V_WB);
       FollowDriven(mechanism_, states);
       return RunSummary::Done();
     }
     previous = open;
-    const VecX step = LeastMotion(-r, FirmRank());
+    VecX step = LeastMotion(-r, FirmRank());
+    step -= MotionOfHeld(held, held * step + gaps);
     if (moved != nullptr) *moved += SizeOfTwists(step, length_);
     MoveBodies(step, states);
   }
@@ -313,9 +370,14 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
     const Joint& joint = mechanism_.joints[prescribed.joint];
     rows.Add(JointCoordinateRow(joint, 0, states), !IsLength(joint.kind, 0));
   }
+  const int first_held = rows.size();
+  const std::vector<ScalarRow> elements = ElementRows(mechanism_, states);
+  for (const size_t e : phase_.held) {
+    rows.Add(elements[e], !ActsOnLength(mechanism_, mechanism_.elements[e]));
+  }
 
   std::vector<Vec6> required, given(mechanism_.bodies.size(), Vec6::Zero());
-  RequiredWrenches(mechanism_, states, command_.loads, {}, &required);
+  RequiredWrenches(mechanism_, states, command_.loads, phase_.sign, &required);
   AddDriveForces(t_s, states, &given);
   const VecX wrenches = body_scale_.cwiseProduct(Stack(required) - Stack(given));
   MatX columns = MatX::Zero(size_, rows.size());
@@ -331,7 +393,11 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == first_driven,
              first_driven);
   sample->drive_force = GivenOr(t_s, force.segment(first_driven, first_prescribed - first_driven));
-  sample->prescribed_force = force.tail(rows.size() - first_prescribed);
+  sample->prescribed_force = force.segment(first_prescribed, first_held - first_prescribed);
+  sample->rubbing = phase_.sign;
+  // Friction at rest is what the held state needs: nothing is open.
+  sample->drive_band = VecX::Zero(sample->drive_force.size());
+  sample->prescribed_band = VecX::Zero(sample->prescribed_force.size());
 }
 
 void FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
@@ -362,7 +428,7 @@ VecX FreeDynamics::WorkRates(double t_s, const BodyStates& states) {
     put(sample.prescribed_force[static_cast<Eigen::Index>(p)],
         JointCoordinateRow(mechanism_.joints[mechanism_.prescribed[p].joint], 0, states));
   }
-  const Powers power = PowersOf(mechanism_, states, command_.loads, {});
+  const Powers power = PowersOf(mechanism_, states, command_.loads, phase_.sign);
   rates[next++] = power.loads;
   rates[next++] = power.dampers;
   return rates;

@@ -10,6 +10,9 @@
 // and loads (rotors count in M and w), and F the wrenches of the forced drives. Reactions drop out
 // of (3); massless bodies need no inertia as long as RᵀM R has it [Udwadia, Kalaba 1996; García de
 // Jalón, Bayo 1994, ch. 5]. Redundant rows cost nothing, and no choice of rows outlives a pose.
+//
+// Elements of dry friction slide in a given direction, or are held: then u̇ keeps their coordinates
+// at rest, and the least change of R u puts poses and rates back there (rest_decision.h).
 #pragma once
 
 #include <Eigen/QR>
@@ -20,9 +23,17 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/reference.h"
+#include "reference/rest_decision.h"
 #include "reference/row_set.h"
 
 namespace mbv::internal {
+
+/// What every element of dry friction does.
+struct FrictionPhase {
+  std::vector<int> sign;     ///< per force element: of the rate with which it slides; otherwise 0
+  std::vector<size_t> held;  ///< those that stick, increasing …
+  std::vector<double> at;    ///< … and the values of their coordinates [m or rad]
+};
 
 class FreeDynamics {
  public:
@@ -32,6 +43,14 @@ class FreeDynamics {
   /// A_WB at t from X_WB and V_WB. kSingular where the pose leaves more freedoms than that, or
   /// where one of them has no inertia.
   [[nodiscard]] RunSummary Accelerate(double t_s, BodyStates* states);
+
+  /// In which phase friction is from now on; all others but Factor() depend on it.
+  void SetPhase(FrictionPhase phase) { phase_ = std::move(phase); }
+  [[nodiscard]] const FrictionPhase& phase() const { return phase_; }
+  /// The held elements at the last Accelerate().
+  [[nodiscard]] const RestSystem& rest() const { return rest_; }
+  /// Share of its coordinate's motion that loops and commands leave to forces, after Accelerate().
+  [[nodiscard]] double ShareLeft(const ScalarRow& row) const;
 
   /// Poses onto the loops and commands at t by Newton with the least correction, then velocities;
   /// `moved` (if given) is the size of the correction of the pose [rad, characteristic lengths].
@@ -71,6 +90,12 @@ class FreeDynamics {
   /// Least-norm twists with J V = rates, from the first `rank` pivots.
   [[nodiscard]] VecX LeastMotion(const VecX& rates, Eigen::Index rank) const;
   [[nodiscard]] Eigen::Index FirmRank() const;
+  /// Gradients of the held coordinates (held × 6·bodies), and how far they are from where they are
+  /// held.
+  [[nodiscard]] MatX HeldRows(const BodyStates& states, VecX* gaps) const;
+  /// The least of the motions left that changes held coordinates by `amount`.
+  [[nodiscard]] VecX MotionOfHeld(const MatX& rows, const VecX& amount) const;
+  void FillRest(const BodyStates& states, const VecX& A_p, const MatX& R);
   void SolveForces(double t_s, ReferenceSample* sample);
   /// Per drive: the given force at t, or the next of those solved for.
   [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;
@@ -91,6 +116,8 @@ class FreeDynamics {
   Eigen::ColPivHouseholderQR<MatX> qr_;           ///< of the scaled Jᵀ
   MatX Q_;
   double pivot_ = kNan;
+  FrictionPhase phase_;
+  RestSystem rest_;
 };
 
 }  // namespace mbv::internal

@@ -46,12 +46,21 @@ constexpr double kSurely = 1.1;
 struct FreeMotion::Stepper {
   using Fehlberg = odeint::runge_kutta_fehlberg78<State>;
   odeint::controlled_runge_kutta<Fehlberg> controlled;
+  Fehlberg plain = {};  ///< for steps of a given length
 
   explicit Stepper(double tolerance)
       : controlled(
             odeint::default_error_checker<double, odeint::range_algebra,
                                           odeint::default_operations>(tolerance, tolerance)) {}
 };
+
+FreeMotion::State FreeMotion::StepFrom(const State& from, double h) {
+  if (h == 0.0) return from;
+  const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
+  State to(from.size());
+  stepper_->plain.do_step(rates, from, now_.time_s, to, h);
+  return to;
+}
 
 FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance,
                        double largest_step_s, Effort effort)
@@ -62,7 +71,12 @@ FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double 
       dynamics_(mechanism, motion),
       stepper_(std::make_unique<Stepper>(tolerance)),
       breaks_(BreakTimes(motion)),
-      dt_(std::min({motion.sample_s, largest_step_s, 1e-3})) {
+      dt_(std::min({motion.sample_s, largest_step_s, 1e-3})),
+      tolerance_(tolerance),
+      fresh_(mechanism.elements.size(), 0) {
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
+    if (Rubs(mechanism.elements[e])) rubbing_.push_back(e);
+  }
   now_.states.Resize(mechanism.bodies.size());
   work_states_ = sampled_ = now_.states;
   double mass = 0.0;
@@ -108,7 +122,8 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   if (RunSummary summary = dynamics_.Project(0.0, &now_.states); !summary.ok()) return summary;
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
-  return summary;
+  if (!summary.ok() || rubbing_.empty()) return summary;
+  return BeginFriction();
 }
 
 void FreeMotion::Rates(const State& x, State* rates, double t_s) {
@@ -213,6 +228,7 @@ RunSummary FreeMotion::Segment(double to_s) {
     if (tried_steps_ % kLook == 0) {
       if (RunSummary summary = LookAhead(); !summary.ok()) return summary;
     }
+    if (RunSummary summary = CheckFriction(); !summary.ok()) return summary;
     double t = now_.time_s;
     State x = Pack(now_);
     const double natural = dt_;
@@ -230,7 +246,7 @@ RunSummary FreeMotion::Segment(double to_s) {
     }
     dt_ = clipped ? std::max(natural, dt) : dt;
     if (to_the_end) t = to_s;
-    if (RunSummary summary = Accept(x, t); !summary.ok()) return summary;
+    if (RunSummary summary = AcceptWithFriction(x, t, tried); !summary.ok()) return summary;
     if (tried < kSmallestStepShare * duration_s_ && !to_the_end) return NoWayOn(tried);
   }
   return RunSummary::Done();
@@ -320,6 +336,7 @@ bool FreeMotion::Land(const Hermite& way, double at_s, Node* node) {
 }
 
 void FreeMotion::TryBridge() {
+  if (!rubbing_.empty()) return;  // what slides could stop on it
   if (!(now_.pivot < kBridge * largest_pivot_)) return;
   const double half = TimeToSingular(), landing = now_.time_s + 2.0 * half;
   if (!std::isfinite(landing)) return;

@@ -7,9 +7,15 @@
 // it, put back onto loops and commands, and integrated on from there. The bridge holds only if the
 // loops are closed and the energy balances at its end; otherwise the integration goes on step by
 // step and ends at the pose.
+//
+// Dry friction (free_friction.cc): while every element slides in one direction or sticks, the
+// equations are smooth. After each step the rates of what slides and the load of what sticks
+// (rest_decision.h) are looked at, also within the step; where one passes its bound, the same
+// scheme with shorter steps brackets that time to round-off, and the motion goes on from there.
 #pragma once
 
 #include <deque>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -78,6 +84,32 @@ class FreeMotion {
   [[nodiscard]] std::optional<Hermite> WayOn(double gap_s);
   [[nodiscard]] bool Land(const Hermite& way, double at_s, Node* node);
   void Watch();
+
+  // What ends a phase of friction: some elements come to rest, or what is held starts.
+  struct FrictionEvent {
+    double after_s = 0.0;
+    std::vector<size_t> stops;
+    bool starts = false;
+  };
+  [[nodiscard]] RunSummary BeginFriction();
+  [[nodiscard]] RunSummary CheckFriction();
+  [[nodiscard]] RunSummary AcceptWithFriction(const State& x, double t_s, double tried_s);
+  [[nodiscard]] std::optional<FrictionEvent> FirstEvent(const State& from, double h,
+                                                        const State& to);
+  void FindStops(const State& from, double h, const State& to, FrictionEvent* first);
+  void FindStart(const State& from, double h, FrictionEvent* first);
+  [[nodiscard]] RunSummary Settle(const FrictionEvent& event, double h);
+  [[nodiscard]] RunSummary RestAt(double t_s, BodyStates* states, FrictionPhase phase);
+  [[nodiscard]] FrictionPhase RestingPhase(const FrictionEvent& event);
+  [[nodiscard]] std::vector<int> Starting(double t_s, const BodyStates& states,
+                                          RunSummary* trouble);
+  [[nodiscard]] RunSummary Contradiction(size_t element, const std::string& what, double amount,
+                                         const std::string& unit) const;
+  [[nodiscard]] State StepFrom(const State& from, double h);
+  [[nodiscard]] VecX ElementRates(const BodyStates& states) const;
+  /// Rates that the integration does not tell from zero.
+  [[nodiscard]] double Resolved(size_t element) const;
+  [[nodiscard]] BodyStates StatesOf(const State& x) const;
   [[nodiscard]] RunSummary NoWayOn(double dt_s) const;
   [[nodiscard]] RunSummary TooManySteps() const;
   /// Every so many steps: whether the springs let the rest be done with the steps that are left.
@@ -107,6 +139,10 @@ class FreeMotion {
   double looked_s_ = 0.0;  ///< time of the last LookAhead()
   double largest_pivot_ = 0.0;
   std::vector<SingularPassage> passages_;
+  const double tolerance_;
+  std::vector<size_t> rubbing_;  ///< elements of dry friction
+  std::vector<char> fresh_;      ///< per element: slides since this very time
+  int settled_here_ = 0;         ///< how often friction was decided at this very time
 };
 
 }  // namespace mbv::internal

@@ -72,13 +72,16 @@ class FreeMotionReader {
   }
 
   void CheckFriction(const YamlNode& node) {
-    const std::string friction = FirstFriction(mechanism_);
-    if (friction.empty()) return;
-    yaml().Error(node,
-                 fmt::format("motion: element '{}' of {} is dry friction, which is not known where "
-                             "freedoms move by forces",
-                             friction, mechanism_.name),
-                 "command every freedom, or set its coulomb and breakaway to 0");
+    for (const ForceElement& element : mechanism_.elements) {
+      const auto* law = std::get_if<FrictionLaw>(&element.law);
+      if (law == nullptr || law->per_load() == 0.0) continue;
+      yaml().Error(node,
+                   fmt::format("motion: element '{}' of {} is friction by its joint's load, which "
+                               "is not known where freedoms move by forces",
+                               element.name, mechanism_.name),
+                   "command every freedom, or set its coefficient to 0");
+      return;
+    }
   }
 
   void ReadForces(const YamlNode& node) {

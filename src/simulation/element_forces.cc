@@ -94,10 +94,11 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     return -spring->preload - PowerSum(spring->polynomial, at.position - spring->free);
   }
   if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
-    const double ratio = at.rate / friction->stribeck_rate;
+    if (at.rests) return 0.0;
+    const double ratio = at.rate / friction->stribeck_rate;  // beyond all bounds where vs = 0
     const double curve = std::exp(-(ratio * ratio));
     const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
-    return at.rests ? 0.0 : -std::copysign(most + at.load_friction, at.rate);
+    return -std::copysign(most + at.load_friction, at.rate);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
   return -rotor.reflected() * at.acceleration - rotor.inertia * rotor.ratio * at.turning.along_rate;

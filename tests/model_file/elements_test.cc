@@ -118,10 +118,10 @@ TEST(Elements, WhatMeansNothingIsAFinding) {
   EXPECT_EQ(ElementFindings("  g: {kind: rotor, joint: turn, inertia: 2, ratio: 0}\n"),
             "m.yaml:10:52: error: elements.g.ratio = 0 turns no rotor\n"
             "  hint: ratio: the rotor's rate by that of the coordinate\n");
-  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coulomb: 2, breakaway: 3}\n"),
-            "m.yaml:10:6: error: elements.g needs both breakaway and stribeck_rate, or neither\n"
-            "  hint: breakaway: friction just above rest; stribeck_rate: how fast it falls to "
-            "coulomb\n");
+  EXPECT_EQ(ElementFindings("  g: {kind: friction, joint: turn, coulomb: 2, stribeck_rate: 3}\n"),
+            "m.yaml:10:63: error: elements.g needs breakaway as well\n"
+            "  hint: breakaway: friction at rest; stribeck_rate: how fast it falls to coulomb from "
+            "there (left out: at once)\n");
   EXPECT_EQ(ElementFindings(
                 "  g: {kind: friction, joint: turn, coulomb: 2, breakaway: 1, stribeck_rate: 1}\n"),
             "m.yaml:10:59: error: elements.g.breakaway = 1 violates breakaway >= coulomb = 2\n");

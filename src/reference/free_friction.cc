@@ -1,0 +1,310 @@
+// Stick and slip in free motion: the part of FreeMotion that finds when phases of friction end, and
+// what follows.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/toms748_solve.hpp>
+#include <cmath>
+
+#include "kinematics/element_rows.h"
+#include "reference/free_motion.h"
+
+namespace mbv::internal {
+namespace {
+
+// Places within a step at which rates are looked at by cubics, and loads by the scheme.
+constexpr int kRateLooks = 16, kLoadLooks = 4;
+// Held elements start where the load exceeds what friction takes by more than round-off.
+constexpr double kExceeds = 1e-11;
+// A rate counts as zero within so many tolerances of a step [characteristic lengths/s, rad/s].
+constexpr double kUnresolved = 10.0;
+// What starts is decided by the load that the held motion has this share of a step later: at the
+// start itself nothing moves yet.
+constexpr double kAhead = 1e-4;
+// A coordinate of which loops and commands leave a smaller share is led by them.
+constexpr double kLed = 1e-9;
+constexpr int kMostHalvings = 40;
+constexpr std::uintmax_t kMostTries = 100;
+
+// Where f, of different signs at both ends, vanishes.
+template <typename F>
+double Root(const F& f, double a, double b) {
+  const double at_a = f(a), at_b = f(b);
+  if (at_a == 0.0) return a;
+  if (at_b == 0.0) return b;
+  std::uintmax_t passes = kMostTries;
+  const auto [low, high] = boost::math::tools::toms748_solve(
+      f, a, b, at_a, at_b, boost::math::tools::eps_tolerance<double>(), passes);
+  return 0.5 * (low + high);
+}
+
+// The cubic with given values and derivatives at 0 and h.
+double Cubic(double h, double t, double v0, double a0, double v1, double a1) {
+  const double s = t / h, r = 1.0 - s;
+  return r * r * ((1.0 + 2.0 * s) * v0 + t * a0) + s * s * ((1.0 + 2.0 * r) * v1 - (h - t) * a1);
+}
+
+}  // namespace
+
+BodyStates FreeMotion::StatesOf(const State& x) const {
+  BodyStates states = now_.states;
+  Unpack(x, &states, nullptr);
+  FollowElements(mechanism_, &states);
+  return states;
+}
+
+VecX FreeMotion::ElementRates(const BodyStates& states) const {
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, states);
+  VecX rates(static_cast<Eigen::Index>(rows.size()));
+  for (size_t e = 0; e < rows.size(); ++e) {
+    rates[static_cast<Eigen::Index>(e)] = RateOf(rows[e], states.V_WB);
+  }
+  return rates;
+}
+
+double FreeMotion::Resolved(size_t element) const {
+  const bool length = ActsOnLength(mechanism_, mechanism_.elements[element]);
+  return kUnresolved * tolerance_ * (length ? dynamics_.length() : 1.0);
+}
+
+RunSummary FreeMotion::Contradiction(size_t element, const std::string& what, double amount,
+                                     const std::string& unit) const {
+  const ForceElement& at = mechanism_.elements[element];
+  return {.stop = Stop::kNoConvergence,
+          .message = fmt::format("{} ('{}') {} at t = {:.6g} s", Described(mechanism_, at), at.name,
+                                 what, now_.time_s),
+          .time_s = now_.time_s,
+          .where = at.name,
+          .amount = amount,
+          .unit = unit};
+}
+
+// Elements whose coordinate moves by forces; at rest where nothing tells their rate from zero.
+RunSummary FreeMotion::BeginFriction() {
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
+  FrictionEvent start;
+  FrictionPhase phase;
+  phase.sign.assign(mechanism_.elements.size(), 0);
+  for (const size_t e : rubbing_) {
+    if (dynamics_.ShareLeft(rows[e]) < kLed) {
+      return {.stop = Stop::kUnsupported,
+              .message = fmt::format("{} ('{}') rubs on a coordinate that commands move, where "
+                                     "other freedoms move by forces: it must move by them too",
+                                     Described(mechanism_, mechanism_.elements[e]),
+                                     mechanism_.elements[e].name),
+              .time_s = 0.0,
+              .where = mechanism_.elements[e].name,
+              .unit = {}};
+    }
+    const double rate = RateOf(rows[e], now_.states.V_WB);
+    if (std::abs(rate) <= Resolved(e)) {
+      start.stops.push_back(e);
+    } else {
+      phase.sign[e] = rate > 0.0 ? 1 : -1;
+    }
+  }
+  dynamics_.SetPhase(std::move(phase));
+  if (!start.stops.empty()) {
+    if (RunSummary summary = Settle(start, 0.0); !summary.ok()) return summary;
+  }
+  return dynamics_.Accelerate(now_.time_s, &now_.states);
+}
+
+// Before a step: forces may have jumped, and what has just started may set others free.
+RunSummary FreeMotion::CheckFriction() {
+  if (rubbing_.empty() || dynamics_.phase().held.empty()) return RunSummary::Done();
+  for (;;) {
+    BodyStates states = now_.states;
+    if (RunSummary summary = dynamics_.Accelerate(now_.time_s, &states); !summary.ok()) {
+      return summary;
+    }
+    const double load = LoadRatio(dynamics_.rest());
+    if (load <= 1.0 + kExceeds) return RunSummary::Done();
+    const size_t held = dynamics_.phase().held.front();
+    if (std::isnan(load)) {
+      return Contradiction(held, "and others share their load at rest in too many ways", kNan, "");
+    }
+    const FrictionEvent event{.after_s = 0.0, .stops = {}, .starts = true};
+    if (RunSummary summary = Settle(event, dt_); !summary.ok()) return summary;
+    if (dynamics_.phase().held.empty()) return RunSummary::Done();
+  }
+}
+
+RunSummary FreeMotion::AcceptWithFriction(const State& x, double t_s, double tried_s) {
+  if (rubbing_.empty()) return Accept(x, t_s);
+  const State from = Pack(now_);
+  const std::optional<FrictionEvent> event = FirstEvent(from, tried_s, x);
+  if (!trouble_.ok()) return trouble_;
+  if (!event) {
+    settled_here_ = 0;
+    std::ranges::fill(fresh_, 0);
+    return Accept(x, t_s);
+  }
+  if (event->after_s > 0.0) {
+    settled_here_ = 0;
+    std::ranges::fill(fresh_, 0);
+    const State at = StepFrom(from, event->after_s);
+    if (!trouble_.ok()) return trouble_;
+    if (RunSummary summary = Accept(at, now_.time_s + event->after_s); !summary.ok()) {
+      return summary;
+    }
+  }
+  return Settle(*event, tried_s);
+}
+
+std::optional<FreeMotion::FrictionEvent> FreeMotion::FirstEvent(const State& from, double h,
+                                                                const State& to) {
+  FrictionEvent first{.after_s = 2.0 * h, .stops = {}, .starts = false};
+  FindStops(from, h, to, &first);
+  if (!dynamics_.phase().held.empty()) FindStart(from, h, &first);
+  if (first.after_s > h) return {};
+  return first;
+}
+
+// Elements whose rate leaves the direction in which they slide.
+void FreeMotion::FindStops(const State& from, double h, const State& to, FrictionEvent* first) {
+  BodyStates begin = now_.states, end = StatesOf(to);
+  trouble_ = dynamics_.Accelerate(now_.time_s, &begin);
+  if (trouble_.ok()) trouble_ = dynamics_.Accelerate(now_.time_s + h, &end);
+  if (!trouble_.ok()) return;
+  const std::vector<ScalarRow> at_begin = ElementRows(mechanism_, begin),
+                               at_end = ElementRows(mechanism_, end);
+  for (const size_t e : rubbing_) {
+    const double s = dynamics_.phase().sign[e];
+    if (s == 0.0) continue;
+    const auto rate = [&](double after_s) {
+      const auto k = static_cast<Eigen::Index>(e);
+      return s * ElementRates(StatesOf(StepFrom(from, after_s)))[k];
+    };
+    const double v0 = s * RateOf(at_begin[e], begin.V_WB), v1 = s * RateOf(at_end[e], end.V_WB);
+    const double a0 = s * (RateOf(at_begin[e], begin.A_WB) + at_begin[e].bias);
+    const double a1 = s * (RateOf(at_end[e], end.A_WB) + at_end[e].bias);
+    // A time at which it is beyond zero …
+    double beyond = v1 < 0.0 ? h : -1.0;
+    for (int i = 1; i < kRateLooks && beyond < 0.0; ++i) {
+      const double t = h * i / kRateLooks;
+      if (Cubic(h, t, v0, a0, v1, a1) < 0.0 && rate(t) < 0.0) beyond = t;
+    }
+    if (beyond < 0.0) continue;
+    // … and one at which it is not there yet.
+    double before = v0 > 0.0 && fresh_[e] == 0 ? 0.0 : -1.0, t = beyond;
+    for (int i = 0; i < kMostHalvings && before < 0.0; ++i) {
+      t *= 0.5;
+      if (rate(t) > 0.0) before = t;
+    }
+    const double at = before < 0.0 ? 0.0 : Root(rate, before, beyond);
+    if (at > first->after_s) continue;
+    if (at < first->after_s) *first = {.after_s = at, .stops = {}, .starts = false};
+    first->stops.push_back(e);
+  }
+}
+
+// The load of the held elements exceeds what their friction takes.
+void FreeMotion::FindStart(const State& from, double h, FrictionEvent* first) {
+  const auto excess = [&](double after_s) {
+    BodyStates states = StatesOf(StepFrom(from, after_s));
+    if (!trouble_.ok()) return kNan;
+    trouble_ = dynamics_.Accelerate(now_.time_s + after_s, &states);
+    return LoadRatio(dynamics_.rest()) - 1.0;
+  };
+  const double end = std::min(h, first->after_s);
+  std::array<double, kLoadLooks + 1> looks{};
+  int beyond = -1;
+  for (int i = 0; i <= kLoadLooks && beyond < 0; ++i) {
+    looks.at(static_cast<size_t>(i)) = excess(end * i / kLoadLooks);
+    if (looks.at(static_cast<size_t>(i)) > kExceeds) beyond = i;
+  }
+  double until = beyond < 0 ? -1.0 : end * beyond / kLoadLooks;
+  // A peak between two looks.
+  const auto peak = std::ranges::max_element(looks) - looks.begin();
+  if (beyond < 0 && peak > 0 && peak < kLoadLooks) {
+    const auto [at, least] = boost::math::tools::brent_find_minima(
+        [&](double t) { return -excess(t); }, end * static_cast<double>(peak - 1) / kLoadLooks,
+        end * static_cast<double>(peak + 1) / kLoadLooks, 26);
+    if (-least > kExceeds) until = at;
+  }
+  if (!trouble_.ok() || until < 0.0) return;
+  const double at = until == 0.0 || looks[0] >= 0.0 ? 0.0 : Root(excess, 0.0, until);
+  if (at < first->after_s) *first = {.after_s = at, .stops = {}, .starts = true};
+}
+
+// All that is at rest: held, just stopped, or too slow to tell; not what has just started.
+FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
+  const FrictionPhase& phase = dynamics_.phase();
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
+  FrictionPhase resting{.sign = phase.sign, .held = {}, .at = {}};
+  for (const size_t e : rubbing_) {
+    const auto held = std::ranges::find(phase.held, e);
+    const bool stopped = std::ranges::find(event.stops, e) != event.stops.end();
+    const bool slow = std::abs(RateOf(rows[e], now_.states.V_WB)) <= Resolved(e);
+    if (held == phase.held.end() && !stopped && (!slow || fresh_[e] != 0)) continue;
+    resting.held.push_back(e);
+    resting.at.push_back(held == phase.held.end()
+                             ? rows[e].value
+                             : phase.at[static_cast<size_t>(held - phase.held.begin())]);
+    resting.sign[e] = 0;
+  }
+  return resting;
+}
+
+// Signs of what starts, per held element, from the load at these states.
+std::vector<int> FreeMotion::Starting(double t_s, const BodyStates& states, RunSummary* trouble) {
+  BodyStates at = states;
+  std::vector<int> sign;
+  *trouble = dynamics_.Accelerate(t_s, &at);
+  if (!trouble->ok()) return sign;
+  if (DecideRest(dynamics_.rest(), &sign)) return sign;
+  *trouble = Contradiction(dynamics_.phase().held.front(),
+                           "neither sticks nor slides in one direction (with what rests beside it)",
+                           LoadRatio(dynamics_.rest()), "of breakaway");
+  return sign;
+}
+
+RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
+  FrictionPhase next = RestingPhase(event);
+  if (++settled_here_ > 4 + 2 * static_cast<int>(rubbing_.size())) {
+    return Contradiction(next.held.empty() ? rubbing_.front() : next.held.front(),
+                         "stops and starts again and again", settled_here_, "times");
+  }
+  // What starts does so by the load that it would have a little later.
+  BodyStates ahead = now_.states;
+  double ahead_s = now_.time_s;
+  if (event.starts && h > 0.0) {
+    ahead_s += kAhead * h;
+    trouble_ = RunSummary::Done();
+    ahead = StatesOf(StepFrom(Pack(now_), kAhead * h));
+    if (!trouble_.ok()) return trouble_;
+  }
+  dynamics_.SetPhase(next);
+  if (RunSummary summary = dynamics_.Project(now_.time_s, &now_.states); !summary.ok()) {
+    return summary;
+  }
+  if (!event.starts) ahead = now_.states;
+  RunSummary trouble;
+  std::vector<int> sign = Starting(ahead_s, ahead, &trouble);
+  if (!trouble.ok()) return trouble;
+  if (event.starts && std::ranges::all_of(sign, [](int s) { return s == 0; })) {
+    VecX direction = VecX::Zero(static_cast<Eigen::Index>(sign.size()));
+    (void)LoadRatio(dynamics_.rest(), &direction);
+    const double least = 1e-6 * direction.cwiseAbs().maxCoeff();
+    for (size_t k = 0; k < sign.size(); ++k) {
+      const double rate = direction[static_cast<Eigen::Index>(k)];
+      if (std::abs(rate) > least) sign[k] = rate > 0.0 ? 1 : -1;
+    }
+  }
+  FrictionPhase phase{.sign = next.sign, .held = {}, .at = {}};
+  for (size_t k = 0; k < sign.size(); ++k) {
+    const size_t e = next.held[k];
+    phase.sign[e] = sign[k];
+    fresh_[e] = sign[k] != 0 ? 1 : 0;
+    if (sign[k] != 0) continue;
+    phase.held.push_back(e);
+    phase.at.push_back(next.at[k]);
+  }
+  dynamics_.SetPhase(std::move(phase));
+  return RunSummary::Done();
+}
+
+}  // namespace mbv::internal
