@@ -174,10 +174,19 @@ void UrdfReader::AddDynamics(const UrdfTree& tree, const Into& into) {
   for (const UrdfTree::Dynamics& dynamics : tree.dynamics) {
     const int joint = into.joints->Find(dynamics.joint);
     if (joint < 0) continue;  // refused, with its own finding
-    const std::string place = "urdf." + dynamics.joint + ".dynamics.damping";
-    into.elements->push_back({.name = dynamics.joint + "_damping",
-                              .joint = joint,
-                              .law = DampingLaw{literals_.At(place, dynamics.damping)}});
+    const std::string place = "urdf." + dynamics.joint + ".dynamics.";
+    if (dynamics.damping > 0.0) {
+      into.elements->push_back(
+          {.name = dynamics.joint + "_damping",
+           .joint = joint,
+           .law = DampingLaw{literals_.At(place + "damping", dynamics.damping)}});
+    }
+    if (dynamics.friction > 0.0) {
+      const double most = literals_.At(place + "friction", dynamics.friction);
+      into.elements->push_back({.name = dynamics.joint + "_friction",
+                                .joint = joint,
+                                .law = FrictionLaw{.coulomb = most, .breakaway = most}});
+    }
   }
 }
 

@@ -48,10 +48,11 @@ struct UrdfTree {
     double multiplier = 1.0, offset = 0.0;
   };
   std::vector<Mimic> mimics;
-  /// <dynamics>: viscous damping of joints with one coordinate [N s/m or N m s/rad]
+  /// <dynamics>: viscous damping [N s/m or N m s/rad] and Coulomb friction [N or N m] of joints
+  /// with one coordinate
   struct Dynamics {
     std::string joint;
-    double damping = 0.0;
+    double damping = 0.0, friction = 0.0;
   };
   std::vector<Dynamics> dynamics;
 

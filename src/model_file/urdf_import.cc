@@ -305,13 +305,17 @@ class Importer {
   }
 
   void ReadDynamics(const urdf::Joint& from, JointKind kind, int line) {
-    const double damping = from.dynamics->damping;
-    if (damping > 0.0 && std::isfinite(damping) && FreedomsOf(kind) == 1) {
-      tree_.dynamics.push_back({from.name, damping});
-    } else {
-      AddLoss(from.name, damping, line, &damped_);
-    }
-    AddLoss(from.name, from.dynamics->friction, line, &rubbing_);
+    UrdfTree::Dynamics dynamics{.joint = from.name};
+    const auto take = [&](double value, double* into, Losses* losses) {
+      if (value > 0.0 && std::isfinite(value) && FreedomsOf(kind) == 1) {
+        *into = value;
+      } else {
+        AddLoss(from.name, value, line, losses);
+      }
+    };
+    take(from.dynamics->damping, &dynamics.damping, &damped_);
+    take(from.dynamics->friction, &dynamics.friction, &rubbing_);
+    if (dynamics.damping > 0.0 || dynamics.friction > 0.0) tree_.dynamics.push_back(dynamics);
   }
 
   void ReadLimits(const urdf::Joint& from, Joint* joint) {

@@ -125,8 +125,8 @@ TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {
   };
   const std::string text = Robot(
       "\n" + joint("a", "<dynamics damping=\"0.5\"/>") +
-      joint("b", "<dynamics friction=\"0.1\"/>") +
-      joint("c", "<dynamics damping=\"2\" friction=\"0.2\"/>") +
+      joint("b", "<dynamics friction=\"-0.1\"/>") +
+      joint("c", "<dynamics damping=\"2\" friction=\"-0.2\"/>") +
       joint("d", "<dynamics damping=\"0\" friction=\"0\"/>") +
       "<transmission name=\"t1\"><joint name=\"a\"/><actuator name=\"m\">"
       "<mechanicalReduction>50</mechanicalReduction></actuator></transmission>\n"
@@ -137,7 +137,7 @@ TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {
   (void)ReadUrdf(text, "r.urdf", &diagnostics);
   const std::string said = diagnostics.Text();
   for (const char* part :
-       {"r.urdf:5:1: warning: friction in 2 joints is left out: b (0.1), c (0.2)\n"
+       {"r.urdf:5:1: warning: friction in 2 joints is left out: b (-0.1), c (-0.2)\n"
         "  hint: drive forces are computed without it\n",
         "r.urdf:10:1: warning: transmission 't1': the reduction 50 is left out\n"
         "  hint: positions and forces are those of the joint, not of the motor\n",
@@ -235,16 +235,21 @@ TEST_P(ShippedModel, SurvivesTheRoundTripThroughUrdf) {
 INSTANTIATE_TEST_SUITE_P(Urdf, ShippedModel, testing::ValuesIn(ShippedModelNames()),
                          [](const auto& name) { return name.param; });
 
-TEST(UrdfImport, DampingOfJointsIsAForceElement) {
+TEST(UrdfImport, DampingAndFrictionOfJointsAreForceElements) {
   const std::string text = Robot(
       "<link name=\"arm\"><inertial><mass value=\"1\"/><inertia ixx=\"1\" ixy=\"0\" ixz=\"0\" "
       "iyy=\"1\" iyz=\"0\" izz=\"1\"/></inertial></link>\n<joint name=\"hip\" "
       "type=\"continuous\"><parent link=\"world\"/><child link=\"arm\"/>"
-      "<dynamics damping=\"0.5\"/></joint>\n");
+      "<dynamics damping=\"0.5\" friction=\"0.2\"/></joint>\n");
   const LoadResult loaded = LoadModel(WriteFile("damped.urdf", text));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mechanism& m = *loaded.mechanism;
-  ASSERT_EQ(m.elements.size(), 1u);
+  ASSERT_EQ(m.elements.size(), 2u);
+  const auto& friction = std::get<FrictionLaw>(m.elements[1].law);
+  EXPECT_EQ(m.elements[1].name, "hip_friction");
+  EXPECT_EQ(m.elements[1].joint, m.FindJoint("hip"));
+  EXPECT_EQ(friction.coulomb, 0.2);
+  EXPECT_EQ(friction.breakaway, 0.2);
   EXPECT_EQ(m.elements[0].name, "hip_damping");
   EXPECT_EQ(m.elements[0].joint, m.FindJoint("hip"));
   EXPECT_EQ(std::get<DampingLaw>(m.elements[0].law).damping, 0.5);
