@@ -11,6 +11,7 @@ namespace mbv {
 namespace {
 
 constexpr Eigen::Index kReach = 3;  // samples to either side that the formulas use
+constexpr double kTimesOff = 1e-6;  // of times, by their distance
 // Where the formulas differ, the truncation error of the sixth-order one is taken off: smooth
 // motions lose nothing, and jumps of the jerk do not count. A jump J of the jerk makes an error of
 // up to 0.15 J h, while the formulas differ by at least 0.0125 J h at the nearest sample: a factor
@@ -59,6 +60,15 @@ double LargestPhase(const Mechanism& mechanism, const Motion& motion, double h) 
   return largest;
 }
 
+// True if accelerations jump among the samples that the formulas use, and where round-off may have
+// put them on the other side.
+bool NearBreak(const Trace& trace, Eigen::Index i) {
+  const double h = trace.time_s[1] - trace.time_s[0];
+  const double from = trace.time_s[static_cast<size_t>(i - kReach)] - kTimesOff * h;
+  const double to = trace.time_s[static_cast<size_t>(i + kReach)] + kTimesOff * h;
+  return std::ranges::any_of(trace.breaks_s, [&](double t) { return from <= t && t <= to; });
+}
+
 // One column against the derivative of another; returns the share of samples that were judged.
 double MeasureDerivative(const Trace& trace, int position, int rate, double scale,
                          WitnessMetrics* out) {
@@ -70,10 +80,14 @@ double MeasureDerivative(const Trace& trace, int position, int rate, double scal
     differences[static_cast<size_t>(i)] = Differentiate(trace.values, i, position, h);
     sum2 += std::pow(differences[static_cast<size_t>(i)].sixth, 2);
   }
-  const auto inner = static_cast<double>(n - 2 * kReach);
+  auto inner = static_cast<double>(n - 2 * kReach);
   const double rms = std::sqrt(sum2 / inner);
   double judged = 0.0;
   for (Eigen::Index i = kReach; i + kReach < n; ++i) {
+    if (NearBreak(trace, i)) {
+      inner -= 1.0;
+      continue;
+    }
     double truncation = 0.0;
     for (Eigen::Index k = std::max(kReach, i - kReach); k <= std::min(n - 1 - kReach, i + kReach);
          ++k) {
@@ -87,7 +101,7 @@ double MeasureDerivative(const Trace& trace, int position, int rate, double scal
     KeepWorst(&out->metrics[Metric::kDerivatives], error <= 0.0 ? 0.0 : error / scale,
               trace.time_s[static_cast<size_t>(i)], trace.channels[static_cast<size_t>(rate)].name);
   }
-  return judged / inner;
+  return inner > 0.0 ? judged / inner : 0.0;
 }
 
 struct DriveColumns {

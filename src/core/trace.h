@@ -16,6 +16,8 @@ struct Trace {
   std::vector<double> time_s;     ///< n sample times [s], increasing
   std::vector<Channel> channels;  ///< m channels
   MatX values;                    ///< n × m
+  /// Times [s] at which accelerations jump because dry friction stops or starts, increasing.
+  std::vector<double> breaks_s = {};
 
   /// Column of the channel with this name, or -1.
   [[nodiscard]] int Find(const std::string& name) const;

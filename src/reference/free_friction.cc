@@ -10,11 +10,12 @@
 
 #include "kinematics/element_rows.h"
 #include "reference/free_motion.h"
+#include "reference/hermite.h"
 
 namespace mbv::internal {
 namespace {
 
-// Places within a step at which rates are looked at by cubics, and loads by the scheme.
+// Places within a step at which rates and loads are looked at on cubics.
 constexpr int kRateLooks = 16, kLoadLooks = 4;
 // Held elements start where the load exceeds what friction takes by more than round-off.
 constexpr double kExceeds = 1e-11;
@@ -158,7 +159,7 @@ std::optional<FreeMotion::FrictionEvent> FreeMotion::FirstEvent(const State& fro
                                                                 const State& to) {
   FrictionEvent first{.after_s = 2.0 * h, .stops = {}, .starts = false};
   FindStops(from, h, to, &first);
-  if (!dynamics_.phase().held.empty()) FindStart(from, h, &first);
+  if (!dynamics_.phase().held.empty()) FindStart(from, h, to, &first);
   if (first.after_s > h) return {};
   return first;
 }
@@ -202,7 +203,7 @@ void FreeMotion::FindStops(const State& from, double h, const State& to, Frictio
 }
 
 // The load of the held elements exceeds what their friction takes.
-void FreeMotion::FindStart(const State& from, double h, FrictionEvent* first) {
+void FreeMotion::FindStart(const State& from, double h, const State& to, FrictionEvent* first) {
   const auto excess = [&](double after_s) {
     BodyStates states = StatesOf(StepFrom(from, after_s));
     if (!trouble_.ok()) return kNan;
@@ -210,20 +211,40 @@ void FreeMotion::FindStart(const State& from, double h, FrictionEvent* first) {
     return LoadRatio(dynamics_.rest()) - 1.0;
   };
   const double end = std::min(h, first->after_s);
+  // Looks on the cubic through both ends of the step.
+  State from_rates, to_rates;
+  Rates(from, &from_rates, now_.time_s);
+  Rates(to, &to_rates, now_.time_s + h);
+  const auto as_vector = [](const State& x) {
+    return VecX(Eigen::Map<const VecX>(x.data(), static_cast<Eigen::Index>(x.size())));
+  };
+  const Hermite way({0.0, h}, {as_vector(from), as_vector(to)},
+                    {as_vector(from_rates), as_vector(to_rates)});
+  const auto look = [&](double after_s) {
+    VecX x, rates;
+    way.Evaluate(after_s, &x, &rates);
+    BodyStates states = StatesOf({x.begin(), x.end()});
+    trouble_ = dynamics_.Accelerate(now_.time_s + after_s, &states);
+    return trouble_.ok() ? LoadRatio(dynamics_.rest()) - 1.0 : kNan;
+  };
   std::array<double, kLoadLooks + 1> looks{};
-  int beyond = -1;
-  for (int i = 0; i <= kLoadLooks && beyond < 0; ++i) {
-    looks.at(static_cast<size_t>(i)) = excess(end * i / kLoadLooks);
-    if (looks.at(static_cast<size_t>(i)) > kExceeds) beyond = i;
+  double until = -1.0;
+  for (size_t i = 0; i < looks.size() && until < 0.0 && trouble_.ok(); ++i) {
+    const double t = end * static_cast<double>(i) / kLoadLooks;
+    looks.at(i) = look(t);
+    if (looks.at(i) > kExceeds && (i == 0 || excess(t) > 0.0)) until = t;
   }
-  double until = beyond < 0 ? -1.0 : end * beyond / kLoadLooks;
-  // A peak between two looks.
-  const auto peak = std::ranges::max_element(looks) - looks.begin();
-  if (beyond < 0 && peak > 0 && peak < kLoadLooks) {
-    const auto [at, least] = boost::math::tools::brent_find_minima(
-        [&](double t) { return -excess(t); }, end * static_cast<double>(peak - 1) / kLoadLooks,
-        end * static_cast<double>(peak + 1) / kLoadLooks, 26);
-    if (-least > kExceeds) until = at;
+  // A peak between two looks, if it may be high enough.
+  const auto peak = static_cast<size_t>(std::ranges::max_element(looks) - looks.begin());
+  if (until < 0.0 && peak > 0 && peak < kLoadLooks && trouble_.ok()) {
+    const double least = std::min(looks.at(peak - 1), looks.at(peak + 1));
+    if (2.0 * looks.at(peak) - least > 0.0) {
+      const auto [t, value] = boost::math::tools::brent_find_minima(
+          [&](double after_s) { return -look(after_s); },
+          end * static_cast<double>(peak - 1) / kLoadLooks,
+          end * static_cast<double>(peak + 1) / kLoadLooks, 26);
+      if (-value > kExceeds && excess(t) > 0.0) until = t;
+    }
   }
   if (!trouble_.ok() || until < 0.0) return;
   const double at = until == 0.0 || looks[0] >= 0.0 ? 0.0 : Root(excess, 0.0, until);
@@ -304,6 +325,7 @@ RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
     phase.at.push_back(next.at[k]);
   }
   dynamics_.SetPhase(std::move(phase));
+  if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
   return RunSummary::Done();
 }
 

@@ -50,6 +50,8 @@ class FreeMotion {
   /// Work since the start, as WorkChannels().
   [[nodiscard]] const VecX& work() const { return on_bridge_ ? sampled_work_ : now_.work; }
   [[nodiscard]] FreeDynamics& dynamics() { return dynamics_; }
+  /// Times at which friction stopped or started something.
+  [[nodiscard]] const std::vector<double>& friction_events() const { return events_s_; }
   [[nodiscard]] long steps() const { return steps_; }
   [[nodiscard]] long evaluations() const { return evaluations_; }
   /// Passages found so far, in time order.
@@ -97,9 +99,8 @@ class FreeMotion {
   [[nodiscard]] std::optional<FrictionEvent> FirstEvent(const State& from, double h,
                                                         const State& to);
   void FindStops(const State& from, double h, const State& to, FrictionEvent* first);
-  void FindStart(const State& from, double h, FrictionEvent* first);
+  void FindStart(const State& from, double h, const State& to, FrictionEvent* first);
   [[nodiscard]] RunSummary Settle(const FrictionEvent& event, double h);
-  [[nodiscard]] RunSummary RestAt(double t_s, BodyStates* states, FrictionPhase phase);
   [[nodiscard]] FrictionPhase RestingPhase(const FrictionEvent& event);
   [[nodiscard]] std::vector<int> Starting(double t_s, const BodyStates& states,
                                           RunSummary* trouble);
@@ -142,7 +143,8 @@ class FreeMotion {
   const double tolerance_;
   std::vector<size_t> rubbing_;  ///< elements of dry friction
   std::vector<char> fresh_;      ///< per element: slides since this very time
-  int settled_here_ = 0;         ///< how often friction was decided at this very time
+  std::vector<double> events_s_;
+  int settled_here_ = 0;  ///< how often friction was decided at this very time
 };
 
 }  // namespace mbv::internal

@@ -148,6 +148,7 @@ void ConstraintSystem::EvaluatePosition() {
   mj_makeConstraint(m, d_);
   // MuJoCo drops a constraint whose Jacobian is zero; no sensible mechanism has one.
   if (d_->ne != rows_) throw EngineError("a closure or drive constrains nothing");
+  if (d_->nf != friction_rows()) throw EngineError("friction acts on nothing");
 }
 
 void ConstraintSystem::EvaluatePassive() {
@@ -232,6 +233,30 @@ void ConstraintSystem::Bias(VecX* bias) {
     const DrivenPlace& place = engine_.driven[k];
     if (place.is_tendon && driven_row_[k] >= 0) (*bias)[driven_row_[k]] = TendonBias(place.object);
   }
+}
+
+double ConstraintSystem::FrictionUnit(int row) const {
+  const FrictionPlace& place = engine_.frictions[static_cast<size_t>(row)];
+  return place.tendon >= 0 ? length_ : dof_unit_[place.dof];
+}
+
+double ConstraintSystem::HeldLoss(int row) const {
+  double loss = 0.0;
+  for (const size_t e : engine_.frictions[static_cast<size_t>(row)].elements) {
+    if (!sliding_.empty() && sliding_[e] != 0) continue;
+    loss += std::get<FrictionLaw>(engine_.mechanism->elements[e].law).breakaway;
+  }
+  return loss;
+}
+
+double ConstraintSystem::HeldForce(size_t element) const {
+  for (int row = 0; row < friction_rows(); ++row) {
+    const std::vector<size_t>& of = engine_.frictions[static_cast<size_t>(row)].elements;
+    if (std::ranges::find(of, element) == of.end()) continue;
+    const double own = std::get<FrictionLaw>(engine_.mechanism->elements[element].law).breakaway;
+    return d_->efc_force[rows_ + row] * own / HeldLoss(row);
+  }
+  return 0.0;
 }
 
 ConstraintSystem::Gap ConstraintSystem::LargestGap() const {

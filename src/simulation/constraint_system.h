@@ -105,6 +105,23 @@ class ConstraintSystem {
     return load_friction_.size() == 0 ? 0.0 : load_friction_[static_cast<Eigen::Index>(element)];
   }
 
+  /// Rows of MuJoCo's frictionloss, behind the equalities (free motion with dry friction).
+  [[nodiscard]] int friction_rows() const { return static_cast<int>(engine_.frictions.size()); }
+  /// Unit of such a row as row_unit(), and its Jacobian.
+  [[nodiscard]] double FrictionUnit(int row) const;
+  [[nodiscard]] Eigen::Map<const VecX> FrictionJacobian(int row) const {
+    return {d_->efc_J + (rows_ + row) * nv(), nv()};
+  }
+  /// Per force element: sign of the rate with which it slides, 0 at rest, where MuJoCo's row holds
+  /// it up to its breakaway force. Empty: in free motion MuJoCo's rows do all of it; elsewhere the
+  /// rate says.
+  void SetSliding(std::vector<int> sign) { sliding_ = std::move(sign); }
+  [[nodiscard]] const std::vector<int>& sliding() const { return sliding_; }
+  /// Sum of the breakaway forces of what a row holds.
+  [[nodiscard]] double HeldLoss(int row) const;
+  /// Share of an element in the force of MuJoCo's row.
+  [[nodiscard]] double HeldForce(size_t element) const;
+
   /// Largest gaps of the closures: |translation| [m] and rotation angle of welds [rad].
   struct Gap {
     double position_m = 0.0, rotation_rad = 0.0;
@@ -131,6 +148,7 @@ class ConstraintSystem {
   std::vector<int> closure_row_, driven_row_;
   std::vector<bool> coupling_is_length_;
   VecX given_, load_friction_;
+  std::vector<int> sliding_;
   MatX unit_;  // column k: gradient of driven joint k, where it has no row
   Eigen::Matrix<double, 6, Eigen::Dynamic> A0_;  // per MuJoCo body, (1)
 };

@@ -18,12 +18,37 @@ RunSummary GyroUnsupported(const ForceElement& element, const std::string& descr
           .unit = {}};
 }
 
-RunSummary FrictionUnsupported(const Mechanism& mechanism, const ForceElement& element) {
+// Why friction cannot be simulated where some drive is not guided, or "".
+std::string FrictionTrouble(const EngineModel& engine, size_t e, bool free, bool own_events) {
+  const auto& law = std::get<FrictionLaw>(engine.mechanism->elements[e].law);
+  if (!free) return "friction is known where every drive is commanded, and in free motion, only";
+  if (law.per_load() > 0.0) return "friction by the joint's load needs every drive commanded";
+  if (!own_events && law.breakaway != law.coulomb) {
+    return "MuJoCo's frictionloss knows no breakaway force other than coulomb";
+  }
+  const ElementPlace& at = engine.elements[e];
+  const bool guided = std::ranges::any_of(engine.driven, [&](const DrivenPlace& place) {
+    if (place.forced) return false;
+    return place.is_tendon ? place.object == at.tendon : at.dof >= 0 && place.dof == at.dof;
+  });
+  return guided ? "friction on a coordinate that is commanded where others move by forces" : "";
+}
+
+RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::string& why) {
+  const ForceElement& element = engine.mechanism->elements[e];
   return {.stop = Stop::kUnsupported,
-          .message = "element '" + element.name + "', " + Described(mechanism, element) +
-                     ": friction is known where every drive is commanded only",
+          .message = "element '" + element.name + "', " + Described(*engine.mechanism, element) +
+                     ": " + why,
           .where = element.name,
           .unit = {}};
+}
+
+// In free motion MuJoCo's rows hold friction at rest; by itself MuJoCo lets them do all of it.
+void AddHolding(const ConstraintSystem& system, size_t e, ElementMotion* at) {
+  if (system.friction_rows() == 0 || !Rubs(system.engine().mechanism->elements[e])) return;
+  at->sliding = system.sliding().empty() ? 0 : system.sliding()[e];
+  at->rests = at->sliding == 0;
+  if (at->rests) at->held = system.HeldForce(e);
 }
 
 // The coordinate's gradient, of a tendon.
@@ -75,6 +100,7 @@ ElementMotion ElementMotionOf(const ConstraintSystem& system, size_t element) {
   }
   at.rests = std::abs(at.rate) <= place.rest_rate;
   at.load_friction = system.load_friction(element);
+  AddHolding(system, element, &at);
   if (place.carrier >= 0) AddCarrier(system, element, &at);
   return at;
 }
@@ -94,10 +120,11 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     return -spring->preload - PowerSum(spring->polynomial, at.position - spring->free);
   }
   if (const auto* friction = std::get_if<FrictionLaw>(&element.law)) {
-    if (at.rests) return 0.0;
-    const double ratio = at.rate / friction->stribeck_rate;  // beyond all bounds where vs = 0
-    const double curve = std::exp(-(ratio * ratio));
+    if (at.rests) return at.held;
+    const double ratio = at.rate / friction->stribeck_rate;
+    const double curve = friction->stribeck_rate > 0.0 ? std::exp(-(ratio * ratio)) : 0.0;
     const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
+    if (at.sliding != 0) return -at.sliding * most;
     return -std::copysign(most + at.load_friction, at.rate);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
@@ -147,13 +174,15 @@ ElementSlope SlopeOf(const ForceElement& element, double position) {
   return {slope, 0.0};
 }
 
-RunSummary CheckElements(const EngineModel& engine, const Motion& motion) {
+RunSummary CheckElements(const EngineModel& engine, const Motion& motion, bool own_events) {
   const bool released =
       motion.free() ||
       std::ranges::any_of(engine.driven, [](const DrivenPlace& place) { return place.forced; });
-  for (const ForceElement& element : engine.mechanism->elements) {
+  for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
+    const ForceElement& element = engine.mechanism->elements[e];
     if (released && Rubs(element)) {
-      return FrictionUnsupported(*engine.mechanism, element);
+      const std::string why = FrictionTrouble(engine, e, motion.free(), own_events);
+      if (!why.empty()) return FrictionUnsupported(engine, e, why);
     }
     if (released && IsGyroscopic(element)) {
       return GyroUnsupported(element, Described(*engine.mechanism, element));
@@ -183,6 +212,7 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
     if (mjcf::IsPlanned(elements[e])) continue;
     const ElementPlace& place = engine.elements[e];
     ElementMotion at = ElementMotionOf(system, e);
+    if (at.rests && Rubs(elements[e])) continue;  // unknown, or MuJoCo's own
     if (elements[e].drive >= 0 && elements[e].drive < driven_acceleration.size()) {
       at.acceleration = driven_acceleration[elements[e].drive];
     }

@@ -3,7 +3,8 @@
 // Damping, linear springs and rotors of joints are MuJoCo's (damping, stiffness, springref,
 // armature; mjcf/plan.h). What 2.2 has no word for is pushed along the coordinate's gradient u:
 // springs with other terms than the linear one or without it, rotors on tendons, and dry friction
-// (frictionloss is a soft constraint without Stribeck's curve):
+// that slides (frictionloss is a soft constraint without Stribeck's curve; it serves at rest in
+// free motion, stick_slip.h):
 //   F(q, q̇, q̈),  qfrc = F u                                                                   (1)
 // A rotor on a tendon needs q̈ before it is known: the commanded one, so that its drive must be
 // guided.
@@ -24,8 +25,10 @@ struct RotorTurning {
 /// Motion of an element's coordinate.
 struct ElementMotion {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
-  bool rests = false;          ///< where it may rub: at most at the rest rate
+  bool rests = false;          ///< where it may rub: at most at the rest rate, or held
   double load_friction = 0.0;  ///< by the joint's load (load_friction.h)
+  int sliding = 0;             ///< where it is known: sign of the rate
+  double held = 0.0;           ///< force of MuJoCo's row that holds it
   RotorTurning turning = {};
 };
 
@@ -36,8 +39,8 @@ struct ElementMotion {
 /// dq/dq̇ of MuJoCo's velocities (nv).
 [[nodiscard]] VecX ElementGradient(const ConstraintSystem& system, size_t element);
 
-/// Force of an element along its coordinate [N or N m]; of friction at rest 0, the middle of what
-/// statics allows.
+/// Force of an element along its coordinate [N or N m]; of friction at rest what MuJoCo holds it
+/// with, or 0, the middle of what statics allows.
 [[nodiscard]] double ForceOf(const ForceElement& element, const ElementMotion& at);
 
 /// Friction may be anywhere within ± this: the breakaway force at rest, otherwise 0.
@@ -67,9 +70,11 @@ struct ElementSlope {
 };
 [[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position);
 
-/// kUnsupported for a rotor on a distance drive that is not guided, and for friction and rotors
-/// with a carrier where some drive is not.
-[[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion);
+/// kUnsupported for a rotor on a distance drive that is not guided, for rotors with a carrier where
+/// some drive is not, and for friction there but in free motion: of what a guided coordinate bears,
+/// by the joint's load, and, without our own events, other than Coulomb's.
+[[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion,
+                                       bool own_events);
 
 /// True if there is something that MuJoCo lacks.
 [[nodiscard]] bool HasLacking(const Mechanism& mechanism);

@@ -203,6 +203,25 @@ void SetRestRates(double duration_s, EngineModel* engine) {
   }
 }
 
+void AddFrictionRows(EngineModel* engine) {
+  mjModel& m = *engine->m;
+  std::vector<FrictionPlace> places;
+  for (int dof = 0; dof < m.nv; ++dof) places.push_back({.dof = dof, .elements = {}});
+  for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
+  for (size_t e = 0; e < engine->elements.size(); ++e) {
+    if (!Rubs(engine->mechanism->elements[e])) continue;
+    const ElementPlace& place = engine->elements[e];
+    const int at = place.tendon >= 0 ? m.nv + place.tendon : place.dof;
+    const double loss = std::get<FrictionLaw>(engine->mechanism->elements[e].law).breakaway;
+    (place.tendon >= 0 ? m.tendon_frictionloss[place.tendon] : m.dof_frictionloss[place.dof]) +=
+        loss;
+    places[static_cast<size_t>(at)].elements.push_back(e);
+  }
+  std::erase_if(places, [](const FrictionPlace& place) { return place.elements.empty(); });
+  m.njmax += static_cast<int>(places.size());
+  engine->frictions = std::move(places);
+}
+
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine) {
   for (const DriveForce& force : motion.forces) {
     DrivenPlace& place = engine->driven[static_cast<size_t>(force.drive)];

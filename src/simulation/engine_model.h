@@ -34,6 +34,12 @@ struct ElementPlace {
   int carrier = -1;  ///< MuJoCo's body whose turning a rotor feels
 };
 
+/// A row of MuJoCo's frictionloss, and the elements that rub there.
+struct FrictionPlace {
+  int dof = -1, tendon = -1;  ///< one of both
+  std::vector<size_t> elements;
+};
+
 struct EngineModel {
   const Mechanism* mechanism = nullptr;
   mjcf::Plan plan;
@@ -44,6 +50,7 @@ struct EngineModel {
   std::vector<int> coupling_equality;       ///< per coupling
   std::vector<int> spring_tendon;           ///< per spring
   std::vector<ElementPlace> elements;       ///< per force element
+  std::vector<FrictionPlace> frictions;     ///< in the order of MuJoCo's rows; AddFrictionRows()
   std::vector<std::vector<int>> joint_ids;  ///< per mechanism joint: MuJoCo joints, inner to outer
   std::vector<bool> dof_is_rotation3;       ///< first of three dofs of a ball (or of a free joint's
                                             ///< rotation): quaternion coordinates
@@ -68,6 +75,10 @@ void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data);
 
 /// What counts as rest in a motion of this length, for every force element.
 void SetRestRates(double duration_s, EngineModel* engine);
+
+/// Gives MuJoCo rows of frictionloss where elements rub, with the breakaway forces as losses. To be
+/// called before the data is made.
+void AddFrictionRows(EngineModel* engine);
 
 /// Switches off the guiding constraints of the drives whose force the motion gives.
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);

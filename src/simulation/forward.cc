@@ -13,6 +13,7 @@
 #include "simulation/integrator.h"
 #include "simulation/session.h"
 #include "simulation/steps.h"
+#include "simulation/stick_slip.h"
 
 namespace mbv::simulation {
 namespace {
@@ -135,8 +136,13 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   if (RunSummary summary = CheckStep(s); !summary.ok()) return summary;
   const double largest_gap = kApart * ExtentOf(*s->engine.mechanism);
   Integrator integrator(s, AdjustedStep(s->motion, s->options.step_s));
+  StickSlip friction(s, &integrator, command);
   const LoopClock clock;
+  if (friction.acts()) friction.FindSliding();
   integrator.Start(first);
+  if (friction.acts()) {
+    if (RunSummary summary = friction.Begin(); !summary.ok()) return summary;
+  }
   s->FindShared();
   s->work.Start(s->WorkRates());
   s->Record(0);
@@ -144,13 +150,15 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   for (size_t i = 0; i < steps.size(); ++i) {
     const Step& step = steps[i];
     const double h = step.to_s - step.from_s;
-    if (step.uniform == 4) {
+    if (friction.acts()) {
+      if (RunSummary summary = friction.Advance(step); !summary.ok()) return summary;
+    } else if (step.uniform == 4) {
       integrator.MultiStep(h, ends[i], step.to_s);
     } else {
       integrator.RungeKutta(h, middles[i], ends[i], step.from_s);
     }
     if (!integrator.healthy()) return Failure("the simulated motion diverged", step.to_s);
-    s->work.Step(h, step.uniform == 4, s->WorkRates());
+    if (!friction.acts()) s->work.Step(h, step.uniform == 4, s->WorkRates());
     if (step.sample < 0) continue;
     s->Record(static_cast<size_t>(step.sample));
     if (RunSummary summary = CheckSample(*s, largest_gap, step.to_s); !summary.ok()) return summary;

@@ -1,6 +1,7 @@
 #include "simulation/integrator.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "mjcf/mjcf.h"
 
@@ -18,6 +19,13 @@ constexpr double kLightest = 1e-4;
 constexpr int kStartRepeats = 4;
 // How far off the acceleration is that the solver starts from [m/s², rad/s²].
 constexpr double kNudge = 1e-9;
+// What MuJoCo's solver takes to decide which rows of friction give way.
+constexpr int kFrictionIterations = 100;
+// A row that gives way anyway is put so many times as far off as its force could accelerate it.
+constexpr double kBeyond = 10.0;
+constexpr double kUnbounded = 1e20;
+// A smaller share of what its force could do to a row is no acceleration.
+constexpr double kMoves = 1e-6;
 // Shares of the largest pivot of J, see the head of integrator.h.
 constexpr double kWeak = 0.01, kNear = 0.2;
 
@@ -34,6 +42,13 @@ Integrator::Integrator(Session* session, double h)
   // Rotation rows: of that mass at a characteristic length.
   largest_R_ = s_.system.row_unit() / s_.system.length();
   largest_R_ = (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_)) * largest_R_.cwiseAbs2();
+  largest_friction_R_.resize(s_.system.friction_rows());
+  friction_R_ = friction_aref_ = largest_friction_R_;
+  for (int row = 0; row < s_.system.friction_rows(); ++row) {
+    const double unit = s_.system.FrictionUnit(row) / s_.system.length();
+    largest_friction_R_[row] =
+        (1.0 - kMjcfImpedance) / (kLightest * mj_getTotalmass(m_)) * unit * unit;
+  }
   q_ = Eigen::Map<const VecX>(d_->qpos, m_->nq);
   v_ = Eigen::Map<const VecX>(d_->qvel, m_->nv);
   a_.fill(VecX::Zero(m_->nv));
@@ -41,6 +56,26 @@ Integrator::Integrator(Session* session, double h)
   // tolerance only ends its line search, which without one would hunt round-off fifty times.
   session->engine.m->opt.iterations = 1;
   session->engine.m->opt.tolerance = 1e-12;
+}
+
+void Integrator::Restore(const Node& node) {
+  q_ = node.q;
+  v_ = node.v;
+  guidance_ = node.guidance;
+  a_ = node.a;
+  f_ = node.f;
+  nodes_ = node.nodes;
+  std::copy(a_[0].begin(), a_[0].end(), d_->qacc);
+  s_.system.force() = f_[0];
+}
+
+void Integrator::EvaluateAgain(const Commanded& at, double t_s) {
+  expected_ = f_[0];
+  warm_ = a_[0];
+  Evaluate(q_, v_, at, t_s);
+  for (int i = 0; i < kStartRepeats; ++i) SolveAgain();
+  a_[0] = qacc();
+  f_[0] = s_.system.force();
 }
 
 void Integrator::Start(const Commanded& first) {
@@ -191,8 +226,86 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const Commanded& at, dou
 // MuJoCo's constraint stage, from a start that is a little off: it takes no Newton step shorter
 // than 1e-15, and what that leaves undone in the acceleration is divided by R in the force.
 void Integrator::SolveConstraints() {
+  if (friction_aref_.size() == 0) return SolveOnce();
+  HoldFriction(VecX::Zero(friction_aref_.size()));
+  SolveOnce();
+  if (!FrictionExceeds()) return;
+  // MuJoCo decides with soft rows; what that leaves open is decided with hard ones.
+  VecX gives = DecideFriction();
+  for (Eigen::Index i = 0; i <= 2 * gives.size(); ++i) {
+    HoldFriction(gives);
+    SolveOnce();
+    if (!RefineFriction(&gives)) return;
+  }
+}
+
+// Rows that hold more than their loss give way, rows that move with their force hold. False where
+// there are none.
+bool Integrator::RefineFriction(VecX* gives) const {
+  bool changed = false;
+  for (int row = 0; row < s_.system.friction_rows(); ++row) {
+    const int i = s_.system.rows() + row;
+    const double loss = s_.system.HeldLoss(row), force = d_->efc_force[i];
+    const double moves = s_.system.FrictionJacobian(row).dot(qacc()) - friction_aref_[row];
+    double& sign = (*gives)[row];
+    if (loss > 0.0 && sign == 0.0 && std::abs(force) > loss) {
+      sign = force > 0.0 ? 1.0 : -1.0;
+      changed = true;
+    } else if (sign * moves > kMoves * loss * d_->efc_diagApprox[i]) {
+      sign = 0.0;
+      changed = true;
+    }
+  }
+  return changed;
+}
+
+void Integrator::SolveOnce() {
   Eigen::Map<VecX>(d_->qacc_warmstart, m_->nv).array() += kNudge;
   mj_fwdConstraint(m_, d_);
+}
+
+// Rows hold without bound, but for those that exert ± their loss (`gives`).
+void Integrator::HoldFriction(const VecX& gives) {
+  for (Eigen::Index row = 0; row < gives.size(); ++row) {
+    const int i = s_.system.rows() + static_cast<int>(row);
+    const double loss = s_.system.HeldLoss(static_cast<int>(row));
+    d_->efc_R[i] = kSoftness * friction_R_[row];
+    d_->efc_D[i] = 1.0 / d_->efc_R[i];
+    d_->efc_frictionloss[i] = loss > 0.0 && gives[row] == 0.0 ? kUnbounded : loss;
+    d_->efc_aref[i] = friction_aref_[row] + kBeyond * gives[row] * loss * d_->efc_diagApprox[i];
+  }
+}
+
+bool Integrator::FrictionExceeds() const {
+  for (int row = 0; row < s_.system.friction_rows(); ++row) {
+    const double loss = s_.system.HeldLoss(row);
+    if (loss > 0.0 && std::abs(d_->efc_force[s_.system.rows() + row]) > loss) return true;
+  }
+  return false;
+}
+
+// The sign of the force of each row that MuJoCo finds at its bound, else 0.
+VecX Integrator::DecideFriction() {
+  for (int row = 0; row < s_.system.friction_rows(); ++row) {
+    const int i = s_.system.rows() + row;
+    d_->efc_R[i] = friction_R_[row];
+    d_->efc_D[i] = 1.0 / d_->efc_R[i];
+    d_->efc_frictionloss[i] = s_.system.HeldLoss(row);
+    d_->efc_aref[i] = friction_aref_[row];
+  }
+  mjOption& option = s_.engine.m->opt;
+  const int iterations = std::exchange(option.iterations, kFrictionIterations);
+  const double tolerance = std::exchange(option.tolerance, 0.0);
+  SolveOnce();
+  option.iterations = iterations;
+  option.tolerance = tolerance;
+  VecX gives = VecX::Zero(s_.system.friction_rows());
+  for (int row = 0; row < s_.system.friction_rows(); ++row) {
+    const int state = d_->efc_state[s_.system.rows() + row];
+    if (state == mjCNSTRSTATE_LINEARNEG) gives[row] = 1.0;
+    if (state == mjCNSTRSTATE_LINEARPOS) gives[row] = -1.0;
+  }
+  return gives;
 }
 
 // (1) without the expected force; R and its inverse D.
@@ -208,7 +321,20 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance gu
   Eigen::Map<VecX> R(d_->efc_R, rows);
   R = kSoftness * R.cwiseMin(largest_R_);
   Eigen::Map<VecX>(d_->efc_D, rows) = R.cwiseInverse();
+  SetFrictionRows(v);
   ApplyReference();
+}
+
+// Rows that hold what rests: no acceleration, as in (1).
+void Integrator::SetFrictionRows(const VecX& v) {
+  const int rows = s_.system.rows();
+  for (int row = 0; row < s_.system.friction_rows(); ++row) {
+    const FrictionPlace& place = s_.engine.frictions[static_cast<size_t>(row)];
+    const double bias = place.tendon >= 0 ? s_.system.TendonBias(place.tendon) : 0.0;
+    friction_R_[row] =
+        std::min((1.0 - kMjcfImpedance) * d_->efc_diagApprox[rows + row], largest_friction_R_[row]);
+    friction_aref_[row] = -bias - b_ * s_.system.FrictionJacobian(row).dot(v);
+  }
 }
 
 // With redundant constraints the self-stress is determined through R alone, and a force that relies

@@ -44,6 +44,18 @@ class Integrator {
   /// Four evaluations and one at the end.
   void RungeKutta(double h, const Commanded& middle, const Commanded& end, double from_s);
 
+  /// A node to come back to.
+  struct Node {
+    VecX q, v, guidance;
+    std::array<VecX, 6> a;
+    std::array<VecX, 4> f;
+    int nodes = 0;
+  };
+  [[nodiscard]] Node Save() const { return {q_, v_, guidance_, a_, f_, nodes_}; }
+  void Restore(const Node& node);
+  /// The present node once more, where forces have jumped.
+  void EvaluateAgain(const Commanded& at, double t_s);
+
   /// False once the accelerations have diverged.
   [[nodiscard]] bool healthy() const { return IsSane(d_->qacc, m_->nv); }
 
@@ -53,6 +65,12 @@ class Integrator {
                 Guidance guidance = Guidance::kNew);
   void SetReference(const VecX& v, const DrivenSample& at, Guidance guidance);
   void ApplyReference();
+  void SetFrictionRows(const VecX& v);
+  void SolveOnce();
+  void HoldFriction(const VecX& gives);
+  [[nodiscard]] bool FrictionExceeds() const;
+  [[nodiscard]] VecX DecideFriction();
+  [[nodiscard]] bool RefineFriction(VecX* gives) const;
   void SolveConstraints();
   void SolveAgain();
   void RememberNode();
@@ -69,7 +87,9 @@ class Integrator {
   mjData* const d_;
   double b_ = 0.0, k_ = 0.0;  // of (1)
   VecX largest_R_;            // per row [1/kg], [1/(kg m²)]
-  VecX q_, v_;                // corrected state at the present node
+  VecX largest_friction_R_;   // the same, per row of friction
+  VecX friction_R_, friction_aref_;
+  VecX q_, v_;  // corrected state at the present node
   VecX q_p_, v_p_, mean_, work_, warm_;
   VecX bias_, rate_, guidance_, aref_, expected_;
   std::array<VecX, 6> a_;  // accelerations at the last nodes, newest first

@@ -37,6 +37,8 @@ struct Energies {
 class WorkMeter {
  public:
   void Start(const VecX& power);
+  /// The same node with another power, after a jump of the forces.
+  void Jump(const VecX& power) { power_[0] = power; }
   void Middle(const VecX& power) { middle_ = power; }
   /// The step of length `h` to a node with this power.
   void Step(double h, bool multistep, const VecX& power);

@@ -107,6 +107,7 @@ VecX OpenedForces(const ConstraintSystem& system) {
 VecX Session::Bands() {
   const auto driven = static_cast<Eigen::Index>(engine.driven.size());
   VecX bands = VecX::Zero(driven);
+  if (motion.free()) return bands;  // MuJoCo finds what holds
   const VecX found = system.force();
   for (size_t e = 0; e < engine.elements.size(); ++e) {
     const ElementMotion at = ElementMotionOf(system, e);
@@ -240,7 +241,11 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
     GuideDrives(false, &engine);
   }
   if (options.drives == DriveMode::kServo) FindServos(&engine);
-  if (RunSummary summary = CheckElements(engine, motion); !summary.ok()) return summary;
+  const bool own_events = options.engine == Engine::kCorrected;
+  if (RunSummary summary = CheckElements(engine, motion, own_events); !summary.ok()) {
+    return summary;
+  }
+  if (motion.free()) AddFrictionRows(&engine);
   Session session(std::move(engine), motion, options, run);
   session.start = std::move(start);
   session.progress = progress;

@@ -89,6 +89,25 @@ TEST(Derivatives, SamplesThatDoNotResolveAFastMotionAreNotJudgedAndSaySo) {
   EXPECT_GT(wrong.Worst(), limit);
 }
 
+// Dry friction stops d1 at 0.204 s: its acceleration jumps. Beside the jump nothing is judged if
+// the witness says where it is; everywhere else all is.
+TEST(Derivatives, AccelerationsMayJumpWhereAWitnessSaysThatFrictionStopped) {
+  const double limit = *RowOf(Metric::kDerivatives).limits.reference, stop = 0.204;
+  Fast slides(20.0);
+  const Trace& trace = slides.trace;
+  for (size_t i = 0; i < trace.time_s.size(); ++i) {
+    const double left = std::max(0.0, stop - trace.time_s[i]);
+    slides.trace.values.row(static_cast<Eigen::Index>(i)) << -left * left, 2.0 * left,
+        left > 0.0 ? -2.0 : 0.0, 0.0, 0.7, 0.0, 0.0, 0.0;
+  }
+  EXPECT_GT(slides.Worst(), limit);
+  slides.trace.breaks_s = {stop};
+  EXPECT_LT(slides.Worst(), limit);
+  EXPECT_TRUE(slides.Measure().derivatives_gap.empty());
+  synthetic::Stretch(&slides.trace, "d1.acceleration", 1.0 + 4.0 * limit);
+  EXPECT_GT(slides.Worst(), limit);
+}
+
 TEST(Derivatives, ADriveHeldStillIsMeasuredByTheOnesThatMove) {
   const double limit = *RowOf(Metric::kDerivatives).limits.reference;
   // 70 m/s² RMS beside it: the floor is 7 cm/s².

@@ -10,6 +10,7 @@
 #include "reference/rest_decision.h"
 #include "tests/reference/fixture.h"
 #include "tests/shipped.h"
+#include "tests/stacked_blocks.h"
 
 namespace mbv::fixtures {
 namespace {
@@ -17,68 +18,6 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 // What steps of tolerance 1e-12 leave, events included.
 constexpr double kFollowed = 1e-10;
-
-// Blocks of these masses in a row, each sliding along x on the one before (the first on the
-// ground), with these laws of friction between them; the first on a spring whose force vanishes at
-// x = 0.
-struct Stack {
-  std::vector<double> masses;
-  std::vector<FrictionLaw> laws;
-  double stiffness = 0.0;
-
-  [[nodiscard]] Mechanism Make() const {
-    Mechanism m;
-    m.name = "stack";
-    m.gravity_W.setZero();
-    m.bodies = {MakeWorld()};
-    for (size_t i = 0; i < masses.size(); ++i) {
-      const std::string number = std::to_string(i + 1);
-      m.bodies.push_back(MakeBody("block" + number, masses[i], Vec3::Zero(), Vec3::Constant(0.01)));
-      m.joints.push_back(MakeJoint("slide" + number, JointKind::kPrismatic, static_cast<int>(i),
-                                   Vec3::Zero(), static_cast<int>(i) + 1, Vec3::Zero()));
-      m.joints.back().axis = Vec3::UnitX();
-      Drive motor;
-      motor.name = "motor" + number;
-      motor.kind = JointDrive{static_cast<int>(i), 0};
-      m.drives.push_back(motor);
-      ForceElement dry;
-      dry.name = "dry" + number;
-      dry.joint = static_cast<int>(i);
-      dry.law = laws[i];
-      m.elements.push_back(dry);
-    }
-    if (stiffness > 0.0) {
-      ForceElement spring;
-      spring.name = "spring";
-      spring.joint = 0;
-      spring.law = SpringLaw{.polynomial = {stiffness}};
-      m.elements.push_back(spring);
-    }
-    FinishTree(&m);
-    return m;
-  }
-
-  // From x and v of the first block; the others rest on it.
-  [[nodiscard]] static Motion From(const Mechanism& m, double x, double v, double duration_s) {
-    Motion motion;
-    motion.duration_s = duration_s;
-    motion.sample_s = 0.01;
-    for (size_t d = 0; d < m.drives.size(); ++d) {
-      const int drive = static_cast<int>(d);
-      motion.forces.push_back({drive, {}});
-      motion.initial.push_back({.name = m.drives[d].name,
-                                .coordinate = {Coordinate::Kind::kDrive, drive, 0},
-                                .position = d == 0 ? x : 0.0,
-                                .rate = d == 0 ? v : 0.0});
-    }
-    return motion;
-  }
-};
-
-FrictionLaw Coulomb(double force) { return {.coulomb = force, .breakaway = force}; }
-FrictionLaw Jumping(double coulomb, double breakaway) {
-  return {.coulomb = coulomb, .breakaway = breakaway, .stribeck_rate = 0.0};
-}
 
 template <typename Truth>
 double LargestError(const Trace& trace, const char* channel, const Truth& truth) {
@@ -103,9 +42,9 @@ double Unbalanced(const Trace& trace) {
 
 TEST(StickSlip, ASlidingBlockStopsAndStays) {
   const double mass = 2.0, force = 3.0, v0 = 1.7, a = force / mass, stop = v0 / a;
-  const Mechanism m = Stack{{mass}, {Coulomb(force)}}.Make();
+  const Mechanism m = StackedBlocks{{mass}, {CoulombFriction(force)}}.Make();
   for (const double sense : {1.0, -1.0}) {
-    const ForwardRun run = RunForwardReference(m, Stack::From(m, 0.1, sense * v0, 2.0));
+    const ForwardRun run = RunForwardReference(m, StackedBlocks::From(m, 0.1, sense * v0, 2.0));
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     const auto x = [&](double t) {
       const double s = std::min(t, stop);
@@ -124,8 +63,8 @@ TEST(StickSlip, ASlidingBlockStopsAndStays) {
 TEST(StickSlip, ASpringSwingsBackByTwoFrictionForcesLessEachTime) {
   const double mass = 2.0, k = 50.0, coulomb = 1.1, x0 = 0.35, w = std::sqrt(k / mass);
   for (const double breakaway : {coulomb, 2.5 * coulomb}) {
-    const Mechanism m = Stack{{mass}, {Jumping(coulomb, breakaway)}, k}.Make();
-    const ForwardRun run = RunForwardReference(m, Stack::From(m, x0, 0.0, 6.0));
+    const Mechanism m = StackedBlocks{{mass}, {JumpingFriction(coulomb, breakaway)}, k}.Make();
+    const ForwardRun run = RunForwardReference(m, StackedBlocks::From(m, x0, 0.0, 6.0));
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     const auto x = [&](double t) {
       double from = x0, left = t;
@@ -147,8 +86,8 @@ TEST(StickSlip, ASpringSwingsBackByTwoFrictionForcesLessEachTime) {
 // A force that grows evenly, from rest: F = r t sets it free at t = Fs/r.
 TEST(StickSlip, AGrowingForceBreaksABlockAwayAtItsBreakaway) {
   const double mass = 1.5, coulomb = 2.0, breakaway = 3.3, r = 4.0, start = breakaway / r;
-  const Mechanism m = Stack{{mass}, {Jumping(coulomb, breakaway)}}.Make();
-  Motion motion = Stack::From(m, 0.0, 0.0, 1.5);
+  const Mechanism m = StackedBlocks{{mass}, {JumpingFriction(coulomb, breakaway)}}.Make();
+  Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.5);
   motion.forces[0].force = {{RampTerm{.rate = r}}};
   const ForwardRun run = RunForwardReference(m, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -158,7 +97,8 @@ TEST(StickSlip, AGrowingForceBreaksABlockAwayAtItsBreakaway) {
   EXPECT_LT(LargestError(run.trace, "motor1.velocity", v), kFollowed);
   EXPECT_LT(Unbalanced(run.trace), kFollowed);
   // A thousandth more breakaway shows.
-  const Mechanism bent = Stack{{mass}, {Jumping(coulomb, 1.001 * breakaway)}}.Make();
+  const Mechanism bent =
+      StackedBlocks{{mass}, {JumpingFriction(coulomb, 1.001 * breakaway)}}.Make();
   EXPECT_GT(LargestError(RunForwardReference(bent, motion).trace, "motor1.velocity", v), 1e-4);
 }
 
@@ -166,8 +106,8 @@ TEST(StickSlip, AGrowingForceBreaksABlockAwayAtItsBreakaway) {
 TEST(StickSlip, StribeckFrictionFallsFromBreakawayAndBalancesEnergy) {
   for (const double stribeck : {0.05, 0.3}) {
     const FrictionLaw law{.coulomb = 1.0, .breakaway = 2.0, .stribeck_rate = stribeck};
-    const Mechanism m = Stack{{1.0}, {law}, 30.0}.Make();
-    Motion motion = Stack::From(m, 0.0, 0.0, 5.0);
+    const Mechanism m = StackedBlocks{{1.0}, {law}, 30.0}.Make();
+    Motion motion = StackedBlocks::From(m, 0.0, 0.0, 5.0);
     motion.forces[0].force = {{SineTerm{4.0, 1.7, 0.0}}};
     const ForwardRun run = RunForwardReference(m, motion);
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -180,8 +120,8 @@ TEST(StickSlip, StribeckFrictionFallsFromBreakawayAndBalancesEnergy) {
 
 // A force that jumps over breakaway for an instant between two samples is not missed.
 TEST(StickSlip, AShortPeakOfTheForceIsSeen) {
-  const Mechanism m = Stack{{1.0}, {Coulomb(1.0)}}.Make();
-  Motion motion = Stack::From(m, 0.0, 0.0, 1.0);
+  const Mechanism m = StackedBlocks{{1.0}, {CoulombFriction(1.0)}}.Make();
+  Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.0);
   motion.sample_s = 0.1;
   motion.forces[0].force = {{BumpTerm{.start_s = 0.2, .duration_s = 0.3, .height = 1.02}}};
   const ForwardRun run = RunForwardReference(m, motion);
@@ -192,10 +132,11 @@ TEST(StickSlip, AShortPeakOfTheForceIsSeen) {
 // The lower block is pushed: both rest, move as one, or slip, by the force.
 TEST(StickSlip, TwoBlocksRestMoveTogetherOrSlip) {
   const double lower = 2.0, upper = 1.0, ground = 3.0, between = 1.5;
-  const Mechanism m = Stack{{lower, upper}, {Coulomb(ground), Coulomb(between)}}.Make();
+  const Mechanism m =
+      StackedBlocks{{lower, upper}, {CoulombFriction(ground), CoulombFriction(between)}}.Make();
   const double together = ground + (lower + upper) * between / upper;
   for (const double force : {0.9 * ground, 0.5 * (ground + together), 1.4 * together}) {
-    Motion motion = Stack::From(m, 0.0, 0.0, 1.0);
+    Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.0);
     motion.forces[0].force = Constant(force);
     const ForwardRun run = RunForwardReference(m, motion);
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -216,8 +157,9 @@ TEST(StickSlip, TwoBlocksRestMoveTogetherOrSlip) {
 // One stops on the other while both slide on, then both stop at once.
 TEST(StickSlip, TwoBlocksBecomeOneAndStopTogether) {
   const double lower = 2.0, upper = 1.0, ground = 3.0, between = 2.5;
-  const Mechanism m = Stack{{lower, upper}, {Coulomb(ground), Coulomb(between)}}.Make();
-  Motion motion = Stack::From(m, 0.0, 2.0, 3.0);
+  const Mechanism m =
+      StackedBlocks{{lower, upper}, {CoulombFriction(ground), CoulombFriction(between)}}.Make();
+  Motion motion = StackedBlocks::From(m, 0.0, 2.0, 3.0);
   motion.initial[1].rate = -1.0;  // the upper one has 1 m/s
   const ForwardRun run = RunForwardReference(m, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
@@ -248,7 +190,7 @@ TEST(StickSlip, JointsOfALoopBreakAwayTogether) {
     ForceElement dry;
     dry.name = "dry" + std::to_string(j);
     dry.joint = static_cast<int>(j);
-    dry.law = Coulomb(0.3 + 0.2 * static_cast<double>(j));
+    dry.law = CoulombFriction(0.3 + 0.2 * static_cast<double>(j));
     m.elements.push_back(dry);
   }
   const double home = m.joints[0].home[0];
@@ -281,8 +223,9 @@ TEST(StickSlip, JointsOfALoopBreakAwayTogether) {
 }
 
 TEST(StickSlip, FrictionOnACommandedCoordinateBesideFreedomsIsRefused) {
-  const Mechanism m = Stack{{2.0, 1.0}, {Coulomb(1.0), Coulomb(0.5)}}.Make();
-  Motion motion = Stack::From(m, 0.0, 0.0, 1.0);
+  const Mechanism m =
+      StackedBlocks{{2.0, 1.0}, {CoulombFriction(1.0), CoulombFriction(0.5)}}.Make();
+  Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.0);
   motion.forces.erase(motion.forces.begin());
   motion.initial.erase(motion.initial.begin());
   motion.commands = {DriveCommand(m, 0, {{RampTerm{.rate = 1.0}}})};
@@ -295,9 +238,11 @@ TEST(StickSlip, FrictionOnACommandedCoordinateBesideFreedomsIsRefused) {
 // A commanded belt takes the block along; the belt's drive needs no acceleration of its own.
 TEST(StickSlip, ABlockOnACommandedBeltRidesUntilItsForceBreaksItAway) {
   const double mass = 1.2, coulomb = 2.0, breakaway = 3.0, r = 5.0, speed = 0.3;
-  Mechanism m = Stack{{1.0, mass}, {Coulomb(1.0), Jumping(coulomb, breakaway)}}.Make();
+  Mechanism m =
+      StackedBlocks{{1.0, mass}, {CoulombFriction(1.0), JumpingFriction(coulomb, breakaway)}}
+          .Make();
   m.elements.erase(m.elements.begin());
-  Motion motion = Stack::From(m, 0.0, 0.0, 1.5);
+  Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.5);
   motion.forces.erase(motion.forces.begin());
   motion.initial.erase(motion.initial.begin());
   motion.commands = {DriveCommand(m, 0, {{RampTerm{.rate = speed}}})};
