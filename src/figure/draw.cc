@@ -45,6 +45,10 @@ class FigurePainter {
 
   void Curve(const FigurePanel& panel, const FigureCurve& curve, const PanelPlace& place) const {
     if (!curve.line || curve.points.empty()) return;
+    if (curve.extent) {
+      canvas_.Line(OnPaper(curve, place), ColorOf(style_, curve.look), style_.axis_pt);
+      return;
+    }
     // Noise on a logarithmic scale would be a black area.
     const double width = panel.y.log ? 0.75 * style_.line_pt : style_.line_pt;
     canvas_.Line(OnPaper(curve, place), ColorOf(style_, curve.look), width,

@@ -22,7 +22,8 @@ struct FigureCurve {
   FigurePoints points = {};  ///< empty: a row of the legend only
   int look = 0;              ///< which colour and dashes of the style; < 0: black, solid
   bool line = true;
-  int marker = -1;  ///< which shape of kMarkerShapes stands at the points; -1: none
+  bool extent = false;  ///< strokes between ends: thin, and solid whatever the look is
+  int marker = -1;      ///< which shape of kMarkerShapes stands at the points; -1: none
 };
 
 /// Shapes of markers that are told apart without colour.

@@ -92,14 +92,14 @@ class PgfWriter {
   [[nodiscard]] std::string LookOf(const FigureCurve& curve) const {
     const auto index = static_cast<size_t>(std::max(0, curve.look)) % style_.colors.size();
     std::string look = curve.look < 0 ? "black" : fmt::format("mbv{}", index);
-    look += fmt::format(", line width={:g}pt", style_.line_pt);
+    look += fmt::format(", line width={:g}pt", curve.extent ? style_.axis_pt : style_.line_pt);
     std::string pattern;
     const std::vector<double>& dashes = DashesOf(style_, curve.look);
     for (size_t k = 0; k < dashes.size(); ++k) {
       pattern += fmt::format("{}{} {:g}pt", k == 0 ? "" : " ", k % 2 == 0 ? "on" : "off",
                              dashes[k] * style_.line_pt);
     }
-    if (curve.line && !pattern.empty()) look += ", dash pattern=" + pattern;
+    if (curve.line && !curve.extent && !pattern.empty()) look += ", dash pattern=" + pattern;
     if (curve.marker < 0) return look + ", no markers";
     return look + fmt::format("{}, mark={}, mark size={:g}pt, mark options={{solid, fill=white}}",
                               curve.line ? "" : ", only marks",

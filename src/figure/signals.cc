@@ -90,7 +90,8 @@ class OverTimePainter {
                              .points = Placed(Thinned(ValuesOf(trace, signal), kFigureBins)),
                              .look = look});
     const PlotPoints strokes = StrokesOf(trace, signal);
-    if (!strokes.empty()) panel_.curves.push_back({.points = Placed(strokes), .look = look});
+    if (strokes.empty()) return;
+    panel_.curves.push_back({.points = Placed(strokes), .look = look, .extent = true});
   }
 
   void Marks(const Trace& trace, const SignalRow& row, int look, int marker) {

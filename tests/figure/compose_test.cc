@@ -91,6 +91,37 @@ TEST(ComposeFigures, WhatNobodyRecordedIsLeftOutAndTold) {
                                         "that is shown recorded it"));
 }
 
+TEST(ComposeFigures, ForcesAtRestAreSolidStrokesFromEndToEnd) {
+  synthetic::Case c;
+  std::vector<Channel> channels = c.analytic.channels;
+  channels.push_back(MakeChannel(Quantity::kForceBand, "N", "d2"));
+  Trace resting = c.analytic;
+  resting.Reset(c.analytic.time_s, channels);
+  resting.values.leftCols(c.analytic.values.cols()) = c.analytic.values;
+  resting.values.rightCols(1).setZero();
+  resting.values(40, resting.values.cols() - 1) = 3.0;
+  c.analytic = resting;
+  const FigureSet set = ComposeFigures({SpecOf({.signals = {{"d*.force"}}})},
+                                       test::SampledReport(c), Language::kEnglish);
+  const FigurePanel& panel = set.figures[0].panels[0];
+  const double middle = resting.values(40, resting.Find("d2.force"));
+  const FigureCurve& stroke = panel.curves[2];
+  ASSERT_EQ(stroke.points.size(), 3u);
+  EXPECT_TRUE(stroke.extent);
+  EXPECT_EQ(stroke.look, panel.curves[1].look);
+  EXPECT_DOUBLE_EQ(stroke.points[0].second, middle - 3.0);
+  EXPECT_DOUBLE_EQ(stroke.points[1].second, middle + 3.0);
+  // d2 is dashed, its stroke is not.
+  const std::string svg = DrawFigure(set.figures[0], FigureStyles()[0], PictureFormat::kSvg);
+  size_t solid = 0;
+  for (const test::SvgPath& path : test::PathsOf(svg)) {
+    const bool upright =
+        path.points.size() == 2 && std::abs(path.points[0].first - path.points[1].first) < 1e-9;
+    if (upright && path.color == "rgb(83.529412%,36.862745%,0%)") solid += path.dashes.empty();
+  }
+  EXPECT_EQ(solid, 1u);
+}
+
 TEST(ComposeFigures, WithoutALegendNoCurveIsNamed) {
   const FigureSet set = Composed({.signals = {{"d*.force"}}, .legend = false});
   EXPECT_THAT(LabelsOf(set.figures[0].panels[0]), ElementsAre());
