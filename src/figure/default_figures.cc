@@ -78,6 +78,7 @@ class FigureMaker {
                          const ShownUnit& unit, bool legend) const {
     FigurePanel panel{.x = TimeAxis()};
     std::vector<SignalRow> rows;
+    rows.reserve(drives.size());
     for (const std::string& drive : drives) {
       rows.push_back({ChannelName(quantity, drive), Verbatim(drive)});
     }

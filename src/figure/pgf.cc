@@ -141,11 +141,12 @@ class PgfWriter {
     const double h = (map.y_max - map.y_min) / map.rows;
     for (size_t k = 0; k < map.values.size(); ++k) {
       const auto columns = static_cast<size_t>(map.columns);
+      const size_t row = k / columns, column = k % columns;
       const double v = map.values[k];
-      map_ += fmt::format("{:.10g} {:.10g} {}\n",
-                          map.x_min + (static_cast<double>(k % columns) + 0.5) * w,
-                          map.y_min + (static_cast<double>(k / columns) + 0.5) * h,
-                          NumberText(value.Shows(v) ? value.Inner(v) : kNan));
+      map_ +=
+          fmt::format("{:.10g} {:.10g} {}\n", map.x_min + (static_cast<double>(column) + 0.5) * w,
+                      map.y_min + (static_cast<double>(row) + 0.5) * h,
+                      NumberText(value.Shows(v) ? value.Inner(v) : kNan));
     }
   }
 

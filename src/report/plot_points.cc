@@ -65,6 +65,7 @@ std::vector<SharedAxis> ByUnit(const Trace& trace, Quantity quantity,
     axes[unit].subjects.push_back(subject);
   }
   std::vector<SharedAxis> sorted;
+  sorted.reserve(axes.size());
   for (auto& [unit, axis] : axes) sorted.push_back(std::move(axis));
   return sorted;
 }
