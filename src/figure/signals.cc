@@ -12,7 +12,8 @@ std::vector<const WitnessRecord*> ShownWitnesses(const Report& report) {
   std::vector<const WitnessRecord*> shown;
   for (const WitnessRecord& record : report.witnesses) {
     const Role* role = FindRole(record.name);
-    if (role == nullptr || !IsCompared(*role) || record.trace.time_s.empty()) continue;
+    const bool compared = role == nullptr ? record.foreign.has_value() : IsCompared(*role);
+    if (!compared || record.trace.time_s.empty()) continue;
     shown.push_back(&record);
   }
   return shown;

@@ -47,7 +47,8 @@ const char* const kScenarios[] = {"andrews_squeezer/benchmark",
                                   "stewart_legs/dance_inverse",
                                   "journal_crank/press_inverse",
                                   "slotted_screw/turn_inverse",
-                                  "machine_five_bar/draw_inverse"};
+                                  "machine_five_bar/draw_inverse",
+                                  "belt_block/stick_slip"};
 
 struct Case {
   Scenario scenario;
