@@ -37,14 +37,8 @@ std::string WriteFolder(const std::string& out, const ConvergenceReport& report)
 int RunConverge(const ConvergeArguments& arguments) {
   ConvergeOptions options;
   options.steps_s = arguments.steps_s;
-  for (const std::string& text : arguments.set) {
-    const auto value = SplitSet(text);
-    if (!value) {
-      Say(stderr, "--set {}: error: write KEY=VALUE, e.g. parameters.link_mass=0.5\n", text);
-      return 2;
-    }
-    options.scenario.set.push_back(*value);
-  }
+  if (!ReadAssignments(arguments.set, "--set", "parameters.link_mass=0.5", &options.scenario.set))
+    return 2;
   ProgressLine progress(true);
   if (progress.active()) {
     options.progress = [&](const std::string& what, double fraction) {

@@ -16,7 +16,9 @@ namespace {
 
 struct CrosscheckArguments {
   std::vector<std::string> scenarios, set;
-  std::vector<std::string> engines = {"simbody=mbverify-witness-simbody"};
+  std::vector<std::string> engines = {"simbody=mbverify-witness-simbody",
+                                      "mujoco_newest=mbverify-witness-mujoco",
+                                      "mujoco_newest_default=mbverify-witness-mujoco --defaults"};
   std::string markdown, csv;
   JsonOption json;
 };
@@ -72,21 +74,12 @@ int RunCrosscheck(const CrosscheckArguments& arguments) {
   const auto witnesses = WitnessesOf(arguments.engines);
   if (!witnesses) return Refuse("--engine: write NAME=COMMAND", "");
   options.scenario.set.push_back(*witnesses);
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) return Refuse("--set " + text + ": write key=value", "");
-    options.scenario.set.push_back(*set);
-  }
-  std::string trouble;
-  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
-  if (!trouble.empty()) return Refuse(trouble, "");
-  for (const std::string& file : files) {
-    for (const std::string& path : {arguments.json.path(), arguments.markdown, arguments.csv}) {
-      if (const int code = RefuseInput(path, file); code != 0) return code;
-    }
-  }
-  std::vector<CrosscheckRow> rows;
+  if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options.scenario.set))
+    return 2;
   int exit_code = 0;
+  const std::vector<std::string> files = FilesToRun(
+      arguments.scenarios, {arguments.json.path(), arguments.markdown, arguments.csv}, &exit_code);
+  std::vector<CrosscheckRow> rows;
   for (size_t i = 0; i < files.size(); ++i) {
     Say(stderr, "{} of {}: {}\n", i + 1, files.size(), files[i]);
     exit_code = WorseExit(exit_code, AddRows(files[i], options, &rows));

@@ -44,15 +44,7 @@ bool MakeFigureOptions(const FiguresArguments& arguments, FigureOptions* options
   options->language = LanguageOf(arguments.language);
   options->formats = arguments.formats;
   options->only = arguments.only;
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) {
-      (void)Refuse("--set " + text + ": write key=value", "");
-      return false;
-    }
-    options->scenario.set.push_back(*set);
-  }
-  return true;
+  return ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options->scenario.set);
 }
 
 // What was drawn, one figure a line; "" or what went wrong.
@@ -91,16 +83,13 @@ nlohmann::ordered_json OutcomeJson(const std::string& file, const FigureOutcome&
 int Figures(const FiguresArguments& arguments) {
   FigureOptions options;
   if (!MakeFigureOptions(arguments, &options)) return 2;
-  std::string trouble;
-  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
-  if (!trouble.empty()) return Refuse(trouble, "");
-  for (const std::string& file : files) {
-    if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
-  }
+  int exit_code = 0;
+  const std::vector<std::string> files =
+      FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  if (exit_code != 0) return exit_code;
   ProgressLine progress(true);
   FindingPrinter findings(stderr);
   auto results = nlohmann::ordered_json::array();
-  int exit_code = 0;
   for (const std::string& file : files) {
     if (progress.active()) {
       options.progress = [&](const std::string& stage, double fraction) {

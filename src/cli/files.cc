@@ -1,10 +1,11 @@
 #include "cli/files.h"
-#include "cli/terminal.h"
 
 #include <fmt/format.h>
 
 #include <filesystem>
 
+#include "cli/cli.h"
+#include "cli/terminal.h"
 #include "core/files.h"
 #include "pipeline/check_file.h"
 #include "scenario/find_model.h"
@@ -63,6 +64,33 @@ std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& t
   const size_t at = text.find('=');
   if (at == std::string::npos || at == 0) return {};
   return std::pair{text.substr(0, at), text.substr(at + 1)};
+}
+
+bool ReadAssignments(const std::vector<std::string>& texts, const char* option, const char* example,
+                     std::vector<SetValue>* values, const std::string& section) {
+  for (const std::string& text : texts) {
+    const auto value = SplitSet(text);
+    if (!value) {
+      Say(stderr, "{} {}: error: write key=value, e.g. {}\n", option, text, example);
+      return false;
+    }
+    values->emplace_back(section + value->first, value->second);
+  }
+  return true;
+}
+
+std::vector<std::string> FilesToRun(const std::vector<std::string>& arguments,
+                                    const std::vector<std::string>& written, int* exit_code) {
+  std::string trouble;
+  std::vector<std::string> files = ExpandScenarios(arguments, &trouble);
+  *exit_code = trouble.empty() ? 0 : Refuse(trouble, "");
+  for (const std::string& file : files) {
+    for (const std::string& path : written) {
+      if (*exit_code == 0) *exit_code = RefuseInput(path, file);
+    }
+  }
+  if (*exit_code != 0) files.clear();
+  return files;
 }
 
 std::vector<InputFile> InputsOf(const std::string& scenario) {

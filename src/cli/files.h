@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/inputs.h"
+#include "scenario/load_scenario.h"
 
 namespace mbv {
 
@@ -24,6 +25,18 @@ struct LoadOptions;
 
 /// "key=value" → pair; empty if there is no '=' or no key.
 [[nodiscard]] std::optional<std::pair<std::string, std::string>> SplitSet(const std::string& text);
+
+/// Words KEY=VALUE of an option ("--set") → values whose keys begin with `section`, appended; false
+/// after saying what is wrong with one.
+[[nodiscard]] bool ReadAssignments(const std::vector<std::string>& texts, const char* option,
+                                   const char* example, std::vector<SetValue>* values,
+                                   const std::string& section = "");
+
+/// The scenario files to run, none of which needs a file in `written`; empty after saying what is
+/// wrong, with 2 in `exit_code`.
+[[nodiscard]] std::vector<std::string> FilesToRun(const std::vector<std::string>& arguments,
+                                                  const std::vector<std::string>& written,
+                                                  int* exit_code);
 
 /// "m_p=1000" of --set → overrides; false after saying what is wrong with one.
 [[nodiscard]] bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options);

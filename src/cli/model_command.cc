@@ -21,14 +21,7 @@ namespace mbv {
 
 bool ReadParameters(const std::vector<std::string>& texts, LoadOptions* options) {
   std::vector<SetValue> values;
-  for (const std::string& text : texts) {
-    const auto set = SplitSet(text);
-    if (!set) {
-      Say(stderr, "--set {}: error: write PARAMETER=NUMBER, e.g. m_p=45000\n", text);
-      return false;
-    }
-    values.push_back(*set);
-  }
+  if (!ReadAssignments(texts, "--set", "m_p=45000", &values)) return false;
   const Diagnostics findings = ReadParameterOptions(values, options);
   SayText(stderr, findings.Text());
   return !findings.has_errors();

@@ -77,14 +77,7 @@ bool SetCamera(const std::string& camera, ScenarioOptions* options) {
 // What the options set in the scenario; false after a message.
 bool ReadRequest(const RenderArguments& arguments, RenderRequest* request) {
   ScenarioOptions& options = request->scenario;
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) {
-      return Refuse(fmt::format("--set {}: write key=value", text), "e.g. parameters.m_p=45000") ==
-             0;
-    }
-    options.set.push_back(*set);
-  }
+  if (!ReadAssignments(arguments.set, "--set", "parameters.m_p=45000", &options.set)) return false;
   if (!arguments.at.empty()) {
     options.set.emplace_back("snapshots.times_s", "[" + arguments.at + "]");
   }

@@ -89,14 +89,8 @@ bool MakeOptions(const RunArguments& arguments, RunOptions* options) {
   options->script_link = arguments.report_script;
   options->kept_audits = arguments.kept_audits;
   options->data = arguments.data;
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) {
-      Say(stderr, "--set {}: error: write key=value, e.g. simulation.step_s=0.002\n", text);
-      return false;
-    }
-    options->scenario.set.push_back(*set);
-  }
+  if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options->scenario.set))
+    return false;
   if (!arguments.mode.empty()) {
     options->scenario.set.emplace_back("simulation.mode", arguments.mode);
   }

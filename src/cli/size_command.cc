@@ -70,19 +70,12 @@ int RunSize(const SizeArguments& arguments) {
   RunOptions options;
   options.out_dir.clear();
   options.pictures = options.page = false;
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) return Refuse("--set " + text + ": write key=value", "");
-    options.scenario.set.push_back(*set);
-  }
-  std::string trouble;
-  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
-  if (!trouble.empty()) return Refuse(trouble, "");
-  for (const std::string& file : files) {
-    if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
-  }
-  Sized sized;
+  if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options.scenario.set))
+    return 2;
   int exit_code = 0;
+  const std::vector<std::string> files =
+      FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  Sized sized;
   for (const std::string& file : files) {
     exit_code = WorseExit(exit_code, AddScenario(file, options, &sized));
   }

@@ -26,20 +26,6 @@ struct StiffnessArguments {
   JsonOption json;
 };
 
-// "key=value" options as values of a scenario; false after a message.
-bool AddAssignments(const std::vector<std::string>& texts, const char* option, const char* section,
-                    const char* example, std::vector<SetValue>* set) {
-  for (const std::string& text : texts) {
-    const auto assignment = SplitSet(text);
-    if (!assignment) {
-      Say(stderr, "{} {}: error: write NAME=VALUE, e.g. {}\n", option, text, example);
-      return false;
-    }
-    set->emplace_back(std::string(section) + assignment->first, assignment->second);
-  }
-  return true;
-}
-
 // Coordinates that --at leaves out keep their values of the usual pose, if it is told by the same
 // coordinates.
 void FillPose(const Mechanism& mechanism, ScenarioOptions* options) {
@@ -79,8 +65,8 @@ std::optional<PreparedStiffness> PrepareRequest(const StiffnessArguments& argume
                                                 Diagnostics* diagnostics) {
   ScenarioOptions options;
   options.set.emplace_back("mechanism", "\"" + arguments.model + "\"");
-  if (!AddAssignments(arguments.at, "--at", "pose.", "platform.x=-0.05", &options.set) ||
-      !AddAssignments(arguments.set, "--set", "parameters.", "K_act=10000", &options.set)) {
+  if (!ReadAssignments(arguments.at, "--at", "platform.x=-0.05", &options.set, "pose.") ||
+      !ReadAssignments(arguments.set, "--set", "K_act=10000", &options.set, "parameters.")) {
     return {};
   }
   if (!arguments.output.empty()) options.set.emplace_back("output", arguments.output);

@@ -44,7 +44,7 @@ TEST(ConvergeCommand, RefusesBadInputWithExitCode2AndWritesNothing) {
            {scenario + " --steps 0.004,0.003,0.002", "whole fraction"},
            {scenario + " --steps 0.004,0.002", "at least 3 steps"},
            {scenario + " --steps fast", "--steps"},
-           {scenario + " --set nonsense", "write KEY=VALUE"},
+           {scenario + " --set nonsense", "write key=value"},
            {"converge scenarios/no_such.yaml", "no_such.yaml"},
            {"converge scenarios/stabilizing_platform/must_fail/no_yaml.yaml", "no_yaml.yaml:"},
        }) {
