@@ -209,6 +209,7 @@ int RunCli(int argc, char** argv) {
   AddSurveyCommand(&app, &exit_code);
   AddInertiaCommand(&app, &exit_code);
   AddSizeCommand(&app, &exit_code);
+  AddUpgradeCommand(&app, &exit_code);
   AddFiguresCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);

@@ -47,5 +47,6 @@ void AddInertiaCommand(CLI::App* app, int* exit_code);
 void AddCompletionCommand(CLI::App* app, int* exit_code);
 void AddSizeCommand(CLI::App* app, int* exit_code);
 void AddFiguresCommand(CLI::App* app, int* exit_code);
+void AddUpgradeCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

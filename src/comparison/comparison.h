@@ -41,6 +41,7 @@ struct Witness {
     LimitColumn limits = LimitColumn::kReference;
     std::optional<double> force_nrmse;  ///< instead of that limit
     std::vector<std::pair<std::string, std::string>> declined;
+    double compute_s = kNan;  ///< without its start, reading and writing, as it says itself
   };
   std::optional<Foreign> foreign = {};
 };

@@ -31,6 +31,15 @@ std::string TextAt(const Parsed& json, const char* key, std::string* trouble) {
   return "";
 }
 
+// A number of a key, at least 0; NaN where it is left out. Anything else is trouble.
+double AmountAt(const Parsed& json, const char* key, std::string* trouble) {
+  const auto found = json.find(key);
+  if (found == json.end() || found->is_null()) return kNan;
+  if (found->is_number() && found->get<double>() >= 0.0) return found->get<double>();
+  *trouble = fmt::format("witness.json: {} is no number of at least 0", key);
+  return kNan;
+}
+
 void ReadDeclined(const Parsed& json, WitnessAnswer* answer, std::string* trouble) {
   const auto list = json.find("declined");
   if (list == json.end() || list->is_null()) return;
@@ -172,7 +181,8 @@ std::optional<WitnessAnswer> ReadAnswer(std::string_view json, std::string* trou
                        .version = TextAt(root, "version", trouble),
                        .method = TextAt(root, "method", trouble),
                        .refused = TextAt(root, "refused", trouble),
-                       .declined = {}};
+                       .declined = {},
+                       .compute_s = AmountAt(root, "compute_s", trouble)};
   if (const std::string units = TextAt(root, "units", trouble); units != "SI") {
     *trouble =
         fmt::format("witness.json gives its units as '{}': SI and radians are needed", units);

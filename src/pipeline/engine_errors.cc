@@ -24,6 +24,15 @@ double ValueOf(const std::map<Metric, Measured>& metrics, Metric metric) {
 
 }  // namespace
 
+EngineError EngineErrorOf(const ComparisonInput& input, const Trace& trace, const Trace& truth) {
+  const PairComparison pair = ComparePair(input, trace, truth);
+  EngineError error{.engine = {}};
+  error.force_nrmse = ValueOf(pair.metrics, Metric::kForceNrmse);
+  error.force_max_rel = ValueOf(pair.metrics, Metric::kForceMax);
+  error.closure_max_m = ValueOf(MeasureWitness(input, trace).metrics, Metric::kClosureM);
+  return error;
+}
+
 EngineComparison CompareEngines(const ComparisonInput& input, const Trace& truth,
                                 const std::vector<EngineRun>& runs) {
   EngineComparison comparison{.truth = truth.witness, .engines = {}};
@@ -35,12 +44,9 @@ EngineComparison CompareEngines(const ComparisonInput& input, const Trace& truth
       error.failure = run.summary.message;
       continue;
     }
-    const PairComparison pair = ComparePair(input, run.trace, truth);
-    error.force_nrmse = ValueOf(pair.metrics, Metric::kForceNrmse);
-    error.force_max_rel = ValueOf(pair.metrics, Metric::kForceMax);
-    error.closure_max_m = ValueOf(MeasureWitness(input, run.trace).metrics, Metric::kClosureM);
-    error.force_nrmse_later =
-        ValueOf(ComparePair(later, run.trace, truth).metrics, Metric::kForceNrmse);
+    error = EngineErrorOf(input, run.trace, truth);
+    error.engine = KeyOf(run.engine);
+    error.force_nrmse_later = EngineErrorOf(later, run.trace, truth).force_nrmse;
   }
   return comparison;
 }

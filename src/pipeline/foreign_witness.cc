@@ -1,35 +1,15 @@
 #include "pipeline/foreign_witness.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <optional>
-
-#include "core/files.h"
-#include "core/scratch_folder.h"
-#include "core/worker_pool.h"
 #include "exchange/mechanism_json.h"
 #include "exchange/motion_text.h"
 #include "exchange/witness_answer.h"
+#include "mjcf/mjcf.h"
 #include "pipeline/model_text.h"
 #include "pipeline/not_run.h"
+#include "pipeline/program_call.h"
 
 namespace mbv {
 namespace {
-
-namespace fs = std::filesystem;
-
-constexpr double kBytesPerMb = 1e6;
-constexpr size_t kMostLog = 200;  // characters of what a program said last
-
-// A program that stands beside ours is found there, as those are that are built with it.
-std::string OursOr(const std::string& program) {
-  std::error_code error;
-  const fs::path beside = fs::read_symlink("/proc/self/exe", error).parent_path() / program;
-  const bool plain = program.find('/') == std::string::npos;
-  return plain && !error && fs::is_regular_file(beside, error) ? beside.string() : program;
-}
 
 class ForeignRunner {
  public:
@@ -37,7 +17,8 @@ class ForeignRunner {
       : witness_(witness),
         motion_(prepared.scenario.motion),
         mechanism_(mechanism),
-        scratch_("witness") {
+        step_s_(prepared.scenario.simulation.step_s),
+        call_(witness) {
     record_.foreign = Witness::Foreign{.program = "",
                                        .limits = witness.limits,
                                        .force_nrmse = witness.force_nrmse,
@@ -46,13 +27,12 @@ class ForeignRunner {
 
   WitnessRecord Run(const DrivenMotion& driven) {
     std::string trouble = WhyNotAsked();
-    if (trouble.empty()) trouble = scratch_.trouble();
     if (trouble.empty()) trouble = HandOver(driven);
-    if (trouble.empty()) trouble = Call();
+    if (trouble.empty()) trouble = call_.Run();
     if (trouble.empty()) trouble = ReadBack();
     record_.name = record_.trace.witness = witness_.name;
     record_.summary = trouble.empty() ? RunSummary::Done() : NotRun(trouble);
-    record_.summary.wall_s = wall_s_;
+    record_.summary.wall_s = call_.wall_s();
     if (!trouble.empty()) record_.trace = {};
     return std::move(record_);
   }
@@ -83,66 +63,28 @@ class ForeignRunner {
         {"mechanism.json", MechanismJson(mechanism_)},
         {"motion.csv", MotionCsv(mechanism_, handed)},
         {"loads.csv", LoadsCsv(mechanism_, handed)},
-        {"model.xml", MjcfFor(mechanism_, ModelDrives::kHeld).text},
+        {"model.xml", WriteMjcf(mechanism_, {.step_s = step_s_})},
         {"model.urdf", ModelText(mechanism_, ModelFormat::kUrdf)}};
     for (const auto& [name, text] : files) {
-      const std::string trouble = WriteFile(scratch_.path() / name, text, false);
+      const std::string trouble = call_.Give(name, text);
       if (!trouble.empty()) return trouble;
     }
     return "";
   }
 
-  std::string Call() {
-    WorkerJob job{.argv = witness_.command, .log = scratch_.path() / "log"};
-    job.argv.front() = OursOr(job.argv.front());
-    job.folder = scratch_.path();
-    job.data_bytes = witness_.memory_mb * kBytesPerMb;
-    job.file_bytes = witness_.output_mb * kBytesPerMb;
-    WorkerEnd end;
-    WorkerPool pool;
-    pool.timeout_s = witness_.timeout_s;
-    pool.ended = [&](size_t, const WorkerEnd& how) { end = how; };
-    if (!pool.Run({job})) return "was stopped";
-    wall_s_ = end.cost.wall_s;
-    if (end.timed_out) return fmt::format("took longer than {:g} s", witness_.timeout_s) + Said();
-    if (!end.trouble.empty()) return fmt::format("'{}' {}", job.argv.front(), end.trouble) + Said();
-    if (end.signal != 0) return fmt::format("was ended by signal {}", end.signal) + Said();
-    if (end.exit_code != 0) return fmt::format("ended with exit code {}", end.exit_code) + Said();
-    return "";
-  }
-
-  // The last line that the program printed.
-  [[nodiscard]] std::string Said() const {
-    std::string log = Text("log").value_or("");
-    while (!log.empty() && static_cast<unsigned char>(log.back()) <= ' ') log.pop_back();
-    const size_t line = log.rfind('\n');
-    if (line != std::string::npos) log = log.substr(line + 1);
-    for (char& c : log) {
-      if (static_cast<unsigned char>(c) < ' ') c = ' ';
-    }
-    return log.empty() ? "" : ": " + log.substr(0, kMostLog);
-  }
-
-  // Of a file in the folder that is not longer than it may be.
-  [[nodiscard]] std::optional<std::string> Text(const char* name) const {
-    std::error_code error;
-    const auto bytes = fs::file_size(scratch_.path() / name, error);
-    if (error || static_cast<double>(bytes) > witness_.output_mb * kBytesPerMb) return {};
-    return ReadWholeFile(scratch_.path() / name);
-  }
-
   std::string ReadBack() {
-    const auto json = Text("witness.json");
-    if (!json) return "left no witness.json" + Said();
+    const auto json = call_.Text("witness.json");
+    if (!json) return "left no witness.json" + call_.Said();
     std::string trouble;
     const auto answer = ReadAnswer(*json, &trouble);
     if (!answer) return trouble;
     record_.foreign->program =
         answer->program + (answer->version.empty() ? "" : " " + answer->version);
     record_.foreign->declined = answer->declined;
+    record_.foreign->compute_s = answer->compute_s;
     if (!answer->refused.empty()) return "declines: " + answer->refused;
-    const auto csv = Text("traces.csv");
-    if (!csv) return "left no traces.csv" + Said();
+    const auto csv = call_.Text("traces.csv");
+    if (!csv) return "left no traces.csv" + call_.Said();
     auto trace = ReadWitnessTrace(*csv, mechanism_, times_s_, &trouble);
     if (trace) record_.trace = std::move(*trace);
     return trouble;
@@ -151,9 +93,9 @@ class ForeignRunner {
   const ForeignWitness& witness_;
   const Motion& motion_;
   const Mechanism& mechanism_;
-  ScratchFolder scratch_;
+  const double step_s_;
+  ProgramCall call_;
   std::vector<double> times_s_;
-  double wall_s_ = 0.0;
   WitnessRecord record_;
 };
 

@@ -13,8 +13,12 @@ namespace {
 
 using Rows = std::vector<CrosscheckRow>;
 
-// A run's time by its samples; the time to start a program and to read and write files is in it.
-double MicrosecondsEach(double seconds, const WitnessRecord& witness) {
+// A run's time by its samples: of a program outside what it tells of its computation, else with the
+// time to start it and to read and write files.
+double MicrosecondsEach(const WitnessRecord& witness) {
+  double seconds = witness.summary.wall_s;
+  if (witness.foreign && !std::isnan(witness.foreign->compute_s))
+    seconds = witness.foreign->compute_s;
   const auto samples = static_cast<double>(witness.trace.time_s.size());
   return seconds > 0.0 && samples > 0.0 ? 1e6 * seconds / samples : kNan;
 }
@@ -39,13 +43,18 @@ const PairComparison* PairWithReference(const Comparison& comparison, const std:
   return pair != nullptr ? pair : comparison.FindPair(PairName(role::kReference.name, witness));
 }
 
+double ValueOf(const PairComparison& pair, Metric metric) {
+  const auto found = pair.metrics.find(metric);
+  return found == pair.metrics.end() ? kNan : found->second.value;
+}
+
 CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
   CrosscheckRow row{.mechanism = report.mechanism,
                     .scenario = report.scenario,
                     .engine = EngineName(witness),
                     .program = witness.foreign ? witness.foreign->program : "",
                     .loop_gap_m = GapOf(report.comparison, witness.name),
-                    .sample_us = MicrosecondsEach(witness.summary.wall_s, witness),
+                    .sample_us = MicrosecondsEach(witness),
                     .why = witness.summary.ok() ? "" : witness.summary.message};
   if (!row.why.empty()) return row;
   const PairComparison* pair = PairWithReference(report.comparison, witness.name);
@@ -53,9 +62,9 @@ CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
     row.why = pair == nullptr ? "is not held against the reference" : pair->reason;
     return row;
   }
-  const auto found = pair->metrics.find(Metric::kForceNrmse);
-  if (found != pair->metrics.end()) row.force_nrmse = found->second.value;
-  if (found == pair->metrics.end()) row.why = "has no drive force in common with the reference";
+  row.force_nrmse = ValueOf(*pair, Metric::kForceNrmse);
+  row.pose_m = ValueOf(*pair, Metric::kPoseM);
+  if (std::isnan(row.force_nrmse)) row.why = "has no drive force in common with the reference";
   return row;
 }
 
@@ -113,13 +122,15 @@ std::string ToText(const Rows& rows) {
   const TextTable table("", {{"scenario", WidthOf(Distinct(rows, &CaseOf))},
                              {"  engine", WidthOf(Distinct(rows, &EngineAndProgram)) - 2},
                              {"drive force, RMS", 18},
+                             {"pose", 12},
                              {"loop gap", 12},
                              {"per sample", 14}});
   std::string text = table.Head() + "\n";
   for (const CrosscheckRow& row : rows) {
     text +=
         table.Row({CaseOf(row), "  " + EngineAndProgram(row), NumberText("{:.1e}", row.force_nrmse),
-                   NumberText("{:.1e} m", row.loop_gap_m), NumberText("{:.3g} us", row.sample_us)});
+                   NumberText("{:.1e} m", row.pose_m), NumberText("{:.1e} m", row.loop_gap_m),
+                   NumberText("{:.3g} us", row.sample_us)});
     text += (row.why.empty() ? "" : "  " + row.why) + "\n";
   }
   return text;
@@ -148,14 +159,15 @@ std::string ToMarkdown(const Rows& rows) {
 }
 
 std::string ToCsv(const Rows& rows) {
-  std::string text = "mechanism,scenario,engine,program,force_nrmse,loop_gap_m,sample_us,why\n";
+  std::string text =
+      "mechanism,scenario,engine,program,force_nrmse,pose_m,loop_gap_m,sample_us,why\n";
   for (const CrosscheckRow& row : rows) {
     std::string why = row.why;
     for (size_t at = 0; (at = why.find('"', at)) != std::string::npos; at += 2)
       why.insert(at, "\"");
-    text += fmt::format("{},{},\"{}\",\"{}\",{:.17g},{:.17g},{:.17g},\"{}\"\n", row.mechanism,
-                        row.scenario, row.engine, row.program, row.force_nrmse, row.loop_gap_m,
-                        row.sample_us, why);
+    text += fmt::format("{},{},\"{}\",\"{}\",{:.17g},{:.17g},{:.17g},{:.17g},\"{}\"\n",
+                        row.mechanism, row.scenario, row.engine, row.program, row.force_nrmse,
+                        row.pose_m, row.loop_gap_m, row.sample_us, why);
   }
   return text;
 }
@@ -168,6 +180,7 @@ std::string ToJson(const Rows& rows) {
                     {"engine", row.engine},
                     {"program", row.program},
                     {"force_nrmse", Number(row.force_nrmse)},
+                    {"pose_m", Number(row.pose_m)},
                     {"loop_gap_m", Number(row.loop_gap_m)},
                     {"sample_us", Number(row.sample_us)},
                     {"why", row.why}});

@@ -15,9 +15,11 @@ struct CrosscheckRow {
   std::string engine;         ///< "closed form", "MuJoCo, default softness, …", "simbody"
   std::string program;        ///< of a foreign witness, as it calls itself: "Simbody 3.7"
   double force_nrmse = kNan;  ///< of all drive forces, against the generic reference
+  double pose_m = kNan;       ///< outputs' origins, against the generic reference
   double loop_gap_m = kNan;   ///< its own largest; NaN if it tells none
-  double sample_us = kNan;    ///< wall time of its run by samples; NaN where it is not timed alone
-  std::string why;            ///< why there is no number; "" if there is
+  /// Wall time by samples, of its computation or of its whole run; NaN where it is not timed alone.
+  double sample_us = kNan;
+  std::string why;  ///< why there is no number; "" if there is
 };
 
 /// Every engine of a run but the reference itself.

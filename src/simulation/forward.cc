@@ -168,6 +168,12 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   return RunSummary::Done();
 }
 
+void TargetsWithRates(const DrivenSample& at, double time_constant_s, VecX* targets) {
+  const double d = kMjcfImpedance, tc = time_constant_s;
+  const double b = 2.0 / (d * tc), k_d = d / (d * d * tc * tc);
+  *targets = at.position + (b * at.velocity + at.acceleration) / k_d;
+}
+
 RunSummary RunStock(Session* s, const DrivenMotion& driven) {
   const double h = AdjustedStep(s->motion, s->options.step_s);
   const std::vector<double>& times = s->run->trace.time_s;
@@ -181,21 +187,18 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
   }
   if (RunSummary summary = PutAtStart(s, samples[0]); !summary.ok()) return summary;
   if (RunSummary summary = CheckStep(s); !summary.ok()) return summary;
-  // The reference of MuJoCo's row is aref = −b J q̇ − k d (x − target): the target is moved so that
-  // aref is the commanded acceleration where position and velocity are as commanded.
   const bool rates = s->options.engine == Engine::kStock;
-  const double d = kMjcfImpedance, tc = s->options.stock_time_constant_steps * h;
-  const double b = 2.0 / (d * tc), k_d = d / (d * d * tc * tc);
+  const double tc = s->options.stock_time_constant_steps * h;
   s->FindShared();
   const mjModel* m = s->engine.m.get();
   mjData* data = s->data.get();
-  VecX target;
+  VecX targets;
   const LoopClock clock;
   for (long n = 0; n <= last; ++n) {
     const DrivenSample& at = samples[n];
-    target = at.position;
-    if (rates) target += (b * at.velocity + at.acceleration) / k_d;
-    s->system.SetTargets(target);
+    targets = at.position;
+    if (rates) TargetsWithRates(at, tc, &targets);
+    s->system.SetTargets(targets);
     if (s->system.has_given_forces() || s->lacking || s->loads.follow()) {
       s->system.EvaluatePosition();
       mj_comVel(m, data);

@@ -82,6 +82,11 @@ struct Session {
 /// Puts the session there, closed once more without the guides.
 [[nodiscard]] RunSummary PutAtCommandedStart(Session* session, const DrivenSample& first);
 
+/// Targets for MuJoCo's rows as they are. Of the stiffest impedance d and the time constant tc they
+/// ask for aref = −b J q̇ − k d (x − target): the target is moved so that this is the commanded
+/// acceleration where position and velocity are as commanded.
+void TargetsWithRates(const DrivenSample& at, double time_constant_s, VecX* targets);
+
 /// Positions of everything driven at home.
 [[nodiscard]] VecX HomePositions(const EngineModel& engine);
 

@@ -38,6 +38,7 @@ Report FourEngines() {
                       Record("mine", 6e-6)};
   report.witnesses[3].foreign = Witness::Foreign{};
   report.witnesses[3].foreign->program = "Mine 2";
+  report.witnesses[3].foreign->compute_s = 4e-6;  // without its start
   WitnessRecord gone = Record("gone", 0.0);
   gone.summary = RunSummary{};
   gone.summary.message = "could \"not\" be started";
@@ -46,6 +47,7 @@ Report FourEngines() {
   report.comparison.pairs = {Pair("reference", "analytic", 1e-15),
                              Pair("simulated", "reference", 2e-10),
                              Pair("mine", "reference", 3e-5)};
+  report.comparison.pairs[1].metrics[Metric::kPoseM] = Measured{.value = 7e-9, .channel = {}};
   report.comparison.witnesses = {
       {.witness = "simulated", .metrics = {{Metric::kClosureM, {.value = 5e-12, .channel = {}}}}}};
   report.engine_comparison = EngineComparison{.truth = "analytic", .engines = {}};
@@ -64,10 +66,14 @@ TEST(Crosscheck, HasARowPerEngineButTheReference) {
   EXPECT_DOUBLE_EQ(rows[0].sample_us, 1.0);
   EXPECT_EQ(rows[1].engine, "MuJoCo");
   EXPECT_EQ(rows[1].force_nrmse, 2e-10);
+  EXPECT_EQ(rows[1].pose_m, 7e-9);
+  EXPECT_TRUE(std::isnan(rows[0].pose_m));
   EXPECT_EQ(rows[1].loop_gap_m, 5e-12);
   EXPECT_EQ(rows[2].engine, "mine");
   EXPECT_EQ(rows[2].program, "Mine 2");
   EXPECT_EQ(rows[2].force_nrmse, 3e-5);
+  EXPECT_DOUBLE_EQ(rows[1].sample_us, 2.0);
+  EXPECT_DOUBLE_EQ(rows[2].sample_us, 2.0);
   EXPECT_EQ(rows[3].engine, "gone");
   EXPECT_EQ(rows[3].why, "could \"not\" be started");
   EXPECT_TRUE(std::isnan(rows[3].force_nrmse));
@@ -82,7 +88,7 @@ TEST(Crosscheck, WritesTables) {
             "position targets |\n|---|---|---|---|---|---|\n"
             "| `bar/turn` | 1.0e-15 | 2.0e-10 | 3.0e-05 | – | 5.0e-01 |\n");
   EXPECT_NE(
-      ToCsv(rows).find("bar,turn,\"gone\",\"\",nan,nan,nan,\"could \"\"not\"\" be started\"\n"),
+      ToCsv(rows).find("bar,turn,\"gone\",\"\",nan,nan,nan,nan,\"could \"\"not\"\" be started\"\n"),
       std::string::npos)
       << ToCsv(rows);
   EXPECT_NE(ToText(rows).find("mine (Mine 2)"), std::string::npos) << ToText(rows);

@@ -1,0 +1,28 @@
+// The newest MuJoCo (npm's @mujoco/mujoco, run by Node.js) as a witness:
+//
+//   mbverify-witness-mujoco              stiff equalities, rates in the drives' targets
+//   mbverify-witness-mujoco --defaults   MuJoCo's default softness, positions as targets
+//   mbverify-witness-mujoco --rows       instead: rows of the model at given states (mbverify upgrade)
+//
+// mbverify calls it in a folder of its own (docs/witnesses.md).
+import fs from 'node:fs';
+
+import {load, messageOf, Refused} from './engine.mjs';
+import {rows} from './rows.mjs';
+import {witness} from './witness.mjs';
+
+const [, program, ...words] = process.argv;
+const answer = {schema: 'mbverify/witness/1', program: 'MuJoCo', version: '', units: 'SI'};
+let engine;
+try {
+  engine = await load(program);
+  answer.version = engine.version;
+  Object.assign(answer, words.includes('--rows') ? rows(engine) : witness(engine, !words.includes('--defaults')));
+} catch (error) {
+  if (!(error instanceof Refused)) {
+    console.error(messageOf(engine, error));
+    process.exit(1);
+  }
+  answer.refused = error.message;
+}
+fs.writeFileSync('witness.json', JSON.stringify(answer, null, 1));

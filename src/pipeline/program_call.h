@@ -1,0 +1,34 @@
+// A program of a stranger, called in a folder of its own with files that it gets and leaves.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "core/scratch_folder.h"
+#include "scenario/scenario.h"
+
+namespace mbv {
+
+/// The folder goes with this object. Limits of time, memory and output are the witness' own.
+class ProgramCall {
+ public:
+  explicit ProgramCall(const ForeignWitness& witness) : witness_(witness), folder_("witness") {}
+
+  /// Puts a file into the folder. "" or what went wrong.
+  [[nodiscard]] std::string Give(const std::string& name, const std::string& text) const;
+  /// Calls the program and waits. "" or how it failed, with what it said last.
+  [[nodiscard]] std::string Run();
+  /// A file that it left, if it is not longer than it may be.
+  [[nodiscard]] std::optional<std::string> Text(const std::string& name) const;
+  /// The last line that the program printed, behind ": "; "" if it printed none.
+  [[nodiscard]] std::string Said() const;
+  /// Of the program's whole run.
+  [[nodiscard]] double wall_s() const { return wall_s_; }
+
+ private:
+  const ForeignWitness& witness_;
+  ScratchFolder folder_;
+  double wall_s_ = 0.0;
+};
+
+}  // namespace mbv

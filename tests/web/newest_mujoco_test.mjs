@@ -1,0 +1,56 @@
+// The newest MuJoCo (npm's @mujoco/mujoco): that the generated files load there without a message,
+// that messages are heard, and what it still leaves out.
+import assert from 'node:assert/strict';
+import fs from 'node:fs';
+import {test} from 'node:test';
+import {fileURLToPath} from 'node:url';
+
+import {CASES, radialAcceleration} from '../../examples/upstream/velocity_term.mjs';
+import {leastSolution} from '../../examples/witness/mujoco/algebra.mjs';
+import {compile, load, messageOf} from '../../examples/witness/mujoco/engine.mjs';
+
+const models = fileURLToPath(new URL('../../models', import.meta.url));
+const engine = await load(fileURLToPath(import.meta.url));
+
+test('The generated files load without a message, and step', () => {
+  const files = fs.readdirSync(models).map((name) => `${models}/${name}/${name}.xml`).filter((file) => fs.existsSync(file));
+  assert.ok(files.length >= 6, `${files}`);
+  for (const file of files) {
+    const {model, messages} = compile(engine, fs.readFileSync(file, 'utf8'));
+    assert.deepEqual(messages, [], file);
+    const data = new engine.mj.MjData(model);
+    for (let i = 0; i < 10; i++) engine.mj.mj_step(model, data);
+    assert.ok(Array.from(data.qpos).every(Number.isFinite), file);
+  }
+});
+
+test('A file that it does not take is an error with its message', () => {
+  assert.throws(() => compile(engine, '<mujoco><worldbody><body><joint/></body></worldbody></mujoco>'), (error) => {
+    assert.match(messageOf(engine, error), /mass|inertia/);
+    return true;
+  });
+});
+
+test('What is said of a file that is taken is heard, printed or listed', () => {
+  const said = ['from before'];
+  const mj = {
+    parseXMLString: (xml) => ({xml}), mj_compile: (spec) => { said.push('printed'); return spec.xml; },
+    mjs_numWarnings: () => 2, mjs_getWarning: (_, i) => ['listed', 'printed'][i],
+  };
+  assert.deepEqual(compile({mj, said}, 'text'), {model: 'text', messages: ['printed', 'listed']});
+});
+
+test('Connect rows have their velocity term; tendon and polynomial joint rows still lack it', () => {
+  const radial = Object.fromEntries(Object.entries(CASES).map(([name, one]) => [name, radialAcceleration(engine, one)]));
+  assert.ok(Math.abs(radial.connect + 1) < 1e-3, `${radial.connect}`);
+  assert.ok(Math.abs(radial.tendon) < 1e-9, `${radial.tendon}`);
+  assert.ok(Math.abs(radial.joint) < 1e-9, `${radial.joint}`);
+});
+
+test('Least solutions: of full rank, of dependent rows, of too few rows', () => {
+  const near = (x, y) => x.forEach((value, i) => assert.ok(Math.abs(value - y[i]) < 1e-12, `${x} is not ${y}`));
+  near(leastSolution([[2, 0], [1, 1]], [4, 5]), [2, 3]);
+  near(leastSolution([[1, 1], [2, 2]], [1, 2]), [0.5, 0.5]);
+  near(leastSolution([[3, 4]], [5]), [0.6, 0.8]);
+  near(leastSolution([[0, 0], [1, 0]], [0, 7]), [7, 0]);
+});
