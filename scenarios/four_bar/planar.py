@@ -12,6 +12,7 @@ give rates, accelerations and the forces f of the rows: those of the drives' row
 import csv
 import json
 import math
+import os
 
 PLAIN = ("revolute", "prismatic", "fixed")
 
@@ -270,6 +271,8 @@ def main():
               "method": "planar bodies in absolute coordinates, Lagrange multipliers",
               "declined": [{"what": "joint reactions", "why": "only drive forces are computed"}]}
     try:
+        if os.path.exists("start.csv"):
+            raise Declined("free motions need an integrator, which it has not")
         with open("mechanism.json") as file:
             planar = Planar(json.load(file))
         with open("motion.csv") as file:

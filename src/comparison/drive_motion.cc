@@ -124,8 +124,9 @@ std::string ForeignDriving(const ComparisonInput& input) {
   std::string text;
   for (const Witness& witness : input.witnesses) {
     if (!witness.foreign || witness.trace == nullptr) continue;
-    text += fmt::format("{}{} ({}) is given the drive motion", text.empty() ? "" : ", ",
-                        witness.name, witness.foreign->program);
+    text += fmt::format("{}{} ({}) is given the {}", text.empty() ? "" : ", ", witness.name,
+                        witness.foreign->program,
+                        input.motion->free() ? "same start and forces" : "drive motion");
   }
   return text;
 }

@@ -23,18 +23,50 @@ void AddNumbers(const Vec3& v, std::string* text) {
 
 std::string MotionCsv(const Mechanism& mechanism, const HandedMotion& motion) {
   const std::vector<std::string> names = DrivenNames(mechanism);
+  const auto told = [&](size_t k) { return motion.told.empty() || motion.told[k]; };
   std::string text = "time_s";
-  for (const std::string& name : names) {
-    text += fmt::format(",{0}.position,{0}.velocity,{0}.acceleration", name);
+  for (size_t k = 0; k < names.size(); ++k) {
+    if (told(k)) text += fmt::format(",{0}.position,{0}.velocity,{0}.acceleration", names[k]);
   }
   text += '\n';
   for (size_t i = 0; i < motion.time_s.size(); ++i) {
     text += fmt::format("{:.17g}", motion.time_s[i]);
     const DrivenSample& driven = motion.driven[i];
     for (size_t k = 0; k < names.size(); ++k) {
+      if (!told(k)) continue;
       const auto d = static_cast<Eigen::Index>(k);
       AddNumbers({driven.position[d], driven.velocity[d], driven.acceleration[d]}, &text);
     }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string ForcesCsv(const Mechanism& mechanism, const HandedMotion& motion) {
+  std::string text = "time_s";
+  for (const int drive : motion.forced) {
+    text += fmt::format(",{0}.force,{0}.force_rate,{0}.force_acceleration",
+                        mechanism.drives[static_cast<size_t>(drive)].name);
+  }
+  text += '\n';
+  for (size_t i = 0; i < motion.forces.size(); ++i) {
+    text += fmt::format("{:.17g}", motion.time_s[i]);
+    for (const Jet& jet : motion.forces[i]) {
+      AddNumbers({jet.value, jet.rate, jet.acceleration}, &text);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string StartCsv(const Mechanism& mechanism, const BodyStates& start) {
+  std::string text = "body,px,py,pz,R11,R12,R13,R21,R22,R23,R31,R32,R33,wx,wy,wz,vx,vy,vz\n";
+  for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
+    text += mechanism.bodies[b].name;
+    AddNumbers(start.X_WB[b].translation(), &text);
+    for (int r = 0; r < 3; ++r) AddNumbers(start.X_WB[b].linear().row(r).transpose(), &text);
+    AddNumbers(start.V_WB[b].head<3>(), &text);
+    AddNumbers(start.V_WB[b].tail<3>(), &text);
     text += '\n';
   }
   return text;

@@ -7,6 +7,7 @@
 #include "pipeline/model_text.h"
 #include "pipeline/not_run.h"
 #include "pipeline/program_call.h"
+#include "reference/forward.h"
 
 namespace mbv {
 namespace {
@@ -39,7 +40,6 @@ class ForeignRunner {
 
  private:
   [[nodiscard]] std::string WhyNotAsked() const {
-    if (motion_.free()) return "free motions are not handed to foreign witnesses";
     for (const Load& load : motion_.loads) {
       if (!load.following.empty()) {
         return "loads that are expressions of the state are not handed to foreign witnesses";
@@ -50,15 +50,9 @@ class ForeignRunner {
 
   std::string HandOver(const DrivenMotion& driven) {
     HandedMotion handed;
-    handed.time_s = SampleTimes(motion_.duration_s, motion_.sample_s);
-    CommandSample sample;
-    for (const double t_s : handed.time_s) {
-      const RunSummary there = driven(t_s, &handed.driven.emplace_back());
-      if (!there.ok()) return "there is no drive motion: " + there.message;
-      EvaluateMotion(motion_, t_s, &sample);
-      handed.loads.push_back(sample.loads);
-    }
-    times_s_ = handed.time_s;
+    handed.time_s = times_s_ = SampleTimes(motion_.duration_s, motion_.sample_s);
+    std::string trouble = Sample(driven, &handed);
+    if (trouble.empty() && motion_.free()) trouble = HandOverFree(&handed);
     const std::pair<const char*, std::string> files[] = {
         {"mechanism.json", MechanismJson(mechanism_)},
         {"motion.csv", MotionCsv(mechanism_, handed)},
@@ -66,10 +60,40 @@ class ForeignRunner {
         {"model.xml", WriteMjcf(mechanism_, {.step_s = step_s_})},
         {"model.urdf", ModelText(mechanism_, ModelFormat::kUrdf)}};
     for (const auto& [name, text] : files) {
-      const std::string trouble = call_.Give(name, text);
-      if (!trouble.empty()) return trouble;
+      if (trouble.empty()) trouble = call_.Give(name, text);
+    }
+    return trouble;
+  }
+
+  std::string Sample(const DrivenMotion& driven, HandedMotion* handed) const {
+    CommandSample sample;
+    for (const double t_s : handed->time_s) {
+      const RunSummary there = driven(t_s, &handed->driven.emplace_back());
+      if (!there.ok()) return "there is no drive motion: " + there.message;
+      EvaluateMotion(motion_, t_s, &sample);
+      handed->loads.push_back(sample.loads);
     }
     return "";
+  }
+
+  // What moves by forces: where it starts, and which forces drives push with.
+  std::string HandOverFree(HandedMotion* handed) {
+    for (const Drive& drive : mechanism_.drives) Tell(drive.name, handed);
+    for (const Prescribed& base : mechanism_.prescribed) Tell(base.name, handed);
+    for (const DriveForce& force : motion_.forces) handed->forced.push_back(force.drive);
+    for (const double t_s : handed->time_s) {
+      std::vector<Jet>& jets = handed->forces.emplace_back();
+      for (const DriveForce& force : motion_.forces) jets.push_back(Evaluate(force.force, t_s));
+    }
+    BodyStates start;
+    const RunSummary there = InitialStates(mechanism_, motion_, &start);
+    if (!there.ok()) return "there is no start: " + there.message;
+    const std::string trouble = call_.Give("forces.csv", ForcesCsv(mechanism_, *handed));
+    return trouble.empty() ? call_.Give("start.csv", StartCsv(mechanism_, start)) : trouble;
+  }
+
+  void Tell(const std::string& name, HandedMotion* handed) const {
+    handed->told.push_back(motion_.FindCommand(name) >= 0);
   }
 
   std::string ReadBack() {

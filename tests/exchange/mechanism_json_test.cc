@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <Eigen/Dense>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -132,6 +134,34 @@ TEST(MotionText, GivesDrivenCoordinatesAndLoadsInFull) {
             "time_s,load,body,px,py,pz,axes,fx,fy,fz,mx,my,mz\n"
             "0,0," +
                 m.bodies[1].name + ",0.10000000000000001,0,0,body,1,2,3,0,0,-4\n");
+}
+
+// Of a free motion: commanded coordinates alone, forces with two derivatives, states of all bodies.
+TEST(MotionText, GivesForcesAndTheStartOfAFreeMotion) {
+  const Mechanism m = Shipped("four_bar");
+  const std::string drive = m.drives[0].name;
+  HandedMotion motion;
+  motion.time_s = {0.0, 0.5};
+  const VecX zero = VecX::Zero(1);
+  motion.driven = {{zero, zero, zero}, {zero, zero, zero}};
+  motion.told = {false};
+  motion.forced = {0};
+  motion.forces = {{Jet{1.0, 2.0, 3.0}}, {Jet{-0.1, 0.0, 4.0}}};
+  EXPECT_EQ(MotionCsv(m, motion), "time_s\n0\n0.5\n");
+  EXPECT_EQ(ForcesCsv(m, motion), "time_s," + drive + ".force," + drive + ".force_rate," + drive +
+                                      ".force_acceleration\n0,1,2,3\n"
+                                      "0.5,-0.10000000000000001,0,4\n");
+  BodyStates start;
+  start.Resize(m.bodies.size());
+  start.X_WB[1].translation() = Vec3(1, 2, 3);
+  start.X_WB[1].linear() << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+  start.V_WB[1] << 4, 5, 6, 7, 8, 9;
+  const std::string csv = StartCsv(m, start);
+  EXPECT_TRUE(csv.starts_with("body,px,py,pz,R11,R12,R13,R21,")) << csv;
+  EXPECT_NE(csv.find("\n" + m.bodies[1].name + ",1,2,3,0,-1,0,1,0,0,0,0,1,4,5,6,7,8,9\n"),
+            std::string::npos)
+      << csv;
+  EXPECT_EQ(static_cast<size_t>(std::count(csv.begin(), csv.end(), '\n')), m.bodies.size() + 1);
 }
 
 }  // namespace

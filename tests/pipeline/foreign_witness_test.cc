@@ -158,6 +158,38 @@ TEST(ForeignWitness, SimbodyAgrees) {
   }
 }
 
+// Free motions: springs, six free coordinates, a stiff loop that turns at thousands of rad/s. A
+// bent truth is told, and of three witnesses the odd one out is named.
+TEST(ForeignWitness, SimbodyMovesFreely) {
+  const auto run = [](const char* scenario, const std::string& density) {
+    RunOptions options;
+    options.out_dir.clear();
+    options.pictures = options.page = false;
+    options.scenario.set = {
+        {"witnesses", std::string("{simbody: {limits: stepped, command: [") + MBV_SIMBODY + "]}}"}};
+    if (!density.empty()) options.scenario.set.emplace_back("simulation.parameters.rho", density);
+    return RunScenario(SourcePath(std::string("/scenarios/") + scenario + ".yaml"), options);
+  };
+  for (const char* scenario :
+       {"spring_cart/swing", "floating_loop/tumble", "andrews_squeezer/benchmark"}) {
+    const RunOutcome outcome = run(scenario, "");
+    ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+    EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kAgree) << scenario;
+    const PairComparison* pair = outcome.report->comparison.FindPair("simbody_vs_reference");
+    ASSERT_NE(pair, nullptr) << scenario;
+    ASSERT_TRUE(pair->compared) << scenario << ": " << pair->reason;
+    // Measured up to 5.4e-11 m: its integrator is asked for 1e-11 in each step.
+    EXPECT_LT(pair->metrics.at(Metric::kPoseM).value, 1e-9) << scenario;
+  }
+  const RunOutcome heavy = run("floating_loop/tumble", "3.0003");
+  ASSERT_TRUE(heavy.report);
+  EXPECT_EQ(heavy.report->comparison.verdict, Verdict::kDisagree);
+  EXPECT_EQ(heavy.report->comparison.attribution.odd_one_out, "simulated");
+  EXPECT_NE(heavy.report->comparison.drive_motion.find("is given the same start and forces"),
+            std::string::npos)
+      << heavy.report->comparison.drive_motion;
+}
+
 // What it does not know it declines, and the verdict is that of the others.
 TEST(ForeignWitness, SimbodyDeclinesFriction) {
   RunOptions options;

@@ -84,6 +84,7 @@ function run(simulation, outputs, motion, loads, stiff) {
 /** Computes in the present folder; throws Refused for what it cannot. Returns what stands in
  * witness.json besides the program's name. */
 export function witness(engine, stiff) {
+  if (fs.existsSync('start.csv')) throw new Refused('free motions are not stepped here');
   const mechanism = JSON.parse(fs.readFileSync('mechanism.json', 'utf8'));
   const motion = readMotion(), loads = readLoads(motion.times.length);
   const simulation = new Simulation(engine, fs.readFileSync('model.xml', 'utf8'), motion.names);
