@@ -22,6 +22,7 @@ const LIBRARIES = {
   'nlohmann-json': { headers: ['nlohmann/'], target: 'nlohmann_json::nlohmann_json' },
   'tinyxml2': { headers: ['tinyxml2'], target: 'tinyxml2::tinyxml2' },
   'urdfdom': { headers: ['urdf'], target: 'PkgConfig::URDFDOM' },
+  'valijson': { headers: ['valijson/'], target: 'valijson' },
   'yaml-cpp': { headers: ['yaml-cpp/'], target: 'yaml-cpp' },
   'zlib': { headers: ['zlib'], target: 'ZLIB::ZLIB' },
 };

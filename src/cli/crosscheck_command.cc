@@ -19,7 +19,7 @@ struct CrosscheckArguments {
   std::vector<std::string> engines = {"simbody=mbverify-witness-simbody",
                                       "mujoco_newest=mbverify-witness-mujoco",
                                       "mujoco_newest_default=mbverify-witness-mujoco --defaults"};
-  std::string markdown, csv;
+  std::string markdown, csv, html;
   JsonOption json;
 };
 
@@ -45,11 +45,10 @@ std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
 int WriteAll(const CrosscheckArguments& arguments, const std::vector<CrosscheckRow>& rows) {
   SayText(arguments.json.text(), ToText(rows));
   int exit_code = arguments.json.Write(ToJson(rows), {});
-  if (!arguments.markdown.empty()) {
-    exit_code = WorseExit(exit_code, WriteWholeFile(arguments.markdown, ToMarkdown(rows), {}));
-  }
-  if (!arguments.csv.empty()) {
-    exit_code = WorseExit(exit_code, WriteWholeFile(arguments.csv, ToCsv(rows), {}));
+  const std::pair<const std::string&, std::string (*)(const std::vector<CrosscheckRow>&)> files[] =
+      {{arguments.markdown, &ToMarkdown}, {arguments.csv, &ToCsv}, {arguments.html, &ToHtml}};
+  for (const auto& [path, write] : files) {
+    if (!path.empty()) exit_code = WorseExit(exit_code, WriteWholeFile(path, write(rows), {}));
   }
   return exit_code;
 }
@@ -78,7 +77,8 @@ int RunCrosscheck(const CrosscheckArguments& arguments) {
     return 2;
   int exit_code = 0;
   const std::vector<std::string> files = FilesToRun(
-      arguments.scenarios, {arguments.json.path(), arguments.markdown, arguments.csv}, &exit_code);
+      arguments.scenarios,
+      {arguments.json.path(), arguments.markdown, arguments.csv, arguments.html}, &exit_code);
   std::vector<CrosscheckRow> rows;
   for (size_t i = 0; i < files.size(); ++i) {
     Say(stderr, "{} of {}: {}\n", i + 1, files.size(), files[i]);
@@ -103,6 +103,7 @@ void AddCrosscheckCommand(CLI::App* app, int* exit_code) {
   crosscheck->add_option("--markdown", arguments->markdown,
                          "writes the forces' differences as a table, a column per engine");
   crosscheck->add_option("--csv", arguments->csv, "writes all rows as CSV");
+  crosscheck->add_option("--html", arguments->html, "writes all rows as a page");
   arguments->json.AddTo(crosscheck);
   crosscheck
       ->add_option("--set", arguments->set,

@@ -37,11 +37,12 @@ struct ModelArguments {
 };
 
 ModelFormat FormatOf(const std::string& word) {
-  return word == "mjcf"   ? ModelFormat::kMjcf
-         : word == "urdf" ? ModelFormat::kUrdf
-         : word == "yaml" ? ModelFormat::kYaml
-         : word == "json" ? ModelFormat::kJson
-                          : ModelFormat::kMobility;
+  return word == "mjcf"        ? ModelFormat::kMjcf
+         : word == "urdf"      ? ModelFormat::kUrdf
+         : word == "yaml"      ? ModelFormat::kYaml
+         : word == "json"      ? ModelFormat::kJson
+         : word == "mechanism" ? ModelFormat::kMechanism
+                               : ModelFormat::kMobility;
 }
 
 ModelDrives DrivesOf(const std::string& word) {
@@ -217,10 +218,12 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
   model->add_option("model", arguments->model, "model name, model.yaml, .urdf or MJCF (.xml) file")
       ->required();
   model
-      ->add_option("--format", arguments->format,
-                   "text (mobility report), json (the same for programs), or the model as mjcf, "
-                   "urdf or yaml (a model file with the numbers that the parameters give)")
-      ->check(OneOf({"text", "json", "mjcf", "urdf", "yaml"}));
+      ->add_option(
+          "--format", arguments->format,
+          "text (mobility report), json (the same for programs), or the model as mjcf, "
+          "urdf, yaml (a model file with the numbers that the parameters give) or mechanism "
+          "(mechanism.json, docs/witnesses.md)")
+      ->check(OneOf({"text", "json", "mjcf", "urdf", "yaml", "mechanism"}));
   model
       ->add_option("--drives", arguments->drives,
                    "of an mjcf: free (nothing holds them), held (at home, by equalities; the "
@@ -240,7 +243,8 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
 
 void AddCheckCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<CheckArguments>();
-  CLI::App* check = app->add_subcommand("check", "Validate model and scenario files");
+  CLI::App* check =
+      app->add_subcommand("check", "Validate model and scenario files, and mechanism.json");
   check->add_option("file", arguments->files, "files, or folders of them")->required();
   arguments->json.AddTo(check);
   SetFooter(check, {"check my_model.yaml my_scenario.yaml", "check scenarios/spr_tripod"},

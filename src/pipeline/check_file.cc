@@ -1,6 +1,10 @@
 #include "pipeline/check_file.h"
 
+#include <cstdlib>
+
 #include "analytic/closed_form.h"
+#include "exchange/mechanism_check.h"
+#include "input/yaml_reader.h"
 #include "model_file/load_model.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/prepare.h"
@@ -21,9 +25,39 @@ Diagnostics CheckModel(const std::string& file) {
   return std::move(loaded.diagnostics);
 }
 
+// The node of a path, or the last one that there is on the way.
+const YamlNode& NodeAt(const YamlNode& root, const std::vector<std::string>& path) {
+  const YamlNode* at = &root;
+  for (const std::string& step : path) {
+    const YamlNode* next = at->Find(step);
+    if (at->is_sequence()) {
+      const size_t index = std::strtoul(step.c_str(), nullptr, 10);
+      next = index < at->items.size() ? at->items[index].get() : nullptr;
+    }
+    if (next == nullptr) break;
+    at = next;
+  }
+  return *at;
+}
+
+// mechanism.json as foreign witnesses get it. JSON is YAML: its tree knows the lines.
+Diagnostics CheckMechanismFile(const std::string& file) {
+  YamlReader reader(file);
+  const auto text = reader.ReadFile();
+  const YamlNodePtr root = text ? reader.Parse(*text) : nullptr;
+  if (!root) return reader.diagnostics();
+  for (const JsonFinding& finding : CheckMechanismJson(*text)) {
+    const std::string path = PathText(finding.path);
+    reader.Error(NodeAt(*root, finding.path), (path.empty() ? "" : path + ": ") + finding.message,
+                 finding.hint);
+  }
+  return reader.diagnostics();
+}
+
 }  // namespace
 
 Diagnostics CheckFile(const std::string& file) {
+  if (file.ends_with(".json")) return CheckMechanismFile(file);
   const ScenarioHead head = ReadScenarioHead(file);
   if (!head.is_scenario) return CheckModel(file);
   Diagnostics diagnostics;

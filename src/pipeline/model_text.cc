@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <numbers>
 
+#include "exchange/mechanism_json.h"
 #include "mjcf/mjcf.h"
 #include "model_file/urdf.h"
 #include "model_file/write_model.h"
@@ -136,6 +137,8 @@ std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
       return WriteUrdf(mechanism);
     case ModelFormat::kYaml:
       return WriteModel(mechanism);
+    case ModelFormat::kMechanism:
+      return MechanismJson(mechanism);
   }
   return "";
 }

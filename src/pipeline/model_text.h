@@ -9,8 +9,9 @@
 
 namespace mbv {
 
-/// Mobility report for people or as JSON, or the generated MJCF, URDF or model.yaml.
-enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf, kYaml };
+/// Mobility report for people or as JSON, the generated MJCF, URDF or model.yaml, or the
+/// mechanism.json of foreign witnesses.
+enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf, kYaml, kMechanism };
 [[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format);
 
 /// Servos that hold a mechanism in its home pose.

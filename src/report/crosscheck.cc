@@ -6,6 +6,8 @@
 
 #include "comparison/verdict.h"
 #include "core/json_text.h"
+#include "report/html_text.h"
+#include "report/page.h"
 #include "report/text_table.h"
 
 namespace mbv {
@@ -68,10 +70,6 @@ CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
   return row;
 }
 
-std::string NumberText(const char* format, double number) {
-  return std::isnan(number) ? "–" : fmt::format(fmt::runtime(format), number);
-}
-
 std::string CaseOf(const CrosscheckRow& row) { return row.mechanism + "/" + row.scenario; }
 
 // In the order in which they first come.
@@ -127,10 +125,10 @@ std::string ToText(const Rows& rows) {
                              {"per sample", 14}});
   std::string text = table.Head() + "\n";
   for (const CrosscheckRow& row : rows) {
-    text +=
-        table.Row({CaseOf(row), "  " + EngineAndProgram(row), NumberText("{:.1e}", row.force_nrmse),
-                   NumberText("{:.1e} m", row.pose_m), NumberText("{:.1e} m", row.loop_gap_m),
-                   NumberText("{:.3g} us", row.sample_us)});
+    text += table.Row(
+        {CaseOf(row), "  " + EngineAndProgram(row), NumberOrDash(row.force_nrmse, "{:.1e}"),
+         NumberOrDash(row.pose_m, "{:.1e} m"), NumberOrDash(row.loop_gap_m, "{:.1e} m"),
+         NumberOrDash(row.sample_us, "{:.3g} us")});
     text += (row.why.empty() ? "" : "  " + row.why) + "\n";
   }
   return text;
@@ -150,8 +148,8 @@ std::string ToMarkdown(const Rows& rows) {
       const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& row) {
         return CaseOf(row) == scenario && row.engine == engine;
       });
-      text +=
-          fmt::format(" {} |", found == rows.end() ? "" : NumberText("{:.1e}", found->force_nrmse));
+      text += fmt::format(" {} |",
+                          found == rows.end() ? "" : NumberOrDash(found->force_nrmse, "{:.1e}"));
     }
     text += "\n";
   }
@@ -170,6 +168,29 @@ std::string ToCsv(const Rows& rows) {
                         row.pose_m, row.loop_gap_m, row.sample_us, why);
   }
   return text;
+}
+
+std::string ToHtml(const Rows& rows) {
+  Page page;
+  for (const std::string& scenario : Distinct(rows, &CaseOf)) {
+    Table table{.caption = "Engines on " + scenario,
+                .head = {Text("engine"), Digits("drive force, RMS"), Digits("pose [m]"),
+                         Digits("loop gap [m]"), Digits("per sample [us]"), Text("why not")},
+                .rows = {}};
+    for (const CrosscheckRow& row : rows) {
+      if (CaseOf(row) != scenario) continue;
+      table.rows.push_back({Text(EngineAndProgram(row)),
+                            Digits(NumberOrDash(row.force_nrmse, "{:.1e}")),
+                            Digits(NumberOrDash(row.pose_m, "{:.1e}")),
+                            Digits(NumberOrDash(row.loop_gap_m, "{:.1e}")),
+                            Digits(NumberOrDash(row.sample_us, "{:.3g}")), Text(row.why)});
+    }
+    page.Add(scenario, scenario, ToHtml(table));
+  }
+  return page.Write({.kicker = "mbverify crosscheck",
+                     .title = "Engines side by side",
+                     .lead = "Against the generic reference, given the same drive motion",
+                     .judges = false});
 }
 
 std::string ToJson(const Rows& rows) {

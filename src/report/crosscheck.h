@@ -29,6 +29,8 @@ struct CrosscheckRow {
 /// A row per scenario, a column per engine: the forces' differences.
 [[nodiscard]] std::string ToMarkdown(const std::vector<CrosscheckRow>& rows);
 [[nodiscard]] std::string ToCsv(const std::vector<CrosscheckRow>& rows);
+/// A page with a table per scenario: all numbers of every engine.
+[[nodiscard]] std::string ToHtml(const std::vector<CrosscheckRow>& rows);
 /// `schema: mbverify.crosscheck/1`.
 [[nodiscard]] std::string ToJson(const std::vector<CrosscheckRow>& rows);
 

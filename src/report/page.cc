@@ -33,20 +33,25 @@ std::string HeadHtml(const PageHead& head) {
       "<meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n"
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
       "style-src 'unsafe-inline'{}\">\n<meta name=\"color-scheme\" content=\"light dark\">\n"
-      "<link rel=\"icon\" href=\"data:,\">\n<title>{}: {} – mbverify</title>\n"
+      "<link rel=\"icon\" href=\"data:,\">\n<title>{}{} – mbverify</title>\n"
       "<style>{}</style>\n</head>\n",
-      scripts, Escape(head.title), WordsOf(head.verdict).word, PageStyle());
+      scripts, Escape(head.title),
+      head.judges ? std::string(": ") + WordsOf(head.verdict).word : "", PageStyle());
 }
 
 std::string TopHtml(const PageHead& head) {
   const VerdictWords words = WordsOf(head.verdict);
   const std::string sign =
       head.sign ? fmt::format("<span aria-hidden=\"true\">{}</span> ", words.sign) : "";
+  const std::string badge =
+      head.judges
+          ? fmt::format("<div class=\"badges\"><span class=\"verdict {}\">{}{}</span></div>",
+                        ToText(head.verdict), sign, words.word)
+          : "";
   return fmt::format(
       "<header class=\"top\"><div><p class=\"kicker\">{}</p><h1>{}</h1><p class=\"lead\">{}</p>"
-      "</div><div class=\"badges\"><span class=\"verdict {}\">{}{}</span></div></header>\n",
-      Escape(head.kicker), Escape(head.title), Escape(head.lead), ToText(head.verdict), sign,
-      words.word);
+      "</div>{}</header>\n",
+      Escape(head.kicker), Escape(head.title), Escape(head.lead), badge);
 }
 
 }  // namespace
@@ -61,10 +66,11 @@ void Page::Add(const std::string& title, const std::string& link, const std::str
 }
 
 std::string Page::Write(const PageHead& head) const {
-  return HeadHtml(head) + "<body>\n<a class=\"skip\" href=\"#main\">Skip to the verdict</a>\n" +
-         TopHtml(head) + "<nav aria-label=\"Sections\">\n" + navigation_ +
-         "</nav>\n<main id=\"main\">\n" + sections_ + "</main>\n<footer>" + Escape(head.footer) +
-         "</footer>\n" + head.scripts + "</body>\n</html>\n";
+  return HeadHtml(head) + "<body>\n<a class=\"skip\" href=\"#main\">Skip to the " +
+         (head.judges ? "verdict" : "numbers") + "</a>\n" + TopHtml(head) +
+         "<nav aria-label=\"Sections\">\n" + navigation_ + "</nav>\n<main id=\"main\">\n" +
+         sections_ + "</main>\n<footer>" + Escape(head.footer) + "</footer>\n" + head.scripts +
+         "</body>\n</html>\n";
 }
 
 }  // namespace mbv

@@ -14,10 +14,10 @@ const std::string kTurn = SourcePath("/scenarios/four_bar/turn_inverse.yaml");
 TEST(CrosscheckCommand, PutsAnEngineBesideOurs) {
   const Program mbverify("crosscheck");
   const std::string folder = mbverify.folder().string();
-  const ProgramResult result =
-      mbverify("crosscheck " + kTurn + " --engine 'planar=python3 " +
-               SourcePath("/scenarios/four_bar/planar.py") + "' --json " + folder +
-               "/c.json --markdown " + folder + "/c.md --csv " + folder + "/c.csv");
+  const ProgramResult result = mbverify("crosscheck " + kTurn + " --engine 'planar=python3 " +
+                                        SourcePath("/scenarios/four_bar/planar.py") + "' --json " +
+                                        folder + "/c.json --markdown " + folder + "/c.md --csv " +
+                                        folder + "/c.csv --html " + folder + "/c.html");
   EXPECT_EQ(result.exit_code, 0) << result.out << result.err;
   const auto json = nlohmann::json::parse(ReadAll(folder + "/c.json"));
   bool found = false;
@@ -31,6 +31,9 @@ TEST(CrosscheckCommand, PutsAnEngineBesideOurs) {
   EXPECT_NE(ReadAll(folder + "/c.md").find("| `four_bar/turn_inverse` |"), std::string::npos);
   EXPECT_NE(ReadAll(folder + "/c.csv").find("four_bar,turn_inverse,\"planar\",\"planar.py 1\","),
             std::string::npos);
+  const std::string page = ReadAll(folder + "/c.html");
+  EXPECT_NE(page.find("planar (planar.py 1)"), std::string::npos);
+  EXPECT_EQ(page.find("class=\"verdict"), std::string::npos);
 }
 
 TEST(CrosscheckCommand, RefusesWhatIsNoEngineAndItsOwnInputs) {

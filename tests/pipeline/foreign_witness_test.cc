@@ -185,9 +185,9 @@ TEST(ForeignWitness, SimbodyMovesFreely) {
   ASSERT_TRUE(heavy.report);
   EXPECT_EQ(heavy.report->comparison.verdict, Verdict::kDisagree);
   EXPECT_EQ(heavy.report->comparison.attribution.odd_one_out, "simulated");
-  EXPECT_NE(heavy.report->comparison.drive_motion.find("is given the same start and forces"),
+  EXPECT_NE(heavy.report->comparison.driving.find("is given the same start and forces"),
             std::string::npos)
-      << heavy.report->comparison.drive_motion;
+      << heavy.report->comparison.driving;
 }
 
 // What it does not know it declines, and the verdict is that of the others.

@@ -1,0 +1,25 @@
+// Checks a mechanism.json: against its schema (mechanism.schema.json), and what no schema can say:
+// that names are unique and known, axes are unit vectors, frames rotations, inertias possible, and
+// that the joints which close no loop make one tree.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+struct JsonFinding {
+  std::vector<std::string> path;  ///< keys and indices from the root
+  std::string message, hint;
+};
+
+/// "joints[3].parent.body".
+[[nodiscard]] std::string PathText(const std::vector<std::string>& path);
+
+/// All findings; those beyond the schema only where the schema is met.
+[[nodiscard]] std::vector<JsonFinding> CheckMechanismJson(const std::string& text);
+
+/// The schema: JSON Schema, draft 7, with units.
+[[nodiscard]] const std::string& MechanismSchemaText();
+
+}  // namespace mbv
