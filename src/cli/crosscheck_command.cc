@@ -101,7 +101,7 @@ void AddCrosscheckCommand(CLI::App* app, int* exit_code) {
       ->allow_extra_args(false)
       ->capture_default_str();
   crosscheck->add_option("--markdown", arguments->markdown,
-                         "writes the forces' differences as a table, a column per engine");
+                         "writes forces, poses, loop gaps and cost as tables, a column per engine");
   crosscheck->add_option("--csv", arguments->csv, "writes all rows as CSV");
   crosscheck->add_option("--html", arguments->html, "writes all rows as a page");
   arguments->json.AddTo(crosscheck);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <functional>
 
 #include "comparison/verdict.h"
 #include "core/json_text.h"
@@ -88,6 +89,29 @@ std::string EngineAndProgram(const CrosscheckRow& row) {
   return row.engine + (row.program.empty() ? "" : " (" + row.program + ")");
 }
 
+// A row per scenario, a column per engine.
+std::string MarkdownTable(const Rows& rows,
+                          const std::function<std::string(const CrosscheckRow&)>& cell) {
+  const std::vector<std::string> engines = Distinct(rows, &EngineOf);
+  std::string text = "| scenario |", line = "|---|";
+  for (const std::string& engine : engines) {
+    text += fmt::format(" {} |", engine);
+    line += "---|";
+  }
+  text += "\n" + line + "\n";
+  for (const std::string& scenario : Distinct(rows, &CaseOf)) {
+    text += fmt::format("| `{}` |", scenario);
+    for (const std::string& engine : engines) {
+      const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& row) {
+        return CaseOf(row) == scenario && row.engine == engine;
+      });
+      text += fmt::format(" {} |", found == rows.end() ? "" : cell(*found));
+    }
+    text += "\n";
+  }
+  return text;
+}
+
 int WidthOf(const std::vector<std::string>& words) {
   size_t width = 8;
   for (const std::string& word : words) width = std::max(width, word.size());
@@ -135,23 +159,22 @@ std::string ToText(const Rows& rows) {
 }
 
 std::string ToMarkdown(const Rows& rows) {
-  const std::vector<std::string> engines = Distinct(rows, &EngineOf);
-  std::string text = "| scenario |", line = "|---|";
-  for (const std::string& engine : engines) {
-    text += fmt::format(" {} |", engine);
-    line += "---|";
-  }
-  text += "\n" + line + "\n";
-  for (const std::string& scenario : Distinct(rows, &CaseOf)) {
-    text += fmt::format("| `{}` |", scenario);
-    for (const std::string& engine : engines) {
-      const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& row) {
-        return CaseOf(row) == scenario && row.engine == engine;
-      });
-      text += fmt::format(" {} |",
-                          found == rows.end() ? "" : NumberOrDash(found->force_nrmse, "{:.1e}"));
-    }
-    text += "\n";
+  struct Shown {
+    const char* title;
+    double CrosscheckRow::*number;
+    const char* format;
+  };
+  constexpr Shown kShown[] = {
+      {"Drive forces, RMS difference of all", &CrosscheckRow::force_nrmse, "{:.1e}"},
+      {"Outputs' origins, largest distance [m]", &CrosscheckRow::pose_m, "{:.1e}"},
+      {"Loops, largest gap [m]", &CrosscheckRow::loop_gap_m, "{:.1e}"},
+      {"Cost of a sample [us]", &CrosscheckRow::sample_us, "{:.3g}"}};
+  std::string text;
+  for (const Shown& shown : kShown) {
+    text += fmt::format("{}## {}\n\n", text.empty() ? "" : "\n", shown.title);
+    text += MarkdownTable(rows, [&](const CrosscheckRow& row) {
+      return NumberOrDash(row.*shown.number, shown.format);
+    });
   }
   return text;
 }

@@ -26,7 +26,8 @@ struct CrosscheckRow {
 [[nodiscard]] std::vector<CrosscheckRow> CrosscheckRows(const Report& report);
 
 [[nodiscard]] std::string ToText(const std::vector<CrosscheckRow>& rows);
-/// A row per scenario, a column per engine: the forces' differences.
+/// Forces' and poses' differences, loop gaps and cost: a table each, with a row per scenario and a
+/// column per engine.
 [[nodiscard]] std::string ToMarkdown(const std::vector<CrosscheckRow>& rows);
 [[nodiscard]] std::string ToCsv(const std::vector<CrosscheckRow>& rows);
 /// A page with a table per scenario: all numbers of every engine.

@@ -83,10 +83,17 @@ TEST(Crosscheck, HasARowPerEngineButTheReference) {
 
 TEST(Crosscheck, WritesTables) {
   const auto rows = CrosscheckRows(FourEngines());
-  EXPECT_EQ(ToMarkdown(rows),
-            "| scenario | closed form | MuJoCo | mine | gone | MuJoCo, default softness, "
-            "position targets |\n|---|---|---|---|---|---|\n"
-            "| `bar/turn` | 1.0e-15 | 2.0e-10 | 3.0e-05 | – | 5.0e-01 |\n");
+  const std::string head =
+      "| scenario | closed form | MuJoCo | mine | gone | MuJoCo, default softness, "
+      "position targets |\n|---|---|---|---|---|---|\n";
+  EXPECT_EQ(ToMarkdown(rows), "## Drive forces, RMS difference of all\n\n" + head +
+                                  "| `bar/turn` | 1.0e-15 | 2.0e-10 | 3.0e-05 | – | 5.0e-01 |\n\n"
+                                  "## Outputs' origins, largest distance [m]\n\n" +
+                                  head + "| `bar/turn` | – | 7.0e-09 | – | – | – |\n\n" +
+                                  "## Loops, largest gap [m]\n\n" + head +
+                                  "| `bar/turn` | – | 5.0e-12 | – | – | 1.0e-02 |\n\n" +
+                                  "## Cost of a sample [us]\n\n" + head +
+                                  "| `bar/turn` | 1 | 2 | 2 | – | – |\n");
   EXPECT_NE(
       ToCsv(rows).find("bar,turn,\"gone\",\"\",nan,nan,nan,nan,\"could \"\"not\"\" be started\"\n"),
       std::string::npos)
