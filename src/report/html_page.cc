@@ -2,6 +2,8 @@
 // it.
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <cmath>
 
 #include "core/inputs.h"
@@ -14,6 +16,7 @@
 #include "report/html_text.h"
 #include "report/motion_tables.h"
 #include "report/own_file_text.h"
+#include "report/pair_matrix.h"
 #include "report/reference_table.h"
 #include "report/result_html.h"
 #include "report/sizing.h"
@@ -34,7 +37,8 @@ class PageWriter {
     page_.Add("Verdict", "Verdict", VerdictHtml(view_, Cards(), About()));
     Interactive();
     Pictures();
-    page_.Add("Checks", "Checks", ChecksHtml(view_, kHowToReadChecks));
+    page_.Add("Checks", "Checks",
+              PairMatrixHtml(report_.comparison) + ChecksHtml(view_, kHowToReadChecks));
     page_.Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
     page_.Add("Tables that command the motion", "Tables", MotionTableHtml(report_));
     page_.Add("Drives", "Drives", DrivesHtml(report_));
@@ -113,7 +117,9 @@ class PageWriter {
   std::string CountCards() const {
     return Card("Ran · compared · verified",
                 fmt::format("{} · {} · {}", view_.ran(), view_.pairs_compared, view_.verified),
-                fmt::format("witnesses of 3 · pairs of 3 · checks of {}", view_.limits()));
+                fmt::format("witnesses of {} · pairs of {} · checks of {}",
+                            std::max<size_t>(3, view_.witnesses.size()),
+                            std::max<size_t>(3, view_.pairs), view_.limits()));
   }
 
   // Filled by the script; without it, plots that do not move.

@@ -83,7 +83,7 @@ struct ResultView {
   std::vector<ShownCheck> checks = {};  ///< off ones included
   std::vector<NotCompared> not_compared = {};
   std::vector<std::pair<std::string, RunSummary>> witnesses = {};  ///< all, run or not
-  size_t pairs_compared = 0, verified = 0;
+  size_t pairs = 0, pairs_compared = 0, verified = 0;
   /// How many checks passed and verify nothing, and why; in summary.json.
   std::vector<std::pair<const char*, size_t>> empty_counts = {};
   /// The pair that a reader looks at first, and the name of its first check; "" without one.
@@ -102,6 +102,7 @@ template <typename Judged>
                   .reason = comparison.reason,
                   .attribution = comparison.attribution,
                   .not_compared = comparison.not_compared,
+                  .pairs = comparison.pairs.size(),
                   .verified = comparison.verified()};
   for (const auto& pair : comparison.pairs) view.pairs_compared += pair.compared ? 1 : 0;
   return view;

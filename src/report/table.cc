@@ -7,6 +7,7 @@
 #include "report/html_text.h"
 #include "report/motion_tables.h"
 #include "report/own_file_text.h"
+#include "report/pair_matrix.h"
 #include "report/reference_table.h"
 #include "report/report.h"
 #include "report/sizing.h"
@@ -23,6 +24,7 @@ class VerdictTableWriter {
     const ResultView view = ViewOf(report);
     out_.Head(view, report.title(), About(report));
     out_.Checks(view);
+    AddLines(PairMatrixLines(report.comparison));
     AddLines(ReferenceTableLines(report.comparison, out_.verbose()));
     AddLines(MotionTableLines(report, out_.verbose()));
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/run_scenario.h"
+#include "report/pair_matrix.h"
 #include "tests/source_dir.h"
 #include "tests/test_folder.h"
 
@@ -53,6 +54,24 @@ TEST(ForeignWitness, JoinsTheComparison) {
   EXPECT_NE(comparison.FindCheck("mock_vs_reference.force_nrmse"), nullptr);
   EXPECT_NE(comparison.attribution.text.find("mock"), std::string::npos)
       << comparison.attribution.text;
+  EXPECT_TRUE(PairMatrixLines(comparison).empty());  // three: reference, simulated, mock
+}
+
+// With four of them every pair stands in a matrix, and a star where it fails.
+TEST(ForeignWitness, PairsOfManyStandInAMatrix) {
+  const std::string one = Mock("answers"), two = Mock("bent");
+  const RunOutcome outcome = RunWith(one.substr(0, one.size() - 1) + ", other" + two.substr(5));
+  ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  const std::vector<std::string> lines = PairMatrixLines(outcome.report->comparison);
+  ASSERT_EQ(lines.size(), 6U);
+  EXPECT_NE(lines[0].find("drive force, RMS"), std::string::npos) << lines[0];
+  EXPECT_TRUE(lines[2].starts_with("simulated")) << lines[2];
+  for (size_t row = 2; row < 6; ++row) {
+    const auto stars = std::count(lines[row].begin(), lines[row].end(), '*');
+    EXPECT_EQ(stars, lines[row].starts_with("other") ? 3 : 1) << lines[row];
+  }
+  const std::string html = PairMatrixHtml(outcome.report->comparison);
+  EXPECT_EQ(std::count(html.begin(), html.end(), '*'), 6 + 2);  // caption and label explain
 }
 
 // The limit is that of the reference: an error of 1e-8 counts.
