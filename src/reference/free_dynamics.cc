@@ -220,18 +220,19 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   return RunSummary::Done();
 }
 
-MatX FreeDynamics::HeldRows(const BodyStates& states, VecX* gaps) const {
-  MatX gradients(static_cast<Eigen::Index>(phase_.held.size()), size_);
-  gaps->resize(gradients.rows());
-  if (phase_.held.empty()) return gradients;
+FreeDynamics::Held FreeDynamics::HeldRows(const BodyStates& states) const {
+  const auto count = static_cast<Eigen::Index>(phase_.held.size());
+  Held held{.gradients = MatX(count, size_), .gaps = VecX(count), .bias = VecX(count)};
+  if (count == 0) return held;
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, states);
   for (size_t k = 0; k < phase_.held.size(); ++k) {
     const auto at = static_cast<Eigen::Index>(k);
     const ScalarRow& row = rows[phase_.held[k]];
-    gradients.row(at) = GradientOf(row, mechanism_.bodies.size()).transpose();
-    (*gaps)[at] = row.value - phase_.at[k];
+    held.gradients.row(at) = GradientOf(row, mechanism_.bodies.size()).transpose();
+    held.gaps[at] = row.value - phase_.at[k];
+    held.bias[at] = row.bias;
   }
-  return gradients;
+  return held;
 }
 
 VecX FreeDynamics::MotionOfHeld(const MatX& rows, const VecX& amount) const {
@@ -245,16 +246,13 @@ VecX FreeDynamics::MotionOfHeld(const MatX& rows, const VecX& amount) const {
 
 void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const MatX& R) {
   if (phase_.held.empty()) return;
-  VecX gaps;
-  const MatX rows = HeldRows(states, &gaps);
-  const std::vector<ScalarRow> elements = ElementRows(mechanism_, states);
-  rest_.G = rows * R;
-  rest_.d = rows * A_p;
-  rest_.most.resize(rows.rows());
+  const Held held = HeldRows(states);
+  rest_.G = held.gradients * R;
+  rest_.d = held.gradients * A_p + held.bias;
+  rest_.most.resize(held.gaps.size());
   for (size_t k = 0; k < phase_.held.size(); ++k) {
-    const auto at = static_cast<Eigen::Index>(k);
-    rest_.d[at] += elements[phase_.held[k]].bias;
-    rest_.most[at] = std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway;
+    rest_.most[static_cast<Eigen::Index>(k)] =
+        std::get<FrictionLaw>(mechanism_.elements[phase_.held[k]].law).breakaway;
   }
 }
 
@@ -271,13 +269,12 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
     FollowElements(mechanism_, states);
     Factor(t_s, *states);
     const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
-    VecX gaps;
-    const MatX held = HeldRows(*states, &gaps);
+    const Held held = HeldRows(*states);
     open = LargestOpen();
     for (size_t k = 0; k < phase_.held.size(); ++k) {
       const bool length = ActsOnLength(mechanism_, mechanism_.elements[phase_.held[k]]);
-      open =
-          std::max(open, std::abs(gaps[static_cast<Eigen::Index>(k)]) / (length ? length_ : 1.0));
+      open = std::max(open,
+                      std::abs(held.gaps[static_cast<Eigen::Index>(k)]) / (length ? length_ : 1.0));
     }
     if (!std::isfinite(open)) break;
     const double tolerance = std::max(kClosed, Rounding(*states));
@@ -286,14 +283,14 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
       rates.tail(command_.velocity.size()) = command_.velocity;
       rates -= rows_.Rates(states->V_WB);
       VecX V = Stack(states->V_WB) + LeastMotion(rates, FirmRank());
-      V -= MotionOfHeld(held, held * V);
+      V -= MotionOfHeld(held.gradients, held.gradients * V);
       Unstack(V, &states->V_WB);
       FollowDriven(mechanism_, states);
       return RunSummary::Done();
     }
     previous = open;
     VecX step = LeastMotion(-r, FirmRank());
-    step -= MotionOfHeld(held, held * step + gaps);
+    step -= MotionOfHeld(held.gradients, held.gradients * step + held.gaps);
     if (moved != nullptr) *moved += SizeOfTwists(step, length_);
     MoveBodies(step, states);
   }

@@ -90,9 +90,13 @@ class FreeDynamics {
   /// Least-norm twists with J V = rates, from the first `rank` pivots.
   [[nodiscard]] VecX LeastMotion(const VecX& rates, Eigen::Index rank) const;
   [[nodiscard]] Eigen::Index FirmRank() const;
-  /// Gradients of the held coordinates (held × 6·bodies), and how far they are from where they are
-  /// held.
-  [[nodiscard]] MatX HeldRows(const BodyStates& states, VecX* gaps) const;
+  /// What rests, per held coordinate: gradients (held × 6·bodies), how far they are from where they
+  /// are held, and their accelerations where no body accelerates.
+  struct Held {
+    MatX gradients;
+    VecX gaps, bias;
+  };
+  [[nodiscard]] Held HeldRows(const BodyStates& states) const;
   /// The least of the motions left that changes held coordinates by `amount`.
   [[nodiscard]] VecX MotionOfHeld(const MatX& rows, const VecX& amount) const;
   void FillRest(const BodyStates& states, const VecX& A_p, const MatX& R);
