@@ -93,6 +93,7 @@ class UpgradeRun {
   std::string CompareStates() {
     const std::vector<Eigen::Index> samples = ChosenSamples();
     std::vector<double> times_s;
+    times_s.reserve(samples.size());
     for (const Eigen::Index i : samples) times_s.push_back(truth_.time_s[static_cast<size_t>(i)]);
     const RowSurvey survey =
         SurveyRows(prepared_->mechanisms.simulated, prepared_->scenario.motion,
