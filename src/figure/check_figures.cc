@@ -29,6 +29,7 @@ class FigureChecker {
     for (const PlacedText& signal : panel.signals) CheckSignal(signal, &unit);
     CheckUnit(panel.unit, unit);
     for (const PlacedText& witness : panel.witnesses) CheckWitness(witness);
+    for (const PlacedText& witness : panel.marks) CheckWitness(witness);
     if (panel.against.given()) CheckWitness(panel.against);
     CheckX(panel);
   }

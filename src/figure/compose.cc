@@ -14,6 +14,8 @@
 namespace mbv {
 namespace {
 
+constexpr size_t kMostMarks = 60;  // of one curve; more would be a band
+
 class PanelComposer {
  public:
   PanelComposer(const PanelSpec& spec, const Report& report, Language language)
@@ -34,13 +36,15 @@ class PanelComposer {
   FigurePanel Compose() {
     panel_.share = spec_.share;
     panel_.y.log = spec_.log;
+    panel_.equal_scale = spec_.equal_scale;
     ChooseUnits();
     if (spec_.against.given()) {
       Differences();
     } else if (spec_.x.given() || channels_.size() == 1) {
       LinePerWitness();
     } else {
-      AddOverTime(Rows(), witnesses_, LineOf(), {x_unit_, unit_, language_, spec_.legend}, &panel_);
+      AddOverTime(Rows(), witnesses_, LineOf(),
+                  {x_unit_, unit_, language_, spec_.legend, spec_.from_start}, &panel_);
     }
     if (!spec_.legend) {
       for (FigureCurve& curve : panel_.curves) curve.label.clear();
@@ -118,16 +122,32 @@ class PanelComposer {
         {.label = label, .points = points, .look = static_cast<int>(panel_.curves.size())});
   }
 
+  [[nodiscard]] bool IsMarks(const WitnessRecord& record) const {
+    return std::ranges::any_of(spec_.marks,
+                               [&](const PlacedText& text) { return text.text == record.name; });
+  }
+
+  // The curve added last stands as markers.
+  void MarkLast() {
+    FigureCurve& curve = panel_.curves.back();
+    curve.line = false;
+    if (curve.points.size() > kMostMarks) curve.points = SomeOf(curve.points, 0.5);
+    curve.marker = markers_++ % kMarkerShapes;
+  }
+
   void LinePerWitness() {
     for (const std::string& channel : channels_) {
       for (const WitnessRecord* record : witnesses_) {
         const int column = record->trace.Find(channel);
         if (column < 0) continue;
-        const PlotPoints points = ValuesOf(record->trace, ForceSignal(record->trace, column));
+        const PlotPoints points = FromStart(
+            ValuesOf(record->trace, ForceSignal(record->trace, column)), spec_.from_start);
         const FigurePoints shown = spec_.x.given()
                                        ? OverSignal(*record, points)
                                        : Scaled(Thinned(points, kFigureBins), x_unit_, unit_);
-        if (!shown.empty()) AddCurve(RowName(channel, SayWitnessOf(*record)), shown);
+        if (shown.empty()) continue;
+        AddCurve(RowName(channel, SayWitnessOf(*record)), shown);
+        if (IsMarks(*record)) MarkLast();
       }
     }
   }
@@ -191,6 +211,7 @@ class PanelComposer {
   std::vector<const WitnessRecord*> witnesses_;
   std::vector<std::string> channels_, missing_;
   std::string si_;
+  int markers_ = 0;  // that were given
   ShownUnit unit_, x_unit_;
   FigurePanel panel_;
 };

@@ -35,6 +35,12 @@ FigurePoints Scaled(const PlotPoints& points, const ShownUnit& x, const ShownUni
   return scaled;
 }
 
+PlotPoints FromStart(PlotPoints points, bool from_start) {
+  const double first = from_start && !points.empty() ? points.front().second : 0.0;
+  for (auto& [time, value] : points) value -= first;
+  return points;
+}
+
 PlotPoints Envelope(const PlotPoints& points, size_t spans) {
   if (points.size() <= spans) return points;
   PlotPoints upper;
@@ -88,17 +94,17 @@ class OverTimePainter {
     if (column < 0) return;
     const ForceSignal signal(trace, column);
     panel_.curves.push_back({.label = options_.legend ? row.label : "",
-                             .points = Placed(Thinned(ValuesOf(trace, signal), kFigureBins)),
+                             .points = Placed(Thinned(Values(trace, signal), kFigureBins)),
                              .look = look});
     const PlotPoints strokes = StrokesOf(trace, signal);
-    if (strokes.empty()) return;
+    if (strokes.empty() || options_.from_start) return;
     panel_.curves.push_back({.points = Placed(strokes), .look = look, .extent = true});
   }
 
   void Marks(const Trace& trace, const SignalRow& row, int look, int marker) {
     const int column = trace.Find(row.channel);
     if (column < 0) return;
-    const FigurePoints points = Placed(ValuesOf(trace, ForceSignal(trace, column)));
+    const FigurePoints points = Placed(Values(trace, ForceSignal(trace, column)));
     panel_.curves.push_back({.points = SomeOf(points, kFirstMark + kNextMark * marker),
                              .look = look,
                              .line = false,
@@ -115,6 +121,10 @@ class OverTimePainter {
   }
 
  private:
+  [[nodiscard]] PlotPoints Values(const Trace& trace, const ForceSignal& signal) const {
+    return FromStart(ValuesOf(trace, signal), options_.from_start);
+  }
+
   [[nodiscard]] FigurePoints Placed(const PlotPoints& points) const {
     return Scaled(points, options_.time, options_.unit);
   }

@@ -42,7 +42,10 @@ struct OverTimeOptions {
   ShownUnit time, unit;
   Language language = Language::kEnglish;
   bool legend = true;
+  bool from_start = false;  ///< changes since the first sample
 };
+/// The same points without the first value, or as they are.
+[[nodiscard]] PlotPoints FromStart(PlotPoints points, bool from_start);
 /// Signals over time: of one witness as lines, of the others as markers at some samples; where
 /// friction at rest leaves a force open, a stroke from end to end. The legend says who is what.
 void AddOverTime(const std::vector<SignalRow>& rows,

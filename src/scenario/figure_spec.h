@@ -22,13 +22,16 @@ struct PlacedText {
 struct PanelSpec {
   std::vector<PlacedText> signals = {};    ///< channels; '*' stands for any characters
   std::vector<PlacedText> witnesses = {};  ///< roles' names; empty: all that ran
+  std::vector<PlacedText> marks = {};      ///< of the witnesses: those without lines
   PlacedText against = {};  ///< |signal − the same of this witness|; not given: the signal itself
   PlacedText x = {};        ///< a channel; not given: time
   PlacedText unit = {}, x_unit = {};              ///< not given: the usual one
   std::string label = {}, x_label = {};           ///< markup of figures; "": the names
   std::map<std::string, std::string> names = {};  ///< legend (markup), by channel
   bool log = false, legend = true;
-  double share = 1.0;  ///< of the height, against the other panels
+  bool from_start = false;   ///< changes since the first sample
+  bool equal_scale = false;  ///< one unit is as long on x as on y
+  double share = 1.0;        ///< of the height, against the other panels
 };
 
 struct FigureSpec {

@@ -9,9 +9,9 @@
 namespace mbv {
 namespace {
 
-const std::vector<std::string> kPanelKeys = {"signals", "witnesses", "difference_to", "x",
-                                             "unit",    "x_unit",    "label",         "x_label",
-                                             "names",   "log",       "legend",        "share"};
+const std::vector<std::string> kPanelKeys = {
+    "signals", "witnesses", "marks", "difference_to", "x",     "unit",       "x_unit",     "label",
+    "x_label", "names",     "log",   "legend",        "share", "from_start", "equal_scale"};
 const std::vector<std::string> kFigureKeys = {"name", "caption", "width_mm", "height_mm", "panels"};
 
 constexpr double kLeastFigureMm = 20, kMostFigureMm = 500;
@@ -29,6 +29,17 @@ class FiguresReader {
       RefuseTwice(figures.back().name, *(*items)[k]);
     }
     return figures;
+  }
+
+  std::vector<PanelSpec> Panels(const YamlNode& node, const std::string& path) {
+    std::vector<PanelSpec> panels;
+    const auto items = yaml_.Items(node, path);
+    if (items && items->empty()) yaml_.Error(node, path + " is empty: there is nothing to draw");
+    for (size_t k = 0; items && k < items->size(); ++k) {
+      const YamlMap map(&yaml_, (*items)[k], fmt::format("{}[{}]", path, k), kPanelKeys);
+      if (map.valid()) panels.push_back(Panel(map));
+    }
+    return panels;
   }
 
  private:
@@ -66,24 +77,14 @@ class FiguresReader {
     return name;
   }
 
-  std::vector<PanelSpec> Panels(const YamlNode& node, const std::string& path) {
-    std::vector<PanelSpec> panels;
-    const auto items = yaml_.Items(node, path);
-    if (items && items->empty()) yaml_.Error(node, path + " is empty: there is nothing to draw");
-    for (size_t k = 0; items && k < items->size(); ++k) {
-      const YamlMap map(&yaml_, (*items)[k], fmt::format("{}[{}]", path, k), kPanelKeys);
-      if (map.valid()) panels.push_back(Panel(map));
-    }
-    return panels;
-  }
-
   PanelSpec Panel(const YamlMap& map) {
     PanelSpec panel;
     if (const YamlNode* signals = map.Required("signals")) {
       panel.signals = List(*signals, map.PathOf("signals"));
     }
-    if (const YamlNode* witnesses = map.Find("witnesses")) {
-      panel.witnesses = List(*witnesses, map.PathOf("witnesses"));
+    for (const auto& [key, to] :
+         {std::pair{"witnesses", &panel.witnesses}, {"marks", &panel.marks}}) {
+      if (const YamlNode* node = map.Find(key)) *to = List(*node, map.PathOf(key));
     }
     for (const auto& [key, to] : {std::pair{"difference_to", &panel.against},
                                   {"x", &panel.x},
@@ -108,7 +109,10 @@ class FiguresReader {
   }
 
   void ReadFlags(const YamlMap& map, PanelSpec* panel) {
-    for (const auto& [key, to] : {std::pair{"log", &panel->log}, {"legend", &panel->legend}}) {
+    for (const auto& [key, to] : {std::pair{"log", &panel->log},
+                                  {"legend", &panel->legend},
+                                  {"from_start", &panel->from_start},
+                                  {"equal_scale", &panel->equal_scale}}) {
       if (const YamlNode* node = map.Find(key)) {
         *to = yaml_.Flag(*node, map.PathOf(key)).value_or(*to);
       }
@@ -160,6 +164,11 @@ class FiguresReader {
 std::vector<FigureSpec> ReadFigures(ValueReader* values, const YamlNode* node) {
   if (node == nullptr) return {};
   return FiguresReader(values).Read(*node);
+}
+
+std::vector<PanelSpec> ReadPanels(ValueReader* values, const YamlNode& node,
+                                  const std::string& path) {
+  return FiguresReader(values).Panels(node, path);
 }
 
 }  // namespace mbv

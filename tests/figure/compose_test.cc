@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 
+#include "figure/signals.h"
 #include "tests/figure/read_back.h"
 
 namespace mbv {
@@ -49,6 +50,32 @@ TEST(ComposeFigures, SeveralSignalsAreLinesOfOneWitnessAndMarkersOfTheOthers) {
   const Trace trace = synthetic::ExactTrace("analytic");
   EXPECT_DOUBLE_EQ(panel.curves[0].points[7].second,
                    1e-3 * trace.values(7, trace.Find("d1.force")));
+}
+
+TEST(ComposeFigures, ChangesCountFromTheFirstSample) {
+  for (const char* signals : {"d2.force", "d*.force"}) {
+    const FigureSet set = Composed(
+        {.signals = {{signals}}, .witnesses = {{"analytic"}}, .unit = {"N"}, .from_start = true});
+    const Trace trace = synthetic::ExactTrace("analytic");
+    const int column = trace.Find(signals == std::string("d2.force") ? signals : "d1.force");
+    const FigurePoints& points = set.figures[0].panels[0].curves[0].points;
+    EXPECT_EQ(points[0].second, 0.0);
+    EXPECT_DOUBLE_EQ(points[7].second, trace.values(7, column) - trace.values(0, column));
+  }
+}
+
+TEST(ComposeFigures, MarkedWitnessesHaveNoLines) {
+  const FigureSet set = Composed({.signals = {{"d2.force"}},
+                                  .witnesses = {{"analytic"}, {"simulated"}},
+                                  .marks = {{"simulated"}},
+                                  .equal_scale = true});
+  const FigurePanel& panel = set.figures[0].panels[0];
+  EXPECT_TRUE(panel.equal_scale);
+  EXPECT_TRUE(panel.curves[0].line);
+  EXPECT_EQ(panel.curves[0].marker, -1);
+  EXPECT_FALSE(panel.curves[1].line);
+  EXPECT_EQ(panel.curves[1].marker, 0);
+  EXPECT_EQ(panel.curves[1].points.size(), kMarksAlong);  // of 101 samples
 }
 
 TEST(ComposeFigures, OneSignalHasALineForEachWitnessThatIsNamed) {

@@ -108,7 +108,7 @@ t.yaml:10:12: error: figures[1].name = '../up' is no name of files
   hint: write a letter, then letters, digits and '_', at most 64 characters
 t.yaml:10:28: error: figures[1].signals is empty: there is nothing to draw
 t.yaml:11:47: error: figures[2].panels[0]: unknown key 'colour'
-  hint: known keys: signals, witnesses, difference_to, x, unit, x_unit, label, x_label, names, log, legend, share
+  hint: known keys: signals, witnesses, marks, difference_to, x, unit, x_unit, label, x_label, names, log, legend, share, from_start, equal_scale
 t.yaml:11:62: error: figures[2]: unknown key 'x'
   hint: known keys: name, caption, width_mm, height_mm, panels
 t.yaml:12:5: error: figures[3].name = 'a': another figure has this name
