@@ -1,0 +1,31 @@
+// Tables for papers: the same cells as LaTeX (booktabs) and as Markdown.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mbv {
+
+struct PaperTableColumn {
+  std::string title;
+  bool number = false;  ///< to the right
+};
+
+struct PaperTable {
+  std::string name;  ///< of its files, and of LaTeX's label
+  std::string caption;
+  std::vector<PaperTableColumn> columns;
+  std::vector<std::vector<std::string>> rows;  ///< plain text; a short row is filled up
+};
+
+/// Text as LaTeX sets it: its special characters escaped; Greek letters, minus signs, degrees and
+/// the like as commands that need no package.
+[[nodiscard]] std::string LatexText(const std::string& text);
+/// A table environment, for `\usepackage{booktabs}`; label "tab:NAME".
+[[nodiscard]] std::string ToLatex(const PaperTable& table);
+
+/// Text of a cell: '|' and what Markdown would take for its own escaped.
+[[nodiscard]] std::string MarkdownText(const std::string& text);
+[[nodiscard]] std::string ToMarkdown(const PaperTable& table);
+
+}  // namespace mbv
