@@ -6,6 +6,7 @@
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/json_option.h"
+#include "cli/paper_figures.h"
 #include "cli/terminal.h"
 #include "core/output_folder.h"
 #include "core/text.h"
@@ -19,7 +20,7 @@ namespace {
 
 struct FiguresArguments {
   std::vector<std::string> scenarios, set, formats = {"pdf", "svg"}, only;
-  std::string style = "ieee", language = "en", out = "figures";
+  std::string style = "ieee", language = "en", out = "figures", paper, page;
   double width_mm = 0, font_pt = 0;
   JsonOption json;
 };
@@ -83,6 +84,15 @@ nlohmann::ordered_json OutcomeJson(const std::string& file, const FigureOutcome&
 int Figures(const FiguresArguments& arguments) {
   FigureOptions options;
   if (!MakeFigureOptions(arguments, &options)) return 2;
+  if (!arguments.paper.empty()) {
+    if (!arguments.set.empty()) return Refuse("--paper and --set do not go together", "");
+    return PaperFigures(
+        {arguments.paper, arguments.scenarios, arguments.out, arguments.page, options},
+        arguments.json);
+  }
+  if (arguments.scenarios.empty()) {
+    return Refuse("which scenario?", "name scenarios, or a paper with --paper");
+  }
   int exit_code = 0;
   const std::vector<std::string> files =
       FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
@@ -139,8 +149,14 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<FiguresArguments>();
   CLI::App* figures = app->add_subcommand(
       "figures", "Figures for a paper: forces, motion, reactions, power, maps of stiffness");
-  figures->add_option("scenario", arguments->scenarios, "scenario files or folders of them")
-      ->required();
+  figures->add_option("scenario", arguments->scenarios,
+                      "scenario files or folders of them; with --paper names of its figures");
+  auto* paper = figures->add_option(
+      "--paper", arguments->paper,
+      "the figures of this model's paper instead, all if none is named; list: which there are");
+  figures
+      ->add_option("--page", arguments->page, "a Markdown FILE that shows them, beside pictures/")
+      ->needs(paper);
   figures
       ->add_option("--style", arguments->style,
                    "column width, fonts and lines of a journal; or a style FILE.yaml")
@@ -168,7 +184,8 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
   SetFooter(figures,
             {"figures scenarios/stabilizing_platform/sea_state.yaml",
              "figures stewart/wave --style springer --lang de --only drive_forces",
-             "figures scara_robot/stiffness --formats pdf,pgf --width-mm 120"},
+             "figures scara_robot/stiffness --formats pdf,pgf --width-mm 120",
+             "figures --paper stabilizing_platform fig10 fig11 fig13"},
             "0 agree, 1 disagree (drawn all the same), 2 bad input, 3 could not run, 4 internal "
             "error");
   figures->callback([arguments, exit_code] { *exit_code = Figures(*arguments); });

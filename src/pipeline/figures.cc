@@ -108,34 +108,32 @@ void KeepOnly(const std::vector<std::string>& only, FigureSet* set, FigureOutcom
   std::erase_if(set->figures, [&](const Figure& figure) { return !Contains(only, figure.name); });
 }
 
-void Draw(const Figure& figure, const FigureOptions& options, FigureOutcome* outcome) {
-  if (LacksGlyphs(figure, options.style)) {
-    Finding finding;
-    finding.severity = Severity::kWarning;
-    finding.message = fmt::format("{}: no font here has all its characters", figure.name);
-    finding.hint = "for Chinese install the Debian package fonts-noto-cjk";
-    outcome->diagnostics.Add(std::move(finding));
-  }
-  MadeFigure made{figure, {}};
-  const auto add = [&](const std::string& name, std::string content) {
-    made.files.push_back(name);
-    outcome->files.emplace_back(name, std::move(content));
-  };
-  for (const FigureFormatRow& row : kFigureFormats) {
-    if (!Contains(options.formats, row.word)) continue;
-    add(figure.name + "." + row.word, DrawFigure(figure, options.style, row.format));
-  }
-  if (Contains(options.formats, kPgf)) {
-    for (auto& [name, content] : PgfFiles(figure, options.style)) add(name, std::move(content));
-  }
-  outcome->figures.push_back(std::move(made));
-}
-
 }  // namespace
 
 const std::vector<std::string>& FigureFormats() {
   static const std::vector<std::string> words = {"pdf", "svg", "png", kPgf};
   return words;
+}
+
+std::vector<std::pair<std::string, std::string>> DrawnFiles(const Figure& figure,
+                                                            const FigureOptions& options,
+                                                            Diagnostics* diagnostics) {
+  if (LacksGlyphs(figure, options.style)) {
+    Finding finding;
+    finding.severity = Severity::kWarning;
+    finding.message = fmt::format("{}: no font here has all its characters", figure.name);
+    finding.hint = "for Chinese install the Debian package fonts-noto-cjk";
+    diagnostics->Add(std::move(finding));
+  }
+  std::vector<std::pair<std::string, std::string>> files;
+  for (const FigureFormatRow& row : kFigureFormats) {
+    if (!Contains(options.formats, row.word)) continue;
+    files.emplace_back(figure.name + "." + row.word, DrawFigure(figure, options.style, row.format));
+  }
+  if (Contains(options.formats, kPgf)) {
+    for (auto& file : PgfFiles(figure, options.style)) files.push_back(std::move(file));
+  }
+  return files;
 }
 
 FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options) {
@@ -145,7 +143,14 @@ FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options)
   if (outcome.diagnostics.has_errors()) return outcome;
   KeepOnly(options.only, &set, &outcome);
   if (outcome.diagnostics.has_errors()) return outcome;
-  for (const Figure& figure : set.figures) Draw(figure, options, &outcome);
+  for (const Figure& figure : set.figures) {
+    MadeFigure made{figure, {}};
+    for (auto& file : DrawnFiles(figure, options, &outcome.diagnostics)) {
+      made.files.push_back(file.first);
+      outcome.files.push_back(std::move(file));
+    }
+    outcome.figures.push_back(std::move(made));
+  }
   outcome.left_out = std::move(set.left_out);
   return outcome;
 }

@@ -40,6 +40,11 @@ struct FigureOutcome {
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
 };
 
+/// The files (name, content) of a figure in all formats that are wanted; characters that no font
+/// here has are a warning.
+[[nodiscard]] std::vector<std::pair<std::string, std::string>> DrawnFiles(
+    const Figure& figure, const FigureOptions& options, Diagnostics* diagnostics);
+
 /// Runs a motion (RunScenario()) and draws the figures that its scenario composes, and the usual
 /// ones; of a stiffness, its mechanism's usual
 /// maps. Findings are bad input.

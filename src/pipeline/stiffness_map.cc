@@ -54,7 +54,7 @@ std::vector<std::string> Chosen(const MapResult& result, const std::vector<std::
 double FactorOf(const std::string& unit) {
   return unit == "m" ? 1e3 : unit == "rad" ? 180.0 / std::numbers::pi : 1.0;
 }
-const char* ShownUnit(const std::string& unit) {
+const char* UnitOnPaper(const std::string& unit) {
   return unit == "m" ? "mm" : unit == "rad" ? "deg" : unit.c_str();
 }
 
@@ -81,8 +81,8 @@ MapPlot PlotOf(const StiffnessMap& map, const MapResult& result, size_t index,
   }
   return {
       .title = title,
-      .x_label = fmt::format("{} [{}]", ShortName(x.name), ShownUnit(x.unit)),
-      .y_label = fmt::format("{} [{}]", ShortName(y.name), ShownUnit(y.unit)),
+      .x_label = fmt::format("{} [{}]", ShortName(x.name), UnitOnPaper(x.unit)),
+      .y_label = fmt::format("{} [{}]", ShortName(y.name), UnitOnPaper(y.unit)),
       .value_label = fmt::format("{} [{}]", result.indices[index].name, result.indices[index].unit),
       .x_min = of_x * (x.low - half(x)),
       .x_max = of_x * (x.high + half(x)),
@@ -120,7 +120,7 @@ std::string FixedText(const StiffnessMap& map) {
   std::string text;
   for (const MapValue& fixed : map.fixed) {
     text += fmt::format("{}{} = {:g} {}", text.empty() ? "" : ", ", ShortName(fixed.name),
-                        FactorOf(fixed.unit) * fixed.value, ShownUnit(fixed.unit));
+                        FactorOf(fixed.unit) * fixed.value, UnitOnPaper(fixed.unit));
   }
   return text;
 }
@@ -178,7 +178,7 @@ std::string MapName(const StiffnessMap& map) {
   std::string name = ShortName(map.axes[0].name) + "_" + ShortName(map.axes[1].name);
   for (const MapValue& fixed : map.fixed) {
     name += fmt::format("_{}{:g}{}", ShortName(fixed.name), FactorOf(fixed.unit) * fixed.value,
-                        ShownUnit(fixed.unit));
+                        UnitOnPaper(fixed.unit));
   }
   return name;
 }
@@ -246,8 +246,8 @@ std::string MapText(const StiffnessMap& map, const MapResult& result,
         const MapAxis &x = map.axes[0], &y = map.axes[1];
         return fmt::format(
             "({:.4g} {}, {:.4g} {})", FactorOf(x.unit) * PointOf(x, static_cast<int>(k % columns)),
-            ShownUnit(x.unit), FactorOf(y.unit) * PointOf(y, static_cast<int>(k / columns)),
-            ShownUnit(y.unit));
+            UnitOnPaper(x.unit), FactorOf(y.unit) * PointOf(y, static_cast<int>(k / columns)),
+            UnitOnPaper(y.unit));
       };
       text += fmt::format(
           "  {:<20} median {:.5g}, smallest {:.5g} at {}, largest {:.5g} at {} {}\n", name,

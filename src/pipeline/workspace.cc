@@ -91,6 +91,9 @@ WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures) {
   outcome.agree = form.agree;
   for (const WorkspaceFile& file : form.files) {
     outcome.files.emplace_back(file.name, ContentOf(file));
+    if (const auto* lines = std::get_if<LinePlot>(&file.content)) {
+      outcome.plots.emplace_back(file.name, *lines);
+    }
   }
   if (!pictures || !form.summary.ok() || form.mesh.triangles.empty()) return outcome;
   const RunSummary drawn = DrawInside(mechanism, form.mesh, form.mesh_caption, &outcome);

@@ -19,6 +19,7 @@ struct WorkspaceOutcome {
   std::vector<WorkspaceMeasure> measures;
   bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
+  std::vector<std::pair<std::string, LinePlot>> plots;     ///< of those that draw lines
 };
 
 /// Mechanism names that ComputeWorkspace() supports.

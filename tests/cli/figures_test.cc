@@ -41,6 +41,30 @@ TEST(FiguresCommand, AForeignFileOfThatNameIsNotTouched) {
   EXPECT_EQ(text, "mine");
 }
 
+TEST(FiguresCommand, AFigureOfAPaperIsDrawnWithWhatThePaperSays) {
+  const Program mbverify("figures_paper");
+  const ProgramResult run =
+      mbverify("figures --paper scara_robot fig9 --formats svg --json - --out " + mbverify.Out());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_TRUE(std::filesystem::exists(mbverify.Out() + "/scara_robot/paper/fig9.svg"));
+  EXPECT_NE(run.out.find("\"deviation\": "), std::string::npos) << run.out;
+  EXPECT_NE(run.err.find("“symmetric about y = x"), std::string::npos) << run.err;
+  const ProgramResult list = mbverify("figures --paper list");
+  EXPECT_EQ(list.exit_code, 0) << list.err;
+  EXPECT_NE(list.out.find("  table2 "), std::string::npos) << list.out;
+}
+
+TEST(FiguresCommand, BadPapersAreRefused) {
+  const Program mbverify("figures_paper_bad");
+  for (const char* options :
+       {"--paper scara fig9", "--paper scara_robot fig99", "--paper all fig9", "--paper four_bar",
+        "--paper scara_robot fig9 --set a=1", "--page page.md", ""}) {
+    const ProgramResult run = mbverify("figures --out " + mbverify.Out() + " " + options);
+    EXPECT_EQ(run.exit_code, 2) << options;
+    EXPECT_FALSE(run.err.empty()) << options;
+  }
+}
+
 TEST(FiguresCommand, BadOptionsAreRefused) {
   const Program mbverify("figures_bad");
   for (const char* options : {"--style iee", "--lang fr", "--formats pdf,doc", "--width-mm 2",

@@ -1,0 +1,332 @@
+#include "pipeline/paper_figures.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "core/text.h"
+#include "core/word_hints.h"
+#include "figure/check_figures.h"
+#include "figure/compose.h"
+#include "figure/from_plot.h"
+#include "figure/units.h"
+#include "pipeline/paper_runs.h"
+#include "pipeline/stiffness_map.h"
+#include "report/paper_table.h"
+#include "scenario/find_model.h"
+
+namespace mbv {
+namespace {
+
+constexpr const char* kPaperFile = "paper.yaml";
+
+bool IsOfMaps(PaperMeasure measure) {
+  return measure >= PaperMeasure::kMirror && measure <= PaperMeasure::kMedianRatio;
+}
+
+class PaperMaker {
+ public:
+  PaperMaker(const PaperFile& paper, const FigureOptions& options, PaperOutcome* outcome)
+      : paper_(paper),
+        options_(options),
+        outcome_(*outcome),
+        runs_(outcome->model, paper, options.progress) {}
+
+  void Make(const PaperEntry& entry) {
+    PaperResult result;
+    result.name = entry.name.text;
+    result.title = entry.title;
+    result.differs = entry.differs;
+    for (const PlacedText& row : entry.audit) result.audit.push_back(row.text);
+    result.from = entry.section.given() ? "mbverify workspace " + outcome_.model
+                                        : "scenario " + outcome_.model + "/" + entry.scenario.text;
+    for (const BesideRun& beside : entry.beside) {
+      result.from += fmt::format("; {}: {} of {}/{}", beside.name, beside.witness.text,
+                                 outcome_.model, beside.scenario.text);
+    }
+    if (entry.section.given()) {
+      MakeSection(entry, &result);
+    } else if (!entry.maps.empty()) {
+      MakeMaps(entry, &result);
+    } else {
+      MakeOfRun(entry, &result);
+    }
+    if (!outcome_.diagnostics.has_errors()) outcome_.results.push_back(std::move(result));
+  }
+
+  [[nodiscard]] int exit_code() const { return runs_.exit_code(); }
+
+ private:
+  void Error(const PlacedText& at, const std::string& message, const std::string& hint = "") {
+    outcome_.diagnostics.Add({.severity = Severity::kError,
+                              .file = paper_.file,
+                              .line = at.line,
+                              .column = at.column,
+                              .message = fmt::format("{} = '{}': {}", at.path, at.text, message),
+                              .hint = hint});
+  }
+
+  void MakeOfRun(const PaperEntry& entry, PaperResult* result) {
+    const auto report = runs_.Of(entry, &outcome_.diagnostics);
+    if (!report) return;
+    for (const PaperStatement& statement : entry.statements) {
+      result->said.push_back(
+          MeasureSignals(statement, *report, paper_.file, &outcome_.diagnostics));
+    }
+    if (!entry.columns.empty()) return MakeTable(entry, *report, result);
+    FigureSpec spec;
+    spec.name = entry.name;
+    spec.width_mm = entry.width_mm;
+    spec.height_mm = entry.height_mm;
+    spec.panels = entry.panels;
+    std::vector<Channel> known;
+    std::vector<std::string> foreign;
+    for (const WitnessRecord& record : report->witnesses) {
+      known.insert(known.end(), record.trace.channels.begin(), record.trace.channels.end());
+      foreign.push_back(record.name);
+    }
+    CheckFigures({spec}, known, foreign, paper_.file, &outcome_.diagnostics);
+    if (outcome_.diagnostics.has_errors()) return;
+    FigureSet set = ComposeFigures({spec}, *report, options_.language);
+    for (const std::string& text : set.left_out) Error(entry.name, text);
+    if (set.figures.empty()) return;
+    AddPrintedLines(entry, &set.figures.front());
+    Deliver(entry, std::move(set.figures.front()), result);
+  }
+
+  // A line at the number that a statement prints.
+  void AddPrintedLines(const PaperEntry& entry, Figure* figure) {
+    for (const PaperStatement& statement : entry.statements) {
+      if (!statement.panel) continue;
+      const size_t k = *statement.panel;
+      if (k >= entry.panels.size() || k >= figure->panels.size() ||
+          entry.panels[k].unit.text != statement.unit.text) {
+        Error(entry.name, fmt::format("'{}': there is no panel {} in '{}', counted from 0",
+                                      statement.says, k, statement.unit.text));
+        continue;
+      }
+      double from = kNan, to = kNan;
+      for (const FigureCurve& curve : figure->panels[k].curves) {
+        for (const auto& [x, y] : curve.points) from = std::fmin(from, x), to = std::fmax(to, x);
+      }
+      FigureCurve line;
+      line.label = "as printed";
+      line.points = {{from, statement.printed}, {to, statement.printed}};
+      line.look = -1;
+      figure->panels[k].curves.push_back(std::move(line));
+    }
+  }
+
+  void MakeMaps(const PaperEntry& entry, PaperResult* result) {
+    const auto prepared =
+        PrepareStiffnessFile(runs_.FileOf(entry.scenario), {}, &outcome_.diagnostics);
+    if (!prepared) return;
+    Figure figure{
+        .name = entry.name.text, .width_mm = entry.width_mm, .height_mm = entry.height_mm};
+    std::vector<MapPlot> plots;
+    for (const PaperMap& wanted : entry.maps) {
+      const auto map = ParseMap(wanted.map.text, *prepared, &outcome_.diagnostics);
+      if (!map) return;
+      const auto made = MapPlots(*map, ComputeMap(*prepared, *map, options_.progress),
+                                 prepared->base.name, {wanted.index.text}, &outcome_.diagnostics);
+      if (made.empty()) return;
+      plots.push_back(made.front().second);
+      FigurePanel panel = FromPlot("", plots.back()).panels.front();
+      if (!wanted.label.empty()) panel.map->value_label += ", " + wanted.label;
+      figure.panels.push_back(std::move(panel));
+    }
+    for (const PaperStatement& statement : entry.statements) {
+      if (!IsOfMaps(statement.measure)) {
+        return Error(entry.name, "maps are measured as mirror, mirror_pair or median_ratio");
+      }
+      result->said.push_back(MeasureMaps(statement, plots, paper_.file, &outcome_.diagnostics));
+    }
+    Deliver(entry, std::move(figure), result);
+  }
+
+  void MakeSection(const PaperEntry& entry, PaperResult* result) {
+    const WorkspaceOutcome& workspace = runs_.Workspace(&outcome_.diagnostics);
+    if (outcome_.diagnostics.has_errors() || !workspace.summary.ok()) return;
+    std::vector<std::string> names;
+    const LinePlot* found = nullptr;
+    for (const auto& [name, plot] : workspace.plots) {
+      names.push_back(name);
+      if (name == entry.section.text) found = &plot;
+    }
+    if (found == nullptr) {
+      return Error(entry.section, "the workspace has no such section",
+                   DidYouMean(entry.section.text, names, "sections: " + Joined(names)));
+    }
+    for (const PaperStatement& statement : entry.statements) {
+      result->said.push_back(MeasureWorkspace(statement, workspace));
+    }
+    Figure figure = FromPlot(entry.name.text, *found);
+    figure.width_mm = entry.width_mm;
+    figure.height_mm = entry.height_mm;
+    Deliver(entry, std::move(figure), result);
+  }
+
+  SaidResult MeasureWorkspace(const PaperStatement& statement, const WorkspaceOutcome& workspace) {
+    SaidResult said;
+    said.says = statement.says;
+    said.where = statement.where;
+    said.printed = statement.printed;
+    std::vector<std::string> names;
+    for (const WorkspaceMeasure& measure : workspace.measures) {
+      names.push_back(measure.name);
+      if (measure.name != statement.name.text) continue;
+      said.measured = measure.value;
+      said.unit = measure.unit;
+      return said;
+    }
+    Error(statement.name, "the workspace has no such measure",
+          DidYouMean(statement.name.text, names, "measures: " + Joined(names)));
+    return said;
+  }
+
+  void MakeTable(const PaperEntry& entry, const Report& report, PaperResult* result) {
+    PaperTable table;
+    table.name = entry.name.text;
+    table.columns = {{entry.head, true}};
+    for (const double at : entry.printed.empty() ? std::vector<double>{} : entry.printed[0].at) {
+      table.rows.push_back({fmt::format("{:g}", at)});
+    }
+    for (const PaperColumn& column : entry.columns) AddColumn(column, entry, report, &table);
+    if (outcome_.diagnostics.has_errors()) return;
+    result->caption = CaptionOf(entry, *result);
+    table.caption = entry.title + (result->caption.empty() ? "" : ". " + result->caption);
+    PaperTable bare = table;
+    bare.caption.clear();
+    result->table = ToMarkdown(bare);
+    AddFile(result, entry.name.text + ".md", ToMarkdown(table));
+    AddFile(result, entry.name.text + ".tex", ToLatex(table));
+  }
+
+  void AddColumn(const PaperColumn& column, const PaperEntry& entry, const Report& report,
+                 PaperTable* table) {
+    const Trace* trace = TraceOf(report, column.of.text);
+    if (trace == nullptr) return Error(column.of, "no such witness ran");
+    const int at = trace->Find(column.signal.text);
+    if (at < 0) return Error(column.signal, "not recorded by " + column.of.text);
+    const std::string& si = trace->channels[static_cast<size_t>(at)].unit;
+    const ShownUnit* unit = FindUnit(si, column.unit.text);
+    if (unit == nullptr) return Error(column.unit, "no unit of what is recorded in " + si);
+    table->columns.push_back({fmt::format("{} ({})", column.title, column.unit.text), true});
+    for (size_t row = 0; row < table->rows.size(); ++row) {
+      const double wanted = entry.printed[0].at[row];
+      std::string cell;
+      for (size_t i = 0; i < trace->time_s.size(); ++i) {
+        if (trace->time_s[i] != wanted) continue;
+        cell =
+            fmt::format("{:.{}f}", unit->factor * trace->values(static_cast<Eigen::Index>(i), at),
+                        column.digits);
+      }
+      table->rows[row].push_back(std::move(cell));
+    }
+  }
+
+  // The entry's own words, then what the paper says and by how much it is off.
+  static std::string CaptionOf(const PaperEntry& entry, const PaperResult& result) {
+    std::string caption = entry.caption;
+    for (const SaidResult& said : result.said) {
+      caption += (caption.empty() ? "" : " ") + SayResult(said) + ".";
+    }
+    return caption;
+  }
+
+  void Deliver(const PaperEntry& entry, Figure figure, PaperResult* result) {
+    if (outcome_.diagnostics.has_errors()) return;
+    figure.caption = result->caption = CaptionOf(entry, *result);
+    for (auto& [name, content] : DrawnFiles(figure, options_, &outcome_.diagnostics)) {
+      AddFile(result, name, std::move(content));
+    }
+  }
+
+  void AddFile(PaperResult* result, const std::string& name, std::string content) {
+    result->files.push_back(name);
+    outcome_.files.emplace_back(name, std::move(content));
+  }
+
+  const PaperFile& paper_;
+  const FigureOptions& options_;
+  PaperOutcome& outcome_;
+  PaperRuns runs_;
+};
+
+// Entries by name; unknown ones are findings, and those that are not computed are told.
+std::vector<const PaperEntry*> WantedOf(const PaperFile& paper,
+                                        const std::vector<std::string>& only,
+                                        PaperOutcome* outcome) {
+  std::vector<const PaperEntry*> wanted;
+  std::vector<std::string> names;
+  for (const PaperEntry& entry : paper.entries) {
+    names.push_back(entry.name.text);
+    if (only.empty() || Contains(only, entry.name.text)) wanted.push_back(&entry);
+  }
+  for (const auto& [name, why] : paper.left_out) {
+    names.push_back(name);
+    if (only.empty() || Contains(only, name)) outcome->left_out.emplace_back(name, why);
+  }
+  for (const std::string& name : only) {
+    if (Contains(names, name)) continue;
+    outcome->diagnostics.AddError("--paper " + outcome->model,
+                                  Printable(name) + ": there is no such figure",
+                                  DidYouMean(name, names, "figures: " + Joined(names)));
+  }
+  return wanted;
+}
+
+}  // namespace
+
+std::vector<std::string> PaperModels() {
+  std::vector<std::string> models;
+  for (const std::string& name : ModelNames(std::filesystem::current_path())) {
+    const auto model = FindModel(name, std::filesystem::current_path());
+    if (model &&
+        std::filesystem::exists(std::filesystem::path(*model).parent_path() / kPaperFile)) {
+      models.push_back(name);
+    }
+  }
+  return models;
+}
+
+std::optional<PaperFile> FindPaper(const std::string& model, Diagnostics* diagnostics) {
+  const std::vector<std::string> known = PaperModels();
+  if (!Contains(known, model)) {
+    diagnostics->AddError("--paper " + Printable(model), "there is no paper of such a model",
+                          DidYouMean(model, known, "papers: " + Joined(known)));
+    return {};
+  }
+  const auto file = FindModel(model, std::filesystem::current_path());
+  return LoadPaper(Shown(std::filesystem::path(*file).parent_path() / kPaperFile), diagnostics);
+}
+
+PaperOutcome MakePaperFigures(const std::string& model, const FigureOptions& options) {
+  Diagnostics diagnostics;
+  const auto paper = FindPaper(model, &diagnostics);
+  if (paper) return MakePaperFigures(model, *paper, options);
+  PaperOutcome outcome;
+  outcome.model = model;
+  outcome.exit_code = 2;
+  outcome.diagnostics = std::move(diagnostics);
+  return outcome;
+}
+
+PaperOutcome MakePaperFigures(const std::string& model, const PaperFile& paper,
+                              const FigureOptions& options) {
+  PaperOutcome outcome;
+  outcome.model = model;
+  outcome.exit_code = 2;
+  outcome.source = paper.source;
+  const auto wanted = WantedOf(paper, options.only, &outcome);
+  if (outcome.diagnostics.has_errors()) return outcome;
+  PaperMaker maker(paper, options, &outcome);
+  for (const PaperEntry* entry : wanted) maker.Make(*entry);
+  outcome.exit_code = outcome.diagnostics.has_errors() ? 2 : maker.exit_code();
+  if (outcome.exit_code == 2) outcome.files.clear();
+  return outcome;
+}
+
+}  // namespace mbv
