@@ -123,11 +123,6 @@ class FigurePainter {
                  color);
   }
 
-  static Rgb CellColor(const PlotAxis& value, double v) {
-    if (!value.Shows(v)) return {-1, -1, -1};
-    return MapColor((value.Inner(v) - value.low) / (value.high - value.low));
-  }
-
   void Map(const MapPlot& map, const PanelPlace& place) const {
     std::vector<Rgb> cells;
     for (int r = map.rows - 1; r >= 0; --r) {

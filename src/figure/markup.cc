@@ -5,6 +5,7 @@
 #include <functional>
 
 #include "core/markup.h"
+#include "core/tex_text.h"
 
 namespace mbv {
 namespace {
@@ -52,47 +53,6 @@ std::string Piece(std::string_view markup, char end, const MarkupWords& words, s
   return out;
 }
 
-std::string TexEscaped(std::string_view text) {
-  std::string out;
-  for (const char c : text) {
-    switch (c) {
-      case '\\':
-        out += "\\textbackslash{}";
-        break;
-      case '~':
-        out += "\\textasciitilde{}";
-        break;
-      case '^':
-        out += "\\textasciicircum{}";
-        break;
-      case '&':
-      case '%':
-      case '$':
-      case '#':
-      case '_':
-      case '{':
-      case '}':
-        out += '\\';
-        [[fallthrough]];
-      default:
-        out += c;
-    }
-  }
-  for (const auto& [from, to] : {std::pair{"°", "\\ensuremath{^\\circ}"},
-                                 {"·", "\\ensuremath{\\cdot}"},
-                                 {"−", "\\ensuremath{-}"},
-                                 {"Δ", "\\ensuremath{\\Delta}"},
-                                 {"φ", "\\ensuremath{\\varphi}"},
-                                 {"ω", "\\ensuremath{\\omega}"},
-                                 {"τ", "\\ensuremath{\\tau}"}}) {
-    const std::string_view word = from;
-    for (size_t at = out.find(word); at != std::string::npos; at = out.find(word, at + 1)) {
-      out.replace(at, word.size(), to);
-    }
-  }
-  return out;
-}
-
 }  // namespace
 
 std::string ToPango(std::string_view markup, double font_pt) {
@@ -110,7 +70,7 @@ std::string ToPango(std::string_view markup, double font_pt) {
 
 std::string ToTex(std::string_view markup) {
   size_t at = 0;
-  const MarkupWords words = {TexEscaped, "\\textit{{{}}}", "\\textsubscript{{{}}}",
+  const MarkupWords words = {TexText, "\\textit{{{}}}", "\\textsubscript{{{}}}",
                              "\\textsuperscript{{{}}}"};
   return Piece(markup, '\0', words, &at);
 }

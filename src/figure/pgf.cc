@@ -9,12 +9,16 @@
 
 #include "figure/layout.h"
 #include "figure/markup.h"
+#include "image/png.h"
 
 namespace mbv {
 namespace {
 
 constexpr std::array<const char*, kMarkerShapes> kMarks = {"o",       "square", "triangle",
                                                            "diamond", "x",      "+"};
+
+constexpr int kCellPixels = 4;  // of a map: sharp edges where readers smooth pictures
+constexpr int kWhite = 255;
 
 // PostScript points, which TeX calls bp.
 std::string Bp(double points) { return fmt::format("{:.4g}bp", points); }
@@ -36,7 +40,7 @@ class PgfWriter {
     tex_ += "\\end{groupplot}\n\\end{tikzpicture}\n";
     std::vector<std::pair<std::string, std::string>> files = {{figure_.name + ".tex", tex_}};
     if (!curves_.empty()) files.emplace_back(figure_.name + ".dat", CurveTable());
-    if (!map_.empty()) files.emplace_back(figure_.name + "_map.dat", map_);
+    for (size_t k = 0; k < maps_.size(); ++k) files.emplace_back(MapFile(k), maps_[k]);
     return files;
   }
 
@@ -126,28 +130,35 @@ class PgfWriter {
       colors += fmt::format(" rgb255=({},{},{})", rgb[0], rgb[1], rgb[2]);
     }
     return fmt::format(
-        ",\n  colormap={{mbv}}{{{}}}, colorbar, point meta min={:.8g}, point meta max={:.8g},\n"
+        ",\n  axis on top, colormap={{mbv}}{{{}}}, colorbar, point meta min={:.8g}, point meta "
+        "max={:.8g},\n"
         "  colorbar style={{ylabel={{{}}}{}}}",
         colors.substr(1), value.low, value.high, ToTex(map.value_label),
         value.log ? ", yticklabel={$10^{\\pgfmathprintnumber{\\tick}}$}" : "");
   }
 
+  // A picture: as cells a map of usual size exceeds TeX's memory.
   void Map(const MapPlot& map, const PlotAxis& value) {
-    Add("\\addplot[matrix plot*, mesh/cols={}, point meta=explicit] "
-        "table[x=x, y=y, meta=c] {{{}_map.dat}};\n",
-        map.columns, figure_.name);
-    map_ = "x y c\n";
-    const double w = (map.x_max - map.x_min) / map.columns;
-    const double h = (map.y_max - map.y_min) / map.rows;
-    for (size_t k = 0; k < map.values.size(); ++k) {
-      const auto columns = static_cast<size_t>(map.columns);
-      const size_t row = k / columns, column = k % columns;
-      const double v = map.values[k];
-      map_ +=
-          fmt::format("{:.10g} {:.10g} {}\n", map.x_min + (static_cast<double>(column) + 0.5) * w,
-                      map.y_min + (static_cast<double>(row) + 0.5) * h,
-                      NumberText(value.Shows(v) ? value.Inner(v) : kNan));
+    Add("\\addplot graphics[xmin={:.8g}, xmax={:.8g}, ymin={:.8g}, ymax={:.8g}] {{{}}};\n",
+        map.x_min, map.x_max, map.y_min, map.y_max, MapFile(maps_.size()));
+    Picture picture{.width = kCellPixels * map.columns, .height = kCellPixels * map.rows};
+    picture.rgb.reserve(static_cast<size_t>(picture.width) * static_cast<size_t>(picture.height) *
+                        3);
+    for (int y = 0; y < picture.height; ++y) {
+      for (int x = 0; x < picture.width; ++x) {
+        const int row = map.rows - 1 - y / kCellPixels, column = x / kCellPixels;
+        const double v = map.values[static_cast<size_t>(row * map.columns + column)];
+        for (const int part : CellColor(value, v)) {
+          picture.rgb.push_back(static_cast<std::uint8_t>(part < 0 ? kWhite : part));
+        }
+      }
     }
+    maps_.push_back(EncodePng(picture));
+  }
+
+  // "NAME_map.png"; of further maps "NAME_map2.png" …
+  [[nodiscard]] std::string MapFile(size_t k) const {
+    return figure_.name + "_map" + (k == 0 ? "" : std::to_string(k + 1)) + ".png";
   }
 
   static std::string NumberText(double value) {
@@ -176,7 +187,8 @@ class PgfWriter {
   const Figure& figure_;
   const FigureStyle& style_;
   const FigureLayout layout_;
-  std::string tex_, map_;
+  std::string tex_;
+  std::vector<std::string> maps_;
   std::vector<const FigureCurve*> curves_;
 };
 

@@ -9,6 +9,7 @@ namespace mbv {
 struct PaperTableColumn {
   std::string title;
   bool number = false;  ///< to the right
+  bool wide = false;    ///< texts of several lines
 };
 
 struct PaperTable {
@@ -18,9 +19,6 @@ struct PaperTable {
   std::vector<std::vector<std::string>> rows;  ///< plain text; a short row is filled up
 };
 
-/// Text as LaTeX sets it: its special characters escaped; Greek letters, minus signs, degrees and
-/// the like as commands that need no package.
-[[nodiscard]] std::string LatexText(const std::string& text);
 /// A table environment, for `\usepackage{booktabs}`; label "tab:NAME".
 [[nodiscard]] std::string ToLatex(const PaperTable& table);
 

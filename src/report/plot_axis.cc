@@ -34,6 +34,11 @@ Rgb MapColor(double t) {
   return rgb;
 }
 
+Rgb CellColor(const PlotAxis& value, double v) {
+  if (!value.Shows(v)) return {-1, -1, -1};
+  return MapColor((value.Inner(v) - value.low) / (value.high - value.low));
+}
+
 bool PlotAxis::Shows(double v) const { return std::isfinite(v) && (!log || v > 0); }
 
 double PlotAxis::Inner(double v) const { return log ? std::log10(v) : v; }

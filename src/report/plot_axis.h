@@ -16,6 +16,11 @@ using Rgb = std::array<int, 3>;
 /// Dark blue over green to yellow (a short version of viridis) for 0 … 1: ever brighter.
 [[nodiscard]] Rgb MapColor(double t);
 
+struct PlotAxis;
+/// The colour of a map's cell, `value` being the range of its colours; {-1, -1, -1} where nothing
+/// is shown.
+[[nodiscard]] Rgb CellColor(const PlotAxis& value, double v);
+
 /// The range of an axis, and where it lies on paper or screen.
 struct PlotAxis {
   /// Logarithms to base 10 of what is shown, on a logarithmic axis.

@@ -13,7 +13,7 @@ TEST(FigureMarkup, ForPangoSymbolsSlantAndIndicesAreSmaller) {
 
 TEST(FigureMarkup, ForTexSpecialCharactersAreEscaped) {
   EXPECT_EQ(ToTex("drive_p & 5 %"), "drive\\_p \\& 5 \\%");
-  EXPECT_EQ(ToTex("|Δ*F*| (N·m)"), "|\\ensuremath{\\Delta}\\textit{F}| (N\\ensuremath{\\cdot}m)");
+  EXPECT_EQ(ToTex("Δ*F* (N·m)"), "\\ensuremath{\\Delta}\\textit{F} (N\\ensuremath{\\cdot}m)");
   EXPECT_EQ(ToTex("*k*_{a,b}"), "\\textit{k}\\textsubscript{a,b}");
 }
 

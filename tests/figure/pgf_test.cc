@@ -5,6 +5,7 @@
 #include <sstream>
 
 #include "figure/default_figures.h"
+#include "image/png.h"
 #include "tests/figure/golden_figure.h"
 #include "tests/figure/read_back.h"
 
@@ -60,18 +61,35 @@ TEST(Pgf, TheDataAreTheSamples) {
   }
 }
 
-TEST(Pgf, ALogarithmicMapGivesLogarithms) {
-  Figure figure{.name = "map", .panels = {FigurePanel{}}};
+TEST(Pgf, MapsArePicturesOfTheirOwn) {
+  Figure figure{.name = "map", .panels = {FigurePanel{}, FigurePanel{}}};
   MapPlot map;
   map.columns = 2;
-  map.rows = 1;
-  map.values = {10, kNan};
+  map.rows = 2;
+  map.values = {10, kNan, 1000, 1000};  // the lower row first
   map.log_scale = true;
   figure.panels[0].map = map;
+  map.values[2] = 100;
+  figure.panels[1].map = map;
   const auto files = PgfFiles(figure, FigureStyles()[0]);
-  ASSERT_EQ(files.size(), 2u);
-  EXPECT_EQ(files[1].second, "x y c\n0.25 0.5 1\n0.75 0.5 nan\n");
-  EXPECT_THAT(files[0].second, testing::HasSubstr("mesh/cols=2"));
+  ASSERT_EQ(files.size(), 3u);
+  EXPECT_THAT(files[0].second, testing::HasSubstr("ymax=1] {map_map.png};"));
+  EXPECT_THAT(files[0].second, testing::HasSubstr("{map_map2.png};"));
+  EXPECT_THAT(files[0].second, testing::HasSubstr("point meta min=1, point meta max=3"));
+  EXPECT_THAT(files[0].second, testing::HasSubstr("axis on top"));  // white hides no axis
+  EXPECT_EQ(files[1].first, "map_map.png");
+  EXPECT_EQ(files[2].first, "map_map2.png");
+  Picture picture;
+  ASSERT_TRUE(DecodePng(files[1].second, 1000, &picture));
+  const auto color = [&](int x, int y) {
+    const size_t at = 3 * static_cast<size_t>(y * picture.width + x);
+    return Rgb{picture.rgb[at], picture.rgb[at + 1], picture.rgb[at + 2]};
+  };
+  const int right = picture.width - 1, below = picture.height - 1;
+  EXPECT_EQ(color(0, 0), MapColor(1));
+  EXPECT_EQ(color(0, below), MapColor(0));
+  EXPECT_EQ(color(right, below), (Rgb{255, 255, 255}));
+  EXPECT_NE(files[1].second, files[2].second);
 }
 
 }  // namespace
