@@ -39,6 +39,7 @@ class PaperMaker {
     result.name = entry.name.text;
     result.title = entry.title;
     result.differs = entry.differs;
+    result.note = WithUnitOf(entry);
     for (const PlacedText& row : entry.audit) result.audit.push_back(row.text);
     result.from = entry.section.given() ? "mbverify workspace " + outcome_.model
                                         : "scenario " + outcome_.model + "/" + entry.scenario.text;
@@ -93,7 +94,7 @@ class PaperMaker {
     for (const std::string& text : set.left_out) Error(entry.name, text);
     if (set.figures.empty()) return;
     AddPrintedLines(entry, &set.figures.front());
-    Deliver(entry, std::move(set.figures.front()), result);
+    Deliver(std::move(set.figures.front()), result);
   }
 
   // A line at the number that a statement prints.
@@ -143,7 +144,7 @@ class PaperMaker {
       }
       result->said.push_back(MeasureMaps(statement, plots, paper_.file, &outcome_.diagnostics));
     }
-    Deliver(entry, std::move(figure), result);
+    Deliver(std::move(figure), result);
   }
 
   void MakeSection(const PaperEntry& entry, PaperResult* result) {
@@ -165,7 +166,7 @@ class PaperMaker {
     Figure figure = FromPlot(entry.name.text, *found);
     figure.width_mm = entry.width_mm;
     figure.height_mm = entry.height_mm;
-    Deliver(entry, std::move(figure), result);
+    Deliver(std::move(figure), result);
   }
 
   SaidResult MeasureWorkspace(const PaperStatement& statement, const WorkspaceOutcome& workspace) {
@@ -195,7 +196,7 @@ class PaperMaker {
     }
     for (const PaperColumn& column : entry.columns) AddColumn(column, entry, report, &table);
     if (outcome_.diagnostics.has_errors()) return;
-    result->caption = CaptionOf(entry, *result);
+    result->caption = CaptionOf(*result);
     table.caption = entry.title + (result->caption.empty() ? "" : ". " + result->caption);
     PaperTable bare = table;
     bare.caption.clear();
@@ -213,7 +214,9 @@ class PaperMaker {
     const std::string& si = trace->channels[static_cast<size_t>(at)].unit;
     const ShownUnit* unit = FindUnit(si, column.unit.text);
     if (unit == nullptr) return Error(column.unit, "no unit of what is recorded in " + si);
-    table->columns.push_back({fmt::format("{} ({})", column.title, column.unit.text), true});
+    const bool one_unit = !CommonUnit(entry).empty();
+    table->columns.push_back(
+        {one_unit ? column.title : fmt::format("{} ({})", column.title, column.unit.text), true});
     for (size_t row = 0; row < table->rows.size(); ++row) {
       const double wanted = entry.printed[0].at[row];
       std::string cell;
@@ -227,18 +230,32 @@ class PaperMaker {
     }
   }
 
+  // Of all columns of a table; "" if there is none.
+  static std::string CommonUnit(const PaperEntry& entry) {
+    for (const PaperColumn& column : entry.columns) {
+      if (column.unit.text != entry.columns.front().unit.text) return "";
+    }
+    return entry.columns.empty() ? "" : entry.columns.front().unit.text;
+  }
+
+  static std::string WithUnitOf(const PaperEntry& entry) {
+    const std::string unit = CommonUnit(entry);
+    if (unit.empty()) return entry.caption;
+    return "All in " + unit + "." + (entry.caption.empty() ? "" : " ") + entry.caption;
+  }
+
   // The entry's own words, then what the paper says and by how much it is off.
-  static std::string CaptionOf(const PaperEntry& entry, const PaperResult& result) {
-    std::string caption = entry.caption;
+  static std::string CaptionOf(const PaperResult& result) {
+    std::string caption = result.note;
     for (const SaidResult& said : result.said) {
       caption += (caption.empty() ? "" : " ") + SayResult(said) + ".";
     }
     return caption;
   }
 
-  void Deliver(const PaperEntry& entry, Figure figure, PaperResult* result) {
+  void Deliver(Figure figure, PaperResult* result) {
     if (outcome_.diagnostics.has_errors()) return;
-    figure.caption = result->caption = CaptionOf(entry, *result);
+    figure.caption = result->caption = CaptionOf(*result);
     for (auto& [name, content] : DrawnFiles(figure, options_, &outcome_.diagnostics)) {
       AddFile(result, name, std::move(content));
     }

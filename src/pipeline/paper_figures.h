@@ -15,7 +15,8 @@ namespace mbv {
 struct PaperResult {
   std::string name, title;
   std::string from;     ///< what it is computed from: "scenario stabilizing_platform/sea_state"
-  std::string caption;  ///< with what the paper says and by how much that is off
+  std::string note;     ///< its own words
+  std::string caption;  ///< the note with what the paper says and by how much that is off
   std::string differs;  ///< why the printed one does
   std::vector<std::string> audit;  ///< rows of the equation audit
   std::vector<SaidResult> said;

@@ -29,7 +29,8 @@ std::string EntryText(const PaperOutcome& paper, const PaperResult& result) {
   } else {
     text += result.table + "\n";
   }
-  text += fmt::format("Computed from {}.\n", result.from);
+  text += fmt::format("Computed from {}.{}{}\n", result.from, result.note.empty() ? "" : " ",
+                      result.note);
   for (const SaidResult& said : result.said) text += "\n* " + SayResult(said);
   if (!result.said.empty()) text += "\n";
   if (!result.differs.empty()) {
