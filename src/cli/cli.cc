@@ -211,6 +211,7 @@ int RunCli(int argc, char** argv) {
   AddSizeCommand(&app, &exit_code);
   AddUpgradeCommand(&app, &exit_code);
   AddFiguresCommand(&app, &exit_code);
+  AddTablesCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);

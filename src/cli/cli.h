@@ -48,5 +48,6 @@ void AddCompletionCommand(CLI::App* app, int* exit_code);
 void AddSizeCommand(CLI::App* app, int* exit_code);
 void AddFiguresCommand(CLI::App* app, int* exit_code);
 void AddUpgradeCommand(CLI::App* app, int* exit_code);
+void AddTablesCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

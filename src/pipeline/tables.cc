@@ -1,0 +1,155 @@
+#include "pipeline/tables.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+#include "core/text.h"
+#include "input/yaml_reader.h"
+#include "kinematics/mobility_report.h"
+#include "pipeline/prepare.h"
+#include "pipeline/run_scenario.h"
+#include "pipeline/stiffness.h"
+
+namespace mbv {
+namespace {
+
+constexpr int kDeepestParametersFrom = 16;
+
+void AddStated(const YamlEntry& entry, std::map<std::string, StatedNumber>* stated) {
+  const YamlNode* value = entry.value.get();
+  const YamlNode* unit = nullptr;
+  const UnitSuffix* suffix = &kPlain;
+  if (value->is_map()) {
+    unit = value->Find("unit");
+    const YamlNode* map = value;
+    value = map->Find("value");
+    for (const auto& [key, other] : {std::pair{"value_deg", &kDeg}, {"value_mm", &kMm}}) {
+      if (const YamlNode* found = map->Find(key)) value = found, suffix = other;
+    }
+  }
+  stated->erase(entry.key);  // an expression of a nearer file replaces a number
+  if (value == nullptr || !value->is_scalar()) return;
+  const auto number = PlainNumber(value->text);
+  if (!number) return;
+  const std::string own = unit != nullptr && unit->is_scalar() ? unit->text : "";
+  const std::string shown = suffix == &kDeg ? "deg" : suffix == &kMm ? "mm" : own;
+  (*stated)[entry.key] = {value->text, shown, suffix->to_si(*number)};
+}
+
+// The files that parameters come from, those behind first.
+void ReadStated(const std::string& file, int depth, std::map<std::string, StatedNumber>* stated) {
+  if (depth > kDeepestParametersFrom) return;
+  YamlReader yaml(file);
+  const auto text = yaml.ReadFile();
+  const YamlNodePtr root = text ? yaml.Parse(*text) : nullptr;
+  if (root == nullptr || !root->is_map()) return;
+  const YamlNode* from = root->Find("parameters_from");
+  if (from != nullptr && from->is_scalar()) {
+    const auto path = std::filesystem::path(file).parent_path() / from->text;
+    ReadStated(path.lexically_normal().string(), depth + 1, stated);
+  }
+  const YamlNode* parameters = root->Find("parameters");
+  if (parameters == nullptr || !parameters->is_map()) return;
+  for (const YamlEntry& entry : parameters->entries) AddStated(entry, stated);
+}
+
+class TableMaker {
+ public:
+  TableMaker(const TablesOptions& options, TablesOutcome* outcome)
+      : options_(options), outcome_(*outcome) {}
+
+  void OfMechanism(const Mechanism& mechanism) {
+    if (Wanted("parameters")) {
+      PaperTable table = ParameterTable(mechanism.parameters, StatedNumbers(mechanism.file));
+      table.caption = fmt::format("Parameters of {} in {}", mechanism.name, outcome_.scenario);
+      Add(std::move(table), "the model has no parameters");
+    }
+    if (Wanted("mobility")) Add(MobilityTable(mechanism, ReportMobility(mechanism)), "");
+  }
+
+  void OfRun(const ResultView& view, const Report* report) {
+    if (Wanted("checks")) Add(CheckTable(view), "nothing was compared");
+    if (!Wanted("sizing")) return;
+    if (report == nullptr) {
+      outcome_.left_out.push_back("sizing: a stiffness asks nothing of motors");
+    } else {
+      Add(SizingTable(*report), "the model states no motors");
+    }
+  }
+
+ private:
+  [[nodiscard]] bool Wanted(const char* name) const {
+    return options_.only.empty() || Contains(options_.only, name);
+  }
+
+  void Add(PaperTable table, const std::string& without_rows) {
+    if (table.rows.empty()) {
+      outcome_.left_out.push_back(table.name + ": " + without_rows);
+      return;
+    }
+    PaperTable labelled = table;
+    labelled.name = outcome_.mechanism + "_" + outcome_.scenario + "_" + table.name;
+    for (const std::string& format : options_.formats) {
+      outcome_.files.emplace_back(table.name + "." + format,
+                                  format == "tex" ? ToLatex(labelled) : ToMarkdown(labelled));
+    }
+    outcome_.tables.push_back(std::move(table));
+  }
+
+  const TablesOptions& options_;
+  TablesOutcome& outcome_;
+};
+
+// The mechanism of a scenario of any kind, as it runs.
+std::optional<Mechanism> MechanismOf(const std::string& file, const ScenarioOptions& options) {
+  Diagnostics told_by_the_run;
+  if (ReadScenarioHead(file).is_stiffness()) {
+    auto prepared = PrepareStiffnessFile(file, options, &told_by_the_run);
+    return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
+  }
+  auto prepared = Prepare(file, options, &told_by_the_run);
+  return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
+}
+
+}  // namespace
+
+const std::vector<std::string>& TableFormats() {
+  static const std::vector<std::string> words = {"tex", "md"};
+  return words;
+}
+
+const std::vector<std::string>& TableNames() {
+  static const std::vector<std::string> words = {"parameters", "mobility", "checks", "sizing"};
+  return words;
+}
+
+std::map<std::string, StatedNumber> StatedNumbers(const std::string& model_file) {
+  std::map<std::string, StatedNumber> stated;
+  if (model_file.ends_with(".yaml")) ReadStated(model_file, 0, &stated);
+  return stated;
+}
+
+TablesOutcome MakeTables(const std::string& file, const TablesOptions& options) {
+  TablesOutcome outcome;
+  RunOptions run;
+  run.scenario = options.scenario;
+  run.pictures = run.page = false;
+  run.progress = options.progress;
+  const RunOutcome ran = RunScenario(file, run);
+  outcome.exit_code = ran.exit_code;
+  outcome.diagnostics = ran.diagnostics;
+  if (!ran.report && ran.stiffness == nullptr) return outcome;
+  const auto mechanism = MechanismOf(file, options.scenario);
+  if (!mechanism) return outcome;
+  const ResultView view = ran.report ? ViewOf(*ran.report) : ViewOf(*ran.stiffness);
+  outcome.mechanism = view.frame->mechanism;
+  outcome.scenario = view.frame->scenario;
+  outcome.verdict = ToText(view.verdict);
+  TableMaker maker(options, &outcome);
+  maker.OfMechanism(*mechanism);
+  maker.OfRun(view, ran.report ? &*ran.report : nullptr);
+  return outcome;
+}
+
+}  // namespace mbv

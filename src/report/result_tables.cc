@@ -1,0 +1,156 @@
+#include "report/result_tables.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/text.h"
+#include "report/sizing.h"
+
+namespace mbv {
+namespace {
+
+constexpr const char* kDash = "–";
+constexpr size_t kMostDigits = 9;  // of a number in full; a longer one is rounded
+
+std::string SourceText(Source source) {
+  switch (source) {
+    case Source::kUnstated:
+      return kDash;
+    case Source::kPrinted:
+      return "printed";
+    case Source::kAssumed:
+      return "assumed";
+    case Source::kCorrected:
+      return "corrected";
+  }
+  return kDash;
+}
+
+// As short as it is, or six digits.
+std::string Short(double value) {
+  const std::string full = fmt::format("{}", value);
+  return full.size() <= kMostDigits ? full : fmt::format("{:.6g}", value);
+}
+
+std::string Significant(double value, int digits = 3) {
+  return std::isfinite(value) ? fmt::format("{:.{}g}", value, digits) : kDash;
+}
+
+std::string InUnit(double value, const std::string& unit) {
+  return std::isfinite(value) ? Significant(value) + " " + unit : kDash;
+}
+
+std::string EndText(const ShownCheck& check) {
+  switch (EndOf(check)) {
+    case CheckEnd::kOff:
+      return "off";
+    case CheckEnd::kFail:
+      return "fails";
+    case CheckEnd::kVoid:
+      return "verifies nothing";
+    case CheckEnd::kHeld:
+      return "held";
+    case CheckEnd::kOk:
+      break;
+  }
+  return "ok";
+}
+
+// "kg m^2" → "kg m²".
+std::string PrintedUnit(std::string unit) {
+  if (unit == "1") return "";
+  for (const auto& [plain, printed] : {std::pair{"^2", "²"}, {"^3", "³"}}) {
+    const size_t at = unit.find(plain);
+    if (at != std::string::npos) unit.replace(at, 2, printed);
+  }
+  return unit;
+}
+
+std::string NoneOr(const std::vector<std::string>& names) {
+  return names.empty() ? "none" : Joined(names);
+}
+
+}  // namespace
+
+PaperTable ParameterTable(const std::vector<Parameter>& parameters,
+                          const std::map<std::string, StatedNumber>& stated) {
+  PaperTable table;
+  table.name = "parameters";
+  table.caption = "Parameters";
+  table.columns = {{"Parameter"}, {"Value", true}, {"Unit"}, {"Source"}, {"Meaning", false, true}};
+  for (const Parameter& parameter : parameters) {
+    const auto at = stated.find(parameter.name);
+    const bool written = at != stated.end() && at->second.value == parameter.value;
+    const std::string unit = PrintedUnit(written ? at->second.unit : parameter.unit);
+    // A number of the file that another one replaced is no longer the source's.
+    const bool replaced = at != stated.end() && !written;
+    table.rows.push_back({parameter.name, written ? at->second.text : Short(parameter.value), unit,
+                          replaced ? "set" : SourceText(parameter.source), parameter.note});
+  }
+  return table;
+}
+
+PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& report) {
+  PaperTable table;
+  table.name = "mobility";
+  table.caption = "Mobility of " + mechanism.name;
+  table.columns = {{"Quantity"}, {"Value", false, true}};
+  const Mobility& m = report.home;
+  const auto add = [&](const char* what, const std::string& value) {
+    table.rows.push_back({what, value});
+  };
+  add("moving bodies", std::to_string(mechanism.bodies.size() - 1));
+  add("joints", std::to_string(mechanism.joints.size()));
+  add("loops", std::to_string(report.loops.size()));
+  add("constraints, rank", fmt::format("{}, {}", m.constraint_rows, m.constraint_rank));
+  add("freedoms", std::to_string(report.freedoms()));
+  add("Kutzbach's count", std::to_string(m.kutzbach));
+  add("redundant constraints", std::to_string(report.redundant_count()));
+  add("drives", std::to_string(m.drives));
+  add("prescribed joints", std::to_string(m.prescribed));
+  add("freedoms with all of these locked", std::to_string(report.undriven()));
+  add("drive forces that statics leaves open", NoneOr(m.drives_not_unique));
+  add("joints with reactions left open", NoneOr(m.joints_not_unique));
+  if (report.home_singular()) add("home pose", "singular");
+  return table;
+}
+
+PaperTable CheckTable(const ResultView& view) {
+  PaperTable table;
+  table.name = "checks";
+  table.caption = fmt::format("Checks of {}: {}", view.frame->title(), ToText(view.verdict));
+  table.columns = {{"Compared"}, {"Check"}, {"Value", true}, {"Limit", true}, {"Result"}};
+  for (const ShownCheck& check : view.checks) {
+    if (!check.limit) continue;
+    table.rows.push_back({check.subject, check.title,
+                          std::isnan(check.value) ? kDash : fmt::format("{:.1e}", check.value),
+                          fmt::format("{:.1e}", *check.limit), EndText(check)});
+  }
+  return table;
+}
+
+PaperTable SizingTable(const Report& report) {
+  PaperTable table;
+  table.name = "sizing";
+  table.caption = fmt::format("Motors in {}", report.title());
+  table.columns = {{"Drive"},
+                   {"Torque, peak", true},
+                   {"RMS", true},
+                   {"Speed, peak", true},
+                   {"Power, peak", true},
+                   {"Largest use", true},
+                   {"of"}};
+  for (const MotorLoad* load : MainMotorLoads(report)) {
+    const double use = load->largest_use();
+    table.rows.push_back({load->drive, InUnit(load->peak_torque, load->torque_unit),
+                          InUnit(load->rms_torque, load->torque_unit),
+                          InUnit(load->peak_speed, load->speed_unit), InUnit(load->peak_power, "W"),
+                          std::isfinite(use) ? Significant(100 * use) + " %" : kDash,
+                          std::isfinite(use) ? load->limited_by() : kDash});
+    if (table.rows.size() == 1) table.caption += ", " + load->witness;
+  }
+  return table;
+}
+
+}  // namespace mbv

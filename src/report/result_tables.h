@@ -1,0 +1,32 @@
+// What a paper tells of a model and of a run, as tables.
+#pragma once
+
+#include <map>
+#include <string>
+#include <vector>
+
+#include "kinematics/mobility_report.h"
+#include "mechanism/mechanism.h"
+#include "report/paper_table.h"
+#include "report/report.h"
+
+namespace mbv {
+
+/// A number as its author wrote it.
+struct StatedNumber {
+  std::string text, unit;  ///< "10.2", "deg"
+  double value = kNan;     ///< SI
+};
+
+/// Name, value, unit, source and meaning. A value that stands in `stated` is written with its
+/// digits there; one that was computed or set from outside with six digits at most.
+[[nodiscard]] PaperTable ParameterTable(const std::vector<Parameter>& parameters,
+                                        const std::map<std::string, StatedNumber>& stated);
+/// Bodies, joints, freedoms, redundant constraints, what drives and statics determine.
+[[nodiscard]] PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& report);
+/// Every check that has a limit: what is compared, value, limit, how it ended.
+[[nodiscard]] PaperTable CheckTable(const ResultView& view);
+/// What the run asks of each motor; no rows without motors.
+[[nodiscard]] PaperTable SizingTable(const Report& report);
+
+}  // namespace mbv
