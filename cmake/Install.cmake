@@ -20,6 +20,12 @@ foreach(shell_file "bash mbverify bash-completion/completions" "zsh _mbverify zs
   install(FILES ${completions}/${file} DESTINATION ${CMAKE_INSTALL_DATADIR}/${folder}
           COMPONENT runtime)
 endforeach()
+# So does the manual page.
+add_custom_command(TARGET mbverify POST_BUILD VERBATIM
+                   COMMAND sh -c "\"$0\" man-page >'${CMAKE_BINARY_DIR}/mbverify.1'"
+                           $<TARGET_FILE:mbverify>)
+install(FILES ${CMAKE_BINARY_DIR}/mbverify.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
+        COMPONENT runtime)
 install(TARGETS mbv_main EXPORT mbverify ARCHIVE COMPONENT development)
 install(DIRECTORY src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbverify COMPONENT development
         FILES_MATCHING PATTERN "*.h")

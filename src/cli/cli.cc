@@ -216,6 +216,7 @@ int RunCli(int argc, char** argv) {
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);
   AddCompletionCommand(&app, &exit_code);
+  AddManPageCommand(&app, &exit_code);
   for (const char* command : {"init", "run", "render", "model", "check", "survey", "inertia"}) {
     AddPackages(app.get_subcommand(command));
   }

@@ -45,6 +45,7 @@ void AddSurveyCommand(CLI::App* app, int* exit_code);
 void AddHistoryCommand(CLI::App* app, int* exit_code);
 void AddInertiaCommand(CLI::App* app, int* exit_code);
 void AddCompletionCommand(CLI::App* app, int* exit_code);
+void AddManPageCommand(CLI::App* app, int* exit_code);
 void AddSizeCommand(CLI::App* app, int* exit_code);
 void AddFiguresCommand(CLI::App* app, int* exit_code);
 void AddUpgradeCommand(CLI::App* app, int* exit_code);

@@ -28,7 +28,7 @@ OptionWords WordsOf(const CLI::Option& option) {
   for (const std::string& name : option.get_lnames()) words.names.push_back("--" + name);
   for (const std::string& name : option.get_snames()) words.names.push_back("-" + name);
   words.description = option.get_description();
-  words.takes_value = option.get_type_size() != 0;
+  words.takes_value = option.get_items_expected_max() != 0;  // flags take none
   for (std::string value : ValuesOf(option)) words.values.push_back(CLI::detail::trim(value));
   return words;
 }
@@ -46,7 +46,8 @@ void AddWords(const CLI::App& app, std::vector<CommandWords>* commands) {
     }
   }
   commands->push_back(std::move(words));
-  for (const CLI::App* command : app.get_subcommands([](const CLI::App*) { return true; })) {
+  for (const CLI::App* command :
+       app.get_subcommands([](const CLI::App* one) { return !one->get_group().empty(); })) {
     AddWords(*command, commands);
   }
 }

@@ -5,6 +5,8 @@
 
 #include "cli/cli.h"
 #include "cli/completion.h"
+#include "cli/man_page.h"
+#include "pipeline/version.h"
 
 namespace mbv {
 
@@ -22,6 +24,16 @@ void AddCompletionCommand(CLI::App* app, int* exit_code) {
             "0 done, 2 bad input");
   completion->callback([app, shell, exit_code] {
     fmt::print("{}", CompletionScript(*shell, WordsOf(*app)));
+    *exit_code = 0;
+  });
+}
+
+// For the build, which installs the page; help does not show it.
+void AddManPageCommand(CLI::App* app, int* exit_code) {
+  CLI::App* page = app->add_subcommand("man-page", "The manual page, as source for man");
+  page->group("");
+  page->callback([app, exit_code] {
+    fmt::print("{}", ManPage(*app, std::string("mbverify ") + kVersion));
     *exit_code = 0;
   });
 }

@@ -72,6 +72,13 @@ TEST_F(Completion, OfFishKnowsCommandsOptionsWordsAndNames) {
   EXPECT_TRUE(Has(Fish("model spr_tr"), "spr_tripod"));
 }
 
+TEST_F(Completion, FlagsTakeNoValueAndHiddenCommandsAreNotOffered) {
+  const std::string zsh = ReadAll(Script("zsh"));
+  EXPECT_NE(zsh.find("'--quiet[one line per scenario]' "), std::string::npos);
+  EXPECT_NE(zsh.find("'--out[folder for the figures]:value:_files'"), std::string::npos);
+  EXPECT_EQ(zsh.find("man-page"), std::string::npos);
+}
+
 // What zsh offers appears on a terminal only; here its own functions say what they were given.
 TEST_F(Completion, OfZshKnowsCommandsOptionsWordsAndNames) {
   const auto offered = [&](const std::string& words, int current) {
