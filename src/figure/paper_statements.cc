@@ -190,10 +190,10 @@ double MirrorShare(const MapPlot& a, const MapPlot& b) {
   if (a.columns != b.rows || a.rows != b.columns) return kNan;
   double largest = 0;
   size_t seen = 0;
-  for (int r = 0; r < a.rows; ++r) {
-    for (int c = 0; c < a.columns; ++c) {
-      const double d = a.values[static_cast<size_t>(r * a.columns + c)] -
-                       b.values[static_cast<size_t>(c * b.columns + r)];
+  const auto rows = static_cast<size_t>(a.rows), columns = static_cast<size_t>(a.columns);
+  for (size_t r = 0; r < rows; ++r) {
+    for (size_t c = 0; c < columns; ++c) {
+      const double d = a.values[r * columns + c] - b.values[c * rows + r];
       if (!std::isfinite(d)) continue;
       largest = std::max(largest, std::abs(d));
       ++seen;

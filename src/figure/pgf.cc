@@ -146,8 +146,9 @@ class PgfWriter {
                         3);
     for (int y = 0; y < picture.height; ++y) {
       for (int x = 0; x < picture.width; ++x) {
-        const int row = map.rows - 1 - y / kCellPixels, column = x / kCellPixels;
-        const double v = map.values[static_cast<size_t>(row * map.columns + column)];
+        const auto row = static_cast<size_t>(map.rows - 1 - y / kCellPixels);
+        const auto column = static_cast<size_t>(x / kCellPixels);
+        const double v = map.values[row * static_cast<size_t>(map.columns) + column];
         for (const int part : CellColor(value, v)) {
           picture.rgb.push_back(static_cast<std::uint8_t>(part < 0 ? kWhite : part));
         }
