@@ -64,20 +64,14 @@ nlohmann::ordered_json TablesJson(const std::string& file, const TablesOutcome& 
 int Tables(const TablesArguments& arguments) {
   TablesOptions options{
       .scenario = {}, .formats = arguments.formats, .only = arguments.only, .progress = {}};
-  for (const std::string& text : arguments.set) {
-    const auto set = SplitSet(text);
-    if (!set) return Refuse("--set " + text + ": write key=value", "");
-    options.scenario.set.push_back(*set);
-  }
-  std::string trouble;
-  const std::vector<std::string> files = ExpandScenarios(arguments.scenarios, &trouble);
-  if (!trouble.empty()) return Refuse(trouble, "");
-  for (const std::string& file : files) {
-    if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
-  }
+  if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options.scenario.set))
+    return 2;
+  int exit_code = 0;
+  const std::vector<std::string> files =
+      FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  if (exit_code != 0) return exit_code;
   FindingPrinter findings(stderr);
   auto results = nlohmann::ordered_json::array();
-  int exit_code = 0;
   for (const std::string& file : files) {
     const TablesOutcome outcome = MakeTables(file, options);
     findings.Print(outcome.diagnostics);
