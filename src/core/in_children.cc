@@ -7,6 +7,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -32,7 +33,8 @@ bool WriteBytes(int pipe, const void* bytes, size_t count) {
 }
 
 // In the child: each text after its length, until something ends it.
-[[noreturn]] void Serve(int pipe, pid_t parent, size_t first, size_t count, const Work& work) {
+[[noreturn]] void Serve(int pipe, pid_t parent, const Work& work, size_t first, size_t step,
+                        size_t count) {
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(1);
   const rlimit no_core{0, 0};
@@ -40,7 +42,7 @@ bool WriteBytes(int pipe, const void* bytes, size_t count) {
   const int nothing = open("/dev/null", O_RDWR | O_CLOEXEC);
   for (int stream = 0; stream < 3; ++stream) dup2(nothing, stream);
   try {
-    for (size_t i = first; i < count; ++i) {
+    for (size_t i = first; i < count; i += step) {
       const std::string text = work(i);
       const std::uint64_t size = text.size();
       if (!WriteBytes(pipe, &size, sizeof size) || !WriteBytes(pipe, text.data(), text.size())) {
@@ -82,30 +84,69 @@ std::optional<std::string> ReadText(int pipe, double timeout_s) {
   return text;
 }
 
+// A child that gives the texts of work(first), work(first + step), …
+class Child {
+ public:
+  Child() = default;
+  ~Child() { End(); }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
+
+  void Start(const Work& work, size_t first, size_t step, size_t count) {
+    int ends[2];
+    const pid_t parent = getpid();
+    if (pipe2(ends, O_CLOEXEC) != 0) return;
+    pid_ = fork();
+    if (pid_ == 0) Serve(ends[1], parent, work, first, step, count);
+    close(ends[1]);
+    pipe_ = ends[0];
+    if (pid_ < 0) End();  // no processes left
+  }
+  [[nodiscard]] bool runs() const { return pid_ > 0; }
+  // The next text; without one the child ends.
+  std::optional<std::string> Next(double timeout_s) {
+    auto text = runs() ? ReadText(pipe_, timeout_s) : std::nullopt;
+    if (!text) End();
+    return text;
+  }
+
+ private:
+  void End() {
+    if (pipe_ >= 0) close(pipe_);
+    if (pid_ > 0) {
+      kill(pid_, SIGKILL);
+      waitpid(pid_, nullptr, 0);
+    }
+    pid_ = pipe_ = -1;
+  }
+
+  pid_t pid_ = -1;
+  int pipe_ = -1;
+};
+
 }  // namespace
+
+void StreamFromChildren(
+    size_t count, const ChildStreams& streams, const Work& work,
+    const std::function<bool(size_t, const std::optional<std::string>&)>& take) {
+  const size_t parallel = std::min(static_cast<size_t>(streams.parallel), count);
+  std::vector<Child> children(parallel);
+  for (size_t k = 0; k < parallel; ++k) children[k].Start(work, k, parallel, count);
+  for (size_t i = 0; i < count; ++i) {
+    Child& child = children[i % parallel];
+    if (!child.runs()) child.Start(work, i, parallel, count);
+    if (!take(i, child.Next(streams.timeout_s))) return;
+  }
+}
 
 std::vector<std::optional<std::string>> InChildren(size_t count, double timeout_s,
                                                    const Work& work) {
   std::vector<std::optional<std::string>> texts;
-  while (texts.size() < count) {
-    int ends[2];
-    const pid_t parent = getpid();
-    const pid_t pid = pipe2(ends, O_CLOEXEC) == 0 ? fork() : -1;
-    if (pid < 0) {  // no processes left: nothing is known about the rest
-      texts.resize(count);
-      break;
-    }
-    if (pid == 0) Serve(ends[1], parent, texts.size(), count, work);
-    close(ends[1]);
-    bool alive = true;
-    while (alive && texts.size() < count) {
-      texts.push_back(ReadText(ends[0], timeout_s));
-      alive = texts.back().has_value();
-    }
-    close(ends[0]);
-    kill(pid, SIGKILL);
-    waitpid(pid, nullptr, 0);
-  }
+  StreamFromChildren(count, {.parallel = 1, .timeout_s = timeout_s}, work,
+                     [&](size_t, const std::optional<std::string>& text) {
+                       texts.push_back(text);
+                       return true;
+                     });
   return texts;
 }
 

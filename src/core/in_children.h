@@ -2,12 +2,26 @@
 // night.
 #pragma once
 
+#include <cstddef>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 namespace mbv {
+
+/// How StreamFromChildren() shares work out.
+struct ChildStreams {
+  int parallel = 1;          ///< children at once, at least 1
+  double timeout_s = 300.0;  ///< for each text, from when it is the next one
+};
+
+/// Calls work(0) … work(count − 1) in child processes, and take(i, text) here, in that order; empty
+/// where the child died or took longer. take() returns false to end all. A child that is ahead
+/// waits, so that no more than a pipe's content of texts is kept.
+void StreamFromChildren(size_t count, const ChildStreams& streams,
+                        const std::function<std::string(size_t)>& work,
+                        const std::function<bool(size_t, const std::optional<std::string>&)>& take);
 
 /// Calls work(0) … work(count − 1) in a child process and gives their texts back; empty where the
 /// child died or took longer than `timeout_s`: another child goes on with the next.
