@@ -337,6 +337,7 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
   head.mechanism = word("mechanism");
   head.description = word("description");
   head.is_scenario = head.is_scenario || root->Find("mechanism") != nullptr;
+  head.is_study = !head.is_scenario && root->Find("study") != nullptr;
   if (const YamlNode* expect = root->Find("expect")) head.expect = ReadExpectation(&values, expect);
   return head;
 }

@@ -43,6 +43,7 @@ struct ScenarioResult {
 /// that is no YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
   bool is_scenario = false;  ///< has a `mechanism:` key (or an expectation)
+  bool is_study = false;     ///< has a `study:` key instead (scenario/study_file.h)
   std::string kind;          ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;

@@ -82,6 +82,18 @@ YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, Yam
   return root;
 }
 
+const YamlNode* FindSetNode(const YamlNode& root, const std::string& key) {
+  const YamlNode* node = &root;
+  std::string parent, path = key;
+  while (node != nullptr && node->is_map() && !path.empty()) {
+    const size_t length = FirstKey(*node, path, parent);
+    parent = path.substr(0, length);
+    path = length < path.size() ? path.substr(length + 1) : "";
+    node = node->Find(parent);
+  }
+  return path.empty() ? node : nullptr;
+}
+
 Diagnostics ReadParameterOptions(const std::vector<SetValue>& values, LoadOptions* options) {
   Diagnostics diagnostics;
   for (const SetValue& value : values) {

@@ -12,6 +12,9 @@ namespace mbv {
 [[nodiscard]] YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values,
                                     YamlReader* reader);
 
+/// The node that `key` would replace; null where there is none.
+[[nodiscard]] const YamlNode* FindSetNode(const YamlNode& root, const std::string& key);
+
 /// Overrides of parameters by `--set NAME=VALUE`: numbers and expressions as a scenario's
 /// `parameters` takes them. Findings name the option.
 [[nodiscard]] Diagnostics ReadParameterOptions(const std::vector<SetValue>& values,

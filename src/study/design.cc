@@ -1,0 +1,139 @@
+#include "study/design.h"
+
+#include <boost/random/sobol.hpp>
+#include <limits>
+
+#include "core/demand.h"
+#include "study/hash.h"
+#include "study/permutation.h"
+
+namespace mbv {
+namespace {
+
+constexpr std::uint64_t kMostPoints = std::numeric_limits<std::uint64_t>::max();
+
+std::uint64_t SaturatedProduct(std::uint64_t a, std::uint64_t b) {
+  return b != 0 && a > kMostPoints / b ? kMostPoints : a * b;
+}
+
+}  // namespace
+
+// Sobol's sequence by number, its first point (zero) included: without it, 2^m points would not be
+// a net [Owen 2020, "On dropping the first Sobol' point"].
+struct DesignPoints::Sequence {
+  explicit Sequence(size_t dimensions) : engine(dimensions), size(dimensions) {}
+
+  std::vector<std::uint64_t> At(std::uint64_t number) {
+    std::vector<std::uint64_t> bits(size, 0);
+    if (number == 0) return bits;
+    engine.seed(number - 1);  // Boost leaves zero out
+    for (std::uint64_t& coordinate : bits) coordinate = engine();
+    return bits;
+  }
+
+  boost::random::sobol engine;
+  size_t size;
+};
+
+DesignPoints::DesignPoints(std::vector<Axis> axes, Design design)
+    : axes_(std::move(axes)), design_(std::move(design)) {
+  MBV_DEMAND(!axes_.empty() && axes_.size() <= kMostAxes, axes_.size());
+  if (design_.kind == DesignKind::kSobol) sequence_ = std::make_unique<Sequence>(axes_.size());
+  if (design_.kind == DesignKind::kSaltelli) {
+    sequence_ = std::make_unique<Sequence>(2 * axes_.size());
+  }
+}
+
+DesignPoints::~DesignPoints() = default;
+DesignPoints::DesignPoints(DesignPoints&&) noexcept = default;
+
+std::uint64_t DesignPoints::count() const {
+  std::uint64_t count = 1;
+  switch (design_.kind) {
+    case DesignKind::kSobol:
+    case DesignKind::kLatinHypercube:
+      return design_.count;
+    case DesignKind::kSaltelli:
+      return SaturatedProduct(design_.count, axes_.size() + 2);
+    case DesignKind::kGrid:
+      for (const Axis& axis : axes_) {
+        count = SaturatedProduct(count, Excursions(axis.distribution).size());
+      }
+      return count;
+    case DesignKind::kOneAtATime:
+      for (const Axis& axis : axes_) count += Excursions(axis.distribution).size();
+      return count;
+    case DesignKind::kList:
+      return design_.list.size();
+  }
+  return 0;
+}
+
+std::vector<double> DesignPoints::At(std::uint64_t number) const {
+  MBV_DEMAND(number < count(), number);
+  switch (design_.kind) {
+    case DesignKind::kGrid:
+      return GridPoint(number);
+    case DesignKind::kOneAtATime:
+      return Excursion(number);
+    case DesignKind::kList:
+      return design_.list[number];
+    case DesignKind::kSobol:
+    case DesignKind::kSaltelli:
+    case DesignKind::kLatinHypercube:
+      break;
+  }
+  std::vector<double> values = Shares(number);
+  for (size_t d = 0; d < axes_.size(); ++d) {
+    values[d] = Quantile(axes_[d].distribution, values[d]);
+  }
+  return values;
+}
+
+// Where the point lies in the unit cube.
+std::vector<double> DesignPoints::Shares(std::uint64_t number) const {
+  const size_t axes = axes_.size();
+  std::vector<double> shares(axes);
+  if (design_.kind == DesignKind::kLatinHypercube) {
+    for (size_t d = 0; d < axes; ++d) {
+      const std::uint64_t layer = Permuted(number, design_.count, MixBits(design_.seed, d));
+      const double inside = ShareOf(MixBits(design_.seed ^ 0x5851f42dULL, d, number));
+      shares[d] = (static_cast<double>(layer) + inside) / static_cast<double>(design_.count);
+    }
+    return shares;
+  }
+  const bool blocks = design_.kind == DesignKind::kSaltelli;
+  const std::uint64_t block = blocks ? axes + 2 : 1, place = number % block;
+  const std::vector<std::uint64_t> bits = sequence_->At(number / block);
+  for (size_t d = 0; d < axes; ++d) {
+    const size_t column = place == 1 || place == d + 2 ? axes + d : d;  // of A, or of B
+    shares[d] = ShareOf(bits[column] ^ MixBits(design_.seed, column));
+  }
+  return shares;
+}
+
+std::vector<double> DesignPoints::GridPoint(std::uint64_t number) const {
+  std::vector<double> values(axes_.size());
+  for (size_t d = axes_.size(); d-- > 0;) {
+    const std::vector<double> levels = Excursions(axes_[d].distribution);
+    values[d] = levels[number % levels.size()];
+    number /= levels.size();
+  }
+  return values;
+}
+
+std::vector<double> DesignPoints::Excursion(std::uint64_t number) const {
+  std::vector<double> values;
+  for (const Axis& axis : axes_) values.push_back(axis.nominal);
+  std::uint64_t first = 1;  // number of this axis' first excursion
+  for (size_t d = 0; d < axes_.size(); ++d) {
+    const std::vector<double> excursions = Excursions(axes_[d].distribution);
+    if (number >= first && number < first + excursions.size()) {
+      values[d] = excursions[number - first];
+    }
+    first += excursions.size();
+  }
+  return values;
+}
+
+}  // namespace mbv
