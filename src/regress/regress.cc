@@ -81,6 +81,7 @@ class Run {
     for (const std::string& trouble : found.troubles) AddTrouble(trouble, &outcome_);
     if (!found.troubles.empty()) return false;
     cases_ = std::move(found.cases);
+    outcome_.studies = found.studies;
     unread_ = std::move(found.unread);
     report().run.covers = CoversOf(options_.paths);
     report().run.found = cases_.size();

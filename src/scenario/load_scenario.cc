@@ -48,6 +48,10 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
 
  private:
   void Read(const YamlNode& root) override {
+    if (root.is_map() && root.Find("study") != nullptr && root.Find("mechanism") == nullptr) {
+      yaml_.Error(*root.Find("study"), "this is a study, no scenario", "mbverify study runs it");
+      return;
+    }
     if (const YamlNode* kind = root.Find("kind"); kind != nullptr && !IsMotion(*kind)) return;
     YamlMap map(&yaml_, &root, "", kMotionScenarioKeys);
     scenario_.file = file_;
