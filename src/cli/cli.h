@@ -50,5 +50,6 @@ void AddSizeCommand(CLI::App* app, int* exit_code);
 void AddFiguresCommand(CLI::App* app, int* exit_code);
 void AddUpgradeCommand(CLI::App* app, int* exit_code);
 void AddTablesCommand(CLI::App* app, int* exit_code);
+void AddStudyCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

@@ -9,6 +9,7 @@
 #include "pipeline/load_robot.h"
 #include "pipeline/prepare.h"
 #include "pipeline/stiffness.h"
+#include "pipeline/study.h"
 
 namespace mbv {
 namespace {
@@ -59,6 +60,7 @@ Diagnostics CheckMechanismFile(const std::string& file) {
 Diagnostics CheckFile(const std::string& file) {
   if (file.ends_with(".json")) return CheckMechanismFile(file);
   const ScenarioHead head = ReadScenarioHead(file);
+  if (head.is_study) return CheckStudy(file);
   if (!head.is_scenario) return CheckModel(file);
   Diagnostics diagnostics;
   if (head.is_stiffness()) {

@@ -51,9 +51,10 @@ double PoseError(const Mechanism& mechanism, const Trace& a, const Trace& b,
   return largest;
 }
 
-class Study {
+class StepStudy {
  public:
-  Study(const std::string& file, const ConvergeOptions& options) : file_(file), options_(options) {}
+  StepStudy(const std::string& file, const ConvergeOptions& options)
+      : file_(file), options_(options) {}
 
   ConvergeOutcome Run() {
     if (!Load()) {
@@ -306,7 +307,7 @@ Diagnostics Check(const ConvergeOptions& options) {
 
 ConvergeOutcome Converge(const std::string& file, const ConvergeOptions& options) {
   const ParsedDocuments documents;
-  return Study(file, options).Run();
+  return StepStudy(file, options).Run();
 }
 
 }  // namespace mbv

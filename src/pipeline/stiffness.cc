@@ -7,6 +7,7 @@
 #include "core/demand.h"
 #include "core/inputs.h"
 #include "core/output_folder.h"
+#include "core/shell_word.h"
 #include "pipeline/not_run.h"
 #include "pipeline/version.h"
 #include "reference/frame_stiffness.h"
@@ -20,11 +21,6 @@ namespace {
 
 double Since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
-std::string Quoted(const std::string& argument) {
-  return argument.find_first_of(" '\"$&|;()[]{}*?<>") == std::string::npos ? argument
-                                                                           : "'" + argument + "'";
 }
 
 class Runner {
@@ -266,9 +262,9 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
   }
   StiffnessRun run = RunStiffness(*prepared, options.progress);
   run.report.findings = outcome.diagnostics;
-  run.report.command = "mbverify run " + Quoted(file);
+  run.report.command = "mbverify run " + ShellWord(file);
   for (const auto& [key, value] : options.scenario.set) {
-    run.report.command += " --set " + Quoted(key + "=" + value);
+    run.report.command += " --set " + ShellWord(key + "=" + value);
   }
   outcome.exit_code = run.report.exit_code;
   if (!options.out_dir.empty()) {

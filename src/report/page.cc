@@ -25,6 +25,10 @@ VerdictWords WordsOf(Verdict verdict) {
   return {"?", "?"};
 }
 
+std::string WordOf(const PageHead& head) {
+  return head.word.empty() ? WordsOf(head.verdict).word : Escape(head.word);
+}
+
 std::string HeadHtml(const PageHead& head) {
   const std::string scripts =
       head.script_source.empty() ? "" : "; script-src " + head.script_source;
@@ -35,8 +39,8 @@ std::string HeadHtml(const PageHead& head) {
       "style-src 'unsafe-inline'{}\">\n<meta name=\"color-scheme\" content=\"light dark\">\n"
       "<link rel=\"icon\" href=\"data:,\">\n<title>{}{} – mbverify</title>\n"
       "<style>{}</style>\n</head>\n",
-      scripts, Escape(head.title),
-      head.judges ? std::string(": ") + WordsOf(head.verdict).word : "", PageStyle());
+      scripts, Escape(head.title), head.judges ? ": " + std::string(WordOf(head)) : "",
+      PageStyle());
 }
 
 std::string TopHtml(const PageHead& head) {
@@ -46,7 +50,7 @@ std::string TopHtml(const PageHead& head) {
   const std::string badge =
       head.judges
           ? fmt::format("<div class=\"badges\"><span class=\"verdict {}\">{}{}</span></div>",
-                        ToText(head.verdict), sign, words.word)
+                        ToText(head.verdict), sign, WordOf(head))
           : "";
   return fmt::format(
       "<header class=\"top\"><div><p class=\"kicker\">{}</p><h1>{}</h1><p class=\"lead\">{}</p>"

@@ -12,8 +12,9 @@ struct PageHead {
   std::string kicker = {};            ///< above the title: "mbverify report"
   std::string title = {}, lead = {};  ///< heading, and a sentence below it
   Verdict verdict = Verdict::kNotRun;
-  bool judges = true;  ///< false: a page of numbers, without a verdict
-  bool sign = true;    ///< ✓, ✗ or ? before the verdict's word
+  std::string word = {};  ///< instead of the verdict's
+  bool judges = true;     ///< false: a page of numbers, without a verdict
+  bool sign = true;       ///< ✓, ✗ or ? before the verdict's word
   std::string footer = {};
   std::string script_source =
       {};                    ///< which scripts may run, as in a content security policy; "": none

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cmath>
 #include <filesystem>
+#include <sstream>
 
 #include "core/files.h"
 #include "core/inputs.h"
@@ -19,7 +20,8 @@ namespace {
 const std::vector<std::string> kDesignWords = {"sobol", "saltelli",      "latin_hypercube",
                                                "grid",  "one_at_a_time", "list"};
 
-// The points of a CSV file, in the order of the factors.
+// The points of a file with commas between cells, in the order of the factors; its first line names
+// the columns.
 class PointList {
  public:
   PointList(std::string file, const std::vector<Factor>& factors, Diagnostics* findings)
@@ -32,22 +34,29 @@ class PointList {
       return {};
     }
     NoteInput(file_, *text);
-    const auto table = CutTable(*text, file_, {}, findings_);
-    if (!table || !FindColumns(*table)) return {};
     std::vector<std::vector<double>> points;
+    std::istringstream lines(text->starts_with("\xEF\xBB\xBF") ? text->substr(3) : *text);
     CutLine cut;
-    for (const TableLine& line : table->rows) {
-      CutCells(line.text, table->delimiter, &cut);
-      points.push_back(PointOf(line, cut, table->decimal_comma));
+    int number = 0;
+    for (std::string line; std::getline(lines, line);) {
+      ++number;
+      CutCells(line, ',', &cut);
+      if (cut.cells.size() == 1 && cut.cells[0].text.empty()) continue;
+      if (!columns_.empty()) {
+        points.push_back(PointOf({line, number}, cut));
+      } else if (!FindColumns(cut)) {
+        return {};
+      }
     }
     if (points.empty()) findings_->AddError(file_, "has no points");
     return points;
   }
 
  private:
-  bool FindColumns(const TableText& table) {
+  // The heading: names as they are, whatever units they look like.
+  bool FindColumns(const CutLine& heading) {
     std::vector<std::string> names;
-    for (const TableHeading& heading : table.headings) names.push_back(heading.full);
+    for (const TableCell& cell : heading.cells) names.emplace_back(cell.text);
     for (const Factor& factor : factors_) {
       const auto found = std::find(names.begin(), names.end(), factor.name);
       columns_.push_back(static_cast<size_t>(found - names.begin()));
@@ -58,11 +67,11 @@ class PointList {
     return !findings_->has_errors();
   }
 
-  std::vector<double> PointOf(const TableLine& line, const CutLine& cut, bool decimal_comma) {
+  std::vector<double> PointOf(const TableLine& line, const CutLine& cut) {
     std::vector<double> point;
     for (size_t k = 0; k < factors_.size(); ++k) {
       const bool there = columns_[k] < cut.cells.size();
-      const auto cell = there ? ReadCell(cut.cells[columns_[k]].text, decimal_comma) : CellNumber();
+      const auto cell = there ? ReadCell(cut.cells[columns_[k]].text, false) : CellNumber();
       point.push_back(cell.value);
       if (cell.kind == CellNumber::Kind::kNumber) continue;
       Finding finding;

@@ -93,7 +93,7 @@ class StudyReader {
   bool LoadVaried(const YamlNode& node) {
     const auto name = yaml_.Text(node, "scenario");
     if (!name) return false;
-    const fs::path beside = fs::path(Folder()) / *name;
+    const fs::path beside = (fs::path(Folder()) / *name).lexically_normal();
     std::error_code error;
     study_.scenario = fs::exists(beside, error) ? beside.string() : FindScenario(*name);
     if (!fs::is_regular_file(study_.scenario, error)) {

@@ -1,0 +1,214 @@
+#include "pipeline/study.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <fstream>
+#include <map>
+
+#include "core/growing_file.h"
+#include "input/parsed_documents.h"
+#include "pipeline/study_bands.h"
+#include "pipeline/study_folder.h"
+#include "pipeline/version.h"
+#include "scenario/study_file.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+StudyOutcome Refused(StudyOutcome outcome, const std::string& file, const std::string& why,
+                     const std::string& hint = "") {
+  outcome.exit_code = 2;
+  outcome.diagnostics.AddError(file, why, hint);
+  return outcome;
+}
+
+// Every row of a file that was looked through before.
+PointRows RowsOf(const fs::path& file, const Study& study) {
+  return [file, &study](const std::function<void(const PointRow&)>& take) {
+    std::ifstream stream(file, std::ios::binary);
+    std::string line;
+    std::getline(stream, line);
+    while (std::getline(stream, line)) {
+      if (const auto row = ReadPointLine(line, study)) take(*row);
+    }
+  };
+}
+
+StudyReport ReportOf(const StudyBench& bench, const fs::path& folder) {
+  StudyReport report;
+  report.study = bench.study();
+  report.nominal = bench.nominal().row.values;
+  report.summary =
+      SummariseStudy(report.study, report.nominal, RowsOf(folder / kPointsFile, report.study));
+  report.bands = StudyBands(bench, folder / kForcesFile);
+  for (const QuantitySummary& quantity : report.summary.quantities) {
+    auto& commands = report.worst_commands.emplace_back();
+    for (const WorstPoint& worst : quantity.worst) commands.push_back(bench.Command(worst.varied));
+  }
+  for (const PointRow& row : report.summary.first_failed) {
+    report.failed_commands.push_back(bench.Command(row.varied));
+  }
+  report.versions = Versions();
+  return report;
+}
+
+// From complete rows in `folder` to the result.
+StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
+                    StudyOutcome outcome) {
+  std::vector<std::pair<std::string, std::string>> files;
+  outcome.exit_code = 0;
+  if (whole) {
+    outcome.report = ReportOf(bench, folder->path());
+    outcome.exit_code = outcome.report->exit_code();
+    files = {{"summary.json", ToJson(*outcome.report)}, {"report.html", ToHtml(*outcome.report)}};
+  }
+  const std::string trouble = folder->Publish(files);
+  if (!trouble.empty()) {
+    outcome.report.reset();
+    return Refused(std::move(outcome), "", trouble, "choose another folder with --out");
+  }
+  outcome.folder = folder->target().string();
+  return outcome;
+}
+
+struct LoadedStudy {
+  std::unique_ptr<StudyBench> bench;  // null after bad input
+  int exit_code = 2;
+};
+
+LoadedStudy LoadBench(const std::string& file, bool many, Diagnostics* diagnostics) {
+  LoadedStudy loaded;
+  StudyResult read = LoadStudy(file, {.many = many});
+  diagnostics->Append(read.diagnostics);
+  if (!read.study) return loaded;
+  loaded.bench = StudyBench::Make(*read.study, diagnostics, &loaded.exit_code);
+  return loaded;
+}
+
+// The folders of all shards, by their place.
+class ShardMerger {
+ public:
+  // "" or why these are not all shards of one study.
+  std::string Read(const std::vector<std::string>& folders) {
+    for (const std::string& folder : folders) {
+      const auto identity = ReadIdentity(folder);
+      if (!identity) return folder + ": is no result of a study";
+      if (first_ && identity->fingerprint != first_->fingerprint) {
+        return fmt::format("{}: is of another study than {}, or of other files", folder,
+                           folders[0]);
+      }
+      if (first_ && identity->share.count != first_->share.count) {
+        return fmt::format("{}: is one of {} shards, {} one of {}", folder, identity->share.count,
+                           folders[0], first_->share.count);
+      }
+      if (!first_) first_ = identity;
+      if (!folders_.emplace(identity->share.index, folder).second) {
+        return fmt::format("{}: shard {} is in another folder, too", folder,
+                           identity->share.index + 1);
+      }
+    }
+    for (std::uint64_t k = 0; k < first_->share.count; ++k) {
+      if (!folders_.contains(k))
+        return fmt::format("shard {}/{} is missing", k + 1, first_->share.count);
+    }
+    return "";
+  }
+  // "" or which shard has not all of its rows.
+  [[nodiscard]] std::string CheckRows(const StudyBench& bench) const {
+    for (const auto& [index, folder] : folders_) {
+      const StudyShare share{index, first_->share.count};
+      if (FindDone(bench, share, folder).rows != share.size(bench.points().count())) {
+        return folder + ": its points are not all there, or not as they were written";
+      }
+    }
+    return "";
+  }
+  // Rows and forces in the order of points.
+  [[nodiscard]] std::string Join(const StudyBench& bench, const fs::path& into) const {
+    GrowingFile csv(into / kPointsFile), forces(into / kForcesFile);
+    std::string trouble = csv.Open(0);
+    if (trouble.empty()) trouble = forces.Open(0);
+    if (trouble.empty()) trouble = csv.Append(PointHeader(bench.study()));
+    std::vector<std::ifstream> rows, records;
+    std::string line, record(bench.forces().size() * sizeof(float), '\0');
+    for (const auto& [index, folder] : folders_) {
+      rows.emplace_back(fs::path(folder) / kPointsFile, std::ios::binary);
+      records.emplace_back(fs::path(folder) / kForcesFile, std::ios::binary);
+      std::getline(rows.back(), line);
+    }
+    for (std::uint64_t p = 0; p < bench.points().count() && trouble.empty(); ++p) {
+      std::getline(rows[p % rows.size()], line);
+      trouble = csv.Append(line + "\n");
+      if (p >= kBandPoints || !trouble.empty()) continue;
+      records[p % rows.size()].read(record.data(), static_cast<std::streamsize>(record.size()));
+      trouble = forces.Append(record);
+    }
+    return trouble;
+  }
+  [[nodiscard]] const StudyIdentity& first() const { return *first_; }
+
+ private:
+  std::optional<StudyIdentity> first_;
+  std::map<std::uint64_t, std::string> folders_;
+};
+
+}  // namespace
+
+StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
+  const ParsedDocuments documents;
+  StudyOutcome outcome;
+  const LoadedStudy loaded = LoadBench(file, options.many, &outcome.diagnostics);
+  outcome.exit_code = loaded.exit_code;
+  if (!loaded.bench) return outcome;
+  const StudyBench& bench = *loaded.bench;
+  const StudyShare& share = options.points.share;
+  if (share.size(bench.points().count()) == 0) {
+    return Refused(std::move(outcome), file,
+                   fmt::format("has {} points for {} shards", bench.points().count(), share.count));
+  }
+  StudyFolder folder(options.out_dir, {bench.study().name, file, bench.fingerprint(), share});
+  std::string hint;
+  std::string trouble = folder.Open(options.resume, &hint);
+  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);
+  trouble =
+      ComputePoints(bench, options.points, FindDone(bench, share, folder.path()), folder.path());
+  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
+  return Finish(bench, share.count == 1, &folder, std::move(outcome));
+}
+
+StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::string& out_dir) {
+  const ParsedDocuments documents;
+  StudyOutcome outcome;
+  ShardMerger merger;
+  std::string hint, trouble = merger.Read(folders);
+  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
+  const StudyIdentity& first = merger.first();
+  const LoadedStudy loaded = LoadBench(first.file, true, &outcome.diagnostics);
+  outcome.exit_code = loaded.exit_code;
+  if (!loaded.bench) return outcome;
+  const StudyBench& bench = *loaded.bench;
+  if (bench.fingerprint() != first.fingerprint) {
+    return Refused(std::move(outcome), first.file,
+                   "has changed since the shards were computed, or its scenario, model or this "
+                   "program");
+  }
+  trouble = merger.CheckRows(bench);
+  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
+  StudyFolder folder(out_dir, {first.study, first.file, first.fingerprint, {}});
+  trouble = folder.Open(true, &hint);
+  if (trouble.empty()) trouble = merger.Join(bench, folder.path());
+  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);
+  return Finish(bench, true, &folder, std::move(outcome));
+}
+
+Diagnostics CheckStudy(const std::string& file) {
+  const ParsedDocuments documents;
+  Diagnostics diagnostics;
+  (void)LoadBench(file, true, &diagnostics);
+  return diagnostics;
+}
+
+}  // namespace mbv

@@ -1,0 +1,64 @@
+// Computes points of a study: the scenario with some numbers replaced, by some of its witnesses.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/diagnostics.h"
+#include "pipeline/prepare.h"
+#include "study/point_row.h"
+#include "study/study.h"
+
+namespace mbv {
+
+/// The drive forces over time that bands are made of.
+struct StudyForces {
+  std::vector<std::string> drives, units;
+  std::vector<double> time_s;         ///< at most kBandTimes of the nominal samples
+  std::vector<Eigen::Index> samples;  ///< their rows
+  [[nodiscard]] size_t size() const { return drives.size() * time_s.size(); }
+};
+inline constexpr size_t kBandTimes = 240;
+
+struct StudyPoint {
+  PointRow row;
+  std::vector<float> forces;  ///< drives × times; NaN where there are none
+};
+
+class StudyBench {
+ public:
+  /// Computes the scenario as it is, with nothing varied, and checks all names against it. Null
+  /// after bad input (exit code 2) or where it cannot run (3).
+  [[nodiscard]] static std::unique_ptr<StudyBench> Make(const Study& study,
+                                                        Diagnostics* diagnostics, int* exit_code);
+
+  [[nodiscard]] const Study& study() const { return study_; }
+  [[nodiscard]] const DesignPoints& points() const { return points_; }
+  /// Of the scenario as it is; `row.varied` are the nominal values.
+  [[nodiscard]] const StudyPoint& nominal() const { return nominal_; }
+  [[nodiscard]] const StudyForces& forces() const { return forces_; }
+  /// Tells a study, its scenario and model, and this program from others.
+  [[nodiscard]] const std::string& fingerprint() const { return fingerprint_; }
+
+  /// A function of the study and the number alone.
+  [[nodiscard]] StudyPoint Run(std::uint64_t number) const;
+  /// A point that gave nothing.
+  [[nodiscard]] StudyPoint Lost(std::uint64_t number, const std::string& reason) const;
+  /// What runs the scenario at these values, to be typed.
+  [[nodiscard]] std::string Command(const std::vector<double>& varied) const;
+
+ private:
+  explicit StudyBench(Study study) : study_(std::move(study)), points_(study_.Points()) {}
+  [[nodiscard]] std::vector<SetValue> SetsOf(const std::vector<double>& varied) const;
+  void CheckKeys(Diagnostics* diagnostics) const;
+  void CheckQuantities(const std::vector<std::string>& channels, Diagnostics* diagnostics) const;
+
+  Study study_;
+  DesignPoints points_;
+  StudyPoint nominal_;
+  StudyForces forces_;
+  std::string fingerprint_;
+};
+
+}  // namespace mbv

@@ -1,0 +1,126 @@
+#include "pipeline/study_folder.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+
+#include "core/files.h"
+#include "core/json_text.h"
+#include "core/output_folder.h"
+#include "core/state_folder.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kStudySchema = "mbverify.study/1";
+
+// The file's bytes, piece by piece; what cannot be read any more ends it early, which `size` tells.
+FileContent ContentOf(const fs::path& path, std::uint64_t* size) {
+  return [path, size](const std::function<void(std::string_view)>& write) {
+    std::ifstream stream(path, std::ios::binary);
+    std::string piece(1 << 20, '\0');
+    while (stream) {
+      stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+      write(std::string_view(piece.data(), static_cast<size_t>(stream.gcount())));
+      *size += static_cast<std::uint64_t>(stream.gcount());
+    }
+  };
+}
+
+std::string NameOf(const StudyIdentity& identity) {
+  if (identity.share.count == 1) return identity.study;
+  return fmt::format("{}.shard-{}-of-{}", identity.study, identity.share.index + 1,
+                     identity.share.count);
+}
+
+}  // namespace
+
+std::string ToJson(const StudyIdentity& identity) {
+  return Dump({{"schema", kStudySchema},
+               {"study", identity.study},
+               {"file", identity.file},
+               {"fingerprint", identity.fingerprint},
+               {"shard", {identity.share.index + 1, identity.share.count}}});
+}
+
+std::optional<StudyIdentity> ReadIdentity(const fs::path& folder) {
+  const auto text = ReadWholeFile(folder / kStudyFile);
+  const auto json = nlohmann::json::parse(text.value_or(""), nullptr, false);
+  if (!json.is_object() || json.value("schema", "") != kStudySchema) return {};
+  try {
+    StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}};
+    identity.share.index = json.at("shard").at(0).get<std::uint64_t>() - 1;
+    identity.share.count = json.at("shard").at(1).get<std::uint64_t>();
+    if (identity.share.count == 0 || identity.share.index >= identity.share.count) return {};
+    return identity;
+  } catch (const nlohmann::json::exception&) {
+    return {};
+  }
+}
+
+StudyFolder::StudyFolder(const fs::path& out, const StudyIdentity& identity)
+    : out_(out), identity_(identity), name_(NameOf(identity)) {
+  target_ = out_ / name_;
+  path_ = out_ / (name_ + ".part");
+}
+
+StudyFolder::~StudyFolder() {
+  if (lock_ >= 0) close(lock_);
+}
+
+std::string StudyFolder::Open(bool resume, std::string* hint) {
+  std::error_code error;
+  fs::create_directories(out_, error);
+  const bool is_new = !error && fs::create_directory(path_, error);
+  if (error) return fmt::format("cannot make folder {}: {}", path_.string(), error.message());
+  lock_ = LockFolder(path_);
+  if (lock_ < 0) {
+    const bool held = errno == EWOULDBLOCK;
+    return fmt::format("cannot use folder {}: {}", path_.string(),
+                       held ? "another process computes this study there" : std::strerror(errno));
+  }
+  const auto left = is_new ? std::nullopt : ReadIdentity(path_);
+  if (left && left->fingerprint != identity_.fingerprint) {
+    *hint = "remove that folder, or choose another one with --out";
+    return path_.string() + ": holds points of another study, or of files that have changed since";
+  }
+  if (left && !resume) {
+    *hint = "--resume goes on with them; to start anew remove that folder";
+    return path_.string() + ": holds points of this study that was not finished";
+  }
+  if (!is_new && !left && !fs::is_empty(path_, error)) {
+    *hint = "choose another folder with --out";
+    return path_.string() + ": is a folder of something else";
+  }
+  return left ? "" : WriteFile(path_ / kStudyFile, ToJson(identity_));
+}
+
+std::string StudyFolder::Publish(const std::vector<std::pair<std::string, std::string>>& files) {
+  OutputFolder folder(out_, name_);
+  std::string trouble = folder.Create();
+  for (const char* grown : {kPointsFile, kForcesFile}) {
+    std::uint64_t size = 0;
+    std::error_code error;
+    if (trouble.empty()) trouble = folder.Write(grown, ContentOf(path_ / grown, &size));
+    if (trouble.empty() && size != fs::file_size(path_ / grown, error)) {
+      trouble = fmt::format("cannot read {}", (path_ / grown).string());
+    }
+  }
+  for (const auto& [name, content] : files) {
+    if (trouble.empty()) trouble = folder.Write(name, content);
+  }
+  if (trouble.empty()) trouble = folder.Write(kStudyFile, ToJson(identity_));
+  if (trouble.empty()) trouble = folder.Commit();
+  if (!trouble.empty()) return trouble;
+  std::error_code error;
+  for (const char* ours : {kPointsFile, kForcesFile, kStudyFile}) fs::remove(path_ / ours, error);
+  fs::remove(path_, error);  // unless somebody else put something there
+  return "";
+}
+
+}  // namespace mbv

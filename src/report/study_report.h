@@ -1,0 +1,42 @@
+// What a study found, and its writers.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "study/summary.h"
+
+namespace mbv {
+
+/// A drive's force over time: percentiles of all points, beside the nominal curve.
+struct StudyBand {
+  std::string drive, unit;
+  std::vector<double> time_s, nominal, p5, p50, p95;
+  std::uint64_t points = 0, left_out = 0;  ///< with forces at the nominal times, and without
+};
+
+struct StudyReport {
+  Study study;
+  std::vector<double> nominal;  ///< per quantity
+  StudySummary summary;
+  std::vector<StudyBand> bands;
+  /// What runs a point's scenario, to be typed: per quantity, as its worst points; and of failures.
+  std::vector<std::vector<std::string>> worst_commands;
+  std::vector<std::string> failed_commands;
+  std::vector<std::pair<std::string, std::string>> versions;
+
+  /// 0 limits are kept (or there are none), 1 one is not, 3 no point has values.
+  [[nodiscard]] int exit_code() const {
+    return !summary.any_value() ? 3 : summary.within_limits() ? 0 : 1;
+  }
+};
+
+/// For a terminal.
+[[nodiscard]] std::string ToText(const StudyReport& report);
+/// summary.json, schema "mbverify.study_summary/1".
+[[nodiscard]] std::string ToJson(const StudyReport& report);
+/// report.html.
+[[nodiscard]] std::string ToHtml(const StudyReport& report);
+
+}  // namespace mbv
