@@ -94,6 +94,14 @@ void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, d
   mobility->drive_forces_unique = mobility->drives_not_unique.empty();
 }
 
+BodyStates PosesAtHome(const Mechanism& mechanism) {
+  MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  states.X_WB = mechanism.X_WB_home;
+  return states;
+}
+
 }  // namespace
 
 Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
@@ -122,12 +130,16 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
   return mobility;
 }
 
+int CountFreedoms(const Mechanism& mechanism) {
+  const BodyStates states = PosesAtHome(mechanism);
+  RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  stack.AddJoints(mechanism, states, false);
+  return 6 * (static_cast<int>(mechanism.bodies.size()) - 1) -
+         FindRank(stack.Matrix(), NullSpaces::kNone).rank;
+}
+
 Mobility AnalyseMobility(const Mechanism& mechanism) {
-  MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
-  BodyStates states;
-  states.Resize(mechanism.bodies.size());
-  states.X_WB = mechanism.X_WB_home;
-  return AnalyseMobility(mechanism, states);
+  return AnalyseMobility(mechanism, PosesAtHome(mechanism));
 }
 
 std::vector<std::string> ReactionsNotUnique(const Mechanism& mechanism,

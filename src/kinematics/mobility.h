@@ -38,6 +38,8 @@ struct Mobility {
 };
 
 /// Mobility at the given body poses (the home pose by default).
+/// Only `freedoms` of it, for a quarter of the time and less.
+[[nodiscard]] int CountFreedoms(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states);
 

@@ -84,7 +84,7 @@ Mechanism WithAligned(const Mechanism& mechanism, int joint, const std::vector<S
 int PassiveFreedoms(Mechanism mechanism) {
   mechanism.drives.clear();
   mechanism.prescribed.clear();
-  return AnalyseMobility(mechanism).freedoms;
+  return CountFreedoms(mechanism);
 }
 
 }  // namespace

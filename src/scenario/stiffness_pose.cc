@@ -86,7 +86,7 @@ PoseFault CheckPose(const Mechanism& mechanism, const PoseValues& pose) {
     return {fmt::format("pose: {} has no coordinate '{}'", mechanism.name, name),
             DidYouMean(name, names, "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw")};
   }
-  const int freedoms = AnalyseMobility(mechanism).freedoms;
+  const int freedoms = CountFreedoms(mechanism);
   if (static_cast<int>(pose.size()) == freedoms) return {};
   return {fmt::format("pose gives {} coordinates, but {} has {} freedoms", pose.size(),
                       mechanism.name, freedoms),

@@ -19,6 +19,7 @@ TEST(Mobility, APlanarFourBarMovesAlthoughKutzbachSaysMinusTwo) {
   EXPECT_EQ(mobility.constraint_rank, 17);
   EXPECT_EQ(mobility.kutzbach, -2);
   EXPECT_EQ(mobility.freedoms, 1);
+  EXPECT_EQ(CountFreedoms(MakeFourBar()), 1);
   EXPECT_EQ(mobility.redundant, 3);
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_TRUE(mobility.drives_determine_motion);
