@@ -198,6 +198,39 @@ TEST_F(StudyCommand, ALimitThatTooManyPointsViolateEndsWithOne) {
   EXPECT_NE(violated.out.find("mbverify run "), std::string::npos) << violated.out;
 }
 
+// The mean force is m (g + a), a < 0.1 m/s² from the motion's mean: of two uniform numbers with
+// means M = 2 and G = 10 + a and variances v = 1/3 each, S_m = v G² / (v G² + v M² + v²).
+TEST_F(StudyCommand, IndicesOfAProductAreThoseByHand) {
+  WriteStudy("{saltelli: 128}");
+  ASSERT_EQ(Study("out").exit_code, 0);
+  const auto force = Summary("out")["quantities"][0];
+  const double G = force["nominal"].get<double>() / 2.0, v = 1.0 / 3.0;
+  const double variance = v * G * G + v * 4.0 + v * v;
+  const auto indices = force["sobol"]["indices"];
+  EXPECT_NEAR(force["sobol"]["variance"].get<double>(), variance, 0.05 * variance);
+  EXPECT_NEAR(indices[0]["first"].get<double>(), v * G * G / variance, 0.02);
+  EXPECT_NEAR(indices[1]["first"].get<double>(), v * 4.0 / variance, 0.02);
+  EXPECT_NEAR(indices[1]["total"].get<double>(), (v * 4.0 + v * v) / variance, 0.02);
+  EXPECT_LT(indices[0]["first_interval"][0], indices[0]["first"]);
+}
+
+// At every time the force is m (g + a(t)): its percentiles are those of m where m alone is varied.
+TEST_F(StudyCommand, BandsArePercentilesAtEachTime) {
+  Write("s.yaml",
+        "study: s\nscenario: hold.yaml\nvary: {m: {uniform: {min: 1, max: 3}}}\n"
+        "design: {sobol: 64}\nquantities: [x.force.mean]\n");
+  ASSERT_EQ(Study("out").exit_code, 0);
+  const auto band = Summary("out")["force_bands"][0];
+  ASSERT_EQ(band["points"], 64);
+  ASSERT_EQ(band["time_s"].size(), 11u);
+  for (size_t t = 0; t < 11; ++t) {
+    const double nominal = band["nominal"][t];  // 2 kg
+    EXPECT_NEAR(band["p5"][t].get<double>(), nominal * 0.55, 0.02 * nominal) << t;
+    EXPECT_NEAR(band["p50"][t].get<double>(), nominal, 0.02 * nominal) << t;
+    EXPECT_NEAR(band["p95"][t].get<double>(), nominal * 1.45, 0.02 * nominal) << t;
+  }
+}
+
 TEST_F(StudyCommand, PointsThatFailStayRowsWithTheirReason) {
   Write("list.csv", "m,g\n2,10\n-1,10\n2,11\n");
   Write("s.yaml",
