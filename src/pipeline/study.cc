@@ -74,6 +74,27 @@ StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
   return outcome;
 }
 
+// What an earlier run finished, where all of it is there and nothing has changed.
+std::optional<StudyOutcome> Finished(const StudyBench& bench, const StudyFolder& folder,
+                                     const StudyShare& share, const StudyOutcome& outcome) {
+  std::error_code error;
+  const auto identity = ReadIdentity(folder.target());
+  if (fs::exists(folder.path(), error) || !identity) return {};
+  if (identity->fingerprint != bench.fingerprint() || identity->share.count != share.count ||
+      identity->share.index != share.index) {
+    return {};
+  }
+  const std::uint64_t rows = share.size(bench.points().count());
+  if (FindDone(bench, share, folder.target()).rows != rows) return {};
+  StudyOutcome finished = outcome;
+  finished.exit_code = 0;
+  finished.folder = folder.target().string();
+  if (share.count > 1) return finished;
+  finished.report = ReportOf(bench, folder.target());
+  finished.exit_code = finished.report->exit_code();
+  return finished;
+}
+
 struct LoadedStudy {
   std::unique_ptr<StudyBench> bench;  // null after bad input
   int exit_code = 2;
@@ -170,6 +191,9 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
                    fmt::format("has {} points for {} shards", bench.points().count(), share.count));
   }
   StudyFolder folder(options.out_dir, {bench.study().name, file, bench.fingerprint(), share});
+  if (options.resume) {
+    if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
+  }
   std::string hint;
   std::string trouble = folder.Open(options.resume, &hint);
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);

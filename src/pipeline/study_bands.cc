@@ -32,7 +32,7 @@ std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem
   const StudyForces& forces = bench.forces();
   const size_t times = forces.time_s.size();
   std::ifstream stream(file, std::ios::binary);
-  for (size_t d = 0; d < forces.drives.size() && stream; ++d) {
+  for (size_t d = 0; d < forces.drives.size() && stream.is_open(); ++d) {
     StudyBand band{.drive = forces.drives[d],
                    .unit = forces.units[d],
                    .time_s = forces.time_s,

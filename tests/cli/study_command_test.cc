@@ -125,6 +125,15 @@ TEST_F(StudyCommand, GoesOnWithWhatAKillLeft) {
   EXPECT_EQ(Points("killed"), rows);
   EXPECT_EQ(ReadAll(File("killed/s/forces.bin")), forces);
   EXPECT_FALSE(fs::exists(File("killed/s.part")));
+  // What is finished is told again; what is damaged is computed again.
+  const auto written = fs::last_write_time(File("killed/s/points.csv"));
+  const ProgramResult again = Study("killed", "--resume");
+  EXPECT_EQ(again.exit_code, 0);
+  EXPECT_NE(again.out.find("16 points by sobol"), std::string::npos) << again.out;
+  EXPECT_EQ(fs::last_write_time(File("killed/s/points.csv")), written);
+  Write("killed/s/points.csv", rows.substr(0, cut));
+  EXPECT_EQ(Study("killed", "--resume").exit_code, 0);
+  EXPECT_EQ(Points("killed"), rows);
 }
 
 TEST_F(StudyCommand, DoesNotMixRowsOfChangedFiles) {
@@ -215,19 +224,35 @@ TEST_F(StudyCommand, IndicesOfAProductAreThoseByHand) {
 }
 
 // At every time the force is m (g + a(t)): its percentiles are those of m where m alone is varied.
-TEST_F(StudyCommand, BandsArePercentilesAtEachTime) {
+// The second drive carries three times as much.
+TEST_F(StudyCommand, BandsArePercentilesOfEachDriveAtEachTime) {
+  Write("model.yaml",
+        "name: lifts\nparameters: {m: {value: 2, unit: kg}}\ngravity: [0, 0, -10]\n"
+        "bodies: {a: {mass: m, inertia: [1, 1, 1]}, b: {mass: 3*m, inertia: [1, 1, 1]}}\n"
+        "joints:\n  p: {kind: prismatic, parent: world, child: a, axis: z}\n"
+        "  q: {kind: prismatic, parent: world, child: b, axis: z}\n"
+        "drives: {x: {kind: joint, joint: p}, y: {kind: joint, joint: q}}\n");
+  Write("hold.yaml",
+        "mechanism: model.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: {x: {sine: "
+        "{amplitude: 0.1, period_s: 1}}, y: 0}}\nanalytic: none\nsimulation: off\n");
   Write("s.yaml",
         "study: s\nscenario: hold.yaml\nvary: {m: {uniform: {min: 1, max: 3}}}\n"
         "design: {sobol: 64}\nquantities: [x.force.mean]\n");
-  ASSERT_EQ(Study("out").exit_code, 0);
-  const auto band = Summary("out")["force_bands"][0];
-  ASSERT_EQ(band["points"], 64);
-  ASSERT_EQ(band["time_s"].size(), 11u);
-  for (size_t t = 0; t < 11; ++t) {
-    const double nominal = band["nominal"][t];  // 2 kg
-    EXPECT_NEAR(band["p5"][t].get<double>(), nominal * 0.55, 0.02 * nominal) << t;
-    EXPECT_NEAR(band["p50"][t].get<double>(), nominal, 0.02 * nominal) << t;
-    EXPECT_NEAR(band["p95"][t].get<double>(), nominal * 1.45, 0.02 * nominal) << t;
+  const ProgramResult result = Study("out");
+  ASSERT_EQ(result.exit_code, 0) << result.err;
+  const auto bands = Summary("out")["force_bands"];
+  ASSERT_EQ(bands.size(), 2u);
+  EXPECT_EQ(bands[1]["drive"], "y");
+  EXPECT_NEAR(bands[1]["nominal"][0].get<double>(), 60.0, 1e-5);
+  for (const auto& band : bands) {
+    ASSERT_EQ(band["points"], 64);
+    ASSERT_EQ(band["time_s"].size(), 11u);
+    for (size_t t = 0; t < 11; ++t) {
+      const double nominal = band["nominal"][t];  // 2 kg
+      EXPECT_NEAR(band["p5"][t].get<double>(), nominal * 0.55, 0.02 * nominal) << t;
+      EXPECT_NEAR(band["p50"][t].get<double>(), nominal, 0.02 * nominal) << t;
+      EXPECT_NEAR(band["p95"][t].get<double>(), nominal * 1.45, 0.02 * nominal) << t;
+    }
   }
 }
 
