@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <filesystem>
@@ -106,10 +107,11 @@ std::optional<std::string> YamlReader::ReadFile() {
   }
   std::ifstream stream(file_, std::ios::binary);
   std::string text;
-  if (stream) {
-    text.resize(kMaxBytes + 1);
-    stream.read(text.data(), static_cast<std::streamsize>(text.size()));
-    text.resize(static_cast<size_t>(std::max<std::streamsize>(stream.gcount(), 0)));
+  // Piece by piece: a buffer for the longest file costs more than reading the usual one.
+  std::array<char, 1 << 14> piece;
+  while (stream && text.size() <= kMaxBytes) {
+    stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+    text.append(piece.data(), static_cast<size_t>(stream.gcount()));
   }
   // A folder opens but cannot be read.
   if (!stream && !stream.eof()) {
