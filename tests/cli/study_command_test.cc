@@ -302,6 +302,31 @@ TEST_F(StudyCommand, BadArgumentsAreRefused) {
   EXPECT_EQ(mbverify("run " + File("s.yaml")).exit_code, 2);
 }
 
+// examples/cluster with stand-ins for what schedules: one call after the other.
+TEST_F(StudyCommand, ClusterExamplesComputeAndMergeShards) {
+  WriteStudy("{sobol: 8}");
+  ASSERT_EQ(Study("one").exit_code, 0);
+  Write("srun", "#!/bin/bash\nexec \"$@\"\n");
+  Write("parallel",
+        "#!/bin/bash\nwhile [ \"$1\" != mbverify ]; do shift; done\n"
+        "while read -r k; do \"${@//\\{\\}/$k}\" || exit 1; done\n");
+  const std::string start = "chmod +x '" + File("srun") + "' '" + File("parallel") +
+                            "' && export PATH=\"" + mbverify.folder().string() +
+                            ":$(dirname $mbverify):$PATH\" && here=$PWD && cd '" +
+                            mbverify.folder().string() + "' && ";
+  const ProgramResult array = mbverify.Script(
+      start +
+      "for k in 1 2; do SLURM_ARRAY_TASK_ID=$k SLURM_ARRAY_TASK_COUNT=2 SLURM_CPUS_PER_TASK=1 "
+      "bash $here/examples/cluster/slurm-array.sh s.yaml || exit 1; done && "
+      "mbverify study merge shards/*.shard-*-of-2 -o slurm");
+  EXPECT_EQ(array.exit_code, 0) << array.err;
+  EXPECT_EQ(Points("slurm"), Points("one"));
+  const ProgramResult parallel = mbverify.Script(
+      start + "bash $here/examples/cluster/parallel.sh s.yaml 3 gnu --sshloginfile nodes");
+  EXPECT_EQ(parallel.exit_code, 0) << parallel.err;
+  EXPECT_EQ(Points("gnu"), Points("one"));
+}
+
 // Every shipped study ends as it says, and they are none of the scenarios that a night runs.
 TEST_F(StudyCommand, ShippedStudiesDoWhatTheyExpect) {
   int count = 0;
