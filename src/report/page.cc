@@ -39,8 +39,7 @@ std::string HeadHtml(const PageHead& head) {
       "style-src 'unsafe-inline'{}\">\n<meta name=\"color-scheme\" content=\"light dark\">\n"
       "<link rel=\"icon\" href=\"data:,\">\n<title>{}{} – mbverify</title>\n"
       "<style>{}</style>\n</head>\n",
-      scripts, Escape(head.title), head.judges ? ": " + std::string(WordOf(head)) : "",
-      PageStyle());
+      scripts, Escape(head.title), head.judges ? ": " + WordOf(head) : "", PageStyle());
 }
 
 std::string TopHtml(const PageHead& head) {
