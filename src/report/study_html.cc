@@ -203,10 +203,8 @@ std::string ToHtml(const StudyReport& report) {
                   : report.study.description + "; " + internal::PointsText(report);
   const int code = report.exit_code();
   head.verdict = code == 0 ? Verdict::kAgree : code == 1 ? Verdict::kDisagree : Verdict::kNotRun;
-  head.word = code == 3                     ? "No result"
-              : report.study.limits.empty() ? "No limits"
-              : code == 0                   ? "Limits kept"
-                                            : "Limit violated";
+  head.word = code == 3 ? "No result" : code == 0 ? "Limits kept" : "Limit violated";
+  head.judges = code == 3 || !report.study.limits.empty();
   for (const auto& [name, version] : report.versions) {
     head.footer += (head.footer.empty() ? "" : " · ") + name + " " + version;
   }

@@ -68,7 +68,7 @@ TEST(StudyReport, WithoutLimitsOrResultsSaysSo) {
   report.study.limits.clear();
   report.summary.limits.clear();
   EXPECT_EQ(report.exit_code(), 0);
-  EXPECT_NE(ToHtml(report).find("No limits"), std::string::npos);
+  EXPECT_EQ(ToHtml(report).find("class=\"verdict"), std::string::npos);  // nothing is judged
   report.summary.failed = report.summary.points;
   EXPECT_EQ(report.exit_code(), 3);
   EXPECT_NE(ToHtml(report).find("No result"), std::string::npos);
