@@ -99,12 +99,10 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
   }
   const Eigen::Index rank = size_ - freedoms_;
   if (rows_.size() == 0) {  // nothing to factor: every body floats
-    Q_ = MatX::Identity(size_, size_);
     pivot_ = rank == 0 ? 1.0 : 0.0;
     return;
   }
   qr_.compute(columns);
-  Q_ = qr_.householderQ();
   const auto pivots = qr_.matrixQR().diagonal();
   if (rank == 0) {
     pivot_ = 1.0;
@@ -126,17 +124,26 @@ VecX FreeDynamics::LeastMotion(const VecX& rates, Eigen::Index rank) const {
   // Jᵀ P = Q R, so the chosen rows give R₁ᵀ (Q₁ᵀ V) = (P ᵀrates)₁.
   const VecX ordered = qr_.colsPermutation().transpose() * rates.cwiseProduct(row_scale_);
   const auto R = qr_.matrixQR().topLeftCorner(rank, rank).triangularView<Eigen::Upper>();
-  const VecX y = R.transpose().solve(ordered.head(rank));
-  return body_scale_.cwiseProduct(Q_.leftCols(rank) * y);
+  VecX motion = VecX::Zero(size_);
+  motion.head(rank) = R.transpose().solve(ordered.head(rank));
+  motion.applyOnTheLeft(qr_.householderQ());
+  return body_scale_.cwiseProduct(motion);
 }
 
-MatX FreeDynamics::Motions() const { return body_scale_.asDiagonal() * Q_.rightCols(freedoms_); }
+MatX FreeDynamics::Motions() const {
+  MatX motions = MatX::Zero(size_, freedoms_);
+  motions.bottomRows(freedoms_).setIdentity();
+  if (rows_.size() > 0) motions.applyOnTheLeft(qr_.householderQ());
+  return body_scale_.asDiagonal() * motions;
+}
 
 std::string FreeDynamics::SoftJoint(const BodyStates& states) const {
   const Eigen::Index weakest = size_ - freedoms_ - 1;
   if (weakest < 0) return "";
   // The part of the weakest row that no stronger one holds.
-  return MostMovingJoint(mechanism_, states, body_scale_.cwiseProduct(Q_.col(weakest)));
+  VecX motion = VecX::Unit(size_, weakest);
+  if (rows_.size() > 0) motion.applyOnTheLeft(qr_.householderQ());
+  return MostMovingJoint(mechanism_, states, body_scale_.cwiseProduct(motion));
 }
 
 RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
@@ -257,8 +264,10 @@ void FreeDynamics::FillRest(const BodyStates& states, const VecX& A_p, const Mat
 }
 
 double FreeDynamics::ShareLeft(const ScalarRow& row) const {
-  const VecX scaled = body_scale_.cwiseProduct(GradientOf(row, mechanism_.bodies.size()));
-  return (Q_.rightCols(freedoms_).transpose() * scaled).norm() / scaled.norm();
+  VecX turned = body_scale_.cwiseProduct(GradientOf(row, mechanism_.bodies.size()));
+  const double size = turned.norm();
+  if (rows_.size() > 0) turned.applyOnTheLeft(qr_.householderQ().adjoint());
+  return turned.tail(freedoms_).norm() / size;
 }
 
 RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) {

@@ -118,7 +118,6 @@ class FreeDynamics {
   CommandSample command_;
   std::vector<std::vector<double>> near_values_;  ///< per command, per term
   Eigen::ColPivHouseholderQR<MatX> qr_;           ///< of the scaled Jᵀ
-  MatX Q_;
   double pivot_ = kNan;
   FrictionPhase phase_;
   RestSystem rest_;
