@@ -49,6 +49,7 @@ std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem
     band.left_out = all - records.size();
     for (size_t t = 0; t < times && !records.empty(); ++t) {
       std::vector<double> values;
+      values.reserve(records.size());
       for (const auto& record : records) values.push_back(static_cast<double>(record[t]));
       std::sort(values.begin(), values.end());
       band.nominal.push_back(static_cast<double>(bench.nominal().forces[d * times + t]));

@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <fstream>
+#include <functional>
+#include <optional>
 
 #include "core/growing_file.h"
 #include "core/in_children.h"
@@ -15,6 +17,12 @@ namespace fs = std::filesystem;
 std::string BytesOfForces(const StudyPoint& point) {
   if (point.row.point >= kBandPoints) return "";
   return {reinterpret_cast<const char*>(point.forces.data()), point.forces.size() * sizeof(float)};
+}
+
+// Once more, alone: what killed the child may have been none of the point's doing.
+std::optional<std::string> Again(const std::function<std::string(size_t)>& work, size_t point,
+                                 double timeout_s) {
+  return InChildren(1, timeout_s, [&](size_t) { return work(point); }).front();
 }
 
 std::uint64_t FileSize(const fs::path& path) {
@@ -61,8 +69,9 @@ std::string ComputePoints(const StudyBench& bench, const PointsOptions& options,
   };
   const std::string lost =
       fmt::format("ended by a crash, or not finished after {:g} s", options.timeout_s);
-  const auto take = [&](size_t i, const std::optional<std::string>& text) {
+  const auto take = [&](size_t i, std::optional<std::string> text) {
     std::string line, bytes;
+    if (!text) text = Again(work, i, options.timeout_s);
     if (text) {
       const size_t end = text->find('\n') + 1;
       line = text->substr(0, end);

@@ -179,6 +179,7 @@ Design ReadDesign(ValueReader* values, const YamlNode& node, const std::string& 
   }
   if (yaml.has_errors() || factors.empty()) return design;
   std::vector<Axis> axes;
+  axes.reserve(factors.size());
   for (const Factor& factor : factors) axes.push_back(factor.axis);
   const std::uint64_t count = DesignPoints(std::move(axes), design).count();
   if (count > most) {

@@ -136,6 +136,19 @@ TEST_F(StudyCommand, GoesOnWithWhatAKillLeft) {
   EXPECT_EQ(Points("killed"), rows);
 }
 
+// What somebody else killed (a machine without memory, say) is computed once more.
+TEST_F(StudyCommand, AWorkerThatIsKilledCostsNoPoint) {
+  WriteStudy("{latin_hypercube: 8192}");
+  const ProgramResult killed = mbverify.Script(
+      "\"$mbverify\" study " + File("s.yaml") + " --out " + File("killed") +
+      " --jobs 2 >/dev/null 2>&1 & pid=$!; rows=" + File("killed/s.part/points.csv") +
+      "; until [ \"$(cat \"$rows\" 2>/dev/null | wc -l)\" -gt 100 ]; do sleep 0.01; done; "
+      "kill -KILL $(cut -d ' ' -f 1 /proc/$pid/task/$pid/children) && wait $pid");
+  ASSERT_EQ(killed.exit_code, 0) << killed.out << killed.err;
+  ASSERT_EQ(Study("whole").exit_code, 0);
+  EXPECT_TRUE(Points("killed") == Points("whole"));
+}
+
 TEST_F(StudyCommand, DoesNotMixRowsOfChangedFiles) {
   WriteStudy("{sobol: 8}");
   ASSERT_EQ(Study("a").exit_code, 0);

@@ -51,6 +51,9 @@ TEST(RowStates, WhatDoesNotFitIsNoAnswer) {
   std::string short_row = text;
   short_row.replace(short_row.find("[1, 2]"), 6, "[1]");
   EXPECT_FALSE(ReadRowAnswer(short_row, 1, 1, &trouble));
+  std::string short_bias = text;
+  short_bias.replace(short_bias.find("[3, 4]"), 6, "[3]");
+  EXPECT_FALSE(ReadRowAnswer(short_bias, 1, 1, &trouble));
   std::string no_number = text;
   no_number.replace(no_number.find("[3, 4]"), 6, "[3, null]");
   EXPECT_FALSE(ReadRowAnswer(no_number, 1, 1, &trouble));
