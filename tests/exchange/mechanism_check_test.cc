@@ -71,9 +71,9 @@ TEST(MechanismCheck, TellsWhatIsBent) {
        "joints[0].child.body: there is no body 'cranck' (did you mean 'crank'?)"},
       {"a mirror",
        [](Edited* m) {
-         (*m)["bodies"][1]["home"]["R"][0] = {-1, 0, 0};
+         for (auto& x : (*m)["bodies"][1]["home"]["R"][2]) x = -x.get<double>();
        },
-       "bodies[1].home.R: is no rotation"},
+       "bodies[1].home.R: is no rotation: R Rᵀ − 1 is up to"},
       {"long",
        [](Edited* m) {
          (*m)["joints"][0]["axis"] = {0, 2, 0};
