@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include "cli/cli.h"
@@ -23,6 +24,13 @@ struct CrosscheckArguments {
   JsonOption json;
 };
 
+// A word that names a file here names it anywhere: the program runs in another folder.
+std::string Placed(const std::string& word) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(word, error)) return word;
+  return std::filesystem::absolute(word).string();
+}
+
 // `witnesses:` of all engines that are asked for, in place of the scenarios' own.
 std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
   std::string text;
@@ -33,8 +41,8 @@ std::optional<SetValue> WitnessesOf(const std::vector<std::string>& engines) {
     for (size_t at = 0; at < named->second.size();) {
       const size_t end = std::min(named->second.find(' ', at), named->second.size());
       if (end > at)
-        words +=
-            fmt::format("{}\"{}\"", words.empty() ? "" : ", ", named->second.substr(at, end - at));
+        words += fmt::format("{}\"{}\"", words.empty() ? "" : ", ",
+                             Placed(named->second.substr(at, end - at)));
       at = end + 1;
     }
     text += fmt::format("{}{}: {{command: [{}]}}", text.empty() ? "" : ", ", named->first, words);

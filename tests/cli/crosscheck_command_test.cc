@@ -36,6 +36,15 @@ TEST(CrosscheckCommand, PutsAnEngineBesideOurs) {
   EXPECT_EQ(page.find("class=\"verdict"), std::string::npos);
 }
 
+TEST(CrosscheckCommand, FindsFilesWhereItIsCalled) {
+  const Program mbverify("crosscheck_from");
+  const ProgramResult result = mbverify.From(
+      SourcePath("/scenarios"),
+      "crosscheck four_bar/turn_inverse.yaml --engine 'planar=python3 four_bar/planar.py'");
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_NE(result.out.find("planar (planar.py 1)"), std::string::npos) << result.out;
+}
+
 TEST(CrosscheckCommand, RefusesWhatIsNoEngineAndItsOwnInputs) {
   const Program mbverify("crosscheck_bad");
   EXPECT_EQ(mbverify("crosscheck " + kTurn + " --engine planar").exit_code, 2);
