@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "comparison/metric_value.h"
+
 namespace mbv {
 namespace {
 
@@ -15,11 +17,6 @@ const char* KeyOf(Engine engine) {
       return "corrected";
   }
   return "";
-}
-
-double ValueOf(const std::map<Metric, Measured>& metrics, Metric metric) {
-  const auto found = metrics.find(metric);
-  return found == metrics.end() ? kNan : found->second.value;
 }
 
 }  // namespace

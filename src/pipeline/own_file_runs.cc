@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "comparison/comparison.h"
+#include "comparison/metric_value.h"
 #include "core/files.h"
 #include "core/in_children.h"
 #include "core/text.h"
@@ -17,11 +18,6 @@ namespace mbv {
 namespace {
 
 constexpr double kTimeout_s = 30.0;  // of one run
-
-double MetricOf(const PairComparison& pair, Metric metric) {
-  const auto found = pair.metrics.find(metric);
-  return found == pair.metrics.end() ? kNan : found->second.value;
-}
 
 }  // namespace
 
@@ -137,10 +133,11 @@ void OwnFileRuns::MeasureForces(const OwnRun& run, OwnError* error) const {
   input.motion = &motion_;
   input.twists = &twists_;
   input.start_window_s = 0.0;
-  error->force_all = MetricOf(ComparePair(input, run.trace, truth_->trace), Metric::kForceNrmse);
+  error->force_all =
+      ValueOf(ComparePair(input, run.trace, truth_->trace).metrics, Metric::kForceNrmse);
   input.start_window_s = OwnFileAudit().later_s;
   const PairComparison pair = ComparePair(input, run.trace, truth_->trace);
-  error->force = MetricOf(pair, Metric::kForceNrmse);
+  error->force = ValueOf(pair.metrics, Metric::kForceNrmse);
   const auto most = pair.metrics.find(Metric::kForceMax);
   for (const DriveMetrics& drive : pair.drives) {
     if (most == pair.metrics.end() ||

@@ -37,7 +37,9 @@ class UpgradeRun {
     if (prepared_->scenario.motion.free()) {
       return End(3, "its motion follows from forces: no drive forces to compare");
     }
-    for (const Way& way : kWays) AddWitness(way.name, way.option);
+    auto& witnesses = prepared_->scenario.witnesses;  // in place of the scenario's own
+    witnesses.clear();
+    for (const Way& way : kWays) witnesses.push_back(Program(way.name, way.option));
     WitnessRunner runner(*prepared_, {}, options_.progress);
     runner.Run(role::kReference);
     const WitnessRecord* truth = runner.runs().Find(role::kReference);
@@ -70,13 +72,6 @@ class UpgradeRun {
     if (!option.empty()) program.command.push_back(option);
     program.timeout_s = 600.0;
     return program;
-  }
-
-  // In place of the scenario's own.
-  void AddWitness(const std::string& name, const std::string& option) {
-    auto& witnesses = prepared_->scenario.witnesses;
-    if (name == kWays[0].name) witnesses.clear();
-    witnesses.push_back(Program(name, option));
   }
 
   // Samples of the motion, as evenly as they come.

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 
+#include "comparison/metric_value.h"
 #include "comparison/verdict.h"
 #include "core/json_text.h"
 #include "report/html_text.h"
@@ -34,21 +35,9 @@ std::string EngineName(const WitnessRecord& witness) {
 double GapOf(const Comparison& comparison, const std::string& witness) {
   for (const WitnessMetrics& metrics : comparison.witnesses) {
     if (metrics.witness != witness) continue;
-    const auto gap = metrics.metrics.find(Metric::kClosureM);
-    if (gap != metrics.metrics.end()) return gap->second.value;
+    return ValueOf(metrics.metrics, Metric::kClosureM);
   }
   return kNan;
-}
-
-// Whichever of the two is held against the other.
-const PairComparison* PairWithReference(const Comparison& comparison, const std::string& witness) {
-  const PairComparison* pair = comparison.FindPair(PairName(witness, role::kReference.name));
-  return pair != nullptr ? pair : comparison.FindPair(PairName(role::kReference.name, witness));
-}
-
-double ValueOf(const PairComparison& pair, Metric metric) {
-  const auto found = pair.metrics.find(metric);
-  return found == pair.metrics.end() ? kNan : found->second.value;
 }
 
 CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
@@ -60,13 +49,14 @@ CrosscheckRow RowOf(const Report& report, const WitnessRecord& witness) {
                     .sample_us = MicrosecondsEach(witness),
                     .why = witness.summary.ok() ? "" : witness.summary.message};
   if (!row.why.empty()) return row;
-  const PairComparison* pair = PairWithReference(report.comparison, witness.name);
+  const PairComparison* pair =
+      FindEitherWay(report.comparison, witness.name, role::kReference.name);
   if (pair == nullptr || !pair->compared) {
     row.why = pair == nullptr ? "is not held against the reference" : pair->reason;
     return row;
   }
-  row.force_nrmse = ValueOf(*pair, Metric::kForceNrmse);
-  row.pose_m = ValueOf(*pair, Metric::kPoseM);
+  row.force_nrmse = ValueOf(pair->metrics, Metric::kForceNrmse);
+  row.pose_m = ValueOf(pair->metrics, Metric::kPoseM);
   if (std::isnan(row.force_nrmse)) row.why = "has no drive force in common with the reference";
   return row;
 }

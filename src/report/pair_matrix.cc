@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "comparison/metric_value.h"
 #include "report/html_text.h"
 #include "report/text_table.h"
 
@@ -38,12 +39,9 @@ class PairMatrix {
   // "1.7e-10", with a star where a check of the pair failed; "" on the diagonal.
   [[nodiscard]] std::string CellText(const std::string& a, const std::string& b) const {
     if (a == b) return "";
-    const PairComparison* pair = comparison_.FindPair(PairName(a, b));
-    if (pair == nullptr) pair = comparison_.FindPair(PairName(b, a));
+    const PairComparison* pair = FindEitherWay(comparison_, a, b);
     if (pair == nullptr || !pair->compared) return "–";
-    const auto found = pair->metrics.find(metric_);
-    const std::string number =
-        NumberOrDash(found == pair->metrics.end() ? kNan : found->second.value, "{:.1e}");
+    const std::string number = NumberOrDash(ValueOf(pair->metrics, metric_), "{:.1e}");
     return number + (Fails(pair->name()) ? "*" : "");
   }
 

@@ -61,6 +61,9 @@ enum class CheckEnd { kOff, kFail, kVoid, kHeld, kOk };
 /// "d1.force, 0.25 s"; "" without a place.
 [[nodiscard]] std::string WhereOf(const ShownCheck& check);
 
+/// "printed", "assumed", "corrected"; "" where no source is stated.
+[[nodiscard]] const char* SourceWord(Source source);
+
 /// Where kinds look different.
 struct ResultLook {
   bool signs = true;        ///< ✓, ✗ or ? before the page's verdict

@@ -47,6 +47,8 @@ std::vector<Cell> CheckRow(const ShownCheck& check, bool margins) {
   return row;
 }
 
+}  // namespace
+
 const char* SourceWord(Source source) {
   switch (source) {
     case Source::kPrinted:
@@ -60,8 +62,6 @@ const char* SourceWord(Source source) {
   }
   return "";
 }
-
-}  // namespace
 
 PageHead HeadOf(const ResultView& view) {
   return {.title = view.frame->title(),

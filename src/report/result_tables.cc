@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/text.h"
+#include "report/result.h"
 #include "report/sizing.h"
 
 namespace mbv {
@@ -14,17 +15,8 @@ constexpr const char* kDash = "–";
 constexpr size_t kMostDigits = 9;  // of a number in full; a longer one is rounded
 
 std::string SourceText(Source source) {
-  switch (source) {
-    case Source::kUnstated:
-      return kDash;
-    case Source::kPrinted:
-      return "printed";
-    case Source::kAssumed:
-      return "assumed";
-    case Source::kCorrected:
-      return "corrected";
-  }
-  return kDash;
+  const std::string word = SourceWord(source);
+  return word.empty() ? kDash : word;
 }
 
 // As short as it is, or six digits.
