@@ -57,6 +57,35 @@ TEST(ForeignWitness, JoinsTheComparison) {
   EXPECT_TRUE(PairMatrixLines(comparison).empty());  // three: reference, simulated, mock
 }
 
+// The smallest one that is shipped, on an axis, a centre of mass and a gravity that no axis of the
+// world lines up with; it knows nothing else.
+TEST(ForeignWitness, ThePendulumIsASmallOne) {
+  const test::TestFolder folder("pendulum");
+  folder.Write("model.yaml",
+               "name: pendulum\ngravity: [1, -2, -9]\n"
+               "bodies: {bob: {mass: 2, com: [0.1, 0.3, -0.2], inertia: [0.1, 0.2, 0.25]}}\n"
+               "joints: {pin: {kind: revolute, parent: world, child: bob, axis: [0, 0.6, 0.8]}}\n"
+               "drives: {motor: {kind: joint, joint: pin}}\n");
+  const std::string file = folder.Write(
+      "swing.yaml",
+      "mechanism: model.yaml\nmotion: {duration_s: 0.5, sample_s: 0.01, commands: {motor: {sine: "
+      "{amplitude: 2, period_s: 0.7}}}}\nanalytic: none\nsimulation: {mode: inverse}\n"
+      "witnesses: {pendulum: {command: [python3, " +
+          SourcePath("/examples/witness/pendulum.py") + "]}}\n");
+  const RunOutcome swing = RunScenario(file, {});
+  ASSERT_TRUE(swing.report) << swing.diagnostics.Text();
+  EXPECT_EQ(swing.report->comparison.verdict, Verdict::kAgree) << swing.report->comparison.reason;
+  const PairComparison* pair = swing.report->comparison.FindPair("pendulum_vs_reference");
+  ASSERT_NE(pair, nullptr);
+  ASSERT_TRUE(pair->compared) << pair->reason;
+  EXPECT_LT(pair->metrics.at(Metric::kForceNrmse).value, 1e-13);
+  const RunOutcome linkage = RunWith("{pendulum: {command: [python3, " +
+                                     SourcePath("/examples/witness/pendulum.py") + "]}}");
+  ASSERT_TRUE(linkage.report);
+  EXPECT_EQ(RecordOf(linkage, "pendulum")->summary.message,
+            "declines: it is no body on one revolute joint");
+}
+
 // With four of them every pair stands in a matrix, and a star where it fails.
 TEST(ForeignWitness, PairsOfManyStandInAMatrix) {
   const std::string one = Mock("answers"), two = Mock("bent");
