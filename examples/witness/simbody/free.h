@@ -80,44 +80,51 @@ class FreeMotion : Model {
     }
   }
 
-  // Poses and velocities of start.csv, projected onto the loops.
-  void Start(State* state) {
-    std::map<std::string, std::vector<double>> rows;
+  // A body's pose and velocity [ω; v of its origin] in ground.
+  struct GivenState {
+    Transform X;
+    SpatialVec V;
+  };
+
+  static std::map<std::string, GivenState> ReadStart() {
+    std::map<std::string, GivenState> start;
     for (const std::vector<std::string>& row : ReadCsv("start.csv").rows) {
-      for (size_t k = 1; k < row.size(); ++k) rows[row[0]].push_back(std::stod(row[k]));
+      const auto vector = [&](size_t k) {
+        return Vec3(std::stod(row.at(k)), std::stod(row.at(k + 1)), std::stod(row.at(k + 2)));
+      };
+      SimTK::Mat33 R;
+      for (int r = 0; r < 3; ++r) R[r] = ~vector(4 + 3 * static_cast<size_t>(r));
+      start[row.at(0)] = {Transform(Rotation(R, true), vector(1)),
+                          SpatialVec(vector(13), vector(16))};
     }
-    const auto vector = [](const std::vector<double>& row, size_t k) {
-      return Vec3(row.at(k), row.at(k + 1), row.at(k + 2));
-    };
+    return start;
+  }
+
+  // Poses and velocities of start.csv, inner bodies first, projected onto the loops.
+  void Start(State* state) {
+    std::map<int, std::string> names;
+    for (const auto& [name, index] : placed_) names[index] = name;
+    std::map<std::string, GivenState> start = ReadStart();
     for (SimTK::MobilizedBodyIndex i(1); i < matter_.getNumBodies(); ++i) {
-      for (const auto& [name, index] : placed_) {
-        if (index != i) continue;
-        const std::vector<double>& row = rows.at(name);
-        const MobilizedBody& body = matter_.getMobilizedBody(i);
-        const MobilizedBody& parent = body.getParentMobilizedBody();
-        SimTK::Mat33 R;
-        for (int r = 0; r < 3; ++r) R[r] = ~vector(row, 3 + 3 * r);
-        const Transform X(Rotation(R, true), vector(row, 0));
-        system_.realize(*state, SimTK::Stage::Position);
-        body.setQToFitTransform(
-            *state, ~(parent.getBodyTransform(*state) * body.getInboardFrame(*state)) * X *
-                        body.getOutboardFrame(*state));
-        system_.realize(*state, SimTK::Stage::Velocity);
-        const SpatialVec V(vector(row, 12), vector(row, 15));
-        const SpatialVec V_P = parent.getBodyVelocity(*state);
-        const Vec3 p_PM =
-            X * body.getOutboardFrame(*state).p() - parent.getBodyOriginLocation(*state);
-        const Vec3 p_PF = parent.getBodyRotation(*state) * body.getInboardFrame(*state).p();
-        const Vec3 r_M = X.R() * body.getOutboardFrame(*state).p();
-        const Rotation R_GF = parent.getBodyRotation(*state) * body.getInboardFrame(*state).R();
-        // Of M in F: as F's observer sees it.
-        const Vec3 w = V[0] - V_P[0];
-        const Vec3 v = V[1] + V[0] % r_M - V_P[1] - V_P[0] % p_PF - V_P[0] % (p_PM - p_PF);
-        body.setUToFitVelocity(*state, SpatialVec(~R_GF * w, ~R_GF * v));
-      }
+      PutAt(start.at(names.at(i)), matter_.getMobilizedBody(i), state);
     }
     Project(state);
     for (Push& push : pushes_) FindTurn(*state, &push);
+  }
+
+  // M's pose and velocity in F, as an observer sees them who moves with F.
+  void PutAt(const GivenState& given, const MobilizedBody& body, State* state) {
+    const MobilizedBody& parent = body.getParentMobilizedBody();
+    const Transform X_BM = body.getOutboardFrame(*state), X_PF = body.getInboardFrame(*state);
+    system_.realize(*state, SimTK::Stage::Position);
+    const Transform X_GP = parent.getBodyTransform(*state), X_GF = X_GP * X_PF;
+    body.setQToFitTransform(*state, ~X_GF * given.X * X_BM);
+    system_.realize(*state, SimTK::Stage::Velocity);
+    const SpatialVec V_GP = parent.getBodyVelocity(*state);
+    const Vec3 v_M = given.V[1] + given.V[0] % (given.X.R() * X_BM.p());
+    const Vec3 v_there = V_GP[1] + V_GP[0] % (given.X * X_BM.p() - X_GP.p());
+    body.setUToFitVelocity(
+        *state, SpatialVec(~X_GF.R() * (given.V[0] - V_GP[0]), ~X_GF.R() * (v_M - v_there)));
   }
 
   // Angles start in the turn that is next to home.
