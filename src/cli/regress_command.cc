@@ -76,9 +76,6 @@ bool Complete(RegressArguments* arguments) {
 
 int Conclude(const RegressArguments& arguments, const RegressOutcome& outcome) {
   if (!outcome.trouble.empty()) Say(stderr, "{}\n", outcome.trouble);
-  if (outcome.studies > 0) {
-    Say(stderr, "{} study files were left out; mbverify study runs them\n", outcome.studies);
-  }
   if (outcome.files.empty()) return outcome.exit_code;
   SayText(arguments.json.text(), ToSummaryText(outcome.report));
   if (const int code = arguments.json.Write(ToJson(outcome.report), {}); code != 0) return code;

@@ -136,7 +136,11 @@ void AddStudyOptions(CLI::App* study, StudyArguments* arguments) {
                    "wall time limit of a point [s]")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
-  study->add_flag("--yes", arguments->options.many, "take more than 1e7 points");
+  study->add_option("--count", arguments->options.reading.drawn.count,
+                    "how many points are drawn, instead of the file's number");
+  study->add_option("--seed", arguments->options.reading.drawn.seed,
+                    "which points are drawn, instead of the file's seed");
+  study->add_flag("--yes", arguments->options.reading.many, "take more than 1e7 points");
   arguments->json.AddTo(study);
 }
 

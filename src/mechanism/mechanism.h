@@ -30,6 +30,7 @@ struct Parameter {
   std::string unit;
   Source source = Source::kUnstated;
   std::string note;
+  bool written_out = false;  ///< the model file states a number, not an expression of others
 };
 
 struct NamedFrame {

@@ -26,6 +26,7 @@ struct Block {
   std::string prefix;               ///< "" or "limb1." or "limb1.left."
   std::vector<std::string> levels;  ///< prefixes in which a name is looked up, inner first
   std::vector<std::string> parts;   ///< names of the parts around, to find endless nesting
+  std::vector<std::string> given;   ///< parameters that the instance sets
 
   [[nodiscard]] bool is_model() const { return prefix.empty(); }
   [[nodiscard]] const YamlNode* Section(std::string_view key) const;

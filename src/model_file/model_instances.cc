@@ -22,7 +22,8 @@ ModelBlocks::ModelBlocks(const YamlNode* root) {
                     .path = "",
                     .prefix = "",
                     .levels = {""},
-                    .parts = {}});
+                    .parts = {},
+                    .given = {}});
 }
 
 const YamlNode* Block::Section(std::string_view key) const {
@@ -116,6 +117,7 @@ void InstanceReader::Read(const Block& block, const YamlEntry& entry, const Yaml
     }
     const auto value = values_.Number(block, *given.value, JoinPath(path, given.key));
     inner.scope->Set(given.key, value.value_or(0.0));
+    inner.given.push_back(given.key);
   }
   yaml.SetNote(inner.Note());
   parameters_.FinishPart(inner, parameters);

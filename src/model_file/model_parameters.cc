@@ -6,6 +6,8 @@
 #include <cmath>
 #include <filesystem>
 
+#include "core/text.h"
+
 namespace mbv::internal {
 namespace {
 
@@ -152,6 +154,7 @@ void ParameterReader::Evaluate(YamlReader* yaml, const Block& block, const YamlN
     if (!result.value && !result.error.empty()) {
       yaml->Error(*at, fmt::format("{} = {} {}", where, Describe(*at), result.error), result.hint);
     }
+    parameter.written_out = IsWrittenOut(at->text) && !Contains(block.given, entry.key);
     parameters_.push_back(std::move(parameter));
   }
 }

@@ -10,7 +10,10 @@
 #include "input/parsed_documents.h"
 #include "pipeline/study_bands.h"
 #include "pipeline/study_folder.h"
+#include "pipeline/study_validation.h"
 #include "pipeline/version.h"
+#include "report/inputs_json.h"
+#include "report/study_plots.h"
 #include "scenario/study_file.h"
 
 namespace mbv {
@@ -37,13 +40,25 @@ PointRows RowsOf(const fs::path& file, const Study& study) {
   };
 }
 
+// Evenly chosen, those that have values.
+std::vector<PointRow> ShownOf(const PointRows& rows, std::uint64_t points) {
+  const std::uint64_t every = (points + kMostShown - 1) / kMostShown;
+  std::vector<PointRow> shown;
+  rows([&](const PointRow& row) {
+    if (row.point % every == 0 && row.reason.empty()) shown.push_back(row);
+  });
+  return shown;
+}
+
 StudyReport ReportOf(const StudyBench& bench, const fs::path& folder) {
   StudyReport report;
   report.study = bench.study();
   report.nominal = bench.nominal().row.values;
   report.summary =
       SummariseStudy(report.study, report.nominal, RowsOf(folder / kPointsFile, report.study));
+  report.shown = ShownOf(RowsOf(folder / kPointsFile, report.study), report.summary.points);
   report.bands = StudyBands(bench, folder / kForcesFile);
+  if (report.study.validation) report.validation = ValidateStudy(bench, folder / kForcesFile);
   for (const QuantitySummary& quantity : report.summary.quantities) {
     auto& commands = report.worst_commands.emplace_back();
     for (const WorstPoint& worst : quantity.worst) commands.push_back(bench.Command(worst.varied));
@@ -63,7 +78,12 @@ StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
   if (whole) {
     outcome.report = ReportOf(bench, folder->path());
     outcome.exit_code = outcome.report->exit_code();
-    files = {{"summary.json", ToJson(*outcome.report)}, {"report.html", ToHtml(*outcome.report)}};
+    files = {{"summary.json", ToJson(*outcome.report)},
+             {"report.html", ToHtml(*outcome.report)},
+             {"inputs.json", ToJson(bench.inputs())}};
+    for (StudyPlot& plot : StudyPlots(*outcome.report)) {
+      files.emplace_back("plots/" + plot.file, std::move(plot.svg));
+    }
   }
   const std::string trouble = folder->Publish(files);
   if (!trouble.empty()) {
@@ -100,9 +120,10 @@ struct LoadedStudy {
   int exit_code = 2;
 };
 
-LoadedStudy LoadBench(const std::string& file, bool many, Diagnostics* diagnostics) {
+LoadedStudy LoadBench(const std::string& file, const StudyOptions& options,
+                      Diagnostics* diagnostics) {
   LoadedStudy loaded;
-  StudyResult read = LoadStudy(file, {.many = many});
+  StudyResult read = LoadStudy(file, options);
   diagnostics->Append(read.diagnostics);
   if (!read.study) return loaded;
   loaded.bench = StudyBench::Make(*read.study, diagnostics, &loaded.exit_code);
@@ -181,7 +202,7 @@ class ShardMerger {
 StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
   const ParsedDocuments documents;
   StudyOutcome outcome;
-  const LoadedStudy loaded = LoadBench(file, options.many, &outcome.diagnostics);
+  const LoadedStudy loaded = LoadBench(file, options.reading, &outcome.diagnostics);
   outcome.exit_code = loaded.exit_code;
   if (!loaded.bench) return outcome;
   const StudyBench& bench = *loaded.bench;
@@ -190,7 +211,8 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
     return Refused(std::move(outcome), file,
                    fmt::format("has {} points for {} shards", bench.points().count(), share.count));
   }
-  StudyFolder folder(options.out_dir, {bench.study().name, file, bench.fingerprint(), share});
+  StudyFolder folder(options.out_dir,
+                     {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share});
   if (options.resume) {
     if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
   }
@@ -210,7 +232,7 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
   std::string hint, trouble = merger.Read(folders);
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
   const StudyIdentity& first = merger.first();
-  const LoadedStudy loaded = LoadBench(first.file, true, &outcome.diagnostics);
+  const LoadedStudy loaded = LoadBench(first.file, {true, first.drawn}, &outcome.diagnostics);
   outcome.exit_code = loaded.exit_code;
   if (!loaded.bench) return outcome;
   const StudyBench& bench = *loaded.bench;
@@ -221,7 +243,7 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
   }
   trouble = merger.CheckRows(bench);
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
-  StudyFolder folder(out_dir, {first.study, first.file, first.fingerprint, {}});
+  StudyFolder folder(out_dir, {first.study, first.file, first.fingerprint, first.drawn, {}});
   trouble = folder.Open(true, &hint);
   if (trouble.empty()) trouble = merger.Join(bench, folder.path());
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);
@@ -231,7 +253,7 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
 Diagnostics CheckStudy(const std::string& file) {
   const ParsedDocuments documents;
   Diagnostics diagnostics;
-  (void)LoadBench(file, true, &diagnostics);
+  (void)LoadBench(file, {.many = true}, &diagnostics);
   return diagnostics;
 }
 

@@ -8,14 +8,15 @@
 #include "core/diagnostics.h"
 #include "pipeline/study_points.h"
 #include "report/study_report.h"
+#include "scenario/study_file.h"
 
 namespace mbv {
 
 struct RunStudyOptions {
   std::string out_dir = "out";
   PointsOptions points;
-  bool resume = false;  ///< go on with what a killed study left
-  bool many = false;    ///< take more points than kMostStudyPoints
+  bool resume = false;   ///< go on with what a killed study left
+  StudyOptions reading;  ///< of the file
 };
 
 struct StudyOutcome {

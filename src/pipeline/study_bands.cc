@@ -7,32 +7,33 @@
 #include "study/statistics.h"
 
 namespace mbv {
-namespace {
-
-// One drive's part of every record: points × times.
 std::vector<std::vector<float>> DriveRecords(const StudyForces& forces, size_t drive,
-                                             std::ifstream* stream) {
+                                             const std::filesystem::path& file, size_t* left_out) {
   const size_t times = forces.time_s.size();
   const auto bytes = static_cast<std::streamsize>(times * sizeof(float));
   std::vector<std::vector<float>> records;
-  for (std::uint64_t k = 0;; ++k) {
+  std::ifstream stream(file, std::ios::binary);
+  size_t all = 0;
+  for (;; ++all) {
     std::vector<float> samples(times);
-    stream->clear();
-    stream->seekg(static_cast<std::streamoff>(sizeof(float) * (k * forces.size() + drive * times)));
-    stream->read(reinterpret_cast<char*>(samples.data()), bytes);
-    if (stream->gcount() != bytes) return records;
-    records.push_back(std::move(samples));
+    stream.clear();
+    stream.seekg(
+        static_cast<std::streamoff>(sizeof(float) * (all * forces.size() + drive * times)));
+    stream.read(reinterpret_cast<char*>(samples.data()), bytes);
+    if (stream.gcount() != bytes) break;
+    const bool numbers =
+        std::all_of(samples.begin(), samples.end(), [](float v) { return std::isfinite(v); });
+    if (numbers) records.push_back(std::move(samples));
   }
+  if (left_out != nullptr) *left_out = all - records.size();
+  return records;
 }
-
-}  // namespace
 
 std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem::path& file) {
   std::vector<StudyBand> bands;
   const StudyForces& forces = bench.forces();
   const size_t times = forces.time_s.size();
-  std::ifstream stream(file, std::ios::binary);
-  for (size_t d = 0; d < forces.drives.size() && stream.is_open(); ++d) {
+  for (size_t d = 0; d < forces.drives.size(); ++d) {
     StudyBand band{.drive = forces.drives[d],
                    .unit = forces.units[d],
                    .time_s = forces.time_s,
@@ -40,13 +41,10 @@ std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem
                    .p5 = {},
                    .p50 = {},
                    .p95 = {}};
-    auto records = DriveRecords(forces, d, &stream);
-    const size_t all = records.size();
-    std::erase_if(records, [](const std::vector<float>& r) {
-      return !std::all_of(r.begin(), r.end(), [](float v) { return std::isfinite(v); });
-    });
+    size_t left_out = 0;
+    const auto records = DriveRecords(forces, d, file, &left_out);
     band.points = records.size();
-    band.left_out = all - records.size();
+    band.left_out = left_out;
     for (size_t t = 0; t < times && !records.empty(); ++t) {
       std::vector<double> values;
       values.reserve(records.size());

@@ -11,6 +11,7 @@
 #include "core/shell_word.h"
 #include "core/text.h"
 #include "core/word_hints.h"
+#include "pipeline/study_validation.h"
 #include "pipeline/study_values.h"
 #include "pipeline/version.h"
 #include "scenario/study_file.h"
@@ -52,17 +53,25 @@ void Try(const Study& study, const std::vector<SetValue>& sets, Attempt* attempt
   row->exit_code = row->reason.empty() ? 0 : 3;
 }
 
-// The drive forces that the first witness records.
-StudyForces ForcesOf(const Trace& trace) {
+// The drive forces that the first witness records; at times of `only`, if that is given.
+StudyForces ForcesOf(const Trace& trace, const Trace* only) {
   StudyForces forces;
   for (const Channel& channel : trace.channels) {
     if (channel.quantity != Quantity::kForce) continue;
     forces.drives.push_back(channel.subject);
     forces.units.push_back(channel.unit);
   }
-  const size_t samples = trace.time_s.size(), times = std::min(samples, kBandTimes);
+  std::vector<size_t> rows;
+  for (size_t row = 0; row < trace.time_s.size(); ++row) {
+    if (only != nullptr &&
+        !std::binary_search(only->time_s.begin(), only->time_s.end(), trace.time_s[row])) {
+      continue;
+    }
+    rows.push_back(row);
+  }
+  const size_t samples = rows.size(), times = std::min(samples, kBandTimes);
   for (size_t k = 0; k < times; ++k) {
-    const size_t row = times == 1 ? 0 : k * (samples - 1) / (times - 1);
+    const size_t row = rows[times == 1 ? 0 : k * (samples - 1) / (times - 1)];
     forces.samples.push_back(static_cast<Eigen::Index>(row));
     forces.time_s.push_back(trace.time_s[row]);
   }
@@ -92,8 +101,10 @@ const Trace* FirstTrace(const Attempt& attempt) {
              : nullptr;
 }
 
-std::string FingerprintOf(const std::vector<InputFile>& files) {
+// Count and seed may be others than the file's.
+std::string FingerprintOf(const std::vector<InputFile>& files, const Design& design) {
   Fingerprint fingerprint;
+  fingerprint.Add(fmt::format("{} {}", design.count, design.seed));
   for (const InputFile& file : files) fingerprint.Add(file.fingerprint);
   for (const auto& [name, version] : Versions()) fingerprint.Add(name + " " + version);
   return fingerprint.Text();
@@ -130,11 +141,31 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
   }
   bench->CheckQuantities(channels, diagnostics);
   if (diagnostics->has_errors()) return nullptr;
-  bench->forces_ = ForcesOf(*FirstTrace(attempt));
+  bench->Measure(*attempt.prepared, attempt.run, diagnostics);
+  if (diagnostics->has_errors()) return nullptr;
   bench->nominal_.forces = ForceSamples(bench->forces_, FirstTrace(attempt));
-  bench->fingerprint_ = FingerprintOf(watch.files());
+  bench->fingerprint_ = FingerprintOf(watch.files(), study.design);
+  bench->inputs_ = watch.files();
   *exit_code = 0;
   return bench;
+}
+
+// The nominal forces, and what they are validated against.
+void StudyBench::Measure(const Prepared& prepared, const StudyRun& run, Diagnostics* diagnostics) {
+  const Trace& trace = run.witnesses.front()->trace;
+  if (!study_.validation) {
+    forces_ = ForcesOf(trace, nullptr);
+    return;
+  }
+  steps_ = run.witnesses.front()->name == role::kSimulated && prepared.scenario.simulation.forward;
+  const AlignedTable table = TableOf(prepared);
+  forces_ = ForcesOf(trace, &table.trace);
+  measured_ = MeasureForces(table, run, forces_, *study_.validation);
+  if (!measured_.drives.empty()) return;
+  diagnostics->Add(FindingAt(
+      study_, study_.validation->line, study_.validation->column,
+      fmt::format("validation: {} has no drive force at any sample of the motion", table.name),
+      "its columns: DRIVE.force"));
 }
 
 // Keys that the scenario does not state: whoever reads scenarios says what they mean.

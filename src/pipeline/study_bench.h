@@ -6,11 +6,15 @@
 #include <vector>
 
 #include "core/diagnostics.h"
+#include "core/inputs.h"
 #include "pipeline/prepare.h"
 #include "study/point_row.h"
 #include "study/study.h"
+#include "study/validation.h"
 
 namespace mbv {
+
+struct StudyRun;
 
 /// The drive forces over time that bands are made of.
 struct StudyForces {
@@ -20,6 +24,14 @@ struct StudyForces {
   [[nodiscard]] size_t size() const { return drives.size() * time_s.size(); }
 };
 inline constexpr size_t kBandTimes = 240;
+
+/// What a measured table says at these times, and how exact the nominal run is.
+struct MeasuredForces {
+  std::string table;                    ///< file name; "" where nothing is validated
+  std::string numerical;                ///< where u_num is from
+  std::vector<ForceComparison> drives;  ///< those that the table has; u_input is still empty
+  std::vector<size_t> places;           ///< of these drives in StudyForces::drives
+};
 
 struct StudyPoint {
   PointRow row;
@@ -38,7 +50,12 @@ class StudyBench {
   /// Of the scenario as it is; `row.varied` are the nominal values.
   [[nodiscard]] const StudyPoint& nominal() const { return nominal_; }
   [[nodiscard]] const StudyForces& forces() const { return forces_; }
+  /// Whether the first witness goes in steps: the simulation in forward mode.
+  [[nodiscard]] bool steps() const { return steps_; }
+  [[nodiscard]] const MeasuredForces& measured() const { return measured_; }
   /// Tells a study, its scenario and model, and this program from others.
+  /// The files that it is computed from.
+  [[nodiscard]] const std::vector<InputFile>& inputs() const { return inputs_; }
   [[nodiscard]] const std::string& fingerprint() const { return fingerprint_; }
 
   /// A function of the study and the number alone.
@@ -52,12 +69,16 @@ class StudyBench {
   explicit StudyBench(Study study) : study_(std::move(study)), points_(study_.Points()) {}
   [[nodiscard]] std::vector<SetValue> SetsOf(const std::vector<double>& varied) const;
   void CheckKeys(Diagnostics* diagnostics) const;
+  void Measure(const Prepared& prepared, const StudyRun& run, Diagnostics* diagnostics);
   void CheckQuantities(const std::vector<std::string>& channels, Diagnostics* diagnostics) const;
 
   Study study_;
   DesignPoints points_;
   StudyPoint nominal_;
   StudyForces forces_;
+  MeasuredForces measured_;
+  bool steps_ = false;
+  std::vector<InputFile> inputs_;
   std::string fingerprint_;
 };
 

@@ -41,11 +41,14 @@ std::string NameOf(const StudyIdentity& identity) {
 }  // namespace
 
 std::string ToJson(const StudyIdentity& identity) {
-  return Dump({{"schema", kStudySchema},
-               {"study", identity.study},
-               {"file", identity.file},
-               {"fingerprint", identity.fingerprint},
-               {"shard", {identity.share.index + 1, identity.share.count}}});
+  nlohmann::ordered_json json = {{"schema", kStudySchema},
+                                 {"study", identity.study},
+                                 {"file", identity.file},
+                                 {"fingerprint", identity.fingerprint},
+                                 {"shard", {identity.share.index + 1, identity.share.count}}};
+  if (identity.drawn.count) json["count"] = *identity.drawn.count;
+  if (identity.drawn.seed) json["seed"] = *identity.drawn.seed;
+  return Dump(json);
 }
 
 std::optional<StudyIdentity> ReadIdentity(const fs::path& folder) {
@@ -53,7 +56,9 @@ std::optional<StudyIdentity> ReadIdentity(const fs::path& folder) {
   const auto json = nlohmann::json::parse(text.value_or(""), nullptr, false);
   if (!json.is_object() || json.value("schema", "") != kStudySchema) return {};
   try {
-    StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}};
+    StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}};
+    if (json.contains("count")) identity.drawn.count = json.at("count").get<std::uint64_t>();
+    if (json.contains("seed")) identity.drawn.seed = json.at("seed").get<std::uint64_t>();
     identity.share.index = json.at("shard").at(0).get<std::uint64_t>() - 1;
     identity.share.count = json.at("shard").at(1).get<std::uint64_t>();
     if (identity.share.count == 0 || identity.share.index >= identity.share.count) return {};

@@ -6,12 +6,14 @@
 #include <string>
 
 #include "pipeline/study_points.h"
+#include "scenario/study_file.h"
 
 namespace mbv {
 
 /// study.json of a folder: whose rows it holds.
 struct StudyIdentity {
   std::string study, file, fingerprint;
+  DrawnDesign drawn;
   StudyShare share;
 };
 inline constexpr const char* kStudyFile = "study.json";

@@ -21,6 +21,7 @@ struct AccuracyColumn {
   const char* heading;
   std::vector<const char*> places;  // JSON pointers, or CHECK:value, CHECK:limit
   const char* unit = "";
+  bool count = false;  // a whole number
 };
 
 const std::vector<AccuracyColumn>& AccuracyColumns() {
@@ -46,6 +47,10 @@ const std::vector<AccuracyColumn>& AccuracyColumns() {
         "simulated_vs_analytic.position_m:limit"},
        " m"},
       {"tracking error", {"/metrics/simulated_vs_analytic/position_max_m"}, " m"},
+      {"random cases", {"/points"}, "", true},
+      {"no result", {"/failures/points"}, "", true},
+      {"worst of all pairs", {"/quantities/0/most"}},
+      {"worst, each drive's own scale", {"/quantities/1/most"}},
       {"tracking error, angles", {"/metrics/simulated_vs_analytic/position_max_rad"}, " rad"},
   };
   return kColumns;
@@ -151,6 +156,7 @@ std::optional<std::string> AccuracyText(const std::string& heading, const std::s
   for (const char* place : column->places) {
     const double number = NumberAt(json, place);
     if (std::isnan(number)) continue;
+    if (column->count) return fmt::format("{:.0f}", number);
     return fmt::format(
         "{}{}", number >= 0.01 ? fmt::format("{:.2g}", number) : fmt::format("{:.1e}", number),
         column->unit);

@@ -37,7 +37,7 @@ std::string HeadJson(const std::string& file) {
   Fingerprint fingerprint;
   fingerprint.Add(fs::path(file).filename().string());
   fingerprint.Add(text);
-  const Json json = {{"counts", head.is_scenario || NamesMechanism(text)},
+  const Json json = {{"counts", head.is_scenario || head.is_study || NamesMechanism(text)},
                      {"study", head.is_study},
                      {"kind", head.kind},
                      {"mechanism", head.mechanism},
@@ -51,7 +51,7 @@ std::string HeadJson(const std::string& file) {
 }
 
 struct Found {
-  bool counts = true;  // as a scenario
+  bool counts = true;  // as a scenario or study
   CaseFile file;
 };
 
@@ -64,7 +64,7 @@ Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
   ScenarioHead& head = found.file.head;
   found.counts = json.value("counts", true);
   head.is_study = json.value("study", false);
-  head.is_scenario = found.counts;
+  head.is_scenario = found.counts && !head.is_study;
   head.kind = json.value("kind", "");
   head.mechanism = json.value("mechanism", "");
   head.description = json.value("description", "");
@@ -76,14 +76,12 @@ Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
   return found;
 }
 
-// Reads the heads of `files`; a folder's files count only if they are scenarios.
-void AddFiles(const std::vector<std::string>& files, bool all, std::vector<CaseFile>* cases,
-              FoundCases* total) {
+// Reads the heads of `files`; a folder's files count only if they are scenarios or studies.
+void AddFiles(const std::vector<std::string>& files, bool all, std::vector<CaseFile>* cases) {
   const auto texts =
       InChildren(files.size(), kHeadTimeout_s, [&](size_t i) { return HeadJson(files[i]); });
   for (size_t i = 0; i < files.size(); ++i) {
     Found found = FoundOf(files[i], texts[i]);
-    if (!all && found.file.head.is_study) ++total->studies;
     if (all || found.counts) cases->push_back(std::move(found.file));
   }
 }
@@ -92,7 +90,7 @@ void AddPath(const std::string& given, std::vector<CaseFile>* cases, FoundCases*
   const std::string path = FindScenario(given);
   std::error_code error;
   if (fs::is_regular_file(path, error)) {
-    AddFiles({path}, true, cases, found);
+    AddFiles({path}, true, cases);
     return;
   }
   if (!fs::is_directory(path, error)) {
@@ -102,7 +100,7 @@ void AddPath(const std::string& given, std::vector<CaseFile>* cases, FoundCases*
     return;
   }
   const size_t before = cases->size(), unread = found->unread.size();
-  AddFiles(FilesBelow(path, ".yaml", &found->unread), false, cases, found);
+  AddFiles(FilesBelow(path, ".yaml", &found->unread), false, cases);
   if (cases->size() > before) return;
   // Nothing was found; what could not be read may be why.
   found->troubles.insert(found->troubles.end(), found->unread.begin() + static_cast<long>(unread),

@@ -20,7 +20,6 @@ struct CaseFile {
 struct FoundCases {
   std::vector<CaseFile> cases;        ///< sorted by key, each once
   std::vector<std::string> troubles;  ///< one line each; not empty: bad input
-  size_t studies = 0;                 ///< study files in folders: no scenarios, left out
   std::vector<std::string> unread;    ///< folders that cannot be read: they may hold scenarios
 };
 

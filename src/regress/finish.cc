@@ -15,6 +15,7 @@
 #include "regress/summaries.h"
 #include "scenario/load_scenario.h"
 #include "scenario/stiffness_scenario.h"
+#include "scenario/study_file.h"
 
 namespace mbv {
 namespace {
@@ -150,6 +151,8 @@ std::string FilesRead(const CaseFile& file) {
   const InputWatch watch;
   if (file.head.is_stiffness()) {
     (void)LoadStiffnessScenario(file.file);
+  } else if (file.head.is_study) {
+    (void)LoadStudy(file.file);
   } else {
     (void)LoadScenario(file.file);
   }

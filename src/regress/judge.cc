@@ -35,12 +35,14 @@ Json Part(const Json& json, const char* key) {
 struct SummaryText {
   std::string reason;
   std::string culprits;  ///< failed checks and where witnesses broke down, one per line
+  bool judged = true;    ///< anything was asked; a study may ask nothing
 };
 
 // What a summary.json says; throws where it is none of ours.
 SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
   SummaryText words;
   words.reason = Word(json, "reason");
+  words.judged = json.value("judged", true);
   if (const std::string verdict = Word(json, "verdict"); !verdict.empty()) {
     result->verdict = verdict;
   }
@@ -164,7 +166,7 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
     } else if (offence.empty()) {
       result.status = CaseStatus::kAsExpected;
       result.reason = reason;
-      result.verified = result.verdict == "agree";
+      result.verified = result.verdict == "agree" && words.judged;
     } else {
       result.status = StatusOf(result);
       result.reason = offence + (reason.empty() ? "" : ": " + reason);

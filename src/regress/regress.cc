@@ -35,6 +35,9 @@ std::string ProgramText(const RegressOptions& options) {
                      fingerprint.Text().substr(0, 8));
 }
 
+// Of `mbverify study`: the night itself takes the cores.
+const std::vector<std::string> kStudyWords = {"--jobs", "1"};
+
 class Run {
  public:
   Run(const RegressOptions& options, const RegressProgress& progress)
@@ -81,7 +84,6 @@ class Run {
     for (const std::string& trouble : found.troubles) AddTrouble(trouble, &outcome_);
     if (!found.troubles.empty()) return false;
     cases_ = std::move(found.cases);
-    outcome_.studies = found.studies;
     unread_ = std::move(found.unread);
     report().run.covers = CoversOf(options_.paths);
     report().run.found = cases_.size();
@@ -175,13 +177,11 @@ class Run {
     std::vector<WorkerJob> jobs;
     for (size_t i = 0; i < cases_.size(); ++i) {
       WorkerJob job{options_.worker, folder_.StagedLog(i)};
-      for (const std::string& word : {std::string("run"), cases_[i].file, std::string("--out"),
-                                      folder_.Staging(i).string()}) {
-        job.argv.push_back(word);
-      }
-      job.argv.insert(job.argv.end(), {"--kept-audits", folder_.Shared().string()});
-      if (!options_.pictures) job.argv.emplace_back("--no-pictures");
-      for (const std::string& word : WorkerOptions(cases_[i].key)) job.argv.push_back(word);
+      const bool study = cases_[i].head.is_study;
+      job.argv.insert(job.argv.end(), {study ? "study" : "run", cases_[i].file, "--out",
+                                       folder_.Staging(i).string()});
+      const std::vector<std::string> rest = study ? kStudyWords : RunWords(cases_[i].key);
+      job.argv.insert(job.argv.end(), rest.begin(), rest.end());
       jobs.push_back(std::move(job));
     }
     WorkerPool pool;
@@ -194,6 +194,14 @@ class Run {
     };
     pool.ended = [&](size_t i, const WorkerEnd& end) { Collect(i, end); };
     return pool.Run(jobs);
+  }
+
+  // Of `mbverify run`, besides what is run and where to.
+  std::vector<std::string> RunWords(const std::string& key) const {
+    std::vector<std::string> words = {"--kept-audits", folder_.Shared().string()};
+    if (!options_.pictures) words.emplace_back("--no-pictures");
+    for (const std::string& word : WorkerOptions(key)) words.push_back(word);
+    return words;
   }
 
   // "{up}" stands for the way from the result's folder to --out.

@@ -53,7 +53,6 @@ struct RegressOutcome {
   std::string trouble;  ///< why nothing was run, or "interrupted"
   RegressReport report;
   std::vector<std::string> files;  ///< summaries that were written
-  size_t studies = 0;              ///< study files that were left out
 };
 
 /// Runs and writes everything. Never throws for what scenarios or workers do.

@@ -5,9 +5,9 @@
 
 #include "report/html_text.h"
 #include "report/page.h"
+#include "report/study_plots.h"
 #include "report/study_report.h"
 #include "report/study_words.h"
-#include "report/svg_plot.h"
 
 namespace mbv {
 namespace {
@@ -22,11 +22,18 @@ std::string LimitSection(const StudyReport& report) {
                           Markup(result.pass() ? Pill("ok", "kept") : Pill("fail", "violated")),
                           Text(internal::ShareText(result))});
   }
+  if (report.study.missing) {
+    const bool kept = report.summary.few_missing();
+    table.rows.push_back({Text("points without a result"),
+                          Markup(kept ? Pill("ok", "kept") : Pill("fail", "violated")),
+                          Text(internal::MissingText(report))});
+  }
   if (table.rows.empty()) return "";
   return ToHtml(table) +
-         Note(
-             "Points without a result violate every limit. The interval is Clopper and Pearson's, "
-             "as of independent points.");
+         Note(std::string(report.study.missing ? ""
+                                               : "Points without a result violate every limit. ") +
+              "The interval is Clopper and Pearson's, "
+              "as of independent points.");
 }
 
 std::string QuantitySection(const StudyReport& report) {
@@ -46,66 +53,37 @@ std::string QuantitySection(const StudyReport& report) {
   return ToHtml(table);
 }
 
-// Its outline, and the nominal value as an upright line.
-std::string HistogramSvg(const QuantitySummary& q) {
-  LinePlot plot{.title = q.name, .x_label = q.name, .y_label = "points", .lines = {}};
-  PlotLine outline{.label = "points", .points = {}};
-  const auto bins = static_cast<double>(q.histogram.counts.size());
-  double most = 0.0;
-  outline.points.emplace_back(q.histogram.from, 0.0);
-  for (size_t k = 0; k < q.histogram.counts.size(); ++k) {
-    const double width = (q.histogram.to - q.histogram.from) / bins;
-    const double left = q.histogram.from + width * static_cast<double>(k);
-    const auto count = static_cast<double>(q.histogram.counts[k]);
-    outline.points.emplace_back(left, count);
-    outline.points.emplace_back(left + width, count);
-    most = std::max(most, count);
-  }
-  outline.points.emplace_back(q.histogram.to, 0.0);
-  plot.lines.push_back(std::move(outline));
-  plot.lines.push_back({.label = "nominal", .points = {{q.nominal, 0.0}, {q.nominal, most}}});
-  return ToSvg(plot);
-}
-
-std::string HistogramSection(const StudyReport& report) {
+std::string Plots(const std::vector<StudyPlot>& plots, StudySection section) {
   std::string html;
-  for (const QuantitySummary& q : report.summary.quantities) {
-    if (q.histogram.counts.size() > 1) html += FigureHtml(HistogramSvg(q));
+  for (const StudyPlot& plot : plots) {
+    if (plot.section == section) html += FigureHtml(plot.svg);
   }
   return html;
 }
 
-std::string TornadoSection(const StudyReport& report) {
+std::string TornadoTables(const StudyReport& report) {
   std::string html;
   for (const QuantitySummary& q : report.summary.quantities) {
     if (q.swings.empty()) continue;
-    BarPlot bars{.title = q.name, .columns = {"down, of nominal", "up, of nominal"}, .rows = {}};
     Table table{.caption = q.name + fmt::format(", nominal {:.6g}", q.nominal),
                 .head = {Text("varied alone"), Digits("least"), Digits("most")},
                 .rows = {}};
     for (const Swing& swing : q.swings) {
-      const std::string& name = report.study.factors[swing.factor].name;
-      table.rows.push_back(
-          {Text(name), Digits(StudyNumber(swing.lowest)), Digits(StudyNumber(swing.highest))});
-      const double scale = std::abs(q.nominal);
-      if (!(scale > 0.0) || !std::isfinite(swing.lowest)) continue;
-      bars.rows.push_back(
-          {name, {(swing.lowest - q.nominal) / scale, (swing.highest - q.nominal) / scale}});
+      table.rows.push_back({Text(report.study.factors[swing.factor].name),
+                            Digits(StudyNumber(swing.lowest)), Digits(StudyNumber(swing.highest))});
     }
-    if (!bars.rows.empty()) html += FigureHtml(ToSvg(bars));
     html += ToHtml(table);
   }
   return html;
 }
 
-std::string IndexSection(const StudyReport& report) {
+std::string IndexTables(const StudyReport& report) {
   std::string html;
   const auto interval = [](const Interval& i) {
     return std::isnan(i.lower) ? "–" : fmt::format("{:.3f} … {:.3f}", i.lower, i.upper);
   };
   for (const QuantitySummary& q : report.summary.quantities) {
     if (!q.sobol) continue;
-    BarPlot bars{.title = q.name, .columns = {"first order", "total"}, .rows = {}};
     Table table{.caption = fmt::format("{}: {} blocks, {} left out", q.name, q.sobol->blocks,
                                        q.sobol->left_out),
                 .head = {Text("varied"), Digits("first order"), Digits("95 %"), Digits("total"),
@@ -114,13 +92,11 @@ std::string IndexSection(const StudyReport& report) {
     for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
       const SobolIndex& index = q.sobol->indices[k];
       const std::string& name = report.study.factors[k].name;
-      if (std::isfinite(index.total)) bars.rows.push_back({name, {index.first, index.total}});
       table.rows.push_back({Text(name), Digits(NumberOrDash(index.first, "{:.3f}")),
                             Digits(interval(index.first_interval)),
                             Digits(NumberOrDash(index.total, "{:.3f}")),
                             Digits(interval(index.total_interval))});
     }
-    if (!bars.rows.empty()) html += FigureHtml(ToSvg(bars));
     html += ToHtml(table);
   }
   if (html.empty()) return "";
@@ -130,29 +106,51 @@ std::string IndexSection(const StudyReport& report) {
                     "by bootstrap of blocks.");
 }
 
-std::string BandSection(const StudyReport& report) {
-  std::string html;
-  for (const StudyBand& band : report.bands) {
-    if (band.time_s.size() < 2) continue;
-    LinePlot plot{.title = band.drive,
-                  .x_label = "t [s]",
-                  .y_label = fmt::format("drive force [{}]", band.unit),
-                  .lines = {}};
-    const auto add = [&](const char* label, const std::vector<double>& values) {
-      PlotLine line{.label = label, .points = {}};
-      for (size_t t = 0; t < values.size(); ++t)
-        line.points.emplace_back(band.time_s[t], values[t]);
-      plot.lines.push_back(std::move(line));
-    };
-    add("nominal", band.nominal);
-    add("5 %", band.p5);
-    add("median", band.p50);
-    add("95 %", band.p95);
-    html += FigureHtml(ToSvg(plot));
+std::string BandNote(const StudyReport& report) {
+  if (report.bands.empty()) return "";
+  return Note(fmt::format("Percentiles at each time of {} points ({} left out).",
+                          report.bands[0].points, report.bands[0].left_out));
+}
+
+std::string ValidationTable(const StudyReport& report) {
+  const StudyValidationResult& validation = *report.validation;
+  if (!validation.trouble.empty()) return "<p>" + Escape(validation.trouble) + "</p>\n";
+  Table table{.caption = "Drive forces against " + validation.table,
+              .head = {Text("drive"), Text("verdict")},
+              .rows = {}};
+  for (const char* word : {"mean of E", "RMS of E", "u_num", "u_input", "u_D", "u_val",
+                           "of RMS measured", "outside"}) {
+    table.head.push_back(Digits(word));
   }
-  if (html.empty()) return "";
-  return html + Note(fmt::format("Percentiles at each time of {} points ({} left out).",
-                                 report.bands[0].points, report.bands[0].left_out));
+  table.head.push_back(Text("largest part"));
+  for (const DriveValidation& v : validation.drives) {
+    std::vector<Cell> row = {
+        Text(fmt::format("{} [{}]", v.forces.drive, v.forces.unit)),
+        Markup(v.pass() ? Pill("ok", "within") : Pill("fail", "model error seen"))};
+    for (const double x : {v.error_mean, v.error_rms, v.u_num, v.u_input, v.u_data, v.level}) {
+      row.push_back(Digits(NumberOrDash(x, "{:.4g}")));
+    }
+    row.push_back(Digits(fmt::format("{:.2g} %", 100.0 * v.level / v.measured_rms)));
+    row.push_back(Digits(fmt::format("{} of {}", v.outside, v.samples())));
+    row.push_back(Text(v.largest));
+    table.rows.push_back(std::move(row));
+  }
+  return ToHtml(table) +
+         Note(fmt::format(
+             "E = computed − measured; standard uncertainties, RMS over the samples: u_num of the "
+             "scheme ({}), u_input of the varied numbers, u_D of the table; u_val is their root "
+             "sum "
+             "of squares, the validation level: a smaller error of the model cannot be seen here. "
+             "A "
+             "sample is outside where |E| > {:g} u_val; {:g} % of them may be [ASME V&V 20-2009].",
+             validation.numerical, report.study.validation->coverage,
+             100.0 * report.study.validation->share));
+}
+
+std::string ScatterNote(const StudyReport& report) {
+  if (report.shown.empty()) return "";
+  return Note(fmt::format("{} of {} points; the first 8 varied numbers and 6 quantities.",
+                          report.shown.size(), report.summary.points));
 }
 
 std::string WorstSection(const StudyReport& report) {
@@ -185,16 +183,28 @@ std::string FailureSection(const StudyReport& report) {
   return html;
 }
 
+const char* FailureWord(const StudyReport& report) {
+  return report.summary.within_limits() ? "Not validated" : "Limit violated";
+}
+
 }  // namespace
 
 std::string ToHtml(const StudyReport& report) {
   Page page;
+  const std::vector<StudyPlot> plots = StudyPlots(report);
+  const auto drawn = [&](StudySection section) { return Plots(plots, section); };
   page.Add("Limits", "Limits", LimitSection(report));
   page.Add("Quantities", "Quantities", QuantitySection(report));
-  page.Add("Sobol' indices", "Indices", IndexSection(report));
-  page.Add("One number at a time", "Tornado", TornadoSection(report));
-  page.Add("Drive forces over time", "Bands", BandSection(report));
-  page.Add("Distributions", "Histograms", HistogramSection(report));
+  page.Add("Sobol' indices", "Indices", drawn(StudySection::kIndices) + IndexTables(report));
+  page.Add("One number at a time", "Tornado",
+           drawn(StudySection::kTornado) + TornadoTables(report));
+  if (report.validation) {
+    page.Add("Validation", "Validation",
+             ValidationTable(report) + drawn(StudySection::kValidation));
+  }
+  page.Add("Drive forces over time", "Bands", drawn(StudySection::kBands) + BandNote(report));
+  page.Add("Distributions", "Histograms", drawn(StudySection::kHistograms));
+  page.Add("Point by point", "Scatter", drawn(StudySection::kScatter) + ScatterNote(report));
   page.Add("Worst points, and how to run them", "Worst", WorstSection(report));
   page.Add("Points without a result", "Failures", FailureSection(report));
   PageHead head{.kicker = "mbverify study", .title = report.study.name};
@@ -203,8 +213,8 @@ std::string ToHtml(const StudyReport& report) {
                   : report.study.description + "; " + internal::PointsText(report);
   const int code = report.exit_code();
   head.verdict = code == 0 ? Verdict::kAgree : code == 1 ? Verdict::kDisagree : Verdict::kNotRun;
-  head.word = code == 3 ? "No result" : code == 0 ? "Limits kept" : "Limit violated";
-  head.judges = code == 3 || !report.study.limits.empty();
+  head.word = code == 3 ? "No result" : code == 1 ? FailureWord(report) : "Limits kept";
+  head.judges = code == 3 || report.judged();
   for (const auto& [name, version] : report.versions) {
     head.footer += (head.footer.empty() ? "" : " · ") + name + " " + version;
   }

@@ -102,6 +102,37 @@ Json BandJson(const StudyBand& band) {
           {"p95", NumberList(band.p95)}};
 }
 
+Json ValidationJson(const StudyReport& report) {
+  const StudyValidationResult& validation = *report.validation;
+  Json json = {{"table", validation.table},
+               {"pass", validation.pass()},
+               {"trouble", validation.trouble},
+               {"coverage", report.study.validation->coverage},
+               {"allowed_share", report.study.validation->share},
+               {"u_num_from", validation.numerical},
+               {"drives", Json::array()}};
+  for (const DriveValidation& v : validation.drives) {
+    json["drives"].push_back({{"drive", v.forces.drive},
+                              {"unit", v.forces.unit},
+                              {"pass", v.pass()},
+                              {"samples", v.samples()},
+                              {"outside", v.outside},
+                              {"error_mean", Number(v.error_mean)},
+                              {"error_rms", Number(v.error_rms)},
+                              {"measured_rms", Number(v.measured_rms)},
+                              {"u_num", Number(v.u_num)},
+                              {"u_input", Number(v.u_input)},
+                              {"u_data", Number(v.u_data)},
+                              {"u_val", Number(v.level)},
+                              {"largest", v.largest},
+                              {"time_s", NumberList(v.forces.time_s)},
+                              {"computed", NumberList(v.forces.computed)},
+                              {"measured", NumberList(v.forces.measured)},
+                              {"u_val_samples", NumberList(v.u_val)}});
+  }
+  return json;
+}
+
 Json FailureJson(const StudyReport& report) {
   Json json = {{"points", report.summary.failed}, {"reasons", Json::array()}};
   for (const auto& [reason, count] : report.summary.reasons) {
@@ -118,12 +149,54 @@ Json FailureJson(const StudyReport& report) {
   return json;
 }
 
+// As of scenarios, for whoever reads summaries of both.
+const char* VerdictWord(const StudyReport& report) {
+  const int code = report.exit_code();
+  return code == 0 ? "agree" : code == 1 ? "disagree" : "not_run";
+}
+
+std::string ReasonText(const StudyReport& report) {
+  std::string text = internal::PointsText(report);
+  for (const LimitResult& result : report.summary.limits) {
+    if (result.pass()) continue;
+    text += "; " + internal::LimitText(report, result) + ": " + internal::ShareText(result);
+  }
+  if (!report.summary.few_missing()) text += "; " + internal::MissingText(report);
+  if (report.validation && !report.validation->pass()) {
+    text += "; not validated by " + report.validation->table;
+  }
+  return text;
+}
+
+// What decides the verdict, one row each: shares of points, or of samples, with what is allowed.
+Json ChecksJson(const StudyReport& report) {
+  Json checks = Json::array();
+  const auto add = [&](const std::string& name, double share, double allowed, bool pass) {
+    checks.push_back(
+        {{"name", name}, {"value", Number(share)}, {"limit", Number(allowed)}, {"pass", pass}});
+  };
+  for (const LimitResult& result : report.summary.limits) {
+    add(internal::LimitText(report, result), result.share(), result.limit.share, result.pass());
+  }
+  if (report.study.missing) {
+    add("points without a result",
+        static_cast<double>(report.summary.failed) / static_cast<double>(report.summary.points),
+        *report.study.missing, report.summary.few_missing());
+  }
+  if (!report.validation) return checks;
+  for (const DriveValidation& v : report.validation->drives) {
+    add("validation." + v.forces.drive,
+        static_cast<double>(v.outside) / static_cast<double>(v.samples()), v.share, v.pass());
+  }
+  return checks;
+}
+
 }  // namespace
 
 std::string ToJson(const StudyReport& report) {
   const Study& study = report.study;
   Json varied = Json::array(), quantities = Json::array(), limits = Json::array(),
-       bands = Json::array(), versions = Json::object();
+       bands = Json::array(), witnesses = Json::array(), versions = Json::object();
   for (const Factor& factor : study.factors) {
     varied.push_back(
         {{"name", factor.name}, {"sets", factor.key}, {"nominal", Number(factor.axis.nominal)}});
@@ -134,22 +207,36 @@ std::string ToJson(const StudyReport& report) {
   for (const LimitResult& result : report.summary.limits)
     limits.push_back(LimitJson(study, result));
   for (const StudyBand& band : report.bands) bands.push_back(BandJson(band));
+  size_t pairs = 0;  // quantities that compare witnesses, and did
+  for (size_t k = 0; k < study.quantities.size(); ++k) {
+    pairs += study.quantities[k].of_pair && report.summary.quantities[k].count > 0 ? 1 : 0;
+  }
+  for (const std::string& name : study.witnesses) {
+    witnesses.push_back({{"name", name}, {"ran", report.summary.any_value()}});
+  }
   for (const auto& [name, version] : report.versions) versions[name] = version;
-  return Dump({{"schema", kStudySummarySchema},
+  Json json = {{"schema", kStudySummarySchema},
                {"study", study.name},
                {"scenario", study.scenario},
                {"description", study.description},
+               {"verdict", VerdictWord(report)},
+               {"judged", report.judged()},
+               {"reason", ReasonText(report)},
                {"exit_code", report.exit_code()},
                {"design", internal::DesignWord(study.design.kind)},
                {"seed", study.design.seed},
                {"points", report.summary.points},
-               {"witnesses", study.witnesses},
+               {"witnesses", std::move(witnesses)},
                {"varied", std::move(varied)},
                {"limits", std::move(limits)},
+               {"checks", ChecksJson(report)},
                {"quantities", std::move(quantities)},
+               {"counts", {{"pairs_compared", pairs}}},
                {"failures", FailureJson(report)},
                {"force_bands", std::move(bands)},
-               {"versions", std::move(versions)}});
+               {"versions", std::move(versions)}};
+  if (report.validation) json["validation"] = ValidationJson(report);
+  return Dump(json);
 }
 
 }  // namespace mbv

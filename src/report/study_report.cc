@@ -58,6 +58,14 @@ std::string ShareText(const LimitResult& result) {
   return text + fmt::format("), {:g} % may", 100.0 * result.limit.share);
 }
 
+std::string MissingText(const StudyReport& report) {
+  const StudySummary& summary = report.summary;
+  return fmt::format(
+      "{} of {} points have no result ({:.3g} %), {:g} % may", summary.failed, summary.points,
+      100.0 * static_cast<double>(summary.failed) / static_cast<double>(summary.points),
+      100.0 * *summary.missing);
+}
+
 }  // namespace internal
 
 namespace {
@@ -120,6 +128,35 @@ std::string SwingTable(const StudyReport& report, const QuantitySummary& q) {
   return text;
 }
 
+std::string ValidationLines(const StudyReport& report) {
+  const StudyValidationResult& validation = *report.validation;
+  if (!validation.trouble.empty()) return "\n  not validated: " + validation.trouble + "\n";
+  const TextTable table("  ", {{"drive", WidthOf(report)},
+                               {"RMS of E", 12},
+                               {"u_num", 12},
+                               {"u_input", 12},
+                               {"u_D", 12},
+                               {"u_val", 12},
+                               {"outside", 14}});
+  std::string text = fmt::format("\n  computed - measured (E) against {}, V&V 20\n{}\n",
+                                 validation.table, table.Head());
+  for (const DriveValidation& v : validation.drives) {
+    std::vector<std::string> cells = {v.forces.drive};
+    for (const double x : {v.error_rms, v.u_num, v.u_input, v.u_data, v.level}) {
+      cells.push_back(NumberCell(x, "{:.4g}"));
+    }
+    cells.push_back(fmt::format("{} of {}", v.outside, v.samples()));
+    text += table.Row(cells) + "\n";
+  }
+  for (const DriveValidation& v : validation.drives) {
+    text += fmt::format(
+        "  {} {}: validation level u_val = {:.3g} {} ({:.2g} % of the RMS force), mostly {}\n",
+        v.pass() ? "within  " : "BEYOND  ", v.forces.drive, v.level, v.forces.unit,
+        100.0 * v.level / v.measured_rms, v.largest);
+  }
+  return text;
+}
+
 // What the user will want to look at: what violates a limit, and what did not run.
 std::string WorstLines(const StudyReport& report) {
   std::string text;
@@ -148,10 +185,15 @@ std::string ToText(const StudyReport& report) {
     if (q.sobol) text += IndexTable(report, q);
     if (!q.swings.empty()) text += SwingTable(report, q);
   }
-  if (!report.summary.limits.empty()) text += "\n";
+  if (report.validation) text += ValidationLines(report);
+  if (!report.summary.limits.empty() || report.study.missing) text += "\n";
   for (const LimitResult& result : report.summary.limits) {
     text += fmt::format("  {} {}: {}\n", result.pass() ? "kept    " : "VIOLATED",
                         internal::LimitText(report, result), internal::ShareText(result));
+  }
+  if (report.study.missing) {
+    text += fmt::format("  {} {}\n", report.summary.few_missing() ? "kept    " : "VIOLATED",
+                        internal::MissingText(report));
   }
   return text + WorstLines(report);
 }

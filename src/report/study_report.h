@@ -1,11 +1,13 @@
 // What a study found, and its writers.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "study/summary.h"
+#include "study/validation.h"
 
 namespace mbv {
 
@@ -21,16 +23,23 @@ struct StudyReport {
   std::vector<double> nominal;  ///< per quantity
   StudySummary summary;
   std::vector<StudyBand> bands;
+  std::optional<StudyValidationResult> validation;
+  std::vector<PointRow> shown;  ///< evenly chosen, at most kMostShown: for the scatter matrix
   /// What runs a point's scenario, to be typed: per quantity, as its worst points; and of failures.
   std::vector<std::vector<std::string>> worst_commands;
   std::vector<std::string> failed_commands;
   std::vector<std::pair<std::string, std::string>> versions;
 
-  /// 0 limits are kept (or there are none), 1 one is not, 3 no point has values.
+  /// Whether anything is asked of the points.
+  [[nodiscard]] bool judged() const { return !study.limits.empty() || validation || study.missing; }
+  /// 0 limits are kept (or there are none), 1 one is not, 3 no point has values, or nothing could
+  /// be validated.
   [[nodiscard]] int exit_code() const {
-    return !summary.any_value() ? 3 : summary.within_limits() ? 0 : 1;
+    if (!summary.any_value() || (validation && !validation->trouble.empty())) return 3;
+    return summary.within_limits() && (!validation || validation->pass()) ? 0 : 1;
   }
 };
+inline constexpr std::uint64_t kMostShown = 800;
 
 /// For a terminal.
 [[nodiscard]] std::string ToText(const StudyReport& report);

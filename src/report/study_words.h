@@ -13,6 +13,8 @@ namespace mbv::internal {
 [[nodiscard]] std::string LimitText(const StudyReport& report, const LimitResult& result);
 /// "31 of 1024 points violate it (3.03 %; 95 % interval 2.07 … 4.27 %), 0 % may".
 [[nodiscard]] std::string ShareText(const LimitResult& result);
+/// "3 of 1024 points have no result (0.293 %), 5 % may"; of a study that says how many may.
+[[nodiscard]] std::string MissingText(const StudyReport& report);
 /// The key of the design in study files.
 [[nodiscard]] const char* DesignWord(DesignKind kind);
 

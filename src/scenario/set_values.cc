@@ -1,6 +1,7 @@
 #include "scenario/set_values.h"
 
 #include <algorithm>
+#include <charconv>
 
 #include "input/value_reader.h"
 
@@ -26,7 +27,8 @@ YamlNodePtr Relocate(const YamlNode& node, int line) {
 }
 
 // Length of the first key of `path` in `map`: the longest key that is there, else up to the first
-// dot; names of commands contain dots themselves ("platform.z").
+// dot; names of commands ("platform.z") and of parts' parameters ("leg1.m") contain dots
+// themselves.
 size_t FirstKey(const YamlNode& map, const std::string& path, const std::string& parent) {
   size_t best = 0;
   for (const YamlEntry& entry : map.entries) {
@@ -34,8 +36,24 @@ size_t FirstKey(const YamlNode& map, const std::string& path, const std::string&
     if (n > best && path.starts_with(entry.key) && (path.size() == n || path[n] == '.')) best = n;
   }
   if (best > 0) return best;
-  return parent == "commands" || parent == "pose" ? path.size()
-                                                  : std::min(path.find('.'), path.size());
+  const bool dotted = parent == "commands" || parent == "pose" || parent == "parameters";
+  return dotted ? path.size() : std::min(path.find('.'), path.size());
+}
+
+// The item of a list that a path begins with ("1.sine.amplitude"), and the path behind its number.
+struct ListStep {
+  size_t index = 0;
+  std::string rest;
+};
+std::optional<ListStep> FirstItem(const YamlNode* list, const std::string& path) {
+  if (list == nullptr || !list->is_sequence()) return {};
+  ListStep step;
+  const char* end = path.data() + path.size();
+  const auto [at, error] = std::from_chars(path.data(), end, step.index);
+  if (error != std::errc() || step.index >= list->items.size()) return {};
+  if (at != end && *at != '.') return {};
+  step.rest.assign(at == end ? at : at + 1, end);
+  return step;
 }
 
 // A parameter of the model that was meant as such.
@@ -49,6 +67,12 @@ void HintAtParameters(const SetValue& value, Finding* finding) {
 YamlNodePtr SetAt(const YamlNode* node, const std::string& parent, const std::string& path,
                   const YamlNodePtr& value) {
   if (path.empty()) return value;
+  if (const auto step = FirstItem(node, path)) {
+    auto list = std::make_shared<YamlNode>(*node);
+    YamlNodePtr& item = list->items[step->index];
+    item = SetAt(item.get(), "", step->rest, value);
+    return list;
+  }
   auto map = std::make_shared<YamlNode>();
   map->line = value->line;
   if (node != nullptr && node->is_map()) *map = *node;
@@ -85,7 +109,14 @@ YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, Yam
 const YamlNode* FindSetNode(const YamlNode& root, const std::string& key) {
   const YamlNode* node = &root;
   std::string parent, path = key;
-  while (node != nullptr && node->is_map() && !path.empty()) {
+  while (node != nullptr && !path.empty()) {
+    if (const auto step = FirstItem(node, path)) {
+      node = node->items[step->index].get();
+      parent.clear();
+      path = step->rest;
+      continue;
+    }
+    if (!node->is_map()) break;
     const size_t length = FirstKey(*node, path, parent);
     parent = path.substr(0, length);
     path = length < path.size() ? path.substr(length + 1) : "";

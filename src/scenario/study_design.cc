@@ -135,9 +135,8 @@ bool IsListDesign(const YamlNode* node) {
   return node != nullptr && node->is_map() && node->Find("list") != nullptr;
 }
 
-Design ReadDesign(ValueReader* values, const YamlNode& node, const std::string& folder,
-                  const std::vector<Factor>& factors, std::uint64_t most,
-                  Diagnostics* list_findings) {
+Design ReadDesign(ValueReader* values, const YamlNode& node, const std::vector<Factor>& factors,
+                  const DesignContext& context) {
   Design design;
   YamlReader& yaml = values->yaml();
   std::vector<std::string> keys = kDesignWords;
@@ -162,7 +161,10 @@ Design ReadDesign(ValueReader* values, const YamlNode& node, const std::string& 
     if (!design.draws()) yaml.Error(*seed, path + " draws nothing: it has no seed");
   }
   if (design.draws()) {
-    design.count = ReadCount(values, value, path);
+    design.count = context.drawn.count.value_or(ReadCount(values, value, path));
+    design.seed = context.drawn.seed.value_or(design.seed);
+  } else if (context.drawn.count || context.drawn.seed) {
+    yaml.Error(value, path + " draws nothing: --count and --seed are about points that are drawn");
   } else if (design.kind != DesignKind::kList) {
     if (yaml.Flag(value, path) == false) yaml.Error(value, path + " = false: nothing is computed");
   }
@@ -173,8 +175,8 @@ Design ReadDesign(ValueReader* values, const YamlNode& node, const std::string& 
   if (design.kind == DesignKind::kList) {
     const auto file = yaml.Text(value, path);
     if (file && !factors.empty()) {
-      const std::string beside = (std::filesystem::path(folder) / *file).string();
-      design.list = PointList(beside, factors, list_findings).Read();
+      const std::string beside = (std::filesystem::path(context.folder) / *file).string();
+      design.list = PointList(beside, factors, context.list_findings).Read();
     }
   }
   if (yaml.has_errors() || factors.empty()) return design;
@@ -182,13 +184,101 @@ Design ReadDesign(ValueReader* values, const YamlNode& node, const std::string& 
   axes.reserve(factors.size());
   for (const Factor& factor : factors) axes.push_back(factor.axis);
   const std::uint64_t count = DesignPoints(std::move(axes), design).count();
-  if (count > most) {
+  if (count > context.most) {
     yaml.Error(value,
                fmt::format("{}: {:.3g} points, more than {:g}", path, static_cast<double>(count),
-                           static_cast<double>(most)),
+                           static_cast<double>(context.most)),
                "mbverify study --yes computes them");
   }
   return design;
+}
+
+namespace {
+
+// One entry: two normal numbers and a coefficient.
+std::optional<Correlation> ReadCorrelation(ValueReader* values, const YamlNode& node,
+                                           const std::vector<Factor>& factors) {
+  YamlReader& yaml = values->yaml();
+  YamlMap map(&yaml, &node, "correlations", {"of", "coefficient"});
+  const YamlNode* of = map.Required("of");
+  const YamlNode* coefficient = map.Required("coefficient");
+  if (of == nullptr || coefficient == nullptr) return {};
+  const auto items = yaml.Items(*of, "correlations.of");
+  const auto number = values->Number(*coefficient, "correlations.coefficient");
+  if (!items || !number) return {};
+  if (items->size() != 2) {
+    yaml.Error(*of, "correlations.of: name two numbers", "e.g. {of: [m_p, m_1], coefficient: 0.8}");
+    return {};
+  }
+  std::vector<std::string> names;
+  for (const Factor& factor : factors) names.push_back(factor.name);
+  std::vector<size_t> axes;
+  for (const YamlNode* item : *items) {
+    const auto name = yaml.Text(*item, "correlations.of");
+    if (!name) return {};
+    const auto found = std::find(names.begin(), names.end(), *name);
+    if (found == names.end()) {
+      yaml.Error(*item, fmt::format("correlations.of: '{}' is not varied", *name),
+                 DidYouMean(*name, names));
+      continue;
+    }
+    axes.push_back(static_cast<size_t>(found - names.begin()));
+    if (std::holds_alternative<Normal>(factors[axes.back()].axis.distribution)) continue;
+    yaml.Error(*item, fmt::format("correlations.of: {} is not normal", *name),
+               "only normal numbers have correlations here");
+  }
+  if (axes.size() < 2) return {};
+  if (axes[0] == axes[1]) {
+    yaml.Error(*of, fmt::format("correlations.of: {} with itself", names[axes[0]]));
+    return {};
+  }
+  if (!(std::abs(*number) < 1.0)) {
+    yaml.Error(
+        *coefficient,
+        fmt::format("correlations.coefficient = {:g} violates -1 < coefficient < 1", *number),
+        "two numbers that always go together are one: vary a parameter that both are "
+        "computed from");
+    return {};
+  }
+  return Correlation{axes[0], axes[1], *number};
+}
+
+}  // namespace
+
+void ReadCorrelations(ValueReader* values, const YamlNode& node, const std::vector<Factor>& factors,
+                      Design* design) {
+  YamlReader& yaml = values->yaml();
+  const auto items = yaml.Items(node, "correlations");
+  if (!items) return;
+  if (design->kind != DesignKind::kSobol && design->kind != DesignKind::kLatinHypercube) {
+    yaml.Error(node, "correlations: are drawn by sobol and latin_hypercube alone",
+               design->kind == DesignKind::kSaltelli
+                   ? "Sobol' indices share a variance among independent numbers"
+                   : "");
+    return;
+  }
+  for (const YamlNode* item : *items) {
+    const auto read = ReadCorrelation(values, *item, factors);
+    if (!read) continue;
+    const auto same = [&](const Correlation& c) {
+      return std::minmax(c.first, c.second) == std::minmax(read->first, read->second);
+    };
+    if (std::any_of(design->correlations.begin(), design->correlations.end(), same)) {
+      yaml.Error(*item, fmt::format("correlations: that of {} and {} is given twice",
+                                    factors[read->first].name, factors[read->second].name));
+    }
+    design->correlations.push_back(*read);
+  }
+  if (yaml.has_errors() || design->correlations.empty()) return;
+  // Below this the root of the matrix loses its digits.
+  constexpr double kSmallest = 1e-10;
+  const double smallest = SmallestEigenvalue(CorrelationMatrix(*design, factors.size()));
+  if (smallest >= kSmallest) return;
+  yaml.Error(node,
+             fmt::format("correlations: no numbers have these together: the smallest eigenvalue of "
+                         "their matrix is {:.3g} and must be above 0",
+                         smallest),
+             "make the coefficients smaller, or state those that are left out");
 }
 
 }  // namespace mbv::internal

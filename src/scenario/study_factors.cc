@@ -1,6 +1,7 @@
 #include "scenario/study_factors.h"
 
 #include <fmt/format.h>
+#include <fnmatch.h>
 
 #include <algorithm>
 #include <cmath>
@@ -11,6 +12,12 @@
 
 namespace mbv::internal {
 namespace {
+
+const std::string kParametersStart = "parameters.";
+
+std::string WithoutStart(const std::string& key) {
+  return key.starts_with(kParametersStart) ? key.substr(kParametersStart.size()) : key;
+}
 
 // A factor being read: its own unit, and the SI unit of what it is ("" where nobody knows).
 struct FactorDraft {
@@ -24,13 +31,14 @@ class FactorReader {
   FactorReader(ValueReader* values, const VariedScenario& varied)
       : values_(*values), yaml_(values->yaml()), varied_(varied) {}
 
-  Factor Read(const YamlEntry& entry, bool listed) {
+  /// `name`: of the number that is varied; the entry's key, or what that as a pattern stands for.
+  Factor Read(const std::string& name, const YamlEntry& entry, bool listed) {
     draft_ = {};
-    draft_.factor.name = entry.key;
+    draft_.factor.name = name;
     draft_.factor.line = entry.line;
     draft_.factor.column = entry.column;
-    path_ = "vary." + entry.key;
-    Locate(entry);
+    path_ = "vary." + name;
+    Locate(name, entry);
     if (listed && entry.value->is_null()) return draft_.factor;
     YamlMap map(&yaml_, entry.value.get(), path_, {"normal", "uniform", "grid"});
     const int given = map.Has("normal") + map.Has("uniform") + map.Has("grid");
@@ -46,30 +54,27 @@ class FactorReader {
 
  private:
   // What `--set` sets, and the nominal value.
-  void Locate(const YamlEntry& entry) {
+  void Locate(const std::string& key, const YamlEntry& entry) {
     Factor& factor = draft_.factor;
-    const std::string start = "parameters.";
-    const std::string name =
-        entry.key.starts_with(start) ? entry.key.substr(start.size()) : entry.key;
+    const std::string name = WithoutStart(key);
     const NameInUnit plain = PlainName(name, *varied_.mechanism);
     if (varied_.mechanism->HasParameter(plain.name)) {
-      factor.key = start + name;
+      factor.key = kParametersStart + name;
       draft_.unit = plain.unit;
       const Parameter& parameter = ParameterOf(plain.name);
       draft_.si = parameter.unit;
       factor.axis.nominal = parameter.value / plain.unit.to_si(1.0);
       return;
     }
-    factor.key = entry.key;
+    factor.key = key;
     factor.axis.nominal = kNan;
-    draft_.unit = SplitUnit(entry.key).unit;
-    const YamlNode* node =
-        varied_.root == nullptr ? nullptr : FindSetNode(*varied_.root, entry.key);
+    draft_.unit = SplitUnit(key).unit;
+    const YamlNode* node = varied_.root == nullptr ? nullptr : FindSetNode(*varied_.root, key);
     if (node == nullptr) return CheckKey(entry);
     YamlReader scenario(varied_.file);
     Scope scope;
     for (const Parameter& p : varied_.mechanism->parameters) scope.Set(p.name, p.value);
-    factor.axis.nominal = ValueReader(&scenario, &scope).Number(*node, entry.key).value_or(kNan);
+    factor.axis.nominal = ValueReader(&scenario, &scope).Number(*node, key).value_or(kNan);
     if (std::isnan(factor.axis.nominal)) {
       yaml_.Error(entry, fmt::format("{}: {}:{} has {} there, no number", path_, varied_.file,
                                      node->line, Describe(*node)));
@@ -207,6 +212,110 @@ class FactorReader {
   std::string path_;
 };
 
+// The entries of `vary`, patterns replaced by what they stand for.
+class FactorList {
+ public:
+  FactorList(YamlReader* yaml, const VariedScenario& varied, const std::vector<YamlEntry>& entries)
+      : yaml_(*yaml), varied_(varied), entries_(entries) {}
+
+  // Names of numbers, each with its entry; "NAME: fixed" keeps a number out of patterns.
+  std::vector<std::pair<std::string, const YamlEntry*>> Names() {
+    std::vector<std::pair<std::string, const YamlEntry*>> names;
+    for (const YamlEntry& entry : entries_) {
+      if (IsFixed(entry)) {
+        CheckFixed(entry);
+      } else if (!IsPattern(entry.key)) {
+        names.emplace_back(entry.key, &entry);
+      } else {
+        for (const std::string& name : Matches(entry)) Take(name, entry, &names);
+      }
+    }
+    return names;
+  }
+
+ private:
+  // The last pattern that fits a number wins.
+  static void Take(const std::string& name, const YamlEntry& entry,
+                   std::vector<std::pair<std::string, const YamlEntry*>>* names) {
+    const auto same = [&](const auto& taken) { return taken.first == name; };
+    const auto found = std::find_if(names->begin(), names->end(), same);
+    if (found != names->end()) {
+      found->second = &entry;
+    } else {
+      names->emplace_back(name, &entry);
+    }
+  }
+
+  static bool IsPattern(const std::string& key) { return key.find('*') != std::string::npos; }
+  static bool IsFixed(const YamlEntry& entry) {
+    return entry.value->is_scalar() && entry.value->text == "fixed";
+  }
+
+  void CheckFixed(const YamlEntry& entry) {
+    const std::string name = PlainName(WithoutStart(entry.key), *varied_.mechanism).name;
+    const bool known =
+        varied_.mechanism->HasParameter(name) ||
+        (varied_.root != nullptr && FindSetNode(*varied_.root, entry.key) != nullptr);
+    if (known || IsPattern(entry.key)) return;
+    std::vector<std::string> names;
+    for (const Parameter& p : varied_.mechanism->parameters) names.push_back(p.name);
+    yaml_.Error(entry, fmt::format("vary.{}: there is no such number to keep", entry.key),
+                DidYouMean(entry.key, names));
+  }
+
+  // Whether an entry of its own says what happens to the number.
+  [[nodiscard]] bool IsNamed(const std::string& name) const {
+    return std::any_of(entries_.begin(), entries_.end(), [&](const YamlEntry& entry) {
+      const std::string key = WithoutStart(entry.key);
+      if (IsPattern(key)) return IsFixed(entry) && Fits(key, name);
+      return key == name || PlainName(key, *varied_.mechanism).name == name;
+    });
+  }
+
+  static bool Fits(const std::string& pattern, const std::string& name) {
+    return fnmatch(pattern.c_str(), name.c_str(), 0) == 0;
+  }
+
+  // Parameters that the model writes out, else numbers of the scenario; none that are zero, which
+  // percentages cannot vary.
+  std::vector<std::string> Matches(const YamlEntry& entry) {
+    const std::string pattern = WithoutStart(entry.key);
+    std::vector<std::string> names;
+    for (const Parameter& p : varied_.mechanism->parameters) {
+      if (p.written_out && p.value != 0.0 && Fits(pattern, p.name)) names.push_back(p.name);
+    }
+    if (names.empty() && varied_.root != nullptr) AddNumbers(*varied_.root, "", pattern, &names);
+    if (names.empty()) {
+      yaml_.Error(
+          entry,
+          fmt::format("vary.{}: fits no parameter that {} writes out and that is not 0, and "
+                      "no number of the scenario",
+                      entry.key, varied_.mechanism->name),
+          "'*' stands for any letters");
+    }
+    std::erase_if(names, [&](const std::string& name) { return IsNamed(name); });
+    return names;
+  }
+
+  static void AddNumbers(const YamlNode& node, const std::string& path, const std::string& pattern,
+                         std::vector<std::string>* names) {
+    for (const YamlEntry& entry : node.entries) {
+      AddNumbers(*entry.value, JoinPath(path, entry.key), pattern, names);
+    }
+    for (size_t k = 0; k < node.items.size(); ++k) {
+      AddNumbers(*node.items[k], JoinPath(path, fmt::format("{}", k)), pattern, names);
+    }
+    if (!node.is_scalar() || node.quoted || !IsWrittenOut(node.text)) return;
+    Scope none;
+    const ExpressionResult number = none.Evaluate(node.text);
+    if (number.value && *number.value != 0.0 && Fits(pattern, path)) names->push_back(path);
+  }
+
+  YamlReader& yaml_;
+  const VariedScenario& varied_;
+  const std::vector<YamlEntry>& entries_;
+};
+
 }  // namespace
 
 std::vector<Factor> ReadFactors(ValueReader* values, const YamlNode& node,
@@ -214,15 +323,16 @@ std::vector<Factor> ReadFactors(ValueReader* values, const YamlNode& node,
   std::vector<Factor> factors;
   YamlReader& yaml = values->yaml();
   FactorReader reader(values, varied);
-  for (const YamlEntry& entry : yaml.Entries(node, "vary")) {
+  const std::vector<YamlEntry> entries = yaml.Entries(node, "vary");
+  for (const auto& [name, entry] : FactorList(&yaml, varied, entries).Names()) {
     if (factors.size() == kMostAxes) {
-      yaml.Error(entry, fmt::format("vary: more than {} numbers", kMostAxes));
+      yaml.Error(*entry, fmt::format("vary: more than {} numbers", kMostAxes));
       break;
     }
-    Factor factor = reader.Read(entry, listed);
+    Factor factor = reader.Read(name, *entry, listed);
     const auto same = [&](const Factor& f) { return f.key == factor.key; };
     if (std::any_of(factors.begin(), factors.end(), same)) {
-      yaml.Error(entry, fmt::format("vary: {} is varied twice", factor.key));
+      yaml.Error(*entry, fmt::format("vary: {} is varied twice", factor.key));
     }
     factors.push_back(std::move(factor));
   }

@@ -22,9 +22,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-const std::vector<std::string> kStudyKeys = {"study",      "description", "scenario",
-                                             "vary",       "design",      "witnesses",
-                                             "quantities", "limits",      "expect"};
+const std::vector<std::string> kStudyKeys = {"study",        "description", "scenario",   "vary",
+                                             "design",       "witnesses",   "quantities", "limits",
+                                             "correlations", "validation",  "missing",    "expect"};
 
 class StudyReader {
  public:
@@ -60,6 +60,8 @@ class StudyReader {
     ReadWitnesses(map.Find("witnesses"));
     if (const YamlNode* quantities = map.Required("quantities")) ReadQuantities(*quantities);
     if (const YamlNode* limits = map.Find("limits")) ReadLimits(*limits);
+    if (const YamlNode* missing = map.Find("missing"))
+      study_.missing = ReadShare(*missing, "missing");
     const Expectation expect = ReadExpectation(&values_, map.Find("expect"));
     study_.expected_exit = expect.exit_code;
     study_.mentions = expect.mentions;
@@ -73,8 +75,55 @@ class StudyReader {
     if (design == nullptr) return;
     const std::uint64_t most =
         options_.many ? std::numeric_limits<std::uint64_t>::max() : kMostStudyPoints;
-    study_.design =
-        internal::ReadDesign(&values_, *design, Folder(), study_.factors, most, &other_findings_);
+    study_.design = internal::ReadDesign(&values_, *design, study_.factors,
+                                         {Folder(), most, options_.drawn, &other_findings_});
+    const YamlNode* correlations = map.Find("correlations");
+    if (correlations != nullptr && !yaml_.has_errors()) {
+      internal::ReadCorrelations(&values_, *correlations, study_.factors, &study_.design);
+    }
+    if (const YamlNode* validation = map.Find("validation")) ReadValidation(*validation);
+  }
+
+  // E = S − D of the table in the reference's place, by the first witness.
+  void ReadValidation(const YamlNode& node) {
+    StudyValidation validation;
+    validation.line = node.line;
+    validation.column = node.column;
+    YamlMap map(&yaml_, &node, "validation", {"coverage", "share", "u_num"});
+    if (!map.valid()) return;
+    if (const YamlNode* k = map.Find("coverage")) {
+      validation.coverage = values_.Positive(*k, "validation.coverage").value_or(2.0);
+    }
+    if (const YamlNode* share = map.Find("share"))
+      validation.share = ReadShare(*share, "validation.share");
+    if (const YamlNode* u_num = map.Find("u_num")) {
+      validation.u_num = values_.Number(*u_num, "validation.u_num");
+      if (validation.u_num && !(*validation.u_num >= 0.0)) {
+        yaml_.Error(*u_num,
+                    fmt::format("validation.u_num = {:g} violates >= 0", *validation.u_num));
+      }
+    }
+    if (!study_.design.draws() || study_.design.kind == DesignKind::kSaltelli) {
+      yaml_.Error(node, "validation: the inputs' uncertainty needs drawn points",
+                  "design: {sobol: 256} or {latin_hypercube: 200}");
+    }
+    if (varied_.scenario && varied_.scenario->reference.table == nullptr) {
+      yaml_.Error(node, "validation: the scenario has no table to validate against",
+                  "reference: {csv: measured.csv} there");
+    }
+    if (study_.witnesses.front() == "reference") {
+      yaml_.Error(node, "validation: the first witness is the table itself",
+                  "witnesses: [analytic], [inverse] or [forward]");
+    }
+    study_.validation = validation;
+  }
+
+  double ReadShare(const YamlNode& node, const std::string& path) {
+    const double share = values_.Number(node, path).value_or(0.0);
+    if (share >= 0.0 && share < 1.0) return share;
+    yaml_.Error(node, fmt::format("{} = {:g} violates 0 <= share < 1", path, share),
+                "the share that may violate the limit");
+    return 0.0;
   }
 
   [[nodiscard]] std::string Folder() const { return fs::path(study_.file).parent_path().string(); }
@@ -168,8 +217,10 @@ class StudyReader {
       quantity.channel = name->substr(0, point);
       quantity.statistic = row.statistic;
     }
-    if (quantity.channel.empty() && FindMetric(*name) == nullptr) {
-      UnknownQuantity(item, *name, point, words);
+    if (quantity.is_check()) {
+      const MetricRow* row = FindMetric(*name);
+      if (row == nullptr) UnknownQuantity(item, *name, point, words);
+      quantity.of_pair = row != nullptr && row->of_pair;
     }
     const auto same = [&](const StudyQuantity& q) { return q.name == *name; };
     if (std::any_of(study_.quantities.begin(), study_.quantities.end(), same)) {
@@ -223,14 +274,7 @@ class StudyReader {
       yaml_.Error(entry, fmt::format("{}: above = {:g}, below = {:g}: nothing lies between", path,
                                      *limit.above, *limit.below));
     }
-    if (const YamlNode* share = map.Find("share")) {
-      limit.share = values_.Number(*share, path + ".share").value_or(0.0);
-      if (!(limit.share >= 0.0 && limit.share < 1.0)) {
-        yaml_.Error(*share,
-                    fmt::format("{}.share = {:g} violates 0 <= share < 1", path, limit.share),
-                    "the share of points that may violate the limit");
-      }
-    }
+    if (const YamlNode* share = map.Find("share")) limit.share = ReadShare(*share, path + ".share");
     study_.limits.push_back(limit);
   }
 

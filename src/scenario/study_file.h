@@ -13,8 +13,14 @@ namespace mbv {
 /// A study with more points is a mistake, unless somebody says that it is none.
 inline constexpr std::uint64_t kMostStudyPoints = 10'000'000;
 
+/// How many points are drawn and from which seed, where somebody asks for others than the file.
+struct DrawnDesign {
+  std::optional<std::uint64_t> count = {}, seed = {};
+};
+
 struct StudyOptions {
   bool many = false;  ///< take more than kMostStudyPoints
+  DrawnDesign drawn = {};
 };
 
 struct StudyResult {

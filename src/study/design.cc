@@ -1,5 +1,6 @@
 #include "study/design.h"
 
+#include <Eigen/Dense>
 #include <boost/random/sobol.hpp>
 #include <limits>
 
@@ -35,6 +36,21 @@ struct DesignPoints::Sequence {
   size_t size;
 };
 
+Eigen::MatrixXd CorrelationMatrix(const Design& design, size_t axes) {
+  const auto size = static_cast<Eigen::Index>(axes);
+  Eigen::MatrixXd matrix = Eigen::MatrixXd::Identity(size, size);
+  for (const Correlation& c : design.correlations) {
+    const auto i = static_cast<Eigen::Index>(c.first), j = static_cast<Eigen::Index>(c.second);
+    matrix(i, j) = matrix(j, i) = c.coefficient;
+  }
+  return matrix;
+}
+
+double SmallestEigenvalue(const Eigen::MatrixXd& correlation) {
+  return Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(correlation, Eigen::EigenvaluesOnly)
+      .eigenvalues()[0];
+}
+
 DesignPoints::DesignPoints(std::vector<Axis> axes, Design design)
     : axes_(std::move(axes)), design_(std::move(design)) {
   MBV_DEMAND(!axes_.empty() && axes_.size() <= kMostAxes, axes_.size());
@@ -42,6 +58,10 @@ DesignPoints::DesignPoints(std::vector<Axis> axes, Design design)
   if (design_.kind == DesignKind::kSaltelli) {
     sequence_ = std::make_unique<Sequence>(2 * axes_.size());
   }
+  if (design_.correlations.empty()) return;
+  const Eigen::LLT<Eigen::MatrixXd> llt(CorrelationMatrix(design_, axes_.size()));
+  MBV_DEMAND(llt.info() == Eigen::Success, axes_.size());
+  root_ = llt.matrixL();
 }
 
 DesignPoints::~DesignPoints() = default;
@@ -83,11 +103,28 @@ std::vector<double> DesignPoints::At(std::uint64_t number) const {
     case DesignKind::kLatinHypercube:
       break;
   }
-  std::vector<double> values = Shares(number);
+  const std::vector<double> shares = Shares(number);
+  std::vector<double> values;
   for (size_t d = 0; d < axes_.size(); ++d) {
-    values[d] = Quantile(axes_[d].distribution, values[d]);
+    values.push_back(Quantile(axes_[d].distribution, shares[d]));
   }
+  if (root_.size() > 0) Correlate(shares, &values);
   return values;
+}
+
+// Deviations of normal numbers, each in its sigma, times L: they have the stated correlations.
+// Other numbers have a row and a column of the unit matrix.
+void DesignPoints::Correlate(const std::vector<double>& shares, std::vector<double>* values) const {
+  Eigen::VectorXd z = Eigen::VectorXd::Zero(root_.rows());
+  for (size_t d = 0; d < axes_.size(); ++d) {
+    z[static_cast<Eigen::Index>(d)] = Quantile(Normal{}, shares[d]);
+  }
+  for (size_t d = 0; d < axes_.size(); ++d) {
+    const auto* normal = std::get_if<Normal>(&axes_[d].distribution);
+    if (normal == nullptr) continue;
+    const auto row = static_cast<Eigen::Index>(d);
+    (*values)[d] = normal->mean + normal->sigma * root_.row(row).head(row + 1).dot(z.head(row + 1));
+  }
 }
 
 // Where the point lies in the unit cube.

@@ -4,6 +4,7 @@
 // that any process can compute any of them.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <vector>
@@ -21,11 +22,19 @@ enum class DesignKind {
   kList,            ///< as written down
 };
 
+/// Two normal numbers whose deviations go together.
+struct Correlation {
+  size_t first = 0, second = 0;  ///< axes
+  double coefficient = 0.0;      ///< -1 < coefficient < 1
+};
+
 struct Design {
   DesignKind kind = DesignKind::kSobol;
   std::uint64_t count = 0;  ///< of the first three kinds; Sobol's a power of two
   std::uint64_t seed = 1;
   std::vector<std::vector<double>> list = {};  ///< kList: points × numbers
+  /// Of kSobol and kLatinHypercube, between normal numbers; their matrix is positive definite.
+  std::vector<Correlation> correlations = {};
 
   /// Points are drawn from the distributions, so that shares of them estimate probabilities.
   [[nodiscard]] bool draws() const {
@@ -39,6 +48,11 @@ struct Axis {
   double nominal = 0.0;
   Distribution distribution;
 };
+
+/// The matrix of all correlations: numbers × numbers, ones on its diagonal.
+[[nodiscard]] Eigen::MatrixXd CorrelationMatrix(const Design& design, size_t axes);
+/// Its smallest eigenvalue; above 0 where such numbers can exist.
+[[nodiscard]] double SmallestEigenvalue(const Eigen::MatrixXd& correlation);
 
 inline constexpr size_t kMostAxes = 1000;  ///< Sobol's sequence has 3667 dimensions
 
@@ -57,12 +71,14 @@ class DesignPoints {
  private:
   struct Sequence;
   [[nodiscard]] std::vector<double> Shares(std::uint64_t number) const;
+  void Correlate(const std::vector<double>& shares, std::vector<double>* values) const;
   [[nodiscard]] std::vector<double> GridPoint(std::uint64_t number) const;
   [[nodiscard]] std::vector<double> Excursion(std::uint64_t number) const;
 
   std::vector<Axis> axes_;
   Design design_;
   std::unique_ptr<Sequence> sequence_;
+  Eigen::MatrixXd root_;  // L with L L^T = the correlations' matrix; empty without any
 };
 
 }  // namespace mbv

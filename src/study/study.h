@@ -34,6 +34,7 @@ struct StudyQuantity {
   std::string name;     ///< as in the study: "limb1.drive.force.max", "closure_m"
   std::string channel;  ///< "" of a check
   Statistic statistic = Statistic::kMax;
+  bool of_pair = false;  ///< a check that compares two witnesses
   int line = 0, column = 0;
 
   [[nodiscard]] bool is_check() const { return channel.empty(); }
@@ -51,6 +52,14 @@ struct StudyLimit {
   }
 };
 
+/// A table in the reference's place is judged against the band of all points (pipeline/validate.h).
+struct StudyValidation {
+  double coverage = 2.0;             ///< k: |E| ≤ k u_val is asked of a sample
+  double share = 0.05;               ///< of a drive's samples that may be beyond that
+  std::optional<double> u_num = {};  ///< of the drive forces [N or N m]; left out: estimated
+  int line = 0, column = 0;
+};
+
 struct Study {
   std::string name;
   std::string description;
@@ -61,6 +70,10 @@ struct Study {
   std::vector<std::string> witnesses;  ///< words of kStudyWitnesses
   std::vector<StudyQuantity> quantities;
   std::vector<StudyLimit> limits;
+  std::optional<StudyValidation> validation;
+  /// The share of points that may have no result; limits are about the others then. Left out:
+  /// points without a result violate every limit.
+  std::optional<double> missing;
   int expected_exit = 0;  ///< for tests of shipped studies
   std::string mentions;   ///< must occur in what is printed
 

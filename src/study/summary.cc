@@ -106,17 +106,21 @@ QuantitySummary SummariseQuantity(const Study& study, size_t k, double nominal,
 }  // namespace
 
 bool StudySummary::within_limits() const {
-  return std::all_of(limits.begin(), limits.end(), [](const LimitResult& l) { return l.pass(); });
+  return few_missing() &&
+         std::all_of(limits.begin(), limits.end(), [](const LimitResult& l) { return l.pass(); });
 }
 
 StudySummary SummariseStudy(const Study& study, const std::vector<double>& nominal,
                             const PointRows& rows) {
   StudySummary summary;
+  summary.missing = study.missing;
   for (const StudyLimit& limit : study.limits)
     summary.limits.push_back({.limit = limit, .interval = {}});
   rows([&](const PointRow& row) {
     ++summary.points;
+    const bool asked = row.reason.empty() || !study.missing;
     for (LimitResult& result : summary.limits) {
+      if (!asked) break;
       ++result.count;
       if (!result.limit.Keeps(row.values[result.limit.quantity])) ++result.violations;
     }

@@ -61,7 +61,12 @@ struct StudySummary {
   std::vector<QuantitySummary> quantities;
   std::vector<LimitResult> limits;
 
+  std::optional<double> missing;  ///< Study::missing
+
   [[nodiscard]] bool any_value() const { return failed < points; }
+  [[nodiscard]] bool few_missing() const {
+    return !missing || static_cast<double>(failed) <= *missing * static_cast<double>(points);
+  }
   [[nodiscard]] bool within_limits() const;
 };
 inline constexpr size_t kReasons = 20;  ///< others count under "…"

@@ -18,11 +18,14 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Studies among them.
 std::vector<std::string> ShippedScenarios() {
   std::vector<std::string> files;
   const fs::path root = kSourceDir;
   for (const auto& entry : fs::recursive_directory_iterator(root / "scenarios")) {
-    if (entry.path().extension() == ".yaml" && ReadScenarioHead(entry.path()).is_scenario) {
+    if (entry.path().extension() != ".yaml") continue;
+    const ScenarioHead head = ReadScenarioHead(entry.path());
+    if (head.is_scenario || head.is_study) {
       files.push_back(entry.path().lexically_relative(root));
     }
   }
@@ -73,10 +76,12 @@ void CheckDocuments(const std::string& scenario, const std::string& summary) {
 class ShippedScenario : public testing::TestWithParam<std::string> {};
 
 TEST_P(ShippedScenario, GivesWhatItExpects) {
-  const Expectation expect = ReadScenarioHead(std::string(kSourceDir) + "/" + GetParam()).expect;
+  const ScenarioHead head = ReadScenarioHead(std::string(kSourceDir) + "/" + GetParam());
+  const Expectation& expect = head.expect;
   const Program mbverify(NameOf(GetParam()));
   const ProgramResult result =
-      mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());
+      head.is_study ? mbverify("study " + GetParam() + " --jobs 1 --out " + mbverify.Out())
+                    : mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());
   const std::string printed = result.out + result.err;
   EXPECT_EQ(result.exit_code, expect.exit_code) << printed;
   if (expect.exit_code == 2) {

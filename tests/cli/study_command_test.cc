@@ -2,12 +2,15 @@
 // limits end in exit codes; nothing of anybody's is lost.
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <regex>
 #include <set>
 
-#include "scenario/load_scenario.h"
-#include "scenario/study_file.h"
 #include "tests/cli/program.h"
 
 namespace mbv {
@@ -340,23 +343,124 @@ TEST_F(StudyCommand, ClusterExamplesComputeAndMergeShards) {
   EXPECT_EQ(Points("gnu"), Points("one"));
 }
 
-// Every shipped study ends as it says, and they are none of the scenarios that a night runs.
-TEST_F(StudyCommand, ShippedStudiesDoWhatTheyExpect) {
-  int count = 0;
-  for (const auto& entry : fs::recursive_directory_iterator(SourcePath("/scenarios"))) {
-    if (entry.path().extension() != ".yaml" || !ReadScenarioHead(entry.path()).is_study) continue;
-    const StudyResult study = LoadStudy(entry.path());
-    ASSERT_TRUE(study.study) << entry.path() << "\n" << study.diagnostics.Text();
-    ++count;
-    const ProgramResult result =
-        mbverify("study " + entry.path().string() + " --out " + File("out"));
-    EXPECT_EQ(result.exit_code, study.study->expected_exit) << entry.path() << "\n"
-                                                            << result.out << result.err;
-    EXPECT_NE(result.out.find(study.study->mentions), std::string::npos)
-        << study.study->mentions << " is missing in\n"
-        << result.out;
+TEST_F(StudyCommand, OtherCountsAndSeedsAreOtherStudiesOfTheSameFile) {
+  WriteStudy("{sobol: 8}");
+  ASSERT_EQ(Study("a").exit_code, 0);
+  ASSERT_EQ(Study("b", "--count 16").exit_code, 0);
+  EXPECT_EQ(Points("b").substr(0, Points("a").size()), Points("a"));  // Sobol's go on
+  EXPECT_EQ(Summary("b")["points"], 16);
+  ASSERT_EQ(Study("c", "--seed 9").exit_code, 0);
+  EXPECT_NE(Points("c"), Points("a"));
+  // What is left of another seed's is not gone on with; shards join with the seed they were asked.
+  for (const char* shard : {"1/2", "2/2"}) {
+    ASSERT_EQ(Study("shards", std::string("--seed 9 --shard ") + shard).exit_code, 0);
   }
-  EXPECT_GE(count, 6);
+  const ProgramResult merged = mbverify("study merge " + File("shards/s.shard-1-of-2") + " " +
+                                        File("shards/s.shard-2-of-2") + " -o " + File("d"));
+  ASSERT_EQ(merged.exit_code, 0) << merged.err;
+  EXPECT_EQ(Points("d"), Points("c"));
+  const ProgramResult odd = Study("e", "--count 10");
+  EXPECT_EQ(odd.exit_code, 2);
+  EXPECT_NE(odd.err.find("10 is no power of two"), std::string::npos) << odd.err;
+}
+
+TEST_F(StudyCommand, PlotsAreFilesToo) {
+  WriteStudy("{sobol: 16}");
+  ASSERT_EQ(Study("out").exit_code, 0);
+  const std::string page = ReadAll(File("out/s/report.html"));
+  for (const char* name : {"histogram_x.force.mean", "band_x", "scatter_matrix"}) {
+    const std::string svg = ReadAll(File(std::string("out/s/plots/") + name + ".svg"));
+    EXPECT_EQ(svg.substr(0, 4), "<svg") << name;
+    EXPECT_NE(page.find(svg.substr(svg.find('\n'), 200)), std::string::npos) << name;
+  }
+  const std::string scatter = ReadAll(File("out/s/plots/scatter_matrix.svg"));
+  std::uint64_t dots = 0;
+  for (size_t at = scatter.find("h0"); at != std::string::npos; at = scatter.find("h0", at + 1)) {
+    ++dots;
+  }
+  EXPECT_EQ(dots, 16u * 4u);  // two numbers, two quantities
+}
+
+// The table is m g of a mass of 2 kg; a study of the same mass is within it, one of 2.1 kg is not.
+TEST_F(StudyCommand, AMeasuredTableIsValidatedAgainstTheBand) {
+  std::string table = "time,x.force\n";
+  std::minstd_rand random(7);
+  for (int i = 0; i <= 100; ++i) {
+    const double t = 0.001 * i, w = 2.0 * 3.14159265358979;
+    const double force = 2.0 * (10.0 - 0.1 * w * w * std::sin(w * t));
+    table += fmt::format("{},{:.9f}\n", t, force + 0.02 * (random() % 2001 / 1000.0 - 1.0));
+  }
+  Write("measured.csv", table);
+  Write("hold.yaml",
+        "mechanism: model.yaml\nmotion: {duration_s: 0.1, sample_s: 0.001, commands: {x: {sine: "
+        "{amplitude: 0.1, period_s: 1}}}}\nanalytic: none\nsimulation: {mode: inverse}\n"
+        "reference: {csv: measured.csv}\n");
+  const auto with = [&](const std::string& mass) {
+    Write("s.yaml",
+          "study: s\nscenario: hold.yaml\nvary: {m: {normal: {sigma: 0.002}}}\n"
+          "design: {latin_hypercube: 200}\nwitnesses: [inverse]\nquantities: [x.force.mean]\n"
+          "validation: {}\n");
+    Write("model.yaml", std::regex_replace(ReadAll(File("model.yaml")),
+                                           std::regex("m: .value: [0-9.]+"), "m: {value: " + mass));
+    return Study("out" + mass);
+  };
+  const ProgramResult same = with("2.0");
+  ASSERT_EQ(same.exit_code, 0) << same.out << same.err;
+  const nlohmann::json drive = Summary("out2.0")["validation"]["drives"][0];
+  const double noise = 0.02 / std::sqrt(3.0);
+  EXPECT_NEAR(drive["error_rms"].get<double>(), noise, 0.15 * noise);
+  EXPECT_NEAR(drive["u_data"].get<double>(), noise, 0.3 * noise);  // as estimated
+  const double input = 0.001 * drive["measured_rms"].get<double>();
+  EXPECT_NEAR(drive["u_input"].get<double>(), input, 0.02 * input);
+  EXPECT_EQ(drive["u_num"], 0.0);
+  EXPECT_EQ(drive["largest"], "u_input");
+  const ProgramResult heavier = with("2.1");
+  EXPECT_EQ(heavier.exit_code, 1) << heavier.out << heavier.err;
+  EXPECT_NE(heavier.out.find("BEYOND   x"), std::string::npos) << heavier.out;
+  EXPECT_NE(ReadAll(File("out2.1/s/report.html")).find("Not validated"), std::string::npos);
+}
+
+// In forward mode the step's error is what converge extrapolates.
+TEST_F(StudyCommand, AForwardStudyTakesUNumFromConvergence) {
+  const ProgramResult result = mbverify.Script(
+      "here=$PWD; cd " + mbverify.folder().string() +
+      " && cp $here/scenarios/four_bar/tables/noisy.csv . && sed 's/inverse/forward/; "
+      "s#tables/##' $here/scenarios/four_bar/table_noisy.yaml > f.yaml && "
+      "sed 's/table_noisy/f/; s/inverse/forward/; s/64/4/' "
+      "$here/scenarios/four_bar/study_validation.yaml > s.yaml && $mbverify study s.yaml");
+  ASSERT_EQ(result.exit_code, 0) << result.out << result.err;
+  const nlohmann::json validation =
+      nlohmann::json::parse(ReadAll(File("out/four_bar_validation/summary.json")))["validation"];
+  EXPECT_NE(validation["u_num_from"].get<std::string>().find("grid convergence index"),
+            std::string::npos);
+  EXPECT_GT(validation["drives"][0]["u_num"].get<double>(), 0.0);
+  EXPECT_LT(validation["drives"][0]["u_num"].get<double>(), 1e-6);
+}
+
+TEST_F(StudyCommand, ANightHasStudies) {
+  fs::create_directories(File("scenarios/lift"));
+  WriteStudy("{sobol: 4}", "limits: {x.force.mean: {below: 20, share: 0.9}}\n");
+  for (const char* name : {"model.yaml", "hold.yaml"}) {
+    fs::copy_file(File(name), File(std::string("scenarios/lift/") + name));
+  }
+  const std::string study = ReadAll(File("s.yaml"));
+  Write("scenarios/lift/kept.yaml", study);
+  Write("scenarios/lift/violated.yaml",
+        std::regex_replace(study, std::regex("share: 0.9"), "share: 0") +
+            "expect: {verdict: disagree, mentions: points violate it}\n");
+  Write("scenarios/lift/unexpected.yaml",
+        std::regex_replace(study, std::regex("share: 0.9"), "share: 0"));
+  const ProgramResult night =
+      mbverify("regress " + File("scenarios") + " --out " + File("night") + " --no-pictures");
+  EXPECT_EQ(night.exit_code, 1) << night.out << night.err;
+  const nlohmann::json report = nlohmann::json::parse(ReadAll(File("night/regress.json")));
+  std::map<std::string, nlohmann::json> cases;
+  for (const auto& entry : report["cases"]) cases[entry["key"]] = entry;
+  EXPECT_EQ(cases["lift/kept"]["status"], "as_expected") << cases["lift/kept"];
+  EXPECT_EQ(cases["lift/violated"]["status"], "as_expected") << cases["lift/violated"];
+  EXPECT_EQ(cases["lift/unexpected"]["status"], "unexpected") << cases["lift/unexpected"];
+  EXPECT_TRUE(fs::exists(File("night/lift/kept/points.csv")));
+  EXPECT_FALSE(cases["lift/kept"]["inputs"].get<std::string>().empty());
 }
 
 }  // namespace

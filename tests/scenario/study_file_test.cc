@@ -190,5 +190,133 @@ TEST_F(StudyFiles, HeadsKnowTheKind) {
   EXPECT_FALSE(ReadScenarioHead(SourcePath("/scenarios/four_bar/static.yaml")).is_study);
 }
 
+TEST_F(StudyFiles, PatternsStandForWhatTheModelWritesOut) {
+  const StudyResult result = Load(
+      "vary:\n  '*': {uniform: {plus_minus_percent: 5}}\n  r*: {uniform: {plus_minus_percent: 1}}\n"
+      "  ground: fixed\n  crank: {normal: {sigma: 0.001}}\n  motion.dur*: {grid: [0.1]}\n"
+      "design: {sobol: 8}\nquantities: [closure_m]\n");
+  ASSERT_TRUE(result.study) << result.diagnostics.Text();
+  std::vector<std::string> keys;
+  for (const Factor& f : result.study->factors) keys.push_back(f.key);
+  EXPECT_EQ(keys,
+            (std::vector<std::string>{"parameters.coupler", "parameters.rocker", "parameters.rho",
+                                      "parameters.bar", "parameters.crank", "motion.duration_s"}));
+  const auto width = [&](size_t k) {
+    const auto& uniform = std::get<Uniform>(result.study->factors[k].axis.distribution);
+    return (uniform.upper - uniform.lower) / result.study->factors[k].axis.nominal;
+  };
+  EXPECT_NEAR(width(0), 0.10, 1e-12);
+  EXPECT_NEAR(width(1), 0.02, 1e-12);  // the last pattern wins
+  EXPECT_NEAR(width(3), 0.10, 1e-12);
+}
+
+TEST_F(StudyFiles, PatternsPassByWhatIsComputedOrZero) {
+  // l_home is an expression of others, c_y is 0, and a part's number is set where it is used.
+  const test::TestFolder folder("study_patterns");
+  folder.Write("model.yaml",
+               "name: m\nparameters: {m: 2, I: 2*m, c_y: 0, g: {value: 9.81}}\n"
+               "parts: {cart: {parameters: {mass: 1, k: 3}, bodies: {b: {mass: mass, com: [0, c_y, "
+               "0], inertia: [I, I, I]}}, joints: {s: {kind: prismatic, parent: world, child: b, "
+               "axis: z}}, drives: {x: {kind: joint, joint: s}}}}\n"
+               "instances: {a: {part: cart, mass: m}}\ngravity: [0, 0, -g]\n");
+  folder.Write(
+      "hold.yaml",
+      "mechanism: model.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: {a.x: [0, "
+      "{sine: {amplitude: 0.1, period_s: 1}}]}}\nanalytic: none\n");
+  const auto keys = [&](const std::string& vary) {
+    const StudyResult result = LoadStudyText("study: s\nscenario: hold.yaml\nvary: " + vary +
+                                                 "\ndesign: {sobol: 2}\nquantities: [closure_m]\n",
+                                             folder.PathOf("s.yaml"));
+    EXPECT_TRUE(result.study) << result.diagnostics.Text();
+    std::string text;
+    for (const Factor& f : result.study->factors) text += f.key + " ";
+    return text;
+  };
+  EXPECT_EQ(keys("{'*': {uniform: {plus_minus_percent: 5}}}"),
+            "parameters.m parameters.g parameters.a.k ");
+  EXPECT_EQ(keys("{motion.commands.*: {uniform: {plus_minus_percent: 5}}}"),
+            "motion.commands.a.x.1.sine.amplitude motion.commands.a.x.1.sine.period_s ");
+}
+
+TEST_F(StudyFiles, PatternsThatFitNothingAreRefused) {
+  ExpectIn(Refusal("{q_*: {uniform: {plus_minus_percent: 1}}}", "{sobol: 8}"),
+           "vary.q_*: fits no parameter that four_bar writes out");
+  ExpectIn(Refusal("{rho: {normal: {sigma: 1}}, cranc: fixed}", "{sobol: 8}"),
+           "did you mean 'crank'");
+}
+
+TEST_F(StudyFiles, CorrelationsAreOfNormalNumbersThatCanHaveThem) {
+  const std::string vary =
+      "{rho: {normal: {sigma_percent: 1}}, crank: {normal: {sigma_mm: 1}}, rocker: {normal: "
+      "{sigma_mm: 1}}, bar: {uniform: {plus_minus_mm: 1}}}";
+  const auto with = [&](const std::string& text, const std::string& design = "{sobol: 8}") {
+    return Refusal(vary, design, "quantities: [closure_m]\ncorrelations: " + text + "\n");
+  };
+  ExpectIn(with("[{of: [rho, crank], coefficient: 1}]"), "violates -1 < coefficient < 1");
+  ExpectIn(with("[{of: [rho, cranc], coefficient: 0.1}]"), "did you mean 'crank'");
+  ExpectIn(with("[{of: [rho, bar], coefficient: 0.1}]"), "bar is not normal");
+  ExpectIn(with("[{of: [rho], coefficient: 0.1}]"), "name two numbers");
+  ExpectIn(with("[{of: [rho, rho], coefficient: 0.1}]"), "rho with itself");
+  ExpectIn(with("[{of: [rho, crank], coefficient: 0.1}]", "{saltelli: 8}"), "independent numbers");
+  ExpectIn(with("[{of: [rho, crank], coefficient: 0.1}, {of: [crank, rho], coefficient: 0.2}]"),
+           "is given twice");
+  ExpectIn(with("[{of: [rho, crank], coefficient: 0.9}, {of: [crank, rocker], coefficient: 0.9}, "
+                "{of: [rho, rocker], coefficient: -0.9}]"),
+           "the smallest eigenvalue of their matrix is -0.8");
+  const StudyResult good =
+      Load("vary: " + vary +
+           "\ndesign: {sobol: 8}\nquantities: [closure_m]\ncorrelations: [{of: [rho, rocker], "
+           "coefficient: 0.5}]\n");
+  ASSERT_TRUE(good.study) << good.diagnostics.Text();
+  EXPECT_EQ(good.study->design.correlations[0].second, 2u);
+}
+
+TEST_F(StudyFiles, ValidationNeedsATableAndAnotherWitness) {
+  const auto of = [](const std::string& scenario, const std::string& rest) {
+    return LoadStudyText("study: s\nscenario: " + scenario +
+                             "\nvary: {rho: {normal: {sigma_percent: 1}}}\nquantities: "
+                             "[closure_m]\n" +
+                             rest,
+                         "scenarios/s.yaml");
+  };
+  const std::string table = "four_bar/table_noisy.yaml", sobol = "design: {sobol: 8}\n";
+  const std::string inverse = "witnesses: [inverse]\n";
+  const StudyResult good =
+      of(table, sobol + inverse + "validation: {coverage: 3, share: 0.1, u_num: 0.001}\n");
+  ASSERT_TRUE(good.study) << good.diagnostics.Text();
+  EXPECT_EQ(good.study->validation->coverage, 3.0);
+  EXPECT_EQ(good.study->validation->share, 0.1);
+  EXPECT_EQ(good.study->validation->u_num, 0.001);
+  const auto refused = [&](const std::string& scenario, const std::string& rest,
+                           const std::string& part) {
+    const StudyResult result = of(scenario, rest);
+    EXPECT_FALSE(result.study) << rest;
+    ExpectIn(result.diagnostics.Text(), part);
+  };
+  refused(table, sobol + "validation: {}\n", "the first witness is the table itself");
+  refused("four_bar/static", sobol + inverse + "validation: {}\n", "has no table");
+  refused(table, "design: {saltelli: 8}\n" + inverse + "validation: {}\n", "needs drawn points");
+  refused(table, sobol + inverse + "validation: {u_num: -1}\n", "violates >= 0");
+  refused(table, sobol + inverse + "validation: {share: 1}\n", "violates 0 <= share < 1");
+  refused(table, sobol + inverse + "missing: 2\n", "missing = 2 violates");
+}
+
+TEST_F(StudyFiles, OthersMayAskForOtherPoints) {
+  const std::string vary = "vary: {rho: {normal: {sigma_percent: 1}}}\nquantities: [closure_m]\n";
+  const StudyResult more =
+      Load(vary + "design: {sobol: 8, seed: 3}\n", {.drawn = {.count = 64, .seed = 5}});
+  ASSERT_TRUE(more.study) << more.diagnostics.Text();
+  EXPECT_EQ(more.study->design.count, 64u);
+  EXPECT_EQ(more.study->design.seed, 5u);
+  const StudyResult odd = Load(vary + "design: {sobol: 8}\n", {.drawn = {.count = 60}});
+  EXPECT_FALSE(odd.study);
+  ExpectIn(odd.diagnostics.Text(), "60 is no power of two");
+  const StudyResult grid =
+      Load("vary: {rho: {grid: [1, 2]}}\nquantities: [closure_m]\ndesign: {grid: true}\n",
+           {.drawn = {.count = 64}});
+  EXPECT_FALSE(grid.study);
+  ExpectIn(grid.diagnostics.Text(), "draws nothing");
+}
+
 }  // namespace
 }  // namespace mbv

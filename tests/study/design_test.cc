@@ -122,5 +122,64 @@ TEST(Permutation, ReachesEachPlaceOnce) {
   }
 }
 
+// Correlation of two columns of many points, and the columns' own deviations.
+struct Together {
+  double coefficient, first, second;
+};
+Together TogetherOf(const DesignPoints& points) {
+  const auto n = static_cast<double>(points.count());
+  double a = 0, b = 0, aa = 0, bb = 0, ab = 0;
+  for (std::uint64_t i = 0; i < points.count(); ++i) {
+    const auto x = points.At(i);
+    a += x[0] / n;
+    b += x[1] / n;
+  }
+  for (std::uint64_t i = 0; i < points.count(); ++i) {
+    const auto x = points.At(i);
+    aa += (x[0] - a) * (x[0] - a) / n;
+    bb += (x[1] - b) * (x[1] - b) / n;
+    ab += (x[0] - a) * (x[1] - b) / n;
+  }
+  return {ab / std::sqrt(aa * bb), std::sqrt(aa), std::sqrt(bb)};
+}
+
+TEST(Design, CorrelatedNumbersAreSoAndKeepTheirDistributions) {
+  const std::vector<Axis> axes = {
+      {1.0, Normal{1.0, 0.1}}, {5.0, Normal{5.0, 2.0}}, {0.0, Uniform{0.0, 1.0}}};
+  for (const DesignKind kind : {DesignKind::kSobol, DesignKind::kLatinHypercube}) {
+    for (const double wanted : {-0.6, 0.0, 0.8}) {
+      Design design{.kind = kind, .count = 4096};
+      if (wanted != 0.0) design.correlations = {{0, 1, wanted}};
+      const Together found = TogetherOf(DesignPoints(axes, design));
+      EXPECT_NEAR(found.coefficient, wanted, 0.03);
+      EXPECT_NEAR(found.first, 0.1, 0.002);
+      EXPECT_NEAR(found.second, 2.0, 0.05);
+    }
+  }
+}
+
+TEST(Design, CorrelationsLeaveOtherNumbersAlone) {
+  const std::vector<Axis> axes = {
+      {1.0, Normal{1.0, 0.1}}, {0.0, Uniform{0.0, 1.0}}, {5.0, Normal{5.0, 2.0}}};
+  const Design plain{.kind = DesignKind::kSobol, .count = 64};
+  Design design = plain;
+  design.correlations = {{0, 2, 0.9}};
+  const DesignPoints bound(axes, design), free(axes, plain);
+  for (std::uint64_t i = 0; i < 64; ++i) {
+    EXPECT_EQ(bound.At(i)[1], free.At(i)[1]);
+    EXPECT_NEAR(bound.At(i)[0], free.At(i)[0], 1e-15);  // the first row of L is 1, 0, 0
+  }
+  EXPECT_NE(bound.At(5)[2], free.At(5)[2]);
+}
+
+TEST(Design, ImpossibleCorrelationsHaveANegativeEigenvalue) {
+  Design design;
+  design.correlations = {{0, 1, 0.9}, {1, 2, 0.9}, {0, 2, -0.9}};
+  EXPECT_NEAR(SmallestEigenvalue(CorrelationMatrix(design, 3)), -0.8, 1e-12);
+  design.correlations.pop_back();
+  design.correlations.push_back({0, 2, 0.9});
+  EXPECT_NEAR(SmallestEigenvalue(CorrelationMatrix(design, 3)), 0.1, 1e-12);
+}
+
 }  // namespace
 }  // namespace mbv

@@ -110,5 +110,26 @@ TEST(StudySummary, SwingsAreSortedByTheirWidth) {
   EXPECT_EQ(swings[1].highest, 12.0);
 }
 
+TEST(StudySummary, AFewMayHaveNoResultIfTheStudySaysSo) {
+  Study study = OneQuantity(DesignKind::kSobol);
+  study.limits = {{.quantity = 0, .below = 5.0, .above = {}}};
+  const PointRows rows = [](const std::function<void(const PointRow&)>& take) {
+    take({.point = 0, .reason = {}, .varied = {0.0}, .values = {1.0}});
+    take({.point = 1, .exit_code = 3, .reason = "stuck", .varied = {0.0}, .values = {kNan}});
+    take({.point = 2, .reason = {}, .varied = {0.0}, .values = {2.0}});
+    take({.point = 3, .reason = {}, .varied = {0.0}, .values = {3.0}});
+  };
+  EXPECT_FALSE(SummariseStudy(study, {1.0}, rows).within_limits());
+  study.missing = 0.25;
+  const StudySummary few = SummariseStudy(study, {1.0}, rows);
+  EXPECT_TRUE(few.within_limits());
+  EXPECT_EQ(few.limits[0].count, 3u);
+  study.missing = 0.24;
+  EXPECT_FALSE(SummariseStudy(study, {1.0}, rows).within_limits());
+  study.missing = 0.25;
+  study.limits[0].below = 3.0;  // one that has a result violates it
+  EXPECT_FALSE(SummariseStudy(study, {1.0}, rows).within_limits());
+}
+
 }  // namespace
 }  // namespace mbv

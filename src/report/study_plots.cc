@@ -1,0 +1,151 @@
+#include "report/study_plots.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/names.h"
+#include "report/svg_plot.h"
+
+namespace mbv {
+namespace {
+
+class PlotList {
+ public:
+  explicit PlotList(const StudyReport& report) : report_(report) {}
+
+  std::vector<StudyPlot> All() {
+    for (const QuantitySummary& q : report_.summary.quantities) {
+      if (q.sobol) AddIndices(q);
+      if (!q.swings.empty()) AddTornado(q);
+      if (q.histogram.counts.size() > 1) AddHistogram(q);
+    }
+    for (const StudyBand& band : report_.bands) {
+      if (band.time_s.size() > 1) AddBand(band);
+    }
+    if (report_.validation) {
+      for (const DriveValidation& drive : report_.validation->drives) AddValidation(drive);
+    }
+    if (!report_.shown.empty()) AddScatter();
+    return std::move(plots_);
+  }
+
+ private:
+  void Add(StudySection section, const std::string& name, std::string svg) {
+    std::string file = NearestPlainPath(name);
+    std::replace(file.begin(), file.end(), '/', '_');
+    const auto taken = [&](const StudyPlot& plot) { return plot.file == file + ".svg"; };
+    while (std::any_of(plots_.begin(), plots_.end(), taken)) file += "_";
+    plots_.push_back({section, file + ".svg", std::move(svg)});
+  }
+
+  // Its outline, and the nominal value as an upright line.
+  void AddHistogram(const QuantitySummary& q) {
+    LinePlot plot{.title = q.name, .x_label = q.name, .y_label = "points", .lines = {}};
+    PlotLine outline{.label = "points", .points = {}};
+    const auto bins = static_cast<double>(q.histogram.counts.size());
+    double most = 0.0;
+    outline.points.emplace_back(q.histogram.from, 0.0);
+    for (size_t k = 0; k < q.histogram.counts.size(); ++k) {
+      const double width = (q.histogram.to - q.histogram.from) / bins;
+      const double left = q.histogram.from + width * static_cast<double>(k);
+      const auto count = static_cast<double>(q.histogram.counts[k]);
+      outline.points.emplace_back(left, count);
+      outline.points.emplace_back(left + width, count);
+      most = std::max(most, count);
+    }
+    outline.points.emplace_back(q.histogram.to, 0.0);
+    plot.lines.push_back(std::move(outline));
+    plot.lines.push_back({.label = "nominal", .points = {{q.nominal, 0.0}, {q.nominal, most}}});
+    Add(StudySection::kHistograms, "histogram_" + q.name, ToSvg(plot));
+  }
+
+  void AddTornado(const QuantitySummary& q) {
+    BarPlot bars{.title = q.name, .columns = {"down, of nominal", "up, of nominal"}, .rows = {}};
+    const double scale = std::abs(q.nominal);
+    for (const Swing& swing : q.swings) {
+      if (!(scale > 0.0) || !std::isfinite(swing.lowest)) continue;
+      bars.rows.push_back(
+          {report_.study.factors[swing.factor].name,
+           {(swing.lowest - q.nominal) / scale, (swing.highest - q.nominal) / scale}});
+    }
+    if (!bars.rows.empty()) Add(StudySection::kTornado, "tornado_" + q.name, ToSvg(bars));
+  }
+
+  void AddIndices(const QuantitySummary& q) {
+    BarPlot bars{.title = q.name, .columns = {"first order", "total"}, .rows = {}};
+    for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
+      const SobolIndex& index = q.sobol->indices[k];
+      if (!std::isfinite(index.total)) continue;
+      bars.rows.push_back({report_.study.factors[k].name, {index.first, index.total}});
+    }
+    if (!bars.rows.empty()) Add(StudySection::kIndices, "indices_" + q.name, ToSvg(bars));
+  }
+
+  void AddBand(const StudyBand& band) {
+    LinePlot plot = ForcePlot(band.drive, band.unit);
+    AddLine("nominal", band.time_s, band.nominal, &plot);
+    AddLine("5 %", band.time_s, band.p5, &plot);
+    AddLine("median", band.time_s, band.p50, &plot);
+    AddLine("95 %", band.time_s, band.p95, &plot);
+    Add(StudySection::kBands, "band_" + band.drive, ToSvg(plot));
+  }
+
+  // E with the band that it should lie in.
+  void AddValidation(const DriveValidation& drive) {
+    const ForceComparison& f = drive.forces;
+    LinePlot plot = ForcePlot(f.drive + ": computed − measured", f.unit);
+    std::vector<double> error, upper, lower;
+    for (size_t t = 0; t < f.time_s.size(); ++t) {
+      error.push_back(f.computed[t] - f.measured[t]);
+      upper.push_back(report_.study.validation->coverage * drive.u_val[t]);
+      lower.push_back(-upper.back());
+    }
+    const std::string word = fmt::format("{:g} u_val", report_.study.validation->coverage);
+    AddLine("E", f.time_s, error, &plot);
+    AddLine("+" + word, f.time_s, upper, &plot);
+    AddLine("−" + word, f.time_s, lower, &plot);
+    Add(StudySection::kValidation, "validation_" + f.drive, ToSvg(plot));
+  }
+
+  void AddScatter() {
+    constexpr size_t kMostColumns = 8, kMostRows = 6;
+    ScatterMatrix matrix;
+    matrix.title = "quantities over varied numbers";
+    for (const Factor& f : report_.study.factors) {
+      if (matrix.columns.size() < kMostColumns) matrix.columns.push_back(f.name);
+    }
+    for (const StudyQuantity& q : report_.study.quantities) {
+      if (matrix.rows.size() < kMostRows) matrix.rows.push_back(q.name);
+    }
+    for (const PointRow& row : report_.shown) {
+      matrix.across.push_back(row.varied);
+      matrix.upward.push_back(row.values);
+    }
+    Add(StudySection::kScatter, "scatter_matrix", ToSvg(matrix));
+  }
+
+  static LinePlot ForcePlot(const std::string& title, const std::string& unit) {
+    return {.title = title,
+            .x_label = "t [s]",
+            .y_label = fmt::format("drive force [{}]", unit),
+            .lines = {}};
+  }
+
+  static void AddLine(const std::string& label, const std::vector<double>& time_s,
+                      const std::vector<double>& values, LinePlot* plot) {
+    PlotLine line{.label = label, .points = {}};
+    for (size_t t = 0; t < values.size(); ++t) line.points.emplace_back(time_s[t], values[t]);
+    plot->lines.push_back(std::move(line));
+  }
+
+  const StudyReport& report_;
+  std::vector<StudyPlot> plots_;
+};
+
+}  // namespace
+
+std::vector<StudyPlot> StudyPlots(const StudyReport& report) { return PlotList(report).All(); }
+
+}  // namespace mbv
