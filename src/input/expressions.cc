@@ -8,6 +8,7 @@
 #include <cmath>
 #include <mutex>
 #include <numbers>
+#include <unordered_map>
 
 #include "core/diagnostics.h"
 #include "input/yaml_reader.h"
@@ -87,7 +88,7 @@ void Prepare(const std::string& text, const std::map<std::string, double>& const
   parser->SetExpr(text);
 }
 
-ExpressionResult Compute(const std::string& text, const std::map<std::string, double>& values) {
+ExpressionResult Parse(const std::string& text, const std::map<std::string, double>& values) {
   mu::Parser& parser = TheParser();
   try {
     Prepare(text, values, &parser);
@@ -109,6 +110,23 @@ ExpressionResult Compute(const std::string& text, const std::map<std::string, do
   } catch (const std::exception& e) {
     return {.value = {}, .error = NoExpression(e.what()), .hint = ""};
   }
+}
+
+// Parsing is what an expression costs, and a model that is read again with another parameter has
+// mostly the same ones: results are kept by their text and the numbers in it.
+ExpressionResult Compute(const std::string& text, const std::map<std::string, double>& values) {
+  constexpr size_t kMostKept = 20'000;
+  thread_local std::unordered_map<std::string, ExpressionResult> kept;
+  std::string key = text;
+  for (const auto& [name, value] : values) {
+    key += '\0';
+    key += name;
+    key += '\0';
+    key.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  if (const auto found = kept.find(key); found != kept.end()) return found->second;
+  if (kept.size() >= kMostKept) kept.clear();
+  return kept.emplace(std::move(key), Parse(text, values)).first->second;
 }
 
 // Witnesses may run at the same time: one at a time computes.

@@ -11,6 +11,7 @@ namespace {
 
 using internal::FindRank;
 using internal::NullSpaces;
+using internal::RankOf;
 using internal::RowStack;
 
 BodyStates HomeStates(const Mechanism& mechanism) {
@@ -71,13 +72,15 @@ CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>&
   const auto joint_rows = J.rows();
   const auto columns = static_cast<int>(J.cols());
   CommandRank out;
-  out.freedoms = columns - FindRank(J, NullSpaces::kNone).rank;
+  out.freedoms = columns - RankOf(J);
   for (const Command& command : commands) J = WithRow(J, CommandRow(mechanism, home, command));
 
-  const internal::RankFinding all = FindRank(J, NullSpaces::kMotion);
-  out.undriven = columns - all.rank;
+  out.undriven = columns - RankOf(J);
   out.redundant = static_cast<int>(commands.size()) - (out.freedoms - out.undriven);
-  out.free_joints = MovingJoints(mechanism, home, all.motion);
+  if (out.undriven > 0) {
+    const MatX motion = FindRank(J, NullSpaces::kMotion).motion;
+    out.free_joints = MovingJoints(mechanism, home, motion);
+  }
   if (out.redundant <= 0) return out;
   const MatX stress = FindRank(J, NullSpaces::kSelfStress).self_stress;
   for (size_t k = 0; k < commands.size(); ++k) {
@@ -95,11 +98,11 @@ std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
   const BodyStates home = HomeStates(mechanism);
   MatX J = JointRows(mechanism, home);
   for (const Command& command : commands) J = WithRow(J, CommandRow(mechanism, home, command));
-  int rank = FindRank(J, NullSpaces::kNone).rank;
+  int rank = RankOf(J);
   std::vector<size_t> chosen;
   for (size_t k = 0; k < candidates.size() && chosen.size() < count; ++k) {
     MatX more = WithRow(J, CommandRow(mechanism, home, candidates[k]));
-    const int new_rank = FindRank(more, NullSpaces::kNone).rank;
+    const int new_rank = RankOf(more);
     if (new_rank == rank) continue;
     rank = new_rank;
     J = std::move(more);

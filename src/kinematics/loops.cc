@@ -66,7 +66,7 @@ std::vector<LoopCount> CountLoops(const Mechanism& mechanism) {
       screws.conservativeResize(6, screws.cols() + more.cols());
       screws.rightCols(more.cols()) = more;
     }
-    loop.screw_rank = internal::FindRank(screws, internal::NullSpaces::kNone).rank;
+    loop.screw_rank = internal::RankOf(screws);
     loops.push_back(loop);
   }
   return loops;

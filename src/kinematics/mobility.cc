@@ -17,6 +17,7 @@ using internal::FindRank;
 using internal::kStressTolerance;
 using internal::NullSpaces;
 using internal::RankFinding;
+using internal::RankOf;
 using internal::RowStack;
 
 bool ActsOn(const MatX& self_stress, int first_row, int rows) {
@@ -75,8 +76,7 @@ UndeterminedReaction OpenComponents(const Joint& joint, const ConstraintRows& ro
 void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, double length,
                          Mobility* mobility) {
   ReactionStack reactions(mechanism, states, length);
-  mobility->isostatic_rule_sound =
-      FindRank(reactions.stack.Matrix(), NullSpaces::kNone).rank == mobility->constraint_rank;
+  mobility->isostatic_rule_sound = RankOf(reactions.stack.Matrix()) == mobility->constraint_rank;
   reactions.stack.AddDriven(mechanism, states);
   const MatX self_stress = FindRank(reactions.stack.Matrix(), NullSpaces::kSelfStress).self_stress;
   const std::vector<int>& first_row = reactions.first_row;
@@ -124,7 +124,7 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
   mobility.largest_dropped = joints.largest_dropped;
 
   stack.AddDriven(mechanism, states);
-  mobility.undriven = mobility.body_coordinates - FindRank(stack.Matrix(), NullSpaces::kNone).rank;
+  mobility.undriven = mobility.body_coordinates - RankOf(stack.Matrix());
   mobility.drives_determine_motion = mobility.undriven == 0;
   FindForcesNotUnique(mechanism, states, length, &mobility);
   return mobility;
@@ -134,8 +134,7 @@ int CountFreedoms(const Mechanism& mechanism) {
   const BodyStates states = PosesAtHome(mechanism);
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
-  return 6 * (static_cast<int>(mechanism.bodies.size()) - 1) -
-         FindRank(stack.Matrix(), NullSpaces::kNone).rank;
+  return 6 * (static_cast<int>(mechanism.bodies.size()) - 1) - RankOf(stack.Matrix());
 }
 
 Mobility AnalyseMobility(const Mechanism& mechanism) {

@@ -1,5 +1,6 @@
 #include "kinematics/row_stack.h"
 
+#include <Eigen/QR>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <numeric>
@@ -113,7 +114,47 @@ void AddVectors(const MatX& vectors, const std::vector<Eigen::Index>& places, Ei
   }
 }
 
+// The diagonal of R: a part's singular values within a factor of its size, but for matrices made to
+// spoil that (Kahan's), which the gap that is asked for keeps away.
+struct PivotedPart {
+  VecX diagonal;
+  double size = 0.0;
+};
+
+std::vector<PivotedPart> PivotsOf(const MatX& J) {
+  std::vector<PivotedPart> pivots;
+  for (const Part& part : PartsOf(J)) {
+    if (part.rows.empty() || part.columns.empty()) continue;
+    const Eigen::ColPivHouseholderQR<MatX> qr(J(part.rows, part.columns));
+    pivots.push_back({qr.matrixQR().diagonal().cwiseAbs(),
+                      static_cast<double>(part.rows.size() + part.columns.size())});
+  }
+  return pivots;
+}
+
 }  // namespace
+
+std::optional<int> ClearRank(const MatX& J, double tolerance) {
+  constexpr double kClear = 1e3;  // on both sides of the tolerance
+  const std::vector<PivotedPart> parts = PivotsOf(J);
+  double largest = 0.0;
+  for (const PivotedPart& part : parts) largest = std::max(largest, part.diagonal[0]);
+  const double limit = tolerance * largest;
+  int rank = 0;
+  for (const PivotedPart& part : parts) {
+    for (const double pivot : part.diagonal) {
+      const bool kept = pivot > kClear * part.size * limit;
+      if (!kept && !(pivot <= limit / kClear)) return {};
+      rank += kept ? 1 : 0;
+    }
+  }
+  return rank;
+}
+
+int RankOf(const MatX& J, double tolerance) {
+  const std::optional<int> clear = ClearRank(J, tolerance);
+  return clear ? *clear : FindRank(J, NullSpaces::kNone, tolerance).rank;
+}
 
 RankFinding FindRank(const MatX& J, NullSpaces wanted, double tolerance) {
   const unsigned options = wanted == NullSpaces::kSelfStress ? Eigen::ComputeFullU

@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/SVD>
+#include <filesystem>
+
+#include "kinematics/row_stack.h"
+#include "mechanism/reach.h"
 #include "model_file/load_model.h"
 #include "tests/simulation/test_mechanisms.h"
 #include "tests/source_dir.h"
@@ -125,6 +130,57 @@ TEST(Mobility, TheTripodHasThreeFreedomsAndNoRedundancy) {
   EXPECT_EQ(mobility.freedoms, 3);
   EXPECT_EQ(mobility.redundant, 0);
   EXPECT_EQ(mobility.undriven, 0);
+}
+
+// Rows of all joints and drives of a model at home, as ranks are taken of.
+MatX RowsAtHome(const Mechanism& mechanism, bool driven) {
+  BodyStates states;
+  states.Resize(mechanism.bodies.size());
+  states.X_WB = mechanism.X_WB_home;
+  internal::RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  stack.AddJoints(mechanism, states, false);
+  if (driven) stack.AddDriven(mechanism, states);
+  return stack.Matrix();
+}
+
+TEST(Ranks, PivotsAndSingularValuesGiveTheSameOnEveryShippedModel) {
+  int clear = 0, models = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
+    const LoadResult loaded = LoadModel((entry.path() / "model.yaml").string());
+    if (!loaded.mechanism) continue;
+    ++models;
+    for (const bool driven : {false, true}) {
+      const MatX J = RowsAtHome(*loaded.mechanism, driven);
+      const int rank = internal::FindRank(J, internal::NullSpaces::kNone).rank;
+      const auto pivots = internal::ClearRank(J);
+      if (pivots) {
+        EXPECT_EQ(*pivots, rank) << entry.path();
+      }
+      clear += pivots ? 1 : 0;
+      EXPECT_EQ(internal::RankOf(J), rank) << entry.path();
+    }
+  }
+  EXPECT_GE(models, 20);
+  EXPECT_GE(clear, 2 * models - 4);
+}
+
+TEST(Ranks, WithoutAClearGapSingularValuesDecide) {
+  MatX J = MatX::Random(12, 12);
+  const Eigen::BDCSVD<MatX> svd(J, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  const auto with_smallest = [&](double smallest) -> MatX {
+    VecX values = VecX::Ones(12);
+    values[11] = smallest;
+    return svd.matrixU() * values.asDiagonal() * svd.matrixV().transpose();
+  };
+  EXPECT_EQ(internal::ClearRank(with_smallest(1e-3)), 12);
+  EXPECT_EQ(internal::ClearRank(with_smallest(1e-15)), 11);
+  for (const double smallest : {3e-6, 2e-9, 0.5e-9, 3e-12}) {
+    EXPECT_FALSE(internal::ClearRank(with_smallest(smallest))) << smallest;
+  }
+  EXPECT_EQ(internal::RankOf(with_smallest(2e-9)), 12);
+  EXPECT_EQ(internal::RankOf(with_smallest(0.5e-9)), 11);
+  EXPECT_EQ(internal::RankOf(MatX::Zero(3, 5)), 0);
+  EXPECT_EQ(internal::RankOf(MatX(0, 5)), 0);
 }
 
 }  // namespace
