@@ -66,6 +66,9 @@ StudyReport ReportOf(const StudyBench& bench, const fs::path& folder) {
   for (const PointRow& row : report.summary.first_failed) {
     report.failed_commands.push_back(bench.Command(row.varied));
   }
+  for (const PointRow& row : report.summary.first_disagreed) {
+    report.disagreed_commands.push_back(bench.Command(row.varied));
+  }
   report.versions = Versions();
   return report;
 }

@@ -44,13 +44,17 @@ void Try(const Study& study, const std::vector<SetValue>& sets, Attempt* attempt
   }
   attempt->run = RunStudyWitnesses(*attempt->prepared, study.witnesses);
   row->reason = attempt->run.failure;
+  std::optional<Verdict> verdict;
   if (row->reason.empty()) {
-    row->values = MeasureQuantities(attempt->run, study.quantities);
+    StudyMeasures measures = MeasureQuantities(attempt->run, study.quantities);
+    row->values = std::move(measures.values);
+    verdict = measures.verdict;
     for (size_t k = 0; k < row->values.size() && row->reason.empty(); ++k) {
       if (!std::isfinite(row->values[k])) row->reason = study.quantities[k].name + " has no value";
     }
+    if (row->reason.empty() && verdict == Verdict::kNotRun) row->reason = measures.reason;
   }
-  row->exit_code = row->reason.empty() ? 0 : 3;
+  row->exit_code = !row->reason.empty() ? 3 : verdict == Verdict::kDisagree ? 1 : 0;
 }
 
 // The drive forces that the first witness records; at times of `only`, if that is given.

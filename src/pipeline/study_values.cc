@@ -16,7 +16,8 @@ const Role& RoleOfWitness(const std::string& name) {
                                : role::kSimulated;
 }
 
-// Measures checks of one run; what several of them need is found once.
+// Measures checks of one run; what several of them need is found once. Several witnesses are
+// compared and judged as `mbverify run` does it.
 class CheckMeter {
  public:
   explicit CheckMeter(const StudyRun& run) : run_(run), input_(InputOf(*run.prepared)) {
@@ -24,7 +25,15 @@ class CheckMeter {
     input_.reactions_not_unique = ReactionsNotUnique(
         run.prepared->base,
         run.runs.simulation ? run.runs.simulation->X_WB : std::vector<std::vector<Pose>>());
+    if (run.witnesses.size() > 1) {
+      comparison_ = Compare(input_);
+    } else {
+      comparison_.witnesses = {MeasureWitness(input_, run.witnesses.front()->trace)};
+      comparison_.witnesses.front().witness = run.witnesses.front()->name;
+    }
   }
+
+  [[nodiscard]] const Comparison& comparison() const { return comparison_; }
 
   double Worst(const MetricRow& row) {
     if (row.metric == Metric::kMotorUse) return SmallestMargin();
@@ -35,38 +44,22 @@ class CheckMeter {
       if (std::isnan(worst.value) || !(found->second.value <= worst.value)) worst = found->second;
     };
     if (row.of_pair) {
-      for (const PairComparison& pair : Pairs()) keep(pair.metrics);
+      for (const PairComparison& pair : comparison_.pairs) {
+        if (IsNamed(pair.measured) && IsNamed(pair.truth)) keep(pair.metrics);
+      }
     } else {
-      for (const WitnessMetrics& witness : Witnesses()) keep(witness.metrics);
+      for (const WitnessMetrics& witness : comparison_.witnesses) {
+        if (IsNamed(witness.witness)) keep(witness.metrics);
+      }
     }
     return worst.value;
   }
 
  private:
-  const std::vector<PairComparison>& Pairs() {
-    if (!pairs_.empty()) return pairs_;
-    for (const RolePair& pair : kRolePairs) {
-      const WitnessRecord* measured = Named(*pair.measured);
-      const WitnessRecord* truth = Named(*pair.truth);
-      if (measured == nullptr || truth == nullptr) continue;
-      pairs_.push_back(ComparePair(input_, measured->trace, truth->trace));
-    }
-    return pairs_;
-  }
-
-  const std::vector<WitnessMetrics>& Witnesses() {
-    if (!witnesses_.empty()) return witnesses_;
-    for (const WitnessRecord* record : run_.witnesses) {
-      witnesses_.push_back(MeasureWitness(input_, record->trace));
-    }
-    return witnesses_;
-  }
-
-  [[nodiscard]] const WitnessRecord* Named(const Role& role) const {
-    for (const WitnessRecord* record : run_.witnesses) {
-      if (record->name == role) return record;
-    }
-    return nullptr;
+  // Others may have run because these need them.
+  [[nodiscard]] bool IsNamed(const std::string& witness) const {
+    return std::any_of(run_.witnesses.begin(), run_.witnesses.end(),
+                       [&](const WitnessRecord* record) { return record->name == witness; });
   }
 
   [[nodiscard]] double SmallestMargin() const {
@@ -84,8 +77,7 @@ class CheckMeter {
 
   const StudyRun& run_;
   ComparisonInput input_;
-  std::vector<PairComparison> pairs_;
-  std::vector<WitnessMetrics> witnesses_;
+  Comparison comparison_;
 };
 
 double OfChannel(const StudyRun& run, const StudyQuantity& quantity) {
@@ -157,19 +149,22 @@ StudyRun RunStudyWitnesses(const Prepared& prepared, const std::vector<std::stri
   return result;
 }
 
-std::vector<double> MeasureQuantities(const StudyRun& run,
-                                      const std::vector<StudyQuantity>& quantities) {
-  std::vector<double> values;
+StudyMeasures MeasureQuantities(const StudyRun& run, const std::vector<StudyQuantity>& quantities) {
+  StudyMeasures measures;
   std::optional<CheckMeter> meter;
-  for (const StudyQuantity& quantity : quantities) {
-    if (!quantity.is_check()) {
-      values.push_back(OfChannel(run, quantity));
-      continue;
-    }
+  const auto ready = [&]() -> CheckMeter& {
     if (!meter) meter.emplace(run);
-    values.push_back(meter->Worst(*FindMetric(quantity.name)));
+    return *meter;
+  };
+  for (const StudyQuantity& quantity : quantities) {
+    measures.values.push_back(quantity.is_check() ? ready().Worst(*FindMetric(quantity.name))
+                                                  : OfChannel(run, quantity));
   }
-  return values;
+  if (run.witnesses.size() > 1) {
+    measures.verdict = ready().comparison().verdict;
+    measures.reason = ready().comparison().reason;
+  }
+  return measures;
 }
 
 }  // namespace mbv

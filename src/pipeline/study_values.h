@@ -1,6 +1,7 @@
 // What a study asks of one run of a scenario: the witnesses' traces, reduced to numbers.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,10 +28,16 @@ struct StudyRun {
 /// Of a trace, from its first to its last sample; NaN if some sample is none.
 [[nodiscard]] double StatisticOf(const VecX& samples, Statistic statistic);
 
-/// One value per quantity; NaN where the witnesses do not tell it. Of a channel: by the first
+struct StudyMeasures {
+  std::vector<double> values;      ///< one per quantity
+  std::optional<Verdict> verdict;  ///< of several witnesses, by the scenario's checks
+  std::string reason;              ///< of the verdict
+};
+
+/// Values are NaN where the witnesses do not tell it. Of a channel: by the first
 /// witness that records it. Of a check: the worst of all witnesses, or of all their pairs;
 /// `motor_margin` is the smallest margin.
-[[nodiscard]] std::vector<double> MeasureQuantities(const StudyRun& run,
-                                                    const std::vector<StudyQuantity>& quantities);
+[[nodiscard]] StudyMeasures MeasureQuantities(const StudyRun& run,
+                                              const std::vector<StudyQuantity>& quantities);
 
 }  // namespace mbv

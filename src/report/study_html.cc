@@ -22,6 +22,12 @@ std::string LimitSection(const StudyReport& report) {
                           Markup(result.pass() ? Pill("ok", "kept") : Pill("fail", "violated")),
                           Text(internal::ShareText(result))});
   }
+  if (report.study.witnesses.size() > 1) {
+    table.rows.push_back(
+        {Text("verdicts by the scenario's checks"),
+         Markup(report.summary.disagreed == 0 ? Pill("ok", "kept") : Pill("fail", "violated")),
+         Text(internal::DisagreedText(report))});
+  }
   if (report.study.missing) {
     const bool kept = report.summary.few_missing();
     table.rows.push_back({Text("points without a result"),
@@ -168,6 +174,20 @@ std::string WorstSection(const StudyReport& report) {
   return table.rows.empty() ? "" : ToHtml(table);
 }
 
+std::string CommandLines(const std::vector<std::string>& commands) {
+  std::string html;
+  for (const std::string& command : commands) {
+    html += "<p><code>" + Escape(command) + "</code></p>\n";
+  }
+  return html;
+}
+
+std::string DisagreedSection(const StudyReport& report) {
+  if (report.summary.disagreed == 0) return "";
+  return "<p>" + Escape(internal::DisagreedText(report)) + "</p>\n" +
+         CommandLines(report.disagreed_commands);
+}
+
 std::string FailureSection(const StudyReport& report) {
   if (report.summary.failed == 0) return "";
   Table table{.caption = "Why points have no result",
@@ -176,11 +196,7 @@ std::string FailureSection(const StudyReport& report) {
   for (const auto& [reason, count] : report.summary.reasons) {
     table.rows.push_back({Text(reason), Digits(fmt::format("{}", count))});
   }
-  std::string html = ToHtml(table);
-  for (const std::string& command : report.failed_commands) {
-    html += "<p><code>" + Escape(command) + "</code></p>\n";
-  }
-  return html;
+  return ToHtml(table) + CommandLines(report.failed_commands);
 }
 
 const char* FailureWord(const StudyReport& report) {
@@ -206,6 +222,7 @@ std::string ToHtml(const StudyReport& report) {
   page.Add("Distributions", "Histograms", drawn(StudySection::kHistograms));
   page.Add("Point by point", "Scatter", drawn(StudySection::kScatter) + ScatterNote(report));
   page.Add("Worst points, and how to run them", "Worst", WorstSection(report));
+  page.Add("Points where witnesses disagree", "Disagreements", DisagreedSection(report));
   page.Add("Points without a result", "Failures", FailureSection(report));
   PageHead head{.kicker = "mbverify study", .title = report.study.name};
   head.lead = report.study.description.empty()

@@ -161,6 +161,7 @@ std::string ReasonText(const StudyReport& report) {
     if (result.pass()) continue;
     text += "; " + internal::LimitText(report, result) + ": " + internal::ShareText(result);
   }
+  if (report.summary.disagreed > 0) text += "; " + internal::DisagreedText(report);
   if (!report.summary.few_missing()) text += "; " + internal::MissingText(report);
   if (report.validation && !report.validation->pass()) {
     text += "; not validated by " + report.validation->table;
@@ -178,6 +179,11 @@ Json ChecksJson(const StudyReport& report) {
   for (const LimitResult& result : report.summary.limits) {
     add(internal::LimitText(report, result), result.share(), result.limit.share, result.pass());
   }
+  if (report.study.witnesses.size() > 1) {
+    add("witnesses agree",
+        static_cast<double>(report.summary.disagreed) / static_cast<double>(report.summary.points),
+        0.0, report.summary.disagreed == 0);
+  }
   if (report.study.missing) {
     add("points without a result",
         static_cast<double>(report.summary.failed) / static_cast<double>(report.summary.points),
@@ -189,6 +195,15 @@ Json ChecksJson(const StudyReport& report) {
         static_cast<double>(v.outside) / static_cast<double>(v.samples()), v.share, v.pass());
   }
   return checks;
+}
+
+Json DisagreedJson(const StudyReport& report) {
+  Json json = {{"points", report.summary.disagreed}, {"first", Json::array()}};
+  for (size_t k = 0; k < report.summary.first_disagreed.size(); ++k) {
+    json["first"].push_back({{"point", report.summary.first_disagreed[k].point},
+                             {"command", report.disagreed_commands[k]}});
+  }
+  return json;
 }
 
 }  // namespace
@@ -232,6 +247,7 @@ std::string ToJson(const StudyReport& report) {
                {"checks", ChecksJson(report)},
                {"quantities", std::move(quantities)},
                {"counts", {{"pairs_compared", pairs}}},
+               {"disagreements", DisagreedJson(report)},
                {"failures", FailureJson(report)},
                {"force_bands", std::move(bands)},
                {"versions", std::move(versions)}};

@@ -66,6 +66,11 @@ std::string MissingText(const StudyReport& report) {
       100.0 * *summary.missing);
 }
 
+std::string DisagreedText(const StudyReport& report) {
+  return fmt::format("witnesses disagree at {} of {} points", report.summary.disagreed,
+                     report.summary.points - report.summary.failed);
+}
+
 }  // namespace internal
 
 namespace {
@@ -167,6 +172,10 @@ std::string WorstLines(const StudyReport& report) {
     text += fmt::format("\n  worst {}: {:.6g} at point {}\n    {}\n", q.name, q.worst[0].value,
                         q.worst[0].point, report.worst_commands[result.limit.quantity][0]);
   }
+  for (size_t k = 0; k < report.summary.first_disagreed.size(); ++k) {
+    text += fmt::format("\n  witnesses disagree at point {}\n    {}\n",
+                        report.summary.first_disagreed[k].point, report.disagreed_commands[k]);
+  }
   for (size_t k = 0; k < report.summary.first_failed.size(); ++k) {
     const PointRow& row = report.summary.first_failed[k];
     text += fmt::format("\n  point {} has no result: {}\n    {}\n", row.point, row.reason,
@@ -186,10 +195,14 @@ std::string ToText(const StudyReport& report) {
     if (!q.swings.empty()) text += SwingTable(report, q);
   }
   if (report.validation) text += ValidationLines(report);
-  if (!report.summary.limits.empty() || report.study.missing) text += "\n";
+  if (report.judged()) text += "\n";
   for (const LimitResult& result : report.summary.limits) {
     text += fmt::format("  {} {}: {}\n", result.pass() ? "kept    " : "VIOLATED",
                         internal::LimitText(report, result), internal::ShareText(result));
+  }
+  if (report.study.witnesses.size() > 1) {
+    text += fmt::format("  {} {}\n", report.summary.disagreed == 0 ? "kept    " : "VIOLATED",
+                        internal::DisagreedText(report));
   }
   if (report.study.missing) {
     text += fmt::format("  {} {}\n", report.summary.few_missing() ? "kept    " : "VIOLATED",

@@ -27,11 +27,13 @@ struct StudyReport {
   std::vector<PointRow> shown;  ///< evenly chosen, at most kMostShown: for the scatter matrix
   /// What runs a point's scenario, to be typed: per quantity, as its worst points; and of failures.
   std::vector<std::vector<std::string>> worst_commands;
-  std::vector<std::string> failed_commands;
+  std::vector<std::string> failed_commands, disagreed_commands;
   std::vector<std::pair<std::string, std::string>> versions;
 
   /// Whether anything is asked of the points.
-  [[nodiscard]] bool judged() const { return !study.limits.empty() || validation || study.missing; }
+  [[nodiscard]] bool judged() const {
+    return !study.limits.empty() || validation || study.missing || study.witnesses.size() > 1;
+  }
   /// 0 limits are kept (or there are none), 1 one is not, 3 no point has values, or nothing could
   /// be validated.
   [[nodiscard]] int exit_code() const {

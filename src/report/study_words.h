@@ -15,6 +15,8 @@ namespace mbv::internal {
 [[nodiscard]] std::string ShareText(const LimitResult& result);
 /// "3 of 1024 points have no result (0.293 %), 5 % may"; of a study that says how many may.
 [[nodiscard]] std::string MissingText(const StudyReport& report);
+/// "witnesses disagree at 2 of 1024 points"; of a study with several witnesses.
+[[nodiscard]] std::string DisagreedText(const StudyReport& report);
 /// The key of the design in study files.
 [[nodiscard]] const char* DesignWord(DesignKind kind);
 

@@ -13,7 +13,7 @@ namespace mbv {
 
 struct PointRow {
   std::uint64_t point = 0;  ///< its number
-  int exit_code = 0;        ///< 0, or as of the program
+  int exit_code = 0;        ///< as of `mbverify run`; 1: witnesses disagree, values are there
   std::string reason;       ///< why it has no values; "" if it has
   std::vector<double> varied, values;
 };

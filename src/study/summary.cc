@@ -106,7 +106,7 @@ QuantitySummary SummariseQuantity(const Study& study, size_t k, double nominal,
 }  // namespace
 
 bool StudySummary::within_limits() const {
-  return few_missing() &&
+  return disagreed == 0 && few_missing() &&
          std::all_of(limits.begin(), limits.end(), [](const LimitResult& l) { return l.pass(); });
 }
 
@@ -123,6 +123,10 @@ StudySummary SummariseStudy(const Study& study, const std::vector<double>& nomin
       if (!asked) break;
       ++result.count;
       if (!result.limit.Keeps(row.values[result.limit.quantity])) ++result.violations;
+    }
+    if (row.reason.empty() && row.exit_code == 1) {
+      ++summary.disagreed;
+      if (summary.first_disagreed.size() < kWorstPoints) summary.first_disagreed.push_back(row);
     }
     if (row.reason.empty()) return;
     ++summary.failed;

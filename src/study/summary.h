@@ -56,6 +56,8 @@ struct LimitResult {
 
 struct StudySummary {
   std::uint64_t points = 0, failed = 0;          ///< rows, and those with a reason
+  std::uint64_t disagreed = 0;                   ///< at which witnesses disagree
+  std::vector<PointRow> first_disagreed;         ///< at most kWorstPoints
   std::map<std::string, std::uint64_t> reasons;  ///< at most kReasons, and how often
   std::vector<PointRow> first_failed;            ///< at most kWorstPoints
   std::vector<QuantitySummary> quantities;

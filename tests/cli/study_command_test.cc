@@ -463,5 +463,31 @@ TEST_F(StudyCommand, ANightHasStudies) {
   EXPECT_FALSE(cases["lift/kept"]["inputs"].get<std::string>().empty());
 }
 
+// With bars of another mass in the simulation alone, every point disagrees; others keep their
+// numbers.
+TEST_F(StudyCommand, PointsAreJudgedByTheScenariosChecks) {
+  const auto with = [&](const std::string& scale) {
+    Write("hold.yaml",
+          "mechanism: model.yaml\nmotion: {duration_s: 0.1, sample_s: 0.01, commands: {x: {sine: "
+          "{amplitude: 0.1, period_s: 1}}}}\nanalytic: none\nsimulation: {mode: inverse, "
+          "parameters: {g: " +
+              scale + "}}\n");
+    Write("s.yaml",
+          "study: s\nscenario: hold.yaml\nvary: {m: {uniform: {min: 1, max: 3}}}\n"
+          "design: {sobol: 4}\nwitnesses: [reference, inverse]\nquantities: [force_nrmse]\n");
+    return Study("out" + scale);
+  };
+  EXPECT_EQ(with("10").exit_code, 0);
+  const ProgramResult bent = with("10.00001");
+  EXPECT_EQ(bent.exit_code, 1) << bent.out << bent.err;
+  EXPECT_NE(bent.out.find("VIOLATED witnesses disagree at 4 of 4 points"), std::string::npos)
+      << bent.out;
+  const nlohmann::json summary = Summary("out10.00001");
+  EXPECT_EQ(summary["verdict"], "disagree");
+  EXPECT_EQ(summary["disagreements"]["points"], 4);
+  EXPECT_NEAR(summary["quantities"][0]["most"].get<double>(), 1e-6, 2e-7);
+  EXPECT_NE(Points("out10.00001").find("\n0,1,1,,"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mbv
