@@ -97,6 +97,13 @@ StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
   return outcome;
 }
 
+// All rows are there, with the bytes that were published.
+bool HoldsAll(const StudyBench& bench, const StudyIdentity& identity, const fs::path& folder) {
+  const std::uint64_t rows = identity.share.size(bench.points().count());
+  return FindDone(bench, identity.share, folder).rows == rows &&
+         PointsFingerprint(folder) == identity.points;
+}
+
 // What an earlier run finished, where all of it is there and nothing has changed.
 std::optional<StudyOutcome> Finished(const StudyBench& bench, const StudyFolder& folder,
                                      const StudyShare& share, const StudyOutcome& outcome) {
@@ -107,8 +114,7 @@ std::optional<StudyOutcome> Finished(const StudyBench& bench, const StudyFolder&
       identity->share.index != share.index) {
     return {};
   }
-  const std::uint64_t rows = share.size(bench.points().count());
-  if (FindDone(bench, share, folder.target()).rows != rows) return {};
+  if (!HoldsAll(bench, *identity, folder.target())) return {};
   StudyOutcome finished = outcome;
   finished.exit_code = 0;
   finished.folder = folder.target().string();
@@ -161,11 +167,11 @@ class ShardMerger {
     }
     return "";
   }
-  // "" or which shard has not all of its rows.
+  // "" or which shard has not all of its rows, or others than it was finished with.
   [[nodiscard]] std::string CheckRows(const StudyBench& bench) const {
     for (const auto& [index, folder] : folders_) {
-      const StudyShare share{index, first_->share.count};
-      if (FindDone(bench, share, folder).rows != share.size(bench.points().count())) {
+      const auto identity = ReadIdentity(folder);
+      if (!identity || !HoldsAll(bench, *identity, folder)) {
         return folder + ": its points are not all there, or not as they were written";
       }
     }
@@ -215,7 +221,7 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
                    fmt::format("has {} points for {} shards", bench.points().count(), share.count));
   }
   StudyFolder folder(options.out_dir,
-                     {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share});
+                     {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share, {}});
   if (options.resume) {
     if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
   }
@@ -246,7 +252,7 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
   }
   trouble = merger.CheckRows(bench);
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
-  StudyFolder folder(out_dir, {first.study, first.file, first.fingerprint, first.drawn, {}});
+  StudyFolder folder(out_dir, {first.study, first.file, first.fingerprint, first.drawn, {}, {}});
   trouble = folder.Open(true, &hint);
   if (trouble.empty()) trouble = merger.Join(bench, folder.path());
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);

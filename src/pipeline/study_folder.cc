@@ -45,7 +45,8 @@ std::string ToJson(const StudyIdentity& identity) {
                                  {"study", identity.study},
                                  {"file", identity.file},
                                  {"fingerprint", identity.fingerprint},
-                                 {"shard", {identity.share.index + 1, identity.share.count}}};
+                                 {"shard", {identity.share.index + 1, identity.share.count}},
+                                 {"points", identity.points}};
   if (identity.drawn.count) json["count"] = *identity.drawn.count;
   if (identity.drawn.seed) json["seed"] = *identity.drawn.seed;
   return Dump(json);
@@ -56,16 +57,27 @@ std::optional<StudyIdentity> ReadIdentity(const fs::path& folder) {
   const auto json = nlohmann::json::parse(text.value_or(""), nullptr, false);
   if (!json.is_object() || json.value("schema", "") != kStudySchema) return {};
   try {
-    StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}};
+    StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}, {}};
     if (json.contains("count")) identity.drawn.count = json.at("count").get<std::uint64_t>();
     if (json.contains("seed")) identity.drawn.seed = json.at("seed").get<std::uint64_t>();
     identity.share.index = json.at("shard").at(0).get<std::uint64_t>() - 1;
     identity.share.count = json.at("shard").at(1).get<std::uint64_t>();
+    identity.points = json.value("points", "");
     if (identity.share.count == 0 || identity.share.index >= identity.share.count) return {};
     return identity;
   } catch (const nlohmann::json::exception&) {
     return {};
   }
+}
+
+std::string PointsFingerprint(const fs::path& folder) {
+  Fingerprint fingerprint;
+  for (const char* grown : {kPointsFile, kForcesFile}) {
+    std::uint64_t size = 0;
+    ContentOf(folder / grown,
+              &size)([&](std::string_view piece) { fingerprint.Add(std::string(piece)); });
+  }
+  return fingerprint.Text();
 }
 
 StudyFolder::StudyFolder(const fs::path& out, const StudyIdentity& identity)
@@ -119,6 +131,7 @@ std::string StudyFolder::Publish(const std::vector<std::pair<std::string, std::s
   for (const auto& [name, content] : files) {
     if (trouble.empty()) trouble = folder.Write(name, content);
   }
+  identity_.points = PointsFingerprint(path_);
   if (trouble.empty()) trouble = folder.Write(kStudyFile, ToJson(identity_));
   if (trouble.empty()) trouble = folder.Commit();
   if (!trouble.empty()) return trouble;

@@ -15,12 +15,15 @@ struct StudyIdentity {
   std::string study, file, fingerprint;
   DrawnDesign drawn;
   StudyShare share;
+  std::string points;  ///< fingerprint of the finished points and forces; "" while they grow
 };
 inline constexpr const char* kStudyFile = "study.json";
 
 [[nodiscard]] std::string ToJson(const StudyIdentity& identity);
 /// Empty where there is none, or one of another version.
 [[nodiscard]] std::optional<StudyIdentity> ReadIdentity(const std::filesystem::path& folder);
+/// Of the bytes of points and forces in `folder`.
+[[nodiscard]] std::string PointsFingerprint(const std::filesystem::path& folder);
 
 /// OUT/NAME.part, locked while this lives; two processes never grow the same rows.
 class StudyFolder {

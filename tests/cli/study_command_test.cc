@@ -108,6 +108,31 @@ TEST_F(StudyCommand, RowsAreTheSameForAnyNumberOfJobsAndShards) {
   EXPECT_FALSE(fs::exists(File("partly/s")));
 }
 
+// Rows that could be read but are not those that were computed: one digit, or one force.
+TEST_F(StudyCommand, AShardThatSomebodyTouchedIsNotMergedButComputedAgain) {
+  WriteStudy("{sobol: 8}");
+  for (const char* shard : {"1/2", "2/2"}) {
+    ASSERT_EQ(Study("parts", std::string("--shard ") + shard).exit_code, 0);
+  }
+  const std::string touched = "parts/s.shard-2-of-2";
+  const std::string merge =
+      "study merge " + File("parts/s.shard-1-of-2") + " " + File(touched) + " -o " + File("merged");
+  for (const char* name : {"points.csv", "forces.bin"}) {
+    std::string bytes = ReadAll(File(touched + "/" + name));
+    char& last = bytes[bytes.size() - 2];
+    last = last == '1' ? '2' : '1';
+    Write(touched + "/" + name, bytes);
+    const ProgramResult refused = mbverify(merge);
+    EXPECT_EQ(refused.exit_code, 2) << name;
+    EXPECT_NE(refused.err.find("not as they were written"), std::string::npos) << refused.err;
+    EXPECT_FALSE(fs::exists(File("merged/s"))) << name;
+    ASSERT_EQ(Study("parts", "--shard 2/2 --resume").exit_code, 0);
+    EXPECT_NE(ReadAll(File(touched + "/" + name)), bytes);
+    EXPECT_EQ(mbverify(merge).exit_code, 0) << name;
+    fs::remove_all(File("merged"));
+  }
+}
+
 // What a kill leaves: whole rows, perhaps forces of one more, and a line without its end.
 TEST_F(StudyCommand, GoesOnWithWhatAKillLeft) {
   WriteStudy("{sobol: 16}");
