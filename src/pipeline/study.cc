@@ -220,8 +220,9 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
     return Refused(std::move(outcome), file,
                    fmt::format("has {} points for {} shards", bench.points().count(), share.count));
   }
-  StudyFolder folder(options.out_dir,
-                     {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share, {}});
+  StudyFolder folder(
+      options.out_dir,
+      {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share, {}});
   if (options.resume) {
     if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
   }
