@@ -43,6 +43,7 @@ mbv_find_module(URDFDOM urdfdom liburdfdom-dev)
 mbv_find_module(OSMESA osmesa libosmesa6-dev)
 mbv_find_module(MATIO matio libmatio-dev)
 mbv_find_module(HDF5 hdf5-serial libhdf5-dev)
+mbv_find_module(LIBZIP libzip libzip-dev)
 mbv_find_module(CAIRO cairo-pdf libcairo2-dev)
 mbv_find_module(PANGO pangocairo libpango1.0-dev)
 # GLib's -pthread defines a macro, with which no precompiled header would be taken.

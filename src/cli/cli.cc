@@ -213,13 +213,15 @@ int RunCli(int argc, char** argv) {
   AddFiguresCommand(&app, &exit_code);
   AddTablesCommand(&app, &exit_code);
   AddStudyCommand(&app, &exit_code);
+  AddPackageCommand(&app, &exit_code);
+  AddVerifyCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);
   AddCompletionCommand(&app, &exit_code);
   AddManPageCommand(&app, &exit_code);
   for (const char* command :
-       {"init", "run", "render", "model", "check", "survey", "inertia", "study"}) {
+       {"init", "run", "render", "model", "check", "survey", "inertia", "study", "package"}) {
     AddPackages(app.get_subcommand(command));
   }
   RequireFiniteNumbers(&app);

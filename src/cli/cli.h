@@ -51,5 +51,7 @@ void AddFiguresCommand(CLI::App* app, int* exit_code);
 void AddUpgradeCommand(CLI::App* app, int* exit_code);
 void AddTablesCommand(CLI::App* app, int* exit_code);
 void AddStudyCommand(CLI::App* app, int* exit_code);
+void AddPackageCommand(CLI::App* app, int* exit_code);
+void AddVerifyCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

@@ -107,6 +107,10 @@ class StatedLimits {
         return Relative(Metric::kReaction, pooled.rms);
       case Quantity::kBaseForce:
         return Relative(Metric::kBaseForce, pooled.rms);
+      case Quantity::kLoopGap:
+        return Absolute(Metric::kClosureM);
+      case Quantity::kLoopTwist:
+        return Absolute(Metric::kClosureRad);
       default:  // what no metric is about
         return Relative(Metric::kForceNrmse, pooled.rms);
     }

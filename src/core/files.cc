@@ -97,7 +97,8 @@ void AddFilesBelow(const fs::path& folder, const std::string& ending,
     std::error_code unknown;
     if (entry->symlink_status(unknown).type() == fs::file_type::directory) {
       folders.push_back(entry->path());
-    } else if (entry->path().extension() == ending && entry->is_regular_file(unknown)) {
+    } else if ((ending.empty() || entry->path().extension() == ending) &&
+               entry->is_regular_file(unknown)) {
       files->push_back(entry->path());
     }
   }

@@ -66,6 +66,12 @@ std::array<std::uint8_t, 32> Sha256(std::string_view bytes) {
   return digest;
 }
 
+std::string Sha256Hex(std::string_view bytes) {
+  std::string text;
+  for (const std::uint8_t byte : Sha256(bytes)) text += fmt::format("{:02x}", byte);
+  return text;
+}
+
 std::string CspHash(std::string_view text) {
   const auto digest = Sha256(text);
   return fmt::format("'sha256-{}'",

@@ -74,6 +74,8 @@ std::vector<fs::path> Candidates(const std::string& name, const fs::path& folder
 
 void UseMeshPackages(std::vector<MeshPackage> packages) { Packages() = std::move(packages); }
 
+const std::vector<MeshPackage>& MeshPackages() { return Packages(); }
+
 FoundMesh FindMesh(const std::string& name, const fs::path& folder) {
   std::vector<fs::path> open = {folder};
   for (const MeshPackage& package : Packages()) open.push_back(package.folder);

@@ -14,6 +14,7 @@ struct MeshPackage {
 };
 /// For all that this process reads from now on.
 void UseMeshPackages(std::vector<MeshPackage> packages);
+[[nodiscard]] const std::vector<MeshPackage>& MeshPackages();
 
 /// A mesh file, or why there is none.
 struct FoundMesh {

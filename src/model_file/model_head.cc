@@ -62,7 +62,7 @@ const std::vector<std::string> kModelKeys = {
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
     "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
     "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements",
-    "legs"};
+    "legs",   "license"};
 // clang-format on
 
 ModelHead ReadTitle(const YamlMap& file, YamlReader* yaml) {
@@ -71,6 +71,8 @@ ModelHead ReadTitle(const YamlMap& file, YamlReader* yaml) {
   if (const YamlNode* text = file.Find("description")) {
     head.description = yaml->Text(*text, "description").value_or("");
   }
+  // For people and archives (pipeline/package.h); nothing is computed from it.
+  if (const YamlNode* text = file.Find("license")) (void)yaml->Text(*text, "license");
   return head;
 }
 

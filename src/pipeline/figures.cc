@@ -37,7 +37,10 @@ class FigureSource {
     run.scenario = options_.scenario;
     run.pictures = run.page = false;
     run.progress = options_.progress;
-    const RunOutcome ran = RunScenario(file_, run);
+    return OfMotion(RunScenario(file_, run));
+  }
+
+  FigureSet OfMotion(const RunOutcome& ran) {
     outcome_->exit_code = ran.exit_code;
     outcome_->diagnostics = ran.diagnostics;
     if (!ran.report) return {};
@@ -136,10 +139,13 @@ std::vector<std::pair<std::string, std::string>> DrawnFiles(const Figure& figure
   return files;
 }
 
-FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options) {
+FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
+                          const RunOutcome* ran) {
   FigureOutcome outcome;
   FigureSource source(file, options, &outcome);
-  FigureSet set = ReadScenarioHead(file).is_stiffness() ? source.OfStiffness() : source.OfMotion();
+  FigureSet set = ReadScenarioHead(file).is_stiffness() ? source.OfStiffness()
+                  : ran != nullptr                      ? source.OfMotion(*ran)
+                                                        : source.OfMotion();
   if (outcome.diagnostics.has_errors()) return outcome;
   KeepOnly(options.only, &set, &outcome);
   if (outcome.diagnostics.has_errors()) return outcome;

@@ -100,6 +100,7 @@ class ScenarioRun {
     report_.findings.Append(runs_.findings);
     if (!runs_.trust.empty()) report_.simulation += "; " + runs_.trust;
     report_.timing = runs_.timing;
+    report_.timing.told = options_.timed;
     for (const EngineRun& run : other_engines_) {
       if (run.engine != runner.judged_engine()) report_.timing.stock_s += run.summary.wall_s;
     }

@@ -261,6 +261,7 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
     return outcome;
   }
   StiffnessRun run = RunStiffness(*prepared, options.progress);
+  run.report.timing.told = options.timed;
   run.report.findings = outcome.diagnostics;
   run.report.command = "mbverify run " + ShellWord(file);
   for (const auto& [key, value] : options.scenario.set) {

@@ -147,6 +147,7 @@ std::string SignalsHtml(const Report& report) {
 
 std::string TimesText(const Report& report) {
   const Timing& timing = report.timing;
+  if (!timing.told) return "";
   std::string times = fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
                                   timing.analytic_s, timing.reference_s, timing.simulation_s);
   if (timing.foreign_s > 0.0) {

@@ -25,6 +25,8 @@ struct Timing {
   double total_s = 0.0;
   double loop_s = 0.0;  ///< inside the step loop of the judged simulation
   long steps = 0;
+  /// false: files do not tell it, and are the same whenever and wherever the run is repeated.
+  bool told = true;
 };
 
 /// What was run, of what, and with what.

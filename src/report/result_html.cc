@@ -151,7 +151,7 @@ std::string ReproduceHtml(const ResultView& view, const std::string& command,
   for (const auto& [name, version] : view.frame->versions) {
     table.rows.push_back({Text(name), Text(version)});
   }
-  table.rows.push_back({Text("time taken"), Text(times)});
+  if (!times.empty()) table.rows.push_back({Text("time taken"), Text(times)});
   return "<pre tabindex=\"0\"><code>" + Escape(command) + "</code></pre>\n" + ToHtml(table) +
          Note(files);
 }

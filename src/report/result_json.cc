@@ -39,6 +39,25 @@ Json ChecksOffJson(const ResultView& view) {
   return checks;
 }
 
+Json TimingJson(const ResultView& view) {
+  const Timing& timing = view.frame->timing;
+  Json times = {{"analytic_s", timing.analytic_s},
+                {"reference_s", timing.reference_s},
+                {"simulation_s", timing.simulation_s},
+                {"render_s", timing.render_s}};
+  if (view.look.steps) times["stock_s"] = timing.stock_s;
+  if (timing.foreign_s > 0.0) times["foreign_s"] = timing.foreign_s;
+  times["total_s"] = timing.total_s;
+  if (view.look.steps) {
+    times["loop_s"] = timing.loop_s;
+    times["steps"] = timing.steps;
+  }
+  if (view.look.steps && timing.loop_s > 0.0) {
+    times["steps_per_s"] = static_cast<double>(timing.steps) / timing.loop_s;
+  }
+  return times;
+}
+
 }  // namespace
 
 Json SummaryHead(const ResultView& view) {
@@ -62,22 +81,7 @@ Json SummaryHead(const ResultView& view) {
 }
 
 void AddSummaryEnd(const ResultView& view, Json* json) {
-  const Timing& timing = view.frame->timing;
-  Json times = {{"analytic_s", timing.analytic_s},
-                {"reference_s", timing.reference_s},
-                {"simulation_s", timing.simulation_s},
-                {"render_s", timing.render_s}};
-  if (view.look.steps) times["stock_s"] = timing.stock_s;
-  if (timing.foreign_s > 0.0) times["foreign_s"] = timing.foreign_s;
-  times["total_s"] = timing.total_s;
-  if (view.look.steps) {
-    times["loop_s"] = timing.loop_s;
-    times["steps"] = timing.steps;
-  }
-  if (view.look.steps && timing.loop_s > 0.0) {
-    times["steps_per_s"] = static_cast<double>(timing.steps) / timing.loop_s;
-  }
-  (*json)["timing"] = std::move(times);
+  if (view.frame->timing.told) (*json)["timing"] = TimingJson(view);
   (*json)["versions"] = Json::object();
   for (const auto& [name, version] : view.frame->versions) (*json)["versions"][name] = version;
 }

@@ -1,0 +1,153 @@
+#include "report/rerun_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/json_text.h"
+
+namespace mbv {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+const RerunSignal* WorstSignal(const std::vector<RerunSignal>& signals) {
+  // What is no number is worst.
+  const auto rank = [](const RerunSignal& signal) {
+    return signal.use == signal.use ? signal.use : HUGE_VAL;
+  };
+  const auto worst = std::ranges::max_element(signals, {}, rank);
+  return worst == signals.end() ? nullptr : &*worst;
+}
+
+std::string SignalText(const RerunSignal& signal) {
+  std::string text =
+      fmt::format("{} by {:.2g} of its largest value", signal.signal, signal.relative);
+  if (signal.time_s == signal.time_s) text += fmt::format(" at t = {:g} s", signal.time_s);
+  return text + fmt::format(", {:.2g} of its limit", signal.use);
+}
+
+std::string FileText(const RerunFile& file, bool all) {
+  static constexpr const char* kWords[] = {"the same bytes", "within its limits", "not judged",
+                                           "DIFFERS"};
+  std::string text =
+      fmt::format("  {:<17} {}", kWords[static_cast<size_t>(file.outcome)], file.path);
+  if (!file.why.empty()) text += ": " + file.why;
+  text += "\n";
+  const RerunSignal* worst = WorstSignal(file.signals);
+  for (const RerunSignal& signal : file.signals) {
+    const bool shown = all || &signal == worst || !signal.inside();
+    if (shown) text += "                      " + SignalText(signal) + "\n";
+  }
+  return text;
+}
+
+std::string ScenarioText(const RerunScenario& scenario, bool all) {
+  std::string text = fmt::format("{}: {}", scenario.file, scenario.verdict);
+  if (scenario.verdict != scenario.packed_verdict ||
+      scenario.exit_code != scenario.packed_exit_code) {
+    text += fmt::format(" (exit code {}); the archive says {} (exit code {})", scenario.exit_code,
+                        scenario.packed_verdict, scenario.packed_exit_code);
+  }
+  text += "\n";
+  if (!scenario.failure.empty()) text += "  " + scenario.failure + "\n";
+  const auto same = std::ranges::count(scenario.files, RerunOutcome::kSame, &RerunFile::outcome);
+  if (!all && same > 0) text += fmt::format("  the same bytes    {} files\n", same);
+  for (const RerunFile& file : scenario.files) {
+    if (all || file.outcome != RerunOutcome::kSame) text += FileText(file, all);
+  }
+  return text;
+}
+
+Json FileJson(const RerunFile& file) {
+  Json json = {{"path", file.path}, {"outcome", ToText(file.outcome)}, {"why", file.why}};
+  json["signals"] = Json::array();
+  for (const RerunSignal& signal : file.signals) {
+    json["signals"].push_back({{"signal", signal.signal},
+                               {"relative", Number(signal.relative)},
+                               {"use", Number(signal.use)},
+                               {"time_s", Number(signal.time_s)},
+                               {"inside", signal.inside()}});
+  }
+  return json;
+}
+
+size_t CountOf(const RerunReport& report, RerunOutcome outcome) {
+  size_t count = 0;
+  for (const RerunScenario& scenario : report.scenarios) {
+    count += static_cast<size_t>(std::ranges::count(scenario.files, outcome, &RerunFile::outcome));
+  }
+  return count;
+}
+
+}  // namespace
+
+const char* ToText(RerunOutcome outcome) {
+  switch (outcome) {
+    case RerunOutcome::kSame:
+      return "same";
+    case RerunOutcome::kWithin:
+      return "within";
+    case RerunOutcome::kNotJudged:
+      return "not_judged";
+    case RerunOutcome::kDiffers:
+      return "differs";
+  }
+  return "";
+}
+
+bool RerunScenario::agrees() const {
+  return failure.empty() && !files.empty() && verdict == packed_verdict &&
+         exit_code == packed_exit_code && std::ranges::none_of(files, [](const RerunFile& file) {
+           return file.outcome == RerunOutcome::kDiffers;
+         });
+}
+
+int RerunReport::exit_code() const {
+  return std::ranges::all_of(scenarios, &RerunScenario::agrees) ? 0 : 1;
+}
+
+std::string ToText(const RerunReport& report, bool all) {
+  std::string text;
+  for (const OtherVersion& other : report.other_versions) {
+    text += fmt::format("{}: the archive was written with {} {}, this is {}\n", report.archive,
+                        other.name, other.packed.empty() ? "(none)" : other.packed,
+                        other.here.empty() ? "(none)" : other.here);
+  }
+  for (const RerunScenario& scenario : report.scenarios) text += ScenarioText(scenario, all);
+  text += fmt::format(
+      "{}: {} files the same, {} within their limits, {} not judged, {} differ: {}\n",
+      report.archive, CountOf(report, RerunOutcome::kSame), CountOf(report, RerunOutcome::kWithin),
+      CountOf(report, RerunOutcome::kNotJudged), CountOf(report, RerunOutcome::kDiffers),
+      report.exit_code() == 0 ? "repeated" : "NOT REPEATED");
+  return text;
+}
+
+std::string ToJson(const RerunReport& report, int exit_code) {
+  Json json = {{"schema", "mbverify.verify/1"},
+               {"archive", report.archive},
+               {"exit_code", exit_code},
+               {"repeated", exit_code == 0}};
+  json["other_versions"] = Json::array();
+  for (const OtherVersion& other : report.other_versions) {
+    json["other_versions"].push_back(
+        {{"name", other.name}, {"packed", other.packed}, {"here", other.here}});
+  }
+  json["scenarios"] = Json::array();
+  for (const RerunScenario& scenario : report.scenarios) {
+    Json files = Json::array();
+    for (const RerunFile& file : scenario.files) files.push_back(FileJson(file));
+    json["scenarios"].push_back({{"file", scenario.file},
+                                 {"kind", scenario.kind},
+                                 {"exit_code", scenario.exit_code},
+                                 {"packed_exit_code", scenario.packed_exit_code},
+                                 {"verdict", scenario.verdict},
+                                 {"packed_verdict", scenario.packed_verdict},
+                                 {"failure", scenario.failure},
+                                 {"files", std::move(files)}});
+  }
+  return Dump(json);
+}
+
+}  // namespace mbv

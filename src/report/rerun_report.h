@@ -1,0 +1,59 @@
+// What repeating the results of an archive gave (`mbverify verify`), and its writers.
+#pragma once
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "comparison/rerun.h"
+
+namespace mbv {
+
+/// How a packed file and its repetition compare.
+enum class RerunOutcome {
+  kSame,       ///< byte for byte
+  kWithin,     ///< other bytes, within the limits
+  kNotJudged,  ///< other bytes, which follow from results that are judged, or were drawn otherwise
+  kDiffers,
+};
+[[nodiscard]] const char* ToText(RerunOutcome outcome);  ///< "same", "within", …
+
+struct RerunFile {
+  std::string path;
+  RerunOutcome outcome = RerunOutcome::kDiffers;
+  std::string why;                   ///< one sentence; "" of the same
+  std::vector<RerunSignal> signals;  ///< of those that were judged
+};
+
+/// One scenario or study.
+struct RerunScenario {
+  std::string file, kind;
+  int exit_code = 4, packed_exit_code = 4;
+  std::string verdict, packed_verdict;
+  std::string failure;  ///< why it could not be repeated; "" otherwise
+  std::vector<RerunFile> files;
+
+  [[nodiscard]] bool agrees() const;
+};
+
+/// A program or library of another version than that of the archive.
+struct OtherVersion {
+  std::string name, packed, here;
+};
+
+struct RerunReport {
+  std::string archive;
+  std::vector<OtherVersion> other_versions;
+  std::vector<RerunScenario> scenarios;
+
+  /// 0 everything is the same or within its limits, 1 something differs.
+  [[nodiscard]] int exit_code() const;
+};
+
+/// For a terminal; `all`: every file and signal, not only what is not the same, and the worst of
+/// each.
+[[nodiscard]] std::string ToText(const RerunReport& report, bool all);
+/// JSON, schema "mbverify.verify/1".
+[[nodiscard]] std::string ToJson(const RerunReport& report, int exit_code);
+
+}  // namespace mbv

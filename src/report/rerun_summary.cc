@@ -1,0 +1,90 @@
+#include "report/rerun_summary.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <map>
+#include <nlohmann/json.hpp>
+
+namespace mbv {
+namespace {
+
+using SummaryObject = nlohmann::json;
+
+// "checks/3/value: 1.5e-9 in the archive, 1.6e-9 now"; "" of the same.
+std::string FirstDifference(const SummaryObject& packed, const SummaryObject& rerun) {
+  const SummaryObject patch = SummaryObject::diff(packed, rerun);
+  if (patch.empty()) return "";
+  const SummaryObject::json_pointer place(patch[0]["path"].get<std::string>());
+  const auto shown = [&](const SummaryObject& json) {
+    return json.contains(place)
+               ? json[place].dump(-1, ' ', false, SummaryObject::error_handler_t::replace)
+               : std::string("nothing");
+  };
+  return fmt::format("{}: {} in the archive, {} now", place.to_string().substr(1), shown(packed),
+                     shown(rerun));
+}
+
+// Value and limit of every check, by name; NaN of what has no number.
+struct CheckNumbers {
+  double value = kNan, limit = kNan;
+  bool pass = false;
+};
+std::map<std::string, CheckNumbers> ChecksOf(const SummaryObject& json) {
+  std::map<std::string, CheckNumbers> checks;
+  const auto list = json.find("checks");
+  if (list == json.end() || !list->is_array()) return checks;
+  for (const SummaryObject& check : *list) {
+    if (!check.is_object() || !check.contains("name") || !check["name"].is_string()) continue;
+    CheckNumbers& numbers = checks[check["name"].get<std::string>()];
+    const auto number = [&](const char* key) {
+      const auto found = check.find(key);
+      return found != check.end() && found->is_number() ? found->get<double>() : kNan;
+    };
+    numbers = {number("value"), number("limit"),
+               check.contains("pass") && check["pass"] == SummaryObject(true)};
+  }
+  return checks;
+}
+
+// How far a check has moved, in parts of what it may.
+RerunSignal MovedBy(const std::string& name, const CheckNumbers& packed,
+                    const CheckNumbers& rerun) {
+  RerunSignal signal{.signal = name};
+  const bool unknown = std::isnan(packed.value) && std::isnan(rerun.value);
+  const double moved = unknown ? 0.0 : std::abs(rerun.value - packed.value);
+  signal.relative = moved == 0.0 ? 0.0 : moved / std::abs(packed.value);
+  signal.use = moved == 0.0 ? 0.0 : moved / (kRerunShare * packed.limit);
+  if (packed.pass != rerun.pass) signal.use = kNan;
+  return signal;
+}
+
+}  // namespace
+
+RerunFile CompareSummaries(const std::string& path, const std::string& packed,
+                           const std::string& rerun, bool exact) {
+  RerunFile file{.path = path, .outcome = RerunOutcome::kDiffers, .why = "", .signals = {}};
+  const SummaryObject before = SummaryObject::parse(packed, nullptr, false);
+  const SummaryObject now = SummaryObject::parse(rerun, nullptr, false);
+  if (!before.is_object() || !now.is_object()) {
+    file.why = "is no summary";
+    return file;
+  }
+  file.why = FirstDifference(before, now);
+  if (exact) return file;
+  for (const char* key : {"verdict", "exit_code"}) {
+    if (before.value(key, SummaryObject()) != now.value(key, SummaryObject())) return file;
+  }
+  const auto packed_checks = ChecksOf(before), checks = ChecksOf(now);
+  bool inside = packed_checks.size() == checks.size();
+  for (const auto& [name, numbers] : packed_checks) {
+    const auto found = checks.find(name);
+    file.signals.push_back(found == checks.end() ? RerunSignal{.signal = name}
+                                                 : MovedBy(name, numbers, found->second));
+    inside = inside && file.signals.back().inside();
+  }
+  if (inside) file.outcome = RerunOutcome::kWithin;
+  return file;
+}
+
+}  // namespace mbv
