@@ -196,8 +196,10 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   // How regress shares one script, and what the papers' audits gave, among the reports of a night.
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");
-  run->add_option("--data", arguments->data,
-                  "traces of motions also as traces.mat or traces.h5, for MATLAB, Octave, Python …")
+  run->add_option(
+         "--data", arguments->data,
+         "traces of motions also as traces.mat, traces_v73.mat or traces.h5, for MATLAB, Octave, "
+         "Python …")
       ->delimiter(',')
       ->check(OneOf(DataWords()));
   arguments->json.AddTo(run);

@@ -8,9 +8,11 @@
 
 namespace mbv {
 
-const std::array<DataFormat, 2>& DataFormats() {
-  static const std::array<DataFormat, 2> kFormats = {
-      {{"mat", "traces.mat", &internal::WriteMat}, {"h5", "traces.h5", &internal::WriteHdf5}}};
+const std::array<DataFormat, 3>& DataFormats() {
+  static const std::array<DataFormat, 3> kFormats = {
+      {{"mat", "traces.mat", &internal::WriteMat},
+       {"mat73", "traces_v73.mat", &internal::WriteMat73},
+       {"h5", "traces.h5", &internal::WriteHdf5}}};
   return kFormats;
 }
 

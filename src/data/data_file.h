@@ -4,6 +4,8 @@
 //   struct
 //         `info`, and one struct per witness with time_s (n × 1), values (n × m), and cells of m
 //         texts: names, units, quantities, subjects, frames
+//   mat73 traces_v73.mat, MATLAB's version 7.3 (HDF5), for traces beyond version 5's 2 GB: the same
+//         variables; texts keep all their letters
 //   h5    traces.h5, HDF5: a group per witness with the data sets time_s and one per channel, whose
 //         attributes are unit, quantity, subject and frame; what `info` has, as attributes of the
 //         root
@@ -31,7 +33,7 @@ struct DataFormat {
 };
 
 /// All formats besides traces.csv, which is always written.
-[[nodiscard]] const std::array<DataFormat, 2>& DataFormats();
+[[nodiscard]] const std::array<DataFormat, 3>& DataFormats();
 /// The row of this word; null if there is none.
 [[nodiscard]] const DataFormat* FindDataFormat(const std::string& word);
 

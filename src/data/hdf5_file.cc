@@ -1,44 +1,18 @@
-#include <hdf5.h>
-
 #include "data/formats.h"
+#include "data/hdf5_handle.h"
 
 namespace mbv::internal {
 namespace {
 
-// One of HDF5's numbers, and how it is given back; negative: there is none.
-class Handle {
- public:
-  Handle(hid_t id, herr_t (*close)(hid_t)) : id_(id), close_(close) {}
-  ~Handle() {
-    if (id_ >= 0) close_(id_);
-  }
-  Handle(const Handle&) = delete;
-  Handle& operator=(const Handle&) = delete;
-
-  [[nodiscard]] hid_t id() const { return id_; }
-  [[nodiscard]] bool good() const { return id_ >= 0; }
-
- private:
-  hid_t id_;
-  herr_t (*close_)(hid_t);
-};
-
 bool AddText(hid_t object, const std::string& name, const std::string& text) {
-  const Handle type(H5Tcopy(H5T_C_S1), &H5Tclose);
+  const Hdf5Handle type(H5Tcopy(H5T_C_S1), &H5Tclose);
   H5Tset_size(type.id(), text.empty() ? 1 : text.size());
   H5Tset_cset(type.id(), H5T_CSET_UTF8);
-  const Handle space(H5Screate(H5S_SCALAR), &H5Sclose);
-  const Handle attribute(
+  const Hdf5Handle space(H5Screate(H5S_SCALAR), &H5Sclose);
+  const Hdf5Handle attribute(
       H5Acreate2(object, name.c_str(), type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT), &H5Aclose);
   const std::string written = text.empty() ? std::string(1, '\0') : text;
   return attribute.good() && H5Awrite(attribute.id(), type.id(), written.data()) >= 0;
-}
-
-// Without the times at which things are made: the same values give the same bytes.
-Handle Undated(hid_t kind) {
-  const hid_t list = H5Pcreate(kind);
-  H5Pset_obj_track_times(list, false);
-  return {list, &H5Pclose};
 }
 
 using Texts = std::vector<std::pair<std::string, std::string>>;
@@ -46,11 +20,11 @@ using Texts = std::vector<std::pair<std::string, std::string>>;
 bool AddNumbers(hid_t group, const std::string& name, const double* values, size_t count,
                 const Texts& attributes) {
   const hsize_t size = count;
-  const Handle space(H5Screate_simple(1, &size, nullptr), &H5Sclose);
-  const Handle undated = Undated(H5P_DATASET_CREATE);
-  const Handle data(H5Dcreate2(group, name.c_str(), H5T_IEEE_F64LE, space.id(), H5P_DEFAULT,
-                               undated.id(), H5P_DEFAULT),
-                    &H5Dclose);
+  const Hdf5Handle space(H5Screate_simple(1, &size, nullptr), &H5Sclose);
+  const Hdf5Handle undated = Undated(H5P_DATASET_CREATE);
+  const Hdf5Handle data(H5Dcreate2(group, name.c_str(), H5T_IEEE_F64LE, space.id(), H5P_DEFAULT,
+                                   undated.id(), H5P_DEFAULT),
+                        &H5Dclose);
   if (!data.good()) return false;
   bool good = H5Dwrite(data.id(), H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0;
   for (const auto& [key, text] : attributes) good = AddText(data.id(), key, text) && good;
@@ -58,8 +32,8 @@ bool AddNumbers(hid_t group, const std::string& name, const double* values, size
 }
 
 bool AddTrace(hid_t file, const Trace& trace) {
-  const Handle undated = Undated(H5P_GROUP_CREATE);
-  const Handle group(
+  const Hdf5Handle undated = Undated(H5P_GROUP_CREATE);
+  const Hdf5Handle group(
       H5Gcreate2(file, trace.witness.c_str(), H5P_DEFAULT, undated.id(), H5P_DEFAULT), &H5Gclose);
   if (!group.good()) return false;
   const size_t n = trace.time_s.size();
@@ -81,8 +55,9 @@ bool AddTrace(hid_t file, const Trace& trace) {
 std::string WriteHdf5(const std::string& path, const DataAbout& about,
                       const std::vector<const Trace*>& traces) {
   H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);  // its own words go to standard error
-  const Handle undated = Undated(H5P_FILE_CREATE);
-  const Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, undated.id(), H5P_DEFAULT), &H5Fclose);
+  const Hdf5Handle undated = Undated(H5P_FILE_CREATE);
+  const Hdf5Handle file(H5Fcreate(path.c_str(), H5F_ACC_TRUNC, undated.id(), H5P_DEFAULT),
+                        &H5Fclose);
   if (!file.good()) return "cannot write " + path;
   bool good = true;
   for (const auto& [key, text] : about) good = AddText(file.id(), key, text) && good;

@@ -31,7 +31,7 @@ TEST(RunData, AnUnknownFormatIsRefused) {
   const ProgramResult run = mbverify("run scenarios/four_bar/turn_inverse.yaml --data xls");
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_NE(run.err.find("xls"), std::string::npos) << run.err;
-  EXPECT_NE(run.err.find("mat, h5"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("mat, mat73, h5"), std::string::npos) << run.err;
 }
 
 }  // namespace

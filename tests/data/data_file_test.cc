@@ -1,10 +1,14 @@
 // Binary files of traces, read back by the programs that their users have.
 #include "data/data_file.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
+#include <matio.h>
 
 #include <chrono>
+#include <cstdint>
 #include <cstdio>
+#include <cstring>
 #include <memory>
 #include <thread>
 
@@ -43,9 +47,10 @@ Trace Simulated() {
 std::string BytesOf(const std::string& word) {
   const Trace reference = Reference(), simulated = Simulated();
   std::string trouble;
-  std::string bytes = DataBytes(
-      *FindDataFormat(word), {{"mechanism", "four_bar"}, {"description", "größer"}, {"none", ""}},
-      {&reference, &simulated}, &trouble);
+  std::string bytes =
+      DataBytes(*FindDataFormat(word),
+                {{"mechanism", "four_bar"}, {"description", "größer"}, {"none", ""}, {"sign", "𝛼"}},
+                {&reference, &simulated}, &trouble);
   EXPECT_EQ(trouble, "");
   return bytes;
 }
@@ -70,6 +75,75 @@ printf('%.17g %.17g %s\n', simulated.time_s, simulated.values, simulated.names{1
             "hinge.reaction.fz|N|fz|hinge|hinge.F\n"
             "eigen ?||eigen ?||\n"
             "0 0.29999999999999999 arm.motor.force\n");
+}
+
+struct CloseMat {
+  void operator()(mat_t* file) const { Mat_Close(file); }
+};
+struct FreeMatVariable {
+  void operator()(matvar_t* variable) const { Mat_VarFree(variable); }
+};
+
+// The text of a field, or of one of its cells; letters beyond ASCII as numbers.
+std::string TextOf(matvar_t* variable, const char* field, int cell = -1) {
+  matvar_t* text = Mat_VarGetStructFieldByName(variable, field, 0);
+  if (cell >= 0 && text != nullptr) text = Mat_VarGetCell(text, cell);
+  if (text == nullptr || text->class_type != MAT_C_CHAR) return "(no text)";
+  std::string letters;
+  for (size_t k = 0; k < text->dims[0] * text->dims[1]; ++k) {
+    const unsigned code = static_cast<const std::uint16_t*>(text->data)[k];
+    letters += code < 0x80 ? std::string(1, static_cast<char>(code)) : fmt::format("<{:x}>", code);
+  }
+  return letters;
+}
+
+TEST(DataFile, MatioReadsTheMat73FileAsTheVersion5) {
+  const test::TestFolder folder("mat73");
+  const std::string path = folder.Write("traces_v73.mat", BytesOf("mat73"));
+  const std::unique_ptr<mat_t, CloseMat> file(Mat_Open(path.c_str(), MAT_ACC_RDONLY));
+  ASSERT_NE(file, nullptr);
+  EXPECT_EQ(Mat_GetVersion(file.get()), MAT_FT_MAT73);
+  EXPECT_EQ(std::string(Mat_GetHeader(file.get())).substr(0, 40),
+            "MATLAB 7.3 MAT-file, written by mbverify");
+  const auto read = [&](const char* name) {
+    return std::unique_ptr<matvar_t, FreeMatVariable>(Mat_VarRead(file.get(), name));
+  };
+  const auto info = read("info"), reference = read("reference"), simulated = read("simulated");
+  ASSERT_TRUE(info && reference && simulated);
+  EXPECT_EQ(TextOf(info.get(), "mechanism"), "four_bar");
+  EXPECT_EQ(TextOf(info.get(), "description"), "gr<f6><df>er");
+  EXPECT_EQ(TextOf(info.get(), "none"), "");
+  EXPECT_EQ(TextOf(info.get(), "sign"), "<d835><defc>");
+  const matvar_t* values = Mat_VarGetStructFieldByName(reference.get(), "values", 0);
+  ASSERT_NE(values, nullptr);
+  ASSERT_EQ(values->dims[0] * 10 + values->dims[1], 33U);
+  const Trace trace = Reference();
+  EXPECT_EQ(std::memcmp(values->data, trace.values.data(), 9 * sizeof(double)), 0);
+  const matvar_t* time = Mat_VarGetStructFieldByName(reference.get(), "time_s", 0);
+  ASSERT_EQ(time->dims[0] * 10 + time->dims[1], 31U);
+  EXPECT_EQ(static_cast<const double*>(time->data)[2], 0.25);
+  const std::string second =
+      TextOf(reference.get(), "names", 1) + "|" + TextOf(reference.get(), "units", 1) + "|" +
+      TextOf(reference.get(), "quantities", 1) + "|" + TextOf(reference.get(), "subjects", 1) +
+      "|" + TextOf(reference.get(), "frames", 1);
+  EXPECT_EQ(second, "hinge.reaction.fz|N|fz|hinge|hinge.F");
+  EXPECT_EQ(TextOf(reference.get(), "names", 2), "eigen <3bb>");
+  EXPECT_EQ(TextOf(simulated.get(), "units", 0), "N m");
+}
+
+TEST(DataFile, H5dumpAndOctaveReadNumbersOfTheMat73File) {
+  const test::TestFolder folder("mat73_programs");
+  const std::string file = folder.Write("traces_v73.mat", BytesOf("mat73"));
+  const std::string values = Output("h5dump -m %.17g -d /reference/values " + file);
+  EXPECT_NE(values.find("(0,2): 12345.678901234567"), std::string::npos) << values;
+  EXPECT_NE(values.find("\"double\""), std::string::npos) << values;
+  // Octave's reader of HDF5 knows no cells of MATLAB's; it says so and reads the rest.
+  const std::string script = folder.Write("read.m",
+                                          "load traces_v73.mat\n"
+                                          "printf('%.17g ', reference.values(3, 1))");
+  EXPECT_EQ(Output("cd " + folder.PathOf("") + " && octave-cli --no-init-file --quiet " + script +
+                   " 2>/dev/null"),
+            "12345.678901234567 ");
 }
 
 TEST(DataFile, H5dumpReadsTheHdf5File) {
