@@ -19,7 +19,7 @@ namespace mbv {
 namespace {
 
 struct FiguresArguments {
-  std::vector<std::string> scenarios, set, formats = {"pdf", "svg"}, only;
+  std::vector<std::string> scenarios, set, formats = {"pdf", "svg"}, only, also;
   std::string style = "ieee", language = "en", out = "figures", paper, page;
   double width_mm = 0, font_pt = 0;
   JsonOption json;
@@ -45,6 +45,7 @@ bool MakeFigureOptions(const FiguresArguments& arguments, FigureOptions* options
   options->language = LanguageOf(arguments.language);
   options->formats = arguments.formats;
   options->only = arguments.only;
+  options->also = arguments.also;
   return ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options->scenario.set);
 }
 
@@ -171,6 +172,12 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
       ->capture_default_str();
   figures->add_option("--only", arguments->only, "names of the figures that are wanted")
       ->delimiter(',');
+  figures
+      ->add_option("--also", arguments->also,
+                   "errors against the step (runs the motion again and again), sections of the "
+                   "workspace")
+      ->delimiter(',')
+      ->check(OneOf(MoreFigures()));
   figures->add_option("--width-mm", arguments->width_mm, "instead of the style's width")
       ->check(InRangeOf("width_mm"));
   figures->add_option("--font-pt", arguments->font_pt, "instead of the style's size of texts")
@@ -185,6 +192,7 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
             {"figures scenarios/stabilizing_platform/sea_state.yaml",
              "figures stewart/wave --style springer --lang de --only drive_forces",
              "figures scara_robot/stiffness --formats pdf,pgf --width-mm 120",
+             "figures scenarios/slider_crank/turn.yaml --also convergence",
              "figures --paper stabilizing_platform fig10 fig11 fig13"},
             "0 agree, 1 disagree (drawn all the same), 2 bad input, 3 could not run, 4 internal "
             "error");

@@ -37,6 +37,11 @@ std::string UnitInPrint(std::string unit) {
                                     : unit.substr(0, power) + "^{" + unit.substr(power + 1) + "}";
 }
 
+// The words that a label begins with, in a language.
+void Translate(const std::string& words, FigureWord word, Language language, std::string* label) {
+  if (label->starts_with(words)) label->replace(0, words.size(), WordFor(word, language));
+}
+
 }  // namespace
 
 std::string FigureLabel(const std::string& label) {
@@ -58,6 +63,19 @@ Figure FromPlot(const std::string& name, const LinePlot& plot) {
     panel.curves.push_back(std::move(curve));
   }
   return {.name = name, .caption = plot.title, .panels = {std::move(panel)}};
+}
+
+Figure FromSection(const std::string& name, const LinePlot& plot, Language language) {
+  Figure figure = FromPlot(name, plot);
+  FigurePanel& panel = figure.panels.front();
+  for (FigureAxis* axis : {&panel.x, &panel.y}) {
+    Translate("distance from the axis", FigureWord::kAxisDistance, language, &axis->label);
+  }
+  for (FigureCurve& curve : panel.curves) {
+    Translate("azimuth", FigureWord::kAzimuth, language, &curve.label);
+    if (curve.label.ends_with(" deg")) curve.label.replace(curve.label.size() - 4, 4, "°");
+  }
+  return figure;
 }
 
 Figure FromPlot(const std::string& name, const MapPlot& plot) {

@@ -28,6 +28,15 @@ constexpr std::array<Translations, static_cast<size_t>(FigureWord::kCount_)> kWo
     {"gravity, change", "重力势能变化", "Lage, Änderung"},
     {"springs", "弹性势能", "Federn"},
     {"Difference", "差值", "Differenz"},
+    {"Step", "步长", "Schrittweite"},
+    {"Time constant", "时间常数", "Zeitkonstante"},
+    {"Force error, RMS / RMS force", "力误差（均方根 / 力均方根）",
+     "Kraftfehler, Effektivwert / Kraft"},
+    {"corrected engine", "修正引擎", "korrigiertes MuJoCo"},
+    {"stock engine", "原始引擎", "MuJoCo, wie es ist"},
+    {"step alone", "仅步长", "nur Schrittweite"},
+    {"Distance from the axis", "到轴线的距离", "Abstand von der Achse"},
+    {"azimuth", "方位角", "Azimut"},
 }};
 
 struct WitnessWords {

@@ -31,6 +31,14 @@ enum class FigureWord {
   kGravity,
   kSprings,
   kDifference,
+  kStep,
+  kTimeConstant,
+  kForceError,
+  kCorrectedEngine,
+  kStockEngine,
+  kStepAlone,
+  kAxisDistance,
+  kAzimuth,
   kCount_,
 };
 [[nodiscard]] std::string WordFor(FigureWord word, Language language);

@@ -3,16 +3,21 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "figure/compose.h"
+#include "figure/convergence_figure.h"
 #include "figure/default_figures.h"
 #include "figure/draw.h"
 #include "figure/from_plot.h"
 #include "figure/pgf.h"
+#include "pipeline/converge.h"
+#include "pipeline/prepare.h"
 #include "pipeline/run_scenario.h"
 #include "pipeline/stiffness_map.h"
+#include "pipeline/workspace.h"
 
 namespace mbv {
 namespace {
@@ -96,6 +101,65 @@ class FigureSource {
   FigureOutcome* outcome_;
 };
 
+// What is drawn only where somebody asks for it.
+class MoreFigureSource {
+ public:
+  MoreFigureSource(const std::string& file, const FigureOptions& options, FigureOutcome* outcome,
+                   FigureSet* set)
+      : file_(file), options_(options), outcome_(outcome), set_(set) {}
+
+  void AddConvergence() {
+    if (ReadScenarioHead(file_).is_stiffness()) {
+      return LeaveOut("convergence: a stiffness has no steps");
+    }
+    ConvergeOptions converge;
+    converge.scenario = options_.scenario;
+    converge.progress = options_.progress;
+    const ConvergeOutcome refined = Converge(file_, converge);
+    if (refined.exit_code == 3) return LeaveOut("convergence: " + refined.failure);
+    if (refined.exit_code > 1) return outcome_->diagnostics.Append(refined.diagnostics);
+    if (outcome_->exit_code == 0) outcome_->exit_code = refined.exit_code;
+    FigureSet drawn = ConvergenceFigures(refined.report, options_.language);
+    for (Figure& figure : drawn.figures) set_->figures.push_back(std::move(figure));
+    for (const std::string& text : drawn.left_out) LeaveOut(text);
+  }
+
+  void AddWorkspace() {
+    if (ReadScenarioHead(file_).is_stiffness()) {
+      return LeaveOut("workspace: that of a stiffness is drawn with a motion of its mechanism");
+    }
+    Diagnostics told_by_the_run;
+    const auto prepared = Prepare(file_, options_.scenario, &told_by_the_run);
+    if (!prepared) return;
+    const WorkspaceOutcome reached = ComputeWorkspace(prepared->base, false);
+    if (reached.diagnostics.has_errors()) {
+      return LeaveOut("workspace: " + reached.diagnostics.findings().front().message);
+    }
+    outcome_->diagnostics.Append(reached.diagnostics);
+    if (!reached.summary.ok()) return LeaveOut("workspace: " + reached.summary.message);
+    if (!reached.agree && outcome_->exit_code == 0) outcome_->exit_code = 1;
+    for (const auto& [name, plot] : reached.plots) {
+      set_->figures.push_back(FromSection(NameOf(name), plot, options_.language));
+    }
+    for (const auto& [name, plot] : reached.maps) {
+      set_->figures.push_back(FromPlot(NameOf(name), plot));
+    }
+  }
+
+ private:
+  // "sections.svg" → "workspace_sections".
+  static std::string NameOf(const std::string& file) {
+    const std::string stem = std::filesystem::path(file).stem();
+    return stem.starts_with("workspace") ? stem : "workspace_" + stem;
+  }
+  void LeaveOut(const std::string& text) { set_->left_out.push_back(text); }
+
+  const std::string& file_;
+  const FigureOptions& options_;
+  FigureOutcome* outcome_;
+  FigureSet* set_;
+};
+
 // Those that are wanted; a name that is none of them is bad input.
 void KeepOnly(const std::vector<std::string>& only, FigureSet* set, FigureOutcome* outcome) {
   std::vector<std::string> names;
@@ -115,6 +179,11 @@ void KeepOnly(const std::vector<std::string>& only, FigureSet* set, FigureOutcom
 
 const std::vector<std::string>& FigureFormats() {
   static const std::vector<std::string> words = {"pdf", "svg", "png", kPgf};
+  return words;
+}
+
+const std::vector<std::string>& MoreFigures() {
+  static const std::vector<std::string> words = {"convergence", "workspace"};
   return words;
 }
 
@@ -146,6 +215,11 @@ FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
   FigureSet set = ReadScenarioHead(file).is_stiffness() ? source.OfStiffness()
                   : ran != nullptr                      ? source.OfMotion(*ran)
                                                         : source.OfMotion();
+  if (outcome.diagnostics.has_errors()) return outcome;
+  MoreFigureSource more(file, options, &outcome, &set);
+  if (Contains(options.also, "convergence")) more.AddConvergence();
+  if (Contains(options.also, "workspace")) more.AddWorkspace();
+  if (outcome.diagnostics.has_errors()) outcome.exit_code = 2;
   if (outcome.diagnostics.has_errors()) return outcome;
   KeepOnly(options.only, &set, &outcome);
   if (outcome.diagnostics.has_errors()) return outcome;

@@ -19,11 +19,15 @@ struct FigureOptions {
   Language language = Language::kEnglish;
   std::vector<std::string> formats = {"pdf"};  ///< words of FigureFormats()
   std::vector<std::string> only;               ///< names of figures; empty: all
+  std::vector<std::string> also;               ///< words of MoreFigures(): drawn besides
   ProgressFunction progress;
 };
 
 /// "pdf", "svg", "png", "pgf" (source for TeX with its data).
 [[nodiscard]] const std::vector<std::string>& FigureFormats();
+
+/// "convergence" (errors against the step: runs the motion several times), "workspace" (sections).
+[[nodiscard]] const std::vector<std::string>& MoreFigures();
 
 /// A figure and the names of its files.
 struct MadeFigure {

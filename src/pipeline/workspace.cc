@@ -94,6 +94,9 @@ WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures) {
     if (const auto* lines = std::get_if<LinePlot>(&file.content)) {
       outcome.plots.emplace_back(file.name, *lines);
     }
+    if (const auto* map = std::get_if<MapPlot>(&file.content)) {
+      outcome.maps.emplace_back(file.name, *map);
+    }
   }
   if (!pictures || !form.summary.ok() || form.mesh.triangles.empty()) return outcome;
   const RunSummary drawn = DrawInside(mechanism, form.mesh, form.mesh_caption, &outcome);

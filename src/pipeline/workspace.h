@@ -20,6 +20,7 @@ struct WorkspaceOutcome {
   bool agree = true;  ///< false: two ways to the same measure differ by more than their errors
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
   std::vector<std::pair<std::string, LinePlot>> plots;     ///< of those that draw lines
+  std::vector<std::pair<std::string, MapPlot>> maps;       ///< of those that colour cells
 };
 
 /// Mechanism names that ComputeWorkspace() supports.

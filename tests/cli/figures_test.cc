@@ -54,6 +54,26 @@ TEST(FiguresCommand, AFigureOfAPaperIsDrawnWithWhatThePaperSays) {
   EXPECT_NE(list.out.find("  table2 "), std::string::npos) << list.out;
 }
 
+TEST(FiguresCommand, ConvergenceAndWorkspaceAreDrawnWhereAskedFor) {
+  const Program mbverify("figures_also");
+  const std::string out = " --formats svg --out " + mbverify.Out();
+  const ProgramResult steps = mbverify(
+      "figures scenarios/slider_crank/press.yaml --also convergence --only convergence_step" + out);
+  EXPECT_EQ(steps.exit_code, 0) << steps.err;
+  EXPECT_TRUE(std::filesystem::exists(mbverify.Out() + "/slider_crank/press/convergence_step.svg"));
+  const ProgramResult reach =
+      mbverify("figures scenarios/spr_tripod/static.yaml --also workspace" + out);
+  EXPECT_EQ(reach.exit_code, 0) << reach.err;
+  EXPECT_NE(reach.out.find("\nworkspace_"), std::string::npos) << reach.out;
+  const ProgramResult none =
+      mbverify("figures scenarios/four_bar/turn_inverse.yaml --also workspace" + out);
+  EXPECT_EQ(none.exit_code, 0) << none.err;
+  EXPECT_NE(none.out.find("left out: workspace: no workspace is computed for 'four_bar'"),
+            std::string::npos)
+      << none.out;
+  EXPECT_EQ(mbverify("figures four_bar/turn_inverse --also everything").exit_code, 2);
+}
+
 TEST(FiguresCommand, BadPapersAreRefused) {
   const Program mbverify("figures_paper_bad");
   for (const char* options :
