@@ -16,7 +16,9 @@ namespace {
 
 constexpr int kDeepestParametersFrom = 16;
 
-void AddStated(const YamlEntry& entry, std::map<std::string, StatedNumber>* stated) {
+// A parameter by the name that it has in the mechanism.
+void AddStated(const YamlEntry& entry, const std::string& name,
+               std::map<std::string, StatedNumber>* stated) {
   const YamlNode* value = entry.value.get();
   const YamlNode* unit = nullptr;
   const UnitSuffix* suffix = &kPlain;
@@ -28,13 +30,45 @@ void AddStated(const YamlEntry& entry, std::map<std::string, StatedNumber>* stat
       if (const YamlNode* found = map->Find(key)) value = found, suffix = other;
     }
   }
-  stated->erase(entry.key);  // an expression of a nearer file replaces a number
+  stated->erase(name);  // an expression of a nearer file replaces a number
   if (value == nullptr || !value->is_scalar()) return;
   const auto number = PlainNumber(value->text);
   if (!number) return;
   const std::string own = unit != nullptr && unit->is_scalar() ? unit->text : "";
   const std::string shown = suffix == &kDeg ? "deg" : suffix == &kMm ? "mm" : own;
-  (*stated)[entry.key] = {value->text, shown, suffix->to_si(*number)};
+  (*stated)[name] = {value->text, shown, suffix->to_si(*number)};
+}
+
+// The unit that a part's parameter says it has, for a value that an instance gives it.
+std::string UnitOfPart(const YamlNode& value) {
+  const YamlNode* unit = value.is_map() ? value.Find("unit") : nullptr;
+  return unit != nullptr && unit->is_scalar() ? unit->text : "";
+}
+
+// "limb1.m": what the instance says, else what its part does; `around`: "" or "limb1.".
+void ReadInstances(const YamlNode* parts, const YamlNode& block, const std::string& around,
+                   int depth, std::map<std::string, StatedNumber>* stated) {
+  const YamlNode* instances = block.Find("instances");
+  if (parts == nullptr || instances == nullptr || depth > kDeepestParametersFrom) return;
+  for (const YamlEntry& instance : instances->entries) {
+    const YamlNode* named = instance.value->Find("part");
+    const YamlNode* part = named == nullptr ? nullptr : parts->Find(named->text);
+    if (part == nullptr) continue;
+    const std::string prefix = around + instance.key + ".";
+    const YamlNode* parameters = part->Find("parameters");
+    if (parameters != nullptr) {
+      for (const YamlEntry& entry : parameters->entries) {
+        AddStated(entry, prefix + entry.key, stated);
+        const YamlNode* given = instance.value->Find(entry.key);
+        if (given == nullptr) continue;
+        stated->erase(prefix + entry.key);
+        const auto number = given->is_scalar() ? PlainNumber(given->text) : std::nullopt;
+        if (!number) continue;
+        (*stated)[prefix + entry.key] = {given->text, UnitOfPart(*entry.value), *number};
+      }
+    }
+    ReadInstances(parts, *part, prefix, depth + 1, stated);
+  }
 }
 
 // The files that parameters come from, those behind first.
@@ -49,9 +83,10 @@ void ReadStated(const std::string& file, int depth, std::map<std::string, Stated
     const auto path = std::filesystem::path(file).parent_path() / from->text;
     ReadStated(path.lexically_normal().string(), depth + 1, stated);
   }
+  if (depth == 0) ReadInstances(root->Find("parts"), *root, "", 0, stated);
   const YamlNode* parameters = root->Find("parameters");
   if (parameters == nullptr || !parameters->is_map()) return;
-  for (const YamlEntry& entry : parameters->entries) AddStated(entry, stated);
+  for (const YamlEntry& entry : parameters->entries) AddStated(entry, entry.key, stated);
 }
 
 class TableMaker {

@@ -37,7 +37,7 @@ struct TablesOutcome {
 [[nodiscard]] TablesOutcome MakeTables(const std::string& file, const TablesOptions& options);
 
 /// The numbers (no expressions) of `parameters:` in a model file and those that it takes from
-/// others, by name; empty of a file of another kind.
+/// others, by name, those of instances as "limb1.m"; empty of a file of another kind.
 [[nodiscard]] std::map<std::string, StatedNumber> StatedNumbers(const std::string& model_file);
 
 }  // namespace mbv

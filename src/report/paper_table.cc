@@ -22,6 +22,51 @@ const std::string& CellOf(const std::vector<std::string>& row, size_t column) {
   return column < row.size() ? row[column] : none;
 }
 
+// Of a page at 10 pt, and of a column 0.42 lines wide.
+constexpr size_t kPageLines = 40, kWideLetters = 34;
+
+// Lines that LaTeX needs for the rows, where texts of several lines are broken.
+size_t LinesOf(const PaperTable& table) {
+  size_t lines = 0;
+  for (const auto& row : table.rows) {
+    size_t own = 1;
+    for (size_t k = 0; k < table.columns.size(); ++k) {
+      if (!table.columns[k].wide) continue;
+      own = std::max(own, (CellOf(row, k).size() + kWideLetters - 1) / kWideLetters);
+    }
+    lines += own;
+  }
+  return lines;
+}
+
+// Head and foot of a table on one page, or over several: then the head stands on each.
+struct LatexFrame {
+  std::string head, foot;
+};
+
+LatexFrame OnOnePage(const PaperTable& table, const std::string& columns,
+                     const std::string& titles) {
+  return {"% needs \\usepackage{booktabs}\n\\begin{table}\n  \\centering\n  \\caption{" +
+              TexText(table.caption) + "}\n  \\label{tab:" + table.name + "}\n  \\begin{tabular}{" +
+              columns + "}\n    \\toprule\n" + titles + "    \\midrule\n",
+          "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"};
+}
+
+LatexFrame OverPages(const PaperTable& table, const std::string& columns,
+                     const std::string& titles) {
+  const std::string all = std::to_string(table.columns.size());
+  const std::string head = "    \\toprule\n" + titles + "    \\midrule\n";
+  return {
+      "% needs \\usepackage{booktabs,longtable}, and a page of one column\n"
+      "\\begin{longtable}{" +
+          columns + "}\n    \\caption{" + TexText(table.caption) + "}\n    \\label{tab:" +
+          table.name + "} \\\\\n" + head + "    \\endfirsthead\n    \\multicolumn{" + all +
+          "}{l}{Table \\thetable, continued} \\\\\n" + head +
+          "    \\endhead\n    \\midrule\n    \\endfoot\n    \\bottomrule\n"
+          "    \\endlastfoot\n",
+      "\\end{longtable}\n"};
+}
+
 }  // namespace
 
 std::string MarkdownText(const std::string& text) {
@@ -45,12 +90,12 @@ std::string ToLatex(const PaperTable& table) {
     }
     return text + " \\\\\n";
   };
-  std::string text = "% needs \\usepackage{booktabs}\n\\begin{table}\n  \\centering\n  \\caption{" +
-                     TexText(table.caption) + "}\n  \\label{tab:" + table.name +
-                     "}\n  \\begin{tabular}{" + columns + "}\n    \\toprule\n" +
-                     line([&](size_t k) { return table.columns[k].title; }) + "    \\midrule\n";
+  const std::string titles = line([&](size_t k) { return table.columns[k].title; });
+  const LatexFrame frame = LinesOf(table) > kPageLines ? OverPages(table, columns, titles)
+                                                       : OnOnePage(table, columns, titles);
+  std::string text = frame.head;
   for (const auto& row : table.rows) text += line([&](size_t k) { return CellOf(row, k); });
-  return text + "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n";
+  return text + frame.foot;
 }
 
 std::string ToMarkdown(const PaperTable& table) {

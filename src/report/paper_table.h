@@ -19,7 +19,8 @@ struct PaperTable {
   std::vector<std::vector<std::string>> rows;  ///< plain text; a short row is filled up
 };
 
-/// A table environment, for `\usepackage{booktabs}`; label "tab:NAME".
+/// A table environment, for `\usepackage{booktabs}`; label "tab:NAME". With more lines than a page
+/// has, a longtable that repeats its head (`\usepackage{longtable}`).
 [[nodiscard]] std::string ToLatex(const PaperTable& table);
 
 /// Text of a cell: '|' and what Markdown would take for its own escaped.

@@ -77,5 +77,30 @@ TEST(StatedNumbers, AreThoseOfTheNearestFileAndNoExpressions) {
   EXPECT_TRUE(StatedNumbers("nowhere.yaml").empty());
 }
 
+TEST(StatedNumbers, OfPartsAreThoseOfEachInstance) {
+  const test::TestFolder folder("stated_parts");
+  const auto stated = StatedNumbers(folder.Write("model.yaml", R"(
+parts:
+  limb:
+    parameters: {m: {value: 1.50, unit: kg}, l: {value_mm: 300.0, unit: m}, a: 2*m}
+    instances: {foot: {part: foot, r: 0.10}}
+  foot: {parameters: {r: 0.200, t: {value: 5.0, unit: s}}}
+instances: {limb1: {part: limb}, limb2: {part: limb, m: 2.0, l: 2*0.15}, none: {part: nowhere}}
+)"));
+  const auto text = [&](const char* name) {
+    const auto at = stated.find(name);
+    return at == stated.end() ? "" : at->second.text + " " + at->second.unit;
+  };
+  EXPECT_EQ(text("limb1.m"), "1.50 kg");
+  EXPECT_EQ(text("limb2.m"), "2.0 kg");
+  EXPECT_EQ(stated.at("limb2.m").value, 2.0);
+  EXPECT_EQ(text("limb1.l"), "300.0 mm");
+  EXPECT_EQ(text("limb2.l"), "");  // an expression of the instance's
+  EXPECT_EQ(text("limb1.a"), "");
+  EXPECT_EQ(text("limb1.foot.r"), "0.10 ");
+  EXPECT_EQ(text("limb2.foot.t"), "5.0 s");
+  EXPECT_EQ(stated.size(), 7U);
+}
+
 }  // namespace
 }  // namespace mbv

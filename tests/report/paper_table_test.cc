@@ -32,6 +32,43 @@ TEST(PaperTable, LatexIsABooktabsTable) {
 )");
 }
 
+TEST(PaperTable, MoreLinesThanAPageAreALongtableThatRepeatsItsHead) {
+  PaperTable table = TwoRows();
+  while (table.rows.size() < 40) table.rows.push_back({"b", "1"});
+  EXPECT_EQ(ToLatex(table).find("longtable"), std::string::npos);
+  table.rows.push_back({"last", "2"});
+  const std::string text = ToLatex(table);
+  EXPECT_EQ(text.substr(0, text.find("    a\\ensuremath")),
+            R"(% needs \usepackage{booktabs,longtable}, and a page of one column
+\begin{longtable}{lr}
+    \caption{Masses of a \& b, 5 \% apart}
+    \label{tab:bars} \\
+    \toprule
+    body\_1 & m (kg) \\
+    \midrule
+    \endfirsthead
+    \multicolumn{2}{l}{Table \thetable, continued} \\
+    \toprule
+    body\_1 & m (kg) \\
+    \midrule
+    \endhead
+    \midrule
+    \endfoot
+    \bottomrule
+    \endlastfoot
+)");
+  EXPECT_TRUE(text.ends_with("    last & 2 \\\\\n\\end{longtable}\n")) << text;
+}
+
+TEST(PaperTable, BrokenTextsCountTheirLines) {
+  PaperTable table = TwoRows();
+  table.columns[0].wide = true;
+  table.rows.assign(20, {std::string(68, 'a'), "1"});
+  EXPECT_EQ(ToLatex(table).find("longtable"), std::string::npos);
+  table.rows[3][0] += "a";
+  EXPECT_NE(ToLatex(table).find("longtable"), std::string::npos);
+}
+
 TEST(PaperTable, MarkdownIsATableUnderItsCaption) {
   EXPECT_EQ(ToMarkdown(TwoRows()), R"(Masses of a &amp; b, 5 % apart
 
