@@ -139,6 +139,11 @@ PackedRun RunHere(const std::string& file, const PackedRunOptions& options,
   fs::current_path(options.folder);
   PackedRun run = PackedRunner(file, options).Run();
   if (truth == nullptr || !run.failure.empty()) return run;
+  if (run.scenario.kind != truth->scenario.kind) {
+    run.failure = fmt::format("is of the kind '{}', not '{}' as the manifest says",
+                              run.scenario.kind, truth->scenario.kind);
+    return run;
+  }
   std::map<std::string, std::string> now = FilesOf(".", truth->scenario.results);
   now.merge(FilesOf(".", run.scenario.results));
   if (!truth->scenario.figures.empty()) now.merge(FilesOf(".", truth->scenario.figures));

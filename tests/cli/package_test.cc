@@ -242,6 +242,41 @@ TEST(VerifyCommand, AnotherVersionIsSaid) {
   EXPECT_TRUE(Has(other.out, "\"repeated\": true")) << other.out;
 }
 
+TEST(VerifyCommand, AManifestCannotChooseHowItsResultsAreJudged) {
+  const Packed packed = FourBar("kind");
+  const ProgramResult other = packed.Edited(
+      "scale RESULTS/traces.csv motor.force.simulated 1.001 honest replace manifest.json "
+      "'\"kind\": \"motion\"' '\"kind\": \"study\"' replace manifest.json '\"mbverify\": \"' "
+      "'\"mbverify\": \"9.'");
+  EXPECT_EQ(other.exit_code, 3) << other.out << other.err;
+  EXPECT_TRUE(Has(other.out, "is of the kind 'motion', not 'study'")) << other.out;
+}
+
+TEST(PackageCommand, MeshesOfPackagesAndLicencesAreTakenAlong) {
+  const Program mbverify("package_meshes");
+  const std::string folder = mbverify.folder().string();
+  // A tetrahedron stands for the crank.
+  const ProgramResult made = mbverify.Script(
+      "mkdir -p " + folder + "/mine/models/four_bar " + folder +
+      "/elsewhere && "
+      "python3 -c 'import itertools as i; P = [(0,0,0),(1,0,0),(0,1,0),(0,0,1)]; print(\"\".join("
+      "\"v %g %g %g\\n\" % p for p in P) + \"f 1 3 2\\nf 1 2 4\\nf 1 4 3\\nf 2 3 4\")' >" +
+      folder +
+      "/elsewhere/part.obj && (echo 'license: CC-BY-4.0'; sed "
+      "'s,shapes: .{capsule: {to: end.*,shapes: [{mesh: {file: \"package://arm/part.obj\"}}],' "
+      "models/four_bar/model.yaml) >" +
+      folder +
+      "/mine/models/four_bar/model.yaml && "
+      "cp scenarios/four_bar/turn_inverse.yaml " +
+      folder + "/mine/ && cd " + folder +
+      "/mine && \"$mbverify\" package turn_inverse.yaml --package arm=../elsewhere --no-report "
+      "--no-figures -o paper.zip --json - && \"$mbverify\" verify paper.zip");
+  EXPECT_EQ(made.exit_code, 0) << made.err;
+  EXPECT_TRUE(Has(made.out, "\"path\": \"inputs/packages/arm/part.obj\"")) << made.out;
+  EXPECT_TRUE(Has(made.out, "--package arm=inputs/packages/arm")) << made.out;
+  EXPECT_TRUE(Has(made.out, "\"license\": \"CC-BY-4.0\"")) << made.out;
+}
+
 TEST(VerifyCommand, ProgramsOfStrangersRunOnlyWhereTheyAreTrusted) {
   const Packed packed("trust", "scenarios/four_bar/foreign.yaml", "results/four_bar/foreign");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
