@@ -12,6 +12,7 @@
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "mesh/find_mesh.h"
+#include "pipeline/check_file.h"
 #include "pipeline/figures.h"
 #include "pipeline/rerun_judge.h"
 #include "pipeline/run_scenario.h"
@@ -42,8 +43,8 @@ class PackedRunner {
     run_.scenario.description = head.description;
     run_.scenario.kind = head.is_study ? "study" : head.is_stiffness() ? "stiffness" : "motion";
     if (!options_.programs && CallsPrograms()) return std::move(run_);
+    if (ReadsOutside(head.is_study)) return std::move(run_);
     head.is_study ? RunAsStudy() : RunAsScenario();
-    RefuseOutside();
     return std::move(run_);
   }
 
@@ -109,14 +110,18 @@ class PackedRunner {
     if (folder.empty()) run_.failure = "gave no result";
   }
 
-  // Another machine may have other files there, or none.
-  void RefuseOutside() {
-    for (const InputFile& input : watch_.files()) {
+  // Another machine may have other files there, or none. (The models of papers whose equations a
+  // page audits come with the program.)
+  bool ReadsOutside(bool study) {
+    const InputWatch watch;
+    (void)(study ? CheckStudy(run_.scenario.file) : CheckFile(run_.scenario.file));
+    for (const InputFile& input : watch.files()) {
       const fs::path path = fs::path(input.file).lexically_normal();
       if (path.is_relative() && path.generic_string().starts_with("inputs/")) continue;
       Refuse(fmt::format("reads {}, which is not in the archive", input.file),
              "name files relative to the scenario and its model");
     }
+    return !run_.failure.empty();
   }
 
   void Refuse(const std::string& message, const std::string& hint) {
@@ -130,7 +135,6 @@ class PackedRunner {
   }
 
   const PackedRunOptions& options_;
-  const InputWatch watch_;
   PackedRun run_;
 };
 

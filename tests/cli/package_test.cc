@@ -173,6 +173,19 @@ TEST(PackageCommand, TheDateIsThatOfTheSourceNeverOfTheClock) {
   EXPECT_EQ(mbverify.Script("SOURCE_DATE_EPOCH=soon " + call).exit_code, 2);
 }
 
+TEST(PackageCommand, PagesThatAuditAPapersEquationsArePackedToo) {
+  const Program mbverify("package_page");
+  const std::string paper = (mbverify.folder() / "paper.zip").string();
+  const ProgramResult made = mbverify(
+      "package scenarios/spr_tripod/default_inverse.yaml scenarios/slider_crank/turn.yaml "
+      "--no-figures -o " +
+      paper);
+  ASSERT_EQ(made.exit_code, 0) << made.err;
+  const ProgramResult verified = mbverify("verify " + paper);
+  EXPECT_EQ(verified.exit_code, 0) << verified.err;
+  EXPECT_TRUE(Has(verified.out, "0 not judged, 0 differ: repeated")) << verified.out;
+}
+
 TEST(VerifyCommand, ABentNumberIsToldWithItsSignal) {
   const Packed packed = FourBar("bent");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
