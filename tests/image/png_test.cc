@@ -42,5 +42,18 @@ TEST(Png, APictureWithoutItsPixelsIsOurBug) {
   EXPECT_ANY_THROW((void)EncodePng(picture));
 }
 
+TEST(Png, KeepsOpacitiesAndIsReadAsItLooksOnWhite) {
+  const Picture glass{
+      .width = 3, .height = 1, .rgb = {255, 0, 0, 255, 0, 0, 10, 20, 30}, .alpha = {255, 51, 0}};
+  const std::string png = EncodePng(glass);
+  EXPECT_EQ(png.at(25), 6);  // RGBA
+  const std::vector<std::uint8_t> seen = {255, 0, 0, 255, 204, 204, 255, 255, 255};
+  EXPECT_EQ(OnWhite(glass).rgb, seen);
+  EXPECT_TRUE(OnWhite(glass).alpha.empty());
+  Picture read;
+  ASSERT_TRUE(DecodePng(png, 10, &read));
+  for (std::size_t i = 0; i < seen.size(); ++i) EXPECT_NEAR(read.rgb[i], seen[i], 1) << i;
+}
+
 }  // namespace
 }  // namespace mbv
