@@ -4,27 +4,14 @@
 #include <cstdint>
 #include <numbers>
 
-#include "figure/cairo_handles.h"
 #include "figure/markup.h"
+#include "text/text_layout.h"
 
 namespace mbv {
 
 namespace {
 
 using internal::Handle;
-
-constexpr double kPointsPerInch = 72.0;
-
-// Texts are as long on paper as on a screen: nothing is fitted to pixels.
-void LeaveUnhinted(PangoContext* context) {
-  const Handle<cairo_font_options_t> options(cairo_font_options_create());
-  cairo_font_options_set_hint_style(options.get(), CAIRO_HINT_STYLE_NONE);
-  cairo_font_options_set_hint_metrics(options.get(), CAIRO_HINT_METRICS_OFF);
-  cairo_font_options_set_antialias(options.get(), CAIRO_ANTIALIAS_GRAY);
-  pango_cairo_context_set_font_options(context, options.get());
-  pango_context_set_round_glyph_positions(context, FALSE);
-  pango_cairo_context_set_resolution(context, kPointsPerInch);
-}
 
 void SetColor(cairo_t* cairo, const std::string& color) {
   const auto [r, g, b] = RgbOf(color);
@@ -46,14 +33,8 @@ struct Canvas::Pen {
   bool lacks_glyphs = false;
 
   Handle<PangoLayout> LayOut(const FigureStyle& style, const std::string& text, double scale) {
-    Handle<PangoLayout> layout(pango_cairo_create_layout(cairo));
-    LeaveUnhinted(pango_layout_get_context(layout.get()));
-    const Handle<PangoFontDescription> font(pango_font_description_new());
-    pango_font_description_set_family(font.get(), style.font.c_str());
-    pango_font_description_set_size(
-        font.get(), static_cast<int>(std::lround(scale * style.font_pt * PANGO_SCALE)));
-    pango_layout_set_font_description(layout.get(), font.get());
-    pango_layout_set_markup(layout.get(), ToPango(text, scale * style.font_pt).c_str(), -1);
+    const double size = scale * style.font_pt;
+    Handle<PangoLayout> layout = internal::LayOut(cairo, style.font, size, ToPango(text, size));
     lacks_glyphs = lacks_glyphs || pango_layout_get_unknown_glyphs_count(layout.get()) > 0;
     return layout;
   }

@@ -8,9 +8,9 @@
 #include <map>
 
 #include "core/demand.h"
-#include "figure/cairo_handles.h"
 #include "figure/canvas.h"
 #include "image/png.h"
+#include "text/cairo_handles.h"
 
 namespace mbv {
 namespace {

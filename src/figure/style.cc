@@ -2,17 +2,9 @@
 
 #include <cstdlib>
 
+#include "text/fonts.h"
+
 namespace mbv {
-namespace {
-
-// The faces that journals ask for, else those of the same metrics; then Chinese (fonts-noto-cjk).
-constexpr const char* kSerif =
-    "Times New Roman, Liberation Serif, TeX Gyre Termes, Noto Serif CJK SC, serif";
-constexpr const char* kSans =
-    "Arial, Liberation Sans, TeX Gyre Heros, Noto Sans CJK SC, sans-serif";
-
-}  // namespace
-
 const std::vector<FigureStyle>& FigureStyles() {
   static const std::vector<FigureStyle> styles = {
       {.name = "ieee", .font = kSerif, .font_pt = 8.0, .width_mm = 88.9},

@@ -1,4 +1,4 @@
-// What cairo and Pango give is given back. Internal to figure/.
+// What cairo and Pango give is given back. Internal to text/ and figure/.
 #pragma once
 
 #include <cairo.h>
@@ -14,6 +14,7 @@ struct Unref {
   void operator()(PangoLayout* layout) const { g_object_unref(layout); }
   void operator()(PangoFontDescription* font) const { pango_font_description_free(font); }
   void operator()(cairo_font_options_t* options) const { cairo_font_options_destroy(options); }
+  void operator()(char* text) const { g_free(text); }
 };
 template <typename T>
 using Handle = std::unique_ptr<T, Unref>;
