@@ -21,9 +21,10 @@ namespace mbv {
 namespace {
 
 struct RenderArguments {
-  std::string scenario, at, size, camera, background, video, out = "pictures";
+  std::string scenario, at, size, camera, background, labels, ghosts, style, exploded, video;
+  std::string out = "pictures";
   std::vector<std::string> set;
-  bool no_caption = false, labels = false;
+  bool no_caption = false, scale_bar = false, orthographic = false;
   double frames_per_s = 25.0;
 };
 
@@ -74,6 +75,27 @@ bool SetCamera(const std::string& camera, ScenarioOptions* options) {
   return true;
 }
 
+// A list of words as a list of the scenario; one is a list, too.
+std::string ListText(const std::string& words) { return "[" + words + "]"; }
+
+// How the pictures look, as values of the scenario.
+void SetLook(const RenderArguments& arguments, ScenarioOptions* options) {
+  const auto set = [&](const char* key, const std::string& value) {
+    options->set.emplace_back(std::string("snapshots.") + key, value);
+  };
+  // A colour's # would begin a comment.
+  if (!arguments.background.empty()) set("background", "\"" + arguments.background + "\"");
+  if (!arguments.labels.empty()) set("labels", ListText(arguments.labels));
+  if (!arguments.ghosts.empty()) {
+    const bool times = arguments.ghosts.find_first_of(",.") != std::string::npos;
+    set("ghosts", times ? ListText(arguments.ghosts) : arguments.ghosts);
+  }
+  if (!arguments.style.empty()) set("style", arguments.style);
+  if (!arguments.exploded.empty()) set("exploded", arguments.exploded);
+  if (arguments.scale_bar) set("scale_bar", "true");
+  if (arguments.orthographic) set("camera.projection", "orthographic");
+}
+
 // What the options set in the scenario; false after a message.
 bool ReadRequest(const RenderArguments& arguments, RenderRequest* request) {
   ScenarioOptions& options = request->scenario;
@@ -85,9 +107,8 @@ bool ReadRequest(const RenderArguments& arguments, RenderRequest* request) {
     options.set.emplace_back("snapshots.size_px", SizeText(arguments.size));
   }
   if (!arguments.camera.empty() && !SetCamera(arguments.camera, &options)) return false;
-  request->style = {.background = arguments.background,
-                    .caption = !arguments.no_caption,
-                    .labels = arguments.labels};
+  SetLook(arguments, &options);
+  request->caption = !arguments.no_caption;
   return true;
 }
 
@@ -137,9 +158,19 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
                      "front, back, left, right, top, bottom, iso, usual, or "
                      "AZIMUTH,ELEVATION[,DISTANCE] in degrees and metres");
   render->add_option("--background", arguments->background,
-                     "a colour instead of sky and ground, e.g. white or #f4f4f4");
+                     "transparent, white, or another colour (e.g. #f4f4f4) instead of sky and "
+                     "ground");
   render->add_flag("--no-caption", arguments->no_caption, "the picture alone");
-  render->add_flag("--labels", arguments->labels, "names of outputs, drives and joints");
+  render->add_flag("--labels{usual}", arguments->labels,
+                   "names of outputs, drives and joints; --labels=joints, frames, bodies or names, "
+                   "separated by commas, for those alone");
+  render->add_flag("--scale-bar", arguments->scale_bar, "a bar of a round length");
+  render->add_flag("--orthographic", arguments->orthographic, "parallel rays");
+  render->add_option("--ghosts", arguments->ghosts,
+                     "earlier instants, pale: how many, or their times [s], separated by commas");
+  render->add_option("--style", arguments->style, "shaded or line_art");
+  render->add_option("--exploded", arguments->exploded,
+                     "factor by which bodies move away from their middle, 1 to 10");
   render
       ->add_option("--set", arguments->set,
                    "key=value: overrides a value of the scenario (repeatable)")
@@ -151,12 +182,15 @@ void AddRenderCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::Range(1.0, 120.0))
       ->capture_default_str();
   render->add_option("--out", arguments->out, "folder for pictures")->capture_default_str();
-  SetFooter(render,
-            {"render scenarios/stabilizing_platform/sea_state.yaml --at 0,1.42 --size 1920x1080",
-             "render spr_tripod/default --camera iso --background white --no-caption",
-             "render scenarios/four_bar/turn.yaml --camera -90,0 --labels",
-             "render scenarios/spr_tripod/default.yaml --video tripod.mp4"},
-            "0 drawn, 2 bad input, 3 could not run");
+  SetFooter(
+      render,
+      {"render scenarios/stabilizing_platform/sea_state.yaml --at 0,1.42 --size 1920x1080",
+       "render spr_tripod/default --camera iso --background white --no-caption",
+       "render scenarios/four_bar/turn.yaml --camera -90,0 --labels --orthographic --scale-bar",
+       "render four_bar/turn --at 0.5 --ghosts 5 --background transparent --no-caption",
+       "render scara_robot/default --style line_art --labels=joints --size 7680x4320",
+       "render scenarios/spr_tripod/default.yaml --video tripod.mp4"},
+      "0 drawn, 2 bad input, 3 could not run");
   render->callback([arguments, exit_code] { *exit_code = Render(*arguments); });
 }
 

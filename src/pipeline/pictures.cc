@@ -26,12 +26,19 @@ PictureOptions OptionsOf(const SnapshotSettings& settings) {
   options.camera = {.azimuth_deg = Degrees(settings.camera.azimuth_rad),
                     .elevation_deg = Degrees(settings.camera.elevation_rad),
                     .distance_m = settings.camera.distance_m,
-                    .lookat_W = settings.camera.lookat_W};
+                    .lookat_W = settings.camera.lookat_W,
+                    .orthographic = settings.camera.orthographic};
+  options.background = settings.background;
+  options.labels = settings.labels;
+  options.scale_bar = settings.scale_bar;
+  options.line_art = settings.line_art;
+  options.exploded = settings.exploded;
   return options;
 }
 
 // Averages squares of pixels so that the width is at most 640.
-Picture Shrunk(const Picture& picture) {
+Picture Shrunk(const Picture& original) {
+  const Picture picture = OnWhite(original);
   const int n = std::max(1, (picture.width + 639) / 640);
   Picture small{.width = picture.width / n, .height = picture.height / n};
   for (int y = 0; y < small.height; ++y) {
@@ -62,6 +69,26 @@ PolylineOverlay PathOf(const Mechanism& mechanism, const SimulationRun& run, int
                             output.X_BO.translation());
   }
   return path;
+}
+
+// Instants that a picture at t_s shows beside its own, the first ones first.
+std::vector<double> GhostTimes(const SnapshotSettings& settings, double t_s) {
+  std::vector<double> times_s = settings.ghost_times_s;
+  for (int k = 0; k < settings.ghost_count; ++k) {
+    times_s.push_back(t_s * k / settings.ghost_count);
+  }
+  std::ranges::sort(times_s);
+  return times_s;
+}
+
+void AddGhosts(const SnapshotSettings& settings, const Mechanism& mechanism,
+               const SimulationRun& run, double t_s, PictureFrame* frame) {
+  const int own = NearestSample(run.trace.time_s, t_s);
+  for (const double ghost_s : GhostTimes(settings, t_s)) {
+    const int sample = NearestSample(run.trace.time_s, ghost_s);
+    if (sample == own || !HasPoses(mechanism, run, static_cast<size_t>(sample))) continue;
+    frame->X_WB_ghosts.push_back(run.X_WB[static_cast<size_t>(sample)]);
+  }
 }
 
 std::string SnapshotName(double t_s) { return fmt::format("t_{:.3f}s", t_s); }
@@ -124,22 +151,20 @@ Caption CaptionOf(const Report& report) {
 
 RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
                   const Mechanism& mechanism, const SimulationRun& run, const Caption& caption,
-                  const PictureSink& sink, const PictureStyle& style) {
+                  const PictureSink& sink) {
   const auto start = std::chrono::steady_clock::now();
   std::vector<PictureFrame> frames;
   for (const double t_s : times_s) {
     const int sample = NearestSample(run.trace.time_s, t_s);
     frames.push_back(SampleFrame(mechanism, run, sample));
-    if (!style.caption) continue;
+    AddGhosts(scenario.snapshots, mechanism, run, t_s, &frames.back());
+    if (caption.title.empty()) continue;
     frames.back().caption = caption;
     frames.back().caption.detail = fmt::format(
         "t = {:.3f} s   {}", run.trace.time_s[static_cast<size_t>(sample)], caption.detail);
   }
   PictureOptions options = OptionsOf(scenario.snapshots);
   if (frames.size() > kFewPictures) options.passes = kVideoPasses;
-  // The shapes' white is that of paint; paper is whiter.
-  options.background = style.background == "white" ? "#ffffff" : style.background;
-  options.labels = style.labels;
   Overlay overlay;
   if (scenario.snapshots.path_output >= 0) {
     PolylineOverlay path = PathOf(mechanism, run, scenario.snapshots.path_output);
@@ -153,7 +178,7 @@ RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
 RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
                          const SimulationRun& run, const Caption& caption,
                          const std::function<void(double)>& progress,
-                         std::vector<PictureFile>* files, const PictureStyle& style) {
+                         std::vector<PictureFile>* files) {
   std::vector<double> times_s = scenario.snapshots.times_s;
   std::erase_if(times_s, [&](double t_s) {
     return !HasPoses(mechanism, run, static_cast<size_t>(NearestSample(run.trace.time_s, t_s)));
@@ -164,16 +189,14 @@ RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
     const double sample_s = run.trace.time_s[static_cast<size_t>(sample)];
     files->push_back({SnapshotName(sample_s) + ".png", "", ""});
   }
-  RunSummary summary = DrawAt(
-      times_s, scenario, mechanism, run, caption,
-      [&](int index, Picture picture) {
+  RunSummary summary =
+      DrawAt(times_s, scenario, mechanism, run, caption, [&](int index, Picture picture) {
         PictureFile& file = (*files)[static_cast<size_t>(index)];
         file.content = EncodePng(picture);
         file.preview = EncodePng(Shrunk(picture));
         if (progress) progress((index + 1.0) / static_cast<double>(times_s.size()));
         return true;
-      },
-      style);
+      });
   if (!summary.ok()) files->clear();
   return summary;
 }

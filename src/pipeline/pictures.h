@@ -21,12 +21,6 @@ struct PictureFile {
   std::string preview;  ///< PNG, at most 640 pixels wide
 };
 
-/// How pictures look, beyond what a scenario says of them.
-struct PictureStyle {
-  std::string background = {};  ///< as PictureOptions::background
-  bool caption = true, labels = false;
-};
-
 /// Title and status of a run's pictures; the time is added to the detail of each.
 [[nodiscard]] Caption CaptionOf(const Report& report);
 
@@ -39,18 +33,17 @@ struct PictureStyle {
                                                 const Mechanism& mechanism,
                                                 const SimulationRun& run);
 
-/// Draws the simulation at the scenario's snapshot times (nearest sample each).
+/// Draws the simulation at the scenario's snapshot times (nearest sample each); without a bar below
+/// if the caption is empty.
 [[nodiscard]] RunSummary DrawSnapshots(const Scenario& scenario, const Mechanism& mechanism,
                                        const SimulationRun& run, const Caption& caption,
                                        const std::function<void(double)>& progress,
-                                       std::vector<PictureFile>* files,
-                                       const PictureStyle& style = {});
+                                       std::vector<PictureFile>* files);
 
 /// Draws the simulation at these times (nearest sample each), a little less smooth if there are
 /// many.
 [[nodiscard]] RunSummary DrawAt(const std::vector<double>& times_s, const Scenario& scenario,
                                 const Mechanism& mechanism, const SimulationRun& run,
-                                const Caption& caption, const PictureSink& sink,
-                                const PictureStyle& style = {});
+                                const Caption& caption, const PictureSink& sink);
 
 }  // namespace mbv

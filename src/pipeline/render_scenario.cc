@@ -1,13 +1,6 @@
 #include "pipeline/render_scenario.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-
-#include "core/text.h"
-#include "core/word_hints.h"
 #include "image/png.h"
-#include "mechanism/colors.h"
 #include "pipeline/animation.h"
 #include "pipeline/run_witnesses.h"
 #include "pipeline/video.h"
@@ -33,25 +26,21 @@ RunSummary DrawVideo(const Scenario& scenario, const Mechanism& mechanism, const
   };
   if (VideoFormatOf(request.video_file) == VideoFormat::kAnimatedPng) {
     std::vector<PictureFile> frames;
-    RunSummary drawn = DrawAt(
-        times, scenario, mechanism, run, caption,
-        [&](int index, const Picture& picture) {
+    RunSummary drawn =
+        DrawAt(times, scenario, mechanism, run, caption, [&](int index, const Picture& picture) {
           frames.push_back({"", EncodePng(picture), ""});
           advance(index);
           return true;
-        },
-        request.style);
+        });
     if (drawn.ok()) *video = AnimatedPng(frames, request.frames_per_s);
     return drawn;
   }
   VideoEncoder encoder(request.video_file, request.frames_per_s);
-  RunSummary drawn = DrawAt(
-      times, scenario, mechanism, run, caption,
-      [&](int index, const Picture& picture) {
+  RunSummary drawn =
+      DrawAt(times, scenario, mechanism, run, caption, [&](int index, const Picture& picture) {
         advance(index);
-        return encoder.Add(picture);
-      },
-      request.style);
+        return encoder.Add(OnWhite(picture));
+      });
   if (!drawn.ok()) return drawn;
   const std::string trouble = encoder.Finish(video);
   if (trouble.empty()) return drawn;
@@ -64,13 +53,6 @@ RunSummary DrawVideo(const Scenario& scenario, const Mechanism& mechanism, const
 
 RenderOutcome RenderScenario(const std::string& file, const RenderRequest& request) {
   RenderOutcome outcome;
-  if (const std::string& color = request.style.background; !color.empty() && !IsShapeColor(color)) {
-    outcome.diagnostics.AddError(
-        "", fmt::format("background '{}' is neither a colour's name nor #rrggbb", color),
-        DidYouMean(color, ShapeColorNames(), "colours: " + Joined(ShapeColorNames())));
-    outcome.exit_code = 2;
-    return outcome;
-  }
   if (const std::string trouble = request.video_file.empty() ? "" : CheckVideo(request.video_file);
       !trouble.empty()) {
     Finding finding;
@@ -97,12 +79,12 @@ RenderOutcome RenderScenario(const std::string& file, const RenderRequest& reque
     outcome.diagnostics.AddError(file, witness.run.summary.message);
     return outcome;
   }
-  const Caption caption{
-      .title = outcome.mechanism + " / " + outcome.scenario, .detail = {}, .status = {}};
+  Caption caption;
+  if (request.caption) caption.title = outcome.mechanism + " / " + outcome.scenario;
   const RunSummary drawn =
       request.video_file.empty()
           ? DrawSnapshots(scenario, prepared->mechanisms.simulated, witness.run, caption,
-                          progress("pictures"), &outcome.pictures, request.style)
+                          progress("pictures"), &outcome.pictures)
           : DrawVideo(scenario, prepared->mechanisms.simulated, witness.run, caption, request,
                       progress("video"), &outcome.video);
   if (!drawn.ok()) {

@@ -17,7 +17,7 @@ struct RenderRequest {
   std::string video_file;  ///< given: one video instead of single pictures; its ending tells the
                            ///< format (pipeline/video.h)
   double frames_per_s = 25.0;
-  PictureStyle style = {};
+  bool caption = true;
   ProgressFunction progress;
 };
 

@@ -5,6 +5,8 @@
 #include <numbers>
 #include <utility>
 
+#include "render/tessellation.h"
+
 namespace mbv::render {
 namespace {
 
@@ -261,7 +263,7 @@ void AddPathGhost(const std::vector<Vec3>& points, double radius, const Material
 
 void AddPath(const PolylineOverlay& path, double radius, const Vec3& forward_W, Annotations* out) {
   Material material = MaterialOf(path.color);
-  material.emission = 0.3F;
+  material.emission = 0.05F;
   const std::vector<Vec3> points = Thinned(path.points_W, 0.1 * radius);
   for (std::size_t i = 0; i + 1 < points.size(); ++i) {
     out->items.push_back(Between(Solid::kCapsule, points[i], points[i + 1], radius, material));
@@ -296,77 +298,19 @@ Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame, cons
   return out;
 }
 
-FlatMesh MarkMesh(const Item& mark) {
-  FlatMesh mesh{.rgba = mark.material.rgba, .shaded = true};
-  // Profile (radius, height) along z, turned about z.
-  std::vector<std::pair<double, double>> profile;
-  const double r = mark.size.x(), half = mark.size.z();
-  constexpr int kCap = 5, kSides = 18;
-  const auto cap = [&](double centre, double from, double to) {
-    for (int i = 0; i <= kCap; ++i) {
-      const double angle = from + (to - from) * i / kCap;
-      profile.emplace_back(r * std::cos(angle), centre + r * std::sin(angle));
-    }
-  };
-  switch (mark.solid) {
-    case Solid::kBall:
-      cap(0.0, -0.5 * kPi, 0.0);
-      cap(0.0, 0.0, 0.5 * kPi);
-      break;
-    case Solid::kCapsule:
-      cap(-half, -0.5 * kPi, 0.0);
-      cap(half, 0.0, 0.5 * kPi);
-      break;
-    case Solid::kCylinder:
-      profile = {{0.0, -half}, {r, -half}, {r, half}, {0.0, half}};
-      break;
-    case Solid::kArrow: {
-      // As AddArrowGhost() draws its outline; `half` is the whole length.
-      const double neck = half - std::min(6.0 * r, 0.5 * half);
-      profile = {{0.0, 0.0}, {r, 0.0}, {r, neck}, {2.0 * r, neck}, {0.0, half}};
-      break;
-    }
-    case Solid::kBox:
-      return GlassBox(mark);
-    case Solid::kMesh:
-      for (const Vec3& p : mark.mesh->vertices) mesh.vertices_W.emplace_back(mark.X_WG * p);
-      mesh.triangles = mark.mesh->triangles;
-      return mesh;
+FlatMesh GlassMesh(const Item& item) {
+  constexpr int kSides = 48;
+  FlatMesh mesh{.rgba = item.material.rgba, .shaded = true};
+  if (item.solid == Solid::kMesh) {
+    mesh.vertices_W = item.mesh->vertices;
+    mesh.triangles = item.mesh->triangles;
+  } else {
+    Facets facets = FacetsOf(item, kSides);
+    mesh.vertices_W = std::move(facets.points_G);
+    mesh.triangles = std::move(facets.triangles);
   }
-  for (const auto& [radius, height] : profile) {
-    for (int i = 0; i < kSides; ++i) {
-      const double angle = 2.0 * kPi * i / kSides;
-      mesh.vertices_W.emplace_back(
-          mark.X_WG * Vec3(radius * std::cos(angle), radius * std::sin(angle), height));
-    }
-  }
-  for (int ring = 0; ring + 1 < static_cast<int>(profile.size()); ++ring) {
-    for (int i = 0; i < kSides; ++i) {
-      const int a = ring * kSides + i, b = ring * kSides + (i + 1) % kSides;
-      mesh.triangles.push_back({a, b, a + kSides});
-      mesh.triangles.push_back({b, b + kSides, a + kSides});
-    }
-  }
+  for (Vec3& p : mesh.vertices_W) p = item.X_WG * p;
   return mesh;
-}
-
-FlatMesh GlassBox(const Item& box) {
-  // Corner i has the signs of i's three bits; two triangles per face.
-  return {.vertices_W = Corners(box),
-          .triangles = {{0, 1, 3},
-                        {0, 3, 2},
-                        {4, 5, 7},
-                        {4, 7, 6},
-                        {0, 1, 5},
-                        {0, 5, 4},
-                        {2, 3, 7},
-                        {2, 7, 6},
-                        {0, 2, 6},
-                        {0, 6, 4},
-                        {1, 3, 7},
-                        {1, 7, 5}},
-          .rgba = box.material.rgba,
-          .shaded = true};
 }
 
 Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale, const Vec3& forward_W) {

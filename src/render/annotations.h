@@ -35,10 +35,8 @@ struct Annotations {
 [[nodiscard]] Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame,
                                    const Scale& scale, const PictureOptions& options,
                                    const Vec3& forward_W);
-/// A mark as flat faces: the renderer gives every solid a shadow.
-[[nodiscard]] FlatMesh MarkMesh(const Item& mark);
-/// A translucent box as flat faces: solids, even translucent ones, cast full shadows.
-[[nodiscard]] FlatMesh GlassBox(const Item& box);
+/// A translucent solid as flat faces, to be blended.
+[[nodiscard]] FlatMesh GlassMesh(const Item& item);
 /// The overlay's paths as rods and its meshes, with ghosts where bodies hide them from a camera
 /// looking along `forward_W`.
 [[nodiscard]] Annotations OverlayAnnotations(const Overlay& overlay, const Scale& scale,

@@ -7,16 +7,10 @@
 
 #include "render/annotations.h"
 #include "render/best_view.h"
+#include "render/labels.h"
 
 namespace mbv::render {
 namespace {
-
-// 1, 2 or 5 times a power of ten, not above `value`.
-double RoundLength(double value) {
-  const double power = std::pow(10.0, std::floor(std::log10(value)));
-  const double digit = value / power;
-  return (digit >= 5.0 ? 5.0 : digit >= 2.0 ? 2.0 : 1.0) * power;
-}
 
 std::string WithUnit(double value, const std::string& unit) {
   if (value >= 1e6) return fmt::format("{:.3g} M{}", value * 1e-6, unit);
@@ -80,6 +74,20 @@ class Extent {
   Eigen::AlignedBox3d framed_, all_;
 };
 
+void SetBackground(const PictureOptions& options, StageOptions* stage) {
+  const std::string& name = options.background;
+  if (name == "transparent") {
+    stage->background = std::array<float, 4>{0.0F, 0.0F, 0.0F, 0.0F};
+  } else if (name == "white" || (name.empty() && options.line_art)) {
+    stage->background = std::array<float, 4>{1.0F, 1.0F, 1.0F, 1.0F};
+  } else if (!name.empty()) {
+    stage->background = MaterialOf(name).rgba;
+    (*stage->background)[3] = 1.0F;
+  }
+  const bool shadows_alone = name == "transparent" || name == "white";
+  if (stage->background) stage->ground = shadows_alone ? Ground::kShadowsAlone : Ground::kNone;
+}
+
 }  // namespace
 
 Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
@@ -96,7 +104,6 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
                 {.side = 0.05, .top = 0.045, .bottom = 0.045 + bar_px / height}, set.R_DW);
 
   Extent extent(set.R_DW, &fit);
-  std::size_t most_items = 0;
   std::vector<std::shared_ptr<const TriangleMesh>> meshes;
   for (const PictureFrame& frame : frames) {
     const std::vector<Item> items = MechanismItems(mechanism, frame, set.scale, options);
@@ -104,7 +111,6 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
     const Annotations marks = Annotate(mechanism, frame, set.scale, options, Vec3::UnitX());
     extent.Include(items, &frame == frames.data());
     extent.Include(marks.items, false);
-    most_items = std::max(most_items, items.size() + marks.items.size());
     for (const Item& item : items) {
       if (item.mesh != nullptr && std::ranges::find(meshes, item.mesh) == meshes.end()) {
         meshes.push_back(item.mesh);
@@ -126,17 +132,14 @@ Arrangement Arrange(const Mechanism& mechanism, const std::vector<PictureFrame>&
                .height = options.size_px[1],
                .passes = options.passes,
                .shadows = options.shadows,
+               .line_art = options.line_art,
                .centre_D = extent.framed().center(),
                .radius_m = 0.75 * size,
+               .ground = sea ? Ground::kSea : Ground::kGrid,
                .ground_m = sea.value_or(extent.lowest() - 0.01 * size),
-               .sea = sea.has_value(),
-               .most_items = static_cast<int>(most_items + overlaid.items.size()),
                .grid_m = RoundLength(0.14 * size),
                .meshes = std::move(meshes)};
-  if (!options.background.empty()) {
-    const auto rgba = MaterialOf(options.background).rgba;
-    set.stage.background = std::array<float, 3>{rgba[0], rgba[1], rgba[2]};
-  }
+  SetBackground(options, &set.stage);
   return set;
 }
 
@@ -165,10 +168,13 @@ std::vector<LegendEntry> LegendOf(const Mechanism& mechanism, const Arrangement&
   for (const PolylineOverlay& path : overlay.paths) {
     if (!path.name.empty()) legend.push_back({path.color, path.name});
   }
-  if (!arrangement.stage.sea && ground_seen && !arrangement.stage.background) {
+  if (arrangement.stage.ground == Ground::kGrid && ground_seen) {
     legend.push_back({"", fmt::format("grid {:g} m", arrangement.stage.grid_m)});
   }
   for (size_t i = second_row; i < legend.size(); ++i) legend[i].row = 1;
+  if (options.line_art) {
+    std::erase_if(legend, [](const LegendEntry& entry) { return !entry.color.empty(); });
+  }
   return legend;
 }
 

@@ -18,10 +18,17 @@ struct Camera {
   double azimuth_deg = 0.0, elevation_deg = 0.0;  ///< as in CameraView
   double distance_m = 1.0;
   Vec3 lookat_D = Vec3::Zero();
+  bool parallel = false;  ///< orthographic: all as large as in the plane through the look-at point
 
   [[nodiscard]] Vec3 forward_D() const;  ///< unit, from the camera to the look-at point
   [[nodiscard]] Vec3 position_D() const { return lookat_D - distance_m * forward_D(); }
 };
+
+/// Unit vectors of the picture: to the right, upwards, away from the camera.
+struct CameraAxes {
+  Vec3 right, up, forward;
+};
+[[nodiscard]] CameraAxes AxesOf(const Camera& camera);
 
 /// Part of the picture that the mechanism may fill, as fractions of width and height.
 struct Margins {
@@ -57,6 +64,9 @@ class CameraFit {
   Eigen::AlignedBox3d box_;
   double distance_to_lookat_ = 0.0;  // that a given look-at point needs
 };
+
+/// What the picture's height shows of the plane through the look-at point [m].
+[[nodiscard]] double HeightAtLookat(const Camera& camera);
 
 /// Picture coordinates (0 … 1 from the left and from the top) of a point before the camera.
 [[nodiscard]] Eigen::Vector2d Project(const Camera& camera, double aspect, const Vec3& p_D);

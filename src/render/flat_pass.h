@@ -1,21 +1,27 @@
-// Flat meshes, drawn with plain OpenGL after MuJoCo's pass into the same buffer.
+// Flat meshes, drawn over the solids into the same buffer.
 #pragma once
-
-#include <mujoco/mujoco.h>
 
 #include <vector>
 
 #include "core/types.h"
 #include "render/annotations.h"
+#include "render/gl_objects.h"
+#include "render/projection.h"
 
 namespace mbv::render {
 
-struct FlatView {
-  mjvGLCamera camera;  ///< as used by mjr_render
-  int width = 0, height = 0;
-};
+class FlatPass {
+ public:
+  FlatPass();
+  /// Sorts the meshes' triangles for this view, the farthest first.
+  void Load(const std::vector<FlatMesh>& meshes, const Mat3& R_DW, const Projection& view);
+  /// Draws them against what is already in the depth buffer.
+  void Draw(const Projection& view) const;
 
-/// Draws the meshes, farthest triangle first, against what is already in the depth buffer.
-void DrawFlats(const std::vector<FlatMesh>& meshes, const Mat3& R_DW, const FlatView& view);
+ private:
+  GlMesh mesh_;
+  GlProgram program_;
+  int hidden_ = 0, visible_ = 0;  // vertices: those that show through solids come first
+};
 
 }  // namespace mbv::render

@@ -37,7 +37,7 @@ Finish FinishOf(const std::string& color) {
 
 Material MaterialOf(const std::string& color) {
   if (const auto mark = Marks().find(color); mark != Marks().end()) {
-    return {.rgba = mark->second, .specular = 0.1F, .shininess = 0.3F, .emission = 0.35F};
+    return {.rgba = mark->second, .specular = 0.1F, .shininess = 0.3F, .emission = 0.05F};
   }
   const Finish finish = FinishOf(color);
   Material material{.specular = finish.specular, .shininess = finish.shininess};

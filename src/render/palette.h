@@ -6,7 +6,7 @@
 
 namespace mbv::render {
 
-/// A surface for the fixed-function renderer. Colours are display values 0 … 1.
+/// A surface. Colours are display values 0 … 1.
 struct Material {
   std::array<float, 4> rgba{0.6F, 0.6F, 0.6F, 1.0F};
   float specular = 0.3F;   ///< strength of the highlight, 0 … 1

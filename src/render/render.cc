@@ -8,9 +8,12 @@
 
 #include "core/demand.h"
 #include "mechanism/colors.h"
+#include "mechanism/named_places.h"
 #include "render/annotations.h"
 #include "render/arrangement.h"
 #include "render/caption.h"
+#include "render/instants.h"
+#include "render/labels.h"
 #include "render/scene.h"
 #include "render/stage.h"
 
@@ -60,32 +63,54 @@ RunSummary CheckInput(const Mechanism& mechanism, const std::vector<PictureFrame
   return RunSummary::Done();
 }
 
-// Names of outputs, drives and joints where they are, in this order.
 std::vector<rn::Label> LabelsOf(const Mechanism& mechanism, const PictureFrame& frame,
                                 const rn::Arrangement& set, const PictureOptions& options) {
   std::vector<rn::Label> labels;
   const double aspect = static_cast<double>(options.size_px[0]) / options.size_px[1];
-  const auto add = [&](const std::string& name, const Vec3& p_W) {
+  for (const NamedPlace& place : PlacesFor(mechanism, options.labels)) {
+    const Vec3 p_W =
+        0.5 * (frame.X_WB[place.body_a] * place.p_a + frame.X_WB[place.body_b] * place.p_b);
     const Eigen::Vector2d at = rn::Project(set.camera, aspect, set.R_DW * p_W);
-    labels.push_back({.x = at.x(), .y = at.y(), .text = name});
-  };
-  for (const Output& output : mechanism.outputs) {
-    add(output.name, frame.X_WB[output.body] * Vec3(output.X_BO.translation()));
-  }
-  for (const Drive& drive : mechanism.drives) {
-    if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
-      add(drive.name,
-          0.5 * (frame.X_WB[leg->body_from] * leg->p_from + frame.X_WB[leg->body_to] * leg->p_to));
-    } else {
-      const Joint& joint = mechanism.joints[std::get<JointDrive>(drive.kind).joint];
-      add(drive.name, frame.X_WB[joint.child] * Vec3(joint.X_CM.translation()));
-    }
-  }
-  for (const Joint& joint : mechanism.joints) {
-    if (joint.kind == JointKind::kFree) continue;
-    add(joint.name, frame.X_WB[joint.child] * Vec3(joint.X_CM.translation()));
+    labels.push_back({.x = at.x(), .y = at.y(), .text = place.name});
   }
   return labels;
+}
+
+// Translucent solids become flat meshes, which are blended.
+void MakeGlassFlat(std::vector<rn::Item>* items, std::vector<rn::FlatMesh>* flats) {
+  std::erase_if(*items, [&](const rn::Item& item) {
+    const bool glass = item.material.rgba[3] < 1.0F;
+    if (glass) flats->push_back(rn::GlassMesh(item));
+    return glass;
+  });
+}
+
+rn::StageContent ContentOf(const Mechanism& mechanism, const PictureFrame& frame,
+                           const rn::Arrangement& set, const rn::Annotations& overlaid,
+                           const PictureOptions& options) {
+  rn::StageContent content{.items = rn::MechanismItems(mechanism, frame, set.scale, options)};
+  content.ghosts = rn::GhostItems(mechanism, frame, content.items, set.scale, options);
+  const rn::Annotations marks = rn::Annotate(mechanism, frame, set.scale, options, set.forward_W);
+  for (const rn::Annotations* more : {&marks, &overlaid}) {
+    content.items.insert(content.items.end(), more->items.begin(), more->items.end());
+    content.flats.insert(content.flats.end(), more->flats.begin(), more->flats.end());
+  }
+  MakeGlassFlat(&content.items, &content.flats);
+  return content;
+}
+
+// Labels, scale and caption.
+void PaintTexts(const Mechanism& mechanism, const PictureFrame& frame, const rn::Arrangement& set,
+                const std::vector<rn::LegendEntry>& legend, const PictureOptions& options,
+                Picture* picture) {
+  const int floor_px = picture->height - rn::BarHeight(frame.caption, options.size_px);
+  if (!options.labels.empty()) {
+    (void)rn::PaintLabels(LabelsOf(mechanism, frame, set, options), floor_px, picture);
+  }
+  if (options.scale_bar) {
+    rn::PaintScaleBar(rn::HeightAtLookat(set.camera), set.camera.parallel, floor_px, picture);
+  }
+  rn::PaintCaption(frame.caption, legend, picture);
 }
 
 }  // namespace
@@ -102,8 +127,11 @@ Diagnostics Check(const PictureOptions& options) {
   demand(options.passes >= 1 && options.passes <= 64,
          fmt::format("passes = {} violates 1 <= passes <= 64", options.passes));
   demand(
-      options.background.empty() || IsShapeColor(options.background),
+      options.background.empty() || options.background == "transparent" ||
+          IsShapeColor(options.background),
       fmt::format("background = '{}' is neither a colour's name nor #rrggbb", options.background));
+  demand(options.exploded >= 1.0 && options.exploded <= 10.0,
+         fmt::format("exploded = {} violates 1 <= exploded <= 10", options.exploded));
   const CameraView& view = options.camera;
   demand(!view.azimuth_deg || std::isfinite(*view.azimuth_deg),
          "camera.azimuth_deg is not a finite number");
@@ -131,44 +159,33 @@ PictureFrame SampleFrame(const Mechanism& mechanism, const SimulationRun& run, i
 }
 
 RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
-                          const Overlay& overlay, const PictureOptions& options,
+                          const Overlay& overlay, const PictureOptions& asked,
                           const PictureSink& sink) {
   const auto start = std::chrono::steady_clock::now();
-  if (const Diagnostics found = Check(options); found.has_errors()) {
+  if (const Diagnostics found = Check(asked); found.has_errors()) {
     return Unsupported(found.findings()[0].message);
   }
-  if (RunSummary input = CheckInput(mechanism, frames, overlay); !input.ok()) return input;
+  if (RunSummary input = CheckInput(mechanism, rn::WithGhosts(frames), overlay); !input.ok()) {
+    return input;
+  }
   if (frames.empty()) return RunSummary::Done();
-  const rn::Arrangement set = rn::Arrange(mechanism, frames, overlay, options);
+  PictureOptions options = asked;
+  std::vector<PictureFrame> shown = frames;
+  if (options.exploded > 1.0) {
+    options.closures = false;  // all of them came apart
+    for (PictureFrame& frame : shown) frame = rn::Exploded(mechanism, frame, options.exploded);
+  }
+  const rn::Arrangement set = rn::Arrange(mechanism, rn::WithGhosts(shown), overlay, options);
   std::unique_ptr<rn::Stage> stage;
   if (RunSummary opened = rn::Stage::Open(set.stage, &stage); !opened.ok()) return opened;
-  std::vector<rn::Glyph> font;
-  const bool any_caption = std::ranges::any_of(
-      frames, [](const PictureFrame& frame) { return !rn::IsEmpty(frame.caption); });
-  if (any_caption || options.labels) {
-    if (RunSummary got = stage->Font(&font); !got.ok()) return got;
-  }
   const std::vector<rn::LegendEntry> legend = rn::LegendOf(mechanism, set, overlay, options);
   const rn::Annotations overlaid = rn::OverlayAnnotations(overlay, set.scale, set.forward_W);
-  for (std::size_t f = 0; f < frames.size(); ++f) {
-    std::vector<rn::Item> items = rn::MechanismItems(mechanism, frames[f], set.scale, options);
-    rn::Annotations marks = rn::Annotate(mechanism, frames[f], set.scale, options, set.forward_W);
-    items.insert(items.end(), marks.items.begin(), marks.items.end());
-    items.insert(items.end(), overlaid.items.begin(), overlaid.items.end());
-    marks.flats.insert(marks.flats.end(), overlaid.flats.begin(), overlaid.flats.end());
-    std::erase_if(items, [&marks](const rn::Item& item) {
-      const bool glass = item.solid == rn::Solid::kBox && item.material.rgba[3] < 0.5F;
-      if (glass) marks.flats.push_back(rn::GlassBox(item));
-      return glass;
-    });
+  for (std::size_t f = 0; f < shown.size(); ++f) {
     Picture picture;
-    RunSummary drawn = stage->Draw(items, marks.flats, set.R_DW, set.camera, &picture);
+    RunSummary drawn = stage->Draw(ContentOf(mechanism, shown[f], set, overlaid, options), set.R_DW,
+                                   set.camera, &picture);
     if (!drawn.ok()) return drawn;
-    if (options.labels) {
-      rn::PaintLabels(LabelsOf(mechanism, frames[f], set, options), frames[f].caption, font,
-                      &picture);
-    }
-    rn::PaintCaption(frames[f].caption, legend, font, &picture);
+    PaintTexts(mechanism, shown[f], set, legend, options, &picture);
     if (!sink(static_cast<int>(f), std::move(picture))) break;
   }
   RunSummary summary = RunSummary::Done();

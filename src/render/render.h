@@ -1,4 +1,4 @@
-// Verification pictures: a mechanism drawn off-screen with MuJoCo's renderer (no display needed).
+// Verification pictures: a mechanism drawn off-screen (no display needed).
 //
 // A picture is drawn from the mechanism's shapes and one pose per body, so it works for a
 // simulated sample, for a commanded pose and for the home pose without any simulation. Up is
@@ -29,21 +29,27 @@ struct CameraView {
   std::optional<double> elevation_deg = {};  ///< height of the camera above the horizon, -90 … 90
   std::optional<double> distance_m = {};     ///< to the look-at point, > 0
   std::optional<Vec3> lookat_W = {};         ///< [m]
+  bool orthographic = false;                 ///< parallel rays: lengths across them are to scale
 };
 
 struct PictureOptions {
   std::array<int, 2> size_px{1280, 960};  ///< each 64 … 8192
-  int passes =
-      12;  ///< averaged passes, 1 … 64: smoother edges and softer shadows; time grows with it
+  int passes = 8;  ///< averaged passes, 1 … 64: smoother edges and softer shadows
   CameraView camera;
   bool shadows = true;
   bool joints = true;         ///< joints as small balls and cylinders
   bool closures = true;       ///< rings around the joints that close loops
   bool drive_forces = true;   ///< arrows, where the frame has forces
   bool output_frames = true;  ///< triads at the outputs
-  bool labels = false;        ///< names of outputs, drives and joints, where there is room
-  std::string background =
-      {};  ///< a colour instead of sky and ground ("white", "#rrggbb"); "": none
+  /// What is named, as PlacesFor() of mechanism/named_places.h takes it.
+  std::vector<std::string> labels = {};
+  bool scale_bar = false;
+  bool line_art = false;  ///< black outlines on white, without arrows' colours and ground
+  /// Factor by which bodies move away from the middle of all, >= 1.
+  double exploded = 1.0;
+  /// Instead of sky and ground: "transparent", "white" (both with shadows on the ground), or a
+  /// colour's name or "#rrggbb" without them; "": sky and ground.
+  std::string background = {};
 };
 [[nodiscard]] Diagnostics Check(const PictureOptions& options);
 
@@ -60,6 +66,7 @@ struct PictureFrame {
   std::vector<Pose> X_WB;                 ///< per body of the mechanism
   std::vector<double> drive_forces = {};  ///< per drive [N or N m]; empty: no arrows; NaN: no arrow
   Caption caption = {};                   ///< all empty: no caption bar
+  std::vector<std::vector<Pose>> X_WB_ghosts = {};  ///< other instants, pale, the farthest first
 };
 
 /// Additions drawn into every frame.

@@ -1,14 +1,14 @@
-// The off-screen stage: an OSMesa context with MuJoCo's renderer, ground or sea, sky and lights.
+// The off-screen stage: an OSMesa context that draws solids on the ground or the sea, under a sky.
 //
-// A picture is the mean of several passes. Each pass shifts the camera by a part of a pixel, the
-// key light within a small cone and the sky light over the hemisphere, which gives smooth edges,
-// soft shadows and darkened corners with a renderer that knows only hard ones.
+// A picture is the mean of several passes. Each pass shifts the camera by a part of a pixel and the
+// key light within a small cone, which gives smooth edges and soft shadows. The first passes draw
+// everything, the others only where those differ: along edges. A picture larger than a tile is
+// drawn tile by tile.
 #pragma once
 
 #include <array>
 #include <memory>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/run_summary.h"
@@ -19,38 +19,40 @@
 
 namespace mbv::render {
 
+enum class Ground { kGrid, kSea, kShadowsAlone, kNone };
+
 struct StageOptions {
   int width = 1280, height = 960;
   int passes = 8;
   bool shadows = true;
+  bool line_art = false;         ///< black outlines on white solids
   Vec3 centre_D = Vec3::Zero();  ///< middle of what is lit [m]
   double radius_m = 1.0;         ///< shadows are cast within this radius of the centre
-  double ground_m = 0.0;         ///< height of the ground plane or the water
-  bool sea = false;
-  int most_items = 1000;                                ///< room for so many solids in one picture
-  double grid_m = 0.1;                                  ///< spacing of the ground's grid lines
-  std::optional<std::array<float, 3>> background = {};  ///< instead of sky and ground
+  Ground ground = Ground::kGrid;
+  double ground_m = 0.0;  ///< height of the ground plane or the water
+  double grid_m = 0.1;    ///< spacing of the ground's grid lines
+  /// Red, green, blue, opacity instead of a sky.
+  std::optional<std::array<float, 4>> background = {};
   std::vector<std::shared_ptr<const TriangleMesh>> meshes = {};  ///< that items show
+  int tile_px = 2048;  ///< largest side of what is drawn at once
 };
 
-/// One character of the renderer's font as coverage 0 … 255.
-struct Glyph {
-  int width = 0, height = 0;
-  std::vector<std::uint8_t> coverage;
+/// What one picture shows, in the world frame.
+struct StageContent {
+  std::vector<Item> items = {};
+  std::vector<FlatMesh> flats = {};
+  std::vector<std::vector<Item>> ghosts = {};  ///< pale, behind the items, the first ones farthest
 };
 
 class Stage {
  public:
-  /// Fails with kEngineFailure when there is no off-screen context or MuJoCo reports an error.
+  /// Fails with kEngineFailure when there is no off-screen context.
   [[nodiscard]] static RunSummary Open(const StageOptions& options, std::unique_ptr<Stage>* stage);
   virtual ~Stage() = default;
 
-  /// Draws the items and flat meshes (world frame) as seen by the camera.
-  [[nodiscard]] virtual RunSummary Draw(const std::vector<Item>& items,
-                                        const std::vector<FlatMesh>& flats, const Mat3& R_DW,
+  /// Draws the content as seen by the camera; with opacities if the background has one.
+  [[nodiscard]] virtual RunSummary Draw(const StageContent& content, const Mat3& R_DW,
                                         const Camera& camera, Picture* picture) = 0;
-  /// Glyphs of the characters 32 … 126.
-  [[nodiscard]] virtual RunSummary Font(std::vector<Glyph>* glyphs) = 0;
 };
 
 }  // namespace mbv::render

@@ -16,25 +16,6 @@ void Put(std::vector<std::uint8_t>* rgb, std::size_t pixel, double r, double g, 
 
 }  // namespace
 
-std::vector<std::uint8_t> GridTexture(int size) {
-  std::vector<std::uint8_t> rgb(3UL * size * size);
-  const int field = size / 5;
-  const auto line = [&](int i) {
-    const int to_major = std::min(i, size - i);
-    const int to_minor = std::min(i % field, field - i % field);
-    if (to_major <= size / 256) return 0.16;
-    return to_minor <= size / 512 ? 0.09 : 0.0;
-  };
-  for (int y = 0; y < size; ++y) {
-    for (int x = 0; x < size; ++x) {
-      const double dark = std::max(line(x), line(y));
-      Put(&rgb, static_cast<std::size_t>(y) * size + x, 0.90 - dark, 0.91 - dark,
-          0.92 - 0.9 * dark);
-    }
-  }
-  return rgb;
-}
-
 std::vector<std::uint8_t> WaterTexture(int size) {
   // Waves of whole numbers of periods per tile, so that tiles join.
   struct Wave {

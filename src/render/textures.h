@@ -1,4 +1,4 @@
-// Painted ground: square tiles that join seamlessly.
+// The sea as a square tile that joins seamlessly.
 #pragma once
 
 #include <cstdint>
@@ -6,8 +6,6 @@
 
 namespace mbv::render {
 
-/// size × size RGB: a light floor with 5 × 5 fields of thin grid lines.
-[[nodiscard]] std::vector<std::uint8_t> GridTexture(int size);
 /// size × size RGB: a sea with small waves.
 [[nodiscard]] std::vector<std::uint8_t> WaterTexture(int size);
 

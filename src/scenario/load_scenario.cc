@@ -16,6 +16,7 @@
 #include "scenario/motion_reader.h"
 #include "scenario/scenario_file.h"
 #include "scenario/settings_reader.h"
+#include "scenario/snapshots_reader.h"
 #include "scenario/witness_reader.h"
 #include "table/settings.h"
 

@@ -95,6 +95,7 @@ struct ForeignWitness {
 struct CameraSettings {
   std::optional<double> azimuth_rad, elevation_rad, distance_m;
   std::optional<Vec3> lookat_W;
+  bool orthographic = false;
 };
 
 struct SnapshotSettings {
@@ -102,6 +103,13 @@ struct SnapshotSettings {
   std::array<int, 2> size_px{1280, 960};
   CameraSettings camera;
   int path_output = -1;  ///< output whose path through the whole motion is drawn; -1: none
+  /// Other instants drawn pale into each picture [s]; or so many between the start and its own.
+  std::vector<double> ghost_times_s;
+  int ghost_count = 0;
+  std::string background;           ///< "transparent" or a colour; "": sky and ground
+  std::vector<std::string> labels;  ///< words of PlacesFor() in mechanism/named_places.h
+  bool scale_bar = false, line_art = false;
+  double exploded = 1.0;  ///< 1 … 10
 };
 
 /// What running this file must give; used by the tests of the shipped scenarios.

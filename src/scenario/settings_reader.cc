@@ -249,50 +249,6 @@ CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, const Mechanis
   return limits;
 }
 
-SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node, double duration_s,
-                               const Mechanism& mechanism) {
-  SnapshotSettings settings;
-  YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "snapshots", {"times_s", "size_px", "camera", "path"});
-  settings.times_s = {0.0, 0.5 * duration_s};
-  if (const YamlNode* times = map.Find("times_s")) {
-    settings.times_s = values->Numbers(*times, "snapshots.times_s").value_or(settings.times_s);
-    for (const double t : settings.times_s) {
-      if (t >= 0.0 && t <= duration_s) continue;
-      yaml.Error(*times,
-                 fmt::format("snapshots.times_s = {} violates 0 <= t <= {}", t, duration_s));
-    }
-  }
-  if (const YamlNode* size = map.Find("size_px")) {
-    const auto numbers = values->Numbers(*size, "snapshots.size_px", 2);
-    for (int i = 0; numbers && i < 2; ++i) {
-      const double number = (*numbers)[i];
-      if (number >= 64.0 && number <= 8192.0 && number == std::floor(number)) {
-        settings.size_px[i] = static_cast<int>(number);
-      } else {
-        yaml.Error(*size, fmt::format("snapshots.size_px: {} is not a whole number from 64 to 8192",
-                                      number));
-      }
-    }
-  }
-  if (const YamlNode* path = map.Find("path")) {
-    std::vector<std::string> outputs;
-    for (const Output& output : mechanism.outputs) outputs.push_back(output.name);
-    const auto choice = yaml.Choice(*path, "snapshots.path", outputs);
-    if (choice) settings.path_output = static_cast<int>(*choice);
-  }
-  YamlMap camera(&yaml, map.Find("camera"), "snapshots.camera",
-                 {"azimuth_deg", "elevation_deg", "distance", "lookat"});
-  if (camera.node() == nullptr) return settings;
-  settings.camera.azimuth_rad = values->InUnit(camera, "azimuth", {kDeg});
-  settings.camera.elevation_rad = values->InUnit(camera, "elevation", {kDeg});
-  settings.camera.distance_m = values->InUnit(camera, "distance", {kPlain});
-  if (const YamlNode* lookat = camera.Find("lookat")) {
-    settings.camera.lookat_W = values->Vector(*lookat, "snapshots.camera.lookat");
-  }
-  return settings;
-}
-
 Expectation ReadExpectation(ValueReader* values, const YamlNode* node) {
   Expectation expect;
   YamlReader& yaml = values->yaml();

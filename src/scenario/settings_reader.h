@@ -22,9 +22,6 @@ void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
 /// are those of a metre.
 [[nodiscard]] CheckLimits ReadChecks(ValueReader* values, const YamlNode* node,
                                      const Mechanism* mechanism, double* start_window_s);
-/// Without the section: pictures at the start and half way.
-[[nodiscard]] SnapshotSettings ReadSnapshots(ValueReader* values, const YamlNode* node,
-                                             double duration_s, const Mechanism& mechanism);
 [[nodiscard]] Expectation ReadExpectation(ValueReader* values, const YamlNode* node);
 
 }  // namespace mbv

@@ -293,6 +293,44 @@ TEST_F(CliTest, RenderWritesPicturesAndVideos) {
   EXPECT_NE(ReadAll(video).find("acTL"), std::string::npos);
 }
 
+TEST_F(CliTest, RenderTakesEachLookOfAPaper) {
+  const std::string call =
+      "render " + std::string(kGood) + " --size 160x120 --no-caption --at 0.25";
+  const auto picture = [&](const std::string& options) {
+    const std::string out = mbverify.Out();
+    const ProgramResult made = mbverify(call + " " + options + " --out " + out);
+    EXPECT_EQ(made.exit_code, 0) << options << made.err;
+    return ReadAll((fs::path(out) / "stabilizing_platform/static/t_0.250s.png").string());
+  };
+  const std::string plain = picture("");
+  // IHDR's colour type: 2 RGB, 6 with opacity.
+  EXPECT_EQ(plain.at(25), 2);
+  EXPECT_EQ(picture("--background transparent").at(25), 6);
+  for (const char* options :
+       {"--background white", "--background '#f4f4f4'", "--labels", "--labels=joints",
+        "--scale-bar", "--orthographic", "--style line_art", "--exploded 1.5"}) {
+    EXPECT_NE(picture(options), plain) << options;
+  }
+  for (const char* bad : {"--background whit", "--labels=jonts", "--style art", "--exploded 0",
+                          "--ghosts -1", "--ghosts 0.1,99"}) {
+    const ProgramResult refused = mbverify(call + " " + bad);
+    EXPECT_EQ(refused.exit_code, 2) << bad;
+    EXPECT_NE(refused.err.find("--set snapshots."), std::string::npos) << refused.err;
+  }
+}
+
+TEST_F(CliTest, RenderShowsEarlierInstants) {
+  const auto picture = [&](const std::string& options) {
+    const ProgramResult made = mbverify("render four_bar/turn --size 160x120 --at 0.3 " + options +
+                                        " --out " + mbverify.Out());
+    EXPECT_EQ(made.exit_code, 0) << made.err;
+    return ReadAll((fs::path(mbverify.Out()) / "four_bar/turn/t_0.300s.png").string());
+  };
+  const std::string alone = picture(""), three = picture("--ghosts 3");
+  EXPECT_NE(three, alone);
+  EXPECT_EQ(picture("--ghosts 0,0.1,0.2"), three);
+}
+
 TEST_F(CliTest, FfmpegWritesTheOtherVideos) {
   for (const std::string ending : {"mp4", "webm", "gif"}) {
     const std::string video = (mbverify.folder() / ("v." + ending)).string();

@@ -140,9 +140,10 @@ TEST(Stage, DrawsAnArrowAsLongAsACylinderOfTheSameLength) {
   camera.lookat_D = Vec3(0.0, 0.0, 0.5);
   const auto draw = [&](render::Solid solid) {
     Picture picture;
-    const RunSummary drawn = stage->Draw(
-        {render::Between(solid, Vec3::Zero(), Vec3::UnitZ(), 0.05, render::MaterialOf("push"))}, {},
-        Mat3::Identity(), camera, &picture);
+    const RunSummary drawn =
+        stage->Draw({.items = {render::Between(solid, Vec3::Zero(), Vec3::UnitZ(), 0.05,
+                                               render::MaterialOf("push"))}},
+                    Mat3::Identity(), camera, &picture);
     EXPECT_TRUE(drawn.ok()) << drawn.message;
     return BoundsOf(picture, IsRed);
   };

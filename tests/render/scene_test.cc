@@ -172,10 +172,5 @@ TEST(Palette, TakesTheShapeColoursAndKeepsItsMarksApart) {
   }
 }
 
-TEST(PlainText, ReplacesWhatTheFontLacks) {
-  EXPECT_EQ(PlainText("5° 3 m² −1 µm"), "5 deg 3 m^2 -1 um");
-  EXPECT_EQ(PlainText("a\tb€"), "a?b?");
-}
-
 }  // namespace
 }  // namespace mbv::render

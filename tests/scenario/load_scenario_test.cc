@@ -376,6 +376,31 @@ std::vector<Golden> Goldens() {
           "  hint: did you mean 'm_p'?")},
       {"SnapshotAfterTheEnd", complete("snapshots: {times_s: [0, 13]}\n"),
        At("16:22", "snapshots.times_s = 13 violates 0 <= t <= 12")},
+      {"GhostAfterTheEnd", complete("snapshots: {ghosts: [1, 13]}\n"),
+       At("16:21", "snapshots.ghosts = 13 violates 0 <= t <= 12")},
+      {"HalfAGhost", complete("snapshots: {ghosts: 2.5}\n"),
+       At("16:21",
+          "snapshots.ghosts = 2.5 is not a whole number from 0 to 50\n"
+          "  hint: a list gives times: ghosts: [0.2, 0.4]")},
+      {"UnknownBackground", complete("snapshots: {background: transparant}\n"),
+       At("16:25",
+          "snapshots.background: 'transparant' is neither default, transparent, a colour's name "
+          "nor "
+          "\"#rrggbb\"\n"
+          "  hint: did you mean 'transparent'?")},
+      {"UnknownLabel", complete("snapshots: {labels: [joints, platfrom]}\n"),
+       At("16:30",
+          "snapshots.labels: the mechanism has no output, drive, joint, frame or body 'platfrom'\n"
+          "  hint: did you mean 'platform'?")},
+      {"UnknownStyle", complete("snapshots: {style: lineart}\n"),
+       At("16:20",
+          "snapshots.style = 'lineart' is not one of: shaded, line_art\n"
+          "  hint: did you mean 'line_art'?")},
+      {"ExplodedInwards", complete("snapshots: {exploded: 0.5}\n"),
+       At("16:23", "snapshots.exploded = 0.5 violates 1 <= exploded <= 10")},
+      {"UnknownProjection", complete("snapshots: {camera: {projection: ortho}}\n"),
+       At("16:34",
+          "snapshots.camera.projection = 'ortho' is not one of: perspective, orthographic")},
       {"NegativeLimit", complete("checks: {force_max: -1}\n"),
        At("16:21", "checks.force_max = -1 violates checks.force_max > 0")},
       {"SyntaxError", "mechanism: [\n", At("1:12", "YAML syntax: the bracket [ is never closed")},
@@ -384,6 +409,26 @@ std::vector<Golden> Goldens() {
 
 INSTANTIATE_TEST_SUITE_P(Golden, WrongScenario, testing::ValuesIn(Goldens()),
                          [](const auto& info) { return std::string(info.param.name); });
+
+TEST_F(LoadScenarioTest, PicturesForPapersAreRead) {
+  const auto snapshots = [&](const std::string& text) {
+    return Load(Complete(text)).scenario->snapshots;
+  };
+  const SnapshotSettings plain = snapshots("");
+  EXPECT_EQ(plain.background, "");
+  EXPECT_TRUE(plain.labels.empty());
+  const SnapshotSettings all = snapshots(
+      "snapshots: {background: transparent, labels: joints, scale_bar: true, ghosts: [1, 2], "
+      "style: line_art, exploded: 1.3, camera: {projection: orthographic}}\n");
+  EXPECT_EQ(all.background, "transparent");
+  EXPECT_EQ(all.labels, (std::vector<std::string>{"joints"}));
+  EXPECT_TRUE(all.scale_bar);
+  EXPECT_EQ(all.ghost_times_s, (std::vector<double>{1.0, 2.0}));
+  EXPECT_TRUE(all.line_art);
+  EXPECT_EQ(all.exploded, 1.3);
+  EXPECT_TRUE(all.camera.orthographic);
+  EXPECT_EQ(snapshots("snapshots: {ghosts: 5, background: default}\n").ghost_count, 5);
+}
 
 TEST_F(LoadScenarioTest, AllFindingsComeAtOnceInTheOrderOfTheFile) {
   const std::string messages = Messages(
