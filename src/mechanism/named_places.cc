@@ -1,6 +1,7 @@
 #include "mechanism/named_places.h"
 
 #include <algorithm>
+#include <set>
 
 namespace mbv {
 namespace {
@@ -79,6 +80,8 @@ std::vector<NamedPlace> PlacesFor(const Mechanism& mechanism,
     return std::ranges::none_of(words,
                                 [&](const std::string& word) { return AsksFor(word, place); });
   });
+  std::set<std::string> known;
+  std::erase_if(places, [&](const NamedPlace& place) { return !known.insert(place.name).second; });
   return places;
 }
 

@@ -26,7 +26,7 @@ struct NamedPlace {
 [[nodiscard]] const std::vector<std::string>& PlaceWords();
 
 /// Those that one of the words asks for, by its kind or by its name; "usual" asks for outputs,
-/// drives and joints.
+/// drives and joints. A name that several have stands for the first.
 [[nodiscard]] std::vector<NamedPlace> PlacesFor(const Mechanism& mechanism,
                                                 const std::vector<std::string>& words);
 

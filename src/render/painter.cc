@@ -167,11 +167,9 @@ bool Painter::Paint(const Projection& view, const Tile& tile, const GlFrame& tar
 void Painter::PaintShaded(const Projection& view) {
   const bool far_first = !ghosts_.empty();
   if (!far_first) PaintSolids(view, now_, 1.0, false);
-  const bool water = options_.ground == Ground::kSea;
-  if (water && ground_seen_) PaintSolids(view, now_, 1.0, true);
-  if (water) PaintSky(view);
+  if (options_.ground == Ground::kSea && ground_seen_) PaintSolids(view, now_, 1.0, true);
   PaintGround(view);
-  if (!water) PaintSky(view);
+  PaintSky(view);
   if (!far_first) return;
   PaintGhosts(view);
   PaintSolids(view, now_, 1.0, false);

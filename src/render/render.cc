@@ -76,10 +76,10 @@ std::vector<rn::Label> LabelsOf(const Mechanism& mechanism, const PictureFrame& 
   return labels;
 }
 
-// Translucent solids become flat meshes, which are blended.
+// Glass becomes flat meshes, which are blended and cast no shadows.
 void MakeGlassFlat(std::vector<rn::Item>* items, std::vector<rn::FlatMesh>* flats) {
   std::erase_if(*items, [&](const rn::Item& item) {
-    const bool glass = item.material.rgba[3] < 1.0F;
+    const bool glass = item.material.rgba[3] < 0.5F;
     if (glass) flats->push_back(rn::GlassMesh(item));
     return glass;
   });

@@ -27,12 +27,21 @@ std::vector<std::uint8_t> WaterTexture(int size) {
                         {-7, 15, 3.3, 0.3}, {19, -8, 1.2, 0.25}, {-16, -21, 0.1, 0.2},
                         {27, 18, 2.2, 0.16}};
   std::vector<std::uint8_t> rgb(3UL * size * size);
+  // Whole periods: a wave takes `size` values only.
   const double unit = 2.0 * std::numbers::pi / size;
+  std::vector<std::vector<double>> heights;
+  for (const Wave& wave : waves) {
+    heights.emplace_back();
+    for (int i = 0; i < size; ++i) {
+      heights.back().push_back(wave.height * std::sin(unit * i + wave.phase));
+    }
+  }
+  const auto place = [size](int at) { return static_cast<std::size_t>((at % size + size) % size); };
   for (int y = 0; y < size; ++y) {
     for (int x = 0; x < size; ++x) {
       double height = 0.0;
-      for (const Wave& wave : waves) {
-        height += wave.height * std::sin(unit * (wave.kx * x + wave.ky * y) + wave.phase);
+      for (std::size_t k = 0; k < heights.size(); ++k) {
+        height += heights[k][place(waves[k].kx * x + waves[k].ky * y)];
       }
       // Crests are narrow and light, troughs broad and dark.
       const double crest = std::exp(0.75 * height - 1.2);
