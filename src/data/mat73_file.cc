@@ -141,6 +141,7 @@ class Mat73Writer {
         H5Acreate2(group, "MATLAB_fields", type.id(), space.id(), H5P_DEFAULT, H5P_DEFAULT),
         &H5Aclose);
     std::vector<hvl_t> lists;
+    lists.reserve(fields.size());
     for (const std::string& field : fields) {
       lists.push_back({field.size(), const_cast<char*>(field.data())});
     }

@@ -14,6 +14,7 @@
 #include "core/files.h"
 #include "core/scratch_folder.h"
 #include "core/sha256.h"
+#include "pipeline/home_folder.h"
 #include "pipeline/package_inputs.h"
 #include "pipeline/packed_run.h"
 #include "pipeline/version.h"

@@ -41,9 +41,4 @@ struct PackageInputs {
 /// The licences (`license:`) that model files state, each once: "CC-BY-4.0, MIT"; "" without.
 [[nodiscard]] std::string LicensesOf(const PackageInputs& inputs);
 
-/// The line (1-based) of the first mention of `path` as a path in `text`; 0 without one.
-[[nodiscard]] int LineNaming(const std::string& text, const std::string& path);
-/// $HOME where it is a folder that tells who its owner is; "" else.
-[[nodiscard]] std::string HomeFolder();
-
 }  // namespace mbv
