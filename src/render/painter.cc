@@ -38,7 +38,7 @@ GLuint WaterTextureObject() {
   glTexImage2D(GL_TEXTURE_2D, 0, GL_RGB8, kTexture_px, kTexture_px, 0, GL_RGB, GL_UNSIGNED_BYTE,
                rgb.data());
   glGenerateMipmap(GL_TEXTURE_2D);
-  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_NEAREST);
+  glTexParameteri(GL_TEXTURE_2D, GL_TEXTURE_MIN_FILTER, GL_LINEAR_MIPMAP_LINEAR);
   return texture;
 }
 
