@@ -169,7 +169,7 @@ TEST(FigureFonts, ChineseIsThereAndWhatNoFontHasIsTold) {
   EXPECT_FALSE(LacksGlyphs(figure, FigureStyles()[0]));
   EXPECT_NE(TextsOf(DrawFigure(figure, FigureStyles()[0], PictureFormat::kPdf)).find("驱动力"),
             std::string::npos);
-  figure.panels[0].y.label = "\uE123";  // for private use
+  figure.panels[0].y.label = "\U0010ABCD";  // for private use
   EXPECT_TRUE(LacksGlyphs(figure, FigureStyles()[0]));
 }
 
