@@ -150,8 +150,9 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<FiguresArguments>();
   CLI::App* figures = app->add_subcommand(
       "figures", "Figures for a paper: forces, motion, reactions, power, maps of stiffness");
-  figures->add_option("scenario", arguments->scenarios,
-                      "scenario files or folders of them; with --paper names of its figures");
+  figures->add_option(
+      "scenario", arguments->scenarios,
+      "scenario or study files, or folders of scenarios; with --paper names of its figures");
   auto* paper = figures->add_option(
       "--paper", arguments->paper,
       "the figures of this model's paper instead, all if none is named; list: which there are");

@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <thread>
 
+#include "core/scratch_folder.h"
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "figure/compose.h"
@@ -17,7 +19,9 @@
 #include "pipeline/prepare.h"
 #include "pipeline/run_scenario.h"
 #include "pipeline/stiffness_map.h"
+#include "pipeline/study.h"
 #include "pipeline/workspace.h"
+#include "report/study_plots.h"
 
 namespace mbv {
 namespace {
@@ -53,6 +57,45 @@ class FigureSource {
     outcome_->scenario = ran.report->scenario;
     outcome_->verdict = ToText(ran.report->comparison.verdict);
     return WithUsual(ComposeFigures(ran.figures, *ran.report, options_.language), *ran.report);
+  }
+
+  // The plots of its page that are lines; its points are computed for them.
+  FigureSet OfStudy() {
+    FigureSet set;
+    outcome_->exit_code = 2;
+    if (!options_.scenario.set.empty()) {
+      outcome_->diagnostics.AddError(file_, "--set sets keys of scenarios, and this is a study",
+                                     "its own keys say what is varied");
+      return set;
+    }
+    const ScratchFolder scratch("study");
+    if (!scratch.trouble().empty()) {
+      outcome_->diagnostics.AddError("", scratch.trouble(), "");
+      return set;
+    }
+    RunStudyOptions run;
+    run.out_dir = scratch.path().string();
+    run.points.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    run.points.progress = [&](std::uint64_t done, std::uint64_t all) {
+      if (options_.progress) {
+        options_.progress("points", static_cast<double>(done) / static_cast<double>(all));
+      }
+    };
+    const StudyOutcome ran = RunStudy(file_, run);
+    outcome_->exit_code = ran.exit_code;
+    outcome_->diagnostics = ran.diagnostics;
+    if (!ran.report) return set;
+    outcome_->mechanism = "studies";
+    outcome_->scenario = ran.report->study.name;
+    for (const StudyPlot& plot : StudyPlots(*ran.report)) {
+      const std::string name = std::filesystem::path(plot.file).stem();
+      if (plot.lines) {
+        set.figures.push_back(FromPlot(name, *plot.lines));
+      } else {
+        set.left_out.push_back(name + ": mbverify study draws it");
+      }
+    }
+    return set;
   }
 
   FigureSet OfStiffness() {
@@ -109,9 +152,9 @@ class MoreFigureSource {
       : file_(file), options_(options), outcome_(outcome), set_(set) {}
 
   void AddConvergence() {
-    if (ReadScenarioHead(file_).is_stiffness()) {
-      return LeaveOut("convergence: a stiffness has no steps");
-    }
+    const ScenarioHead head = ReadScenarioHead(file_);
+    if (head.is_stiffness()) return LeaveOut("convergence: a stiffness has no steps");
+    if (head.is_study) return LeaveOut("convergence: of a study's scenario, not of a study");
     ConvergeOptions converge;
     converge.scenario = options_.scenario;
     converge.progress = options_.progress;
@@ -125,8 +168,9 @@ class MoreFigureSource {
   }
 
   void AddWorkspace() {
-    if (ReadScenarioHead(file_).is_stiffness()) {
-      return LeaveOut("workspace: that of a stiffness is drawn with a motion of its mechanism");
+    const ScenarioHead head = ReadScenarioHead(file_);
+    if (head.is_stiffness() || head.is_study) {
+      return LeaveOut("workspace: is drawn with a motion of the mechanism");
     }
     Diagnostics told_by_the_run;
     const auto prepared = Prepare(file_, options_.scenario, &told_by_the_run);
@@ -212,9 +256,11 @@ FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
                           const RunOutcome* ran) {
   FigureOutcome outcome;
   FigureSource source(file, options, &outcome);
-  FigureSet set = ReadScenarioHead(file).is_stiffness() ? source.OfStiffness()
-                  : ran != nullptr                      ? source.OfMotion(*ran)
-                                                        : source.OfMotion();
+  const ScenarioHead head = ReadScenarioHead(file);
+  FigureSet set = head.is_stiffness() ? source.OfStiffness()
+                  : head.is_study     ? source.OfStudy()
+                  : ran != nullptr    ? source.OfMotion(*ran)
+                                      : source.OfMotion();
   if (outcome.diagnostics.has_errors()) return outcome;
   MoreFigureSource more(file, options, &outcome, &set);
   if (Contains(options.also, "convergence")) more.AddConvergence();

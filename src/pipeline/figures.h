@@ -50,8 +50,8 @@ struct FigureOutcome {
     const Figure& figure, const FigureOptions& options, Diagnostics* diagnostics);
 
 /// Runs a motion (RunScenario()) and draws the figures that its scenario composes, and the usual
-/// ones; of a stiffness, its mechanism's usual maps. Findings are bad input. `ran`: what running it
-/// gave somebody with these options; null: it is run.
+/// ones; of a stiffness, its mechanism's usual maps; of a study, its plots. Findings are bad input.
+/// `ran`: what running it gave somebody with these options; null: it is run.
 [[nodiscard]] FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
                                         const RunOutcome* ran = nullptr);
 

@@ -39,6 +39,10 @@ class PlotList {
     while (std::any_of(plots_.begin(), plots_.end(), taken)) file += "_";
     plots_.push_back({section, file + ".svg", std::move(svg)});
   }
+  void Add(StudySection section, const std::string& name, LinePlot plot) {
+    Add(section, name, ToSvg(plot));
+    plots_.back().lines = std::move(plot);
+  }
 
   // Its outline, and the nominal value as an upright line.
   void AddHistogram(const QuantitySummary& q) {
@@ -58,7 +62,7 @@ class PlotList {
     outline.points.emplace_back(q.histogram.to, 0.0);
     plot.lines.push_back(std::move(outline));
     plot.lines.push_back({.label = "nominal", .points = {{q.nominal, 0.0}, {q.nominal, most}}});
-    Add(StudySection::kHistograms, "histogram_" + q.name, ToSvg(plot));
+    Add(StudySection::kHistograms, "histogram_" + q.name, std::move(plot));
   }
 
   void AddTornado(const QuantitySummary& q) {
@@ -89,7 +93,7 @@ class PlotList {
     AddLine("5 %", band.time_s, band.p5, &plot);
     AddLine("median", band.time_s, band.p50, &plot);
     AddLine("95 %", band.time_s, band.p95, &plot);
-    Add(StudySection::kBands, "band_" + band.drive, ToSvg(plot));
+    Add(StudySection::kBands, "band_" + band.drive, std::move(plot));
   }
 
   // E with the band that it should lie in.
@@ -106,7 +110,7 @@ class PlotList {
     AddLine("E", f.time_s, error, &plot);
     AddLine("+" + word, f.time_s, upper, &plot);
     AddLine("−" + word, f.time_s, lower, &plot);
-    Add(StudySection::kValidation, "validation_" + f.drive, ToSvg(plot));
+    Add(StudySection::kValidation, "validation_" + f.drive, std::move(plot));
   }
 
   void AddScatter() {

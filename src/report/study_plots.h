@@ -1,9 +1,11 @@
 // Plots of a study: each is a file of its own, and stands in a section of the page.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/plot.h"
 #include "report/study_report.h"
 
 namespace mbv {
@@ -15,6 +17,7 @@ struct StudyPlot {
   StudySection section;
   std::string file;  ///< "band_limb1.drive.svg", unique and fit for any disk
   std::string svg;
+  std::optional<LinePlot> lines = {};  ///< what is drawn, where it is lines
 };
 
 [[nodiscard]] std::vector<StudyPlot> StudyPlots(const StudyReport& report);

@@ -74,6 +74,25 @@ TEST(FiguresCommand, ConvergenceAndWorkspaceAreDrawnWhereAskedFor) {
   EXPECT_EQ(mbverify("figures four_bar/turn_inverse --also everything").exit_code, 2);
 }
 
+TEST(FiguresCommand, AStudysLinesAreDrawn) {
+  const Program mbverify("figures_study");
+  const std::string study = "figures scenarios/four_bar/study_validation.yaml --formats svg,pgf ";
+  const ProgramResult run = mbverify(study + "--out " + mbverify.Out());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const std::string folder = mbverify.Out() + "/studies/four_bar_validation/";
+  for (const char* name : {"band_motor.svg", "validation_motor.tex", "validation_motor.dat"}) {
+    EXPECT_TRUE(std::filesystem::exists(folder + name)) << name << "\n" << run.out;
+  }
+  EXPECT_NE(run.out.find("left out: scatter_matrix"), std::string::npos) << run.out;
+  EXPECT_FALSE(std::filesystem::exists(mbverify.Out() + "/four_bar_validation"));
+  const ProgramResult violated = mbverify(
+      "figures scenarios/four_bar/must_fail/study_not_validated.yaml --only validation_motor "
+      "--out " +
+      mbverify.Out());
+  EXPECT_EQ(violated.exit_code, 1) << violated.err;
+  EXPECT_EQ(mbverify(study + "--set motion.duration_s=1 --out " + mbverify.Out()).exit_code, 2);
+}
+
 TEST(FiguresCommand, BadPapersAreRefused) {
   const Program mbverify("figures_paper_bad");
   for (const char* options :
