@@ -14,11 +14,11 @@
 #include "cli/terminal.h"
 #include "core/demand.h"
 #include "core/files.h"
-#include "data/data_file.h"
 #include "pipeline/default_setup.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/out_of_memory.h"
 #include "pipeline/run_scenario.h"
+#include "pipeline/trace_data.h"
 #include "report/report.h"
 #include "report/stiffness_report.h"
 
@@ -32,12 +32,6 @@ struct RunArguments {
   bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
   bool sizing = false;
 };
-
-std::vector<std::string> DataWords() {
-  std::vector<std::string> words;
-  for (const DataFormat& format : DataFormats()) words.emplace_back(format.word);
-  return words;
-}
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
 RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunArguments& arguments,
@@ -199,7 +193,7 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   run->add_option(
          "--data", arguments->data,
          "traces of motions also as traces.mat, traces_v73.mat or traces.h5, for MATLAB, Octave, "
-         "Python …")
+         "Python …; csv: units and frames of the columns of traces.csv")
       ->delimiter(',')
       ->check(OneOf(DataWords()));
   arguments->json.AddTo(run);

@@ -3,6 +3,7 @@
 #include "comparison/force_band.h"
 #include "core/demand.h"
 #include "data/data_file.h"
+#include "report/csv.h"
 
 namespace mbv {
 namespace {
@@ -18,7 +19,15 @@ DataAbout AboutOf(const Report& report) {
   return about;
 }
 
+constexpr const char* kCsvWord = "csv";
+
 }  // namespace
+
+std::vector<std::string> DataWords() {
+  std::vector<std::string> words = {kCsvWord};
+  for (const DataFormat& format : DataFormats()) words.emplace_back(format.word);
+  return words;
+}
 
 std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& report,
                                                              const std::vector<std::string>& words,
@@ -32,6 +41,10 @@ std::vector<std::pair<std::string, std::string>> DataFilesOf(const Report& repor
   for (const Trace& trace : shown) traces.push_back(&trace);
   std::vector<std::pair<std::string, std::string>> files;
   for (const std::string& word : words) {
+    if (word == kCsvWord) {
+      files.emplace_back(kCsvMetadataFile, CsvMetadata(report));
+      continue;
+    }
     const DataFormat* format = FindDataFormat(word);
     MBV_DEMAND(format != nullptr, word);
     files.emplace_back(format->file, DataBytes(*format, AboutOf(report), traces, trouble));

@@ -1,4 +1,5 @@
-// Traces of a run in the binary formats of data/data_file.h.
+// Traces of a run in the binary formats of data/data_file.h, and what the columns of traces.csv
+// are.
 #pragma once
 
 #include <string>
@@ -9,7 +10,10 @@
 
 namespace mbv {
 
-/// Names and bytes of the files that these words (DataFormat::word) stand for; "" in `trouble`, or
+/// "csv", and DataFormat::word of all formats.
+[[nodiscard]] std::vector<std::string> DataWords();
+
+/// Names and bytes of the files that these words stand for; "" in `trouble`, or
 /// what went wrong.
 [[nodiscard]] std::vector<std::pair<std::string, std::string>> DataFilesOf(
     const Report& report, const std::vector<std::string>& words, std::string* trouble);

@@ -9,6 +9,7 @@
 
 #include "comparison/force_band.h"
 #include "comparison/metrics.h"
+#include "core/json_text.h"
 
 namespace mbv {
 namespace {
@@ -115,6 +116,27 @@ void WriteCsv(const Report& report, const std::function<void(std::string_view)>&
     text.clear();
   }
   write(text);
+}
+
+std::string CsvMetadata(const Report& report) {
+  using Json = nlohmann::ordered_json;
+  Json list = {{{"name", "time_s"}, {"datatype", "double"}, {"schema:unitText", "s"}}};
+  const Columns columns(report);
+  for (const CsvColumn& c : columns.columns()) {
+    const Channel& channel = c.shown.channel;
+    list.push_back({{"name", channel.name + "." + c.trace->witness},
+                    {"datatype", "double"},
+                    {"schema:unitText", channel.unit},
+                    {"urn:mbverify:quantity", SignalWord(channel)},
+                    {"urn:mbverify:subject", channel.subject},
+                    {"urn:mbverify:frame", channel.frame},
+                    {"urn:mbverify:witness", c.trace->witness}});
+  }
+  return Dump({{"@context", "http://www.w3.org/ns/csvw"},
+               {"url", "traces.csv"},
+               {"dc:title", report.mechanism + " / " + report.scenario},
+               {"null", "nan"},
+               {"tableSchema", {{"columns", std::move(list)}}}});
 }
 
 }  // namespace mbv

@@ -1,6 +1,8 @@
 // --data of run: results for other programs.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
+
 #include "tests/cli/program.h"
 
 namespace mbv {
@@ -26,12 +28,33 @@ TEST(RunData, TracesAreThereForOctaveAndHdf5) {
   EXPECT_NE(read.out.find("(2): " + force), std::string::npos) << read.out;
 }
 
+TEST(RunData, TheColumnsOfTheCsvAreDescribedInTheirOrder) {
+  const Program mbverify("data_csv");
+  const ProgramResult run = mbverify(
+      "run scenarios/four_bar/turn_inverse.yaml --no-pictures --no-report --data csv --out " +
+      mbverify.Out());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  const std::string folder = mbverify.Out() + "/four_bar/turn_inverse/";
+  const auto json = nlohmann::json::parse(ReadAll(folder + "traces.csv-metadata.json"));
+  std::string header;
+  for (const auto& column : json["tableSchema"]["columns"]) {
+    header += (header.empty() ? "" : ",") + column["name"].get<std::string>();
+    if (column["name"] != "motor.force.simulated") continue;
+    EXPECT_EQ(column["schema:unitText"], "N m");
+    EXPECT_EQ(column["urn:mbverify:subject"], "motor");
+    EXPECT_EQ(column["urn:mbverify:quantity"], "force");
+  }
+  const std::string csv = ReadAll(folder + json["url"].get<std::string>());
+  EXPECT_EQ(csv.substr(0, csv.find('\n')), header);
+  EXPECT_NE(header.find("motor.force.simulated"), std::string::npos);
+}
+
 TEST(RunData, AnUnknownFormatIsRefused) {
   const Program mbverify("data_format");
   const ProgramResult run = mbverify("run scenarios/four_bar/turn_inverse.yaml --data xls");
   EXPECT_EQ(run.exit_code, 2);
   EXPECT_NE(run.err.find("xls"), std::string::npos) << run.err;
-  EXPECT_NE(run.err.find("mat, mat73, h5"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("csv, mat, mat73, h5"), std::string::npos) << run.err;
 }
 
 }  // namespace
