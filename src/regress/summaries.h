@@ -33,7 +33,7 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// "63 scenarios: 63 as expected (24 of them must fail), 60 ran, 55 compared, 39 verified".
 [[nodiscard]] std::string CountsText(const Counts& counts);
 
-/// "ok", "FAILED", "drift" …: a case in one word.
+/// "agree", "computed", "fails as it must", "drift", "timed out" …: a case in few words.
 [[nodiscard]] std::string WordOf(const CaseResult& result);
 
 /// What KeyMetric() is: "drive force error, RMS"; "" without one.

@@ -63,7 +63,9 @@ std::string WordOf(const CaseResult& result) {
     return word;
   }
   if (!result.drifts.empty()) return "drift";
-  return result.verified ? "agree" : "fails as it must";
+  if (result.verified) return "agree";
+  // A study that asks nothing of its points is neither.
+  return result.expected.verdict == "agree" ? "computed" : "fails as it must";
 }
 
 std::string KeyTitle(const CaseResult& result) {

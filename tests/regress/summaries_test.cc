@@ -78,6 +78,15 @@ std::string WithoutBackslashes(std::string text) {
   return text;
 }
 
+TEST(Summaries, WhatWasNotJudgedNeitherAgreesNorFails) {
+  CaseResult result = AgreeingCase("m/study", 1e-9);
+  EXPECT_EQ(WordOf(result), "agree");
+  result.verified = false;
+  EXPECT_EQ(WordOf(result), "computed");
+  result.expected.verdict = "disagree";
+  EXPECT_EQ(WordOf(result), "fails as it must");
+}
+
 TEST(Summaries, AFailureNamesCheckValueLimitPlaceAndTheLastGoodRun) {
   for (const auto& [where, text] : AllSummaries(Mixed())) {
     for (const char* part :
