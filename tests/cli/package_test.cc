@@ -206,6 +206,14 @@ TEST(VerifyCommand, ABentNumberIsToldWithItsSignal) {
   EXPECT_TRUE(Has(summary.out, "duration_s: 2.002 in the archive, 2.0 now")) << summary.out;
 }
 
+TEST(VerifyCommand, AModelFileThatSaysSomethingElseDiffersThoughItsNumbersAreTheSame) {
+  const Packed packed = FourBar("verify_page");
+  const ProgramResult run = packed.Edited("replace RESULTS/model.xml 'four_bar' 'five_bar' honest");
+  EXPECT_EQ(run.exit_code, 1) << run.out << run.err;
+  EXPECT_NE(run.out.find("though the numbers that it is made of are the same"), std::string::npos)
+      << run.out;
+}
+
 TEST(VerifyCommand, ChangedInputsGiveOtherResults) {
   const Packed packed = FourBar("input");
   const ProgramResult heavier = packed.Edited(
