@@ -308,6 +308,8 @@ TEST_F(StudyCommand, PointsThatFailStayRowsWithTheirReason) {
   const auto json = Summary("out");
   EXPECT_EQ(json["failures"]["points"], 1);
   EXPECT_EQ(json["limits"][0]["violations"], 1);
+  EXPECT_EQ(json["force_bands"][0]["points"], 2);  // no NaN among what percentiles are taken of
+  EXPECT_EQ(json["force_bands"][0]["left_out"], 1);
   EXPECT_NE(json["failures"]["reasons"][0]["reason"].get<std::string>().find("mass"),
             std::string::npos);
   Write("list.csv", "m,g\n-2,10\n");
