@@ -93,14 +93,14 @@ void SolidBuffer::AddOne(const Part& part) {
   }
 }
 
-// The nearest first: what they hide is not lit.
+// What ends nearest first, so that decks and floors come last: what others hide is not lit.
 template <typename Test>
 IndexRange SolidBuffer::AddThose(std::vector<Part> parts, const Test& test) {
   const int first = static_cast<int>(indices_.size());
   std::erase_if(parts, [&](const Part& part) { return !test(*part.item); });
   std::ranges::stable_sort(parts, {}, [&](const Part& part) {
     const Vec3 p_D = R_DW_ * part.item->X_WG.translation();
-    return p_D.dot(camera_.forward_D()) - part.item->size.norm();
+    return p_D.dot(camera_.forward_D()) + part.item->size.norm();
   });
   for (const Part& part : parts) AddOne(part);
   return {first, static_cast<int>(indices_.size()) - first};
