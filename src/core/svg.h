@@ -50,4 +50,22 @@ using SvgAttributes = std::initializer_list<SvgAttribute>;
   return SvgElement("text", attributes, EscapeMarkup(text));
 }
 
+/// A figure that is a file of its own and stands in pages: it shrinks with them and has the colour
+/// of the text around it.
+[[nodiscard]] inline std::string SvgFigure(double width, double height, const std::string& title,
+                                           std::string_view content) {
+  return SvgElement("svg",
+                    {{"xmlns", kSvgNamespace},
+                     {"viewBox", fmt::format("0 0 {:g} {:g}", width, height)},
+                     {"width", width},
+                     {"height", height},
+                     {"style", "max-width:100%;height:auto"},
+                     {"font-size", "12"},
+                     {"fill", "currentColor"},
+                     {"role", "img"},
+                     {"aria-label", title}},
+                    content) +
+         "\n";
+}
+
 }  // namespace mbv

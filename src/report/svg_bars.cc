@@ -53,18 +53,7 @@ std::string ToSvg(const BarPlot& plot) {
   }
   const double width = kBarName + kBarColumn * static_cast<double>(plot.columns.size()) + 20;
   const double height = top + 6;
-  return SvgElement("svg",
-                    {{"xmlns", kSvgNamespace},
-                     {"viewBox", fmt::format("0 0 {:g} {:g}", width, height)},
-                     {"width", width},
-                     {"height", height},
-                     {"style", "max-width:100%;height:auto"},
-                     {"font-size", "12"},
-                     {"fill", "currentColor"},
-                     {"role", "img"},
-                     {"aria-label", plot.title}},
-                    svg) +
-         "\n";
+  return SvgFigure(width, height, plot.title, svg);
 }
 
 }  // namespace mbv

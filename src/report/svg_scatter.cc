@@ -69,19 +69,7 @@ std::string ToSvg(const ScatterMatrix& matrix) {
   }
   const double width = kNames + (kCell + kGap) * static_cast<double>(matrix.columns.size());
   const double height = kTopNames + (kCell + kGap) * static_cast<double>(matrix.rows.size());
-  return SvgElement("svg",
-                    {{"xmlns", kSvgNamespace},
-                     {"viewBox", fmt::format("0 0 {:g} {:g}", width, height)},
-                     {"width", width},
-                     {"height", height},
-                     {"style", "max-width:100%;height:auto"},
-                     {"font-family", "sans-serif"},
-                     {"font-size", "12"},
-                     {"fill", "currentColor"},
-                     {"role", "img"},
-                     {"aria-label", matrix.title}},
-                    svg) +
-         "\n";
+  return SvgFigure(width, height, matrix.title, svg);
 }
 
 }  // namespace mbv

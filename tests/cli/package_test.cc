@@ -72,14 +72,16 @@ TEST(PackageCommand, TheSameInputsGiveTheSameBytes) {
 TEST(PackageCommand, RunsAsItIsUnpackedAndNamesNobody) {
   const Program mbverify("package_home");
   const std::string home = (mbverify.folder() / "home/jane_doe").string();
-  const std::string copied =
-      "mkdir -p " + home + "/work/mine " + home + "/work/models && cp -r models/four_bar " + home +
-      "/work/models/ && cp scenarios/four_bar/turn_inverse.yaml " + home + "/work/mine/my.yaml";
+  const std::string copied = "mkdir -p " + home + "/papers/mine " + home +
+                             "/papers/models && cp -r models/four_bar " + home +
+                             "/papers/models/ && cp scenarios/four_bar/turn_inverse.yaml " + home +
+                             "/papers/mine/my.yaml";
   ASSERT_EQ(mbverify.Script(copied).exit_code, 0);
   const ProgramResult made = mbverify.Script(
       "cd " + home + " && export HOME=" + home +
       " USER=jane_doe && \"$mbverify\" package "
-      "work/mine/my.yaml -o ../paper.zip && cd .. && python3 -m zipfile -e paper.zip . && cd paper "
+      "papers/mine/my.yaml -o ../paper.zip && cd .. && python3 -m zipfile -e paper.zip . && cd "
+      "paper "
       "&& \"$mbverify\" run inputs/mine/my.yaml --quiet --no-pictures && ls inputs/models/four_bar "
       "&& ! grep -r -a -e jane_doe -e mbv_cli -e mbverify-package .");
   EXPECT_EQ(made.exit_code, 0) << made.out << made.err;
@@ -114,11 +116,12 @@ TEST(PackageCommand, FilesWithoutAFolderInCommonAreRefused) {
   const Program mbverify("package_apart");
   const std::string folder = mbverify.folder().string();
   const ProgramResult made = mbverify.Script(
-      "mkdir -p " + folder + "/home/jane " + folder + "/other && cp -r models/four_bar " + folder +
+      "mkdir -p " + folder + "/people/jane " + folder + "/other && cp -r models/four_bar " +
+      folder +
       "/other/ && sed 's,mechanism: .*,mechanism: ../../other/four_bar/model.yaml,' "
       "scenarios/four_bar/turn_inverse.yaml >" +
-      folder + "/home/jane/my.yaml && cd " + folder + "/home/jane && HOME=" + folder +
-      "/home/jane \"$mbverify\" package my.yaml -o paper.zip");
+      folder + "/people/jane/my.yaml && cd " + folder + "/people/jane && HOME=" + folder +
+      "/people/jane \"$mbverify\" package my.yaml -o paper.zip");
   EXPECT_EQ(made.exit_code, 2);
   EXPECT_TRUE(Has(made.err, "lies in no folder with")) << made.err;
 }

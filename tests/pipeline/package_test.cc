@@ -12,12 +12,12 @@ namespace mbv {
 namespace {
 
 TEST(LineNaming, FindsAFolderButNoPartOfAnotherName) {
-  EXPECT_EQ(LineNaming("a: 1\nb: /home/jane/x.csv\n", "/home/jane"), 2);
-  EXPECT_EQ(LineNaming("\"/home/jane\"", "/home/jane"), 1);
-  EXPECT_EQ(LineNaming("/home/janet/x", "/home/jane"), 0);
-  EXPECT_EQ(LineNaming("package/home/jane-x and data/home/jane", "/home/jane"), 0);
-  EXPECT_EQ(LineNaming("/home/janet\n\n/home/jane", "/home/jane"), 3);
-  EXPECT_EQ(LineNaming("", "/home/jane"), 0);
+  EXPECT_EQ(LineNaming("a: 1\nb: /people/jane/x.csv\n", "/people/jane"), 2);
+  EXPECT_EQ(LineNaming("\"/people/jane\"", "/people/jane"), 1);
+  EXPECT_EQ(LineNaming("/people/janet/x", "/people/jane"), 0);
+  EXPECT_EQ(LineNaming("package/people/jane-x and data/people/jane", "/people/jane"), 0);
+  EXPECT_EQ(LineNaming("/people/janet\n\n/people/jane", "/people/jane"), 3);
+  EXPECT_EQ(LineNaming("", "/people/jane"), 0);
 }
 
 TEST(Package, DatesAreThoseOfTheCalendar) {

@@ -47,18 +47,6 @@ int ShadowPixels(const Picture& with, const Picture& without) {
   return count;
 }
 
-Picture PictureOf(const Mechanism& mechanism, const PictureFrame& frame,
-                  const PictureOptions& options) {
-  Picture drawn;
-  const RunSummary summary =
-      RenderPictures(mechanism, {frame}, {}, options, [&](int, Picture picture) {
-        drawn = std::move(picture);
-        return true;
-      });
-  EXPECT_TRUE(summary.ok()) << summary.message;
-  return drawn;
-}
-
 Mechanism ShippedModel(const std::string& name) {
   LoadResult result = LoadModel(SourcePath("/models/" + name + "/model.yaml"));
   EXPECT_TRUE(result.mechanism.has_value()) << result.diagnostics.Text();
@@ -188,9 +176,9 @@ TEST(MechanismItems, DrawSpringsAsCoilsAndDampersAsPistons) {
   PictureOptions options = test::Quick();
   options.camera = {.azimuth_deg = -90.0, .elevation_deg = 10.0, .distance_m = 4.0};
   options.camera.lookat_W = Vec3(0.2, 0, 0.5);
-  const Picture with = PictureOf(mechanism, frame, options);
+  const Picture with = test::DrawnPicture(mechanism, options, frame);
   mechanism.springs.clear();
-  const Picture bare = PictureOf(mechanism, frame, options);
+  const Picture bare = test::DrawnPicture(mechanism, options, frame);
   int changed = 0;
   for (std::size_t i = 0; i < with.rgb.size(); i += 3) {
     changed += std::abs(with.rgb[i] - bare.rgb[i]) > 30 ? 1 : 0;
@@ -280,9 +268,9 @@ TEST(Pictures, HaveAPlainBackgroundWhenAskedFor) {
     }
     return count;
   };
-  EXPECT_LT(plain(PictureOf(mechanism, HomeFrame(mechanism), options)), 40);
+  EXPECT_LT(plain(test::DrawnPicture(mechanism, options, HomeFrame(mechanism))), 40);
   options.background = "#ffffff";
-  EXPECT_EQ(plain(PictureOf(mechanism, HomeFrame(mechanism), options)), 480);
+  EXPECT_EQ(plain(test::DrawnPicture(mechanism, options, HomeFrame(mechanism))), 480);
   options.background = "whitish";
   EXPECT_NE(Check(options).findings().at(0).message.find("neither a colour's name nor #rrggbb"),
             std::string::npos);
@@ -293,9 +281,9 @@ TEST(Pictures, HaveLabelsWhenAskedFor) {
   PictureOptions options = test::Quick();
   options.size_px = {640, 480};
   options.background = "#ffffff";
-  const Picture without = PictureOf(mechanism, HomeFrame(mechanism), options);
+  const Picture without = test::DrawnPicture(mechanism, options, HomeFrame(mechanism));
   options.labels = {"usual"};
-  const Picture with = PictureOf(mechanism, HomeFrame(mechanism), options);
+  const Picture with = test::DrawnPicture(mechanism, options, HomeFrame(mechanism));
   int changed = 0;
   for (std::size_t i = 0; i < with.rgb.size(); i += 3) {
     changed += std::abs(with.rgb[i] - without.rgb[i]) > 60 ? 1 : 0;

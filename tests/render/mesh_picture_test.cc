@@ -11,17 +11,6 @@ namespace {
 using test::BallOnLeg;
 using test::Quick;
 
-Picture DrawHome(const Mechanism& mechanism, const PictureOptions& options) {
-  Picture picture;
-  const RunSummary drawn =
-      RenderPictures(mechanism, {HomeFrame(mechanism)}, {}, options, [&](int, Picture p) {
-        picture = std::move(p);
-        return true;
-      });
-  EXPECT_TRUE(drawn.ok()) << drawn.message;
-  return picture;
-}
-
 // Share of pixels that differ visibly.
 double Difference(const Picture& a, const Picture& b) {
   if (a.rgb.size() != b.rgb.size()) return 1.0;
@@ -51,10 +40,10 @@ TEST(MeshPictures, ShowAMeshOfABallWhereTheBallWouldBe) {
   options.joints = options.closures = options.output_frames = false;
   options.camera = {
       .azimuth_deg = -60.0, .elevation_deg = 16.0, .distance_m = 1.2, .lookat_W = Vec3(0, 0, 1)};
-  const Picture ball = DrawHome(BallOnLeg(), options);
+  const Picture ball = test::DrawnPicture(BallOnLeg(), options);
   // Outlines and facets differ in some pixels.
-  EXPECT_LT(Difference(ball, DrawHome(MeshOnLeg(), options)), 0.005);
-  EXPECT_GT(Difference(ball, DrawHome(MeshOnLeg(Vec3(0, 0.05, 0)), options)), 0.02);
+  EXPECT_LT(Difference(ball, test::DrawnPicture(MeshOnLeg(), options)), 0.005);
+  EXPECT_GT(Difference(ball, test::DrawnPicture(MeshOnLeg(Vec3(0, 0.05, 0)), options)), 0.02);
 }
 
 TEST(MeshPictures, AreFittedToMeshes) {
@@ -83,7 +72,7 @@ TEST(MeshPictures, TakeFlatAndOpenMeshes) {
        {TriangleMesh{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(0, 1, 0)}, {{0, 1, 2}}},
         TriangleMesh{{Vec3(0, 0, 0), Vec3(1, 0, 0), Vec3(2, 0, 0)}, {{0, 1, 2}}}}) {
     mesh.surface = std::make_shared<const TriangleMesh>(surface);
-    (void)DrawHome(m, Quick());
+    (void)test::DrawnPicture(m, Quick());
   }
 }
 

@@ -19,19 +19,6 @@ PictureOptions Plain() {
   return options;
 }
 
-Picture PaperPicture(const Mechanism& mechanism, const PictureOptions& options,
-                     PictureFrame frame = {}) {
-  if (frame.X_WB.empty()) frame = HomeFrame(mechanism);
-  Picture drawn;
-  const RunSummary summary =
-      RenderPictures(mechanism, {frame}, {}, options, [&](int, Picture picture) {
-        drawn = std::move(picture);
-        return true;
-      });
-  EXPECT_TRUE(summary.ok()) << summary.message;
-  return drawn;
-}
-
 std::size_t PixelsWhere(const Picture& picture, const auto& test) {
   std::size_t count = 0;
   for (std::size_t k = 0; 3 * k < picture.rgb.size(); ++k) {
@@ -51,10 +38,10 @@ int GreatestGap(const Picture& a, const Picture& b) {
 TEST(PaperPictures, AreTransparentWithoutADarkFringe) {
   const Mechanism mechanism = test::BallOnLeg();
   PictureOptions options = Plain();
-  EXPECT_TRUE(PaperPicture(mechanism, options).alpha.empty());
+  EXPECT_TRUE(test::DrawnPicture(mechanism, options).alpha.empty());
   options.background = "transparent";
   options.shadows = false;
-  const Picture clear = PaperPicture(mechanism, options);
+  const Picture clear = test::DrawnPicture(mechanism, options);
   ASSERT_EQ(clear.alpha.size(), 320U * 240U);
   EXPECT_EQ(clear.alpha.front(), 0);
   const auto part = [&](int low, int high) {
@@ -65,7 +52,7 @@ TEST(PaperPictures, AreTransparentWithoutADarkFringe) {
   EXPECT_GT(part(60, 200), 50U);  // edges
   // Laid on white it is the white picture: colours are not multiplied by their opacity.
   options.background = "#ffffff";
-  const Picture white = PaperPicture(mechanism, options);
+  const Picture white = test::DrawnPicture(mechanism, options);
   const Picture laid = OnWhite(clear);
   std::size_t off = 0;
   for (std::size_t i = 0; i < white.rgb.size(); ++i) {
@@ -86,14 +73,14 @@ TEST(PaperPictures, KeepSoftShadowsOnWhiteAndOnNothing) {
   const auto shadow = [](const std::uint8_t* p, int a) {
     return p[0] < 5 && p[1] < 5 && p[2] < 5 && a > 20 && a < 160;
   };
-  EXPECT_GT(PixelsWhere(PaperPicture(mechanism, options), shadow), 100U);
+  EXPECT_GT(PixelsWhere(test::DrawnPicture(mechanism, options), shadow), 100U);
   options.background = "white";
   const auto grey = [](const std::uint8_t* p, int) {
     return p[0] > 100 && p[0] < 240 && p[0] == p[1] && p[1] == p[2];
   };
-  const std::size_t with = PixelsWhere(PaperPicture(mechanism, options), grey);
+  const std::size_t with = PixelsWhere(test::DrawnPicture(mechanism, options), grey);
   options.background = "#ffffff";
-  EXPECT_GT(with, PixelsWhere(PaperPicture(mechanism, options), grey) + 100);
+  EXPECT_GT(with, PixelsWhere(test::DrawnPicture(mechanism, options), grey) + 100);
 }
 
 TEST(PaperPictures, AreTheSameInTilesAsInOnePiece) {
@@ -136,7 +123,7 @@ TEST(PaperPictures, DrawOutlinesOfFacesInBlackOnWhite) {
   mechanism.bodies[1].shapes[0].geometry = Box{.X_BG = Pose::Identity(), .size = Vec3(.3, .3, .3)};
   PictureOptions options = Plain();
   options.line_art = true;
-  const Picture art = PaperPicture(mechanism, options);
+  const Picture art = test::DrawnPicture(mechanism, options);
   const auto black = [](const std::uint8_t* p, int) { return p[0] < 60; };
   const auto white = [](const std::uint8_t* p, int) { return p[0] == 255; };
   const auto coloured = [](const std::uint8_t* p, int) { return p[0] != p[1] || p[1] != p[2]; };
@@ -147,7 +134,7 @@ TEST(PaperPictures, DrawOutlinesOfFacesInBlackOnWhite) {
   EXPECT_LT(lines, 8000U);
   // A ball has an outline, a box has edges inside of it, too.
   mechanism.bodies[1].shapes[0].geometry = Ball{.p_centre = Vec3::Zero(), .radius = 0.15};
-  EXPECT_GT(lines, PixelsWhere(PaperPicture(mechanism, options), black) + 50);
+  EXPECT_GT(lines, PixelsWhere(test::DrawnPicture(mechanism, options), black) + 50);
 }
 
 TEST(PaperPictures, ShowGhostsPalerThanTheInstantItself) {
@@ -161,17 +148,17 @@ TEST(PaperPictures, ShowGhostsPalerThanTheInstantItself) {
   const auto pale = [](const std::uint8_t* p, int) {
     return p[0] > 150 && p[1] > p[0] + 15 && p[1] > p[2] + 8;
   };
-  const Picture alone = PaperPicture(mechanism, options, frame);
+  const Picture alone = test::DrawnPicture(mechanism, options, frame);
   EXPECT_LT(PixelsWhere(alone, pale), 60U);
   frame.X_WB_ghosts = {frame.X_WB};
   frame.X_WB_ghosts[0][1].translation() += Vec3(0.6, 0.0, 0.0);
-  const Picture both = PaperPicture(mechanism, options, frame);
+  const Picture both = test::DrawnPicture(mechanism, options, frame);
   EXPECT_GT(PixelsWhere(both, pale), 200U);
   EXPECT_NEAR(static_cast<double>(PixelsWhere(both, strong)),
               static_cast<double>(PixelsWhere(alone, strong)), 60.0);
   // What stands still is not drawn twice.
   frame.X_WB_ghosts = {frame.X_WB};
-  EXPECT_LE(GreatestGap(PaperPicture(mechanism, options, frame), alone), 1);
+  EXPECT_LE(GreatestGap(test::DrawnPicture(mechanism, options, frame), alone), 1);
 }
 
 TEST(PaperPictures, MoveBodiesApart) {
@@ -185,7 +172,7 @@ TEST(PaperPictures, MoveBodiesApart) {
   EXPECT_EQ(Check(options).findings().size(), 1U);
   options.exploded = 3.0;
   EXPECT_TRUE(Check(options).findings().empty());
-  EXPECT_NE(PaperPicture(mechanism, options).rgb, PaperPicture(mechanism, Plain()).rgb);
+  EXPECT_NE(test::DrawnPicture(mechanism, options).rgb, test::DrawnPicture(mechanism, Plain()).rgb);
   EXPECT_GT(before.distance_m, 0.0);
 }
 
@@ -199,7 +186,7 @@ TEST(PaperPictures, ShowEqualLengthsEquallyLongWithParallelRays) {
   const auto width = [&](double y) {
     PictureFrame frame = HomeFrame(mechanism);
     frame.X_WB[1].translation() = Vec3(0, y, 1);
-    const Picture picture = PaperPicture(mechanism, options, frame);
+    const Picture picture = test::DrawnPicture(mechanism, options, frame);
     int left = 640, right = -1;
     for (int x = 0; x < 640; ++x) {
       const std::uint8_t* p = &picture.rgb[3UL * (240 * 640 + x)];
@@ -268,9 +255,9 @@ TEST(ScaleBar, IsInThePicture) {
   PictureOptions options = Plain();
   options.background = "#ffffff";
   options.camera.orthographic = true;
-  const Picture without = PaperPicture(mechanism, options);
+  const Picture without = test::DrawnPicture(mechanism, options);
   options.scale_bar = true;
-  const Picture with = PaperPicture(mechanism, options);
+  const Picture with = test::DrawnPicture(mechanism, options);
   const Camera camera = Arrange(mechanism, {HomeFrame(mechanism)}, {}, options).camera;
   const double per_px = HeightAtLookat(camera) / 240.0;
   EXPECT_NE(with.rgb, without.rgb);
@@ -306,16 +293,16 @@ TEST(Labels, LieOverNoOtherAndLeaveNoneOut) {
 TEST(Labels, NameWhatIsAskedForAndNothingElse) {
   const Mechanism mechanism = test::BallOnLeg();
   PictureOptions options = Plain();
-  const Picture bare = PaperPicture(mechanism, options);
+  const Picture bare = test::DrawnPicture(mechanism, options);
   options.labels = {"joints"};
-  const Picture joints = PaperPicture(mechanism, options);
+  const Picture joints = test::DrawnPicture(mechanism, options);
   options.labels = {"tip"};  // the only joint
-  EXPECT_EQ(PaperPicture(mechanism, options).rgb, joints.rgb);
+  EXPECT_EQ(test::DrawnPicture(mechanism, options).rgb, joints.rgb);
   EXPECT_NE(joints.rgb, bare.rgb);
   options.labels = {"bodies"};
-  EXPECT_NE(PaperPicture(mechanism, options).rgb, joints.rgb);
+  EXPECT_NE(test::DrawnPicture(mechanism, options).rgb, joints.rgb);
   options.labels = {"frames"};  // it has none
-  EXPECT_EQ(PaperPicture(mechanism, options).rgb, bare.rgb);
+  EXPECT_EQ(test::DrawnPicture(mechanism, options).rgb, bare.rgb);
 }
 
 }  // namespace

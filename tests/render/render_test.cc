@@ -14,20 +14,8 @@ namespace mbv {
 namespace {
 
 using test::BallOnLeg;
+using test::DrawnPicture;
 using test::Quick;
-
-Picture DrawOne(const Mechanism& mechanism, const PictureFrame& frame,
-                const PictureOptions& options, const Overlay& overlay = {}) {
-  Picture drawn;
-  const RunSummary summary =
-      RenderPictures(mechanism, {frame}, overlay, options, [&](int index, Picture picture) {
-        EXPECT_EQ(index, 0);
-        drawn = std::move(picture);
-        return true;
-      });
-  EXPECT_TRUE(summary.ok()) << summary.message;
-  return drawn;
-}
 
 // Bounds of the pixels that satisfy a test, as (left, top, right, bottom); empty: left > right.
 struct Bounds {
@@ -71,7 +59,7 @@ TEST(Pictures, HaveTheSizeAskedForAndAreNotBlank) {
   PictureOptions options = Quick();
   options.size_px = {200, 136};
   const Mechanism mechanism = BallOnLeg();
-  const Picture picture = DrawOne(mechanism, HomeFrame(mechanism), options);
+  const Picture picture = DrawnPicture(mechanism, options);
   ASSERT_EQ(picture.width, 200);
   ASSERT_EQ(picture.height, 136);
   ASSERT_EQ(picture.rgb.size(), 3U * 200 * 136);
@@ -85,12 +73,13 @@ TEST(Pictures, AreTheSameBytesForTheSameInput) {
   options.passes = 3;
   PictureFrame frame = FrameWithForce(mechanism, 10.0);
   frame.caption = {.title = "title", .detail = "detail", .status = "agree"};
-  EXPECT_EQ(DrawOne(mechanism, frame, options).rgb, DrawOne(mechanism, frame, options).rgb);
+  EXPECT_EQ(DrawnPicture(mechanism, options, frame).rgb,
+            DrawnPicture(mechanism, options, frame).rgb);
 }
 
 TEST(Pictures, ShowTheMechanismInsideTheFrameWithAMargin) {
   const Mechanism mechanism = BallOnLeg();
-  const Picture picture = DrawOne(mechanism, HomeFrame(mechanism), Quick());
+  const Picture picture = DrawnPicture(mechanism, Quick());
   const Bounds green = BoundsOf(picture, IsGreen);
   ASSERT_GT(green.count, 200);
   EXPECT_GT(green.left, 0.03 * picture.width);
@@ -105,7 +94,7 @@ TEST(Pictures, AreUprightForAnyGravity) {
   for (const Vec3& g :
        {Vec3(0, 0, -9.81), Vec3(0, 0, 9.81), Vec3(0, -9.81, 0), Vec3(9.81, 0, 0), Vec3(1, 2, -3)}) {
     const Mechanism mechanism = BallOnLeg(g);
-    const Picture picture = DrawOne(mechanism, HomeFrame(mechanism), Quick());
+    const Picture picture = DrawnPicture(mechanism, Quick());
     const Bounds green = BoundsOf(picture, IsGreen);
     ASSERT_GT(green.count, 200) << g.transpose();
     // The ball stands on its leg: above the middle of the picture.
@@ -116,10 +105,10 @@ TEST(Pictures, AreUprightForAnyGravity) {
 TEST(Pictures, HaveAnArrowInTheColourOfTheSignOnlyWhenThereIsAForce) {
   const Mechanism mechanism = BallOnLeg();
   const PictureOptions options = QuickWithoutTriads();
-  const Picture none = DrawOne(mechanism, HomeFrame(mechanism), options);
-  const Picture push = DrawOne(mechanism, FrameWithForce(mechanism, 20.0), options);
-  const Picture pull = DrawOne(mechanism, FrameWithForce(mechanism, -20.0), options);
-  const Picture nan = DrawOne(mechanism, FrameWithForce(mechanism, kNan), options);
+  const Picture none = DrawnPicture(mechanism, options);
+  const Picture push = DrawnPicture(mechanism, options, FrameWithForce(mechanism, 20.0));
+  const Picture pull = DrawnPicture(mechanism, options, FrameWithForce(mechanism, -20.0));
+  const Picture nan = DrawnPicture(mechanism, options, FrameWithForce(mechanism, kNan));
   EXPECT_EQ(BoundsOf(none, IsRed).count, 0);
   EXPECT_EQ(BoundsOf(nan, IsRed).count, 0);
   EXPECT_GT(BoundsOf(push, IsRed).count, 30);
@@ -170,9 +159,9 @@ TEST(Pictures, RingTheClosuresUnlessSwitchedOff) {
   Mechanism mechanism = BallOnLeg();
   std::get<Ball>(mechanism.bodies[1].shapes[0].geometry).radius = 0.01;
   PictureOptions options = Quick();
-  EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options), IsMagenta).count, 4);
+  EXPECT_GT(BoundsOf(DrawnPicture(mechanism, options), IsMagenta).count, 4);
   options.closures = false;
-  EXPECT_EQ(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options), IsMagenta).count, 0);
+  EXPECT_EQ(BoundsOf(DrawnPicture(mechanism, options), IsMagenta).count, 0);
 }
 
 TEST(Pictures, ShowARedBarWhereAClosureCameApart) {
@@ -181,22 +170,22 @@ TEST(Pictures, ShowARedBarWhereAClosureCameApart) {
   apart.X_WB[1].translation() += Vec3(0.0, 0.0, -0.5);
   const PictureOptions options = QuickWithoutTriads();
   const auto is_bar = [](const std::uint8_t* p) { return p[0] > 170 && p[1] < 60 && p[2] < 60; };
-  EXPECT_EQ(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options), is_bar).count, 0);
-  EXPECT_GT(BoundsOf(DrawOne(mechanism, apart, options), is_bar).count, 15);
+  EXPECT_EQ(BoundsOf(DrawnPicture(mechanism, options), is_bar).count, 0);
+  EXPECT_GT(BoundsOf(DrawnPicture(mechanism, options, apart), is_bar).count, 15);
 }
 
 TEST(Pictures, ChangeWithTheCamera) {
   const Mechanism mechanism = BallOnLeg();
   PictureOptions options = Quick();
-  const Picture automatic = DrawOne(mechanism, HomeFrame(mechanism), options);
+  const Picture automatic = DrawnPicture(mechanism, options);
   options.camera.distance_m = 20.0;
-  const Picture far = DrawOne(mechanism, HomeFrame(mechanism), options);
+  const Picture far = DrawnPicture(mechanism, options);
   EXPECT_LT(BoundsOf(far, IsGreen).count, BoundsOf(automatic, IsGreen).count / 4);
   options.camera = {.azimuth_deg = 0.0, .elevation_deg = 80.0};
-  const Picture above = DrawOne(mechanism, HomeFrame(mechanism), options);
+  const Picture above = DrawnPicture(mechanism, options);
   EXPECT_NE(above.rgb, automatic.rgb);
   options.camera = {.lookat_W = Vec3(0, 0, 1)};
-  const Bounds centred = BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options), IsGreen);
+  const Bounds centred = BoundsOf(DrawnPicture(mechanism, options), IsGreen);
   // The leg hides little of the ball, whose middle is now the middle of the picture.
   EXPECT_NEAR(0.5 * (centred.left + centred.right), 160.0, 4.0);
   EXPECT_NEAR(0.5 * (centred.top + centred.bottom), 120.0, 6.0);
@@ -219,7 +208,7 @@ TEST(Pictures, WriteTheCaptionIntoABarOnWhiteAndNoneWithoutText) {
     }
     return std::pair(white, dark);
   };
-  EXPECT_LT(bar(DrawOne(mechanism, frame, options)).first, 100);
+  EXPECT_LT(bar(DrawnPicture(mechanism, options, frame)).first, 100);
   // The verdict is the only green thing.
   std::get<Ball>(mechanism.bodies[1].shapes[0].geometry).radius = 1e-3;
   options.output_frames = false;
@@ -227,7 +216,7 @@ TEST(Pictures, WriteTheCaptionIntoABarOnWhiteAndNoneWithoutText) {
                    .detail = "t = 1.5 s",
                    .status = "agree",
                    .mood = Caption::Mood::kGood};
-  const Picture with_text = DrawOne(mechanism, frame, options);
+  const Picture with_text = DrawnPicture(mechanism, options, frame);
   const auto [white, dark] = bar(with_text);
   EXPECT_GT(white, 640 * 20 / 2);
   EXPECT_GT(dark, 10);  // the legend's letters
@@ -247,14 +236,15 @@ TEST(Pictures, ShowPathsAndTranslucentMeshes) {
   path.paths.push_back({.points_W = {Vec3(0.4, -0.4, 0.1), Vec3(0.4, 0.4, 0.6)},
                         .color = "#ff0000",
                         .radius_m = 0.02});
-  EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options, path), IsRed).count, 50);
+  EXPECT_GT(BoundsOf(DrawnPicture(mechanism, options, HomeFrame(mechanism), path), IsRed).count,
+            50);
   // Inside the green ball it shows through.
   const auto is_mixed = [](const std::uint8_t* p) {
     return p[0] > 90 && p[0] < 2 * p[1] && p[2] < 80;
   };
-  const int without = BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options), is_mixed).count;
+  const int without = BoundsOf(DrawnPicture(mechanism, options), is_mixed).count;
   path.paths[0].points_W = {Vec3(-0.06, 0, 1), Vec3(0.06, 0, 1)};
-  EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), options, path), is_mixed).count,
+  EXPECT_GT(BoundsOf(DrawnPicture(mechanism, options, HomeFrame(mechanism), path), is_mixed).count,
             without + 30);
   // A pane before the ball tints it, but lets its green through.
   Overlay pane;
@@ -262,7 +252,7 @@ TEST(Pictures, ShowPathsAndTranslucentMeshes) {
   pane.meshes.push_back({.vertices_W = {c - x - z, c + x - z, c + x + z, c - x + z},
                          .triangles = {{0, 1, 2}, {0, 2, 3}},
                          .color = "#0000ff60"});
-  const Picture tinted = DrawOne(mechanism, HomeFrame(mechanism), options, pane);
+  const Picture tinted = DrawnPicture(mechanism, options, HomeFrame(mechanism), pane);
   const auto is_both = [](const std::uint8_t* p) { return p[1] > 70 && p[2] > 70 && p[0] < 60; };
   EXPECT_GT(BoundsOf(tinted, is_both).count, 100);
 }
@@ -270,18 +260,18 @@ TEST(Pictures, ShowPathsAndTranslucentMeshes) {
 TEST(Pictures, DrawTheSeaOnlyWhereTheWorldHasOne) {
   Mechanism mechanism = BallOnLeg();
   const auto is_water = [](const std::uint8_t* p) { return p[2] > p[0] + 30 && p[1] > p[0] + 10; };
-  EXPECT_LT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), Quick()), is_water).count, 3000);
+  EXPECT_LT(BoundsOf(DrawnPicture(mechanism, Quick()), is_water).count, 3000);
   Box water;
   water.size = Vec3(10, 10, 0.02);
   mechanism.bodies[0].shapes.push_back({.geometry = water, .color = "sea"});
-  EXPECT_GT(BoundsOf(DrawOne(mechanism, HomeFrame(mechanism), Quick()), is_water).count, 20000);
+  EXPECT_GT(BoundsOf(DrawnPicture(mechanism, Quick()), is_water).count, 20000);
 }
 
 TEST(Pictures, ShowTheMechanismFromBelowTheGroundUnveiled) {
   const Mechanism mechanism = BallOnLeg();
   PictureOptions options = Quick();
   options.camera.elevation_deg = -30.0;
-  const Picture below = DrawOne(mechanism, HomeFrame(mechanism), options);
+  const Picture below = DrawnPicture(mechanism, options);
   EXPECT_GT(BoundsOf(below, IsGreen).count, 100);
 }
 
@@ -332,7 +322,7 @@ TEST(Pictures, DrawBodiesWithoutShapesAsRods) {
   mechanism.bodies[1].shapes.clear();
   mechanism.bodies[1].p_BoBcm_B = Vec3(0.0, 0.4, 0.0);  // the rod goes from the joint to here
   const PictureOptions options = QuickWithoutTriads();
-  const Picture with_rod = DrawOne(mechanism, HomeFrame(mechanism), options);
+  const Picture with_rod = DrawnPicture(mechanism, options);
   const auto is_accent = [](const std::uint8_t* p) {
     return p[0] > 100 && p[1] < 0.75 * p[0] && p[2] < 0.4 * p[0];
   };

@@ -1,6 +1,8 @@
 // Small mechanisms for pictures.
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <cmath>
 #include <string>
 
@@ -48,6 +50,21 @@ inline PictureOptions Quick() {
   options.size_px = {320, 240};
   options.passes = 1;
   return options;
+}
+
+/// One picture; of the home pose if no frame is given.
+inline Picture DrawnPicture(const Mechanism& mechanism, const PictureOptions& options,
+                            PictureFrame frame = {}, const Overlay& overlay = {}) {
+  if (frame.X_WB.empty()) frame = HomeFrame(mechanism);
+  Picture drawn;
+  const RunSummary summary =
+      RenderPictures(mechanism, {frame}, overlay, options, [&](int index, Picture picture) {
+        EXPECT_EQ(index, 0);
+        drawn = std::move(picture);
+        return true;
+      });
+  EXPECT_TRUE(summary.ok()) << summary.message;
+  return drawn;
 }
 
 inline bool Near(const std::uint8_t* pixel, int r, int g, int b, int tolerance) {
