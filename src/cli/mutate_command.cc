@@ -8,7 +8,6 @@
 #include <limits>
 #include <memory>
 #include <optional>
-#include <thread>
 #include <utility>
 
 #include "cli/cli.h"
@@ -16,6 +15,7 @@
 #include "cli/json_option.h"
 #include "cli/terminal.h"
 #include "core/files.h"
+#include "core/in_children.h"
 #include "core/scratch_folder.h"
 #include "core/worker_pool.h"
 #include "pipeline/mutate.h"
@@ -202,7 +202,7 @@ int Mutate(MutateArguments arguments) {
 
 void AddMutateCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<MutateArguments>();
-  arguments->jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  arguments->jobs = AllCores();
   CLI::App* mutate = app->add_subcommand(
       "mutate",
       "Bend each number of the simulated side and put structural faults into it: which errors "

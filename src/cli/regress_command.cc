@@ -5,12 +5,12 @@
 #include <csignal>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "cli/cli.h"
 #include "cli/json_option.h"
 #include "cli/live_table.h"
 #include "cli/terminal.h"
+#include "core/in_children.h"
 #include "pipeline/version.h"
 #include "regress/regress.h"
 #include "regress/summaries.h"
@@ -128,7 +128,7 @@ void AddOutputOptions(CLI::App* app, RegressArguments* arguments) {
 void AddRegressCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<RegressArguments>();
   RegressOptions& options = arguments->options;
-  options.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  options.jobs = AllCores();
   CLI::App* regress = app->add_subcommand(
       "regress", "Run all scenarios, judge them by their expect:, keep history");
   regress->add_option("path", options.paths, "scenario files or folders (scenarios)");

@@ -5,12 +5,12 @@
 #include <chrono>
 #include <filesystem>
 #include <memory>
-#include <thread>
 
 #include "cli/cli.h"
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/in_children.h"
 #include "pipeline/study.h"
 #include "regress/find_cases.h"
 #include "scenario/find_model.h"
@@ -148,8 +148,7 @@ void AddStudyOptions(CLI::App* study, StudyArguments* arguments) {
 
 void AddStudyCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<StudyArguments>();
-  arguments->options.points.jobs =
-      static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+  arguments->options.points.jobs = AllCores();
   CLI::App* study = app->add_subcommand(
       "study", "Vary numbers of a scenario: which of them matter, and how often limits are kept");
   AddStudyOptions(study, arguments.get());

@@ -13,6 +13,7 @@
 #include <csignal>
 #include <cstdint>
 #include <cstring>
+#include <thread>
 
 namespace mbv {
 namespace {
@@ -125,6 +126,8 @@ class Child {
 };
 
 }  // namespace
+
+int AllCores() { return static_cast<int>(std::max(1U, std::thread::hardware_concurrency())); }
 
 void StreamFromChildren(
     size_t count, const ChildStreams& streams, const Work& work,

@@ -10,6 +10,9 @@
 
 namespace mbv {
 
+/// As many processes as this machine runs at once; at least 1.
+[[nodiscard]] int AllCores();
+
 /// How StreamFromChildren() shares work out.
 struct ChildStreams {
   int parallel = 1;          ///< children at once, at least 1

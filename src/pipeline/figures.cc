@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <filesystem>
-#include <thread>
 
+#include "core/in_children.h"
 #include "core/scratch_folder.h"
 #include "core/text.h"
 #include "core/word_hints.h"
@@ -75,7 +75,7 @@ class FigureSource {
     }
     RunStudyOptions run;
     run.out_dir = scratch.path().string();
-    run.points.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    run.points.jobs = AllCores();
     run.points.progress = [&](std::uint64_t done, std::uint64_t all) {
       if (options_.progress) {
         options_.progress("points", static_cast<double>(done) / static_cast<double>(all));

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <thread>
 
 #include "core/bytes.h"
 #include "core/files.h"
@@ -66,7 +65,7 @@ class PackedRunner {
   void RunAsStudy() {
     RunStudyOptions study;
     study.out_dir = kResultsFolder;
-    study.points.jobs = static_cast<int>(std::max(1U, std::thread::hardware_concurrency()));
+    study.points.jobs = AllCores();
     const StudyOutcome outcome = RunStudy(run_.scenario.file, study);
     Tell(outcome.diagnostics, outcome.exit_code, outcome.folder);
     if (!outcome.report) return;
