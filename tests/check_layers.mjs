@@ -17,6 +17,7 @@ const LIBRARIES = {
   'OSMesa': { headers: ['GL/'], target: 'PkgConfig::OSMESA' },
   'SQLite': { headers: ['sqlite3'], target: 'SQLite::SQLite3' },
   'Assimp': { headers: ['assimp/'], target: 'assimp::assimp' },
+  'KLU': { headers: ['suitesparse/'], target: 'KLU::KLU' },
   'libzip': { headers: ['zip.h'], target: 'PkgConfig::LIBZIP' },
   'libpng': { headers: ['png.h'], target: 'PNG::PNG' },
   'muParser': { headers: ['muParser'], target: 'muparser::muparser' },

@@ -21,30 +21,24 @@ BodyStates HomeStates(const Mechanism& mechanism) {
   return states;
 }
 
-MatX JointRows(const Mechanism& mechanism, const BodyStates& states) {
+RowStack JointRows(const Mechanism& mechanism, const BodyStates& states) {
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
-  return stack.Matrix();
+  return stack;
 }
 
 // The gradient of a command, scaled as the joint rows.
-Eigen::RowVectorXd CommandRow(const Mechanism& mechanism, const BodyStates& states,
-                              const Command& command) {
-  RowStack terms(mechanism.bodies.size(), CharacteristicLength(mechanism));
+void AddCommand(const Mechanism& mechanism, const BodyStates& states, const Command& command,
+                RowStack* stack) {
+  std::vector<ScalarRow> terms;
+  bool turns = true;
   for (const Command::Term& term : command.terms) {
-    ScalarRow row = CoordinateRow(mechanism, term.coordinate, states);
+    ScalarRow& row = terms.emplace_back(CoordinateRow(mechanism, term.coordinate, states));
     row.J_parent *= term.factor;
     row.J_child *= term.factor;
-    const bool turns = row.J_parent.tail<3>().isZero(0.0) && row.J_child.tail<3>().isZero(0.0);
-    terms.Add(row, !turns);
+    turns = turns && row.J_parent.tail<3>().isZero(0.0) && row.J_child.tail<3>().isZero(0.0);
   }
-  return terms.Matrix().colwise().sum();
-}
-
-MatX WithRow(const MatX& J, const Eigen::RowVectorXd& row) {
-  MatX more(J.rows() + 1, J.cols());
-  more << J, row;
-  return more;
+  stack->AddSum(terms, !turns);
 }
 
 // Names of the joints that some column of `motion` moves.
@@ -68,12 +62,13 @@ std::vector<std::string> MovingJoints(const Mechanism& mechanism, const BodyStat
 
 CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>& commands) {
   const BodyStates home = HomeStates(mechanism);
-  MatX J = JointRows(mechanism, home);
-  const auto joint_rows = J.rows();
-  const auto columns = static_cast<int>(J.cols());
+  RowStack rows = JointRows(mechanism, home);
+  const auto joint_rows = rows.size();
+  const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
   CommandRank out;
-  out.freedoms = columns - RankOf(J);
-  for (const Command& command : commands) J = WithRow(J, CommandRow(mechanism, home, command));
+  out.freedoms = columns - RankOf(rows.Matrix());
+  for (const Command& command : commands) AddCommand(mechanism, home, command, &rows);
+  const internal::SparseRows J = rows.Matrix();
 
   out.undriven = columns - RankOf(J);
   out.redundant = static_cast<int>(commands.size()) - (out.freedoms - out.undriven);
@@ -84,7 +79,7 @@ CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>&
   if (out.redundant <= 0) return out;
   const MatX stress = FindRank(J, NullSpaces::kSelfStress).self_stress;
   for (size_t k = 0; k < commands.size(); ++k) {
-    const auto row = joint_rows + static_cast<Eigen::Index>(k);
+    const auto row = static_cast<Eigen::Index>(joint_rows) + static_cast<Eigen::Index>(k);
     if (stress.row(row).cwiseAbs().maxCoeff() > internal::kStressTolerance) {
       out.dependent.push_back(static_cast<int>(k));
     }
@@ -96,16 +91,17 @@ std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
                                         const std::vector<Command>& commands,
                                         const std::vector<Command>& candidates, size_t count) {
   const BodyStates home = HomeStates(mechanism);
-  MatX J = JointRows(mechanism, home);
-  for (const Command& command : commands) J = WithRow(J, CommandRow(mechanism, home, command));
-  int rank = RankOf(J);
+  RowStack rows = JointRows(mechanism, home);
+  for (const Command& command : commands) AddCommand(mechanism, home, command, &rows);
+  int rank = RankOf(rows.Matrix());
   std::vector<size_t> chosen;
   for (size_t k = 0; k < candidates.size() && chosen.size() < count; ++k) {
-    MatX more = WithRow(J, CommandRow(mechanism, home, candidates[k]));
-    const int new_rank = RankOf(more);
+    RowStack more = rows;
+    AddCommand(mechanism, home, candidates[k], &more);
+    const int new_rank = RankOf(more.Matrix());
     if (new_rank == rank) continue;
     rank = new_rank;
-    J = std::move(more);
+    rows = std::move(more);
     chosen.push_back(k);
   }
   return chosen;
@@ -123,15 +119,15 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                    const std::vector<Coordinate>& candidates, size_t preferred) {
   constexpr double kIndependent = 1e-5;  // share of a gradient that others do not hold
   const BodyStates home = HomeStates(mechanism);
-  const MatX motion = FindRank(JointRows(mechanism, home), NullSpaces::kMotion).motion;
+  const MatX motion = FindRank(JointRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
   CoordinateChoice choice{
       .freedoms = static_cast<int>(motion.cols()), .chosen = {}, .dependent = {}};
   // Gradients in the freedoms; what is chosen is taken out of those that are left.
-  MatX gradients(static_cast<Eigen::Index>(candidates.size()), motion.cols());
-  for (size_t k = 0; k < candidates.size(); ++k) {
-    gradients.row(static_cast<Eigen::Index>(k)) =
-        CommandRow(mechanism, home, HeldAt(candidates[k])) * motion;
+  RowStack rows(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  for (const Coordinate& candidate : candidates) {
+    AddCommand(mechanism, home, HeldAt(candidate), &rows);
   }
+  MatX gradients = rows.Matrix() * motion;
   const VecX lengths = gradients.rowwise().norm();
   const auto take = [&](Eigen::Index k) {
     choice.chosen.push_back(static_cast<size_t>(k));
@@ -157,13 +153,9 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
 
 std::vector<Vec6> FreeMotion(const Mechanism& mechanism, const std::vector<Coordinate>& held) {
   const BodyStates home = HomeStates(mechanism);
-  MatX J = JointRows(mechanism, home);
-  const auto rows = J.rows();
-  J.conservativeResize(rows + static_cast<Eigen::Index>(held.size()), J.cols());
-  for (size_t k = 0; k < held.size(); ++k) {
-    J.row(rows + static_cast<Eigen::Index>(k)) = CommandRow(mechanism, home, HeldAt(held[k]));
-  }
-  const MatX motion = FindRank(J, NullSpaces::kMotion).motion;
+  RowStack rows = JointRows(mechanism, home);
+  for (const Coordinate& coordinate : held) AddCommand(mechanism, home, HeldAt(coordinate), &rows);
+  const MatX motion = FindRank(rows.Matrix(), NullSpaces::kMotion).motion;
   if (motion.cols() == 0) return {};
   const VecX first = motion.col(0) / motion.col(0).cwiseAbs().maxCoeff();
   std::vector<Vec6> twists(mechanism.bodies.size(), Vec6::Zero());

@@ -44,7 +44,7 @@ BodyStates StatesAt(const std::vector<Pose>& X_WB) {
   return states;
 }
 
-MatX ScaledRows(const Mechanism& mechanism) {
+internal::SparseRows ScaledRows(const Mechanism& mechanism) {
   internal::RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, StatesAt(mechanism.X_WB_home), false);
   return stack.Matrix();
@@ -249,7 +249,7 @@ class Projector {
 
 int CountNearlyRedundant(const Mechanism& mechanism, double gap) {
   if (!(gap < kLargestGap)) return 0;
-  const MatX J = ScaledRows(mechanism);
+  const internal::SparseRows J = ScaledRows(mechanism);
   const int rank = internal::FindRank(J, internal::NullSpaces::kNone, RankTolerance(gap)).rank;
   return static_cast<int>(J.rows()) - rank;
 }

@@ -4,23 +4,41 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <numeric>
+#include <utility>
 
-#include "kinematics/frame_pair.h"
+#include "core/sparse_rank.h"
 
 namespace mbv::internal {
 
+void RowStack::AddTo(Row* row, int body, const Vec6& J, double scale) const {
+  if (body == 0) return;
+  Vec6 scaled;
+  scaled << scale * J.head<3>(), scale * length_ * J.tail<3>();
+  const auto at = std::ranges::find(*row, body, &Row::value_type::first);
+  if (at != row->end()) {
+    at->second += scaled;
+  } else {
+    row->emplace_back(body, scaled);
+  }
+}
+
 void RowStack::Add(int parent, const Vec6& J_parent, int child, const Vec6& J_child,
                    bool translation) {
-  VecX row = VecX::Zero(columns_);
   const double scale = translation ? 1.0 / length_ : 1.0;
-  const auto put = [&](int body, const Vec6& J) {
-    if (body == 0) return;
-    row.segment<3>(6 * (body - 1)) += scale * J.head<3>();
-    row.segment<3>(6 * (body - 1) + 3) += scale * length_ * J.tail<3>();
-  };
-  put(parent, J_parent);
-  put(child, J_child);
-  rows_.push_back(row);
+  Row row;
+  AddTo(&row, parent, J_parent, scale);
+  AddTo(&row, child, J_child, scale);
+  rows_.push_back(std::move(row));
+}
+
+void RowStack::AddSum(const std::vector<ScalarRow>& pieces, bool translation) {
+  const double scale = translation ? 1.0 / length_ : 1.0;
+  Row row;
+  for (const ScalarRow& piece : pieces) {
+    AddTo(&row, piece.parent, piece.J_parent, scale);
+    AddTo(&row, piece.child, piece.J_child, scale);
+  }
+  rows_.push_back(std::move(row));
 }
 
 void RowStack::Add(const ConstraintRows& rows) {
@@ -30,12 +48,7 @@ void RowStack::Add(const ConstraintRows& rows) {
   }
 }
 
-void RowStack::Add(const CouplingRow& row) {
-  const size_t first = rows_.size();
-  for (const ScalarRow& piece : row.pieces) Add(piece, !row.angular);
-  for (size_t i = first + 1; i < rows_.size(); ++i) rows_[first] += rows_[i];
-  rows_.resize(first + 1, VecX::Zero(columns_));
-}
+void RowStack::Add(const CouplingRow& row) { AddSum(row.pieces, !row.angular); }
 
 void RowStack::AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions) {
   for (const Joint& joint : mechanism.joints) Add(RowsOf(joint, states, reactions));
@@ -52,25 +65,35 @@ void RowStack::AddDriven(const Mechanism& mechanism, const BodyStates& states) {
   }
 }
 
-MatX RowStack::Matrix() const {
-  MatX J(size(), columns_);
-  for (int i = 0; i < size(); ++i) J.row(i) = rows_[i].transpose();
-  return J;
+SparseRows RowStack::Matrix() const {
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < size(); ++i) {
+    for (const auto& [body, J] : rows_[static_cast<size_t>(i)]) {
+      for (int c = 0; c < 6; ++c) {
+        if (J[c] != 0.0) entries.emplace_back(i, 6 * (body - 1) + c, J[c]);
+      }
+    }
+  }
+  SparseRows matrix(size(), columns_);
+  matrix.setFromTriplets(entries.begin(), entries.end());
+  return matrix;
 }
 
 namespace {
 
+using Places = std::vector<Eigen::Index>;
+
 // Rows and columns that entries connect: a matrix of mechanisms side by side falls into one part
 // per mechanism.
 struct Part {
-  std::vector<Eigen::Index> rows, columns;
-  Eigen::BDCSVD<MatX> svd;
-  [[nodiscard]] double largest() const {
-    return svd.singularValues().size() == 0 ? 0.0 : svd.singularValues()[0];
+  Places rows, columns;
+  [[nodiscard]] bool empty() const { return rows.empty() || columns.empty(); }
+  [[nodiscard]] auto smaller() const {
+    return static_cast<Eigen::Index>(std::min(rows.size(), columns.size()));
   }
 };
 
-std::vector<Part> PartsOf(const MatX& J) {
+std::vector<Part> PartsOf(const SparseRows& J) {
   // Union-find over the columns.
   std::vector<Eigen::Index> root(static_cast<size_t>(J.cols()));
   std::iota(root.begin(), root.end(), Eigen::Index{0});
@@ -80,10 +103,9 @@ std::vector<Part> PartsOf(const MatX& J) {
   };
   std::vector<Eigen::Index> first(static_cast<size_t>(J.rows()), -1);  // per row
   for (Eigen::Index i = 0; i < J.rows(); ++i) {
-    for (Eigen::Index c = 0; c < J.cols(); ++c) {
-      if (J(i, c) == 0.0) continue;
-      if (first[i] < 0) first[i] = c;
-      root[find(c)] = find(first[i]);
+    for (SparseRows::InnerIterator entry(J, i); entry; ++entry) {
+      if (first[i] < 0) first[i] = entry.col();
+      root[find(entry.col())] = find(first[i]);
     }
   }
   std::vector<Part> parts;
@@ -98,10 +120,35 @@ std::vector<Part> PartsOf(const MatX& J) {
     if (first[i] >= 0) {
       parts[part_of[find(first[i])]].rows.push_back(i);
     } else {
-      parts.push_back({.rows = {i}, .columns = {}, .svd = {}});  // constrains nothing
+      parts.push_back({.rows = {i}, .columns = {}});  // constrains nothing
     }
   }
   return parts;
+}
+
+// Where each row or column lies within its part.
+std::vector<Eigen::Index> PlacesWithin(const Places& places, Eigen::Index size) {
+  std::vector<Eigen::Index> within(static_cast<size_t>(size), -1);
+  for (size_t k = 0; k < places.size(); ++k) within[places[k]] = static_cast<Eigen::Index>(k);
+  return within;
+}
+
+std::vector<Eigen::Triplet<double>> EntriesOf(const SparseRows& J, const Part& part) {
+  const std::vector<Eigen::Index> column = PlacesWithin(part.columns, J.cols());
+  std::vector<Eigen::Triplet<double>> entries;
+  for (size_t i = 0; i < part.rows.size(); ++i) {
+    for (SparseRows::InnerIterator entry(J, part.rows[i]); entry; ++entry) {
+      entries.emplace_back(i, column[entry.col()], entry.value());
+    }
+  }
+  return entries;
+}
+
+MatX DensePart(const SparseRows& J, const Part& part) {
+  MatX dense = MatX::Zero(static_cast<Eigen::Index>(part.rows.size()),
+                          static_cast<Eigen::Index>(part.columns.size()));
+  for (const auto& entry : EntriesOf(J, part)) dense(entry.row(), entry.col()) = entry.value();
+  return dense;
 }
 
 // `to` gets the vectors of a part, at their places of the whole.
@@ -121,20 +168,74 @@ struct PivotedPart {
   double size = 0.0;
 };
 
-std::vector<PivotedPart> PivotsOf(const MatX& J) {
+std::vector<PivotedPart> PivotsOf(const SparseRows& J) {
   std::vector<PivotedPart> pivots;
   for (const Part& part : PartsOf(J)) {
-    if (part.rows.empty() || part.columns.empty()) continue;
-    const Eigen::ColPivHouseholderQR<MatX> qr(J(part.rows, part.columns));
+    if (part.empty()) continue;
+    const Eigen::ColPivHouseholderQR<MatX> qr(DensePart(J, part));
     pivots.push_back({qr.matrixQR().diagonal().cwiseAbs(),
                       static_cast<double>(part.rows.size() + part.columns.size())});
   }
   return pivots;
 }
 
+SparseRows SparseOf(const MatX& J) { return J.sparseView(); }
+
+// Rank and vectors of one part.
+struct PartRank {
+  Eigen::Index rank = 0;
+  double largest = 0.0, smallest_kept = 0.0, largest_dropped = 0.0;
+  MatX vectors;      // of the null space wanted
+  VecX singular;     // dense parts: all of them,
+  MatX all_vectors;  // with theirs
+};
+
+PartRank SingularValuesOf(const MatX& J, NullSpaces wanted) {
+  const unsigned options = wanted == NullSpaces::kSelfStress ? Eigen::ComputeFullU
+                           : wanted == NullSpaces::kMotion   ? Eigen::ComputeFullV
+                                                             : 0;
+  const Eigen::BDCSVD<MatX> svd(J, options);
+  PartRank part;
+  part.singular = svd.singularValues();
+  part.largest = part.singular.size() == 0 ? 0.0 : part.singular[0];
+  if (wanted == NullSpaces::kSelfStress) part.all_vectors = svd.matrixU();
+  if (wanted == NullSpaces::kMotion) part.all_vectors = svd.matrixV();
+  return part;
+}
+
+// With singular values, what lies above `limit` counts.
+void Count(double limit, PartRank* part) {
+  const VecX& s = part->singular;
+  while (part->rank < s.size() && s[part->rank] > limit) ++part->rank;
+  if (part->rank > 0) part->smallest_kept = s[part->rank - 1];
+  if (part->rank < s.size()) part->largest_dropped = s[part->rank];
+  if (part->all_vectors.size() > 0) {
+    part->vectors = part->all_vectors.rightCols(part->all_vectors.cols() - part->rank);
+  }
+}
+
+// By sparse QR; empty where that does not tell clearly.
+std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSpaces wanted,
+                                   double tolerance) {
+  SparseRank::Matrix A(static_cast<Eigen::Index>(part.rows.size()),
+                       static_cast<Eigen::Index>(part.columns.size()));
+  const auto entries = EntriesOf(J, part);
+  A.setFromTriplets(entries.begin(), entries.end());
+  if (wanted != NullSpaces::kSelfStress) A = SparseRank::Matrix(A.transpose());
+  const SparseRank qr(A, tolerance);
+  if (!qr.clear()) return {};
+  return PartRank{.rank = qr.rank(),
+                  .largest = 0.0,
+                  .smallest_kept = qr.smallest_kept(),
+                  .largest_dropped = qr.largest_dropped(),
+                  .vectors = wanted == NullSpaces::kNone ? MatX() : qr.Complement(),
+                  .singular = {},
+                  .all_vectors = {}};
+}
+
 }  // namespace
 
-std::optional<int> ClearRank(const MatX& J, double tolerance) {
+std::optional<int> ClearRank(const SparseRows& J, double tolerance) {
   constexpr double kClear = 1e3;  // on both sides of the tolerance
   const std::vector<PivotedPart> parts = PivotsOf(J);
   double largest = 0.0;
@@ -151,53 +252,56 @@ std::optional<int> ClearRank(const MatX& J, double tolerance) {
   return rank;
 }
 
-int RankOf(const MatX& J, double tolerance) {
-  const std::optional<int> clear = ClearRank(J, tolerance);
-  return clear ? *clear : FindRank(J, NullSpaces::kNone, tolerance).rank;
+int RankOf(const SparseRows& J, double tolerance) {
+  if (std::min(J.rows(), J.cols()) <= kLargestDense) {
+    if (const std::optional<int> clear = ClearRank(J, tolerance)) return *clear;
+  }
+  return FindRank(J, NullSpaces::kNone, tolerance).rank;
+}
+
+int RankOf(const MatX& J, double tolerance) { return RankOf(SparseOf(J), tolerance); }
+
+RankFinding FindRank(const SparseRows& J, NullSpaces wanted, double tolerance, Eigen::Index dense) {
+  const std::vector<Part> parts = PartsOf(J);
+  std::vector<PartRank> ranks(parts.size());
+  double largest = 0.0;
+  for (size_t p = 0; p < parts.size(); ++p) {
+    if (parts[p].empty()) continue;
+    if (parts[p].smaller() > dense) {
+      if (auto sparse = SparsePart(J, parts[p], wanted, tolerance)) {
+        ranks[p] = *std::move(sparse);
+        continue;
+      }
+    }
+    ranks[p] = SingularValuesOf(DensePart(J, parts[p]), wanted);
+    largest = std::max(largest, ranks[p].largest);
+  }
+  RankFinding out;
+  for (PartRank& part : ranks) {
+    if (part.singular.size() > 0) Count(tolerance * largest, &part);
+    out.rank += static_cast<int>(part.rank);
+    out.largest_dropped = std::max(out.largest_dropped, part.largest_dropped);
+    if (part.rank == 0) continue;
+    out.smallest_kept = out.smallest_kept == 0.0 ? part.smallest_kept
+                                                 : std::min(out.smallest_kept, part.smallest_kept);
+  }
+  const bool stress = wanted == NullSpaces::kSelfStress;
+  if (wanted == NullSpaces::kNone) return out;
+  MatX& vectors = stress ? out.self_stress : out.motion;
+  const Eigen::Index size = stress ? J.rows() : J.cols();
+  vectors.setZero(size, size - out.rank);
+  Eigen::Index next = 0;
+  for (size_t p = 0; p < parts.size(); ++p) {
+    const Places& places = stress ? parts[p].rows : parts[p].columns;
+    const auto n = static_cast<Eigen::Index>(places.size());
+    AddVectors(parts[p].empty() ? MatX(MatX::Identity(n, n)) : ranks[p].vectors, places, &next,
+               &vectors);
+  }
+  return out;
 }
 
 RankFinding FindRank(const MatX& J, NullSpaces wanted, double tolerance) {
-  const unsigned options = wanted == NullSpaces::kSelfStress ? Eigen::ComputeFullU
-                           : wanted == NullSpaces::kMotion   ? Eigen::ComputeFullV
-                                                             : 0;
-  std::vector<Part> parts = PartsOf(J);
-  double largest = 0.0;
-  for (Part& part : parts) {
-    if (part.rows.empty() || part.columns.empty()) continue;
-    part.svd.compute(J(part.rows, part.columns), options);
-    largest = std::max(largest, part.largest());
-  }
-  RankFinding out;
-  std::vector<Eigen::Index> ranks;
-  for (const Part& part : parts) {
-    const auto n = static_cast<Eigen::Index>(std::min(part.rows.size(), part.columns.size()));
-    Eigen::Index rank = 0;
-    for (; rank < n && part.svd.singularValues()[rank] > tolerance * largest; ++rank) {
-      const double s = part.svd.singularValues()[rank];
-      out.smallest_kept = out.smallest_kept == 0.0 ? s : std::min(out.smallest_kept, s);
-    }
-    if (rank < n)
-      out.largest_dropped = std::max(out.largest_dropped, part.svd.singularValues()[rank]);
-    out.rank += static_cast<int>(rank);
-    ranks.push_back(rank);
-  }
-  if (wanted == NullSpaces::kSelfStress) out.self_stress.setZero(J.rows(), J.rows() - out.rank);
-  if (wanted == NullSpaces::kMotion) out.motion.setZero(J.cols(), J.cols() - out.rank);
-  Eigen::Index next = 0;
-  for (size_t p = 0; p < parts.size(); ++p) {
-    const Part& part = parts[p];
-    const bool empty = part.rows.empty() || part.columns.empty();
-    if (wanted == NullSpaces::kSelfStress) {
-      const auto rows = static_cast<Eigen::Index>(part.rows.size());
-      const MatX U = empty ? MatX(MatX::Identity(rows, rows)) : part.svd.matrixU();
-      AddVectors(U.rightCols(rows - ranks[p]), part.rows, &next, &out.self_stress);
-    } else if (wanted == NullSpaces::kMotion) {
-      const auto columns = static_cast<Eigen::Index>(part.columns.size());
-      const MatX V = empty ? MatX(MatX::Identity(columns, columns)) : part.svd.matrixV();
-      AddVectors(V.rightCols(columns - ranks[p]), part.columns, &next, &out.motion);
-    }
-  }
-  return out;
+  return FindRank(SparseOf(J), wanted, tolerance);
 }
 
 }  // namespace mbv::internal

@@ -4,7 +4,9 @@
 // a translation row is r/L with ṙ/L = J_ω ω/L + J_v v/L.
 #pragma once
 
+#include <Eigen/SparseCore>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "kinematics/constraints.h"
@@ -16,6 +18,11 @@ namespace mbv::internal {
 inline constexpr double kRankTolerance = 1e-9;
 /// A self-stress with a smaller share than this in a row does not act there.
 inline constexpr double kStressTolerance = 1e-7;
+
+using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
+
+/// Matrices with fewer rows or columns are dense.
+inline constexpr Eigen::Index kLargestDense = 300;
 
 /// Scaled rows over the moving bodies.
 class RowStack {
@@ -29,6 +36,8 @@ class RowStack {
     Add(row.parent, row.J_parent, row.child, row.J_child, translation);
   }
   void Add(const CouplingRow& row);
+  /// One row, the sum of all.
+  void AddSum(const std::vector<ScalarRow>& pieces, bool translation);
   /// The true rows of all joints, then of all couplings; with `reactions`, the isostatic rule is
   /// applied.
   void AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions);
@@ -36,27 +45,38 @@ class RowStack {
   void AddDriven(const Mechanism& mechanism, const BodyStates& states);
 
   [[nodiscard]] int size() const { return static_cast<int>(rows_.size()); }
-  [[nodiscard]] MatX Matrix() const;
+  /// Without the entries that are zero.
+  [[nodiscard]] SparseRows Matrix() const;
 
  private:
+  using Row = std::vector<std::pair<int, Vec6>>;  ///< per body that it touches
+  void AddTo(Row* row, int body, const Vec6& J, double scale) const;
+
   Eigen::Index columns_;
   double length_;
-  std::vector<VecX> rows_;
+  std::vector<Row> rows_;
 };
 
 struct RankFinding {
   int rank = 0;
+  /// Singular values; of large parts an estimate, and the length of what is dropped.
   double smallest_kept = 0.0, largest_dropped = 0.0;
   MatX self_stress;  ///< rows × (rows − rank): null space of the transpose
   MatX motion;       ///< columns × (columns − rank): null space
 };
 enum class NullSpaces { kNone, kSelfStress, kMotion };
+/// By singular values, each part of J that shares no row and column with the others by itself;
+/// parts with more than `dense` rows and columns by sparse QR, where that tells clearly.
+[[nodiscard]] RankFinding FindRank(const SparseRows& J, NullSpaces wanted,
+                                   double tolerance = kRankTolerance,
+                                   Eigen::Index dense = kLargestDense);
 [[nodiscard]] RankFinding FindRank(const MatX& J, NullSpaces wanted,
                                    double tolerance = kRankTolerance);
 /// The same rank for an eighth of the time: by QR with column pivoting, whose diagonal tells it
 /// where there is a clear gap; else by singular values.
+[[nodiscard]] int RankOf(const SparseRows& J, double tolerance = kRankTolerance);
 [[nodiscard]] int RankOf(const MatX& J, double tolerance = kRankTolerance);
 /// By QR alone; empty where the gap is not clear.
-[[nodiscard]] std::optional<int> ClearRank(const MatX& J, double tolerance = kRankTolerance);
+[[nodiscard]] std::optional<int> ClearRank(const SparseRows& J, double tolerance = kRankTolerance);
 
 }  // namespace mbv::internal

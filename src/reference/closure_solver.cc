@@ -19,6 +19,10 @@ namespace {
 constexpr double kTrustedCorrection = 0.2;
 // Redundant rows may miss by this [rad, characteristic lengths] and rounding.
 constexpr double kOpen = 1e-9;
+// Residuals below this share of their tolerances need no further step.
+constexpr double kRoundOff = 1e-2;
+// Rates that miss by this share of the largest are as good as they can be.
+constexpr double kRatesMiss = 4 * kEps;
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -51,15 +55,6 @@ VecX Extended(const VecX& values, size_t size) {
   return out;
 }
 
-// Largest rotation [rad] or translation [characteristic lengths] of stacked twists.
-double SizeOf(const VecX& twists, double length) {
-  double size = 0.0;
-  for (Eigen::Index i = 0; i < twists.size(); i += 6) {
-    size = std::max({size, twists.segment<3>(i).norm(), twists.segment<3>(i + 3).norm() / length});
-  }
-  return size;
-}
-
 RunSummary Failed(Stop stop, const std::string& message) {
   RunSummary summary;
   summary.stop = stop;
@@ -87,7 +82,8 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
       length_(CharacteristicLength(mechanism)),
       lever_(LongestLever(mechanism)),
       commands_(AllCommands(mechanism, motion)),
-      system_(mechanism.bodies.size(), length_) {
+      system_(mechanism.bodies.size(), length_),
+      predictor_(length_) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
   states_.Resize(mechanism.bodies.size());
   states_.X_WB = mechanism.X_WB_home;
@@ -178,14 +174,13 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
     const double largest = Openness(r, target, trial->states.X_WB);
     if (!std::isfinite(largest)) return Step::kSlow;
     const bool small = largest < 1.0;
+    if (factored && largest < kRoundOff) return Turned() ? Step::kSingular : Step::kDone;
     if (!factored || (!small && largest > 0.01 * previous)) {
       if (!system_.Factor(rows_, selection_, selection_is_new_)) return Step::kSingular;
       selection_is_new_ = false;
       factored = true;
       // Other row orders have other signs; within one, a change means a singular pose between.
-      if (orientation_ != 0 && small && system_.determinant_sign() != orientation_) {
-        return Step::kSingular;
-      }
+      if (small && Turned()) return Step::kSingular;
     }
     const VecX step = -system_.SolveTransposed(r);
     const double size = SizeOf(step, length_);
@@ -195,8 +190,7 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
     MoveBodies(step, &trial->states);
     if (small) {
       EvaluateRows(trial);
-      const bool turned = orientation_ != 0 && system_.determinant_sign() != orientation_;
-      return turned ? Step::kSingular : Step::kDone;
+      return Turned() ? Step::kSingular : Step::kDone;
     }
     previous = largest;
   }
@@ -293,15 +287,13 @@ VecX ClosureSolver::Refined(const VecX& rates, bool* accurate) {
   }
   double previous = std::numeric_limits<double>::infinity();
   *accurate = false;
+  VecX missing = rates(selection_);
   for (int i = 0; i < 12; ++i) {
-    const VecX have = rows_.Rates(per_body);
-    VecX missing(system_.size());
-    for (int k = 0; k < system_.size(); ++k) {
-      missing[k] = rates[selection_[k]] - have[selection_[k]];
-    }
+    if (i > 0) missing = rates(selection_) - rows_.Rates(per_body)(selection_);
     const double largest = missing.cwiseQuotient(unit).lpNorm<Eigen::Infinity>();
     *accurate = largest <= 1e-9 * scale;
-    if (largest == 0.0 || (largest < 1e-12 * scale && largest > 0.1 * previous)) break;
+    if (largest <= kRatesMiss * scale) break;
+    if (largest < 1e-12 * scale && largest > 0.1 * previous) break;
     V += system_.SolveTransposed(missing);
     Unstack(V, &per_body);
     previous = largest;
@@ -356,12 +348,12 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   }
 
   // Extrapolate the previous sample; where that does not lead, follow the commands in steps.
-  const double dt = command.time_s - time_s_;
+  const double dt = command.time_s - predictor_.last_s();
   bool done = false;
   if (!first && dt > 0.0 && std::isfinite(dt)) {
     Trial trial{states_, near_values_};
     PredictTurns(mechanism_, dt, &trial.states);
-    MoveBodies(dt * Stack(states_.V_WB) + 0.5 * dt * dt * Stack(states_.A_WB), &trial.states);
+    MoveBodies(predictor_.Predict(dt), &trial.states);
     if (Newton(target, true, &trial) == Step::kDone) {
       Accept(target, std::move(trial));
       done = true;
@@ -371,8 +363,12 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   if (!done) summary = Follow(target, first ? options_.homotopy_steps : 4);
   if (summary.ok()) summary = CheckPose();
   if (summary.ok()) summary = SolveRates(command);
-  time_s_ = command.time_s;
-  if (!summary.ok()) summary.time_s = command.time_s;
+  if (summary.ok()) {
+    predictor_.Remember(command.time_s, states_);
+  } else {
+    predictor_ = PosePredictor(length_);
+    summary.time_s = command.time_s;
+  }
   return summary;
 }
 

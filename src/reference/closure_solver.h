@@ -13,6 +13,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "mechanism/reach.h"
+#include "reference/pose_predictor.h"
 #include "reference/reference.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"
@@ -52,6 +53,10 @@ class ClosureSolver {
   }
   [[nodiscard]] Step Newton(const VecX& target, bool limit_step, Trial* trial);
   [[nodiscard]] RunSummary Follow(const VecX& target, int first_steps);
+  /// The determinant has changed its sign since the last pose.
+  [[nodiscard]] bool Turned() const {
+    return orientation_ != 0 && system_.determinant_sign() != orientation_;
+  }
   [[nodiscard]] RunSummary SelectRows();
   [[nodiscard]] RunSummary CheckPose();
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
@@ -75,7 +80,7 @@ class ClosureSolver {
   BodyStates states_;
   std::vector<std::vector<double>> near_values_;
   VecX target_;  ///< command positions of states_
-  double time_s_ = kNan;
+  PosePredictor predictor_;
   double gap_position_m_ = kNan, gap_rotation_rad_ = kNan;
 };
 

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <numeric>
 
 #include "core/demand.h"
 #include "core/spatial.h"
@@ -19,6 +20,8 @@ namespace {
 constexpr double kBalanceTolerance = 1e-9;
 // A smaller share of the largest that one resting element opens is round-off.
 constexpr double kOpens = 1e-9;
+// More self-stresses than this are not looked at one by one.
+constexpr size_t kFewSelfStresses = 24;
 
 int ReactionRows(const Joint& joint, const ConstraintRows& rows) {
   return joint.transmits_force_only ? rows.translation_rows : rows.rows;
@@ -80,8 +83,25 @@ RunSummary ForceSolver::SelectBasis() {
 
 bool ForceSolver::Factor() {
   if (!system_.Factor(rows_, basis_, basis_is_new_)) return false;
+  sparse_ = rest_.size() > kFewSelfStresses && FactorSparse();
   basis_is_new_ = false;
-  // Self-stresses: each force outside the basis with the basis forces that balance it.
+  if (!sparse_) FindSelfStress();
+  return true;
+}
+
+bool ForceSolver::FactorSparse() {
+  std::vector<int> all(static_cast<size_t>(rows_.size()));
+  std::iota(all.begin(), all.end(), 0);
+  if (basis_is_new_) {
+    system_.MakeColumns(rows_, all, &columns_);
+  } else {
+    system_.FillColumns(rows_, all, &columns_);
+  }
+  return least_.Factor(columns_) && !least_.SelfStressReaches(first_driven_);
+}
+
+// Each force outside the basis with the basis forces that balance it.
+void ForceSolver::FindSelfStress() {
   self_stress_.resize(rows_.size(), static_cast<Eigen::Index>(rest_.size()));
   for (size_t k = 0; k < rest_.size(); ++k) {
     const int i = rest_[k];
@@ -96,7 +116,6 @@ bool ForceSolver::Factor() {
     }
     self_stress_(i, k) = 1.0;
   }
-  return true;
 }
 
 RunSummary ForceSolver::CheckControl(const BodyStates& states) {
@@ -126,6 +145,11 @@ double ForceSolver::Missing(const VecX& force, const VecX& wrenches, VecX* resid
 }
 
 VecX ForceSolver::LeastNorm(const VecX& wrenches) {
+  VecX scale(rows_.size());
+  for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
+  if (sparse_) {
+    return scale.cwiseProduct(least_.Solve(system_.body_scale().cwiseProduct(wrenches)));
+  }
   VecX force = VecX::Zero(rows_.size());
   VecX missing = wrenches;
   // The second pass is iterative refinement.
@@ -135,8 +159,6 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
     (void)Missing(force, wrenches, &missing);
   }
   if (rest_.empty()) return force;
-  VecX scale(rows_.size());
-  for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
   VecX scaled = force.cwiseQuotient(scale);
   TakeLeastForces(self_stress_, first_driven_, &scaled);
   return scale.cwiseProduct(scaled);
@@ -211,7 +233,8 @@ MatX ForceSolver::ReactionsOf(const VecX& force, const BodyStates& states) const
 
 // A load that a self-stress changes is no load that friction could follow.
 RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
-                                         const std::vector<size_t>& loaded) const {
+                                         const std::vector<size_t>& loaded) {
+  if (sparse_) FindSelfStress();
   for (Eigen::Index k = 0; k < self_stress_.cols(); ++k) {
     VecX force = self_stress_.col(k);
     for (int i = 0; i < rows_.size(); ++i) force[i] *= system_.RowScale(rows_.angular[i]);

@@ -8,6 +8,7 @@
 #include "mechanism/body_states.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "reference/least_forces.h"
 #include "reference/reference.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"
@@ -29,6 +30,8 @@ class ForceSolver {
   void FillRows(const BodyStates& states);
   [[nodiscard]] RunSummary SelectBasis();
   [[nodiscard]] bool Factor();
+  [[nodiscard]] bool FactorSparse();
+  void FindSelfStress();
   [[nodiscard]] RunSummary CheckControl(const BodyStates& states);
   [[nodiscard]] VecX LeastNorm(const VecX& wrenches);
   [[nodiscard]] double Missing(const VecX& force, const VecX& wrenches, VecX* residual) const;
@@ -36,7 +39,7 @@ class ForceSolver {
   void FindBands(ReferenceSample* sample);
   [[nodiscard]] RunSummary AddLoadFriction(ReferenceSample* sample, VecX* force);
   [[nodiscard]] RunSummary CheckLoadsUnique(const ReferenceSample& sample,
-                                            const std::vector<size_t>& loaded) const;
+                                            const std::vector<size_t>& loaded);
   [[nodiscard]] MatX ReactionsOf(const VecX& force, const BodyStates& states) const;
   void TakeRoundoff(VecX* driven) const;
 
@@ -47,8 +50,11 @@ class ForceSolver {
   int first_driven_ = 0;  ///< row of the first drive
   std::vector<int> basis_, rest_;
   bool basis_is_new_ = true, chosen_ = false;
-  int orientation_ = 0;  ///< sign of the determinant so far, where the forces are unique
-  MatX self_stress_;     ///< scaled; basis rows then rest rows
+  int orientation_ = 0;       ///< sign of the determinant so far, where the forces are unique
+  MatX self_stress_;          ///< scaled; empty where least_ is in use
+  SparseLu::Matrix columns_;  ///< of all rows, scaled
+  SparseLeastForces least_;   ///< of many self-stresses that leave the driven forces alone
+  bool sparse_ = false;
 };
 
 /// Rows of all joints, with the isostatic rule applied, then of all couplings: what they can

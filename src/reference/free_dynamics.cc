@@ -46,15 +46,6 @@ VecX LeastForces(const MatX& columns, Eigen::Index first_driven, const VecX& wre
   return force;
 }
 
-// The rotation [rad] or translation [L] of the largest twist.
-double SizeOfTwists(const VecX& twists, double length) {
-  double size = 0.0;
-  for (Eigen::Index i = 0; i < twists.size(); i += 6) {
-    size = std::max({size, twists.segment<3>(i).norm(), twists.segment<3>(i + 3).norm() / length});
-  }
-  return size;
-}
-
 }  // namespace
 
 FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
@@ -300,7 +291,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
     previous = open;
     VecX step = LeastMotion(-r, FirmRank());
     step -= MotionOfHeld(held.gradients, held.gradients * step + held.gaps);
-    if (moved != nullptr) *moved += SizeOfTwists(step, length_);
+    if (moved != nullptr) *moved += SizeOf(step, length_);
     MoveBodies(step, states);
   }
   RunSummary summary;

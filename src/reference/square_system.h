@@ -6,12 +6,11 @@
 // equations of a body are divided by L.
 #pragma once
 
-#include <Eigen/SparseCore>
-#include <Eigen/SparseLU>
 #include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "core/sparse_lu.h"
 #include "core/types.h"
 #include "reference/row_set.h"
 
@@ -25,13 +24,20 @@ class SquareSystem {
   [[nodiscard]] int size() const { return size_; }
 
   /// Chooses rows independent of each other among the `rows` with first <= index < last, by QR
-  /// with column pivoting; increasing. Fewer than size() if their rank is less.
+  /// with column pivoting, of many bodies by sparse QR where that tells clearly; increasing. Fewer
+  /// than size() if their rank is less.
   [[nodiscard]] std::vector<int> IndependentRows(const RowSet& rows, int first, int last) const;
 
   /// Factors the matrix of the rows `selection` (size() of them, always the same ones unless
   /// `new_selection`). False if it is exactly singular.
   [[nodiscard]] bool Factor(const RowSet& rows, const std::vector<int>& selection,
                             bool new_selection);
+  /// The scaled columns of the rows `selection`, with the pattern of any state; and filled
+  /// again for another state of the same rows.
+  void MakeColumns(const RowSet& rows, const std::vector<int>& selection,
+                   SparseLu::Matrix* columns) const;
+  void FillColumns(const RowSet& rows, const std::vector<int>& selection,
+                   SparseLu::Matrix* columns) const;
   /// Sign of the determinant of the last factorisation; comparable for the same selection.
   [[nodiscard]] int determinant_sign() const { return determinant_sign_; }
 
@@ -53,18 +59,13 @@ class SquareSystem {
   [[nodiscard]] const VecX& body_scale() const { return body_scale_; }
 
  private:
-  [[nodiscard]] VecX SolveScaled(const VecX& b);
-  [[nodiscard]] VecX SolveScaledTransposed(const VecX& c);
-  void BuildPattern(const RowSet& rows, const std::vector<int>& selection);
-
+  [[nodiscard]] SparseLu::Matrix ScaledColumns(const RowSet& rows, int first, int last) const;
   int size_;
   double length_;
-  bool dense_;
   VecX body_scale_;  ///< 1/L for rotations, 1 for translations
   VecX row_scale_;   ///< per selected row
-  Eigen::SparseMatrix<double> matrix_;
-  Eigen::SparseLU<Eigen::SparseMatrix<double>, Eigen::COLAMDOrdering<int>> sparse_lu_;
-  Eigen::PartialPivLU<MatX> dense_lu_;
+  SparseLu::Matrix matrix_;
+  SparseLu lu_;
   int determinant_sign_ = 0;
   VecX soft_force_, soft_motion_;
 };
@@ -80,5 +81,7 @@ class SquareSystem {
 /// Stacks the moving bodies' entries of `per_body` and back.
 [[nodiscard]] VecX Stack(const std::vector<Vec6>& per_body);
 void Unstack(const VecX& stacked, std::vector<Vec6>* per_body);
+/// Largest rotation [rad] or translation [characteristic lengths] of stacked twists.
+[[nodiscard]] double SizeOf(const VecX& twists, double length);
 
 }  // namespace mbv::internal

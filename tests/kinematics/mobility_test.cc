@@ -140,7 +140,7 @@ MatX RowsAtHome(const Mechanism& mechanism, bool driven) {
   internal::RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
   if (driven) stack.AddDriven(mechanism, states);
-  return stack.Matrix();
+  return MatX(stack.Matrix());
 }
 
 TEST(Ranks, PivotsAndSingularValuesGiveTheSameOnEveryShippedModel) {
@@ -152,7 +152,7 @@ TEST(Ranks, PivotsAndSingularValuesGiveTheSameOnEveryShippedModel) {
     for (const bool driven : {false, true}) {
       const MatX J = RowsAtHome(*loaded.mechanism, driven);
       const int rank = internal::FindRank(J, internal::NullSpaces::kNone).rank;
-      const auto pivots = internal::ClearRank(J);
+      const auto pivots = internal::ClearRank(J.sparseView());
       if (pivots) {
         EXPECT_EQ(*pivots, rank) << entry.path();
       }
@@ -172,10 +172,10 @@ TEST(Ranks, WithoutAClearGapSingularValuesDecide) {
     values[11] = smallest;
     return svd.matrixU() * values.asDiagonal() * svd.matrixV().transpose();
   };
-  EXPECT_EQ(internal::ClearRank(with_smallest(1e-3)), 12);
-  EXPECT_EQ(internal::ClearRank(with_smallest(1e-15)), 11);
+  EXPECT_EQ(internal::ClearRank(with_smallest(1e-3).sparseView()), 12);
+  EXPECT_EQ(internal::ClearRank(with_smallest(1e-15).sparseView()), 11);
   for (const double smallest : {3e-6, 2e-9, 0.5e-9, 3e-12}) {
-    EXPECT_FALSE(internal::ClearRank(with_smallest(smallest))) << smallest;
+    EXPECT_FALSE(internal::ClearRank(with_smallest(smallest).sparseView())) << smallest;
   }
   EXPECT_EQ(internal::RankOf(with_smallest(2e-9)), 12);
   EXPECT_EQ(internal::RankOf(with_smallest(0.5e-9)), 11);
