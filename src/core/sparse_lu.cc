@@ -111,6 +111,13 @@ int SparseLu::determinant_sign() const {
   return sign;
 }
 
+double SparseLu::PivotRatio() const {
+  if (factors_->n == 0) return 1.0;
+  MBV_DEMAND(factors_->numeric != nullptr, factors_->n);
+  const auto sizes = Eigen::Map<const VecX>(factors_->pivots(), factors_->n).cwiseAbs();
+  return sizes.minCoeff() / sizes.maxCoeff();
+}
+
 void SparseLu::Solve(VecX* b) const {
   Factors& f = *factors_;
   if (f.n == 0) return;

@@ -28,6 +28,9 @@ class SparseLu {
   /// −1 or 1; of the matrix factored last, in its own order of rows and columns.
   [[nodiscard]] int determinant_sign() const;
 
+  /// Smallest over largest pivot: a cheap warning of a singular matrix.
+  [[nodiscard]] double PivotRatio() const;
+
   /// In place: x with A x = b, and with Aᵀ x = b.
   void Solve(VecX* b) const;
   void SolveTransposed(VecX* b) const;

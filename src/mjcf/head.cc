@@ -57,6 +57,17 @@ void WriteDefaults(const Sections& s) {
   s.xml->Close();
 }
 
+// From so many degrees of freedom on, MuJoCo's sparse constraint solver is faster.
+constexpr int kSparseFrom = 60;
+
+int FreedomsOfTree(const Mechanism& mechanism) {
+  int freedoms = 0;
+  for (const int j : mechanism.tree_joints) {
+    freedoms += FreedomsOf(mechanism.joints[static_cast<size_t>(j)].kind);
+  }
+  return freedoms;
+}
+
 }  // namespace
 
 void WriteHead(const Sections& s) {
@@ -72,7 +83,7 @@ void WriteHead(const Sections& s) {
   s.xml->Set("integrator", "Euler");
   s.xml->Set("solver", "Newton");
   s.xml->Set("tolerance", "1e-14");
-  s.xml->Set("jacobian", "dense");
+  s.xml->Set("jacobian", FreedomsOfTree(s.mechanism) < kSparseFrom ? "dense" : "sparse");
   s.xml->Open("flag");
   s.xml->Set("contact", "disable");
   s.xml->Set("energy", "enable");

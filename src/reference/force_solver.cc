@@ -94,10 +94,11 @@ bool ForceSolver::FactorSparse() {
   std::iota(all.begin(), all.end(), 0);
   if (basis_is_new_) {
     system_.MakeColumns(rows_, all, &columns_);
+    least_.Reset();
   } else {
     system_.FillColumns(rows_, all, &columns_);
   }
-  return least_.Factor(columns_) && !least_.SelfStressReaches(first_driven_);
+  return least_.Factor(columns_, 0.0) && !SelfStressReaches(least_, columns_, first_driven_);
 }
 
 // Each force outside the basis with the basis forces that balance it.
@@ -148,7 +149,7 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
   VecX scale(rows_.size());
   for (int i = 0; i < rows_.size(); ++i) scale[i] = system_.RowScale(rows_.angular[i]);
   if (sparse_) {
-    return scale.cwiseProduct(least_.Solve(system_.body_scale().cwiseProduct(wrenches)));
+    return scale.cwiseProduct(least_.LeastNorm(system_.body_scale().cwiseProduct(wrenches)));
   }
   VecX force = VecX::Zero(rows_.size());
   VecX missing = wrenches;

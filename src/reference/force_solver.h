@@ -53,7 +53,7 @@ class ForceSolver {
   int orientation_ = 0;       ///< sign of the determinant so far, where the forces are unique
   MatX self_stress_;          ///< scaled; empty where least_ is in use
   SparseLu::Matrix columns_;  ///< of all rows, scaled
-  SparseLeastForces least_;   ///< of many self-stresses that leave the driven forces alone
+  SparseLeastNorm least_;     ///< of many self-stresses that leave the driven forces alone
   bool sparse_ = false;
 };
 

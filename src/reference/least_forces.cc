@@ -2,7 +2,6 @@
 
 #include <Eigen/QR>
 #include <Eigen/SVD>
-#include <algorithm>
 #include <cmath>
 
 namespace mbv::internal {
@@ -10,9 +9,6 @@ namespace {
 
 // A self-stress with a smaller share than this in the driven forces does not act there.
 constexpr double kShare = 1e-7;
-// a of (1): about the smallest singular value of A, for which the condition of the whole is A's
-// [Björck 1996, §2.5.2].
-constexpr double kDiagonal = 0.05;
 
 }  // namespace
 
@@ -35,69 +31,13 @@ void TakeLeastForces(const MatX& self_stress, Eigen::Index first_driven, VecX* f
   *force -= rest * (rest.transpose() * *force);
 }
 
-void SparseLeastForces::MakePattern(const SparseLu::Matrix& A) {
-  const auto forces = static_cast<int>(A.cols());
-  std::vector<Eigen::Triplet<double>> entries;
-  for (int i = 0; i < forces; ++i) {
-    entries.emplace_back(i, i, kDiagonal);
-    for (SparseLu::Matrix::InnerIterator entry(A, i); entry; ++entry) {
-      const auto equation = static_cast<int>(forces + entry.row());
-      entries.emplace_back(equation, i, 0.0);
-      entries.emplace_back(i, equation, 0.0);
-    }
-  }
-  K_.resize(A.cols() + A.rows(), A.cols() + A.rows());
-  K_.setFromTriplets(entries.begin(), entries.end());
-  K_.makeCompressed();
-  const auto place = [&](int row, int column) {
-    const int* first = K_.innerIndexPtr() + K_.outerIndexPtr()[column];
-    const int* last = K_.innerIndexPtr() + K_.outerIndexPtr()[column + 1];
-    return static_cast<int>(std::lower_bound(first, last, row) - K_.innerIndexPtr());
-  };
-  in_rows_.clear();
-  in_columns_.clear();
-  for (int i = 0; i < forces; ++i) {
-    for (SparseLu::Matrix::InnerIterator entry(A, i); entry; ++entry) {
-      const auto equation = static_cast<int>(forces + entry.row());
-      in_columns_.push_back(place(equation, i));
-      in_rows_.push_back(place(i, equation));
-    }
-  }
-  lu_.Reset();
-}
-
-bool SparseLeastForces::Factor(const SparseLu::Matrix& A) {
-  A_ = &A;
-  if (static_cast<Eigen::Index>(in_rows_.size()) != A.nonZeros() ||
-      K_.rows() != A.rows() + A.cols()) {
-    MakePattern(A);
-  }
-  for (Eigen::Index k = 0; k < A.nonZeros(); ++k) {
-    K_.valuePtr()[in_columns_[static_cast<size_t>(k)]] = A.valuePtr()[k];
-    K_.valuePtr()[in_rows_[static_cast<size_t>(k)]] = -A.valuePtr()[k];
-  }
-  return lu_.Factor(K_);
-}
-
-VecX SparseLeastForces::Solve(const VecX& b) const {
-  VecX x = VecX::Zero(A_->cols()), rest = b, both(K_.rows());
-  // The second pass is iterative refinement.
-  for (int pass = 0; pass < 2; ++pass) {
-    both.setZero();
-    both.tail(b.size()) = rest;
-    lu_.Solve(&both);
-    x += both.head(x.size());
-    rest = b - *A_ * x;
-  }
-  return x;
-}
-
-bool SparseLeastForces::SelfStressReaches(Eigen::Index first) const {
-  VecX random(A_->cols());
+bool SelfStressReaches(const SparseLeastNorm& forces, const SparseLu::Matrix& A,
+                       Eigen::Index first) {
+  VecX random(A.cols());
   for (Eigen::Index i = 0; i < random.size(); ++i) {
     random[i] = std::sin(1.0 + 1.7 * static_cast<double>(i) + std::cos(static_cast<double>(i)));
   }
-  const VecX stress = random - Solve(*A_ * random);
+  const VecX stress = random - forces.LeastNorm(A * random);
   return stress.tail(random.size() - first).norm() > kShare * stress.norm();
 }
 

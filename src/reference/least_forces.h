@@ -1,9 +1,7 @@
 // Which of many possible sets of forces is reported. Internal to reference/.
 #pragma once
 
-#include <vector>
-
-#include "core/sparse_lu.h"
+#include "core/sparse_least_norm.h"
 #include "core/types.h"
 
 namespace mbv::internal {
@@ -14,26 +12,9 @@ namespace mbv::internal {
 /// All forces in N: moments divided by the characteristic length.
 void TakeLeastForces(const MatX& self_stress, Eigen::Index first_driven, VecX* force);
 
-/// The forces of least norm alone, for many self-stresses: x with A x = b and x = Aᵀ y, from
-///   [a 1  −Aᵀ] [x  ]   [0]
-///   [A     0 ] [a y] = [b] (1)
-/// whose factors are about as sparse as A's [Björck 1996, §2.5.2].
-class SparseLeastForces {
- public:
-  /// A: equations × forces, of full row rank; always with the same pattern. False where it is
-  /// singular.
-  [[nodiscard]] bool Factor(const SparseLu::Matrix& A);
-  [[nodiscard]] VecX Solve(const VecX& b) const;
-  /// Whether a self-stress acts on forces from `first` on: a random one has a share in all of them.
-  [[nodiscard]] bool SelfStressReaches(Eigen::Index first) const;
-
- private:
-  void MakePattern(const SparseLu::Matrix& A);
-
-  const SparseLu::Matrix* A_ = nullptr;
-  SparseLu::Matrix K_;                     ///< of (1)
-  std::vector<int> in_rows_, in_columns_;  ///< per entry of A: where it stands in K_
-  SparseLu lu_;
-};
+/// Whether a self-stress acts on forces from `first` on, where `forces` solves A x = b for forces
+/// x: a random self-stress has a share in all that one acts on.
+[[nodiscard]] bool SelfStressReaches(const SparseLeastNorm& forces, const SparseLu::Matrix& A,
+                                     Eigen::Index first);
 
 }  // namespace mbv::internal

@@ -14,11 +14,6 @@ constexpr int kMaxNewton = 15;
 // Newton stops after a step whose square is round-off. A start that needs no step at all is kept.
 constexpr double kSmallSquare = 1e-8;
 constexpr double kNoStep = 1e-14;
-// Below this step the factors of the previous iterate serve on, with refinement.
-constexpr double kChordStep = 1e-5;
-// Each refinement shrinks the error of factors that are kChordStep old by about kChordStep times
-// the condition: one leaves up to 1e-9 of the forces, three leave round-off.
-constexpr int kRefinements = 3;
 // Reflections mix all equations: without one refinement the force that accelerates a heavy
 // prescribed body leaves its rounding in the drives that do not move it.
 constexpr int kOrthogonalRefinements = 1;
@@ -30,6 +25,8 @@ constexpr double kFarthestStep = 0.5, kFarthestCorrection = 0.1;
 constexpr double kShortestStep = 1e-4;
 // Relative rank tolerance.
 constexpr double kRankTolerance = 1e-9;
+// With more rows than velocities: of so many velocities on, factors are sparse.
+constexpr int kLargestDense = 60;
 
 // The shortest x with A x = b as well as can be, refined once.
 VecX LeastNorm(const MatX& A, const VecX& b) {
@@ -50,24 +47,26 @@ ClosureSolver::ClosureSolver(ConstraintSystem* system) : system_(system) {
   rhs_.setZero(rows);
   step_.setZero(nv);
   bias_.setZero(rows);
-  if (rows == nv) lu_ = Eigen::PartialPivLU<MatX>(rows);
 }
 
 void ClosureSolver::Factor() {
-  stale_ = false;
-  regular_ = false;
+  const int rows = system_->rows(), nv = system_->nv();
+  factors_ = Factors::kNone;
   rank_ = 0;
-  if (system_->rows() == 0) return;
-  if (system_->rows() == system_->nv()) {
-    lu_.compute(system_->ScaledJ());
-    // The ratio of the pivots is a cheap warning sign of rank deficiency.
-    const auto pivots = lu_.matrixLU().diagonal().cwiseAbs();
-    if (pivots.minCoeff() > kRankTolerance * pivots.maxCoeff()) {
-      regular_ = true;
-      rank_ = system_->nv();
-      return;
-    }
+  if (rows == 0) return;
+  system_->FillScaledTranspose(&columns_);
+  // The ratio of the pivots is a cheap warning sign of rank deficiency.
+  if (rows == nv && lu_.Factor(columns_) && lu_.PivotRatio() > kRankTolerance) {
+    factors_ = Factors::kSquare;
+    rank_ = nv;
+    return;
   }
+  if (rows > nv && nv > kLargestDense && least_.Factor(columns_, kRankTolerance)) {
+    factors_ = Factors::kOverdefined;
+    rank_ = nv;
+    return;
+  }
+  factors_ = Factors::kOrthogonal;
   cod_.setThreshold(kRankTolerance);
   cod_.compute(system_->ScaledJ());
   rank_ = static_cast<int>(cod_.rank());
@@ -75,44 +74,44 @@ void ClosureSolver::Factor() {
 
 // J = R J' D⁻¹ with the factored J', units R of the rows and D of the velocities.
 void ClosureSolver::SolveInto(const VecX& b, VecX* x) {
-  const VecX &row = system_->row_unit(), &dof = system_->dof_unit();
-  if (rank_ == 0) {
+  if (factors_ == Factors::kNone) {
     x->setZero(system_->nv());
     return;
   }
-  scaled_ = b.cwiseQuotient(row);
-  if (!regular_) {
-    *x = cod_.solve(scaled_);
-    x->array() *= dof.array();
-    return;
+  scaled_ = b.cwiseQuotient(system_->row_unit());
+  switch (factors_) {
+    case Factors::kSquare:
+      lu_.SolveTransposed(&scaled_);
+      break;
+    case Factors::kOverdefined:
+      scaled_ = least_.LeastSquares(scaled_);
+      break;
+    default:
+      scaled_ = cod_.solve(scaled_).eval();
   }
-  *x = lu_.solve(scaled_);
-  x->array() *= dof.array();
-  for (int i = 0; stale_ && i < kRefinements; ++i) {
-    refinement_ = b;
-    refinement_.noalias() -= system_->J() * *x;
-    scaled_ = refinement_.cwiseQuotient(row);
-    refinement_ = lu_.solve(scaled_);
-    x->array() += dof.array() * refinement_.array();
-  }
+  *x = scaled_.cwiseProduct(system_->dof_unit());
 }
 
 void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
-  const VecX &row = system_->row_unit(), &dof = system_->dof_unit();
-  if (rank_ == 0) {
+  if (factors_ == Factors::kNone) {
     x->setZero(system_->rows());
     return;
   }
-  const auto solve = [&](const VecX& right) -> VecX {
-    if (regular_) return lu_.transpose().solve(right);
-    return cod_.transpose().solve(right);
-  };
+  const VecX &row = system_->row_unit(), &dof = system_->dof_unit();
   scaled_ = b.cwiseProduct(dof);
+  if (factors_ == Factors::kSquare) {
+    lu_.Solve(&scaled_);
+    *x = scaled_.cwiseQuotient(row);
+    return;
+  }
+  if (factors_ == Factors::kOverdefined) {
+    *x = least_.LeastNorm(scaled_).cwiseQuotient(row);
+    return;
+  }
+  const auto solve = [&](const VecX& right) -> VecX { return cod_.transpose().solve(right); };
   *x = solve(scaled_).cwiseQuotient(row);
-  const int refinements = !regular_ ? kOrthogonalRefinements : stale_ ? kRefinements : 0;
-  for (int i = 0; i < refinements; ++i) {
-    refinement_ = b;
-    refinement_.noalias() -= system_->J().transpose() * *x;
+  for (int i = 0; i < kOrthogonalRefinements; ++i) {
+    refinement_ = b - system_->J().transpose() * *x;
     scaled_ = refinement_.cwiseProduct(dof);
     *x += solve(scaled_).cwiseQuotient(row);
   }
@@ -129,9 +128,8 @@ RunSummary ClosureSolver::Close(const VecX& to) {
     rhs_ = -system_->residual();
     const double open = rhs_.cwiseQuotient(system_->row_unit()).lpNorm<Eigen::Infinity>();
     const bool closed = open < kClosed + system_->Rounding();
-    stale_ = iteration > 0 && size < kChordStep && regular_;
     const bool done = iteration > 0 && size < kSmallSquare && closed;
-    if (!stale_) Factor();
+    Factor();
     if (done) return RunSummary::Done();
     SolveInto(rhs_, &step_);
     size = step_.cwiseQuotient(system_->dof_unit()).lpNorm<Eigen::Infinity>();
@@ -228,9 +226,17 @@ void ClosureSolver::SolveForces(const VecX& tau) {
   system_->force() = rhs_;
 }
 
-void ClosureSolver::RemoveSelfStress(VecX* force) const {
+void ClosureSolver::RemoveSelfStress(VecX* force) {
   if (redundant() == 0) return;
   const VecX& unit = system_->row_unit();
+  if (factors_ == Factors::kOverdefined) {
+    system_->FillScaledTranspose(&columns_here_);
+    if (least_here_.Factor(columns_here_, kRankTolerance)) {
+      const VecX x = least_here_.LeastSquares(force->cwiseProduct(unit));
+      *force = (columns_here_.transpose() * x).cwiseQuotient(unit);
+      return;
+    }
+  }
   const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
   VecX y = qr.householderQ().adjoint() * force->cwiseProduct(unit);
   y.tail(redundant()).setZero();

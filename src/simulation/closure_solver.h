@@ -6,6 +6,8 @@
 #include <vector>
 
 #include "core/run_summary.h"
+#include "core/sparse_least_norm.h"
+#include "core/sparse_lu.h"
 #include "mechanism/motion.h"
 #include "simulation/constraint_system.h"
 
@@ -50,7 +52,7 @@ class ClosureSolver {
 
   /// Takes the part out of row forces that does not act on the present configuration: what remains
   /// is J x for some x. As many dimensions as rows were redundant when last solved.
-  void RemoveSelfStress(VecX* force) const;
+  void RemoveSelfStress(VecX* force);
 
   /// Row forces that balance each other at the last configuration solved: rows × redundant().
   [[nodiscard]] MatX SelfStress() const;
@@ -72,10 +74,20 @@ class ClosureSolver {
   void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b
 
   ConstraintSystem* const system_;
-  bool regular_ = false;  // square and of full rank: lu_ is valid, otherwise cod_
-  bool stale_ = false;    // factors belong to a configuration nearby: solves are refined
+  enum class Factors {
+    kNone,         // no rows
+    kSquare,       // lu_: as many rows as velocities, of full rank
+    kOverdefined,  // least_: many velocities, of full rank, and more rows
+    kOrthogonal,   // cod_
+  };
+  Factors factors_ = Factors::kNone;
   int rank_ = 0;
-  Eigen::PartialPivLU<MatX> lu_;
+  SparseLu::Matrix columns_;  // J'ᵀ
+  SparseLu lu_;               // of it
+  SparseLeastNorm least_;     // with it
+  SparseLu::Matrix
+      columns_here_;  // the same of the present J, where that moves on without Factor()
+  SparseLeastNorm least_here_;
   Eigen::CompleteOrthogonalDecomposition<MatX> cod_;
   VecX rhs_, step_, bias_, refinement_, scaled_;
   double moved_ = 0.0;  // by the last Close, in the units of ScaledJ(): sum of its largest entries

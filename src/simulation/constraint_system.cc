@@ -140,15 +140,81 @@ void ConstraintSystem::AddGivenForces(double* qfrc) const {
   }
 }
 
-void ConstraintSystem::EvaluatePosition() {
-  const mjModel* m = engine_.m.get();
-  mj_kinematics(m, d_);
-  mj_comPos(m, d_);
-  mj_tendon(m, d_);
-  mj_makeConstraint(m, d_);
-  // MuJoCo drops a constraint whose Jacobian is zero; no sensible mechanism has one.
+// MuJoCo drops a constraint whose Jacobian is zero; no sensible mechanism has one.
+void ConstraintSystem::CheckRows() const {
   if (d_->ne != rows_) throw EngineError("a closure or drive constrains nothing");
   if (d_->nf != friction_rows()) throw EngineError("friction acts on nothing");
+}
+
+// MuJoCo's sparse rows have an entry for every dof above one of their bodies.
+void ConstraintSystem::FindPattern() {
+  mjModel* m = engine_.m.get();
+  m->opt.jacobian = mjJAC_SPARSE;
+  mj_tendon(m, d_);
+  mj_makeConstraint(m, d_);
+  m->opt.jacobian = mjJAC_DENSE;
+  CheckRows();
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < rows_; ++i) {
+    const int* columns = d_->efc_J_colind + d_->efc_J_rowadr[i];
+    for (int k = 0; k < d_->efc_J_rownnz[i]; ++k) entries.emplace_back(i, columns[k], 1.0);
+  }
+  J_.resize(rows_, m->nv);
+  J_.setFromTriplets(entries.begin(), entries.end());
+  J_.makeCompressed();
+}
+
+void ConstraintSystem::EvaluatePosition() {
+  mjModel* m = engine_.m.get();
+  mj_kinematics(m, d_);
+  mj_comPos(m, d_);
+  if (J_.rows() != rows_) FindPattern();
+  {
+    const OwnJacobians jacobians(engine_);
+    mj_tendon(m, d_);
+    mj_makeConstraint(m, d_);
+  }
+  CheckRows();
+  if (!engine_.sparse) {
+    TakeJacobian();
+    return;
+  }
+  // Rows and entries stand as in the pattern.
+  for (int i = 0; i < rows_; ++i) {
+    std::copy_n(d_->efc_J + d_->efc_J_rowadr[i], d_->efc_J_rownnz[i],
+                J_.valuePtr() + J_.outerIndexPtr()[i]);
+  }
+  friction_J_.setZero(friction_rows(), m->nv);
+  for (int i = 0; i < friction_rows(); ++i) {
+    const int address = d_->efc_J_rowadr[rows_ + i];
+    for (int k = 0; k < d_->efc_J_rownnz[rows_ + i]; ++k) {
+      friction_J_(i, d_->efc_J_colind[address + k]) = d_->efc_J[address + k];
+    }
+  }
+  if (m->ntendon > 0) mj_tendon(m, d_);  // dense
+}
+
+void ConstraintSystem::TakeJacobian() {
+  const int nv = engine_.m->nv;
+  double* out = J_.valuePtr();
+  for (int i = 0; i < rows_; ++i) {
+    const double* row = d_->efc_J + static_cast<Eigen::Index>(i) * nv;
+    for (int k = J_.outerIndexPtr()[i]; k < J_.outerIndexPtr()[i + 1]; ++k) {
+      *out++ = row[J_.innerIndexPtr()[k]];
+    }
+  }
+}
+
+void ConstraintSystem::FillScaledTranspose(SparseLu::Matrix* columns) const {
+  if (columns->nonZeros() != J_.nonZeros()) *columns = J_.transpose().eval();
+  const double* in = J_.valuePtr();
+  double* out = columns->valuePtr();
+  for (int i = 0; i < rows_; ++i) {
+    const double scale = 1.0 / row_unit_[i];
+    for (int k = J_.outerIndexPtr()[i]; k < J_.outerIndexPtr()[i + 1]; ++k) {
+      *out++ = scale * dof_unit_[J_.innerIndexPtr()[k]] * *in++;
+    }
+  }
 }
 
 void ConstraintSystem::EvaluatePassive() {

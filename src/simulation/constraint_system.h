@@ -20,13 +20,17 @@
 
 #include <vector>
 
+#include "core/sparse_lu.h"
 #include "core/types.h"
 #include "simulation/engine_model.h"
 
 namespace mbv::simulation {
 
 using RowMajor = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
+/// Where the model asks for sparse Jacobians, MuJoCo's constraint stages run on such; everything
+/// else, tendons too, finds dense ones.
 class ConstraintSystem {
  public:
   /// Both outlive the system. `d` is the state that all functions work on.
@@ -64,7 +68,10 @@ class ConstraintSystem {
   /// Kinematics, inertias about the centre of mass, tendons and constraint rows at d.qpos.
   void EvaluatePosition();
   [[nodiscard]] Eigen::Map<const VecX> residual() const { return {d_->efc_pos, rows_}; }
-  [[nodiscard]] Eigen::Map<const RowMajor> J() const { return {d_->efc_J, rows_, engine_.m->nv}; }
+  /// Entries for every dof that can move an end of a row, of the last EvaluatePosition().
+  [[nodiscard]] const SparseRows& J() const { return J_; }
+  /// The same of rows that MuJoCo made by itself, in the dense format.
+  void TakeJacobian();
   [[nodiscard]] Eigen::Map<VecX> force() const { return {d_->efc_force, rows_}; }
 
   /// Characteristic length L [m].
@@ -75,8 +82,10 @@ class ConstraintSystem {
   [[nodiscard]] const VecX& dof_unit() const { return dof_unit_; }
   /// J in these units.
   [[nodiscard]] MatX ScaledJ() const {
-    return row_unit_.cwiseInverse().asDiagonal() * J() * dof_unit_.asDiagonal();
+    return row_unit_.cwiseInverse().asDiagonal() * MatX(J_) * dof_unit_.asDiagonal();
   }
+  /// Its transpose, sparse with a pattern that stays.
+  void FillScaledTranspose(SparseLu::Matrix* columns) const;
   /// Rounding of residuals in these units: positions far from the world's origin and angles of many
   /// turns have few digits behind the point.
   [[nodiscard]] double Rounding() const;
@@ -110,7 +119,8 @@ class ConstraintSystem {
   /// Unit of such a row as row_unit(), and its Jacobian.
   [[nodiscard]] double FrictionUnit(int row) const;
   [[nodiscard]] Eigen::Map<const VecX> FrictionJacobian(int row) const {
-    return {d_->efc_J + (rows_ + row) * nv(), nv()};
+    const double* first = engine_.sparse ? friction_J_.data() : d_->efc_J + rows_ * nv();
+    return {first + row * nv(), nv()};
   }
   /// Per force element: sign of the rate with which it slides, 0 at rest, where MuJoCo's row holds
   /// it up to its breakaway force. Empty: in free motion MuJoCo's rows do all of it; elsewhere the
@@ -139,11 +149,15 @@ class ConstraintSystem {
   [[nodiscard]] bool IsLengthCoupling(size_t coupling) const;
   [[nodiscard]] double CouplingBias(int coupling) const;
   void FindUnits();
+  void FindPattern();
+  void CheckRows() const;
 
   const EngineModel& engine_;
   mjData* const d_;
   const double length_, lever_;
   VecX row_unit_, dof_unit_;
+  SparseRows J_;
+  RowMajor friction_J_;  // where MuJoCo's are sparse
   int rows_ = 0, first_coupling_ = 0, closure_rows_ = 0;
   std::vector<int> closure_row_, driven_row_;
   std::vector<bool> coupling_is_length_;

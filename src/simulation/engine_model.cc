@@ -169,6 +169,8 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   engine->mechanism = &mechanism;
   engine->plan = mjcf::MakePlan(mechanism);
   engine->m = CompileMjcf(mjcf);
+  engine->sparse = mj_isSparse(engine->m.get()) != 0;
+  engine->m->opt.jacobian = mjJAC_DENSE;
   const mjModel& m = *engine->m;
   engine->joint_ids.resize(mechanism.joints.size());
   for (const mjcf::PlannedBody& body : engine->plan.bodies) {

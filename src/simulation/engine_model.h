@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/run_summary.h"
@@ -43,7 +44,8 @@ struct FrictionPlace {
 struct EngineModel {
   const Mechanism* mechanism = nullptr;
   mjcf::Plan plan;
-  ModelHandle m;
+  ModelHandle m;             ///< set to dense Jacobians
+  bool sparse = false;       ///< it asked for sparse ones
   std::vector<int> body_id;  ///< per planned body
   std::vector<DrivenPlace> driven;
   std::vector<int> closure_equality;        ///< per planned closure
@@ -64,6 +66,22 @@ struct EngineModel {
 /// coordinate in MuJoCo.
 [[nodiscard]] RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
                                          EngineModel* engine);
+
+/// MuJoCo's Jacobians for a while as the model asks for them: for its constraint stages, whose
+/// sparse results no one else reads.
+class OwnJacobians {
+ public:
+  explicit OwnJacobians(const EngineModel& engine)
+      : m_(engine.m.get()),
+        before_(std::exchange(m_->opt.jacobian, engine.sparse ? mjJAC_SPARSE : mjJAC_DENSE)) {}
+  ~OwnJacobians() { m_->opt.jacobian = before_; }
+  OwnJacobians(const OwnJacobians&) = delete;
+  OwnJacobians& operator=(const OwnJacobians&) = delete;
+
+ private:
+  mjModel* m_;
+  int before_;
+};
 
 /// The frames that a closure makes coincide, on its first and on its second body.
 struct AnchorFrames {

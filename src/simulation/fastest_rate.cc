@@ -46,7 +46,7 @@ MatX FreeMotions(const ConstraintSystem& system) {
   constexpr double kRankTolerance = 1e-9;
   Eigen::ColPivHouseholderQR<MatX> qr;
   qr.setThreshold(kRankTolerance);
-  qr.compute(MatX(system.J().transpose()));
+  qr.compute(MatX(system.J()).transpose());
   const MatX Q = qr.householderQ();
   return Q.rightCols(nv - qr.rank());
 }

@@ -206,12 +206,16 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     s->ApplyForces(static_cast<double>(n) * h, {.motion = at, .force = {}});
     if (n % per_sample == 0) {
       mj_forward(m, data);
+      s->system.TakeJacobian();
       s->Record(static_cast<size_t>(n / per_sample));
       if (RunSummary summary = TroubleAt(*s, static_cast<double>(n) * h); !summary.ok()) {
         return summary;
       }
     }
-    mj_step(m, data);
+    {
+      const OwnJacobians jacobians(s->engine);
+      mj_step(m, data);
+    }
     if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||
         data->warning[mjWARN_BADQVEL].number > 0) {
       return Failure("MuJoCo reset the simulation, which had diverged", static_cast<double>(n) * h);

@@ -261,6 +261,7 @@ bool Integrator::RefineFriction(VecX* gives) const {
 
 void Integrator::SolveOnce() {
   Eigen::Map<VecX>(d_->qacc_warmstart, m_->nv).array() += kNudge;
+  const OwnJacobians jacobians(s_.engine);
   mj_fwdConstraint(m_, d_);
 }
 
@@ -312,7 +313,7 @@ VecX Integrator::DecideFriction() {
 void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance guidance) {
   const int rows = s_.system.rows(), driven = s_.system.driven_rows();
   s_.system.Bias(&bias_);
-  rate_.noalias() = s_.system.J() * v;
+  rate_ = s_.system.J() * v;
   aref_ = -bias_;
   rate_.tail(driven) -= s_.system.Guided(at.velocity);
   aref_.tail(driven) += s_.system.Guided(at.acceleration);

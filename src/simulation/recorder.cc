@@ -282,7 +282,7 @@ void Recorder::ExcludeDrives(int joint, double sign, Vec6* F_W) const {
   };
   for (const auto& [row, id] : driven_of_[joint]) exclude(id, system_->DrivenForce(row));
   for (const auto& [row, id] : coupled_of_[joint]) {
-    exclude(id, system_->J()(row, engine_.m->jnt_dofadr[id]) * system_->force()[row]);
+    exclude(id, system_->J().coeff(row, engine_.m->jnt_dofadr[id]) * system_->force()[row]);
   }
   for (const size_t e : elements_of_[joint]) exclude(engine_.elements[e].joint, ElementForce(e));
 }

@@ -112,7 +112,7 @@ void Statics::Evaluate(const State& state, const Target& target) {
   J_.resize(loops + (target.held ? 6 : 0), m->nv);
   r_.resize(J_.rows());
   if (loops > 0) {
-    J_.topRows(loops) = system_->J();
+    J_.topRows(loops) = MatX(system_->J());
     r_.head(loops) = system_->residual();
   }
   if (target.held) {

@@ -55,6 +55,7 @@ void BareMjStep(benchmark::State& state) {
   MBV_DEMAND(MakeEngineModel(mechanism, WriteMjcf(mechanism), &engine).ok(), 0);
   engine.m->opt.disableflags |= mjDSBL_SENSOR;
   engine.m->opt.enableflags = 0;
+  const simulation::OwnJacobians jacobians(engine);
   const simulation::DataHandle data = simulation::MakeData(*engine.m);
   for (auto _ : state) mj_step(engine.m.get(), data.get());
   state.SetComplexityN(state.range(0));
