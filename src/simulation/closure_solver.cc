@@ -25,6 +25,8 @@ constexpr double kFarthestStep = 0.5, kFarthestCorrection = 0.1;
 constexpr double kShortestStep = 1e-4;
 // Relative rank tolerance.
 constexpr double kRankTolerance = 1e-9;
+// A self-stress with a smaller share in a row does not act there.
+constexpr double kActs = 1e-6;
 // With more rows than velocities: of so many velocities on, factors are sparse.
 constexpr int kLargestDense = 60;
 
@@ -292,12 +294,20 @@ MatX ClosureSolver::SelfStress() const {
   return system_->row_unit().cwiseInverse().asDiagonal() * ScaledSelfStress();
 }
 
+// Length of a row of the null space's basis: what the projection on it leaves of a unit force.
+double ClosureSolver::SelfStressOn(int row) const {
+  const VecX unit = VecX::Unit(system_->rows(), row);
+  return (unit - least_.LeastNorm(columns_ * unit)).norm();
+}
+
 std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
   std::vector<int> rows;
   if (redundant() == 0) return rows;
-  const MatX self_stress = ScaledSelfStress();
+  const bool sparse = factors_ == Factors::kOverdefined;
+  const MatX self_stress = sparse ? MatX() : ScaledSelfStress();
   for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {
-    if (self_stress.row(i).norm() > 1e-6) rows.push_back(i);
+    const double share = sparse ? SelfStressOn(i) : self_stress.row(i).norm();
+    if (share > kActs) rows.push_back(i);
   }
   return rows;
 }

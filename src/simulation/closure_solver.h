@@ -69,6 +69,7 @@ class ClosureSolver {
   [[nodiscard]] RunSummary CloseOr(const VecX& to, double farthest, VecX* here, Way&& way);
   [[nodiscard]] RunSummary Walk(const VecX& from, const VecX& to);
   [[nodiscard]] MatX ScaledSelfStress() const;
+  [[nodiscard]] double SelfStressOn(int row) const;
   void Factor();
   void SolveInto(const VecX& b, VecX* x);            // x = J⁺ b
   void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b

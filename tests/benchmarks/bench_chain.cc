@@ -62,7 +62,7 @@ void BareMjStep(benchmark::State& state) {
 }
 
 void Loops(benchmark::internal::Benchmark* benchmark) {
-  for (const int loops : {10, 20, 50, 100, 200}) benchmark->Arg(loops);
+  for (const int loops : {10, 20, 50, 100, 200, 500}) benchmark->Arg(loops);
   benchmark->Unit(benchmark::kMicrosecond)->Complexity();
 }
 BENCHMARK(Reference)->Apply(Loops);
