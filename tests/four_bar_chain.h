@@ -6,6 +6,7 @@
 #include <string>
 
 #include "core/demand.h"
+#include "mechanism/motion.h"
 #include "model_file/load_model.h"
 
 namespace mbv {

@@ -1,43 +1,49 @@
-// Rank of large sparse matrices by QR, columns that depend on others last.
+// Rank of large sparse matrices by orthogonal elimination.
 #pragma once
 
 #include <Eigen/SparseCore>
-#include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/types.h"
 
 namespace mbv {
 
-/// A P = Q R by Householder reflections in an order that keeps R sparse. A column of which less
-/// than `tolerance` of the longest column's length is left by those before it is dropped.
+/// QᵀA = R row by row with Givens rotations, columns in an order that keeps R sparse. Entries below
+/// `tolerance` of the longest column's length count as zero; a column without a pivot depends on
+/// the columns before it and is dropped [Heath 1982].
 class SparseRank {
  public:
-  using Matrix = Eigen::SparseMatrix<double>;
+  using Matrix = Eigen::SparseMatrix<double>;  ///< compressed
 
   SparseRank(const Matrix& A, double tolerance);
-  ~SparseRank();
-  SparseRank(SparseRank&&) noexcept;
 
-  [[nodiscard]] int rank() const;
+  [[nodiscard]] int rank() const { return static_cast<int>(kept_.size()); }
   /// The columns kept: they span what A's columns span. Increasing.
   [[nodiscard]] std::vector<int> Independent() const;
   /// What is kept and what is dropped lie on either side of the tolerance by a factor of 1000, and
   /// the smallest singular value of the kept columns by one of 10: singular values say the same.
   [[nodiscard]] bool clear() const { return clear_; }
-  /// Estimate of the smallest singular value of the columns kept, and the longest part of a dropped
-  /// one that they do not span.
+  /// Estimate of the smallest singular value of the columns kept, and the largest entry that was
+  /// taken for zero.
   [[nodiscard]] double smallest_kept() const { return smallest_kept_; }
   [[nodiscard]] double largest_dropped() const { return largest_dropped_; }
-  /// Orthonormal: rows × (rows − rank), what A's columns do not span.
-  [[nodiscard]] MatX Complement() const;
+  /// Columns × (columns − rank), A N = 0: of each dropped column what balances it among those kept;
+  /// columns of unit length.
+  [[nodiscard]] MatX NullSpace() const;
 
  private:
-  struct Factors;
+  using Row = std::vector<std::pair<int, double>>;  ///< (place of the column in the order, entry)
+  void Eliminate(Row row);
+  void Order(const Matrix& A);
+  void Arrange();
   [[nodiscard]] double SmallestSingularValue() const;
-  [[nodiscard]] double LongestRest(const Matrix& A) const;
 
-  std::unique_ptr<Factors> factors_;
+  double limit_ = 0.0;
+  std::vector<int> order_;           ///< column of A at each place
+  std::vector<Row> R_;               ///< per place: the row that starts there, or none
+  std::vector<int> kept_, dropped_;  ///< places
+  Matrix R_kept_, R_dropped_;        ///< rank × rank, rank × dropped
   double smallest_kept_ = 0.0, largest_dropped_ = 0.0;
   bool clear_ = false;
 };

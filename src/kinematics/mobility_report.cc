@@ -67,7 +67,8 @@ Stresses FindStresses(const Mechanism& mechanism, const BodyStates& states, bool
 // the basis; its trace over a part counts that part's self-stresses.
 std::vector<StressGroup> GroupsOf(const Mechanism& mechanism, const Stresses& stresses) {
   if (stresses.self_stress.cols() == 0) return {};
-  const MatX P = stresses.self_stress * stresses.self_stress.transpose();
+  const MatX basis = internal::Orthonormal(stresses.self_stress);
+  const MatX P = basis * basis.transpose();
   const std::vector<Owner>& owners = stresses.owners;
   std::vector<size_t> group(owners.size());
   std::iota(group.begin(), group.end(), size_t{0});

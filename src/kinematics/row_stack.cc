@@ -214,6 +214,12 @@ void Count(double limit, PartRank* part) {
   }
 }
 
+// More vectors stay as sparse as they are.
+MatX FewOrthonormal(MatX vectors) {
+  constexpr Eigen::Index kFew = 100;
+  return vectors.cols() > kFew ? vectors : Orthonormal(vectors);
+}
+
 // By sparse QR; empty where that does not tell clearly.
 std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSpaces wanted,
                                    double tolerance) {
@@ -221,14 +227,14 @@ std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSp
                        static_cast<Eigen::Index>(part.columns.size()));
   const auto entries = EntriesOf(J, part);
   A.setFromTriplets(entries.begin(), entries.end());
-  if (wanted != NullSpaces::kSelfStress) A = SparseRank::Matrix(A.transpose());
+  if (wanted == NullSpaces::kSelfStress) A = SparseRank::Matrix(A.transpose());
   const SparseRank qr(A, tolerance);
   if (!qr.clear()) return {};
   return PartRank{.rank = qr.rank(),
                   .largest = 0.0,
                   .smallest_kept = qr.smallest_kept(),
                   .largest_dropped = qr.largest_dropped(),
-                  .vectors = wanted == NullSpaces::kNone ? MatX() : qr.Complement(),
+                  .vectors = wanted == NullSpaces::kNone ? MatX() : FewOrthonormal(qr.NullSpace()),
                   .singular = {},
                   .all_vectors = {}};
 }
@@ -302,6 +308,12 @@ RankFinding FindRank(const SparseRows& J, NullSpaces wanted, double tolerance, E
 
 RankFinding FindRank(const MatX& J, NullSpaces wanted, double tolerance) {
   return FindRank(SparseOf(J), wanted, tolerance);
+}
+
+MatX Orthonormal(const MatX& vectors) {
+  if (vectors.size() == 0) return vectors;
+  const Eigen::HouseholderQR<MatX> qr(vectors);
+  return qr.householderQ() * MatX::Identity(vectors.rows(), vectors.cols());
 }
 
 }  // namespace mbv::internal

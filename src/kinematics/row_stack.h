@@ -61,9 +61,12 @@ struct RankFinding {
   int rank = 0;
   /// Singular values; of large parts an estimate, and the length of what is dropped.
   double smallest_kept = 0.0, largest_dropped = 0.0;
+  /// Columns of unit length; orthogonal to each other but for more than 100 of a large part.
   MatX self_stress;  ///< rows × (rows − rank): null space of the transpose
   MatX motion;       ///< columns × (columns − rank): null space
 };
+/// A basis of what the columns span.
+[[nodiscard]] MatX Orthonormal(const MatX& vectors);
 enum class NullSpaces { kNone, kSelfStress, kMotion };
 /// By singular values, each part of J that shares no row and column with the others by itself;
 /// parts with more than `dense` rows and columns by sparse QR, where that tells clearly.
