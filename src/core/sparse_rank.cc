@@ -3,13 +3,12 @@
 #include <Eigen/OrderingMethods>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace mbv {
 namespace {
 
-// Of pivots and rests beside the tolerance, and of singular values.
-constexpr double kClear = 1e3, kClearSingular = 10.0;
+// How far the estimated smallest singular value must be above the tolerance.
+constexpr double kClear = 100.0;
 // Inverse iterations that estimate a singular value.
 constexpr int kIterations = 6;
 
@@ -85,7 +84,7 @@ void SparseRank::Eliminate(Row row) {
   while (!row.empty()) {
     const auto [place, entry] = row.front();
     if (std::abs(entry) <= limit_) {
-      largest_dropped_ = std::max(largest_dropped_, std::abs(entry));
+      dropped_norm_ = std::hypot(dropped_norm_, entry);
       row.erase(row.begin());
       continue;
     }
@@ -108,10 +107,8 @@ void SparseRank::Arrange() {
   for (size_t k = 0; k < dropped_.size(); ++k)
     within[static_cast<size_t>(dropped_[k])] = static_cast<int>(k);
   std::vector<Eigen::Triplet<double>> square, rest;
-  double least = std::numeric_limits<double>::infinity();
   for (size_t k = 0; k < kept_.size(); ++k) {
     const Row& row = R_[static_cast<size_t>(kept_[k])];
-    least = std::min(least, std::abs(row.front().second));
     for (const auto& [place, entry] : row) {
       const bool is_kept = !R_[static_cast<size_t>(place)].empty();
       (is_kept ? square : rest)
@@ -125,8 +122,7 @@ void SparseRank::Arrange() {
   R_dropped_.setFromTriplets(rest.begin(), rest.end());
   R_.clear();
   smallest_kept_ = SmallestSingularValue();
-  clear_ = n == 0 || (least > kClear * limit_ && smallest_kept_ > kClearSingular * limit_ &&
-                      largest_dropped_ <= limit_ / kClear);
+  clear_ = dropped_norm_ <= limit_ && (n == 0 || smallest_kept_ > kClear * limit_);
 }
 
 std::vector<int> SparseRank::Independent() const {

@@ -21,13 +21,13 @@ class SparseRank {
   [[nodiscard]] int rank() const { return static_cast<int>(kept_.size()); }
   /// The columns kept: they span what A's columns span. Increasing.
   [[nodiscard]] std::vector<int> Independent() const;
-  /// What is kept and what is dropped lie on either side of the tolerance by a factor of 1000, and
-  /// the smallest singular value of the kept columns by one of 10: singular values say the same.
+  /// Singular values would say the same: with entries dropped of norm e, A has none between e and
+  /// about the smallest of R.
   [[nodiscard]] bool clear() const { return clear_; }
-  /// Estimate of the smallest singular value of the columns kept, and the largest entry that was
-  /// taken for zero.
+  /// Estimate of the smallest singular value of the columns kept, and the Frobenius norm of all
+  /// that was taken for zero: no singular value beyond the rank is larger.
   [[nodiscard]] double smallest_kept() const { return smallest_kept_; }
-  [[nodiscard]] double largest_dropped() const { return largest_dropped_; }
+  [[nodiscard]] double dropped_norm() const { return dropped_norm_; }
   /// Columns × (columns − rank), A N = 0: of each dropped column what balances it among those kept;
   /// columns of unit length.
   [[nodiscard]] MatX NullSpace() const;
@@ -44,7 +44,7 @@ class SparseRank {
   std::vector<Row> R_;               ///< per place: the row that starts there, or none
   std::vector<int> kept_, dropped_;  ///< places
   Matrix R_kept_, R_dropped_;        ///< rank × rank, rank × dropped
-  double smallest_kept_ = 0.0, largest_dropped_ = 0.0;
+  double smallest_kept_ = 0.0, dropped_norm_ = 0.0;
   bool clear_ = false;
 };
 

@@ -233,7 +233,7 @@ std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSp
   return PartRank{.rank = qr.rank(),
                   .largest = 0.0,
                   .smallest_kept = qr.smallest_kept(),
-                  .largest_dropped = qr.largest_dropped(),
+                  .largest_dropped = qr.dropped_norm(),
                   .vectors = wanted == NullSpaces::kNone ? MatX() : FewOrthonormal(qr.NullSpace()),
                   .singular = {},
                   .all_vectors = {}};

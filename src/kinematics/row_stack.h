@@ -59,7 +59,7 @@ class RowStack {
 
 struct RankFinding {
   int rank = 0;
-  /// Singular values; of large parts an estimate, and the length of what is dropped.
+  /// Singular values; of large parts an estimate and a bound.
   double smallest_kept = 0.0, largest_dropped = 0.0;
   /// Columns of unit length; orthogonal to each other but for more than 100 of a large part.
   MatX self_stress;  ///< rows × (rows − rank): null space of the transpose

@@ -228,8 +228,10 @@ class MjcfWriter {
     return home == home_of_joint_.end() ? 0.0 : home->second;
   }
 
+  // The reference pose is home as well.
   void WriteHomeKey() {
-    if (home_qpos_.empty()) return;
+    constexpr size_t kMostNumbers = 1000;  // MuJoCo 2.2.2 reads no more
+    if (home_qpos_.empty() || home_qpos_.size() > kMostNumbers) return;
     xml_.Open("keyframe");
     xml_.Open("key");
     xml_.Set("name", "home");
