@@ -12,9 +12,9 @@ namespace {
 
 // A pivot may be this much smaller than the largest entry of its column.
 constexpr double kPivotTolerance = 0.1;
-// Pivots chosen for another matrix serve while none is smaller by this than it was there: factors
-// grow by no more than its inverse, which leaves 13 digits.
-constexpr double kSmaller = 1e-3;
+// Pivots chosen for another matrix serve while none is smaller by this than it was there: with 1e-3
+// the inverse dynamics of a SCARA robot's pick and place loses two digits.
+constexpr double kSmaller = 0.1;
 
 // Sign of a permutation, by its cycles.
 int SignOf(const int* to, int n, std::vector<char>* seen) {

@@ -164,6 +164,35 @@ TEST(Ranks, PivotsAndSingularValuesGiveTheSameOnEveryShippedModel) {
   EXPECT_GE(clear, 2 * models - 4);
 }
 
+// The same rank, and null spaces that span the same, whichever way they are found.
+TEST(Ranks, SparseEliminationAndSingularValuesGiveTheSameOnEveryShippedModel) {
+  using internal::NullSpaces;
+  const auto projector = [](const MatX& basis) -> MatX {
+    const MatX Q = internal::Orthonormal(basis);
+    return Q * Q.transpose();
+  };
+  int models = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(SourcePath("/models"))) {
+    const LoadResult loaded = LoadModel((entry.path() / "model.yaml").string());
+    if (!loaded.mechanism) continue;
+    ++models;
+    for (const bool driven : {false, true}) {
+      const internal::SparseRows J = RowsAtHome(*loaded.mechanism, driven).sparseView();
+      for (const NullSpaces wanted : {NullSpaces::kSelfStress, NullSpaces::kMotion}) {
+        const bool stress = wanted == NullSpaces::kSelfStress;
+        const auto dense = internal::FindRank(J, wanted, 1e-9, 100000);
+        const auto sparse = internal::FindRank(J, wanted, 1e-9, 0);
+        EXPECT_EQ(sparse.rank, dense.rank) << entry.path();
+        const MatX& a = stress ? dense.self_stress : dense.motion;
+        const MatX& b = stress ? sparse.self_stress : sparse.motion;
+        ASSERT_EQ(a.cols(), b.cols()) << entry.path();
+        EXPECT_LT((projector(a) - projector(b)).norm(), 1e-8) << entry.path();
+      }
+    }
+  }
+  EXPECT_GE(models, 20);
+}
+
 TEST(Ranks, WithoutAClearGapSingularValuesDecide) {
   MatX J = MatX::Random(12, 12);
   const Eigen::BDCSVD<MatX> svd(J, Eigen::ComputeFullU | Eigen::ComputeFullV);

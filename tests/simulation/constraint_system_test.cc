@@ -63,6 +63,33 @@ TEST(ConstraintSystem, BiasIsTheRateOfChangeOfTheJacobian) {
   }
 }
 
+// MuJoCo's own rows, dense and sparse, off the home pose.
+TEST(ConstraintSystem, TheJacobianIsThatOfMuJoCoInBothFormats) {
+  for (const Mechanism& mechanism : Mechanisms()) {
+    std::vector<std::string> warnings;
+    EngineSession session(&warnings);
+    MatX J[2], tendons[2];
+    for (const bool sparse : {false, true}) {
+      EngineModel engine;
+      ASSERT_TRUE(MakeEngineModel(mechanism, WriteMjcf(mechanism), &engine).ok());
+      EXPECT_FALSE(engine.sparse) << mechanism.name;
+      engine.sparse = sparse;
+      const DataHandle data = MakeData(*engine.m);
+      ConstraintSystem system(engine, data.get());
+      VecX offset = VecX::LinSpaced(engine.m->nv, -0.05, 0.04);
+      mj_integratePos(engine.m.get(), data->qpos, offset.data(), 1.0);
+      system.EvaluatePosition();
+      J[sparse] = MatX(system.J());
+      tendons[sparse] = Eigen::Map<const RowMajor>(data->ten_J, engine.m->ntendon, engine.m->nv);
+      if (sparse) continue;
+      const Eigen::Map<const RowMajor> dense(data->efc_J, system.rows(), engine.m->nv);
+      EXPECT_EQ(J[0], MatX(dense)) << mechanism.name;
+    }
+    EXPECT_LT((J[1] - J[0]).cwiseAbs().maxCoeff(), 1e-15) << mechanism.name;
+    EXPECT_EQ(tendons[0], tendons[1]) << mechanism.name;
+  }
+}
+
 TEST(ConstraintSystem, ResidualOfADrivenRowIsPositionMinusTarget) {
   const Mechanism mechanism = fixtures::MakeFourBar();
   std::vector<std::string> warnings;
