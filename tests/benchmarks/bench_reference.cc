@@ -36,16 +36,21 @@ void FollowScenario(benchmark::State& state, const std::string& scenario, bool f
   }
 }
 
-BENCHMARK_CAPTURE(FollowScenario, platform_kinematics, "stabilizing_platform/sea_state.yaml", false)
-    ->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(FollowScenario, platform_forces, "stabilizing_platform/sea_state.yaml", true)
-    ->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(FollowScenario, tripod_forces, "spr_tripod/harmonic.yaml", true)
-    ->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(FollowScenario, scara_forces, "scara_robot/default.yaml", true)
-    ->Unit(benchmark::kMicrosecond);
-BENCHMARK_CAPTURE(FollowScenario, cabin_forces, "cabin_robot/default.yaml", true)
-    ->Unit(benchmark::kMicrosecond);
+void Kinematics(benchmark::State& state, const std::string& scenario) {
+  FollowScenario(state, scenario, false);
+}
+void Forces(benchmark::State& state, const std::string& scenario) {
+  FollowScenario(state, scenario, true);
+}
+constexpr auto kUnit = benchmark::kMicrosecond;
+BENCHMARK_CAPTURE(Kinematics, platform, "stabilizing_platform/sea_state.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Kinematics, tripod, "spr_tripod/harmonic.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Kinematics, scara, "scara_robot/default.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Kinematics, cabin, "cabin_robot/default.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Forces, platform, "stabilizing_platform/sea_state.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Forces, tripod, "spr_tripod/harmonic.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Forces, scara, "scara_robot/default.yaml")->Unit(kUnit);
+BENCHMARK_CAPTURE(Forces, cabin, "cabin_robot/default.yaml")->Unit(kUnit);
 
 void Mobility(benchmark::State& state) {
   const ScenarioResult loaded = Load(state, "stabilizing_platform/sea_state.yaml");

@@ -1,9 +1,7 @@
-// Time per step of the simulation on the stabilizing platform, beside a bare mj_step loop on the
-// same model, and time per sample of inverse mode.
+// Time per step of the simulation of the four papers' mechanisms beside a bare mj_step loop on the
+// same model, and time per sample of inverse mode. Ratios: scripts/performance.
 
 #include <benchmark/benchmark.h>
-
-#include <chrono>
 
 #include "analytic/closed_form.h"
 #include "core/demand.h"
@@ -16,18 +14,20 @@
 namespace mbv {
 namespace {
 
-struct Platform {
+struct Case {
   Mechanism mechanism;
   Motion motion;
+  double step_s = 1e-3;
   std::unique_ptr<ClosedForm> closed_form;
   CommandSample command;
 
-  Platform() {
-    ScenarioResult result =
-        LoadScenario(std::string(kSourceDir) + "/scenarios/stabilizing_platform/sea_state.yaml");
+  explicit Case(const std::string& scenario) {
+    ScenarioResult result = LoadScenario(SourcePath("/scenarios/") + scenario + ".yaml");
     MBV_DEMAND(result.mechanism.has_value(), result.diagnostics.Text());
     mechanism = *std::move(result.mechanism);
     motion = result.scenario->motion;
+    motion.duration_s = std::min(motion.duration_s, 2.0);
+    step_s = result.scenario->simulation.step_s;
     Diagnostics diagnostics;
     closed_form = FindClosedForm(mechanism.name)->factory(mechanism, motion, {}, &diagnostics);
   }
@@ -40,50 +40,56 @@ struct Platform {
 };
 
 // The loop alone (SimulationRun::loop_wall_s), recording of the samples included.
-void Run(benchmark::State& state, const SimulationOptions& options) {
-  Platform platform;
-  double seconds = 0.0;
-  long steps = 0;
+void Run(benchmark::State& state, const std::string& scenario, SimulationOptions options) {
+  Case of(scenario);
+  options.step_s = of.step_s;
   for (auto _ : state) {
-    const SimulationRun run =
-        Simulate(platform.mechanism, platform.motion, platform.Driven(), options);
+    const SimulationRun run = Simulate(of.mechanism, of.motion, of.Driven(), options);
     MBV_DEMAND(run.summary.ok(), run.summary.message);
-    state.SetIterationTime(run.loop_wall_s);
-    seconds += run.loop_wall_s;
-    steps += run.steps;
+    state.SetIterationTime(run.loop_wall_s / static_cast<double>(run.steps));
   }
-  state.counters["us_per_step"] = 1e6 * seconds / static_cast<double>(steps);
 }
 
-void BM_Corrected(benchmark::State& state) { Run(state, {}); }
-void BM_Stock(benchmark::State& state) { Run(state, {.engine = Engine::kStock}); }
-void BM_Inverse(benchmark::State& state) { Run(state, {.mode = SimulationMode::kInverse}); }
-
 // mj_step and nothing else, sensors off, equalities at home.
-void BM_BareMjStep(benchmark::State& state) {
-  Platform platform;
+void BareMjStep(benchmark::State& state, const std::string& scenario) {
+  Case of(scenario);
   std::vector<std::string> warnings;
   simulation::EngineSession session(&warnings);
   simulation::EngineModel engine;
-  MBV_DEMAND(MakeEngineModel(platform.mechanism, WriteMjcf(platform.mechanism), &engine).ok(), 0);
+  MBV_DEMAND(MakeEngineModel(of.mechanism, WriteMjcf(of.mechanism), &engine).ok(), 0);
   engine.m->opt.disableflags |= mjDSBL_SENSOR;
   engine.m->opt.enableflags = 0;
   const simulation::DataHandle data = simulation::MakeData(*engine.m);
-  constexpr int kSteps = 12000;
-  for (auto _ : state) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int i = 0; i < kSteps; ++i) mj_step(engine.m.get(), data.get());
-    state.SetIterationTime(
-        std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
-  }
-  state.counters["us_per_step"] = benchmark::Counter(
-      kSteps * 1e-6, benchmark::Counter::kIsIterationInvariantRate | benchmark::Counter::kInvert);
+  for (auto _ : state) mj_step(engine.m.get(), data.get());
 }
 
-BENCHMARK(BM_BareMjStep)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Corrected)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Stock)->UseManualTime()->Unit(benchmark::kMillisecond);
-BENCHMARK(BM_Inverse)->UseManualTime()->Unit(benchmark::kMillisecond);
+const SimulationOptions kForward = {};
+const SimulationOptions kStock = {.engine = Engine::kStock};
+const SimulationOptions kInverse = {.mode = SimulationMode::kInverse};
+
+const int kRegistered = [] {
+  for (const auto& [name, scenario] :
+       {std::pair<std::string, std::string>{"platform", "stabilizing_platform/sea_state"},
+        {"tripod", "spr_tripod/harmonic"},
+        {"scara", "scara_robot/default"},
+        {"cabin", "cabin_robot/default"}}) {
+    const auto add = [&](const std::string& what, const SimulationOptions& options) {
+      benchmark::RegisterBenchmark((what + "/" + name).c_str(),
+                                   [=](benchmark::State& state) { Run(state, scenario, options); })
+          ->UseManualTime()
+          ->Unit(benchmark::kMicrosecond)
+          ->Iterations(2);
+    };
+    benchmark::RegisterBenchmark(("mj_step/" + name).c_str(),
+                                 [=](benchmark::State& state) { BareMjStep(state, scenario); })
+        ->Unit(benchmark::kMicrosecond)
+        ->Iterations(4000);
+    add("forward", kForward);
+    add("stock", kStock);
+    add("inverse", kInverse);
+  }
+  return 0;
+}();
 
 }  // namespace
 }  // namespace mbv
