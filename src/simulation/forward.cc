@@ -3,7 +3,6 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numbers>
 
@@ -17,20 +16,6 @@
 
 namespace mbv::simulation {
 namespace {
-
-// Wall and processor time of the step loop.
-class LoopClock {
- public:
-  void Stop(SimulationRun* run) const {
-    run->loop_wall_s = std::chrono::duration<double>(Clock::now() - wall_).count();
-    run->loop_cpu_s = ThreadSeconds() - cpu_s_;
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point wall_ = Clock::now();
-  const double cpu_s_ = ThreadSeconds();
-};
 
 // A closure open by more than this part of the mechanism's extent has come apart.
 constexpr double kApart = 0.01;

@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <chrono>
 
 #include "simulation/element_forces.h"
 #include "simulation/session.h"
@@ -91,7 +90,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
   mjData* d = s->data.get();
   Predictor predictor(s->engine);
   VecX tau(s->engine.m->nv), closed;
-  const auto start = std::chrono::steady_clock::now();
+  const LoopClock clock;
   for (size_t i = 0; i < times.size(); ++i) {
     closed = Eigen::Map<const VecX>(d->qpos, s->engine.m->nq);
     if (i > 0) predictor.Predict(times[i] - times[i - 1], d);
@@ -117,8 +116,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
     s->Record(i);
     if (!s->trouble.ok()) return At(s->trouble, times[i]);
   }
-  s->run->loop_wall_s =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  clock.Stop(s->run);
   s->run->steps = static_cast<long>(times.size());
   return RunSummary::Done();
 }

@@ -1,6 +1,7 @@
 // What one simulation works with, and its three ways to run.
 #pragma once
 
+#include <chrono>
 #include <functional>
 #include <vector>
 
@@ -64,6 +65,20 @@ struct Session {
   std::function<void(double)> progress;
   VecX given;                 ///< forces that the driven coordinates are given
   Eigen::RowVectorXd record;  ///< one row of the trace
+};
+
+/// Wall and processor time of the loop over steps or samples.
+class LoopClock {
+ public:
+  void Stop(SimulationRun* run) const {
+    run->loop_wall_s = std::chrono::duration<double>(Clock::now() - wall_).count();
+    run->loop_cpu_s = ThreadSeconds() - cpu_s_;
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  const Clock::time_point wall_ = Clock::now();
+  const double cpu_s_ = ThreadSeconds();
 };
 
 /// The modes. Start configuration: closed, at the first driven sample. Each fills the run's trace,

@@ -42,7 +42,7 @@ void Simulation(benchmark::State& state, const SimulationOptions& options) {
   for (auto _ : state) {
     const SimulationRun run = Simulate(mechanism, motion, driven, options);
     if (!run.summary.ok()) state.SkipWithError(run.summary.message.c_str());
-    state.SetIterationTime(run.loop_wall_s / static_cast<double>(run.steps));
+    state.SetIterationTime(run.loop_cpu_s / static_cast<double>(run.steps));
   }
   state.SetComplexityN(state.range(0));
 }
