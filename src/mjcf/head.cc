@@ -58,7 +58,7 @@ void WriteDefaults(const Sections& s) {
 }
 
 // From so many degrees of freedom on, MuJoCo's sparse constraint solver is faster.
-constexpr int kSparseFrom = 60;
+constexpr int kSparseFrom = 40;
 
 int FreedomsOfTree(const Mechanism& mechanism) {
   int freedoms = 0;

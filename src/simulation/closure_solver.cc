@@ -28,7 +28,7 @@ constexpr double kRankTolerance = 1e-9;
 // A self-stress with a smaller share in a row does not act there.
 constexpr double kActs = 1e-6;
 // With more rows than velocities: of so many velocities on, factors are sparse.
-constexpr int kLargestDense = 60;
+constexpr int kLargestDense = 18;
 
 // The shortest x with A x = b as well as can be, refined once.
 VecX LeastNorm(const MatX& A, const VecX& b) {
