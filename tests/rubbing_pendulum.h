@@ -87,6 +87,14 @@ struct JournalPendulum {
     mechanism.joints.back().closure = true;
     return mechanism;
   }
+  /// What no drive gives: 0 where friction is that of the load by these accelerations.
+  [[nodiscard]] double FreeTorque(double q, double rate, double acceleration) const {
+    const double s = std::sin(q), c = std::cos(q);
+    const double x = r * (-rate * rate * c - acceleration * s);
+    const double y = g + r * (-rate * rate * s + acceleration * c);
+    return (RubbingPendulum::I + m * r * r) * acceleration + m * g * r * c +
+           std::copysign(coefficient * radius * m * std::hypot(x, y), rate);
+  }
   /// At an even rate: weight, and friction by weight and centrifugal force.
   [[nodiscard]] double Torque(double q, double rate) const {
     const double x = -rate * rate * r * std::cos(q), y = g - rate * rate * r * std::sin(q);

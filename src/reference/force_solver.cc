@@ -244,13 +244,7 @@ RunSummary ForceSolver::CheckLoadsUnique(const ReferenceSample& sample,
       if (AcrossAxis(mechanism_, e, reactions).norm() <= kOpens * force.cwiseAbs().maxCoeff()) {
         continue;
       }
-      const ForceElement& element = mechanism_.elements[e];
-      return {.stop = Stop::kUnsupported,
-              .message = fmt::format("the load of the {} ('{}') is not determined by statics: "
-                                     "redundant constraints share it",
-                                     Described(mechanism_, element), element.name),
-              .where = element.name,
-              .unit = {}};
+      return LoadShared(mechanism_, e);
     }
   }
   return RunSummary::Done();

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/demand.h"
 #include "core/spatial.h"
 #include "kinematics/element_rows.h"
 #include "mechanism/reach.h"
@@ -13,7 +12,6 @@
 #include "reference/closure_solver.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
-#include "reference/least_forces.h"
 #include "reference/square_system.h"
 
 namespace mbv::internal {
@@ -31,21 +29,6 @@ constexpr int kMostCorrections = 12;
 // helps, to this many times that.
 constexpr double kClosed = 1e-13, kStalled = 100.0;
 
-// The forces with columns · force = wrenches as well as can be; TakeLeastForces() of them.
-VecX LeastForces(const MatX& columns, Eigen::Index first_driven, const VecX& wrenches) {
-  if (columns.cols() == 0) return VecX();
-  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
-  cod.setThreshold(kLost);
-  cod.compute(columns);
-  VecX force = cod.solve(wrenches);
-  force += cod.solve(wrenches - columns * force);  // refinement
-  if (cod.rank() < columns.cols()) {
-    const MatX Q = Eigen::ColPivHouseholderQR<MatX>(columns.transpose()).householderQ();
-    TakeLeastForces(Q.rightCols(columns.cols() - cod.rank()), first_driven, &force);
-  }
-  return force;
-}
-
 }  // namespace
 
 FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
@@ -54,7 +37,8 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       length_(CharacteristicLength(mechanism)),
       lever_(LongestLever(mechanism)),
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
-      freedoms_(static_cast<int>(motion.initial.size())) {
+      freedoms_(static_cast<int>(motion.initial.size())),
+      loaded_(LoadedElements(mechanism)) {
   body_scale_.setOnes(size_);
   for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
   EvaluateMotion(motion, 0.0, &command_);
@@ -193,7 +177,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   Unstack(A_p, &states->A_WB);
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
-  RequiredWrenches(mechanism_, *states, command_.loads, phase_.sign, &required);
+  RequiredWrenches(mechanism_, *states, command_.loads, SignsAt(*states), &required);
   AddDriveForces(t_s, *states, &drives);
   const MatX R = Motions();
   MatX& inertia = rest_.H;
@@ -213,9 +197,18 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   }
   rest_.f = R.transpose() * (Stack(drives) - Stack(required));
   FillRest(*states, A_p, R);
-  const VecX u = phase_.held.empty() ? VecX(factors.solve(rest_.f)) : HeldMotion(rest_);
-  Unstack(A_p + R * u, &states->A_WB);
+  Unstack(A_p + R * MotionBy(rest_.f), &states->A_WB);
+  if (loaded_.empty()) return RunSummary::Done();
+  if (RunSummary summary = AddLoadFriction(t_s, *states, R, A_p); !summary.ok()) return summary;
+  Unstack(A_p + R * MotionBy(rest_.f), &states->A_WB);
   return RunSummary::Done();
+}
+
+VecX FreeDynamics::MotionBy(const VecX& f) {
+  if (phase_.held.empty()) return rest_.H.ldlt().solve(f);
+  RestSystem by = rest_;
+  by.f = f;
+  return HeldMotion(by);
 }
 
 FreeDynamics::Held FreeDynamics::HeldRows(const BodyStates& states) const {
@@ -339,96 +332,6 @@ void FreeDynamics::Gaps(const BodyStates& states, double* position_m, double* ro
     double* gap = row.angular ? rotation_rad : position_m;
     *gap = std::max(*gap, std::abs(row.value));
   }
-}
-
-VecX FreeDynamics::GivenOr(double t_s, const VecX& solved) const {
-  VecX force(static_cast<Eigen::Index>(mechanism_.drives.size()));
-  Eigen::Index next = 0;
-  for (Eigen::Index d = 0; d < force.size(); ++d) {
-    const int given = motion_.FindForce(static_cast<int>(d));
-    force[d] = given >= 0 ? Evaluate(motion_.forces[given].force, t_s).value : solved[next++];
-  }
-  return force;
-}
-
-void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
-  const BodyStates& states = sample->states;
-  EvaluateMotion(motion_, t_s, &command_);
-  RowSet rows;
-  AddReactionRows(mechanism_, states, &rows);
-  const int first_driven = rows.size();
-  for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
-    if (motion_.FindForce(static_cast<int>(d)) >= 0) continue;
-    rows.Add(DriveRow(mechanism_, mechanism_.drives[d], states),
-             PositionUnit(mechanism_, mechanism_.drives[d]) == "rad");
-  }
-  const int first_prescribed = rows.size();
-  for (const Prescribed& prescribed : mechanism_.prescribed) {
-    const Joint& joint = mechanism_.joints[prescribed.joint];
-    rows.Add(JointCoordinateRow(joint, 0, states), !IsLength(joint.kind, 0));
-  }
-  const int first_held = rows.size();
-  const std::vector<ScalarRow> elements = ElementRows(mechanism_, states);
-  for (const size_t e : phase_.held) {
-    rows.Add(elements[e], !ActsOnLength(mechanism_, mechanism_.elements[e]));
-  }
-
-  std::vector<Vec6> required, given(mechanism_.bodies.size(), Vec6::Zero());
-  RequiredWrenches(mechanism_, states, command_.loads, phase_.sign, &required);
-  AddDriveForces(t_s, states, &given);
-  const VecX wrenches = body_scale_.cwiseProduct(Stack(required) - Stack(given));
-  MatX columns = MatX::Zero(size_, rows.size());
-  VecX scale(rows.size());
-  for (int i = 0; i < rows.size(); ++i) {
-    scale[i] = rows.angular[i] ? length_ : 1.0;
-    for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
-      const int at = 6 * (rows.body[p] - 1);
-      columns.col(i).segment<6>(at) = scale[i] * body_scale_.segment<6>(at).cwiseProduct(rows.J[p]);
-    }
-  }
-  VecX force = LeastForces(columns, first_driven, wrenches).cwiseProduct(scale);
-  MBV_DEMAND(FillReactions(mechanism_, states, force, &sample->reactions) == first_driven,
-             first_driven);
-  sample->drive_force = GivenOr(t_s, force.segment(first_driven, first_prescribed - first_driven));
-  sample->prescribed_force = force.segment(first_prescribed, first_held - first_prescribed);
-  sample->rubbing = phase_.sign;
-  // Friction at rest is what the held state needs: nothing is open.
-  sample->drive_band = VecX::Zero(sample->drive_force.size());
-  sample->prescribed_band = VecX::Zero(sample->prescribed_force.size());
-}
-
-void FreeDynamics::Forces(double t_s, ReferenceSample* sample) {
-  SolveForces(t_s, sample);
-  AuditSample(mechanism_, command_.loads, sample);
-}
-
-VecX FreeDynamics::WorkRates(double t_s, const BodyStates& states) {
-  ReferenceSample sample;
-  sample.states = states;
-  if (motion_.commands.empty() && mechanism_.prescribed.empty()) {
-    EvaluateMotion(motion_, t_s, &command_);
-    sample.drive_force =
-        GivenOr(t_s, VecX::Zero(static_cast<Eigen::Index>(mechanism_.drives.size())));
-  } else {
-    SolveForces(t_s, &sample);
-  }
-  VecX rates(works());
-  Eigen::Index next = 0;
-  const auto put = [&](double force, const ScalarRow& row) {
-    rates[next++] = force * RateOf(row, states.V_WB);
-  };
-  for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
-    put(sample.drive_force[static_cast<Eigen::Index>(d)],
-        DriveRow(mechanism_, mechanism_.drives[d], states));
-  }
-  for (size_t p = 0; p < mechanism_.prescribed.size(); ++p) {
-    put(sample.prescribed_force[static_cast<Eigen::Index>(p)],
-        JointCoordinateRow(mechanism_.joints[mechanism_.prescribed[p].joint], 0, states));
-  }
-  const Powers power = PowersOf(mechanism_, states, command_.loads, phase_.sign);
-  rates[next++] = power.loads;
-  rates[next++] = power.dampers;
-  return rates;
 }
 
 }  // namespace mbv::internal

@@ -12,16 +12,25 @@
 // Jalón, Bayo 1994, ch. 5]. Redundant rows cost nothing, and no choice of rows outlives a pose.
 //
 // Elements of dry friction slide in a given direction, or are held: then u̇ keeps their coordinates
-// at rest, and the least change of R u puts poses and rates back there (rest_decision.h).
+// at rest, and the least change of R u puts poses and rates back there (rest_decision.h). Those
+// whose coordinate loops and commands lead are in nobody's way: their rate tells their direction.
+//
+// Friction by the joints' loads (load_friction.h) moves the freedoms, and they the loads: with u̇_0
+// and reactions of the state without it, and g_d = Rᵀ∇q_d,
+//   u̇ = u̇_0 + Σ_d F_d a_d,  H a_d = g_d (what is held stays),                                  (4)
+//   p_e: load by A_p + R u̇_0,  P_ed: load by M R a_d − ∇q_d alone                             (5)
+// give eq. (2) there, which is solved as in commanded motion; held elements bear n_e, too.
 #pragma once
 
 #include <Eigen/QR>
+#include <functional>
 #include <vector>
 
 #include "core/run_summary.h"
 #include "mechanism/body_states.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "reference/load_friction.h"
 #include "reference/reference.h"
 #include "reference/rest_decision.h"
 #include "reference/row_set.h"
@@ -33,6 +42,7 @@ struct FrictionPhase {
   std::vector<int> sign;     ///< per force element: of the rate with which it slides; otherwise 0
   std::vector<size_t> held;  ///< those that stick, increasing …
   std::vector<double> at;    ///< … and the values of their coordinates [m or rad]
+  std::vector<size_t> led;   ///< those whose rate tells their sign
 };
 
 class FreeDynamics {
@@ -40,8 +50,9 @@ class FreeDynamics {
   /// Both outlive the object. motion.initial.size() freedoms move by forces.
   FreeDynamics(const Mechanism& mechanism, const Motion& motion);
 
-  /// A_WB at t from X_WB and V_WB. kSingular where the pose leaves more freedoms than that, or
-  /// where one of them has no inertia.
+  /// A_WB at t from X_WB and V_WB. kSingular where the pose leaves more freedoms than that, where
+  /// one of them has no inertia, or where friction by loads is not determined; kUnsupported where
+  /// redundant constraints share such a load.
   [[nodiscard]] RunSummary Accelerate(double t_s, BodyStates* states);
 
   /// In which phase friction is from now on; all others but Factor() depend on it.
@@ -77,6 +88,7 @@ class FreeDynamics {
   /// Largest translation and rotation residual over all joints.
   void Gaps(const BodyStates& states, double* position_m, double* rotation_rad) const;
 
+  [[nodiscard]] bool rubs_by_load() const { return !loaded_.empty(); }
   [[nodiscard]] double length() const { return length_; }
   [[nodiscard]] int freedoms() const { return freedoms_; }
   /// Basis R of the last factorisation, scaled back: 6·bodies × freedoms.
@@ -100,6 +112,42 @@ class FreeDynamics {
   /// The least of the motions left that changes held coordinates by `amount`.
   [[nodiscard]] VecX MotionOfHeld(const MatX& rows, const VecX& amount) const;
   void FillRest(const BodyStates& states, const VecX& A_p, const MatX& R);
+  /// FrictionPhase::sign, with those of what is led.
+  [[nodiscard]] std::vector<int> SignsAt(const BodyStates& states) const;
+  /// All that bears forces that are not given: reactions, drives, prescribed joints, what is held.
+  struct ForceRows {
+    RowSet rows;
+    int first_driven = 0, first_prescribed = 0, first_held = 0;
+    VecX scale;
+    MatX columns;  ///< scaled wrenches of unit forces
+    Eigen::CompleteOrthogonalDecomposition<MatX> factors;
+    MatX self_stress;  ///< scaled forces that balance each other
+    [[nodiscard]] VecX Solve(const VecX& scaled_wrenches) const;
+  };
+  /// `held`: with what is held.
+  [[nodiscard]] ForceRows ForceRowsAt(const BodyStates& states, bool held) const;
+  /// Motion of the freedoms by f, what is held at rest.
+  [[nodiscard]] VecX MotionBy(const VecX& f);
+  /// (4), (5): finds load_friction_ at states.A_WB = A_p + R u̇_0 and adds it to rest_.
+  [[nodiscard]] RunSummary AddLoadFriction(double t_s, const BodyStates& states, const MatX& R,
+                                           const VecX& A_p);
+  [[nodiscard]] LoadSystem LoadsAt(double t_s, const ForceRows& at, const BodyStates& states,
+                                   const MatX& R, MatX* along);
+  void TakeLoads(const LoadSystem& system, const MatX& along, const RestSystem& without,
+                 const VecX& n);
+  [[nodiscard]] RunSummary FollowHeld(double t_s, const ForceRows& loops, const BodyStates& states,
+                                      const MatX& R, const VecX& A_p,
+                                      const std::function<void()>& take, VecX* n);
+  /// Reactions by what bodies need, joints × 6.
+  [[nodiscard]] MatX ReactionsBy(const ForceRows& at, const BodyStates& states,
+                                 const VecX& wrenches) const;
+  /// Wrenches that bodies need beyond all forces but reactions, what is solved for, and friction by
+  /// load and at rest (6·bodies).
+  [[nodiscard]] VecX NeededWrenches(double t_s, const BodyStates& states) const;
+  [[nodiscard]] RunSummary CheckLoadsUnique(const ForceRows& at, const BodyStates& states) const;
+  /// Forces of friction by load along the coordinates, as wrenches (6·bodies).
+  [[nodiscard]] VecX LoadFrictionWrenches(const BodyStates& states) const;
+  void FindLedBands(const ForceRows& at, ReferenceSample* sample) const;
   void SolveForces(double t_s, ReferenceSample* sample);
   /// Per drive: the given force at t, or the next of those solved for.
   [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;
@@ -121,6 +169,8 @@ class FreeDynamics {
   double pivot_ = kNan;
   FrictionPhase phase_;
   RestSystem rest_;
+  const std::vector<size_t> loaded_;  ///< elements with friction by load
+  VecX load_friction_;                ///< per element, at the last Accelerate()
 };
 
 }  // namespace mbv::internal

@@ -26,6 +26,8 @@ constexpr double kUnresolved = 10.0;
 constexpr double kAhead = 1e-4;
 // A coordinate of which loops and commands leave a smaller share is led by them.
 constexpr double kLed = 1e-9;
+// A smaller share of what an acceleration is made of is none.
+constexpr double kTurns = 1e-9;
 constexpr int kMostHalvings = 40;
 constexpr std::uintmax_t kMostTries = 100;
 
@@ -82,23 +84,18 @@ RunSummary FreeMotion::Contradiction(size_t element, const std::string& what, do
           .unit = unit};
 }
 
-// Elements whose coordinate moves by forces; at rest where nothing tells their rate from zero.
+// Elements whose coordinate moves by forces are at rest where nothing tells their rate from zero;
+// commands lead the others.
 RunSummary FreeMotion::BeginFriction() {
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   FrictionEvent start;
   FrictionPhase phase;
   phase.sign.assign(mechanism_.elements.size(), 0);
   for (const size_t e : rubbing_) {
-    if (dynamics_.ShareLeft(rows[e]) < kLed) {
-      return {.stop = Stop::kUnsupported,
-              .message = fmt::format("{} ('{}') rubs on a coordinate that commands move, where "
-                                     "other freedoms move by forces: it must move by them too",
-                                     Described(mechanism_, mechanism_.elements[e]),
-                                     mechanism_.elements[e].name),
-              .time_s = 0.0,
-              .where = mechanism_.elements[e].name,
-              .unit = {}};
-    }
+    if (dynamics_.ShareLeft(rows[e]) < kLed) phase.led.push_back(e);
+  }
+  std::erase_if(rubbing_, [&](size_t e) { return std::ranges::count(phase.led, e) > 0; });
+  for (const size_t e : rubbing_) {
     const double rate = RateOf(rows[e], now_.states.V_WB);
     if (std::abs(rate) <= Resolved(e)) {
       start.stops.push_back(e);
@@ -255,7 +252,7 @@ void FreeMotion::FindStart(const State& from, double h, const State& to, Frictio
 FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
   const FrictionPhase& phase = dynamics_.phase();
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
-  FrictionPhase resting{.sign = phase.sign, .held = {}, .at = {}};
+  FrictionPhase resting{.sign = phase.sign, .held = {}, .at = {}, .led = phase.led};
   for (const size_t e : rubbing_) {
     const auto held = std::ranges::find(phase.held, e);
     const bool stopped = std::ranges::find(event.stops, e) != event.stops.end();
@@ -283,7 +280,32 @@ std::vector<int> FreeMotion::Starting(double t_s, const BodyStates& states, RunS
   return sign;
 }
 
+// Whether what stops slides on the other way at once: then it does, as the way on is unique. Held
+// for an instant at the dead point of its coordinate, its joint would bear any load.
+bool FreeMotion::PassesThrough(const FrictionEvent& event) {
+  if (event.starts || event.stops.size() != 1 || !dynamics_.rubs_by_load()) return false;
+  const size_t e = event.stops.front();
+  const FrictionPhase before = dynamics_.phase();
+  FrictionPhase after = before;
+  after.sign[e] = -before.sign[e];
+  dynamics_.SetPhase(after);
+  BodyStates at = now_.states;
+  if (dynamics_.Accelerate(now_.time_s, &at).ok()) {
+    const ScalarRow row = ElementRows(mechanism_, at)[e];
+    const double acceleration = RateOf(row, at.A_WB) + row.bias;
+    const double size = std::abs(RateOf(row, at.A_WB)) + std::abs(row.bias);
+    if (after.sign[e] * acceleration > kTurns * size) {
+      fresh_[e] = 1;
+      if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
+      return true;
+    }
+  }
+  dynamics_.SetPhase(before);
+  return false;
+}
+
 RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
+  if (PassesThrough(event)) return RunSummary::Done();
   FrictionPhase next = RestingPhase(event);
   if (++settled_here_ > 4 + 2 * static_cast<int>(rubbing_.size())) {
     return Contradiction(next.held.empty() ? rubbing_.front() : next.held.front(),
@@ -315,7 +337,7 @@ RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
       if (std::abs(rate) > least) sign[k] = rate > 0.0 ? 1 : -1;
     }
   }
-  FrictionPhase phase{.sign = next.sign, .held = {}, .at = {}};
+  FrictionPhase phase{.sign = next.sign, .held = {}, .at = {}, .led = next.led};
   for (size_t k = 0; k < sign.size(); ++k) {
     const size_t e = next.held[k];
     phase.sign[e] = sign[k];

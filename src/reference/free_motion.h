@@ -100,6 +100,7 @@ class FreeMotion {
                                                         const State& to);
   void FindStops(const State& from, double h, const State& to, FrictionEvent* first);
   void FindStart(const State& from, double h, const State& to, FrictionEvent* first);
+  [[nodiscard]] bool PassesThrough(const FrictionEvent& event);
   [[nodiscard]] RunSummary Settle(const FrictionEvent& event, double h);
   [[nodiscard]] FrictionPhase RestingPhase(const FrictionEvent& event);
   [[nodiscard]] std::vector<int> Starting(double t_s, const BodyStates& states,

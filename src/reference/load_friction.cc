@@ -37,15 +37,33 @@ Vec3 AcrossAxis(const Mechanism& mechanism, size_t element, const MatX& reaction
   return R - a * a.dot(R);
 }
 
-double LoadSystem::contraction() const {
-  double q = 0.0;
-  for (const std::vector<Vec3>& row : P) {
-    double sum = 0.0;
-    for (size_t d = 0; d < row.size(); ++d) sum += row[d].norm() * std::abs(sign[d]) * per_load[d];
-    q = std::max(q, sum);
-  }
-  return q;
+RunSummary LoadShared(const Mechanism& mechanism, size_t element) {
+  const ForceElement& at = mechanism.elements[element];
+  return {.stop = Stop::kUnsupported,
+          .message = fmt::format("the load of the {} ('{}') is not determined by statics: "
+                                 "redundant constraints share it",
+                                 Described(mechanism, at), at.name),
+          .where = at.name,
+          .unit = {}};
 }
+
+double LoadSystem::Raised(size_t e) const {
+  double sum = 0.0;
+  for (size_t d = 0; d < P[e].size(); ++d) {
+    sum += P[e][d].norm() * std::abs(sign[d]) * per_load[d];
+  }
+  return sum;
+}
+
+size_t LoadSystem::MostRaised() const {
+  size_t most = 0;
+  for (size_t e = 0; e < P.size(); ++e) {
+    if (Raised(e) > Raised(most)) most = e;
+  }
+  return most;
+}
+
+double LoadSystem::contraction() const { return P.empty() ? 0.0 : Raised(MostRaised()); }
 
 RunSummary LoadSystem::Solve(VecX* n) const {
   n->setZero(static_cast<Eigen::Index>(p.size()));

@@ -27,6 +27,9 @@ namespace mbv::internal {
 /// `reactions` (joints × 6).
 [[nodiscard]] Vec3 AcrossAxis(const Mechanism& mechanism, size_t element, const MatX& reactions);
 
+/// kUnsupported: redundant constraints share the load of an element's joint.
+[[nodiscard]] RunSummary LoadShared(const Mechanism& mechanism, size_t element);
+
 /// (2): all p and P of the loaded elements; `sign`: of their rates, 0 at rest.
 struct LoadSystem {
   std::vector<Vec3> p;               ///< per loaded element [N]
@@ -34,8 +37,13 @@ struct LoadSystem {
   std::vector<double> sign, per_load;
 
   [[nodiscard]] double contraction() const;  ///< (3)
+  /// The loaded element whose load the others raise most.
+  [[nodiscard]] size_t MostRaised() const;
   /// n_e [N]; kSingular where (3) does not hold, with q.
   [[nodiscard]] RunSummary Solve(VecX* n) const;
+
+ private:
+  [[nodiscard]] double Raised(size_t e) const;
 };
 
 }  // namespace mbv::internal

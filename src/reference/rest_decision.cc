@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 namespace mbv::internal {
 namespace {
@@ -15,6 +16,8 @@ constexpr double kDependent = 1e-9;
 constexpr long kMostChoices = 20000;
 // Sweeps of the projected Gauss–Seidel iteration for (3).
 constexpr int kMostSweeps = 20000;
+// Elements that take a smaller share in a motion stay out of it.
+constexpr double kLeftOut = 1e-6;
 // A smaller share of what an element's acceleration is made of is none.
 constexpr double kStarts = 1e-9;
 
@@ -125,6 +128,43 @@ VecX HeldMotion(const RestSystem& system) {
   const MatX N = split.Q.rightCols(left);
   const MatX inertia = N.transpose() * system.H * N;
   return u + N * inertia.ldlt().solve(N.transpose() * (system.f - system.H * u));
+}
+
+VecX LeastShares(const RestSystem& system) {
+  const Eigen::Index count = system.G.rows();
+  VecX share = VecX::Zero(count);
+  if (SplitFreedoms(system.G).rank == count) {
+    const VecX load = system.H * HeldMotion(system) - system.f;
+    return system.G.transpose().colPivHouseholderQr().solve(load);
+  }
+  RestSystem left = system;
+  std::vector<Eigen::Index> which(static_cast<size_t>(count));
+  std::iota(which.begin(), which.end(), 0);
+  while (!which.empty()) {
+    VecX direction = VecX::Zero(left.G.rows());
+    const double ratio = LoadRatio(left, &direction);
+    if (std::isnan(ratio)) return VecX::Constant(count, kNan);
+    direction = direction.cwiseQuotient(left.G.rowwise().norm());
+    const double least = kLeftOut * direction.cwiseAbs().maxCoeff();
+    // Those of the motion nearest to starting are known; the others share what is left.
+    std::vector<Eigen::Index> rest;
+    for (Eigen::Index e = 0; e < direction.size(); ++e) {
+      if (!(std::abs(direction[e]) > least)) {
+        rest.push_back(e);
+        continue;
+      }
+      const double force = -std::copysign(ratio * left.most[e], direction[e]);
+      share[which[static_cast<size_t>(e)]] = force;
+      left.f += force * left.G.row(e).transpose();
+    }
+    if (rest.size() == which.size()) return share;
+    left.G = MatX(left.G(rest, Eigen::all));
+    left.d = VecX(left.d(rest));
+    left.most = VecX(left.most(rest));
+    for (Eigen::Index& e : rest) e = which[static_cast<size_t>(e)];
+    which = std::move(rest);
+  }
+  return share;
 }
 
 double LoadRatio(const RestSystem& system, VecX* direction) {

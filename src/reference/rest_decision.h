@@ -35,6 +35,11 @@ struct RestSystem {
 /// of the motion that is nearest to starting, per element, where forces would drive it.
 [[nodiscard]] double LoadRatio(const RestSystem& system, VecX* direction = nullptr);
 
+/// Friction λ along each coordinate while all are held; where they share the load in many ways,
+/// that of which the largest |λ_e|/F_e is least, then the next: at the start of a motion it is what
+/// all that start exert. NaN as LoadRatio().
+[[nodiscard]] VecX LeastShares(const RestSystem& system);
+
 /// (1): per element the sign of its acceleration, 0 where it sticks. False where none is found.
 [[nodiscard]] bool DecideRest(const RestSystem& system, std::vector<int>* sign);
 

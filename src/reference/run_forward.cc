@@ -12,7 +12,6 @@
 #include "reference/force_solver.h"
 #include "reference/forward.h"
 #include "reference/free_motion.h"
-#include "reference/load_friction.h"
 #include "reference/sample_recorder.h"
 #include "reference/square_system.h"
 
@@ -130,18 +129,6 @@ void Complete(double t_s, FreeMotion* free, internal::SampleRecorder* recorder,
   free->dynamics().Forces(t_s, sample);
 }
 
-RunSummary LoadFrictionRefused(const Mechanism& mechanism) {
-  const std::vector<size_t> loaded = internal::LoadedElements(mechanism);
-  if (loaded.empty()) return RunSummary::Done();
-  const std::string& name = mechanism.elements[loaded.front()].name;
-  return {.stop = Stop::kUnsupported,
-          .message = "element '" + name +
-                     "' is friction by its joint's load, which is known in commanded motion only",
-          .time_s = 0.0,
-          .where = name,
-          .unit = {}};
-}
-
 RunSummary Integrate(const Mechanism& mechanism, const Motion& motion,
                      const ForwardOptions& options, ForwardRun* run) {
   if (RunSummary summary = InitialStates(mechanism, motion, &run->start); !summary.ok()) {
@@ -209,8 +196,7 @@ ForwardRun RunForwardReference(const Mechanism& mechanism, const Motion& motion,
   std::vector<Channel> channels = internal::ReferenceChannels(mechanism, options.reactions);
   for (Channel& channel : WorkChannels(mechanism)) channels.push_back(std::move(channel));
   run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
-  run.summary = LoadFrictionRefused(mechanism);
-  if (run.summary.ok()) run.summary = Integrate(mechanism, motion, options, &run);
+  run.summary = Integrate(mechanism, motion, options, &run);
   run.summary.wall_s =
       std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
   return run;

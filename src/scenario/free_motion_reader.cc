@@ -45,7 +45,6 @@ class FreeMotionReader {
 
   void Read(const YamlNode& node, const YamlNode* forces) {
     CheckCommands(node);
-    CheckFriction(node);
     if (forces != nullptr) ReadForces(*forces);
     ReadInitial(node.Find("initial"), "motion.initial", false);
     ReadInitial(node.Find("initial_rates"), "motion.initial_rates", true);
@@ -68,19 +67,6 @@ class FreeMotionReader {
                                "commands name drives and prescribed joints only",
                                command.name),
                    "command the drives themselves, or give no forces and no initial values");
-    }
-  }
-
-  void CheckFriction(const YamlNode& node) {
-    for (const ForceElement& element : mechanism_.elements) {
-      const auto* law = std::get_if<FrictionLaw>(&element.law);
-      if (law == nullptr || law->per_load() == 0.0) continue;
-      yaml().Error(node,
-                   fmt::format("motion: element '{}' of {} is friction by its joint's load, which "
-                               "is not known where freedoms move by forces",
-                               element.name, mechanism_.name),
-                   "command every freedom, or set its coefficient to 0");
-      return;
     }
   }
 

@@ -306,11 +306,16 @@ double ConstraintSystem::FrictionUnit(int row) const {
   return place.tendon >= 0 ? length_ : dof_unit_[place.dof];
 }
 
+double ConstraintSystem::Breakaway(size_t element) const {
+  return std::get<FrictionLaw>(engine_.mechanism->elements[element].law).breakaway +
+         load_friction(element);
+}
+
 double ConstraintSystem::HeldLoss(int row) const {
   double loss = 0.0;
   for (const size_t e : engine_.frictions[static_cast<size_t>(row)].elements) {
     if (!sliding_.empty() && sliding_[e] != 0) continue;
-    loss += std::get<FrictionLaw>(engine_.mechanism->elements[e].law).breakaway;
+    loss += Breakaway(e);
   }
   return loss;
 }
@@ -319,8 +324,8 @@ double ConstraintSystem::HeldForce(size_t element) const {
   for (int row = 0; row < friction_rows(); ++row) {
     const std::vector<size_t>& of = engine_.frictions[static_cast<size_t>(row)].elements;
     if (std::ranges::find(of, element) == of.end()) continue;
-    const double own = std::get<FrictionLaw>(engine_.mechanism->elements[element].law).breakaway;
-    return d_->efc_force[rows_ + row] * own / HeldLoss(row);
+    const double loss = HeldLoss(row);
+    return loss > 0.0 ? d_->efc_force[rows_ + row] * Breakaway(element) / loss : 0.0;
   }
   return 0.0;
 }

@@ -127,6 +127,8 @@ class ConstraintSystem {
   /// rate says.
   void SetSliding(std::vector<int> sign) { sliding_ = std::move(sign); }
   [[nodiscard]] const std::vector<int>& sliding() const { return sliding_; }
+  /// Of an element that rubs, by its joint's load too.
+  [[nodiscard]] double Breakaway(size_t element) const;
   /// Sum of the breakaway forces of what a row holds.
   [[nodiscard]] double HeldLoss(int row) const;
   /// Share of an element in the force of MuJoCo's row.

@@ -12,26 +12,20 @@ using ConstVecX = Eigen::Map<const VecX>;
 RunSummary GyroUnsupported(const ForceElement& element, const std::string& described) {
   return {.stop = Stop::kUnsupported,
           .message = "element '" + element.name + "', a " + described +
-                     ", needs every drive's motion commanded: MuJoCo 2.2 has no inertia between a "
-                     "joint and a body that turns, and the moment needs accelerations",
+                     ", needs every drive's motion commanded or the corrected engine, and a "
+                     "joint's coordinate: MuJoCo 2.2 has no inertia between a joint and a body "
+                     "that turns",
           .where = element.name,
           .unit = {}};
 }
 
 // Why friction cannot be simulated where some drive is not guided, or "".
-std::string FrictionTrouble(const EngineModel& engine, size_t e, bool free, bool own_events) {
-  const auto& law = std::get<FrictionLaw>(engine.mechanism->elements[e].law);
-  if (!free) return "friction is known where every drive is commanded, and in free motion, only";
-  if (law.per_load() > 0.0) return "friction by the joint's load needs every drive commanded";
-  if (!own_events && law.breakaway != law.coulomb) {
-    return "MuJoCo's frictionloss knows no breakaway force other than coulomb";
-  }
-  const ElementPlace& at = engine.elements[e];
-  const bool guided = std::ranges::any_of(engine.driven, [&](const DrivenPlace& place) {
-    if (place.forced) return false;
-    return place.is_tendon ? place.object == at.tendon : at.dof >= 0 && place.dof == at.dof;
-  });
-  return guided ? "friction on a coordinate that is commanded where others move by forces" : "";
+std::string FrictionTrouble(const ForceElement& element, bool own_events) {
+  const auto& law = std::get<FrictionLaw>(element.law);
+  if (own_events) return "";
+  if (law.per_load() > 0.0) return "MuJoCo's frictionloss knows no load of the joint";
+  if (law.breakaway == law.coulomb) return "";
+  return "MuJoCo's frictionloss knows no breakaway force other than coulomb";
 }
 
 RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::string& why) {
@@ -45,7 +39,8 @@ RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::s
 
 // In free motion MuJoCo's rows hold friction at rest; by itself MuJoCo lets them do all of it.
 void AddHolding(const ConstraintSystem& system, size_t e, ElementMotion* at) {
-  if (system.friction_rows() == 0 || !Rubs(system.engine().mechanism->elements[e])) return;
+  if (system.friction_rows() == 0 || system.engine().elements[e].led) return;
+  if (!Rubs(system.engine().mechanism->elements[e])) return;
   at->sliding = system.sliding().empty() ? 0 : system.sliding()[e];
   at->rests = at->sliding == 0;
   if (at->rests) at->held = system.HeldForce(e);
@@ -124,7 +119,7 @@ double ForceOf(const ForceElement& element, const ElementMotion& at) {
     const double ratio = at.rate / friction->stribeck_rate;
     const double curve = friction->stribeck_rate > 0.0 ? std::exp(-(ratio * ratio)) : 0.0;
     const double most = friction->breakaway * curve + friction->coulomb * (1.0 - curve);
-    if (at.sliding != 0) return -at.sliding * most;
+    if (at.sliding != 0) return -at.sliding * (most + at.load_friction);
     return -std::copysign(most + at.load_friction, at.rate);
   }
   const auto& rotor = std::get<RotorLaw>(element.law);
@@ -175,16 +170,14 @@ ElementSlope SlopeOf(const ForceElement& element, double position) {
 }
 
 RunSummary CheckElements(const EngineModel& engine, const Motion& motion, bool own_events) {
-  const bool released =
-      motion.free() ||
-      std::ranges::any_of(engine.driven, [](const DrivenPlace& place) { return place.forced; });
+  const bool released = motion.free() || IsReleased(engine);
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
     if (released && Rubs(element)) {
-      const std::string why = FrictionTrouble(engine, e, motion.free(), own_events);
+      const std::string why = FrictionTrouble(element, own_events);
       if (!why.empty()) return FrictionUnsupported(engine, e, why);
     }
-    if (released && IsGyroscopic(element)) {
+    if (released && IsGyroscopic(element) && (!own_events || element.drive >= 0)) {
       return GyroUnsupported(element, Described(*engine.mechanism, element));
     }
     const bool on_tendon = element.drive >= 0 && std::holds_alternative<RotorLaw>(element.law);
@@ -198,6 +191,25 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, bool o
             .unit = {}};
   }
   return RunSummary::Done();
+}
+
+void FindLed(EngineModel* engine) {
+  // A share of a coordinate that loops and commands leave open; less is round-off.
+  constexpr double kLed = 1e-9;
+  const DataHandle data = MakeData(*engine->m);
+  ConstraintSystem system(*engine, data.get());
+  system.SetTargets(VecX::Zero(static_cast<Eigen::Index>(engine->driven.size())));
+  system.EvaluatePosition();
+  Eigen::CompleteOrthogonalDecomposition<MatX> rows;
+  rows.setThreshold(kLed);
+  if (system.rows() > 0) rows.compute(system.ScaledJ().transpose());
+  for (size_t e = 0; e < engine->elements.size(); ++e) {
+    if (!Rubs(engine->mechanism->elements[e])) continue;
+    const VecX u = ElementGradient(system, e).cwiseProduct(system.dof_unit());
+    VecX left = u;
+    if (system.rows() > 0) left -= system.ScaledJ().transpose() * rows.solve(u);
+    engine->elements[e].led = left.norm() < kLed * u.norm();
+  }
 }
 
 bool HasLacking(const Mechanism& mechanism) {
@@ -216,7 +228,8 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
     if (elements[e].drive >= 0 && elements[e].drive < driven_acceleration.size()) {
       at.acceleration = driven_acceleration[elements[e].drive];
     }
-    const double force = ForceOf(elements[e], at);
+    double force = ForceOf(elements[e], at);
+    if (place.armature) force += std::get<RotorLaw>(elements[e].law).reflected() * at.acceleration;
     if (place.dof >= 0) {
       qfrc[place.dof] += force;
     } else {

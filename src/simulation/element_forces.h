@@ -7,7 +7,10 @@
 // free motion, stick_slip.h):
 //   F(q, q̇, q̈),  qfrc = F u                                                                   (1)
 // A rotor on a tendon needs q̈ before it is known: the commanded one, so that its drive must be
-// guided.
+// guided. So does one that feels its carrier turn. Where freedoms move by forces, MuJoCo has its
+// J n² as armature, and the rest follows the accelerations that MuJoCo finds (Integrator::Settle):
+// with M MuJoCo's inertia and C what J n q̇ a·ω adds to it, M q̈_{k+1} = f − C q̈_k, which
+// converges, as ½ J (n q̇ ± a·ω)² ≥ 0 makes M + C and M − C positive.
 #pragma once
 
 #include "simulation/bushings.h"
@@ -70,11 +73,12 @@ struct ElementSlope {
 };
 [[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position);
 
-/// kUnsupported for a rotor on a distance drive that is not guided, for rotors with a carrier where
-/// some drive is not, and for friction there but in free motion: of what a guided coordinate bears,
-/// by the joint's load, and, without our own events, other than Coulomb's.
+/// kUnsupported for a rotor on a distance drive that is not guided, and where some drive is not and
+/// MuJoCo steps by itself for rotors with a carrier and for friction other than Coulomb's.
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion,
                                        bool own_events);
+/// Finds the elements that are led, at the model's reference pose.
+void FindLed(EngineModel* engine);
 
 /// True if there is something that MuJoCo lacks.
 [[nodiscard]] bool HasLacking(const Mechanism& mechanism);

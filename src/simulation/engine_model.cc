@@ -211,10 +211,12 @@ void AddFrictionRows(EngineModel* engine) {
   for (int dof = 0; dof < m.nv; ++dof) places.push_back({.dof = dof, .elements = {}});
   for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
   for (size_t e = 0; e < engine->elements.size(); ++e) {
-    if (!Rubs(engine->mechanism->elements[e])) continue;
     const ElementPlace& place = engine->elements[e];
+    if (place.led || !Rubs(engine->mechanism->elements[e])) continue;
     const int at = place.tendon >= 0 ? m.nv + place.tendon : place.dof;
-    const double loss = std::get<FrictionLaw>(engine->mechanism->elements[e].law).breakaway;
+    const auto& law = std::get<FrictionLaw>(engine->mechanism->elements[e].law);
+    // Without a loss there is no row; that by the load is written into it at every node.
+    const double loss = law.breakaway > 0.0 ? law.breakaway : 1.0;
     (place.tendon >= 0 ? m.tendon_frictionloss[place.tendon] : m.dof_frictionloss[place.dof]) +=
         loss;
     places[static_cast<size_t>(at)].elements.push_back(e);
@@ -222,6 +224,20 @@ void AddFrictionRows(EngineModel* engine) {
   std::erase_if(places, [](const FrictionPlace& place) { return place.elements.empty(); });
   m.njmax += static_cast<int>(places.size());
   engine->frictions = std::move(places);
+}
+
+bool IsReleased(const EngineModel& engine) {
+  return std::ranges::any_of(engine.driven, [](const DrivenPlace& place) { return place.forced; });
+}
+
+void AddArmatures(EngineModel* engine) {
+  for (size_t e = 0; e < engine->elements.size(); ++e) {
+    ElementPlace& place = engine->elements[e];
+    const ForceElement& element = engine->mechanism->elements[e];
+    if (place.dof < 0 || !IsGyroscopic(element)) continue;
+    engine->m->dof_armature[place.dof] += std::get<RotorLaw>(element.law).reflected();
+    place.armature = true;
+  }
 }
 
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine) {

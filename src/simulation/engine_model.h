@@ -32,7 +32,9 @@ struct ElementPlace {
   int tendon = -1;
   double rest_rate = 0.0;  ///< up to which dry friction rests (RestRate())
   int bushing_parent = -1, bushing_child = -1;
-  int carrier = -1;  ///< MuJoCo's body whose turning a rotor feels
+  int carrier = -1;       ///< MuJoCo's body whose turning a rotor feels
+  bool armature = false;  ///< MuJoCo has such a rotor's inertia along its coordinate
+  bool led = false;       ///< commands move the coordinate, loops included, where others are free
 };
 
 /// A row of MuJoCo's frictionloss, and the elements that rub there.
@@ -94,9 +96,15 @@ void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data);
 /// What counts as rest in a motion of this length, for every force element.
 void SetRestRates(double duration_s, EngineModel* engine);
 
-/// Gives MuJoCo rows of frictionloss where elements rub, with the breakaway forces as losses. To be
-/// called before the data is made.
+/// Gives MuJoCo rows of frictionloss where elements rub on a coordinate that is not led, with the
+/// breakaway forces as losses. To be called before the data is made.
 void AddFrictionRows(EngineModel* engine);
+
+/// True if some drive is not guided.
+[[nodiscard]] bool IsReleased(const EngineModel& engine);
+/// Gives MuJoCo the inertia of rotors with a carrier along their coordinates, as armature: what is
+/// left of them is smaller than the inertia that it meets (element_forces.h).
+void AddArmatures(EngineModel* engine);
 
 /// Switches off the guiding constraints of the drives whose force the motion gives.
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);

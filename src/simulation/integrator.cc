@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "mjcf/mjcf.h"
+#include "simulation/load_friction.h"
 
 namespace mbv::simulation {
 namespace {
@@ -26,6 +27,10 @@ constexpr double kBeyond = 10.0;
 constexpr double kUnbounded = 1e20;
 // A smaller share of what its force could do to a row is no acceleration.
 constexpr double kMoves = 1e-6;
+// Forces that follow accelerations have settled when a pass changes them by less than this share of
+// the largest; where round-off keeps that away, when passes no longer help below the second.
+constexpr double kSettledForces = 4e-16, kStalledForces = 1e-11;
+constexpr int kMostSettling = 400;
 // Shares of the largest pivot of J, see the head of integrator.h.
 constexpr double kWeak = 0.01, kNear = 0.2;
 
@@ -186,6 +191,7 @@ void Integrator::Coast() {
     work_ += (i % 2 == 1 ? binomial : -binomial) * a_[static_cast<size_t>(i - 1)];
   }
   std::copy(work_.begin(), work_.end(), d_->qacc);
+  if (s_.follows()) s_.ApplyForces(time_s_, at_);
   VecX tau(m_->nv);
   mj_mulM(m_, d_, tau.data(), d_->qacc);
   tau += Eigen::Map<const VecX>(d_->qfrc_bias, m_->nv) -
@@ -214,13 +220,63 @@ void Integrator::Evaluate(const VecX& q, const VecX& v, const Commanded& at, dou
   mj_comVel(m_, d_);
   s_.system.EvaluatePassive();
   mj_rne(m_, d_, 0, d_->qfrc_bias);
+  if (s_.follows()) {
+    at_ = at;
+    time_s_ = t_s;
+    std::copy(warm_.begin(), warm_.end(), d_->qacc);
+    s_.system.Bias(&bias_);
+  }
   s_.ApplyForces(t_s, at);
   SetReference(v, at.motion, guidance);
   std::copy(warm_.begin(), warm_.end(), d_->qacc_warmstart);
+  SolveSmooth();
+  SolveConstraints();
+  Settle();
+}
+
+void Integrator::SolveSmooth() {
   mj_fwdAcceleration(m_, d_);
   // MuJoCo starts from here where that is cheaper than the warm start: as far off as that one.
   if (d_->nefc > 0) Eigen::Map<VecX>(d_->qacc_smooth, m_->nv).array() += kNudge;
-  SolveConstraints();
+}
+
+// Forces by the accelerations and loads just found, until they are those that MuJoCo finds.
+void Integrator::Settle() {
+  if (!s_.follows()) return;
+  const VecX units = s_.system.dof_unit();
+  double last = kUnbounded;
+  for (int pass = 0; pass < kMostSettling; ++pass) {
+    const VecX before = Eigen::Map<const VecX>(d_->qfrc_applied, m_->nv);
+    const VecX sizes = LoadFrictionOf(&s_);
+    double change = 0.0, largest = 0.0;
+    for (const size_t e : s_.loaded) {
+      const double size = sizes[static_cast<Eigen::Index>(e)];
+      const double unit = units[s_.engine.elements[e].dof];
+      change = std::max(change, unit * std::abs(size - s_.system.load_friction(e)));
+      largest = std::max(largest, unit * size);
+    }
+    s_.system.SetLoadFriction(sizes);
+    s_.ApplyForces(time_s_, at_);
+    const Eigen::Map<const VecX> now(d_->qfrc_applied, m_->nv);
+    change = std::max(change, (now - before).cwiseProduct(units).cwiseAbs().maxCoeff());
+    largest = std::max(largest, now.cwiseProduct(units).cwiseAbs().maxCoeff());
+    if (change <= kSettledForces * largest) return;
+    if (change >= last && change <= kStalledForces * largest) return;
+    last = change;
+    SolveSmooth();
+    expected_ = s_.system.force();
+    ApplyReference();
+    SolveConstraints();
+  }
+  if (s_.trouble.ok()) {
+    s_.trouble = {.stop = Stop::kSingular,
+                  .message =
+                      "friction by loads and the loads, or rotors and the bodies that carry "
+                      "them, raise each other",
+                  .time_s = time_s_,
+                  .where = {},
+                  .unit = {}};
+  }
 }
 
 // MuJoCo's constraint stage, from a start that is a little off: it takes no Newton step shorter
@@ -352,6 +408,7 @@ void Integrator::SolveAgain() {
   expected_ = s_.system.force();
   ApplyReference();
   SolveConstraints();
+  Settle();
 }
 
 }  // namespace mbv::simulation

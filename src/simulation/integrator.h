@@ -14,6 +14,9 @@
 //              q_{n+1} = q_n ⊕ (h v_n + h²/360 (38 a_{n+1} + 171 a_n − 36 a_{n−1} + 7 a_{n−2})) (5)
 // [Hairer, Nørsett, Wanner 1993, III.1 and III.10].
 //
+// Friction by the joints' loads and the moments of carried rotors follow accelerations and forces
+// of the very same node: MuJoCo solves again until they no longer change.
+//
 // Where a free motion passes a pose at which a constraint is lost, constraint forces divide by zero
 // although the accelerations go on smoothly. At the nodes next to such a pose (a pivot of J below
 // kWeak of its largest) they are extrapolated by the polynomial through the last n ≤ 6 nodes,
@@ -72,6 +75,8 @@ class Integrator {
   [[nodiscard]] VecX DecideFriction();
   [[nodiscard]] bool RefineFriction(VecX* gives) const;
   void SolveConstraints();
+  void SolveSmooth();
+  void Settle();
   void SolveAgain();
   void RememberNode();
   [[nodiscard]] bool PassesSingularPose();
@@ -92,6 +97,8 @@ class Integrator {
   VecX q_, v_;  // corrected state at the present node
   VecX q_p_, v_p_, mean_, work_, warm_;
   VecX bias_, rate_, guidance_, aref_, expected_;
+  Commanded at_;  // of the state evaluated last
+  double time_s_ = 0.0;
   std::array<VecX, 6> a_;  // accelerations at the last nodes, newest first
   std::array<VecX, 4> f_;  // constraint forces there
   int nodes_ = 0;          // of these that lie at equal distances

@@ -40,9 +40,24 @@ std::vector<size_t> LoadedElements(const Mechanism& mechanism) {
   return loaded;
 }
 
+VecX LoadFrictionOf(Session* session) {
+  VecX sizes = VecX::Zero(static_cast<Eigen::Index>(session->engine.mechanism->elements.size()));
+  const std::vector<Vec3> across = session->recorder.ForcesAcross(session->loaded, session->loads);
+  for (size_t d = 0; d < across.size(); ++d) {
+    const size_t e = session->loaded[d];
+    sizes[static_cast<Eigen::Index>(e)] = PerLoad(ElementOf(*session, e)) * across[d].norm();
+  }
+  return sizes;
+}
+
 LoadFriction::LoadFriction(Session* session) : s_(*session) {
   if (s_.loaded.empty()) return;
   found_ = s_.system.force();
+  if (s_.released) {
+    p_ = s_.recorder.ForcesAcross(s_.loaded, s_.loads);
+    CheckUnique();
+    return;
+  }
   FindLoads();
   CheckUnique();
   if (!SolveLoads()) {
@@ -57,7 +72,7 @@ LoadFriction::LoadFriction(Session* session) : s_(*session) {
 }
 
 LoadFriction::~LoadFriction() {
-  if (s_.loaded.empty()) return;
+  if (s_.loaded.empty() || s_.released) return;
   s_.system.force() = found_;
   s_.system.SetLoadFriction({});
 }

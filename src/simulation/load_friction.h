@@ -2,8 +2,10 @@
 //
 //   F_e = −c_e n_e sign q̇_e,  n_e = |p_e + Σ_d P_ed F_d|,  c = μ r                             (1)
 // p: reaction force across the axis without such friction, as the recorder reads it; P: what a unit
-// force F_d adds, with Jᵀλ = −u_d. The motion is commanded, so that friction changes forces only:
-// it is found where forces are recorded and is not pushed with. Newton on n.
+// force F_d adds, with Jᵀλ = −u_d. Where the motion is commanded, friction changes forces only:
+// it is found where forces are recorded and is not pushed with. Newton on n. Where freedoms move by
+// forces, MuJoCo is pushed with (1) by the loads that it finds itself, until they no longer change
+// (Integrator::Settle); what rests breaks away beyond Fs + c n.
 #pragma once
 
 #include "simulation/session.h"
@@ -13,8 +15,11 @@ namespace mbv::simulation {
 /// Indices of the elements with friction by load.
 [[nodiscard]] std::vector<size_t> LoadedElements(const Mechanism& mechanism);
 
-/// Adds (1) to the session's constraint forces for as long as it lives. What goes wrong is in
-/// Session::trouble.
+/// c_e n_e per force element, by the data's accelerations and constraint forces.
+[[nodiscard]] VecX LoadFrictionOf(Session* session);
+
+/// In commanded motion adds (1) to the session's constraint forces for as long as it lives. What
+/// goes wrong is in Session::trouble, in all motions also that a load is not unique.
 class LoadFriction {
  public:
   explicit LoadFriction(Session* session);

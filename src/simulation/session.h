@@ -38,7 +38,10 @@ struct Session {
   [[nodiscard]] const VecX& WorkRates();
   /// Half-widths within which friction at rest leaves the forces of everything driven,
   /// Σ |∂(force)/∂(friction)| Fs: per element Jᵀλ = −u Fs, as forces are solved for.
+  /// Where drives are released MuJoCo finds what holds, but for coordinates that are led.
   [[nodiscard]] VecX Bands();
+  /// True if forces depend on the accelerations and forces that MuJoCo finds.
+  [[nodiscard]] bool follows() const { return released && (gyroscopic || !loaded.empty()); }
   /// Decides, at the present configuration, whether the drives share their forces.
   void FindShared();
   /// Loads, given drive forces and force elements that MuJoCo lacks at t, for the data's current
@@ -55,6 +58,7 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
+  const bool released;  ///< some drive is not guided: friction and accelerations are MuJoCo's
   const std::vector<size_t> loaded;         ///< elements with friction by their joint's load
   RunSummary trouble = RunSummary::Done();  ///< in finding it
   const bool lacking;     ///< there are force elements that MuJoCo has no word for

@@ -7,6 +7,7 @@
 #include "core/roles.h"
 #include "mjcf/mjcf.h"
 #include "simulation/element_forces.h"
+#include "simulation/held_shares.h"
 #include "simulation/load_friction.h"
 #include "simulation/session.h"
 #include "simulation/steps.h"
@@ -52,6 +53,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       solver(&system),
       loads(engine, motion_),
       recorder(&system, Integrates(options_)),
+      released(motion_.free() || IsReleased(engine)),
       loaded(LoadedElements(*engine.mechanism)),
       lacking(HasLacking(*engine.mechanism)),
       gyroscopic(HasGyroscopic(*engine.mechanism)) {
@@ -68,6 +70,7 @@ void Session::Record(size_t i) {
   {
     const LoadFriction load_friction(this);
     const LeastForces least(this);
+    const HeldShares shares(this);
     recorder.Record(loads, work.work(), record, &run->X_WB[i]);
     if (recorder.has_bands()) recorder.RecordBands(Bands(), record);
   }
@@ -107,9 +110,9 @@ VecX OpenedForces(const ConstraintSystem& system) {
 VecX Session::Bands() {
   const auto driven = static_cast<Eigen::Index>(engine.driven.size());
   VecX bands = VecX::Zero(driven);
-  if (motion.free()) return bands;  // MuJoCo finds what holds
   const VecX found = system.force();
   for (size_t e = 0; e < engine.elements.size(); ++e) {
+    if (released && !engine.elements[e].led) continue;
     const ElementMotion at = ElementMotionOf(system, e);
     const double most = BreakawayAt(engine.mechanism->elements[e], at);
     if (most == 0.0) continue;
@@ -138,7 +141,7 @@ void Session::ApplyForces(double t_s, const Commanded& at) {
   if (loads.world().empty() && !system.has_given_forces() && !lacking) return;
   mju_zero(data->qfrc_applied, engine.m->nv);
   loads.AddGeneralized(data.get(), data->qfrc_applied);
-  if (gyroscopic) SetCommandedAcceleration(at.motion.acceleration, &system);
+  if (gyroscopic && !released) SetCommandedAcceleration(at.motion.acceleration, &system);
   if (lacking) AddLackingForces(system, at.motion.acceleration, data->qfrc_applied);
   if (!system.has_given_forces()) return;
   given.setZero(static_cast<Eigen::Index>(engine.driven.size()));
@@ -245,7 +248,11 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   if (RunSummary summary = CheckElements(engine, motion, own_events); !summary.ok()) {
     return summary;
   }
-  if (motion.free()) AddFrictionRows(&engine);
+  if (motion.free() || IsReleased(engine)) {
+    FindLed(&engine);
+    AddFrictionRows(&engine);
+    AddArmatures(&engine);
+  }
   Session session(std::move(engine), motion, options, run);
   session.start = std::move(start);
   session.progress = progress;

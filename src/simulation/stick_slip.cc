@@ -28,7 +28,7 @@ StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command
     : s_(*session), integrator_(*integrator), command_(std::move(command)) {
   const std::vector<ForceElement>& elements = s_.engine.mechanism->elements;
   for (size_t e = 0; e < elements.size(); ++e) {
-    if (Rubs(elements[e])) rubbing_.push_back(e);
+    if (Rubs(elements[e]) && !s_.engine.elements[e].led) rubbing_.push_back(e);
   }
   sliding_.assign(elements.size(), 0);
   fresh_.assign(elements.size(), 0);

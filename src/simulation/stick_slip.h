@@ -1,4 +1,4 @@
-// Stick and slip in free motion with the corrected engine.
+// Stick and slip where freedoms move by forces, with the corrected engine.
 //
 // MuJoCo's frictionloss is a soft constraint: what rests creeps, and what slides stops over many
 // steps. Here its rows hold what rests, as hard as all other rows (integrator.h). Where one would
@@ -22,7 +22,7 @@ class StickSlip {
   /// All outlive the object.
   StickSlip(Session* session, Integrator* integrator, CommandAt command);
 
-  /// True in free motion with dry friction.
+  /// True where something that rubs moves by forces.
   [[nodiscard]] bool acts() const { return !s_.engine.frictions.empty(); }
   /// Decides at the start, before Integrator::Start(): rates tell who slides.
   void FindSliding();

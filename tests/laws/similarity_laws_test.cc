@@ -46,6 +46,7 @@ const char* const kScenarios[] = {"andrews_squeezer/benchmark",
                                   "slider_crank/buffer",
                                   "stewart_legs/dance_inverse",
                                   "journal_crank/press_inverse",
+                                  "journal_crank/falls",
                                   "slotted_screw/turn_inverse",
                                   "machine_five_bar/draw_inverse",
                                   "belt_block/stick_slip"};

@@ -112,14 +112,75 @@ TEST(ReferenceElements, APrescribedJointThatRestsHasABand) {
   EXPECT_NEAR(At(run.trace, 1, "base.force.band"), 0.6, 1e-12);
 }
 
-TEST(ReferenceElements, FreeMotionWithFrictionByLoadIsRefused) {
-  Mechanism m = RubbingPendulum().Make();
-  for (ForceElement& element : m.elements) {
-    if (auto* law = std::get_if<FrictionLaw>(&element.law)) law->coefficient = 0.1;
+// Swings out and comes to rest: at every sample friction is that of the load that the accelerations
+// of this very sample make.
+TEST(ReferenceElements, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
+  const JournalPendulum p{.coefficient = 0.6};
+  const Mechanism m = p.Make();
+  const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 8.0));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  JournalPendulum bent = p;
+  bent.coefficient *= 1.0 + 1e-6;
+  int slides = 0;
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double q = At(run.trace, i, "motor.position"), rate = At(run.trace, i, "motor.velocity"),
+                 acceleration = At(run.trace, i, "motor.acceleration");
+    if (std::abs(rate) < 1e-6) continue;
+    ++slides;
+    EXPECT_NEAR(p.FreeTorque(q, rate, acceleration), 0.0, 1e-12) << i;
+    EXPECT_GT(std::abs(bent.FreeTorque(q, rate, acceleration)), 1e-9) << i;
   }
-  const ForwardRun free = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 1.0));
-  EXPECT_EQ(free.summary.stop, Stop::kUnsupported);
-  EXPECT_EQ(free.summary.where, "dry");
+  EXPECT_GT(slides, 10);
+  const Eigen::Index end = run.trace.values.rows() - 1;
+  EXPECT_EQ(At(run.trace, end, "motor.velocity"), 0.0);
+  const double q = At(run.trace, end, "motor.position");
+  EXPECT_LT(std::abs(p.g * std::cos(q)), p.coefficient * p.radius / p.r * p.g);
+  const double start = At(run.trace, 0, "energy.kinetic") + At(run.trace, 0, "energy.gravity");
+  EXPECT_NEAR(At(run.trace, end, "energy.gravity") - start, At(run.trace, end, "dampers.work"),
+              1e-10);
+}
+
+// Pushed from below by a growing force, the block breaks away where the push has taken so much of
+// its weight that the rest of it holds no longer.
+TEST(ReferenceElements, FrictionByLoadBreaksAwayByTheLoad) {
+  const PushedBlock block;
+  const Mechanism m = block.Make();
+  Motion motion = FreeMotion(m, 0.4, 0.0, 1.0);
+  const double r = 6.0,
+               start = block.coefficient * block.m * block.g / (0.8 + block.coefficient * 0.6) / r;
+  motion.sample_s = 0.01;
+  motion.forces[0].force = {{RampTerm{.rate = r}}};
+  const ForwardRun run = RunForwardReference(m, motion);
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  ASSERT_EQ(run.trace.breaks_s.size(), 1U);
+  EXPECT_NEAR(run.trace.breaks_s[0], start, 1e-11);
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double t = run.trace.time_s[static_cast<size_t>(i)];
+    const double L = At(run.trace, i, "leg.position"), rate = At(run.trace, i, "leg.velocity");
+    if (t < start) {
+      EXPECT_NEAR(L, 0.5, 1e-14);
+      continue;
+    }
+    EXPECT_NEAR(block.Force(L, rate, At(run.trace, i, "leg.acceleration")), r * t, 1e-10) << i;
+  }
+  const ForwardRun bent = RunForwardReference(PushedBlock{.coefficient = 0.2501}.Make(), motion);
+  EXPECT_GT(std::abs(bent.trace.breaks_s.at(0) - start), 1e-5);
+}
+
+// A journal as large as that takes back more load than it makes: no acceleration, or several.
+TEST(ReferenceElements, FreeFrictionByLoadWithoutASolutionIsRefused) {
+  JournalPendulum p;
+  p.coefficient = 8.0;
+  const ForwardRun run = RunForwardReference(p.Make(), FreeMotion(p.Make(), 0.3, 5.0, 1.0));
+  EXPECT_EQ(run.summary.stop, Stop::kSingular) << run.summary.message;
+  EXPECT_EQ(run.summary.where, "journal");
+  EXPECT_EQ(run.summary.time_s, 0.0);
+  const double J = RubbingPendulum::I + p.m * p.r * p.r;
+  EXPECT_NEAR(run.summary.amount, p.coefficient * p.radius * p.m * p.r / J, 1e-12);
+  const Mechanism shared = JournalPendulum().OnTwoHinges();
+  const ForwardRun two = RunForwardReference(shared, FreeMotion(shared, 0.3, 5.0, 1.0));
+  EXPECT_EQ(two.summary.stop, Stop::kUnsupported) << two.summary.message;
+  EXPECT_EQ(two.summary.where, "journal");
 }
 
 // A spring's preload in an element's place moves the torques by as much as it opens them.

@@ -6,6 +6,8 @@
 
 #include "reference/forward.h"
 #include "simulation/simulation.h"
+#include "tests/pushed_block.h"
+#include "tests/rubbing_pendulum.h"
 #include "tests/stacked_blocks.h"
 
 namespace mbv {
@@ -160,22 +162,73 @@ TEST(SimulatedStickSlip, MuJoCosOwnFrictionlossDoesNotConvergeWithTheStep) {
   }
 }
 
-TEST(SimulatedStickSlip, WhatIsNotKnownIsRefused) {
-  Mechanism m = StackedBlocks{{2.0, 1.0}, {CoulombFriction(1.0), CoulombFriction(0.5)}}.Make();
-  Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.0);
+double Apart(const SimulationRun& run, const ForwardRun& reference, const char* channel) {
+  EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+  EXPECT_TRUE(reference.summary.ok()) << reference.summary.message;
+  const int a = run.trace.Find(channel), b = reference.trace.Find(channel);
+  return (run.trace.values.col(a) - reference.trace.values.col(b)).cwiseAbs().maxCoeff();
+}
+
+// From breakaway on, with the load that the push leaves; a wrong coefficient shows.
+TEST(SimulatedStickSlip, FrictionByLoadIsThatOfThePushedBlock) {
+  const fixtures::PushedBlock block;
+  const Mechanism m = block.Make();
+  Motion motion = StackedBlocks::From(m, 0.5, 0.0, 1.0);
+  motion.forces[0].force = {{RampTerm{.rate = 6.0}}};
+  const ForwardRun reference = RunForwardReference(m, motion);
+  EXPECT_LT(Apart(SlipFreely(m, motion), reference, "leg.position"), 1e-10);
+  EXPECT_LT(Apart(SlipFreely(m, motion), reference, "rail.reaction.fz"), 1e-7);
+  EXPECT_LT(Apart(SlipFreely(m, motion), reference, "dampers.work"), 1e-9);
+  const Mechanism bent = fixtures::PushedBlock{.coefficient = 0.25 + 1e-4}.Make();
+  EXPECT_GT(Apart(SlipFreely(bent, motion), reference, "leg.position"), 1e-6);
+}
+
+TEST(SimulatedStickSlip, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
+  const fixtures::JournalPendulum p;
+  const Mechanism m = p.Make();
+  const Motion motion = StackedBlocks::From(m, 0.3, 5.0, 4.0);
+  const ForwardRun reference = RunForwardReference(m, motion);
+  const SimulationRun run = SlipFreely(m, motion);
+  EXPECT_LT(Apart(run, reference, "motor.position"), 1e-7);
+  EXPECT_LT(Apart(run, reference, "pivot.reaction.fx"), 1e-6);
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const auto at = [&](const char* name) { return run.trace.values(i, run.trace.Find(name)); };
+    if (std::abs(at("motor.velocity")) < 1e-6) continue;
+    const double rest =
+        p.FreeTorque(at("motor.position"), at("motor.velocity"), at("motor.acceleration"));
+    EXPECT_NEAR(rest, 0.0, 1e-9) << i;
+  }
+}
+
+TEST(SimulatedStickSlip, FrictionOnACommandedCoordinateIsItsDrives) {
+  const Mechanism m =
+      StackedBlocks{{2.0, 1.0}, {CoulombFriction(1.3), CoulombFriction(0.5)}}.Make();
+  Motion motion = StackedBlocks::From(m, 0.0, 0.0, 2.0);
   motion.forces.erase(motion.forces.begin());
   motion.initial.erase(motion.initial.begin());
   motion.commands = {{.name = "motor1",
                       .terms = {{{Coordinate::Kind::kDrive, 0, 0}, 1.0}},
-                      .profile = {{RampTerm{.rate = 1.0}}}}};
-  EXPECT_EQ(SlipFreely(m, motion).summary.where, "dry1");
-  m.elements[0].law = FrictionLaw{};
-  EXPECT_TRUE(SlipFreely(m, motion).summary.ok());
-  m.elements[1].law = FrictionLaw{.coefficient = 0.1};
-  EXPECT_NE(SlipFreely(m, motion).summary.message.find("by the joint's load"), std::string::npos);
-  m.elements[1].law = JumpingFriction(0.5, 0.6);
-  EXPECT_NE(SlipFreely(m, motion, 1e-3, Engine::kStock).summary.message.find("frictionloss"),
-            std::string::npos);
+                      .profile = {{SineTerm{0.05, 1.1, 0.0}}}}};
+  const ForwardRun reference = RunForwardReference(m, motion);
+  const SimulationRun run = SlipFreely(m, motion);
+  EXPECT_LT(Apart(run, reference, "motor2.position"), 1e-8);
+  EXPECT_LT(Apart(run, reference, "motor1.force"), 1e-6);
+  motion.commands[0].profile = {{ConstantTerm{0.0}}};
+  const SimulationRun held = SlipFreely(m, motion);
+  EXPECT_NEAR(held.trace.values(50, held.trace.Find("motor1.force.band")), 1.3, 1e-12);
+  EXPECT_EQ(held.trace.values(50, held.trace.Find("motor2.force.band")), 0.0);
+}
+
+TEST(SimulatedStickSlip, WhatMuJoCoByItselfLacksIsRefused) {
+  Mechanism m = StackedBlocks{{2.0}, {JumpingFriction(0.5, 0.6)}}.Make();
+  const Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.0);
+  const RunSummary jumps = SlipFreely(m, motion, 1e-3, Engine::kStock).summary;
+  EXPECT_EQ(jumps.where, "dry1");
+  EXPECT_NE(jumps.message.find("frictionloss"), std::string::npos);
+  m.elements[0].law = FrictionLaw{.coefficient = 0.1};
+  const RunSummary by_load = SlipFreely(m, motion, 1e-3, Engine::kStock).summary;
+  EXPECT_EQ(by_load.where, "dry1");
+  EXPECT_NE(by_load.message.find("no load of the joint"), std::string::npos);
 }
 
 }  // namespace
