@@ -118,6 +118,7 @@ class ScenarioRun {
   // The simulator's own modelling error: the same run by the other engines.
   void RunOtherEngines(const WitnessRunner& runner) {
     const SimulationSettings& settings = scenario().simulation;
+    if (scenario().motion.free()) RunStockFriction(runner);
     // Its error is stated in drive forces, which a free motion does not compare.
     if (scenario().motion.free() || !settings.forward || !settings.stock_too) return;
     for (const Engine engine : {Engine::kDefaults, Engine::kStock, Engine::kCorrected}) {
@@ -133,6 +134,16 @@ class ScenarioRun {
       run.trace = std::move(witness.run.trace);
       run.summary = std::move(witness.run.summary);
     }
+  }
+
+  // Dry friction as MuJoCo's frictionloss has it.
+  void RunStockFriction(const WitnessRunner& runner) {
+    const WitnessRecord* truth = runner.runs().Find(role::kReference);
+    if (FirstFriction(prepared_->mechanisms.simulated).empty() || truth == nullptr) return;
+    if (runner.judged_engine() != Engine::kCorrected || !truth->summary.ok()) return;
+    report_.engine_comparison =
+        CompareStockFriction(*prepared_, truth->trace, StageOf(options_.progress, "stock friction"),
+                             &report_.timing.stock_s);
   }
 
   void AddWarning(const std::string& text) {

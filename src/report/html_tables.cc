@@ -43,9 +43,30 @@ std::string DrivesHtml(const Report& report) {
   return html;
 }
 
+namespace {
+
+std::string FrictionHtml(const EngineComparison& engine) {
+  if (engine.friction.empty()) return "";
+  Table table{.caption = "Dry friction by MuJoCo's own frictionloss, against " + engine.truth,
+              .head = {Digits("step"), Text("misses farthest"), Digits("by"), Digits("limit")},
+              .rows = {}};
+  for (const FrictionError& e : engine.friction) {
+    const std::string unit = e.unit.empty() ? "" : " " + e.unit;
+    table.rows.push_back({Digits(fmt::format("{:g} ms", 1e3 * e.step_s)),
+                          Text(e.failure.empty() ? e.check : e.failure),
+                          Digits(NumberOrDash(e.value) + unit),
+                          Digits(NumberOrDash(e.limit) + unit)});
+  }
+  return ToHtml(table) + Note(Escape(Sentence(engine.FrictionText())));
+}
+
+}  // namespace
+
 std::string EngineHtml(const Report& report) {
   if (!report.engine_comparison) return "";
   const EngineComparison& engine = *report.engine_comparison;
+  const std::string friction = FrictionHtml(engine);
+  if (engine.engines.empty()) return friction;
   Table table{.caption = "The same run by each engine, against " + engine.truth,
               .head = {Text("engine"), Digits("force error, RMS"),
                        Digits(fmt::format("from {:g} s", engine.later_s)),
@@ -59,7 +80,7 @@ std::string EngineHtml(const Report& report) {
         {Text(name), Digits(NumberOrDash(e.force_nrmse)), Digits(NumberOrDash(e.force_nrmse_later)),
          Digits(NumberOrDash(e.force_max_rel)), Digits(NumberOrDash(e.closure_max_m) + " m")});
   }
-  return ToHtml(table) + failures +
+  return friction + ToHtml(table) + failures +
          Note(
              "What MuJoCo as it is is off by is its own modelling error, not the equations'. Most "
              "of it are the first moments, in which its soft constraints take up the load.");

@@ -200,6 +200,15 @@ Json EngineJson(const EngineComparison& engine) {
                       {"closure_max_m", Number(e.closure_max_m)}};
     if (!e.failure.empty()) json[e.engine]["failure"] = e.failure;
   }
+  if (engine.friction.empty()) return json;
+  json["coulomb_alone"] = engine.coulomb_alone;
+  json["friction_text"] = engine.FrictionText();
+  for (const FrictionError& e : engine.friction) {
+    Json& row = json["friction"].emplace_back();
+    row = {{"step_s", Number(e.step_s)}, {"check", e.check},         {"unit", e.unit},
+           {"value", Number(e.value)},   {"limit", Number(e.limit)}, {"within", e.within()}};
+    if (!e.failure.empty()) row["failure"] = e.failure;
+  }
   return json;
 }
 

@@ -60,6 +60,30 @@ std::string AtRestText(const Comparison& comparison) {
       pair->samples_at_rest, pair->force_samples);
 }
 
+std::string EngineComparison::FrictionText() const {
+  if (friction.empty()) return "";
+  const FrictionError& first = friction.front();
+  if (!first.failure.empty()) return "MuJoCo's own frictionloss: no result: " + first.failure;
+  const auto of = [](const FrictionError& e) {
+    const std::string unit = e.unit.empty() ? "" : " " + e.unit;
+    return fmt::format("{:.2g}{} in {} with a step of {:g} ms", e.value, unit, e.check,
+                       1e3 * e.step_s);
+  };
+  std::string text =
+      fmt::format("MuJoCo's own frictionloss{} is off by {}",
+                  coulomb_alone ? " (of coulomb alone: it has no breakaway)" : "", of(first));
+  text += fmt::format(" (limit {:.1g})", first.limit);
+  if (first.within()) return text;
+  for (const FrictionError& e : friction) {
+    if (e.within()) return text + fmt::format("; {:g} ms brings it below", 1e3 * e.step_s);
+  }
+  const FrictionError& last = friction.back();
+  if (friction.size() == 1) return text + "; no smaller step was tried";
+  if (!last.failure.empty())
+    return text + "; no smaller step that was tried helps: " + last.failure;
+  return text + "; no step that was tried brings it below: still " + of(last);
+}
+
 const char* EngineComparison::NameOf(const std::string& engine) {
   if (engine == "defaults") return "MuJoCo, default softness, position targets";
   if (engine == "stock") return "MuJoCo, best recipe from outside";

@@ -36,13 +36,27 @@ struct EngineError {
   double force_nrmse_later = kNan;  ///< without the first EngineComparison::later_s
   std::string failure = {};         ///< why it gave nothing; "" if it ran
 };
+/// How far a free motion with dry friction is off where MuJoCo's own frictionloss does all of it.
+struct FrictionError {
+  double step_s = kNan;
+  std::string check, unit;            ///< of the motion: what it misses farthest, as a share of …
+  double value = kNan, limit = kNan;  ///< … its limit
+  std::string failure = {};           ///< why it gave nothing; "" if it ran
+
+  [[nodiscard]] bool within() const { return failure.empty() && value <= limit; }
+};
+
 /// The simulator's own modelling error: MuJoCo as it is, by default and by the best recipe from
 /// outside, and with the corrections, judged against another witness.
 struct EngineComparison {
   std::string truth;     ///< witness by which all are judged
   double later_s = 0.1;  ///< when soft constraints have taken up the load
   std::vector<EngineError> engines;
+  std::vector<FrictionError> friction = {};  ///< from the scenario's step to smaller ones
+  bool coulomb_alone = false;                ///< there: breakaway and Stribeck's curve left out
 
+  /// Of `friction`: the error at the scenario's step, and which step tried is within the limit.
+  [[nodiscard]] std::string FrictionText() const;
   /// What an engine is called for people.
   [[nodiscard]] static const char* NameOf(const std::string& engine);
 };

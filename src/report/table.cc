@@ -91,6 +91,11 @@ class VerdictTableWriter {
   void Engine(const Report& report) {
     if (!report.engine_comparison) return;
     const EngineComparison& engine = *report.engine_comparison;
+    if (!engine.friction.empty()) {
+      out_.Line();
+      out_.Line("  " + engine.FrictionText());
+    }
+    if (engine.engines.empty()) return;
     const TextTable table("  ", {{"the simulator's own error (against " + engine.truth + ")", -44},
                                  {"force, RMS", 12},
                                  {fmt::format("from {:g} s", engine.later_s), 12},

@@ -1,6 +1,8 @@
 // Force-driven and servo simulations, and the engines beside each other, through all stages.
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "pipeline/run_scenario.h"
 #include "tests/source_dir.h"
 
@@ -150,6 +152,41 @@ TEST(StiffSpring, TheStepThatIsNeededIsSaidBeforeTheMotionIsOff) {
       << refused.report->comparison.reason;
   set.back().second = "80";
   EXPECT_EQ(RunOf("spring_cart/swing", set).report->findings.Text().find("step_s"),
+            std::string::npos);
+}
+
+// A block on a belt: by itself MuJoCo creeps where it sticks, whatever the step.
+TEST(EngineErrors, AFreeMotionTellsWhatMuJoCosOwnFrictionlossIsOff) {
+  const std::vector<std::pair<std::string, std::string>> plain = {
+      {"parameters.F_s", "0.5"}, {"snapshots.times_s", "[]"}, {"motion.duration_s", "6"}};
+  const RunOutcome outcome = RunOf("belt_block/stick_slip", plain);
+  ASSERT_TRUE(outcome.report && outcome.report->engine_comparison) << outcome.diagnostics.Text();
+  const EngineComparison& stock = *outcome.report->engine_comparison;
+  EXPECT_FALSE(stock.coulomb_alone);
+  ASSERT_EQ(stock.friction.size(), 4U);
+  for (size_t i = 0; i < 4; ++i) {
+    EXPECT_EQ(stock.friction[i].step_s, 1e-3 / std::pow(2.0, i));
+    EXPECT_EQ(stock.friction[i].check, "output position");
+    EXPECT_GT(stock.friction[i].value, 1e-3);
+    EXPECT_LT(stock.friction[i].value, 1e-2);
+    EXPECT_FALSE(stock.friction[i].within());
+  }
+  const std::string text = stock.FrictionText();
+  EXPECT_NE(text.find("no step that was tried brings it below"), std::string::npos) << text;
+  // A wide limit is met at once, and no smaller step is tried; breakaway is left out and told.
+  const RunOutcome wide = RunOf("belt_block/stick_slip", {{"motion.duration_s", "4"},
+                                                          {"snapshots.times_s", "[]"},
+                                                          {"checks.position_m", "0.5"},
+                                                          {"checks.pose_m", "0.5"}});
+  ASSERT_TRUE(wide.report && wide.report->engine_comparison) << wide.diagnostics.Text();
+  EXPECT_TRUE(wide.report->engine_comparison->coulomb_alone);
+  ASSERT_EQ(wide.report->engine_comparison->friction.size(), 1U);
+  EXPECT_TRUE(wide.report->engine_comparison->friction[0].within());
+  EXPECT_EQ(wide.report->engine_comparison->FrictionText().find("no step"), std::string::npos);
+  // What it does not know at all is said.
+  const RunOutcome loads = RunOf("journal_crank/falls", {{"motion.duration_s", "0.1"}});
+  ASSERT_TRUE(loads.report && loads.report->engine_comparison) << loads.diagnostics.Text();
+  EXPECT_NE(loads.report->engine_comparison->FrictionText().find("no load of the joint"),
             std::string::npos);
 }
 
