@@ -20,8 +20,12 @@ RunSummary GyroUnsupported(const ForceElement& element, const std::string& descr
 }
 
 // Why friction cannot be simulated where some drive is not guided, or "".
-std::string FrictionTrouble(const ForceElement& element, bool own_events) {
+std::string FrictionTrouble(const ForceElement& element, DriveMode drives, bool own_events) {
   const auto& law = std::get<FrictionLaw>(element.law);
+  if (drives == DriveMode::kPushed) {
+    return "in open loop the drive forces jump where it turns round on the commanded motion, and "
+           "the motion does so a little earlier or later: servos follow (mode: servo)";
+  }
   if (own_events) return "";
   if (law.per_load() > 0.0) return "MuJoCo's frictionloss knows no load of the joint";
   if (law.breakaway == law.coulomb) return "";
@@ -169,12 +173,13 @@ ElementSlope SlopeOf(const ForceElement& element, double position) {
   return {slope, 0.0};
 }
 
-RunSummary CheckElements(const EngineModel& engine, const Motion& motion, bool own_events) {
+RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveMode drives,
+                         bool own_events) {
   const bool released = motion.free() || IsReleased(engine);
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
     if (released && Rubs(element)) {
-      const std::string why = FrictionTrouble(element, own_events);
+      const std::string why = FrictionTrouble(element, drives, own_events);
       if (!why.empty()) return FrictionUnsupported(engine, e, why);
     }
     if (released && IsGyroscopic(element) && (!own_events || element.drive >= 0)) {

@@ -15,6 +15,7 @@
 
 #include "simulation/bushings.h"
 #include "simulation/constraint_system.h"
+#include "simulation/simulation.h"
 
 namespace mbv::simulation {
 
@@ -74,9 +75,10 @@ struct ElementSlope {
 [[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position);
 
 /// kUnsupported for a rotor on a distance drive that is not guided, and where some drive is not and
-/// MuJoCo steps by itself for rotors with a carrier and for friction other than Coulomb's.
+/// MuJoCo steps by itself for rotors with a carrier and for friction other than Coulomb's; for all
+/// friction where drives are pushed in open loop.
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion,
-                                       bool own_events);
+                                       DriveMode drives, bool own_events);
 /// Finds the elements that are led, at the model's reference pose.
 void FindLed(EngineModel* engine);
 

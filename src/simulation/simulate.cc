@@ -245,7 +245,8 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   }
   if (options.drives == DriveMode::kServo) FindServos(&engine);
   const bool own_events = options.engine == Engine::kCorrected;
-  if (RunSummary summary = CheckElements(engine, motion, own_events); !summary.ok()) {
+  if (RunSummary summary = CheckElements(engine, motion, options.drives, own_events);
+      !summary.ok()) {
     return summary;
   }
   if (motion.free() || IsReleased(engine)) {

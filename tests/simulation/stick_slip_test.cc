@@ -219,6 +219,24 @@ TEST(SimulatedStickSlip, FrictionOnACommandedCoordinateIsItsDrives) {
   EXPECT_EQ(held.trace.values(50, held.trace.Find("motor2.force.band")), 0.0);
 }
 
+TEST(SimulatedStickSlip, PushedInOpenLoopIsRefused) {
+  const Mechanism m = StackedBlocks{{2.0}, {CoulombFriction(0.5)}}.Make();
+  const Motion motion{.duration_s = 1.0, .sample_s = 0.1, .commands = {}, .loads = {}};
+  SimulationOptions options{.drives = DriveMode::kPushed};
+  options.forces = [](double, VecX* force) {
+    *force = VecX::Ones(1);
+    return RunSummary::Done();
+  };
+  const auto still = [](double, DrivenSample* at) {
+    at->position = at->velocity = at->acceleration = VecX::Zero(1);
+    return RunSummary::Done();
+  };
+  const RunSummary summary = Simulate(m, motion, still, options).summary;
+  EXPECT_EQ(summary.stop, Stop::kUnsupported);
+  EXPECT_EQ(summary.where, "dry1");
+  EXPECT_NE(summary.message.find("in open loop"), std::string::npos) << summary.message;
+}
+
 TEST(SimulatedStickSlip, WhatMuJoCoByItselfLacksIsRefused) {
   Mechanism m = StackedBlocks{{2.0}, {JumpingFriction(0.5, 0.6)}}.Make();
   const Motion motion = StackedBlocks::From(m, 0.0, 0.0, 1.0);
