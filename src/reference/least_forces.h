@@ -1,7 +1,7 @@
 // Which of many possible sets of forces is reported. Internal to reference/.
 #pragma once
 
-#include "core/sparse_least_norm.h"
+#include "core/sparse_saddle.h"
 #include "core/types.h"
 
 namespace mbv::internal {

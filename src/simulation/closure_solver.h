@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/run_summary.h"
-#include "core/sparse_least_norm.h"
 #include "core/sparse_lu.h"
+#include "core/sparse_saddle.h"
 #include "mechanism/motion.h"
 #include "simulation/constraint_system.h"
 

@@ -4,9 +4,9 @@
 #include <Eigen/Dense>
 #include <random>
 
-#include "core/sparse_least_norm.h"
 #include "core/sparse_lu.h"
 #include "core/sparse_rank.h"
+#include "core/sparse_saddle.h"
 
 namespace mbv {
 namespace {
