@@ -38,6 +38,7 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       lever_(LongestLever(mechanism)),
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
       freedoms_(static_cast<int>(motion.initial.size())),
+      near_(mechanism, length_),
       loaded_(LoadedElements(mechanism)) {
   body_scale_.setOnes(size_);
   for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
@@ -49,7 +50,7 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
   }
 }
 
-void FreeDynamics::Factor(double t_s, const BodyStates& states) {
+void FreeDynamics::FillRows(double t_s, const BodyStates& states) {
   EvaluateMotion(motion_, t_s, &command_);
   rows_.Clear();
   for (const Joint& joint : mechanism_.joints) {
@@ -62,6 +63,10 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
     rows_.Add(mechanism_, motion_.commands[k], states, &near_values_[k]);
     rows_.value.back() -= command_.position[static_cast<Eigen::Index>(k)];
   }
+}
+
+void FreeDynamics::Factor(double t_s, const BodyStates& states) {
+  FillRows(t_s, states);
   MatX columns = MatX::Zero(size_, rows_.size());
   row_scale_.resize(rows_.size());
   for (int i = 0; i < rows_.size(); ++i) {
@@ -204,6 +209,33 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   return RunSummary::Done();
 }
 
+// The rows that the last factorisation picked.
+void FreeDynamics::ChooseNear() {
+  if (near_.chosen() || !near_.apply()) return;
+  const Eigen::Index rank = size_ - freedoms_;
+  if (rank > 0 && (rows_.size() == 0 || rank > qr_.cols())) return;
+  std::vector<int> rows;
+  for (Eigen::Index k = 0; k < rank; ++k) rows.push_back(qr_.colsPermutation().indices()[k]);
+  std::ranges::sort(rows);
+  near_.Choose(std::move(rows));
+}
+
+RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
+  if (!near_.chosen() || !phase_.held.empty() || !loaded_.empty()) return Accelerate(t_s, states);
+  FollowCouplings(mechanism_, states);
+  FollowElements(mechanism_, states);
+  FillRows(t_s, *states);
+  VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
+  rates.tail(command_.acceleration.size()) += command_.acceleration;
+  Unstack(VecX::Zero(size_), &states->A_WB);
+  VecX A;
+  if (!near_.Solve(*states, rows_, -NeededWrenches(t_s, *states), rates, &A)) {
+    return Accelerate(t_s, states);
+  }
+  Unstack(A, &states->A_WB);
+  return RunSummary::Done();
+}
+
 VecX FreeDynamics::MotionBy(const VecX& f) {
   if (phase_.held.empty()) return rest_.H.ldlt().solve(f);
   RestSystem by = rest_;
@@ -279,6 +311,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
       V -= MotionOfHeld(held.gradients, held.gradients * V);
       Unstack(V, &states->V_WB);
       FollowDriven(mechanism_, states);
+      ChooseNear();
       return RunSummary::Done();
     }
     previous = open;

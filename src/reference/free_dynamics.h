@@ -31,6 +31,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/load_friction.h"
+#include "reference/motion_equations.h"
 #include "reference/reference.h"
 #include "reference/rest_decision.h"
 #include "reference/row_set.h"
@@ -54,6 +55,10 @@ class FreeDynamics {
   /// one of them has no inertia, or where friction by loads is not determined; kUnsupported where
   /// redundant constraints share such a load.
   [[nodiscard]] RunSummary Accelerate(double t_s, BodyStates* states);
+  /// The same within a step from the poses projected last, by the rows that were independent there
+  /// (motion_equations.h); by Accelerate() where these do not serve, and with friction that rests
+  /// or follows loads.
+  [[nodiscard]] RunSummary AccelerateNear(double t_s, BodyStates* states);
 
   /// In which phase friction is from now on; all others but Factor() depend on it.
   void SetPhase(FrictionPhase phase) { phase_ = std::move(phase); }
@@ -153,6 +158,8 @@ class FreeDynamics {
   [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;
   void AddDriveForces(double t_s, const BodyStates& states, std::vector<Vec6>* wrench_W) const;
   [[nodiscard]] RunSummary CheckFreedoms(double t_s) const;
+  void FillRows(double t_s, const BodyStates& states);
+  void ChooseNear();
   [[nodiscard]] RunSummary Singular(double t_s, const BodyStates& states) const;
 
   const Mechanism& mechanism_;
@@ -169,6 +176,7 @@ class FreeDynamics {
   double pivot_ = kNan;
   FrictionPhase phase_;
   RestSystem rest_;
+  MotionEquations near_;
   const std::vector<size_t> loaded_;  ///< elements with friction by load
   VecX load_friction_;                ///< per element, at the last Accelerate()
 };

@@ -133,7 +133,7 @@ void FreeMotion::Rates(const State& x, State* rates, double t_s) {
   work_states_.coupled = now_.states.coupled;
   work_states_.turns = now_.states.turns;
   Unpack(x, &work_states_, nullptr);
-  trouble_ = dynamics_.Accelerate(t_s, &work_states_);
+  trouble_ = Accelerate(t_s, &work_states_);
   if (!trouble_.ok()) return;
   double* out = rates->data();
   const double* in = x.data();
@@ -261,7 +261,13 @@ RunSummary FreeMotion::AdvanceTo(double t_s) {
   if (RunSummary summary = Segment(t_s); !summary.ok()) return summary;
   on_bridge_ = now_.time_s > t_s + 1e-14 * std::max(duration_s_, t_s);
   if (on_bridge_) return SampleBridge(t_s);
-  return dynamics_.Accelerate(now_.time_s, &now_.states);
+  return Accelerate(now_.time_s, &now_.states);
+}
+
+// Close to a singular pose, by rows chosen for every state.
+RunSummary FreeMotion::Accelerate(double t_s, BodyStates* states) {
+  return now_.pivot > kApproach * largest_pivot_ ? dynamics_.AccelerateNear(t_s, states)
+                                                 : dynamics_.Accelerate(t_s, states);
 }
 
 // Near the singular pose the accelerations are the polynomial's, too.

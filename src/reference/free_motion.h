@@ -76,6 +76,7 @@ class FreeMotion {
   // characteristic lengths L, work is in M L²/s² with the mass M of all bodies.
   [[nodiscard]] State Pack(const Node& node) const;
   void Unpack(const State& x, BodyStates* states, VecX* work) const;
+  [[nodiscard]] RunSummary Accelerate(double t_s, BodyStates* states);
   void Rates(const State& x, State* rates, double t_s);
   [[nodiscard]] RunSummary Segment(double to_s);
   [[nodiscard]] RunSummary Accept(const State& x, double t_s);
