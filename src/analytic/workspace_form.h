@@ -22,6 +22,17 @@ namespace mbv {
 /// empty where the mechanism has no ranges.
 using RangeFilter = std::function<bool(const std::vector<Pose>& X_WB)>;
 
+/// What a workspace is computed with.
+struct WorkspaceRequest {
+  RangeFilter within_ranges = {};
+  int jobs = 1;  ///< processes at once (ShareOut() of core/in_children.h): nothing depends on it
+  std::function<void(double fraction)> progress = {};
+
+  void Tell(double fraction) const {
+    if (progress) progress(fraction);
+  }
+};
+
 struct WorkspaceFile {
   std::string name;  ///< with its ending: .svg for figures
   std::variant<std::string, LinePlot, MapPlot> content;
@@ -45,7 +56,14 @@ struct WorkspaceForm {
   std::string mesh_caption;  ///< "spr_tripod / workspace of the platform centre"
 };
 
-using WorkspaceFunction = WorkspaceForm (*)(const Mechanism&, const RangeFilter& within_ranges);
+/// The outcome where a process that shared the work was killed.
+[[nodiscard]] inline WorkspaceForm LostWork() {
+  WorkspaceForm form;
+  form.summary.message = "a process that shared the work was killed";
+  return form;
+}
+
+using WorkspaceFunction = WorkspaceForm (*)(const Mechanism&, const WorkspaceRequest&);
 
 struct WorkspaceFormRow {
   std::string mechanism;  ///< Mechanism::name

@@ -8,6 +8,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/in_children.h"
 #include "core/output_folder.h"
 #include "pipeline/converge.h"
 #include "report/convergence_report.h"
@@ -20,6 +21,7 @@ struct ConvergeArguments {
   std::string scenario, out = "out";
   std::vector<double> steps_s = ConvergeOptions{}.steps_s;
   std::vector<std::string> set;
+  int jobs = 1;
   JsonOption json;
 };
 
@@ -37,6 +39,7 @@ std::string WriteFolder(const std::string& out, const ConvergenceReport& report)
 int RunConverge(const ConvergeArguments& arguments) {
   ConvergeOptions options;
   options.steps_s = arguments.steps_s;
+  options.jobs = arguments.jobs;
   if (!ReadAssignments(arguments.set, "--set", "parameters.link_mass=0.5", &options.scenario.set))
     return 2;
   ProgressLine progress(true);
@@ -65,6 +68,7 @@ int RunConverge(const ConvergeArguments& arguments) {
 
 void AddConvergeCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<ConvergeArguments>();
+  arguments->jobs = AllCores();
   CLI::App* converge = app->add_subcommand(
       "converge", "Refine step and constraint time constant: is the order that of the scheme?");
   converge->add_option("scenario", arguments->scenario, "scenario file with a motion")->required();
@@ -74,6 +78,9 @@ void AddConvergeCommand(CLI::App* app, int* exit_code) {
       ->delimiter(',')
       ->capture_default_str();
   converge->add_option("--set", arguments->set, "replace a value of the scenario: KEY=VALUE");
+  converge->add_option("--jobs", arguments->jobs, "processes at once")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
   converge->add_option("--out", arguments->out, "folder for results")->capture_default_str();
   arguments->json.AddTo(converge);
   SetFooter(converge,

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <limits>
@@ -33,7 +34,7 @@ struct MutateArguments {
   double resolution_percent = 10.0;
   std::vector<std::string> numbers;
   bool markdown = false, no_search = false, no_faults = false;
-  std::string mode = "both", part;
+  std::string mode = "both", part, progress;
   JsonOption json;
   int jobs = 1;
 };
@@ -75,9 +76,9 @@ std::optional<MutationOptions> OptionsOf(const MutateArguments& arguments) {
   return options;
 }
 
-// What a worker is started with: these arguments, for one part.
+// What a worker is started with: these arguments, for one part; it writes how far it is.
 std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
-                                   const std::string& json) {
+                                   const std::string& json, const std::string& progress) {
   std::vector<std::string> argv = {"/proc/self/exe",
                                    "mutate",
                                    arguments.scenario,
@@ -90,7 +91,9 @@ std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
                                    "--mode",
                                    arguments.mode,
                                    "--json",
-                                   json};
+                                   json,
+                                   "--progress",
+                                   progress};
   for (const std::string& number : arguments.numbers) {
     argv.insert(argv.end(), {"--parameter", number});
   }
@@ -113,13 +116,15 @@ class Workers {
     }
     std::vector<WorkerJob> jobs;
     for (size_t k = 0; k < parts_.size(); ++k) {
-      jobs.push_back(
-          {CommandOf(arguments_, static_cast<int>(k), Place(k, "json").string()), Place(k, "log")});
+      jobs.push_back({CommandOf(arguments_, static_cast<int>(k), Place(k, "json").string(),
+                                Place(k, "done").string()),
+                      Place(k, "log")});
     }
     WorkerPool pool;
     pool.parallel = arguments_.jobs;
     pool.timeout_s = std::numeric_limits<double>::infinity();
     pool.ended = [this](size_t part, const WorkerEnd& end) { Take(part, end); };
+    if (progress_.active()) pool.tick = [this] { ShowProgress(); };
     (void)pool.Run(jobs);
     progress_.Clear();
     return failure_ == 0 ? MergeParts(std::move(parts_)) : Failed(failure_);
@@ -136,9 +141,20 @@ class Workers {
     return report;
   }
 
+  // The mean of what the workers wrote: they have as many numbers each.
+  void ShowProgress() {
+    double done = 0.0;
+    for (size_t k = 0; k < parts_.size(); ++k) {
+      const std::string text = ReadWholeFile(Place(k, "done")).value_or("");
+      double fraction = 0.0;
+      std::from_chars(text.data(), text.data() + text.size(), fraction);
+      done += std::clamp(fraction, 0.0, 1.0);
+    }
+    farthest_ = std::max(farthest_, done / static_cast<double>(parts_.size()));
+    progress_.Show(fmt::format("{} workers", arguments_.jobs), farthest_);
+  }
+
   void Take(size_t part, const WorkerEnd& end) {
-    progress_.Show(fmt::format("{} workers", arguments_.jobs),
-                   static_cast<double>(++done_) / static_cast<double>(parts_.size()));
     auto report = MutationReportOf(ReadWholeFile(Place(part, "json")).value_or(""));
     const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
     if (good) parts_[part] = *std::move(report);
@@ -155,7 +171,7 @@ class Workers {
   const ScratchFolder folder_{"mutate"};
   ProgressLine progress_{true};
   std::vector<MutationReport> parts_;
-  size_t done_ = 0;
+  double farthest_ = 0.0;
   int failure_ = 0;
   bool told_ = false;
 };
@@ -165,6 +181,15 @@ MutationReport RunHere(const MutateArguments& arguments, MutationOptions options
   if (progress.active()) {
     options.progress = [&](const std::string& number, double fraction) {
       progress.Show(number, fraction);
+    };
+  } else if (!arguments.progress.empty()) {
+    options.progress = [&, told = std::chrono::steady_clock::time_point()](
+                           const std::string&, double fraction) mutable {
+      constexpr std::chrono::milliseconds kBetween(500);
+      const auto now = std::chrono::steady_clock::now();
+      if (now < told + kBetween) return;
+      told = now;
+      (void)WriteFile(arguments.progress, fmt::format("{:.6f}", fraction), false);
     };
   }
   return MutateScenario(arguments.scenario, options);
@@ -232,6 +257,7 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
   mutate->add_option("--part", arguments->part, "i/n: a worker's share")->group("");
+  mutate->add_option("--progress", arguments->progress, "file for a worker's progress")->group("");
   mutate->add_flag("--markdown", arguments->markdown, "print Markdown tables");
   arguments->json.AddTo(mutate);
   SetFooter(

@@ -8,6 +8,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/in_children.h"
 #include "core/output_folder.h"
 #include "pipeline/stiffness.h"
 #include "pipeline/stiffness_map.h"
@@ -20,7 +21,7 @@ struct StiffnessArguments {
   std::string model, output, out, format = "text", seed, closed_form;
   std::vector<std::string> at, set, indices;
   std::vector<std::vector<std::string>> maps;
-  int loads = 0;
+  int loads = 0, jobs = 1;
   double force_max = 1000.0, moment_max = 1.0;
   bool no_simulation = false, verbose = false;
   JsonOption json;
@@ -145,7 +146,7 @@ MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness&
   for (const std::string& text : texts) {
     const auto map = ParseMap(text, prepared, diagnostics);
     if (!map) continue;
-    const MapResult result = ComputeMap(prepared, *map, progress);
+    const MapResult result = ComputeMap(prepared, *map, progress, arguments.jobs);
     folder.text += MapText(*map, result, arguments.indices);
     for (auto& file : MapFiles(*map, result, prepared.base.name, arguments.indices, diagnostics)) {
       folder.files.push_back(std::move(file));
@@ -199,6 +200,7 @@ int Stiffness(const StiffnessArguments& arguments) {
 
 void AddStiffnessCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<StiffnessArguments>();
+  arguments->jobs = AllCores();
   CLI::App* stiffness = app->add_subcommand(
       "stiffness", "Stiffness at a pose by three computations, weak directions, maps");
   stiffness
@@ -227,6 +229,9 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
       "(repeatable)");
   stiffness->add_option("--index", arguments->indices, "index to draw on maps (repeatable)")
       ->allow_extra_args(false);
+  stiffness->add_option("--jobs", arguments->jobs, "processes at once for maps")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
   stiffness->add_option("--out", arguments->out, "folder for results (maps: default out)");
   stiffness->add_option("--format", arguments->format, "of what is printed")
       ->check(OneOf({"text", "json"}))

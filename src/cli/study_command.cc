@@ -27,13 +27,6 @@ struct StudyArguments {
   JsonOption json;
 };
 
-// "12 s", "3 min", "2.5 h".
-std::string TimeText(double seconds) {
-  if (seconds < 100.0) return fmt::format("{:.0f} s", seconds);
-  if (seconds < 6000.0) return fmt::format("{:.0f} min", seconds / 60.0);
-  return fmt::format("{:.1f} h", seconds / 3600.0);
-}
-
 // How far a study is and how long the rest takes: one line that rewrites itself, or a line now and
 // then where there is no such terminal.
 class StudyProgress {
@@ -47,12 +40,11 @@ class StudyProgress {
     const double left = done > first_ ? elapsed / static_cast<double>(done - first_) *
                                             static_cast<double>(all - done)
                                       : 0.0;
-    const std::string text = fmt::format("{}: {} of {} points, {} left", name_, done, all,
-                                         done > first_ ? TimeText(left) : "?");
+    const std::string text = fmt::format("{}: {} of {} points", name_, done, all);
     if (line_.active()) {
       line_.Show(text, static_cast<double>(done) / static_cast<double>(all));
     } else if (Since(told_) > kBetween_s) {
-      Say(stderr, "{}\n", text);
+      Say(stderr, "{}, {} left\n", text, done > first_ ? TimeText(left) : "?");
       told_ = StudyClock::now();
     }
   }

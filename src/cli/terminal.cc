@@ -4,6 +4,7 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -50,6 +51,25 @@ void FindingPrinter::Print(const Diagnostics& diagnostics) {
   }
 }
 
+std::string TimeText(double seconds) {
+  if (seconds < 100.0) return fmt::format("{:.0f} s", seconds);
+  if (seconds < 6000.0) return fmt::format("{:.0f} min", seconds / 60.0);
+  return fmt::format("{:.1f} h", seconds / 3600.0);
+}
+
+std::string TimeLeft::Text(double fraction, double now_s) {
+  constexpr double kTooEarly_s = 2.0, kTooLate_s = 1.0;
+  if (first_ < 0.0 || fraction < last_) {
+    first_ = fraction;
+    start_s_ = now_s;
+  }
+  last_ = fraction;
+  const double elapsed_s = now_s - start_s_;
+  if (elapsed_s < kTooEarly_s || fraction <= first_) return "";
+  const double left_s = elapsed_s * (1.0 - fraction) / (fraction - first_);
+  return left_s < kTooLate_s ? "" : "about " + TimeText(left_s) + " left";
+}
+
 ProgressLine::ProgressLine(bool wanted) : active_(wanted && ObeysEscapes(stderr)) {}
 
 void ProgressLine::Show(const std::string& what, double fraction) {
@@ -57,11 +77,16 @@ void ProgressLine::Show(const std::string& what, double fraction) {
   if (!active_ || (percent == last_percent_ && what == last_what_)) return;
   last_percent_ = percent;
   last_what_ = what;
+  const double now_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count();
+  std::string done = fmt::format(" {} %", percent);
+  if (const std::string left = left_.Text(fraction, now_s); !left.empty()) done += ", " + left;
   // A line that the terminal breaks cannot be taken back: its beginning is left out.
-  const size_t columns = TerminalColumns(stderr), room = columns > 8 ? columns - 8 : what.size();
+  const size_t columns = TerminalColumns(stderr), taken = done.size() + 2;
+  const size_t room = columns > taken ? columns - taken : what.size();
   std::string shown = what;
   while (PrintedWidth(shown) > room) shown.erase(0, 1);
-  std::fprintf(stderr, "\r\x1b[K%s %d %%", shown.c_str(), percent);
+  std::fprintf(stderr, "\r\x1b[K%s%s", shown.c_str(), done.c_str());
   std::fflush(stderr);
   shown_ = true;
 }

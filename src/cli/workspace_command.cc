@@ -7,6 +7,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/in_children.h"
 #include "core/json_text.h"
 #include "core/output_folder.h"
 #include "core/text.h"
@@ -21,6 +22,7 @@ struct WorkspaceArguments {
   std::string model, out = "out";
   std::vector<std::string> set;
   bool no_pictures = false;
+  int jobs = 1;
   JsonOption json;
 };
 
@@ -46,7 +48,14 @@ int Workspace(const WorkspaceArguments& arguments) {
   const LoadResult loaded = LoadModel(*file, options);
   SayText(stderr, loaded.diagnostics.Text());
   if (!loaded.mechanism) return 2;
-  const WorkspaceOutcome outcome = ComputeWorkspace(*loaded.mechanism, !arguments.no_pictures);
+  ProgressLine line(true);
+  ProgressFunction progress;
+  if (line.active()) {
+    progress = [&](const std::string& what, double fraction) { line.Show(what, fraction); };
+  }
+  const WorkspaceOutcome outcome =
+      ComputeWorkspace(*loaded.mechanism, !arguments.no_pictures, arguments.jobs, progress);
+  line.Clear();
   SayText(stderr, outcome.diagnostics.Text());
   if (outcome.diagnostics.has_errors()) return 2;
   SayText(arguments.json.text(), outcome.text);
@@ -69,6 +78,7 @@ int Workspace(const WorkspaceArguments& arguments) {
 
 void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   auto arguments = std::make_shared<WorkspaceArguments>();
+  arguments->jobs = AllCores();
   CLI::App* workspace =
       app->add_subcommand("workspace", "Reachable workspace: measures, meshes, sections, pictures");
   workspace
@@ -78,6 +88,9 @@ void AddWorkspaceCommand(CLI::App* app, int* exit_code) {
   workspace->add_option("--set", arguments->set, "PARAMETER=VALUE of the model (repeatable)")
       ->allow_extra_args(false);
   workspace->add_option("--out", arguments->out, "result folder")->capture_default_str();
+  workspace->add_option("--jobs", arguments->jobs, "processes at once")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
   arguments->json.AddTo(workspace);
   workspace->add_flag("--no-pictures", arguments->no_pictures, "data files only");
   SetFooter(workspace, {"workspace spr_tripod --set q_min=0.45 --set q_max=0.65"},

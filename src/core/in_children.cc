@@ -142,6 +142,20 @@ void StreamFromChildren(
   }
 }
 
+void ShareOut(size_t count, int jobs, const Work& work,
+              const std::function<void(size_t, const std::optional<std::string>&)>& take) {
+  constexpr double kNever_s = 1e6;
+  if (jobs <= 1) {
+    for (size_t i = 0; i < count; ++i) take(i, work(i));
+    return;
+  }
+  StreamFromChildren(count, {.parallel = jobs, .timeout_s = kNever_s}, work,
+                     [&](size_t i, const std::optional<std::string>& text) {
+                       take(i, text);
+                       return true;
+                     });
+}
+
 std::vector<std::optional<std::string>> InChildren(size_t count, double timeout_s,
                                                    const Work& work) {
   std::vector<std::optional<std::string>> texts;

@@ -26,6 +26,11 @@ void StreamFromChildren(size_t count, const ChildStreams& streams,
                         const std::function<std::string(size_t)>& work,
                         const std::function<bool(size_t, const std::optional<std::string>&)>& take);
 
+/// As StreamFromChildren(), however long a text takes; where one job at once is wanted, work() is
+/// called here. What work() gives must not depend on earlier calls: then nothing depends on `jobs`.
+void ShareOut(size_t count, int jobs, const std::function<std::string(size_t)>& work,
+              const std::function<void(size_t, const std::optional<std::string>&)>& take);
+
 /// Calls work(0) … work(count − 1) in a child process and gives their texts back; empty where the
 /// child died or took longer than `timeout_s`: another child goes on with the next.
 [[nodiscard]] std::vector<std::optional<std::string>> InChildren(

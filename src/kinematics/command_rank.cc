@@ -21,9 +21,11 @@ BodyStates HomeStates(const Mechanism& mechanism) {
   return states;
 }
 
-RowStack JointRows(const Mechanism& mechanism, const BodyStates& states) {
+// Of the joints, and of what needs no command.
+RowStack HeldRows(const Mechanism& mechanism, const BodyStates& states) {
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
+  stack.AddIdle(mechanism, states);
   return stack;
 }
 
@@ -62,8 +64,8 @@ std::vector<std::string> MovingJoints(const Mechanism& mechanism, const BodyStat
 
 CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>& commands) {
   const BodyStates home = HomeStates(mechanism);
-  RowStack rows = JointRows(mechanism, home);
-  const auto joint_rows = rows.size();
+  RowStack rows = HeldRows(mechanism, home);
+  const auto held_rows = rows.size();
   const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
   CommandRank out;
   out.freedoms = columns - RankOf(rows.Matrix());
@@ -79,7 +81,7 @@ CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>&
   if (out.redundant <= 0) return out;
   const MatX stress = FindRank(J, NullSpaces::kSelfStress).self_stress;
   for (size_t k = 0; k < commands.size(); ++k) {
-    const auto row = static_cast<Eigen::Index>(joint_rows) + static_cast<Eigen::Index>(k);
+    const auto row = static_cast<Eigen::Index>(held_rows) + static_cast<Eigen::Index>(k);
     if (stress.row(row).cwiseAbs().maxCoeff() > internal::kStressTolerance) {
       out.dependent.push_back(static_cast<int>(k));
     }
@@ -91,7 +93,7 @@ std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
                                         const std::vector<Command>& commands,
                                         const std::vector<Command>& candidates, size_t count) {
   const BodyStates home = HomeStates(mechanism);
-  RowStack rows = JointRows(mechanism, home);
+  RowStack rows = HeldRows(mechanism, home);
   for (const Command& command : commands) AddCommand(mechanism, home, command, &rows);
   int rank = RankOf(rows.Matrix());
   std::vector<size_t> chosen;
@@ -119,7 +121,7 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
                                    const std::vector<Coordinate>& candidates, size_t preferred) {
   constexpr double kIndependent = 1e-5;  // share of a gradient that others do not hold
   const BodyStates home = HomeStates(mechanism);
-  const MatX motion = FindRank(JointRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
+  const MatX motion = FindRank(HeldRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
   CoordinateChoice choice{
       .freedoms = static_cast<int>(motion.cols()), .chosen = {}, .dependent = {}};
   // Gradients in the freedoms; what is chosen is taken out of those that are left.
@@ -153,7 +155,7 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
 
 std::vector<Vec6> FreeMotion(const Mechanism& mechanism, const std::vector<Coordinate>& held) {
   const BodyStates home = HomeStates(mechanism);
-  RowStack rows = JointRows(mechanism, home);
+  RowStack rows = HeldRows(mechanism, home);
   for (const Coordinate& coordinate : held) AddCommand(mechanism, home, HeldAt(coordinate), &rows);
   const MatX motion = FindRank(rows.Matrix(), NullSpaces::kMotion).motion;
   if (motion.cols() == 0) return {};

@@ -9,7 +9,8 @@
 
 namespace mbv {
 
-/// Rank of a set of commands at the home pose.
+/// Rank of a set of commands at the home pose. Idle spins (mechanism/idle_spins.h) are no freedoms
+/// here and below: nothing needs to hold them.
 struct CommandRank {
   int freedoms = 0;                      ///< of the mechanism without commands, at home
   int undriven = 0;                      ///< freedoms that are left with the commands held

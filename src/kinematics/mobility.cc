@@ -8,6 +8,7 @@
 #include "core/demand.h"
 #include "core/text.h"
 #include "kinematics/row_stack.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -117,12 +118,15 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
   const RankFinding joints = FindRank(stack.Matrix(), NullSpaces::kNone);
   mobility.constraint_rows = stack.size();
   mobility.constraint_rank = joints.rank;
-  mobility.freedoms = mobility.body_coordinates - joints.rank;
+  for (const Spin& spin : IdleSpins(mechanism)) mobility.idle_spins.push_back(spin.name);
+  const int idle = static_cast<int>(mobility.idle_spins.size());
+  mobility.freedoms = mobility.body_coordinates - joints.rank - idle;
   mobility.redundant = stack.size() - joints.rank;
-  mobility.kutzbach = mobility.body_coordinates - stack.size();
+  mobility.kutzbach = mobility.body_coordinates - stack.size() - idle;
   mobility.smallest_kept = joints.smallest_kept;
   mobility.largest_dropped = joints.largest_dropped;
 
+  stack.AddIdle(mechanism, states);
   stack.AddDriven(mechanism, states);
   mobility.undriven = mobility.body_coordinates - RankOf(stack.Matrix());
   mobility.drives_determine_motion = mobility.undriven == 0;
@@ -131,6 +135,10 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
 }
 
 int CountFreedoms(const Mechanism& mechanism) {
+  return CountAllFreedoms(mechanism) - static_cast<int>(IdleSpins(mechanism).size());
+}
+
+int CountAllFreedoms(const Mechanism& mechanism) {
   const BodyStates states = PosesAtHome(mechanism);
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);

@@ -19,9 +19,10 @@ struct Mobility {
   int body_coordinates = 0;  ///< 6 × moving bodies
   int constraint_rows = 0;   ///< scalar constraints of joints (true kinds) and couplings
   int constraint_rank = 0;
-  int freedoms = 0;   ///< body_coordinates − constraint_rank
+  std::vector<std::string> idle_spins = {};  ///< names (mechanism/idle_spins.h)
+  int freedoms = 0;   ///< body_coordinates − constraint_rank − idle spins
   int redundant = 0;  ///< constraint_rows − constraint_rank
-  int kutzbach = 0;   ///< body_coordinates − constraint_rows
+  int kutzbach = 0;   ///< body_coordinates − constraint_rows − idle spins
   int drives = 0, prescribed = 0;
   int undriven = 0;  ///< freedoms left with all drives and prescribed joints locked
   bool drives_determine_motion = false;  ///< undriven == 0
@@ -40,6 +41,8 @@ struct Mobility {
 /// Mobility at the given body poses (the home pose by default).
 /// Only `freedoms` of it, for a quarter of the time and less.
 [[nodiscard]] int CountFreedoms(const Mechanism& mechanism);
+/// The same with the idle spins.
+[[nodiscard]] int CountAllFreedoms(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states);
 

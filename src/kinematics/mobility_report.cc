@@ -11,6 +11,7 @@
 #include "kinematics/home.h"
 #include "kinematics/loops.h"
 #include "kinematics/row_stack.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -115,6 +116,7 @@ std::vector<StressGroup> GroupsOf(const Mechanism& mechanism, const Stresses& st
 std::vector<std::string> FreeBodies(const Mechanism& mechanism, const BodyStates& states) {
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
+  stack.AddIdle(mechanism, states);
   stack.AddDriven(mechanism, states);
   const MatX motion = FindRank(stack.Matrix(), NullSpaces::kMotion).motion;
   std::vector<std::string> names;
@@ -184,6 +186,9 @@ MobilityReport ReportMobility(const Mechanism& mechanism, int poses) {
   report.loops = CountLoops(mechanism);
   report.redundant = GroupsOf(mechanism, FindStresses(mechanism, home, false));
   report.undetermined = GroupsOf(mechanism, FindStresses(mechanism, home, true));
+  for (const Spin& spin : FindSpins(mechanism)) {
+    if (!spin.why_not.empty()) report.spins_not_idle.push_back(spin.name + ": " + spin.why_not);
+  }
   if (report.home.undriven > 0) report.free_bodies = FreeBodies(mechanism, home);
   return report;
 }

@@ -35,6 +35,8 @@ struct MobilityReport {
   std::vector<StressGroup> undetermined;  ///< isostatic rule applied, drives and base motion locked
   /// Bodies that can still move with drives and prescribed joints locked, at home.
   std::vector<std::string> free_bodies;
+  /// Spins between two balls that are freedoms, each with the reason.
+  std::vector<std::string> spins_not_idle = {};
 
   /// The fewest freedoms (undriven freedoms, redundant constraints) of all poses: those of a
   /// general pose.

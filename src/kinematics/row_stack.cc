@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/sparse_rank.h"
+#include "kinematics/idle_rows.h"
 
 namespace mbv::internal {
 
@@ -53,6 +54,10 @@ void RowStack::Add(const CouplingRow& row) { AddSum(row.pieces, !row.angular); }
 void RowStack::AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions) {
   for (const Joint& joint : mechanism.joints) Add(RowsOf(joint, states, reactions));
   for (const CouplingRow& row : CouplingRows(mechanism, states)) Add(row);
+}
+
+void RowStack::AddIdle(const Mechanism& mechanism, const BodyStates& states) {
+  for (const Spin& spin : IdleSpins(mechanism)) Add(IdleRow(spin, states), false);
 }
 
 void RowStack::AddDriven(const Mechanism& mechanism, const BodyStates& states) {

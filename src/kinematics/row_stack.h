@@ -41,6 +41,8 @@ class RowStack {
   /// The true rows of all joints, then of all couplings; with `reactions`, the isostatic rule is
   /// applied.
   void AddJoints(const Mechanism& mechanism, const BodyStates& states, bool reactions);
+  /// n·ω of every idle spin: held, as the commands need not do it.
+  void AddIdle(const Mechanism& mechanism, const BodyStates& states);
   /// Every drive and prescribed joint, locked.
   void AddDriven(const Mechanism& mechanism, const BodyStates& states);
 

@@ -207,8 +207,8 @@ void CheckIsostaticRule(const Mechanism& mechanism, ModelReport* report) {
   Mechanism passive = mechanism;
   passive.drives.clear();
   passive.prescribed.clear();
-  const int freedoms = CountFreedoms(passive);
-  const int as_balls = CountFreedoms(balls);
+  const int freedoms = CountAllFreedoms(passive);
+  const int as_balls = CountAllFreedoms(balls);
   if (freedoms == as_balls) return;
   report->AtJoint(*last, Severity::kError,
                   fmt::format("transmits: force changes the mechanism: {} freedoms instead of {}",

@@ -77,7 +77,8 @@ class Leg {
   }
 
  private:
-  // A ball at both ends would let the halves spin about the line without any force.
+  // Two balls let the halves spin about the line, but nothing turns them: they are symmetric about
+  // it (mechanism/idle_spins.h).
   bool ReadEnds() {
     const YamlNode* node = map_.Find("ends");
     if (node == nullptr) return true;
@@ -88,12 +89,12 @@ class Leg {
     const auto second = yaml_.Choice(*(*items)[1], map_.PathOf("ends") + "[1]", kinds);
     if (!first || !second) return false;
     universal_first_ = *first == 0;
-    if (*first != *second) return true;
+    universal_last_ = *second == 0;
+    if (!universal_first_ || !universal_last_) return true;
     yaml_.Error(*node,
-                fmt::format("{}: two ends of kind {} leave the leg {}", map_.PathOf("ends"),
-                            kinds[static_cast<size_t>(*first)],
-                            *first == 0 ? "no turn about its line" : "to spin about its line"),
-                "one end universal, the other spherical");
+                fmt::format("{}: two ends of kind universal leave the leg no turn about its line",
+                            map_.PathOf("ends")),
+                "at least one end spherical");
     return false;
   }
 
@@ -110,13 +111,19 @@ class Leg {
                                          {"range_mm", range_mm}});
     return make_.Map({{"from", End(from, lower, universal_first_)},
                       {"slide", slide},
-                      {"to", End(upper, to, !universal_first_)}});
+                      {"to", End(upper, to, universal_last_)}});
   }
 
   [[nodiscard]] YamlNodePtr End(const YamlNodePtr& parent, const YamlNodePtr& child,
                                 bool universal) const {
     if (!universal) {
-      return make_.Map({{"kind", make_.Scalar("spherical")}, {"parent", parent}, {"child", child}});
+      // The first of two balls starts where a universal joint would.
+      const bool guessed = child->text == "lower" && !universal_last_;
+      return make_.Map({{"kind", make_.Scalar("spherical")},
+                        {"parent", parent},
+                        {"child", child},
+                        {"guess", guessed ? BallGuess("guess") : nullptr},
+                        {"guess_deg", guessed ? BallGuess("guess_deg") : nullptr}});
     }
     return make_.Map({{"kind", make_.Scalar("universal")},
                       {"parent", parent},
@@ -125,6 +132,13 @@ class Leg {
                       {"axis2", make_.Scalar("x")},
                       {"guess", Shared(map_, "guess")},
                       {"guess_deg", Shared(map_, "guess_deg")}});
+  }
+
+  // Roll, pitch, yaw of the angles about y and then x.
+  [[nodiscard]] YamlNodePtr BallGuess(const std::string& key) const {
+    const YamlNodePtr angles = Shared(map_, key);
+    if (angles == nullptr || angles->items.size() != 2) return angles;
+    return make_.List({angles->items[1], angles->items[0], make_.Scalar("0")});
   }
 
   // A body with its centre of mass on the line; of the upper half counted downwards.
@@ -165,7 +179,7 @@ class Leg {
   const YamlMap& map_;
   YamlReader& yaml_;
   const NodeMaker make_;
-  bool universal_first_ = true;
+  bool universal_first_ = true, universal_last_ = false;
 };
 
 void ExpandLeg(const Block& block, const YamlEntry& entry, ModelValues* values,

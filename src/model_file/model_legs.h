@@ -8,6 +8,7 @@
 //     from:  {kind: universal, parent: FROM, child: lower, axis: y, axis2: x}
 //     slide: {kind: prismatic, parent: lower, child: upper, axis: z, guess: LENGTH}
 //     to:    {kind: spherical, parent: upper, child: TO}
+//   (`ends` says which end is universal; both may be spherical)
 //   drives: {length: {kind: joint, joint: slide}}
 #pragma once
 

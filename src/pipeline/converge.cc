@@ -5,8 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstring>
+#include <iterator>
+#include <numeric>
 #include <optional>
 
+#include "core/in_children.h"
 #include "input/parsed_documents.h"
 #include "mechanism/break_times.h"
 #include "pipeline/computed_once.h"
@@ -28,6 +32,67 @@ struct SteppedRun {
   ConvergencePoint point;
   MatX forces;  // empty if it failed
 };
+
+// What a run is: a step, a time constant, an engine.
+struct PlannedRun {
+  std::string title;
+  bool stock = false;
+  double step_s = kNan, constant_steps = kNan;
+
+  [[nodiscard]] double cost() const { return 1.0 / step_s; }
+  [[nodiscard]] SteppedRun Lost(const std::string& why) const {
+    SteppedRun run;
+    run.point.step_s = step_s;
+    run.point.time_constant_s = constant_steps * step_s;
+    run.point.failure = why;
+    return run;
+  }
+};
+
+struct PlannedSeries {
+  ConvergenceSeries series;
+  std::vector<std::pair<double, double>> grid;  // step, time constant in steps, coarse to fine
+};
+
+// A run as bytes, from a process of its own.
+std::string BytesOf(const SteppedRun& run) {
+  const ConvergencePoint& p = run.point;
+  std::string bytes;
+  const auto put = [&](double x) { bytes.append(reinterpret_cast<const char*>(&x), sizeof x); };
+  for (const double x : {p.step_s, p.time_constant_s, static_cast<double>(p.steps), p.cpu_s,
+                         p.closure_m, p.pose_m, p.error.smooth, p.error.breaks,
+                         static_cast<double>(run.forces.rows()),
+                         static_cast<double>(run.forces.cols())}) {
+    put(x);
+  }
+  for (Eigen::Index i = 0; i < run.forces.size(); ++i) put(run.forces.data()[i]);
+  return bytes + p.failure;
+}
+
+SteppedRun SteppedRunOf(const std::string& bytes) {
+  SteppedRun run;
+  ConvergencePoint& p = run.point;
+  size_t at = 0;
+  const auto take = [&] {
+    double x = kNan;
+    std::memcpy(&x, bytes.data() + at, sizeof x);
+    at += sizeof x;
+    return x;
+  };
+  p.step_s = take();
+  p.time_constant_s = take();
+  p.steps = static_cast<long>(take());
+  p.cpu_s = take();
+  p.closure_m = take();
+  p.pose_m = take();
+  p.error.smooth = take();
+  p.error.breaks = take();
+  const auto rows = static_cast<Eigen::Index>(take());
+  run.forces.resize(rows, static_cast<Eigen::Index>(take()));
+  for (Eigen::Index i = 0; i < run.forces.size(); ++i) run.forces.data()[i] = take();
+  p.failure = bytes.substr(at);
+  return run;
+}
 
 MatX OutputPositions(const Output& output, const Trace& trace) {
   MatX positions(trace.values.rows(), 3);
@@ -63,9 +128,11 @@ class StepStudy {
     }
     ChooseSamples();
     if (!RunTruth()) return std::move(outcome_);
+    ComputeDrivenMotion();
+    cost_ = CostOfAll();
     RunCorrected();
     if (outcome_.failure.empty()) {
-      RunStock();
+      AddSeries(Others());
       outcome_.exit_code = report().finding() ? 1 : 0;
     }
     return std::move(outcome_);
@@ -133,7 +200,8 @@ class StepStudy {
 
   // Inverse mode, which has neither step nor time constant.
   bool RunTruth() {
-    SimulatedWitness inverse = Simulate({.mode = SimulationMode::kInverse}, "inverse mode");
+    SimulatedWitness inverse = Simulate({.mode = SimulationMode::kInverse}, "inverse mode",
+                                        &driven_, {});
     if (!inverse.run.summary.ok()) return Fail("inverse mode: " + inverse.run.summary.message);
     truth_ = std::move(inverse.run.trace);
     truth_forces_ = DriveForceTable(mechanism(), truth_);
@@ -150,22 +218,33 @@ class StepStudy {
     return false;
   }
 
-  // The driven motion is computed once for all runs, at each instant that one of them asks for.
-  SimulatedWitness Simulate(const SimulationOptions& options, const std::string& what) {
-    const WitnessRunner runner(*prepared_, {.driven = driven_.Of(prepared_->MakeDrivenMotion())},
-                               options_.progress);
+  SimulatedWitness Simulate(const SimulationOptions& options, const std::string& what,
+                            ComputedOnce<DrivenSample>* driven, const ProgressFunction& progress) {
+    const WitnessRunner runner(*prepared_, {.driven = driven->Of(prepared_->MakeDrivenMotion())},
+                               progress);
     return runner.Simulate(options, what);
   }
 
-  SteppedRun RunForward(const ConvergenceSeries& series, double step_s, double constant_steps) {
-    SimulationOptions options{.engine = series.stock ? Engine::kStock : Engine::kCorrected,
-                              .step_s = step_s};
-    (series.stock ? options.stock_time_constant_steps : options.guidance_steps) = constant_steps;
-    const SimulatedWitness witness =
-        Simulate(options, fmt::format("{}, step {:g} s", series.title, step_s));
-    SteppedRun run;
-    run.point.step_s = step_s;
-    run.point.time_constant_s = constant_steps * step_s;
+  // The driven motion at the steps of the finest runs, which all runs share: once, and in order, as
+  // what a solver finds depends in its last digits on where it comes from.
+  void ComputeDrivenMotion() {
+    const double h = options_.steps_s.back();
+    const auto driven = driven_.Of(prepared_->MakeDrivenMotion());
+    DrivenSample sample;
+    for (long n = 0; static_cast<double>(n) * h <= motion().duration_s * (1.0 + kEps); ++n) {
+      if (!driven(static_cast<double>(n) * h, &sample).ok()) return;  // the runs will tell
+    }
+  }
+
+  SteppedRun RunForward(const PlannedRun& planned, const ProgressFunction& progress) {
+    SimulationOptions options{.engine = planned.stock ? Engine::kStock : Engine::kCorrected,
+                              .step_s = planned.step_s};
+    (planned.stock ? options.stock_time_constant_steps : options.guidance_steps) =
+        planned.constant_steps;
+    // What one run asks for besides is its own: no run depends on those before it.
+    ComputedOnce<DrivenSample> driven = driven_;
+    const SimulatedWitness witness = Simulate(options, planned.title, &driven, progress);
+    SteppedRun run = planned.Lost("");
     if (witness.diagnostics.has_errors()) {
       run.point.failure = witness.diagnostics.findings().front().message;
     } else if (!witness.run.summary.ok()) {
@@ -188,12 +267,65 @@ class StepStudy {
     return RelativeError(mechanism(), difference, truth_forces_, classes_);
   }
 
-  // Runs (step, time constant in steps) from coarse to fine; the forces of each run.
-  std::vector<MatX> AddSeries(ConvergenceSeries series,
-                              const std::vector<std::pair<double, double>>& grid) {
+  // All runs of these series, the longest ones first: shared out to processes, they end at about
+  // the same time.
+  std::vector<SteppedRun> RunAll(const std::vector<PlannedSeries>& all) {
+    std::vector<PlannedRun> runs;
+    for (const PlannedSeries& planned : all) {
+      for (const auto& [step_s, constant_steps] : planned.grid) {
+        runs.push_back({fmt::format("{}, step {:g} s", planned.series.title, step_s),
+                        planned.series.stock, step_s, constant_steps});
+      }
+    }
+    std::vector<size_t> order(runs.size());
+    std::iota(order.begin(), order.end(), size_t{0});
+    std::stable_sort(order.begin(), order.end(),
+                     [&](size_t a, size_t b) { return runs[a].cost() > runs[b].cost(); });
+    std::vector<SteppedRun> done(runs.size());
+    const auto work = [&](size_t k) {
+      const PlannedRun& run = runs[order[k]];
+      const double before = done_;
+      const std::string bytes = BytesOf(RunForward(run, [&](const std::string&, double fraction) {
+        done_ = before;
+        Tell(run, fraction);
+      }));
+      done_ = before;
+      return bytes;
+    };
+    ShareOut(order.size(), options_.jobs, work,
+             [&](size_t k, const std::optional<std::string>& bytes) {
+               const PlannedRun& run = runs[order[k]];
+               done[order[k]] = bytes ? SteppedRunOf(*bytes) : run.Lost("its process was killed");
+               Tell(run, 1.0);
+             });
+    return done;
+  }
+
+  // A part of a run is done.
+  void Tell(const PlannedRun& run, double fraction) {
+    done_ += fraction * run.cost();
+    if (options_.progress) options_.progress(run.title, std::min(1.0, done_ / cost_));
+  }
+
+  std::vector<MatX> AddSeries(const std::vector<PlannedSeries>& all) {
+    std::vector<SteppedRun> runs = RunAll(all);
     std::vector<MatX> forces;
-    for (const auto& [step_s, constant_steps] : grid) {
-      SteppedRun run = RunForward(series, step_s, constant_steps);
+    size_t next = 0;
+    for (const PlannedSeries& planned : all) {
+      const auto first = runs.begin() + static_cast<std::ptrdiff_t>(next);
+      next += planned.grid.size();
+      forces = AddRuns(planned.series, {std::make_move_iterator(first),
+                                        std::make_move_iterator(
+                                            first + static_cast<std::ptrdiff_t>(
+                                                        planned.grid.size()))});
+    }
+    return forces;
+  }
+
+  // Runs from coarse to fine; the forces of each.
+  std::vector<MatX> AddRuns(ConvergenceSeries series, std::vector<SteppedRun> runs) {
+    std::vector<MatX> forces;
+    for (SteppedRun& run : runs) {
       if (!forces.empty() && forces.back().size() > 0 && run.forces.size() > 0) {
         run.point.change = Error(run.forces - forces.back());
       }
@@ -206,13 +338,9 @@ class StepStudy {
     return forces;
   }
 
+  // The corrected engine's usual refinement, without which the rest says nothing.
   void RunCorrected() {
-    const std::vector<double>& steps = options_.steps_s;
-    const double kUsual = SimulationOptions{}.guidance_steps;
-    const std::vector<MatX> forces = AddSeries(
-        {.name = "corrected_both",
-         .title = fmt::format("corrected engine, step and time constant = {:g} steps", kUsual)},
-        Both(kUsual));
+    const std::vector<MatX> forces = AddSeries({CorrectedBoth()});
     const ConvergenceSeries& series = report().series.back();
     const auto ran = std::count_if(series.points.begin(), series.points.end(),
                                    [](const ConvergencePoint& p) { return p.failure.empty(); });
@@ -222,39 +350,59 @@ class StepStudy {
     }
     report().extrapolation =
         ExtrapolateForces(mechanism(), series, forces, truth_forces_, classes_);
-    AddSeries({.name = "corrected_step",
-               .title = fmt::format("corrected engine, step at time constant {:g} s",
-                                    kUsual * steps.front()),
-               .knob = Knob::kStep},
-              StepAlone(kUsual));
-    AddConstants("corrected", false, steps[steps.size() / 2], kCorrectedConstants);
   }
 
-  void RunStock() {
+  [[nodiscard]] PlannedSeries CorrectedBoth() const {
+    const double kUsual = SimulationOptions{}.guidance_steps;
+    return {{.name = "corrected_both",
+             .title = fmt::format("corrected engine, step and time constant = {:g} steps", kUsual)},
+            Both(kUsual)};
+  }
+
+  [[nodiscard]] std::vector<PlannedSeries> Others() const {
     const std::vector<double>& steps = options_.steps_s;
-    const double kUsual = SimulationOptions{}.stock_time_constant_steps;
-    AddSeries({.name = "stock_both",
-               .title = fmt::format("stock engine, step and time constant = {:g} steps", kUsual),
-               .stock = true},
-              Both(kUsual));
-    AddSeries(
-        {.name = "stock_step",
-         .title = fmt::format("stock engine, step at time constant {:g} s", kUsual * steps.front()),
-         .stock = true,
-         .knob = Knob::kStep},
-        StepAlone(kUsual));
-    AddConstants("stock", true, steps.back(), kStockConstants);
+    const double guidance = SimulationOptions{}.guidance_steps;
+    const double stock = SimulationOptions{}.stock_time_constant_steps;
+    return {
+        {{.name = "corrected_step",
+          .title = fmt::format("corrected engine, step at time constant {:g} s",
+                               guidance * steps.front()),
+          .knob = Knob::kStep},
+         StepAlone(guidance)},
+        Constants("corrected", false, steps[steps.size() / 2], kCorrectedConstants),
+        {{.name = "stock_both",
+          .title = fmt::format("stock engine, step and time constant = {:g} steps", stock),
+          .stock = true},
+         Both(stock)},
+        {{.name = "stock_step",
+          .title =
+              fmt::format("stock engine, step at time constant {:g} s", stock * steps.front()),
+          .stock = true,
+          .knob = Knob::kStep},
+         StepAlone(stock)},
+        Constants("stock", true, steps.back(), kStockConstants)};
   }
 
-  void AddConstants(const std::string& engine, bool stock, double step_s,
-                    const std::array<double, 5>& constants) {
+  [[nodiscard]] static PlannedSeries Constants(const std::string& engine, bool stock,
+                                               double step_s,
+                                               const std::array<double, 5>& constants) {
     std::vector<std::pair<double, double>> grid;
     for (const double constant : constants) grid.emplace_back(step_s, constant);
-    AddSeries({.name = engine + "_time_constant",
-               .title = fmt::format("{} engine, time constant at step {:g} s", engine, step_s),
-               .stock = stock,
-               .knob = Knob::kTimeConstant},
-              grid);
+    return {{.name = engine + "_time_constant",
+             .title = fmt::format("{} engine, time constant at step {:g} s", engine, step_s),
+             .stock = stock,
+             .knob = Knob::kTimeConstant},
+            grid};
+  }
+
+  [[nodiscard]] double CostOfAll() const {
+    std::vector<PlannedSeries> all = Others();
+    all.push_back(CorrectedBoth());
+    double cost = 0.0;
+    for (const PlannedSeries& planned : all) {
+      for (const auto& [step_s, constant] : planned.grid) cost += 1.0 / step_s;
+    }
+    return cost;
   }
 
   [[nodiscard]] std::vector<std::pair<double, double>> Both(double constant_steps) const {
@@ -278,7 +426,8 @@ class StepStudy {
   SampleClasses classes_;
   Trace truth_;
   MatX truth_forces_;
-  double extent_m_ = 0.0;  // largest coordinate of an output
+  double extent_m_ = 0.0;           // largest coordinate of an output
+  double done_ = 0.0, cost_ = 1.0;  // of all runs
 };
 
 }  // namespace

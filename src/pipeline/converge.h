@@ -20,7 +20,8 @@ struct ConvergeOptions {
   /// At least three steps [s], each a whole fraction of the one before, all by the same factor.
   std::vector<double> steps_s = {4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4};
   ScenarioOptions scenario = {};
-  ProgressFunction progress = {};
+  int jobs = 1;                    ///< processes at once; the results do not depend on it
+  ProgressFunction progress = {};  ///< of all runs, by their numbers of steps
 };
 [[nodiscard]] Diagnostics Check(const ConvergeOptions& options);
 

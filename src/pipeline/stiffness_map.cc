@@ -5,10 +5,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <iterator>
 #include <limits>
 #include <numbers>
+#include <optional>
+#include <span>
 
+#include "core/in_children.h"
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "input/yaml_reader.h"
@@ -125,10 +129,73 @@ std::string FixedText(const StiffnessMap& map) {
   return text;
 }
 
+// Rows of a map, computed where bytes of them can be sent from.
+class MapRows {
+ public:
+  MapRows(const PreparedStiffness& prepared, const StiffnessMap& map, size_t own, size_t indices)
+      : prepared_(prepared), map_(map), own_(own), indices_(indices) {}
+
+  // Per point: whether it counts, is out of range, is reached; rank; indices.
+  [[nodiscard]] std::string BytesOf(size_t row) const {
+    std::string bytes;
+    for (int c = 0; c < map_.axes[0].count; ++c) {
+      const std::vector<double> cell = Cell(PointOf(map_.axes[0], c), PointOf(map_.axes[1], static_cast<int>(row)));
+      bytes.append(reinterpret_cast<const char*>(cell.data()), cell.size() * sizeof(double));
+    }
+    return bytes;
+  }
+
+  void Put(size_t row, const std::string& bytes, MapResult* result) const {
+    std::vector<double> cell(kHead + indices_);
+    const size_t columns = static_cast<size_t>(map_.axes[0].count);
+    for (size_t c = 0; c < columns; ++c) {
+      std::memcpy(cell.data(), bytes.data() + c * cell.size() * sizeof(double),
+                  cell.size() * sizeof(double));
+      const size_t k = row * columns + c;
+      result->points += cell[0] > 0.0;
+      result->out_of_range += cell[1] > 0.0;
+      result->reached += cell[2] > 0.0;
+      result->rank[k] = static_cast<int>(cell[3]);
+      for (size_t i = 0; i < indices_; ++i) result->values[i][k] = cell[kHead + i];
+    }
+  }
+
+ private:
+  static constexpr size_t kHead = 4;
+
+  [[nodiscard]] std::vector<double> Cell(double u, double v) const {
+    std::vector<double> cell(kHead + indices_, kNan);
+    cell[0] = cell[1] = cell[2] = 0.0;
+    cell[3] = -1.0;
+    if (std::hypot(u, v) > map_.within * (1 + 1e-9)) return cell;
+    cell[0] = 1.0;
+    PoseValues pose = prepared_.scenario.pose;
+    for (const MapValue& fixed : map_.fixed) pose[fixed.name] = fixed.value;
+    pose[map_.axes[0].name] = u;
+    pose[map_.axes[1].name] = v;
+    bool out_of_range = false;
+    const StiffnessResult at = StiffnessAt(prepared_, pose, &out_of_range);
+    cell[1] = out_of_range ? 1.0 : 0.0;
+    if (out_of_range || !at.K.allFinite()) return cell;
+    cell[2] = 1.0;
+    cell[3] = at.rank;
+    if (prepared_.form != nullptr) {
+      prepared_.form->IndexValues(at, std::span(cell).subspan(kHead, own_));
+    }
+    const std::vector<NamedIndex> general = GeneralIndices(at);
+    for (size_t i = 0; i < general.size(); ++i) cell[kHead + own_ + i] = general[i].value;
+    return cell;
+  }
+
+  const PreparedStiffness& prepared_;
+  const StiffnessMap& map_;
+  const size_t own_, indices_;
+};
+
 }  // namespace
 
 MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
-                     const ProgressFunction& progress) {
+                     const ProgressFunction& progress, int jobs) {
   const auto start = std::chrono::steady_clock::now();
   MapResult result;
   result.closed_form = prepared.form != nullptr;
@@ -143,33 +210,17 @@ MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
       static_cast<size_t>(map.axes[0].count) * static_cast<size_t>(map.axes[1].count);
   result.values.assign(result.indices.size(), std::vector<double>(cells, kNan));
   result.rank.assign(cells, -1);
-  PoseValues pose = prepared.scenario.pose;
-  for (const MapValue& fixed : map.fixed) pose[fixed.name] = fixed.value;
-  double &u_of_pose = pose[map.axes[0].name], &v_of_pose = pose[map.axes[1].name];
-  std::vector<double> own_values(own);
-  size_t k = 0;
-  for (int r = 0; r < map.axes[1].count; ++r) {
-    if (progress) progress("map", static_cast<double>(r) / map.axes[1].count);
-    for (int c = 0; c < map.axes[0].count; ++c, ++k) {
-      const double u = PointOf(map.axes[0], c), v = PointOf(map.axes[1], r);
-      if (std::hypot(u, v) > map.within * (1 + 1e-9)) continue;
-      ++result.points;
-      u_of_pose = u;
-      v_of_pose = v;
-      bool out_of_range = false;
-      const StiffnessResult at = StiffnessAt(prepared, pose, &out_of_range);
-      result.out_of_range += out_of_range;
-      if (out_of_range || !at.K.allFinite()) continue;
-      ++result.reached;
-      result.rank[k] = at.rank;
-      if (prepared.form != nullptr) {
-        prepared.form->IndexValues(at, own_values);
-        for (size_t i = 0; i < own; ++i) result.values[i][k] = own_values[i];
-      }
-      const std::vector<NamedIndex> general = GeneralIndices(at);
-      for (size_t i = 0; i < general.size(); ++i) result.values[own + i][k] = general[i].value;
-    }
-  }
+  const MapRows rows(prepared, map, own, result.indices.size());
+  ShareOut(
+      static_cast<size_t>(map.axes[1].count), jobs, [&](size_t row) { return rows.BytesOf(row); },
+      [&](size_t row, const std::optional<std::string>& bytes) {
+        if (bytes) {
+          rows.Put(row, *bytes, &result);
+        } else {
+          ++result.lost_rows;
+        }
+        if (progress) progress("map", static_cast<double>(row + 1) / map.axes[1].count);
+      });
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }
@@ -232,6 +283,10 @@ std::string MapText(const StiffnessMap& map, const MapResult& result,
           ? ""
           : fmt::format(" ({} more only beyond ranges of joints or drives)", result.out_of_range),
       result.closed_form ? "the closed form" : "frame elements", result.wall_s);
+  if (result.lost_rows > 0) {
+    text += fmt::format("  {} of {} rows are empty: their processes were killed\n",
+                        result.lost_rows, map.axes[1].count);
+  }
   for (const std::string& name : Chosen(result, names)) {
     for (size_t i = 0; i < result.indices.size(); ++i) {
       if (result.indices[i].name != name) continue;

@@ -49,12 +49,15 @@ struct MapResult {
   std::vector<int> rank;                    ///< −1 where there is no stiffness
   size_t points = 0, reached = 0;           ///< within the circle
   size_t out_of_range = 0;  ///< poses that only joints or drives beyond their ranges would reach
+  int lost_rows = 0;  ///< whose process was killed
   double wall_s = 0.0;
   bool closed_form = false;  ///< else frame elements
 };
-/// Evaluates by the closed form where there is one, else by frame elements.
+/// Evaluates by the closed form where there is one, else by frame elements; `jobs` processes at
+/// once, on which the result does not depend. Rows whose process was killed are not reached, and
+/// counted.
 [[nodiscard]] MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
-                                   const ProgressFunction& progress = {});
+                                   const ProgressFunction& progress = {}, int jobs = 1);
 
 /// A picture of each of `names` (default: the closed form's first two and the weakest stiffnesses)
 /// by the name of its files. Unknown names are findings.

@@ -68,7 +68,8 @@ std::vector<std::string> WorkspaceMechanisms() {
   return names;
 }
 
-WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures) {
+WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures, int jobs,
+                                  const ProgressFunction& progress) {
   WorkspaceOutcome outcome;
   RefuseUncovered(mechanism, &outcome.diagnostics);
   if (outcome.diagnostics.has_errors()) return outcome;
@@ -83,7 +84,10 @@ WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures) {
   if (HasRanges(mechanism)) {
     within_ranges = [&](const std::vector<Pose>& X_WB) { return IsWithinRanges(mechanism, X_WB); };
   }
-  const WorkspaceForm form = row->compute(mechanism, within_ranges);
+  const WorkspaceForm form =
+      row->compute(mechanism, {.within_ranges = within_ranges,
+                               .jobs = jobs,
+                               .progress = StageOf(progress, "workspace")});
   outcome.summary = form.summary;
   outcome.diagnostics.Append(form.diagnostics);
   outcome.text = form.text;

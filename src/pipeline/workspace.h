@@ -9,6 +9,7 @@
 #include "core/diagnostics.h"
 #include "core/run_summary.h"
 #include "mechanism/mechanism.h"
+#include "pipeline/progress.h"
 
 namespace mbv {
 
@@ -27,7 +28,9 @@ struct WorkspaceOutcome {
 [[nodiscard]] std::vector<std::string> WorkspaceMechanisms();
 
 /// What the mechanism's form computes (analytic/workspace_form.h), and with `pictures` the
-/// mechanism inside its mesh.
-[[nodiscard]] WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures);
+/// mechanism inside its mesh; by `jobs` processes at once, on which nothing depends.
+[[nodiscard]] WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures,
+                                                int jobs = 1,
+                                                const ProgressFunction& progress = {});
 
 }  // namespace mbv

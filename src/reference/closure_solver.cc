@@ -9,6 +9,7 @@
 #include "core/demand.h"
 #include "core/spatial.h"
 #include "kinematics/element_rows.h"
+#include "kinematics/idle_rows.h"
 #include "reference/closure_failure.h"
 
 namespace mbv::internal {
@@ -49,8 +50,8 @@ double HomeTurn(const Mechanism& mechanism, const Coordinate& coordinate, double
                                                       : HomeValue(mechanism, coordinate);
 }
 
-VecX Extended(const VecX& values, size_t size) {
-  VecX out = VecX::Zero(static_cast<Eigen::Index>(size));
+VecX Extended(const VecX& values, Eigen::Index size) {
+  VecX out = VecX::Zero(size);
   out.head(values.size()) = values;
   return out;
 }
@@ -82,6 +83,7 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
       length_(CharacteristicLength(mechanism)),
       lever_(LongestLever(mechanism)),
       commands_(AllCommands(mechanism, motion)),
+      spins_(IdleSpins(mechanism)),
       system_(mechanism.bodies.size(), length_),
       predictor_(length_) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
@@ -105,6 +107,7 @@ void ClosureSolver::EvaluateRows(Trial* trial) {
   for (size_t k = 0; k < commands_.size(); ++k) {
     rows_.Add(mechanism_, commands_[k], trial->states, &trial->near_values[k]);
   }
+  for (const Spin& spin : spins_) rows_.Add(IdleRow(spin, trial->states), true);
 }
 
 VecX ClosureSolver::Residual(const VecX& target) const {
@@ -136,7 +139,7 @@ RunSummary ClosureSolver::SelectRows() {
   selection_ = system_.IndependentRows(rows_, 0, joint_rows_);
   selection_is_new_ = true;
   orientation_ = 0;
-  const int freedoms = system_.size() - static_cast<int>(selection_.size());
+  const int freedoms = system_.size() - static_cast<int>(selection_.size() + spins_.size());
   if (freedoms != static_cast<int>(commands_.size())) {
     return Failed(Stop::kUnsupported,
                   fmt::format("the joints leave {} freedoms, but {} coordinates are commanded",
@@ -161,6 +164,66 @@ RunSummary ClosureSolver::Prepare() {
   near_values_ = home.near_values;
   target_ = Eigen::Map<const VecX>(rows_.value.data() + joint_rows_, rows_.size() - joint_rows_);
   return SelectRows();
+}
+
+RunSummary ClosureSolver::TurnBack(const std::vector<double>& turns) {
+  Trial trial{states_, near_values_};
+  for (size_t k = 0; k < spins_.size(); ++k) {
+    const Spin& spin = spins_[k];
+    const Pose X_WB = trial.states.X_WB[static_cast<size_t>(spin.bodies[0])];
+    const Mat3 back = ExpRotation(-turns[k] * (X_WB.linear() * spin.n_B));
+    const Vec3 p_WP = X_WB * spin.p_BP;
+    for (const int b : spin.bodies) {
+      Pose& X = trial.states.X_WB[static_cast<size_t>(b)];
+      X.linear() = back * X.linear();
+      X.translation() = p_WP + back * (X.translation() - p_WP);
+    }
+  }
+  if (Newton(target_, false, &trial) != Step::kDone) {
+    return ExplainUnreached(mechanism_, commands_, target_, states_, near_values_);
+  }
+  Accept(target_, std::move(trial));
+  return RunSummary::Done();
+}
+
+// Where the way to the first sample leaves the idle spins depends on how it was cut into steps.
+RunSummary ClosureSolver::TakeLeastTurns() {
+  if (spins_.empty()) return RunSummary::Done();
+  std::vector<double> turns;
+  for (const Spin& spin : spins_) {
+    const Pose& X_WB = states_.X_WB[static_cast<size_t>(spin.bodies[0])];
+    turns.push_back(TurnFromHome(mechanism_, spin, X_WB.linear()));
+  }
+  return TurnBack(turns);
+}
+
+MovingDirection ClosureSolver::LineOf(const Spin& spin) const {
+  const auto b = static_cast<size_t>(spin.bodies[0]);
+  return DirectionOf(states_.X_WB[b].linear() * spin.n_B, states_.V_WB[b].head<3>(),
+                     states_.A_WB[b].head<3>());
+}
+
+// The prediction transports the lines to a lower order, and Newton not at all.
+RunSummary ClosureSolver::TransportTurns(const CommandSample& command) {
+  if (spins_.empty()) return RunSummary::Done();
+  const double h = command.time_s - predictor_.last_s();
+  if (last_lines_.size() == spins_.size() && h > 0.0) {
+    std::vector<double> turns;
+    for (size_t k = 0; k < spins_.size(); ++k) {
+      const Mat3& R_WB = states_.X_WB[static_cast<size_t>(spins_[k].bodies[0])].linear();
+      const MovingDirection line = LineOf(spins_[k]);
+      const Mat3 R = Transported(last_lines_[k].R_WB, last_lines_[k].line, line, h);
+      turns.push_back(TurnBeyond(R, R_WB, line.n));
+    }
+    if (RunSummary summary = TurnBack(turns); !summary.ok()) return summary;
+    if (RunSummary summary = SolveRates(command); !summary.ok()) return summary;
+  }
+  last_lines_.clear();
+  for (const Spin& spin : spins_) {
+    const auto b = static_cast<size_t>(spin.bodies[0]);
+    last_lines_.push_back({LineOf(spin), states_.X_WB[b].linear()});
+  }
+  return RunSummary::Done();
 }
 
 ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, Trial* trial) {
@@ -310,7 +373,7 @@ RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
       const double rounding = Rounding(states_.X_WB) / length_;
       if (system_.SmallestSingularValue(3) < SingularValueLimit(rounding)) break;
     }
-    const size_t count = commands_.size();
+    const Eigen::Index count = rows_.size() - joint_rows_;
     VecX rates = VecX::Zero(rows_.size());
     rates.tail(count) = Extended(command.velocity, count);
     bool accurate = false, accurate_too = false;
@@ -361,11 +424,14 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   }
   RunSummary summary = RunSummary::Done();
   if (!done) summary = Follow(target, first ? options_.homotopy_steps : 4);
+  if (first && summary.ok()) summary = TakeLeastTurns();
   if (summary.ok()) summary = CheckPose();
   if (summary.ok()) summary = SolveRates(command);
+  if (summary.ok()) summary = TransportTurns(command);
   if (summary.ok()) {
     predictor_.Remember(command.time_s, states_);
   } else {
+    last_lines_.clear();
     predictor_ = PosePredictor(length_);
     summary.time_s = command.time_s;
   }

@@ -3,13 +3,17 @@
 //
 // Newton in maximal coordinates on an independent subset of the joint rows plus one row per
 // command; the matrix is factored once near the solution and then refined against. Redundant joint
-// rows are dropped and their residuals checked.
+// rows are dropped and their residuals checked. Idle spins (mechanism/idle_spins.h) have a row each:
+// no Newton step turns them, and their rates are zero. From sample to sample their lines are
+// transported parallel (core/parallel_transport.h); the first sample takes the least turn from home.
 #pragma once
 
 #include <vector>
 
+#include "core/parallel_transport.h"
 #include "core/run_summary.h"
 #include "mechanism/body_states.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "mechanism/reach.h"
@@ -58,6 +62,11 @@ class ClosureSolver {
     return orientation_ != 0 && system_.determinant_sign() != orientation_;
   }
   [[nodiscard]] RunSummary SelectRows();
+  /// Turns idle spins back by these angles.
+  [[nodiscard]] RunSummary TurnBack(const std::vector<double>& turns);
+  [[nodiscard]] RunSummary TakeLeastTurns();
+  [[nodiscard]] RunSummary TransportTurns(const CommandSample& command);
+  [[nodiscard]] MovingDirection LineOf(const Spin& spin) const;
   [[nodiscard]] RunSummary CheckPose();
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
   [[nodiscard]] VecX Refined(const VecX& rates, bool* accurate);
@@ -69,8 +78,9 @@ class ClosureSolver {
   const ReferenceOptions options_;
   const double length_, lever_;
   std::vector<Command> commands_;  ///< of the motion, then prescribed joints held at home
+  const std::vector<Spin> spins_;  ///< idle
   SquareSystem system_;
-  RowSet rows_;  ///< all joint rows and couplings, then the command rows
+  RowSet rows_;  ///< all joint rows and couplings, then the command rows, then idle spins
   int first_coupling_ = 0, joint_rows_ = 0;
   std::vector<double> coupled_size_;  ///< per coupling: its largest piece, for rounding
   std::vector<int> selection_;
@@ -79,8 +89,13 @@ class ClosureSolver {
 
   BodyStates states_;
   std::vector<std::vector<double>> near_values_;
-  VecX target_;  ///< command positions of states_
+  VecX target_;  ///< command positions of states_; zero for idle spins
   PosePredictor predictor_;
+  struct LastLine {
+    MovingDirection line;
+    Mat3 R_WB;
+  };
+  std::vector<LastLine> last_lines_;  ///< of the last sample, per spin; empty: there is none
   double gap_position_m_ = kNan, gap_rotation_rad_ = kNan;
 };
 

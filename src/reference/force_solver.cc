@@ -7,11 +7,13 @@
 
 #include "core/demand.h"
 #include "core/spatial.h"
+#include "kinematics/idle_rows.h"
 #include "mechanism/reach.h"
 #include "reference/closure_failure.h"
 #include "reference/element_forces.h"
 #include "reference/least_forces.h"
 #include "reference/load_friction.h"
+#include "reference/spin_check.h"
 
 namespace mbv::internal {
 namespace {
@@ -42,7 +44,8 @@ ForceSolver::ForceSolver(const Mechanism& mechanism, double duration_s)
       length_(CharacteristicLength(mechanism)),
       lever_(LongestLever(mechanism)),
       duration_s_(duration_s),
-      system_(mechanism.bodies.size(), length_) {}
+      system_(mechanism.bodies.size(), length_),
+      spins_(IdleSpins(mechanism)) {}
 
 void ForceSolver::FillRows(const BodyStates& states) {
   rows_.Clear();
@@ -55,6 +58,7 @@ void ForceSolver::FillRows(const BodyStates& states) {
     const Joint& joint = mechanism_.joints[prescribed.joint];
     rows_.Add(JointCoordinateRow(joint, 0, states), !IsLength(joint.kind, 0));
   }
+  for (const Spin& spin : spins_) rows_.Add(IdleRow(spin, states), true);
 }
 
 RunSummary ForceSolver::SelectBasis() {
@@ -170,6 +174,10 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
   std::vector<Vec6> required;
   sample->rubbing = RubbingOf(mechanism_, sample->states, duration_s_);
   RequiredWrenches(mechanism_, sample->states, loads, sample->rubbing, &required);
+  if (RunSummary summary = CheckSpinsIdle(spins_, sample->states, required, length_);
+      !summary.ok()) {
+    return summary;
+  }
   const VecX wrenches = Stack(required);
   const double largest =
       system_.size() == 0 ? 0.0 : system_.body_scale().cwiseProduct(wrenches).cwiseAbs().maxCoeff();

@@ -6,6 +6,7 @@
 
 #include "core/run_summary.h"
 #include "mechanism/body_states.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/least_forces.h"
@@ -46,7 +47,8 @@ class ForceSolver {
   const Mechanism& mechanism_;
   const double length_, lever_, duration_s_;
   SquareSystem system_;
-  RowSet rows_;           ///< AddReactionRows(), drives, prescribed joints
+  const std::vector<Spin> spins_;  ///< idle
+  RowSet rows_;  ///< AddReactionRows(), drives, prescribed joints, idle spins: these are given none
   int first_driven_ = 0;  ///< row of the first drive
   std::vector<int> basis_, rest_;
   bool basis_is_new_ = true, chosen_ = false;

@@ -7,11 +7,13 @@
 
 #include "core/spatial.h"
 #include "kinematics/element_rows.h"
+#include "kinematics/idle_rows.h"
 #include "mechanism/reach.h"
 #include "reference/closure_failure.h"
 #include "reference/closure_solver.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
+#include "reference/spin_check.h"
 #include "reference/square_system.h"
 
 namespace mbv::internal {
@@ -39,7 +41,8 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
       freedoms_(static_cast<int>(motion.initial.size())),
       near_(mechanism, length_),
-      loaded_(LoadedElements(mechanism)) {
+      loaded_(LoadedElements(mechanism)),
+      spins_(IdleSpins(mechanism)) {
   body_scale_.setOnes(size_);
   for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
   EvaluateMotion(motion, 0.0, &command_);
@@ -58,6 +61,7 @@ void FreeDynamics::FillRows(double t_s, const BodyStates& states) {
     rows_.Add(rows, rows.rows);
   }
   for (const CouplingRow& row : CouplingRows(mechanism_, states)) rows_.Add(row);
+  for (const Spin& spin : spins_) rows_.Add(IdleRow(spin, states), true);
   joint_rows_ = rows_.size();
   for (size_t k = 0; k < motion_.commands.size(); ++k) {
     rows_.Add(mechanism_, motion_.commands[k], states, &near_values_[k]);
@@ -183,6 +187,10 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
   RequiredWrenches(mechanism_, *states, command_.loads, SignsAt(*states), &required);
+  if (RunSummary summary = CheckSpinsIdle(spins_, *states, required, length_); !summary.ok()) {
+    summary.time_s = t_s;
+    return summary;
+  }
   AddDriveForces(t_s, *states, &drives);
   const MatX R = Motions();
   MatX& inertia = rest_.H;

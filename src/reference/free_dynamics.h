@@ -28,6 +28,7 @@
 
 #include "core/run_summary.h"
 #include "mechanism/body_states.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/load_friction.h"
@@ -166,6 +167,7 @@ class FreeDynamics {
   const Motion& motion_;
   const double length_, lever_;
   const int size_, freedoms_;
+  const std::vector<Spin> spins_;  ///< idle: their rows stand between couplings and commands
   VecX body_scale_;
   RowSet rows_;
   int joint_rows_ = 0;

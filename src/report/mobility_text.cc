@@ -48,8 +48,11 @@ std::string HeadText(const Mechanism& mechanism, const Mobility& m) {
 std::string FreedomsText(const MobilityReport& report, bool coupled) {
   const Mobility& m = report.home;
   std::string text = fmt::format(
-      "  freedoms: {} = {} body coordinates - rank {} of {} joint{} constraints\n", m.freedoms,
-      m.body_coordinates, m.constraint_rank, m.constraint_rows, coupled ? " and coupling" : "");
+      "  freedoms: {} = {} body coordinates - rank {} of {} joint{} constraints{}\n", m.freedoms,
+      m.body_coordinates, m.constraint_rank, m.constraint_rows, coupled ? " and coupling" : "",
+      m.idle_spins.empty()
+          ? ""
+          : " - " + Count(static_cast<int>(m.idle_spins.size()), "idle spin", "idle spins"));
   double kept = m.smallest_kept, dropped = m.largest_dropped;
   for (const Mobility& near : report.nearby) {
     kept = std::min(kept, near.smallest_kept);
@@ -71,6 +74,18 @@ std::string FreedomsText(const MobilityReport& report, bool coupled) {
   if (!report.home_singular()) {
     text += fmt::format(";\n    smallest singular value kept {:.1e}, largest dropped {:.1e}\n",
                         kept, dropped);
+  }
+  return text;
+}
+
+// What turns between two balls.
+std::string SpinText(const MobilityReport& report) {
+  std::string text;
+  for (const std::string& name : report.home.idle_spins) {
+    text += fmt::format("  spin of {}, idle: no force turns it, and no command needs to\n", name);
+  }
+  for (const std::string& spin : report.spins_not_idle) {
+    text += fmt::format("  spin between two balls that is a freedom: {}\n", spin);
   }
   return text;
 }
@@ -175,8 +190,8 @@ Json PoseJson(const Mobility& m) {
 
 std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report) {
   std::string text = HeadText(mechanism, report.home) +
-                     FreedomsText(report, !mechanism.couplings.empty()) + RedundancyText(report) +
-                     DrivenText(report) + ForcesText(mechanism, report);
+                     FreedomsText(report, !mechanism.couplings.empty()) + SpinText(report) +
+                     RedundancyText(report) + DrivenText(report) + ForcesText(mechanism, report);
   text += "  drives:";
   for (const Drive& drive : mechanism.drives) text += " " + drive.name;
   text += "\n  outputs:";
@@ -210,6 +225,8 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
   json["nearby"] = Json::array();
   for (const Mobility& near : report.nearby) json["nearby"].push_back(PoseJson(near));
   json["free_bodies"] = report.free_bodies;
+  json["idle_spins"] = report.home.idle_spins;
+  json["spins_not_idle"] = report.spins_not_idle;
   json["loops"] = Json::array();
   for (const LoopCount& loop : report.loops) {
     json["loops"].push_back({{"closure", loop.closure},

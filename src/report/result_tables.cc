@@ -97,6 +97,7 @@ PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& repor
   add("loops", std::to_string(report.loops.size()));
   add("constraints, rank", fmt::format("{}, {}", m.constraint_rows, m.constraint_rank));
   add("freedoms", std::to_string(report.freedoms()));
+  if (!m.idle_spins.empty()) add("idle spins", std::to_string(m.idle_spins.size()));
   add("Kutzbach's count", std::to_string(m.kutzbach));
   add("redundant constraints", std::to_string(report.redundant_count()));
   add("drives", std::to_string(m.drives));

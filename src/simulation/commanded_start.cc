@@ -13,7 +13,13 @@ RunSummary FindCommandedStart(EngineModel* engine, const DrivenSample& first, En
     summary.time_s = 0.0;
     return summary;
   }
+  SpinStopper spins(&system);
+  if (RunSummary summary = spins.TakeLeastTurns(&solver, first); !summary.ok()) {
+    summary.time_s = 0.0;
+    return summary;
+  }
   solver.SolveVelocity(first.velocity);
+  spins.StopVelocity();
   start->qpos = Eigen::Map<const VecX>(data->qpos, engine->m->nq);
   start->qvel = Eigen::Map<const VecX>(data->qvel, engine->m->nv);
   return RunSummary::Done();
@@ -27,6 +33,7 @@ RunSummary PutAtCommandedStart(Session* s, const DrivenSample& first) {
     return summary;
   }
   s->solver.CorrectVelocity(first.velocity);
+  s->spins.StopVelocity();
   s->solver.SolveAcceleration(first.acceleration);
   return RunSummary::Done();
 }

@@ -37,8 +37,14 @@ RunSummary PutAtStart(Session* s, const DrivenSample& first) {
     summary.time_s = 0.0;
     return summary;
   }
+  if (RunSummary summary = s->spins.TakeLeastTurns(&s->solver, first); !summary.ok()) {
+    summary.time_s = 0.0;
+    return summary;
+  }
   s->solver.SolveVelocity(first.velocity);
+  s->spins.StopVelocity();
   s->solver.SolveAcceleration(first.acceleration);
+  s->spins.StopAcceleration();
   return RunSummary::Done();
 }
 

@@ -116,6 +116,7 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
     return summary;
   }
   s->solver.CorrectVelocity(first.velocity);
+  s->spins.StopVelocity();
   s->solver.SolveAcceleration(first.acceleration);
   return RunSummary::Done();
 }

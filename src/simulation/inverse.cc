@@ -46,7 +46,7 @@ class Predictor {
   VecX mean_, v_new_, work_;
 };
 
-void SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* tau) {
+RunSummary SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* tau) {
   const mjModel* m = s->engine.m.get();
   mjData* d = s->data.get();
   mj_rne(m, d, 1, tau->data());
@@ -60,11 +60,13 @@ void SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* tau) {
   s->loads.AddGeneralized(d, tau->data());
   if (s->lacking) AddLackingForces(s->system, at.acceleration, tau->data());
   *tau = -*tau;
+  if (RunSummary summary = s->spins.CheckIdle(*tau); !summary.ok()) return summary;
   if (s->shared) {
     s->solver.SolveLeastDriven(*tau);
   } else {
     s->solver.SolveForces(*tau);
   }
+  return RunSummary::Done();
 }
 
 RunSummary At(RunSummary summary, double t_s) {
@@ -99,20 +101,29 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
         !summary.ok()) {
       return At(summary, times[i]);
     }
-    if (s->solver.undriven() > 0) {
+    if (s->solver.undriven() > s->spins.count()) {
       return {
           .stop = Stop::kUnsupported,
           .message = fmt::format("{} freedoms are not driven: their motion follows from forces, "
                                  "use mode: forward",
-                                 s->solver.undriven()),
+                                 s->solver.undriven() - s->spins.count()),
           .time_s = times[i],
           .where = {},
           .unit = {}};
     }
-    if (i == 0) s->FindShared();
+    if (i == 0) {
+      if (RunSummary summary = s->spins.TakeLeastTurns(&s->solver, samples[i]); !summary.ok()) {
+        return At(summary, times[i]);
+      }
+      s->FindShared();
+    }
     s->solver.SolveVelocity(samples[i].velocity);
+    s->spins.StopVelocity();
     s->solver.SolveAcceleration(samples[i].acceleration);
-    SolveDynamics(s, times[i], samples[i], &tau);
+    s->spins.StopAcceleration();
+    if (RunSummary summary = SolveDynamics(s, times[i], samples[i], &tau); !summary.ok()) {
+      return At(summary, times[i]);
+    }
     s->Record(i);
     if (!s->trouble.ok()) return At(s->trouble, times[i]);
   }

@@ -68,7 +68,7 @@ struct MjcfImport {
 void AddTree(MjcfImport* in);
 /// Closures, and couplings of joints.
 void AddEqualities(MjcfImport* in);
-/// Armature, damping and springs of hinges and slides.
+/// Armature, damping, dry friction and springs of hinges and slides.
 void AddElements(MjcfImport* in);
 /// Actuators on hinges and slides.
 void AddDrives(MjcfImport* in);

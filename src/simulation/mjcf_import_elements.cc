@@ -17,6 +17,9 @@ void AddElementsOf(int j, MjcfImport* in) {
     add("_spring",
         SpringLaw{.polynomial = {m.jnt_stiffness[j]}, .free = m.qpos_spring[at] - m.qpos0[at]});
   }
+  if (const double loss = m.dof_frictionloss[dof]; loss > 0.0) {
+    add("_friction", FrictionLaw{.coulomb = loss, .breakaway = loss});
+  }
   if (m.dof_armature[dof] > 0.0) add("_rotor", RotorLaw{.inertia = m.dof_armature[dof]});
 }
 

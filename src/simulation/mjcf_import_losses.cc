@@ -14,7 +14,7 @@ std::vector<std::string> JointsWith(const MjcfImport& in, const mjtNum* per_dof)
   for (int d = 0; d < in.m.nv; ++d) {
     const std::string name = in.JointNameOf(in.m.dof_jntid[d]);
     const bool held = in.m.jnt_type[in.m.dof_jntid[d]] == mjJNT_FREE;
-    const bool taken = per_dof != in.m.dof_frictionloss && IsScalar(in.m, in.m.dof_jntid[d]);
+    const bool taken = IsScalar(in.m, in.m.dof_jntid[d]);
     if (per_dof[d] != 0.0 && !held && !taken && (names.empty() || names.back() != name)) {
       names.push_back(name);
     }

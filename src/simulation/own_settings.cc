@@ -31,8 +31,8 @@ class SettingsTaker {
   void ForLeftOut(const Visit& visit) {
     for (int dof = 0; dof < m_->nv; ++dof) {
       if (IsHeld(dof)) continue;
-      visit("friction loss", &m_->dof_frictionloss[dof]);
       if (IsScalar(*m_, m_->dof_jntid[dof])) continue;  // force elements
+      visit("friction loss", &m_->dof_frictionloss[dof]);
       visit("armature", &m_->dof_armature[dof]);
       visit("damping", &m_->dof_damping[dof]);
     }

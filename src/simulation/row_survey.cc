@@ -34,7 +34,7 @@ class RowSurveyor {
       DrivenSample at;
       if (RunSummary summary = driven(t_s, &at); !summary.ok()) return summary;
       RunSummary summary = s_.solver.Follow(from, at.position);
-      if (summary.ok() && s_.solver.undriven() > 0) {
+      if (summary.ok() && s_.solver.undriven() > s_.spins.count()) {
         summary = {.stop = Stop::kUnsupported,
                    .message = "freedoms are not driven: their motion follows from forces",
                    .where = {},
@@ -56,6 +56,7 @@ class RowSurveyor {
     RowState& state = surveyed.state;
     surveyed.time_s = t_s;
     s_.solver.SolveVelocity(at.velocity);
+    s_.spins.StopVelocity();
     state.qpos = Eigen::Map<const VecX>(d->qpos, m->nq);
     state.qvel = Eigen::Map<const VecX>(d->qvel, m->nv);
     s_.system.Bias(&surveyed.velocity_term);

@@ -7,6 +7,7 @@
 
 #include "simulation/closure_solver.h"
 #include "simulation/constraint_system.h"
+#include "simulation/idle_spins.h"
 #include "simulation/loads.h"
 #include "simulation/powers.h"
 #include "simulation/recorder.h"
@@ -55,6 +56,7 @@ struct Session {
   SimulationRun* const run;
   ConstraintSystem system;
   ClosureSolver solver;
+  SpinStopper spins;
   Loads loads;
   Recorder recorder;
   WorkMeter work;

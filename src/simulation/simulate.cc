@@ -51,6 +51,7 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
       run(run_),
       system(engine, data.get()),
       solver(&system),
+      spins(&system),
       loads(engine, motion_),
       recorder(&system, Integrates(options_)),
       released(motion_.free() || IsReleased(engine)),

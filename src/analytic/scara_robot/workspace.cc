@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <numbers>
+#include <optional>
 #include <random>
+#include <string>
 
 #include "core/demand.h"
+#include "core/in_children.h"
 
 namespace mbv::scara {
 
@@ -63,44 +67,77 @@ std::vector<PoseCheck> MapSlice(const Parameters& parameters, const Limits& limi
   return map;
 }
 
-Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double phi,
-                      const Box3& box, int cells, std::uint64_t seed) {
-  MBV_DEMAND(cells > 0, cells);
+namespace {
+
+// What the cells of a layer across x gave.
+struct LayerCount {
+  std::int64_t reached = 0, usable = 0, at_edge = 0, differences = 0;
+};
+
+LayerCount CountLayer(const Parameters& parameters, const Limits& limits, double phi,
+                      const Box3& box, int cells, std::uint64_t seed, int layer) {
+  // Each of the layers before has taken its numbers: two samples per cell, three each.
   std::mt19937_64 random(seed);
+  random.discard(6ULL * static_cast<std::uint64_t>(cells) * static_cast<std::uint64_t>(cells) *
+                 static_cast<std::uint64_t>(layer));
   // 53 random bits, the same on every standard library.
   const auto uniform = [&random] { return static_cast<double>(random() >> 11) * 0x1.0p-53; };
   const Vec3 cell = (box.high - box.low) / cells;
-  std::int64_t reached = 0, usable = 0, at_edge = 0;
-  double differences = 0.0;
+  LayerCount count;
   const auto sample = [&](const Vec3& corner) {
     const Vec3 p(corner.x() + cell.x() * uniform(), corner.y() + cell.y() * uniform(),
                  corner.z() + cell.z() * uniform());
     const PoseCheck check = CheckPose(parameters, limits, Vec4(p.x(), p.y(), p.z(), phi));
     const bool in = check.reach == Reach::kReachable;
-    reached += in;
-    usable += in && check.singularity.s_min >= kNearlySingular;
+    count.reached += in;
+    count.usable += in && check.singularity.s_min >= kNearlySingular;
     return in;
   };
-  for (int i = 0; i < cells; ++i) {
-    for (int j = 0; j < cells; ++j) {
-      for (int k = 0; k < cells; ++k) {
-        const Vec3 corner = box.low + cell.cwiseProduct(Vec3(i, j, k));
-        const bool first = sample(corner), second = sample(corner);
-        differences += first != second;
-        const auto [least, most] = std::minmax({i, j, k});
-        at_edge += (first || second) && (least == 0 || most == cells - 1);
-      }
+  for (int j = 0; j < cells; ++j) {
+    for (int k = 0; k < cells; ++k) {
+      const Vec3 corner = box.low + cell.cwiseProduct(Vec3(layer, j, k));
+      const bool first = sample(corner), second = sample(corner);
+      count.differences += first != second;
+      const auto [least, most] = std::minmax({layer, j, k});
+      count.at_edge += (first || second) && (least == 0 || most == cells - 1);
     }
   }
-  // Per cell the mean of two samples; half their squared difference estimates the variance of one.
-  const double cell_volume = cell.prod();
+  return count;
+}
+
+}  // namespace
+
+Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double phi,
+                      const Box3& box, int cells, std::uint64_t seed, int jobs) {
+  MBV_DEMAND(cells > 0, cells);
+  LayerCount all;
   Volume volume;
-  volume.touches_box = at_edge > 0;
+  const auto work = [&](size_t layer) {
+    const LayerCount count =
+        CountLayer(parameters, limits, phi, box, cells, seed, static_cast<int>(layer));
+    return std::string(reinterpret_cast<const char*>(&count), sizeof count);
+  };
+  ShareOut(static_cast<size_t>(cells), jobs, work,
+           [&](size_t, const std::optional<std::string>& bytes) {
+             volume.lost = volume.lost || !bytes;
+             if (!bytes) return;
+             LayerCount count;
+             std::memcpy(&count, bytes->data(), sizeof count);
+             all.reached += count.reached;
+             all.usable += count.usable;
+             all.at_edge += count.at_edge;
+             all.differences += count.differences;
+           });
+  if (volume.lost) return volume;
+  // Per cell the mean of two samples; half their squared difference estimates the variance of one.
+  const double cell_volume = ((box.high - box.low) / cells).prod();
+  const auto reached = static_cast<double>(all.reached);
+  volume.touches_box = all.at_edge > 0;
   volume.samples = 2LL * cells * cells * cells;
-  volume.volume_m3 = cell_volume * static_cast<double>(reached) / 2.0;
-  volume.uncertainty_m3 = 2.0 * cell_volume * std::sqrt(differences) / 2.0;
-  volume.fraction_usable =
-      reached > 0 ? static_cast<double>(usable) / static_cast<double>(reached) : 0.0;
+  volume.volume_m3 = cell_volume * reached / 2.0;
+  volume.uncertainty_m3 =
+      2.0 * cell_volume * std::sqrt(static_cast<double>(all.differences)) / 2.0;
+  volume.fraction_usable = reached > 0 ? static_cast<double>(all.usable) / reached : 0.0;
   return volume;
 }
 

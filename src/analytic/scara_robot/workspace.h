@@ -56,11 +56,12 @@ struct Volume {
   double fraction_usable = kNan;  ///< of it: s_min ≥ kNearlySingular
   std::int64_t samples = 0;
   bool touches_box = false;  ///< reached in the outermost cells: there may be more beyond
+  bool lost = false;         ///< a process that shared the work was killed: nothing is known
 };
 /// `cells` cells along each axis of the box, two samples per cell (their differences give the
-/// standard error); > 0. The same seed gives the same numbers.
+/// standard error); > 0. The same seed gives the same numbers, whatever the number of jobs.
 [[nodiscard]] Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double phi,
-                                    const Box3& box, int cells, std::uint64_t seed);
+                                    const Box3& box, int cells, std::uint64_t seed, int jobs = 1);
 
 /// The workspace that the paper draws: radius 100 mm from z = −100 to −230 mm (its text says
 /// 90 mm high; the faces that it evaluates are 130 mm apart).

@@ -66,23 +66,22 @@ void AddSlice(const Parameters& parameters, const Limits& limits, double z,
 }
 
 // In a box that is large enough for a robot of any size.
-Volume WholeVolume(const Parameters& parameters, const Limits& limits, double yaw) {
+Volume WholeVolume(const Parameters& parameters, const Limits& limits, double yaw, int jobs) {
   constexpr int kCells = 60, kMostTries = 12;
   constexpr std::uint64_t kSeed = 2019;
   Box3 box;
-  Volume volume = EstimateVolume(parameters, limits, yaw, box, kCells, kSeed);
+  Volume volume = EstimateVolume(parameters, limits, yaw, box, kCells, kSeed, jobs);
   for (int k = 0; k < kMostTries && volume.touches_box; ++k) {
     const Vec3 middle = 0.5 * (box.low + box.high), half = 0.75 * (box.high - box.low);
     box = {middle - half, middle + half};
-    volume = EstimateVolume(parameters, limits, yaw, box, kCells, kSeed);
+    volume = EstimateVolume(parameters, limits, yaw, box, kCells, kSeed, jobs);
   }
   return volume;
 }
 
 }  // namespace
 
-WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
-                                   const RangeFilter& /*within_ranges*/) {
+WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRequest& request) {
   WorkspaceForm outcome;
   outcome.summary = RunSummary::Done();
   const Parameters parameters = ParametersOf(mechanism);
@@ -107,7 +106,9 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
     }
   }
   for (double yaw : {0.0, 45.0}) {
-    const Volume v = WholeVolume(parameters, limits, yaw * kDegree);
+    request.Tell(yaw > 0.0 ? 0.6 : 0.2);
+    const Volume v = WholeVolume(parameters, limits, yaw * kDegree, request.jobs);
+    if (v.lost) return LostWork();
     outcome.text += fmt::format(
         "reachable volume at yaw {:g} deg: {:.4e} +- {:.1e} m^3 (two standard "
         "errors, {} samples); {:.1f} % of it away from singular poses\n",

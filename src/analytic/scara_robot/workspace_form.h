@@ -7,6 +7,6 @@ namespace mbv::scara {
 
 /// The paper's cylinder point by point, volumes, singularity maps (CSV, SVG).
 [[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
-                                                 const RangeFilter& within_ranges);
+                                                 const WorkspaceRequest& request);
 
 }  // namespace mbv::scara

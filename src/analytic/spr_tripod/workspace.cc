@@ -4,9 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <unordered_map>
 
 #include "core/demand.h"
+#include "core/in_children.h"
 #include "core/spatial.h"
 
 namespace mbv::spr_tripod {
@@ -196,35 +199,58 @@ bool IsReachable(const Geometry& geometry, const Vec3& r) {
   return !PosturesAt(geometry, r).empty();
 }
 
+namespace {
+
+// Per cell of a layer across x: how many postures (up to 3), and 4 if the filter lets one pass.
+std::string LayerOfVoxels(const Geometry& geometry, size_t layer, size_t n, const Box3& box,
+                          const PoseFilter& filter) {
+  const Vec3 cell = (box.upper - box.lower) / static_cast<double>(n);
+  std::string voxels(n * n, '\0');
+  for (size_t j = 0; j < n; ++j) {
+    for (size_t k = 0; k < n; ++k) {
+      const Vec3 steps(static_cast<double>(layer), static_cast<double>(j), static_cast<double>(k));
+      const auto found =
+          PosturesAt(geometry, box.lower + cell.cwiseProduct(steps + Vec3::Constant(0.5)));
+      const bool passes = filter && std::any_of(found.begin(), found.end(), filter);
+      voxels[j * n + k] = static_cast<char>(std::min<size_t>(found.size(), 3) + (passes ? 4 : 0));
+    }
+  }
+  return voxels;
+}
+
+}  // namespace
+
 VoxelCount CountVoxels(const Geometry& geometry, int cells, const Box3& box,
-                       const PoseFilter& filter) {
+                       const PoseFilter& filter, int jobs,
+                       const std::function<void(double)>& progress) {
   MBV_DEMAND(cells > 0, cells);
-  const Vec3 cell = (box.upper - box.lower) / cells;
   const auto n = static_cast<size_t>(cells);
-  std::vector<char> inside(n * n * n, 0);
-  const auto at = [&](size_t i, size_t j, size_t k) -> char& {
-    return inside[(i * n + j) * n + k];
-  };
+  std::string voxels;
+  ShareOut(
+      n, jobs, [&](size_t layer) { return LayerOfVoxels(geometry, layer, n, box, filter); },
+      [&](size_t i, const std::optional<std::string>& layer) {
+        voxels += layer.value_or("");
+        if (progress) progress(static_cast<double>(i + 1) / static_cast<double>(n));
+      });
+  if (voxels.size() != n * n * n) return {.uncertainty = kNan, .several = kNan, .filtered = kNan};
+  const auto at = [&](size_t i, size_t j, size_t k) { return voxels[(i * n + j) * n + k]; };
+  const auto inside = [&](size_t i, size_t j, size_t k) { return (at(i, j, k) & 3) != 0; };
   long count = 0, several = 0, filtered = 0, boundary = 0;
   for (size_t i = 0; i < n; ++i) {
     for (size_t j = 0; j < n; ++j) {
       for (size_t k = 0; k < n; ++k) {
-        const Vec3 steps(static_cast<double>(i), static_cast<double>(j), static_cast<double>(k));
-        const auto found =
-            PosturesAt(geometry, box.lower + cell.cwiseProduct(steps + Vec3::Constant(0.5)));
-        at(i, j, k) = !found.empty();
-        count += !found.empty();
-        several += found.size() > 1;
-        filtered += filter && std::any_of(found.begin(), found.end(), filter);
+        const bool in = inside(i, j, k);
+        count += in;
+        several += (at(i, j, k) & 3) > 1;
+        filtered += (at(i, j, k) & 4) != 0;
         // Pairs of neighbours of which one is inside: a face of the boundary between them.
-        boundary += (i > 0 && at(i, j, k) != at(i - 1, j, k)) +
-                    (j > 0 && at(i, j, k) != at(i, j - 1, k)) +
-                    (k > 0 && at(i, j, k) != at(i, j, k - 1));
+        boundary += (i > 0 && in != inside(i - 1, j, k)) + (j > 0 && in != inside(i, j - 1, k)) +
+                    (k > 0 && in != inside(i, j, k - 1));
       }
     }
   }
   // A cell cut by the boundary counts whole or not at all: a variance of 1/12.
-  const double size = cell.prod();
+  const double size = ((box.upper - box.lower) / cells).prod();
   return {static_cast<double>(count) * size,
           4.0 * std::sqrt(static_cast<double>(boundary) / 12.0) * size,
           static_cast<double>(several) * size, static_cast<double>(filtered) * size};

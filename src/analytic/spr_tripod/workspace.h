@@ -57,8 +57,10 @@ struct VoxelCount {
   double several = 0.0;       ///< of the volume: reached with several leg triples [m³]
   double filtered = 0.0;      ///< of the volume: what the filter lets pass [m³]
 };
+/// NaN where one of the `jobs` processes was killed; nothing else depends on their number.
 [[nodiscard]] VoxelCount CountVoxels(const Geometry& geometry, int cells, const Box3& box = {},
-                                     const PoseFilter& filter = {});
+                                     const PoseFilter& filter = {}, int jobs = 1,
+                                     const std::function<void(double)>& progress = {});
 
 /// The leg triples within the stroke that put O_A at r on the home branch (the assembly that the
 /// forward problem finds): at most one where z > b/2.
@@ -108,6 +110,8 @@ struct WorkspaceOptions {
       {};  ///< of sections [m]; empty: round ones where the z axis is reached
   int section_azimuths = 180;
   PoseFilter within_ranges = {};  ///< of the joints besides the stroke; empty: there are none
+  int jobs = 1;                   ///< processes at once for the voxels
+  std::function<void(double)> progress = {};  ///< of the voxels, which take nearly all the time
 };
 
 /// Heights between which (0, 0, z) is reached without tilt [m].

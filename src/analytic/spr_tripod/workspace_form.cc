@@ -75,12 +75,14 @@ PoseFilter JointFilter(const Mechanism& mechanism, const RangeFilter& within_ran
 
 }  // namespace
 
-WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const RangeFilter& within_ranges) {
+WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRequest& request) {
   WorkspaceForm outcome;
   const Geometry geometry = ReadGeometry(mechanism, &outcome.diagnostics);
   if (outcome.diagnostics.has_errors()) return outcome;
   const WorkspaceReport report =
-      ReportWorkspace(geometry, {.within_ranges = JointFilter(mechanism, within_ranges)});
+      ReportWorkspace(geometry, {.within_ranges = JointFilter(mechanism, request.within_ranges),
+                                 .jobs = request.jobs,
+                                 .progress = request.progress});
   outcome.summary = report.summary;
   outcome.agree = report.contradictions.empty();
   outcome.text = report.text;

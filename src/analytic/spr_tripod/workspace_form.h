@@ -7,6 +7,6 @@ namespace mbv::spr_tripod {
 
 /// The six faces (STL, PLY) and sections (CSV, SVG).
 [[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
-                                                 const RangeFilter& within_ranges);
+                                                 const WorkspaceRequest& request);
 
 }  // namespace mbv::spr_tripod

@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "analytic/spr_tripod/workspace.h"
+#include "analytic/workspace_form.h"
 #include "core/demand.h"
 
 namespace mbv::spr_tripod {
@@ -90,7 +91,7 @@ std::string AddVoxels(const Geometry& geometry, const WorkspaceOptions& options,
   const Vec3 upper(ranges.x.upper, ranges.y.upper, ranges.z.upper);
   const Vec3 margin = 0.05 * (upper - lower);
   const VoxelCount count = CountVoxels(geometry, options.voxels, {lower - margin, upper + margin},
-                                       options.within_ranges);
+                                       options.within_ranges, options.jobs, options.progress);
   report->volumes.push_back({"voxels", count.volume, count.uncertainty});
   std::string text;
   if (options.within_ranges) {
@@ -232,6 +233,11 @@ WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions
   const WorkspaceRanges ranges = RangesOf(geometry, 20);
   std::string within;
   if (options.voxels > 0) within = AddVoxels(geometry, options, ranges, &report);
+  if (options.voxels > 0 && std::isnan(report.volumes.back().value)) {
+    report.summary = LostWork().summary;
+    report.text = "no workspace: " + report.summary.message + "\n";
+    return report;
+  }
   for (std::string& text : Contradictions(report, ranges.det)) {
     report.contradictions.push_back(std::move(text));
   }
