@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/demand.h"
 
@@ -44,9 +45,28 @@ SpinStopper::SpinStopper(ConstraintSystem* system)
   }
 }
 
-Vec3 SpinStopper::Direction(size_t k) const {
+Mat3 SpinStopper::RotationOf(size_t k) const {
   BodyPoses(system_->engine(), *system_->data(), &X_WB_);
-  return X_WB_[static_cast<size_t>(spins_[k].bodies[0])].linear() * spins_[k].n_B;
+  return X_WB_[static_cast<size_t>(spins_[k].bodies[0])].linear();
+}
+
+Vec3 SpinStopper::Direction(size_t k) const { return RotationOf(k) * spins_[k].n_B; }
+
+// (2), all components
+Vec3 SpinStopper::AngularVelocity(size_t k) const {
+  const mjData& d = *system_->data();
+  Vec3 w = Vec3::Zero();
+  for (const int dof : places_[k].chain) w += AxisOf(d, dof) * d.qvel[dof];
+  return w;
+}
+
+Vec3 SpinStopper::AngularAcceleration(size_t k) const {
+  const mjData& d = *system_->data();
+  Vec3 alpha = Vec3::Zero();
+  for (const int dof : places_[k].chain) {
+    alpha += AxisOf(d, dof) * d.qacc[dof] + AxisRate(d, dof) * d.qvel[dof];
+  }
+  return alpha;
 }
 
 // (1)
@@ -63,43 +83,52 @@ VecX SpinStopper::Motion(size_t k) const {
   return motion;
 }
 
+void SpinStopper::Turn(size_t k, double angle) {
+  VecX motion = angle * Motion(k);
+  mj_integratePos(system_->engine().m.get(), system_->data()->qpos, motion.data(), 1.0);
+}
+
 RunSummary SpinStopper::TakeLeastTurns(ClosureSolver* solver, const DrivenSample& first) {
   if (spins_.empty()) return RunSummary::Done();
-  const EngineModel& engine = system_->engine();
   for (size_t k = 0; k < spins_.size(); ++k) {
-    VecX motion = Motion(k);
-    const Mat3 R_WB = X_WB_[static_cast<size_t>(spins_[k].bodies[0])].linear();
-    motion *= -TurnFromHome(*engine.mechanism, spins_[k], R_WB);
-    mj_integratePos(engine.m.get(), system_->data()->qpos, motion.data(), 1.0);
+    Turn(k, -TurnFromHome(*system_->engine().mechanism, spins_[k], RotationOf(k)));
   }
   return solver->Close(first.position);
 }
 
-// (2)
 void SpinStopper::StopVelocity() {
   if (spins_.empty()) return;
   mjData* d = system_->data();
   Eigen::Map<VecX> qvel(d->qvel, system_->nv());
   for (size_t k = 0; k < spins_.size(); ++k) {
-    const Vec3 n = Direction(k);
-    double rate = 0.0;
-    for (const int dof : places_[k].chain) rate += n.dot(AxisOf(*d, dof)) * qvel[dof];
-    qvel -= rate * Motion(k);
+    qvel -= Direction(k).dot(AngularVelocity(k)) * Motion(k);
   }
   mj_comVel(system_->engine().m.get(), d);
 }
 
 void SpinStopper::StopAcceleration() {
-  const mjData& d = *system_->data();
   Eigen::Map<VecX> qacc(system_->data()->qacc, system_->nv());
   for (size_t k = 0; k < spins_.size(); ++k) {
-    const Vec3 n = Direction(k);
-    double rate = 0.0;
-    for (const int dof : places_[k].chain) {
-      rate += n.dot(AxisOf(d, dof)) * qacc[dof] + n.dot(AxisRate(d, dof)) * d.qvel[dof];
-    }
-    qacc -= rate * Motion(k);
+    qacc -= Direction(k).dot(AngularAcceleration(k)) * Motion(k);
   }
+}
+
+RunSummary SpinStopper::Transport(double t_s, const DrivenSample& at, ClosureSolver* solver,
+                                  bool* turned) {
+  *turned = !last_lines_.empty();
+  std::vector<LastLine> lines;
+  for (size_t k = 0; k < spins_.size(); ++k) {
+    const MovingDirection line =
+        DirectionOf(Direction(k), AngularVelocity(k), AngularAcceleration(k));
+    const Mat3 here = RotationOf(k);
+    lines.push_back({line, here});
+    if (!*turned) continue;
+    lines[k].R_WB = Transported(last_lines_[k].R_WB, last_lines_[k].line, line, t_s - last_s_);
+    Turn(k, -TurnBeyond(lines[k].R_WB, here, line.n));
+  }
+  last_lines_ = std::move(lines);
+  last_s_ = t_s;
+  return *turned ? solver->Close(at.position) : RunSummary::Done();
 }
 
 RunSummary SpinStopper::CheckIdle(const VecX& tau) const {

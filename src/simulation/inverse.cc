@@ -46,6 +46,13 @@ class Predictor {
   VecX mean_, v_new_, work_;
 };
 
+void SolveRates(Session* s, const DrivenSample& at) {
+  s->solver.SolveVelocity(at.velocity);
+  s->spins.StopVelocity();
+  s->solver.SolveAcceleration(at.acceleration);
+  s->spins.StopAcceleration();
+}
+
 RunSummary SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* tau) {
   const mjModel* m = s->engine.m.get();
   mjData* d = s->data.get();
@@ -117,10 +124,13 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
       }
       s->FindShared();
     }
-    s->solver.SolveVelocity(samples[i].velocity);
-    s->spins.StopVelocity();
-    s->solver.SolveAcceleration(samples[i].acceleration);
-    s->spins.StopAcceleration();
+    SolveRates(s, samples[i]);
+    bool turned = false;
+    if (RunSummary summary = s->spins.Transport(times[i], samples[i], &s->solver, &turned);
+        !summary.ok()) {
+      return At(summary, times[i]);
+    }
+    if (turned) SolveRates(s, samples[i]);
     if (RunSummary summary = SolveDynamics(s, times[i], samples[i], &tau); !summary.ok()) {
       return At(summary, times[i]);
     }
