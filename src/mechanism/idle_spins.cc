@@ -82,9 +82,7 @@ class SpinFinder {
 
  private:
   [[nodiscard]] bool Spins(int body) const { return group_[static_cast<size_t>(body)] == which_; }
-  [[nodiscard]] const Pose& Home(int body) const {
-    return m_.X_WB_home[static_cast<size_t>(body)];
-  }
+  [[nodiscard]] const Pose& Home(int body) const { return m_.X_WB_home[static_cast<size_t>(body)]; }
   [[nodiscard]] const std::string& NameOf(int body) const {
     return m_.bodies[static_cast<size_t>(body)].name;
   }
@@ -115,7 +113,9 @@ class SpinFinder {
     return bodies;
   }
 
-  [[nodiscard]] double BesideLine(const Vec3& p_W) const { return (p_W - p_WP_).cross(n_W_).norm(); }
+  [[nodiscard]] double BesideLine(const Vec3& p_W) const {
+    return (p_W - p_WP_).cross(n_W_).norm();
+  }
   [[nodiscard]] bool OnLine(int body, const Vec3& p_B) const {
     return BesideLine(Home(body) * p_B) <= kBeside * distance_;
   }

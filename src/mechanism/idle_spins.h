@@ -23,12 +23,12 @@ namespace mbv {
 
 /// What spins together about the line through two balls.
 struct Spin {
-  std::string name;           ///< of the body, or of the part that its bodies belong to
-  std::vector<int> bodies;    ///< the first one carries balls[0]; slides along the line join them
+  std::string name;            ///< of the body, or of the part that its bodies belong to
+  std::vector<int> bodies;     ///< the first one carries balls[0]; slides along the line join them
   std::array<int, 2> balls{};  ///< joints
-  Vec3 p_BP = Vec3::Zero();   ///< centre of balls[0] in the frame of bodies[0] [m]
-  Vec3 n_B = Vec3::UnitZ();   ///< unit, towards balls[1]
-  std::string why_not;        ///< why it is not idle; empty: it is
+  Vec3 p_BP = Vec3::Zero();    ///< centre of balls[0] in the frame of bodies[0] [m]
+  Vec3 n_B = Vec3::UnitZ();    ///< unit, towards balls[1]
+  std::string why_not;         ///< why it is not idle; empty: it is
 };
 
 /// Every part that two balls and nothing else connect with the rest, at the home pose.

@@ -59,10 +59,10 @@ std::string BytesOf(const SteppedRun& run) {
   const ConvergencePoint& p = run.point;
   std::string bytes;
   const auto put = [&](double x) { bytes.append(reinterpret_cast<const char*>(&x), sizeof x); };
-  for (const double x : {p.step_s, p.time_constant_s, static_cast<double>(p.steps), p.cpu_s,
-                         p.closure_m, p.pose_m, p.error.smooth, p.error.breaks,
-                         static_cast<double>(run.forces.rows()),
-                         static_cast<double>(run.forces.cols())}) {
+  for (const double x :
+       {p.step_s, p.time_constant_s, static_cast<double>(p.steps), p.cpu_s, p.closure_m, p.pose_m,
+        p.error.smooth, p.error.breaks, static_cast<double>(run.forces.rows()),
+        static_cast<double>(run.forces.cols())}) {
     put(x);
   }
   for (Eigen::Index i = 0; i < run.forces.size(); ++i) put(run.forces.data()[i]);
@@ -200,8 +200,8 @@ class StepStudy {
 
   // Inverse mode, which has neither step nor time constant.
   bool RunTruth() {
-    SimulatedWitness inverse = Simulate({.mode = SimulationMode::kInverse}, "inverse mode",
-                                        &driven_, {});
+    SimulatedWitness inverse =
+        Simulate({.mode = SimulationMode::kInverse}, "inverse mode", &driven_, {});
     if (!inverse.run.summary.ok()) return Fail("inverse mode: " + inverse.run.summary.message);
     truth_ = std::move(inverse.run.trace);
     truth_forces_ = DriveForceTable(mechanism(), truth_);
@@ -314,10 +314,10 @@ class StepStudy {
     for (const PlannedSeries& planned : all) {
       const auto first = runs.begin() + static_cast<std::ptrdiff_t>(next);
       next += planned.grid.size();
-      forces = AddRuns(planned.series, {std::make_move_iterator(first),
-                                        std::make_move_iterator(
-                                            first + static_cast<std::ptrdiff_t>(
-                                                        planned.grid.size()))});
+      forces = AddRuns(
+          planned.series,
+          {std::make_move_iterator(first),
+           std::make_move_iterator(first + static_cast<std::ptrdiff_t>(planned.grid.size()))});
     }
     return forces;
   }
@@ -375,16 +375,14 @@ class StepStudy {
           .stock = true},
          Both(stock)},
         {{.name = "stock_step",
-          .title =
-              fmt::format("stock engine, step at time constant {:g} s", stock * steps.front()),
+          .title = fmt::format("stock engine, step at time constant {:g} s", stock * steps.front()),
           .stock = true,
           .knob = Knob::kStep},
          StepAlone(stock)},
         Constants("stock", true, steps.back(), kStockConstants)};
   }
 
-  [[nodiscard]] static PlannedSeries Constants(const std::string& engine, bool stock,
-                                               double step_s,
+  [[nodiscard]] static PlannedSeries Constants(const std::string& engine, bool stock, double step_s,
                                                const std::array<double, 5>& constants) {
     std::vector<std::pair<double, double>> grid;
     for (const double constant : constants) grid.emplace_back(step_s, constant);

@@ -139,7 +139,8 @@ class MapRows {
   [[nodiscard]] std::string BytesOf(size_t row) const {
     std::string bytes;
     for (int c = 0; c < map_.axes[0].count; ++c) {
-      const std::vector<double> cell = Cell(PointOf(map_.axes[0], c), PointOf(map_.axes[1], static_cast<int>(row)));
+      const std::vector<double> cell =
+          Cell(PointOf(map_.axes[0], c), PointOf(map_.axes[1], static_cast<int>(row)));
       bytes.append(reinterpret_cast<const char*>(cell.data()), cell.size() * sizeof(double));
     }
     return bytes;

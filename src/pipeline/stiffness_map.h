@@ -49,7 +49,7 @@ struct MapResult {
   std::vector<int> rank;                    ///< −1 where there is no stiffness
   size_t points = 0, reached = 0;           ///< within the circle
   size_t out_of_range = 0;  ///< poses that only joints or drives beyond their ranges would reach
-  int lost_rows = 0;  ///< whose process was killed
+  int lost_rows = 0;        ///< whose process was killed
   double wall_s = 0.0;
   bool closed_form = false;  ///< else frame elements
 };

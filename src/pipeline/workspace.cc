@@ -84,10 +84,9 @@ WorkspaceOutcome ComputeWorkspace(const Mechanism& mechanism, bool pictures, int
   if (HasRanges(mechanism)) {
     within_ranges = [&](const std::vector<Pose>& X_WB) { return IsWithinRanges(mechanism, X_WB); };
   }
-  const WorkspaceForm form =
-      row->compute(mechanism, {.within_ranges = within_ranges,
-                               .jobs = jobs,
-                               .progress = StageOf(progress, "workspace")});
+  const WorkspaceForm form = row->compute(
+      mechanism,
+      {.within_ranges = within_ranges, .jobs = jobs, .progress = StageOf(progress, "workspace")});
   outcome.summary = form.summary;
   outcome.diagnostics.Append(form.diagnostics);
   outcome.text = form.text;

@@ -3,9 +3,10 @@
 //
 // Newton in maximal coordinates on an independent subset of the joint rows plus one row per
 // command; the matrix is factored once near the solution and then refined against. Redundant joint
-// rows are dropped and their residuals checked. Idle spins (mechanism/idle_spins.h) have a row each:
-// no Newton step turns them, and their rates are zero. From sample to sample their lines are
-// transported parallel (core/parallel_transport.h); the first sample takes the least turn from home.
+// rows are dropped and their residuals checked. Idle spins (mechanism/idle_spins.h) have a row
+// each: no Newton step turns them, and their rates are zero. From sample to sample their lines are
+// transported parallel (core/parallel_transport.h); the first sample takes the least turn from
+// home.
 #pragma once
 
 #include <vector>

@@ -9,6 +9,7 @@
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility_report.h"
 #include "mechanism/channel_count.h"
+#include "mechanism/idle_spins.h"
 #include "model_file/load_model.h"
 #include "scenario/figures_reader.h"
 #include "scenario/file_parts.h"
@@ -279,11 +280,22 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     return names;
   }
 
+  // Why what spins between two balls needs a command.
+  [[nodiscard]] std::string SpinHint() const {
+    std::string hint;
+    for (const Spin& spin : FindSpins(*mechanism_)) {
+      if (spin.why_not.empty()) continue;
+      hint += fmt::format("; the spin of {} about the line through its balls is not idle: {}",
+                          spin.name, spin.why_not);
+    }
+    return hint;
+  }
+
   [[nodiscard]] std::string CountHint(const CommandRank& rank, bool too_few) const {
     if (too_few) {
       return "command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives under "
              "motion.equal; what moves by forces needs motion.initial; not held yet: " +
-             JoinWords(rank.free_joints);
+             JoinWords(rank.free_joints) + SpinHint();
     }
     std::string hint = "leave commands out: each further one contradicts the others";
     if (!rank.dependent.empty()) hint += "; " + JoinWords(DependentNames(rank)) + " are dependent";

@@ -15,7 +15,9 @@ namespace {
 constexpr double kNoMoment = 1e-9;
 
 // World axis of the rotation that a velocity is, and its rate.
-Eigen::Map<const Vec3> AxisOf(const mjData& d, int dof) { return Eigen::Map<const Vec3>(d.cdof + 6 * dof); }
+Eigen::Map<const Vec3> AxisOf(const mjData& d, int dof) {
+  return Eigen::Map<const Vec3>(d.cdof + 6 * dof);
+}
 Eigen::Map<const Vec3> AxisRate(const mjData& d, int dof) {
   return Eigen::Map<const Vec3>(d.cdof_dot + 6 * dof);
 }

@@ -36,8 +36,8 @@ class SpinStopper {
   void StopVelocity();
   /// Takes n·ε out of d.qacc, at the velocity that mj_comVel was evaluated for.
   void StopAcceleration();
-  /// Transports the lines to the state of time t_s, with velocity and acceleration, from that of the
-  /// last call: where there was one, d.qpos is turned and closed again, and velocity and
+  /// Transports the lines to the state of time t_s, with velocity and acceleration, from that of
+  /// the last call: where there was one, d.qpos is turned and closed again, and velocity and
   /// acceleration must be solved for anew (*turned).
   [[nodiscard]] RunSummary Transport(double t_s, const DrivenSample& at, ClosureSolver* solver,
                                      bool* turned);
@@ -46,8 +46,8 @@ class SpinStopper {
 
  private:
   struct Place {
-    int first_dof = -1;   ///< of the ball on which the part hangs
-    int second_dof = -1;  ///< of the other ball, if it is in the tree
+    int first_dof = -1;      ///< of the ball on which the part hangs
+    int second_dof = -1;     ///< of the other ball, if it is in the tree
     std::vector<int> chain;  ///< velocities that turn the part
   };
   // n; ω and ε of the part at the data's velocity and acceleration.

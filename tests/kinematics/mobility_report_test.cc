@@ -72,11 +72,23 @@ TEST(MobilityReport, TheSpatialSliderCrankIsStaticallyDeterminate) {
 TEST(MobilityReport, ABallAtBothEndsLetsTheRodSpin) {
   Mechanism m = Shipped("slider_crank");
   m.joints[m.FindJoint("C")].kind = JointKind::kSpherical;
+  // A round rod: nothing turns it.
+  const MobilityReport idle = ReportMobility(m);
+  EXPECT_EQ(idle.freedoms(), 1);
+  EXPECT_EQ(idle.home.undriven, 0);
+  EXPECT_EQ(idle.home.idle_spins, (Names{"rod"}));
+  EXPECT_TRUE(idle.free_bodies.empty());
+  // One that its weight turns.
+  m.bodies[static_cast<size_t>(m.FindBody("rod"))].p_BoBcm_B += Vec3(1e-3, 2e-3, 3e-3);
   const MobilityReport report = ReportMobility(m);
   EXPECT_EQ(report.freedoms(), 2);
   EXPECT_EQ(report.home.undriven, 1);
   EXPECT_FALSE(report.drives_singular());
   EXPECT_EQ(report.free_bodies, (Names{"rod"}));
+  EXPECT_TRUE(report.home.idle_spins.empty());
+  ASSERT_EQ(report.spins_not_idle.size(), 1u);
+  EXPECT_NE(report.spins_not_idle[0].find("rod: the centre of mass of rod lies"),
+            std::string::npos);
 }
 
 TEST(MobilityReport, TheStewartPlatformHasSixFreedomsAndNothingRedundant) {

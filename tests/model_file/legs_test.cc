@@ -57,6 +57,11 @@ TEST(Legs, AreTheSameAsWrittenByHand) {
   EXPECT_NE(leg.find("leg_lower"), std::string::npos) << leg;
   EXPECT_EQ(Written("legs: {leg: {" + ends + ", ends: [spherical, universal]" + kHalves + "}}\n"),
             Written(ByHand(ball, universal)));
+  const std::string balls = "legs: {leg: {" + ends + ", ends: [spherical, spherical]";
+  EXPECT_EQ(Written(balls + kHalves + "}}\n"), Written(ByHand(ball, ball)));
+  // Two angles of a universal joint, as roll, pitch, yaw.
+  EXPECT_EQ(Written(balls + ", guess: [0.1, -0.2]" + kHalves + "}}\n"),
+            Written(ByHand(ball + ", guess: [-0.2, 0.1, 0]", ball)));
   // Every number arrives.
   for (const char* bent : {"along: 0.002", "across: 0.01", "mass: 1", "com: c - 0.02"}) {
     std::string halves = kHalves;
@@ -87,9 +92,9 @@ TEST(Legs, OfPartsSeeTheirParametersAndNames) {
 TEST(Legs, WhatMeansNothingIsAFinding) {
   EXPECT_EQ(LegFindings("from: world.B, to: top.A"),
             "m.yaml:6:13: error: legs.leg: 'length' is missing\n");
-  EXPECT_EQ(LegFindings("from: world.B, to: top.A, length: 0.5, ends: [spherical, spherical]"),
-            "m.yaml:6:59: error: legs.leg.ends: two ends of kind spherical leave the leg to spin "
-            "about its line\n  hint: one end universal, the other spherical\n");
+  EXPECT_EQ(LegFindings("from: world.B, to: top.A, length: 0.5, ends: [universal, universal]"),
+            "m.yaml:6:59: error: legs.leg.ends: two ends of kind universal leave the leg no turn "
+            "about its line\n  hint: at least one end spherical\n");
   EXPECT_EQ(LegFindings("from: world.B, to: top.A, length: 0.5, lower: {mass: 1, com: 0.1}"),
             "m.yaml:6:60: error: legs.leg.lower: 'along' is missing\n");
   EXPECT_NE(

@@ -1,5 +1,6 @@
 // The Stewart platform's inverse kinematics by hand: leg i has the length |p + R A_i − B_i|, with
 // B_i on the base, A_i on the platform in its own axes, p and R the platform's pose.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -111,6 +112,86 @@ TEST(Stewart, APlatformJointOffByAMicrometreWouldBeNoticed) {
   Leg bent = Legs()[0];
   bent.top.x() += 1e-6;
   EXPECT_GT(std::abs(legs(0) - Length(bent, pose)), 1e3 * kTolerance_m);
+}
+
+// The six legs with balls at both ends, and the same with one end universal, where a leg's turn
+// about its line is what the universal joint makes of it: with next to no inertia about the line
+// that is the same mechanism.
+Mechanism WithLegs(bool balls, const std::string& along) {
+  const std::string leg = ", lower: {mass: 1.5, com: 0.125, along: " + along +
+                          ", across: 0.006}, upper: {mass: 1, com: 0.11, along: " + along +
+                          ", across: 0.004}}\n";
+  std::string world = "world: {frames: {", platform;
+  for (int i = 0; i < 6; ++i) {
+    const Leg& at = Legs()[static_cast<size_t>(i)];
+    const auto point = [&](const char* name, const Vec3& p) {
+      return fmt::format("{}{}: [{:.17g}, {:.17g}, {:.17g}], ", name, i + 1, p.x(), p.y(), p.z());
+    };
+    world += point("B", at.base);
+    platform += point("A", at.top);
+  }
+  std::string text =
+      "name: six\n" + world + "}}\n" +
+      "bodies:\n  platform: {mass: 12, com: [0, 0, 0.01], inertia: [0.3, 0.3, 0.5], frames: {" +
+      platform + "}}\n" +
+      "joints:\n  float: {kind: free, parent: world, child: platform, guess: [0, 0, 0.4, 0, 0, 0],"
+      " closure: false}\noutputs: {platform: platform}\nlegs:\n";
+  for (int i = 1; i <= 6; ++i) {
+    text += fmt::format("  leg{0}: {{from: world.B{0}, to: platform.A{0}, length: 0.5{1}{2}", i,
+                        balls ? ", ends: [spherical, spherical]" : "", leg);
+  }
+  LoadResult loaded = LoadModelText(text, "six.yaml");
+  if (!loaded.mechanism.has_value()) throw std::runtime_error(loaded.diagnostics.Text());
+  return *std::move(loaded.mechanism);
+}
+
+ReferenceRun Dance(const Mechanism& mechanism) {
+  Motion motion = At({0.0, 0.0, kHeight_m, 0.0, 0.0, 0.0});
+  motion.duration_s = 1.0;
+  for (size_t c = 0; c < 6; ++c) {
+    const double size = c < 3 ? 0.03 : 0.2;
+    motion.commands[c].profile.terms.push_back(
+        SineTerm{.amplitude = size,
+                 .frequency_hz = 1.0 + 0.2 * static_cast<double>(c),
+                 .phase_rad = static_cast<double>(c)});
+  }
+  ReferenceRun run = RunReference(mechanism, motion);
+  EXPECT_TRUE(run.summary.ok()) << run.summary.message;
+  return run;
+}
+
+double LargestForceDifference(const ReferenceRun& a, const ReferenceRun& b) {
+  double largest = 0.0;
+  for (int i = 1; i <= 6; ++i) {
+    const std::string name = "leg" + std::to_string(i) + ".length.force";
+    const VecX difference =
+        a.trace.values.col(a.trace.Find(name)) - b.trace.values.col(b.trace.Find(name));
+    largest = std::max(largest, difference.cwiseAbs().maxCoeff());
+  }
+  return largest;
+}
+
+TEST(Stewart, LegsWithTwoBallsAreLegsWithOneWhereNothingHasInertiaAboutTheLine) {
+  const ReferenceRun balls = Dance(WithLegs(true, "1e-10"));
+  EXPECT_LT(LargestForceDifference(balls, Dance(WithLegs(false, "1e-10"))), 1e-8);
+  // An inertia about the line is felt by the universal joint alone.
+  EXPECT_LT(LargestForceDifference(balls, Dance(WithLegs(true, "0.001"))), 1e-10);
+  EXPECT_GT(LargestForceDifference(balls, Dance(WithLegs(false, "0.001"))), 1e-3);
+}
+
+// What turns the leg about its line is told: the spin would not stay what it was.
+TEST(Stewart, AMomentAboutALegsLineIsNoIdleSpin) {
+  Mechanism mechanism = WithLegs(true, "0.001");
+  Motion motion = At({0.0, 0.0, kHeight_m, 0.0, 0.0, 0.0});
+  Load load;
+  load.body = mechanism.FindBody("leg3.upper");
+  load.moment[2].terms.push_back(ConstantTerm{1e-3});
+  motion.loads.push_back(load);
+  const ReferenceRun run = RunReference(mechanism, motion);
+  EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
+  EXPECT_NE(run.summary.message.find("about the line through both balls of leg3 changes its spin"),
+            std::string::npos)
+      << run.summary.message;
 }
 
 }  // namespace

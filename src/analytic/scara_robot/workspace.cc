@@ -135,8 +135,7 @@ Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double
   volume.touches_box = all.at_edge > 0;
   volume.samples = 2LL * cells * cells * cells;
   volume.volume_m3 = cell_volume * reached / 2.0;
-  volume.uncertainty_m3 =
-      2.0 * cell_volume * std::sqrt(static_cast<double>(all.differences)) / 2.0;
+  volume.uncertainty_m3 = 2.0 * cell_volume * std::sqrt(static_cast<double>(all.differences)) / 2.0;
   volume.fraction_usable = reached > 0 ? static_cast<double>(all.usable) / reached : 0.0;
   return volume;
 }
