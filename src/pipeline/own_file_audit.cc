@@ -42,6 +42,11 @@ const std::vector<CauseRow>& Rows() {
          s->time_constant_s = 2.0 * facts.step_s;
          s->impedance = kMjcfImpedance;
        }},
+      {"friction", "soft friction losses (solreffriction, solimpfriction)",
+       "To MuJoCo a joint that rubs is held by a damper that gives way where its force exceeds the "
+       "friction loss: near rest it creeps, and the force is less than the loss.",
+       [](const OwnFacts& facts) { return facts.rubs; },
+       [](const OwnFacts&, OwnSettings* s) { s->stiff_friction = true; }},
       {"integration", "step and integrator",
        "How time is cut into steps: here against the Runge-Kutta method at a quarter of the step.",
        &Always,
@@ -99,6 +104,7 @@ class Auditor {
     OwnSettings base;
     base.exact_drives = true;
     base.plain = !own.run.facts.left_out.empty();
+    base.stiff_friction = own.run.facts.rubs;
     const OwnFileRuns::Measured bare = runs_.Run(base);
     audit_.bare = bare.error;
     const bool comparable = !bare.error.sound() || std::isfinite(bare.error.force);

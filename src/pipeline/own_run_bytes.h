@@ -22,7 +22,8 @@ void VisitMembers(Visit& visit, typename Visit::template Of<OwnRun>& run) {
   visit(s.stop), visit(s.message), visit(s.time_s);
   auto& f = run.facts;
   visit(f.step_s), visit(f.integrator), visit(f.solver), visit(f.tolerance), visit(f.iterations);
-  visit(f.rough_solver), visit(f.closures), visit(f.solref), visit(f.solimp), visit(f.leads);
+  visit(f.rough_solver), visit(f.rubs), visit(f.closures), visit(f.solref), visit(f.solimp),
+      visit(f.leads);
   visit(f.motors), visit(f.left_out), visit(f.held), visit(f.couplings), visit(f.pushers);
   visit(f.damped);
   visit(run.trace.time_s), visit(run.trace.channels), visit(run.trace.values);

@@ -35,9 +35,10 @@ struct OwnSettings {
   /// Supplies J̇q̇, which MuJoCo before 3.7 leaves out of the closures' reference acceleration, as a
   /// central difference of J q̇ along the motion.
   bool velocity_term = false;
-  bool exact_drives = false;  ///< all drives as DriveLead::kAdded
-  bool plain = false;         ///< without what the mechanism does not have: OwnFacts::left_out
-  bool exact_solver = false;  ///< Newton's method to the end
+  bool exact_drives = false;    ///< all drives as DriveLead::kAdded
+  bool plain = false;           ///< without what the mechanism does not have: OwnFacts::left_out
+  bool exact_solver = false;    ///< Newton's method to the end
+  bool stiff_friction = false;  ///< friction losses as stiff as MuJoCo allows: 2 steps, 0.9999
 };
 
 struct OwnTask {
@@ -56,6 +57,7 @@ struct OwnFacts {
   std::string integrator, solver;  ///< as MJCF names them
   double tolerance = kNan;
   int iterations = 0;
+  bool rubs = false;                  ///< hinges or slides with a friction loss
   bool rough_solver = false;          ///< not Newton's method with at least MuJoCo's default effort
   std::vector<std::string> closures;  ///< names
   std::vector<std::string> solref, solimp;      ///< per closure, as MJCF

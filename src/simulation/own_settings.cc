@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 
+#include "mjcf/mjcf.h"
 #include "simulation/mjcf_import.h"
 #include "simulation/own_model_parts.h"
 
@@ -16,6 +17,7 @@ class SettingsTaker {
 
   void Run() {
     TellLeftOut();
+    for (int dof = 0; dof < m_->nv; ++dof) own_.facts.rubs |= Rubs(dof);
     if (task_.settings.plain) LeaveOut();
     HoldFreeBodies();
     Apply();
@@ -24,6 +26,10 @@ class SettingsTaker {
  private:
   [[nodiscard]] bool IsHeld(int dof) const {
     return m_->jnt_type[m_->dof_jntid[dof]] == mjJNT_FREE;
+  }
+
+  [[nodiscard]] bool Rubs(int dof) const {
+    return IsScalar(*m_, m_->dof_jntid[dof]) && m_->dof_frictionloss[dof] > 0.0;
   }
 
   // Calls visit(word, value) on every number that acts on forces and that the mechanism lacks.
@@ -94,6 +100,13 @@ class SettingsTaker {
       m_->opt.solver = mjSOL_NEWTON;
       m_->opt.iterations = 200;
       m_->opt.tolerance = 1e-14;
+    }
+    const std::array<mjtNum, 5> stiff{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0};
+    for (int dof = 0; settings.stiff_friction && dof < m_->nv; ++dof) {
+      if (!Rubs(dof)) continue;
+      m_->dof_solref[mjNREF * dof] = 2.0 * m_->opt.timestep;
+      m_->dof_solref[mjNREF * dof + 1] = 1.0;
+      std::copy(stiff.begin(), stiff.end(), m_->dof_solimp + mjNIMP * dof);
     }
     for (const OwnClosure& closure : own_.closures) {
       mjtNum* ref = m_->eq_solref + mjNREF * closure.equality;

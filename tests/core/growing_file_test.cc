@@ -59,6 +59,37 @@ TEST(StreamFromChildren, GivesTextsInOrderForAnyNumberOfChildren) {
   }
 }
 
+TEST(ShareOut, GivesTheSameWithOneJobAndWithMany) {
+  const auto shared = [](int jobs) {
+    std::string all;
+    ShareOut(
+        20, jobs, [](size_t i) { return std::to_string(i * i); },
+        [&](size_t i, const std::optional<std::string>& text) {
+          all += std::to_string(i) + ":" + text.value_or("-") + " ";
+        });
+    return all;
+  };
+  EXPECT_EQ(shared(1), shared(3));
+  EXPECT_EQ(shared(1), shared(50));
+}
+
+// A killed process costs what it was at, and is told.
+TEST(ShareOut, TellsWhatWasLost) {
+  size_t lost = 0, given = 0;
+  ShareOut(
+      6, 2,
+      [](size_t i) {
+        if (i == 3) raise(SIGKILL);
+        return std::string("x");
+      },
+      [&](size_t i, const std::optional<std::string>& text) {
+        (text ? given : lost) += 1;
+        EXPECT_EQ(text.has_value(), i != 3);
+      });
+  EXPECT_EQ(lost, 1u);
+  EXPECT_EQ(given, 5u);
+}
+
 TEST(StreamFromChildren, EndsWhenNobodyTakesMore) {
   size_t taken = 0;
   StreamFromChildren(

@@ -13,6 +13,7 @@ namespace {
 // A rod between two cranks, with balls at both ends.
 std::string RodText(const std::string& rod, const std::string& more = "") {
   return "name: linkage\n"
+         "world: {frames: {D: [0.5, 0.1, -0.15]}}\n"
          "bodies:\n"
          "  crank: {mass: 1, inertia: [1, 1, 1], frames: {C: [0.1, 0, 0]}}\n"
          "  rod: {" +
@@ -23,8 +24,7 @@ std::string RodText(const std::string& rod, const std::string& more = "") {
          "  A: {kind: revolute, parent: world, child: crank, axis: z}\n"
          "  B: {kind: spherical, parent: crank.C, child: rod}\n"
          "  C: {kind: spherical, parent: rod.end, child: rocker.D, closure: true}\n"
-         "  D: {kind: revolute, parent: {body: world, position: [0.5, 0.1, -0.15]}, child: rocker,"
-         " axis: x}\n"
+         "  D: {kind: revolute, parent: world.D, child: rocker, axis: x}\n"
          "drives: {A: {kind: joint, joint: A}}\n" +
          more;
 }

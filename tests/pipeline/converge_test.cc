@@ -1,5 +1,6 @@
 // The orders of the schemes, seen on shipped scenarios.
 #include "pipeline/converge.h"
+#include "report/convergence_report.h"
 #include "tests/source_dir.h"
 
 #include <gtest/gtest.h>
@@ -38,6 +39,25 @@ TEST(Converge, OnTheSliderCrankEachSchemeShowsItsOrder) {
   ASSERT_EQ(e.drives.size(), 1u);
   EXPECT_GT(e.drives[0].uncertainty, 0.0);
   EXPECT_LT(e.drives[0].uncertainty, 1e-8 * e.drives[0].rms);
+}
+
+// All but the processor time.
+std::string WithoutTimes(ConvergeOutcome outcome) {
+  for (ConvergenceSeries& series : outcome.report.series) {
+    for (ConvergencePoint& point : series.points) point.cpu_s = 0.0;
+  }
+  return ToJson(outcome.report) + ToCsv(outcome.report) + ToText(outcome.report);
+}
+
+// In task space the reference computes the drive motion, whose last digits depend on its way.
+TEST(Converge, ItsBytesDoNotDependOnTheNumberOfJobs) {
+  for (const char* scenario : {"slider_crank/press", "stewart_balls/dance"}) {
+    ConvergeOptions options{.steps_s = {4e-3, 2e-3, 1e-3}};
+    options.scenario.set = {{"motion.duration_s", "0.4"}, {"snapshots.times_s", "[]"}};
+    const std::string one = WithoutTimes(Study(scenario, options));
+    options.jobs = 3;
+    EXPECT_EQ(one, WithoutTimes(Study(scenario, options))) << scenario;
+  }
 }
 
 TEST(Converge, BreaksOfTheMotionAreKeptApart) {

@@ -78,8 +78,8 @@ TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {
               "armature='0.1' damping='2' frictionloss='3' stiffness='4'", "<joint type='free'/>"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const std::string said = loaded.diagnostics.Text();
-  for (const char* lost : {"friction loss of 1 joint is left out: A", "1 tendons are left",
-                           "free bodies are held where they are, fixed to the world: base"}) {
+  for (const char* lost :
+       {"1 tendons are left", "free bodies are held where they are, fixed to the world: base"}) {
     EXPECT_NE(said.find(lost), std::string::npos) << lost << "\n" << said;
   }
   const LoadResult plain = LoadText(folder, Linkage());
@@ -106,11 +106,25 @@ TEST(MjcfImport, WhatActsOnHingesIsAForceElement) {
   EXPECT_EQ(std::get<RotorLaw>(m.elements[2].law).reflected(), 0.1);
 }
 
+TEST(MjcfImport, FrictionLossIsDryFriction) {
+  const test::TestFolder folder("mjcf_friction");
+  const LoadResult loaded = LoadText(folder, Linkage("", "frictionloss='0.3'"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  ASSERT_EQ(loaded.mechanism->elements.size(), 1u);
+  const ForceElement& element = loaded.mechanism->elements[0];
+  EXPECT_EQ(element.name, "A_friction");
+  EXPECT_EQ(std::get<FrictionLaw>(element.law).coulomb, 0.3);
+  EXPECT_EQ(std::get<FrictionLaw>(element.law).breakaway, 0.3);
+  EXPECT_EQ(loaded.diagnostics.Text().find("left out"), std::string::npos)
+      << loaded.diagnostics.Text();
+}
+
 TEST(MjcfImport, ARobotWithForceElementsAgreesInBothModes) {
   const test::TestFolder folder("mjcf_elements_agree");
   const SurveyRow row = SurveyFile(
-      folder.Write("robot.xml",
-                   Linkage("", "armature='0.1' damping='2' stiffness='4' springref='0.3'")),
+      folder.Write("robot.xml", Linkage("",
+                                        "armature='0.1' damping='2' stiffness='4' springref='0.3' "
+                                        "frictionloss='0.2'")),
       folder.PathOf("scratch"));
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_LT(row.inverse_nrmse, 1e-10);

@@ -193,11 +193,21 @@ TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
 }
 
 TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
-  const OwnFileAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='1'"}));
+  const OwnFileAudit audit =
+      Audit(Text({.head = std::string("<option density='2000'/>") + kStiff}));
   EXPECT_EQ(Named(audit), Keys{"left_out"});
   ASSERT_NE(Find(audit, "left_out"), nullptr);
-  EXPECT_NE(Find(audit, "left_out")->title.find("friction loss"), std::string::npos);
+  EXPECT_NE(Find(audit, "left_out")->title.find("the medium's density"), std::string::npos);
   EXPECT_FALSE(audit.searched);
+}
+
+// Dry friction is in the reference, too; MuJoCo's gives way before it slides.
+TEST_F(OwnFile, FrictionLossIsJudgedOutsideTheBandThatRestLeaves) {
+  const OwnFileAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='0.3'"}));
+  EXPECT_EQ(Find(audit, "left_out"), nullptr);
+  ASSERT_NE(Find(audit, "friction"), nullptr);
+  EXPECT_LT(audit.mended.force, 1e-3);
+  EXPECT_GT(audit.as_is.force, 1e-3);
 }
 
 // Damping, armature and springs of hinges are in the reference as well.

@@ -130,6 +130,22 @@ TEST(StiffnessMap, ItsPointsAreThoseOfSinglePosesAndItsMirrorIsTheMechanisms) {
   EXPECT_NEAR(plus.values[0][13 * 8 + 1] / values[0], 1.0, 1e-12);
 }
 
+TEST(StiffnessMap, ItsBytesDoNotDependOnTheNumberOfJobs) {
+  const auto prepared = Prepare("scara_robot", "simulation: off\n");
+  ASSERT_TRUE(prepared);
+  Diagnostics diagnostics;
+  const auto map =
+      ParseMap("x=-0.1:0.1:9 y=-0.1:0.1:7 within=0.11 z=-0.21 phi_deg=30", *prepared, &diagnostics);
+  ASSERT_TRUE(map) << diagnostics.Text();
+  const auto files = [&](int jobs) {
+    return MapFiles(*map, ComputeMap(*prepared, *map, {}, jobs), "scara_robot", {}, &diagnostics);
+  };
+  const auto one = files(1);
+  EXPECT_GT(one.size(), 2u);
+  EXPECT_EQ(one, files(2));
+  EXPECT_EQ(one, files(30));
+}
+
 TEST(StiffnessMap, PointsOutOfTheCircleOrOfReachAreLeftOut) {
   const auto prepared = Prepare("scara_robot", "simulation: off\n");
   ASSERT_TRUE(prepared);

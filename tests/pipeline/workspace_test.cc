@@ -48,6 +48,15 @@ TEST(Workspace, ScaraReachesThePapersCylinderWithoutYawAndNotWithIt) {
   EXPECT_EQ(std::count(map->begin(), map->end(), '\n'), 1 + 61 * 61);
 }
 
+TEST(Workspace, ItsBytesDoNotDependOnTheNumberOfJobs) {
+  for (const char* name : {"spr_tripod", "scara_robot"}) {
+    const WorkspaceOutcome one = ComputeWorkspace(LoadShipped(name), false);
+    const WorkspaceOutcome many = ComputeWorkspace(LoadShipped(name), false, 3);
+    EXPECT_EQ(one.text, many.text) << name;
+    EXPECT_EQ(one.files, many.files) << name;
+  }
+}
+
 TEST(Workspace, JointRangesCountAsInStiffnessMaps) {
   Mechanism tripod = LoadShipped("spr_tripod");
   const WorkspaceOutcome whole = ComputeWorkspace(tripod, false);
