@@ -13,8 +13,10 @@ WorkspaceForm Saying(const char* text) {
   form.text = text;
   return form;
 }
-WorkspaceForm FirstWorkspace(const Mechanism&, const RangeFilter&) { return Saying("first"); }
-WorkspaceForm SecondWorkspace(const Mechanism&, const RangeFilter&) { return Saying("second"); }
+WorkspaceForm FirstWorkspace(const Mechanism&, const WorkspaceRequest&) { return Saying("first"); }
+WorkspaceForm SecondWorkspace(const Mechanism&, const WorkspaceRequest&) {
+  return Saying("second");
+}
 std::unique_ptr<StiffnessForm> NoStiffness(const Mechanism&, const PoseCoordinates&,
                                            const std::string&, Diagnostics*) {
   return nullptr;

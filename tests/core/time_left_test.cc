@@ -11,7 +11,7 @@ TEST(TimeLeft, GoesOnAsFastAsSoFar) {
   EXPECT_EQ(left.Text(0.0, 100.0), "");
   EXPECT_EQ(left.Text(0.05, 101.0), "");  // too early to tell
   EXPECT_EQ(left.Text(0.1, 140.0), "about 6 min left");
-  EXPECT_EQ(left.Text(0.5, 200.0), "about 100 s left");
+  EXPECT_EQ(left.Text(0.5, 200.0), "about 2 min left");
   EXPECT_EQ(left.Text(0.8, 260.0), "about 40 s left");
   EXPECT_EQ(left.Text(0.999, 300.0), "");  // nearly done
 }

@@ -18,7 +18,7 @@ std::string RodText(const std::string& rod, const std::string& more = "") {
          "  crank: {mass: 1, inertia: [1, 1, 1], frames: {C: [0.1, 0, 0]}}\n"
          "  rod: {" +
          rod +
-         ", frames: {side: [0.2, 0.01, 0], end: [0.4, 0, 0]}}\n"
+         ", frames: {side: [0.2, 0.01, 0], end: [0.42, 0, 0]}}\n"
          "  rocker: {mass: 1, inertia: [1, 1, 1], frames: {D: [0, 0, 0.2]}}\n"
          "joints:\n"
          "  A: {kind: revolute, parent: world, child: crank, axis: z}\n"

@@ -118,7 +118,7 @@ constexpr const char* kRod = R"(name: rod
 world: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}
 bodies:
   crank: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.2, 0, 0]}}
-  rod: {mass: 1, com: [0.25, 0, 0], inertia: [0.001, 0.01, 0.01], frames: {end: [0.5, 0, 0]}}
+  rod: {mass: 1, com: [0.25, 0, 0], inertia: [0.001, 0.01, 0.009], frames: {end: [0.5, 0, 0]}}
   rocker: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.4, 0, 0]}}
 joints:
   A: {kind: revolute, parent: world.A, child: crank, axis: z, guess: 1.1}
@@ -149,6 +149,23 @@ TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
   ASSERT_EQ(chosen.drives.size(), 1u);
   EXPECT_EQ(AnalyseMobility(chosen).undriven, 0);
   EXPECT_NE(notes.back().find("chosen by rank"), std::string::npos) << notes.back();
+}
+
+// One that is symmetric about its line spins idly.
+TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
+  std::string round = kRod;
+  round.replace(round.find("0.009"), 5, "0.01");
+  const LoadResult loaded = LoadModelText(round, "rod.yaml");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  std::vector<std::string> notes;
+  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes);
+  EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("B"))].kind, JointKind::kSpherical);
+  EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("C"))].kind, JointKind::kSpherical);
+  const Mobility mobility = AnalyseMobility(m);
+  EXPECT_EQ(mobility.idle_spins, std::vector<std::string>{"rod"});
+  EXPECT_EQ(mobility.undriven, 0);
+  ASSERT_EQ(notes.size(), 1u);
+  EXPECT_NE(notes[0].find("left out: n"), std::string::npos) << notes[0];
 }
 
 TEST(DefaultSetup, TheFirstMotionKeepsToTheRanges) {
