@@ -106,7 +106,9 @@ std::vector<std::string> CommandOf(const MutateArguments& arguments, int part,
 class Workers {
  public:
   explicit Workers(const MutateArguments& arguments)
-      : arguments_(arguments), parts_(static_cast<size_t>(arguments.jobs)) {}
+      : arguments_(arguments),
+        parts_(static_cast<size_t>(arguments.jobs)),
+        ended_(parts_.size(), false) {}
 
   // Where a worker fails, the report has its exit code and nothing else, and what it said is told.
   MutationReport Run() {
@@ -145,7 +147,7 @@ class Workers {
   void ShowProgress() {
     double done = 0.0;
     for (size_t k = 0; k < parts_.size(); ++k) {
-      const std::string text = ReadWholeFile(Place(k, "done")).value_or("");
+      const std::string text = ended_[k] ? "1" : ReadWholeFile(Place(k, "done")).value_or("");
       double fraction = 0.0;
       std::from_chars(text.data(), text.data() + text.size(), fraction);
       done += std::clamp(fraction, 0.0, 1.0);
@@ -155,6 +157,7 @@ class Workers {
   }
 
   void Take(size_t part, const WorkerEnd& end) {
+    ended_[part] = true;
     auto report = MutationReportOf(ReadWholeFile(Place(part, "json")).value_or(""));
     const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
     if (good) parts_[part] = *std::move(report);
@@ -171,6 +174,7 @@ class Workers {
   const ScratchFolder folder_{"mutate"};
   ProgressLine progress_{true};
   std::vector<MutationReport> parts_;
+  std::vector<bool> ended_;
   double farthest_ = 0.0;
   int failure_ = 0;
   bool told_ = false;

@@ -120,6 +120,7 @@ std::string WriteFolder(const StiffnessArguments& arguments, const StiffnessRun&
 struct MapFolder {
   std::string text;
   std::vector<std::pair<std::string, std::string>> files;
+  bool whole = true;  ///< false: processes of rows were killed
 };
 
 // All wanted maps; findings are bad input.
@@ -148,6 +149,7 @@ MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness&
     if (!map) continue;
     const MapResult result = ComputeMap(prepared, *map, progress, arguments.jobs);
     folder.text += MapText(*map, result, arguments.indices);
+    folder.whole = folder.whole && result.lost_rows == 0;
     for (auto& file : MapFiles(*map, result, prepared.base.name, arguments.indices, diagnostics)) {
       folder.files.push_back(std::move(file));
     }
@@ -192,7 +194,8 @@ int Stiffness(const StiffnessArguments& arguments) {
       return 2;
     }
   }
-  return WorseExit(run.report.exit_code,
+  const int exit_code = WorseExit(run.report.exit_code, maps.whole ? 0 : 3);
+  return WorseExit(exit_code,
                    arguments.json.Write(ToJson(run.report), {{prepared->base.file, ""}}));
 }
 

@@ -1,6 +1,7 @@
 #include "pipeline/converge.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
@@ -135,6 +136,8 @@ class StepStudy {
       AddSeries(Others());
       outcome_.exit_code = report().finding() ? 1 : 0;
     }
+    // What a killed run would have shown is not known: that is no good end.
+    if (!lost_.empty()) Fail(fmt::format("killed: the process of {}", fmt::join(lost_, "; ")));
     return std::move(outcome_);
   }
 
@@ -296,6 +299,7 @@ class StepStudy {
              [&](size_t k, const std::optional<std::string>& bytes) {
                const PlannedRun& run = runs[order[k]];
                done[order[k]] = bytes ? SteppedRunOf(*bytes) : run.Lost("its process was killed");
+               if (!bytes) lost_.push_back(run.title);
                Tell(run, 1.0);
              });
     return done;
@@ -426,6 +430,7 @@ class StepStudy {
   MatX truth_forces_;
   double extent_m_ = 0.0;           // largest coordinate of an output
   double done_ = 0.0, cost_ = 1.0;  // of all runs
+  std::vector<std::string> lost_;   // titles of the runs whose process was killed
 };
 
 }  // namespace
