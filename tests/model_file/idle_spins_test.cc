@@ -64,7 +64,7 @@ TEST(IdleSpins, AreNoneWhereSomethingFeelsTheTurn) {
   EXPECT_EQ(why("mass: 2, com: [0.17, 0, 0], inertia: [0.01, 0.3, 0.3001]"),
             "the inertia of rod is not symmetric about the line through its balls (by 7.07e-05 "
             "kg m²)");
-  EXPECT_EQ(why("mass: 2, com: [0.17, 0, 0], inertia: [0.01, 0.3, 0.3, 0.001, 0, 0]"),
+  EXPECT_EQ(why("mass: 2, com: [0.17, 0, 0], inertia: {xx: 0.01, yy: 0.3, zz: 0.3, xy: 0.001}"),
             "the inertia of rod is not symmetric about the line through its balls (by 0.001 "
             "kg m²)");
   EXPECT_EQ(why(kRoundRod, "outputs: {rod: rod}\n"), "output 'rod' shows its turn");

@@ -4,6 +4,9 @@
 #include "tests/source_dir.h"
 
 #include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <csignal>
 
 namespace mbv {
 namespace {
@@ -58,6 +61,19 @@ TEST(Converge, ItsBytesDoNotDependOnTheNumberOfJobs) {
     options.jobs = 3;
     EXPECT_EQ(one, WithoutTimes(Study(scenario, options))) << scenario;
   }
+}
+
+TEST(Converge, ARunWhoseProcessIsKilledIsTold) {
+  ConvergeOptions options{.steps_s = {4e-3, 2e-3, 1e-3, 5e-4}, .jobs = 2};
+  options.scenario.set = {{"motion.duration_s", "0.4"}, {"snapshots.times_s", "[]"}};
+  options.progress = [here = getpid()](const std::string& what, double) {
+    if (getpid() != here && what.ends_with("50 steps, step 0.004 s")) raise(SIGKILL);
+  };
+  const ConvergeOutcome outcome = Study("slider_crank/press", options);
+  const std::vector<ConvergencePoint>& points = FindSeries(outcome, "corrected_both").points;
+  ASSERT_EQ(points.size(), 4u) << outcome.failure;
+  EXPECT_EQ(points[0].failure, "its process was killed");
+  for (size_t k = 1; k < points.size(); ++k) EXPECT_EQ(points[k].failure, "") << k;
 }
 
 TEST(Converge, BreaksOfTheMotionAreKeptApart) {

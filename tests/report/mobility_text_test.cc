@@ -53,6 +53,19 @@ TEST(MobilityText, JsonIsAsWritten) {
   ExpectGolden("mobility.json", MobilityJson(Sliders(), Counts()));
 }
 
+TEST(MobilityText, SpinsBetweenTwoBallsAreTold) {
+  MobilityReport report = Counts();
+  report.home.idle_spins = {"leg1", "leg2"};
+  report.spins_not_idle = {"rod: output 'o' shows its turn"};
+  const std::string text = MobilityText(Sliders(), report);
+  for (const char* line :
+       {"constraints - 2 idle spins\n",
+        "  spin of leg2, idle: no force turns it, and no command needs to\n",
+        "  spin between two balls that is a freedom: rod: output 'o' shows its turn\n"}) {
+    EXPECT_NE(text.find(line), std::string::npos) << line << text;
+  }
+}
+
 TEST(MobilityText, ASingularHomeAndOnesThatHoldNothingAreTold) {
   MobilityReport report = Counts();
   report.home.freedoms = 4;
