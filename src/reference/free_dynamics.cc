@@ -40,9 +40,9 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       lever_(LongestLever(mechanism)),
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
       freedoms_(static_cast<int>(motion.initial.size())),
+      spins_(IdleSpins(mechanism)),
       near_(mechanism, length_),
-      loaded_(LoadedElements(mechanism)),
-      spins_(IdleSpins(mechanism)) {
+      loaded_(LoadedElements(mechanism)) {
   body_scale_.setOnes(size_);
   for (int i = 0; i < size_; i += 6) body_scale_.segment<3>(i).setConstant(1.0 / length_);
   EvaluateMotion(motion, 0.0, &command_);
@@ -236,10 +236,15 @@ RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
   rates.tail(command_.acceleration.size()) += command_.acceleration;
   Unstack(VecX::Zero(size_), &states->A_WB);
-  VecX A;
-  if (!near_.Solve(*states, rows_, -NeededWrenches(t_s, *states), rates, &A)) {
-    return Accelerate(t_s, states);
+  const VecX needed = NeededWrenches(t_s, *states);
+  std::vector<Vec6> required(mechanism_.bodies.size(), Vec6::Zero());
+  Unstack(needed, &required);
+  if (RunSummary summary = CheckSpinsIdle(spins_, *states, required, length_); !summary.ok()) {
+    summary.time_s = t_s;
+    return summary;
   }
+  VecX A;
+  if (!near_.Solve(*states, rows_, -needed, rates, &A)) return Accelerate(t_s, states);
   Unstack(A, &states->A_WB);
   return RunSummary::Done();
 }

@@ -21,13 +21,39 @@ void PutRotation(const Mat3& R, double* wxyz) {
   wxyz[3] = q.z();
 }
 
+// Per joint and coordinate a value within half a turn: home, or what the states followed on their
+// way (BodyStates::coupled, turns).
+std::vector<std::array<double, 6>> NearValues(const Mechanism& mechanism,
+                                              const BodyStates& states) {
+  std::vector<std::array<double, 6>> near;
+  for (const Joint& joint : mechanism.joints) near.push_back(joint.home);
+  if (!states.coupled.empty()) {
+    const double* value = states.coupled.data();
+    for (const Coupling& coupling : mechanism.couplings) {
+      for (const Coupling::Term& term : coupling.terms)
+        near[term.joint][term.coordinate] = *value++;
+    }
+  }
+  if (states.turns.empty()) return near;
+  const double* value = states.turns.data();
+  for (const ForceElement& element : mechanism.elements) {
+    if (element.joint >= 0) near[element.joint][element.coordinate] = *value;
+    ++value;
+  }
+  for (const Drive& drive : mechanism.drives) {
+    if (const auto* on = std::get_if<JointDrive>(&drive.kind))
+      near[on->joint][on->coordinate] = *value;
+    ++value;
+  }
+  for (const Prescribed& prescribed : mechanism.prescribed) near[prescribed.joint][0] = *value++;
+  return near;
+}
+
 class Start {
  public:
   Start(const EngineModel& engine, const BodyStates& states, mjData* d)
       : engine_(engine), mechanism_(*engine.mechanism), states_(states), d_(d) {
-    std::vector<std::array<double, 6>> near;
-    for (const Joint& joint : mechanism_.joints) near.push_back(joint.home);
-    coordinates_ = JointCoordinatesAt(mechanism_, states.X_WB, near);
+    coordinates_ = JointCoordinatesAt(mechanism_, states.X_WB, NearValues(mechanism_, states));
   }
 
   // False if a joint has coordinates that body states do not give one by one.

@@ -68,7 +68,7 @@ TEST(SimulatedRotors, TurnTheirCarrierInFreeMotion) {
       motion.forces.push_back({.drive = d, .force = {{SineTerm{0.4, 0.7, 0.3 * d}}}});
       motion.initial.push_back({.name = m.drives[static_cast<size_t>(d)].name,
                                 .coordinate = {Coordinate::Kind::kDrive, d, 0},
-                                .position = 0.1 + 0.05 * d,
+                                .position = 0.1 + 0.25 * d,  // the rotor: 8.4 rad, a turn and more
                                 .rate = d == 2 ? 6.0 : 1.0});
     }
     SimulationOptions options{.engine = engine};
