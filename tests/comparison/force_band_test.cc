@@ -42,6 +42,22 @@ void Rest(Trace* trace, double half) {
   for (size_t i = kFrom; i < kTo; ++i) trace->values(static_cast<Eigen::Index>(i), columns) = half;
 }
 
+// One trace says only that something rests; the other contains the friction that holds.
+TEST(ForceBand, ReactionsAreNotComparedWhereOnlyOneSideKnowsOfRest) {
+  const auto check = [](bool simulated_too, size_t bent) {
+    synthetic::Case c;
+    Rest(&c.reference, kHalf);
+    Rest(&c.analytic, kHalf);
+    if (simulated_too) Rest(&c.simulated, kHalf);
+    c.simulated.values(static_cast<Eigen::Index>(bent), c.simulated.Find("slide1.reaction.fx")) +=
+        0.1;
+    return c.Run().FindCheck("simulated_vs_reference.reaction_nrmse")->pass;
+  };
+  EXPECT_TRUE(check(false, kFrom + 3));
+  EXPECT_FALSE(check(true, kFrom + 3));
+  EXPECT_FALSE(check(false, kTo));
+}
+
 TEST(ForceBand, FilesGiveItsEndsAndNoNumber) {
   synthetic::Case c;
   const VecX force = c.reference.values.col(c.reference.Find("d1.force"));
