@@ -217,9 +217,11 @@ void ExpectRoundTrip(const Mechanism& m) {
         << before.name;
   }
   const Mobility mobility = AnalyseMobility(m), again = AnalyseMobility(n);
-  EXPECT_EQ(mobility.freedoms, again.freedoms);
+  // URDF has no balls: three hinges each, between which no spin is known to be idle.
+  const auto lost = static_cast<int>(mobility.idle_spins.size() - again.idle_spins.size());
+  EXPECT_EQ(mobility.freedoms + lost, again.freedoms);
   EXPECT_EQ(mobility.redundant, again.redundant);
-  EXPECT_EQ(again.undriven, mobility.undriven);
+  EXPECT_EQ(again.undriven, mobility.undriven + lost);
   EXPECT_EQ(m.drives.size(), n.drives.size());
 }
 
