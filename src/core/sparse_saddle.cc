@@ -7,7 +7,7 @@ namespace {
 
 // Weight of the norm: about the smallest singular value of A, for which the condition of the whole
 // is A's [Björck 1996, §2.5.2].
-constexpr double kWeight = 0.05;
+constexpr double kNormWeight = 0.05;
 
 // Index of an entry of a compressed matrix that is there.
 int PlaceOf(const SparseLu::Matrix& matrix, Eigen::Index row, Eigen::Index column) {
@@ -80,7 +80,7 @@ bool SparseLeastNorm::Factor(const SparseLu::Matrix& A, double tolerance) {
   if (weight_.cols() != A.cols()) {
     weight_.resize(A.cols(), A.cols());
     weight_.setIdentity();
-    weight_ *= kWeight;
+    weight_ *= kNormWeight;
   }
   return saddle_.Factor(weight_, A_, tolerance);
 }
