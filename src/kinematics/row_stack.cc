@@ -219,12 +219,6 @@ void Count(double limit, PartRank* part) {
   }
 }
 
-// More vectors stay as sparse as they are.
-MatX FewOrthonormal(MatX vectors) {
-  constexpr Eigen::Index kFew = 100;
-  return vectors.cols() > kFew ? vectors : Orthonormal(vectors);
-}
-
 // By sparse QR; empty where that does not tell clearly.
 std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSpaces wanted,
                                    double tolerance) {
@@ -235,11 +229,13 @@ std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSp
   if (wanted == NullSpaces::kSelfStress) A = SparseRank::Matrix(A.transpose());
   const SparseRank qr(A, tolerance);
   if (!qr.clear()) return {};
+  MatX vectors = wanted == NullSpaces::kNone ? MatX() : qr.NullSpace();
+  const bool leave = wanted == NullSpaces::kSelfStress && vectors.cols() > kMostOrthogonal;
   return PartRank{.rank = qr.rank(),
                   .largest = 0.0,
                   .smallest_kept = qr.smallest_kept(),
                   .largest_dropped = qr.dropped_norm(),
-                  .vectors = wanted == NullSpaces::kNone ? MatX() : FewOrthonormal(qr.NullSpace()),
+                  .vectors = leave ? std::move(vectors) : Orthonormal(vectors),
                   .singular = {},
                   .all_vectors = {}};
 }

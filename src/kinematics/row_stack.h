@@ -23,6 +23,8 @@ using SparseRows = Eigen::SparseMatrix<double, Eigen::RowMajor>;
 
 /// Matrices with fewer rows or columns are dense.
 inline constexpr Eigen::Index kLargestDense = 300;
+/// More self-stresses of a large part are left as sparse as they are found.
+inline constexpr Eigen::Index kMostOrthogonal = 100;
 
 /// Scaled rows over the moving bodies.
 class RowStack {
@@ -63,7 +65,7 @@ struct RankFinding {
   int rank = 0;
   /// Singular values; of large parts an estimate and a bound.
   double smallest_kept = 0.0, largest_dropped = 0.0;
-  /// Columns of unit length; orthogonal to each other but for more than 100 of a large part.
+  /// Columns of unit length, orthogonal to each other but for many self-stresses of a large part.
   MatX self_stress;  ///< rows × (rows − rank): null space of the transpose
   MatX motion;       ///< columns × (columns − rank): null space
 };

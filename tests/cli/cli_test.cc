@@ -375,9 +375,9 @@ TEST_F(CliTest, RegressShowsALiveTableOnATerminal) {
       mbverify.OnTerminal("regress --no-pictures --no-history --jobs 1 --out " + mbverify.Out() +
                           " " + kGood + " " + kDisagrees);
   EXPECT_EQ(regress.exit_code, 0) << regress.out;
-  for (const char* part : {"  running  stabilizing_platform/must_fail/analytic_mass ", "\x1b[2A\x1b[J",
-                           "0 of 2 done, 0 not as expected", "[1/2] fails as it must ",
-                           "[2/2] agree ", "2 scenarios"}) {
+  for (const char* part : {"  running  stabilizing_platform/must_fail/analytic_mass ",
+                           "\x1b[2A\x1b[J", "0 of 2 done, 0 not as expected",
+                           "[1/2] fails as it must ", "[2/2] agree ", "2 scenarios"}) {
     EXPECT_NE(regress.out.find(part), std::string::npos) << part << "\n" << regress.out;
   }
   // The last thing on the screen is the summary, not a running scenario.

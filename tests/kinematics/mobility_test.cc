@@ -193,6 +193,24 @@ TEST(Ranks, SparseEliminationAndSingularValuesGiveTheSameOnEveryShippedModel) {
   EXPECT_GE(models, 20);
 }
 
+// A robot of many freedoms: coordinates are chosen by lengths in this basis.
+TEST(Ranks, MotionsOfManyFreedomsAreOrthonormal) {
+  constexpr int kRows = 400, kFreedoms = 120;
+  std::vector<Eigen::Triplet<double>> entries;
+  for (int i = 0; i < kRows; ++i) {
+    for (int k = 0; k <= kFreedoms; k += 8)
+      entries.emplace_back(i, i + k, 1.0 + 0.3 * std::sin(i + k));
+  }
+  internal::SparseRows J(kRows, kRows + kFreedoms);
+  J.setFromTriplets(entries.begin(), entries.end());
+  const auto found = internal::FindRank(J, internal::NullSpaces::kMotion);
+  EXPECT_EQ(found.rank, kRows);
+  ASSERT_EQ(found.motion.cols(), kFreedoms);
+  EXPECT_LT((J * found.motion).norm(), 1e-11);
+  const MatX product = found.motion.transpose() * found.motion;
+  EXPECT_LT((product - MatX::Identity(kFreedoms, kFreedoms)).norm(), 1e-12);
+}
+
 TEST(Ranks, WithoutAClearGapSingularValuesDecide) {
   MatX J = MatX::Random(12, 12);
   const Eigen::BDCSVD<MatX> svd(J, Eigen::ComputeFullU | Eigen::ComputeFullV);
