@@ -150,6 +150,20 @@ TEST(SparseRanks, AreNotClearNearTheTolerance) {
   }
 }
 
+// Thirty columns of 0.9e-9 each: every one counts as zero, a singular value of all of them does
+// not.
+TEST(SparseRanks, AreNotClearWhereManySmallEntriesAddUp) {
+  MatX dense = MatX::Zero(40, 31);
+  dense(0, 0) = 1.0;
+  for (int c = 1; c < 31; ++c) dense(5, c) = 0.9e-9;
+  const SparseRank qr(dense.sparseView(), 1e-9);
+  EXPECT_EQ(qr.rank(), 1);
+  EXPECT_FALSE(qr.clear());
+  dense *= 0.1;
+  dense(0, 0) = 1.0;
+  EXPECT_TRUE(SparseRank(dense.sparseView(), 1e-9).clear());
+}
+
 TEST(SparseLeastNorms, AreThoseOfTheDensePseudoInverse) {
   RandomMatrices matrices(18, 30);
   SparseLeastNorm solver;
