@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "simulation/element_forces.h"
 
@@ -16,6 +17,10 @@ constexpr double kStarts = 1e-6;
 // At an event, other rates below this share of the rest rate have come to rest as well: joints of
 // one loop.
 constexpr double kStopped = 1e-3;
+// Loops turn a joint that has stopped into rest of another one where its pivot is above this share
+// of the largest. At a dead point, where a guide stops and the crank runs on, it is round-off; what
+// the loops miss is divided by it.
+constexpr double kDetermined = 1e-4;
 constexpr int kHalvings = 40, kPassesToRoot = 80;
 // Where a held coordinate starts is the zero of its acceleration, extrapolated from this share of
 // the step behind it.
@@ -110,6 +115,61 @@ RunSummary StickSlip::LetGo(double t_s) {
           .time_s = t_s,
           .where = {},
           .unit = {}};
+}
+
+// (1)
+RunSummary StickSlip::FindRates(const Event& event, double t_s) {
+  Commanded at;
+  if (RunSummary summary = command_(t_s, &at); !summary.ok()) return summary;
+  const ConstraintSystem& system = s_.system;
+  const auto rests = [&](size_t e) {
+    return sliding_[e] == 0 || std::ranges::find(event.stops, e) != event.stops.end();
+  };
+  const Eigen::Index rows = system.rows(), resting = std::ranges::count_if(rubbing_, rests);
+  const Eigen::Map<const VecX> v(s_.data->qvel, system.nv());
+  MatX S(rows + resting, system.nv());
+  VecX missed(rows + resting);
+  S.topRows(rows) = system.ScaledJ();
+  missed.head(rows) = system.J() * v;
+  missed.segment(rows - system.driven_rows(), system.driven_rows()) -=
+      system.Guided(at.motion.velocity);
+  missed.head(rows) = missed.head(rows).cwiseQuotient(system.row_unit());
+  Eigen::Index row = rows;
+  for (const size_t e : rubbing_) {
+    if (!rests(e)) continue;
+    const VecX G = ElementGradient(system, e).cwiseProduct(system.dof_unit());
+    const double unit = std::max(G.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
+    S.row(row) = G.transpose() / unit;
+    missed[row++] = ElementMotionOf(system, e).rate / unit;
+  }
+  Eigen::CompleteOrthogonalDecomposition<MatX> factors;
+  factors.setThreshold(kDetermined);
+  factors.compute(S);
+  const VecX error = factors.solve(missed).cwiseProduct(system.dof_unit());
+  rates_.resize(rubbing_.size());
+  for (size_t k = 0; k < rubbing_.size(); ++k) {
+    const size_t e = rubbing_[k];
+    rates_[k] = ElementMotionOf(system, e).rate - ElementGradient(system, e).dot(error);
+  }
+  return RunSummary::Done();
+}
+
+// What comes to rest with the event, and what starts there.
+RunSummary StickSlip::Apply(const Event& event, double t_s) {
+  if (!event.stops.empty()) {
+    if (RunSummary summary = FindRates(event, t_s); !summary.ok()) return summary;
+    for (size_t k = 0; k < rubbing_.size(); ++k) {
+      const size_t e = rubbing_[k];
+      const bool stops = std::ranges::find(event.stops, e) != event.stops.end();
+      const bool slow = std::abs(rates_[k]) <= kStopped * s_.engine.elements[e].rest_rate;
+      if (stops || (slow && fresh_[e] == 0)) sliding_[e] = 0;
+    }
+  }
+  for (const auto& [e, sign] : event.starts) {
+    sliding_[e] = sign;
+    fresh_[e] = 1;
+  }
+  return RunSummary::Done();
 }
 
 double StickSlip::RateAfter(const Integrator::Node& node, size_t element, double from_s, double h) {
@@ -217,16 +277,7 @@ RunSummary StickSlip::Advance(const Step& step) {
       return summary;
     }
     s_.run->trace.breaks_s.push_back(from);
-    for (const size_t e : rubbing_) {
-      const bool stops = std::ranges::find(event.stops, e) != event.stops.end();
-      const bool slow = std::abs(ElementMotionOf(s_.system, e).rate) <=
-                        kStopped * s_.engine.elements[e].rest_rate;
-      if (stops || (slow && !event.stops.empty() && fresh_[e] == 0)) sliding_[e] = 0;
-    }
-    for (const auto& [e, sign] : event.starts) {
-      sliding_[e] = sign;
-      fresh_[e] = 1;
-    }
+    if (RunSummary summary = Apply(event, from); !summary.ok()) return summary;
     if (RunSummary summary = Jump(from); !summary.ok()) return summary;
     if (RunSummary summary = LetGo(from); !summary.ok()) return summary;
     s_.work.Jump(s_.WorkRates());

@@ -7,6 +7,11 @@
 // What slides feels its law (element_forces.h) with the sign of its rate fixed. The times at which
 // a rate leaves that sign, or a held coordinate accelerates, are found with Runge–Kutta steps from
 // the node before; multistep history starts anew there. What is over between two nodes is not seen.
+//
+// Joints of one loop stop together, but for what the scheme leaves undone in the loops. With J the
+// loops and commands, G_r what rests or stops, ẋ what is commanded, G_e has the rate
+//   q̇_e = G_e (v − e),  (J; G_r) e = (J v − ẋ; G_r v), e of least norm                          (1)
+// in which that is taken out: what (1) leaves is motion, however large the step.
 #pragma once
 
 #include <functional>
@@ -40,6 +45,8 @@ class StickSlip {
   [[nodiscard]] RunSummary Go(double from_s, double h, bool multistep);
   [[nodiscard]] RunSummary LetGo(double t_s);
   [[nodiscard]] RunSummary Jump(double t_s);
+  [[nodiscard]] RunSummary FindRates(const Event& event, double t_s);
+  [[nodiscard]] RunSummary Apply(const Event& event, double t_s);
   [[nodiscard]] bool Ended() const;
   [[nodiscard]] bool Stopped(size_t element) const;
   /// Sign of a held element's acceleration, 0 where MuJoCo holds it.
@@ -60,6 +67,7 @@ class StickSlip {
   std::vector<int> sliding_;
   std::vector<char> fresh_;  ///< slides since the present node
   std::vector<size_t> rubbing_;
+  std::vector<double> rates_;  ///< of these, by (1)
   RunSummary trouble_ = RunSummary::Done();
   int uniform_ = 4;  ///< nodes since the last event, as in Step
 };

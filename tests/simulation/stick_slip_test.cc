@@ -4,10 +4,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "model_file/load_model.h"
 #include "reference/forward.h"
 #include "simulation/simulation.h"
 #include "tests/pushed_block.h"
 #include "tests/rubbing_pendulum.h"
+#include "tests/source_dir.h"
 #include "tests/stacked_blocks.h"
 
 namespace mbv {
@@ -197,6 +199,29 @@ TEST(SimulatedStickSlip, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
     const double rest =
         p.FreeTorque(at("motor.position"), at("motor.velocity"), at("motor.acceleration"));
     EXPECT_NEAR(rest, 0.0, 1e-9) << i;
+  }
+}
+
+// A loop of one freedom stops as a whole, whatever the step's own error leaves in its rates: what
+// its joints bear at rest does not depend on the step.
+TEST(SimulatedStickSlip, WhatALoopHoldsRestsWithItAtAnyStep) {
+  const LoadResult loaded = LoadModel(std::string(kSourceDir) + "/models/journal_crank/model.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value());
+  const Mechanism& m = *loaded.mechanism;
+  const Motion motion = StackedBlocks::From(m, std::numbers::pi * 2.0 / 9.0, 0.0, 1.4);
+  const auto at_rest = [](const SimulationRun& run, const char* channel) -> VecX {
+    return run.trace.values.col(run.trace.Find(channel)).tail(40);  // it stops at 0.95 s
+  };
+  const SimulationRun fine = SlipFreely(m, motion, 2.5e-4);
+  ASSERT_TRUE(fine.summary.ok()) << fine.summary.message;
+  for (const double step_s : {5e-4, 1e-3, 2e-3}) {
+    const SimulationRun run = SlipFreely(m, motion, step_s);
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    EXPECT_LT(at_rest(run, "motor.velocity").cwiseAbs().maxCoeff(), 1e-8) << step_s;
+    for (const char* channel : {"B.reaction.fx", "B.reaction.fy", "C.reaction.fx"}) {
+      const VecX truth = at_rest(fine, channel), off = at_rest(run, channel) - truth;
+      EXPECT_LT(off.cwiseAbs().maxCoeff(), 1e-5 * truth.norm()) << channel << ", " << step_s;
+    }
   }
 }
 
