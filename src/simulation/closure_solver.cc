@@ -11,9 +11,10 @@ namespace {
 constexpr int kMaxNewton = 15;
 // All in the units of ConstraintSystem::ScaledJ(): characteristic lengths, radians.
 //
-// Newton stops after a step whose square is round-off. A start that needs no step at all is kept.
+// Newton stops after a step whose square is round-off. After one that is round-off itself nothing
+// is evaluated again.
 constexpr double kSmallSquare = 1e-8;
-constexpr double kNoStep = 1e-14;
+constexpr double kNoStep = 3e-14;
 // Reflections mix all equations: without one refinement the force that accelerates a heavy
 // prescribed body leaves its rounding in the drives that do not move it.
 constexpr int kOrthogonalRefinements = 1;
@@ -136,9 +137,9 @@ RunSummary ClosureSolver::Close(const VecX& to) {
     SolveInto(rhs_, &step_);
     size = step_.cwiseQuotient(system_->dof_unit()).lpNorm<Eigen::Infinity>();
     if (!std::isfinite(size) || size > 1e3) break;
-    if (size < kNoStep && closed) return RunSummary::Done();
     moved_ += size;
     mj_integratePos(m, d->qpos, step_.data(), 1.0);
+    if (size < kNoStep && closed) return RunSummary::Done();
   }
   const double open = system_->residual().lpNorm<Eigen::Infinity>();
   return {.stop = Stop::kNoConvergence,

@@ -198,6 +198,12 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   return FindDriven(engine);
 }
 
+void LeaveOutShapes(EngineModel* engine) {
+  mjModel& m = *engine->m;
+  m.ngeom = 0;
+  std::fill_n(m.body_geomnum, m.nbody, 0);
+}
+
 void SetRestRates(double duration_s, EngineModel* engine) {
   const Mechanism& mechanism = *engine->mechanism;
   for (size_t e = 0; e < engine->elements.size(); ++e) {

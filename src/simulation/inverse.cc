@@ -7,44 +7,11 @@
 #include <array>
 
 #include "simulation/element_forces.h"
+#include "simulation/sample_predictor.h"
 #include "simulation/session.h"
 
 namespace mbv::simulation {
 namespace {
-
-// Predicts the next sample's configuration: the velocity is extrapolated by the polynomial through
-// velocities and accelerations of the last (up to three) samples, equally spaced, and integrated.
-class Predictor {
- public:
-  explicit Predictor(const EngineModel& engine) : engine_(engine) {}
-
-  void Predict(double h, mjData* d) {
-    const int nv = engine_.m->nv;
-    for (int i = 2; i > 0; --i) {
-      v_[i].swap(v_[i - 1]);
-      a_[i].swap(a_[i - 1]);
-    }
-    v_[0] = Eigen::Map<const VecX>(d->qvel, nv);
-    a_[0] = Eigen::Map<const VecX>(d->qacc, nv);
-    known_ = std::min(known_ + 1, 3);
-    if (known_ == 1) {
-      mean_ = v_[0] + h / 2.0 * a_[0];
-    } else if (known_ == 2) {
-      mean_ = 1.5 * v_[1] - 0.5 * v_[0] + h / 12.0 * (17.0 * a_[0] + 7.0 * a_[1]);
-    } else {
-      mean_ = (-949.0 * v_[0] + 608.0 * v_[1] + 581.0 * v_[2]) / 240.0 +
-              h / 240.0 * (637.0 * a_[0] + 1080.0 * a_[1] + 173.0 * a_[2]);
-    }
-    v_new_ = v_[0] + h * a_[0];
-    AdvancePositions(engine_, h, mean_, v_[0], v_new_, &work_, d->qpos);
-  }
-
- private:
-  const EngineModel& engine_;
-  int known_ = 0;
-  std::array<VecX, 3> v_, a_;  // newest first
-  VecX mean_, v_new_, work_;
-};
 
 void SolveRates(Session* s, const DrivenSample& at) {
   s->solver.SolveVelocity(at.velocity);
@@ -97,7 +64,7 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
     if (RunSummary summary = driven(times[i], &samples[i]); !summary.ok()) return summary;
   }
   mjData* d = s->data.get();
-  Predictor predictor(s->engine);
+  SamplePredictor predictor(s->engine);
   VecX tau(s->engine.m->nv), closed;
   const LoopClock clock;
   for (size_t i = 0; i < times.size(); ++i) {

@@ -232,6 +232,7 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
     return summary;
   }
+  LeaveOutShapes(&engine);
   if (RunSummary summary = CheckLoads(engine, motion); !summary.ok()) return summary;
   SetRestRates(motion.duration_s, &engine);
   ReleaseForcedDrives(motion, &engine);
