@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/spatial.h"
 #include "mechanism/joint_pose.h"
@@ -108,14 +109,6 @@ void ConstraintSystem::SetTargets(const VecX& position) {
   }
 }
 
-VecX ConstraintSystem::Guided(const VecX& per_driven) const {
-  VecX guided(driven_rows());
-  for (Eigen::Index k = 0; k < per_driven.size(); ++k) {
-    if (driven_row_[k] >= 0) guided[driven_row_[k] - closure_rows_] = per_driven[k];
-  }
-  return guided;
-}
-
 double ConstraintSystem::DrivenForce(int k) const {
   return driven_row_[k] >= 0 ? d_->efc_force[driven_row_[k]] : given_[k];
 }
@@ -125,12 +118,6 @@ Eigen::Map<const VecX> ConstraintSystem::DrivenJacobian(int k) const {
   const int nv = engine_.m->nv;
   if (place.is_tendon) return {d_->ten_J + place.object * nv, nv};
   return {unit_.data() + static_cast<Eigen::Index>(k) * nv, nv};
-}
-
-double ConstraintSystem::DrivenBias(int k, const VecX& bias) {
-  if (driven_row_[k] >= 0) return bias[driven_row_[k]];
-  const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
-  return place.is_tendon ? TendonBias(place.object) : 0.0;
 }
 
 void ConstraintSystem::AddGivenForces(double* qfrc) const {
@@ -162,6 +149,12 @@ void ConstraintSystem::FindPattern() {
   J_.resize(rows_, m->nv);
   J_.setFromTriplets(entries.begin(), entries.end());
   J_.makeCompressed();
+  J_unit_.resize(J_.nonZeros());
+  for (int i = 0; i < rows_; ++i) {
+    for (int k = J_.outerIndexPtr()[i]; k < J_.outerIndexPtr()[i + 1]; ++k) {
+      J_unit_[k] = dof_unit_[J_.innerIndexPtr()[k]] / row_unit_[i];
+    }
+  }
 }
 
 void ConstraintSystem::EvaluatePosition() {
@@ -207,14 +200,8 @@ void ConstraintSystem::TakeJacobian() {
 
 void ConstraintSystem::FillScaledTranspose(SparseLu::Matrix* columns) const {
   if (columns->nonZeros() != J_.nonZeros()) *columns = J_.transpose().eval();
-  const double* in = J_.valuePtr();
-  double* out = columns->valuePtr();
-  for (int i = 0; i < rows_; ++i) {
-    const double scale = 1.0 / row_unit_[i];
-    for (int k = J_.outerIndexPtr()[i]; k < J_.outerIndexPtr()[i + 1]; ++k) {
-      *out++ = scale * dof_unit_[J_.innerIndexPtr()[k]] * *in++;
-    }
-  }
+  Eigen::Map<VecX>(columns->valuePtr(), J_.nonZeros()) =
+      J_unit_.cwiseProduct(Eigen::Map<const VecX>(J_.valuePtr(), J_.nonZeros()));
 }
 
 void ConstraintSystem::EvaluatePassive() {
@@ -224,6 +211,22 @@ void ConstraintSystem::EvaluatePassive() {
       Eigen::Map<const RowMajor>(d_->ten_J, m->ntendon, m->nv) *
       Eigen::Map<const VecX>(d_->qvel, m->nv);
   mj_passive(m, d_);
+}
+
+void ConstraintSystem::EvaluateBodyForces() {
+  // MuJoCo adds the constraints' forces otherwise: it knows nothing of tendons, and takes a weld's
+  // rotation rows for a torque in world axes, which they are not.
+  const int ne = std::exchange(d_->ne, 0);
+  mj_rnePostConstraint(engine_.m.get(), d_);
+  d_->ne = ne;
+}
+
+void ConstraintSystem::BodyForces(VecX* tau) const {
+  const mjModel& m = *engine_.m;
+  tau->resize(m.nv);
+  for (int i = 0; i < m.nv; ++i) {
+    (*tau)[i] = ConstVec6(d_->cdof + 6 * i).dot(ConstVec6(d_->cfrc_int + 6 * m.dof_bodyid[i]));
+  }
 }
 
 void ConstraintSystem::BodyBiasAccelerations() {

@@ -42,8 +42,13 @@ class ConstraintSystem {
   [[nodiscard]] int driven_rows() const { return rows_ - closure_rows_; }
   /// Row of driven coordinate k, or -1 if its force is given.
   [[nodiscard]] int driven_row(int k) const { return driven_row_[k]; }
-  /// The entries of a vector over all driven coordinates that have rows.
-  [[nodiscard]] VecX Guided(const VecX& per_driven) const;
+  /// Adds the multiple of a vector over all driven coordinates to the rows that they have.
+  void AddGuided(double factor, const VecX& per_driven, VecX* per_row) const {
+    for (Eigen::Index k = 0; k < per_driven.size(); ++k) {
+      const int row = driven_row_[static_cast<size_t>(k)];
+      if (row >= 0) (*per_row)[row] += factor * per_driven[k];
+    }
+  }
 
   /// Forces of the drives that have no row, per driven coordinate.
   void SetGivenForces(const VecX& force) { given_ = force; }
@@ -51,8 +56,11 @@ class ConstraintSystem {
   [[nodiscard]] double DrivenForce(int k) const;
   /// dx/dq̇ of driven coordinate k at the present position.
   [[nodiscard]] Eigen::Map<const VecX> DrivenJacobian(int k) const;
-  /// J̇q̇ of driven coordinate k, given the bias of all rows.
-  [[nodiscard]] double DrivenBias(int k, const VecX& bias);
+  /// J̇q̇ of driven coordinate k; after BodyBiasAccelerations() at the same state.
+  [[nodiscard]] double DrivenBias(int k) const {
+    const DrivenPlace& place = engine_.driven[static_cast<size_t>(k)];
+    return place.is_tendon ? TendonBias(place.object) : 0.0;
+  }
   /// Adds Jᵀ · given force to `qfrc` (nv).
   void AddGivenForces(double* qfrc) const;
   [[nodiscard]] bool has_given_forces() const {
@@ -93,6 +101,13 @@ class ConstraintSystem {
   /// Forces of springs and of MuJoCo's own force elements at d.qpos, d.qvel into qfrc_passive.
   void EvaluatePassive();
 
+  /// MuJoCo's recursion over the bodies at the data's position, velocity and qacc: accelerations
+  /// (cacc) of the bodies, and the wrenches (cfrc_int) that inertia and gravity of each and of all
+  /// that it carries need, constraints and loads left out.
+  void EvaluateBodyForces();
+  /// The generalized forces of that, M q̈ + bias without armature.
+  void BodyForces(VecX* tau) const;
+
   /// J̇q̇ of a tendon's length; after Bias() at the same state.
   [[nodiscard]] double TendonBias(int tendon) const;
 
@@ -100,6 +115,8 @@ class ConstraintSystem {
   /// state.
   [[nodiscard]] Vec3 AngularAcceleration(int body) const;
 
+  /// What Bias() begins with: accelerations of the bodies at q̈ = 0.
+  void BodyBiasAccelerations();
   /// J̇q̇ of every row, from positions and velocities evaluated by MuJoCo (mj_comVel).
   void Bias(VecX* bias);
 
@@ -144,7 +161,6 @@ class ConstraintSystem {
   struct Point {
     Vec3 p, v, a0;  // position, velocity, bias acceleration [m, m/s, m/s²]
   };
-  void BodyBiasAccelerations();
   [[nodiscard]] Point PointOn(int body, const Vec3& p_W) const;
   void ClosureBias(int closure, VecX* bias) const;
 
@@ -159,6 +175,7 @@ class ConstraintSystem {
   const double length_, lever_;
   VecX row_unit_, dof_unit_;
   SparseRows J_;
+  VecX J_unit_;          // of its entries
   RowMajor friction_J_;  // where MuJoCo's are sparse
   int rows_ = 0, first_coupling_ = 0, closure_rows_ = 0;
   std::vector<int> closure_row_, driven_row_;

@@ -254,7 +254,7 @@ void SetCommandedAcceleration(const VecX& driven_acceleration, ConstraintSystem*
   VecX rates;
   system->Bias(&rates);
   rates = -rates;
-  rates.tail(system->driven_rows()) += system->Guided(driven_acceleration);
+  system->AddGuided(1.0, driven_acceleration, &rates);
   const Eigen::CompleteOrthogonalDecomposition<MatX> J(system->ScaledJ());
   const VecX scaled = J.solve(rates.cwiseQuotient(system->row_unit()));
   Eigen::Map<VecX>(system->data()->qacc, system->nv()) = scaled.cwiseProduct(system->dof_unit());

@@ -202,6 +202,13 @@ void LeaveOutShapes(EngineModel* engine) {
   mjModel& m = *engine->m;
   m.ngeom = 0;
   std::fill_n(m.body_geomnum, m.nbody, 0);
+  std::vector<bool> passed(static_cast<size_t>(m.nsite), false);
+  for (int w = 0; w < m.nwrap; ++w) {
+    if (m.wrap_type[w] == mjWRAP_SITE) passed[static_cast<size_t>(m.wrap_objid[w])] = true;
+  }
+  for (int s = 0; s < m.nsite; ++s) {
+    if (!passed[static_cast<size_t>(s)]) m.site_sameframe[s] = 1;
+  }
 }
 
 void SetRestRates(double duration_s, EngineModel* engine) {

@@ -93,8 +93,9 @@ struct AnchorFrames {
 /// body 2 in body 1 too: the compiler takes them from the reference pose.
 void SetAnchors(bool weld, const AnchorFrames& frames, mjtNum* eq_data);
 
-/// Takes the geoms out of a compiled model, which collide with nothing: their poses would be
-/// computed at every step. To be called before the data is made.
+/// Takes out of a compiled model what only pictures need and MuJoCo would place at every step:
+/// geoms, which collide with nothing, are gone, and sites that no tendon passes lie in their
+/// bodies' frames. To be called before the data is made.
 void LeaveOutShapes(EngineModel* engine);
 
 /// What counts as rest in a motion of this length, for every force element.

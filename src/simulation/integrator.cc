@@ -367,12 +367,12 @@ VecX Integrator::DecideFriction() {
 
 // (1) without the expected force; R and its inverse D.
 void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance guidance) {
-  const int rows = s_.system.rows(), driven = s_.system.driven_rows();
+  const int rows = s_.system.rows();
   s_.system.Bias(&bias_);
   rate_ = s_.system.J() * v;
   aref_ = -bias_;
-  rate_.tail(driven) -= s_.system.Guided(at.velocity);
-  aref_.tail(driven) += s_.system.Guided(at.acceleration);
+  s_.system.AddGuided(-1.0, at.velocity, &rate_);
+  s_.system.AddGuided(1.0, at.acceleration, &aref_);
   if (guidance == Guidance::kNew) guidance_ = b_ * rate_ + k_ * s_.system.residual();
   aref_ -= guidance_;
   Eigen::Map<VecX> R(d_->efc_R, rows);

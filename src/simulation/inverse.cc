@@ -23,10 +23,11 @@ void SolveRates(Session* s, const DrivenSample& at) {
 RunSummary SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* tau) {
   const mjModel* m = s->engine.m.get();
   mjData* d = s->data.get();
-  mj_rne(m, d, 1, tau->data());
+  s->system.EvaluateBodyForces();
+  s->system.BodyForces(tau);
   s->system.EvaluatePassive();
   *tau -= Eigen::Map<const VecX>(d->qfrc_passive, m->nv);
-  // mj_rne knows no armature.
+  // The bodies know no armature.
   *tau += Eigen::Map<const VecX>(m->dof_armature, m->nv)
               .cwiseProduct(Eigen::Map<const VecX>(d->qacc, m->nv));
   s->loads.Evaluate(t_s, *d);
@@ -67,10 +68,11 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
   SamplePredictor predictor(s->engine);
   VecX tau(s->engine.m->nv), closed;
   const LoopClock clock;
+  const VecX home = HomePositions(s->engine);
   for (size_t i = 0; i < times.size(); ++i) {
     closed = Eigen::Map<const VecX>(d->qpos, s->engine.m->nq);
     if (i > 0) predictor.Predict(times[i] - times[i - 1], d);
-    const VecX from = i > 0 ? samples[i - 1].position : HomePositions(s->engine);
+    const VecX& from = i > 0 ? samples[i - 1].position : home;
     if (RunSummary summary = s->solver.FollowPredicted(closed, from, samples[i].position);
         !summary.ok()) {
       return At(summary, times[i]);

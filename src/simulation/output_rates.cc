@@ -7,6 +7,8 @@
 // With R_RO = Rz(ψ) Ry(θ) Rx(φ) and, in R's axes, e1 = Rz Ry x, e2 = Rz y, e3 = z:
 //   ω  = φ̇ e1 + θ̇ e2 + ψ̇ e3                                                                     (4)
 //   α  = φ̈ e1 + θ̈ e2 + ψ̈ e3 + φ̇ (ψ̇ e3 + θ̇ e2) × e1 + θ̇ ψ̇ e3 × e2                               (5)
+// e1 is the first column of R_RO; e2 is square to both others, and e = Rz x to e2 and e3:
+//   θ̇ = e2·ω,  φ̇ = e·ω / cos θ,  ψ̇ = e3·ω + φ̇ sin θ                                             (6)
 #include "simulation/output_rates.h"
 
 #include <cmath>
@@ -27,6 +29,8 @@ struct Place {
 // The origin of a frame fixed in a body, at p_BQ. MuJoCo's accelerations contain −gravity.
 Place PlaceOf(const EngineModel& engine, const mjData& d, int body, const Vec3& p_BQ) {
   const mjModel& m = *engine.m;
+  const Vec3 rest = Vec3::Zero();
+  if (body == 0) return {.p = p_BQ, .v = rest, .a = rest, .w = rest, .alpha = rest};
   const int id = engine.body_id[engine.PlannedOf(body)];
   Vec6 V, A;
   mj_objectVelocity(&m, &d, mjOBJ_XBODY, id, V.data(), 0);
@@ -41,20 +45,21 @@ Place PlaceOf(const EngineModel& engine, const mjData& d, int body, const Vec3& 
           .alpha = alpha};
 }
 
-// Roll, pitch, yaw rates and accelerations, (4) and (5), from ω and α in R's axes.
+// Roll, pitch, yaw rates and accelerations, (4) to (6), from ω and α in R's axes.
 void PutAngles(const Mat3& R_RO, const Vec3& w, const Vec3& alpha, OutputRates* rates) {
-  const Vec3 rpy = RpyOf(R_RO);
-  if (std::abs(std::cos(rpy.y())) < kLocked) return;
-  const Mat3 Rz = RotZ(rpy.z());
-  const Vec3 e1 = Rz * RotY(rpy.y()).col(0), e2 = Rz.col(1), e3 = Vec3::UnitZ();
-  Mat3 E;
-  E << e1, e2, e3;
-  const auto inverse = E.partialPivLu();
-  const Vec3 rate = inverse.solve(w);
+  const Vec3 e1 = R_RO.col(0), e3 = Vec3::UnitZ();
+  const double cosine = std::hypot(e1.x(), e1.y()), sine = -e1.z();
+  if (cosine < kLocked) return;
+  const Vec3 e(e1.x() / cosine, e1.y() / cosine, 0.0), e2 = e3.cross(e);
+  const auto angles = [&](const Vec3& turn) {
+    const double roll = e.dot(turn) / cosine;
+    return Vec3(roll, e2.dot(turn), turn.z() + roll * sine);
+  };
+  const Vec3 rate = angles(w);
   const Vec3 bias =
       rate[0] * (rate[2] * e3 + rate[1] * e2).cross(e1) + rate[1] * rate[2] * e3.cross(e2);
   rates->velocity.tail<3>() = rate;
-  rates->acceleration.tail<3>() = inverse.solve(alpha - bias);
+  rates->acceleration.tail<3>() = angles(alpha - bias);
 }
 
 }  // namespace

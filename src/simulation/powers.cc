@@ -53,12 +53,13 @@ void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates) 
   }
 }
 
-Powers PowersOf(const ConstraintSystem& system, const Loads& loads) {
+void FindPowers(const ConstraintSystem& system, const Loads& loads, Powers* found) {
   const EngineModel& engine = system.engine();
   const mjModel& m = *engine.m;
   const mjData& d = *system.data();
-  Powers power;
+  Powers& power = *found;
   WorkRates(system, loads, &power.rates);
+  power.gravity = power.springs = power.rotors = 0.0;
   const ConstVec3 g(m.opt.gravity);
   for (int b = 1; b < m.nbody; ++b) {
     power.gravity += m.body_mass[b] * g.dot(VelocityOf(m, d, b, ConstVec3(d.xipos + 3 * b)));
@@ -75,7 +76,6 @@ Powers PowersOf(const ConstraintSystem& system, const Loads& loads) {
     if (std::holds_alternative<SpringLaw>(element.law)) power.springs += put_in;
     if (std::holds_alternative<RotorLaw>(element.law)) power.rotors -= put_in;
   }
-  return power;
 }
 
 Energies EnergiesOf(const ConstraintSystem& system) {

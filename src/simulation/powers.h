@@ -23,7 +23,7 @@ struct Powers {
 /// coordinates, then loads and dampers [W].
 void WorkRates(const ConstraintSystem& system, const Loads& loads, VecX* rates);
 /// The same and what is stored.
-[[nodiscard]] Powers PowersOf(const ConstraintSystem& system, const Loads& loads);
+void FindPowers(const ConstraintSystem& system, const Loads& loads, Powers* power);
 
 /// Energies [J]; gravity's counts from the world's origin.
 struct Energies {

@@ -5,7 +5,6 @@
 #include "mechanism/channels.h"
 #include "simulation/element_forces.h"
 #include "simulation/output_rates.h"
-#include "simulation/powers.h"
 
 namespace mbv::simulation {
 namespace {
@@ -110,14 +109,14 @@ void Recorder::Record(const Loads& loads, const VecX& work, Eigen::Ref<Eigen::Ro
   RecordDriven(row);
   RecordOutputs(*X_WB, row);
   RecordReactions(loads, *X_WB, row);
-  RecordOutputRates(row);  // from the accelerations that the reactions needed
+  RecordOutputRates(row);
   RecordAudit(loads, work, row);
 }
 
 void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
   const mjData* d = system_->data();
   const int nv = engine_.m->nv;
-  system_->Bias(&bias_);
+  system_->BodyBiasAccelerations();
   const int drives = static_cast<int>(engine_.mechanism->drives.size());
   for (int k = 0; k < static_cast<int>(engine_.driven.size()); ++k) {
     const DrivenPlace& place = engine_.driven[k];
@@ -131,7 +130,7 @@ void Recorder::RecordDriven(Eigen::Ref<Eigen::RowVectorXd> row) {
     const auto J = system_->DrivenJacobian(k);
     row[columns_(Quantity::kVelocity, k)] = J.dot(ConstVecX(d->qvel, nv));
     row[columns_(Quantity::kAcceleration, k)] =
-        J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k, bias_);
+        J.dot(ConstVecX(d->qacc, nv)) + system_->DrivenBias(k);
     row[columns_(Quantity::kForce, k)] = system_->DrivenForce(k);
   }
 }
@@ -208,13 +207,7 @@ Vec6 Recorder::ClosureWrench(int c) const {
 
 void Recorder::TreeWrenches(const Loads& loads) {
   const mjModel& m = *engine_.m;
-  mjData* d = system_->data();
-  // MuJoCo's own recursion without the constraint forces: it knows nothing of tendons, and takes
-  // a weld's rotation rows for a torque in world axes, which they are not.
-  const int ne = d->ne;
-  d->ne = 0;
-  mj_rnePostConstraint(&m, d);
-  d->ne = ne;
+  const mjData* d = system_->data();
   W_.setZero();
   for (size_t c = 0; c < engine_.plan.closures.size(); ++c) {
     const PlannedClosure& closure = engine_.plan.closures[c];
@@ -308,6 +301,7 @@ Vec6 Recorder::ReactionOf(int j, const std::vector<Pose>& X_WB) const {
 std::vector<Vec3> Recorder::ForcesAcross(const std::vector<size_t>& elements, const Loads& loads) {
   std::vector<Pose> X_WB;
   BodyPoses(engine_, *system_->data(), &X_WB);
+  system_->EvaluateBodyForces();
   TreeWrenches(loads);
   std::vector<Vec3> forces;
   for (const size_t e : elements) {
@@ -333,10 +327,11 @@ void Recorder::RecordAudit(const Loads& loads, const VecX& work,
                            Eigen::Ref<Eigen::RowVectorXd> row) {
   const mjModel& m = *engine_.m;
   const ConstraintSystem::Gap gap = system_->LargestGap();
-  const Powers power = PowersOf(*system_, loads);
+  FindPowers(*system_, loads, &power_);
+  const Powers& power = power_;
   const Energies energy = EnergiesOf(*system_);
   // d/dt(kinetic + gravity) = q̇·(M q̈ + bias), M without rotors.
-  mj_rne(&m, system_->data(), 1, work_.data());
+  system_->BodyForces(&work_);
   const double energy_rate =
       ConstVecX(system_->data()->qvel, m.nv).dot(work_) + power.rotors - power.springs;
   const auto drives = static_cast<Eigen::Index>(engine_.mechanism->drives.size());

@@ -6,11 +6,13 @@
 #include "core/trace.h"
 #include "simulation/constraint_system.h"
 #include "simulation/loads.h"
+#include "simulation/powers.h"
 
 namespace mbv::simulation {
 
-/// Expects positions, velocities (mj_comVel), accelerations qacc and constraint forces efc_force
-/// of one and the same instant in the system's data.
+/// Expects positions, velocities (mj_comVel), accelerations qacc, body forces
+/// (ConstraintSystem::EvaluateBodyForces()) and constraint forces efc_force of one and the same
+/// instant in the system's data.
 class Recorder {
  public:
   /// `work`: with WorkChannels().
@@ -24,7 +26,7 @@ class Recorder {
               std::vector<Pose>* X_WB);
 
   /// Force across its joint's axis that the parent exerts on the child, per element, in F's axes,
-  /// by the data's accelerations and constraint forces.
+  /// by the data's accelerations and constraint forces. Evaluates the body forces.
   [[nodiscard]] std::vector<Vec3> ForcesAcross(const std::vector<size_t>& elements,
                                                const Loads& loads);
 
@@ -72,7 +74,8 @@ class Recorder {
   std::vector<std::vector<size_t>> elements_of_;  // per joint: force elements
   Eigen::Matrix<double, 6, Eigen::Dynamic> W_;  // per MuJoCo body: wrench from its parent about the
                                                 // root's centre of mass, world axes
-  VecX bias_, acceleration_, work_;
+  VecX work_;
+  Powers power_;
 };
 
 }  // namespace mbv::simulation

@@ -30,11 +30,15 @@ struct EngineState {
 struct Session {
   Session(EngineModel model, const Motion& motion_, const SimulationOptions& options_,
           SimulationRun* run_);
+  ~Session();
   Session(const Session&) = delete;
   Session& operator=(const Session&) = delete;
 
-  /// Stores sample i and reports progress now and then.
+  /// Stores sample i, the next one, and reports progress now and then.
   void Record(size_t i);
+  /// Puts what Record() has kept into the run: samples in blocks, as its columns are far apart. The
+  /// last ones when the session ends, however it does.
+  void PutRecords();
   /// Work rates at the present state, as WorkChannels().
   [[nodiscard]] const VecX& WorkRates();
   /// Half-widths within which friction at rest leaves the forces of everything driven,
@@ -69,8 +73,10 @@ struct Session {
   EngineState start;      ///< of a mechanism whose drives are pushed or servos
   bool shared = false;    ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
-  VecX given;                 ///< forces that the driven coordinates are given
-  Eigen::RowVectorXd record;  ///< one row of the trace
+  VecX given;  ///< forces that the driven coordinates are given
+  static constexpr Eigen::Index kBlock = 16;
+  MatX records, qpos_records;      ///< samples that are not yet in the run: a column each
+  Eigen::Index kept = 0, put = 0;  ///< how many, and how many are in the run
 };
 
 /// Wall and processor time of the loop over steps or samples.

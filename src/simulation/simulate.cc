@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "core/demand.h"
 #include "core/roles.h"
 #include "mjcf/mjcf.h"
 #include "simulation/element_forces.h"
@@ -62,24 +63,40 @@ Session::Session(EngineModel model, const Motion& motion_, const SimulationOptio
   run->trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), recorder.channels());
   run->qpos.setConstant(static_cast<Eigen::Index>(run->trace.time_s.size()), engine.m->nq, kNan);
   run->X_WB.assign(run->trace.time_s.size(), {});
-  for (std::vector<Pose>& X_WB : run->X_WB) X_WB.reserve(engine.mechanism->bodies.size());
-  record.setZero(run->trace.values.cols());
+  for (std::vector<Pose>& X_WB : run->X_WB) {
+    // Written once: the loop finds the memory there.
+    X_WB.assign(engine.mechanism->bodies.size(), Pose::Identity());
+    X_WB.clear();
+  }
+  records.setZero(run->trace.values.cols(), kBlock);
+  qpos_records.setZero(engine.m->nq, kBlock);
 }
 
+Session::~Session() { PutRecords(); }
+
 void Session::Record(size_t i) {
-  const auto row = static_cast<Eigen::Index>(i);
+  MBV_DEMAND(put + kept == static_cast<Eigen::Index>(i), i);
   {
     const LoadFriction load_friction(this);
     const LeastForces least(this);
     const HeldShares shares(this);
+    if (options.mode != SimulationMode::kInverse) system.EvaluateBodyForces();
+    const Eigen::Map<Eigen::RowVectorXd> record(records.col(kept).data(), records.rows());
     recorder.Record(loads, work.work(), record, &run->X_WB[i]);
     if (recorder.has_bands()) recorder.RecordBands(Bands(), record);
   }
-  run->trace.values.row(row) = record;
-  run->qpos.row(row) = Eigen::Map<const Eigen::RowVectorXd>(data->qpos, engine.m->nq);
+  qpos_records.col(kept) = Eigen::Map<const VecX>(data->qpos, engine.m->nq);
+  if (++kept == kBlock) PutRecords();
   if (progress && i % 16 == 0) {
     progress(static_cast<double>(i) / static_cast<double>(run->trace.time_s.size()));
   }
+}
+
+void Session::PutRecords() {
+  run->trace.values.middleRows(put, kept) = records.leftCols(kept).transpose();
+  run->qpos.middleRows(put, kept) = qpos_records.leftCols(kept).transpose();
+  put += kept;
+  kept = 0;
 }
 
 const VecX& Session::WorkRates() {

@@ -131,8 +131,7 @@ RunSummary StickSlip::FindRates(const Event& event, double t_s) {
   VecX missed(rows + resting);
   S.topRows(rows) = system.ScaledJ();
   missed.head(rows) = system.J() * v;
-  missed.segment(rows - system.driven_rows(), system.driven_rows()) -=
-      system.Guided(at.motion.velocity);
+  system.AddGuided(-1.0, at.motion.velocity, &missed);
   missed.head(rows) = missed.head(rows).cwiseQuotient(system.row_unit());
   Eigen::Index row = rows;
   for (const size_t e : rubbing_) {
