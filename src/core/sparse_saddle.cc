@@ -62,38 +62,49 @@ bool SparseSaddle::Factor(const Matrix& W, const Matrix& B_transposed, double to
   return lu_.Factor(K_) && lu_.PivotRatio() > tolerance;
 }
 
-void SparseSaddle::Solve(const VecX& c, const VecX& b, VecX* x, VecX* y) const {
-  VecX both = VecX::Zero(K_.cols()), right(K_.cols());
-  right << c, b;
-  VecX rest = right;
-  for (int pass = 0; pass < 2; ++pass) {
-    lu_.Solve(&rest);
-    both += rest;
-    if (pass == 0) rest = right - K_ * both;
+void SparseSaddle::Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int refinements) const {
+  right_.resize(K_.cols());
+  right_ << c, b;
+  both_ = right_;
+  lu_.Solve(&both_);
+  for (int i = 0; i < refinements; ++i) {
+    rest_ = right_;
+    rest_.noalias() -= K_ * both_;
+    lu_.Solve(&rest_);
+    both_ += rest_;
   }
-  *x = both.head(c.size());
-  *y = both.tail(b.size());
+  *x = both_.head(c.size());
+  *y = both_.tail(b.size());
+}
+
+void SparseLeastNorm::MakePattern(const SparseLu::Matrix& A) {
+  weight_.resize(A.cols(), A.cols());
+  weight_.setIdentity();
+  weight_ *= kNormWeight;
+  zero_cols_.setZero(A.cols());
+  zero_rows_.setZero(A.rows());
+  SparseLu::Matrix places = A;
+  for (int k = 0; k < A.nonZeros(); ++k) places.valuePtr()[k] = k;
+  A_ = places.transpose();
+  from_.assign(A_.valuePtr(), A_.valuePtr() + A_.nonZeros());
 }
 
 bool SparseLeastNorm::Factor(const SparseLu::Matrix& A, double tolerance) {
-  A_ = A.transpose();
-  if (weight_.cols() != A.cols()) {
-    weight_.resize(A.cols(), A.cols());
-    weight_.setIdentity();
-    weight_ *= kNormWeight;
-  }
+  if (weight_.cols() != A.cols() || A_.nonZeros() != A.nonZeros()) MakePattern(A);
+  double* values = A_.valuePtr();
+  for (const int from : from_) *values++ = A.valuePtr()[from];
   return saddle_.Factor(weight_, A_, tolerance);
 }
 
 VecX SparseLeastNorm::LeastNorm(const VecX& b) const {
-  VecX x, y;
-  saddle_.Solve(VecX::Zero(A_.rows()), b, &x, &y);
+  VecX x;
+  saddle_.Solve(zero_cols_, b, &x, &y_);
   return x;
 }
 
-VecX SparseLeastNorm::LeastSquares(const VecX& c) const {
-  VecX x, y;
-  saddle_.Solve(c, VecX::Zero(A_.cols()), &x, &y);
+VecX SparseLeastNorm::LeastSquares(const VecX& c, int refinements) const {
+  VecX y;
+  saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
   return -y;
 }
 

@@ -22,8 +22,7 @@ class SparseSaddle {
   [[nodiscard]] bool Factor(const Matrix& W, const Matrix& B_transposed, double tolerance);
   void Reset();
 
-  /// Refined once.
-  void Solve(const VecX& c, const VecX& b, VecX* x, VecX* y) const;
+  void Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int refinements = 1) const;
 
  private:
   void MakePattern(const Matrix& W, const Matrix& B_transposed);
@@ -32,6 +31,7 @@ class SparseSaddle {
   std::vector<int> of_W_, in_rows_,
       in_columns_;  ///< per entry of W and of B: where it stands in K_
   SparseLu lu_;
+  mutable VecX right_, both_, rest_;  ///< of the last Solve()
 };
 
 /// For A of full row rank: x of least norm with A x = b, and y with least |Aᵀ y − c| [Björck 1996,
@@ -40,13 +40,21 @@ class SparseLeastNorm {
  public:
   /// As SparseSaddle::Factor(), with the same patterns since the last Reset().
   [[nodiscard]] bool Factor(const SparseLu::Matrix& A, double tolerance);
-  void Reset() { saddle_.Reset(); }
+  void Reset() {
+    A_.resize(0, 0);
+    saddle_.Reset();
+  }
 
   [[nodiscard]] VecX LeastNorm(const VecX& b) const;
-  [[nodiscard]] VecX LeastSquares(const VecX& c) const;
+  [[nodiscard]] VecX LeastSquares(const VecX& c, int refinements = 1) const;
 
  private:
-  SparseLu::Matrix A_, weight_;
+  void MakePattern(const SparseLu::Matrix& A);
+
+  SparseLu::Matrix A_, weight_;  ///< Aᵀ, W
+  std::vector<int> from_;        ///< per entry of Aᵀ: which one of A
+  VecX zero_cols_, zero_rows_;
+  mutable VecX x_, y_;
   SparseSaddle saddle_;
 };
 

@@ -28,8 +28,8 @@ constexpr double kShortestStep = 1e-4;
 constexpr double kRankTolerance = 1e-9;
 // A self-stress with a smaller share in a row does not act there.
 constexpr double kActs = 1e-6;
-// With more rows than velocities: of so many velocities on, factors are sparse.
-constexpr int kLargestDense = 18;
+// With more rows than velocities: of more velocities, factors are sparse.
+constexpr int kLargestDense = 6;
 
 // The shortest x with A x = b as well as can be, refined once.
 VecX LeastNorm(const MatX& A, const VecX& b) {
@@ -76,7 +76,7 @@ void ClosureSolver::Factor() {
 }
 
 // J = R J' D⁻¹ with the factored J', units R of the rows and D of the velocities.
-void ClosureSolver::SolveInto(const VecX& b, VecX* x) {
+void ClosureSolver::SolveInto(const VecX& b, VecX* x, int refinements) {
   if (factors_ == Factors::kNone) {
     x->setZero(system_->nv());
     return;
@@ -87,7 +87,7 @@ void ClosureSolver::SolveInto(const VecX& b, VecX* x) {
       lu_.SolveTransposed(&scaled_);
       break;
     case Factors::kOverdefined:
-      scaled_ = least_.LeastSquares(scaled_);
+      scaled_ = least_.LeastSquares(scaled_, refinements);
       break;
     default:
       scaled_ = cod_.solve(scaled_).eval();
@@ -134,7 +134,7 @@ RunSummary ClosureSolver::Close(const VecX& to) {
     const bool done = iteration > 0 && size < kSmallSquare && closed;
     Factor();
     if (done) return RunSummary::Done();
-    SolveInto(rhs_, &step_);
+    SolveInto(rhs_, &step_, 0);
     size = step_.cwiseQuotient(system_->dof_unit()).lpNorm<Eigen::Infinity>();
     if (!std::isfinite(size) || size > 1e3) break;
     moved_ += size;
@@ -232,10 +232,10 @@ void ClosureSolver::SolveForces(const VecX& tau) {
 void ClosureSolver::RemoveSelfStress(VecX* force) {
   if (redundant() == 0) return;
   const VecX& unit = system_->row_unit();
-  if (undriven() == 0) {  // J x next to the force
+  if (undriven() == 0) {  // J x next to the force: rounding in x is no self-stress
     system_->FillScaledTranspose(&columns_here_);
     if (least_here_.Factor(columns_here_, kRankTolerance)) {
-      const VecX x = least_here_.LeastSquares(force->cwiseProduct(unit));
+      const VecX x = least_here_.LeastSquares(force->cwiseProduct(unit), 0);
       *force = (columns_here_.transpose() * x).cwiseQuotient(unit);
       return;
     }

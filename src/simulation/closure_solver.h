@@ -71,8 +71,8 @@ class ClosureSolver {
   [[nodiscard]] MatX ScaledSelfStress() const;
   [[nodiscard]] double SelfStressOn(int row) const;
   void Factor();
-  void SolveInto(const VecX& b, VecX* x);            // x = J⁺ b
-  void SolveTransposedInto(const VecX& b, VecX* x);  // x = (Jᵀ)⁺ b
+  void SolveInto(const VecX& b, VecX* x, int refinements = 1);  // x = J⁺ b
+  void SolveTransposedInto(const VecX& b, VecX* x);             // x = (Jᵀ)⁺ b
 
   ConstraintSystem* const system_;
   enum class Factors {
