@@ -22,8 +22,8 @@ constexpr double kTrustedCorrection = 0.2;
 constexpr double kOpen = 1e-9;
 // Residuals below this share of their tolerances need no further step.
 constexpr double kRoundOff = 1e-2;
-// Rates that miss by this share of the largest are as good as they can be.
-constexpr double kRatesMiss = 4 * kEps;
+// A step that is round-off itself [rad, characteristic lengths]: rows are not evaluated again.
+constexpr double kNoStep = 3e-14;
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -48,12 +48,6 @@ std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motio
 double HomeTurn(const Mechanism& mechanism, const Coordinate& coordinate, double commanded) {
   return coordinate.kind == Coordinate::Kind::kOutput ? commanded
                                                       : HomeValue(mechanism, coordinate);
-}
-
-VecX Extended(const VecX& values, Eigen::Index size) {
-  VecX out = VecX::Zero(size);
-  out.head(values.size()) = values;
-  return out;
 }
 
 RunSummary Failed(Stop stop, const std::string& message) {
@@ -166,66 +160,6 @@ RunSummary ClosureSolver::Prepare() {
   return SelectRows();
 }
 
-RunSummary ClosureSolver::TurnBack(const std::vector<double>& turns) {
-  Trial trial{states_, near_values_};
-  for (size_t k = 0; k < spins_.size(); ++k) {
-    const Spin& spin = spins_[k];
-    const Pose X_WB = trial.states.X_WB[static_cast<size_t>(spin.bodies[0])];
-    const Mat3 back = ExpRotation(-turns[k] * (X_WB.linear() * spin.n_B));
-    const Vec3 p_WP = X_WB * spin.p_BP;
-    for (const int b : spin.bodies) {
-      Pose& X = trial.states.X_WB[static_cast<size_t>(b)];
-      X.linear() = back * X.linear();
-      X.translation() = p_WP + back * (X.translation() - p_WP);
-    }
-  }
-  if (Newton(target_, false, &trial) != Step::kDone) {
-    return ExplainUnreached(mechanism_, commands_, target_, states_, near_values_);
-  }
-  Accept(target_, std::move(trial));
-  return RunSummary::Done();
-}
-
-// Where the way to the first sample leaves the idle spins depends on how it was cut into steps.
-RunSummary ClosureSolver::TakeLeastTurns() {
-  if (spins_.empty()) return RunSummary::Done();
-  std::vector<double> turns;
-  for (const Spin& spin : spins_) {
-    const Pose& X_WB = states_.X_WB[static_cast<size_t>(spin.bodies[0])];
-    turns.push_back(TurnFromHome(mechanism_, spin, X_WB.linear()));
-  }
-  return TurnBack(turns);
-}
-
-MovingDirection ClosureSolver::LineOf(const Spin& spin) const {
-  const auto b = static_cast<size_t>(spin.bodies[0]);
-  return DirectionOf(states_.X_WB[b].linear() * spin.n_B, states_.V_WB[b].head<3>(),
-                     states_.A_WB[b].head<3>());
-}
-
-// The prediction transports the lines to a lower order, and Newton not at all.
-RunSummary ClosureSolver::TransportTurns(const CommandSample& command) {
-  if (spins_.empty()) return RunSummary::Done();
-  const double h = command.time_s - predictor_.last_s();
-  if (last_lines_.size() == spins_.size() && h > 0.0) {
-    std::vector<double> turns;
-    for (size_t k = 0; k < spins_.size(); ++k) {
-      const Mat3& R_WB = states_.X_WB[static_cast<size_t>(spins_[k].bodies[0])].linear();
-      const MovingDirection line = LineOf(spins_[k]);
-      const Mat3 R = Transported(last_lines_[k].R_WB, last_lines_[k].line, line, h);
-      turns.push_back(TurnBeyond(R, R_WB, line.n));
-    }
-    if (RunSummary summary = TurnBack(turns); !summary.ok()) return summary;
-    if (RunSummary summary = SolveRates(command); !summary.ok()) return summary;
-  }
-  last_lines_.clear();
-  for (const Spin& spin : spins_) {
-    const auto b = static_cast<size_t>(spin.bodies[0]);
-    last_lines_.push_back({LineOf(spin), states_.X_WB[b].linear()});
-  }
-  return RunSummary::Done();
-}
-
 ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, Trial* trial) {
   bool factored = false;
   double previous = std::numeric_limits<double>::infinity(), moved = 0.0;
@@ -252,7 +186,7 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
     if (!(size < 10.0)) return Step::kSlow;
     MoveBodies(step, &trial->states);
     if (small) {
-      EvaluateRows(trial);
+      if (size > kNoStep) EvaluateRows(trial);
       return Turned() ? Step::kSingular : Step::kDone;
     }
     previous = largest;
@@ -260,11 +194,11 @@ ClosureSolver::Step ClosureSolver::Newton(const VecX& target, bool limit_step, T
   return Step::kSlow;
 }
 
-void ClosureSolver::Accept(const VecX& target, Trial&& trial) {
-  states_ = std::move(trial.states);
+void ClosureSolver::Accept(const VecX& target, Trial* trial) {
+  std::swap(states_, trial->states);
   FollowElements(mechanism_, &states_);
   FollowDriven(mechanism_, &states_);
-  near_values_ = std::move(trial.near_values);
+  std::swap(near_values_, trial->near_values);
   target_ = target;
   orientation_ = system_.determinant_sign();
 }
@@ -278,7 +212,7 @@ RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
     const VecX between = start + next * (target - start);
     Trial trial{states_, near_values_};
     if (Newton(between, true, &trial) == Step::kDone) {
-      Accept(between, std::move(trial));
+      Accept(between, &trial);
       reached = next;
       if (++easy >= 3) step = std::min(2 * step, 4.0 / first_steps);
       continue;
@@ -308,7 +242,7 @@ std::string ClosureSolver::OwnerOf(int joint_row) const {
   return "";
 }
 
-RunSummary ClosureSolver::CheckPose() {
+int ClosureSolver::MeasureGaps() {
   gap_position_m_ = gap_rotation_rad_ = 0.0;
   int worst = 0;
   for (int i = 0; i < joint_rows_; ++i) {
@@ -316,6 +250,11 @@ RunSummary ClosureSolver::CheckPose() {
     gap = std::max(gap, std::abs(rows_.value[i]));
     if (std::abs(rows_.value[i]) > std::abs(rows_.value[worst])) worst = i;
   }
+  return worst;
+}
+
+RunSummary ClosureSolver::CheckPose() {
+  const int worst = MeasureGaps();
   const double rounding = Rounding(states_.X_WB);
   if (gap_position_m_ > kOpen * length_ + rounding || gap_rotation_rad_ > kOpen) {
     RunSummary summary = Failed(
@@ -338,64 +277,6 @@ RunSummary ClosureSolver::CheckPose() {
   return RunSummary::Done();
 }
 
-VecX ClosureSolver::Refined(const VecX& rates, bool* accurate) {
-  // The factors belong to a pose nearby; refinement against the true rows restores all digits.
-  VecX V = VecX::Zero(system_.size());
-  std::vector<Vec6> per_body(mechanism_.bodies.size(), Vec6::Zero());
-  VecX unit(system_.size());
-  for (int k = 0; k < system_.size(); ++k) unit[k] = system_.RateUnit(rows_.angular[selection_[k]]);
-  double scale = 0.0;
-  for (int k = 0; k < system_.size(); ++k) {
-    scale = std::max(scale, std::abs(rates[selection_[k]]) / unit[k]);
-  }
-  double previous = std::numeric_limits<double>::infinity();
-  *accurate = false;
-  VecX missing = rates(selection_);
-  for (int i = 0; i < 12; ++i) {
-    if (i > 0) missing = rates(selection_) - rows_.Rates(per_body)(selection_);
-    const double largest = missing.cwiseQuotient(unit).lpNorm<Eigen::Infinity>();
-    *accurate = largest <= 1e-9 * scale;
-    if (largest <= kRatesMiss * scale) break;
-    if (largest < 1e-12 * scale && largest > 0.1 * previous) break;
-    V += system_.SolveTransposed(missing);
-    Unstack(V, &per_body);
-    previous = largest;
-  }
-  return V;
-}
-
-RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
-  // Near a singular pose the factors from the way here are too far off: take those of the pose.
-  for (const bool refactor : {false, true}) {
-    if (refactor) {
-      if (!system_.Factor(rows_, selection_, false)) break;
-      if (system_.determinant_sign() != orientation_) break;
-      const double rounding = Rounding(states_.X_WB) / length_;
-      if (system_.SmallestSingularValue(3) < SingularValueLimit(rounding)) break;
-    }
-    const Eigen::Index count = rows_.size() - joint_rows_;
-    VecX rates = VecX::Zero(rows_.size());
-    rates.tail(count) = Extended(command.velocity, count);
-    bool accurate = false, accurate_too = false;
-    Unstack(Refined(rates, &accurate), &states_.V_WB);
-
-    Trial here{states_, near_values_};  // biases depend on the velocities
-    EvaluateRows(&here);
-    rates.tail(count) = Extended(command.acceleration, count);
-    rates -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
-    Unstack(Refined(rates, &accurate_too), &states_.A_WB);
-    if (accurate && accurate_too) return RunSummary::Done();
-  }
-  const double sigma = system_.SmallestSingularValue(3);
-  RunSummary summary =
-      Singular(fmt::format("the commands do not determine the velocities at this pose (smallest "
-                           "singular value {:.1e})",
-                           sigma));
-  summary.amount = sigma;
-  summary.unit = std::string("1");
-  return summary;
-}
-
 RunSummary ClosureSolver::Solve(const CommandSample& command) {
   const bool first = near_values_.empty();
   if (first) {
@@ -414,11 +295,15 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   const double dt = command.time_s - predictor_.last_s();
   bool done = false;
   if (!first && dt > 0.0 && std::isfinite(dt)) {
-    Trial trial{states_, near_values_};
-    PredictTurns(mechanism_, dt, &trial.states);
-    MoveBodies(predictor_.Predict(dt), &trial.states);
-    if (Newton(target, true, &trial) == Step::kDone) {
-      Accept(target, std::move(trial));
+    trial_.states = states_;
+    trial_.near_values = near_values_;
+    PredictTurns(mechanism_, dt, &trial_.states);
+    predictor_.Predict(dt);
+    MoveBodies(predictor_.step(), &trial_.states);
+    if (Newton(target, true, &trial_) == Step::kDone) {
+      Accept(target, &trial_);
+      Unstack(predictor_.V(), &states_.V_WB);
+      Unstack(predictor_.A(), &states_.A_WB);
       done = true;
     }
   }
@@ -427,6 +312,7 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   if (first && summary.ok()) summary = TakeLeastTurns();
   if (summary.ok()) summary = CheckPose();
   if (summary.ok()) summary = SolveRates(command);
+  if (summary.ok()) MeasureGaps();
   if (summary.ok()) summary = TransportTurns(command);
   if (summary.ok()) {
     predictor_.Remember(command.time_s, states_);

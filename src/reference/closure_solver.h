@@ -68,11 +68,24 @@ class ClosureSolver {
   [[nodiscard]] RunSummary TakeLeastTurns();
   [[nodiscard]] RunSummary TransportTurns(const CommandSample& command);
   [[nodiscard]] MovingDirection LineOf(const Spin& spin) const;
+  /// Of the rows last evaluated; returns the joint row with the largest.
+  int MeasureGaps();
   [[nodiscard]] RunSummary CheckPose();
+  void EvaluateHere();
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
-  [[nodiscard]] VecX Refined(const VecX& rates, bool* accurate);
+  /// What the selected rows miss of the rates, into missing_; the largest [rad, characteristic
+  /// lengths].
+  double Miss(const VecX& rates, const std::vector<Vec6>& per_body);
+  /// Adds the motions that the factors give to what is missing.
+  void AddMissing(std::vector<Vec6>* per_body);
+  struct Refinement {
+    bool began_settled = false, accurate = false;
+  };
+  /// Solves the selected rows for the bodies' motions, from those at hand.
+  Refinement Refine(const VecX& rates, std::vector<Vec6>* per_body);
   [[nodiscard]] RunSummary Singular(const std::string& why) const;
-  void Accept(const VecX& target, Trial&& trial);
+  /// Exchanges states and turns with those of the trial.
+  void Accept(const VecX& target, Trial* trial);
   [[nodiscard]] std::string OwnerOf(int joint_row) const;
 
   const Mechanism& mechanism_;
@@ -90,7 +103,9 @@ class ClosureSolver {
 
   BodyStates states_;
   std::vector<std::vector<double>> near_values_;
-  VecX target_;  ///< command positions of states_; zero for idle spins
+  Trial trial_;           ///< work space
+  VecX rates_, missing_;  ///< the same: per row, per selected row
+  VecX target_;           ///< command positions of states_; zero for idle spins
   PosePredictor predictor_;
   struct LastLine {
     MovingDirection line;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "reference/square_system.h"
 
@@ -17,41 +18,53 @@ constexpr double kBelieved = 0.02;
 }  // namespace
 
 void PosePredictor::Remember(double time_s, const BodyStates& states) {
-  std::rotate(samples_.begin(), samples_.end() - 1, samples_.end());
-  samples_[0] = {time_s, Stack(states.V_WB), Stack(states.A_WB)};
+  for (size_t i = samples_.size() - 1; i > 0; --i) std::swap(samples_[i], samples_[i - 1]);
+  samples_[0].time_s = time_s;
+  samples_[0].V = Stack(states.V_WB);
+  samples_[0].A = Stack(states.A_WB);
 }
 
 int PosePredictor::Usable(double dt_s) const {
-  int usable = 1;
-  while (usable < 3) {
+  size_t usable = 1;
+  while (usable < samples_.size()) {
     const double apart = samples_[usable - 1].time_s - samples_[usable].time_s;
     if (!(std::abs(apart - dt_s) <= kEqual * dt_s)) break;
     ++usable;
   }
-  return usable;
+  return static_cast<int>(usable);
 }
 
-VecX PosePredictor::Predict(double h) const {
-  const auto& [now, before, first] = samples_;
-  const VecX by_one = h * (now.V + 0.5 * h * now.A);
-  VecX step = by_one;
-  switch (Usable(h)) {
-    case 2:
-      step = h * (1.5 * before.V - 0.5 * now.V) + h * h / 12.0 * (17.0 * now.A + 7.0 * before.A);
-      break;
-    case 3:
-      step = h / 240.0 * (-949.0 * now.V + 608.0 * before.V + 581.0 * first.V) +
-             h * h / 240.0 * (637.0 * now.A + 1080.0 * before.A + 173.0 * first.A);
-      break;
-    default:
-      break;
+template <typename Out>
+void PosePredictor::Sum(int samples, const RateWeights& weights, double h, Eigen::Index first,
+                        Eigen::Index count, Out* sum) const {
+  sum->setZero(count);
+  for (size_t i = 0; i < static_cast<size_t>(samples); ++i) {
+    *sum += weights.of_v[i] * samples_[i].V.segment(first, count) +
+            h * weights.of_a[i] * samples_[i].A.segment(first, count);
   }
-  if (!(SizeOf(step - by_one, length_) < kBelieved)) return by_one;
-  for (Eigen::Index i = 0; i < step.size(); i += 6) {
-    const Vec3 w = now.V.segment<3>(i);
-    step.segment<3>(i) += h * h * h / 12.0 * now.A.segment<3>(i).cross(w);
+}
+
+void PosePredictor::Predict(double h) {
+  const Eigen::Index size = samples_[0].V.size();
+  int samples = Usable(h);
+  Sum(1, RateRulesOf(1).mean, h, 0, size, &by_one_);
+  Sum(samples, RateRulesOf(samples).mean, h, 0, size, &step_);
+  step_ *= h;
+  by_one_ *= h;
+  by_one_ -= step_;
+  if (!(SizeOf(by_one_, length_) < kBelieved)) {
+    step_ += by_one_;
+    samples = 1;
   }
-  return step;
+  const RateRules& rules = RateRulesOf(samples);
+  Sum(samples, rules.end, h, 0, size, &V_);
+  Sum(samples, rules.end_slope, h, 0, size, &A_);
+  A_ /= h;
+  std::array<Vec3, 3> w;
+  for (Eigen::Index i = 0; i < size; i += 6) {
+    for (size_t k = 0; k < w.size(); ++k) Sum(samples, rules.places[k], h, i, 3, &w[k]);
+    step_.segment<3>(i) += TurnOfAxes(h, w, true);
+  }
 }
 
 }  // namespace mbv::internal

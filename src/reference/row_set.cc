@@ -17,10 +17,16 @@ void RowSet::Clear() {
 void RowSet::AddPiece(int body_index, const Vec6& J_piece) {
   if (body_index == 0) return;
   // Insert in order, or add to the piece of the same body.
-  auto at = static_cast<size_t>(start.back());
-  while (at < body.size() && body[at] < body_index) ++at;
-  if (at < body.size() && body[at] == body_index) {
-    J[at] += J_piece;
+  const auto first = static_cast<size_t>(start.back());
+  size_t at = body.size();
+  while (at > first && body[at - 1] > body_index) --at;
+  if (at > first && body[at - 1] == body_index) {
+    J[at - 1] += J_piece;
+    return;
+  }
+  if (at == body.size()) {
+    body.push_back(body_index);
+    J.push_back(J_piece);
     return;
   }
   body.insert(body.begin() + static_cast<std::ptrdiff_t>(at), body_index);
@@ -76,10 +82,8 @@ void RowSet::Add(const Mechanism& mechanism, const Command& command, const BodyS
 }
 
 VecX RowSet::Rates(const std::vector<Vec6>& motion) const {
-  VecX rates = VecX::Zero(size());
-  for (int i = 0; i < size(); ++i) {
-    for (int p = start[i]; p < start[i + 1]; ++p) rates[i] += J[p].dot(motion[body[p]]);
-  }
+  VecX rates(size());
+  for (int i = 0; i < size(); ++i) rates[i] = Rate(i, motion.data());
   return rates;
 }
 

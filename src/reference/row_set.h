@@ -30,7 +30,14 @@ struct RowSet {
   void Add(const Mechanism& mechanism, const Command& command, const BodyStates& states,
            std::vector<double>* near_values);
 
-  /// J · motion for every row, in [m] or [rad] per unit.
+  /// J · motion for row i, in [m] or [rad] per unit; `motion` per body.
+  [[nodiscard]] double Rate(int i, const Vec6* motion) const {
+    double rate = 0.0;
+    const int *first = start.data() + i, *of = body.data();
+    for (int p = first[0]; p < first[1]; ++p) rate += J.data()[p].dot(motion[of[p]]);
+    return rate;
+  }
+  /// The same for every row.
   [[nodiscard]] VecX Rates(const std::vector<Vec6>& motion) const;
   /// Adds Jᵀ · force to the wrenches of all bodies.
   void AddWrenches(const VecX& force, std::vector<Vec6>* wrench_W) const;

@@ -78,12 +78,14 @@ void SquareSystem::FillColumns(const RowSet& rows, const std::vector<int>& selec
                                SparseLu::Matrix* columns) const {
   double* out = columns->valuePtr();
   for (const int i : selection) {
-    const double scale = RowScale(rows.angular[i]);
-    for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
-      const int at = 6 * (rows.body[p] - 1);
-      for (int c = 0; c < (rows.angular[i] ? 3 : 6); ++c) {
-        *out++ = scale * body_scale_[at + c] * rows.J[p][c];
-      }
+    const bool angular = rows.angular[static_cast<size_t>(i)] != 0;
+    const double translation = RowScale(angular), rotation = translation / length_;
+    const int* first = rows.start.data() + i;
+    for (int p = first[0]; p < first[1]; ++p) {
+      const double* J = rows.J.data()[p].data();
+      for (int c = 0; c < 3; ++c) *out++ = rotation * J[c];
+      if (angular) continue;
+      for (int c = 3; c < 6; ++c) *out++ = translation * J[c];
     }
   }
   MBV_DEMAND(out == columns->valuePtr() + columns->nonZeros(), columns->nonZeros());
