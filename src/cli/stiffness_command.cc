@@ -12,6 +12,7 @@
 #include "core/output_folder.h"
 #include "pipeline/stiffness.h"
 #include "pipeline/stiffness_map.h"
+#include "scenario/coordinate_names.h"
 #include "scenario/motion_reader.h"
 
 namespace mbv {

@@ -8,6 +8,7 @@
 #include "comparison/drive_motion.h"
 #include "comparison/driven.h"
 #include "comparison/force_scale.h"
+#include "comparison/not_compared.h"
 #include "comparison/reservations.h"
 #include "comparison/table_diagnosis.h"
 #include "comparison/table_tube.h"
@@ -86,10 +87,6 @@ void AddChecks(const ComparisonInput& input, const std::string& measured_by,
   }
 }
 
-bool IsTable(const ComparisonInput& input, const std::string& witness) {
-  return input.table != nullptr && witness == role::kReference;
-}
-
 // A pair with a table: its columns judged one by one, and the tubes of its metrics.
 std::map<Metric, double> JudgeTablePair(const ComparisonInput& input, const Witness& other,
                                         PairComparison* pair, TableVerdict* verdict) {
@@ -144,88 +141,6 @@ std::vector<std::pair<std::string, std::string>> PairsOf(const ComparisonInput& 
     before.push_back(witness.name);
   }
   return pairs;
-}
-
-// Quantities that one would expect to be judged but that the traces do not hold.
-void AddMissingNotes(const ComparisonInput& input, Comparison* comparison) {
-  const auto note = [&](const std::string& what, const char* why) {
-    comparison->not_compared.push_back({what, why});
-  };
-  for (const PairComparison& pair : comparison->pairs) {
-    if (!pair.compared) continue;
-    if (!input.mechanism->outputs.empty() && !pair.metrics.contains(Metric::kPoseM)) {
-      note(pair.name() + ".pose", "the outputs are not recorded by both");
-    }
-    if (pair.reactions.empty()) {
-      note(pair.name() + ".reaction", "no unique joint reaction is recorded by both");
-    }
-  }
-  for (const WitnessMetrics& witness : comparison->witnesses) {
-    const Role* role = FindRole(witness.witness);
-    if (role != nullptr && !role->has_bodies()) continue;
-    if (IsTable(input, witness.witness)) continue;
-    if (!witness.metrics.contains(Metric::kClosureM))
-      note(witness.witness + ".closure", "not recorded");
-    if (!witness.metrics.contains(Metric::kPower)) note(witness.witness + ".power", "not recorded");
-    if (IsEngine(witness.witness) && IsTaskSpace(*input.motion) &&
-        !witness.metrics.contains(Metric::kCommandVelocity)) {
-      note(witness.witness + "." + RowOf(Metric::kCommandVelocity).key,
-           "the rates of the commanded outputs are not recorded");
-    }
-  }
-  for (const Witness& witness : input.witnesses) {
-    if (!witness.foreign) continue;
-    for (const auto& [what, why] : witness.foreign->declined) {
-      note(witness.name + ": " + what, why.c_str());
-    }
-  }
-  for (const WitnessMetrics& witness : comparison->witnesses) {
-    if (witness.derivatives_gap.empty()) continue;
-    note(witness.witness + ".derivatives", witness.derivatives_gap.c_str());
-  }
-}
-
-// Reaction components that statics leaves open, joint by joint: "hinge.reaction (fz, mx, my)".
-void AddReactionNotes(const ComparisonInput& input, Comparison* comparison) {
-  for (const Joint& joint : input.mechanism->joints) {
-    std::string components;
-    size_t count = 0;
-    for (const Channel& channel : ReactionChannels(joint)) {
-      const auto& open = input.reactions_not_unique;
-      if (std::find(open.begin(), open.end(), channel.name) == open.end()) continue;
-      components += (count++ == 0 ? "" : ", ") + SignalWord(channel);
-    }
-    if (count == 0) continue;
-    comparison->not_compared.push_back(
-        {ChannelName(Quantity::kReaction, joint.name) + (count == 6 ? "" : " (" + components + ")"),
-         "statics alone does not determine it (redundant constraints)"});
-  }
-}
-
-// Prescribed motion is imposed; no witness records it as a signal.
-void AddCommandNotes(const ComparisonInput& input, Comparison* comparison) {
-  for (const Command& command : input.motion->commands) {
-    for (const Command::Term& term : command.terms) {
-      if (term.coordinate.kind != Coordinate::Kind::kPrescribed) continue;
-      comparison->not_compared.push_back(
-          {command.name, "a prescribed joint's motion is an input and is not measured back"});
-    }
-  }
-}
-
-// Given forces are the same in every witness.
-void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
-  if (input.drive_by == DriveBy::kForces) {
-    comparison->not_compared.push_back(
-        {role::kSimulated.name + std::string(" drive forces"),
-         "they are the " + input.driven_by + " forces; the motion that they cause is compared"});
-  }
-  for (const DriveForce& force : input.motion->forces) {
-    const std::string& drive = input.mechanism->drives[force.drive].name;
-    comparison->not_compared.push_back({ChannelName(Quantity::kForce, drive),
-                                        "it is given by the scenario; the motion it causes is "
-                                        "compared"});
-  }
 }
 
 // A witness that started and broke down, or nullptr.
@@ -417,10 +332,7 @@ Comparison Compare(const ComparisonInput& given) {
     const bool alone = role == nullptr || role->judged_alone();
     if (Ran(witness) && alone) AddWitness(input, witness, &comparison);
   }
-  AddMissingNotes(input, &comparison);
-  AddReactionNotes(input, &comparison);
-  AddCommandNotes(input, &comparison);
-  AddForceNotes(input, &comparison);
+  AddNotCompared(input, &comparison);
   if (input.table != nullptr) FinishTable(input, &comparison);
   MarkBlind(input, &comparison);
   Judge(input, &comparison);

@@ -210,6 +210,10 @@ double TableColumnResult::ratio() const {
   return std::isnan(rms) || std::isnan(max) ? kNan : std::max(rms, max);
 }
 
+bool IsTable(const ComparisonInput& input, const std::string& witness) {
+  return input.table != nullptr && witness == role::kReference;
+}
+
 std::map<Metric, double> TubeLimits(const ComparisonInput& input, const Trace& other,
                                     bool table_is_truth) {
   const Shared shared = Share(*input.table, other);

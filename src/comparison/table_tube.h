@@ -16,6 +16,9 @@
 
 namespace mbv {
 
+/// True of the witness that a table stands for.
+[[nodiscard]] bool IsTable(const ComparisonInput& input, const std::string& witness);
+
 /// k · (the value of each metric that the table's uncertainty would cause) against `other`;
 /// `truth` tells which of the two is the pair's truth.
 [[nodiscard]] std::map<Metric, double> TubeLimits(const ComparisonInput& input, const Trace& other,

@@ -1,19 +1,17 @@
 #include "mjcf/compliant.h"
 
 #include <fmt/format.h>
-#include <tinyxml2.h>
 
 #include <array>
 #include <cmath>
-#include <map>
 #include <numeric>
 
 #include "core/demand.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/spanning_tree.h"
+#include "mjcf/compliant_springs.h"
 #include "mjcf/mjcf.h"
 #include "mjcf/plan.h"
-#include "mjcf/writer.h"
 
 namespace mbv::mjcf {
 namespace {
@@ -46,7 +44,7 @@ class Expander {
       *error = error_;
       return std::nullopt;
     }
-    model_.mjcf = TextWithSprings();
+    model_.mjcf = TextWithSprings(model_);
     return std::move(model_);
   }
 
@@ -364,40 +362,6 @@ class Expander {
            model_.mechanism.bodies[tree.unconnected_bodies[0]].name + "' to the world");
     }
     MBV_DEMAND(tree.hints_broken.empty(), tree.hints_broken.size());
-  }
-
-  // The writer's text with the stiffness of the joint springs (those of tendons are there). Their
-  // coordinates count from the given pose, so that they are deformations: the rounding of an angle
-  // of 1 rad, times the servo's stiffness, would unbalance small loads.
-  [[nodiscard]] std::string TextWithSprings() const {
-    std::map<std::string, const ElasticSpring*> on_joint;
-    for (const ElasticSpring& spring : model_.springs) {
-      if (!spring.is_tendon) on_joint[spring.object] = &spring;
-    }
-    tinyxml2::XMLDocument document;
-    const std::string text = WriteMjcf(model_.mechanism, {.pictures = false, .statics = true});
-    MBV_DEMAND(document.Parse(text.c_str(), text.size()) == tinyxml2::XML_SUCCESS, text);
-    SetSprings(document.RootElement(), on_joint);
-    tinyxml2::XMLPrinter printer;
-    document.Print(&printer);
-    return printer.CStr();
-  }
-
-  static void SetSprings(tinyxml2::XMLElement* element,
-                         const std::map<std::string, const ElasticSpring*>& on_joint) {
-    for (auto* child = element->FirstChildElement(); child != nullptr;
-         child = child->NextSiblingElement()) {
-      const char* name = child->Attribute("name");
-      const bool is_joint = std::string_view(child->Name()) == "joint";
-      const auto spring = is_joint && name != nullptr ? on_joint.find(name) : on_joint.end();
-      if (spring != on_joint.end() && child->Attribute("type") != nullptr) {
-        child->SetAttribute("stiffness", NumberText(spring->second->stiffness).c_str());
-        child->SetAttribute("springref", "0");
-        for (const char* of_own_zero : {"ref", "range", "limited"})
-          child->DeleteAttribute(of_own_zero);
-      }
-      SetSprings(child, on_joint);
-    }
   }
 
   void Fail(const std::string& message) {

@@ -7,6 +7,7 @@
 
 #include "core/spatial.h"
 #include "mechanism/joint_pose.h"
+#include "model_file/element_text.h"
 #include "model_file/urdf.h"
 #include "model_file/urdf_frames.h"
 #include "model_file/write_model.h"

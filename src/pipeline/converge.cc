@@ -4,17 +4,17 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <numeric>
 #include <optional>
 
+#include "core/bytes.h"
 #include "core/in_children.h"
 #include "input/parsed_documents.h"
 #include "mechanism/break_times.h"
 #include "pipeline/computed_once.h"
+#include "pipeline/convergence_plan.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/run_witnesses.h"
 #include "scenario/settings_reader.h"
@@ -25,73 +25,23 @@ namespace {
 // Samples this many of the coarsest steps after a break count as near it: three times the history
 // that the multistep formulas rebuild there.
 constexpr double kWindowSteps = 12.0;
-// Time constants in steps, halved.
-constexpr std::array<double, 5> kCorrectedConstants = {400, 200, 100, 50, 25};
-constexpr std::array<double, 5> kStockConstants = {32, 16, 8, 4, 2};
-
 struct SteppedRun {
   ConvergencePoint point;
   MatX forces;  // empty if it failed
 };
-
-// What a run is: a step, a time constant, an engine.
-struct PlannedRun {
-  std::string title;
-  bool stock = false;
-  double step_s = kNan, constant_steps = kNan;
-
-  [[nodiscard]] double cost() const { return 1.0 / step_s; }
-  [[nodiscard]] SteppedRun Lost(const std::string& why) const {
-    SteppedRun run;
-    run.point.step_s = step_s;
-    run.point.time_constant_s = constant_steps * step_s;
-    run.point.failure = why;
-    return run;
-  }
-};
-
-struct PlannedSeries {
-  ConvergenceSeries series;
-  std::vector<std::pair<double, double>> grid;  // step, time constant in steps, coarse to fine
-};
-
-// A run as bytes, from a process of its own.
-std::string BytesOf(const SteppedRun& run) {
-  const ConvergencePoint& p = run.point;
-  std::string bytes;
-  const auto put = [&](double x) { bytes.append(reinterpret_cast<const char*>(&x), sizeof x); };
-  for (const double x :
-       {p.step_s, p.time_constant_s, static_cast<double>(p.steps), p.cpu_s, p.closure_m, p.pose_m,
-        p.error.smooth, p.error.breaks, static_cast<double>(run.forces.rows()),
-        static_cast<double>(run.forces.cols())}) {
-    put(x);
-  }
-  for (Eigen::Index i = 0; i < run.forces.size(); ++i) put(run.forces.data()[i]);
-  return bytes + p.failure;
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<SteppedRun>& run) {
+  auto& point = run.point;
+  visit(point.step_s), visit(point.time_constant_s), visit(point.steps), visit(point.cpu_s);
+  visit(point.closure_m), visit(point.pose_m), visit(point.error.smooth);
+  visit(point.error.breaks), visit(point.failure), visit(run.forces);
 }
 
-SteppedRun SteppedRunOf(const std::string& bytes) {
+SteppedRun Lost(const PlannedRun& planned, std::string why) {
   SteppedRun run;
-  ConvergencePoint& p = run.point;
-  size_t at = 0;
-  const auto take = [&] {
-    double x = kNan;
-    std::memcpy(&x, bytes.data() + at, sizeof x);
-    at += sizeof x;
-    return x;
-  };
-  p.step_s = take();
-  p.time_constant_s = take();
-  p.steps = static_cast<long>(take());
-  p.cpu_s = take();
-  p.closure_m = take();
-  p.pose_m = take();
-  p.error.smooth = take();
-  p.error.breaks = take();
-  const auto rows = static_cast<Eigen::Index>(take());
-  run.forces.resize(rows, static_cast<Eigen::Index>(take()));
-  for (Eigen::Index i = 0; i < run.forces.size(); ++i) run.forces.data()[i] = take();
-  p.failure = bytes.substr(at);
+  run.point.step_s = planned.step_s;
+  run.point.time_constant_s = planned.constant_steps * planned.step_s;
+  run.point.failure = std::move(why);
   return run;
 }
 
@@ -120,7 +70,7 @@ double PoseError(const Mechanism& mechanism, const Trace& a, const Trace& b,
 class StepStudy {
  public:
   StepStudy(const std::string& file, const ConvergeOptions& options)
-      : file_(file), options_(options) {}
+      : file_(file), options_(options), planned_(options.steps_s) {}
 
   ConvergeOutcome Run() {
     if (!Load()) {
@@ -130,10 +80,10 @@ class StepStudy {
     ChooseSamples();
     if (!RunTruth()) return std::move(outcome_);
     ComputeDrivenMotion();
-    cost_ = CostOfAll();
+    cost_ = CostOf(planned_.UsualRefinement()) + CostOf(planned_.Others());
     RunCorrected();
     if (outcome_.failure.empty()) {
-      AddSeries(Others());
+      AddSeries(planned_.Others());
       outcome_.exit_code = report().finding() ? 1 : 0;
     }
     // What a killed run would have shown is not known: that is no good end.
@@ -247,7 +197,7 @@ class StepStudy {
     // What one run asks for besides is its own: no run depends on those before it.
     ComputedOnce<DrivenSample> driven = driven_;
     const SimulatedWitness witness = Simulate(options, planned.title, &driven, progress);
-    SteppedRun run = planned.Lost("");
+    SteppedRun run = Lost(planned, "");
     if (witness.diagnostics.has_errors()) {
       run.point.failure = witness.diagnostics.findings().front().message;
     } else if (!witness.run.summary.ok()) {
@@ -273,13 +223,7 @@ class StepStudy {
   // All runs of these series, the longest ones first: shared out to processes, they end at about
   // the same time.
   std::vector<SteppedRun> RunAll(const std::vector<PlannedSeries>& all) {
-    std::vector<PlannedRun> runs;
-    for (const PlannedSeries& planned : all) {
-      for (const auto& [step_s, constant_steps] : planned.grid) {
-        runs.push_back({fmt::format("{}, step {:g} s", planned.series.title, step_s),
-                        planned.series.stock, step_s, constant_steps});
-      }
-    }
+    const std::vector<PlannedRun> runs = RunsOf(all);
     std::vector<size_t> order(runs.size());
     std::iota(order.begin(), order.end(), size_t{0});
     std::stable_sort(order.begin(), order.end(),
@@ -288,7 +232,7 @@ class StepStudy {
     const auto work = [&](size_t k) {
       const PlannedRun& run = runs[order[k]];
       const double before = done_;
-      const std::string bytes = BytesOf(RunForward(run, [&](const std::string&, double fraction) {
+      const std::string bytes = ToBytes(RunForward(run, [&](const std::string&, double fraction) {
         done_ = before;
         Tell(run, fraction);
       }));
@@ -298,8 +242,9 @@ class StepStudy {
     ShareOut(order.size(), options_.jobs, work,
              [&](size_t k, const std::optional<std::string>& bytes) {
                const PlannedRun& run = runs[order[k]];
-               done[order[k]] = bytes ? SteppedRunOf(*bytes) : run.Lost("its process was killed");
-               if (!bytes) lost_.push_back(run.title);
+               auto ended = bytes ? FromBytes<SteppedRun>(*bytes) : std::nullopt;
+               if (!ended) lost_.push_back(run.title);
+               done[order[k]] = std::move(ended).value_or(Lost(run, "its process was killed"));
                Tell(run, 1.0);
              });
     return done;
@@ -344,7 +289,7 @@ class StepStudy {
 
   // The corrected engine's usual refinement, without which the rest says nothing.
   void RunCorrected() {
-    const std::vector<MatX> forces = AddSeries({CorrectedBoth()});
+    const std::vector<MatX> forces = AddSeries(planned_.UsualRefinement());
     const ConvergenceSeries& series = report().series.back();
     const auto ran = std::count_if(series.points.begin(), series.points.end(),
                                    [](const ConvergencePoint& p) { return p.failure.empty(); });
@@ -356,72 +301,9 @@ class StepStudy {
         ExtrapolateForces(mechanism(), series, forces, truth_forces_, classes_);
   }
 
-  [[nodiscard]] PlannedSeries CorrectedBoth() const {
-    const double kUsual = SimulationOptions{}.guidance_steps;
-    return {{.name = "corrected_both",
-             .title = fmt::format("corrected engine, step and time constant = {:g} steps", kUsual)},
-            Both(kUsual)};
-  }
-
-  [[nodiscard]] std::vector<PlannedSeries> Others() const {
-    const std::vector<double>& steps = options_.steps_s;
-    const double guidance = SimulationOptions{}.guidance_steps;
-    const double stock = SimulationOptions{}.stock_time_constant_steps;
-    return {
-        {{.name = "corrected_step",
-          .title = fmt::format("corrected engine, step at time constant {:g} s",
-                               guidance * steps.front()),
-          .knob = Knob::kStep},
-         StepAlone(guidance)},
-        Constants("corrected", false, steps[steps.size() / 2], kCorrectedConstants),
-        {{.name = "stock_both",
-          .title = fmt::format("stock engine, step and time constant = {:g} steps", stock),
-          .stock = true},
-         Both(stock)},
-        {{.name = "stock_step",
-          .title = fmt::format("stock engine, step at time constant {:g} s", stock * steps.front()),
-          .stock = true,
-          .knob = Knob::kStep},
-         StepAlone(stock)},
-        Constants("stock", true, steps.back(), kStockConstants)};
-  }
-
-  [[nodiscard]] static PlannedSeries Constants(const std::string& engine, bool stock, double step_s,
-                                               const std::array<double, 5>& constants) {
-    std::vector<std::pair<double, double>> grid;
-    for (const double constant : constants) grid.emplace_back(step_s, constant);
-    return {{.name = engine + "_time_constant",
-             .title = fmt::format("{} engine, time constant at step {:g} s", engine, step_s),
-             .stock = stock,
-             .knob = Knob::kTimeConstant},
-            grid};
-  }
-
-  [[nodiscard]] double CostOfAll() const {
-    std::vector<PlannedSeries> all = Others();
-    all.push_back(CorrectedBoth());
-    double cost = 0.0;
-    for (const PlannedSeries& planned : all) {
-      for (const auto& [step_s, constant] : planned.grid) cost += 1.0 / step_s;
-    }
-    return cost;
-  }
-
-  [[nodiscard]] std::vector<std::pair<double, double>> Both(double constant_steps) const {
-    std::vector<std::pair<double, double>> grid;
-    for (const double h : options_.steps_s) grid.emplace_back(h, constant_steps);
-    return grid;
-  }
-  [[nodiscard]] std::vector<std::pair<double, double>> StepAlone(double constant_steps) const {
-    std::vector<std::pair<double, double>> grid;
-    for (const double h : options_.steps_s) {
-      grid.emplace_back(h, constant_steps * options_.steps_s.front() / h);
-    }
-    return grid;
-  }
-
   const std::string file_;
   const ConvergeOptions& options_;
+  const ConvergencePlan planned_;
   ConvergeOutcome outcome_;
   std::optional<Prepared> prepared_;
   ComputedOnce<DrivenSample> driven_{1e12};  // by time in ps

@@ -59,6 +59,9 @@ class FreeMotion {
 
  private:
   using State = std::vector<double>;
+  static constexpr size_t kPerBody = 13;  ///< position, quaternion (w, x, y, z), twist
+  /// A pose counts as near singular while its pivot is below this share of the largest of the run.
+  static constexpr double kNear = 0.03;
   // A node of the integration.
   struct Node {
     double time_s = 0.0;

@@ -11,6 +11,7 @@
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "scenario/blended_path_reader.h"
+#include "scenario/coordinate_names.h"
 #include "scenario/free_motion_reader.h"
 #include "scenario/profile_reader.h"
 #include "scenario/state_function_reader.h"
@@ -382,25 +383,6 @@ class MotionReader {
 };
 
 }  // namespace
-
-std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
-  std::vector<std::string> names;
-  for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
-  for (const Drive& d : mechanism.drives) names.push_back(d.name);
-  for (const Output& o : mechanism.outputs) {
-    for (const char* c : kPoseComponents) names.push_back(o.name + "." + c);
-  }
-  return names;
-}
-
-Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
-  using Kind = Coordinate::Kind;
-  if (k < mechanism.prescribed.size()) return {Kind::kPrescribed, static_cast<int>(k), 0};
-  k -= mechanism.prescribed.size();
-  if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
-  k -= mechanism.drives.size();
-  return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
-}
 
 Motion ReadMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode* motion,
                   const YamlNode* loads, const YamlNode* forces, const MotionTimes& otherwise,

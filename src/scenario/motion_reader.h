@@ -21,9 +21,4 @@ struct MotionTimes {
                                 const YamlNode* forces, const MotionTimes& otherwise,
                                 Diagnostics* files);
 
-/// Names a command may use: prescribed joints, drives, output components ("platform.yaw").
-[[nodiscard]] std::vector<std::string> CoordinateNames(const Mechanism& mechanism);
-/// The k-th of these names as a coordinate.
-[[nodiscard]] Coordinate CoordinateAt(const Mechanism& mechanism, size_t k);
-
 }  // namespace mbv

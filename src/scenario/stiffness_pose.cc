@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "kinematics/mobility.h"
+#include "scenario/coordinate_names.h"
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/stiffness_scenario.h"

@@ -9,6 +9,7 @@
 #include "core/text.h"
 #include "core/word_hints.h"
 #include "model_file/load_model.h"
+#include "scenario/coordinate_names.h"
 #include "scenario/file_parts.h"
 #include "scenario/motion_reader.h"
 #include "scenario/scenario_file.h"

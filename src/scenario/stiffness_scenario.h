@@ -59,7 +59,8 @@ struct StiffnessScenarioResult {
                                                           const std::string& start,
                                                           std::string* why);
 
-/// A pose as constant commands, for loop closure. The names must be CoordinateNames().
+/// A pose as constant commands, for loop closure. The names must be CoordinateNames()
+/// (coordinate_names.h).
 [[nodiscard]] Motion PoseMotion(const Mechanism& mechanism, const PoseValues& pose);
 
 /// The values of all drives at the home pose.

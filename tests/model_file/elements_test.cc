@@ -3,6 +3,7 @@
 
 #include <numbers>
 
+#include "model_file/element_text.h"
 #include "model_file/load_model.h"
 #include "model_file/urdf.h"
 #include "model_file/write_model.h"

@@ -10,6 +10,7 @@
 #include "core/spatial.h"
 #include "four_bar.h"
 #include "kinematics/mobility.h"
+#include "model_file/element_text.h"
 #include "model_file/load_model.h"
 #include "model_file/write_model.h"
 #include "tests/shipped.h"

@@ -1,0 +1,95 @@
+#include "model_file/element_text.h"
+
+#include <fmt/ranges.h>
+
+#include <string_view>
+#include <variant>
+#include <vector>
+
+namespace mbv {
+namespace {
+
+std::string TextOf(const DampingLaw& law) { return fmt::format("damping: {}", law.damping); }
+std::string TextOf(const SpringLaw& law) {
+  const std::vector<double>& p = law.polynomial;
+  std::string text = p.size() == 1 && p[0] >= 0.0
+                         ? fmt::format("stiffness: {}", p[0])
+                         : fmt::format("polynomial: [{}]", fmt::join(p, ", "));
+  if (law.free != 0.0) text += fmt::format(", free: {}", law.free);
+  if (law.preload != 0.0) text += fmt::format(", preload: {}", law.preload);
+  return text;
+}
+std::string TextOf(const RotorLaw& law) {
+  return fmt::format("inertia: {}, ratio: {}", law.inertia, law.ratio);
+}
+std::string TextOf(const FrictionLaw& law) {
+  std::string text = fmt::format("coulomb: {}", law.coulomb);
+  if (law.breakaway != law.coulomb) {
+    text += fmt::format(", breakaway: {}", law.breakaway);
+    if (law.stribeck_rate != 0.0) text += fmt::format(", stribeck_rate: {}", law.stribeck_rate);
+  }
+  return law.coefficient == 0.0 ? text : text + fmt::format(", coefficient: {}", law.coefficient);
+}
+
+}  // namespace
+
+std::string CoordinateText(int coordinate) {
+  return coordinate == 0 ? "" : fmt::format(", coordinate: {}", coordinate);
+}
+
+std::string ElementText(const ForceElement& element, const std::string& place, bool slides) {
+  const auto* friction = std::get_if<FrictionLaw>(&element.law);
+  const bool journal = friction != nullptr && friction->per_load() > 0.0 && !slides;
+  return fmt::format("kind: {}, {}, {}{}", WordOf(element), place,
+                     std::visit([](const auto& law) { return TextOf(law); }, element.law),
+                     journal ? fmt::format(", radius: {}", friction->radius) : "");
+}
+
+std::string CarrierText(const RotorAxis& axis, const std::string& body) {
+  const Vec3& n = axis.axis_B;
+  return fmt::format(", axis_on: {}, axis: [{}, {}, {}]", body, n.x(), n.y(), n.z());
+}
+
+std::string BushingText(const Mechanism& mechanism, int bushing, const std::string& parent,
+                        const std::string& child) {
+  Vec6 stiffness = Vec6::Zero(), damping = Vec6::Zero();
+  for (const ForceElement& element : mechanism.elements) {
+    if (element.bushing != bushing) continue;
+    const auto* spring = std::get_if<SpringLaw>(&element.law);
+    const auto* damper = std::get_if<DampingLaw>(&element.law);
+    if (spring != nullptr) stiffness[element.coordinate] += spring->polynomial[0];
+    if (damper != nullptr) damping[element.coordinate] += damper->damping;
+  }
+  return fmt::format("kind: bushing, parent: {}, child: {}, stiffness: [{}], damping: [{}]", parent,
+                     child, fmt::join(stiffness.begin(), stiffness.end(), ", "),
+                     fmt::join(damping.begin(), damping.end(), ", "));
+}
+
+std::string CouplingText(const Coupling& coupling, const TermNames& name_of) {
+  const std::vector<Coupling::Term>& terms = coupling.terms;
+  const auto coordinate = [&](const char* key, const Coupling::Term& term) {
+    const auto [joint, k] = name_of(term);
+    const bool follows = std::string_view(key) == "follows";
+    return fmt::format(
+        "{}: {}{}", key, joint,
+        k == 0 ? "" : fmt::format(", {}: {}", follows ? "follows_coordinate" : "coordinate", k));
+  };
+  std::string text;
+  if (terms.size() == 2 && terms[0].polynomial == std::vector<double>{-1.0}) {
+    const std::vector<double>& p = terms[1].polynomial;
+    text = coordinate("joint", terms[0]) + ", " + coordinate("follows", terms[1]);
+    text += p.size() == 1 ? fmt::format(", ratio: {}", p[0])
+                          : fmt::format(", polynomial: [{}]", fmt::join(p, ", "));
+    if (coupling.constant != 0.0) text += fmt::format(", offset: {}", coupling.constant);
+    return text;
+  }
+  for (const Coupling::Term& term : terms) {
+    text += fmt::format("{}{{{}, factor: {}}}", text.empty() ? "" : ", ", coordinate("joint", term),
+                        term.polynomial[0]);
+  }
+  text = "sum: [" + text + "]";
+  if (coupling.constant != 0.0) text += fmt::format(", offset: {}", -coupling.constant);
+  return text;
+}
+
+}  // namespace mbv
