@@ -248,7 +248,7 @@ std::vector<AuditRow> PlatformRows(const StiffnessParameters& p, const std::vect
     const Mat3 K_fr = at.K.bottomLeftCorner<3, 3>(), K_ft = at.K.bottomRightCorner<3, 3>();
     for (int k = 0; k < 9; ++k) blocks.Add(truth.K(k / 3, 3 + k % 3), K_fr(k % 3, k / 3));
     const auto basis = [](const Mat3& K) {
-      return Mat3(Eigen::SelfAdjointEigenSolver<Mat3>(K.transpose() * K).eigenvectors());
+      return Mat3(Eigen::SelfAdjointEigenSolver<Mat3>(Mat3(K.transpose() * K)).eigenvectors());
     };
     Eigen::Matrix<double, 3, 6> G_m, G_f;
     G_m << K_mr * basis(K_mr), K_mt * basis(K_mt);

@@ -14,6 +14,7 @@
 #include <sstream>
 #include <system_error>
 
+#include "cli/run_cli.h"
 #include "cli/terminal.h"
 #include "core/text.h"
 #include "core/word_hints.h"

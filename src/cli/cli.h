@@ -1,7 +1,4 @@
-// argv → command → exit code.
-//
-// Exit codes: 0 agree (or done), 1 disagree, 2 bad input, 3 could not run, 4 internal error; over
-// several scenarios the worst in the order 4, 2, 3, 1, 0. Results go to stdout, talk to stderr.
+// The commands of the program (run_cli.h), and what they share.
 #pragma once
 
 #include <CLI/CLI.hpp>
@@ -9,9 +6,6 @@
 #include <vector>
 
 namespace mbv {
-
-/// Runs the program; never throws.
-[[nodiscard]] int RunCli(int argc, char** argv);
 
 /// The worse of two exit codes.
 [[nodiscard]] int WorseExit(int a, int b);

@@ -10,6 +10,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/json_text.h"
 #include "core/names.h"
 #include "core/sha256.h"
 
@@ -59,7 +60,7 @@ nlohmann::ordered_json PackageJson(const PackageArguments& arguments, const Pack
   if (!outcome.zip.empty()) {
     json["bytes"] = outcome.zip.size();
     json["sha256"] = Sha256Hex(outcome.zip);
-    json["manifest"] = nlohmann::ordered_json::parse(ManifestJson(outcome.description));
+    json["manifest"] = ParseJson<nlohmann::ordered_json>(ManifestJson(outcome.description));
   }
   json["findings"] = FindingObjects(outcome.diagnostics);
   return json;

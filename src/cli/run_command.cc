@@ -14,6 +14,7 @@
 #include "cli/terminal.h"
 #include "core/demand.h"
 #include "core/files.h"
+#include "core/json_text.h"
 #include "pipeline/default_setup.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/out_of_memory.h"
@@ -66,9 +67,9 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
 
 // summary.json of what ran, findings of what did not.
 nlohmann::ordered_json ResultJson(const std::string& file, const RunOutcome& outcome) {
-  if (outcome.report) return nlohmann::ordered_json::parse(ToJson(*outcome.report));
+  if (outcome.report) return ParseJson<nlohmann::ordered_json>(ToJson(*outcome.report));
   if (outcome.stiffness != nullptr) {
-    return nlohmann::ordered_json::parse(ToJson(*outcome.stiffness));
+    return ParseJson<nlohmann::ordered_json>(ToJson(*outcome.stiffness));
   }
   return {{"scenario_file", file},
           {"exit_code", outcome.exit_code},

@@ -6,6 +6,7 @@
 #include "cli/cli.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/json_text.h"
 #include "pipeline/verify_package.h"
 
 namespace mbv {
@@ -34,7 +35,7 @@ int Verify(const VerifyArguments& arguments) {
   RerunReport none;
   none.archive = arguments.archive;
   auto json =
-      nlohmann::ordered_json::parse(ToJson(outcome.report.value_or(none), outcome.exit_code));
+      ParseJson<nlohmann::ordered_json>(ToJson(outcome.report.value_or(none), outcome.exit_code));
   json["findings"] = FindingObjects(outcome.diagnostics);
   return WorseExit(outcome.exit_code, arguments.json.Write(json, {{arguments.archive, ""}}));
 }

@@ -159,7 +159,7 @@ void AddOwnChecks(const StiffnessInput& input, const StiffnessWitness& witness,
   const Vec6 scale = ScaleOf(result.K);
   add(StiffnessMetric::kSymmetry, WorstOf(Scaled(result.K - result.K.transpose(), scale), "K"));
   const Eigen::SelfAdjointEigenSolver<Mat6> solver(
-      Scaled(0.5 * (result.K + result.K.transpose()), scale));
+      Mat6(Scaled(0.5 * (result.K + result.K.transpose()), scale)));
   add(StiffnessMetric::kDefinite, {std::max(0.0, -solver.eigenvalues()[0]), ""});
   if (!result.shares.empty() && result.C.allFinite()) {
     Mat6 rest = -result.C;

@@ -23,7 +23,7 @@ struct Principal {
 Principal PrincipalOf(const Mat3& block) {
   Principal principal;
   if (!block.allFinite()) return principal;
-  const Eigen::SelfAdjointEigenSolver<Mat3> solver(0.5 * (block + block.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Mat3> solver(Mat3(0.5 * (block + block.transpose())));
   principal.values = solver.eigenvalues();
   principal.directions = solver.eigenvectors();
   return principal;
@@ -46,7 +46,7 @@ double Condition(const Mat6& C) {
   Vec6 s = Vec6::Ones();
   s.head<3>().setConstant(L);
   const Mat6 scaled = s.asDiagonal() * C * s.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Mat6> solver(0.5 * (scaled + scaled.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Mat6> solver(Mat6(0.5 * (scaled + scaled.transpose())));
   return solver.eigenvalues()[5] / solver.eigenvalues()[0];
 }
 
@@ -63,7 +63,7 @@ WeakScrew WeakestScrew(const Mat6& C, double length_m) {
   Vec6 s = Vec6::Ones();
   s.head<3>().setConstant(screw.length_m);
   const Mat6 scaled = s.asDiagonal() * C * s.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Mat6> solver(0.5 * (scaled + scaled.transpose()));
+  const Eigen::SelfAdjointEigenSolver<Mat6> solver(Mat6(0.5 * (scaled + scaled.transpose())));
   screw.stiffness = 1.0 / solver.eigenvalues()[5];
   screw.twist = WithPositiveMain(Vec6(solver.eigenvectors().col(5)));
   screw.twist.head<3>() /= screw.length_m;

@@ -38,6 +38,13 @@ class Diagnostics {
 
 [[nodiscard]] std::string ToText(const Finding& finding);
 
+/// See core/bytes.h.
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<Finding>& finding) {
+  visit(finding.severity), visit(finding.file), visit(finding.line), visit(finding.column);
+  visit(finding.message), visit(finding.hint);
+}
+
 /// The candidate closest to `word` by edit distance, or "" when none is near (for "did you mean").
 [[nodiscard]] std::string ClosestWord(const std::string& word,
                                       const std::vector<std::string>& candidates);

@@ -1,9 +1,11 @@
-// Numbers in JSON, and JSON as the text of a file.
+// Numbers in JSON, and JSON as the text of a file. Writing and parsing are compiled once
+// (json_text.cc): the library's templates cost each file that uses them seconds.
 #pragma once
 
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <string>
+#include <string_view>
 
 namespace mbv {
 
@@ -13,8 +15,15 @@ inline nlohmann::ordered_json Number(double value) {
 }
 
 /// So many blanks per level, and a line feed at the end; bytes that are no text become U+FFFD.
-inline std::string Dump(const nlohmann::ordered_json& json, int blanks = 2) {
-  return json.dump(blanks, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
-}
+[[nodiscard]] std::string Dump(const nlohmann::ordered_json& json, int blanks = 2);
+/// In one line, without a line feed.
+[[nodiscard]] std::string DumpLine(const nlohmann::ordered_json& json);
+
+/// Of nlohmann::json or ordered_json. Throws the library's parse_error.
+template <typename Json>
+[[nodiscard]] Json ParseJson(std::string_view text);
+/// is_discarded() where the text is no JSON.
+template <typename Json>
+[[nodiscard]] Json ParseIfJson(std::string_view text);
 
 }  // namespace mbv

@@ -5,7 +5,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <valijson/adapters/nlohmann_json_adapter.hpp>
 #include <valijson/schema.hpp>
@@ -14,6 +13,7 @@
 #include <valijson/validator.hpp>
 
 #include "core/diagnostics.h"
+#include "core/json_text.h"
 #include "core/types.h"
 
 namespace mbv {
@@ -41,7 +41,7 @@ bool IsBelow(const Path& path, const Path& above) {
 // The schema's errors without those that only say that something below them is wrong.
 std::vector<JsonFinding> SchemaFindings(const Value& json) {
   valijson::Schema schema;
-  const Value schema_json = Value::parse(MechanismSchemaText());
+  const Value schema_json = ParseJson<Value>(MechanismSchemaText());
   valijson::SchemaParser(valijson::SchemaParser::kDraft7)
       .populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_json), schema);
   valijson::ValidationResults results;
@@ -247,7 +247,7 @@ std::string PathText(const std::vector<std::string>& path) {
 std::vector<JsonFinding> CheckMechanismJson(const std::string& text) {
   Value json;
   try {
-    json = Value::parse(text);
+    json = ParseJson<Value>(text);
   } catch (const Value::parse_error& error) {
     return {{.path = {}, .message = error.what(), .hint = {}}};
   }

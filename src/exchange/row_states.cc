@@ -1,7 +1,6 @@
 #include "exchange/row_states.h"
 
 #include <Eigen/Dense>
-#include <nlohmann/json.hpp>
 
 #include "core/json_text.h"
 
@@ -56,7 +55,7 @@ std::string StatesJson(const std::vector<std::string>& driven,
 std::optional<RowAnswer> ReadRowAnswer(std::string_view json, size_t states, size_t driven,
                                        std::string* trouble) {
   try {
-    RowAnswer answer = Answered(Parsed::parse(json));
+    RowAnswer answer = Answered(ParseJson<Parsed>(json));
     if (Fits(answer, states, driven)) return answer;
     *trouble = "rows.json does not fit the states that were asked for";
   } catch (const Parsed::exception& error) {

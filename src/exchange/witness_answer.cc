@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
 #include "core/word_hints.h"
 #include "mechanism/channels.h"
 #include "table/columns.h"
@@ -168,7 +168,7 @@ class TraceReader {
 
 std::optional<WitnessAnswer> ReadAnswer(std::string_view json, std::string* trouble) {
   trouble->clear();
-  const Parsed root = Parsed::parse(json, nullptr, false);
+  const Parsed root = ParseIfJson<Parsed>(json);
   if (!root.is_object()) {
     *trouble = "witness.json is no JSON object";
     return {};

@@ -25,6 +25,13 @@ bool IsTranslation(const Mechanism& mechanism, const Drive& drive) {
 
 }  // namespace
 
+Mechanism::Mechanism() = default;
+Mechanism::~Mechanism() = default;
+Mechanism::Mechanism(const Mechanism&) = default;
+Mechanism& Mechanism::operator=(const Mechanism&) = default;
+Mechanism::Mechanism(Mechanism&&) noexcept = default;
+Mechanism& Mechanism::operator=(Mechanism&&) noexcept = default;
+
 int Mechanism::FindBody(const std::string& n) const { return FindNamed(bodies, n); }
 int Mechanism::FindJoint(const std::string& n) const { return FindNamed(joints, n); }
 int Mechanism::FindDrive(const std::string& n) const { return FindNamed(drives, n); }

@@ -251,6 +251,14 @@ struct ForceElement {
 };
 
 struct Mechanism {
+  // Compiled once (mechanism.cc): each file that copies one would do so again.
+  Mechanism();
+  ~Mechanism();
+  Mechanism(const Mechanism&);
+  Mechanism& operator=(const Mechanism&);
+  Mechanism(Mechanism&&) noexcept;
+  Mechanism& operator=(Mechanism&&) noexcept;
+
   std::string name;
   std::string file;  ///< model.yaml it came from, as given
   std::string description;

@@ -4,7 +4,7 @@
 #include <tinyxml2.h>
 
 #include <map>
-#include <regex>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -280,15 +280,28 @@ const std::map<std::string, SitePair>& ForeignMjcf::closures_by_sites() const {
   return impl_->by_sites;
 }
 
+namespace {
+
+// What stands between two marks of a message, beyond a text that must come before them.
+std::optional<std::string> TextBetween(const std::string& message, const std::string& beyond,
+                                       const std::string& open, const std::string& close) {
+  const size_t mark = message.find(open, message.find(beyond));
+  if (mark == std::string::npos) return {};
+  const size_t from = mark + open.size(), to = message.find(close, from);
+  if (to == std::string::npos) return {};
+  return message.substr(from, to - from);
+}
+
+}  // namespace
+
 // MuJoCo 2.2 wants mass of every geom of a body that does not state its own.
 bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& message) {
-  static const std::regex body_is("body mass is too small.*\\n?.*Object name = ([^,]*),");
-  std::smatch name;
-  if (!std::regex_search(message, name, body_is)) return false;
+  const auto name = TextBetween(message, "body mass is too small", "Object name = ", ",");
+  if (!name) return false;
   std::vector<XMLElement*> geoms;
   int line = 0;
   ForEach(root(), [&](XMLElement* e) {
-    if (!IsTag(e, "body") || e->Attribute("name") == nullptr || name[1] != e->Attribute("name")) {
+    if (!IsTag(e, "body") || e->Attribute("name") == nullptr || *name != e->Attribute("name")) {
       return;
     }
     line = e->GetLineNum();
@@ -300,40 +313,36 @@ bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& message) {
   for (XMLElement* geom : geoms) document.DeleteNode(geom);
   if (geoms.empty()) return false;
   Add(Severity::kWarning, line,
-      fmt::format("body '{}' has no mass: its {} geoms are left out", name[1].str(), geoms.size()));
+      fmt::format("body '{}' has no mass: its {} geoms are left out", *name, geoms.size()));
   return true;
 }
 
 bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
   if (impl_->DropWeightlessGeoms(message)) return true;
-  static const std::regex attribute_is("unrecognized attribute: '([^']*)'");
-  static const std::regex element_is("Element '([^']*)'");
-  std::smatch element, attribute;
-  if (!std::regex_search(message, element, element_is)) return false;
-  const std::string tag = element[1];
-  if (std::regex_search(message, attribute, attribute_is)) {
-    const std::string name = attribute[1];
+  const auto tag = TextBetween(message, "", "Element '", "'");
+  if (!tag) return false;
+  if (const auto name = TextBetween(message, "", "unrecognized attribute: '", "'")) {
     int count = 0, line = 0;
     ForEach(impl_->root(), [&](XMLElement* e) {
-      if (!IsTag(e, tag.c_str()) || e->Attribute(name.c_str()) == nullptr) return;
+      if (!IsTag(e, tag->c_str()) || e->Attribute(name->c_str()) == nullptr) return;
       if (count++ == 0) line = e->GetLineNum();
-      e->DeleteAttribute(name.c_str());
+      e->DeleteAttribute(name->c_str());
     });
     if (count == 0) return false;
     impl_->Add(
         Severity::kWarning, line,
-        fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left out", name,
-                    tag, count));
+        fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left out",
+                    *name, *tag, count));
     return true;
   }
   if (message.find("unrecognized element") == std::string::npos) return false;
   std::vector<XMLElement*> dropped;
   ForEach(impl_->root(), [&](XMLElement* e) {
-    if (IsTag(e, tag.c_str())) dropped.push_back(e);
+    if (IsTag(e, tag->c_str())) dropped.push_back(e);
   });
   if (dropped.empty()) return false;
   impl_->Add(Severity::kWarning, dropped.front()->GetLineNum(),
-             fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out", tag,
+             fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out", *tag,
                          dropped.size()));
   // One at a time: an element may lie inside another of its kind.
   impl_->document.DeleteNode(dropped.front());

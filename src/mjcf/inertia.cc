@@ -20,7 +20,7 @@ PrincipalInertia PrincipalInertiaOf(const Mat3& I, double mass) {
   if (off_diagonal.isZero(0.0)) {
     principal.moments = I.diagonal();
   } else {
-    const Eigen::SelfAdjointEigenSolver<Mat3> solver(0.5 * (I + I.transpose()));
+    const Eigen::SelfAdjointEigenSolver<Mat3> solver(Mat3(0.5 * (I + I.transpose())));
     // Descending order, right-handed.
     principal.moments = solver.eigenvalues().reverse();
     principal.R = solver.eigenvectors().rowwise().reverse();

@@ -12,12 +12,6 @@
 #include "simulation/read_mjcf.h"
 
 namespace mbv {
-
-template <typename Visit>
-void VisitMembers(Visit& visit, typename Visit::template Of<Finding>& f) {
-  visit(f.severity), visit(f.file), visit(f.line), visit(f.column), visit(f.message), visit(f.hint);
-}
-
 namespace {
 
 // A child's answer.

@@ -51,11 +51,6 @@ struct PackedTruth {
                                                          const std::string& folder);
 
 template <typename Visit>
-void VisitMembers(Visit& visit, typename Visit::template Of<Finding>& finding) {
-  visit(finding.severity), visit(finding.file), visit(finding.line), visit(finding.column);
-  visit(finding.message), visit(finding.hint);
-}
-template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<RerunSignal>& signal) {
   visit(signal.signal), visit(signal.relative), visit(signal.use), visit(signal.time_s);
 }

@@ -54,7 +54,7 @@ std::string ToJson(const StudyIdentity& identity) {
 
 std::optional<StudyIdentity> ReadIdentity(const fs::path& folder) {
   const auto text = ReadWholeFile(folder / kStudyFile);
-  const auto json = nlohmann::json::parse(text.value_or(""), nullptr, false);
+  const auto json = ParseIfJson<nlohmann::json>(text.value_or(""));
   if (!json.is_object() || json.value("schema", "") != kStudySchema) return {};
   try {
     StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}, {}};

@@ -66,7 +66,7 @@ SpringMode FastestSpringMode(const Mechanism& mechanism, const BodyStates& state
     K += part.stiffness * part.u * part.u.transpose();
     C += part.damping * part.u * part.u.transpose();
   }
-  const Eigen::LDLT<MatX> inertia(motions.transpose() * Momenta(mechanism, states, motions));
+  const Eigen::LDLT<MatX> inertia(MatX(motions.transpose() * Momenta(mechanism, states, motions)));
   MatX A = MatX::Zero(2 * n, 2 * n);
   A.topRightCorner(n, n).setIdentity();
   A.bottomLeftCorner(n, n) = -inertia.solve(K);

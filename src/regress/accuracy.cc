@@ -1,10 +1,11 @@
 #include "regress/accuracy.h"
 
+#include "core/json_text.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <sstream>
 
 namespace mbv {
@@ -146,7 +147,7 @@ std::vector<AccuracyCell> AccuracyCells(const std::string& document) {
 }
 
 std::optional<std::string> AccuracyText(const std::string& heading, const std::string& summary) {
-  const Json json = Json::parse(summary, nullptr, false);
+  const Json json = ParseIfJson<Json>(summary);
   if (!json.is_object()) return {};
   if (heading == "step") return StepText(json);
   const auto& columns = AccuracyColumns();

@@ -202,7 +202,7 @@ std::string ToJson(const RegressReport& report) {
 // The library throws at the first thing that is not as written; a damaged file is simply not used.
 std::optional<CaseResult> CaseFromJson(const std::string& text) {
   try {
-    return CaseOf(Json::parse(text));
+    return CaseOf(ParseJson<Json>(text));
   } catch (const Json::exception&) {
     return std::nullopt;
   }
@@ -210,7 +210,7 @@ std::optional<CaseResult> CaseFromJson(const std::string& text) {
 
 std::optional<RegressReport> ReportFromJson(const std::string& text) {
   try {
-    const Json json = Json::parse(text);
+    const Json json = ParseJson<Json>(text);
     if (json.at("schema") != kSchema) return std::nullopt;
     RegressReport report;
     const Json& run = json.at("run");

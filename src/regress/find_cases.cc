@@ -5,10 +5,10 @@
 #include <charconv>
 #include <filesystem>
 #include <map>
-#include <nlohmann/json.hpp>
 
 #include "core/files.h"
 #include "core/in_children.h"
+#include "core/json_text.h"
 #include "core/names.h"
 #include "core/word_hints.h"
 #include "scenario/find_model.h"
@@ -47,7 +47,7 @@ std::string HeadJson(const std::string& file) {
                      {"mentions", head.expect.mentions},
                      {"inputs", fingerprint.Text()},
                      {"models", model.value_or("") + "\n" + elastic.value_or("")}};
-  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+  return DumpLine(json);
 }
 
 struct Found {
@@ -59,7 +59,7 @@ struct Found {
 Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
   Found found;
   found.file.file = file;
-  const Json json = text ? Json::parse(*text, nullptr, false) : Json();
+  const Json json = text ? ParseIfJson<Json>(*text) : Json();
   if (!json.is_object()) return found;
   ScenarioHead& head = found.file.head;
   found.counts = json.value("counts", true);

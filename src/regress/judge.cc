@@ -4,9 +4,9 @@
 
 #include <cstring>
 #include <filesystem>
-#include <nlohmann/json.hpp>
 
 #include "core/files.h"
+#include "core/json_text.h"
 #include "regress/log_text.h"
 
 namespace mbv {
@@ -76,7 +76,7 @@ SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
 
 // The same from text; nothing if it is no summary.
 SummaryText ReadSummary(const std::string& text, CaseResult* result) {
-  const Json json = Json::parse(text, nullptr, false);
+  const Json json = ParseIfJson<Json>(text);
   if (!json.is_object()) return {};
   try {
     return ReadSummaryJson(json, result);
@@ -180,7 +180,7 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
 }
 
 void AddInputs(const std::string& inputs, CaseResult* result) {
-  const Json json = Json::parse(inputs, nullptr, false);
+  const Json json = ParseIfJson<Json>(inputs);
   if (!json.is_object()) return;
   Fingerprint fingerprint;
   for (const Json& input : Part(json, "inputs")) {

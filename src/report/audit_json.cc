@@ -1,6 +1,6 @@
 #include "report/audit_json.h"
 
-#include <nlohmann/json.hpp>
+#include "core/json_text.h"
 
 namespace mbv {
 
@@ -14,12 +14,12 @@ std::string ToJson(const HtmlAudit& audit) {
   }
   const AuditJson json = {
       {"source", audit.source}, {"rows", std::move(rows)}, {"note", audit.note}};
-  return json.dump(-1, ' ', false, AuditJson::error_handler_t::replace);
+  return DumpLine(json);
 }
 
 std::optional<HtmlAudit> AuditFromJson(const std::string& text) {
   try {
-    const AuditJson json = AuditJson::parse(text);
+    const AuditJson json = ParseJson<AuditJson>(text);
     HtmlAudit audit{.source = json.at("source"), .rows = {}, .note = json.at("note")};
     for (const AuditJson& row : json.at("rows")) {
       audit.rows.push_back({.equation = row.at(0),

@@ -1,10 +1,10 @@
 // The signals of report.html: what its plots and its replay draw.
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <set>
 
 #include "comparison/metrics.h"
+#include "core/json_text.h"
 #include "core/markup.h"
 #include "report/html_replay.h"
 #include "report/html_report.h"
@@ -108,7 +108,7 @@ class DataWriter {
       json["pairs"] = Pairs();
     }
     json["replay"] = ReplayJson(input_);
-    return EscapeScript(json.dump(-1, ' ', false, Json::error_handler_t::replace));
+    return EscapeScript(DumpLine(json));
   }
 
  private:

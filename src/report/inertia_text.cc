@@ -4,8 +4,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 
+#include "core/json_text.h"
 #include "core/text.h"
 #include "report/text_table.h"
 
@@ -99,7 +99,7 @@ std::string InertiaJson(const std::vector<BodyInertia>& bodies, const std::strin
                {"tensor_order", {"xx", "yy", "zz", "xy", "xz", "yz"}},
                {"bodies", Json::array()}};
   for (const BodyInertia& body : bodies) json["bodies"].push_back(BodyJson(body));
-  return json.dump(1) + "\n";
+  return Dump(json, 1);
 }
 
 }  // namespace mbv

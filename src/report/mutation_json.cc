@@ -188,7 +188,7 @@ std::string ToJson(const MutationReport& report) {
 
 std::optional<MutationReport> MutationReportOf(const std::string& text) {
   try {
-    const Json json = Json::parse(text);
+    const Json json = ParseJson<Json>(text);
     if (json.at("schema") != kMutationSchema) return {};
     MutationReport report;
     const FromFields field{json};

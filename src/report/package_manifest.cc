@@ -19,7 +19,7 @@ class ManifestReader {
       : file_(file), diagnostics_(diagnostics) {}
 
   std::optional<PackageDescription> Read(const std::string& text) {
-    const Json json = Json::parse(text, nullptr, false);
+    const Json json = ParseIfJson<Json>(text);
     if (!json.is_object()) return Refused("is no JSON object");
     const std::string schema = TextAt(json, "schema", "");
     if (schema != kManifestSchema) {

@@ -1,10 +1,11 @@
 #include "report/rerun_summary.h"
 
+#include "core/json_text.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
 #include <map>
-#include <nlohmann/json.hpp>
 
 namespace mbv {
 namespace {
@@ -64,8 +65,8 @@ RerunSignal MovedBy(const std::string& name, const CheckNumbers& packed,
 RerunFile CompareSummaries(const std::string& path, const std::string& packed,
                            const std::string& rerun, bool exact) {
   RerunFile file{.path = path, .outcome = RerunOutcome::kDiffers, .why = "", .signals = {}};
-  const SummaryObject before = SummaryObject::parse(packed, nullptr, false);
-  const SummaryObject now = SummaryObject::parse(rerun, nullptr, false);
+  const SummaryObject before = ParseIfJson<SummaryObject>(packed);
+  const SummaryObject now = ParseIfJson<SummaryObject>(rerun);
   if (!before.is_object() || !now.is_object()) {
     file.why = "is no summary";
     return file;

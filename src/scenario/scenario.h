@@ -120,6 +120,14 @@ struct Expectation {
 };
 
 struct Scenario {
+  // Compiled once (scenario.cc): each file that copies one would do so again.
+  Scenario();
+  ~Scenario();
+  Scenario(const Scenario&);
+  Scenario& operator=(const Scenario&);
+  Scenario(Scenario&&) noexcept;
+  Scenario& operator=(Scenario&&) noexcept;
+
   std::string file;  ///< as given
   std::string name;  ///< file name without its ending, "must_fail/x" below a model's folder
   std::string description;

@@ -89,7 +89,8 @@ class Witness {
     }
     const Mat6 scaled = size_.asDiagonal() * K_linear_ * size_.asDiagonal();
     const VecX eigenvalues =
-        Eigen::SelfAdjointEigenSolver<Mat6>(0.5 * (scaled + scaled.transpose())).eigenvalues();
+        Eigen::SelfAdjointEigenSolver<Mat6>(Mat6(0.5 * (scaled + scaled.transpose())))
+            .eigenvalues();
     const double largest = eigenvalues.cwiseAbs().maxCoeff();
     run_.result.rank = static_cast<int>((eigenvalues.array() > kSingular * largest).count());
     singular_ = run_.result.rank < 6;

@@ -86,7 +86,7 @@ FastestRate FastestRateOf(const ConstraintSystem& system, const ServoGains& serv
     K += part.k * u * u.transpose();
     C += part.c * u * u.transpose();
   }
-  const Eigen::LDLT<MatX> M_N(N.transpose() * M * N);
+  const Eigen::LDLT<MatX> M_N(MatX(N.transpose() * M * N));
   MatX A = MatX::Zero(2 * n, 2 * n);
   A.topRightCorner(n, n).setIdentity();
   A.bottomLeftCorner(n, n) = -M_N.solve(K);

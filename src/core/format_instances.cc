@@ -1,0 +1,3 @@
+#include "core/format_instances.h"
+
+MBV_FORMAT_INSTANCES(template)
