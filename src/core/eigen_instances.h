@@ -14,6 +14,9 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
   Eigen::SelfAdjointEigenSolver<MATRIX>::compute(const EigenBase<MATRIX>&, int);
 
 #define MBV_EIGEN_INSTANCES(DECLARATION)                                                         \
+  DECLARATION struct Eigen::internal::general_matrix_vector_product<                             \
+      long, double, Eigen::internal::const_blas_data_mapper<double, long, 1>, 1, false, double,  \
+      Eigen::internal::const_blas_data_mapper<double, long, 0>, false, 0>;                       \
   DECLARATION class Eigen::JacobiSVD<Eigen::MatrixXd>;                                           \
   DECLARATION class Eigen::BDCSVD<Eigen::MatrixXd>;                                              \
   DECLARATION class Eigen::HouseholderQR<Eigen::MatrixXd>;                                       \
@@ -42,3 +45,9 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
       const Eigen::VectorXd&, Eigen::VectorXd&) const;
 
 MBV_EIGEN_INSTANCES(extern template)
+
+namespace mbv {
+/// The square orthogonal factor Q.
+[[nodiscard]] Eigen::MatrixXd OrthogonalFactor(
+    const Eigen::ColPivHouseholderQR<Eigen::MatrixXd>& qr);
+}  // namespace mbv

@@ -24,7 +24,7 @@ struct MovingDirection {
 [[nodiscard]] Mat3 Transported(const Mat3& R0, const MovingDirection& from,
                                const MovingDirection& to, double h);
 
-/// The least rotation that brings n0 to n1.
+/// The least rotation that brings the direction of n0 to that of n1; of opposite ones, one of them.
 [[nodiscard]] Mat3 LeastRotation(const Vec3& n0, const Vec3& n1);
 
 /// Angle [rad] about n by which R is turned beyond R0, where both agree on n.

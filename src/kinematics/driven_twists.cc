@@ -84,7 +84,7 @@ MatX MoveAlone(const MatX& D, const std::function<MatX()>& mass_matrix) {
   all.setThreshold(kSeen);
   all.compute(D);
   if (all.rank() == D.cols()) return all.solve(one);
-  const MatX response = mass_matrix().ldlt().solve(D.transpose());
+  const MatX response = mass_matrix().ldlt().solve(MatX(D.transpose()));
   const MatX A = D * response;
   const VecX size = A.diagonal().cwiseSqrt();
   const VecX scale = (size.array() > 0.0).select(size.cwiseInverse(), 0.0);

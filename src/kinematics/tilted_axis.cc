@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "core/parallel_transport.h"
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
 
@@ -75,8 +76,7 @@ Mechanism WithAligned(const Mechanism& mechanism, int joint, const std::vector<S
     if (found == all.end()) continue;
     const Vec3 to = AlignedAxis(own, aligned.joints[found->other], body);
     Pose& frame = own.parent == body ? own.X_PF : own.X_CM;
-    const auto turn = Eigen::Quaterniond::FromTwoVectors(AxisOn(own, body), to);
-    frame.linear() = turn.toRotationMatrix() * frame.linear();
+    frame.linear() = LeastRotation(AxisOn(own, body), to) * frame.linear();
   }
   return aligned;
 }

@@ -7,6 +7,7 @@
 #include <optional>
 #include <sstream>
 
+#include "core/parallel_transport.h"
 #include "core/spatial.h"
 #include "core/text.h"
 
@@ -136,7 +137,7 @@ class ClosureReader {
     }
     joint.axis = on_parent.value_or(on_child.value_or(Vec3::UnitX()));  // URDF's default
     if (!on_child || on_child->isApprox(joint.axis, 1e-12)) return;
-    Mat3 turn = Eigen::Quaterniond::FromTwoVectors(joint.axis, *on_child).toRotationMatrix();
+    const Mat3 turn = LeastRotation(joint.axis, *on_child);
     joint.X_CM.linear() = joint.X_CM.linear() * turn;
   }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "core/parallel_transport.h"
 #include "core/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "model_file/element_text.h"
@@ -195,7 +196,7 @@ class Companion {
     if (IsGyroscopic(element)) {
       const RotorAxis& axis = *std::get<RotorLaw>(element.law).carrier;
       Pose X = Pose::Identity();
-      X.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), axis.axis_B).matrix();
+      X.linear() = LeastRotation(Vec3::UnitZ(), axis.axis_B);
       const std::string frame = Attach(axis.body, YamlName(element.name) + "_axis", X);
       place += CarrierText({.body = axis.body, .axis_B = Vec3::UnitZ()}, frame);
     }

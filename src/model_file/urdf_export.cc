@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "core/markup.h"
+#include "core/parallel_transport.h"
 #include "core/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "mesh/find_mesh.h"
@@ -30,7 +31,7 @@ std::string Origin(const Pose& X) {
 Pose StickPose(const Vec3& from, const Vec3& to) {
   Pose X = Pose::Identity();
   X.translation() = 0.5 * (from + to);
-  X.linear() = Eigen::Quaterniond::FromTwoVectors(Vec3::UnitZ(), to - from).toRotationMatrix();
+  X.linear() = LeastRotation(Vec3::UnitZ(), to - from);
   return X;
 }
 

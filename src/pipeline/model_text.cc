@@ -54,7 +54,7 @@ void SetGains(const MatX& M, const HomeRows& rows, double frequency_hz, HomeServ
     Eigen::ColPivHouseholderQR<MatX> qr;
     qr.setThreshold(kServoRank);
     qr.compute(llt.matrixL().solve(MatX(rows.held.transpose())));
-    Q = MatX(qr.householderQ()).leftCols(qr.rank());
+    Q = OrthogonalFactor(qr).leftCols(qr.rank());
   }
   for (Eigen::Index k = 0; k < rows.drives.rows(); ++k) {
     // Acceleration of the drive per force on it: what the held rows leave of M⁻¹.

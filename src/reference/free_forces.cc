@@ -32,7 +32,7 @@ constexpr double kStalledLoads = 1e-12;
 VecX FreeDynamics::ForceRows::Solve(const VecX& scaled_wrenches) const {
   if (columns.cols() == 0) return VecX();
   VecX force = factors.solve(scaled_wrenches);
-  force += factors.solve(scaled_wrenches - columns * force);  // refinement
+  force += factors.solve(VecX(scaled_wrenches - columns * force));  // refinement
   if (self_stress.cols() > 0) TakeLeastForces(self_stress, first_driven, &force);
   return force.cwiseProduct(scale);
 }
@@ -72,7 +72,7 @@ FreeDynamics::ForceRows FreeDynamics::ForceRowsAt(const BodyStates& states, bool
   at.factors.compute(at.columns);
   const Eigen::Index rank = at.factors.rank();
   if (rank == rows.size()) return at;
-  const MatX Q = Eigen::ColPivHouseholderQR<MatX>(at.columns.transpose()).householderQ();
+  const MatX Q = OrthogonalFactor(Eigen::ColPivHouseholderQR<MatX>(at.columns.transpose()));
   at.self_stress = Q.rightCols(rows.size() - rank);
   return at;
 }

@@ -41,7 +41,7 @@ Split SplitFreedoms(const MatX& G) {
   Eigen::ColPivHouseholderQR<MatX> qr;
   qr.setThreshold(kDependent);
   qr.compute(UnitRows(G).transpose());
-  split.Q = qr.householderQ();
+  split.Q = OrthogonalFactor(qr);
   split.rank = qr.rank();
   return split;
 }
@@ -122,12 +122,12 @@ VecX HeldMotion(const RestSystem& system) {
   VecX u = VecX::Zero(system.G.cols());
   if (split.rank > 0) {
     const MatX P = split.Q.leftCols(split.rank);
-    u = P * (system.G * P).colPivHouseholderQr().solve(-system.d);
+    u = P * (system.G * P).colPivHouseholderQr().solve(VecX(-system.d));
   }
   if (left == 0) return u;
   const MatX N = split.Q.rightCols(left);
   const MatX inertia = N.transpose() * system.H * N;
-  return u + N * inertia.ldlt().solve(N.transpose() * (system.f - system.H * u));
+  return u + N * inertia.ldlt().solve(VecX(N.transpose() * (system.f - system.H * u)));
 }
 
 VecX LeastShares(const RestSystem& system) {
@@ -199,7 +199,7 @@ double LoadRatio(const RestSystem& system, VecX* direction) {
 
 bool DecideRest(const RestSystem& system, std::vector<int>* sign) {
   const auto factors = system.H.ldlt();
-  const MatX A = system.G * factors.solve(system.G.transpose());
+  const MatX A = system.G * factors.solve(MatX(system.G.transpose()));
   const VecX c = system.G * factors.solve(system.f) + system.d;
   const VecX lambda = LeastOf(A, c, system.most);
   const VecX q = A * lambda + c;

@@ -271,7 +271,7 @@ void ClosureSolver::SolveLeastDriven(const VecX& tau) {
     Eigen::ColPivHouseholderQR<MatX> qr;
     qr.setThreshold(kRankTolerance);
     qr.compute(J_c.transpose());
-    const MatX Q = qr.householderQ();
+    const MatX Q = OrthogonalFactor(qr);
     N = Q.rightCols(nv - qr.rank());
   }
   VecX lambda(closures + driven);
@@ -286,7 +286,7 @@ void ClosureSolver::SolveLeastDriven(const VecX& tau) {
 // The null space of Jᵀ, from the Q factor behind the rank.
 MatX ClosureSolver::ScaledSelfStress() const {
   const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
-  const MatX Q = qr.householderQ();
+  const MatX Q = OrthogonalFactor(qr);
   return Q.rightCols(redundant());
 }
 

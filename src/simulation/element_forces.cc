@@ -256,7 +256,7 @@ void SetCommandedAcceleration(const VecX& driven_acceleration, ConstraintSystem*
   rates = -rates;
   system->AddGuided(1.0, driven_acceleration, &rates);
   const Eigen::CompleteOrthogonalDecomposition<MatX> J(system->ScaledJ());
-  const VecX scaled = J.solve(rates.cwiseQuotient(system->row_unit()));
+  const VecX scaled = J.solve(VecX(rates.cwiseQuotient(system->row_unit())));
   Eigen::Map<VecX>(system->data()->qacc, system->nv()) = scaled.cwiseProduct(system->dof_unit());
 }
 

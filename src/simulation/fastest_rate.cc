@@ -47,7 +47,7 @@ MatX FreeMotions(const ConstraintSystem& system) {
   Eigen::ColPivHouseholderQR<MatX> qr;
   qr.setThreshold(kRankTolerance);
   qr.compute(MatX(system.J()).transpose());
-  const MatX Q = qr.householderQ();
+  const MatX Q = OrthogonalFactor(qr);
   return Q.rightCols(nv - qr.rank());
 }
 
