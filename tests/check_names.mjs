@@ -28,7 +28,9 @@ function declared(lines, i) {
   if (!call) return null;
   let parameters = call[2];
   for (let next = i + 1; !parameters.includes(')') && next < lines.length; ++next) parameters += lines[next];
-  const types = parameters.split(')')[0].split(',').map((one) => one.trim().replace(/\s*=.*/, '').replace(/\s*\w+$/, ''));
+  // A literal goes to either of two that take text in different types.
+  const types = parameters.split(')')[0].split(',').map((one) => one.trim().replace(/\s*=.*/, '').replace(/\s*\w+$/, '')
+      .replace(/^(const char\*|(const )?std::string&?|std::string_view)$/, 'text'));
   return { name: call[1], shape: `(${types.join(', ')})` };
 }
 
@@ -147,6 +149,7 @@ function selfTest() {
   if (check({ 'src/a/x.cc': same, 'src/b/x.cc': same }).length !== 0) return 'one name in two layers';
   if (both('struct Row;\nusing internal::Row;\nusing Json = nlohmann::json;', 'int Shared(int x);').length !== 0) return 'declarations that may occur twice';
   if (check({ 'src/a/x.cc': file('int Of(int x) {'), 'src/a/y.cc': file('int Of(const Row& x,\n       int y) {') }).length !== 0) return 'overloads';
+  if (check({ 'src/a/x.cc': file('int Of(const char* x) {'), 'src/a/y.cc': file('int Of(const std::string& x) {') }).length !== 1) return 'texts of different types';
   if (check({ 'src/a/x.cc': file('using Row = int;'), 'src/a/y.cc': file('using Row = double;') }).length !== 1) return 'two aliases';
   return '';
 }

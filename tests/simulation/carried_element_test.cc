@@ -30,13 +30,13 @@ RunSummary TurnThree(double t, DrivenSample* driven) {
 
 Motion TwoSeconds() { return {.duration_s = 2.0, .sample_s = 0.05, .commands = {}, .loads = {}}; }
 
-VecX Column(const SimulationRun& run, const char* channel) {
+VecX SignalOf(const SimulationRun& run, const char* channel) {
   return run.trace.values.col(run.trace.Find(channel));
 }
 
 double Difference(const SimulationRun& a, const SimulationRun& b, const char* channel) {
-  const VecX truth = Column(b, channel);
-  return (Column(a, channel) - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
+  const VecX truth = SignalOf(b, channel);
+  return (SignalOf(a, channel) - truth).cwiseAbs().maxCoeff() / truth.cwiseAbs().maxCoeff();
 }
 
 TEST(SimulatedRotors, AreTheBodyOnItsBearing) {
@@ -53,8 +53,8 @@ TEST(SimulatedRotors, AreTheBodyOnItsBearing) {
          {"m1.force", "m2.force", "m3.force", "energy.kinetic", "yaw.reaction.mx"}) {
       EXPECT_LT(Difference(a, b, channel), tolerance) << channel;
     }
-    const VecX in = Column(a, "power.input");
-    EXPECT_LT((in - Column(a, "power.energy_rate")).cwiseAbs().maxCoeff(),
+    const VecX in = SignalOf(a, "power.input");
+    EXPECT_LT((in - SignalOf(a, "power.energy_rate")).cwiseAbs().maxCoeff(),
               tolerance * in.cwiseAbs().maxCoeff());
   }
 }
@@ -86,8 +86,8 @@ TEST(SimulatedRotors, TurnTheirCarrierInFreeMotion) {
     EXPECT_LT(Difference(law, body, channel), 1e-8) << channel;
   }
   EXPECT_LT(Difference(law, body, "yaw.reaction.mx"), 1e-6);
-  const VecX in = Column(law, "power.input");
-  EXPECT_LT((in - Column(law, "power.energy_rate")).cwiseAbs().maxCoeff(),
+  const VecX in = SignalOf(law, "power.input");
+  EXPECT_LT((in - SignalOf(law, "power.energy_rate")).cwiseAbs().maxCoeff(),
             1e-9 * in.cwiseAbs().maxCoeff());
   fixtures::CarriedRotor bent = rotor;
   bent.ratio *= 1.0 + 1e-5;
@@ -113,11 +113,11 @@ TEST(SimulatedBushings, KeepTheBalanceOfPower) {
   const SimulationRun run =
       Simulate(m, TwoSeconds(), TurnThree, {.mode = SimulationMode::kInverse});
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-  const VecX in = Column(run, "power.input");
-  EXPECT_LT((in - Column(run, "power.energy_rate")).cwiseAbs().maxCoeff(),
+  const VecX in = SignalOf(run, "power.input");
+  EXPECT_LT((in - SignalOf(run, "power.energy_rate")).cwiseAbs().maxCoeff(),
             1e-12 * in.cwiseAbs().maxCoeff());
-  EXPECT_LT(Column(run, "power.dampers").maxCoeff(), 0.0);
-  EXPECT_GT(Column(run, "energy.springs").minCoeff(), 1.0);
+  EXPECT_LT(SignalOf(run, "power.dampers").maxCoeff(), 0.0);
+  EXPECT_GT(SignalOf(run, "energy.springs").minCoeff(), 1.0);
 }
 
 TEST(SimulatedBushings, AreNamedInTheFile) {
