@@ -3,8 +3,9 @@
 namespace mbv {
 namespace {
 
-std::string Dumped(const nlohmann::ordered_json& json, int blanks) {
-  return json.dump(blanks, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
+template <typename Json>
+std::string Dumped(const Json& json, int blanks) {
+  return json.dump(blanks, ' ', false, Json::error_handler_t::replace);
 }
 
 }  // namespace
@@ -13,7 +14,10 @@ std::string Dump(const nlohmann::ordered_json& json, int blanks) {
   return Dumped(json, blanks) + "\n";
 }
 
-std::string DumpLine(const nlohmann::ordered_json& json) { return Dumped(json, -1); }
+template <typename Json>
+std::string DumpLine(const Json& json) {
+  return Dumped(json, -1);
+}
 
 template <typename Json>
 Json ParseJson(std::string_view text) {
@@ -25,8 +29,10 @@ Json ParseIfJson(std::string_view text) {
   return Json::parse(text, nullptr, false);
 }
 
+template std::string DumpLine(const nlohmann::json&);
 template nlohmann::json ParseJson(std::string_view);
 template nlohmann::json ParseIfJson(std::string_view);
+template std::string DumpLine(const nlohmann::ordered_json&);
 template nlohmann::ordered_json ParseJson(std::string_view);
 template nlohmann::ordered_json ParseIfJson(std::string_view);
 

@@ -16,10 +16,13 @@ inline nlohmann::ordered_json Number(double value) {
 
 /// So many blanks per level, and a line feed at the end; bytes that are no text become U+FFFD.
 [[nodiscard]] std::string Dump(const nlohmann::ordered_json& json, int blanks = 2);
-/// In one line, without a line feed.
-[[nodiscard]] std::string DumpLine(const nlohmann::ordered_json& json);
 
-/// Of nlohmann::json or ordered_json. Throws the library's parse_error.
+// The rest is there of nlohmann::json and of ordered_json.
+
+/// In one line, without a line feed.
+template <typename Json>
+[[nodiscard]] std::string DumpLine(const Json& json);
+/// Throws the library's parse_error.
 template <typename Json>
 [[nodiscard]] Json ParseJson(std::string_view text);
 /// is_discarded() where the text is no JSON.

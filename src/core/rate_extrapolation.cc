@@ -1,5 +1,6 @@
 #include "core/rate_extrapolation.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/demand.h"
@@ -66,6 +67,18 @@ Vec3 TurnOfAxes(double h, const std::array<Vec3, 3>& w, bool fixed_in_space) {
              a_3 = 10.0 / 3.0 * h * (w[2] - 2.0 * w[1] + w[0]);
   const Vec3 b = bracket(a_1, a_2), c = bracket(a_1, 2.0 * a_3 + b) / -60.0;
   return bracket(b - 20.0 * a_1 - a_3, a_2 + c) / 240.0;
+}
+
+void RateHistory::Remember(const Eigen::Ref<const VecX>& v, const Eigen::Ref<const VecX>& a) {
+  std::rotate(samples_.begin(), samples_.end() - 1, samples_.end());
+  samples_[0].v = v;
+  samples_[0].a = a;
+}
+
+Vec3 RateHistory::Turn(int n, double h, Eigen::Index first, bool fixed_in_space) const {
+  std::array<Vec3, 3> w;
+  for (size_t i = 0; i < w.size(); ++i) Sum(n, RateRulesOf(n).places[i], h, first, 3, &w[i]);
+  return TurnOfAxes(h, w, fixed_in_space);
 }
 
 }  // namespace mbv

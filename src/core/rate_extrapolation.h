@@ -35,4 +35,30 @@ struct RateRules {
 /// What (2) adds to (1).
 [[nodiscard]] Vec3 TurnOfAxes(double h, const std::array<Vec3, 3>& w, bool fixed_in_space);
 
+/// Rates of the last samples.
+class RateHistory {
+ public:
+  /// Velocities and accelerations of the newest sample, in the space of the oldest.
+  void Remember(const Eigen::Ref<const VecX>& v, const Eigen::Ref<const VecX>& a);
+  [[nodiscard]] Eigen::Index size() const { return samples_[0].v.size(); }  ///< of a sample
+  /// Of `count` coordinates from `first`, by the n newest samples.
+  template <typename Out>
+  void Sum(int n, const RateWeights& weights, double h, Eigen::Index first, Eigen::Index count,
+           Out* sum) const {
+    sum->setZero(count);
+    for (size_t i = 0; i < static_cast<size_t>(n); ++i) {
+      *sum += weights.of_v[i] * samples_[i].v.segment(first, count) +
+              h * weights.of_a[i] * samples_[i].a.segment(first, count);
+    }
+  }
+  /// TurnOfAxes() of three coordinates.
+  [[nodiscard]] Vec3 Turn(int n, double h, Eigen::Index first, bool fixed_in_space) const;
+
+ private:
+  struct Sample {
+    VecX v, a;
+  };
+  std::array<Sample, kMostRateSamples> samples_;  // newest first
+};
+
 }  // namespace mbv

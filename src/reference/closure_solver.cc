@@ -23,7 +23,7 @@ constexpr double kOpen = 1e-9;
 // Residuals below this share of their tolerances need no further step.
 constexpr double kRoundOff = 1e-2;
 // A step that is round-off itself [rad, characteristic lengths]: rows are not evaluated again.
-constexpr double kNoStep = 3e-14;
+constexpr double kNoStep = 1e-14;
 constexpr int kSmallestStep = 4096;  ///< the way to a sample is cut into at most this many steps
 
 std::vector<Command> AllCommands(const Mechanism& mechanism, const Motion& motion) {
@@ -312,8 +312,8 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   if (first && summary.ok()) summary = TakeLeastTurns();
   if (summary.ok()) summary = CheckPose();
   if (summary.ok()) summary = SolveRates(command);
-  if (summary.ok()) MeasureGaps();
   if (summary.ok()) summary = TransportTurns(command);
+  if (summary.ok()) MeasureGaps();
   if (summary.ok()) {
     predictor_.Remember(command.time_s, states_);
   } else {

@@ -11,7 +11,7 @@ namespace mbv::internal {
 
 class PosePredictor {
  public:
-  explicit PosePredictor(double length) : length_(length) {}
+  explicit PosePredictor(double length) : length_(length) { times_s_.fill(kNan); }
 
   /// States of a sample, with twists and accelerations.
   void Remember(double time_s, const BodyStates& states);
@@ -23,20 +23,14 @@ class PosePredictor {
   /// Twists and accelerations there, stacked.
   [[nodiscard]] const VecX& V() const { return V_; }
   [[nodiscard]] const VecX& A() const { return A_; }
-  [[nodiscard]] double last_s() const { return samples_[0].time_s; }
+  [[nodiscard]] double last_s() const { return times_s_[0]; }
 
  private:
-  struct Sample {
-    double time_s = kNan;
-    VecX V, A;
-  };
   [[nodiscard]] int Usable(double dt_s) const;
-  template <typename Out>
-  void Sum(int samples, const RateWeights& weights, double h, Eigen::Index first,
-           Eigen::Index count, Out* sum) const;
 
   double length_;
-  std::array<Sample, kMostRateSamples> samples_;  ///< newest first
+  std::array<double, kMostRateSamples> times_s_;  ///< newest first
+  RateHistory history_;
   VecX step_, by_one_, V_, A_;
 };
 

@@ -18,9 +18,7 @@ std::string FirstDifference(const SummaryObject& packed, const SummaryObject& re
   if (patch.empty()) return "";
   const SummaryObject::json_pointer place(patch[0]["path"].get<std::string>());
   const auto shown = [&](const SummaryObject& json) {
-    return json.contains(place)
-               ? json[place].dump(-1, ' ', false, SummaryObject::error_handler_t::replace)
-               : std::string("nothing");
+    return json.contains(place) ? DumpLine(json[place]) : std::string("nothing");
   };
   return fmt::format("{}: {} in the archive, {} now", place.to_string().substr(1), shown(packed),
                      shown(rerun));

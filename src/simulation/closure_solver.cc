@@ -14,7 +14,7 @@ constexpr int kMaxNewton = 15;
 // Newton stops after a step whose square is round-off. After one that is round-off itself nothing
 // is evaluated again.
 constexpr double kSmallSquare = 1e-8;
-constexpr double kNoStep = 3e-14;
+constexpr double kNoStep = 1e-14;
 // Reflections mix all equations: without one refinement the force that accelerates a heavy
 // prescribed body leaves its rounding in the drives that do not move it.
 constexpr int kOrthogonalRefinements = 1;

@@ -1,8 +1,6 @@
 // Predicts the configuration at the next of equally spaced samples (core/rate_extrapolation.h).
 #pragma once
 
-#include <array>
-
 #include "core/rate_extrapolation.h"
 #include "simulation/engine_model.h"
 
@@ -18,14 +16,9 @@ class SamplePredictor {
   void Predict(double h, mjData* d);
 
  private:
-  void Remember(const mjData& d);
-  template <typename Out>
-  void Sum(const RateWeights& weights, double h, int first, int count, Out* sum) const;
-  [[nodiscard]] Vec3 Turn(double h, int dof) const;
-
   const EngineModel& engine_;
   int known_ = 0;
-  std::array<VecX, kMostRateSamples> v_, a_;  // newest first
+  RateHistory history_;
   VecX u_;
 };
 
