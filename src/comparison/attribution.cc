@@ -1,20 +1,27 @@
 // Which witness is the odd one out, and what the difference looks like.
 //
 // Evidence is taken in this order:
-//   1. motion: rates that are no derivatives, drive motion that leads elsewhere than commanded
-//      (attribution_kinematics.cc). Wrong motion makes wrong forces, so it is looked at first;
-//   2. the two that are closest by far stand against the third;
-//   3. of two that differ, the one whose own energy drifts (attribution_energy.cc).
+//   1. what a witness shows by itself: rates that are no derivatives, its own command missed
+//      (attribution_kinematics.cc);
+//   2. where forces or servos move the simulation: whether it confirms the forces (driven.cc);
+//      elsewhere motion: drive motion that leads elsewhere than commanded. Wrong motion makes wrong
+//      forces, so it is looked at before them;
+//   3. the two that are closest by far stand against the third;
+//   4. of two that differ, the one whose own energy drifts (attribution_energy.cc).
+// That two agree against a third is a fact. That the third is wrong follows only if the two are
+// independent of each other in what they agree on; SharedBy() says what they may have in common.
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <optional>
 
 #include "comparison/attribution_parts.h"
+#include "comparison/drive_motion.h"
 #include "comparison/driven.h"
+#include "comparison/known_factors.h"
 #include "comparison/metrics.h"
+#include "comparison/table_tube.h"
 #include "comparison/verdict.h"
 
 namespace mbv {
@@ -26,19 +33,28 @@ using internal::Failed;
 using internal::NameOf;
 using internal::Place;
 
-// What a wrong force looks like: opposite sign or a constant factor.
-std::string Hint(const PairComparison& pair) {
+// What the force of the worst drive looks like: opposite sign or a constant factor. A force that
+// hardly varies has a constant ratio to anything, so a factor that no unit explains must explain
+// the difference better than a constant that is added.
+std::string Hint(const PairComparison& pair, const Measured& worst) {
   constexpr double kLooksConstant = 1e-3;
-  for (const DriveMetrics& drive : pair.drives) {
-    if (!(drive.factor_residual < kLooksConstant * std::abs(drive.factor - 1.0))) continue;
-    if (std::abs(drive.factor + 1.0) < kLooksConstant) {
-      return fmt::format("; {} has the opposite sign throughout", drive.drive);
-    }
-    return fmt::format(
-        "; the ratio at {} is constant ({:.6g}): look for a factor, a mass or a unit", drive.drive,
-        drive.factor);
+  constexpr double kBetter = 0.1, kVaries = 1e-2;
+  const auto drive =
+      std::find_if(pair.drives.begin(), pair.drives.end(), [&](const DriveMetrics& one) {
+        return ChannelName(Quantity::kForce, one.drive) == worst.channel;
+      });
+  if (drive == pair.drives.end()) return "";
+  if (!(drive->factor_residual < kLooksConstant * std::abs(drive->factor - 1.0))) return "";
+  if (std::abs(drive->factor + 1.0) < kLooksConstant) {
+    return fmt::format("; {} has the opposite sign throughout", drive->drive);
   }
-  return "";
+  const KnownFactor* known = FindFactor(drive->factor);
+  const bool varies = drive->offset_residual > kVaries * std::abs(drive->factor - 1.0) &&
+                      drive->factor_residual < kBetter * drive->offset_residual;
+  if (known == nullptr && !varies) return "";
+  return fmt::format(
+      "; the ratio at {} is constant ({:.6g}){}", drive->drive, drive->factor,
+      known == nullptr ? ": a factor or a mass?" : std::string(", near ") + known->text);
 }
 
 // The metric to judge three pairs by: forces if they fail, else what fails worst.
@@ -132,7 +148,7 @@ Yardstick YardstickOf(const ComparisonInput& input, const CheckResult& check) {
   return yardstick;
 }
 
-// Why two computations that differ do not tell which of them is wrong, or that they do.
+// Why two computations that differ leave open which of them is wrong, or which one it is.
 Attribution WhyUndecided(const ComparisonInput& input, const Comparison& comparison,
                          const CheckResult& check, bool third) {
   const PairComparison& pair = *comparison.FindPair(check.subject);
@@ -143,7 +159,7 @@ Attribution WhyUndecided(const ComparisonInput& input, const Comparison& compari
             "contradicts itself"};
   }
   if (!third) {
-    Attribution energy = internal::AttributeByEnergy(comparison, pair);
+    Attribution energy = internal::AttributeByEnergy(input, comparison, pair, check);
     if (!energy.text.empty()) return energy;
     return {"", "a third witness would tell which one is wrong" + internal::EnergyHint(comparison)};
   }
@@ -156,15 +172,130 @@ Attribution WhyUndecided(const ComparisonInput& input, const Comparison& compari
 Attribution TwoDiffer(const ComparisonInput& input, const Comparison& comparison,
                       const CheckResult& check, bool third) {
   const PairComparison& pair = *comparison.FindPair(check.subject);
+  const Measured worst{.value = check.value, .time_s = check.time_s, .channel = check.channel};
   Attribution attribution = WhyUndecided(input, comparison, check, third);
-  attribution.text = fmt::format("{} and {} differ by {} in {}: worst at {}{}; {}",
-                                 NameOf(comparison, pair.measured), NameOf(comparison, pair.truth),
-                                 AmountOf(check), RowOf(check.metric).title,
-                                 Place(check.channel, check.time_s), Hint(pair), attribution.text);
+  attribution.text = fmt::format(
+      "{} and {} differ by {} in {}: worst at {}{}; {}", NameOf(comparison, pair.measured),
+      NameOf(comparison, pair.truth), AmountOf(check), RowOf(check.metric).title,
+      Place(check.channel, check.time_s), Hint(pair, worst), attribution.text);
   return attribution;
 }
 
-// 2. Two against one.
+const Witness* FindWitness(const ComparisonInput& input, const std::string& name) {
+  return FindNamed(input.witnesses, name);
+}
+
+// "reference and simulation"; "analytic, reference and simulation".
+std::string Listed(const Comparison& comparison, const std::vector<std::string>& witnesses) {
+  std::string text;
+  for (size_t k = 0; k < witnesses.size(); ++k) {
+    text += k == 0 ? "" : k + 1 == witnesses.size() ? " and " : ", ";
+    text += NameOf(comparison, witnesses[k]);
+  }
+  return text;
+}
+
+// Parameters that the scenario gives all of these and not the odd one: "m_platform = 30.001".
+std::string OwnParametersOf(const ComparisonInput& input, const std::vector<std::string>& agree,
+                            const std::string& odd) {
+  const auto has = [&](const std::string& witness, const std::string& name, double value) {
+    const auto own = input.own_parameters.find(witness);
+    if (own == input.own_parameters.end()) return false;
+    const auto found = own->second.find(name);
+    return found != own->second.end() && found->second == value;
+  };
+  const auto own = input.own_parameters.find(agree.front());
+  std::string text;
+  if (own == input.own_parameters.end()) return text;
+  for (const auto& [name, value] : own->second) {
+    const bool all = std::all_of(agree.begin(), agree.end(),
+                                 [&, n = name, v = value](const auto& w) { return has(w, n, v); });
+    if (!all || has(odd, name, value)) continue;
+    text += fmt::format("{}{} = {:.10g}", text.empty() ? "" : ", ", name, value);
+  }
+  return text;
+}
+
+std::string OwnText(const ComparisonInput& input, const Comparison& comparison,
+                    const std::vector<std::string>& agree, const std::string& odd) {
+  const std::string own = OwnParametersOf(input, agree, odd);
+  if (own.empty()) return "";
+  return fmt::format("the scenario gives {} {} and {} another value", Listed(comparison, agree),
+                     own, NameOf(comparison, odd));
+}
+
+// Moves as the drive motion says that the driver computed.
+bool FollowsDriver(const ComparisonInput& input, const std::string& name) {
+  const Witness* witness = FindWitness(input, name);
+  const bool engine = IsEngine(name) && input.drive_by == DriveBy::kMotion;
+  return name == input.driven_by || engine || (witness != nullptr && witness->foreign);
+}
+
+bool Confirms(const CheckResult* check) {
+  return check != nullptr && check->limit && check->pass && !check->follows;
+}
+
+// Something that does not follow the drive motion has found it right: the command, where MuJoCo's
+// kinematics leads the outputs, or the other witness, which has computed it, too.
+bool DriveMotionIsConfirmed(const ComparisonInput& input, const Comparison& comparison,
+                            const std::string& odd) {
+  const auto by_command = [&](Metric metric) {
+    return Confirms(comparison.FindCheck(role::kSimulated, metric));
+  };
+  if ((by_command(Metric::kCommandM) || by_command(Metric::kCommandRad)) &&
+      by_command(Metric::kCommandVelocity) && by_command(Metric::kCommandAcceleration)) {
+    return true;
+  }
+  const auto by_other = [&](Metric metric) {
+    const char* key = RowOf(metric).key;
+    return Confirms(comparison.FindCheck(PairName(odd, input.driven_by) + "." + key)) ||
+           Confirms(comparison.FindCheck(PairName(input.driven_by, odd) + "." + key));
+  };
+  return (by_other(Metric::kPositionM) || by_other(Metric::kPositionRad)) &&
+         by_other(Metric::kVelocity) && by_other(Metric::kAcceleration);
+}
+
+// What those that agree have in common and the odd one has not; "" where nothing is known that
+// would make them agree on something wrong.
+std::string SharedBy(const ComparisonInput& input, const Comparison& comparison,
+                     const std::vector<std::string>& agree, const std::string& odd) {
+  if (std::string own = OwnText(input, comparison, agree, odd); !own.empty()) return own;
+  const bool engine = std::any_of(agree.begin(), agree.end(),
+                                  [](const std::string& name) { return IsEngine(name); });
+  if (input.motion->free()) {
+    // A table has a start of its own; all others begin where the generic solver does, which
+    // MuJoCo's reading of the start values can confirm.
+    const bool confirmed = Confirms(comparison.FindCheck(role::kSimulated, Metric::kCommandM)) ||
+                           Confirms(comparison.FindCheck(role::kSimulated, Metric::kCommandRad));
+    if (!engine || !IsTable(input, odd) || confirmed) return "";
+    return fmt::format("{} start from one state, which the generic solver computes",
+                       Listed(comparison, agree));
+  }
+  if (GivesAllDriveMotion(input)) return "";
+  const bool follow = std::all_of(agree.begin(), agree.end(), [&](const std::string& name) {
+    return FollowsDriver(input, name);
+  });
+  if (!follow || DriveMotionIsConfirmed(input, comparison, odd)) return "";
+  const Role* driver = FindRole(input.driven_by);
+  return fmt::format(
+      "{} have the drive motion in common that the {} computes, and nothing else "
+      "confirms it",
+      Listed(comparison, agree), driver == nullptr ? input.driven_by : driver->method);
+}
+
+// Names of all that take part, the odd one left out; nearest pair first.
+std::vector<std::string> AllBut(const std::string& odd, const std::vector<Distance>& distances) {
+  std::vector<std::string> names;
+  for (const Distance& d : distances) {
+    for (const std::string& name : {d.measured, d.truth}) {
+      const bool known = std::find(names.begin(), names.end(), name) != names.end();
+      if (name != odd && !known) names.push_back(name);
+    }
+  }
+  return names;
+}
+
+// 3. Two against one.
 Attribution ByDistance(const ComparisonInput& input, const Comparison& comparison) {
   const CheckResult* check = WorstPairCheck(comparison);
   if (check == nullptr) return {};
@@ -190,14 +321,27 @@ Attribution ByDistance(const ComparisonInput& input, const Comparison& compariso
                             distances[2].pair->name(), amount(distances[2]), yardstick.title)};
   }
   const std::string tube = yardstick.column.empty() ? "" : " (" + AmountOf(*check) + ")";
-  return {odd,
-          fmt::format("{} and {} agree to {}, {} differs by {} in {}{}: worst at {}{}",
-                      NameOf(comparison, near.pair->measured), NameOf(comparison, near.pair->truth),
-                      amount(near), NameOf(comparison, odd), amount(far), yardstick.title, tube,
-                      Place(far.where.channel, far.where.time_s), Hint(*far.pair))};
+  const std::vector<std::string> agree = AllBut(odd, distances);
+  double agree_to = near.value;
+  for (const Distance& d : distances) {
+    if (d.measured != odd && d.truth != odd) agree_to = std::max(agree_to, d.value);
+  }
+  const std::string text = fmt::format(
+      "{} agree to {}, {} differs by {} in {}{}: worst at {}{}", Listed(comparison, agree),
+      Amount(agree_to, yardstick.unit), NameOf(comparison, odd), amount(far), yardstick.title, tube,
+      Place(far.where.channel, far.where.time_s), Hint(*far.pair, far.where));
+  const std::string energy = odd == role::kSimulated ? internal::EnergyHint(comparison) : "";
+  return {odd, text + energy,
+          Attribution::Split{.agree = agree,
+                             .agree_to = agree_to,
+                             .differs = odd,
+                             .differs_by = far.value,
+                             .measure = yardstick.title,
+                             .unit = yardstick.unit,
+                             .shared = SharedBy(input, comparison, agree, odd)}};
 }
 
-// 4. A check of the simulation alone (loop gap, power) that fails while all pairs agree.
+// 5. A check of one witness alone (loop gap, power) that fails while all pairs agree.
 Attribution BySingleCheck(const Comparison& comparison) {
   for (const CheckResult& check : comparison.checks) {
     if (!Failed(&check) || RowOf(check.metric).of_pair) continue;
@@ -207,9 +351,12 @@ Attribution BySingleCheck(const Comparison& comparison) {
                               NameOf(comparison, check.subject), check.channel, 1.0 / check.value,
                               1.0 / *check.limit)};
     }
+    const std::string energy =
+        check.subject == role::kSimulated ? internal::EnergyHint(comparison) : "";
     return {check.subject, fmt::format("{}: {} is {} at {}", NameOf(comparison, check.subject),
                                        RowOf(check.metric).title, AmountOf(check),
-                                       Place(check.channel, check.time_s))};
+                                       Place(check.channel, check.time_s)) +
+                               energy};
   }
   return {};
 }
@@ -234,19 +381,43 @@ std::string AgreementText(const ComparisonInput& input, const Comparison& compar
 // What a disagreement comes from: motion first, then forces. Motion that only the simulation gets
 // wrong (its own error) does not hide that another witness' forces are wrong by far.
 Attribution OfDisagreement(const ComparisonInput& input, const Comparison& comparison) {
-  const Attribution motion = internal::AttributeByKinematics(input, comparison);
+  Attribution motion = internal::AttributeByOwnMotion(input, comparison);
+  if (motion.text.empty()) {
+    motion = input.drive_by == DriveBy::kMotion || input.motion->free()
+                 ? internal::AttributeByKinematics(input, comparison)
+                 : AttributeDriven(input, comparison);
+  }
   if (motion.text.empty()) {
     Attribution found = ByDistance(input, comparison);
-    if (found.text.empty()) found = BySingleCheck(comparison);
-    const bool said = found.text.find("step_s") != std::string::npos;
-    if (found.odd_one_out == role::kSimulated && !said)
-      found.text += internal::EnergyHint(comparison);
-    return found;
+    return found.text.empty() ? BySingleCheck(comparison) : found;
   }
-  if (!IsEngine(motion.odd_one_out)) return motion;
-  const Attribution distance = ByDistance(input, comparison);
+  if (!IsEngine(motion.odd_one_out) || input.drive_by != DriveBy::kMotion) return motion;
+  Attribution distance = ByDistance(input, comparison);
   if (distance.odd_one_out.empty() || distance.odd_one_out == motion.odd_one_out) return motion;
-  return {distance.odd_one_out, distance.text + "; besides, " + motion.text};
+  distance.text += "; also, " + motion.text;
+  return distance;
+}
+
+// An inference that what the others have in common takes away leaves the facts.
+void KeepToIndependence(const ComparisonInput& input, const Comparison& comparison,
+                        Attribution* attribution) {
+  const std::string odd = attribution->odd_one_out;
+  if (odd.empty()) return;
+  std::string shared = attribution->split ? attribution->split->shared : "";
+  if (shared.empty()) {
+    std::vector<std::string> others;
+    for (const Witness& witness : input.witnesses) {
+      const bool ran = witness.trace != nullptr && witness.summary.ok();
+      if (ran && witness.name != odd && witness.name != role::kReached) {
+        others.push_back(witness.name);
+      }
+    }
+    if (others.size() > 1) shared = OwnText(input, comparison, others, odd);
+    if (attribution->split) attribution->split->shared = shared;
+  }
+  if (shared.empty()) return;
+  attribution->odd_one_out = "";
+  attribution->text += fmt::format("; {}: this leaves open which is wrong", shared);
 }
 
 }  // namespace
@@ -283,16 +454,12 @@ bool Failed(const CheckResult* check) { return check != nullptr && check->limit 
 
 Attribution Attribute(const ComparisonInput& input, const Comparison& comparison) {
   if (comparison.verdict == Verdict::kNotRun) return {};
-  const Attribution driven = AttributeDriven(input, comparison);
   if (comparison.verdict == Verdict::kAgree) {
+    const Attribution driven = AttributeDriven(input, comparison);
     return driven.text.empty() ? Attribution{"", AgreementText(input, comparison)} : driven;
   }
-  Attribution attribution = driven.text.empty() ? OfDisagreement(input, comparison) : driven;
-  if (comparison.table) {
-    for (const std::string& diagnosis : comparison.table->diagnoses) {
-      attribution.text += (attribution.text.empty() ? "" : "; ") + diagnosis;
-    }
-  }
+  Attribution attribution = OfDisagreement(input, comparison);
+  KeepToIndependence(input, comparison, &attribution);
   return attribution;
 }
 

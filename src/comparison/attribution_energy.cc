@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "comparison/attribution_parts.h"
+#include "mechanism/reach.h"
 
 namespace mbv::internal {
 namespace {
@@ -50,7 +51,22 @@ std::string StepText(const CheckResult& power, const CheckResult& drift) {
 
 }  // namespace
 
-Attribution AttributeByEnergy(const Comparison& comparison, const PairComparison& pair) {
+namespace {
+
+// An error of the integration shifts a motion by more than the energy that it costs, but not by
+// thousands of times as much.
+bool DriftExplains(const ComparisonInput& input, const CheckResult& drift,
+                   const CheckResult& differ) {
+  constexpr double kMost = 1e3;
+  const double size =
+      std::string(RowOf(differ.metric).unit) == "m" ? CharacteristicLength(*input.mechanism) : 1.0;
+  return !(differ.value > kMost * drift.value * size);
+}
+
+}  // namespace
+
+Attribution AttributeByEnergy(const ComparisonInput& input, const Comparison& comparison,
+                              const PairComparison& pair, const CheckResult& differ) {
   const CheckResult* a = EnergyCheck(comparison, pair.measured);
   const CheckResult* b = EnergyCheck(comparison, pair.truth);
   if (a == nullptr || b == nullptr || Failed(a) == Failed(b)) return {};
@@ -61,6 +77,11 @@ Attribution AttributeByEnergy(const Comparison& comparison, const PairComparison
       NameOf(comparison, bad.subject), bad.value, NameOf(comparison, good.subject), good.value);
   if (const CheckResult* power = PowerBesideTheStep(comparison, bad)) {
     text += "; " + StepText(*power, bad);
+  }
+  if (!DriftExplains(input, bad, differ)) {
+    return {"", text +
+                    "; this is too little to explain the difference: a third witness would tell "
+                    "which one is wrong"};
   }
   return {bad.subject, text};
 }

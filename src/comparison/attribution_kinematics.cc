@@ -11,7 +11,12 @@
 //   no                no                             the simulated model
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "comparison/attribution_parts.h"
+#include "comparison/driven.h"
+#include "mechanism/reach.h"
 
 namespace mbv::internal {
 namespace {
@@ -65,21 +70,62 @@ Attribution ByDerivatives(const Comparison& comparison) {
   return {};
 }
 
-// A computation that does not do what is commanded, whatever the simulation does.
-Attribution ByOwnCommand(const Comparison& comparison) {
-  for (const Role* role : kGenericFirst) {
-    const char* name = role->name;
-    const CheckResult* check = FirstFailed(comparison, name, kCommandMetrics);
-    if (check == nullptr) continue;
-    if (comparison.table && role == &role::kReference) {
-      return {name, fmt::format("the table {} does not follow the commanded motion: {} off at {}; "
-                                "does it belong to another motion?",
-                                comparison.table->name, AmountOf(*check),
-                                Place(check->channel, check->time_s))};
+// What a command goes through, least to most.
+double SpanOf(const Motion& motion, const std::string& command_name) {
+  double least = kNan, most = kNan;
+  for (const Command& command : motion.commands) {
+    if (command.name != command_name) continue;
+    for (const double t_s : SampleTimes(motion.duration_s, motion.sample_s)) {
+      const double value = Evaluate(command.profile, t_s).value;
+      least = std::fmin(least, value);
+      most = std::fmax(most, value);
     }
-    return {name, fmt::format("the {} {}", name, MissText(*check))};
   }
-  return {};
+  return most - least;
+}
+
+std::string TableMissText(const ComparisonInput& input, const Comparison& comparison,
+                          const CheckResult& check) {
+  // Less than this share of the way is a scale, a rounding or a delay of the same motion.
+  constexpr double kAnotherMotion = 0.1;
+  const bool another = (check.metric == Metric::kCommandM || check.metric == Metric::kCommandRad) &&
+                       !(check.value <= kAnotherMotion * SpanOf(*input.motion, check.channel));
+  return fmt::format("the table {} does not follow the commanded motion: {} off at {}{}",
+                     comparison.table->name, AmountOf(check), Place(check.channel, check.time_s),
+                     another ? "; does it belong to another motion?" : "");
+}
+
+// Computations that do not do what is commanded, whatever the simulation does. Where all of them
+// miss alike, they agree with each other, and none is wrong alone.
+Attribution ByOwnCommand(const ComparisonInput& input, const Comparison& comparison) {
+  constexpr double kAlike = 10.0;
+  std::vector<const CheckResult*> missed;
+  std::string names;
+  size_t judged = 0;
+  for (const Role* role : kGenericFirst) {
+    const bool any = std::any_of(
+        comparison.checks.begin(), comparison.checks.end(),
+        [&](const CheckResult& c) { return c.subject == *role && c.limit && IsCommand(c.metric); });
+    judged += any ? 1 : 0;
+    const CheckResult* check = FirstFailed(comparison, role->name, kCommandMetrics);
+    if (check == nullptr) continue;
+    missed.push_back(check);
+    names += (names.empty() ? "" : " and ") + NameOf(comparison, role->name);
+  }
+  if (missed.empty()) return {};
+  const CheckResult& first = *missed.front();
+  const bool alike = std::all_of(missed.begin(), missed.end(), [&](const CheckResult* check) {
+    return check->metric == first.metric && check->value <= kAlike * first.value &&
+           first.value <= kAlike * check->value;
+  });
+  if (judged > 1 && missed.size() == judged && alike) {
+    return {"",
+            fmt::format("{} agree with each other that the mechanism {}", names, MissText(first))};
+  }
+  if (comparison.table && first.subject == role::kReference) {
+    return {first.subject, TableMissText(input, comparison, first)};
+  }
+  return {first.subject, fmt::format("the {} {}", first.subject, MissText(first))};
 }
 
 // The second opinion on the drive motion, against the driver's.
@@ -114,6 +160,17 @@ bool JudgesMotion(const Comparison& comparison, Metric motion) {
   return judged(Metric::kCommandM) || judged(Metric::kCommandRad);
 }
 
+// A difference of positions that is nothing beside the miss is not its cause. Rates are measured
+// relative to scales of their own.
+bool Explains(const Opinions& opinions, const CheckResult& miss) {
+  constexpr double kNothing = 1e-3;
+  const CheckResult* differ = opinions.differ;
+  if (differ == nullptr) return false;
+  const auto is_length = [](Metric metric) { return std::string(RowOf(metric).unit) == "m"; };
+  const bool alike = is_length(differ->metric) && is_length(miss.metric);
+  return !alike || !(differ->value < kNothing * miss.value);
+}
+
 std::string OtherText(const Comparison& comparison, const Opinions& opinions) {
   const bool table = comparison.table && opinions.other == role::kReference;
   const std::string who =
@@ -124,8 +181,12 @@ std::string OtherText(const Comparison& comparison, const Opinions& opinions) {
                      Place(opinions.differ->channel, opinions.differ->time_s));
 }
 
-// The opinions differ, and the simulation meets the command with the driver's.
-Attribution OtherIsWrong(const Comparison& comparison, const Opinions& opinions) {
+// The opinions differ, and the simulation meets the command with the driver's. Another assembly
+// meets the command, too, with drive positions far away; with ones nearby only close to a
+// singularity.
+Attribution OtherIsWrong(const ComparisonInput& input, const Comparison& comparison,
+                         const Opinions& opinions) {
+  constexpr double kAnotherAssembly = 0.05;  // of the characteristic length, or rad
   const CheckResult& differ = *opinions.differ;
   const std::string text = fmt::format(
       "under the {} drive motion the simulation meets the command; {}{}'s {} differ from it by {} "
@@ -134,17 +195,23 @@ Attribution OtherIsWrong(const Comparison& comparison, const Opinions& opinions)
       DriveNoun(differ.metric), AmountOf(differ), Place(differ.channel, differ.time_s));
   const bool position =
       differ.metric == Metric::kPositionM || differ.metric == Metric::kPositionRad;
-  if (position && !comparison.table) {
-    return {"", text + " and meet it too: two assemblies of the same mechanism"};
+  const double size =
+      differ.metric == Metric::kPositionM ? CharacteristicLength(*input.mechanism) : 1.0;
+  if (position && !comparison.table && !(differ.value <= kAnotherAssembly * size)) {
+    return {"",
+            text + " and meet it too: another assembly of the same mechanism, or wrong lengths"};
   }
   return {opinions.other, text};
 }
 
 }  // namespace
 
+Attribution AttributeByOwnMotion(const ComparisonInput& input, const Comparison& comparison) {
+  Attribution found = ByDerivatives(comparison);
+  return found.text.empty() ? ByOwnCommand(input, comparison) : found;
+}
+
 Attribution AttributeByKinematics(const ComparisonInput& input, const Comparison& comparison) {
-  if (Attribution found = ByDerivatives(comparison); !found.text.empty()) return found;
-  if (Attribution found = ByOwnCommand(comparison); !found.text.empty()) return found;
   const CheckResult* miss = FirstFailed(comparison, role::kSimulated.name, kCommandMetrics);
   if (input.motion->free()) {
     return miss == nullptr ? Attribution{}
@@ -152,9 +219,9 @@ Attribution AttributeByKinematics(const ComparisonInput& input, const Comparison
   }
   const Opinions opinions = OpinionsOf(input, comparison);
   if (miss == nullptr) {
-    const bool told =
+    const bool judged =
         opinions.differ != nullptr && JudgesMotion(comparison, opinions.differ->metric);
-    return told ? OtherIsWrong(comparison, opinions) : Attribution{};
+    return judged ? OtherIsWrong(input, comparison, opinions) : Attribution{};
   }
   if (opinions.pair == nullptr) {
     return {"", fmt::format("the simulation, driven by the {} drive motion, {}; either that drive "
@@ -162,11 +229,12 @@ Attribution AttributeByKinematics(const ComparisonInput& input, const Comparison
                             "witness to tell",
                             input.driven_by, MissText(*miss))};
   }
-  if (opinions.differ == nullptr) {
+  if (!Explains(opinions, *miss)) {
     return {miss->subject,
-            fmt::format("{} and {} agree on the drive motion, but under it the "
-                        "simulation {}",
-                        opinions.driver, NameOf(comparison, opinions.other), MissText(*miss))};
+            fmt::format("{} and {} agree on the drive motion{}, but under it the simulation {}",
+                        opinions.driver, NameOf(comparison, opinions.other),
+                        opinions.differ == nullptr ? "" : " to " + AmountOf(*opinions.differ),
+                        MissText(*miss))};
   }
   return {opinions.driver,
           fmt::format("under the {} drive motion the simulation {}; {}", opinions.driver,

@@ -18,15 +18,22 @@ namespace mbv::internal {
 /// Has a limit and exceeds it.
 [[nodiscard]] bool Failed(const CheckResult* check);
 
-/// Evidence from motion alone: rates against positions, drive motion against commands. Empty if
-/// motion tells nothing.
+/// What a computation shows by itself: rates that are not the derivatives of its positions, outputs
+/// that are not where the commands say. Empty if there is nothing of the kind.
+[[nodiscard]] Attribution AttributeByOwnMotion(const ComparisonInput& input,
+                                               const Comparison& comparison);
+
+/// Evidence from motion of a simulation that follows a drive motion: that motion against the
+/// commands. Empty if motion shows nothing.
 [[nodiscard]] Attribution AttributeByKinematics(const ComparisonInput& input,
                                                 const Comparison& comparison);
 
 /// Of the two witnesses of a pair, the one whose own energy drifts beyond its limit while the
-/// other's does not, and a sentence about it: what integrates badly gains or loses energy.
-[[nodiscard]] Attribution AttributeByEnergy(const Comparison& comparison,
-                                            const PairComparison& pair);
+/// other's does not, and a sentence about it: what integrates badly gains or loses energy. Named
+/// only if the drift is large enough to explain `differ`, the failed check of the pair.
+[[nodiscard]] Attribution AttributeByEnergy(const ComparisonInput& input,
+                                            const Comparison& comparison,
+                                            const PairComparison& pair, const CheckResult& differ);
 /// What a drift of the simulated energy adds to another finding, "; …"; "" if there is none.
 [[nodiscard]] std::string EnergyHint(const Comparison& comparison);
 

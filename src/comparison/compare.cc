@@ -296,6 +296,19 @@ size_t Comparison::blind() const {
 
 namespace {
 
+// What the table's differences look like is about the table: where another witness is wrong, it
+// would have a right table repaired.
+void DescribeTable(Comparison* comparison) {
+  std::vector<std::string>& diagnoses = comparison->table->diagnoses;
+  Attribution& attribution = comparison->attribution;
+  const std::string& odd = attribution.odd_one_out;
+  if (!odd.empty() && odd != role::kReference) diagnoses.clear();
+  if (comparison->verdict != Verdict::kDisagree) return;
+  for (const std::string& diagnosis : diagnoses) {
+    attribution.text += (attribution.text.empty() ? "" : "; ") + diagnosis;
+  }
+}
+
 // What a witness shows by itself. Servos follow their commands as well as their gains let them.
 void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison* comparison) {
   WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
@@ -338,6 +351,7 @@ Comparison Compare(const ComparisonInput& given) {
   Judge(input, &comparison);
   comparison.reservations = Reservations(input, comparison);
   comparison.attribution = Attribute(input, comparison);
+  if (comparison.table) DescribeTable(&comparison);
   return comparison;
 }
 

@@ -65,12 +65,15 @@ void FitFactor(const PairReader& reader, Columns columns, double start_s, DriveM
   }
   metrics->rms_measured = std::sqrt(all / count);
   metrics->factor = ab / bb;
-  double residual2 = 0.0;
+  double residual2 = 0.0, offset = 0.0, beside2 = 0.0;
   for (const auto& [a, b] : numbers) {
     const double r = a - metrics->factor * b;
     residual2 += r * r;
+    offset += (a - b) / static_cast<double>(numbers.size());
   }
+  for (const auto& [a, b] : numbers) beside2 += (a - b - offset) * (a - b - offset);
   metrics->factor_residual = std::sqrt(residual2 / bb);
+  metrics->offset_residual = std::sqrt(beside2 / bb);
 }
 
 // Errors of all drives that both have; `wanted` counts those that are not given their force.

@@ -61,6 +61,8 @@ struct ComparisonInput {
   DriveBy drive_by = DriveBy::kMotion;   ///< what moves the simulation's drives (driven.h)
   const Trace* bent = nullptr;           ///< force-driven: the same run with bent forces (kBent)
   double bend = kNan;                    ///< by this share of their RMS
+  /// Per witness: parameters of the model that the scenario gives it another value of.
+  std::map<std::string, std::map<std::string, double>> own_parameters = {};
 };
 
 /// Judges where a free motion leads.
@@ -83,6 +85,7 @@ struct DriveMetrics {
   double time_s = kNan;           ///< of the largest error
   double factor = kNan;           ///< k of the best fit measured = k · truth
   double factor_residual = kNan;  ///< RMS of measured − k · truth, over the RMS of the truth
+  double offset_residual = kNan;  ///< the same of measured − truth − c, the best constant c
 };
 
 /// What could not be compared, and why.
@@ -181,10 +184,23 @@ struct CheckResult {
   [[nodiscard]] bool Involves(const Role& role) const { return measured == role || truth == role; }
 };
 
-/// What the witnesses say about each other.
+/// What the witnesses say about each other: what was found, and what follows from it.
 struct Attribution {
-  std::string odd_one_out;  ///< the witness that is wrong, "" if none or undecided
+  std::string odd_one_out;  ///< the witness that is wrong; "" if none is, or if nothing decides
   std::string text;         ///< one or two sentences for people
+  /// Witnesses that agree where another one differs from them: a fact, whoever is wrong.
+  struct Split {
+    std::vector<std::string> agree = {};
+    double agree_to = kNan;
+    std::string differs = {};
+    double differs_by = kNan;
+    std::string measure = {};  ///< "drive force, RMS"
+    std::string unit = {};     ///< of both amounts; "" of ratios
+    /// What those that agree have in common and the other one has not, so that a fault in it would
+    /// make them agree on something wrong; "" where they are independent of each other.
+    std::string shared = {};
+  };
+  std::optional<Split> split = {};
 };
 
 /// What there is to say about a table that stands in for the reference.

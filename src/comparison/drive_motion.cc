@@ -107,8 +107,7 @@ std::string SimulationDriving(const ComparisonInput& input) {
         "the commanded start; nothing guides its drives",
         driver);
   }
-  const std::vector<bool> commanded = CommandedDrives(input);
-  if (std::find(commanded.begin(), commanded.end(), false) == commanded.end()) {
+  if (GivesAllDriveMotion(input)) {
     return "commanded in joint space, every computation is given the same drive motion";
   }
   const Role* driver = FindRole(input.driven_by);
@@ -143,6 +142,11 @@ std::string DrivingText(const ComparisonInput& input) {
   std::string text = SimulationDriving(input);
   const std::string foreign = ForeignDriving(input);
   return text + (text.empty() || foreign.empty() ? "" : "; ") + foreign;
+}
+
+bool GivesAllDriveMotion(const ComparisonInput& input) {
+  const std::vector<bool> commanded = CommandedDrives(input);
+  return std::find(commanded.begin(), commanded.end(), false) == commanded.end();
 }
 
 bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& check) {

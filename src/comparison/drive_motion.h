@@ -13,6 +13,9 @@ namespace mbv {
 /// True when some command is about an output: drive motions are then computed, not given.
 [[nodiscard]] bool IsTaskSpace(const Motion& motion);
 
+/// True when the commands determine every drive's motion, so that all computations are given it.
+[[nodiscard]] bool GivesAllDriveMotion(const ComparisonInput& input);
+
 /// True when a check compares a drive motion with itself: the simulation's with what it was told
 /// to follow, or a drive that the scenario commands with its command. Such a check can fail; that
 /// it passes verifies nothing.

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 
 #include "comparison/attribution_parts.h"
+#include "comparison/verdict.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -24,86 +26,190 @@ std::string Amount(const CheckResult& check) {
   return fmt::format("{:.1e}{}{}", check.value, *unit == '\0' ? "" : " ", unit);
 }
 
-// The simulation's check of lengths and angles that is worst against its limit.
-const CheckResult* WorstMotion(const Comparison& comparison) {
+double UseOf(const CheckResult& check) {
+  if (std::isnan(check.value)) return 1e300;
+  return check.value == 0.0 ? 0.0 : check.value / *check.limit;
+}
+
+bool IsPlace(const CheckResult& check) {
+  return IsTrajectory(check.metric) || check.metric == Metric::kCommandM ||
+         check.metric == Metric::kCommandRad;
+}
+
+bool IsOf(const CheckResult& check, const std::string& a, const std::string& b) {
+  return (check.measured == a && check.truth == b) || (check.measured == b && check.truth == a);
+}
+
+// The simulation's check of lengths and angles that is worst against its limit, held against the
+// command and the driver; what it is held against otherwise may be wrong itself.
+const CheckResult* WorstPlace(const ComparisonInput& input, const Comparison& comparison) {
   const CheckResult* worst = nullptr;
-  double most = -1.0;
   for (const CheckResult& check : comparison.checks) {
-    if (!IsEngine(check.measured) || check.truth == role::kReached) continue;
-    const bool place = IsTrajectory(check.metric) || check.metric == Metric::kCommandM ||
-                       check.metric == Metric::kCommandRad;
-    if (!check.limit || !place) continue;
-    const double ratio = std::isnan(check.value) ? 1e300 : check.value / *check.limit;
-    if (ratio <= most) continue;
-    worst = &check;
-    most = ratio;
+    if (!IsEngine(check.measured) || !check.limit || !IsPlace(check)) continue;
+    if (check.of_pair() && check.truth != input.driven_by) continue;
+    if (worst == nullptr || UseOf(check) > UseOf(*worst)) worst = &check;
   }
   return worst;
 }
 
+// Of the simulation's failed checks of motion against the command and the driver the worst; places
+// rather than rates, and what has a measure of growth rather than what has none.
+const CheckResult* WorstLeaving(const ComparisonInput& input, const Comparison& comparison) {
+  const CheckResult* worst = nullptr;
+  const auto rank = [](const CheckResult& check) {
+    return std::tuple(*check.limit > 0.0, IsPlace(check), UseOf(check));
+  };
+  for (const CheckResult& check : comparison.checks) {
+    if (!IsEngine(check.measured) || !Failed(&check)) continue;
+    const bool of_command = !check.of_pair() && IsCommand(check.metric);
+    const bool of_driver = check.truth == input.driven_by &&
+                           (IsTrajectory(check.metric) || IsDriveMotion(check.metric));
+    if (!of_command && !of_driver) continue;
+    if (worst == nullptr || rank(check) > rank(*worst)) worst = &check;
+  }
+  return worst;
+}
+
+// The worst failed check between two computations: of forces, else of motion.
+const CheckResult* WorstDifference(const Comparison& comparison, const std::string& a,
+                                   const std::string& b) {
+  const CheckResult* worst = nullptr;
+  const auto rank = [](const CheckResult& check) {
+    const bool rms = check.metric == Metric::kForceNrmse;
+    return std::tuple(IsDriveForce(check.metric), rms, UseOf(check));
+  };
+  for (const CheckResult& check : comparison.checks) {
+    if (!Failed(&check) || !IsOf(check, a, b)) continue;
+    if (!IsDriveForce(check.metric) && !IsDriveMotion(check.metric)) continue;
+    if (worst == nullptr || rank(check) > rank(*worst)) worst = &check;
+  }
+  return worst;
+}
+
+const CheckResult* FindOf(const Comparison& comparison, const std::string& a, const std::string& b,
+                          Metric metric) {
+  for (const CheckResult& check : comparison.checks) {
+    if (check.metric == metric && IsOf(check, a, b)) return &check;
+  }
+  return nullptr;
+}
+
+// Another witness that has computed the driver's motion and forces: the reference, a closed form,
+// else a program outside. "" if there is none.
+std::string OtherThan(const std::string& driver, const Comparison& comparison) {
+  for (const PairComparison& pair : comparison.pairs) {
+    if (!pair.compared || IsEngine(pair.measured) || pair.truth == role::kReached) continue;
+    if (pair.measured == driver) return pair.truth;
+    if (pair.truth == driver) return pair.measured;
+  }
+  return "";
+}
+
+// By which share of their RMS the driver's forces would have to be wrong to lead the simulation as
+// far from it and from the command as it is: by the most sensitive check, whatever its verdict.
+double ForceErrorSeen(const ComparisonInput& input, const Comparison& comparison) {
+  double most = 0.0;
+  for (const CheckResult& check : comparison.checks) {
+    if (!IsEngine(check.measured) || check.truth != input.driven_by || !check.limit) continue;
+    if (!IsTrajectory(check.metric) && !IsDriveMotion(check.metric)) continue;
+    if (check.value == 0.0) continue;
+    most = std::max(most, UseOf(check) * input.bend);
+  }
+  return most;
+}
+
+// What agrees must agree this much better than the third one differs.
+bool IsNothingBeside(double near, double far) { return near * kClearlyFarther <= far; }
+
 std::string Astray(const ComparisonInput& input, const CheckResult& check) {
+  if (!(*check.limit > 0.0)) return "";
   const char* unit = RowOf(check.metric).unit;
-  return fmt::format("forces bent by {:.0e} would lead it {:.1e} {} astray", input.bend,
-                     *check.limit, unit);
+  return fmt::format("; forces bent by {:.0e} would lead it {:.1e}{}{} astray", input.bend,
+                     *check.limit, *unit == '\0' ? "" : " ", unit);
 }
 
+// "drive force, RMS, by 1.2e-04, worst at leg1.force, t = 0.2 s"
+std::string Difference(const CheckResult& check) {
+  return fmt::format("{} by {}, worst at {}", RowOf(check.metric).title, Amount(check),
+                     internal::Place(check.channel, check.time_s));
+}
+
+// The simulation goes where the driver's forces lead it, so that it judges these forces; the other
+// computation judges them, too:
+//
+//   the other differs   the simulation leaves the command   wrong is
+//   yes                 yes                                 the driver
+//   no                  yes                                 the simulation
+//   yes                 no                                  the other, if the simulation could have
+//                                                           seen a force error of that size
 Attribution AttributePushed(const ComparisonInput& input, const Comparison& comparison) {
-  const CheckResult* worst = WorstMotion(comparison);
-  if (worst == nullptr || (worst->pass && comparison.verdict != Verdict::kAgree)) return {};
-  if (worst->pass) {
-    return {"", fmt::format("pushed by the {} forces in open loop for {:g} s, the simulation stays "
-                            "within {} of the commanded motion; {}",
-                            input.driven_by, input.motion->duration_s, Amount(*worst),
-                            Astray(input, *worst))};
+  const std::string& driver = input.driven_by;
+  if (comparison.verdict == Verdict::kAgree) {
+    const CheckResult* worst = WorstPlace(input, comparison);
+    if (worst == nullptr) return {};
+    return {"",
+            fmt::format("pushed by the {} forces in open loop for {:g} s, the simulation stays "
+                        "within {} of the commanded motion{}",
+                        driver, input.motion->duration_s, Amount(*worst), Astray(input, *worst))};
   }
-  const std::string leaves = fmt::format(
-      "pushed by the {} forces, the simulation leaves the commanded motion by {} at "
-      "{}, t = {:.4g} s; {}",
-      input.driven_by, Amount(*worst), worst->channel, worst->time_s, Astray(input, *worst));
-  const CheckResult* forces =
-      comparison.FindCheck(role::kReference, role::kAnalytic, Metric::kForceNrmse);
-  if (forces == nullptr) {
-    return {"", leaves +
-                    "; a third witness would tell whether the forces or the simulated model "
-                    "are wrong"};
+  const std::string other = OtherThan(driver, comparison);
+  const CheckResult* leaves = WorstLeaving(input, comparison);
+  const CheckResult* differ = other.empty() ? nullptr : WorstDifference(comparison, driver, other);
+  if (leaves == nullptr && differ == nullptr) return {};
+  const std::string name = internal::NameOf(comparison, other);
+  if (leaves != nullptr) {
+    const std::string text = fmt::format(
+        "pushed by the {} forces, the simulation leaves the commanded motion: {} {} at "
+        "{}{}",
+        driver, RowOf(leaves->metric).title, Amount(*leaves),
+        internal::Place(leaves->channel, leaves->time_s), Astray(input, *leaves));
+    if (other.empty()) {
+      return {"", text +
+                      "; a third witness would tell whether the forces or the simulated model "
+                      "are wrong"};
+    }
+    if (differ == nullptr) {
+      const CheckResult* forces = FindOf(comparison, driver, other, Metric::kForceNrmse);
+      return {leaves->measured,
+              fmt::format("{} and {} agree on the drive forces{}, but {}", driver, name,
+                          forces == nullptr ? "" : " to " + Amount(*forces), text)};
+    }
+    return {driver, fmt::format("{}; {} differs from {}, too: {}", text, name, driver,
+                                Difference(*differ))};
   }
-  if (!Failed(forces)) {
-    return {worst->measured,
-            fmt::format("analytic and reference agree on the drive forces to {}, but {}",
-                        Amount(*forces), leaves)};
+  const std::string text = fmt::format("{} and {} differ in {}", name, driver, Difference(*differ));
+  double seen = ForceErrorSeen(input, comparison);
+  if (!IsDriveForce(differ->metric)) {
+    const CheckResult* simulated =
+        FindOf(comparison, role::kSimulated.name, driver, differ->metric);
+    seen = simulated == nullptr ? kNan : simulated->value;
   }
-  return {input.driven_by == role::kAnalytic ? input.driven_by : "",
-          fmt::format("{}; the reference's forces differ from the analytic ones by {}, worst at "
-                      "{}, t = {:.4g} s",
-                      leaves, Amount(*forces), forces->channel, forces->time_s)};
+  const CheckResult* rms = FindOf(comparison, driver, other, Metric::kForceNrmse);
+  const double size = IsDriveForce(differ->metric) && rms != nullptr ? rms->value : differ->value;
+  const bool confirms = IsNothingBeside(seen, size) || std::isnan(size);
+  if (!confirms) {
+    return {"", fmt::format("{}; the simulation, pushed by the {} forces, stays within its limits: "
+                            "it does not resolve a difference so small",
+                            text, driver)};
+  }
+  return {other,
+          fmt::format("{}; the simulation, pushed by the {} forces, stays on the commanded motion: "
+                      "forces wrong by {:.1e} would lead it as far off as it is",
+                      text, driver, seen),
+          Attribution::Split{.agree = {role::kSimulated.name, driver},
+                             .agree_to = seen,
+                             .differs = other,
+                             .differs_by = size,
+                             .measure = RowOf(differ->metric).title,
+                             .unit = RowOf(differ->metric).unit}};
 }
 
-Attribution AttributeServo(const Comparison& comparison) {
-  const CheckResult* reached =
-      comparison.FindCheck(role::kSimulated, role::kReached, Metric::kForceNrmse);
-  const CheckResult* forces =
-      comparison.FindCheck(role::kReference, role::kAnalytic, Metric::kForceNrmse);
-  if (reached == nullptr) return {};
-  if (comparison.verdict != Verdict::kAgree && !Failed(reached) && !Failed(forces)) return {};
-  const std::string differ =
-      fmt::format("worst at {}, t = {:.4g} s", reached->channel, reached->time_s);
-  if (Failed(reached)) {
-    const bool sure = forces != nullptr && !Failed(forces);
-    return {sure ? reached->measured : "",
-            fmt::format(
-                "on the motion that the servos reached, the actuator forces differ from "
-                "the reference by {}: {}{}",
-                Amount(*reached), differ,
-                sure ? fmt::format("; analytic and reference agree to {}", Amount(*forces)) : "")};
-  }
-  const std::string agree =
-      fmt::format("on the motion that the servos reached, simulation and reference agree to {}",
-                  Amount(*reached));
-  if (Failed(forces)) {
-    return {forces->truth, fmt::format("{}; analytic differs by {}, worst at {}, t = {:.4g} s",
-                                       agree, Amount(*forces), forces->channel, forces->time_s)};
-  }
-  std::string text = agree;
+// Judged both between the two computations and on the motion that servos reached, what is told
+// apart there: drive forces, else reactions.
+constexpr Metric kOfForces[] = {Metric::kForceNrmse, Metric::kForceOwn,    Metric::kForceMax,
+                                Metric::kReaction,   Metric::kReactionOwn, Metric::kBaseForce};
+
+std::string TrackingText(const Comparison& comparison) {
   for (const Role* truth : {&role::kAnalytic, &role::kReference}) {
     const auto find = [&](Metric metric) {
       return comparison.FindCheck(role::kSimulated, *truth, metric);
@@ -112,11 +218,63 @@ Attribution AttributeServo(const Comparison& comparison) {
     if (tracking == nullptr) tracking = find(Metric::kPositionRad);
     const CheckResult* cost = find(Metric::kForceNrmse);
     if (tracking == nullptr || cost == nullptr) continue;
-    return {"", fmt::format("{}; they follow the command to {}, with forces that differ from the "
-                            "commanded motion's by {}",
-                            text, Amount(*tracking), Amount(*cost))};
+    return fmt::format(
+        "; they follow the command to {}, with forces that differ from the "
+        "commanded motion's by {}",
+        Amount(*tracking), Amount(*cost));
   }
-  return {"", text};
+  return "";
+}
+
+// The reference stands between the two others: it is held against the simulation on the motion that
+// the servos reached, and against the closed form on the commanded one.
+//
+//   differs on the reached motion   differs from the closed form   wrong is
+//   yes                             no                             the simulation
+//   no                              yes                            the closed form
+//   yes, by as much                 yes                            the reference
+Attribution AttributeServo(const Comparison& comparison) {
+  for (const Metric metric : kOfForces) {
+    const CheckResult* reached = comparison.FindCheck(role::kSimulated, role::kReached, metric);
+    const CheckResult* computed = comparison.FindCheck(role::kReference, role::kAnalytic, metric);
+    if (reached == nullptr || (!Failed(reached) && !Failed(computed))) continue;
+    const std::string there = fmt::format(
+        "on the motion that the servos reached, simulation and reference {}",
+        Failed(reached) ? "differ in " + Difference(*reached) : "agree to " + Amount(*reached));
+    if (computed == nullptr) {
+      return {"", there + "; a third witness would tell which one is wrong"};
+    }
+    const std::string text = fmt::format(
+        "{}; on the commanded motion analytic and reference {}", there,
+        Failed(computed) ? "differ in " + Difference(*computed) : "agree to " + Amount(*computed));
+    Attribution::Split split{.measure = RowOf(metric).title, .unit = RowOf(metric).unit};
+    const auto stands_alone = [&](const Role& odd, const Role& with, const CheckResult& near,
+                                  const CheckResult& far) -> Attribution {
+      split.agree = {role::kReference.name, with.name};
+      split.agree_to = near.value;
+      split.differs = odd.name;
+      split.differs_by = far.value;
+      return {odd.name, text, split};
+    };
+    if (Failed(reached) && IsNothingBeside(computed->value, reached->value)) {
+      return stands_alone(role::kSimulated, role::kAnalytic, *computed, *reached);
+    }
+    if (Failed(computed) && IsNothingBeside(reached->value, computed->value)) {
+      return stands_alone(role::kAnalytic, role::kSimulated, *reached, *computed);
+    }
+    if (Failed(reached) && Failed(computed)) {
+      return {role::kReference.name, text + ": the reference differs from both"};
+    }
+    return {"", text + ": on the reached motion a difference so small is not resolved"};
+  }
+  if (comparison.verdict != Verdict::kAgree) return {};
+  const CheckResult* reached =
+      comparison.FindCheck(role::kSimulated, role::kReached, Metric::kForceNrmse);
+  if (reached == nullptr) return {};
+  return {"",
+          fmt::format("on the motion that the servos reached, simulation and reference agree to "
+                      "{}{}",
+                      Amount(*reached), TrackingText(comparison))};
 }
 
 }  // namespace

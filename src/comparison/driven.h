@@ -55,7 +55,8 @@ void LeaveOutReachedMotion(PairComparison* pair);
 [[nodiscard]] std::string WhyHorizonTooLong(const ComparisonInput& input,
                                             const Comparison& comparison);
 
-/// What a force-driven or servo run tells; an empty text where it tells nothing.
+/// Who is wrong in a force-driven or servo run, or how well it agrees; an empty text where the
+/// simulation's motion and forces show nothing.
 [[nodiscard]] Attribution AttributeDriven(const ComparisonInput& input,
                                           const Comparison& comparison);
 

@@ -36,7 +36,16 @@ double RmsDeviation(const VecX& values) { return Rms((values.array() - values.me
 
 // An explanation of one column.
 struct Explanation {
-  enum class Kind { kSign, kFactor, kExchange, kOffset, kUnknownFactor, kOutliers, kDrift };
+  enum class Kind {
+    kSign,
+    kFactor,
+    kExchange,
+    kOffset,
+    kUnknownFactor,
+    kEither,
+    kOutliers,
+    kDrift
+  };
   Kind kind = Kind::kSign;
   double factor = 1.0, offset = 0.0;
   size_t partner = 0;                // index of the series that it looks like
@@ -108,11 +117,23 @@ class Diagnosis {
     Explanation offset{.kind = Explanation::Kind::kOffset};
     offset.offset = (series.table - series.other).mean();
     offset.left = RmsDeviation(series.table - series.other);
-    if (good(offset)) return offset;
     scaled.kind = Explanation::Kind::kUnknownFactor;
+    if (good(offset) && good(scaled)) return Clearer(scaled, offset);
+    if (good(offset)) return offset;
     if (good(scaled)) return scaled;
     if (auto outliers = Outliers(series)) return outliers;
     return Drifting(series);
+  }
+
+  // Of a signal that hardly varies, a factor and an added constant are the same.
+  static Explanation Clearer(const Explanation& scaled, const Explanation& offset) {
+    constexpr double kClearly = 0.5;
+    if (scaled.left < kClearly * offset.left) return scaled;
+    if (offset.left < kClearly * scaled.left) return offset;
+    Explanation either = scaled;
+    either.kind = Explanation::Kind::kEither;
+    either.offset = offset.offset;
+    return either;
   }
 
   [[nodiscard]] std::optional<Explanation> Drifting(const Series& series) const {
@@ -240,6 +261,12 @@ class Diagnosis {
             "{} is {} with {:.6g} {} added: a preload, a weight or a zero point? "
             "({})",
             columns, channel, finding.offset, series_[k].unit, Left(k));
+      case Explanation::Kind::kEither:
+        return fmt::format(
+            "{} is {:.6g} times {}, or {} with {:.6g} {} added: {} varies too little to tell them "
+            "apart ({})",
+            columns, finding.factor, channel, channel, finding.offset, series_[k].unit, channel,
+            Left(k));
       case Explanation::Kind::kOutliers:
         return OutlierText(k);
       case Explanation::Kind::kDrift:
@@ -303,6 +330,7 @@ class Diagnosis {
     std::tie(best_s, best) = boost::math::tools::brent_find_minima(
         misfit, best_s - step_s, best_s + step_s, std::numeric_limits<double>::digits / 2);
     if (!(best <= kExplains * unshifted) || !AllFit(moving, best_s)) return {};
+    if (LeavesOthers(best_s)) return {};
     return fmt::format(
         "the table is shifted by {:.4g} s: it is {} (time_offset_s: {:.4g} on top "
         "of what is stated)",
@@ -361,6 +389,18 @@ class Diagnosis {
   [[nodiscard]] bool AllFit(const std::vector<size_t>& moving, double shift_s) const {
     return std::all_of(moving.begin(), moving.end(),
                        [&](size_t k) { return IsGood(series_[k], ShiftedRms(k, shift_s)); });
+  }
+
+  // A shift of the time moves every column: one that is right as it is contradicts it.
+  [[nodiscard]] bool LeavesOthers(double shift_s) const {
+    for (size_t k = 0; k < series_.size(); ++k) {
+      const Series& series = series_[k];
+      if (!series.result->inside()) continue;
+      const double as_is = Rms(series.table - series.other);
+      const double most = std::max(kTubes * series.result->tube_rms, kTubes * as_is);
+      if (ShiftedRms(k, shift_s) > most) return true;
+    }
+    return false;
   }
 
   const AlignedTable& table_;

@@ -12,20 +12,17 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-const RerunSignal* WorstSignal(const std::vector<RerunSignal>& signals) {
-  // What is no number is worst.
-  const auto rank = [](const RerunSignal& signal) {
-    return signal.use == signal.use ? signal.use : HUGE_VAL;
-  };
-  const auto worst = std::ranges::max_element(signals, {}, rank);
-  return worst == signals.end() ? nullptr : &*worst;
-}
-
 std::string SignalText(const RerunSignal& signal) {
-  std::string text =
-      fmt::format("{} by {:.2g} of its largest value", signal.signal, signal.relative);
+  std::string text = signal.signal;
+  if (std::isfinite(signal.relative)) {
+    text += fmt::format(" by {:.2g} of its largest value", signal.relative);
+  } else {
+    text += std::isnan(signal.relative) ? " is not a number in both"
+                                        : " differs where the archive has zero";
+  }
   if (signal.time_s == signal.time_s) text += fmt::format(" at t = {:g} s", signal.time_s);
-  return text + fmt::format(", {:.2g} of its limit", signal.use);
+  if (std::isfinite(signal.use)) return text + fmt::format(", {:.2g} of its limit", signal.use);
+  return text + ", outside its limit";
 }
 
 std::string FileText(const RerunFile& file, bool all) {
@@ -82,6 +79,14 @@ size_t CountOf(const RerunReport& report, RerunOutcome outcome) {
 }
 
 }  // namespace
+
+const RerunSignal* WorstSignal(const std::vector<RerunSignal>& signals) {
+  const auto rank = [](const RerunSignal& signal) {
+    return signal.use == signal.use ? signal.use : HUGE_VAL;
+  };
+  const auto worst = std::ranges::max_element(signals, {}, rank);
+  return worst == signals.end() ? nullptr : &*worst;
+}
 
 const char* ToText(RerunOutcome outcome) {
   switch (outcome) {

@@ -25,6 +25,9 @@ struct RerunFile {
   std::vector<RerunSignal> signals;  ///< of those that were judged
 };
 
+/// The signal that takes most of its tube; what is not a number is worst. Null without signals.
+[[nodiscard]] const RerunSignal* WorstSignal(const std::vector<RerunSignal>& signals);
+
 /// One scenario or study.
 struct RerunScenario {
   std::string file, kind;

@@ -6,6 +6,8 @@
 
 #include <cmath>
 #include <map>
+#include <string>
+#include <vector>
 
 namespace mbv {
 namespace {
@@ -58,6 +60,26 @@ RerunSignal MovedBy(const std::string& name, const CheckNumbers& packed,
   return signal;
 }
 
+// The first check that only one of the two has, else the one that has moved farthest.
+std::string WhyOutside(const std::map<std::string, CheckNumbers>& packed,
+                       const std::map<std::string, CheckNumbers>& rerun,
+                       const std::vector<RerunSignal>& signals) {
+  for (const auto& [name, numbers] : packed) {
+    if (!rerun.contains(name)) return fmt::format("the check {} is not made any more", name);
+  }
+  for (const auto& [name, numbers] : rerun) {
+    if (!packed.contains(name)) return fmt::format("the check {} is not in the archive", name);
+  }
+  const RerunSignal* worst = WorstSignal(signals);
+  if (worst == nullptr) return "";
+  const CheckNumbers &was = packed.at(worst->signal), &is = rerun.at(worst->signal);
+  if (was.pass != is.pass) {
+    return fmt::format("{} {} in the archive, {} now", worst->signal, was.pass ? "passes" : "fails",
+                       is.pass ? "passes" : "fails");
+  }
+  return fmt::format("{}: {:.6g} in the archive, {:.6g} now", worst->signal, was.value, is.value);
+}
+
 }  // namespace
 
 RerunFile CompareSummaries(const std::string& path, const std::string& packed,
@@ -72,7 +94,11 @@ RerunFile CompareSummaries(const std::string& path, const std::string& packed,
   file.why = FirstDifference(before, now);
   if (exact) return file;
   for (const char* key : {"verdict", "exit_code"}) {
-    if (before.value(key, SummaryObject()) != now.value(key, SummaryObject())) return file;
+    const SummaryObject was = before.value(key, SummaryObject()),
+                        is = now.value(key, SummaryObject());
+    if (was == is) continue;
+    file.why = fmt::format("{}: {} in the archive, {} now", key, DumpLine(was), DumpLine(is));
+    return file;
   }
   const auto packed_checks = ChecksOf(before), checks = ChecksOf(now);
   bool inside = packed_checks.size() == checks.size();
@@ -82,7 +108,11 @@ RerunFile CompareSummaries(const std::string& path, const std::string& packed,
                                                  : MovedBy(name, numbers, found->second));
     inside = inside && file.signals.back().inside();
   }
-  if (inside) file.outcome = RerunOutcome::kWithin;
+  if (inside) {
+    file.outcome = RerunOutcome::kWithin;
+    return file;
+  }
+  file.why = WhyOutside(packed_checks, checks, file.signals);
   return file;
 }
 

@@ -58,6 +58,21 @@ Json TimingJson(const ResultView& view) {
   return times;
 }
 
+// What was found, beside what follows from it.
+Json AttributionJson(const Attribution& attribution) {
+  Json json = {{"odd_one_out", attribution.odd_one_out}, {"text", attribution.text}};
+  if (!attribution.split) return json;
+  const Attribution::Split& split = *attribution.split;
+  json["agree"] = split.agree;
+  json["agree_to"] = Number(split.agree_to);
+  json["differs"] = split.differs;
+  json["differs_by"] = Number(split.differs_by);
+  json["measure"] = split.measure;
+  json["unit"] = split.unit;
+  json["shared"] = split.shared;
+  return json;
+}
+
 }  // namespace
 
 Json SummaryHead(const ResultView& view) {
@@ -73,8 +88,7 @@ Json SummaryHead(const ResultView& view) {
   json["reason"] = view.reason;
   json["exit_code"] = frame.exit_code;
   if (view.reservations) json["reservations"] = *view.reservations;
-  json["attribution"] = {{"odd_one_out", view.attribution.odd_one_out},
-                         {"text", view.attribution.text}};
+  json["attribution"] = AttributionJson(view.attribution);
   json["checks"] = ChecksJson(view);
   json["checks_off"] = ChecksOffJson(view);
   return json;

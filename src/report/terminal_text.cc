@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include "report/html_text.h"
 
 namespace mbv {
@@ -125,12 +127,36 @@ void TerminalText::Times(const std::vector<std::pair<const char*, double>>& part
   Line(line + fmt::format(" all {:.3f} s", total_s) + more);
 }
 
+namespace {
+
+// The failed check farthest beyond its limit; null without one.
+const ShownCheck* WorstFailed(const ResultView& view) {
+  const ShownCheck* worst = nullptr;
+  const auto use = [](const ShownCheck& check) {
+    return std::isnan(check.value) ? HUGE_VAL : check.value / *check.limit;
+  };
+  for (const ShownCheck& check : view.checks) {
+    if (!check.limit || check.pass) continue;
+    if (worst == nullptr || use(check) > use(*worst)) worst = &check;
+  }
+  return worst;
+}
+
+}  // namespace
+
 std::string VerdictLine(const ResultView& view, const TableOptions& options) {
   std::string line =
       fmt::format("{}: {}", view.frame->title(), TerminalText(options).Word(view.verdict));
   const ShownCheck* check = view.FindCheck(view.main_check);
+  std::string about = view.main_pair;
+  // A number that passes says nothing of a disagreement.
+  const bool passes = check == nullptr || !check->limit || check->pass;
+  if (view.verdict == Verdict::kDisagree && passes) {
+    check = WorstFailed(view);
+    if (check != nullptr) about = check->name;
+  }
   if (check != nullptr && view.verdict != Verdict::kNotRun) {
-    line += fmt::format("  {} {:.1e}", view.main_pair, check->value);
+    line += fmt::format("  {} {:.1e}", about, check->value);
     if (check->limit) line += fmt::format(" (limit {:.1e})", *check->limit);
   }
   if (check != nullptr && check->floored) line += " floored";

@@ -361,6 +361,73 @@ TEST(TableDiagnosis, AShiftInTimeIsFoundBetweenSamplesWithItsDirection) {
   }
 }
 
+// Half a per cent of a force that hardly varies: a factor or an added constant.
+TEST(TableDiagnosis, WhatASignalThatHardlyVariesLeavesOpenIsSaid) {
+  const auto of = [](double swing, double factor) {
+    TableCase c;
+    for (int i = 0; i <= 100; ++i) {
+      const double exact = 100.0 + swing * std::sin(kOmega * 0.01 * i);
+      c.table.values(i, 0) = factor * exact;
+      for (Trace* trace : {&c.solver, &c.base.simulated}) {
+        trace->values(i, trace->Find("d1.force")) = exact;
+      }
+    }
+    c.Print(1e-2);
+    return c.Run();
+  };
+  const Comparison hardly = of(0.1, 1.005);
+  EXPECT_TRUE(Says(hardly, "varies too little to tell them apart")) << All(hardly);
+  EXPECT_FALSE(Says(hardly, "preload")) << All(hardly);
+  const Comparison swings = of(60.0, 1.005);
+  EXPECT_TRUE(Says(swings, "is 1.005 times d1.force: a mass")) << All(swings);
+}
+
+// A time shift would move the positions, too.
+TEST(TableDiagnosis, ForcesThatComeLateBesideAPositionThatDoesNotAreNotShiftedInTime) {
+  for (const bool position_too : {false, true}) {
+    TableCase c;
+    const double shift_s = 0.0234;
+    for (int i = 0; i <= 100; ++i) {
+      const double t = 0.01 * i - shift_s;
+      c.table.values(i, 0) = 100.0 * std::sin(kOmega * t);
+      c.table.values(i, 1) = 40.0 * std::cos(kOmega * t);
+    }
+    c.AddColumn("plate.x", [&](double t) { return 0.3 * (position_too ? t - shift_s : t); });
+    c.table.columns.back().channel.unit = c.table.columns.back().unit = "m";
+    c.Print(1e-5);
+    const Comparison comparison = c.Run();
+    EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+    EXPECT_EQ(Says(comparison, "shifted by 0.0234 s"), position_too) << All(comparison);
+  }
+}
+
+// Where the table is right, what the difference looks like would have it repaired.
+TEST(TableDiagnosis, ARightTableIsNotRepairedForAWrongSolver) {
+  TableCase c;
+  c.Print(1e-6);
+  synthetic::Stretch(&c.solver, "d1.force", 1.37);
+  const Comparison comparison = c.Run();
+  EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
+  EXPECT_EQ(comparison.attribution.odd_one_out, "solver") << All(comparison);
+  EXPECT_TRUE(comparison.table->diagnoses.empty()) << All(comparison);
+  EXPECT_EQ(comparison.attribution.text.find("times d1.force"), std::string::npos);
+}
+
+TEST(TableDiagnosis, OnlyATableFarFromTheCommandMayBelongToAnotherMotion) {
+  for (const double factor : {1.01, 2.0}) {
+    TableCase c;
+    const VecX exact = c.solver.values.col(c.solver.Find("d1.position"));
+    c.AddColumn("d1.position", [&](double t) { return factor * exact[std::lround(t / 0.01)]; });
+    c.table.columns.back().channel.unit = c.table.columns.back().unit = "m";
+    c.Print(1e-6);
+    const Comparison comparison = c.Run();
+    EXPECT_EQ(comparison.attribution.odd_one_out, "reference") << All(comparison);
+    EXPECT_EQ(comparison.attribution.text.find("another motion?") != std::string::npos,
+              factor == 2.0)
+        << All(comparison);
+  }
+}
+
 TEST(TableDiagnosis, ADifferenceThatNoneOfThemExplainsHasNoDiagnosis) {
   TableCase c;
   for (int i = 0; i <= 100; ++i) c.table.values(i, 0) += 10.0 * std::sin(3 * kOmega * 0.01 * i);

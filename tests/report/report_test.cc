@@ -64,6 +64,68 @@ TEST(Report, JsonHasTheFieldsOthersRelyOn) {
   }
 }
 
+TEST(Report, JsonStatesWhoAgreesBesideWhoIsNamed) {
+  Report report = MakeReport(BentCase());
+  const auto without = nlohmann::json::parse(ToJson(report))["attribution"];
+  EXPECT_FALSE(without.contains("agree"));
+  report.comparison.attribution.split = Attribution::Split{.agree = {"reference", "analytic"},
+                                                           .agree_to = 1e-12,
+                                                           .differs = "simulated",
+                                                           .differs_by = 2e-3,
+                                                           .measure = "drive force, RMS",
+                                                           .unit = "",
+                                                           .shared = "one number"};
+  const auto json = nlohmann::json::parse(ToJson(report))["attribution"];
+  EXPECT_EQ(json["agree"], (std::vector<std::string>{"reference", "analytic"}));
+  EXPECT_EQ(json["agree_to"], 1e-12);
+  EXPECT_EQ(json["differs"], "simulated");
+  EXPECT_EQ(json["differs_by"], 2e-3);
+  EXPECT_EQ(json["measure"], "drive force, RMS");
+  EXPECT_EQ(json["unit"], "");
+  EXPECT_EQ(json["shared"], "one number");
+}
+
+// The line of a disagreement quotes a check that fails, though the usual one passes.
+TEST(Report, TheVerdictLineQuotesNoNumberThatPasses) {
+  Report report = MakeReport(BentCase());
+  ResultView view = ViewOf(report);
+  view.verdict = Verdict::kDisagree;
+  view.main_pair = "simulated vs analytic";
+  view.main_check = "simulated_vs_analytic.force_nrmse";
+  view.checks = {{.name = view.main_check,
+                  .subject = "",
+                  .title = "",
+                  .value = 2e-11,
+                  .limit = 1e-10,
+                  .pass = true},
+                 {.name = "simulated.power_balance",
+                  .subject = "",
+                  .title = "",
+                  .value = 3e-7,
+                  .limit = 1e-8,
+                  .pass = false},
+                 {.name = "simulated.energy_drift",
+                  .subject = "",
+                  .title = "",
+                  .value = 3e-4,
+                  .limit = 1e-5,
+                  .pass = false},
+                 {.name = "simulated.closure_m",
+                  .subject = "",
+                  .title = "",
+                  .value = kNan,
+                  .limit = {},
+                  .pass = false}};
+  EXPECT_NE(VerdictLine(view, {}).find("  simulated.power_balance 3.0e-07 (limit 1.0e-08)"),
+            std::string::npos)
+      << VerdictLine(view, {});
+  view.checks[0].pass = false;
+  EXPECT_NE(VerdictLine(view, {}).find("  simulated vs analytic 2.0e-11"), std::string::npos);
+  view.checks[0].pass = true;
+  view.verdict = Verdict::kAgree;
+  EXPECT_NE(VerdictLine(view, {}).find("  simulated vs analytic 2.0e-11"), std::string::npos);
+}
+
 TEST(Report, CsvHasDrivesFirstInTheOrderOfTheWitnesses) {
   const std::string csv = ToCsv(MakeReport(BentCase()));
   const std::string start =

@@ -46,6 +46,52 @@ TEST(RerunSummary, NamesTheFirstValueThatDiffers) {
   EXPECT_EQ(file.why, "checks/0/value: 1e-08 in the archive, 1.5e-08 now");
 }
 
+// Of several values that differ, the one that decides is named: not the first in the file.
+TEST(RerunSummary, NamesWhatDecides) {
+  const std::string packed = R"({"description": "a", "verdict": "agree", "exit_code": 0, "checks": [
+      {"name": "a.force_nrmse", "value": 1e-8, "limit": 1e-6, "pass": true},
+      {"name": "b.force_nrmse", "value": 0.0, "limit": 1e-6, "pass": true}]})";
+  const auto why = [&](const std::vector<std::pair<std::string, std::string>>& changes) {
+    std::string now = packed;
+    for (const auto& [what, by] : changes) now.replace(now.find(what), what.size(), by);
+    const RerunFile file = CompareSummaries("s", packed, now, false);
+    EXPECT_EQ(file.outcome, RerunOutcome::kDiffers) << now;
+    return file.why;
+  };
+  EXPECT_EQ(why({{"\"a\"", "\"b\""}, {"agree", "disagree"}}),
+            "verdict: \"agree\" in the archive, \"disagree\" now");
+  EXPECT_EQ(why({{"1e-8", "1.1e-8"}, {"0.0", "5e-7"}}),
+            "b.force_nrmse: 0 in the archive, 5e-07 now");
+  EXPECT_EQ(why({{"1e-8", "1.1e-8"}, {"b.force", "c.force"}}),
+            "the check b.force_nrmse is not made any more");
+  EXPECT_EQ(why({{"{\"name\": \"a.force", "{\"name\": \"d.force"}, {"1e-8", "1.1e-8"}}),
+            "the check a.force_nrmse is not made any more");
+  std::string failing = "\"pass\": true}]";
+  EXPECT_EQ(why({{"\"a\"", "\"b\""}, {failing, "\"pass\": false}]"}}),
+            "b.force_nrmse passes in the archive, fails now");
+}
+
+TEST(RerunReport, SaysInWordsWhatHasNoRatio) {
+  RerunReport report;
+  report.scenarios.push_back(
+      {.file = "inputs/a.yaml",
+       .kind = "motion",
+       .verdict = "agree",
+       .packed_verdict = "agree",
+       .failure = "",
+       .files = {{"results/a/traces.csv",
+                  RerunOutcome::kDiffers,
+                  "",
+                  {{"m.force", HUGE_VAL, HUGE_VAL, 0.25}, {"m.position", kNan, kNan, kNan}}}}});
+  const std::string text = ToText(report, false);
+  EXPECT_TRUE(Says(text,
+                   "m.force differs where the archive has zero at t = 0.25 s, outside its "
+                   "limit"))
+      << text;
+  EXPECT_TRUE(Says(text, "m.position is not a number in both, outside its limit")) << text;
+  EXPECT_FALSE(Says(text, "inf")) << text;
+}
+
 RerunReport AReport() {
   RerunReport report;
   report.archive = "paper.zip";
