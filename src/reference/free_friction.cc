@@ -7,10 +7,13 @@
 #include <boost/math/tools/minima.hpp>
 #include <boost/math/tools/toms748_solve.hpp>
 #include <cmath>
+#include <utility>
 
 #include "kinematics/element_rows.h"
+#include "reference/closure_solver.h"
 #include "reference/free_motion.h"
 #include "reference/hermite.h"
+#include "reference/square_system.h"
 
 namespace mbv::internal {
 namespace {
@@ -24,9 +27,12 @@ constexpr double kUnresolved = 10.0;
 // What starts is decided by the load that the held motion has this share of a step later: at the
 // start itself nothing moves yet.
 constexpr double kAhead = 1e-4;
-// A coordinate of which loops and commands leave a smaller share is led by them.
+// A coordinate of which loops and commands leave a smaller share to forces is led by them, or
+// stands at its dead centre.
 constexpr double kLed = 1e-9;
-// A smaller share of what an acceleration is made of is none.
+// Where it is led, it is also led at a pose that is so far away [rad, characteristic lengths].
+constexpr double kAside = 1e-2;
+// A smaller share of what a rate or an acceleration is made of is none.
 constexpr double kTurns = 1e-9;
 constexpr int kMostHalvings = 40;
 constexpr std::uintmax_t kMostTries = 100;
@@ -47,6 +53,20 @@ double Root(const F& f, double a, double b) {
 double Cubic(double h, double t, double v0, double a0, double v1, double a1) {
   const double s = t / h, r = 1.0 - s;
   return r * r * ((1.0 + 2.0 * s) * v0 + t * a0) + s * s * ((1.0 + 2.0 * r) * v1 - (h - t) * a1);
+}
+
+// What J · twists of a row would be if its bodies moved as much as any.
+double MostOf(const ScalarRow& row, const std::vector<Vec6>& twists, double length) {
+  const auto size = [](const Vec6& twist, double scale) {
+    return std::hypot(scale * twist.head<3>().norm(), twist.tail<3>().norm());
+  };
+  double most = 0.0;
+  for (const Vec6& twist : twists) most = std::max(most, size(twist, length));
+  return (size(row.J_parent, 1.0 / length) + size(row.J_child, 1.0 / length)) * most;
+}
+
+int SignOf(double value, double least) {
+  return std::abs(value) > least ? (value > 0.0 ? 1 : -1) : 0;
 }
 
 }  // namespace
@@ -84,23 +104,56 @@ RunSummary FreeMotion::Contradiction(size_t element, const std::string& what, do
           .unit = unit};
 }
 
+// At its dead centre a coordinate is at rest, as loops and commands have it, but forces neither
+// move nor hold it: its share there is round-off of the pose.
+bool FreeMotion::AtDeadCentre(const ScalarRow& row) const {
+  return dynamics_.ShareLeft(row) < kLed;
+}
+
+// Its rate is within the error of freedoms at rest, or, at a dead centre, within round-off.
+bool FreeMotion::Rests(size_t element, const ScalarRow& row) const {
+  const std::vector<Vec6>& V_WB = now_.states.V_WB;
+  const double least = AtDeadCentre(row) ? kTurns * MostOf(row, V_WB, dynamics_.length())
+                                         : Resolved(element) * dynamics_.ShareLeft(row);
+  return std::abs(RateOf(row, V_WB)) <= least;
+}
+
+// Elements whose coordinate loops and commands lead, at this pose and beside it.
+std::vector<size_t> FreeMotion::LedElements() {
+  std::vector<size_t> led;
+  const auto keep_led = [&](const BodyStates& states, std::vector<size_t> of) {
+    const std::vector<ScalarRow> rows = ElementRows(mechanism_, states);
+    std::erase_if(of, [&](size_t e) { return !AtDeadCentre(rows[e]); });
+    return of;
+  };
+  dynamics_.Factor(now_.time_s, now_.states);
+  led = keep_led(now_.states, rubbing_);
+  VecX aside = dynamics_.Motions() * VecX::Ones(dynamics_.freedoms());
+  aside *= kAside / SizeOf(aside, dynamics_.length());
+  for (const double sense : {1.0, -1.0}) {
+    if (led.empty()) break;
+    BodyStates states = now_.states;
+    MoveBodies(sense * aside, &states);
+    if (dynamics_.Project(now_.time_s, &states).ok()) led = keep_led(states, led);
+  }
+  return led;
+}
+
 // Elements whose coordinate moves by forces are at rest where nothing tells their rate from zero;
 // commands lead the others.
 RunSummary FreeMotion::BeginFriction() {
-  const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   FrictionEvent start;
   FrictionPhase phase;
   phase.sign.assign(mechanism_.elements.size(), 0);
-  for (const size_t e : rubbing_) {
-    if (dynamics_.ShareLeft(rows[e]) < kLed) phase.led.push_back(e);
-  }
+  phase.led = LedElements();
   std::erase_if(rubbing_, [&](size_t e) { return std::ranges::count(phase.led, e) > 0; });
+  dynamics_.Factor(0.0, now_.states);
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   for (const size_t e : rubbing_) {
-    const double rate = RateOf(rows[e], now_.states.V_WB);
-    if (std::abs(rate) <= Resolved(e)) {
+    if (Rests(e, rows[e])) {
       start.stops.push_back(e);
     } else {
-      phase.sign[e] = rate > 0.0 ? 1 : -1;
+      phase.sign[e] = RateOf(rows[e], now_.states.V_WB) > 0.0 ? 1 : -1;
     }
   }
   dynamics_.SetPhase(std::move(phase));
@@ -112,7 +165,9 @@ RunSummary FreeMotion::BeginFriction() {
 
 // Before a step: forces may have jumped, and what has just started may set others free.
 RunSummary FreeMotion::CheckFriction() {
-  if (rubbing_.empty() || dynamics_.phase().held.empty()) return RunSummary::Done();
+  if (rubbing_.empty()) return RunSummary::Done();
+  FollowDeadCentres();
+  if (dynamics_.phase().held.empty()) return RunSummary::Done();
   for (;;) {
     BodyStates states = now_.states;
     if (RunSummary summary = dynamics_.Accelerate(now_.time_s, &states); !summary.ok()) {
@@ -252,12 +307,13 @@ void FreeMotion::FindStart(const State& from, double h, const State& to, Frictio
 FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
   const FrictionPhase& phase = dynamics_.phase();
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
+  dynamics_.Factor(now_.time_s, now_.states);
   FrictionPhase resting{.sign = phase.sign, .held = {}, .at = {}, .led = phase.led};
   for (const size_t e : rubbing_) {
     const auto held = std::ranges::find(phase.held, e);
     const bool stopped = std::ranges::find(event.stops, e) != event.stops.end();
-    const bool slow = std::abs(RateOf(rows[e], now_.states.V_WB)) <= Resolved(e);
-    if (held == phase.held.end() && !stopped && (!slow || fresh_[e] != 0)) continue;
+    const bool rests = phase.sign[e] == 0 || stopped || (fresh_[e] == 0 && Rests(e, rows[e]));
+    if (!rests) continue;
     resting.held.push_back(e);
     resting.at.push_back(held == phase.held.end()
                              ? rows[e].value
@@ -265,6 +321,65 @@ FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
     resting.sign[e] = 0;
   }
   return resting;
+}
+
+// What rests at a dead centre is not held: it slides on as loops have it, whatever its friction.
+// The acceleration gives the direction; where the freedoms rest as well, FollowDeadCentres() does.
+RunSummary FreeMotion::LeaveDeadCentres(FrictionPhase* resting) {
+  BodyStates at = now_.states;
+  if (RunSummary summary = dynamics_.Accelerate(now_.time_s, &at); !summary.ok()) return summary;
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, at);
+  std::vector<size_t> held;
+  std::vector<double> values;
+  for (size_t k = 0; k < resting->held.size(); ++k) {
+    const size_t e = resting->held[k];
+    if (!AtDeadCentre(rows[e])) {
+      held.push_back(e);
+      values.push_back(resting->at[k]);
+      continue;
+    }
+    const double acceleration = RateOf(rows[e], at.A_WB) + rows[e].bias;
+    const double size = MostOf(rows[e], at.A_WB, dynamics_.length()) + std::abs(rows[e].bias);
+    resting->sign[e] = SignOf(acceleration, kTurns * size);
+    fresh_[e] = resting->sign[e] != 0 ? 1 : 0;
+  }
+  resting->held = std::move(held);
+  resting->at = std::move(values);
+  return RunSummary::Done();
+}
+
+// What stands at a dead centre slides as the freedoms take it along in the step ahead, if they do:
+// by the shortest part of it in which the rate shows.
+void FreeMotion::FollowDeadCentres() {
+  FrictionPhase phase = dynamics_.phase();
+  std::vector<size_t> open;
+  for (const size_t e : rubbing_) {
+    if (phase.sign[e] == 0 && std::ranges::count(phase.held, e) == 0) open.push_back(e);
+  }
+  if (open.empty()) return;
+  const State from = Pack(now_);
+  const double step_s = std::min(dt_, largest_step_s_);
+  const auto signs_after = [&](double after_s) {
+    trouble_ = RunSummary::Done();
+    const BodyStates ahead = StatesOf(StepFrom(from, after_s));
+    std::vector<int> sign(mechanism_.elements.size(), 0);
+    if (!std::exchange(trouble_, RunSummary::Done()).ok()) return sign;
+    const std::vector<ScalarRow> rows = ElementRows(mechanism_, ahead);
+    for (const size_t e : open) {
+      sign[e] = SignOf(RateOf(rows[e], ahead.V_WB),
+                       kTurns * MostOf(rows[e], ahead.V_WB, dynamics_.length()));
+    }
+    return sign;
+  };
+  const std::vector<int> in_the_end = signs_after(step_s);
+  std::erase_if(open, [&](size_t e) { return in_the_end[e] == 0; });
+  for (double share = kAhead; share < 0.5 && !open.empty(); share *= 10.0) {
+    const std::vector<int> sign = signs_after(share * step_s);
+    for (const size_t e : open) phase.sign[e] = sign[e];
+    std::erase_if(open, [&](size_t e) { return sign[e] != 0; });
+  }
+  for (const size_t e : open) phase.sign[e] = in_the_end[e];
+  dynamics_.SetPhase(std::move(phase));
 }
 
 // Signs of what starts, per held element, from the load at these states.
@@ -280,55 +395,71 @@ std::vector<int> FreeMotion::Starting(double t_s, const BodyStates& states, RunS
   return sign;
 }
 
-// Whether what stops slides on the other way at once: then it does, as the way on is unique. Held
-// for an instant at the dead point of its coordinate, its joint would bear any load.
-bool FreeMotion::PassesThrough(const FrictionEvent& event) {
-  if (event.starts || event.stops.size() != 1 || !dynamics_.rubs_by_load()) return false;
-  const size_t e = event.stops.front();
+// Whether all that stops slides on the other way at once: then it does, as the way on is unique.
+// What held it in between would decide by the loads of another motion.
+bool FreeMotion::PassesThrough(const FrictionPhase& resting, const std::vector<size_t>& stopping) {
   const FrictionPhase before = dynamics_.phase();
-  FrictionPhase after = before;
-  after.sign[e] = -before.sign[e];
-  dynamics_.SetPhase(after);
-  BodyStates at = now_.states;
-  if (dynamics_.Accelerate(now_.time_s, &at).ok()) {
-    const ScalarRow row = ElementRows(mechanism_, at)[e];
-    const double acceleration = RateOf(row, at.A_WB) + row.bias;
-    const double size = std::abs(RateOf(row, at.A_WB)) + std::abs(row.bias);
-    if (after.sign[e] * acceleration > kTurns * size) {
-      fresh_[e] = 1;
-      if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
-      return true;
+  FrictionPhase after{.sign = resting.sign, .held = {}, .at = {}, .led = resting.led};
+  for (size_t k = 0; k < resting.held.size(); ++k) {
+    const size_t e = resting.held[k];
+    if (std::ranges::count(stopping, e) > 0) {
+      if (before.sign[e] == 0) return false;
+      after.sign[e] = -before.sign[e];
+    } else {
+      after.held.push_back(e);
+      after.at.push_back(resting.at[k]);
     }
   }
-  dynamics_.SetPhase(before);
-  return false;
+  dynamics_.SetPhase(after);
+  BodyStates at = now_.states;
+  bool passes = dynamics_.Accelerate(now_.time_s, &at).ok();
+  const std::vector<ScalarRow> rows = ElementRows(mechanism_, at);
+  for (const size_t e : stopping) {
+    const double acceleration = RateOf(rows[e], at.A_WB) + rows[e].bias;
+    const double size = std::abs(RateOf(rows[e], at.A_WB)) + std::abs(rows[e].bias);
+    passes = passes && after.sign[e] * acceleration > kTurns * size;
+  }
+  if (!passes) dynamics_.SetPhase(before);
+  for (const size_t e : stopping) fresh_[e] = passes ? 1 : fresh_[e];
+  return passes;
 }
 
 RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
-  if (PassesThrough(event)) return RunSummary::Done();
   FrictionPhase next = RestingPhase(event);
   if (++settled_here_ > 4 + 2 * static_cast<int>(rubbing_.size())) {
     return Contradiction(next.held.empty() ? rubbing_.front() : next.held.front(),
                          "stops and starts again and again", settled_here_, "times");
   }
+  if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
+  if (RunSummary summary = LeaveDeadCentres(&next); !summary.ok()) return summary;
+  std::vector<size_t> stopping = next.held;
+  std::erase_if(stopping, [held = dynamics_.phase().held](size_t e) {
+    return std::ranges::count(held, e) > 0;
+  });
+  const bool alone = !event.starts && (stopping.empty() || dynamics_.rubs_by_load());
+  if (!alone || !PassesThrough(next, stopping)) {
+    if (RunSummary summary = DecideResting(next, event.starts, h); !summary.ok()) return summary;
+  }
+  FollowDeadCentres();
+  return RunSummary::Done();
+}
+
+// Who of what rests sticks, and who starts which way.
+RunSummary FreeMotion::DecideResting(const FrictionPhase& next, bool starts, double h) {
   // What starts does so by the load that it would have a little later.
   BodyStates ahead = now_.states;
   double ahead_s = now_.time_s;
-  if (event.starts && h > 0.0) {
+  if (starts && h > 0.0) {
     ahead_s += kAhead * h;
     trouble_ = RunSummary::Done();
     ahead = StatesOf(StepFrom(Pack(now_), kAhead * h));
     if (!trouble_.ok()) return trouble_;
   }
   dynamics_.SetPhase(next);
-  if (RunSummary summary = dynamics_.Project(now_.time_s, &now_.states); !summary.ok()) {
-    return summary;
-  }
-  if (!event.starts) ahead = now_.states;
   RunSummary trouble;
   std::vector<int> sign = Starting(ahead_s, ahead, &trouble);
   if (!trouble.ok()) return trouble;
-  if (event.starts && std::ranges::all_of(sign, [](int s) { return s == 0; })) {
+  if (starts && std::ranges::all_of(sign, [](int s) { return s == 0; })) {
     VecX direction = VecX::Zero(static_cast<Eigen::Index>(sign.size()));
     (void)LoadRatio(dynamics_.rest(), &direction);
     const double least = 1e-6 * direction.cwiseAbs().maxCoeff();
@@ -346,9 +477,10 @@ RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
     phase.held.push_back(e);
     phase.at.push_back(next.at[k]);
   }
+  const bool sticks = !phase.held.empty();
   dynamics_.SetPhase(std::move(phase));
-  if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
-  return RunSummary::Done();
+  // Only what sticks is brought to rest to round-off.
+  return sticks ? dynamics_.Project(now_.time_s, &now_.states) : RunSummary::Done();
 }
 
 }  // namespace mbv::internal

@@ -11,7 +11,8 @@
 // Dry friction (free_friction.cc): while every element slides in one direction or sticks, the
 // equations are smooth. After each step the rates of what slides and the load of what sticks
 // (rest_decision.h) are looked at, also within the step; where one passes its bound, the same
-// scheme with shorter steps brackets that time to round-off, and the motion goes on from there.
+// scheme with shorter steps brackets that time to round-off, and the motion goes on from there. At
+// a dead centre a coordinate is at rest although the freedoms are not: it turns, and is never held.
 #pragma once
 
 #include <deque>
@@ -104,7 +105,14 @@ class FreeMotion {
                                                         const State& to);
   void FindStops(const State& from, double h, const State& to, FrictionEvent* first);
   void FindStart(const State& from, double h, const State& to, FrictionEvent* first);
-  [[nodiscard]] bool PassesThrough(const FrictionEvent& event);
+  [[nodiscard]] bool AtDeadCentre(const ScalarRow& row) const;
+  [[nodiscard]] bool Rests(size_t element, const ScalarRow& row) const;
+  [[nodiscard]] std::vector<size_t> LedElements();
+  [[nodiscard]] RunSummary LeaveDeadCentres(FrictionPhase* resting);
+  void FollowDeadCentres();
+  [[nodiscard]] bool PassesThrough(const FrictionPhase& resting,
+                                   const std::vector<size_t>& stopping);
+  [[nodiscard]] RunSummary DecideResting(const FrictionPhase& next, bool starts, double h);
   [[nodiscard]] RunSummary Settle(const FrictionEvent& event, double h);
   [[nodiscard]] FrictionPhase RestingPhase(const FrictionEvent& event);
   [[nodiscard]] std::vector<int> Starting(double t_s, const BodyStates& states,

@@ -1,7 +1,9 @@
 // Dry friction in free motion of the reference against closed forms.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <functional>
 #include <numbers>
 #include <random>
 
@@ -18,6 +20,8 @@ namespace {
 constexpr double kPi = std::numbers::pi;
 // What steps of tolerance 1e-12 leave, events included.
 constexpr double kFollowed = 1e-10;
+// In machines, over many events; fourth-order steps of their equation of motion leave 1e-10.
+constexpr double kMachine = 1e-9;
 
 template <typename Truth>
 double LargestError(const Trace& trace, const char* channel, const Truth& truth) {
@@ -270,6 +274,351 @@ TEST(StickSlip, ABlockOnACommandedBeltRidesUntilItsForceBreaksItAway) {
   };
   EXPECT_LT(LargestError(run.trace, "motor2.velocity", v), kFollowed);
   EXPECT_LT(Unbalanced(run.trace), kFollowed);
+}
+
+// A machine of one freedom q with friction in some coordinates, whose rates are k_e(q) q̇:
+//   J q̈ + ½ J' q̇² + V' + Σ F_e |k_e| sign q̇ = 0,  F_e = Fc or μ N_e(q, q̇, q̈, sign).
+struct OneFreedom {
+  using Function = std::function<double(double)>;
+  struct Friction {
+    double force = 0.0;
+    Function k;
+    std::function<double(double q, double v, double a, int sign)> by_load = {};
+  };
+  Function J, V;
+  std::vector<Friction> frictions;
+  struct At {
+    double q = 0.0, v = 0.0;
+  };
+
+  static double Slope(const Function& f, double q) {  // eighth-order differences
+    constexpr double h = 4e-3;
+    const auto d = [&](int k) { return f(q + k * h) - f(q - k * h); };
+    return (672 * d(1) - 168 * d(2) + 32 * d(3) - 3 * d(4)) / (840 * h);
+  }
+  // The sign of each k_e q̇ is given: it does not jump within a step.
+  [[nodiscard]] double Acceleration(const At& x, const std::vector<int>& sign) const {
+    const double J_q = J(x.q), without = -0.5 * Slope(J, x.q) * x.v * x.v - Slope(V, x.q);
+    std::vector<double> k;
+    for (const Friction& friction : frictions) k.push_back(friction.k(x.q));
+    double a = without / J_q;
+    for (int pass = 0; pass < 60; ++pass) {  // loads follow the acceleration
+      const double last = a;
+      double force = without;
+      for (size_t e = 0; e < sign.size(); ++e) {
+        const auto& by_load = frictions[e].by_load;
+        const double size = frictions[e].force + (by_load ? by_load(x.q, x.v, a, sign[e]) : 0.0);
+        force -= sign[e] * size * k[e];
+      }
+      a = force / J_q;
+      if (std::abs(a - last) <= 4.0 * kEps * std::abs(a)) break;
+    }
+    return a;
+  }
+  [[nodiscard]] At Step(const At& x, const std::vector<int>& sign, double h) const {  // RK4
+    const auto rates = [&](const At& at) { return At{at.v, Acceleration(at, sign)}; };
+    const auto on = [](const At& at, const At& rate, double t) {
+      return At{at.q + t * rate.q, at.v + t * rate.v};
+    };
+    const At a = rates(x), b = rates(on(x, a, h / 2)), c = rates(on(x, b, h / 2)),
+             d = rates(on(x, c, h));
+    return {x.q + h / 6 * (a.q + 2 * b.q + 2 * c.q + d.q),
+            x.v + h / 6 * (a.v + 2 * b.v + 2 * c.v + d.v)};
+  }
+  // Which way it starts at rest, or 0 if friction that is not by load holds it.
+  [[nodiscard]] int Starts(double q) const {
+    double most = 0.0;
+    for (const Friction& friction : frictions) most += friction.force * std::abs(friction.k(q));
+    const double force = -Slope(V, q);
+    return std::abs(force) <= most ? 0 : (force > 0.0 ? 1 : -1);
+  }
+  [[nodiscard]] std::vector<int> Signs(double q, int direction) const {
+    std::vector<int> sign;
+    for (const Friction& friction : frictions) {
+      sign.push_back(friction.k(q + 1e-6 * direction) > 0.0 ? direction : -direction);
+    }
+    return sign;
+  }
+  // States at the samples; how often a coordinate passed its dead centre, and all stopped.
+  [[nodiscard]] std::vector<At> Follow(At x, const std::vector<double>& times, double step_s,
+                                       int* passed, int* stopped) const {
+    int direction = x.v == 0.0 ? Starts(x.q) : (x.v > 0.0 ? 1 : -1);
+    std::vector<int> sign = Signs(x.q, direction);
+    std::vector<At> samples = {x};
+    *passed = *stopped = 0;
+    for (size_t i = 1; i < times.size(); ++i) {
+      const auto steps = static_cast<int>(std::ceil((times[i] - times[i - 1]) / step_s));
+      const double h = (times[i] - times[i - 1]) / steps;
+      for (int n = 0; n < steps; ++n) {
+        for (double left = h; left > 0.0 && direction != 0 && *passed + *stopped < 100;) {
+          const auto stops = [&](const At& at) { return direction * at.v < 0.0; };
+          const auto over = [&](const At& at) {
+            if (stops(at)) return true;
+            for (size_t e = 0; e < sign.size(); ++e) {
+              if (sign[e] * direction * frictions[e].k(at.q) < 0.0) return true;
+            }
+            return false;
+          };
+          const At end = Step(x, sign, left);
+          if (!over(end)) {
+            x = end;
+            break;
+          }
+          double low = 0.0, high = left;
+          for (int k = 0; k < 60; ++k) {
+            const double middle = 0.5 * (low + high);
+            (over(Step(x, sign, middle)) ? high : low) = middle;
+          }
+          const bool stop = stops(Step(x, sign, high));
+          x = Step(x, sign, high);
+          left -= high;
+          ++*(stop ? stopped : passed);
+          if (stop) {
+            x.v = 0.0;
+            direction = Starts(x.q);
+          }
+          sign = Signs(x.q, direction);
+        }
+      }
+      samples.push_back(x);
+    }
+    return samples;
+  }
+};
+
+void AddDryFriction(Mechanism* m, int joint, double force) {
+  ForceElement dry;
+  dry.name = "dry" + std::to_string(m->elements.size());
+  dry.joint = joint;
+  dry.law = CoulombFriction(force);
+  m->elements.push_back(dry);
+}
+
+/// The crank-rocker of FourBar with friction in these joints (A, B, D, C) [N m].
+OneFreedom RubbingFourBar(const std::array<double, 4>& torque, Mechanism* m) {
+  *m = MakeFourBar();
+  OneFreedom truth{.J = [](double q) { return FourBar(q).J(); },
+                   .V = [](double q) { return FourBar(q).V(); },
+                   .frictions = {}};
+  const std::array<OneFreedom::Function, 4> k = {
+      [](double) { return 1.0; }, [](double q) { return FourBar(q).k2() - 1.0; },
+      [](double q) { return FourBar(q).k3(); },
+      [](double q) { return FourBar(q).k3() - FourBar(q).k2(); }};
+  for (size_t j = 0; j < 4; ++j) {
+    if (torque.at(j) == 0.0) continue;
+    AddDryFriction(m, static_cast<int>(j), torque.at(j));
+    truth.frictions.push_back({torque.at(j), k.at(j)});
+  }
+  return truth;
+}
+
+/// A crank about z at the origin that drives one slider along x, or a second one the other way from
+/// the opposite pin: both are at their dead centres at the same time. Gravity along −y.
+struct Boxer {
+  static constexpr double r = 0.06, l = 0.22, g = 9.81;
+  static constexpr double m1 = 0.9, I1 = 0.0015, m2 = 0.6, I2 = 0.0024, m3 = 1.4;
+  static constexpr double off = 0.02;  ///< of the crank's centre of mass
+  int sliders = 1;
+
+  // The first half at crank angle q: rod angle f, sin f = −(r/l) sin q.
+  struct Half {
+    double f, df, ddf, x, dx, dcx, dcy, cy;
+    explicit Half(double q) {
+      f = std::asin(-r / l * std::sin(q));
+      df = -r * std::cos(q) / (l * std::cos(f));
+      ddf = r * std::sin(q) / (l * std::cos(f)) + df * df * std::tan(f);
+      x = r * std::cos(q) + l * std::cos(f);
+      dx = -r * std::sin(q) - l * std::sin(f) * df;
+      dcx = -r * std::sin(q) - l / 2 * std::sin(f) * df;
+      dcy = r * std::cos(q) + l / 2 * std::cos(f) * df;
+      cy = r * std::sin(q) + l / 2 * std::sin(f);
+    }
+  };
+  static double SliderRate(double q) { return Half(q).dx; }
+  // What the first guide bears, from the moments about the pin of a rod whose end pushes its slider
+  // with C: l (cos f C_y − sin f C_x) = −I2 f̈ − m2 l/2 (cos f (a_y + g) − sin f a_x).
+  static double Load(double q, double v, double a, double gravity, double force, double coefficient,
+                     int sign) {
+    const Half at(q);
+    const double c = std::cos(at.f), s = std::sin(at.f);
+    const double turn_s = s * at.ddf + c * at.df * at.df, turn_c = c * at.ddf - s * at.df * at.df;
+    const double ddx = -r * std::cos(q) - l * turn_s, dd_cx = ddx + l / 2 * turn_s,
+                 dd_cy = -r * std::sin(q) + l / 2 * turn_c;
+    const auto second = [&](double first, double twice) { return twice * v * v + first * a; };
+    const double inertia =
+        I2 * second(at.df, at.ddf) +
+        m2 * l / 2 * (c * (second(at.dcy, dd_cy) + gravity) - s * second(at.dcx, dd_cx));
+    double load = 0.0;
+    for (int pass = 0; pass < 60; ++pass) {
+      const double C_x = m3 * second(at.dx, ddx) + sign * (force + coefficient * load);
+      const double C_y = (s * C_x - inertia / l) / c, last = load;
+      load = std::abs(m3 * gravity - C_y);
+      if (std::abs(load - last) <= 4.0 * kEps * load) break;
+    }
+    return load;
+  }
+
+  [[nodiscard]] OneFreedom Truth() const {
+    const double n = sliders;
+    return {
+        .J =
+            [n](double q) {
+              const Half at(q);
+              return I1 + m1 * off * off +
+                     n * (I2 * at.df * at.df + m2 * (at.dcx * at.dcx + at.dcy * at.dcy) +
+                          m3 * at.dx * at.dx);
+            },
+        .V = [n](double q) { return g * (m1 * off * std::sin(q) + (2.0 - n) * m2 * Half(q).cy); },
+        .frictions = {}};
+  }
+
+  [[nodiscard]] Mechanism Make(double q) const {
+    const double f = std::asin(-r / l * std::sin(q));
+    Mechanism m;
+    m.name = "boxer";
+    m.gravity_W = Vec3(0, -g, 0);
+    m.bodies = {MakeWorld(), MakeBody("crank", m1, {off, 0, 0}, Vec3::Constant(I1))};
+    m.joints = {MakeJoint("A", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, q)};
+    for (int s = 0; s < sliders; ++s) {
+      const int rod = 2 + 2 * s, slider = rod + 1;
+      const std::string n = std::to_string(s + 1);
+      m.bodies.push_back(MakeBody("rod" + n, m2, {l / 2, 0, 0}, Vec3::Constant(I2)));
+      m.bodies.push_back(MakeBody("slider" + n, m3, Vec3::Zero(), Vec3::Constant(0.002)));
+      m.joints.push_back(MakeJoint("D" + n, JointKind::kPrismatic, 0, Vec3::Zero(), slider,
+                                   Vec3::Zero(), Half(q).x));
+      m.joints.back().X_PF.linear() = RotZ(s * kPi);
+      m.joints.back().axis = Vec3::UnitX();
+      const double pin = s == 0 ? r : -r;
+      m.joints.push_back(
+          MakeJoint("B" + n, JointKind::kRevolute, 1, {pin, 0, 0}, rod, {0, 0, 0}, f - q));
+      m.joints.back().X_PF.linear() = RotZ(s * kPi);
+      // Every joint bears what statics determines.
+      m.joints.push_back(MakeJoint("C" + n, JointKind::kPointOnLine, slider, {0, 0, 0}, rod,
+                                   {l, 0, 0}, 0.0, true));
+    }
+    m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+    AddTree(&m);
+    std::vector<std::array<double, 6>> home;
+    for (const Joint& joint : m.joints) home.push_back(joint.home);
+    m.X_WB_home = TreePoses(m, home);
+    return m;
+  }
+  static int Guide(int s) { return 1 + 3 * s; }
+};
+
+// Against its equation of motion the reference's errors of position and rate, over the largest
+// rate, and of energy over what friction takes.
+struct Followed {
+  double position = 0.0, rate = 0.0, energy = 0.0;
+  int passed = 0, stopped = 0;
+};
+Followed Against(const OneFreedom& truth, const ForwardRun& run, double step_s) {
+  EXPECT_TRUE(run.summary.ok()) << run.summary.message << " " << run.summary.time_s;
+  Followed off;
+  const VecX q = ColumnOf(run.trace, "motor.position"), v = ColumnOf(run.trace, "motor.velocity"),
+             taken = ColumnOf(run.trace, "dampers.work"),
+             energy = ColumnOf(run.trace, "energy.kinetic") +
+                      ColumnOf(run.trace, "energy.gravity") - taken;
+  const std::vector<OneFreedom::At> samples =
+      truth.Follow({q[0], v[0]}, run.trace.time_s, step_s, &off.passed, &off.stopped);
+  const double fastest = v.cwiseAbs().maxCoeff(), least = taken.minCoeff();
+  const auto raise = [](double* most, double by) { *most = by <= *most ? *most : by; };
+  for (size_t i = 0; i < samples.size(); ++i) {
+    const auto k = static_cast<Eigen::Index>(i);
+    raise(&off.position, std::abs(q[k] - samples[i].q) / fastest);
+    raise(&off.rate, std::abs(v[k] - samples[i].v) / fastest);
+    raise(&off.energy, std::abs(energy[k] - energy[0]) / -least);
+  }
+  return off;
+}
+
+struct Start {
+  double q, v, duration_s;
+  int passes, stops;  ///< at least so many dead centres, and stops of everything
+};
+
+// The reference follows the equation of motion, and not that with a thousandth more friction.
+void ExpectFollowed(const OneFreedom& truth, const Mechanism& m, const Start& start) {
+  const ForwardRun run = RunForwardReference(m, FreeMotion(m, start.q, start.v, start.duration_s));
+  const Followed off = Against(truth, run, 4e-5);
+  EXPECT_LT(off.position, kMachine);
+  EXPECT_LT(off.rate, kMachine);
+  EXPECT_LT(off.energy, kMachine);
+  EXPECT_GE(off.passed, start.passes);
+  EXPECT_GE(off.stopped, start.stops);
+  OneFreedom more = truth;
+  for (OneFreedom::Friction& friction : more.frictions) {
+    friction.force *= 1.001;
+    if (!friction.by_load) continue;
+    friction.by_load = [load = friction.by_load](double q, double v, double a, int sign) {
+      return 1.001 * load(q, v, a, sign);
+    };
+  }
+  EXPECT_GT(Against(more, run, 2e-4).rate, 100.0 * kMachine);
+}
+
+// The rocker stops at its dead centres while the crank goes on; nothing holds it there.
+TEST(DeadCentre, ACrankRockerWithFrictionInItsJointsFollowsItsEquationOfMotion) {
+  const std::array<double, 4> little = {0, 0, 0.01, 0}, much = {0, 0, 0.8, 0},
+                              all = {0.02, 0.05, 0.3, 0.15};
+  for (const auto& [torque, start] : {std::pair{little, Start{1.0, 0.0, 1.5, 2, 1}},
+                                      {little, {1.0, 9.0, 1.0, 2, 0}},
+                                      {much, {1.0, 9.0, 1.5, 2, 1}},
+                                      {all, {1.0, 9.0, 2.5, 4, 2}}}) {
+    SCOPED_TRACE(testing::Message() << torque[0] << " " << torque[2] << " " << start.v);
+    Mechanism m;
+    const OneFreedom truth = RubbingFourBar(torque, &m);
+    ExpectFollowed(truth, m, start);
+  }
+}
+
+// One slider or two that turn at the same time, one friction element in each guide or two; let
+// fall, turning, and from a dead centre.
+TEST(DeadCentre, SlidersWithFrictionInTheirGuidesFollowTheirEquationOfMotion) {
+  const Start fall{1.0, 0.0, 1.2, 0, 1}, turn{1.0, 30.0, 0.4, 3, 0}, rest{0.0, 0.0, 0.8, 0, 1},
+      from{0.0, -20.0, 0.5, 1, 0};
+  for (const int sliders : {1, 2}) {
+    for (const Start& start : {fall, turn, rest, from}) {
+      for (const int elements : {1, 2}) {
+        SCOPED_TRACE(testing::Message() << sliders << " sliders, " << elements << " elements, from "
+                                        << start.q << " " << start.v);
+        const Boxer boxer{.sliders = sliders};
+        Mechanism m = boxer.Make(start.q);
+        OneFreedom truth = boxer.Truth();
+        for (int n = 0; n < sliders * elements; ++n) {
+          const double force = 0.15 + 0.05 * n;
+          AddDryFriction(&m, Boxer::Guide(n % sliders), force);
+          truth.frictions.push_back({force, Boxer::SliderRate});
+        }
+        ExpectFollowed(truth, m, start);
+      }
+    }
+  }
+}
+
+// Guides that rub by what they bear as well: at the dead centre both turn at once, by the loads of
+// the motion that goes on.
+TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
+  for (const int sliders : {1, 2}) {
+    for (const Start& start :
+         {Start{1.0, 0.0, 0.9, 0, sliders == 1 ? 1 : 0}, Start{1.0, 14.0, 0.4, 1, 0}}) {
+      SCOPED_TRACE(testing::Message() << sliders << " sliders from " << start.v);
+      const Boxer boxer{.sliders = sliders};
+      Mechanism m = boxer.Make(start.q);
+      OneFreedom truth = boxer.Truth();
+      const double force = 0.1, coefficient = 0.03;
+      for (int s = 0; s < sliders; ++s) {
+        AddDryFriction(&m, Boxer::Guide(s), force);
+        std::get<FrictionLaw>(m.elements.back().law).coefficient = coefficient;
+        const double g = s == 0 ? Boxer::g : -Boxer::g;
+        truth.frictions.push_back(
+            {force, Boxer::SliderRate, [=](double q, double v, double a, int sign) {
+               return coefficient * Boxer::Load(q, v, a, g, force, coefficient, sign);
+             }});
+      }
+      ExpectFollowed(truth, m, start);
+    }
+  }
 }
 
 // Random systems, with more elements than freedoms as well: what is found is the least of (2).
