@@ -22,6 +22,12 @@ constexpr double kTruncation = 12.0;
 constexpr double kUnresolved = 0.03;
 // … and a difference below this share of the scale is round-off, however small the rate.
 constexpr double kNegligible = 1e-4;
+// Of (2): how far the drives' rates per command exceed their RMS at some pose of the motion.
+constexpr double kAlongTheWay = 4.0;
+// Of a command's RMS rate: less than this its differences need not show.
+constexpr double kShownRates = 1e-6;
+// A drive is judged where at least this share of its samples resolves its motion.
+constexpr double kJudged = 0.5;
 // Commands that turn by more than this between two samples hide whole oscillations [rad].
 constexpr double kHidden = 2.0;
 
@@ -34,9 +40,15 @@ Differences Differentiate(const MatX& values, Eigen::Index i, int column, double
   return {(8 * step(1) - step(2)) / (12 * h), (45 * step(1) - 9 * step(2) + step(3)) / (60 * h)};
 }
 
-double Rms(const Trace& trace, int column) {
-  return std::sqrt(trace.values.col(column).squaredNorm() /
-                   static_cast<double>(trace.values.rows()));
+// RMS of the sixth differences: what alternates from sample to sample counts 64 times.
+double SixthDifference(const MatX& values, int column) {
+  double sum2 = 0.0;
+  for (Eigen::Index i = kReach; i + kReach < values.rows(); ++i) {
+    const auto pair = [&](Eigen::Index k) { return values(i + k, column) + values(i - k, column); };
+    sum2 += std::pow(pair(3) - 6.0 * pair(2) + 15.0 * pair(1) - 20.0 * values(i, column), 2);
+  }
+  return std::sqrt(sum2 /
+                   static_cast<double>(std::max<Eigen::Index>(1, values.rows() - 2 * kReach)));
 }
 
 // Phase by which the fastest command goes on between two samples.
@@ -69,9 +81,81 @@ bool NearBreak(const Trace& trace, Eigen::Index i) {
   return std::ranges::any_of(trace.breaks_s, [&](double t) { return from <= t && t <= to; });
 }
 
-// One column against the derivative of another; returns the share of samples that were judged.
-double MeasureDerivative(const Trace& trace, int position, int rate, double scale,
-                         WitnessMetrics* out) {
+// The largest within reach of the formulas.
+VecX Widest(const VecX& values) {
+  VecX widest = values;
+  for (Eigen::Index i = 0; i < values.size(); ++i) {
+    const Eigen::Index from = std::max<Eigen::Index>(0, i - kReach);
+    const Eigen::Index to = std::min(values.size() - 1, i + kReach);
+    widest[i] = values.segment(from, to - from + 1).maxCoeff();
+  }
+  return widest;
+}
+
+// What the commands themselves show at a witness' samples: how far differences of their values (or
+// rates) are from their exact rates (accelerations). A spline through rounded rows has parts that
+// alternate from row to row; no difference of samples sees those.
+//   u_c = (D x_c − x'_c) / RMS(δ⁶ x'_c),    missed = √Σ_c u_c²                                  (1)
+// A drive follows commands by q' = Σ_c J_c x'_c. Where the commands' parts of highest frequency are
+// independent, RMS²(δ⁶ q') = Σ_c J_c² RMS²(δ⁶ x'_c), and so
+//   |Σ_c J_c (D x_c − x'_c)| ≤ RMS(δ⁶ q') · missed,                                             (2)
+// up to the changes of J along the motion. Nothing is missed where the differences of orders 4 and
+// 6 of every command show it: then those of the drive do, too.
+class MissedByCommands {
+ public:
+  MissedByCommands(const Motion& motion, const std::vector<double>& time_s) {
+    const auto n = static_cast<Eigen::Index>(time_s.size());
+    MatX jets(n, 3);
+    for (Missed* missed : {&rate_, &acceleration_}) missed->values.setZero(n);
+    for (const Command& command : motion.commands) {
+      for (Eigen::Index i = 0; i < n; ++i) {
+        const Jet jet = Evaluate(command.profile, time_s[static_cast<size_t>(i)]);
+        jets.row(i) << jet.value, jet.rate, jet.acceleration;
+      }
+      Add(jets, 0, time_s[1] - time_s[0], &rate_);
+      Add(jets, 1, time_s[1] - time_s[0], &acceleration_);
+    }
+    for (Missed* missed : {&rate_, &acceleration_}) {
+      missed->values = Widest(missed->values.cwiseSqrt());
+      if (missed->shown) missed->values.setZero();
+    }
+  }
+  [[nodiscard]] const VecX& of(bool acceleration) const {
+    return (acceleration ? acceleration_ : rate_).values;
+  }
+
+ private:
+  struct Missed {
+    VecX values;        // (1), its square while commands are added
+    bool shown = true;  // by the commands' differences
+  };
+
+  static void Add(const MatX& jets, int value, double h, Missed* sum) {
+    const double content = SixthDifference(jets, value + 1);
+    if (content == 0.0) return;
+    VecX missed = VecX::Zero(jets.rows()), shown = missed;
+    for (Eigen::Index i = kReach; i + kReach < jets.rows(); ++i) {
+      const auto [fourth, sixth] = Differentiate(jets, i, value, h);
+      missed[i] = sixth - jets(i, value + 1);
+      shown[i] = std::abs(sixth - fourth);
+    }
+    const double roundoff = kShownRates * mbv::Rms(jets.col(value + 1));
+    const VecX covered = Widest(shown).array() + roundoff;
+    sum->shown = sum->shown && (missed.cwiseAbs().array() <= covered.array()).all();
+    sum->values += (missed / content).cwiseAbs2();
+  }
+
+  Missed rate_, acceleration_;
+};
+
+// One column against the derivative of another: the worst sample, and the share of samples that
+// resolve the motion.
+struct JudgedRate {
+  Measured worst = {};
+  double share = 0.0;
+};
+JudgedRate MeasureDerivative(const Trace& trace, int position, int rate, double scale,
+                             const VecX& missed) {
   const auto n = static_cast<Eigen::Index>(trace.time_s.size());
   const double h = trace.time_s[1] - trace.time_s[0];
   std::vector<Differences> differences(trace.time_s.size());
@@ -82,7 +166,8 @@ double MeasureDerivative(const Trace& trace, int position, int rate, double scal
   }
   auto inner = static_cast<double>(n - 2 * kReach);
   const double rms = std::sqrt(sum2 / inner);
-  double judged = 0.0;
+  const double content = SixthDifference(trace.values, rate);
+  JudgedRate judged;
   for (Eigen::Index i = kReach; i + kReach < n; ++i) {
     if (NearBreak(trace, i)) {
       inner -= 1.0;
@@ -94,14 +179,16 @@ double MeasureDerivative(const Trace& trace, int position, int rate, double scal
       const auto [fourth, sixth] = differences[static_cast<size_t>(k)];
       truncation = std::max(truncation, std::abs(sixth - fourth));
     }
-    if (truncation > kUnresolved * rms && truncation > kNegligible * scale) continue;
-    judged += 1.0;
+    const double unseen = kTruncation * truncation + kAlongTheWay * content * missed[i];
+    if (unseen > kTruncation * std::max(kUnresolved * rms, kNegligible * scale)) continue;
+    judged.share += 1.0;
     const double sixth = differences[static_cast<size_t>(i)].sixth;
-    const double error = std::abs(sixth - trace.values(i, rate)) - kTruncation * truncation;
-    KeepWorst(&out->metrics[Metric::kDerivatives], error <= 0.0 ? 0.0 : error / scale,
+    const double error = std::abs(sixth - trace.values(i, rate)) - unseen;
+    KeepWorst(&judged.worst, error <= 0.0 ? 0.0 : error / scale,
               trace.time_s[static_cast<size_t>(i)], trace.channels[static_cast<size_t>(rate)].name);
   }
-  return inner > 0.0 ? judged / inner : 0.0;
+  judged.share = inner > 0.0 ? judged.share / inner : 0.0;
+  return judged;
 }
 
 struct DriveColumns {
@@ -136,15 +223,23 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
     out->derivatives_gap = "the samples are too far apart for a motion so fast";
     return;
   }
+  const MissedByCommands missed(*input.motion, trace.time_s);
   std::string coarse;
   for (const DriveColumns& drive : drives) {
     const RestFloor rest = RestFloorOf(input, drive.unit, trace);
-    const double velocity = std::max(rest.velocity, Rms(trace, drive.velocity));
-    const double acceleration = std::max(rest.acceleration, Rms(trace, drive.acceleration));
-    const double first = MeasureDerivative(trace, drive.position, drive.velocity, velocity, out);
-    const double second =
-        MeasureDerivative(trace, drive.velocity, drive.acceleration, acceleration, out);
-    if (std::min(first, second) < 0.5) coarse += (coarse.empty() ? "" : ", ") + drive.name;
+    const double velocity = std::max(rest.velocity, mbv::Rms(trace.values.col(drive.velocity)));
+    const double acceleration =
+        std::max(rest.acceleration, mbv::Rms(trace.values.col(drive.acceleration)));
+    const JudgedRate first =
+        MeasureDerivative(trace, drive.position, drive.velocity, velocity, missed.of(false));
+    const JudgedRate second =
+        MeasureDerivative(trace, drive.velocity, drive.acceleration, acceleration, missed.of(true));
+    for (const JudgedRate& judged : {first, second}) {
+      if (judged.share >= kJudged) KeepWorst(&out->metrics[Metric::kDerivatives], judged.worst);
+    }
+    if (std::min(first.share, second.share) < kJudged) {
+      coarse += (coarse.empty() ? "" : ", ") + drive.name;
+    }
   }
   if (!coarse.empty()) {
     out->derivatives_gap = "the samples do not resolve the motion of " + coarse;

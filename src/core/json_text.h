@@ -1,5 +1,6 @@
 // Numbers in JSON, and JSON as the text of a file. Writing and parsing are compiled once
-// (json_text.cc): the library's templates cost each file that uses them seconds.
+// (json_text.cc): the library's templates cost each file that uses them seconds. What others may
+// have written is read by json_document.h.
 #pragma once
 
 #include <cmath>
@@ -25,7 +26,7 @@ template <typename Json>
 /// Throws the library's parse_error.
 template <typename Json>
 [[nodiscard]] Json ParseJson(std::string_view text);
-/// is_discarded() where the text is no JSON.
+/// is_discarded() where the text is no JSON, or nested more than 100 levels deep.
 template <typename Json>
 [[nodiscard]] Json ParseIfJson(std::string_view text);
 

@@ -13,6 +13,7 @@
 #include <valijson/validator.hpp>
 
 #include "core/diagnostics.h"
+#include "core/json_document.h"
 #include "core/json_text.h"
 #include "core/types.h"
 
@@ -245,12 +246,16 @@ std::string PathText(const std::vector<std::string>& path) {
 }
 
 std::vector<JsonFinding> CheckMechanismJson(const std::string& text) {
-  Value json;
-  try {
-    json = ParseJson<Value>(text);
-  } catch (const Value::parse_error& error) {
-    return {{.path = {}, .message = error.what(), .hint = {}}};
+  const auto document = ReadJson(text, [](const JsonValue& root) { return root.json(); });
+  if (!document) {
+    const JsonRefusal& why = document.refusal;
+    return {{.path = {},
+             .message = why.message,
+             .hint = why.hint,
+             .line = why.line,
+             .column = why.column}};
   }
+  const Value& json = *document.value;
   std::vector<JsonFinding> findings = SchemaFindings(json);
   return findings.empty() ? MechanismChecker(json).Check() : findings;
 }

@@ -11,6 +11,7 @@ namespace mbv {
 struct JsonFinding {
   std::vector<std::string> path;  ///< keys and indices from the root
   std::string message, hint;
+  int line = 0, column = 0;  ///< where the text is not JSON; 0 elsewhere
 };
 
 /// "joints[3].parent.body".

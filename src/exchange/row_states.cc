@@ -2,25 +2,24 @@
 
 #include <Eigen/Dense>
 
+#include "core/json_document.h"
 #include "core/json_text.h"
 
 namespace mbv {
 namespace {
 
-using Parsed = nlohmann::json;
-
 std::vector<double> Numbers(const VecX& v) { return {v.begin(), v.end()}; }
 
-VecX VectorAt(const Parsed& json, const char* key) {
+VecX VectorAt(const JsonValue& json, const char* key) {
   const auto numbers = json.at(key).get<std::vector<double>>();
   return Eigen::Map<const VecX>(numbers.data(), static_cast<Eigen::Index>(numbers.size()));
 }
 
-RowAnswer Answered(const Parsed& json) {
+RowAnswer Answered(const JsonValue& json) {
   RowAnswer answer{.messages = json.at("messages").get<std::vector<std::string>>(),
                    .equalities = json.at("equalities").get<std::vector<std::string>>(),
                    .states = {}};
-  for (const Parsed& state : json.at("states")) {
+  for (const JsonValue& state : json.at("states").list()) {
     answer.states.push_back({.R = VectorAt(state, "R"),
                              .bias = VectorAt(state, "bias"),
                              .force = VectorAt(state, "force")});
@@ -54,13 +53,10 @@ std::string StatesJson(const std::vector<std::string>& driven,
 
 std::optional<RowAnswer> ReadRowAnswer(std::string_view json, size_t states, size_t driven,
                                        std::string* trouble) {
-  try {
-    RowAnswer answer = Answered(ParseJson<Parsed>(json));
-    if (Fits(answer, states, driven)) return answer;
-    *trouble = "rows.json does not fit the states that were asked for";
-  } catch (const Parsed::exception& error) {
-    *trouble = std::string("rows.json is no answer: ") + error.what();
-  }
+  auto answer = ReadJson(json, Answered);
+  if (answer && Fits(*answer.value, states, driven)) return std::move(answer.value);
+  *trouble = answer ? "rows.json does not fit the states that were asked for"
+                    : "rows.json is no answer: " + answer.refusal.Text();
   return {};
 }
 

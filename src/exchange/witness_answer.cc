@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/json_text.h"
+#include "core/json_document.h"
 #include "core/word_hints.h"
 #include "mechanism/channels.h"
 #include "table/columns.h"
@@ -15,45 +15,45 @@
 namespace mbv {
 namespace {
 
-using Parsed = nlohmann::json;
-
 constexpr const char* kTime = "time_s";
 constexpr const char* kTraces = "traces.csv";
 // Of the sample distance: how far a time stamp may lie from its sample.
 constexpr double kStampShare = 1e-6;
 
-// The text of a key; "" where it is left out. Anything but text is trouble.
-std::string TextAt(const Parsed& json, const char* key, std::string* trouble) {
-  const auto found = json.find(key);
-  if (found == json.end() || found->is_null()) return "";
-  if (found->is_string()) return found->get<std::string>();
-  *trouble = fmt::format("witness.json: {} is no text", key);
-  return "";
+bool States(const JsonValue& json, const char* key) {
+  return json.contains(key) && !json.at(key).is_null();
 }
 
-// A number of a key, at least 0; NaN where it is left out. Anything else is trouble.
-double AmountAt(const Parsed& json, const char* key, std::string* trouble) {
-  const auto found = json.find(key);
-  if (found == json.end() || found->is_null()) return kNan;
-  if (found->is_number() && found->get<double>() >= 0.0) return found->get<double>();
-  *trouble = fmt::format("witness.json: {} is no number of at least 0", key);
-  return kNan;
+// "" where it is left out.
+std::string TextAt(const JsonValue& json, const char* key) {
+  return States(json, key) ? json.at(key).get<std::string>() : "";
 }
 
-void ReadDeclined(const Parsed& json, WitnessAnswer* answer, std::string* trouble) {
-  const auto list = json.find("declined");
-  if (list == json.end() || list->is_null()) return;
-  if (!list->is_array()) {
-    *trouble = "witness.json: declined is no list";
-    return;
+// At least 0; NaN where it is left out.
+double AmountAt(const JsonValue& json, const char* key) {
+  if (!States(json, key)) return kNan;
+  const double amount = json.at(key);
+  if (!(amount >= 0.0)) json.at(key).Refuse(fmt::format("is {:g}, which is below 0", amount));
+  return amount;
+}
+
+WitnessAnswer AnswerOf(const JsonValue& json) {
+  WitnessAnswer answer{.program = TextAt(json, "program"),
+                       .version = TextAt(json, "version"),
+                       .method = TextAt(json, "method"),
+                       .refused = TextAt(json, "refused"),
+                       .declined = {},
+                       .compute_s = AmountAt(json, "compute_s")};
+  if (const std::string units = TextAt(json, "units"); units != "SI") {
+    json.at("units").Refuse(fmt::format("is '{}': SI and radians are needed", units));
   }
-  for (const Parsed& entry : *list) {
-    if (!entry.is_object()) {
-      *trouble = "witness.json: an entry of declined is no {what, why}";
-      return;
+  if (States(json, "declined")) {
+    for (const JsonValue& entry : json.at("declined").list()) {
+      answer.declined.emplace_back(TextAt(entry, "what"), TextAt(entry, "why"));
     }
-    answer->declined.emplace_back(TextAt(entry, "what", trouble), TextAt(entry, "why", trouble));
   }
+  if (answer.program.empty()) json.Refuse("names no program");
+  return answer;
 }
 
 // All signals that may be given.
@@ -167,30 +167,9 @@ class TraceReader {
 }  // namespace
 
 std::optional<WitnessAnswer> ReadAnswer(std::string_view json, std::string* trouble) {
-  trouble->clear();
-  const Parsed root = ParseIfJson<Parsed>(json);
-  if (!root.is_object()) {
-    *trouble = "witness.json is no JSON object";
-    return {};
-  }
-  const std::string schema = TextAt(root, "schema", trouble);
-  if (trouble->empty() && schema != kWitnessSchema) {
-    *trouble = fmt::format("witness.json: schema is '{}', needed is {}", schema, kWitnessSchema);
-  }
-  WitnessAnswer answer{.program = TextAt(root, "program", trouble),
-                       .version = TextAt(root, "version", trouble),
-                       .method = TextAt(root, "method", trouble),
-                       .refused = TextAt(root, "refused", trouble),
-                       .declined = {},
-                       .compute_s = AmountAt(root, "compute_s", trouble)};
-  if (const std::string units = TextAt(root, "units", trouble); units != "SI") {
-    *trouble =
-        fmt::format("witness.json gives its units as '{}': SI and radians are needed", units);
-  }
-  ReadDeclined(root, &answer, trouble);
-  if (trouble->empty() && answer.program.empty()) *trouble = "witness.json names no program";
-  if (!trouble->empty()) return {};
-  return answer;
+  auto answer = ReadJson(json, AnswerOf, kWitnessSchema);
+  *trouble = answer ? "" : "witness.json: " + answer.refusal.Text();
+  return std::move(answer.value);
 }
 
 std::optional<Trace> ReadWitnessTrace(std::string_view csv, const Mechanism& mechanism,

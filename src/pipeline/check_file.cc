@@ -43,14 +43,19 @@ const YamlNode& NodeAt(const YamlNode& root, const std::vector<std::string>& pat
 
 // mechanism.json as foreign witnesses get it. JSON is YAML: its tree knows the lines.
 Diagnostics CheckMechanismFile(const std::string& file) {
-  YamlReader reader(file);
+  YamlReader reader(file), places(file);
   const auto text = reader.ReadFile();
-  const YamlNodePtr root = text ? reader.Parse(*text) : nullptr;
-  if (!root) return reader.diagnostics();
-  for (const JsonFinding& finding : CheckMechanismJson(*text)) {
+  if (!text) return reader.diagnostics();
+  const std::vector<JsonFinding> findings = CheckMechanismJson(*text);
+  const YamlNodePtr root = findings.empty() ? nullptr : places.Parse(*text);
+  for (const JsonFinding& finding : findings) {
     const std::string path = PathText(finding.path);
-    reader.Error(NodeAt(*root, finding.path), (path.empty() ? "" : path + ": ") + finding.message,
-                 finding.hint);
+    const std::string message = (path.empty() ? "" : path + ": ") + finding.message;
+    if (finding.line > 0 || !root) {
+      reader.AddAt(Severity::kError, finding.line, finding.column, message, finding.hint);
+    } else {
+      reader.Error(NodeAt(*root, finding.path), message, finding.hint);
+    }
   }
   return reader.diagnostics();
 }

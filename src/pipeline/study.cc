@@ -28,6 +28,12 @@ StudyOutcome Refused(StudyOutcome outcome, const std::string& file, const std::s
   return outcome;
 }
 
+StudyOutcome Refused(StudyOutcome outcome, Finding finding) {
+  outcome.exit_code = 2;
+  outcome.diagnostics.Add(std::move(finding));
+  return outcome;
+}
+
 // Every row of a file that was looked through before.
 PointRows RowsOf(const fs::path& file, const Study& study) {
   return [file, &study](const std::function<void(const PointRow&)>& take) {
@@ -108,7 +114,9 @@ bool HoldsAll(const StudyBench& bench, const StudyIdentity& identity, const fs::
 std::optional<StudyOutcome> Finished(const StudyBench& bench, const StudyFolder& folder,
                                      const StudyShare& share, const StudyOutcome& outcome) {
   std::error_code error;
-  const auto identity = ReadIdentity(folder.target());
+  std::optional<Finding> damage;
+  const auto identity = ReadIdentity(folder.target(), &damage);
+  if (damage) return Refused(outcome, *std::move(damage));
   if (fs::exists(folder.path(), error) || !identity) return {};
   if (identity->fingerprint != bench.fingerprint() || identity->share.count != share.count ||
       identity->share.index != share.index) {
@@ -142,40 +150,46 @@ LoadedStudy LoadBench(const std::string& file, const StudyOptions& options,
 // The folders of all shards, by their place.
 class ShardMerger {
  public:
-  // "" or why these are not all shards of one study.
-  std::string Read(const std::vector<std::string>& folders) {
+  // Why these are not all shards of one study.
+  std::optional<Finding> Read(const std::vector<std::string>& folders) {
+    const auto refused = [](const std::string& folder, std::string why) {
+      return Finding{.file = folder, .message = std::move(why), .hint = {}};
+    };
     for (const std::string& folder : folders) {
-      const auto identity = ReadIdentity(folder);
-      if (!identity) return folder + ": is no result of a study";
+      std::optional<Finding> damage;
+      const auto identity = ReadIdentity(folder, &damage);
+      if (damage) return damage;
+      if (!identity) return refused(folder, "is no result of a study");
       if (first_ && identity->fingerprint != first_->fingerprint) {
-        return fmt::format("{}: is of another study than {}, or of other files", folder,
-                           folders[0]);
+        return refused(folder,
+                       fmt::format("is of another study than {}, or of other files", folders[0]));
       }
       if (first_ && identity->share.count != first_->share.count) {
-        return fmt::format("{}: is one of {} shards, {} one of {}", folder, identity->share.count,
-                           folders[0], first_->share.count);
+        return refused(folder, fmt::format("is one of {} shards, {} one of {}",
+                                           identity->share.count, folders[0], first_->share.count));
       }
       if (!first_) first_ = identity;
       if (!folders_.emplace(identity->share.index, folder).second) {
-        return fmt::format("{}: shard {} is in another folder, too", folder,
-                           identity->share.index + 1);
+        return refused(
+            folder, fmt::format("shard {} is in another folder, too", identity->share.index + 1));
       }
     }
     for (std::uint64_t k = 0; k < first_->share.count; ++k) {
-      if (!folders_.contains(k))
-        return fmt::format("shard {}/{} is missing", k + 1, first_->share.count);
+      if (folders_.contains(k)) continue;
+      return refused("", fmt::format("shard {}/{} is missing", k + 1, first_->share.count));
     }
-    return "";
+    return {};
   }
-  // "" or which shard has not all of its rows, or others than it was finished with.
-  [[nodiscard]] std::string CheckRows(const StudyBench& bench) const {
+  // Which shard has not all of its rows, or others than it was finished with.
+  [[nodiscard]] std::optional<Finding> CheckRows(const StudyBench& bench) const {
     for (const auto& [index, folder] : folders_) {
       const auto identity = ReadIdentity(folder);
-      if (!identity || !HoldsAll(bench, *identity, folder)) {
-        return folder + ": its points are not all there, or not as they were written";
-      }
+      if (identity && HoldsAll(bench, *identity, folder)) continue;
+      return Finding{.file = folder,
+                     .message = "its points are not all there, or not as they were written",
+                     .hint = {}};
     }
-    return "";
+    return {};
   }
   // Rows and forces in the order of points.
   [[nodiscard]] std::string Join(const StudyBench& bench, const fs::path& into) const {
@@ -226,10 +240,10 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
   if (options.resume) {
     if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
   }
-  std::string hint;
-  std::string trouble = folder.Open(options.resume, &hint);
-  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);
-  trouble =
+  if (auto refused = folder.Open(options.resume)) {
+    return Refused(std::move(outcome), *std::move(refused));
+  }
+  const std::string trouble =
       ComputePoints(bench, options.points, FindDone(bench, share, folder.path()), folder.path());
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
   return Finish(bench, share.count == 1, &folder, std::move(outcome));
@@ -239,8 +253,9 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
   const ParsedDocuments documents;
   StudyOutcome outcome;
   ShardMerger merger;
-  std::string hint, trouble = merger.Read(folders);
-  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
+  if (auto refused = merger.Read(folders)) {
+    return Refused(std::move(outcome), *std::move(refused));
+  }
   const StudyIdentity& first = merger.first();
   const LoadedStudy loaded = LoadBench(first.file, {true, first.drawn}, &outcome.diagnostics);
   outcome.exit_code = loaded.exit_code;
@@ -251,12 +266,15 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
                    "has changed since the shards were computed, or its scenario, model or this "
                    "program");
   }
-  trouble = merger.CheckRows(bench);
+  if (auto refused = merger.CheckRows(bench)) {
+    return Refused(std::move(outcome), *std::move(refused));
+  }
+  // By its own name: the one in the shards' files may be anything.
+  StudyFolder folder(out_dir,
+                     {bench.study().name, first.file, first.fingerprint, first.drawn, {}, {}});
+  if (auto refused = folder.Open(true)) return Refused(std::move(outcome), *std::move(refused));
+  const std::string trouble = merger.Join(bench, folder.path());
   if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
-  StudyFolder folder(out_dir, {first.study, first.file, first.fingerprint, first.drawn, {}, {}});
-  trouble = folder.Open(true, &hint);
-  if (trouble.empty()) trouble = merger.Join(bench, folder.path());
-  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble, hint);
   return Finish(bench, true, &folder, std::move(outcome));
 }
 

@@ -8,6 +8,7 @@
 #include <fstream>
 
 #include "core/files.h"
+#include "core/json_document.h"
 #include "core/json_text.h"
 #include "core/output_folder.h"
 #include "core/state_folder.h"
@@ -32,6 +33,20 @@ FileContent ContentOf(const fs::path& path, std::uint64_t* size) {
   };
 }
 
+StudyIdentity IdentityOf(const JsonValue& json) {
+  StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}, {}};
+  if (json.contains("count")) identity.drawn.count = json.at("count").get<std::uint64_t>();
+  if (json.contains("seed")) identity.drawn.seed = json.at("seed").get<std::uint64_t>();
+  const JsonValue shard = json.at("shard");
+  identity.share.count = shard.at(1).get<std::uint64_t>();
+  identity.share.index = shard.at(0).get<std::uint64_t>() - 1;
+  if (identity.share.index >= identity.share.count) {
+    shard.Refuse(fmt::format("says {} of {}", identity.share.index + 1, identity.share.count));
+  }
+  identity.points = json.value("points", "");
+  return identity;
+}
+
 std::string NameOf(const StudyIdentity& identity) {
   if (identity.share.count == 1) return identity.study;
   return fmt::format("{}.shard-{}-of-{}", identity.study, identity.share.index + 1,
@@ -52,22 +67,13 @@ std::string ToJson(const StudyIdentity& identity) {
   return Dump(json);
 }
 
-std::optional<StudyIdentity> ReadIdentity(const fs::path& folder) {
-  const auto text = ReadWholeFile(folder / kStudyFile);
-  const auto json = ParseIfJson<nlohmann::json>(text.value_or(""));
-  if (!json.is_object() || json.value("schema", "") != kStudySchema) return {};
-  try {
-    StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}, {}};
-    if (json.contains("count")) identity.drawn.count = json.at("count").get<std::uint64_t>();
-    if (json.contains("seed")) identity.drawn.seed = json.at("seed").get<std::uint64_t>();
-    identity.share.index = json.at("shard").at(0).get<std::uint64_t>() - 1;
-    identity.share.count = json.at("shard").at(1).get<std::uint64_t>();
-    identity.points = json.value("points", "");
-    if (identity.share.count == 0 || identity.share.index >= identity.share.count) return {};
-    return identity;
-  } catch (const nlohmann::json::exception&) {
-    return {};
-  }
+std::optional<StudyIdentity> ReadIdentity(const fs::path& folder, std::optional<Finding>* damage) {
+  const fs::path file = folder / kStudyFile;
+  const auto text = ReadWholeFile(file);
+  if (!text) return {};
+  auto identity = ReadJson(*text, IdentityOf, kStudySchema);
+  if (!identity && damage != nullptr) *damage = identity.refusal.FindingIn(file.string());
+  return std::move(identity.value);
 }
 
 std::string PointsFingerprint(const fs::path& folder) {
@@ -90,31 +96,45 @@ StudyFolder::~StudyFolder() {
   if (lock_ >= 0) close(lock_);
 }
 
-std::string StudyFolder::Open(bool resume, std::string* hint) {
+std::optional<Finding> StudyFolder::Open(bool resume) {
+  const auto refused = [&](std::string why, std::string hint) {
+    return Finding{.file = path_.string(), .message = std::move(why), .hint = std::move(hint)};
+  };
+  const char* const elsewhere = "choose another folder with --out";
   std::error_code error;
   fs::create_directories(out_, error);
   const bool is_new = !error && fs::create_directory(path_, error);
-  if (error) return fmt::format("cannot make folder {}: {}", path_.string(), error.message());
+  if (error) return refused("cannot make the folder: " + error.message(), elsewhere);
   lock_ = LockFolder(path_);
   if (lock_ < 0) {
     const bool held = errno == EWOULDBLOCK;
-    return fmt::format("cannot use folder {}: {}", path_.string(),
-                       held ? "another process computes this study there" : std::strerror(errno));
+    return refused(std::string("cannot use the folder: ") +
+                       (held ? "another process computes this study there" : std::strerror(errno)),
+                   elsewhere);
   }
-  const auto left = is_new ? std::nullopt : ReadIdentity(path_);
+  std::optional<Finding> damage;
+  const auto left = is_new ? std::nullopt : ReadIdentity(path_, &damage);
+  if (damage) {
+    if (damage->hint.empty()) {
+      damage->hint = "remove " + path_.string() + ", or choose another folder with --out";
+    }
+    return damage;
+  }
   if (left && left->fingerprint != identity_.fingerprint) {
-    *hint = "remove that folder, or choose another one with --out";
-    return path_.string() + ": holds points of another study, or of files that have changed since";
+    return refused("holds points of another study, or of files that have changed since",
+                   "remove that folder, or choose another one with --out");
   }
   if (left && !resume) {
-    *hint = "--resume goes on with them; to start anew remove that folder";
-    return path_.string() + ": holds points of this study that was not finished";
+    return refused("holds points of this study that was not finished",
+                   "--resume goes on with them; to start anew remove that folder");
   }
   if (!is_new && !left && !fs::is_empty(path_, error)) {
-    *hint = "choose another folder with --out";
-    return path_.string() + ": is a folder of something else";
+    return refused("is a folder of something else", elsewhere);
   }
-  return left ? "" : WriteFile(path_ / kStudyFile, ToJson(identity_));
+  if (left) return {};
+  const std::string trouble = WriteFile(path_ / kStudyFile, ToJson(identity_));
+  if (trouble.empty()) return {};
+  return Finding{.file = "", .message = trouble, .hint = elsewhere};
 }
 
 std::string StudyFolder::Publish(const std::vector<std::pair<std::string, std::string>>& files) {

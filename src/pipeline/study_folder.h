@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "core/diagnostics.h"
 #include "pipeline/study_points.h"
 #include "scenario/study_file.h"
 
@@ -20,8 +21,9 @@ struct StudyIdentity {
 inline constexpr const char* kStudyFile = "study.json";
 
 [[nodiscard]] std::string ToJson(const StudyIdentity& identity);
-/// Empty where there is none, or one of another version.
-[[nodiscard]] std::optional<StudyIdentity> ReadIdentity(const std::filesystem::path& folder);
+/// Empty where there is none, and where there is one that cannot be used: `damage` says why.
+[[nodiscard]] std::optional<StudyIdentity> ReadIdentity(const std::filesystem::path& folder,
+                                                        std::optional<Finding>* damage = nullptr);
 /// Of the bytes of points and forces in `folder`.
 [[nodiscard]] std::string PointsFingerprint(const std::filesystem::path& folder);
 
@@ -33,9 +35,9 @@ class StudyFolder {
   StudyFolder(const StudyFolder&) = delete;
   StudyFolder& operator=(const StudyFolder&) = delete;
 
-  /// Makes it, or takes what a killed study left: only with `resume`, and of the same study. "" or
-  /// why not, with a hint.
-  [[nodiscard]] std::string Open(bool resume, std::string* hint);
+  /// Makes it, or takes what a killed study left: only with `resume`, and of the same study. Empty,
+  /// or why not.
+  [[nodiscard]] std::optional<Finding> Open(bool resume);
   /// Publishes points and forces with these files in OUT/NAME; then the folder goes. "" or why not.
   [[nodiscard]] std::string Publish(const std::vector<std::pair<std::string, std::string>>& files);
 

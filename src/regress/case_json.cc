@@ -1,6 +1,7 @@
 // regress.json and the state files: CaseResult and RegressReport ↔ JSON.
 #include "regress/case_result.h"
 
+#include "core/json_document.h"
 #include "core/json_text.h"
 
 namespace mbv {
@@ -9,9 +10,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr const char* kSchema = "mbverify.regress/1";
-
-// Null is read as NaN.
-double NumberOf(const Json& json) { return json.is_number() ? json.get<double>() : kNan; }
 
 Json MetricsJson(const CaseResult& result) {
   Json metrics = Json::object();
@@ -50,12 +48,14 @@ Json PastJson(const PastOfFailure& past) {
           {"values", std::move(values)}};
 }
 
-PastOfFailure PastOf(const Json& json) {
+PastOfFailure PastOf(const JsonValue& json) {
   PastOfFailure past;
   past.runs = json.at("runs");
   past.good_run = json.at("good_run");
   past.when = json.at("when");
-  for (const auto& [name, value] : json.at("values").items()) past.values[name] = NumberOf(value);
+  for (const auto& [name, value] : json.at("values").items()) {
+    past.values[name] = value.NumberOrNan();
+  }
   return past;
 }
 
@@ -109,7 +109,7 @@ Json CaseJson(const CaseResult& result) {
   return json;
 }
 
-CaseResult CaseOf(const Json& json) {
+CaseResult CaseOf(const JsonValue& json) {
   CaseResult result;
   result.key = json.at("key");
   result.file = json.at("file");
@@ -129,19 +129,21 @@ CaseResult CaseOf(const Json& json) {
   result.verified = json.at("verified");
   for (const auto& [name, metric] : json.at("metrics").items()) {
     MetricValue& value = result.metrics[name];
-    value.value = NumberOf(metric.at("value"));
+    value.value = metric.at("value").NumberOrNan();
     value.channel = metric.value("channel", "");
-    value.time_s = NumberOf(metric.value("time_s", Json()));
+    value.time_s = metric.contains("time_s") ? metric.at("time_s").NumberOrNan() : kNan;
     if (!metric.contains("limit")) continue;
     value.limit = metric.at("limit").get<double>();
     value.pass = metric.at("pass");
   }
-  for (const Json& item : json.at("not_compared")) {
+  for (const JsonValue& item : json.at("not_compared").list()) {
     result.not_compared.push_back({item.at("what"), item.at("why")});
   }
   result.versions = json.at("versions").get<std::map<std::string, std::string>>();
-  for (const Json& input : json.value("input_files", Json::array())) {
-    result.input_files.push_back({input.at("file"), input.at("fingerprint")});
+  if (json.contains("input_files")) {
+    for (const JsonValue& input : json.at("input_files").list()) {
+      result.input_files.push_back({input.at("file"), input.at("fingerprint")});
+    }
   }
   result.has_folder = json.at("has_folder");
   result.has_report = json.value("has_report", result.has_folder);
@@ -150,13 +152,15 @@ CaseResult CaseOf(const Json& json) {
   result.cost.peak_kib = json.at("cost").at("peak_kib");
   result.log_tail = json.at("log_tail");
   result.kept = json.at("kept");
-  for (const Json& drift : json.at("drifts")) {
-    result.drifts.push_back({drift.at("metric"), drift.at("text"), NumberOf(drift.at("value")),
-                             NumberOf(drift.at("baseline")), drift.at("since_run"),
+  for (const JsonValue& drift : json.at("drifts").list()) {
+    result.drifts.push_back({drift.at("metric"), drift.at("text"), drift.at("value").NumberOrNan(),
+                             drift.at("baseline").NumberOrNan(), drift.at("since_run"),
                              drift.at("since")});
   }
   if (json.contains("past")) result.past = PastOf(json.at("past"));
-  for (const Json& value : json.at("course")) result.course.push_back(NumberOf(value));
+  for (const JsonValue& value : json.at("course").list()) {
+    result.course.push_back(value.NumberOrNan());
+  }
   return result;
 }
 
@@ -199,21 +203,15 @@ std::string ToJson(const RegressReport& report) {
   return Dump(json, 1);
 }
 
-// The library throws at the first thing that is not as written; a damaged file is simply not used.
 std::optional<CaseResult> CaseFromJson(const std::string& text) {
-  try {
-    return CaseOf(ParseJson<Json>(text));
-  } catch (const Json::exception&) {
-    return std::nullopt;
-  }
+  return ReadJson(text, CaseOf).value;
 }
 
-std::optional<RegressReport> ReportFromJson(const std::string& text) {
-  try {
-    const Json json = ParseJson<Json>(text);
-    if (json.at("schema") != kSchema) return std::nullopt;
+std::optional<RegressReport> ReportFromJson(const std::string& text, const std::string& file,
+                                            std::optional<Finding>* damage) {
+  const auto read = [](const JsonValue& json) {
     RegressReport report;
-    const Json& run = json.at("run");
+    const JsonValue run = json.at("run");
     report.run.uid = run.value("uid", "");
     report.run.id = run.at("id");
     report.run.started_utc = run.at("started_utc");
@@ -229,14 +227,17 @@ std::optional<RegressReport> ReportFromJson(const std::string& text) {
     report.run.jobs = run.at("jobs");
     report.notes = json.at("notes").get<std::vector<std::string>>();
     report.fail_on_missing = json.value("fail_on_missing", false);
-    for (const Json& item : json.value("missing", Json::array())) {
-      report.missing.push_back({item.at("key"), item.at("last_run"), item.at("when")});
+    if (json.contains("missing")) {
+      for (const JsonValue& item : json.at("missing").list()) {
+        report.missing.push_back({item.at("key"), item.at("last_run"), item.at("when")});
+      }
     }
-    for (const Json& item : json.at("cases")) report.cases.push_back(CaseOf(item));
+    for (const JsonValue& item : json.at("cases").list()) report.cases.push_back(CaseOf(item));
     return report;
-  } catch (const Json::exception&) {
-    return std::nullopt;
-  }
+  };
+  auto report = ReadJson(text, read, kSchema);
+  if (!report && damage != nullptr) *damage = report.refusal.FindingIn(file);
+  return std::move(report.value);
 }
 
 }  // namespace mbv

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "core/diagnostics.h"
 #include "core/inputs.h"
 #include "core/types.h"
 #include "core/worker_pool.h"
@@ -154,6 +155,9 @@ struct Counts {
 [[nodiscard]] std::string ToJson(const RegressReport& report);
 /// Empty when the text is not what ToJson() wrote.
 [[nodiscard]] std::optional<CaseResult> CaseFromJson(const std::string& text);
-[[nodiscard]] std::optional<RegressReport> ReportFromJson(const std::string& text);
+/// The same; `damage` says what of `file` is not so.
+[[nodiscard]] std::optional<RegressReport> ReportFromJson(const std::string& text,
+                                                          const std::string& file = {},
+                                                          std::optional<Finding>* damage = nullptr);
 
 }  // namespace mbv

@@ -129,8 +129,9 @@ class Merger {
       unfinished_.push_back(from);
       return "";
     }
-    auto part = ReportFromJson(*text);
-    if (!part) return fmt::format("{}: is no regress.json of this version", from);
+    std::optional<Finding> damage;
+    auto part = ReportFromJson(*text, report_file, &damage);
+    if (damage) return ToText(*damage);
     parts_.push_back({from, part->run, part->cases.size()});
     JoinInfo(part->run);
     for (const std::string& note : part->notes) report().notes.push_back(note);

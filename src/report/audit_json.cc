@@ -1,5 +1,6 @@
 #include "report/audit_json.h"
 
+#include "core/json_document.h"
 #include "core/json_text.h"
 
 namespace mbv {
@@ -18,10 +19,9 @@ std::string ToJson(const HtmlAudit& audit) {
 }
 
 std::optional<HtmlAudit> AuditFromJson(const std::string& text) {
-  try {
-    const AuditJson json = ParseJson<AuditJson>(text);
+  const auto read = [](const JsonValue& json) {
     HtmlAudit audit{.source = json.at("source"), .rows = {}, .note = json.at("note")};
-    for (const AuditJson& row : json.at("rows")) {
+    for (const JsonValue& row : json.at("rows").list()) {
       audit.rows.push_back({.equation = row.at(0),
                             .erratum = row.at(1),
                             .status = row.at(2),
@@ -33,9 +33,8 @@ std::optional<HtmlAudit> AuditFromJson(const std::string& text) {
                             .corrected_right = row.at(8)});
     }
     return audit;
-  } catch (const AuditJson::exception&) {
-    return std::nullopt;
-  }
+  };
+  return ReadJson(text, read).value;
 }
 
 }  // namespace mbv

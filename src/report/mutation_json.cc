@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/json_document.h"
 #include "core/json_text.h"
 #include "report/mutation_report.h"
 
@@ -24,10 +25,8 @@ struct ToFields {
 };
 
 struct FromFields {
-  const Json& json;
-  void operator()(const char* key, double& x) const {
-    x = json.at(key).is_null() ? kNan : json.at(key).get<double>();
-  }
+  const JsonValue& json;
+  void operator()(const char* key, double& x) const { x = json.at(key).NumberOrNan(); }
   template <typename T>
   void operator()(const char* key, T& x) const {
     x = json.at(key).get<T>();
@@ -121,32 +120,34 @@ Json JsonOf(const FaultResult& r) {
   return field.json;
 }
 
-Sighting SightingOf(const Json& json) {
+Sighting SightingOf(const JsonValue& json) {
   Sighting s;
   const FromFields field{json};
   SightingFields(field, s);
   return s;
 }
 
-FaultSighting FaultSightingOf(const Json& json) {
+FaultSighting FaultSightingOf(const JsonValue& json) {
   FaultSighting s;
   const FromFields field{json};
   FaultFields(field, s);
   return s;
 }
 
-Mutation MutationOf(const Json& json) {
+Mutation MutationOf(const JsonValue& json) {
   Mutation m;
   const FromFields field{json};
   MutationFields(field, m);
-  const auto kind = std::find(std::begin(kKinds), std::end(kKinds), json.at("kind"));
+  const std::string word = json.at("kind");
+  const auto kind = std::find(std::begin(kKinds), std::end(kKinds), word);
+  if (kind == std::end(kKinds)) json.at("kind").Refuse("is no kind of a number");
   m.kind = static_cast<NumberKind>(kind - std::begin(kKinds));
   m.own = SightingOf(json.at("own"));
   if (!json.at("inverse").is_null()) m.inverse = SightingOf(json.at("inverse"));
   return m;
 }
 
-FaultResult FaultResultOf(const Json& json) {
+FaultResult FaultResultOf(const JsonValue& json) {
   FaultResult r;
   const FromFields field{json};
   ResultFields(field, r);
@@ -187,18 +188,19 @@ std::string ToJson(const MutationReport& report) {
 }
 
 std::optional<MutationReport> MutationReportOf(const std::string& text) {
-  try {
-    const Json json = ParseJson<Json>(text);
-    if (json.at("schema") != kMutationSchema) return {};
+  const auto read = [](const JsonValue& json) {
     MutationReport report;
     const FromFields field{json};
     ReportFields(field, report);
-    for (const Json& item : json.at("numbers")) report.mutations.push_back(MutationOf(item));
-    for (const Json& item : json.at("faults")) report.faults.push_back(FaultResultOf(item));
+    for (const JsonValue& item : json.at("numbers").list()) {
+      report.mutations.push_back(MutationOf(item));
+    }
+    for (const JsonValue& item : json.at("faults").list()) {
+      report.faults.push_back(FaultResultOf(item));
+    }
     return report;
-  } catch (const Json::exception&) {
-    return {};
-  }
+  };
+  return ReadJson(text, read, kMutationSchema).value;
 }
 
 MutationReport MergeParts(std::vector<MutationReport> parts) {

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include "core/json_document.h"
 #include "core/json_text.h"
 #include "core/names.h"
 #include "core/text.h"
@@ -19,13 +20,10 @@ class ManifestReader {
       : file_(file), diagnostics_(diagnostics) {}
 
   std::optional<PackageDescription> Read(const std::string& text) {
-    const Json json = ParseIfJson<Json>(text);
-    if (!json.is_object()) return Refused("is no JSON object");
-    const std::string schema = TextAt(json, "schema", "");
-    if (schema != kManifestSchema) {
-      return Refused(
-          fmt::format("has the schema '{}', needed is {}", Printable(schema), kManifestSchema));
-    }
+    const auto root = [](const JsonValue& value) { return Json(value.json()); };
+    const auto document = ReadJson(text, root, kManifestSchema);
+    if (!document) return Refused(document.refusal.Text());
+    const Json& json = *document.value;
     PackageDescription package;
     package.date = TextAt(json, "date", "");
     package.license = TextAt(json, "license", "");
@@ -50,7 +48,7 @@ class ManifestReader {
   }
   void Complain(const std::string& why) {
     good_ = false;
-    diagnostics_->AddError(file_, fmt::format("{} {}", kManifestFile, why),
+    diagnostics_->AddError(file_, fmt::format("{}: {}", kManifestFile, why),
                            "mbverify package writes it");
   }
 

@@ -245,7 +245,8 @@ TEST(VerifyCommand, WhatIsNoArchiveOfOursIsRefusedUnrun) {
       {"twice README.md", "holds 'paper/README.md' twice"},
       {"slip ../evil.yaml", "leads outside"},
       {"slip other/evil.yaml", "does not hold one folder alone"},
-      {"replace manifest.json mbverify.package/1 mbverify.package/7", "has the schema"}};
+      {"replace manifest.json mbverify.package/1 mbverify.package/7",
+       "schema is 'mbverify.package/7'"}};
   for (const auto& [words, finding] : edits) {
     const ProgramResult verified = packed.Edited(words);
     EXPECT_EQ(verified.exit_code, 2) << words;

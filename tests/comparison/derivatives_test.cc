@@ -1,7 +1,10 @@
 // "Rates are derivatives" on motions whose jerk jumps, wherever the jumps fall between samples.
 #include <gtest/gtest.h>
 
+#include <memory>
+
 #include "comparison/comparison.h"
+#include "table/row_spline.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {
@@ -106,6 +109,97 @@ TEST(Derivatives, AccelerationsMayJumpWhereAWitnessSaysThatFrictionStopped) {
   EXPECT_TRUE(slides.Measure().derivatives_gap.empty());
   synthetic::Stretch(&slides.trace, "d1.acceleration", 1.0 + 4.0 * limit);
   EXPECT_GT(slides.Worst(), limit);
+}
+
+// d1 follows a spline through rows `row_s` apart, rounded to `decimals` of a degree (or, with
+// rates, through those, too); d2 follows from it as a driven member of a linkage does.
+struct Rounded {
+  static constexpr double kDegree = std::numbers::pi / 180.0;
+  Mechanism mechanism = synthetic::TwoSliders();
+  Motion motion;
+  Trace trace;
+
+  Rounded(int decimals, double row_s, double sample_s, bool rates, double phase) {
+    motion.duration_s = 2.0;
+    motion.sample_s = sample_s;
+    const double unit = std::pow(10.0, decimals);
+    const auto rounded = [&](double x) { return std::round(x / kDegree * unit) / unit * kDegree; };
+    SplineRows rows;
+    for (int i = 0; i <= std::lround(motion.duration_s / row_s); ++i) {
+      const Jet jet = Evaluate(SineTerm{0.7, 1.3, phase}, row_s * i);
+      rows.time_s.push_back(row_s * i);
+      rows.values.push_back(rounded(jet.value));
+      if (rates) rows.rates.push_back(rounded(jet.rate));
+    }
+    const Profile profile{{PiecewiseTerm{std::make_shared<const Piecewise>(Interpolated(rows))}}};
+    motion.commands = {{"d1", {{{Coordinate::Kind::kDrive, 0, 0}, 1.0}}, profile}};
+    trace.witness = "analytic";
+    trace.Reset(SampleTimes(motion.duration_s, sample_s), DriveChannels(mechanism));
+    for (size_t i = 0; i < trace.time_s.size(); ++i) {
+      const auto [x, v, a] = Evaluate(profile, trace.time_s[i]);
+      const double s = std::sin(1.5 * x + 0.3), c = std::cos(1.5 * x + 0.3);
+      trace.values.row(static_cast<Eigen::Index>(i)) << x, v, a, 0.0, 0.2 * s, 0.3 * c * v,
+          0.3 * c * a - 0.45 * s * v * v, 0.0;
+    }
+  }
+  [[nodiscard]] WitnessMetrics Measure() const {
+    ComparisonInput input;
+    input.mechanism = &mechanism;
+    input.motion = &motion;
+    return MeasureWitness(input, trace);
+  }
+};
+
+// Check and caveat are one decision: rates are judged right, or said not to have been checked.
+TEST(Derivatives, RoundingOfTablesIsNotTakenForWrongRates) {
+  const double limit = *RowOf(Metric::kDerivatives).limits.reference;
+  for (int decimals = 2; decimals <= 6; ++decimals) {
+    for (const auto& [row_s, sample_s] :
+         {std::pair{0.01, 0.01}, {0.002, 0.01}, {0.02, 0.005}, {0.005, 0.005}, {0.001, 0.004}}) {
+      for (const bool rates : {false, true}) {
+        for (const double phase : {0.0, 0.37, 0.81}) {
+          const WitnessMetrics metrics = Rounded(decimals, row_s, sample_s, rates, phase).Measure();
+          const auto found = metrics.metrics.find(Metric::kDerivatives);
+          const bool judged = found != metrics.metrics.end();
+          EXPECT_LE(judged ? found->second.value : 0.0, limit) << decimals << " " << row_s;
+          EXPECT_TRUE(judged || !metrics.derivatives_gap.empty()) << decimals << " " << row_s;
+        }
+      }
+    }
+  }
+}
+
+TEST(Derivatives, WrongRatesAreSeenThroughTheRoundingOfATable) {
+  const double limit = *RowOf(Metric::kDerivatives).limits.reference;
+  struct Fault {
+    const char* signal;
+    double factor;
+    int decimals;  // from which on the table lets it be seen
+  };
+  for (const Fault& fault : {Fault{"d2.velocity", -1.0, 3},
+                             {"d2.acceleration", -1.0, 4},
+                             {"d2.velocity", 1.01, 4},
+                             {"d2.acceleration", 1.01, 6},
+                             {"d1.velocity", 1.01, 4},
+                             {"d1.acceleration", 1.01, 6}}) {
+    for (const double phase : {0.0, 0.37, 0.81}) {
+      Rounded wrong(fault.decimals, 0.01, 0.01, false, phase);
+      synthetic::Stretch(&wrong.trace, fault.signal, fault.factor);
+      const WitnessMetrics metrics = wrong.Measure();
+      const auto found = metrics.metrics.find(Metric::kDerivatives);
+      ASSERT_NE(found, metrics.metrics.end()) << fault.signal << fault.factor;
+      EXPECT_GT(found->second.value, limit) << fault.signal << fault.factor;
+    }
+  }
+}
+
+// A drive of which most samples resolve nothing is not judged by the others either.
+TEST(Derivatives, WhatIsSaidNotToBeCheckedFailsNoCheck) {
+  Fast fast(3.0);
+  synthetic::Stretch(&fast.trace, "d1.acceleration", 1.5);
+  const WitnessMetrics metrics = fast.Measure();
+  EXPECT_FALSE(metrics.derivatives_gap.empty());
+  EXPECT_LT(fast.Worst(), *RowOf(Metric::kDerivatives).limits.reference);
 }
 
 TEST(Derivatives, ADriveHeldStillIsMeasuredByTheOnesThatMove) {

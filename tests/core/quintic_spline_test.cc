@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 
 #include "core/types.h"
@@ -137,6 +138,45 @@ TEST(QuinticSpline, HeavySmoothingLeavesTheParabola) {
   EXPECT_NEAR(Evaluate(p, 0.1).acceleration, Evaluate(p, 0.9).acceleration, 1e-3);
   EXPECT_LT(std::abs(Evaluate(p, times[7]).value - data[7].value), 1.0);
   EXPECT_GT(std::abs(Evaluate(p, times[7]).value - data[7].value), 0.8);
+}
+
+// At the least of (1) its derivative in every direction g of the same splines vanishes:
+// Σ w² (f − y) g + λ ∫ f''' g''' dt = 0, the integral here from the polynomials themselves.
+TEST(QuinticSpline, SmoothingIsTheLeastOfMisfitAndTheExactIntegralOfRoughness) {
+  std::vector<double> time_s;
+  std::vector<SplineDatum> data, other;
+  for (int i = 0; i < 24; ++i) {
+    time_s.push_back(0.1 * i + 0.02 * std::sin(3.0 * i));
+    const double t = time_s.back();
+    data.push_back({t, std::sin(2.0 * t) + 0.1 * std::cos(37.0 * i), 0, 3.0});
+    other.push_back({t, std::cos(11.0 * i), 0, 1.0});
+  }
+  const std::vector<double> knots = FreeKnots(time_s, false);
+  const Piecewise g = FitSpline(knots, other);
+  const auto third = [](const Piecewise& p, size_t i) {  // its coefficients on an interval
+    const Piecewise::Polynomial& c = p.coefficients[i];
+    return std::array{6.0 * c[3], 24.0 * c[4], 60.0 * c[5]};
+  };
+  for (const double lambda : {1e-4, 1e-2, 1.0}) {
+    const Piecewise f = FitSpline(knots, data, lambda);
+    double misfit = 0.0, roughness = 0.0;
+    for (const SplineDatum& datum : data) {
+      misfit += datum.weight * datum.weight * (Evaluate(f, datum.time_s).value - datum.value) *
+                Evaluate(g, datum.time_s).value;
+    }
+    for (size_t i = 0; i < f.coefficients.size(); ++i) {
+      const double width = f.knots[i + 1] - f.knots[i];
+      const auto a = third(f, i), b = third(g, i);
+      for (size_t j = 0; j < 3; ++j) {
+        for (size_t k = 0; k < 3; ++k) {
+          roughness += a[j] * b[k] * std::pow(width, static_cast<double>(j + k + 1)) /
+                       static_cast<double>(j + k + 1);
+        }
+      }
+    }
+    EXPECT_GT(std::abs(misfit), 1e-3) << lambda;
+    EXPECT_NEAR(misfit + lambda * roughness, 0.0, 1e-8 * std::abs(misfit)) << lambda;
+  }
 }
 
 }  // namespace

@@ -147,26 +147,28 @@ TEST_P(ForeignMischief, HarmsNobodyAndIsTold) {
 
 INSTANTIATE_TEST_SUITE_P(
     All, ForeignMischief,
-    testing::Values(
-        Mischief{"dies", "ended with exit code 3: no licence"},
-        Mischief{"crashes", "was ended by signal 6"},
-        Mischief{"hangs", "took longer than 0.5 s", ", timeout_s: 0.5"},
-        Mischief{"forks", "took longer than 0.5 s", ", timeout_s: 0.5"},
-        Mischief{"prints", "", ", output_mb: 1, timeout_s: 20"},
-        Mischief{"eats", "ended with exit code 1: MemoryError", ", memory_mb: 500"},
-        Mischief{"writes", "", ", output_mb: 1, timeout_s: 20"},
-        Mischief{"nothing", "left no witness.json"},
-        Mischief{"few", "traces.csv has 8 rows for 11 samples"},
-        Mischief{"nan", "traces.csv:6 gives 'nan' for motor.force"},
-        Mischief{"late", "traces.csv:6 is at t = 0.0401 s where the sample is at 0.04 s"},
-        Mischief{"short", "traces.csv:6 has 3 cells for 4 columns"},
-        Mischief{"unknown",
-                 "a column 'motr.force', which is no signal of the mechanism (did you "
-                 "mean 'motor.force'?)"},
-        Mischief{"twice", "traces.csv has two columns 'motor.velocity'"},
-        Mischief{"foot", "units as 'foot, pound'"}, Mischief{"refuses", "declines: it has a loop"},
-        Mischief{"schema", "schema is 'mbverify/witness/0'"},
-        Mischief{"link", "left no traces.csv"}, Mischief{"garbage", "witness.json is no JSON"}),
+    testing::Values(Mischief{"dies", "ended with exit code 3: no licence"},
+                    Mischief{"crashes", "was ended by signal 6"},
+                    Mischief{"hangs", "took longer than 0.5 s", ", timeout_s: 0.5"},
+                    Mischief{"forks", "took longer than 0.5 s", ", timeout_s: 0.5"},
+                    Mischief{"prints", "", ", output_mb: 1, timeout_s: 20"},
+                    Mischief{"eats", "ended with exit code 1: MemoryError", ", memory_mb: 500"},
+                    Mischief{"writes", "", ", output_mb: 1, timeout_s: 20"},
+                    Mischief{"nothing", "left no witness.json"},
+                    Mischief{"few", "traces.csv has 8 rows for 11 samples"},
+                    Mischief{"nan", "traces.csv:6 gives 'nan' for motor.force"},
+                    Mischief{"late",
+                             "traces.csv:6 is at t = 0.0401 s where the sample is at 0.04 s"},
+                    Mischief{"short", "traces.csv:6 has 3 cells for 4 columns"},
+                    Mischief{"unknown",
+                             "a column 'motr.force', which is no signal of the mechanism (did you "
+                             "mean 'motor.force'?)"},
+                    Mischief{"twice", "traces.csv has two columns 'motor.velocity'"},
+                    Mischief{"foot", "units is 'foot, pound'"},
+                    Mischief{"refuses", "declines: it has a loop"},
+                    Mischief{"schema", "schema is 'mbverify/witness/0'"},
+                    Mischief{"link", "left no traces.csv"},
+                    Mischief{"garbage", "witness.json: line 1, character 2: the file ends"}),
     [](const testing::TestParamInfo<Mischief>& info) { return std::string(info.param.how); });
 
 TEST(ForeignWitness, ThatIsNotThereIsNotAvailable) {

@@ -1,9 +1,12 @@
 // A table in the reference's place, through all stages.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <sstream>
 
 #include "pipeline/run_scenario.h"
@@ -152,6 +155,111 @@ TEST(TableRun, FilesHoldTheTableItsTubeAndItsGaps) {
     EXPECT_NE(page.find(wanted), std::string::npos) << text;
   }
   std::filesystem::remove_all(out);
+}
+
+// A smooth motion as encoders and planners print it: so many decimals of a degree or a millimetre.
+struct Printed {
+  const char* scenario;
+  std::vector<std::pair<const char*, const char*>> commands;  // name, and what is added
+  const char* unit;
+  double amplitude, period_s;
+  const char* simulation;
+};
+
+// motion: of the tables, which it writes.
+std::string PrintedMotion(const Printed& printed, int decimals, double row_s, bool rates,
+                          bool smooth) {
+  const auto folder = std::filesystem::temp_directory_path() / "mbv_printed";
+  std::filesystem::create_directories(folder);
+  const std::string file = (folder / "motion.csv").string(), unit = printed.unit;
+  const double w = 2.0 * std::numbers::pi / printed.period_s, duration_s = 2.0;
+  std::ofstream csv(file);
+  csv << "t (s)";
+  for (size_t c = 0; c < printed.commands.size(); ++c) {
+    csv << fmt::format(",p{0} ({1}),v{0} ({1}/s)", c, unit);
+  }
+  for (int i = 0; i <= std::lround(duration_s / row_s); ++i) {
+    csv << fmt::format("\n{:.3f}", i * row_s);
+    for (size_t c = 0; c < printed.commands.size(); ++c) {
+      const double phase = 0.9 * static_cast<double>(c), x = w * i * row_s + phase;
+      csv << fmt::format(",{:.{}f},{:.{}f}", printed.amplitude * (std::sin(x) - std::sin(phase)),
+                         decimals, printed.amplitude * w * std::cos(x), decimals);
+    }
+  }
+  std::string motion = fmt::format("{{duration_s: {}, sample_s: 0.01, commands: {{", duration_s);
+  for (size_t c = 0; c < printed.commands.size(); ++c) {
+    motion += fmt::format("{}{}: [{}, {{table: {{csv: \"{}\", column: \"p{} ({})\"{}{}}}}}]",
+                          c == 0 ? "" : ", ", printed.commands[c].first, printed.commands[c].second,
+                          file, c, unit,
+                          rates ? fmt::format(", rate: {{column: \"v{} ({}/s)\"}}", c, unit) : "",
+                          smooth ? ", smoothing: auto" : "");
+  }
+  return motion + "}}";
+}
+
+TEST(TableRun, RoundedTrajectoriesOfRightModelsAgreeAndThoseOfWrongOnesDoNot) {
+  const Printed all[] = {
+      {"four_bar/turn", {{"motor", "home"}}, "deg", 40.0, 0.9, "{mode: forward}"},
+      {"slider_crank/turn", {{"motor", "home"}}, "deg", 60.0, 0.7, "{mode: inverse}"},
+      {"spr_tripod/random",
+       {{"platform.x", "home"}, {"platform.y", "home"}, {"platform.z", "home"}},
+       "mm",
+       30.0,
+       1.1,
+       "{mode: inverse}"}};
+  for (const Printed& printed : all) {
+    for (const int decimals : {3, 5}) {
+      for (const double row_s : {0.002, 0.01}) {
+        for (const int kind : {0, 1, 2}) {  // positions, with rates, smoothed
+          const auto run = [&](std::vector<SetValue> set) {
+            set.emplace_back("motion",
+                             PrintedMotion(printed, decimals, row_s, kind == 1, kind == 2));
+            return RunScenario(TableScenario(printed.scenario), WithoutPictures(std::move(set)));
+          };
+          const std::string what =
+              fmt::format("{} {} {} {}", printed.scenario, decimals, row_s, kind);
+          const RunOutcome right = run({{"simulation", printed.simulation}});
+          ASSERT_TRUE(right.report) << what << right.diagnostics.Text();
+          EXPECT_EQ(right.exit_code, 0)
+              << what << ": " << right.report->comparison.attribution.text;
+        }
+      }
+    }
+  }
+  // One percent of a mass, and a centre of mass on the other side.
+  const auto wrong = [&](const Printed& printed, const std::string& parameters) {
+    return RunScenario(
+        TableScenario(printed.scenario),
+        WithoutPictures(
+            {{"motion", PrintedMotion(printed, 3, 0.01, false, false)},
+             {"simulation", fmt::format("{{mode: inverse, parameters: {{{}}}}}", parameters)}}));
+  };
+  EXPECT_EQ(wrong(all[0], "rho: 2.02").exit_code, 1);
+  EXPECT_EQ(wrong(all[2], "m_platform: 30.3").exit_code, 1);
+  EXPECT_EQ(wrong(all[2], "c_platform_z: -0.05").exit_code, 1);
+}
+
+TEST(TableRun, StepsResolveATableAndAStatedOneThatDoesNotIsWarnedOf) {
+  const Printed printed{"four_bar/turn", {{"motor", "home"}}, "deg", 40.0, 0.9, ""};
+  const auto run = [&](int decimals, double row_s, const char* simulation) {
+    return RunScenario(
+        TableScenario(printed.scenario),
+        WithoutPictures({{"motion", PrintedMotion(printed, decimals, row_s, false, false)},
+                         {"simulation", simulation}}));
+  };
+  const RunOutcome fine = run(4, 0.002, "{mode: forward}");
+  ASSERT_TRUE(fine.report);
+  EXPECT_LT(fine.report->step_s, 5e-4);
+  EXPECT_EQ(fine.exit_code, 0);
+  const RunOutcome smooth = run(6, 0.01, "{mode: forward}");
+  ASSERT_TRUE(smooth.report);
+  EXPECT_EQ(smooth.report->step_s, 1e-3);
+  const std::string found = run(4, 0.002, "{mode: forward, step_s: 0.001}").diagnostics.Text();
+  EXPECT_NE(found.find("simulation.step_s = 0.001 s does not resolve motion.csv"),
+            std::string::npos)
+      << found;
+  EXPECT_EQ(run(6, 0.01, "{mode: forward, step_s: 0.001}").diagnostics.Text().find("resolve"),
+            std::string::npos);
 }
 
 }  // namespace

@@ -184,14 +184,15 @@ TEST(Manifest, WhatIsMissingOrLeadsOutsideIsFound) {
     EXPECT_FALSE(ReadManifest(text, "a.zip", &diagnostics)) << by;
     return diagnostics.Text();
   };
-  EXPECT_TRUE(Says(found("mbverify.package/1", "mbverify.package/2"), "has the schema"));
+  EXPECT_TRUE(
+      Says(found("mbverify.package/1", "mbverify.package/2"), "schema is 'mbverify.package/2'"));
   EXPECT_TRUE(Says(found("results/m/a/traces", "../m/a/traces"), "no path in an archive"));
   EXPECT_TRUE(Says(found("\"inputs/packages", "\"/packages"), "no path in an archive"));
   EXPECT_TRUE(Says(found("\"exit_code\": 0", "\"exit_code\": \"0\""), "without exit_code"));
   EXPECT_TRUE(Says(found("\"motion\"", "\"emotion\""), "of the kind 'emotion'"));
   EXPECT_TRUE(Says(found("\"files\"", "\"fils\""), "has no list 'files'"));
   EXPECT_TRUE(Says(found("\"bytes\": 5", "\"bytes\": -5"), "no size of inputs/a b.yaml"));
-  EXPECT_TRUE(Says(found("{", "["), "is no JSON object"));
+  EXPECT_TRUE(Says(found("{", "["), "this is not JSON"));
 }
 
 TEST(Crate, NamesEveryFileTheProgramAndTheCommand) {
