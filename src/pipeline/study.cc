@@ -60,6 +60,7 @@ StudyReport ReportOf(const StudyBench& bench, const fs::path& folder) {
   StudyReport report;
   report.study = bench.study();
   report.nominal = bench.nominal().row.values;
+  report.idle = bench.idle();
   report.summary =
       SummariseStudy(report.study, report.nominal, RowsOf(folder / kPointsFile, report.study));
   report.shown = ShownOf(RowsOf(folder / kPointsFile, report.study), report.summary.points);
@@ -137,14 +138,18 @@ struct LoadedStudy {
   int exit_code = 2;
 };
 
-LoadedStudy LoadBench(const std::string& file, const StudyOptions& options,
+// `timeout_s`: of one point.
+LoadedStudy LoadBench(const std::string& file, const StudyOptions& options, double timeout_s,
                       Diagnostics* diagnostics) {
   LoadedStudy loaded;
   StudyResult read = LoadStudy(file, options);
   diagnostics->Append(read.diagnostics);
   if (!read.study) return loaded;
   loaded.bench = StudyBench::Make(*read.study, diagnostics, &loaded.exit_code);
-  return loaded;
+  if (!loaded.bench) return loaded;
+  loaded.bench->FindIdle(timeout_s, diagnostics);
+  if (!diagnostics->has_errors()) return loaded;
+  return {nullptr, 2};
 }
 
 // The folders of all shards, by their place.
@@ -225,7 +230,8 @@ class ShardMerger {
 StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
   const ParsedDocuments documents;
   StudyOutcome outcome;
-  const LoadedStudy loaded = LoadBench(file, options.reading, &outcome.diagnostics);
+  const LoadedStudy loaded =
+      LoadBench(file, options.reading, options.points.timeout_s, &outcome.diagnostics);
   outcome.exit_code = loaded.exit_code;
   if (!loaded.bench) return outcome;
   const StudyBench& bench = *loaded.bench;
@@ -257,7 +263,8 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
     return Refused(std::move(outcome), *std::move(refused));
   }
   const StudyIdentity& first = merger.first();
-  const LoadedStudy loaded = LoadBench(first.file, {true, first.drawn}, &outcome.diagnostics);
+  const LoadedStudy loaded =
+      LoadBench(first.file, {true, first.drawn}, PointsOptions{}.timeout_s, &outcome.diagnostics);
   outcome.exit_code = loaded.exit_code;
   if (!loaded.bench) return outcome;
   const StudyBench& bench = *loaded.bench;
@@ -281,7 +288,7 @@ StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::st
 Diagnostics CheckStudy(const std::string& file) {
   const ParsedDocuments documents;
   Diagnostics diagnostics;
-  (void)LoadBench(file, {.many = true}, &diagnostics);
+  (void)LoadBench(file, {.many = true}, PointsOptions{}.timeout_s, &diagnostics);
   return diagnostics;
 }
 

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "core/files.h"
+#include "core/in_children.h"
 #include "core/inputs.h"
 #include "core/shell_word.h"
 #include "core/text.h"
@@ -217,6 +218,56 @@ std::vector<SetValue> StudyBench::SetsOf(const std::vector<double>& varied) cons
   const std::string mode = ModeOf(study_.witnesses);
   if (!mode.empty()) sets.emplace_back("simulation.mode", mode);
   return sets;
+}
+
+// Per quantity '1' where it is another than with nothing varied, else '0'.
+std::string StudyBench::MovedBy(size_t factor) const {
+  std::string moved(study_.quantities.size(), '0');
+  const std::vector<double> ends = Excursions(study_.factors[factor].axis.distribution);
+  for (const double end : {ends.front(), ends.back()}) {
+    if (moved.find('0') == std::string::npos) break;
+    std::vector<SetValue> sets = SetsOf({});
+    sets.emplace_back(study_.factors[factor].key, fmt::format("{:.17g}", end));
+    Attempt attempt;
+    PointRow row;
+    Try(study_, sets, &attempt, &row);
+    for (size_t k = 0; k < moved.size(); ++k) {
+      if (row.values[k] != nominal_.row.values[k]) moved[k] = '1';  // NaN, too
+    }
+  }
+  return moved;
+}
+
+void StudyBench::FindIdle(double timeout_s, Diagnostics* diagnostics) {
+  const auto found = InChildren(study_.factors.size(), 2.0 * timeout_s,
+                                [&](size_t factor) { return MovedBy(factor); });
+  std::vector<bool> moved(study_.quantities.size(), false);
+  for (size_t f = 0; f < found.size(); ++f) {
+    const Factor& factor = study_.factors[f];
+    const std::string by = found[f].value_or(std::string(moved.size(), '1'));
+    for (size_t k = 0; k < moved.size(); ++k) moved[k] = moved[k] || by[k] == '1';
+    if (by.find('1') != std::string::npos) continue;
+    idle_.push_back(factor.name);
+    Finding finding = FindingAt(
+        study_, factor.line, factor.column,
+        fmt::format("vary.{}: moves no quantity of this study: with it alone at its ends, every "
+                    "value is that of nothing varied",
+                    factor.name),
+        fmt::format("witnesses: {} do not read it; ask others, or leave it out",
+                    Joined(study_.witnesses)));
+    finding.severity = Severity::kWarning;
+    diagnostics->Add(std::move(finding));
+  }
+  for (const StudyLimit& limit : study_.limits) {
+    if (moved[limit.quantity]) continue;
+    const StudyQuantity& quantity = study_.quantities[limit.quantity];
+    diagnostics->Add(FindingAt(
+        study_, quantity.line, quantity.column,
+        fmt::format("limits.{}: none of the varied numbers moves it, so that every point keeps "
+                    "it or none does",
+                    quantity.name),
+        "vary what it depends on, or ask witnesses that read what is varied"));
+  }
 }
 
 StudyPoint StudyBench::Run(std::uint64_t number) const {

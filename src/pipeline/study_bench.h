@@ -53,13 +53,18 @@ class StudyBench {
   /// Whether the first witness goes in steps: the simulation in forward mode.
   [[nodiscard]] bool steps() const { return steps_; }
   [[nodiscard]] const MeasuredForces& measured() const { return measured_; }
-  /// Tells a study, its scenario and model, and this program from others.
   /// The files that it is computed from.
   [[nodiscard]] const std::vector<InputFile>& inputs() const { return inputs_; }
+  /// Tells a study, its scenario and model, and this program from others.
   [[nodiscard]] const std::string& fingerprint() const { return fingerprint_; }
 
   /// A function of the study and the number alone.
   [[nodiscard]] StudyPoint Run(std::uint64_t number) const;
+  /// Finds which numbers move which quantities, by setting each alone to its ends, in a child
+  /// process. A number that moves none is a warning; a limit whose quantity none moves is an error.
+  void FindIdle(double timeout_s, Diagnostics* diagnostics);
+  /// Names of the numbers that move no quantity; empty before FindIdle().
+  [[nodiscard]] const std::vector<std::string>& idle() const { return idle_; }
   /// A point that gave nothing.
   [[nodiscard]] StudyPoint Lost(std::uint64_t number, const std::string& reason) const;
   /// What runs the scenario at these values, to be typed.
@@ -68,6 +73,7 @@ class StudyBench {
  private:
   explicit StudyBench(Study study) : study_(std::move(study)), points_(study_.Points()) {}
   [[nodiscard]] std::vector<SetValue> SetsOf(const std::vector<double>& varied) const;
+  [[nodiscard]] std::string MovedBy(size_t factor) const;
   void CheckKeys(Diagnostics* diagnostics) const;
   void Measure(const Prepared& prepared, const StudyRun& run, Diagnostics* diagnostics);
   void CheckQuantities(const std::vector<std::string>& channels, Diagnostics* diagnostics) const;
@@ -78,6 +84,7 @@ class StudyBench {
   StudyForces forces_;
   MeasuredForces measured_;
   bool steps_ = false;
+  std::vector<std::string> idle_;
   std::vector<InputFile> inputs_;
   std::string fingerprint_;
 };

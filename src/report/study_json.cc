@@ -1,5 +1,6 @@
 // summary.json of a study.
 #include "core/json_text.h"
+#include "core/text.h"
 #include "report/study_report.h"
 #include "report/study_words.h"
 
@@ -213,8 +214,10 @@ std::string ToJson(const StudyReport& report) {
   Json varied = Json::array(), quantities = Json::array(), limits = Json::array(),
        bands = Json::array(), witnesses = Json::array(), versions = Json::object();
   for (const Factor& factor : study.factors) {
-    varied.push_back(
-        {{"name", factor.name}, {"sets", factor.key}, {"nominal", Number(factor.axis.nominal)}});
+    varied.push_back({{"name", factor.name},
+                      {"sets", factor.key},
+                      {"nominal", Number(factor.axis.nominal)},
+                      {"moves", !Contains(report.idle, factor.name)}});
   }
   for (size_t k = 0; k < study.quantities.size(); ++k) {
     quantities.push_back(QuantityJson(report, k));

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/text.h"
 #include "report/number_text.h"
 #include "report/study_words.h"
 #include "report/text_table.h"
@@ -36,6 +37,10 @@ std::string PointsText(const StudyReport& report) {
   std::string text =
       fmt::format("{} points by {}", summary.points, DesignWord(report.study.design.kind));
   if (summary.failed > 0) text += fmt::format(", {} of them without a result", summary.failed);
+  if (!report.idle.empty()) {
+    text += fmt::format("; {} {} no quantity", Joined(report.idle),
+                        report.idle.size() == 1 ? "moves" : "move");
+  }
   return text;
 }
 

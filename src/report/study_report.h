@@ -20,7 +20,8 @@ struct StudyBand {
 
 struct StudyReport {
   Study study;
-  std::vector<double> nominal;  ///< per quantity
+  std::vector<double> nominal;    ///< per quantity
+  std::vector<std::string> idle;  ///< varied numbers that move no quantity
   StudySummary summary;
   std::vector<StudyBand> bands;
   std::optional<StudyValidationResult> validation;

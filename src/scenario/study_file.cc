@@ -111,7 +111,7 @@ class StudyReader {
       yaml_.Error(node, "validation: the scenario has no table to validate against",
                   "reference: {csv: measured.csv} there");
     }
-    if (study_.witnesses.front() == "reference") {
+    if (!study_.witnesses.empty() && study_.witnesses.front() == "reference") {
       yaml_.Error(node, "validation: the first witness is the table itself",
                   "witnesses: [analytic], [inverse] or [forward]");
     }

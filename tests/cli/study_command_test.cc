@@ -255,5 +255,77 @@ TEST_F(StudyCommand, ANightHasStudies) {
 // With bars of another mass in the simulation alone, every point disagrees; others keep their
 // numbers.
 
+TEST_F(StudyCommand, ANumberThatMovesNothingIsSaidAndALimitThatNothingMovesIsRefused) {
+  const auto with = [&](const std::string& vary, const std::string& limits) {
+    Write("s.yaml", "study: s\nscenario: hold.yaml\nvary: {" + vary +
+                        "}\ndesign: {sobol: 4}\nquantities: [x.force.mean]\n" + limits);
+    return Study("out");
+  };
+  const std::string mass = "m: {uniform: {min: 1, max: 3}}";
+  const std::string step = "simulation.step_s: {uniform: {min: 0.0005, max: 0.001}}";
+  const std::string limit = "limits: {x.force.mean: {below: 100}}\n";
+  const ProgramResult both = with(mass + ", " + step, limit);
+  EXPECT_EQ(both.exit_code, 0) << both.err;
+  EXPECT_NE(both.err.find("s.yaml:3:"), std::string::npos) << both.err;
+  EXPECT_NE(both.err.find("warning: vary.simulation.step_s: moves no quantity of this study"),
+            std::string::npos)
+      << both.err;
+  EXPECT_NE(both.out.find("4 points by sobol; simulation.step_s moves no quantity"),
+            std::string::npos)
+      << both.out;
+  EXPECT_TRUE(Summary("out")["varied"][0]["moves"]);
+  EXPECT_FALSE(Summary("out")["varied"][1]["moves"]);
+  const ProgramResult alone = with(step, limit);
+  EXPECT_EQ(alone.exit_code, 2);
+  EXPECT_NE(alone.err.find("error: limits.x.force.mean: none of the varied numbers moves it"),
+            std::string::npos)
+      << alone.err;
+  EXPECT_EQ(mbverify("check " + File("s.yaml")).exit_code, 2);
+  EXPECT_EQ(with(step, "").exit_code, 0);  // asks nothing, and says what moves nothing
+  const ProgramResult moved = with(mass, limit);
+  EXPECT_EQ(moved.exit_code, 0);
+  EXPECT_EQ(moved.err.find("moves no quantity"), std::string::npos) << moved.err;
+}
+
+// Whatever stands in study.json: a finding with file and key, exit code 2.
+TEST_F(StudyCommand, ADamagedIdentityIsAFindingWithItsKey) {
+  WriteStudy("{sobol: 4}");
+  ASSERT_EQ(Study("parts", "--shard 1/2").exit_code, 0);
+  const std::string folder = File("parts/s.shard-1-of-2"), file = "parts/s.shard-1-of-2/study.json";
+  const auto good = nlohmann::json::parse(ReadAll(File(file)));
+  const auto refused = [&](const std::string& text, const std::string& key) {
+    Write(file, text);
+    for (const std::string& command :
+         {"study merge " + folder + " -o " + File("merged"),
+          "study " + File("s.yaml") + " --shard 1/2 --resume -o " + File("parts")}) {
+      const ProgramResult result = mbverify(command);
+      EXPECT_EQ(result.exit_code, 2) << command << text << result.err;
+      EXPECT_NE(result.err.find("study.json:"), std::string::npos) << result.err;
+      EXPECT_NE(result.err.find("error: " + key), std::string::npos) << key << result.err;
+    }
+  };
+  const nlohmann::json others[] = {nullptr,
+                                   true,
+                                   1.5,
+                                   "x",
+                                   nlohmann::json::array({1}),
+                                   {{"a", nlohmann::json::array({nlohmann::json::object()})}}};
+  for (const char* key : {"schema", "study", "file", "fingerprint", "shard", "points"}) {
+    for (const nlohmann::json& other : others) {
+      if (other.is_string() && good.at(key).is_string() && std::string(key) != "schema") continue;
+      nlohmann::json damaged = good;
+      damaged[key] = other;
+      refused(damaged.dump(), key);
+    }
+  }
+  nlohmann::json zero = good;
+  zero["shard"] = {0, 0};
+  refused(zero.dump(), "shard says 0 of 0");
+  const std::string text = good.dump();
+  refused(text.substr(0, text.size() / 2), "the file ends before its JSON does");
+  refused("", "the file is empty");
+  refused(std::string(200000, '['), "the JSON is nested more than 100 levels deep");
+}
+
 }  // namespace
 }  // namespace mbv

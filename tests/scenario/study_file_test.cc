@@ -318,5 +318,18 @@ TEST_F(StudyFiles, OthersMayAskForOtherPoints) {
   ExpectIn(grid.diagnostics.Text(), "draws nothing");
 }
 
+TEST_F(StudyFiles, AValidationWithoutAWitnessThatIsKnownIsRefusedNotCrashedOn) {
+  for (const auto& [witnesses, told] : {std::pair{"[referense]", "witnesses = 'referense'"},
+                                        {"[]", "witnesses: nobody computes"},
+                                        {"[\"\"]", "witnesses = ''"},
+                                        {"{}", "witnesses"},
+                                        {"[[]]", "witnesses"}}) {
+    ExpectIn(Refusal("{crank: {uniform: {plus_minus_mm: 0.2}}}", "{latin_hypercube: 8}",
+                     std::string("quantities: [motor.force.max]\nvalidation: {}\nwitnesses: ") +
+                         witnesses + "\n"),
+             told);
+  }
+}
+
 }  // namespace
 }  // namespace mbv
