@@ -6,10 +6,12 @@
 namespace mbv {
 namespace {
 
-// Calls visit(body, point in the body) for everything that is attached.
+// Calls visit(body, point in the body) for everything that constrains the body. A free joint does
+// not.
 template <typename Visit>
-void VisitAttachments(const Mechanism& mechanism, const Visit& visit) {
+void VisitConstraints(const Mechanism& mechanism, const Visit& visit) {
   for (const Joint& joint : mechanism.joints) {
+    if (joint.kind == JointKind::kFree) continue;
     visit(joint.parent, joint.X_PF.translation());
     visit(joint.child, joint.X_CM.translation());
   }
@@ -19,6 +21,11 @@ void VisitAttachments(const Mechanism& mechanism, const Visit& visit) {
       visit(leg->body_to, leg->p_to);
     }
   }
+}
+
+// The same where forces act.
+template <typename Visit>
+void VisitForces(const Mechanism& mechanism, const Visit& visit) {
   for (const SpringDamper& spring : mechanism.springs) {
     visit(spring.body_from, spring.p_from);
     visit(spring.body_to, spring.p_to);
@@ -51,7 +58,8 @@ double MeanDistance(const std::vector<std::vector<Vec3>>& points) {
 
 double CharacteristicLength(const Mechanism& mechanism) {
   std::vector<std::vector<Vec3>> points(mechanism.bodies.size());
-  VisitAttachments(mechanism, [&](int body, const Vec3& p) { points[body].push_back(p); });
+  const auto add = [&](int body, const Vec3& p) { points[body].push_back(p); };
+  VisitConstraints(mechanism, add);
   if (const double distance = MeanDistance(points); distance > 0.0) return distance;
   double inertia = 0.0, mass = 0.0;
   for (size_t b = 1; b < points.size(); ++b) {
@@ -62,12 +70,15 @@ double CharacteristicLength(const Mechanism& mechanism) {
     mass += body.mass;
   }
   if (const double distance = MeanDistance(points); distance > 0.0) return distance;
-  return inertia > 0.0 ? std::sqrt(inertia / mass) : 1.0;
+  if (inertia > 0.0) return std::sqrt(inertia / mass);
+  VisitForces(mechanism, add);
+  const double distance = MeanDistance(points);
+  return distance > 0.0 ? distance : 1.0;
 }
 
 double LongestLever(const Mechanism& mechanism) {
   double longest = 0.0;
-  VisitAttachments(mechanism, [&](int, const Vec3& p) { longest = std::max(longest, p.norm()); });
+  VisitConstraints(mechanism, [&](int, const Vec3& p) { longest = std::max(longest, p.norm()); });
   return longest;
 }
 

@@ -1,10 +1,12 @@
 // How large the coordinates are that a mechanism is computed with, and what that leaves of small
 // differences.
 //
-// CharacteristicLength() measures the mechanism itself: the root mean square distance of two points
-// of one body (the world included) where joints, drives or springs are attached. It depends neither
-// on where the mechanism stands nor on where its bodies have their origins. Where all attachments
-// of a body fall together, centres of mass count as points, too; then radii of gyration.
+// CharacteristicLength() measures what constrains: the root mean square distance of two points of
+// one body (the world included) where joints or distance drives are attached. It depends neither on
+// where the mechanism stands nor on where its bodies have their origins, nor on frames that hold
+// nothing (free joints, ends of springs and bushings, outputs, shapes), which may lie anywhere.
+// Where all these points of every body fall together, centres of mass count as points, too; then
+// radii of gyration; of point masses that only forces hold, the ends of springs and bushings.
 #pragma once
 
 #include <vector>
@@ -14,7 +16,7 @@
 namespace mbv {
 
 /// A length typical of the mechanism [m], to weigh metres against radians: the root mean square
-/// distance of two attachments of one body, wherever the bodies' origins lie.
+/// distance of two constrained points of one body, wherever the bodies' origins lie.
 [[nodiscard]] double CharacteristicLength(const Mechanism& mechanism);
 
 /// The largest coordinate [m] of joint frames and drive ends in their bodies (the world included).

@@ -211,25 +211,13 @@ class Planner {
                             .joints = JointsOf(closure->joint, closure->split_parent, other)});
   }
 
-  // Diagonal of the box around all joint origins at home, or the characteristic length.
-  double Extent() const {
-    Vec3 low = Vec3::Constant(1e300), high = -low;
-    for (const Joint& joint : mechanism_.joints) {
-      const Vec3 p = mechanism_.X_WB_home[joint.child] * joint.X_CM.translation();
-      low = low.cwiseMin(p);
-      high = high.cwiseMax(p);
-    }
-    const double least = CharacteristicLength(mechanism_);
-    return mechanism_.joints.empty() ? least : std::max((high - low).norm(), least);
-  }
-
   void AssignMasses() {
     std::vector<int> parts(mechanism_.bodies.size(), 0);
     for (const PlannedBody& body : plan_.bodies) ++parts[body.body];
     double total = 0.0;
     for (const Body& body : mechanism_.bodies) total += body.mass;
     const double tiny = kTinyMassFraction * (total > 0.0 ? total : 1.0);
-    const double gyration_m = 0.1 * Extent();
+    const double gyration_m = 0.1 * Extent(mechanism_);
     constexpr double kSmallest = 2e-15;  // MuJoCo refuses less than 1e-15 kg and kg m²
     for (size_t i = 1; i < plan_.bodies.size(); ++i) {
       PlannedBody& planned = plan_.bodies[i];
@@ -253,6 +241,18 @@ class Planner {
 };
 
 }  // namespace
+
+double Extent(const Mechanism& mechanism) {
+  Vec3 low = Vec3::Constant(1e300), high = -low;
+  for (const Joint& joint : mechanism.joints) {
+    if (joint.kind == JointKind::kFree) continue;
+    const Vec3 p = mechanism.X_WB_home[joint.child] * joint.X_CM.translation();
+    low = low.cwiseMin(p);
+    high = high.cwiseMax(p);
+  }
+  const double least = CharacteristicLength(mechanism);
+  return low.x() > high.x() ? least : std::max((high - low).norm(), least);
+}
 
 Plan MakePlan(const Mechanism& mechanism) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.X_WB_home.size());

@@ -70,6 +70,9 @@ inline constexpr double kTinyMassFraction = 1e-11;
 
 [[nodiscard]] Plan MakePlan(const Mechanism& mechanism);
 
+/// Diagonal of the box around all joints at home, at least the characteristic length [m].
+[[nodiscard]] double Extent(const Mechanism& mechanism);
+
 /// How MuJoCo holds a coupling.
 struct PlannedCoupling {
   enum class Type {
