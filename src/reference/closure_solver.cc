@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
 #include "core/demand.h"
 #include "core/spatial.h"
@@ -143,6 +144,24 @@ RunSummary ClosureSolver::SelectRows() {
   return RunSummary::Done();
 }
 
+bool ClosureSolver::SelectAnew() {
+  if (static_cast<int>(selection_.size()) == rows_.size()) return false;
+  constexpr double kRegular = 1e-2;  // smallest singular value, clearly away from a singular pose
+  EvaluateHere();
+  const std::vector<int> before = std::exchange(selection_, {});
+  const int orientation = orientation_;
+  if (SelectRows().ok() && selection_ != before && system_.Factor(rows_, selection_, true) &&
+      system_.SmallestSingularValue(1) > kRegular) {
+    selection_is_new_ = false;
+    orientation_ = system_.determinant_sign();
+    return true;
+  }
+  selection_ = before;
+  selection_is_new_ = true;
+  orientation_ = orientation;
+  return false;
+}
+
 RunSummary ClosureSolver::Prepare() {
   near_values_.clear();
   for (const Command& command : commands_) {
@@ -205,7 +224,7 @@ void ClosureSolver::Accept(const VecX& target, Trial* trial) {
 
 RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
   const VecX start = target_;
-  double reached = 0.0, step = 1.0 / first_steps;
+  double reached = 0.0, step = 1.0 / first_steps, selected_at = -1.0;
   int easy = 0;
   while (reached < 1.0) {
     const double next = std::min(1.0, reached + step);
@@ -220,6 +239,11 @@ RunSummary ClosureSolver::Follow(const VecX& target, int first_steps) {
     easy = 0;
     step *= 0.5;
     if (step * kSmallestStep < 1.0) {
+      if (reached > selected_at && SelectAnew()) {
+        selected_at = reached;
+        step = 1.0 / first_steps;
+        continue;
+      }
       return ExplainUnreached(mechanism_, commands_, target, states_, near_values_);
     }
   }
@@ -254,6 +278,15 @@ int ClosureSolver::MeasureGaps() {
 }
 
 RunSummary ClosureSolver::CheckPose() {
+  RunSummary summary = CheckHere();
+  if (summary.ok() || !SelectAnew()) return summary;
+  Trial trial{states_, near_values_};
+  if (Newton(target_, true, &trial) != Step::kDone) return summary;
+  Accept(target_, &trial);
+  return CheckHere().ok() ? RunSummary::Done() : summary;
+}
+
+RunSummary ClosureSolver::CheckHere() {
   const int worst = MeasureGaps();
   const double rounding = Rounding(states_.X_WB);
   if (gap_position_m_ > kOpen * length_ + rounding || gap_rotation_rad_ > kOpen) {

@@ -63,6 +63,9 @@ class ClosureSolver {
     return orientation_ != 0 && system_.determinant_sign() != orientation_;
   }
   [[nodiscard]] RunSummary SelectRows();
+  /// Chooses among redundant rows anew at states(), where those chosen before may have become
+  /// dependent although the mechanism is regular there. False if it is not.
+  [[nodiscard]] bool SelectAnew();
   /// Turns idle spins back by these angles.
   [[nodiscard]] RunSummary TurnBack(const std::vector<double>& turns);
   [[nodiscard]] RunSummary TakeLeastTurns();
@@ -70,7 +73,9 @@ class ClosureSolver {
   [[nodiscard]] MovingDirection LineOf(const Spin& spin) const;
   /// Of the rows last evaluated; returns the joint row with the largest.
   int MeasureGaps();
+  /// Gaps and smallest singular value at states(), with another choice of rows if need be.
   [[nodiscard]] RunSummary CheckPose();
+  [[nodiscard]] RunSummary CheckHere();
   void EvaluateHere();
   [[nodiscard]] RunSummary SolveRates(const CommandSample& command);
   /// What the selected rows miss of the rates, into missing_; the largest [rad, characteristic

@@ -184,12 +184,20 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
 
   // A basis chosen earlier may have become bad; choose again once.
   VecX residual;
+  RunSummary control = RunSummary::Done();
   for (int attempt = chosen_ ? 0 : 1; attempt < 2; ++attempt) {
     if (attempt == 1) {
-      if (RunSummary summary = SelectBasis(); !summary.ok()) return summary;
+      if (RunSummary summary = SelectBasis(); !summary.ok()) {
+        return control.ok() ? summary : control;
+      }
     }
     if (!Factor()) continue;
-    if (RunSummary summary = CheckControl(sample->states); !summary.ok()) return summary;
+    control = CheckControl(sample->states);
+    if (!control.ok()) {
+      // Of redundant rows the basis may have become dependent, not the mechanism.
+      if (attempt == 0 && !rest_.empty()) continue;
+      return control;
+    }
     VecX force = LeastNorm(wrenches);
     if (!(Missing(force, wrenches, &residual) <= kBalanceTolerance * largest)) continue;
     if (RunSummary summary = AddLoadFriction(sample, &force); !summary.ok()) return summary;
