@@ -101,6 +101,50 @@ std::vector<double> CoupledGuesses(const Mechanism& mechanism) {
   return guesses;
 }
 
+namespace {
+
+// x near `start` with P(x) = value; `start` where Newton finds none.
+double SolutionNear(const std::vector<double>& polynomial, double value, double start) {
+  if (polynomial.size() == 1) return value / polynomial[0];
+  constexpr int kMostSteps = 60;
+  double x = start;
+  for (int i = 0; i < kMostSteps; ++i) {
+    const PolynomialJet P = PolynomialAt(polynomial, x);
+    const double step = (value - P.value) / P.slope;
+    if (!std::isfinite(step)) return start;
+    x += step;
+    if (std::abs(step) <= 4 * kEps * std::max(1.0, std::abs(x))) return x;
+  }
+  return start;
+}
+
+}  // namespace
+
+void SolveFollowers(const Mechanism& mechanism, CoordinateSet* known,
+                    std::vector<std::array<double, 6>>* q) {
+  for (bool any = true; any;) {
+    any = false;
+    for (const Coupling& coupling : mechanism.couplings) {
+      const Coupling::Term* unknown = nullptr;
+      int count = 0;
+      double sum = coupling.constant;
+      for (const Coupling::Term& term : coupling.terms) {
+        if (!known->contains({term.joint, term.coordinate})) {
+          unknown = &term;
+          ++count;
+        } else {
+          sum += PolynomialAt(term.polynomial, (*q)[term.joint][term.coordinate]).value;
+        }
+      }
+      if (count != 1) continue;
+      double& follower = (*q)[unknown->joint][unknown->coordinate];
+      follower = SolutionNear(unknown->polynomial, -sum, follower);
+      known->insert({unknown->joint, unknown->coordinate});
+      any = true;
+    }
+  }
+}
+
 std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling) {
   std::vector<std::string> names;
   for (const Coupling::Term& term : coupling.terms) {

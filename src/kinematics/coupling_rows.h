@@ -4,6 +4,9 @@
 //   ṙ = Σ_k P_k′ q̇_k,  r̈ = Σ_k (P_k′ q̈_k + P_k″ q̇_k²).
 #pragma once
 
+#include <array>
+#include <set>
+#include <utility>
 #include <vector>
 
 #include "kinematics/constraints.h"
@@ -35,6 +38,13 @@ std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates*
 
 /// How many turns the coupled coordinates count at the joints' guesses, for poses near them.
 [[nodiscard]] std::vector<double> CoupledGuesses(const Mechanism& mechanism);
+
+/// Coordinates by joint and number.
+using CoordinateSet = std::set<std::pair<int, int>>;
+/// Gives the one coordinate of a coupling that is not `known` the value that the others ask for, in
+/// any turn, and counts it as known; for as long as there is such a coupling. `q`: by joint.
+void SolveFollowers(const Mechanism& mechanism, CoordinateSet* known,
+                    std::vector<std::array<double, 6>>* q);
 
 /// Names of the coupled joints, for messages: "wheel, pinion".
 [[nodiscard]] std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling);

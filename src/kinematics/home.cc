@@ -16,6 +16,7 @@
 #include "kinematics/coupling_rows.h"
 #include "kinematics/damped_search.h"
 #include "kinematics/frame_pair.h"
+#include "kinematics/loop_groups.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"
@@ -68,6 +69,17 @@ constexpr internal::DampingRule kDamping{.most_steps = 100,
                                          .easier = 0.1,
                                          .stronger = 30.0};
 
+// Of every term of the couplings.
+std::vector<double> CoupledAt(const Mechanism& mechanism, const Coordinates& q) {
+  std::vector<double> coupled;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      coupled.push_back(q[term.joint][term.coordinate]);
+    }
+  }
+  return coupled;
+}
+
 Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
               const Coordinates& start) {
   const double length = CharacteristicLength(mechanism);
@@ -79,9 +91,12 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
   for (size_t j = 0; j < start.size(); ++j) {
     now.X_FM.push_back(JointPose(mechanism.joints[j], start[j]));
   }
+  now.states.coupled = CoupledAt(mechanism, start);
   const auto evaluate = [&](Attempt* at, MatX* J) {
+    std::vector<double> coupled = std::move(at->states.coupled);
     at->states = tree.States(at->X_FM);
-    at->states.coupled = CoupledGuesses(mechanism);
+    at->states.coupled = std::move(coupled);
+    (void)FollowCouplings(mechanism, &at->states);
     MatX J_q;
     VecX r = ClosureResidual(mechanism, tree, at->states, length, &J_q);
     *J = J_q * unit.asDiagonal();
@@ -97,6 +112,44 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
   internal::DampedSearch(kDamping, &now, evaluate, move, enough);
   now.gap = LargestGap(mechanism, now.states, length);
   return now;
+}
+
+// Joint coordinates of an attempt: coupled ones in the turns that it counts, other angles within
+// half a turn of `near`.
+Coordinates CoordinatesOf(const Mechanism& mechanism, const Attempt& attempt, Coordinates near) {
+  const double* value = attempt.states.coupled.data();
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) near[term.joint][term.coordinate] = *value++;
+  }
+  return JointCoordinatesAt(mechanism, attempt.states.X_WB, near);
+}
+
+// Where couplings lead what is in no loop, once the loops are closed without it: a start from which
+// followers have no turns to go.
+Coordinates Followed(const Mechanism& mechanism, const std::vector<bool>& locked,
+                     const Coordinates& start) {
+  std::vector<bool> follows(mechanism.joints.size(), true);
+  for (const LoopGroup& group : LoopGroups(mechanism)) {
+    for (const int j : group.joints) follows[j] = false;
+    for (const int j : group.closures) follows[j] = false;
+  }
+  CoordinateSet known;
+  for (size_t j = 0; j < follows.size(); ++j) {
+    if (follows[j] && !locked[j]) continue;
+    for (int c = 0; c < FreedomsOf(mechanism.joints[j].kind); ++c) {
+      known.insert({static_cast<int>(j), c});
+    }
+  }
+  Mechanism loops = mechanism;
+  std::erase_if(loops.couplings, [&](const Coupling& coupling) {
+    return std::ranges::any_of(coupling.terms, [&](const Coupling::Term& term) {
+      return !known.contains({term.joint, term.coordinate});
+    });
+  });
+  if (loops.couplings.size() == mechanism.couplings.size()) return start;
+  Coordinates q = CoordinatesOf(loops, Close(loops, locked, start), start);
+  SolveFollowers(mechanism, &known, &q);
+  return q;
 }
 
 std::vector<bool> DrivenJoints(const Mechanism& mechanism) {
@@ -174,6 +227,9 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess,
     best = std::move(attempt);
     return true;
   };
+  if (open() && !mechanism.couplings.empty()) {
+    (void)try_from(driven, Followed(mechanism, driven, guess));
+  }
   const bool any_driven = std::find(driven.begin(), driven.end(), true) != driven.end();
   if (open() && any_driven) result->drives_moved = try_from(none, guess);
 
@@ -181,7 +237,7 @@ Attempt BestAttempt(const Mechanism& mechanism, const Coordinates& guess,
 
   // Loops that are open at the best pose so far, each group by itself; then all from there.
   Coordinates start = guess;
-  const Coordinates at_best = JointCoordinatesAt(mechanism, best.states.X_WB, guess);
+  const Coordinates at_best = CoordinatesOf(mechanism, best, guess);
   bool any = false, drives_moved = false, chosen = false;
   for (const LoopGroup& group : LoopGroups(mechanism)) {
     double gap = 0.0;
@@ -281,7 +337,7 @@ HomeResult SolveHome(Mechanism* mechanism, const AssemblyChoice& choice) {
   }
   const Attempt best = BestAttempt(*mechanism, guess, choice, &result);
   mechanism->X_WB_home = best.states.X_WB;
-  const Coordinates home = JointCoordinatesAt(*mechanism, best.states.X_WB, guess);
+  const Coordinates home = CoordinatesOf(*mechanism, best, guess);
   BodyStates at_guess;
   at_guess.Resize(mechanism->bodies.size());
   at_guess.X_WB = TreePoses(*mechanism, guess);

@@ -231,7 +231,8 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
   if (report.has_errors()) return;
   internal::CloseLoops({.tolerance_m = s.head.closure_tolerance_m,
                         .bare_urdf = reading->bare_urdf,
-                        .assembly = reading->options.assembly},
+                        .assembly = reading->options.assembly,
+                        .guessed = s.joints.guessed},
                        mechanism, &report);
   if (report.has_own_errors()) return;
   internal::CheckHome(*mechanism, &report);

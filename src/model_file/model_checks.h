@@ -1,6 +1,7 @@
 // Checks on a whole model: what no section can tell alone. Internal to the model loader.
 #pragma once
 
+#include <set>
 #include <string>
 
 #include "kinematics/home.h"
@@ -24,8 +25,11 @@ struct ClosureRules {
   double tolerance_m = 0.0;      ///< up to which rounded data are projected
   bool bare_urdf = false;        ///< no model file: joints named as balls are taken for such
   AssemblyChoice assembly = {};  ///< by option
+  std::set<int> guessed = {};    ///< joints with a stated guess
 };
-/// Solves the home pose. What it had to do for that are warnings; open loops are errors.
+/// Solves the home pose. Coupled coordinates without a stated guess follow the others; driven ones
+/// lead where none of a coupling is stated. What it had to do for that are warnings; open loops are
+/// errors.
 void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* report);
 
 /// Coordinates at home against their ranges, ends of legs that coincide.

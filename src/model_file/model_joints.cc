@@ -135,6 +135,9 @@ void JointReader::ReadJoint(const Block& block, const YamlEntry& entry) {
   joint.child = on_child->body;
   joint.X_CM = on_child->X_BF;
   joints_.refused.erase(joint.name);
+  if (map.Has("guess") || map.Has("guess_deg") || map.Has("guess_mm")) {
+    joints_.guessed.insert(static_cast<int>(joints_.joints.size()));
+  }
   if (lead) joints_.screws.push_back(ScrewOf(joint.name, joints_.joints.size(), *lead));
   joints_.Add(std::move(joint), PlaceOf(entry), HintOf(map, &yaml));
 }

@@ -17,6 +17,7 @@ struct ModelJoints {
   std::vector<Joint> joints;
   std::vector<Place> places;      ///< per joint; those of a URDF file have none
   ClosureHints hints;             ///< per joint
+  std::set<int> guessed;          ///< with a stated guess
   std::vector<Coupling> screws;   ///< travel by turn, of helical joints
   std::set<std::string> refused;  ///< names of joints that have a finding
   bool good = true;               ///< false: the graph of joints is not worth checking

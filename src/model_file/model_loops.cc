@@ -2,7 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "kinematics/assembly.h"
 #include "kinematics/coupling_rows.h"
@@ -73,6 +77,45 @@ void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const Hom
   if (!report->has_errors()) {
     report->AtFile(Severity::kError, "the home pose was not found");
   }
+}
+
+// Guesses of coupled coordinates that have none, in order of who leads: stated guesses, what is
+// driven, what follows nothing, the later terms of a coupling.
+void GuessFollowers(const std::set<int>& guessed, Mechanism* mechanism) {
+  if (mechanism->couplings.empty()) return;
+  std::vector<std::array<double, 6>> q;
+  for (const Joint& joint : mechanism->joints) q.push_back(joint.guess);
+  CoordinateSet known;
+  const auto lead = [&](int j) {
+    for (int c = 0; c < FreedomsOf(mechanism->joints[j].kind); ++c) known.insert({j, c});
+  };
+  for (const int j : guessed) lead(j);
+  SolveFollowers(*mechanism, &known, &q);
+  for (const Drive& drive : mechanism->drives) {
+    if (const auto* on = std::get_if<JointDrive>(&drive.kind)) {
+      known.insert({on->joint, on->coordinate});
+    }
+  }
+  for (const Prescribed& base : mechanism->prescribed) lead(base.joint);
+  SolveFollowers(*mechanism, &known, &q);
+  CoordinateSet followers;
+  for (const Coupling& coupling : mechanism->couplings) {
+    followers.insert({coupling.terms[0].joint, coupling.terms[0].coordinate});
+  }
+  for (const Coupling& coupling : mechanism->couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      const std::pair<int, int> at(term.joint, term.coordinate);
+      if (!followers.contains(at)) known.insert(at);
+    }
+  }
+  SolveFollowers(*mechanism, &known, &q);
+  for (const Coupling& coupling : mechanism->couplings) {
+    for (size_t k = 1; k < coupling.terms.size(); ++k) {
+      known.insert({coupling.terms[k].joint, coupling.terms[k].coordinate});
+    }
+    SolveFollowers(*mechanism, &known, &q);
+  }
+  for (size_t j = 0; j < q.size(); ++j) mechanism->joints[j].guess = q[j];
 }
 
 // The drives that home could not leave at their guesses: commands that count from home do so from
@@ -162,6 +205,7 @@ void ReportUnmet(const Mechanism& mechanism, const HomeResult& home, ModelReport
 }  // namespace
 
 void CloseLoops(const ClosureRules& rules, Mechanism* mechanism, ModelReport* report) {
+  GuessFollowers(rules.guessed, mechanism);
   const HomeResult home = SolveHome(mechanism, rules.assembly);
   if (!home.unmet.empty()) return ReportUnmet(*mechanism, home, report);
   if (home.closed) {

@@ -121,6 +121,7 @@ void UrdfReader::ReadGuesses(const Block& model, const YamlMap& map, ModelJoints
     const std::string path = JoinPath(map.PathOf(found.key), entry.key);
     const int index = joints->Find(entry.key);
     if (index >= 0) {
+      joints->guessed.insert(index);
       ReadGuess(model, *entry.value, path, found.unit, &values_, &joints->joints[index]);
       continue;
     }

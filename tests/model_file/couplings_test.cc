@@ -1,7 +1,9 @@
 // `couplings` of model files: read, refused, written.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <numbers>
+#include <stdexcept>
 
 #include "model_file/load_model.h"
 #include "model_file/write_model.h"
@@ -132,6 +134,155 @@ TEST(Couplings, AreWrittenAsTheyAreRead) {
       EXPECT_EQ(a.terms[k].coordinate, b.terms[k].coordinate);
       EXPECT_EQ(a.terms[k].polynomial, b.terms[k].polynomial);
     }
+  }
+}
+
+// Three shafts; `guess` and coupling texts as given, the motor on one of them.
+Mechanism Shafts(const std::string& guess_one, const std::string& guess_two,
+                 const std::string& couplings, const std::string& motor) {
+  const auto joint = [](const std::string& name, const std::string& guess) {
+    return "  " + name + ": {kind: revolute, parent: world." + name + ", child: " + name +
+           ", axis: z" + guess + "}\n";
+  };
+  LoadResult loaded = LoadModelText(
+      "name: shafts\nworld: {frames: {one: [0, 0, 0], two: [0.3, 0, 0], three: [0.6, 0, 0]}}\n"
+      "bodies:\n"
+      "  one: {mass: 1, inertia: [1, 1, 1]}\n"
+      "  two: {mass: 1, inertia: [1, 1, 1]}\n"
+      "  three: {mass: 1, inertia: [1, 1, 1]}\n"
+      "joints:\n" +
+          joint("one", guess_one) + joint("two", guess_two) + joint("three", "") + "couplings:\n" +
+          couplings + "drives: {motor: {kind: joint, joint: " + motor + "}}\n",
+      "shafts.yaml");
+  EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_TRUE(loaded.diagnostics.findings().empty()) << loaded.diagnostics.Text();
+  if (!loaded.mechanism) throw std::runtime_error("no mechanism");
+  return *std::move(loaded.mechanism);
+}
+
+constexpr double kDegree = std::numbers::pi / 180;
+
+double HomeDegrees(const Mechanism& m, const std::string& joint) {
+  return m.joints[static_cast<size_t>(m.FindJoint(joint))].home[0] / kDegree;
+}
+
+// What drives and what is guessed stays; what follows turns as often as it takes.
+TEST(Couplings, FollowersWithoutAGuessFollow) {
+  const std::string sixty = ", guess_deg: 60";
+  struct Case {
+    const char* what;
+    std::string one, two, couplings, motor;
+    double home[3];  // [deg]
+  };
+  const std::vector<Case> cases = {
+      {"a follower and its follower",
+       sixty,
+       "",
+       "  g: {joint: two, follows: one, ratio: -5}\n"
+       "  h: {joint: three, follows: two, ratio: 3.3, offset_deg: 20}\n",
+       "one",
+       {60, -300, -970}},
+      {"listed from the last to the first",
+       sixty,
+       "",
+       "  h: {joint: three, follows: two, ratio: 3.3}\n"
+       "  g: {joint: two, follows: one, ratio: -5, offset_deg: 12}\n",
+       "one",
+       {60, -288, -950.4}},
+      {"the motor on the shaft that a guessed wheel follows",
+       "",
+       sixty,
+       "  g: {joint: two, follows: one, ratio: -0.2}\n"
+       "  h: {joint: three, follows: two, ratio: 3.3}\n",
+       "one",
+       {-300, 60, 198}},
+      {"the motor on the follower of a guessed wheel",
+       sixty,
+       "",
+       "  g: {joint: two, follows: one, ratio: -5}\n"
+       "  h: {joint: three, follows: two, ratio: 1}\n",
+       "two",
+       {60, -300, -300}},
+      {"high ratios",
+       sixty,
+       "",
+       "  g: {joint: two, follows: one, ratio: 128}\n"
+       "  h: {joint: three, follows: two, ratio: -40}\n",
+       "one",
+       {60, 7680, -307200}},
+      {"a sum",
+       sixty,
+       ", guess_deg: 10",
+       "  g: {sum: [{joint: three, factor: 0.5}, {joint: one, factor: 7}, {joint: two, factor: "
+       "1}], "
+       "offset_deg: 30}\n",
+       "one",
+       {60, 10, -800}},
+      {"nothing is guessed: the motor leads",
+       "",
+       "",
+       "  g: {joint: one, follows: two, ratio: 3, offset_deg: 720}\n"
+       "  h: {joint: three, follows: one, ratio: 1}\n",
+       "one",
+       {0, -240, 0}},
+  };
+  for (const Case& c : cases) {
+    const Mechanism m = Shafts(c.one, c.two, c.couplings, c.motor);
+    const char* names[] = {"one", "two", "three"};
+    for (int k = 0; k < 3; ++k) {
+      EXPECT_NEAR(HomeDegrees(m, names[k]), c.home[k], 1e-9 * (1 + std::abs(c.home[k])))
+          << c.what << ": " << names[k];
+    }
+  }
+}
+
+TEST(Couplings, AFollowerByAPolynomialIsFoundFromItsValue) {
+  const Mechanism m = Shafts("", ", guess_deg: 60",
+                             "  g: {joint: two, follows: one, polynomial: [3, 0.5, 0.1]}\n", "one");
+  const double q = m.joints[0].home[0];
+  EXPECT_NEAR(HomeDegrees(m, "two"), 60, 1e-10);
+  EXPECT_NEAR(3 * q + 0.5 * q * q + 0.1 * q * q * q, 60 * kDegree, 1e-12);
+}
+
+// A four-bar between a motor's shaft, geared to the crank, and a wheel that the rocker turns.
+TEST(Couplings, FollowersBesideALoopLeaveItAlone) {
+  const auto load = [](const std::string& couplings, const std::string& motor) {
+    LoadResult loaded = LoadModelText(
+        "name: geared\n"
+        "world: {frames: {A: [0, 0, 0], D: [0.5, 0, 0], S: [-0.3, 0, 0], T: [0.9, 0, 0]}}\n"
+        "bodies:\n"
+        "  crank: {mass: 1, inertia: [1, 1, 1], frames: {end: [0.2, 0, 0]}}\n"
+        "  coupler: {mass: 1, inertia: [1, 1, 1], frames: {end: [0.5, 0, 0]}}\n"
+        "  rocker: {mass: 1, inertia: [1, 1, 1], frames: {end: [0.4, 0, 0]}}\n"
+        "  shaft: {mass: 1, inertia: [1, 1, 1]}\n"
+        "  wheel: {mass: 1, inertia: [1, 1, 1]}\n"
+        "joints:\n"
+        "  A: {kind: revolute, parent: world.A, child: crank, axis: z, guess_deg: 60}\n"
+        "  B: {kind: revolute, parent: crank.end, child: coupler, axis: z, guess_deg: -40}\n"
+        "  C: {kind: revolute, parent: rocker.end, child: coupler.end, axis: z}\n"
+        "  D: {kind: revolute, parent: world.D, child: rocker, axis: z, guess_deg: 70}\n"
+        "  S: {kind: revolute, parent: world.S, child: shaft, axis: z}\n"
+        "  T: {kind: revolute, parent: world.T, child: wheel, axis: z}\n"
+        "couplings:\n" +
+            couplings + "drives: {motor: {kind: joint, joint: " + motor + "}}\n",
+        "geared.yaml");
+    EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    EXPECT_TRUE(loaded.diagnostics.findings().empty()) << loaded.diagnostics.Text();
+    if (!loaded.mechanism) throw std::runtime_error("no mechanism");
+    return *std::move(loaded.mechanism);
+  };
+  for (const double ratio : {6.5, 65.0, 650.0}) {
+    const std::string wheel = "  h: {joint: T, follows: D, ratio: " + std::to_string(ratio) + "}\n";
+    const Mechanism driven = load("  g: {joint: A, follows: S, ratio: -0.2}\n" + wheel, "S");
+    EXPECT_NEAR(HomeDegrees(driven, "A"), 60, 1e-10);
+    EXPECT_NEAR(HomeDegrees(driven, "S"), -300, 1e-9);
+    EXPECT_NEAR(HomeDegrees(driven, "T"), ratio * HomeDegrees(driven, "D"), 1e-9 * ratio);
+    const Mechanism geared = load("  g: {joint: S, follows: A, ratio: -5000}\n" + wheel, "A");
+    EXPECT_NEAR(HomeDegrees(geared, "A"), 60, 1e-10);
+    EXPECT_NEAR(HomeDegrees(geared, "S"), -300000, 1e-6);
+    EXPECT_NEAR(HomeDegrees(geared, "T"), ratio * HomeDegrees(geared, "D"), 1e-9 * ratio);
+    // The rocker is where it is without gears.
+    EXPECT_NEAR(HomeDegrees(geared, "D"), HomeDegrees(driven, "D"), 1e-9);
   }
 }
 
