@@ -77,6 +77,7 @@ class SpinFinder {
       if (spin->why_not.empty()) spin->why_not = WhyNotSymmetric(body);
     }
     if (spin->why_not.empty()) spin->why_not = WhatHolds();
+    if (spin->why_not.empty()) spin->why_not = WhatActsOn(balls);
     return true;
   }
 
@@ -170,6 +171,26 @@ class SpinFinder {
     }
     for (const Beam& beam : m_.beams) {
       if (Spins(beam.body)) return fmt::format("{} is elastic", NameOf(beam.body));
+    }
+    return "";
+  }
+
+  // Forces and relations of a ball's own coordinates.
+  [[nodiscard]] std::string WhatActsOn(const std::vector<int>& balls) const {
+    const auto is_ball = [&](int joint) { return std::ranges::find(balls, joint) != balls.end(); };
+    for (const ForceElement& element : m_.elements) {
+      if (is_ball(element.joint)) return fmt::format("element '{}' acts on a ball", element.name);
+    }
+    for (const Drive& drive : m_.drives) {
+      const auto* on = std::get_if<JointDrive>(&drive.kind);
+      if (on != nullptr && is_ball(on->joint)) {
+        return fmt::format("drive '{}' acts on a ball", drive.name);
+      }
+    }
+    for (const Coupling& coupling : m_.couplings) {
+      if (std::ranges::any_of(coupling.terms, [&](const auto& t) { return is_ball(t.joint); })) {
+        return fmt::format("coupling '{}' uses a ball", coupling.name);
+      }
     }
     return "";
   }

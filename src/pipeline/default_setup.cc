@@ -8,6 +8,7 @@
 #include "core/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/constraints.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/reach.h"
 #include "model_file/write_model.h"
 #include "pipeline/load_robot.h"
@@ -48,8 +49,8 @@ Drive DriveOn(const Mechanism& m, const Coordinate& coordinate) {
   return drive;
 }
 
-// A ball that turns in this motion becomes a universal joint that does not; empty without one.
-std::string HoldSpin(const std::vector<Vec6>& motion, Mechanism* m) {
+// A ball that turns in this motion becomes a universal joint that does not; false without one.
+bool HoldTurn(const std::vector<Vec6>& motion, Mechanism* m) {
   for (Joint& joint : m->joints) {
     if (joint.kind != JointKind::kSpherical) continue;
     const Vec3 turn = motion[joint.child].head<3>() - motion[joint.parent].head<3>();
@@ -65,9 +66,86 @@ std::string HoldSpin(const std::vector<Vec6>& motion, Mechanism* m) {
     joint.X_CM.linear() = m->X_WB_home[joint.child].linear().transpose() * E;
     joint.guess = joint.home = {};
     joint.range = {};
-    return joint.name;
+    return true;
   }
-  return "";
+  return false;
+}
+
+// The mechanism with balls held where no drive holds them: for a look at where the drives lead.
+Mechanism WithTurnsHeld(const Mechanism& mechanism) {
+  Mechanism m = mechanism;
+  std::vector<Coordinate> drives;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    drives.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+  }
+  for (std::vector<Vec6> free = FreeMotion(m, drives); !free.empty();
+       free = FreeMotion(m, drives)) {
+    if (!HoldTurn(free, &m)) break;
+  }
+  return m;
+}
+
+// Rotations of balls that stay when `held` are held, as independent coordinates.
+std::vector<Coordinate> TurnsLeft(const Mechanism& m, const std::vector<Coordinate>& held) {
+  std::vector<Coordinate> candidates = held;
+  for (size_t j = 0; j < m.joints.size(); ++j) {
+    for (int c = 0; c < FreedomsOf(m.joints[j].kind); ++c) {
+      if (!IsOfBall(m.joints[j].kind, c)) continue;
+      candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
+    }
+  }
+  std::vector<Coordinate> turns;
+  for (const size_t k : ChooseCoordinates(m, candidates, held.size()).chosen) {
+    if (k >= held.size()) turns.push_back(candidates[k]);
+  }
+  return turns;
+}
+
+// "J.0, J.1 …", as a scenario names start values.
+std::vector<std::string> StartNames(const Mechanism& m, const std::vector<Coordinate>& turns) {
+  std::vector<std::string> names;
+  for (const Coordinate& turn : turns) {
+    names.push_back(
+        fmt::format("{}.{}", m.joints[static_cast<size_t>(turn.index)].name, turn.component));
+  }
+  return names;
+}
+
+std::string ByForcesNote(const Mechanism& m, const std::vector<Coordinate>& turns) {
+  std::string text =
+      fmt::format("{} degree{} of freedom that no drive on a joint can hold move{} by forces: {}",
+                  turns.size(), turns.size() == 1 ? "" : "s", turns.size() == 1 ? "s" : "",
+                  Joined(StartNames(m, turns), kMostNames));
+  std::vector<std::string> spins;
+  for (const Spin& spin : FindSpins(m)) {
+    if (spin.why_not.empty()) continue;
+    spins.push_back(fmt::format("{} ({})", spin.name, spin.why_not));
+  }
+  if (!spins.empty()) {
+    text += "; these spins between two balls are not idle: " + Joined(spins, kMostNames);
+  }
+  return text;
+}
+
+// Without outputs nothing shows how balls turn. Idle spins stay idle without one.
+void AddOutputs(Mechanism* m) {
+  if (!m->outputs.empty()) return;
+  std::vector<bool> shown(m->bodies.size(), false);
+  for (const Joint& joint : m->joints) {
+    if (joint.kind != JointKind::kSpherical) continue;
+    for (const int b : {joint.parent, joint.child}) shown[static_cast<size_t>(b)] = b != 0;
+  }
+  for (const Spin& spin : IdleSpins(*m)) {
+    for (const int b : spin.bodies) shown[static_cast<size_t>(b)] = false;
+  }
+  for (size_t b = 1; b < shown.size(); ++b) {
+    if (!shown[b]) continue;
+    m->outputs.push_back({.name = m->bodies[b].name,
+                          .body = static_cast<int>(b),
+                          .X_BO = Pose::Identity(),
+                          .reference_body = 0,
+                          .X_RbR = Pose::Identity()});
+  }
 }
 
 // How fast the bodies are against the drives.
@@ -176,7 +254,7 @@ class MotionSearch {
 
 std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
                          const std::string& model_ref, const std::vector<std::string>& notes,
-                         bool holding) {
+                         const std::vector<Coordinate>& by_forces, bool holding) {
   const WrittenNames names = NamesInModel(m);
   std::string text =
       "# A first motion, made by mbverify: each drive goes out and back again.\n"
@@ -184,8 +262,8 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
   for (const std::string& note : notes) text += "# " + note + "\n";
   text += fmt::format(
       "mechanism: {}\ndescription: Each drive out and back, from rest to rest\nmotion:\n"
-      "  duration_s: {}\n  sample_s: 0.01\n  commands:\n",
-      QuotedYaml(model_ref), motion.duration_s);
+      "  duration_s: {}\n  sample_s: 0.01\n{}",
+      QuotedYaml(model_ref), motion.duration_s, m.drives.empty() ? "" : "  commands:\n");
   for (size_t d = 0; d < m.drives.size(); ++d) {
     const DriveStroke& stroke = motion.strokes[d];
     if (stroke.height == 0.0) {
@@ -194,6 +272,14 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
       text += fmt::format(
           "    {}: [home, {{bump: {{start_s: {:g}, duration_s: {:g}, height: {:.6g}}}}}]\n",
           names.drives[d], stroke.start_s, stroke.duration_s, stroke.height);
+    }
+  }
+  if (!by_forces.empty()) {
+    text += "  initial:\n";
+    for (const Coordinate& turn : by_forces) {
+      text +=
+          fmt::format("    {}: home\n",
+                      QuotedYaml(fmt::format("{}.{}", names.joints[turn.index], turn.component)));
     }
   }
   return text + fmt::format(
@@ -211,61 +297,50 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
 
 }  // namespace
 
-Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::string>* notes) {
+Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::string>* notes,
+                                  std::vector<Coordinate>* by_forces) {
   Mechanism m = mechanism;
-  std::vector<std::string> held;
-  for (;;) {
-    const std::vector<Coordinate> candidates = Candidates(m);
-    const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
-    std::vector<Coordinate> taken;
-    for (const size_t k : choice.chosen) taken.push_back(candidates[k]);
-    if (choice.left() > 0) {
-      const std::string ball = HoldSpin(FreeMotion(m, taken), &m);
-      if (!ball.empty()) {
-        held.push_back(ball);
-        continue;
-      }
-      notes->push_back(
-          fmt::format("{} freedoms cannot be held by a drive on a joint", choice.left()));
-    }
-    std::vector<Drive> drives;
-    std::vector<std::string> dropped, added;
-    for (size_t d = 0; d < m.drives.size(); ++d) {
-      if (std::find(choice.dependent.begin(), choice.dependent.end(), d) ==
-          choice.dependent.end()) {
-        drives.push_back(m.drives[d]);
-      } else {
-        dropped.push_back(m.drives[d].name);
-      }
-    }
-    for (const Coordinate& coordinate : taken) {
-      if (coordinate.kind != Coordinate::Kind::kJoint) continue;
-      drives.push_back(DriveOn(m, coordinate));
-      added.push_back(drives.back().name);
-    }
-    if (!held.empty()) {
-      notes->push_back(
-          fmt::format("these balls are universal joints here, so that rods do not spin "
-                      "about their own axes: {}",
-                      Joined(held, kMostNames)));
-    }
-    if (!dropped.empty()) {
-      notes->push_back(fmt::format("these drives depend on the others and are left out: {}",
-                                   Joined(dropped, kMostNames)));
-    }
-    if (!added.empty()) {
-      notes->push_back(
-          fmt::format("{} freedom{} without a drive {} held by added drives, chosen by rank: {}",
-                      added.size(), added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are",
-                      Joined(added, kMostNames)));
-    }
-    m.drives = std::move(drives);
-    return m;
+  const std::vector<Coordinate> candidates = Candidates(m);
+  const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
+  std::vector<Coordinate> taken;
+  for (const size_t k : choice.chosen) taken.push_back(candidates[k]);
+  by_forces->clear();
+  if (choice.left() > 0) *by_forces = TurnsLeft(m, taken);
+  if (!by_forces->empty()) notes->push_back(ByForcesNote(m, *by_forces));
+  if (const auto held = static_cast<int>(by_forces->size()); held < choice.left()) {
+    notes->push_back(
+        fmt::format("{} freedoms cannot be held by a drive on a joint", choice.left() - held));
   }
+  std::vector<Drive> drives;
+  std::vector<std::string> dropped, added;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    if (std::find(choice.dependent.begin(), choice.dependent.end(), d) == choice.dependent.end()) {
+      drives.push_back(m.drives[d]);
+    } else {
+      dropped.push_back(m.drives[d].name);
+    }
+  }
+  for (const Coordinate& coordinate : taken) {
+    if (coordinate.kind != Coordinate::Kind::kJoint) continue;
+    drives.push_back(DriveOn(m, coordinate));
+    added.push_back(drives.back().name);
+  }
+  if (!dropped.empty()) {
+    notes->push_back(fmt::format("these drives depend on the others and are left out: {}",
+                                 Joined(dropped, kMostNames)));
+  }
+  if (!added.empty()) {
+    notes->push_back(fmt::format(
+        "{} freedom{} without a drive {} held by added drives, chosen by rank: {}", added.size(),
+        added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are", Joined(added, kMostNames)));
+  }
+  m.drives = std::move(drives);
+  return m;
 }
 
 FirstMotion FindFirstMotion(const Mechanism& mechanism, const std::vector<std::string>& resting) {
-  return MotionSearch(mechanism, resting).Run();
+  const Mechanism held = WithTurnsHeld(mechanism);
+  return MotionSearch(held, resting).Run();
 }
 
 DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
@@ -275,9 +350,12 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   result.diagnostics = loaded.diagnostics;
   if (!loaded.mechanism) return result;
   DefaultSetup setup;
-  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &setup.notes);
+  std::vector<Coordinate> by_forces;
+  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &setup.notes, &by_forces);
+  setup.by_forces = static_cast<int>(by_forces.size());
+  if (setup.by_forces > 0) AddOutputs(&m);
   if (!name.empty()) m.name = name;
-  if (m.drives.empty()) {
+  if (m.drives.empty() && by_forces.empty()) {
     result.diagnostics.AddError(file, "the mechanism has no freedom: there is nothing to move");
     return result;
   }
@@ -298,7 +376,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   }
   setup.meshes = TakeMeshesAlong(&m);
   setup.model = WriteModel(m);
-  setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, !resting.empty());
+  setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, by_forces, !resting.empty());
   setup.mechanism = std::move(m);
   for (const std::string& note : setup.notes) {
     result.diagnostics.Add({Severity::kWarning, file, 0, 0, note, ""});

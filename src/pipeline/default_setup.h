@@ -7,17 +7,20 @@
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
 #include "model_file/load_model.h"
 #include "model_file/write_model.h"
 
 namespace mbv {
 
-/// Gives every freedom of a mechanism one drive. Drives that depend on others are left out, and
-/// freedoms that none of them holds get drives on joints, chosen by rank. A rod that can spin about
-/// its own axis between two balls is held by making one of them a universal joint. What was done is
-/// said in `notes`.
+/// Gives every degree of freedom of a mechanism one drive. Drives that depend on others are left
+/// out, and degrees of freedom that none of them holds get drives on joints, chosen by rank. Idle
+/// spins need none. Rotations of balls that no drive on a joint can hold, such as spins that are
+/// not idle, move by forces: `by_forces` gets coordinates for them. What was done is reported in
+/// `notes`.
 [[nodiscard]] Mechanism WithDriveForEachFreedom(const Mechanism& mechanism,
-                                                std::vector<std::string>* notes);
+                                                std::vector<std::string>* notes,
+                                                std::vector<Coordinate>* by_forces);
 
 struct DriveStroke {
   double home = 0.0;    ///< [m] or [rad]
@@ -33,7 +36,7 @@ struct FirstMotion {
 };
 /// The largest of a sequence of ever smaller motions on which loops stay closed, joints stay in
 /// their ranges and no body moves much faster against the drives than it does at home. Drives named
-/// in `resting` rest.
+/// in `resting` rest, and so do rotations that move by forces.
 [[nodiscard]] FirstMotion FindFirstMotion(const Mechanism& mechanism,
                                           const std::vector<std::string>& resting);
 
@@ -44,6 +47,7 @@ struct DefaultSetup {
   std::vector<ModelMeshFile> meshes;  ///< beside model.yaml
   std::vector<std::string> notes;
   Mechanism mechanism;  ///< as `model` describes it
+  int by_forces = 0;    ///< degrees of freedom that move by forces: the scenario is a free motion
 };
 struct DefaultSetupResult {
   std::optional<DefaultSetup> setup;  ///< empty after errors

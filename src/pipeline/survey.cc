@@ -111,7 +111,9 @@ void Survey(const std::string& file, const std::string& scratch, SurveyRow* row)
     }
   }
   const std::string scenario = (folder / "first.yaml").string();
-  const bool inverse = RunMode(scenario, "inverse", &row->inverse_nrmse, row);
+  // What moves by forces has no inverse dynamics.
+  const bool inverse =
+      made.setup->by_forces > 0 || RunMode(scenario, "inverse", &row->inverse_nrmse, row);
   const std::string said = row->message, status = row->status;
   const bool forward = RunMode(scenario, "forward", &row->forward_nrmse, row);
   if (!inverse) {

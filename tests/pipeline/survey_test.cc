@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "core/bytes.h"
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
@@ -113,7 +115,8 @@ TEST(Survey, ARowGoesThroughBytesUnchanged) {
   EXPECT_EQ(SurveyHtml({row}, "x").find("<script>"), std::string::npos);
 }
 
-// A rod between two balls, whose spin nothing holds, and a drive too many.
+// A rod between two balls, whose spin nothing holds and which its inertia feels, and a drive too
+// many.
 constexpr const char* kRod = R"(name: rod
 world: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}
 bodies:
@@ -132,22 +135,27 @@ TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
   const LoadResult loaded = LoadModelText(kRod, "rod.yaml");
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   std::vector<std::string> notes;
-  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes);
+  std::vector<Coordinate> by_forces;
+  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
   const Mobility mobility = AnalyseMobility(m);
-  EXPECT_EQ(mobility.undriven, 0);
-  EXPECT_EQ(mobility.freedoms, 1);  // the spin is held, not driven
+  EXPECT_EQ(mobility.undriven, 1);  // the spin, which moves by forces
+  EXPECT_EQ(mobility.freedoms, 2);
+  ASSERT_EQ(by_forces.size(), 1u);
+  EXPECT_TRUE(m.joints[static_cast<size_t>(by_forces[0].index)].kind == JointKind::kSpherical);
   ASSERT_EQ(m.drives.size(), 1u);
   EXPECT_EQ(m.drives[0].name, "m");
   ASSERT_EQ(notes.size(), 2u);
-  EXPECT_NE(notes[0].find("universal joints here"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[0].find("moves by forces"), std::string::npos) << notes[0];
+  EXPECT_NE(notes[0].find("the inertia of rod is not symmetric"), std::string::npos) << notes[0];
   EXPECT_NE(notes[1].find("left out: n"), std::string::npos) << notes[1];
 
   Mechanism without = *loaded.mechanism;
   without.drives.clear();
   notes.clear();
-  const Mechanism chosen = WithDriveForEachFreedom(without, &notes);
+  const Mechanism chosen = WithDriveForEachFreedom(without, &notes, &by_forces);
   ASSERT_EQ(chosen.drives.size(), 1u);
-  EXPECT_EQ(AnalyseMobility(chosen).undriven, 0);
+  EXPECT_EQ(AnalyseMobility(chosen).undriven, 1);
+  EXPECT_EQ(by_forces.size(), 1u);
   EXPECT_NE(notes.back().find("chosen by rank"), std::string::npos) << notes.back();
 }
 
@@ -158,7 +166,9 @@ TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   const LoadResult loaded = LoadModelText(round, "rod.yaml");
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   std::vector<std::string> notes;
-  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes);
+  std::vector<Coordinate> by_forces;
+  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
+  EXPECT_TRUE(by_forces.empty());
   EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("B"))].kind, JointKind::kSpherical);
   EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("C"))].kind, JointKind::kSpherical);
   const Mobility mobility = AnalyseMobility(m);
@@ -168,11 +178,112 @@ TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   EXPECT_NE(notes[0].find("left out: n"), std::string::npos) << notes[0];
 }
 
+// Whatever balls connect keeps its degrees of freedom; those that no drive can hold move by forces.
+TEST(DefaultSetup, BallsStayBalls) {
+  const auto rod = [](const char* com, const char* inertia, const char* more) {
+    return std::string(
+               "name: rod\nworld: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}\nbodies:\n"
+               "  crank: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.2, 0, 0]}}\n"
+               "  rod: {mass: 1, com: ") +
+           com + ", inertia: " + inertia +
+           ", frames: {side: [0.2, 0.02, 0], end: [0.5, 0, 0]}}\n"
+           "  rocker: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.4, 0, 0]}}\n"
+           "joints:\n"
+           "  A: {kind: revolute, parent: world.A, child: crank, axis: z, guess: 1.1}\n"
+           "  B: {kind: spherical, parent: crank.end, child: rod}\n"
+           "  C: {kind: spherical, parent: rocker.end, child: rod.end}\n"
+           "  D: {kind: revolute, parent: world.D, child: rocker, axis: z, guess: 1.2}\n"
+           "drives: {m: {kind: joint, joint: A}}\n" +
+           more;
+  };
+  std::string platform =
+      "name: platform\n"
+      "world: {frames: {P1: [0.3, 0, 0], P2: [-0.15, 0.26, 0], P3: [-0.15, -0.26, 0]}}\nbodies:\n"
+      "  plate: {mass: 2, inertia: [0.02, 0.02, 0.04], frames: {C1: [0.2, 0, 0], C2: [-0.1, 0.17, "
+      "0], C3: [-0.1, -0.17, 0]}}\n";
+  std::string joints = "joints:\n";
+  for (int i = 1; i <= 3; ++i) {
+    platform += fmt::format(
+        "  rod{}: {{mass: 0.3, com: [0, 0, -0.15], inertia: [0.003, 0.003, 0.0001], frames: {{end: "
+        "[0, 0, -0.3]}}}}\n",
+        i);
+    joints += fmt::format(
+        "  B{0}: {{kind: spherical, parent: world.P{0}, child: rod{0}}}\n"
+        "  C{0}: {{kind: spherical, parent: rod{0}.end, child: plate.C{0}}}\n",
+        i);
+  }
+  const std::string chain =
+      "name: chain\nworld: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}\nbodies:\n"
+      "  crank: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.2, 0, 0]}}\n"
+      "  one: {mass: 1, com: [0.2, 0, 0], inertia: [0.001, 0.01, 0.01], frames: {end: [0.4, 0, "
+      "0]}}\n"
+      "  two: {mass: 1, com: [0.2, 0, 0], inertia: [0.001, 0.01, 0.01], frames: {end: [0.4, 0, "
+      "0]}}\n"
+      "  rocker: {mass: 1, inertia: [0.01, 0.01, 0.01], frames: {end: [0.4, 0, 0]}}\n"
+      "joints:\n"
+      "  A: {kind: revolute, parent: world.A, child: crank, axis: z, guess: 1.1}\n"
+      "  B: {kind: spherical, parent: crank.end, child: one}\n"
+      "  M: {kind: spherical, parent: one.end, child: two, guess: [0, 0.5, -0.9]}\n"
+      "  C: {kind: spherical, parent: rocker.end, child: two.end}\n"
+      "  D: {kind: revolute, parent: world.D, child: rocker, axis: z, guess: 1.2}\n";
+  const char* kRound = "[0.001, 0.01, 0.01]";
+  const char* kMiddle = "[0.25, 0, 0]";
+  struct Case {
+    const char* what;
+    std::string model;
+    int freedoms, by_forces;
+  };
+  const std::vector<Case> cases = {
+      {"a round rod", rod(kMiddle, kRound, ""), 1, 0},
+      {"an uneven rod", rod(kMiddle, "[0.001, 0.01, 0.009]", ""), 2, 1},
+      {"an eccentric rod", rod("[0.25, 0.01, 0]", kRound, ""), 2, 1},
+      {"a rod with a spring beside its line",
+       rod(kMiddle, kRound, "springs: {s: {from: world, to: rod.side, stiffness: 10}}\n"), 2, 1},
+      {"a rod with an output", rod(kMiddle, kRound, "outputs: {rod: rod}\n"), 2, 1},
+      {"a chain of two rods", chain, 3, 1},
+      {"a platform on three rods", platform + joints, 3, 3},
+      {"a body on one ball",
+       "name: pendulum\nbodies: {bob: {mass: 1, com: [0.05, 0, -0.3], inertia: [0.01, 0.012, "
+       "0.003]}}\njoints: {B: {kind: spherical, parent: world, child: bob}}\n",
+       3, 3},
+  };
+  for (const Case& c : cases) {
+    const LoadResult loaded = LoadModelText(c.model, "m.yaml");
+    ASSERT_TRUE(loaded.mechanism) << c.what << loaded.diagnostics.Text();
+    std::vector<std::string> notes;
+    std::vector<Coordinate> by_forces;
+    const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
+    EXPECT_EQ(AnalyseMobility(*loaded.mechanism).freedoms, c.freedoms) << c.what;
+    EXPECT_EQ(AnalyseMobility(m).freedoms, c.freedoms) << c.what;
+    EXPECT_EQ(static_cast<int>(by_forces.size()), c.by_forces) << c.what;
+    EXPECT_EQ(static_cast<int>(m.drives.size()), c.freedoms - c.by_forces) << c.what;
+    for (size_t j = 0; j < m.joints.size(); ++j) {
+      EXPECT_EQ(m.joints[j].kind, loaded.mechanism->joints[j].kind) << c.what;
+    }
+  }
+}
+
+// A ball pendulum from MJCF is surveyed with all its degrees of freedom.
+TEST(Survey, ABallPendulumSwingsFreely) {
+  const test::TestFolder folder("survey_ball");
+  const SurveyRow row = SurveyFile(
+      folder.Write("bob.xml",
+                   "<mujoco model=\"bob\"><worldbody><body name=\"bob\"><joint name=\"B\" "
+                   "type=\"ball\"/><inertial pos=\"0.05 0 -0.3\" mass=\"1\" "
+                   "diaginertia=\"0.01 0.012 0.003\"/></body></worldbody></mujoco>"),
+      folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_EQ(row.freedoms, 3);
+  EXPECT_TRUE(std::isnan(row.inverse_nrmse));
+  EXPECT_NE(row.message.find("3 degrees of freedom"), std::string::npos) << row.message;
+}
+
 TEST(DefaultSetup, TheFirstMotionKeepsToTheRanges) {
   LoadResult loaded = LoadModelText(kRod, "rod.yaml");
   ASSERT_TRUE(loaded.mechanism);
   std::vector<std::string> notes;
-  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes);
+  std::vector<Coordinate> by_forces;
+  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
   const FirstMotion wide = FindFirstMotion(m, {});
   EXPECT_TRUE(wide.found);
   EXPECT_FALSE(wide.beyond_ranges);
