@@ -367,9 +367,12 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
     }
   }
   const FirstMotion motion = FindFirstMotion(m, resting);
-  if (!motion.found) {
+  if (!motion.found && !m.drives.empty()) {
     setup.notes.emplace_back(
-        "no motion was found that stays away from singular poses: the smallest is taken");
+        by_forces.empty()
+            ? "no motion was found that stays away from singular poses: the smallest is taken"
+            : "no motion of the drives was found with what moves by forces held: the smallest is "
+              "taken");
   }
   if (motion.beyond_ranges) {
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");

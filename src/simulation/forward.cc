@@ -1,13 +1,12 @@
 // Forward mode: the step loops of the corrected and of the stock engine.
 #include <fmt/format.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "mechanism/reach.h"
 #include "mjcf/mjcf.h"
+#include "mjcf/plan.h"
 #include "simulation/fastest_rate.h"
 #include "simulation/integrator.h"
 #include "simulation/session.h"
@@ -32,7 +31,7 @@ RunSummary Failure(const std::string& message, double t_s) {
 RunSummary PutAtStart(Session* s, const DrivenSample& first) {
   if (s->motion.free()) return PutAtFreeStart(s, first);
   if (s->options.drives != DriveMode::kGuided) return PutAtCommandedStart(s, first);
-  if (RunSummary summary = s->solver.Follow(HomePositions(s->engine), first.position);
+  if (RunSummary summary = CloseAtStart(s->motion, first, &s->system, &s->solver, &s->run->notes);
       !summary.ok()) {
     summary.time_s = 0.0;
     return summary;
@@ -82,14 +81,6 @@ RunSummary CheckStep(Session* s) {
   return RunSummary::Done();
 }
 
-double ExtentOf(const Mechanism& mechanism) {
-  Eigen::AlignedBox3d box;
-  for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
-    box.extend(mechanism.X_WB_home[b].translation());
-  }
-  return std::max(box.isEmpty() ? 0.0 : box.diagonal().norm(), CharacteristicLength(mechanism));
-}
-
 // Of what was recorded.
 RunSummary TroubleAt(const Session& s, double t_s) {
   RunSummary summary = s.trouble;
@@ -125,7 +116,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
   }
   if (RunSummary summary = PutAtStart(s, first.motion); !summary.ok()) return summary;
   if (RunSummary summary = CheckStep(s); !summary.ok()) return summary;
-  const double largest_gap = kApart * ExtentOf(*s->engine.mechanism);
+  const double largest_gap = kApart * mjcf::Extent(*s->engine.mechanism);
   Integrator integrator(s, AdjustedStep(s->motion, s->options.step_s));
   StickSlip friction(s, &integrator, command);
   const LoopClock clock;

@@ -68,12 +68,13 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
   SamplePredictor predictor(s->engine);
   VecX tau(s->engine.m->nv), closed;
   const LoopClock clock;
-  const VecX home = HomePositions(s->engine);
   for (size_t i = 0; i < times.size(); ++i) {
     closed = Eigen::Map<const VecX>(d->qpos, s->engine.m->nq);
     if (i > 0) predictor.Predict(times[i] - times[i - 1], d);
-    const VecX& from = i > 0 ? samples[i - 1].position : home;
-    if (RunSummary summary = s->solver.FollowPredicted(closed, from, samples[i].position);
+    if (RunSummary summary =
+            i == 0
+                ? CloseAtStart(s->motion, samples[0], &s->system, &s->solver, &s->run->notes)
+                : s->solver.FollowPredicted(closed, samples[i - 1].position, samples[i].position);
         !summary.ok()) {
       return At(summary, times[i]);
     }

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <functional>
+#include <string>
 #include <vector>
 
 #include "simulation/closure_solver.h"
@@ -102,10 +103,18 @@ class LoopClock {
 /// Start of a free motion: options.start on the loops, guided coordinates at `first`.
 [[nodiscard]] RunSummary PutAtFreeStart(Session* session, const DrivenSample& first);
 
+/// Brings the system's data from home to the commanded start. Commands of outputs lead there by
+/// MuJoCo's own kinematics, those of drives by the drive positions; the loops are closed at the
+/// drive positions of `first`. A note says where the drive positions alone would have led
+/// elsewhere.
+[[nodiscard]] RunSummary CloseAtStart(const Motion& motion, const DrivenSample& first,
+                                      ConstraintSystem* system, ClosureSolver* solver,
+                                      std::vector<std::string>* notes);
 /// Start of a pushed or servo-driven mechanism: every drive and base on its command. Needs the
 /// guiding constraints of all drives; leaves them switched on.
-[[nodiscard]] RunSummary FindCommandedStart(EngineModel* engine, const DrivenSample& first,
-                                            EngineState* start);
+[[nodiscard]] RunSummary FindCommandedStart(const Motion& motion, const DrivenSample& first,
+                                            EngineModel* engine, EngineState* start,
+                                            std::vector<std::string>* notes);
 /// Puts the session there, closed once more without the guides.
 [[nodiscard]] RunSummary PutAtCommandedStart(Session* session, const DrivenSample& first);
 

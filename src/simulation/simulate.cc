@@ -257,7 +257,8 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   if (options.drives != DriveMode::kGuided) {
     DrivenSample first;
     if (RunSummary summary = driven(0.0, &first); !summary.ok()) return summary;
-    if (RunSummary summary = FindCommandedStart(&engine, first, &start); !summary.ok()) {
+    if (RunSummary summary = FindCommandedStart(motion, first, &engine, &start, &run->notes);
+        !summary.ok()) {
       return summary;
     }
     GuideDrives(false, &engine);
