@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "comparison/force_scale.h"
 #include "mechanism/channels.h"
 #include "tests/comparison/carried.h"
 #include "tests/comparison/synthetic.h"
@@ -175,6 +176,167 @@ TEST(EnergyAudit, EnergyOfABaseDoesNotHideADrive) {
   EXPECT_GT(audit.drift.value, 0.2) << "of the energy that the cart has";
   EXPECT_LT(audit.drift_J, 1e-6 * 1e8) << "beside the vehicle's it would be nothing";
   EXPECT_EQ(audit.culprit, "d2");
+}
+
+// The energy turned over: the largest kinetic energy or work, whichever is more, and at least what
+// the force scale does over a thousandth of the length.
+TEST(EnergyScale, IsTheLargestOfKineticEnergyWorkAndWhatForcesDoAtLeast) {
+  Pushed run;
+  EXPECT_NEAR(run.Audit().scale_J, 9.0, 1e-9) << "kinetic";
+  Stretch(&run.trace, "energy.kinetic", 0.1);
+  VecX work = run.trace.values.col(run.trace.Find("d1.work")) +
+              run.trace.values.col(run.trace.Find("dampers.work"));
+  EXPECT_NEAR(run.Audit().scale_J, work.cwiseAbs().maxCoeff(), 1e-9) << "work";
+  for (const char* part : {"energy.kinetic", "energy.springs", "d1.work", "dampers.work"}) {
+    Stretch(&run.trace, part, 0.0);
+  }
+  const ForceScale force = ForceScaleOf(run.Input(), run.trace);
+  EXPECT_NEAR(run.Audit().scale_J, 1e-3 * force.length_m * force.force_N, 1e-12);
+}
+
+TEST(EnergyScale, BesideABaseIsWhatTheCarriedBodiesOrTheDrivesCanDo) {
+  OnMovingVehicle run;
+  const ComparisonInput input{.mechanism = &run.mechanism,
+                              .motion = &run.motion,
+                              .limits = {},
+                              .simulation_limits = LimitColumn::kForward,
+                              .witnesses = {},
+                              .driven_by = "reference",
+                              .reactions_not_unique = {}};
+  for (const char* signal : {"d2.velocity"}) {
+    run.trace.values.col(run.trace.Find(signal)).setConstant(2.0);
+  }
+  const ForceScale force = ForceScaleOf(input, run.trace);
+  ASSERT_GT(force.power_W, 9.0);
+  EXPECT_NEAR(run.Audit().scale_J, force.power_W * 1.0, 1e-9) << "in the second that it takes";
+  run.trace.values.col(run.trace.Find("d2.velocity")).setZero();
+  EXPECT_NEAR(run.Audit().scale_J, 9.0, 0.01) << "what the drive has done";
+  // At rest in an even lift: no less than what forces do at least.
+  run.trace.values.col(run.trace.Find("d2.work")).setZero();
+  const ForceScale at_rest = ForceScaleOf(input, run.trace);
+  EXPECT_NEAR(run.Audit().scale_J, 1e-3 * at_rest.length_m * at_rest.force_N, 1e-12);
+}
+
+TEST(EnergyScale, AShareOfTheBasesEnergyIsNoDriftAndOfNothingElse) {
+  OnMovingVehicle run;
+  const double base_J = 1e8 * std::sin(1.0) + 9.0;
+  Bend(&run.trace, "d2.work", 0.5e-8 * base_J);
+  EXPECT_EQ(run.Audit().drift.value, 0.0);
+  Bend(&run.trace, "d2.work", 1.5e-8 * base_J);
+  EXPECT_GT(run.Audit().drift.value, 0.0);
+  OnMovingVehicle light;  // a base that turns over no more than the drive
+  for (const char* part : {"energy.kinetic", "vehicle.work"}) Stretch(&light.trace, part, 0.0);
+  light.trace.values.col(light.trace.Find("energy.kinetic")) =
+      light.trace.values.col(light.trace.Find("d2.work"));
+  Bend(&light.trace, "d2.work", 1e-9);
+  EXPECT_GT(light.Audit().drift.value, 0.0);
+}
+
+TEST(EnergyAudit, WithoutItsWorkABaseCountsWithItsPower) {
+  OnMovingVehicle run;
+  for (Channel& channel : run.trace.channels) {
+    if (channel.name == "vehicle.work") channel.name = "vehicle.work_unknown";
+    if (channel.name == "d2.work") channel.name = "d2.work_unknown";
+  }
+  run.trace.values.col(run.trace.Find("energy.kinetic")).setZero();
+  const int base = run.trace.Find("power.base");
+  // P = 4 t³ − 3 t², of which cubics through four samples make exactly t⁴ − t³.
+  for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+    const double t = run.trace.time_s[i];
+    const auto row = static_cast<Eigen::Index>(i);
+    run.trace.values(row, base) = 4e6 * t * t * t - 3e6 * t * t;
+    run.trace.values(row, run.trace.Find("energy.kinetic")) = 1e6 * (t * t * t * t - t * t * t);
+  }
+  const EnergyAudit audit = run.Audit();
+  EXPECT_FALSE(audit.integrated);
+  EXPECT_LT(audit.drift_J, 1e6 * 64 * kEps);
+  const auto part = std::find_if(audit.parts.begin(), audit.parts.end(),
+                                 [](const EnergyPart& p) { return p.name == "base motion"; });
+  ASSERT_NE(part, audit.parts.end());
+  EXPECT_NEAR(part->most_J, 1e6 * 27.0 / 256.0, 50.0);
+}
+
+TEST(EnergyAudit, WhatIsNotANumberIsNoBalance) {
+  Pushed run;
+  run.trace.values(50, run.trace.Find("energy.springs")) = kNan;
+  EXPECT_TRUE(std::isnan(run.Audit().drift.value));
+}
+
+// Two parts that explain a drift equally are both named, one that explains it less is not.
+TEST(EnergyAudit, PartsThatExplainItEquallyAreBothNamed) {
+  Pushed run;
+  const VecX damped = run.trace.values.col(run.trace.Find("dampers.work"));
+  run.trace.values.col(run.trace.Find("loads.work")) = damped;
+  run.trace.values.col(run.trace.Find("d1.work")) -= damped;
+  Stretch(&run.trace, "dampers.work", 0.9);
+  EXPECT_NE(run.Audit().text.find(" or work of "), std::string::npos) << run.Audit().text;
+  // A part that is a fifth off explains less: it is not named beside one that explains all.
+  Pushed alone;
+  VecX like = damped;
+  for (Eigen::Index i = 0; i < like.size(); ++i) {
+    like[i] += 0.3 * std::sin(20.0 * alone.trace.time_s[static_cast<size_t>(i)]);
+  }
+  alone.trace.values.col(alone.trace.Find("loads.work")) = like;
+  alone.trace.values.col(alone.trace.Find("d1.work")) -= like;
+  Stretch(&alone.trace, "dampers.work", 0.9);
+  EXPECT_EQ(alone.Audit().text.find(" or "), std::string::npos) << alone.Audit().text;
+}
+
+// The power balance is relative to the largest flow, to the kinetic energy over the time, and at
+// rest to what forces do at the speed of rest.
+TEST(PowerScaleTerms, EachFlowCountsAlone) {
+  for (const char* flow : {"power.base", "power.loads", "power.dampers", "power.gravity",
+                           "power.springs", "power.input"}) {
+    Pushed run;
+    run.trace.values.setZero();
+    run.trace.values.col(run.trace.Find("power.energy_rate")).setConstant(1.0);
+    run.trace.values.col(run.trace.Find(flow)).setConstant(1e6);
+    const WitnessMetrics metrics = MeasureWitness(run.Input(), run.trace);
+    // Inputs are not balanced where they flow in; what is exchanged inside is a scale only.
+    EXPECT_LT(metrics.metrics.at(Metric::kPower).value, 2.0) << flow;
+    EXPECT_GT(metrics.metrics.at(Metric::kPower).value, 0.5e-6) << flow;
+    const bool inside =
+        std::string(flow) == "power.gravity" || std::string(flow) == "power.springs";
+    if (inside) {
+      EXPECT_NEAR(metrics.metrics.at(Metric::kPower).value, 1e-6, 1e-12) << flow;
+    }
+  }
+}
+
+TEST(PowerScaleTerms, KineticEnergyCountsOverTheTimeAndRestWithTheSpeedOfRest) {
+  Pushed run;
+  run.trace.values.setZero();
+  run.trace.values.col(run.trace.Find("power.energy_rate")).setConstant(1e-6);
+  const auto power = [&] {
+    return MeasureWitness(run.Input(), run.trace).metrics.at(Metric::kPower).value;
+  };
+  const ForceScale force = ForceScaleOf(run.Input(), run.trace);
+  const double rest = RestFloorOf(run.Input(), "m").velocity;
+  EXPECT_NEAR(power(), 1e-6 / std::max(1e-6, rest * 1e-3 * force.force_N), 1e-9);
+  run.trace.values.col(run.trace.Find("d1.force")).setConstant(500.0);
+  EXPECT_NEAR(power(), 1e-6 / (rest * 500.0), 1e-12) << "a drive that holds";
+  run.trace.values.col(run.trace.Find("energy.kinetic")).setConstant(60.0);
+  EXPECT_NEAR(power(), 1e-6 / (60.0 / 2.0), 1e-13) << "over the 2 s";
+}
+
+TEST(PowerScaleTerms, RoundOffIsForgivenBesideABaseOnly) {
+  Pushed run;
+  run.trace.values.setZero();
+  for (const char* side : {"power.input", "power.energy_rate", "power.loads"}) {
+    run.trace.values.col(run.trace.Find(side)).setConstant(1e6);
+  }
+  run.trace.values(3, run.trace.Find("power.input")) += 1e-9;  // a few units in the last place
+  EXPECT_GT(MeasureWitness(run.Input(), run.trace).metrics.at(Metric::kPower).value, 0.0);
+}
+
+TEST(Start, OfAFreeMotionIsHeldAgainstItsValues) {
+  Pushed run;
+  run.motion.commands.clear();
+  run.motion.initial = {{.name = "d1", .coordinate = {Coordinate::Kind::kDrive, 0, 0}}};
+  run.motion.initial[0].position = 0.25;
+  ASSERT_TRUE(run.motion.free());
+  EXPECT_NEAR(MeasureWitness(run.Input(), run.trace).metrics.at(Metric::kCommandM).value, 0.25,
+              1e-12);
 }
 
 }  // namespace

@@ -102,6 +102,20 @@ TEST(Servo, AStatedLimitOnTheCommandIsJudged) {
       RunOf("spr_tripod/servo", Short({{"checks.position_m", "{servo: 1e-4}"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 1);
+  size_t failed = 0;
+  for (const CheckResult& check : outcome.report->comparison.checks) {
+    if (!check.limit || check.pass) continue;
+    ++failed;
+    EXPECT_EQ(check.metric, Metric::kPositionM) << check.name;
+    EXPECT_EQ(*check.limit, 1e-4);
+    EXPECT_GT(check.value, 1e-4);
+  }
+  EXPECT_GT(failed, 0u);
+  // Servos sag by themselves; that is no witness' fault.
+  EXPECT_EQ(outcome.report->comparison.attribution.odd_one_out, "");
+  const RunOutcome wide =
+      RunOf("spr_tripod/servo", Short({{"checks.position_m", "{servo: 1e-2}"}}));
+  EXPECT_EQ(wide.exit_code, 0) << wide.report->comparison.reason;
 }
 
 TEST(Servo, AStepThatCannotFollowTheGainsIsRefusedWithTheStepNeeded) {

@@ -2,7 +2,13 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
 #include "pipeline/check_file.h"
+#include "pipeline/run_scenario.h"
+#include "tests/figure/read_back.h"
 #include "tests/source_dir.h"
 #include "tests/test_folder.h"
 
@@ -13,6 +19,35 @@ using testing::HasSubstr;
 
 std::string FigureScenario(const std::string& name) {
   return std::string(kSourceDir) + "/scenarios/" + name + ".yaml";
+}
+
+// What a run records, by witness.
+const Trace& RecordedBy(const RunOutcome& outcome, const std::string& witness) {
+  for (const WitnessRecord& record : outcome.report->witnesses) {
+    if (record.name == witness) return record.trace;
+  }
+  ADD_FAILURE() << witness;
+  return outcome.report->witnesses.front().trace;
+}
+
+RunOutcome RunOfFigures(const std::string& name) {
+  RunOptions options;
+  options.pictures = false;
+  return RunScenario(FigureScenario(name), options);
+}
+
+// Every sample of a signal, in order, as a curve over time.
+void ExpectDrawn(const FigureCurve& curve, const Trace& trace, const std::string& signal,
+                 double factor = 1.0) {
+  ASSERT_EQ(curve.points.size(), trace.time_s.size()) << signal;
+  const int column = trace.Find(signal);
+  ASSERT_GE(column, 0) << signal;
+  EXPECT_GT(trace.values.col(column).cwiseAbs().maxCoeff(), 0.0) << signal;
+  for (size_t i = 0; i < curve.points.size(); ++i) {
+    const double value = factor * trace.values(static_cast<Eigen::Index>(i), column);
+    EXPECT_DOUBLE_EQ(curve.points[i].first, trace.time_s[i]);
+    EXPECT_NEAR(curve.points[i].second, value, 1e-12 * std::abs(value)) << signal << " " << i;
+  }
 }
 
 TEST(MakeFigures, DrawsWhatAMotionAndItsRunGave) {
@@ -27,6 +62,35 @@ TEST(MakeFigures, DrawsWhatAMotionAndItsRunGave) {
   EXPECT_EQ(outcome.files[0].first, "drive_torques.pdf");
   EXPECT_EQ(outcome.files[1].first, "drive_torques.svg");
   EXPECT_EQ(outcome.figures[0].files.size(), 2u);
+  // The torque that the run recorded, sample by sample, on the right scale.
+  const RunOutcome run = RunOfFigures("four_bar/turn_inverse");
+  ASSERT_TRUE(run.report) << run.diagnostics.Text();
+  const Figure& figure = outcome.figures[0].figure;
+  EXPECT_EQ(figure.panels[0].y.label, "Drive torque *τ* (N·m)");
+  ExpectDrawn(figure.panels[0].curves[0], RecordedBy(run, "reference"), "motor.force");
+  // In the file one path goes through all of its points: to the right with time, upwards with the
+  // torque, on one scale each.
+  const FigurePoints& points = figure.panels[0].curves[0].points;
+  const auto value = [](const auto& a, const auto& b) { return a.second < b.second; };
+  const auto low = static_cast<size_t>(std::ranges::min_element(points, value) - points.begin());
+  const auto high = static_cast<size_t>(std::ranges::max_element(points, value) - points.begin());
+  size_t found = 0;
+  for (const test::SvgPath& path : test::PathsOf(outcome.files[1].second)) {
+    if (path.points.size() != points.size()) continue;
+    ++found;
+    const auto& drawn = path.points;
+    const double pt_per_s = (drawn.back().first - drawn.front().first) / points.back().first;
+    const double pt_per_Nm =
+        (drawn[high].second - drawn[low].second) / (points[high].second - points[low].second);
+    EXPECT_GT(pt_per_s, 0.0);
+    EXPECT_LT(pt_per_Nm, 0.0);
+    for (size_t i = 0; i < points.size(); ++i) {
+      EXPECT_NEAR(drawn[i].first, drawn.front().first + pt_per_s * points[i].first, 0.02);
+      EXPECT_NEAR(drawn[i].second,
+                  drawn[low].second + pt_per_Nm * (points[i].second - points[low].second), 0.02);
+    }
+  }
+  EXPECT_EQ(found, 1u);
 }
 
 TEST(MakeFigures, AnUnknownNameIsRefusedWithTheNearest) {
@@ -46,6 +110,18 @@ TEST(MakeFigures, OfAStiffnessAreTheUsualMaps) {
   ASSERT_FALSE(outcome.figures.empty());
   EXPECT_THAT(outcome.figures[0].figure.name, HasSubstr("map_x_y_"));
   EXPECT_EQ(outcome.figures.size(), outcome.files.size());
+  // Cells of the first map are stiffnesses at its poses: numbers, and not the same ones.
+  ASSERT_TRUE(outcome.figures[0].figure.panels[0].map);
+  const MapPlot& map = *outcome.figures[0].figure.panels[0].map;
+  ASSERT_EQ(map.values.size(), static_cast<size_t>(map.columns * map.rows));
+  std::vector<double> reached;
+  for (const double cell : map.values) {
+    if (cell == cell) reached.push_back(cell);
+  }
+  ASSERT_GT(reached.size(), map.values.size() / 4);
+  const auto [least, most] = std::minmax_element(reached.begin(), reached.end());
+  EXPECT_GT(*least, 0.0);
+  EXPECT_GT(*most, 1.01 * *least);
 }
 
 // A turn of the four-bar with figures of its own.
@@ -74,7 +150,24 @@ TEST(OwnFigures, KnowForeignWitnesses) {
   const FigureOutcome outcome = MakeFigures(FigureScenario("four_bar/foreign"), options);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
   ASSERT_EQ(outcome.figures.size(), 1u);
-  EXPECT_EQ(outcome.figures[0].figure.panels[0].curves.size(), 2u);
+  ASSERT_EQ(outcome.figures[0].figure.panels[0].curves.size(), 2u);
+  const RunOutcome run = RunOfFigures("four_bar/foreign");
+  ASSERT_TRUE(run.report) << run.diagnostics.Text();
+  std::vector<std::string> drawn;
+  for (const FigureCurve& curve : outcome.figures[0].figure.panels[0].curves) {
+    for (const char* witness : {"planar", "reference", "simulated"}) {
+      const Trace& trace = RecordedBy(run, witness);
+      const int column = trace.Find("motor.force");
+      if (curve.points.size() == trace.time_s.size() &&
+          curve.points[30].second == trace.values(30, column)) {
+        drawn.emplace_back(witness);
+        ExpectDrawn(curve, trace, "motor.force");
+        break;
+      }
+    }
+  }
+  EXPECT_THAT(drawn, testing::Contains("planar"));
+  EXPECT_EQ(drawn.size(), 2u);
   options.scenario.set = {{"witnesses", "{other: {command: [x]}}"}};
   EXPECT_THAT(MakeFigures(FigureScenario("four_bar/foreign"), options).diagnostics.Text(),
               HasSubstr("= 'planar' is no witness"));
@@ -95,7 +188,15 @@ TEST(OwnFigures, AreDrawnBesideTheUsualOnesAndReplaceThoseOfTheirName) {
   EXPECT_THAT(names, testing::ElementsAre("drive_torques", "rates", "drive_angles", "power_energy",
                                           "torque_speed"));
   EXPECT_EQ(outcome.figures[0].figure.caption, "Mine");
-  EXPECT_EQ(outcome.figures[1].figure.panels.size(), 2u);
+  ASSERT_EQ(outcome.figures[1].figure.panels.size(), 2u);
+  // motor: cycloid of 1 rad in 1 s: rate 1 − cos 2πt, acceleration 2π sin 2πt.
+  const auto& panels = outcome.figures[1].figure.panels;
+  for (const size_t i : {0u, 10u, 25u, 70u, 100u}) {
+    const double angle = 2.0 * std::numbers::pi * 0.01 * static_cast<double>(i);
+    EXPECT_NEAR(panels[0].curves[0].points.at(i).second, 1.0 - std::cos(angle), 1e-9);
+    EXPECT_NEAR(panels[1].curves[0].points.at(i).second, 2.0 * std::numbers::pi * std::sin(angle),
+                1e-9);
+  }
 }
 
 TEST(OwnFigures, MistakesOfFormAreAllToldWithTheirPlaces) {

@@ -421,8 +421,12 @@ TEST(Mutate, ErrorsOfBothSignsMustBeSeen) {
 
 TEST(Mutate, AScenarioThatDisagreesIsNotBent) {
   const MutationReport report = Mutate("spr_tripod/must_fail/analytic_mass");
-  EXPECT_NE(report.exit_code, 0);
+  EXPECT_EQ(report.exit_code, 1);
   EXPECT_TRUE(report.mutations.empty());
+  EXPECT_EQ(report.runs, 0u) << "nothing is bent";
+  EXPECT_NE(report.diagnostics.Text().find("does not agree before anything is bent"),
+            std::string::npos)
+      << report.diagnostics.Text();
 }
 
 }  // namespace

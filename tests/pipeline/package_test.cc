@@ -5,6 +5,7 @@
 
 #include "pipeline/home_folder.h"
 #include "pipeline/package_inputs.h"
+#include "pipeline/rerun_judge.h"
 #include "tests/source_dir.h"
 #include "tests/test_folder.h"
 
@@ -18,6 +19,90 @@ TEST(LineNaming, FindsAFolderButNoPartOfAnotherName) {
   EXPECT_EQ(LineNaming("package/people/jane-x and data/people/jane", "/people/jane"), 0);
   EXPECT_EQ(LineNaming("/people/janet\n\n/people/jane", "/people/jane"), 3);
   EXPECT_EQ(LineNaming("", "/people/jane"), 0);
+}
+
+// Results of a packed motion against their repetition, as files.
+struct Repeated {
+  PackedScenario scenario{.file = std::string(kSourceDir) + "/scenarios/four_bar/turn_inverse.yaml",
+                          .kind = "motion",
+                          .results = "results/t",
+                          .figures = "",
+                          .verdict = "agree",
+                          .description = "",
+                          .reason = ""};
+  PackedResults packed = {
+      {"results/t/traces.csv",
+       "time_s,motor.position.reference,motor.force.reference,motor.force.simulated\n"
+       "0,0.1,2,2\n0.01,0.2,3,3\n0.02,0.3,4,4\n"},
+      {"results/t/inputs.json", "{}"}};
+  PackedResults rerun = packed;
+
+  void Replace(PackedResults* side, const std::string& what, const std::string& by) const {
+    std::string& text = side->at("results/t/traces.csv");
+    ASSERT_NE(text.find(what), std::string::npos) << what;
+    text.replace(text.find(what), what.size(), by);
+  }
+  [[nodiscard]] std::map<std::string, RerunFile> Judge() const {
+    std::map<std::string, RerunFile> files;
+    for (const RerunFile& file : JudgeReruns(scenario, packed, rerun, true)) {
+      files.emplace(file.path, file);
+    }
+    return files;
+  }
+  [[nodiscard]] RerunFile Traces() const { return Judge().at("results/t/traces.csv"); }
+};
+
+TEST(JudgeReruns, TheSameFilesAreTheSame) {
+  for (const auto& [path, file] : Repeated().Judge()) {
+    EXPECT_EQ(file.outcome, RerunOutcome::kSame) << path << file.why;
+  }
+}
+
+TEST(JudgeReruns, AFileThatOnlyOneSideHasDiffers) {
+  for (const bool archive : {true, false}) {
+    Repeated r;
+    (archive ? r.packed : r.rerun)["results/t/more.csv"] = "surplus";
+    const RerunFile more = r.Judge().at("results/t/more.csv");
+    EXPECT_EQ(more.outcome, RerunOutcome::kDiffers);
+    EXPECT_EQ(more.why, archive ? "is in the archive and is not made any more"
+                                : "is made, but is not in the archive");
+  }
+}
+
+TEST(JudgeReruns, AColumnOrARowThatOnlyOneSideHasDiffers) {
+  for (const bool archive : {true, false}) {
+    Repeated r;
+    PackedResults* side = archive ? &r.packed : &r.rerun;
+    r.Replace(side, "motor.force.simulated", "motor.force.simulated,motor.extra.simulated");
+    for (const char* row : {",2,2\n", ",3,3\n", ",4,4\n"}) {
+      r.Replace(side, row, std::string(row).substr(0, 4) + ",7\n");
+    }
+    EXPECT_EQ(r.Traces().outcome, RerunOutcome::kDiffers);
+    EXPECT_EQ(r.Traces().why, "has other columns");
+    Repeated rows;
+    rows.Replace(archive ? &rows.packed : &rows.rerun, "0.02,0.3,4,4\n", "");
+    EXPECT_EQ(rows.Traces().outcome, RerunOutcome::kDiffers);
+    EXPECT_EQ(rows.Traces().why,
+              archive ? "has 2 rows in the archive, 3 now" : "has 3 rows in the archive, 2 now");
+  }
+}
+
+TEST(JudgeReruns, TheSignalThatChangedIsTheOneThatIsOutside) {
+  Repeated r;
+  r.Replace(&r.rerun, "0.01,0.2,3,3", "0.01,0.2,3,3.001");
+  const RerunFile file = r.Traces();
+  EXPECT_EQ(file.outcome, RerunOutcome::kDiffers);
+  for (const RerunSignal& signal : file.signals) {
+    EXPECT_EQ(signal.inside(), signal.signal != "motor.force.simulated") << signal.signal;
+  }
+  ASSERT_NE(WorstSignal(file.signals), nullptr);
+  EXPECT_EQ(WorstSignal(file.signals)->signal, "motor.force.simulated");
+  EXPECT_NEAR(WorstSignal(file.signals)->relative, 0.001 / 4.0, 1e-12);
+  EXPECT_NEAR(WorstSignal(file.signals)->time_s, 0.01, 1e-12);
+  Repeated times;
+  times.Replace(&times.rerun, "0.02,0.3", "0.03,0.3");
+  EXPECT_EQ(times.Traces().outcome, RerunOutcome::kDiffers);
+  EXPECT_EQ(times.Traces().why, "has other times");
 }
 
 TEST(Package, DatesAreThoseOfTheCalendar) {

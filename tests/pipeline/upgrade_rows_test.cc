@@ -69,6 +69,7 @@ TEST(UpgradeRows, AreComparedOnlyWhereTheyAreTheSame) {
   RowAnswer other = NewRows();
   other.equalities[0] = "close:z";
   EXPECT_TRUE(CompareRows(OldRows(), other).empty());
+  EXPECT_EQ(CompareRows(OldRows(), NewRows()).size(), OldRows().states.empty() ? 0u : 3u);
 }
 
 }  // namespace

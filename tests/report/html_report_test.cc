@@ -163,6 +163,16 @@ TEST(HtmlData, PosesEndWhereTheSimulationFailed) {
   page.poses[2][2].translation().setConstant(kNan);
   const Json replay = Json::parse(PageData(page.input()))["replay"];
   EXPECT_EQ(replay["time"].size(), 2U);
+  for (const Json& body : replay["bodies"]) {
+    // Seven floats each, as base64, of what moves; seven numbers of what rests.
+    const Json& poses = body["poses"];
+    const size_t expected = poses.is_string() ? (2U * 7U * 4U + 2U) / 3U * 4U : 7U;
+    EXPECT_EQ(poses.is_string() ? poses.get<std::string>().size() : poses.size(), expected);
+  }
+  // Without the failure the third pose is there, too.
+  const Json whole = Json::parse(PageData(BentPage().input()))["replay"];
+  EXPECT_GT(whole["time"].size(), 2U);
+  EXPECT_EQ(whole["time"][1], replay["time"][1]);
 }
 
 TEST(HtmlData, WithoutASimulationThereIsTheHomePose) {
