@@ -187,5 +187,15 @@ TEST(SparseLeastNorms, NeedRowsThatAreIndependent) {
   EXPECT_FALSE(solver.Factor(dense.sparseView(), 1e-9));
 }
 
+// Rows that are nearly dependent are so by one tolerance and not by another.
+TEST(SparseLeastNorms, NeedRowsThatAreIndependentToTheTolerance) {
+  RandomMatrices matrices(6, 9);
+  MatX dense(matrices.Next());
+  dense.row(5) = dense.row(2) - 2.0 * dense.row(4) + 1e-4 * MatX(matrices.Next()).row(5);
+  SparseLeastNorm strict, loose;
+  EXPECT_FALSE(strict.Factor(dense.sparseView(), 1e-3));
+  EXPECT_TRUE(loose.Factor(dense.sparseView(), 1e-14));
+}
+
 }  // namespace
 }  // namespace mbv
