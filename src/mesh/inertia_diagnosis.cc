@@ -239,6 +239,8 @@ class Diagnosis {
 
 const char* WordOf(InertiaMistake mistake) {
   switch (mistake) {
+    case InertiaMistake::kNoMass:
+      return "no_mass";
     case InertiaMistake::kOpenMesh:
       return "open_mesh";
     case InertiaMistake::kImpossibleTensor:
@@ -282,13 +284,21 @@ BodyInertia DiagnoseInertia(const Body& body) {
   result.p_stated = body.p_BoBcm_B;
   result.I_stated = body.I_Bcm_B;
   const Surface surface = SurfaceOf(body, &result.meshes);
+  const auto add_no_mass = [&](const std::string& volume) {
+    if (body.mass > 0.0) return;
+    result.findings.push_back(
+        {InertiaMistake::kNoMass, "it has a mesh" + volume + " and no mass",
+         "state its mass properties (URDF: <inertial>); a body that never moves needs none"});
+  };
   if (!surface.open.empty()) {
+    add_no_mass("");
     result.findings.push_back({InertiaMistake::kOpenMesh, "not closed: " + surface.open,
                                "without a volume there is nothing to compare with"});
     return result;
   }
   result.solid = SolidShape(surface.whole);
   result.r_m = std::sqrt(0.5 * result.solid.G_cm.trace());
+  add_no_mass(fmt::format(" of {:.4g} cm³", 1e6 * result.solid.amount));
   if (body.mass <= 0.0) return result;
   result.density = body.mass / result.solid.amount;
   Diagnosis(body, surface, &result).Run();

@@ -16,6 +16,7 @@
 namespace mbv {
 
 enum class InertiaMistake {
+  kNoMass,             ///< meshes, and none stated
   kOpenMesh,           ///< a mesh that bounds no volume
   kImpossibleTensor,   ///< no distribution of mass has it
   kImprobableDensity,  ///< of no material
@@ -65,8 +66,7 @@ inline constexpr double kExplainedShare = 1.0 / 3.0;
 /// Between styrofoam and osmium, with room for hollow parts [kg/m³].
 inline constexpr double kLeastDensity = 50.0, kMostDensity = 23000.0;
 
-/// Judges a body with at least one mesh. Other shapes are passed over. A body without mass has no
-/// findings but those of its meshes.
+/// Judges a body with at least one mesh. Other shapes are passed over.
 [[nodiscard]] BodyInertia DiagnoseInertia(const Body& body);
 
 }  // namespace mbv

@@ -7,8 +7,11 @@
 #include <assimp/Importer.hpp>
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <map>
+#include <sstream>
+#include <string_view>
 
 #include "core/bytes.h"
 #include "core/files.h"
@@ -62,6 +65,148 @@ void AddNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& above,
   }
 }
 
+// Of a PLY file, whose header promises counts: what follows must hold them, or reading takes the
+// time that was promised. "" if it does, or is no PLY file.
+class PlyCheck {
+ public:
+  explicit PlyCheck(const std::string& bytes) : bytes_(bytes) {}
+
+  std::string Run() {
+    if (!bytes_.starts_with("ply") || !ReadHeader()) return "";  // the library's to say
+    for (const Element& element : elements_) {
+      if (element.count > 0 && element.properties.empty()) {
+        return fmt::format("its {} {} have no property", element.count, element.name);
+      }
+      for (unsigned long long i = 0; i < element.count; ++i) {
+        for (const Property& property : element.properties) {
+          if (!Skip(property)) {
+            return fmt::format("its header promises {} {}, and it ends in the {}th", element.count,
+                               element.name, i + 1);
+          }
+        }
+      }
+    }
+    return "";
+  }
+
+ private:
+  struct Property {
+    size_t bytes = 0, count_bytes = 0;  // count_bytes: of a list
+  };
+  struct Element {
+    std::string name;
+    unsigned long long count = 0;
+    std::vector<Property> properties;
+  };
+
+  static size_t BytesOf(const std::string& type) {
+    constexpr std::pair<std::string_view, size_t> kTypes[] = {
+        {"char", 1},  {"uchar", 1},   {"int8", 1},   {"uint8", 1},  {"short", 2}, {"ushort", 2},
+        {"int16", 2}, {"uint16", 2},  {"int", 4},    {"uint", 4},   {"int32", 4}, {"uint32", 4},
+        {"float", 4}, {"float32", 4}, {"double", 8}, {"float64", 8}};
+    for (const auto& [name, bytes] : kTypes) {
+      if (type == name) return bytes;
+    }
+    return 0;
+  }
+
+  bool ReadHeader() {
+    for (std::string line; NextLine(&line);) {
+      std::istringstream words(line);
+      std::string word, type, more;
+      words >> word;
+      if (word == "end_header") return true;
+      if (word == "format") {
+        words >> type;
+        ascii_ = type == "ascii";
+        big_ = type == "binary_big_endian";
+      } else if (word == "element") {
+        Element element;
+        if (!(words >> element.name >> element.count)) return false;
+        elements_.push_back(element);
+      } else if (word == "property" && !elements_.empty()) {
+        words >> type;
+        Property property{.bytes = BytesOf(type)};
+        if (type == "list") {
+          words >> type >> more;
+          property = {.bytes = BytesOf(more), .count_bytes = BytesOf(type)};
+          if (property.count_bytes == 0) return false;
+        }
+        if (property.bytes == 0) return false;
+        elements_.back().properties.push_back(property);
+      }
+    }
+    return false;
+  }
+
+  bool NextLine(std::string* line) {
+    if (at_ >= bytes_.size()) return false;
+    const size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+    *line = bytes_.substr(at_, end - at_);
+    at_ = end + 1;
+    return true;
+  }
+
+  bool Skip(const Property& property) {
+    if (ascii_) {
+      unsigned long long count = 1;
+      if (property.count_bytes > 0) {
+        const std::string_view text = NextWord();
+        if (text.empty() ||
+            std::from_chars(text.data(), text.data() + text.size(), count).ec != std::errc()) {
+          return false;
+        }
+      }
+      for (unsigned long long i = 0; i < count; ++i) {
+        if (NextWord().empty()) return false;
+      }
+      return true;
+    }
+    unsigned long long count = 1;
+    if (property.count_bytes > 0) {
+      if (at_ > bytes_.size() || property.count_bytes > bytes_.size() - at_) return false;
+      count = 0;
+      for (size_t k = 0; k < property.count_bytes; ++k) {
+        const auto byte = static_cast<unsigned char>(bytes_[at_ + k]);
+        count |= static_cast<unsigned long long>(byte)
+                 << (8 * (big_ ? property.count_bytes - 1 - k : k));
+      }
+      at_ += property.count_bytes;
+    }
+    if (at_ > bytes_.size() || count > (bytes_.size() - at_) / property.bytes) return false;
+    at_ += static_cast<size_t>(count) * property.bytes;
+    return true;
+  }
+
+  std::string_view NextWord() {
+    constexpr const char* kSpace = " \t\r\n";
+    const size_t from = bytes_.find_first_not_of(kSpace, at_);
+    if (from == std::string::npos) return {};
+    at_ = std::min(bytes_.find_first_of(kSpace, from), bytes_.size());
+    return std::string_view(bytes_).substr(from, at_ - from);
+  }
+
+  const std::string& bytes_;
+  size_t at_ = 0;
+  bool ascii_ = true, big_ = false;
+  std::vector<Element> elements_;
+};
+
+// Of counts that a DAE file states of its arrays and primitives, one that the file cannot hold: a
+// number and a space are two bytes.
+std::string DaeTrouble(const std::string& bytes) {
+  constexpr std::string_view kCount = "count=";
+  for (size_t at = bytes.find(kCount); at != std::string::npos; at = bytes.find(kCount, at + 1)) {
+    const char* from = bytes.data() + std::min(at + kCount.size() + 1, bytes.size());
+    unsigned long long count = 0;
+    const auto [end, error] = std::from_chars(from, bytes.data() + bytes.size(), count);
+    if (error == std::errc::result_out_of_range || count > bytes.size()) {
+      return "it states a count of " + std::string(from, end) + ", more than it can hold";
+    }
+  }
+  return "";
+}
+
 // What a child answers.
 std::string Answer(MeshText mesh) {
   std::string bytes = ToBytes(mesh);
@@ -86,6 +231,10 @@ bool IsMeshFile(const std::filesystem::path& file) {
 
 MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
   MeshText mesh;
+  const std::string kind = Lower(extension);
+  // The library itself compares the counts of STL, and OBJ has none.
+  mesh.trouble = kind == ".ply" ? PlyCheck(bytes).Run() : kind == ".dae" ? DaeTrouble(bytes) : "";
+  if (!mesh.trouble.empty()) return mesh;
   Assimp::Importer importer;
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,

@@ -88,6 +88,14 @@ TEST(InertiaDiagnosis, FindsNothingOnSoundParts) {
   EXPECT_NEAR(DiagnoseInertia(BoxPart()).density, kSteel, 1e-6);
 }
 
+TEST(InertiaDiagnosis, AMeshWithoutMassIsAFinding) {
+  for (Body part : SoundParts()) {
+    part.mass = 0.0;
+    part.I_Bcm_B.setZero();
+    EXPECT_EQ(MistakesOf(part), std::vector{InertiaMistake::kNoMass}) << TextOf(part);
+  }
+}
+
 // Every number is 3 % off, in either direction: rounded, meshed coarsely, with screws or without.
 TEST(InertiaDiagnosis, FindsNothingInDifferencesOfRoundingAndMeshing) {
   std::mt19937_64 random(2026);
@@ -298,7 +306,7 @@ TEST(InertiaDiagnosis, WhatNoMistakeExplainsIsSaidSo) {
   Body massless = BoxPart();
   massless.mass = 0.0;
   massless.I_Bcm_B.setZero();
-  EXPECT_TRUE(MistakesOf(massless).empty());
+  EXPECT_EQ(MistakesOf(massless), std::vector{InertiaMistake::kNoMass});
 }
 
 }  // namespace

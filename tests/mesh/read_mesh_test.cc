@@ -1,9 +1,12 @@
 // Mesh files: what is read of each format, and where they are looked for.
 #include "mesh/read_mesh.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <array>
+#include <chrono>
 #include <cstdlib>
 
 #include "core/inputs.h"
@@ -72,6 +75,57 @@ TEST(ReadMesh, WhatIsNoMeshIsTold) {
   EXPECT_NE(ReadMeshBytes("<COLLADA/>", ".dae").trouble, "");
   EXPECT_TRUE(IsMeshFile("a/B.StL"));
   EXPECT_FALSE(IsMeshFile("a/b.blend"));
+}
+
+// Counts in a file's head that its bytes cannot hold are refused at once, whatever the format.
+TEST(ReadMesh, CountsThatTheFileCannotHoldAreRefusedAtOnce) {
+  const std::string xyz = "property float x\nproperty float y\nproperty float z\n";
+  const std::string faces = "property list uchar int vertex_indices\n";
+  const auto ply = [&](const char* format, const std::string& counts, const std::string& data) {
+    return fmt::format("ply\nformat {} 1.0\n{}end_header\n{}", format, counts, data);
+  };
+  std::vector<std::pair<std::string, std::string>> files;
+  for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
+    for (const char* many : {"4000000000", "18446744073709551615"}) {
+      files.emplace_back(".ply",
+                         ply(format, fmt::format("element vertex {}\n", many) + xyz, "0 0 0"));
+      files.emplace_back(".ply",
+                         ply(format, fmt::format("element face {}\n", many) + faces, "3 0"));
+      files.emplace_back(".ply", ply(format, fmt::format("element nothing {}\n", many), ""));
+    }
+    // The count of a list, among the data.
+    const std::string list = "element face 1\nproperty list uint int vertex_indices\n";
+    files.emplace_back(
+        ".ply",
+        ply(format, list, std::string(format) == "ascii" ? "4000000000 0 1" : "\x7f\xff\xff\xff "));
+  }
+  files.emplace_back(".stl", std::string(80, 'x') + "\xff\xff\xff\xef" + std::string(50, '\0'));
+  std::string dae = Dae("", "Z_UP");
+  dae.replace(dae.find("count=\"12\""), 10, "count=\"4000000000\"");
+  files.emplace_back(".dae", dae);
+  for (const auto& [extension, bytes] : files) {
+    const auto start = std::chrono::steady_clock::now();
+    EXPECT_NE(ReadMeshBytes(bytes, extension).trouble, "") << extension << bytes.substr(0, 150);
+    const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
+    EXPECT_LT(took.count(), 5.0) << extension << bytes.substr(0, 150);
+  }
+  // What holds its counts is read, in each way of writing it.
+  const std::string counts = "element vertex 4\n" + xyz + "element face 4\n" + faces;
+  const std::string text = "0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
+  EXPECT_NEAR(SolidShape(ReadMeshBytes(ply("ascii", counts, text), ".ply").surface).amount, 1.0 / 6,
+              1e-6);
+  std::string binary;
+  const auto put = [&](const auto& value) {
+    binary.append(reinterpret_cast<const char*>(&value), sizeof value);
+  };
+  for (const float x : {0.F, 0.F, 0.F, 1.F, 0.F, 0.F, 0.F, 1.F, 0.F, 0.F, 0.F, 1.F}) put(x);
+  for (const auto& face : {std::array{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}}) {
+    binary += '\3';
+    for (const int index : face) put(index);
+  }
+  const MeshText solid = ReadMeshBytes(ply("binary_little_endian", counts, binary), ".ply");
+  EXPECT_EQ(solid.trouble, "");
+  EXPECT_NEAR(SolidShape(solid.surface).amount, 1.0 / 6, 1e-6);
 }
 
 TEST(ReadMesh, FilesAreReadOnceAndAreInputs) {
