@@ -1,5 +1,6 @@
 // Doubts about a model that is possible but hardly meant: lengths in millimetres, inertias in
-// kg mm² or about another point than the centre of mass, gravity in mm/s². All are warnings.
+// kg mm² or about another point than the centre of mass, gravity in mm/s², rotors in kg cm² or
+// stated twice, friction in percent, leads in millimetres, couplings that lock. All are warnings.
 //
 // What tells them is density. Nothing solid is denser than osmium (22 600 kg/m³), so a body whose
 // lengths are millimetres taken for metres has less than 2.3e-5 kg per cubic metre of its extent,
@@ -7,8 +8,10 @@
 // ships and flywheels do not come near either.
 #include <fmt/format.h>
 
+#include <Eigen/Dense>
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "mechanism/reach.h"
 #include "model_file/model_checks.h"
@@ -175,6 +178,153 @@ void WarnAboutGravity(const Mechanism& mechanism, ModelReport* report) {
                  "gravity is in m/s²; is it in mm/s²?");
 }
 
+// The joint coordinate that a drive moves; null for legs.
+const JointDrive* JointOf(const Mechanism& mechanism, int drive) {
+  return std::get_if<JointDrive>(&mechanism.drives[static_cast<size_t>(drive)].kind);
+}
+
+bool AreOnOneCoordinate(const Mechanism& mechanism, const Motor& motor,
+                        const ForceElement& element) {
+  if (element.drive >= 0) return element.drive == motor.drive;
+  const JointDrive* at = JointOf(mechanism, motor.drive);
+  return at != nullptr && element.bushing < 0 && element.joint == at->joint &&
+         element.coordinate == at->coordinate;
+}
+
+// Forces of a mechanism with a rotor contain it, and a motor's torque adds its own once more.
+void WarnAboutRotorsTwice(const Mechanism& mechanism, ModelReport* report) {
+  constexpr double kSame = 0.05;
+  for (const Motor& motor : mechanism.motors) {
+    const double of_motor = motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia;
+    for (const ForceElement& element : mechanism.elements) {
+      const auto* rotor = std::get_if<RotorLaw>(&element.law);
+      if (rotor == nullptr || !AreOnOneCoordinate(mechanism, motor, element)) continue;
+      if (!(std::abs(rotor->reflected() - of_motor) <= kSame * of_motor) || of_motor == 0.0) {
+        continue;
+      }
+      const std::string& drive = mechanism.drives[static_cast<size_t>(motor.drive)].name;
+      report->AtFile(
+          Severity::kWarning,
+          fmt::format("motors.{}: its rotor, {:.4g} behind the gear, is element '{}', too, and "
+                      "counts twice in the motor's torque",
+                      drive, of_motor, element.name),
+          "under `elements` drive forces contain it; then leave out `rotor_inertia` of the motor");
+    }
+  }
+}
+
+// A rotor that is a multiple of the whole mechanism is hardly one: kg cm² are 1e-4 kg m².
+void WarnAboutRotorSizes(const Mechanism& mechanism, ModelReport* report) {
+  constexpr double kMostTurning = 10.0, kMostSliding = 1e3;  // of the mechanism's own
+  double mass = 0.0;
+  for (const Body& body : mechanism.bodies) mass += body.mass;
+  const double length_m = CharacteristicLength(mechanism);
+  const auto check = [&](const std::string& name, double inertia, double reflected, bool length) {
+    const double own = length ? mass : mass * length_m * length_m;
+    if (!(own > 0.0) || !(reflected > (length ? kMostSliding : kMostTurning) * own)) return;
+    report->AtFile(Severity::kWarning,
+                   fmt::format("{}: rotor inertia {:.4g} kg m² weighs {:.4g} {} behind its gear, "
+                               "{:.3g} times the whole mechanism",
+                               name, inertia, reflected, length ? "kg" : "kg m²", reflected / own),
+                   "rotor inertias are in kg m²; is it in kg cm² (1e-4 kg m²)?");
+  };
+  for (const ForceElement& element : mechanism.elements) {
+    const auto* rotor = std::get_if<RotorLaw>(&element.law);
+    if (rotor == nullptr) continue;
+    check("elements." + element.name, rotor->inertia, rotor->reflected(),
+          ActsOnLength(mechanism, element));
+  }
+  for (const Motor& motor : mechanism.motors) {
+    if (!motor.turns) continue;
+    const Drive& drive = mechanism.drives[static_cast<size_t>(motor.drive)];
+    check("motors." + drive.name, motor.rotor_inertia,
+          motor.gear_ratio * motor.gear_ratio * motor.rotor_inertia,
+          PositionUnit(mechanism, drive) == "m");
+  }
+}
+
+void WarnAboutFriction(const Mechanism& mechanism, ModelReport* report) {
+  constexpr double kMost = 2.0;  // rubber on rough ground stays below
+  for (const ForceElement& element : mechanism.elements) {
+    const auto* friction = std::get_if<FrictionLaw>(&element.law);
+    if (friction == nullptr || !(friction->coefficient > kMost)) continue;
+    report->AtFile(Severity::kWarning,
+                   fmt::format("elements.{}: friction coefficient {:.4g}, more than any pair of "
+                               "materials has",
+                               element.name, friction->coefficient),
+                   "it is friction force by normal force, 0.12 rather than 12 (percent)");
+  }
+}
+
+// Screws: one coordinate of a joint is a length, the other an angle, and they follow each other.
+void WarnAboutLeads(const Mechanism& mechanism, ModelReport* report) {
+  constexpr double kMost_m = 1.0;
+  const double length_m = CharacteristicLength(mechanism);
+  const double most_m = length_m > 0.0 ? std::min(kMost_m, length_m) : kMost_m;
+  for (const Coupling& coupling : mechanism.couplings) {
+    if (coupling.terms.size() != 2 || coupling.terms[0].joint != coupling.terms[1].joint) continue;
+    const Joint& joint = mechanism.joints[static_cast<size_t>(coupling.terms[0].joint)];
+    double of_length = 0.0, of_angle = 0.0;
+    for (const Coupling::Term& term : coupling.terms) {
+      (IsLength(joint.kind, term.coordinate) ? of_length : of_angle) = term.polynomial.front();
+    }
+    if (of_length == 0.0 || of_angle == 0.0) continue;
+    const double lead_m = 2.0 * std::numbers::pi * std::abs(of_angle / of_length);
+    if (!(lead_m > most_m)) continue;
+    report->AtFile(Severity::kWarning,
+                   fmt::format("couplings.{}: joint '{}' moves {:.4g} m with each turn, in a "
+                               "mechanism of {:.4g} m",
+                               coupling.name, joint.name, lead_m, CharacteristicLength(mechanism)),
+                   "leads are in metres; is it in millimetres (lead_mm)?");
+  }
+}
+
+// Coordinates that couplings alone leave no freedom, wherever they are: gears in a circle. Slopes
+// are taken away from home, where a cam may rest.
+void WarnAboutLocks(const Mechanism& mechanism, ModelReport* report) {
+  if (mechanism.couplings.size() < 2) return;
+  std::vector<std::pair<int, int>> coordinates;
+  const auto column_of = [&](const Coupling::Term& term) {
+    const std::pair at(term.joint, term.coordinate);
+    const auto found = std::ranges::find(coordinates, at);
+    if (found == coordinates.end()) coordinates.push_back(at);
+    return std::ranges::find(coordinates, at) - coordinates.begin();
+  };
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) (void)column_of(term);
+  }
+  MatX rows = MatX::Zero(static_cast<Eigen::Index>(mechanism.couplings.size()),
+                         static_cast<Eigen::Index>(coordinates.size()));
+  for (size_t c = 0; c < mechanism.couplings.size(); ++c) {
+    for (const Coupling::Term& term : mechanism.couplings[c].terms) {
+      const Eigen::Index k = column_of(term);
+      const double q = 0.3 + 0.17 * static_cast<double>(k);
+      double slope = 0.0, power = 1.0;
+      for (size_t i = 0; i < term.polynomial.size(); ++i, power *= q) {
+        slope += static_cast<double>(i + 1) * term.polynomial[i] * power;
+      }
+      rows(static_cast<Eigen::Index>(c), k) = slope;
+    }
+    rows.row(static_cast<Eigen::Index>(c)).normalize();
+  }
+  const Eigen::JacobiSVD<MatX> svd(rows, Eigen::ComputeFullV);
+  const Eigen::Index rank = (svd.singularValues().array() > 1e-9).count();
+  std::string locked;
+  for (Eigen::Index k = 0; k < rows.cols(); ++k) {
+    // A direction that no coupling forbids moves it.
+    const MatX free = svd.matrixV().rightCols(rows.cols() - rank);
+    if (free.cols() > 0 && free.row(k).norm() > 1e-9) continue;
+    locked += fmt::format(
+        "{}'{}'", locked.empty() ? "" : ", ",
+        mechanism.joints[static_cast<size_t>(coordinates[static_cast<size_t>(k)].first)].name);
+  }
+  if (locked.empty()) return;
+  report->AtFile(
+      Severity::kWarning,
+      fmt::format("the couplings lock joint {}: together they leave it no freedom", locked),
+      "a joint that is held is fixed or prescribed; do ratios in a circle multiply to 1?");
+}
+
 }  // namespace
 
 void CheckPlausible(const Mechanism& mechanism, ModelReport* report) {
@@ -204,6 +354,11 @@ void CheckPlausible(const Mechanism& mechanism, ModelReport* report) {
   }
   WarnAboutLengths(mechanism, thin, extent_m, report);
   WarnAboutGravity(mechanism, report);
+  WarnAboutRotorsTwice(mechanism, report);
+  WarnAboutRotorSizes(mechanism, report);
+  WarnAboutFriction(mechanism, report);
+  WarnAboutLeads(mechanism, report);
+  WarnAboutLocks(mechanism, report);
 }
 
 }  // namespace mbv::internal

@@ -56,6 +56,64 @@ const Slip kDoubts[] = {
 INSTANTIATE_TEST_SUITE_P(Slips, Doubtful, testing::ValuesIn(kDoubts),
                          [](const auto& info) { return std::string(info.param.name); });
 
+// A shaft with a lever, a screw beside it, and what is said of both.
+std::string Machine(const std::string& more, const std::string& lead = "lead_mm: 5") {
+  return "name: m\nbodies:\n  a: {mass: 1, com: [0.1, 0, 0], inertia: [1e-4, 4e-3, 4e-3]}\n"
+         "  b: {mass: 1, com: [0.1, 0, 0], inertia: [1e-4, 4e-3, 4e-3]}\n"
+         "  c: {mass: 1, com: [0.1, 0, 0], inertia: [1e-4, 4e-3, 4e-3]}\n"
+         "  d: {mass: 1, com: [0.1, 0, 0], inertia: [1e-4, 4e-3, 4e-3]}\n"
+         "world: {frames: {pb: [0.3, 0, 0], pc: [0.6, 0, 0], pd: [0.9, 0, 0]}}\n"
+         "joints:\n  ja: {kind: revolute, parent: world, child: a, axis: z}\n"
+         "  jb: {kind: revolute, parent: world.pb, child: b, axis: z}\n"
+         "  jc: {kind: revolute, parent: world.pc, child: c, axis: z}\n"
+         "  screw: {kind: helical, parent: world.pd, child: d, axis: z, " +
+         lead + "}\ndrives: {da: {kind: joint, joint: ja}}\n" + more;
+}
+
+TEST(Plausibility, RotorsFrictionLeadsAndLocksAreSaid) {
+  EXPECT_EQ(WarningsOf(Machine("")), "");
+  struct Case {
+    std::string right, wrong;
+    const char* said;
+  };
+  const std::string rotor = "elements: {r: {joint: ja, kind: rotor, inertia: 1e-5, ratio: 50}}\n";
+  const std::string motor = "motors: {da: {rotor_inertia: 1e-5, gear_ratio: 50}}\n";
+  const auto gears = [](const char* last) {
+    return fmt::format(
+        "couplings:\n  ab: {{joint: ja, follows: jb, ratio: 2}}\n"
+        "  bc: {{joint: jb, follows: jc, ratio: 3}}\n"
+        "  ca: {{joint: jc, follows: ja, ratio: {}}}\n",
+        last);
+  };
+  const Case cases[] = {
+      {Machine(rotor), Machine(rotor + motor),
+       "motors.da: its rotor, 0.025 behind the gear, is element 'r', too"},
+      {Machine(rotor + "motors: {da: {rotor_inertia: 1e-7, gear_ratio: 50}}\n"),
+       Machine(rotor + "motors: {da: {rotor_inertia: 1.03e-5, gear_ratio: 50}}\n"),
+       "is element 'r', too"},
+      {Machine(rotor),
+       Machine("elements: {r: {joint: ja, kind: rotor, inertia: 0.1, ratio: 50}}\n"),
+       "elements.r: rotor inertia 0.1 kg m² weighs 250 kg m² behind its gear"},
+      {Machine(motor), Machine("motors: {da: {rotor_inertia: 0.1, gear_ratio: 50}}\n"),
+       "motors.da: rotor inertia 0.1 kg m²"},
+      {Machine("elements: {f: {joint: ja, kind: friction, coefficient: 0.12, radius: 0.01}}\n"),
+       Machine("elements: {f: {joint: ja, kind: friction, coefficient: 12, radius: 0.01}}\n"),
+       "elements.f: friction coefficient 12, more than any pair"},
+      {Machine("", "lead_mm: 5"), Machine("", "lead: 5"), "joint 'screw' moves 5 m with each turn"},
+      {Machine(gears("1/6")), Machine(gears("1/5")),
+       "the couplings lock joint 'ja', 'jb', 'jc': together they leave it no freedom"},
+  };
+  for (const Case& c : cases) {
+    const std::string right = LoadModelText(c.right, "m.yaml").diagnostics.Text();
+    const LoadResult wrong = LoadModelText(c.wrong, "m.yaml");
+    EXPECT_EQ(right.find(c.said), std::string::npos) << right;
+    EXPECT_TRUE(wrong.mechanism.has_value()) << wrong.diagnostics.Text();
+    EXPECT_NE(wrong.diagnostics.Text().find(c.said), std::string::npos) << c.said << "\n"
+                                                                        << wrong.diagnostics.Text();
+    EXPECT_NE(wrong.diagnostics.Text().find("m.yaml: warning:"), std::string::npos);
+  }
+}
+
 TEST(Plausibility, LengthsInMillimetresAreSaidOnceForAllBodies) {
   std::string text = Replaced(Slender(), "crank: 0.2", "crank: 200");
   text = Replaced(text, "{value_mm: 500,", "{value: 500,");
