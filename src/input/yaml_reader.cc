@@ -234,7 +234,10 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
   if (!node_->is_map()) {
     const size_t dot = path_.rfind('.');
     const std::string own = dot == std::string::npos ? "" : path_.substr(dot + 1);
-    reader_->Error(*node_, fmt::format("{} is {}, a map is needed", shown, Describe(*node_)),
+    // What is no model or scenario at all may hold what must not be shown.
+    const bool foreign = path_.empty() && node_->is_scalar();
+    const std::string what = foreign ? "a text" : Describe(*node_);
+    reader_->Error(*node_, fmt::format("{} is {}, a map is needed", shown, what),
                    is_known(own) ? fmt::format("'{}' belongs into an entry of {}: indent it deeper",
                                                own, path_.substr(0, dot))
                                  : "");

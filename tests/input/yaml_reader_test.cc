@@ -26,6 +26,15 @@ TEST(YamlReader, ValuesKnowTheirPlace) {
   EXPECT_EQ(deep.column, 12);
 }
 
+// A file that is no map at all is of another kind, and may hold a secret.
+TEST(YamlReader, WhatIsNoMapIsNotQuoted) {
+  YamlReader reader("token");
+  const YamlNodePtr root = reader.Parse("hunter2\n");
+  ASSERT_TRUE(root);
+  EXPECT_FALSE(YamlMap(&reader, root.get(), "", {"name"}).valid());
+  EXPECT_EQ(reader.diagnostics().Text(), "token:1:1: error: the file is a text, a map is needed\n");
+}
+
 TEST(YamlReader, ReadersReportTheWrongTypeAndGoOn) {
   YamlReader reader("a.yaml");
   const YamlNodePtr root = reader.Parse(
@@ -224,10 +233,10 @@ TEST(YamlReader, LongValuesAreCutBetweenCharacters) {
   EXPECT_EQ(
       SaidOfMap("x" + key + ": 1\n", "", {"name"}),
       "a.yaml:1:1: error: the file: unknown key '" + shown + "...'\n  hint: known keys: name\n");
-  EXPECT_EQ(SaidOfMap("\"two\\nlines\"\n", "", {"name"}),
-            "a.yaml:1:1: error: the file is 'two...', a map is needed\n");
-  EXPECT_EQ(SaidOfMap("Fuß\n", "", {"name"}),
-            "a.yaml:1:1: error: the file is 'Fuß', a map is needed\n");
+  EXPECT_EQ(SaidOfMap("\"two\\nlines\"\n", "bodies", {"name"}),
+            "a.yaml:1:1: error: bodies is 'two...', a map is needed\n");
+  EXPECT_EQ(SaidOfMap("Fuß\n", "bodies", {"name"}),
+            "a.yaml:1:1: error: bodies is 'Fuß', a map is needed\n");
 }
 
 TEST(YamlReader, AKeyAtTheWrongLevelIsToldWhereItBelongs) {
