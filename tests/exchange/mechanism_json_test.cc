@@ -109,7 +109,16 @@ TEST(MechanismJson, GivesElementsWithTheirLaws) {
     ASSERT_EQ(terms.size(), m.couplings[c].terms.size());
     EXPECT_EQ(terms.at(0).at("polynomial").get<std::vector<double>>(),
               m.couplings[c].terms[0].polynomial);
+    EXPECT_EQ(json.at("couplings").at(c).at("constant").get<double>(), m.couplings[c].constant);
   }
+}
+
+TEST(MechanismJson, ACouplingKeepsItsConstant) {
+  Mechanism m = Shipped("four_bar");
+  m.couplings.push_back(
+      {.name = "gear", .terms = {{0, 0, {-1.0}}, {1, 0, {2.0}}}, .constant = 0.7});
+  const Document json = Document::parse(MechanismJson(m));
+  EXPECT_EQ(json.at("couplings").back().at("constant").get<double>(), 0.7);
 }
 
 TEST(MotionText, GivesDrivenCoordinatesAndLoadsInFull) {

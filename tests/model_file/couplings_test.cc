@@ -50,6 +50,19 @@ TEST(Couplings, OneFollowsAnother) {
               std::numbers::pi / 2 + 3 * slide[0] - 2 * slide[0] * slide[0], 1e-12);
 }
 
+// Σ factor · q = offset, with this sign.
+TEST(Couplings, ASumIsItsOffset) {
+  const LoadResult loaded = LoadModelText(
+      Model("  sum: {sum: [{joint: turn, factor: 2}, {joint: slide, coordinate: 1, factor: 3}], "
+            "offset_deg: 60}\n"),
+      "m.yaml");
+  ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.couplings.size(), 1u);
+  EXPECT_DOUBLE_EQ(m.couplings[0].constant, -std::numbers::pi / 3);
+  EXPECT_NEAR(2 * m.joints[0].home[0] + 3 * m.joints[1].home[1], std::numbers::pi / 3, 1e-12);
+}
+
 std::string Helical(const std::string& rest) {
   return "name: m\nbodies: {b: {mass: 1, inertia: [1, 1, 1]}}\n"
          "joints: {slide: {kind: helical, parent: world, child: b, axis: z, " +
