@@ -5,6 +5,9 @@
 #include <zip.h>
 
 #include <algorithm>
+#include <array>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <set>
 
@@ -75,120 +78,37 @@ std::optional<std::string> BytesOf(zip_source_t* source) {
   return bytes;
 }
 
-class ZipReader {
- public:
-  ZipReader(zip_t* archive, const std::string& file, const ArchiveLimits& limits,
-            Diagnostics* diagnostics)
-      : archive_(archive), file_(file), limits_(limits), diagnostics_(diagnostics) {}
+constexpr const char* kNotOurs = "mbverify package writes no such archive";
 
-  std::vector<ArchiveEntry> Read() {
-    const auto count = static_cast<zip_uint64_t>(zip_get_num_entries(archive_, 0));
-    if (count > limits_.entries) {
-      Refuse(fmt::format("holds {} files, more than {}", count, limits_.entries), kNotOurs);
-      return {};
-    }
-    for (zip_uint64_t i = 0; i < count && !full_; ++i) ReadEntry(i);
-    std::ranges::sort(entries_, {}, &ArchiveEntry::path);
-    CheckFolders();
-    return std::move(entries_);
+// Plain files and folders, not encrypted; else what is wrong. `executable` if it is.
+std::string WhyNotPlain(zip_t* archive, const zip_stat_t& stat, bool* executable) {
+  if ((stat.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && stat.encryption_method != ZIP_EM_NONE) {
+    return "is encrypted";
   }
-
- private:
-  static constexpr const char* kNotOurs = "mbverify package writes no such archive";
-
-  void Refuse(const std::string& message, const std::string& hint) {
-    diagnostics_->AddError(file_, message, hint);
+  zip_uint8_t system = 0;
+  zip_uint32_t attributes = 0;
+  if (zip_file_get_external_attributes(archive, stat.index, 0, &system, &attributes) != 0 ||
+      system != ZIP_OPSYS_UNIX) {
+    return "";
   }
+  const zip_uint32_t mode = attributes >> kModeShift, kind = mode & S_IFMT;
+  *executable = (mode & S_IXUSR) != 0;
+  if (kind == 0 || kind == S_IFREG || kind == S_IFDIR) return "";
+  return fmt::format("is {}, no plain file", S_ISLNK(kind) ? "a link" : "a device");
+}
 
-  void ReadEntry(zip_uint64_t i) {
-    zip_stat_t stat;
-    if (zip_stat_index(archive_, i, 0, &stat) != 0 || (stat.valid & ZIP_STAT_NAME) == 0) {
-      return Refuse(fmt::format("entry {} cannot be read: {}", i, zip_strerror(archive_)), "");
-    }
-    std::string path = stat.name;
-    const bool folder = path.ends_with('/');
-    if (folder) path.pop_back();
-    const std::string shown = Printable(path);
-    if (!IsPlainPath(path) || FindNonName(path) != std::string::npos) {
-      return Refuse(fmt::format("'{}' leads outside of the archive, or is no plain path", shown),
-                    kNotOurs);
-    }
-    bool executable = false;
-    if (!CheckKind(i, stat, shown, &executable) || folder) return;
-    if (!paths_.insert(path).second) return Refuse("holds '" + shown + "' twice", kNotOurs);
-    if (auto content = ReadContent(i, stat, shown)) {
-      entries_.push_back({path, *std::move(content), executable});
-    }
-  }
-
-  // Plain files and folders, not encrypted.
-  bool CheckKind(zip_uint64_t i, const zip_stat_t& stat, const std::string& shown,
-                 bool* executable) {
-    if ((stat.valid & ZIP_STAT_ENCRYPTION_METHOD) != 0 && stat.encryption_method != ZIP_EM_NONE) {
-      Refuse("'" + shown + "' is encrypted", kNotOurs);
-      return false;
-    }
-    zip_uint8_t system = 0;
-    zip_uint32_t attributes = 0;
-    if (zip_file_get_external_attributes(archive_, i, 0, &system, &attributes) != 0) return true;
-    if (system != ZIP_OPSYS_UNIX) return true;
-    const zip_uint32_t mode = attributes >> kModeShift, kind = mode & S_IFMT;
-    *executable = (mode & S_IXUSR) != 0;
-    if (kind == 0 || kind == S_IFREG || kind == S_IFDIR) return true;
-    Refuse(fmt::format("'{}' is {}, no plain file", shown, S_ISLNK(kind) ? "a link" : "a device"),
-           kNotOurs);
-    return false;
-  }
-
-  // One byte more than is left is asked for: what an archive says of its sizes may be wrong.
-  std::optional<std::string> ReadContent(zip_uint64_t i, const zip_stat_t& stat,
-                                         const std::string& shown) {
-    const std::unique_ptr<zip_file_t, EntryClose> entry(zip_fopen_index(archive_, i, 0));
-    if (entry == nullptr) {
-      Refuse(fmt::format("'{}' cannot be read: {}", shown, zip_strerror(archive_)), "");
-      return {};
-    }
-    std::string content;
-    if ((stat.valid & ZIP_STAT_SIZE) != 0) content.reserve(std::min(stat.size, limits_.bytes));
-    char piece[1 << 16];
-    zip_int64_t count = 0;
-    while ((count = zip_fread(entry.get(), piece, sizeof piece)) > 0) {
-      read_ += static_cast<std::uint64_t>(count);
-      if (read_ > limits_.bytes) {
-        full_ = true;
-        Refuse(fmt::format("unpacks to more than {} MB (at '{}')", limits_.bytes >> 20, shown),
-               kNotOurs);
-        return {};
-      }
-      content.append(piece, static_cast<size_t>(count));
-    }
-    if (count == 0) return content;
-    Refuse(fmt::format("'{}' is damaged: {}", shown, zip_file_strerror(entry.get())),
-           "fetch the archive again");
-    return {};
-  }
-
-  // No file lies below another.
-  void CheckFolders() {
-    for (const std::string& path : paths_) {
-      for (size_t at = path.find('/'); at != std::string::npos; at = path.find('/', at + 1)) {
-        if (!paths_.contains(path.substr(0, at))) continue;
-        Refuse(fmt::format("'{}' is a file and the folder of '{}'", Printable(path.substr(0, at)),
-                           Printable(path)),
-               kNotOurs);
-      }
-    }
-  }
-
-  zip_t* archive_;
-  const std::string& file_;
-  const ArchiveLimits& limits_;
-  Diagnostics* diagnostics_;
-  std::vector<ArchiveEntry> entries_;
-  std::set<std::string> paths_;
-  std::uint64_t read_ = 0;
-  bool full_ = false;
-};
+// True of archives with the 64-bit directory, whose number of entries is without a bound (libzip
+// keeps all of them).
+bool IsZip64(const std::string& file) {
+  constexpr std::streamoff kTail = 22 + 65535, kLocator = 20;  // directory's end and comment
+  std::ifstream stream(file, std::ios::binary | std::ios::ate);
+  const std::streamoff size = stream.tellg();
+  const std::streamoff from = std::max<std::streamoff>(0, size - kTail - kLocator);
+  if (!stream || !stream.seekg(from)) return false;
+  const std::string tail(std::istreambuf_iterator<char>(stream), {});
+  const size_t end = tail.rfind("PK\5\6");
+  return end != std::string::npos && end >= kLocator && tail.substr(end - kLocator, 4) == "PK\6\7";
+}
 
 }  // namespace
 
@@ -218,25 +138,123 @@ std::optional<std::string> WriteZip(std::vector<ArchiveEntry> entries, std::stri
   return bytes;
 }
 
-std::optional<std::vector<ArchiveEntry>> ReadZip(const std::string& bytes, const std::string& file,
-                                                 const ArchiveLimits& limits,
-                                                 Diagnostics* diagnostics) {
-  zip_error_t error;
-  zip_error_init(&error);
-  const Source source(zip_source_buffer_create(bytes.data(), bytes.size(), 0, &error));
-  std::string trouble;
-  if (source == nullptr) trouble = Reason(&error);
-  const Archive archive = source == nullptr ? nullptr : Open(source.get(), ZIP_RDONLY, &trouble);
-  if (archive != nullptr && zip_get_num_entries(archive.get(), 0) == 0) trouble = "it is empty";
-  if (!trouble.empty()) {
-    diagnostics->AddError(file, "is no ZIP archive: " + trouble, "fetch it again");
-    return {};
-  }
+ZipFile::ZipFile(const std::string& file, const ArchiveLimits& limits, Diagnostics* diagnostics)
+    : file_(file), limits_(limits), diagnostics_(diagnostics) {
   Diagnostics found;
-  auto entries = ZipReader(archive.get(), file, limits, &found).Read();
-  diagnostics->Append(found);
-  if (found.has_errors()) return {};
-  return entries;
+  diagnostics_ = &found;
+  if (Open()) List();
+  diagnostics_ = diagnostics;
+  diagnostics_->Append(found);
+  if (found.has_errors()) entries_.clear();
+}
+
+ZipFile::~ZipFile() {
+  if (archive_ != nullptr) zip_discard(archive_);
+}
+
+void ZipFile::Refuse(const std::string& message, const std::string& hint) {
+  diagnostics_->AddError(file_, message, hint);
+}
+
+bool ZipFile::Open() {
+  if (IsZip64(file_)) {
+    Refuse("is a ZIP64 archive", kNotOurs);
+    return false;
+  }
+  int code = 0;
+  archive_ = zip_open(file_.c_str(), ZIP_RDONLY, &code);
+  std::string trouble;
+  if (archive_ == nullptr) {
+    zip_error_t error;
+    zip_error_init_with_code(&error, code);
+    trouble = Reason(&error);
+  } else if (zip_get_num_entries(archive_, 0) == 0) {
+    trouble = "it is empty";
+  }
+  if (!trouble.empty()) Refuse("is no ZIP archive: " + trouble, "fetch it again");
+  return trouble.empty();
+}
+
+void ZipFile::List() {
+  const auto count = static_cast<zip_uint64_t>(zip_get_num_entries(archive_, 0));
+  if (count > limits_.entries) {
+    return Refuse(fmt::format("holds {} files, more than {}", count, limits_.entries), kNotOurs);
+  }
+  for (zip_uint64_t i = 0; i < count; ++i) ListEntry(i);
+  std::uint64_t bytes = 0;
+  for (const ListedEntry& entry : entries_) {
+    bytes += std::min(entry.bytes, limits_.bytes + 1);  // no sum of theirs overflows
+    if (bytes <= limits_.bytes) continue;
+    Refuse(fmt::format("unpacks to more than {} MB (at '{}')", limits_.bytes >> 20,
+                       Printable(entry.path)),
+           kNotOurs);
+    break;
+  }
+  std::ranges::sort(entries_, {}, &ListedEntry::path);
+  CheckFolders();
+}
+
+void ZipFile::ListEntry(std::uint64_t index) {
+  zip_stat_t stat;
+  constexpr zip_uint64_t kNeeded = ZIP_STAT_NAME | ZIP_STAT_SIZE | ZIP_STAT_INDEX;
+  if (zip_stat_index(archive_, index, 0, &stat) != 0 || (stat.valid & kNeeded) != kNeeded) {
+    return Refuse(fmt::format("entry {} cannot be read: {}", index, zip_strerror(archive_)), "");
+  }
+  ListedEntry entry{.path = stat.name, .bytes = stat.size, .index = index};
+  const bool folder = entry.path.ends_with('/');
+  if (folder) entry.path.pop_back();
+  const std::string shown = Printable(entry.path);
+  if (!IsPlainPath(entry.path) || FindNonName(entry.path) != std::string::npos) {
+    return Refuse(fmt::format("'{}' leads outside of the archive, or is no plain path", shown),
+                  kNotOurs);
+  }
+  if (const std::string why = WhyNotPlain(archive_, stat, &entry.executable); !why.empty()) {
+    return Refuse(fmt::format("'{}' {}", shown, why), kNotOurs);
+  }
+  if (!folder) entries_.push_back(std::move(entry));
+}
+
+// No file twice, and none below another.
+void ZipFile::CheckFolders() {
+  std::set<std::string> paths;
+  for (const ListedEntry& entry : entries_) {
+    if (!paths.insert(entry.path).second) {
+      Refuse("holds '" + Printable(entry.path) + "' twice", kNotOurs);
+    }
+  }
+  for (const std::string& path : paths) {
+    for (size_t at = path.find('/'); at != std::string::npos; at = path.find('/', at + 1)) {
+      if (!paths.contains(path.substr(0, at))) continue;
+      Refuse(fmt::format("'{}' is a file and the folder of '{}'", Printable(path.substr(0, at)),
+                         Printable(path)),
+             kNotOurs);
+    }
+  }
+}
+
+bool ZipFile::Read(const ListedEntry& entry, const std::function<bool(std::string_view)>& take) {
+  const std::string shown = Printable(entry.path);
+  const std::unique_ptr<zip_file_t, EntryClose> file(zip_fopen_index(archive_, entry.index, 0));
+  if (file == nullptr) {
+    Refuse(fmt::format("'{}' cannot be read: {}", shown, zip_strerror(archive_)), "");
+    return false;
+  }
+  std::uint64_t left = entry.bytes;
+  std::array<char, 1 << 16> piece;
+  zip_int64_t count = 0;
+  while ((count = zip_fread(file.get(), piece.data(), piece.size())) > 0) {
+    if (static_cast<std::uint64_t>(count) > left) {
+      Refuse(fmt::format("'{}' is longer than the archive says", shown), kNotOurs);
+      return false;
+    }
+    left -= static_cast<std::uint64_t>(count);
+    if (!take({piece.data(), static_cast<size_t>(count)})) return false;
+  }
+  if (count == 0 && left == 0) return true;
+  Refuse(fmt::format("'{}' is damaged: {}", shown,
+                     count == 0 ? "it ends early" : zip_file_strerror(file.get())),
+         "fetch the archive again");
+  return false;
 }
 
 }  // namespace mbv

@@ -2,11 +2,15 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "core/diagnostics.h"
+
+struct zip;
 
 namespace mbv {
 
@@ -28,13 +32,45 @@ struct ArchiveLimits {
   std::uint64_t entries = 20'000;
 };
 
-/// The files of an archive, sorted by path; folders are left out. Nothing is unpacked to disk.
-/// Findings, all at once, with `file` as their place: what is no ZIP, paths that lead outside,
-/// links and devices, two files of one path, a file that is a folder as well, encryption, more than
-/// the limits (whatever the archive says of its sizes), content that its checksum contradicts.
-[[nodiscard]] std::optional<std::vector<ArchiveEntry>> ReadZip(const std::string& bytes,
-                                                               const std::string& file,
-                                                               const ArchiveLimits& limits,
-                                                               Diagnostics* diagnostics);
+/// A file in an archive that is read.
+struct ListedEntry {
+  std::string path;
+  std::uint64_t bytes = 0;  ///< unpacked, as the archive says
+  bool executable = false;
+  std::uint64_t index = 0;
+};
+
+/// An archive that is read without trusting it: from its file, piece by piece.
+class ZipFile {
+ public:
+  /// Lists the files; folders are left out. Findings, all at once, with `file` as their place: what
+  /// is no ZIP, paths that lead outside, links and devices, two files of one path, a file that is a
+  /// folder as well, encryption, more than the limits.
+  ZipFile(const std::string& file, const ArchiveLimits& limits, Diagnostics* diagnostics);
+  ~ZipFile();
+  ZipFile(const ZipFile&) = delete;
+  ZipFile& operator=(const ZipFile&) = delete;
+
+  /// Sorted by path; empty after findings.
+  [[nodiscard]] const std::vector<ListedEntry>& entries() const { return entries_; }
+
+  /// Gives the content piece by piece; take() returns false to end it. False then, and after a
+  /// finding: content that its checksum contradicts, or that is longer than `entry.bytes`.
+  [[nodiscard]] bool Read(const ListedEntry& entry,
+                          const std::function<bool(std::string_view)>& take);
+
+ private:
+  void Refuse(const std::string& message, const std::string& hint);
+  [[nodiscard]] bool Open();
+  void List();
+  void ListEntry(std::uint64_t index);
+  void CheckFolders();
+
+  std::string file_;
+  ArchiveLimits limits_;
+  Diagnostics* diagnostics_;
+  zip* archive_ = nullptr;
+  std::vector<ListedEntry> entries_;
+};
 
 }  // namespace mbv

@@ -6,6 +6,7 @@
 #include <array>
 #include <cerrno>
 #include <cmath>
+#include <csignal>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -176,12 +177,21 @@ int Refuse(const std::string& message, const std::string& hint) {
   return 2;
 }
 
+int NotWritten(const std::string& message, const std::string& hint) {
+  (void)Refuse(message, hint);
+  return 3;
+}
+
 int WorseExit(int a, int b) {
   static constexpr std::array<int, 5> kBadness = {0, 1, 3, 2, 4};  // of exit codes 0 … 4
   return kBadness[static_cast<size_t>(a)] >= kBadness[static_cast<size_t>(b)] ? a : b;
 }
 
 int RunCli(int argc, char** argv) {
+  // A reader that went away (`| head`) and a limit of file sizes (`ulimit -f`) are failed writes,
+  // which are reported; they do not end this process in silence with half of a result.
+  std::signal(SIGPIPE, SIG_IGN);
+  std::signal(SIGXFSZ, SIG_IGN);
   CLI::App app(
       "Verifies the dynamics of closed-loop mechanisms: closed-form equations, a generic "
       "reference solver and MuJoCo against each other.");
@@ -246,7 +256,7 @@ int RunCli(int argc, char** argv) {
   if (lost.empty() && std::ferror(stdout) == 0) return exit_code;
   // Results that nobody can read are not delivered.
   Complain("error: cannot write to standard output" + (lost.empty() ? "" : ": " + lost));
-  return 2;
+  return 3;
 }
 
 }  // namespace mbv

@@ -19,6 +19,8 @@ void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
 
 /// Says "error: message" and the hint, if there is one. Exit code 2.
 [[nodiscard]] int Refuse(const std::string& message, const std::string& hint);
+/// The same of results that cannot be written. Exit code 3.
+[[nodiscard]] int NotWritten(const std::string& message, const std::string& hint);
 
 // One function per command: adds it to the app; when chosen, its callback sets *exit_code.
 void AddInitCommand(CLI::App* app, int* exit_code);

@@ -58,8 +58,7 @@ int RunConverge(const ConvergeArguments& arguments) {
   SayText(arguments.json.text(), ToText(outcome.report));
   std::fflush(stdout);
   if (const std::string trouble = WriteFolder(arguments.out, outcome.report); !trouble.empty()) {
-    Say(stderr, "error: {}\n", trouble);
-    return 2;
+    return NotWritten(trouble, "choose another folder with --out");
   }
   return WorseExit(outcome.exit_code, arguments.json.Write(ToJson(outcome.report), {}));
 }

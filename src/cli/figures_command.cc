@@ -112,7 +112,7 @@ int Figures(const FiguresArguments& arguments) {
     findings.Print(outcome.diagnostics);
     std::string folder;
     if (const std::string lost = Deliver(arguments, outcome, &folder); !lost.empty()) {
-      return Refuse(lost, "choose another folder with --out");
+      return NotWritten(lost, "choose another folder with --out");
     }
     exit_code = WorseExit(exit_code, outcome.exit_code);
     results.push_back(OutcomeJson(file, outcome, folder));

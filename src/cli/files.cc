@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cctype>
 #include <filesystem>
 
 #include "cli/cli.h"
 #include "cli/terminal.h"
 #include "core/files.h"
+#include "core/text.h"
 #include "pipeline/check_file.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
@@ -30,7 +33,40 @@ std::string WhyRefused(const std::string& path, const std::vector<InputFile>& in
                      input == path ? "a file" : input);
 }
 
+// How a file's content begins: its format, and in texts the first word, which tells a summary from
+// a model file, or a table from notes.
+std::string BeginningOf(std::string_view content) {
+  for (const auto& [magic, format] : {std::pair<std::string_view, const char*>{"PK\3\4", "ZIP"},
+                                      {"\x89PNG", "PNG"},
+                                      {"%PDF", "PDF"},
+                                      {"GIF8", "GIF"},
+                                      {"SQLite format 3", "SQLite"}}) {
+    if (content.starts_with(magic)) return format;
+  }
+  content = content.substr(0, 4096);
+  if (content.find('\0') != std::string_view::npos) return "binary";
+  if (content.starts_with("<?xml")) content = content.substr(content.find('>') + 1);
+  const size_t at = content.find_first_not_of(" \t\r\n");
+  const char first = at == std::string_view::npos ? ' ' : content[at];
+  if (first == '#') return "text that begins with '#'";  // a heading, which may change
+  const auto is_word = [](char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0; };
+  const auto from = std::ranges::find_if(content, is_word);
+  const std::string word(from, std::find_if_not(from, content.end(), is_word));
+  const char* format = first == '{' || first == '[' ? "JSON" : first == '<' ? "XML" : "text";
+  return word.empty() ? format : fmt::format("{} that begins with '{}'", format, word);
+}
+
 }  // namespace
+
+std::string WhyForeign(const std::string& path, const std::string& content) {
+  const auto old = ReadWholeFile(path);  // of a regular file
+  if (!old || old->empty()) return "";
+  const std::string there = BeginningOf(*old), here = BeginningOf(content);
+  if (there == here) return "";
+  return fmt::format(
+      "{} is {}, not {}: mbverify did not write it; choose another file, or remove it", path,
+      Printable(there), here);
+}
 
 std::vector<std::string> ExpandYaml(const std::string& argument, std::vector<std::string>* unread) {
   std::error_code error;
@@ -112,11 +148,11 @@ int RefuseInput(const std::string& path, const std::string& scenario) {
 
 int WriteWholeFile(const std::string& path, const std::string& content,
                    const std::vector<InputFile>& inputs) {
-  std::string trouble = WhyRefused(path, inputs);
-  if (trouble.empty()) trouble = WriteFile(path, content);
-  if (trouble.empty()) return 0;
-  Say(stderr, "error: {}\n", trouble);
-  return 2;
+  std::string why = WhyRefused(path, inputs);
+  if (why.empty()) why = WhyForeign(path, content);
+  if (!why.empty()) return Refuse(why, "");
+  const std::string trouble = WriteFile(path, content);
+  return trouble.empty() ? 0 : NotWritten(trouble, "");
 }
 
 }  // namespace mbv

@@ -48,8 +48,13 @@ struct LoadOptions;
 /// the files that `scenario` is computed from.
 [[nodiscard]] int RefuseInput(const std::string& path, const std::string& scenario);
 
-/// Writes a file whole or not at all (see WriteFile in core/files.h), but not one of `inputs`. Exit
-/// code: 0, or 2 after saying on standard error what went wrong.
+/// Why `content` may not replace the regular file `path`: what is there is of another format, or a
+/// text that begins otherwise, so that mbverify did not write it. "" if it may.
+[[nodiscard]] std::string WhyForeign(const std::string& path, const std::string& content);
+
+/// Writes a file whole or not at all (see WriteFile in core/files.h), but not over one of `inputs`
+/// or over what mbverify did not write. Exit code: 0; after an error message 2 where `path` is
+/// refused, 3 where it cannot be written.
 [[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content,
                                  const std::vector<InputFile>& inputs);
 

@@ -20,7 +20,7 @@ int Init(InitArguments arguments) {
   if (!ReadAssembly(arguments.assembly, &arguments.options.assembly)) return 2;
   const InitResult result = InitModel(arguments.options);
   SayText(stderr, result.diagnostics.Text());
-  if (result.files.empty()) return 2;
+  if (result.files.empty()) return result.exit_code;
   for (const std::string& file : result.files) fmt::print("wrote {}\n", file);
   Say(stdout, "next: mbverify run {}\n", result.files.back());
   return 0;

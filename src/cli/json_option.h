@@ -20,8 +20,8 @@ class JsonOption {
   [[nodiscard]] bool wanted() const { return !path_.empty(); }
   /// Where the text for people goes: standard error when JSON takes standard output.
   [[nodiscard]] std::FILE* text() const { return path_ == "-" ? stderr : stdout; }
-  /// Writes what was asked for, but not over one of `inputs`. Exit code: 0, or 2 after saying what
-  /// went wrong.
+  /// Writes what was asked for, but not over one of `inputs`. Exit code as of
+  /// WriteWholeFile().
   [[nodiscard]] int Write(const std::string& json, const std::vector<InputFile>& inputs) const;
   [[nodiscard]] int Write(const nlohmann::ordered_json& json,
                           const std::vector<InputFile>& inputs) const;

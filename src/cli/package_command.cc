@@ -10,6 +10,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/files.h"
 #include "core/json_text.h"
 #include "core/names.h"
 #include "core/sha256.h"
@@ -90,8 +91,9 @@ int Package(const PackageArguments& arguments) {
   FindingPrinter(stderr).Print(outcome.diagnostics);
   exit_code = outcome.exit_code;
   if (exit_code == 0) {
-    exit_code = WriteWholeFile(arguments.out, outcome.zip, {});
-    if (exit_code != 0) return exit_code;
+    // Inputs were refused before anything ran, and --force is for any other file.
+    const std::string trouble = WriteFile(arguments.out, outcome.zip);
+    if (!trouble.empty()) return NotWritten(trouble, "");
     TellPackage(arguments, outcome);
     for (const PackedScenario& scenario : outcome.description.scenarios) {
       exit_code = WorseExit(exit_code, scenario.exit_code);

@@ -128,7 +128,7 @@ int PaperFigures(const PaperArguments& arguments, const JsonOption& json) {
     SayPaper(papers.back(), json.text());
     std::string folder;
     if (const std::string lost = WritePaper(papers.back(), arguments.out, &folder); !lost.empty()) {
-      return Refuse(lost, "choose another folder with --out");
+      return NotWritten(lost, "choose another folder with --out");
     }
     exit_code = WorseExit(exit_code, papers.back().exit_code);
     results.push_back(PaperJson(papers.back(), folder));

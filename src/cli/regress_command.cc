@@ -66,6 +66,7 @@ bool Complete(RegressArguments* arguments) {
         options.shard.count > 1 ? "; or give it to merge" : "");
     return false;
   }
+  if (arguments->json.path() != "-") options.json = arguments->json.path();
   options.pictures = !arguments->no_pictures;
   ShareScript(*arguments, &options);
   options.program = std::string("mbverify ") + kVersion;
@@ -78,7 +79,11 @@ int Conclude(const RegressArguments& arguments, const RegressOutcome& outcome) {
   if (!outcome.trouble.empty()) Say(stderr, "{}\n", outcome.trouble);
   if (outcome.files.empty()) return outcome.exit_code;
   SayText(arguments.json.text(), ToSummaryText(outcome.report));
-  if (const int code = arguments.json.Write(ToJson(outcome.report), {}); code != 0) return code;
+  std::vector<InputFile> inputs;
+  for (const CaseResult& result : outcome.report.cases) {
+    inputs.insert(inputs.end(), result.input_files.begin(), result.input_files.end());
+  }
+  if (const int code = arguments.json.Write(ToJson(outcome.report), inputs); code != 0) return code;
   if (!arguments.quiet) {
     for (const std::string& file : outcome.files) Say(stderr, "wrote {}\n", file);
   }

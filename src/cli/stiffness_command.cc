@@ -190,10 +190,7 @@ int Stiffness(const StiffnessArguments& arguments) {
   if (!maps.text.empty()) Say(json ? stderr : arguments.json.text(), "\n{}", maps.text);
   if (!arguments.out.empty() || !maps.files.empty()) {
     const std::string trouble = WriteFolder(arguments, run, maps.files);
-    if (!trouble.empty()) {
-      Say(stderr, "error: {}\n  hint: choose another folder with --out\n", trouble);
-      return 2;
-    }
+    if (!trouble.empty()) return NotWritten(trouble, "choose another folder with --out");
   }
   const int exit_code = WorseExit(run.report.exit_code, maps.whole ? 0 : 3);
   return WorseExit(exit_code,

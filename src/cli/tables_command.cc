@@ -77,7 +77,7 @@ int Tables(const TablesArguments& arguments) {
     findings.Print(outcome.diagnostics);
     std::string folder;
     if (const std::string lost = WriteTables(arguments, outcome, &folder); !lost.empty()) {
-      return Refuse(lost, "choose another folder with --out");
+      return NotWritten(lost, "choose another folder with --out");
     }
     exit_code = WorseExit(exit_code, outcome.exit_code);
     results.push_back(TablesJson(file, outcome, folder));

@@ -65,8 +65,7 @@ int Workspace(const WorkspaceArguments& arguments) {
   }
   OutputFolder folder(arguments.out, loaded.mechanism->name + "/workspace");
   if (const std::string trouble = folder.WriteAll(outcome.files); !trouble.empty()) {
-    Say(stderr, "error: {}\n", trouble);
-    return 2;
+    return NotWritten(trouble, "choose another folder with --out");
   }
   Say(stderr, "results in {}\n", folder.target().string());
   return WorseExit(

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <bit>
 
 #include "core/markup.h"
@@ -44,18 +45,30 @@ void Compress(const unsigned char* block, std::array<std::uint32_t, 8>* state) {
 
 }  // namespace
 
-std::array<std::uint8_t, 32> Sha256(std::string_view bytes) {
-  std::array<std::uint32_t, 8> state = {0x6a09e667, 0xbb67ae85, 0x3c6ef372, 0xa54ff53a,
-                                        0x510e527f, 0x9b05688c, 0x1f83d9ab, 0x5be0cd19};
-  const auto* data = reinterpret_cast<const unsigned char*>(bytes.data());
-  const size_t whole = bytes.size() / 64 * 64;
-  for (size_t at = 0; at < whole; at += 64) Compress(data + at, &state);
+void Sha256Sum::Add(std::string_view bytes) {
+  count_ += bytes.size();
+  const auto compress = [this](std::string_view block) {
+    Compress(reinterpret_cast<const unsigned char*>(block.data()), &state_);
+  };
+  if (!rest_.empty()) {
+    const size_t missing = std::min(64 - rest_.size(), bytes.size());
+    rest_ += bytes.substr(0, missing);
+    bytes.remove_prefix(missing);
+    if (rest_.size() < 64) return;
+    compress(rest_);
+    rest_.clear();
+  }
+  for (; bytes.size() >= 64; bytes.remove_prefix(64)) compress(bytes);
+  rest_ = bytes;
+}
+
+std::array<std::uint8_t, 32> Sha256Sum::Digest() const {
   // The rest, a one bit, zeros, and the length in bits.
-  std::string tail(bytes.substr(whole));
-  tail += '\x80';
+  std::string tail = rest_ + '\x80';
   while (tail.size() % 64 != 56) tail += '\0';
-  const std::uint64_t bits = 8 * static_cast<std::uint64_t>(bytes.size());
+  const std::uint64_t bits = 8 * count_;
   for (int shift = 56; shift >= 0; shift -= 8) tail += static_cast<char>(bits >> shift & 255U);
+  std::array<std::uint32_t, 8> state = state_;
   for (size_t at = 0; at < tail.size(); at += 64) {
     Compress(reinterpret_cast<const unsigned char*>(tail.data()) + at, &state);
   }
@@ -66,10 +79,22 @@ std::array<std::uint8_t, 32> Sha256(std::string_view bytes) {
   return digest;
 }
 
-std::string Sha256Hex(std::string_view bytes) {
+std::string Sha256Sum::Hex() const {
   std::string text;
-  for (const std::uint8_t byte : Sha256(bytes)) text += fmt::format("{:02x}", byte);
+  for (const std::uint8_t byte : Digest()) text += fmt::format("{:02x}", byte);
   return text;
+}
+
+std::array<std::uint8_t, 32> Sha256(std::string_view bytes) {
+  Sha256Sum sum;
+  sum.Add(bytes);
+  return sum.Digest();
+}
+
+std::string Sha256Hex(std::string_view bytes) {
+  Sha256Sum sum;
+  sum.Add(bytes);
+  return sum.Hex();
 }
 
 std::string CspHash(std::string_view text) {

@@ -51,8 +51,7 @@ void Limit(__rlimit_resource resource, double bytes) {
   setrlimit(RLIMIT_CORE, &no_core);
   Limit(RLIMIT_DATA, job.data_bytes);
   Limit(RLIMIT_FSIZE, job.file_bytes);
-  signal(SIGINT, SIG_DFL);
-  signal(SIGTERM, SIG_DFL);
+  for (const int ours : {SIGINT, SIGTERM, SIGHUP, SIGPIPE, SIGXFSZ}) signal(ours, SIG_DFL);
   const int nothing = open("/dev/null", O_RDONLY);
   dup2(nothing, STDIN_FILENO);
   dup2(log, STDOUT_FILENO);

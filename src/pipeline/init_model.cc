@@ -196,6 +196,7 @@ class Initialiser {
     }
     if (!trouble.empty()) {
       Add(trouble, "choose another folder by --into");
+      result_.exit_code = 3;
       return;
     }
     for (const NewFolder* folder : {&a, &b}) {

@@ -28,6 +28,7 @@ struct InitOptions {
 struct InitResult {
   Diagnostics diagnostics;         ///< why nothing was written
   std::vector<std::string> files;  ///< model file, scenario file; empty after a finding
+  int exit_code = 2;               ///< after a finding: 2 bad input, 3 they cannot be written
 };
 
 /// Writes INTO/models/NAME/model.yaml and INTO/scenarios/NAME/first.yaml, both or neither; nothing

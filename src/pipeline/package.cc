@@ -46,7 +46,7 @@ class PackageMaker {
 
   PackageOutcome Make() {
     outcome_.exit_code = 2;
-    if (!stage_.trouble().empty()) outcome_.diagnostics.AddError("", stage_.trouble());
+    if (!stage_.trouble().empty()) return CannotWrite("", stage_.trouble());
     FindDate();
     const auto inputs = GatherInputs(scenarios_, &outcome_.diagnostics);
     if (!inputs || outcome_.diagnostics.has_errors()) return std::move(outcome_);
@@ -54,7 +54,11 @@ class PackageMaker {
     package().page = options_.page;
     package().versions = Versions();
     package().meshes = inputs->meshes;
-    for (const PackedInput& input : inputs->files) StageInput(input);
+    for (const PackedInput& input : inputs->files) {
+      if (std::string trouble = StageInput(input); !trouble.empty()) {
+        return CannotWrite(input.file, std::move(trouble));
+      }
+    }
     for (size_t k = 0; k < inputs->scenarios.size(); ++k) {
       if (outcome_.diagnostics.has_errors()) return std::move(outcome_);
       if (options_.progress) {
@@ -85,14 +89,21 @@ class PackageMaker {
     }
   }
 
-  void StageInput(const PackedInput& input) {
+  PackageOutcome CannotWrite(const std::string& file, std::string trouble) {
+    outcome_.diagnostics.AddError(file, std::move(trouble));
+    outcome_.exit_code = 3;
+    return std::move(outcome_);
+  }
+
+  // "" or what went wrong.
+  std::string StageInput(const PackedInput& input) {
     const fs::path path = stage_.path() / input.path;
-    const std::string trouble = WriteFile(path, input.content, false);
+    std::string trouble = WriteFile(path, input.content, false);
     std::error_code error;
     if (input.executable) fs::permissions(path, fs::perms::owner_all, error);
-    if (!trouble.empty()) outcome_.diagnostics.AddError(input.file, trouble);
     Keep({.path = input.path, .role = input.role, .bytes = 0, .sha256 = ""}, input.content,
          input.executable);
+    return trouble;
   }
 
   void RunOne(const std::string& file) {
@@ -102,6 +113,7 @@ class PackageMaker {
                                            .figures = options_.figures});
     for (const Finding& finding : run.findings) outcome_.diagnostics.Add(finding);
     if (!run.failure.empty()) outcome_.diagnostics.AddError(file, run.failure);
+    if (!run.failure.empty() && run.scenario.exit_code == 3) outcome_.exit_code = 3;
     for (const PackedScenario& other : package().scenarios) {
       if (other.results != run.scenario.results || run.scenario.results.empty()) continue;
       outcome_.diagnostics.AddError(file, "has its results where those of " + other.file + " are",

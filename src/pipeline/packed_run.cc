@@ -150,7 +150,11 @@ PackedRun RunHere(const std::string& file, const PackedRunOptions& options,
   std::map<std::string, std::string> now = FilesOf(".", truth->scenario.results);
   now.merge(FilesOf(".", run.scenario.results));
   if (!truth->scenario.figures.empty()) now.merge(FilesOf(".", truth->scenario.figures));
-  run.files = JudgeReruns(truth->scenario, truth->files, now, truth->same_versions);
+  std::map<std::string, std::string> packed;
+  for (const std::string& path : truth->files) {
+    packed[path] = ReadWholeFile(truth->folder / path).value_or("");
+  }
+  run.files = JudgeReruns(truth->scenario, packed, now, truth->same_versions);
   return run;
 }
 

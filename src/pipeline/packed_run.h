@@ -36,7 +36,8 @@ struct PackedRun {
 /// Results of an archive that a repetition is judged by.
 struct PackedTruth {
   PackedScenario scenario;
-  std::map<std::string, std::string> files;  ///< path in the archive → content
+  std::filesystem::path folder;    ///< where they are unpacked
+  std::vector<std::string> files;  ///< paths in the archive, and below `folder`
   bool same_versions = true;
 };
 

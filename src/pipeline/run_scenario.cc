@@ -283,7 +283,7 @@ class ScenarioRun {
     finding.message = trouble;
     finding.hint = "choose another folder with --out";
     outcome_.diagnostics.Add(std::move(finding));
-    outcome_.exit_code = 2;
+    outcome_.exit_code = 3;
   }
 
   const std::string file_;

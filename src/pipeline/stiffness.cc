@@ -282,7 +282,7 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
       finding.message = trouble;
       finding.hint = "choose another folder with --out";
       outcome.diagnostics.Add(std::move(finding));
-      outcome.exit_code = 2;
+      outcome.exit_code = 3;
     }
   }
   outcome.stiffness = std::make_shared<StiffnessReport>(std::move(run.report));

@@ -21,6 +21,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+StudyOutcome NotWritten(StudyOutcome outcome, const std::string& why, const std::string& hint) {
+  outcome.exit_code = 3;
+  outcome.diagnostics.AddError("", why, hint);
+  return outcome;
+}
+
 StudyOutcome Refused(StudyOutcome outcome, const std::string& file, const std::string& why,
                      const std::string& hint = "") {
   outcome.exit_code = 2;
@@ -98,7 +104,7 @@ StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
   const std::string trouble = folder->Publish(files);
   if (!trouble.empty()) {
     outcome.report.reset();
-    return Refused(std::move(outcome), "", trouble, "choose another folder with --out");
+    return NotWritten(std::move(outcome), trouble, "choose another folder with --out");
   }
   outcome.folder = folder->target().string();
   return outcome;
@@ -251,7 +257,7 @@ StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
   }
   const std::string trouble =
       ComputePoints(bench, options.points, FindDone(bench, share, folder.path()), folder.path());
-  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
+  if (!trouble.empty()) return NotWritten(std::move(outcome), trouble, "");
   return Finish(bench, share.count == 1, &folder, std::move(outcome));
 }
 

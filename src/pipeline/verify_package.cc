@@ -1,10 +1,15 @@
 #include "pipeline/verify_package.h"
 
+#include <fcntl.h>
 #include <fmt/format.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <map>
+#include <optional>
 
 #include "archive/zip.h"
 #include "core/files.h"
@@ -20,24 +25,19 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// An archive that is what its manifest says.
+constexpr const char* kPackedFolder = "packed";  // of the stage: what the archive's results are
+
+// An archive that is what its manifest says, unpacked into a folder: nothing is before the names
+// and sizes of all files are those of the manifest, and no file is held in memory but the manifest.
 class CheckedArchive {
  public:
-  CheckedArchive(const std::string& file, Diagnostics* diagnostics)
-      : file_(file), diagnostics_(diagnostics) {}
+  CheckedArchive(const std::string& file, const fs::path& stage, Diagnostics* diagnostics)
+      : file_(file), stage_(stage), diagnostics_(diagnostics), zip_(file, {}, diagnostics) {}
 
   bool Read() {
-    const auto bytes = ReadWholeFile(file_);
-    if (!bytes) {
-      Refuse("cannot be read", "is it there, and a file?");
-      return false;
-    }
-    auto entries = ReadZip(*bytes, file_, {}, diagnostics_);
-    if (!entries || !FindFolder(*entries)) return false;
-    for (ArchiveEntry& entry : *entries) {
-      const std::string path = entry.path.substr(folder_.size() + 1);
-      entry.path = path;
-      files_.emplace(path, std::move(entry));
+    if (zip_.entries().empty() || !FindFolder()) return false;
+    for (const ListedEntry& entry : zip_.entries()) {
+      files_.emplace(entry.path.substr(folder_.size() + 1), entry);
     }
     const auto manifest = files_.find(kManifestFile);
     if (manifest == files_.end()) {
@@ -45,24 +45,38 @@ class CheckedArchive {
              "only archives of mbverify package are verified");
       return false;
     }
-    auto package = ReadManifest(manifest->second.content, file_, diagnostics_);
+    if (manifest->second.bytes > kMostManifest) {
+      Refuse(fmt::format("has a manifest of {} MB", manifest->second.bytes >> 20), kChanged);
+      return false;
+    }
+    std::string text;
+    const bool read = zip_.Read(manifest->second, [&](std::string_view piece) {
+      text += piece;
+      return true;
+    });
+    auto package = read ? ReadManifest(text, file_, diagnostics_) : std::nullopt;
     if (!package) return false;
     package_ = *std::move(package);
-    return CheckFiles();
+    return CheckFiles() && Unpack();
   }
 
   [[nodiscard]] const PackageDescription& package() const { return package_; }
-  [[nodiscard]] const std::map<std::string, ArchiveEntry>& files() const { return files_; }
+  [[nodiscard]] const std::map<std::string, ListedEntry>& files() const { return files_; }
+  /// It could not be unpacked here, whatever is in it.
+  [[nodiscard]] bool not_written() const { return not_written_; }
 
  private:
+  static constexpr std::uint64_t kMostManifest = 16'000'000;
+
   void Refuse(const std::string& message, const std::string& hint) {
     diagnostics_->AddError(file_, message, hint);
   }
 
-  bool FindFolder(const std::vector<ArchiveEntry>& entries) {
+  bool FindFolder() {
+    const std::vector<ListedEntry>& entries = zip_.entries();
     folder_ = entries.front().path.substr(0, entries.front().path.find('/'));
     const auto outside = std::ranges::find_if(
-        entries, [&](const ArchiveEntry& entry) { return !entry.path.starts_with(folder_ + "/"); });
+        entries, [&](const ListedEntry& entry) { return !entry.path.starts_with(folder_ + "/"); });
     if (outside == entries.end()) return true;
     Refuse(fmt::format("does not hold one folder alone: '{}' and '{}'",
                        Printable(entries.front().path), Printable(outside->path)),
@@ -70,29 +84,81 @@ class CheckedArchive {
     return false;
   }
 
-  // Each file of the manifest as it says, and no other; all findings at once.
+  // Each file of the manifest with its size, and no other; all findings at once.
   bool CheckFiles() {
-    std::map<std::string, const PackedFile*> listed;
     for (const PackedFile& file : package_.files) {
-      if (!listed.emplace(file.path, &file).second) Refuse(TwiceText(file.path), kChanged);
+      if (!listed_.emplace(file.path, &file).second) Refuse(TwiceText(file.path), kChanged);
     }
-    for (const auto& [path, file] : listed) {
+    for (const auto& [path, file] : listed_) {
       const auto found = files_.find(path);
       if (found == files_.end()) {
         Refuse(fmt::format("lacks '{}', which its manifest names", Printable(path)), kChanged);
-      } else if (Sha256Hex(found->second.content) != file->sha256) {
-        Refuse(fmt::format("'{}' was changed: its SHA-256 is not that of the manifest",
-                           Printable(path)),
+      } else if (found->second.bytes != file->bytes) {
+        Refuse(fmt::format("'{}' was changed: it has {} bytes, {} in the manifest", Printable(path),
+                           found->second.bytes, file->bytes),
                kChanged);
       }
     }
     for (const auto& [path, entry] : files_) {
-      if (path == kManifestFile || listed.contains(path)) continue;
+      if (path == kManifestFile || listed_.contains(path)) continue;
       Refuse(fmt::format("holds '{}', which its manifest does not name", Printable(path)),
              kChanged);
     }
     for (const PackedScenario& scenario : package_.scenarios) CheckScenario(scenario);
     return !diagnostics_->has_errors();
+  }
+
+  // Inputs where they are read; results, which are compared and not looked up, aside.
+  [[nodiscard]] fs::path PlaceOf(const std::string& path) const {
+    if (path.starts_with(std::string(kInputsFolder) + "/")) return stage_ / path;
+    for (const char* folder : {kResultsFolder, kFiguresFolder}) {
+      if (path.starts_with(std::string(folder) + "/")) return stage_ / kPackedFolder / path;
+    }
+    return {};
+  }
+
+  bool Unpack() {
+    for (const auto& [path, file] : listed_) {
+      if (!UnpackFile(path, *file)) return false;
+    }
+    return !diagnostics_->has_errors();
+  }
+
+  // False where going on is of no use.
+  bool UnpackFile(const std::string& path, const PackedFile& file) {
+    const ListedEntry& entry = files_.at(path);
+    const fs::path place = PlaceOf(path);
+    int to = -1;
+    if (!place.empty()) {
+      std::error_code error;
+      fs::create_directories(place.parent_path(), error);
+      constexpr int kFlags = O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC;
+      to = open(place.c_str(), kFlags, entry.executable ? 0700 : 0600);
+      if (to < 0) return CannotWrite(place);
+    }
+    Sha256Sum sum;
+    bool written = true;
+    (void)zip_.Read(entry, [&](std::string_view piece) {
+      sum.Add(piece);
+      written = to < 0 || WriteBytes(to, piece);
+      return written;
+    });
+    if (!written) (void)CannotWrite(place);
+    if (to >= 0) close(to);
+    if (written && !diagnostics_->has_errors() && sum.Hex() != file.sha256) {
+      Refuse(
+          fmt::format("'{}' was changed: its SHA-256 is not that of the manifest", Printable(path)),
+          kChanged);
+    }
+    return written;
+  }
+
+  bool CannotWrite(const fs::path& place) {
+    const std::string reason = std::strerror(errno);
+    diagnostics_->AddError(file_, fmt::format("cannot unpack {}: {}", place.string(), reason),
+                           "TMPDIR names another folder for temporary files");
+    not_written_ = true;
+    return false;
   }
 
   void CheckScenario(const PackedScenario& scenario) {
@@ -121,10 +187,14 @@ class CheckedArchive {
 
   static constexpr const char* kChanged = "somebody changed it; ask for the archive as it was made";
   const std::string& file_;
+  const fs::path stage_;
   Diagnostics* diagnostics_;
+  ZipFile zip_;
   std::string folder_;
   PackageDescription package_;
-  std::map<std::string, ArchiveEntry> files_;
+  std::map<std::string, const PackedFile*> listed_;  // by the manifest
+  std::map<std::string, ListedEntry> files_;         // in the archive
+  bool not_written_ = false;
 };
 
 std::vector<OtherVersion> OtherVersions(const PackageDescription& package) {
@@ -144,16 +214,22 @@ std::vector<OtherVersion> OtherVersions(const PackageDescription& package) {
 class PackageVerifier {
  public:
   PackageVerifier(const std::string& file, const VerifyOptions& options)
-      : options_(options), stage_("verify"), archive_(file, &outcome_.diagnostics) {
+      : options_(options), stage_("verify") {
     report_.archive = file;
   }
 
   VerifyOutcome Verify() {
-    outcome_.exit_code = 2;
-    if (!stage_.trouble().empty()) outcome_.diagnostics.AddError("", stage_.trouble());
-    if (outcome_.diagnostics.has_errors() || !archive_.Read() || !Unpack()) {
+    outcome_.exit_code = 3;
+    if (!stage_.trouble().empty()) {
+      outcome_.diagnostics.AddError("", stage_.trouble());
       return std::move(outcome_);
     }
+    archive_.emplace(report_.archive, stage_.path(), &outcome_.diagnostics);
+    if (!archive_->Read()) {
+      outcome_.exit_code = archive_->not_written() ? 3 : 2;
+      return std::move(outcome_);
+    }
+    outcome_.exit_code = 2;
     report_.other_versions = OtherVersions(package());
     bool ran = true;
     for (size_t k = 0; k < package().scenarios.size(); ++k) {
@@ -171,31 +247,15 @@ class PackageVerifier {
   }
 
  private:
-  [[nodiscard]] const PackageDescription& package() const { return archive_.package(); }
-
-  // Inputs alone: results of the archive are compared, not looked up.
-  bool Unpack() {
-    for (const auto& [path, entry] : archive_.files()) {
-      if (!path.starts_with(std::string(kInputsFolder) + "/")) continue;
-      const fs::path place = stage_.path() / path;
-      const std::string trouble = WriteFile(place, entry.content, false);
-      if (!trouble.empty()) {
-        outcome_.diagnostics.AddError(report_.archive, trouble);
-        return false;
-      }
-      std::error_code error;
-      if (entry.executable) fs::permissions(place, fs::perms::owner_all, error);
-    }
-    return true;
-  }
+  [[nodiscard]] const PackageDescription& package() const { return archive_->package(); }
 
   // True when it ran.
   bool Repeat(const PackedScenario& packed) {
-    PackedTruth truth{packed, {}, report_.other_versions.empty()};
-    for (const auto& [path, entry] : archive_.files()) {
+    PackedTruth truth{packed, stage_.path() / kPackedFolder, {}, report_.other_versions.empty()};
+    for (const auto& [path, entry] : archive_->files()) {
       const bool of_it = path.starts_with(packed.results + "/") ||
                          (!packed.figures.empty() && path.starts_with(packed.figures + "/"));
-      if (of_it) truth.files[path] = entry.content;
+      if (of_it) truth.files.push_back(path);
     }
     PackedRun run = RunPacked(packed.file,
                               {.folder = stage_.path(),
@@ -205,6 +265,7 @@ class PackageVerifier {
                                .programs = options_.trust},
                               &truth);
     for (Finding& finding : run.findings) outcome_.diagnostics.Add(std::move(finding));
+    if (!run.failure.empty() && run.scenario.exit_code == 3) outcome_.exit_code = 3;
     report_.scenarios.push_back({.file = packed.file,
                                  .kind = packed.kind,
                                  .exit_code = run.scenario.exit_code,
@@ -219,7 +280,7 @@ class PackageVerifier {
   const VerifyOptions& options_;
   const ScratchFolder stage_;
   VerifyOutcome outcome_;
-  CheckedArchive archive_;
+  std::optional<CheckedArchive> archive_;
   RerunReport report_;
 };
 

@@ -160,7 +160,11 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
   if (!EndedBadly(end, timeout_s, output, &result)) {
     const std::string offence = Offence(result, output + words.culprits);
     if (reason.empty()) reason = TellingLine(output);
-    if (!summary && end.exit_code != 2) {
+    if (!summary && end.exit_code == 3) {
+      // Results that could not be written are never what was expected.
+      result.status = CaseStatus::kCouldNotRun;
+      result.reason = (offence.empty() ? "no results" : offence) + ": " + reason;
+    } else if (!summary && end.exit_code != 2) {
       result.status = CaseStatus::kInternalError;
       result.reason = fmt::format("exit code {} but no summary.json", end.exit_code);
     } else if (offence.empty()) {

@@ -120,7 +120,8 @@ class Merger {
           from);
     }
     const std::string report_file = (fs::path(from) / "regress.json").string();
-    for (const std::string& output : {options_.junit, options_.markdown, options_.history}) {
+    for (const std::string& output :
+         {options_.junit, options_.markdown, options_.json, options_.history}) {
       if (output.empty() || SameFile(output, {{report_file, ""}}).empty()) continue;
       return fmt::format("{}: error: is read for the merge; choose another output", output);
     }

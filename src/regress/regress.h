@@ -22,6 +22,7 @@ struct RegressOptions {
   std::string history;                   ///< SQLite file; "" writes none
   std::string junit;                     ///< "" is OUT/junit.xml
   std::string markdown;                  ///< "" is OUT/summary.md
+  std::string json;                      ///< written by the caller; it may be no other file
   std::vector<std::string> tables = {};  ///< documents whose accuracy tables are filled
   std::string label;                     ///< kept with the run, e.g. a commit
   std::string program;                   ///< version text; its file's fingerprint is added

@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/test_folder.h"
+
 namespace mbv {
 namespace {
 
@@ -13,11 +15,31 @@ std::string Written(const std::vector<ArchiveEntry>& entries) {
   return bytes.value_or("");
 }
 
+// All files of an archive; empty after findings.
+std::vector<ArchiveEntry> Unpacked(const std::string& bytes, const ArchiveLimits& limits,
+                                   Diagnostics* diagnostics) {
+  const test::TestFolder folder("zip");
+  ZipFile zip(folder.Write("a.zip", bytes), limits, diagnostics);
+  EXPECT_EQ(zip.entries().empty(), diagnostics->has_errors());
+  std::vector<ArchiveEntry> entries;
+  for (const ListedEntry& listed : zip.entries()) {
+    ArchiveEntry entry{.path = listed.path, .content = "", .executable = listed.executable};
+    const bool read = zip.Read(listed, [&](std::string_view piece) {
+      entry.content += piece;
+      return true;
+    });
+    EXPECT_EQ(read, !diagnostics->has_errors());
+    if (!read) continue;
+    EXPECT_EQ(entry.content.size(), listed.bytes);
+    entries.push_back(std::move(entry));
+  }
+  return entries;
+}
+
 // The text of what is found; "" of an archive that is read.
 std::string FindingsOf(const std::string& bytes, const ArchiveLimits& limits = {}) {
   Diagnostics diagnostics;
-  const auto entries = ReadZip(bytes, "a.zip", limits, &diagnostics);
-  EXPECT_EQ(entries.has_value(), !diagnostics.has_errors());
+  (void)Unpacked(bytes, limits, &diagnostics);
   return diagnostics.Text();
 }
 
@@ -37,16 +59,15 @@ bool Says(const std::string& text, const std::string& words) {
 TEST(Zip, GivesBackWhatWasWritten) {
   const std::string zeros(100'000, '\0');
   Diagnostics diagnostics;
-  const auto entries = ReadZip(Written({{"p/b", "text\n", true}, {"p/a", zeros}, {"p/c", ""}}),
-                               "a.zip", {}, &diagnostics);
-  ASSERT_TRUE(entries) << diagnostics.Text();
-  ASSERT_EQ(entries->size(), 3U);
-  EXPECT_EQ((*entries)[0].path, "p/a");
-  EXPECT_EQ((*entries)[0].content, zeros);
-  EXPECT_FALSE((*entries)[0].executable);
-  EXPECT_EQ((*entries)[1].content, "text\n");
-  EXPECT_TRUE((*entries)[1].executable);
-  EXPECT_EQ((*entries)[2].content, "");
+  const std::vector<ArchiveEntry> entries =
+      Unpacked(Written({{"p/b", "text\n", true}, {"p/a", zeros}, {"p/c", ""}}), {}, &diagnostics);
+  ASSERT_EQ(entries.size(), 3U) << diagnostics.Text();
+  EXPECT_EQ(entries[0].path, "p/a");
+  EXPECT_EQ(entries[0].content, zeros);
+  EXPECT_FALSE(entries[0].executable);
+  EXPECT_EQ(entries[1].content, "text\n");
+  EXPECT_TRUE(entries[1].executable);
+  EXPECT_EQ(entries[2].content, "");
 }
 
 TEST(Zip, TheOrderOfFilesAndTheZoneOfTimeChangeNoByte) {
@@ -88,6 +109,37 @@ TEST(Zip, BombsEndAtTheLimit) {
   EXPECT_EQ(FindingsOf(bytes, {.bytes = 1'200'000}), "");
   EXPECT_TRUE(Says(FindingsOf(bytes, {.bytes = 1'199'999}), "unpacks to more than 1 MB"));
   EXPECT_TRUE(Says(FindingsOf(bytes, {.entries = 1}), "holds 2 files, more than 1"));
+}
+
+// The directory at its end says how much there is to unpack; no more is, whatever it says.
+TEST(Zip, MoreThanIsStatedIsNotUnpacked) {
+  const std::string size("\x27\x27\0\0", 4), less("\x10\x27\0\0", 4), more("\x50\x27\0\0", 4);
+  const std::string bytes = Written({{"p/a", std::string(0x2727, '\0')}});
+  EXPECT_EQ(FindingsOf(bytes), "");
+  EXPECT_TRUE(
+      Says(FindingsOf(Replaced(bytes, size, less)), "'p/a' is longer than the archive says"));
+  EXPECT_TRUE(Says(FindingsOf(Replaced(bytes, size, more)), "'p/a' is damaged: it ends early"));
+}
+
+TEST(Zip, TheReaderMayStop) {
+  const test::TestFolder folder("zip_stop");
+  Diagnostics diagnostics;
+  ZipFile zip(folder.Write("a.zip", Written({{"p/a", std::string(1'000'000, 'x')}})), {},
+              &diagnostics);
+  size_t taken = 0;
+  EXPECT_FALSE(zip.Read(zip.entries().at(0), [&](std::string_view piece) {
+    taken += piece.size();
+    return false;
+  }));
+  EXPECT_LE(taken, 65536U);
+  EXPECT_FALSE(diagnostics.has_errors());
+}
+
+// libzip keeps every entry of a directory, of which ZIP64 has any number.
+TEST(Zip, TheLargeDirectoryIsRefused) {
+  std::string bytes = Written({{"p/a", "1"}});
+  bytes.insert(bytes.find("PK\5\6"), "PK\6\7" + std::string(16, '\0'));
+  EXPECT_TRUE(Says(FindingsOf(bytes), "is a ZIP64 archive"));
 }
 
 TEST(Zip, DamageIsFound) {

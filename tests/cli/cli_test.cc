@@ -203,11 +203,11 @@ TEST_F(CliTest, AKilledRunLeavesTheOldResultWhole) {
   EXPECT_FALSE(before.empty());
 }
 
-TEST_F(CliTest, AFolderThatCannotBeWrittenIsBadInput) {
+TEST_F(CliTest, AFolderThatCannotBeWrittenIsNamed) {
   std::ofstream(mbverify.folder() / "file") << "x";
   const ProgramResult result =
       mbverify("run --no-pictures --out " + (mbverify.folder() / "file").string() + " " + kGood);
-  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_EQ(result.exit_code, 3);
   EXPECT_NE(result.err.find("cannot make folder"), std::string::npos) << result.err;
   EXPECT_NE(result.err.find("hint: choose another folder with --out"), std::string::npos);
 }

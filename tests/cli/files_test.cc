@@ -105,14 +105,14 @@ TEST_F(UserFilesTest, OutputsThatAreNoFilesAreWrittenInto) {
   EXPECT_EQ(mbverify(model + "/dev/null").exit_code, 0);
   EXPECT_TRUE(fs::is_character_file("/dev/null"));
   EXPECT_EQ(mbverify(model + "/dev/stdout").out, text);
-  EXPECT_EQ(mbverify(model + "/dev/full").exit_code, 2);
+  EXPECT_EQ(mbverify(model + "/dev/full").exit_code, 3);
   ASSERT_EQ(mkfifo(In("pipe").c_str(), 0600), 0);
   ASSERT_EQ(
       std::system(("cat '" + In("pipe").string() + "' > '" + In("copy").string() + "' &").c_str()),
       0);
   EXPECT_EQ(mbverify(model + "'" + In("pipe").string() + "'").exit_code, 0);
   EXPECT_TRUE(fs::is_fifo(In("pipe")));
-  Put("target.xml", "old");
+  Put("target.xml", "<mujoco>old</mujoco>");
   fs::create_symlink("target.xml", In("link.xml"));
   EXPECT_EQ(mbverify(model + "'" + In("link.xml").string() + "'").exit_code, 0);
   EXPECT_TRUE(fs::is_symlink(In("link.xml")));

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <csignal>
 
 #include "tests/cli/program.h"
 #include "tests/source_dir.h"
@@ -154,25 +155,24 @@ TEST_F(RobustnessTest, AFullDiskIsNamedAndTheOldResultStays) {
   const fs::path summary = fs::path(mbverify.Out()) / "slider_crank" / "turn" / "summary.json";
   const std::string old = ReadAll(summary);
   ASSERT_GT(fs::file_size(summary.parent_path() / "traces.csv"), 8u * 1024u);
-  const ProgramResult full = Shell("trap '' XFSZ; ulimit -f 8; " + run);
-  EXPECT_EQ(full.exit_code, 2);
+  const ProgramResult full = Shell("ulimit -f 8; " + run);
+  EXPECT_EQ(full.exit_code, 3);
   EXPECT_NE(full.err.find("cannot write"), std::string::npos) << full.err;
   EXPECT_NE(full.err.find("File too large"), std::string::npos) << full.err;
   EXPECT_EQ(FilesBelow(mbverify.Out()), before);
   EXPECT_EQ(ReadAll(summary), old);
   // Nothing of a first result either.
   fs::remove_all(mbverify.Out());
-  EXPECT_EQ(Shell("trap '' XFSZ; ulimit -f 8; " + run).exit_code, 2);
+  EXPECT_EQ(Shell("ulimit -f 8; " + run).exit_code, 3);
   EXPECT_TRUE(FilesBelow(mbverify.Out()).empty());
   EXPECT_EQ(Shell(run).exit_code, 0);
 }
 
 TEST_F(RobustnessTest, AFullDiskLeavesNoHalfOfASingleFile) {
   const fs::path file = mbverify.folder() / "model.xml";
-  const ProgramResult full =
-      Shell("trap '' XFSZ; ulimit -f 2; \"$mbverify\" model scara_robot --format mjcf --out '" +
-            file.string() + "'");
-  EXPECT_EQ(full.exit_code, 2);
+  const ProgramResult full = Shell(
+      "ulimit -f 2; \"$mbverify\" model scara_robot --format mjcf --out '" + file.string() + "'");
+  EXPECT_EQ(full.exit_code, 3);
   EXPECT_NE(full.err.find("File too large"), std::string::npos) << full.err;
   for (const std::string& left : FilesBelow(mbverify.folder())) {
     EXPECT_EQ(left.find("model.xml"), std::string::npos) << left;
@@ -183,21 +183,138 @@ TEST_F(RobustnessTest, ResultsThatCannotBePrintedAreAnError) {
   for (const std::string& command : {std::string("list"), Run(kSoundScenario),
                                      std::string("model slider_crank --format mjcf")}) {
     const ProgramResult result = Shell("\"$mbverify\" " + command + " >/dev/full");
-    EXPECT_EQ(result.exit_code, 2) << command << "\n" << result.err;
+    EXPECT_EQ(result.exit_code, 3) << command << "\n" << result.err;
     EXPECT_NE(result.err.find("cannot write to standard output"), std::string::npos)
         << command << "\n"
         << result.err;
   }
   // Nobody to complain to either.
-  EXPECT_EQ(Shell("\"$mbverify\" " + Run(kSoundScenario) + " >/dev/full 2>/dev/full").exit_code, 2);
+  EXPECT_EQ(Shell("\"$mbverify\" " + Run(kSoundScenario) + " >/dev/full 2>/dev/full").exit_code, 3);
+}
+
+// Commands that write, with where they write to and a lower bound of how many bytes one file has.
+struct Writer {
+  const char* name;
+  const char* arguments;  // OUT: a folder
+  int kib;
+};
+class DiskTrouble : public RobustnessTest, public testing::WithParamInterface<Writer> {
+ protected:
+  [[nodiscard]] std::string Call(const std::string& out) const {
+    std::string arguments = GetParam().arguments;
+    arguments.replace(arguments.find("OUT"), 3, out);
+    return "\"$mbverify\" " + arguments;
+  }
+};
+
+// No half of a result stays, neither where it should go nor in the folder of temporary files.
+TEST_P(DiskTrouble, IsNamedAndLeavesNothing) {
+  const fs::path out = mbverify.folder() / "disk", scratch = mbverify.folder() / "scratch";
+  fs::create_directories(out);
+  fs::create_directories(scratch);
+  // What it prints goes into a pipe, which has no limit.
+  const ProgramResult full = Shell("( export TMPDIR='" + scratch.string() + "'; ulimit -f " +
+                                   std::to_string(GetParam().kib) + "; " + Call(out.string()) +
+                                   " 2>&1 >/dev/null; echo \"code $?\" ) | cat");
+  EXPECT_NE(full.out.find("code 3"), std::string::npos) << full.out;
+  EXPECT_NE(full.out.find("File too large"), std::string::npos) << full.out;
+  EXPECT_TRUE(FilesBelow(out).empty()) << FilesBelow(out).front();
+  EXPECT_TRUE(fs::is_empty(scratch));
+  // A file system that takes no file, whoever asks.
+  const ProgramResult refused = Shell(Call("/proc/self/fd"));
+  EXPECT_EQ(refused.exit_code, 3) << refused.err;
+  EXPECT_NE(refused.err.find("/proc/self/fd"), std::string::npos) << refused.err;
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    AllWriters, DiskTrouble,
+    testing::ValuesIn(std::vector<Writer>{
+        {"run", "run -q --no-pictures --out OUT scenarios/slider_crank/turn.yaml", 4},
+        {"run_json", "audit spr_tripod --json OUT/a.json", 2},
+        {"stiffness", "stiffness scara_robot --no-simulation --out OUT", 2},
+        {"workspace", "workspace spr_tripod --out OUT", 4},
+        {"figures", "figures scenarios/slider_crank/turn.yaml --out OUT", 4},
+        {"tables", "tables scenarios/slider_crank/turn.yaml --out OUT", 0},
+        {"converge", "converge scenarios/slider_crank/turn.yaml --steps 4e-3,2e-3,1e-3 --out OUT",
+         1},
+        {"model", "model slider_crank --format mjcf --out OUT/m.xml", 1},
+        {"check", "check scenarios/slider_crank/turn.yaml --json OUT/c.json", 0},
+        {"list", "list --json OUT/l.json", 1},
+        {"init", "init mine --into OUT", 0},
+        {"mutate", "mutate four_bar/turn_inverse --json OUT/m.json", 2},
+        {"size", "size scenarios/slider_crank/motor.yaml --json OUT/s.json", 0},
+        {"package", "package scenarios/slider_crank/turn.yaml -o OUT/p.zip", 4}}),
+    [](const auto& info) { return std::string(info.param.name); });
+
+// `mbverify … | head`: a reader that goes away is told like any other lost output.
+TEST_F(RobustnessTest, AReaderThatGoesAwayIsToldAndIsNoSilentDeath) {
+  for (const std::string& command :
+       {std::string("list"), std::string("audit spr_tripod"), Run(kSoundScenario),
+        std::string("model scara_robot --format mjcf")}) {
+    const ProgramResult result =
+        Shell("{ sleep 0.3; \"$mbverify\" " + command + "; echo \"code $?\" >&2; } | true");
+    EXPECT_NE(result.err.find("cannot write to standard output"), std::string::npos)
+        << command << result.err;
+    EXPECT_NE(result.err.find("code 3"), std::string::npos) << command << result.err;
+  }
+}
+
+TEST_F(RobustnessTest, ATerminatedCommandLeavesNothingInTheFolderOfTemporaryFiles) {
+  const fs::path scratch = mbverify.folder() / "scratch";
+  fs::create_directories(scratch);
+  // It ends when its scratch folder is there; then one that is killed, and one that finds it.
+  const auto end = [&](const char* signal) {
+    return Shell(
+        "export TMPDIR='" + scratch.string() + "'; \"$mbverify\" package -o '" +
+        (mbverify.folder() / "p.zip").string() +
+        "' scenarios/stabilizing_platform/sea_state.yaml & pid=$!; for i in $(seq 200); do "
+        "test -n \"$(ls -A '" +
+        scratch.string() + "'/*/inputs 2>/dev/null)\" && break; sleep 0.05; done; kill -" + signal +
+        " $pid; wait $pid");
+  };
+  EXPECT_EQ(end("TERM").exit_code, 128 + SIGTERM);
+  EXPECT_TRUE(fs::is_empty(scratch));
+  EXPECT_EQ(end("KILL").exit_code, 128 + SIGKILL);
+  EXPECT_FALSE(fs::is_empty(scratch));
+  const ProgramResult next =
+      Shell("export TMPDIR='" + scratch.string() + "'; \"$mbverify\" package -o '" +
+            (mbverify.folder() / "q.zip").string() +
+            "' --no-report --no-figures scenarios/four_bar/turn_inverse.yaml");
+  EXPECT_EQ(next.exit_code, 0) << next.err;
+  EXPECT_TRUE(fs::is_empty(scratch));
+}
+
+// A slip that names a model where a summary should go.
+TEST_F(RobustnessTest, NoSummaryReplacesWhatMbverifyDidNotWrite) {
+  const std::string model = "name: mine\nbodies: {}\n";
+  for (const std::string& command :
+       {std::string("regress --no-pictures --out '") + mbverify.Out() +
+            "' scenarios/slider_crank/turn.yaml --json ",
+        std::string("regress --no-pictures --out '") + mbverify.Out() +
+            "' scenarios/slider_crank/turn.yaml --junit ",
+        std::string("audit spr_tripod --json "), std::string("list --json "),
+        std::string("model slider_crank --format mjcf --out "),
+        std::string("check scenarios/slider_crank/turn.yaml --json ")}) {
+    const std::string file = Write("model.yaml", model);
+    const ProgramResult result = mbverify(command + "'" + file + "'");
+    EXPECT_EQ(result.exit_code, 2) << command << result.err;
+    EXPECT_NE(result.err.find("mbverify did not write it"), std::string::npos) << result.err;
+    EXPECT_EQ(ReadAll(file), model) << command;
+  }
+  EXPECT_FALSE(fs::exists(mbverify.Out())) << "refused before anything ran";
+  // Other JSON than its own; what it wrote is replaced.
+  const std::string json = Write("package.json", "{\"name\": \"mine\"}");
+  EXPECT_EQ(mbverify("list --json '" + json + "'").exit_code, 2);
+  const std::string own = (mbverify.folder() / "own.json").string();
+  EXPECT_EQ(mbverify("list --json '" + own + "'").exit_code, 0);
+  EXPECT_EQ(mbverify("list --json '" + own + "'").exit_code, 0);
 }
 
 TEST_F(RobustnessTest, ARegressionOnAFullDiskTellsWhyEachScenarioFailed) {
-  const ProgramResult full =
-      Shell("trap '' XFSZ; ulimit -f 40; \"$mbverify\" regress --no-pictures --out '" +
-            mbverify.Out() + "' " + kSoundScenario);
-  EXPECT_EQ(full.exit_code, 2);
-  EXPECT_NE(full.out.find("exit code 2, expected 0: "), std::string::npos) << full.out;
+  const ProgramResult full = Shell("ulimit -f 40; \"$mbverify\" regress --no-pictures --out '" +
+                                   mbverify.Out() + "' " + kSoundScenario);
+  EXPECT_EQ(full.exit_code, 2) << "its own files do not fit, either";
+  EXPECT_NE(full.out.find("exit code 3, expected 0: "), std::string::npos) << full.out;
   EXPECT_NE(full.out.find("File too large"), std::string::npos) << full.out;
 }
 

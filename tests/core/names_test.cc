@@ -53,6 +53,19 @@ TEST(ScriptData, HasNoMarkup) {
 }
 
 // FIPS 180-4's examples, and a length at the edge of a block.
+TEST(Sha256, OfPiecesIsThatOfTheWhole) {
+  std::string text;
+  for (int i = 0; i < 1000; ++i) text += static_cast<char>('a' + i % 23);
+  for (const size_t piece : {1U, 7U, 63U, 64U, 65U, 200U, 1000U}) {
+    Sha256Sum sum;
+    for (size_t at = 0; at < text.size(); at += piece) sum.Add(text.substr(at, piece));
+    EXPECT_EQ(sum.Hex(), Sha256Hex(text)) << piece;
+  }
+  Sha256Sum other;
+  other.Add(text.substr(1));
+  EXPECT_NE(other.Hex(), Sha256Hex(text));
+}
+
 TEST(Sha256, GivesThePublishedDigests) {
   const auto hex = [](const std::string& text) {
     std::string digits;
