@@ -321,7 +321,7 @@ TEST_F(StudyFiles, OthersMayAskForOtherPoints) {
 TEST_F(StudyFiles, AValidationWithoutAWitnessThatIsKnownIsRefusedNotCrashedOn) {
   for (const auto& [witnesses, told] : {std::pair{"[referense]", "witnesses = 'referense'"},
                                         {"[]", "witnesses: nobody computes"},
-                                        {"[\"\"]", "witnesses = ''"},
+                                        {"[\"\"]", "witnesses is ''"},
                                         {"{}", "witnesses"},
                                         {"[[]]", "witnesses"}}) {
     ExpectIn(Refusal("{crank: {uniform: {plus_minus_mm: 0.2}}}", "{latin_hypercube: 8}",
