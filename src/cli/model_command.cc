@@ -84,11 +84,12 @@ int Model(const ModelArguments& arguments) {
   if (format == ModelFormat::kMjcf) {
     MjcfText mjcf = MjcfFor(*loaded.mechanism, DrivesOf(arguments.drives));
     if (!mjcf.trouble.empty()) {
-      return Refuse("--drives " + arguments.drives + ": " + mjcf.trouble, "");
+      const std::string of = arguments.drives.empty() ? "" : "--drives " + arguments.drives + ": ";
+      return Refuse(of + mjcf.trouble, "");
     }
     text = std::move(mjcf.text);
   } else {
-    text = ModelText(*loaded.mechanism, format);
+    text = ModelText(*loaded.mechanism, format, loaded.caveats);
   }
   if (arguments.out.empty()) {
     if (!IsForPeople(arguments.format)) {

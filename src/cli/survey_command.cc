@@ -105,10 +105,10 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
       ->check(CLI::PositiveNumber)
       ->capture_default_str();
   arguments->json.AddTo(survey);
-  SetFooter(
-      survey, {"survey my_robots --out out"},
-      "0 all ok, or refused for a fault of the file itself; 1 some disagree or do not close; 2 "
-      "bad input; 3 some failed");
+  SetFooter(survey, {"survey my_robots --out out"},
+            "0 all ok (caveats are listed), or refused for a fault of the file itself; 1 some "
+            "disagree or do "
+            "not close; 2 bad input; 3 some failed");
   survey->callback([arguments, exit_code] { *exit_code = Survey(*arguments); });
 }
 

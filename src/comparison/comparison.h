@@ -63,6 +63,7 @@ struct ComparisonInput {
   double bend = kNan;                    ///< by this share of their RMS
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
+  std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
 };
 
 /// Judges where a free motion leads.

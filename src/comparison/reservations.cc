@@ -182,6 +182,7 @@ std::vector<std::string> Reservations(const ComparisonInput& input, const Compar
                   "rates were not checked against positions: " + witness.derivatives_gap);
   }
   std::vector<std::string> all = sentences.Take();
+  for (const std::string& text : input.left_out) all.push_back("not the whole robot: " + text);
   if (const std::string coarse = CoarseLimits(input, comparison); !coarse.empty()) {
     all.insert(all.begin(), "limits so wide that they verify nothing: " + coarse);
   }

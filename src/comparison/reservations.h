@@ -19,7 +19,7 @@ void MarkBlind(const ComparisonInput& input, Comparison* comparison);
 
 /// One sentence each, loud in every report: limits that verify nothing, forces that only cancel
 /// out, few samples, a part of the motion that was not judged, a table without forces, rates that
-/// could not be checked against positions.
+/// could not be checked against positions, what acts on forces in a robot's file and not here.
 [[nodiscard]] std::vector<std::string> Reservations(const ComparisonInput& input,
                                                     const Comparison& comparison);
 

@@ -3,13 +3,18 @@
 #include <fmt/format.h>
 #include <tinyxml2.h>
 
+#include <cstdlib>
 #include <map>
 #include <optional>
 #include <set>
+#include <utility>
 #include <vector>
 
 #include "core/files.h"
+#include "core/text.h"
+#include "mjcf/foreign_frames.h"
 #include "mjcf/foreign_meshes.h"
+#include "mjcf/foreign_rows.h"
 #include "mjcf/xml_walk.h"
 
 namespace mbv::mjcf {
@@ -20,6 +25,25 @@ using tinyxml2::XMLDocument;
 using tinyxml2::XMLElement;
 
 constexpr int kDeepest = 200;  // nesting of elements
+constexpr size_t kMostNames = 6;
+
+// What a row's element and attribute are called in findings.
+std::string NameOf(const std::string& element, const std::string& attribute) {
+  const std::string tag = element.substr(element.find('/') + 1);
+  if (attribute.empty()) return fmt::format("<{}>", tag);
+  return fmt::format("{} of <{}>", attribute, tag);
+}
+
+std::string ElementOf(const XMLElement* e) {
+  const XMLElement* parent = e->Parent() == nullptr ? nullptr : e->Parent()->ToElement();
+  return ForeignElement(parent == nullptr ? "" : parent->Name(), e->Name());
+}
+
+// True if an attribute switches something off, "disable".
+bool IsOff(const XMLElement* flag, const char* name) {
+  const char* value = flag->Attribute(name);
+  return value != nullptr && std::string_view(value) == "disable";
+}
 
 int DepthOf(const XMLElement* element) {
   int deepest = 0;
@@ -38,6 +62,8 @@ struct ForeignMjcf::Impl {
   Diagnostics* diagnostics = nullptr;
   std::map<std::string, SitePair> by_sites;
   std::map<std::string, ForeignMesh> meshes;
+  std::vector<ModelCaveat> left_out;
+  bool weightless = false;  // gravity compensation does nothing
   bool good = false;
 
   void Add(Severity severity, int line, const std::string& text, const std::string& hint = "") {
@@ -57,9 +83,17 @@ struct ForeignMjcf::Impl {
 
   void Parse(const std::string& text) {
     good = true;
-    if (document.Parse(text.c_str(), text.size()) != tinyxml2::XML_SUCCESS) {
+    const tinyxml2::XMLError trouble = document.Parse(text.c_str(), text.size());
+    if (trouble == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
       Add(Severity::kError, document.ErrorLineNum(),
-          fmt::format("no XML: {}", document.ErrorName()));
+          fmt::format("elements are nested deeper than {}, which no XML reader of MuJoCo takes",
+                      TINYXML2_MAX_ELEMENT_DEPTH - 1),
+          "a chain of so many bodies can be written as a model.yaml, where bodies do not nest");
+      return;
+    }
+    if (trouble != tinyxml2::XML_SUCCESS) {
+      Add(Severity::kError, document.ErrorLineNum(), "the file is not well-formed XML",
+          fmt::format("the XML reader says {}", document.ErrorName()));
       return;
     }
     if (root() == nullptr || !IsTag(root(), "mujoco")) {
@@ -126,8 +160,13 @@ struct ForeignMjcf::Impl {
         others.push_back(e);
       }
       if (e->Parent() != root()) return;
-      for (const char* section : {"visual", "sensor", "contact"}) {
+      for (const char* section : {"visual", "sensor"}) {
         if (IsTag(e, section)) others.push_back(e);
+      }
+      if (!IsTag(e, "contact")) return;
+      for (XMLElement* pair = e->FirstChildElement("pair"); pair != nullptr;
+           pair = pair->NextSiblingElement("pair")) {
+        others.push_back(pair);  // of geoms that may be gone
       }
     });
     for (XMLElement* e : others) document.DeleteNode(e);
@@ -168,7 +207,13 @@ struct ForeignMjcf::Impl {
   // Since MuJoCo 3.0 a range holds unless the file says otherwise.
   void LetRangesHold() {
     int open = 0, line = 0;
+    bool of_actuators = false;  // no force: their motion is commanded
     ForEach(root(), [&](XMLElement* e) {
+      for (const auto& [range, limited] : {std::pair("ctrlrange", "ctrllimited"),
+                                           {"forcerange", "forcelimited"},
+                                           {"actrange", "actlimited"}}) {
+        if (e->Attribute(range) != nullptr && e->Attribute(limited) == nullptr) of_actuators = true;
+      }
       if (e->Attribute("range") == nullptr || e->Attribute("limited") != nullptr) return;
       if (open++ == 0) line = e->GetLineNum();
     });
@@ -177,8 +222,9 @@ struct ForeignMjcf::Impl {
          e = e->NextSiblingElement("compiler")) {
       stated = stated || e->Attribute("autolimits") != nullptr;
     }
-    if (stated || open == 0) return;
+    if (stated || (open == 0 && !of_actuators)) return;
     Compiler()->SetAttribute("autolimits", "true");
+    if (open == 0) return;
     Add(Severity::kWarning, line,
         fmt::format("{} range{} without `limited` hold{}, as since MuJoCo 3", open,
                     open == 1 ? "" : "s", open == 1 ? "s" : ""),
@@ -234,7 +280,149 @@ struct ForeignMjcf::Impl {
   fs::path MeshFolder() {
     const XMLElement* compiler = root()->FirstChildElement("compiler");
     const char* meshes = compiler == nullptr ? nullptr : compiler->Attribute("meshdir");
+    if (meshes == nullptr && compiler != nullptr) meshes = compiler->Attribute("assetdir");
     return meshes == nullptr ? folder : folder / meshes;
+  }
+
+  void WriteOutFrames() {
+    const FrameTrouble trouble = DissolveFrames(&document);
+    if (!trouble.text.empty()) Add(Severity::kError, trouble.line, trouble.text, trouble.hint);
+  }
+
+  // Since MuJoCo 3.3.6 springs and dampers are switched off apart.
+  void SwitchOff() {
+    bool springs = false, dampers = false, passive = false;
+    weightless = false;
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "option")) {
+        const char* gravity = e->Attribute("gravity");
+        if (gravity != nullptr && !MoreThanFirst(gravity) && std::atof(gravity) == 0.0) {
+          weightless = true;
+        }
+      }
+      if (!IsTag(e, "flag")) return;
+      springs = springs || IsOff(e, "spring");
+      dampers = dampers || IsOff(e, "damper");
+      passive = passive || IsOff(e, "passive");
+      weightless = weightless || IsOff(e, "gravity");
+      if (springs && dampers) e->SetAttribute("passive", "disable");
+      e->DeleteAttribute("spring");
+      e->DeleteAttribute("damper");
+    });
+    weightless = weightless || passive || (springs && dampers);
+    if (springs == dampers) return;
+    const char* off = springs ? "stiffness" : "damping";
+    ForEach(root(), [&](XMLElement* e) {
+      for (const char* tag : {"joint", "spatial", "fixed", "tendon"}) {
+        if (IsTag(e, tag) && e->Attribute(off) != nullptr) e->SetAttribute(off, "0");
+      }
+    });
+  }
+
+  // Of several numbers, whether one beyond the first is not zero.
+  static bool MoreThanFirst(const std::string& text) {
+    const char* at = text.c_str();
+    char* end = nullptr;
+    (void)std::strtod(at, &end);
+    for (at = end; *at != '\0'; at = end) {
+      const double x = std::strtod(at, &end);
+      if (end == at) return false;
+      if (x != 0.0) return true;
+    }
+    return false;
+  }
+
+  // Something of one kind that is left out, and where.
+  struct Loss {
+    int count = 0, line = 0;
+    std::vector<std::string> names;
+  };
+  using Losses = std::map<std::pair<std::string, std::string>, Loss>;  // by element, attribute
+
+  static void Note(const XMLElement* e, const std::string& element, const std::string& attribute,
+                   Losses* losses) {
+    Loss& loss = (*losses)[{element, attribute}];
+    if (loss.count++ == 0) loss.line = e->GetLineNum();
+    for (const XMLElement* at = e; at != nullptr; at = at->Parent()->ToElement()) {
+      if (const char* name = at->Attribute("name")) {
+        if (loss.names.empty() || loss.names.back() != name) loss.names.emplace_back(name);
+        return;
+      }
+    }
+  }
+
+  // Every element and attribute against the rows.
+  void LookUpAll() {
+    Losses lost, unknown;
+    ForEach(root(), [&](XMLElement* e) { LookUp(e, &lost, &unknown); });
+    for (const auto& [what, loss] : lost) {
+      const ForeignRow* row = FindForeignRow(what.first, what.second);
+      if (row->fate == Fate::kRefused) {
+        Add(Severity::kError, loss.line,
+            fmt::format("{} is not read: {}", Described(what, loss), row->effect),
+            "write the model out with a current MuJoCo (mj_saveLastXML) and import that");
+      } else {
+        LeaveOut(what, loss, row->effect);
+      }
+    }
+    for (const auto& [what, loss] : unknown) {
+      LeaveOut(what, loss, "it is not known, and forces may depend on it");
+    }
+  }
+
+  void LookUp(XMLElement* e, Losses* lost, Losses* unknown) {
+    const std::string element = ElementOf(e);
+    const ForeignRow* row = FindForeignRow(element, "");
+    if (row != nullptr && !row->compiled &&
+        (row->fate == Fate::kLeftOut || row->fate == Fate::kRefused)) {
+      Note(e, element, "", lost);
+      return;
+    }
+    if (!IsForeignElement(element)) {
+      Note(e, element, "", unknown);
+      return;
+    }
+    TakeFirstNumber(e, lost);
+    for (const auto* a = e->FirstAttribute(); a != nullptr; a = a->Next()) {
+      row = FindForeignRow(element, a->Name());
+      if (row == nullptr) Note(e, element, a->Name(), unknown);
+      if (row == nullptr || row->fate != Fate::kLeftOut || row->compiled) continue;
+      if (IsNeutral(*row, a->Value())) continue;
+      if (weightless && std::string_view(a->Name()) == "gravcomp") continue;
+      Note(e, element, a->Name(), lost);
+    }
+  }
+
+  // Springs and dampers may be polynomials since MuJoCo 3.
+  static void TakeFirstNumber(XMLElement* e, Losses* lost) {
+    for (const char* tag : {"joint", "spatial", "fixed", "tendon"}) {
+      if (!IsTag(e, tag)) continue;
+      for (const char* attribute : {"stiffness", "damping"}) {
+        const char* text = e->Attribute(attribute);
+        if (text == nullptr) continue;
+        if (MoreThanFirst(text)) Note(e, attribute, "2nd", lost);
+        char* end = nullptr;
+        (void)std::strtod(text, &end);
+        while (*end == ' ') ++end;
+        if (*end == '\0' || end == text) continue;
+        e->SetAttribute(attribute, std::string(text, static_cast<const char*>(end)).c_str());
+      }
+    }
+  }
+
+  static std::string Described(const std::pair<std::string, std::string>& what, const Loss& loss) {
+    const std::string name = what.second == "2nd" ? fmt::format("a second number of {}", what.first)
+                                                  : NameOf(what.first, what.second);
+    return fmt::format("{} ({}{}{})", name, loss.count, loss.names.empty() ? "" : ": ",
+                       Joined(loss.names, kMostNames));
+  }
+
+  void LeaveOut(const std::pair<std::string, std::string>& what, const Loss& loss,
+                const std::string& effect) {
+    left_out.push_back({.kind = ModelCaveat::Kind::kLeftOut,
+                        .text = fmt::format("{} is left out: {}", Described(what, loss), effect),
+                        .source = what.first + (what.second.empty() ? "" : " ") + what.second});
+    Add(Severity::kWarning, loss.line, left_out.back().text, "forces are computed without it");
   }
 
   bool DropWeightlessGeoms(const std::string& message);
@@ -253,7 +441,10 @@ ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnost
   impl_->diagnostics = diagnostics;
   impl_->Parse(text);
   if (ok()) impl_->TakeIncludes();
+  if (ok()) impl_->SwitchOff();
+  if (ok()) impl_->WriteOutFrames();
   if (ok()) impl_->DropPictures();
+  if (ok()) impl_->LookUpAll();  // what only serves pictures needs no word
   if (ok()) impl_->LetRangesHold();
   if (ok()) impl_->NameBodiesOfSites();
   if (ok()) impl_->MakeFoldersAbsolute();
@@ -275,6 +466,8 @@ std::string ForeignMjcf::ModelName() const {
   const char* name = impl_->root()->Attribute("model");
   return name == nullptr ? "" : name;
 }
+
+const std::vector<ModelCaveat>& ForeignMjcf::left_out() const { return impl_->left_out; }
 
 const std::map<std::string, SitePair>& ForeignMjcf::closures_by_sites() const {
   return impl_->by_sites;
@@ -323,16 +516,20 @@ bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
   if (!tag) return false;
   if (const auto name = TextBetween(message, "", "unrecognized attribute: '", "'")) {
     int count = 0, line = 0;
+    bool forceless = true;
     ForEach(impl_->root(), [&](XMLElement* e) {
       if (!IsTag(e, tag->c_str()) || e->Attribute(name->c_str()) == nullptr) return;
       if (count++ == 0) line = e->GetLineNum();
+      const ForeignRow* row = FindForeignRow(ElementOf(e), *name);
+      forceless = forceless && row != nullptr && row->fate == Fate::kNoForce;
       e->DeleteAttribute(name->c_str());
     });
     if (count == 0) return false;
-    impl_->Add(
-        Severity::kWarning, line,
-        fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left out",
-                    *name, *tag, count));
+    if (!forceless) return true;  // a finding already, or neutral
+    impl_->Add(Severity::kWarning, line,
+               fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left "
+                           "out; no force depends on it",
+                           *name, *tag, count));
     return true;
   }
   if (message.find("unrecognized element") == std::string::npos) return false;
@@ -341,11 +538,25 @@ bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
     if (IsTag(e, tag->c_str())) dropped.push_back(e);
   });
   if (dropped.empty()) return false;
-  impl_->Add(Severity::kWarning, dropped.front()->GetLineNum(),
-             fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out", *tag,
-                         dropped.size()));
+  const std::string element = ElementOf(dropped.front());
+  const ForeignRow* row = FindForeignRow(element, "");
+  const bool is_finding = !IsForeignElement(element) ||
+                          (row != nullptr && row->fate == Fate::kLeftOut && !row->compiled);
+  if (!is_finding) {
+    impl_->Add(
+        Severity::kWarning, dropped.front()->GetLineNum(),
+        fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out; no force "
+                    "depends on it",
+                    *tag, dropped.size()));
+  }
   // One at a time: an element may lie inside another of its kind.
-  impl_->document.DeleteNode(dropped.front());
+  for (XMLElement* next = dropped.front(); next != nullptr;) {
+    impl_->document.DeleteNode(next);
+    next = nullptr;
+    ForEach(impl_->root(), [&](XMLElement* e) {
+      if (next == nullptr && IsTag(e, tag->c_str()) && ElementOf(e) == element) next = e;
+    });
+  }
   return true;
 }
 

@@ -6,9 +6,11 @@
 #include <memory>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/diagnostics.h"
 #include "core/types.h"
+#include "mechanism/model_caveat.h"
 
 namespace mbv::mjcf {
 
@@ -27,7 +29,9 @@ struct ForeignMesh {
 /// out; mesh geoms of bodies that state their inertia become small spheres of no mass in the same
 /// pose, of others such spheres stand beside them: the compiler moves the frames of meshes, not
 /// theirs. Files outside the model's folder are refused. What MuJoCo 3 says differently is
-/// translated: closures by two sites, ranges that hold without being called limited.
+/// translated: closures by two sites, ranges that hold without being called limited, <frame>,
+/// <replicate>, springs or dampers switched off. Every element and attribute is looked up in
+/// foreign_rows.h.
 class ForeignMjcf {
  public:
   ForeignMjcf(const std::string& text, const std::filesystem::path& file, Diagnostics* diagnostics);
@@ -45,6 +49,9 @@ class ForeignMjcf {
 
   /// Meshes by the name of the sphere that stands where the geom is.
   [[nodiscard]] const std::map<std::string, ForeignMesh>& meshes() const;
+
+  /// What acts on forces and is left out, as the text alone shows; findings name it, too.
+  [[nodiscard]] const std::vector<ModelCaveat>& left_out() const;
 
   /// Removes what this compiler does not know, as its message says; one finding for each kind of
   /// thing. False if the message is about something else.

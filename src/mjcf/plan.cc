@@ -1,5 +1,7 @@
 #include "mjcf/plan.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 
@@ -322,6 +324,20 @@ PlannedCoupling PlanCoupling(const Mechanism& mechanism, const Coupling& couplin
     for (const Coupling::Term& term : terms) out.polycoef[0] -= term.polynomial[0] * ref(term);
   }
   return out;
+}
+
+std::string NestingTrouble(const Plan& plan) {
+  constexpr int kDeepest = 96;  // of 100 elements: <mujoco>, <worldbody> and what a body holds
+  std::vector<int> depth(plan.bodies.size(), 0);
+  int deepest = 0;
+  for (size_t b = 1; b < plan.bodies.size(); ++b) {
+    depth[b] = depth[static_cast<size_t>(plan.bodies[b].parent)] + 1;
+    deepest = std::max(deepest, depth[b]);
+  }
+  if (deepest <= kDeepest) return "";
+  return fmt::format(
+      "a chain of {} bodies is too deep for MJCF, where bodies nest: MuJoCo's XML reader takes {}",
+      deepest, kDeepest);
 }
 
 }  // namespace mbv::mjcf

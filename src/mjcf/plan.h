@@ -73,6 +73,9 @@ inline constexpr double kTinyMassFraction = 1e-11;
 /// Diagonal of the box around all joints at home, at least the characteristic length [m].
 [[nodiscard]] double Extent(const Mechanism& mechanism);
 
+/// Why MuJoCo's XML reader does not take the nested bodies of a plan; "" if it does.
+[[nodiscard]] std::string NestingTrouble(const Plan& plan);
+
 /// How MuJoCo holds a coupling.
 struct PlannedCoupling {
   enum class Type {

@@ -58,6 +58,7 @@ struct Reading {
   YamlReader yaml;
   Diagnostics others;  // findings of other files: overrides, URDF, parameters
   internal::Literals literals;
+  std::vector<ModelCaveat> caveats;
 };
 
 // What the sections of a model give.
@@ -177,6 +178,12 @@ std::optional<ModelSections> ReadModel(const YamlNode& root, Reading* reading) {
   const internal::BodyNames names(s.bodies, &values);
   internal::UrdfReader urdf(reading->bare_urdf, &values, &reading->literals, &reading->others);
   ReadBodies(each_block, names, &values, &urdf, &s, &reading->others);
+  // A URDF file may state gravity; the model file's word and the caller's go before it.
+  if (s.urdf.gravity_W && root.Find("gravity") == nullptr && !reading->options.gravity_W) {
+    s.head.gravity_W = *s.urdf.gravity_W;
+    const double g = s.head.gravity_W.norm();
+    if (g > 0.0 && root.Find("up") == nullptr) s.head.up_W = -s.head.gravity_W / g;
+  }
   internal::JointReader joints(&values, names, s.bodies, &s.joints);
   each_block([&](const Block& block) { joints.Read(block); });
   ReadSignals(each_block, names, &values, &s);
@@ -222,7 +229,7 @@ void Check(const ModelSections& s, Reading* reading, Mechanism* mechanism) {
                                      .beams = s.beams.places,
                                      .signals = s.signals,
                                      .urdf_joints = s.urdf.joints};
-  internal::ModelReport report(places, &reading->yaml, &reading->others);
+  internal::ModelReport report(places, &reading->yaml, &reading->others, &reading->caveats);
   internal::CheckMasses(*mechanism, s.head.impossible_inertia_allowed, &report);
   if (s.beams.good) internal::CheckBeams(*mechanism, &report);
   // With a broken joint, findings about the graph would only be its consequences; with a broken
@@ -254,7 +261,8 @@ Reading ReadingOf(const std::string& file, const LoadOptions& options) {
           .bare_urdf = internal::IsUrdfFile(file),
           .yaml = YamlReader(file),
           .others = {},
-          .literals = internal::Literals(options.literals)};
+          .literals = internal::Literals(options.literals),
+          .caveats = {}};
 }
 
 // The model file that a text is or, of a URDF file, stands for.
@@ -267,11 +275,15 @@ LoadResult LoadFrom(const std::string& text, Reading reading) {
   std::optional<Mechanism> mechanism;
   const YamlNodePtr root = reading.yaml.Parse(text);
   if (auto sections = root == nullptr ? std::nullopt : ReadModel(*root, &reading)) {
+    for (const auto* more : {&sections->head.left_out, &sections->urdf.left_out}) {
+      reading.caveats.insert(reading.caveats.end(), more->begin(), more->end());
+    }
     mechanism = Assembled(reading.yaml.file(), &*sections);
     Check(*sections, &reading, &*mechanism);
   }
   result.diagnostics = FindingsOf(reading);
   result.literals = reading.literals.Take();
+  result.caveats = std::move(reading.caveats);
   if (!result.diagnostics.has_errors()) result.mechanism = std::move(mechanism);
   return result;
 }
@@ -303,7 +315,9 @@ LoadedBodies LoadBodies(const std::string& file) {
 LoadResult LoadModel(const std::string& file, const LoadOptions& options) {
   YamlReader reader(file);
   const auto text = reader.ReadFile();
-  if (!text) return {.mechanism = {}, .diagnostics = reader.diagnostics(), .literals = {}};
+  if (!text) {
+    return {.mechanism = {}, .diagnostics = reader.diagnostics(), .literals = {}, .caveats = {}};
+  }
   return LoadModelText(*text, file, options);
 }
 

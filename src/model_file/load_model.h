@@ -8,6 +8,7 @@
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 
 namespace mbv {
 
@@ -35,6 +36,7 @@ struct LoadResult {
   std::optional<Mechanism> mechanism;  ///< empty when there are errors
   Diagnostics diagnostics;             ///< all findings, warnings included
   std::vector<Literal> literals;       ///< in the order of reading, each place once
+  std::vector<ModelCaveat> caveats;    ///< what every verdict on it names
 };
 
 /// Loads `file` (model.yaml or .urdf), evaluates expressions, builds the joint graph and spanning

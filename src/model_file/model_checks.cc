@@ -11,7 +11,6 @@
 #include "kinematics/constraints.h"
 #include "kinematics/mobility.h"
 #include "kinematics/tilted_axis.h"
-#include "mechanism/concession.h"
 #include "mechanism/impossible_inertia.h"
 #include "mechanism/reach.h"
 
@@ -117,7 +116,7 @@ void CheckMasses(const Mechanism& mechanism, bool impossible_allowed, ModelRepor
     if (impossible_allowed) {
       report->AtBody(
           mechanism, b, Severity::kWarning,
-          fmt::format("{}impossible inertia of {}: {}", kConcession, body.name, violation), "");
+          report->Allow(fmt::format("impossible inertia of {}: {}", body.name, violation)), "");
     } else {
       report->AtBody(mechanism, b, Severity::kError, violation,
                      "no distribution of mass has such inertias; look for exchanged or missing "

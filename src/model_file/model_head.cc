@@ -54,6 +54,19 @@ void ReadAllowances(const Block& model, const YamlMap& file, ModelValues* values
   }
 }
 
+// What the file that the model was made from has and the model has not.
+void ReadLeftOut(const YamlNode* node, YamlReader* yaml, ModelHead* head) {
+  if (node == nullptr) return;
+  const auto items = yaml->Items(*node, "left_out");
+  for (const YamlNode* item : items.value_or(std::vector<const YamlNode*>{})) {
+    const auto text = yaml->Text(*item, "left_out");
+    if (!text) continue;
+    head->left_out.push_back({.kind = ModelCaveat::Kind::kLeftOut, .text = *text});
+    yaml->AddAt(Severity::kWarning, item->line, item->column, "left_out: " + *text,
+                "verdicts on the model name it; when the model has it, delete this line");
+  }
+}
+
 }  // namespace
 
 // clang-format off
@@ -62,7 +75,7 @@ const std::vector<std::string> kModelKeys = {
     "drives", "prescribed",  "outputs",    "springs",   "parts",    "instances",      "drive_order",
     "urdf",   "attach",      "up",         "materials", "sections", "parameters_from", "allow",
     "closure_tolerance", "closure_tolerance_mm", "couplings", "motors", "elements",
-    "legs",   "license"};
+    "legs",   "license",     "left_out"};
 // clang-format on
 
 ModelHead ReadTitle(const YamlMap& file, YamlReader* yaml) {
@@ -73,6 +86,7 @@ ModelHead ReadTitle(const YamlMap& file, YamlReader* yaml) {
   }
   // For people and archives (pipeline/package.h); nothing is computed from it.
   if (const YamlNode* text = file.Find("license")) (void)yaml->Text(*text, "license");
+  ReadLeftOut(file.Find("left_out"), yaml, &head);
   return head;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "mechanism/model_caveat.h"
 #include "model_file/model_block.h"
 #include "model_file/model_values.h"
 
@@ -17,6 +18,7 @@ struct ModelHead {
   Vec3 up_W = Mechanism().up_W;
   bool impossible_inertia_allowed = false;
   double closure_tolerance_m = 0.0;  ///< up to which rounded data are projected
+  std::vector<ModelCaveat> left_out;
 };
 
 /// The keys of a model file.

@@ -13,7 +13,6 @@
 #include "kinematics/data_projection.h"
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
-#include "mechanism/concession.h"
 #include "mechanism/reach.h"
 #include "model_file/model_checks.h"
 
@@ -33,12 +32,12 @@ bool ProjectRoundedData(const ClosureRules& rules, const HomeResult& home, Mecha
   const double moved_m =
       std::max(projection.moved_m, projection.turned_rad * CharacteristicLength(*mechanism));
   if (moved_m > kProjectionReach * rules.tolerance_m) return false;
-  const std::string text = fmt::format(
-      "{}joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
-      "overconstrained "
-      "by {} and their data close them except for {:.2g} m (closure_tolerance {:g} m)",
-      kConcession, projection.moved_m, projection.turned_rad, projection.redundant,
-      home.gap * CharacteristicLength(*mechanism), rules.tolerance_m);
+  const std::string text = report->Allow(
+      fmt::format("joint frames moved by up to {:.2g} m and {:.2g} rad, because the loops are "
+                  "overconstrained "
+                  "by {} and their data close them except for {:.2g} m (closure_tolerance {:g} m)",
+                  projection.moved_m, projection.turned_rad, projection.redundant,
+                  home.gap * CharacteristicLength(*mechanism), rules.tolerance_m));
   report->AtFile(Severity::kWarning, text);
   return true;
 }

@@ -9,6 +9,7 @@
 #include "core/diagnostics.h"
 #include "input/yaml_reader.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 #include "model_file/model_bodies.h"
 #include "model_file/model_signals.h"
 
@@ -25,8 +26,15 @@ struct ModelPlaces {
 
 class ModelReport {
  public:
-  ModelReport(const ModelPlaces& places, YamlReader* yaml, Diagnostics* others)
-      : places_(places), yaml_(*yaml), others_(*others) {}
+  ModelReport(const ModelPlaces& places, YamlReader* yaml, Diagnostics* others,
+              std::vector<ModelCaveat>* caveats)
+      : places_(places), yaml_(*yaml), others_(*others), caveats_(*caveats) {}
+
+  /// What the model makes acceptable; the warning that says it, and a caveat of every verdict.
+  [[nodiscard]] std::string Allow(const std::string& text) {
+    caveats_.push_back({.kind = ModelCaveat::Kind::kAllowed, .text = text});
+    return "ALLOWED BY THE MODEL: " + text;
+  }
 
   void At(Place place, Severity severity, const std::string& message, const std::string& hint = "");
   void AtBody(const Mechanism& mechanism, size_t body, Severity severity,
@@ -52,6 +60,7 @@ class ModelReport {
   const ModelPlaces& places_;
   YamlReader& yaml_;
   Diagnostics& others_;
+  std::vector<ModelCaveat>& caveats_;
 };
 
 }  // namespace mbv::internal

@@ -22,9 +22,12 @@ UrdfSection UrdfReader::Read(const Block& model, const YamlNode& node, const Int
   if (!HasRoom(node, source->tree.bodies.size(), kMaxBodies + 1, "bodies", &yaml)) return {};
   into.joints->good = true;
   UrdfSection urdf = Add(*source, into.bodies, into.joints);
+  urdf.left_out = source->tree.left_out;
+  urdf.gravity_W = source->tree.gravity_W;
   ReadGuesses(model, map, into.joints);
   AddMimics(source->tree, node, into);
   AddDynamics(source->tree, into);
+  AddExtras(source->tree, into);
   // The model file's own drives are the better ones.
   if (model.Section("drives") == nullptr) AddDrives(MotorsOf(*source, *into.joints), node, into);
   return urdf;
@@ -187,6 +190,25 @@ void UrdfReader::AddDynamics(const UrdfTree& tree, const Into& into) {
       into.elements->push_back({.name = dynamics.joint + "_friction",
                                 .joint = joint,
                                 .law = FrictionLaw{.coulomb = most, .breakaway = most}});
+    }
+  }
+}
+
+void UrdfReader::AddExtras(const UrdfTree& tree, const Into& into) {
+  for (const UrdfTree::Extra& extra : tree.extras) {
+    const int joint = into.joints->Find(extra.joint);
+    if (joint < 0) continue;  // refused, with its own finding
+    const auto add = [&](const char* what, const auto& law) {
+      into.elements->push_back({.name = extra.joint + what, .joint = joint, .law = law});
+    };
+    const std::string place = "urdf." + extra.joint + ".";
+    if (extra.stiffness != 0.0) {
+      add("_spring", SpringLaw{.polynomial = {literals_.At(place + "spring", extra.stiffness)},
+                               .free = extra.free});
+    }
+    if (extra.rotor_inertia != 0.0) {
+      add("_rotor", RotorLaw{.inertia = literals_.At(place + "rotor", extra.rotor_inertia),
+                             .ratio = extra.gear_ratio});
     }
   }
 }

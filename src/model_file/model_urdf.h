@@ -20,6 +20,8 @@ namespace mbv::internal {
 struct UrdfSection {
   int root = -1;                          ///< body that needs a joint to the world; -1: none
   std::map<std::string, Finding> joints;  ///< where each joint is described, closures included
+  std::vector<ModelCaveat> left_out;
+  std::optional<Vec3> gravity_W;  ///< where the file states it
 };
 
 /// Reads the links of a URDF file as bodies, its joints and closures, its motors as drives,
@@ -58,6 +60,7 @@ class UrdfReader {
   std::vector<std::string> MotorsOf(const Source& source, const ModelJoints& joints) const;
   void AddMimics(const UrdfTree& tree, const YamlNode& at, const Into& into);
   void AddDynamics(const UrdfTree& tree, const Into& into);
+  void AddExtras(const UrdfTree& tree, const Into& into);
   void AddDrives(const std::vector<std::string>& motors, const YamlNode& at, const Into& into);
 
   bool bare_;

@@ -7,11 +7,13 @@
 #pragma once
 
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 
 namespace mbv {
 
@@ -55,15 +57,24 @@ struct UrdfTree {
     double damping = 0.0, friction = 0.0;
   };
   std::vector<Dynamics> dynamics;
+  /// Of joints with one coordinate, as simulators add it: a rotor's inertia [kg m²] and ratio, a
+  /// spring's stiffness [N/m or N m/rad] and free position.
+  struct Extra {
+    std::string joint;
+    double rotor_inertia = 0.0, gear_ratio = 1.0, stiffness = 0.0, free = 0.0;
+  };
+  std::vector<Extra> extras;
+  std::optional<Vec3> gravity_W;      ///< where the file states it
+  std::vector<ModelCaveat> left_out;  ///< acts on forces in the file and is not in the tree
 
   /// Index of a link (-1: the world), or -2.
   [[nodiscard]] int FindLink(const std::string& link) const;
 };
 
 /// Reads URDF text; everything urdfdom says is a finding, with the line where it is known. Closures
-/// are read in the forms listed in urdf_closures.h. Gears, joints inside <gazebo> and
-/// meshes that cannot be read (model_meshes.h) are left out with a warning. The tree is empty
-/// after an error.
+/// are read in the forms listed in urdf_closures.h. Gears and meshes that cannot be read
+/// (model_meshes.h) are left out with a warning, what acts on forces with a caveat. The tree is
+/// empty after an error.
 [[nodiscard]] UrdfTree ReadUrdf(const std::string& text, const std::string& file,
                                 Diagnostics* diagnostics);
 

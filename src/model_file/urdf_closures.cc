@@ -4,6 +4,7 @@
 #include <tinyxml2.h>
 
 #include <cmath>
+#include <cstdlib>
 #include <optional>
 #include <sstream>
 
@@ -219,22 +220,183 @@ void WarnOfReduction(const XMLElement& element, const char* transmission, const 
   }
 }
 
-// Closures and gears that mbverify does not read, but that must not be lost silently.
-void WarnOfOthers(const XMLElement& element, const std::string& file, Diagnostics* diagnostics) {
-  const std::string tag = element.Name();
-  const auto warn = [&](const std::string& text, const std::string& hint) {
-    diagnostics->Add({Severity::kWarning, file, element.GetLineNum(), 1, text, hint});
-  };
-  if (tag == "gazebo" && element.FirstChildElement("joint") != nullptr) {
-    warn("a joint inside <gazebo> is left out",
-         "if it closes a loop, state it as <constraint> or under `joints` of the model file");
-  } else if (tag == "coupling") {
-    warn("<coupling> is left out: there are no gears between joints here",
-         "drive both joints and couple them by `equal` in the scenario");
-  } else if (tag == "transmission") {
-    WarnOfReduction(element, element.Attribute("name"), file, diagnostics);
+constexpr const char* kMass = "masses and inertias are other ones";
+constexpr const char* kFluid = "a fluid drags and lifts every body";
+constexpr const char* kWeight = "the link has no weight";
+
+const UrdfForceRow kForceRows[] = {
+    {"gazebo", "joint", "", "", "the loop that it may close is open"},
+    {"gazebo", "turnGravityOff", "text", "false|0", kWeight},
+    {"gazebo", "gravity", "text", "true|1", kWeight},
+    {"gazebo", "dampingFactor", "text", "0|0.0", "a damper acts on the link"},
+    {"gazebo", "fluid_density", "text", "0|0.0", kFluid},
+    {"gazebo", "wind", "", "", kFluid},
+    {"gazebo", "enable_wind", "text", "false|0", kFluid},
+    {"coupling", "coupling", "", "", "the joints turn apart"},
+    {"mujoco", "option", "density", "0|0.0", kFluid},
+    {"mujoco", "option", "viscosity", "0|0.0", kFluid},
+    {"mujoco", "flag", "passive", "enable", "dampers do not act"},
+    {"mujoco", "flag", "equality", "enable", "loops are open"},
+    {"mujoco", "flag", "constraint", "enable", "loops are open and dry friction does not act"},
+    {"mujoco", "flag", "frictionloss", "enable", "dry friction does not act"},
+    {"mujoco", "compiler", "settotalmass", "-1|0", kMass},
+    {"mujoco", "compiler", "boundmass", "0|0.0", kMass},
+    {"mujoco", "compiler", "boundinertia", "0|0.0", kMass},
+    {"mujoco", "compiler", "balanceinertia", "false", kMass},
+    {"mujoco", "compiler", "inertiafromgeom", "false|auto", kMass},
+    {"", "drake:linear_bushing_rpy", "", "", "a bushing acts between two frames"},
+    {"", "drake:linear_spring_damper", "", "", "a spring acts between two points"},
+    {"", "drake:mimic", "", "", "the joint follows another one"},
+    {"joint", "dynamics", "spring_stiffness", "0|0.0", "a spring acts on the joint"},
+    {"joint", "dynamics", "rotor_inertia", "0|0.0", "a rotor turns with the joint"},
+    {"joint", "dynamics", "armature", "0|0.0", "a rotor turns with the joint"},
+    {"joint", "dynamics", "stiffness", "0|0.0", "a spring acts on the joint"},
+};
+
+bool IsNeutral(const UrdfForceRow& row, const std::string& value) {
+  std::istringstream words(row.neutral);
+  for (std::string word; std::getline(words, word, '|');) {
+    if (value == word) return true;
   }
+  char* end = nullptr;
+  const double x = std::strtod(value.c_str(), &end);
+  const bool zero_does_nothing = std::string_view(row.neutral).find('0') != std::string_view::npos;
+  return zero_does_nothing && end != value.c_str() && *end == '\0' && x == 0.0;
 }
+
+std::string Trimmed(const char* text) {
+  const std::string all = text == nullptr ? "" : text;
+  const size_t from = all.find_first_not_of(" \t\r\n"), to = all.find_last_not_of(" \t\r\n");
+  return from == std::string::npos ? "" : all.substr(from, to - from + 1);
+}
+
+// What simulators add: taken, or left out with what it does.
+class ExtraReader {
+ public:
+  ExtraReader(std::string file, Diagnostics* diagnostics, UrdfDetails* details)
+      : file_(std::move(file)), diagnostics_(*diagnostics), details_(*details) {}
+
+  void Read(const XMLElement& section) {
+    section_ = section.Name();
+    const char* owner = section.Attribute("reference");
+    if (owner == nullptr) owner = section.Attribute("name");
+    owner_ = owner == nullptr ? "" : owner;
+    if (section_ == "transmission") {
+      WarnOfReduction(section, section.Attribute("name"), file_, &diagnostics_);
+      ReadRotor(section);
+    }
+    if (section_ == "gazebo") {
+      if (const auto k = NumberOf(section.FirstChildElement("springStiffness"))) {
+        At(owner_, section).stiffness = *k;
+      }
+      if (const auto q = NumberOf(section.FirstChildElement("springReference"))) {
+        At(owner_, section).free = *q;
+      }
+    }
+    if (section_ == "mujoco") ReadGravity(section);
+    LookUp(section);
+  }
+
+ private:
+  void Warn(const XMLElement& at, const std::string& text, const std::string& hint) {
+    diagnostics_.Add({Severity::kWarning, file_, at.GetLineNum(), 1, text, hint});
+  }
+  void LeaveOut(const XMLElement& at, const std::string& what, const char* effect) {
+    details_.left_out.push_back(
+        {.kind = ModelCaveat::Kind::kLeftOut,
+         .text = fmt::format("{}{} is left out: {}", what,
+                             owner_.empty() ? "" : fmt::format(" ('{}')", owner_), effect),
+         .source = section_ + "/" + at.Name()});
+    Warn(at, details_.left_out.back().text,
+         section_ == "coupling" ? "state it under `couplings` of a model file"
+         : std::string_view(at.Name()) == "joint"
+             ? "if it closes a loop, state it as <constraint> or under `joints` of the model file"
+             : "forces are computed without it");
+  }
+
+  UrdfDetails::Extra& At(const std::string& joint, const XMLElement& at) {
+    UrdfDetails::Extra& extra = details_.extras[joint];
+    extra.line = at.GetLineNum();
+    return extra;
+  }
+
+  // Of the text, or of the attribute `value`.
+  static std::optional<double> NumberOf(const XMLElement* e) {
+    double x = 0.0;
+    if (e == nullptr) return std::nullopt;
+    if (e->QueryDoubleAttribute("value", &x) == tinyxml2::XML_SUCCESS) return x;
+    if (e->QueryDoubleText(&x) == tinyxml2::XML_SUCCESS) return x;
+    return std::nullopt;
+  }
+
+  // Drake: <actuator> of a transmission with drake:rotor_inertia and drake:gear_ratio.
+  void ReadRotor(const XMLElement& transmission) {
+    const XMLElement* joint = transmission.FirstChildElement("joint");
+    const char* name = joint == nullptr ? nullptr : joint->Attribute("name");
+    for (const XMLElement* a = transmission.FirstChildElement("actuator"); a != nullptr;
+         a = a->NextSiblingElement("actuator")) {
+      const auto inertia = NumberOf(a->FirstChildElement("drake:rotor_inertia"));
+      if (!inertia || *inertia == 0.0) continue;
+      if (name == nullptr) {
+        LeaveOut(*a, "drake:rotor_inertia", "a rotor turns with a joint that is not named");
+        continue;
+      }
+      At(name, *a).rotor_inertia = *inertia;
+      details_.extras[name].gear_ratio =
+          NumberOf(a->FirstChildElement("drake:gear_ratio")).value_or(1.0);
+    }
+  }
+
+  void ReadGravity(const XMLElement& mujoco) {
+    const XMLElement* option = mujoco.FirstChildElement("option");
+    if (option == nullptr) return;
+    if (const char* text = option->Attribute("gravity")) {
+      std::istringstream stream(text);
+      Vec3 g = Vec3::Zero();
+      if (stream >> g.x() >> g.y() >> g.z()) details_.gravity_W = g;
+    }
+    const XMLElement* flag = option->FirstChildElement("flag");
+    const char* off = flag == nullptr ? nullptr : flag->Attribute("gravity");
+    if (off != nullptr && std::string_view(off) == "disable") details_.gravity_W = Vec3::Zero();
+    if (details_.gravity_W) {
+      Warn(*option,
+           fmt::format("gravity is ({:g}, {:g}, {:g}) m/s², as <mujoco> says",
+                       details_.gravity_W->x(), details_.gravity_W->y(), details_.gravity_W->z()),
+           "`gravity` of a model file goes before it");
+    }
+  }
+
+  void LookUp(const XMLElement& e) {
+    for (const UrdfForceRow& row : kForceRows) {
+      if (*row.section != '\0' && section_ != row.section) continue;
+      if (std::string_view(e.Name()) != row.element) continue;
+      const std::string_view of = row.value;
+      if (of.empty()) {
+        LeaveOut(e,
+                 row.element == std::string_view("joint") ? "a joint inside <gazebo>"
+                                                          : fmt::format("<{}>", row.element),
+                 row.effect);
+        continue;
+      }
+      const char* attribute = of == "text" ? nullptr : e.Attribute(row.value);
+      if (of != "text" && attribute == nullptr) continue;
+      const std::string value = of == "text" ? Trimmed(e.GetText()) : attribute;
+      if (value.empty() || IsNeutral(row, value)) continue;
+      LeaveOut(e,
+               of == "text" ? fmt::format("<{}> {}", row.element, value)
+                            : fmt::format("{} = {} of <{}>", row.value, value, row.element),
+               row.effect);
+    }
+    for (const XMLElement* inner = e.FirstChildElement(); inner != nullptr;
+         inner = inner->NextSiblingElement()) {
+      LookUp(*inner);
+    }
+  }
+
+  std::string file_, section_, owner_;
+  Diagnostics& diagnostics_;
+  UrdfDetails& details_;
+};
 
 std::string Numbers(const Vec3& v) {
   return fmt::format("{} {} {}", v.x() + 0.0, v.y() + 0.0, v.z() + 0.0);
@@ -248,6 +410,8 @@ std::string Escaped(const std::string& text) {
 
 }  // namespace
 
+std::span<const UrdfForceRow> UrdfForceRows() { return kForceRows; }
+
 UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
                             Diagnostics* diagnostics) {
   UrdfDetails details;
@@ -256,6 +420,7 @@ UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
   const XMLElement* robot = document.FirstChildElement("robot");
   if (robot == nullptr) return details;
   ClosureReader reader(file, diagnostics);
+  ExtraReader extras(file, diagnostics, &details);
   for (const XMLElement* e = robot->FirstChildElement(); e != nullptr;
        e = e->NextSiblingElement()) {
     const std::string tag = e->Name();
@@ -266,7 +431,7 @@ UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
         tag == "drake:ball_constraint") {
       if (const auto closure = reader.Read(*e)) details.closures.push_back(*closure);
     }
-    WarnOfOthers(*e, file, diagnostics);
+    extras.Read(*e);
     if (tag == "transmission") {
       for (const XMLElement* j = e->FirstChildElement("joint"); j != nullptr;
            j = j->NextSiblingElement("joint")) {

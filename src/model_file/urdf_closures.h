@@ -13,14 +13,20 @@
 // given it has the same components in both frames. Types: fixed, revolute (continuous), prismatic,
 // cylindrical, universal (parent_axis on the parent, child_axis on the child), spherical (ball),
 // planar.
+//
+// What simulators add to URDF and acts on forces is read, too: rotors of Drake, springs of Gazebo,
+// gravity of MuJoCo. What of it is not read is a caveat (UrdfForceRows()).
 #pragma once
 
 #include <map>
+#include <optional>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 
 namespace mbv::internal {
 
@@ -35,7 +41,25 @@ struct UrdfDetails {
   std::vector<UrdfClosure> closures;
   std::map<std::string, int> link_lines, joint_lines;  ///< by name
   std::vector<std::string> transmission_joints;        ///< in file order, each once
+  /// Of joints: a rotor's inertia and its ratio, a spring's stiffness and where it is free.
+  struct Extra {
+    double rotor_inertia = 0.0, gear_ratio = 1.0, stiffness = 0.0, free = 0.0;
+    int line = 0;
+  };
+  std::map<std::string, Extra> extras;  ///< by joint
+  std::optional<Vec3> gravity_W;
+  std::vector<ModelCaveat> left_out;
 };
+
+/// Something in a URDF file that acts on forces and is not read.
+struct UrdfForceRow {
+  const char* section;  ///< element below <robot>, "" for any
+  const char* element;  ///< itself or below it
+  const char* value;    ///< attribute; "text": the element's text; "": its presence
+  const char* neutral;  ///< values that do nothing, separated by |
+  const char* effect;
+};
+[[nodiscard]] std::span<const UrdfForceRow> UrdfForceRows();
 
 /// Reads them; findings carry the line. Empty if the text is no XML (urdfdom says so).
 [[nodiscard]] UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,

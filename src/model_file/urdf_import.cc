@@ -81,7 +81,10 @@ class Importer {
     }
     for (const internal::UrdfClosure& closure : details_.closures) AddClosure(closure);
     tree_.transmission_joints = details_.transmission_joints;
+    tree_.gravity_W = details_.gravity_W;
+    tree_.left_out = details_.left_out;
     CheckMimics();
+    TakeExtras();
     const Finding place{.severity = Severity::kWarning, .file = file_, .message = {}, .hint = {}};
     internal::LoadMeshes(std::filesystem::path(file_).parent_path(), place, &tree_.bodies,
                          diagnostics_);
@@ -195,10 +198,33 @@ class Importer {
   }
   void WarnOfLosses(const char* what, const Losses& losses) {
     if (losses.joints == 0) return;
-    Warn(losses.line,
-         fmt::format("{} in {} joint{} is left out: {}", what, losses.joints,
-                     losses.joints == 1 ? "" : "s", losses.text),
-         "drive forces are computed without it");
+    LeaveOut(losses.line, fmt::format("{} in {} joint{} is left out: {}", what, losses.joints,
+                                      losses.joints == 1 ? "" : "s", losses.text));
+  }
+  void LeaveOut(int line, const std::string& text) {
+    tree_.left_out.push_back(
+        {.kind = ModelCaveat::Kind::kLeftOut, .text = text, .source = "joint"});
+    Warn(line, text, "drive forces are computed without it");
+  }
+
+  // Rotors and springs act along a single coordinate.
+  void TakeExtras() {
+    for (const auto& [name, extra] : details_.extras) {
+      const auto joint = std::ranges::find(tree_.joints, name, &Joint::name);
+      const bool fits = joint != tree_.joints.end() && FreedomsOf(joint->kind) == 1;
+      const auto is_good = [](double x) { return std::isfinite(x) && x >= 0.0; };
+      if (!fits || !is_good(extra.rotor_inertia) || !std::isfinite(extra.gear_ratio) ||
+          extra.gear_ratio == 0.0 || !std::isfinite(extra.stiffness) ||
+          !std::isfinite(extra.free)) {
+        LeaveOut(extra.line, fmt::format("the rotor or spring of '{}' is left out: it acts on no "
+                                         "joint with one coordinate, or has no sound number",
+                                         name));
+        continue;
+      }
+      if (extra.rotor_inertia == 0.0 && extra.stiffness == 0.0) continue;
+      tree_.extras.push_back(
+          {name, extra.rotor_inertia, extra.gear_ratio, extra.stiffness, extra.free});
+    }
   }
 
   void CheckMimics() {

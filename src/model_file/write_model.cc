@@ -330,6 +330,12 @@ WrittenNames NamesInModel(const Mechanism& mechanism) {
   return names;
 }
 
-std::string WriteModel(const Mechanism& mechanism) { return ModelWriter(mechanism).Text(); }
+std::string WriteModel(const Mechanism& mechanism, const std::vector<ModelCaveat>& caveats) {
+  std::string text = ModelWriter(mechanism).Text();
+  const auto left_out = TextsOf(caveats, ModelCaveat::Kind::kLeftOut);
+  if (!left_out.empty()) text += "left_out:\n";
+  for (const std::string& each : left_out) text += "  - " + QuotedYaml(each) + "\n";
+  return text;
+}
 
 }  // namespace mbv

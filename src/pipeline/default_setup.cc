@@ -378,7 +378,7 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
     setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
   }
   setup.meshes = TakeMeshesAlong(&m);
-  setup.model = WriteModel(m);
+  setup.model = WriteModel(m, loaded.caveats);
   setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, by_forces, !resting.empty());
   setup.mechanism = std::move(m);
   for (const std::string& note : setup.notes) {

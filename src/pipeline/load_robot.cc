@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "core/bytes.h"
 #include "core/in_children.h"
@@ -18,41 +20,46 @@ namespace {
 struct ModelAnswer {
   std::vector<Finding> findings;
   std::string model;  // "" after errors
+  std::vector<ModelCaveat> left_out;
 };
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<ModelAnswer>& answer) {
-  visit(answer.findings), visit(answer.model);
+  visit(answer.findings), visit(answer.model), visit(answer.left_out);
 }
 
 ModelAnswer ModelAnswerOf(const std::string& text, const std::string& file) {
   Diagnostics findings;
-  auto mechanism = ReadMjcf(text, file, &findings);
-  ModelAnswer answer{.findings = findings.findings(), .model = ""};
-  if (!mechanism) return answer;
-  mechanism->name = NearestName(mechanism->name);
-  if (mechanism->name.empty()) mechanism->name = "robot";
-  answer.model = WriteModel(*mechanism);
+  auto read = ReadMjcf(text, file, &findings);
+  ModelAnswer answer{.findings = findings.findings(), .model = "", .left_out = {}};
+  if (!read) return answer;
+  Mechanism& mechanism = read->mechanism;
+  mechanism.name = NearestName(mechanism.name);
+  if (mechanism.name.empty()) mechanism.name = "robot";
+  answer.model = WriteModel(mechanism);
+  answer.left_out = std::move(read->left_out);
   return answer;
 }
 
-// The model file that an MJCF file stands for; "" after errors.
-std::string ModelOfMjcf(const std::string& file, Diagnostics* findings) {
+// The model file that an MJCF file stands for, "" after errors, and what it leaves out.
+std::pair<std::string, std::vector<ModelCaveat>> ModelOfMjcf(const std::string& file,
+                                                             Diagnostics* findings) {
   constexpr double kTimeout_s = 60.0;
   YamlReader reader(file);
   const auto text = reader.ReadFile();
   findings->Append(reader.diagnostics());
-  if (!text) return "";
+  if (!text) return {};
   const auto answers =
       InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(ModelAnswerOf(*text, file)); });
-  const auto answer = answers[0] ? FromBytes<ModelAnswer>(*answers[0]) : std::nullopt;
+  auto answer = answers[0] ? FromBytes<ModelAnswer>(*answers[0]) : std::nullopt;
   if (!answer) {
     findings->AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than "
                                          "{:g} s",
                                          kTimeout_s));
-    return "";
+    return {};
   }
   for (const Finding& finding : answer->findings) findings->Add(finding);
-  return findings->has_errors() ? "" : answer->model;
+  if (findings->has_errors()) return {};
+  return {std::move(answer->model), std::move(answer->left_out)};
 }
 
 // Nobody wrote the lines that findings point to.
@@ -65,12 +72,14 @@ void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
 
 LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
   LoadResult result;
-  const std::string model = ModelOfMjcf(file, &result.diagnostics);
+  auto [model, left_out] = ModelOfMjcf(file, &result.diagnostics);
   if (model.empty()) return result;
   LoadResult loaded = LoadModelText(model, file, options);
   AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
   result.mechanism = std::move(loaded.mechanism);
   result.literals = std::move(loaded.literals);
+  result.caveats = std::move(left_out);
+  for (ModelCaveat& caveat : loaded.caveats) result.caveats.push_back(std::move(caveat));
   return result;
 }
 
@@ -83,7 +92,7 @@ bool IsRobotFile(const std::string& file) {
 LoadedBodies LoadRobotBodies(const std::string& file) {
   if (!file.ends_with(".xml")) return LoadBodies(file);
   LoadedBodies result;
-  const std::string model = ModelOfMjcf(file, &result.diagnostics);
+  const std::string model = ModelOfMjcf(file, &result.diagnostics).first;
   if (model.empty()) return result;
   LoadedBodies loaded = LoadBodiesText(model, file);
   AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);

@@ -8,6 +8,7 @@
 
 #include "exchange/mechanism_json.h"
 #include "mjcf/mjcf.h"
+#include "mjcf/plan.h"
 #include "model_file/urdf.h"
 #include "model_file/write_model.h"
 #include "report/mobility_text.h"
@@ -125,7 +126,8 @@ HomeServos TuneHomeServos(const Mechanism& mechanism, double frequency_hz) {
   return servos;
 }
 
-std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
+std::string ModelText(const Mechanism& mechanism, ModelFormat format,
+                      const std::vector<ModelCaveat>& caveats) {
   switch (format) {
     case ModelFormat::kMobility:
       return MobilityText(mechanism, ReportMobility(mechanism));
@@ -136,7 +138,7 @@ std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
     case ModelFormat::kUrdf:
       return WriteUrdf(mechanism);
     case ModelFormat::kYaml:
-      return WriteModel(mechanism);
+      return WriteModel(mechanism, caveats);
     case ModelFormat::kMechanism:
       return MechanismJson(mechanism);
   }
@@ -144,6 +146,9 @@ std::string ModelText(const Mechanism& mechanism, ModelFormat format) {
 }
 
 MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
+  if (std::string trouble = mjcf::NestingTrouble(mjcf::MakePlan(mechanism)); !trouble.empty()) {
+    return {.text = {}, .trouble = std::move(trouble)};
+  }
   MjcfOptions options;
   options.guided = drives == ModelDrives::kHeld;
   if (drives == ModelDrives::kServo) {

@@ -6,13 +6,15 @@
 
 #include "core/run_summary.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 
 namespace mbv {
 
 /// Mobility report for people or as JSON, the generated MJCF, URDF or model.yaml, or the
-/// mechanism.json of foreign witnesses.
+/// mechanism.json of foreign witnesses. A model.yaml says what its source left out.
 enum class ModelFormat { kMobility, kJson, kMjcf, kUrdf, kYaml, kMechanism };
-[[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format);
+[[nodiscard]] std::string ModelText(const Mechanism& mechanism, ModelFormat format,
+                                    const std::vector<ModelCaveat>& caveats = {});
 
 /// Servos that hold a mechanism in its home pose.
 struct HomeServos {
@@ -30,7 +32,7 @@ enum class ModelDrives { kFree, kHeld, kServo };
 
 struct MjcfText {
   std::string text;     ///< "" when there is trouble
-  std::string trouble;  ///< why there are no servos
+  std::string trouble;  ///< why there is no such text
 };
 [[nodiscard]] MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives);
 

@@ -8,7 +8,6 @@
 #include "core/output_folder.h"
 #include "input/parsed_documents.h"
 #include "kinematics/mobility.h"
-#include "mechanism/concession.h"
 #include "pipeline/drive_by.h"
 #include "pipeline/engine_errors.h"
 #include "pipeline/load_inertia.h"
@@ -166,7 +165,7 @@ class ScenarioRun {
         base(), runs_.simulation ? runs_.simulation->X_WB : std::vector<std::vector<Pose>>());
     report_.reactions_not_unique = input.reactions_not_unique;
     report_.comparison = Compare(input);
-    NameConcessions();
+    NameWaivers();
     DoubtGravity();
     report_.tables = scenario().motion.tables;
     report_.smoothed_forces = SmoothedForces(prepared_->mechanisms.reference, scenario().motion);
@@ -177,10 +176,11 @@ class ScenarioRun {
   }
 
   // Whatever the verdict is, it is about a mechanism that the model describes with an exception.
-  void NameConcessions() {
+  void NameWaivers() {
     std::string& text = report_.comparison.attribution.text;
-    for (const std::string& concession : ConcessionsIn(outcome_.diagnostics)) {
-      text += fmt::format("{}allowed by the model: {}", text.empty() ? "" : "; ", concession);
+    for (const std::string& allowed :
+         TextsOf(scenario().model_caveats, ModelCaveat::Kind::kAllowed)) {
+      text += fmt::format("{}allowed by the model: {}", text.empty() ? "" : "; ", allowed);
     }
   }
 

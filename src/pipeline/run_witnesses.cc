@@ -290,7 +290,8 @@ ComparisonInput InputOf(const Prepared& prepared) {
           .driven_by = prepared.driver().name,
           .reactions_not_unique = {},
           .drive_by = simulation.forward ? simulation.drive_by : DriveBy::kMotion,
-          .own_parameters = OwnParameters(prepared)};
+          .own_parameters = OwnParameters(prepared),
+          .left_out = TextsOf(scenario.model_caveats, ModelCaveat::Kind::kLeftOut)};
 }
 
 }  // namespace mbv

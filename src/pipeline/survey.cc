@@ -1,6 +1,7 @@
 #include "pipeline/survey.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <chrono>
@@ -80,6 +81,9 @@ bool RunMode(const std::string& scenario, const char* mode, double* nrmse, Surve
     const auto force = pair->metrics.find(Metric::kForceNrmse);
     if (force != pair->metrics.end()) *nrmse = force->second.value;
   }
+  for (const std::string& caveat : comparison.reservations) {
+    if (!Contains(row->caveats, caveat)) row->caveats.push_back(caveat);
+  }
   if (comparison.verdict == Verdict::kAgree) return true;
   row->status = comparison.verdict == Verdict::kDisagree ? "disagree" : "failed";
   row->message = fmt::format("{}: {}", mode, comparison.reason);
@@ -152,12 +156,17 @@ std::vector<std::string> Fields(const SurveyRow& row) {
           Small(row.inverse_nrmse),
           Small(row.forward_nrmse),
           Seconds(row.seconds),
+          fmt::format("{}", fmt::join(row.caveats, "; ")),
           row.message};
 }
 
 std::string CountedOk(const std::vector<SurveyRow>& rows) {
   const auto ok = std::ranges::count(rows, "ok", &SurveyRow::status);
-  return fmt::format("{} of {} ok", ok, rows.size());
+  const auto partly = std::ranges::count_if(
+      rows, [](const SurveyRow& row) { return row.status == "ok" && !row.caveats.empty(); });
+  std::string text = fmt::format("{} of {} ok", ok, rows.size());
+  if (partly > 0) text += fmt::format(", {} of them with caveats", partly);
+  return text;
 }
 
 // None where no robot came as far as a comparison.
@@ -168,8 +177,8 @@ Verdict VerdictOf(const std::vector<SurveyRow>& rows) {
 }
 
 const std::vector<std::string> kSurveyColumns = {
-    "file",  "status",  "bodies",        "loops",         "freedoms", "redundant",
-    "gap_m", "gap_rad", "inverse_nrmse", "forward_nrmse", "seconds",  "message"};
+    "file",    "status",        "bodies",        "loops",   "freedoms", "redundant", "gap_m",
+    "gap_rad", "inverse_nrmse", "forward_nrmse", "seconds", "caveats",  "message"};
 
 }  // namespace
 
@@ -199,6 +208,7 @@ std::string SurveyJson(const std::vector<SurveyRow>& rows) {
                       {"inverse_nrmse", Number(row.inverse_nrmse)},
                       {"forward_nrmse", Number(row.forward_nrmse)},
                       {"seconds", Number(row.seconds)},
+                      {"caveats", row.caveats},
                       {"message", row.message}});
   }
   return Dump({{"robots", std::move(robots)}});
@@ -232,6 +242,9 @@ std::string SurveyTable(const std::vector<SurveyRow>& rows) {
   std::string text = table.Head() + "\n";
   for (const SurveyRow& row : rows) {
     text += table.Row(Fields(row)) + "\n";
+    for (const std::string& caveat : row.caveats) {
+      text += fmt::format("    caveat: {}\n", Printable(caveat));
+    }
     if (row.status != "ok") text += fmt::format("    {}\n", Printable(row.message));
   }
   return text + CountedOk(rows) + "\n";

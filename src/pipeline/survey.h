@@ -18,6 +18,7 @@ struct SurveyRow {
   double inverse_nrmse = kNan, forward_nrmse = kNan;  ///< drive forces, simulation and reference
   double seconds = kNan;
   std::string message = "ended before it said anything";
+  std::vector<std::string> caveats = {};  ///< why an agreement says less than it seems to
 };
 
 /// Loads a robot, gives it a first motion and runs that forward and inverse. Writes only below
@@ -29,7 +30,7 @@ template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<SurveyRow>& row) {
   visit(row.file), visit(row.status), visit(row.bodies), visit(row.loops), visit(row.freedoms);
   visit(row.redundant), visit(row.gap_m), visit(row.gap_rad), visit(row.inverse_nrmse);
-  visit(row.forward_nrmse), visit(row.seconds), visit(row.message);
+  visit(row.forward_nrmse), visit(row.seconds), visit(row.message), visit(row.caveats);
 }
 
 /// survey.csv, survey.html, the same for programs, and the table for a terminal.
@@ -38,7 +39,8 @@ void VisitMembers(Visit& visit, typename Visit::template Of<SurveyRow>& row) {
 [[nodiscard]] std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& folder);
 [[nodiscard]] std::string SurveyTable(const std::vector<SurveyRow>& rows);
 
-/// 0: all are ok, or refused for a fault of the file itself; 1 otherwise; 3 where something failed.
+/// 0: all are ok (with caveats or without), or refused for a fault of the file itself; 1 otherwise;
+/// 3 where something failed.
 [[nodiscard]] int SurveyExit(const std::vector<SurveyRow>& rows);
 
 }  // namespace mbv

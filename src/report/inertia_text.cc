@@ -24,8 +24,7 @@ std::string WordsOf(const BodyInertia& body) {
     const std::string word = WordOf(finding.mistake);
     if (!Contains(words, word)) words.push_back(word);
   }
-  if (words.empty()) return body.mass > 0.0 ? "sound" : "no mass stated";
-  return Joined(words);
+  return words.empty() ? "sound" : Joined(words);
 }
 
 Json NumberJson(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }

@@ -13,6 +13,7 @@
 #include "core/diagnostics.h"
 #include "core/types.h"
 #include "input/overrides.h"
+#include "mechanism/model_caveat.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
 #include "scenario/figure_spec.h"
@@ -132,6 +133,7 @@ struct Scenario {
   std::string name;  ///< file name without its ending, "must_fail/x" below a model's folder
   std::string description;
   std::string model_file;                           ///< the model.yaml it uses
+  std::vector<ModelCaveat> model_caveats;           ///< of that model
   Overrides parameters;                             ///< for all witnesses
   std::map<std::string, Finding> parameter_places;  ///< where each override was written
   std::optional<Vec3> gravity_W;                    ///< instead of the model's [m/s²]

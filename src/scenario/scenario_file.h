@@ -65,6 +65,7 @@ class ScenarioFile {
       loaded = LoadModel(scenario_.model_file);
     }
     mechanism_ = std::move(loaded.mechanism);
+    scenario_.model_caveats = std::move(loaded.caveats);
     if (!mechanism_) return;
     for (const Parameter& p : mechanism_->parameters) scope_.Set(p.name, p.value);
   }

@@ -27,6 +27,7 @@ struct StiffnessSimulation {
 struct StiffnessScenario {
   std::string file, name, description;
   std::string model_file;                           ///< the model with beams
+  std::vector<ModelCaveat> model_caveats;           ///< of that model
   Overrides parameters;                             ///< for all witnesses, the pose's included
   std::map<std::string, Finding> parameter_places;  ///< where each was written
   PoseValues pose;     ///< coordinates; empty: home pose, to be filled in by the user of this

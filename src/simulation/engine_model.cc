@@ -168,6 +168,9 @@ RunSummary MakeEngineModel(const Mechanism& mechanism, const std::string& mjcf,
   if (RunSummary summary = CheckCouplings(mechanism); !summary.ok()) return summary;
   engine->mechanism = &mechanism;
   engine->plan = mjcf::MakePlan(mechanism);
+  if (std::string trouble = mjcf::NestingTrouble(engine->plan); !trouble.empty()) {
+    return {.stop = Stop::kUnsupported, .message = std::move(trouble), .where = {}, .unit = {}};
+  }
   engine->m = CompileMjcf(mjcf);
   engine->sparse = mj_isSparse(engine->m.get()) != 0;
   engine->m->opt.jacobian = mjJAC_DENSE;

@@ -8,6 +8,7 @@
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 #include "simulation/engine.h"
 
 namespace mbv::simulation {
@@ -15,6 +16,7 @@ namespace mbv::simulation {
 struct ImportedMjcf {
   Mechanism mechanism;  ///< as ReadMjcf() gives it
   ModelHandle model;
+  std::vector<ModelCaveat> left_out;
   std::string text;                   ///< as compiled: without what this compiler does not know
   std::vector<int> joint_of;          ///< per MuJoCo joint: index into mechanism.joints
   std::vector<int> closure_of;        ///< per equality: index into mechanism.joints, or -1

@@ -10,6 +10,7 @@
 
 #include "core/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/model_caveat.h"
 #include "mjcf/foreign.h"
 #include "simulation/engine.h"
 
@@ -44,13 +45,32 @@ struct MjcfImport {
   std::vector<int> joint_of = {};    ///< per joint of MuJoCo: index into mechanism.joints
   std::vector<int> closure_of = {};  ///< per equality: index into mechanism.joints, or -1
 
+  std::vector<ModelCaveat> left_out = {};  ///< what acts on forces and is not in the mechanism
+
   // What the findings at the end tell.
   std::vector<std::string> held = {}, geared = {}, shifted = {}, moved = {};
-  std::set<int> coupling_tendons = {};  ///< that are nothing but the sum in a coupling
-  bool touching = false;                ///< geoms would touch each other
+  std::vector<std::string> driving = {};  ///< joints whose damping is negative
+  std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
+  bool touching = false;                  ///< geoms would touch each other
 
   void Say(const std::string& text, const std::string& hint = "") const {
     diagnostics->Add({Severity::kWarning, file, 0, 0, text, hint});
+  }
+  /// Leaves out what a row of foreign_rows.h is about; `what` names it. The effect is the row's.
+  void LeaveOut(const char* element, const char* attribute, const std::string& what);
+  /// What the file's flags switch off, e.g. mjDSBL_PASSIVE.
+  [[nodiscard]] bool IsOff(int flag) const { return (m.opt.disableflags & flag) != 0; }
+  [[nodiscard]] bool EqualitiesAreOff() const {
+    return IsOff(mjDSBL_EQUALITY) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] bool FrictionIsOff() const {
+    return IsOff(mjDSBL_FRICTIONLOSS) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] bool LimitsAreOff() const {
+    return IsOff(mjDSBL_LIMIT) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] bool ContactsAreOff() const {
+    return IsOff(mjDSBL_CONTACT) || IsOff(mjDSBL_CONSTRAINT);
   }
   [[nodiscard]] std::string NameOf(mjtObj type, int id, const char* kind) const {
     return NameAt(m, type, id, kind);
@@ -76,6 +96,6 @@ void AddDrives(MjcfImport* in);
 void AddSites(MjcfImport* in);
 void AddShapes(MjcfImport* in);
 /// A finding for each kind of thing that the mechanism cannot express or has otherwise.
-void TellWhatIsLost(const MjcfImport& in);
+void TellWhatIsLost(MjcfImport* in);
 
 }  // namespace mbv::simulation

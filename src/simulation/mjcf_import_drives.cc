@@ -1,5 +1,6 @@
 // Drives of an MJCF file.
 #include <algorithm>
+#include <utility>
 
 #include "simulation/mjcf_import.h"
 
@@ -13,7 +14,16 @@ void AddDrive(int u, MjcfImport* in) {
   const bool on_joint = type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT;
   const int j = on_joint ? in->joint_of[static_cast<size_t>(m.actuator_trnid[2 * u])] : -1;
   if (j < 0 || FreedomsOf(in->mechanism.joints[static_cast<size_t>(j)].kind) != 1) {
-    in->Say(fmt::format("actuator '{}' does not act on a hinge or slide and is left out", name));
+    constexpr std::pair<int, const char*> kOthers[] = {{mjTRN_SLIDERCRANK, "slidersite"},
+                                                       {mjTRN_TENDON, "tendon"},
+                                                       {mjTRN_SITE, "site"},
+                                                       {mjTRN_BODY, "body"}};
+    const char* attribute = "joint";  // of a ball or free body
+    for (const auto& [other, word] : kOthers) {
+      if (type == other) attribute = word;
+    }
+    in->LeaveOut(on_joint ? "actuator of a ball" : "actuator/general", attribute,
+                 fmt::format("actuator '{}', which does not act on a hinge or slide,", name));
     return;
   }
   std::vector<Drive>& drives = in->mechanism.drives;

@@ -12,12 +12,14 @@ void AddElementsOf(int j, MjcfImport* in) {
                                       .joint = in->joint_of[static_cast<size_t>(j)],
                                       .law = law});
   };
-  if (m.dof_damping[dof] > 0.0) add("_damping", DampingLaw{m.dof_damping[dof]});
-  if (m.jnt_stiffness[j] != 0.0) {
+  const bool passive = !in->IsOff(mjDSBL_PASSIVE);
+  if (passive && m.dof_damping[dof] > 0.0) add("_damping", DampingLaw{m.dof_damping[dof]});
+  if (passive && m.dof_damping[dof] < 0.0) in->driving.push_back(in->JointNameOf(j));
+  if (passive && m.jnt_stiffness[j] != 0.0) {
     add("_spring",
         SpringLaw{.polynomial = {m.jnt_stiffness[j]}, .free = m.qpos_spring[at] - m.qpos0[at]});
   }
-  if (const double loss = m.dof_frictionloss[dof]; loss > 0.0) {
+  if (const double loss = m.dof_frictionloss[dof]; loss > 0.0 && !in->FrictionIsOff()) {
     add("_friction", FrictionLaw{.coulomb = loss, .breakaway = loss});
   }
   if (m.dof_armature[dof] > 0.0) add("_rotor", RotorLaw{.inertia = m.dof_armature[dof]});

@@ -86,13 +86,27 @@ bool AddSides(int e, Coupling* coupling, MjcfImport* in) {
 void AddCoupling(int e, const std::string& name, MjcfImport* in) {
   Coupling coupling{.name = name, .terms = {}};
   if (!AddSides(e, &coupling, in)) {
-    in->Say(fmt::format("equality '{}' is left out: what it couples is free", name),
-            "couplings are known of hinges and slides, by a polynomial or by linear fixed tendons");
+    const char* element = in->m.eq_type[e] == mjEQ_JOINT ? "equality/joint" : "equality/tendon";
+    in->LeaveOut(element, "",
+                 fmt::format("equality '{}' (couplings are known of hinges and slides, by a "
+                             "polynomial or by linear fixed tendons)",
+                             name));
   } else if (coupling.terms.size() == 1) {
+    // A drive holds it as well; without one it is another mechanism.
     const int joint = coupling.terms[0].joint;
-    in->Say(
-        fmt::format("equality '{}' holds joint '{}' alone and is left out: it is driven, or free",
-                    name, in->mechanism.joints[static_cast<size_t>(joint)].name));
+    const std::string text = fmt::format("equality '{}', which holds joint '{}' alone,", name,
+                                         in->mechanism.joints[static_cast<size_t>(joint)].name);
+    bool driven = false;
+    for (int u = 0; u < in->m.nu; ++u) {
+      const int type = in->m.actuator_trntype[u];
+      if (type != mjTRN_JOINT && type != mjTRN_JOINTINPARENT) continue;
+      driven = driven || in->joint_of[static_cast<size_t>(in->m.actuator_trnid[2 * u])] == joint;
+    }
+    if (driven) {
+      in->Say(text + " is left out: its drive holds the joint");
+    } else {
+      in->LeaveOut("equality/joint", "", text);
+    }
   } else {
     in->mechanism.couplings.push_back(coupling);
   }
@@ -105,7 +119,7 @@ void AddEqualities(MjcfImport* in) {
   in->closure_of.assign(static_cast<size_t>(m.neq), -1);
   for (int e = 0; e < m.neq; ++e) {
     const std::string name = in->NameOf(mjOBJ_EQUALITY, e, "equality");
-    if (m.eq_active[e] == 0) {
+    if (m.eq_active[e] == 0 || in->EqualitiesAreOff()) {
       in->Say(fmt::format("equality '{}' is switched off in the file, and left out", name));
     } else if (m.eq_type[e] == mjEQ_CONNECT || m.eq_type[e] == mjEQ_WELD) {
       AddClosure(e, name, in);

@@ -42,9 +42,11 @@ void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
       joint.X_PF = X_PB * Shifted(anchor);
       joint.X_CM = Shifted(anchor);
       joint.home[0] = in->qpos[at] - in->m.qpos0[at];
-      if (in->m.jnt_limited[j] != 0) {
-        joint.range[0] = {in->m.jnt_range[2 * j] - in->m.qpos0[at],
-                          in->m.jnt_range[2 * j + 1] - in->m.qpos0[at]};
+      if (in->m.jnt_limited[j] != 0 && !in->LimitsAreOff()) {
+        // Its limit pushes from the margin on.
+        const double margin = in->m.jnt_margin[j];
+        joint.range[0] = {in->m.jnt_range[2 * j] - in->m.qpos0[at] + margin,
+                          in->m.jnt_range[2 * j + 1] - in->m.qpos0[at] - margin};
       }
       if (in->m.qpos0[at] != 0.0) in->shifted.push_back(joint.name);
       if (in->m.nkey == 0) StartInside(&joint, in);

@@ -19,7 +19,8 @@ ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
   MjcfImport in{.m = m, .foreign = foreign, .file = file, .diagnostics = diagnostics};
   in.mechanism.name = foreign.ModelName();
   in.mechanism.file = file;
-  in.mechanism.gravity_W = VecAt(m.opt.gravity);
+  in.left_out = foreign.left_out();
+  in.mechanism.gravity_W = in.IsOff(mjDSBL_GRAVITY) ? Vec3(Vec3::Zero()) : VecAt(m.opt.gravity);
   if (in.mechanism.gravity_W.norm() > 0.0) {
     in.mechanism.up_W = -in.mechanism.gravity_W.normalized();
   }
@@ -29,8 +30,9 @@ ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
   AddDrives(&in);
   AddSites(&in);
   AddShapes(&in);
-  TellWhatIsLost(in);
+  TellWhatIsLost(&in);
   imported.mechanism = std::move(in.mechanism);
+  imported.left_out = std::move(in.left_out);
   imported.joint_of = std::move(in.joint_of);
   imported.closure_of = std::move(in.closure_of);
   for (int e = 0; e < m.neq; ++e) {
@@ -68,13 +70,13 @@ std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::strin
 
 }  // namespace simulation
 
-std::optional<Mechanism> ReadMjcf(const std::string& text, const std::string& file,
+std::optional<MjcfModel> ReadMjcf(const std::string& text, const std::string& file,
                                   Diagnostics* diagnostics) {
   std::vector<std::string> warnings;
   const simulation::EngineSession session(&warnings);
   auto imported = simulation::ImportMjcf(text, file, warnings, diagnostics);
   if (!imported) return std::nullopt;
-  return std::move(imported->mechanism);
+  return MjcfModel{std::move(imported->mechanism), std::move(imported->left_out)};
 }
 
 }  // namespace mbv

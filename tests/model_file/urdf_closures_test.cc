@@ -173,7 +173,8 @@ TEST(UrdfConstraint, WhatIsNotReadIsSaid) {
   EXPECT_NE(text.find("r.urdf:6:1: warning: a joint inside <gazebo> is left out"),
             std::string::npos)
       << text;
-  EXPECT_NE(text.find("r.urdf:7:1: warning: <coupling> is left out"), std::string::npos) << text;
+  EXPECT_NE(text.find("r.urdf:7:1: warning: <coupling> ('g') is left out"), std::string::npos)
+      << text;
   EXPECT_NE(text.find("r.urdf: warning: 2 of 2 meshes are left out: 'a.stl' is not there, for one"),
             std::string::npos)
       << text;

@@ -1,5 +1,6 @@
 #include "model_file/urdf.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -12,9 +13,11 @@
 #include "kinematics/mobility.h"
 #include "model_file/element_text.h"
 #include "model_file/load_model.h"
+#include "model_file/urdf_closures.h"
 #include "model_file/write_model.h"
 #include "tests/shipped.h"
 #include "tests/source_dir.h"
+#include "tests/test_folder.h"
 
 namespace mbv {
 namespace {
@@ -146,6 +149,85 @@ TEST(UrdfImport, WhatIsDroppedAndChangesForcesIsAFindingEach) {
     EXPECT_NE(said.find(part), std::string::npos) << part << said;
   }
   EXPECT_EQ(diagnostics.findings().size(), 3u) << said;
+}
+
+// A link on a hinge with more in it, below it and below <robot>.
+std::string Extended(const std::string& in_joint, const std::string& more) {
+  return "<robot name=\"r\"><link name=\"base\"/><link name=\"arm\"><inertial><mass value=\"1\"/>"
+         "<inertia ixx=\"1\" iyy=\"1\" izz=\"1\" ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>"
+         "<joint name=\"j\" type=\"continuous\"><parent link=\"base\"/><child link=\"arm\"/>"
+         "<axis xyz=\"0 1 0\"/>" +
+         in_joint + "</joint>" + more + "</robot>";
+}
+
+// Each row in a file in which it acts, and in one with a value that does nothing.
+TEST(UrdfImport, WhatSimulatorsAddAndIsLeftOutIsACaveatUnlessItDoesNothing) {
+  for (const internal::UrdfForceRow& row : internal::UrdfForceRows()) {
+    const std::string_view section = row.section, value = row.value, neutral = row.neutral;
+    const auto element = [&](const std::string& v) {
+      if (value.empty()) return fmt::format("<{}/>", row.element);
+      if (value == "text") return fmt::format("<{0}>{1}</{0}>", row.element, v);
+      // urdfdom wants one of its own words in <dynamics>.
+      return fmt::format("<{}{} {}=\"{}\"/>", row.element,
+                         section == "joint" ? " damping=\"1\"" : "", row.value, v);
+    };
+    const auto file = [&](const std::string& inner) {
+      if (section == "joint") return Extended(inner, "");
+      if (section == row.element || section.empty()) return Extended("", inner);
+      const bool in_option = std::string_view(row.element) == "flag";
+      return Extended(
+          "", fmt::format("<{0} reference=\"arm\">{1}{2}{3}</{0}>", row.section,
+                          in_option ? "<option>" : "", inner, in_option ? "</option>" : ""));
+    };
+    const std::string what = fmt::format("{}/{} {}", row.section, row.element, row.value);
+    Diagnostics findings;
+    const std::string acts = neutral == "true|1"            ? "false"
+                             : neutral == "enable"          ? "disable"
+                             : neutral.starts_with("false") ? "true"
+                                                            : "3";
+    const UrdfTree tree = ReadUrdf(file(element(acts)), "r.urdf", &findings);
+    ASSERT_FALSE(findings.has_errors()) << what << findings.Text();
+    ASSERT_EQ(tree.left_out.size(), 1u) << what << findings.Text();
+    EXPECT_NE(tree.left_out[0].text.find(row.effect), std::string::npos) << what;
+    EXPECT_NE(findings.Text().find(tree.left_out[0].text), std::string::npos) << what;
+    if (neutral.empty()) continue;
+    Diagnostics none;
+    const std::string nothing(neutral.substr(0, neutral.find('|')));
+    EXPECT_TRUE(ReadUrdf(file(element(nothing)), "r.urdf", &none).left_out.empty())
+        << what << none.Text();
+  }
+}
+
+// Rotors of Drake, springs of Gazebo and gravity of MuJoCo are the mechanism's.
+TEST(UrdfImport, RotorsSpringsAndGravityOfSimulatorsAreTaken) {
+  const test::TestFolder folder("urdf_extras");
+  const std::string rotor =
+      "<transmission name=\"t\"><joint name=\"j\"/><actuator name=\"a\"><drake:rotor_inertia "
+      "value=\"0.01\"/><drake:gear_ratio value=\"100\"/></actuator></transmission>";
+  const std::string spring =
+      "<gazebo reference=\"j\"><springStiffness>7</springStiffness><springReference>0.2"
+      "</springReference></gazebo>";
+  const std::string gravity = "<mujoco><option gravity=\"0 0 -1.62\"/></mujoco>";
+  const LoadResult loaded =
+      LoadModel(folder.Write("r.urdf", Extended("", rotor + spring + gravity)));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_TRUE(loaded.caveats.empty()) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.elements.size(), 2u);
+  const auto& law = std::get<SpringLaw>(m.elements[0].law);
+  EXPECT_EQ(law.polynomial, std::vector<double>{7});
+  EXPECT_EQ(law.free, 0.2);
+  EXPECT_DOUBLE_EQ(std::get<RotorLaw>(m.elements[1].law).reflected(), 100.0);
+  EXPECT_EQ(m.gravity_W, Vec3(0, 0, -1.62));
+  const LoadResult weightless = LoadModel(folder.Write(
+      "w.urdf", Extended("", "<mujoco><option><flag gravity=\"disable\"/></option></mujoco>")));
+  ASSERT_TRUE(weightless.mechanism) << weightless.diagnostics.Text();
+  EXPECT_EQ(weightless.mechanism->gravity_W, Vec3(0, 0, 0));
+  // On a joint that there is not, they are a caveat.
+  const LoadResult lost = LoadModel(folder.Write(
+      "l.urdf",
+      Extended("", "<gazebo reference=\"arm\"><springStiffness>7</springStiffness></gazebo>")));
+  EXPECT_EQ(lost.caveats.size(), 1u) << lost.diagnostics.Text();
 }
 
 TEST(UrdfImport, FindingsReplaceUrdfdomsTalk) {

@@ -78,11 +78,14 @@ TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {
               "armature='0.1' damping='2' frictionloss='3' stiffness='4'", "<joint type='free'/>"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   const std::string said = loaded.diagnostics.Text();
-  for (const char* lost :
-       {"1 tendons are left", "free bodies are held where they are, fixed to the world: base"}) {
+  for (const char* lost : {"1 tendons are left out: they exert no force",
+                           "the free joint of base is left out: the body is held where it is"}) {
     EXPECT_NE(said.find(lost), std::string::npos) << lost << "\n" << said;
   }
+  ASSERT_EQ(loaded.caveats.size(), 1u);
+  EXPECT_EQ(loaded.caveats[0].source, "body/freejoint");
   const LoadResult plain = LoadText(folder, Linkage());
+  EXPECT_TRUE(plain.caveats.empty());
   EXPECT_EQ(plain.diagnostics.Text().find("left out"), std::string::npos)
       << plain.diagnostics.Text();
 }
@@ -104,6 +107,27 @@ TEST(MjcfImport, WhatActsOnHingesIsAForceElement) {
   EXPECT_EQ(spring.polynomial, std::vector<double>{4.0});
   EXPECT_NEAR(spring.free, 0.3 - 0.1, 1e-15);  // from the reference
   EXPECT_EQ(std::get<RotorLaw>(m.elements[2].law).reflected(), 0.1);
+}
+
+// What acts on forces and is left out stands in the row, in its table and its JSON: never ok alone.
+TEST(MjcfImport, AnAgreementWithoutAllForcesHasACaveat) {
+  const test::TestFolder folder("mjcf_caveat");
+  for (const bool fluid : {false, true}) {
+    const std::string file =
+        folder.Write("robot.xml", Linkage(fluid ? "<option density='1.2'/>" : ""));
+    const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));
+    EXPECT_EQ(row.status, "ok") << row.message;
+    ASSERT_EQ(row.caveats.size(), fluid ? 1u : 0u);
+    const std::string text =
+        "the fluid's density 1.2 is left out: a fluid drags and lifts every body";
+    EXPECT_EQ(SurveyTable({row}).find("caveat: not the whole robot: " + text) != std::string::npos,
+              fluid);
+    EXPECT_EQ(SurveyTable({row}).find("1 of 1 ok, 1 of them with caveats") != std::string::npos,
+              fluid);
+    EXPECT_EQ(SurveyJson({row}).find(text) != std::string::npos, fluid);
+    EXPECT_EQ(SurveyCsv({row}).find(text) != std::string::npos, fluid);
+    EXPECT_EQ(SurveyHtml({row}, "f").find("caveats") != std::string::npos, true);
+  }
 }
 
 TEST(MjcfImport, FrictionLossIsDryFriction) {
@@ -330,18 +354,29 @@ TEST(MjcfImport, HostileFilesAreBadInput) {
   const test::TestFolder folder("mjcf_hostile");
   std::string deep = "<mujoco>";
   for (int i = 0; i < 5000; ++i) deep += "<a>";
-  for (const std::string& text :
-       {std::string("<mujoco"), std::string("<robot/>"), deep, std::string("<mujoco model='x'/>"),
-        std::string("<mujoco><worldbody><body><joint type='hinge' axis='0 0 0'/></body></worldbody>"
-                    "</mujoco>"),
-        std::string("<mujoco><worldbody><geom type='sphere' size='nan'/></worldbody></mujoco>"),
-        std::string("<mujoco><equality><weld body1='q'/></equality></mujoco>")}) {
+  const std::pair<std::string, const char*> files[] = {
+      {"<mujoco", "the file is not well-formed XML"},
+      {"<robot/>", "no MJCF: the root element is not <mujoco>"},
+      {deep, "elements are nested deeper than"},
+      {"<mujoco><worldbody><body><joint type='hinge' axis='0 0 0'/></body></worldbody></mujoco>",
+       "MuJoCo: "},
+      {"<mujoco><worldbody><geom type='sphere' size='-1'/></worldbody></mujoco>", "MuJoCo: "},
+      {"<mujoco><worldbody><frame euler='0 1'><body/></frame></worldbody></mujoco>",
+       "<frame> euler = '0 1' is not 3 numbers"},
+      {"<mujoco><worldbody><replicate count='2000000000'><body/></replicate></worldbody></mujoco>",
+       "<replicate> makes more than 10000 elements"},
+      {"<mujoco><equality><weld body1='q'/></equality></mujoco>", "MuJoCo: "}};
+  for (const auto& [text, said] : files) {
     const LoadResult loaded = LoadText(folder, text);
-    if (!loaded.mechanism) {
-      EXPECT_TRUE(loaded.diagnostics.has_errors()) << text.substr(0, 80);
-    }
+    EXPECT_FALSE(loaded.mechanism) << text.substr(0, 80);
+    EXPECT_TRUE(loaded.diagnostics.has_errors()) << text.substr(0, 80);
+    EXPECT_NE(loaded.diagnostics.Text().find(said), std::string::npos) << text.substr(0, 80) << "\n"
+                                                                       << loaded.diagnostics.Text();
   }
-  EXPECT_FALSE(LoadText(folder, deep).mechanism);
+  // Nothing in it is a mechanism of nothing.
+  const LoadResult empty = LoadText(folder, "<mujoco model='x'/>");
+  ASSERT_TRUE(empty.mechanism) << empty.diagnostics.Text();
+  EXPECT_EQ(empty.mechanism->bodies.size(), 1u);
 }
 
 TEST(MjcfImport, TheModelThatIsWrittenReadsBackToTheSameNumbers) {
