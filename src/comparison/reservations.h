@@ -17,10 +17,14 @@ void MarkBlind(const ComparisonInput& input, Comparison* comparison);
 [[nodiscard]] std::string WhyNothingVerified(const ComparisonInput& input,
                                              const Comparison& comparison);
 
-/// One sentence each, loud in every report: limits that verify nothing, forces that only cancel
-/// out, few samples, a part of the motion that was not judged, a table without forces, rates that
-/// could not be checked against positions.
-[[nodiscard]] std::vector<std::string> Reservations(const ComparisonInput& input,
-                                                    const Comparison& comparison);
+/// Loud in every report: limits that verify nothing, forces that only cancel out, few samples, a
+/// part of the motion that was not judged, a table without forces, rates that could not be checked
+/// against positions, witnesses that nothing was compared with.
+[[nodiscard]] std::vector<Caveat> CaveatsOf(const ComparisonInput& input,
+                                            const Comparison& comparison);
+
+/// Those of witnesses that the scenario has and that nothing was compared with; each names one.
+[[nodiscard]] std::vector<Caveat> MissingWitnesses(const ComparisonInput& input,
+                                                   const Comparison& comparison);
 
 }  // namespace mbv

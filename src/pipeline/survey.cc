@@ -123,17 +123,6 @@ void Survey(const std::string& file, const std::string& scratch, SurveyRow* row)
   }
 }
 
-std::string CsvField(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  if (text.find_first_of("\",") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + "\"";
-}
-
 std::string Count(int n) { return n < 0 ? "" : fmt::format("{}", n); }
 std::string Small(double x) { return std::isfinite(x) ? fmt::format("{:.2g}", x) : ""; }
 std::string Seconds(double x) { return std::isfinite(x) ? fmt::format("{:.1f}", x) : ""; }
@@ -207,7 +196,7 @@ std::string SurveyCsv(const std::vector<SurveyRow>& rows) {
   for (const std::string& column : kSurveyColumns) text += (text.empty() ? "" : ",") + column;
   for (const SurveyRow& row : rows) {
     std::string line;
-    for (const std::string& field : Fields(row)) line += "," + CsvField(field);
+    for (const std::string& field : Fields(row)) line += "," + CsvCell(field);
     text += "\n" + line.substr(1);
   }
   return text + "\n";
