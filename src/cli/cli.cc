@@ -36,7 +36,7 @@ std::string VersionText() {
 }
 
 // Does not throw: standard error may be full, too.
-void Complain(const std::string& text) { std::fputs((text + "\n").c_str(), stderr); }
+void Complain(const std::string& text) { std::fputs((ForTerminal(text) + "\n").c_str(), stderr); }
 
 int SayInternalError(const std::exception& error) {
   Complain(std::string("internal error: ") + error.what());
@@ -123,7 +123,7 @@ int AnswerParse(const CLI::App& app, const CLI::ParseError& error) {
   std::ostringstream out, err;
   const int code = app.exit(error, out, err);
   fmt::print("{}", HelpFor(out.str(), HelpColumns()));
-  SayText(stderr, err.str());
+  SayText(stderr, Shortened(err.str()));
   return code == 0 ? 0 : 2;
 }
 
@@ -159,6 +159,17 @@ void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
   command->footer(text + "Exit codes: " + exit_codes);
 }
 
+CLI::Validator Positive() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        char* end = nullptr;
+        const double value = std::strtod(text.c_str(), &end);
+        const bool good = end != text.c_str() && *end == '\0' && value > 0.0;
+        return good ? std::string() : fmt::format("'{}' violates > 0", QuotedValue(text));
+      },
+      "> 0");
+}
+
 CLI::Validator OneOf(const std::vector<std::string>& words) {
   const std::string list = Joined(words);
   return CLI::Validator(
@@ -172,8 +183,8 @@ CLI::Validator OneOf(const std::vector<std::string>& words) {
 }
 
 int Refuse(const std::string& message, const std::string& hint) {
-  Say(stderr, "error: {}\n", message);
-  if (!hint.empty()) Say(stderr, "  hint: {}\n", hint);
+  Say(stderr, "error: {}\n", Shortened(message));
+  if (!hint.empty()) Say(stderr, "  hint: {}\n", Shortened(hint));
   return 2;
 }
 
@@ -226,6 +237,7 @@ int RunCli(int argc, char** argv) {
   AddStudyCommand(&app, &exit_code);
   AddPackageCommand(&app, &exit_code);
   AddVerifyCommand(&app, &exit_code);
+  AddTrustCommand(&app, &exit_code);
   AddRegressCommand(&app, &exit_code);
   AddMergeCommand(&app, &exit_code);
   AddHistoryCommand(&app, &exit_code);

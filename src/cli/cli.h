@@ -14,6 +14,9 @@ namespace mbv {
 void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
                const std::string& exit_codes);
 
+/// A check that a value is a number above 0.
+[[nodiscard]] CLI::Validator Positive();
+
 /// A check that a value is one of some words.
 [[nodiscard]] CLI::Validator OneOf(const std::vector<std::string>& words);
 
@@ -49,5 +52,6 @@ void AddTablesCommand(CLI::App* app, int* exit_code);
 void AddStudyCommand(CLI::App* app, int* exit_code);
 void AddPackageCommand(CLI::App* app, int* exit_code);
 void AddVerifyCommand(CLI::App* app, int* exit_code);
+void AddTrustCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

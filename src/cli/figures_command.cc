@@ -8,6 +8,7 @@
 #include "cli/json_option.h"
 #include "cli/paper_figures.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "figure/style.h"
@@ -22,6 +23,7 @@ struct FiguresArguments {
   std::vector<std::string> scenarios, set, formats = {"pdf", "svg"}, only, also;
   std::string style = "ieee", language = "en", out = "figures", paper, page;
   double width_mm = 0, font_pt = 0;
+  bool trust = false;
   JsonOption json;
 };
 
@@ -87,6 +89,7 @@ int Figures(const FiguresArguments& arguments) {
   if (!MakeFigureOptions(arguments, &options)) return 2;
   if (!arguments.paper.empty()) {
     if (!arguments.set.empty()) return Refuse("--paper and --set do not go together", "");
+    options.programs.all = arguments.trust;
     return PaperFigures(
         {arguments.paper, arguments.scenarios, arguments.out, arguments.page, options},
         arguments.json);
@@ -97,6 +100,9 @@ int Figures(const FiguresArguments& arguments) {
   int exit_code = 0;
   const std::vector<std::string> files =
       FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  if (exit_code == 0) {
+    exit_code = AskForPrograms(files, options.scenario, arguments.trust, false, &options.programs);
+  }
   if (exit_code != 0) return exit_code;
   ProgressLine progress(true);
   FindingPrinter findings(stderr);
@@ -184,6 +190,7 @@ void AddFiguresCommand(CLI::App* app, int* exit_code) {
   figures->add_option("--font-pt", arguments->font_pt, "instead of the style's size of texts")
       ->check(InRangeOf("font_pt"));
   figures->add_option("--out", arguments->out, "folder for the figures")->capture_default_str();
+  AddTrustOption(figures, &arguments->trust);
   arguments->json.AddTo(figures);
   figures
       ->add_option("--set", arguments->set,

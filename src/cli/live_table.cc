@@ -53,7 +53,7 @@ void LiveTable::Draw() {
 }
 
 void LiveTable::Clear() {
-  if (lines_ > 0) Say(stderr, "\x1b[{}A\x1b[J", lines_);
+  if (lines_ > 0) fmt::print(stderr, "\x1b[{}A\x1b[J", lines_);
   lines_ = 0;
 }
 

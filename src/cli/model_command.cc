@@ -9,10 +9,12 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "core/text.h"
 #include "model_file/load_model.h"
 #include "pipeline/check_file.h"
 #include "pipeline/load_robot.h"
 #include "pipeline/model_text.h"
+#include "pipeline/program_consent.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
 #include "scenario/set_values.h"
@@ -107,6 +109,18 @@ struct CheckArguments {
   JsonOption json;
 };
 
+nlohmann::ordered_json ProgramsJson(const ProgramList& list) {
+  auto programs = nlohmann::ordered_json::array();
+  for (const CalledProgram& called : list.programs) {
+    programs.push_back({{"witness", called.witness},
+                        {"command", called.command},
+                        {"trusted", called.trust != ProgramTrust::kNone},
+                        {"because", TrustWord(called.trust)},
+                        {"doubt", called.doubt}});
+  }
+  return programs;
+}
+
 int CheckFiles(const CheckArguments& arguments) {
   int exit_code = 0;
   std::FILE* const text = arguments.json.text();
@@ -127,15 +141,14 @@ int CheckFiles(const CheckArguments& arguments) {
       const Diagnostics diagnostics = CheckFile(file);
       inputs.insert(inputs.end(), watch.files().begin(), watch.files().end());
       inputs.push_back({file, ""});
-      checked.push_back({{"file", file},
-                         {"ok", !diagnostics.has_errors()},
-                         {"findings", FindingObjects(diagnostics)}});
+      const bool ok = !diagnostics.has_errors();
+      const ProgramList programs = ok ? ProgramsOf(file, {}) : ProgramList{};
+      checked.push_back({{"file", file}, {"ok", ok}, {"findings", FindingObjects(diagnostics)}});
+      if (!programs.programs.empty()) checked.back()["programs"] = ProgramsJson(programs);
       findings.Print(diagnostics);
-      if (diagnostics.has_errors()) {
-        exit_code = 2;
-      } else {
-        Say(text, "{}: ok\n", file);
-      }
+      if (!ok) exit_code = 2;
+      if (ok) Say(text, "{}: ok\n", file);
+      for (const std::string& line : programs.Lines()) Say(text, "  runs {}\n", line);
     }
   }
   return WorseExit(
@@ -187,12 +200,12 @@ nlohmann::ordered_json ListScenarios(std::FILE* text) {
 // Names alone, one per line: what completion offers.
 int ListNames(const std::string& kind) {
   if (kind == "models") {
-    for (const std::string& name : ModelNames(".")) fmt::print("{}\n", name);
+    for (const std::string& name : ModelNames(".")) fmt::print("{}\n", OneLine(name));
     return 0;
   }
   for (const auto& [file, head] : KnownScenarios()) {
     const fs::path name = fs::path(file).lexically_relative(*ScenariosFolder());
-    fmt::print("{}\n", fs::path(name).replace_extension().string());
+    fmt::print("{}\n", OneLine(fs::path(name).replace_extension().string()));
   }
   return 0;
 }

@@ -18,6 +18,7 @@
 #include "core/files.h"
 #include "core/in_children.h"
 #include "core/scratch_folder.h"
+#include "core/text.h"
 #include "core/worker_pool.h"
 #include "pipeline/mutate.h"
 #include "regress/find_cases.h"
@@ -220,7 +221,7 @@ int Mutate(MutateArguments arguments) {
   if (!arguments.part.empty()) return report.exit_code;
   const std::string text = ToText(report, arguments.markdown);
   if (arguments.markdown) {
-    fmt::print(arguments.json.text(), "{}", text);
+    fmt::print(arguments.json.text(), "{}", ForTerminal(text));
   } else {
     SayText(arguments.json.text(), text);
   }
@@ -247,7 +248,7 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
   mutate
       ->add_option("--resolution", arguments->resolution_percent,
                    "of the smallest detectable error, in percent")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   mutate->add_flag("--no-search", arguments->no_search,
                    "smallest errors by proportion, without searching");

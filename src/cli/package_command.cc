@@ -10,6 +10,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "core/files.h"
 #include "core/json_text.h"
 #include "core/names.h"
@@ -23,7 +24,7 @@ namespace fs = std::filesystem;
 struct PackageArguments {
   std::vector<std::string> scenarios;
   std::string out = "paper.zip", date;
-  bool no_report = false, no_figures = false, force = false;
+  bool no_report = false, no_figures = false, force = false, trust = false;
   JsonOption json;
 };
 
@@ -80,6 +81,8 @@ int Package(const PackageArguments& arguments) {
                          .date = arguments.date,
                          .page = !arguments.no_report,
                          .figures = !arguments.no_figures};
+  exit_code = AskForPrograms(files, {}, arguments.trust, false, &options.programs);
+  if (exit_code != 0) return exit_code;
   PackageOutcome outcome;
   {
     ProgressLine progress(true);
@@ -118,6 +121,7 @@ void AddPackageCommand(CLI::App* app, int* exit_code) {
   package->add_flag("--no-report", arguments->no_report, "without report.html");
   package->add_flag("--no-figures", arguments->no_figures, "without figures");
   package->add_flag("--force", arguments->force, "replace a file of this name");
+  AddTrustOption(package, &arguments->trust);
   arguments->json.AddTo(package);
   SetFooter(package,
             {"package scenarios/stabilizing_platform/sea_state.yaml -o paper.zip",

@@ -10,6 +10,7 @@
 #include "cli/json_option.h"
 #include "cli/live_table.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "core/in_children.h"
 #include "pipeline/version.h"
 #include "regress/regress.h"
@@ -24,8 +25,8 @@ struct RegressArguments {
   RegressOptions options;
   std::vector<std::string> folders;  // of merge
   std::string shard, worker;
-  bool no_reports = false, embed = false, no_pictures = false, no_history = false, quiet = false,
-       fail_on_drift = false;
+  bool trust = false, no_reports = false, embed = false, no_pictures = false, no_history = false,
+       quiet = false, fail_on_drift = false;
   JsonOption json;
 };
 
@@ -91,8 +92,28 @@ int Conclude(const RegressArguments& arguments, const RegressOutcome& outcome) {
   return outcome.exit_code == 0 && drifted && arguments.fail_on_drift ? 1 : outcome.exit_code;
 }
 
+// Workers have no terminal: what they may run is decided here, and handed to each. A scenario whose
+// reading ends the process is left to its worker, which may run nothing.
+int AskForCases(RegressArguments* arguments) {
+  constexpr double kLongestReading_s = 60.0;
+  FoundCases found = FindCases(arguments->options.paths);
+  KeepShard(arguments->options.shard, &found.cases);
+  std::vector<std::string> files;
+  for (const CaseFile& file : found.cases) {
+    if (!file.head.has_witnesses) continue;
+    const auto list = InChildren(1, kLongestReading_s,
+                                 [&](size_t) { return ProgramsOf(file.file, {}).Fingerprint(); });
+    if (!list.front()) continue;
+    arguments->options.agreed_programs[file.file] = *list.front();
+    files.push_back(file.file);
+  }
+  ProgramConsent consent;
+  return AskForPrograms(files, {}, arguments->trust, arguments->quiet, &consent);
+}
+
 int RunRegress(RegressArguments* arguments) {
   if (!Complete(arguments)) return 2;
+  if (const int code = AskForCases(arguments); code != 0) return code;
   std::signal(SIGINT, Interrupt);
   std::signal(SIGTERM, Interrupt);
   LiveTable table(!arguments->quiet);
@@ -144,8 +165,9 @@ void AddRegressCommand(CLI::App* app, int* exit_code) {
   regress->add_option("--shard", arguments->shard, "i/n: run the i-th of n parts");
   regress->add_flag("--resume", options.resume, "keep what an interrupted run has finished");
   regress->add_option("--timeout", options.timeout_s, "wall time limit of a scenario [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
+  AddTrustOption(regress, &arguments->trust);
   regress->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
   regress->add_flag("--no-reports", arguments->no_reports, "do not write a report.html for each");
   regress->add_flag("--embed", arguments->embed,

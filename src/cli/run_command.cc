@@ -12,6 +12,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "core/demand.h"
 #include "core/files.h"
 #include "core/json_text.h"
@@ -28,10 +29,10 @@ namespace {
 
 struct RunArguments {
   std::vector<std::string> scenarios, set, assembly, data;
-  std::string out = "out", mode, report_script, kept_audits;
+  std::string out = "out", mode, report_script, kept_audits, agreed;
   JsonOption json;
   bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
-  bool sizing = false;
+  bool sizing = false, trust = false;
 };
 
 // One scenario; prints its result. Our own bugs end this scenario, not the others.
@@ -134,6 +135,12 @@ int Run(const RunArguments& arguments) {
   for (const std::string& file : files) {
     if (const int code = RefuseInput(arguments.json.path(), file); code != 0) return code;
   }
+  if (!arguments.agreed.empty()) options.programs.agreed.insert(arguments.agreed);
+  if (const int code = AskForPrograms(files, options.scenario, arguments.trust, arguments.quiet,
+                                      &options.programs);
+      code != 0) {
+    return code;
+  }
   ProgressLine progress(!arguments.quiet);
   FindingPrinter findings(stderr);
   RunCounts counts;
@@ -191,6 +198,9 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   // How regress shares one script, and what the papers' audits gave, among the reports of a night.
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");
+  // The fingerprint of the programs that regress was allowed to run for this scenario.
+  run->add_option("--agreed-programs", arguments->agreed)->group("");
+  AddTrustOption(run, &arguments->trust);
   run->add_option(
          "--data", arguments->data,
          "traces of motions also as traces.mat, traces_v73.mat or traces.h5, for MATLAB, Octave, "

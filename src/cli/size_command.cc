@@ -8,6 +8,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "pipeline/run_scenario.h"
 #include "report/sizing.h"
 
@@ -18,6 +19,7 @@ struct SizeArguments {
   std::vector<std::string> scenarios, set;
   JsonOption json;
   double margin = 1.0;
+  bool trust = false;
 };
 
 // The envelopes of one mechanism over its scenarios.
@@ -75,6 +77,10 @@ int RunSize(const SizeArguments& arguments) {
   int exit_code = 0;
   const std::vector<std::string> files =
       FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  if (exit_code == 0) {
+    exit_code = AskForPrograms(files, options.scenario, arguments.trust, false, &options.programs);
+  }
+  if (exit_code != 0) return exit_code;
   Sized sized;
   for (const std::string& file : files) {
     exit_code = WorseExit(exit_code, AddScenario(file, options, &sized));
@@ -91,8 +97,9 @@ void AddSizeCommand(CLI::App* app, int* exit_code) {
   size->add_option("scenarios", arguments->scenarios, "scenario files or folders of one mechanism")
       ->required();
   size->add_option("--margin", arguments->margin, "smaller ones end with exit code 1")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
+  AddTrustOption(size, &arguments->trust);
   arguments->json.AddTo(size);
   size->add_option("--set", arguments->set,
                    "key=value: overrides a value of the scenarios (repeatable)")

@@ -126,7 +126,7 @@ void AddStudyOptions(CLI::App* study, StudyArguments* arguments) {
   study
       ->add_option("--timeout", arguments->options.points.timeout_s,
                    "wall time limit of a point [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   study->add_option("--count", arguments->options.reading.drawn.count,
                     "how many points are drawn, instead of the file's number");

@@ -102,7 +102,7 @@ void AddSurveyCommand(CLI::App* app, int* exit_code) {
   survey->add_option("folder", arguments->folder, "folder with .urdf and MJCF files")->required();
   survey->add_option("--out", arguments->out, "folder for survey.csv and survey.html");
   survey->add_option("--timeout", arguments->timeout_s, "wall time limit of a robot [s]")
-      ->check(CLI::PositiveNumber)
+      ->check(Positive())
       ->capture_default_str();
   arguments->json.AddTo(survey);
   SetFooter(survey, {"survey my_robots --out out"},

@@ -7,6 +7,7 @@
 #include "cli/files.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "core/output_folder.h"
 #include "core/text.h"
 #include "pipeline/tables.h"
@@ -17,6 +18,7 @@ namespace {
 struct TablesArguments {
   std::vector<std::string> scenarios, set, formats = {"tex", "md"}, only;
   std::string out = "tables";
+  bool trust = false;
   JsonOption json;
 };
 
@@ -62,13 +64,19 @@ nlohmann::ordered_json TablesJson(const std::string& file, const TablesOutcome& 
 }
 
 int Tables(const TablesArguments& arguments) {
-  TablesOptions options{
-      .scenario = {}, .formats = arguments.formats, .only = arguments.only, .progress = {}};
+  TablesOptions options{.scenario = {},
+                        .programs = {},
+                        .formats = arguments.formats,
+                        .only = arguments.only,
+                        .progress = {}};
   if (!ReadAssignments(arguments.set, "--set", "simulation.step_s=0.002", &options.scenario.set))
     return 2;
   int exit_code = 0;
   const std::vector<std::string> files =
       FilesToRun(arguments.scenarios, {arguments.json.path()}, &exit_code);
+  if (exit_code == 0) {
+    exit_code = AskForPrograms(files, options.scenario, arguments.trust, false, &options.programs);
+  }
   if (exit_code != 0) return exit_code;
   FindingPrinter findings(stderr);
   auto results = nlohmann::ordered_json::array();
@@ -102,6 +110,7 @@ void AddTablesCommand(CLI::App* app, int* exit_code) {
       ->delimiter(',')
       ->check(OneOf(TableNames()));
   tables->add_option("--out", arguments->out, "folder for the tables")->capture_default_str();
+  AddTrustOption(tables, &arguments->trust);
   arguments->json.AddTo(tables);
   tables
       ->add_option("--set", arguments->set,

@@ -4,17 +4,31 @@
 #include <sys/ioctl.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
 
+#include "core/text.h"
 #include "core/wrapped.h"
 
 namespace mbv {
 namespace {
 
 constexpr size_t kNarrowest = 20;  // below that, a width is a mistake
+
+// Diagnostics may quote a value of any length.
+std::string ShortLines(std::string_view text) {
+  std::string shown;
+  for (size_t at = 0; at < text.size();) {
+    const size_t end = std::min(text.find('\n', at), text.size());
+    shown += Shortened(std::string(text.substr(at, end - at)));
+    if (end < text.size()) shown += '\n';
+    at = end + 1;
+  }
+  return shown;
+}
 
 bool IsTerminal(std::FILE* to) { return isatty(fileno(to)) != 0; }
 
@@ -41,7 +55,8 @@ bool WantsColor(std::FILE* to) {
 
 void SayText(std::FILE* to, std::string_view text) {
   if (to != stdout) std::fflush(stdout);
-  fmt::print(to, "{}", Wrapped(text, TerminalColumns(to)));
+  const std::string shown = to == stderr ? ShortLines(text) : std::string(text);
+  fmt::print(to, "{}", Wrapped(ForTerminal(shown), TerminalColumns(to)));
 }
 
 void FindingPrinter::Print(const Diagnostics& diagnostics) {
@@ -64,8 +79,8 @@ void ProgressLine::Show(const std::string& what, double fraction) {
   if (const std::string left = left_.Text(fraction, now_s); !left.empty()) done += ", " + left;
   // A line that the terminal breaks cannot be taken back: its beginning is left out.
   const size_t columns = TerminalColumns(stderr), taken = done.size() + 2;
-  const size_t room = columns > taken ? columns - taken : what.size();
-  std::string shown = what;
+  const size_t room = columns > taken ? columns - taken : std::string::npos;
+  std::string shown = OneLine(what);
   while (PrintedWidth(shown) > room) shown.erase(0, 1);
   std::fprintf(stderr, "\r\x1b[K%s%s", shown.c_str(), done.c_str());
   std::fflush(stderr);

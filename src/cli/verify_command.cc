@@ -6,6 +6,7 @@
 #include "cli/cli.h"
 #include "cli/json_option.h"
 #include "cli/terminal.h"
+#include "cli/trust.h"
 #include "core/json_text.h"
 #include "pipeline/verify_package.h"
 
@@ -25,6 +26,14 @@ int Verify(const VerifyArguments& arguments) {
     ProgressLine progress(true);
     options.progress = [&](const std::string& file, double fraction) {
       progress.active() ? progress.Show(file, fraction) : Say(stderr, "repeats {}\n", file);
+    };
+    options.ask = [&](const std::string& file, const std::vector<std::string>& programs) {
+      progress.Clear();
+      return AskForPrograms(file, programs);
+    };
+    options.show = [&](const std::string& file, const std::vector<std::string>& programs) {
+      progress.Clear();
+      ListPrograms(file, programs);
     };
     outcome = VerifyPackage(arguments.archive, options);
   }
@@ -47,8 +56,7 @@ void AddVerifyCommand(CLI::App* app, int* exit_code) {
   CLI::App* verify = app->add_subcommand(
       "verify", "Repeat what an archive of package holds, and say which results are the same");
   verify->add_option("archive", arguments->archive, "the archive")->required();
-  verify->add_flag("--trust", arguments->trust,
-                   "let the programs run that its scenarios call (witnesses)");
+  AddTrustOption(verify, &arguments->trust);
   verify->add_flag("-v,--verbose", arguments->verbose,
                    "every file, and every signal of those that are not the same");
   arguments->json.AddTo(verify);

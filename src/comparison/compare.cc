@@ -213,9 +213,24 @@ std::string CountText(const Comparison& comparison) {
   return text;
 }
 
+// A witness without which the scenario wants no verdict, and that nothing was compared with.
+const Caveat* FindMissingRequired(const ComparisonInput& input,
+                                  const std::vector<Caveat>& missing) {
+  for (const Caveat& caveat : missing) {
+    const Witness* witness = FindNamed(input.witnesses, caveat.of.front());
+    if (witness != nullptr && witness->required) return &caveat;
+  }
+  return nullptr;
+}
+
 void Judge(const ComparisonInput& input, Comparison* comparison) {
   if (const Witness* broken = FindBroken(input)) {
     comparison->reason = Explain(*broken);
+    return;
+  }
+  const std::vector<Caveat> missing = MissingWitnesses(input, *comparison);
+  if (const Caveat* caveat = FindMissingRequired(input, missing)) {
+    comparison->reason = "the scenario requires " + caveat->text;
     return;
   }
   const auto compared = std::count_if(comparison->pairs.begin(), comparison->pairs.end(),
@@ -259,6 +274,58 @@ const char* ToText(Verdict verdict) {
       return "agree";
     case Verdict::kDisagree:
       return "disagree";
+  }
+  return "?";
+}
+
+const char* ToText(WitnessGap gap) {
+  switch (gap) {
+    case WitnessGap::kNone:
+      return "";
+    case WitnessGap::kNotApplicable:
+      return "not_applicable";
+    case WitnessGap::kNotHandedOver:
+      return "not_handed_over";
+    case WitnessGap::kNotStarted:
+      return "not_started";
+    case WitnessGap::kExitCode:
+      return "exit_code";
+    case WitnessGap::kSignal:
+      return "signal";
+    case WitnessGap::kTimedOut:
+      return "timed_out";
+    case WitnessGap::kNoAnswer:
+      return "no_answer";
+    case WitnessGap::kBadAnswer:
+      return "bad_answer";
+    case WitnessGap::kDeclined:
+      return "declined";
+    case WitnessGap::kNoForces:
+      return "no_forces";
+  }
+  return "?";
+}
+
+const char* ToText(CaveatKind kind) {
+  switch (kind) {
+    case CaveatKind::kWideLimits:
+      return "wide_limits";
+    case CaveatKind::kForcesCancel:
+      return "forces_cancel";
+    case CaveatKind::kFewSamples:
+      return "few_samples";
+    case CaveatKind::kPartOfMotion:
+      return "part_of_motion";
+    case CaveatKind::kTable:
+      return "table";
+    case CaveatKind::kRatesUnchecked:
+      return "rates_unchecked";
+    case CaveatKind::kWitnessMissing:
+      return "witness_missing";
+    case CaveatKind::kWitnessInPart:
+      return "witness_in_part";
+    case CaveatKind::kLeftOut:
+      return "left_out";
   }
   return "?";
 }
@@ -349,7 +416,7 @@ Comparison Compare(const ComparisonInput& given) {
   if (input.table != nullptr) FinishTable(input, &comparison);
   MarkBlind(input, &comparison);
   Judge(input, &comparison);
-  comparison.reservations = Reservations(input, comparison);
+  comparison.caveats = CaveatsOf(input, comparison);
   comparison.attribution = Attribute(input, comparison);
   if (comparison.table) DescribeTable(&comparison);
   return comparison;

@@ -29,6 +29,22 @@ namespace mbv {
 enum class Verdict { kNotRun, kAgree, kDisagree };
 [[nodiscard]] const char* ToText(Verdict verdict);  ///< "not_run", "agree", "disagree"
 
+/// Why a witness that a scenario has gave nothing to compare.
+enum class WitnessGap {
+  kNone,           ///< it answered, or the scenario does not have it
+  kNotApplicable,  ///< a closed form that covers neither this mechanism nor this motion
+  kNotHandedOver,  ///< a program: the scenario cannot be written for one
+  kNotStarted,     ///< no such program, or none that can be executed
+  kExitCode,       ///< it ended with one that is not 0
+  kSignal,
+  kTimedOut,
+  kNoAnswer,   ///< it left no files, or longer ones than they may be
+  kBadAnswer,  ///< its files are not what docs/witnesses.md asks for
+  kDeclined,   ///< it states that the mechanism or motion is beyond it
+  kNoForces,   ///< it answered, without drive forces that another witness has, too
+};
+[[nodiscard]] const char* ToText(WitnessGap gap);  ///< "timed_out"; "" of kNone
+
 /// One witness as handed to the comparison.
 struct Witness {
   std::string name;              ///< of its role (core/roles.h)
@@ -44,6 +60,8 @@ struct Witness {
     double compute_s = kNan;  ///< without its start, reading and writing, as it says itself
   };
   std::optional<Foreign> foreign = {};
+  WitnessGap gap = WitnessGap::kNone;  ///< why it did not run, if the scenario asks it to
+  bool required = false;               ///< without it there is no verdict
 };
 
 struct ComparisonInput {
@@ -218,6 +236,27 @@ struct TableVerdict {
   std::vector<std::string> diagnoses;         ///< what the differences look like
 };
 
+/// What makes an agreement say less than it seems to.
+enum class CaveatKind {
+  kWideLimits,      ///< limits that verify nothing
+  kForcesCancel,    ///< forces so small that zero would pass
+  kFewSamples,      ///< of forces
+  kPartOfMotion,    ///< forces were judged in a part of it
+  kTable,           ///< has no forces, a part of the motion, or columns that verify nothing
+  kRatesUnchecked,  ///< against positions
+  kWitnessMissing,  ///< a witness of the scenario gave nothing to compare
+  kWitnessInPart,   ///< a program gave the forces of some drives only
+  kLeftOut,         ///< what acts on forces in a robot's file and not in the model
+};
+[[nodiscard]] const char* ToText(CaveatKind kind);  ///< "witness_missing"
+
+struct Caveat {
+  CaveatKind kind = CaveatKind::kWideLimits;
+  std::vector<std::string> of = {};    ///< witnesses, pairs, checks or the mechanism
+  std::string text = {};               ///< one sentence, with what it is about
+  WitnessGap gap = WitnessGap::kNone;  ///< of kWitnessMissing
+};
+
 struct Comparison {
   Verdict verdict = Verdict::kNotRun;
   std::string reason = "comparison was not run";  ///< one sentence
@@ -226,7 +265,7 @@ struct Comparison {
   std::vector<WitnessMetrics> witnesses;  ///< those that ran
   std::vector<CheckResult> checks;        ///< off ones included
   std::vector<NotCompared> not_compared;
-  std::vector<std::string> reservations;  ///< why an agreement says less than it seems to
+  std::vector<Caveat> caveats;
   Attribution attribution;
   std::optional<TableVerdict> table;
 

@@ -6,6 +6,9 @@
 #include <cmath>
 
 #include "comparison/driven.h"
+#include "comparison/verdict.h"
+#include "core/text.h"
+#include "mechanism/channels.h"
 #include "mechanism/reach.h"
 
 namespace mbv {
@@ -44,14 +47,16 @@ bool Judges(const ComparisonInput& input, const CheckResult& check) {
 }
 
 // All limits that are too wide, with the checks they belong to.
-std::string CoarseLimits(const ComparisonInput& input, const Comparison& comparison) {
-  std::string names;
+Caveat CoarseLimits(const ComparisonInput& input, const Comparison& comparison) {
+  Caveat caveat{.kind = CaveatKind::kWideLimits};
   for (const CheckResult& check : comparison.checks) {
     if (!IsCoarse(input, check)) continue;
-    names += fmt::format("{}{} ({:.2g}{}{})", names.empty() ? "" : ", ", check.name, *check.limit,
-                         *RowOf(check.metric).unit == '\0' ? "" : " ", RowOf(check.metric).unit);
+    caveat.text +=
+        fmt::format("{}{} ({:.2g}{}{})", caveat.of.empty() ? "" : ", ", check.name, *check.limit,
+                    *RowOf(check.metric).unit == '\0' ? "" : " ", RowOf(check.metric).unit);
+    caveat.of.push_back(check.name);
   }
-  return names;
+  return caveat;
 }
 
 bool IsWhole(const ComparisonInput& input, double from_s, double to_s) {
@@ -68,26 +73,25 @@ std::string Span(const ComparisonInput& input, const PairComparison& pair) {
                      pair.from_s, pair.to_s, input.motion->duration_s);
 }
 
-// Sentences that several pairs share are said once, with the pairs.
+// Sentences that several pairs share are written once, with the pairs.
 class Sentences {
  public:
-  void Add(const std::string& subject, const std::string& text) {
+  void Add(CaveatKind kind, const std::string& subject, const std::string& text) {
     if (text.empty()) return;
-    for (auto& [subjects, known] : all_) {
-      if (known != text) continue;
-      subjects += ", " + subject;
+    for (Caveat& known : all_) {
+      if (known.text != text) continue;
+      known.of.push_back(subject);
       return;
     }
-    all_.emplace_back(subject, text);
+    all_.push_back({.kind = kind, .of = {subject}, .text = text});
   }
-  [[nodiscard]] std::vector<std::string> Take() const {
-    std::vector<std::string> sentences;
-    for (const auto& [subjects, text] : all_) sentences.push_back(subjects + ": " + text);
-    return sentences;
+  [[nodiscard]] std::vector<Caveat> Take() {
+    for (Caveat& caveat : all_) caveat.text = Joined(caveat.of) + ": " + caveat.text;
+    return std::move(all_);
   }
 
  private:
-  std::vector<std::pair<std::string, std::string>> all_;
+  std::vector<Caveat> all_;
 };
 
 bool IsForce(const std::string& unit) { return unit == "N" || unit == "N m"; }
@@ -101,13 +105,15 @@ void ReserveTable(const ComparisonInput& input, const Comparison& comparison,
   if (!input.motion->free() &&
       std::none_of(channels.begin(), channels.end(),
                    [](const Channel& channel) { return IsForce(channel.unit); })) {
-    sentences->Add(name, "it has no column of forces, so it verifies the motion only");
+    sentences->Add(CaveatKind::kTable, name,
+                   "it has no column of forces, so it verifies the motion only");
   }
   if (!table.trace.time_s.empty() &&
       !IsWhole(input, table.trace.time_s.front(), table.trace.time_s.back())) {
-    sentences->Add(name, fmt::format("it covers {:.4g} to {:.4g} s only, of a motion of {:.4g} s",
-                                     table.trace.time_s.front(), table.trace.time_s.back(),
-                                     input.motion->duration_s));
+    sentences->Add(CaveatKind::kTable, name,
+                   fmt::format("it covers {:.4g} to {:.4g} s only, of a motion of {:.4g} s",
+                               table.trace.time_s.front(), table.trace.time_s.back(),
+                               input.motion->duration_s));
   }
   std::string coarse;
   for (const PairComparison& pair : comparison.pairs) {
@@ -120,10 +126,36 @@ void ReserveTable(const ComparisonInput& input, const Comparison& comparison,
     }
   }
   if (!coarse.empty()) {
-    sentences->Add(name,
+    sentences->Add(CaveatKind::kTable, name,
                    fmt::format("a tube of more than {:g} % of the column verifies nothing: {}",
                                100.0 * table.coarsest, coarse));
   }
+}
+
+// Of a witness that ran and that nothing was compared with.
+std::string WhyNothingInCommon(const ComparisonInput& input, const Comparison& comparison,
+                               const Witness& witness) {
+  for (const PairComparison& pair : comparison.pairs) {
+    const bool first = pair.measured == witness.name;
+    if (!first && pair.truth != witness.name) continue;
+    const Witness* other = FindNamed(input.witnesses, first ? pair.truth : pair.measured);
+    if (other != nullptr && other->summary.ok()) return pair.reason;
+  }
+  return "no other witness ran that it is compared with";
+}
+
+// The drives whose forces a program does not give; "" if it gives all of them, or none.
+std::string ForcesLeftOut(const ComparisonInput& input, const Witness& witness) {
+  if (!witness.foreign || witness.trace == nullptr || !witness.summary.ok()) return "";
+  if (input.motion->free()) return "";
+  std::vector<std::string> left_out;
+  for (const Drive& drive : input.mechanism->drives) {
+    if (witness.trace->Find(ChannelName(Quantity::kForce, drive.name)) < 0) {
+      left_out.push_back(drive.name);
+    }
+  }
+  if (left_out.empty() || left_out.size() == input.mechanism->drives.size()) return "";
+  return "it gives no force of " + Joined(left_out);
 }
 
 }  // namespace
@@ -152,39 +184,73 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
   if (!any) return fmt::format("every {} check is switched off, so nothing was verified", what);
   if (coarse) {
     return fmt::format("every {} limit is so wide that it verifies nothing: {}", what,
-                       CoarseLimits(input, comparison));
+                       CoarseLimits(input, comparison).text);
   }
   return "nothing moves, weighs or pushes: the drive forces vanish whatever the masses are, so "
          "nothing was verified";
 }
 
-std::vector<std::string> Reservations(const ComparisonInput& input, const Comparison& comparison) {
+std::vector<Caveat> MissingWitnesses(const ComparisonInput& input, const Comparison& comparison) {
+  std::vector<Caveat> missing;
+  for (const Witness& witness : input.witnesses) {
+    const bool compared =
+        std::any_of(comparison.pairs.begin(), comparison.pairs.end(), [&](const auto& pair) {
+          return pair.compared && (pair.measured == witness.name || pair.truth == witness.name);
+        });
+    const bool asked = witness.foreign || witness.required || witness.gap != WitnessGap::kNone;
+    if (!asked || compared) continue;
+    Caveat caveat{.kind = CaveatKind::kWitnessMissing, .of = {witness.name}, .gap = witness.gap};
+    std::string why = witness.summary.message;
+    if (witness.trace != nullptr && witness.summary.ok()) {
+      caveat.gap = WitnessGap::kNoForces;
+      why = WhyNothingInCommon(input, comparison, witness);
+    }
+    caveat.text =
+        fmt::format("the witness {}, which nothing was compared with: {}", witness.name, why);
+    missing.push_back(std::move(caveat));
+  }
+  return missing;
+}
+
+std::vector<Caveat> CaveatsOf(const ComparisonInput& input, const Comparison& comparison) {
   Sentences sentences;
   for (const PairComparison& pair : comparison.pairs) {
     if (!pair.compared) continue;
     const CheckResult* force = comparison.FindCheck(pair.name() + ".force_nrmse");
     if (force != nullptr && pair.forces_act && ZeroPasses(comparison, *force)) {
-      sentences.Add(pair.name(),
+      sentences.Add(CaveatKind::kForcesCancel, pair.name(),
                     "the drive forces are so small that zero would pass, too: "
                     "verified is only that they cancel out");
     }
     if (!pair.drives.empty() && pair.force_samples < kFewSamples) {
-      sentences.Add(pair.name(),
+      sentences.Add(CaveatKind::kFewSamples, pair.name(),
                     fmt::format("forces were judged at {} sample{} only", pair.force_samples,
                                 pair.force_samples == 1 ? "" : "s"));
     }
-    sentences.Add(pair.name(), Span(input, pair));
+    sentences.Add(CaveatKind::kPartOfMotion, pair.name(), Span(input, pair));
   }
   if (input.table != nullptr) ReserveTable(input, comparison, &sentences);
   for (const WitnessMetrics& witness : comparison.witnesses) {
     if (witness.derivatives_gap.empty()) continue;
-    sentences.Add(witness.witness,
+    sentences.Add(CaveatKind::kRatesUnchecked, witness.witness,
                   "rates were not checked against positions: " + witness.derivatives_gap);
   }
-  std::vector<std::string> all = sentences.Take();
-  for (const std::string& text : input.left_out) all.push_back("not the whole robot: " + text);
-  if (const std::string coarse = CoarseLimits(input, comparison); !coarse.empty()) {
-    all.insert(all.begin(), "limits so wide that they verify nothing: " + coarse);
+  for (const Witness& witness : input.witnesses) {
+    sentences.Add(CaveatKind::kWitnessInPart, witness.name, ForcesLeftOut(input, witness));
+  }
+  std::vector<Caveat> all = sentences.Take();
+  for (const std::string& text : input.left_out) {
+    all.push_back({.kind = CaveatKind::kLeftOut,
+                   .of = {"mechanism"},
+                   .text = "not the whole robot: " + text});
+  }
+  if (Caveat coarse = CoarseLimits(input, comparison); !coarse.of.empty()) {
+    coarse.text = "limits so wide that they verify nothing: " + coarse.text;
+    all.insert(all.begin(), std::move(coarse));
+  }
+  for (Caveat& missing : MissingWitnesses(input, comparison)) {
+    missing.text = "without " + missing.text;
+    all.push_back(std::move(missing));
   }
   return all;
 }

@@ -17,10 +17,15 @@ void MarkBlind(const ComparisonInput& input, Comparison* comparison);
 [[nodiscard]] std::string WhyNothingVerified(const ComparisonInput& input,
                                              const Comparison& comparison);
 
-/// One sentence each, loud in every report: limits that verify nothing, forces that only cancel
-/// out, few samples, a part of the motion that was not judged, a table without forces, rates that
-/// could not be checked against positions, what acts on forces in a robot's file and not here.
-[[nodiscard]] std::vector<std::string> Reservations(const ComparisonInput& input,
-                                                    const Comparison& comparison);
+/// Loud in every report: limits that verify nothing, forces that only cancel out, few samples, a
+/// part of the motion that was not judged, a table without forces, rates that could not be checked
+/// against positions, witnesses that nothing was compared with, what acts on forces in
+/// a robot's file and was left out.
+[[nodiscard]] std::vector<Caveat> CaveatsOf(const ComparisonInput& input,
+                                            const Comparison& comparison);
+
+/// Those of witnesses that the scenario has and that nothing was compared with; each names one.
+[[nodiscard]] std::vector<Caveat> MissingWitnesses(const ComparisonInput& input,
+                                                   const Comparison& comparison);
 
 }  // namespace mbv

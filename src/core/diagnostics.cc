@@ -63,8 +63,8 @@ std::string ToText(const Finding& finding) {
     text += " ";
   }
   text += finding.severity == Severity::kError ? "error: " : "warning: ";
-  text += finding.message;
-  if (!finding.hint.empty()) text += "\n  hint: " + finding.hint;
+  text += Shortened(finding.message);
+  if (!finding.hint.empty()) text += "\n  hint: " + Shortened(finding.hint);
   return Printable(text);  // names and values come from files
 }
 

@@ -1,6 +1,7 @@
 #include "core/text.h"
 
 #include <algorithm>
+#include <charconv>
 
 namespace mbv {
 namespace {
@@ -57,6 +58,101 @@ std::string Printable(std::string_view text) {
     from = at + 1;
   }
   return shown += text.substr(from);
+}
+
+namespace {
+
+// U+200B … U+200F, U+202A … U+202E, U+2060 … U+206F, U+FEFF: the code of the one at `at`, else 0.
+unsigned MisleadingAt(std::string_view text, size_t at) {
+  const auto byte = [&](size_t k) {
+    return static_cast<unsigned>(static_cast<unsigned char>(text[at + k]));
+  };
+  if (at + 3 > text.size() || (byte(0) & 0xF0U) != 0xE0U) return 0;
+  const unsigned code = (byte(0) & 0xFU) << 12U | (byte(1) & 0x3FU) << 6U | (byte(2) & 0x3FU);
+  const bool misleads = (code >= 0x200B && code <= 0x200F) || (code >= 0x202A && code <= 0x202E) ||
+                        (code >= 0x2060 && code <= 0x206F) || code == 0xFEFF;
+  return misleads ? code : 0;
+}
+
+// The length of a sequence that paints, in one of a few ways; 0 for anything else.
+size_t PaintAt(std::string_view text, size_t at) {
+  for (const std::string_view paint : {"\x1b[0m", "\x1b[1m", "\x1b[2m", "\x1b[32m", "\x1b[33m",
+                                       "\x1b[36m", "\x1b[1;31m", "\x1b[1;32m", "\x1b[1;33m"}) {
+    if (text.substr(at).starts_with(paint)) return paint.size();
+  }
+  return 0;
+}
+
+std::string Tamed(std::string_view text, bool one_line) {
+  constexpr std::string_view kDigits = "0123456789abcdef";
+  std::string shown;
+  for (size_t at = 0; at < text.size();) {
+    const char c = text[at];
+    const size_t paint = c == '\x1b' && !one_line ? PaintAt(text, at) : 0;
+    const bool splits = c == '\r' || (one_line && (c == '\n' || c == '\t'));
+    const size_t length = splits ? 0 : std::max(paint, LengthAt(text, at));
+    if (length == 0) {
+      const auto byte = static_cast<unsigned char>(c);
+      shown += {'\\', 'x', kDigits[byte >> 4U], kDigits[byte & 0xFU]};
+    } else if (const unsigned code = MisleadingAt(text, at); code != 0) {
+      shown += "\\u";
+      for (const unsigned shift : {12U, 8U, 4U, 0U}) shown += kDigits[code >> shift & 0xFU];
+    } else {
+      shown += text.substr(at, length);
+    }
+    at += std::max<size_t>(length, 1);
+  }
+  return shown;
+}
+
+// Where a character begins, at or before `at`.
+size_t StartOfCharacter(std::string_view text, size_t at) {
+  while (at > 0 && at < text.size() && (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U)
+    --at;
+  return at;
+}
+
+bool IsNumber(std::string_view text) {
+  if (text.starts_with('+')) text.remove_prefix(1);
+  double value = 0.0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+}  // namespace
+
+std::string ForTerminal(std::string_view text) { return Tamed(text, false); }
+
+std::string OneLine(std::string_view text) { return Tamed(text, true); }
+
+std::string QuotedValue(std::string_view text, size_t most) {
+  if (text.size() <= most) return OneLine(text);
+  return OneLine(text.substr(0, StartOfCharacter(text, most))) + "… (" +
+         std::to_string(text.size()) + " bytes)";
+}
+
+std::string Shortened(std::string text, size_t most) {
+  if (text.size() <= most) return text;
+  const size_t begin = StartOfCharacter(text, most / 2);
+  const size_t end = StartOfCharacter(text, text.size() - most / 2);
+  return text.substr(0, begin) + " … (" + std::to_string(end - begin) + " bytes left out) … " +
+         text.substr(end);
+}
+
+std::string CsvCell(std::string_view text) {
+  std::string cell;
+  const bool computed =
+      !text.empty() && std::string_view("=+-@\t\r").find(text[0]) != std::string_view::npos;
+  if (computed && !IsNumber(text)) cell += '\'';
+  std::string plain(text);
+  for (char& c : plain) {
+    if (c == '\n' || c == '\r' || c == '\t') c = ' ';
+  }
+  cell += Printable(plain);
+  if (cell.find_first_of(",\"") == std::string::npos) return cell;
+  std::string quoted = "\"";
+  for (const char c : cell) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
+  return quoted + "\"";
 }
 
 std::string Joined(const std::vector<std::string>& words, size_t most) {

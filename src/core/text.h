@@ -19,6 +19,24 @@ namespace mbv {
 /// `text` with "\x1b" for each byte that is no text: nothing that a terminal obeys.
 [[nodiscard]] std::string Printable(std::string_view text);
 
+/// Lines for a terminal: printable, without carriage returns, and without marks that reverse the
+/// order of characters or take no room. Colours that mbverify paints with stay.
+[[nodiscard]] std::string ForTerminal(std::string_view text);
+
+/// The same of one name or command: line feeds and tabs are shown, too, and no colour stays.
+[[nodiscard]] std::string OneLine(std::string_view text);
+
+/// OneLine() of a value that a message quotes: of more than `most` bytes the beginning and how many
+/// there are.
+[[nodiscard]] std::string QuotedValue(std::string_view text, size_t most = 200);
+
+/// A message whose values may be of any length: of more than `most` bytes its beginning and end.
+[[nodiscard]] std::string Shortened(std::string text, size_t most = 2000);
+
+/// A text as a cell of CSV: on one line, in quotes where it needs them, and after a ' where a
+/// spreadsheet would compute it (=, +, - and @ in front of what is not a number).
+[[nodiscard]] std::string CsvCell(std::string_view text);
+
 /// "a, b, c"; of more than `most` words the first ones and "…".
 [[nodiscard]] std::string Joined(const std::vector<std::string>& words,
                                  size_t most = static_cast<size_t>(-1));

@@ -43,7 +43,8 @@ void Limit(__rlimit_resource resource, double bytes) {
 }
 
 // In the child, between fork and exec: only calls that are safe there.
-[[noreturn]] void BecomeWorker(const WorkerJob& job, char* const* argv, int log, pid_t parent) {
+[[noreturn]] void BecomeWorker(const WorkerJob& job, char* const* argv, char** variables, int log,
+                               pid_t parent) {
   setpgid(0, 0);  // its own group, to be killed as a whole
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kCannotStart);
@@ -57,6 +58,7 @@ void Limit(__rlimit_resource resource, double bytes) {
   dup2(log, STDOUT_FILENO);
   dup2(log, STDERR_FILENO);
   if (!job.folder.empty() && chdir(job.folder.c_str()) != 0) _exit(kCannotStart);
+  environ = variables;
   execvp(argv[0], argv);
   const char* reason = std::strerror(errno);
   for (const char* text :
@@ -75,12 +77,20 @@ pid_t Start(const WorkerJob& job, std::string* trouble) {
     *trouble = "cannot write " + job.log.string() + ": " + std::strerror(errno);
     return -1;
   }
-  std::vector<char*> argv;
-  for (const std::string& word : job.argv) argv.push_back(const_cast<char*>(word.c_str()));
-  argv.push_back(nullptr);
+  const auto pointers = [](const std::vector<std::string>& words) {
+    std::vector<char*> all;
+    for (const std::string& word : words) all.push_back(const_cast<char*>(word.c_str()));
+    all.push_back(nullptr);
+    return all;
+  };
+  const std::vector<char*> argv = pointers(job.argv);
+  std::vector<char*> variables;
+  if (job.environment) variables = pointers(*job.environment);
   const pid_t parent = getpid();
   const pid_t pid = fork();
-  if (pid == 0) BecomeWorker(job, argv.data(), log, parent);
+  if (pid == 0) {
+    BecomeWorker(job, argv.data(), job.environment ? variables.data() : environ, log, parent);
+  }
   if (pid < 0) *trouble = std::string("cannot start a process: ") + std::strerror(errno);
   if (pid > 0) setpgid(pid, pid);  // both sides set it, so that it is set before a kill
   close(log);

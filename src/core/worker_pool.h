@@ -7,6 +7,7 @@
 #include <csignal>
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,6 +27,8 @@ struct WorkerJob {
   std::filesystem::path folder = {};  ///< to work in; empty: the present one
   double data_bytes = 0.0;            ///< memory of its own that it may have; 0: no limit
   double file_bytes = 0.0;            ///< length of each file that it writes; 0: no limit
+  /// "NAME=value" of each variable that it gets; empty: those of this process.
+  std::optional<std::vector<std::string>> environment = {};
 };
 
 /// How a worker ended.

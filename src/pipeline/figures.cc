@@ -44,6 +44,7 @@ class FigureSource {
   FigureSet OfMotion() {
     RunOptions run;
     run.scenario = options_.scenario;
+    run.programs = options_.programs;
     run.pictures = run.page = false;
     run.progress = options_.progress;
     return OfMotion(RunScenario(file_, run));

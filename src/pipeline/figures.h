@@ -15,6 +15,7 @@ namespace mbv {
 
 struct FigureOptions {
   ScenarioOptions scenario;
+  ProgramConsent programs = {};  ///< that scenarios name
   FigureStyle style = FigureStyles().front();
   Language language = Language::kEnglish;
   std::vector<std::string> formats = {"pdf"};  ///< words of FigureFormats()

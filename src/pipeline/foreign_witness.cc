@@ -1,5 +1,6 @@
 #include "pipeline/foreign_witness.h"
 
+#include "core/text.h"
 #include "exchange/mechanism_json.h"
 #include "exchange/motion_text.h"
 #include "exchange/witness_answer.h"
@@ -12,6 +13,8 @@
 namespace mbv {
 namespace {
 
+constexpr size_t kMostVersion = 60, kMostReason = 500;  // bytes of what a program says of itself
+
 class ForeignRunner {
  public:
   ForeignRunner(const ForeignWitness& witness, const Prepared& prepared, const Mechanism& mechanism)
@@ -20,6 +23,7 @@ class ForeignRunner {
         mechanism_(mechanism),
         step_s_(prepared.scenario.simulation.step_s),
         call_(witness) {
+    record_.required = witness.required;
     record_.foreign = Witness::Foreign{.program = "",
                                        .limits = witness.limits,
                                        .force_nrmse = witness.force_nrmse,
@@ -27,14 +31,18 @@ class ForeignRunner {
   }
 
   WitnessRecord Run(const DrivenMotion& driven) {
+    std::optional<ProgramFailure> failure;
     std::string trouble = WhyNotAsked();
     if (trouble.empty()) trouble = HandOver(driven);
-    if (trouble.empty()) trouble = call_.Run();
-    if (trouble.empty()) trouble = ReadBack();
+    if (!trouble.empty()) failure = ProgramFailure{WitnessGap::kNotHandedOver, trouble};
+    if (!failure) failure = call_.Run();
+    if (!failure) failure = ReadBack();
     record_.name = record_.trace.witness = witness_.name;
-    record_.summary = trouble.empty() ? RunSummary::Done() : NotRun(trouble);
+    record_.summary =
+        failure ? NotRun(Shortened(OneLine(failure->text), 1000)) : RunSummary::Done();
     record_.summary.wall_s = call_.wall_s();
-    if (!trouble.empty()) record_.trace = {};
+    if (failure) record_.trace = {};
+    if (failure) record_.gap = failure->gap;
     return std::move(record_);
   }
 
@@ -96,22 +104,29 @@ class ForeignRunner {
     handed->told.push_back(motion_.FindCommand(name) >= 0);
   }
 
-  std::string ReadBack() {
+  std::optional<ProgramFailure> ReadBack() {
     const auto json = call_.Text("witness.json");
-    if (!json) return "left no witness.json" + call_.Said();
+    if (!json) return ProgramFailure{WitnessGap::kNoAnswer, "left no witness.json" + call_.Said()};
     std::string trouble;
     const auto answer = ReadAnswer(*json, &trouble);
-    if (!answer) return trouble;
+    if (!answer) return ProgramFailure{WitnessGap::kBadAnswer, trouble};
     record_.foreign->program =
-        answer->program + (answer->version.empty() ? "" : " " + answer->version);
-    record_.foreign->declined = answer->declined;
+        QuotedValue(answer->program) +
+        (answer->version.empty() ? "" : " " + QuotedValue(answer->version, kMostVersion));
+    for (const auto& [what, why] : answer->declined) {
+      record_.foreign->declined.emplace_back(QuotedValue(what), QuotedValue(why, kMostReason));
+    }
     record_.foreign->compute_s = answer->compute_s;
-    if (!answer->refused.empty()) return "declines: " + answer->refused;
+    if (!answer->refused.empty()) {
+      return ProgramFailure{WitnessGap::kDeclined,
+                            "declines: " + QuotedValue(answer->refused, kMostReason)};
+    }
     const auto csv = call_.Text("traces.csv");
-    if (!csv) return "left no traces.csv" + call_.Said();
+    if (!csv) return ProgramFailure{WitnessGap::kNoAnswer, "left no traces.csv" + call_.Said()};
     auto trace = ReadWitnessTrace(*csv, mechanism_, times_s_, &trouble);
-    if (trace) record_.trace = std::move(*trace);
-    return trouble;
+    if (!trace) return ProgramFailure{WitnessGap::kBadAnswer, trouble};
+    record_.trace = std::move(*trace);
+    return {};
   }
 
   const ForeignWitness& witness_;

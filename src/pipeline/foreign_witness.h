@@ -8,7 +8,7 @@
 namespace mbv {
 
 /// Runs it on the drives' motion. Whatever the program does (dies, hangs, floods, answers nonsense)
-/// is told in the record's summary as not run, so that it never harms a verdict.
+/// is in the record's summary, as not run, and in its gap.
 [[nodiscard]] WitnessRecord RunForeign(const ForeignWitness& witness, const Prepared& prepared,
                                        const Mechanism& mechanism, const DrivenMotion& driven);
 

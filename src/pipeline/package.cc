@@ -48,6 +48,7 @@ class PackageMaker {
     outcome_.exit_code = 2;
     if (!stage_.trouble().empty()) return CannotWrite("", stage_.trouble());
     FindDate();
+    if (!MayRun()) return std::move(outcome_);
     const auto inputs = GatherInputs(scenarios_, &outcome_.diagnostics);
     if (!inputs || outcome_.diagnostics.has_errors()) return std::move(outcome_);
     package().license = LicensesOf(*inputs);
@@ -106,11 +107,21 @@ class PackageMaker {
     return trouble;
   }
 
+  // Consent is about the files as they are; what runs is their copies.
+  bool MayRun() {
+    for (const std::string& file : scenarios_) {
+      const ProgramList list = ProgramsOf(file, {});
+      if (!options_.programs.Allows(list)) outcome_.diagnostics.Add(Refusal(list));
+    }
+    return !outcome_.diagnostics.has_errors();
+  }
+
   void RunOne(const std::string& file) {
     const PackedRun run = RunPacked(file, {.folder = stage_.path(),
                                            .meshes = package().meshes,
                                            .page = options_.page,
-                                           .figures = options_.figures});
+                                           .figures = options_.figures,
+                                           .programs = {.all = true}});
     for (const Finding& finding : run.findings) outcome_.diagnostics.Add(finding);
     if (!run.failure.empty()) outcome_.diagnostics.AddError(file, run.failure);
     if (!run.failure.empty() && run.scenario.exit_code == 3) outcome_.exit_code = 3;

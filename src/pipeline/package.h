@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/diagnostics.h"
+#include "pipeline/program_consent.h"
 #include "pipeline/progress.h"
 #include "report/package_files.h"
 
@@ -16,6 +17,7 @@ struct PackageOptions {
   std::string folder = "paper";  ///< the one folder in the archive
   std::string date;              ///< YYYY-MM-DD; "": that of SOURCE_DATE_EPOCH, else 1980-01-01
   bool page = true, figures = true;
+  ProgramConsent programs = {};  ///< that scenarios name
   ProgressFunction progress = {};
 };
 

@@ -41,25 +41,25 @@ class PackedRunner {
     const ScenarioHead head = ReadScenarioHead(run_.scenario.file);
     run_.scenario.description = head.description;
     run_.scenario.kind = head.is_study ? "study" : head.is_stiffness() ? "stiffness" : "motion";
-    if (!options_.programs && CallsPrograms()) return std::move(run_);
+    if (!MayCallPrograms()) return std::move(run_);
     if (ReadsOutside(head.is_study)) return std::move(run_);
     head.is_study ? RunAsStudy() : RunAsScenario();
     return std::move(run_);
   }
 
  private:
-  bool CallsPrograms() {
-    if (run_.scenario.kind != "motion") return false;
+  // Lists the programs it names; false if they may not run.
+  bool MayCallPrograms() {
+    if (run_.scenario.kind != "motion") return true;
     const ScenarioResult loaded = LoadScenario(run_.scenario.file);
-    if (!loaded.scenario) return false;
-    std::vector<std::string> names;
-    for (const ForeignWitness& witness : loaded.scenario->witnesses) {
-      names.push_back(witness.name + ": " + Joined(witness.command));
-    }
-    if (names.empty()) return false;
-    Refuse("calls programs (" + Joined(names) + ")",
+    if (!loaded.scenario) return true;
+    const ProgramList list = ProgramsOf(*loaded.scenario, options_.programs.archived);
+    run_.programs = list.Lines();
+    if (options_.programs.Allows(list)) return true;
+    run_.refused = true;
+    Refuse("calls programs (" + Joined(run_.programs) + ")",
            "read what they are; --trust lets them run as you");
-    return true;
+    return false;
   }
 
   void RunAsStudy() {
@@ -81,6 +81,7 @@ class PackedRunner {
     run.out_dir = kResultsFolder;
     run.pictures = run.timed = false;
     run.page = options_.page;
+    run.programs = options_.programs;
     const RunOutcome outcome = RunScenario(run_.scenario.file, run);
     Tell(outcome.diagnostics, outcome.exit_code, outcome.folder);
     if (!outcome.report && outcome.stiffness == nullptr) return;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/diagnostics.h"
+#include "pipeline/program_consent.h"
 #include "pipeline/progress.h"
 #include "report/package_files.h"
 #include "report/rerun_report.h"
@@ -22,7 +23,7 @@ struct PackedRunOptions {
   std::vector<PackedMeshes> meshes;  ///< relative to it
   bool page = true;                  ///< report.html
   bool figures = true;
-  bool programs = true;  ///< scenarios may call programs (`witnesses:`)
+  ProgramConsent programs = {.archived = true};  ///< that scenarios name
 };
 
 /// What became of it.
@@ -31,6 +32,9 @@ struct PackedRun {
   std::vector<Finding> findings;  ///< bad input and warnings
   std::vector<RerunFile> files;   ///< of a repetition that was judged
   std::string failure;            ///< why it gave nothing; "" otherwise
+  /// The programs that it names, each with why it may run (ProgramList::Lines()).
+  std::vector<std::string> programs;
+  bool refused = false;  ///< because of them
 };
 
 /// Results of an archive that a repetition is judged by.
@@ -68,6 +72,7 @@ void VisitMembers(Visit& visit, typename Visit::template Of<PackedScenario>& sce
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<PackedRun>& run) {
   visit(run.scenario), visit(run.findings), visit(run.files), visit(run.failure);
+  visit(run.programs), visit(run.refused);
 }
 
 }  // namespace mbv

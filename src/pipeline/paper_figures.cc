@@ -32,7 +32,7 @@ class PaperMaker {
       : paper_(paper),
         options_(options),
         outcome_(*outcome),
-        runs_(outcome->model, paper, options.progress) {}
+        runs_(outcome->model, paper, options.programs, options.progress) {}
 
   void Make(const PaperEntry& entry) {
     PaperResult result;

@@ -97,6 +97,7 @@ const Report* PaperRuns::Run(const PlacedText& scenario, Diagnostics* diagnostic
   if (!added) return at->second ? &*at->second : nullptr;
   RunOptions options;
   options.pictures = options.page = false;
+  options.programs = programs_;
   options.progress = progress_;
   RunOutcome ran = RunScenario(file, options);
   exit_code_ = std::max(exit_code_, ran.exit_code);

@@ -15,8 +15,12 @@ namespace mbv {
 
 class PaperRuns {
  public:
-  PaperRuns(std::string model, const PaperFile& paper, ProgressFunction progress)
-      : model_(std::move(model)), paper_(paper), progress_(std::move(progress)) {}
+  PaperRuns(std::string model, const PaperFile& paper, ProgramConsent programs,
+            ProgressFunction progress)
+      : model_(std::move(model)),
+        paper_(paper),
+        programs_(std::move(programs)),
+        progress_(std::move(progress)) {}
 
   /// The run of an entry's scenario with what stands beside it. Of a stiffness: its loads in the
   /// place of samples, `load` (their number) and `displacement.x` … `rotation.z`. Empty after a
@@ -38,6 +42,7 @@ class PaperRuns {
 
   std::string model_;
   const PaperFile& paper_;
+  ProgramConsent programs_;
   ProgressFunction progress_;
   std::map<std::string, std::optional<Report>> runs_;  // by file
   std::optional<WorkspaceOutcome> workspace_;

@@ -77,11 +77,15 @@ Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Ove
 ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
                                 Diagnostics* diagnostics) {
   if (!scenario.analytic.on) return {nullptr, "switched off in the scenario"};
+  const WitnessGap asked =
+      scenario.analytic.stated ? WitnessGap::kNotApplicable : WitnessGap::kNone;
   if (scenario.motion.free()) {
-    return {nullptr, "closed forms give forces for a motion, not the motion for forces"};
+    return {nullptr, "closed forms give forces for a motion, not the motion for forces", asked};
   }
   const ClosedFormRow* row = FindClosedForm(mechanism.name);
-  if (row == nullptr) return {nullptr, "there are no closed-form equations for " + mechanism.name};
+  if (row == nullptr) {
+    return {nullptr, "there are no closed-form equations for " + mechanism.name, asked};
+  }
   const AnalyticSettings& settings = scenario.analytic;
   bool fits = true;
   if (!settings.model.empty() && !Contains(row->models, settings.model)) {
@@ -101,7 +105,7 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
   }
   if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
   if (std::string reason = Decline(scenario, mechanism, *row, diagnostics); !reason.empty()) {
-    return {nullptr, std::move(reason)};
+    return {nullptr, std::move(reason), WitnessGap::kNotApplicable};
   }
   Diagnostics found;
   auto closed_form =

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "analytic/closed_form.h"
+#include "comparison/comparison.h"
 #include "core/diagnostics.h"
 #include "core/roles.h"
 #include "mechanism/mechanism.h"
@@ -24,6 +25,8 @@ struct ClosedFormChoice {
   std::unique_ptr<ClosedForm> closed_form;
   std::string reason;  ///< not empty: switched off, or the mechanism has none, or it is outside
                        ///< what the equations cover
+  /// kNotApplicable where the scenario counts on one: it asks for it, or the mechanism has one.
+  WitnessGap gap = WitnessGap::kNone;
 };
 /// Unsuitable models, errata and commands are errors; what the equations do not cover of the
 /// mechanism and its loads is a warning each.

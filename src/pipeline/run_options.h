@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/diagnostics.h"
+#include "pipeline/program_consent.h"
 #include "pipeline/progress.h"
 #include "report/report.h"
 #include "scenario/figure_spec.h"
@@ -19,10 +20,11 @@ struct StiffnessReport;  // report/stiffness_report.h
 
 struct RunOptions {
   ScenarioOptions scenario;
-  std::string out_dir;   ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
-  bool pictures = true;  ///< needs out_dir
-  bool page = true;      ///< report.html; needs out_dir
-  bool timed = true;     ///< files tell how long it took: then no two runs write the same bytes
+  ProgramConsent programs;  ///< that it names
+  std::string out_dir;      ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
+  bool pictures = true;     ///< needs out_dir
+  bool page = true;         ///< report.html; needs out_dir
+  bool timed = true;        ///< files tell how long it took: then no two runs write the same bytes
   std::vector<std::string> data;  ///< words of data/data_file.h: traces in these formats, too
   std::string script_link;  ///< the page's script, relative to the result's folder; "": in the page
   /// Folder that the runs of one night share: each paper's equations are audited once for all their

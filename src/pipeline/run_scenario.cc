@@ -40,6 +40,11 @@ class ScenarioRun {
     const auto start = std::chrono::steady_clock::now();
     prepared_ = Prepare(file_, options_.scenario, &outcome_.diagnostics);
     if (!prepared_) return BadInput();
+    const ProgramList programs = ProgramsOf(scenario(), options_.programs.archived);
+    if (!options_.programs.Allows(programs)) {
+      outcome_.diagnostics.Add(Refusal(programs));
+      return BadInput();
+    }
     outcome_.figures = scenario().figures;
     Describe();
     RunWitnesses();

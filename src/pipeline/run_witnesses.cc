@@ -63,7 +63,7 @@ const WitnessRecord* WitnessRuns::Find(const Role& role) const {
 void WitnessRuns::HandOver(ComparisonInput* input) const {
   for (const WitnessRecord& record : records) {
     input->witnesses.push_back({record.name, record.trace.time_s.empty() ? nullptr : &record.trace,
-                                record.summary, record.foreign});
+                                record.summary, record.foreign, record.gap, record.required});
   }
   if (table) input->table = &*table;
   if (bent) input->bent = &*bent;
@@ -151,12 +151,16 @@ void WitnessRunner::Warn(const std::string& text) {
 
 void WitnessRunner::RunAnalytic() {
   if (!prepared_.has_closed_form()) {
-    return LeaveOut(role::kAnalytic, NotRun(prepared_.closed_form.reason));
+    LeaveOut(role::kAnalytic, NotRun(prepared_.closed_form.reason));
+    runs_.records.back().gap = prepared_.closed_form.gap;
+    runs_.records.back().required = scenario().analytic.required;
+    return;
   }
   ClosedFormRun run = RunClosedForm(prepared_.mechanisms.analytic, scenario().motion,
                                     prepared_.closed_form.closed_form.get());
   runs_.timing.analytic_s = run.summary.wall_s;
   Add(role::kAnalytic, std::move(run.summary), std::move(run.trace));
+  runs_.records.back().required = scenario().analytic.required;
 }
 
 // The generic solver, or a table in its place.

@@ -87,7 +87,7 @@ std::unique_ptr<StiffnessForm> MakeForm(const PreparedStiffness& prepared,
   return form;
 }
 
-void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
+void FindForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   const AnalyticSettings& settings = prepared->scenario.analytic;
   const StiffnessFormRow* row = FindStiffnessForm(prepared->base.name);
   if (!settings.on) {
@@ -122,6 +122,12 @@ void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   if (prepared->scenario.compare_printed && prepared->form != nullptr) {
     prepared->printed = MakeForm(*prepared, *row, kPrintedModel, diagnostics);
   }
+}
+
+void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
+  FindForms(prepared, diagnostics);
+  if (!prepared->scenario.analytic.required || prepared->form != nullptr) return;
+  diagnostics->AddError(prepared->scenario.file, "analytic.required: " + prepared->form_reason, "");
 }
 
 }  // namespace

@@ -81,8 +81,8 @@ bool RunMode(const std::string& scenario, const char* mode, double* nrmse, Surve
     const auto force = pair->metrics.find(Metric::kForceNrmse);
     if (force != pair->metrics.end()) *nrmse = force->second.value;
   }
-  for (const std::string& caveat : comparison.reservations) {
-    if (!Contains(row->caveats, caveat)) row->caveats.push_back(caveat);
+  for (const Caveat& caveat : comparison.caveats) {
+    if (!Contains(row->caveats, caveat.text)) row->caveats.push_back(caveat.text);
   }
   if (comparison.verdict == Verdict::kAgree) return true;
   row->status = comparison.verdict == Verdict::kDisagree ? "disagree" : "failed";
@@ -127,17 +127,6 @@ void Survey(const std::string& file, const std::string& scratch, SurveyRow* row)
     row->status = "ok";
     row->message = AllWarnings(made.diagnostics);
   }
-}
-
-std::string CsvField(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  if (text.find_first_of("\",") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (const char c : text) {
-    if (c == '"') quoted += '"';
-    quoted += c;
-  }
-  return quoted + "\"";
 }
 
 std::string Count(int n) { return n < 0 ? "" : fmt::format("{}", n); }
@@ -219,7 +208,7 @@ std::string SurveyCsv(const std::vector<SurveyRow>& rows) {
   for (const std::string& column : kSurveyColumns) text += (text.empty() ? "" : ",") + column;
   for (const SurveyRow& row : rows) {
     std::string line;
-    for (const std::string& field : Fields(row)) line += "," + CsvField(field);
+    for (const std::string& field : Fields(row)) line += "," + CsvCell(field);
     text += "\n" + line.substr(1);
   }
   return text + "\n";

@@ -169,6 +169,7 @@ TablesOutcome MakeTables(const std::string& file, const TablesOptions& options) 
   TablesOutcome outcome;
   RunOptions run;
   run.scenario = options.scenario;
+  run.programs = options.programs;
   run.pictures = run.page = false;
   run.progress = options.progress;
   const RunOutcome ran = RunScenario(file, run);

@@ -14,6 +14,7 @@ namespace mbv {
 
 struct TablesOptions {
   ScenarioOptions scenario;
+  ProgramConsent programs = {};                      ///< that it names
   std::vector<std::string> formats = {"tex", "md"};  ///< words of TableFormats()
   std::vector<std::string> only;                     ///< words of TableNames(); empty: all
   ProgressFunction progress;

@@ -71,6 +71,7 @@ class UpgradeRun {
     program.command = options_.command;
     if (!option.empty()) program.command.push_back(option);
     program.timeout_s = 600.0;
+    program.typed = true;
     return program;
   }
 
@@ -122,7 +123,9 @@ class UpgradeRun {
     std::string& trouble = report_.unavailable;
     trouble = call.Give("model.xml", survey.mjcf);
     if (trouble.empty()) trouble = call.Give("states.json", StatesJson(survey.driven, states));
-    if (trouble.empty()) trouble = call.Run();
+    if (trouble.empty()) {
+      if (const auto failure = call.Run()) trouble = failure->text;
+    }
     if (!trouble.empty()) return {};
     const auto witness = ReadAnswer(call.Text("witness.json").value_or(""), &trouble);
     if (witness) trouble = witness->refused;

@@ -257,13 +257,19 @@ class PackageVerifier {
                          (!packed.figures.empty() && path.starts_with(packed.figures + "/"));
       if (of_it) truth.files.push_back(path);
     }
-    PackedRun run = RunPacked(packed.file,
-                              {.folder = stage_.path(),
-                               .meshes = package().meshes,
-                               .page = package().page,
-                               .figures = !packed.figures.empty(),
-                               .programs = options_.trust},
-                              &truth);
+    PackedRunOptions options{.folder = stage_.path(),
+                             .meshes = package().meshes,
+                             .page = package().page,
+                             .figures = !packed.figures.empty(),
+                             .programs = {.all = options_.trust, .archived = true}};
+    PackedRun run = RunPacked(packed.file, options, &truth);
+    if (run.refused && options_.ask && options_.ask(packed.file, run.programs)) {
+      options.programs.all = true;
+      run = RunPacked(packed.file, options, &truth);
+    }
+    if (!run.refused && !run.programs.empty() && options_.show) {
+      options_.show(packed.file, run.programs);
+    }
     for (Finding& finding : run.findings) outcome_.diagnostics.Add(std::move(finding));
     if (!run.failure.empty() && run.scenario.exit_code == 3) outcome_.exit_code = 3;
     report_.scenarios.push_back({.file = packed.file,

@@ -1,8 +1,10 @@
 // `mbverify verify`: repeats the results of an archive (pipeline/package.h) on this machine.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/diagnostics.h"
 #include "pipeline/progress.h"
@@ -11,7 +13,12 @@
 namespace mbv {
 
 struct VerifyOptions {
+  using Programs = std::vector<std::string>;
   bool trust = false;  ///< run the programs that scenarios of the archive call
+  /// Is asked before, of a scenario and its programs, without `trust`; null: no.
+  std::function<bool(const std::string& scenario, const Programs& programs)> ask = {};
+  /// Is shown the programs of a scenario that ran.
+  std::function<void(const std::string& scenario, const Programs& programs)> show = {};
   ProgressFunction progress = {};
 };
 

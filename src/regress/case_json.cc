@@ -90,6 +90,7 @@ Json CaseJson(const CaseResult& result) {
   for (const Unmeasured& item : result.not_compared) {
     json["not_compared"].push_back({{"what", item.what}, {"why", item.why}});
   }
+  json["caveats"] = result.caveats;
   json["versions"] = result.versions;
   json["input_files"] = Json::array();
   for (const InputFile& input : result.input_files) {
@@ -138,6 +139,9 @@ CaseResult CaseOf(const JsonValue& json) {
   }
   for (const JsonValue& item : json.at("not_compared").list()) {
     result.not_compared.push_back({item.at("what"), item.at("why")});
+  }
+  if (json.contains("caveats")) {
+    result.caveats = json.at("caveats").get<std::vector<std::string>>();
   }
   result.versions = json.at("versions").get<std::map<std::string, std::string>>();
   if (json.contains("input_files")) {

@@ -90,6 +90,7 @@ struct CaseResult {
   bool verified = false;                       ///< verdict agree, as expected
   std::map<std::string, MetricValue> metrics;  ///< by check name
   std::vector<Unmeasured> not_compared;
+  std::vector<std::string> caveats;  ///< why its agreement says less than it seems to
   std::map<std::string, std::string> versions;
   bool has_folder = false;  ///< OUT/<key>/ holds a result
   bool has_report = false;  ///< and a report.html in it

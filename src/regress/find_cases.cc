@@ -40,6 +40,7 @@ std::string HeadJson(const std::string& file) {
   const Json json = {{"counts", head.is_scenario || head.is_study || NamesMechanism(text)},
                      {"study", head.is_study},
                      {"kind", head.kind},
+                     {"witnesses", head.has_witnesses},
                      {"mechanism", head.mechanism},
                      {"description", head.description},
                      {"verdict", head.expect.verdict},
@@ -66,6 +67,7 @@ Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
   head.is_study = json.value("study", false);
   head.is_scenario = found.counts && !head.is_study;
   head.kind = json.value("kind", "");
+  head.has_witnesses = json.value("witnesses", false);
   head.mechanism = json.value("mechanism", "");
   head.description = json.value("description", "");
   head.expect.verdict = json.value("verdict", "agree");

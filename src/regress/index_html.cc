@@ -95,6 +95,9 @@ std::string Notes(const CaseResult& result) {
   if (!result.failed() && !result.verified) {
     text += "<p class=\"soft\">" + EscapeXml(result.reason) + "</p>";
   }
+  for (const std::string& caveat : result.caveats) {
+    text += "<p class=\"warn\">caveat: " + EscapeXml(caveat) + "</p>";
+  }
   if (!result.not_compared.empty()) {
     text +=
         fmt::format("<details><summary>{} not compared</summary><ul>", result.not_compared.size());

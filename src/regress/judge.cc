@@ -67,6 +67,7 @@ SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
   for (const Json& item : Part(json, "not_compared")) {
     result->not_compared.push_back({Word(item, "what"), Word(item, "why")});
   }
+  for (const Json& caveat : Part(json, "caveats")) result->caveats.push_back(Word(caveat, "text"));
   const Json versions = Part(json, "versions");
   for (const auto& [name, version] : versions.items()) {
     if (version.is_string()) result->versions[name] = version;

@@ -55,6 +55,7 @@ std::string OutputOf(const CaseResult& result) {
     text += KeyTitle(result) + ": " + key + "\n";
   }
   if (!result.drifts.empty()) text += "drift: " + DriftLine(result) + "\n";
+  for (const std::string& caveat : result.caveats) text += "caveat: " + caveat + "\n";
   for (const Unmeasured& item : result.not_compared) {
     text += fmt::format("not compared: {}: {}\n", item.what, item.why);
   }

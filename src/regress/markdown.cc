@@ -19,8 +19,9 @@ std::string Plain(const std::string& text) {
 }
 
 // Job pages take 1 MiB in all (GitHub's limit of a step's summary): every part has its share.
-constexpr size_t kFailedBytes = 430'000, kDriftBytes = 130'000, kMissingBytes = 60'000,
-                 kNoteBytes = 30'000, kGapBytes = 90'000, kTableBytes = 240'000;
+constexpr size_t kFailedBytes = 400'000, kDriftBytes = 130'000, kMissingBytes = 60'000,
+                 kCaveatBytes = 30'000, kNoteBytes = 30'000, kGapBytes = 90'000,
+                 kTableBytes = 240'000;
 constexpr size_t kLineBytes = 2'000;
 
 // Lines up to a number of bytes; then how many are left out.
@@ -99,6 +100,17 @@ std::string Missing(const RegressReport& report) {
   return text.empty() ? "" : "\n### Missing\n\n" + text;
 }
 
+std::string Caveats(const RegressReport& report) {
+  Lines lines(kCaveatBytes, kMore);
+  for (const CaseResult& result : report.cases) {
+    for (const std::string& caveat : result.caveats) {
+      lines.Add(fmt::format("* **{}**: {}\n", Plain(result.key), Plain(caveat)));
+    }
+  }
+  const std::string text = lines.Text();
+  return text.empty() ? "" : "\n### Caveats\n\n" + text;
+}
+
 std::string NotCompared(const RegressReport& report) {
   Lines lines(kGapBytes, kMore);
   for (const CaseResult& result : report.cases) {
@@ -125,7 +137,7 @@ std::string ToMarkdown(const RegressReport& report) {
       Plain(report.run.program), report.run.label.empty() ? "" : ", " + Plain(report.run.label),
       report.run.shard.empty() ? "" : ", shard " + report.run.shard,
       report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
-  text += Failed(report) + Missing(report) + Drifted(report);
+  text += Failed(report) + Missing(report) + Drifted(report) + Caveats(report);
   Lines notes(kNoteBytes, "\nNote: and {} more\n");
   for (const std::string& note : report.notes) notes.Add("\nNote: " + Plain(note) + "\n");
   text += notes.Text() + NotCompared(report);

@@ -5,6 +5,7 @@
 #include <set>
 
 #include "core/json_text.h"
+#include "core/text.h"
 #include "regress/history.h"
 #include "regress/history_schema.h"
 #include "regress/missing.h"
@@ -90,13 +91,6 @@ Json ComparedJson(Database* database, const std::string& key, const HistoryRow* 
   return json;
 }
 
-std::string CsvText(const std::string& text) {
-  if (text.find_first_of(",\"\n") == std::string::npos) return text;
-  std::string quoted = "\"";
-  for (char c : text) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);
-  return quoted + "\"";
-}
-
 std::string CsvNumber(double value) {
   return std::isnan(value) ? "" : fmt::format("{:.17g}", value);
 }
@@ -179,13 +173,14 @@ HistoryText HistoryCsv(const std::string& path) {
                    "ORDER BY u.id, s.key, m.name");
   while (select.Step()) {
     const bool metric = !select.Text(11).empty();
-    text += fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", select.Integer(0),
-                        select.Text(1), CsvText(select.Text(2)), CsvText(select.Text(3)),
-                        CsvText(select.Text(4)), select.Text(5), select.Text(6), select.Integer(7),
-                        CsvNumber(select.Real(8)), CsvNumber(select.Real(9)), select.Integer(10),
-                        select.Text(11), CsvNumber(select.Real(12)), CsvNumber(select.Real(13)),
-                        metric ? fmt::format("{}", select.Integer(14)) : "",
-                        metric ? fmt::format("{}", select.Integer(15)) : "");
+    text +=
+        fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", select.Integer(0),
+                    CsvCell(select.Text(1)), CsvCell(select.Text(2)), CsvCell(select.Text(3)),
+                    CsvCell(select.Text(4)), CsvCell(select.Text(5)), CsvCell(select.Text(6)),
+                    select.Integer(7), CsvNumber(select.Real(8)), CsvNumber(select.Real(9)),
+                    select.Integer(10), CsvCell(select.Text(11)), CsvNumber(select.Real(12)),
+                    CsvNumber(select.Real(13)), metric ? fmt::format("{}", select.Integer(14)) : "",
+                    metric ? fmt::format("{}", select.Integer(15)) : "");
   }
   return {text, database.trouble()};
 }

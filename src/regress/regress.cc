@@ -183,7 +183,7 @@ class Run {
       const bool study = cases_[i].head.is_study;
       job.argv.insert(job.argv.end(), {study ? "study" : "run", cases_[i].file, "--out",
                                        folder_.Staging(i).string()});
-      const std::vector<std::string> rest = study ? kStudyWords : RunWords(cases_[i].key);
+      const std::vector<std::string> rest = study ? kStudyWords : RunWords(cases_[i]);
       job.argv.insert(job.argv.end(), rest.begin(), rest.end());
       jobs.push_back(std::move(job));
     }
@@ -200,10 +200,14 @@ class Run {
   }
 
   // Of `mbverify run`, besides what is run and where to.
-  std::vector<std::string> RunWords(const std::string& key) const {
+  std::vector<std::string> RunWords(const CaseFile& file) const {
     std::vector<std::string> words = {"--kept-audits", folder_.Shared().string()};
+    const auto agreed = options_.agreed_programs.find(file.file);
+    if (agreed != options_.agreed_programs.end()) {
+      words.insert(words.end(), {"--agreed-programs", agreed->second});
+    }
     if (!options_.pictures) words.emplace_back("--no-pictures");
-    for (const std::string& word : WorkerOptions(key)) words.push_back(word);
+    for (const std::string& word : WorkerOptions(file.key)) words.push_back(word);
     return words;
   }
 

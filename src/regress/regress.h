@@ -37,6 +37,8 @@ struct RegressOptions {
   std::vector<std::string> worker = {"/proc/self/exe"};
   /// "{up}" in them is the way from a result's folder to OUT.
   std::vector<std::string> worker_options;
+  /// By scenario file: the fingerprint of its programs, which its worker may run.
+  std::map<std::string, std::string> agreed_programs = {};
   std::map<std::string, std::string> shared_files;   ///< further files in OUT: content by name
   const volatile std::sig_atomic_t* stop = nullptr;  ///< not 0: stop the workers and return
 };

@@ -8,6 +8,7 @@
 #include "comparison/metric_value.h"
 #include "comparison/verdict.h"
 #include "core/json_text.h"
+#include "core/text.h"
 #include "report/html_text.h"
 #include "report/page.h"
 #include "report/text_table.h"
@@ -173,12 +174,10 @@ std::string ToCsv(const Rows& rows) {
   std::string text =
       "mechanism,scenario,engine,program,force_nrmse,pose_m,loop_gap_m,sample_us,why\n";
   for (const CrosscheckRow& row : rows) {
-    std::string why = row.why;
-    for (size_t at = 0; (at = why.find('"', at)) != std::string::npos; at += 2)
-      why.insert(at, "\"");
-    text += fmt::format("{},{},\"{}\",\"{}\",{:.17g},{:.17g},{:.17g},{:.17g},\"{}\"\n",
-                        row.mechanism, row.scenario, row.engine, row.program, row.force_nrmse,
-                        row.pose_m, row.loop_gap_m, row.sample_us, why);
+    text +=
+        fmt::format("{},{},{},{},{:.17g},{:.17g},{:.17g},{:.17g},{}\n", CsvCell(row.mechanism),
+                    CsvCell(row.scenario), CsvCell(row.engine), CsvCell(row.program),
+                    row.force_nrmse, row.pose_m, row.loop_gap_m, row.sample_us, CsvCell(row.why));
   }
   return text;
 }

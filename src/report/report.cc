@@ -106,7 +106,7 @@ std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& 
 ResultView ViewOf(const Report& report) {
   const Comparison& comparison = report.comparison;
   ResultView view = ViewOfComparison(report, comparison);
-  view.reservations = comparison.reservations;
+  view.caveats = comparison.caveats;
   for (const CheckResult& check : comparison.checks) {
     const MetricRow& row = RowOf(check.metric);
     view.checks.push_back(

@@ -27,6 +27,8 @@ struct WitnessRecord {
   RunSummary summary;                            ///< kNotRun with the reason if it was switched off
   Trace trace;                                   ///< empty if it did not run
   std::optional<Witness::Foreign> foreign = {};  ///< of a program outside
+  WitnessGap gap = WitnessGap::kNone;            ///< why it gave nothing though it was asked
+  bool required = false;                         ///< by the scenario
 };
 
 /// One engine's error against the truth that all are judged by.

@@ -83,7 +83,7 @@ struct ResultView {
 
   Verdict verdict = Verdict::kNotRun;
   std::string reason = {};
-  std::optional<std::vector<std::string>> reservations = {};  ///< empty: the kind knows none
+  std::optional<std::vector<Caveat>> caveats = {};  ///< empty: the kind knows none
   Attribution attribution = {};
   std::vector<ShownCheck> checks = {};  ///< off ones included
   std::vector<NotCompared> not_compared = {};

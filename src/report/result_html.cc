@@ -76,8 +76,9 @@ std::string VerdictHtml(const ResultView& view, const std::string& cards,
     return Escape(view.look.capitals ? Sentence(text) : text + ".");
   };
   std::string html = "<p class=\"reason\">" + sentence(view.reason) + "</p>\n";
-  for (const std::string& text : view.reservations.value_or(std::vector<std::string>{})) {
-    html += "<p class=\"reason\">" + Pill("warn", "reservation") + " " + sentence(text) + "</p>\n";
+  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+    html +=
+        "<p class=\"reason\">" + Pill("warn", "caveat") + " " + sentence(caveat.text) + "</p>\n";
   }
   if (!view.attribution.text.empty()) {
     html += fmt::format("<p class=\"attribution{}\">{}</p>\n",

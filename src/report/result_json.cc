@@ -39,6 +39,20 @@ Json ChecksOffJson(const ResultView& view) {
   return checks;
 }
 
+// As texts, as ever, and as values.
+void AddCaveats(const std::vector<Caveat>& caveats, Json* json) {
+  Json texts = Json::array(), values = Json::array();
+  for (const Caveat& caveat : caveats) {
+    texts.push_back(caveat.text);
+    Json value = {{"kind", ToText(caveat.kind)}, {"of", caveat.of}};
+    if (caveat.gap != WitnessGap::kNone) value["cause"] = ToText(caveat.gap);
+    value["text"] = caveat.text;
+    values.push_back(std::move(value));
+  }
+  (*json)["reservations"] = std::move(texts);
+  (*json)["caveats"] = std::move(values);
+}
+
 Json TimingJson(const ResultView& view) {
   const Timing& timing = view.frame->timing;
   Json times = {{"analytic_s", timing.analytic_s},
@@ -87,7 +101,7 @@ Json SummaryHead(const ResultView& view) {
   json["verdict"] = ToText(view.verdict);
   json["reason"] = view.reason;
   json["exit_code"] = frame.exit_code;
-  if (view.reservations) json["reservations"] = *view.reservations;
+  if (view.caveats) AddCaveats(*view.caveats, &json);
   json["attribution"] = AttributionJson(view.attribution);
   json["checks"] = ChecksJson(view);
   json["checks_off"] = ChecksOffJson(view);

@@ -41,8 +41,8 @@ void TerminalText::Head(const ResultView& view, const std::string& title,
     if (!line.empty()) Line("  " + line);
   }
   Line("  " + view.reason);
-  for (const std::string& text : view.reservations.value_or(std::vector<std::string>{})) {
-    Line("  " + Painted("reservation", Paint::kDoubt) + ": " + text);
+  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+    Line("  " + Painted("caveat", Paint::kDoubt) + ": " + caveat.text);
   }
   if (!view.attribution.text.empty()) Line("  " + view.attribution.text);
   for (const Finding& finding : view.frame->findings.findings()) Line("  " + ToText(finding));
@@ -161,8 +161,8 @@ std::string VerdictLine(const ResultView& view, const TableOptions& options) {
   }
   if (check != nullptr && check->floored) line += " floored";
   if (view.verdict != Verdict::kAgree) line += "  " + view.reason;
-  for (const std::string& text : view.reservations.value_or(std::vector<std::string>{})) {
-    line += "; reservation: " + text;
+  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+    line += "; caveat: " + caveat.text;
   }
   return line + "\n";
 }

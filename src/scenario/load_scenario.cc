@@ -412,6 +412,8 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
   head.mechanism = word("mechanism");
   head.description = word("description");
   head.is_scenario = head.is_scenario || root->Find("mechanism") != nullptr;
+  const YamlNode* witnesses = root->Find("witnesses");
+  head.has_witnesses = witnesses != nullptr && witnesses->is_map();
   head.is_study = !head.is_scenario && root->Find("study") != nullptr;
   if (const YamlNode* expect = root->Find("expect")) head.expect = ReadExpectation(&values, expect);
   return head;

@@ -42,9 +42,10 @@ struct ScenarioResult {
 /// Only the mechanism name, description and `expect:` of a file, even if the rest is wrong. A file
 /// that is no YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
-  bool is_scenario = false;  ///< has a `mechanism:` key (or an expectation)
-  bool is_study = false;     ///< has a `study:` key instead (scenario/study_file.h)
-  std::string kind;          ///< "motion", "stiffness"; "" means motion
+  bool is_scenario = false;    ///< has a `mechanism:` key (or an expectation)
+  bool is_study = false;       ///< has a `study:` key instead (scenario/study_file.h)
+  bool has_witnesses = false;  ///< names programs (scenario/witness_reader.h)
+  std::string kind;            ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;
 

@@ -25,6 +25,8 @@ struct ReferenceTable;  // table/table.h
 /// The closed form's part in a scenario.
 struct AnalyticSettings {
   bool on = true;                       ///< false: `analytic: none`
+  bool stated = false;                  ///< the file asks for it
+  bool required = false;                ///< without it there is no verdict
   std::string model;                    ///< formulation; "" is the mechanism's default
   std::vector<std::string> as_printed;  ///< errata left uncorrected on purpose
   Overrides parameters;                 ///< bend this witness only
@@ -90,7 +92,10 @@ struct ForeignWitness {
   std::vector<std::string> command;              ///< program and arguments; not empty
   LimitColumn limits = LimitColumn::kReference;  ///< that it is judged by
   std::optional<double> force_nrmse;             ///< > 0, instead of that limit of drive forces
+  bool required = false;                         ///< without it there is no verdict
   double timeout_s = 60.0, memory_mb = 4000.0, output_mb = 500.0;  ///< > 0
+  bool typed = false;  ///< the command is the user's, of an option
+  int line = 0;        ///< of the command in the file; 0: unknown
 };
 
 struct CameraSettings {

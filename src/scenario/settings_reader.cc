@@ -72,11 +72,15 @@ AnalyticSettings ReadAnalytic(ValueReader* values, const YamlNode* node) {
   AnalyticSettings settings;
   if (node == nullptr || node->is_null()) return settings;
   if (const auto on = AsSwitch(*node)) {
-    settings.on = *on;
+    settings.on = settings.stated = *on;
     return settings;
   }
+  settings.stated = true;
   YamlReader& yaml = values->yaml();
-  YamlMap map(&yaml, node, "analytic", {"model", "as_printed", "parameters"});
+  YamlMap map(&yaml, node, "analytic", {"model", "as_printed", "parameters", "required"});
+  if (const YamlNode* flag = map.Find("required")) {
+    settings.required = yaml.Flag(*flag, "analytic.required").value_or(false);
+  }
   if (const YamlNode* model = map.Find("model")) {
     settings.model = yaml.Text(*model, "analytic.model").value_or("");
   }

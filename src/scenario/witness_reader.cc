@@ -31,8 +31,9 @@ class WitnessReader {
   std::optional<ForeignWitness> Read(const YamlEntry& entry) {
     const std::string path = JoinPath("witnesses", entry.key);
     if (!CheckName(entry, path)) return {};
-    const YamlMap map(&yaml_, entry.value.get(), path,
-                      {"command", "limits", "force_nrmse", "timeout_s", "memory_mb", "output_mb"});
+    const YamlMap map(
+        &yaml_, entry.value.get(), path,
+        {"command", "limits", "force_nrmse", "required", "timeout_s", "memory_mb", "output_mb"});
     const YamlNode* command = map.valid() ? map.Required("command") : nullptr;
     if (command == nullptr) return {};
     ForeignWitness witness;
@@ -45,6 +46,8 @@ class WitnessReader {
       if (!text) return {};
       witness.command.push_back(Found(*text));
     }
+    witness.typed = std::ranges::all_of(*words, [](const auto* word) { return word->line < 0; });
+    witness.line = std::max(0, command->line);
     ReadLimits(map, &witness);
     return witness;
   }
@@ -76,6 +79,9 @@ class WitnessReader {
     }
     if (const YamlNode* node = map.Find("force_nrmse")) {
       witness->force_nrmse = values_->Positive(*node, map.PathOf("force_nrmse"));
+    }
+    if (const YamlNode* node = map.Find("required")) {
+      witness->required = yaml_.Flag(*node, map.PathOf("required")).value_or(false);
     }
     const std::pair<const char*, double*> amounts[] = {{"timeout_s", &witness->timeout_s},
                                                        {"memory_mb", &witness->memory_mb},

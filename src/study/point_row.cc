@@ -6,22 +6,13 @@
 #include <charconv>
 #include <cmath>
 
+#include "core/text.h"
 #include "core/types.h"
 
 namespace mbv {
 namespace {
 
 // In quotes where a comma or a quote would be mistaken; lines stay lines.
-std::string CsvField(std::string text) {
-  for (char& c : text) {
-    if (c == '\n' || c == '\r') c = ' ';
-  }
-  if (text.find_first_of(",\"") == std::string::npos) return text;
-  for (size_t at = 0; (at = text.find('"', at)) != std::string::npos; at += 2)
-    text.insert(at, "\"");
-  return "\"" + text + "\"";
-}
-
 std::string NumberField(double value) {
   return std::isfinite(value) ? fmt::format("{:.17g}", value) : "";
 }
@@ -74,14 +65,14 @@ bool TakeNumbers(std::string_view* line, bool* more, size_t count, std::vector<d
 
 std::string PointHeader(const Study& study) {
   std::string text = "point,seed,exit,reason";
-  for (const Factor& factor : study.factors) text += "," + CsvField(factor.name);
-  for (const StudyQuantity& quantity : study.quantities) text += "," + CsvField(quantity.name);
+  for (const Factor& factor : study.factors) text += "," + CsvCell(factor.name);
+  for (const StudyQuantity& quantity : study.quantities) text += "," + CsvCell(quantity.name);
   return text + "\n";
 }
 
 std::string PointLine(const PointRow& row, const Study& study) {
   std::string text =
-      fmt::format("{},{},{},{}", row.point, study.design.seed, row.exit_code, CsvField(row.reason));
+      fmt::format("{},{},{},{}", row.point, study.design.seed, row.exit_code, CsvCell(row.reason));
   for (const double value : row.varied) text += "," + NumberField(value);
   for (const double value : row.values) text += "," + NumberField(value);
   return text + "\n";

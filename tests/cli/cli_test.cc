@@ -388,5 +388,166 @@ TEST_F(CliTest, RegressShowsALiveTableOnATerminal) {
   EXPECT_EQ(plain.err.find("running"), std::string::npos) << plain.err;
 }
 
+// A scenario of somebody else, whose program leaves a file.
+class TheirProgram {
+ public:
+  explicit TheirProgram(const std::string& name) : mbverify_("trust_" + name) {
+    const fs::path theirs = mbverify_.folder() / "theirs";
+    fs::create_directories(theirs);
+    fs::copy_file(std::string(kSourceDir) + "/models/slider_crank/model.yaml",
+                  theirs / "model.yaml");
+    std::ofstream(theirs / "case.yaml")
+        << "mechanism: ./model.yaml\n"
+        << "motion: {duration_s: 0.02, sample_s: 0.01, commands: {motor: [home, {ramp: {rate: "
+           "3}}]}}\n"
+        << "simulation: {mode: inverse}\nwitnesses: {there: {command: [python3, there.py]}}\n";
+    std::ofstream(theirs / "there.py") << "open('" << Ran() << "', 'w')\n";
+  }
+  [[nodiscard]] std::string Ran() const { return (mbverify_.folder() / "ran").string(); }
+  [[nodiscard]] std::string Folder() const { return (mbverify_.folder() / "theirs").string(); }
+  // The program, with a configuration of its own; "CASE" is the scenario, "OUT" a folder.
+  ProgramResult operator()(std::string words, const std::string& input = "") const {
+    for (const auto& [word, path] :
+         {std::pair<std::string, std::string>{"CASE", Folder() + "/case.yaml"},
+          {"OUT", mbverify_.Out()}}) {
+      for (size_t at = 0; (at = words.find(word, at)) != std::string::npos; at += path.size()) {
+        words.replace(at, word.size(), path);
+      }
+    }
+    fs::remove(Ran());
+    const std::string set =
+        "export NO_COLOR=1 XDG_CONFIG_HOME=" + (mbverify_.folder() / "config").string() +
+        " mbverify; ";
+    if (input.empty()) return mbverify_.Script(set + "\"$mbverify\" " + words + " </dev/null");
+    return mbverify_.Script(set + "printf '" + input +
+                            "' | script --quiet --return --command \"'$mbverify' " + words +
+                            "\" /dev/null");
+  }
+  [[nodiscard]] bool ran() const { return fs::exists(Ran()); }
+
+ private:
+  Program mbverify_;
+};
+
+// Every command that runs scenarios.
+const char* const kRunningCommands[] = {"run CASE --no-pictures --no-report --out OUT",
+                                        "run CASE -q --no-pictures --no-report --out OUT",
+                                        "regress CASE --no-pictures --no-reports --out OUT/night",
+                                        "figures CASE --formats svg --out OUT",
+                                        "tables CASE --out OUT",
+                                        "size CASE",
+                                        "package CASE --no-report --no-figures -o OUT.zip"};
+
+TEST(TrustCommand, ProgramsOfOthersDoNotRunUnasked) {
+  const TheirProgram theirs("unasked");
+  for (const char* command : kRunningCommands) {
+    const ProgramResult refused = theirs(command);
+    EXPECT_EQ(refused.exit_code, 2) << command << refused.out;
+    EXPECT_FALSE(theirs.ran()) << command;
+    for (const char* told :
+         {"case.yaml:4", "its programs may not run as you: there: /",
+          "theirs/there.py (no folder above it is trusted)", "--trust", "mbverify trust "}) {
+      EXPECT_NE(refused.err.find(told), std::string::npos) << command << told << refused.err;
+    }
+  }
+  // Those that run no programs go on.
+  for (const char* command :
+       {"render CASE --out OUT/pictures --time 0", "mutate CASE --no-search", "converge CASE"}) {
+    const ProgramResult other = theirs(command);
+    EXPECT_EQ(other.err.find("may not run as you"), std::string::npos) << command << other.err;
+    EXPECT_FALSE(theirs.ran()) << command;
+  }
+  const ProgramResult checked = theirs("check CASE --json OUT.json");
+  EXPECT_EQ(checked.exit_code, 0) << checked.out;
+  EXPECT_FALSE(theirs.ran());
+  EXPECT_NE(checked.out.find("theirs/there.py (not trusted: no folder above it is trusted)"),
+            std::string::npos)
+      << checked.out;
+}
+
+TEST(TrustCommand, TrustOfARunOrOfAFolderLetsThemRun) {
+  const TheirProgram theirs("trusted");
+  for (const char* command : kRunningCommands) {
+    const ProgramResult trusted = theirs(std::string(command) + " --trust --force");
+    if (std::string(command).starts_with("package")) {
+      EXPECT_TRUE(theirs.ran()) << command << trusted.err;
+    }
+    const ProgramResult run = theirs(std::string(command) + " --trust");
+    if (!std::string(command).starts_with("package")) {
+      EXPECT_TRUE(theirs.ran()) << command << run.err;
+    }
+  }
+  EXPECT_FALSE((theirs("run CASE --out OUT --no-report"), theirs.ran()));
+  EXPECT_EQ(theirs("trust " + theirs.Folder()).exit_code, 0);
+  EXPECT_EQ(theirs("trust").out, fs::canonical(theirs.Folder()).string() + "\n");
+  const ProgramResult run = theirs("run CASE --out OUT --no-report");
+  EXPECT_TRUE(theirs.ran()) << run.err;
+  EXPECT_NE(run.err.find("case.yaml runs programs as you:"), std::string::npos) << run.err;
+  EXPECT_NE(run.err.find("there.py (in a trusted folder)"), std::string::npos) << run.err;
+  EXPECT_NE(run.out.find("caveat: without the witness there"), std::string::npos) << run.out;
+  theirs("regress CASE --no-pictures --no-reports --out OUT/night");
+  EXPECT_TRUE(theirs.ran());
+  EXPECT_EQ(theirs("trust --remove " + theirs.Folder()).exit_code, 0);
+  EXPECT_EQ(theirs("trust").out, "");
+  EXPECT_EQ(theirs("run CASE --out OUT --no-report").exit_code, 2);
+  EXPECT_EQ(theirs("trust /nowhere/at/all").exit_code, 2);
+}
+
+TEST(TrustCommand, AtATerminalTheUserIsAsked) {
+  const TheirProgram theirs("asked");
+  const std::string run = "run CASE --out OUT --no-report --no-pictures";
+  for (const char* no : {"\\n", "n\\n", "x\\n"}) {
+    const ProgramResult refused = theirs(run, no);
+    EXPECT_EQ(refused.exit_code, 2) << refused.out;
+    EXPECT_NE(refused.out.find("Run them?"), std::string::npos) << refused.out;
+    EXPECT_FALSE(theirs.ran()) << no;
+  }
+  EXPECT_TRUE((theirs(run, "y\\n"), theirs.ran()));
+  EXPECT_FALSE((theirs(run), theirs.ran()));  // this time means this time
+  EXPECT_TRUE((theirs(run, "f\\n"), theirs.ran()));
+  EXPECT_TRUE((theirs(run), theirs.ran()));
+}
+
+// Names and values of others: nothing that a terminal obeys, nothing endless.
+TEST(Terminal, GetsNoEscapesAndNoEndlessValuesOfOthers) {
+  const TheirProgram theirs("escapes");
+  std::ofstream(theirs.Folder() + "/there.py")
+      << "import json\nrows = [line.split(',')[0] for line in open('motion.csv')][1:]\n"
+      << "open('traces.csv', 'w').write('time_s,motor.force\\n' + ''.join(t + ',0\\n' for t in "
+         "rows))\n"
+      << "json.dump({'schema': 'mbverify/witness/1', 'units': 'SI', 'program': "
+         "'a\\x1b]0;title\\x07\\u202e\\rb', 'version': '1' * 20000}, open('witness.json', 'w'))\n";
+  const ProgramResult loud = theirs("run CASE --trust --out OUT --no-report --no-pictures -v");
+  EXPECT_NE(loud.out.find(R"(a\x1b]0;title\x07\u202e\x0db)"), std::string::npos) << loud.out;
+  EXPECT_EQ(loud.out.find(std::string(300, '1')), std::string::npos);
+  const ProgramResult label = theirs(
+      "regress CASE --trust --no-pictures --no-reports --out OUT/night --label "
+      "\"$(printf '=cmd|A1\\033[2J')\"");
+  EXPECT_TRUE(fs::exists(theirs.Ran()) || label.exit_code < 2) << label.err;
+  const std::string history = "--history OUT/night/history.sqlite";
+  const ProgramResult list = theirs("history list " + history);
+  EXPECT_NE(list.out.find(R"(=cmd|A1\x1b[2J)"), std::string::npos) << list.out;
+  const ProgramResult csv = theirs("history export " + history);
+  EXPECT_NE(csv.out.find(",'=cmd|A1"), std::string::npos) << csv.out;
+  for (const ProgramResult& result : {loud, label, list, csv}) {
+    EXPECT_EQ((result.out + result.err).find_first_of("\x1b\x07"), std::string::npos);
+  }
+  const ProgramResult range = theirs("regress CASE --timeout -1");
+  EXPECT_EQ(range.exit_code, 2);
+  EXPECT_NE(range.err.find("'-1' violates > 0"), std::string::npos) << range.err;
+  const std::string endless(20000, 'q');
+  for (const std::string& words :
+       {"run CASE --set simulation.mode=" + endless, "run CASE --set " + endless + "=1",
+        "run " + endless, "run CASE --mode " + endless, "regress CASE --timeout " + endless,
+        "run CASE --" + endless, endless, "regress CASE --shard " + endless,
+        "mutate CASE --size " + endless, "package CASE -o OUT.zip --date " + endless,
+        "verify " + endless, "run CASE --set " + endless, "trust " + endless, "merge " + endless,
+        "history list --history " + endless, "model " + endless}) {
+    const ProgramResult refused = theirs(words);
+    EXPECT_EQ(refused.exit_code, 2) << words.substr(0, 40);
+    EXPECT_LT((refused.out + refused.err).size(), 6000U) << words.substr(0, 40);
+  }
+}
+
 }  // namespace
 }  // namespace mbv

@@ -35,6 +35,10 @@ def scaled(text, column, factor):
 def make_honest():
     manifest = json.loads(files[folder + 'manifest.json'])
     manifest['files'] = [entry for entry in manifest['files'] if folder + entry['path'] in files]
+    listed = {folder + entry['path'] for entry in manifest['files']}
+    for name in files:
+        if name not in listed and name != folder + 'manifest.json':
+            manifest['files'].append({'path': name[len(folder):], 'role': 'result'})
     for entry in manifest['files']:
         content = files[folder + entry['path']]
         entry['bytes'], entry['sha256'] = len(content), hashlib.sha256(content).hexdigest()

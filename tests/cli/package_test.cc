@@ -344,8 +344,30 @@ TEST(VerifyCommand, ProgramsOfStrangersRunOnlyWhereTheyAreTrusted) {
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
   const ProgramResult refused = packed.Verify("");
   EXPECT_EQ(refused.exit_code, 2);
-  EXPECT_TRUE(Has(refused.err, "calls programs (planar: python3")) << refused.err;
-  EXPECT_EQ(packed.Verify("--trust").exit_code, 0);
+  EXPECT_TRUE(Has(refused.err, "calls programs (planar: /")) << refused.err;
+  EXPECT_TRUE(Has(refused.err, "not trusted: it comes from an archive")) << refused.err;
+  const ProgramResult trusted = packed.Verify("--trust");
+  EXPECT_EQ(trusted.exit_code, 0);
+  EXPECT_TRUE(Has(trusted.err, "foreign.yaml runs programs as you")) << trusted.err;
+  // A folder that is trusted says nothing of what is unpacked below it.
+  const std::string folder = packed.program().folder().string();
+  const ProgramResult below = packed.program().Script(
+      "export XDG_CONFIG_HOME=" + folder + "/config TMPDIR=" + folder + " && \"$mbverify\" trust " +
+      folder + " && \"$mbverify\" verify " + packed.Zip());
+  EXPECT_EQ(below.exit_code, 2) << below.err;
+}
+
+// An archive may hold more than it is made of, and its manifest may name it.
+TEST(VerifyCommand, ASurplusResultIsTold) {
+  const Packed packed = FourBar("surplus");
+  ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
+  const ProgramResult more = packed.Edited("add RESULTS/more.csv honest");
+  EXPECT_EQ(more.exit_code, 1) << more.out << more.err;
+  EXPECT_TRUE(Has(more.out, "results/four_bar/turn_inverse/more.csv")) << more.out;
+  EXPECT_TRUE(Has(more.out, "is in the archive and is not made any more")) << more.out;
+  const ProgramResult less = packed.Edited("drop RESULTS/model.xml honest");
+  EXPECT_EQ(less.exit_code, 1) << less.out << less.err;
+  EXPECT_TRUE(Has(less.out, "is made, but is not in the archive")) << less.out;
 }
 
 TEST(VerifyCommand, FilesOutsideOfTheArchiveAreNotRead) {

@@ -43,7 +43,7 @@ TEST(Comparison, EqualWitnessesAgreeInEveryCheck) {
   EXPECT_EQ(comparison.failed(), 0u);
   // Per pair: three force, one position, velocity, acceleration, two pose, two reaction.
   EXPECT_EQ(comparison.checks.size(), 3u * 10u + 2u * 5u + 4u);
-  EXPECT_TRUE(comparison.reservations.empty()) << comparison.reservations.front();
+  EXPECT_TRUE(comparison.caveats.empty()) << comparison.caveats.front().text;
   EXPECT_TRUE(comparison.attribution.odd_one_out.empty());
 }
 

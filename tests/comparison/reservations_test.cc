@@ -12,9 +12,9 @@ using synthetic::Bend;
 using synthetic::Case;
 using synthetic::Stretch;
 
-bool Has(const std::vector<std::string>& sentences, const std::string& part) {
-  for (const std::string& sentence : sentences) {
-    if (sentence.find(part) != std::string::npos) return true;
+bool Has(const std::vector<Caveat>& caveats, const std::string& part) {
+  for (const Caveat& caveat : caveats) {
+    if (caveat.text.find(part) != std::string::npos) return true;
   }
   return false;
 }
@@ -44,11 +44,11 @@ TEST(Reservations, OneWideLimitIsNamedAndNotCountedAsVerified) {
   EXPECT_EQ(comparison.verified(), all - 6);
   EXPECT_EQ(comparison.blind(), 6u);
   EXPECT_NE(comparison.reason.find("6 more verify nothing"), std::string::npos);
-  EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.reaction_nrmse (0.2)"));
-  EXPECT_TRUE(Has(comparison.reservations, "simulated_vs_analytic.pose_m (0.2 m)"));
+  EXPECT_TRUE(Has(comparison.caveats, "simulated_vs_analytic.reaction_nrmse (0.2)"));
+  EXPECT_TRUE(Has(comparison.caveats, "simulated_vs_analytic.pose_m (0.2 m)"));
   Widen(&c, Metric::kReaction, 0.1);
   Widen(&c, Metric::kPoseM, 0.1);
-  EXPECT_TRUE(c.Run().reservations.empty());
+  EXPECT_TRUE(c.Run().caveats.empty());
 }
 
 TEST(Reservations, AWideLimitThatIsExceededStillDisagrees) {
@@ -67,9 +67,9 @@ TEST(Reservations, AStartWindowThatLeavesOneSampleVerifiesNothing) {
   EXPECT_NE(c.Run().reason.find("leaves 1 sample to judge"), std::string::npos) << c.Run().reason;
   c.start_window_s = 0.5;
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
-  EXPECT_TRUE(Has(c.Run().reservations, "judged from 0.5 to 1 s only, in a motion of 1 s"));
+  EXPECT_TRUE(Has(c.Run().caveats, "judged from 0.5 to 1 s only, in a motion of 1 s"));
   c.start_window_s = 0.02;
-  EXPECT_TRUE(c.Run().reservations.empty());
+  EXPECT_TRUE(c.Run().caveats.empty());
 }
 
 // The traces shortened to `rows`.
@@ -85,12 +85,12 @@ Case Short(Eigen::Index rows) {
 
 TEST(Reservations, FewSamplesAndTheDerivativesTheyDoNotAllowAreSaid) {
   const Comparison seven = Short(7).Run();
-  EXPECT_TRUE(seven.reservations.empty()) << seven.reservations.front();
+  EXPECT_TRUE(seven.caveats.empty()) << seven.caveats.front().text;
   const Comparison six = Short(6).Run();
   EXPECT_EQ(six.verdict, Verdict::kAgree);
-  EXPECT_TRUE(Has(six.reservations, "rates were not checked against positions: 6 samples"));
-  EXPECT_FALSE(Has(six.reservations, "forces were judged at"));
-  EXPECT_TRUE(Has(Short(2).Run().reservations, "forces were judged at 2 samples only"));
+  EXPECT_TRUE(Has(six.caveats, "rates were not checked against positions: 6 samples"));
+  EXPECT_FALSE(Has(six.caveats, "forces were judged at"));
+  EXPECT_TRUE(Has(Short(2).Run().caveats, "forces were judged at 2 samples only"));
 }
 
 // At rest, without gravity: forces are zero whatever the masses are.
@@ -128,7 +128,7 @@ TEST(Reservations, ForcesThatCancelOutAgreeWithAReservation) {
     Stretch(trace, "d2.force", 0.0);
   }
   EXPECT_EQ(c.Run().verdict, Verdict::kAgree);
-  EXPECT_TRUE(Has(c.Run().reservations, "verified is only that they cancel out"));
+  EXPECT_TRUE(Has(c.Run().caveats, "verified is only that they cancel out"));
 }
 
 }  // namespace

@@ -79,8 +79,8 @@ bool Says(const Comparison& comparison, const std::string& text) {
 }
 
 bool Reserves(const Comparison& comparison, const std::string& text) {
-  for (const std::string& sentence : comparison.reservations) {
-    if (sentence.find(text) != std::string::npos) return true;
+  for (const Caveat& caveat : comparison.caveats) {
+    if (caveat.text.find(text) != std::string::npos) return true;
   }
   return false;
 }
@@ -238,7 +238,7 @@ TEST(TableTube, OneColumnWithAWideToleranceIsAReservation) {
 TEST(TableTube, ATableOfHalfTheMotionSaysSo) {
   TableCase c;
   c.Print(1e-6);
-  EXPECT_TRUE(c.Run().reservations.empty());
+  EXPECT_TRUE(c.Run().caveats.empty());
   c.table.time_s.resize(51);
   c.table.values = c.table.values.topRows(51).eval();
   c.table.steps = c.table.steps.topRows(51).eval();

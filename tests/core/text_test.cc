@@ -40,6 +40,35 @@ TEST(Text, NothingThatATerminalObeysIsPrinted) {
   EXPECT_EQ(ToText(finding).find_first_of("\x1b\x07\b"), std::string::npos);
 }
 
+TEST(Text, ColoursOfOursStayOnATerminalAndNothingElse) {
+  EXPECT_EQ(ForTerminal("\x1b[1;31mDISAGREE\x1b[0m\n\ta"), "\x1b[1;31mDISAGREE\x1b[0m\n\ta");
+  EXPECT_EQ(ForTerminal("a\rb\x1b[2J\x1b[8m\xc2\x9b"), "a\\x0db\\x1b[2J\\x1b[8m\\xc2\\x9b");
+  EXPECT_EQ(ForTerminal("a\u202eb\u200bc\ufeff\u2066→é"), "a\\u202eb\\u200bc\\ufeff\\u2066→é");
+  EXPECT_EQ(OneLine("\x1b[0ma\tb\nc"), "\\x1b[0ma\\x09b\\x0ac");
+}
+
+TEST(Text, QuotedValuesAndMessagesEnd) {
+  EXPECT_EQ(QuotedValue("short"), "short");
+  EXPECT_EQ(QuotedValue("ééé", 3), "é… (6 bytes)");
+  EXPECT_EQ(Shortened("0123456789", 4), "01 … (6 bytes left out) … 89");
+  EXPECT_EQ(Shortened("0123", 4), "0123");
+  const Finding finding{Severity::kError, "a", 0, 0, "b" + std::string(20000, 'x') + "e", "h"};
+  EXPECT_LT(ToText(finding).size(), 2200U);
+  EXPECT_TRUE(ToText(finding).ends_with("xe\n  hint: h"));
+}
+
+// Spreadsheets compute what begins so; numbers are numbers.
+TEST(Text, CellsOfCsvAreNotComputed) {
+  for (const char* text : {"=cmd|' /C calc'!A0", "+1+1", "-1+1", "@SUM(A1)", "-x", "=1"}) {
+    EXPECT_EQ(CsvCell(text), "'" + std::string(text)) << text;
+  }
+  for (const char* text : {"-1.5e-3", "+7", "-inf", "a=b", "", "2026-11-24", "x-1"}) {
+    EXPECT_EQ(CsvCell(text), text) << text;
+  }
+  EXPECT_EQ(CsvCell("\t=1"), "' =1");
+  EXPECT_EQ(CsvCell("=\"a\",\nb"), "\"'=\"\"a\"\", b\"");
+}
+
 TEST(Text, WhatIsNoTextIsReplacedInMarkup) {
   for (const std::string& bad : kNoText) {
     const std::string escaped = EscapeMarkup("<" + bad + ">");

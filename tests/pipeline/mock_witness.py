@@ -62,6 +62,22 @@ elif how == "refuses":
     answer["refused"] = "it has a loop"
 elif how == "schema":
     answer["schema"] = "mbverify/witness/0"
+elif how == "inf":
+    rows[4][force] = "inf"
+elif how == "moves":  # without forces
+    rows = [row[:force] + row[force + 1:] for row in rows]
+    del names[force]
+elif how == "untimed":
+    names[0] = "seconds"
+elif how == "listed":
+    answer = [answer]
+elif how == "nameless":
+    del answer["program"]
+elif how == "loud":
+    answer["program"] = "planar \x1b[2J\x1b]0;title\x07"
+elif how == "tells":
+    with open(sys.argv[3], "w") as file:
+        file.write("\n".join(sorted(os.environ)))
 elif how == "link":
     os.remove("traces.csv")
     os.symlink("/dev/zero", "traces.csv")

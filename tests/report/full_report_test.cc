@@ -34,7 +34,7 @@ TEST(FullReport, TheShortLineTellsReservations) {
   const Report report = test::FullReport();
   EXPECT_EQ(VerdictLine(ViewOf(report), {}),
             "two_sliders / full: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  the "
-            "masses differ; reservation: only 3 samples were compared; reservation: forces < 1 N "
+            "masses differ; caveat: only 3 samples were compared; caveat: forces < 1 N "
             "are all there is.\n");
 }
 
@@ -78,7 +78,7 @@ TEST(FullReport, NothingThatItHoldsGoesUntold) {
        {"page", "text"}},
       {"reaction not unique", [](F* f) { f->report.reactions_not_unique = {}; }, {"text"}},
       {"picture", [](F* f) { f->report.pictures = {}; }, {"page", "text"}},
-      {"reservation", [](F* f) { f->report.comparison.reservations[1] = "other"; }},
+      {"caveat", [](F* f) { f->report.comparison.caveats[1].text = "other"; }},
       {"driving", [](F* f) { f->report.comparison.driving = "other"; }},
       {"a check that follows", [](F* f) { LastCheck(f, 0).follows = true; }},
       {"a check that is blind", [](F* f) { LastCheck(f, 2).blind = "other"; }, {"page"}},

@@ -118,7 +118,12 @@ inline Report FullReport() {
   Comparison& comparison = report.comparison;
   comparison.reason = "the masses differ";
   comparison.driving = "the simulation follows the closed form";
-  comparison.reservations = {"only 3 samples were compared", "forces < 1 N are all there is."};
+  comparison.caveats = {
+      {.kind = CaveatKind::kFewSamples, .of = {"d1"}, .text = "only 3 samples were compared"},
+      {.kind = CaveatKind::kWitnessMissing,
+       .of = {"planar"},
+       .text = "forces < 1 N are all there is.",
+       .gap = WitnessGap::kTimedOut}};
   comparison.attribution = {"simulated", "analytic & reference agree; simulated does not"};
   CheckResult tube = OddCheck("simulated_vs_reference", Metric::kTableTube, 5e-5);
   tube.stated_limit = 2e-6;
