@@ -297,7 +297,7 @@ TEST_F(StudyCommand, ADamagedIdentityIsAFindingWithItsKey) {
     Write(file, text);
     for (const std::string& command :
          {"study merge " + folder + " -o " + File("merged"),
-          "study " + File("s.yaml") + " --shard 1/2 --resume -o " + File("parts")}) {
+          "study " + File("s.yaml") + " --shard 1/2 --resume --out " + File("parts")}) {
       const ProgramResult result = mbverify(command);
       EXPECT_EQ(result.exit_code, 2) << command << text << result.err;
       EXPECT_NE(result.err.find("study.json:"), std::string::npos) << result.err;

@@ -116,6 +116,10 @@ TEST(Statistics, HistogramsCountEveryValue) {
   for (const auto count : histogram.counts) sum += count;
   EXPECT_EQ(sum, 1000u);
   EXPECT_GE(histogram.counts.size(), 5u);
+  // Freedman and Diaconis: 2 · 149.5 / 300^(1/3) = 44.7 wide, so 7 bins over 299.
+  values.clear();
+  for (int i = 0; i < 300; ++i) values.push_back(i);
+  EXPECT_EQ(HistogramOf(values).counts, (std::vector<std::uint64_t>{43, 43, 43, 42, 43, 43, 43}));
   EXPECT_EQ(HistogramOf(std::vector<double>(7, 2.0)).counts, (std::vector<std::uint64_t>{7}));
   EXPECT_TRUE(HistogramOf({}).counts.empty());
 }
