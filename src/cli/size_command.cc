@@ -1,6 +1,7 @@
 // mbverify size
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
 #include <memory>
 
@@ -61,11 +62,17 @@ bool TooSmall(const Sized& sized, double margin) {
   return small;
 }
 
+bool IsUnknown(const Sized& sized) {
+  return std::any_of(sized.envelopes.begin(), sized.envelopes.end(),
+                     [](const MotorEnvelope& e) { return e.limited && !e.unresolved.empty(); });
+}
+
 int Tell(const SizeArguments& arguments, const Sized& sized, int exit_code) {
   SayText(arguments.json.text(), ToText(sized.envelopes));
   const std::string json = ToJson(sized.envelopes, sized.scenarios);
   if (const int code = arguments.json.Write(json, {}); code != 0) return code;
-  return WorseExit(exit_code, TooSmall(sized, arguments.margin) ? 1 : 0);
+  if (TooSmall(sized, arguments.margin)) return WorseExit(exit_code, 1);
+  return WorseExit(exit_code, IsUnknown(sized) ? 3 : 0);
 }
 
 int RunSize(const SizeArguments& arguments) {

@@ -260,6 +260,10 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
     comparison->reason = WhyTableVerifiesNothing(*comparison);
     if (!comparison->reason.empty()) return;
   }
+  if (failed == 0) {
+    comparison->reason = WhyMarginUnknown(*comparison);
+    if (!comparison->reason.empty()) return;
+  }
   comparison->verdict = failed == 0 ? Verdict::kAgree : Verdict::kDisagree;
   comparison->reason = CountText(*comparison);
 }

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "comparison/force_scale.h"
 
@@ -244,6 +245,19 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
   if (!coarse.empty()) {
     out->derivatives_gap = "the samples do not resolve the motion of " + coarse;
   }
+}
+
+std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace) {
+  constexpr double kSixPerOscillation = std::numbers::pi / 3.0;
+  if (trace.time_s.size() < 2) return "";
+  if (trace.time_s.size() < 2 * kReach + 1) {
+    const double h = trace.time_s[1] - trace.time_s[0];
+    if (LargestPhase(*input.mechanism, *input.motion, h) <= kSixPerOscillation) return "";
+    return "the samples are too far apart for a motion so fast";
+  }
+  WitnessMetrics metrics;
+  MeasureDerivatives(input, trace, &metrics);
+  return metrics.derivatives_gap;
 }
 
 }  // namespace mbv

@@ -1,6 +1,8 @@
 // Whether a witness' drive rates are the time derivatives of its drive positions.
 #pragma once
 
+#include <string>
+
 #include "comparison/comparison.h"
 
 namespace mbv {
@@ -11,5 +13,10 @@ namespace mbv {
 /// order disagree there, or the commands themselves turn too far between two samples.
 /// `derivatives_gap` says why drives were not judged.
 void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out);
+
+/// Why the samples of a trace do not resolve the motion, by the same formulas: peaks, means,
+/// energies and margins over them then say nothing. "" where they do. Samples too few for the
+/// formulas are judged by the commands alone: fewer than six per oscillation.
+[[nodiscard]] std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace);
 
 }  // namespace mbv

@@ -37,6 +37,7 @@ struct MotorLoad {
   double peak_voltage = kNan;                      ///< where k_t and resistance are [V]
   double inertia_ratio = kNan;  ///< of the load, reflected to the rotor, to the rotor's own
   size_t samples_at_rest = 0;   ///< at which the force is open
+  std::string unresolved = {};  ///< why the samples do not resolve the motion; "" if they do
   std::vector<Use> uses = {};   ///< of every limit that the motor states
 
   [[nodiscard]] bool known() const { return torque.size() > 0; }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/derivatives.h"
 #include "comparison/driven.h"
 #include "comparison/verdict.h"
 #include "core/text.h"
@@ -17,11 +18,14 @@ namespace {
 constexpr size_t kFewSamples = 5;
 constexpr double kWhole = 0.95;  // of the motion: judged up to the samples at its ends
 
+// Of what is measured in parts of what may be used.
+bool IsWide(const CheckResult& check) { return check.limit && *check.limit > 1.0; }
+
 bool IsCoarse(const ComparisonInput& input, const CheckResult& check) {
   // A limit that a table's uncertainty widened is judged with the table.
   if (!check.limit || check.stated_limit) return false;
   if (check.metric == Metric::kTableTube || check.metric == Metric::kMotorUse) {
-    return *check.limit > 1.0;
+    return IsWide(check);
   }
   const bool metres = std::string(RowOf(check.metric).unit) == "m";
   const double size = metres ? CharacteristicLength(*input.mechanism) : 1.0;
@@ -163,12 +167,26 @@ std::string ForcesLeftOut(const ComparisonInput& input, const Witness& witness) 
 void MarkBlind(const ComparisonInput& input, Comparison* comparison) {
   for (CheckResult& check : comparison->checks) {
     const PairComparison* pair = comparison->FindPair(check.subject);
+    if (check.metric == Metric::kMotorUse) {
+      const Witness* witness = FindNamed(input.witnesses, check.measured);
+      if (witness != nullptr) check.blind = UnresolvedBySamples(input, *witness->trace);
+      if (!check.blind.empty()) continue;
+    }
     if (IsCoarse(input, check)) {
       check.blind = "a limit so wide verifies nothing";
     } else if (pair != nullptr && !pair->forces_act && ZeroPasses(*comparison, check)) {
       check.blind = "nothing asks for drive forces";
     }
   }
+}
+
+std::string WhyMarginUnknown(const Comparison& comparison) {
+  for (const CheckResult& check : comparison.checks) {
+    if (check.metric != Metric::kMotorUse || check.blind.empty() || IsWide(check)) continue;
+    return fmt::format("{}: {}; what motors need between the samples is not known", check.name,
+                       check.blind);
+  }
+  return "";
 }
 
 std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& comparison) {

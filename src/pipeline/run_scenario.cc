@@ -4,6 +4,7 @@
 
 #include <chrono>
 
+#include "comparison/derivatives.h"
 #include "core/inputs.h"
 #include "core/output_folder.h"
 #include "input/parsed_documents.h"
@@ -191,6 +192,7 @@ class ScenarioRun {
 
   void SizeMotors() {
     const Mechanism& mechanism = base();
+    const ComparisonInput input = InputOf(*prepared_);
     report_.motors = mechanism.motors;
     std::vector<double> inertias;
     for (const Motor& motor : mechanism.motors) {
@@ -198,10 +200,12 @@ class ScenarioRun {
       inertias.push_back(needed ? LoadInertia(mechanism, motor.drive) : kNan);
     }
     for (const WitnessRecord& record : report_.witnesses) {
-      if (!record.summary.ok() || record.trace.time_s.empty()) continue;
+      if (!record.summary.ok() || record.trace.time_s.empty() || mechanism.motors.empty()) continue;
+      const std::string unresolved = UnresolvedBySamples(input, record.trace);
       for (size_t k = 0; k < mechanism.motors.size(); ++k) {
         MotorLoad load = MotorLoadOf(mechanism, mechanism.motors[k], record.trace, inertias[k]);
         load.witness = record.name;
+        load.unresolved = unresolved;
         if (load.known()) report_.motor_loads.push_back(std::move(load));
       }
     }

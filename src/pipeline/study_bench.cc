@@ -54,6 +54,11 @@ void Try(const Study& study, const std::vector<SetValue>& sets, Attempt* attempt
       if (!std::isfinite(row->values[k])) row->reason = study.quantities[k].name + " has no value";
     }
     if (row->reason.empty() && verdict == Verdict::kNotRun) row->reason = measures.reason;
+    // A limit over samples that resolve nothing is kept or violated by chance.
+    if (row->reason.empty() && !study.limits.empty()) {
+      row->reason = UnresolvedBySamples(attempt->run);
+      if (!row->reason.empty()) row->values.assign(study.quantities.size(), kNan);
+    }
   }
   row->exit_code = !row->reason.empty() ? 3 : verdict == Verdict::kDisagree ? 1 : 0;
 }
@@ -138,6 +143,14 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
     *exit_code = 3;
     diagnostics->AddError(study.scenario, "cannot run with nothing varied: " + row.reason,
                           "mbverify run shows why");
+    return nullptr;
+  }
+  const std::string unresolved = study.limits.empty() ? "" : UnresolvedBySamples(attempt.run);
+  if (!unresolved.empty()) {
+    *exit_code = 3;
+    diagnostics->AddError(study.scenario,
+                          "limits cannot be judged with nothing varied: " + unresolved,
+                          "a smaller motion.sample_s resolves it");
     return nullptr;
   }
   std::vector<std::string> channels;

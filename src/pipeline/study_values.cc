@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "comparison/derivatives.h"
 #include "comparison/motor_load.h"
 #include "core/text.h"
 #include "kinematics/mobility.h"
@@ -147,6 +148,15 @@ StudyRun RunStudyWitnesses(const Prepared& prepared, const std::vector<std::stri
     }
   }
   return result;
+}
+
+std::string UnresolvedBySamples(const StudyRun& run) {
+  const ComparisonInput input = InputOf(*run.prepared);
+  for (const WitnessRecord* record : run.witnesses) {
+    const std::string why = UnresolvedBySamples(input, record->trace);
+    if (!why.empty()) return record->name + ": " + why;
+  }
+  return "";
 }
 
 StudyMeasures MeasureQuantities(const StudyRun& run, const std::vector<StudyQuantity>& quantities) {

@@ -28,6 +28,9 @@ struct StudyRun {
 /// Of a trace, from its first to its last sample; NaN if some sample is none.
 [[nodiscard]] double StatisticOf(const VecX& samples, Statistic statistic);
 
+/// Why the first witness' samples do not resolve the motion; "" if they do.
+[[nodiscard]] std::string UnresolvedBySamples(const StudyRun& run);
+
 struct StudyMeasures {
   std::vector<double> values;      ///< one per quantity
   std::optional<Verdict> verdict;  ///< of several witnesses, by the scenario's checks

@@ -23,10 +23,13 @@ std::string WithUnit(double value, const std::string& unit) {
   return std::isfinite(value) ? fmt::format("{:.5g} {}", value, unit) : "–";
 }
 
-std::string MarginText(double use, const std::string& limited_by) {
+std::string MarginText(const MotorLoad& load) {
+  const double use = load.largest_use();
   if (std::isnan(use)) return "no limit is stated";
-  if (use == 0.0) return "not used at all";
-  return fmt::format("margin {:.3g} ({})", 1.0 / use, limited_by);
+  if (use == 0.0 && load.unresolved.empty()) return "not used at all";
+  const std::string margin = fmt::format("{:.3g} ({})", 1.0 / use, load.limited_by());
+  if (load.unresolved.empty()) return "margin " + margin;
+  return fmt::format("margin not known: {}; at the samples alone {}", load.unresolved, margin);
 }
 
 std::string UsesText(const MotorLoad& load) {
@@ -131,8 +134,7 @@ std::vector<std::string> SizingLines(const Report& report, bool details) {
   std::vector<std::string> lines;
   for (const MotorLoad* load : MainMotorLoads(report)) {
     const std::string &t = load->torque_unit, &s = load->speed_unit;
-    lines.push_back(fmt::format("motor of {}: {}", load->drive,
-                                MarginText(load->largest_use(), load->limited_by())));
+    lines.push_back(fmt::format("motor of {}: {}", load->drive, MarginText(*load)));
     if (!details) continue;
     lines.push_back(fmt::format("  torque: peak {}, RMS {}, mean {}; continuous limit {}",
                                 WithUnit(load->peak_torque, t), WithUnit(load->rms_torque, t),
@@ -168,6 +170,7 @@ std::string SizingHtml(const Report& report) {
   std::string html = ToHtml(FiguresTable(loads));
   for (const MotorLoad* load : loads) {
     const Motor* motor = MotorOf(report, *load);
+    if (!load->unresolved.empty()) html += Note(load->drive + ": " + MarginText(*load) + ".");
     if (load->samples_at_rest > 0) html += Note(load->drive + ": " + AtRestText(*load) + ".");
     if (motor != nullptr && load->known()) html += CloudHtml(*motor, *load);
   }
@@ -208,6 +211,7 @@ Json SizingJson(const Report& report) {
          {"voltage_V", Number(load.peak_voltage)},
          {"inertia_ratio", Number(load.inertia_ratio)},
          {"samples_at_rest", load.samples_at_rest},
+         {"unresolved", load.unresolved},
          {"uses", std::move(uses)},
          {"limited_by", load.limited_by()},
          {"margin", Number(load.margin())}});
@@ -224,6 +228,10 @@ void Widen(const Report& report, std::vector<MotorEnvelope>* envelopes) {
       found = envelopes->insert(
           envelopes->end(),
           {.drive = load->drive, .torque_unit = load->torque_unit, .speed_unit = load->speed_unit});
+    }
+    if (!load->unresolved.empty()) {
+      found->unresolved += fmt::format("{}{}: {}", found->unresolved.empty() ? "" : "; ", scenario,
+                                       load->unresolved);
     }
     Keep(load->peak_torque, scenario, &found->peak_torque);
     Keep(load->rms_torque, scenario, &found->rms_torque);
@@ -258,6 +266,10 @@ std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
                        e.limited ? fmt::format("  {}, {}", e.limited_by, e.use.scenario) : ""}) +
             "\n";
   }
+  for (const MotorEnvelope& e : envelopes) {
+    if (e.unresolved.empty()) continue;
+    text += fmt::format("{}: not known between the samples: {}\n", e.drive, e.unresolved);
+  }
   return text;
 }
 
@@ -275,6 +287,7 @@ std::string ToJson(const std::vector<MotorEnvelope>& envelopes,
                       {"brake_power_W", MostJson(e.brake_power)},
                       {"use", MostJson(e.use)},
                       {"limited_by", e.limited_by},
+                      {"unresolved", e.unresolved},
                       {"margin", Number(e.limited ? e.margin() : kNan)}});
   }
   const Json json = {

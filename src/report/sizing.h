@@ -30,6 +30,7 @@ struct MotorEnvelope {
   Most peak_power = {}, brake_power = {}, use = {};
   std::string limited_by = {};  ///< of the largest use
   bool limited = false;         ///< the motor states a limit
+  std::string unresolved = {};  ///< scenarios whose samples do not resolve the motion, and why
 
   [[nodiscard]] double margin() const { return 1.0 / use.value; }
 };

@@ -61,6 +61,33 @@ TEST_F(SizeCommand, EndsWithOneWhereAMarginIsTooSmall) {
   EXPECT_EQ(mbverify("size " + File("fast.yaml") + " --margin 1.08").exit_code, 1);
 }
 
+// Samples twice per period see no force at all: the margin of 1.07 would look like any number.
+TEST_F(SizeCommand, AMarginOverSamplesThatResolveNothingIsNotKnown) {
+  const std::string coarse = " --set motion.sample_s=0.4";
+  const ProgramResult sized = mbverify("size " + File("fast.yaml") + coarse);
+  EXPECT_EQ(sized.exit_code, 3) << sized.out << sized.err;
+  EXPECT_NE(sized.out.find("x: not known between the samples: fast: the samples are too far apart"),
+            std::string::npos)
+      << sized.out;
+  const ProgramResult run = mbverify("run " + File("fast.yaml") + coarse + Out());
+  EXPECT_EQ(run.exit_code, 0) << run.err;
+  EXPECT_NE(run.out.find("motor of x: margin not known: the samples"), std::string::npos)
+      << run.out;
+  const ProgramResult required =
+      mbverify("run " + File("fast.yaml") + coarse + " --set checks.motor_margin=1" + Out());
+  EXPECT_EQ(required.exit_code, 3) << required.out;
+  EXPECT_NE(required.out.find("what motors need between the samples is not known"),
+            std::string::npos)
+      << required.out;
+  const ProgramResult fine =
+      mbverify("run " + File("fast.yaml") + " --set checks.motor_margin=1.05" + Out());
+  EXPECT_EQ(fine.exit_code, 0) << fine.out;
+  // What fails at the samples fails between them, too.
+  const ProgramResult fails =
+      mbverify("run " + File("fast.yaml") + coarse + " --set checks.motor_margin=100" + Out());
+  EXPECT_EQ(fails.exit_code, 1) << fails.out;
+}
+
 TEST_F(SizeCommand, NeedsMotors) {
   const ProgramResult result = mbverify("size " + File("none.yaml"));
   EXPECT_EQ(result.exit_code, 2);
