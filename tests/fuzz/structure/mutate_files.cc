@@ -252,6 +252,16 @@ class Maker {
           folder / "package.txt"}});
     results_ = folder / "study";
     archive_ = Read(folder / "paper.zip");
+    Diagnostics diagnostics;
+    ZipFile zip((folder / "paper.zip").string(), {}, &diagnostics);
+    for (const ListedEntry& entry : zip.entries()) {
+      ArchiveEntry& packed = packed_.emplace_back(entry.path, "", entry.executable);
+      (void)zip.Read(entry, [&](std::string_view piece) {
+        packed.content += piece;
+        return true;
+      });
+    }
+    if (packed_.empty()) trouble_ = "a seed could not be made: see " + folder.string();
   }
 
   void Study(Random* random, Input* input) const {
@@ -316,21 +326,20 @@ class Maker {
   void Archive(Random* random, Input* input) const {
     const fs::path file = input->folder / "paper.zip";
     std::string bytes = archive_;
-    Diagnostics diagnostics;
     std::string trouble;
-    auto entries = ReadZip(archive_, "paper.zip", {}, &diagnostics);
-    if (!entries || (*random)() % 4 == 0) {
+    std::vector<ArchiveEntry> entries = packed_;
+    if ((*random)() % 4 == 0) {
       bytes = MutateBytes(archive_, random);
     } else {
-      ArchiveEntry* entry = &(*entries)[static_cast<size_t>((*random)() % entries->size())];
-      for (ArchiveEntry& each : *entries) {
+      ArchiveEntry* entry = &entries[static_cast<size_t>((*random)() % entries.size())];
+      for (ArchiveEntry& each : entries) {
         if (each.path.ends_with("manifest.json") && (*random)() % 4 != 0) entry = &each;
       }
       const bool json = entry->path.ends_with(".json");
       entry->content =
           json ? MutateJson(entry->content, random) : MutateBytes(entry->content, random);
-      if ((*random)() % 8 == 0) entries->push_back({"four/more.txt", "surplus"});
-      bytes = WriteZip(std::move(*entries), &trouble).value_or(bytes);
+      if ((*random)() % 8 == 0) entries.push_back({"four/more.txt", "surplus"});
+      bytes = WriteZip(std::move(entries), &trouble).value_or(bytes);
     }
     WriteText(file, bytes);
     input->argv = {"verify", file.string()};
@@ -357,6 +366,7 @@ class Maker {
 
   const Options& options_;
   std::string trouble_, archive_;
+  std::vector<ArchiveEntry> packed_;  // what archive_ holds
   fs::path results_;
   std::vector<fs::path> studies_, papers_;
   std::vector<fs::path> models_, motions_, stiffness_, urdfs_, mjcfs_, tables_;
