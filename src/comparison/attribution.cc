@@ -38,7 +38,7 @@ using internal::Place;
 // the difference better than a constant that is added.
 std::string Hint(const PairComparison& pair, const Measured& worst) {
   constexpr double kLooksConstant = 1e-3;
-  constexpr double kBetter = 0.1, kVaries = 1e-2;
+  constexpr double kVaries = 1e-2;  // by ten times what a factor may leave
   const auto drive =
       std::find_if(pair.drives.begin(), pair.drives.end(), [&](const DriveMetrics& one) {
         return ChannelName(Quantity::kForce, one.drive) == worst.channel;
@@ -49,8 +49,7 @@ std::string Hint(const PairComparison& pair, const Measured& worst) {
     return fmt::format("; {} has the opposite sign throughout", drive->drive);
   }
   const KnownFactor* known = FindFactor(drive->factor);
-  const bool varies = drive->offset_residual > kVaries * std::abs(drive->factor - 1.0) &&
-                      drive->factor_residual < kBetter * drive->offset_residual;
+  const bool varies = drive->offset_residual > kVaries * std::abs(drive->factor - 1.0);
   if (known == nullptr && !varies) return "";
   return fmt::format(
       "; the ratio at {} is constant ({:.6g}){}", drive->drive, drive->factor,

@@ -1,5 +1,6 @@
-// Feeds structurally changed models, scenarios, URDF and MJCF files and tables to the whole
-// program: it must end by itself with an exit code from 0 to 3, in time. (scripts/fuzz_structure)
+// Feeds structurally changed models, scenarios, studies and their results, papers, meshes,
+// archives, URDF and MJCF files and tables to the whole program: it must end by itself with an exit
+// code from 0 to 3, in time. (scripts/fuzz_structure)
 //   mutate_files --program FILE --source FOLDER --out FOLDER [--count N] [--seed N] [--jobs N]
 // Inputs that break this stay in OUT/found; each has its seed, with which it is made again.
 #include <fmt/format.h>
@@ -14,6 +15,7 @@
 #include <map>
 #include <thread>
 
+#include "archive/zip.h"
 #include "core/worker_pool.h"
 #include "tests/fuzz/structure/mutations.h"
 
@@ -39,10 +41,12 @@ void WriteText(const fs::path& path, const std::string& text) {
   std::ofstream(path, std::ios::binary) << text;
 }
 
+// With this extension, "" for any.
 std::vector<fs::path> FilesBelow(const fs::path& folder, const std::string& extension) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.path().extension() == extension) files.push_back(entry.path());
+    const bool wanted = extension.empty() || entry.path().extension() == extension;
+    if (wanted && entry.is_regular_file()) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -67,14 +71,38 @@ class Maker {
     urdfs_ = FilesBelow(source / "tests/fuzz/seeds/urdf", ".urdf");
     mjcfs_ = FilesBelow(source / "tests/fuzz/seeds/mjcf", ".xml");
     tables_ = FilesBelow(source / "scenarios", ".csv");
+    for (const fs::path& file : FilesBelow(source / "scenarios", ".yaml")) {
+      if (file.filename().string().starts_with("study_")) studies_.push_back(file);
+    }
+    for (const fs::path& file : models_) {
+      if (file.filename() == "paper.yaml") papers_.push_back(file);
+    }
+    MakeResults();
   }
+
+  [[nodiscard]] const std::string& trouble() const { return trouble_; }
 
   // The k-th input; it depends on the seed and k alone.
   [[nodiscard]] Input Make(size_t k) const {
     Random random(options_.seed * 1000003UL + k);
     Input input;
     input.folder = fs::path(options_.out) / "work" / std::to_string(k);
-    switch (k % 9) {
+    switch (k % 14) {
+      case 9:
+        Study(&random, &input);
+        break;
+      case 10:
+        StudyResult(&random, &input);
+        break;
+      case 11:
+        Paper(&random, &input);
+        break;
+      case 12:
+        Archive(&random, &input);
+        break;
+      case 13:
+        Mesh(&random, &input);
+        break;
       case 0:
         Urdf(&random, &input);
         break;
@@ -203,7 +231,144 @@ class Maker {
     Urdf(random, input);
   }
 
+  // Seeds that only the program itself writes: results of a study, and an archive.
+  void MakeResults() {
+    const fs::path folder = fs::path(options_.out) / "seeds", source = options_.source;
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    const fs::path study = source / "scenarios/four_bar/study_by_hand.yaml";
+    WorkerPool pool;
+    pool.timeout_s = 300.0;
+    pool.parallel = 1;
+    pool.ended = [&](size_t, const WorkerEnd& end) {
+      if (end.exit_code != 0) trouble_ = "a seed could not be made: see " + folder.string();
+    };
+    (void)pool.Run(
+        {{{options_.program, "study", study.string(), "--count", "4", "--out",
+           (folder / "study").string()},
+          folder / "study.txt"},
+         {{options_.program, "package", (source / "scenarios/four_bar/turn_inverse.yaml").string(),
+           "--no-report", "--no-figures", "--out", (folder / "paper.zip").string()},
+          folder / "package.txt"}});
+    results_ = folder / "study";
+    archive_ = Read(folder / "paper.zip");
+    Diagnostics diagnostics;
+    ZipFile zip((folder / "paper.zip").string(), {}, &diagnostics);
+    for (const ListedEntry& entry : zip.entries()) {
+      ArchiveEntry& packed = packed_.emplace_back(entry.path, "", entry.executable);
+      (void)zip.Read(entry, [&](std::string_view piece) {
+        packed.content += piece;
+        return true;
+      });
+    }
+    if (packed_.empty()) trouble_ = "a seed could not be made: see " + folder.string();
+  }
+
+  void Study(Random* random, Input* input) const {
+    const fs::path seed = OneOf(studies_, random);
+    const fs::path file = input->folder / seed.filename();
+    WriteText(file, MutateYaml(Read(seed), random));
+    if ((*random)() % 2 == 0) {
+      input->argv = {"check", file.string()};
+      return;
+    }
+    // The scenario that it varies lies beside it.
+    for (const auto& beside : fs::directory_iterator(seed.parent_path())) {
+      std::error_code error;
+      if (!fs::exists(input->folder / beside.path().filename())) {
+        fs::copy(beside.path(), input->folder / beside.path().filename(),
+                 fs::copy_options::recursive, error);
+      }
+    }
+    input->argv = {"study",  file.string(), "--count", "2",
+                   "--jobs", "1",           "--out",   (input->folder / "out").string()};
+  }
+
+  // study.json and points of a study, which --resume and merge read again.
+  void StudyResult(Random* random, Input* input) const {
+    fs::create_directories(input->folder);
+    fs::copy(results_, input->folder / "out", fs::copy_options::recursive);
+    const std::vector<fs::path> files = FilesBelow(input->folder / "out", ".json");
+    const std::vector<fs::path> points = FilesBelow(input->folder / "out", ".csv");
+    const bool json = points.empty() || (*random)() % 4 != 0;
+    const fs::path file = OneOf(json ? files : points, random);
+    WriteText(file, json ? MutateJson(Read(file), random) : MutateTable(Read(file), random));
+    const std::string out = (input->folder / "out").string();
+    if ((*random)() % 2 == 0) {
+      input->argv = {"study", "merge", (files.front().parent_path()).string(), "--out",
+                     (input->folder / "merged").string()};
+    } else {
+      input->argv = {"study",
+                     (fs::path(options_.source) / "scenarios/four_bar/study_by_hand.yaml").string(),
+                     "--count",
+                     "4",
+                     "--resume",
+                     "--jobs",
+                     "1",
+                     "--out",
+                     out};
+    }
+  }
+
+  void Paper(Random* random, Input* input) const {
+    const fs::path seed = OneOf(papers_, random);
+    for (const auto& beside : fs::directory_iterator(seed.parent_path())) {
+      std::error_code error;
+      fs::create_directories(input->folder);
+      fs::copy(beside.path(), input->folder / beside.path().filename(), error);
+    }
+    const fs::path file = input->folder / seed.filename();
+    WriteText(file, MutateYaml(Read(seed), random));
+    input->argv = {"check", file.string()};
+  }
+
+  // Bytes of an archive, or a file in it whose checksum then does not fit, or its manifest.
+  void Archive(Random* random, Input* input) const {
+    const fs::path file = input->folder / "paper.zip";
+    std::string bytes = archive_;
+    std::string trouble;
+    std::vector<ArchiveEntry> entries = packed_;
+    if ((*random)() % 4 == 0) {
+      bytes = MutateBytes(archive_, random);
+    } else {
+      ArchiveEntry* entry = &entries[static_cast<size_t>((*random)() % entries.size())];
+      for (ArchiveEntry& each : entries) {
+        if (each.path.ends_with("manifest.json") && (*random)() % 4 != 0) entry = &each;
+      }
+      const bool json = entry->path.ends_with(".json");
+      entry->content =
+          json ? MutateJson(entry->content, random) : MutateBytes(entry->content, random);
+      if ((*random)() % 8 == 0) entries.push_back({"four/more.txt", "surplus"});
+      bytes = WriteZip(std::move(entries), &trouble).value_or(bytes);
+    }
+    WriteText(file, bytes);
+    input->argv = {"verify", file.string()};
+  }
+
+  // A cube in the formats that meshes have, on a body.
+  void Mesh(Random* random, Input* input) const {
+    const std::vector<fs::path> meshes =
+        FilesBelow(fs::path(options_.source) / "tests/fuzz/seeds/mesh", "");
+    const fs::path seed = OneOf(meshes, random);
+    const std::string name = seed.filename().string();
+    const bool text = (*random)() % 2 == 0;
+    WriteText(input->folder / name,
+              text ? MutateTable(Read(seed), random) : MutateBytes(Read(seed), random));
+    WriteText(input->folder / "model.yaml",
+              "name: cube\nbodies:\n  arm:\n    mass: 1\n    inertia: [1, 1, 1]\n    shapes:\n"
+              "      - {mesh: {file: " +
+                  name +
+                  "}}\njoints:\n  hinge: {kind: revolute, parent: "
+                  "world, child: arm, axis: z}\ndrives:\n  motor: {kind: joint, joint: hinge}\n");
+    input->argv = {(*random)() % 2 == 0 ? "inertia" : "model",
+                   (input->folder / "model.yaml").string()};
+  }
+
   const Options& options_;
+  std::string trouble_, archive_;
+  std::vector<ArchiveEntry> packed_;  // what archive_ holds
+  fs::path results_;
+  std::vector<fs::path> studies_, papers_;
   std::vector<fs::path> models_, motions_, stiffness_, urdfs_, mjcfs_, tables_;
 };
 
@@ -218,12 +383,16 @@ std::string Broken(const WorkerEnd& end) {
 int Run(const Options& options) {
   constexpr size_t kBatch = 256;  // folders at a time
   constexpr double kTimeout_s = 60.0;
+  fs::remove_all(fs::path(options.out) / "work");
   const Maker maker(options);
+  if (!maker.trouble().empty()) {
+    fmt::print("{}\n", maker.trouble());
+    return 3;
+  }
   const auto start = std::chrono::steady_clock::now();
   std::map<int, size_t> codes;
   size_t broken = 0;
   double slowest_s = 0.0;
-  fs::remove_all(fs::path(options.out) / "work");
   for (size_t from = 0; from < options.count; from += kBatch) {
     std::vector<Input> inputs;
     std::vector<WorkerJob> jobs;

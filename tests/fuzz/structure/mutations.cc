@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -183,7 +184,93 @@ void ChangeAttribute(XMLElement* element, Random* random) {
   element->SetAttribute(name.c_str(), fmt::format("{}", fmt::join(parts, " ")).c_str());
 }
 
+using Json = nlohmann::ordered_json;
+
+void Collect(Json* json, std::vector<std::pair<Json*, std::string>>* places) {
+  if (!json->is_structured()) return;
+  for (const auto& item : json->items()) {
+    places->emplace_back(json, item.key());
+    Collect(&item.value(), places);
+  }
+}
+
+Json& At(const std::pair<Json*, std::string>& place) {
+  Json& parent = *place.first;
+  return parent.is_array() ? parent[std::stoul(place.second)] : parent[place.second];
+}
+
+// What a value becomes: another kind, another number, another text.
+Json Changed(const Json& value, Random* random) {
+  switch (Below(7, random)) {
+    case 0:
+      return nullptr;
+    case 1:
+      return Json::array({value});
+    case 2:
+      return Json::object({{AWord(random), value}});
+    case 3:
+      return Below(2, random) == 0;
+    case 4:
+      return AWord(random);
+    default: {
+      if (!value.is_number()) return value.is_string() ? Json(1.0) : Json();
+      constexpr std::array kFactors = {0.0, -1.0, 1e-12, 0.5, 1.001, 2.0, 1e3, 1e18, 1e300};
+      const double factor = kFactors[Below(kFactors.size(), random)];
+      return value.get<double>() * factor;
+    }
+  }
+}
+
 }  // namespace
+
+std::string MutateJson(const std::string& text, Random* random) {
+  Json root = Json::parse(text, nullptr, false);
+  if (root.is_discarded()) return text;
+  for (size_t k = 1 + Below(3, random); k > 0; --k) {
+    std::vector<std::pair<Json*, std::string>> places;
+    Collect(&root, &places);
+    if (places.empty()) break;
+    const auto& at = places[Below(places.size(), random)];
+    const Json other = At(places[Below(places.size(), random)]);
+    switch (Below(4, random)) {
+      case 0:
+        if (at.first->is_array()) {
+          at.first->erase(std::stoul(at.second));
+        } else {
+          at.first->erase(at.second);
+        }
+        break;
+      case 1:
+        At(at) = other;
+        break;
+      default:
+        At(at) = Changed(At(at), random);
+    }
+  }
+  return root.dump(1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::string MutateBytes(const std::string& bytes, Random* random) {
+  std::string changed = bytes;
+  for (size_t k = 1 + Below(6, random); k > 0 && !changed.empty(); --k) {
+    const size_t at = Below(changed.size(), random);
+    const size_t length = std::min(changed.size() - at, 1 + Below(64, random));
+    switch (Below(5, random)) {
+      case 0:
+        changed.erase(at, length);
+        break;
+      case 1:
+        changed.insert(at, changed.substr(at, length));
+        break;
+      case 2:
+        changed.resize(at);
+        break;
+      default:
+        changed[at] = static_cast<char>((*random)());
+    }
+  }
+  return changed;
+}
 
 std::string MutateYaml(const std::string& text, Random* random) {
   YamlReader reader("seed.yaml");

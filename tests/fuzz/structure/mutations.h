@@ -12,5 +12,8 @@ using Random = std::mt19937_64;
 [[nodiscard]] std::string MutateYaml(const std::string& text, Random* random);
 [[nodiscard]] std::string MutateXml(const std::string& text, Random* random);
 [[nodiscard]] std::string MutateTable(const std::string& text, Random* random);
+[[nodiscard]] std::string MutateJson(const std::string& text, Random* random);
+/// Any bytes: some changed, left out, doubled or cut off.
+[[nodiscard]] std::string MutateBytes(const std::string& bytes, Random* random);
 
 }  // namespace mbv::fuzz
