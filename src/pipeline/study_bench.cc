@@ -34,6 +34,14 @@ struct Attempt {
   StudyRun run;
 };
 
+// Peaks and means over samples that do not resolve the motion keep a limit or violate it by chance.
+// What compares two witnesses, or closes a loop, is judged at the samples themselves.
+bool LimitsSamples(const Study& study) {
+  return std::ranges::any_of(study.limits, [&](const StudyLimit& limit) {
+    return !study.quantities[limit.quantity].is_check();
+  });
+}
+
 // Not moved: the run refers to what was prepared.
 void Try(const Study& study, const std::vector<SetValue>& sets, Attempt* attempt, PointRow* row) {
   row->values.assign(study.quantities.size(), kNan);
@@ -54,8 +62,7 @@ void Try(const Study& study, const std::vector<SetValue>& sets, Attempt* attempt
       if (!std::isfinite(row->values[k])) row->reason = study.quantities[k].name + " has no value";
     }
     if (row->reason.empty() && verdict == Verdict::kNotRun) row->reason = measures.reason;
-    // A limit over samples that resolve nothing is kept or violated by chance.
-    if (row->reason.empty() && !study.limits.empty()) {
+    if (row->reason.empty() && LimitsSamples(study)) {
       row->reason = UnresolvedBySamples(attempt->run);
       if (!row->reason.empty()) row->values.assign(study.quantities.size(), kNan);
     }
@@ -145,7 +152,7 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
                           "mbverify run shows why");
     return nullptr;
   }
-  const std::string unresolved = study.limits.empty() ? "" : UnresolvedBySamples(attempt.run);
+  const std::string unresolved = LimitsSamples(study) ? UnresolvedBySamples(attempt.run) : "";
   if (!unresolved.empty()) {
     *exit_code = 3;
     diagnostics->AddError(study.scenario,
@@ -266,7 +273,7 @@ void StudyBench::FindIdle(double timeout_s, Diagnostics* diagnostics) {
         fmt::format("vary.{}: moves no quantity of this study: with it alone at its ends, every "
                     "value is that of nothing varied",
                     factor.name),
-        fmt::format("witnesses: {} do not read it; ask others, or leave it out",
+        fmt::format("the quantities of {} do not depend on it; ask for others, or leave it out",
                     Joined(study_.witnesses)));
     finding.severity = Severity::kWarning;
     diagnostics->Add(std::move(finding));

@@ -29,7 +29,7 @@ TEST(ConvergeCommand, PrintsTheTableAndWritesTheFiles) {
   fs::remove(folder / ".mbverify-files");
   std::ofstream(folder / "converge.json") << "mine";
   const ProgramResult refused = program(call);
-  EXPECT_EQ(refused.exit_code, 2);
+  EXPECT_EQ(refused.exit_code, 3);
   EXPECT_NE(refused.err.find("which mbverify did not write"), std::string::npos) << refused.err;
   EXPECT_EQ(ReadAll(folder / "converge.json"), "mine");
 }

@@ -35,7 +35,7 @@ TEST(FiguresCommand, AForeignFileOfThatNameIsNotTouched) {
   const ProgramResult run = mbverify(
       "figures scenarios/four_bar/turn_inverse.yaml --formats svg --only drive_torques --out " +
       mbverify.Out());
-  EXPECT_EQ(run.exit_code, 2);
+  EXPECT_EQ(run.exit_code, 3);
   std::string text;
   std::ifstream(folder + "drive_torques.svg") >> text;
   EXPECT_EQ(text, "mine");

@@ -39,7 +39,7 @@ TEST(TablesCommand, BadOptionsAreRefused) {
     EXPECT_EQ(run.exit_code, 2) << options;
     EXPECT_FALSE(run.err.empty()) << options;
   }
-  EXPECT_EQ(mbverify("tables four_bar/turn_inverse --out /dev/null/tables").exit_code, 2);
+  EXPECT_EQ(mbverify("tables four_bar/turn_inverse --out /dev/null/tables").exit_code, 3);
 }
 
 }  // namespace

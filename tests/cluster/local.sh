@@ -37,7 +37,7 @@ compute 'my study.yaml' 'all results' >again.txt 2>&1
 code=$?
 case $3 in
   parallel) [ $code = 0 ] && same_as_at_once 'all results' ;;
-  snakemake) [ $code != 0 ] && grep -q 'shard-4-of-6: its points are not all there' again.txt ;;
+  snakemake) [ $code != 0 ] && grep -q 'shard-4-of-6: error: its points are not all there' again.txt ;;
 esac || fail "with an altered shard: $code, $(cat again.txt)"
 
 compute 'no study.yaml' none >none.txt 2>&1 && fail "a study that is not there was computed"

@@ -62,7 +62,7 @@ mkdir altered missing
 cp -r out/shards altered
 cp -r out/shards missing
 alter altered 4
-refused altered 'shard-4-of-6: its points are not all there, or not as they were written'
+refused altered 'shard-4-of-6: error: its points are not all there, or not as they were written'
 rm -r "missing/shards/$name.shard-5-of-$shards"
 refused missing 'shard 5/6 is missing'
 

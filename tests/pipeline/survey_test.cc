@@ -95,6 +95,7 @@ TEST(Survey, ARowGoesThroughBytesUnchanged) {
   SurveyRow row{.file = "a.urdf", .status = "ok", .bodies = 3, .loops = 1, .freedoms = 2};
   row.gap_m = 1.0 / 3.0;
   row.message = "a, \"b\"\nc";
+  row.caveats = {"not the whole robot", "=cmd"};
   const auto back = FromBytes<SurveyRow>(ToBytes(row));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->file, "a.urdf");
@@ -104,13 +105,16 @@ TEST(Survey, ARowGoesThroughBytesUnchanged) {
   EXPECT_EQ(back->gap_m, row.gap_m);
   EXPECT_TRUE(std::isnan(back->inverse_nrmse));
   EXPECT_EQ(back->message, row.message);
+  EXPECT_EQ(back->caveats, row.caveats);
   EXPECT_FALSE(FromBytes<SurveyRow>("nonsense"));
 
   const std::string csv = SurveyCsv({row});
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
             "file,status,bodies,loops,freedoms,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
-            "seconds,message");
-  EXPECT_NE(csv.find("a.urdf,ok,3,1,2,,0.33,,,,,\"a, \"\"b\"\" c\"\n"), std::string::npos) << csv;
+            "seconds,caveats,message");
+  EXPECT_NE(csv.find("a.urdf,ok,3,1,2,,0.33,,,,,not the whole robot; =cmd,\"a, \"\"b\"\" c\"\n"),
+            std::string::npos)
+      << csv;
   row.message = "<script>";
   EXPECT_EQ(SurveyHtml({row}, "x").find("<script>"), std::string::npos);
 }
