@@ -152,6 +152,13 @@ struct ForeignMjcf::Impl {
           "meshes of files in the model's folder or below are drawn");
     }
     std::vector<XMLElement*> others;
+    std::set<std::string> bodies{"world"};
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "body") && e->Attribute("name") != nullptr) bodies.insert(e->Attribute("name"));
+    });
+    const auto known = [&](const XMLElement* e, const char* body) {
+      return e->Attribute(body) != nullptr && bodies.contains(e->Attribute(body));
+    };
     ForEach(root(), [&](XMLElement* e) {
       for (const char* attribute : {"material", "texture"}) e->DeleteAttribute(attribute);
       const bool in_assets = e->Parent() != nullptr && e->Parent()->ToElement() != nullptr &&
@@ -167,6 +174,11 @@ struct ForeignMjcf::Impl {
       for (XMLElement* pair = e->FirstChildElement("pair"); pair != nullptr;
            pair = pair->NextSiblingElement("pair")) {
         others.push_back(pair);  // of geoms that may be gone
+      }
+      // Of bodies of a scene that is another file.
+      for (XMLElement* exclude = e->FirstChildElement("exclude"); exclude != nullptr;
+           exclude = exclude->NextSiblingElement("exclude")) {
+        if (!known(exclude, "body1") || !known(exclude, "body2")) others.push_back(exclude);
       }
     });
     for (XMLElement* e : others) document.DeleteNode(e);

@@ -460,6 +460,18 @@ TEST(ForeignMjcf, BodiesOfOtherModelsAreNotLostInSilence) {
       << read.diagnostics.Text();
 }
 
+TEST(ForeignMjcf, PairsOfBodiesOfASceneElsewhereAreNotNeeded) {
+  const auto excluding = [](const std::string& body) {
+    return ReadText(Arm({.tail = "<contact><exclude body1='upper' body2='" + body +
+                                 "'/><exclude body1='upper' body2='lower'/></contact>"}));
+  };
+  for (const char* body : {"terrain", "world", "lower"}) {
+    const Read read = excluding(body);
+    EXPECT_TRUE(read.model) << body << read.diagnostics.Text();
+    EXPECT_TRUE(Sources(read).empty()) << body;
+  }
+}
+
 TEST(ForeignMjcf, BodiesThatNestTooDeeplyAreNamedSo) {
   std::string deep = "<mujoco><worldbody>";
   for (int i = 0; i < 150; ++i) deep += "<body>";
