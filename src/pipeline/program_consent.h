@@ -33,7 +33,7 @@ struct CalledProgram {
   ProgramTrust trust = ProgramTrust::kNone;
   std::string doubt = {};  ///< of kNone: why
 
-  /// "planar: /usr/bin/python3 /home/me/planar.py", whole and printable.
+  /// "planar: /usr/bin/python3 planar.py", whole and printable.
   [[nodiscard]] std::string Text() const;
 };
 
