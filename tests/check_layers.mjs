@@ -1,4 +1,4 @@
-// The layer table of docs/architecture.md against CMakeLists.txt and against the includes: nothing
+// The layer table of docs/development/architecture.md against CMakeLists.txt and against the includes: nothing
 // beyond the table, and no permit that nobody uses.
 //   node check_layers.mjs ROOT
 import { readdirSync, readFileSync } from 'node:fs';
@@ -97,10 +97,10 @@ function checkOrder(table) {
   const below = [];
   for (const [folder, row] of Object.entries(table)) {
     for (const layer of Object.keys(row.ours)) {
-      if (!below.includes(layer)) found.push(`docs/architecture.md: ${folder} names ${layer}, which does not stand above it in the table`);
+      if (!below.includes(layer)) found.push(`docs/development/architecture.md: ${folder} names ${layer}, which does not stand above it in the table`);
     }
     for (const name of row.external) {
-      if (!(name in LIBRARIES) && !['Eigen', 'fmt'].includes(name)) found.push(`docs/architecture.md: ${folder}: unknown library ${name}`);
+      if (!(name in LIBRARIES) && !['Eigen', 'fmt'].includes(name)) found.push(`docs/development/architecture.md: ${folder}: unknown library ${name}`);
     }
     below.push(folder);
   }
@@ -133,11 +133,11 @@ function compareWithIncludes(table, includes) {
   for (const [folder, row] of Object.entries(table)) {
     for (const [layer, files] of Object.entries(row.ours)) {
       for (const file of files ?? ['']) {
-        if (!used.has(`${folder} ${layer} ${file}`)) found.push(`docs/architecture.md: ${file || folder} may include ${layer}, but does not`);
+        if (!used.has(`${folder} ${layer} ${file}`)) found.push(`docs/development/architecture.md: ${file || folder} may include ${layer}, but does not`);
       }
     }
     for (const name of row.external) {
-      if (name in LIBRARIES && !used.has(`${folder} ${name}`)) found.push(`docs/architecture.md: ${folder} may include ${name}, but does not`);
+      if (name in LIBRARIES && !used.has(`${folder} ${name}`)) found.push(`docs/development/architecture.md: ${folder} may include ${name}, but does not`);
     }
   }
   return found;
@@ -165,12 +165,12 @@ function selfTest() {
     [{ more: [{ path: 'maths/m.cc', header: 'mujoco/mujoco.h' }] }, ['src/maths/m.cc: maths may not include mujoco/mujoco.h']],
     [{ more: [{ path: 'engine/e.cc', header: 'maths/m.h' }] }, ['src/engine/e.cc: of engine only start.cc may include maths/m.h']],
     [{ more: [{ path: 'attic/a.cc', header: 'core/c.h' }] }, ["src/attic/a.cc: folder 'attic' is not in the layer table"]],
-    [{ without: 'maths/m.h' }, ['docs/architecture.md: start.cc may include maths, but does not']],
-    [{ without: 'boost/b.hpp' }, ['docs/architecture.md: maths may include Boost, but does not']],
+    [{ without: 'maths/m.h' }, ['docs/development/architecture.md: start.cc may include maths, but does not']],
+    [{ without: 'boost/b.hpp' }, ['docs/development/architecture.md: maths may include Boost, but does not']],
     [{ lists: cmake.replace('core maths', 'core') }, ['CMakeLists.txt: DEPS of engine lacks maths']],
     [{ lists: cmake.replace('Boost::headers', 'Boost::headers ZLIB::ZLIB') }, ['CMakeLists.txt: LIBS of maths has ZLIB::ZLIB, the table has not']],
     [{ lists: cmake + 'mbv_layer(attic)' }, ['CMakeLists.txt has attic, the table has not']],
-    [{ rows: [table[1], table[0], table[2]] }, ['docs/architecture.md: maths names core, which does not stand above it in the table']],
+    [{ rows: [table[1], table[0], table[2]] }, ['docs/development/architecture.md: maths names core, which does not stand above it in the table']],
   ];
   for (const [changes, wanted] of cases) {
     const found = run(changes);
@@ -187,7 +187,7 @@ if (failure) {
   process.exit(1);
 }
 const root = process.argv[2];
-const found = check(readFileSync(join(root, 'docs/architecture.md'), 'utf8'),
+const found = check(readFileSync(join(root, 'docs/development/architecture.md'), 'utf8'),
                     readFileSync(join(root, 'CMakeLists.txt'), 'utf8'), readIncludes(root));
 console.log(found.length > 0 ? found.join('\n') : 'table, CMake and includes agree');
 process.exit(found.length > 0 ? 1 : 0);

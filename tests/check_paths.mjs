@@ -32,7 +32,7 @@ if (self !== wanted) {
 }
 
 const root = process.argv[2];
-const pages = Object.fromEntries(readdirSync(join(root, 'docs')).filter((name) => name.endsWith('.md'))
+const pages = Object.fromEntries(readdirSync(join(root, 'docs'), { recursive: true }).filter((name) => name.endsWith('.md'))
     .map((name) => [`docs/${name}`, readFileSync(join(root, 'docs', name), 'utf8')]));
 const found = missing(pages, (path) => existsSync(join(root, path)));
 console.log(found.length > 0 ? found.join('\n') : `the ${Object.keys(pages).length} pages name files that exist`);

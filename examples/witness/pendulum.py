@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The smallest witness: one body on a driven revolute joint of the world (docs/witnesses.md).
+"""The smallest witness: one body on a driven revolute joint of the world (docs/how-to/external_solvers.md).
 
     torque = (a.I a + m |a x r|^2) qdd - a.(r x m g)
 

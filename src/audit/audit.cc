@@ -12,7 +12,7 @@
 namespace mbv {
 namespace {
 
-// One row per mechanism with an equation audit, in the order of docs/equation_audit.md.
+// One row per mechanism with an equation audit, in the order of docs/results/equation_audit.md.
 const std::vector<AuditEntry>& Registry() {
   static const std::vector<AuditEntry> entries = {
       {"stabilizing_platform", &AuditStabilizingPlatform},

@@ -64,7 +64,7 @@ enum class AuditNumbers { kStable, kMeasured };
 [[nodiscard]] std::string ToMarkdown(const AuditTable& table,
                                      AuditNumbers numbers = AuditNumbers::kStable);
 
-/// The text of docs/equation_audit.md: every registered mechanism's table, stable numbers.
+/// The text of docs/results/equation_audit.md: every registered mechanism's table, stable numbers.
 [[nodiscard]] std::string AuditDocument(const std::string& models_dir);
 
 }  // namespace mbv

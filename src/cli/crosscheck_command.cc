@@ -104,10 +104,10 @@ void AddCrosscheckCommand(CLI::App* app, int* exit_code) {
   crosscheck->add_option("scenarios", arguments->scenarios, "scenario files or folders")
       ->required();
   crosscheck
-      ->add_option(
-          "--engine", arguments->engines,
-          "NAME=COMMAND: a foreign witness (repeatable), see docs/witnesses.md; Simbody and "
-          "the newest MuJoCo in two ways if left out")
+      ->add_option("--engine", arguments->engines,
+                   "NAME=COMMAND: a foreign witness (repeatable), see "
+                   "docs/how-to/external_solvers.md; Simbody and "
+                   "the newest MuJoCo in two ways if left out")
       ->allow_extra_args(false);
   crosscheck->add_option("--markdown", arguments->markdown,
                          "writes forces, poses, loop gaps and cost as tables, a column per engine");

@@ -236,7 +236,7 @@ void AddModelCommand(CLI::App* app, int* exit_code) {
           "--format", arguments->format,
           "text (mobility report), json (the same for programs), or the model as mjcf, "
           "urdf, yaml (a model file with the numbers that the parameters give) or mechanism "
-          "(mechanism.json, docs/witnesses.md)")
+          "(mechanism.json, docs/how-to/external_solvers.md)")
       ->check(OneOf({"text", "json", "mjcf", "urdf", "yaml", "mechanism"}));
   model
       ->add_option("--drives", arguments->drives,

@@ -39,7 +39,7 @@ enum class WitnessGap {
   kSignal,
   kTimedOut,
   kNoAnswer,   ///< it left no files, or longer ones than they may be
-  kBadAnswer,  ///< its files are not what docs/witnesses.md asks for
+  kBadAnswer,  ///< its files are not what docs/how-to/external_solvers.md asks for
   kDeclined,   ///< it states that the mechanism or motion is beyond it
   kNoForces,   ///< it answered, without drive forces that another witness has, too
 };
@@ -50,8 +50,8 @@ struct Witness {
   std::string name;              ///< of its role (core/roles.h)
   const Trace* trace = nullptr;  ///< null if there is none; summary says why
   RunSummary summary;            ///< the trace is compared only if this is ok
-  /// Of a program outside (docs/witnesses.md): what it is, the limits it is judged by, and what it
-  /// leaves out, and why.
+  /// Of a program outside (docs/how-to/external_solvers.md): what it is, the limits it is judged
+  /// by, and what it leaves out, and why.
   struct Foreign {
     std::string program;
     LimitColumn limits = LimitColumn::kReference;

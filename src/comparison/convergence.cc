@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kSameTime_s = 1e-9;
 
-// docs/convergence.md derives these.
+// docs/explanation/convergence.md derives these.
 ExpectedOrder Expected(bool stock, Knob knob) {
   switch (knob) {
     case Knob::kBoth:

@@ -1,5 +1,6 @@
 // What refining the step and the constraint time constant of the forward simulation shows, and
-// whether that is what its schemes promise. The orders are derived in docs/convergence.md.
+// whether that is what its schemes promise. The orders are derived in
+// docs/explanation/convergence.md.
 #pragma once
 
 #include <string>

@@ -1,7 +1,7 @@
 // mechanism.json: a mechanism with everything resolved to numbers, for other programs.
 //
-// docs/witnesses.md describes every key; the schema has a version that changes when a reader could
-// be misled.
+// docs/how-to/external_solvers.md describes every key; the schema has a version that changes when a
+// reader could be misled.
 #pragma once
 
 #include <string>

@@ -1,4 +1,4 @@
-// What a foreign witness gives back: witness.json and traces.csv (docs/witnesses.md).
+// What a foreign witness gives back: witness.json and traces.csv (docs/how-to/external_solvers.md).
 //
 // A stranger wrote both: whatever is wrong with them is a sentence about the witness, never an
 // error of the scenario.

@@ -3,7 +3,7 @@
 //
 // Two numbers of the simulation are artificial: the step and the time constant with which
 // constraints are guided. They are refined together, as runs do it, and each alone, for the
-// corrected engine and for stock MuJoCo (docs/convergence.md).
+// corrected engine and for stock MuJoCo (docs/explanation/convergence.md).
 #pragma once
 
 #include <string>

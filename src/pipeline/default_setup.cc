@@ -258,7 +258,7 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
   const WrittenNames names = NamesInModel(m);
   std::string text =
       "# A first motion, made by mbverify: each drive goes out and back again.\n"
-      "# All keys: docs/scenario_format.md.\n";
+      "# All keys: docs/reference/scenario_file.md.\n";
   for (const std::string& note : notes) text += "# " + note + "\n";
   text += fmt::format(
       "mechanism: {}\ndescription: Each drive out and back, from rest to rest\nmotion:\n"

@@ -1,5 +1,5 @@
-// A program of a stranger as a witness (docs/witnesses.md): it gets a folder with the mechanism and
-// its motion, and leaves its traces there.
+// A program of a stranger as a witness (docs/how-to/external_solvers.md): it gets a folder with the
+// mechanism and its motion, and leaves its traces there.
 #pragma once
 
 #include "pipeline/prepare.h"

@@ -1,5 +1,5 @@
 // `mbverify package`: the archive beside a paper, with inputs, results, figures and what describes
-// them (docs/package.md).
+// them (docs/how-to/archives.md).
 #pragma once
 
 #include <optional>

@@ -8,7 +8,7 @@ namespace {
 constexpr const char* kHead =
     R"(# The papers' figures, computed anew
 
-Written by `scripts/paper_figures`; do not edit. `mbverify figures --paper MODEL` draws them (`docs/figures.md`), what they show stands in `models/MODEL/paper.yaml`.
+Written by `scripts/paper_figures`; do not edit. `mbverify figures --paper MODEL` draws them (`docs/how-to/figures.md`), what they show stands in `models/MODEL/paper.yaml`.
 
 In “…” stands in short, and in English, what a paper says of a figure, then its place, the number that is printed for it, and what is computed here. The project has the papers as text
 alone, not as pictures: a curve that is only drawn there is not compared with one point of ours. Where no "printed" number follows, the paper gives none.
@@ -18,14 +18,14 @@ std::string AuditText(const PaperResult& result) {
   if (result.audit.empty()) return "";
   std::string text;
   for (const std::string& row : result.audit) text += (text.empty() ? "`" : ", `") + row + "`";
-  return " Equation audit (`docs/equation_audit.md`): " + text + ".";
+  return " Equation audit (`docs/results/equation_audit.md`): " + text + ".";
 }
 
 std::string EntryText(const PaperOutcome& paper, const PaperResult& result) {
   std::string text = fmt::format("### {}: {}\n\n", result.name, result.title);
   if (result.table.empty()) {
-    text +=
-        fmt::format("![{}](pictures/paper_{}_{}.png)\n\n", result.title, paper.model, result.name);
+    text += fmt::format("![{}](../pictures/paper_{}_{}.png)\n\n", result.title, paper.model,
+                        result.name);
   } else {
     text += result.table + "\n";
   }

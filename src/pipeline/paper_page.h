@@ -1,4 +1,4 @@
-// docs/paper_figures.md: all figures of all papers on one page.
+// docs/results/paper_figures.md: all figures of all papers on one page.
 #pragma once
 
 #include <string>

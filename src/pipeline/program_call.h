@@ -30,8 +30,8 @@ class ProgramCall {
 
   /// Puts a file into the folder. "" or what went wrong.
   [[nodiscard]] std::string Give(const std::string& name, const std::string& text) const;
-  /// Calls the program with few variables of the environment (docs/witnesses.md) and waits. Empty,
-  /// or how it failed, with what it printed last.
+  /// Calls the program with few variables of the environment (docs/how-to/external_solvers.md) and
+  /// waits. Empty, or how it failed, with what it printed last.
   [[nodiscard]] std::optional<ProgramFailure> Run();
   /// A file that it left, if it is not longer than it may be.
   [[nodiscard]] std::optional<std::string> Text(const std::string& name) const;

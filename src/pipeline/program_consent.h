@@ -1,4 +1,5 @@
-// Whether programs that scenarios name (`witnesses:`) may run (docs/witnesses.md, "Consent").
+// Whether programs that scenarios name (`witnesses:`) may run (docs/how-to/external_solvers.md,
+// "Consent").
 //
 // A scenario of somebody else must not run commands unasked. Trusted are commands that the user
 // wrote on the command line, programs that mbverify installs, scenarios that it is shipped with,

@@ -1,5 +1,6 @@
-// What another version of MuJoCo changes for a scenario's model (docs/upgrade.md): the equality
-// rows at states of its motion, and the drive forces and loop gaps of stepping it as it is.
+// What another version of MuJoCo changes for a scenario's model (docs/how-to/upgrade_mujoco.md):
+// the equality rows at states of its motion, and the drive forces and loop gaps of stepping it as
+// it is.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// The history of regression runs: one SQLite file, schema in docs/nightly.md.
+// The history of regression runs: one SQLite file, schema in docs/how-to/regression.md.
 //
 // A run is appended in one transaction (write-ahead log, waiting for other writers), so the file
 // holds whole runs only, whatever is killed when.

@@ -1,6 +1,6 @@
 // Report: everything one run gave, and its writers (value → text).
 //
-// The formats are described in docs/scenario_format.md; summary.json carries its version in
+// The formats are described in docs/reference/scenario_file.md; summary.json carries its version in
 // `schema`.
 #pragma once
 

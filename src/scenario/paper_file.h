@@ -1,6 +1,6 @@
 // models/NAME/paper.yaml: the figures and tables that a paper prints of its mechanism, what they
 // are computed from here, the numbers that are printed, and what the paper says of them
-// (docs/paper_figures.md).
+// (docs/results/paper_figures.md).
 #pragma once
 
 #include <optional>

@@ -86,7 +86,7 @@ struct SimulationSettings {
   std::optional<Extrapolation> extrapolate;
 };
 
-/// A program outside that computes the scenario as well (docs/witnesses.md).
+/// A program outside that computes the scenario as well (docs/how-to/external_solvers.md).
 struct ForeignWitness {
   std::string name;
   std::vector<std::string> command;              ///< program and arguments; not empty

@@ -1,5 +1,5 @@
 // StiffnessScenario: the stiffness of a mechanism at one pose, and displacements under loads, as
-// data. A scenario file with `kind: stiffness`; see docs/stiffness.md.
+// data. A scenario file with `kind: stiffness`; see docs/explanation/stiffness.md.
 #pragma once
 
 #include <map>

@@ -1,4 +1,4 @@
-// Study file → Study, checked against its scenario (docs/studies.md).
+// Study file → Study, checked against its scenario (docs/how-to/studies.md).
 #pragma once
 
 #include <cstdint>

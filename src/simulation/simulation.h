@@ -16,7 +16,7 @@ namespace mbv {
 
 enum class SimulationMode { kForward, kInverse };
 enum class Engine {
-  kCorrected,  ///< J̇q̇ and exact drive references supplied (see docs/simulation.md)
+  kCorrected,  ///< J̇q̇ and exact drive references supplied (see docs/explanation/simulation.md)
   kStock,      ///< MuJoCo as it is, by the best recipe from outside (stiff, rates in the targets)
   kDefaults,   ///< MuJoCo as it is by default: soft constraints, positions as targets
 };

@@ -1,4 +1,4 @@
-// The audit's own judgement, and docs/equation_audit.md kept in step.
+// The audit's own judgement, and docs/results/equation_audit.md kept in step.
 #include "audit/audit.h"
 
 #include <gtest/gtest.h>
@@ -97,13 +97,13 @@ TEST(AuditMarkdown, IsTheSameForResidualsThatDifferByRoundoff) {
 // Update with MBV_UPDATE_GOLDEN=1.
 TEST(EquationAudit, DocumentIsInStep) {
   const std::string root = kSourceDir;
-  const std::string path = root + "/docs/equation_audit.md";
+  const std::string path = root + "/docs/results/equation_audit.md";
   const std::string text = AuditDocument(root + "/models");
   if (std::getenv("MBV_UPDATE_GOLDEN") != nullptr) std::ofstream(path) << text;
   std::ifstream file(path);
   std::ostringstream stored;
   stored << file.rdbuf();
-  EXPECT_EQ(stored.str(), text) << "docs/equation_audit.md is stale; rerun with "
+  EXPECT_EQ(stored.str(), text) << "docs/results/equation_audit.md is stale; rerun with "
                                    "MBV_UPDATE_GOLDEN=1";
 }
 

@@ -60,7 +60,7 @@ std::string Culprits(const nlohmann::json& summary) {
 
 // What the documents quote of a scenario is what it gives.
 void CheckDocuments(const std::string& scenario, const std::string& summary) {
-  for (const char* document : {"README.md", "docs/simulation.md"}) {
+  for (const char* document : {"README.md", "docs/explanation/simulation.md"}) {
     const std::string text = ReadAll(fs::path(kSourceDir) / document);
     for (const AccuracyCell& cell : AccuracyCells(text)) {
       if (cell.scenario != scenario) continue;
@@ -134,7 +134,7 @@ std::string ErrorAtStep(const Program& mbverify, const std::string& scenario, do
 }
 
 TEST(ShippedScenarios, TheStepStudyIsWhatTheyGive) {
-  const std::string text = ReadAll(fs::path(kSourceDir) / "docs/simulation.md");
+  const std::string text = ReadAll(fs::path(kSourceDir) / "docs/explanation/simulation.md");
   const std::string mark = "<!-- step study: held by a test -->\n";
   const size_t begin = text.find(mark), end = text.find("<!-- step study: end -->");
   ASSERT_TRUE(begin != std::string::npos && end != std::string::npos);
@@ -170,7 +170,7 @@ TEST(ShippedScenarios, TheStepStudyIsWhatTheyGive) {
 TEST(ShippedScenarios, DocumentsQuoteScenariosThatExist) {
   const fs::path root = kSourceDir;
   size_t quoted = 0;
-  for (const char* document : {"README.md", "docs/simulation.md"}) {
+  for (const char* document : {"README.md", "docs/explanation/simulation.md"}) {
     for (const AccuracyCell& cell : AccuracyCells(ReadAll(root / document))) {
       EXPECT_TRUE(fs::exists(root / "scenarios" / (cell.scenario + ".yaml"))) << cell.scenario;
       ++quoted;

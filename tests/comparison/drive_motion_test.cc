@@ -128,7 +128,8 @@ TEST(DriveMotion, TheDocumentsSayTheSame) {
   const std::string sentence =
       "ommanded in task space, the simulation follows the drive positions, rates and accelerations "
       "that the closed form (else the reference) computes";
-  for (const char* file : {"README.md", "docs/architecture.md", "docs/simulation.md"}) {
+  for (const char* file :
+       {"README.md", "docs/development/architecture.md", "docs/explanation/simulation.md"}) {
     std::ifstream stream(SourcePath(std::string("/") + file));
     std::string text{std::istreambuf_iterator<char>(stream), {}};
     for (char& c : text) {

@@ -123,7 +123,7 @@ TEST(SprTripodModel, HasThreeFreedomsAndNothingRedundant) {
 }
 
 TEST(ModelFormatDocument, ItsExampleLoads) {
-  const std::string file = std::string(kSourceDir) + "/docs/model_format.md";
+  const std::string file = std::string(kSourceDir) + "/docs/reference/model_file.md";
   std::ifstream stream(file);
   const std::string text(std::istreambuf_iterator<char>(stream), {});
   const std::string fence = "```yaml\n";

@@ -15,7 +15,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 std::string DocText(const std::string& name) {
-  std::ifstream stream(std::string(kSourceDir) + "/docs/" + name);
+  std::ifstream stream(std::string(kSourceDir) + "/docs/results/" + name);
   std::stringstream text;
   text << stream.rdbuf();
   return text.str();

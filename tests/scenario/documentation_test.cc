@@ -1,4 +1,4 @@
-// docs/scenario_format.md says what the program does.
+// docs/reference/scenario_file.md says what the program does.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -14,7 +14,7 @@ namespace mbv {
 namespace {
 
 std::string Document() {
-  std::ifstream stream(std::string(kSourceDir) + "/docs/scenario_format.md");
+  std::ifstream stream(std::string(kSourceDir) + "/docs/reference/scenario_file.md");
   std::stringstream text;
   text << stream.rdbuf();
   return text.str();

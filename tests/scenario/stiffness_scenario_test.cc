@@ -165,7 +165,7 @@ TEST_F(StiffnessScenarioText, EmptyLoadsAreNoLoads) {
 }
 
 TEST_F(StiffnessScenarioText, TheDocumentsExampleLoadsAndItsTableHoldsTheDefaults) {
-  std::ifstream stream("docs/stiffness.md");
+  std::ifstream stream("docs/explanation/stiffness.md");
   std::stringstream read;
   read << stream.rdbuf();
   const std::string document = read.str();

@@ -1,4 +1,4 @@
-// What mbverify hands over (docs/witnesses.md): the drives' motion and the loads, at any time.
+// What mbverify hands over (docs/how-to/external_solvers.md): the drives' motion and the loads, at any time.
 import fs from 'node:fs';
 
 /** {header, rows}: a CSV file of mbverify's, cells as text. */

@@ -4,7 +4,7 @@
 //   mbverify-witness-mujoco --defaults   MuJoCo's default softness, positions as targets
 //   mbverify-witness-mujoco --rows       instead: rows of the model at given states (mbverify upgrade)
 //
-// mbverify calls it in a folder of its own (docs/witnesses.md).
+// mbverify calls it in a folder of its own (docs/how-to/external_solvers.md).
 import fs from 'node:fs';
 
 import {load, messageOf, Refused} from './engine.mjs';

@@ -1,4 +1,4 @@
-// The witness (docs/witnesses.md): drive forces of MuJoCo's newest version as anyone would get them.
+// The witness (docs/how-to/external_solvers.md): drive forces of MuJoCo's newest version as anyone would get them.
 import fs from 'node:fs';
 
 import {Refused} from './engine.mjs';

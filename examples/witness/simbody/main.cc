@@ -1,9 +1,9 @@
 // Simbody 3.7 as a witness: a mechanism's drive forces by another engine with its own mathematics.
 //
 // mbverify calls it in a folder with mechanism.json, motion.csv and loads.csv, and it leaves
-// witness.json and traces.csv there (docs/witnesses.md). Joints of the spanning tree are Simbody's
-// mobilizers, closures its constraints, drives constraints on a mobilizer's coordinate or on the
-// distance of two points.
+// witness.json and traces.csv there (docs/how-to/external_solvers.md). Joints of the spanning tree
+// are Simbody's mobilizers, closures its constraints, drives constraints on a mobilizer's
+// coordinate or on the distance of two points.
 #include <iostream>
 
 #include "commanded.h"

@@ -10,8 +10,9 @@
 // Assembly branch: AB leans right, CD and EF lean left, all three angles in (0, π/2) for the
 // inverse problem. K is the middle of BC with coordinates (X, Y).
 //
-// [Liu 2025, Eqs. 1–4, 8, 9, 14–25, 35–46], corrected where the print is wrong (docs/
-// equation_audit.md): AD = X_C − X1 + L3 cos β, β = β1 + β2 in (9), the signs of (23)–(25).
+// [Liu 2025, Eqs. 1–4, 8, 9, 14–25, 35–46], corrected where the print is wrong
+// (docs/results/equation_audit.md): AD = X_C − X1 + L3 cos β, β = β1 + β2 in (9), the signs of
+// (23)–(25).
 #pragma once
 
 #include "core/run_summary.h"
