@@ -8,10 +8,13 @@ namespace {
 constexpr const char* kHead =
     R"(# The papers' figures, computed anew
 
-Written by `scripts/paper_figures`; do not edit. `mbverify figures --paper MODEL` draws them (`docs/how-to/figures.md`), what they show stands in `models/MODEL/paper.yaml`.
+Written by `scripts/results paper_figures`; do not edit. `mbverify figures --paper MODEL` draws them
+(`docs/how-to/figures.md`); `models/MODEL/paper.yaml` states what they show.
 
-In “…” stands in short, and in English, what a paper says of a figure, then its place, the number that is printed for it, and what is computed here. The project has the papers as text
-alone, not as pictures: a curve that is only drawn there is not compared with one point of ours. Where no "printed" number follows, the paper gives none.
+“…” quotes, shortened and in English, what a paper states about a figure. Its place, the printed
+number and the computed value follow. The project has the text of the papers, but not their
+pictures: a curve that is only drawn there is not compared. Where no "printed" number follows, the
+paper gives none.
 )";
 
 std::string AuditText(const PaperResult& result) {
