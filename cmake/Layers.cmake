@@ -1,5 +1,5 @@
-# mbv_layer(folder [LIGHT] DEPS our layers… LIBS external targets…): the static library
-# mbv_<folder> of src/<folder>/**.cc. LIGHT layers compute nothing per sample or step.
+# mbv_layer(room [LIGHT] DEPS our layers… LIBS external targets…): the static library
+# mbv_<room> of src/<room>/**.cc (mbv_features_<product> of a product). LIGHT layers compute nothing per sample or step.
 
 function(mbv_compile_options target)
   # No fused multiply-add contraction: the same numbers on every machine. The four warnings left out
@@ -27,9 +27,11 @@ function(mbv_light target)
   target_compile_options(${target} PRIVATE $<$<CONFIG:Release>:-O1>)
 endfunction()
 
-function(mbv_layer folder)
+function(mbv_layer room)
+  string(REPLACE / _ folder ${room})
   cmake_parse_arguments(ARG "LIGHT" "" "DEPS;LIBS" ${ARGN})
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${folder}/*.cc)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/src/${room}/*.cc)
+  list(TRANSFORM ARG_DEPS REPLACE / _)
   list(TRANSFORM ARG_DEPS PREPEND mbv_)
   if(sources)
     add_library(mbv_${folder} STATIC ${sources})
@@ -52,5 +54,8 @@ function(mbv_layer folder)
   target_link_libraries(mbv_${folder} ${scope} ${ARG_DEPS} ${ARG_LIBS})
   target_compile_features(mbv_${folder} ${scope} cxx_std_20)
   set_target_properties(mbv_${folder} PROPERTIES EXPORT_NAME ${folder})
+  if(room MATCHES "^features/")
+    set(MBV_PRODUCTS ${MBV_PRODUCTS} mbv_${folder} PARENT_SCOPE)
+  endif()
   install(TARGETS mbv_${folder} EXPORT mbverify ARCHIVE COMPONENT development)
 endfunction()

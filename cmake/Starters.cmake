@@ -1,4 +1,4 @@
-# The files that `mbverify init` writes (starters/) as one C++ source of mbv_pipeline, so that the
+# The files that `mbverify init` writes (starters/) as one C++ source of mbv_features_robots, so that the
 # program needs no data beside it.
 
 set(starter_rows "")
@@ -12,7 +12,7 @@ foreach(name four_bar slider_crank stewart)
          "{\"${name}\", R\"--(${model})--\",\nR\"--(${first})--\"},\n")
 endforeach()
 file(CONFIGURE OUTPUT ${CMAKE_BINARY_DIR}/starters.cc @ONLY CONTENT [[
-#include "pipeline/init_model.h"
+#include "features/robots/init.h"
 
 namespace mbv {
 
@@ -24,4 +24,4 @@ const std::vector<Starter>& Starters() {
 
 }  // namespace mbv
 ]])
-target_sources(mbv_pipeline PRIVATE ${CMAKE_BINARY_DIR}/starters.cc)
+target_sources(mbv_features_robots PRIVATE ${CMAKE_BINARY_DIR}/starters.cc)

@@ -1,3 +1,3 @@
-#include "cli/run_cli.h"
+#include "program.h"
 
-int main(int argc, char** argv) { return mbv::RunCli(argc, argv); }
+int main(int argc, char** argv) { return mbv::RunProgram(argc, argv); }

@@ -33,9 +33,9 @@ const EVERYBODYS = ['Eigen3::Eigen', 'fmt::fmt'];
 // Rows "| `folder` | … | ours | external |" → folder: {ours: {layer: files or null}, external}.
 function readTable(text) {
   const layers = {};
-  for (const row of text.matchAll(/^\| `(\w+)` \|.*\| ([^|]*) \| ?([^|]*) ?\|$/gm)) {
+  for (const row of text.matchAll(/^\| `([\w/]+)` \|.*\| ([^|]*) \| ?([^|]*) ?\|$/gm)) {
     const ours = {};
-    for (const item of row[2].matchAll(/(\w+)(?: \(([^)]*)\))?/g)) {
+    for (const item of row[2].matchAll(/([\w/]+)(?: \(([^)]*)\))?/g)) {
       ours[item[1]] = item[2] ? item[2].replaceAll('`', '').split(/,\s*/) : null;
     }
     const external = row[3].split(',').map((word) => word.trim()).filter((word) => word !== '');
@@ -61,11 +61,17 @@ function readCmake(text) {
   return layers;
 }
 
-// Every include below src/ as {path, header}; main.cc stands above the layers.
+// src/<room>/… or src/features/<product>/…
+function roomOf(path) {
+  const parts = path.split('/');
+  return parts[0] === 'features' && parts.length > 2 ? `features/${parts[1]}` : parts[0];
+}
+
+// Every include below src/ as {path, header}; main.cc and program.cc stand above the layers.
 function readIncludes(root) {
   const includes = [];
   for (const path of readdirSync(join(root, 'src'), { recursive: true })) {
-    if (!/\.(h|cc)$/.test(path) || path === 'main.cc') continue;
+    if (!/\.(h|cc)$/.test(path) || !path.includes('/')) continue;
     const text = readFileSync(join(root, 'src', path), 'utf8');
     for (const line of text.matchAll(/^\s*#include [<"]([^>"]+)/gm)) {
       includes.push({ path, header: line[1] });
@@ -111,13 +117,13 @@ function compareWithIncludes(table, includes) {
   const found = [];
   const used = new Set();
   for (const { path, header } of includes) {
-    const folder = path.split('/')[0];
+    const folder = roomOf(path);
     const row = table[folder];
     if (!row) {
       found.push(`src/${path}: folder '${folder}' is not in the layer table`);
       continue;
     }
-    const target = header.includes('/') ? header.split('/')[0] : '';
+    const target = header.includes('/') ? roomOf(header) : '';
     if (target in table && target !== folder) {
       const files = row.ours[target];
       if (files === undefined) found.push(`src/${path}: ${folder} may not include ${header}`);

@@ -1,10 +1,16 @@
 // Sources are compiled several at a time (CMake's unity build): names in unnamed namespaces must
-// differ within each src/<layer> and tests/<folder>, and so must tests; none is a type of a
+// differ within each library of src/ and tests/, and so must tests; none is a type of a
 // header that one of the files includes, and no file opens a namespace for those compiled after it
 // (but within a namespace of its room, which all its files share).
 //   node check_names.mjs ROOT
 import { readdirSync, readFileSync } from 'node:fs';
 import { join } from 'node:path';
+
+// src/<room>, src/features/<product>, and the same below tests/.
+function libraryOf(path) {
+  const parts = path.split('/');
+  return parts.slice(0, parts[1] === 'features' ? 3 : 2).join('/');
+}
 
 // What the lines from `i` on declare at the left margin of an unnamed namespace: {name, shape}, or
 // null. Two declarations of one name may live together when both are functions with different
@@ -88,7 +94,7 @@ function reachedHeaders(sources, headers) {
   const includes = (text) => [...text.matchAll(/^#include "([^"]+)"/gm)].map((match) => `src/${match[1]}`);
   const reached = {};
   for (const [path, text] of Object.entries(sources)) {
-    const folder = path.split('/').slice(0, 2).join('/');
+    const folder = libraryOf(path);
     const seen = (reached[folder] ??= new Set());
     const open = includes(text);
     while (open.length > 0) {
@@ -109,7 +115,7 @@ function check(sources, headers = {}) {
   const types = typesIn(headers);
   const reached = reachedHeaders(sources, headers);
   for (const [path, text] of Object.entries(sources)) {
-    const folder = path.split('/').slice(0, 2).join('/');
+    const folder = libraryOf(path);
     for (const { name, kind, shape } of namesOf(text)) {
       if (kind === 'directive') {
         found.push(`${path}: using namespace ${name} reaches the files compiled after it`);

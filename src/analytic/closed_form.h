@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "analytic/coverage.h"
-#include "core/diagnostics.h"
-#include "core/run_summary.h"
-#include "core/trace.h"
+#include "base/diagnostics.h"
+#include "base/run_summary.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

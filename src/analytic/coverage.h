@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "core/diagnostics.h"
-#include "core/types.h"
+#include "base/diagnostics.h"
+#include "base/types.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

@@ -1,21 +1,17 @@
 // What the mechanisms' papers give, one row each: motion, stiffness, workspace.
 #include <vector>
 
-#include "analytic/cabin_robot/cabin_robot.h"
-#include "analytic/cabin_robot/coverage.h"
-#include "analytic/cabin_robot/stiffness_form.h"
+#include "analytic/cabin_robot/closed_form.h"
+#include "analytic/cabin_robot/stiffness.h"
 #include "analytic/closed_form.h"
 #include "analytic/register_closed_form.h"
 #include "analytic/scara_robot/closed_form.h"
-#include "analytic/scara_robot/coverage.h"
-#include "analytic/scara_robot/stiffness_form.h"
-#include "analytic/scara_robot/workspace_form.h"
+#include "analytic/scara_robot/stiffness.h"
+#include "analytic/scara_robot/workspace.h"
 #include "analytic/spr_tripod/closed_form.h"
-#include "analytic/spr_tripod/coverage.h"
-#include "analytic/spr_tripod/workspace_form.h"
-#include "analytic/stabilizing_platform/coverage.h"
-#include "analytic/stabilizing_platform/stabilizing_platform.h"
-#include "core/demand.h"
+#include "analytic/spr_tripod/workspace.h"
+#include "analytic/stabilizing_platform/closed_form.h"
+#include "base/demand.h"
 
 namespace mbv {
 

@@ -12,8 +12,8 @@
 #include <vector>
 
 #include "analytic/coverage.h"
-#include "core/diagnostics.h"
-#include "core/stiffness.h"
+#include "base/diagnostics.h"
+#include "math/stiffness.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -69,5 +69,28 @@ struct StiffnessFormRow {
 [[nodiscard]] std::span<const StiffnessFormRow> StiffnessForms();
 /// The row for a mechanism name, or nullptr.
 [[nodiscard]] const StiffnessFormRow* FindStiffnessForm(const std::string& mechanism);
+
+// What the stiffness forms of all mechanisms check before they are made, as findings.
+
+/// The coordinates by which a form takes its pose.
+struct PoseNames {
+  std::vector<std::string> needed, accepted;
+  std::string hint;  ///< "the pose is platform.x, …"
+};
+
+/// Coordinates that the form of this mechanism cannot take, and those it misses.
+void CheckPoseNames(const Mechanism& mechanism, const PoseNames& names, const PoseCoordinates& pose,
+                    Diagnostics* diagnostics);
+
+/// Parameters that the model does not have, and those of `positive` that are not.
+void CheckStiffnessParameters(const Mechanism& mechanism, std::span<const std::string> positive,
+                              std::span<const std::string> others, Diagnostics* diagnostics);
+
+/// Index of `model` among `models`; 0 for "", the default; −1 after a finding.
+[[nodiscard]] int IndexOfModel(std::span<const std::string> models, const std::string& model,
+                               Diagnostics* diagnostics);
+
+/// (M + Mᵀ)/2.
+[[nodiscard]] inline Mat6 Symmetric(const Mat6& M) { return 0.5 * (M + M.transpose()); }
 
 }  // namespace mbv

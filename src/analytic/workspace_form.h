@@ -10,10 +10,10 @@
 #include <variant>
 #include <vector>
 
-#include "core/diagnostics.h"
-#include "core/plot.h"
-#include "core/run_summary.h"
-#include "core/triangle_mesh.h"
+#include "base/diagnostics.h"
+#include "base/run_summary.h"
+#include "math/plot.h"
+#include "math/triangle_mesh.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -25,7 +25,7 @@ using RangeFilter = std::function<bool(const std::vector<Pose>& X_WB)>;
 /// What a workspace is computed with.
 struct WorkspaceRequest {
   RangeFilter within_ranges = {};
-  int jobs = 1;  ///< processes at once (ShareOut() of core/in_children.h): nothing depends on it
+  int jobs = 1;  ///< processes at once (ShareOut() of base/worker_pool.h): nothing depends on it
   std::function<void(double fraction)> progress = {};
 
   void Tell(double fraction) const {

@@ -15,14 +15,12 @@
 #include <sstream>
 #include <system_error>
 
+#include "base/text.h"
 #include "cli/run_cli.h"
 #include "cli/terminal.h"
-#include "core/text.h"
-#include "core/word_hints.h"
-#include "core/wrapped.h"
-#include "input/parsed_documents.h"
-#include "mesh/find_mesh.h"
-#include "pipeline/version.h"
+#include "model_file/mesh/read_mesh.h"
+#include "model_file/yaml/parsed_documents.h"
+#include "verify/version.h"
 
 namespace mbv {
 namespace {
@@ -198,7 +196,7 @@ int WorseExit(int a, int b) {
   return kBadness[static_cast<size_t>(a)] >= kBadness[static_cast<size_t>(b)] ? a : b;
 }
 
-int RunCli(int argc, char** argv) {
+int RunCli(int argc, char** argv, std::span<const CommandRow> commands) {
   // A reader that went away (`| head`) and a limit of file sizes (`ulimit -f`) are failed writes,
   // which are reported; they do not end this process in silence with half of a result.
   std::signal(SIGPIPE, SIG_IGN);
@@ -216,36 +214,11 @@ int RunCli(int argc, char** argv) {
              "audit scara_robot"},
             "0 agree, 1 disagree, 2 bad input, 3 could not run, 4 internal error");
   int exit_code = 4;
-  AddInitCommand(&app, &exit_code);
-  AddRunCommand(&app, &exit_code);
-  AddRenderCommand(&app, &exit_code);
-  AddModelCommand(&app, &exit_code);
-  AddCheckCommand(&app, &exit_code);
-  AddAuditCommand(&app, &exit_code);
-  AddListCommand(&app, &exit_code);
-  AddWorkspaceCommand(&app, &exit_code);
-  AddStiffnessCommand(&app, &exit_code);
-  AddMutateCommand(&app, &exit_code);
-  AddConvergeCommand(&app, &exit_code);
-  AddCrosscheckCommand(&app, &exit_code);
-  AddSurveyCommand(&app, &exit_code);
-  AddInertiaCommand(&app, &exit_code);
-  AddSizeCommand(&app, &exit_code);
-  AddUpgradeCommand(&app, &exit_code);
-  AddFiguresCommand(&app, &exit_code);
-  AddTablesCommand(&app, &exit_code);
-  AddStudyCommand(&app, &exit_code);
-  AddPackageCommand(&app, &exit_code);
-  AddVerifyCommand(&app, &exit_code);
-  AddTrustCommand(&app, &exit_code);
-  AddRegressCommand(&app, &exit_code);
-  AddMergeCommand(&app, &exit_code);
-  AddHistoryCommand(&app, &exit_code);
-  AddCompletionCommand(&app, &exit_code);
-  AddManPageCommand(&app, &exit_code);
-  for (const char* command :
-       {"init", "run", "render", "model", "check", "survey", "inertia", "study", "package"}) {
-    AddPackages(app.get_subcommand(command));
+  for (const CommandRow& command : commands) {
+    const size_t before = app.get_subcommands([](CLI::App*) { return true; }).size();
+    command.add(&app, &exit_code);
+    const auto added = app.get_subcommands([](CLI::App*) { return true; });
+    if (command.reads_robots) std::for_each(added.begin() + before, added.end(), AddPackages);
   }
   RequireFiniteNumbers(&app);
   std::string lost;  // why output was lost

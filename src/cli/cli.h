@@ -25,33 +25,9 @@ void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
 /// The same of results that cannot be written. Exit code 3.
 [[nodiscard]] int NotWritten(const std::string& message, const std::string& hint);
 
-// One function per command: adds it to the app; when chosen, its callback sets *exit_code.
-void AddInitCommand(CLI::App* app, int* exit_code);
-void AddRunCommand(CLI::App* app, int* exit_code);
-void AddRenderCommand(CLI::App* app, int* exit_code);
-void AddModelCommand(CLI::App* app, int* exit_code);
-void AddCheckCommand(CLI::App* app, int* exit_code);
-void AddAuditCommand(CLI::App* app, int* exit_code);
-void AddListCommand(CLI::App* app, int* exit_code);
-void AddWorkspaceCommand(CLI::App* app, int* exit_code);
-void AddStiffnessCommand(CLI::App* app, int* exit_code);
-void AddMutateCommand(CLI::App* app, int* exit_code);
-void AddConvergeCommand(CLI::App* app, int* exit_code);
-void AddCrosscheckCommand(CLI::App* app, int* exit_code);
-void AddRegressCommand(CLI::App* app, int* exit_code);
-void AddMergeCommand(CLI::App* app, int* exit_code);
-void AddSurveyCommand(CLI::App* app, int* exit_code);
-void AddHistoryCommand(CLI::App* app, int* exit_code);
-void AddInertiaCommand(CLI::App* app, int* exit_code);
+// Commands of the spine itself; those of features/ are rows of program.cc.
 void AddCompletionCommand(CLI::App* app, int* exit_code);
 void AddManPageCommand(CLI::App* app, int* exit_code);
-void AddSizeCommand(CLI::App* app, int* exit_code);
-void AddFiguresCommand(CLI::App* app, int* exit_code);
-void AddUpgradeCommand(CLI::App* app, int* exit_code);
-void AddTablesCommand(CLI::App* app, int* exit_code);
-void AddStudyCommand(CLI::App* app, int* exit_code);
-void AddPackageCommand(CLI::App* app, int* exit_code);
-void AddVerifyCommand(CLI::App* app, int* exit_code);
 void AddTrustCommand(CLI::App* app, int* exit_code);
 
 }  // namespace mbv

@@ -1,11 +1,39 @@
-#include "cli/completion.h"
+// Scripts by which shells complete mbverify's commands, options and names.
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
+#include <CLI/CLI.hpp>
 #include <algorithm>
+#include <memory>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "cli/cli.h"
+#include "verify/version.h"
 
 namespace mbv {
+
+/// An option as it is typed.
+struct OptionWords {
+  std::vector<std::string> names;  ///< "--quiet", "-q"
+  std::string description;
+  bool takes_value = false;
+  std::vector<std::string> values;  ///< the words that it takes; empty: any, or files
+};
+/// A command, "" for the program itself, with what may follow it.
+struct CommandWords {
+  std::string path;  ///< "history list"
+  std::string description;
+  std::vector<OptionWords> options;
+  std::vector<std::string> names;  ///< kinds of names it takes besides files: "models", "scenarios"
+};
+
+/// All commands and options that help shows, the program itself first.
+[[nodiscard]] std::vector<CommandWords> WordsOf(const CLI::App& app);
+
+// The manual page of the program, of what its commands say of themselves.
+
 namespace {
 
 std::string PathOf(const CLI::App& command) {
@@ -242,8 +270,125 @@ std::vector<CommandWords> WordsOf(const CLI::App& app) {
   return commands;
 }
 
+// The script of a shell: bash, zsh or fish.
 std::string CompletionScript(const std::string& shell, const std::vector<CommandWords>& commands) {
   return shell == "bash" ? Bash(commands) : shell == "zsh" ? Zsh(commands) : Fish(commands);
+}
+
+namespace {
+
+// Text as it is: no request, no escape of troff's.
+std::string Troff(const std::string& text) {
+  std::string out = text.starts_with('.') || text.starts_with('\'') ? "\\&" : "";
+  for (const char c : text) {
+    if (c == '\\') {
+      out += "\\e";
+    } else if (c == '-') {
+      out += "\\-";
+    } else {
+      out += c == '\n' ? ' ' : c;
+    }
+  }
+  return out;
+}
+
+std::string OptionText(const OptionWords& option) {
+  std::string names;
+  for (const std::string& name : option.names) {
+    names += (names.empty() ? "\\fB" : ", \\fB") + Troff(name) + "\\fR";
+  }
+  std::string text = ".TP\n" + names + (option.takes_value ? " \\fIVALUE\\fR" : "") + "\n";
+  text += option.description.empty() ? "\\&\n" : Troff(option.description) + "\n";
+  if (!option.values.empty()) {
+    text += fmt::format("(one of {})\n", Troff(fmt::format("{}", fmt::join(option.values, ", "))));
+  }
+  return text;
+}
+
+// "Examples:" and "Exit codes:" of a command, a line each.
+std::string FooterText(const CLI::App& app) {
+  std::istringstream lines(app.get_footer());
+  std::string text;
+  for (std::string line; std::getline(lines, line);) {
+    const bool example = line.starts_with("  ");
+    text += (example ? ".br\n" : ".PP\n") + Troff(CLI::detail::trim_copy(line)) + "\n";
+  }
+  return text;
+}
+
+std::string PositionalText(const CLI::App& app) {
+  std::string text;
+  for (const CLI::Option* option : app.get_options()) {
+    if (!option->get_positional() || option->get_group().empty()) continue;
+    text += fmt::format(".TP\n\\fI{}\\fR\n{}\n", Troff(option->get_name()),
+                        Troff(option->get_description()));
+  }
+  return text;
+}
+
+// Commands in the order of WordsOf(), which is that of `app`.
+const CLI::App* FindCommand(const CLI::App& app, const std::string& path) {
+  const CLI::App* found = &app;
+  std::istringstream words(path);
+  for (std::string word; found != nullptr && words >> word;) {
+    const auto below =
+        found->get_subcommands([&](const CLI::App* one) { return one->get_name() == word; });
+    found = below.empty() ? nullptr : below.front();
+  }
+  return found;
+}
+
+}  // namespace
+
+// man(7) source, section 1: every command and option that help shows, with examples and exit
+// codes. `version` stands at its foot.
+std::string ManPage(const CLI::App& app, const std::string& version) {
+  std::string text = fmt::format(
+      ".TH MBVERIFY 1 \"\" \"{}\" \"User Commands\"\n.SH NAME\nmbverify \\- {}\n"
+      ".SH SYNOPSIS\n\\fBmbverify\\fR \\fICOMMAND\\fR [\\fIARGUMENT\\fR ...]\n",
+      Troff(version), Troff(app.get_description()));
+  for (const CommandWords& command : WordsOf(app)) {
+    const CLI::App* of = FindCommand(app, command.path);
+    if (of == nullptr) continue;
+    text += command.path.empty() ? ".SH OPTIONS\n"
+                                 : fmt::format(".SS mbverify {}\n{}\n", Troff(command.path),
+                                               Troff(command.description));
+    text += PositionalText(*of);
+    for (const OptionWords& option : command.options) text += OptionText(option);
+    text += FooterText(*of);
+    if (command.path.empty()) text += ".SH COMMANDS\n";
+  }
+  return text;
+}
+
+// mbverify completion
+
+void AddCompletionCommand(CLI::App* app, int* exit_code) {
+  auto shell = std::make_shared<std::string>();
+  CLI::App* completion = app->add_subcommand(
+      "completion", "The script by which a shell completes commands, options and names");
+  completion->add_option("shell", *shell, "bash, zsh or fish")
+      ->required()
+      ->check(OneOf({"bash", "zsh", "fish"}));
+  SetFooter(completion,
+            {"completion bash >~/.local/share/bash-completion/completions/mbverify",
+             "completion zsh >\"${fpath[1]}/_mbverify\"",
+             "completion fish >~/.config/fish/completions/mbverify.fish"},
+            "0 done, 2 bad input");
+  completion->callback([app, shell, exit_code] {
+    fmt::print("{}", CompletionScript(*shell, WordsOf(*app)));
+    *exit_code = 0;
+  });
+}
+
+// For the build, which installs the page; help does not show it.
+void AddManPageCommand(CLI::App* app, int* exit_code) {
+  CLI::App* page = app->add_subcommand("man-page", "The manual page, as source for man");
+  page->group("");
+  page->callback([app, exit_code] {
+    fmt::print("{}", ManPage(*app, std::string("mbverify ") + kVersion));
+    *exit_code = 0;
+  });
 }
 
 }  // namespace mbv

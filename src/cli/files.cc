@@ -6,13 +6,13 @@
 #include <cctype>
 #include <filesystem>
 
+#include "base/files.h"
+#include "base/text.h"
 #include "cli/cli.h"
 #include "cli/terminal.h"
-#include "core/files.h"
-#include "core/text.h"
-#include "pipeline/check_file.h"
 #include "scenario/find_model.h"
 #include "scenario/load_scenario.h"
+#include "verify/check_file.h"
 
 namespace mbv {
 namespace {

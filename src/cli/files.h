@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/inputs.h"
+#include "base/inputs.h"
 #include "scenario/load_scenario.h"
 
 namespace mbv {
@@ -52,7 +52,7 @@ struct LoadOptions;
 /// text that begins otherwise, so that mbverify did not write it. "" if it may.
 [[nodiscard]] std::string WhyForeign(const std::string& path, const std::string& content);
 
-/// Writes a file whole or not at all (see WriteFile in core/files.h), but not over one of `inputs`
+/// Writes a file whole or not at all (see WriteFile in base/files.h), but not over one of `inputs`
 /// or over what mbverify did not write. Exit code: 0; after an error message 2 where `path` is
 /// refused, 3 where it cannot be written.
 [[nodiscard]] int WriteWholeFile(const std::string& path, const std::string& content,

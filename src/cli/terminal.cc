@@ -10,8 +10,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "core/text.h"
-#include "core/wrapped.h"
+#include "base/text.h"
 
 namespace mbv {
 namespace {

@@ -8,8 +8,8 @@
 #include <string>
 #include <string_view>
 
-#include "core/diagnostics.h"
-#include "core/time_left.h"
+#include "base/diagnostics.h"
+#include "base/worker_pool.h"
 
 namespace mbv {
 

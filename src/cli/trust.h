@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/program_consent.h"
+#include "verify/program_consent.h"
 
 namespace mbv {
 

@@ -13,16 +13,16 @@
 #include <string>
 #include <vector>
 
+#include "base/roles.h"
+#include "base/run_summary.h"
 #include "comparison/metrics.h"
-#include "core/roles.h"
-#include "core/run_summary.h"
-#include "core/trace.h"
 #include "kinematics/driven_twists.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "scenario/checks.h"
 #include "scenario/scenario.h"
-#include "table/table.h"
+#include "scenario/tables/table.h"
 
 namespace mbv {
 
@@ -47,7 +47,7 @@ enum class WitnessGap {
 
 /// One witness as handed to the comparison.
 struct Witness {
-  std::string name;              ///< of its role (core/roles.h)
+  std::string name;              ///< of its role (base/roles.h)
   const Trace* trace = nullptr;  ///< null if there is none; summary says why
   RunSummary summary;            ///< the trace is compared only if this is ok
   /// Of a program outside (docs/how-to/external_solvers.md): what it is, the limits it is judged
@@ -288,5 +288,23 @@ struct Comparison {
                                          const Trace& truth);
 [[nodiscard]] WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace);
 [[nodiscard]] Attribution Attribute(const ComparisonInput& input, const Comparison& comparison);
+
+// What a comparison leaves out, and why.
+
+/// Notes what one would expect to be judged and is not; of pairs and witnesses as measured so far.
+void AddNotCompared(const ComparisonInput& input, Comparison* comparison);
+
+// Factors by which signals of other programs are wrong: units, mostly.
+
+struct KnownFactor {
+  double factor;
+  const char* text;  ///< "1000: is the unit kN, mm or ms mistaken?"
+};
+
+/// How far a fitted factor may be from a known one.
+inline constexpr double kSameFactor = 5e-3;
+
+/// The known one that a fitted factor > 0 is; null if it is none.
+[[nodiscard]] const KnownFactor* FindFactor(double factor);
 
 }  // namespace mbv

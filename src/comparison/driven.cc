@@ -6,7 +6,7 @@
 #include <cmath>
 #include <tuple>
 
-#include "comparison/attribution_parts.h"
+#include "comparison/attribution.h"
 #include "comparison/verdict.h"
 #include "mechanism/reach.h"
 
@@ -129,7 +129,7 @@ std::string Astray(const ComparisonInput& input, const CheckResult& check) {
 }
 
 // "drive force, RMS, by 1.2e-04, worst at leg1.force, t = 0.2 s"
-std::string Difference(const CheckResult& check) {
+std::string DifferenceText(const CheckResult& check) {
   return fmt::format("{} by {}, worst at {}", RowOf(check.metric).title, Amount(check),
                      internal::Place(check.channel, check.time_s));
 }
@@ -175,9 +175,10 @@ Attribution AttributePushed(const ComparisonInput& input, const Comparison& comp
                           forces == nullptr ? "" : " to " + Amount(*forces), text)};
     }
     return {driver, fmt::format("{}; {} differs from {}, too: {}", text, name, driver,
-                                Difference(*differ))};
+                                DifferenceText(*differ))};
   }
-  const std::string text = fmt::format("{} and {} differ in {}", name, driver, Difference(*differ));
+  const std::string text =
+      fmt::format("{} and {} differ in {}", name, driver, DifferenceText(*differ));
   double seen = ForceErrorSeen(input, comparison);
   if (!IsDriveForce(differ->metric)) {
     const CheckResult* simulated =
@@ -240,13 +241,14 @@ Attribution AttributeServo(const Comparison& comparison) {
     if (reached == nullptr || (!Failed(reached) && !Failed(computed))) continue;
     const std::string there = fmt::format(
         "on the motion that the servos reached, simulation and reference {}",
-        Failed(reached) ? "differ in " + Difference(*reached) : "agree to " + Amount(*reached));
+        Failed(reached) ? "differ in " + DifferenceText(*reached) : "agree to " + Amount(*reached));
     if (computed == nullptr) {
       return {"", there + "; a third witness would tell which one is wrong"};
     }
-    const std::string text = fmt::format(
-        "{}; on the commanded motion analytic and reference {}", there,
-        Failed(computed) ? "differ in " + Difference(*computed) : "agree to " + Amount(*computed));
+    const std::string text =
+        fmt::format("{}; on the commanded motion analytic and reference {}", there,
+                    Failed(computed) ? "differ in " + DifferenceText(*computed)
+                                     : "agree to " + Amount(*computed));
     Attribution::Split split{.measure = RowOf(metric).title, .unit = RowOf(metric).unit};
     const auto stands_alone = [&](const Role& odd, const Role& with, const CheckResult& near,
                                   const CheckResult& far) -> Attribution {

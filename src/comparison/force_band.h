@@ -6,8 +6,8 @@
 
 #include <vector>
 
-#include "core/trace.h"
-#include "core/types.h"
+#include "base/types.h"
+#include "math/trace.h"
 
 namespace mbv {
 

@@ -5,8 +5,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/trace.h"
-#include "core/types.h"
+#include "base/types.h"
+#include "math/trace.h"
 
 namespace mbv {
 

@@ -1,10 +1,10 @@
-// What a run asks of a drive's motor (mechanism/motor.h), and how much of the motor that uses.
+// What a run asks of a drive's motor (mechanism/mechanism.h), and how much of the motor that uses.
 #pragma once
 
 #include <string>
 #include <vector>
 
-#include "core/trace.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {

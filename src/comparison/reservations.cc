@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "comparison/derivatives.h"
 #include "comparison/driven.h"
 #include "comparison/verdict.h"
-#include "core/text.h"
 #include "mechanism/channels.h"
 #include "mechanism/reach.h"
 

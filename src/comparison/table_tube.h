@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "comparison/comparison.h"
-#include "table/table.h"
+#include "scenario/tables/table.h"
 
 namespace mbv {
 

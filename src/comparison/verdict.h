@@ -1,7 +1,7 @@
 // What is judged alike, whatever is compared: motions, stiffnesses, or what comes next. A
 // comparison brings measurements (pairs with named metrics, checks) and words; this decides.
 //
-//   pairs            of witnesses: kRolePairs (core/roles.h)
+//   pairs            of witnesses: kRolePairs (base/roles.h)
 //   a check          passes only if its value is a number at or below its limit
 //   two against one  those that are closest by far stand against the one that is left
 #pragma once
@@ -9,13 +9,31 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/roles.h"
+#include "base/roles.h"
+#include "comparison/comparison.h"
+
+// Single numbers out of a comparison.
 
 namespace mbv {
+
+/// NaN where it was not measured.
+[[nodiscard]] inline double ValueOf(const std::map<Metric, Measured>& metrics, Metric metric) {
+  const auto found = metrics.find(metric);
+  return found == metrics.end() ? kNan : found->second.value;
+}
+
+/// Whichever of the two is held against the other; null if neither is.
+[[nodiscard]] inline const PairComparison* FindEitherWay(const Comparison& comparison,
+                                                         const std::string& a,
+                                                         const std::string& b) {
+  const PairComparison* pair = comparison.FindPair(PairName(a, b));
+  return pair != nullptr ? pair : comparison.FindPair(PairName(b, a));
+}
 
 /// The entry with this name, or nullptr: witnesses and checks have `name`.
 template <typename Named>

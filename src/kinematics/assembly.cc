@@ -1,5 +1,6 @@
 #include "kinematics/assembly.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -7,12 +8,12 @@
 #include <numbers>
 #include <random>
 
-#include "core/spatial.h"
-#include "kinematics/assembly_residual.h"
-#include "kinematics/damped_search.h"
+#include "kinematics/constraints.h"
 #include "kinematics/home.h"
 #include "kinematics/tree_motion.h"
+#include "math/spatial.h"
 #include "mechanism/joint_pose.h"
+#include "mechanism/motion.h"
 #include "mechanism/reach.h"
 #include "mechanism/spanning_tree.h"
 
@@ -275,6 +276,158 @@ GroupAssemblies FindAssemblies(const Mechanism& mechanism, const LoopGroup& grou
                                const std::vector<bool>& driven, const JointCoordinates& guess) {
   if (group.joints.empty()) return {.group = group, .assemblies = {}, .best = {}};
   return AssemblySearch(mechanism, group, driven, guess).Run();
+}
+
+}  // namespace mbv
+
+// What is open at a closure, as rotation vectors that vanish nowhere else.
+
+namespace mbv::internal {
+namespace {
+
+// d log(R)/dt = L ω for Ṙ = [ω]× R, the inverse left Jacobian of SO(3).
+Mat3 LogDerivative(const Vec3& r) {
+  const double angle = r.norm();
+  const Mat3 S = Skew(r);
+  double k = 1.0 / 12.0;
+  if (angle > 1e-3) k = (1.0 - 0.5 * angle / std::tan(0.5 * angle)) / (angle * angle);
+  return Mat3::Identity() - 0.5 * S + k * S * S;
+}
+
+// Rotation vector that turns the unit vector a onto m by the shortest way, and its derivative by
+// the angular velocity of m.
+void Alignment(const Vec3& a, const Vec3& m, Vec3* r, Mat3* J) {
+  const Vec3 cross = a.cross(m);
+  const double sine = cross.norm(), angle = std::atan2(sine, a.dot(m));
+  if (sine < 1e-12 && angle < 1.0) {
+    r->setZero();
+    *J = Mat3::Identity() - a * a.transpose();
+    return;
+  }
+  // Against each other any way is as short: some perpendicular axis.
+  const Vec3 n = sine < 1e-12 ? Vec3(a.unitOrthogonal()) : Vec3(cross / sine);
+  constexpr double kSteepest = 10.0;  // where the shortest way jumps from one side to the other
+  const double k = sine < angle / kSteepest ? kSteepest : angle / sine;
+  *r = angle * n;
+  *J = n * n.transpose() + k * a.cross(n) * m.cross(n).transpose();
+}
+
+// Rows of the rotation, in F, and their derivative by the angular velocity of M against F.
+void RotationRows(const Joint& joint, const Mat3& R_FM, VecX* r, MatX* J) {
+  switch (joint.kind) {
+    case JointKind::kSpherical:
+    case JointKind::kPointOnLine:
+    case JointKind::kPointOnPlane:
+    case JointKind::kFree:
+      r->resize(0);
+      J->resize(0, 3);
+      return;
+    case JointKind::kFixed:
+    case JointKind::kPrismatic: {
+      const Vec3 log = LogRotation(R_FM);
+      *r = log;
+      *J = LogDerivative(log);
+      return;
+    }
+    case JointKind::kRevolute:
+    case JointKind::kCylindrical:
+    case JointKind::kPlanar: {
+      Vec3 v;
+      Mat3 D;
+      Alignment(joint.axis, R_FM * joint.axis, &v, &D);
+      *r = v;
+      *J = D;
+      return;
+    }
+    case JointKind::kUniversal: {
+      const Vec3 m = R_FM * joint.axis2;
+      const Vec3 cross = joint.axis.cross(m);
+      const double sine = cross.norm();
+      const Vec3 n = sine < 1e-12 ? Vec3(joint.axis.unitOrthogonal()) : Vec3(cross / sine);
+      r->resize(1);
+      (*r)[0] = std::atan2(sine, joint.axis.dot(m)) -
+                std::atan2(joint.axis.cross(joint.axis2).norm(), joint.axis.dot(joint.axis2));
+      *J = n.transpose();
+      return;
+    }
+  }
+}
+
+}  // namespace
+
+ClosureGap AssemblyResidual(const Joint& joint, const ClosureFrames& frames, double length) {
+  BodyStates states;
+  states.Resize(2);
+  states.X_WB = {frames.X_WP, frames.X_WC};
+  Joint alone = joint;
+  alone.parent = 0;
+  alone.child = 1;
+  const ConstraintRows rows = RowsOf(alone, states, false);
+  const int n = rows.translation_rows;
+
+  const Mat3 R_WF = frames.X_WP.linear() * joint.X_PF.linear();
+  VecX r;
+  MatX D;
+  RotationRows(joint, R_WF.transpose() * frames.X_WC.linear() * joint.X_CM.linear(), &r, &D);
+  ClosureGap gap;
+  gap.residual.resize(n + r.size());
+  gap.residual << rows.residual.head(n) / length, r;
+  gap.J_parent = gap.J_child = MatX::Zero(n + r.size(), 6);
+  gap.J_parent.topRows(n) = rows.J_parent.topRows(n) / length;
+  gap.J_child.topRows(n) = rows.J_child.topRows(n) / length;
+  if (r.size() == 0) return gap;
+  gap.J_child.bottomLeftCorner(r.size(), 3) = D * R_WF.transpose();
+  gap.J_parent.bottomLeftCorner(r.size(), 3) = -D * R_WF.transpose();
+  return gap;
+}
+
+}  // namespace mbv::internal
+
+namespace mbv {
+
+std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& found) {
+  constexpr size_t kMostJoints = 4, kMostWays = 4;
+  // The joints in which the ways differ most, or which moved most.
+  std::vector<std::pair<double, size_t>> moved;
+  for (size_t k = 0; k < found.group.joints.size(); ++k) {
+    const Joint& joint = mechanism.joints[found.group.joints[k]];
+    if (FreedomsOf(joint.kind) == 0) continue;
+    double most = std::abs(found.assemblies.front().q[k][0] - joint.guess[0]);
+    for (const Assembly& way : found.assemblies) {
+      most = std::max(most, std::abs(way.q[k][0] - found.assemblies.front().q[k][0]));
+    }
+    moved.emplace_back(-most, k);
+  }
+  std::stable_sort(moved.begin(), moved.end());
+  moved.resize(std::min(moved.size(), kMostJoints));
+  const auto angles = [&](const Assembly& way) {
+    std::string text;
+    for (const auto& [change, k] : moved) {
+      const Joint& joint = mechanism.joints[found.group.joints[k]];
+      std::string values;
+      for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+        values += fmt::format("{}{:.4g}", c == 0 ? "" : " ", way.q[k][c]);
+      }
+      text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", joint.name, values);
+    }
+    return text;
+  };
+  std::string text;
+  for (size_t i = 0; i < std::min<size_t>(found.group.closures.size(), 3); ++i) {
+    text += (i == 0 ? "" : ", ") + mechanism.joints[found.group.closures[i]].name;
+  }
+  if (found.group.closures.size() > 3) text += ", …";
+  text += fmt::format(
+      ": {} found, taken is {}",
+      found.assemblies.size() == 1 ? "1 way to close"
+                                   : fmt::format("{} ways to close", found.assemblies.size()),
+      (found.assemblies.size() == 1 ? "" : "1: ") + angles(found.assemblies.front()));
+  for (size_t i = 1; i < std::min(found.assemblies.size(), kMostWays); ++i) {
+    text +=
+        fmt::format("{}{}: {}", i == 1 ? "; others: " : " / ", i + 1, angles(found.assemblies[i]));
+  }
+  if (found.assemblies.size() > kMostWays) text += " / …";
+  return text;
 }
 
 }  // namespace mbv

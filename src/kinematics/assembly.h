@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "kinematics/loop_groups.h"
+#include "kinematics/mobility.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -44,3 +44,21 @@ struct GroupAssemblies {
 [[nodiscard]] std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& found);
 
 }  // namespace mbv
+
+// Residual of closures for the search of assemblies. Internal to kinematics/.
+
+namespace mbv::internal {
+
+/// What is left open at a closure, and its derivative by the twists of its two bodies. Lengths are
+/// relative to `length`.
+struct ClosureGap {
+  VecX residual;
+  MatX J_parent, J_child;  ///< rows × 6
+};
+struct ClosureFrames {
+  Pose X_WP, X_WC;  ///< of parent and child body
+};
+[[nodiscard]] ClosureGap AssemblyResidual(const Joint& joint, const ClosureFrames& frames,
+                                          double length);
+
+}  // namespace mbv::internal

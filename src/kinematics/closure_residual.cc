@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "kinematics/constraints.h"
-#include "kinematics/coupling_rows.h"
 
 namespace mbv::internal {
 

@@ -2,7 +2,7 @@
 #pragma once
 
 #include "kinematics/tree_motion.h"
-#include "mechanism/body_states.h"
+#include "mechanism/motion.h"
 
 namespace mbv::internal {
 

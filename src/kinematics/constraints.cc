@@ -1,11 +1,17 @@
 #include "kinematics/constraints.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <vector>
 
-#include "core/demand.h"
+#include "base/demand.h"
+#include "base/text.h"
 #include "kinematics/frame_pair.h"
+#include "kinematics/home.h"
+#include "kinematics/mobility.h"
+#include "math/parallel_transport.h"
 #include "mechanism/joint_pose.h"
 
 namespace mbv {
@@ -132,6 +138,357 @@ ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate
                                 near_value);
   }
   ThrowDemand("known coordinate kind", __FILE__, __LINE__, "?");
+}
+
+namespace {
+
+// P(q) without constant, P′ and P″ by Horner's rule.
+struct PolynomialJet {
+  double value = 0.0, slope = 0.0, curvature = 0.0;
+};
+
+PolynomialJet PolynomialAt(const std::vector<double>& coefficients, double q) {
+  PolynomialJet at;
+  for (size_t i = coefficients.size(); i-- > 0;) {
+    at.curvature = at.curvature * q + 2.0 * at.slope;
+    at.slope = at.slope * q + at.value;
+    at.value = at.value * q + coefficients[i];
+  }
+  // So far of P(q)/q.
+  return {.value = at.value * q,
+          .slope = at.slope * q + at.value,
+          .curvature = at.curvature * q + 2.0 * at.slope};
+}
+
+// `near`: per term a value within half a turn.
+CouplingRow RowOf(const Mechanism& mechanism, const Coupling& coupling, const BodyStates& states,
+                  const double* near) {
+  CouplingRow out;
+  out.value = coupling.constant;
+  for (const Coupling::Term& term : coupling.terms) {
+    const Joint& joint = mechanism.joints[term.joint];
+    ScalarRow row = JointCoordinateRow(joint, term.coordinate, states,
+                                       near == nullptr ? joint.home[term.coordinate] : *near++);
+    const double rate = RateOf(row, states.V_WB);
+    const PolynomialJet P = PolynomialAt(term.polynomial, row.value);
+    out.coordinates.push_back(row.value);
+    row.value = P.value;
+    row.bias = P.slope * row.bias + P.curvature * rate * rate;
+    row.J_parent *= P.slope;
+    row.J_child *= P.slope;
+    out.value += row.value;
+    out.angular = out.angular && !IsLength(joint.kind, term.coordinate);
+    out.pieces.push_back(row);
+  }
+  if (!out.pieces.empty()) out.pieces.front().value += coupling.constant;
+  return out;
+}
+
+}  // namespace
+
+double CouplingRow::LargestPiece() const {
+  double largest = 0.0;
+  for (const ScalarRow& piece : pieces) largest = std::max(largest, std::abs(piece.value));
+  return largest;
+}
+
+std::vector<CouplingRow> CouplingRows(const Mechanism& mechanism, const BodyStates& states) {
+  std::vector<CouplingRow> rows;
+  const double* near = states.coupled.empty() ? nullptr : states.coupled.data();
+  for (const Coupling& coupling : mechanism.couplings) {
+    rows.push_back(RowOf(mechanism, coupling, states, near));
+    if (near != nullptr) near += coupling.terms.size();
+  }
+  return rows;
+}
+
+std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states) {
+  std::vector<CouplingRow> rows = CouplingRows(mechanism, *states);
+  states->coupled.clear();
+  for (const CouplingRow& row : rows) {
+    states->coupled.insert(states->coupled.end(), row.coordinates.begin(), row.coordinates.end());
+  }
+  return rows;
+}
+
+std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism, const BodyStates& states) {
+  std::vector<ScalarRow> rows;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      const Joint& joint = mechanism.joints[term.joint];
+      const double near =
+          states.coupled.empty() ? joint.home[term.coordinate] : states.coupled[rows.size()];
+      rows.push_back(JointCoordinateRow(joint, term.coordinate, states, near));
+    }
+  }
+  return rows;
+}
+
+std::vector<double> CoupledGuesses(const Mechanism& mechanism) {
+  std::vector<double> guesses;
+  for (const Coupling& coupling : mechanism.couplings) {
+    for (const Coupling::Term& term : coupling.terms) {
+      guesses.push_back(mechanism.joints[term.joint].guess[term.coordinate]);
+    }
+  }
+  return guesses;
+}
+
+namespace {
+
+// x near `start` with P(x) = value; `start` where Newton finds none.
+double SolutionNear(const std::vector<double>& polynomial, double value, double start) {
+  if (polynomial.size() == 1) return value / polynomial[0];
+  constexpr int kMostSteps = 60;
+  double x = start;
+  for (int i = 0; i < kMostSteps; ++i) {
+    const PolynomialJet P = PolynomialAt(polynomial, x);
+    const double step = (value - P.value) / P.slope;
+    if (!std::isfinite(step)) return start;
+    x += step;
+    if (std::abs(step) <= 4 * kEps * std::max(1.0, std::abs(x))) return x;
+  }
+  return start;
+}
+
+}  // namespace
+
+void SolveFollowers(const Mechanism& mechanism, CoordinateSet* known,
+                    std::vector<std::array<double, 6>>* q) {
+  for (bool any = true; any;) {
+    any = false;
+    for (const Coupling& coupling : mechanism.couplings) {
+      const Coupling::Term* unknown = nullptr;
+      int count = 0;
+      double sum = coupling.constant;
+      for (const Coupling::Term& term : coupling.terms) {
+        if (!known->contains({term.joint, term.coordinate})) {
+          unknown = &term;
+          ++count;
+        } else {
+          sum += PolynomialAt(term.polynomial, (*q)[term.joint][term.coordinate]).value;
+        }
+      }
+      if (count != 1) continue;
+      double& follower = (*q)[unknown->joint][unknown->coordinate];
+      follower = SolutionNear(unknown->polynomial, -sum, follower);
+      known->insert({unknown->joint, unknown->coordinate});
+      any = true;
+    }
+  }
+}
+
+std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling) {
+  std::vector<std::string> names;
+  for (const Coupling::Term& term : coupling.terms) {
+    names.push_back(mechanism.joints[term.joint].name);
+  }
+  return Joined(names);
+}
+
+namespace {
+
+ScalarRow RowOf(const Mechanism& mechanism, const ForceElement& element, const BodyStates& states,
+                const double* near) {
+  if (element.drive >= 0) {
+    return DriveRow(mechanism, mechanism.drives[static_cast<size_t>(element.drive)], states);
+  }
+  if (element.bushing >= 0) {
+    return BushingRow(mechanism.bushings[static_cast<size_t>(element.bushing)], element.coordinate,
+                      states);
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
+  const auto k = static_cast<size_t>(element.coordinate);
+  return JointCoordinateRow(joint, element.coordinate, states,
+                            near == nullptr ? joint.home[k] : *near);
+}
+
+// Drives, then prescribed joints.
+std::vector<Coordinate> Driven(const Mechanism& mechanism) {
+  std::vector<Coordinate> driven;
+  for (size_t k = 0; k < mechanism.drives.size(); ++k) {
+    driven.push_back({Coordinate::Kind::kDrive, static_cast<int>(k), 0});
+  }
+  for (size_t k = 0; k < mechanism.prescribed.size(); ++k) {
+    driven.push_back({Coordinate::Kind::kPrescribed, static_cast<int>(k), 0});
+  }
+  return driven;
+}
+
+// Where nothing was followed yet, the poses lie within half a turn of home.
+std::vector<double>* TurnsOf(const Mechanism& mechanism, BodyStates* states) {
+  if (!states->turns.empty()) return &states->turns;
+  for (const ForceElement& element : mechanism.elements) {
+    const Coordinate on{Coordinate::Kind::kJoint, element.joint, element.coordinate};
+    states->turns.push_back(element.joint < 0 ? 0.0 : HomeValue(mechanism, on));
+  }
+  for (const Coordinate& driven : Driven(mechanism)) {
+    states->turns.push_back(HomeValue(mechanism, driven));
+  }
+  return &states->turns;
+}
+
+ScalarRow DrivenRow(const Mechanism& mechanism, const Coordinate& driven, const BodyStates& states,
+                    double near) {
+  const auto k = static_cast<size_t>(driven.index);
+  if (driven.kind == Coordinate::Kind::kDrive) {
+    return DriveRow(mechanism, mechanism.drives[k], states, near);
+  }
+  const Joint& joint = mechanism.joints[static_cast<size_t>(mechanism.prescribed[k].joint)];
+  return JointCoordinateRow(joint, 0, states, near);
+}
+
+void Put(const std::vector<ScalarRow>& rows, size_t first, std::vector<double>* turns) {
+  for (size_t k = 0; k < rows.size(); ++k) (*turns)[first + k] = rows[k].value;
+}
+
+// c + ċ Δt + c̈ Δt²/2
+double Later(const ScalarRow& row, const BodyStates& states, double dt_s) {
+  return row.value +
+         dt_s * (RateOf(row, states.V_WB) + 0.5 * dt_s * (RateOf(row, states.A_WB) + row.bias));
+}
+
+}  // namespace
+
+std::vector<ScalarRow> ElementRows(const Mechanism& mechanism, const BodyStates& states) {
+  std::vector<ScalarRow> rows;
+  for (size_t e = 0; e < mechanism.elements.size(); ++e) {
+    rows.push_back(RowOf(mechanism, mechanism.elements[e], states,
+                         states.turns.empty() ? nullptr : &states.turns[e]));
+  }
+  return rows;
+}
+
+std::vector<ScalarRow> DrivenRows(const Mechanism& mechanism, const BodyStates& states) {
+  std::vector<ScalarRow> rows;
+  for (const Coordinate& driven : Driven(mechanism)) {
+    const size_t k = mechanism.elements.size() + rows.size();
+    const double near = states.turns.empty() ? HomeValue(mechanism, driven) : states.turns[k];
+    rows.push_back(DrivenRow(mechanism, driven, states, near));
+  }
+  return rows;
+}
+
+void FollowElements(const Mechanism& mechanism, BodyStates* states) {
+  if (mechanism.elements.empty()) return;
+  Put(ElementRows(mechanism, *states), 0, TurnsOf(mechanism, states));
+}
+
+void FollowDriven(const Mechanism& mechanism, BodyStates* states) {
+  Put(DrivenRows(mechanism, *states), mechanism.elements.size(), TurnsOf(mechanism, states));
+}
+
+void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states) {
+  std::vector<double> turns, coupled;
+  for (auto* rows_of : {&ElementRows, &DrivenRows}) {
+    for (const ScalarRow& row : rows_of(mechanism, *states)) {
+      turns.push_back(Later(row, *states, dt_s));
+    }
+  }
+  for (const ScalarRow& row : CoupledCoordinates(mechanism, *states)) {
+    coupled.push_back(Later(row, *states, dt_s));
+  }
+  states->turns = std::move(turns);
+  states->coupled = std::move(coupled);
+}
+
+namespace {
+
+// Angles between these are suspected: round-off is smaller, a drawing has larger ones.
+constexpr double kSmallest_rad = 1e-9, kLargest_rad = 0.1;
+
+bool IsHinge(const Joint& joint) {
+  return joint.kind == JointKind::kRevolute || joint.kind == JointKind::kCylindrical;
+}
+bool HasOneAxis(const Joint& joint) {
+  return IsHinge(joint) || joint.kind == JointKind::kPrismatic;
+}
+
+// The axis of a joint in a body that it connects.
+Vec3 AxisOn(const Joint& joint, int body) {
+  return (joint.parent == body ? joint.X_PF : joint.X_CM).linear() * joint.axis;
+}
+
+// Where the axis of `joint` would be beside that of `other`: parallel, or perpendicular if one
+// slides and one turns.
+Vec3 AlignedAxis(const Joint& joint, const Joint& other, int body) {
+  const Vec3 own = AxisOn(joint, body), near = AxisOn(other, body);
+  const Vec3 along = near * near.dot(own);
+  return (IsHinge(joint) == IsHinge(other) ? along : Vec3(own - along)).normalized();
+}
+
+struct Suspicion {
+  int joint, other, body;
+  double angle_rad;
+};
+
+std::vector<Suspicion> Suspicions(const Mechanism& mechanism) {
+  std::vector<Suspicion> found;
+  const auto count = static_cast<int>(mechanism.joints.size());
+  for (int j = 0; j < count; ++j) {
+    for (int k = 0; k < count; ++k) {
+      const Joint &a = mechanism.joints[j], &b = mechanism.joints[k];
+      if (j == k || !HasOneAxis(a) || !HasOneAxis(b)) continue;
+      for (const int body : {a.parent, a.child}) {
+        if (body != b.parent && body != b.child) continue;
+        const Vec3 own = AxisOn(a, body);
+        const double angle = std::asin(std::min(1.0, own.cross(AlignedAxis(a, b, body)).norm()));
+        if (angle > kSmallest_rad && angle < kLargest_rad) found.push_back({j, k, body, angle});
+      }
+    }
+  }
+  // The culprit misses its neighbours on both of its bodies.
+  const auto misses = [&](int joint) {
+    return std::count_if(found.begin(), found.end(),
+                         [&](const Suspicion& s) { return s.joint == joint; });
+  };
+  std::stable_sort(found.begin(), found.end(), [&](const Suspicion& a, const Suspicion& b) {
+    return misses(a.joint) > misses(b.joint);
+  });
+  return found;
+}
+
+// The joint with its axis turned to its neighbours' on every body where it misses one.
+Mechanism WithAligned(const Mechanism& mechanism, int joint, const std::vector<Suspicion>& all) {
+  Mechanism aligned = mechanism;
+  Joint& own = aligned.joints[joint];
+  for (const int body : {own.parent, own.child}) {
+    const auto found = std::find_if(all.begin(), all.end(), [&](const Suspicion& s) {
+      return s.joint == joint && s.body == body;
+    });
+    if (found == all.end()) continue;
+    const Vec3 to = AlignedAxis(own, aligned.joints[found->other], body);
+    Pose& frame = own.parent == body ? own.X_PF : own.X_CM;
+    frame.linear() = LeastRotation(AxisOn(own, body), to) * frame.linear();
+  }
+  return aligned;
+}
+
+int PassiveFreedoms(Mechanism mechanism) {
+  mechanism.drives.clear();
+  mechanism.prescribed.clear();
+  return CountFreedoms(mechanism);
+}
+
+}  // namespace
+
+std::optional<TiltedAxis> FindTiltedAxis(const Mechanism& mechanism, bool closed_at_home) {
+  const std::vector<Suspicion> suspicions = Suspicions(mechanism);
+  if (suspicions.empty()) return {};
+  const int freedoms = closed_at_home ? PassiveFreedoms(mechanism) : 0;
+  const auto driven = static_cast<int>(mechanism.drives.size() + mechanism.prescribed.size());
+  if (closed_at_home && freedoms >= std::max(1, driven)) return {};
+  int tried = -1;
+  for (const Suspicion& s : suspicions) {
+    if (s.joint == tried) continue;
+    tried = s.joint;
+    Mechanism aligned = WithAligned(mechanism, s.joint, suspicions);
+    if (!SolveHome(&aligned).closed) continue;
+    const int more = PassiveFreedoms(aligned);
+    if (closed_at_home && more <= freedoms) continue;
+    return TiltedAxis{s.joint, s.other, s.body, s.angle_rad, freedoms, more};
+  }
+  return {};
 }
 
 }  // namespace mbv

@@ -4,8 +4,14 @@
 // as  ṙ = J V  and  r̈ = J A + b.
 #pragma once
 
-#include "core/types.h"
-#include "mechanism/body_states.h"
+#include <array>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "base/types.h"
+#include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 
@@ -56,5 +62,94 @@ struct ScalarRow {
                                    const BodyStates& states);
 [[nodiscard]] ScalarRow CoordinateRow(const Mechanism& mechanism, const Coordinate& coordinate,
                                       const BodyStates& states, double near_value = 0.0);
+
+// Couplings of joint coordinates as constraint rows.
+//
+// The row Σ_k P_k(q_k) + constant = 0 is differentiated as
+//   ṙ = Σ_k P_k′ q̇_k,  r̈ = Σ_k (P_k′ q̈_k + P_k″ q̇_k²).
+
+/// A coupling's row: the sum of its pieces.
+struct CouplingRow {
+  std::vector<ScalarRow> pieces;    ///< per term; the constant is in the first
+  std::vector<double> coordinates;  ///< per term: q_k, which counts turns
+  bool angular = true;              ///< all coordinates are angles
+  double value = 0.0;               ///< of the sum: in the unit of the coordinates
+
+  [[nodiscard]] double LargestPiece() const;  ///< |P_k(q_k)|, which the sum's rounding follows
+};
+
+/// The rows of all couplings at poses, with velocities for the bias, in the turns that
+/// `states.coupled` tells.
+[[nodiscard]] std::vector<CouplingRow> CouplingRows(const Mechanism& mechanism,
+                                                    const BodyStates& states);
+
+/// The same, and brings `states->coupled` to the poses, which lie within half a turn of those it
+/// was last brought to (or of home).
+std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states);
+
+/// The coordinate of every term of every coupling, in the turns that `states.coupled` tells.
+[[nodiscard]] std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism,
+                                                        const BodyStates& states);
+
+/// How many turns the coupled coordinates count at the joints' guesses, for poses near them.
+[[nodiscard]] std::vector<double> CoupledGuesses(const Mechanism& mechanism);
+
+/// Coordinates by joint and number.
+using CoordinateSet = std::set<std::pair<int, int>>;
+/// Gives the one coordinate of a coupling that is not `known` the value that the others ask for, in
+/// any turn, and counts it as known; for as long as there is such a coupling. `q`: by joint.
+void SolveFollowers(const Mechanism& mechanism, CoordinateSet* known,
+                    std::vector<std::array<double, 6>>* q);
+
+/// Names of the coupled joints, for messages: "wheel, pinion".
+[[nodiscard]] std::string CoupledJoints(const Mechanism& mechanism, const Coupling& coupling);
+
+// Coordinates of force elements as rows, and which turn their angles and those of drives are in.
+
+/// The coordinates of all force elements at poses, in the turns that `states.turns` tells, with
+/// velocities for the bias.
+[[nodiscard]] std::vector<ScalarRow> ElementRows(const Mechanism& mechanism,
+                                                 const BodyStates& states);
+/// The same of drives, then of prescribed joints.
+[[nodiscard]] std::vector<ScalarRow> DrivenRows(const Mechanism& mechanism,
+                                                const BodyStates& states);
+
+/// Brings the elements' part of `states->turns` to the poses, which lie within half a turn of those
+/// it was last brought to (or of home).
+void FollowElements(const Mechanism& mechanism, BodyStates* states);
+/// The same for drives and prescribed joints.
+void FollowDriven(const Mechanism& mechanism, BodyStates* states);
+
+/// What `states->coupled` and `states->turns` are likely to be `dt_s` later, by velocities and
+/// accelerations. To be called before the poses are moved there, where angles may turn by more than
+/// half a turn.
+void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states);
+
+// The rows of idle spins (mechanism/idle_spins.h, eq. 3): ṙ = n·ω, r̈ = n·ε. There is no r: the turn
+// about n is left where it is, so its value is always 0.
+
+[[nodiscard]] inline ScalarRow IdleRow(const Spin& spin, const BodyStates& states) {
+  ScalarRow row;
+  row.child = spin.bodies[0];
+  row.J_child.head<3>() = states.X_WB[static_cast<size_t>(row.child)].linear() * spin.n_B;
+  return row;
+}
+
+// Axes that are almost, but not quite, parallel: a typing slip that freezes a planar loop.
+
+struct TiltedAxis {
+  int joint = -1;  ///< its axis is tilted
+  int other = -1;  ///< against that of this joint
+  int body = 0;    ///< that carries both
+  double angle_rad = kNan;
+  int freedoms = 0;          ///< of the mechanism as it is
+  int freedoms_aligned = 0;  ///< with the two axes parallel (perpendicular: slide and hinge)
+};
+
+/// Looks for a joint whose axis misses those beside it by a small angle, where aligning it closes
+/// loops that do not close at home, or gives freedom to a mechanism that has too little for its
+/// drives. Nothing if aligning changes neither: then the angle is meant.
+[[nodiscard]] std::optional<TiltedAxis> FindTiltedAxis(const Mechanism& mechanism,
+                                                       bool closed_at_home);
 
 }  // namespace mbv

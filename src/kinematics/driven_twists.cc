@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "kinematics/row_stack.h"
-#include "mechanism/body_states.h"
+#include "mechanism/motion.h"
 #include "mechanism/reach.h"
 
 namespace mbv {

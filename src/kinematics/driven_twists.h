@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "core/types.h"
+#include "base/types.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {

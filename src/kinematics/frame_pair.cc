@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "core/spatial.h"
-#include "mechanism/joint_coordinate.h"
+#include "math/spatial.h"
+#include "mechanism/joint_pose.h"
 
 namespace mbv::internal {
 namespace {

@@ -4,9 +4,9 @@
 // world axes. Each scalar c comes with its exact derivatives, ċ = J V and c̈ = J A + b.
 #pragma once
 
-#include "core/types.h"
-#include "mechanism/body_states.h"
+#include "base/types.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
 
 namespace mbv::internal {
 

@@ -1,22 +1,20 @@
 // Levenberg–Marquardt on the loop closures in tree coordinates.
 //
-// Lengths are divided by a characteristic length L (kinematics/damped_search.h).
+// Lengths are divided by a characteristic length L (kinematics/home.h).
+
 #include "kinematics/home.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 #include <optional>
 #include <random>
 
-#include "core/demand.h"
+#include "base/demand.h"
 #include "kinematics/closure_residual.h"
 #include "kinematics/constraints.h"
-#include "kinematics/coupling_rows.h"
-#include "kinematics/damped_search.h"
 #include "kinematics/frame_pair.h"
-#include "kinematics/loop_groups.h"
+#include "kinematics/mobility.h"
 #include "kinematics/tree_motion.h"
 #include "mechanism/joint_pose.h"
 #include "mechanism/reach.h"

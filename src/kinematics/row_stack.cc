@@ -6,8 +6,8 @@
 #include <numeric>
 #include <utility>
 
-#include "core/sparse_rank.h"
-#include "kinematics/idle_rows.h"
+#include "kinematics/constraints.h"
+#include "math/sparse.h"
 
 namespace mbv::internal {
 

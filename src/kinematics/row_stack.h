@@ -10,7 +10,6 @@
 #include <vector>
 
 #include "kinematics/constraints.h"
-#include "kinematics/coupling_rows.h"
 
 namespace mbv::internal {
 

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "core/trace.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -39,5 +39,10 @@ namespace mbv {
 /// Where a witness integrates the motion: work since the start [J] as NAME.work for every drive,
 /// then every prescribed joint, then loads.work and dampers.work.
 [[nodiscard]] std::vector<Channel> WorkChannels(const Mechanism& mechanism);
+
+// How much a witness records.
+
+/// Channels (mechanism/channels.h) that a witness records of a mechanism at most.
+[[nodiscard]] size_t MostChannels(const Mechanism& mechanism);
 
 }  // namespace mbv

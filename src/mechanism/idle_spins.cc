@@ -7,7 +7,7 @@
 #include <numeric>
 #include <utility>
 
-#include "core/parallel_transport.h"
+#include "math/parallel_transport.h"
 
 namespace mbv {
 namespace {

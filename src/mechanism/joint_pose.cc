@@ -2,9 +2,8 @@
 
 #include <cmath>
 
-#include "core/demand.h"
-#include "core/spatial.h"
-#include "mechanism/joint_coordinate.h"
+#include "base/demand.h"
+#include "math/spatial.h"
 
 namespace mbv {
 
@@ -248,3 +247,14 @@ std::vector<Pose> ChainPoses(const Mechanism& mechanism, const std::vector<Pose>
 }
 
 }  // namespace mbv
+
+namespace mbv::internal {
+
+double RollPitchYaw(const RestingPair& pair, int component) {
+  const Vec3 x = Vec3::UnitX(), y = Vec3::UnitY(), z = Vec3::UnitZ();
+  if (component == 0) return Angle(Cosine(pair, z, y), Cosine(pair, z, z));
+  if (component == 2) return Angle(Cosine(pair, y, x), Cosine(pair, x, x));
+  return std::atan2(-Cosine(pair, z, x), std::hypot(Cosine(pair, z, y), Cosine(pair, z, z)));
+}
+
+}  // namespace mbv::internal

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv {
 namespace {
@@ -112,6 +112,30 @@ void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample) {
       out.moment[c] = Evaluate(load.moment[c], t_s).value;
     }
   }
+}
+
+std::vector<double> BreakTimes(const Motion& motion) {
+  std::vector<double> breaks;
+  const auto add = [&breaks](const Profile& profile) {
+    const std::vector<double> times = BreakTimes(profile);
+    breaks.insert(breaks.end(), times.begin(), times.end());
+  };
+  for (const Command& command : motion.commands) add(command.profile);
+  for (const DriveForce& force : motion.forces) add(force.force);
+  for (const Load& load : motion.loads) {
+    for (int c = 0; c < 3; ++c) {
+      add(load.force[c]);
+      add(load.moment[c]);
+    }
+  }
+  std::sort(breaks.begin(), breaks.end());
+  return breaks;
+}
+
+void BodyStates::Resize(size_t bodies) {
+  X_WB.assign(bodies, Pose::Identity());
+  V_WB.assign(bodies, Vec6::Zero());
+  A_WB.assign(bodies, Vec6::Zero());
 }
 
 }  // namespace mbv

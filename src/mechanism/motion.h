@@ -2,15 +2,16 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <span>
 #include <string>
 #include <vector>
 
-#include "core/profile.h"
-#include "core/trace.h"
-#include "core/types.h"
+#include "base/types.h"
+#include "math/profile.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv {
@@ -154,6 +155,31 @@ void EvaluateMotion(const Motion& motion, double t_s, CommandSample* sample);
 /// joints in model order.
 struct DrivenSample {
   VecX position, velocity, acceleration;
+};
+
+// The times at which a motion is not smooth.
+
+/// Times [s] at which a command, given force or load of the motion changes its formula; increasing,
+/// the same time may occur more than once.
+[[nodiscard]] std::vector<double> BreakTimes(const Motion& motion);
+
+// Where the bodies of a mechanism are and how they move, in maximal coordinates.
+
+/// Pose X_WB, twist V_WB = [ω; v of Bo] and acceleration A_WB = [ε; a of Bo] of every body, in
+/// world axes (the classical acceleration of the origin, not the spatial one); index 0 (the world)
+/// stays at rest.
+struct BodyStates {
+  std::vector<Pose> X_WB;
+  std::vector<Vec6> V_WB;
+  std::vector<Vec6> A_WB;
+
+  /// Per term of the mechanism's couplings in order: a value of its coordinate within half a turn,
+  /// which says how many turns an angle counts; empty: home (coupling_rows.h).
+  std::vector<double> coupled;
+  /// The same per force element, drive and prescribed joint (element_rows.h).
+  std::vector<double> turns;
+
+  void Resize(size_t bodies);
 };
 
 }  // namespace mbv

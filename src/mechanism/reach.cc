@@ -1,5 +1,7 @@
 #include "mechanism/reach.h"
 
+#include <fmt/format.h>
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -86,6 +88,17 @@ double Reach(double longest_lever, const std::vector<Pose>& X_WB) {
   double reach = longest_lever;
   for (const Pose& X : X_WB) reach = std::max(reach, X.translation().norm());
   return reach;
+}
+
+std::string PrincipalInertiaText(const Vec3& principal) {
+  return fmt::format("principal inertias {:.6g}, {:.6g}, {:.6g} kg m²", principal[0], principal[1],
+                     principal[2]);
+}
+
+std::string TriangleViolation(const Body& body) {
+  const Vec3 principal = Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B).eigenvalues();
+  if (!(principal[0] + principal[1] < principal[2] * (1.0 - 1e-9))) return "";
+  return PrincipalInertiaText(principal) + " violate I1 + I2 >= I3";
 }
 
 }  // namespace mbv

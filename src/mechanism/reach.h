@@ -9,6 +9,7 @@
 // radii of gyration; of point masses that only forces hold, the ends of springs and bushings.
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "mechanism/mechanism.h"
@@ -27,5 +28,14 @@ namespace mbv {
 /// Rounding [m] that a gap between frames may have: a few ten operations with coordinates that
 /// large.
 [[nodiscard]] inline double GapRounding(double reach_m) { return 32 * kEps * reach_m; }
+
+// Inertias that no distribution of mass has.
+
+/// "principal inertias 1, 2, 4 kg m² violate I1 + I2 >= I3", or "" if the body's inertia obeys the
+/// triangle inequality (to 1e-9: laminae are on its bound).
+[[nodiscard]] std::string TriangleViolation(const Body& body);
+
+/// "principal inertias 1, 2, 4 kg m²".
+[[nodiscard]] std::string PrincipalInertiaText(const Vec3& principal);
 
 }  // namespace mbv

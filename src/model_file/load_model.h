@@ -6,9 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "core/diagnostics.h"
+#include "base/diagnostics.h"
 #include "mechanism/mechanism.h"
-#include "mechanism/model_caveat.h"
 
 namespace mbv {
 

@@ -2,12 +2,14 @@
 // the model loader.
 #pragma once
 
+#include <filesystem>
 #include <map>
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "base/diagnostics.h"
 #include "mechanism/mechanism.h"
-#include "model_file/model_block.h"
 #include "model_file/model_names.h"
 #include "model_file/model_values.h"
 
@@ -63,5 +65,45 @@ class BodyReader {
   FrameReader& frames_;
   ModelBodies& bodies_;
 };
+
+// `shapes` of a model file: what pictures show of bodies. Internal to the model loader.
+
+/// Reads shapes onto bodies whose frames are known. Meshes name their files: LoadMeshes() reads
+/// them.
+class ShapeReader {
+ public:
+  ShapeReader(ModelValues* values, const BodyNames& names, ModelBodies* bodies)
+      : values_(*values), names_(names), bodies_(*bodies) {}
+
+  /// Of the bodies of a block; of the model: of the world, too.
+  void Read(const Block& block);
+
+ private:
+  void ReadList(const Block& block, const YamlNode& node, const std::string& path, int body);
+  std::optional<Shape> ReadShape(const Block& block, const YamlNode& node, const std::string& path,
+                                 int body);
+  template <typename Rod>
+  std::optional<Rod> ReadRod(const Block& block, const YamlNode& node, const std::string& path,
+                             int body);
+  std::optional<Box> ReadBox(const Block& block, const YamlNode& node, const std::string& path,
+                             int body);
+  std::optional<Pose> ReadAt(const Block& block, const YamlMap& map, int body);
+  std::optional<Mesh> ReadMesh(const Block& block, const YamlNode& node, const std::string& path,
+                               int body);
+  std::optional<Ball> ReadBall(const Block& block, const YamlNode& node, const std::string& path,
+                               int body);
+
+  ModelValues& values_;
+  const BodyNames& names_;
+  ModelBodies& bodies_;
+};
+
+// Mesh files of a robot's shapes. Internal to the readers of models and URDF.
+
+/// Reads the surfaces of all meshes that have none yet, which their shapes name as the robot's file
+/// does. Those that cannot be read are taken out of the bodies: one warning names the first, at
+/// `place`. Files are looked for as FindMesh() says, `folder` being that of the robot's file.
+void LoadMeshes(const std::filesystem::path& folder, const Finding& place,
+                std::vector<Body>* bodies, Diagnostics* diagnostics);
 
 }  // namespace mbv::internal

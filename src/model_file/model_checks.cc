@@ -1,20 +1,56 @@
 // Masses, the graph of joints, ranges at home, and the isostatic rule.
+
 #include "model_file/model_checks.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <optional>
 
-#include "input/units.h"
+#include "base/text.h"
 #include "kinematics/constraints.h"
+#include "kinematics/home.h"
 #include "kinematics/mobility.h"
-#include "kinematics/tilted_axis.h"
-#include "mechanism/impossible_inertia.h"
+#include "mechanism/mechanism.h"
 #include "mechanism/reach.h"
+#include "model_file/yaml/units.h"
 
 namespace mbv::internal {
+
+void ModelReport::At(Place place, Severity severity, const std::string& message,
+                     const std::string& hint) {
+  yaml_.AddAt(severity, place.line, place.column, message, hint);
+}
+
+void ModelReport::AtBody(const Mechanism& mechanism, size_t body, Severity severity,
+                         const std::string& message, const std::string& hint) {
+  const BodyPlace& at = places_.bodies[body];
+  if (at.place.line == 0) {
+    others_.Add({severity, at.path, 0, 0,
+                 fmt::format("link '{}': {}", mechanism.bodies[body].name, message), hint});
+    return;
+  }
+  yaml_.SetNote(at.note);
+  At(at.place, severity, at.path + ": " + message, hint);
+  yaml_.SetNote("");
+}
+
+void ModelReport::AtJoint(size_t joint, Severity severity, const std::string& message,
+                          const std::string& hint) {
+  At(places_.joints[joint], severity, message, hint);
+}
+
+void ModelReport::AtFile(Severity severity, const std::string& message, const std::string& hint) {
+  At({}, severity, message, hint);
+}
+
+const Finding* ModelReport::InUrdf(const Mechanism& mechanism, int joint) const {
+  if (places_.joints[joint].line > 0) return nullptr;
+  const auto found = places_.urdf_joints.find(mechanism.joints[joint].name);
+  return found == places_.urdf_joints.end() ? nullptr : &found->second;
+}
+
 namespace {
 
 // Beside larger ones, usual masses and lengths are lost in a sum.
@@ -213,6 +249,193 @@ void CheckIsostaticRule(const Mechanism& mechanism, ModelReport* report) {
                   fmt::format("transmits: force changes the mechanism: {} freedoms instead of {}",
                               as_balls, freedoms),
                   "only a redundant constraint can be left out of the reactions");
+}
+
+// Checks on elastic bodies: beams that hold together, and joints on beam ends.
+
+namespace {
+
+// Points nearer than this are one node [m].
+constexpr double kSamePoint = 1e-9;
+
+bool Same(const Vec3& a, const Vec3& b) { return (a - b).norm() < kSamePoint; }
+
+// Whether p lies between the ends of the beam.
+bool IsWithin(const Beam& beam, const Vec3& p) {
+  if (Same(p, beam.p_from) || Same(p, beam.p_to)) return false;
+  const double L = beam.length(), x = beam.R_BE.col(0).dot(p - beam.p_from);
+  return x > 0.0 && x < L && Same(p, beam.p_from + x * beam.R_BE.col(0));
+}
+
+std::string Shown(const Vec3& p) {
+  return fmt::format("[{:.6g}, {:.6g}, {:.6g}]", p.x() + 0.0, p.y() + 0.0, p.z() + 0.0);
+}
+
+void CheckFrameOfBeams(const Mechanism& mechanism, int body, ModelReport* report) {
+  std::vector<size_t> own;
+  for (size_t i = 0; i < mechanism.beams.size(); ++i) {
+    if (mechanism.beams[i].body == body) own.push_back(i);
+  }
+  if (own.empty()) return;
+  const auto& beams = mechanism.beams;
+  std::vector<size_t> reached = {own.front()};  // grows from the first beam
+  for (size_t k = 0; k < reached.size(); ++k) {
+    const Beam& beam = beams[reached[k]];
+    for (const size_t i : own) {
+      if (std::find(reached.begin(), reached.end(), i) != reached.end()) continue;
+      for (const Vec3& end : {beams[i].p_from, beams[i].p_to}) {
+        if (!Same(end, beam.p_from) && !Same(end, beam.p_to)) continue;
+        reached.push_back(i);
+        break;
+      }
+    }
+  }
+  const std::string& name = mechanism.bodies[body].name;
+  for (const size_t i : own) {
+    for (const size_t other : own) {
+      for (const Vec3& end : {beams[i].p_from, beams[i].p_to}) {
+        if (!IsWithin(beams[other], end)) continue;
+        report->At(report->places().beams[i], Severity::kError,
+                   fmt::format("beam '{}' ends at {} within beam '{}'", beams[i].name, Shown(end),
+                               beams[other].name),
+                   fmt::format("cut '{}' there: beams meet at their ends", beams[other].name));
+      }
+    }
+    if (std::find(reached.begin(), reached.end(), i) != reached.end()) continue;
+    report->At(report->places().beams[i], Severity::kError,
+               fmt::format("beam '{}' is not connected with the other beams of body '{}'",
+                           beams[i].name, name),
+               "beams of one body meet at their ends; two pieces are two bodies");
+  }
+}
+
+bool IsOnBeamEnd(const Mechanism& mechanism, int body, const Vec3& p) {
+  bool elastic = false;
+  for (const Beam& beam : mechanism.beams) {
+    if (beam.body != body) continue;
+    elastic = true;
+    if (Same(p, beam.p_from) || Same(p, beam.p_to)) return true;
+  }
+  return !elastic;
+}
+
+// Joints, legs and springs move with a beam end or with a rigid body.
+void CheckEndsOnBeams(const Mechanism& mechanism, ModelReport* report) {
+  const auto check = [&](Place at, const std::string& what, int body, const Vec3& p) {
+    if (IsOnBeamEnd(mechanism, body, p)) return;
+    report->At(at, Severity::kError,
+               fmt::format("{} sits at {} of body '{}', where no beam ends", what, Shown(p),
+                           mechanism.bodies[body].name),
+               "a body with beams is elastic: what holds it sits on ends of its beams");
+  };
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    const std::string what = fmt::format("joint '{}'", joint.name);
+    check(report->places().joints[j], what, joint.parent, joint.X_PF.translation());
+    check(report->places().joints[j], what, joint.child, joint.X_CM.translation());
+  }
+  for (const Drive& drive : mechanism.drives) {
+    const auto* leg = std::get_if<DistanceDrive>(&drive.kind);
+    if (leg == nullptr) continue;
+    const Place at = report->places().signals.Of(drive.name);
+    check(at, fmt::format("drive '{}'", drive.name), leg->body_from, leg->p_from);
+    check(at, fmt::format("drive '{}'", drive.name), leg->body_to, leg->p_to);
+  }
+  for (const SpringDamper& spring : mechanism.springs) {
+    check({}, fmt::format("spring '{}'", spring.name), spring.body_from, spring.p_from);
+    check({}, fmt::format("spring '{}'", spring.name), spring.body_to, spring.p_to);
+  }
+}
+
+}  // namespace
+
+void CheckBeams(const Mechanism& mechanism, ModelReport* report) {
+  for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
+    CheckFrameOfBeams(mechanism, static_cast<int>(b), report);
+  }
+  CheckEndsOnBeams(mechanism, report);
+}
+
+// Loops that do not close as they are stated: what would close them.
+
+namespace {
+
+bool SaysBall(std::string name) {
+  std::transform(name.begin(), name.end(), name.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return name.find("spherical") != std::string::npos || name.find("rotule") != std::string::npos;
+}
+
+bool HasDriveOn(const Mechanism& mechanism, int joint) {
+  return std::any_of(mechanism.drives.begin(), mechanism.drives.end(), [joint](const Drive& drive) {
+    const auto* on = std::get_if<JointDrive>(&drive.kind);
+    return on != nullptr && on->joint == joint;
+  });
+}
+
+void MakeBall(Joint* joint) {
+  joint->kind = JointKind::kSpherical;
+  joint->guess = joint->home = {};
+  joint->range = {};
+}
+
+}  // namespace
+
+// CAD exporters know no balls and write hinges of that name, to be mended by hand in the closure
+// file (joint_name, joint_type). Where that was forgotten loops do not close.
+bool TakeNamedBalls(Mechanism* mechanism, ModelReport* report) {
+  Mechanism balls = *mechanism;
+  std::vector<std::string> names;
+  for (size_t j = 0; j < balls.joints.size(); ++j) {
+    Joint& joint = balls.joints[j];
+    const bool hinge = joint.kind == JointKind::kRevolute && !joint.closure;
+    if (!hinge || !SaysBall(joint.name) || HasDriveOn(balls, static_cast<int>(j))) continue;
+    MakeBall(&joint);
+    names.push_back(joint.name);
+  }
+  if (names.empty()) return false;
+  const HomeResult home = SolveHome(&balls);
+  if (!home.closed) return false;
+  *mechanism = std::move(balls);
+  report->AddOther(
+      {Severity::kWarning, report->file(), 0, 0,
+       fmt::format("the loops do not close as they are stated; they do with {} joint{} as ball{} "
+                   "whose name{} so, and which the URDF states as hinges: {}",
+                   names.size(), names.size() == 1 ? "" : "s", names.size() == 1 ? "" : "s",
+                   names.size() == 1 ? " says" : "s say", Joined(names, 4)),
+       "list them in the closure file: joint_name: […], joint_type: [SPHERICAL, …]"});
+  if (home.guesses_moved) WarnAboutAssembly(*mechanism, home, report);
+  return true;
+}
+
+std::string WhatWouldClose(const Mechanism& mechanism, const HomeResult& home) {
+  std::string text;
+  if (!home.gaps.empty()) {
+    const Joint& joint = mechanism.joints[home.gaps.front().joint];
+    const Pose X_FM = (mechanism.X_WB_home[joint.parent] * joint.X_PF).inverse() *
+                      (mechanism.X_WB_home[joint.child] * joint.X_CM);
+    const Vec3 d = X_FM.translation();
+    text = fmt::format(
+        "at the pose of least gaps the frame of '{}' on '{}' would have to move by [{:.4g}, "
+        "{:.4g}, "
+        "{:.4g}] m in its own axes",
+        joint.name, mechanism.bodies[joint.parent].name, d.x(), d.y(), d.z());
+  }
+  // Would points do where frames are welded?
+  Mechanism points = mechanism;
+  std::vector<std::string> names;
+  for (const LoopGap& gap : home.gaps) {
+    Joint& joint = points.joints[gap.joint];
+    if (joint.kind != JointKind::kFixed) continue;
+    MakeBall(&joint);
+    names.push_back(joint.name);
+  }
+  if (!names.empty() && SolveHome(&points).closed) {
+    text +=
+        fmt::format("; all loops close where the welded frames (6d) meet in points only (3d): {}",
+                    Joined(names, 12));
+  }
+  return text;
 }
 
 }  // namespace mbv::internal

@@ -64,4 +64,30 @@ void OrderDrives(const YamlNode& root, YamlReader* yaml, std::vector<Drive>* dri
 void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* yaml,
                     SignalPlaces* places, std::vector<Prescribed>* prescribed);
 
+// `legs` of a model file: telescopic legs with two heavy halves, written in one line. Internal to
+// the model loader.
+//
+//   legs: {leg1: {from: world.B1, to: platform.A1, length: 0.5, lower: {…}, upper: {…}}}
+// stands for an instance of this part, with the z axis along the leg:
+//   bodies: {lower: {mass, com: [0, 0, com], inertia: [across, across, along]}, upper: {…, −com}}
+//   joints:
+//     from:  {kind: universal, parent: FROM, child: lower, axis: y, axis2: x}
+//     slide: {kind: prismatic, parent: lower, child: upper, axis: z, guess: LENGTH}
+//     to:    {kind: spherical, parent: upper, child: TO}
+//   (`ends` says which end is universal; both may be spherical)
+//   drives: {length: {kind: joint, joint: slide}}
+
+/// Adds a block for each leg of the blocks that there are; findings go to the reader.
+void ExpandLegs(ModelValues* values, ModelBlocks* blocks);
+
+// `motors` of a model file. Internal to the model loader.
+
+/// Reads the motors of known drives (mechanism/mechanism.h). Only a model has them, parts do not:
+/// they are named as the drives of the whole model.
+void ReadMotors(const Block& model, const std::vector<Drive>& drives,
+                const std::vector<Joint>& joints, ModelValues* values, std::vector<Motor>* motors);
+
+/// A motor as a model file's map, without braces; reads back to the same numbers.
+[[nodiscard]] std::string MotorText(const Motor& motor);
+
 }  // namespace mbv::internal

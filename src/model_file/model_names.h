@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "model_file/model_block.h"
 #include "model_file/model_values.h"
 
 namespace mbv::internal {

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
-#include "input/yaml_reader.h"
 #include "mechanism/mechanism.h"
-#include "model_file/model_block.h"
+#include "model_file/model_values.h"
+#include "model_file/yaml/yaml_reader.h"
 
 namespace mbv::internal {
 

@@ -6,13 +6,14 @@
 #include <string>
 #include <vector>
 
-#include "core/diagnostics.h"
+#include "base/diagnostics.h"
 #include "mechanism/mechanism.h"
 #include "model_file/model_bodies.h"
 #include "model_file/model_joints.h"
 #include "model_file/model_signals.h"
 #include "model_file/model_values.h"
-#include "model_file/urdf.h"
+#include "model_file/urdf/urdf_import.h"
+#include "model_file/yaml/yaml_reader.h"
 
 namespace mbv::internal {
 
@@ -68,5 +69,15 @@ class UrdfReader {
   Literals& literals_;
   Diagnostics& others_;
 };
+
+// The file beside a URDF tree that names its closed loops. Internal to the model loader.
+
+/// Takes the closures out of a tree that the URDF file itself states.
+void DropClosures(UrdfTree* tree);
+
+/// Reads the closure file that `node` names: closures and kinds of joints into the tree, motors by
+/// name. False after a finding, which goes to `yaml` (the model file) or `others` (this file).
+bool ReadClosureFile(const YamlNode& node, YamlReader* yaml, Diagnostics* others, UrdfTree* tree,
+                     std::vector<std::string>* motors);
 
 }  // namespace mbv::internal

@@ -1,11 +1,10 @@
 #include "model_file/model_values.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv::internal {
 

@@ -2,17 +2,16 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <set>
 
-#include "core/names.h"
-#include "mesh/find_mesh.h"
+#include "base/names.h"
 #include "model_file/element_text.h"
-#include "model_file/model_motors.h"
+#include "model_file/mesh/read_mesh.h"
+#include "model_file/model_drives.h"
 
 namespace mbv {
 namespace {
@@ -336,6 +335,40 @@ std::string WriteModel(const Mechanism& mechanism, const std::vector<ModelCaveat
   if (!left_out.empty()) text += "left_out:\n";
   for (const std::string& each : left_out) text += "  - " + QuotedYaml(each) + "\n";
   return text;
+}
+
+namespace {
+
+// "meshes/NAME.stl" with a name near that of the file, each once.
+std::string MeshPath(const std::string& file, std::set<std::string>* taken) {
+  std::string name = NearestName(std::filesystem::path(file).stem().string());
+  if (name.empty()) name = "mesh";
+  std::string fresh = name;
+  for (int i = 2; !taken->insert(fresh).second; ++i) fresh = fmt::format("{}_{}", name, i);
+  return "meshes/" + fresh + ".stl";
+}
+
+}  // namespace
+
+std::vector<ModelMeshFile> TakeMeshesAlong(Mechanism* mechanism) {
+  std::vector<ModelMeshFile> files;
+  std::map<const TriangleMesh*, std::string> known;
+  std::set<std::string> taken;
+  for (Body& body : mechanism->bodies) {
+    for (Shape& shape : body.shapes) {
+      auto* mesh = std::get_if<Mesh>(&shape.geometry);
+      if (mesh == nullptr) continue;
+      std::string& path = known[mesh->surface.get()];
+      if (path.empty()) {
+        path = MeshPath(mesh->file, &taken);
+        files.push_back({path, ToStl(*mesh->surface, mechanism->name + ", metres")});
+      }
+      mesh->file = path;
+      mesh->scale = Vec3::Ones();
+    }
+  }
+  mechanism->file.clear();
+  return files;
 }
 
 }  // namespace mbv

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "mechanism/mechanism.h"
-#include "mechanism/model_caveat.h"
 
 namespace mbv {
 
@@ -15,8 +14,8 @@ namespace mbv {
 /// home pose, so that loops close from there. Names become such as model files take (letters,
 /// digits, _ and -). Parameters are written as the numbers they gave; beams are left out. Mesh
 /// files are named relative to the folder of Mechanism::file where they lie below it, else by
-/// absolute paths, which are read back only from folders that are allowed (mesh/find_mesh.h). What
-/// its source left out is written, too.
+/// absolute paths, which are read back only from folders that are allowed
+/// (model_file/mesh/read_mesh.h). What its source left out is written, too.
 [[nodiscard]] std::string WriteModel(const Mechanism& mechanism,
                                      const std::vector<ModelCaveat>& caveats = {});
 

@@ -1,17 +1,20 @@
 #include "reference/closure_solver.h"
 
 #include <fmt/format.h>
-
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <utility>
 
-#include "core/demand.h"
-#include "core/spatial.h"
-#include "kinematics/element_rows.h"
-#include "kinematics/idle_rows.h"
-#include "reference/closure_failure.h"
+#include "base/demand.h"
+#include "kinematics/constraints.h"
+#include "kinematics/home.h"
+#include "math/spatial.h"
+#include "mechanism/reach.h"
+#include "reference/row_set.h"
+#include "reference/square_system.h"
 
 namespace mbv::internal {
 namespace {
@@ -355,6 +358,354 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
     summary.time_s = command.time_s;
   }
   return summary;
+}
+
+namespace {
+
+constexpr double kHard = 1e3;      // weight of rows that should hold, against 1 of the others
+constexpr double kReached = 1e-6;  // residual [1] of a pose that closes after all
+// Steps in rad, or characteristic lengths: short, so that assemblies stay apart.
+constexpr DampingRule kDamping{.most_steps = 60,
+                               .largest_step = 0.3,
+                               .first = 1e-3,
+                               .least = 1e-12,
+                               .most = 1e12,
+                               .easier = 0.1,
+                               .stronger = 10.0};
+
+// All joint rows and commands as a weighted dense least-squares problem, lengths per L.
+class OpenLoops {
+ public:
+  OpenLoops(const Mechanism& mechanism, const std::vector<Command>& commands, const VecX& target,
+            const std::vector<std::vector<double>>& near_values)
+      : mechanism_(mechanism),
+        commands_(commands),
+        target_(target),
+        near_values_(near_values),
+        length_(CharacteristicLength(mechanism)),
+        any_closure_(!mechanism.couplings.empty() ||
+                     std::any_of(mechanism.joints.begin(), mechanism.joints.end(),
+                                 [](const Joint& joint) { return joint.closure; })) {}
+
+  // Weighted residual; with the Jacobian when J is given.
+  VecX Evaluate(const BodyStates& states, bool weighted, MatX* J) {
+    RowSet rows;
+    std::vector<double> weight;
+    for (const Joint& joint : mechanism_.joints) {
+      const ConstraintRows joint_rows = RowsOf(joint, states, false);
+      rows.Add(joint_rows, joint_rows.rows);
+      weight.resize(rows.size(), weighted && !joint.closure ? kHard : 1.0);
+    }
+    for (const CouplingRow& row : CouplingRows(mechanism_, states)) rows.Add(row);
+    weight.resize(rows.size(), 1.0);
+    for (size_t k = 0; k < commands_.size(); ++k) {
+      rows.Add(mechanism_, commands_[k], states, &near_values_[k]);
+      rows.value.back() -= target_[k];
+    }
+    weight.resize(rows.size(), weighted && any_closure_ ? kHard : 1.0);
+
+    VecX r(rows.size());
+    if (J != nullptr) J->setZero(rows.size(), 6 * (mechanism_.bodies.size() - 1));
+    for (int i = 0; i < rows.size(); ++i) {
+      const double scale = weight[i] / (rows.angular[i] ? 1.0 : length_);
+      r[i] = scale * rows.value[i];
+      if (J == nullptr) continue;
+      for (int p = rows.start[i]; p < rows.start[i + 1]; ++p) {
+        const int at = 6 * (rows.body[p] - 1);
+        J->block<1, 3>(i, at) = scale * rows.J[p].head<3>().transpose();
+        J->block<1, 3>(i, at + 3) = scale * length_ * rows.J[p].tail<3>().transpose();
+      }
+    }
+    return r;
+  }
+
+  // Unscales a step of twists whose velocities are per L.
+  [[nodiscard]] VecX Unscaled(VecX twists) const {
+    for (Eigen::Index i = 3; i < twists.size(); i += 6) twists.segment<3>(i) *= length_;
+    return twists;
+  }
+
+  // From `states`, which end at the best compromise.
+  void Minimise(BodyStates* states) {
+    constexpr double kSettled = 1e-9;    // a smaller share of the residual is no progress
+    constexpr double kRounding = 1e-12;  // of scaled rows
+    const auto evaluate = [&](BodyStates* at, MatX* J) { return Evaluate(*at, true, J); };
+    const auto move = [&](const VecX& s, BodyStates* at) {
+      MoveBodies(Unscaled(s), at);
+      FollowCouplings(mechanism_, at);
+    };
+    const auto enough = [](const internal::DampedStepMade& step) {
+      const double now = step.r.norm();
+      return step.better && (now > (1 - kSettled) * step.before || now < kRounding);
+    };
+    internal::DampedSearch(kDamping, states, evaluate, move, enough);
+  }
+
+  [[nodiscard]] double length() const { return length_; }
+
+ private:
+  const Mechanism& mechanism_;
+  const std::vector<Command>& commands_;
+  const VecX& target_;
+  std::vector<std::vector<double>> near_values_;
+  double length_;
+  bool any_closure_;
+};
+
+// The largest open joint, or the largest missed command where no loop can open.
+void NameWorst(const Mechanism& mechanism, const std::vector<Command>& commands,
+               const BodyStates& states, const VecX& r, double length, RunSummary* summary) {
+  double worst = 0.0;
+  int row = 0;
+  const auto offer = [&](const std::string& name, double size, double amount, const char* unit) {
+    if (size <= worst) return;
+    worst = size;
+    summary->where = name;
+    summary->amount = amount;
+    summary->unit = unit;
+  };
+  for (const Joint& joint : mechanism.joints) {
+    const ConstraintRows rows = RowsOf(joint, states, false);
+    const double gap = rows.residual.head(rows.translation_rows).norm();
+    const double turn =
+        r.segment(row + rows.translation_rows, rows.rows - rows.translation_rows).norm();
+    offer(joint.name, gap / length, gap, "m");
+    offer(joint.name, turn, turn, "rad");
+    row += rows.rows;
+  }
+  const std::vector<CouplingRow> coupled = CouplingRows(mechanism, states);
+  for (size_t c = 0; c < coupled.size(); ++c) {
+    const bool angular = coupled[c].angular;
+    const double miss = std::abs(r[row++]);
+    offer(mechanism.couplings[c].name, miss, angular ? miss : miss * length, angular ? "rad" : "m");
+  }
+  for (const Command& command : commands) {
+    const bool angle = !IsLength(mechanism, command.terms.front().coordinate);
+    const double miss = std::abs(r[row++]);
+    offer(command.name, miss, angle ? miss : miss * length, angle ? "rad" : "m");
+  }
+}
+
+}  // namespace
+
+std::string MostMovingJoint(const Mechanism& mechanism, const BodyStates& states,
+                            const VecX& twists) {
+  std::vector<Vec6> motion(mechanism.bodies.size(), Vec6::Zero());
+  if (twists.size() == 6 * (static_cast<Eigen::Index>(motion.size()) - 1)) {
+    Unstack(twists, &motion);
+  }
+  const double length = CharacteristicLength(mechanism);
+  std::string name;
+  double most = 0.0;
+  for (const Joint& joint : mechanism.joints) {
+    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      const ScalarRow row = JointCoordinateRow(joint, c, states);
+      const bool length_unit = !row.J_child.tail<3>().isZero();
+      const double rate =
+          std::abs(row.J_parent.dot(motion[joint.parent]) + row.J_child.dot(motion[joint.child])) /
+          (length_unit ? length : 1.0);
+      if (rate > most) {
+        most = rate;
+        name = joint.name;
+      }
+    }
+  }
+  return name;
+}
+
+RunSummary ExplainUnreached(const Mechanism& mechanism, const std::vector<Command>& commands,
+                            const VecX& target, const BodyStates& nearest,
+                            std::vector<std::vector<double>> near_values) {
+  OpenLoops loops(mechanism, commands, target, near_values);
+  BodyStates best = nearest;
+  loops.Minimise(&best);
+  const VecX r = loops.Evaluate(best, false, nullptr);
+
+  RunSummary summary;
+  if (r.norm() > kReached) {
+    summary.stop = Stop::kUnreachable;
+    NameWorst(mechanism, commands, best, r, loops.length(), &summary);
+    summary.message =
+        fmt::format("the commanded pose cannot be reached: {} stays open by {:.4g} {}",
+                    summary.where, summary.amount, summary.unit);
+    return summary;
+  }
+  MatX J;
+  (void)loops.Evaluate(nearest, false, &J);
+  const Eigen::BDCSVD<MatX> svd(J, Eigen::ComputeThinV);
+  const Eigen::Index last = svd.singularValues().size() - 1;
+  summary.stop = Stop::kSingular;
+  summary.where = MostMovingJoint(mechanism, nearest, loops.Unscaled(svd.matrixV().col(last)));
+  summary.amount = svd.singularValues()[last];
+  summary.unit = "1";
+  summary.message = fmt::format(
+      "the commanded motion passes a singular pose near {} (smallest singular value {:.1e})",
+      summary.where, summary.amount);
+  return summary;
+}
+
+// Velocities and accelerations of closed poses, and idle spins: parts of ClosureSolver.
+
+namespace {
+
+// Rates that miss by this share of the largest are as good as they can be.
+constexpr double kRatesMiss = 4 * kEps;
+// Solutions go on below it, but while that helps; what misses more than the second is wrong.
+constexpr double kRatesGood = 1e-12, kRatesAccurate = 1e-9;
+constexpr int kMostSolutions = 12;
+// Velocities that missed by more when the biases were evaluated have changed these.
+constexpr double kRatesSettled = 1e-13;
+
+// Of the command rows; those of idle spins, behind them, are zero.
+void PutAtEnd(const VecX& values, Eigen::Index count, VecX* rates) {
+  rates->tail(count).setZero();
+  rates->segment(rates->size() - count, values.size()) = values;
+}
+
+}  // namespace
+
+double ClosureSolver::Miss(const VecX& rates, const std::vector<Vec6>& per_body) {
+  double largest_m = 0.0, largest_rad = 0.0;
+  missing_.resize(system_.size());
+  double* missing = missing_.data();
+  for (const int i : selection_) {
+    const double miss = rates[i] - rows_.Rate(i, per_body.data());
+    double& largest = rows_.angular.data()[i] != 0 ? largest_rad : largest_m;
+    if (std::isnan(miss)) return kNan;
+    largest = std::max(largest, std::abs(miss));
+    *missing++ = miss;
+  }
+  return std::max(largest_rad, largest_m / length_);
+}
+
+void ClosureSolver::AddMissing(std::vector<Vec6>* per_body) {
+  const VecX change = system_.SolveTransposed(missing_);
+  for (size_t b = 1; b < per_body->size(); ++b) {
+    (*per_body)[b] += change.segment<6>(6 * (static_cast<Eigen::Index>(b) - 1));
+  }
+}
+
+// The factors belong to a pose nearby; refinement against the true rows restores all digits.
+ClosureSolver::Refinement ClosureSolver::Refine(const VecX& rates, std::vector<Vec6>* per_body) {
+  double scale = 0.0;
+  for (const int i : selection_) {
+    scale = std::max(scale, std::abs(rates[i]) / system_.RateUnit(rows_.angular[i]));
+  }
+  Refinement refinement;
+  double previous = std::numeric_limits<double>::infinity();
+  for (int solutions = 0;; ++solutions) {
+    const double largest = Miss(rates, *per_body);
+    if (solutions == 0) refinement.began_settled = largest <= kRatesSettled * scale;
+    if (scale == 0.0 && !std::isnan(largest)) {  // exactly, where sums leave round-off
+      std::ranges::fill(*per_body, Vec6::Zero());
+      refinement.accurate = true;
+      break;
+    }
+    refinement.accurate = largest <= kRatesAccurate * scale;
+    if (largest <= kRatesMiss * scale || solutions == kMostSolutions) break;
+    if (largest < kRatesGood * scale && largest > 0.1 * previous) break;
+    AddMissing(per_body);
+    previous = largest;
+  }
+  return refinement;
+}
+
+RunSummary ClosureSolver::SolveRates(const CommandSample& command) {
+  // Near a singular pose the factors from the way here are too far off: take those of the pose.
+  for (const bool refactor : {false, true}) {
+    if (refactor) {
+      if (!system_.Factor(rows_, selection_, false)) break;
+      if (system_.determinant_sign() != orientation_) break;
+      const double rounding = Rounding(states_.X_WB) / length_;
+      if (system_.SmallestSingularValue(3) < SingularValueLimit(rounding)) break;
+    }
+    rates_.setZero(rows_.size());
+    PutAtEnd(command.velocity, rows_.size() - joint_rows_, &rates_);
+    Miss(rates_, states_.V_WB);
+    AddMissing(&states_.V_WB);
+    EvaluateHere();
+    const Refinement velocity = Refine(rates_, &states_.V_WB);
+    if (!velocity.began_settled) EvaluateHere();
+    PutAtEnd(command.acceleration, rows_.size() - joint_rows_, &rates_);
+    rates_ -= Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
+    const Refinement acceleration = Refine(rates_, &states_.A_WB);
+    if (velocity.accurate && acceleration.accurate) return RunSummary::Done();
+  }
+  const double sigma = system_.SmallestSingularValue(3);
+  RunSummary summary =
+      Singular(fmt::format("the commands do not determine the velocities at this pose (smallest "
+                           "singular value {:.1e})",
+                           sigma));
+  summary.amount = sigma;
+  summary.unit = std::string("1");
+  return summary;
+}
+
+// Rows at the pose found; biases depend on the velocities.
+void ClosureSolver::EvaluateHere() {
+  trial_.states = states_;
+  trial_.near_values = near_values_;
+  EvaluateRows(&trial_);
+}
+
+RunSummary ClosureSolver::TurnBack(const std::vector<double>& turns) {
+  Trial trial{states_, near_values_};
+  for (size_t k = 0; k < spins_.size(); ++k) {
+    const Spin& spin = spins_[k];
+    const Pose X_WB = trial.states.X_WB[static_cast<size_t>(spin.bodies[0])];
+    const Mat3 back = ExpRotation(-turns[k] * (X_WB.linear() * spin.n_B));
+    const Vec3 p_WP = X_WB * spin.p_BP;
+    for (const int b : spin.bodies) {
+      Pose& X = trial.states.X_WB[static_cast<size_t>(b)];
+      X.linear() = back * X.linear();
+      X.translation() = p_WP + back * (X.translation() - p_WP);
+    }
+  }
+  if (Newton(target_, false, &trial) != Step::kDone) {
+    return ExplainUnreached(mechanism_, commands_, target_, states_, near_values_);
+  }
+  Accept(target_, &trial);
+  return RunSummary::Done();
+}
+
+// Where the way to the first sample leaves the idle spins depends on how it was cut into steps.
+RunSummary ClosureSolver::TakeLeastTurns() {
+  if (spins_.empty()) return RunSummary::Done();
+  std::vector<double> turns;
+  for (const Spin& spin : spins_) {
+    const Pose& X_WB = states_.X_WB[static_cast<size_t>(spin.bodies[0])];
+    turns.push_back(TurnFromHome(mechanism_, spin, X_WB.linear()));
+  }
+  return TurnBack(turns);
+}
+
+MovingDirection ClosureSolver::LineOf(const Spin& spin) const {
+  const auto b = static_cast<size_t>(spin.bodies[0]);
+  return DirectionOf(states_.X_WB[b].linear() * spin.n_B, states_.V_WB[b].head<3>(),
+                     states_.A_WB[b].head<3>());
+}
+
+// The prediction transports the lines to a lower order, and Newton not at all.
+RunSummary ClosureSolver::TransportTurns(const CommandSample& command) {
+  if (spins_.empty()) return RunSummary::Done();
+  const double h = command.time_s - predictor_.last_s();
+  if (last_lines_.size() == spins_.size() && h > 0.0) {
+    std::vector<double> turns;
+    for (size_t k = 0; k < spins_.size(); ++k) {
+      const Mat3& R_WB = states_.X_WB[static_cast<size_t>(spins_[k].bodies[0])].linear();
+      const MovingDirection line = LineOf(spins_[k]);
+      const Mat3 R = Transported(last_lines_[k].R_WB, last_lines_[k].line, line, h);
+      turns.push_back(TurnBeyond(R, R_WB, line.n));
+    }
+    if (RunSummary summary = TurnBack(turns); !summary.ok()) return summary;
+    if (RunSummary summary = SolveRates(command); !summary.ok()) return summary;
+  }
+  last_lines_.clear();
+  for (const Spin& spin : spins_) {
+    const auto b = static_cast<size_t>(spin.bodies[0]);
+    last_lines_.push_back({LineOf(spin), states_.X_WB[b].linear()});
+  }
+  return RunSummary::Done();
 }
 
 }  // namespace mbv::internal

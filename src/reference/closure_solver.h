@@ -5,15 +5,14 @@
 // command; the matrix is factored once near the solution and then refined against. Redundant joint
 // rows are dropped and their residuals checked. Idle spins (mechanism/idle_spins.h) have a row
 // each: no Newton step turns them, and their rates are zero. From sample to sample their lines are
-// transported parallel (core/parallel_transport.h); the first sample takes the least turn from
+// transported parallel (math/parallel_transport.h); the first sample takes the least turn from
 // home.
 #pragma once
 
 #include <vector>
 
-#include "core/parallel_transport.h"
-#include "core/run_summary.h"
-#include "mechanism/body_states.h"
+#include "base/run_summary.h"
+#include "math/parallel_transport.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -122,5 +121,21 @@ class ClosureSolver {
 
 /// Moves all bodies by small twists: R ← exp(δω) R, p ← p + δv; keeps rotations orthonormal.
 void MoveBodies(const VecX& stacked_twists, BodyStates* states);
+
+// Why a command cannot be followed. Internal to reference/.
+
+/// Explains a failure to reach `target` (one entry per command) from the nearest pose that was
+/// reached: kUnreachable with the loop that stays open, by least squares with the commands held;
+/// kSingular if the target can be reached after all, but not along the commanded way.
+/// `near_values` per command and term. The time is left to the caller.
+[[nodiscard]] RunSummary ExplainUnreached(const Mechanism& mechanism,
+                                          const std::vector<Command>& commands, const VecX& target,
+                                          const BodyStates& nearest,
+                                          std::vector<std::vector<double>> near_values);
+
+/// Name of the joint that moves most in the motion given by stacked body twists (scaled by a
+/// characteristic length).
+[[nodiscard]] std::string MostMovingJoint(const Mechanism& mechanism, const BodyStates& states,
+                                          const VecX& stacked_twists);
 
 }  // namespace mbv::internal

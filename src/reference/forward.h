@@ -11,9 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "core/run_summary.h"
-#include "core/trace.h"
-#include "mechanism/body_states.h"
+#include "base/run_summary.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 

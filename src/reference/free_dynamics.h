@@ -26,18 +26,35 @@
 #include <functional>
 #include <vector>
 
-#include "core/run_summary.h"
-#include "mechanism/body_states.h"
+#include "base/run_summary.h"
+#include "base/types.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
-#include "reference/load_friction.h"
+#include "reference/element_forces.h"
 #include "reference/motion_equations.h"
 #include "reference/reference.h"
 #include "reference/rest_decision.h"
 #include "reference/row_set.h"
 
+// Polynomials through values and derivatives. Internal to reference/.
+
 namespace mbv::internal {
+
+/// The polynomial of degree 2n − 1 that has given values and derivatives at n times.
+class Hermite {
+ public:
+  /// Times distinct; one value and one derivative per time, all of one size.
+  Hermite(const std::vector<double>& times, const std::vector<VecX>& values,
+          const std::vector<VecX>& derivatives);
+
+  /// Value and derivative at t.
+  void Evaluate(double t, VecX* value, VecX* derivative) const;
+
+ private:
+  std::vector<double> nodes_;       ///< each time twice
+  std::vector<VecX> coefficients_;  ///< of Newton's form
+};
 
 /// What every element of dry friction does.
 struct FrictionPhase {

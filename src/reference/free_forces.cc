@@ -6,14 +6,12 @@
 #include <cmath>
 #include <limits>
 
-#include "core/demand.h"
-#include "core/spatial.h"
-#include "kinematics/element_rows.h"
+#include "base/demand.h"
+#include "kinematics/constraints.h"
+#include "math/spatial.h"
 #include "reference/element_forces.h"
 #include "reference/force_solver.h"
 #include "reference/free_dynamics.h"
-#include "reference/least_forces.h"
-#include "reference/load_friction.h"
 
 namespace mbv::internal {
 namespace {

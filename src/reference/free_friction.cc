@@ -9,10 +9,10 @@
 #include <cmath>
 #include <utility>
 
-#include "kinematics/element_rows.h"
+#include "kinematics/constraints.h"
 #include "reference/closure_solver.h"
+#include "reference/free_dynamics.h"
 #include "reference/free_motion.h"
-#include "reference/hermite.h"
 #include "reference/square_system.h"
 
 namespace mbv::internal {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv::internal {
 namespace {

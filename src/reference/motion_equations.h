@@ -9,9 +9,9 @@
 
 #include <vector>
 
-#include "core/sparse_saddle.h"
-#include "mechanism/body_states.h"
+#include "math/sparse.h"
 #include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
 #include "reference/row_set.h"
 #include "reference/square_system.h"
 

@@ -1,11 +1,11 @@
 // Where all bodies will be at the next sample of a motion, and how they will move there
-// (core/rate_extrapolation.h). Internal to reference/.
+// (math/rate_extrapolation.h). Internal to reference/.
 #pragma once
 
 #include <array>
 
-#include "core/rate_extrapolation.h"
-#include "mechanism/body_states.h"
+#include "math/rate_extrapolation.h"
+#include "mechanism/motion.h"
 
 namespace mbv::internal {
 

@@ -3,9 +3,8 @@
 
 #include <vector>
 
-#include "core/types.h"
+#include "base/types.h"
 #include "kinematics/constraints.h"
-#include "kinematics/coupling_rows.h"
 #include "mechanism/motion.h"
 
 namespace mbv::internal {

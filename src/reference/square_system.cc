@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/demand.h"
-#include "core/sparse_rank.h"
+#include "base/demand.h"
+#include "math/sparse.h"
 
 namespace mbv::internal {
 namespace {

@@ -10,8 +10,8 @@
 #include <cmath>
 #include <vector>
 
-#include "core/sparse_lu.h"
-#include "core/types.h"
+#include "base/types.h"
+#include "math/sparse.h"
 #include "reference/row_set.h"
 
 namespace mbv::internal {

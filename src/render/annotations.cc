@@ -1,13 +1,264 @@
 #include "render/annotations.h"
 
+#include <fmt/format.h>
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
+#include "plot/text_mask.h"
+#include "render/scene.h"
 #include "render/tessellation.h"
 
 namespace mbv::render {
+
+double TextUnit(const std::array<int, 2>& size_px) {
+  return std::min(size_px[0] * 0.75, static_cast<double>(size_px[1]));
+}
+
+// Lays a colour over a pixel; over a transparent one it makes it opaque as far as it covers it.
+void Blend(Picture* picture, int x, int y, const Ink& color, float share) {
+  if (x < 0 || y < 0 || x >= picture->width || y >= picture->height) return;
+  const auto at = static_cast<std::size_t>(y) * picture->width + x;
+  const float below =
+      (1.0F - share) * (picture->alpha.empty() ? 1.0F : picture->alpha[at] / 255.0F);
+  const float all = share + below;
+  if (all <= 0.0F) return;
+  std::uint8_t* pixel = picture->rgb.data() + 3 * at;
+  for (int i = 0; i < 3; ++i) {
+    const float value = (share * color[i] * 255.0F + below * pixel[i]) / all;
+    pixel[i] = static_cast<std::uint8_t>(std::lround(value));
+  }
+  if (!picture->alpha.empty()) {
+    picture->alpha[at] = static_cast<std::uint8_t>(std::lround(255.0F * all));
+  }
+}
+
+void Fill(Picture* picture, int left, int top, int width, int height, const Ink& color,
+          float share) {
+  for (int y = top; y < top + height; ++y) {
+    for (int x = left; x < left + width; ++x) Blend(picture, x, y, color, share);
+  }
+}
+
+// A line of a pixel's width or two.
+void Stroke(Picture* picture, const Eigen::Vector2d& from, const Eigen::Vector2d& to,
+            const Ink& color) {
+  const int steps = std::max(1, static_cast<int>(std::ceil((to - from).cwiseAbs().maxCoeff())));
+  const int thick = std::max(1, picture->height / 960);
+  for (int i = 0; i <= steps; ++i) {
+    const Eigen::Vector2d p = from + (to - from) * i / steps;
+    Fill(picture, static_cast<int>(p.x()), static_cast<int>(p.y()), thick, thick, color);
+  }
+}
+
+void Write(const std::string& text, double left, double top, double height_px, const Ink& color,
+           Picture* picture) {
+  const double whole = std::floor(left);
+  const TextMask mask = DrawText(text, height_px, left - whole);
+  for (int y = 0; y < mask.height; ++y) {
+    for (int x = 0; x < mask.width; ++x) {
+      const std::uint8_t share = mask.coverage[static_cast<std::size_t>(y) * mask.width + x];
+      if (share == 0) continue;
+      Blend(picture, static_cast<int>(whole) + x, static_cast<int>(std::lround(top)) + y, color,
+            static_cast<float>(share) / 255.0F);
+    }
+  }
+}
+
+namespace {
+
+using TextBox = Eigen::AlignedBox2d;
+
+// Where a text's box may begin, about its place: beside it, then on wider and wider rings.
+std::vector<Eigen::Vector2d> TextCorners(const Eigen::Vector2d& at, double width, double height,
+                                         double h) {
+  std::vector<Eigen::Vector2d> corners = {at + Eigen::Vector2d(0.6 * h, -0.5 * height),
+                                          at + Eigen::Vector2d(-0.6 * h - width, -0.5 * height),
+                                          at + Eigen::Vector2d(-0.5 * width, -height - 0.6 * h),
+                                          at + Eigen::Vector2d(-0.5 * width, 0.6 * h)};
+  constexpr int kRings = 8, kTurns = 16;
+  for (int ring = 1; ring <= kRings; ++ring) {
+    for (int turn = 0; turn < kTurns; ++turn) {
+      const double angle = 2.0 * std::numbers::pi * (turn + 0.5 * (ring % 2)) / kTurns;
+      const Eigen::Vector2d e(std::cos(angle), std::sin(angle));
+      const Eigen::Vector2d middle =
+          at + e * (1.6 * h * ring) + Eigen::Vector2d(0.5 * width * e.x(), 0.5 * height * e.y());
+      corners.emplace_back(middle - Eigen::Vector2d(0.5 * width, 0.5 * height));
+    }
+  }
+  return corners;
+}
+
+// The first of the boxes that lies inside and over no other; empty if there is none.
+TextBox FreeBox(const std::vector<Eigen::Vector2d>& corners, const Eigen::Vector2d& size,
+                const TextBox& inside, const std::vector<TextBox>& taken) {
+  for (const Eigen::Vector2d& corner : corners) {
+    const TextBox box(corner, corner + size);
+    const bool over =
+        std::ranges::any_of(taken, [&](const TextBox& other) { return other.intersects(box); });
+    if (inside.contains(box) && !over) return box;
+  }
+  return {};
+}
+
+std::string LengthText(double length_m) {
+  if (length_m < 1e-3) return fmt::format("{:g} µm", length_m * 1e6);
+  if (length_m < 1.0) return fmt::format("{:g} mm", length_m * 1e3);
+  if (length_m < 1e3) return fmt::format("{:g} m", length_m);
+  return fmt::format("{:g} km", length_m * 1e-3);
+}
+
+}  // namespace
+
+int PaintLabels(const std::vector<Label>& labels, int floor_px, Picture* picture) {
+  const double h = kSmallText * TextUnit({picture->width, picture->height});
+  const TextBox inside(Eigen::Vector2d::Zero(), Eigen::Vector2d(picture->width, floor_px));
+  std::vector<TextBox> taken;
+  std::vector<Eigen::Vector2d> places;
+  for (const Label& label : labels) {
+    places.emplace_back(label.x * picture->width, label.y * picture->height);
+    // No name lies over another one's place.
+    const Eigen::Vector2d dot = Eigen::Vector2d::Constant(2.0);
+    if (inside.contains(places.back()))
+      taken.emplace_back(places.back() - dot, places.back() + dot);
+  }
+  int left_out = 0;
+  for (std::size_t k = 0; k < labels.size(); ++k) {
+    const Eigen::Vector2d& at = places[k];
+    if (!inside.contains(at)) continue;
+    const Eigen::Vector2d size(TextWidth(labels[k].text, h) + 0.6 * h, 1.15 * h);
+    const TextBox box = FreeBox(TextCorners(at, size.x(), size.y(), h), size, inside, taken);
+    if (box.isEmpty()) {
+      ++left_out;
+      continue;
+    }
+    taken.push_back(box);
+    const Eigen::Vector2d near = at.cwiseMax(box.min()).cwiseMin(box.max());
+    if ((near - at).norm() > h) Stroke(picture, at, near, kInk);
+    Fill(picture, static_cast<int>(box.min().x()), static_cast<int>(box.min().y()),
+         static_cast<int>(size.x()), static_cast<int>(size.y()), kPaper, 0.72F);
+    const int dot = std::max(1, picture->height / 480);
+    Fill(picture, static_cast<int>(at.x()) - dot / 2, static_cast<int>(at.y()) - dot / 2, dot + 1,
+         dot + 1, kInk);
+    Write(labels[k].text, box.min().x() + 0.3 * h, box.min().y() + 0.05 * h, h, kInk, picture);
+  }
+  return left_out;
+}
+
+double RoundLength(double value) {
+  const double power = std::pow(10.0, std::floor(std::log10(value)));
+  const double digit = value / power;
+  return (digit >= 5.0 ? 5.0 : digit >= 2.0 ? 2.0 : 1.0) * power;
+}
+
+void PaintScaleBar(double height_m, bool parallel, int floor_px, Picture* picture) {
+  const double unit = TextUnit({picture->width, picture->height}), h = kSmallText * unit;
+  const double px_per_m = picture->height / height_m;
+  const double length_m = RoundLength(0.25 * picture->width / px_per_m);
+  const int width = static_cast<int>(std::lround(length_m * px_per_m));
+  const std::string text = LengthText(length_m) + (parallel ? "" : " at the point looked at");
+  const double text_width = TextWidth(text, h), pad = 0.018 * unit;
+  const int thick = std::max(2, static_cast<int>(std::lround(0.005 * unit)));
+  const double room = std::max<double>(width, text_width);
+  const double middle = picture->width - pad - 0.5 * room, top = floor_px - pad - thick - 1.2 * h;
+  Fill(picture, static_cast<int>(middle - 0.5 * room - 0.4 * h), static_cast<int>(top - 0.2 * h),
+       static_cast<int>(room + 0.8 * h), static_cast<int>(1.6 * h) + thick, kPaper, 0.72F);
+  Write(text, middle - 0.5 * text_width, top, h, kInk, picture);
+  Fill(picture, static_cast<int>(std::lround(middle - 0.5 * width)),
+       static_cast<int>(top + 1.2 * h), width, thick, kInk);
+}
+
+namespace {
+
+constexpr Ink kRule{0.55F, 0.58F, 0.62F};
+
+Ink MoodColor(Caption::Mood mood) {
+  switch (mood) {
+    case Caption::Mood::kNeutral:
+      return kSoftInk;
+    case Caption::Mood::kGood:
+      return {0.07F, 0.50F, 0.20F};
+    case Caption::Mood::kBad:
+      return {0.78F, 0.09F, 0.08F};
+  }
+  return kInk;
+}
+
+// Heights of the rows as fractions of the picture's smaller side.
+struct Layout {
+  double pad, title, detail, legend;
+
+  Layout(const Caption& caption, const std::array<int, 2>& size_px) {
+    const double unit = TextUnit(size_px);
+    pad = 0.009 * unit;
+    title = 0.033 * unit;
+    detail = caption.detail.empty() ? -pad : 0.0245 * unit;  // without its gap, too
+    legend = kSmallText * unit;
+  }
+  [[nodiscard]] double bar() const { return 5.3 * pad + title + detail + 2.0 * legend; }
+};
+
+void WriteLegend(const std::vector<LegendEntry>& legend, double top, const Layout& layout,
+                 Picture* picture) {
+  const double h = layout.legend;
+  std::array<double, 2> lefts = {2.0 * layout.pad, 2.0 * layout.pad};
+  const bool any_above =
+      std::ranges::any_of(legend, [](const LegendEntry& entry) { return entry.row == 0; });
+  for (const LegendEntry& entry : legend) {
+    const int row = any_above ? entry.row : 0;
+    double& left = lefts[static_cast<size_t>(row)];
+    const double y = top + row * (h + 0.7 * layout.pad);
+    const double mark = entry.color.empty() ? 0.0 : 1.5 * h;
+    const double width = TextWidth(entry.text, h);
+    if (left + mark + width > picture->width - 2.0 * layout.pad) continue;
+    if (!entry.color.empty()) {
+      const auto rgba = MaterialOf(entry.color).rgba;
+      Fill(picture, static_cast<int>(left), static_cast<int>(y + 0.22 * h),
+           static_cast<int>(1.1 * h), static_cast<int>(0.56 * h), {rgba[0], rgba[1], rgba[2]});
+    }
+    Write(entry.text, left + mark, y, h, kSoftInk, picture);
+    left += mark + width + 1.6 * h;
+  }
+}
+
+}  // namespace
+
+bool IsEmpty(const Caption& caption) {
+  return caption.title.empty() && caption.detail.empty() && caption.status.empty();
+}
+
+int BarHeight(const Caption& caption, const std::array<int, 2>& size_px) {
+  return IsEmpty(caption) ? 0 : static_cast<int>(std::ceil(Layout(caption, size_px).bar()));
+}
+
+void PaintCaption(const Caption& caption, const std::vector<LegendEntry>& legend,
+                  Picture* picture) {
+  const std::array<int, 2> size{picture->width, picture->height};
+  const int bar = BarHeight(caption, size);
+  if (bar == 0) return;
+  const Layout layout(caption, size);
+  const int top = picture->height - bar;
+  Fill(picture, 0, top, picture->width, bar, kPaper);
+  Fill(picture, 0, top, picture->width, std::max(1, picture->height / 500), kRule);
+  const double left = 2.0 * layout.pad, room = picture->width - 2.0 * left;
+  // The verdict first: the title gets the room that is left.
+  const std::string status = FittedText(caption.status, layout.title, 0.5 * room);
+  const double status_width = TextWidth(status, layout.title);
+  double y = top + 1.5 * layout.pad;
+  Write(status, left + room - status_width, y, layout.title, MoodColor(caption.mood), picture);
+  const double title_room = room - status_width - (status.empty() ? 0.0 : layout.title);
+  Write(FittedText(caption.title, layout.title, title_room), left, y, layout.title, kInk, picture);
+  y += layout.title + layout.pad;
+  if (!caption.detail.empty()) {
+    Write(FittedText(caption.detail, layout.detail, room), left, y, layout.detail, kInk, picture);
+  }
+  y += layout.detail + layout.pad;
+  WriteLegend(legend, y, layout, picture);
+}
+
 namespace {
 
 constexpr double kPi = std::numbers::pi;

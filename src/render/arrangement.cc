@@ -6,8 +6,7 @@
 #include <cmath>
 
 #include "render/annotations.h"
-#include "render/best_view.h"
-#include "render/labels.h"
+#include "render/camera.h"
 
 namespace mbv::render {
 namespace {

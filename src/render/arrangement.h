@@ -4,8 +4,8 @@
 #include <vector>
 
 #include "mechanism/mechanism.h"
+#include "render/annotations.h"
 #include "render/camera.h"
-#include "render/caption.h"
 #include "render/render.h"
 #include "render/scene.h"
 #include "render/stage.h"

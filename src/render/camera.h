@@ -2,9 +2,12 @@
 #pragma once
 
 #include <limits>
+#include <vector>
 
-#include "core/types.h"
+#include "base/types.h"
+#include "mechanism/mechanism.h"
 #include "render/render.h"
+#include "render/scene.h"
 
 namespace mbv::render {
 
@@ -70,5 +73,39 @@ class CameraFit {
 
 /// Picture coordinates (0 … 1 from the left and from the top) of a point before the camera.
 [[nodiscard]] Eigen::Vector2d Project(const Camera& camera, double aspect, const Vec3& p_D);
+
+// A camera's picture as the graphics pipeline wants it, whole or one tile of it.
+
+/// Pixels [left, left + width) × [top, top + height) of a picture; they may lie beyond its edges.
+struct Tile {
+  int left = 0, top = 0, width = 1, height = 1;
+};
+
+struct Projection {
+  Eigen::Matrix4d clip_D = Eigen::Matrix4d::Identity();  ///< D → clip coordinates of the tile
+  Mat3 rays_D = Mat3::Identity();  ///< (x, y, 1) of the tile, -1 … 1 → direction of view
+  Vec3 eye_D = Vec3::Zero(), forward_D = Vec3::UnitX();
+  Eigen::Vector2d shift_px = Eigen::Vector2d::Zero();  ///< to the right and up
+  bool parallel = false;
+};
+
+/// `extent_m` is the size of what is drawn; depth reaches some of it before and many of it behind
+/// the look-at point. `shift_px` moves the picture to the right and up.
+[[nodiscard]] Projection ProjectionOf(const Camera& camera, int width, int height, const Tile& tile,
+                                      double extent_m, const Eigen::Vector2d& shift_px);
+
+// From where most of a mechanism is seen.
+
+/// Share of the mechanism's joints and drive ends (0 … 1, over all frames) that no solid hides from
+/// a far camera in the direction `to_camera_W`.
+[[nodiscard]] double VisibleShare(const Mechanism& mechanism,
+                                  const std::vector<PictureFrame>& frames, const Scale& scale,
+                                  const PictureOptions& options, const Vec3& to_camera_W);
+
+/// The options' view with the azimuth and elevation that it leaves open: azimuth -60° and elevation
+/// 16° unless clearly more is seen from elsewhere.
+[[nodiscard]] CameraView BestView(const Mechanism& mechanism,
+                                  const std::vector<PictureFrame>& frames, const Scale& scale,
+                                  const PictureOptions& options, const Mat3& R_DW);
 
 }  // namespace mbv::render

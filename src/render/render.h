@@ -12,12 +12,12 @@
 #include <string>
 #include <vector>
 
-#include "core/diagnostics.h"
-#include "core/run_summary.h"
-#include "core/types.h"
-#include "image/png.h"
+#include "base/diagnostics.h"
+#include "base/png.h"
+#include "base/run_summary.h"
+#include "base/types.h"
 #include "mechanism/mechanism.h"
-#include "simulation/simulation.h"
+#include "simulation/engine/simulation.h"
 
 namespace mbv {
 

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "render/accumulation.h"
 #include "render/painter.h"
 
 namespace mbv::render {

@@ -11,7 +11,7 @@
 #include <optional>
 #include <vector>
 
-#include "core/run_summary.h"
+#include "base/run_summary.h"
 #include "render/annotations.h"
 #include "render/camera.h"
 #include "render/render.h"

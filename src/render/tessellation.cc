@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "mesh/decimate.h"
+#include "model_file/mesh/decimate.h"
 
 namespace mbv::render {
 namespace {

@@ -4,7 +4,7 @@
 #include <array>
 #include <vector>
 
-#include "core/triangle_mesh.h"
+#include "math/triangle_mesh.h"
 #include "render/scene.h"
 
 namespace mbv::render {

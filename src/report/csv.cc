@@ -7,9 +7,9 @@
 #include <iterator>
 #include <map>
 
+#include "base/json_text.h"
 #include "comparison/force_band.h"
 #include "comparison/metrics.h"
-#include "core/json_text.h"
 
 namespace mbv {
 namespace {

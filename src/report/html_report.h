@@ -59,4 +59,23 @@ struct HtmlInput {
 /// little-endian 32-bit floats in base64). No '<' occurs in it.
 [[nodiscard]] std::string PageData(const HtmlInput& input);
 
+// The tables of a motion's page. Each returns HTML, or "" when there is nothing to show.
+
+[[nodiscard]] std::string DrivesHtml(const Report& report);
+[[nodiscard]] std::string EngineHtml(const Report& report);
+/// What drives and joints bear: force, power, stroke and speed; magnitudes of reactions.
+[[nodiscard]] std::string LoadsHtml(const Report& report);
+[[nodiscard]] std::string EnergyHtml(const Report& report);
+[[nodiscard]] std::string AuditHtml(const std::optional<HtmlAudit>& audit);
+[[nodiscard]] std::string SignalsHtml(const Report& report);
+
+/// How long each witness took: text, not HTML.
+[[nodiscard]] std::string TimesText(const Report& report);
+
+// Plots of a run for viewers without JavaScript.
+
+/// Drive forces of the main pair's measured witness over time, one plot per unit, and the errors
+/// against the other witness on a logarithmic scale, as inline SVG; "" if no forces were compared.
+[[nodiscard]] std::string StaticPlotsHtml(const Report& report);
+
 }  // namespace mbv

@@ -1,12 +1,25 @@
-#include "core/json_text.h"
+#include "report/json.h"
+
+#include "base/json_text.h"
 #include "report/load_figures.h"
 #include "report/motion_tables.h"
-#include "report/own_file_text.h"
 #include "report/report.h"
-#include "report/result_json.h"
+#include "report/result.h"
 #include "report/sizing.h"
+#include "report/source_model_report.h"
 
 namespace mbv {
+
+using Json = nlohmann::ordered_json;
+
+std::string ToJson(const std::vector<InputFile>& inputs) {
+  Json json = {{"schema", "mbverify.inputs/1"}, {"inputs", Json::array()}};
+  for (const InputFile& input : inputs) {
+    json["inputs"].push_back({{"file", input.file}, {"fingerprint", input.fingerprint}});
+  }
+  return Dump(json);
+}
+
 namespace {
 
 using Json = nlohmann::ordered_json;

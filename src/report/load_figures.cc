@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
+#include "base/text.h"
 #include "comparison/force_band.h"
-#include "core/text.h"
 
 namespace mbv {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "kinematics/mobility_report.h"
+#include "kinematics/mobility.h"
 
 namespace mbv {
 

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "report/html_text.h"
+#include "report/page.h"
 
 namespace mbv {
 namespace {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "core/json_text.h"
+#include "base/json_text.h"
 #include "report/report.h"
 
 namespace mbv {

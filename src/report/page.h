@@ -1,11 +1,63 @@
 // The skeleton of a page: one file of HTML with head, badge, navigation, sections and footer.
 #pragma once
 
+#include <span>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "comparison/comparison.h"
 
+// Pieces of HTML: escaped text, tables, base64.
+
 namespace mbv {
+
+/// Text that is safe between tags and in quoted attributes.
+[[nodiscard]] std::string Escape(std::string_view text);
+
+/// RFC 4648, with padding.
+[[nodiscard]] std::string Base64(std::string_view bytes);
+/// The values as little-endian 32-bit floats.
+[[nodiscard]] std::string Base64(std::span<const float> values);
+
+/// A table cell: text is escaped unless it is marked as HTML.
+struct Cell {
+  std::string text;
+  bool number = false;  ///< aligned to the right
+  bool html = false;    ///< `text` is HTML already
+};
+[[nodiscard]] inline Cell Text(std::string text) { return {std::move(text), false, false}; }
+[[nodiscard]] inline Cell Digits(std::string text) { return {std::move(text), true, false}; }
+[[nodiscard]] inline Cell Markup(std::string html) { return {std::move(html), false, true}; }
+
+/// A table that scrolls by itself where the page is narrow; the first column names the row.
+struct Table {
+  std::string caption;
+  std::vector<Cell> head;
+  std::vector<std::vector<Cell>> rows;
+};
+[[nodiscard]] std::string ToHtml(const Table& table);
+
+/// "–" for what is no number.
+[[nodiscard]] std::string NumberOrDash(double value, const char* format = "{:.2e}");
+
+/// With a capital letter and a full stop.
+[[nodiscard]] std::string Sentence(std::string text);
+
+/// HTML that is seen when its title is clicked.
+[[nodiscard]] std::string Folded(const std::string& title, const std::string& content);
+/// A picture beside others.
+[[nodiscard]] std::string FigureHtml(const std::string& svg);
+
+/// A faint remark.
+[[nodiscard]] std::string Note(const std::string& text);
+/// A word on coloured ground: kind is ok, warn, fail or off.
+[[nodiscard]] std::string Pill(const char* kind, const std::string& text);
+/// A number with its title, and what it is about below.
+[[nodiscard]] std::string Card(const std::string& title, const std::string& value,
+                               const std::string& detail);
+/// "force_nrmse" → "force nrmse".
+[[nodiscard]] std::string Spaced(std::string text);
 
 /// What stands around a page's sections. Texts; they are escaped here.
 struct PageHead {

@@ -4,7 +4,7 @@
 #include <string_view>
 #include <utility>
 
-#include "core/tex_text.h"
+#include "base/markup.h"
 
 namespace mbv {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "comparison/force_band.h"
-#include "core/trace.h"
+#include "math/trace.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -35,5 +35,13 @@ struct SharedAxis {
 /// Those of which the trace records this quantity, by unit, sorted by it.
 [[nodiscard]] std::vector<SharedAxis> ByUnit(const Trace& trace, Quantity quantity,
                                              const std::vector<std::string>& subjects);
+
+// Every witness against every other, where there are more than three: one number per pair.
+
+/// Lines for a terminal; empty with up to three witnesses.
+[[nodiscard]] std::vector<std::string> PairMatrixLines(const Comparison& comparison);
+
+/// Table of report.html; "" with up to three witnesses.
+[[nodiscard]] std::string PairMatrixHtml(const Comparison& comparison);
 
 }  // namespace mbv

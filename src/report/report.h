@@ -9,21 +9,21 @@
 #include <string>
 #include <vector>
 
+#include "base/run_summary.h"
 #include "comparison/comparison.h"
 #include "comparison/motor_load.h"
-#include "core/run_summary.h"
-#include "core/trace.h"
+#include "math/trace.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "report/result.h"
 
 namespace mbv {
 
-struct OwnFileAudit;  // report/own_file.h
+struct OwnFileAudit;  // report/source_model_report.h
 
 /// One witness' part in a run.
 struct WitnessRecord {
-  std::string name;                              ///< of its role (core/roles.h)
+  std::string name;                              ///< of its role (base/roles.h)
   RunSummary summary;                            ///< kNotRun with the reason if it was switched off
   Trace trace;                                   ///< empty if it did not run
   std::optional<Witness::Foreign> foreign = {};  ///< of a program outside

@@ -1,10 +1,10 @@
 #include "report/result.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <cmath>
 
+#include "base/json_text.h"
 #include "comparison/verdict.h"
 
 namespace mbv {
@@ -58,6 +58,307 @@ std::string CountLine(const RunCounts& counts) {
                   counts.scenarios == 1 ? "" : "s", counts.ran, counts.compared, counts.verified);
   if (counts.bad_input > 0) text += fmt::format(", {} with bad input", counts.bad_input);
   return text + "\n";
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kSummarySchema = "mbverify.summary/1";
+
+Json ChecksJson(const ResultView& view) {
+  Json checks = Json::array();
+  for (const ShownCheck& check : view.checks) {
+    if (!check.limit) continue;
+    Json json = {{"name", check.name},
+                 {"value", Number(check.value)},
+                 {"limit", *check.limit},
+                 {"pass", check.pass}};
+    if (check.verifies) json["verifies"] = *check.verifies;
+    json["time_s"] = Number(check.time_s);
+    json["channel"] = check.where;
+    if (check.stated_limit) {
+      json["stated_limit"] = *check.stated_limit;
+      json["limit_by"] = check.limit_by;
+    }
+    if (check.floored) json["floored"] = true;
+    if (!check.blind.empty()) json["verifies_nothing"] = check.blind;
+    checks.push_back(std::move(json));
+  }
+  return checks;
+}
+
+Json ChecksOffJson(const ResultView& view) {
+  Json checks = Json::array();
+  for (const ShownCheck& check : view.checks) {
+    if (!check.limit) checks.push_back({{"name", check.name}, {"value", Number(check.value)}});
+  }
+  return checks;
+}
+
+// As texts, as ever, and as values.
+void AddCaveats(const std::vector<Caveat>& caveats, Json* json) {
+  Json texts = Json::array(), values = Json::array();
+  for (const Caveat& caveat : caveats) {
+    texts.push_back(caveat.text);
+    Json value = {{"kind", ToText(caveat.kind)}, {"of", caveat.of}};
+    if (caveat.gap != WitnessGap::kNone) value["cause"] = ToText(caveat.gap);
+    value["text"] = caveat.text;
+    values.push_back(std::move(value));
+  }
+  (*json)["reservations"] = std::move(texts);
+  (*json)["caveats"] = std::move(values);
+}
+
+Json TimingJson(const ResultView& view) {
+  const Timing& timing = view.frame->timing;
+  Json times = {{"analytic_s", timing.analytic_s},
+                {"reference_s", timing.reference_s},
+                {"simulation_s", timing.simulation_s},
+                {"render_s", timing.render_s}};
+  if (view.look.steps) times["stock_s"] = timing.stock_s;
+  if (timing.foreign_s > 0.0) times["foreign_s"] = timing.foreign_s;
+  times["total_s"] = timing.total_s;
+  if (view.look.steps) {
+    times["loop_s"] = timing.loop_s;
+    times["steps"] = timing.steps;
+  }
+  if (view.look.steps && timing.loop_s > 0.0) {
+    times["steps_per_s"] = static_cast<double>(timing.steps) / timing.loop_s;
+  }
+  return times;
+}
+
+// What was found, beside what follows from it.
+Json AttributionJson(const Attribution& attribution) {
+  Json json = {{"odd_one_out", attribution.odd_one_out}, {"text", attribution.text}};
+  if (!attribution.split) return json;
+  const Attribution::Split& split = *attribution.split;
+  json["agree"] = split.agree;
+  json["agree_to"] = Number(split.agree_to);
+  json["differs"] = split.differs;
+  json["differs_by"] = Number(split.differs_by);
+  json["measure"] = split.measure;
+  json["unit"] = split.unit;
+  json["shared"] = split.shared;
+  return json;
+}
+
+}  // namespace
+
+Json SummaryHead(const ResultView& view) {
+  const ResultFrame& frame = *view.frame;
+  Json json = {{"schema", kSummarySchema}};
+  if (*view.kind != '\0') json["kind"] = view.kind;
+  json["scenario"] = frame.scenario;
+  json["scenario_file"] = frame.scenario_file;
+  json["mechanism"] = frame.mechanism;
+  json["model_file"] = frame.model_file;
+  json["description"] = frame.description;
+  json["verdict"] = ToText(view.verdict);
+  json["reason"] = view.reason;
+  json["exit_code"] = frame.exit_code;
+  if (view.caveats) AddCaveats(*view.caveats, &json);
+  json["attribution"] = AttributionJson(view.attribution);
+  json["checks"] = ChecksJson(view);
+  json["checks_off"] = ChecksOffJson(view);
+  return json;
+}
+
+void AddSummaryEnd(const ResultView& view, Json* json) {
+  if (view.frame->timing.told) (*json)["timing"] = TimingJson(view);
+  (*json)["versions"] = Json::object();
+  for (const auto& [name, version] : view.frame->versions) (*json)["versions"][name] = version;
+}
+
+Json NotComparedJson(const ResultView& view) {
+  Json json = Json::array();
+  for (const NotCompared& item : view.not_compared) {
+    json.push_back({{"what", item.what}, {"why", item.why}});
+  }
+  return json;
+}
+
+Json CountsJson(const ResultView& view) {
+  Json json = {{"witnesses_ran", view.ran()},
+               {"pairs_compared", view.pairs_compared},
+               {"checks", view.limits()},
+               {"checks_verified", view.verified}};
+  for (const auto& [key, count] : view.empty_counts) json[key] = count;
+  json["checks_off"] = view.checks.size() - view.limits();
+  return json;
+}
+
+Json FindingsJson(const Diagnostics& findings) {
+  Json json = Json::array();
+  for (const Finding& finding : findings.findings()) json.push_back(ToText(finding));
+  return json;
+}
+
+Json WitnessHead(const std::string& name, const RunSummary& summary) {
+  return {{"name", name},
+          {"ran", summary.ok()},
+          {"stop", ToText(summary.stop)},
+          {"message", summary.message}};
+}
+
+void AddBreakdown(const ResultView& view, const RunSummary& summary, Json* json) {
+  if (summary.ok() || summary.stop == Stop::kNotRun) return;
+  if (view.look.steps) (*json)["time_s"] = Number(summary.time_s);
+  (*json)["where"] = summary.where;
+  (*json)["amount"] = Number(summary.amount);
+  (*json)["unit"] = summary.unit;
+}
+
+namespace {
+
+// Limit over value as a factor, with a bar of its decimal digits (ten fill it).
+std::string Margin(const ShownCheck& check) {
+  if (!check.limit || !std::isfinite(check.value)) return "";
+  if (check.value <= 0.0) return "exact";
+  const double digits = std::log10(*check.limit / check.value);
+  const double filled = std::clamp(10.0 * std::abs(digits), 2.0, 100.0);
+  const std::string factor = digits >= 0.0
+                                 ? fmt::format("{:.3g}×", *check.limit / check.value)
+                                 : fmt::format("{:.3g}× over", check.value / *check.limit);
+  return fmt::format("<span class=\"margin{}\"><i style=\"width:{:.0f}%\"></i></span> {}",
+                     check.pass ? "" : " over", filled, factor);
+}
+
+std::string EndPill(const ShownCheck& check) {
+  switch (EndOf(check)) {
+    case CheckEnd::kOff:
+      return Pill("off", "off");
+    case CheckEnd::kFail:
+      return Pill("fail", "fail");
+    case CheckEnd::kVoid:
+      return Pill("warn", "verifies nothing");
+    case CheckEnd::kHeld:
+      return Pill("off", "held");
+    case CheckEnd::kOk:
+      return Pill("ok", "ok");
+  }
+  return "";
+}
+
+std::vector<Cell> CheckRow(const ShownCheck& check, bool margins) {
+  std::vector<Cell> row = {
+      Text(Spaced(check.subject)), Text(check.title), Digits(NumberOrDash(check.value)),
+      Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
+      Markup(EndPill(check) + (check.floored ? " " + Pill("warn", "floored") : ""))};
+  if (margins) row.push_back(Markup(check.blind.empty() ? Margin(check) : ""));
+  row.push_back(Text(WhereOf(check)));
+  return row;
+}
+
+}  // namespace
+
+const char* SourceWord(Source source) {
+  switch (source) {
+    case Source::kPrinted:
+      return "printed";
+    case Source::kAssumed:
+      return "assumed";
+    case Source::kCorrected:
+      return "corrected";
+    case Source::kUnstated:
+      break;
+  }
+  return "";
+}
+
+PageHead HeadOf(const ResultView& view) {
+  return {.title = view.frame->title(),
+          .lead = view.frame->description,
+          .verdict = view.verdict,
+          .sign = view.look.signs};
+}
+
+std::string VerdictHtml(const ResultView& view, const std::string& cards,
+                        const std::string& about) {
+  const auto sentence = [&](const std::string& text) {
+    return Escape(view.look.capitals ? Sentence(text) : text + ".");
+  };
+  std::string html = "<p class=\"reason\">" + sentence(view.reason) + "</p>\n";
+  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+    html +=
+        "<p class=\"reason\">" + Pill("warn", "caveat") + " " + sentence(caveat.text) + "</p>\n";
+  }
+  if (!view.attribution.text.empty()) {
+    html += fmt::format("<p class=\"attribution{}\">{}</p>\n",
+                        view.attribution.odd_one_out.empty() ? "" : " odd",
+                        sentence(view.attribution.text));
+  }
+  html += "<dl class=\"cards\">\n" + cards + "</dl>\n" + Note(about);
+  if (view.frame->findings.empty()) return html;
+  html += "<ul class=\"findings\">\n";
+  for (const Finding& finding : view.frame->findings.findings()) {
+    html += "<li>" + Escape(ToText(finding)) + "</li>\n";
+  }
+  return html + "</ul>\n";
+}
+
+std::string ChecksHtml(const ResultView& view, const std::string& note) {
+  if (view.checks.empty()) return "";
+  const bool margins = view.look.margins;
+  Table table{.caption = "Checks, failed ones first",
+              .head = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
+                       Text(margins ? "result" : "")},
+              .rows = {}};
+  if (margins) table.head.push_back(Text("margin"));
+  table.head.push_back(Text("worst at"));
+  for (const bool failed : {true, false}) {
+    for (const ShownCheck& check : view.checks) {
+      if ((EndOf(check) == CheckEnd::kFail) == failed)
+        table.rows.push_back(CheckRow(check, margins));
+    }
+  }
+  return ToHtml(table) + Note(note);
+}
+
+std::string GapsHtml(const ResultView& view) {
+  std::string html;
+  for (const auto& [name, summary] : view.witnesses) {
+    if (summary.ok()) continue;
+    html += "<li><b>" + Escape(name) + "</b>: " + Escape(ToText(summary.stop)) + ". " +
+            Escape(summary.message) + "</li>\n";
+  }
+  for (const NotCompared& item : view.not_compared) {
+    html += "<li><b>" + Escape(item.what) + "</b>: " + Escape(item.why) + "</li>\n";
+  }
+  return html.empty() ? "" : "<ul>\n" + html + "</ul>\n";
+}
+
+std::string ParametersHtml(const std::vector<Parameter>& parameters, bool sources) {
+  if (parameters.empty()) return "";
+  Table table{.caption = "Parameters with the scenario's overrides",
+              .head = {Text("name"), Digits("value"), Text("unit")},
+              .rows = {}};
+  if (sources) table.head.push_back(Text("source"));
+  table.head.push_back(Text("note"));
+  for (const Parameter& parameter : parameters) {
+    std::vector<Cell> row = {Text(parameter.name), Digits(fmt::format("{:.10g}", parameter.value)),
+                             Text(parameter.unit)};
+    if (sources) row.push_back(Text(SourceWord(parameter.source)));
+    row.push_back(Text(parameter.note));
+    table.rows.push_back(std::move(row));
+  }
+  return Folded(fmt::format("{} parameters", parameters.size()), ToHtml(table));
+}
+
+std::string ReproduceHtml(const ResultView& view, const std::string& command,
+                          const std::string& times, const std::string& files) {
+  Table table{.caption = "Inputs and versions", .head = {Text("what"), Text("is")}, .rows = {}};
+  if (!view.frame->scenario_file.empty()) {
+    table.rows.push_back({Text("scenario"), Text(view.frame->scenario_file)});
+  }
+  table.rows.push_back({Text("model"), Text(view.frame->model_file)});
+  for (const auto& [name, version] : view.frame->versions) {
+    table.rows.push_back({Text(name), Text(version)});
+  }
+  if (!times.empty()) table.rows.push_back({Text("time taken"), Text(times)});
+  return "<pre tabindex=\"0\"><code>" + Escape(command) + "</code></pre>\n" + ToHtml(table) +
+         Note(files);
 }
 
 }  // namespace mbv

@@ -8,14 +8,17 @@
 // was not compared, inputs and versions. Its own sections, tables and fields it adds there.
 #pragma once
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "base/diagnostics.h"
+#include "base/run_summary.h"
 #include "comparison/comparison.h"
-#include "core/diagnostics.h"
-#include "core/run_summary.h"
+#include "mechanism/mechanism.h"
+#include "report/page.h"
 
 namespace mbv {
 
@@ -132,5 +135,45 @@ struct TableOptions {
 };
 /// "stabilizing_platform / sea_state: AGREE  simulated vs analytic 4.2e-08 (limit 1.0e-07)".
 [[nodiscard]] std::string VerdictLine(const ResultView& view, const TableOptions& options);
+
+// summary.json: what results of every kind write alike.
+
+/// The beginning of summary.json: schema, kind, names and files, verdict with reason, exit code and
+/// attribution, checks, checks_off.
+[[nodiscard]] nlohmann::ordered_json SummaryHead(const ResultView& view);
+/// Its end: timing and versions.
+void AddSummaryEnd(const ResultView& view, nlohmann::ordered_json* json);
+
+/// [{what, why}]
+[[nodiscard]] nlohmann::ordered_json NotComparedJson(const ResultView& view);
+/// How many witnesses ran, pairs were compared, checks passed.
+[[nodiscard]] nlohmann::ordered_json CountsJson(const ResultView& view);
+[[nodiscard]] nlohmann::ordered_json FindingsJson(const Diagnostics& findings);
+
+/// {name, ran, stop, message}
+[[nodiscard]] nlohmann::ordered_json WitnessHead(const std::string& name,
+                                                 const RunSummary& summary);
+/// Where (and if it runs in time, when) a witness broke down and by how much, if it did.
+void AddBreakdown(const ResultView& view, const RunSummary& summary, nlohmann::ordered_json* json);
+
+// The sections that pages of every kind of result have. Each is HTML, or "" when there is nothing
+// to show.
+
+/// Title, description and verdict of a result; the kind adds kicker, footer and scripts.
+[[nodiscard]] PageHead HeadOf(const ResultView& view);
+
+/// Reason, reservations, attribution, `cards` (HTML of Card()), `about` (HTML), findings.
+[[nodiscard]] std::string VerdictHtml(const ResultView& view, const std::string& cards,
+                                      const std::string& about);
+/// Every check, failed ones first; `note` (HTML) says how to read them.
+[[nodiscard]] std::string ChecksHtml(const ResultView& view, const std::string& note);
+/// Witnesses that did not run, and what was not compared.
+[[nodiscard]] std::string GapsHtml(const ResultView& view);
+/// `sources`: also where values come from.
+[[nodiscard]] std::string ParametersHtml(const std::vector<Parameter>& parameters, bool sources);
+/// `command` gives the same result again; `times` and `files` say how long it took and what stands
+/// beside the page.
+[[nodiscard]] std::string ReproduceHtml(const ResultView& view, const std::string& command,
+                                        const std::string& times, const std::string& files);
 
 }  // namespace mbv

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/text.h"
+#include "base/text.h"
 #include "report/result.h"
 #include "report/sizing.h"
 

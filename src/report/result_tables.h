@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "kinematics/mobility_report.h"
+#include "kinematics/mobility.h"
 #include "mechanism/mechanism.h"
 #include "report/paper_table.h"
 #include "report/report.h"

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/html_text.h"
+#include "plot/svg_plot.h"
+#include "report/page.h"
 #include "report/plot_points.h"
-#include "report/svg_plot.h"
 #include "report/text_table.h"
 
 namespace mbv {

@@ -4,14 +4,14 @@
 #include <algorithm>
 #include <cmath>
 
-#include "report/html_text.h"
 #include "report/motion_tables.h"
-#include "report/own_file_text.h"
-#include "report/pair_matrix.h"
+#include "report/page.h"
+#include "report/plot_points.h"
 #include "report/reference_table.h"
 #include "report/report.h"
 #include "report/sizing.h"
-#include "report/terminal_text.h"
+#include "report/source_model_report.h"
+#include "report/text_table.h"
 
 namespace mbv {
 namespace {

@@ -1,6 +1,6 @@
 #include "scenario/checks.h"
 
-#include "core/demand.h"
+#include "base/demand.h"
 
 namespace mbv {
 namespace {

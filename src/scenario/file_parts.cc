@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
-#include "core/names.h"
-#include "core/word_hints.h"
+#include "base/names.h"
+#include "base/text.h"
 
 namespace mbv {
 

@@ -3,9 +3,8 @@
 #include <cstdlib>
 #include <set>
 
-#include "core/diagnostics.h"
-#include "core/text.h"
-#include "core/word_hints.h"
+#include "base/diagnostics.h"
+#include "base/text.h"
 
 namespace mbv {
 namespace {

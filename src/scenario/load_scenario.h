@@ -6,8 +6,11 @@
 #include <utility>
 #include <vector>
 
-#include "core/diagnostics.h"
+#include "base/diagnostics.h"
 #include "mechanism/mechanism.h"
+#include "model_file/load_model.h"
+#include "model_file/yaml/value_reader.h"
+#include "model_file/yaml/yaml_reader.h"
 #include "scenario/scenario.h"
 
 namespace mbv {
@@ -43,8 +46,8 @@ struct ScenarioResult {
 /// that is no YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
   bool is_scenario = false;    ///< has a `mechanism:` key (or an expectation)
-  bool is_study = false;       ///< has a `study:` key instead (scenario/study_file.h)
-  bool has_witnesses = false;  ///< names programs (scenario/witness_reader.h)
+  bool is_study = false;       ///< has a `study:` key instead (features/study/study_file.h)
+  bool has_witnesses = false;  ///< names programs (scenario/load_scenario.h)
   std::string kind;            ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;
@@ -52,5 +55,31 @@ struct ScenarioHead {
   [[nodiscard]] bool is_stiffness() const { return kind == "stiffness"; }
 };
 [[nodiscard]] ScenarioHead ReadScenarioHead(const std::string& file);
+
+// `--set key=value`: replacing values of a YAML tree from the command line.
+
+/// The tree with the values put in; maps on the way are made when missing. Values that are no YAML
+/// are findings. Nodes that came from the k-th value carry the line −(k + 1).
+[[nodiscard]] YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values,
+                                    YamlReader* reader);
+
+/// The node that `key` would replace; null where there is none.
+[[nodiscard]] const YamlNode* FindSetNode(const YamlNode& root, const std::string& key);
+
+/// Overrides of parameters by `--set NAME=VALUE`: numbers and expressions as a scenario's
+/// `parameters` takes them. Findings name the option.
+[[nodiscard]] Diagnostics ReadParameterOptions(const std::vector<SetValue>& values,
+                                               LoadOptions* options);
+
+/// Moves findings about such nodes from the file to "--set key=value", and sorts all by place.
+[[nodiscard]] Diagnostics PlaceSetFindings(const Diagnostics& diagnostics,
+                                           const std::vector<SetValue>& values);
+
+// The `witnesses:` section of a scenario: programs that compute it besides our own witnesses.
+
+/// In the order of the file. `folder`: of the scenario; words of a command that name a file in it
+/// become its path.
+[[nodiscard]] std::vector<ForeignWitness> ReadWitnesses(ValueReader* values, const YamlNode* node,
+                                                        const std::string& folder);
 
 }  // namespace mbv

@@ -1,24 +1,443 @@
 #include "scenario/motion_reader.h"
 
 #include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <string>
+#include <vector>
 
-#include "core/channel.h"
-#include "core/spatial.h"
-#include "core/text.h"
-#include "core/word_hints.h"
-#include "scenario/blended_path_reader.h"
-#include "scenario/coordinate_names.h"
-#include "scenario/free_motion_reader.h"
+#include "base/text.h"
+#include "kinematics/command_rank.h"
+#include "kinematics/mobility.h"
+#include "math/channel.h"
+#include "math/spatial.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "model_file/yaml/value_reader.h"
 #include "scenario/profile_reader.h"
-#include "scenario/state_function_reader.h"
-#include "table/motion_table.h"
-#include "table/pose_table.h"
+#include "scenario/tables/motion_table.h"
 
 namespace mbv {
+namespace {
+
+// Forward dynamics in scenario files: `forces:`, `motion.initial` and `motion.initial_rates`.
+
+struct NamedCoordinate {
+  std::string name;
+  Coordinate coordinate;
+};
+/// What a state is made of, by name: drives, OUTPUT.x … OUTPUT.yaw, JOINT, and JOINT.0, JOINT.1 …
+/// where a joint has several.
+[[nodiscard]] std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism);
+
+constexpr size_t kMostNames = 12;  // in one message
+
+// Joint coordinates by name: JOINT, or JOINT.0, JOINT.1 … where a joint has several.
+std::vector<NamedCoordinate> JointCoordinates(const Mechanism& mechanism) {
+  std::vector<NamedCoordinate> named;
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    const int freedoms = FreedomsOf(joint.kind);
+    for (int c = 0; c < freedoms; ++c) {
+      named.push_back({freedoms == 1 ? joint.name : fmt::format("{}.{}", joint.name, c),
+                       {Coordinate::Kind::kJoint, static_cast<int>(j), c}});
+    }
+  }
+  return named;
+}
+
+Command AsCommand(const std::string& name, const Coordinate& coordinate) {
+  return {.name = name, .terms = {{coordinate, 1.0}}, .profile = {}};
+}
+
+class FreeMotionReader {
+ public:
+  FreeMotionReader(ValueReader* values, const Mechanism& mechanism, ProfileTables* tables,
+                   Motion* motion)
+      : values_(values), mechanism_(mechanism), tables_(tables), motion_(motion) {
+    for (NamedCoordinate& named : StateCoordinates(mechanism)) known_.push_back(std::move(named));
+  }
+
+  void Read(const YamlNode& node, const YamlNode* forces) {
+    CheckCommands(node);
+    if (forces != nullptr) ReadForces(*forces);
+    ReadInitial(node.Find("initial"), "motion.initial", false);
+    ReadInitial(node.Find("initial_rates"), "motion.initial_rates", true);
+    if (yaml().has_errors()) return;
+    CheckDrives(forces != nullptr ? *forces : node);
+    if (!yaml().has_errors()) Complete(node);
+  }
+
+ private:
+  YamlReader& yaml() { return values_->yaml(); }
+
+  // Guided coordinates must be drives or prescribed joints themselves.
+  void CheckCommands(const YamlNode& node) {
+    for (const Command& command : motion_->commands) {
+      const bool plain = command.terms.size() == 1 &&
+                         command.terms[0].coordinate.kind != Coordinate::Kind::kOutput;
+      if (plain) continue;
+      yaml().Error(node,
+                   fmt::format("motion: '{}' is commanded, but where some freedoms move by forces, "
+                               "commands name drives and prescribed joints only",
+                               command.name),
+                   "command the drives themselves, or give no forces and no initial values");
+    }
+  }
+
+  void ReadForces(const YamlNode& node) {
+    std::vector<std::string> names;
+    for (const Drive& drive : mechanism_.drives) names.push_back(drive.name);
+    for (const YamlEntry& entry : yaml().Entries(node, "forces")) {
+      const int drive = mechanism_.FindDrive(entry.key);
+      if (drive < 0) {
+        yaml().Error(entry, fmt::format("forces: {} has no drive '{}'", mechanism_.name, entry.key),
+                     DidYouMean(entry.key, names, "known: " + Joined(names, kMostNames)));
+        continue;
+      }
+      const ProfileContext context{.unit = ForceUnit(mechanism_, mechanism_.drives[drive]),
+                                   .home = {},
+                                   .name = "forces." + entry.key,
+                                   .tables = tables_};
+      motion_->forces.push_back(
+          {drive, ReadProfile(values_, *entry.value, "forces." + entry.key, context)});
+    }
+  }
+
+  const NamedCoordinate* Find(const YamlEntry& entry, const std::string& path) {
+    std::vector<std::string> names;
+    for (const NamedCoordinate& named : known_) {
+      if (named.name == entry.key) return &named;
+      names.push_back(named.name);
+    }
+    yaml().Error(entry,
+                 fmt::format("{}: {} has no coordinate '{}'", path, mechanism_.name, entry.key),
+                 DidYouMean(entry.key, names,
+                            "known: drives, OUTPUT.x … OUTPUT.yaw, joints (JOINT.0, JOINT.1 … "
+                            "where they have several coordinates)"));
+    return nullptr;
+  }
+
+  // Number of a start value: a constant profile, so that units and `home` are read alike.
+  std::optional<double> Number(const YamlEntry& entry, const std::string& path,
+                               const Coordinate& coordinate, bool rate) {
+    ProfileContext context{.unit = CoordinateUnit(mechanism_, coordinate), .home = {}};
+    if (!rate) context.home = HomeValue(mechanism_, coordinate);
+    const Profile profile = ReadProfile(values_, *entry.value, path, context);
+    for (const ProfileTerm& term : profile.terms) {
+      if (std::holds_alternative<ConstantTerm>(term)) continue;
+      yaml().Error(entry, path + " is a start value and cannot depend on time");
+      return {};
+    }
+    return Evaluate(profile, 0.0).value;
+  }
+
+  void ReadInitial(const YamlNode* node, const std::string& path, bool rate) {
+    if (node == nullptr) return;
+    for (const YamlEntry& entry : yaml().Entries(*node, path)) {
+      const NamedCoordinate* named = Find(entry, path);
+      if (named == nullptr) continue;
+      const auto value = Number(entry, path + "." + entry.key, named->coordinate, rate);
+      if (!value) continue;
+      auto at = std::find_if(motion_->initial.begin(), motion_->initial.end(),
+                             [&](const InitialValue& v) { return v.name == entry.key; });
+      if (at == motion_->initial.end()) {
+        motion_->initial.push_back({.name = named->name,
+                                    .coordinate = named->coordinate,
+                                    .position = HomeValue(mechanism_, named->coordinate)});
+        at = std::prev(motion_->initial.end());
+      }
+      (rate ? at->rate : at->position) = *value;
+    }
+  }
+
+  [[nodiscard]] bool IsCommanded(int drive) const {
+    return std::any_of(motion_->commands.begin(), motion_->commands.end(),
+                       [&](const Command& command) {
+                         const Coordinate& c = command.terms.front().coordinate;
+                         return c.kind == Coordinate::Kind::kDrive && c.index == drive;
+                       });
+  }
+
+  // Each drive has either a command or a force.
+  void CheckDrives(const YamlNode& node) {
+    for (size_t d = 0; d < mechanism_.drives.size(); ++d) {
+      const int drive = static_cast<int>(d);
+      const std::string& name = mechanism_.drives[d].name;
+      const bool forced = motion_->FindForce(drive) >= 0, commanded = IsCommanded(drive);
+      if (forced && commanded) {
+        yaml().Error(node, fmt::format("drive '{}' has a command and a force", name),
+                     "its motion follows from the force, or its force from the motion");
+      } else if (!forced && !commanded) {
+        yaml().Error(node, fmt::format("drive '{}' has neither a command nor a force", name),
+                     fmt::format("a drive that is switched off has forces: {{{}: 0}}", name));
+      }
+    }
+  }
+
+  // As many start values as freedoms that no command holds.
+  void Complete(const YamlNode& node) {
+    const int freedoms = ReportMobility(mechanism_).freedoms();
+    const auto commands = static_cast<int>(motion_->commands.size());
+    const int free = freedoms - commands;
+    if (free <= 0) {
+      yaml().Error(node,
+                   fmt::format("motion commands {} of {} freedoms, so no freedom is left to forces",
+                               commands, freedoms),
+                   "leave out forces and initial values, or a command");
+      return;
+    }
+    std::vector<Command> given = motion_->commands;
+    for (const InitialValue& value : motion_->initial) {
+      given.push_back(AsCommand(value.name, value.coordinate));
+    }
+    const CommandRank rank = RankCommands(mechanism_, given);
+    if (rank.redundant > 0 || static_cast<int>(motion_->initial.size()) > free) {
+      std::vector<std::string> names;
+      for (const int k : rank.dependent) names.push_back(given[static_cast<size_t>(k)].name);
+      yaml().Error(node,
+                   fmt::format("start values and commands depend on each other: {}",
+                               names.empty() ? "more are given than there are freedoms"
+                                             : Joined(names, kMostNames)),
+                   fmt::format("{} has {} freedoms, {} of them commanded: leave out {}",
+                               mechanism_.name, freedoms, commands, rank.redundant));
+      return;
+    }
+    std::vector<Command> candidates;
+    const std::vector<NamedCoordinate> joints = JointCoordinates(mechanism_);
+    candidates.reserve(joints.size());
+    for (const NamedCoordinate& joint : joints) {
+      candidates.push_back(AsCommand(joint.name, joint.coordinate));
+    }
+    const size_t missing = static_cast<size_t>(free) - motion_->initial.size();
+    const std::vector<size_t> chosen = IndependentCommands(mechanism_, given, candidates, missing);
+    for (const size_t k : chosen) {
+      motion_->initial.push_back({.name = joints[k].name,
+                                  .coordinate = joints[k].coordinate,
+                                  .position = HomeValue(mechanism_, joints[k].coordinate)});
+    }
+  }
+
+  ValueReader* values_;
+  const Mechanism& mechanism_;
+  ProfileTables* tables_;
+  Motion* motion_;
+  std::vector<NamedCoordinate> known_;
+};
+
+std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism) {
+  std::vector<NamedCoordinate> named;
+  for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+    named.push_back({mechanism.drives[d].name, {Coordinate::Kind::kDrive, static_cast<int>(d), 0}});
+  }
+  for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
+    int component = 0;
+    for (const char* c : kPoseComponents) {
+      named.push_back({mechanism.outputs[o].name + "." + c,
+                       {Coordinate::Kind::kOutput, static_cast<int>(o), component++}});
+    }
+  }
+  for (NamedCoordinate& joint : JointCoordinates(mechanism)) named.push_back(std::move(joint));
+  return named;
+}
+
+// True when the scenario leaves freedoms to forces.
+bool IsFree(const YamlNode* motion, const YamlNode* forces) {
+  if (forces != nullptr) return true;
+  return motion != nullptr && motion->is_map() &&
+         (motion->Find("initial") != nullptr || motion->Find("initial_rates") != nullptr);
+}
+
+// Reads drive forces and start values into a motion whose commands have been read, and completes
+// the start values: freedoms that are not named start at home, at rest, in joint coordinates in
+// model order. Findings go to the reader.
+void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
+                    const YamlNode* forces, ProfileTables* tables, Motion* motion) {
+  FreeMotionReader(values, mechanism, tables, motion).Read(motion_node, forces);
+}
+
+}  // namespace
+std::vector<std::string> CoordinateNames(const Mechanism& mechanism) {
+  std::vector<std::string> names;
+  for (const Prescribed& p : mechanism.prescribed) names.push_back(p.name);
+  for (const Drive& d : mechanism.drives) names.push_back(d.name);
+  for (const Output& o : mechanism.outputs) {
+    for (const char* c : kPoseComponents) names.push_back(o.name + "." + c);
+  }
+  return names;
+}
+
+Coordinate CoordinateAt(const Mechanism& mechanism, size_t k) {
+  using Kind = Coordinate::Kind;
+  if (k < mechanism.prescribed.size()) return {Kind::kPrescribed, static_cast<int>(k), 0};
+  k -= mechanism.prescribed.size();
+  if (k < mechanism.drives.size()) return {Kind::kDrive, static_cast<int>(k), 0};
+  k -= mechanism.drives.size();
+  return {Kind::kOutput, static_cast<int>(k / 6), static_cast<int>(k % 6)};
+}
+
+std::optional<PolylinePlan> ReadBlendedPlan(ValueReader* values, const YamlMap& map) {
+  YamlReader& yaml = values->yaml();
+  PolylinePlan plan;
+  plan.start_s = values->InUnit(map, "start_s", {kPlain}).value_or(0.0);
+  if (const YamlNode* law = map.Find("law")) {
+    const auto choice = yaml.Choice(*law, map.PathOf("law"), {"trapezoid", "s_curve"});
+    if (!choice) return std::nullopt;
+    plan.s_curve = *choice == 1;
+  }
+  if (!plan.s_curve && map.Has("j_max")) {
+    yaml.Error(*map.Find("j_max"), map.PathOf("j_max") + " has a meaning with law: s_curve only");
+    return std::nullopt;
+  }
+  const auto v_max = values->RequiredPositive(map, "v_max");
+  const auto a_max = values->RequiredPositive(map, "a_max");
+  const auto j_max = plan.s_curve ? values->RequiredPositive(map, "j_max") : 1.0;
+  const auto blend = values->InUnit(map, "blend", {kPlain, kMm});
+  if (!v_max || !a_max || !j_max || !blend) return std::nullopt;
+  plan.blend = *blend;
+  plan.limits = {.v_max = *v_max, .a_max = *a_max, .j_max = *j_max};
+  if (plan.blend > 0.0) return plan;
+  yaml.Error(*map.node(), fmt::format("{} = {} violates blend > 0", map.PathOf("blend"), *blend),
+             "without blend the path rests at each point");
+  return std::nullopt;
+}
+
+std::vector<Piecewise> PlanPath(YamlReader* yaml, const YamlNode& node, const PolylinePlan& plan) {
+  for (size_t i = 0; i + 1 < plan.points.size(); ++i) {
+    if (plan.points[i] != plan.points[i + 1]) continue;
+    yaml->Error(node, fmt::format("motion.path.points: points {} and {} are equal", i, i + 1));
+    return {};
+  }
+  const PolylineTrouble trouble = TroubleOf(plan);
+  if (trouble.text.empty()) return BlendedPolyline(plan);
+  yaml->Error(node, "motion.path: " + trouble.text, trouble.hint);
+  return {};
+}
+
+namespace {
+
+constexpr const char* kTime = "t";
+
+bool IsWord(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
+// A text in pieces: words with their dots, and what is between them.
+struct Piece {
+  std::string text;
+  bool is_word = false;  // starts with a letter or _
+
+  [[nodiscard]] bool is_dotted() const { return is_word && text.find('.') != std::string::npos; }
+};
+
+std::vector<Piece> PiecesOf(const std::string& text) {
+  std::vector<Piece> pieces;
+  for (size_t i = 0; i < text.size();) {
+    size_t end = i;
+    while (end < text.size() && (IsWord(text[end]) || text[end] == '.')) ++end;
+    if (end == i) ++end;
+    const bool letter = IsWord(text[i]) && std::isdigit(static_cast<unsigned char>(text[i])) == 0;
+    pieces.push_back({text.substr(i, end - i), letter});
+    i = end;
+  }
+  return pieces;
+}
+
+// Rotations of balls are coordinates for start values only.
+bool CanFollow(const Mechanism& mechanism, const Coordinate& coordinate) {
+  if (coordinate.kind != Coordinate::Kind::kJoint) return true;
+  const Joint& joint = mechanism.joints[static_cast<size_t>(coordinate.index)];
+  return !HasBall(joint.kind);
+}
+
+class FunctionReader {
+ public:
+  FunctionReader(ValueReader* values, const Mechanism& mechanism)
+      : values_(*values), mechanism_(mechanism) {
+    for (const NamedCoordinate& named : StateCoordinates(mechanism)) {
+      if (!CanFollow(mechanism, named.coordinate)) continue;
+      known_.push_back({named.name + ".position", Input(named.coordinate, false)});
+      known_.push_back({named.name + ".velocity", Input(named.coordinate, true)});
+    }
+  }
+
+  std::optional<StateFunction> Read(const YamlNode& node, const std::string& path) {
+    std::string expression;
+    bool good = true;
+    for (const Piece& piece : PiecesOf(node.text)) {
+      good = CheckTime(piece, node, path) && good;
+      const auto name = piece.is_dotted() ? VariableOf(piece.text, node, path) : piece.text;
+      good = good && name;
+      expression += name.value_or("0");
+    }
+    if (!good) return std::nullopt;
+    const auto formula = values_.Compile(node, path, expression, variables_);
+    if (formula == nullptr) return std::nullopt;
+    return StateFunction{.inputs = inputs_, .value = [formula](double t_s, auto inputs) {
+                           std::vector<double> all{t_s};
+                           all.insert(all.end(), inputs.begin(), inputs.end());
+                           return formula->At(all);
+                         }};
+  }
+
+ private:
+  struct Known {
+    std::string name;
+    StateFunction::Input input;
+  };
+
+  [[nodiscard]] StateFunction::Input Input(const Coordinate& coordinate, bool rate) const {
+    return {coordinate, rate, HomeValue(mechanism_, coordinate)};
+  }
+
+  bool CheckTime(const Piece& piece, const YamlNode& node, const std::string& path) {
+    if (piece.text != kTime || !values_.HasParameter(kTime)) return true;
+    values_.yaml().Error(
+        node, fmt::format("{}: t is the time here, and a parameter of {}", path, mechanism_.name));
+    return false;
+  }
+
+  // The variable that stands for a coordinate.
+  std::optional<std::string> VariableOf(const std::string& name, const YamlNode& node,
+                                        const std::string& path) {
+    const auto found =
+        std::ranges::find_if(known_, [&](const Known& known) { return known.name == name; });
+    if (found == known_.end()) {
+      std::vector<std::string> names;
+      for (const Known& known : known_) names.push_back(known.name);
+      values_.yaml().Error(node, fmt::format("{}: {} has no '{}'", path, mechanism_.name, name),
+                           DidYouMean(name, names,
+                                      "known: t [s], and .position and .velocity of drives, of "
+                                      "OUTPUT.x … OUTPUT.yaw and of joints"));
+      return std::nullopt;
+    }
+    inputs_.push_back(found->input);
+    variables_.push_back(fmt::format("state_{}", variables_.size()));
+    return variables_.back();
+  }
+
+  ValueReader& values_;
+  const Mechanism& mechanism_;
+  std::vector<Known> known_;
+  std::vector<StateFunction::Input> inputs_;
+  std::vector<std::string> variables_ = {kTime};
+};
+
+}  // namespace
+
+bool FollowsState(const ValueReader& values, const YamlNode& node) {
+  if (!node.is_scalar()) return false;
+  const std::vector<Piece> pieces = PiecesOf(node.text);
+  return std::ranges::any_of(pieces, [&](const Piece& piece) {
+    return piece.is_dotted() || (piece.text == kTime && !values.HasParameter(kTime));
+  });
+}
+
+std::optional<StateFunction> ReadStateFunction(ValueReader* values, const Mechanism& mechanism,
+                                               const YamlNode& node, const std::string& path) {
+  return FunctionReader(values, mechanism).Read(node, path);
+}
+
 namespace {
 
 constexpr double kMostSamples = 1e6;

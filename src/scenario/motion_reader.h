@@ -2,12 +2,46 @@
 #pragma once
 
 #include <optional>
+#include <string>
+#include <vector>
 
-#include "input/value_reader.h"
+#include "math/quintic_spline.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "model_file/yaml/value_reader.h"
+
+// What a scenario may command, by name.
 
 namespace mbv {
+
+/// Names a command may use: prescribed joints, drives, output components ("platform.yaw").
+[[nodiscard]] std::vector<std::string> CoordinateNames(const Mechanism& mechanism);
+/// The k-th of these names as a coordinate.
+[[nodiscard]] Coordinate CoordinateAt(const Mechanism& mechanism, size_t k);
+
+// Keys of `motion.path` with `blend`: polylines with rounded corners.
+
+/// Everything but the points; empty after a finding.
+[[nodiscard]] std::optional<PolylinePlan> ReadBlendedPlan(ValueReader* values, const YamlMap& map);
+
+/// The motion of every axis; empty after a finding, at `node`.
+[[nodiscard]] std::vector<Piecewise> PlanPath(YamlReader* yaml, const YamlNode& node,
+                                              const PolylinePlan& plan);
+
+// Numbers of a scenario that follow from time and from the mechanism's state.
+//
+//   "-k*(slider.position - 0.1) - c*slider.velocity + 5*sin(2*pi*t)"
+// Names with dots are coordinates (StateCoordinates()) with .position or .velocity behind, t is the
+// time [s]; other names are parameters, which are constants. SI units, radians.
+
+/// True for a text that names the time or a coordinate.
+[[nodiscard]] bool FollowsState(const ValueReader& values, const YamlNode& node);
+
+/// Empty after a finding.
+[[nodiscard]] std::optional<StateFunction> ReadStateFunction(ValueReader* values,
+                                                             const Mechanism& mechanism,
+                                                             const YamlNode& node,
+                                                             const std::string& path);
 
 /// Times for a motion that states none, from a table that it is compared with.
 struct MotionTimes {

@@ -10,17 +10,17 @@
 #include <string>
 #include <vector>
 
-#include "core/diagnostics.h"
-#include "core/types.h"
-#include "input/overrides.h"
-#include "mechanism/model_caveat.h"
+#include "base/diagnostics.h"
+#include "base/types.h"
+#include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
+#include "model_file/yaml/value_reader.h"
+#include "plot/figure.h"
 #include "scenario/checks.h"
-#include "scenario/figure_spec.h"
 
 namespace mbv {
 
-struct ReferenceTable;  // table/table.h
+struct ReferenceTable;  // scenario/tables/table.h
 
 /// The closed form's part in a scenario.
 struct AnalyticSettings {

@@ -6,7 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/word_hints.h"
+#include "base/text.h"
 #include "mechanism/reach.h"
 #include "scenario/checks.h"
 #include "scenario/file_parts.h"

@@ -1,7 +1,7 @@
 // The sections of a scenario file that do not concern motion.
 #pragma once
 
-#include "input/value_reader.h"
+#include "model_file/yaml/value_reader.h"
 #include "scenario/scenario.h"
 
 namespace mbv {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "analytic/cabin_robot/stiffness.h"
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv::cabin {
 

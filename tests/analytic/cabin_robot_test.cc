@@ -1,15 +1,15 @@
 // The cabin robot's closed form: hand-checkable cases first, then laws.
-#include "analytic/cabin_robot/cabin_robot.h"
+#include "analytic/cabin_robot/closed_form.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <numbers>
 
-#include "analytic/cabin_robot/cabin_dynamics.h"
-#include "core/spatial.h"
+#include "analytic/cabin_robot/dynamics.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::cabin {
 namespace {

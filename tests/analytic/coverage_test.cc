@@ -11,7 +11,7 @@
 #include "model_file/load_model.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

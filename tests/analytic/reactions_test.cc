@@ -5,12 +5,12 @@
 #include <cmath>
 #include <set>
 
-#include "analytic/cabin_robot/reactions.h"
+#include "analytic/cabin_robot/dynamics.h"
 #include "analytic/closed_form.h"
-#include "analytic/scara_robot/reactions.h"
+#include "analytic/scara_robot/dynamics.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -8,7 +8,7 @@
 #include "model_file/load_model.h"
 #include "reference/reference.h"
 #include "tests/analytic/scara_robot_fixture.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::scara {
 namespace {

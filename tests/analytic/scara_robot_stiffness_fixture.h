@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "analytic/scara_robot/stiffness.h"
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "tests/analytic/scara_robot_fixture.h"
 
 namespace mbv::scara {

@@ -9,9 +9,9 @@
 
 #include "model_file/load_model.h"
 #include "reference/reference.h"
-#include "spr_tripod_model.h"
 #include "tests/analytic/allocation_counter.h"
-#include "tests/source_dir.h"
+#include "tests/analytic/spr_tripod_model.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::spr_tripod {
 namespace {

@@ -8,8 +8,8 @@
 #include <numbers>
 #include <type_traits>
 
-#include "core/spatial.h"
-#include "spr_tripod_model.h"
+#include "math/spatial.h"
+#include "tests/analytic/spr_tripod_model.h"
 
 namespace mbv::spr_tripod {
 namespace {

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv::spr_tripod {
 namespace {

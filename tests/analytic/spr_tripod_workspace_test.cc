@@ -7,7 +7,7 @@
 #include <cstring>
 #include <numbers>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv::spr_tripod {
 namespace {

@@ -3,7 +3,7 @@
 
 #include <functional>
 
-#include "core/types.h"
+#include "base/types.h"
 
 namespace mbv::stabilizing_platform {
 

@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "analytic/stabilizing_platform/equivalent_limb.h"
-#include "core/spatial.h"
+#include "analytic/stabilizing_platform/position.h"
+#include "math/spatial.h"
 #include "tests/analytic/stabilizing_platform_differences.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 

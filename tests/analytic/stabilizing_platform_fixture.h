@@ -7,9 +7,9 @@
 #include <numbers>
 #include <string>
 
-#include "analytic/stabilizing_platform/equations.h"
-#include "analytic/stabilizing_platform/stabilizing_platform.h"
-#include "core/demand.h"
+#include "analytic/stabilizing_platform/closed_form.h"
+#include "analytic/stabilizing_platform/dynamics.h"
+#include "base/demand.h"
 
 namespace mbv::stabilizing_platform {
 

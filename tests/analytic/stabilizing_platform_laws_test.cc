@@ -4,7 +4,7 @@
 #include <cmath>
 #include <random>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 
 namespace mbv::stabilizing_platform {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "analytic/stabilizing_platform/limb_system.h"
+#include "analytic/stabilizing_platform/dynamics.h"
 #include "tests/analytic/stabilizing_platform_differences.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
 

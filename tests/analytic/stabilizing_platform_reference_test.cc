@@ -8,7 +8,7 @@
 
 #include "model_file/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::stabilizing_platform {
 namespace {

@@ -2,10 +2,10 @@
 #include <benchmark/benchmark.h>
 
 #include "analytic/stiffness_form.h"
-#include "core/demand.h"
+#include "base/demand.h"
 #include "model_file/load_model.h"
 #include "tests/analytic/stabilizing_platform_fixture.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

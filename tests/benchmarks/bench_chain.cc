@@ -1,11 +1,11 @@
 // Cost per sample and per step of chains of N four-bars: how it grows with the number of loops.
 #include <benchmark/benchmark.h>
 
-#include "mjcf/mjcf.h"
 #include "reference/reference.h"
-#include "simulation/engine_model.h"
-#include "simulation/simulation.h"
-#include "tests/four_bar_chain.h"
+#include "simulation/engine/engine_model.h"
+#include "simulation/engine/simulation.h"
+#include "simulation/mjcf/mjcf.h"
+#include "tests/mechanisms/four_bar_chain.h"
 
 namespace mbv {
 namespace {

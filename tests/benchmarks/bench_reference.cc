@@ -6,7 +6,7 @@
 #include "kinematics/mobility.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

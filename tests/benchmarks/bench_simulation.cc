@@ -4,12 +4,12 @@
 #include <benchmark/benchmark.h>
 
 #include "analytic/closed_form.h"
-#include "core/demand.h"
-#include "mjcf/mjcf.h"
+#include "base/demand.h"
 #include "scenario/load_scenario.h"
-#include "simulation/engine_model.h"
-#include "simulation/simulation.h"
-#include "tests/source_dir.h"
+#include "simulation/engine/engine_model.h"
+#include "simulation/engine/simulation.h"
+#include "simulation/mjcf/mjcf.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

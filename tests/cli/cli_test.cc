@@ -4,9 +4,9 @@
 #include <csignal>
 #include <nlohmann/json.hpp>
 
-#include "tests/cli/program.h"
-#include "tests/shipped.h"
-#include "tests/source_dir.h"
+#include "tests/support/run_program.h"
+#include "tests/support/shipped.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

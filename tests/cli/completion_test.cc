@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <sstream>
 
-#include "tests/cli/program.h"
+#include "tests/support/run_program.h"
 
 namespace mbv {
 namespace {

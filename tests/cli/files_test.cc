@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "tests/cli/program.h"
-#include "tests/kill_at_calls.h"
+#include "tests/support/kill_at_calls.h"
+#include "tests/support/run_program.h"
 
 namespace mbv {
 namespace {

@@ -4,9 +4,9 @@
 #include <regex>
 #include <set>
 
-#include "core/wrapped.h"
-#include "tests/cli/program.h"
-#include "tests/source_dir.h"
+#include "base/text.h"
+#include "tests/support/run_program.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

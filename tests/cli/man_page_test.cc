@@ -3,7 +3,7 @@
 
 #include <fstream>
 
-#include "tests/cli/program.h"
+#include "tests/support/run_program.h"
 
 namespace mbv {
 namespace {

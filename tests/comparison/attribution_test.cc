@@ -1,7 +1,7 @@
 // The verdict names the odd one out, whichever it is, and admits when it cannot.
 #include <gtest/gtest.h>
 
-#include "comparison/attribution_parts.h"
+#include "comparison/attribution.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {

@@ -4,7 +4,7 @@
 #include <memory>
 
 #include "comparison/comparison.h"
-#include "table/row_spline.h"
+#include "scenario/tables/table_spline.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {

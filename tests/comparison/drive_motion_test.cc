@@ -7,7 +7,7 @@
 #include <iterator>
 
 #include "tests/comparison/synthetic.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -5,7 +5,6 @@
 
 #include <limits>
 
-#include "comparison/element_force_scale.h"
 #include "mechanism/channels.h"
 #include "mechanism/reach.h"
 #include "tests/comparison/carried.h"

@@ -8,7 +8,7 @@
 
 #include "comparison/comparison.h"
 #include "mechanism/channels.h"
-#include "tests/two_sliders.h"
+#include "tests/mechanisms/two_sliders.h"
 
 namespace mbv::synthetic {
 

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "comparison/table_diagnosis.h"
-#include "table/noise.h"
+#include "scenario/tables/grid.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {

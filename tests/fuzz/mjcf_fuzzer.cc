@@ -2,7 +2,7 @@
 // what is removed at its word.
 #include <string>
 
-#include "mjcf/foreign.h"
+#include "simulation/mjcf/foreign.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, size_t size) {

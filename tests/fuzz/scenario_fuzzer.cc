@@ -1,8 +1,8 @@
 // Any text as scenario, next to the shipped ones.
 #include <string>
 
+#include "features/stiffness/stiffness_scenario.h"
 #include "scenario/load_scenario.h"
-#include "scenario/stiffness_scenario.h"
 #include "tests/fuzz/fuzz.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const unsigned char* data, size_t size) {

@@ -2,7 +2,7 @@
 #include <string>
 
 #include "model_file/load_model.h"
-#include "table/settings.h"
+#include "scenario/tables/table.h"
 #include "tests/fuzz/fuzz.h"
 
 namespace {

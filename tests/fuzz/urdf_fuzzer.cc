@@ -1,5 +1,5 @@
 // Any text as URDF with closures, alone and as the tree of a model.
-#include "model_file/urdf.h"
+#include "model_file/urdf/urdf_import.h"
 
 #include <string>
 

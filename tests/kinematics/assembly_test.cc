@@ -1,13 +1,12 @@
 // Ways to put loops together.
 #include "kinematics/assembly.h"
-#include "kinematics/assembly_residual.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include <numbers>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 #include "model_file/load_model.h"
 

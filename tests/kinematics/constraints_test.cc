@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 
 namespace mbv {

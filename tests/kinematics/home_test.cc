@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "mechanism/spanning_tree.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

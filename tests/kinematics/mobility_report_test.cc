@@ -1,10 +1,10 @@
 // The mobility report: by loop, by name, and at a singular home.
-#include "kinematics/mobility_report.h"
+#include "kinematics/mobility.h"
 
 #include <gtest/gtest.h>
 
 #include "model_file/load_model.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

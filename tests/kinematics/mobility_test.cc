@@ -7,12 +7,12 @@
 #include <filesystem>
 #include <random>
 
-#include "core/sparse_rank.h"
 #include "kinematics/row_stack.h"
+#include "math/sparse.h"
 #include "mechanism/reach.h"
 #include "model_file/load_model.h"
-#include "tests/simulation/test_mechanisms.h"
-#include "tests/source_dir.h"
+#include "tests/mechanisms/simulated.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

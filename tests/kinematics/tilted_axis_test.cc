@@ -1,12 +1,12 @@
 // An axis that is tilted by a slip is named as the cause of what it does.
-#include "kinematics/tilted_axis.h"
+#include "kinematics/constraints.h"
 
 #include <gtest/gtest.h>
 
 #include <filesystem>
 
 #include "model_file/load_model.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -2,7 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/demand.h"
+#include "base/demand.h"
 #include "kinematics/constraints.h"
 #include "mechanism/channels.h"
 #include "tests/laws/subject.h"

@@ -1,7 +1,7 @@
 // Laws of the drive forces.
 #include <cmath>
 
-#include "mechanism/body_states.h"
+#include "mechanism/motion.h"
 #include "tests/laws/fixture.h"
 
 namespace mbv::laws {

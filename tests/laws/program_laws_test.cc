@@ -3,8 +3,8 @@
 #include <cmath>
 #include <cstring>
 
-#include "mjcf/mjcf.h"
-#include "simulation/engine.h"
+#include "simulation/engine/engine.h"
+#include "simulation/mjcf/mjcf.h"
 #include "tests/laws/fixture.h"
 
 namespace mbv::laws {

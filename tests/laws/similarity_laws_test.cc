@@ -7,18 +7,18 @@
 #include <filesystem>
 #include <iterator>
 
+#include "base/demand.h"
 #include "comparison/comparison.h"
-#include "core/demand.h"
-#include "core/spatial.h"
 #include "kinematics/mobility.h"
+#include "math/spatial.h"
 #include "mechanism/reach.h"
-#include "pipeline/drive_sources.h"
-#include "pipeline/simulate_scenario.h"
 #include "reference/forward.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
 #include "tests/laws/similar.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
+#include "verify/drive_by.h"
+#include "verify/simulate_scenario.h"
 
 namespace mbv::laws {
 namespace {

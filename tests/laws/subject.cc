@@ -6,11 +6,11 @@
 #include <random>
 #include <set>
 
-#include "core/demand.h"
+#include "base/demand.h"
 #include "mechanism/channels.h"
 #include "mechanism/reach.h"
 #include "model_file/load_model.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::laws {
 namespace {

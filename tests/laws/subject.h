@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "analytic/closed_form.h"
-#include "mechanism/body_states.h"
+#include "mechanism/motion.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
-#include "simulation/simulation.h"
+#include "simulation/engine/simulation.h"
 
 namespace mbv::laws {
 

@@ -6,7 +6,7 @@
 #include <set>
 #include <string>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "mechanism/joint_pose.h"
 
 namespace mbv {

@@ -7,11 +7,11 @@
 #include <fstream>
 #include <iterator>
 
-#include "four_bar.h"
 #include "kinematics/home.h"
-#include "kinematics/mobility_report.h"
+#include "kinematics/mobility.h"
 #include "model_file/load_model.h"
-#include "tests/source_dir.h"
+#include "tests/mechanisms/four_bar.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

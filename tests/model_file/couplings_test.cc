@@ -7,7 +7,7 @@
 
 #include "model_file/load_model.h"
 #include "model_file/write_model.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

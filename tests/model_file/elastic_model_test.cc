@@ -4,12 +4,12 @@
 #include <cmath>
 #include <numbers>
 
-#include "four_bar.h"
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
-#include "slip.h"
-#include "tests/source_dir.h"
-#include "tests/test_folder.h"
+#include "tests/mechanisms/four_bar.h"
+#include "tests/mechanisms/slip.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

@@ -5,9 +5,9 @@
 
 #include "model_file/element_text.h"
 #include "model_file/load_model.h"
-#include "model_file/urdf.h"
+#include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -3,8 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/spatial.h"
 #include "kinematics/mobility.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 
 namespace mbv {

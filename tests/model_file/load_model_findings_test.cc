@@ -6,10 +6,10 @@
 #include <iterator>
 #include <random>
 
-#include "four_bar.h"
 #include "model_file/load_model.h"
-#include "slip.h"
-#include "tests/source_dir.h"
+#include "tests/mechanisms/four_bar.h"
+#include "tests/mechanisms/slip.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/spatial.h"
-#include "four_bar.h"
+#include "math/spatial.h"
 #include "model_file/write_model.h"
+#include "tests/mechanisms/four_bar.h"
 
 namespace mbv {
 namespace {

@@ -1,13 +1,13 @@
 // Meshes of model files and URDF files: found, read, written back, or left out with one warning.
 #include <gtest/gtest.h>
 
-#include "mesh/mass_properties.h"
 #include "model_file/load_bodies.h"
 #include "model_file/load_model.h"
-#include "model_file/urdf.h"
+#include "model_file/mesh/mass_properties.h"
+#include "model_file/urdf/urdf_import.h"
 #include "model_file/write_model.h"
-#include "tests/mesh/solids.h"
-#include "tests/test_folder.h"
+#include "tests/support/solids.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

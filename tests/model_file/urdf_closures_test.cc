@@ -4,11 +4,11 @@
 #include <filesystem>
 #include <fstream>
 
-#include "core/spatial.h"
 #include "kinematics/mobility.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
-#include "model_file/urdf.h"
-#include "tests/source_dir.h"
+#include "model_file/urdf/urdf_import.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

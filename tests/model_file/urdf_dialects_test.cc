@@ -3,7 +3,7 @@
 
 #include "kinematics/mobility.h"
 #include "model_file/load_model.h"
-#include "tests/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

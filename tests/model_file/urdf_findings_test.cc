@@ -4,7 +4,7 @@
 #include <ostream>
 
 #include "model_file/load_model.h"
-#include "tests/test_folder.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

@@ -1,4 +1,4 @@
-#include "model_file/urdf.h"
+#include "model_file/urdf/urdf_import.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -8,16 +8,16 @@
 #include <fstream>
 #include <numbers>
 
-#include "core/spatial.h"
-#include "four_bar.h"
 #include "kinematics/mobility.h"
+#include "math/spatial.h"
 #include "model_file/element_text.h"
 #include "model_file/load_model.h"
-#include "model_file/urdf_closures.h"
+#include "model_file/urdf/urdf_closures.h"
 #include "model_file/write_model.h"
-#include "tests/shipped.h"
-#include "tests/source_dir.h"
-#include "tests/test_folder.h"
+#include "tests/mechanisms/four_bar.h"
+#include "tests/support/shipped.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

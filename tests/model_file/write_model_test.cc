@@ -4,8 +4,8 @@
 #include <gtest/gtest.h>
 
 #include "model_file/load_model.h"
-#include "tests/shipped.h"
-#include "tests/source_dir.h"
+#include "tests/support/shipped.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -1,10 +1,10 @@
 // Slips of indentation and punctuation are told as such, at their place.
 #include <gtest/gtest.h>
 
-#include "core/diagnostics.h"
-#include "four_bar.h"
+#include "base/diagnostics.h"
 #include "model_file/load_model.h"
-#include "slip.h"
+#include "tests/mechanisms/four_bar.h"
+#include "tests/mechanisms/slip.h"
 
 namespace mbv {
 namespace {

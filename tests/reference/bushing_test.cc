@@ -2,8 +2,8 @@
 // slope of their energy.
 #include <gtest/gtest.h>
 
-#include "core/spatial.h"
 #include "kinematics/constraints.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "tests/reference/fixture.h"
 

@@ -1,5 +1,5 @@
 // A rotor that its carrier turns against the exact model, in which it is a body.
-#include "tests/carried_rotor.h"
+#include "tests/mechanisms/carried_rotor.h"
 
 #include <gtest/gtest.h>
 

@@ -4,7 +4,7 @@
 #include "kinematics/home.h"
 #include "kinematics/mobility.h"
 #include "reference/forward.h"
-#include "tests/coupled_wheels.h"
+#include "tests/mechanisms/coupled_wheels.h"
 #include "tests/reference/fixture.h"
 
 namespace mbv::fixtures {

@@ -8,8 +8,8 @@
 #include <cmath>
 #include <vector>
 
-#include "core/spatial.h"
 #include "kinematics/constraints.h"
+#include "math/spatial.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv::fixtures {

@@ -5,12 +5,12 @@
 #include <numbers>
 
 #include "analytic/stiffness_form.h"
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
 #include "tests/reference/direct_stiffness.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

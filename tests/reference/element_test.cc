@@ -3,10 +3,10 @@
 
 #include "model_file/load_model.h"
 #include "reference/forward.h"
-#include "tests/pushed_block.h"
+#include "tests/mechanisms/pushed_block.h"
+#include "tests/mechanisms/rubbing_pendulum.h"
 #include "tests/reference/fixture.h"
-#include "tests/rubbing_pendulum.h"
-#include "tests/shipped.h"
+#include "tests/support/shipped.h"
 
 namespace mbv::fixtures {
 namespace {

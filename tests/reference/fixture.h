@@ -8,7 +8,7 @@
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 #include "reference/reference.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv::fixtures {
 

@@ -7,7 +7,7 @@
 #include <numbers>
 #include <random>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "tests/reference/direct_stiffness.h"
 

@@ -4,10 +4,10 @@
 
 #include <numbers>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "tests/reference/fixture.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::fixtures {
 namespace {

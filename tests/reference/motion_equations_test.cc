@@ -7,7 +7,7 @@
 #include "reference/closure_solver.h"
 #include "reference/forward.h"
 #include "reference/free_dynamics.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::internal {
 namespace {

@@ -4,12 +4,12 @@
 
 #include <cmath>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "reference/pose_predictor.h"
 #include "reference/reference.h"
 #include "reference/square_system.h"
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <random>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "reference/reference.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

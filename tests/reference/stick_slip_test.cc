@@ -10,9 +10,9 @@
 #include "model_file/load_model.h"
 #include "reference/forward.h"
 #include "reference/rest_decision.h"
+#include "tests/mechanisms/stacked_blocks.h"
 #include "tests/reference/fixture.h"
-#include "tests/shipped.h"
-#include "tests/stacked_blocks.h"
+#include "tests/support/shipped.h"
 
 namespace mbv::fixtures {
 namespace {

@@ -1,4 +1,4 @@
-#include "render/accumulation.h"
+#include "render/painter.h"
 
 #include <gtest/gtest.h>
 

@@ -5,14 +5,13 @@
 #include <cmath>
 #include <numbers>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "model_file/load_model.h"
 #include "render/annotations.h"
 #include "render/arrangement.h"
-#include "render/best_view.h"
-#include "render/caption.h"
-#include "test_mechanisms.h"
-#include "tests/source_dir.h"
+#include "render/camera.h"
+#include "tests/mechanisms/rendered.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::render {
 namespace {

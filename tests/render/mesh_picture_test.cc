@@ -2,8 +2,8 @@
 #include <gtest/gtest.h>
 
 #include "render/scene.h"
-#include "test_mechanisms.h"
-#include "tests/mesh/solids.h"
+#include "tests/mechanisms/rendered.h"
+#include "tests/support/solids.h"
 
 namespace mbv {
 namespace {

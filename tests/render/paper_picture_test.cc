@@ -4,10 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "render/annotations.h"
 #include "render/arrangement.h"
-#include "render/labels.h"
 #include "render/stage.h"
-#include "test_mechanisms.h"
+#include "tests/mechanisms/rendered.h"
 
 namespace mbv::render {
 namespace {

@@ -8,7 +8,7 @@
 #include "render/camera.h"
 #include "render/scene.h"
 #include "render/stage.h"
-#include "test_mechanisms.h"
+#include "tests/mechanisms/rendered.h"
 
 namespace mbv {
 namespace {

@@ -5,9 +5,7 @@
 #include "mechanism/colors.h"
 #include "render/annotations.h"
 #include "render/camera.h"
-#include "render/caption.h"
-#include "render/palette.h"
-#include "test_mechanisms.h"
+#include "tests/mechanisms/rendered.h"
 
 namespace mbv::render {
 namespace {

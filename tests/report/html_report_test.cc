@@ -9,13 +9,11 @@
 #include <cstdint>
 #include <nlohmann/json.hpp>
 
-#include "core/sha256.h"
+#include "base/sha256.h"
 #include "report/html_assets.h"
-#include "report/html_plots.h"
-#include "report/html_tables.h"
-#include "report/html_text.h"
+#include "report/page.h"
 #include "report/plot_points.h"
-#include "report/result_html.h"
+#include "report/result.h"
 #include "tests/comparison/synthetic.h"
 
 namespace mbv {

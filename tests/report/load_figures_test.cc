@@ -6,7 +6,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "report/html_tables.h"
+#include "report/html_report.h"
 
 namespace mbv {
 namespace {

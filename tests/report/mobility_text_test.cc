@@ -1,8 +1,8 @@
 // What a model's joints and drives determine, in words and for programs.
 #include "report/mobility_text.h"
 
-#include "tests/report/golden_file.h"
-#include "tests/two_sliders.h"
+#include "tests/mechanisms/two_sliders.h"
+#include "tests/support/golden_file.h"
 
 namespace mbv {
 namespace {

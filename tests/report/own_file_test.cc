@@ -1,10 +1,7 @@
 // What is said about the user's own file.
-#include "report/own_file.h"
+#include "report/source_model_report.h"
 
 #include <gtest/gtest.h>
-
-#include "report/own_file_text.h"
-#include "report/own_file_words.h"
 
 namespace mbv {
 namespace {

@@ -3,9 +3,9 @@
 #include <algorithm>
 
 #include "report/html_report.h"
-#include "tests/mesh/solids.h"
-#include "tests/report/golden_file.h"
-#include "tests/report/reports.h"
+#include "tests/support/golden_file.h"
+#include "tests/support/reports.h"
+#include "tests/support/solids.h"
 
 namespace mbv {
 namespace {

@@ -6,8 +6,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "tests/report/golden_file.h"
-#include "tests/report/reports.h"
+#include "tests/support/golden_file.h"
+#include "tests/support/reports.h"
 
 namespace mbv {
 namespace {

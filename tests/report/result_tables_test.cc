@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "tests/report/reports.h"
+#include "tests/support/reports.h"
 
 namespace mbv {
 namespace {

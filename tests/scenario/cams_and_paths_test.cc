@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

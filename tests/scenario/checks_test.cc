@@ -8,7 +8,7 @@
 #include "mechanism/reach.h"
 #include "scenario/load_scenario.h"
 #include "scenario/settings_reader.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

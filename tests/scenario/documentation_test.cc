@@ -7,8 +7,8 @@
 #include <sstream>
 
 #include "scenario/load_scenario.h"
-#include "tests/document_text.h"
-#include "tests/source_dir.h"
+#include "tests/support/document_text.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

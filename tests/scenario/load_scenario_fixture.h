@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 

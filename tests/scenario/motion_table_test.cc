@@ -6,10 +6,10 @@
 #include <numbers>
 #include <random>
 
-#include "core/inputs.h"
+#include "base/inputs.h"
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
-#include "tests/test_folder.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

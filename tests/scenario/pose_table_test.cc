@@ -6,10 +6,10 @@
 #include <functional>
 #include <numbers>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 #include "scenario/load_scenario.h"
-#include "tests/source_dir.h"
-#include "tests/test_folder.h"
+#include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
 
 namespace mbv {
 namespace {

@@ -1,12 +1,12 @@
 // Bushings and carried rotors in MuJoCo: against the exact model, and against energy.
 #include <gtest/gtest.h>
 
-#include "mjcf/mjcf.h"
 #include "model_file/load_model.h"
 #include "reference/forward.h"
-#include "simulation/simulation.h"
-#include "tests/carried_rotor.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "simulation/engine/simulation.h"
+#include "simulation/mjcf/mjcf.h"
+#include "tests/mechanisms/carried_rotor.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

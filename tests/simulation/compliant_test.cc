@@ -1,13 +1,13 @@
 // The compliant simulation against hand calculations: cantilever, truss, parallelogram, servo,
 // idle and free motions, large loads.
-#include "simulation/compliant.h"
+#include "simulation/engine/compliant.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "core/spatial.h"
-#include "test_mechanisms.h"
+#include "math/spatial.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

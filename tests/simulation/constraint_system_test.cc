@@ -1,14 +1,14 @@
 // J̇q̇ of every kind of row against differences of MuJoCo's own J q̇ along the motion.
-#include "simulation/constraint_system.h"
+#include "simulation/engine/constraint_system.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "mjcf/mjcf.h"
 #include "model_file/load_model.h"
-#include "tests/simulation/test_mechanisms.h"
-#include "tests/source_dir.h"
+#include "simulation/mjcf/mjcf.h"
+#include "tests/mechanisms/simulated.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::simulation {
 namespace {

@@ -1,10 +1,10 @@
 // Coupled joints in MuJoCo against an equation of motion by hand.
 #include <gtest/gtest.h>
 
-#include "mjcf/mjcf.h"
-#include "mjcf/plan.h"
-#include "simulation/simulation.h"
-#include "tests/coupled_wheels.h"
+#include "simulation/engine/simulation.h"
+#include "simulation/mjcf/mjcf.h"
+#include "simulation/mjcf/plan.h"
+#include "tests/mechanisms/coupled_wheels.h"
 #include "tests/simulation/torque_error.h"
 
 namespace mbv {

@@ -1,11 +1,11 @@
 // Force elements in MuJoCo against an equation of motion by hand.
 #include <gtest/gtest.h>
 
-#include "mjcf/mjcf.h"
-#include "mjcf/plan.h"
-#include "simulation/simulation.h"
-#include "tests/pushed_block.h"
-#include "tests/rubbing_pendulum.h"
+#include "simulation/engine/simulation.h"
+#include "simulation/mjcf/mjcf.h"
+#include "simulation/mjcf/plan.h"
+#include "tests/mechanisms/pushed_block.h"
+#include "tests/mechanisms/rubbing_pendulum.h"
 #include "tests/simulation/torque_error.h"
 
 namespace mbv {

@@ -1,11 +1,11 @@
 // MuJoCo's errors and warnings, and what becomes of them.
 
-#include "simulation/engine.h"
+#include "simulation/engine/engine.h"
 
 #include <gtest/gtest.h>
 
-#include "simulation/simulation.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "simulation/engine/simulation.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

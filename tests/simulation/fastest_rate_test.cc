@@ -1,13 +1,13 @@
 // How fast springs, dampers and servos are, against formulas.
-#include "simulation/fastest_rate.h"
+#include "simulation/engine/fastest_rate.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "mjcf/mjcf.h"
-#include "simulation/closure_solver.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "simulation/engine/closure_solver.h"
+#include "simulation/mjcf/mjcf.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv::simulation {
 namespace {

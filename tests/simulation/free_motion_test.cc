@@ -6,8 +6,8 @@
 
 #include "mechanism/reach.h"
 #include "reference/forward.h"
-#include "simulation/simulation.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "simulation/engine/simulation.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

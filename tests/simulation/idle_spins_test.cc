@@ -6,12 +6,12 @@
 #include <optional>
 #include <string>
 
-#include "core/demand.h"
+#include "base/demand.h"
 #include "mechanism/idle_spins.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
-#include "simulation/simulation.h"
-#include "tests/source_dir.h"
+#include "simulation/engine/simulation.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -9,11 +9,11 @@
 
 #include "kinematics/mobility.h"
 #include "mechanism/reach.h"
-#include "mjcf/plan.h"
 #include "reference/force_solver.h"
 #include "reference/reference.h"
-#include "simulation/simulation.h"
-#include "tests/four_bar_chain.h"
+#include "simulation/engine/simulation.h"
+#include "simulation/mjcf/plan.h"
+#include "tests/mechanisms/four_bar_chain.h"
 
 namespace mbv {
 namespace {

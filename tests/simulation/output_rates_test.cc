@@ -3,8 +3,8 @@
 
 #include <cmath>
 
-#include "simulation/simulation.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "simulation/engine/simulation.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

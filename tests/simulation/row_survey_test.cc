@@ -1,11 +1,11 @@
 // Equality rows along the motion of a four-bar, against its closed form.
-#include "simulation/row_survey.h"
+#include "simulation/engine/row_survey.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "tests/simulation/test_mechanisms.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

@@ -1,12 +1,12 @@
 // Predictions along smooth motions against motions integrated in small steps.
-#include "simulation/sample_predictor.h"
+#include "simulation/engine/sample_predictor.h"
 
 #include <gtest/gtest.h>
 
-#include "mjcf/mjcf.h"
 #include "model_file/load_model.h"
-#include "simulation/session.h"
-#include "tests/source_dir.h"
+#include "simulation/engine/session.h"
+#include "simulation/mjcf/mjcf.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv::simulation {
 namespace {

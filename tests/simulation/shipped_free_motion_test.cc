@@ -1,11 +1,11 @@
 // A benchmark with a published solution: Andrews' squeezing mechanism, seven bodies in three loops.
 #include <gtest/gtest.h>
 
-#include "core/demand.h"
+#include "base/demand.h"
 #include "reference/forward.h"
 #include "scenario/load_scenario.h"
-#include "simulation/simulation.h"
-#include "tests/source_dir.h"
+#include "simulation/engine/simulation.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -6,12 +6,12 @@
 #include <cmath>
 
 #include "analytic/closed_form.h"
-#include "core/demand.h"
+#include "base/demand.h"
 #include "kinematics/mobility.h"
 #include "reference/reference.h"
 #include "scenario/load_scenario.h"
-#include "simulation/simulation.h"
-#include "tests/source_dir.h"
+#include "simulation/engine/simulation.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -7,8 +7,8 @@
 
 #include "kinematics/tree_motion.h"
 #include "mechanism/joint_pose.h"
-#include "simulation/simulation.h"
-#include "tests/simulation/test_mechanisms.h"
+#include "simulation/engine/simulation.h"
+#include "tests/mechanisms/simulated.h"
 
 namespace mbv {
 namespace {

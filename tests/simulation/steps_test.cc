@@ -1,4 +1,4 @@
-#include "simulation/steps.h"
+#include "simulation/engine/steps.h"
 
 #include <gtest/gtest.h>
 

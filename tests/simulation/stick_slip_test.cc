@@ -6,11 +6,11 @@
 
 #include "model_file/load_model.h"
 #include "reference/forward.h"
-#include "simulation/simulation.h"
-#include "tests/pushed_block.h"
-#include "tests/rubbing_pendulum.h"
-#include "tests/source_dir.h"
-#include "tests/stacked_blocks.h"
+#include "simulation/engine/simulation.h"
+#include "tests/mechanisms/pushed_block.h"
+#include "tests/mechanisms/rubbing_pendulum.h"
+#include "tests/mechanisms/stacked_blocks.h"
+#include "tests/support/source_dir.h"
 
 namespace mbv {
 namespace {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "simulation/simulation.h"
+#include "simulation/engine/simulation.h"
 
 namespace mbv::fixtures {
 

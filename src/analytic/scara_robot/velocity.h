@@ -12,7 +12,7 @@
 // motor axis and l2 for every L_i, and l_i² for l1² in (29). [Zhu 2019 §3.1]
 #pragma once
 
-#include "analytic/scara_robot/geometry.h"
+#include "analytic/scara_robot/position.h"
 
 namespace mbv::scara {
 

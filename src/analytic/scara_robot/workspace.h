@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "analytic/scara_robot/velocity.h"
+#include "analytic/workspace_form.h"
 
 namespace mbv::scara {
 
@@ -82,5 +83,11 @@ struct CylinderCheck {
 [[nodiscard]] CylinderCheck CheckCylinder(const Parameters& parameters, const Limits& limits,
                                           const CylinderSpace& cylinder, double phi, int layers,
                                           int rings, int spokes);
+
+// The workspace of scara_robot for the workspace command.
+
+/// The paper's cylinder point by point, volumes, singularity maps (CSV, SVG).
+[[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
+                                                 const WorkspaceRequest& request);
 
 }  // namespace mbv::scara

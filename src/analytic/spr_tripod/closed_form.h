@@ -15,6 +15,7 @@
 #include <memory>
 
 #include "analytic/closed_form.h"
+#include "analytic/coverage.h"
 
 namespace mbv {
 
@@ -27,3 +28,12 @@ namespace mbv {
                                                         Diagnostics* diagnostics);
 
 }  // namespace mbv
+
+// What the equations of the 3-SPR mechanism take for granted.
+
+namespace mbv::spr_tripod {
+
+/// Three equal legs at 120, −120 and 0 degrees with tangential hinges; any inertias.
+[[nodiscard]] Coverage CoverageOf(const Mechanism& mechanism);
+
+}  // namespace mbv::spr_tripod

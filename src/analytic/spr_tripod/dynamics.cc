@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "core/spatial.h"
+#include "math/spatial.h"
 
 namespace mbv::spr_tripod {
 namespace {

@@ -16,7 +16,8 @@
 #include <vector>
 
 #include "analytic/spr_tripod/dynamics.h"
-#include "core/triangle_mesh.h"
+#include "analytic/workspace_form.h"
+#include "math/triangle_mesh.h"
 
 namespace mbv::spr_tripod {
 
@@ -145,5 +146,11 @@ struct WorkspaceReport {
                                                       const Range& det);
 [[nodiscard]] WorkspaceReport ReportWorkspace(const Geometry& geometry,
                                               const WorkspaceOptions& options = {});
+
+// The workspace of spr_tripod for the workspace command.
+
+/// The six faces (STL, PLY) and sections (CSV, SVG).
+[[nodiscard]] WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism,
+                                                 const WorkspaceRequest& request);
 
 }  // namespace mbv::spr_tripod

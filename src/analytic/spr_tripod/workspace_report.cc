@@ -6,7 +6,7 @@
 
 #include "analytic/spr_tripod/workspace.h"
 #include "analytic/workspace_form.h"
-#include "core/demand.h"
+#include "base/demand.h"
 
 namespace mbv::spr_tripod {
 namespace {

@@ -4,8 +4,8 @@
 #include <array>
 #include <string>
 
-#include "core/diagnostics.h"
-#include "core/types.h"
+#include "base/diagnostics.h"
+#include "base/types.h"
 #include "mechanism/mechanism.h"
 
 namespace mbv::stabilizing_platform {

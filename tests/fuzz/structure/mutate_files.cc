@@ -15,8 +15,8 @@
 #include <map>
 #include <thread>
 
-#include "archive/zip.h"
-#include "core/worker_pool.h"
+#include "base/worker_pool.h"
+#include "base/zip.h"
 #include "tests/fuzz/structure/mutations.h"
 
 namespace mbv::fuzz {

@@ -11,8 +11,8 @@
 #include <utility>
 #include <vector>
 
-#include "input/yaml_reader.h"
 #include "model_file/write_model.h"
+#include "model_file/yaml/yaml_reader.h"
 
 namespace mbv::fuzz {
 namespace {

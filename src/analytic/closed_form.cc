@@ -1,0 +1,42 @@
+#include "analytic/closed_form.h"
+
+#include <chrono>
+
+#include "base/roles.h"
+#include "mechanism/channels.h"
+
+namespace mbv {
+
+ClosedFormRun RunClosedForm(const Mechanism& mechanism, const Motion& motion,
+                            ClosedForm* closed_form) {
+  ClosedFormRun run;
+  std::vector<Channel> channels = DriveChannels(mechanism);
+  for (Channel& channel : closed_form->extra_channels()) channels.push_back(std::move(channel));
+  run.trace.witness = role::kAnalytic.name;
+  run.trace.Reset(SampleTimes(motion.duration_s, motion.sample_s), std::move(channels));
+
+  const auto start = std::chrono::steady_clock::now();
+  CommandSample command;
+  ClosedFormSample sample;
+  const ChannelColumns columns(run.trace.channels);
+  run.summary = RunSummary::Done();
+  for (size_t i = 0; i < run.trace.time_s.size() && run.summary.ok(); ++i) {
+    EvaluateMotion(motion, run.trace.time_s[i], &command);
+    run.summary = closed_form->Dynamics(command, &sample);
+    if (!run.summary.ok()) break;
+    auto row = run.trace.values.row(static_cast<Eigen::Index>(i));
+    for (size_t d = 0; d < mechanism.drives.size(); ++d) {
+      const auto k = static_cast<Eigen::Index>(d);
+      row[columns(Quantity::kPosition, d)] = sample.driven.position[k];
+      row[columns(Quantity::kVelocity, d)] = sample.driven.velocity[k];
+      row[columns(Quantity::kAcceleration, d)] = sample.driven.acceleration[k];
+      row[columns(Quantity::kForce, d)] = sample.force[k];
+    }
+    row.tail(sample.extra.size()) = sample.extra.transpose();
+  }
+  run.summary.wall_s =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return run;
+}
+
+}  // namespace mbv

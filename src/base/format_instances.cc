@@ -1,0 +1,3 @@
+#include "base/format_instances.h"
+
+MBV_FORMAT_INSTANCES(template)

@@ -1,0 +1,59 @@
+// How a numerical computation ended. Numerical trouble is returned, never thrown.
+#pragma once
+
+#include <string>
+
+#include "base/types.h"
+
+namespace mbv {
+
+enum class Stop {
+  kNotRun,         ///< pessimistic start value
+  kDone,           ///< ran to the end
+  kUnreachable,    ///< the commanded pose cannot be reached
+  kSingular,       ///< a matrix that must be regular is not
+  kLimit,          ///< a joint or stroke limit is violated
+  kNoConvergence,  ///< an iteration did not converge
+  kEngineFailure,  ///< MuJoCo reported an error or diverged
+  kUnsupported,    ///< this formulation does not cover what the scenario asks for
+};
+
+/// The end of a witness' run, or of one evaluation within it.
+struct [[nodiscard]] RunSummary {
+  Stop stop = Stop::kNotRun;
+  std::string message = "was not run";  ///< one sentence for people, with numbers
+  double time_s = kNan;                 ///< scenario time of the trouble [s]
+  std::string where;                    ///< limb, drive or joint in trouble
+  double amount = kNan;                 ///< by how much (see unit), e.g. the missing reach
+  std::string unit;                     ///< of `amount`
+  double wall_s = 0.0;                  ///< time spent computing [s]
+
+  [[nodiscard]] bool ok() const { return stop == Stop::kDone; }
+  static RunSummary Done() {
+    return {.stop = Stop::kDone, .message = "done", .where = {}, .unit = {}};
+  }
+};
+
+[[nodiscard]] inline const char* ToText(Stop stop) {
+  switch (stop) {
+    case Stop::kNotRun:
+      return "not run";
+    case Stop::kDone:
+      return "done";
+    case Stop::kUnreachable:
+      return "unreachable pose";
+    case Stop::kSingular:
+      return "singular pose";
+    case Stop::kLimit:
+      return "limit violated";
+    case Stop::kNoConvergence:
+      return "no convergence";
+    case Stop::kEngineFailure:
+      return "engine failure";
+    case Stop::kUnsupported:
+      return "not supported";
+  }
+  return "?";
+}
+
+}  // namespace mbv

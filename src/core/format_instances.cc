@@ -1,3 +1,0 @@
-#include "core/format_instances.h"
-
-MBV_FORMAT_INSTANCES(template)

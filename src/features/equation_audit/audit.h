@@ -1,0 +1,79 @@
+// Equation audit: every numbered equation of a paper as printed and as corrected, each measured
+// against an independent computation over seeded states.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "report/html_report.h"
+
+namespace mbv {
+
+enum class AuditVerdict {
+  kOk,               ///< as printed: right
+  kWrong,            ///< as printed: wrong; the corrected form is right
+  kApproximation,    ///< as printed: as near to the exact form as an approximation is said to be
+  kWrongAndUnfixed,  ///< the corrected form misses its limit too: a defect of ours
+  kNotTestable,      ///< a label, a choice or a claim that no residual measures; the note says why
+};
+
+/// One row of the audit table.
+struct AuditRow {
+  std::string equation{};   ///< "(6) M", "(17)", "section 4 data"
+  std::string erratum{};    ///< "E2" or ""
+  std::string printed{};    ///< the form as printed, in plain text
+  std::string corrected{};  ///< the corrected form; "" when the print is right
+  double residual_printed =
+      0.0;  ///< largest |difference| of the print; NaN if it cannot be evaluated
+  double residual_corrected = 0.0;  ///< largest |difference| of the corrected form (of the print
+                                    ///< when it is right)
+  double scale = 1.0;               ///< largest |value| of the quantity, same unit
+  double approximation = 0.0;  ///< how far an approximation may be off, same unit; 0: it is none
+  double limit = 0.0;  ///< residual_corrected must stay at or below this (derived, see note)
+  std::string unit{};
+  AuditVerdict verdict = AuditVerdict::kWrongAndUnfixed;
+  std::string note{};  ///< what it was compared with, and what the difference means
+};
+
+/// The verdict that the numbers of a row give: kOk or kWrong when the corrected form is within its
+/// limit and the print is or is not, kApproximation where the print keeps `approximation`;
+/// kWrongAndUnfixed otherwise.
+[[nodiscard]] AuditVerdict VerdictOf(const AuditRow& row);
+
+struct AuditTable {
+  std::string mechanism;
+  std::string source;  ///< the paper
+  std::vector<AuditRow> rows;
+};
+
+/// Computes a mechanism's table. `models_dir` holds <mechanism>/model.yaml.
+using AuditFunction = AuditTable (*)(const std::string& models_dir);
+
+struct AuditEntry {
+  std::string mechanism;
+  AuditFunction run = nullptr;
+};
+[[nodiscard]] std::span<const AuditEntry> Audits();
+
+[[nodiscard]] const char* ToText(AuditVerdict verdict);
+
+/// How residuals are written: as measured, or stable across machines (a residual within its limit
+/// is roundoff and shows as "≤ limit"; one above it is a fact and shows with two digits).
+enum class AuditNumbers { kStable, kMeasured };
+
+/// Markdown of a table, one line per row.
+[[nodiscard]] std::string ToMarkdown(const AuditTable& table,
+                                     AuditNumbers numbers = AuditNumbers::kStable);
+
+/// The text of docs/results/equation_audit.md: every registered mechanism's table, stable numbers.
+[[nodiscard]] std::string AuditDocument(const std::string& models_dir);
+
+// The audit of a page as JSON, so that the runs of a night compute it once.
+
+[[nodiscard]] std::string ToJson(const HtmlAudit& audit);
+/// Empty when the text is not what ToJson() wrote.
+[[nodiscard]] std::optional<HtmlAudit> AuditFromJson(const std::string& text);
+
+}  // namespace mbv

@@ -1,0 +1,422 @@
+#include "features/mutation/mutation_report.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
+#include "base/json_document.h"
+#include "base/json_text.h"
+#include "report/text_table.h"
+
+namespace mbv {
+namespace {
+
+// "|" would end a cell of a Markdown table.
+std::string InCell(std::string text) {
+  for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) {
+    text.insert(at, "\\");
+  }
+  return text;
+}
+
+// By smallest error where it is known, else by the force change.
+double Rank(const Sighting& s) {
+  if (!std::isnan(s.smallest)) return s.smallest;
+  return s.detected && !std::isnan(s.force_change) ? 1.0 / (1.0 + s.force_change) : 10.0;
+}
+
+std::string SeenText(const Sighting& s) {
+  return !s.detected ? "no" : s.by_force ? "drive forces" : s.ran ? "yes" : "refused";
+}
+
+std::string NoteOf(const Mutation& m) {
+  const Sighting& s = m.own;
+  std::string note;
+  if (m.value == 0.0) {
+    note = fmt::format("relative to {:g}{}{}; ", m.relative_to, m.unit.empty() ? "" : " ", m.unit);
+  }
+  if (!s.only.empty()) note += fmt::format("only {}, the model refuses the other way; ", s.only);
+  if (!s.detected) {
+    note += m.reason + (s.best_check.empty() ? "" : "; seen first by " + s.best_check);
+  } else if (s.best_check == "model") {
+    note += "the model is refused";
+    if (!s.reason.empty()) note += ": " + s.reason;
+  } else {
+    note += s.best_check;
+  }
+  return note;
+}
+
+bool HasInverse(const MutationReport& report) {
+  return std::any_of(report.mutations.begin(), report.mutations.end(),
+                     [](const Mutation& m) { return m.inverse.has_value(); }) ||
+         std::any_of(report.faults.begin(), report.faults.end(),
+                     [](const FaultResult& f) { return f.inverse.has_value(); });
+}
+
+// `inverse`: also by inverse dynamics.
+TextTable NumberTable(bool inverse) {
+  std::vector<TextColumn> columns = {{"number", -22},   {"value", 12}, {"", -11},
+                                     {"detected", -14}, {"force", 9},  {"smallest", 10}};
+  if (inverse) columns.push_back({"inverse", 10});
+  columns.push_back({"  seen first by, or why not", 0});
+  return {"  ", std::move(columns)};
+}
+
+TextTable FaultTable(bool inverse) {
+  std::vector<TextColumn> columns = {{"structural fault", -31}, {"where", -38}, {"detected", -15}};
+  if (inverse) columns.push_back({"inverse", -9});
+  columns.push_back({"how, or why not", 0});
+  return {"  ", std::move(columns)};
+}
+
+std::string Row(const Mutation& m, bool inverse, bool markdown) {
+  const std::string change = NumberCell(m.own.force_change, "{:.1e}");
+  const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
+  const std::string by_inverse = NumberCell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
+  if (markdown) {
+    return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {}{} |\n", m.name, m.value, m.unit,
+                       SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",
+                       InCell(NoteOf(m)));
+  }
+  std::vector<std::string> cells = {
+      m.name, fmt::format("{:g}", m.value), " " + m.unit, SeenText(m.own), change, smallest};
+  if (inverse) cells.push_back(by_inverse);
+  cells.push_back("  " + NoteOf(m));
+  return NumberTable(inverse).Row(cells) + "\n";
+}
+
+std::string SeenText(const FaultSighting& s) { return s.detected ? "yes" : "no"; }
+
+std::string Row(const FaultResult& f, bool inverse, bool markdown) {
+  const std::string seen = !f.applicable ? "not applicable" : SeenText(f.own);
+  const std::string by_inverse = f.inverse ? SeenText(*f.inverse) : "-";
+  std::string note = f.applicable ? f.own.reason : f.reason;
+  if (f.applicable && f.own.ran && f.own.detected) {
+    note = fmt::format("{} = {:.1e} (limit {:.0e})", f.own.check, f.own.value, f.own.limit);
+  } else if (f.applicable && !f.own.ran) {
+    note = "could not run: " + f.own.reason;
+  }
+  const std::string where = f.where + (f.alike > 0 ? fmt::format(" (and {} alike)", f.alike) : "");
+  if (markdown) {
+    return fmt::format("| {} | {} | {} | {}{} |\n", f.kind, where, seen,
+                       inverse ? by_inverse + " | " : "", InCell(note));
+  }
+  std::vector<std::string> cells = {f.kind, where, seen};
+  if (inverse) cells.push_back(by_inverse);
+  cells.push_back(note);
+  return FaultTable(inverse).Row(cells) + "\n";
+}
+
+// An instance's number of which forces know nothing: part of a long list, told together.
+bool IsIdle(const Mutation& m) {
+  return m.kind == NumberKind::kInstance && !m.own.detected && !std::isnan(m.proved_to);
+}
+
+std::string IdleText(const MutationReport& report, bool markdown) {
+  std::string names;
+  size_t count = 0;
+  for (const Mutation& m : report.mutations) {
+    if (!IsIdle(m)) continue;
+    names += (count++ == 0 ? "" : ", ") + (markdown ? "`" + m.name + "`" : m.name);
+  }
+  if (count == 0) return "";
+  return fmt::format("\n{}Numbers of instances that change no drive force ({}): {}.\n",
+                     markdown ? "" : "  ", count, names);
+}
+
+std::string CountText(const MutationReport& report) {
+  const auto of_kind = [&](NumberKind kind) {
+    return std::count_if(report.mutations.begin(), report.mutations.end(),
+                         [kind](const Mutation& m) { return m.kind == kind; });
+  };
+  const auto instance = of_kind(NumberKind::kInstance), literal = of_kind(NumberKind::kLiteral);
+  std::string text = fmt::format("{} parameters", of_kind(NumberKind::kParameter));
+  if (instance > 0) text += fmt::format(", {} of instances", instance);
+  if (literal > 0) text += fmt::format(", {} written out in place", literal);
+  return text;
+}
+
+std::string Head(const MutationReport& report, bool inverse) {
+  const auto count = [&](auto predicate) {
+    return std::count_if(report.mutations.begin(), report.mutations.end(), predicate);
+  };
+  const auto seen = count([](const Mutation& m) { return m.own.detected; });
+  const auto by_force = count([](const Mutation& m) { return m.own.by_force; });
+  std::string text = fmt::format(
+      "{}: {} of {} numbers ({}), each {:g} % too large and too small on the simulated side, turn "
+      "the verdict in {} mode; {} of them by the drive forces",
+      report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
+      report.mode, by_force);
+  if (inverse) {
+    text += fmt::format("; {} do in inverse mode",
+                        count([](const Mutation& m) { return m.inverse && m.inverse->detected; }));
+  }
+  if (!report.faults.empty()) {
+    size_t applicable = 0, detected = 0;
+    for (const FaultResult& fault : report.faults) {
+      applicable += fault.applicable ? 1 : 0;
+      detected += fault.applicable && fault.own.detected ? 1 : 0;
+    }
+    text += fmt::format("; so do {} of {} structural faults in {} mode", detected, applicable,
+                        report.mode);
+  }
+  return text + fmt::format(" ({} simulations in {:.1f} s)\n\n", report.runs, report.wall_s);
+}
+
+std::string NumberHead(const MutationReport& report, bool inverse, bool markdown) {
+  if (markdown) {
+    return fmt::format(
+        "| number | value | detected | force NRMSE | smallest relative error, {} | {}seen first "
+        "by, or why not |\n|---|---|---|---|---|{}---|\n",
+        report.mode, inverse ? "inverse | " : "", inverse ? "---|" : "");
+  }
+  return NumberTable(inverse).Head() + "\n";
+}
+
+std::string FaultHead(bool inverse, bool markdown) {
+  if (markdown) {
+    return fmt::format(
+        "\n| structural fault | where | detected | {}how, or why not |\n|---|---|---|{}---|\n",
+        inverse ? "inverse | " : "", inverse ? "---|" : "");
+  }
+  return "\n" + FaultTable(inverse).Head() + "\n";
+}
+
+}  // namespace
+
+void SortBySensitivity(MutationReport* report) {
+  std::stable_sort(report->mutations.begin(), report->mutations.end(),
+                   [](const Mutation& a, const Mutation& b) { return Rank(a.own) < Rank(b.own); });
+}
+
+std::string ToText(const MutationReport& report, bool markdown) {
+  const bool inverse = HasInverse(report);
+  std::string text = Head(report, inverse) + NumberHead(report, inverse, markdown);
+  for (const Mutation& m : report.mutations) {
+    if (!IsIdle(m)) text += Row(m, inverse, markdown);
+  }
+  text += IdleText(report, markdown);
+  text += fmt::format(
+      "\n{}The smallest relative error is the smallest one that was detected both ways; one {:g} % "
+      "smaller was not.\n",
+      markdown ? "" : "  ", 100.0 * report.resolution);
+  if (report.faults.empty()) return text;
+  text += FaultHead(inverse, markdown);
+  for (const FaultResult& fault : report.faults) text += Row(fault, inverse, markdown);
+  return text;
+}
+
+// Mutation reports as JSON, and back: workers hand their parts over in this form.
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr const char* kMutationSchema = "mbverify.mutate/2";
+constexpr const char* kKinds[] = {"parameter", "instance", "literal"};
+
+// One list of fields per struct serves both directions.
+struct ToFields {
+  Json json = Json::object();
+  void operator()(const char* key, const double& x) { json[key] = Number(x); }
+  template <typename T>
+  void operator()(const char* key, const T& x) {
+    json[key] = x;
+  }
+};
+
+struct FromFields {
+  const JsonValue& json;
+  void operator()(const char* key, double& x) const { x = json.at(key).NumberOrNan(); }
+  template <typename T>
+  void operator()(const char* key, T& x) const {
+    x = json.at(key).get<T>();
+  }
+};
+
+template <typename F, typename S>
+void SightingFields(F& field, S& s) {
+  field("ran", s.ran);
+  field("detected", s.detected);
+  field("by_force", s.by_force);
+  field("force_nrmse", s.force_change);
+  field("smallest", s.smallest);
+  field("check", s.best_check);
+  field("only", s.only);
+  field("reason", s.reason);
+}
+
+template <typename F, typename S>
+void FaultFields(F& field, S& s) {
+  field("ran", s.ran);
+  field("detected", s.detected);
+  field("check", s.check);
+  field("value", s.value);
+  field("limit", s.limit);
+  field("reason", s.reason);
+}
+
+template <typename F, typename M>
+void MutationFields(F& field, M& m) {
+  field("name", m.name);
+  field("unit", m.unit);
+  field("value", m.value);
+  field("relative_to", m.relative_to);
+  field("unseen_up_to", m.proved_to);
+  field("force_sensitivity", m.sensitivity);
+  field("reason", m.reason);
+}
+
+template <typename F, typename R>
+void ResultFields(F& field, R& r) {
+  field("fault", r.kind);
+  field("where", r.where);
+  field("applicable", r.applicable);
+  field("alike", r.alike);
+  field("reason", r.reason);
+}
+
+template <typename F, typename R>
+void ReportFields(F& field, R& r) {
+  field("scenario", r.scenario);
+  field("mode", r.mode);
+  field("exit_code", r.exit_code);
+  field("size", r.size);
+  field("resolution", r.resolution);
+  field("simulations", r.runs);
+  field("wall_s", r.wall_s);
+}
+
+Json JsonOf(const Sighting& s) {
+  ToFields field;
+  SightingFields(field, s);
+  return field.json;
+}
+
+Json JsonOf(const FaultSighting& s) {
+  ToFields field;
+  FaultFields(field, s);
+  return field.json;
+}
+
+template <typename T>
+Json Optional(const std::optional<T>& value) {
+  return value ? JsonOf(*value) : Json();
+}
+
+Json JsonOf(const Mutation& m) {
+  ToFields field;
+  field("kind", kKinds[static_cast<size_t>(m.kind)]);
+  MutationFields(field, m);
+  field.json["own"] = JsonOf(m.own);
+  field.json["inverse"] = Optional(m.inverse);
+  return field.json;
+}
+
+Json JsonOf(const FaultResult& r) {
+  ToFields field;
+  ResultFields(field, r);
+  field.json["own"] = JsonOf(r.own);
+  field.json["inverse"] = Optional(r.inverse);
+  return field.json;
+}
+
+Sighting SightingOf(const JsonValue& json) {
+  Sighting s;
+  const FromFields field{json};
+  SightingFields(field, s);
+  return s;
+}
+
+FaultSighting FaultSightingOf(const JsonValue& json) {
+  FaultSighting s;
+  const FromFields field{json};
+  FaultFields(field, s);
+  return s;
+}
+
+Mutation MutationOf(const JsonValue& json) {
+  Mutation m;
+  const FromFields field{json};
+  MutationFields(field, m);
+  const std::string word = json.at("kind");
+  const auto kind = std::find(std::begin(kKinds), std::end(kKinds), word);
+  if (kind == std::end(kKinds)) json.at("kind").Refuse("is no kind of a number");
+  m.kind = static_cast<NumberKind>(kind - std::begin(kKinds));
+  m.own = SightingOf(json.at("own"));
+  if (!json.at("inverse").is_null()) m.inverse = SightingOf(json.at("inverse"));
+  return m;
+}
+
+FaultResult FaultResultOf(const JsonValue& json) {
+  FaultResult r;
+  const FromFields field{json};
+  ResultFields(field, r);
+  r.own = FaultSightingOf(json.at("own"));
+  if (!json.at("inverse").is_null()) r.inverse = FaultSightingOf(json.at("inverse"));
+  return r;
+}
+
+// Item k of part i is item k·n + i of all.
+template <typename T>
+std::vector<T> Interleave(std::vector<MutationReport>* parts,
+                          std::vector<T> MutationReport::*items) {
+  std::vector<T> all;
+  bool any = true;
+  for (size_t k = 0; any; ++k) {
+    any = false;
+    for (MutationReport& part : *parts) {
+      if (k >= (part.*items).size()) continue;
+      all.push_back(std::move((part.*items)[k]));
+      any = true;
+    }
+  }
+  return all;
+}
+
+}  // namespace
+
+std::string ToJson(const MutationReport& report) {
+  ToFields field;
+  field("schema", kMutationSchema);
+  ReportFields(field, report);
+  Json& json = field.json;
+  json["numbers"] = Json::array();
+  for (const Mutation& m : report.mutations) json["numbers"].push_back(JsonOf(m));
+  json["faults"] = Json::array();
+  for (const FaultResult& f : report.faults) json["faults"].push_back(JsonOf(f));
+  return Dump(json);
+}
+
+std::optional<MutationReport> MutationReportOf(const std::string& text) {
+  const auto read = [](const JsonValue& json) {
+    MutationReport report;
+    const FromFields field{json};
+    ReportFields(field, report);
+    for (const JsonValue& item : json.at("numbers").list()) {
+      report.mutations.push_back(MutationOf(item));
+    }
+    for (const JsonValue& item : json.at("faults").list()) {
+      report.faults.push_back(FaultResultOf(item));
+    }
+    return report;
+  };
+  return ReadJson(text, read, kMutationSchema).value;
+}
+
+MutationReport MergeParts(std::vector<MutationReport> parts) {
+  MutationReport all = parts.front();
+  all.mutations = Interleave(&parts, &MutationReport::mutations);
+  all.faults = Interleave(&parts, &MutationReport::faults);
+  all.runs = 0;
+  for (const MutationReport& part : parts) {
+    all.runs += part.runs;
+    all.wall_s = std::max(all.wall_s, part.wall_s);
+    all.exit_code = std::max(all.exit_code, part.exit_code);
+  }
+  SortBySensitivity(&all);
+  return all;
+}
+
+}  // namespace mbv

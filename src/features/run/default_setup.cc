@@ -1,0 +1,391 @@
+#include "features/run/default_setup.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "base/text.h"
+#include "kinematics/command_rank.h"
+#include "kinematics/constraints.h"
+#include "mechanism/idle_spins.h"
+#include "mechanism/reach.h"
+#include "model_file/write_model.h"
+#include "reference/reference.h"
+#include "verify/model_text.h"
+#include "verify/ranges.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kMostNames = 6;
+
+// The drives' coordinates, then all others that can be driven.
+std::vector<Coordinate> Candidates(const Mechanism& m) {
+  std::vector<Coordinate> candidates;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    candidates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+  }
+  for (size_t j = 0; j < m.joints.size(); ++j) {
+    for (int c = 0; c < FreedomsOf(m.joints[j].kind); ++c) {
+      const bool driven = std::any_of(m.drives.begin(), m.drives.end(), [&](const Drive& drive) {
+        const auto* on = std::get_if<JointDrive>(&drive.kind);
+        return on != nullptr && on->joint == static_cast<int>(j) && on->coordinate == c;
+      });
+      if (!driven && !IsOfBall(m.joints[j].kind, c)) {
+        candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
+      }
+    }
+  }
+  return candidates;
+}
+
+Drive DriveOn(const Mechanism& m, const Coordinate& coordinate) {
+  const Joint& joint = m.joints[coordinate.index];
+  Drive drive{.name = joint.name,
+              .kind = JointDrive{coordinate.index, coordinate.component},
+              .range = joint.range[coordinate.component]};
+  if (FreedomsOf(joint.kind) > 1) drive.name += fmt::format("_{}", coordinate.component);
+  return drive;
+}
+
+// A ball that turns in this motion becomes a universal joint that does not; false without one.
+bool HoldTurn(const std::vector<Vec6>& motion, Mechanism* m) {
+  for (Joint& joint : m->joints) {
+    if (joint.kind != JointKind::kSpherical) continue;
+    const Vec3 turn = motion[joint.child].head<3>() - motion[joint.parent].head<3>();
+    if (turn.norm() < 1e-3) continue;
+    Mat3 E;
+    E.col(2) = turn.normalized();
+    E.col(0) = E.col(2).unitOrthogonal();
+    E.col(1) = E.col(2).cross(E.col(0));
+    joint.kind = JointKind::kUniversal;
+    joint.axis = Vec3::UnitX();
+    joint.axis2 = Vec3::UnitY();
+    joint.X_PF.linear() = m->X_WB_home[joint.parent].linear().transpose() * E;
+    joint.X_CM.linear() = m->X_WB_home[joint.child].linear().transpose() * E;
+    joint.guess = joint.home = {};
+    joint.range = {};
+    return true;
+  }
+  return false;
+}
+
+// The mechanism with balls held where no drive holds them: for a look at where the drives lead.
+Mechanism WithTurnsHeld(const Mechanism& mechanism) {
+  Mechanism m = mechanism;
+  std::vector<Coordinate> drives;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    drives.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
+  }
+  for (std::vector<Vec6> free = FreeMotion(m, drives); !free.empty();
+       free = FreeMotion(m, drives)) {
+    if (!HoldTurn(free, &m)) break;
+  }
+  return m;
+}
+
+// Rotations of balls that stay when `held` are held, as independent coordinates.
+std::vector<Coordinate> TurnsLeft(const Mechanism& m, const std::vector<Coordinate>& held) {
+  std::vector<Coordinate> candidates = held;
+  for (size_t j = 0; j < m.joints.size(); ++j) {
+    for (int c = 0; c < FreedomsOf(m.joints[j].kind); ++c) {
+      if (!IsOfBall(m.joints[j].kind, c)) continue;
+      candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
+    }
+  }
+  std::vector<Coordinate> turns;
+  for (const size_t k : ChooseCoordinates(m, candidates, held.size()).chosen) {
+    if (k >= held.size()) turns.push_back(candidates[k]);
+  }
+  return turns;
+}
+
+// "J.0, J.1 …", as a scenario names start values.
+std::vector<std::string> StartNames(const Mechanism& m, const std::vector<Coordinate>& turns) {
+  std::vector<std::string> names;
+  for (const Coordinate& turn : turns) {
+    names.push_back(
+        fmt::format("{}.{}", m.joints[static_cast<size_t>(turn.index)].name, turn.component));
+  }
+  return names;
+}
+
+std::string ByForcesNote(const Mechanism& m, const std::vector<Coordinate>& turns) {
+  std::string text =
+      fmt::format("{} degree{} of freedom that no drive on a joint can hold move{} by forces: {}",
+                  turns.size(), turns.size() == 1 ? "" : "s", turns.size() == 1 ? "s" : "",
+                  Joined(StartNames(m, turns), kMostNames));
+  std::vector<std::string> spins;
+  for (const Spin& spin : FindSpins(m)) {
+    if (spin.why_not.empty()) continue;
+    spins.push_back(fmt::format("{} ({})", spin.name, spin.why_not));
+  }
+  if (!spins.empty()) {
+    text += "; these spins between two balls are not idle: " + Joined(spins, kMostNames);
+  }
+  return text;
+}
+
+// Without outputs nothing shows how balls turn. Idle spins stay idle without one.
+void AddOutputs(Mechanism* m) {
+  if (!m->outputs.empty()) return;
+  std::vector<bool> shown(m->bodies.size(), false);
+  for (const Joint& joint : m->joints) {
+    if (joint.kind != JointKind::kSpherical) continue;
+    for (const int b : {joint.parent, joint.child}) shown[static_cast<size_t>(b)] = b != 0;
+  }
+  for (const Spin& spin : IdleSpins(*m)) {
+    for (const int b : spin.bodies) shown[static_cast<size_t>(b)] = false;
+  }
+  for (size_t b = 1; b < shown.size(); ++b) {
+    if (!shown[b]) continue;
+    m->outputs.push_back({.name = m->bodies[b].name,
+                          .body = static_cast<int>(b),
+                          .X_BO = Pose::Identity(),
+                          .reference_body = 0,
+                          .X_RbR = Pose::Identity()});
+  }
+}
+
+// How fast the bodies are against the drives.
+double Quickness(const Mechanism& m, const ReferenceSample& sample, double length) {
+  double fastest = 0.0;
+  for (const Vec6& V : sample.states.V_WB) {
+    fastest = std::max({fastest, V.head<3>().norm(), V.tail<3>().norm() / length});
+  }
+  double drives = 0.0;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    const double rate = sample.driven.velocity[static_cast<Eigen::Index>(d)];
+    drives = std::max(drives, std::abs(rate) / (PositionUnit(m, m.drives[d]) == "m" ? length : 1));
+  }
+  return drives > 0.0 ? fastest / drives : 0.0;
+}
+
+class MotionSearch {
+ public:
+  MotionSearch(const Mechanism& m, const std::vector<std::string>& resting)
+      : m_(m), length_(CharacteristicLength(m)) {
+    BodyStates home;
+    home.Resize(m.bodies.size());
+    home.X_WB = m.X_WB_home;
+    motion_.beyond_ranges = !IsWithinRanges(m, m.X_WB_home);
+    motion_.duration_s = 1.0;
+    for (size_t d = 0; d < m.drives.size(); ++d) {
+      motion_.strokes.push_back(
+          FullStroke(d, DriveRow(m, m.drives[d], home).value, Contains(resting, m.drives[d].name)));
+    }
+  }
+
+  FirstMotion Run() {
+    const std::vector<DriveStroke> full = motion_.strokes;
+    constexpr int kHalvings = 7;
+    // At the smallest motion the bodies are as fast as at home.
+    const auto scaled = [&](double scale) {
+      for (size_t d = 0; d < full.size(); ++d) {
+        motion_.strokes[d].height = scale * full[d].height;
+      }
+    };
+    scaled(std::ldexp(1.0, -kHalvings));
+    double at_home = 0.0;
+    if (!Follow(std::numeric_limits<double>::infinity(), &at_home)) return motion_;
+    for (int i = 0; i <= kHalvings; ++i) {
+      scaled(std::ldexp(1.0, -i));
+      double most = 0.0;
+      if (!Follow(kMostQuicker * at_home, &most)) continue;
+      motion_.found = true;
+      break;
+    }
+    return motion_;
+  }
+
+ private:
+  static constexpr double kMostQuicker = 3.0;
+
+  DriveStroke FullStroke(size_t d, double home, bool rests) const {
+    const Drive& drive = m_.drives[d];
+    DriveStroke stroke{.home = home, .height = 0.0};
+    // Not all at once, so that forces can be told apart.
+    stroke.start_s = 0.05 * static_cast<double>(d % 4);
+    stroke.duration_s = motion_.duration_s - 0.2;
+    if (rests) return stroke;
+    const double usual = PositionUnit(m_, drive) == "m" ? 0.1 * length_ : 0.2;
+    const double up = drive.range.upper - home, down = home - drive.range.lower;
+    const double sign = up >= down || up >= usual ? 1.0 : -1.0;
+    const double room = sign > 0.0 ? up : down;
+    stroke.height = sign * std::min(usual, room > 0.0 ? 0.6 * room : usual);
+    return stroke;
+  }
+
+  Motion Commands() const {
+    Motion motion{.duration_s = motion_.duration_s, .sample_s = 0.02, .commands = {}, .loads = {}};
+    for (size_t d = 0; d < m_.drives.size(); ++d) {
+      const DriveStroke& stroke = motion_.strokes[d];
+      Profile profile{{ConstantTerm{stroke.home}}};
+      profile.terms.emplace_back(BumpTerm{stroke.start_s, stroke.duration_s, stroke.height});
+      const Coordinate coordinate{Coordinate::Kind::kDrive, static_cast<int>(d), 0};
+      motion.commands.push_back({m_.drives[d].name, {{coordinate, 1.0}}, profile});
+    }
+    return motion;
+  }
+
+  // False where the motion cannot be followed, leaves a range or gets quicker than `limit`.
+  bool Follow(double limit, double* quickest) const {
+    const Motion motion = Commands();
+    ReferenceSolver solver(m_, motion);
+    ReferenceSample sample;
+    CommandSample command;
+    const int samples = static_cast<int>(std::lround(motion.duration_s / motion.sample_s));
+    for (int i = 0; i <= samples; ++i) {
+      EvaluateMotion(motion, i * motion.sample_s, &command);
+      if (!solver.Kinematics(command, &sample).ok()) return false;
+      const double quick = Quickness(m_, sample, length_);
+      if (!std::isfinite(quick) || quick > limit) return false;
+      *quickest = std::max(*quickest, quick);
+      if (!motion_.beyond_ranges && !IsWithinRanges(m_, sample.states.X_WB)) return false;
+    }
+    return true;
+  }
+
+  const Mechanism& m_;
+  const double length_;
+  FirstMotion motion_;
+};
+
+std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
+                         const std::string& model_ref, const std::vector<std::string>& notes,
+                         const std::vector<Coordinate>& by_forces, bool holding) {
+  const WrittenNames names = NamesInModel(m);
+  std::string text =
+      "# A first motion, made by mbverify: each drive goes out and back again.\n"
+      "# All keys: docs/reference/scenario_file.md.\n";
+  for (const std::string& note : notes) text += "# " + note + "\n";
+  text += fmt::format(
+      "mechanism: {}\ndescription: Each drive out and back, from rest to rest\nmotion:\n"
+      "  duration_s: {}\n  sample_s: 0.01\n{}",
+      QuotedYaml(model_ref), motion.duration_s, m.drives.empty() ? "" : "  commands:\n");
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    const DriveStroke& stroke = motion.strokes[d];
+    if (stroke.height == 0.0) {
+      text += fmt::format("    {}: home\n", names.drives[d]);
+    } else {
+      text += fmt::format(
+          "    {}: [home, {{bump: {{start_s: {:g}, duration_s: {:g}, height: {:.6g}}}}}]\n",
+          names.drives[d], stroke.start_s, stroke.duration_s, stroke.height);
+    }
+  }
+  if (!by_forces.empty()) {
+    text += "  initial:\n";
+    for (const Coordinate& turn : by_forces) {
+      text +=
+          fmt::format("    {}: home\n",
+                      QuotedYaml(fmt::format("{}.{}", names.joints[turn.index], turn.component)));
+    }
+  }
+  return text + fmt::format(
+                    "analytic: none\n"
+                    "simulation: {{mode: forward, step_s: 0.001, stock_too: false{}}}\n"
+                    "{}checks: {{force_nrmse: {{forward: 1.0e-6, inverse: 1.0e-10}}{}}}\n"
+                    "snapshots: {{times_s: [0, {:g}]}}\n",
+                    motion.beyond_ranges ? ", ignore_ranges: true" : "",
+                    holding
+                        ? "# Drives that only hold a freedom carry next to nothing: no scale of "
+                          "their own to judge them by.\n"
+                        : "",
+                    holding ? ", force_nrmse_own: off" : "", 0.5 * motion.duration_s);
+}
+
+}  // namespace
+
+Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::string>* notes,
+                                  std::vector<Coordinate>* by_forces) {
+  Mechanism m = mechanism;
+  const std::vector<Coordinate> candidates = Candidates(m);
+  const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
+  std::vector<Coordinate> taken;
+  for (const size_t k : choice.chosen) taken.push_back(candidates[k]);
+  by_forces->clear();
+  if (choice.left() > 0) *by_forces = TurnsLeft(m, taken);
+  if (!by_forces->empty()) notes->push_back(ByForcesNote(m, *by_forces));
+  if (const auto held = static_cast<int>(by_forces->size()); held < choice.left()) {
+    notes->push_back(
+        fmt::format("{} freedoms cannot be held by a drive on a joint", choice.left() - held));
+  }
+  std::vector<Drive> drives;
+  std::vector<std::string> dropped, added;
+  for (size_t d = 0; d < m.drives.size(); ++d) {
+    if (std::find(choice.dependent.begin(), choice.dependent.end(), d) == choice.dependent.end()) {
+      drives.push_back(m.drives[d]);
+    } else {
+      dropped.push_back(m.drives[d].name);
+    }
+  }
+  for (const Coordinate& coordinate : taken) {
+    if (coordinate.kind != Coordinate::Kind::kJoint) continue;
+    drives.push_back(DriveOn(m, coordinate));
+    added.push_back(drives.back().name);
+  }
+  if (!dropped.empty()) {
+    notes->push_back(fmt::format("these drives depend on the others and are left out: {}",
+                                 Joined(dropped, kMostNames)));
+  }
+  if (!added.empty()) {
+    notes->push_back(fmt::format(
+        "{} freedom{} without a drive {} held by added drives, chosen by rank: {}", added.size(),
+        added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are", Joined(added, kMostNames)));
+  }
+  m.drives = std::move(drives);
+  return m;
+}
+
+FirstMotion FindFirstMotion(const Mechanism& mechanism, const std::vector<std::string>& resting) {
+  const Mechanism held = WithTurnsHeld(mechanism);
+  return MotionSearch(held, resting).Run();
+}
+
+DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
+                                    const std::string& model_ref, const LoadOptions& options) {
+  DefaultSetupResult result;
+  LoadResult loaded = LoadRobot(file, options);
+  result.diagnostics = loaded.diagnostics;
+  if (!loaded.mechanism) return result;
+  DefaultSetup setup;
+  std::vector<Coordinate> by_forces;
+  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &setup.notes, &by_forces);
+  setup.by_forces = static_cast<int>(by_forces.size());
+  if (setup.by_forces > 0) AddOutputs(&m);
+  if (!name.empty()) m.name = name;
+  if (m.drives.empty() && by_forces.empty()) {
+    result.diagnostics.AddError(file, "the mechanism has no freedom: there is nothing to move");
+    return result;
+  }
+  // Added drives hold what the robot's own ones leave free; without own ones all move.
+  std::vector<std::string> resting;
+  for (const Drive& drive : m.drives) {
+    if (!loaded.mechanism->drives.empty() && loaded.mechanism->FindDrive(drive.name) < 0) {
+      resting.push_back(drive.name);
+    }
+  }
+  const FirstMotion motion = FindFirstMotion(m, resting);
+  if (!motion.found && !m.drives.empty()) {
+    setup.notes.emplace_back(
+        by_forces.empty()
+            ? "no motion was found that stays away from singular poses: the smallest is taken"
+            : "no motion of the drives was found with what moves by forces held: the smallest is "
+              "taken");
+  }
+  if (motion.beyond_ranges) {
+    setup.notes.emplace_back("the home pose is beyond the range of a joint: ranges are ignored");
+  }
+  setup.meshes = TakeMeshesAlong(&m);
+  setup.model = WriteModel(m, loaded.caveats);
+  setup.scenario = ScenarioText(m, motion, model_ref, setup.notes, by_forces, !resting.empty());
+  setup.mechanism = std::move(m);
+  for (const std::string& note : setup.notes) {
+    result.diagnostics.Add({Severity::kWarning, file, 0, 0, note, ""});
+  }
+  result.setup = std::move(setup);
+  return result;
+}
+
+}  // namespace mbv

@@ -1,0 +1,62 @@
+// A robot from a file, made ready to run: drives for every freedom, and a first motion.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/diagnostics.h"
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "model_file/load_model.h"
+#include "model_file/write_model.h"
+
+namespace mbv {
+
+/// Gives every degree of freedom of a mechanism one drive. Drives that depend on others are left
+/// out, and degrees of freedom that none of them holds get drives on joints, chosen by rank. Idle
+/// spins need none. Rotations of balls that no drive on a joint can hold, such as spins that are
+/// not idle, move by forces: `by_forces` gets coordinates for them. What was done is reported in
+/// `notes`.
+[[nodiscard]] Mechanism WithDriveForEachFreedom(const Mechanism& mechanism,
+                                                std::vector<std::string>* notes,
+                                                std::vector<Coordinate>* by_forces);
+
+struct DriveStroke {
+  double home = 0.0;    ///< [m] or [rad]
+  double height = 0.0;  ///< of its bump; 0: it rests
+  double start_s = 0.0, duration_s = 1.0;
+};
+/// A motion from rest to rest: each drive goes out and back again.
+struct FirstMotion {
+  std::vector<DriveStroke> strokes;  ///< per drive
+  double duration_s = 1.0;
+  bool found = false;          ///< the loops stay closed on it, away from singular poses
+  bool beyond_ranges = false;  ///< home itself is out of range
+};
+/// The largest of a sequence of ever smaller motions on which loops stay closed, joints stay in
+/// their ranges and no body moves much faster against the drives than it does at home. Drives named
+/// in `resting` rest, and so do rotations that move by forces.
+[[nodiscard]] FirstMotion FindFirstMotion(const Mechanism& mechanism,
+                                          const std::vector<std::string>& resting);
+
+/// The files to go on from.
+struct DefaultSetup {
+  std::string model;                  ///< model.yaml
+  std::string scenario;               ///< first.yaml
+  std::vector<ModelMeshFile> meshes;  ///< beside model.yaml
+  std::vector<std::string> notes;
+  Mechanism mechanism;  ///< as `model` describes it
+  int by_forces = 0;    ///< degrees of freedom that move by forces: the scenario is a free motion
+};
+struct DefaultSetupResult {
+  std::optional<DefaultSetup> setup;  ///< empty after errors
+  Diagnostics diagnostics;
+};
+/// `file`: anything LoadRobot() takes, with its options. `name`: of the model; "": its own.
+/// `model_ref`: how the scenario names the model.
+[[nodiscard]] DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& name,
+                                                  const std::string& model_ref,
+                                                  const LoadOptions& options = {});
+
+}  // namespace mbv

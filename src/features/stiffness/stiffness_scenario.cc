@@ -1,0 +1,473 @@
+#include "features/stiffness/stiffness_scenario.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <filesystem>
+
+#include "base/demand.h"
+#include "base/text.h"
+#include "kinematics/mobility.h"
+#include "model_file/load_model.h"
+#include "scenario/checks.h"
+#include "scenario/file_parts.h"
+#include "scenario/find_model.h"
+#include "scenario/motion_reader.h"
+#include "scenario/settings_reader.h"
+
+namespace mbv {
+
+std::vector<Vec6> DrawLoads(const RandomLoads& loads) {
+  std::uint64_t state = loads.seed;
+  const auto draw = [&state] {
+    state = 6364136223846793005ULL * state + 1442695040888963407ULL;
+    return static_cast<double>(state >> 11U) * 0x1p-53;
+  };
+  std::vector<Vec6> wrenches(static_cast<size_t>(loads.count));
+  for (Vec6& wrench : wrenches) {
+    for (int i = 3; i < 6; ++i) wrench[i] = loads.force_max * draw();
+    for (int i = 0; i < 3; ++i) wrench[i] = loads.moment_max * draw();
+  }
+  return wrenches;
+}
+
+namespace {
+
+// Two linear computations differ by rounding only. The simulated stiffness is extrapolated to zero
+// load; its finite displacements also contain the geometric non-linearity of the load itself.
+constexpr StiffnessMetricRow kStiffnessRows[] = {
+    {StiffnessMetric::kStiffnessEntry,
+     "stiffness_entry",
+     "stiffness, worst entry",
+     true,
+     {1e-4, 1e-9}},
+    {StiffnessMetric::kComplianceEntry,
+     "compliance_entry",
+     "compliance, worst entry",
+     true,
+     {1e-4, 1e-9}},
+    {StiffnessMetric::kShareEntry,
+     "share_entry",
+     "elements' shares, worst entry",
+     true,
+     {1e-4, 1e-9}},
+    {StiffnessMetric::kDisplacementAxis,
+     "displacement_axis",
+     "displacement, worst axis",
+     true,
+     {1e-2, 1e-9}},
+    {StiffnessMetric::kDisplacementVector,
+     "displacement_vector",
+     "displacement, worst vector",
+     true,
+     {1e-2, 1e-9}},
+    {StiffnessMetric::kRotationAxis, "rotation_axis", "rotation, worst axis", true, {1e-2, 1e-9}},
+    {StiffnessMetric::kSymmetry, "symmetry", "symmetry", false, {1e-6, 1e-9}},
+    {StiffnessMetric::kDefinite, "definite", "no negative stiffness", false, {1e-6, 1e-9}},
+    {StiffnessMetric::kSharesSum, "shares_sum", "shares add up", false, {1e-6, 1e-9}},
+    {StiffnessMetric::kResidual, "residual", "equilibrium, unbalanced force", false, {1e-8, 1e-8}},
+    {StiffnessMetric::kExtrapolation,
+     "extrapolation",
+     "extrapolation to zero load",
+     false,
+     {1e-5, 1e-5}},
+};
+static_assert(std::size(kStiffnessRows) == kStiffnessMetrics);
+
+}  // namespace
+
+std::span<const StiffnessMetricRow> StiffnessMetricRows() { return kStiffnessRows; }
+
+const StiffnessMetricRow& RowOf(StiffnessMetric metric) {
+  const StiffnessMetricRow& row = kStiffnessRows[static_cast<int>(metric)];
+  MBV_DEMAND(row.metric == metric, row.key);
+  return row;
+}
+
+const StiffnessMetricRow* FindStiffnessMetric(const std::string& key) {
+  for (const StiffnessMetricRow& row : kStiffnessRows) {
+    if (key == row.key) return &row;
+  }
+  return nullptr;
+}
+
+StiffnessLimits::StiffnessLimits() {
+  for (const StiffnessMetricRow& row : kStiffnessRows) (*this)[row.metric] = row.limit;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+const std::vector<std::string> kStiffnessScenarioKeys = {
+    "kind",      "mechanism",  "description", "parameters",      "pose",   "output", "analytic",
+    "reference", "simulation", "loads",       "compare_printed", "checks", "expect"};
+
+class StiffnessLoader final
+    : public internal::ScenarioFile<StiffnessScenario, StiffnessScenarioResult> {
+ public:
+  using ScenarioFile::ScenarioFile;
+
+ private:
+  void Read(const YamlNode& root) override {
+    YamlMap map(&yaml_, &root, "", kStiffnessScenarioKeys);
+    scenario_.file = file_;
+    if (const YamlNode* kind = map.Required("kind")) {
+      (void)yaml_.Choice(*kind, "kind", {"stiffness"});
+    }
+    ReadDescription(map);
+    if (const YamlNode* parameters = map.Find("parameters")) {
+      scenario_.parameters = ReadOverrides(&values_, parameters, "parameters");
+      scenario_.parameter_places = PlacesOf(*parameters, file_, options_.set);
+    }
+    if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
+    ReadSettings(map);
+    if (!mechanism_) return;
+    UseSiOverrides();
+    if (const YamlNode* pose = map.Find("pose")) ReadPose(*pose);
+    if (const YamlNode* output = map.Find("output")) ReadOutput(*output);
+    if (mechanism_) CheckWitnessParameters(map);
+    if (!scenario_.analytic.on && !scenario_.reference.on && !scenario_.simulation.on) {
+      yaml_.Error(root, "analytic, reference and simulation are all off");
+    }
+  }
+
+  void LoadMechanism(const YamlNode& node) {
+    const auto name = yaml_.Text(node, "mechanism");
+    if (!name) return;
+    std::string why;
+    const auto model = FindElasticModel(*name, fs::path(file_).parent_path().string(), &why);
+    if (!model) {
+      const size_t hint = why.find("; ");
+      yaml_.Error(node, fmt::format("mechanism = '{}': {}", *name, why.substr(0, hint)),
+                  hint == std::string::npos ? "" : why.substr(hint + 2));
+      return;
+    }
+    scenario_.model_file = *model;
+    LoadWith(scenario_.parameters);
+    if (!mechanism_) return;
+    NameTheCase();
+    if (mechanism_->beams.empty() && !HasServos()) {
+      yaml_.Error(node, fmt::format("mechanism: {} is rigid: it has no beams and no drive with a "
+                                    "stiffness",
+                                    *model));
+    }
+  }
+
+  void LoadWith(const Overrides& overrides) {
+    LoadOptions options;
+    options.overrides = overrides;
+    options.override_places = scenario_.parameter_places;
+    LoadModelWith(options);
+  }
+
+  bool HasServos() const {
+    return std::any_of(mechanism_->drives.begin(), mechanism_->drives.end(),
+                       [](const Drive& drive) { return std::isfinite(drive.stiffness); });
+  }
+
+  void ReadSettings(const YamlMap& map) {
+    scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
+    if (!scenario_.analytic.as_printed.empty()) {
+      yaml_.Error(*map.Find("analytic"), "analytic.as_printed: stiffness models have no errata",
+                  "analytic: {model: as_printed} takes the whole of the paper's own model");
+    }
+    scenario_.reference = ReadStiffnessReference(&values_, map.Find("reference"));
+    scenario_.simulation = ReadStiffnessSimulation(&values_, map.Find("simulation"));
+    scenario_.loads = ReadStiffnessLoads(&values_, map.Find("loads"), &scenario_.loads_text);
+    scenario_.checks = ReadStiffnessChecks(&values_, map.Find("checks"));
+    scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
+    if (const YamlNode* printed = map.Find("compare_printed")) {
+      scenario_.compare_printed = yaml_.Flag(*printed, "compare_printed").value_or(false);
+    }
+  }
+
+  // Coordinates of the pose, and parameters of the model that belong to it.
+  void ReadPose(const YamlNode& node) {
+    if (node.is_scalar() && node.text == "home") return;
+    const std::vector<std::string> coordinates = CoordinateNames(*mechanism_);
+    Overrides parameters;
+    for (const YamlEntry& entry : yaml_.Entries(node, "pose")) {
+      const auto [name, unit] = SplitUnit(entry.key);
+      const auto number = values_.Number(*entry.value, JoinPath("pose", entry.key));
+      const bool coordinate = Contains(coordinates, name);
+      const bool parameter = mechanism_->HasParameter(name);
+      if (!coordinate && !parameter) {
+        UnknownName(entry, name, coordinates);
+        continue;
+      }
+      if (scenario_.pose.contains(name) || parameters.contains(name)) {
+        yaml_.Error(entry, fmt::format("pose: {} is given twice", name));
+      }
+      if (!number) continue;
+      if (coordinate) scenario_.pose[name] = unit.to_si(*number);
+      if (parameter) parameters[name] = unit.to_si(*number);
+      if (parameter)
+        scenario_.parameter_places[name] = PlacesOf(node, file_, options_.set)[entry.key];
+    }
+    if (!parameters.empty()) {
+      scenario_.parameters = Merge(scenario_.parameters, parameters);
+      LoadWith(scenario_.parameters);
+    }
+    if (!mechanism_ || yaml_.has_errors() || scenario_.pose.empty()) return;
+    const PoseFault fault = CheckPose(*mechanism_, scenario_.pose);
+    if (!fault.message.empty()) yaml_.Error(node, fault.message, fault.hint);
+  }
+
+  void UnknownName(const YamlEntry& entry, const std::string& name,
+                   std::vector<std::string> known) {
+    for (const Parameter& p : mechanism_->parameters) known.push_back(p.name);
+    yaml_.Error(entry,
+                fmt::format("pose: {} has no coordinate or parameter '{}'", mechanism_->name, name),
+                DidYouMean(name, known,
+                           "known: drives, OUTPUT.x … OUTPUT.yaw, and the model's parameters"));
+  }
+
+  void ReadOutput(const YamlNode& node) {
+    std::vector<std::string> names;
+    for (const Output& output : mechanism_->outputs) names.push_back(output.name);
+    const auto choice = yaml_.Choice(node, "output", names);
+    if (choice) scenario_.output = names[static_cast<size_t>(*choice)];
+  }
+};
+
+}  // namespace
+
+StiffnessScenarioResult LoadStiffnessScenario(const std::string& file,
+                                              const ScenarioOptions& options) {
+  return StiffnessLoader(file, options).LoadFile();
+}
+
+StiffnessScenarioResult LoadStiffnessScenarioText(const std::string& text, const std::string& file,
+                                                  const ScenarioOptions& options) {
+  return StiffnessLoader(file, options).Load(text);
+}
+
+namespace {
+
+constexpr int kMostLoads = 10000;
+
+std::optional<double> NotNegative(ValueReader* values, const YamlNode& node,
+                                  const std::string& path) {
+  const auto value = values->Number(node, path);
+  if (!value || *value >= 0.0) return value;
+  values->yaml().Error(node, fmt::format("{} = {} violates {} >= 0", path, *value, path));
+  return {};
+}
+
+RandomLoads ReadRandom(ValueReader* values, const YamlNode& node) {
+  YamlReader& yaml = values->yaml();
+  RandomLoads random;
+  YamlMap map(&yaml, &node, "loads.random", {"count", "seed", "force_max", "moment_max"});
+  if (const YamlNode* count = map.Find("count")) {
+    random.count = yaml.Integer(*count, "loads.random.count").value_or(random.count);
+    if (random.count < 1 || random.count > kMostLoads) {
+      yaml.Error(*count, fmt::format("loads.random.count = {} violates 1 <= count <= {}",
+                                     random.count, kMostLoads));
+      random.count = 1;
+    }
+  }
+  if (const YamlNode* seed = map.Find("seed")) {
+    const std::string text = yaml.Text(*seed, "loads.random.seed").value_or("");
+    const char* end = text.data() + text.size();
+    const auto parsed = std::from_chars(text.data(), end, random.seed);
+    if (parsed.ec != std::errc() || parsed.ptr != end) {
+      yaml.Error(*seed, fmt::format("loads.random.seed = {}: a whole number from 0 to 2^64 - 1 is "
+                                    "needed",
+                                    Describe(*seed)));
+    }
+  }
+  for (const auto& [key, value] :
+       {std::pair{"force_max", &random.force_max}, std::pair{"moment_max", &random.moment_max}}) {
+    const YamlNode* number = map.Find(key);
+    if (number == nullptr) continue;
+    *value = NotNegative(values, *number, map.PathOf(key)).value_or(*value);
+  }
+  if (random.force_max == 0.0 && random.moment_max == 0.0) {
+    yaml.Error(node, "loads.random: force_max = moment_max = 0 is no load");
+  }
+  return random;
+}
+
+Vec6 ReadWrench(ValueReader* values, const YamlNode& node, const std::string& path) {
+  Vec6 wrench = Vec6::Zero();
+  YamlMap map(&values->yaml(), &node, path, {"force", "moment"});
+  if (const YamlNode* force = map.Find("force")) {
+    wrench.tail<3>() = values->Vector(*force, path + ".force").value_or(Vec3::Zero());
+  }
+  if (const YamlNode* moment = map.Find("moment")) {
+    wrench.head<3>() = values->Vector(*moment, path + ".moment").value_or(Vec3::Zero());
+  }
+  if (map.valid() && !values->yaml().has_errors() && wrench.isZero(0.0)) {
+    values->yaml().Error(node, path + " is no load", "give force and/or moment");
+  }
+  return wrench;
+}
+
+void ReadCheck(ValueReader* values, const YamlEntry& entry, StiffnessLimits* limits) {
+  const bool reference = entry.key.starts_with(kReferencePrefix);
+  const StiffnessMetricRow* row =
+      FindStiffnessMetric(reference ? entry.key.substr(kReferencePrefix.size()) : entry.key);
+  if (row == nullptr) return;  // reported as unknown key
+  std::optional<double> limit;
+  if (!entry.value->is_null() && AsSwitch(*entry.value) != false) {
+    limit = values->Positive(*entry.value, "checks." + entry.key);
+    if (!limit) return;
+  }
+  StiffnessLimit& target = (*limits)[row->metric];
+  (reference ? target.computed : target.simulated) = limit;
+}
+
+}  // namespace
+
+ReferenceSettings ReadStiffnessReference(ValueReader* values, const YamlNode* node) {
+  ReferenceSettings settings;
+  if (node == nullptr || node->is_null()) return settings;
+  if (const auto on = AsSwitch(*node)) {
+    settings.on = *on;
+    return settings;
+  }
+  YamlMap map(&values->yaml(), node, "reference", {"parameters"});
+  settings.parameters = ReadOverrides(values, map.Find("parameters"), "reference.parameters");
+  return settings;
+}
+
+StiffnessSimulation ReadStiffnessSimulation(ValueReader* values, const YamlNode* node) {
+  StiffnessSimulation settings;
+  if (node == nullptr || node->is_null()) return settings;
+  if (const auto on = AsSwitch(*node)) {
+    settings.on = *on;
+    return settings;
+  }
+  YamlMap map(&values->yaml(), node, "simulation", {"parameters", "force_N", "moment_Nm", "mode"});
+  if (const YamlNode* mode = map.Find("mode")) {
+    values->yaml().Warn(*mode, "simulation.mode has no meaning here: stiffness is static");
+  }
+  settings.parameters = ReadOverrides(values, map.Find("parameters"), "simulation.parameters");
+  if (const YamlNode* force = map.Find("force_N")) {
+    settings.force_N = values->Positive(*force, "simulation.force_N").value_or(settings.force_N);
+  }
+  if (const YamlNode* moment = map.Find("moment_Nm")) {
+    settings.moment_Nm =
+        values->Positive(*moment, "simulation.moment_Nm").value_or(settings.moment_Nm);
+  }
+  return settings;
+}
+
+std::vector<Vec6> ReadStiffnessLoads(ValueReader* values, const YamlNode* node, std::string* text) {
+  if (node == nullptr || node->is_null() || AsSwitch(*node) == false) return {};
+  YamlReader& yaml = values->yaml();
+  std::vector<Vec6> loads;
+  if (node->is_sequence()) {
+    for (size_t i = 0; i < node->items.size() && i < kMostLoads; ++i) {
+      loads.push_back(ReadWrench(values, *node->items[i], fmt::format("loads[{}]", i)));
+    }
+    *text = fmt::format("{} listed wrench{}", loads.size(), loads.size() == 1 ? "" : "es");
+    return loads;
+  }
+  YamlMap map(&yaml, node, "loads", {"random"});
+  const YamlNode* random_node = map.Required("random");
+  if (random_node == nullptr) return {};
+  const RandomLoads random = ReadRandom(values, *random_node);
+  *text = fmt::format("{} random wrenches, seed {}: forces 0 … {:g} N, moments 0 … {:g} N m",
+                      random.count, random.seed, random.force_max, random.moment_max);
+  return DrawLoads(random);
+}
+
+StiffnessLimits ReadStiffnessChecks(ValueReader* values, const YamlNode* node) {
+  StiffnessLimits limits;
+  std::vector<std::string> keys;
+  for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
+    keys.emplace_back(row.key);
+    keys.push_back(std::string(kReferencePrefix) + row.key);
+  }
+  YamlMap map(&values->yaml(), node, "checks", keys);
+  if (!map.valid() || node == nullptr) return limits;
+  for (const YamlEntry& entry : node->entries) ReadCheck(values, entry, &limits);
+  return limits;
+}
+
+// Poses and models of stiffness scenarios.
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kElasticFile = "elastic.yaml";
+
+bool IsPath(const std::string& name) {
+  return name.find('/') != std::string::npos || name.ends_with(".yaml");
+}
+
+std::string ElasticBeside(const std::string& model_file) {
+  std::error_code error;
+  const fs::path file = fs::path(model_file).parent_path() / kElasticFile;
+  return fs::is_regular_file(file, error) ? file.string() : "";
+}
+
+}  // namespace
+
+std::optional<std::string> FindElasticModel(const std::string& name, const std::string& start,
+                                            std::string* why) {
+  const auto model = FindModel(name, start);
+  if (model && IsPath(name)) return model;
+  if (const std::string elastic = model ? ElasticBeside(*model) : ""; !elastic.empty()) {
+    return Shown(elastic);
+  }
+  std::vector<std::string> elastic_models;
+  for (const std::string& known : ModelNames(start)) {
+    const auto file = FindModel(known, start);
+    if (file && !ElasticBeside(*file).empty()) elastic_models.push_back(known);
+  }
+  *why = model ? fmt::format("{} has no {} with its beams and servos", name, kElasticFile)
+               : "there is no such model";
+  const std::string hint =
+      DidYouMean(name, elastic_models,
+                 elastic_models.empty() ? "" : "elastic models: " + Joined(elastic_models));
+  if (!hint.empty()) *why += "; " + hint;
+  return std::nullopt;
+}
+
+Motion PoseMotion(const Mechanism& mechanism, const PoseValues& pose) {
+  const std::vector<std::string> names = CoordinateNames(mechanism);
+  Motion motion;
+  for (const auto& [name, value] : pose) {
+    const auto found = std::find(names.begin(), names.end(), name);
+    MBV_DEMAND(found != names.end(), name);
+    const Coordinate coordinate =
+        CoordinateAt(mechanism, static_cast<size_t>(found - names.begin()));
+    motion.commands.push_back(
+        {.name = name, .terms = {{coordinate, 1.0}}, .profile = Constant(value)});
+  }
+  return motion;
+}
+
+PoseValues HomePose(const Mechanism& mechanism) {
+  PoseValues pose;
+  for (size_t i = 0; i < mechanism.drives.size(); ++i) {
+    const Coordinate drive{Coordinate::Kind::kDrive, static_cast<int>(i), 0};
+    pose[mechanism.drives[i].name] = HomeValue(mechanism, drive);
+  }
+  for (size_t i = 0; i < mechanism.prescribed.size(); ++i) {
+    const Coordinate joint{Coordinate::Kind::kPrescribed, static_cast<int>(i), 0};
+    pose[mechanism.prescribed[i].name] = HomeValue(mechanism, joint);
+  }
+  return pose;
+}
+
+PoseFault CheckPose(const Mechanism& mechanism, const PoseValues& pose) {
+  const std::vector<std::string> names = CoordinateNames(mechanism);
+  for (const auto& [name, value] : pose) {
+    if (std::find(names.begin(), names.end(), name) != names.end()) continue;
+    return {fmt::format("pose: {} has no coordinate '{}'", mechanism.name, name),
+            DidYouMean(name, names, "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw")};
+  }
+  const int freedoms = CountFreedoms(mechanism);
+  if (static_cast<int>(pose.size()) == freedoms) return {};
+  return {fmt::format("pose gives {} coordinates, but {} has {} freedoms", pose.size(),
+                      mechanism.name, freedoms),
+          "give as many drives or output components (OUTPUT.x …) as there are freedoms"};
+}
+
+}  // namespace mbv

@@ -1,0 +1,507 @@
+#include "features/study/study.h"
+
+#include <fmt/format.h>
+#include <unistd.h>
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <map>
+
+#include "base/files.h"
+#include "base/json_document.h"
+#include "base/json_text.h"
+#include "base/output_folder.h"
+#include "base/state_folder.h"
+#include "features/study/statistics.h"
+#include "features/study/study_file.h"
+#include "features/study/study_html.h"
+#include "features/study/study_validation.h"
+#include "model_file/yaml/parsed_documents.h"
+#include "report/json.h"
+#include "verify/version.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+StudyOutcome NotWritten(StudyOutcome outcome, const std::string& why, const std::string& hint) {
+  outcome.exit_code = 3;
+  outcome.diagnostics.AddError("", why, hint);
+  return outcome;
+}
+
+StudyOutcome Refused(StudyOutcome outcome, const std::string& file, const std::string& why,
+                     const std::string& hint = "") {
+  outcome.exit_code = 2;
+  outcome.diagnostics.AddError(file, why, hint);
+  return outcome;
+}
+
+StudyOutcome Refused(StudyOutcome outcome, Finding finding) {
+  outcome.exit_code = 2;
+  outcome.diagnostics.Add(std::move(finding));
+  return outcome;
+}
+
+// Every row of a file that was looked through before.
+PointRows RowsOf(const fs::path& file, const Study& study) {
+  return [file, &study](const std::function<void(const PointRow&)>& take) {
+    std::ifstream stream(file, std::ios::binary);
+    std::string line;
+    std::getline(stream, line);
+    while (std::getline(stream, line)) {
+      if (const auto row = ReadPointLine(line, study)) take(*row);
+    }
+  };
+}
+
+// Evenly chosen, those that have values.
+std::vector<PointRow> ShownOf(const PointRows& rows, std::uint64_t points) {
+  const std::uint64_t every = (points + kMostShown - 1) / kMostShown;
+  std::vector<PointRow> shown;
+  rows([&](const PointRow& row) {
+    if (row.point % every == 0 && row.reason.empty()) shown.push_back(row);
+  });
+  return shown;
+}
+
+StudyReport ReportOf(const StudyBench& bench, const fs::path& folder) {
+  StudyReport report;
+  report.study = bench.study();
+  report.nominal = bench.nominal().row.values;
+  report.idle = bench.idle();
+  report.summary =
+      SummariseStudy(report.study, report.nominal, RowsOf(folder / kPointsFile, report.study));
+  report.shown = ShownOf(RowsOf(folder / kPointsFile, report.study), report.summary.points);
+  report.bands = StudyBands(bench, folder / kForcesFile);
+  if (report.study.validation) report.validation = ValidateStudy(bench, folder / kForcesFile);
+  for (const QuantitySummary& quantity : report.summary.quantities) {
+    auto& commands = report.worst_commands.emplace_back();
+    for (const WorstPoint& worst : quantity.worst) commands.push_back(bench.Command(worst.varied));
+  }
+  for (const PointRow& row : report.summary.first_failed) {
+    report.failed_commands.push_back(bench.Command(row.varied));
+  }
+  for (const PointRow& row : report.summary.first_disagreed) {
+    report.disagreed_commands.push_back(bench.Command(row.varied));
+  }
+  report.versions = Versions();
+  return report;
+}
+
+// From complete rows in `folder` to the result.
+StudyOutcome Finish(const StudyBench& bench, bool whole, StudyFolder* folder,
+                    StudyOutcome outcome) {
+  std::vector<std::pair<std::string, std::string>> files;
+  outcome.exit_code = 0;
+  if (whole) {
+    outcome.report = ReportOf(bench, folder->path());
+    outcome.exit_code = outcome.report->exit_code();
+    files = {{"summary.json", ToJson(*outcome.report)},
+             {"report.html", ToHtml(*outcome.report)},
+             {"inputs.json", ToJson(bench.inputs())}};
+    for (StudyPlot& plot : StudyPlots(*outcome.report)) {
+      files.emplace_back("plots/" + plot.file, std::move(plot.svg));
+    }
+  }
+  const std::string trouble = folder->Publish(files);
+  if (!trouble.empty()) {
+    outcome.report.reset();
+    return NotWritten(std::move(outcome), trouble, "choose another folder with --out");
+  }
+  outcome.folder = folder->target().string();
+  return outcome;
+}
+
+// All rows are there, with the bytes that were published.
+bool HoldsAll(const StudyBench& bench, const StudyIdentity& identity, const fs::path& folder) {
+  const std::uint64_t rows = identity.share.size(bench.points().count());
+  return FindDone(bench, identity.share, folder).rows == rows &&
+         PointsFingerprint(folder) == identity.points;
+}
+
+// What an earlier run finished, where all of it is there and nothing has changed.
+std::optional<StudyOutcome> Finished(const StudyBench& bench, const StudyFolder& folder,
+                                     const StudyShare& share, const StudyOutcome& outcome) {
+  std::error_code error;
+  std::optional<Finding> damage;
+  const auto identity = ReadIdentity(folder.target(), &damage);
+  if (damage) return Refused(outcome, *std::move(damage));
+  if (fs::exists(folder.path(), error) || !identity) return {};
+  if (identity->fingerprint != bench.fingerprint() || identity->share.count != share.count ||
+      identity->share.index != share.index) {
+    return {};
+  }
+  if (!HoldsAll(bench, *identity, folder.target())) return {};
+  StudyOutcome finished = outcome;
+  finished.exit_code = 0;
+  finished.folder = folder.target().string();
+  if (share.count > 1) return finished;
+  finished.report = ReportOf(bench, folder.target());
+  finished.exit_code = finished.report->exit_code();
+  return finished;
+}
+
+struct LoadedStudy {
+  std::unique_ptr<StudyBench> bench;  // null after bad input
+  int exit_code = 2;
+};
+
+// `timeout_s`: of one point.
+LoadedStudy LoadBench(const std::string& file, const StudyOptions& options, double timeout_s,
+                      Diagnostics* diagnostics) {
+  LoadedStudy loaded;
+  StudyResult read = LoadStudy(file, options);
+  diagnostics->Append(read.diagnostics);
+  if (!read.study) return loaded;
+  loaded.bench = StudyBench::Make(*read.study, diagnostics, &loaded.exit_code);
+  if (!loaded.bench) return loaded;
+  loaded.bench->FindIdle(timeout_s, diagnostics);
+  if (!diagnostics->has_errors()) return loaded;
+  return {nullptr, 2};
+}
+
+// The folders of all shards, by their place.
+class ShardMerger {
+ public:
+  // Why these are not all shards of one study.
+  std::optional<Finding> Read(const std::vector<std::string>& folders) {
+    const auto refused = [](const std::string& folder, std::string why) {
+      return Finding{.file = folder, .message = std::move(why), .hint = {}};
+    };
+    for (const std::string& folder : folders) {
+      std::optional<Finding> damage;
+      const auto identity = ReadIdentity(folder, &damage);
+      if (damage) return damage;
+      if (!identity) return refused(folder, "is no result of a study");
+      if (first_ && identity->fingerprint != first_->fingerprint) {
+        return refused(folder,
+                       fmt::format("is of another study than {}, or of other files", folders[0]));
+      }
+      if (first_ && identity->share.count != first_->share.count) {
+        return refused(folder, fmt::format("is one of {} shards, {} one of {}",
+                                           identity->share.count, folders[0], first_->share.count));
+      }
+      if (!first_) first_ = identity;
+      if (!folders_.emplace(identity->share.index, folder).second) {
+        return refused(
+            folder, fmt::format("shard {} is in another folder, too", identity->share.index + 1));
+      }
+    }
+    for (std::uint64_t k = 0; k < first_->share.count; ++k) {
+      if (folders_.contains(k)) continue;
+      return refused("", fmt::format("shard {}/{} is missing", k + 1, first_->share.count));
+    }
+    return {};
+  }
+  // Which shard has not all of its rows, or others than it was finished with.
+  [[nodiscard]] std::optional<Finding> CheckRows(const StudyBench& bench) const {
+    for (const auto& [index, folder] : folders_) {
+      const auto identity = ReadIdentity(folder);
+      if (identity && HoldsAll(bench, *identity, folder)) continue;
+      return Finding{.file = folder,
+                     .message = "its points are not all there, or not as they were written",
+                     .hint = {}};
+    }
+    return {};
+  }
+  // Rows and forces in the order of points.
+  [[nodiscard]] std::string Join(const StudyBench& bench, const fs::path& into) const {
+    GrowingFile csv(into / kPointsFile), forces(into / kForcesFile);
+    std::string trouble = csv.Open(0);
+    if (trouble.empty()) trouble = forces.Open(0);
+    if (trouble.empty()) trouble = csv.Append(PointHeader(bench.study()));
+    std::vector<std::ifstream> rows, records;
+    std::string line, record(bench.forces().size() * sizeof(float), '\0');
+    for (const auto& [index, folder] : folders_) {
+      rows.emplace_back(fs::path(folder) / kPointsFile, std::ios::binary);
+      records.emplace_back(fs::path(folder) / kForcesFile, std::ios::binary);
+      std::getline(rows.back(), line);
+    }
+    for (std::uint64_t p = 0; p < bench.points().count() && trouble.empty(); ++p) {
+      std::getline(rows[p % rows.size()], line);
+      trouble = csv.Append(line + "\n");
+      if (p >= kBandPoints || !trouble.empty()) continue;
+      records[p % rows.size()].read(record.data(), static_cast<std::streamsize>(record.size()));
+      trouble = forces.Append(record);
+    }
+    return trouble;
+  }
+  [[nodiscard]] const StudyIdentity& first() const { return *first_; }
+
+ private:
+  std::optional<StudyIdentity> first_;
+  std::map<std::uint64_t, std::string> folders_;
+};
+
+}  // namespace
+
+StudyOutcome RunStudy(const std::string& file, const RunStudyOptions& options) {
+  const ParsedDocuments documents;
+  StudyOutcome outcome;
+  const LoadedStudy loaded =
+      LoadBench(file, options.reading, options.points.timeout_s, &outcome.diagnostics);
+  outcome.exit_code = loaded.exit_code;
+  if (!loaded.bench) return outcome;
+  const StudyBench& bench = *loaded.bench;
+  const StudyShare& share = options.points.share;
+  if (share.size(bench.points().count()) == 0) {
+    return Refused(std::move(outcome), file,
+                   fmt::format("has {} points for {} shards", bench.points().count(), share.count));
+  }
+  StudyFolder folder(
+      options.out_dir,
+      {bench.study().name, file, bench.fingerprint(), options.reading.drawn, share, {}});
+  if (options.resume) {
+    if (auto finished = Finished(bench, folder, share, outcome)) return *std::move(finished);
+  }
+  if (auto refused = folder.Open(options.resume)) {
+    return Refused(std::move(outcome), *std::move(refused));
+  }
+  const std::string trouble =
+      ComputePoints(bench, options.points, FindDone(bench, share, folder.path()), folder.path());
+  if (!trouble.empty()) return NotWritten(std::move(outcome), trouble, "");
+  return Finish(bench, share.count == 1, &folder, std::move(outcome));
+}
+
+StudyOutcome MergeStudies(const std::vector<std::string>& folders, const std::string& out_dir) {
+  const ParsedDocuments documents;
+  StudyOutcome outcome;
+  ShardMerger merger;
+  if (auto refused = merger.Read(folders)) {
+    return Refused(std::move(outcome), *std::move(refused));
+  }
+  const StudyIdentity& first = merger.first();
+  const LoadedStudy loaded =
+      LoadBench(first.file, {true, first.drawn}, PointsOptions{}.timeout_s, &outcome.diagnostics);
+  outcome.exit_code = loaded.exit_code;
+  if (!loaded.bench) return outcome;
+  const StudyBench& bench = *loaded.bench;
+  if (bench.fingerprint() != first.fingerprint) {
+    return Refused(std::move(outcome), first.file,
+                   "has changed since the shards were computed, or its scenario, model or this "
+                   "program");
+  }
+  if (auto refused = merger.CheckRows(bench)) {
+    return Refused(std::move(outcome), *std::move(refused));
+  }
+  // By its own name: the one in the shards' files may be anything.
+  StudyFolder folder(out_dir,
+                     {bench.study().name, first.file, first.fingerprint, first.drawn, {}, {}});
+  if (auto refused = folder.Open(true)) return Refused(std::move(outcome), *std::move(refused));
+  const std::string trouble = merger.Join(bench, folder.path());
+  if (!trouble.empty()) return Refused(std::move(outcome), "", trouble);
+  return Finish(bench, true, &folder, std::move(outcome));
+}
+
+Diagnostics CheckStudy(const std::string& file) {
+  const ParsedDocuments documents;
+  Diagnostics diagnostics;
+  (void)LoadBench(file, {.many = true}, PointsOptions{}.timeout_s, &diagnostics);
+  return diagnostics;
+}
+
+std::vector<std::vector<float>> DriveRecords(const StudyForces& forces, size_t drive,
+                                             const std::filesystem::path& file, size_t* left_out) {
+  const size_t times = forces.time_s.size();
+  const auto bytes = static_cast<std::streamsize>(times * sizeof(float));
+  std::vector<std::vector<float>> records;
+  std::ifstream stream(file, std::ios::binary);
+  size_t all = 0;
+  for (;; ++all) {
+    std::vector<float> samples(times);
+    stream.clear();
+    stream.seekg(
+        static_cast<std::streamoff>(sizeof(float) * (all * forces.size() + drive * times)));
+    stream.read(reinterpret_cast<char*>(samples.data()), bytes);
+    if (stream.gcount() != bytes) break;
+    const bool numbers =
+        std::all_of(samples.begin(), samples.end(), [](float v) { return std::isfinite(v); });
+    if (numbers) records.push_back(std::move(samples));
+  }
+  if (left_out != nullptr) *left_out = all - records.size();
+  return records;
+}
+
+std::vector<StudyBand> StudyBands(const StudyBench& bench, const std::filesystem::path& file) {
+  std::vector<StudyBand> bands;
+  const StudyForces& forces = bench.forces();
+  const size_t times = forces.time_s.size();
+  for (size_t d = 0; d < forces.drives.size(); ++d) {
+    StudyBand band{.drive = forces.drives[d],
+                   .unit = forces.units[d],
+                   .time_s = forces.time_s,
+                   .nominal = {},
+                   .p5 = {},
+                   .p50 = {},
+                   .p95 = {}};
+    size_t left_out = 0;
+    const auto records = DriveRecords(forces, d, file, &left_out);
+    band.points = records.size();
+    band.left_out = left_out;
+    for (size_t t = 0; t < times && !records.empty(); ++t) {
+      std::vector<double> values;
+      values.reserve(records.size());
+      for (const auto& record : records) values.push_back(static_cast<double>(record[t]));
+      std::sort(values.begin(), values.end());
+      band.nominal.push_back(static_cast<double>(bench.nominal().forces[d * times + t]));
+      band.p5.push_back(Percentile(values, 0.05));
+      band.p50.push_back(Percentile(values, 0.50));
+      band.p95.push_back(Percentile(values, 0.95));
+    }
+    if (band.points > 0) bands.push_back(std::move(band));
+  }
+  return bands;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kStudySchema = "mbverify.study/1";
+
+// The file's bytes, piece by piece; what cannot be read any more ends it early, which `size` tells.
+FileContent ContentOf(const fs::path& path, std::uint64_t* size) {
+  return [path, size](const std::function<void(std::string_view)>& write) {
+    std::ifstream stream(path, std::ios::binary);
+    std::string piece(1 << 20, '\0');
+    while (stream) {
+      stream.read(piece.data(), static_cast<std::streamsize>(piece.size()));
+      write(std::string_view(piece.data(), static_cast<size_t>(stream.gcount())));
+      *size += static_cast<std::uint64_t>(stream.gcount());
+    }
+  };
+}
+
+StudyIdentity IdentityOf(const JsonValue& json) {
+  StudyIdentity identity{json.at("study"), json.at("file"), json.at("fingerprint"), {}, {}, {}};
+  if (json.contains("count")) identity.drawn.count = json.at("count").get<std::uint64_t>();
+  if (json.contains("seed")) identity.drawn.seed = json.at("seed").get<std::uint64_t>();
+  const JsonValue shard = json.at("shard");
+  identity.share.count = shard.at(1).get<std::uint64_t>();
+  identity.share.index = shard.at(0).get<std::uint64_t>() - 1;
+  if (identity.share.index >= identity.share.count) {
+    shard.Refuse(fmt::format("says {} of {}", identity.share.index + 1, identity.share.count));
+  }
+  identity.points = json.value("points", "");
+  return identity;
+}
+
+std::string NameOf(const StudyIdentity& identity) {
+  if (identity.share.count == 1) return identity.study;
+  return fmt::format("{}.shard-{}-of-{}", identity.study, identity.share.index + 1,
+                     identity.share.count);
+}
+
+}  // namespace
+
+std::string ToJson(const StudyIdentity& identity) {
+  nlohmann::ordered_json json = {{"schema", kStudySchema},
+                                 {"study", identity.study},
+                                 {"file", identity.file},
+                                 {"fingerprint", identity.fingerprint},
+                                 {"shard", {identity.share.index + 1, identity.share.count}},
+                                 {"points", identity.points}};
+  if (identity.drawn.count) json["count"] = *identity.drawn.count;
+  if (identity.drawn.seed) json["seed"] = *identity.drawn.seed;
+  return Dump(json);
+}
+
+std::optional<StudyIdentity> ReadIdentity(const fs::path& folder, std::optional<Finding>* damage) {
+  const fs::path file = folder / kStudyFile;
+  const auto text = ReadWholeFile(file);
+  if (!text) return {};
+  auto identity = ReadJson(*text, IdentityOf, kStudySchema);
+  if (!identity && damage != nullptr) *damage = identity.refusal.FindingIn(file.string());
+  return std::move(identity.value);
+}
+
+std::string PointsFingerprint(const fs::path& folder) {
+  Fingerprint fingerprint;
+  for (const char* grown : {kPointsFile, kForcesFile}) {
+    std::uint64_t size = 0;
+    ContentOf(folder / grown,
+              &size)([&](std::string_view piece) { fingerprint.Add(std::string(piece)); });
+  }
+  return fingerprint.Text();
+}
+
+StudyFolder::StudyFolder(const fs::path& out, const StudyIdentity& identity)
+    : out_(out), identity_(identity), name_(NameOf(identity)) {
+  target_ = out_ / name_;
+  path_ = out_ / (name_ + ".part");
+}
+
+StudyFolder::~StudyFolder() {
+  if (lock_ >= 0) close(lock_);
+}
+
+std::optional<Finding> StudyFolder::Open(bool resume) {
+  const auto refused = [&](std::string why, std::string hint) {
+    return Finding{.file = path_.string(), .message = std::move(why), .hint = std::move(hint)};
+  };
+  const char* const elsewhere = "choose another folder with --out";
+  std::error_code error;
+  fs::create_directories(out_, error);
+  const bool is_new = !error && fs::create_directory(path_, error);
+  if (error) return refused("cannot make the folder: " + error.message(), elsewhere);
+  lock_ = LockFolder(path_);
+  if (lock_ < 0) {
+    const bool held = errno == EWOULDBLOCK;
+    return refused(std::string("cannot use the folder: ") +
+                       (held ? "another process computes this study there" : std::strerror(errno)),
+                   elsewhere);
+  }
+  std::optional<Finding> damage;
+  const auto left = is_new ? std::nullopt : ReadIdentity(path_, &damage);
+  if (damage) {
+    if (damage->hint.empty()) {
+      damage->hint = "remove " + path_.string() + ", or choose another folder with --out";
+    }
+    return damage;
+  }
+  if (left && left->fingerprint != identity_.fingerprint) {
+    return refused("holds points of another study, or of files that have changed since",
+                   "remove that folder, or choose another one with --out");
+  }
+  if (left && !resume) {
+    return refused("holds points of this study that was not finished",
+                   "--resume goes on with them; to start anew remove that folder");
+  }
+  if (!is_new && !left && !fs::is_empty(path_, error)) {
+    return refused("is a folder of something else", elsewhere);
+  }
+  if (left) return {};
+  const std::string trouble = WriteFile(path_ / kStudyFile, ToJson(identity_));
+  if (trouble.empty()) return {};
+  return Finding{.file = "", .message = trouble, .hint = elsewhere};
+}
+
+std::string StudyFolder::Publish(const std::vector<std::pair<std::string, std::string>>& files) {
+  OutputFolder folder(out_, name_);
+  std::string trouble = folder.Create();
+  for (const char* grown : {kPointsFile, kForcesFile}) {
+    std::uint64_t size = 0;
+    std::error_code error;
+    if (trouble.empty()) trouble = folder.Write(grown, ContentOf(path_ / grown, &size));
+    if (trouble.empty() && size != fs::file_size(path_ / grown, error)) {
+      trouble = fmt::format("cannot read {}", (path_ / grown).string());
+    }
+  }
+  for (const auto& [name, content] : files) {
+    if (trouble.empty()) trouble = folder.Write(name, content);
+  }
+  identity_.points = PointsFingerprint(path_);
+  if (trouble.empty()) trouble = folder.Write(kStudyFile, ToJson(identity_));
+  if (trouble.empty()) trouble = folder.Commit();
+  if (!trouble.empty()) return trouble;
+  std::error_code error;
+  for (const char* ours : {kPointsFile, kForcesFile, kStudyFile}) fs::remove(path_ / ours, error);
+  fs::remove(path_, error);  // unless somebody else put something there
+  return "";
+}
+
+}  // namespace mbv

@@ -1,0 +1,453 @@
+// report.html of a study.
+
+#include "features/study/study_html.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+
+#include "base/names.h"
+#include "features/study/study_report.h"
+#include "plot/svg.h"
+#include "plot/svg_plot.h"
+#include "report/page.h"
+
+namespace mbv {
+namespace {
+
+class PlotList {
+ public:
+  explicit PlotList(const StudyReport& report) : report_(report) {}
+
+  std::vector<StudyPlot> All() {
+    for (const QuantitySummary& q : report_.summary.quantities) {
+      if (q.sobol) AddIndices(q);
+      if (!q.swings.empty()) AddTornado(q);
+      if (q.histogram.counts.size() > 1) AddHistogram(q);
+    }
+    for (const StudyBand& band : report_.bands) {
+      if (band.time_s.size() > 1) AddBand(band);
+    }
+    if (report_.validation) {
+      for (const DriveValidation& drive : report_.validation->drives) AddValidation(drive);
+    }
+    if (!report_.shown.empty()) AddScatter();
+    return std::move(plots_);
+  }
+
+ private:
+  void Add(StudySection section, const std::string& name, std::string svg) {
+    std::string file = NearestPlainPath(name);
+    std::replace(file.begin(), file.end(), '/', '_');
+    const auto taken = [&](const StudyPlot& plot) { return plot.file == file + ".svg"; };
+    while (std::any_of(plots_.begin(), plots_.end(), taken)) file += "_";
+    plots_.push_back({section, file + ".svg", std::move(svg)});
+  }
+  void Add(StudySection section, const std::string& name, LinePlot plot) {
+    Add(section, name, ToSvg(plot));
+    plots_.back().lines = std::move(plot);
+  }
+
+  // Its outline, and the nominal value as an upright line.
+  void AddHistogram(const QuantitySummary& q) {
+    LinePlot plot{.title = q.name, .x_label = q.name, .y_label = "points", .lines = {}};
+    PlotLine outline{.label = "points", .points = {}};
+    const auto bins = static_cast<double>(q.histogram.counts.size());
+    double most = 0.0;
+    outline.points.emplace_back(q.histogram.from, 0.0);
+    for (size_t k = 0; k < q.histogram.counts.size(); ++k) {
+      const double width = (q.histogram.to - q.histogram.from) / bins;
+      const double left = q.histogram.from + width * static_cast<double>(k);
+      const auto count = static_cast<double>(q.histogram.counts[k]);
+      outline.points.emplace_back(left, count);
+      outline.points.emplace_back(left + width, count);
+      most = std::max(most, count);
+    }
+    outline.points.emplace_back(q.histogram.to, 0.0);
+    plot.lines.push_back(std::move(outline));
+    plot.lines.push_back({.label = "nominal", .points = {{q.nominal, 0.0}, {q.nominal, most}}});
+    Add(StudySection::kHistograms, "histogram_" + q.name, std::move(plot));
+  }
+
+  void AddTornado(const QuantitySummary& q) {
+    BarPlot bars{.title = q.name, .columns = {"down, of nominal", "up, of nominal"}, .rows = {}};
+    const double scale = std::abs(q.nominal);
+    for (const Swing& swing : q.swings) {
+      if (!(scale > 0.0) || !std::isfinite(swing.lowest)) continue;
+      bars.rows.push_back(
+          {report_.study.factors[swing.factor].name,
+           {(swing.lowest - q.nominal) / scale, (swing.highest - q.nominal) / scale}});
+    }
+    if (!bars.rows.empty()) Add(StudySection::kTornado, "tornado_" + q.name, ToSvg(bars));
+  }
+
+  void AddIndices(const QuantitySummary& q) {
+    BarPlot bars{.title = q.name, .columns = {"first order", "total"}, .rows = {}};
+    for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
+      const SobolIndex& index = q.sobol->indices[k];
+      if (!std::isfinite(index.total)) continue;
+      bars.rows.push_back({report_.study.factors[k].name, {index.first, index.total}});
+    }
+    if (!bars.rows.empty()) Add(StudySection::kIndices, "indices_" + q.name, ToSvg(bars));
+  }
+
+  void AddBand(const StudyBand& band) {
+    LinePlot plot = ForcePlot(band.drive, band.unit);
+    AddLine("nominal", band.time_s, band.nominal, &plot);
+    AddLine("5 %", band.time_s, band.p5, &plot);
+    AddLine("median", band.time_s, band.p50, &plot);
+    AddLine("95 %", band.time_s, band.p95, &plot);
+    Add(StudySection::kBands, "band_" + band.drive, std::move(plot));
+  }
+
+  // E with the band that it should lie in.
+  void AddValidation(const DriveValidation& drive) {
+    const ForceComparison& f = drive.forces;
+    LinePlot plot = ForcePlot(f.drive + ": computed − measured", f.unit);
+    std::vector<double> error, upper, lower;
+    for (size_t t = 0; t < f.time_s.size(); ++t) {
+      error.push_back(f.computed[t] - f.measured[t]);
+      upper.push_back(report_.study.validation->coverage * drive.u_val[t]);
+      lower.push_back(-upper.back());
+    }
+    const std::string word = fmt::format("{:g} u_val", report_.study.validation->coverage);
+    AddLine("E", f.time_s, error, &plot);
+    AddLine("+" + word, f.time_s, upper, &plot);
+    AddLine("−" + word, f.time_s, lower, &plot);
+    Add(StudySection::kValidation, "validation_" + f.drive, std::move(plot));
+  }
+
+  void AddScatter() {
+    constexpr size_t kMostColumns = 8, kMostRows = 6;
+    ScatterMatrix matrix;
+    matrix.title = "quantities over varied numbers";
+    for (const Factor& f : report_.study.factors) {
+      if (matrix.columns.size() < kMostColumns) matrix.columns.push_back(f.name);
+    }
+    for (const StudyQuantity& q : report_.study.quantities) {
+      if (matrix.rows.size() < kMostRows) matrix.rows.push_back(q.name);
+    }
+    for (const PointRow& row : report_.shown) {
+      matrix.across.push_back(row.varied);
+      matrix.upward.push_back(row.values);
+    }
+    Add(StudySection::kScatter, "scatter_matrix", ToSvg(matrix));
+  }
+
+  static LinePlot ForcePlot(const std::string& title, const std::string& unit) {
+    return {.title = title,
+            .x_label = "t [s]",
+            .y_label = fmt::format("drive force [{}]", unit),
+            .lines = {}};
+  }
+
+  static void AddLine(const std::string& label, const std::vector<double>& time_s,
+                      const std::vector<double>& values, LinePlot* plot) {
+    PlotLine line{.label = label, .points = {}};
+    for (size_t t = 0; t < values.size(); ++t) line.points.emplace_back(time_s[t], values[t]);
+    plot->lines.push_back(std::move(line));
+  }
+
+  const StudyReport& report_;
+  std::vector<StudyPlot> plots_;
+};
+
+}  // namespace
+
+std::vector<StudyPlot> StudyPlots(const StudyReport& report) { return PlotList(report).All(); }
+
+namespace {
+
+std::string StudyNumber(double value) { return NumberOrDash(value, "{:.6g}"); }
+
+std::string LimitSection(const StudyReport& report) {
+  Table table{
+      .caption = "Limits", .head = {Text("limit"), Text("verdict"), Text("points")}, .rows = {}};
+  for (const LimitResult& result : report.summary.limits) {
+    table.rows.push_back({Text(internal::LimitText(report, result)),
+                          Markup(result.pass() ? Pill("ok", "kept") : Pill("fail", "violated")),
+                          Text(internal::ShareText(result))});
+  }
+  if (report.study.witnesses.size() > 1) {
+    table.rows.push_back(
+        {Text("verdicts by the scenario's checks"),
+         Markup(report.summary.disagreed == 0 ? Pill("ok", "kept") : Pill("fail", "violated")),
+         Text(internal::DisagreedText(report))});
+  }
+  if (report.study.missing) {
+    const bool kept = report.summary.few_missing();
+    table.rows.push_back({Text("points without a result"),
+                          Markup(kept ? Pill("ok", "kept") : Pill("fail", "violated")),
+                          Text(internal::MissingText(report))});
+  }
+  if (table.rows.empty()) return "";
+  return ToHtml(table) +
+         Note(std::string(report.study.missing ? ""
+                                               : "Points without a result violate every limit. ") +
+              "The interval is Clopper and Pearson's, "
+              "as of independent points.");
+}
+
+std::string QuantitySection(const StudyReport& report) {
+  Table table{.caption = "Quantities over all points", .head = {Text("quantity")}, .rows = {}};
+  for (const char* word : {"nominal", "least", "5 %", "median", "95 %", "most", "mean",
+                           "standard deviation", "missing"}) {
+    table.head.push_back(Digits(word));
+  }
+  for (const QuantitySummary& q : report.summary.quantities) {
+    std::vector<Cell> row = {Text(q.name)};
+    for (const double v : {q.nominal, q.least, q.p5, q.p50, q.p95, q.most, q.mean, q.deviation}) {
+      row.push_back(Digits(StudyNumber(v)));
+    }
+    row.push_back(Digits(fmt::format("{}", q.missing)));
+    table.rows.push_back(std::move(row));
+  }
+  return ToHtml(table);
+}
+
+std::string Plots(const std::vector<StudyPlot>& plots, StudySection section) {
+  std::string html;
+  for (const StudyPlot& plot : plots) {
+    if (plot.section == section) html += FigureHtml(plot.svg);
+  }
+  return html;
+}
+
+std::string TornadoTables(const StudyReport& report) {
+  std::string html;
+  for (const QuantitySummary& q : report.summary.quantities) {
+    if (q.swings.empty()) continue;
+    Table table{.caption = q.name + fmt::format(", nominal {:.6g}", q.nominal),
+                .head = {Text("varied alone"), Digits("least"), Digits("most")},
+                .rows = {}};
+    for (const Swing& swing : q.swings) {
+      table.rows.push_back({Text(report.study.factors[swing.factor].name),
+                            Digits(StudyNumber(swing.lowest)), Digits(StudyNumber(swing.highest))});
+    }
+    html += ToHtml(table);
+  }
+  return html;
+}
+
+std::string IndexTables(const StudyReport& report) {
+  std::string html;
+  const auto interval = [](const Interval& i) {
+    return std::isnan(i.lower) ? "–" : fmt::format("{:.3f} … {:.3f}", i.lower, i.upper);
+  };
+  for (const QuantitySummary& q : report.summary.quantities) {
+    if (!q.sobol) continue;
+    Table table{.caption = fmt::format("{}: {} blocks, {} left out", q.name, q.sobol->blocks,
+                                       q.sobol->left_out),
+                .head = {Text("varied"), Digits("first order"), Digits("95 %"), Digits("total"),
+                         Digits("95 %")},
+                .rows = {}};
+    for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
+      const SobolIndex& index = q.sobol->indices[k];
+      const std::string& name = report.study.factors[k].name;
+      table.rows.push_back({Text(name), Digits(NumberOrDash(index.first, "{:.3f}")),
+                            Digits(interval(index.first_interval)),
+                            Digits(NumberOrDash(index.total, "{:.3f}")),
+                            Digits(interval(index.total_interval))});
+    }
+    html += ToHtml(table);
+  }
+  if (html.empty()) return "";
+  return html + Note(
+                    "Shares of the variance: first order of the number alone, total with all that "
+                    "it does together with others. Saltelli's and Jansen's estimators; intervals "
+                    "by bootstrap of blocks.");
+}
+
+std::string BandNote(const StudyReport& report) {
+  if (report.bands.empty()) return "";
+  return Note(fmt::format("Percentiles at each time of {} points ({} left out).",
+                          report.bands[0].points, report.bands[0].left_out));
+}
+
+std::string ValidationTable(const StudyReport& report) {
+  const StudyValidationResult& validation = *report.validation;
+  if (!validation.trouble.empty()) return "<p>" + Escape(validation.trouble) + "</p>\n";
+  Table table{.caption = "Drive forces against " + validation.table,
+              .head = {Text("drive"), Text("verdict")},
+              .rows = {}};
+  for (const char* word : {"mean of E", "RMS of E", "u_num", "u_input", "u_D", "u_val",
+                           "of RMS measured", "outside"}) {
+    table.head.push_back(Digits(word));
+  }
+  table.head.push_back(Text("largest part"));
+  for (const DriveValidation& v : validation.drives) {
+    std::vector<Cell> row = {
+        Text(fmt::format("{} [{}]", v.forces.drive, v.forces.unit)),
+        Markup(v.pass() ? Pill("ok", "within") : Pill("fail", "model error seen"))};
+    for (const double x : {v.error_mean, v.error_rms, v.u_num, v.u_input, v.u_data, v.level}) {
+      row.push_back(Digits(NumberOrDash(x, "{:.4g}")));
+    }
+    row.push_back(Digits(fmt::format("{:.2g} %", 100.0 * v.level / v.measured_rms)));
+    row.push_back(Digits(fmt::format("{} of {}", v.outside, v.samples())));
+    row.push_back(Text(v.largest));
+    table.rows.push_back(std::move(row));
+  }
+  return ToHtml(table) +
+         Note(fmt::format(
+             "E = computed − measured; standard uncertainties, RMS over the samples: u_num of the "
+             "scheme ({}), u_input of the varied numbers, u_D of the table; u_val is their root "
+             "sum "
+             "of squares, the validation level: a smaller error of the model cannot be seen here. "
+             "A "
+             "sample is outside where |E| > {:g} u_val; {:g} % of them may be [ASME V&V 20-2009].",
+             validation.numerical, report.study.validation->coverage,
+             100.0 * report.study.validation->share));
+}
+
+std::string ScatterNote(const StudyReport& report) {
+  if (report.shown.empty()) return "";
+  return Note(fmt::format("{} of {} points; the first 8 varied numbers and 6 quantities.",
+                          report.shown.size(), report.summary.points));
+}
+
+std::string WorstSection(const StudyReport& report) {
+  Table table{.caption = "Worst points",
+              .head = {Text("quantity"), Digits("point"), Digits("value"), Text("command")},
+              .rows = {}};
+  for (size_t k = 0; k < report.summary.quantities.size(); ++k) {
+    const QuantitySummary& q = report.summary.quantities[k];
+    for (size_t i = 0; i < q.worst.size(); ++i) {
+      table.rows.push_back({Text(q.name), Digits(fmt::format("{}", q.worst[i].point)),
+                            Digits(StudyNumber(q.worst[i].value)),
+                            Markup("<code>" + Escape(report.worst_commands[k][i]) + "</code>")});
+    }
+  }
+  return table.rows.empty() ? "" : ToHtml(table);
+}
+
+std::string CommandLines(const std::vector<std::string>& commands) {
+  std::string html;
+  for (const std::string& command : commands) {
+    html += "<p><code>" + Escape(command) + "</code></p>\n";
+  }
+  return html;
+}
+
+std::string DisagreedSection(const StudyReport& report) {
+  if (report.summary.disagreed == 0) return "";
+  return "<p>" + Escape(internal::DisagreedText(report)) + "</p>\n" +
+         CommandLines(report.disagreed_commands);
+}
+
+std::string FailureSection(const StudyReport& report) {
+  if (report.summary.failed == 0) return "";
+  Table table{.caption = "Why points have no result",
+              .head = {Text("reason"), Digits("points")},
+              .rows = {}};
+  for (const auto& [reason, count] : report.summary.reasons) {
+    table.rows.push_back({Text(reason), Digits(fmt::format("{}", count))});
+  }
+  return ToHtml(table) + CommandLines(report.failed_commands);
+}
+
+const char* FailureWord(const StudyReport& report) {
+  return report.summary.within_limits() ? "Not validated" : "Limit violated";
+}
+
+}  // namespace
+
+std::string ToHtml(const StudyReport& report) {
+  Page page;
+  const std::vector<StudyPlot> plots = StudyPlots(report);
+  const auto drawn = [&](StudySection section) { return Plots(plots, section); };
+  page.Add("Limits", "Limits", LimitSection(report));
+  page.Add("Quantities", "Quantities", QuantitySection(report));
+  page.Add("Sobol' indices", "Indices", drawn(StudySection::kIndices) + IndexTables(report));
+  page.Add("One number at a time", "Tornado",
+           drawn(StudySection::kTornado) + TornadoTables(report));
+  if (report.validation) {
+    page.Add("Validation", "Validation",
+             ValidationTable(report) + drawn(StudySection::kValidation));
+  }
+  page.Add("Drive forces over time", "Bands", drawn(StudySection::kBands) + BandNote(report));
+  page.Add("Distributions", "Histograms", drawn(StudySection::kHistograms));
+  page.Add("Point by point", "Scatter", drawn(StudySection::kScatter) + ScatterNote(report));
+  page.Add("Worst points, and how to run them", "Worst", WorstSection(report));
+  page.Add("Points where witnesses disagree", "Disagreements", DisagreedSection(report));
+  page.Add("Points without a result", "Failures", FailureSection(report));
+  PageHead head{.kicker = "mbverify study", .title = report.study.name};
+  head.lead = report.study.description.empty()
+                  ? internal::PointsText(report)
+                  : report.study.description + "; " + internal::PointsText(report);
+  const int code = report.exit_code();
+  head.verdict = code == 0 ? Verdict::kAgree : code == 1 ? Verdict::kDisagree : Verdict::kNotRun;
+  head.word = code == 3 ? "No result" : code == 1 ? FailureWord(report) : "Limits kept";
+  head.judges = code == 3 || report.judged();
+  for (const auto& [name, version] : report.versions) {
+    head.footer += (head.footer.empty() ? "" : " · ") + name + " " + version;
+  }
+  return page.Write(head);
+}
+
+// A matrix of small plots with a dot per point.
+
+namespace {
+
+constexpr double kCell = 118, kGap = 10, kNames = 150, kTopNames = 26;
+
+PlotAxis AxisOf(const std::vector<std::vector<double>>& points, size_t k, double from, double to) {
+  PlotAxis axis{.from_px = from, .to_px = to};
+  for (const auto& point : points) axis.Add(point[k]);
+  axis.Pad();
+  return axis;
+}
+
+std::string Panel(const ScatterMatrix& matrix, size_t column, size_t row) {
+  const double left = kNames + (kCell + kGap) * static_cast<double>(column);
+  const double top = kTopNames + (kCell + kGap) * static_cast<double>(row);
+  const PlotAxis x = AxisOf(matrix.across, column, left, left + kCell);
+  const PlotAxis y = AxisOf(matrix.upward, row, top + kCell, top);
+  std::string dots;  // one path: round line ends without a length
+  for (size_t p = 0; p < matrix.across.size(); ++p) {
+    const double u = matrix.across[p][column], v = matrix.upward[p][row];
+    if (!x.Shows(u) || !y.Shows(v)) continue;
+    dots += fmt::format("M{:.1f} {:.1f}h0", x.Px(u), y.Px(v));
+  }
+  return SvgShape("rect", {{"x", left},
+                           {"y", top},
+                           {"width", kCell},
+                           {"height", kCell},
+                           {"fill", "none"},
+                           {"stroke", "#888888"}}) +
+         SvgShape("path", {{"d", dots},
+                           {"fill", "none"},
+                           {"stroke", kLineColors[0]},
+                           {"stroke-width", "2.4"},
+                           {"stroke-linecap", "round"},
+                           {"stroke-opacity", "0.6"}}) +
+         "\n";
+}
+
+// As much of a name as the margin has room for.
+std::string Cut(const std::string& name, size_t most) {
+  return name.size() <= most ? name : "…" + name.substr(name.size() - most + 1);
+}
+
+}  // namespace
+
+std::string ToSvg(const ScatterMatrix& matrix) {
+  std::string svg = "\n" + SvgElement("title", {}, EscapeMarkup(matrix.title)) + "\n";
+  for (size_t c = 0; c < matrix.columns.size(); ++c) {
+    const double middle = kNames + (kCell + kGap) * static_cast<double>(c) + kCell / 2.0;
+    svg += SvgText({{"x", middle}, {"y", "16"}, {"text-anchor", "middle"}},
+                   Cut(matrix.columns[c], 18)) +
+           "\n";
+  }
+  for (size_t r = 0; r < matrix.rows.size(); ++r) {
+    const double middle = kTopNames + (kCell + kGap) * static_cast<double>(r) + kCell / 2.0;
+    svg += SvgText({{"x", kNames - 8}, {"y", middle}, {"text-anchor", "end"}},
+                   Cut(matrix.rows[r], 22)) +
+           "\n";
+    for (size_t c = 0; c < matrix.columns.size(); ++c) svg += Panel(matrix, c, r);
+  }
+  const double width = kNames + (kCell + kGap) * static_cast<double>(matrix.columns.size());
+  const double height = kTopNames + (kCell + kGap) * static_cast<double>(matrix.rows.size());
+  return SvgFigure(width, height, matrix.title, svg);
+}
+
+}  // namespace mbv

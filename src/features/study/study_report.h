@@ -1,0 +1,73 @@
+// What a study found, and its writers.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "features/study/summary.h"
+#include "features/study/validation.h"
+
+namespace mbv {
+
+/// A drive's force over time: percentiles of all points, beside the nominal curve.
+struct StudyBand {
+  std::string drive, unit;
+  std::vector<double> time_s, nominal, p5, p50, p95;
+  std::uint64_t points = 0, left_out = 0;  ///< with forces at the nominal times, and without
+};
+
+struct StudyReport {
+  Study study;
+  std::vector<double> nominal;    ///< per quantity
+  std::vector<std::string> idle;  ///< varied numbers that move no quantity
+  StudySummary summary;
+  std::vector<StudyBand> bands;
+  std::optional<StudyValidationResult> validation;
+  std::vector<PointRow> shown;  ///< evenly chosen, at most kMostShown: for the scatter matrix
+  /// What runs a point's scenario, to be typed: per quantity, as its worst points; and of failures.
+  std::vector<std::vector<std::string>> worst_commands;
+  std::vector<std::string> failed_commands, disagreed_commands;
+  std::vector<std::pair<std::string, std::string>> versions;
+
+  /// Whether anything is asked of the points.
+  [[nodiscard]] bool judged() const {
+    return !study.limits.empty() || validation || study.missing || study.witnesses.size() > 1;
+  }
+  /// 0 limits are kept (or there are none), 1 one is not, 3 no point has values, or nothing could
+  /// be validated.
+  [[nodiscard]] int exit_code() const {
+    if (!summary.any_value() || (validation && !validation->trouble.empty())) return 3;
+    return summary.within_limits() && (!validation || validation->pass()) ? 0 : 1;
+  }
+};
+inline constexpr std::uint64_t kMostShown = 800;
+
+/// For a terminal.
+[[nodiscard]] std::string ToText(const StudyReport& report);
+/// summary.json, schema "mbverify.study_summary/1".
+[[nodiscard]] std::string ToJson(const StudyReport& report);
+/// report.html.
+[[nodiscard]] std::string ToHtml(const StudyReport& report);
+
+}  // namespace mbv
+
+// Words that a study's terminal text and page share. Internal to report/.
+
+namespace mbv::internal {
+
+/// "1024 points by sobol, 3 of them without a result".
+[[nodiscard]] std::string PointsText(const StudyReport& report);
+/// "limb1.drive.force.max < 1200".
+[[nodiscard]] std::string LimitText(const StudyReport& report, const LimitResult& result);
+/// "31 of 1024 points violate it (3.03 %; 95 % interval 2.07 … 4.27 %), 0 % may".
+[[nodiscard]] std::string ShareText(const LimitResult& result);
+/// "3 of 1024 points have no result (0.293 %), 5 % may"; of a study that says how many may.
+[[nodiscard]] std::string MissingText(const StudyReport& report);
+/// "witnesses disagree at 2 of 1024 points"; of a study with several witnesses.
+[[nodiscard]] std::string DisagreedText(const StudyReport& report);
+/// The key of the design in study files.
+[[nodiscard]] const char* DesignWord(DesignKind kind);
+
+}  // namespace mbv::internal

@@ -1,0 +1,399 @@
+#include "math/sparse.h"
+
+#include <suitesparse/klu.h>
+#include <Eigen/OrderingMethods>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "base/demand.h"
+
+namespace mbv {
+namespace {
+
+// A pivot may be this much smaller than the largest entry of its column.
+constexpr double kPivotTolerance = 0.1;
+// Pivots chosen for another matrix serve while none is smaller by this than it was there: with 1e-3
+// the inverse dynamics of a SCARA robot's pick and place loses two digits.
+constexpr double kSmaller = 0.1;
+
+// Sign of a permutation, by its cycles.
+int SignOf(const int* to, int n, std::vector<char>* seen) {
+  seen->assign(static_cast<size_t>(n), 0);
+  int sign = 1;
+  for (int i = 0; i < n; ++i) {
+    for (int j = i; !(*seen)[static_cast<size_t>(j)]; j = to[j]) {
+      (*seen)[static_cast<size_t>(j)] = 1;
+      if (to[j] != i) sign = -sign;
+    }
+  }
+  return sign;
+}
+
+}  // namespace
+
+// KLU takes pointers to what it does not change without const.
+struct SparseLu::Factors {
+  Factors() {
+    klu_defaults(&common);
+    common.tol = kPivotTolerance;
+    common.scale = -1;  // rows and columns come in units that suit them
+  }
+  ~Factors() { Clear(); }
+  Factors(const Factors&) = delete;
+  Factors& operator=(const Factors&) = delete;
+
+  void Clear() {
+    if (numeric != nullptr) klu_free_numeric(&numeric, &common);
+    if (symbolic != nullptr) klu_free_symbolic(&symbolic, &common);
+  }
+  [[nodiscard]] bool FactorAnew(int* columns, int* rows, double* values) {
+    if (numeric != nullptr) klu_free_numeric(&numeric, &common);
+    numeric = klu_factor(columns, rows, values, symbolic, &common);
+    if (numeric == nullptr) return false;
+    sign = SignOf(numeric->Pnum, n, &seen) * SignOf(symbolic->Q, n, &seen);
+    chosen = Eigen::Map<const VecX>(pivots(), n).cwiseAbs();
+    return true;
+  }
+  [[nodiscard]] bool FactorAgain(int* columns, int* rows, double* values) {
+    if (numeric == nullptr) return false;
+    if (klu_refactor(columns, rows, values, symbolic, numeric, &common) == 0) return false;
+    for (int k = 0; k < n; ++k) {
+      if (!(std::abs(pivots()[k]) > kSmaller * chosen[k])) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] bool IsRegular() const {
+    for (int k = 0; k < n; ++k) {
+      if (pivots()[k] == 0.0 || !std::isfinite(pivots()[k])) return false;
+    }
+    return true;
+  }
+  [[nodiscard]] const double* pivots() const { return static_cast<double*>(numeric->Udiag); }
+
+  klu_common common{};
+  klu_symbolic* symbolic = nullptr;
+  klu_numeric* numeric = nullptr;
+  int n = 0, sign = 1;  // sign: of both permutations
+  VecX chosen;          // sizes of the pivots when they were chosen
+  std::vector<char> seen;
+};
+
+SparseLu::SparseLu() : factors_(std::make_unique<Factors>()) {}
+SparseLu::~SparseLu() = default;
+SparseLu::SparseLu(SparseLu&&) noexcept = default;
+SparseLu& SparseLu::operator=(SparseLu&&) noexcept = default;
+
+void SparseLu::Reset() { factors_->Clear(); }
+
+bool SparseLu::Factor(const Matrix& A) {
+  MBV_DEMAND(A.rows() == A.cols() && A.isCompressed(), A.rows());
+  Factors& f = *factors_;
+  auto* columns = const_cast<int*>(A.outerIndexPtr());
+  auto* rows = const_cast<int*>(A.innerIndexPtr());
+  auto* values = const_cast<double*>(A.valuePtr());
+  if (f.symbolic == nullptr) {
+    f.n = static_cast<int>(A.cols());
+    if (f.n == 0) return true;
+    f.symbolic = klu_analyze(f.n, columns, rows, &f.common);
+    if (f.symbolic == nullptr) return false;
+  }
+  MBV_DEMAND(f.n == A.cols(), A.cols());
+  if (f.FactorAgain(columns, rows, values)) return f.IsRegular();
+  return f.FactorAnew(columns, rows, values) && f.IsRegular();
+}
+
+int SparseLu::determinant_sign() const {
+  int sign = factors_->sign;
+  if (factors_->numeric == nullptr) return sign;
+  for (int k = 0; k < factors_->n; ++k) {
+    if (factors_->pivots()[k] < 0.0) sign = -sign;
+  }
+  return sign;
+}
+
+double SparseLu::PivotRatio() const {
+  if (factors_->n == 0) return 1.0;
+  MBV_DEMAND(factors_->numeric != nullptr, factors_->n);
+  const auto sizes = Eigen::Map<const VecX>(factors_->pivots(), factors_->n).cwiseAbs();
+  return sizes.minCoeff() / sizes.maxCoeff();
+}
+
+void SparseLu::Solve(VecX* b) const {
+  Factors& f = *factors_;
+  if (f.n == 0) return;
+  MBV_DEMAND(f.numeric != nullptr && b->size() == f.n, b->size());
+  klu_solve(f.symbolic, f.numeric, f.n, 1, b->data(), &f.common);
+}
+
+void SparseLu::SolveTransposed(VecX* b) const {
+  Factors& f = *factors_;
+  if (f.n == 0) return;
+  MBV_DEMAND(f.numeric != nullptr && b->size() == f.n, b->size());
+  klu_tsolve(f.symbolic, f.numeric, f.n, 1, b->data(), &f.common);
+}
+
+namespace {
+
+// How far the estimated smallest singular value must be above the tolerance.
+constexpr double kClear = 100.0;
+// Inverse iterations that estimate a singular value.
+constexpr int kIterations = 6;
+
+double LongestColumn(const SparseRank::Matrix& A) {
+  double longest = 0.0;
+  for (int c = 0; c < A.cols(); ++c) longest = std::max(longest, A.col(c).norm());
+  return longest;
+}
+
+// Sums of two sparse rows, (c x + s y, −s x + c y).
+template <typename Row>
+std::pair<Row, Row> Rotated(const Row& x, const Row& y, double c, double s) {
+  std::pair<Row, Row> out;
+  out.first.reserve(x.size() + y.size());
+  out.second.reserve(x.size() + y.size());
+  auto a = x.begin();
+  auto b = y.begin();
+  while (a != x.end() || b != y.end()) {
+    const bool in_x = a != x.end() && (b == y.end() || a->first <= b->first);
+    const bool in_y = b != y.end() && (a == x.end() || b->first <= a->first);
+    const int at = in_x ? a->first : b->first;
+    const double from_x = in_x ? (a++)->second : 0.0, from_y = in_y ? (b++)->second : 0.0;
+    out.first.emplace_back(at, c * from_x + s * from_y);
+    out.second.emplace_back(at, c * from_y - s * from_x);
+  }
+  out.second.erase(out.second.begin());  // rotated away
+  return out;
+}
+
+}  // namespace
+
+SparseRank::SparseRank(const Matrix& A, double tolerance) {
+  limit_ = tolerance * LongestColumn(A);
+  Order(A);
+  R_.resize(order_.size());
+  std::vector<int> place(order_.size());
+  for (size_t k = 0; k < order_.size(); ++k)
+    place[static_cast<size_t>(order_[k])] = static_cast<int>(k);
+  const Eigen::SparseMatrix<double, Eigen::RowMajor> by_rows = A;
+  std::vector<Row> rows;
+  for (int i = 0; i < by_rows.rows(); ++i) {
+    Row row;
+    for (Eigen::SparseMatrix<double, Eigen::RowMajor>::InnerIterator entry(by_rows, i); entry;
+         ++entry) {
+      row.emplace_back(place[static_cast<size_t>(entry.col())], entry.value());
+    }
+    std::sort(row.begin(), row.end());
+    if (!row.empty()) rows.push_back(std::move(row));
+  }
+  // Rows that reach least far to the right first: what is rotated stays short.
+  std::stable_sort(rows.begin(), rows.end(),
+                   [](const Row& a, const Row& b) { return a.back().first < b.back().first; });
+  for (Row& row : rows) Eliminate(std::move(row));
+  for (size_t place = 0; place < R_.size(); ++place) {
+    (R_[place].empty() ? dropped_ : kept_).push_back(static_cast<int>(place));
+  }
+  Arrange();
+}
+
+void SparseRank::Order(const Matrix& A) {
+  order_.resize(static_cast<size_t>(A.cols()));
+  if (A.cols() == 0) return;
+  const Matrix pattern = Matrix(A.transpose()) * A;
+  Eigen::PermutationMatrix<Eigen::Dynamic, Eigen::Dynamic, int> permutation;
+  Eigen::AMDOrdering<int>()(pattern, permutation);
+  for (Eigen::Index k = 0; k < A.cols(); ++k) {
+    order_[static_cast<size_t>(k)] = permutation.indices()[k];
+  }
+}
+
+// Rotates the row into R until nothing is left of it. Pivots only grow.
+void SparseRank::Eliminate(Row row) {
+  while (!row.empty()) {
+    const auto [place, entry] = row.front();
+    if (std::abs(entry) <= limit_) {
+      dropped_norm_ = std::hypot(dropped_norm_, entry);
+      row.erase(row.begin());
+      continue;
+    }
+    Row& pivot = R_[static_cast<size_t>(place)];
+    if (pivot.empty()) {
+      pivot = std::move(row);
+      return;
+    }
+    const double r = std::hypot(pivot.front().second, entry);
+    auto [rotated, rest] = Rotated(pivot, row, pivot.front().second / r, entry / r);
+    pivot = std::move(rotated);
+    row = std::move(rest);
+  }
+}
+
+void SparseRank::Arrange() {
+  std::vector<int> within(R_.size(), -1);  // the place among those kept, or those dropped
+  for (size_t k = 0; k < kept_.size(); ++k)
+    within[static_cast<size_t>(kept_[k])] = static_cast<int>(k);
+  for (size_t k = 0; k < dropped_.size(); ++k)
+    within[static_cast<size_t>(dropped_[k])] = static_cast<int>(k);
+  std::vector<Eigen::Triplet<double>> square, rest;
+  for (size_t k = 0; k < kept_.size(); ++k) {
+    const Row& row = R_[static_cast<size_t>(kept_[k])];
+    for (const auto& [place, entry] : row) {
+      const bool is_kept = !R_[static_cast<size_t>(place)].empty();
+      (is_kept ? square : rest)
+          .emplace_back(static_cast<int>(k), within[static_cast<size_t>(place)], entry);
+    }
+  }
+  const auto n = static_cast<Eigen::Index>(kept_.size());
+  R_kept_.resize(n, n);
+  R_kept_.setFromTriplets(square.begin(), square.end());
+  R_dropped_.resize(n, static_cast<Eigen::Index>(dropped_.size()));
+  R_dropped_.setFromTriplets(rest.begin(), rest.end());
+  R_.clear();
+  smallest_kept_ = SmallestSingularValue();
+  clear_ = dropped_norm_ <= limit_ && (n == 0 || smallest_kept_ > kClear * limit_);
+}
+
+std::vector<int> SparseRank::Independent() const {
+  std::vector<int> columns;
+  for (const int place : kept_) columns.push_back(order_[static_cast<size_t>(place)]);
+  std::sort(columns.begin(), columns.end());
+  return columns;
+}
+
+double SparseRank::SmallestSingularValue() const {
+  VecX x(R_kept_.cols());
+  for (Eigen::Index i = 0; i < x.size(); ++i) {
+    x[i] = 1.0 + 0.5 * std::sin(1.7 * static_cast<double>(i));  // a share in every direction
+  }
+  double sigma = 0.0;
+  for (int i = 0; i < kIterations; ++i) {
+    x.normalize();
+    R_kept_.triangularView<Eigen::Upper>().solveInPlace(x);
+    R_kept_.transpose().triangularView<Eigen::Lower>().solveInPlace(x);
+    sigma = 1.0 / std::sqrt(x.norm());
+  }
+  return std::isfinite(sigma) ? sigma : 0.0;
+}
+
+MatX SparseRank::NullSpace() const {
+  MatX N = MatX::Zero(static_cast<Eigen::Index>(order_.size()),
+                      static_cast<Eigen::Index>(dropped_.size()));
+  for (size_t k = 0; k < dropped_.size(); ++k) {
+    const auto column = static_cast<Eigen::Index>(k);
+    VecX balance = -VecX(R_dropped_.col(column));
+    R_kept_.triangularView<Eigen::Upper>().solveInPlace(balance);
+    for (size_t i = 0; i < kept_.size(); ++i) {
+      N(order_[static_cast<size_t>(kept_[i])], column) = balance[static_cast<Eigen::Index>(i)];
+    }
+    N(order_[static_cast<size_t>(dropped_[k])], column) = 1.0;
+    N.col(column).normalize();
+  }
+  return N;
+}
+
+namespace {
+
+// Weight of the norm: about the smallest singular value of A, for which the condition of the whole
+// is A's [Björck 1996, §2.5.2].
+constexpr double kNormWeight = 0.05;
+
+// Index of an entry of a compressed matrix that is there.
+int PlaceOf(const SparseLu::Matrix& matrix, Eigen::Index row, Eigen::Index column) {
+  const int* first = matrix.innerIndexPtr() + matrix.outerIndexPtr()[column];
+  const int* last = matrix.innerIndexPtr() + matrix.outerIndexPtr()[column + 1];
+  return static_cast<int>(std::lower_bound(first, last, row) - matrix.innerIndexPtr());
+}
+
+template <typename Visit>
+void ForEntries(const SparseLu::Matrix& matrix, const Visit& visit) {
+  for (Eigen::Index c = 0; c < matrix.cols(); ++c) {
+    for (SparseLu::Matrix::InnerIterator entry(matrix, c); entry; ++entry) visit(entry.row(), c);
+  }
+}
+
+}  // namespace
+
+void SparseSaddle::Reset() {
+  K_.resize(0, 0);
+  lu_.Reset();
+}
+
+void SparseSaddle::MakePattern(const Matrix& W, const Matrix& B_transposed) {
+  const Eigen::Index n = W.cols(), size = n + B_transposed.cols();
+  std::vector<Eigen::Triplet<double>> entries;
+  ForEntries(W, [&](auto r, auto c) { entries.emplace_back(r, c, 0.0); });
+  ForEntries(B_transposed, [&](auto r, auto c) {
+    entries.emplace_back(r, n + c, 0.0);
+    entries.emplace_back(n + c, r, 0.0);
+  });
+  K_.resize(size, size);
+  K_.setFromTriplets(entries.begin(), entries.end());
+  K_.makeCompressed();
+  of_W_.clear();
+  in_rows_.clear();
+  in_columns_.clear();
+  ForEntries(W, [&](auto r, auto c) { of_W_.push_back(PlaceOf(K_, r, c)); });
+  ForEntries(B_transposed, [&](auto r, auto c) {
+    in_columns_.push_back(PlaceOf(K_, n + c, r));
+    in_rows_.push_back(PlaceOf(K_, r, n + c));
+  });
+}
+
+bool SparseSaddle::Factor(const Matrix& W, const Matrix& B_transposed, double tolerance) {
+  if (K_.cols() == 0) MakePattern(W, B_transposed);
+  double* values = K_.valuePtr();
+  for (size_t k = 0; k < of_W_.size(); ++k) values[of_W_[k]] = W.valuePtr()[k];
+  for (size_t k = 0; k < in_rows_.size(); ++k) {
+    values[in_columns_[k]] = B_transposed.valuePtr()[k];
+    values[in_rows_[k]] = -B_transposed.valuePtr()[k];
+  }
+  return lu_.Factor(K_) && lu_.PivotRatio() > tolerance;
+}
+
+void SparseSaddle::Solve(const VecX& c, const VecX& b, VecX* x, VecX* y, int refinements) const {
+  right_.resize(K_.cols());
+  right_ << c, b;
+  both_ = right_;
+  lu_.Solve(&both_);
+  for (int i = 0; i < refinements; ++i) {
+    rest_ = right_;
+    rest_.noalias() -= K_ * both_;
+    lu_.Solve(&rest_);
+    both_ += rest_;
+  }
+  *x = both_.head(c.size());
+  *y = both_.tail(b.size());
+}
+
+void SparseLeastNorm::MakePattern(const SparseLu::Matrix& A) {
+  weight_.resize(A.cols(), A.cols());
+  weight_.setIdentity();
+  weight_ *= kNormWeight;
+  zero_cols_.setZero(A.cols());
+  zero_rows_.setZero(A.rows());
+  SparseLu::Matrix places = A;
+  for (int k = 0; k < A.nonZeros(); ++k) places.valuePtr()[k] = k;
+  A_ = places.transpose();
+  from_.assign(A_.valuePtr(), A_.valuePtr() + A_.nonZeros());
+}
+
+bool SparseLeastNorm::Factor(const SparseLu::Matrix& A, double tolerance) {
+  if (weight_.cols() != A.cols() || A_.nonZeros() != A.nonZeros()) MakePattern(A);
+  double* values = A_.valuePtr();
+  for (const int from : from_) *values++ = A.valuePtr()[from];
+  return saddle_.Factor(weight_, A_, tolerance);
+}
+
+VecX SparseLeastNorm::LeastNorm(const VecX& b) const {
+  VecX x;
+  saddle_.Solve(zero_cols_, b, &x, &y_);
+  return x;
+}
+
+VecX SparseLeastNorm::LeastSquares(const VecX& c, int refinements) const {
+  VecX y;
+  saddle_.Solve(c, zero_rows_, &x_, &y, refinements);
+  return -y;
+}
+
+}  // namespace mbv

@@ -1,0 +1,81 @@
+// Skew matrices, adjoints and rotations: the basic screw algebra every layer may use.
+// [Murray, Li, Sastry 1994, ch. 2], with the rotation first in twists and the moment first in
+// wrenches.
+#pragma once
+
+#include <cmath>
+
+#include "base/types.h"
+
+namespace mbv {
+
+/// [v]×, so that Skew(v) * x = v × x.
+inline Mat3 Skew(const Vec3& v) {
+  Mat3 S;
+  S << 0, -v.z(), v.y(), v.z(), 0, -v.x(), -v.y(), v.x(), 0;
+  return S;
+}
+
+/// Ad(R, p) = [R 0; [p]×R R] (6×6): a twist about B's origin in B to one about A's origin in A.
+inline Mat6 Adjoint(const Pose& X_AB) {
+  Mat6 Ad;
+  const Mat3 R = X_AB.linear();
+  Ad << R, Mat3::Zero(), Skew(X_AB.translation()) * R, R;
+  return Ad;
+}
+
+/// ad(V) = [[ω]× 0; [v]× [ω]×] (6×6): the Lie bracket [V1, V2] = ad(V1) V2.
+inline Mat6 LieBracket(const Vec6& V) {
+  Mat6 ad;
+  const Mat3 W = Skew(V.head<3>());
+  ad << W, Mat3::Zero(), Skew(V.tail<3>()), W;
+  return ad;
+}
+
+/// Spatial inertia about the frame origin (6×6, rotation first), for mass m [kg], centre of mass
+/// c [m] and rotational inertia I_cm [kg m²] about the centre of mass, all in the frame's axes.
+inline Mat6 SpatialInertia(double m, const Vec3& c, const Mat3& I_cm) {
+  Mat6 N;
+  const Mat3 C = Skew(c);
+  N << I_cm - m * C * C, m * C, -m * C, m * Mat3::Identity();
+  return N;
+}
+
+/// The wrench F about point P, moved to act about point Q: m_Q = m_P + p_QP × f.
+inline Vec6 ShiftWrench(const Vec6& F_P, const Vec3& p_QP) {
+  Vec6 F_Q = F_P;
+  F_Q.head<3>() += p_QP.cross(F_P.tail<3>());
+  return F_Q;
+}
+
+inline Mat3 RotX(double a) { return Eigen::AngleAxisd(a, Vec3::UnitX()).toRotationMatrix(); }
+inline Mat3 RotY(double a) { return Eigen::AngleAxisd(a, Vec3::UnitY()).toRotationMatrix(); }
+inline Mat3 RotZ(double a) { return Eigen::AngleAxisd(a, Vec3::UnitZ()).toRotationMatrix(); }
+
+/// Rz(yaw) Ry(pitch) Rx(roll), the URDF convention.
+inline Mat3 RotRpy(const Vec3& rpy) { return RotZ(rpy.z()) * RotY(rpy.y()) * RotX(rpy.x()); }
+
+/// Roll, pitch, yaw of R = Rz Ry Rx, pitch in [-π/2, π/2]. At pitch = ±π/2 roll and yaw are not
+/// unique; they are then one of the pairs that reproduce R.
+inline Vec3 RpyOf(const Mat3& R) {
+  const double yaw = std::atan2(R(1, 0), R(0, 0));
+  const double c = std::cos(yaw), s = std::sin(yaw);
+  // Rz(-yaw) R = Ry Rx holds whatever yaw came from rounding.
+  return {std::atan2(s * R(0, 2) - c * R(1, 2), c * R(1, 1) - s * R(0, 1)),
+          std::atan2(-R(2, 0), c * R(0, 0) + s * R(1, 0)), yaw};
+}
+
+/// Rotation vector log(R) [rad], |log| in [0, π].
+inline Vec3 LogRotation(const Mat3& R) {
+  const Eigen::AngleAxisd aa(R);
+  return aa.angle() * aa.axis();
+}
+
+/// exp of a rotation vector [rad].
+inline Mat3 ExpRotation(const Vec3& r) {
+  const double angle = r.norm();
+  if (angle < 1e-12) return Mat3::Identity() + Skew(r);
+  return Eigen::AngleAxisd(angle, r / angle).toRotationMatrix();
+}
+
+}  // namespace mbv

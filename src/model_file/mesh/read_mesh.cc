@@ -1,0 +1,404 @@
+#include "model_file/mesh/read_mesh.h"
+
+#include <assimp/config.h>
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+#include <fmt/format.h>
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <charconv>
+#include <cmath>
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <string_view>
+
+#include "base/files.h"
+#include "base/inputs.h"
+#include "base/worker_pool.h"
+#include "math/bytes.h"
+#include "model_file/mesh/mass_properties.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<MeshPackage>& Packages() {
+  static std::vector<MeshPackage> packages;
+  return packages;
+}
+
+// The folders that an environment variable lists.
+std::vector<fs::path> Listed(const char* variable) {
+  std::vector<fs::path> folders;
+  const char* text = std::getenv(variable);
+  std::istringstream stream(text == nullptr ? "" : text);
+  for (std::string folder; std::getline(stream, folder, ':');) {
+    if (!folder.empty()) folders.emplace_back(folder);
+  }
+  return folders;
+}
+
+std::vector<fs::path> AmentShares() {
+  std::vector<fs::path> shares;
+  for (const fs::path& prefix : Listed("AMENT_PREFIX_PATH")) shares.push_back(prefix / "share");
+  return shares;
+}
+
+bool LiesBelow(const fs::path& folder, const fs::path& file) {
+  std::error_code error;
+  const fs::path base = fs::weakly_canonical(folder.empty() ? "." : folder, error);
+  if (error) return false;
+  const fs::path inside = fs::weakly_canonical(file, error).lexically_relative(base);
+  return !error && !inside.empty() && *inside.begin() != ".." && inside != ".";
+}
+
+// Where PACKAGE/REST may be.
+std::vector<fs::path> InPackage(const std::string& package, const fs::path& rest,
+                                const fs::path& folder) {
+  if (package.empty()) return {folder / rest};
+  std::vector<fs::path> paths;
+  for (const MeshPackage& given : Packages()) {
+    if (given.name == package) paths.push_back(given.folder / rest);
+  }
+  for (const fs::path& listed : Listed("ROS_PACKAGE_PATH")) {
+    if (listed.filename() == package) paths.push_back(listed / rest);
+    paths.push_back(listed / package / rest);
+  }
+  for (const fs::path& share : AmentShares()) paths.push_back(share / package / rest);
+  paths.push_back(folder / package / rest);
+  return paths;
+}
+
+// What people name as FOLDER/… or SCHEME://NAME/….
+std::vector<fs::path> Candidates(const std::string& name, const fs::path& folder) {
+  for (const char* scheme : {"package://", "model://"}) {
+    if (!name.starts_with(scheme)) continue;
+    const std::string path = name.substr(std::string(scheme).size());
+    const size_t slash = path.find('/');
+    if (slash == std::string::npos) return {};
+    return InPackage(path.substr(0, slash), fs::path(path.substr(slash + 1)).relative_path(),
+                     folder);
+  }
+  const std::string file = "file://";
+  return {folder / (name.starts_with(file) ? name.substr(file.size()) : name)};
+}
+
+}  // namespace
+
+void UseMeshPackages(std::vector<MeshPackage> packages) { Packages() = std::move(packages); }
+
+const std::vector<MeshPackage>& MeshPackages() { return Packages(); }
+
+FoundMesh FindMesh(const std::string& name, const fs::path& folder) {
+  std::vector<fs::path> open = {folder};
+  for (const MeshPackage& package : Packages()) open.push_back(package.folder);
+  for (const fs::path& listed : Listed("ROS_PACKAGE_PATH")) open.push_back(listed);
+  for (const fs::path& share : AmentShares()) open.push_back(share);
+  bool outside = false;
+  for (const fs::path& path : Candidates(name, folder)) {
+    std::error_code error;
+    if (!fs::is_regular_file(path, error)) continue;
+    for (const fs::path& allowed : open) {
+      if (LiesBelow(allowed, path)) return {path.lexically_normal(), "", false};
+    }
+    outside = true;
+  }
+  return {{}, outside ? "lies outside the folder of the file" : "is not there", outside};
+}
+
+std::string PathSeenFrom(const fs::path& folder, const fs::path& file) {
+  std::error_code error;
+  const fs::path base = fs::absolute(folder.empty() ? "." : folder, error).lexically_normal();
+  const fs::path path = fs::absolute(file, error).lexically_normal();
+  const fs::path inside = path.lexically_relative(base);
+  return inside.empty() || *inside.begin() == ".." ? path.string() : inside.string();
+}
+
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<MeshText>& mesh) {
+  visit(mesh.surface.vertices), visit(mesh.surface.triangles), visit(mesh.trouble);
+}
+
+namespace {
+
+constexpr size_t kMostBytes = 256UL << 20;
+constexpr size_t kMostBytesOfAnswer = 60'000'000;  // what a child may answer
+constexpr const char* kNothing = "it gave nothing";
+constexpr double kReadTimeout_s = 60.0;
+constexpr size_t kMostKnown = 500;  // surfaces
+
+std::string Lower(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return text;
+}
+
+// Adds the meshes of a node and of those below it.
+void AddNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& above,
+             TriangleMesh* surface) {
+  const aiMatrix4x4 X = above * node.mTransformation;
+  for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+    const aiMesh& part = *scene.mMeshes[node.mMeshes[i]];
+    const int first = static_cast<int>(surface->vertices.size());
+    for (unsigned v = 0; v < part.mNumVertices; ++v) {
+      const aiVector3D p = X * part.mVertices[v];
+      surface->vertices.emplace_back(p.x, p.y, p.z);
+    }
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+      const aiFace& face = part.mFaces[f];
+      if (face.mNumIndices != 3) continue;  // points and lines
+      std::array<int, 3> triangle{};
+      for (int k = 0; k < 3; ++k) triangle[k] = first + static_cast<int>(face.mIndices[k]);
+      if (X.Determinant() < 0.0F) std::swap(triangle[1], triangle[2]);
+      surface->triangles.push_back(triangle);
+    }
+  }
+  for (unsigned i = 0; i < node.mNumChildren; ++i) {
+    AddNode(scene, *node.mChildren[i], X, surface);
+  }
+}
+
+// Of a PLY file, whose header promises counts: what follows must hold them, or reading takes the
+// time that was promised. "" if it does, or is no PLY file.
+class PlyCheck {
+ public:
+  explicit PlyCheck(const std::string& bytes) : bytes_(bytes) {}
+
+  std::string Run() {
+    if (!bytes_.starts_with("ply") || !ReadHeader()) return "";  // the library's to say
+    for (const Element& element : elements_) {
+      if (element.count > 0 && element.properties.empty()) {
+        return fmt::format("its {} {} have no property", element.count, element.name);
+      }
+      for (unsigned long long i = 0; i < element.count; ++i) {
+        for (const Property& property : element.properties) {
+          if (!Skip(property)) {
+            return fmt::format("its header promises {} {}, and it ends in the {}th", element.count,
+                               element.name, i + 1);
+          }
+        }
+      }
+    }
+    return "";
+  }
+
+ private:
+  struct Property {
+    size_t bytes = 0, count_bytes = 0;  // count_bytes: of a list
+  };
+  struct Element {
+    std::string name;
+    unsigned long long count = 0;
+    std::vector<Property> properties;
+  };
+
+  static size_t BytesOf(const std::string& type) {
+    constexpr std::pair<std::string_view, size_t> kTypes[] = {
+        {"char", 1},  {"uchar", 1},   {"int8", 1},   {"uint8", 1},  {"short", 2}, {"ushort", 2},
+        {"int16", 2}, {"uint16", 2},  {"int", 4},    {"uint", 4},   {"int32", 4}, {"uint32", 4},
+        {"float", 4}, {"float32", 4}, {"double", 8}, {"float64", 8}};
+    for (const auto& [name, bytes] : kTypes) {
+      if (type == name) return bytes;
+    }
+    return 0;
+  }
+
+  bool ReadHeader() {
+    for (std::string line; NextLine(&line);) {
+      std::istringstream words(line);
+      std::string word, type, more;
+      words >> word;
+      if (word == "end_header") return true;
+      if (word == "format") {
+        words >> type;
+        ascii_ = type == "ascii";
+        big_ = type == "binary_big_endian";
+      } else if (word == "element") {
+        Element element;
+        if (!(words >> element.name >> element.count)) return false;
+        elements_.push_back(element);
+      } else if (word == "property" && !elements_.empty()) {
+        words >> type;
+        Property property{.bytes = BytesOf(type)};
+        if (type == "list") {
+          words >> type >> more;
+          property = {.bytes = BytesOf(more), .count_bytes = BytesOf(type)};
+          if (property.count_bytes == 0) return false;
+        }
+        if (property.bytes == 0) return false;
+        elements_.back().properties.push_back(property);
+      }
+    }
+    return false;
+  }
+
+  bool NextLine(std::string* line) {
+    if (at_ >= bytes_.size()) return false;
+    const size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+    *line = bytes_.substr(at_, end - at_);
+    at_ = end + 1;
+    return true;
+  }
+
+  bool Skip(const Property& property) {
+    if (ascii_) {
+      unsigned long long count = 1;
+      if (property.count_bytes > 0) {
+        const std::string_view text = NextWord();
+        if (text.empty() ||
+            std::from_chars(text.data(), text.data() + text.size(), count).ec != std::errc()) {
+          return false;
+        }
+      }
+      for (unsigned long long i = 0; i < count; ++i) {
+        if (NextWord().empty()) return false;
+      }
+      return true;
+    }
+    unsigned long long count = 1;
+    if (property.count_bytes > 0) {
+      if (at_ > bytes_.size() || property.count_bytes > bytes_.size() - at_) return false;
+      count = 0;
+      for (size_t k = 0; k < property.count_bytes; ++k) {
+        const auto byte = static_cast<unsigned char>(bytes_[at_ + k]);
+        count |= static_cast<unsigned long long>(byte)
+                 << (8 * (big_ ? property.count_bytes - 1 - k : k));
+      }
+      at_ += property.count_bytes;
+    }
+    if (at_ > bytes_.size() || count > (bytes_.size() - at_) / property.bytes) return false;
+    at_ += static_cast<size_t>(count) * property.bytes;
+    return true;
+  }
+
+  std::string_view NextWord() {
+    constexpr const char* kSpace = " \t\r\n";
+    const size_t from = bytes_.find_first_not_of(kSpace, at_);
+    if (from == std::string::npos) return {};
+    at_ = std::min(bytes_.find_first_of(kSpace, from), bytes_.size());
+    return std::string_view(bytes_).substr(from, at_ - from);
+  }
+
+  const std::string& bytes_;
+  size_t at_ = 0;
+  bool ascii_ = true, big_ = false;
+  std::vector<Element> elements_;
+};
+
+// Of counts that a DAE file states of its arrays and primitives, one that the file cannot hold: a
+// number and a space are two bytes.
+std::string DaeTrouble(const std::string& bytes) {
+  constexpr std::string_view kCount = "count=";
+  for (size_t at = bytes.find(kCount); at != std::string::npos; at = bytes.find(kCount, at + 1)) {
+    const char* from = bytes.data() + std::min(at + kCount.size() + 1, bytes.size());
+    unsigned long long count = 0;
+    const auto [end, error] = std::from_chars(from, bytes.data() + bytes.size(), count);
+    if (error == std::errc::result_out_of_range || count > bytes.size()) {
+      return "it states a count of " + std::string(from, end) + ", more than it can hold";
+    }
+  }
+  return "";
+}
+
+// What a child answers.
+std::string Answer(MeshText mesh) {
+  std::string bytes = ToBytes(mesh);
+  if (bytes.size() <= kMostBytesOfAnswer) return bytes;
+  const size_t triangles = mesh.surface.triangles.size();
+  return ToBytes(MeshText{{}, fmt::format("its {} triangles are too many", triangles)});
+}
+
+// Surfaces of this process by content and ending of their files.
+std::map<std::string, MeshFile>& Known() {
+  thread_local std::map<std::string, MeshFile> known;
+  if (known.size() > kMostKnown) known.clear();
+  return known;
+}
+
+}  // namespace
+
+bool IsMeshFile(const std::filesystem::path& file) {
+  const std::string extension = Lower(file.extension().string());
+  return extension == ".stl" || extension == ".obj" || extension == ".dae" || extension == ".ply";
+}
+
+MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
+  MeshText mesh;
+  const std::string kind = Lower(extension);
+  // The library itself compares the counts of STL, and OBJ has none.
+  mesh.trouble = kind == ".ply" ? PlyCheck(bytes).Run() : kind == ".dae" ? DaeTrouble(bytes) : "";
+  if (!mesh.trouble.empty()) return mesh;
+  Assimp::Importer importer;
+  importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
+  importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
+                              aiPrimitiveType_POINT | aiPrimitiveType_LINE);
+  const std::string hint = Lower(extension).substr(extension.starts_with('.') ? 1 : 0);
+  const aiScene* scene =
+      importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_Triangulate, hint.c_str());
+  if (scene == nullptr || scene->mRootNode == nullptr) {
+    mesh.trouble = importer.GetErrorString();
+    if (mesh.trouble.empty()) mesh.trouble = "it holds no mesh";
+    return mesh;
+  }
+  AddNode(*scene, *scene->mRootNode, aiMatrix4x4(), &mesh.surface);
+  const bool finite = std::all_of(mesh.surface.vertices.begin(), mesh.surface.vertices.end(),
+                                  [](const Vec3& p) { return p.allFinite(); });
+  mesh.surface = Welded(mesh.surface, 0.0);
+  if (!finite) mesh.trouble = "a vertex is not finite";
+  if (finite && mesh.surface.triangles.empty()) mesh.trouble = "it holds no triangle";
+  return mesh;
+}
+
+std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& files) {
+  std::vector<MeshFile> result(files.size());
+  std::vector<std::string> contents, keys(files.size()), endings;
+  std::vector<std::string> unknown;  // keys
+  for (size_t i = 0; i < files.size(); ++i) {
+    auto bytes = ReadWholeFile(files[i]);
+    if (!bytes || bytes->size() > kMostBytes) {
+      result[i].trouble = bytes ? "it is larger than 256 MB" : "it cannot be read";
+      continue;
+    }
+    NoteInput(files[i].string(), *bytes);
+    const std::string ending = Lower(files[i].extension().string());
+    keys[i] = ending + ContentFingerprint(*bytes);
+    if (Known().contains(keys[i])) continue;
+    if (std::find(unknown.begin(), unknown.end(), keys[i]) != unknown.end()) continue;
+    unknown.push_back(keys[i]);
+    endings.push_back(ending);
+    contents.push_back(std::move(*bytes));
+  }
+  const auto answers = InChildren(unknown.size(), kReadTimeout_s, [&](size_t k) {
+    return Answer(ReadMeshBytes(contents[k], endings[k]));
+  });
+  for (size_t k = 0; k < unknown.size(); ++k) {
+    MeshText read =
+        answers[k] ? FromBytes<MeshText>(*answers[k]).value_or(MeshText{{}, kNothing}) : MeshText{};
+    if (!answers[k]) {
+      read.trouble = fmt::format("reading it crashed, or took longer than {:g} s", kReadTimeout_s);
+    }
+    MeshFile& known = Known()[unknown[k]];
+    known.trouble = read.trouble;
+    if (read.trouble.empty()) {
+      known.surface = std::make_shared<const TriangleMesh>(std::move(read.surface));
+    }
+  }
+  for (size_t i = 0; i < files.size(); ++i) {
+    if (!keys[i].empty()) result[i] = Known()[keys[i]];
+  }
+  return result;
+}
+
+TriangleMesh Scaled(const TriangleMesh& surface, const Vec3& scale) {
+  TriangleMesh scaled = surface;
+  for (Vec3& p : scaled.vertices) p = p.cwiseProduct(scale);
+  if (scale.prod() < 0.0) {
+    for (auto& t : scaled.triangles) std::swap(t[1], t[2]);
+  }
+  return scaled;
+}
+
+}  // namespace mbv

@@ -1,0 +1,67 @@
+// Files of triangle meshes.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "math/triangle_mesh.h"
+
+// Where the mesh files of a robot lie.
+
+namespace mbv {
+
+/// Where a package lies, as somebody says who starts the program.
+struct MeshPackage {
+  std::string name;
+  std::filesystem::path folder;
+};
+/// For all that this process reads from now on.
+void UseMeshPackages(std::vector<MeshPackage> packages);
+[[nodiscard]] const std::vector<MeshPackage>& MeshPackages();
+
+/// A mesh file, or why there is none.
+struct FoundMesh {
+  std::filesystem::path path;  ///< empty: `trouble`
+  std::string trouble;
+  bool outside = false;  ///< there is one, but nobody allowed that folder
+};
+/// Finds what a robot's file in `folder` calls `name`: a path relative to the folder, an absolute
+/// one, file://…, package://NAME/… or model://NAME/…. Packages are those of UseMeshPackages(), then
+/// folders NAME of ROS_PACKAGE_PATH (or entries of that name), share/NAME of AMENT_PREFIX_PATH, and
+/// NAME below `folder`; without a name (package:///…), `folder` itself. Nothing outside of `folder`
+/// and these is found.
+[[nodiscard]] FoundMesh FindMesh(const std::string& name, const std::filesystem::path& folder);
+
+/// `file` relative to `folder` if it lies below it, else absolute.
+[[nodiscard]] std::string PathSeenFrom(const std::filesystem::path& folder,
+                                       const std::filesystem::path& file);
+
+/// Endings of the files that are read: stl, obj, dae, ply.
+[[nodiscard]] bool IsMeshFile(const std::filesystem::path& file);
+
+/// A surface in the file's numbers, or why there is none.
+struct MeshText {
+  TriangleMesh surface;  ///< vertices at one place are one vertex; no triangle without area
+  std::string trouble;   ///< "" or why there is no surface
+};
+/// Reads bytes of a file whose name ends in `extension` (".stl"). Polygons become triangles, parts
+/// are put together. Of DAE the unit is applied (metres then), its up axis is not, as ROS does. The
+/// library may crash on hostile files: see ReadMeshFiles().
+[[nodiscard]] MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension);
+
+/// A surface of a file that is read by several people is there once.
+struct MeshFile {
+  std::shared_ptr<const TriangleMesh> surface;  ///< in the file's numbers; null: `trouble`
+  std::string trouble;
+};
+/// The surfaces of files, which are read in a process of its own and known afterwards by their
+/// content. Each file is told to NoteInput().
+[[nodiscard]] std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& files);
+
+/// Vertices times `scale`, component by component; where that mirrors, triangles turn so that
+/// outside stays outside.
+[[nodiscard]] TriangleMesh Scaled(const TriangleMesh& surface, const Vec3& scale);
+
+}  // namespace mbv

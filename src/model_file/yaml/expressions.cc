@@ -1,0 +1,301 @@
+#include "model_file/yaml/expressions.h"
+
+#include <fmt/format.h>
+#include <muParser.h>
+
+#include <algorithm>
+#include <cctype>
+#include <cmath>
+#include <mutex>
+#include <numbers>
+#include <unordered_map>
+
+#include "base/diagnostics.h"
+#include "model_file/yaml/yaml_reader.h"
+
+namespace mbv {
+namespace {
+
+constexpr size_t kMaxExpression = 2000;  // characters
+constexpr size_t kMaxChain = 200;        // parameters that refer to each other
+
+bool IsNameStart(char c) { return std::isalpha(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+bool IsNamePart(char c) { return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_'; }
+
+mu::Parser& TheParser() {
+  thread_local mu::Parser parser;
+  return parser;
+}
+
+struct UsedName {
+  std::string name;
+  bool is_call = false;
+};
+
+// Names in an expression, numbers such as 1e-3 skipped.
+std::vector<UsedName> NamesIn(const std::string& text) {
+  std::vector<UsedName> names;
+  size_t i = 0;
+  while (i < text.size()) {
+    if (std::isdigit(static_cast<unsigned char>(text[i])) != 0 || text[i] == '.') {
+      while (i < text.size() &&
+             (IsNamePart(text[i]) || text[i] == '.' ||
+              ((text[i] == '-' || text[i] == '+') && (text[i - 1] == 'e' || text[i - 1] == 'E')))) {
+        ++i;
+      }
+    } else if (IsNameStart(text[i])) {
+      const size_t start = i;
+      while (i < text.size() && IsNamePart(text[i])) ++i;
+      const size_t next = text.find_first_not_of(' ', i);
+      names.push_back(
+          {text.substr(start, i - start), next != std::string::npos && text[next] == '('});
+    } else {
+      ++i;
+    }
+  }
+  return names;
+}
+
+std::vector<std::string> FunctionNames() {
+  std::vector<std::string> names;
+  for (const auto& [name, callback] : TheParser().GetFunDef()) names.push_back(name);
+  return names;
+}
+
+// Assignments and lists would be accepted by muParser and mean something else.
+bool HasForeignOperator(const std::string& text) {
+  if (text.find('"') != std::string::npos) return true;
+  for (size_t i = 0; i < text.size(); ++i) {
+    if (text[i] != '=') continue;
+    if (i + 1 < text.size() && text[i + 1] == '=') {
+      ++i;
+    } else if (i == 0 || std::string("<>!").find(text[i - 1]) == std::string::npos) {
+      return true;
+    }
+  }
+  return false;
+}
+
+constexpr const char* kSeveralValues = "gives several values";
+
+std::string NoExpression(const std::string& why) { return "is no expression: " + why; }
+
+void Prepare(const std::string& text, const std::map<std::string, double>& constants,
+             mu::Parser* parser) {
+  parser->ClearConst();
+  parser->DefineConst("pi", std::numbers::pi);
+  for (const auto& [name, value] : constants) parser->DefineConst(name, value);
+  parser->SetExpr(text);
+}
+
+ExpressionResult Parse(const std::string& text, const std::map<std::string, double>& values) {
+  mu::Parser& parser = TheParser();
+  try {
+    Prepare(text, values, &parser);
+    int count = 0;
+    const double* results = parser.Eval(count);
+    if (count != 1) return {.value = {}, .error = kSeveralValues, .hint = ""};
+    const double value = results[0];
+    if (!std::isfinite(value)) {
+      return {.value = {},
+              .error = fmt::format("gives {}, a finite number is needed", value),
+              .hint = "look for a root of a negative number or a division by zero"};
+    }
+    if (const std::string why = WhyNoNumber(value); !why.empty()) {
+      return {.value = {}, .error = fmt::format("gives {}, which {}", value, why), .hint = ""};
+    }
+    return {.value = value, .error = "", .hint = ""};
+  } catch (const mu::ParserError& e) {
+    return {.value = {}, .error = NoExpression(e.GetMsg()), .hint = ""};
+  } catch (const std::exception& e) {
+    return {.value = {}, .error = NoExpression(e.what()), .hint = ""};
+  }
+}
+
+// Parsing is what an expression costs, and a model that is read again with another parameter has
+// mostly the same ones: results are kept by their text and the numbers in it.
+ExpressionResult Compute(const std::string& text, const std::map<std::string, double>& values) {
+  constexpr size_t kMostKept = 20'000;
+  thread_local std::unordered_map<std::string, ExpressionResult> kept;
+  std::string key = text;
+  for (const auto& [name, value] : values) {
+    key += '\0';
+    key += name;
+    key += '\0';
+    key.append(reinterpret_cast<const char*>(&value), sizeof value);
+  }
+  if (const auto found = kept.find(key); found != kept.end()) return found->second;
+  if (kept.size() >= kMostKept) kept.clear();
+  return kept.emplace(std::move(key), Parse(text, values)).first->second;
+}
+
+// Witnesses may run at the same time: one at a time computes.
+class MuFormula : public Formula {
+ public:
+  MuFormula(const std::string& text, const std::map<std::string, double>& constants,
+            const std::vector<std::string>& variables)
+      : variables_(variables.size(), 1.0) {
+    for (size_t i = 0; i < variables.size(); ++i) {
+      parser_.DefineVar(variables[i], &variables_[i]);
+    }
+    Prepare(text, constants, &parser_);
+    int count = 0;
+    parser_.Eval(count);  // parses it
+    if (count != 1) throw mu::ParserError(kSeveralValues);
+  }
+
+  [[nodiscard]] double At(std::span<const double> variables) const override {
+    const std::lock_guard lock(mutex_);
+    std::copy(variables.begin(), variables.end(), variables_.begin());
+    return parser_.Eval();
+  }
+
+ private:
+  mutable std::mutex mutex_;
+  mutable std::vector<double> variables_;
+  mu::Parser parser_;
+};
+
+}  // namespace
+
+bool IsWrittenOut(const std::string& expression) {
+  const std::vector<UsedName> names = NamesIn(expression);
+  return std::all_of(names.begin(), names.end(),
+                     [](const UsedName& used) { return used.is_call || used.name == "pi"; });
+}
+
+std::string WhyNoParameterName(const std::string& name) {
+  const bool is_name = !name.empty() && IsNameStart(name.front()) &&
+                       std::all_of(name.begin(), name.end(), IsNamePart);
+  if (!is_name) return "a parameter's name is made of letters, digits and _";
+  if (name == "pi" || PlainNumber(name)) return "this name has a fixed meaning";
+  if (TheParser().GetFunDef().count(name) > 0) return "this is the name of a function";
+  return "";
+}
+
+void Scope::Define(const std::string& name, std::string expression, const UnitSuffix& unit) {
+  entries_[name] = Entry{
+      .expression = std::move(expression), .unit = unit, .state = State::kWaiting, .result = {}};
+}
+
+void Scope::Set(const std::string& name, double value) {
+  entries_[name] = Entry{.expression = "",
+                         .unit = kPlain,
+                         .state = State::kDone,
+                         .result = {.value = value, .error = "", .hint = ""}};
+}
+
+void Scope::EvaluateEntry(const std::string& name, Entry* entry) {
+  entry->state = State::kEvaluating;
+  evaluating_.push_back(name);
+  ExpressionResult result =
+      evaluating_.size() > kMaxChain
+          ? ExpressionResult{.value = {},
+                             .error = "is the end of a very long chain of parameters",
+                             .hint = ""}
+          : Evaluate(entry->expression);
+  evaluating_.pop_back();
+  if (result.value) result.value = entry->unit.to_si(*result.value);
+  // A cycle has already marked this entry and holds its text.
+  if (entry->state == State::kFailed) return;
+  entry->state = result.value ? State::kDone : State::kFailed;
+  entry->result = std::move(result);
+}
+
+ExpressionResult Scope::Lookup(const std::string& name) {
+  const auto found = entries_.find(name);
+  if (found == entries_.end()) {
+    return {.value = {},
+            .error = fmt::format("there is no parameter '{}'", name),
+            .hint = DidYouMean(name, Names())};
+  }
+  if (found->second.state == State::kWaiting) EvaluateEntry(name, &found->second);
+  return found->second.result;
+}
+
+ExpressionResult Scope::Use(const std::string& name) {
+  const auto found = entries_.find(name);
+  if (found == entries_.end()) {
+    if (outer_ != nullptr) return outer_->Use(name);
+    return {.value = {}, .error = fmt::format("has the unknown symbol '{}'", name), .hint = ""};
+  }
+  Entry& entry = found->second;
+  if (entry.state == State::kWaiting) EvaluateEntry(name, &entry);
+  if (entry.state == State::kEvaluating) {
+    // Close the cycle: its first member carries the text.
+    std::string text;
+    const auto first = std::find(evaluating_.begin(), evaluating_.end(), name);
+    for (auto it = first; it != evaluating_.end(); ++it) text += *it + " → ";
+    entry.result = {.value = {}, .error = "is a cycle of parameters: " + text + name, .hint = ""};
+    entry.state = State::kFailed;
+  }
+  if (entry.state == State::kFailed) return {};
+  return entry.result;
+}
+
+ExpressionResult Scope::Evaluate(const std::string& expression) {
+  if (const auto number = PlainNumber(expression)) {
+    const std::string why = WhyNoNumber(*number);
+    if (why.empty()) return {.value = number, .error = "", .hint = ""};
+    return {.value = {}, .error = why, .hint = ""};
+  }
+  const Constants constants = ConstantsOf(expression, {});
+  return constants.good ? Compute(expression, constants.values) : constants.failed;
+}
+
+Scope::Constants Scope::ConstantsOf(const std::string& expression,
+                                    const std::vector<std::string>& variables) {
+  const auto refuse = [](const std::string& error, const std::string& hint) {
+    return Constants{.values = {}, .failed = {.value = {}, .error = error, .hint = hint}};
+  };
+  if (expression.size() > kMaxExpression) return refuse("is too long for an expression", "");
+  if (HasForeignOperator(expression)) {
+    return refuse("is no expression: = and \" have no meaning here", "");
+  }
+  Constants constants;
+  for (const UsedName& used : NamesIn(expression)) {
+    if (used.name == "pi" || constants.values.count(used.name) > 0) continue;
+    if (used.is_call) {
+      if (TheParser().GetFunDef().count(used.name) > 0) continue;
+      return refuse(fmt::format("has the unknown function '{}'", used.name),
+                    DidYouMean(used.name, FunctionNames()));
+    }
+    if (std::ranges::find(variables, used.name) != variables.end()) continue;
+    const ExpressionResult result = Use(used.name);
+    if (!result.value) {
+      return refuse(result.error, result.error.empty() ? "" : DidYouMean(used.name, Names()));
+    }
+    constants.values[used.name] = *result.value;
+  }
+  constants.good = true;
+  return constants;
+}
+
+FormulaResult Scope::Compile(const std::string& expression,
+                             const std::vector<std::string>& variables) {
+  const Constants constants = ConstantsOf(expression, variables);
+  if (!constants.good) {
+    return {.formula = {}, .error = constants.failed.error, .hint = constants.failed.hint};
+  }
+  try {
+    auto formula = std::make_shared<MuFormula>(expression, constants.values, variables);
+    return {.formula = std::move(formula), .error = "", .hint = ""};
+  } catch (const mu::ParserError& error) {
+    return {.formula = {}, .error = NoExpression(error.GetMsg()), .hint = ""};
+  }
+}
+
+std::vector<std::string> Scope::Names() const {
+  std::vector<std::string> names =
+      outer_ == nullptr ? std::vector<std::string>{"pi"} : outer_->Names();
+  for (const auto& [name, entry] : entries_) names.push_back(name);
+  return names;
+}
+
+std::string WhyNoNumber(double value) {
+  if (!std::isfinite(value)) return "is not a finite number";
+  if (std::abs(value) <= kLargestNumber) return "";
+  return fmt::format("violates |number| <= {:g}", kLargestNumber);
+}
+
+}  // namespace mbv

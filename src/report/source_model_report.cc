@@ -1,0 +1,414 @@
+#include "report/source_model_report.h"
+
+#include <fmt/format.h>
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+
+#include "base/json_text.h"
+#include "report/page.h"
+#include "report/text_table.h"
+
+namespace mbv {
+
+double Removed(double as_is, double without) { return 1.0 - without / as_is; }
+
+// Mended by itself it takes most of the error with it, or left by itself it makes most of it: where
+// causes hide each other only one of the two shows.
+std::vector<const OwnCause*> OwnFileAudit::Culprits() const {
+  constexpr double kMost = 0.5;
+  std::vector<const OwnCause*> culprits;
+  if (!as_is.sound()) return culprits;
+  const double rest = mended.sound() ? mended.force : 0.0;
+  for (const OwnCause& cause : causes) {
+    const bool removes = cause.without.sound() && Removed(as_is.force, cause.without.force) > kMost;
+    const bool makes = cause.alone.sound() && cause.alone.force * cause.alone.force - rest * rest >
+                                                  kMost * kMost * as_is.force * as_is.force;
+    if (removes || makes) culprits.push_back(&cause);
+  }
+  return culprits;
+}
+
+std::string OwnFileSentence(const OwnFileAudit& audit) {
+  if (!audit.declined.empty()) return "your own file was not run: " + audit.declined;
+  const OwnError& e = audit.as_is;
+  if (!e.sound()) {
+    return fmt::format("with its own settings your file gives no forces that could be compared: {}",
+                       e.failure);
+  }
+  std::string gap = fmt::format("its loops open by at most {:.1e} m", e.gap_m);
+  if (!e.joint.empty()) gap += fmt::format(" ({}, at {:.3g} s)", e.joint, e.gap_at_s);
+  if (!e.twisted.empty()) {
+    gap += fmt::format(" and twist by {:.1e} rad ({}, at {:.3g} s)", e.gap_rad, e.twisted,
+                       e.gap_rad_at_s);
+  }
+  if (std::isnan(e.force)) return gap + "; no drive forces could be compared";
+  if (audit.Good(e)) {
+    return fmt::format(
+        "nothing is wrong with your file's settings: on this motion its drive forces agree with "
+        "the reference to {:.1e}, and {}",
+        e.force, gap);
+  }
+  if (e.force <= OwnFileAudit::kGoodForce) {
+    return fmt::format("with its own settings your file's drive forces agree to {:.1e}, but {}",
+                       e.force, gap);
+  }
+  return fmt::format("with its own settings your file's drive forces are off by {:.2g} %, and {}",
+                     100.0 * e.force, gap);
+}
+
+namespace {
+
+using Cells = std::vector<std::vector<std::string>>;
+
+// Columns as wide as their widest cell; the first to the left.
+void WriteTable(const std::vector<std::string>& head, const Cells& rows, TerminalText* out) {
+  std::vector<TextColumn> columns;
+  for (size_t c = 0; c < head.size(); ++c) {
+    size_t width = head[c].size();
+    for (const auto& row : rows) width = std::max(width, row[c].size());
+    const int wide = static_cast<int>(width);
+    columns.push_back({head[c], c == 0 ? -wide : wide + 2});
+  }
+  const TextTable table("    ", columns);
+  out->TableHead(table);
+  for (const auto& row : rows) out->Line(table.Row(row));
+}
+
+void WriteLines(const std::vector<std::string>& lines, TerminalText* out) {
+  for (const std::string& line : lines) out->Line("    " + line);
+}
+
+}  // namespace
+
+void WriteOwnFile(const OwnFileAudit& audit, TerminalText* out) {
+  out->Line();
+  out->Line("  " + Sentence(OwnFileSentence(audit)));
+  if (!audit.declined.empty()) return;
+  WriteLines({SettingsLine(audit)}, out);
+  WriteLines(audit.done, out);
+  WriteLines(audit.notes, out);
+  WriteLines(MeasuredLines(audit), out);
+  WriteTable(CauseHead(), CauseCells(audit), out);
+  if (!audit.Good(audit.as_is)) out->Line("    " + CauseSentence(audit));
+  if (audit.searched) {
+    WriteTable(TrialHead(), TrialCells(audit, out->verbose()), out);
+    WriteLines(SearchLines(audit), out);
+  }
+  if (!audit.lines.empty()) {
+    out->Line();
+    out->Line("    to mend it, paste this before </mujoco>:");
+    std::string lines = audit.lines;
+    for (size_t end = lines.find('\n'); end != std::string::npos; end = lines.find('\n')) {
+      out->Line("      " + lines.substr(0, end));
+      lines.erase(0, end + 1);
+    }
+    WriteLines(PastedLines(audit), out);
+  }
+  out->Line(
+      fmt::format("    all of this took {:.1f} s (--no-own-file leaves it out)", audit.seconds));
+}
+
+namespace {
+
+std::string TableHtml(const std::string& caption, const std::vector<std::string>& head,
+                      const Cells& rows) {
+  Table table{.caption = caption, .head = {}, .rows = {}};
+  for (size_t c = 0; c < head.size(); ++c) table.head.push_back({head[c], c > 0});
+  for (const auto& row : rows) {
+    std::vector<Cell> cells;
+    for (size_t c = 0; c < row.size(); ++c) cells.push_back({row[c], c > 0});
+    table.rows.push_back(std::move(cells));
+  }
+  return ToHtml(table);
+}
+
+std::string ListHtml(const std::vector<std::string>& lines) {
+  std::string html;
+  for (const std::string& line : lines) html += "<li>" + Escape(line) + "</li>\n";
+  return html.empty() ? "" : "<ul>\n" + html + "</ul>\n";
+}
+
+std::string Paragraph(const std::string& text) {
+  return text.empty() ? "" : "<p>" + Escape(text) + "</p>\n";
+}
+
+}  // namespace
+
+std::string OwnFileHtml(const OwnFileAudit* audit) {
+  if (audit == nullptr) return "";
+  std::string html = "<p class=\"reason\">" + Escape(Sentence(OwnFileSentence(*audit))) + "</p>\n";
+  if (!audit->declined.empty()) return html;
+  html += ListHtml(MeasuredLines(*audit)) + ListHtml(audit->notes);
+  html += Folded("How it was run", ListHtml({SettingsLine(*audit)}) + ListHtml(audit->done));
+  html += TableHtml("One thing mended at a time", CauseHead(), CauseCells(*audit));
+  if (!audit->Good(audit->as_is)) html += Paragraph(CauseSentence(*audit));
+  std::string meanings;
+  for (const OwnCause& cause : audit->causes) {
+    meanings +=
+        "<p><b>" + Escape(Sentence(cause.title)) + "</b> " + Escape(cause.meaning) + "</p>\n";
+  }
+  html += Folded("What these things are", meanings);
+  if (audit->searched) {
+    html += TableHtml("Settings: error against cost", TrialHead(), TrialCells(*audit, false)) +
+            Folded("All settings that were run",
+                   TableHtml("All settings", TrialHead(), TrialCells(*audit, true))) +
+            ListHtml(SearchLines(*audit));
+  }
+  if (!audit->lines.empty()) {
+    html += "<p>To mend it, paste this before <code>&lt;/mujoco&gt;</code>:</p>\n<pre>" +
+            Escape(audit->lines) + "</pre>\n" + ListHtml(PastedLines(*audit));
+  }
+  return html +
+         Note(fmt::format("Every number is a run of MuJoCo on the file itself, in all {:.1f} "
+                          "s. The verdict does not depend on it.",
+                          audit->seconds));
+}
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+Json ErrorJson(const OwnError& e) {
+  if (!e.sound()) return {{"failure", e.failure}, {"time_s", Number(e.time_s)}};
+  return {{"force_nrmse_later", Number(e.force)},
+          {"force_nrmse", Number(e.force_all)},
+          {"force_max",
+           {{"value", Number(e.force_most)},
+            {"unit", e.force_unit},
+            {"drive", e.drive},
+            {"time_s", Number(e.force_at_s)}}},
+          {"joint_force_nrmse_later", Number(e.joint_force)},
+          {"loop_gap_m", Number(e.gap_m)},
+          {"loop_gap_joint", e.joint},
+          {"loop_gap_time_s", Number(e.gap_at_s)},
+          {"loop_twist_rad", Number(e.gap_rad)},
+          {"loop_twist_joint", e.twisted},
+          {"loop_twist_time_s", Number(e.gap_rad_at_s)},
+          {"ms_per_s", Number(e.cost_ms)}};
+}
+
+}  // namespace
+
+nlohmann::ordered_json OwnFileJson(const OwnFileAudit& audit) {
+  Json json = {{"file", audit.file}, {"sentence", OwnFileSentence(audit)}};
+  if (!audit.declined.empty()) {
+    json["declined"] = audit.declined;
+    return json;
+  }
+  json["good"] = audit.Good(audit.as_is);
+  json["settings"] = {{"step_s", Number(audit.step_s)}, {"integrator", audit.integrator},
+                      {"solver", audit.solver},         {"closures", audit.closures},
+                      {"solref", audit.solref},         {"solimp", audit.solimp}};
+  json["done"] = audit.done;
+  json["notes"] = audit.notes;
+  json["later_s"] = audit.later_s;
+  json["as_is"] = ErrorJson(audit.as_is);
+  json["causes"] = Json::array();
+  for (const OwnCause& cause : audit.causes) {
+    json["causes"].push_back({{"cause", cause.key},
+                              {"title", cause.title},
+                              {"removes", Number(Removed(audit.as_is.force, cause.without.force))},
+                              {"without", ErrorJson(cause.without)},
+                              {"alone", ErrorJson(cause.alone)}});
+  }
+  json["mended"] = ErrorJson(audit.mended);
+  json["trials"] = Json::array();
+  for (const OwnTrial& trial : audit.trials) {
+    json["trials"].push_back({{"step_s", Number(trial.step_s)},
+                              {"integrator", trial.integrator},
+                              {"solref", trial.solref},
+                              {"solimp", trial.solimp},
+                              {"other", trial.other},
+                              {"front", trial.front},
+                              {"error", ErrorJson(trial.error)}});
+  }
+  json["recommended"] = audit.recommended;
+  json["lines"] = audit.lines;
+  json["closures_with_own_settings"] = audit.stubborn;
+  if (!audit.lines.empty()) json["pasted"] = ErrorJson(audit.pasted);
+  json["seconds"] = Number(audit.seconds);
+  return json;
+}
+
+namespace {
+
+std::string Share(double share) {
+  if (!std::isfinite(share)) return "-";
+  if (share < 0.0) return "none";
+  return fmt::format("{:.0f} %", 100.0 * share);
+}
+
+// A number of a run, or what became of it.
+std::string OrUnsound(const OwnError& error, double value) {
+  return error.sound() ? NumberCell(value) : "unsound";
+}
+
+// "solref 0.02 1" of the first closure; says where others differ.
+std::string OfClosures(const std::vector<std::string>& values) {
+  if (values.empty()) return "none";
+  for (const std::string& value : values) {
+    if (value != values[0]) return values[0] + " and others";
+  }
+  return values[0];
+}
+
+std::vector<std::string> CauseRowOf(const OwnFileAudit& audit, const std::string& title,
+                                    const OwnError& without, const OwnError* alone) {
+  const OwnError& own = audit.as_is;
+  const bool both = own.sound() && without.sound();
+  return {title,
+          OrUnsound(without, without.force),
+          both ? Share(Removed(own.force, without.force)) : "-",
+          OrUnsound(without, without.gap_m),
+          both ? Share(Removed(own.gap_m, without.gap_m)) : "-",
+          alone == nullptr ? "" : OrUnsound(*alone, alone->force)};
+}
+
+}  // namespace
+
+std::string SettingsLine(const OwnFileAudit& audit) {
+  return fmt::format("{}: step {:g} ms, {}, solver {}, loops with solref {}, solimp {}",
+                     std::filesystem::path(audit.file).filename().string(), 1e3 * audit.step_s,
+                     audit.integrator, audit.solver, OfClosures(audit.solref),
+                     OfClosures(audit.solimp));
+}
+
+std::vector<std::string> MeasuredLines(const OwnFileAudit& audit) {
+  const OwnError& e = audit.as_is;
+  if (!e.sound()) return {};
+  std::vector<std::string> lines;
+  if (std::isfinite(e.force)) {
+    lines.push_back(fmt::format(
+        "drive forces: error {:.1e} of their RMS from {:g} s on, {:.1e} with the start, in which "
+        "soft loops take up the load",
+        e.force, audit.later_s, e.force_all));
+    if (!e.drive.empty()) {
+      lines.back() += fmt::format("; most {:.3g} {} ({}, at {:.3g} s)", e.force_most, e.force_unit,
+                                  e.drive, e.force_at_s);
+    }
+  }
+  if (std::isfinite(e.joint_force)) {
+    lines.push_back(fmt::format(
+        "forces in the joints that close the loops: error {:.1e} of their RMS", e.joint_force));
+  }
+  return lines;
+}
+
+std::string CauseSentence(const OwnFileAudit& audit) {
+  constexpr double kUnexplained = 0.2;
+  const OwnError &own = audit.as_is, &mended = audit.mended;
+  if (audit.causes.empty() || !mended.sound()) {
+    return mended.sound() ? "" : "with everything mended it still is unsound: " + mended.failure;
+  }
+  if (!own.sound())
+    return fmt::format("with everything mended {:.1e} of the force is error", mended.force);
+  const std::vector<const OwnCause*> culprits = audit.Culprits();
+  std::string text;
+  if (culprits.empty()) {
+    text = "No single thing makes most of the force error.";
+  } else {
+    std::string titles;
+    for (const OwnCause* cause : culprits) titles += (titles.empty() ? "" : "; ") + cause->title;
+    text = fmt::format("{}: {}. {}",
+                       culprits.size() == 1
+                           ? "Most of the force error is made by one thing"
+                           : "Most of the force error is made by things that act together",
+                       titles, culprits[0]->meaning);
+  }
+  if (mended.force > std::max(kUnexplained * own.force, OwnFileAudit::kGoodForce)) {
+    text += fmt::format(
+        " But {:.2g} % of the force stays wrong with all of them mended: that is no matter of "
+        "settings, the file computes another mechanism than the reference.",
+        100.0 * mended.force);
+  }
+  if (!audit.searched && audit.Good(audit.bare)) {
+    text += fmt::format(
+        " The settings need no change: with the drives led exactly, and without what the reference "
+        "does not have, the force error is {:.1e}.",
+        audit.bare.force);
+  }
+  return text;
+}
+
+std::vector<std::string> CauseHead() {
+  return {"what makes it wrong", "force error", "removed",
+          "loop gap [m]",        "removed",     "it alone leaves"};
+}
+
+std::vector<std::vector<std::string>> CauseCells(const OwnFileAudit& audit) {
+  std::vector<std::vector<std::string>> cells;
+  const OwnError& own = audit.as_is;
+  cells.push_back(
+      {"as your file is", OrUnsound(own, own.force), "", OrUnsound(own, own.gap_m), "", ""});
+  for (const OwnCause& cause : audit.causes) {
+    cells.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
+  }
+  cells.push_back(CauseRowOf(audit, "without all of these", audit.mended, nullptr));
+  return cells;
+}
+
+std::vector<std::string> SearchLines(const OwnFileAudit& audit) {
+  if (!audit.searched) return {};
+  std::vector<std::string> lines = {fmt::format(
+      "{} of {} settings were run{}; of each the file's drives are led exactly, and what the "
+      "reference does not have is left out, so that nothing but settings is judged",
+      audit.trials.size(), audit.planned,
+      std::isnan(audit.budget_s)
+          ? ""
+          : fmt::format(", which took the {:g} s that it may take", audit.budget_s))};
+  for (const OwnTrial& trial : audit.trials) {
+    if (trial.other.empty() || audit.trials.empty()) continue;
+    const bool same = trial.error.force == audit.trials[0].error.force;
+    lines.push_back(same ? trial.other + " changes nothing: it acts on the friction of contacts"
+                         : trial.other + fmt::format(" gives {:.2e}", trial.error.force));
+  }
+  if (audit.recommended == 0) {
+    lines.emplace_back("nothing that was tried does better than the file's own settings");
+  }
+  return lines;
+}
+
+std::vector<std::string> PastedLines(const OwnFileAudit& audit) {
+  if (audit.lines.empty()) return {};
+  std::vector<std::string> lines;
+  if (!audit.stubborn.empty()) {
+    std::string names;
+    for (const std::string& name : audit.stubborn) names += (names.empty() ? "" : ", ") + name;
+    lines.push_back(fmt::format(
+        "these closures state settings of their own, or have a class: write solref and solimp "
+        "there, too: {}",
+        names));
+  }
+  lines.push_back(audit.pasted.sound()
+                      ? fmt::format("run with these lines in it, the file gives a force error of "
+                                    "{:.2e} and a loop gap of {:.1e} m",
+                                    audit.pasted.force, audit.pasted.gap_m)
+                      : "run with these lines in it, the file gives nothing: " +
+                            audit.pasted.failure);
+  return lines;
+}
+
+std::vector<std::string> TrialHead() {
+  return {"step", "integrator", "solref", "solimp", "force error", "loop gap", "ms per s", ""};
+}
+
+std::vector<std::vector<std::string>> TrialCells(const OwnFileAudit& audit, bool all) {
+  std::vector<std::vector<std::string>> cells;
+  for (size_t i = 0; i < audit.trials.size(); ++i) {
+    const OwnTrial& trial = audit.trials[i];
+    const bool recommended = static_cast<int>(i) == audit.recommended;
+    if (!all && i > 0 && !trial.front && !recommended) continue;
+    std::string mark = recommended && i > 0 ? "recommended" : i == 0 ? "your file" : trial.other;
+    if (trial.front && mark.empty()) mark = all ? "best for its cost" : "";
+    cells.push_back({fmt::format("{:g} ms", 1e3 * trial.step_s), trial.integrator,
+                     trial.solref.empty() ? "own" : trial.solref,
+                     trial.solimp.empty() ? "own" : trial.solimp,
+                     OrUnsound(trial.error, trial.error.force),
+                     trial.error.sound() ? fmt::format("{:.1e} m", trial.error.gap_m) : "unsound",
+                     trial.error.sound() ? fmt::format("{:.3g}", trial.error.cost_ms) : "-", mark});
+  }
+  return cells;
+}
+
+}  // namespace mbv

@@ -1,0 +1,60 @@
+// `table: {csv: …}` in a profile: a measured or exported trajectory (or load) over time.
+//
+//   crank.drive: {table: {csv: run7.csv, time: "t (ms)", column: "Angle (deg)", smoothing: auto}}
+//
+// Read as tables in the reference's place are (settings.h); what becomes of the rows: row_spline.h.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mechanism/mechanism.h"
+#include "mechanism/motion.h"
+#include "model_file/yaml/value_reader.h"
+
+namespace mbv {
+
+/// What a table is wanted for.
+struct MotionTableUse {
+  std::string name;    ///< of what it gives: "crank.drive"
+  std::string unit;    ///< SI, of its values
+  bool moves = false;  ///< a command: rates may be given, and its second derivative makes forces
+};
+
+/// Reads and loads a table; `path` is its key's. Findings about the settings go to `values`, those
+/// about the file to `files`; empty after an error.
+[[nodiscard]] std::optional<MotionTable> LoadMotionTable(ValueReader* values, const YamlNode& node,
+                                                         const std::string& path,
+                                                         const MotionTableUse& use,
+                                                         const Mechanism& mechanism,
+                                                         Diagnostics* files);
+
+/// A finding where the rows do not cover the motion 0 … duration_s; at the place of `node`.
+void CheckCover(const MotionTable& table, const YamlNode& node, const std::string& path,
+                double duration_s, YamlReader* yaml);
+
+// `motion.pose_table`: the pose of an output over time, from one file.
+//
+//   pose_table: {output: platform, csv: path.csv, angles: quaternion, smoothing: auto}
+//
+// Orientations of every row become roll, pitch and yaw (R = Rz(yaw) Ry(pitch) Rx(roll)), without
+// jumps of whole turns; each component is then a table of its own (motion_table.h).
+
+/// A commanded component of an output's pose.
+struct PoseComponent {
+  int component = 0;  ///< x, y, z, roll, pitch, yaw
+  MotionTable table;
+};
+
+/// What a pose table commands.
+struct PoseTable {
+  int output = -1;  ///< index into Mechanism::outputs
+  std::vector<PoseComponent> components;
+};
+
+/// Reads and loads it; findings as in LoadMotionTable(). No components after an error.
+[[nodiscard]] PoseTable LoadPoseTable(ValueReader* values, const YamlNode& node,
+                                      const Mechanism& mechanism, Diagnostics* files);
+
+}  // namespace mbv

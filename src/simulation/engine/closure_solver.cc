@@ -1,0 +1,316 @@
+#include "simulation/engine/closure_solver.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbv::simulation {
+namespace {
+
+constexpr int kMaxNewton = 15;
+// All in the units of ConstraintSystem::ScaledJ(): characteristic lengths, radians.
+//
+// Newton stops after a step whose square is round-off. After one that is round-off itself nothing
+// is evaluated again.
+constexpr double kSmallSquare = 1e-8;
+constexpr double kNoStep = 1e-14;
+// Reflections mix all equations: without one refinement the force that accelerates a heavy
+// prescribed body leaves its rounding in the drives that do not move it.
+constexpr int kOrthogonalRefinements = 1;
+// A solution of Newton must be closed to this and rounding.
+constexpr double kClosed = 1e-10;
+// What Newton moves further than this, or corrects of a prediction, may be another assembly.
+constexpr double kFarthestStep = 0.5, kFarthestCorrection = 0.1;
+// Of the way between two samples.
+constexpr double kShortestStep = 1e-4;
+// Relative rank tolerance.
+constexpr double kRankTolerance = 1e-9;
+// A self-stress with a smaller share in a row does not act there.
+constexpr double kActs = 1e-6;
+// With more rows than velocities: of more velocities, factors are sparse.
+constexpr int kLargestDense = 6;
+
+// The shortest x with A x = b as well as can be, refined once.
+VecX LeastNorm(const MatX& A, const VecX& b) {
+  if (A.size() == 0) return VecX::Zero(A.cols());
+  Eigen::CompleteOrthogonalDecomposition<MatX> cod;
+  cod.setThreshold(kRankTolerance);
+  cod.compute(A);
+  VecX x = cod.solve(b);
+  const VecX rest = b - A * x;
+  x += cod.solve(rest);
+  return x;
+}
+
+}  // namespace
+
+ClosureSolver::ClosureSolver(ConstraintSystem* system) : system_(system) {
+  const int rows = system->rows(), nv = system->nv();
+  rhs_.setZero(rows);
+  step_.setZero(nv);
+  bias_.setZero(rows);
+}
+
+void ClosureSolver::Factor() {
+  const int rows = system_->rows(), nv = system_->nv();
+  factors_ = Factors::kNone;
+  rank_ = 0;
+  if (rows == 0) return;
+  system_->FillScaledTranspose(&columns_);
+  // The ratio of the pivots is a cheap warning sign of rank deficiency.
+  if (rows == nv && lu_.Factor(columns_) && lu_.PivotRatio() > kRankTolerance) {
+    factors_ = Factors::kSquare;
+    rank_ = nv;
+    return;
+  }
+  if (rows > nv && nv > kLargestDense && least_.Factor(columns_, kRankTolerance)) {
+    factors_ = Factors::kOverdefined;
+    rank_ = nv;
+    return;
+  }
+  factors_ = Factors::kOrthogonal;
+  cod_.setThreshold(kRankTolerance);
+  cod_.compute(system_->ScaledJ());
+  rank_ = static_cast<int>(cod_.rank());
+}
+
+// J = R J' D⁻¹ with the factored J', units R of the rows and D of the velocities.
+void ClosureSolver::SolveInto(const VecX& b, VecX* x, int refinements) {
+  if (factors_ == Factors::kNone) {
+    x->setZero(system_->nv());
+    return;
+  }
+  scaled_ = b.cwiseQuotient(system_->row_unit());
+  switch (factors_) {
+    case Factors::kSquare:
+      lu_.SolveTransposed(&scaled_);
+      break;
+    case Factors::kOverdefined:
+      scaled_ = least_.LeastSquares(scaled_, refinements);
+      break;
+    default:
+      scaled_ = cod_.solve(scaled_).eval();
+  }
+  *x = scaled_.cwiseProduct(system_->dof_unit());
+}
+
+void ClosureSolver::SolveTransposedInto(const VecX& b, VecX* x) {
+  if (factors_ == Factors::kNone) {
+    x->setZero(system_->rows());
+    return;
+  }
+  const VecX &row = system_->row_unit(), &dof = system_->dof_unit();
+  scaled_ = b.cwiseProduct(dof);
+  if (factors_ == Factors::kSquare) {
+    lu_.Solve(&scaled_);
+    *x = scaled_.cwiseQuotient(row);
+    return;
+  }
+  if (factors_ == Factors::kOverdefined) {
+    *x = least_.LeastNorm(scaled_).cwiseQuotient(row);
+    return;
+  }
+  const auto solve = [&](const VecX& right) -> VecX { return cod_.transpose().solve(right); };
+  *x = solve(scaled_).cwiseQuotient(row);
+  for (int i = 0; i < kOrthogonalRefinements; ++i) {
+    refinement_ = b - system_->J().transpose() * *x;
+    scaled_ = refinement_.cwiseProduct(dof);
+    *x += solve(scaled_).cwiseQuotient(row);
+  }
+}
+
+RunSummary ClosureSolver::Close(const VecX& to) {
+  const mjModel* m = system_->engine().m.get();
+  mjData* d = system_->data();
+  system_->SetTargets(to);
+  double size = kNan;
+  moved_ = 0.0;
+  for (int iteration = 0; iteration < kMaxNewton; ++iteration) {
+    system_->EvaluatePosition();
+    rhs_ = -system_->residual();
+    const double open = rhs_.cwiseQuotient(system_->row_unit()).lpNorm<Eigen::Infinity>();
+    const bool closed = open < kClosed + system_->Rounding();
+    const bool done = iteration > 0 && size < kSmallSquare && closed;
+    Factor();
+    if (done) return RunSummary::Done();
+    SolveInto(rhs_, &step_, 0);
+    size = step_.cwiseQuotient(system_->dof_unit()).lpNorm<Eigen::Infinity>();
+    if (!std::isfinite(size) || size > 1e3) break;
+    moved_ += size;
+    mj_integratePos(m, d->qpos, step_.data(), 1.0);
+    if (size < kNoStep && closed) return RunSummary::Done();
+  }
+  const double open = system_->residual().lpNorm<Eigen::Infinity>();
+  return {.stop = Stop::kNoConvergence,
+          .message = fmt::format("the loops do not close with the commanded drive positions (open "
+                                 "by {:.3g} after {} iterations)",
+                                 open, kMaxNewton),
+          .where = {},
+          .amount = open,
+          .unit = "m or rad"};
+}
+
+template <typename Way>
+RunSummary ClosureSolver::CloseOr(const VecX& to, double farthest, VecX* here, Way&& way) {
+  Eigen::Map<VecX> qpos(system_->data()->qpos, system_->engine().m->nq);
+  *here = qpos;
+  const bool direct = Close(to).ok();
+  if (direct && moved_ < farthest) return RunSummary::Done();
+  RunSummary summary = way(qpos);
+  if (summary.ok() || !direct) return summary;
+  qpos = *here;
+  return Close(to);
+}
+
+RunSummary ClosureSolver::Follow(const VecX& from, const VecX& to) {
+  return CloseOr(to, kFarthestStep, &began_, [&](Eigen::Map<VecX>& qpos) {
+    qpos = began_;
+    return Walk(from, to);
+  });
+}
+
+// In steps that adapt to what Newton can bridge.
+RunSummary ClosureSolver::Walk(const VecX& from, const VecX& to) {
+  mjData* d = system_->data();
+  const int nq = system_->engine().m->nq;
+  reached_.assign(d->qpos, d->qpos + nq);
+  double s = 0.0, ds = 0.25;
+  while (s < 1.0) {
+    std::copy(reached_.begin(), reached_.end(), d->qpos);
+    const double next = std::min(1.0, s + ds);
+    const RunSummary summary = Close(from + next * (to - from));
+    if (summary.ok() && (moved_ < kFarthestStep || ds < kShortestStep)) {
+      s = next;
+      ds *= 1.5;
+      reached_.assign(d->qpos, d->qpos + nq);
+    } else {
+      if (ds < kShortestStep) return summary;
+      ds *= 0.5;
+    }
+  }
+  return RunSummary::Done();
+}
+
+RunSummary ClosureSolver::FollowPredicted(const VecX& closed, const VecX& from, const VecX& to) {
+  return CloseOr(to, kFarthestCorrection, &predicted_, [&](Eigen::Map<VecX>& qpos) {
+    qpos = closed;
+    return Follow(from, to);
+  });
+}
+
+void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {
+  Eigen::Map<VecX> qvel(system_->data()->qvel, system_->nv());
+  rhs_ = -(system_->J() * qvel);
+  system_->AddGuided(1.0, driven_velocity, &rhs_);
+  SolveInto(rhs_, &step_);
+  qvel += step_;
+  mj_comVel(system_->engine().m.get(), system_->data());
+}
+
+void ClosureSolver::SolveVelocity(const VecX& driven_velocity) {
+  rhs_.setZero();
+  system_->AddGuided(1.0, driven_velocity, &rhs_);
+  SolveInto(rhs_, &step_);
+  std::copy(step_.begin(), step_.end(), system_->data()->qvel);
+  mj_comVel(system_->engine().m.get(), system_->data());
+}
+
+void ClosureSolver::SolveAcceleration(const VecX& driven_acceleration) {
+  system_->Bias(&bias_);
+  rhs_ = -bias_;
+  system_->AddGuided(1.0, driven_acceleration, &rhs_);
+  SolveInto(rhs_, &step_);
+  std::copy(step_.begin(), step_.end(), system_->data()->qacc);
+}
+
+void ClosureSolver::SolveForces(const VecX& tau) {
+  SolveTransposedInto(tau, &rhs_);
+  system_->force() = rhs_;
+}
+
+void ClosureSolver::RemoveSelfStress(VecX* force) {
+  if (redundant() == 0) return;
+  const VecX& unit = system_->row_unit();
+  if (undriven() == 0) {  // J x next to the force: rounding in x is no self-stress
+    system_->FillScaledTranspose(&columns_here_);
+    if (least_here_.Factor(columns_here_, kRankTolerance)) {
+      const VecX x = least_here_.LeastSquares(force->cwiseProduct(unit), 0);
+      *force = (columns_here_.transpose() * x).cwiseQuotient(unit);
+      return;
+    }
+  }
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
+  VecX y = qr.householderQ().adjoint() * force->cwiseProduct(unit);
+  y.tail(redundant()).setZero();
+  *force = (qr.householderQ() * y).cwiseQuotient(unit);
+}
+
+void ClosureSolver::SolveForcesHere(const VecX& tau) {
+  const VecX force =
+      LeastNorm(system_->ScaledJ().transpose(), tau.cwiseProduct(system_->dof_unit()));
+  system_->force() = force.cwiseQuotient(system_->row_unit());
+}
+
+double ClosureSolver::WeakestPivot() const {
+  if (rank_ == 0) return 1.0;
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ().transpose());
+  const auto pivots = qr.matrixQR().diagonal();
+  return std::abs(pivots[rank_ - 1]) / std::abs(pivots[0]);
+}
+
+void ClosureSolver::SolveLeastDriven(const VecX& tau) {
+  const int nv = system_->nv(), closures = system_->first_driven_row();
+  const int driven = system_->driven_rows();
+  // In these units a force counts as its moment at the characteristic length.
+  const MatX J = system_->ScaledJ();
+  const VecX scaled_tau = tau.cwiseProduct(system_->dof_unit());
+  const MatX J_c = J.topRows(closures), J_u = J.bottomRows(driven);
+  MatX N = MatX::Identity(nv, nv);
+  if (closures > 0) {
+    Eigen::ColPivHouseholderQR<MatX> qr;
+    qr.setThreshold(kRankTolerance);
+    qr.compute(J_c.transpose());
+    const MatX Q = OrthogonalFactor(qr);
+    N = Q.rightCols(nv - qr.rank());
+  }
+  VecX lambda(closures + driven);
+  const VecX u = LeastNorm((J_u * N).transpose(), N.transpose() * scaled_tau);
+  lambda.tail(driven) = u;
+  if (closures > 0) {
+    lambda.head(closures) = LeastNorm(J_c.transpose(), scaled_tau - J_u.transpose() * u);
+  }
+  system_->force() = lambda.cwiseQuotient(system_->row_unit());
+}
+
+// The null space of Jᵀ, from the Q factor behind the rank.
+MatX ClosureSolver::ScaledSelfStress() const {
+  const Eigen::ColPivHouseholderQR<MatX> qr(system_->ScaledJ());
+  const MatX Q = OrthogonalFactor(qr);
+  return Q.rightCols(redundant());
+}
+
+MatX ClosureSolver::SelfStress() const {
+  if (redundant() == 0) return MatX(system_->rows(), 0);
+  return system_->row_unit().cwiseInverse().asDiagonal() * ScaledSelfStress();
+}
+
+// Length of a row of the null space's basis: what the projection on it leaves of a unit force.
+double ClosureSolver::SelfStressOn(int row) const {
+  const VecX unit = VecX::Unit(system_->rows(), row);
+  return (unit - least_.LeastNorm(columns_ * unit)).norm();
+}
+
+std::vector<int> ClosureSolver::DrivenRowsNotUnique() const {
+  std::vector<int> rows;
+  if (redundant() == 0) return rows;
+  const bool sparse = factors_ == Factors::kOverdefined;
+  const MatX self_stress = sparse ? MatX() : ScaledSelfStress();
+  for (int i = system_->first_driven_row(); i < system_->rows(); ++i) {
+    const double share = sparse ? SelfStressOn(i) : self_stress.row(i).norm();
+    if (share > kActs) rows.push_back(i);
+  }
+  return rows;
+}
+
+}  // namespace mbv::simulation

@@ -1,0 +1,165 @@
+#include "simulation/engine/loads.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "math/spatial.h"
+#include "simulation/engine/recorder.h"
+
+namespace mbv::simulation {
+namespace {
+
+struct Value {
+  double position = 0.0, rate = 0.0;
+};
+
+// Joint and coordinate that an input stands for; no joint: a distance drive or an output.
+JointDrive JointOf(const Mechanism& mechanism, const Coordinate& coordinate) {
+  const auto index = static_cast<size_t>(coordinate.index);
+  if (coordinate.kind == Coordinate::Kind::kJoint) {
+    return {coordinate.index, coordinate.component};
+  }
+  if (coordinate.kind == Coordinate::Kind::kPrescribed) {
+    return {mechanism.prescribed[index].joint, 0};
+  }
+  const auto* driven = coordinate.kind == Coordinate::Kind::kDrive
+                           ? std::get_if<JointDrive>(&mechanism.drives[index].kind)
+                           : nullptr;
+  return driven == nullptr ? JointDrive{} : *driven;
+}
+
+int JointId(const EngineModel& engine, const JointDrive& at) {
+  const Joint& joint = engine.mechanism->joints[static_cast<size_t>(at.joint)];
+  return mj_name2id(engine.m.get(), mjOBJ_JOINT, mjcf::JointName(joint, at.coordinate).c_str());
+}
+
+// A tendon's rate from its Jacobian: MuJoCo's own is not evaluated here.
+Value OfTendon(const EngineModel& engine, const mjData& d, const std::string& name) {
+  const int tendon = IdOf(*engine.m, mjOBJ_TENDON, name), nv = engine.m->nv;
+  const Eigen::Map<const VecX> J(d.ten_J + tendon * nv, nv), qvel(d.qvel, nv);
+  return {d.ten_length[tendon], J.dot(qvel)};
+}
+
+Value OfOutput(const EngineModel& engine, const mjData& d, const Coordinate& coordinate) {
+  const Output& output = engine.mechanism->outputs[static_cast<size_t>(coordinate.index)];
+  const auto pose = [&](int body) {
+    return PoseOf(d, engine.body_id[static_cast<size_t>(engine.PlannedOf(body))]);
+  };
+  const Pose X_WR = pose(output.reference_body) * output.X_RbR;
+  const Pose X_RO = X_WR.inverse(Eigen::Isometry) * pose(output.body) * output.X_BO;
+  Vec6 position;
+  position << X_RO.translation(), RpyOf(X_RO.linear());
+  return {position[coordinate.component],
+          OutputRatesOf(engine, d, output).velocity[coordinate.component]};
+}
+
+Value ValueOf(const EngineModel& engine, const mjData& d, const Coordinate& coordinate) {
+  if (coordinate.kind == Coordinate::Kind::kOutput) return OfOutput(engine, d, coordinate);
+  const JointDrive at = JointOf(*engine.mechanism, coordinate);
+  if (at.joint < 0) {
+    return OfTendon(engine, d,
+                    engine.mechanism->drives[static_cast<size_t>(coordinate.index)].name);
+  }
+  const int id = JointId(engine, at);
+  return {d.qpos[engine.m->jnt_qposadr[id]], d.qvel[engine.m->jnt_dofadr[id]]};
+}
+
+// An angle in the turn of `near`.
+double InTurnOf(double near, double angle) {
+  return near + std::remainder(angle - near, 2.0 * std::numbers::pi);
+}
+
+bool IsKnown(const EngineModel& engine, const Coordinate& coordinate) {
+  if (coordinate.kind == Coordinate::Kind::kOutput) {
+    return HasOutputRates(engine, engine.mechanism->outputs[static_cast<size_t>(coordinate.index)]);
+  }
+  const JointDrive at = JointOf(*engine.mechanism, coordinate);
+  return at.joint < 0 || JointId(engine, at) >= 0;
+}
+
+}  // namespace
+
+RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load) {
+  for (const Load::Following& part : load.following) {
+    for (const StateFunction::Input& input : part.function.inputs) {
+      if (IsKnown(engine, input.coordinate)) continue;
+      return {.stop = Stop::kUnsupported,
+              .message = "load '" + load.name +
+                         "' follows a coordinate that MuJoCo does not have; the other witnesses "
+                         "take it as it is",
+              .where = load.name,
+              .unit = {}};
+    }
+  }
+  return RunSummary::Done();
+}
+
+Vec6 FollowingPart(const EngineModel& engine, const mjData& d, const Load& load, double t_s) {
+  Vec6 sum = Vec6::Zero();
+  std::vector<double> inputs;
+  for (const Load::Following& part : load.following) {
+    inputs.clear();
+    for (const StateFunction::Input& input : part.function.inputs) {
+      const Value value = ValueOf(engine, d, input.coordinate);
+      const bool length = IsLength(*engine.mechanism, input.coordinate);
+      inputs.push_back(input.rate ? value.rate
+                       : length   ? value.position
+                                  : InTurnOf(input.near, value.position));
+    }
+    sum[part.component] += part.function.value(t_s, inputs);
+  }
+  return sum;
+}
+
+RunSummary CheckLoads(const EngineModel& engine, const Motion& motion) {
+  for (const Load& load : motion.loads) {
+    if (engine.PlannedOf(load.body) >= 0) {
+      if (RunSummary summary = CheckLoadInputs(engine, load); !summary.ok()) return summary;
+      continue;
+    }
+    return {.stop = Stop::kUnsupported,
+            .message = "load '" + load.name + "' acts on the massless body '" +
+                       engine.mechanism->bodies[load.body].name + "'",
+            .where = load.name,
+            .unit = {}};
+  }
+  return RunSummary::Done();
+}
+
+void Loads::Evaluate(double t_s, const mjData& d) {
+  world_.resize(motion_.loads.size());
+  for (size_t i = 0; i < world_.size(); ++i) {
+    const Load& load = motion_.loads[i];
+    WorldLoad& out = world_[i];
+    out.body_id = engine_.body_id[engine_.PlannedOf(load.body)];
+    const Pose X_WB = PoseOf(d, out.body_id);
+    out.p_WQ = X_WB * load.p_BoQ_B;
+    for (int c = 0; c < 3; ++c) {
+      out.force[c] = mbv::Evaluate(load.force[c], t_s).value;
+      out.moment[c] = mbv::Evaluate(load.moment[c], t_s).value;
+    }
+    if (!load.following.empty()) {
+      const Vec6 part = FollowingPart(engine_, d, load, t_s);
+      out.force += part.head<3>();
+      out.moment += part.tail<3>();
+    }
+    if (!load.in_body_axes) continue;
+    out.force = X_WB.linear() * out.force;
+    out.moment = X_WB.linear() * out.moment;
+  }
+}
+
+bool Loads::follow() const {
+  return std::ranges::any_of(motion_.loads,
+                             [](const Load& load) { return !load.following.empty(); });
+}
+
+void Loads::AddGeneralized(mjData* d, double* qfrc) const {
+  for (const WorldLoad& load : world_) {
+    mj_applyFT(engine_.m.get(), d, load.force.data(), load.moment.data(), load.p_WQ.data(),
+               load.body_id, qfrc);
+  }
+}
+
+}  // namespace mbv::simulation

@@ -1,0 +1,561 @@
+// Bodies and joints of an MJCF file.
+
+#include "simulation/import/mjcf_import.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "base/demand.h"
+#include "base/text.h"
+#include "math/spatial.h"
+#include "simulation/mjcf/foreign_rows.h"
+
+namespace mbv::simulation {
+namespace {
+
+struct Ends {
+  int inboard, outboard;
+};
+
+int NewBody(MjcfImport* in, const std::string& name) {
+  in->mechanism.bodies.push_back({.name = name, .frames = {}, .shapes = {}});
+  return static_cast<int>(in->mechanism.bodies.size()) - 1;
+}
+
+// Without a pose of the file, the zero of a joint may be far from where it works: a stretched
+// leg.
+void StartInside(Joint* joint, MjcfImport* in) {
+  constexpr double kShare = 0.2;  // of the range, from its near end
+  const CoordinateRange& range = joint->range[0];
+  const double width = range.upper - range.lower;
+  if (joint->home[0] >= range.lower && joint->home[0] <= range.upper) return;
+  joint->home[0] =
+      joint->home[0] < range.lower ? range.lower + kShare * width : range.upper - kShare * width;
+  in->moved.push_back(joint->name);
+}
+
+// `X_PB`: the body at the joint's reference position.
+void AddJoint(int j, const Ends& ends, const Pose& X_PB, MjcfImport* in) {
+  const Vec3 anchor = VecAt(in->m.jnt_pos + 3 * j);
+  const int at = in->m.jnt_qposadr[j];
+  Joint joint;
+  joint.name = in->JointNameOf(j);
+  joint.parent = ends.inboard;
+  joint.child = ends.outboard;
+  joint.axis = VecAt(in->m.jnt_axis + 3 * j).normalized();
+  switch (in->m.jnt_type[j]) {
+    case mjJNT_HINGE:
+    case mjJNT_SLIDE:
+      joint.kind = in->m.jnt_type[j] == mjJNT_HINGE ? JointKind::kRevolute : JointKind::kPrismatic;
+      joint.X_PF = X_PB * Shifted(anchor);
+      joint.X_CM = Shifted(anchor);
+      joint.home[0] = in->qpos[at] - in->m.qpos0[at];
+      if (in->m.jnt_limited[j] != 0 && !in->LimitsAreOff()) {
+        // Its limit pushes from the margin on.
+        const double margin = in->m.jnt_margin[j];
+        joint.range[0] = {in->m.jnt_range[2 * j] - in->m.qpos0[at] + margin,
+                          in->m.jnt_range[2 * j + 1] - in->m.qpos0[at] - margin};
+      }
+      if (in->m.qpos0[at] != 0.0) in->shifted.push_back(joint.name);
+      if (in->m.nkey == 0) StartInside(&joint, in);
+      break;
+    case mjJNT_BALL: {
+      joint.kind = JointKind::kSpherical;
+      joint.X_PF = X_PB * Shifted(anchor);
+      joint.X_CM = Shifted(anchor);
+      const Mat3 R = RotationAt(in->m.qpos0 + at).transpose() * RotationAt(in->qpos + at);
+      const Vec3 rpy = RpyOf(R);
+      joint.home = {rpy.x(), rpy.y(), rpy.z(), 0, 0, 0};
+      break;
+    }
+    default:  // free
+      joint.kind = JointKind::kFixed;
+      joint.X_PF = PoseAt(in->qpos + at, in->qpos + at + 3);
+      in->held.push_back(in->mechanism.bodies[static_cast<size_t>(ends.outboard)].name);
+      break;
+  }
+  joint.guess = joint.home;
+  in->joint_of[static_cast<size_t>(j)] = static_cast<int>(in->mechanism.joints.size());
+  in->mechanism.joints.push_back(joint);
+}
+
+void AddBody(int b, MjcfImport* in) {
+  const std::string name = in->NameOf(mjOBJ_BODY, b, "body");
+  const int first = in->m.body_jntadr[b], count = in->m.body_jntnum[b];
+  int inboard = in->body_of[static_cast<size_t>(in->m.body_parentid[b])];
+  Pose X_PB = PoseAt(in->m.body_pos + 3 * b, in->m.body_quat + 4 * b);
+  // Each joint but the last carries a massless piece that lies where the body does.
+  for (int k = 0; k < count; ++k) {
+    const int j = first + k;
+    const bool last = k + 1 == count;
+    const int outboard = NewBody(in, last ? name : fmt::format("{}_{}", name, in->JointNameOf(j)));
+    AddJoint(j, {inboard, outboard}, X_PB, in);
+    inboard = outboard;
+    X_PB = Pose::Identity();
+  }
+  if (count == 0) {
+    const int outboard = NewBody(in, name);
+    Joint weld;
+    weld.name = name + "_fixed";
+    weld.parent = inboard;
+    weld.child = outboard;
+    weld.X_PF = X_PB;
+    in->mechanism.joints.push_back(weld);
+    inboard = outboard;
+  }
+  in->body_of[static_cast<size_t>(b)] = inboard;
+  Body& body = in->BodyOf(b);
+  const Mat3 R = RotationAt(in->m.body_iquat + 4 * b);
+  body.mass = in->m.body_mass[b];
+  body.p_BoBcm_B = VecAt(in->m.body_ipos + 3 * b);
+  body.I_Bcm_B = R * VecAt(in->m.body_inertia + 3 * b).asDiagonal() * R.transpose();
+  body.I_Bcm_B = 0.5 * (body.I_Bcm_B + body.I_Bcm_B.transpose()).eval();
+  if (body.mass == 0.0) body.I_Bcm_B.setZero();
+}
+
+}  // namespace
+
+void AddTree(MjcfImport* in) {
+  in->qpos = in->m.nkey > 0 ? in->m.key_qpos : in->m.qpos0;
+  in->body_of.assign(static_cast<size_t>(in->m.nbody), 0);
+  in->joint_of.assign(static_cast<size_t>(in->m.njnt), -1);
+  (void)NewBody(in, "world");
+  for (int b = 1; b < in->m.nbody; ++b) AddBody(b, in);
+}
+
+// Drives of an MJCF file.
+
+namespace {
+
+void AddDrive(int u, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const std::string name = in->NameOf(mjOBJ_ACTUATOR, u, "actuator");
+  const int type = m.actuator_trntype[u];
+  const bool on_joint = type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT;
+  const int j = on_joint ? in->joint_of[static_cast<size_t>(m.actuator_trnid[2 * u])] : -1;
+  if (j < 0 || FreedomsOf(in->mechanism.joints[static_cast<size_t>(j)].kind) != 1) {
+    constexpr std::pair<int, const char*> kOthers[] = {{mjTRN_SLIDERCRANK, "slidersite"},
+                                                       {mjTRN_TENDON, "tendon"},
+                                                       {mjTRN_SITE, "site"},
+                                                       {mjTRN_BODY, "body"}};
+    const char* attribute = "joint";  // of a ball or free body
+    for (const auto& [other, word] : kOthers) {
+      if (type == other) attribute = word;
+    }
+    in->LeaveOut(on_joint ? "actuator of a ball" : "actuator/general", attribute,
+                 fmt::format("actuator '{}', which does not act on a hinge or slide,", name));
+    return;
+  }
+  std::vector<Drive>& drives = in->mechanism.drives;
+  const bool second = std::ranges::any_of(
+      drives, [j](const Drive& drive) { return std::get<JointDrive>(drive.kind).joint == j; });
+  if (second) return;
+  if (m.actuator_gear[6 * u] != 1.0) in->geared.push_back(name);
+  drives.push_back({.name = name,
+                    .kind = JointDrive{j, 0},
+                    .range = in->mechanism.joints[static_cast<size_t>(j)].range[0]});
+}
+
+}  // namespace
+
+void AddDrives(MjcfImport* in) {
+  for (int u = 0; u < in->m.nu; ++u) AddDrive(u, in);
+}
+
+// Force elements of an MJCF file.
+
+namespace {
+
+void AddElementsOf(int j, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const int dof = m.jnt_dofadr[j], at = m.jnt_qposadr[j];
+  const auto add = [&](const char* what, const auto& law) {
+    in->mechanism.elements.push_back({.name = in->JointNameOf(j) + what,
+                                      .joint = in->joint_of[static_cast<size_t>(j)],
+                                      .law = law});
+  };
+  const bool passive = !in->IsOff(mjDSBL_PASSIVE);
+  if (passive && m.dof_damping[dof] > 0.0) add("_damping", DampingLaw{m.dof_damping[dof]});
+  if (passive && m.dof_damping[dof] < 0.0) in->driving.push_back(in->JointNameOf(j));
+  if (passive && m.jnt_stiffness[j] != 0.0) {
+    add("_spring",
+        SpringLaw{.polynomial = {m.jnt_stiffness[j]}, .free = m.qpos_spring[at] - m.qpos0[at]});
+  }
+  if (const double loss = m.dof_frictionloss[dof]; loss > 0.0 && !in->FrictionIsOff()) {
+    add("_friction", FrictionLaw{.coulomb = loss, .breakaway = loss});
+  }
+  if (m.dof_armature[dof] > 0.0) add("_rotor", RotorLaw{.inertia = m.dof_armature[dof]});
+}
+
+}  // namespace
+
+void AddElements(MjcfImport* in) {
+  for (int j = 0; j < in->m.njnt; ++j) {
+    if (IsScalar(in->m, j)) AddElementsOf(j, in);
+  }
+}
+
+// Closures and couplings of an MJCF file.
+
+namespace {
+
+Pose SitePose(const mjModel& m, const std::string& name) {
+  const int s = IdOf(m, mjOBJ_SITE, name);
+  return PoseAt(m.site_pos + 3 * s, m.site_quat + 4 * s);
+}
+
+void AddClosure(int e, const std::string& name, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const mjtNum* data = m.eq_data + mjNEQDATA * e;
+  const bool connect = m.eq_type[e] == mjEQ_CONNECT;
+  Joint joint;
+  joint.name = name;
+  joint.closure = true;
+  joint.kind = connect ? JointKind::kSpherical : JointKind::kFixed;
+  joint.parent = in->body_of[static_cast<size_t>(m.eq_obj1id[e])];
+  joint.child = in->body_of[static_cast<size_t>(m.eq_obj2id[e])];
+  const auto sites = in->foreign.closures_by_sites().find(name);
+  if (sites != in->foreign.closures_by_sites().end()) {
+    joint.X_PF = SitePose(m, sites->second.first);
+    joint.X_CM = SitePose(m, sites->second.second);
+  } else if (connect) {
+    joint.X_PF = Shifted(VecAt(data));
+    joint.X_CM = Shifted(VecAt(data + 3));
+  } else {
+    joint.X_PF = PoseAt(data + 3, data + 6);
+    joint.X_CM = Shifted(VecAt(data));
+  }
+  if (joint.parent == joint.child) {
+    in->Say(fmt::format("equality '{}' connects a body with itself and is left out", name));
+    return;
+  }
+  in->closure_of[static_cast<size_t>(e)] = static_cast<int>(in->mechanism.joints.size());
+  in->mechanism.joints.push_back(joint);
+}
+
+// Adds P(q) of a joint; false if it has no such coordinate, or stands in the coupling twice.
+bool AddTerm(const MjcfImport& in, int joint, const std::vector<double>& polynomial,
+             Coupling* coupling) {
+  const int type = in.m.jnt_type[joint];
+  if (type != mjJNT_HINGE && type != mjJNT_SLIDE) return false;
+  const int at = in.joint_of[static_cast<size_t>(joint)];
+  const bool twice = std::ranges::any_of(
+      coupling->terms, [at](const Coupling::Term& term) { return term.joint == at; });
+  coupling->terms.push_back({.joint = at, .coordinate = 0, .polynomial = polynomial});
+  return !twice;
+}
+
+// Adds c Σ c_k q_k of a fixed tendon.
+bool AddTendon(int tendon, double factor, Coupling* coupling, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const int first = m.tendon_adr[tendon];
+  for (int w = first; w < first + m.tendon_num[tendon]; ++w) {
+    if (m.wrap_type[w] != mjWRAP_JOINT) return false;
+    if (!AddTerm(*in, m.wrap_objid[w], {factor * m.wrap_prm[w]}, coupling)) return false;
+  }
+  if (m.tendon_stiffness[tendon] == 0.0 && m.tendon_damping[tendon] == 0.0) {
+    in->coupling_tendons.insert(tendon);
+  }
+  return true;
+}
+
+// q_1 = Σ_i a_i q_2^i of two joints or fixed tendons, all counted from the reference pose; of
+// tendons only where it is linear.
+bool AddSides(int e, Coupling* coupling, MjcfImport* in) {
+  const mjModel& m = in->m;
+  const mjtNum* a = m.eq_data + mjNEQDATA * e;
+  const auto add = [&](int object, const std::vector<double>& polynomial) {
+    if (m.eq_type[e] == mjEQ_JOINT) return AddTerm(*in, object, polynomial, coupling);
+    return m.eq_type[e] == mjEQ_TENDON && polynomial.size() == 1 &&
+           AddTendon(object, polynomial[0], coupling, in);
+  };
+  std::vector<double> polynomial(a + 1, a + 5);
+  while (!polynomial.empty() && polynomial.back() == 0.0) polynomial.pop_back();
+  coupling->constant = a[0];
+  return add(m.eq_obj1id[e], {-1.0}) &&
+         (m.eq_obj2id[e] < 0 || polynomial.empty() || add(m.eq_obj2id[e], polynomial));
+}
+
+void AddCoupling(int e, const std::string& name, MjcfImport* in) {
+  Coupling coupling{.name = name, .terms = {}};
+  if (!AddSides(e, &coupling, in)) {
+    const char* element = in->m.eq_type[e] == mjEQ_JOINT ? "equality/joint" : "equality/tendon";
+    in->LeaveOut(element, "",
+                 fmt::format("equality '{}' (couplings are known of hinges and slides, by a "
+                             "polynomial or by linear fixed tendons)",
+                             name));
+  } else if (coupling.terms.size() == 1) {
+    // A drive holds it as well; without one it is another mechanism.
+    const int joint = coupling.terms[0].joint;
+    const std::string text = fmt::format("equality '{}', which holds joint '{}' alone,", name,
+                                         in->mechanism.joints[static_cast<size_t>(joint)].name);
+    bool driven = false;
+    for (int u = 0; u < in->m.nu; ++u) {
+      const int type = in->m.actuator_trntype[u];
+      if (type != mjTRN_JOINT && type != mjTRN_JOINTINPARENT) continue;
+      driven = driven || in->joint_of[static_cast<size_t>(in->m.actuator_trnid[2 * u])] == joint;
+    }
+    if (driven) {
+      in->Say(text + " is left out: its drive holds the joint");
+    } else {
+      in->LeaveOut("equality/joint", "", text);
+    }
+  } else {
+    in->mechanism.couplings.push_back(coupling);
+  }
+}
+
+}  // namespace
+
+void AddEqualities(MjcfImport* in) {
+  const mjModel& m = in->m;
+  in->closure_of.assign(static_cast<size_t>(m.neq), -1);
+  for (int e = 0; e < m.neq; ++e) {
+    const std::string name = in->NameOf(mjOBJ_EQUALITY, e, "equality");
+    if (m.eq_active[e] == 0 || in->EqualitiesAreOff()) {
+      in->Say(fmt::format("equality '{}' is switched off in the file, and left out", name));
+    } else if (m.eq_type[e] == mjEQ_CONNECT || m.eq_type[e] == mjEQ_WELD) {
+      AddClosure(e, name, in);
+    } else {
+      AddCoupling(e, name, in);
+    }
+  }
+}
+
+// What a mechanism cannot express of an MJCF file.
+
+namespace {
+
+constexpr size_t kMost = 6;  // names that are told
+
+// Joints with several coordinates of which a number that acts on forces is not zero.
+std::vector<std::string> BallsWith(const MjcfImport& in, const mjtNum* per_dof) {
+  std::vector<std::string> names;
+  for (int d = 0; d < in.m.nv; ++d) {
+    const int j = in.m.dof_jntid[d];
+    const std::string name = in.JointNameOf(j);
+    const bool is_ball = in.m.jnt_type[j] == mjJNT_BALL;
+    if (per_dof[d] != 0.0 && is_ball && (names.empty() || names.back() != name)) {
+      names.push_back(name);
+    }
+  }
+  return names;
+}
+
+std::vector<std::string> BallsWhere(const MjcfImport& in, const auto& applies) {
+  std::vector<std::string> names;
+  for (int j = 0; j < in.m.njnt; ++j) {
+    if (in.m.jnt_type[j] == mjJNT_BALL && applies(j)) names.push_back(in.JointNameOf(j));
+  }
+  return names;
+}
+
+void LeaveOutOf(const char* element, const char* attribute, const char* what,
+                const std::vector<std::string>& joints, MjcfImport* in) {
+  if (joints.empty()) return;
+  in->LeaveOut(element, attribute,
+               fmt::format("{} of {} joint{} ({})", what, joints.size(),
+                           joints.size() == 1 ? "" : "s", Joined(joints, kMost)));
+}
+
+void LeaveOutBalls(MjcfImport* in) {
+  const mjModel& m = in->m;
+  LeaveOutOf("ball", "armature", "armature", BallsWith(*in, m.dof_armature), in);
+  if (!in->FrictionIsOff()) {
+    LeaveOutOf("ball", "frictionloss", "friction loss", BallsWith(*in, m.dof_frictionloss), in);
+  }
+  if (!in->IsOff(mjDSBL_PASSIVE)) {
+    LeaveOutOf("ball", "damping", "damping", BallsWith(*in, m.dof_damping), in);
+    LeaveOutOf("ball", "stiffness", "stiffness",
+               BallsWhere(*in, [&](int j) { return m.jnt_stiffness[j] != 0.0; }), in);
+  }
+  if (!in->LimitsAreOff()) {
+    LeaveOutOf("ball", "range", "the range",
+               BallsWhere(*in, [&](int j) { return m.jnt_limited[j] != 0; }), in);
+  }
+}
+
+void LeaveOutFluid(MjcfImport* in) {
+  const mjOption& option = in->m.opt;
+  if (in->IsOff(mjDSBL_PASSIVE) || (option.density == 0.0 && option.viscosity == 0.0)) return;
+  for (const auto& [name, value] :
+       {std::pair("density", option.density), {"viscosity", option.viscosity}}) {
+    if (value != 0.0) in->LeaveOut("option", name, fmt::format("the fluid's {} {:g}", name, value));
+  }
+  const Vec3 wind = VecAt(option.wind);
+  if (wind.norm() > 0.0) {
+    in->LeaveOut("option", "wind", fmt::format("the fluid's wind of {:g} m/s", wind.norm()));
+  }
+}
+
+void LeaveOutTendons(MjcfImport* in) {
+  const mjModel& m = in->m;
+  const size_t tendons = static_cast<size_t>(m.ntendon) - in->coupling_tendons.size();
+  bool acts = false;
+  for (int t = 0; t < m.ntendon; ++t) {
+    const bool passive = !in->IsOff(mjDSBL_PASSIVE);
+    const std::pair<const char*, bool> kinds[] = {
+        {"stiffness", passive && m.tendon_stiffness[t] != 0.0},
+        {"damping", passive && m.tendon_damping[t] != 0.0},
+        {"frictionloss", !in->FrictionIsOff() && m.tendon_frictionloss[t] != 0.0},
+        {"range", !in->LimitsAreOff() && m.tendon_limited[t] != 0}};
+    for (const auto& [attribute, is_there] : kinds) {
+      if (!is_there) continue;
+      acts = true;
+      in->LeaveOut(
+          "tendon/spatial", attribute,
+          fmt::format("{} of tendon '{}'", attribute, in->NameOf(mjOBJ_TENDON, t, "tendon")));
+    }
+  }
+  if (tendons > 0 && !acts)
+    in->Say(fmt::format("{} tendons are left out: they exert no force", tendons));
+}
+
+// Geoms that touch in the pose of the file; the balls in the place of meshes do not count.
+std::string TouchingGeoms(const MjcfImport& in) {
+  const std::unique_ptr<mjModel, void (*)(mjModel*)> copy(mj_copyModel(nullptr, &in.m),
+                                                          [](mjModel* m) { mj_deleteModel(m); });
+  for (int g = 0; g < copy->ngeom; ++g) {
+    if (!in.foreign.meshes().contains(in.NameOf(mjOBJ_GEOM, g, "geom"))) continue;
+    copy->geom_contype[g] = copy->geom_conaffinity[g] = 0;
+  }
+  const DataHandle data = MakeData(*copy);
+  std::copy(in.qpos, in.qpos + copy->nq, data->qpos);
+  mj_kinematics(copy.get(), data.get());
+  mj_comPos(copy.get(), data.get());
+  mj_collision(copy.get(), data.get());
+  for (int c = 0; c < data->ncon; ++c) {
+    const mjContact& contact = data->contact[c];
+    if (contact.dist > 0.0) continue;
+    return fmt::format("contact of '{}' with '{}'", in.NameOf(mjOBJ_GEOM, contact.geom1, "geom"),
+                       in.NameOf(mjOBJ_GEOM, contact.geom2, "geom"));
+  }
+  return "";
+}
+
+void TellNames(const MjcfImport& in, const char* text, const std::vector<std::string>& names,
+               const char* hint = "") {
+  if (!names.empty()) in.Say(text + Joined(names, kMost), hint);
+}
+
+}  // namespace
+
+void MjcfImport::LeaveOut(const char* element, const char* attribute, const std::string& what) {
+  const mjcf::ForeignRow* row = mjcf::FindForeignRow(element, attribute);
+  MBV_DEMAND(row != nullptr && row->fate == mjcf::Fate::kLeftOut, element);
+  left_out.push_back(
+      {.kind = ModelCaveat::Kind::kLeftOut,
+       .text = fmt::format("{} is left out: {}", what, row->effect),
+       .source = fmt::format("{}{}{}", row->element, *attribute == '\0' ? "" : " ", attribute)});
+  Say(left_out.back().text, "forces are computed without it");
+}
+
+void TellWhatIsLost(MjcfImport* in) {
+  LeaveOutFluid(in);
+  LeaveOutBalls(in);
+  LeaveOutOf("hinge or slide", "damping", "the negative damping", in->driving, in);
+  LeaveOutTendons(in);
+  if (!in->held.empty()) {
+    in->LeaveOut("body/freejoint", "", "the free joint of " + Joined(in->held, kMost));
+  }
+  TellNames(*in, "the gears of these actuators are left out: ", in->geared,
+            "positions and forces are those of the joint, not of the motor");
+  TellNames(*in, "positions of these joints count from the file's reference (ref): ", in->shifted);
+  TellNames(*in, "zero is beyond the range of these joints, the loops are closed from inside it: ",
+            in->moved);
+  if (in->touching && !in->ContactsAreOff()) {
+    const std::string contact = TouchingGeoms(*in);
+    if (contact.empty()) {
+      in->Say("there are no contacts here: geoms do not touch");
+    } else {
+      in->LeaveOut("contact", "", contact);
+    }
+  }
+  if (in->m.nkey > 0) {
+    in->Say(fmt::format("the loops are closed from the keyframe '{}'",
+                        in->NameOf(mjOBJ_KEY, 0, "keyframe")));
+  }
+}
+
+// Frames and shapes of an MJCF file.
+
+namespace {
+
+// "" for MuJoCo's default grey.
+std::string ColorOf(const float* rgba) {
+  if (rgba[0] == 0.5F && rgba[1] == 0.5F && rgba[2] == 0.5F) return "";
+  const auto byte = [](float x) {
+    return static_cast<int>(std::lround(255.0 * std::clamp(double{x}, 0.0, 1.0)));
+  };
+  return fmt::format("#{:02x}{:02x}{:02x}{:02x}", byte(rgba[0]), byte(rgba[1]), byte(rgba[2]),
+                     byte(rgba[3]));
+}
+
+void AddMesh(int g, const mjcf::ForeignMesh& mesh, MjcfImport* in) {
+  constexpr int kHidden = 3;  // groups from here on are switched off in MuJoCo's viewer
+  const mjModel& m = in->m;
+  const Mesh geometry{.X_BG = PoseAt(m.geom_pos + 3 * g, m.geom_quat + 4 * g) * mesh.X_GF,
+                      .file = mesh.file,
+                      .scale = mesh.scale,
+                      .surface = std::make_shared<const TriangleMesh>()};
+  std::vector<Shape>& shapes = in->BodyOf(m.geom_bodyid[g]).shapes;
+  // The same mesh once more, to be touched.
+  const bool again = std::ranges::any_of(shapes, [&](const Shape& other) {
+    const auto* known = std::get_if<Mesh>(&other.geometry);
+    return known != nullptr && known->file == geometry.file && known->scale == geometry.scale &&
+           known->X_BG.isApprox(geometry.X_BG, 1e-12);
+  });
+  if (again || m.geom_group[g] >= kHidden) return;
+  Shape shape{.geometry = geometry};
+  if (const std::string color = ColorOf(m.geom_rgba + 4 * g); !color.empty()) shape.color = color;
+  shapes.push_back(shape);
+}
+
+// Of a geom that MuJoCo draws by itself; empty for planes and others.
+std::optional<Shape> SolidOf(const mjModel& m, int g) {
+  const Pose X = PoseAt(m.geom_pos + 3 * g, m.geom_quat + 4 * g);
+  const mjtNum* size = m.geom_size + 3 * g;
+  const Vec3 half(0, 0, size[1]);
+  switch (m.geom_type[g]) {
+    case mjGEOM_SPHERE:
+      return Shape{.geometry = Ball{X.translation(), size[0]}};
+    case mjGEOM_CAPSULE:
+      return Shape{.geometry = Capsule{X * Vec3(-half), X * half, size[0]}};
+    case mjGEOM_CYLINDER:
+      return Shape{.geometry = Cylinder{X * Vec3(-half), X * half, size[0]}};
+    case mjGEOM_BOX:
+      return Shape{.geometry = Box{X, 2.0 * VecAt(size)}};
+    default:
+      return std::nullopt;
+  }
+}
+
+}  // namespace
+
+void AddSites(MjcfImport* in) {
+  const mjModel& m = in->m;
+  for (int s = 0; s < m.nsite; ++s) {
+    in->BodyOf(m.site_bodyid[s])
+        .frames.push_back(
+            {in->NameOf(mjOBJ_SITE, s, "site"), PoseAt(m.site_pos + 3 * s, m.site_quat + 4 * s)});
+  }
+}
+
+void AddShapes(MjcfImport* in) {
+  const mjModel& m = in->m;
+  for (int g = 0; g < m.ngeom; ++g) {
+    if (m.geom_contype[g] != 0 || m.geom_conaffinity[g] != 0) in->touching = true;
+    const auto mesh = in->foreign.meshes().find(in->NameOf(mjOBJ_GEOM, g, "geom"));
+    if (mesh != in->foreign.meshes().end()) {
+      AddMesh(g, mesh->second, in);
+      continue;
+    }
+    if (m.geom_bodyid[g] == 0) continue;  // floors
+    if (auto solid = SolidOf(m, g)) in->BodyOf(m.geom_bodyid[g]).shapes.push_back(*solid);
+  }
+}
+
+}  // namespace mbv::simulation

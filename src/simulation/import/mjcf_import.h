@@ -1,0 +1,99 @@
+// What an MJCF file becomes, on its way: MuJoCo's compiled model, the mechanism so far, and which
+// part of one is which part of the other. Internal to simulation/.
+#pragma once
+
+#include <fmt/format.h>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "base/diagnostics.h"
+#include "mechanism/mechanism.h"
+#include "simulation/engine/engine.h"
+#include "simulation/mjcf/foreign.h"
+
+namespace mbv::simulation {
+
+[[nodiscard]] inline Vec3 VecAt(const mjtNum* data) { return {data[0], data[1], data[2]}; }
+[[nodiscard]] inline Mat3 RotationAt(const mjtNum* quat) {
+  return Eigen::Quaterniond(quat[0], quat[1], quat[2], quat[3]).normalized().toRotationMatrix();
+}
+[[nodiscard]] inline Pose PoseAt(const mjtNum* pos, const mjtNum* quat) {
+  Pose X = Pose::Identity();
+  X.translation() = VecAt(pos);
+  X.linear() = RotationAt(quat);
+  return X;
+}
+[[nodiscard]] inline Pose Shifted(const Vec3& p) { return Pose(Eigen::Translation3d(p)); }
+
+/// Hinges and slides.
+[[nodiscard]] inline bool IsScalar(const mjModel& m, int joint) {
+  return m.jnt_type[joint] == mjJNT_HINGE || m.jnt_type[joint] == mjJNT_SLIDE;
+}
+
+struct MjcfImport {
+  const mjModel& m;
+  const mjcf::ForeignMjcf& foreign;
+  const std::string& file;
+  Diagnostics* diagnostics;
+
+  const mjtNum* qpos = nullptr;  ///< pose of the file: the first keyframe's, or the reference
+  Mechanism mechanism = {};
+  std::vector<int> body_of = {};     ///< per body of MuJoCo: index into mechanism.bodies
+  std::vector<int> joint_of = {};    ///< per joint of MuJoCo: index into mechanism.joints
+  std::vector<int> closure_of = {};  ///< per equality: index into mechanism.joints, or -1
+
+  std::vector<ModelCaveat> left_out = {};  ///< what acts on forces and is not in the mechanism
+
+  // What the findings at the end tell.
+  std::vector<std::string> held = {}, geared = {}, shifted = {}, moved = {};
+  std::vector<std::string> driving = {};  ///< joints whose damping is negative
+  std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
+  bool touching = false;                  ///< geoms would touch each other
+
+  void Say(const std::string& text, const std::string& hint = "") const {
+    diagnostics->Add({Severity::kWarning, file, 0, 0, text, hint});
+  }
+  /// Leaves out what a row of foreign_rows.h is about; `what` names it. The effect is the row's.
+  void LeaveOut(const char* element, const char* attribute, const std::string& what);
+  /// What the file's flags switch off, e.g. mjDSBL_PASSIVE.
+  [[nodiscard]] bool IsOff(int flag) const { return (m.opt.disableflags & flag) != 0; }
+  [[nodiscard]] bool EqualitiesAreOff() const {
+    return IsOff(mjDSBL_EQUALITY) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] bool FrictionIsOff() const {
+    return IsOff(mjDSBL_FRICTIONLOSS) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] bool LimitsAreOff() const {
+    return IsOff(mjDSBL_LIMIT) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] bool ContactsAreOff() const {
+    return IsOff(mjDSBL_CONTACT) || IsOff(mjDSBL_CONSTRAINT);
+  }
+  [[nodiscard]] std::string NameOf(mjtObj type, int id, const char* kind) const {
+    return NameAt(m, type, id, kind);
+  }
+  [[nodiscard]] std::string JointNameOf(int j) const { return NameOf(mjOBJ_JOINT, j, "joint"); }
+  /// The mechanism's body that a body of MuJoCo became.
+  [[nodiscard]] Body& BodyOf(int b) {
+    return mechanism.bodies[static_cast<size_t>(body_of[static_cast<size_t>(b)])];
+  }
+};
+
+// In this order, each needs those before.
+
+/// Bodies, and the joints that carry them; free bodies are held.
+void AddTree(MjcfImport* in);
+/// Closures, and couplings of joints.
+void AddEqualities(MjcfImport* in);
+/// Armature, damping, dry friction and springs of hinges and slides.
+void AddElements(MjcfImport* in);
+/// Actuators on hinges and slides.
+void AddDrives(MjcfImport* in);
+/// Sites as frames, geoms and mesh files as shapes.
+void AddSites(MjcfImport* in);
+void AddShapes(MjcfImport* in);
+/// A finding for each kind of thing that the mechanism cannot express or has otherwise.
+void TellWhatIsLost(MjcfImport* in);
+
+}  // namespace mbv::simulation

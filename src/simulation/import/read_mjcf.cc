@@ -1,0 +1,81 @@
+#include "simulation/import/read_mjcf.h"
+
+#include <vector>
+
+#include "simulation/import/mjcf_import.h"
+#include "simulation/mjcf/foreign.h"
+
+namespace mbv {
+namespace simulation {
+namespace {
+
+ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
+                    Diagnostics* diagnostics) {
+  ImportedMjcf imported;
+  imported.text = foreign.Text();
+  imported.model = CompileMjcf(imported.text);
+  const mjModel& m = *imported.model;
+  MjcfImport in{.m = m, .foreign = foreign, .file = file, .diagnostics = diagnostics};
+  in.mechanism.name = foreign.ModelName();
+  in.mechanism.file = file;
+  in.left_out = foreign.left_out();
+  in.mechanism.gravity_W = in.IsOff(mjDSBL_GRAVITY) ? Vec3(Vec3::Zero()) : VecAt(m.opt.gravity);
+  if (in.mechanism.gravity_W.norm() > 0.0) {
+    in.mechanism.up_W = -in.mechanism.gravity_W.normalized();
+  }
+  AddTree(&in);
+  AddEqualities(&in);
+  AddElements(&in);
+  AddDrives(&in);
+  AddSites(&in);
+  AddShapes(&in);
+  TellWhatIsLost(&in);
+  imported.mechanism = std::move(in.mechanism);
+  imported.left_out = std::move(in.left_out);
+  imported.joint_of = std::move(in.joint_of);
+  imported.closure_of = std::move(in.closure_of);
+  for (int e = 0; e < m.neq; ++e) {
+    const char* name = mj_id2name(&m, mjOBJ_EQUALITY, e);
+    imported.closed_by_sites.push_back(name != nullptr &&
+                                       foreign.closures_by_sites().contains(name));
+  }
+  return imported;
+}
+
+}  // namespace
+
+std::optional<ImportedMjcf> ImportMjcf(const std::string& text, const std::string& file,
+                                       const std::vector<std::string>& warnings,
+                                       Diagnostics* diagnostics) {
+  mjcf::ForeignMjcf foreign(text, file, diagnostics);
+  if (!foreign.ok()) return std::nullopt;
+  constexpr int kMostRounds = 200;
+  for (int round = 0; round < kMostRounds; ++round) {
+    try {
+      ImportedMjcf imported = Import(foreign, file, diagnostics);
+      for (const std::string& warning : warnings) {
+        diagnostics->Add({Severity::kWarning, file, 0, 0, "MuJoCo: " + warning, ""});
+      }
+      return imported;
+    } catch (const EngineError& error) {
+      if (foreign.DropWhatIsUnknown(error.what())) continue;
+      diagnostics->AddError(file, std::string("MuJoCo: ") + error.what());
+      return std::nullopt;
+    }
+  }
+  diagnostics->AddError(file, "too many things in it are unknown to MuJoCo 2.2");
+  return std::nullopt;
+}
+
+}  // namespace simulation
+
+std::optional<MjcfModel> ReadMjcf(const std::string& text, const std::string& file,
+                                  Diagnostics* diagnostics) {
+  std::vector<std::string> warnings;
+  const simulation::EngineSession session(&warnings);
+  auto imported = simulation::ImportMjcf(text, file, warnings, diagnostics);
+  if (!imported) return std::nullopt;
+  return MjcfModel{std::move(imported->mechanism), std::move(imported->left_out)};
+}
+
+}  // namespace mbv

@@ -1,0 +1,573 @@
+#include "simulation/mjcf/foreign.h"
+
+#include <fmt/format.h>
+#include <tinyxml2.h>
+
+#include <cstdlib>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "base/files.h"
+#include "base/text.h"
+#include "simulation/mjcf/foreign_frames.h"
+#include "simulation/mjcf/foreign_rows.h"
+
+namespace mbv::mjcf {
+namespace {
+
+namespace fs = std::filesystem;
+using tinyxml2::XMLDocument;
+using tinyxml2::XMLElement;
+
+constexpr int kDeepest = 200;  // nesting of elements
+constexpr size_t kMostNames = 6;
+
+// What a row's element and attribute are called in findings.
+std::string NameOf(const std::string& element, const std::string& attribute) {
+  const std::string tag = element.substr(element.find('/') + 1);
+  if (attribute.empty()) return fmt::format("<{}>", tag);
+  return fmt::format("{} of <{}>", attribute, tag);
+}
+
+std::string ElementOf(const XMLElement* e) {
+  const XMLElement* parent = e->Parent() == nullptr ? nullptr : e->Parent()->ToElement();
+  return ForeignElement(parent == nullptr ? "" : parent->Name(), e->Name());
+}
+
+// True if an attribute switches something off, "disable".
+bool IsOff(const XMLElement* flag, const char* name) {
+  const char* value = flag->Attribute(name);
+  return value != nullptr && std::string_view(value) == "disable";
+}
+
+int DepthOf(const XMLElement* element) {
+  int deepest = 0;
+  for (const XMLElement* e = element->FirstChildElement(); e != nullptr;
+       e = e->NextSiblingElement()) {
+    deepest = std::max(deepest, 1 + DepthOf(e));
+  }
+  return deepest;
+}
+
+}  // namespace
+
+struct ForeignMjcf::Impl {
+  XMLDocument document;
+  fs::path file, folder;
+  Diagnostics* diagnostics = nullptr;
+  std::map<std::string, SitePair> by_sites;
+  std::map<std::string, ForeignMesh> meshes;
+  std::vector<ModelCaveat> left_out;
+  bool weightless = false;  // gravity compensation does nothing
+  bool good = false;
+
+  void Add(Severity severity, int line, const std::string& text, const std::string& hint = "") {
+    diagnostics->Add({severity, file.string(), line, line > 0 ? 1 : 0, text, hint});
+    if (severity == Severity::kError) good = false;
+  }
+
+  XMLElement* root() { return document.RootElement(); }
+
+  // The path of a file that the model names, if it lies below the model's folder.
+  [[nodiscard]] bool IsBelow(const fs::path& path) const {
+    std::error_code error;
+    const fs::path base = fs::weakly_canonical(folder, error);
+    const fs::path inside = fs::weakly_canonical(path, error).lexically_relative(base);
+    return !error && !inside.empty() && *inside.begin() != "..";
+  }
+
+  void Parse(const std::string& text) {
+    good = true;
+    const tinyxml2::XMLError trouble = document.Parse(text.c_str(), text.size());
+    if (trouble == tinyxml2::XML_ELEMENT_DEPTH_EXCEEDED) {
+      Add(Severity::kError, document.ErrorLineNum(),
+          fmt::format("elements are nested deeper than {}, which no XML reader of MuJoCo takes",
+                      TINYXML2_MAX_ELEMENT_DEPTH - 1),
+          "a chain of so many bodies can be written as a model.yaml, where bodies do not nest");
+      return;
+    }
+    if (trouble != tinyxml2::XML_SUCCESS) {
+      Add(Severity::kError, document.ErrorLineNum(), "the file is not well-formed XML",
+          fmt::format("the XML reader says {}", document.ErrorName()));
+      return;
+    }
+    if (root() == nullptr || !IsTag(root(), "mujoco")) {
+      Add(Severity::kError, 0, "no MJCF: the root element is not <mujoco>");
+      return;
+    }
+    if (DepthOf(root()) > kDeepest) {
+      Add(Severity::kError, 0, fmt::format("elements are nested deeper than {}", kDeepest));
+    }
+  }
+
+  void TakeIncludes() {
+    constexpr int kMost = 100;
+    for (int taken = 0; good && taken <= kMost; ++taken) {
+      XMLElement* found = nullptr;
+      ForEach(root(), [&](XMLElement* e) {
+        if (found == nullptr && IsTag(e, "include")) found = e;
+      });
+      if (found == nullptr) return;
+      if (taken == kMost) {
+        Add(Severity::kError, found->GetLineNum(), fmt::format("more than {} includes", kMost));
+        return;
+      }
+      TakeInclude(found);
+    }
+  }
+
+  void TakeInclude(XMLElement* include) {
+    const char* name = include->Attribute("file");
+    const fs::path path = folder / (name == nullptr ? "" : name);
+    const auto text = IsBelow(path) ? ReadWholeFile(path) : std::nullopt;
+    XMLDocument other;
+    if (!text || other.Parse(text->c_str(), text->size()) != tinyxml2::XML_SUCCESS ||
+        other.RootElement() == nullptr || DepthOf(other.RootElement()) > kDeepest) {
+      Add(Severity::kError, include->GetLineNum(),
+          fmt::format("include '{}' cannot be read", name == nullptr ? "" : name),
+          "it must be an XML file in the model's folder or below");
+      return;
+    }
+    tinyxml2::XMLNode* parent = include->Parent();
+    tinyxml2::XMLNode* last = include;
+    for (const XMLElement* e = other.RootElement()->FirstChildElement(); e != nullptr;
+         e = e->NextSiblingElement()) {
+      last = parent->InsertAfterChild(last, e->DeepClone(&document));
+    }
+    document.DeleteNode(include);
+  }
+
+  // What dynamics without contacts do not need.
+  void DropPictures() {
+    MeshGeoms geoms = TakeMeshGeoms(
+        MeshFolder(), [this](const fs::path& path) { return IsBelow(path); }, &document);
+    meshes = std::move(geoms.meshes);
+    if (geoms.lost > 0) {
+      Add(Severity::kWarning, 0, fmt::format("{} meshes are left out of the pictures", geoms.lost),
+          "meshes of files in the model's folder or below are drawn");
+    }
+    std::vector<XMLElement*> others;
+    std::set<std::string> bodies{"world"};
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "body") && e->Attribute("name") != nullptr) bodies.insert(e->Attribute("name"));
+    });
+    const auto known = [&](const XMLElement* e, const char* body) {
+      return e->Attribute(body) != nullptr && bodies.contains(e->Attribute(body));
+    };
+    ForEach(root(), [&](XMLElement* e) {
+      for (const char* attribute : {"material", "texture"}) e->DeleteAttribute(attribute);
+      const bool in_assets = e->Parent() != nullptr && e->Parent()->ToElement() != nullptr &&
+                             IsTag(e->Parent()->ToElement(), "asset");
+      if (in_assets && (IsTag(e, "texture") || IsTag(e, "material") || IsTag(e, "skin"))) {
+        others.push_back(e);
+      }
+      if (e->Parent() != root()) return;
+      for (const char* section : {"visual", "sensor"}) {
+        if (IsTag(e, section)) others.push_back(e);
+      }
+      if (!IsTag(e, "contact")) return;
+      for (XMLElement* pair = e->FirstChildElement("pair"); pair != nullptr;
+           pair = pair->NextSiblingElement("pair")) {
+        others.push_back(pair);  // of geoms that may be gone
+      }
+      // Of bodies of a scene that is another file.
+      for (XMLElement* exclude = e->FirstChildElement("exclude"); exclude != nullptr;
+           exclude = exclude->NextSiblingElement("exclude")) {
+        if (!known(exclude, "body1") || !known(exclude, "body2")) others.push_back(exclude);
+      }
+    });
+    for (XMLElement* e : others) document.DeleteNode(e);
+    DropUnusedMeshes();
+  }
+
+  void DropUnusedMeshes() {
+    std::set<std::string> used;
+    std::vector<XMLElement*> unused;
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "geom") && e->Attribute("mesh") != nullptr) used.insert(e->Attribute("mesh"));
+    });
+    ForEach(root(), [&](XMLElement* e) {
+      const auto* parent = e->Parent()->ToElement();
+      if (!IsTag(e, "mesh") || parent == nullptr || !IsTag(parent, "asset")) return;
+      std::string name = e->Attribute("name") == nullptr ? "" : e->Attribute("name");
+      const char* from = e->Attribute("file");
+      if (name.empty() && from != nullptr) name = fs::path(from).stem().string();
+      if (used.count(name) == 0) {
+        unused.push_back(e);
+      } else if (from != nullptr && !IsBelow(MeshFolder() / from)) {
+        Add(Severity::kError, e->GetLineNum(),
+            fmt::format("mesh '{}' lies outside the model's folder", from));
+      }
+    });
+    for (XMLElement* e : unused) document.DeleteNode(e);
+  }
+
+  XMLElement* Compiler() {
+    XMLElement* compiler = root()->FirstChildElement("compiler");
+    if (compiler == nullptr) {
+      compiler = document.NewElement("compiler");
+      root()->InsertFirstChild(compiler);
+    }
+    return compiler;
+  }
+
+  // Since MuJoCo 3.0 a range holds unless the file says otherwise.
+  void LetRangesHold() {
+    int open = 0, line = 0;
+    bool of_actuators = false;  // no force: their motion is commanded
+    ForEach(root(), [&](XMLElement* e) {
+      for (const auto& [range, limited] : {std::pair("ctrlrange", "ctrllimited"),
+                                           {"forcerange", "forcelimited"},
+                                           {"actrange", "actlimited"}}) {
+        if (e->Attribute(range) != nullptr && e->Attribute(limited) == nullptr) of_actuators = true;
+      }
+      if (e->Attribute("range") == nullptr || e->Attribute("limited") != nullptr) return;
+      if (open++ == 0) line = e->GetLineNum();
+    });
+    bool stated = false;
+    for (XMLElement* e = root()->FirstChildElement("compiler"); e != nullptr;
+         e = e->NextSiblingElement("compiler")) {
+      stated = stated || e->Attribute("autolimits") != nullptr;
+    }
+    if (stated || (open == 0 && !of_actuators)) return;
+    Compiler()->SetAttribute("autolimits", "true");
+    if (open == 0) return;
+    Add(Severity::kWarning, line,
+        fmt::format("{} range{} without `limited` hold{}, as since MuJoCo 3", open,
+                    open == 1 ? "" : "s", open == 1 ? "s" : ""),
+        "<compiler autolimits=\"false\"/> if they should not");
+  }
+
+  // The body that carries a site, by its name, which it is given if it has none; empty without one.
+  std::string BodyOfSite(const std::string& site) {
+    XMLElement* body = nullptr;
+    ForEach(root(), [&](XMLElement* e) {
+      const char* name = IsTag(e, "site") ? e->Attribute("name") : nullptr;
+      if (name != nullptr && name == site) body = e->Parent()->ToElement();
+    });
+    if (body == nullptr) return "";
+    if (IsTag(body, "worldbody")) return "world";
+    if (!IsTag(body, "body")) return "";
+    if (body->Attribute("name") == nullptr) {
+      body->SetAttribute("name", ("body_of_" + site).c_str());
+    }
+    return body->Attribute("name");
+  }
+
+  // Since MuJoCo 3.2 a connect or weld may name two sites.
+  void NameBodiesOfSites() {
+    std::vector<XMLElement*> closures;
+    ForEach(root(), [&](XMLElement* e) {
+      if ((IsTag(e, "connect") || IsTag(e, "weld")) && e->Attribute("site1") != nullptr &&
+          e->Attribute("site2") != nullptr) {
+        closures.push_back(e);
+      }
+    });
+    for (XMLElement* e : closures) {
+      const SitePair sites{e->Attribute("site1"), e->Attribute("site2")};
+      const std::string body1 = BodyOfSite(sites.first), body2 = BodyOfSite(sites.second);
+      if (body1.empty() || body2.empty()) {
+        Add(Severity::kError, e->GetLineNum(),
+            fmt::format("<{}> names the site '{}', which no body has", e->Name(),
+                        body1.empty() ? sites.first : sites.second));
+        continue;
+      }
+      std::string name =
+          e->Attribute("name") == nullptr ? sites.first + "_" + sites.second : e->Attribute("name");
+      while (by_sites.contains(name)) name += "_";
+      for (const char* attribute : {"site1", "site2", "relpose"}) e->DeleteAttribute(attribute);
+      e->SetAttribute("name", name.c_str());
+      e->SetAttribute("body1", body1.c_str());
+      e->SetAttribute("body2", body2.c_str());
+      e->SetAttribute("anchor", "0 0 0");
+      by_sites.emplace(name, sites);
+    }
+  }
+
+  fs::path MeshFolder() {
+    const XMLElement* compiler = root()->FirstChildElement("compiler");
+    const char* meshes = compiler == nullptr ? nullptr : compiler->Attribute("meshdir");
+    if (meshes == nullptr && compiler != nullptr) meshes = compiler->Attribute("assetdir");
+    return meshes == nullptr ? folder : folder / meshes;
+  }
+
+  void WriteOutFrames() {
+    const FrameTrouble trouble = DissolveFrames(&document);
+    if (!trouble.text.empty()) Add(Severity::kError, trouble.line, trouble.text, trouble.hint);
+  }
+
+  // Since MuJoCo 3.3.6 springs and dampers are switched off apart.
+  void SwitchOff() {
+    bool springs = false, dampers = false, passive = false;
+    weightless = false;
+    ForEach(root(), [&](XMLElement* e) {
+      if (IsTag(e, "option")) {
+        const char* gravity = e->Attribute("gravity");
+        if (gravity != nullptr && !MoreThanFirst(gravity) && std::atof(gravity) == 0.0) {
+          weightless = true;
+        }
+      }
+      if (!IsTag(e, "flag")) return;
+      springs = springs || IsOff(e, "spring");
+      dampers = dampers || IsOff(e, "damper");
+      passive = passive || IsOff(e, "passive");
+      weightless = weightless || IsOff(e, "gravity");
+      if (springs && dampers) e->SetAttribute("passive", "disable");
+      e->DeleteAttribute("spring");
+      e->DeleteAttribute("damper");
+    });
+    weightless = weightless || passive || (springs && dampers);
+    if (springs == dampers) return;
+    const char* off = springs ? "stiffness" : "damping";
+    ForEach(root(), [&](XMLElement* e) {
+      for (const char* tag : {"joint", "spatial", "fixed", "tendon"}) {
+        if (IsTag(e, tag) && e->Attribute(off) != nullptr) e->SetAttribute(off, "0");
+      }
+    });
+  }
+
+  // Of several numbers, whether one beyond the first is not zero.
+  static bool MoreThanFirst(const std::string& text) {
+    const char* at = text.c_str();
+    char* end = nullptr;
+    (void)std::strtod(at, &end);
+    for (at = end; *at != '\0'; at = end) {
+      const double x = std::strtod(at, &end);
+      if (end == at) return false;
+      if (x != 0.0) return true;
+    }
+    return false;
+  }
+
+  // Something of one kind that is left out, and where.
+  struct Loss {
+    int count = 0, line = 0;
+    std::vector<std::string> names;
+  };
+  using Losses = std::map<std::pair<std::string, std::string>, Loss>;  // by element, attribute
+
+  static void Note(const XMLElement* e, const std::string& element, const std::string& attribute,
+                   Losses* losses) {
+    Loss& loss = (*losses)[{element, attribute}];
+    if (loss.count++ == 0) loss.line = e->GetLineNum();
+    for (const XMLElement* at = e; at != nullptr; at = at->Parent()->ToElement()) {
+      if (const char* name = at->Attribute("name")) {
+        if (loss.names.empty() || loss.names.back() != name) loss.names.emplace_back(name);
+        return;
+      }
+    }
+  }
+
+  // Every element and attribute against the rows.
+  void LookUpAll() {
+    Losses lost, unknown;
+    ForEach(root(), [&](XMLElement* e) { LookUp(e, &lost, &unknown); });
+    for (const auto& [what, loss] : lost) {
+      const ForeignRow* row = FindForeignRow(what.first, what.second);
+      if (row->fate == Fate::kRefused) {
+        Add(Severity::kError, loss.line,
+            fmt::format("{} is not read: {}", Described(what, loss), row->effect),
+            "write the model out with a current MuJoCo (mj_saveLastXML) and import that");
+      } else {
+        LeaveOut(what, loss, row->effect);
+      }
+    }
+    for (const auto& [what, loss] : unknown) {
+      LeaveOut(what, loss, "it is not known, and forces may depend on it");
+    }
+  }
+
+  void LookUp(XMLElement* e, Losses* lost, Losses* unknown) {
+    const std::string element = ElementOf(e);
+    const ForeignRow* row = FindForeignRow(element, "");
+    if (row != nullptr && !row->compiled &&
+        (row->fate == Fate::kLeftOut || row->fate == Fate::kRefused)) {
+      Note(e, element, "", lost);
+      return;
+    }
+    if (!IsForeignElement(element)) {
+      Note(e, element, "", unknown);
+      return;
+    }
+    TakeFirstNumber(e, lost);
+    for (const auto* a = e->FirstAttribute(); a != nullptr; a = a->Next()) {
+      row = FindForeignRow(element, a->Name());
+      if (row == nullptr) Note(e, element, a->Name(), unknown);
+      if (row == nullptr || row->fate != Fate::kLeftOut || row->compiled) continue;
+      if (IsNeutral(*row, a->Value())) continue;
+      if (weightless && std::string_view(a->Name()) == "gravcomp") continue;
+      Note(e, element, a->Name(), lost);
+    }
+  }
+
+  // Springs and dampers may be polynomials since MuJoCo 3.
+  static void TakeFirstNumber(XMLElement* e, Losses* lost) {
+    for (const char* tag : {"joint", "spatial", "fixed", "tendon"}) {
+      if (!IsTag(e, tag)) continue;
+      for (const char* attribute : {"stiffness", "damping"}) {
+        const char* text = e->Attribute(attribute);
+        if (text == nullptr) continue;
+        if (MoreThanFirst(text)) Note(e, attribute, "2nd", lost);
+        char* end = nullptr;
+        (void)std::strtod(text, &end);
+        while (*end == ' ') ++end;
+        if (*end == '\0' || end == text) continue;
+        e->SetAttribute(attribute, std::string(text, static_cast<const char*>(end)).c_str());
+      }
+    }
+  }
+
+  static std::string Described(const std::pair<std::string, std::string>& what, const Loss& loss) {
+    const std::string name = what.second == "2nd" ? fmt::format("a second number of {}", what.first)
+                                                  : NameOf(what.first, what.second);
+    return fmt::format("{} ({}{}{})", name, loss.count, loss.names.empty() ? "" : ": ",
+                       Joined(loss.names, kMostNames));
+  }
+
+  void LeaveOut(const std::pair<std::string, std::string>& what, const Loss& loss,
+                const std::string& effect) {
+    left_out.push_back({.kind = ModelCaveat::Kind::kLeftOut,
+                        .text = fmt::format("{} is left out: {}", Described(what, loss), effect),
+                        .source = what.first + (what.second.empty() ? "" : " ") + what.second});
+    Add(Severity::kWarning, loss.line, left_out.back().text, "forces are computed without it");
+  }
+
+  bool DropWeightlessGeoms(const std::string& message);
+
+  void MakeFoldersAbsolute() {
+    std::error_code error;
+    const std::string meshes = fs::absolute(MeshFolder(), error).lexically_normal().string();
+    Compiler()->SetAttribute("meshdir", meshes.c_str());
+  }
+};
+
+ForeignMjcf::ForeignMjcf(const std::string& text, const fs::path& file, Diagnostics* diagnostics)
+    : impl_(std::make_unique<Impl>()) {
+  impl_->file = file;
+  impl_->folder = file.parent_path();
+  impl_->diagnostics = diagnostics;
+  impl_->Parse(text);
+  if (ok()) impl_->TakeIncludes();
+  if (ok()) impl_->SwitchOff();
+  if (ok()) impl_->WriteOutFrames();
+  if (ok()) impl_->DropPictures();
+  if (ok()) impl_->LookUpAll();  // what only serves pictures needs no word
+  if (ok()) impl_->LetRangesHold();
+  if (ok()) impl_->NameBodiesOfSites();
+  if (ok()) impl_->MakeFoldersAbsolute();
+}
+
+ForeignMjcf::~ForeignMjcf() = default;
+
+bool ForeignMjcf::ok() const { return impl_->good; }
+
+std::string ForeignMjcf::Text() const {
+  tinyxml2::XMLPrinter printer;
+  impl_->document.Print(&printer);
+  return printer.CStr();
+}
+
+const std::map<std::string, ForeignMesh>& ForeignMjcf::meshes() const { return impl_->meshes; }
+
+std::string ForeignMjcf::ModelName() const {
+  const char* name = impl_->root()->Attribute("model");
+  return name == nullptr ? "" : name;
+}
+
+const std::vector<ModelCaveat>& ForeignMjcf::left_out() const { return impl_->left_out; }
+
+const std::map<std::string, SitePair>& ForeignMjcf::closures_by_sites() const {
+  return impl_->by_sites;
+}
+
+namespace {
+
+// What stands between two marks of a message, beyond a text that must come before them.
+std::optional<std::string> TextBetween(const std::string& message, const std::string& beyond,
+                                       const std::string& open, const std::string& close) {
+  const size_t mark = message.find(open, message.find(beyond));
+  if (mark == std::string::npos) return {};
+  const size_t from = mark + open.size(), to = message.find(close, from);
+  if (to == std::string::npos) return {};
+  return message.substr(from, to - from);
+}
+
+}  // namespace
+
+// MuJoCo 2.2 wants mass of every geom of a body that does not state its own.
+bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& message) {
+  const auto name = TextBetween(message, "body mass is too small", "Object name = ", ",");
+  if (!name) return false;
+  std::vector<XMLElement*> geoms;
+  int line = 0;
+  ForEach(root(), [&](XMLElement* e) {
+    if (!IsTag(e, "body") || e->Attribute("name") == nullptr || *name != e->Attribute("name")) {
+      return;
+    }
+    line = e->GetLineNum();
+    for (XMLElement* g = e->FirstChildElement("geom"); g != nullptr;
+         g = g->NextSiblingElement("geom")) {
+      geoms.push_back(g);
+    }
+  });
+  for (XMLElement* geom : geoms) document.DeleteNode(geom);
+  if (geoms.empty()) return false;
+  Add(Severity::kWarning, line,
+      fmt::format("body '{}' has no mass: its {} geoms are left out", *name, geoms.size()));
+  return true;
+}
+
+bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
+  if (impl_->DropWeightlessGeoms(message)) return true;
+  const auto tag = TextBetween(message, "", "Element '", "'");
+  if (!tag) return false;
+  if (const auto name = TextBetween(message, "", "unrecognized attribute: '", "'")) {
+    int count = 0, line = 0;
+    bool forceless = true;
+    ForEach(impl_->root(), [&](XMLElement* e) {
+      if (!IsTag(e, tag->c_str()) || e->Attribute(name->c_str()) == nullptr) return;
+      if (count++ == 0) line = e->GetLineNum();
+      const ForeignRow* row = FindForeignRow(ElementOf(e), *name);
+      forceless = forceless && row != nullptr && row->fate == Fate::kNoForce;
+      e->DeleteAttribute(name->c_str());
+    });
+    if (count == 0) return false;
+    if (!forceless) return true;  // a finding already, or neutral
+    impl_->Add(Severity::kWarning, line,
+               fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left "
+                           "out; no force depends on it",
+                           *name, *tag, count));
+    return true;
+  }
+  if (message.find("unrecognized element") == std::string::npos) return false;
+  std::vector<XMLElement*> dropped;
+  ForEach(impl_->root(), [&](XMLElement* e) {
+    if (IsTag(e, tag->c_str())) dropped.push_back(e);
+  });
+  if (dropped.empty()) return false;
+  const std::string element = ElementOf(dropped.front());
+  const ForeignRow* row = FindForeignRow(element, "");
+  const bool is_finding = !IsForeignElement(element) ||
+                          (row != nullptr && row->fate == Fate::kLeftOut && !row->compiled);
+  if (!is_finding) {
+    impl_->Add(
+        Severity::kWarning, dropped.front()->GetLineNum(),
+        fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out; no force "
+                    "depends on it",
+                    *tag, dropped.size()));
+  }
+  // One at a time: an element may lie inside another of its kind.
+  for (XMLElement* next = dropped.front(); next != nullptr;) {
+    impl_->document.DeleteNode(next);
+    next = nullptr;
+    ForEach(impl_->root(), [&](XMLElement* e) {
+      if (next == nullptr && IsTag(e, tag->c_str()) && ElementOf(e) == element) next = e;
+    });
+  }
+  return true;
+}
+
+}  // namespace mbv::mjcf

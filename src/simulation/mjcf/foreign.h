@@ -1,0 +1,65 @@
+// MJCF files of others, made such as MuJoCo 2.2.2 compiles them from memory.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "base/diagnostics.h"
+#include "base/types.h"
+#include "mechanism/mechanism.h"
+
+namespace mbv::mjcf {
+
+/// The two sites that a closure makes coincide, the first one on body1.
+using SitePair = std::pair<std::string, std::string>;
+
+/// A mesh that a geom shows, from a file in the model's folder or below.
+struct ForeignMesh {
+  std::string file;              ///< path, or relative to the working folder as the model is
+  Vec3 scale = Vec3::Ones();     ///< of the file's numbers
+  Pose X_GF = Pose::Identity();  ///< the file's frame in the geom's as the model states it
+};
+
+/// An MJCF file on its way to the compiler. Included files are taken in; folders of assets become
+/// absolute. What only serves pictures (textures, materials, meshes that nothing needs) is left
+/// out; mesh geoms of bodies that state their inertia become small spheres of no mass in the same
+/// pose, of others such spheres stand beside them: the compiler moves the frames of meshes, not
+/// theirs. Files outside the model's folder are refused. What MuJoCo 3 says differently is
+/// translated: closures by two sites, ranges that hold without being called limited, <frame>,
+/// <replicate>, springs or dampers switched off. Every element and attribute is looked up in
+/// foreign_rows.h.
+class ForeignMjcf {
+ public:
+  ForeignMjcf(const std::string& text, const std::filesystem::path& file, Diagnostics* diagnostics);
+  ~ForeignMjcf();
+  ForeignMjcf(const ForeignMjcf&) = delete;
+  ForeignMjcf& operator=(const ForeignMjcf&) = delete;
+
+  /// False after an error.
+  [[nodiscard]] bool ok() const;
+  [[nodiscard]] std::string Text() const;
+  [[nodiscard]] std::string ModelName() const;
+  /// Closures by sites, by the equality's name: MuJoCo 2.2 would take their place from the pose of
+  /// the file, where the sites may be apart.
+  [[nodiscard]] const std::map<std::string, SitePair>& closures_by_sites() const;
+
+  /// Meshes by the name of the sphere that stands where the geom is.
+  [[nodiscard]] const std::map<std::string, ForeignMesh>& meshes() const;
+
+  /// What acts on forces and is left out, as the text alone shows; findings name it, too.
+  [[nodiscard]] const std::vector<ModelCaveat>& left_out() const;
+
+  /// Removes what this compiler does not know, as its message says; one finding for each kind of
+  /// thing. False if the message is about something else.
+  [[nodiscard]] bool DropWhatIsUnknown(const std::string& message);
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mbv::mjcf

@@ -1,0 +1,55 @@
+// <frame> and <replicate> of MuJoCo 3 in foreign MJCF files. Internal to mjcf/.
+#pragma once
+
+#include <tinyxml2.h>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <string>
+#include <string_view>
+
+#include "simulation/mjcf/foreign.h"
+
+// Walks through XML. Internal to mjcf/.
+
+namespace mbv::mjcf {
+
+// Calls visit(element) on all elements below, deepest last.
+template <typename Visit>
+void ForEach(tinyxml2::XMLElement* element, const Visit& visit) {
+  for (tinyxml2::XMLElement* e = element->FirstChildElement(); e != nullptr;
+       e = e->NextSiblingElement()) {
+    visit(e);
+    ForEach(e, visit);
+  }
+}
+
+inline bool IsTag(const tinyxml2::XMLElement* element, const char* tag) {
+  return std::string_view(element->Name()) == tag;
+}
+
+/// What could not be dissolved; empty text: nothing.
+struct FrameTrouble {
+  int line = 0;
+  std::string text, hint = {};
+};
+
+/// Writes out what <replicate> repeats, with the elements that refer to it, and moves what stands
+/// in a <frame> to the body around it, posed as it was.
+[[nodiscard]] FrameTrouble DissolveFrames(tinyxml2::XMLDocument* document);
+
+// Mesh geoms of foreign MJCF files. Internal to mjcf/.
+
+struct MeshGeoms {
+  std::map<std::string, ForeignMesh> meshes;  ///< by the name of the sphere in the geom's place
+  int lost = 0;                               ///< geoms that went without one
+};
+
+/// Puts a sphere of no mass where a geom shows a mesh of a file that `is_open` allows, and removes
+/// mesh geoms that give no mass to their body. `folder`: that of the mesh files.
+[[nodiscard]] MeshGeoms TakeMeshGeoms(
+    const std::filesystem::path& folder,
+    const std::function<bool(const std::filesystem::path&)>& is_open,
+    tinyxml2::XMLDocument* document);
+
+}  // namespace mbv::mjcf

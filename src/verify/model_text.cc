@@ -1,0 +1,261 @@
+#include "verify/model_text.h"
+
+#include <fmt/format.h>
+#include <Eigen/Dense>
+#include <algorithm>
+#include <numbers>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include "base/names.h"
+#include "base/worker_pool.h"
+#include "external/mechanism_json.h"
+#include "math/bytes.h"
+#include "model_file/urdf/urdf_import.h"
+#include "model_file/write_model.h"
+#include "model_file/yaml/yaml_reader.h"
+#include "report/mobility_text.h"
+#include "simulation/engine/engine_model.h"
+#include "simulation/import/read_mjcf.h"
+#include "simulation/mjcf/mjcf.h"
+#include "simulation/mjcf/plan.h"
+
+namespace mbv {
+namespace {
+
+// A child's answer.
+struct ModelAnswer {
+  std::vector<Finding> findings;
+  std::string model;  // "" after errors
+  std::vector<ModelCaveat> left_out;
+};
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<ModelAnswer>& answer) {
+  visit(answer.findings), visit(answer.model), visit(answer.left_out);
+}
+
+ModelAnswer ModelAnswerOf(const std::string& text, const std::string& file) {
+  Diagnostics findings;
+  auto read = ReadMjcf(text, file, &findings);
+  ModelAnswer answer{.findings = findings.findings(), .model = "", .left_out = {}};
+  if (!read) return answer;
+  Mechanism& mechanism = read->mechanism;
+  mechanism.name = NearestName(mechanism.name);
+  if (mechanism.name.empty()) mechanism.name = "robot";
+  answer.model = WriteModel(mechanism);
+  answer.left_out = std::move(read->left_out);
+  return answer;
+}
+
+// The model file that an MJCF file stands for, "" after errors, and what it leaves out.
+std::pair<std::string, std::vector<ModelCaveat>> ModelOfMjcf(const std::string& file,
+                                                             Diagnostics* findings) {
+  constexpr double kTimeout_s = 60.0;
+  YamlReader reader(file);
+  const auto text = reader.ReadFile();
+  findings->Append(reader.diagnostics());
+  if (!text) return {};
+  const auto answers =
+      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(ModelAnswerOf(*text, file)); });
+  auto answer = answers[0] ? FromBytes<ModelAnswer>(*answers[0]) : std::nullopt;
+  if (!answer) {
+    findings->AddError(file, fmt::format("MuJoCo's compiler crashed on it, or took longer than "
+                                         "{:g} s",
+                                         kTimeout_s));
+    return {};
+  }
+  for (const Finding& finding : answer->findings) findings->Add(finding);
+  if (findings->has_errors()) return {};
+  return {std::move(answer->model), std::move(answer->left_out)};
+}
+
+// Nobody wrote the lines that findings point to.
+void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
+  for (Finding finding : from.findings()) {
+    finding.line = finding.column = 0;
+    to->Add(std::move(finding));
+  }
+}
+
+LoadResult LoadMjcf(const std::string& file, const LoadOptions& options) {
+  LoadResult result;
+  auto [model, left_out] = ModelOfMjcf(file, &result.diagnostics);
+  if (model.empty()) return result;
+  LoadResult loaded = LoadModelText(model, file, options);
+  AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
+  result.mechanism = std::move(loaded.mechanism);
+  result.literals = std::move(loaded.literals);
+  result.caveats = std::move(left_out);
+  for (ModelCaveat& caveat : loaded.caveats) result.caveats.push_back(std::move(caveat));
+  return result;
+}
+
+}  // namespace
+
+bool IsRobotFile(const std::string& file) {
+  return file.ends_with(".urdf") || file.ends_with(".xml");
+}
+
+LoadedBodies LoadRobotBodies(const std::string& file) {
+  if (!file.ends_with(".xml")) return LoadBodies(file);
+  LoadedBodies result;
+  const std::string model = ModelOfMjcf(file, &result.diagnostics).first;
+  if (model.empty()) return result;
+  LoadedBodies loaded = LoadBodiesText(model, file);
+  AddWithoutPlaces(loaded.diagnostics, &result.diagnostics);
+  result.bodies = std::move(loaded.bodies);
+  return result;
+}
+
+LoadResult LoadRobot(const std::string& file, const LoadOptions& options) {
+  return file.ends_with(".xml") ? LoadMjcf(file, options) : LoadModel(file, options);
+}
+
+namespace {
+
+constexpr double kServoRank = 1e-10;      // singular values below this share are zero
+constexpr double kServoImbalance = 1e-6;  // of the load, which the drives leave unbalanced
+
+// The rows of MuJoCo's constraint Jacobian at home, those of the drives apart.
+struct HomeRows {
+  MatX held;    // closures and prescribed joints
+  MatX drives;  // one row each
+};
+
+HomeRows RowsAtHome(const simulation::EngineModel& engine, const mjData& d) {
+  const int nv = engine.m->nv;
+  const auto drives = static_cast<Eigen::Index>(engine.mechanism->drives.size());
+  HomeRows rows{.held = MatX(0, nv), .drives = MatX::Zero(drives, nv)};
+  for (int i = 0; i < d.nefc; ++i) {
+    if (d.efc_type[i] != mjCNSTR_EQUALITY) continue;
+    const Eigen::Map<const Eigen::RowVectorXd> row(d.efc_J + static_cast<long>(i) * nv, nv);
+    Eigen::Index drive = 0;
+    while (drive < drives && engine.driven[static_cast<size_t>(drive)].equality != d.efc_id[i]) {
+      ++drive;
+    }
+    if (drive < drives) {
+      rows.drives.row(drive) = row;
+    } else {
+      rows.held.conservativeResize(rows.held.rows() + 1, nv);
+      rows.held.bottomRows(1) = row;
+    }
+  }
+  return rows;
+}
+
+void SetGains(const MatX& M, const HomeRows& rows, double frequency_hz, HomeServos* servos) {
+  const double omega = 2.0 * std::numbers::pi * frequency_hz;
+  const Eigen::LLT<MatX> llt(M);
+  MatX Q(M.rows(), 0);  // what the held rows take; Eigen decomposes no empty matrix
+  if (rows.held.rows() > 0) {
+    Eigen::ColPivHouseholderQR<MatX> qr;
+    qr.setThreshold(kServoRank);
+    qr.compute(llt.matrixL().solve(MatX(rows.held.transpose())));
+    Q = OrthogonalFactor(qr).leftCols(qr.rank());
+  }
+  for (Eigen::Index k = 0; k < rows.drives.rows(); ++k) {
+    // Acceleration of the drive per force on it: what the held rows leave of M⁻¹.
+    VecX y = llt.matrixL().solve(VecX(rows.drives.row(k).transpose()));
+    y -= Q * (Q.transpose() * y);
+    y -= Q * (Q.transpose() * y);
+    const double mobility = y.squaredNorm();
+    const double inertia = mobility > 0.0 ? 1.0 / mobility : 0.0;
+    servos->kp.push_back(omega * omega * inertia);
+    servos->kv.push_back(2.0 * omega * inertia);
+  }
+}
+
+RunSummary SetForces(const VecX& load, const HomeRows& rows, HomeServos* servos) {
+  MatX A(load.size(), rows.held.rows() + rows.drives.rows());
+  A << rows.held.transpose(), rows.drives.transpose();
+  VecX forces = VecX::Zero(A.cols());
+  if (A.size() > 0) {
+    Eigen::CompleteOrthogonalDecomposition<MatX> solver;
+    solver.setThreshold(kServoRank);
+    solver.compute(A);
+    forces = solver.solve(load);
+  }
+  if ((A * forces - load).norm() > kServoImbalance * load.norm()) {
+    return {.stop = Stop::kUnsupported,
+            .message =
+                "the drives cannot hold the home pose: a freedom that they do not drive "
+                "gives way to gravity or springs",
+            .where = {},
+            .unit = {}};
+  }
+  const VecX drives = forces.tail(rows.drives.rows());
+  servos->force.assign(drives.begin(), drives.end());
+  return RunSummary::Done();
+}
+
+RunSummary TuneInEngine(const Mechanism& mechanism, double frequency_hz, HomeServos* servos) {
+  simulation::EngineModel engine;
+  RunSummary summary =
+      simulation::MakeEngineModel(mechanism, WriteMjcf(mechanism, {.pictures = false}), &engine);
+  if (!summary.ok()) return summary;
+  const mjModel& m = *engine.m;
+  const simulation::DataHandle data = simulation::MakeData(m);
+  mj_forward(&m, data.get());
+  const HomeRows rows = RowsAtHome(engine, *data);
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> M(m.nv, m.nv);
+  mj_fullM(&m, M.data(), data->qM);
+  SetGains(M, rows, frequency_hz, servos);
+  const VecX load = Eigen::Map<const VecX>(data->qfrc_bias, m.nv) -
+                    Eigen::Map<const VecX>(data->qfrc_passive, m.nv);
+  return SetForces(load, rows, servos);
+}
+
+}  // namespace
+
+HomeServos TuneHomeServos(const Mechanism& mechanism, double frequency_hz) {
+  HomeServos servos;
+  std::vector<std::string> warnings;
+  const simulation::EngineSession session(&warnings);
+  try {
+    servos.summary = TuneInEngine(mechanism, frequency_hz, &servos);
+  } catch (const simulation::EngineError& error) {
+    servos.summary = {.stop = Stop::kEngineFailure,
+                      .message = std::string("MuJoCo: ") + error.what(),
+                      .where = {},
+                      .unit = {}};
+  }
+  return servos;
+}
+
+std::string ModelText(const Mechanism& mechanism, ModelFormat format,
+                      const std::vector<ModelCaveat>& caveats) {
+  switch (format) {
+    case ModelFormat::kMobility:
+      return MobilityText(mechanism, ReportMobility(mechanism));
+    case ModelFormat::kJson:
+      return MobilityJson(mechanism, ReportMobility(mechanism));
+    case ModelFormat::kMjcf:
+      return WriteMjcf(mechanism);
+    case ModelFormat::kUrdf:
+      return WriteUrdf(mechanism);
+    case ModelFormat::kYaml:
+      return WriteModel(mechanism, caveats);
+    case ModelFormat::kMechanism:
+      return MechanismJson(mechanism);
+  }
+  return "";
+}
+
+MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
+  if (std::string trouble = mjcf::NestingTrouble(mjcf::MakePlan(mechanism)); !trouble.empty()) {
+    return {.text = {}, .trouble = std::move(trouble)};
+  }
+  MjcfOptions options;
+  options.guided = drives == ModelDrives::kHeld;
+  if (drives == ModelDrives::kServo) {
+    HomeServos servos = TuneHomeServos(mechanism);
+    if (!servos.summary.ok()) return {.text = {}, .trouble = servos.summary.message};
+    options.kp = std::move(servos.kp);
+    options.kv = std::move(servos.kv);
+    options.motor_home = std::move(servos.force);
+  }
+  return {.text = WriteMjcf(mechanism, options), .trouble = {}};
+}
+
+}  // namespace mbv

@@ -1,0 +1,174 @@
+#include "verify/prepare.h"
+
+#include <fmt/format.h>
+
+#include "base/text.h"
+#include "mechanism/channels.h"
+#include "model_file/load_model.h"
+#include "plot/check_figures.h"
+#include "verify/drive_by.h"
+
+namespace mbv {
+namespace {
+
+// Why the closed form does not take this mechanism and its loads; "" if it does. One warning each.
+std::string Decline(const Scenario& scenario, const Mechanism& mechanism, const ClosedFormRow& row,
+                    Diagnostics* diagnostics) {
+  if (row.coverage == nullptr) return "";
+  const Coverage coverage = row.coverage(mechanism);
+  std::vector<Finding> uncovered = FindUncovered(coverage, mechanism, Concern::kDynamics);
+  for (Finding& load : FindUncoveredLoads(coverage, mechanism, scenario.motion)) {
+    uncovered.push_back(std::move(load));
+  }
+  const std::string reason = ReasonToDecline(uncovered);
+  for (Finding& finding : uncovered) {
+    finding.file = scenario.file;
+    finding.message = "analytic declines: " + finding.message;
+    diagnostics->Add(std::move(finding));
+  }
+  return reason;
+}
+
+WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,
+                                 Diagnostics* diagnostics) {
+  const auto load = [&](const Overrides& own, const Role& witness) {
+    return LoadVariant(scenario, base, own, witness, diagnostics);
+  };
+  return {load(scenario.analytic.parameters, role::kAnalytic),
+          load(scenario.reference.parameters, role::kReference),
+          load(scenario.simulation.parameters, role::kSimulated)};
+}
+
+// Every channel that some witness may record.
+std::vector<Channel> RecordableChannels(const Prepared& prepared) {
+  const Mechanism& mechanism = prepared.base;
+  std::vector<Channel> channels;
+  const auto add = [&](const std::vector<Channel>& more) {
+    channels.insert(channels.end(), more.begin(), more.end());
+  };
+  add(DriveChannels(mechanism));
+  add(OutputChannels(mechanism));
+  for (const Output& output : mechanism.outputs) add(OutputRateChannels(mechanism, output));
+  add(PrescribedChannels(mechanism));
+  add(BandChannels(mechanism));
+  for (const Joint& joint : mechanism.joints) add(ReactionChannels(joint));
+  add(AuditChannels());
+  add(EnergyChannels());
+  add(WorkChannels(mechanism));
+  if (prepared.has_closed_form()) add(prepared.closed_form.closed_form->extra_channels());
+  return channels;
+}
+
+}  // namespace
+
+Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Overrides& own,
+                      const Role& witness, Diagnostics* diagnostics) {
+  if (own.empty()) return base;
+  LoadResult loaded = LoadModel(scenario.model_file, ModelOptions(scenario, own));
+  if (loaded.mechanism) return *std::move(loaded.mechanism);
+  diagnostics->Append(loaded.diagnostics);
+  diagnostics->AddError(
+      scenario.file,
+      fmt::format("the model cannot be loaded with the parameters of the {} witness", witness.name),
+      "");
+  return base;
+}
+
+ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
+                                Diagnostics* diagnostics) {
+  if (!scenario.analytic.on) return {nullptr, "switched off in the scenario"};
+  const WitnessGap asked =
+      scenario.analytic.stated ? WitnessGap::kNotApplicable : WitnessGap::kNone;
+  if (scenario.motion.free()) {
+    return {nullptr, "closed forms give forces for a motion, not the motion for forces", asked};
+  }
+  const ClosedFormRow* row = FindClosedForm(mechanism.name);
+  if (row == nullptr) {
+    return {nullptr, "there are no closed-form equations for " + mechanism.name, asked};
+  }
+  const AnalyticSettings& settings = scenario.analytic;
+  bool fits = true;
+  if (!settings.model.empty() && !Contains(row->models, settings.model)) {
+    diagnostics->AddError(
+        scenario.file,
+        fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(row->models)),
+        "");
+    fits = false;
+  }
+  for (const std::string& erratum : settings.as_printed) {
+    if (Contains(row->errata, erratum)) continue;
+    diagnostics->AddError(
+        scenario.file,
+        fmt::format("analytic.as_printed: '{}' is not one of: {}", erratum, Joined(row->errata)),
+        "");
+    fits = false;
+  }
+  if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
+  if (std::string reason = Decline(scenario, mechanism, *row, diagnostics); !reason.empty()) {
+    return {nullptr, std::move(reason), WitnessGap::kNotApplicable};
+  }
+  Diagnostics found;
+  auto closed_form =
+      row->factory(mechanism, scenario.motion,
+                   {.model = settings.model, .as_printed = settings.as_printed}, &found);
+  for (Finding finding : found.findings()) {
+    if (finding.file.empty()) finding.file = scenario.file;
+    diagnostics->Add(std::move(finding));
+  }
+  if (closed_form == nullptr) return {nullptr, "the closed form does not suit this scenario"};
+  return {std::move(closed_form), ""};
+}
+
+std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& options,
+                                Diagnostics* diagnostics) {
+  ScenarioResult loaded = LoadScenario(file, options);
+  diagnostics->Append(loaded.diagnostics);
+  if (!loaded.scenario) return {};
+  Prepared prepared{.scenario = *std::move(loaded.scenario),
+                    .base = *std::move(loaded.mechanism),
+                    .mechanisms = {},
+                    .closed_form = {}};
+  prepared.mechanisms = LoadMechanisms(prepared.scenario, prepared.base, diagnostics);
+  prepared.closed_form =
+      MakeClosedForm(prepared.scenario, prepared.mechanisms.analytic, diagnostics);
+  if (prepared.scenario.simulation.on && !prepared.has_closed_form() &&
+      !prepared.scenario.reference.on && !prepared.scenario.motion.free()) {
+    Finding finding;
+    finding.file = file;
+    finding.message =
+        "simulation needs the drive motion, but neither a closed form nor the reference gives it";
+    finding.hint = "set reference: on";
+    diagnostics->Add(std::move(finding));
+  }
+  std::vector<std::string> foreign;
+  for (const ForeignWitness& witness : prepared.scenario.witnesses) foreign.push_back(witness.name);
+  CheckFigures(prepared.scenario.figures, RecordableChannels(prepared), foreign, file, diagnostics);
+  if (diagnostics->has_errors()) return {};
+  return prepared;
+}
+
+const Role& Prepared::driver() const {
+  if (has_closed_form()) return role::kAnalytic;
+  return has_table() ? role::kSolver : role::kReference;
+}
+
+DrivenMotion Prepared::MakeDrivenMotion() const {
+  if (scenario.motion.free()) return DriveByCommands(mechanisms.simulated, scenario.motion);
+  if (!has_closed_form()) return DriveByReference(mechanisms.reference, scenario.motion);
+  // A fresh closed form, because it may follow its solution from the start of the motion.
+  Diagnostics known;
+  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);
+  return DriveByClosedForm(scenario.motion, std::move(fresh.closed_form));
+}
+
+DriveForces Prepared::MakeDriveForces() const {
+  const SimulationSettings& settings = scenario.simulation;
+  const bool servo = settings.drive_by == DriveBy::kServos && settings.servo.feedforward;
+  if (!settings.forward || (settings.drive_by != DriveBy::kForces && !servo)) return {};
+  if (!has_closed_form()) return ForcesByReference(mechanisms.reference, scenario.motion);
+  Diagnostics known;
+  ClosedFormChoice fresh = MakeClosedForm(scenario, mechanisms.analytic, &known);
+  return ForcesByClosedForm(scenario.motion, std::move(fresh.closed_form));
+}
+
+}  // namespace mbv

@@ -1,0 +1,65 @@
+// A scenario made ready to run: loaded, and resolved for each witness.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "analytic/closed_form.h"
+#include "base/diagnostics.h"
+#include "base/roles.h"
+#include "comparison/comparison.h"
+#include "mechanism/mechanism.h"
+#include "scenario/load_scenario.h"
+#include "simulation/engine/simulation.h"
+
+namespace mbv {
+
+/// The scenario's mechanism as each witness sees it (their own parameter overrides applied).
+struct WitnessMechanisms {
+  Mechanism analytic, reference, simulated;
+};
+
+/// A closed form for a scenario, or the reason why there is none.
+struct ClosedFormChoice {
+  std::unique_ptr<ClosedForm> closed_form;
+  std::string reason;  ///< not empty: switched off, or the mechanism has none, or it is outside
+                       ///< what the equations cover
+  /// kNotApplicable where the scenario counts on one: it asks for it, or the mechanism has one.
+  WitnessGap gap = WitnessGap::kNone;
+};
+/// Unsuitable models, errata and commands are errors; what the equations do not cover of the
+/// mechanism and its loads is a warning each.
+[[nodiscard]] ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mechanism,
+                                              Diagnostics* diagnostics);
+
+struct Prepared {
+  Scenario scenario;
+  Mechanism base;  ///< with the scenario's common parameters
+  WitnessMechanisms mechanisms;
+  ClosedFormChoice closed_form;
+
+  /// The witness whose kinematics the simulation follows.
+  [[nodiscard]] const Role& driver() const;
+  [[nodiscard]] bool has_closed_form() const { return closed_form.closed_form != nullptr; }
+  /// A table stands in the reference's place.
+  [[nodiscard]] bool has_table() const { return scenario.reference.table != nullptr; }
+  /// The commanded motion of everything driven; refers to this object.
+  [[nodiscard]] DrivenMotion MakeDrivenMotion() const;
+  /// The drive forces for it, by the same witness; refers to this object. Empty where the
+  /// simulation is given none.
+  [[nodiscard]] DriveForces MakeDriveForces() const;
+};
+
+/// Loads a scenario with everything it needs. Empty after bad input; warnings may remain.
+[[nodiscard]] std::optional<Prepared> Prepare(const std::string& file,
+                                              const ScenarioOptions& options,
+                                              Diagnostics* diagnostics);
+
+/// The mechanism with a witness' own overrides: `base`, or the model loaded again. Findings are bad
+/// input.
+[[nodiscard]] Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base,
+                                    const Overrides& own, const Role& witness,
+                                    Diagnostics* diagnostics);
+
+}  // namespace mbv

@@ -1,0 +1,49 @@
+// A program outside, called in a folder of its own with files that it gets and leaves.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "base/scratch_folder.h"
+#include "comparison/comparison.h"
+#include "scenario/scenario.h"
+
+namespace mbv {
+
+/// Programs that mbverify installs beside itself.
+[[nodiscard]] bool IsInstalledProgram(const std::string& program);
+
+/// The file that a command's first word stands for: a path as it is, else what lies beside
+/// mbverify, else what the absolute folders of PATH have. Empty if there is none.
+[[nodiscard]] std::optional<std::string> FindProgram(const std::string& program);
+
+/// Why a program gave nothing.
+struct ProgramFailure {
+  WitnessGap gap = WitnessGap::kNotStarted;
+  std::string text;  ///< one sentence without its subject
+};
+
+/// The folder goes with this object. Limits of time, memory and output are the witness' own.
+class ProgramCall {
+ public:
+  explicit ProgramCall(const ForeignWitness& witness) : witness_(witness), folder_("witness") {}
+
+  /// Puts a file into the folder. "" or what went wrong.
+  [[nodiscard]] std::string Give(const std::string& name, const std::string& text) const;
+  /// Calls the program with few variables of the environment (docs/how-to/external_solvers.md) and
+  /// waits. Empty, or how it failed, with what it printed last.
+  [[nodiscard]] std::optional<ProgramFailure> Run();
+  /// A file that it left, if it is not longer than it may be.
+  [[nodiscard]] std::optional<std::string> Text(const std::string& name) const;
+  /// The last line that the program printed, behind ": "; "" if it printed none.
+  [[nodiscard]] std::string Said() const;
+  /// Of the program's whole run.
+  [[nodiscard]] double wall_s() const { return wall_s_; }
+
+ private:
+  const ForeignWitness& witness_;
+  ScratchFolder folder_;
+  double wall_s_ = 0.0;
+};
+
+}  // namespace mbv

@@ -1,0 +1,147 @@
+// Runs the witnesses of a prepared scenario and hands their traces over.
+//
+// Who takes part, in which order and by which computation stands in one table (kComputations in
+// run_witnesses.cc), one row for each role (base/roles.h). All commands run witnesses here: `run`
+// all of them, `mutate` the simulated side many times, `converge` the engine with its own options.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "base/roles.h"
+#include "base/run_summary.h"
+#include "comparison/comparison.h"
+#include "report/report.h"
+#include "scenario/tables/table.h"
+#include "verify/prepare.h"
+#include "verify/ranges.h"
+#include "verify/simulate_scenario.h"
+
+// Computations that did not take place.
+
+namespace mbv {
+
+/// The summary of a witness that was not asked, and why.
+inline RunSummary NotRun(const std::string& why) {
+  RunSummary summary;
+  summary.message = why;
+  return summary;
+}
+
+// How far a computation is.
+
+/// Stage ("simulation") and how much of it is done (0 … 1).
+using ProgressFunction = std::function<void(const std::string& stage, double fraction)>;
+
+/// The same of one stage; empty if nobody asks.
+[[nodiscard]] inline std::function<void(double)> StageOf(const ProgressFunction& progress,
+                                                         const std::string& stage) {
+  if (!progress) return {};
+  return [progress, stage](double fraction) { progress(stage, fraction); };
+}
+
+// A program of a stranger as a witness (docs/how-to/external_solvers.md): it gets a folder with the
+// mechanism and its motion, and leaves its traces there.
+
+/// Runs it on the drives' motion. Whatever the program does (dies, hangs, floods, answers nonsense)
+/// is in the record's summary, as not run, and in its gap.
+[[nodiscard]] WitnessRecord RunForeign(const ForeignWitness& witness, const Prepared& prepared,
+                                       const Mechanism& mechanism, const DrivenMotion& driven);
+
+/// What the simulation is run with; what is left empty is the prepared scenario's own.
+struct SimulatedSide {
+  const Scenario* scenario = nullptr;
+  const Mechanism* mechanism = nullptr;
+  const Mechanism* ranges = nullptr;  ///< whose joint ranges hold; null: the base mechanism's
+  DrivenMotion driven = {};
+  DriveForces forces = {};
+};
+
+/// What witnesses gave.
+struct WitnessRuns {
+  std::vector<WitnessRecord> records;  ///< in the order in which they ran
+  std::optional<AlignedTable> table;   ///< in the reference's place
+  std::optional<SimulationRun> simulation;
+  std::vector<RangeViolation> violations;  ///< of joints along the simulated motion
+  std::optional<Trace> bent;               ///< force-driven: pushed with wrong forces
+  double bend = kNan;                      ///< wrong by this share of their RMS
+  Diagnostics bad_input;                   ///< that only the simulation could find
+  Diagnostics findings;                    ///< warnings, and ranges that are left
+  std::string trust;  ///< of a free motion: how far the reference can be trusted
+  Timing timing;
+
+  /// The record of a witness; null if it did not take part.
+  [[nodiscard]] const WitnessRecord* Find(const Role& role) const;
+  /// Adds witnesses, table and bent run to what is compared; refers to this object.
+  void HandOver(ComparisonInput* input) const;
+};
+
+class WitnessRunner {
+ public:
+  /// `prepared` must outlive the runner.
+  explicit WitnessRunner(const Prepared& prepared, SimulatedSide side = {},
+                         ProgressFunction progress = {});
+
+  /// Whether the scenario has this witness. One that has a place but was switched off, or cannot
+  /// do its part, takes part with a record that says so.
+  [[nodiscard]] bool TakesPart(const Role& role) const;
+  /// Runs a witness that takes part.
+  void Run(const Role& role);
+  /// Those that compute motion and forces from the commands, one after the other; and those that
+  /// need them.
+  void RunComputed();
+  void RunFollowing();
+  /// Programs outside that the scenario names.
+  void RunForeign();
+
+  /// Strokes along the motion that was computed. False, and then the simulation must not run, if
+  /// drives cannot go there and the scenario does not ignore it.
+  bool CheckStrokes();
+  /// Where the simulation is pushed by forces, besides the witnesses: the same run with forces that
+  /// are wrong by the limit of their checks. A warning if it fails.
+  void RunBent();
+  /// One run of the simulation: as the scenario has it, by another engine, or by other options.
+  [[nodiscard]] SimulatedWitness Simulate(Engine engine, const std::string& stage) const;
+  [[nodiscard]] SimulatedWitness Simulate(const SimulationOptions& options,
+                                          const std::string& stage) const;
+  /// The engine that is judged.
+  [[nodiscard]] Engine judged_engine() const;
+
+  [[nodiscard]] const WitnessRuns& runs() const { return runs_; }
+  [[nodiscard]] WitnessRuns Take() { return std::move(runs_); }
+
+ private:
+  struct Computation;
+  static const std::vector<Computation>& Computations();
+
+  void RunAnalytic();
+  void RunReferenceOrTable();
+  void RunSolver();
+  void RunSimulated();
+  void RunReached();
+  void Solve(const Role& role);
+  void SolveFree(const Role& role);
+  void CheckRanges(SimulationRun* run);
+  void LeaveOut(const Role& role, RunSummary why);
+  void Add(const Role& role, RunSummary summary, Trace trace);
+  void Warn(const std::string& text);
+  void RunThose(bool following);
+  /// Gave the simulation its motion; must have run.
+  [[nodiscard]] const WitnessRecord& driver() const;
+  [[nodiscard]] const Scenario& scenario() const;
+  [[nodiscard]] const Mechanism& simulated() const;
+  [[nodiscard]] DriveForces Forces() const;
+  [[nodiscard]] DrivenMotion Driven() const;
+
+  const Prepared& prepared_;
+  SimulatedSide side_;
+  ProgressFunction progress_;
+  WitnessRuns runs_;
+};
+
+/// What is compared, except for the witnesses and what statics leaves open.
+[[nodiscard]] ComparisonInput InputOf(const Prepared& prepared);
+
+}  // namespace mbv

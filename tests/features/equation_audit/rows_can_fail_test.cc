@@ -1,0 +1,283 @@
+// Every row of every audit can fail: the equations' constants and what they are compared with are
+// bent one at a time, and each row with a residual must notice at least one of them. What notices
+// none depends on none of them; those rows are named, and no others may be so.
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+#include <set>
+
+#include "analytic/cabin_robot/stiffness.h"
+#include "analytic/scara_robot/stiffness.h"
+#include "features/equation_audit/cabin_robot_audit.h"
+#include "features/equation_audit/scara_robot_audit.h"
+#include "features/equation_audit/spr_tripod_audit.h"
+#include "features/equation_audit/stabilizing_platform_audit.h"
+#include "features/equation_audit/stiffness_truth.h"
+#include "model_file/load_model.h"
+#include "tests/support/source_dir.h"
+
+namespace mbv {
+namespace {
+
+using Rows = std::vector<AuditRow>;
+
+const std::string kModelsOfAudits = SourcePath("/models");
+
+// Joined rows of several functions.
+Rows All(std::vector<Rows> parts) {
+  Rows all;
+  for (Rows& rows : parts) {
+    for (AuditRow& row : rows) all.push_back(std::move(row));
+  }
+  return all;
+}
+
+// What no bent constant is seen by.
+class Noticed {
+ public:
+  explicit Noticed(const Rows& right) {
+    for (const AuditRow& row : right) {
+      EXPECT_NE(row.verdict, AuditVerdict::kWrongAndUnfixed) << row.equation;
+      if (row.verdict != AuditVerdict::kNotTestable) blind_.insert(row.equation);
+    }
+  }
+  void Bent(const Rows& rows) {
+    for (const AuditRow& row : rows) {
+      if (row.verdict == AuditVerdict::kWrongAndUnfixed) blind_.erase(row.equation);
+    }
+  }
+  [[nodiscard]] const std::set<std::string>& blind() const { return blind_; }
+
+ private:
+  std::set<std::string> blind_;
+};
+
+constexpr double kBendOfAll = 1 + 1e-6;
+
+TEST(AuditRows, OfTheScaraRobotCanFail) {
+  const LoadResult model = LoadModel(kModelsOfAudits + "/scara_robot/model.yaml");
+  const Mechanism& robot = *model.mechanism;
+  const auto sweep = scara_audit::Sweep(robot);
+  const auto rows = [&](const scara::Parameters& p, const std::vector<scara_audit::State>& states) {
+    return All({scara_audit::PositionRows(robot, p, states), scara_audit::VelocityRows(p, states),
+                scara_audit::LinkRows(p, states), scara_audit::DynamicsRows(p, states)});
+  };
+  const scara::Parameters right = scara::ParametersOf(robot);
+  Noticed noticed(rows(right, sweep));
+  using P = scara::Parameters;
+  for (double P::*member : {&P::R, &P::r, &P::l1, &P::l2, &P::l3, &P::e, &P::m_p, &P::I_pz,
+                            &P::m_arm, &P::arm_radius, &P::arm_com, &P::m_rods, &P::rod_radius}) {
+    P bent = right;
+    bent.*member *= kBendOfAll;
+    noticed.Bent(rows(bent, sweep));
+  }
+  using State = scara_audit::State;
+  const std::vector<std::function<void(State*)>> bends = {
+      [](State* s) { s->theta *= kBendOfAll; },
+      [](State* s) { s->rates.dX *= kBendOfAll; },
+      [](State* s) { s->rates.ddX *= kBendOfAll; },
+      [](State* s) { s->rates.dtheta *= kBendOfAll; },
+      [](State* s) { s->rates.ddtheta *= kBendOfAll; },
+      [](State* s) { s->M *= kBendOfAll; },
+      [](State* s) { s->P.v *= kBendOfAll; },
+      [](State* s) { s->P.a *= kBendOfAll; },
+      [](State* s) { s->domega_platform *= kBendOfAll; },
+      [](State* s) { s->tilt += 1e-6; },
+      [](State* s) { s->limbs[1].arm.a *= kBendOfAll; },
+      [](State* s) { s->limbs[1].rods.v *= kBendOfAll; },
+      [](State* s) { s->limbs[1].rods.a *= kBendOfAll; },
+      [](State* s) { s->limbs[1].omega_arm *= kBendOfAll; },
+      [](State* s) { s->limbs[1].domega_arm *= kBendOfAll; },
+      [](State* s) { s->limbs[1].omega_rod *= kBendOfAll; },
+      [](State* s) { s->limbs[1].domega_rod *= kBendOfAll; },
+      [](State* s) { s->limbs[1].rods_apart += 1e-6; },
+      [](State* s) { s->J *= kBendOfAll; },
+      [](State* s) { s->J_inverse *= kBendOfAll; }};
+  for (const auto& bend : bends) {
+    auto states = sweep;
+    bend(&states[5]);
+    noticed.Bent(rows(right, states));
+  }
+  // The topology, printed data and figures; (33) and (49) hold for any constants.
+  EXPECT_EQ(noticed.blind(), (std::set<std::string>{"(1)", "(33)", "(49)", "F = Σf − Σξ", "Fig. 8",
+                                                    "Table 1, platform", "Table 1, ρ1, ρ2"}));
+}
+
+TEST(AuditRows, OfTheScaraRobotsStiffnessCanFail) {
+  const auto rows = [](const scara::StiffnessParameters& p) {
+    return scara_audit::StiffnessRows(kModelsOfAudits, p);
+  };
+  const auto right =
+      scara::StiffnessParametersOf(stiffness_audit::LoadElastic(kModelsOfAudits, "scara_robot"));
+  Noticed noticed(rows(right));
+  using P = scara::StiffnessParameters;
+  for (double P::*member : {&P::d, &P::E, &P::G, &P::diameter, &P::K_act}) {
+    P bent = right;
+    bent.*member *= kBendOfAll;
+    noticed.Bent(rows(bent));
+  }
+  for (double scara::Parameters::*member : {&scara::Parameters::l1, &scara::Parameters::l2,
+                                            &scara::Parameters::r, &scara::Parameters::e}) {
+    P bent = right;
+    bent.geometry.*member *= kBendOfAll;
+    noticed.Bent(rows(bent));
+  }
+  EXPECT_EQ(noticed.blind(), std::set<std::string>{});
+}
+
+TEST(AuditRows, OfTheCabinRobotCanFail) {
+  const LoadResult model = LoadModel(kModelsOfAudits + "/cabin_robot/model.yaml");
+  const Mechanism& robot = *model.mechanism;
+  using cabin_audit::Lengths;
+  const Lengths truth = cabin_audit::LengthsOf(robot);
+  const auto rows = [&](const Lengths& l, const Mechanism& m) {
+    return All({cabin_audit::PositionRows(l, truth), cabin_audit::VelocityRows(l, truth),
+                cabin_audit::WristRows(l, truth), cabin_audit::DynamicsRows(m, robot)});
+  };
+  Noticed noticed(rows(truth, robot));
+  for (double Lengths::*length :
+       {&Lengths::L1, &Lengths::L2, &Lengths::L3, &Lengths::L4, &Lengths::a2, &Lengths::d3,
+        &Lengths::a3, &Lengths::a4, &Lengths::d6}) {
+    Lengths bent = truth;
+    bent.*length += 1e-6;
+    noticed.Bent(
+        All({cabin_audit::PositionRows(bent, truth), cabin_audit::VelocityRows(bent, truth),
+             cabin_audit::WristRows(bent, truth)}));
+  }
+  for (const Parameter& parameter : robot.parameters) {
+    if (!parameter.name.starts_with("m_") && !parameter.name.starts_with("I_")) continue;
+    Mechanism bent = robot;
+    for (Parameter& p : bent.parameters) {
+      if (p.name == parameter.name) p.value *= kBendOfAll;
+    }
+    noticed.Bent(cabin_audit::DynamicsRows(bent, robot));
+  }
+  // Orientations and rates by angles alone: they are compared with differences of the linkage that
+  // Newton closes, whatever its lengths (PlanarTruth).
+  EXPECT_EQ(
+      noticed.blind(),
+      (std::set<std::string>{"(12), (13) a_x", "(12), (13) a_y", "(12), (13) a_z", "(12), (13) n_x",
+                             "(12), (13) n_y", "(12), (13) n_z", "(12), (13) o_x", "(12), (13) o_y",
+                             "(12), (13) o_z", "(15)",           "(16)",           "(17)",
+                             "(18), (19)",     "(21), (22)",     "(23) V_X",       "(23) V_Y",
+                             "(24), (25) J11", "(25) J12",       "(25) J13",       "(25) J22",
+                             "(25) J23",       "(31)",           "(53)",           "(7) θ1",
+                             "(7) θ3",         "below (20): m"}));
+}
+
+TEST(AuditRows, OfTheCabinRobotsStiffnessCanFail) {
+  const auto rows = [](const cabin::StiffnessParameters& p) {
+    return cabin_audit::StiffnessRows(kModelsOfAudits, p);
+  };
+  const auto right =
+      cabin::StiffnessParametersOf(stiffness_audit::LoadElastic(kModelsOfAudits, "cabin_robot"));
+  Noticed noticed(rows(right));
+  const std::vector<std::function<void(cabin::StiffnessParameters*)>> bends = {
+      [](auto* p) { p->E *= kBendOfAll; },
+      [](auto* p) { p->G *= kBendOfAll; },
+      [](auto* p) { p->w *= kBendOfAll; },
+      [](auto* p) { p->wrist.a3 *= kBendOfAll; },
+      [](auto* p) { p->sections[cabin::kBeamEF].h *= kBendOfAll; },
+      [](auto* p) { p->sections[cabin::kBeamCD].b *= kBendOfAll; },
+      [](auto* p) { p->sections[cabin::kBeamAB].b *= kBendOfAll; }};
+  for (const auto& bend : bends) {
+    cabin::StiffnessParameters bent = right;
+    bend(&bent);
+    noticed.Bent(rows(bent));
+  }
+  EXPECT_EQ(noticed.blind(), std::set<std::string>{"(55)"});  // equilibrium by angles
+}
+
+TEST(AuditRows, OfTheTripodCanFail) {
+  using namespace spr_tripod_audit;
+  const Case right = MakeCase(kModelsOfAudits);
+  const auto rows = [](const Case& c) {
+    return All({PositionRows(c), VelocityRows(c), PathRows(c), DynamicsRows(c)});
+  };
+  Noticed noticed(rows(right));
+  const std::vector<std::function<void(Case*)>> bends = {
+      [](Case* c) { c->geometry.a *= kBendOfAll; },
+      [](Case* c) { c->geometry.b *= kBendOfAll; },
+      [](Case* c) { c->truth[3].r.x() *= kBendOfAll; },
+      [](Case* c) { c->truth[3].v *= kBendOfAll; },
+      [](Case* c) { c->truth[3].v_dot *= kBendOfAll; },
+      [](Case* c) { c->truth[3].omega *= kBendOfAll; },
+      [](Case* c) { c->truth[3].omega_dot *= kBendOfAll; },
+      [](Case* c) { c->truth[3].psi *= kBendOfAll; },
+      [](Case* c) { c->truth[3].theta *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].q *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].q_dot *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].q_ddot *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].f *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].S *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].v_A *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].omega *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].omega_dot *= kBendOfAll; },
+      [](Case* c) { c->truth[3].leg[1].w += Vec3(0, 1e-6, 0); },
+      [](Case* c) { c->truth[3].leg[1].c += Vec3(0, 1e-6, 0); },
+      [](Case* c) { c->truth[3].leg[1].A += Vec3(1e-6, 0, 0); }};
+  for (const auto& bend : bends) {
+    Case bent = right;
+    bend(&bent);
+    noticed.Bent(rows(bent));
+  }
+  // The path law, the example's data, and identities in the angles.
+  EXPECT_EQ(noticed.blind(),
+            (std::set<std::string>{"(21)", "(22)", "(6) δ in (2)", "G(ψ, θ, z0) = 0",
+                                   "Table 1, R and h", "section 3, W1 … W6"}));
+}
+
+TEST(AuditRows, OfTheStabilizingPlatformCanFail) {
+  using namespace platform_audit;
+  const Case full = MakeCase(kModelsOfAudits, 1.0), massless = MakeCase(kModelsOfAudits, 0.0);
+  const auto rows = [](const Case& a, const Case& b) {
+    return All({PoseRows(a), TwistRows(a), LimbRows(a), ForceRows(a, b), ClaimRows(a, b)});
+  };
+  Noticed noticed(rows(full, massless));
+  const auto bend = [&](const std::function<void(Truth*)>& change) {
+    Case bent_full = full, bent_massless = massless;
+    change(&bent_full.truth[7]);
+    change(&bent_massless.truth[7]);
+    noticed.Bent(rows(bent_full, bent_massless));
+  };
+  bend([](Truth* t) { t->X_eo.translation() *= kBendOfAll; });
+  bend([](Truth* t) { t->X_ep.translation() *= kBendOfAll; });
+  bend([](Truth* t) { t->X_ep.linear() *= Eigen::AngleAxisd(1e-6, Vec3::UnitZ()).matrix(); });
+  bend([](Truth* t) { t->motion_o *= kBendOfAll; });
+  bend([](Truth* t) { t->motion_p *= kBendOfAll; });
+  bend([](Truth* t) { t->acceleration_o *= kBendOfAll; });
+  bend([](Truth* t) { t->acceleration_p *= kBendOfAll; });
+  bend([](Truth* t) { t->V_eo *= kBendOfAll; });
+  bend([](Truth* t) { t->V_ep *= kBendOfAll; });
+  bend([](Truth* t) { t->A_eo *= kBendOfAll; });
+  bend([](Truth* t) { t->A_ep *= kBendOfAll; });
+  bend([](Truth* t) { t->V_op *= kBendOfAll; });
+  bend([](Truth* t) { t->A_op *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].p_oA *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].p_oB *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].l *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].l_rate *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].l_acceleration *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].tilt += 1e-6; });
+  bend([](Truth* t) { t->limbs[1].tilt_rate *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].q1 *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].q2 *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].q1_rate *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].q2_rate *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].R.value *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].R.rate *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].side[1].elbow_A *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].link_twist_A[2] *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].force_A *= kBendOfAll; });
+  bend([](Truth* t) { t->limbs[1].drive[1] *= kBendOfAll; });
+  // Counts of equations, claims about the design, and limits at 0/0.
+  EXPECT_EQ(noticed.blind(),
+            (std::set<std::string>{"(16) φ''", "(4)", "30 equations, rank",
+                                   "30 equations, solvable", "Fig. 10, ratio at 0/0",
+                                   "derivatives of (18), (19): R''", "design, drives",
+                                   "section 4 data, I_1, I_1'", "section 4, Figs. 11 and 13"}));
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,81 @@
+// Audit of the stiffness equations of both robots: what is right, and that a wrong constant is
+// seen.
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "analytic/cabin_robot/stiffness.h"
+#include "analytic/scara_robot/stiffness.h"
+#include "features/equation_audit/cabin_robot_audit.h"
+#include "features/equation_audit/scara_robot_audit.h"
+#include "features/equation_audit/stiffness_truth.h"
+#include "tests/support/source_dir.h"
+
+namespace mbv {
+namespace {
+
+const std::string kModels = SourcePath("/models");
+
+std::set<std::string> With(const std::vector<AuditRow>& rows, AuditVerdict verdict) {
+  std::set<std::string> equations;
+  for (const AuditRow& row : rows) {
+    if (row.verdict == verdict) equations.insert(row.equation);
+  }
+  return equations;
+}
+
+cabin::StiffnessParameters Cabin() {
+  return cabin::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "cabin_robot"));
+}
+scara::StiffnessParameters Scara() {
+  return scara::StiffnessParametersOf(stiffness_audit::LoadElastic(kModels, "scara_robot"));
+}
+
+TEST(StiffnessAudit, CabinsEquationsAreRightOrMended) {
+  const auto rows = cabin_audit::StiffnessRows(kModels, Cabin());
+  EXPECT_EQ(With(rows, AuditVerdict::kOk),
+            (std::set<std::string>{"(54)", "(55)", "(62)–(64), (66)–(68)", "(69)–(75)"}));
+  EXPECT_EQ(With(rows, AuditVerdict::kWrong),
+            (std::set<std::string>{"(56)–(61)", "(65) K_AB", "(65) K_CD", "Table 2"}));
+  EXPECT_EQ(With(rows, AuditVerdict::kApproximation), std::set<std::string>{"(54) I_p"});
+  // (72), X = C F, has no sum.
+  EXPECT_TRUE(With(rows, AuditVerdict::kNotTestable).contains("(71), (73), (74): sum"));
+  EXPECT_TRUE(With(rows, AuditVerdict::kWrongAndUnfixed).empty());
+}
+
+TEST(StiffnessAudit, CabinsBentConstantsLeaveEquationsUnconfirmed) {
+  const auto unconfirmed = [](const auto& bend) {
+    cabin::StiffnessParameters p = Cabin();
+    bend(&p);
+    return With(cabin_audit::StiffnessRows(kModels, p), AuditVerdict::kWrongAndUnfixed);
+  };
+  constexpr double kBend = 1 + 1e-8;
+  const auto strut = unconfirmed([](auto* p) { p->sections[cabin::kBeamEF].h *= kBend; });
+  EXPECT_TRUE(strut.contains("(56)–(61)"));
+  EXPECT_TRUE(strut.contains("(65) K_AB"));
+  EXPECT_FALSE(strut.contains("(65) K_CD"));
+  const auto link = unconfirmed([](auto* p) { p->sections[cabin::kBeamCD].b *= kBend; });
+  EXPECT_TRUE(link.contains("(65) K_CD"));
+  EXPECT_TRUE(link.contains("(62)–(64), (66)–(68)"));
+  EXPECT_TRUE(unconfirmed([](auto* p) { p->w *= kBend; }).contains("(62)–(64), (66)–(68)"));
+  EXPECT_TRUE(unconfirmed([](auto* p) { p->wrist.a3 *= kBend; }).contains("(69)–(75)"));
+  EXPECT_TRUE(unconfirmed([](auto* p) { p->E *= kBend; }).contains("(54)"));
+}
+
+TEST(StiffnessAudit, ScarasBentConstantsLeaveEquationsUnconfirmed) {
+  const auto unconfirmed = [](double scara::StiffnessParameters::*member) {
+    scara::StiffnessParameters p = Scara();
+    p.*member *= 1 + 1e-8;
+    return With(scara_audit::StiffnessRows(kModels, p), AuditVerdict::kWrongAndUnfixed);
+  };
+  const auto servo = unconfirmed(&scara::StiffnessParameters::K_act);
+  EXPECT_TRUE(servo.contains("(15)"));
+  EXPECT_TRUE(servo.contains("(18), (21) κ_m"));
+  EXPECT_FALSE(servo.contains("(12)"));
+  EXPECT_FALSE(servo.contains("K_D1"));
+  EXPECT_TRUE(unconfirmed(&scara::StiffnessParameters::E).contains("(12)"));
+  EXPECT_TRUE(unconfirmed(&scara::StiffnessParameters::d).contains("K_D1"));
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,295 @@
+// The audit of the user's own MJCF: what it finds is planted here.
+#include "report/source_model_report.h"
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "base/files.h"
+#include "features/mjcf_audit/source_audit.h"
+#include "features/run/default_setup.h"
+#include "simulation/mjcf/closure_settings.h"
+#include "tests/support/test_folder.h"
+
+namespace mbv {
+namespace {
+
+struct Barwork {
+  std::string head = {};   // options and defaults
+  std::string base = {};   // joint of the base
+  std::string joint = {};  // attributes of the crank's
+  std::string closure = R"(<connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.4"/>)";
+  std::string actuator = R"(<motor name="m" joint="A"/>)";
+  double coupler_kg = 1.0;
+};
+
+// A four-bar linkage of sides 0.2, 0.6, 0.4, 0.5 m whose coupler's end runs on another curve than a
+// parallelogram's; its loop is closed at zero.
+std::string Text(const Barwork& b) {
+  return fmt::format(R"(<mujoco model="bars"><compiler angle="radian"/>{}<worldbody>
+<body name="base">{}<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<body name="crank"><joint name="A" axis="0 1 0" {}/><inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.001"/>
+<body name="coupler" pos="0 0 0.2"><joint name="B" axis="0 1 0"/>
+<inertial pos="0.25 0 0.1" mass="{}" diaginertia="0.001 0.02 0.02"/></body></body>
+<body name="rocker" pos="0.5 0 0"><joint name="D" axis="0 1 0"/>
+<inertial pos="0 0 0.2" mass="1" diaginertia="0.01 0.01 0.001"/></body></body></worldbody>
+<equality>{}</equality><actuator>{}</actuator></mujoco>
+)",
+                     b.head, b.base, b.joint, b.coupler_kg, b.closure, b.actuator);
+}
+
+const char* const kStiff =
+    R"(<default><equality solref="0.004 1" solimp="0.9999 0.9999 0.001 0.5 2"/></default>)";
+const char* const kSoft =
+    R"(<default><equality solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/></default>)";
+
+class OwnFile : public testing::Test {
+ protected:
+  // `run`: another text that is run in place of the one that the reference computes. `height`: of
+  // the drive's bump.
+  OwnFileAudit Audit(const std::string& text, const std::string& run = "",
+                     const std::string& height = "") {
+    const std::string file = folder_.Write("robot.xml", text);
+    const DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
+    EXPECT_TRUE(made.setup) << made.diagnostics.Text();
+    if (!made.setup) return {};
+    folder_.Write("model.yaml", made.setup->model);
+    std::string scenario = made.setup->scenario;
+    if (const size_t at = scenario.find("height: "); !height.empty() && at != std::string::npos) {
+      scenario.replace(at, scenario.find('}', at) - at, "height: " + height);
+    }
+    Diagnostics diagnostics;
+    const auto prepared = Prepare(folder_.Write("first.yaml", scenario), {}, &diagnostics);
+    EXPECT_TRUE(prepared) << diagnostics.Text();
+    if (!prepared) return {};
+    return AuditOwnFile({.file = file, .text = run, .prepared = &*prepared});
+  }
+  static const OwnCause* Find(const OwnFileAudit& audit, const std::string& key) {
+    for (const OwnCause& cause : audit.causes) {
+      if (cause.key == key) return &cause;
+    }
+    return nullptr;
+  }
+  using Keys = std::vector<std::string>;
+  static Keys Named(const OwnFileAudit& audit) {
+    Keys keys;
+    for (const OwnCause* cause : audit.Culprits()) keys.push_back(cause->key);
+    return keys.empty() ? Keys{""} : keys;
+  }
+  static bool Said(const std::vector<std::string>& lines, const std::string& text) {
+    for (const std::string& line : lines) {
+      if (line.find(text) != std::string::npos) return true;
+    }
+    return false;
+  }
+
+  const test::TestFolder folder_{std::string("own_file_") +
+                                 testing::UnitTest::GetInstance()->current_test_info()->name()};
+};
+
+TEST_F(OwnFile, InWhichNothingIsWrongIsToldSo) {
+  const OwnFileAudit audit =
+      Audit(Text({.head = std::string("<option timestep='0.0005' integrator='RK4'/>") + kStiff}));
+  ASSERT_TRUE(audit.declined.empty()) << audit.declined;
+  EXPECT_TRUE(audit.Good(audit.as_is)) << audit.as_is.failure << audit.as_is.force;
+  EXPECT_LT(audit.as_is.force, 1e-3);
+  EXPECT_LT(audit.as_is.joint_force, 1e-3);  // sign and frame of the closures' forces are right
+  EXPECT_FALSE(audit.searched);
+  EXPECT_NE(OwnFileSentence(audit).find("nothing is wrong"), std::string::npos);
+  EXPECT_EQ(audit.integrator, "RK4");
+}
+
+TEST_F(OwnFile, SoftLoopsOpenAreNamedAndMendedByTheLines) {
+  const std::string text = Text({.head = kSoft});
+  const OwnFileAudit audit = Audit(text);
+  ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
+  EXPECT_GT(audit.as_is.gap_m, 1e-3);
+  EXPECT_EQ(audit.as_is.joint, "C");
+  EXPECT_GT(audit.as_is.force, 0.01);
+  EXPECT_EQ(Named(audit), Keys{"softness"});
+  EXPECT_GT(Removed(audit.as_is.force, Find(audit, "softness")->without.force), 0.8);
+  EXPECT_LT(audit.mended.force, 1e-3);
+  // The lines in the file give what the table promises: here, and to whom pastes them.
+  ASSERT_GT(audit.recommended, 0);
+  const OwnError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
+  EXPECT_TRUE(audit.Good(promised)) << promised.force << " " << promised.gap_m;
+  EXPECT_TRUE(audit.stubborn.empty());
+  EXPECT_NEAR(audit.pasted.force, promised.force, 1e-9 * promised.force);
+  const OwnFileAudit pasted = Audit(mjcf::WithLines(text, audit.lines));
+  EXPECT_NEAR(pasted.as_is.force, promised.force, 1e-9 * promised.force) << audit.lines;
+  EXPECT_NEAR(pasted.as_is.gap_m, promised.gap_m, 1e-9 * promised.gap_m);
+  EXPECT_TRUE(pasted.Good(pasted.as_is));
+}
+
+TEST_F(OwnFile, ClosuresWithSettingsOfTheirOwnAreNamed) {
+  const OwnFileAudit audit = Audit(Text(
+      {.closure =
+           R"(<connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.4" solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/>)"}));
+  ASSERT_GT(audit.recommended, 0);
+  EXPECT_EQ(audit.stubborn, std::vector<std::string>{"C"});
+  const OwnError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
+  EXPECT_NEAR(audit.pasted.force, promised.force, 1e-9 * promised.force);
+}
+
+// Fast, with a stiff impedance: what is left out is the pull on the curve.
+TEST_F(OwnFile, ThePullOnTheCurveIsNamed) {
+  const std::string stiff_but_slow =
+      R"(<default><equality solref="0.04 1" solimp="0.9999 0.9999 0.001 0.5 2"/></default>)";
+  const OwnFileAudit audit = Audit(Text({.head = stiff_but_slow}), "", "0.8");
+  ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
+  const OwnCause* pull = Find(audit, "velocity_term");
+  ASSERT_NE(pull, nullptr);
+  EXPECT_EQ(Named(audit)[0], "velocity_term");
+  EXPECT_GT(audit.as_is.force, 0.01);
+  EXPECT_GT(Removed(audit.as_is.force, pull->without.force), 0.9);
+  EXPECT_GT(Removed(audit.as_is.gap_m, pull->without.gap_m), 0.9);
+}
+
+TEST_F(OwnFile, ServosThatLagAreNamedAndNoSettingIsBlamed) {
+  const OwnFileAudit audit = Audit(Text(
+      {.head = kStiff,
+       .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"}));
+  ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
+  EXPECT_TRUE(Said(audit.done, "m: led by the file's own position servos"));
+  EXPECT_GT(audit.as_is.force, 0.01);
+  EXPECT_EQ(Named(audit), Keys{"drives"});
+  EXPECT_FALSE(audit.searched);
+  EXPECT_TRUE(audit.Good(audit.bare));
+}
+
+TEST_F(OwnFile, WhatCutsAServosCommandOrForceIsTold) {
+  const auto servo = [](const char* range) {
+    return Text({.head = kStiff,
+                 .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", range)});
+  };
+  EXPECT_TRUE(Said(Audit(servo("ctrllimited='true' ctrlrange='-0.05 0.05'")).notes,
+                   "ctrlrange cuts its command, first at 0."));
+  EXPECT_TRUE(Said(Audit(servo("forcelimited='true' forcerange='-0.5 0.5'")).notes,
+                   "as its forcerange allows, first at 0"));
+  EXPECT_TRUE(Audit(servo("")).notes.empty());
+}
+
+// MuJoCo 2.2 drops `kv`; run as it is, the servo has it.
+TEST_F(OwnFile, ADampedServoKeepsItsDamping) {
+  const auto servo = [](const char* kv) {
+    return Text({.head = kStiff,
+                 .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", kv)});
+  };
+  const OwnFileAudit damped = Audit(servo("kv='40'")), plain = Audit(servo(""));
+  EXPECT_TRUE(Said(damped.done, "kv is taken over"));
+  EXPECT_FALSE(Said(plain.done, "kv is taken over"));
+  // A servo that brakes lags more.
+  EXPECT_GT(damped.as_is.force, 2.0 * plain.as_is.force);
+}
+
+TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
+  const std::string holds = R"(<joint name="hold" joint1="A" polycoef="0 1 0 0 0"/>)";
+  Barwork bars{.head = kStiff};
+  bars.closure += holds;
+  const OwnFileAudit audit = Audit(Text(bars));
+  ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
+  EXPECT_TRUE(Said(audit.done, "m: led by the file's own equality"));
+  EXPECT_NE(Find(audit, "drives"), nullptr);
+  EXPECT_LT(audit.mended.force, 1e-3);
+}
+
+TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
+  const OwnFileAudit audit =
+      Audit(Text({.head = std::string("<option density='2000'/>") + kStiff}));
+  EXPECT_EQ(Named(audit), Keys{"left_out"});
+  ASSERT_NE(Find(audit, "left_out"), nullptr);
+  EXPECT_NE(Find(audit, "left_out")->title.find("the medium's density"), std::string::npos);
+  EXPECT_FALSE(audit.searched);
+}
+
+// Dry friction is in the reference, too; MuJoCo's gives way before it slides.
+TEST_F(OwnFile, FrictionLossIsJudgedOutsideTheBandThatRestLeaves) {
+  const OwnFileAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='0.3'"}));
+  EXPECT_EQ(Find(audit, "left_out"), nullptr);
+  ASSERT_NE(Find(audit, "friction"), nullptr);
+  EXPECT_LT(audit.mended.force, 1e-3);
+  EXPECT_GT(audit.as_is.force, 1e-3);
+}
+
+// Damping, armature and springs of hinges are in the reference as well.
+TEST_F(OwnFile, ForceElementsAreNotLeftOut) {
+  const OwnFileAudit audit =
+      Audit(Text({.head = kStiff, .joint = "damping='1' armature='0.2' stiffness='3'"}));
+  EXPECT_EQ(Find(audit, "left_out"), nullptr);
+  EXPECT_LT(audit.mended.force, 1e-3);
+}
+
+TEST_F(OwnFile, AFreeBaseIsHeldAsIfItWereFixed) {
+  const OwnFileAudit fixed = Audit(Text({.head = kStiff}));
+  const OwnFileAudit free = Audit(Text({.head = kStiff, .base = "<freejoint/>"}));
+  ASSERT_TRUE(free.as_is.sound()) << free.as_is.failure;
+  EXPECT_TRUE(Said(free.done, "free bodies are held where they are"));
+  EXPECT_NEAR(free.as_is.force, fixed.as_is.force, 1e-2 * fixed.as_is.force);
+  EXPECT_LT(free.mended.force, 1e-3);
+}
+
+TEST_F(OwnFile, AWeldThatTwistsIsMeasured) {
+  const std::string soft =
+      R"(<default><equality solref="0.1 1" solimp="0.3 0.3 0.001 0.5 2"/></default>)";
+  const auto text = [](const std::string& head) {
+    return R"(<mujoco model="w"><compiler angle="radian"/>)" + head + R"(<worldbody>
+<body name="a"><joint name="A" axis="0 1 0"/><inertial pos="0.1 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+<body name="b" pos="0 0 0.5"><joint name="B" axis="0 1 0"/><inertial pos="0.3 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>
+<body name="c" pos="0.5 0 0"><joint name="C" axis="0 1 0"/><inertial pos="0 0 -0.2" mass="1" diaginertia="0.01 0.01 0.01"/></body></body></body>
+<body name="d" pos="0.5 0 0"><joint name="D" axis="0 1 0"/><inertial pos="0.2 0 0.2" mass="1" diaginertia="0.01 0.01 0.01"/></body>
+</worldbody><equality><weld name="W" body1="c" body2="d"/></equality>
+<actuator><motor name="m" joint="A"/></actuator></mujoco>)";
+  };
+  const OwnFileAudit loose = Audit(text(soft)), tight = Audit(text(kStiff));
+  ASSERT_TRUE(loose.as_is.sound()) << loose.as_is.failure;
+  EXPECT_GT(loose.as_is.gap_rad, 1e-3);
+  EXPECT_EQ(loose.as_is.twisted, "W");
+  EXPECT_EQ(Named(loose), Keys{"softness"});
+  EXPECT_LT(tight.as_is.gap_rad, 1e-4);
+  EXPECT_TRUE(tight.Good(tight.as_is)) << tight.as_is.force;
+  EXPECT_LT(tight.as_is.joint_force, 1e-2);
+}
+
+// Another mass is no matter of settings: it stays when all is mended, and is told.
+TEST_F(OwnFile, AFileOfAnotherMechanismIsNotBlamedOnItsSettings) {
+  const std::string right = Text({.head = kStiff});
+  const OwnFileAudit audit = Audit(right, Text({.head = kStiff, .coupler_kg = 1.05}));
+  const OwnFileAudit same = Audit(right, right);
+  EXPECT_LT(same.mended.force, 1e-3);
+  EXPECT_GT(audit.mended.force, 0.01);
+  EXPECT_GT(audit.as_is.force, 0.01);
+  EXPECT_EQ(Named(audit), Keys{""});
+}
+
+TEST_F(OwnFile, ThatDivergesGivesATimeAndNoNumbers) {
+  const OwnFileAudit audit =
+      Audit(Text({.head = "<option timestep='0.05'/>",
+                  .actuator = R"(<position name="m" joint="A" kp="1e7"/>)"}));
+  EXPECT_FALSE(audit.as_is.sound());
+  EXPECT_GE(audit.as_is.time_s, 0.0);
+  EXPECT_TRUE(std::isnan(audit.as_is.force));
+  EXPECT_NE(OwnFileSentence(audit).find("no forces that could be compared"), std::string::npos)
+      << OwnFileSentence(audit);
+}
+
+TEST_F(OwnFile, FrictionOfContactsIsNoMatterHere) {
+  const OwnFileAudit audit = Audit(Text({.head = kSoft}));
+  bool found = false;
+  for (const OwnTrial& trial : audit.trials) {
+    if (trial.other != "impratio 10") continue;
+    found = true;
+    EXPECT_EQ(trial.error.force, audit.trials[0].error.force);
+  }
+  EXPECT_TRUE(found);
+}
+
+TEST_F(OwnFile, ADriveWithoutANameForItsJointIsDeclined) {
+  std::string text = Text({.actuator = ""});
+  for (const char* name : {R"(name="A" )", R"(name="B" )", R"(name="D" )"}) {
+    text.erase(text.find(name), std::string(name).size());
+  }
+  const OwnFileAudit audit = Audit(text);
+  EXPECT_NE(audit.declined.find("has no name in the file"), std::string::npos) << audit.declined;
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,55 @@
+// Runs of a user's file on their way out of a child process.
+#include "features/mjcf_audit/own_run_bytes.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+namespace mbv {
+namespace {
+
+OwnRun ExampleRun() {
+  OwnRun run;
+  run.summary = {.stop = Stop::kEngineFailure, .message = "it\nended", .where = {}, .unit = {}};
+  run.facts.step_s = 0.002;
+  run.facts.closures = {"C", ""};
+  run.facts.leads = {DriveLead::kServo, DriveLead::kAdded};
+  run.facts.rough_solver = true;
+  run.trace.Reset({0.0, 0.01}, {MakeChannel(Quantity::kForce, "N m", "m")});
+  run.trace.values << 1.5, kNan;
+  run.gaps = {{.position_m = 1.0, .position_at_s = 2.0, .rotation_rad = 3.0, .rotation_at_s = 4.0}};
+  run.notes = {"a limit pushes"};
+  run.cost_ms = 7.0;
+  return run;
+}
+
+TEST(OwnRunBytes, ComeBackAsTheyWere) {
+  const OwnRun run = ExampleRun();
+  const auto back = FromBytes<OwnRun>(ToBytes(run));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(back->summary.stop, run.summary.stop);
+  EXPECT_EQ(back->summary.message, run.summary.message);
+  EXPECT_EQ(back->facts.closures, run.facts.closures);
+  EXPECT_EQ(back->facts.leads, run.facts.leads);
+  EXPECT_TRUE(back->facts.rough_solver);
+  EXPECT_EQ(back->trace.time_s, run.trace.time_s);
+  EXPECT_EQ(back->trace.channels[0].name, "m.force");
+  EXPECT_EQ(back->trace.values(0, 0), 1.5);
+  EXPECT_TRUE(std::isnan(back->trace.values(1, 0)));
+  EXPECT_EQ(back->gaps[0].rotation_at_s, 4.0);
+  EXPECT_EQ(back->notes, run.notes);
+  EXPECT_EQ(back->cost_ms, 7.0);
+}
+
+// A child that dies while it writes, or writes too much.
+TEST(OwnRunBytes, PartsAreNoRun) {
+  const std::string bytes = ToBytes(ExampleRun());
+  for (size_t size = 0; size < bytes.size(); ++size) {
+    EXPECT_FALSE(FromBytes<OwnRun>(bytes.substr(0, size))) << size;
+  }
+  EXPECT_FALSE(FromBytes<OwnRun>(bytes + "x"));
+  EXPECT_FALSE(FromBytes<OwnRun>(std::string(1000, '\xff')));
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,52 @@
+// The page of a run: what the runs of one night share.
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "base/files.h"
+#include "features/run/run_scenario.h"
+#include "tests/support/source_dir.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+// The section of the paper's equations in the report of a short run.
+std::string EquationsSection(const fs::path& out, const std::string& kept) {
+  RunOptions options;
+  options.pictures = false;
+  options.scenario.set = {{"simulation", "off"}};
+  options.out_dir = out.string();
+  options.kept_audits = kept;
+  const RunOutcome outcome = RunScenario(SourcePath("/scenarios/spr_tripod/static.yaml"), options);
+  EXPECT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  const std::string page = ReadWholeFile(fs::path(outcome.folder) / "report.html").value_or("");
+  const size_t begin = page.find("<section id=\"equations\">");
+  EXPECT_NE(begin, std::string::npos);
+  return page.substr(begin, page.find("</section>", begin) - begin);
+}
+
+TEST(RunPage, TheAuditOfANightIsComputedOnceAndReadByTheOthers) {
+  const fs::path out = fs::temp_directory_path() / ("mbv_run_page_" + std::to_string(getpid()));
+  const fs::path kept = out / "kept", file = kept / "spr_tripod.json";
+  const std::string alone = EquationsSection(out, "");
+  EXPECT_EQ(EquationsSection(out, kept.string()), alone);
+  const std::string text = ReadWholeFile(file).value_or("");
+  ASSERT_FALSE(text.empty());
+  EXPECT_EQ(EquationsSection(out, kept.string()), alone);
+  // It is read, not computed anew; and a damaged file is.
+  std::string bent = text;
+  const size_t at = bent.find("(1)");
+  ASSERT_NE(at, std::string::npos);
+  bent.replace(at, 3, "(X)");
+  ASSERT_EQ(WriteFile(file, bent), "");
+  EXPECT_NE(EquationsSection(out, kept.string()).find("(X)"), std::string::npos);
+  ASSERT_EQ(WriteFile(file, text.substr(0, text.size() / 2)), "");
+  EXPECT_EQ(EquationsSection(out, kept.string()), alone);
+  fs::remove_all(out);
+}
+
+}  // namespace
+}  // namespace mbv

@@ -1,0 +1,199 @@
+// Factors, ranks and least-norm solutions of sparse matrices against Eigen's dense ones.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <random>
+
+#include "math/sparse.h"
+
+namespace mbv {
+namespace {
+
+// Entries of the order one at a fifth of the places, and on the diagonal.
+class RandomMatrices {
+ public:
+  RandomMatrices(int rows, int cols) : rows_(rows), cols_(cols) {
+    for (int r = 0; r < rows; ++r) {
+      for (int c = 0; c < cols; ++c) {
+        if (r == c || uniform_(random_) > 0.6) places_.emplace_back(r, c);
+      }
+    }
+  }
+  // Another matrix of the same pattern.
+  SparseLu::Matrix Next() {
+    std::vector<Eigen::Triplet<double>> entries;
+    for (const auto& [r, c] : places_) entries.emplace_back(r, c, uniform_(random_));
+    SparseLu::Matrix A(rows_, cols_);
+    A.setFromTriplets(entries.begin(), entries.end());
+    return A;
+  }
+  VecX Vector(Eigen::Index size) {
+    VecX v(size);
+    for (double& x : v) x = uniform_(random_);
+    return v;
+  }
+
+ private:
+  std::mt19937_64 random_{7};
+  std::uniform_real_distribution<double> uniform_{-1.0, 1.0};
+  int rows_, cols_;
+  std::vector<std::pair<int, int>> places_;
+};
+
+TEST(SparseLuFactors, SolveMatricesOfOnePatternAndKnowTheSignOfTheirDeterminants) {
+  RandomMatrices matrices(30, 30);
+  SparseLu lu;
+  int negative = 0;
+  for (int k = 0; k < 40; ++k) {
+    const SparseLu::Matrix A = matrices.Next();
+    ASSERT_TRUE(lu.Factor(A));
+    const MatX dense(A);
+    const double sign = dense.determinant() < 0 ? -1 : 1;
+    negative += sign < 0 ? 1 : 0;
+    EXPECT_EQ(lu.determinant_sign(), sign) << k;
+    const double condition = 1.0 / dense.partialPivLu().rcond();
+    const VecX b = matrices.Vector(30);
+    VecX x = b, y = b;
+    lu.Solve(&x);
+    lu.SolveTransposed(&y);
+    EXPECT_LT((A * x - b).norm(), 1e-14 * condition) << k;
+    EXPECT_LT((A.transpose() * y - b).norm(), 1e-14 * condition) << k;
+  }
+  EXPECT_GT(negative, 5);
+  EXPECT_LT(negative, 35);
+}
+
+TEST(SparseLuFactors, ChooseNewPivotsWhereTheOldOnesVanish) {
+  // [ε 1; 1 0]: the pivot of ε = 1 does not serve for ε = 1e-18.
+  const auto matrix = [](double corner) {
+    SparseLu::Matrix A(2, 2);
+    A.insert(0, 0) = corner;
+    A.insert(0, 1) = 1.0;
+    A.insert(1, 0) = 1.0;
+    A.insert(1, 1) = 1e-3;
+    A.makeCompressed();
+    return A;
+  };
+  SparseLu lu;
+  for (const double corner : {1.0, 1e-18, -1.0, 0.0}) {
+    const SparseLu::Matrix A = matrix(corner);
+    ASSERT_TRUE(lu.Factor(A)) << corner;
+    VecX x(2);
+    x << 1.0, 2.0;
+    lu.Solve(&x);
+    VecX b(2);
+    b << 1.0, 2.0;
+    EXPECT_LT((A * x - b).norm(), 1e-15) << corner;
+    EXPECT_EQ(lu.determinant_sign(), corner * 1e-3 - 1.0 < 0 ? -1 : 1) << corner;
+  }
+}
+
+TEST(SparseLuFactors, ASingularMatrixIsRefusedAndTheNextOneServed) {
+  SparseLu lu;
+  SparseLu::Matrix A(3, 3);
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) A.insert(i, j) = 1.0;
+  }
+  A.makeCompressed();
+  EXPECT_FALSE(lu.Factor(A));
+  for (int i = 0; i < 3; ++i) A.coeffRef(i, i) = 3.0;
+  ASSERT_TRUE(lu.Factor(A));
+  EXPECT_EQ(lu.determinant_sign(), 1);
+  EXPECT_NEAR(lu.PivotRatio(), (20.0 / 8.0) / 3.0, 1e-12);
+  A.coeffRef(1, 1) = NAN;
+  EXPECT_FALSE(lu.Factor(A));
+}
+
+// Rank r by r columns mixed.
+MatX OfRank(int rows, int cols, int rank, unsigned seed) {
+  std::srand(seed);
+  return MatX::Random(rows, rank) * MatX::Random(rank, cols);
+}
+
+TEST(SparseRanks, FindRankAndNullSpaceAsSingularValuesDo) {
+  for (const int rank : {0, 1, 7, 12, 20}) {
+    const MatX dense = OfRank(20, 25, rank, static_cast<unsigned>(rank));
+    const SparseRank qr(dense.sparseView(), 1e-9);
+    EXPECT_EQ(qr.rank(), rank);
+    EXPECT_TRUE(qr.clear()) << rank;
+    const MatX N = qr.NullSpace();
+    ASSERT_EQ(N.cols(), 25 - rank);
+    EXPECT_LT((dense * N).norm(), 1e-12);
+    EXPECT_EQ(N.colPivHouseholderQr().rank(), 25 - rank);
+    // The columns kept span all.
+    const std::vector<int> kept = qr.Independent();
+    ASSERT_EQ(static_cast<int>(kept.size()), rank);
+    if (rank == 0) continue;
+    const Eigen::BDCSVD<MatX> svd(MatX(dense(Eigen::all, kept)));
+    EXPECT_GT(svd.singularValues()[rank - 1], 1e-6);
+    EXPECT_LT(qr.smallest_kept(), 1.5 * svd.singularValues()[rank - 1]);
+    EXPECT_GT(qr.smallest_kept(), 0.5 * svd.singularValues()[rank - 1]);
+  }
+}
+
+TEST(SparseRanks, AreNotClearNearTheTolerance) {
+  std::srand(3);
+  const MatX dense = MatX::Random(12, 12);
+  const Eigen::BDCSVD<MatX> svd(dense, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  for (const auto& [smallest, clear] :
+       {std::pair{1e-3, true}, {1e-8, false}, {1e-9, false}, {1e-14, true}}) {
+    VecX values = VecX::Ones(12);
+    values[11] = smallest;
+    const MatX J = svd.matrixU() * values.asDiagonal() * svd.matrixV().transpose();
+    const SparseRank qr(J.sparseView(), 1e-9);
+    EXPECT_EQ(qr.clear(), clear) << smallest;
+    if (clear) {
+      EXPECT_EQ(qr.rank(), smallest > 1e-9 ? 12 : 11);
+    }
+  }
+}
+
+// Thirty columns of 0.9e-9 each: every one counts as zero, a singular value of all of them does
+// not.
+TEST(SparseRanks, AreNotClearWhereManySmallEntriesAddUp) {
+  MatX dense = MatX::Zero(40, 31);
+  dense(0, 0) = 1.0;
+  for (int c = 1; c < 31; ++c) dense(5, c) = 0.9e-9;
+  const SparseRank qr(dense.sparseView(), 1e-9);
+  EXPECT_EQ(qr.rank(), 1);
+  EXPECT_FALSE(qr.clear());
+  dense *= 0.1;
+  dense(0, 0) = 1.0;
+  EXPECT_TRUE(SparseRank(dense.sparseView(), 1e-9).clear());
+}
+
+TEST(SparseLeastNorms, AreThoseOfTheDensePseudoInverse) {
+  RandomMatrices matrices(18, 30);
+  SparseLeastNorm solver;
+  for (int k = 0; k < 10; ++k) {
+    const SparseLu::Matrix A = matrices.Next();
+    ASSERT_TRUE(solver.Factor(A, 1e-9));
+    const Eigen::CompleteOrthogonalDecomposition<MatX> dense{MatX(A)};
+    const Eigen::CompleteOrthogonalDecomposition<MatX> transposed{MatX(A).transpose()};
+    const VecX b = matrices.Vector(18), c = matrices.Vector(30);
+    EXPECT_LT((solver.LeastNorm(b) - dense.solve(b)).norm(), 1e-12) << k;
+    EXPECT_LT((solver.LeastSquares(c) - transposed.solve(c)).norm(), 1e-12) << k;
+  }
+}
+
+TEST(SparseLeastNorms, NeedRowsThatAreIndependent) {
+  RandomMatrices matrices(6, 9);
+  SparseLu::Matrix A = matrices.Next();
+  MatX dense(A);
+  dense.row(5) = dense.row(2) - 2.0 * dense.row(4);
+  SparseLeastNorm solver;
+  EXPECT_FALSE(solver.Factor(dense.sparseView(), 1e-9));
+}
+
+// Rows that are nearly dependent are so by one tolerance and not by another.
+TEST(SparseLeastNorms, NeedRowsThatAreIndependentToTheTolerance) {
+  RandomMatrices matrices(6, 9);
+  MatX dense(matrices.Next());
+  dense.row(5) = dense.row(2) - 2.0 * dense.row(4) + 1e-4 * MatX(matrices.Next()).row(5);
+  SparseLeastNorm strict, loose;
+  EXPECT_FALSE(strict.Factor(dense.sparseView(), 1e-3));
+  EXPECT_TRUE(loose.Factor(dense.sparseView(), 1e-14));
+}
+
+}  // namespace
+}  // namespace mbv

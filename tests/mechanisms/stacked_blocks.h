@@ -1,0 +1,75 @@
+// Blocks that slide on each other, for closed forms of stick and slip.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "tests/mechanisms/simulated.h"
+
+namespace mbv::fixtures {
+
+/// Blocks of these masses in a row, each sliding along x on the one before (the first on the
+/// ground), with these laws of friction between them; the first on a spring whose force vanishes at
+/// x = 0.
+struct StackedBlocks {
+  std::vector<double> masses;
+  std::vector<FrictionLaw> laws;
+  double stiffness = 0.0;
+
+  [[nodiscard]] Mechanism Make() const {
+    Mechanism m;
+    m.name = "stack";
+    m.gravity_W.setZero();
+    m.bodies = {MakeBody("world", 0.0, Vec3::Zero(), Vec3::Zero())};
+    for (size_t i = 0; i < masses.size(); ++i) {
+      const std::string number = std::to_string(i + 1);
+      m.bodies.push_back(MakeBody("block" + number, masses[i], Vec3::Zero(), Vec3::Constant(0.01)));
+      m.joints.push_back(MakeJoint("slide" + number, JointKind::kPrismatic, static_cast<int>(i),
+                                   Vec3::Zero(), static_cast<int>(i) + 1, Vec3::Zero()));
+      m.joints.back().axis = Vec3::UnitX();
+      Drive motor;
+      motor.name = "motor" + number;
+      motor.kind = JointDrive{static_cast<int>(i), 0};
+      m.drives.push_back(motor);
+      ForceElement dry;
+      dry.name = "dry" + number;
+      dry.joint = static_cast<int>(i);
+      dry.law = laws[i];
+      m.elements.push_back(dry);
+    }
+    if (stiffness > 0.0) {
+      ForceElement spring;
+      spring.name = "spring";
+      spring.joint = 0;
+      spring.law = SpringLaw{.polynomial = {stiffness}};
+      m.elements.push_back(spring);
+    }
+    AddTree(&m);
+    m.X_WB_home.assign(m.bodies.size(), Pose::Identity());
+    return m;
+  }
+
+  /// From x and v of the first block; the others rest on it.
+  [[nodiscard]] static Motion From(const Mechanism& m, double x, double v, double duration_s) {
+    Motion motion;
+    motion.duration_s = duration_s;
+    motion.sample_s = 0.01;
+    for (size_t d = 0; d < m.drives.size(); ++d) {
+      const int drive = static_cast<int>(d);
+      motion.forces.push_back({drive, {}});
+      motion.initial.push_back({.name = m.drives[d].name,
+                                .coordinate = {Coordinate::Kind::kDrive, drive, 0},
+                                .position = d == 0 ? x : 0.0,
+                                .rate = d == 0 ? v : 0.0});
+    }
+    return motion;
+  }
+};
+
+inline FrictionLaw CoulombFriction(double force) { return {.coulomb = force, .breakaway = force}; }
+/// `breakaway` at rest, `coulomb` as soon as it slides.
+inline FrictionLaw JumpingFriction(double coulomb, double breakaway) {
+  return {.coulomb = coulomb, .breakaway = breakaway, .stribeck_rate = 0.0};
+}
+
+}  // namespace mbv::fixtures

@@ -1,0 +1,402 @@
+// MJCF files as mechanisms.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "features/robots/survey.h"
+#include "features/run/default_setup.h"
+#include "kinematics/mobility.h"
+#include "math/spatial.h"
+#include "model_file/mesh/inertia_diagnosis.h"
+#include "model_file/write_model.h"
+#include "tests/support/solids.h"
+#include "tests/support/test_folder.h"
+#include "verify/model_text.h"
+
+namespace mbv {
+namespace {
+
+// A four-bar linkage of sides 0.3, 0.5, 0.3, 0.5 m, upright at zero; `more` goes into <mujoco>,
+// `joint` into the crank's joint.
+std::string Linkage(const std::string& more = "", const std::string& joint = "",
+                    const std::string& base = "") {
+  return R"(<mujoco model="linkage"><compiler angle="radian"/><worldbody>
+<body name="base">)" +
+         base + R"(<inertial pos="0 0 0" mass="2" diaginertia="1 1 1"/>
+<body name="crank"><joint name="A" axis="0 1 0" )" +
+         joint + R"(/><inertial pos="0 0 0.15" mass="1" diaginertia="0.01 0.01 0.001"/>
+<site name="mark" pos="0 0 0.1"/>
+<body name="coupler" pos="0 0 0.3"><joint name="B" axis="0 1 0"/>
+<inertial pos="0.25 0 0" mass="1" diaginertia="0.001 0.02 0.02"/><geom type="box" size="0.25 0.01 0.01" pos="0.25 0 0"/></body></body>
+<body name="rocker" pos="0.5 0 0"><joint name="D" axis="0 1 0"/>
+<inertial pos="0 0 0.15" mass="1" diaginertia="0.01 0.01 0.001"/></body></body></worldbody>
+<equality><connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.3"/></equality>
+<actuator><motor name="m" joint="A"/></actuator>)" +
+         more + "</mujoco>\n";
+}
+
+LoadResult LoadText(const test::TestFolder& folder, const std::string& text) {
+  return LoadRobot(folder.Write("robot.xml", text));
+}
+
+TEST(MjcfImport, ALinkageClosedByConnectIsAMechanism) {
+  const test::TestFolder folder("mjcf_linkage");
+  const LoadResult loaded = LoadText(folder, Linkage());
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  EXPECT_EQ(m.name, "linkage");
+  ASSERT_EQ(m.bodies.size(), 5u);
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  ASSERT_EQ(m.drives.size(), 1u);
+  EXPECT_EQ(m.drives[0].name, "m");
+  const Body& coupler = m.bodies[m.FindBody("coupler")];
+  EXPECT_EQ(coupler.mass, 1.0);
+  EXPECT_EQ(coupler.p_BoBcm_B, Vec3(0.25, 0, 0));
+  EXPECT_NEAR(coupler.I_Bcm_B(1, 1), 0.02, 1e-15);
+  ASSERT_EQ(coupler.shapes.size(), 1u);
+  const NamedFrame* mark = m.FindFrame(m.FindBody("crank"), "mark");
+  ASSERT_NE(mark, nullptr);
+  EXPECT_EQ(mark->X_BF.translation(), Vec3(0, 0, 0.1));
+  const Vec3 at_coupler = m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0);
+  EXPECT_LT((at_coupler - Vec3(0.5, 0, 0.3)).norm(), 1e-12);
+}
+
+TEST(MjcfImport, ItAgreesInBothModes) {
+  const test::TestFolder folder("mjcf_agrees");
+  const SurveyRow row = SurveyFile(folder.Write("robot.xml", Linkage()), folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_LT(row.inverse_nrmse, 1e-10);
+  EXPECT_LT(row.forward_nrmse, 1e-6);
+}
+
+TEST(MjcfImport, WhatAMechanismCannotExpressIsAFinding) {
+  const test::TestFolder folder("mjcf_lost");
+  const LoadResult loaded = LoadText(
+      folder,
+      Linkage("<tendon><fixed name='t'><joint joint='A' coef='1'/></fixed></tendon>",
+              "armature='0.1' damping='2' frictionloss='3' stiffness='4'", "<joint type='free'/>"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const std::string said = loaded.diagnostics.Text();
+  for (const char* lost : {"1 tendons are left out: they exert no force",
+                           "the free joint of base is left out: the body is held where it is"}) {
+    EXPECT_NE(said.find(lost), std::string::npos) << lost << "\n" << said;
+  }
+  ASSERT_EQ(loaded.caveats.size(), 1u);
+  EXPECT_EQ(loaded.caveats[0].source, "body/freejoint");
+  const LoadResult plain = LoadText(folder, Linkage());
+  EXPECT_TRUE(plain.caveats.empty());
+  EXPECT_EQ(plain.diagnostics.Text().find("left out"), std::string::npos)
+      << plain.diagnostics.Text();
+}
+
+// Armature, damping and springs of hinges are force elements; of balls they are lost.
+TEST(MjcfImport, WhatActsOnHingesIsAForceElement) {
+  const test::TestFolder folder("mjcf_elements");
+  const LoadResult loaded = LoadText(
+      folder, Linkage("", "armature='0.1' damping='2' stiffness='4' springref='0.3' ref='0.1'"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_EQ(loaded.diagnostics.Text().find("left out"), std::string::npos)
+      << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  ASSERT_EQ(m.elements.size(), 3u);
+  for (const ForceElement& element : m.elements) EXPECT_EQ(element.joint, m.FindJoint("A"));
+  EXPECT_EQ(m.elements[0].name, "A_damping");
+  EXPECT_EQ(std::get<DampingLaw>(m.elements[0].law).damping, 2.0);
+  const auto& spring = std::get<SpringLaw>(m.elements[1].law);
+  EXPECT_EQ(spring.polynomial, std::vector<double>{4.0});
+  EXPECT_NEAR(spring.free, 0.3 - 0.1, 1e-15);  // from the reference
+  EXPECT_EQ(std::get<RotorLaw>(m.elements[2].law).reflected(), 0.1);
+}
+
+// What acts on forces and is left out stands in the row, in its table and its JSON: never ok alone.
+TEST(MjcfImport, AnAgreementWithoutAllForcesHasACaveat) {
+  const test::TestFolder folder("mjcf_caveat");
+  for (const bool fluid : {false, true}) {
+    const std::string file =
+        folder.Write("robot.xml", Linkage(fluid ? "<option density='1.2'/>" : ""));
+    const SurveyRow row = SurveyFile(file, folder.PathOf("scratch"));
+    EXPECT_EQ(row.status, "ok") << row.message;
+    ASSERT_EQ(row.caveats.size(), fluid ? 1u : 0u);
+    const std::string text =
+        "the fluid's density 1.2 is left out: a fluid drags and lifts every body";
+    EXPECT_EQ(SurveyTable({row}).find("caveat: not the whole robot: " + text) != std::string::npos,
+              fluid);
+    EXPECT_EQ(SurveyTable({row}).find("1 of 1 ok, 1 of them with caveats") != std::string::npos,
+              fluid);
+    EXPECT_EQ(SurveyJson({row}).find(text) != std::string::npos, fluid);
+    EXPECT_EQ(SurveyCsv({row}).find(text) != std::string::npos, fluid);
+    EXPECT_EQ(SurveyHtml({row}, "f").find("caveats") != std::string::npos, true);
+  }
+}
+
+TEST(MjcfImport, FrictionLossIsDryFriction) {
+  const test::TestFolder folder("mjcf_friction");
+  const LoadResult loaded = LoadText(folder, Linkage("", "frictionloss='0.3'"));
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  ASSERT_EQ(loaded.mechanism->elements.size(), 1u);
+  const ForceElement& element = loaded.mechanism->elements[0];
+  EXPECT_EQ(element.name, "A_friction");
+  EXPECT_EQ(std::get<FrictionLaw>(element.law).coulomb, 0.3);
+  EXPECT_EQ(std::get<FrictionLaw>(element.law).breakaway, 0.3);
+  EXPECT_EQ(loaded.diagnostics.Text().find("left out"), std::string::npos)
+      << loaded.diagnostics.Text();
+}
+
+TEST(MjcfImport, ARobotWithForceElementsAgreesInBothModes) {
+  const test::TestFolder folder("mjcf_elements_agree");
+  const SurveyRow row = SurveyFile(
+      folder.Write("robot.xml", Linkage("",
+                                        "armature='0.1' damping='2' stiffness='4' springref='0.3' "
+                                        "frictionloss='0.2'")),
+      folder.PathOf("scratch"));
+  EXPECT_EQ(row.status, "ok") << row.message;
+  EXPECT_LT(row.inverse_nrmse, 1e-10);
+  EXPECT_LT(row.forward_nrmse, 1e-6);
+}
+
+// What later versions know: attribute, its element, and what the finding says.
+TEST(MjcfImport, WhatOnlyNewerMuJoCoKnowsIsDroppedWithAFinding) {
+  const test::TestFolder folder("mjcf_newer");
+  struct Newer {
+    const char *more, *joint, *says;
+  };
+  for (const Newer& newer :
+       {Newer{"", "actuatorfrcrange='-1 1'", "attribute 'actuatorfrcrange' of <joint> (1 times)"},
+        Newer{"<option><flag island='disable'/></option>", "", "attribute 'island' of <flag>"},
+        Newer{"<deformable/>", "", "element <deformable> (1 times)"}}) {
+    const LoadResult loaded = LoadText(folder, Linkage(newer.more, newer.joint));
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    EXPECT_NE(loaded.diagnostics.Text().find(newer.says), std::string::npos)
+        << newer.says << "\n"
+        << loaded.diagnostics.Text();
+  }
+}
+
+TEST(MjcfImport, JointsOfOneBodyBallsWeldsAndKeyframesAreRead) {
+  const test::TestFolder folder("mjcf_joints");
+  const LoadResult loaded = LoadText(folder, R"(<mujoco model="arm"><compiler angle="radian"/>
+<worldbody><body name="a" pos="0 0 1" euler="0.3 0.2 -0.4">
+<joint name="slide" type="slide" axis="1 0 0"/><joint name="turn" axis="0 0 1" pos="0 0.1 0"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="b" pos="0 0 0.5"><joint name="ball" type="ball" pos="0 0 -0.1"/>
+<inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
+<body name="c" pos="2 0 0"><joint name="lone" axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="d" pos="0 0 0.2"><joint name="inner" axis="0 1 0"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></body>
+</worldbody>
+<equality><weld name="w" body1="c" body2="d"/></equality>
+<keyframe><key name="home" qpos="0.2 0.5 0.9238795325112867 0 0.3826834323650898 0 0 0"/></keyframe></mujoco>)");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  // MuJoCo's kinematics by hand: the slide along the body's x, the turn about the anchor, the ball.
+  const Mat3 R0 = RotX(0.3) * RotY(0.2) * RotZ(-0.4);
+  const Vec3 anchor(0, 0.1, 0);
+  const Vec3 slid = Vec3(0, 0, 1) + R0 * Vec3(0.2, 0, 0);
+  const Vec3 p_a = slid + R0 * (anchor - RotZ(0.5) * anchor);
+  const Mat3 R_a = R0 * RotZ(0.5);
+  const Pose& X_a = m.X_WB_home[m.FindBody("a")];
+  EXPECT_LT((X_a.translation() - p_a).norm(), 1e-12);
+  EXPECT_LT((X_a.linear() - R_a).norm(), 1e-12);
+  const Mat3 R_b = R_a * RotY(std::numbers::pi / 4);
+  const Vec3 p_b = p_a + R_a * Vec3(0, 0, 0.4) + R_b * Vec3(0, 0, 0.1);
+  const Pose& X_b = m.X_WB_home[m.FindBody("b")];
+  EXPECT_LT((X_b.translation() - p_b).norm(), 1e-12);
+  EXPECT_LT((X_b.linear() - R_b).norm(), 1e-12);
+  // The weld holds the two as they are at the reference.
+  EXPECT_EQ(AnalyseMobility(m).freedoms, 2 + 3 + 1);
+  EXPECT_NE(loaded.diagnostics.Text().find("the keyframe 'home'"), std::string::npos);
+}
+
+// As MuJoCo 3.2 writes closures. The sites are a centimetre apart in the pose of the file: where
+// they meet is in the sites, not in the pose.
+std::string LinkageBySites(const std::string& closure) {
+  std::string text = Linkage();
+  const auto swap = [&](const std::string& from, const std::string& to) {
+    const size_t at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+  };
+  swap(R"(<connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.3"/>)", closure);
+  swap(R"(<body name="rocker" pos="0.5 0 0">)",
+       R"(<body pos="0.5 0 0"><site name="top" pos="0 0 0.3"/>)");
+  swap(R"(<body name="coupler" pos="0 0 0.3">)",
+       R"(<body name="coupler" pos="0 0 0.3"><site name="end" pos="0.49 0 0"/>)");
+  return text;
+}
+
+TEST(MjcfImport, ClosuresByTwoSitesMeetInTheSites) {
+  const test::TestFolder folder("mjcf_sites");
+  for (const char* closure : {R"(<connect site1="top" site2="end"/>)",
+                              R"(<connect name="top_end" site1="end" site2="top"/>)"}) {
+    const LoadResult loaded = LoadText(folder, LinkageBySites(closure));
+    ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    const Mechanism& m = *loaded.mechanism;
+    EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+    ASSERT_GE(m.FindJoint("top_end"), 0);
+    const int rocker = m.FindBody("body_of_top"), coupler = m.FindBody("coupler");
+    ASSERT_GE(rocker, 0);
+    const Vec3 gap =
+        m.X_WB_home[rocker] * Vec3(0, 0, 0.3) - m.X_WB_home[coupler] * Vec3(0.49, 0, 0);
+    EXPECT_LT(gap.norm(), 1e-12) << closure;
+  }
+}
+
+TEST(MjcfImport, AWeldBySitesMakesTheirAxesCoincide) {
+  const test::TestFolder folder("mjcf_weld_sites");
+  const LoadResult loaded = LoadText(folder, R"(<mujoco model="w"><worldbody>
+<site name="hold" pos="0 0 1" quat="0.5 0.5 0.5 0.5"/>
+<body name="a"><joint type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<body name="b" pos="0 0 1"><joint type="ball"/><inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/>
+<site name="tip" quat="0.6 0 0.8 0"/></body></body></worldbody>
+<equality><weld site1="hold" site2="tip"/></equality></mujoco>)");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const Mechanism& m = *loaded.mechanism;
+  const Joint& weld = m.joints[m.FindJoint("hold_tip")];
+  const Mat3 hold = (m.X_WB_home[weld.parent] * weld.X_PF).linear();
+  const Mat3 tip = (m.X_WB_home[weld.child] * weld.X_CM).linear();
+  EXPECT_LT((hold - tip).norm(), 1e-12);
+  const Mat3 stated = Eigen::Quaterniond(0.5, 0.5, 0.5, 0.5).toRotationMatrix();
+  EXPECT_LT((hold - stated).norm(), 1e-12);
+}
+
+TEST(MjcfImport, ASiteThatIsMissingIsNamedWithItsLine) {
+  const test::TestFolder folder("mjcf_no_site");
+  const LoadResult loaded =
+      LoadText(folder, LinkageBySites(R"(<connect site1="top" site2="endd"/>)"));
+  EXPECT_FALSE(loaded.mechanism);
+  EXPECT_NE(loaded.diagnostics.Text().find("<connect> names the site 'endd', which no body has"),
+            std::string::npos)
+      << loaded.diagnostics.Text();
+}
+
+// Left alone, MuJoCo 2.2 refuses a range that is not called limited.
+TEST(MjcfImport, RangesHoldUnlessTheFileSaysOtherwise) {
+  const test::TestFolder folder("mjcf_ranges");
+  const auto upper = [&](const std::string& text) {
+    const LoadResult loaded = LoadText(folder, text);
+    EXPECT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+    if (!loaded.mechanism) return kNan;
+    const Joint& crank = loaded.mechanism->joints[loaded.mechanism->FindJoint("A")];
+    const bool said = loaded.diagnostics.Text().find("1 range without") != std::string::npos;
+    EXPECT_EQ(said, text.find("limited") == std::string::npos) << loaded.diagnostics.Text();
+    return crank.range[0].upper;
+  };
+  EXPECT_EQ(upper(Linkage("", "range='-1 1.5'")), 1.5);
+  EXPECT_EQ(upper(Linkage("", "range='-1 1.5' limited='true'")), 1.5);
+  EXPECT_GT(upper(Linkage("", "range='-1 1.5' limited='false'")), 1e3);
+  // The file's own word stays, and MuJoCo's refusal of it.
+  const LoadResult own =
+      LoadText(folder, Linkage("<compiler autolimits='false'/>", "range='-1 1.5'"));
+  EXPECT_FALSE(own.mechanism);
+  EXPECT_NE(own.diagnostics.Text().find("`range` but not `limited`"), std::string::npos);
+}
+
+TEST(MjcfImport, MeshesLieWhereTheFileStatesThem) {
+  const test::TestFolder folder("mjcf_meshes");
+  folder.Write("assets/part.stl", ToStl(test::BracketMesh(200, 120, 30, 60), ""));
+  // The class gives type, pose and group; the asset's class the scale. MuJoCo would move the frame.
+  const std::string text =
+      R"(<mujoco><compiler angle="degree" meshdir="assets" exactmeshinertia="true"/>
+<default><default class="mm"><mesh scale="0.001 0.001 0.001"/></default>
+<default class="visual"><geom type="mesh" euler="0 0 90" group="1"/></default></default>
+<asset><material name="red" rgba="1 0 0 1"/><mesh name="part" class="mm" file="part.stl"/><mesh name="gone" file="gone.stl"/>
+<mesh name="outside" file="../../part.stl"/></asset><worldbody>
+<body name="arm"><joint name="A" axis="0 1 0"/><inertial pos="0 0 0.15" mass="1" diaginertia="0.01 0.01 0.001"/>
+<geom class="visual" mesh="part" pos="1 2 3" material="red"/><geom class="visual" mesh="part" pos="1 2 3"/>
+<geom type="mesh" mesh="part" group="3"/><geom class="visual" mesh="gone"/>
+<geom type="mesh" mesh="outside"/></body>
+<body name="solid" pos="1 0 0"><joint name="B" axis="0 1 0"/><geom type="mesh" mesh="part" density="2700" pos="0 0 1"/></body>
+</worldbody><actuator><motor name="a" joint="A"/><motor name="b" joint="B"/></actuator></mujoco>)";
+  const LoadResult loaded = LoadText(folder, text);
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  const std::string said = loaded.diagnostics.Text();
+  EXPECT_NE(said.find("1 meshes are left out of the pictures"), std::string::npos) << said;
+  EXPECT_NE(said.find("1 of 3 meshes is left out: 'assets/gone.stl' is not there"),
+            std::string::npos)
+      << said;
+  const Mechanism& m = *loaded.mechanism;
+  const Body& arm = m.bodies[m.FindBody("arm")];
+  ASSERT_EQ(arm.shapes.size(), 1u);
+  EXPECT_EQ(arm.shapes[0].color, "#ff0000ff");
+  const Mesh& mesh = std::get<Mesh>(arm.shapes[0].geometry);
+  EXPECT_TRUE((mesh.X_BG * Vec3(0.2, 0, 0)).isApprox(Vec3(1, 2.2, 3), 1e-9));
+  EXPECT_NEAR(SolidShape(*mesh.surface).amount, 0.03 * 0.29 * 0.06, 1e-9);
+  // MuJoCo's mass from the same mesh, where the geom stands.
+  const Body& solid = m.bodies[m.FindBody("solid")];
+  ASSERT_EQ(solid.shapes.size(), 1u);
+  const Mesh& heavy = std::get<Mesh>(solid.shapes[0].geometry);
+  EXPECT_NEAR(solid.mass, 2700 * 0.03 * 0.29 * 0.06, 1e-6);
+  EXPECT_TRUE(solid.p_BoBcm_B.isApprox(heavy.X_BG * SolidShape(*heavy.surface).p_cm, 1e-6));
+  // So the check of inertias finds it sound.
+  EXPECT_TRUE(DiagnoseInertia(solid).findings.empty());
+  EXPECT_NEAR(DiagnoseInertia(solid).density, 2700, 0.1);
+}
+
+TEST(MjcfImport, IncludesStayInTheFolder) {
+  const test::TestFolder folder("mjcf_include");
+  folder.Write("arm.xml",
+               "<mujoco><worldbody><body name='x'><joint name='j' axis='0 0 1'/><inertial pos='0 0 "
+               "0' mass='1' diaginertia='1 1 1'/></body></worldbody></mujoco>");
+  const LoadResult loaded =
+      LoadText(folder, "<mujoco model='i'><include file='arm.xml'/></mujoco>");
+  ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
+  EXPECT_GE(loaded.mechanism->FindBody("x"), 0);
+  for (const char* outside : {"../arm.xml", "/etc/hostname", "missing.xml"}) {
+    const LoadResult bad =
+        LoadText(folder, fmt::format("<mujoco model='i'><include file='{}'/></mujoco>", outside));
+    EXPECT_FALSE(bad.mechanism) << outside;
+    EXPECT_NE(bad.diagnostics.Text().find("cannot be read"), std::string::npos)
+        << bad.diagnostics.Text();
+  }
+}
+
+TEST(MjcfImport, HostileFilesAreBadInput) {
+  const test::TestFolder folder("mjcf_hostile");
+  std::string deep = "<mujoco>";
+  for (int i = 0; i < 5000; ++i) deep += "<a>";
+  const std::pair<std::string, const char*> files[] = {
+      {"<mujoco", "the file is not well-formed XML"},
+      {"<robot/>", "no MJCF: the root element is not <mujoco>"},
+      {deep, "elements are nested deeper than"},
+      {"<mujoco><worldbody><body><joint type='hinge' axis='0 0 0'/></body></worldbody></mujoco>",
+       "MuJoCo: "},
+      {"<mujoco><worldbody><geom type='sphere' size='-1'/></worldbody></mujoco>", "MuJoCo: "},
+      {"<mujoco><worldbody><frame euler='0 1'><body/></frame></worldbody></mujoco>",
+       "<frame> euler = '0 1' is not 3 numbers"},
+      {"<mujoco><worldbody><replicate count='2000000000'><body/></replicate></worldbody></mujoco>",
+       "<replicate> makes more than 10000 elements"},
+      {"<mujoco><equality><weld body1='q'/></equality></mujoco>", "MuJoCo: "}};
+  for (const auto& [text, said] : files) {
+    const LoadResult loaded = LoadText(folder, text);
+    EXPECT_FALSE(loaded.mechanism) << text.substr(0, 80);
+    EXPECT_TRUE(loaded.diagnostics.has_errors()) << text.substr(0, 80);
+    EXPECT_NE(loaded.diagnostics.Text().find(said), std::string::npos) << text.substr(0, 80) << "\n"
+                                                                       << loaded.diagnostics.Text();
+  }
+  // Nothing in it is a mechanism of nothing.
+  const LoadResult empty = LoadText(folder, "<mujoco model='x'/>");
+  ASSERT_TRUE(empty.mechanism) << empty.diagnostics.Text();
+  EXPECT_EQ(empty.mechanism->bodies.size(), 1u);
+}
+
+TEST(MjcfImport, TheModelThatIsWrittenReadsBackToTheSameNumbers) {
+  const test::TestFolder folder("mjcf_bits");
+  const LoadResult first = LoadText(folder, Linkage("", "range='-1 1' limited='true'"));
+  ASSERT_TRUE(first.mechanism) << first.diagnostics.Text();
+  const LoadResult second = LoadModelText(WriteModel(*first.mechanism), "m.yaml");
+  ASSERT_TRUE(second.mechanism) << second.diagnostics.Text();
+  for (size_t b = 0; b < first.mechanism->bodies.size(); ++b) {
+    EXPECT_EQ(first.mechanism->bodies[b].I_Bcm_B, second.mechanism->bodies[b].I_Bcm_B);
+    EXPECT_EQ(first.mechanism->bodies[b].p_BoBcm_B, second.mechanism->bodies[b].p_BoBcm_B);
+  }
+  for (size_t j = 0; j < first.mechanism->joints.size(); ++j) {
+    const Joint &a = first.mechanism->joints[j], &b = second.mechanism->joints[j];
+    EXPECT_TRUE(a.X_PF.matrix() == b.X_PF.matrix()) << a.name;
+    EXPECT_TRUE(a.X_CM.matrix() == b.X_CM.matrix()) << a.name;
+    EXPECT_EQ(a.axis, b.axis) << a.name;
+    EXPECT_EQ(a.range[0].upper, b.range[0].upper) << a.name;
+  }
+}
+
+}  // namespace
+}  // namespace mbv
