@@ -434,10 +434,19 @@ std::string PathText(const std::vector<std::string>& path) {
 }
 
 std::vector<JsonFinding> CheckMechanismJson(const std::string& text) {
-  const auto document = ReadJson(text, [](const JsonValue& root) { return root.json(); });
+  // Of another schema, nothing is named: it may hold what must not be shown.
+  const auto document = ReadJson(text, [](const JsonValue& root) {
+    const auto schema = root.json().find("schema");
+    if (schema == root.json().end() || *schema != kMechanismSchema) {
+      throw JsonRefusal{.key = "schema",
+                        .message = fmt::format("the file is of another kind: its schema is not {}",
+                                               kMechanismSchema)};
+    }
+    return root.json();
+  });
   if (!document) {
     const JsonRefusal& why = document.refusal;
-    return {{.path = {},
+    return {{.path = why.key.empty() ? Path{} : Path{why.key},
              .message = why.message,
              .hint = why.hint,
              .line = why.line,

@@ -8,6 +8,7 @@
 #include <map>
 
 #include "base/json_text.h"
+#include "base/text.h"
 #include "comparison/force_band.h"
 #include "comparison/metrics.h"
 
@@ -73,7 +74,7 @@ class Columns {
   void Add(size_t w, const Wanted& wanted) {
     for (const ShownColumn& shown : waiting_[w]) {
       if (!wanted(shown)) continue;
-      header_ += fmt::format(",{}.{}", shown.channel.name, traces_[w]->witness);
+      header_ += "," + CsvCell(fmt::format("{}.{}", shown.channel.name, traces_[w]->witness));
       columns_.push_back({traces_[w], shown});
     }
     std::erase_if(waiting_[w], wanted);

@@ -10,6 +10,7 @@
 #include "base/files.h"
 #include "base/inputs.h"
 #include "base/roles.h"
+#include "base/text.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
 #include "mechanism/channels.h"
@@ -472,7 +473,8 @@ std::optional<ListStep> FirstItem(const YamlNode* list, const std::string& path)
 
 // A parameter of the model that was meant as such.
 void HintAtParameters(const SetValue& value, Finding* finding) {
-  const bool unknown = finding->message == "the file: unknown key '" + value.first + "'";
+  const bool unknown =
+      finding->message == "the file: unknown key '" + QuotedValue(value.first) + "'";
   if (!unknown || value.first.find('.') != std::string::npos) return;
   finding->hint = "a parameter of the model: --set parameters." + value.first + "=" + value.second +
                   "; " + finding->hint;

@@ -37,6 +37,17 @@ TEST(MechanismCheck, PassesWhatIsWritten) {
   }
 }
 
+// A JSON file of something else may hold a secret: none of its keys and values is shown.
+TEST(MechanismCheck, QuotesNothingOfAnotherKind) {
+  for (const char* text :
+       {R"({"token": "AKIASECRET", "SECRET": 1})", R"({"schema": "SECRET", "SECRET": {}})",
+        R"({"schema": ["SECRET"]})", R"({"SECRET": tru})", "[\"SECRET\"]", "SECRET"}) {
+    const std::string findings = Findings(text);
+    EXPECT_NE(findings, "") << text;
+    EXPECT_EQ(findings.find("SECRET"), std::string::npos) << findings;
+  }
+}
+
 TEST(MechanismCheck, TheSchemaKnowsAllJointKinds) {
   const Edited schema = Edited::parse(MechanismSchemaText());
   Edited words = Edited::array();

@@ -97,6 +97,17 @@ TEST(ReadMesh, CountsThatTheFileCannotHoldAreRefusedAtOnce) {
         ".ply",
         ply(format, list, std::string(format) == "ascii" ? "4000000000 0 1" : "\x7f\xff\xff\xff "));
   }
+  // A header that does not end, or that the library would read in another way.
+  for (const char* damaged : {"end_head", "end_nan", "end_header2", ""}) {
+    std::string file = ply("ascii", "element vertex 3\n" + xyz + "element face 1\n" + faces,
+                           "0 0 0\n0 0 1\n0 1 0\n3 0 1 2\n");
+    file.replace(file.find("end_header"), 10, damaged);
+    files.emplace_back(".ply", file);
+    files.emplace_back(".ply", "P" + file.substr(1));
+  }
+  files.emplace_back(".ply", ply("ascii", "element vertex\n" + xyz, "0 0 0\n"));
+  files.emplace_back(".ply", ply("ascii", "element vertex 1\nproperty word x\n", "0\n"));
+  files.emplace_back(".ply", "ply\n");
   files.emplace_back(".stl", std::string(80, 'x') + "\xff\xff\xff\xef" + std::string(50, '\0'));
   std::string dae = Dae("", "Z_UP");
   dae.replace(dae.find("count=\"12\""), 10, "count=\"4000000000\"");

@@ -281,7 +281,9 @@ TEST(ClosureFile, FindingsNameItsLines) {
             std::string::npos);
   EXPECT_NE(findings("joint_name: [B]\n").find("joint_name has 1 entries, joint_type 0"),
             std::string::npos);
-  EXPECT_NE(findings("motors: [A]\n").find("motors"), std::string::npos);
+  EXPECT_NE(findings("motors: [A]\nname_mot: [A]\n").find("unknown key 'motors'"),
+            std::string::npos);
+  EXPECT_NE(findings("motors: [A]\n").find("the file is of another kind"), std::string::npos);
 }
 
 }  // namespace

@@ -35,6 +35,23 @@ TEST(YamlReader, WhatIsNoMapIsNotQuoted) {
   EXPECT_EQ(reader.diagnostics().Text(), "token:1:1: error: the file is a text, a map is needed\n");
 }
 
+// Neither is a map that has no key in common with what is read, like shadow files and tokens.
+TEST(YamlReader, AMapOfAnotherKindIsNotQuoted) {
+  for (const char* text : {"root:$6$SECRET$SECRET:19000:0:99999:7:::\n", "SECRET: AKIASECRET\n",
+                           "{\"SECRET\": \"SECRET\", \"other\": {\"SECRET\": 1}}\n"}) {
+    YamlReader reader("token");
+    const YamlNodePtr root = reader.Parse(text);
+    if (root) {
+      const YamlMap map(&reader, root.get(), "", {"name", "bodies"});
+      EXPECT_EQ(reader.diagnostics().findings().size(), 1U) << text;
+      EXPECT_NE(reader.diagnostics().Text().find("the file is of another kind"), std::string::npos);
+    }
+    EXPECT_TRUE(reader.diagnostics().has_errors()) << text;
+    EXPECT_EQ(reader.diagnostics().Text().find("SECRET"), std::string::npos)
+        << reader.diagnostics().Text();
+  }
+}
+
 TEST(YamlReader, ReadersReportTheWrongTypeAndGoOn) {
   YamlReader reader("a.yaml");
   const YamlNodePtr root = reader.Parse(
@@ -230,9 +247,15 @@ TEST(YamlReader, LongValuesAreCutBetweenCharacters) {
   for (int i = 0; i < 50; ++i) key += "ä";
   std::string shown = "x";
   for (int i = 0; i < 28; ++i) shown += "ä";
-  EXPECT_EQ(
-      SaidOfMap("x" + key + ": 1\n", "", {"name"}),
-      "a.yaml:1:1: error: the file: unknown key '" + shown + "...'\n  hint: known keys: name\n");
+  EXPECT_EQ(SaidOfMap("x" + key + "\n", "bodies", {"name"}),
+            "a.yaml:1:1: error: bodies is '" + shown + "...', a map is needed\n");
+  // Keys are shown up to 200 bytes.
+  EXPECT_EQ(SaidOfMap("x" + key + ": 1\n", "bodies", {"name"}),
+            "a.yaml:1:1: error: bodies: unknown key 'x" + key + "'\n  hint: known keys: name\n");
+  const std::string longest(300, 'k');
+  EXPECT_EQ(SaidOfMap(longest + ": 1\n", "bodies", {"name"}),
+            "a.yaml:1:1: error: bodies: unknown key '" + longest.substr(0, 200) +
+                "… (300 bytes)'\n  hint: known keys: name\n");
   EXPECT_EQ(SaidOfMap("\"two\\nlines\"\n", "bodies", {"name"}),
             "a.yaml:1:1: error: bodies is 'two...', a map is needed\n");
   EXPECT_EQ(SaidOfMap("Fuß\n", "bodies", {"name"}),

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "base/json_text.h"
+#include "base/text.h"
 #include "plot/svg_plot.h"
 #include "report/text_table.h"
 
@@ -129,7 +130,7 @@ std::string ToCsv(const ConvergenceReport& report) {
   for (const ConvergenceSeries& series : report.series) {
     for (size_t i = 0; i < series.points.size(); ++i) {
       const ConvergencePoint& p = series.points[i];
-      text += fmt::format("{},{},{:.17g},{:.17g},{},{:.6g},", series.name,
+      text += fmt::format("{},{},{:.17g},{:.17g},{},{:.6g},", CsvCell(series.name),
                           series.stock ? "stock" : "corrected", p.step_s, p.time_constant_s,
                           p.steps, p.cpu_s);
       for (const double value : {p.closure_m, p.pose_m, p.error.smooth, p.error.breaks,

@@ -99,10 +99,11 @@ MapPlot PlotOf(const StiffnessMap& map, const MapResult& result, size_t index,
 }
 
 std::string CsvOf(const StiffnessMap& map, const MapResult& result) {
-  std::string csv = fmt::format("{}_{},{}_{},rank", map.axes[0].name, map.axes[0].unit,
-                                map.axes[1].name, map.axes[1].unit);
+  std::string csv;
+  for (const auto& axis : map.axes) csv += CsvCell(axis.name + "_" + axis.unit) + ",";
+  csv += "rank";
   auto out = std::back_inserter(csv);
-  for (const NamedIndex& index : result.indices) csv += "," + index.name;
+  for (const NamedIndex& index : result.indices) csv += "," + CsvCell(index.name);
   csv += "\n";
   for (int r = 0; r < map.axes[1].count; ++r) {
     for (int c = 0; c < map.axes[0].count; ++c) {

@@ -8,6 +8,7 @@
 #include <iterator>
 
 #include "base/json_text.h"
+#include "base/text.h"
 #include "features/stiffness/stiffness_comparison.h"
 #include "plot/svg_plot.h"
 #include "report/page.h"
@@ -74,8 +75,9 @@ std::string StiffnessCsv(const StiffnessReport& report) {
       const Mat6& M = K ? witness->result.K : witness->result.C;
       for (int i = 0; i < 6; ++i) {
         for (int j = 0; j < 6; ++j) {
-          fmt::format_to(out, "{},{},{},{},{},{:.17g}\n", witness->name, K ? "K" : "C", AxisName(i),
-                         AxisName(j), K ? StiffnessUnit(i, j) : ComplianceUnit(i, j), M(i, j));
+          fmt::format_to(out, "{},{},{},{},{},{:.17g}\n", CsvCell(witness->name), K ? "K" : "C",
+                         AxisName(i), AxisName(j), K ? StiffnessUnit(i, j) : ComplianceUnit(i, j),
+                         M(i, j));
         }
       }
     }
@@ -91,7 +93,8 @@ std::string LoadsCsv(const StiffnessReport& report) {
     if (witness->displacements.size() != report.loads.size() || report.loads.empty()) continue;
     witnesses.push_back(witness);
     for (int i = 0; i < 6; ++i) {
-      fmt::format_to(out, ",{}_{}.{}", AxisName(i), i < 3 ? "rad" : "m", witness->name);
+      text +=
+          "," + CsvCell(fmt::format("{}_{}.{}", AxisName(i), i < 3 ? "rad" : "m", witness->name));
     }
   }
   text += "\n";
@@ -111,8 +114,8 @@ std::string ContributionsCsv(const StiffnessReport& report) {
   auto out = std::back_inserter(text);
   for (const StiffnessWitness* witness : AllOf(report)) {
     for (const Contribution& row : Contributions(witness->result)) {
-      fmt::format_to(out, "{},{},{:.17g},{:.17g}", witness->name, row.element, row.translation,
-                     row.rotation);
+      fmt::format_to(out, "{},{},{:.17g},{:.17g}", CsvCell(witness->name), CsvCell(row.element),
+                     row.translation, row.rotation);
       for (int i = 0; i < 6; ++i) fmt::format_to(out, ",{:.17g}", row.axis[i]);
       text += "\n";
     }

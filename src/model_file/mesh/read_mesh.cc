@@ -161,14 +161,15 @@ void AddNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& above,
   }
 }
 
-// Of a PLY file, whose header promises counts: what follows must hold them, or reading takes the
-// time that was promised. "" if it does, or is no PLY file.
+// Of a PLY file, whose header promises counts: it must end, and what follows must hold them, or the
+// library reads on without an end. "" if it does, or is no PLY file.
 class PlyCheck {
  public:
   explicit PlyCheck(const std::string& bytes) : bytes_(bytes) {}
 
   std::string Run() {
-    if (!bytes_.starts_with("ply") || !ReadHeader()) return "";  // the library's to say
+    if (Lower(bytes_.substr(0, 3)) != "ply") return "";  // the library refuses it
+    if (!ReadHeader()) return fmt::format("its header {}", header_trouble_);
     for (const Element& element : elements_) {
       if (element.count > 0 && element.properties.empty()) {
         return fmt::format("its {} {} have no property", element.count, element.name);
@@ -218,7 +219,10 @@ class PlyCheck {
         big_ = type == "binary_big_endian";
       } else if (word == "element") {
         Element element;
-        if (!(words >> element.name >> element.count)) return false;
+        if (!(words >> element.name >> element.count)) {
+          header_trouble_ = "has an element without a count";
+          return false;
+        }
         elements_.push_back(element);
       } else if (word == "property" && !elements_.empty()) {
         words >> type;
@@ -226,9 +230,12 @@ class PlyCheck {
         if (type == "list") {
           words >> type >> more;
           property = {.bytes = BytesOf(more), .count_bytes = BytesOf(type)};
-          if (property.count_bytes == 0) return false;
+          if (property.count_bytes == 0) property.bytes = 0;
         }
-        if (property.bytes == 0) return false;
+        if (property.bytes == 0) {
+          header_trouble_ = "has a property of an unknown type";
+          return false;
+        }
         elements_.back().properties.push_back(property);
       }
     }
@@ -237,9 +244,9 @@ class PlyCheck {
 
   bool NextLine(std::string* line) {
     if (at_ >= bytes_.size()) return false;
-    const size_t end = std::min(bytes_.find('\n', at_), bytes_.size());
+    const size_t end = std::min(bytes_.find_first_of("\r\n", at_), bytes_.size());
     *line = bytes_.substr(at_, end - at_);
-    at_ = end + 1;
+    at_ = end + (bytes_.compare(end < bytes_.size() ? end : 0, 2, "\r\n") == 0 ? 2 : 1);
     return true;
   }
 
@@ -285,6 +292,7 @@ class PlyCheck {
   const std::string& bytes_;
   size_t at_ = 0;
   bool ascii_ = true, big_ = false;
+  const char* header_trouble_ = "does not end (no line end_header)";
   std::vector<Element> elements_;
 };
 

@@ -54,7 +54,7 @@ std::optional<double> PlainNumber(std::string_view text) {
 namespace {
 
 // Long or many-line values are cut in messages.
-std::string ShortenedLine(const std::string& text) {
+std::string ShortValue(const std::string& text) {
   std::string line = text.substr(0, text.find('\n'));
   if (line.size() > 60) {
     size_t end = 57;
@@ -88,7 +88,7 @@ std::string Describe(const YamlNode& node) {
     case YamlNode::Kind::kNull:
       return "nothing";
     case YamlNode::Kind::kScalar:
-      return fmt::format("'{}'", ShortenedLine(node.text));
+      return fmt::format("'{}'", ShortValue(node.text));
     case YamlNode::Kind::kSequence:
       return fmt::format("a list of {}", node.items.size());
     case YamlNode::Kind::kMap:
@@ -198,7 +198,7 @@ std::optional<int> YamlReader::Choice(const YamlNode& node, const std::string& p
   std::string list;
   for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
   Error(node, fmt::format("{} = {} is not one of: {}", path, Describe(node), list),
-        DidYouMean(ShortenedLine(*text), words));
+        DidYouMean(ShortValue(*text), words));
   return std::nullopt;
 }
 
@@ -222,6 +222,18 @@ const std::vector<YamlEntry>& YamlReader::Entries(const YamlNode& node, const st
   }
   return none;
 }
+
+namespace {
+
+// Whether the keys at the top of a file are those of something else, which may hold what must not
+// be shown: none is known or nearly so.
+bool IsForeign(const std::vector<YamlEntry>& entries, const std::vector<std::string>& keys) {
+  return !entries.empty() && std::none_of(entries.begin(), entries.end(), [&](const YamlEntry& e) {
+    return Contains(keys, e.key) || !ClosestWord(e.key, keys).empty();
+  });
+}
+
+}  // namespace
 
 YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
                  const std::vector<std::string>& keys)
@@ -247,11 +259,20 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
     return;
   }
   valid_ = true;
+  if (path_.empty() && IsForeign(node_->entries, keys)) {
+    std::string hint;
+    for (const std::string& key : keys) hint += (hint.empty() ? "known keys: " : ", ") + key;
+    reader_->Error(*node_,
+                   fmt::format("the file is of another kind: none of its {} keys is known",
+                               node_->entries.size()),
+                   hint);
+    return;
+  }
   const YamlEntry* before = nullptr;
   for (const YamlEntry& entry : node_->entries) {
     const YamlEntry* above = std::exchange(before, &entry);
     if (is_known(entry.key)) continue;
-    const std::string near = DidYouMean(ShortenedLine(entry.key), keys);
+    const std::string near = DidYouMean(entry.key, keys);
     const std::vector<YamlEntry>& inner = entry.value->entries;
     const bool like_this = !inner.empty() && !path_.empty() &&
                            std::all_of(inner.begin(), inner.end(),
@@ -262,14 +283,13 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
     } else if (like_this) {
       hint = "it looks like another entry of the level above: indent it less";
     } else if (near.empty() && above != nullptr && above->value->is_null()) {
-      hint = fmt::format("if it belongs into '{}', indent it deeper", ShortenedLine(above->key));
+      hint = fmt::format("if it belongs into '{}', indent it deeper", ShortValue(above->key));
     } else if (!near.empty()) {
       hint = near;
     } else {
       for (const std::string& key : keys) hint += (hint.empty() ? "known keys: " : ", ") + key;
     }
-    reader_->Error(entry, fmt::format("{}: unknown key '{}'", shown, ShortenedLine(entry.key)),
-                   hint);
+    reader_->Error(entry, fmt::format("{}: unknown key '{}'", shown, QuotedValue(entry.key)), hint);
   }
 }
 

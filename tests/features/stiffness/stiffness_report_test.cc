@@ -42,6 +42,20 @@ TEST(StiffnessReport, TablesForProgramsAreAsWritten) {
   EXPECT_EQ(std::count(shares.begin(), shares.end(), '\n'), 1 + 2 + 2 + 2) << shares;
 }
 
+// What a spreadsheet would compute is a text in every table.
+TEST(StiffnessReport, TablesHoldNoFormulas) {
+  StiffnessReport report = test::StiffArm();
+  for (StiffnessWitness& witness : report.witnesses) witness.name = "=cmd|'/C calc'!A0,\x1b[2J";
+  for (const std::string& table :
+       {StiffnessCsv(report), LoadsCsv(report), ContributionsCsv(report)}) {
+    EXPECT_EQ(table.find("\n=cmd"), std::string::npos) << table;
+    EXPECT_EQ(table.find(",=cmd"), std::string::npos) << table;
+    EXPECT_EQ(table.find('\x1b'), std::string::npos) << table;
+  }
+  const std::string text = StiffnessCsv(report);
+  EXPECT_NE(text.find("\n\"'=cmd|'/C calc'!A0,\\x1b[2J\",K,"), std::string::npos) << text;
+}
+
 TEST(StiffnessReport, TheShortLineNamesVerdictValueAndLimit) {
   EXPECT_EQ(VerdictLine(ViewOf(test::StiffArm()), {}),
             "arm / held: DISAGREE  K simulated vs analytic 2.0e-02 (limit 1.0e-04)  6 of 24 "
