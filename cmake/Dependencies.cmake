@@ -1,7 +1,9 @@
 # Finds every dependency and, when one is missing, names the Debian package that brings it.
 include(Libraries)
-mbv_find(GTest libgtest-dev)
-mbv_find(benchmark libbenchmark-dev)
+if(MBV_BUILD_TESTS)
+  mbv_find(GTest libgtest-dev)
+  mbv_find(benchmark libbenchmark-dev)
+endif()
 
 # The scripts of the pages (web/) are bundled with npm's packages, and tests check their types.
 find_program(NODE NAMES node nodejs)
@@ -13,12 +15,12 @@ endif()
 if(NOT NPM)
   list(APPEND MBV_MISSING "npm (npm)")
 endif()
-if(NOT TSC)
+if(MBV_BUILD_TESTS AND NOT TSC)
   list(APPEND MBV_MISSING "TypeScript (node-typescript)")
 endif()
 
 if(MBV_MISSING)
   list(JOIN MBV_MISSING "\n  " missing_text)
   message(FATAL_ERROR "mbverify: missing dependencies (Debian package in brackets):\n"
-                      "  ${missing_text}\nRun scripts/setup to install them.")
+                      "  ${missing_text}\nRun scripts/setup (with --tests for those of the tests) to install them.")
 endif()

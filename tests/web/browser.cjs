@@ -20,7 +20,7 @@ const threads = new WeakMap();  // by page: the session that tells what its thre
 async function launch() {
   const program = process.env.MBV_CHROMIUM;
   assert.ok(program && fs.existsSync(program),
-            'no Chromium: install the Debian package chromium (scripts/setup does)');
+            'no Chromium: install the Debian package chromium (scripts/setup --tests does)');
   return chromium.launch({executablePath: program, args: kFlags, timeout: kPatience_ms});
 }
 
