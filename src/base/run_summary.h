@@ -23,16 +23,26 @@ struct [[nodiscard]] RunSummary {
   Stop stop = Stop::kNotRun;
   std::string message = "was not run";  ///< one sentence for people, with numbers
   double time_s = kNan;                 ///< scenario time of the trouble [s]
-  std::string where;                    ///< limb, drive or joint in trouble
+  std::string where = {};               ///< limb, drive or joint in trouble
   double amount = kNan;                 ///< by how much (see unit), e.g. the missing reach
-  std::string unit;                     ///< of `amount`
+  std::string unit = {};                ///< of `amount`
   double wall_s = 0.0;                  ///< time spent computing [s]
+  bool names_where = false;             ///< `message` names `where`
+  bool states_time = false;             ///< `message` states `time_s`
 
   [[nodiscard]] bool ok() const { return stop == Stop::kDone; }
   static RunSummary Done() {
     return {.stop = Stop::kDone, .message = "done", .where = {}, .unit = {}};
   }
 };
+
+/// See math/bytes.h.
+template <typename Visit>
+void VisitMembers(Visit& visit, typename Visit::template Of<RunSummary>& summary) {
+  visit(summary.stop), visit(summary.message), visit(summary.time_s), visit(summary.where);
+  visit(summary.amount), visit(summary.unit), visit(summary.wall_s), visit(summary.names_where);
+  visit(summary.states_time);
+}
 
 [[nodiscard]] inline const char* ToText(Stop stop) {
   switch (stop) {

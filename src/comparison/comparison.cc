@@ -150,11 +150,10 @@ namespace {
 // "reference: the commands do not hold the mechanism at this pose (near limb2.R12; t = 3.22 s)".
 std::string Explain(const Witness& witness) {
   std::string text = witness.name + ": " + witness.summary.message;
-  const std::string& where = witness.summary.where;
-  if (!where.empty() && text.find(where) == std::string::npos) text += " (near " + where + ")";
-  const bool has_time = witness.summary.message.find("t = ") != std::string::npos;
-  if (!has_time && !std::isnan(witness.summary.time_s)) {
-    text += fmt::format(" (t = {:.6g} s)", witness.summary.time_s);
+  const RunSummary& summary = witness.summary;
+  if (!summary.names_where && !summary.where.empty()) text += " (near " + summary.where + ")";
+  if (!summary.states_time && !std::isnan(summary.time_s)) {
+    text += fmt::format(" (t = {:.6g} s)", summary.time_s);
   }
   return text;
 }

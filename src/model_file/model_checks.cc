@@ -41,6 +41,12 @@ void ModelReport::AtJoint(size_t joint, Severity severity, const std::string& me
   At(places_.joints[joint], severity, message, hint);
 }
 
+void ModelReport::AtJoint(size_t joint, Finding finding) {
+  finding.line = places_.joints[joint].line;
+  finding.column = places_.joints[joint].column;
+  yaml_.Add(std::move(finding));
+}
+
 void ModelReport::AtFile(Severity severity, const std::string& message, const std::string& hint) {
   At({}, severity, message, hint);
 }

@@ -46,6 +46,7 @@ class ModelReport {
   /// At the joint's line in the model file, or at none.
   void AtJoint(size_t joint, Severity severity, const std::string& message,
                const std::string& hint = "");
+  void AtJoint(size_t joint, Finding finding);
   /// About the file as a whole.
   void AtFile(Severity severity, const std::string& message, const std::string& hint = "");
   /// The same without a place, for what nobody wrote into the model file.

@@ -335,14 +335,18 @@ void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const Hom
     std::string text = fmt::format("the loop at joint '{}' does not close: gap", joint.name);
     if (!in_place) text += fmt::format(" {:.3g} m", gap.position_m);
     if (turned) text += fmt::format(" {:.3g} rad", gap.rotation_rad);
+    Finding finding{
+        .message = text, .hint = hint, .code = FindingCode::kOpenLoop, .subject = joint.name};
     if (const Finding* urdf = report->InUrdf(mechanism, gap.joint); urdf != nullptr) {
-      report->AddOther(
-          {urdf->severity, urdf->file, urdf->line, urdf->column, text,
-           told ? ""
-                : hint +
-                      "; guesses of URDF joints stand in the model file under `urdf: {guess: …}`"});
+      finding.severity = urdf->severity;
+      finding.file = urdf->file;
+      finding.line = urdf->line;
+      finding.column = urdf->column;
+      finding.hint += "; guesses of URDF joints stand in the model file under `urdf: {guess: …}`";
+      if (told) finding.hint.clear();
+      report->AddOther(std::move(finding));
     } else {
-      report->AtJoint(gap.joint, Severity::kError, text, hint);
+      report->AtJoint(gap.joint, std::move(finding));
     }
   }
   for (const CouplingGap& missed : home.couplings) {

@@ -524,6 +524,7 @@ RunSummary ExplainUnreached(const Mechanism& mechanism, const std::vector<Comman
   RunSummary summary;
   if (r.norm() > kReached) {
     summary.stop = Stop::kUnreachable;
+    summary.names_where = true;
     NameWorst(mechanism, commands, best, r, loops.length(), &summary);
     summary.message =
         fmt::format("the commanded pose cannot be reached: {} stays open by {:.4g} {}",
@@ -536,6 +537,7 @@ RunSummary ExplainUnreached(const Mechanism& mechanism, const std::vector<Comman
   const Eigen::Index last = svd.singularValues().size() - 1;
   summary.stop = Stop::kSingular;
   summary.where = MostMovingJoint(mechanism, nearest, loops.Unscaled(svd.matrixV().col(last)));
+  summary.names_where = true;
   summary.amount = svd.singularValues()[last];
   summary.unit = "1";
   summary.message = fmt::format(

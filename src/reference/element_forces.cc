@@ -253,7 +253,8 @@ RunSummary LoadShared(const Mechanism& mechanism, size_t element) {
                                  "redundant constraints share it",
                                  Described(mechanism, at), at.name),
           .where = at.name,
-          .unit = {}};
+          .unit = {},
+          .names_where = true};
 }
 
 double LoadSystem::Raised(size_t e) const {

@@ -170,6 +170,7 @@ RunSummary ForceSolver::CheckControl(const BodyStates& states) {
   RunSummary summary;
   summary.stop = Stop::kSingular;
   summary.where = MostMovingJoint(mechanism_, states, system_.SoftMotion());
+  summary.names_where = true;
   summary.amount = sigma;
   summary.unit = std::string("1");
   summary.message =

@@ -312,6 +312,7 @@ void SetSingular(const std::string& message, const std::string& where, Stiffness
   result->summary.stop = Stop::kSingular;
   result->summary.message = message;
   result->summary.where = where;
+  result->summary.names_where = true;
 }
 
 /// K and C, or one of them, from the compliance C_W against the loads W that are carried.

@@ -167,6 +167,7 @@ RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
   summary.stop = Stop::kSingular;
   summary.time_s = t_s;
   summary.where = SoftJoint(states);
+  summary.names_where = true;
   summary.amount = pivot_;
   summary.unit = std::string("1");
   summary.message = fmt::format(
@@ -235,6 +236,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
     summary.stop = Stop::kSingular;
     summary.time_s = t_s;
     summary.where = MostMovingJoint(mechanism_, *states, R * eigen.eigenvectors().col(0));
+    summary.names_where = true;
     summary.message =
         fmt::format("a freedom near {} has no inertia, so forces do not determine its acceleration",
                     summary.where);

@@ -210,7 +210,8 @@ RunSummary FreeDynamics::FollowHeld(double t_s, const ForceRows& loops, const Bo
                                  name, last),
           .where = name,
           .amount = last,
-          .unit = std::string("N")};
+          .unit = std::string("N"),
+          .names_where = true};
 }
 
 VecX FreeDynamics::NeededWrenches(double t_s, const BodyStates& states) const {

@@ -101,7 +101,9 @@ RunSummary FreeMotion::Contradiction(size_t element, const std::string& what, do
           .time_s = now_.time_s,
           .where = at.name,
           .amount = amount,
-          .unit = unit};
+          .unit = unit,
+          .names_where = true,
+          .states_time = true};
 }
 
 // At its dead centre a coordinate is at rest, as loops and commands have it, but forces neither

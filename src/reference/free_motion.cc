@@ -167,6 +167,7 @@ RunSummary FreeMotion::NoWayOn(double dt_s) const {
   }
   summary.stop = Stop::kSingular;
   summary.where = dynamics_.SoftJoint(now_.states);
+  summary.names_where = true;
   summary.amount = now_.pivot / largest_pivot_;
   summary.unit = std::string("1");
   summary.message = fmt::format(
@@ -180,6 +181,7 @@ RunSummary FreeMotion::TooManySteps() const {
   RunSummary summary;
   summary.stop = Stop::kNoConvergence;
   summary.time_s = now_.time_s;
+  summary.states_time = true;
   summary.amount = dt_;
   summary.unit = "s";
   summary.message = fmt::format(

@@ -163,6 +163,7 @@ RunSummary CheckSpinsIdle(const std::vector<Spin>& spins, const BodyStates& stat
         "counts as idle; hold it by a universal joint",
         -moment, spin.name);
     summary.where = spin.name;
+    summary.names_where = true;
     summary.amount = -moment;
     summary.unit = std::string("N m");
     return summary;

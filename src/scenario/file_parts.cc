@@ -4,6 +4,7 @@
 
 #include "base/names.h"
 #include "base/text.h"
+#include "scenario/load_scenario.h"
 
 namespace mbv {
 
@@ -38,8 +39,7 @@ std::map<std::string, Finding> PlacesOf(const YamlNode& map, const std::string& 
   for (const YamlEntry& entry : map.entries) {
     Finding place;
     if (entry.line < 0) {
-      const SetValue& value = set[static_cast<size_t>(-entry.line - 1)];
-      place.file = "--set " + value.first + "=" + value.second;
+      place = AtOption(set[static_cast<size_t>(-entry.line - 1)]);
     } else {
       place.file = file;
       place.line = entry.line;

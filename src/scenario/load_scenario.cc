@@ -423,10 +423,6 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
 
 namespace {
 
-std::string OptionText(const SetValue& value) {
-  return "--set " + value.first + "=" + value.second;
-}
-
 // A copy whose every node carries `line`.
 YamlNodePtr Relocate(const YamlNode& node, int line) {
   auto copy = std::make_shared<YamlNode>(node);
@@ -473,9 +469,8 @@ std::optional<ListStep> FirstItem(const YamlNode* list, const std::string& path)
 
 // A parameter of the model that was meant as such.
 void HintAtParameters(const SetValue& value, Finding* finding) {
-  const bool unknown =
-      finding->message == "the file: unknown key '" + QuotedValue(value.first) + "'";
-  if (!unknown || value.first.find('.') != std::string::npos) return;
+  if (finding->code != FindingCode::kUnknownKey || finding->subject != value.first) return;
+  if (value.first.find('.') != std::string::npos) return;
   finding->hint = "a parameter of the model: --set parameters." + value.first + "=" + value.second +
                   "; " + finding->hint;
 }
@@ -507,10 +502,14 @@ YamlNodePtr SetAt(const YamlNode* node, const std::string& parent, const std::st
 
 }  // namespace
 
+Finding AtOption(const SetValue& value) {
+  return {.file = "--set " + value.first + "=" + value.second, .set = value};
+}
+
 YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, YamlReader* reader) {
   for (size_t k = 0; k < values.size(); ++k) {
     const int line = -static_cast<int>(k) - 1;
-    YamlReader value_reader(OptionText(values[k]));
+    YamlReader value_reader(AtOption(values[k]).file);
     const YamlNodePtr value = value_reader.Parse(values[k].second);
     if (value == nullptr || values[k].first.empty()) {
       reader->AddAt(Severity::kError, line, 0, "the value is no YAML",
@@ -544,15 +543,17 @@ const YamlNode* FindSetNode(const YamlNode& root, const std::string& key) {
 Diagnostics ReadParameterOptions(const std::vector<SetValue>& values, LoadOptions* options) {
   Diagnostics diagnostics;
   for (const SetValue& value : values) {
-    YamlReader yaml(OptionText(value));
+    const Finding place = AtOption(value);
+    YamlReader yaml(place.file);
     Scope scope;
     ValueReader reader(&yaml, &scope);
     const YamlNodePtr node = yaml.Parse(value.second);
     const auto number = node == nullptr ? std::nullopt : reader.Number(*node, value.first);
     if (number) options->overrides[value.first] = *number;
-    options->override_places[value.first].file = OptionText(value);
+    options->override_places[value.first] = place;
     for (Finding finding : yaml.diagnostics().findings()) {
       finding.line = 0;  // there is only one
+      finding.set = value;
       if (finding.hint.empty()) finding.hint = "write --set PARAMETER=NUMBER, e.g. --set m_p=45000";
       diagnostics.Add(std::move(finding));
     }
@@ -566,7 +567,8 @@ Diagnostics PlaceSetFindings(const Diagnostics& diagnostics, const std::vector<S
     if (finding.line < 0) {
       const SetValue& value = values[static_cast<size_t>(-finding.line - 1)];
       HintAtParameters(value, &finding);
-      finding.file = OptionText(value);
+      finding.file = AtOption(value).file;
+      finding.set = value;
       finding.line = 0;
     }
     findings.push_back(std::move(finding));

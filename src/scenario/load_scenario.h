@@ -63,6 +63,9 @@ struct ScenarioHead {
 [[nodiscard]] YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values,
                                     YamlReader* reader);
 
+/// The place of a finding about the option.
+[[nodiscard]] Finding AtOption(const SetValue& value);
+
 /// The node that `key` would replace; null where there is none.
 [[nodiscard]] const YamlNode* FindSetNode(const YamlNode& root, const std::string& key);
 

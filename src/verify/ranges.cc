@@ -142,7 +142,9 @@ RunSummary LimitSummary(const std::vector<RangeViolation>& violations) {
           .time_s = worst->time_s,
           .where = worst->what,
           .amount = worst->amount,
-          .unit = worst->unit};
+          .unit = worst->unit,
+          .names_where = true,
+          .states_time = true};
 }
 
 void AddFindings(const std::vector<RangeViolation>& violations, const std::string& file,

@@ -4,6 +4,7 @@
 
 #include "base/json_document.h"
 #include "base/json_text.h"
+#include "math/bytes.h"
 
 namespace mbv {
 namespace {
@@ -18,6 +19,25 @@ TEST(Diagnostics, AFindingIsPrintedWithPlaceAndHint) {
   EXPECT_EQ(ToText(finding),
             "a.yaml:3:7: error: mass = -1 violates mass >= 0\n"
             "  hint: leave the key out for a massless body");
+}
+
+// What callers decide by crosses the boundary of processes.
+TEST(Diagnostics, AFindingGoesThroughBytesUnchanged) {
+  const Finding finding{.severity = Severity::kWarning,
+                        .file = "--set a.b=1",
+                        .line = 3,
+                        .column = 7,
+                        .message = "unknown",
+                        .hint = "none",
+                        .code = FindingCode::kUnknownKey,
+                        .subject = "a.b",
+                        .set = {"a.b", "1"}};
+  const auto back = FromBytes<Finding>(ToBytes(finding));
+  ASSERT_TRUE(back);
+  EXPECT_EQ(ToText(*back), ToText(finding));
+  EXPECT_EQ(back->code, FindingCode::kUnknownKey);
+  EXPECT_EQ(back->subject, "a.b");
+  EXPECT_EQ(back->set, finding.set);
 }
 
 TEST(Diagnostics, WarningsAreNotErrors) {

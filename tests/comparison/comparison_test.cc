@@ -278,6 +278,23 @@ TEST(Comparison, TheStartWindowExcludesForcesOnlyAndOnlyWhenAsked) {
   EXPECT_EQ(c.Run().verdict, Verdict::kDisagree);
 }
 
+TEST(Comparison, PlaceAndTimeOfABrokenWitnessDoNotDependOnWords) {
+  Case c;
+  const auto reason = [&](const RunSummary& summary) {
+    c.reference_summary = summary;
+    return c.Run().reason;
+  };
+  RunSummary broken{.stop = Stop::kLimit, .message = "limit = 3 of d1", .time_s = 0.3};
+  EXPECT_EQ(reason(broken), "reference: limit = 3 of d1 (t = 0.3 s)");
+  broken.where = "d";  // a letter of the message, not a name in it
+  EXPECT_EQ(reason(broken), "reference: limit = 3 of d1 (near d) (t = 0.3 s)");
+  broken.names_where = true;
+  EXPECT_EQ(reason(broken), "reference: limit = 3 of d1 (t = 0.3 s)");
+  broken.message = "after three tenths of a second limit = 3 of d1";
+  broken.states_time = true;
+  EXPECT_EQ(reason(broken), "reference: " + broken.message);
+}
+
 TEST(Comparison, ABrokenWitnessMakesTheVerdictNotRun) {
   Case c;
   c.reference_summary = {

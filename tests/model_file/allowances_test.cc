@@ -77,8 +77,11 @@ TEST(RoundedData, AreProjectedUpToTheStatedTolerance) {
 TEST(RoundedData, AWrongLengthIsNoRounding) {
   const std::string text = Replaced(kFourBar, "rocker:\n    frames: {foot: {}, end: [crank, 0, 0]}",
                                     "rocker:\n    frames: {foot: {}, end: [crank, 0, 0.05]}");
-  const std::string said = LoadText("closure_tolerance: 1\n" + text).diagnostics.Text();
-  EXPECT_NE(said.find("does not close"), std::string::npos) << said;
+  const LoadResult loaded = LoadText("closure_tolerance: 1\n" + text);
+  const std::string said = loaded.diagnostics.Text();
+  ASSERT_FALSE(loaded.diagnostics.empty());
+  EXPECT_EQ(loaded.diagnostics.findings()[0].code, FindingCode::kOpenLoop) << said;
+  EXPECT_EQ(loaded.diagnostics.findings()[0].subject, "C") << said;
   EXPECT_EQ(said.find("rounded"), std::string::npos) << said;
 }
 

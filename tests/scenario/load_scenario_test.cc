@@ -244,6 +244,27 @@ TEST_F(LoadScenarioTest, FindingsAboutSetValuesNameTheOption) {
   EXPECT_NE(Messages(Complete(), {{"m_p", "4"}})
                 .find("hint: a parameter of the model: --set parameters.m_p=4; known keys: kind"),
             std::string::npos);
+  // Of a key that is too long to be shown whole, too.
+  const std::string longest(500, 'm');
+  EXPECT_NE(Messages(Complete(), {{longest, "4"}}).find("hint: a parameter of the model: --set"),
+            std::string::npos);
+}
+
+TEST_F(LoadScenarioTest, FindingsAboutSetValuesHaveKeyAndValueAsData) {
+  for (const SetValue& set : {SetValue{"m_p", "4"}, SetValue{"simulation.stp_s", "0.1"}}) {
+    const ScenarioResult result = Load(Complete(), {set});
+    ASSERT_EQ(result.diagnostics.findings().size(), 1u) << result.diagnostics.Text();
+    const Finding& finding = result.diagnostics.findings()[0];
+    EXPECT_EQ(finding.code, FindingCode::kUnknownKey);
+    EXPECT_EQ(finding.subject, set.first);
+    EXPECT_EQ(finding.set, set);
+  }
+  const ScenarioResult model = Load(Complete(), {{"parameters.m_q", "1"}});
+  ASSERT_EQ(model.diagnostics.findings().size(), 1u) << model.diagnostics.Text();
+  EXPECT_EQ(model.diagnostics.findings()[0].set, (SetValue{"parameters.m_q", "1"}));
+  const ScenarioResult file = Load(Complete("chekcs: {}\n"));
+  ASSERT_FALSE(file.diagnostics.empty());
+  EXPECT_TRUE(file.diagnostics.findings()[0].set.first.empty());
 }
 
 TEST_F(LoadScenarioTest, PicturesForPapersAreRead) {

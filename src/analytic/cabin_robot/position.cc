@@ -9,11 +9,12 @@ namespace {
 constexpr double kSingularSine = 1e-6;
 
 RunSummary Trouble(Stop stop, const char* where, const char* message, double amount,
-                   const char* unit) {
+                   const char* unit, bool names_where = false) {
   RunSummary summary;
   summary.stop = stop;
   summary.message = message;
   summary.where = where;
+  summary.names_where = names_where;
   summary.amount = amount;
   summary.unit = unit;
   return summary;
@@ -70,11 +71,13 @@ RunSummary SolveAngles(const PlanarGeometry& g, PlanarState* s) {
 RunSummary CheckRegular(const PlanarState& s) {
   const double strut = std::sin(s.alpha.p + s.epsilon.p);
   if (std::abs(strut) < kSingularSine) {
-    return Trouble(Stop::kSingular, "strut EF", "the strut EF lies in line with AB", strut, "sin");
+    return Trouble(Stop::kSingular, "strut EF", "the strut EF lies in line with AB", strut, "sin",
+                   true);
   }
   const double link = std::sin(s.beta.p + s.gamma.p);
   if (std::abs(link) < kSingularSine) {
-    return Trouble(Stop::kSingular, "link CD", "the link CD lies in line with BC", link, "sin");
+    return Trouble(Stop::kSingular, "link CD", "the link CD lies in line with BC", link, "sin",
+                   true);
   }
   return RunSummary::Done();
 }

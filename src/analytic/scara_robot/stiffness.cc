@@ -132,6 +132,7 @@ RunSummary SingularPlatform(const Vec4& X, int rank) {
   RunSummary summary;
   summary.stop = Stop::kSingular;
   summary.where = "platform";
+  summary.names_where = true;
   summary.amount = rank;
   summary.unit = "1";
   summary.message = fmt::format(

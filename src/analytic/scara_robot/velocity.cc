@@ -81,6 +81,7 @@ RunSummary CheckRegular(const Position& position, const Singularity& singularity
   RunSummary summary;
   summary.stop = Stop::kSingular;
   summary.where = dead_point ? LimbName(singularity.dead_limb) : "platform";
+  summary.names_where = !dead_point;
   summary.amount = dead_point ? singularity.V_min : singularity.s_min;
   summary.unit = "1";
   summary.message = fmt::format(

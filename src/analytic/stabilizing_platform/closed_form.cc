@@ -377,7 +377,8 @@ RunSummary Unsupported(const CommandSample& sample, std::string where, double am
           .time_s = sample.time_s,
           .where = where,
           .amount = amount,
-          .unit = unit};
+          .unit = unit,
+          .names_where = true};
 }
 
 // Drives and prescribed joints by their names.

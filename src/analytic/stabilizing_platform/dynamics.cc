@@ -340,7 +340,8 @@ RunSummary SolvePlatform(const PlatformParameters& p, const RelativeMotion& moti
                                    smallest),
             .where = "platform",
             .amount = smallest,
-            .unit = "1"};
+            .unit = "1",
+            .names_where = true};
   }
   *f = lu.solve(W);
   return RunSummary::Done();

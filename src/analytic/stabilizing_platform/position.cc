@@ -162,6 +162,7 @@ RunSummary ComputeLimb(const PlatformParameters& p, int limb, const LimbPlace& p
   if (summary.ok()) summary = CheckToggle(p, pairs, *m);
   if (!summary.ok()) {
     summary.where = fmt::format("limb{}", limb + 1);
+    summary.names_where = true;
     summary.message = summary.where + ": " + summary.message;
   }
   return summary;

@@ -173,7 +173,8 @@ RunSummary Singular(const char* where, double amount) {
           .message = fmt::format("the parasitic motion is not defined: {} = {:.3g}", where, amount),
           .where = where,
           .amount = amount,
-          .unit = "1"};
+          .unit = "1",
+          .names_where = true};
 }
 
 // γ with its derivatives.

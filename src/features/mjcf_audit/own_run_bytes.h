@@ -18,8 +18,7 @@ void VisitMembers(Visit& visit, typename Visit::template Of<OwnRun::Gap>& g) {
 }
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<OwnRun>& run) {
-  auto& s = run.summary;
-  visit(s.stop), visit(s.message), visit(s.time_s);
+  visit(run.summary);
   auto& f = run.facts;
   visit(f.step_s), visit(f.integrator), visit(f.solver), visit(f.tolerance), visit(f.iterations);
   visit(f.rough_solver), visit(f.rubs), visit(f.closures), visit(f.solref), visit(f.solimp),

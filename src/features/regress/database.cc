@@ -49,6 +49,8 @@ void Database::Fail() {
   if (!trouble_.empty()) return;
   trouble_ = fmt::format("history {}: {}", path_,
                          db_ == nullptr ? "out of memory" : sqlite3_errmsg(db_.get()));
+  const int code = db_ == nullptr ? SQLITE_NOMEM : sqlite3_errcode(db_.get()) & 0xFF;
+  locked_ = code == SQLITE_BUSY || code == SQLITE_LOCKED;
 }
 
 void Database::Run(const std::string& sql) {

@@ -29,6 +29,8 @@ class Database {
   [[nodiscard]] bool ok() const { return trouble_.empty(); }
   /// First thing that went wrong, with file and SQLite's reason; "" if nothing.
   [[nodiscard]] const std::string& trouble() const { return trouble_; }
+  /// The trouble is another program's lock, which it will release.
+  [[nodiscard]] bool locked() const { return locked_; }
 
   /// Runs statements without results.
   void Run(const std::string& sql);
@@ -44,6 +46,7 @@ class Database {
     void operator()(sqlite3* db) const;
   };
   std::string path_, trouble_;
+  bool locked_ = false;
   std::unique_ptr<sqlite3, Closer> db_;
 };
 

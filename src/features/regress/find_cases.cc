@@ -31,9 +31,9 @@ std::string HeadJson(const std::string& file) {
   const std::string text = ReadWholeFile(file).value_or("");
   const ScenarioHead head = ReadScenarioHead(file);
   const std::string folder = fs::path(file).parent_path().string();
-  std::string why;
   const auto model = FindModel(head.mechanism, folder);
-  const auto elastic = FindElasticModel(head.mechanism, folder, &why);
+  const auto found = FindElasticModel(head.mechanism, folder);
+  const std::string* elastic = std::get_if<std::string>(&found);
   Fingerprint fingerprint;
   fingerprint.Add(fs::path(file).filename().string());
   fingerprint.Add(text);
@@ -47,7 +47,7 @@ std::string HeadJson(const std::string& file) {
                      {"exit_code", head.expect.exit_code},
                      {"mentions", head.expect.mentions},
                      {"inputs", fingerprint.Text()},
-                     {"models", model.value_or("") + "\n" + elastic.value_or("")}};
+                     {"models", model.value_or("") + "\n" + (elastic == nullptr ? "" : *elastic)}};
   return DumpLine(json);
 }
 

@@ -390,19 +390,18 @@ class Appender {
 };
 
 std::string AppendOnce(const std::string& path, const std::map<std::string, GoldenTraces>& goldens,
-                       RegressReport* report, const HistoryOptions& options) {
-  Database database(path, Database::Mode::kCreate);
-  database.Run("PRAGMA journal_mode = WAL");
-  database.Run("PRAGMA synchronous = NORMAL");
+                       RegressReport* report, const HistoryOptions& options, Database* database) {
+  database->Run("PRAGMA journal_mode = WAL");
+  database->Run("PRAGMA synchronous = NORMAL");
   // Not while a run is entered anew: what was accepted refers to its number, which stays.
-  database.Run("PRAGMA foreign_keys = OFF");
-  database.Run("BEGIN IMMEDIATE");
-  if (!database.ok()) return database.trouble();
-  if (std::string trouble = PrepareSchema(path, &database); !trouble.empty()) return trouble;
+  database->Run("PRAGMA foreign_keys = OFF");
+  database->Run("BEGIN IMMEDIATE");
+  if (!database->ok()) return database->trouble();
+  if (std::string trouble = PrepareSchema(path, database); !trouble.empty()) return trouble;
   RegressReport judged = *report;
-  Appender(&database, options).Append(goldens, &judged);
-  database.Run("COMMIT");
-  if (!database.ok()) return database.trouble();  // closing rolls back
+  Appender(database, options).Append(goldens, &judged);
+  database->Run("COMMIT");
+  if (!database->ok()) return database->trouble();  // closing rolls back
   *report = std::move(judged);
   return "";
 }
@@ -431,15 +430,14 @@ std::string CheckHistory(const std::string& path) {
     return fmt::format("history {}: {}", path, std::strerror(errno));
   }
   Database database(path, Database::Mode::kWrite);
-  const auto busy = [&] { return database.trouble().ends_with("locked"); };  // it will be free
   Statement check(&database, "PRAGMA quick_check(1)");
   const std::string state = check.Step() ? check.Text(0) : "";
-  if (!database.ok()) return busy() ? "" : database.trouble();
+  if (!database.ok()) return database.locked() ? "" : database.trouble();
   if (state != "ok") return fmt::format("history {}: is damaged: {}", path, state);
   if (std::string trouble = CheckWritable(path, &database); !trouble.empty()) return trouble;
   database.Run("BEGIN IMMEDIATE");
   database.Run("ROLLBACK");
-  return busy() ? "" : database.trouble();
+  return database.locked() ? "" : database.trouble();
 }
 
 std::string AppendRun(const std::string& path, const std::map<std::string, GoldenTraces>& goldens,
@@ -450,9 +448,10 @@ std::string AppendRun(const std::string& path, const std::map<std::string, Golde
   // SQLite does not wait where waiting could be a deadlock, e.g. when two programs make the file.
   std::string trouble;
   for (int attempt = 0; attempt < kLockedAttempts; ++attempt) {
-    trouble = AppendOnce(path, goldens, report, options);
-    if (!trouble.ends_with("locked")) break;
-    std::this_thread::sleep_for(kLockedPause);
+    if (attempt > 0) std::this_thread::sleep_for(kLockedPause);
+    Database database(path, Database::Mode::kCreate);
+    trouble = AppendOnce(path, goldens, report, options, &database);
+    if (!database.locked()) break;
   }
   return trouble;
 }

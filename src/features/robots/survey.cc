@@ -30,12 +30,15 @@
 namespace mbv {
 namespace {
 
-std::string FirstError(const Diagnostics& diagnostics) {
-  for (const Finding& finding : diagnostics.findings()) {
-    if (finding.severity != Severity::kError) continue;
-    return finding.message + (finding.hint.empty() ? "" : " (" + finding.hint + ")");
-  }
-  return "";
+// There is one wherever nothing was made.
+Finding FirstError(const Diagnostics& diagnostics) {
+  const auto error =
+      std::ranges::find(diagnostics.findings(), Severity::kError, &Finding::severity);
+  return error == diagnostics.findings().end() ? Finding{} : *error;
+}
+
+std::string WithHint(const Finding& finding) {
+  return finding.message + (finding.hint.empty() ? "" : " (" + finding.hint + ")");
 }
 
 std::string AllWarnings(const Diagnostics& diagnostics) {
@@ -78,7 +81,7 @@ bool RunMode(const std::string& scenario, const char* mode, double* nrmse, Surve
   const RunOutcome outcome = RunScenario(scenario, options);
   if (!outcome.report) {
     row->status = "failed";
-    row->message = fmt::format("{}: {}", mode, FirstError(outcome.diagnostics));
+    row->message = fmt::format("{}: {}", mode, WithHint(FirstError(outcome.diagnostics)));
     return false;
   }
   const Comparison& comparison = outcome.report->comparison;
@@ -100,15 +103,15 @@ void Survey(const std::string& file, const std::string& scratch, SurveyRow* row)
   // The robot as it is, before drives are added to it.
   LoadResult loaded = LoadRobot(file);
   if (!loaded.mechanism) {
-    row->message = FirstError(loaded.diagnostics);
-    const bool open = row->message.find("does not close") != std::string::npos;
-    row->status = open ? "not_closed" : "refused";
+    const Finding error = FirstError(loaded.diagnostics);
+    row->message = WithHint(error);
+    row->status = error.code == FindingCode::kOpenLoop ? "not_closed" : "refused";
     return;
   }
   MeasureHome(*loaded.mechanism, row);
   DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
   if (!made.setup) {
-    row->message = FirstError(made.diagnostics);
+    row->message = WithHint(FirstError(made.diagnostics));
     row->status = "failed";
     return;
   }

@@ -336,9 +336,8 @@ void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   if (!pose.empty()) return;
   pose = HomePose(prepared->base);
   prepared->pose_note = "no pose is given: this is the model's home pose";
-  const PoseFault fault = CheckPose(prepared->base, pose);
-  if (!fault.message.empty()) {
-    diagnostics->AddError(prepared->scenario.file, fault.message, fault.hint);
+  if (const auto fault = CheckPose(prepared->base, pose)) {
+    diagnostics->AddError(prepared->scenario.file, fault->message, fault->hint);
   }
 }
 

@@ -47,18 +47,20 @@ void FillPose(const Mechanism& mechanism, ScenarioOptions* options) {
   }
 }
 
-// Findings in the words of this command's options.
-std::string InOwnWords(std::string text) {
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"--set pose.", "--at "},
-                                 {"--set parameters.", "--set "},
-                                 {"--set output=", "--output "},
-                                 {"--set mechanism=", ""}}) {
-    for (size_t at = text.find(from); at != std::string::npos; at = text.find(from, at)) {
-      text.replace(at, from.size(), to);
-      at += to.size();
+// What was given as an argument of this command stands in the scenario as a key.
+Diagnostics AtArguments(const Diagnostics& diagnostics) {
+  Diagnostics placed;
+  for (Finding finding : diagnostics.findings()) {
+    const auto& [key, value] = finding.set;
+    for (const auto& [above, option] :
+         {std::pair<std::string, std::string>{"pose.", "--at "}, {"parameters.", "--set "}}) {
+      if (key.starts_with(above)) finding.file = option + key.substr(above.size()) + "=" + value;
     }
+    if (key == "output") finding.file = "--output " + value;
+    if (key == "mechanism") finding.file = value;
+    placed.Add(std::move(finding));
   }
-  return text;
+  return placed;
 }
 
 // The request as a scenario, so that it is checked and run like one.
@@ -161,7 +163,7 @@ MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness&
 int Stiffness(const StiffnessArguments& arguments) {
   Diagnostics diagnostics;
   const auto prepared = PrepareRequest(arguments, &diagnostics);
-  SayText(stderr, InOwnWords(diagnostics.Text()));
+  SayText(stderr, AtArguments(diagnostics).Text());
   if (!prepared) return 2;
   ProgressLine progress_line(true);
   ProgressFunction progress;

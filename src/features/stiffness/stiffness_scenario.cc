@@ -136,22 +136,19 @@ class StiffnessLoader final
   void LoadMechanism(const YamlNode& node) {
     const auto name = yaml_.Text(node, "mechanism");
     if (!name) return;
-    std::string why;
-    const auto model = FindElasticModel(*name, fs::path(file_).parent_path().string(), &why);
-    if (!model) {
-      const size_t hint = why.find("; ");
-      yaml_.Error(node, fmt::format("mechanism = '{}': {}", *name, why.substr(0, hint)),
-                  hint == std::string::npos ? "" : why.substr(hint + 2));
+    const auto found = FindElasticModel(*name, fs::path(file_).parent_path().string());
+    if (const Finding* none = std::get_if<Finding>(&found)) {
+      yaml_.Error(node, fmt::format("mechanism = '{}': {}", *name, none->message), none->hint);
       return;
     }
-    scenario_.model_file = *model;
+    scenario_.model_file = std::get<std::string>(found);
     LoadWith(scenario_.parameters);
     if (!mechanism_) return;
     NameTheCase();
     if (mechanism_->beams.empty() && !HasServos()) {
       yaml_.Error(node, fmt::format("mechanism: {} is rigid: it has no beams and no drive with a "
                                     "stiffness",
-                                    *model));
+                                    scenario_.model_file));
     }
   }
 
@@ -211,8 +208,8 @@ class StiffnessLoader final
       LoadWith(scenario_.parameters);
     }
     if (!mechanism_ || yaml_.has_errors() || scenario_.pose.empty()) return;
-    const PoseFault fault = CheckPose(*mechanism_, scenario_.pose);
-    if (!fault.message.empty()) yaml_.Error(node, fault.message, fault.hint);
+    const auto fault = CheckPose(*mechanism_, scenario_.pose);
+    if (fault) yaml_.Error(node, fault->message, fault->hint);
   }
 
   void UnknownName(const YamlEntry& entry, const std::string& name,
@@ -408,10 +405,10 @@ std::string ElasticBeside(const std::string& model_file) {
 
 }  // namespace
 
-std::optional<std::string> FindElasticModel(const std::string& name, const std::string& start,
-                                            std::string* why) {
+std::variant<std::string, Finding> FindElasticModel(const std::string& name,
+                                                    const std::string& start) {
   const auto model = FindModel(name, start);
-  if (model && IsPath(name)) return model;
+  if (model && IsPath(name)) return *model;
   if (const std::string elastic = model ? ElasticBeside(*model) : ""; !elastic.empty()) {
     return Shown(elastic);
   }
@@ -420,13 +417,12 @@ std::optional<std::string> FindElasticModel(const std::string& name, const std::
     const auto file = FindModel(known, start);
     if (file && !ElasticBeside(*file).empty()) elastic_models.push_back(known);
   }
-  *why = model ? fmt::format("{} has no {} with its beams and servos", name, kElasticFile)
-               : "there is no such model";
-  const std::string hint =
-      DidYouMean(name, elastic_models,
-                 elastic_models.empty() ? "" : "elastic models: " + Joined(elastic_models));
-  if (!hint.empty()) *why += "; " + hint;
-  return std::nullopt;
+  return Finding{
+      .message = model ? fmt::format("{} has no {} with its beams and servos", name, kElasticFile)
+                       : "there is no such model",
+      .hint =
+          DidYouMean(name, elastic_models,
+                     elastic_models.empty() ? "" : "elastic models: " + Joined(elastic_models))};
 }
 
 Motion PoseMotion(const Mechanism& mechanism, const PoseValues& pose) {
@@ -456,18 +452,20 @@ PoseValues HomePose(const Mechanism& mechanism) {
   return pose;
 }
 
-PoseFault CheckPose(const Mechanism& mechanism, const PoseValues& pose) {
+std::optional<Finding> CheckPose(const Mechanism& mechanism, const PoseValues& pose) {
   const std::vector<std::string> names = CoordinateNames(mechanism);
   for (const auto& [name, value] : pose) {
     if (std::find(names.begin(), names.end(), name) != names.end()) continue;
-    return {fmt::format("pose: {} has no coordinate '{}'", mechanism.name, name),
-            DidYouMean(name, names, "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw")};
+    return Finding{.message = fmt::format("pose: {} has no coordinate '{}'", mechanism.name, name),
+                   .hint = DidYouMean(
+                       name, names, "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw")};
   }
   const int freedoms = CountFreedoms(mechanism);
   if (static_cast<int>(pose.size()) == freedoms) return {};
-  return {fmt::format("pose gives {} coordinates, but {} has {} freedoms", pose.size(),
-                      mechanism.name, freedoms),
-          "give as many drives or output components (OUTPUT.x …) as there are freedoms"};
+  return Finding{
+      .message = fmt::format("pose gives {} coordinates, but {} has {} freedoms", pose.size(),
+                             mechanism.name, freedoms),
+      .hint = "give as many drives or output components (OUTPUT.x …) as there are freedoms"};
 }
 
 }  // namespace mbv

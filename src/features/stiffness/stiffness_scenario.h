@@ -8,6 +8,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <variant>
 #include <vector>
 
 #include "base/types.h"
@@ -124,11 +125,10 @@ struct StiffnessScenarioResult {
 [[nodiscard]] StiffnessScenarioResult LoadStiffnessScenarioText(
     const std::string& text, const std::string& file, const ScenarioOptions& options = {});
 
-/// models/<name>/elastic.yaml for a name, or the path itself (as FindModel()). Empty with the
-/// reason in `why` when there is none.
-[[nodiscard]] std::optional<std::string> FindElasticModel(const std::string& name,
-                                                          const std::string& start,
-                                                          std::string* why);
+/// models/<name>/elastic.yaml for a name, or the path itself (as FindModel()); a finding without a
+/// place when there is none.
+[[nodiscard]] std::variant<std::string, Finding> FindElasticModel(const std::string& name,
+                                                                  const std::string& start);
 
 /// A pose as constant commands, for loop closure. The names must be CoordinateNames()
 /// (coordinate_names.h).
@@ -137,11 +137,8 @@ struct StiffnessScenarioResult {
 /// The values of all drives at the home pose.
 [[nodiscard]] PoseValues HomePose(const Mechanism& mechanism);
 
-/// What is wrong with a pose's names and their number, with a hint; "" if nothing.
-struct PoseFault {
-  std::string message, hint;
-};
-[[nodiscard]] PoseFault CheckPose(const Mechanism& mechanism, const PoseValues& pose);
+/// What is wrong with a pose's names and their number, without a place.
+[[nodiscard]] std::optional<Finding> CheckPose(const Mechanism& mechanism, const PoseValues& pose);
 
 // The sections of a stiffness scenario that do not need its mechanism.
 

@@ -204,7 +204,7 @@ void StudyBench::CheckKeys(Diagnostics* diagnostics) const {
     const SetValue set{factor.key, fmt::format("{:.17g}", first[k])};
     const ScenarioResult loaded = LoadScenario(study_.scenario, {.set = {set}});
     for (const Finding& finding : loaded.diagnostics.findings()) {
-      if (!finding.file.starts_with("--set ") || finding.severity != Severity::kError) continue;
+      if (finding.set.first.empty() || finding.severity != Severity::kError) continue;
       diagnostics->Add(FindingAt(study_, factor.line, factor.column,
                                  fmt::format("vary.{}: {}", factor.name, finding.message),
                                  finding.hint));

@@ -129,7 +129,12 @@ std::optional<std::string> YamlReader::ReadFile() {
 
 void YamlReader::AddAt(Severity severity, int line, int column, const std::string& message,
                        const std::string& hint) {
-  if (!given_.insert(fmt::format("{}:{}:{}", line, column, message)).second) return;
+  Add({severity, file_, line, column, message, hint});
+}
+
+void YamlReader::Add(Finding finding) {
+  if (!given_.insert(fmt::format("{}:{}:{}", finding.line, finding.column, finding.message)).second)
+    return;
   const auto count = static_cast<int>(diagnostics_.findings().size());
   if (count > kMaxFindings) return;
   if (count == kMaxFindings) {
@@ -139,7 +144,9 @@ void YamlReader::AddAt(Severity severity, int line, int column, const std::strin
                       .hint = ""});
     return;
   }
-  diagnostics_.Add({severity, file_, line, column, message + note_, hint});
+  finding.file = file_;
+  finding.message += note_;
+  diagnostics_.Add(std::move(finding));
 }
 
 void YamlReader::Error(const YamlNode& at, const std::string& message, const std::string& hint) {
@@ -289,7 +296,12 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
     } else {
       for (const std::string& key : keys) hint += (hint.empty() ? "known keys: " : ", ") + key;
     }
-    reader_->Error(entry, fmt::format("{}: unknown key '{}'", shown, QuotedValue(entry.key)), hint);
+    reader_->Add({.line = entry.line,
+                  .column = entry.column,
+                  .message = fmt::format("{}: unknown key '{}'", shown, QuotedValue(entry.key)),
+                  .hint = hint,
+                  .code = FindingCode::kUnknownKey,
+                  .subject = PathOf(entry.key)});
   }
 }
 

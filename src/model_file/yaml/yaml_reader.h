@@ -80,6 +80,8 @@ class YamlReader {
   void Warn(const YamlNode& at, const std::string& message, const std::string& hint = "");
   void AddAt(Severity severity, int line, int column, const std::string& message,
              const std::string& hint = "");
+  /// A finding of this file, whatever its `file` says.
+  void Add(Finding finding);
   /// Appended to later messages: " (in limb2)". The same message at the same place is given only
   /// once, whatever the note.
   void SetNote(std::string note) { note_ = std::move(note); }

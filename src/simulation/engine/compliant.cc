@@ -409,6 +409,7 @@ class Witness {
         fmt::format("no static equilibrium {}: unbalanced force {:.2g} of the load, gap {:.2g}",
                     where, state.residual, state.gap));
     summary.where = where;
+    summary.names_where = true;
     summary.amount = state.residual;
     return summary;
   }

@@ -99,7 +99,8 @@ RunSummary GyroUnsupported(const ForceElement& element, const std::string& descr
                      "joint's coordinate: MuJoCo 2.2 has no inertia between a joint and a body "
                      "that turns",
           .where = element.name,
-          .unit = {}};
+          .unit = {},
+          .names_where = true};
 }
 
 // Why friction cannot be simulated where some drive is not guided, or "".
@@ -121,7 +122,8 @@ RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::s
           .message = "element '" + element.name + "', " + Described(*engine.mechanism, element) +
                      ": " + why,
           .where = element.name,
-          .unit = {}};
+          .unit = {},
+          .names_where = true};
 }
 
 // In free motion MuJoCo's rows hold friction at rest; by itself MuJoCo lets them do all of it.
@@ -276,7 +278,8 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
                        ", needs that drive's motion commanded: MuJoCo 2.2 has no inertia along a "
                        "tendon",
             .where = element.name,
-            .unit = {}};
+            .unit = {},
+            .names_where = true};
   }
   return RunSummary::Done();
 }

@@ -55,7 +55,8 @@ RunSummary FindDriven(EngineModel* engine) {
                          "' acts on a coordinate of the ball or free joint '" +
                          mechanism.joints[driven->joint].name + "', which MuJoCo does not have",
               .where = drive.name,
-              .unit = {}};
+              .unit = {},
+              .names_where = true};
     }
     add_joint(drive.name, equality, driven->joint, driven->coordinate);
   }
@@ -83,7 +84,8 @@ RunSummary CheckCouplings(const Mechanism& mechanism) {
                                    "': it is neither linear nor one coordinate as a polynomial of "
                                    "one other; the other witnesses take it as it is",
             .where = coupling.name,
-            .unit = {}};
+            .unit = {},
+            .names_where = true};
   }
   return RunSummary::Done();
 }
@@ -126,7 +128,8 @@ RunSummary FindElements(EngineModel* engine) {
               .message = "element '" + element.name + "' acts on a coordinate of the free joint '" +
                          joint.name + "', which MuJoCo does not have",
               .where = element.name,
-              .unit = {}};
+              .unit = {},
+              .names_where = true};
     }
     place.joint = IdOf(m, mjOBJ_JOINT, mjcf::JointName(joint, element.coordinate));
     place.dof = m.jnt_dofadr[place.joint];
@@ -145,7 +148,8 @@ RunSummary CheckInertias(const Mechanism& mechanism) {
             .message = "MuJoCo cannot follow: it refuses body '" + body.name + "', whose " +
                        violation + "; the other witnesses take it as it is",
             .where = body.name,
-            .unit = {}};
+            .unit = {},
+            .names_where = true};
   }
   return RunSummary::Done();
 }

@@ -357,7 +357,8 @@ RunSummary StickSlip::Advance(const Step& step) {
           .message = fmt::format("friction starts and stops again and again at t = {:.6g} s", from),
           .time_s = from,
           .where = {},
-          .unit = {}};
+          .unit = {},
+          .states_time = true};
 }
 
 }  // namespace
@@ -416,7 +417,8 @@ RunSummary CheckStep(Session* s) {
         .time_s = 0.0,
         .where = fastest.part,
         .amount = wanted_s,
-        .unit = "s"};
+        .unit = "s",
+        .names_where = true};
   }
   const double drift = fastest.drift * std::pow(h, 4);
   if (drift <= kMostDrift) return RunSummary::Done();

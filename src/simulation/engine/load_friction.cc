@@ -119,7 +119,8 @@ void LoadFriction::CheckUnique() {
                                Described(*s_.engine.mechanism, element) + " ('" + element.name +
                                "'): statics does not determine it",
                     .where = element.name,
-                    .unit = {}};
+                    .unit = {},
+                    .names_where = true};
     }
   }
   s_.system.force() = found_;

@@ -89,7 +89,8 @@ RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load) {
                          "' follows a coordinate that MuJoCo does not have; the other witnesses "
                          "take it as it is",
               .where = load.name,
-              .unit = {}};
+              .unit = {},
+              .names_where = true};
     }
   }
   return RunSummary::Done();
@@ -122,7 +123,8 @@ RunSummary CheckLoads(const EngineModel& engine, const Motion& motion) {
             .message = "load '" + load.name + "' acts on the massless body '" +
                        engine.mechanism->bodies[load.body].name + "'",
             .where = load.name,
-            .unit = {}};
+            .unit = {},
+            .names_where = true};
   }
   return RunSummary::Done();
 }

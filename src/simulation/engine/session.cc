@@ -145,7 +145,8 @@ RunSummary SpinStopper::CheckIdle(const VecX& tau) const {
                                    -moment, spins_[k].name),
             .where = spins_[k].name,
             .amount = -moment,
-            .unit = std::string("N m")};
+            .unit = std::string("N m"),
+            .names_where = true};
   }
   return RunSummary::Done();
 }

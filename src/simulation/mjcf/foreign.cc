@@ -435,7 +435,7 @@ struct ForeignMjcf::Impl {
     Add(Severity::kWarning, loss.line, left_out.back().text, "forces are computed without it");
   }
 
-  bool DropWeightlessGeoms(const std::string& message);
+  bool DropWeightlessGeoms(const std::string& body);
 
   void MakeFoldersAbsolute() {
     std::error_code error;
@@ -485,6 +485,14 @@ const std::map<std::string, SitePair>& ForeignMjcf::closures_by_sites() const {
 
 namespace {
 
+// What MuJoCo's compiler refuses.
+struct Refused {
+  enum class Kind { kOther, kWeightlessBody, kUnknownAttribute, kUnknownElement };
+  Kind kind = Kind::kOther;
+  std::string name = {};     // of the body or the attribute
+  std::string element = {};  // with the unknown attribute, or unknown itself
+};
+
 // What stands between two marks of a message, beyond a text that must come before them.
 std::optional<std::string> TextBetween(const std::string& message, const std::string& beyond,
                                        const std::string& open, const std::string& close) {
@@ -495,16 +503,28 @@ std::optional<std::string> TextBetween(const std::string& message, const std::st
   return message.substr(from, to - from);
 }
 
+// The only place that reads a message: MuJoCo reports refusals as text alone.
+Refused ReadRefusal(const std::string& message) {
+  if (auto body = TextBetween(message, "body mass is too small", "Object name = ", ",")) {
+    return {.kind = Refused::Kind::kWeightlessBody, .name = *std::move(body)};
+  }
+  auto element = TextBetween(message, "", "Element '", "'");
+  if (!element) return {};
+  if (auto attribute = TextBetween(message, "", "unrecognized attribute: '", "'")) {
+    return {Refused::Kind::kUnknownAttribute, *std::move(attribute), *std::move(element)};
+  }
+  if (message.find("unrecognized element") == std::string::npos) return {};
+  return {.kind = Refused::Kind::kUnknownElement, .element = *std::move(element)};
+}
+
 }  // namespace
 
 // MuJoCo 2.2 wants mass of every geom of a body that does not state its own.
-bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& message) {
-  const auto name = TextBetween(message, "body mass is too small", "Object name = ", ",");
-  if (!name) return false;
+bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& body) {
   std::vector<XMLElement*> geoms;
   int line = 0;
   ForEach(root(), [&](XMLElement* e) {
-    if (!IsTag(e, "body") || e->Attribute("name") == nullptr || *name != e->Attribute("name")) {
+    if (!IsTag(e, "body") || e->Attribute("name") == nullptr || body != e->Attribute("name")) {
       return;
     }
     line = e->GetLineNum();
@@ -516,36 +536,36 @@ bool ForeignMjcf::Impl::DropWeightlessGeoms(const std::string& message) {
   for (XMLElement* geom : geoms) document.DeleteNode(geom);
   if (geoms.empty()) return false;
   Add(Severity::kWarning, line,
-      fmt::format("body '{}' has no mass: its {} geoms are left out", *name, geoms.size()));
+      fmt::format("body '{}' has no mass: its {} geoms are left out", body, geoms.size()));
   return true;
 }
 
 bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
-  if (impl_->DropWeightlessGeoms(message)) return true;
-  const auto tag = TextBetween(message, "", "Element '", "'");
-  if (!tag) return false;
-  if (const auto name = TextBetween(message, "", "unrecognized attribute: '", "'")) {
+  const Refused refused = ReadRefusal(message);
+  const std::string &name = refused.name, &tag = refused.element;
+  if (refused.kind == Refused::Kind::kOther) return false;
+  if (refused.kind == Refused::Kind::kWeightlessBody) return impl_->DropWeightlessGeoms(name);
+  if (refused.kind == Refused::Kind::kUnknownAttribute) {
     int count = 0, line = 0;
     bool forceless = true;
     ForEach(impl_->root(), [&](XMLElement* e) {
-      if (!IsTag(e, tag->c_str()) || e->Attribute(name->c_str()) == nullptr) return;
+      if (!IsTag(e, tag.c_str()) || e->Attribute(name.c_str()) == nullptr) return;
       if (count++ == 0) line = e->GetLineNum();
-      const ForeignRow* row = FindForeignRow(ElementOf(e), *name);
+      const ForeignRow* row = FindForeignRow(ElementOf(e), name);
       forceless = forceless && row != nullptr && row->fate == Fate::kNoForce;
-      e->DeleteAttribute(name->c_str());
+      e->DeleteAttribute(name.c_str());
     });
     if (count == 0) return false;
     if (!forceless) return true;  // a finding already, or neutral
     impl_->Add(Severity::kWarning, line,
                fmt::format("attribute '{}' of <{}> ({} times) is unknown to MuJoCo 2.2 and left "
                            "out; no force depends on it",
-                           *name, *tag, count));
+                           name, tag, count));
     return true;
   }
-  if (message.find("unrecognized element") == std::string::npos) return false;
   std::vector<XMLElement*> dropped;
   ForEach(impl_->root(), [&](XMLElement* e) {
-    if (IsTag(e, tag->c_str())) dropped.push_back(e);
+    if (IsTag(e, tag.c_str())) dropped.push_back(e);
   });
   if (dropped.empty()) return false;
   const std::string element = ElementOf(dropped.front());
@@ -557,14 +577,14 @@ bool ForeignMjcf::DropWhatIsUnknown(const std::string& message) {
         Severity::kWarning, dropped.front()->GetLineNum(),
         fmt::format("element <{}> ({} times) is unknown to MuJoCo 2.2 and left out; no force "
                     "depends on it",
-                    *tag, dropped.size()));
+                    tag, dropped.size()));
   }
   // One at a time: an element may lie inside another of its kind.
   for (XMLElement* next = dropped.front(); next != nullptr;) {
     impl_->document.DeleteNode(next);
     next = nullptr;
     ForEach(impl_->root(), [&](XMLElement* e) {
-      if (next == nullptr && IsTag(e, tag->c_str()) && ElementOf(e) == element) next = e;
+      if (next == nullptr && IsTag(e, tag.c_str()) && ElementOf(e) == element) next = e;
     });
   }
   return true;

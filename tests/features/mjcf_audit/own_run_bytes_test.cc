@@ -10,7 +10,15 @@ namespace {
 
 OwnRun ExampleRun() {
   OwnRun run;
-  run.summary = {.stop = Stop::kEngineFailure, .message = "it\nended", .where = {}, .unit = {}};
+  run.summary = {.stop = Stop::kEngineFailure,
+                 .message = "it\nended at C",
+                 .time_s = 0.5,
+                 .where = "C",
+                 .amount = 2.0,
+                 .unit = "m",
+                 .wall_s = 9.0,
+                 .names_where = true,
+                 .states_time = true};
   run.facts.step_s = 0.002;
   run.facts.closures = {"C", ""};
   run.facts.leads = {DriveLead::kServo, DriveLead::kAdded};
@@ -29,6 +37,13 @@ TEST(OwnRunBytes, ComeBackAsTheyWere) {
   ASSERT_TRUE(back);
   EXPECT_EQ(back->summary.stop, run.summary.stop);
   EXPECT_EQ(back->summary.message, run.summary.message);
+  EXPECT_EQ(back->summary.time_s, 0.5);
+  EXPECT_EQ(back->summary.where, "C");
+  EXPECT_EQ(back->summary.amount, 2.0);
+  EXPECT_EQ(back->summary.unit, "m");
+  EXPECT_EQ(back->summary.wall_s, 9.0);
+  EXPECT_TRUE(back->summary.names_where);
+  EXPECT_TRUE(back->summary.states_time);
   EXPECT_EQ(back->facts.closures, run.facts.closures);
   EXPECT_EQ(back->facts.leads, run.facts.leads);
   EXPECT_TRUE(back->facts.rough_solver);

@@ -142,6 +142,22 @@ TEST_F(HistoryTest, TwoWritersAtOnceLoseNothing) {
   EXPECT_EQ(Count("SELECT COUNT(*) FROM golden"), 2 * kWriters * kRuns);
 }
 
+TEST_F(HistoryTest, OnlyAnotherProgramsLockIsWaitedFor) {
+  Database writer(kFile, Database::Mode::kCreate, 0.0);
+  writer.Run("CREATE TABLE a(b)");
+  writer.Run("BEGIN IMMEDIATE");
+  Database waiting(kFile, Database::Mode::kWrite, 0.0);
+  waiting.Run("BEGIN IMMEDIATE");
+  EXPECT_TRUE(waiting.locked()) << waiting.trouble();
+  writer.Run("COMMIT");
+  EXPECT_FALSE(writer.locked()) << writer.trouble();
+  // Its text ends as that of a lock does.
+  Database wrong(kFile, Database::Mode::kWrite, 0.0);
+  wrong.Run("SELECT * FROM locked");
+  EXPECT_TRUE(wrong.trouble().ends_with("locked")) << wrong.trouble();
+  EXPECT_FALSE(wrong.locked());
+}
+
 // A process is killed at many moments of its writing; what is there afterwards are whole runs.
 TEST_F(HistoryTest, KillingAWriterLeavesWholeRunsOnly) {
   constexpr int kCases = 40;

@@ -75,6 +75,19 @@ TEST(Survey, EachFaultHasItsStatus) {
   EXPECT_EQ(broken.status, "refused");
 }
 
+// The status is the finding's code, whatever names its message holds.
+TEST(Survey, ALinkNamedAsAFaultIsNotThatFault) {
+  const test::TestFolder folder("survey_names");
+  std::string robot = "<robot name=\"r\">" + UrdfLink("base", 0.5) +
+                      UrdfLink("does not close", 0.5) +
+                      UrdfJoint("continuous", "base", "does not close", 0) + "</robot>";
+  const std::string mass = "<mass value=\"1\"/>";
+  robot.replace(robot.rfind(mass), mass.size(), "<mass value=\"-1\"/>");
+  const SurveyRow row = SurveyFile(folder.Write("r.urdf", robot), folder.PathOf("scratch"));
+  EXPECT_NE(row.message.find("does not close"), std::string::npos) << row.message;
+  EXPECT_EQ(row.status, "refused") << row.message;
+}
+
 TEST(Survey, TheExitCodeTellsFaultsOfTheFileFromOthers) {
   const auto exit_of = [](std::vector<std::string> states) {
     std::vector<SurveyRow> rows;

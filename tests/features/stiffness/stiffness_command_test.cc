@@ -97,8 +97,11 @@ INSTANTIATE_TEST_SUITE_P(
         {"model", "scara_robo", "did you mean 'scara_robot'?"},
         {"rigid_model", "spr_tripod", "has no elastic.yaml"},
         {"coordinate", "scara_robot --at platform.hight=1", "platform.hight"},
-        {"no_number", "scara_robot --at platform.x=soon", "--at platform.x"},
-        {"parameter", "scara_robot --set K_akt=1", "K_akt"},
+        {"misspelt_model", "scara_robo", "\"scara_robo\": error: mechanism = 'scara_robo'"},
+        {"no_number", "scara_robot --at platform.x=soon", "--at platform.x=soon: error: "},
+        {"parameter", "scara_robot --set K_akt=1", "--set K_akt=1: error: "},
+        // Values are shown as given, though they look like another option.
+        {"output", "scara_robot --output 'a --set pose.b'", "--output a --set pose.b: error: "},
         {"closed_form", "scara_robot --closed-form best",
          "analytic.model = 'best' is not one of: corrected"},
         {"map_coordinate", "scara_robot --no-simulation --map z=-0.1 hight=1",

@@ -2,6 +2,7 @@
 #include "features/stiffness/stiffness_scenario.h"
 #include "tests/support/document_text.h"
 #include "tests/support/source_dir.h"
+#include "tests/support/test_folder.h"
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -43,6 +44,16 @@ loads: [{force: [1, 2, 3]}, {moment: [0, 0, 4], force: [5, 0, 0]}]
 checks: {stiffness_entry: 1.0e-3, reference_stiffness_entry: 1.0e-8, rotation_axis: null}
 expect: {verdict: disagree, mentions: differs}
 )";
+
+TEST_F(StiffnessScenarioText, ANameWithASemicolonStaysWhole) {
+  const test::TestFolder folder("semicolon");
+  folder.Write("models/a; b/model.yaml", "");
+  const StiffnessScenarioResult result =
+      LoadStiffnessScenarioText("kind: stiffness\nmechanism: \"a; b\"\n", folder.PathOf("s.yaml"));
+  ASSERT_FALSE(result.diagnostics.empty());
+  EXPECT_EQ(result.diagnostics.findings()[0].message,
+            "mechanism = 'a; b': a; b has no elastic.yaml with its beams and servos");
+}
 
 TEST_F(StiffnessScenarioText, EveryKeyIsRead) {
   const StiffnessScenarioResult result = Load(kFull);

@@ -281,6 +281,11 @@ TEST_F(StudyCommand, ANumberThatMovesNothingIsSaidAndALimitThatNothingMovesIsRef
             std::string::npos)
       << alone.err;
   EXPECT_EQ(mbverify("check " + File("s.yaml")).exit_code, 2);
+  const ProgramResult slip = with("simulation.stp_s: {uniform: {min: 1, max: 2}}", "");
+  EXPECT_EQ(slip.exit_code, 2);
+  EXPECT_NE(slip.err.find("error: vary.simulation.stp_s: simulation: unknown key 'stp_s'"),
+            std::string::npos)
+      << slip.err;
   EXPECT_EQ(with(step, "").exit_code, 0);  // asks nothing, and says what moves nothing
   const ProgramResult moved = with(mass, limit);
   EXPECT_EQ(moved.exit_code, 0);
