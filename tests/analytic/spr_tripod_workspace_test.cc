@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <regex>
 
 #include "math/spatial.h"
 
@@ -300,6 +301,69 @@ TEST(SprTripodWorkspace, DigitsFollowTheErrorAndSectionsTheDimensions) {
   const std::string line = report.text.substr(at, report.text.find('\n', at) - at);
   EXPECT_NE(line.find(" m3 (error "), std::string::npos) << line;
   EXPECT_LT(line.find(" m3") - line.find("0."), 6u) << line;
+}
+
+// Every number after `key` of the report's text with its decimals.
+std::vector<std::pair<double, int>> NumbersAfter(const std::string& text, const std::string& key) {
+  std::vector<std::pair<double, int>> numbers;
+  const size_t at = text.find(key);
+  if (at == std::string::npos) return numbers;
+  const std::string line = text.substr(at + key.size(), text.find('\n', at) - at - key.size());
+  const std::regex number(R"([-+]?\d+(\.(\d+))?(?![\de.]))");
+  for (std::sregex_iterator it(line.begin(), line.end(), number), end; it != end; ++it) {
+    numbers.emplace_back(std::stod(it->str()), static_cast<int>((*it)[2].length()));
+  }
+  return numbers;
+}
+
+// The last digit of areas and centroid is right to two units, also where the faces nearly fold and
+// the rule converges slowly.
+TEST(SprTripodWorkspace, NoDigitOfAreaAndCentroidIsWrong) {
+  for (const auto& [a, b, q_min, q_max] :
+       {std::array{0.21, 0.455, 0.5, 0.75}, std::array{0.4, 0.455, 0.30, 0.75},
+        std::array{0.21, 0.455, 0.30, 0.75}, std::array{0.42, 0.91, 1.0, 1.5}}) {
+    Geometry g = PaperGeometry(a, b);
+    g.q_min = q_min;
+    g.q_max = q_max;
+    const FaceIntegrals truth = IntegrateFaces(g, 80);
+    const WorkspaceReport report = ReportWorkspace(g, Coarse({5}, 0));
+    ASSERT_TRUE(report.summary.ok()) << report.summary.message;
+    const auto expect = [&](const std::pair<double, int>& shown, double exact) {
+      EXPECT_LE(std::abs(shown.first - exact), 2.0 * std::pow(10.0, -shown.second))
+          << shown.first << " " << exact << "\n"
+          << report.text;
+    };
+    const auto area = NumbersAfter(report.text, "\narea ");
+    ASSERT_GE(area.size(), 1u + kFaces) << report.text;
+    expect(area[0], truth.solid.area);
+    for (size_t k = 0; k < kFaces; ++k) {
+      expect(area[area.size() - kFaces + k], truth.face_area[k]);
+    }
+    const auto centroid = NumbersAfter(report.text, "centroid (");
+    ASSERT_GE(centroid.size(), 3u);
+    for (int k = 0; k < 3; ++k) expect(centroid[static_cast<size_t>(k)], truth.solid.centroid[k]);
+    EXPECT_LE(std::abs(report.exact.area - truth.solid.area), report.area_error);
+    EXPECT_LE((report.exact.centroid - truth.solid.centroid).norm(), report.centroid_error);
+    // Extremes: against a grid that is four times finer.
+    const WorkspaceRanges fine = RangesOf(g, 80);
+    const auto range = [&](const std::string& key, const Range& exact, double unit) {
+      const auto shown = NumbersAfter(report.text, "\n" + key);
+      ASSERT_EQ(shown.size(), 2u) << key << report.text;
+      expect(shown[0], exact.lower / unit);
+      expect(shown[1], exact.upper / unit);
+    };
+    range("x_m", fine.x, 1.0);
+    range("y_m", fine.y, 1.0);
+    range("z_m", fine.z, 1.0);
+    range("tilt_deg", fine.tilt, kDegWorkspace);
+    range("det J", fine.det, 1.0);
+    range("singular values of J", fine.sigma, 1.0);
+    range("condition of J", fine.cond, 1.0);
+    range("condition of (12)", fine.cond_c, 1.0);
+    range("ball swing_deg", fine.ball_swing, kDegWorkspace);
+    range("ball twist_deg", fine.ball_twist, kDegWorkspace);
+    range("change of lean_deg", fine.lean, kDegWorkspace);
+  }
 }
 
 TEST(SprTripodWorkspace, LegsThatNeverMeetGiveAReasonInsteadOfANumber) {

@@ -456,10 +456,11 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRe
   for (const VolumeEstimate& v : report.volumes) {
     outcome.measures.push_back({"volume by " + std::string(v.way), v.value, v.error, "m3"});
   }
-  outcome.measures.push_back({"area", report.exact.area, kNan, "m2"});
+  outcome.measures.push_back({"area", report.exact.area, report.area_error, "m2"});
   for (const int k : {0, 1, 2}) {
     const std::string axis(1, "xyz"[k]);
-    outcome.measures.push_back({"centroid " + axis, report.exact.centroid[k], kNan, "m"});
+    outcome.measures.push_back(
+        {"centroid " + axis, report.exact.centroid[k], report.centroid_error, "m"});
   }
   if (!report.summary.ok()) return outcome;
   outcome.files.push_back({"workspace.stl", ToStl(report.faces.mesh, "spr_tripod workspace [m]")});

@@ -129,16 +129,19 @@ struct VolumeEstimate {
 /// Everything a command needs: a text for people, the mesh, and the section curves.
 struct WorkspaceReport {
   RunSummary summary;
-  std::string text;                         ///< plain text, one finding per line
-  WorkspaceMesh faces;                      ///< the finest mesh
-  std::string sections_csv;                 ///< section,azimuth_rad,x_m,y_m,z_m
-  SolidProperties exact;                    ///< from IntegrateFaces
-  std::vector<double> heights;              ///< of the sections [m]
-  std::vector<VolumeEstimate> volumes;      ///< faces, interior, mesh, voxels
-  std::vector<std::string> contradictions;  ///< between them; empty: they agree
-  double mesh_error = kNan;                 ///< finest mesh against the smooth faces [m³]
-  double convergence_order = kNan;          ///< of the mesh volume in the step, 2 expected; NaN
-                                            ///< where the faces' own error hides it
+  std::string text;                             ///< plain text, one finding per line
+  WorkspaceMesh faces;                          ///< the finest mesh
+  std::string sections_csv;                     ///< section,azimuth_rad,x_m,y_m,z_m
+  SolidProperties exact;                        ///< from IntegrateFaces
+  double area_error = kNan;                     ///< of `exact`: what fewer points change [m²]
+  double centroid_error = kNan;                 ///< [m]
+  std::array<double, kFaces> face_errors = {};  ///< [m²]
+  std::vector<double> heights;                  ///< of the sections [m]
+  std::vector<VolumeEstimate> volumes;          ///< faces, interior, mesh, voxels
+  std::vector<std::string> contradictions;      ///< between them; empty: they agree
+  double mesh_error = kNan;                     ///< finest mesh against the smooth faces [m³]
+  double convergence_order = kNan;              ///< of the mesh volume in the step, 2 expected; NaN
+                                                ///< where the faces' own error hides it
 };
 /// Volumes that differ by more than both errors, and signs that the faces are no boundary: det J
 /// (`det`: its range over the stroke) not positive, meshes that do not converge with order 2.

@@ -120,19 +120,36 @@ std::string VerdictText(const WorkspaceReport& report) {
   return text;
 }
 
-// Areas and centroid of the smooth faces.
-std::string MeasuresText(const FaceIntegrals& fine, const FaceIntegrals& coarse) {
-  const auto decimals = [](double a, double b) { return std::min(9, Decimals(std::abs(a - b))); };
-  std::string text = fmt::format("area {:.{}f} m2; faces", fine.solid.area,
-                                 decimals(fine.solid.area, coarse.solid.area));
+// What rounding leaves of a sum of so many terms of this size.
+double Roundoff(double size) { return 64.0 * kEps * std::abs(size); }
+
+// Errors of the smooth faces: what fewer points change of each face, so that faces do not make up
+// for each other.
+void FillErrors(const FaceIntegrals& fine, const FaceIntegrals& coarse, WorkspaceReport* report) {
+  report->area_error = 0.0;
   for (size_t k = 0; k < fine.face_area.size(); ++k) {
-    text += fmt::format(" {:.{}f}", fine.face_area[k],
-                        decimals(fine.face_area[k], coarse.face_area[k]));
+    const double error =
+        std::max(std::abs(fine.face_area[k] - coarse.face_area[k]), Roundoff(fine.face_area[k]));
+    report->face_errors[k] = error;
+    report->area_error += error;
   }
   const Vec3 &c = fine.solid.centroid, &d = coarse.solid.centroid;
-  const int digits = decimals((c - d).norm(), 0.0);
-  return text + fmt::format("\ncentroid ({:.{}f}, {:.{}f}, {:.{}f}) m\n\n", Clean(c.x()), digits,
-                            Clean(c.y()), digits, c.z(), digits);
+  report->centroid_error = std::max((c - d).norm(), Roundoff(c.norm()));
+}
+
+// Areas and centroid of the smooth faces.
+std::string MeasuresText(const FaceIntegrals& fine, const WorkspaceReport& report) {
+  const auto digits = [](double error) { return std::min(9, Decimals(error)); };
+  std::string text = fmt::format("area {:.{}f} m2 (error {:.0e}); faces", fine.solid.area,
+                                 digits(report.area_error), report.area_error);
+  for (size_t k = 0; k < fine.face_area.size(); ++k) {
+    text += fmt::format(" {:.{}f}", fine.face_area[k], digits(report.face_errors[k]));
+  }
+  const Vec3& c = fine.solid.centroid;
+  const int places = digits(report.centroid_error);
+  return text + fmt::format("\ncentroid ({:.{}f}, {:.{}f}, {:.{}f}) m (error {:.0e})\n\n",
+                            Clean(c.x()), places, Clean(c.y()), places, c.z(), places,
+                            report.centroid_error);
 }
 
 std::string CornerTable(const Geometry& geometry) {
@@ -149,16 +166,32 @@ std::string CornerTable(const Geometry& geometry) {
   return text;
 }
 
-std::string RangeTable(const WorkspaceRanges& r) {
-  const auto line = [](const char* name, const Range& range, double unit) {
-    return fmt::format("{:<28} {:>12.6f} … {:.6f}\n", name, range.lower / unit, range.upper / unit);
+// Extremes over the finest of several grids; those of the others say how well it knows them.
+std::string RangeTable(const WorkspaceRanges& r, const std::vector<WorkspaceRanges>& coarser) {
+  const auto number = [&](Range WorkspaceRanges::*range, double Range::*end, double unit) {
+    constexpr int kMost = 6;
+    const double value = (r.*range).*end;
+    double error = 0.0;
+    for (const WorkspaceRanges& other : coarser) {
+      error = std::max(error, std::abs(value - (other.*range).*end));
+    }
+    const int places = std::min(kMost, Decimals(error / unit));
+    const double shown = value / unit;
+    // No sign of what rounds to zero.
+    return fmt::format("{:.{}f}", std::abs(shown) < 0.5 * std::pow(10.0, -places) ? 0.0 : shown,
+                       places);
   };
-  return line("x_m", r.x, 1) + line("y_m", r.y, 1) + line("z_m", r.z, 1) +
-         line("tilt_deg", r.tilt, kDeg) + line("det J", r.det, 1) +
-         line("singular values of J", r.sigma, 1) + line("condition of J", r.cond, 1) +
-         line("|det| of (12) [m3]", r.det_c, 1) + line("condition of (12)", r.cond_c, 1) +
-         line("ball swing_deg", r.ball_swing, kDeg) + line("ball twist_deg", r.ball_twist, kDeg) +
-         line("change of lean_deg", r.lean, kDeg);
+  const auto line = [&](const char* name, Range WorkspaceRanges::*range, double unit) {
+    return fmt::format("{:<28} {:>12} … {}\n", name, number(range, &Range::lower, unit),
+                       number(range, &Range::upper, unit));
+  };
+  using R = WorkspaceRanges;
+  return line("x_m", &R::x, 1) + line("y_m", &R::y, 1) + line("z_m", &R::z, 1) +
+         line("tilt_deg", &R::tilt, kDeg) + line("det J", &R::det, 1) +
+         line("singular values of J", &R::sigma, 1) + line("condition of J", &R::cond, 1) +
+         line("|det| of (12) [m3]", &R::det_c, 1) + line("condition of (12)", &R::cond_c, 1) +
+         line("ball swing_deg", &R::ball_swing, kDeg) +
+         line("ball twist_deg", &R::ball_twist, kDeg) + line("change of lean_deg", &R::lean, kDeg);
 }
 
 std::string SectionTable(const Geometry& geometry, const std::vector<double>& heights) {
@@ -231,6 +264,9 @@ WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions
     return report;
   }
   const WorkspaceRanges ranges = RangesOf(geometry, 20);
+  // Grids that share few points with it.
+  const std::vector<WorkspaceRanges> coarser = {RangesOf(geometry, 17), RangesOf(geometry, 13)};
+  FillErrors(faces, coarse, &report);
   std::string within;
   if (options.voxels > 0) within = AddVoxels(geometry, options, ranges, &report);
   if (options.voxels > 0 && std::isnan(report.volumes.back().value)) {
@@ -248,8 +284,8 @@ WorkspaceReport ReportWorkspace(const Geometry& geometry, const WorkspaceOptions
     report.text += fmt::format("volume by {:<14}  {}\n", v.way, Volume(v));
   }
   report.text += VerdictText(report) + within;
-  report.text += MeasuresText(faces, coarse);
-  report.text += meshes + "\n" + CornerTable(geometry) + "\n" + RangeTable(ranges) + "\n" +
+  report.text += MeasuresText(faces, report);
+  report.text += meshes + "\n" + CornerTable(geometry) + "\n" + RangeTable(ranges, coarser) + "\n" +
                  SectionTable(geometry, report.heights);
   report.sections_csv = SectionsCsv(geometry, options, report.heights);
   report.summary = RunSummary::Done();

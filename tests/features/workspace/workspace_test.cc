@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <regex>
 
 #include "model_file/load_model.h"
 #include "tests/support/source_dir.h"
@@ -46,6 +47,20 @@ TEST(Workspace, ScaraReachesThePapersCylinderWithoutYawAndNotWithIt) {
   const std::string* map = FindFile(outcome, "singularity_z-165mm.csv");
   ASSERT_NE(map, nullptr);
   EXPECT_EQ(std::count(map->begin(), map->end(), '\n'), 1 + 61 * 61);
+}
+
+// No digits beyond the sampling's error, and the numbers are in the JSON, too.
+TEST(Workspace, ScarasVolumesShowAsManyDigitsAsTheirErrorLeaves) {
+  const WorkspaceOutcome outcome = ComputeWorkspace(LoadShipped("scara_robot"), false);
+  EXPECT_TRUE(std::regex_search(outcome.text,
+                                std::regex(R"(volume at yaw 0 deg: 0\.0\d{4} \+- \de-05 m\^3 .*; )"
+                                           R"(\d\d\.\d \+- [1-9]e-01 % of it)")))
+      << outcome.text;
+  ASSERT_EQ(outcome.measures.size(), 4u);
+  for (const WorkspaceMeasure& measure : outcome.measures) {
+    EXPECT_GT(measure.error, 0.0) << measure.name;
+    EXPECT_LT(measure.error, 0.01 * measure.value) << measure.name;
+  }
 }
 
 TEST(Workspace, ItsBytesDoNotDependOnTheNumberOfJobs) {
