@@ -198,6 +198,45 @@ TEST(UrdfImport, WhatSimulatorsAddAndIsLeftOutIsACaveatUnlessItDoesNothing) {
   }
 }
 
+UrdfTree WithPlugin(const std::string& plugin, Diagnostics* findings) {
+  return ReadUrdf(Extended("", "<gazebo reference=\"arm\">" + plugin + "</gazebo>"), "r.urdf",
+                  findings);
+}
+
+TEST(UrdfImport, PluginsOfGazeboAreCaveatsUnlessTheyOnlyMeasureOrDrive) {
+  for (const internal::UrdfPluginRow& row : internal::UrdfPluginRows()) {
+    for (const char* form : {"<plugin filename=\"libgazebo_{}.so\" name=\"n\"/>",
+                             "<plugin name=\"my_{}\"><camera/></plugin>"}) {
+      Diagnostics findings;
+      const UrdfTree tree = WithPlugin(fmt::format(fmt::runtime(form), row.part), &findings);
+      ASSERT_FALSE(findings.has_errors()) << row.part << findings.Text();
+      ASSERT_EQ(tree.left_out.size(), row.effect == nullptr ? 0u : 1u)
+          << row.part << findings.Text();
+      if (row.effect == nullptr) continue;
+      EXPECT_NE(tree.left_out[0].text.find(row.effect), std::string::npos)
+          << row.part << tree.left_out[0].text;
+      EXPECT_EQ(tree.left_out[0].source, "gazebo/plugin");
+    }
+  }
+  // What is not known may do anything; hyphens and capitals do not matter.
+  Diagnostics findings;
+  const UrdfTree unknown = WithPlugin("<plugin filename=\"libmine.so\" name=\"m\"/>", &findings);
+  ASSERT_EQ(unknown.left_out.size(), 1u);
+  EXPECT_EQ(unknown.left_out[0].text,
+            "<plugin> 'libmine.so' ('arm') is left out: what it does to forces is not known");
+  EXPECT_NE(findings.Text().find("r.urdf:1:"), std::string::npos) << findings.Text();
+  EXPECT_EQ(WithPlugin("<plugin/>", &findings).left_out.size(), 1u);
+  EXPECT_NE(WithPlugin("<plugin filename=\"GZ-Sim-Hydrodynamics-System\"/>", &findings)
+                .left_out.at(0)
+                .text.find("a fluid"),
+            std::string::npos);
+  // A sensor's plugins hand on what it measures.
+  EXPECT_TRUE(
+      WithPlugin("<sensor name=\"s\" type=\"ray\"><plugin filename=\"libmine.so\"/></sensor>",
+                 &findings)
+          .left_out.empty());
+}
+
 // Rotors of Drake, springs of Gazebo and gravity of MuJoCo are the mechanism's.
 TEST(UrdfImport, RotorsSpringsAndGravityOfSimulatorsAreTaken) {
   const test::TestFolder folder("urdf_extras");

@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <filesystem>
 #include <fstream>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "analytic/closed_form.h"
 #include "features/run/run_scenario.h"
+#include "features/stiffness/stiffness_report.h"
 #include "features/workspace/workspace.h"
 #include "model_file/load_model.h"
 #include "tests/support/source_dir.h"
@@ -203,6 +205,46 @@ TEST(Decline, AnElasticModelWithAnotherBeam) {
       outcome.diagnostics.Text().find("analytic declines: beam limb1.bar: area is 0.000113097"),
       std::string::npos)
       << outcome.diagnostics.Text();
+  // A caveat of the verdict, in JSON and on the line of -q.
+  ASSERT_TRUE(outcome.stiffness);
+  const std::vector<Caveat>& caveats = outcome.stiffness->comparison.caveats;
+  ASSERT_EQ(caveats.size(), 1u);
+  EXPECT_EQ(caveats[0].kind, CaveatKind::kWitnessMissing);
+  EXPECT_EQ(caveats[0].gap, WitnessGap::kNotApplicable);
+  const std::string text = "without the witness analytic, which nothing was compared with: ";
+  EXPECT_TRUE(caveats[0].text.starts_with(text)) << caveats[0].text;
+  EXPECT_NE(VerdictLine(ViewOf(*outcome.stiffness), {}).find("; caveat: " + text),
+            std::string::npos);
+  const auto json = nlohmann::json::parse(ToJson(*outcome.stiffness));
+  EXPECT_EQ(json["caveats"][0]["kind"], "witness_missing");
+  EXPECT_EQ(json["caveats"][0]["cause"], "not_applicable");
+  EXPECT_TRUE(json["reservations"][0].get<std::string>().starts_with(text));
+}
+
+// Of a robot's file that has more than the model, and of a closed form that is there.
+TEST(Decline, AStiffnessOfAModelThatLeavesSomethingOutHasACaveat) {
+  for (const bool whole : {true, false}) {
+    const Copy copy(whole ? "whole" : "left_out");
+    std::string model = ReadShipped("models/scara_robot/elastic.yaml");
+    Replace("parameters_from: model.yaml",
+            "parameters_from: \"" + SourcePath("/models/scara_robot/model.yaml") + "\"", &model);
+    if (!whole) model += "\nleft_out: [a spring acts on the joint]\n";
+    copy.Model(model);
+    const std::string scenario =
+        copy.Scenario(ReadShipped("scenarios/scara_robot/stiffness.yaml"), "scara_robot");
+    RunOptions options;
+    options.pictures = false;
+    const RunOutcome outcome = RunScenario(scenario, options);
+    EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
+    ASSERT_TRUE(outcome.stiffness);
+    const auto json = nlohmann::json::parse(ToJson(*outcome.stiffness));
+    ASSERT_EQ(json["caveats"].size(), whole ? 0u : 1u) << json["caveats"];
+    if (whole) continue;
+    EXPECT_EQ(json["caveats"][0]["kind"], "left_out");
+    EXPECT_NE(VerdictLine(ViewOf(*outcome.stiffness), {})
+                  .find("; caveat: not the whole robot: a spring acts on the joint"),
+              std::string::npos);
+  }
 }
 
 }  // namespace

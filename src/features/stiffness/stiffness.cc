@@ -91,6 +91,7 @@ class Runner {
   void RunAnalytic() {
     if (prepared_.form == nullptr) {
       AddFailed(role::kAnalytic.name, NotRun(prepared_.form_reason));
+      report().witnesses.back().gap = prepared_.form_gap;
       return;
     }
     const auto start = std::chrono::steady_clock::now();
@@ -175,6 +176,7 @@ class Runner {
     input.limits = scenario_.checks;
     input.loads = scenario_.loads;
     input.witnesses = report().witnesses;
+    input.left_out = TextsOf(scenario_.model_caveats, ModelCaveat::Kind::kLeftOut);
     report().comparison = CompareStiffness(input);
     switch (report().comparison.verdict) {
       case Verdict::kAgree:
@@ -371,6 +373,7 @@ std::unique_ptr<StiffnessForm> MakeForm(const PreparedStiffness& prepared,
 void FindForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   const AnalyticSettings& settings = prepared->scenario.analytic;
   const StiffnessFormRow* row = FindStiffnessForm(prepared->base.name);
+  if (settings.on && settings.stated) prepared->form_gap = WitnessGap::kNotApplicable;
   if (!settings.on) {
     prepared->form_reason = "switched off in the scenario";
     return;
@@ -397,9 +400,15 @@ void FindForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
         fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(models)), "");
     return;
   }
+  prepared->form_gap = WitnessGap::kNotApplicable;  // unless it is made
   prepared->form_reason = Decline(*prepared, *row, diagnostics);
   if (!prepared->form_reason.empty()) return;
   prepared->form = MakeForm(*prepared, *row, prepared->form_model, diagnostics);
+  if (prepared->form == nullptr) {
+    prepared->form_reason = "the closed form does not suit this scenario";
+  } else {
+    prepared->form_gap = WitnessGap::kNone;
+  }
   if (prepared->scenario.compare_printed && prepared->form != nullptr) {
     prepared->printed = MakeForm(*prepared, *row, kPrintedModel, diagnostics);
   }

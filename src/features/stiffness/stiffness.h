@@ -21,6 +21,8 @@ struct PreparedStiffness {
   int output = 0;
   std::unique_ptr<StiffnessForm> form;  ///< null: none, or switched off
   std::string form_reason;              ///< why, if null
+  /// Not kNone where the scenario states a closed form, or there is one that does not apply.
+  WitnessGap form_gap = WitnessGap::kNone;
   std::string form_model;
   std::unique_ptr<StiffnessForm> printed;  ///< the paper's own, if it is compared
   std::string pose_note;                   ///< where a pose comes from that the scenario left out

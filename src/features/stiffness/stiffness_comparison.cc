@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "comparison/reservations.h"
 #include "comparison/verdict.h"
 
 namespace mbv {
@@ -317,6 +318,16 @@ StiffnessComparison CompareStiffness(const StiffnessInput& input) {
     if (witness.ran()) AddOwnChecks(input, witness, &comparison);
   }
   Judge(input, &comparison);
+  for (const std::string& text : input.left_out) {
+    comparison.caveats.push_back(LeftOutCaveat(text));
+  }
+  for (const StiffnessWitness& witness : input.witnesses) {
+    if (witness.gap == WitnessGap::kNone || witness.ran()) continue;
+    comparison.caveats.push_back(
+        MissingWitnessCaveat(witness.name, witness.gap, witness.result.summary.message));
+    Caveat& caveat = comparison.caveats.back();
+    caveat.text = "without " + caveat.text;
+  }
   comparison.attribution = Attribute(comparison);
   return comparison;
 }

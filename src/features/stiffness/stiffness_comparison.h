@@ -22,7 +22,8 @@ struct StiffnessWitness {
   StiffnessResult result;
   std::vector<Vec6> displacements;  ///< [Δγ; Δε] per load; empty if K is singular or none is given
   double residual = kNan;           ///< simulation only
-  double extrapolation_error = kNan;  ///< simulation only
+  double extrapolation_error = kNan;   ///< simulation only
+  WitnessGap gap = WitnessGap::kNone;  ///< why the scenario's closed form has no result
 
   [[nodiscard]] bool ran() const { return result.K.allFinite(); }
 };
@@ -31,6 +32,7 @@ struct StiffnessInput {
   StiffnessLimits limits;
   std::vector<Vec6> loads;
   std::vector<StiffnessWitness> witnesses;  ///< in the order analytic, reference, simulated
+  std::vector<std::string> left_out = {};   ///< what a robot's file has and the model has not
 };
 
 struct WorstEntry {
@@ -77,6 +79,7 @@ struct StiffnessComparison {
   std::vector<StiffnessPair> pairs;
   std::vector<StiffnessCheck> checks;  ///< off ones included
   std::vector<NotCompared> not_compared;
+  std::vector<Caveat> caveats;
   Attribution attribution;
 
   [[nodiscard]] const StiffnessPair* FindPair(const std::string& name) const;

@@ -45,6 +45,7 @@ ResultView ViewOf(const StiffnessReport& report) {
   const StiffnessComparison& comparison = report.comparison;
   ResultView view = ViewOfComparison(report, comparison);
   view.kind = "stiffness";
+  view.caveats = comparison.caveats;
   view.look = {
       .signs = false, .capitals = false, .margins = false, .steps = false, .title_width = 32};
   for (const StiffnessCheck& check : comparison.checks) {

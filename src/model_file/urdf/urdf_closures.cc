@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <tinyxml2.h>
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <cstdlib>
 #include <map>
@@ -258,6 +259,76 @@ const UrdfForceRow kForceRows[] = {
     {"joint", "dynamics", "stiffness", "0|0.0", "a spring acts on the joint"},
 };
 
+constexpr const char* kSprung = "it acts on joints or links as a spring or damper";
+constexpr const char* kSent = "it applies forces that other programs send";
+constexpr const char* kFlow = "it applies forces of a fluid";
+constexpr const char* kHolds = "it joins bodies while it runs";
+constexpr const char* kMoves = "it moves or pushes the base";
+
+const UrdfPluginRow kPluginRows[] = {
+    {"mimic", "the joint follows another one"},
+    {"spring", kSprung},
+    {"damp", kSprung},
+    {"friction", "dry friction acts"},
+    {"hydrodynamic", kFlow},
+    {"buoyan", kFlow},
+    {"wind", kFlow},
+    {"lift_drag", kFlow},
+    {"liftdrag", kFlow},
+    {"propeller", kFlow},
+    {"thruster", kFlow},
+    {"rotor", kFlow},
+    {"motor_model", kFlow},
+    {"multicopter", kFlow},
+    {"gripper", kHolds},
+    {"vacuum", kHolds},
+    {"detachable", kHolds},
+    {"attach", kHolds},
+    {"diff_drive", kMoves},
+    {"diffdrive", kMoves},
+    {"planar_move", kMoves},
+    {"skid_steer", kMoves},
+    {"ackermann", kMoves},
+    {"force_torque", nullptr},
+    {"ft_sensor", nullptr},
+    {"force", kSent},
+    {"wrench", kSent},
+    // Their forces are those of drives.
+    {"ros_control", nullptr},
+    {"ros2_control", nullptr},
+    {"joint_position_controller", nullptr},
+    {"jointpositioncontroller", nullptr},
+    {"joint_trajectory", nullptr},
+    {"jointtrajectory", nullptr},
+    // These measure or publish.
+    {"joint_state", nullptr},
+    {"jointstate", nullptr},
+    {"pose_publisher", nullptr},
+    {"posepublisher", nullptr},
+    {"odometry", nullptr},
+    {"p3d", nullptr},
+    {"camera", nullptr},
+    {"kinect", nullptr},
+    {"imu", nullptr},
+    {"laser", nullptr},
+    {"ray_sensor", nullptr},
+    {"lidar", nullptr},
+    {"gps", nullptr},
+    {"bumper", nullptr},
+    {"contact_sensor", nullptr},
+    {"sensors_system", nullptr},
+};
+
+const UrdfPluginRow* FindPlugin(std::string name) {
+  for (char& c : name) {
+    c = c == '-' ? '_' : static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  }
+  for (const UrdfPluginRow& row : kPluginRows) {
+    if (name.find(row.part) != std::string::npos) return &row;
+  }
+  return nullptr;
+}
+
 bool IsNeutral(const UrdfForceRow& row, const std::string& value) {
   std::istringstream words(row.neutral);
   for (std::string word; std::getline(words, word, '|');) {
@@ -371,7 +442,24 @@ class ExtraReader {
     }
   }
 
+  // By its file, else by its name: names are chosen freely.
+  void ReadPlugin(const XMLElement& plugin) {
+    const char* file = plugin.Attribute("filename");
+    const char* name = plugin.Attribute("name");
+    const std::string word = file != nullptr ? file : name != nullptr ? name : "";
+    const UrdfPluginRow* row = FindPlugin(word);
+    if (row == nullptr && file != nullptr && name != nullptr) row = FindPlugin(name);
+    if (row != nullptr && row->effect == nullptr) return;
+    LeaveOut(plugin, word.empty() ? "<plugin>" : "<plugin> " + QuotedValue(word),
+             row == nullptr ? "what it does to forces is not known" : row->effect);
+  }
+
   void LookUp(const XMLElement& e) {
+    if (section_ == "gazebo" && std::string_view(e.Name()) == "sensor") return;
+    if (section_ == "gazebo" && std::string_view(e.Name()) == "plugin") {
+      ReadPlugin(e);
+      return;
+    }
     for (const UrdfForceRow& row : kForceRows) {
       if (*row.section != '\0' && section_ != row.section) continue;
       if (std::string_view(e.Name()) != row.element) continue;
@@ -416,6 +504,8 @@ std::string Escaped(const std::string& text) {
 }  // namespace
 
 std::span<const UrdfForceRow> UrdfForceRows() { return kForceRows; }
+
+std::span<const UrdfPluginRow> UrdfPluginRows() { return kPluginRows; }
 
 UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
                             Diagnostics* diagnostics) {

@@ -60,6 +60,14 @@ struct UrdfForceRow {
 };
 [[nodiscard]] std::span<const UrdfForceRow> UrdfForceRows();
 
+/// A kind of <plugin> below <gazebo>, by a part of its file or name in lower case, '-' as '_'. The
+/// first row that fits counts; what fits none may do anything. Plugins of sensors only measure.
+struct UrdfPluginRow {
+  const char* part;
+  const char* effect;  ///< nullptr: none on forces, or only those of drives, which are commanded
+};
+[[nodiscard]] std::span<const UrdfPluginRow> UrdfPluginRows();
+
 /// Reads them; findings carry the line. Empty if the text is no XML (urdfdom says so).
 [[nodiscard]] UrdfDetails ReadUrdfDetails(const std::string& text, const std::string& file,
                                           Diagnostics* diagnostics);
