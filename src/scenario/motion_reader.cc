@@ -486,7 +486,24 @@ class MotionReader {
       CheckCover(tables_.loaded[i], *tables_.places[i].node, tables_.places[i].path,
                  motion_.duration_s, &yaml());
     }
+    for (const ProfileTables::Law& law : tables_.laws) {
+      if (times_known_) CheckEnd(law);
+    }
     motion_.tables = std::move(tables_.loaded);
+  }
+
+  // A law that the motion cuts off. One that ends before it holds its last value, which is usual.
+  void CheckEnd(const ProfileTables::Law& law) {
+    constexpr double kSame = 1e-6;  // of the duration
+    const double end_s = motion_.duration_s;
+    if (law.end_s <= end_s * (1.0 + kSame)) return;
+    const std::string what =
+        law.start_s >= end_s
+            ? fmt::format("begins at {:g} s, when the motion of {:g} s is over", law.start_s, end_s)
+            : fmt::format("ends at {:g} s, but the motion at {:g} s: it is cut off", law.end_s,
+                          end_s);
+    yaml().Warn(*law.node, law.path + ": " + what,
+                "state a longer motion.duration_s, or a shorter law");
   }
 
   // The shortest of the commands' tables, if any ends.

@@ -55,6 +55,7 @@ class ProfileReader : AmountReader {
     const std::string& key = node.entries.front().key;
     const YamlNode* value = node.entries.front().value.get();
     const std::string term_path = JoinPath(path, key);
+    const size_t terms = profile->terms.size();
     if (key.starts_with("value")) {
       if (const auto number = Amount(map, "value"))
         profile->terms.emplace_back(ConstantTerm{*number});
@@ -78,6 +79,16 @@ class ProfileReader : AmountReader {
     } else {
       ReadStep(key, value, term_path, profile);
     }
+    if (key != "table" && key != "cam") NoteEnd(node, term_path, terms, *profile);
+  }
+
+  // Of what was added to the `terms` before.
+  void NoteEnd(const YamlNode& node, const std::string& path, size_t terms,
+               const Profile& profile) {
+    if (context_.tables == nullptr || profile.terms.size() <= terms) return;
+    const std::vector<double> breaks = BreakTimes({{profile.terms.back()}});
+    if (breaks.empty()) return;
+    context_.tables->laws.push_back({&node, path, breaks.front(), breaks.back()});
   }
 
   void ReadSine(const YamlNode* node, const std::string& path, Profile* profile) {

@@ -23,6 +23,13 @@ struct ProfileTables {
   };
   std::vector<Place> places = {};  ///< of loaded
   bool failed = false;             ///< some table could not be loaded
+  /// Laws that come to an end.
+  struct Law {
+    const YamlNode* node;
+    std::string path;
+    double start_s, end_s;
+  };
+  std::vector<Law> laws = {};
 };
 
 /// What a profile's values are.

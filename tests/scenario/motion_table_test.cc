@@ -276,5 +276,68 @@ TEST_F(MotionTableTest, LawsAreReadInTheirUnits) {
       0.0);
 }
 
+// A motor's angle without a unit: degrees where round numbers or turns to and fro say so.
+TEST_F(MotionTableTest, AnglesThatOnlyMakeSenseInDegreesAreDoubted) {
+  const auto messages = [&](double size, double frequency, const std::string& more = "") {
+    std::string text = "t (s),angle\n";
+    for (int i = 0; i <= 100; ++i) {
+      const double t = 0.01 * i;
+      text += fmt::format("{:.9g},{:.9g}\n", t,
+                          frequency > 0.0 ? size * std::sin(2.0 * pi * frequency * t) : size * t);
+    }
+    folder_.Write("a.csv", text);
+    return Messages("{table: {csv: a.csv, column: angle" + more + "}}");
+  };
+  const char* doubt = "a.csv:1:7: warning: angle has no unit";
+  EXPECT_NE(messages(45.0, 1.0).find(doubt), std::string::npos) << messages(45.0, 1.0);
+  EXPECT_NE(messages(360.0, 0.0).find(doubt), std::string::npos);
+  EXPECT_NE(messages(37.3, 1.0).find("are they degrees? state unit: deg (or rad)"),
+            std::string::npos);
+  EXPECT_EQ(messages(45.0, 1.0, ", unit: deg").find("no unit"), std::string::npos);
+  // Radians: a swing, a spindle of ten turns, and a steady speed.
+  EXPECT_EQ(messages(0.785, 1.0).find("no unit"), std::string::npos);
+  EXPECT_EQ(messages(20.0 * pi, 0.0).find("no unit"), std::string::npos);
+  EXPECT_EQ(messages(20.0, 0.0).find("no unit"), std::string::npos);
+}
+
+TEST_F(MotionTableTest, WhatGoesOnAfterTheMotionIsNamed) {
+  WriteTable("swing.csv", 301, 0.01, Swing);
+  const std::string table = "{table: {csv: swing.csv, column: \"angle (deg)\", time: \"t (s)\"}}";
+  const std::string over = Messages(table);
+  EXPECT_NE(
+      over.find("s.yaml:5:25: warning: motion.commands.motor.table: swing.csv goes on to 3 s, "
+                "but the motion ends at 1 s: 67 % of it is not used"),
+      std::string::npos)
+      << over;
+  EXPECT_EQ(Messages(table, "duration_s: 2.98").find("goes on"), std::string::npos);
+  EXPECT_EQ(Messages(table, "duration_s: 3").find("goes on"), std::string::npos);
+  EXPECT_NE(Messages(table, "duration_s: 3.5").find("error: "), std::string::npos);
+  EXPECT_NE(Messages(table, "duration_s: 0.005, sample_s: 0.001").find("time_unit: ms"),
+            std::string::npos);
+}
+
+TEST_F(MotionTableTest, LawsThatTheMotionCutsOffAreNamed) {
+  for (const char* law :
+       {"poly345: {start_s: 0.5, duration_s: 0.8, delta: 1}", "bump: {duration_s: 1.2, height: 1}",
+        "cycloid: {start_s: 0.9, duration_s: 0.2, delta: 1}",
+        "via: {times_s: [0, 0.5, 1.5], values: [0, 1, 2]}",
+        "trapezoid: {delta: 3, v_max: 1, a_max: 10}",
+        "s_curve: {delta: 3, v_max: 1, a_max: 10, j_max: 100}"}) {
+    const std::string text = Messages("[home, {" + std::string(law) + "}]");
+    const std::string name = std::string(law).substr(0, std::string(law).find(':'));
+    EXPECT_NE(text.find("motion.commands.motor[1]." + name + ": ends at "), std::string::npos)
+        << text;
+    EXPECT_NE(text.find("but the motion at 1 s: it is cut off"), std::string::npos) << text;
+    EXPECT_EQ(Messages("[home, {" + std::string(law) + "}]", "duration_s: 4").find("cut off"),
+              std::string::npos);
+  }
+  EXPECT_NE(Messages("[home, {poly345: {start_s: 2, duration_s: 1, delta: 1}}]")
+                .find("begins at 2 s, when the motion of 1 s is over"),
+            std::string::npos);
+  // One that ends with the motion, and one that does not end.
+  EXPECT_EQ(Messages("[home, {poly345: {start_s: 0.5, duration_s: 0.5, delta: 1}}]"), "");
+  EXPECT_EQ(Messages("[home, {sine: {amplitude: 0.1, period_s: 7}}]"), "");
+}
+
 }  // namespace
 }  // namespace mbv

@@ -1,8 +1,10 @@
 // What is said about wrong tables: each finding with file, line and column.
 #include "scenario/tables/table.h"
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -13,6 +15,94 @@
 
 namespace mbv {
 namespace {
+
+// Rows of d1.position over time: `rows` of them, `h` apart, without those in `from` … `to`.
+template <typename F>
+std::string PositionTable(int rows, double h, const F& f, int from = -1, int to = -1,
+                          const std::string& head = "t (s),d1.position (m)") {
+  std::string text = head + "\n";
+  for (int i = 0; i < rows; ++i) {
+    if (i >= from && i <= to) continue;
+    text += fmt::format("{:.9g},{:.9g}\n", i * h, f(i * h));
+  }
+  return text;
+}
+
+TEST(TableFindings, MissingRowsOfARegularGridAreNamedWithTheirLine) {
+  const auto swing = [](double t) { return 0.1 * std::sin(5.0 * t); };
+  const std::string text = LoadTable(PositionTable(101, 0.01, swing, 40, 69)).text;
+  EXPECT_TRUE(Has(text,
+                  "t.csv:42:1: warning: 30 rows are missing: the rows are 0.01 s apart, but none "
+                  "lies between 0.39 and 0.7 s"))
+      << text;
+  // In the file's own unit, too.
+  EXPECT_TRUE(Has(LoadTable(PositionTable(101, 10.0, swing, 40, 69, "t (ms),d1.position (m)")).text,
+                  "none lies between 0.39 and 0.7 s"));
+  // A row or two that a log lost, none at all, and stamps that were rounded.
+  EXPECT_EQ(LoadTable(PositionTable(101, 0.01, swing, 40, 41)).text, "");
+  EXPECT_EQ(LoadTable(PositionTable(101, 0.01, swing)).text, "");
+  std::string rounded = "t (s),d1.position (m)\n", uneven = rounded;
+  double t = 0.0;
+  for (int i = 0; i < 200; ++i) {
+    rounded += fmt::format("{:.3f},{:.9g}\n", i / 300.0, swing(i / 300.0));
+    t += 0.002 * (1.0 + 0.9 * std::sin(0.7 * i)) * (i % 40 == 0 ? 8.0 : 1.0);
+    uneven += fmt::format("{:.9g},{:.9g}\n", t, swing(t));
+  }
+  EXPECT_EQ(LoadTable(rounded).text, "");
+  EXPECT_EQ(LoadTable(uneven).text, "");  // steps of a solver
+}
+
+TEST(TableFindings, TwoPositionsAtOneTimeAreNamedWithTheirLine) {
+  const auto swing = [](double t) { return 0.1 * std::sin(5.0 * t); };
+  std::string rows = PositionTable(101, 0.01, swing);
+  const size_t at = rows.find("\n0.5,") + 1;
+  const std::string twice = rows.substr(0, at) + "0.5,0.3\n" + rows.substr(at);
+  const std::string text = LoadTable(twice).text;
+  EXPECT_TRUE(Has(text,
+                  "t.csv:53:1: warning: t (s) = 0.5 has two values of d1.position (m), 0.3 "
+                  "and 0.0598472144: both rows are left out") ||
+              Has(text,
+                  "t.csv:53:1: warning: t (s) = 0.5 has two values of d1.position (m), 0.3 "
+                  "and 0.0598472: both rows are left out"))
+      << text;
+  // An event writes its time twice; positions go on, forces may jump.
+  const std::string event = rows.substr(0, at) + "0.5,0.0598472145\n" + rows.substr(at);
+  EXPECT_EQ(LoadTable(event).text, "");
+  std::string forces = "t (s),d1.force (N)\n";
+  for (int i = 0; i <= 100; ++i) {
+    if (i == 50) forces += "0.5,3\n";
+    forces += fmt::format("{:.9g},{:.9g}\n", 0.01 * i, i < 50 ? 3.0 : -4.0);
+  }
+  EXPECT_EQ(LoadTable(forces).text, "");
+}
+
+TEST(TableFindings, NumbersThatFitAnotherUnitAreDoubtedWhereNoneIsStated) {
+  const auto swing = [](double t) { return 0.1 * std::sin(5.0 * t); };
+  // Milliseconds.
+  const auto in_ms = [&](double t) { return swing(1e-3 * t); };
+  const std::string ms =
+      LoadTable(PositionTable(101, 10.0, in_ms, -1, -1, "t,d1.position (m)")).text;
+  EXPECT_TRUE(Has(ms,
+                  "t.csv:1:1: warning: t has no unit, and its whole numbers, 10 apart up to "
+                  "1000, are taken as seconds"))
+      << ms;
+  EXPECT_TRUE(Has(ms, "time_unit: ms")) << ms;
+  for (const char* head : {"t (ms),d1.position (m)", "t (s),d1.position (m)"}) {
+    EXPECT_EQ(LoadTable(PositionTable(101, 10.0, in_ms, -1, -1, head)).text, "") << head;
+  }
+  EXPECT_EQ(LoadTable(PositionTable(11, 1.0, swing, -1, -1, "t,d1.position (m)")).text, "");
+  EXPECT_EQ(LoadTable(PositionTable(101, 10.0, in_ms, -1, -1, "t,d1.position (m)"),
+                      "{csv: t.csv, time_unit: s}")
+                .text,
+            "");
+  // Millimetres.
+  const auto in_mm = [&](double t) { return 1e4 * swing(t); };
+  const std::string mm =
+      LoadTable(PositionTable(101, 0.01, in_mm, -1, -1, "t (s),d1.position")).text;
+  EXPECT_TRUE(Has(mm, "t.csv:1:7: warning: d1.position has no unit")) << mm;
+  EXPECT_TRUE(Has(mm, "are they millimetres? state unit: mm (or m)")) << mm;
+  EXPECT_EQ(LoadTable(PositionTable(101, 0.01, swing, -1, -1, "t (s),d1.position")).text, "");
+}
 
 TEST(TableFindings, AMissingColumnIsNamedAtItsKeyWithTheNearestHeading) {
   const std::string text = LoadTable("t,F_one,F2\n0,1,10\n1,2,11\n2,3,12\n3,4,13\n",

@@ -162,6 +162,7 @@ class Mapper {
       if (name == "timems") mapping_.time_factor = 1e-3;
       if (name != "timems" && name != "times" && name != "timesec") {
         mapping_.notes.emplace_back("its time has no unit: seconds are assumed");
+        mapping_.time_unit_assumed = true;
       }
       return;
     }
@@ -285,6 +286,7 @@ class Mapper {
     const std::string& text = stated ? mapped->settings->unit : heading.unit;
     if (text.empty()) {
       unitless_.push_back(mapped->column.heading);
+      mapped->unit_assumed = true;
       return;
     }
     const auto unit = FindUnit(text);

@@ -13,6 +13,7 @@ namespace mbv {
 struct MappedColumn {
   size_t index = 0;  ///< 0-based
   TableColumn column;
+  bool unit_assumed = false;  ///< neither heading nor settings state one
   /// For `tolerance:` and findings.
   const TableColumnSettings* settings = nullptr;
 };
@@ -20,7 +21,8 @@ struct MappedColumn {
 /// All columns to read.
 struct TableMapping {
   size_t time_index = 0;
-  double time_factor = 1.0;  ///< to seconds
+  double time_factor = 1.0;        ///< to seconds
+  bool time_unit_assumed = false;  ///< neither heading nor settings state one
   std::vector<MappedColumn> columns;
   std::vector<std::string> notes;  ///< automatic choices, assumed units, unused columns
 };

@@ -19,6 +19,8 @@ namespace {
 constexpr size_t kFewestSplineRows = 6;  // that determine a quintic polynomial
 // A column of rates further from the positions' own, of their RMS, belongs to something else.
 constexpr double kRateDoubt = 0.2;
+// A table that lasts more than so many motions may be in milliseconds.
+constexpr double kMilli = 300.0;
 
 class Loader {
  public:
@@ -179,7 +181,24 @@ std::optional<MotionTable> LoadMotionTable(ValueReader* values, const YamlNode& 
 void CheckCover(const MotionTable& table, const YamlNode& node, const std::string& path,
                 double duration_s, YamlReader* yaml) {
   const double same_s = 1e-9 + 1.05 * table.stamp_error_s;
-  if (table.periodic || (table.from_s <= same_s && table.to_s >= duration_s - same_s)) return;
+  if (table.periodic) return;
+  if (table.from_s <= same_s && table.to_s >= duration_s - same_s) {
+    // Rows that are left over: more than a few, and more than a log runs on.
+    constexpr double kRows = 3.0, kShare = 0.02;
+    const double row_s = (table.to_s - table.from_s) / static_cast<double>(table.rows - 1);
+    const double over_s = table.to_s - duration_s;
+    if (over_s <= std::max(kRows * row_s, kShare * duration_s) + same_s) return;
+    yaml->Warn(
+        node,
+        fmt::format("{}: {} goes on to {:g} s, but the motion ends at {:g} s: {:.0f} % of it "
+                    "is not used",
+                    path, table.file, table.to_s, duration_s,
+                    100.0 * over_s / (table.to_s - table.from_s)),
+        table.to_s > kMilli * duration_s
+            ? "are its times milliseconds? state time_unit: ms"
+            : "state a longer motion.duration_s, or shorten the table");
+    return;
+  }
   const std::string shift =
       table.from_s > same_s
           ? fmt::format(

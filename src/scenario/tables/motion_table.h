@@ -30,7 +30,8 @@ struct MotionTableUse {
                                                          const Mechanism& mechanism,
                                                          Diagnostics* files);
 
-/// A finding where the rows do not cover the motion 0 … duration_s; at the place of `node`.
+/// A finding where the rows do not cover the motion 0 … duration_s, a warning where they go on for
+/// long after it; at the place of `node`.
 void CheckCover(const MotionTable& table, const YamlNode& node, const std::string& path,
                 double duration_s, YamlReader* yaml);
 

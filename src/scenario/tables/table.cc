@@ -5,9 +5,11 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <numbers>
 #include <sstream>
 
 #include "base/inputs.h"
+#include "mechanism/reach.h"
 #include "scenario/tables/columns.h"
 #include "scenario/tables/grid.h"
 #include "scenario/tables/text.h"
@@ -252,6 +254,7 @@ class RowReader {
 
   std::vector<std::vector<double>> numbers;  // time first, then the mapped columns
   std::vector<DigitStatistics> digits;
+  std::vector<int> lines;          // of the rows
   std::vector<std::string> notes;  // about rows that are left out
 
  private:
@@ -261,6 +264,7 @@ class RowReader {
     bool different;  // with other values
     int line, column;
     std::string text;
+    std::vector<double> last = {};  // the values that differ
   };
 
   void Add(int line, int column, const std::string& message, const std::string& hint) {
@@ -307,6 +311,7 @@ class RowReader {
       Report(line, cell, k, row_[k].kind);
     }
     if (!complete || !CheckTime(line, cut.cells[indices_[0]]) || IsRepeat(line, cut)) return;
+    lines.push_back(line.number);
     for (size_t k = 0; k < indices_.size(); ++k) {
       numbers[k].push_back(row_[k].value);
       digits[k].Add(row_[k]);
@@ -374,6 +379,10 @@ class RowReader {
     } else {
       repeats_.push_back({row, different, line.number, cell.column, Shown(cell.text)});
     }
+    if (different) {
+      repeats_.back().last.clear();
+      for (const CellNumber& number : row_) repeats_.back().last.push_back(number.value);
+    }
     return true;
   }
 
@@ -390,6 +399,7 @@ class RowReader {
       }
       return;
     }
+    for (const Repeat& repeat : repeats_) ReportTwoValues(repeat);
     const double spacing = UsualStep();
     size_t left_out = 0;
     for (auto repeat = repeats_.rbegin(); repeat != repeats_.rend(); ++repeat) {
@@ -399,6 +409,7 @@ class RowReader {
       for (std::vector<double>& column : numbers) {
         column.erase(column.begin() + static_cast<std::ptrdiff_t>(repeat->row));
       }
+      lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(repeat->row));
     }
     if (left_out > 0) {
       notes.push_back(fmt::format(
@@ -408,6 +419,42 @@ class RowReader {
     if (repeats_.size() > left_out) {
       notes.push_back(fmt::format("{} rows that repeat the row before are left out",
                                   repeats_.size() - left_out));
+    }
+  }
+
+  // A force may jump at an event. A position cannot, and a spline through a motion's rows does not:
+  // there two values far apart, for how the column changes around, are two rows of one time.
+  void ReportTwoValues(const Repeat& repeat) {
+    constexpr double kApart = 3.0;  // times the changes beside it
+    if (!repeat.different) return;
+    for (size_t k = 1; k < numbers.size(); ++k) {
+      const std::string& unit = mapping_.columns[k - 1].column.channel.unit;
+      if (settings_.signals.empty() && unit != "m" && unit != "rad") continue;
+      const std::vector<double>& values = numbers[k];
+      const double first = values[repeat.row], last = repeat.last[k];
+      double beside = 0.0;
+      if (repeat.row > 0) {
+        const double before = values[repeat.row - 1];
+        beside = std::min(std::abs(first - before), std::abs(last - before));
+      }
+      if (repeat.row + 1 < values.size()) {
+        const double after = values[repeat.row + 1];
+        beside = std::max(beside, std::min(std::abs(after - first), std::abs(after - last)));
+      }
+      const double apart = std::abs(last - first);
+      if (apart <= kApart * beside || apart <= 1e-6 * std::max(std::abs(first), std::abs(last))) {
+        continue;
+      }
+      Finding finding;
+      finding.severity = Severity::kWarning;
+      finding.file = settings_.file;
+      finding.line = repeat.line;
+      finding.column = repeat.column;
+      finding.message =
+          fmt::format("{} = {} has two values of {}, {:g} and {:g}: both rows are left out",
+                      NameOf(0), repeat.text, NameOf(k), first, last);
+      finding.hint = "keep the row that is right";
+      diagnostics_->Add(std::move(finding));
     }
   }
 
@@ -438,6 +485,162 @@ class RowReader {
   std::vector<CellNumber> row_;
   std::vector<Repeat> repeats_;
   size_t found_ = 0;
+};
+
+// What can be read and is hardly meant: one warning each, at its line.
+class Plausibility {
+ public:
+  Plausibility(const TableText& text, const TableSettings& settings, const TableMapping& mapping,
+               const RowReader& rows, const Mechanism& mechanism, Diagnostics* diagnostics)
+      : text_(text),
+        settings_(settings),
+        mapping_(mapping),
+        rows_(rows),
+        mechanism_(mechanism),
+        diagnostics_(*diagnostics) {}
+
+  void Check() {
+    if (rows_.numbers[0].size() < kFewestRows) return;
+    FindStep();
+    CheckHoles();
+    if (mapping_.time_unit_assumed) DoubtTimeUnit();
+    for (size_t k = 0; k < mapping_.columns.size(); ++k) {
+      const TableColumn& column = mapping_.columns[k].column;
+      if (!mapping_.columns[k].unit_assumed || std::abs(column.factor) != 1.0) continue;
+      if (column.channel.unit == "rad") DoubtAngles(k);
+      if (column.channel.unit == "m") DoubtLengths(k);
+    }
+  }
+
+ private:
+  void Warn(int line, int character, std::string message, std::string hint) {
+    Finding finding;
+    finding.severity = Severity::kWarning;
+    finding.file = settings_.file;
+    finding.line = line;
+    finding.column = character;
+    finding.message = std::move(message);
+    finding.hint = std::move(hint);
+    diagnostics_.Add(std::move(finding));
+  }
+
+  // The median step, and whether nearly all are like it.
+  void FindStep() {
+    const std::vector<double>& times = rows_.numbers[0];
+    std::vector<double> steps;
+    for (size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+    std::vector<double> sorted = steps;
+    std::sort(sorted.begin(), sorted.end());
+    step_ = sorted[sorted.size() / 2];
+    // Printed times are off by half a unit each.
+    const std::vector<double> printed = PrintedSteps(times, rows_.digits[0], 0);
+    const double unit = *std::max_element(printed.begin(), printed.end());
+    const auto others = std::count_if(steps.begin(), steps.end(), [&](double step) {
+      return std::abs(step - step_) > kSameStep * step_ + 1.01 * std::min(unit, 0.5 * step_);
+    });
+    regular_ = step_ > 0.0 && static_cast<size_t>(others) * kStepsPerHole <= steps.size();
+  }
+
+  // A row or two may be lost in any log; a spline goes through such gaps.
+  void CheckHoles() {
+    if (!regular_) return;
+    const std::vector<double>& times = rows_.numbers[0];
+    for (size_t i = 1; i < times.size(); ++i) {
+      const double missing = std::round((times[i] - times[i - 1]) / step_) - 1.0;
+      if (missing < kMissing) continue;
+      const double f = mapping_.time_factor;
+      Warn(rows_.lines[i], 1,
+           fmt::format("{:g} rows are missing: the rows are {:g} s apart, but none lies between "
+                       "{:g} and {:g} s",
+                       missing, f * step_, f * times[i - 1], f * times[i]),
+           "what happens there is interpolated; export the whole recording");
+    }
+  }
+
+  [[nodiscard]] std::string TimeName() const {
+    const std::string& name = text_.headings[mapping_.time_index].full;
+    return name.empty() ? fmt::format("column {}", mapping_.time_index + 1) : name;
+  }
+
+  // Seconds of a mechanism's motion are sampled more finely than whole ones.
+  void DoubtTimeUnit() {
+    const std::vector<double>& times = rows_.numbers[0];
+    const bool whole =
+        std::all_of(times.begin(), times.end(), [](double t) { return t == std::round(t); });
+    if (!whole || step_ < kWholeSteps) return;
+    const TableHeading& heading = text_.headings[mapping_.time_index];
+    Warn(heading.line > 0 ? heading.line : rows_.lines.front(), std::max(1, heading.character),
+         fmt::format("{} has no unit, and its whole numbers, {:g} apart up to {:g}, are taken as "
+                     "seconds",
+                     TimeName(), step_, times.back()),
+         "are they milliseconds? state time_unit: ms (or s)");
+  }
+
+  struct Extent {
+    double low = 0.0, high = 0.0;
+    bool returns = false;  // goes much further than from one end to the other
+    [[nodiscard]] double span() const { return high - low; }
+  };
+  [[nodiscard]] Extent ExtentOf(size_t k) const {
+    const std::vector<double>& values = rows_.numbers[k + 1];
+    const auto [low, high] = std::minmax_element(values.begin(), values.end());
+    double path = 0.0;
+    for (size_t i = 1; i < values.size(); ++i) path += std::abs(values[i] - values[i - 1]);
+    return {*low, *high, path > 1.5 * (*high - *low)};
+  }
+
+  void DoubtUnit(size_t k, const Extent& extent, const char* taken, const std::string& reason,
+                 const char* hint) {
+    const MappedColumn& mapped = mapping_.columns[k];
+    const TableHeading& heading = text_.headings[mapped.index];
+    Warn(heading.line > 0 ? heading.line : rows_.lines.front(), std::max(1, heading.character),
+         fmt::format("{} has no unit, and its numbers from {:g} to {:g} are taken as {}: {}",
+                     mapped.column.heading, extent.low, extent.high, taken, reason),
+         hint);
+  }
+
+  void DoubtAngles(size_t k) {
+    constexpr double kTurn = 2.0 * std::numbers::pi;
+    const Extent extent = ExtentOf(k);
+    const auto multiple = [](double x, double of) {
+      return std::abs(x - of * std::round(x / of)) <= 1e-6 * of;
+    };
+    // Round numbers of degrees that are far from round in radians.
+    const bool round = extent.span() >= 30.0 && multiple(extent.low, 15.0) &&
+                       multiple(extent.high, 15.0) &&
+                       (extent.returns || multiple(extent.span(), 90.0));
+    const bool back = extent.returns && extent.span() > 4.0 * kTurn;
+    if (!round && !back) return;
+    DoubtUnit(
+        k, extent, "radians",
+        fmt::format("{:.3g} turns{}", extent.span() / kTurn, extent.returns ? " to and fro" : ""),
+        "are they degrees? state unit: deg (or rad)");
+  }
+
+  void DoubtLengths(size_t k) {
+    constexpr double kTimes = 50.0;
+    const Extent extent = ExtentOf(k);
+    const double size = CharacteristicLength(mechanism_);
+    if (!(extent.span() > kTimes * size)) return;
+    DoubtUnit(k, extent, "metres",
+              fmt::format("{:.3g} times the size of {}, {:.2g} m", extent.span() / size,
+                          mechanism_.name, size),
+              "are they millimetres? state unit: mm (or m)");
+  }
+
+  static constexpr double kSameStep = 0.05;  // of the median step
+  static constexpr size_t kStepsPerHole = 20;
+  static constexpr double kMissing = 3.0;     // rows
+  static constexpr double kWholeSteps = 2.0;  // seconds
+
+  const TableText& text_;
+  const TableSettings& settings_;
+  const TableMapping& mapping_;
+  const RowReader& rows_;
+  const Mechanism& mechanism_;
+  Diagnostics& diagnostics_;
+  double step_ = kNan;
+  bool regular_ = false;
 };
 
 // The largest digit count that a telling column shows; columns of constants borrow it.
@@ -502,6 +705,7 @@ std::shared_ptr<const ReferenceTable> LoadTableText(const std::string& text,
   if (!rows.ok() || mapping.columns.empty() || yaml->has_errors() || diagnostics->has_errors()) {
     return nullptr;
   }
+  Plausibility(*cut, settings, mapping, rows, mechanism, diagnostics).Check();
   return MakeTable(settings, std::move(mapping), rows);
 }
 
