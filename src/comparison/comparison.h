@@ -178,6 +178,7 @@ struct WitnessMetrics {
   std::map<Metric, Measured> metrics;
   std::optional<EnergyAudit> energy = {};
   std::string derivatives_gap = {};  ///< why rates were not checked against positions; "" if so
+  std::string unresolved = {};       ///< see UnresolvedBySamples(); "" of tables
 };
 
 struct CheckResult {

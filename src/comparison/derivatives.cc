@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "comparison/force_band.h"
 #include "comparison/force_scale.h"
 
 namespace mbv {
@@ -210,6 +211,50 @@ std::vector<DriveColumns> FindColumns(const Mechanism& mechanism, const Trace& t
   return all;
 }
 
+// Whether the values between samples follow from them: midpoints by four and by six samples differ
+// by less than kUnresolved of the RMS value at most of them, which takes about six samples per
+// oscillation of this signal. Below `negligible` nothing is to be resolved.
+bool IsResolved(const VecX& values, double negligible) {
+  constexpr Eigen::Index kHalf = 3;  // samples to either side of a midpoint
+  if (!values.allFinite()) return true;
+  const double allowed = kUnresolved * std::max(mbv::Rms(values), negligible);
+  Eigen::Index resolved = 0, all = 0;
+  for (Eigen::Index i = kHalf - 1; i + kHalf < values.size(); ++i, ++all) {
+    const auto pair = [&](Eigen::Index k) { return values[i - k] + values[i + 1 + k]; };
+    const double by_four = (9.0 * pair(0) - pair(1)) / 16.0;
+    const double by_six = (150.0 * pair(0) - 25.0 * pair(1) + 3.0 * pair(2)) / 256.0;
+    if (std::abs(by_six - by_four) <= allowed) ++resolved;
+  }
+  return static_cast<double>(resolved) >= kJudged * static_cast<double>(all);
+}
+
+// A power oscillates twice as fast as the motion, and a force may oscillate without it.
+std::string UnresolvedForces(const ComparisonInput& input, const Trace& trace) {
+  const Mechanism& mechanism = *input.mechanism;
+  std::string forces, powers;
+  const auto add = [](const std::string& name, std::string* list) {
+    *list += (list->empty() ? "" : ", ") + name;
+  };
+  for (const Drive& drive : mechanism.drives) {
+    const int force = trace.Find(Quantity::kForce, drive.name);
+    const int velocity = trace.Find(Quantity::kVelocity, drive.name);
+    if (force < 0 || velocity < 0) continue;
+    const VecX values = ForceSignal(trace, force).Worst();
+    const std::string& unit = trace.channels[static_cast<size_t>(force)].unit;
+    const double least = ForceScaleOf(input, trace).Floor(unit);
+    const double rest = RestFloorOf(input, PositionUnit(mechanism, drive), trace).velocity;
+    const VecX power = values.cwiseProduct(trace.values.col(velocity));
+    if (!IsResolved(values, least)) {
+      add(drive.name, &forces);
+    } else if (!IsResolved(power, rest * std::max(least, mbv::Rms(values)))) {
+      add(drive.name, &powers);
+    }
+  }
+  if (!forces.empty()) return "the samples do not resolve the force of " + forces;
+  if (!powers.empty()) return "the samples do not resolve the power of " + powers;
+  return "";
+}
+
 }  // namespace
 
 void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out) {
@@ -248,16 +293,17 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
 }
 
 std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace) {
-  constexpr double kSixPerOscillation = std::numbers::pi / 3.0;
+  constexpr double kTwelvePerOscillation = std::numbers::pi / 6.0;  // six of a power
   if (trace.time_s.size() < 2) return "";
   if (trace.time_s.size() < 2 * kReach + 1) {
     const double h = trace.time_s[1] - trace.time_s[0];
-    if (LargestPhase(*input.mechanism, *input.motion, h) <= kSixPerOscillation) return "";
+    if (LargestPhase(*input.mechanism, *input.motion, h) <= kTwelvePerOscillation) return "";
     return "the samples are too far apart for a motion so fast";
   }
   WitnessMetrics metrics;
   MeasureDerivatives(input, trace, &metrics);
-  return metrics.derivatives_gap;
+  if (!metrics.derivatives_gap.empty()) return metrics.derivatives_gap;
+  return UnresolvedForces(input, trace);
 }
 
 }  // namespace mbv

@@ -14,9 +14,10 @@ namespace mbv {
 /// `derivatives_gap` says why drives were not judged.
 void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, WitnessMetrics* out);
 
-/// Why the samples of a trace do not resolve the motion, by the same formulas: peaks, means,
-/// energies and margins over them then say nothing. "" where they do. Samples too few for the
-/// formulas are judged by the commands alone: fewer than six per oscillation.
+/// Why the samples of a trace do not resolve the motion (by the same formulas) or the forces and
+/// powers of drives (midpoints by four and by six samples disagree): peaks, means, energies and
+/// margins over them then mean nothing. "" where they do. Samples too few for the formulas are
+/// judged by the commands alone: fewer than twelve per oscillation, six of a power.
 [[nodiscard]] std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace);
 
 }  // namespace mbv

@@ -208,6 +208,18 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
          "nothing was verified";
 }
 
+Caveat LeftOutCaveat(const std::string& text) {
+  return {
+      .kind = CaveatKind::kLeftOut, .of = {"mechanism"}, .text = "not the whole robot: " + text};
+}
+
+Caveat MissingWitnessCaveat(const std::string& witness, WitnessGap gap, const std::string& why) {
+  return {.kind = CaveatKind::kWitnessMissing,
+          .of = {witness},
+          .text = fmt::format("the witness {}, which nothing was compared with: {}", witness, why),
+          .gap = gap};
+}
+
 std::vector<Caveat> MissingWitnesses(const ComparisonInput& input, const Comparison& comparison) {
   std::vector<Caveat> missing;
   for (const Witness& witness : input.witnesses) {
@@ -217,15 +229,11 @@ std::vector<Caveat> MissingWitnesses(const ComparisonInput& input, const Compari
         });
     const bool asked = witness.foreign || witness.required || witness.gap != WitnessGap::kNone;
     if (!asked || compared) continue;
-    Caveat caveat{.kind = CaveatKind::kWitnessMissing, .of = {witness.name}, .gap = witness.gap};
-    std::string why = witness.summary.message;
-    if (witness.trace != nullptr && witness.summary.ok()) {
-      caveat.gap = WitnessGap::kNoForces;
-      why = WhyNothingInCommon(input, comparison, witness);
-    }
-    caveat.text =
-        fmt::format("the witness {}, which nothing was compared with: {}", witness.name, why);
-    missing.push_back(std::move(caveat));
+    const bool no_forces = witness.trace != nullptr && witness.summary.ok();
+    missing.push_back(
+        no_forces ? MissingWitnessCaveat(witness.name, WitnessGap::kNoForces,
+                                         WhyNothingInCommon(input, comparison, witness))
+                  : MissingWitnessCaveat(witness.name, witness.gap, witness.summary.message));
   }
   return missing;
 }
@@ -258,9 +266,7 @@ std::vector<Caveat> CaveatsOf(const ComparisonInput& input, const Comparison& co
   }
   std::vector<Caveat> all = sentences.Take();
   for (const std::string& text : input.left_out) {
-    all.push_back({.kind = CaveatKind::kLeftOut,
-                   .of = {"mechanism"},
-                   .text = "not the whole robot: " + text});
+    all.push_back(LeftOutCaveat(text));
   }
   if (Caveat coarse = CoarseLimits(input, comparison); !coarse.of.empty()) {
     coarse.text = "limits so wide that they verify nothing: " + coarse.text;

@@ -29,6 +29,12 @@ void MarkBlind(const ComparisonInput& input, Comparison* comparison);
 [[nodiscard]] std::vector<Caveat> CaveatsOf(const ComparisonInput& input,
                                             const Comparison& comparison);
 
+/// Of what acts on forces in a robot's file and is not in the model.
+[[nodiscard]] Caveat LeftOutCaveat(const std::string& text);
+/// Of a witness that gave nothing to compare: "the witness NAME, …".
+[[nodiscard]] Caveat MissingWitnessCaveat(const std::string& witness, WitnessGap gap,
+                                          const std::string& why);
+
 /// Those of witnesses that the scenario has and that nothing was compared with; each names one.
 [[nodiscard]] std::vector<Caveat> MissingWitnesses(const ComparisonInput& input,
                                                    const Comparison& comparison);

@@ -503,6 +503,12 @@ std::string LoadsHtml(const Report& report) {
     html += Shown(JointTable(loads.joints, record.name), false);
   }
   for (const JointLoad& load : loads.joints) open = open || load.not_unique;
+  for (const auto& [witness, why] : loads.unresolved) {
+    html +=
+        Note(Escape(fmt::format("{}: peaks, means and powers between the samples are not known: "
+                                "{}.",
+                                witness, why)));
+  }
   return html +
          Note(std::string("Peak: the value of largest magnitude. RMS and mean are over time. "
                           "Power is force times speed, positive into the mechanism. Reactions "

@@ -188,7 +188,11 @@ Json LoadsJson(const Report& report) {
     json["unique"] = !load.not_unique;
     joints.push_back(std::move(json));
   }
-  return {{"drives", std::move(drives)}, {"joints", std::move(joints)}};
+  Json unresolved = Json::object();
+  for (const auto& [witness, why] : loads.unresolved) unresolved[witness] = why;
+  return {{"drives", std::move(drives)},
+          {"joints", std::move(joints)},
+          {"unresolved", std::move(unresolved)}};
 }
 
 Json SheetsJson(const std::vector<SignalSheet>& sheets) {

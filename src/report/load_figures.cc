@@ -109,6 +109,10 @@ LoadFigures LoadFiguresOf(const Report& report) {
     if (record.summary.ok() && !record.trace.time_s.empty()) ran.push_back(&record);
   }
   LoadFigures loads;
+  for (const WitnessMetrics& witness : report.comparison.witnesses) {
+    if (witness.unresolved.empty()) continue;
+    loads.unresolved.emplace_back(witness.witness, witness.unresolved);
+  }
   for (const std::string& drive : report.drives) {
     for (const WitnessRecord* record : ran) {
       DriveLoad load = DriveLoadOf(*record, drive);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "report/report.h"
@@ -38,6 +39,9 @@ struct JointLoad {
 struct LoadFigures {
   std::vector<DriveLoad> drives;  ///< by drive in model order, then by witness
   std::vector<JointLoad> joints;  ///< by joint in the order of the traces, then by witness
+  /// Witnesses whose samples do not resolve what they bear, and why: the figures are those of the
+  /// samples alone.
+  std::vector<std::pair<std::string, std::string>> unresolved = {};
 };
 /// Of all witnesses that ran.
 [[nodiscard]] LoadFigures LoadFiguresOf(const Report& report);

@@ -25,7 +25,10 @@ std::string WithUnit(double value, const std::string& unit) {
 
 std::string MarginText(const MotorLoad& load) {
   const double use = load.largest_use();
-  if (std::isnan(use)) return "no limit is stated";
+  if (std::isnan(use)) {
+    if (load.unresolved.empty()) return "no limit is stated";
+    return "no limit is stated; torque, power and energy not known: " + load.unresolved;
+  }
   if (use == 0.0 && load.unresolved.empty()) return "not used at all";
   const std::string margin = fmt::format("{:.3g} ({})", 1.0 / use, load.limited_by());
   if (load.unresolved.empty()) return "margin " + margin;
@@ -136,6 +139,9 @@ std::vector<std::string> SizingLines(const Report& report, bool details) {
     const std::string &t = load->torque_unit, &s = load->speed_unit;
     lines.push_back(fmt::format("motor of {}: {}", load->drive, MarginText(*load)));
     if (!details) continue;
+    if (!load->unresolved.empty()) {
+      lines.push_back("  not known between the samples; at the samples alone:");
+    }
     lines.push_back(fmt::format("  torque: peak {}, RMS {}, mean {}; continuous limit {}",
                                 WithUnit(load->peak_torque, t), WithUnit(load->rms_torque, t),
                                 WithUnit(load->mean_torque, t),
@@ -268,7 +274,8 @@ std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
   }
   for (const MotorEnvelope& e : envelopes) {
     if (e.unresolved.empty()) continue;
-    text += fmt::format("{}: not known between the samples: {}\n", e.drive, e.unresolved);
+    text += fmt::format("{}: torque, power and margin not known between the samples: {}\n", e.drive,
+                        e.unresolved);
   }
   return text;
 }

@@ -64,7 +64,7 @@ bool TooSmall(const Sized& sized, double margin) {
 
 bool IsUnknown(const Sized& sized) {
   return std::any_of(sized.envelopes.begin(), sized.envelopes.end(),
-                     [](const MotorEnvelope& e) { return e.limited && !e.unresolved.empty(); });
+                     [](const MotorEnvelope& e) { return !e.unresolved.empty(); });
 }
 
 int Tell(const SizeArguments& arguments, const Sized& sized, int exit_code) {

@@ -36,11 +36,17 @@ struct Attempt {
   StudyRun run;
 };
 
-// Peaks and means over samples that do not resolve the motion keep a limit or violate it by chance.
-// What compares two witnesses, or closes a loop, is judged at the samples themselves.
+// Peaks, means and margins of motors over samples that do not resolve the motion are chance. What
+// compares two witnesses, or closes a loop, is judged at the samples themselves; so is a last
+// value.
+bool IsOverSamples(const StudyQuantity& quantity) {
+  if (!quantity.is_check()) return quantity.statistic != Statistic::kEnd;
+  return FindMetric(quantity.name)->metric == Metric::kMotorUse;
+}
+
 bool LimitsSamples(const Study& study) {
   return std::ranges::any_of(study.limits, [&](const StudyLimit& limit) {
-    return !study.quantities[limit.quantity].is_check();
+    return IsOverSamples(study.quantities[limit.quantity]);
   });
 }
 
@@ -154,8 +160,16 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
                           "mbverify run shows why");
     return nullptr;
   }
-  const std::string unresolved = LimitsSamples(study) ? UnresolvedBySamples(attempt.run) : "";
-  if (!unresolved.empty()) {
+  const bool over_samples = std::ranges::any_of(study.quantities, IsOverSamples);
+  const std::string unresolved = over_samples ? UnresolvedBySamples(attempt.run) : "";
+  if (!unresolved.empty() && !LimitsSamples(study)) {
+    Finding finding = FindingAt(study, 0, 0, "", "a smaller motion.sample_s resolves it");
+    finding.file = study.scenario;
+    finding.message =
+        "peaks and means are those of the samples alone, with nothing varied: " + unresolved;
+    finding.severity = Severity::kWarning;
+    diagnostics->Add(std::move(finding));
+  } else if (!unresolved.empty()) {
     *exit_code = 3;
     diagnostics->AddError(study.scenario,
                           "limits cannot be judged with nothing varied: " + unresolved,

@@ -19,6 +19,13 @@ class SizeCommand : public testing::Test {
     Write("fast.yaml", Scenario("model.yaml", 1.0));
     Write("slow.yaml", Scenario("model.yaml", 2.0));
     Write("none.yaml", Scenario("bare.yaml", 1.0));
+    Write("geared.yaml", kModel + std::string("motors: {x: {gear_ratio: 1}}\n"));
+    Write("unlimited.yaml", Scenario("geared.yaml", 1.0));
+    Write("shaken_model.yaml",
+          kModel + std::string("loads: {shaker: {kind: force, body: cart, point: [0, 0, 0], "
+                               "force: [\"sin(2*pi*30*t)\", 0, 0]}}\n"
+                               "motors: {x: {continuous: 60, peak: 100}}\n"));
+    Write("shaken.yaml", Scenario("shaken_model.yaml", 1.0));
   }
   static constexpr const char* kModel =
       "name: cart\nbodies: {cart: {mass: 2, inertia: [1, 1, 1]}}\n"
@@ -66,7 +73,9 @@ TEST_F(SizeCommand, AMarginOverSamplesThatResolveNothingIsNotKnown) {
   const std::string coarse = " --set motion.sample_s=0.4";
   const ProgramResult sized = mbverify("size " + File("fast.yaml") + coarse);
   EXPECT_EQ(sized.exit_code, 3) << sized.out << sized.err;
-  EXPECT_NE(sized.out.find("x: not known between the samples: fast: the samples are too far apart"),
+  EXPECT_NE(sized.out.find(
+                "x: torque, power and margin not known between the samples: fast: the samples are "
+                "too far apart"),
             std::string::npos)
       << sized.out;
   const ProgramResult run = mbverify("run " + File("fast.yaml") + coarse + Out());
@@ -86,6 +95,37 @@ TEST_F(SizeCommand, AMarginOverSamplesThatResolveNothingIsNotKnown) {
   const ProgramResult fails =
       mbverify("run " + File("fast.yaml") + coarse + " --set checks.motor_margin=100" + Out());
   EXPECT_EQ(fails.exit_code, 1) << fails.out;
+}
+
+// Eight samples per oscillation show the motion and the torque, four per oscillation not the power:
+// its peak is 0.2 (2π)³ 0.1 / 2 = 2.48 W, the samples' any value down to 70 % of that.
+TEST_F(SizeCommand, APowerThatTheSamplesDoNotResolveIsNotKnown) {
+  for (const char* file : {"fast.yaml", "unlimited.yaml"}) {
+    const ProgramResult coarse = mbverify("size " + File(file) + " --set motion.sample_s=0.125" +
+                                          " --json " + File("size.json"));
+    EXPECT_EQ(coarse.exit_code, 3) << file << coarse.out << coarse.err;
+    EXPECT_NE(coarse.out.find("the samples do not resolve the power of x"), std::string::npos)
+        << coarse.out;
+    EXPECT_FALSE(nlohmann::json::parse(ReadAll(File("size.json")))["motors"][0]["unresolved"]
+                     .get<std::string>()
+                     .empty());
+    const ProgramResult run =
+        mbverify("run " + File(file) + " --sizing" + " --set motion.sample_s=0.125" + Out());
+    EXPECT_EQ(run.exit_code, 0) << run.out;
+    EXPECT_NE(run.out.find("not known between the samples; at the samples alone:"),
+              std::string::npos)
+        << run.out;
+    EXPECT_EQ(mbverify("size " + File(file) + " --set motion.sample_s=0.05").exit_code, 0) << file;
+  }
+}
+
+// A load may oscillate while the motion hardly does.
+TEST_F(SizeCommand, ATorqueThatTheSamplesDoNotResolveIsNotKnown) {
+  const ProgramResult coarse = mbverify("size " + File("shaken.yaml"));
+  EXPECT_EQ(coarse.exit_code, 3) << coarse.out << coarse.err;
+  EXPECT_NE(coarse.out.find("the samples do not resolve the force of x"), std::string::npos)
+      << coarse.out;
+  EXPECT_EQ(mbverify("size " + File("shaken.yaml") + " --set motion.sample_s=0.001").exit_code, 0);
 }
 
 TEST_F(SizeCommand, NeedsMotors) {
