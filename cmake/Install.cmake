@@ -1,5 +1,5 @@
 # `cmake --install`: the program with its models and scenarios, and the package that
-# find_package(mbverify) finds: headers, libraries and mbverify::main.
+# find_package(mbverify) finds: mbverify::mbverify and the headers of what programs may call.
 include(CMakePackageConfigHelpers)
 
 install(TARGETS mbverify COMPONENT runtime)
@@ -26,9 +26,28 @@ add_custom_command(TARGET mbverify POST_BUILD VERBATIM
                            $<TARGET_FILE:mbverify>)
 install(FILES ${CMAKE_BINARY_DIR}/mbverify.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
         COMPONENT runtime)
-install(TARGETS mbv_main EXPORT mbverify ARCHIVE COMPONENT development)
-install(DIRECTORY src/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbverify COMPONENT development
-        FILES_MATCHING PATTERN "*.h")
+install(TARGETS mbverify_library EXPORT mbverify ARCHIVE COMPONENT development)
+target_include_directories(mbverify_library INTERFACE
+                           $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/mbverify>)
+# The public headers with all that they include, and no other.
+set(waiting analytic/register_closed_form.h program.h)
+set(public)
+while(waiting)
+  list(POP_FRONT waiting header)
+  list(APPEND public ${header})
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS
+               ${CMAKE_CURRENT_SOURCE_DIR}/src/${header})
+  file(STRINGS src/${header} includes REGEX "^#include \"")
+  foreach(line ${includes})
+    string(REGEX REPLACE "^#include \"([^\"]+)\".*" "\\1" included ${line})
+    if(NOT included IN_LIST public AND NOT included IN_LIST waiting)
+      list(APPEND waiting ${included})
+    endif()
+  endforeach()
+  get_filename_component(folder ${header} DIRECTORY)
+  install(FILES src/${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbverify/${folder}
+          COMPONENT development)
+endwhile()
 
 set(package ${CMAKE_INSTALL_LIBDIR}/cmake/mbverify)
 install(EXPORT mbverify NAMESPACE mbverify:: FILE mbverify-targets.cmake DESTINATION ${package}

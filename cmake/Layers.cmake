@@ -2,24 +2,19 @@
 # mbv_<room> of src/<room>/**.cc (mbv_features_<product> of a product). LIGHT layers compute nothing per sample or step.
 
 function(mbv_compile_options target)
-  # No fused multiply-add contraction: the same numbers on every machine. The four warnings left out
-  # are wrong in GCC 12 for std::string and Eigen at -O3 (GCC bugs 105651, 105562, 105329).
+  # No fused multiply-add contraction: the same numbers on every machine. No path of the build in
+  # what is built. Warnings as errors, hardening and unity build are the presets' (CMakePresets.json).
   target_compile_options(${target} PRIVATE
-      -Wall -Wextra -Wpedantic -Werror -ffp-contract=off
-      -Wno-restrict -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow)
-  # Broken memory ends the program at once instead of going on with wrong numbers: overwritten stack
-  # frames, indices beyond a container, overlong copies. No path of the build in what is built.
-  target_compile_options(${target} PRIVATE
-      -fstack-protector-strong -ffile-prefix-map=${CMAKE_SOURCE_DIR}/=
-      $<$<CONFIG:Release>:-U_FORTIFY_SOURCE> $<$<CONFIG:Release>:-D_FORTIFY_SOURCE=2>)
-  target_compile_definitions(${target} PRIVATE _GLIBCXX_ASSERTIONS)
+      -Wall -Wextra -Wpedantic -ffp-contract=off -ffile-prefix-map=${CMAKE_SOURCE_DIR}/=)
   # GCC collects its own garbage from 128 MB on, again and again where Eigen's templates fill 1 GB.
   # Without, a quarter of the compiler's time is saved for a fifth more memory (1.2 → 1.4 GB).
+  # The four warnings left out are wrong in GCC 12 for std::string and Eigen at -O3 (GCC bugs 105651,
+  # 105562, 105329).
   if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU")
     target_compile_options(${target} PRIVATE
+        -Wno-restrict -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow
         "SHELL:--param ggc-min-expand=300" "SHELL:--param ggc-min-heapsize=1048576")
   endif()
-  target_link_options(${target} PRIVATE LINKER:-z,relro,-z,now)
 endfunction()
 
 # Code that runs once per file, page or test: -O3 would cost the compiler more than it saves.
@@ -49,13 +44,12 @@ function(mbv_layer room)
     set(scope INTERFACE)
   endif()
   target_include_directories(mbv_${folder} ${scope}
-                             $<BUILD_INTERFACE:${CMAKE_CURRENT_SOURCE_DIR}/src>
-                             $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/mbverify>)
+                             ${CMAKE_CURRENT_SOURCE_DIR}/src)
   target_link_libraries(mbv_${folder} ${scope} ${ARG_DEPS} ${ARG_LIBS})
   target_compile_features(mbv_${folder} ${scope} cxx_std_20)
-  set_target_properties(mbv_${folder} PROPERTIES EXPORT_NAME ${folder})
+  set_property(GLOBAL APPEND PROPERTY MBV_LIBRARIES mbv_${folder})
+  set_property(GLOBAL APPEND PROPERTY MBV_EXTERNAL_LIBRARIES ${ARG_LIBS})
   if(room MATCHES "^features/")
     set(MBV_PRODUCTS ${MBV_PRODUCTS} mbv_${folder} PARENT_SCOPE)
   endif()
-  install(TARGETS mbv_${folder} EXPORT mbverify ARCHIVE COMPONENT development)
 endfunction()

@@ -1,5 +1,5 @@
 #!/bin/sh
-# The built program has the protections of cmake/Layers.cmake, and no path of the machine that built
+# The built program has the protections of CMakePresets.json, and no path of the machine that built
 # it: check_hardening.sh PROGRAM SOURCE_DIR [RELEASE]. Exit code 1 with a line per lack.
 program=$1 folder=$2 release=${3:-1}
 lacks=0

@@ -5,7 +5,7 @@
 //   r /            ‾‾[slider] φ  rod angle: sin φ = −(r/l) sin θ, |φ| < 90°
 //   (θ)------------------→ x  x  slider: r cos θ + l cos φ
 //
-// With one freedom, every coordinate c_j (position of a centre of mass, angle of a body) is a
+// With one DOF, every coordinate c_j (position of a centre of mass, angle of a body) is a
 // function of θ with c_j' = dc_j/dθ and c_j'' = d²c_j/dθ², and virtual work gives
 //
 //   τ = Σ_j w_j c_j' (c_j' θ̈ + c_j'' θ̇²) + g Σ_bodies m y'                                     (1)

@@ -72,7 +72,7 @@ std::vector<Finding> FindUncoveredLoads(const Coverage& coverage, const Mechanis
   return findings;
 }
 
-std::string ReasonToDecline(std::span<const Finding> uncovered) {
+std::string ReasonNotApplicable(std::span<const Finding> uncovered) {
   if (uncovered.empty()) return {};
   std::string text = fmt::format("outside what the equations cover: {}; {}", uncovered[0].message,
                                  uncovered[0].hint);
@@ -128,7 +128,7 @@ class Checker {
     if (concern_ == Concern::kStiffness) {
       for (const AssumedBeam& beam : coverage_.beams) CheckBeam(beam);
     }
-    Strangers();
+    CheckExtraParts();
     return std::move(findings_);
   }
 
@@ -361,7 +361,7 @@ class Checker {
     const std::string subject = "beam " + assumed.name;
     const Beam* beam = Find(mechanism_.beams, assumed.name);
     if (beam == nullptr) {
-      Add(subject + " is missing", "bends it");
+      Add(subject + " is missing", "deforms it");
       return;
     }
     const auto compare = [&](const char* quantity, double actual, double value, const char* unit) {
@@ -382,8 +382,8 @@ class Checker {
     compare("shear modulus", beam->shear_modulus, assumed.shear_modulus, "Pa");
   }
 
-  // What the mechanism has besides.
-  void Strangers() {
+  // What else the mechanism has.
+  void CheckExtraParts() {
     for (size_t b = 1; b < mechanism_.bodies.size(); ++b) {
       const Body& body = mechanism_.bodies[b];
       if (Find(coverage_.bodies, body.name) != nullptr || IsOrnament(static_cast<int>(b))) continue;

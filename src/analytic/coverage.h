@@ -133,7 +133,7 @@ enum class Concern {
                                                       const Mechanism& mechanism,
                                                       const Motion& motion);
 
-/// "declines: <the first finding> (and 3 more)"; "" if there are none.
-[[nodiscard]] std::string ReasonToDecline(std::span<const Finding> uncovered);
+/// "not applicable: <the first finding> (and 3 more)"; "" if there are none.
+[[nodiscard]] std::string ReasonNotApplicable(std::span<const Finding> uncovered);
 
 }  // namespace mbv

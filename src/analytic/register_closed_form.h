@@ -1,5 +1,5 @@
 // Adds closed forms (motion, stiffness, workspace) from outside this source tree: a namespace-scope
-// object in any source file of a program that links mbverify::main.
+// object in any source file of a program that links mbverify::mbverify.
 //
 //   const mbv::ClosedFormRegistration kMine({.mechanism = "my_arm", .models = {"full"},
 //                                            .errata = {}, .factory = &MakeMyArm,

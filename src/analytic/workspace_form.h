@@ -28,7 +28,7 @@ struct WorkspaceRequest {
   int jobs = 1;  ///< processes at once (ShareOut() of base/worker_pool.h): nothing depends on it
   std::function<void(double fraction)> progress = {};
 
-  void Tell(double fraction) const {
+  void Report(double fraction) const {
     if (progress) progress(fraction);
   }
 };

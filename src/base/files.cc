@@ -127,7 +127,7 @@ void SweepTemporaries(const fs::path& folder) {
   for (const fs::path& stale : found) {
     const int file = open(stale.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
     if (file < 0) continue;
-    // Nobody holds the lock of what a killed writer left.
+    // No process holds the lock of what a killed writer left.
     struct stat status {};
     if (fstat(file, &status) == 0 && S_ISREG(status.st_mode) && status.st_uid == geteuid() &&
         flock(file, LOCK_EX | LOCK_NB) == 0) {

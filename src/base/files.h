@@ -1,4 +1,4 @@
-// Files: read whole, written whole or not at all, told apart by fingerprints.
+// Files: read whole, written whole or not at all, distinguished by fingerprints.
 #pragma once
 
 #include <cstdint>
@@ -33,7 +33,7 @@ void SweepTemporaries(const std::filesystem::path& folder);
 /// Makes the entries of a folder durable; best effort, some file systems cannot.
 void SyncFolder(const std::filesystem::path& folder);
 
-/// 64-bit FNV-1a, for telling versions of files apart (no protection against forgery).
+/// 64-bit FNV-1a, for distinguishing versions of files (no protection against forgery).
 class Fingerprint {
  public:
   void Add(const std::string& bytes);  ///< the length counts, so "ab"+"c" is not "a"+"bc"
@@ -46,12 +46,12 @@ class Fingerprint {
 };
 
 /// Regular files below a folder whose names have this ending, sorted; links to folders are not
-/// followed. Folders that cannot be read are told, one line each.
+/// followed. Folders that cannot be read are reported, one line each.
 [[nodiscard]] std::vector<std::string> FilesBelow(const std::filesystem::path& folder,
                                                   const std::string& ending,
                                                   std::vector<std::string>* unread);
 
-/// Makes a new folder that only this user may enter: `prefix` and random letters, which nobody can
+/// Makes a new folder that only this user may enter: `prefix` and random letters, which no one can
 /// lay a link for in advance. Empty, with errno, where none can be made.
 [[nodiscard]] std::filesystem::path MakePrivateFolder(const std::filesystem::path& prefix);
 

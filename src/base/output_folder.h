@@ -24,7 +24,7 @@ inline constexpr const char* kFileList = ".mbverify-files";
 /// folder with ROOT/NAME in one step. What the old folder holds beyond its list (notes, pictures,
 /// results of other scenarios) is in the new one, too; a file of that kind whose name is needed is
 /// refused. Without Commit() the old result stays as it was. What killed runs left is put right by
-/// the next one (it is told by a lock that ends with its process).
+/// the next one (recognised by a lock that ends with its process).
 class OutputFolder {
  public:
   /// `name`: "four_bar/turn".

@@ -60,14 +60,15 @@ inline constexpr Role kSimulated{"simulated",
                                  "MuJoCo",
                                  RoleKind::kEngine,
                                  {&kAnalytic, &kReference, &kSolver, &kReached}};
-/// The simulation pushed by wrong forces: a measure of how errors grow, compared with nothing else.
-inline constexpr Role kBent{"bent", "simulation", "MuJoCo", RoleKind::kEngine, {}};
+/// The simulation driven by perturbed forces: a measure of how errors grow, compared with nothing
+/// else.
+inline constexpr Role kPerturbed{"perturbed", "simulation", "MuJoCo", RoleKind::kEngine, {}};
 
 }  // namespace role
 
 /// In the order in which they run and are shown.
 inline constexpr std::array kRoles = {&role::kAnalytic, &role::kReference, &role::kSimulated,
-                                      &role::kSolver,   &role::kReached,   &role::kBent};
+                                      &role::kSolver,   &role::kReached,   &role::kPerturbed};
 
 /// The row of this name; null for what is no witness.
 [[nodiscard]] constexpr const Role* FindRole(std::string_view name) {
@@ -125,7 +126,7 @@ inline constexpr auto kRolePairs = internal::MakeRolePairs();
   return false;
 }
 
-/// The pairs that a reader looks at first, the most telling one first.
+/// The pairs that a reader looks at first, the most significant one first.
 inline constexpr std::array<RolePair, 4> kMainPairs = {{{&role::kSimulated, &role::kReached},
                                                         {&role::kSimulated, &role::kAnalytic},
                                                         {&role::kSimulated, &role::kReference},

@@ -9,7 +9,7 @@ namespace mbv {
 inline constexpr const char* kStateFolder = ".mbverify";
 
 /// Descriptor of a folder with a lock that ends with this process, or -1 with errno
-/// (EWOULDBLOCK: held by somebody). File systems without locks give the descriptor alone.
+/// (EWOULDBLOCK: held by another process). File systems without locks give the descriptor alone.
 [[nodiscard]] int LockFolder(const std::filesystem::path& folder);
 
 /// Makes ROOT/.mbverify and holds its lock: whoever publishes below ROOT does so one after the

@@ -256,7 +256,7 @@ std::string DidYouMeanPath(const std::string& path, const std::string& otherwise
          !error && entry != fs::directory_iterator(); entry.increment(error)) {
       names.push_back(entry->path().filename().string());
     }
-    std::sort(names.begin(), names.end());  // the file system's order is nobody's
+    std::sort(names.begin(), names.end());  // the file system's order is arbitrary
     const std::string near = ClosestWord(part.string(), names);
     if (near.empty()) return otherwise;
     found /= near;

@@ -65,7 +65,7 @@ namespace mbv {
 [[nodiscard]] std::string DidYouMeanPath(const std::string& path,
                                          const std::string& otherwise = "");
 
-// Commands that are told, to be typed.
+// Commands as shown to users, to be typed.
 
 /// A word of a command line as a shell takes it: in quotes where it must be.
 [[nodiscard]] inline std::string ShellWord(std::string word) {

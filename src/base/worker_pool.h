@@ -53,7 +53,7 @@ struct WorkerPool {
   [[nodiscard]] bool Run(const std::vector<WorkerJob>& jobs) const;
 };
 
-// Work on what strangers wrote, in processes of its own: whatever it does ends a child, not the
+// Work on untrusted input, in processes of its own: whatever it does ends a child, not the
 // night.
 
 /// As many processes as this machine runs at once; at least 1.

@@ -239,7 +239,7 @@ int RunCli(int argc, char** argv, std::span<const CommandRow> commands) {
   }
   if (std::fflush(stdout) != 0) lost = std::strerror(errno);
   if (lost.empty() && std::ferror(stdout) == 0) return exit_code;
-  // Results that nobody can read are not delivered.
+  // Results that no reader takes are not delivered.
   Complain("error: cannot write to standard output" + (lost.empty() ? "" : ": " + lost));
   return 3;
 }

@@ -26,7 +26,8 @@ struct CommandWords {
   std::string path;  ///< "history list"
   std::string description;
   std::vector<OptionWords> options;
-  std::vector<std::string> names;  ///< kinds of names it takes besides files: "models", "scenarios"
+  std::vector<std::string>
+      names;  ///< kinds of names it takes in addition to files: "models", "scenarios"
 };
 
 /// All commands and options that help shows, the program itself first.

@@ -33,8 +33,8 @@ std::string WhyRefused(const std::string& path, const std::vector<InputFile>& in
                      input == path ? "a file" : input);
 }
 
-// How a file's content begins: its format, and in texts the first word, which tells a summary from
-// a model file, or a table from notes.
+// How a file's content begins: its format, and in texts the first word, which distinguishes a
+// summary from a model file, or a table from notes.
 std::string BeginningOf(std::string_view content) {
   for (const auto& [magic, format] : {std::pair<std::string_view, const char*>{"PK\3\4", "ZIP"},
                                       {"\x89PNG", "PNG"},

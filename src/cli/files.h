@@ -19,7 +19,7 @@ struct LoadOptions;
                                                        std::string* trouble);
 
 /// All .yaml files below a folder, sorted; a file stands for itself. Folders that cannot be read
-/// are told, one line each.
+/// are reported, one line each.
 [[nodiscard]] std::vector<std::string> ExpandYaml(const std::string& argument,
                                                   std::vector<std::string>* unread);
 

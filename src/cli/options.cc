@@ -13,7 +13,7 @@ void AddAssemblyOption(CLI::App* command, std::vector<std::string>* texts) {
   command
       ->add_option("--assembly", *texts,
                    "CLOSURE=N: takes the N-th of the ways to close the loops of this closure that "
-                   "are told (repeatable)")
+                   "are reported (repeatable)")
       ->allow_extra_args(false);
 }
 

@@ -61,7 +61,7 @@ void SayText(std::FILE* to, std::string_view text) {
 void FindingPrinter::Print(const Diagnostics& diagnostics) {
   for (const Finding& finding : diagnostics.findings()) {
     const std::string text = ToText(finding);
-    if (told_.insert(text).second) SayText(to_, text + "\n");
+    if (reported_.insert(text).second) SayText(to_, text + "\n");
   }
 }
 

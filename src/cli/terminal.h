@@ -17,7 +17,7 @@ namespace mbv {
 /// `to` is none.
 [[nodiscard]] size_t TerminalColumns(std::FILE* to);
 
-/// A terminal that moves its cursor when told: TERM is not dumb.
+/// A terminal that obeys cursor movements: TERM is not dumb.
 [[nodiscard]] bool ObeysEscapes(std::FILE* to);
 
 /// Colour: such a terminal, and NO_COLOR is not set.
@@ -40,7 +40,7 @@ class FindingPrinter {
 
  private:
   std::FILE* to_;
-  std::set<std::string> told_;
+  std::set<std::string> reported_;
 };
 
 /// One line on stderr that rewrites itself, with the time left; does nothing unless stderr is a

@@ -81,26 +81,26 @@ bool AskForPrograms(const std::string& scenario, const std::vector<std::string>&
 
 int AskForPrograms(const std::vector<std::string>& scenarios, const ScenarioOptions& options,
                    bool trust, bool quiet, ProgramConsent* consent) {
-  std::vector<ProgramList> doubtful;
+  std::vector<ProgramList> untrusted;
   for (const std::string& scenario : scenarios) {
     ProgramList list = ProgramsOf(scenario, options);
     if (list.programs.empty()) continue;
     if (trust) consent->agreed.insert(list.Fingerprint());
     if (!trust && !consent->Allows(list)) {
-      doubtful.push_back(std::move(list));
+      untrusted.push_back(std::move(list));
     } else if (!quiet) {
       ListPrograms(list.scenario, list.Lines());
     }
   }
-  if (doubtful.empty()) return 0;
+  if (untrusted.empty()) return 0;
   if (!CanAsk()) {
     Diagnostics refused;
-    for (const ProgramList& list : doubtful) refused.Add(Refusal(list));
+    for (const ProgramList& list : untrusted) refused.Add(Refusal(list));
     SayText(stderr, refused.Text());
     return 2;
   }
-  for (const ProgramList& list : doubtful) ListPrograms(list.scenario, list.Lines());
-  const std::set<fs::path> folders = FoldersOf(doubtful);
+  for (const ProgramList& list : untrusted) ListPrograms(list.scenario, list.Lines());
+  const std::set<fs::path> folders = FoldersOf(untrusted);
   for (const fs::path& folder : folders) {
     Say(stderr, "[f]rom now on means all scenarios below {}\n", OneLine(folder.string()));
   }
@@ -114,7 +114,7 @@ int AskForPrograms(const std::vector<std::string>& scenarios, const ScenarioOpti
   } else if (answer != 'y' && answer != 'Y') {
     return Refuse("its programs may not run", "");
   }
-  for (const ProgramList& list : doubtful) consent->agreed.insert(list.Fingerprint());
+  for (const ProgramList& list : untrusted) consent->agreed.insert(list.Fingerprint());
   return 0;
 }
 

@@ -162,9 +162,9 @@ Attribution WhyUndecided(const ComparisonInput& input, const Comparison& compari
   if (!third) {
     Attribution energy = internal::AttributeByEnergy(input, comparison, pair, check);
     if (!energy.text.empty()) return energy;
-    return {"", "a third witness would tell which one is wrong" + internal::EnergyHint(comparison)};
+    return {"", "a third witness would show which one is wrong" + internal::EnergyHint(comparison)};
   }
-  return {"", fmt::format("the simulation follows the {} drive motion and cannot tell which is "
+  return {"", fmt::format("the simulation follows the {} drive motion and cannot show which is "
                           "wrong",
                           input.driven_by)};
 }
@@ -537,7 +537,7 @@ Attribution AttributeByEnergy(const ComparisonInput& input, const Comparison& co
   }
   if (!DriftExplains(input, bad, differ)) {
     return {"", text +
-                    "; this is too little to explain the difference: a third witness would tell "
+                    "; this is too little to explain the difference: a third witness would show "
                     "which one is wrong"};
   }
   return {bad.subject, text};
@@ -551,7 +551,7 @@ std::string EnergyHint(const Comparison& comparison) {
   if (const CheckResult* power = PowerBesideTheStep(comparison, *drift)) {
     return drifts + " and " + StepText(*power, *drift);
   }
-  return fmt::format("{}: {} would tell whether simulation.step_s is too coarse", drifts,
+  return fmt::format("{}: {} would show whether simulation.step_s is too coarse", drifts,
                      SmallerStep(*drift));
 }
 
@@ -774,7 +774,7 @@ Attribution AttributeByKinematics(const ComparisonInput& input, const Comparison
   if (opinions.pair == nullptr) {
     return {"", fmt::format("the simulation, driven by the {} drive motion, {}; either that drive "
                             "motion or the simulated model is wrong, and there is no third "
-                            "witness to tell",
+                            "witness to decide",
                             input.driven_by, MissText(*miss))};
   }
   if (!Explains(opinions, *miss)) {

@@ -206,7 +206,7 @@ std::vector<JointError> JointErrors(const ComparisonInput& input, const PairRead
                                    input.reactions_not_unique.end());
   std::vector<JointError> errors;
   for (const Joint& joint : input.mechanism->joints) {
-    if (FreedomsOf(joint.kind) == 6) continue;  // transmits nothing
+    if (DofsOf(joint.kind) == 6) continue;  // transmits nothing
     JointError error{.joint = &joint, .force = {}, .moment = {}};
     for (const Channel& channel : ReactionChannels(joint)) {
       const Columns c = reader.Find(channel.name);

@@ -279,7 +279,7 @@ const Witness* FindBroken(const ComparisonInput& input) {
   return nullptr;
 }
 
-// A table that was given must have been judged, and must be able to tell something.
+// A table that was given must have been judged, and must be able to show errors.
 std::string WhyTableVerifiesNothing(const Comparison& comparison) {
   const TableVerdict& table = *comparison.table;
   if (!table.too_coarse.empty()) return table.too_coarse;
@@ -311,7 +311,7 @@ void FinishTable(const ComparisonInput& input, Comparison* comparison) {
     if (input.table->trace.Find(force) >= 0) continue;
     comparison->not_compared.push_back({force, "it is not in the table"});
   }
-  // The computation that the simulation does not depend on tells more than the simulation.
+  // The computation that the simulation does not depend on says more than the simulation.
   for (const auto& [measured, truth] : {RolePair{&role::kReference, &role::kAnalytic},
                                         {&role::kReference, &role::kSolver},
                                         {&role::kSimulated, &role::kReference}}) {
@@ -431,7 +431,7 @@ const char* ToText(WitnessGap gap) {
     case WitnessGap::kBadAnswer:
       return "bad_answer";
     case WitnessGap::kDeclined:
-      return "declined";
+      return "not applicable";
     case WitnessGap::kNoForces:
       return "no_forces";
   }

@@ -3,9 +3,9 @@
 // Compared are signals with the same channel name at common sample times. Angles are differenced
 // modulo 2π, orientations as log(RᵀR'). A check passes only if its value is a number at or below
 // its limit. The verdict starts as kNotRun and is kAgree only if drive forces of at least one pair
-// of witnesses were compared (trajectories, where freedoms move by given forces) on enough samples
-// and within limits that can tell something, no witness broke down and every check passes. What
-// makes an agreement say less than it seems to is a reservation.
+// of witnesses were compared (trajectories, where DOFs move by given forces) on enough samples
+// and within limits that are sensitive, no witness broke down and every check passes. What
+// makes an agreement say less than it seems to is a caveat.
 #pragma once
 
 #include <map>
@@ -77,8 +77,8 @@ struct ComparisonInput {
   const AlignedTable* table = nullptr;   ///< what the reference is, if it is a table
   const DrivenTwists* twists = nullptr;  ///< TwistsFor() this; found where needed if null
   DriveBy drive_by = DriveBy::kMotion;   ///< what moves the simulation's drives (driven.h)
-  const Trace* bent = nullptr;           ///< force-driven: the same run with bent forces (kBent)
-  double bend = kNan;                    ///< by this share of their RMS
+  const Trace* perturbed = nullptr;      ///< force-driven: the same run with perturbed forces
+  double perturbation = kNan;            ///< by this share of their RMS
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
@@ -189,7 +189,7 @@ struct CheckResult {
   double value = kNan;
   std::optional<double> limit;  ///< empty: switched off in the scenario
   /// Set where `limit` is not the scenario's own but what a table's uncertainty allows, or how far
-  /// bent forces lead.
+  /// perturbed forces set it.
   std::optional<double> stated_limit;
   std::string limit_by;  ///< what `limit` comes from then
   bool pass = false;

@@ -154,7 +154,7 @@ bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& c
   const bool table = input.table != nullptr && check.Involves(role::kReference);
   const bool foreign = IsForeign(input, check.measured) || IsForeign(input, check.truth);
   const bool engine = IsEngine(check.measured) || IsEngine(check.truth);
-  // Pushed drives and servos go where forces lead them.
+  // Force-controlled drives and servos move as forces determine.
   const bool by_forces = input.drive_by != DriveBy::kMotion && engine;
   if (by_forces && metric != Metric::kDerivatives) return false;
   switch (metric) {

@@ -16,7 +16,7 @@ namespace mbv {
 /// True when the commands determine every drive's motion, so that all computations are given it.
 [[nodiscard]] bool GivesAllDriveMotion(const ComparisonInput& input);
 
-/// True when a check compares a drive motion with itself: the simulation's with what it was told
+/// True when a check compares a drive motion with itself: the simulation's with its own command
 /// to follow, or a drive that the scenario commands with its command. Such a check can fail; that
 /// it passes verifies nothing.
 [[nodiscard]] bool ComparesMotionWithItself(const ComparisonInput& input, const CheckResult& check);

@@ -113,7 +113,7 @@ double ForceErrorSeen(const ComparisonInput& input, const Comparison& comparison
     if (!IsEngine(check.measured) || check.truth != input.driven_by || !check.limit) continue;
     if (!IsTrajectory(check.metric) && !IsDriveMotion(check.metric)) continue;
     if (check.value == 0.0) continue;
-    most = std::max(most, UseOf(check) * input.bend);
+    most = std::max(most, UseOf(check) * input.perturbation);
   }
   return most;
 }
@@ -124,8 +124,8 @@ bool IsNothingBeside(double near, double far) { return near * kClearlyFarther <=
 std::string Astray(const ComparisonInput& input, const CheckResult& check) {
   if (!(*check.limit > 0.0)) return "";
   const char* unit = RowOf(check.metric).unit;
-  return fmt::format("; forces bent by {:.0e} would lead it {:.1e}{}{} astray", input.bend,
-                     *check.limit, *unit == '\0' ? "" : " ", unit);
+  return fmt::format("; forces perturbed by {:.0e} would make it deviate by {:.1e}{}{}",
+                     input.perturbation, *check.limit, *unit == '\0' ? "" : " ", unit);
 }
 
 // "drive force, RMS, by 1.2e-04, worst at leg1.force, t = 0.2 s"
@@ -142,13 +142,13 @@ std::string DifferenceText(const CheckResult& check) {
 //   no                  yes                                 the simulation
 //   yes                 no                                  the other, if the simulation could have
 //                                                           seen a force error of that size
-Attribution AttributePushed(const ComparisonInput& input, const Comparison& comparison) {
+Attribution AttributeForceDriven(const ComparisonInput& input, const Comparison& comparison) {
   const std::string& driver = input.driven_by;
   if (comparison.verdict == Verdict::kAgree) {
     const CheckResult* worst = WorstPlace(input, comparison);
     if (worst == nullptr) return {};
     return {"",
-            fmt::format("pushed by the {} forces in open loop for {:g} s, the simulation stays "
+            fmt::format("driven by the {} forces in open loop for {:g} s, the simulation stays "
                         "within {} of the commanded motion{}",
                         driver, input.motion->duration_s, Amount(*worst), Astray(input, *worst))};
   }
@@ -159,13 +159,13 @@ Attribution AttributePushed(const ComparisonInput& input, const Comparison& comp
   const std::string name = internal::NameOf(comparison, other);
   if (leaves != nullptr) {
     const std::string text = fmt::format(
-        "pushed by the {} forces, the simulation leaves the commanded motion: {} {} at "
+        "driven by the {} forces, the simulation leaves the commanded motion: {} {} at "
         "{}{}",
         driver, RowOf(leaves->metric).title, Amount(*leaves),
         internal::Place(leaves->channel, leaves->time_s), Astray(input, *leaves));
     if (other.empty()) {
       return {"", text +
-                      "; a third witness would tell whether the forces or the simulated model "
+                      "; a third witness would show whether the forces or the simulated model "
                       "are wrong"};
     }
     if (differ == nullptr) {
@@ -189,12 +189,12 @@ Attribution AttributePushed(const ComparisonInput& input, const Comparison& comp
   const double size = IsDriveForce(differ->metric) && rms != nullptr ? rms->value : differ->value;
   const bool confirms = IsNothingBeside(seen, size) || std::isnan(size);
   if (!confirms) {
-    return {"", fmt::format("{}; the simulation, pushed by the {} forces, stays within its limits: "
+    return {"", fmt::format("{}; the simulation, driven by the {} forces, stays within its limits: "
                             "it does not resolve a difference so small",
                             text, driver)};
   }
   return {other,
-          fmt::format("{}; the simulation, pushed by the {} forces, stays on the commanded motion: "
+          fmt::format("{}; the simulation, driven by the {} forces, stays on the commanded motion: "
                       "forces wrong by {:.1e} would lead it as far off as it is",
                       text, driver, seen),
           Attribution::Split{.agree = {role::kSimulated.name, driver},
@@ -205,7 +205,7 @@ Attribution AttributePushed(const ComparisonInput& input, const Comparison& comp
                              .unit = RowOf(differ->metric).unit}};
 }
 
-// Judged both between the two computations and on the motion that servos reached, what is told
+// Judged both between the two computations and on the motion that servos reached, what is reported
 // apart there: drive forces, else reactions.
 constexpr Metric kOfForces[] = {Metric::kForceNrmse, Metric::kForceOwn,    Metric::kForceMax,
                                 Metric::kReaction,   Metric::kReactionOwn, Metric::kBaseForce};
@@ -243,7 +243,7 @@ Attribution AttributeServo(const Comparison& comparison) {
         "on the motion that the servos reached, simulation and reference {}",
         Failed(reached) ? "differ in " + DifferenceText(*reached) : "agree to " + Amount(*reached));
     if (computed == nullptr) {
-      return {"", there + "; a third witness would tell which one is wrong"};
+      return {"", there + "; a third witness would show which one is wrong"};
     }
     const std::string text =
         fmt::format("{}; on the commanded motion analytic and reference {}", there,
@@ -304,7 +304,7 @@ std::map<Metric, double> GrowthLimits(const ComparisonInput& input, const Trace&
   std::map<Metric, double> limits;
   if (input.drive_by != DriveBy::kForces) return limits;
   PairComparison growth;
-  if (input.bent != nullptr) growth = ComparePair(input, *input.bent, simulated);
+  if (input.perturbed != nullptr) growth = ComparePair(input, *input.perturbed, simulated);
   for (const MetricRow& row : MetricRows()) {
     if (!IsMotion(row.metric)) continue;
     const auto found = growth.metrics.find(row.metric);
@@ -317,13 +317,13 @@ std::map<Metric, double> CommandGrowth(const ComparisonInput& input,
                                        const WitnessMetrics& simulated) {
   std::map<Metric, double> limits;
   if (input.drive_by != DriveBy::kForces) return limits;
-  WitnessMetrics bent;
-  if (input.bent != nullptr) bent = MeasureWitness(input, *input.bent);
+  WitnessMetrics perturbed;
+  if (input.perturbed != nullptr) perturbed = MeasureWitness(input, *input.perturbed);
   for (const auto& [metric, measured] : simulated.metrics) {
     if (!IsCommand(metric)) continue;
-    const auto found = bent.metrics.find(metric);
+    const auto found = perturbed.metrics.find(metric);
     limits[metric] =
-        found == bent.metrics.end() ? kNan : std::abs(found->second.value - measured.value);
+        found == perturbed.metrics.end() ? kNan : std::abs(found->second.value - measured.value);
   }
   return limits;
 }
@@ -338,7 +338,7 @@ void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckRes
   } else if (growth != other.growth.end()) {
     check->stated_limit = check->limit;
     check->limit = growth->second;
-    check->limit_by = fmt::format("forces bent by {:.0e}", input.bend);
+    check->limit_by = fmt::format("forces perturbed by {:.0e}", input.perturbation);
   }
 }
 
@@ -367,7 +367,8 @@ bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
 std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& comparison) {
   constexpr double kMost = 1e-2;  // of a radian or of the characteristic length
   if (input.drive_by != DriveBy::kForces) return "";
-  if (input.bent == nullptr) return "the run with bent forces failed, so errors have no measure";
+  if (input.perturbed == nullptr)
+    return "the run with perturbed forces failed, so errors have no measure";
   const double length_m = CharacteristicLength(*input.mechanism);
   for (const CheckResult& check : comparison.checks) {
     if (!check.limit || !IsTrajectory(check.metric)) continue;
@@ -375,9 +376,9 @@ std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& co
     const double size = *RowOf(check.metric).unit == 'm' ? length_m : 1.0;
     if (!(*check.limit > kMost * size)) continue;  // one that is no number fails its check
     return fmt::format(
-        "{:g} s are too long to push this mechanism in open loop: forces bent by "
+        "{:g} s are too long to drive this mechanism in open loop: forces perturbed by "
         "{:.0e} lead it {:.2g} {} astray",
-        input.motion->duration_s, input.bend, *check.limit, RowOf(check.metric).unit);
+        input.motion->duration_s, input.perturbation, *check.limit, RowOf(check.metric).unit);
   }
   return "";
 }
@@ -386,7 +387,7 @@ Attribution AttributeDriven(const ComparisonInput& input, const Comparison& comp
   if (input.motion->free()) return {};
   switch (input.drive_by) {
     case DriveBy::kForces:
-      return AttributePushed(input, comparison);
+      return AttributeForceDriven(input, comparison);
     case DriveBy::kServos:
       return AttributeServo(comparison);
     case DriveBy::kMotion:

@@ -1,8 +1,8 @@
-// Judging simulations whose drives are pushed by given forces or follow servos.
+// Judging simulations whose drives exert given forces (open loop) or follow servos.
 //
 // * Force-driven: the drive forces of the simulation are another witness' own, so the motion is
 //   judged. In open loop errors grow by themselves: the limit of every metric of motion is how far
-//   the same run leads when its forces are bent by ComparisonInput::bend of their RMS.
+//   the same run leads when its forces are perturbed by ComparisonInput::perturbation of their RMS.
 // * Servo: the forces are judged by the reference evaluated on the motion that was reached (witness
 //   kReached). Against what is commanded they differ by what the servo's error costs: reported,
 //   and judged where the scenario states a limit (column `servo`).
@@ -23,7 +23,7 @@ namespace mbv {
 [[nodiscard]] LimitColumn ColumnOfPair(const ComparisonInput& input, const std::string& measured,
                                        const std::string& truth);
 
-/// Per metric of motion, how far the bent forces lead `simulated` astray; empty unless
+/// Per metric of motion, how far `simulated` deviates under perturbed forces; empty unless
 /// force-driven.
 [[nodiscard]] std::map<Metric, double> GrowthLimits(const ComparisonInput& input,
                                                     const Trace& simulated);
@@ -40,8 +40,9 @@ namespace mbv {
 
 /// Limits that do not come from the scenario.
 struct OtherLimits {
-  std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
-  std::map<Metric, double> growth;  ///< where bent forces lead: counts instead of the limit
+  std::map<Metric, double> tubes;  ///< a table's own uncertainty: the wider of it and the limit
+  std::map<Metric, double>
+      growth;  ///< deviation under perturbed forces: counts instead of the limit
 };
 void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check);
 
@@ -51,7 +52,7 @@ void LeaveOutReachedMotion(PairComparison* pair);
 /// Whether a check counts as evidence of what the simulation is for.
 [[nodiscard]] bool IsEvidence(const ComparisonInput& input, const CheckResult& check);
 
-/// Why the horizon of a force-driven run is too long to tell anything; "" if it is not.
+/// Why the horizon of a force-driven run is too long for a judgement; "" if it is not.
 [[nodiscard]] std::string WhyHorizonTooLong(const ComparisonInput& input,
                                             const Comparison& comparison);
 

@@ -195,10 +195,10 @@ class Scales {
       const double all = mechanism_.gravity_W.norm() * v.norm();
       acts_ = acts_ || (IsCompared(k) && body.mass > 0.0 && weight > kRoundoff * all);
     }
-    const double pushed = std::max({LoadWork(k), SpringWork(k), ElementWork(k)});
-    acts_ = acts_ || (IsCompared(k) && pushed > 0.0);
+    const double applied = std::max({LoadWork(k), SpringWork(k), ElementWork(k)});
+    acts_ = acts_ || (IsCompared(k) && applied > 0.0);
     const double crossed = k >= mechanism_.drives.size() ? CrossWork(k) : 0.0;
-    scale_.driven[k] = std::max({largest, pushed, crossed});
+    scale_.driven[k] = std::max({largest, applied, crossed});
     if (IsCompared(k)) {
       double& of_unit = scale_.of_unit[ForceUnit(mechanism_, mechanism_.drives[k])];
       of_unit = std::max(of_unit, scale_.driven[k]);

@@ -204,7 +204,8 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
     return fmt::format("every {} limit is so wide that it verifies nothing: {}", what,
                        CoarseLimits(input, comparison).text);
   }
-  return "nothing moves, weighs or pushes: the drive forces vanish whatever the masses are, so "
+  return "nothing moves, weighs or exerts a force: the drive forces vanish whatever the masses "
+         "are, so "
          "nothing was verified";
 }
 

@@ -261,7 +261,8 @@ class Diagnosis {
             columns, channel, finding.offset, series_[k].unit, Left(k));
       case Explanation::Kind::kEither:
         return fmt::format(
-            "{} is {:.6g} times {}, or {} with {:.6g} {} added: {} varies too little to tell them "
+            "{} is {:.6g} times {}, or {} with {:.6g} {} added: {} varies too little to "
+            "distinguish them "
             "apart ({})",
             columns, finding.factor, channel, channel, finding.offset, series_[k].unit, channel,
             Left(k));

@@ -12,7 +12,7 @@
 namespace mbv {
 
 /// Explanations for the columns that leave their tube against `other`, each with the entry of the
-/// scenario that would mend it. An explanation must take away at least 90 % of the difference.
+/// scenario that would correct it. An explanation must take away at least 90 % of the difference.
 [[nodiscard]] std::vector<std::string> DiagnoseTable(const ComparisonInput& input,
                                                      const Trace& other,
                                                      const std::vector<TableColumnResult>& columns);

@@ -68,10 +68,10 @@ Shared Share(const AlignedTable& table, const Trace& other) {
 }
 
 // The trace that differs from `truth` by the uncertainty.
-Trace Bent(const Trace& truth, const MatX& uncertainty) {
-  Trace bent = truth;
-  bent.values += uncertainty;
-  return bent;
+Trace Perturbed(const Trace& truth, const MatX& uncertainty) {
+  Trace perturbed = truth;
+  perturbed.values += uncertainty;
+  return perturbed;
 }
 
 // Limits of a scenario in a column's own unit; empty where they are switched off.
@@ -220,8 +220,8 @@ std::map<Metric, double> TubeLimits(const ComparisonInput& input, const Trace& o
   const Trace& truth = table_is_truth ? shared.table : shared.other;
   ComparisonInput plain = input;
   plain.table = nullptr;
-  const PairComparison rms = ComparePair(plain, Bent(truth, shared.standard), truth);
-  const PairComparison max = ComparePair(plain, Bent(truth, shared.bound), truth);
+  const PairComparison rms = ComparePair(plain, Perturbed(truth, shared.standard), truth);
+  const PairComparison max = ComparePair(plain, Perturbed(truth, shared.bound), truth);
   std::map<Metric, double> tubes;
   const auto take = [&](const PairComparison& pair, Metric metric) {
     const auto found = pair.metrics.find(metric);

@@ -20,7 +20,7 @@ namespace mbv {
 [[nodiscard]] bool IsTable(const ComparisonInput& input, const std::string& witness);
 
 /// k · (the value of each metric that the table's uncertainty would cause) against `other`;
-/// `truth` tells which of the two is the pair's truth.
+/// `truth` says which of the two is the pair's truth.
 [[nodiscard]] std::map<Metric, double> TubeLimits(const ComparisonInput& input, const Trace& other,
                                                   bool table_is_truth);
 

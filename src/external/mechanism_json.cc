@@ -94,7 +94,7 @@ class Writer {
 
   [[nodiscard]] Json JointJson(const Joint& joint) const {
     Json home = Json::array(), range = Json::array();
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
       home.push_back(joint.home[static_cast<size_t>(c)]);
       range.push_back(RangeJson(joint.range[static_cast<size_t>(c)]));
     }
@@ -245,10 +245,10 @@ std::vector<JsonFinding> SchemaFindings(const Value& json) {
     const bool covered = std::any_of(all.begin(), all.end(), [&](const JsonFinding& other) {
       return IsBelow(other.path, finding.path);
     });
-    const bool told = std::any_of(deepest.begin(), deepest.end(), [&](const JsonFinding& other) {
-      return other.path == finding.path;
-    });
-    if (!covered && !told) deepest.push_back(finding);
+    const bool reported =
+        std::any_of(deepest.begin(), deepest.end(),
+                    [&](const JsonFinding& other) { return other.path == finding.path; });
+    if (!covered && !reported) deepest.push_back(finding);
   }
   return deepest;
 }

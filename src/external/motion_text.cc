@@ -25,17 +25,17 @@ void AddNumbers(const Vec3& v, std::string* text) {
 
 std::string MotionCsv(const Mechanism& mechanism, const HandedMotion& motion) {
   const std::vector<std::string> names = DrivenNames(mechanism);
-  const auto told = [&](size_t k) { return motion.told.empty() || motion.told[k]; };
+  const auto commanded = [&](size_t k) { return motion.commanded.empty() || motion.commanded[k]; };
   std::string text = "time_s";
   for (size_t k = 0; k < names.size(); ++k) {
-    if (told(k)) text += fmt::format(",{0}.position,{0}.velocity,{0}.acceleration", names[k]);
+    if (commanded(k)) text += fmt::format(",{0}.position,{0}.velocity,{0}.acceleration", names[k]);
   }
   text += '\n';
   for (size_t i = 0; i < motion.time_s.size(); ++i) {
     text += fmt::format("{:.17g}", motion.time_s[i]);
     const DrivenSample& driven = motion.driven[i];
     for (size_t k = 0; k < names.size(); ++k) {
-      if (!told(k)) continue;
+      if (!commanded(k)) continue;
       const auto d = static_cast<Eigen::Index>(k);
       AddNumbers({driven.position[d], driven.velocity[d], driven.acceleration[d]}, &text);
     }

@@ -14,12 +14,12 @@
 
 namespace mbv {
 
-/// What a foreign witness is told of a motion.
+/// What an external solver gets of a motion.
 struct HandedMotion {
   std::vector<double> time_s;
   std::vector<DrivenSample> driven;            ///< per sample: drives, then prescribed joints
   std::vector<std::vector<LoadSample>> loads;  ///< per sample, in the order of the scenario
-  std::vector<bool> told = {};                 ///< per entry of `driven`; empty: all are commanded
+  std::vector<bool> commanded = {};            ///< per entry of `driven`; empty: all are commanded
   std::vector<int> forced = {};                ///< drives whose force is given (free motion)
   std::vector<std::vector<Jet>> forces = {};   ///< per sample and entry of `forced`
 };
@@ -33,7 +33,7 @@ struct HandedMotion {
 [[nodiscard]] std::string LoadsCsv(const Mechanism& mechanism, const HandedMotion& motion);
 
 /// time_s, then DRIVE.force, DRIVE.force_rate, DRIVE.force_acceleration (its first and second
-/// derivative) of every drive that pushes with a given force.
+/// derivative) of every drive that exerts a given force.
 [[nodiscard]] std::string ForcesCsv(const Mechanism& mechanism, const HandedMotion& motion);
 
 /// One row per body at t = 0: body, px, py, pz (of its origin), R11, R12 … R33 (row by row), wx,

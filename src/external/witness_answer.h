@@ -1,6 +1,6 @@
 // What a foreign witness gives back: witness.json and traces.csv (docs/how-to/external_solvers.md).
 //
-// A stranger wrote both: whatever is wrong with them is a sentence about the witness, never an
+// Both are untrusted input: whatever is wrong with them is a sentence about the witness, never an
 // error of the scenario.
 #pragma once
 
@@ -23,7 +23,7 @@ struct WitnessAnswer {
   std::string method;   ///< what computes, one sentence; may be empty
   std::string refused;  ///< why it does not compute this case; "" if it does
   std::vector<std::pair<std::string, std::string>> declined;  ///< what it leaves out, and why
-  double compute_s = kNan;  ///< wall time of its computation alone, by itself; NaN: not told
+  double compute_s = kNan;  ///< wall time of its computation alone, by itself; NaN: not stated
 };
 
 /// Empty, with one sentence of trouble, for what is no such file.

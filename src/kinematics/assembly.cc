@@ -64,8 +64,8 @@ class GroupSolver {
  public:
   GroupSolver(const PartOfTree& part, const std::vector<bool>& locked)
       : m_(part.mechanism), length_(part.length), tree_(m_, locked) {
-    unit_.resize(tree_.freedoms());
-    for (int c = 0; c < tree_.freedoms(); ++c) unit_[c] = tree_.angular()[c] ? 1.0 : length_;
+    unit_.resize(tree_.dofs());
+    for (int c = 0; c < tree_.dofs(); ++c) unit_[c] = tree_.angular()[c] ? 1.0 : length_;
   }
 
   [[nodiscard]] Closed Run(const JointCoordinates& start) const {
@@ -120,7 +120,7 @@ class GroupSolver {
       rows += gaps.back().residual.size();
     }
     VecX r(rows);
-    J->resize(rows, tree_.freedoms());
+    J->resize(rows, tree_.dofs());
     Eigen::Index at = 0;
     for (size_t k = 0; k < gaps.size(); ++k) {
       const Eigen::Index n = gaps[k].residual.size();
@@ -212,7 +212,7 @@ class AssemblySearch {
     for (const int j : part_.mechanism.tree_joints) {
       if (locked[j]) continue;
       const Joint& joint = part_.mechanism.joints[j];
-      for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      for (int c = 0; c < DofsOf(joint.kind); ++c) {
         const double step = uniform(*random) * (IsLength(joint.kind, c) ? 0.5 * part_.length : 1.0);
         q[j][c] = std::clamp(q[j][c] + step, joint.range[c].lower, joint.range[c].upper);
       }
@@ -391,7 +391,7 @@ std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& foun
   std::vector<std::pair<double, size_t>> moved;
   for (size_t k = 0; k < found.group.joints.size(); ++k) {
     const Joint& joint = mechanism.joints[found.group.joints[k]];
-    if (FreedomsOf(joint.kind) == 0) continue;
+    if (DofsOf(joint.kind) == 0) continue;
     double most = std::abs(found.assemblies.front().q[k][0] - joint.guess[0]);
     for (const Assembly& way : found.assemblies) {
       most = std::max(most, std::abs(way.q[k][0] - found.assemblies.front().q[k][0]));
@@ -405,7 +405,7 @@ std::string AssemblyText(const Mechanism& mechanism, const GroupAssemblies& foun
     for (const auto& [change, k] : moved) {
       const Joint& joint = mechanism.joints[found.group.joints[k]];
       std::string values;
-      for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      for (int c = 0; c < DofsOf(joint.kind); ++c) {
         values += fmt::format("{}{:.4g}", c == 0 ? "" : " ", way.q[k][c]);
       }
       text += fmt::format("{}{} = {}", text.empty() ? "" : ", ", joint.name, values);

@@ -20,7 +20,7 @@ VecX ClosureResidual(const Mechanism& mechanism, const TreeMotion& tree, const B
   VecX r(count + static_cast<Eigen::Index>(coupled.size()));
   MatX J_bodies;
   if (J != nullptr) {
-    J->setZero(r.size(), tree.freedoms());
+    J->setZero(r.size(), tree.dofs());
     J_bodies = tree.Jacobian(states);
   }
   int at = 0;

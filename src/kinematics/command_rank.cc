@@ -50,7 +50,7 @@ std::vector<std::string> MovingJoints(const Mechanism& mechanism, const BodyStat
   if (motion.cols() == 0) return names;
   for (const Joint& joint : mechanism.joints) {
     RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
       stack.Add(JointCoordinateRow(joint, c, states), IsLength(joint.kind, c));
     }
     if (stack.size() == 0) continue;
@@ -68,12 +68,12 @@ CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>&
   const auto held_rows = rows.size();
   const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
   CommandRank out;
-  out.freedoms = columns - RankOf(rows.Matrix());
+  out.dofs = columns - RankOf(rows.Matrix());
   for (const Command& command : commands) AddCommand(mechanism, home, command, &rows);
   const internal::SparseRows J = rows.Matrix();
 
   out.undriven = columns - RankOf(J);
-  out.redundant = static_cast<int>(commands.size()) - (out.freedoms - out.undriven);
+  out.redundant = static_cast<int>(commands.size()) - (out.dofs - out.undriven);
   if (out.undriven > 0) {
     const MatX motion = FindRank(J, NullSpaces::kMotion).motion;
     out.free_joints = MovingJoints(mechanism, home, motion);
@@ -122,9 +122,8 @@ CoordinateChoice ChooseCoordinates(const Mechanism& mechanism,
   constexpr double kIndependent = 1e-5;  // share of a gradient that others do not hold
   const BodyStates home = HomeStates(mechanism);
   const MatX motion = FindRank(HeldRows(mechanism, home).Matrix(), NullSpaces::kMotion).motion;
-  CoordinateChoice choice{
-      .freedoms = static_cast<int>(motion.cols()), .chosen = {}, .dependent = {}};
-  // Gradients in the freedoms; what is chosen is taken out of those that are left.
+  CoordinateChoice choice{.dofs = static_cast<int>(motion.cols()), .chosen = {}, .dependent = {}};
+  // Gradients in the DOFs; what is chosen is taken out of those that are left.
   RowStack rows(mechanism.bodies.size(), CharacteristicLength(mechanism));
   for (const Coordinate& candidate : candidates) {
     AddCommand(mechanism, home, HeldAt(candidate), &rows);

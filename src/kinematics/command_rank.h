@@ -9,11 +9,11 @@
 
 namespace mbv {
 
-/// Rank of a set of commands at the home pose. Idle spins (mechanism/idle_spins.h) are no freedoms
+/// Rank of a set of commands at the home pose. Idle spins (mechanism/idle_spins.h) are no DOFs
 /// here and below: nothing needs to hold them.
 struct CommandRank {
-  int freedoms = 0;                      ///< of the mechanism without commands, at home
-  int undriven = 0;                      ///< freedoms that are left with the commands held
+  int dofs = 0;                          ///< of the mechanism without commands, at home
+  int undriven = 0;                      ///< DOFs that are left with the commands held
   int redundant = 0;                     ///< commands too many: they cannot be given independently
   std::vector<int> dependent;            ///< commands that share the redundancy, by index
   std::vector<std::string> free_joints;  ///< joints that still move with the commands held
@@ -23,19 +23,19 @@ struct CommandRank {
 [[nodiscard]] CommandRank RankCommands(const Mechanism& mechanism,
                                        const std::vector<Command>& commands);
 
-/// The first candidates, in their order, that together with `commands` hold each freedom once; by
+/// The first candidates, in their order, that together with `commands` hold each DOF once; by
 /// index. At most `count`.
 [[nodiscard]] std::vector<size_t> IndependentCommands(const Mechanism& mechanism,
                                                       const std::vector<Command>& commands,
                                                       const std::vector<Command>& candidates,
                                                       size_t count);
 
-/// A set of coordinates that holds each freedom once.
+/// A set of coordinates that holds each DOF once.
 struct CoordinateChoice {
-  int freedoms = 0;               ///< of the mechanism, at home
+  int dofs = 0;                   ///< of the mechanism, at home
   std::vector<size_t> chosen;     ///< of the candidates, by index
   std::vector<size_t> dependent;  ///< of the first ones, what depends on others before it
-  [[nodiscard]] int left() const { return freedoms - static_cast<int>(chosen.size()); }
+  [[nodiscard]] int left() const { return dofs - static_cast<int>(chosen.size()); }
 };
 
 /// Takes the first `preferred` candidates in their order, as far as they are independent at home,
@@ -44,7 +44,7 @@ struct CoordinateChoice {
                                                  const std::vector<Coordinate>& candidates,
                                                  size_t preferred);
 
-/// A freedom that stays when these coordinates are held: twists [ω; v] per body, world axes, the
+/// A DOF that stays when these coordinates are held: twists [ω; v] per body, world axes, the
 /// largest entry 1. Empty if none stays.
 [[nodiscard]] std::vector<Vec6> FreeMotion(const Mechanism& mechanism,
                                            const std::vector<Coordinate>& held);

@@ -464,10 +464,10 @@ Mechanism WithAligned(const Mechanism& mechanism, int joint, const std::vector<S
   return aligned;
 }
 
-int PassiveFreedoms(Mechanism mechanism) {
+int PassiveDofs(Mechanism mechanism) {
   mechanism.drives.clear();
   mechanism.prescribed.clear();
-  return CountFreedoms(mechanism);
+  return CountDofs(mechanism);
 }
 
 }  // namespace
@@ -475,18 +475,18 @@ int PassiveFreedoms(Mechanism mechanism) {
 std::optional<TiltedAxis> FindTiltedAxis(const Mechanism& mechanism, bool closed_at_home) {
   const std::vector<Suspicion> suspicions = Suspicions(mechanism);
   if (suspicions.empty()) return {};
-  const int freedoms = closed_at_home ? PassiveFreedoms(mechanism) : 0;
+  const int dofs = closed_at_home ? PassiveDofs(mechanism) : 0;
   const auto driven = static_cast<int>(mechanism.drives.size() + mechanism.prescribed.size());
-  if (closed_at_home && freedoms >= std::max(1, driven)) return {};
+  if (closed_at_home && dofs >= std::max(1, driven)) return {};
   int tried = -1;
   for (const Suspicion& s : suspicions) {
     if (s.joint == tried) continue;
     tried = s.joint;
     Mechanism aligned = WithAligned(mechanism, s.joint, suspicions);
     if (!SolveHome(&aligned).closed) continue;
-    const int more = PassiveFreedoms(aligned);
-    if (closed_at_home && more <= freedoms) continue;
-    return TiltedAxis{s.joint, s.other, s.body, s.angle_rad, freedoms, more};
+    const int more = PassiveDofs(aligned);
+    if (closed_at_home && more <= dofs) continue;
+    return TiltedAxis{s.joint, s.other, s.body, s.angle_rad, dofs, more};
   }
   return {};
 }

@@ -29,7 +29,7 @@ struct ConstraintRows {
   Vec6 bias = Vec6::Zero();      ///< b in r̈ = J A + b
 };
 
-/// Rows that a joint imposes (6 − freedoms). With `reactions` true, the isostatic rule is applied:
+/// Rows that a joint imposes (6 − DOFs). With `reactions` true, the isostatic rule is applied:
 /// a joint that transmits a force only has its three translation rows and no others.
 [[nodiscard]] ConstraintRows RowsOf(const Joint& joint, const BodyStates& states, bool reactions);
 
@@ -79,7 +79,7 @@ struct CouplingRow {
 };
 
 /// The rows of all couplings at poses, with velocities for the bias, in the turns that
-/// `states.coupled` tells.
+/// `states.coupled` counts.
 [[nodiscard]] std::vector<CouplingRow> CouplingRows(const Mechanism& mechanism,
                                                     const BodyStates& states);
 
@@ -87,7 +87,7 @@ struct CouplingRow {
 /// was last brought to (or of home).
 std::vector<CouplingRow> FollowCouplings(const Mechanism& mechanism, BodyStates* states);
 
-/// The coordinate of every term of every coupling, in the turns that `states.coupled` tells.
+/// The coordinate of every term of every coupling, in the rotations that `states.coupled` counts.
 [[nodiscard]] std::vector<ScalarRow> CoupledCoordinates(const Mechanism& mechanism,
                                                         const BodyStates& states);
 
@@ -106,8 +106,8 @@ void SolveFollowers(const Mechanism& mechanism, CoordinateSet* known,
 
 // Coordinates of force elements as rows, and which turn their angles and those of drives are in.
 
-/// The coordinates of all force elements at poses, in the turns that `states.turns` tells, with
-/// velocities for the bias.
+/// The coordinates of all force elements at poses, in the rotations that `states.turns` counts,
+/// with velocities for the bias.
 [[nodiscard]] std::vector<ScalarRow> ElementRows(const Mechanism& mechanism,
                                                  const BodyStates& states);
 /// The same of drives, then of prescribed joints.
@@ -142,12 +142,12 @@ struct TiltedAxis {
   int other = -1;  ///< against that of this joint
   int body = 0;    ///< that carries both
   double angle_rad = kNan;
-  int freedoms = 0;          ///< of the mechanism as it is
-  int freedoms_aligned = 0;  ///< with the two axes parallel (perpendicular: slide and hinge)
+  int dofs = 0;          ///< of the mechanism as it is
+  int dofs_aligned = 0;  ///< with the two axes parallel (perpendicular: slide and hinge)
 };
 
 /// Looks for a joint whose axis misses those beside it by a small angle, where aligning it closes
-/// loops that do not close at home, or gives freedom to a mechanism that has too little for its
+/// loops that do not close at home, or gives DOF to a mechanism that has too little for its
 /// drives. Nothing if aligning changes neither: then the angle is meant.
 [[nodiscard]] std::optional<TiltedAxis> FindTiltedAxis(const Mechanism& mechanism,
                                                        bool closed_at_home);

@@ -10,7 +10,7 @@ namespace mbv {
 
 struct DrivenTwists {
   /// Per drive, then per prescribed joint, and per body: the twist [ω; v of Bo] in world axes at
-  /// one unit of this coordinate's rate, the other ones at rest. Freedoms that nothing drives
+  /// one unit of this coordinate's rate, the other ones at rest. DOFs that nothing drives
   /// follow by inertia; coordinates that depend on each other share the motion with least rates.
   /// All zero where the coordinate is not held, or hardly moves anything at home.
   std::vector<std::vector<Vec6>> V_WB;

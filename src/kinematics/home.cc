@@ -82,8 +82,8 @@ Attempt Close(const Mechanism& mechanism, const std::vector<bool>& locked,
               const Coordinates& start) {
   const double length = CharacteristicLength(mechanism);
   const TreeMotion tree(mechanism, locked);
-  VecX unit(tree.freedoms());
-  for (int c = 0; c < tree.freedoms(); ++c) unit[c] = tree.angular()[c] ? 1.0 : length;
+  VecX unit(tree.dofs());
+  for (int c = 0; c < tree.dofs(); ++c) unit[c] = tree.angular()[c] ? 1.0 : length;
 
   Attempt now;
   for (size_t j = 0; j < start.size(); ++j) {
@@ -134,7 +134,7 @@ Coordinates Followed(const Mechanism& mechanism, const std::vector<bool>& locked
   CoordinateSet known;
   for (size_t j = 0; j < follows.size(); ++j) {
     if (follows[j] && !locked[j]) continue;
-    for (int c = 0; c < FreedomsOf(mechanism.joints[j].kind); ++c) {
+    for (int c = 0; c < DofsOf(mechanism.joints[j].kind); ++c) {
       known.insert({static_cast<int>(j), c});
     }
   }
@@ -154,8 +154,8 @@ std::vector<bool> DrivenJoints(const Mechanism& mechanism) {
   std::vector<bool> driven(mechanism.joints.size(), false);
   for (const Drive& drive : mechanism.drives) {
     if (const auto* d = std::get_if<JointDrive>(&drive.kind)) {
-      // A joint with undriven freedoms beside the driven one cannot be locked as a whole.
-      driven[d->joint] = FreedomsOf(mechanism.joints[d->joint].kind) == 1;
+      // A joint with undriven DOFs beside the driven one cannot be locked as a whole.
+      driven[d->joint] = DofsOf(mechanism.joints[d->joint].kind) == 1;
     }
   }
   for (const Prescribed& p : mechanism.prescribed) driven[p.joint] = true;
@@ -170,7 +170,7 @@ Coordinates Disturbed(const Mechanism& mechanism, const Coordinates& guess,
   for (const int j : mechanism.tree_joints) {
     if (locked[j]) continue;
     const Joint& joint = mechanism.joints[j];
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
       out[j][c] += uniform(*random) * (IsLength(joint.kind, c) ? length : 1.0);
     }
   }
@@ -195,7 +195,7 @@ double LargestTurn(const BodyStates& from, const BodyStates& to) {
 // A pose with a body turned farther is another assembly, not the least gap of rounded data.
 constexpr double kElsewhere = 0.3;
 
-// Which way to close the group is chosen, from 0; what cannot be met is told.
+// Which way to close the group is chosen, from 0; what cannot be met is reported.
 std::optional<size_t> Chosen(const Mechanism& mechanism, const GroupAssemblies& found,
                              const AssemblyChoice& choice, HomeResult* result) {
   for (const int c : found.group.closures) {
@@ -315,7 +315,7 @@ std::vector<std::array<double, 6>> JointCoordinatesAt(const Mechanism& mechanism
   Coordinates q(mechanism.joints.size());
   for (size_t j = 0; j < q.size(); ++j) {
     q[j].fill(0.0);
-    for (int c = 0; c < FreedomsOf(mechanism.joints[j].kind); ++c) {
+    for (int c = 0; c < DofsOf(mechanism.joints[j].kind); ++c) {
       q[j][c] = JointCoordinateRow(mechanism.joints[j], c, states, near[j][c]).value;
     }
   }

@@ -130,7 +130,7 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
   mobility.constraint_rank = joints.rank;
   for (const Spin& spin : IdleSpins(mechanism)) mobility.idle_spins.push_back(spin.name);
   const int idle = static_cast<int>(mobility.idle_spins.size());
-  mobility.freedoms = mobility.body_coordinates - joints.rank - idle;
+  mobility.dofs = mobility.body_coordinates - joints.rank - idle;
   mobility.redundant = stack.size() - joints.rank;
   mobility.kutzbach = mobility.body_coordinates - stack.size() - idle;
   mobility.smallest_kept = joints.smallest_kept;
@@ -144,11 +144,11 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
   return mobility;
 }
 
-int CountFreedoms(const Mechanism& mechanism) {
-  return CountAllFreedoms(mechanism) - static_cast<int>(IdleSpins(mechanism).size());
+int CountDofs(const Mechanism& mechanism) {
+  return CountAllDofs(mechanism) - static_cast<int>(IdleSpins(mechanism).size());
 }
 
-int CountAllFreedoms(const Mechanism& mechanism) {
+int CountAllDofs(const Mechanism& mechanism) {
   const BodyStates states = PosesAtHome(mechanism);
   RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
   stack.AddJoints(mechanism, states, false);
@@ -299,7 +299,7 @@ std::vector<std::string> FreeBodies(const Mechanism& mechanism, const BodyStates
   return names;
 }
 
-// A pose that closes the loops, a random step along the freedoms away from home.
+// A pose that closes the loops, a random step along the DOFs away from home.
 std::optional<BodyStates> RandomPose(const Mechanism& mechanism, double step,
                                      std::mt19937_64* random) {
   const double length = CharacteristicLength(mechanism);
@@ -337,7 +337,7 @@ int Least(const MobilityReport& report, int Mobility::*count) {
 
 }  // namespace
 
-int MobilityReport::freedoms() const { return Least(*this, &Mobility::freedoms); }
+int MobilityReport::dofs() const { return Least(*this, &Mobility::dofs); }
 int MobilityReport::undriven() const { return Least(*this, &Mobility::undriven); }
 int MobilityReport::redundant_count() const { return Least(*this, &Mobility::redundant); }
 
@@ -419,7 +419,7 @@ std::vector<LoopCount> CountLoops(const Mechanism& mechanism) {
     for (const int j : JointsAround(mechanism, static_cast<int>(c))) {
       const Joint& joint = mechanism.joints[j];
       loop.joints.push_back(joint.name);
-      loop.joint_freedoms += FreedomsOf(joint.kind);
+      loop.joint_dofs += DofsOf(joint.kind);
       const MatX more = ScrewsOf(joint, states, length);
       screws.conservativeResize(6, screws.cols() + more.cols());
       screws.rightCols(more.cols()) = more;

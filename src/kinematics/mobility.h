@@ -1,4 +1,4 @@
-// Mobility by rank: degrees of freedom, redundant constraints, and what the drives determine.
+// Mobility by rank: DOFs, redundant constraints, and what the drives determine.
 #pragma once
 
 #include <string>
@@ -20,11 +20,11 @@ struct Mobility {
   int constraint_rows = 0;   ///< scalar constraints of joints (true kinds) and couplings
   int constraint_rank = 0;
   std::vector<std::string> idle_spins = {};  ///< names (mechanism/idle_spins.h)
-  int freedoms = 0;   ///< body_coordinates − constraint_rank − idle spins
+  int dofs = 0;       ///< body_coordinates − constraint_rank − idle spins
   int redundant = 0;  ///< constraint_rows − constraint_rank
   int kutzbach = 0;   ///< body_coordinates − constraint_rows − idle spins
   int drives = 0, prescribed = 0;
-  int undriven = 0;  ///< freedoms left with all drives and prescribed joints locked
+  int undriven = 0;                      ///< DOFs left with all drives and prescribed joints locked
   bool drives_determine_motion = false;  ///< undriven == 0
   bool drive_forces_unique = false;      ///< no self-stress of the locked mechanism acts on a drive
   std::vector<std::string> drives_not_unique;
@@ -39,10 +39,10 @@ struct Mobility {
 };
 
 /// Mobility at the given body poses (the home pose by default).
-/// Only `freedoms` of it, for a quarter of the time and less.
-[[nodiscard]] int CountFreedoms(const Mechanism& mechanism);
+/// Only `dofs` of it, for a quarter of the time and less.
+[[nodiscard]] int CountDofs(const Mechanism& mechanism);
 /// The same with the idle spins.
-[[nodiscard]] int CountAllFreedoms(const Mechanism& mechanism);
+[[nodiscard]] int CountAllDofs(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states);
 
@@ -52,7 +52,7 @@ struct Mobility {
 [[nodiscard]] std::vector<std::string> ReactionsNotUnique(
     const Mechanism& mechanism, const std::vector<std::vector<Pose>>& X_WB);
 
-// What a model's joints, loops and drives determine, by name: freedoms at home and nearby,
+// What a model's joints, loops and drives determine, by name: DOFs at home and nearby,
 // redundant constraints by the loops that share them, which forces statics determine, and why not.
 
 /// Joints and drives that hold each other: the part of the mechanism a self-stress (forces in
@@ -66,7 +66,7 @@ struct StressGroup {
 struct LoopCount {
   std::string closure;
   std::vector<std::string> joints;  ///< in order around the loop, closure last
-  int joint_freedoms = 0;
+  int joint_dofs = 0;
   int screw_rank = 0;  ///< order of the loop: 3 for a planar or spherical one, 6 for a general one
 };
 
@@ -74,23 +74,23 @@ struct MobilityReport {
   Mobility home;
   /// At random poses nearby that close the loops. A rank that grows there shows a singular home.
   std::vector<Mobility> nearby;
-  double nearby_step = 0.0;  ///< how far the freedoms were moved [rad, or characteristic lengths]
+  double nearby_step = 0.0;  ///< how far the DOFs were moved [rad, or characteristic lengths]
 
   std::vector<LoopCount> loops;
   std::vector<StressGroup> redundant;  ///< of the true joints alone; counts add up to `redundant`
   std::vector<StressGroup> undetermined;  ///< isostatic rule applied, drives and base motion locked
   /// Bodies that can still move with drives and prescribed joints locked, at home.
   std::vector<std::string> free_bodies;
-  /// Spins between two balls that are freedoms, each with the reason.
+  /// Spins between two balls that are DOFs, each with the reason.
   std::vector<std::string> spins_not_idle = {};
 
-  /// The fewest freedoms (undriven freedoms, redundant constraints) of all poses: those of a
+  /// The fewest DOFs (undriven DOFs, redundant constraints) of all poses: those of a
   /// general pose.
-  [[nodiscard]] int freedoms() const;
+  [[nodiscard]] int dofs() const;
   [[nodiscard]] int undriven() const;
   [[nodiscard]] int redundant_count() const;
   /// The joints alone lose rank at home.
-  [[nodiscard]] bool home_singular() const { return home.freedoms > freedoms(); }
+  [[nodiscard]] bool home_singular() const { return home.dofs > dofs(); }
   /// The drives lose their hold on the motion at home, but not nearby.
   [[nodiscard]] bool drives_singular() const {
     return !home_singular() && home.undriven > undriven();
@@ -102,7 +102,7 @@ struct MobilityReport {
 
 // The loops of the spanning tree, one per closure.
 
-/// Joints around each loop, their freedoms, and the rank of their screws at home.
+/// Joints around each loop, their DOFs, and the rank of their screws at home.
 [[nodiscard]] std::vector<LoopCount> CountLoops(const Mechanism& mechanism);
 
 // Which loops hang together.

@@ -219,7 +219,7 @@ void Count(double limit, PartRank* part) {
   }
 }
 
-// By sparse QR; empty where that does not tell clearly.
+// By sparse QR; empty where that is not clear.
 std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSpaces wanted,
                                    double tolerance) {
   SparseRank::Matrix A(static_cast<Eigen::Index>(part.rows.size()),

@@ -72,13 +72,13 @@ struct RankFinding {
 [[nodiscard]] MatX Orthonormal(const MatX& vectors);
 enum class NullSpaces { kNone, kSelfStress, kMotion };
 /// By singular values, each part of J that shares no row and column with the others by itself;
-/// parts with more than `dense` rows and columns by sparse QR, where that tells clearly.
+/// parts with more than `dense` rows and columns by sparse QR, where that is clear.
 [[nodiscard]] RankFinding FindRank(const SparseRows& J, NullSpaces wanted,
                                    double tolerance = kRankTolerance,
                                    Eigen::Index dense = kLargestDense);
 [[nodiscard]] RankFinding FindRank(const MatX& J, NullSpaces wanted,
                                    double tolerance = kRankTolerance);
-/// The same rank for an eighth of the time: by QR with column pivoting, whose diagonal tells it
+/// The same rank for an eighth of the time: by QR with column pivoting, whose diagonal shows it
 /// where there is a clear gap; else by singular values.
 [[nodiscard]] int RankOf(const SparseRows& J, double tolerance = kRankTolerance);
 [[nodiscard]] int RankOf(const MatX& J, double tolerance = kRankTolerance);

@@ -11,9 +11,9 @@ TreeMotion::TreeMotion(const Mechanism& mechanism, const std::vector<bool>& lock
   for (const int j : mechanism.tree_joints) {
     if (locked[j]) continue;
     const JointKind kind = mechanism.joints[j].kind;
-    first_column_[j] = freedoms_;
-    for (int c = 0; c < FreedomsOf(kind); ++c) angular_.push_back(!IsLength(kind, c));
-    freedoms_ += FreedomsOf(kind);
+    first_column_[j] = dofs_;
+    for (int c = 0; c < DofsOf(kind); ++c) angular_.push_back(!IsLength(kind, c));
+    dofs_ += DofsOf(kind);
   }
 }
 
@@ -26,7 +26,7 @@ BodyStates TreeMotion::States(const std::vector<Pose>& X_FM) const {
 
 MatX TreeMotion::Jacobian(const BodyStates& states) const {
   const auto bodies = static_cast<Eigen::Index>(mechanism_.bodies.size());
-  MatX J = MatX::Zero(6 * bodies, freedoms_);
+  MatX J = MatX::Zero(6 * bodies, dofs_);
   for (size_t i = 0; i < mechanism_.tree_joints.size(); ++i) {
     const int j = mechanism_.tree_joints[i];
     const Joint& joint = mechanism_.joints[j];
@@ -42,7 +42,7 @@ MatX TreeMotion::Jacobian(const BodyStates& states) const {
     J_out.bottomRows<3>() -= Skew(p_InOut) * J_out.topRows<3>();
     if (first_column_[j] < 0) continue;
 
-    // … and moves by the joint's own freedoms, backwards when the joint is reversed.
+    // … and moves by the joint's own DOFs, backwards when the joint is reversed.
     const Pose X_WM = states.X_WB[joint.child] * joint.X_CM;
     const Mat3 R_WF = states.X_WB[joint.parent].linear() * joint.X_PF.linear();
     JointTwists S = UnitTwists(joint, R_WF, X_WM.linear());

@@ -15,13 +15,13 @@ class TreeMotion {
   /// Joints with locked[j] get no columns.
   TreeMotion(const Mechanism& mechanism, const std::vector<bool>& locked);
 
-  [[nodiscard]] int freedoms() const { return freedoms_; }
+  [[nodiscard]] int dofs() const { return dofs_; }
   /// True per column when it is an angle.
   [[nodiscard]] const std::vector<bool>& angular() const { return angular_; }
 
   /// Body poses; velocities zero. `X_FM` by joint index.
   [[nodiscard]] BodyStates States(const std::vector<Pose>& X_FM) const;
-  /// 6·bodies × freedoms: twist of every body (world axes, body origins) per unit rate.
+  /// 6·bodies × DOFs: twist of every body (world axes, body origins) per unit rate.
   [[nodiscard]] MatX Jacobian(const BodyStates& states) const;
   /// Moves every joint by the finite step `dq`.
   void Step(const VecX& dq, std::vector<Pose>* X_FM) const;
@@ -30,7 +30,7 @@ class TreeMotion {
   const Mechanism& mechanism_;
   std::vector<int> first_column_;  ///< by joint, -1 without columns
   std::vector<bool> angular_;
-  int freedoms_ = 0;
+  int dofs_ = 0;
 };
 
 }  // namespace mbv::internal

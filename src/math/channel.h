@@ -1,6 +1,6 @@
 // Channels: what a recorded signal measures, of whom, and the name that files call it by.
 //
-// The rows in channel.cc are the only place where names are put together; nobody takes one apart.
+// The rows in channel.cc are the only place where names are composed; no other code splits one.
 #pragma once
 
 #include <array>

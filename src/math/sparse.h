@@ -25,7 +25,7 @@ class SparseLu {
   /// Forgets the pattern; the next Factor() takes that of its matrix.
   void Reset();
   /// Factors A, of the pattern that the first call since Reset() had. False where A is singular as
-  /// far as its pivots tell (one is exactly zero), or not finite.
+  /// far as its pivots show (one is exactly zero), or not finite.
   [[nodiscard]] bool Factor(const Matrix& A);
   /// −1 or 1; of the matrix factored last, in its own order of rows and columns.
   [[nodiscard]] int determinant_sign() const;
@@ -95,7 +95,7 @@ class SparseSaddle {
   using Matrix = SparseLu::Matrix;
 
   /// Always with the same patterns since the last Reset(); B is given as its transpose. False where
-  /// (1) is singular as far as pivots tell: one is below `tolerance` of the largest.
+  /// (1) is singular as far as pivots show: one is below `tolerance` of the largest.
   [[nodiscard]] bool Factor(const Matrix& W, const Matrix& B_transposed, double tolerance);
   void Reset();
 

@@ -24,7 +24,7 @@ namespace mbv {
 [[nodiscard]] std::vector<Channel> PrescribedChannels(const Mechanism& mechanism);
 /// DRIVE.force.band for every drive, then PRESCRIBED.force.band: half-width of the band around the
 /// force (its middle) within which friction at rest leaves it; 0 where everything slides. Empty of
-/// a mechanism in which nothing rubs.
+/// a mechanism without dry friction.
 [[nodiscard]] std::vector<Channel> BandChannels(const Mechanism& mechanism);
 /// JOINT.reaction.fx … .mz: wrench of the parent on the child through the joint (drive forces
 /// excluded), about M's origin, in F's axes.

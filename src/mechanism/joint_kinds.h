@@ -79,14 +79,14 @@ static_assert(JointKindRowsAreInOrder());
 /// The word for a kind in model files and messages.
 [[nodiscard]] constexpr std::string_view WordOf(JointKind kind) { return RowOf(kind).word; }
 
-/// Number of coordinates = degrees of freedom of a joint kind.
-[[nodiscard]] constexpr int FreedomsOf(JointKind kind) {
+/// Number of coordinates = DOFs of a joint kind.
+[[nodiscard]] constexpr int DofsOf(JointKind kind) {
   return static_cast<int>(RowOf(kind).coordinates.size());
 }
 
 /// True when a coordinate of a joint is a length (else it is an angle).
 [[nodiscard]] constexpr bool IsLength(JointKind kind, int coordinate) {
-  return coordinate < FreedomsOf(kind) &&
+  return coordinate < DofsOf(kind) &&
          RowOf(kind).coordinates[static_cast<std::size_t>(coordinate)] == 's';
 }
 
@@ -102,7 +102,7 @@ static_assert(JointKindRowsAreInOrder());
 
 /// True when a coordinate is one of a ball's.
 [[nodiscard]] constexpr bool IsOfBall(JointKind kind, int coordinate) {
-  return coordinate < FreedomsOf(kind) &&
+  return coordinate < DofsOf(kind) &&
          RowOf(kind).coordinates[static_cast<std::size_t>(coordinate)] == 'b';
 }
 

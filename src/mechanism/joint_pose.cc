@@ -72,7 +72,7 @@ Pose JointPose(const Joint& joint, const std::array<double, 6>& q) {
 
 std::array<double, 6> CoordinatesOf(const Joint& joint, const Pose& X_FM) {
   std::array<double, 6> q{};
-  for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+  for (int c = 0; c < DofsOf(joint.kind); ++c) {
     q[c] = internal::CoordinateBetween(joint, c, internal::RestingPair{X_FM});
   }
   return q;
@@ -85,7 +85,7 @@ double RotationGap(const Joint& joint, const Pose& X_FM) {
 }
 
 JointTwists UnitTwists(const Joint& joint, const Mat3& R_WF, const Mat3& R_WM) {
-  JointTwists S = JointTwists::Zero(6, FreedomsOf(joint.kind));
+  JointTwists S = JointTwists::Zero(6, DofsOf(joint.kind));
   const Vec3 axis = R_WF * joint.axis;
   switch (joint.kind) {
     case JointKind::kFixed:

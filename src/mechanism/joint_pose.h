@@ -24,11 +24,11 @@ namespace mbv {
 /// cosines of a constraint's rows it does not vanish when an axis points backwards.
 [[nodiscard]] double RotationGap(const Joint& joint, const Pose& X_FM);
 
-/// Unit twists [ω; v of Mo] of M in F, one column per freedom.
+/// Unit twists [ω; v of Mo] of M in F, one column per DOF.
 using JointTwists = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::ColMajor, 6, 6>;
 /// In world axes. Balls and free joints turn about M's own axes.
 [[nodiscard]] JointTwists UnitTwists(const Joint& joint, const Mat3& R_WF, const Mat3& R_WM);
-/// Moves a joint by small steps `dq` of the freedoms that UnitTwists() has columns for.
+/// Moves a joint by small steps `dq` of the DOFs that UnitTwists() has columns for.
 void StepJoint(const Joint& joint, const double* dq, Pose* X_FM);
 
 /// The first columns (their number is returned) are the directions in F along which the joint
@@ -98,7 +98,7 @@ template <typename Pair>
 /// Coordinate of a joint between F and M.
 template <typename Pair>
 [[nodiscard]] auto CoordinateBetween(const Joint& joint, int coordinate, const Pair& pair) {
-  MBV_DEMAND(coordinate >= 0 && coordinate < FreedomsOf(joint.kind), joint.name);
+  MBV_DEMAND(coordinate >= 0 && coordinate < DofsOf(joint.kind), joint.name);
   switch (joint.kind) {
     case JointKind::kFixed:
       break;

@@ -121,14 +121,14 @@ std::string BushingWord(const ForceElement& element) {
          std::string(kCoordinates.at(static_cast<size_t>(element.coordinate)));
 }
 
-bool Rubs(const ForceElement& element) {
+bool HasFriction(const ForceElement& element) {
   const auto* friction = std::get_if<FrictionLaw>(&element.law);
   return friction != nullptr && (friction->breakaway > 0.0 || friction->per_load() > 0.0);
 }
 
 std::string FirstFriction(const Mechanism& mechanism) {
   for (const ForceElement& element : mechanism.elements) {
-    if (Rubs(element)) return element.name;
+    if (HasFriction(element)) return element.name;
   }
   return "";
 }
@@ -143,9 +143,8 @@ std::string Described(const Mechanism& mechanism, const ForceElement& element) {
     return word + " of drive '" + mechanism.drives[static_cast<size_t>(element.drive)].name + "'";
   }
   const Joint& joint = mechanism.joints[static_cast<size_t>(element.joint)];
-  const std::string of = FreedomsOf(joint.kind) == 1
-                             ? ""
-                             : "coordinate " + std::to_string(element.coordinate) + " of ";
+  const std::string of =
+      DofsOf(joint.kind) == 1 ? "" : "coordinate " + std::to_string(element.coordinate) + " of ";
   return word + " of " + of + "joint '" + joint.name + "'";
 }
 

@@ -222,7 +222,7 @@ struct Drive {
   double stiffness = std::numeric_limits<double>::infinity();
 };
 
-/// A one-freedom joint whose motion is given (a ship's roll); it is driven, but its force is base
+/// A single-DOF joint whose motion is given (a ship's roll); it is driven, but its force is base
 /// reaction and not compared as a drive.
 struct Prescribed {
   std::string name;
@@ -396,8 +396,8 @@ struct SignalSheet {
 /// "kx", "krz", "cry": what an element of a bushing is.
 [[nodiscard]] std::string BushingWord(const ForceElement& element);
 /// True for dry friction that is not zero.
-[[nodiscard]] bool Rubs(const ForceElement& element);
-/// Name of the first element that rubs, or "".
+[[nodiscard]] bool HasFriction(const ForceElement& element);
+/// Name of the first element with dry friction, or "".
 [[nodiscard]] std::string FirstFriction(const Mechanism& mechanism);
 /// Sheet of a joint's reaction: the wrench that the parent exerts on the child through the joint,
 /// about M's origin, expressed in F. Channels: JOINT.reaction.{fx,fy,fz,mx,my,mz}.

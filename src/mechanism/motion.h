@@ -67,7 +67,7 @@ struct Load {
   bool in_body_axes = false;      ///< components in body axes instead of world axes
   std::array<Profile, 3> force;   ///< [N]
   std::array<Profile, 3> moment;  ///< [N m], about Q
-  /// What a component (0…2 of the force, 3…5 of the moment) is besides its profile.
+  /// What a component (0…2 of the force, 3…5 of the moment) is in addition to its profile.
   struct Following {
     int component = 0;
     StateFunction function;
@@ -75,13 +75,13 @@ struct Load {
   std::vector<Following> following = {};
 };
 
-/// A drive that pushes with a given force instead of following a command.
+/// A drive that exerts a given force instead of following a command.
 struct DriveForce {
   int drive = 0;  ///< index into Mechanism::drives
   Profile force;  ///< [N] or [N m]
 };
 
-/// Where a freedom starts that moves by forces.
+/// Where a DOF starts that moves by forces.
 struct InitialValue {
   std::string name;
   Coordinate coordinate;
@@ -120,10 +120,10 @@ struct Motion {
   std::vector<Command> commands;
   std::vector<Load> loads;
   std::vector<DriveForce> forces = {};     ///< free motion only; no drive is commanded and forced
-  std::vector<InitialValue> initial = {};  ///< one per freedom that no command holds
+  std::vector<InitialValue> initial = {};  ///< one per DOF that no command holds
   std::vector<MotionTable> tables = {};    ///< those that profiles above were made of
 
-  /// True when some freedoms move by forces (forward dynamics) instead of by commands.
+  /// True when some DOFs move by forces (forward dynamics) instead of by commands.
   [[nodiscard]] bool free() const { return !initial.empty(); }
   /// Index into `forces` of a drive, or -1.
   [[nodiscard]] int FindForce(int drive) const;

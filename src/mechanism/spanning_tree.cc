@@ -65,7 +65,7 @@ int KeepClass(const Mechanism& mechanism, int j, Choice choice) {
   if (massless(joint.parent) || massless(joint.child)) return 2;
   if (joint.transmits_force_only) return 9;
   if (joint.kind == JointKind::kSpherical) return 8;
-  return 3 + FreedomsOf(joint.kind);
+  return 3 + DofsOf(joint.kind);
 }
 
 int Root(std::vector<int>* link, int body) {

@@ -25,7 +25,7 @@ struct SpanningTreeResult {
 
 /// Chooses the spanning tree from the world and sets Mechanism::tree_joints (inboard first),
 /// tree_reversed and Joint::closure. Among joints without hint the tree prefers the costlier to
-/// cut (driven and prescribed joints, then those with the fewest freedoms), so that spherical and
+/// cut (driven and prescribed joints, then those with the fewest DOFs), so that spherical and
 /// force-only joints become the closures. Depends only on the order and data of the joints.
 SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& hints = {});
 

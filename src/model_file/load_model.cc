@@ -511,7 +511,7 @@ Diagnostics InFileOrder(const Diagnostics& diagnostics) {
   return sorted;
 }
 
-// Places in a model file that nobody wrote.
+// Places in a generated model file.
 Diagnostics WithoutPlaces(const Diagnostics& diagnostics) {
   Diagnostics result;
   for (Finding finding : diagnostics.findings()) {
@@ -611,11 +611,11 @@ void ReadElastic(const EachBlock& each_block, const internal::BodyNames& names,
   each_block([&](const Block& block) { beams.Read(block); });
 }
 
-// No witness reads a motor's numbers, so they are none of those that mutate bends.
+// No witness reads a motor's numbers, so mutate does not perturb them.
 void ReadMotors(const Block& model, YamlReader* yaml, ModelSections* s) {
   const std::map<std::string, double> none;
-  internal::Literals unbent(none);
-  internal::ModelValues values(yaml, &unbent);
+  internal::Literals unperturbed(none);
+  internal::ModelValues values(yaml, &unperturbed);
   internal::ReadMotors(model, s->drives, s->joints.joints, &values, &s->motors);
 }
 

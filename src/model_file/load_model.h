@@ -25,7 +25,7 @@ struct LoadOptions {
   std::map<std::string, Finding> override_places;
   std::optional<Vec3> gravity_W;  ///< [m/s²], instead of the model's; its `up` stays
   /// Which way to close the loops is meant (kinematics/home.h), by the name of a closure; counted
-  /// from 1 in the order in which they are told.
+  /// from 1 in the order in which they are reported.
   std::map<std::string, int> assembly = {};
   /// Other values of literals, by place.
   std::map<std::string, double> literals;

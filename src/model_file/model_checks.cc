@@ -185,8 +185,8 @@ void CheckAxes(const Mechanism& mechanism, bool closed_at_home, ModelReport* rep
       "{}",
       joint.name, tilted->angle_rad / FromDegrees(1.0), other.name,
       mechanism.bodies[tilted->body].name, like ? "parallel" : "perpendicular",
-      closed_at_home ? fmt::format("the mechanism has {} freedoms instead of {}",
-                                   tilted->freedoms_aligned, tilted->freedoms)
+      closed_at_home ? fmt::format("the mechanism has {} degrees of freedom instead of {}",
+                                   tilted->dofs_aligned, tilted->dofs)
                      : "the loops close");
   const std::string hint = "look at its axis and at the rotations of its two frames";
   if (const Finding* urdf = report->InUrdf(mechanism, tilted->joint); urdf != nullptr) {
@@ -205,7 +205,7 @@ void CheckHome(const Mechanism& mechanism, ModelReport* report) {
   };
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
     const Joint& joint = mechanism.joints[j];
-    for (int k = 0; k < FreedomsOf(joint.kind); ++k) {
+    for (int k = 0; k < DofsOf(joint.kind); ++k) {
       if (report->places().joints[j].line == 0 ||
           !outside(joint.home[k], joint.range[k], IsLength(joint.kind, k))) {
         continue;
@@ -248,13 +248,14 @@ void CheckIsostaticRule(const Mechanism& mechanism, ModelReport* report) {
   Mechanism passive = mechanism;
   passive.drives.clear();
   passive.prescribed.clear();
-  const int freedoms = CountAllFreedoms(passive);
-  const int as_balls = CountAllFreedoms(balls);
-  if (freedoms == as_balls) return;
-  report->AtJoint(*last, Severity::kError,
-                  fmt::format("transmits: force changes the mechanism: {} freedoms instead of {}",
-                              as_balls, freedoms),
-                  "only a redundant constraint can be left out of the reactions");
+  const int dofs = CountAllDofs(passive);
+  const int as_balls = CountAllDofs(balls);
+  if (dofs == as_balls) return;
+  report->AtJoint(
+      *last, Severity::kError,
+      fmt::format("transmits: force changes the mechanism: {} degrees of freedom instead of {}",
+                  as_balls, dofs),
+      "only a redundant constraint can be left out of the reactions");
 }
 
 // Checks on elastic bodies: beams that hold together, and joints on beam ends.
@@ -387,7 +388,7 @@ void MakeBall(Joint* joint) {
 
 }  // namespace
 
-// CAD exporters know no balls and write hinges of that name, to be mended by hand in the closure
+// CAD exporters know no balls and write hinges of that name, to be corrected by hand in the closure
 // file (joint_name, joint_type). Where that was forgotten loops do not close.
 bool TakeNamedBalls(Mechanism* mechanism, ModelReport* report) {
   Mechanism balls = *mechanism;

@@ -1,4 +1,4 @@
-// Checks on a whole model: what no section can tell alone. Internal to the model loader.
+// Checks on a whole model: what no section shows alone. Internal to the model loader.
 #pragma once
 
 #include <map>
@@ -49,7 +49,7 @@ class ModelReport {
   void AtJoint(size_t joint, Finding finding);
   /// About the file as a whole.
   void AtFile(Severity severity, const std::string& message, const std::string& hint = "");
-  /// The same without a place, for what nobody wrote into the model file.
+  /// The same without a place, for what is not written in the model file.
   void AddOther(Finding finding) { others_.Add(std::move(finding)); }
 
   /// Where a joint is described that stands in a URDF file; null for those of the model file.
@@ -95,10 +95,10 @@ void CheckHome(const Mechanism& mechanism, ModelReport* report);
 /// An axis that is tilted by a typing slip: the cause behind what else is wrong.
 void CheckAxes(const Mechanism& mechanism, bool closed_at_home, ModelReport* report);
 
-/// Joints that transmit a force only must not gain freedoms by it.
+/// Joints that transmit a force only must not gain DOFs by it.
 void CheckIsostaticRule(const Mechanism& mechanism, ModelReport* report);
 
-/// Doubts about what is possible but hardly meant: units, reference points. Warnings only.
+/// Warnings about what is possible but hardly meant: units, reference points. Warnings only.
 void CheckPlausible(const Mechanism& mechanism, ModelReport* report);
 
 /// That only a search closed the loops.

@@ -108,7 +108,7 @@ std::optional<JointDrive> ReadJointCoordinate(const ModelJoints& joints, const B
   if (!index) return std::nullopt;
   drive.joint = *index;
   const Joint& joint = joints.joints[*index];
-  const int n = FreedomsOf(joint.kind);
+  const int n = DofsOf(joint.kind);
   if (drive.coordinate < 0 || drive.coordinate >= n) {
     yaml->Error(coordinate == nullptr ? *joint_node : *coordinate,
                 fmt::format("{}: coordinate {} of joint '{}', which has {} coordinates", map.path(),
@@ -200,10 +200,10 @@ void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* y
     const auto index = FindJointNamed(joints, block, *node, map.PathOf("joint"), yaml);
     if (!index) continue;
     const Joint& joint = joints.joints[*index];
-    if (FreedomsOf(joint.kind) != 1) {
+    if (DofsOf(joint.kind) != 1) {
       yaml->Error(*node,
                   fmt::format("{}: joint '{}' has {} coordinates, one is needed", map.path(),
-                              joint.name, FreedomsOf(joint.kind)),
+                              joint.name, DofsOf(joint.kind)),
                   "split the joint by massless bodies");
       continue;
     }
@@ -214,7 +214,7 @@ void ReadPrescribed(const Block& block, const ModelJoints& joints, YamlReader* y
 
 namespace {
 
-// YAML that nobody wrote, with the place of what it stands for.
+// Generated YAML, with the place of what it stands for.
 class NodeMaker {
  public:
   explicit NodeMaker(const YamlNode& at) : at_(at) {}

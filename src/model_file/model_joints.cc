@@ -207,7 +207,7 @@ void JointReader::ReadRange(const Block& block, const YamlMap& map, Joint* joint
   const YamlMap::InUnit range = map.FindInUnit("range", {kPlain, kDeg, kMm});
   if (range.node == nullptr) return;
   const std::string path = map.PathOf(range.key);
-  const int n = FreedomsOf(joint->kind);
+  const int n = DofsOf(joint->kind);
   const bool one_pair = n == 1 && range.node->is_sequence() && !range.node->items.empty() &&
                         !range.node->items.front()->is_sequence();
   if (one_pair) {
@@ -241,7 +241,7 @@ bool JointReader::ReadFreeChoices(const YamlMap& map, Joint* joint) {
 
 void ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
                const UnitSuffix& unit, ModelValues* values, Joint* joint) {
-  const int n = FreedomsOf(joint->kind);
+  const int n = DofsOf(joint->kind);
   if (n == 1 && node.is_scalar()) {
     joint->guess[0] = values->Number(block, node, path, UnitOf(unit, joint->kind, 0)).value_or(0.0);
     WarnAboutGuess(node, path, unit, *joint, 0, &values->yaml());

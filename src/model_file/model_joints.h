@@ -53,7 +53,7 @@ class JointReader {
   ModelJoints& joints_;
 };
 
-/// Reads the coordinates from which home is searched: a number, or one per freedom.
+/// Reads the coordinates from which home is searched: a number, or one per DOF.
 void ReadGuess(const Block& block, const YamlNode& node, const std::string& path,
                const UnitSuffix& unit, ModelValues* values, Joint* joint);
 

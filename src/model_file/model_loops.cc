@@ -73,15 +73,15 @@ class Projector {
         tree_(mechanism_, std::vector<bool>(mechanism.joints.size(), false)),
         frames_(static_cast<Eigen::Index>(12 * mechanism.joints.size())),
         xi_(VecX::Zero(frames_)) {
-    unit_.setOnes(tree_.freedoms());
-    for (int c = 0; c < tree_.freedoms(); ++c) {
+    unit_.setOnes(tree_.dofs());
+    for (int c = 0; c < tree_.dofs(); ++c) {
       if (!tree_.angular()[c]) unit_[c] = length_;
     }
     MakePoses(gap);
   }
 
   [[nodiscard]] Eigen::Index unknowns() const {
-    return frames_ + static_cast<Eigen::Index>(poses_.size()) * tree_.freedoms();
+    return frames_ + static_cast<Eigen::Index>(poses_.size()) * tree_.dofs();
   }
 
   /// True if all poses close.
@@ -129,7 +129,7 @@ class Projector {
 
   // As many as the number of unknowns allows.
   [[nodiscard]] Eigen::Index Poses() const {
-    const Eigen::Index room = (kMostUnknowns - frames_) / std::max(1, tree_.freedoms());
+    const Eigen::Index room = (kMostUnknowns - frames_) / std::max(1, tree_.dofs());
     return std::clamp(room, kFewestPoses, kPoses);
   }
 
@@ -151,7 +151,7 @@ class Projector {
       for (Eigen::Index c = 0; c < motion.cols() && k > 0; ++c) {
         dx += uniform(random) * motion.col(c);
       }
-      // Spread over both directions of a single freedom, too.
+      // Spread over both directions of a single DOF, too.
       const double amplitude =
           kReach * (2.0 * static_cast<double>(k) / static_cast<double>(poses) - 1.0);
       if (const double size = dx.lpNorm<Eigen::Infinity>(); size > 0.0) dx *= amplitude / size;
@@ -212,7 +212,7 @@ class Projector {
     SetFrames(xi_ + s.head(frames_));
     for (size_t k = 0; k < poses_.size(); ++k) {
       const VecX dq =
-          s.segment(frames_ + static_cast<Eigen::Index>(k) * tree_.freedoms(), tree_.freedoms());
+          s.segment(frames_ + static_cast<Eigen::Index>(k) * tree_.dofs(), tree_.dofs());
       tree_.Step(unit_.cwiseProduct(dq), &poses_[k]);
     }
   }
@@ -224,7 +224,7 @@ class Projector {
   // Residuals of all poses; derivatives by the frames from central differences.
   VecX Evaluate(const std::vector<std::vector<Pose>>& poses, MatX* J) {
     constexpr double kStep = 1e-6;
-    const Eigen::Index rows = At(poses[0], nullptr).size(), n = tree_.freedoms();
+    const Eigen::Index rows = At(poses[0], nullptr).size(), n = tree_.dofs();
     const auto count = static_cast<Eigen::Index>(poses.size());
     VecX r(rows * count);
     if (J != nullptr) J->setZero(rows * count, unknowns());
@@ -237,9 +237,9 @@ class Projector {
     for (Eigen::Index c = 0; c < frames_; ++c) {
       Vec6 xi = xi_.segment<6>(6 * (c / 6));
       for (const double step : {kStep, -kStep}) {
-        Vec6 bent = xi;
-        bent[c % 6] += step;
-        MoveFrame(static_cast<size_t>(c / 6), bent);
+        Vec6 perturbed = xi;
+        perturbed[c % 6] += step;
+        MoveFrame(static_cast<size_t>(c / 6), perturbed);
         for (Eigen::Index k = 0; k < count; ++k) {
           J->block(k * rows, c, rows, 1) += At(poses[k], nullptr) / (2 * step);
         }
@@ -301,7 +301,7 @@ namespace {
 
 // Joint frames may have to move farther than the gap that they leave at home is wide.
 constexpr double kProjectionReach = 10.0;
-// Guesses are given to some digits; a driven joint that home moves farther is told [rad,
+// Guesses are given to some digits; a driven joint that home moves farther is reported [rad,
 // characteristic lengths].
 constexpr double kMovedDrive = 1e-3;
 
@@ -330,8 +330,8 @@ void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const Hom
     const bool turned = !(gap.rotation_rad <= home.tolerance);
     if (in_place && !turned) continue;
     const Joint& joint = mechanism.joints[gap.joint];
-    // Of a whole robot's loops the worst one tells what to do.
-    const bool told = rules.bare_urdf && &gap != home.gaps.data();
+    // Of a whole robot's loops the worst one alone has a hint.
+    const bool has_hint = rules.bare_urdf && &gap != home.gaps.data();
     std::string text = fmt::format("the loop at joint '{}' does not close: gap", joint.name);
     if (!in_place) text += fmt::format(" {:.3g} m", gap.position_m);
     if (turned) text += fmt::format(" {:.3g} rad", gap.rotation_rad);
@@ -343,7 +343,7 @@ void ReportGaps(const ClosureRules& rules, const Mechanism& mechanism, const Hom
       finding.line = urdf->line;
       finding.column = urdf->column;
       finding.hint += "; guesses of URDF joints stand in the model file under `urdf: {guess: …}`";
-      if (told) finding.hint.clear();
+      if (has_hint) finding.hint.clear();
       report->AddOther(std::move(finding));
     } else {
       report->AtJoint(gap.joint, std::move(finding));
@@ -370,7 +370,7 @@ void GuessFollowers(const std::set<int>& guessed, Mechanism* mechanism) {
   for (const Joint& joint : mechanism->joints) q.push_back(joint.guess);
   CoordinateSet known;
   const auto lead = [&](int j) {
-    for (int c = 0; c < FreedomsOf(mechanism->joints[j].kind); ++c) known.insert({j, c});
+    for (int c = 0; c < DofsOf(mechanism->joints[j].kind); ++c) known.insert({j, c});
   };
   for (const int j : guessed) lead(j);
   SolveFollowers(*mechanism, &known, &q);
@@ -411,7 +411,7 @@ void WarnAboutMovedDrives(const Mechanism& mechanism, ModelReport* report) {
     const Joint& joint = mechanism.joints[j];
     const bool is_length = IsLength(joint.kind, 0);
     const double moved = std::abs(joint.home[0] - joint.guess[0]) / (is_length ? length_m : 1.0);
-    if (FreedomsOf(joint.kind) != 1 || !(moved > kMovedDrive)) return;
+    if (DofsOf(joint.kind) != 1 || !(moved > kMovedDrive)) return;
     if (at.line == 0) at = report->places().joints[j];
     text += fmt::format("{}{} from {:.5g} to {:.5g} {}", text.empty() ? "" : ", ", name,
                         joint.guess[0], joint.home[0], is_length ? "m" : "rad");
@@ -437,7 +437,7 @@ void WarnAboutAssembly(const Mechanism& mechanism, const HomeResult& home, Model
   for (const int j : mechanism.tree_joints) {
     const Joint& joint = mechanism.joints[j];
     double most = 0.0;
-    for (int k = 0; k < FreedomsOf(joint.kind); ++k) {
+    for (int k = 0; k < DofsOf(joint.kind); ++k) {
       const double unit = IsLength(joint.kind, k) ? length_m : 1.0;
       most = std::max(most, std::abs(joint.home[k] - joint.guess[k]) / unit);
     }

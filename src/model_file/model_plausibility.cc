@@ -1,11 +1,11 @@
-// Doubts about a model that is possible but hardly meant: lengths in millimetres, inertias in
+// Warnings about a model that is possible but hardly meant: lengths in millimetres, inertias in
 // kg mm² or about another point than the centre of mass, gravity in mm/s², rotors in kg cm² or
 // stated twice, friction in percent, leads in millimetres, couplings that lock. All are warnings.
 //
-// What tells them is density. Nothing solid is denser than osmium (22 600 kg/m³), so a body whose
-// lengths are millimetres taken for metres has less than 2.3e-5 kg per cubic metre of its extent,
-// and one whose inertia is in kg mm² less than 1e-3 kg per cubic metre of its radius of gyration:
-// ships and flywheels do not come near either.
+// They are recognised by density. Nothing solid is denser than osmium (22 600 kg/m³), so a body
+// whose lengths are millimetres taken for metres has less than 2.3e-5 kg per cubic metre of its
+// extent, and one whose inertia is in kg mm² less than 1e-3 kg per cubic metre of its radius of
+// gyration: ships and flywheels do not come near either.
 #include <fmt/format.h>
 
 #include <Eigen/Dense>
@@ -96,30 +96,31 @@ Points PointsOf(const Mechanism& mechanism, int body) {
   return points;
 }
 
-struct Doubt {
+struct PlausibilityWarning {
   std::string text, hint;
 };
 
 double Cubed(double x) { return x * x * x; }
 
-std::optional<Doubt> DoubtCentreOfMass(const Body& body, const Points& points, double length_m) {
+std::optional<PlausibilityWarning> WarnCentreOfMass(const Body& body, const Points& points,
+                                                    double length_m) {
   if (points.p.empty()) return {};
   const Vec3 c = body.p_BoBcm_B;
   const double away = (c - c.cwiseMax(points.low()).cwiseMin(points.high())).norm();
   if (away <= kFarOut * length_m || body.mass >= kThinnestCloud * Cubed(away)) return {};
-  return Doubt{
+  return PlausibilityWarning{
       fmt::format("its centre of mass is {:.4g} m away from the rest of it, which measures "
                   "{:.4g} m",
                   away, length_m),
       "lengths are in metres; is the centre of mass in millimetres?"};
 }
 
-std::optional<Doubt> DoubtInertia(const Body& body, double length_m) {
+std::optional<PlausibilityWarning> WarnInertia(const Body& body, double length_m) {
   const double largest =
       Eigen::SelfAdjointEigenSolver<Mat3>(body.I_Bcm_B, Eigen::EigenvaluesOnly).eigenvalues()[2];
   const double k = std::sqrt(largest / body.mass);
   if (!(k > kFarOut * length_m) || body.mass >= kThinnestCloud * Cubed(k)) return {};
-  return Doubt{
+  return PlausibilityWarning{
       fmt::format("its radius of gyration is {:.4g} m, the body measures {:.4g} m", k, length_m),
       "inertias are in kg m²; are they in kg mm² (1e-6 kg m²)?"};
 }
@@ -127,7 +128,7 @@ std::optional<Doubt> DoubtInertia(const Body& body, double length_m) {
 // The second moments about the centre of mass, Σ m (p − c)², are largest when all mass sits at the
 // ends of the body: m (high − c)(c − low) per axis. Inertias about the body's origin exceed that,
 // and what is left without the share m |c|² of the shift does not, or is an even body's.
-std::optional<Doubt> DoubtPoint(const Body& body, Points points) {
+std::optional<PlausibilityWarning> WarnPoint(const Body& body, Points points) {
   const Vec3 c = body.p_BoBcm_B;
   points.Add(c);
   const double possible = body.mass * (points.high() - c).dot(c - points.low());
@@ -147,7 +148,7 @@ std::optional<Doubt> DoubtPoint(const Body& body, Points points) {
       Eigen::SelfAdjointEigenSolver<Mat3>(moved, Eigen::EigenvaluesOnly).eigenvalues();
   if (!(principal[0] >= -1e-9 * principal[2])) return {};
   if (principal[0] + principal[1] < principal[2] * (1.0 - 1e-6)) return {};
-  return Doubt{
+  return PlausibilityWarning{
       fmt::format("its inertia about the centre of mass is {:.3g} times the largest that a body of "
                   "this extent can have",
                   given / possible),
@@ -279,7 +280,7 @@ void WarnAboutLeads(const Mechanism& mechanism, ModelReport* report) {
   }
 }
 
-// Coordinates that couplings alone leave no freedom, wherever they are: gears in a circle. Slopes
+// Coordinates that couplings alone leave no DOF, wherever they are: gears in a circle. Slopes
 // are taken away from home, where a cam may rest.
 void WarnAboutLocks(const Mechanism& mechanism, ModelReport* report) {
   if (mechanism.couplings.size() < 2) return;
@@ -321,7 +322,8 @@ void WarnAboutLocks(const Mechanism& mechanism, ModelReport* report) {
   if (locked.empty()) return;
   report->AtFile(
       Severity::kWarning,
-      fmt::format("the couplings lock joint {}: together they leave it no freedom", locked),
+      fmt::format("the couplings lock joint {}: together they leave it no degree of freedom",
+                  locked),
       "a joint that is held is fixed or prescribed; do ratios in a circle multiply to 1?");
 }
 
@@ -344,11 +346,11 @@ void CheckPlausible(const Mechanism& mechanism, ModelReport* report) {
       continue;  // the rest would be its consequences
     }
     const double length_m = std::max(extent, extent > 0.0 ? 0.0 : mechanism_m);
-    for (const auto& doubt : {DoubtCentreOfMass(body, points, length_m),
-                              DoubtInertia(body, length_m), DoubtPoint(body, points)}) {
-      if (!doubt) continue;
-      report->AtBody(mechanism, static_cast<size_t>(b), Severity::kWarning, doubt->text,
-                     doubt->hint);
+    for (const auto& warning : {WarnCentreOfMass(body, points, length_m),
+                                WarnInertia(body, length_m), WarnPoint(body, points)}) {
+      if (!warning) continue;
+      report->AtBody(mechanism, static_cast<size_t>(b), Severity::kWarning, warning->text,
+                     warning->hint);
       break;
     }
   }

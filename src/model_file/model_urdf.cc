@@ -389,7 +389,7 @@ std::vector<std::string> UrdfReader::MotorsOf(const Source& source,
   std::vector<std::string> motors;
   for (const std::string& name : source.tree.transmission_joints) {
     const int index = joints.Find(name);
-    if (index >= 0 && FreedomsOf(joints.joints[index].kind) == 1) motors.push_back(name);
+    if (index >= 0 && DofsOf(joints.joints[index].kind) == 1) motors.push_back(name);
   }
   return motors;
 }
@@ -527,9 +527,10 @@ class ClosureFile {
     for (const YamlNode* node : ListOf(map, "name_mot")) {
       const auto index = JointNamed(*node, "name_mot");
       if (!index) continue;
-      if (FreedomsOf(tree_.joints[*index].kind) != 1) {
-        yaml_.Error(*node, fmt::format("name_mot: joint '{}' has {} freedoms, a motor drives one",
-                                       node->text, FreedomsOf(tree_.joints[*index].kind)));
+      if (DofsOf(tree_.joints[*index].kind) != 1) {
+        yaml_.Error(
+            *node, fmt::format("name_mot: joint '{}' has {} degrees of freedom, a motor drives one",
+                               node->text, DofsOf(tree_.joints[*index].kind)));
       } else {
         motors->push_back(node->text);
       }
@@ -656,7 +657,7 @@ class ClosureFile {
     const auto names = yaml_.Items(*independent, "independent");
     for (const YamlNode* node : names.value_or(std::vector<const YamlNode*>{})) {
       const auto index = JointNamed(*node, "independent");
-      if (index && FreedomsOf(tree_.joints[*index].kind) == 1) motors->push_back(node->text);
+      if (index && DofsOf(tree_.joints[*index].kind) == 1) motors->push_back(node->text);
     }
   }
 

@@ -17,7 +17,7 @@
 
 namespace mbv::internal {
 
-/// What a URDF file gives to a model besides bodies and joints.
+/// What a URDF file gives to a model in addition to bodies and joints.
 struct UrdfSection {
   int root = -1;                          ///< body that needs a joint to the world; -1: none
   std::map<std::string, Finding> joints;  ///< where each joint is described, closures included
@@ -29,7 +29,7 @@ struct UrdfSection {
 /// its mimic joints as couplings and the damping of its joints as force elements.
 class UrdfReader {
  public:
-  /// `bare`: the model file stands for the URDF file, and nobody wrote it.
+  /// `bare`: the model file stands for the URDF file, and was not written by a user.
   UrdfReader(bool bare, ModelValues* values, Literals* literals, Diagnostics* others)
       : bare_(bare), values_(*values), literals_(*literals), others_(*others) {}
 

@@ -191,7 +191,7 @@ class ModelWriter {
   }
 
   static std::string GuessAndRange(const Joint& joint) {
-    const int n = FreedomsOf(joint.kind);
+    const int n = DofsOf(joint.kind);
     std::string guess, range;
     bool limited = false;
     for (int k = 0; k < n; ++k) {

@@ -41,7 +41,7 @@ class Canvas {
   /// Texts are in the markup of plot/figure.h, in the style's font.
   [[nodiscard]] TextSize Measure(const std::string& text, double scale = 1.0) const;
   void Text(const std::string& text, const TextPlace& place, double scale = 1.0) const;
-  /// Characters for which no font was found are told here, each once.
+  /// Characters for which no font was found are reported here, each once.
   [[nodiscard]] bool lacks_glyphs() const;
 
   /// Between the points that are numbers.

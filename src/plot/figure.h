@@ -27,7 +27,7 @@ struct FigureCurve {
   int marker = -1;      ///< which shape of kMarkerShapes stands at the points; -1: none
 };
 
-/// Shapes of markers that are told apart without colour.
+/// Shapes of markers that differ without colour.
 enum class Marker { kCircle, kSquare, kTriangle, kDiamond, kCross, kPlus };
 inline constexpr int kMarkerShapes = 6;
 

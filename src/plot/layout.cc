@@ -222,7 +222,7 @@ class LayoutMaker {
     for (PanelPlace& panel : layout_.panels) panel.x = all;
   }
 
-  // Heights before the widths of texts are known; those of equal scales are mended later.
+  // Heights before the widths of texts are known; those of equal scales are corrected later.
   void ChooseHeights() {
     for (size_t k = 0; k < size(); ++k) {
       layout_.panels[k].height = kUsualHeight * figure_.panels[k].share * layout_.width;

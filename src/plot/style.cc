@@ -178,7 +178,7 @@ namespace {
 constexpr double kToDegrees = 180.0 / std::numbers::pi;
 constexpr double kFewest = 1e-2, kMost = 1e4;  // largest values that are short as they are
 
-// The first of each is SI; the last column tells whether it is chosen by itself.
+// The first of each is SI; the last column says whether it is chosen by itself.
 struct UnitRow {
   ShownUnit unit;
   bool usual = true;

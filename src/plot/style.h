@@ -22,7 +22,7 @@ struct FigureStyle {
   double dpi = 300;        ///< of PNG files, > 0
   std::vector<std::string> colors = {kLineColors.begin(), kLineColors.end()};  ///< "#rrggbb"
   /// Lengths of strokes and gaps in line widths, for each colour; an empty one is solid. No two of
-  /// the first eight are alike, so that curves are told apart in grey.
+  /// the first eight are alike, so that curves differ in grey.
   std::vector<std::vector<double>> dashes = {
       {},     {6, 2},       {1.5, 1.5}, {7, 2, 1.5, 2}, {12, 2.5}, {7, 2, 1.5, 2, 1.5, 2},
       {3, 2}, {12, 2, 3, 2}};

@@ -58,7 +58,7 @@ void PlotAxis::Add(double v) {
 
 void PlotAxis::Pad() {
   if (!(low <= high)) low = 0, high = 1;
-  // Round-off of a constant is no range to show: between its ends no tick could be told apart.
+  // Round-off of a constant is no range to show: between its ends ticks would not differ.
   const double largest = std::max(std::abs(low), std::abs(high));
   const bool constant = log ? high <= low : high - low <= kRoundOff * largest;
   const double pad = !constant ? 0.04 * (high - low) : log ? 0.5 : std::max(1e-12, largest);

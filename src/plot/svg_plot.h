@@ -78,8 +78,8 @@ struct ContourPiece {
   std::array<double, 2> from{}, to{};
 };
 
-/// Pieces where the linearly interpolated value is `level` (marching squares; a saddle is told by
-/// its mean). Squares with a missing corner (NaN) have none. `values` is rows × columns.
+/// Pieces where the linearly interpolated value is `level` (marching squares; a saddle is resolved
+/// by its mean). Squares with a missing corner (NaN) have none. `values` is rows × columns.
 [[nodiscard]] std::vector<ContourPiece> Contour(const std::vector<double>& values, int columns,
                                                 int rows, double level);
 

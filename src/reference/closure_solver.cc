@@ -137,11 +137,12 @@ RunSummary ClosureSolver::SelectRows() {
   selection_ = system_.IndependentRows(rows_, 0, joint_rows_);
   selection_is_new_ = true;
   orientation_ = 0;
-  const int freedoms = system_.size() - static_cast<int>(selection_.size() + spins_.size());
-  if (freedoms != static_cast<int>(commands_.size())) {
-    return Failed(Stop::kUnsupported,
-                  fmt::format("the joints leave {} freedoms, but {} coordinates are commanded",
-                              freedoms, commands_.size()));
+  const int dofs = system_.size() - static_cast<int>(selection_.size() + spins_.size());
+  if (dofs != static_cast<int>(commands_.size())) {
+    return Failed(
+        Stop::kUnsupported,
+        fmt::format("the joints leave {} degrees of freedom, but {} coordinates are commanded",
+                    dofs, commands_.size()));
   }
   for (int k = joint_rows_; k < rows_.size(); ++k) selection_.push_back(k);
   return RunSummary::Done();
@@ -263,7 +264,7 @@ std::string ClosureSolver::OwnerOf(int joint_row) const {
   if (joint_row >= first_coupling_) return mechanism_.couplings[joint_row - first_coupling_].name;
   int row = 0;
   for (const Joint& joint : mechanism_.joints) {
-    row += 6 - FreedomsOf(joint.kind);
+    row += 6 - DofsOf(joint.kind);
     if (joint_row < row) return joint.name;
   }
   return "";
@@ -498,7 +499,7 @@ std::string MostMovingJoint(const Mechanism& mechanism, const BodyStates& states
   std::string name;
   double most = 0.0;
   for (const Joint& joint : mechanism.joints) {
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
       const ScalarRow row = JointCoordinateRow(joint, c, states);
       const bool length_unit = !row.J_child.tail<3>().isZero();
       const double rate =

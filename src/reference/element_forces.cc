@@ -9,7 +9,7 @@ namespace {
 
 struct AlongElement {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
-  int rubs = 0;                                                    // sign of the rate, 0 at rest
+  int friction_sign = 0;                                           // sign of the rate, 0 at rest
   Vec3 axis_W = Vec3::Zero(), w = Vec3::Zero(), e = Vec3::Zero();  // of a rotor's carrier
 };
 
@@ -38,10 +38,10 @@ double ForceOf(const RotorLaw& law, const AlongElement& at) {
 }
 
 double ForceOf(const FrictionLaw& law, const AlongElement& at) {
-  if (law.stribeck_rate == 0.0) return -at.rubs * law.coulomb;
+  if (law.stribeck_rate == 0.0) return -at.friction_sign * law.coulomb;
   const double slowness = at.rate / law.stribeck_rate;
   const double size = law.coulomb + (law.breakaway - law.coulomb) * std::exp(-slowness * slowness);
-  return -at.rubs * size;
+  return -at.friction_sign * size;
 }
 
 // (5), on the body that carries a rotor.
@@ -94,12 +94,13 @@ ElementSlope Slope(const FrictionLaw& /*law*/, double /*q*/) { return {}; }
 // visit(law, motion) of every element.
 template <typename Visit>
 void ForElements(const Mechanism& mechanism, const BodyStates& states,
-                 const std::vector<int>& rubbing, const Visit& visit) {
+                 const std::vector<int>& friction_signs, const Visit& visit) {
   if (mechanism.elements.empty()) return;
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
   for (size_t e = 0; e < rows.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
-    const AlongElement at = MotionOf(element, rows[e], states, rubbing.empty() ? 0 : rubbing[e]);
+    const AlongElement at =
+        MotionOf(element, rows[e], states, friction_signs.empty() ? 0 : friction_signs[e]);
     std::visit([&](const auto& law) { visit(law, rows[e], at); }, element.law);
   }
 }
@@ -119,8 +120,8 @@ void TakeCarrierMoments(const Mechanism& mechanism, const BodyStates& states,
 }  // namespace
 
 void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
-                       const std::vector<int>& rubbing, std::vector<Vec6>* wrench_W) {
-  ForElements(mechanism, states, rubbing,
+                       const std::vector<int>& friction_signs, std::vector<Vec6>* wrench_W) {
+  ForElements(mechanism, states, friction_signs,
               [&](const auto& law, const ScalarRow& row, const AlongElement& at) {
                 const double force = ForceOf(law, at);
                 (*wrench_W)[static_cast<size_t>(row.parent)] -= force * row.J_parent;
@@ -137,26 +138,26 @@ void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, En
 }
 
 void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<int>& rubbing, Powers* power) {
-  ForElements(mechanism, states, rubbing,
+                      const std::vector<int>& friction_signs, Powers* power) {
+  ForElements(mechanism, states, friction_signs,
               [&](const auto& law, const ScalarRow& /*row*/, const AlongElement& at) {
                 AddPower(law, at, power);
               });
 }
 
-std::vector<int> RubbingOf(const Mechanism& mechanism, const BodyStates& states,
-                           double duration_s) {
+std::vector<int> FrictionDirections(const Mechanism& mechanism, const BodyStates& states,
+                                    double duration_s) {
   if (FirstFriction(mechanism).empty()) return {};
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
-  std::vector<int> rubbing(rows.size(), 0);
+  std::vector<int> friction_signs(rows.size(), 0);
   for (size_t e = 0; e < rows.size(); ++e) {
     const ForceElement& element = mechanism.elements[e];
-    if (!Rubs(element)) continue;
+    if (!HasFriction(element)) continue;
     const double rate = RateOf(rows[e], states.V_WB);
     if (std::abs(rate) <= RestRate(mechanism, element, duration_s)) continue;
-    rubbing[e] = rate > 0.0 ? 1 : -1;
+    friction_signs[e] = rate > 0.0 ? 1 : -1;
   }
-  return rubbing;
+  return friction_signs;
 }
 
 VecX GradientOf(const ScalarRow& row, size_t bodies) {
@@ -167,12 +168,13 @@ VecX GradientOf(const ScalarRow& row, size_t bodies) {
 }
 
 std::vector<VecX> RestingWrenches(const Mechanism& mechanism, const BodyStates& states,
-                                  const std::vector<int>& rubbing, const VecX& load_friction) {
+                                  const std::vector<int>& friction_signs,
+                                  const VecX& load_friction) {
   std::vector<VecX> wrenches;
-  if (rubbing.empty()) return wrenches;
+  if (friction_signs.empty()) return wrenches;
   const std::vector<ScalarRow> rows = ElementRows(mechanism, states);
   for (size_t e = 0; e < rows.size(); ++e) {
-    if (rubbing[e] != 0 || !Rubs(mechanism.elements[e])) continue;
+    if (friction_signs[e] != 0 || !HasFriction(mechanism.elements[e])) continue;
     double most = std::get<FrictionLaw>(mechanism.elements[e].law).breakaway;
     if (load_friction.size() > 0) most += load_friction[static_cast<Eigen::Index>(e)];
     wrenches.push_back(most * GradientOf(rows[e], mechanism.bodies.size()));
@@ -186,7 +188,7 @@ double LoadFrictionLoss(const Mechanism& mechanism, const ReferenceSample& sampl
   double loss = 0.0;
   for (size_t e = 0; e < rows.size(); ++e) {
     const double size = sample.load_friction[static_cast<Eigen::Index>(e)];
-    loss += sample.rubbing[e] * size * RateOf(rows[e], sample.states.V_WB);
+    loss += sample.friction_signs[e] * size * RateOf(rows[e], sample.states.V_WB);
   }
   return loss;
 }

@@ -4,7 +4,8 @@
 //   spring   F = −(F0 + Σ_i k_i x^i),  x = q − free           E = F0 x + Σ_i k_i x^(i+1)/(i+1)  (2)
 //   rotor    F = −J n² q̈                                      E = ½ J n² q̇²                     (3)
 //   friction F = −(Fc + (Fs − Fc) exp(−(q̇/vs)²)) sign q̇       P = F q̇ to the dampers           (4)
-// A rotor about the axis a of a body that turns with ω and ε has the momentum h = J n q̇ a besides:
+// A rotor about the axis a of a body that turns with ω and ε has the additional momentum h = J n q̇
+// a:
 //   M = −dh/dt = −J n (q̈ a + q̇ ω × a) on that body            E += J n q̇ a·ω                    (5)
 //   F = −J n² q̈ − J n a·ε                                                                       (6)
 //
@@ -22,21 +23,21 @@
 
 namespace mbv::internal {
 
-/// Per force element: the sign of its rate where it rubs; 0 at rest (RestRate()) and for all that
-/// does not rub. Empty of a mechanism in which nothing does.
-[[nodiscard]] std::vector<int> RubbingOf(const Mechanism& mechanism, const BodyStates& states,
-                                         double duration_s);
+/// Per force element: the sign of its rate where it has dry friction; 0 at rest (RestRate()) and
+/// for all that has none. Empty for a mechanism without dry friction.
+[[nodiscard]] std::vector<int> FrictionDirections(const Mechanism& mechanism,
+                                                  const BodyStates& states, double duration_s);
 
 /// Takes the elements' forces away from the wrenches that bodies need (RequiredWrenches()); that
-/// of rotors at states.A_WB, that of friction in the directions of RubbingOf().
+/// of rotors at states.A_WB, that of friction in the directions of FrictionDirections().
 void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
-                       const std::vector<int>& rubbing, std::vector<Vec6>* wrench_W);
+                       const std::vector<int>& friction_signs, std::vector<Vec6>* wrench_W);
 
 /// Per element that rests: breakaway force (with `load_friction`) times its coordinate's gradient:
 /// the wrenches that statics may add or take.
 [[nodiscard]] std::vector<VecX> RestingWrenches(const Mechanism& mechanism,
                                                 const BodyStates& states,
-                                                const std::vector<int>& rubbing,
+                                                const std::vector<int>& friction_signs,
                                                 const VecX& load_friction);
 /// Power that friction by the joints' loads takes [W].
 [[nodiscard]] double LoadFrictionLoss(const Mechanism& mechanism, const ReferenceSample& sample);
@@ -46,7 +47,7 @@ void TakeElementForces(const Mechanism& mechanism, const BodyStates& states,
 void AddElementEnergies(const Mechanism& mechanism, const BodyStates& states, Energies* energy);
 /// Of the rotors: the rate of their kinetic energy.
 void AddElementPowers(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<int>& rubbing, Powers* power);
+                      const std::vector<int>& friction_signs, Powers* power);
 
 /// Adds what motions R (6·bodies × n) call for of rotors: Σ J n² u (uᵀR), u: gradient of the
 /// coordinate; with a carrier also J n (u aᵀ + a uᵀ) R.

@@ -209,8 +209,8 @@ VecX ForceSolver::LeastNorm(const VecX& wrenches) {
 RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSample* sample) {
   FillRows(sample->states);
   std::vector<Vec6> required;
-  sample->rubbing = RubbingOf(mechanism_, sample->states, duration_s_);
-  RequiredWrenches(mechanism_, sample->states, loads, sample->rubbing, &required);
+  sample->friction_signs = FrictionDirections(mechanism_, sample->states, duration_s_);
+  RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required);
   if (RunSummary summary = CheckSpinsIdle(spins_, sample->states, required, length_);
       !summary.ok()) {
     return summary;
@@ -318,7 +318,7 @@ RunSummary ForceSolver::AddLoadFriction(ReferenceSample* sample, VecX* force) {
     unit.col(static_cast<Eigen::Index>(d)) =
         -LeastNorm(GradientOf(rows[e], mechanism_.bodies.size()));
     system.p.push_back(AcrossAxis(mechanism_, e, reactions));
-    system.sign.push_back(sample->rubbing[e]);
+    system.sign.push_back(sample->friction_signs[e]);
     system.per_load.push_back(std::get<FrictionLaw>(mechanism_.elements[e].law).per_load());
   }
   for (const size_t e : loaded) {
@@ -354,7 +354,7 @@ void ForceSolver::FindBands(ReferenceSample* sample) {
   const auto bases = static_cast<Eigen::Index>(mechanism_.prescribed.size());
   VecX band = VecX::Zero(drives + bases);
   for (const VecX& wrenches :
-       RestingWrenches(mechanism_, sample->states, sample->rubbing, sample->load_friction)) {
+       RestingWrenches(mechanism_, sample->states, sample->friction_signs, sample->load_friction)) {
     VecX part = LeastNorm(wrenches).segment(first_driven_, drives + bases).cwiseAbs();
     TakeRoundoff(&part);
     band += part;
@@ -410,7 +410,7 @@ ScalarRow LengthRow(const SpringDamper& spring, const Mechanism& mechanism,
 }
 
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<LoadSample>& loads, const std::vector<int>& rubbing,
+                      const std::vector<LoadSample>& loads, const std::vector<int>& friction_signs,
                       std::vector<Vec6>* wrench_W) {
   wrench_W->assign(mechanism.bodies.size(), Vec6::Zero());
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
@@ -432,7 +432,7 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
     (*wrench_W)[row.parent] -= thrust * row.J_parent;
     (*wrench_W)[row.child] -= thrust * row.J_child;
   }
-  TakeElementForces(mechanism, states, rubbing, wrench_W);
+  TakeElementForces(mechanism, states, friction_signs, wrench_W);
 }
 
 MatX Momenta(const Mechanism& mechanism, const BodyStates& states, const MatX& R) {
@@ -467,7 +467,7 @@ Energies EnergyOf(const Mechanism& mechanism, const BodyStates& states) {
 }
 
 Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
-                const std::vector<LoadSample>& loads, const std::vector<int>& rubbing) {
+                const std::vector<LoadSample>& loads, const std::vector<int>& friction_signs) {
   Powers power;
   for (size_t b = 1; b < mechanism.bodies.size(); ++b) {
     const Body& body = mechanism.bodies[b];
@@ -488,7 +488,7 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
     power.dampers -= spring.damping * rate * rate;
     power.springs -= spring.stiffness * (row.value - spring.free_length_m) * rate;
   }
-  AddElementPowers(mechanism, states, rubbing, &power);
+  AddElementPowers(mechanism, states, friction_signs, &power);
   power.energy_rate -= power.springs;
   return power;
 }
@@ -496,7 +496,7 @@ Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
 void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& loads,
                  ReferenceSample* sample) {
   sample->energy = EnergyOf(mechanism, sample->states);
-  sample->power = PowersOf(mechanism, sample->states, loads, sample->rubbing);
+  sample->power = PowersOf(mechanism, sample->states, loads, sample->friction_signs);
   const auto drives = static_cast<Eigen::Index>(mechanism.drives.size());
   const VecX& velocity = sample->driven.velocity;
   Powers& power = sample->power;

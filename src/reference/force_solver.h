@@ -86,9 +86,9 @@ int FillReactions(const Mechanism& mechanism, const BodyStates& states, const Ve
 
 /// Wrench [m about Bo; f] that each body needs beyond gravity, springs, force elements and loads,
 /// in world axes: m a_cm and I ε + ω × I ω about the centre of mass, moved to the origin.
-/// `rubbing`: RubbingOf().
+/// `friction_signs`: FrictionDirections().
 void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
-                      const std::vector<LoadSample>& loads, const std::vector<int>& rubbing,
+                      const std::vector<LoadSample>& loads, const std::vector<int>& friction_signs,
                       std::vector<Vec6>* wrench_W);
 
 /// M R per body, of motions R (6·bodies × n), rotors included.
@@ -98,7 +98,7 @@ void RequiredWrenches(const Mechanism& mechanism, const BodyStates& states,
 /// Powers but for the base and the input.
 [[nodiscard]] Powers PowersOf(const Mechanism& mechanism, const BodyStates& states,
                               const std::vector<LoadSample>& loads,
-                              const std::vector<int>& rubbing);
+                              const std::vector<int>& friction_signs);
 /// Energies and all powers of a sample whose forces and driven motion are known.
 void AuditSample(const Mechanism& mechanism, const std::vector<LoadSample>& loads,
                  ReferenceSample* sample);

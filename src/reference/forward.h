@@ -34,10 +34,10 @@ struct ForwardOptions {
 };
 
 /// A singular pose that the motion passed or came close to.
-struct SingularPassage {
+struct SingularityCrossing {
   double time_s = kNan;
   double pivot = kNan;  ///< weakest constraint there over its largest value in this run
-  std::string joint;    ///< moves most in the momentary freedom
+  std::string joint;    ///< moves most in the momentary DOF
   bool passed = false;  ///< the pivot vanishes there to within the search
 };
 
@@ -46,7 +46,7 @@ struct ForwardRun {
   RunSummary summary;  ///< kSingular, kNoConvergence, kUnsupported, or what the start failed with
   BodyStates start;    ///< at t = 0
   long steps = 0, evaluations = 0;
-  std::vector<SingularPassage> singular;
+  std::vector<SingularityCrossing> singular;
   /// Largest difference over all samples to the run with 100 times the tolerance, in drive
   /// positions and outputs, lengths over the characteristic length [1]: an upper estimate of the
   /// integration error. Where the samples alone set the steps, to a run with half of them. At least

@@ -223,7 +223,7 @@ std::string FrameModel::MostMovingJoint(const VecX& twists) const {
     return 0.0;
   };
   for (const Joint& joint : mechanism_.joints) {
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
       const ScalarRow row = JointCoordinateRow(joint, c, states_);
       const double moved = std::abs(rate(joint.parent, joint.X_PF.translation(), row.J_parent) +
                                     rate(joint.child, joint.X_CM.translation(), row.J_child)) /

@@ -71,7 +71,7 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       length_(CharacteristicLength(mechanism)),
       lever_(LongestLever(mechanism)),
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
-      freedoms_(static_cast<int>(motion.initial.size())),
+      dofs_(static_cast<int>(motion.initial.size())),
       spins_(IdleSpins(mechanism)),
       near_(mechanism, length_),
       loaded_(LoadedElements(mechanism)) {
@@ -113,7 +113,7 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
           row_scale_[i] * body_scale_.segment<6>(at).cwiseProduct(rows_.J[p]);
     }
   }
-  const Eigen::Index rank = size_ - freedoms_;
+  const Eigen::Index rank = size_ - dofs_;
   if (rows_.size() == 0) {  // nothing to factor: every body floats
     pivot_ = rank == 0 ? 1.0 : 0.0;
     return;
@@ -130,7 +130,7 @@ void FreeDynamics::Factor(double t_s, const BodyStates& states) {
 Eigen::Index FreeDynamics::FirmRank() const {
   if (rows_.size() == 0) return 0;
   const auto pivots = qr_.matrixQR().diagonal();
-  Eigen::Index rank = std::min<Eigen::Index>(size_ - freedoms_, pivots.size());
+  Eigen::Index rank = std::min<Eigen::Index>(size_ - dofs_, pivots.size());
   while (rank > 0 && std::abs(pivots[rank - 1]) < kFirm * std::abs(pivots[0])) --rank;
   return rank;
 }
@@ -147,14 +147,14 @@ VecX FreeDynamics::LeastMotion(const VecX& rates, Eigen::Index rank) const {
 }
 
 MatX FreeDynamics::Motions() const {
-  MatX motions = MatX::Zero(size_, freedoms_);
-  motions.bottomRows(freedoms_).setIdentity();
+  MatX motions = MatX::Zero(size_, dofs_);
+  motions.bottomRows(dofs_).setIdentity();
   if (rows_.size() > 0) motions.applyOnTheLeft(qr_.householderQ());
   return body_scale_.asDiagonal() * motions;
 }
 
 std::string FreeDynamics::SoftJoint(const BodyStates& states) const {
-  const Eigen::Index weakest = size_ - freedoms_ - 1;
+  const Eigen::Index weakest = size_ - dofs_ - 1;
   if (weakest < 0) return "";
   // The part of the weakest row that no stronger one holds.
   VecX motion = VecX::Unit(size_, weakest);
@@ -171,17 +171,18 @@ RunSummary FreeDynamics::Singular(double t_s, const BodyStates& states) const {
   summary.amount = pivot_;
   summary.unit = std::string("1");
   summary.message = fmt::format(
-      "the loops lose a constraint at this pose: besides the {} freedom{} of the mechanism, {} "
+      "the loops lose a constraint at this pose: in addition to the {} degree{} of freedom of the "
+      "mechanism, {} "
       "moves freely there, so the way on is not determined (relative pivot {:.1e})",
-      freedoms_ + static_cast<int>(motion_.commands.size()),
-      freedoms_ + motion_.commands.size() == 1 ? "" : "s", summary.where, pivot_);
+      dofs_ + static_cast<int>(motion_.commands.size()),
+      dofs_ + motion_.commands.size() == 1 ? "" : "s", summary.where, pivot_);
   return summary;
 }
 
-RunSummary FreeDynamics::CheckFreedoms(double t_s) const {
+RunSummary FreeDynamics::CheckDofs(double t_s) const {
   if (rows_.size() == 0) return RunSummary::Done();
   const auto pivots = qr_.matrixQR().diagonal();
-  const Eigen::Index rank = size_ - freedoms_;
+  const Eigen::Index rank = size_ - dofs_;
   if (rank >= pivots.size() || !(std::abs(pivots[rank]) > kExtra * std::abs(pivots[0]))) {
     return RunSummary::Done();
   }
@@ -191,9 +192,10 @@ RunSummary FreeDynamics::CheckFreedoms(double t_s) const {
   summary.amount = std::abs(pivots[rank]) / std::abs(pivots[0]);
   summary.unit = std::string("1");
   summary.message = fmt::format(
-      "the loops and commands leave fewer than the {} freedoms that have initial values: the home "
+      "the loops and commands leave fewer than the {} degrees of freedom that have initial values: "
+      "the home "
       "pose was singular, or a command contradicts another (relative pivot {:.1e})",
-      freedoms_, summary.amount);
+      dofs_, summary.amount);
   return summary;
 }
 
@@ -212,10 +214,10 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   FollowElements(mechanism_, states);
   Factor(t_s, *states);
   if (!(pivot_ > kLost)) return Singular(t_s, *states);
-  if (RunSummary summary = CheckFreedoms(t_s); !summary.ok()) return summary;
+  if (RunSummary summary = CheckDofs(t_s); !summary.ok()) return summary;
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
   rates.tail(command_.acceleration.size()) += command_.acceleration;
-  const VecX A_p = LeastMotion(rates, size_ - freedoms_);
+  const VecX A_p = LeastMotion(rates, size_ - dofs_);
   Unstack(A_p, &states->A_WB);
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
@@ -237,9 +239,9 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
     summary.time_s = t_s;
     summary.where = MostMovingJoint(mechanism_, *states, R * eigen.eigenvectors().col(0));
     summary.names_where = true;
-    summary.message =
-        fmt::format("a freedom near {} has no inertia, so forces do not determine its acceleration",
-                    summary.where);
+    summary.message = fmt::format(
+        "a degree of freedom near {} has no inertia, so forces do not determine its acceleration",
+        summary.where);
     return summary;
   }
   rest_.f = R.transpose() * (Stack(drives) - Stack(required));
@@ -254,7 +256,7 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
 // The rows that the last factorisation picked.
 void FreeDynamics::ChooseNear() {
   if (near_.chosen() || !near_.apply()) return;
-  const Eigen::Index rank = size_ - freedoms_;
+  const Eigen::Index rank = size_ - dofs_;
   if (rank > 0 && (rows_.size() == 0 || rank > qr_.cols())) return;
   std::vector<int> rows;
   for (Eigen::Index k = 0; k < rank; ++k) rows.push_back(qr_.colsPermutation().indices()[k]);
@@ -330,7 +332,7 @@ double FreeDynamics::ShareLeft(const ScalarRow& row) const {
   VecX turned = body_scale_.cwiseProduct(GradientOf(row, mechanism_.bodies.size()));
   const double size = turned.norm();
   if (rows_.size() > 0) turned.applyOnTheLeft(qr_.householderQ().adjoint());
-  return turned.tail(freedoms_).norm() / size;
+  return turned.tail(dofs_).norm() / size;
 }
 
 RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) {

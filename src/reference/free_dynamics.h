@@ -1,7 +1,7 @@
 // Accelerations of a mechanism whose motion follows from forces. Internal to reference/.
 //
 // With the scaled Jacobian J of all joint rows and commands, a QR factorisation of Jᵀ with column
-// pivoting at the present pose picks k = n − f independent rows (n: body coordinates, f: freedoms
+// pivoting at the present pose picks k = n − f independent rows (n: body coordinates, f: DOFs
 // that move by forces) and gives an orthonormal basis R of the motions they leave:
 //   J R = 0                                                                                    (1)
 //   A = A_p + R u̇,  A_p = J⁺(ẍ − b)  (least norm)                                             (2)
@@ -13,9 +13,9 @@
 //
 // Elements of dry friction slide in a given direction, or are held: then u̇ keeps their coordinates
 // at rest, and the least change of R u puts poses and rates back there (rest_decision.h). Those
-// whose coordinate loops and commands lead are in nobody's way: their rate tells their direction.
+// whose coordinate loops and commands prescribe have the direction of their rate.
 //
-// Friction by the joints' loads (load_friction.h) moves the freedoms, and they the loads: with u̇_0
+// Friction by the joints' loads (load_friction.h) moves the DOFs, and they the loads: with u̇_0
 // and reactions of the state without it, and g_d = Rᵀ∇q_d,
 //   u̇ = u̇_0 + Σ_d F_d a_d,  H a_d = g_d (what is held stays),                                  (4)
 //   p_e: load by A_p + R u̇_0,  P_ed: load by M R a_d − ∇q_d alone                             (5)
@@ -61,15 +61,15 @@ struct FrictionPhase {
   std::vector<int> sign;     ///< per force element: of the rate with which it slides; otherwise 0
   std::vector<size_t> held;  ///< those that stick, increasing …
   std::vector<double> at;    ///< … and the values of their coordinates [m or rad]
-  std::vector<size_t> led;   ///< those whose rate tells their sign
+  std::vector<size_t> led;   ///< those whose rate gives their sign
 };
 
 class FreeDynamics {
  public:
-  /// Both outlive the object. motion.initial.size() freedoms move by forces.
+  /// Both outlive the object. motion.initial.size() DOFs move by forces.
   FreeDynamics(const Mechanism& mechanism, const Motion& motion);
 
-  /// A_WB at t from X_WB and V_WB. kSingular where the pose leaves more freedoms than that, where
+  /// A_WB at t from X_WB and V_WB. kSingular where the pose leaves more DOFs than that, where
   /// one of them has no inertia, or where friction by loads is not determined; kUnsupported where
   /// redundant constraints share such a load.
   [[nodiscard]] RunSummary Accelerate(double t_s, BodyStates* states);
@@ -111,10 +111,10 @@ class FreeDynamics {
   /// Largest translation and rotation residual over all joints.
   void Gaps(const BodyStates& states, double* position_m, double* rotation_rad) const;
 
-  [[nodiscard]] bool rubs_by_load() const { return !loaded_.empty(); }
+  [[nodiscard]] bool has_load_friction() const { return !loaded_.empty(); }
   [[nodiscard]] double length() const { return length_; }
-  [[nodiscard]] int freedoms() const { return freedoms_; }
-  /// Basis R of the last factorisation, scaled back: 6·bodies × freedoms.
+  [[nodiscard]] int dofs() const { return dofs_; }
+  /// Basis R of the last factorisation, scaled back: 6·bodies × DOFs.
   [[nodiscard]] MatX Motions() const;
 
  private:
@@ -149,7 +149,7 @@ class FreeDynamics {
   };
   /// `held`: with what is held.
   [[nodiscard]] ForceRows ForceRowsAt(const BodyStates& states, bool held) const;
-  /// Motion of the freedoms by f, what is held at rest.
+  /// Motion of the DOFs by f, what is held at rest.
   [[nodiscard]] VecX MotionBy(const VecX& f);
   /// (4), (5): finds load_friction_ at states.A_WB = A_p + R u̇_0 and adds it to rest_.
   [[nodiscard]] RunSummary AddLoadFriction(double t_s, const BodyStates& states, const MatX& R,
@@ -175,7 +175,7 @@ class FreeDynamics {
   /// Per drive: the given force at t, or the next of those solved for.
   [[nodiscard]] VecX GivenOr(double t_s, const VecX& solved) const;
   void AddDriveForces(double t_s, const BodyStates& states, std::vector<Vec6>* wrench_W) const;
-  [[nodiscard]] RunSummary CheckFreedoms(double t_s) const;
+  [[nodiscard]] RunSummary CheckDofs(double t_s) const;
   void FillRows(double t_s, const BodyStates& states);
   void ChooseNear();
   [[nodiscard]] RunSummary Singular(double t_s, const BodyStates& states) const;
@@ -183,7 +183,7 @@ class FreeDynamics {
   const Mechanism& mechanism_;
   const Motion& motion_;
   const double length_, lever_;
-  const int size_, freedoms_;
+  const int size_, dofs_;
   const std::vector<Spin> spins_;  ///< idle: their rows stand between couplings and commands
   VecX body_scale_;
   RowSet rows_;

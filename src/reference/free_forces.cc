@@ -79,8 +79,8 @@ std::vector<int> FreeDynamics::SignsAt(const BodyStates& states) const {
   std::vector<int> sign = phase_.sign;
   if (sign.empty()) sign.assign(mechanism_.elements.size(), 0);  // before the first phase
   if (phase_.led.empty()) return sign;
-  const std::vector<int> rubbing = RubbingOf(mechanism_, states, motion_.duration_s);
-  for (const size_t e : phase_.led) sign[e] = rubbing[e];
+  const std::vector<int> signs = FrictionDirections(mechanism_, states, motion_.duration_s);
+  for (const size_t e : phase_.led) sign[e] = signs[e];
   return sign;
 }
 
@@ -255,7 +255,7 @@ void FreeDynamics::SolveForces(double t_s, ReferenceSample* sample) {
   EvaluateMotion(motion_, t_s, &command_);
   const bool open = !held.allFinite();  // too many ways to share: least norm
   const ForceRows at = ForceRowsAt(states, open);
-  sample->rubbing = SignsAt(states);
+  sample->friction_signs = SignsAt(states);
   VecX wrenches = NeededWrenches(t_s, states) - LoadFrictionWrenches(states);
   if (!open && held.size() > 0) wrenches -= HeldRows(states).gradients.transpose() * held;
   const VecX force = at.Solve(body_scale_.cwiseProduct(wrenches));
@@ -273,7 +273,7 @@ void FreeDynamics::FindLedBands(const ForceRows& at, ReferenceSample* sample) co
   sample->drive_band = VecX::Zero(sample->drive_force.size());
   sample->prescribed_band = VecX::Zero(sample->prescribed_force.size());
   if (phase_.led.empty()) return;
-  std::vector<int> held_too = sample->rubbing;
+  std::vector<int> held_too = sample->friction_signs;
   for (const size_t e : phase_.held) held_too[e] = 1;
   const int drives = at.first_prescribed - at.first_driven;
   for (const VecX& wrenches :

@@ -112,7 +112,7 @@ bool FreeMotion::AtDeadCentre(const ScalarRow& row) const {
   return dynamics_.ShareLeft(row) < kLed;
 }
 
-// Its rate is within the error of freedoms at rest, or, at a dead centre, within round-off.
+// Its rate is within the error of DOFs at rest, or, at a dead centre, within round-off.
 bool FreeMotion::Rests(size_t element, const ScalarRow& row) const {
   const std::vector<Vec6>& V_WB = now_.states.V_WB;
   const double least = AtDeadCentre(row) ? kTurns * MostOf(row, V_WB, dynamics_.length())
@@ -129,8 +129,8 @@ std::vector<size_t> FreeMotion::LedElements() {
     return of;
   };
   dynamics_.Factor(now_.time_s, now_.states);
-  led = keep_led(now_.states, rubbing_);
-  VecX aside = dynamics_.Motions() * VecX::Ones(dynamics_.freedoms());
+  led = keep_led(now_.states, friction_elements_);
+  VecX aside = dynamics_.Motions() * VecX::Ones(dynamics_.dofs());
   aside *= kAside / SizeOf(aside, dynamics_.length());
   for (const double sense : {1.0, -1.0}) {
     if (led.empty()) break;
@@ -141,17 +141,17 @@ std::vector<size_t> FreeMotion::LedElements() {
   return led;
 }
 
-// Elements whose coordinate moves by forces are at rest where nothing tells their rate from zero;
+// Elements whose coordinate moves by forces are at rest where their rate does not differ from zero;
 // commands lead the others.
 RunSummary FreeMotion::BeginFriction() {
   FrictionEvent start;
   FrictionPhase phase;
   phase.sign.assign(mechanism_.elements.size(), 0);
   phase.led = LedElements();
-  std::erase_if(rubbing_, [&](size_t e) { return std::ranges::count(phase.led, e) > 0; });
+  std::erase_if(friction_elements_, [&](size_t e) { return std::ranges::count(phase.led, e) > 0; });
   dynamics_.Factor(0.0, now_.states);
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     if (Rests(e, rows[e])) {
       start.stops.push_back(e);
     } else {
@@ -167,7 +167,7 @@ RunSummary FreeMotion::BeginFriction() {
 
 // Before a step: forces may have jumped, and what has just started may set others free.
 RunSummary FreeMotion::CheckFriction() {
-  if (rubbing_.empty()) return RunSummary::Done();
+  if (friction_elements_.empty()) return RunSummary::Done();
   FollowDeadCentres();
   if (dynamics_.phase().held.empty()) return RunSummary::Done();
   for (;;) {
@@ -188,7 +188,7 @@ RunSummary FreeMotion::CheckFriction() {
 }
 
 RunSummary FreeMotion::AcceptWithFriction(const State& x, double t_s, double tried_s) {
-  if (rubbing_.empty()) return Accept(x, t_s);
+  if (friction_elements_.empty()) return Accept(x, t_s);
   const State from = Pack(now_);
   const std::optional<FrictionEvent> event = FirstEvent(from, tried_s, x);
   if (!trouble_.ok()) return trouble_;
@@ -226,7 +226,7 @@ void FreeMotion::FindStops(const State& from, double h, const State& to, Frictio
   if (!trouble_.ok()) return;
   const std::vector<ScalarRow> at_begin = ElementRows(mechanism_, begin),
                                at_end = ElementRows(mechanism_, end);
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     const double s = dynamics_.phase().sign[e];
     if (s == 0.0) continue;
     const auto rate = [&](double after_s) {
@@ -305,13 +305,13 @@ void FreeMotion::FindStart(const State& from, double h, const State& to, Frictio
   if (at < first->after_s) *first = {.after_s = at, .stops = {}, .starts = true};
 }
 
-// All that is at rest: held, just stopped, or too slow to tell; not what has just started.
+// All that is at rest: held, just stopped, or too slow to decide; not what has just started.
 FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
   const FrictionPhase& phase = dynamics_.phase();
   const std::vector<ScalarRow> rows = ElementRows(mechanism_, now_.states);
   dynamics_.Factor(now_.time_s, now_.states);
   FrictionPhase resting{.sign = phase.sign, .held = {}, .at = {}, .led = phase.led};
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     const auto held = std::ranges::find(phase.held, e);
     const bool stopped = std::ranges::find(event.stops, e) != event.stops.end();
     const bool rests = phase.sign[e] == 0 || stopped || (fresh_[e] == 0 && Rests(e, rows[e]));
@@ -326,7 +326,7 @@ FrictionPhase FreeMotion::RestingPhase(const FrictionEvent& event) {
 }
 
 // What rests at a dead centre is not held: it slides on as loops have it, whatever its friction.
-// The acceleration gives the direction; where the freedoms rest as well, FollowDeadCentres() does.
+// The acceleration gives the direction; where the DOFs rest as well, FollowDeadCentres() does.
 RunSummary FreeMotion::LeaveDeadCentres(FrictionPhase* resting) {
   BodyStates at = now_.states;
   if (RunSummary summary = dynamics_.Accelerate(now_.time_s, &at); !summary.ok()) return summary;
@@ -350,12 +350,12 @@ RunSummary FreeMotion::LeaveDeadCentres(FrictionPhase* resting) {
   return RunSummary::Done();
 }
 
-// What stands at a dead centre slides as the freedoms take it along in the step ahead, if they do:
+// What stands at a dead centre slides as the DOFs take it along in the step ahead, if they do:
 // by the shortest part of it in which the rate shows.
 void FreeMotion::FollowDeadCentres() {
   FrictionPhase phase = dynamics_.phase();
   std::vector<size_t> open;
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     if (phase.sign[e] == 0 && std::ranges::count(phase.held, e) == 0) open.push_back(e);
   }
   if (open.empty()) return;
@@ -428,8 +428,8 @@ bool FreeMotion::PassesThrough(const FrictionPhase& resting, const std::vector<s
 
 RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
   FrictionPhase next = RestingPhase(event);
-  if (++settled_here_ > 4 + 2 * static_cast<int>(rubbing_.size())) {
-    return Contradiction(next.held.empty() ? rubbing_.front() : next.held.front(),
+  if (++settled_here_ > 4 + 2 * static_cast<int>(friction_elements_.size())) {
+    return Contradiction(next.held.empty() ? friction_elements_.front() : next.held.front(),
                          "stops and starts again and again", settled_here_, "times");
   }
   if (now_.time_s > 0.0) events_s_.push_back(now_.time_s);
@@ -438,7 +438,7 @@ RunSummary FreeMotion::Settle(const FrictionEvent& event, double h) {
   std::erase_if(stopping, [held = dynamics_.phase().held](size_t e) {
     return std::ranges::count(held, e) > 0;
   });
-  const bool alone = !event.starts && (stopping.empty() || dynamics_.rubs_by_load());
+  const bool alone = !event.starts && (stopping.empty() || dynamics_.has_load_friction());
   if (!alone || !PassesThrough(next, stopping)) {
     if (RunSummary summary = DecideResting(next, event.starts, h); !summary.ok()) return summary;
   }

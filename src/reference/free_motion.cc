@@ -24,7 +24,7 @@ constexpr double kSmallestStepShare = 1e-10;  // of the duration
 // Below this share of the largest pivot steps go half the way to the singular pose at most.
 constexpr double kApproach = 0.2;
 constexpr size_t kMostNodes = 600;
-constexpr long kTold = 64;  // steps from one word about the progress to the next
+constexpr long kProgressSteps = 64;  // steps from one report of the progress to the next
 // Steps from one look ahead to the next; and how far above what is left the estimate must be, which
 // is good to some percent.
 constexpr long kLook = 1000;
@@ -64,7 +64,7 @@ FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double 
       tolerance_(tolerance),
       fresh_(mechanism.elements.size(), 0) {
   for (size_t e = 0; e < mechanism.elements.size(); ++e) {
-    if (Rubs(mechanism.elements[e])) rubbing_.push_back(e);
+    if (HasFriction(mechanism.elements[e])) friction_elements_.push_back(e);
   }
   now_.states.Resize(mechanism.bodies.size());
   work_states_ = sampled_ = now_.states;
@@ -111,7 +111,7 @@ RunSummary FreeMotion::Start(const BodyStates& states) {
   if (RunSummary summary = dynamics_.Project(0.0, &now_.states); !summary.ok()) return summary;
   RunSummary summary = dynamics_.Accelerate(0.0, &now_.states);
   now_.pivot = largest_pivot_ = dynamics_.pivot();
-  if (!summary.ok() || rubbing_.empty()) return summary;
+  if (!summary.ok() || friction_elements_.empty()) return summary;
   return BeginFriction();
 }
 
@@ -215,7 +215,8 @@ RunSummary FreeMotion::Segment(double to_s) {
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
     if (++tried_steps_ > effort_.most_steps) return TooManySteps();
-    if (effort_.progress && tried_steps_ % kTold == 0) effort_.progress(now_.time_s / duration_s_);
+    if (effort_.progress && tried_steps_ % kProgressSteps == 0)
+      effort_.progress(now_.time_s / duration_s_);
     if (tried_steps_ % kLook == 0) {
       if (RunSummary summary = LookAhead(); !summary.ok()) return summary;
     }
@@ -442,7 +443,7 @@ bool FreeMotion::Land(const Hermite& way, double at_s, Node* node) {
 }
 
 void FreeMotion::TryBridge() {
-  if (!rubbing_.empty()) return;  // what slides could stop on it
+  if (!friction_elements_.empty()) return;  // what slides could stop on it
   if (!(now_.pivot < kBridge * largest_pivot_)) return;
   const double half = TimeToSingular(), landing = now_.time_s + 2.0 * half;
   if (!std::isfinite(landing)) return;
@@ -460,7 +461,7 @@ void FreeMotion::TryBridge() {
     *states = now_.states;
     Unpack({x.begin(), x.end()}, states, nullptr);
   };
-  passages_.push_back(Closest(now_.time_s, landing, states_at));
+  crossings_.push_back(Closest(now_.time_s, landing, states_at));
   bridge_ = Bridge{now_.time_s, landing, *std::move(way)};
   now_ = std::move(end);
   nodes_.clear();
@@ -477,14 +478,14 @@ void FreeMotion::Watch() {
     *states = last.states;
     MoveBodies(dt * Stack(states->V_WB) + 0.5 * dt * dt * Stack(states->A_WB), states);
   };
-  const SingularPassage passage = Closest(before.time_s, now_.time_s, states_at);
-  if (passage.pivot < kNear * largest_pivot_) passages_.push_back(passage);
+  const SingularityCrossing crossing = Closest(before.time_s, now_.time_s, states_at);
+  if (crossing.pivot < kNear * largest_pivot_) crossings_.push_back(crossing);
 }
 
 // Golden-section search for the smallest pivot. It falls and rises like |t|, so that the time can
 // be found to round-off; Boost's minimiser stops at its root, where a parabola would be flat.
 template <typename StatesAt>
-SingularPassage FreeMotion::Closest(double first_s, double last_s, const StatesAt& states_at) {
+SingularityCrossing FreeMotion::Closest(double first_s, double last_s, const StatesAt& states_at) {
   BodyStates states;
   const auto pivot_at = [&](double t_s) {
     states_at(t_s, &states);
@@ -511,18 +512,18 @@ SingularPassage FreeMotion::Closest(double first_s, double last_s, const StatesA
     }
   }
   const double t_s = 0.5 * (a + b);
-  SingularPassage passage{.time_s = t_s, .pivot = pivot_at(t_s), .joint = {}};
-  passage.joint = dynamics_.SoftJoint(states);
-  return passage;
+  SingularityCrossing crossing{.time_s = t_s, .pivot = pivot_at(t_s), .joint = {}};
+  crossing.joint = dynamics_.SoftJoint(states);
+  return crossing;
 }
 
-std::vector<SingularPassage> FreeMotion::Passages() const {
-  std::vector<SingularPassage> passages = passages_;
-  for (SingularPassage& passage : passages) {
-    passage.pivot /= largest_pivot_;
-    passage.passed = passage.pivot < kPassed;
+std::vector<SingularityCrossing> FreeMotion::Crossings() const {
+  std::vector<SingularityCrossing> crossings = crossings_;
+  for (SingularityCrossing& crossing : crossings) {
+    crossing.pivot /= largest_pivot_;
+    crossing.passed = crossing.pivot < kPassed;
   }
-  return passages;
+  return crossings;
 }
 
 }  // namespace mbv::internal

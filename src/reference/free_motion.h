@@ -12,7 +12,7 @@
 // equations are smooth. After each step the rates of what slides and the load of what sticks
 // (rest_decision.h) are looked at, also within the step; where one passes its bound, the same
 // scheme with shorter steps brackets that time to round-off, and the motion goes on from there. At
-// a dead centre a coordinate is at rest although the freedoms are not: it turns, and is never held.
+// a dead centre a coordinate is at rest although the DOFs are not: it turns, and is never held.
 #pragma once
 
 #include <deque>
@@ -31,7 +31,7 @@
 
 namespace mbv::internal {
 
-/// How long an integration may take, and whom it tells how far it is.
+/// How long an integration may take, and where its progress is reported.
 struct Effort {
   long most_steps = 0;                            ///< tried ones included
   std::function<void(double fraction)> progress;  ///< of the motion's duration; may be empty
@@ -57,8 +57,8 @@ class FreeMotion {
   [[nodiscard]] const std::vector<double>& friction_events() const { return events_s_; }
   [[nodiscard]] long steps() const { return steps_; }
   [[nodiscard]] long evaluations() const { return evaluations_; }
-  /// Passages found so far, in time order.
-  [[nodiscard]] std::vector<SingularPassage> Passages() const;
+  /// Crossings found so far, in time order.
+  [[nodiscard]] std::vector<SingularityCrossing> Crossings() const;
 
  private:
   using State = std::vector<double>;
@@ -123,7 +123,7 @@ class FreeMotion {
                                          const std::string& unit) const;
   [[nodiscard]] State StepFrom(const State& from, double h);
   [[nodiscard]] VecX ElementRates(const BodyStates& states) const;
-  /// Rates that the integration does not tell from zero.
+  /// Rates that the integration does not distinguish from zero.
   [[nodiscard]] double Resolved(size_t element) const;
   [[nodiscard]] BodyStates StatesOf(const State& x) const;
   [[nodiscard]] RunSummary NoWayOn(double dt_s) const;
@@ -131,7 +131,8 @@ class FreeMotion {
   /// Every so many steps: whether the springs let the rest be done with the steps that are left.
   [[nodiscard]] RunSummary LookAhead();
   template <typename StatesAt>
-  [[nodiscard]] SingularPassage Closest(double first_s, double last_s, const StatesAt& states_at);
+  [[nodiscard]] SingularityCrossing Closest(double first_s, double last_s,
+                                            const StatesAt& states_at);
 
   struct Stepper;
   const Mechanism& mechanism_;
@@ -154,10 +155,10 @@ class FreeMotion {
   long steps_ = 0, tried_steps_ = 0, evaluations_ = 0;
   double looked_s_ = 0.0;  ///< time of the last LookAhead()
   double largest_pivot_ = 0.0;
-  std::vector<SingularPassage> passages_;
+  std::vector<SingularityCrossing> crossings_;
   const double tolerance_;
-  std::vector<size_t> rubbing_;  ///< elements of dry friction
-  std::vector<char> fresh_;      ///< per element: slides since this very time
+  std::vector<size_t> friction_elements_;  ///< with dry friction
+  std::vector<char> fresh_;                ///< per element: slides since this very time
   std::vector<double> events_s_;
   int settled_here_ = 0;  ///< how often friction was decided at this very time
 };
@@ -176,7 +177,7 @@ struct SpringMode {
   std::string spring;        ///< or force element that has most of its energy
 };
 
-/// At a pose; `motions` (6·bodies × freedoms) is a basis of what the constraints leave there.
+/// At a pose; `motions` (6·bodies × DOFs) is a basis of what the constraints leave there.
 [[nodiscard]] SpringMode FastestSpringMode(const Mechanism& mechanism, const BodyStates& states,
                                            const MatX& motions);
 

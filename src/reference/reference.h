@@ -43,8 +43,8 @@ struct ReferenceSample {
   VecX prescribed_force;  ///< per prescribed joint
   MatX reactions;         ///< joints × 6: [fx fy fz mx my mz] as ReactionChannels() defines
   MatX outputs;           ///< outputs × 6
-  /// Per force element, of those that rub: sign of the rate, 0 at rest (RestRate()).
-  std::vector<int> rubbing;
+  /// Per force element, of those with dry friction: sign of the rate, 0 at rest (RestRate()).
+  std::vector<int> friction_signs;
   /// Per force element: friction by its joint's load, μ r N; empty where none depends on it.
   VecX load_friction;
   VecX drive_band, prescribed_band;  ///< half-widths of what friction at rest leaves open

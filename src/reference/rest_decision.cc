@@ -28,13 +28,13 @@ MatX UnitRows(const MatX& G) {
   return unit;
 }
 
-// The freedoms that held elements take (first `rank` columns) and those they leave.
+// The DOFs that held elements take (first `rank` columns) and those they leave.
 struct Split {
   MatX Q;
   Eigen::Index rank = 0;
 };
 
-Split SplitFreedoms(const MatX& G) {
+Split SplitDofs(const MatX& G) {
   Split split;
   split.Q = MatX::Identity(G.cols(), G.cols());
   if (G.rows() == 0 || G.cols() == 0) return split;
@@ -117,7 +117,7 @@ bool Consistent(const RestSystem& system, const std::vector<int>& sign) {
 }  // namespace
 
 VecX HeldMotion(const RestSystem& system) {
-  const Split split = SplitFreedoms(system.G);
+  const Split split = SplitDofs(system.G);
   const Eigen::Index left = system.G.cols() - split.rank;
   VecX u = VecX::Zero(system.G.cols());
   if (split.rank > 0) {
@@ -133,7 +133,7 @@ VecX HeldMotion(const RestSystem& system) {
 VecX LeastShares(const RestSystem& system) {
   const Eigen::Index count = system.G.rows();
   VecX share = VecX::Zero(count);
-  if (SplitFreedoms(system.G).rank == count) {
+  if (SplitDofs(system.G).rank == count) {
     const VecX load = system.H * HeldMotion(system) - system.f;
     return system.G.transpose().colPivHouseholderQr().solve(load);
   }
@@ -170,7 +170,7 @@ VecX LeastShares(const RestSystem& system) {
 double LoadRatio(const RestSystem& system, VecX* direction) {
   if (system.G.rows() == 0) return 0.0;
   const VecX load = system.H * HeldMotion(system) - system.f;
-  const Split split = SplitFreedoms(system.G);
+  const Split split = SplitDofs(system.G);
   const MatX P = split.Q.leftCols(split.rank);
   const MatX along = system.G * P, unit = UnitRows(system.G) * P;
   const VecX r = P.transpose() * load;

@@ -21,9 +21,9 @@
 namespace mbv::internal {
 
 struct RestSystem {
-  MatX H;     ///< inertia (freedoms × freedoms)
-  VecX f;     ///< forces along the freedoms but for friction at rest
-  MatX G;     ///< gradients of the coordinates at rest (elements × freedoms)
+  MatX H;     ///< inertia (DOF × DOF)
+  VecX f;     ///< forces along the DOFs but for friction at rest
+  MatX G;     ///< gradients of the coordinates at rest (elements × DOFs)
   VecX d;     ///< their accelerations where u̇ = 0
   VecX most;  ///< breakaway forces F_e > 0
 };
@@ -31,7 +31,7 @@ struct RestSystem {
 /// u̇ with all elements held.
 [[nodiscard]] VecX HeldMotion(const RestSystem& system);
 
-/// (4) of all elements held; NaN where too many of them share the load to tell. `direction`: G y
+/// (4) of all elements held; NaN where too many of them share the load. `direction`: G y
 /// of the motion that is nearest to starting, per element, where forces would drive it.
 [[nodiscard]] double LoadRatio(const RestSystem& system, VecX* direction = nullptr);
 

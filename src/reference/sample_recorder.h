@@ -12,8 +12,8 @@
 namespace mbv::internal {
 
 /// Reads drives, prescribed joints and outputs from body states. Drives and prescribed joints count
-/// the turns that the states tell; of an output's angles the last sample says which turn they are
-/// in.
+/// the rotations that the states count; of an output's angles the last sample says which turn they
+/// are in.
 class SampleRecorder {
  public:
   explicit SampleRecorder(const Mechanism& mechanism) : mechanism_(mechanism) {}

@@ -24,7 +24,7 @@ class SquareSystem {
   [[nodiscard]] int size() const { return size_; }
 
   /// Chooses rows independent of each other among the `rows` with first <= index < last, by QR
-  /// with column pivoting, of many bodies by sparse QR where that tells clearly; increasing. Fewer
+  /// with column pivoting, of many bodies by sparse QR where that is clear; increasing. Fewer
   /// than size() if their rank is less.
   [[nodiscard]] std::vector<int> IndependentRows(const RowSet& rows, int first, int last) const;
 
@@ -70,10 +70,11 @@ class SquareSystem {
   VecX soft_force_, soft_motion_;
 };
 
-/// Scaled singular values below this cannot be told from zero. Near a singular pose loops closed to
-/// 1e-13 leave the pose open to its square root, 3e-7, and the singular value with it; ten times
-/// that. Loops that coordinates far from the origin close less well, to `rounding` [characteristic
-/// lengths, GapRounding()], leave more open; a typical rounding is a tenth of the bound.
+/// Scaled singular values below this cannot be distinguished from zero. Near a singular pose loops
+/// closed to 1e-13 leave the pose open to its square root, 3e-7, and the singular value with it;
+/// ten times that. Loops that coordinates far from the origin close less well, to `rounding`
+/// [characteristic lengths, GapRounding()], leave more open; a typical rounding is a tenth of the
+/// bound.
 [[nodiscard]] inline double SingularValueLimit(double rounding) {
   return std::max(3e-6, 10 * std::sqrt(0.1 * rounding));
 }

@@ -92,7 +92,7 @@ struct Annotations {
 };
 
 /// Arrows of one frame's drive forces with ghosts where bodies hide them, and rings around the
-/// closures that face a camera looking along `forward_W`. A closure that came apart by more than
+/// closures that face a camera looking along `forward_W`. A closure with an error of more than
 /// half its ball gets a red bar across the gap.
 [[nodiscard]] Annotations Annotate(const Mechanism& mechanism, const PictureFrame& frame,
                                    const Scale& scale, const PictureOptions& options,

@@ -14,7 +14,7 @@ namespace mbv::render {
 /// Vertical field of view [deg]; small, so that parallel edges stay nearly parallel.
 inline constexpr double kFieldOfView_deg = 26.0;
 
-/// From where is looked unless told otherwise [deg].
+/// The default direction of view [deg].
 inline constexpr double kUsualAzimuth_deg = -60.0, kUsualElevation_deg = 16.0;
 
 struct Camera {

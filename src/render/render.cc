@@ -90,7 +90,7 @@ RunSummary Unsupported(std::string message) {
   return summary;
 }
 
-// Every frame and overlay must fit the mechanism; the first offence is told.
+// Every frame and overlay must fit the mechanism; the first that does not is reported.
 RunSummary CheckInput(const Mechanism& mechanism, const std::vector<PictureFrame>& frames,
                       const Overlay& overlay) {
   for (std::size_t f = 0; f < frames.size(); ++f) {
@@ -232,7 +232,7 @@ RunSummary RenderPictures(const Mechanism& mechanism, const std::vector<PictureF
   PictureOptions options = asked;
   std::vector<PictureFrame> shown = frames;
   if (options.exploded > 1.0) {
-    options.closures = false;  // all of them came apart
+    options.closures = false;  // all of them are open
     for (PictureFrame& frame : shown) frame = rn::Exploded(mechanism, frame, options.exploded);
   }
   const rn::Arrangement set = rn::Arrange(mechanism, rn::WithGhosts(shown), overlay, options);

@@ -23,7 +23,7 @@ RunSummary Failure(const std::string& message) {
 }
 
 // The i-th point of a sequence that fills the square −0.5 … 0.5 evenly (generalised golden ratio).
-// It starts where the first three lie far apart, so that they tell what is uneven.
+// It starts where the first three lie far apart, so that they show what is uneven.
 Eigen::Vector2d EvenPoint(int i) {
   const int k = i + kFirstPoint;
   const double a = 0.5 + 0.7548776662466927 * k, b = 0.5 + 0.5698402909980532 * k;

@@ -179,7 +179,7 @@ std::string SignalsHtml(const Report& report) {
 
 std::string TimesText(const Report& report) {
   const Timing& timing = report.timing;
-  if (!timing.told) return "";
+  if (!timing.stated) return "";
   std::string times = fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
                                   timing.analytic_s, timing.reference_s, timing.simulation_s);
   if (timing.foreign_s > 0.0) {
@@ -266,7 +266,7 @@ class PageWriter {
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("Motors", "Motors", SizingHtml(report_));
     page_.Add("The simulator's own error", "Engine", EngineHtml(report_));
-    page_.Add("Your own file, run as it is", "File", OwnFileHtml(report_.own_file.get()));
+    page_.Add("Your own file, run as it is", "File", SourceModelHtml(report_.source_model.get()));
     page_.Add("Energy", "Energy", EnergyHtml(report_));
     page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
     page_.Add("The paper's equations", "Equations", AuditHtml(input_.audit));

@@ -252,7 +252,7 @@ std::string ToJson(const Report& report) {
   if (report.comparison.table) json["reference_table"] = ReferenceTableJson(report.comparison);
   if (!report.tables.empty()) json["motion_tables"] = MotionTableJson(report);
   if (report.engine_comparison) json["engine_error"] = EngineJson(*report.engine_comparison);
-  if (report.own_file != nullptr) json["own_file"] = OwnFileJson(*report.own_file);
+  if (report.source_model != nullptr) json["source_model"] = SourceModelJson(*report.source_model);
   json["loads"] = LoadsJson(report);
   if (!report.motors.empty()) json["motors"] = SizingJson(report);
   json["findings"] = FindingsJson(report.findings);

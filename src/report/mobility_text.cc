@@ -45,11 +45,12 @@ std::string HeadText(const Mechanism& mechanism, const Mobility& m) {
   return text;
 }
 
-std::string FreedomsText(const MobilityReport& report, bool coupled) {
+std::string DofsText(const MobilityReport& report, bool coupled) {
   const Mobility& m = report.home;
   std::string text = fmt::format(
-      "  freedoms: {} = {} body coordinates - rank {} of {} joint{} constraints{}\n", m.freedoms,
-      m.body_coordinates, m.constraint_rank, m.constraint_rows, coupled ? " and coupling" : "",
+      "  degrees of freedom: {} = {} body coordinates - rank {} of {} joint{} constraints{}\n",
+      m.dofs, m.body_coordinates, m.constraint_rank, m.constraint_rows,
+      coupled ? " and coupling" : "",
       m.idle_spins.empty()
           ? ""
           : " - " + Count(static_cast<int>(m.idle_spins.size()), "idle spin", "idle spins"));
@@ -62,7 +63,8 @@ std::string FreedomsText(const MobilityReport& report, bool coupled) {
     text += fmt::format(
         "  the home pose is singular: {} at home, {} at {} random poses nearby; choose guesses for "
         "another home\n",
-        Count(m.freedoms, "freedom", "freedoms"), report.freedoms(), report.nearby.size());
+        Count(m.dofs, "degree of freedom", "degrees of freedom"), report.dofs(),
+        report.nearby.size());
   } else if (report.nearby.empty()) {
     text += "    by numerical rank at home";
   } else {
@@ -85,7 +87,7 @@ std::string SpinText(const MobilityReport& report) {
     text += fmt::format("  spin of {}, idle: no force turns it, and no command needs to\n", name);
   }
   for (const std::string& spin : report.spins_not_idle) {
-    text += fmt::format("  spin between two balls that is a freedom: {}\n", spin);
+    text += fmt::format("  spin between two balls that is a degree of freedom: {}\n", spin);
   }
   return text;
 }
@@ -100,7 +102,8 @@ std::vector<std::string> SharersOf(const StressGroup& group) {
 std::string RedundancyText(const MobilityReport& report) {
   const Mobility& m = report.home;
   std::string text = fmt::format(
-      "  redundant constraints: {}; Kutzbach's count, which cannot see them, gives {} freedoms\n",
+      "  redundant constraints: {}; Kutzbach's count, which cannot see them, gives {} degrees of "
+      "degree of freedom\n",
       m.redundant, m.kutzbach);
   if (m.redundant == 0) {
     text = fmt::format("  redundant constraints: 0; Kutzbach's count is right\n");
@@ -109,9 +112,10 @@ std::string RedundancyText(const MobilityReport& report) {
     text += fmt::format("    {} shared by {}\n", group.count, Joined(SharersOf(group)));
   }
   for (const LoopCount& loop : report.loops) {
-    text += fmt::format("  loop {}: {}, screws of rank {}{}\n", Joined(loop.joints, " "),
-                        Count(loop.joint_freedoms, "joint freedom", "joint freedoms"),
-                        loop.screw_rank, loop.screw_rank == 3 ? " (planar or spherical)" : "");
+    text +=
+        fmt::format("  loop {}: {}, screws of rank {}{}\n", Joined(loop.joints, " "),
+                    Count(loop.joint_dofs, "joint degree of freedom", "joint degrees of freedom"),
+                    loop.screw_rank, loop.screw_rank == 3 ? " (planar or spherical)" : "");
   }
   return text;
 }
@@ -121,11 +125,12 @@ std::string DrivenText(const MobilityReport& report) {
   if (m.undriven == 0) return "  drives and prescribed joints determine the motion\n";
   std::string text =
       fmt::format("  {} left when drives and prescribed joints are locked; {} can still move\n",
-                  Count(m.undriven, "freedom is", "freedoms are"), Joined(report.free_bodies));
+                  Count(m.undriven, "degree of freedom is", "degrees of freedom are"),
+                  Joined(report.free_bodies));
   if (report.drives_singular()) {
     text += fmt::format(
         "  only at home: nearby the drives leave {}; the home pose is singular for these drives\n",
-        Count(report.undriven(), "freedom", "freedoms"));
+        Count(report.undriven(), "degree of freedom", "degrees of freedom"));
   }
   return text;
 }
@@ -136,8 +141,8 @@ std::string ReasonText(const StressGroup& group) {
   all.insert(all.end(), group.prescribed.begin(), group.prescribed.end());
   if (!all.empty()) {
     return fmt::format(
-        "    {} hold each other: {} more than the freedoms they share (through {})\n", Joined(all),
-        Count(group.count, "drive", "drives"),
+        "    {} hold each other: {} more than the degrees of freedom they share (through {})\n",
+        Joined(all), Count(group.count, "drive", "drives"),
         SharersOf(group).empty() ? "no joint" : Joined(SharersOf(group)));
   }
   return fmt::format("    {} share {}: forces can act there against each other without any load\n",
@@ -177,7 +182,7 @@ Json GroupsJson(const std::vector<StressGroup>& groups) {
 }
 
 Json PoseJson(const Mobility& m) {
-  return {{"freedoms", m.freedoms},
+  return {{"freedoms", m.dofs},
           {"redundant", m.redundant},
           {"undriven", m.undriven},
           {"smallest_kept", m.smallest_kept},
@@ -190,7 +195,7 @@ Json PoseJson(const Mobility& m) {
 
 std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report) {
   std::string text = HeadText(mechanism, report.home) +
-                     FreedomsText(report, !mechanism.couplings.empty()) + SpinText(report) +
+                     DofsText(report, !mechanism.couplings.empty()) + SpinText(report) +
                      RedundancyText(report) + DrivenText(report) + ForcesText(mechanism, report);
   text += "  drives:";
   for (const Drive& drive : mechanism.drives) text += " " + drive.name;
@@ -210,7 +215,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
                {"joint_constraints", report.home.constraint_rows},
                {"constraint_rank", report.home.constraint_rank},
                {"kutzbach", report.home.kutzbach},
-               {"freedoms", report.freedoms()},
+               {"freedoms", report.dofs()},
                {"home_singular", report.home_singular()},
                {"drives_singular_at_home", report.drives_singular()}};
   json["drives"] = Json::array();
@@ -231,7 +236,7 @@ std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& repor
   for (const LoopCount& loop : report.loops) {
     json["loops"].push_back({{"closure", loop.closure},
                              {"joints", loop.joints},
-                             {"joint_freedoms", loop.joint_freedoms},
+                             {"joint_freedoms", loop.joint_dofs},
                              {"screw_rank", loop.screw_rank}});
   }
   json["redundant_constraints"] = GroupsJson(report.redundant);

@@ -10,7 +10,7 @@ namespace mbv {
 /// Lines for the terminal.
 [[nodiscard]] std::string MobilityText(const Mechanism& mechanism, const MobilityReport& report);
 
-/// JSON, schema "mbverify.model/1": name, file, bodies, joints, freedoms, loops, redundant
+/// JSON, schema "mbverify.model/1": name, file, bodies, joints, DOFs, loops, redundant
 /// constraints, undetermined forces.
 [[nodiscard]] std::string MobilityJson(const Mechanism& mechanism, const MobilityReport& report);
 

@@ -9,8 +9,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of the second derivative's mean square: 1 % of its RMS is told without being asked.
-constexpr double kToldShare = 1e-4;
+// Of the second derivative's mean square: 1 % of its RMS is reported unasked.
+constexpr double kReportedShare = 1e-4;
 
 std::string SmoothingText(const MotionTable& table) {
   if (!table.smoothed()) return "none";
@@ -69,7 +69,7 @@ std::vector<std::string> MotionTableLines(const Report& report, bool verbose) {
   for (const MotionTable& table : report.tables) {
     lines.push_back(fmt::format("{} follows column '{}' of {}: {}; smoothing: {}", table.name,
                                 table.column, table.file, KindText(table), SmoothingText(table)));
-    if (table.moves && (verbose || table.smoothed() || table.noise_share() > kToldShare)) {
+    if (table.moves && (verbose || table.smoothed() || table.noise_share() > kReportedShare)) {
       lines.push_back(
           fmt::format("  {} by {}, the second derivative by {} (RMS of all: {:.4g})",
                       table.smoothed() ? "smoothing changes it" : "smoothing: auto would change it",

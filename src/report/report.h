@@ -19,7 +19,7 @@
 
 namespace mbv {
 
-struct OwnFileAudit;  // report/source_model_report.h
+struct SourceModelAudit;  // report/source_model_report.h
 
 /// One witness' part in a run.
 struct WitnessRecord {
@@ -93,8 +93,8 @@ struct Report : ResultFrame {
   std::vector<Motor> motors;                   ///< of the model
   std::vector<MotorLoad> motor_loads;          ///< by witness that ran, then by motor
   std::optional<EngineComparison> engine_comparison;
-  std::shared_ptr<const OwnFileAudit> own_file;  ///< of a robot's MJCF; null without one
-  std::vector<std::string> pictures;             ///< file names below snapshots/
+  std::shared_ptr<const SourceModelAudit> source_model;  ///< of a robot's MJCF; null without one
+  std::vector<std::string> pictures;                     ///< file names below snapshots/
 };
 
 /// summary.json.

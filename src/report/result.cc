@@ -166,7 +166,7 @@ Json SummaryHead(const ResultView& view) {
 }
 
 void AddSummaryEnd(const ResultView& view, Json* json) {
-  if (view.frame->timing.told) (*json)["timing"] = TimingJson(view);
+  if (view.frame->timing.stated) (*json)["timing"] = TimingJson(view);
   (*json)["versions"] = Json::object();
   for (const auto& [name, version] : view.frame->versions) (*json)["versions"][name] = version;
 }

@@ -4,7 +4,7 @@
 //   ResultView ViewOf(const KindReport&)
 //
 // From it the page (page.h, result_html.h), the text for a terminal (terminal_text.h) and
-// summary.json (result_json.h) take what every kind tells: title, verdict, findings, checks, what
+// summary.json (result_json.h) take what every kind reports: title, verdict, findings, checks, what
 // was not compared, inputs and versions. Its own sections, tables and fields it adds there.
 #pragma once
 
@@ -28,8 +28,8 @@ struct Timing {
   double total_s = 0.0;
   double loop_s = 0.0;  ///< inside the step loop of the judged simulation
   long steps = 0;
-  /// false: files do not tell it, and are the same whenever and wherever the run is repeated.
-  bool told = true;
+  /// false: files do not state it, and are the same whenever and wherever the run is repeated.
+  bool stated = true;
 };
 
 /// What was run, of what, and with what.

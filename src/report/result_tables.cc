@@ -96,13 +96,13 @@ PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& repor
   add("joints", std::to_string(mechanism.joints.size()));
   add("loops", std::to_string(report.loops.size()));
   add("constraints, rank", fmt::format("{}, {}", m.constraint_rows, m.constraint_rank));
-  add("freedoms", std::to_string(report.freedoms()));
+  add("degrees of freedom", std::to_string(report.dofs()));
   if (!m.idle_spins.empty()) add("idle spins", std::to_string(m.idle_spins.size()));
   add("Kutzbach's count", std::to_string(m.kutzbach));
   add("redundant constraints", std::to_string(report.redundant_count()));
   add("drives", std::to_string(m.drives));
   add("prescribed joints", std::to_string(m.prescribed));
-  add("freedoms with all of these locked", std::to_string(report.undriven()));
+  add("degrees of freedom with all of these locked", std::to_string(report.undriven()));
   add("drive forces that statics leaves open", NoneOr(m.drives_not_unique));
   add("joints with reactions left open", NoneOr(m.joints_not_unique));
   if (report.home_singular()) add("home pose", "singular");

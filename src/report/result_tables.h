@@ -1,4 +1,4 @@
-// What a paper tells of a model and of a run, as tables.
+// What a paper reports of a model and of a run, as tables.
 #pragma once
 
 #include <map>
@@ -22,7 +22,7 @@ struct StatedNumber {
 /// digits there; one that was computed or set from outside with six digits at most.
 [[nodiscard]] PaperTable ParameterTable(const std::vector<Parameter>& parameters,
                                         const std::map<std::string, StatedNumber>& stated);
-/// Bodies, joints, freedoms, redundant constraints, what drives and statics determine.
+/// Bodies, joints, DOFs, redundant constraints, what drives and statics determine.
 [[nodiscard]] PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& report);
 /// Every check that has a limit: what is compared, value, limit, how it ended.
 [[nodiscard]] PaperTable CheckTable(const ResultView& view);

@@ -13,14 +13,14 @@ namespace mbv {
 
 double Removed(double as_is, double without) { return 1.0 - without / as_is; }
 
-// Mended by itself it takes most of the error with it, or left by itself it makes most of it: where
-// causes hide each other only one of the two shows.
-std::vector<const OwnCause*> OwnFileAudit::Culprits() const {
+// Corrected by itself it takes most of the error with it, or left by itself it makes most of it:
+// where causes hide each other only one of the two shows.
+std::vector<const SourceModelCause*> SourceModelAudit::Culprits() const {
   constexpr double kMost = 0.5;
-  std::vector<const OwnCause*> culprits;
+  std::vector<const SourceModelCause*> culprits;
   if (!as_is.sound()) return culprits;
-  const double rest = mended.sound() ? mended.force : 0.0;
-  for (const OwnCause& cause : causes) {
+  const double rest = corrected.sound() ? corrected.force : 0.0;
+  for (const SourceModelCause& cause : causes) {
     const bool removes = cause.without.sound() && Removed(as_is.force, cause.without.force) > kMost;
     const bool makes = cause.alone.sound() && cause.alone.force * cause.alone.force - rest * rest >
                                                   kMost * kMost * as_is.force * as_is.force;
@@ -29,9 +29,9 @@ std::vector<const OwnCause*> OwnFileAudit::Culprits() const {
   return culprits;
 }
 
-std::string OwnFileSentence(const OwnFileAudit& audit) {
-  if (!audit.declined.empty()) return "your own file was not run: " + audit.declined;
-  const OwnError& e = audit.as_is;
+std::string SourceModelSentence(const SourceModelAudit& audit) {
+  if (!audit.declined.empty()) return "the source model was not run: " + audit.declined;
+  const SourceModelError& e = audit.as_is;
   if (!e.sound()) {
     return fmt::format("with its own settings your file gives no forces that could be compared: {}",
                        e.failure);
@@ -49,7 +49,7 @@ std::string OwnFileSentence(const OwnFileAudit& audit) {
         "the reference to {:.1e}, and {}",
         e.force, gap);
   }
-  if (e.force <= OwnFileAudit::kGoodForce) {
+  if (e.force <= SourceModelAudit::kGoodForce) {
     return fmt::format("with its own settings your file's drive forces agree to {:.1e}, but {}",
                        e.force, gap);
   }
@@ -81,9 +81,9 @@ void WriteLines(const std::vector<std::string>& lines, TerminalText* out) {
 
 }  // namespace
 
-void WriteOwnFile(const OwnFileAudit& audit, TerminalText* out) {
+void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out) {
   out->Line();
-  out->Line("  " + Sentence(OwnFileSentence(audit)));
+  out->Line("  " + Sentence(SourceModelSentence(audit)));
   if (!audit.declined.empty()) return;
   WriteLines({SettingsLine(audit)}, out);
   WriteLines(audit.done, out);
@@ -97,7 +97,7 @@ void WriteOwnFile(const OwnFileAudit& audit, TerminalText* out) {
   }
   if (!audit.lines.empty()) {
     out->Line();
-    out->Line("    to mend it, paste this before </mujoco>:");
+    out->Line("    recommended settings, to be pasted before </mujoco>:");
     std::string lines = audit.lines;
     for (size_t end = lines.find('\n'); end != std::string::npos; end = lines.find('\n')) {
       out->Line("      " + lines.substr(0, end));
@@ -135,16 +135,17 @@ std::string Paragraph(const std::string& text) {
 
 }  // namespace
 
-std::string OwnFileHtml(const OwnFileAudit* audit) {
+std::string SourceModelHtml(const SourceModelAudit* audit) {
   if (audit == nullptr) return "";
-  std::string html = "<p class=\"reason\">" + Escape(Sentence(OwnFileSentence(*audit))) + "</p>\n";
+  std::string html =
+      "<p class=\"reason\">" + Escape(Sentence(SourceModelSentence(*audit))) + "</p>\n";
   if (!audit->declined.empty()) return html;
   html += ListHtml(MeasuredLines(*audit)) + ListHtml(audit->notes);
   html += Folded("How it was run", ListHtml({SettingsLine(*audit)}) + ListHtml(audit->done));
-  html += TableHtml("One thing mended at a time", CauseHead(), CauseCells(*audit));
+  html += TableHtml("One setting corrected at a time", CauseHead(), CauseCells(*audit));
   if (!audit->Good(audit->as_is)) html += Paragraph(CauseSentence(*audit));
   std::string meanings;
-  for (const OwnCause& cause : audit->causes) {
+  for (const SourceModelCause& cause : audit->causes) {
     meanings +=
         "<p><b>" + Escape(Sentence(cause.title)) + "</b> " + Escape(cause.meaning) + "</p>\n";
   }
@@ -156,8 +157,9 @@ std::string OwnFileHtml(const OwnFileAudit* audit) {
             ListHtml(SearchLines(*audit));
   }
   if (!audit->lines.empty()) {
-    html += "<p>To mend it, paste this before <code>&lt;/mujoco&gt;</code>:</p>\n<pre>" +
-            Escape(audit->lines) + "</pre>\n" + ListHtml(PastedLines(*audit));
+    html +=
+        "<p>Recommended settings, to be pasted before <code>&lt;/mujoco&gt;</code>:</p>\n<pre>" +
+        Escape(audit->lines) + "</pre>\n" + ListHtml(PastedLines(*audit));
   }
   return html +
          Note(fmt::format("Every number is a run of MuJoCo on the file itself, in all {:.1f} "
@@ -169,7 +171,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json ErrorJson(const OwnError& e) {
+Json ErrorJson(const SourceModelError& e) {
   if (!e.sound()) return {{"failure", e.failure}, {"time_s", Number(e.time_s)}};
   return {{"force_nrmse_later", Number(e.force)},
           {"force_nrmse", Number(e.force_all)},
@@ -190,8 +192,8 @@ Json ErrorJson(const OwnError& e) {
 
 }  // namespace
 
-nlohmann::ordered_json OwnFileJson(const OwnFileAudit& audit) {
-  Json json = {{"file", audit.file}, {"sentence", OwnFileSentence(audit)}};
+nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit) {
+  Json json = {{"file", audit.file}, {"sentence", SourceModelSentence(audit)}};
   if (!audit.declined.empty()) {
     json["declined"] = audit.declined;
     return json;
@@ -205,16 +207,16 @@ nlohmann::ordered_json OwnFileJson(const OwnFileAudit& audit) {
   json["later_s"] = audit.later_s;
   json["as_is"] = ErrorJson(audit.as_is);
   json["causes"] = Json::array();
-  for (const OwnCause& cause : audit.causes) {
+  for (const SourceModelCause& cause : audit.causes) {
     json["causes"].push_back({{"cause", cause.key},
                               {"title", cause.title},
                               {"removes", Number(Removed(audit.as_is.force, cause.without.force))},
                               {"without", ErrorJson(cause.without)},
                               {"alone", ErrorJson(cause.alone)}});
   }
-  json["mended"] = ErrorJson(audit.mended);
+  json["corrected"] = ErrorJson(audit.corrected);
   json["trials"] = Json::array();
-  for (const OwnTrial& trial : audit.trials) {
+  for (const SourceModelTrial& trial : audit.trials) {
     json["trials"].push_back({{"step_s", Number(trial.step_s)},
                               {"integrator", trial.integrator},
                               {"solref", trial.solref},
@@ -240,7 +242,7 @@ std::string Share(double share) {
 }
 
 // A number of a run, or what became of it.
-std::string OrUnsound(const OwnError& error, double value) {
+std::string OrUnsound(const SourceModelError& error, double value) {
   return error.sound() ? NumberCell(value) : "unsound";
 }
 
@@ -253,9 +255,10 @@ std::string OfClosures(const std::vector<std::string>& values) {
   return values[0];
 }
 
-std::vector<std::string> CauseRowOf(const OwnFileAudit& audit, const std::string& title,
-                                    const OwnError& without, const OwnError* alone) {
-  const OwnError& own = audit.as_is;
+std::vector<std::string> CauseRowOf(const SourceModelAudit& audit, const std::string& title,
+                                    const SourceModelError& without,
+                                    const SourceModelError* alone) {
+  const SourceModelError& own = audit.as_is;
   const bool both = own.sound() && without.sound();
   return {title,
           OrUnsound(without, without.force),
@@ -267,15 +270,15 @@ std::vector<std::string> CauseRowOf(const OwnFileAudit& audit, const std::string
 
 }  // namespace
 
-std::string SettingsLine(const OwnFileAudit& audit) {
+std::string SettingsLine(const SourceModelAudit& audit) {
   return fmt::format("{}: step {:g} ms, {}, solver {}, loops with solref {}, solimp {}",
                      std::filesystem::path(audit.file).filename().string(), 1e3 * audit.step_s,
                      audit.integrator, audit.solver, OfClosures(audit.solref),
                      OfClosures(audit.solimp));
 }
 
-std::vector<std::string> MeasuredLines(const OwnFileAudit& audit) {
-  const OwnError& e = audit.as_is;
+std::vector<std::string> MeasuredLines(const SourceModelAudit& audit) {
+  const SourceModelError& e = audit.as_is;
   if (!e.sound()) return {};
   std::vector<std::string> lines;
   if (std::isfinite(e.force)) {
@@ -295,32 +298,35 @@ std::vector<std::string> MeasuredLines(const OwnFileAudit& audit) {
   return lines;
 }
 
-std::string CauseSentence(const OwnFileAudit& audit) {
+std::string CauseSentence(const SourceModelAudit& audit) {
   constexpr double kUnexplained = 0.2;
-  const OwnError &own = audit.as_is, &mended = audit.mended;
-  if (audit.causes.empty() || !mended.sound()) {
-    return mended.sound() ? "" : "with everything mended it still is unsound: " + mended.failure;
+  const SourceModelError &own = audit.as_is, &corrected = audit.corrected;
+  if (audit.causes.empty() || !corrected.sound()) {
+    return corrected.sound()
+               ? ""
+               : "with all of them corrected it is still unsound: " + corrected.failure;
   }
   if (!own.sound())
-    return fmt::format("with everything mended {:.1e} of the force is error", mended.force);
-  const std::vector<const OwnCause*> culprits = audit.Culprits();
+    return fmt::format("with all of them corrected the force error is {:.1e}", corrected.force);
+  const std::vector<const SourceModelCause*> culprits = audit.Culprits();
   std::string text;
   if (culprits.empty()) {
     text = "No single thing makes most of the force error.";
   } else {
     std::string titles;
-    for (const OwnCause* cause : culprits) titles += (titles.empty() ? "" : "; ") + cause->title;
+    for (const SourceModelCause* cause : culprits)
+      titles += (titles.empty() ? "" : "; ") + cause->title;
     text = fmt::format("{}: {}. {}",
                        culprits.size() == 1
                            ? "Most of the force error is made by one thing"
                            : "Most of the force error is made by things that act together",
                        titles, culprits[0]->meaning);
   }
-  if (mended.force > std::max(kUnexplained * own.force, OwnFileAudit::kGoodForce)) {
+  if (corrected.force > std::max(kUnexplained * own.force, SourceModelAudit::kGoodForce)) {
     text += fmt::format(
-        " But {:.2g} % of the force stays wrong with all of them mended: that is no matter of "
+        " But {:.2g} % of the force stays wrong with all of them corrected: the cause is not "
         "settings, the file computes another mechanism than the reference.",
-        100.0 * mended.force);
+        100.0 * corrected.force);
   }
   if (!audit.searched && audit.Good(audit.bare)) {
     text += fmt::format(
@@ -336,19 +342,19 @@ std::vector<std::string> CauseHead() {
           "loop gap [m]",        "removed",     "it alone leaves"};
 }
 
-std::vector<std::vector<std::string>> CauseCells(const OwnFileAudit& audit) {
+std::vector<std::vector<std::string>> CauseCells(const SourceModelAudit& audit) {
   std::vector<std::vector<std::string>> cells;
-  const OwnError& own = audit.as_is;
+  const SourceModelError& own = audit.as_is;
   cells.push_back(
       {"as your file is", OrUnsound(own, own.force), "", OrUnsound(own, own.gap_m), "", ""});
-  for (const OwnCause& cause : audit.causes) {
+  for (const SourceModelCause& cause : audit.causes) {
     cells.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
   }
-  cells.push_back(CauseRowOf(audit, "without all of these", audit.mended, nullptr));
+  cells.push_back(CauseRowOf(audit, "without all of these", audit.corrected, nullptr));
   return cells;
 }
 
-std::vector<std::string> SearchLines(const OwnFileAudit& audit) {
+std::vector<std::string> SearchLines(const SourceModelAudit& audit) {
   if (!audit.searched) return {};
   std::vector<std::string> lines = {fmt::format(
       "{} of {} settings were run{}; of each the file's drives are led exactly, and what the "
@@ -357,7 +363,7 @@ std::vector<std::string> SearchLines(const OwnFileAudit& audit) {
       std::isnan(audit.budget_s)
           ? ""
           : fmt::format(", which took the {:g} s that it may take", audit.budget_s))};
-  for (const OwnTrial& trial : audit.trials) {
+  for (const SourceModelTrial& trial : audit.trials) {
     if (trial.other.empty() || audit.trials.empty()) continue;
     const bool same = trial.error.force == audit.trials[0].error.force;
     lines.push_back(same ? trial.other + " changes nothing: it acts on the friction of contacts"
@@ -369,7 +375,7 @@ std::vector<std::string> SearchLines(const OwnFileAudit& audit) {
   return lines;
 }
 
-std::vector<std::string> PastedLines(const OwnFileAudit& audit) {
+std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
   if (audit.lines.empty()) return {};
   std::vector<std::string> lines;
   if (!audit.stubborn.empty()) {
@@ -393,10 +399,10 @@ std::vector<std::string> TrialHead() {
   return {"step", "integrator", "solref", "solimp", "force error", "loop gap", "ms per s", ""};
 }
 
-std::vector<std::vector<std::string>> TrialCells(const OwnFileAudit& audit, bool all) {
+std::vector<std::vector<std::string>> TrialCells(const SourceModelAudit& audit, bool all) {
   std::vector<std::vector<std::string>> cells;
   for (size_t i = 0; i < audit.trials.size(); ++i) {
-    const OwnTrial& trial = audit.trials[i];
+    const SourceModelTrial& trial = audit.trials[i];
     const bool recommended = static_cast<int>(i) == audit.recommended;
     if (!all && i > 0 && !trial.front && !recommended) continue;
     std::string mark = recommended && i > 0 ? "recommended" : i == 0 ? "your file" : trial.other;

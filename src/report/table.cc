@@ -30,7 +30,7 @@ class VerdictTableWriter {
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
     if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
     Engine(report);
-    if (report.own_file != nullptr) WriteOwnFile(*report.own_file, &out_);
+    if (report.source_model != nullptr) WriteSourceModel(*report.source_model, &out_);
     Energy(report.comparison);
     Tail(report);
     if (out_.verbose()) {

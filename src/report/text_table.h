@@ -1,4 +1,4 @@
-// A table of plain text: its columns are told once, for the headings and for every row.
+// A table of plain text: its columns are given once, for the headings and for every row.
 #pragma once
 
 #include <fmt/format.h>

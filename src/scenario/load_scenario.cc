@@ -167,7 +167,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     }
   }
 
-  // Samples must fall on whole steps: the next smaller step that divides them. Told where the
+  // Samples must fall on whole steps: the next smaller step that divides them. Reported where the
   // scenario states another one.
   void FitStep(const YamlNode* simulation) {
     const bool stated = simulation != nullptr && simulation->Find("step_s") != nullptr;
@@ -274,15 +274,15 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
                             scenario_.motion.duration_s * signals / kMostValues));
   }
 
-  // Drives that are pushed or servos need forces or commands for all freedoms, and the engine whose
-  // constraints hold moving loops.
+  // Drives that are force-controlled or servos need forces or commands for all DOFs, and the engine
+  // whose constraints hold moving loops.
   void CheckDriveBy(const YamlNode& motion, const YamlNode* simulation) {
     const SimulationSettings& settings = scenario_.simulation;
     if (!settings.on || settings.drive_by == DriveBy::kMotion) return;
     const bool servo = settings.drive_by == DriveBy::kServos;
     const std::string mode = servo ? "simulation.mode = servo" : "simulation.mode = force_driven";
     if (scenario_.motion.free()) {
-      yaml_.Error(*simulation, mode + ": every freedom needs a command",
+      yaml_.Error(*simulation, mode + ": every degree of freedom needs a command",
                   "forces that the scenario gives itself work with mode: forward");
     }
     if (settings.stock_engine) yaml_.Error(*simulation, mode + " runs with engine: corrected only");
@@ -296,34 +296,35 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     CheckGain(*simulation->Find("kv"), "simulation.kv", settings.servo.kv, *mechanism_, &yaml_);
     const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
     const auto drives = mechanism_->drives.size(), bases = mechanism_->prescribed.size();
-    if (!scenario_.motion.free() && static_cast<int>(drives + bases) != rank.freedoms) {
-      yaml_.Error(motion,
-                  fmt::format("{}: {} drives and {} prescribed joints for {} freedoms; a servo "
-                              "needs its own",
-                              mode, drives, bases, rank.freedoms));
+    if (!scenario_.motion.free() && static_cast<int>(drives + bases) != rank.dofs) {
+      yaml_.Error(
+          motion,
+          fmt::format("{}: {} drives and {} prescribed joints for {} degrees of freedom; a servo "
+                      "needs its own",
+                      mode, drives, bases, rank.dofs));
     }
   }
 
-  // Every freedom needs one command, or a start value where it moves by forces.
+  // Every DOF needs one command, or a start value where it moves by forces.
   void CheckCommands(const YamlNode& motion) {
     if (scenario_.motion.free()) {
       const SimulationSettings& settings = scenario_.simulation;
       if (settings.on && !settings.forward) {
-        yaml_.Error(motion, "simulation.mode = inverse, but some freedoms move by forces",
+        yaml_.Error(motion, "simulation.mode = inverse, but some degrees of freedom move by forces",
                     "inverse dynamics needs every motion: use mode: forward");
       }
       return;
     }
     const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
     const auto commands = static_cast<int>(scenario_.motion.commands.size());
-    int freedoms = rank.freedoms;
-    if (commands != freedoms) freedoms = ReportMobility(*mechanism_).freedoms();
-    if (commands != freedoms) {
+    int dofs = rank.dofs;
+    if (commands != dofs) dofs = ReportMobility(*mechanism_).dofs();
+    if (commands != dofs) {
       yaml_.Error(motion,
-                  fmt::format("motion gives {} commands, but {} has {} freedoms", commands,
-                              mechanism_->name, freedoms),
-                  CountHint(rank, commands < freedoms));
-    } else if (rank.redundant > 0 && freedoms == rank.freedoms) {
+                  fmt::format("motion gives {} commands, but {} has {} degrees of freedom",
+                              commands, mechanism_->name, dofs),
+                  CountHint(rank, commands < dofs));
+    } else if (rank.redundant > 0 && dofs == rank.dofs) {
       yaml_.Error(motion,
                   fmt::format("motion commands coordinates that depend on each other: {}",
                               JoinWords(DependentNames(rank))),
@@ -359,7 +360,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     }
     std::string hint = "leave commands out: each further one contradicts the others";
     if (!rank.dependent.empty()) hint += "; " + JoinWords(DependentNames(rank)) + " are dependent";
-    if (static_cast<int>(mechanism_->drives.size()) > rank.freedoms) {
+    if (static_cast<int>(mechanism_->drives.size()) > rank.dofs) {
       hint += "; drives that are not commanded share the force by least norm";
     }
     return hint;

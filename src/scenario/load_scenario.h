@@ -78,7 +78,8 @@ struct ScenarioHead {
 [[nodiscard]] Diagnostics PlaceSetFindings(const Diagnostics& diagnostics,
                                            const std::vector<SetValue>& values);
 
-// The `witnesses:` section of a scenario: programs that compute it besides our own witnesses.
+// The `witnesses:` section of a scenario: programs that compute it in addition to our own
+// witnesses.
 
 /// In the order of the file. `folder`: of the scenario; words of a command that name a file in it
 /// become its path.

@@ -39,9 +39,9 @@ std::vector<NamedCoordinate> JointCoordinates(const Mechanism& mechanism) {
   std::vector<NamedCoordinate> named;
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
     const Joint& joint = mechanism.joints[j];
-    const int freedoms = FreedomsOf(joint.kind);
-    for (int c = 0; c < freedoms; ++c) {
-      named.push_back({freedoms == 1 ? joint.name : fmt::format("{}.{}", joint.name, c),
+    const int dofs = DofsOf(joint.kind);
+    for (int c = 0; c < dofs; ++c) {
+      named.push_back({dofs == 1 ? joint.name : fmt::format("{}.{}", joint.name, c),
                        {Coordinate::Kind::kJoint, static_cast<int>(j), c}});
     }
   }
@@ -73,17 +73,19 @@ class FreeMotionReader {
  private:
   YamlReader& yaml() { return values_->yaml(); }
 
-  // Guided coordinates must be drives or prescribed joints themselves.
+  // Commanded coordinates must be drives or prescribed joints themselves.
   void CheckCommands(const YamlNode& node) {
     for (const Command& command : motion_->commands) {
       const bool plain = command.terms.size() == 1 &&
                          command.terms[0].coordinate.kind != Coordinate::Kind::kOutput;
       if (plain) continue;
-      yaml().Error(node,
-                   fmt::format("motion: '{}' is commanded, but where some freedoms move by forces, "
-                               "commands name drives and prescribed joints only",
-                               command.name),
-                   "command the drives themselves, or give no forces and no initial values");
+      yaml().Error(
+          node,
+          fmt::format(
+              "motion: '{}' is commanded, but where some degrees of freedom move by forces, "
+              "commands name drives and prescribed joints only",
+              command.name),
+          "command the drives themselves, or give no forces and no initial values");
     }
   }
 
@@ -177,15 +179,16 @@ class FreeMotionReader {
     }
   }
 
-  // As many start values as freedoms that no command holds.
+  // As many start values as DOFs that no command holds.
   void Complete(const YamlNode& node) {
-    const int freedoms = ReportMobility(mechanism_).freedoms();
+    const int dofs = ReportMobility(mechanism_).dofs();
     const auto commands = static_cast<int>(motion_->commands.size());
-    const int free = freedoms - commands;
+    const int free = dofs - commands;
     if (free <= 0) {
       yaml().Error(node,
-                   fmt::format("motion commands {} of {} freedoms, so no freedom is left to forces",
-                               commands, freedoms),
+                   fmt::format("motion commands {} of {} degrees of freedom, so no degree of "
+                               "degree of freedom is left to forces",
+                               commands, dofs),
                    "leave out forces and initial values, or a command");
       return;
     }
@@ -199,10 +202,10 @@ class FreeMotionReader {
       for (const int k : rank.dependent) names.push_back(given[static_cast<size_t>(k)].name);
       yaml().Error(node,
                    fmt::format("start values and commands depend on each other: {}",
-                               names.empty() ? "more are given than there are freedoms"
+                               names.empty() ? "more are given than there are degrees of freedom"
                                              : Joined(names, kMostNames)),
-                   fmt::format("{} has {} freedoms, {} of them commanded: leave out {}",
-                               mechanism_.name, freedoms, commands, rank.redundant));
+                   fmt::format("{} has {} degrees of freedom, {} of them commanded: leave out {}",
+                               mechanism_.name, dofs, commands, rank.redundant));
       return;
     }
     std::vector<Command> candidates;
@@ -243,7 +246,7 @@ std::vector<NamedCoordinate> StateCoordinates(const Mechanism& mechanism) {
   return named;
 }
 
-// True when the scenario leaves freedoms to forces.
+// True when the scenario leaves DOFs to forces.
 bool IsFree(const YamlNode* motion, const YamlNode* forces) {
   if (forces != nullptr) return true;
   return motion != nullptr && motion->is_map() &&
@@ -251,7 +254,7 @@ bool IsFree(const YamlNode* motion, const YamlNode* forces) {
 }
 
 // Reads drive forces and start values into a motion whose commands have been read, and completes
-// the start values: freedoms that are not named start at home, at rest, in joint coordinates in
+// the start values: DOFs that are not named start at home, at rest, in joint coordinates in
 // model order. Findings go to the reader.
 void ReadFreeMotion(ValueReader* values, const Mechanism& mechanism, const YamlNode& motion_node,
                     const YamlNode* forces, ProfileTables* tables, Motion* motion) {

@@ -29,7 +29,7 @@ struct AnalyticSettings {
   bool required = false;                ///< without it there is no verdict
   std::string model;                    ///< formulation; "" is the mechanism's default
   std::vector<std::string> as_printed;  ///< errata left uncorrected on purpose
-  Overrides parameters;                 ///< bend this witness only
+  Overrides parameters;                 ///< perturb this witness only
 };
 
 /// The reference's part: the generic solver, or a table of forces in its place.

@@ -70,7 +70,7 @@ Diagnostics CheckModel(const std::string& file) {
   if (!loaded.mechanism) return std::move(loaded.diagnostics);
   for (Finding& finding : FindUncovered(*loaded.mechanism)) {
     finding.file = file;
-    finding.message = "the closed form will decline: " + finding.message;
+    finding.message = "the closed form will not be applicable: " + finding.message;
     loaded.diagnostics.Add(std::move(finding));
   }
   return std::move(loaded.diagnostics);

@@ -59,8 +59,8 @@ ReferenceRun RunReached(const Mechanism& mechanism, const Motion& motion, const 
   return run;
 }
 
-DriveForces Bent(const DriveForces& forces, const Mechanism& mechanism, const Trace& truth,
-                 double bend) {
+DriveForces PerturbedForces(const DriveForces& forces, const Mechanism& mechanism,
+                            const Trace& truth, double perturbation) {
   std::map<std::string, std::pair<double, double>> square;  // per unit: sum and count
   for (const Drive& drive : mechanism.drives) {
     const int column = truth.Find(Quantity::kForce, drive.name);
@@ -73,7 +73,7 @@ DriveForces Bent(const DriveForces& forces, const Mechanism& mechanism, const Tr
   for (Eigen::Index d = 0; d < offset.size(); ++d) {
     const auto& [sum, count] =
         square[ForceUnit(mechanism, mechanism.drives[static_cast<size_t>(d)])];
-    offset[d] = (d % 2 == 0 ? bend : -bend) * std::sqrt(sum / count);
+    offset[d] = (d % 2 == 0 ? perturbation : -perturbation) * std::sqrt(sum / count);
   }
   return [forces, offset](double t_s, VecX* force) {
     RunSummary summary = forces(t_s, force);
@@ -112,7 +112,7 @@ std::string DriveText(const SimulationSettings& settings, const std::string& dri
     case DriveBy::kMotion:
       return driven_by + " drive motion";
     case DriveBy::kForces:
-      return "pushed in open loop by the " + driven_by + " drive forces";
+      return "driven in open loop by the " + driven_by + " drive forces";
     case DriveBy::kServos:
       return fmt::format("servos on the {} drive motion, kp {}, kv {}, feed-forward: {}", driven_by,
                          GainText(settings.servo.kp), GainText(settings.servo.kv),
@@ -226,8 +226,9 @@ std::string FreeMotionText(const Mechanism& mechanism, const Motion& motion) {
     if (value.rate != 0.0) start += fmt::format(" (rate {:.6g})", value.rate);
   }
   if (motion.initial.size() > kMost) start += ", …";
-  std::string text = fmt::format("free motion of {} {} from {}", motion.initial.size(),
-                                 motion.initial.size() == 1 ? "freedom" : "freedoms", start);
+  std::string text =
+      fmt::format("free motion of {} {} from {}", motion.initial.size(),
+                  motion.initial.size() == 1 ? "degree of freedom" : "degrees of freedom", start);
   for (size_t i = 0; i < motion.forces.size(); ++i) {
     text += (i == 0 ? ", forces given for " : ", ") +
             mechanism.drives[static_cast<size_t>(motion.forces[i].drive)].name;
@@ -245,10 +246,10 @@ std::string TrustLine(const ForwardRun& run) {
       run.steps, run.uncertainty, run.growth);
 }
 
-std::vector<std::string> PassageTexts(const ForwardRun& run, double duration_s) {
+std::vector<std::string> CrossingTexts(const ForwardRun& run, double duration_s) {
   constexpr size_t kMost = 5;
   std::vector<std::string> texts;
-  for (const SingularPassage& passage : run.singular) {
+  for (const SingularityCrossing& crossing : run.singular) {
     if (texts.size() == kMost) {
       texts.push_back(fmt::format("… and {} more singular poses within {:g} s",
                                   run.singular.size() - kMost, duration_s));
@@ -258,8 +259,8 @@ std::vector<std::string> PassageTexts(const ForwardRun& run, double duration_s) 
         "the motion {} a singular pose at t = {:.6g} s: the loops lose a constraint there, {} "
         "could move by itself (weakest constraint {:.1e} of its usual size); the motion is "
         "continued smoothly, reactions near it are large and uncertain",
-        passage.passed ? "passes" : "comes close to", passage.time_s, passage.joint,
-        passage.pivot));
+        crossing.passed ? "passes" : "comes close to", crossing.time_s, crossing.joint,
+        crossing.pivot));
   }
   return texts;
 }

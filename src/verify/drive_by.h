@@ -1,4 +1,4 @@
-// What goes with simulations whose drives are pushed or servos.
+// Simulations whose drives are force-controlled (open loop) or servos.
 #pragma once
 
 #include <memory>
@@ -21,10 +21,10 @@ namespace mbv {
 [[nodiscard]] ReferenceRun RunReached(const Mechanism& mechanism, const Motion& motion,
                                       const Trace& simulated);
 
-/// `forces`, wrong by `bend` of the RMS drive force in `truth` (per unit), with alternating signs
-/// from drive to drive.
-[[nodiscard]] DriveForces Bent(const DriveForces& forces, const Mechanism& mechanism,
-                               const Trace& truth, double bend);
+/// `forces`, wrong by `perturbation` of the RMS drive force in `truth` (per unit), with alternating
+/// signs from drive to drive.
+[[nodiscard]] DriveForces PerturbedForces(const DriveForces& forces, const Mechanism& mechanism,
+                                          const Trace& truth, double perturbation);
 
 /// Gains of all drives.
 [[nodiscard]] ServoGains GainsOf(const ServoSettings& settings, const Mechanism& mechanism);
@@ -35,7 +35,7 @@ namespace mbv {
 /// What the simulation does, in one line: mode, step, engine, what moves it, samples.
 [[nodiscard]] std::string SimulationLine(const Prepared& prepared);
 
-/// "pushed in open loop by the analytic drive forces", "servos with kp 2e+05, kv 600, …".
+/// "driven in open loop by the analytic drive forces", "servos with kp 2e+05, kv 600, …".
 [[nodiscard]] std::string DriveText(const SimulationSettings& settings,
                                     const std::string& driven_by);
 
@@ -56,13 +56,13 @@ namespace mbv {
 
 // What a report says about a free motion.
 
-/// "free motion of 2 freedoms from crank = 0.8, rocker at rest at home".
+/// "free motion of 2 DOFs from crank = 0.8, rocker at rest at home".
 [[nodiscard]] std::string FreeMotionText(const Mechanism& mechanism, const Motion& motion);
 
 /// How far the reference's trajectory can be trusted: its own error, and the growth of differences.
 [[nodiscard]] std::string TrustLine(const ForwardRun& run);
 
 /// One sentence for each singular pose passed, at most five.
-[[nodiscard]] std::vector<std::string> PassageTexts(const ForwardRun& run, double duration_s);
+[[nodiscard]] std::vector<std::string> CrossingTexts(const ForwardRun& run, double duration_s);
 
 }  // namespace mbv

@@ -70,7 +70,7 @@ std::pair<std::string, std::vector<ModelCaveat>> ModelOfMjcf(const std::string& 
   return {std::move(answer->model), std::move(answer->left_out)};
 }
 
-// Nobody wrote the lines that findings point to.
+// Findings point to generated lines.
 void AddWithoutPlaces(const Diagnostics& from, Diagnostics* to) {
   for (Finding finding : from.findings()) {
     finding.line = finding.column = 0;
@@ -179,7 +179,7 @@ RunSummary SetForces(const VecX& load, const HomeRows& rows, HomeServos* servos)
   if ((A * forces - load).norm() > kServoImbalance * load.norm()) {
     return {.stop = Stop::kUnsupported,
             .message =
-                "the drives cannot hold the home pose: a freedom that they do not drive "
+                "the drives cannot hold the home pose: a degree of freedom that they do not drive "
                 "gives way to gravity or springs",
             .where = {},
             .unit = {}};
@@ -247,7 +247,7 @@ MjcfText MjcfFor(const Mechanism& mechanism, ModelDrives drives) {
     return {.text = {}, .trouble = std::move(trouble)};
   }
   MjcfOptions options;
-  options.guided = drives == ModelDrives::kHeld;
+  options.prescribed = drives == ModelDrives::kHeld;
   if (drives == ModelDrives::kServo) {
     HomeServos servos = TuneHomeServos(mechanism);
     if (!servos.summary.ok()) return {.text = {}, .trouble = servos.summary.message};

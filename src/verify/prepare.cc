@@ -12,18 +12,18 @@ namespace mbv {
 namespace {
 
 // Why the closed form does not take this mechanism and its loads; "" if it does. One warning each.
-std::string Decline(const Scenario& scenario, const Mechanism& mechanism, const ClosedFormRow& row,
-                    Diagnostics* diagnostics) {
+std::string WarnNotApplicable(const Scenario& scenario, const Mechanism& mechanism,
+                              const ClosedFormRow& row, Diagnostics* diagnostics) {
   if (row.coverage == nullptr) return "";
   const Coverage coverage = row.coverage(mechanism);
   std::vector<Finding> uncovered = FindUncovered(coverage, mechanism, Concern::kDynamics);
   for (Finding& load : FindUncoveredLoads(coverage, mechanism, scenario.motion)) {
     uncovered.push_back(std::move(load));
   }
-  const std::string reason = ReasonToDecline(uncovered);
+  const std::string reason = ReasonNotApplicable(uncovered);
   for (Finding& finding : uncovered) {
     finding.file = scenario.file;
-    finding.message = "analytic declines: " + finding.message;
+    finding.message = "analytic is not applicable: " + finding.message;
     diagnostics->Add(std::move(finding));
   }
   return reason;
@@ -104,7 +104,8 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
     fits = false;
   }
   if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
-  if (std::string reason = Decline(scenario, mechanism, *row, diagnostics); !reason.empty()) {
+  if (std::string reason = WarnNotApplicable(scenario, mechanism, *row, diagnostics);
+      !reason.empty()) {
     return {nullptr, std::move(reason), WitnessGap::kNotApplicable};
   }
   Diagnostics found;

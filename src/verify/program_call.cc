@@ -72,7 +72,7 @@ std::optional<std::string> FindProgram(const std::string& program) {
   return std::nullopt;
 }
 
-std::string ProgramCall::Give(const std::string& name, const std::string& text) const {
+std::string ProgramCall::WriteInput(const std::string& name, const std::string& text) const {
   if (!folder_.trouble().empty()) return folder_.trouble();
   return WriteFile(folder_.path() / name, text, false);
 }
@@ -97,7 +97,7 @@ std::optional<ProgramFailure> ProgramCall::Run() {
   if (!pool.Run({job})) return ProgramFailure{WitnessGap::kSignal, "was stopped"};
   wall_s_ = end.cost.wall_s;
   const auto failed = [&](WitnessGap gap, const std::string& how) {
-    return ProgramFailure{gap, how + Said()};
+    return ProgramFailure{gap, how + OutputTail()};
   };
   if (end.timed_out) {
     return failed(WitnessGap::kTimedOut,
@@ -116,7 +116,7 @@ std::optional<ProgramFailure> ProgramCall::Run() {
   return {};
 }
 
-std::string ProgramCall::Said() const {
+std::string ProgramCall::OutputTail() const {
   std::string log = Text(kLog).value_or("");
   while (!log.empty() && static_cast<unsigned char>(log.back()) <= ' ') log.pop_back();
   const size_t line = log.rfind('\n');

@@ -29,14 +29,14 @@ class ProgramCall {
   explicit ProgramCall(const ForeignWitness& witness) : witness_(witness), folder_("witness") {}
 
   /// Puts a file into the folder. "" or what went wrong.
-  [[nodiscard]] std::string Give(const std::string& name, const std::string& text) const;
+  [[nodiscard]] std::string WriteInput(const std::string& name, const std::string& text) const;
   /// Calls the program with few variables of the environment (docs/how-to/external_solvers.md) and
   /// waits. Empty, or how it failed, with what it printed last.
   [[nodiscard]] std::optional<ProgramFailure> Run();
   /// A file that it left, if it is not longer than it may be.
   [[nodiscard]] std::optional<std::string> Text(const std::string& name) const;
   /// The last line that the program printed, behind ": "; "" if it printed none.
-  [[nodiscard]] std::string Said() const;
+  [[nodiscard]] std::string OutputTail() const;
   /// Of the program's whole run.
   [[nodiscard]] double wall_s() const { return wall_s_; }
 

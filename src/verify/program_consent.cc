@@ -61,14 +61,14 @@ bool IsShipped(const fs::path& file) {
 }
 
 // Why neither the scenario's place nor its owner lets its programs run; "" if they do.
-std::string DoubtPlace(const fs::path& file, const std::vector<std::string>& command) {
-  std::string doubt = "no folder above it is trusted";
+std::string WarnPlace(const fs::path& file, const std::vector<std::string>& command) {
+  std::string reason = "no folder above it is trusted";
   for (const fs::path& folder : TrustedFolders()) {
     if (!LiesBelow(file, folder)) continue;
-    doubt = WhoElseWritesBetween(file, folder);
-    if (doubt.empty()) break;
+    reason = WhoElseWritesBetween(file, folder);
+    if (reason.empty()) break;
   }
-  if (!doubt.empty()) return doubt;
+  if (!reason.empty()) return reason;
   for (const std::string& word : command) {
     std::error_code error;
     if (!word.starts_with('/') || !fs::is_regular_file(word, error)) continue;
@@ -85,12 +85,12 @@ CalledProgram Called(const Scenario& scenario, const ForeignWitness& witness, bo
   } else if (IsInstalledProgram(witness.command.front())) {
     called.trust = ProgramTrust::kInstalledProgram;
   } else if (archived) {
-    called.doubt = "it comes from an archive";
+    called.reason = "it comes from an archive";
   } else if (const fs::path file = Real(scenario.file); IsShipped(file)) {
     called.trust = ProgramTrust::kShippedScenario;
   } else {
-    called.doubt = DoubtPlace(file, called.command);
-    if (called.doubt.empty()) called.trust = ProgramTrust::kTrustedFolder;
+    called.reason = WarnPlace(file, called.command);
+    if (called.reason.empty()) called.trust = ProgramTrust::kTrustedFolder;
   }
   return called;
 }
@@ -140,7 +140,7 @@ std::vector<std::string> ProgramList::Lines() const {
   std::vector<std::string> lines;
   for (const CalledProgram& called : programs) {
     lines.push_back(fmt::format("{} ({}{}{})", called.Text(), TrustWord(called.trust),
-                                called.doubt.empty() ? "" : ": ", OneLine(called.doubt)));
+                                called.reason.empty() ? "" : ": ", OneLine(called.reason)));
   }
   return lines;
 }
@@ -170,18 +170,18 @@ bool ProgramConsent::Allows(const ProgramList& list) const {
 }
 
 Finding Refusal(const ProgramList& list) {
-  std::string programs, doubt;
+  std::string programs, reason;
   for (const CalledProgram& called : list.programs) {
     if (called.trust != ProgramTrust::kNone) continue;
     programs += (programs.empty() ? "" : "; ") + called.Text();
-    if (doubt.empty()) doubt = OneLine(called.doubt);
+    if (reason.empty()) reason = OneLine(called.reason);
   }
   std::error_code error;
   const fs::path folder = Real(list.scenario).parent_path();
   Finding finding;
   finding.file = list.scenario;
   finding.line = list.line;
-  finding.message = fmt::format("its programs may not run as you: {} ({})", programs, doubt);
+  finding.message = fmt::format("its programs may not run as you: {} ({})", programs, reason);
   finding.hint = fmt::format(
       "read what they do; --trust lets them run this time, 'mbverify trust {}' from now on",
       OneLine(folder.string()));

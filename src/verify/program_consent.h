@@ -1,7 +1,7 @@
 // Whether programs that scenarios name (`witnesses:`) may run (docs/how-to/external_solvers.md,
 // "Consent").
 //
-// A scenario of somebody else must not run commands unasked. Trusted are commands that the user
+// A scenario from another source must not run commands unasked. Trusted are commands that the user
 // wrote on the command line, programs that mbverify installs, scenarios that it is shipped with,
 // and scenarios below folders that the user trusts; anything else needs an answer for the run.
 #pragma once
@@ -32,7 +32,7 @@ struct CalledProgram {
   std::vector<std::string> command =
       {};  ///< as it is executed; the program by its path if there is one
   ProgramTrust trust = ProgramTrust::kNone;
-  std::string doubt = {};  ///< of kNone: why
+  std::string reason = {};  ///< of kNone: why
 
   /// "planar: /usr/bin/python3 planar.py", whole and printable.
   [[nodiscard]] std::string Text() const;

@@ -32,7 +32,7 @@ const char* UnitOf(const Joint& joint, int coordinate) {
 }
 
 std::string JointText(const Joint& joint, int coordinate) {
-  if (FreedomsOf(joint.kind) == 1) return "joint " + joint.name;
+  if (DofsOf(joint.kind) == 1) return "joint " + joint.name;
   return fmt::format("joint {} (coordinate {})", joint.name, coordinate + 1);
 }
 
@@ -75,7 +75,7 @@ std::vector<RangeViolation> JointViolations(const Mechanism& mechanism,
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
     const Joint& joint = mechanism.joints[j];
     coordinates.push_back(joint.home);
-    for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
       const CoordinateRange& range = joint.range[static_cast<size_t>(c)];
       if (!IsBounded(range)) continue;
       watched.push_back(
@@ -115,7 +115,7 @@ bool IsWithinRanges(const Mechanism& mechanism, const std::vector<Pose>& X_WB) {
   };
   for (size_t j = 0; j < mechanism.joints.size(); ++j) {
     const Joint& joint = mechanism.joints[j];
-    for (size_t c = 0; c < static_cast<size_t>(FreedomsOf(joint.kind)); ++c) {
+    for (size_t c = 0; c < static_cast<size_t>(DofsOf(joint.kind)); ++c) {
       if (!inside(coordinates[j][c], joint.range[c])) return false;
     }
   }

@@ -24,15 +24,15 @@ struct RunOptions {
   std::string out_dir;      ///< results go to out_dir/<mechanism>/<scenario>/; "" writes nothing
   bool pictures = true;     ///< needs out_dir
   bool page = true;         ///< report.html; needs out_dir
-  bool timed = true;        ///< files tell how long it took: then no two runs write the same bytes
+  bool timed = true;        ///< files state how long it took: then no two runs write the same bytes
   std::vector<std::string>
       data;                 ///< words of report/data/data_file.h: traces in these formats, too
   std::string script_link;  ///< the page's script, relative to the result's folder; "": in the page
-  /// Folder that the runs of one night share: each paper's equations are audited once for all their
-  /// pages; "": by every run.
+  /// Folder that the runs of one regression share: each paper's equations are audited once for all
+  /// their pages; "": by every run.
   std::string kept_audits;
-  /// The user's MJCF that the scenario was made of: it is run as it is, besides; "": none.
-  std::string own_file;
+  /// The user's MJCF that the scenario was made of: it is run as it is, in addition; "": none.
+  std::string source_model;
   ProgressFunction progress;
 };
 

@@ -74,7 +74,7 @@ class ForeignRunner {
         {"model.xml", WriteMjcf(mechanism_, {.step_s = step_s_})},
         {"model.urdf", ModelText(mechanism_, ModelFormat::kUrdf)}};
     for (const auto& [name, text] : files) {
-      if (trouble.empty()) trouble = call_.Give(name, text);
+      if (trouble.empty()) trouble = call_.WriteInput(name, text);
     }
     return trouble;
   }
@@ -92,8 +92,8 @@ class ForeignRunner {
 
   // What moves by forces: where it starts, and which forces drives push with.
   std::string HandOverFree(HandedMotion* handed) {
-    for (const Drive& drive : mechanism_.drives) Tell(drive.name, handed);
-    for (const Prescribed& base : mechanism_.prescribed) Tell(base.name, handed);
+    for (const Drive& drive : mechanism_.drives) AddCommanded(drive.name, handed);
+    for (const Prescribed& base : mechanism_.prescribed) AddCommanded(base.name, handed);
     for (const DriveForce& force : motion_.forces) handed->forced.push_back(force.drive);
     for (const double t_s : handed->time_s) {
       std::vector<Jet>& jets = handed->forces.emplace_back();
@@ -102,17 +102,18 @@ class ForeignRunner {
     BodyStates start;
     const RunSummary there = InitialStates(mechanism_, motion_, &start);
     if (!there.ok()) return "there is no start: " + there.message;
-    const std::string trouble = call_.Give("forces.csv", ForcesCsv(mechanism_, *handed));
-    return trouble.empty() ? call_.Give("start.csv", StartCsv(mechanism_, start)) : trouble;
+    const std::string trouble = call_.WriteInput("forces.csv", ForcesCsv(mechanism_, *handed));
+    return trouble.empty() ? call_.WriteInput("start.csv", StartCsv(mechanism_, start)) : trouble;
   }
 
-  void Tell(const std::string& name, HandedMotion* handed) const {
-    handed->told.push_back(motion_.FindCommand(name) >= 0);
+  void AddCommanded(const std::string& name, HandedMotion* handed) const {
+    handed->commanded.push_back(motion_.FindCommand(name) >= 0);
   }
 
   std::optional<ProgramFailure> ReadBack() {
     const auto json = call_.Text("witness.json");
-    if (!json) return ProgramFailure{WitnessGap::kNoAnswer, "left no witness.json" + call_.Said()};
+    if (!json)
+      return ProgramFailure{WitnessGap::kNoAnswer, "left no witness.json" + call_.OutputTail()};
     std::string trouble;
     const auto answer = ReadAnswer(*json, &trouble);
     if (!answer) return ProgramFailure{WitnessGap::kBadAnswer, trouble};
@@ -125,10 +126,11 @@ class ForeignRunner {
     record_.foreign->compute_s = answer->compute_s;
     if (!answer->refused.empty()) {
       return ProgramFailure{WitnessGap::kDeclined,
-                            "declines: " + QuotedValue(answer->refused, kMostReason)};
+                            "not applicable: " + QuotedValue(answer->refused, kMostReason)};
     }
     const auto csv = call_.Text("traces.csv");
-    if (!csv) return ProgramFailure{WitnessGap::kNoAnswer, "left no traces.csv" + call_.Said()};
+    if (!csv)
+      return ProgramFailure{WitnessGap::kNoAnswer, "left no traces.csv" + call_.OutputTail()};
     auto trace = ReadWitnessTrace(*csv, mechanism_, times_s_, &trouble);
     if (!trace) return ProgramFailure{WitnessGap::kBadAnswer, trouble};
     record_.trace = std::move(*trace);
@@ -203,8 +205,8 @@ void WitnessRuns::HandOver(ComparisonInput* input) const {
                                 record.summary, record.foreign, record.gap, record.required});
   }
   if (table) input->table = &*table;
-  if (bent) input->bent = &*bent;
-  if (!std::isnan(bend)) input->bend = bend;
+  if (perturbed) input->perturbed = &*perturbed;
+  if (!std::isnan(perturbation)) input->perturbation = perturbation;
 }
 
 WitnessRunner::WitnessRunner(const Prepared& prepared, SimulatedSide side,
@@ -323,7 +325,7 @@ void WitnessRunner::SolveFree(const Role& role) {
                                        {.progress = StageOf(progress_, role::kReference.called)});
   runs_.timing.reference_s = run.summary.wall_s;
   runs_.trust = TrustLine(run);
-  for (const std::string& text : PassageTexts(run, scenario().motion.duration_s)) Warn(text);
+  for (const std::string& text : CrossingTexts(run, scenario().motion.duration_s)) Warn(text);
   Add(role, std::move(run.summary), std::move(run.trace));
 }
 
@@ -375,15 +377,16 @@ void WitnessRunner::RunReached() {
   Add(role::kReached, std::move(run.summary), std::move(run.trace));
 }
 
-void WitnessRunner::RunBent() {
+void WitnessRunner::RunPerturbed() {
   const std::optional<double>& limit = scenario().checks[Metric::kForceNrmse].forward;
-  runs_.bend = limit.value_or(*RowOf(Metric::kForceNrmse).limits.forward);
+  runs_.perturbation = limit.value_or(*RowOf(Metric::kForceNrmse).limits.forward);
   SimulationOptions options = OptionsOf(scenario(), simulated(), judged_engine());
-  options.forces = Bent(Forces(), prepared_.base, driver().trace, runs_.bend);
-  SimulatedWitness bent = Simulate(options, "bent forces");
-  if (!bent.run.summary.ok()) return Warn("bent forces: " + bent.run.summary.message);
-  runs_.bent = std::move(bent.run.trace);
-  runs_.bent->witness = role::kBent.name;
+  options.forces = PerturbedForces(Forces(), prepared_.base, driver().trace, runs_.perturbation);
+  SimulatedWitness perturbed = Simulate(options, "perturbed forces");
+  if (!perturbed.run.summary.ok())
+    return Warn("perturbed forces: " + perturbed.run.summary.message);
+  runs_.perturbed = std::move(perturbed.run.trace);
+  runs_.perturbed->witness = role::kPerturbed.name;
 }
 
 SimulatedWitness WitnessRunner::Simulate(Engine engine, const std::string& stage) const {

@@ -35,14 +35,14 @@ inline RunSummary NotRun(const std::string& why) {
 /// Stage ("simulation") and how much of it is done (0 … 1).
 using ProgressFunction = std::function<void(const std::string& stage, double fraction)>;
 
-/// The same of one stage; empty if nobody asks.
+/// The same of one stage; empty if not asked for.
 [[nodiscard]] inline std::function<void(double)> StageOf(const ProgressFunction& progress,
                                                          const std::string& stage) {
   if (!progress) return {};
   return [progress, stage](double fraction) { progress(stage, fraction); };
 }
 
-// A program of a stranger as a witness (docs/how-to/external_solvers.md): it gets a folder with the
+// An external program as a witness (docs/how-to/external_solvers.md): it gets a folder with the
 // mechanism and its motion, and leaves its traces there.
 
 /// Runs it on the drives' motion. Whatever the program does (dies, hangs, floods, answers nonsense)
@@ -65,8 +65,8 @@ struct WitnessRuns {
   std::optional<AlignedTable> table;   ///< in the reference's place
   std::optional<SimulationRun> simulation;
   std::vector<RangeViolation> violations;  ///< of joints along the simulated motion
-  std::optional<Trace> bent;               ///< force-driven: pushed with wrong forces
-  double bend = kNan;                      ///< wrong by this share of their RMS
+  std::optional<Trace> perturbed;          ///< force-driven, with perturbed forces
+  double perturbation = kNan;              ///< wrong by this share of their RMS
   Diagnostics bad_input;                   ///< that only the simulation could find
   Diagnostics findings;                    ///< warnings, and ranges that are left
   std::string trust;  ///< of a free motion: how far the reference can be trusted
@@ -74,7 +74,7 @@ struct WitnessRuns {
 
   /// The record of a witness; null if it did not take part.
   [[nodiscard]] const WitnessRecord* Find(const Role& role) const;
-  /// Adds witnesses, table and bent run to what is compared; refers to this object.
+  /// Adds witnesses, table and perturbed run to what is compared; refers to this object.
   void HandOver(ComparisonInput* input) const;
 };
 
@@ -99,9 +99,9 @@ class WitnessRunner {
   /// Strokes along the motion that was computed. False, and then the simulation must not run, if
   /// drives cannot go there and the scenario does not ignore it.
   bool CheckStrokes();
-  /// Where the simulation is pushed by forces, besides the witnesses: the same run with forces that
-  /// are wrong by the limit of their checks. A warning if it fails.
-  void RunBent();
+  /// Where the simulation is driven by forces, in addition to the witnesses: the same run with
+  /// forces that are wrong by the limit of their checks. A warning if it fails.
+  void RunPerturbed();
   /// One run of the simulation: as the scenario has it, by another engine, or by other options.
   [[nodiscard]] SimulatedWitness Simulate(Engine engine, const std::string& stage) const;
   [[nodiscard]] SimulatedWitness Simulate(const SimulationOptions& options,

@@ -18,7 +18,7 @@ SimulationOptions OptionsOf(const Scenario& scenario, const Mechanism& mechanism
   options.engine = engine;
   options.step_s = settings.step_s;
   if (!settings.forward || engine != Engine::kCorrected) return options;
-  if (settings.drive_by == DriveBy::kForces) options.drives = DriveMode::kPushed;
+  if (settings.drive_by == DriveBy::kForces) options.drives = DriveMode::kForceDriven;
   if (settings.drive_by == DriveBy::kServos) {
     options.drives = DriveMode::kServo;
     options.servo = GainsOf(settings.servo, mechanism);

@@ -90,7 +90,7 @@ class Collector {
     std::map<std::string, size_t> seen;
     const auto flip = [&](int index) {
       const Joint& joint = m_.joints[static_cast<size_t>(index)];
-      if (FreedomsOf(joint.kind) != 1 || !IsFirst(&seen, joint.name)) return;
+      if (DofsOf(joint.kind) != 1 || !IsFirst(&seen, joint.name)) return;
       Mechanism wrong = m_;
       Joint& flipped = wrong.joints[static_cast<size_t>(index)];
       flipped.axis = -flipped.axis;
@@ -129,15 +129,15 @@ class Collector {
     for (size_t i = 1; i < spring->polynomial.size(); i += 2) spring->polynomial[i] *= -1.0;
   }
 
-  // The force of a preload pushes the other way; a gear turns a rotor as if its inertia grew with
+  // The force of a preload acts the other way; a gear turns a rotor as if its inertia grew with
   // the ratio and not with its square.
   void WrongElements() {
-    std::map<std::string, size_t> pushed, geared;
+    std::map<std::string, size_t> preloaded, geared;
     for (size_t e = 0; e < m_.elements.size(); ++e) {
       const ForceElement& element = m_.elements[e];
       Mechanism wrong = m_;
       if (const auto* spring = std::get_if<SpringLaw>(&element.law)) {
-        if (spring->preload == 0.0 || !IsFirst(&pushed, element.name)) continue;
+        if (spring->preload == 0.0 || !IsFirst(&preloaded, element.name)) continue;
         std::get<SpringLaw>(wrong.elements[e].law).preload *= -1.0;
         Add("preload the other way", element.name, std::move(wrong));
       } else if (const auto* rotor = std::get_if<RotorLaw>(&element.law)) {
@@ -274,7 +274,7 @@ class Collector {
       joint.range = {};
       joint.guess = joint.home;
       if (joint.closure || HasLedCoordinate(m_, static_cast<int>(j))) continue;
-      for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+      for (int c = 0; c < DofsOf(joint.kind); ++c) {
         joint.guess[static_cast<size_t>(c)] +=
             IsLength(joint.kind, c) ? size * share(*random) : angle(*random);
       }

@@ -13,9 +13,9 @@ TEST(CabinStiffness, BeamComplianceIsTheIntegratedFlexibility) {  // (54)
   for (int beam = 0; beam < kStiffBeams; ++beam) {
     const Mat6 truth = IntegratedFlexibility(p, StiffBeam(beam), 0.3);
     EXPECT_LT(ScaledDifference(BeamCompliance(p, StiffBeam(beam), 0.3), truth), 1e-14);
-    StiffnessParameters bent = p;
-    bent.sections[beam].h *= 1 + 1e-12;
-    EXPECT_GT(ScaledDifference(BeamCompliance(bent, StiffBeam(beam), 0.3), truth), 1e-14);
+    StiffnessParameters perturbed = p;
+    perturbed.sections[beam].h *= 1 + 1e-12;
+    EXPECT_GT(ScaledDifference(BeamCompliance(perturbed, StiffBeam(beam), 0.3), truth), 1e-14);
   }
 }
 
@@ -59,9 +59,9 @@ TEST(CabinStiffness, StrutLimbIsWhatUnitLoadsGive) {  // replaces (56)–(61)
     const StrutLimb limb = StrutLimbCompliance(p, alpha, epsilon);
     EXPECT_LT(ScaledDifference(limb.in_plane, truth.in_plane), 1e-13);
     EXPECT_LT(ScaledDifference(limb.out_of_plane, truth.out_of_plane), 1e-13);
-    StiffnessParameters bent = p;
-    bent.planar.L4 *= 1 + 1e-10;
-    const StrutLimb wrong = StrutLimbCompliance(bent, alpha, epsilon);
+    StiffnessParameters perturbed = p;
+    perturbed.planar.L4 *= 1 + 1e-10;
+    const StrutLimb wrong = StrutLimbCompliance(perturbed, alpha, epsilon);
     EXPECT_GT(ScaledDifference(wrong.in_plane, truth.in_plane), 1e-13);
     EXPECT_GT(ScaledDifference(wrong.out_of_plane, truth.out_of_plane), 1e-13);
   }

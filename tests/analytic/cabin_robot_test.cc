@@ -129,8 +129,8 @@ TEST(CabinRobot, ZeroGravityShowsTheInertiaTerms) {
                         -11.405846, -4.441989, -15.401294, 1.563732};
   for (int d = 0; d < kDrives; ++d) EXPECT_NEAR(sample.force[d], tau[d], 1e-6) << d;
   // One tenth of a percent of one link's inertia is far above these digits.
-  const auto bent = Evaluate(LoadCabin({{"g", 0.0}, {"m_AB", 7.007}}), DefaultMotion(), 2.0);
-  EXPECT_GT((bent.force - sample.force).cwiseAbs().maxCoeff(), 1e-4);
+  const auto perturbed = Evaluate(LoadCabin({{"g", 0.0}, {"m_AB", 7.007}}), DefaultMotion(), 2.0);
+  EXPECT_GT((perturbed.force - sample.force).cwiseAbs().maxCoeff(), 1e-4);
 }
 
 TEST(CabinRobot, ForwardUndoesInverseWithBothDerivatives) {

@@ -1,5 +1,5 @@
-// What closed forms take for granted, against the shipped models and against bent copies of them:
-// everything that changes a drive force must be outside what the equations cover.
+// What closed forms take for granted, against the shipped models and against perturbed copies of
+// them: everything that changes a drive force must be outside what the equations cover.
 #include "analytic/coverage.h"
 
 #include <gtest/gtest.h>
@@ -70,8 +70,8 @@ TEST_P(CoverageOfModel, LeavesNoMassOrInertiaOutThatMovesADrive) {
     if (body.mass == 0.0) continue;
     // Mass, centre of mass, and the six inertias.
     for (int k = 0; k < 10; ++k) {
-      Mechanism bent = mechanism_;
-      Body& changed = bent.bodies[b];
+      Mechanism perturbed = mechanism_;
+      Body& changed = perturbed.bodies[b];
       const double inertia = body.I_Bcm_B.cwiseAbs().maxCoeff();
       if (k == 0) changed.mass *= 1.01;
       if (k >= 1 && k < 4) changed.p_BoBcm_B[k - 1] += 0.01;
@@ -80,10 +80,10 @@ TEST_P(CoverageOfModel, LeavesNoMassOrInertiaOutThatMovesADrive) {
         changed.I_Bcm_B(i, j) += 0.01 * inertia;
         if (i != j) changed.I_Bcm_B(j, i) += 0.01 * inertia;
       }
-      const double change = (Forces(bent) - forces).cwiseAbs().maxCoeff();
+      const double change = (Forces(perturbed) - forces).cwiseAbs().maxCoeff();
       if (!(change > 1e-9 * size)) continue;
       ++felt;
-      EXPECT_TRUE(Mentions(FindUncovered(bent), "body " + body.name + ": "))
+      EXPECT_TRUE(Mentions(FindUncovered(perturbed), "body " + body.name + ": "))
           << "quantity " << k << " of " << body.name << " changes a drive force by " << change;
     }
   }
@@ -94,16 +94,18 @@ TEST_P(CoverageOfModel, NamesAJointThatIsMoved) {
   for (size_t j = 0; j < mechanism_.joints.size(); ++j) {
     const Joint& joint = mechanism_.joints[j];
     if (joint.kind == JointKind::kFree) continue;
-    Mechanism bent = mechanism_;
-    bent.joints[j].X_PF.translation() += Vec3(1e-6, 2e-6, 3e-6);
-    EXPECT_TRUE(Mentions(FindUncovered(bent), "joint " + joint.name + ": centre")) << joint.name;
-    bent = mechanism_;
-    bent.joints[j].X_CM.translation() += Vec3(1e-6, 2e-6, 3e-6);
-    EXPECT_TRUE(Mentions(FindUncovered(bent), "joint " + joint.name + ": centre")) << joint.name;
+    Mechanism perturbed = mechanism_;
+    perturbed.joints[j].X_PF.translation() += Vec3(1e-6, 2e-6, 3e-6);
+    EXPECT_TRUE(Mentions(FindUncovered(perturbed), "joint " + joint.name + ": centre"))
+        << joint.name;
+    perturbed = mechanism_;
+    perturbed.joints[j].X_CM.translation() += Vec3(1e-6, 2e-6, 3e-6);
+    EXPECT_TRUE(Mentions(FindUncovered(perturbed), "joint " + joint.name + ": centre"))
+        << joint.name;
     if (joint.kind == JointKind::kSpherical) continue;
-    bent = mechanism_;
-    bent.joints[j].X_PF.rotate(Eigen::AngleAxisd(1e-6, Vec3(1, 2, 3).normalized()));
-    EXPECT_TRUE(Mentions(FindUncovered(bent), "joint " + joint.name + ": ")) << joint.name;
+    perturbed = mechanism_;
+    perturbed.joints[j].X_PF.rotate(Eigen::AngleAxisd(1e-6, Vec3(1, 2, 3).normalized()));
+    EXPECT_TRUE(Mentions(FindUncovered(perturbed), "joint " + joint.name + ": ")) << joint.name;
   }
 }
 
@@ -256,26 +258,26 @@ TEST(StiffnessCoverage, HoldsTheElasticModelsAndNamesABeamAServoAndAHinge) {
     };
     EXPECT_EQ(TextOf(uncovered(m)), "");
     for (size_t k = 0; k < m.beams.size(); ++k) {
-      Mechanism bent = m;
-      bent.beams[k].section.I_y *= 1 + 1e-6;
-      EXPECT_TRUE(Mentions(uncovered(bent), "beam " + m.beams[k].name + ": I_y"));
-      bent = m;
-      bent.beams[k].section.torsion *= 1 + 1e-6;
-      EXPECT_TRUE(Mentions(uncovered(bent), "beam " + m.beams[k].name + ": torsion"));
-      bent = m;
-      bent.beams[k].p_to *= 1 + 1e-6;
-      bent.beams[k].p_from *= 1 + 1e-6;
-      EXPECT_TRUE(Mentions(uncovered(bent), "beam " + m.beams[k].name + ": length"));
+      Mechanism perturbed = m;
+      perturbed.beams[k].section.I_y *= 1 + 1e-6;
+      EXPECT_TRUE(Mentions(uncovered(perturbed), "beam " + m.beams[k].name + ": I_y"));
+      perturbed = m;
+      perturbed.beams[k].section.torsion *= 1 + 1e-6;
+      EXPECT_TRUE(Mentions(uncovered(perturbed), "beam " + m.beams[k].name + ": torsion"));
+      perturbed = m;
+      perturbed.beams[k].p_to *= 1 + 1e-6;
+      perturbed.beams[k].p_from *= 1 + 1e-6;
+      EXPECT_TRUE(Mentions(uncovered(perturbed), "beam " + m.beams[k].name + ": length"));
     }
     for (size_t k = 0; k < m.drives.size(); ++k) {
-      Mechanism bent = m;
-      bent.drives[k].stiffness = 1234.0;
-      EXPECT_TRUE(Mentions(uncovered(bent), "drive " + m.drives[k].name + ": compliance"));
+      Mechanism perturbed = m;
+      perturbed.drives[k].stiffness = 1234.0;
+      EXPECT_TRUE(Mentions(uncovered(perturbed), "drive " + m.drives[k].name + ": compliance"));
     }
     for (size_t k = 0; k < m.joints.size(); ++k) {
-      Mechanism bent = m;
-      bent.joints[k].X_PF.translation() += Vec3(1e-6, 1e-6, 1e-6);
-      EXPECT_TRUE(Mentions(uncovered(bent), "joint " + m.joints[k].name + ": centre"));
+      Mechanism perturbed = m;
+      perturbed.joints[k].X_PF.translation() += Vec3(1e-6, 1e-6, 1e-6);
+      EXPECT_TRUE(Mentions(uncovered(perturbed), "joint " + m.joints[k].name + ": centre"));
     }
   }
   const Mechanism balls = Shipped("scara_robot/elastic_crossbar.yaml");

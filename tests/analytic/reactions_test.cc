@@ -87,11 +87,11 @@ TEST(CabinReactions, ABentLinkIsSeen) {
   const ScenarioResult loaded =
       LoadedScenario("cabin_robot/default.yaml", {{"motion.sample_s", "0.25"}});
   for (const char* name : {"m_CD", "c_EF_x", "I_AB_z", "m_payload", "I_slewing_z"}) {
-    Mechanism bent = *loaded.mechanism;
-    for (Parameter& p : bent.parameters) {
+    Mechanism perturbed = *loaded.mechanism;
+    for (Parameter& p : perturbed.parameters) {
       if (p.name == name) p.value *= 1 + 1e-4;
     }
-    EXPECT_GT(CompareReactions(bent, *loaded.mechanism, loaded.scenario->motion).worst,
+    EXPECT_GT(CompareReactions(perturbed, *loaded.mechanism, loaded.scenario->motion).worst,
               2 * kAgreement)
         << name;
   }
@@ -138,11 +138,11 @@ TEST(ScaraReactions, ABentConstantIsSeen) {
   const ScenarioResult loaded =
       LoadedScenario("scara_robot/pick_place.yaml", {{"motion.sample_s", "0.01"}});
   for (const char* name : {"m_p", "m_rods", "m_arm", "pivot_mass", "I_p_z"}) {
-    Mechanism bent = *loaded.mechanism;
-    for (Parameter& p : bent.parameters) {
+    Mechanism perturbed = *loaded.mechanism;
+    for (Parameter& p : perturbed.parameters) {
       if (p.name == name) p.value *= 1 + 1e-4;
     }
-    EXPECT_GT(CompareReactions(bent, *loaded.mechanism, loaded.scenario->motion).worst,
+    EXPECT_GT(CompareReactions(perturbed, *loaded.mechanism, loaded.scenario->motion).worst,
               2 * kAgreement)
         << name;
   }

@@ -72,7 +72,7 @@ TEST(ScaraDynamics, NothingActsAtRestWithoutGravityAndForce) {
 }
 
 /// Largest |input power − dE/dt| over a motion, relative to the largest power in the mechanism
-/// (largest torque times largest rate). The torques may be bent.
+/// (largest torque times largest rate). The torques may be perturbed.
 template <typename Motion>
 double PowerGap(const Parameters& p, const Motion& at_time, const std::vector<double>& times,
                 const Vec3& F, double M_z, const Parameters& torque_parameters) {
@@ -122,16 +122,16 @@ TEST(ScaraDynamics, PowerBalanceDetectsSlightlyWrongMasses) {
   const Parameters p = WithGravity();
   const std::vector<double> times = {0.04, 0.05, 0.075, 0.1, 0.13};
   const auto at_time = [&](double t) { return PickPlaceInstant(p, t); };
-  const auto bent = [&](double Parameters::*member) {
+  const auto perturbed = [&](double Parameters::*member) {
     Parameters wrong = p;
     wrong.*member *= 1 + 1e-6;
     return PowerGap(p, at_time, times, Vec3::Zero(), 0.0, wrong);
   };
-  EXPECT_GT(bent(&Parameters::m_p), 20 * kPowerTolerance);
-  EXPECT_GT(bent(&Parameters::I_pz), 20 * kPowerTolerance);
-  EXPECT_GT(bent(&Parameters::m_arm), 20 * kPowerTolerance);
-  EXPECT_GT(bent(&Parameters::m_rods), 20 * kPowerTolerance);
-  EXPECT_GT(bent(&Parameters::arm_com), 20 * kPowerTolerance);
+  EXPECT_GT(perturbed(&Parameters::m_p), 20 * kPowerTolerance);
+  EXPECT_GT(perturbed(&Parameters::I_pz), 20 * kPowerTolerance);
+  EXPECT_GT(perturbed(&Parameters::m_arm), 20 * kPowerTolerance);
+  EXPECT_GT(perturbed(&Parameters::m_rods), 20 * kPowerTolerance);
+  EXPECT_GT(perturbed(&Parameters::arm_com), 20 * kPowerTolerance);
 }
 
 TEST(ScaraDynamics, MirroredMotionExchangesTheTorques) {

@@ -49,7 +49,7 @@ TEST(ScaraModel, HasFourFreedomsAndNoRedundantConstraint) {
   EXPECT_EQ(mobility.body_coordinates, 78);
   EXPECT_EQ(mobility.constraint_rows, 74);
   EXPECT_EQ(mobility.constraint_rank, 74);
-  EXPECT_EQ(mobility.freedoms, 4);
+  EXPECT_EQ(mobility.dofs, 4);
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_TRUE(mobility.drive_forces_unique);
   EXPECT_TRUE(mobility.joints_not_unique.empty());
@@ -61,9 +61,9 @@ TEST(ScaraModel, TiltsWithoutItsCrossBars) {
   const std::string ball = LineOf(text, "      ball_C_b:");
   text = Replaced(text, ball, Replaced(ball, ", closure: true", ""));
   const Mobility mobility = AnalyseMobility(Loaded(text));
-  // Four freedoms, two tilts of the platform, idle spins of four rods.
+  // Four DOFs, two tilts of the platform, idle spins of four rods.
   EXPECT_EQ(mobility.idle_spins.size(), 4u);
-  EXPECT_EQ(mobility.freedoms, 4 + 2);
+  EXPECT_EQ(mobility.dofs, 4 + 2);
   EXPECT_EQ(mobility.undriven, 2);
 }
 
@@ -78,7 +78,7 @@ TEST(ScaraModel, RigidCrossBarsAddOneRedundantConstraintEach) {
                   "      cross:\n        frames: {a: {position: [0, d/2, 0]}, b: {position: [0, "
                   "-d/2, 0]}}\n      bar:\n");
   const Mobility mobility = AnalyseMobility(Loaded(text));
-  EXPECT_EQ(mobility.freedoms, 4);
+  EXPECT_EQ(mobility.dofs, 4);
   EXPECT_EQ(mobility.redundant, 2);
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_TRUE(mobility.drive_forces_unique);

@@ -176,10 +176,10 @@ TEST(ScaraPosition, LiteralPatternStopsAtASingularPose) {
 }
 
 TEST(ScaraPosition, TopologyGivesThreeTranslationsAndOneRotation) {
-  const FreedomCount count = CountFreedoms();
-  EXPECT_EQ(count.limb_freedoms, (std::array<int, 4>{5, 5, 6, 6}));
+  const DofCount count = CountDofs();
+  EXPECT_EQ(count.limb_dofs, (std::array<int, 4>{5, 5, 6, 6}));
   EXPECT_EQ(count.loop_equations, (std::array<int, 3>{6, 6, 6}));
-  EXPECT_EQ(count.freedoms, 4);
+  EXPECT_EQ(count.dofs, 4);
   EXPECT_EQ(count.platform_translations, 3);
   EXPECT_EQ(count.platform_rotations, 1);
   EXPECT_NEAR(std::abs(count.rotation_axis.z()), 1.0, kAngleTolerance);

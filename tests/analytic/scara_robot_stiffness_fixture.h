@@ -87,18 +87,18 @@ inline Pose FrameAt(const Vec3& x, const Vec3& y, const Vec3& p) {
 /// carries everything after it. Coordinates: station k moves by SmallMotion(B_k c).
 struct Station {
   Pose X_W;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> freedoms;  ///< columns of unit motions in its axes
+  Eigen::Matrix<double, 6, Eigen::Dynamic> dofs;  ///< columns of unit motions in its axes
 };
 
 /// Twist of P (world axes) per coordinate of one station, by central differences.
 inline MatX DifferentiatedColumns(const Station& station, const Vec3& p_WP) {
   constexpr double h = 1e-5;  // truncation 1e-10, round-off 1e-11
-  MatX J(6, station.freedoms.cols());
+  MatX J(6, station.dofs.cols());
   Pose X_WP = Pose::Identity();
   X_WP.translation() = p_WP;
   for (Eigen::Index c = 0; c < J.cols(); ++c) {
     const auto moved = [&](double t) {
-      return Pose(station.X_W * SmallMotion(t * station.freedoms.col(c)) * station.X_W.inverse() *
+      return Pose(station.X_W * SmallMotion(t * station.dofs.col(c)) * station.X_W.inverse() *
                   X_WP);
     };
     const Pose plus = moved(h), minus = moved(-h);

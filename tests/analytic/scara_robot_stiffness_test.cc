@@ -13,7 +13,7 @@ namespace {
 
 const Mat6 kAll = Mat6::Identity();
 
-/// Stations of a limb in the order of the columns of J_d; their freedoms give all columns.
+/// Stations of a limb in the order of the columns of J_d; their DOFs give all columns.
 std::vector<Station> DeformingStations(const StiffnessParameters& p, const Position& at, int i) {
   const Vec3 a = MotorAxis(i), u = at.u[i], w = at.eta[i], P = at.X.head<3>();
   const Vec3 A = p.geometry.R * Radial(i), C = A + p.geometry.l1 * u, B = P + at.s[i];
@@ -67,10 +67,10 @@ TEST(ScaraStiffness, ColumnsAreDerivativesOfTheLimbsEnd) {  // (11)
       }
       ASSERT_EQ(J_p.cols(), limb.J_p.cols());
       EXPECT_LT(RelativeDifference(limb.J_p, J_p), kDifferences) << "limb " << i + 1;
-      // A bent column is seen.
-      MatX bent = limb.J_p;
-      bent(4, 1) += 1e-8;
-      EXPECT_GT(RelativeDifference(bent, J_p), kDifferences);
+      // A perturbed column is seen.
+      MatX perturbed = limb.J_p;
+      perturbed(4, 1) += 1e-8;
+      EXPECT_GT(RelativeDifference(perturbed, J_p), kDifferences);
     }
   }
 }
@@ -81,9 +81,9 @@ TEST(ScaraStiffness, TipStiffnessIsTheInverseOfTheIntegratedFlexibility) {  // (
     const Mat6 k = TipStiffness(p, length);
     const Mat6 flexibility = IntegratedFlexibility(p, length);
     EXPECT_LT(RelativeDifference(k * flexibility, kAll), kAlgebra);
-    StiffnessParameters bent = p;
-    bent.diameter *= 1 + 1e-10;
-    EXPECT_GT(RelativeDifference(TipStiffness(bent, length) * flexibility, kAll), kAlgebra);
+    StiffnessParameters perturbed = p;
+    perturbed.diameter *= 1 + 1e-10;
+    EXPECT_GT(RelativeDifference(TipStiffness(perturbed, length) * flexibility, kAll), kAlgebra);
     Mat6 left_handed = k;  // what (12) would be in the axes x, z, y
     left_handed(2, 4) = left_handed(4, 2) = -k(2, 4);
     EXPECT_GT(RelativeDifference(left_handed * flexibility, kAll), 0.1);
@@ -164,9 +164,9 @@ TEST(ScaraStiffness, LimbsFollowTheSaddleEquations) {  // (13), (14)
       EXPECT_LT((limb.K * at.springs[i].J_p).norm(), kAlgebra * limb.K.norm());
       EXPECT_LT(RelativeDifference(limb.K * SpringCompliance(at.springs[i]) * limb.K, limb.K),
                 kAlgebra);
-      LimbSprings bent = at.springs[i];
-      bent.springs[0].flexibility *= 1 + 1e-5;
-      EXPECT_GT(RelativeDifference(limb.K, LiteralBlock(bent, p.geometry.R, p.K_act)), 1e-9);
+      LimbSprings perturbed = at.springs[i];
+      perturbed.springs[0].flexibility *= 1 + 1e-5;
+      EXPECT_GT(RelativeDifference(limb.K, LiteralBlock(perturbed, p.geometry.R, p.K_act)), 1e-9);
     }
   }
 }

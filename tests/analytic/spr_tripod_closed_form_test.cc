@@ -287,10 +287,10 @@ TEST(SprTripodClosedForm, MotionsItDoesNotCoverAreRefusedWithAHint) {
   EXPECT_NE(ErrorOf(mechanism, tilted).find("platform.roll"), std::string::npos);
   Motion incomplete = motion;
   incomplete.commands.pop_back();
-  EXPECT_NE(ErrorOf(mechanism, incomplete).find("three freedoms"), std::string::npos);
+  EXPECT_NE(ErrorOf(mechanism, incomplete).find("three degrees of freedom"), std::string::npos);
   Motion mixed = motion;
   mixed.commands[0].terms[0].coordinate = {Coordinate::Kind::kDrive, 0, 0};
-  EXPECT_NE(ErrorOf(mechanism, mixed).find("three freedoms"), std::string::npos);
+  EXPECT_NE(ErrorOf(mechanism, mixed).find("three degrees of freedom"), std::string::npos);
   Motion loaded = motion;
   loaded.loads.emplace_back().name = "on the base";
   EXPECT_NE(ErrorOf(mechanism, loaded).find("on the base"), std::string::npos);

@@ -104,11 +104,11 @@ TEST(SprTripodPosition, CorrectedCentreMeetsTheConstraints) {
     FillPosture(g, CentreOf(g, tilt, z), tilt, &p);
     EXPECT_LT(ConstraintGap(p), kRoundoff_m);
     // Bent by the printed torsion δ = +ψ, the gap must show.
-    Posture bent = p;
-    bent.R = RotZ(psi) * RotX(theta) * RotZ(psi);
-    for (int i = 0; i < 3; ++i) bent.c[i] = bent.R * g.c[i];
+    Posture perturbed = p;
+    perturbed.R = RotZ(psi) * RotX(theta) * RotZ(psi);
+    for (int i = 0; i < 3; ++i) perturbed.c[i] = perturbed.R * g.c[i];
     if (std::abs(std::sin(2 * psi)) > 0.1) {
-      EXPECT_GT(ConstraintGap(bent), 1e-3);
+      EXPECT_GT(ConstraintGap(perturbed), 1e-3);
     }
   });
 }

@@ -151,12 +151,12 @@ TEST(StabilizingPlatformAgainstReference, AgreesWithLoadsOnPlatformAndLinks) {
 TEST(StabilizingPlatformAgainstReference, NoticesAPlatformHeavierByAMilligram) {
   // 1 mg is 1e-5 N of weight, a fifth of it on a drive: 6 limits.
   const Mechanism mechanism = LoadWith();
-  Mechanism bent = mechanism;
-  for (Parameter& parameter : bent.parameters) {
+  Mechanism perturbed = mechanism;
+  for (Parameter& parameter : perturbed.parameters) {
     if (parameter.name == "m_p") parameter.value += 1e-6;
   }
   const Motion motion = Coarse(mechanism, false);
-  const Differences differences = Compare(bent, motion);  // bodies keep their mass
+  const Differences differences = Compare(perturbed, motion);  // bodies keep their mass
   EXPECT_GT(differences.by_unit.at("N"), kLimits.at("N"));
 }
 

@@ -36,7 +36,7 @@ TEST(Roles, NobodyIsHeldAgainstItself) {
 
 TEST(Roles, OnlyEnginesFollowAndOnlyClosedFormsHaveNoBodies) {
   EXPECT_TRUE(role::kSimulated.is_engine());
-  EXPECT_TRUE(role::kBent.is_engine());
+  EXPECT_TRUE(role::kPerturbed.is_engine());
   for (const Role* role : {&role::kAnalytic, &role::kReference, &role::kSolver, &role::kReached}) {
     EXPECT_FALSE(role->is_engine()) << role->name;
     EXPECT_EQ(role->has_bodies(), role != &role::kAnalytic) << role->name;

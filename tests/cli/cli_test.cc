@@ -240,7 +240,7 @@ TEST_F(CliTest, CheckPrintsEveryFindingAndEveryFileThatIsFine) {
 TEST_F(CliTest, ModelReportsMobilityAndWritesMjcf) {
   const ProgramResult report = mbverify("model stabilizing_platform");
   EXPECT_EQ(report.exit_code, 0);
-  EXPECT_NE(report.out.find("freedoms: 9"), std::string::npos) << report.out;
+  EXPECT_NE(report.out.find("degrees of freedom: 9"), std::string::npos) << report.out;
   EXPECT_NE(report.out.find("redundant constraints: 6"), std::string::npos) << report.out;
   const ProgramResult mjcf = mbverify("model stabilizing_platform --format mjcf --out " +
                                       (mbverify.folder() / "p.xml").string());

@@ -1,4 +1,4 @@
-// Every metric and every verdict: exact data passes, data bent by twice its limit fails.
+// Every metric and every verdict: exact data passes, data perturbed by twice its limit fails.
 #include "comparison/comparison.h"
 
 #include <gtest/gtest.h>
@@ -213,7 +213,7 @@ TEST(Comparison, ForcesThatCancelOutAreJudgedByTheForceScaleOfTheMechanism) {
   const ForceScale scale = ForceScaleOf(c.Input(), c.analytic);
   EXPECT_NEAR(scale.force_N, 0.5 * w * w / std::numbers::sqrt2, 0.1);
   EXPECT_EQ(bent_by(0.0).verdict, Verdict::kAgree);
-  // One of two drives is bent: the pooled RMS is 1/√2 of the bend.
+  // One of two drives is perturbed: the pooled RMS is 1/√2 of the bend.
   const double just = std::numbers::sqrt2 * limit * scale.Floor("N");
   EXPECT_EQ(bent_by(0.5 * just).verdict, Verdict::kAgree);
   EXPECT_TRUE(Fails(bent_by(2.0 * just), "simulated_vs_analytic.force_nrmse"));

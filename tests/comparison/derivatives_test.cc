@@ -226,9 +226,9 @@ TEST(DriveMotion, ADriveHeldStillIsComparedOnTheScaleOfOtherUnitsToo) {
   }
   c.mechanism.gravity_W.setZero();
   const auto value = [&](double bend) {
-    Trace bent = c.simulated;
-    synthetic::Bend(&bent, "d2.acceleration", bend);
-    const PairComparison pair = ComparePair(c.Input(), bent, c.analytic);
+    Trace perturbed = c.simulated;
+    synthetic::Bend(&perturbed, "d2.acceleration", bend);
+    const PairComparison pair = ComparePair(c.Input(), perturbed, c.analytic);
     return pair.metrics.at(Metric::kAcceleration).value;
   };
   EXPECT_NEAR(value(1e-10), 1e-10 / 0.13889, 1e-12);

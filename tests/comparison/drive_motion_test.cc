@@ -69,7 +69,8 @@ TEST(DriveMotion, AFollowedMotionThatDiffersStillFails) {
   EXPECT_GT(comparison.failed(), 0u);
 }
 
-// Rates of the output: exact ones pass, those bent by twice the limit fail, whoever follows whom.
+// Rates of the output: exact ones pass, those perturbed by twice the limit fail, whoever follows
+// whom.
 TEST(DriveMotion, OutputRatesAreHeldAgainstTheCommand) {
   struct Bent {
     const char *channel, *check;
@@ -81,23 +82,24 @@ TEST(DriveMotion, OutputRatesAreHeldAgainstTheCommand) {
   Case c;
   c.CommandPlate();
   const double w = 2.0 * std::numbers::pi;
-  for (const Bent& bent : {Bent{"plate.x.velocity", "simulated.command_velocity", 2e-9 * 0.3},
-                           Bent{"plate.yaw.velocity", "simulated.command_velocity", 2e-9 * 0.5},
-                           Bent{"plate.x.acceleration", "simulated.command_acceleration",
-                                2e-8 * 1e-3 * 0.5 * w * w / std::numbers::sqrt2}}) {
+  for (const Bent& perturbed :
+       {Bent{"plate.x.velocity", "simulated.command_velocity", 2e-9 * 0.3},
+        Bent{"plate.yaw.velocity", "simulated.command_velocity", 2e-9 * 0.5},
+        Bent{"plate.x.acceleration", "simulated.command_acceleration",
+             2e-8 * 1e-3 * 0.5 * w * w / std::numbers::sqrt2}}) {
     Case exact = c;
     EXPECT_EQ(exact.Run().verdict, Verdict::kAgree) << exact.Run().reason;
     Case wrong = c;
-    Bend(&wrong.simulated, bent.channel, bent.twice_the_limit);
+    Bend(&wrong.simulated, perturbed.channel, perturbed.twice_the_limit);
     const Comparison comparison = wrong.Run();
-    const CheckResult* check = comparison.FindCheck(bent.check);
-    ASSERT_NE(check, nullptr) << bent.check;
-    EXPECT_FALSE(check->pass) << bent.channel << " " << check->value;
-    EXPECT_NEAR(check->value, 2.0 * *check->limit, 0.05 * *check->limit) << bent.channel;
+    const CheckResult* check = comparison.FindCheck(perturbed.check);
+    ASSERT_NE(check, nullptr) << perturbed.check;
+    EXPECT_FALSE(check->pass) << perturbed.channel << " " << check->value;
+    EXPECT_NEAR(check->value, 2.0 * *check->limit, 0.05 * *check->limit) << perturbed.channel;
     EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
     Case slight = c;
-    Bend(&slight.simulated, bent.channel, 0.25 * bent.twice_the_limit);
-    EXPECT_EQ(slight.Run().verdict, Verdict::kAgree) << bent.channel;
+    Bend(&slight.simulated, perturbed.channel, 0.25 * perturbed.twice_the_limit);
+    EXPECT_EQ(slight.Run().verdict, Verdict::kAgree) << perturbed.channel;
   }
 }
 

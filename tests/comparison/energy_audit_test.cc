@@ -89,7 +89,7 @@ TEST(EnergyAudit, ADriveForceTooLargeByAThousandthIsFoundAndNamed) {
   EXPECT_EQ(audit.culprit, "d1");
   EXPECT_NEAR(audit.from_s, 0.01, 1e-12);
   EXPECT_NE(audit.text.find("work of d1 that is 0.1 % too large"), std::string::npos) << audit.text;
-  // The recorded forces alone are bent: the power balance tells.
+  // The recorded forces alone are perturbed: the power balance tells.
   Pushed forces;
   Stretch(&forces.trace, "d1.force", 1.001);
   const WitnessMetrics metrics = MeasureWitness(forces.Input(), forces.trace);

@@ -44,13 +44,13 @@ void Rest(Trace* trace, double half) {
 
 // One trace says only that something rests; the other contains the friction that holds.
 TEST(ForceBand, ReactionsAreNotComparedWhereOnlyOneSideKnowsOfRest) {
-  const auto check = [](bool simulated_too, size_t bent) {
+  const auto check = [](bool simulated_too, size_t perturbed) {
     synthetic::Case c;
     Rest(&c.reference, kHalf);
     Rest(&c.analytic, kHalf);
     if (simulated_too) Rest(&c.simulated, kHalf);
-    c.simulated.values(static_cast<Eigen::Index>(bent), c.simulated.Find("slide1.reaction.fx")) +=
-        0.1;
+    c.simulated.values(static_cast<Eigen::Index>(perturbed),
+                       c.simulated.Find("slide1.reaction.fx")) += 0.1;
     return c.Run().FindCheck("simulated_vs_reference.reaction_nrmse")->pass;
   };
   EXPECT_TRUE(check(false, kFrom + 3));

@@ -116,9 +116,9 @@ TEST(Reservations, NothingMovesAndNothingWeighsVerifiesNothing) {
   Case round = Weightless();
   Bend(&round.simulated, "d1.force", 1e-16);  // round-off
   EXPECT_EQ(round.Run().verdict, Verdict::kNotRun);
-  Case bent = Weightless();
-  Bend(&bent.simulated, "d1.force", 0.5);  // a force out of nothing
-  EXPECT_EQ(bent.Run().verdict, Verdict::kDisagree);
+  Case perturbed = Weightless();
+  Bend(&perturbed.simulated, "d1.force", 0.5);  // a force out of nothing
+  EXPECT_EQ(perturbed.Run().verdict, Verdict::kDisagree);
 }
 
 TEST(Reservations, ForcesThatCancelOutAgreeWithAReservation) {

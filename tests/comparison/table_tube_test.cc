@@ -146,7 +146,7 @@ TEST(TableTube, TwoRowsOfAHundredAreMoreThanOutliers) {
 }
 
 TEST(TableTube, NoisePassesAndTwiceTheNoiseAsABendFails) {
-  for (const bool bent : {false, true}) {
+  for (const bool perturbed : {false, true}) {
     TableCase c;
     std::mt19937_64 random(7);
     std::normal_distribution<double> normal(0.0, 0.2);
@@ -155,17 +155,18 @@ TEST(TableTube, NoisePassesAndTwiceTheNoiseAsABendFails) {
     }
     c.Print(1e-6);
     // Tube 2 · 0.2; a sine of amplitude 0.8 has an RMS of 0.57, with the noise 0.6.
-    if (bent) {
+    if (perturbed) {
       for (int i = 0; i <= 100; ++i) c.table.values(i, 0) += 0.8 * std::cos(kOmega * 0.01 * i);
     }
     const Comparison comparison = c.Run();
-    EXPECT_EQ(comparison.verdict, bent ? Verdict::kDisagree : Verdict::kAgree) << All(comparison);
+    EXPECT_EQ(comparison.verdict, perturbed ? Verdict::kDisagree : Verdict::kAgree)
+        << All(comparison);
     EXPECT_NEAR(comparison.table->uncertainty[0].noise, 0.2, 0.06);
   }
 }
 
 TEST(TableTube, ACoarseColumnDoesNotHideAFineOne) {
-  // d1 to 1 N, d2 to 1 mN and bent by 10 mN: pooled, the 10 mN drown in d1's rounding.
+  // d1 to 1 N, d2 to 1 mN and perturbed by 10 mN: pooled, the 10 mN drown in d1's rounding.
   TableCase c;
   c.Print(1.0);
   for (int i = 0; i <= 100; ++i) {

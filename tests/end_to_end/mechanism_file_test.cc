@@ -23,9 +23,9 @@ TEST(MechanismFile, IsPrintedAndChecked) {
   const auto line = 1 + std::count(text.begin(), text.begin() + static_cast<long>(at), '\n');
   text.replace(at, body.size(), "\"body\": \"rockr\"");
   std::ofstream(file) << text;
-  const ProgramResult bent = mbverify("check " + file);
-  EXPECT_EQ(bent.exit_code, 2);
-  const std::string said = bent.out + bent.err;
+  const ProgramResult perturbed = mbverify("check " + file);
+  EXPECT_EQ(perturbed.exit_code, 2);
+  const std::string said = perturbed.out + perturbed.err;
   EXPECT_NE(said.find("there is no body 'rockr'"), std::string::npos) << said;
   EXPECT_NE(said.find("did you mean 'rocker'?"), std::string::npos) << said;
   EXPECT_NE(said.find("mechanism.json:" + std::to_string(line) + ":"), std::string::npos) << said;

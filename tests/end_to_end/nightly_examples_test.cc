@@ -98,11 +98,11 @@ TEST(NightlyExamples, ABrokenWorkflowIsNoticed) {
       {"retention-days: 3\n", "compression: 3\n"},
       {"      - run: tar -czf", "      - name: tar -czf"}};
   for (const auto& [from, to] : bends) {
-    std::string bent = text;
-    const size_t at = bent.find(from);
+    std::string perturbed = text;
+    const size_t at = perturbed.find(from);
     ASSERT_NE(at, std::string::npos) << from;
-    bent.replace(at, from.size(), to);
-    EXPECT_NE(GithubTrouble(YAML::Load(bent)), "") << from;
+    perturbed.replace(at, from.size(), to);
+    EXPECT_NE(GithubTrouble(YAML::Load(perturbed)), "") << from;
   }
 }
 

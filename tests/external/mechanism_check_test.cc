@@ -1,4 +1,4 @@
-// mechanism.json: what is written passes, what is bent is told with its path.
+// mechanism.json: what is written passes, what is perturbed is told with its path.
 #include "external/mechanism_json.h"
 
 #include <gtest/gtest.h>

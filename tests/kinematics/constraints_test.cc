@@ -128,7 +128,7 @@ TEST(Constraints, RowsCountWhatTheJointLocks) {
   for (const JointKind kind : EveryKind()) {
     const Joint joint = MakeJoint(kind, &random);
     const ConstraintRows rows = RowsOf(joint, MakeStates(joint, {}, 0.0, &random), false);
-    EXPECT_EQ(rows.rows, 6 - FreedomsOf(kind));
+    EXPECT_EQ(rows.rows, 6 - DofsOf(kind));
   }
 }
 
@@ -202,7 +202,7 @@ TEST(Constraints, CoordinatesUndoTheJointPose) {
     const Joint joint = MakeJoint(kind, &random);
     const std::array<double, 6> q = {0.7, -0.4, 1.1, 0.3, -0.9, 2.0};
     const std::array<double, 6> back = CoordinatesOf(joint, JointPose(joint, q));
-    for (int c = 0; c < FreedomsOf(kind); ++c) EXPECT_NEAR(back[c], q[c], 16 * kEps);
+    for (int c = 0; c < DofsOf(kind); ++c) EXPECT_NEAR(back[c], q[c], 16 * kEps);
   }
 }
 
@@ -211,7 +211,7 @@ TEST(Constraints, JointCoordinatesMoveAsTheirJacobianAndBiasSay) {
   for (const JointKind kind : EveryKind()) {
     const Joint joint = MakeJoint(kind, &random);
     const BodyStates s = MakeStates(joint, {0.3, -0.2, 0.4, 0.1, 0.2, -0.5}, 0.2, &random);
-    for (int c = 0; c < FreedomsOf(kind); ++c) {
+    for (int c = 0; c < DofsOf(kind); ++c) {
       ExpectDerivatives(
           JointCoordinateRow(joint, c, s), s,
           [&](const BodyStates& at) { return JointCoordinateRow(joint, c, at).value; },

@@ -40,11 +40,11 @@ Mechanism FourBar(double crank, double coupler, double rocker, double a, double 
 
 TEST(MobilityReport, APlanarFourBarHasThreeRedundantConstraintsInOneLoop) {
   const MobilityReport report = ReportMobility(Shipped("four_bar"));
-  EXPECT_EQ(report.freedoms(), 1);
+  EXPECT_EQ(report.dofs(), 1);
   EXPECT_EQ(report.nearby.size(), 5u);
   EXPECT_FALSE(report.home_singular());
   ASSERT_EQ(report.loops.size(), 1u);
-  EXPECT_EQ(report.loops[0].joint_freedoms, 4);
+  EXPECT_EQ(report.loops[0].joint_dofs, 4);
   EXPECT_EQ(report.loops[0].screw_rank, 3);
   ASSERT_EQ(report.redundant.size(), 1u);
   EXPECT_EQ(report.redundant[0].count, 3);
@@ -60,9 +60,9 @@ TEST(MobilityReport, APlanarFourBarHasThreeRedundantConstraintsInOneLoop) {
 
 TEST(MobilityReport, TheSpatialSliderCrankIsStaticallyDeterminate) {
   const MobilityReport report = ReportMobility(Shipped("slider_crank"));
-  EXPECT_EQ(report.freedoms(), 1);
+  EXPECT_EQ(report.dofs(), 1);
   ASSERT_EQ(report.loops.size(), 1u);
-  EXPECT_EQ(report.loops[0].joint_freedoms, 7);  // Grübler: 7 - 6 = 1
+  EXPECT_EQ(report.loops[0].joint_dofs, 7);  // Grübler: 7 - 6 = 1
   EXPECT_EQ(report.loops[0].screw_rank, 6);
   EXPECT_TRUE(report.redundant.empty());
   EXPECT_TRUE(report.undetermined.empty());
@@ -74,14 +74,14 @@ TEST(MobilityReport, ABallAtBothEndsLetsTheRodSpin) {
   m.joints[m.FindJoint("C")].kind = JointKind::kSpherical;
   // A round rod: nothing turns it.
   const MobilityReport idle = ReportMobility(m);
-  EXPECT_EQ(idle.freedoms(), 1);
+  EXPECT_EQ(idle.dofs(), 1);
   EXPECT_EQ(idle.home.undriven, 0);
   EXPECT_EQ(idle.home.idle_spins, (Names{"rod"}));
   EXPECT_TRUE(idle.free_bodies.empty());
   // One that its weight turns.
   m.bodies[static_cast<size_t>(m.FindBody("rod"))].p_BoBcm_B += Vec3(1e-3, 2e-3, 3e-3);
   const MobilityReport report = ReportMobility(m);
-  EXPECT_EQ(report.freedoms(), 2);
+  EXPECT_EQ(report.dofs(), 2);
   EXPECT_EQ(report.home.undriven, 1);
   EXPECT_FALSE(report.drives_singular());
   EXPECT_EQ(report.free_bodies, (Names{"rod"}));
@@ -93,7 +93,7 @@ TEST(MobilityReport, ABallAtBothEndsLetsTheRodSpin) {
 
 TEST(MobilityReport, TheStewartPlatformHasSixFreedomsAndNothingRedundant) {
   const MobilityReport report = ReportMobility(Shipped("stewart"));
-  EXPECT_EQ(report.freedoms(), 6);
+  EXPECT_EQ(report.dofs(), 6);
   EXPECT_EQ(report.loops.size(), 6u);
   EXPECT_TRUE(report.redundant.empty());
   EXPECT_TRUE(report.home.reactions_not_unique.empty());
@@ -114,10 +114,10 @@ TEST(MobilityReport, RedundancyIsSharedOutAmongTheLoopsThatHaveIt) {
 
 TEST(MobilityReport, AFoldedLinkageIsRecognisedAsASingularHome) {
   // A parallelogram that lies flat on the ground line: it can rise as a parallelogram or as an
-  // antiparallelogram, two freedoms at home, one nearby.
+  // antiparallelogram, two DOFs at home, one nearby.
   const MobilityReport flat = ReportMobility(FourBar(0.2, 0.5, 0.2, 0, 0, 0));
-  EXPECT_EQ(flat.home.freedoms, 2);
-  EXPECT_EQ(flat.freedoms(), 1);
+  EXPECT_EQ(flat.home.dofs, 2);
+  EXPECT_EQ(flat.dofs(), 1);
   EXPECT_TRUE(flat.home_singular());
   const MobilityReport raised = ReportMobility(FourBar(0.2, 0.5, 0.2, 60, -60, 60));
   EXPECT_FALSE(raised.home_singular());
@@ -130,7 +130,7 @@ TEST(MobilityReport, ADriveInItsDeadCentreHoldsNothingAtHomeOnly) {
   Mechanism m = FourBar(0.1875, 0.4375, 0.375, angle_deg, 0, 90);
   m.drives[0].kind = JointDrive{m.FindJoint("D"), 0};
   const MobilityReport report = ReportMobility(m);
-  EXPECT_EQ(report.freedoms(), 1);
+  EXPECT_EQ(report.dofs(), 1);
   EXPECT_EQ(report.home.undriven, 1);
   EXPECT_EQ(report.undriven(), 0);
   EXPECT_TRUE(report.drives_singular());

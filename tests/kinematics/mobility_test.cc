@@ -25,8 +25,8 @@ TEST(Mobility, APlanarFourBarMovesAlthoughKutzbachSaysMinusTwo) {
   EXPECT_EQ(mobility.constraint_rows, 20);
   EXPECT_EQ(mobility.constraint_rank, 17);
   EXPECT_EQ(mobility.kutzbach, -2);
-  EXPECT_EQ(mobility.freedoms, 1);
-  EXPECT_EQ(CountFreedoms(MakeFourBar()), 1);
+  EXPECT_EQ(mobility.dofs, 1);
+  EXPECT_EQ(CountDofs(MakeFourBar()), 1);
   EXPECT_EQ(mobility.redundant, 3);
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_TRUE(mobility.drives_determine_motion);
@@ -95,7 +95,7 @@ TEST(Mobility, WithoutItsMotorTheFourBarIsFree) {
 TEST(Mobility, ABallRemovesTwoOfTheThreeRedundancies) {
   const Mobility mobility = AnalyseMobility(MakeFourBar(JointKind::kSpherical));
   EXPECT_EQ(mobility.kutzbach, 0);
-  EXPECT_EQ(mobility.freedoms, 1);
+  EXPECT_EQ(mobility.dofs, 1);
   EXPECT_EQ(mobility.redundant, 1);
 }
 
@@ -111,7 +111,7 @@ TEST(Mobility, TheStabilizingPlatformHasTwoRedundantConstraintsPerLimb) {
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mobility mobility = AnalyseMobility(*loaded.mechanism);
   EXPECT_EQ(mobility.redundant, 6);
-  EXPECT_EQ(mobility.freedoms, 3 + 6);  // the ship's and the platform's
+  EXPECT_EQ(mobility.dofs, 3 + 6);  // the ship's and the platform's
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_TRUE(mobility.isostatic_rule_sound);
   EXPECT_TRUE(mobility.drive_forces_unique);
@@ -129,7 +129,7 @@ TEST(Mobility, TheTripodHasThreeFreedomsAndNoRedundancy) {
   const LoadResult loaded = LoadModel(SourcePath("/models/spr_tripod/model.yaml"));
   ASSERT_TRUE(loaded.mechanism.has_value()) << loaded.diagnostics.Text();
   const Mobility mobility = AnalyseMobility(*loaded.mechanism);
-  EXPECT_EQ(mobility.freedoms, 3);
+  EXPECT_EQ(mobility.dofs, 3);
   EXPECT_EQ(mobility.redundant, 0);
   EXPECT_EQ(mobility.undriven, 0);
 }

@@ -43,7 +43,8 @@ TEST(TiltedAxis, ALinkageThatItFreezesSaysSo) {
     EXPECT_NE(text.find("warning: the axis of joint " + joint + " is tilted by " + angle),
               std::string::npos)
         << text;
-    EXPECT_NE(text.find("the mechanism has 1 freedoms instead of 0"), std::string::npos) << text;
+    EXPECT_NE(text.find("the mechanism has 1 degrees of freedom instead of 0"), std::string::npos)
+        << text;
   }
 }
 

@@ -174,7 +174,7 @@ TEST_P(Forces, OfMotionGravityAndLoadsAddUp) {
         .error = (motion + (1 + bend) * gravity + loads - all).lpNorm<Eigen::Infinity>() / size,
         .budget = ForceBudget(subject(), state),
         .trouble = asked.trouble + afloat.trouble};
-    if (bend > 0) {  // the share that was bent
+    if (bend > 0) {  // the share that was perturbed
       r.error *= size / (gravity + loads).lpNorm<Eigen::Infinity>();
     }
     return r;

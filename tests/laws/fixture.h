@@ -28,7 +28,7 @@ class EveryMechanism : public ::testing::TestWithParam<std::tuple<std::string, R
     return StatesOf(subject().name, regime());
   }
 
-  /// The law holds at every state, and fails there when the truth is bent by about twice the
+  /// The law holds at every state, and fails there when the truth is perturbed by about twice the
   /// budget. `law(state, bend)` returns what it measured; bend 0 is the truth and bend b must
   /// change a compared quantity by about b of its size.
   template <typename Law>
@@ -38,8 +38,8 @@ class EveryMechanism : public ::testing::TestWithParam<std::tuple<std::string, R
                    std::to_string(state.condition));
       const Residual truth = law(state, 0.0);
       EXPECT_TRUE(truth.Holds()) << truth;
-      const Residual bent = law(state, 2.5 * truth.budget.Total());
-      EXPECT_FALSE(bent.Holds()) << "bent truth passes: " << bent;
+      const Residual perturbed = law(state, 2.5 * truth.budget.Total());
+      EXPECT_FALSE(perturbed.Holds()) << "perturbed truth passes: " << perturbed;
     }
   }
 };

@@ -61,9 +61,9 @@ TEST_P(Programs, GiveTheSameBitsTwice) {
     EXPECT_TRUE(Identical(OfSimulation(mode), OfSimulation(mode)));
   }
   // One unit in the last place of one value is a difference.
-  Trace bent = form;
-  bent.values(1, 0) = std::nextafter(bent.values(1, 0), 1e300);
-  EXPECT_FALSE(Identical(form, bent));
+  Trace perturbed = form;
+  perturbed.values(1, 0) = std::nextafter(perturbed.values(1, 0), 1e300);
+  EXPECT_FALSE(Identical(form, perturbed));
 }
 
 double MassOf(const Mechanism& m) {

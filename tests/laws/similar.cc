@@ -8,7 +8,7 @@ namespace {
 void Scale(double scale, Pose* X) { X->translation() *= scale; }
 
 void ScaleCoordinate(const Joint& joint, double scale, std::array<double, 6>* q) {
-  for (int c = 0; c < FreedomsOf(joint.kind); ++c) {
+  for (int c = 0; c < DofsOf(joint.kind); ++c) {
     if (IsLength(joint.kind, c)) (*q)[c] *= scale;
   }
 }

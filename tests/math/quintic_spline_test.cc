@@ -112,10 +112,10 @@ TEST(QuinticSpline, CountsItsParameters) {
     const SplineFit fit = FitSmooth(knots, data, lambda);
     double trace = 0.0, misfit = 0.0;
     for (size_t i = 0; i < data.size(); ++i) {
-      std::vector<SplineDatum> bent = data;
-      bent[i].value += 1.0;
+      std::vector<SplineDatum> perturbed = data;
+      perturbed[i].value += 1.0;
       const double at = times[i], before = Evaluate(fit.spline, at).value;
-      trace += Evaluate(FitSpline(knots, bent, lambda), at).value - before;
+      trace += Evaluate(FitSpline(knots, perturbed, lambda), at).value - before;
       misfit += std::pow(data[i].weight * (before - data[i].value), 2);
     }
     EXPECT_NEAR(fit.parameters, trace, 1e-8) << lambda;

@@ -22,8 +22,8 @@ class JointKinds : public testing::TestWithParam<JointKindRow> {
 };
 
 TEST_P(JointKinds, HaveACoordinatePerFreedomThatMovesAsItsLetterSays) {
-  ASSERT_EQ(UnitTwists(joint_, Mat3::Identity(), Mat3::Identity()).cols(), FreedomsOf(joint_.kind));
-  for (int c = 0; c < FreedomsOf(joint_.kind); ++c) {
+  ASSERT_EQ(UnitTwists(joint_, Mat3::Identity(), Mat3::Identity()).cols(), DofsOf(joint_.kind));
+  for (int c = 0; c < DofsOf(joint_.kind); ++c) {
     std::array<double, 6> q{};
     q[static_cast<size_t>(c)] = 0.1;
     const Pose X_FM = JointPose(joint_, q);
@@ -38,11 +38,11 @@ TEST_P(JointKinds, LockWhatTheyDoNotMove) {
   Mat3 directions;
   std::array<LockedCosine, 3> cosines;
   EXPECT_EQ(LockedDirections(joint_, &directions) + LockedCosines(joint_, &cosines),
-            6 - FreedomsOf(joint_.kind));
+            6 - DofsOf(joint_.kind));
 }
 
 TEST_P(JointKinds, UseAsManyAxesAsTheRowSays) {
-  const int n = FreedomsOf(joint_.kind);
+  const int n = DofsOf(joint_.kind);
   std::array<double, 6> q{};
   for (int c = 0; c < n; ++c) q[static_cast<size_t>(c)] = 0.1 * (c + 1);
   const Pose before = JointPose(joint_, q);
@@ -56,14 +56,14 @@ TEST_P(JointKinds, UseAsManyAxesAsTheRowSays) {
 TEST_P(JointKinds, CanTransmitAForceOnlyWhereABallCanStandForThem) {
   Mat3 directions;
   const bool held = LockedDirections(joint_, &directions) == 3;
-  EXPECT_EQ(GetParam().may_transmit_force_only, held && FreedomsOf(joint_.kind) > 0);
+  EXPECT_EQ(GetParam().may_transmit_force_only, held && DofsOf(joint_.kind) > 0);
 }
 
 TEST_P(JointKinds, TurnAsABallWhereNothingOfTheTurnIsLocked) {
   std::array<LockedCosine, 3> cosines;
   const bool ball = LockedCosines(joint_, &cosines) == 0;
   EXPECT_EQ(HasBall(joint_.kind), ball);
-  for (int c = 0; c < FreedomsOf(joint_.kind); ++c) {
+  for (int c = 0; c < DofsOf(joint_.kind); ++c) {
     EXPECT_EQ(IsOfBall(joint_.kind, c), ball && !IsLength(joint_.kind, c)) << c;
   }
 }

@@ -1,4 +1,4 @@
-// N four-bars side by side, each driven by the rocker before: one freedom, N loops, 2N + 1 bodies.
+// N four-bars side by side, each driven by the rocker before: one DOF, N loops, 2N + 1 bodies.
 #pragma once
 
 #include <fmt/format.h>

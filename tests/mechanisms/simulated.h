@@ -158,7 +158,7 @@ inline Mechanism MakeParallelogram(double angle) {
 }
 
 /// An arm of 2 kg m² about z at the origin, turned by a motor and by a massless leg that pulls at a
-/// right angle with a lever of 0.5 m while the arm lies along x: one freedom, two drives. Torque T
+/// right angle with a lever of 0.5 m while the arm lies along x: one DOF, two drives. Torque T
 /// is shared with least (τ/L)² + f² by f = 0.5 T / (L² + 0.25), τ = T − 0.5 f.
 inline Mechanism MakeSharedArm() {
   Mechanism m;
@@ -176,7 +176,7 @@ inline Mechanism MakeSharedArm() {
   return m;
 }
 
-/// Starts the first joint's freedom at a position and rate; all drives push with nothing.
+/// Starts the first joint's DOF at a position and rate; all drives push with nothing.
 inline Motion FreeMotion(const Mechanism& m, double position, double rate, double duration_s) {
   Motion motion;
   motion.duration_s = duration_s;
@@ -252,7 +252,7 @@ inline Mechanism MakeJointZoo(bool reversed) {
     joint.axis = Vec3(0.6, 0.0, 0.8);
     joint.axis2 = Vec3(0.8, 0.0, -0.6);
     joint.home = {0.3, -0.2, 0.4, 0, 0, 0};
-    for (int k = FreedomsOf(kind); k < 6; ++k) joint.home[k] = 0.0;
+    for (int k = DofsOf(kind); k < 6; ++k) joint.home[k] = 0.0;
     if (reversed) {
       std::swap(joint.parent, joint.child);
       std::swap(joint.X_PF, joint.X_CM);

@@ -58,10 +58,10 @@ void ExpectProjected(const LoadResult& loaded, double size, int redundant) {
   const Mechanism& m = *loaded.mechanism;
   // It moves as the ideal mechanism does: at home and nearby.
   const MobilityReport report = ReportMobility(m, 4);
-  EXPECT_EQ(report.home.freedoms, 1);
+  EXPECT_EQ(report.home.dofs, 1);
   EXPECT_EQ(report.home.redundant, redundant);
   EXPECT_EQ(report.nearby.size(), 4u);
-  EXPECT_EQ(report.freedoms(), 1);
+  EXPECT_EQ(report.dofs(), 1);
   EXPECT_EQ(report.redundant_count(), redundant);
 }
 

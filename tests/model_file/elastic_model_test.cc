@@ -300,7 +300,7 @@ TEST(ElasticScara, IsOverconstrainedByItsParallelogramsOnly) {
   EXPECT_EQ(m.name, "scara_robot");
   EXPECT_EQ(m.beams.size(), 12u);
   const Mobility mobility = AnalyseMobility(m);
-  EXPECT_EQ(mobility.freedoms, 4);
+  EXPECT_EQ(mobility.dofs, 4);
   EXPECT_EQ(mobility.undriven, 0);
   // A planar four-bar of hinges has three redundant constraints; the main loops have none.
   EXPECT_EQ(mobility.redundant, 2 * 3);
@@ -316,7 +316,7 @@ TEST(ElasticCabin, CarriesItsPlatformOnTwoLinkages) {
   EXPECT_EQ(m.name, "cabin_robot");
   EXPECT_EQ(m.beams.size(), 12u);
   const Mobility mobility = AnalyseMobility(m);
-  EXPECT_EQ(mobility.freedoms, 7) << "the wrist's slide is a parameter";
+  EXPECT_EQ(mobility.dofs, 7) << "the wrist's slide is a parameter";
   EXPECT_EQ(mobility.undriven, 0);
   // Each loop in a plane is three times redundant: two per linkage. The second linkage closes two
   // more loops through the first: over A-B and C-D.

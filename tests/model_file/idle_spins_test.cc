@@ -46,10 +46,10 @@ TEST(IdleSpins, OfASymmetricRodBetweenTwoBalls) {
   EXPECT_LT((spins[0].n_B - Vec3::UnitX()).norm(), 1e-9);
   const Mobility mobility = AnalyseMobility(m);
   EXPECT_EQ(mobility.idle_spins, std::vector<std::string>{"rod"});
-  EXPECT_EQ(mobility.freedoms, 1);
+  EXPECT_EQ(mobility.dofs, 1);
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_EQ(mobility.kutzbach, 1);
-  EXPECT_EQ(CountAllFreedoms(m), 2);
+  EXPECT_EQ(CountAllDofs(m), 2);
 }
 
 // Each of these turns the rod, or shows how it is turned.

@@ -121,14 +121,14 @@ TEST(InertiaDiagnosis, FindsNothingInDifferencesOfRoundingAndMeshing) {
 
 // The limit tells: half of it passes, twice fails.
 TEST(InertiaDiagnosis, ADifferenceOfTwiceTheLimitIsFound) {
-  const auto bent = [](double times) {
+  const auto perturbed = [](double times) {
     return With(BoxPart(), [&](Body* b) {
       b->I_Bcm_B(0, 1) += times * kInertiaLimit * b->I_Bcm_B.norm() / std::sqrt(2.0);
       b->I_Bcm_B(1, 0) = b->I_Bcm_B(0, 1);
     });
   };
-  EXPECT_TRUE(MistakesOf(bent(0.5)).empty());
-  EXPECT_FALSE(MistakesOf(bent(2.0)).empty());
+  EXPECT_TRUE(MistakesOf(perturbed(0.5)).empty());
+  EXPECT_FALSE(MistakesOf(perturbed(2.0)).empty());
   const auto shifted = [](double times) {
     return With(BoxPart(), [&](Body* b) {
       b->p_BoBcm_B.x() += times * kInertiaLimit * DiagnoseInertia(*b).r_m;

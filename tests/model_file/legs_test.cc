@@ -63,10 +63,10 @@ TEST(Legs, AreTheSameAsWrittenByHand) {
   EXPECT_EQ(Written(balls + ", guess: [0.1, -0.2]" + kHalves + "}}\n"),
             Written(ByHand(ball + ", guess: [-0.2, 0.1, 0]", ball)));
   // Every number arrives.
-  for (const char* bent : {"along: 0.002", "across: 0.01", "mass: 1", "com: c - 0.02"}) {
+  for (const char* perturbed : {"along: 0.002", "across: 0.01", "mass: 1", "com: c - 0.02"}) {
     std::string halves = kHalves;
-    halves.insert(halves.find(bent) + std::string(bent).size(), "*1.01");
-    EXPECT_NE(Written("legs: {leg: {" + ends + halves + "}}\n"), leg) << bent;
+    halves.insert(halves.find(perturbed) + std::string(perturbed).size(), "*1.01");
+    EXPECT_NE(Written("legs: {leg: {" + ends + halves + "}}\n"), leg) << perturbed;
   }
 }
 

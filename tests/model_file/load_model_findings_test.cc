@@ -168,12 +168,13 @@ TEST(LoadModelFindings, JointsThatMustNotBeCutMayNotCloseALoop) {
 }
 
 TEST(LoadModelFindings, TheIsostaticRuleMayNotChangeTheMechanism) {
-  // One ball in a planar four-bar leaves its one freedom; with two, the coupler spins.
+  // One ball in a planar four-bar leaves its one DOF; with two, the coupler spins.
   const std::string one = Replaced(kFourBar, "closure: true", "closure: true, transmits: force");
   EXPECT_EQ(FindingsOf(one), "");
   const std::string two =
       Replaced(one, "coupler.start, axis: z", "coupler.start, axis: z, transmits: force");
-  EXPECT_NE(FindingsOf(two).find("transmits: force changes the mechanism: 2 freedoms instead of 1"),
+  EXPECT_NE(FindingsOf(two).find(
+                "transmits: force changes the mechanism: 2 degrees of freedom instead of 1"),
             std::string::npos)
       << FindingsOf(two);
 }

@@ -100,10 +100,10 @@ instances: {a: {part: link}, b: {part: link, length: 0.75}}
   EXPECT_EQ(literals.count("parts.link.attach.world.foot[1]"), 0u);
   LoadOptions options;
   options.literals = {{"parts.link.bodies.rod.com_mm[0]", 0.02}};
-  const LoadResult bent = LoadModelText(text, "m.yaml", options);
-  ASSERT_TRUE(bent.mechanism);
+  const LoadResult perturbed = LoadModelText(text, "m.yaml", options);
+  ASSERT_TRUE(perturbed.mechanism);
   for (const char* rod : {"a.rod", "b.rod"}) {
-    const Body& body = bent.mechanism->bodies[bent.mechanism->FindBody(rod)];
+    const Body& body = perturbed.mechanism->bodies[perturbed.mechanism->FindBody(rod)];
     EXPECT_EQ(body.p_BoBcm_B, Vec3(0.02, 0, 0));
   }
 }

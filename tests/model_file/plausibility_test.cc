@@ -101,7 +101,7 @@ TEST(Plausibility, RotorsFrictionLeadsAndLocksAreSaid) {
        "elements.f: friction coefficient 12, more than any pair"},
       {Machine("", "lead_mm: 5"), Machine("", "lead: 5"), "joint 'screw' moves 5 m with each turn"},
       {Machine(gears("1/6")), Machine(gears("1/5")),
-       "the couplings lock joint 'ja', 'jb', 'jc': together they leave it no freedom"},
+       "the couplings lock joint 'ja', 'jb', 'jc': together they leave it no degree of freedom"},
   };
   for (const Case& c : cases) {
     const std::string right = LoadModelText(c.right, "m.yaml").diagnostics.Text();

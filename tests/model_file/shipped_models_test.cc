@@ -69,7 +69,7 @@ TEST(StabilizingPlatformModel, KeepsTheNamesAndOrderOfItsDrives) {
 
 TEST(StabilizingPlatformModel, HasSixFreedomsOnTheShipAndTwoRedundantConstraintsPerLimb) {
   const Mobility mobility = AnalyseMobility(LoadShipped("stabilizing_platform"));
-  EXPECT_EQ(mobility.freedoms, 6 + 3);  // and the ship's three
+  EXPECT_EQ(mobility.dofs, 6 + 3);  // and the ship's three
   EXPECT_EQ(mobility.redundant, 6);
   EXPECT_EQ(mobility.undriven, 0);
   EXPECT_TRUE(mobility.drive_forces_unique);
@@ -117,7 +117,7 @@ TEST(SprTripodModel, LegAxesFollowThePrintedAzimuths) {
 
 TEST(SprTripodModel, HasThreeFreedomsAndNothingRedundant) {
   const Mobility mobility = AnalyseMobility(LoadShipped("spr_tripod"));
-  EXPECT_EQ(mobility.freedoms, 3);
+  EXPECT_EQ(mobility.dofs, 3);
   EXPECT_EQ(mobility.redundant, 0);
   EXPECT_EQ(mobility.undriven, 0);
 }
@@ -134,7 +134,7 @@ TEST(ModelFormatDocument, ItsExampleLoads) {
       LoadModelText(text.substr(begin, text.find("```", begin) - begin), file);
   EXPECT_EQ(result.diagnostics.Text(), "");
   ASSERT_TRUE(result.mechanism);
-  EXPECT_EQ(AnalyseMobility(*result.mechanism).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(*result.mechanism).dofs, 1);
 }
 
 }  // namespace

@@ -53,7 +53,7 @@ void ExpectClosed(const LoadResult& loaded, JointKind kind) {
   const Vec3 on_rocker = m.X_WB_home[m.FindBody("rocker")] * Vec3(0.4, 0, 0);
   const Vec3 on_coupler = m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0);
   EXPECT_LT((on_rocker - on_coupler).norm(), 1e-12);
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 1);
   EXPECT_EQ(m.joints.at(3).kind, kind);
   EXPECT_TRUE(m.joints.at(3).closure);
 }
@@ -104,10 +104,10 @@ TEST(UrdfConstraint, AxesOfDifferentComponentsOnTheTwoSidesAreTheSameLine) {
 <child_axis xyz="1 0 0"/></constraint>)"),
                JointKind::kRevolute);
   // Bent by a right angle, it cannot close.
-  const LoadResult bent = LoadFourBar("bent", R"(<constraint name="C" type="revolute">
+  const LoadResult perturbed = LoadFourBar("perturbed", R"(<constraint name="C" type="revolute">
 <parent link="rocker"/><parent_origin xyz="0.4 0 0"/><parent_axis xyz="0 0 1"/>
 <child link="coupler"/><child_origin xyz="0.5 0 0"/><child_axis xyz="1 0 0"/></constraint>)");
-  EXPECT_FALSE(bent.mechanism);
+  EXPECT_FALSE(perturbed.mechanism);
 }
 
 TEST(UrdfConstraint, AUniversalJointTakesOneAxisFromEachSide) {
@@ -194,7 +194,7 @@ TEST(UrdfExport, TheConstraintsAloneCloseTheLoopsAgain) {
     ASSERT_TRUE(back.mechanism) << name << ": " << back.diagnostics.Text();
     const Mobility before = AnalyseMobility(*loaded.mechanism);
     const Mobility after = AnalyseMobility(*back.mechanism);
-    EXPECT_EQ(before.freedoms, after.freedoms) << name;
+    EXPECT_EQ(before.dofs, after.dofs) << name;
     EXPECT_EQ(before.redundant, after.redundant) << name;
   }
 }
@@ -228,7 +228,7 @@ TEST(ClosureFile, PairsOfFramesCloseTheLoopAndMotorsBecomeDrives) {
     EXPECT_EQ(m.drives[0].name, "A");
     const Mobility mobility = AnalyseMobility(m);
     // With the ball, the mark at the end of the hinge to_B turns by itself.
-    EXPECT_EQ(mobility.freedoms, *type == '6' ? 1 : 2);
+    EXPECT_EQ(mobility.dofs, *type == '6' ? 1 : 2);
     EXPECT_LT((m.X_WB_home[m.FindBody("rocker")] * Vec3(0.4, 0, 0) -
                m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0))
                   .norm(),

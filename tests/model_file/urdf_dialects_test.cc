@@ -51,7 +51,7 @@ TEST(UrdfDialects, ARobotWithItsClosureFileIsReadFromTheUrdfAlone) {
   EXPECT_EQ(m.bodies.size(), 5u);  // the frames are no bodies
   ASSERT_EQ(m.drives.size(), 1u);
   EXPECT_EQ(m.drives[0].name, "A");
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 1);
   const Vec3 a = m.X_WB_home[m.FindBody("coupler")] * Vec3(0.5, 0, 0);
   const Vec3 b = m.X_WB_home[m.FindBody("rocker")] * Vec3(0.4, 0, 0);
   EXPECT_LT((a - b).norm(), 1e-12);
@@ -83,7 +83,7 @@ TEST(UrdfDialects, CutJointsOfCadExportersCloseLoopsAsHinges) {
                                 [](const Joint& joint) { return joint.closure; });
   ASSERT_NE(cut, m.joints.end());
   EXPECT_EQ(cut->kind, JointKind::kRevolute);
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 1);
   EXPECT_EQ(AnalyseMobility(m).redundant, 3);
   EXPECT_EQ(m.drives.size(), 1u);
 }
@@ -156,7 +156,7 @@ TEST(UrdfDialects, NextToNothingBetweenTwoJointsIsAConnectingPiece) {
   const Mechanism& m = *loaded.mechanism;
   EXPECT_EQ(m.bodies[m.FindBody("cross")].mass, 0.0);
   EXPECT_EQ(m.FindBody("marker"), -1);  // moves nothing of mass
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 2);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 2);
   const std::string said = loaded.diagnostics.Text();
   EXPECT_NE(said.find("the joints idle move nothing of mass and are held at zero"),
             std::string::npos)

@@ -341,7 +341,7 @@ void ExpectRoundTrip(const Mechanism& m) {
   const Mobility mobility = AnalyseMobility(m), again = AnalyseMobility(n);
   // URDF has no balls: three hinges each, between which no spin is known to be idle.
   const auto lost = static_cast<int>(mobility.idle_spins.size() - again.idle_spins.size());
-  EXPECT_EQ(mobility.freedoms + lost, again.freedoms);
+  EXPECT_EQ(mobility.dofs + lost, again.dofs);
   EXPECT_EQ(mobility.redundant, again.redundant);
   EXPECT_EQ(again.undriven, mobility.undriven + lost);
   EXPECT_EQ(m.drives.size(), n.drives.size());
@@ -524,7 +524,7 @@ joints:
 drives: {motor: {kind: joint, joint: A}}
 )"));
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
-  EXPECT_EQ(AnalyseMobility(*loaded.mechanism).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(*loaded.mechanism).dofs, 1);
   const int coupler = loaded.mechanism->FindBody("coupler");
   EXPECT_LT((loaded.mechanism->X_WB_home[coupler].translation() -
              0.2 * Vec3(std::cos(pi / 3), std::sin(pi / 3), 0))

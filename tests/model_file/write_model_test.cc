@@ -48,7 +48,7 @@ TEST_P(WriteModelOf, ReadsBackToTheLastBit) {
     EXPECT_EQ(x.axis2, y.axis2) << x.name;
     EXPECT_EQ(x.home, y.guess) << x.name;
     EXPECT_EQ(x.transmits_force_only, y.transmits_force_only) << x.name;
-    for (int k = 0; k < FreedomsOf(x.kind); ++k) {
+    for (int k = 0; k < DofsOf(x.kind); ++k) {
       EXPECT_EQ(x.range[k].lower, y.range[k].lower) << x.name;
       EXPECT_EQ(x.range[k].upper, y.range[k].upper) << x.name;
     }

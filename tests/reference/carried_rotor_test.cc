@@ -51,8 +51,8 @@ TEST(CarriedRotor, EachNumberCounts) {
   lighter.rotor_inertia = "0.003996";
   tilted.axis = "[0.601, 0, 0.8]";
   backwards.ratio *= -1.0;
-  for (const CarriedRotor& bent : {slower, lighter, tilted, backwards}) {
-    const ReferenceRun run = Wheeling(Loaded(bent.AsLaw()));
+  for (const CarriedRotor& perturbed : {slower, lighter, tilted, backwards}) {
+    const ReferenceRun run = Wheeling(Loaded(perturbed.AsLaw()));
     EXPECT_GT(ErrorOf(run.trace, truth.trace, "m2.force"), 1e-5);
   }
 }

@@ -319,8 +319,8 @@ TEST(Reference, PowerBalancesWithSpringsDampersAndLoads) {
 
   // The balance of a coupler that is a thousandth heavier is another one.
   m.bodies[2].mass *= 1.001;
-  const Eigen::VectorXd bent = ColumnOf(RunReference(m, motion).trace, "power.energy_rate");
-  EXPECT_GT((bent - input).cwiseAbs().maxCoeff(), 1e-6 * scale);
+  const Eigen::VectorXd perturbed = ColumnOf(RunReference(m, motion).trace, "power.energy_rate");
+  EXPECT_GT((perturbed - input).cwiseAbs().maxCoeff(), 1e-6 * scale);
 }
 
 }  // namespace

@@ -25,22 +25,22 @@ TEST(ReferenceCoupling, TorqueIsThatOfTheEquationOfMotion) {
   EXPECT_GT(At(run.trace, run.trace.values.rows() - 1, "motor.position"), 5 * 2 * std::numbers::pi);
   EXPECT_LT(TorqueError(run.trace, wheels), 1e-12);
   // What is not coupled by the numbers of the file is seen.
-  CoupledWheels bent = wheels;
-  bent.curve *= 1.0 + 1e-9;
-  EXPECT_GT(TorqueError(run.trace, bent), 1e-11);
+  CoupledWheels perturbed = wheels;
+  perturbed.curve *= 1.0 + 1e-9;
+  EXPECT_GT(TorqueError(run.trace, perturbed), 1e-11);
 }
 
 TEST(ReferenceCoupling, CountsInMobility) {
   Mechanism m = CoupledWheels().Make();
   const Mobility coupled = AnalyseMobility(m);
-  EXPECT_EQ(coupled.freedoms, 1);
+  EXPECT_EQ(coupled.dofs, 1);
   EXPECT_TRUE(coupled.drives_determine_motion);
   m.couplings.push_back(m.couplings[0]);
   const Mobility twice = AnalyseMobility(m);
-  EXPECT_EQ(twice.freedoms, 1);
+  EXPECT_EQ(twice.dofs, 1);
   EXPECT_EQ(twice.redundant, 1);
   m.couplings.clear();
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 2);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 2);
 }
 
 TEST(ReferenceCoupling, HomeMeetsIt) {

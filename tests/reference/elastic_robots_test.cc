@@ -152,12 +152,12 @@ TEST(ElasticScara, MissesThePrintedDigitsWhenOneSectionIsOnePercentOff) {
   const Mechanism m = LoadShipped("scara_robot/elastic.yaml");
   const std::vector<Pose> X_WB = PosesAt(m, kTabulated);
   for (size_t b = 0; b < m.beams.size(); ++b) {
-    Mechanism bent = m;
-    bent.beams[b].section.I_y *= 1.01;
-    bent.beams[b].section.I_z *= 1.01;
-    bent.beams[b].section.area *= 1.01;
-    bent.beams[b].section.torsion *= 1.01;
-    EXPECT_FALSE(IsPrintedK(FrameStiffness(bent, X_WB, 0).K)) << m.beams[b].name;
+    Mechanism perturbed = m;
+    perturbed.beams[b].section.I_y *= 1.01;
+    perturbed.beams[b].section.I_z *= 1.01;
+    perturbed.beams[b].section.area *= 1.01;
+    perturbed.beams[b].section.torsion *= 1.01;
+    EXPECT_FALSE(IsPrintedK(FrameStiffness(perturbed, X_WB, 0).K)) << m.beams[b].name;
   }
   for (size_t d = 0; d < m.drives.size(); ++d) {
     Mechanism soft = m;
@@ -278,10 +278,10 @@ TEST(ElasticCabin, MissesTheFirstDisplacementWhenOneBeamIsOnePercentTooStiff) {
   Vec6 load;
   load << 0.245263, 0.700674, 0.332428, 872.199362, 873.529244, 700.172153;
   for (size_t b = 0; b < m.beams.size(); ++b) {
-    Mechanism bent = m;
-    bent.beams[b].youngs_modulus *= 1.01;
-    bent.beams[b].shear_modulus *= 1.01;
-    const Mat6 C = FrameStiffness(bent, X_WB, tool).C;
+    Mechanism perturbed = m;
+    perturbed.beams[b].youngs_modulus *= 1.01;
+    perturbed.beams[b].shear_modulus *= 1.01;
+    const Mat6 C = FrameStiffness(perturbed, X_WB, tool).C;
     EXPECT_GT(RelativeDifference(C, C_direct), kDirect) << m.beams[b].name;
     if (m.beams[b].name == "tool") continue;  // too short and thick for the printed digits
     const Vec3 displacement_mm = 1e3 * (C * load).tail<3>();

@@ -3,8 +3,8 @@
 
 #include "model_file/load_model.h"
 #include "reference/forward.h"
+#include "tests/mechanisms/friction_pendulum.h"
 #include "tests/mechanisms/pushed_block.h"
-#include "tests/mechanisms/rubbing_pendulum.h"
 #include "tests/reference/fixture.h"
 #include "tests/support/shipped.h"
 
@@ -28,9 +28,9 @@ TEST(ReferenceElements, TorqueIsThatOfTheEquationOfMotion) {
   using P = RubbingPendulum;
   for (double P::*number : {&P::damping, &P::free, &P::preload, &P::k1, &P::k2, &P::k3, &P::rotor,
                             &P::ratio, &P::coulomb, &P::breakaway, &P::stribeck}) {
-    RubbingPendulum bent = pendulum;
-    bent.*number *= 1.0 + 1e-6;
-    EXPECT_GT(TorqueError(run.trace, bent), 1e-10);
+    RubbingPendulum perturbed = pendulum;
+    perturbed.*number *= 1.0 + 1e-6;
+    EXPECT_GT(TorqueError(run.trace, perturbed), 1e-10);
   }
 }
 
@@ -119,8 +119,8 @@ TEST(ReferenceElements, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
   const Mechanism m = p.Make();
   const ForwardRun run = RunForwardReference(m, FreeMotion(m, 0.3, 5.0, 8.0));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-  JournalPendulum bent = p;
-  bent.coefficient *= 1.0 + 1e-6;
+  JournalPendulum perturbed = p;
+  perturbed.coefficient *= 1.0 + 1e-6;
   int slides = 0;
   for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
     const double q = At(run.trace, i, "motor.position"), rate = At(run.trace, i, "motor.velocity"),
@@ -128,7 +128,7 @@ TEST(ReferenceElements, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
     if (std::abs(rate) < 1e-6) continue;
     ++slides;
     EXPECT_NEAR(p.FreeTorque(q, rate, acceleration), 0.0, 1e-12) << i;
-    EXPECT_GT(std::abs(bent.FreeTorque(q, rate, acceleration)), 1e-9) << i;
+    EXPECT_GT(std::abs(perturbed.FreeTorque(q, rate, acceleration)), 1e-9) << i;
   }
   EXPECT_GT(slides, 10);
   const Eigen::Index end = run.trace.values.rows() - 1;
@@ -163,8 +163,9 @@ TEST(ReferenceElements, FrictionByLoadBreaksAwayByTheLoad) {
     }
     EXPECT_NEAR(block.Force(L, rate, At(run.trace, i, "leg.acceleration")), r * t, 1e-10) << i;
   }
-  const ForwardRun bent = RunForwardReference(PushedBlock{.coefficient = 0.2501}.Make(), motion);
-  EXPECT_GT(std::abs(bent.trace.breaks_s.at(0) - start), 1e-5);
+  const ForwardRun perturbed =
+      RunForwardReference(PushedBlock{.coefficient = 0.2501}.Make(), motion);
+  EXPECT_GT(std::abs(perturbed.trace.breaks_s.at(0) - start), 1e-5);
 }
 
 // A journal as large as that takes back more load than it makes: no acceleration, or several.
@@ -196,7 +197,7 @@ TEST(ReferenceElements, ABandIsWhatAForceInTheElementsPlaceWouldMove) {
     const std::string force = std::string(motor) + ".force";
     double band = 0.0;
     for (size_t e = 0; e < m.elements.size(); ++e) {
-      if (!Rubs(m.elements[e])) continue;
+      if (!HasFriction(m.elements[e])) continue;
       Mechanism pressed = m;
       const double most = std::get<FrictionLaw>(m.elements[e].law).breakaway;
       pressed.elements[e].law = SpringLaw{.polynomial = {0.0}, .preload = most};
@@ -222,15 +223,15 @@ TEST(ReferenceElements, FrictionByLoadIsThatOfAPushedBlock) {
   const Profile profile{{ConstantTerm{0.55}, SineTerm{0.05, 0.5, 0}}};
   const ReferenceRun run = RunReference(m, DriveMotion(m, {profile}, 1.0, 0.05));
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-  PushedBlock bent = block;
-  bent.coefficient *= 1.0 + 1e-6;
+  PushedBlock perturbed = block;
+  perturbed.coefficient *= 1.0 + 1e-6;
   for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
     const double L = At(run.trace, i, "leg.position");
     const double rate = i == 10 ? 0.0 : At(run.trace, i, "leg.velocity");
     const double acceleration = At(run.trace, i, "leg.acceleration");
     const double force = At(run.trace, i, "leg.force");
     EXPECT_NEAR(force, block.Force(L, rate, acceleration), 1e-11) << i;
-    const double away = std::abs(force - bent.Force(L, rate, acceleration));
+    const double away = std::abs(force - perturbed.Force(L, rate, acceleration));
     EXPECT_GT(away, i == 10 ? -1.0 : 1e-8) << i;
     EXPECT_NEAR(At(run.trace, i, "leg.force.band"), i == 10 ? BandAt(block, run.trace) : 0.0,
                 1e-11);

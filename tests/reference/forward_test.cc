@@ -110,8 +110,8 @@ TEST(Forward, ADampedMassFollowsItsClosedForm) {
     EXPECT_NEAR(x[i], exact, kIntegrated) << t;
   }
   // Mutation: 0.1 % more stiffness is seen at once.
-  const Mechanism bent = SpringMass(mass, 1.001 * k, c);
-  const ForwardRun wrong = RunForwardReference(bent, FreeMotion(bent, x0, v0, 3.0));
+  const Mechanism perturbed = SpringMass(mass, 1.001 * k, c);
+  const ForwardRun wrong = RunForwardReference(perturbed, FreeMotion(perturbed, x0, v0, 3.0));
   EXPECT_GT((ColumnOf(wrong.trace, "motor.position") - x).cwiseAbs().maxCoeff(), 1e4 * kIntegrated);
 }
 

@@ -58,9 +58,9 @@ TEST(MotionEquations, AccelerationsWithinAStepAreThoseOfTheFullEquations) {
     ASSERT_TRUE(dynamics.Accelerate(0.01, &full).ok()) << name;
     EXPECT_LT((Accelerations(near) - Accelerations(full)).norm(), 1e-11 * a.norm()) << name;
 
-    Mechanism bent = mechanism;
-    bent.bodies.back().mass *= 1.0 + 1e-6;
-    FreeDynamics other(bent, motion);
+    Mechanism perturbed = mechanism;
+    perturbed.bodies.back().mass *= 1.0 + 1e-6;
+    FreeDynamics other(perturbed, motion);
     BodyStates wrong = states;
     ASSERT_TRUE(other.Project(0.01, &wrong).ok()) << name;
     ASSERT_TRUE(other.AccelerateNear(0.01, &wrong).ok()) << name;

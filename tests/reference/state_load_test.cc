@@ -58,8 +58,8 @@ TEST(StateLoads, AreTheSpringAndTheDamperThatTheyDescribe) {
                 1e-12);
   }
   loaded.loads = {Follower(3.0, 0.2 * 1.001, 0.7)};
-  const ReferenceRun bent = RunReference(plain, loaded);
-  EXPECT_GT((ColumnOf(bent.trace, "motor.force") - ColumnOf(load.trace, "motor.force"))
+  const ReferenceRun perturbed = RunReference(plain, loaded);
+  EXPECT_GT((ColumnOf(perturbed.trace, "motor.force") - ColumnOf(load.trace, "motor.force"))
                 .cwiseAbs()
                 .maxCoeff(),
             1e-4);

@@ -109,9 +109,9 @@ TEST(Stewart, AtRandomPosesTheLegsHaveTheLengthsOfTheFormula) {
 TEST(Stewart, APlatformJointOffByAMicrometreWouldBeNoticed) {
   const std::array<double, 6> pose = {0.02, -0.03, 0.42, 0.1, -0.05, 0.2};
   const VecX legs = LegsByReference(Stewart(), pose);
-  Leg bent = Legs()[0];
-  bent.top.x() += 1e-6;
-  EXPECT_GT(std::abs(legs(0) - Length(bent, pose)), 1e3 * kTolerance_m);
+  Leg perturbed = Legs()[0];
+  perturbed.top.x() += 1e-6;
+  EXPECT_GT(std::abs(legs(0) - Length(perturbed, pose)), 1e3 * kTolerance_m);
 }
 
 // The six legs with balls at both ends, and the same with one end universal, where a leg's turn

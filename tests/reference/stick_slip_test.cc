@@ -101,9 +101,9 @@ TEST(StickSlip, AGrowingForceBreaksABlockAwayAtItsBreakaway) {
   EXPECT_LT(LargestError(run.trace, "motor1.velocity", v), kFollowed);
   EXPECT_LT(Unbalanced(run.trace), kFollowed);
   // A thousandth more breakaway shows.
-  const Mechanism bent =
+  const Mechanism perturbed =
       StackedBlocks{{mass}, {JumpingFriction(coulomb, 1.001 * breakaway)}}.Make();
-  EXPECT_GT(LargestError(RunForwardReference(bent, motion).trace, "motor1.velocity", v), 1e-4);
+  EXPECT_GT(LargestError(RunForwardReference(perturbed, motion).trace, "motor1.velocity", v), 1e-4);
 }
 
 // With Fs = Fc the block goes on without a jump, with Stribeck's curve it runs away.
@@ -276,7 +276,7 @@ TEST(StickSlip, ABlockOnACommandedBeltRidesUntilItsForceBreaksItAway) {
   EXPECT_LT(Unbalanced(run.trace), kFollowed);
 }
 
-// A machine of one freedom q with friction in some coordinates, whose rates are k_e(q) q̇:
+// A machine of one DOF q with friction in some coordinates, whose rates are k_e(q) q̇:
 //   J q̈ + ½ J' q̇² + V' + Σ F_e |k_e| sign q̇ = 0,  F_e = Fc or μ N_e(q, q̇, q̈, sign).
 struct OneFreedom {
   using Function = std::function<double(double)>;
@@ -621,7 +621,7 @@ TEST(DeadCentre, SlidersThatRubByTheirLoadsFollowTheirEquationOfMotion) {
   }
 }
 
-// Random systems, with more elements than freedoms as well: what is found is the least of (2).
+// Random systems, with more elements than DOFs as well: what is found is the least of (2).
 TEST(RestDecision, FindsTheLeastOfGauss) {
   std::mt19937_64 random(20261122);
   std::normal_distribution<double> normal;
@@ -630,12 +630,12 @@ TEST(RestDecision, FindsTheLeastOfGauss) {
   };
   int sticking = 0, starting = 0;
   for (int trial = 0; trial < 300; ++trial) {
-    const Eigen::Index freedoms = 1 + trial % 4, elements = 1 + trial % 6;
-    const MatX L = matrix(freedoms, freedoms);
+    const Eigen::Index dofs = 1 + trial % 4, elements = 1 + trial % 6;
+    const MatX L = matrix(dofs, dofs);
     internal::RestSystem system;
-    system.H = L * L.transpose() + 0.3 * MatX::Identity(freedoms, freedoms);
-    system.f = 3.0 * matrix(freedoms, 1);
-    system.G = matrix(elements, freedoms);
+    system.H = L * L.transpose() + 0.3 * MatX::Identity(dofs, dofs);
+    system.f = 3.0 * matrix(dofs, 1);
+    system.G = matrix(elements, dofs);
     system.d = VecX::Zero(elements);
     system.most = matrix(elements, 1).cwiseAbs().array() + 0.1;
     std::vector<int> sign;
@@ -646,7 +646,7 @@ TEST(RestDecision, FindsTheLeastOfGauss) {
     };
     // The motion of this choice.
     internal::RestSystem held = system;
-    held.G.resize(0, freedoms);
+    held.G.resize(0, dofs);
     for (Eigen::Index e = 0; e < elements; ++e) {
       const int s = sign[static_cast<size_t>(e)];
       (s == 0 ? sticking : starting) += 1;
@@ -654,13 +654,13 @@ TEST(RestDecision, FindsTheLeastOfGauss) {
         held.f -= s * system.most[e] * system.G.row(e).transpose();
         continue;
       }
-      held.G.conservativeResize(held.G.rows() + 1, freedoms);
+      held.G.conservativeResize(held.G.rows() + 1, dofs);
       held.G.bottomRows(1) = system.G.row(e);
     }
     held.d = VecX::Zero(held.G.rows());
     const VecX u = internal::HeldMotion(held);
     for (int other = 0; other < 40; ++other) {
-      const VecX step = std::pow(10.0, -(other % 5)) * matrix(freedoms, 1);
+      const VecX step = std::pow(10.0, -(other % 5)) * matrix(dofs, 1);
       EXPECT_GE(size(u + step), size(u) - 1e-12) << trial;
     }
   }

@@ -59,7 +59,7 @@ EnergyAudit& SimulatedEnergy(test::FullPage* f) {
   return *f->report.comparison.witnesses.back().energy;
 }
 
-// The truth, bent in one place: page, terminal text and summary differ.
+// The truth, perturbed in one place: page, terminal text and summary differ.
 TEST(FullReport, NothingThatItHoldsGoesUntold) {
   using F = test::FullPage;
   const std::vector<FullBending> bendings = {
@@ -156,13 +156,13 @@ TEST(FullReport, NothingThatItHoldsGoesUntold) {
       {"time of the other engine", [](F* f) { f->report.timing.stock_s = 5; }}};
   const test::FullPage right;
   for (const FullBending& bending : bendings) {
-    test::FullPage bent;
-    bending.bend(&bent);
-    EXPECT_EQ(ToJson(bent.report) == ToJson(right.report), bending.unseen.contains("json"))
+    test::FullPage perturbed;
+    bending.bend(&perturbed);
+    EXPECT_EQ(ToJson(perturbed.report) == ToJson(right.report), bending.unseen.contains("json"))
         << bending.what;
-    EXPECT_EQ(TextOf(bent.report) == TextOf(right.report), bending.unseen.contains("text"))
+    EXPECT_EQ(TextOf(perturbed.report) == TextOf(right.report), bending.unseen.contains("text"))
         << bending.what;
-    EXPECT_EQ(PageOf(bent) == PageOf(right), bending.unseen.contains("page")) << bending.what;
+    EXPECT_EQ(PageOf(perturbed) == PageOf(right), bending.unseen.contains("page")) << bending.what;
   }
 }
 

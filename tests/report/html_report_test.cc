@@ -31,8 +31,8 @@ struct BentPage {
   BentPage() {
     c.column = LimitColumn::kForward;
     synthetic::Stretch(&c.simulated, "d1.force", 1.01);
-    report.scenario = "bent";
-    report.scenario_file = "scenarios/two_sliders/bent.yaml";
+    report.scenario = "perturbed";
+    report.scenario_file = "scenarios/two_sliders/perturbed.yaml";
     report.mechanism = "two_sliders";
     report.description = "Plates <b>&</b> \"sliders\"";
     report.drives = {"d1", "d2"};
@@ -134,10 +134,10 @@ TEST(HtmlData, ThinningKeepsTheWorstSample) {
   Trace exact;
   exact.Reset(SampleTimes(100.0, 0.01), DriveChannels(page.c.mechanism));
   exact.values.setOnes();
-  Trace bent = exact;
-  bent.values(4321, bent.Find("d1.force")) = 1.5;
+  Trace perturbed = exact;
+  perturbed.values(4321, perturbed.Find("d1.force")) = 1.5;
   page.report.witnesses = {{"analytic", RunSummary::Done(), exact},
-                           {"simulated", RunSummary::Done(), bent}};
+                           {"simulated", RunSummary::Done(), perturbed}};
   const Json data = Json::parse(PageData(page.input()));
   EXPECT_LE(data["time"].size(), 2500U);
   const std::vector<float> error = Floats(data["pairs"][0]["error"][0].get<std::string>());

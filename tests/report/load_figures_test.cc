@@ -81,10 +81,10 @@ TEST(LoadFigures, OfAJointAreMagnitudesOfWholeVectors) {
 TEST(LoadFigures, ABentSampleChangesThem) {
   const LoadFigures straight = LoadFiguresOf(LoadedReport());
   for (const char* channel : {"d1.force", "d1.velocity", "d1.position", "j.reaction.fz"}) {
-    Report bent = LoadedReport();
-    Trace& trace = bent.witnesses[0].trace;
+    Report perturbed = LoadedReport();
+    Trace& trace = perturbed.witnesses[0].trace;
     trace.values(1, trace.Find(channel)) *= 1.01;
-    const LoadFigures loads = LoadFiguresOf(bent);
+    const LoadFigures loads = LoadFiguresOf(perturbed);
     const DriveLoad &a = straight.drives[0], &b = loads.drives[0];
     const bool same = a.force.rms == b.force.rms && a.power.mean == b.power.mean &&
                       a.stroke == b.stroke &&

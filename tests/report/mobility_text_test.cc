@@ -25,7 +25,7 @@ MobilityReport Counts() {
   home = {.body_coordinates = 12,
           .constraint_rows = 11,
           .constraint_rank = 9,
-          .freedoms = 3,
+          .dofs = 3,
           .redundant = 2,
           .kutzbach = 1,
           .drives = 2,
@@ -61,25 +61,26 @@ TEST(MobilityText, SpinsBetweenTwoBallsAreTold) {
   for (const char* line :
        {"constraints - 2 idle spins\n",
         "  spin of leg2, idle: no force turns it, and no command needs to\n",
-        "  spin between two balls that is a freedom: rod: output 'o' shows its turn\n"}) {
+        "  spin between two balls that is a degree of freedom: rod: output 'o' shows its turn\n"}) {
     EXPECT_NE(text.find(line), std::string::npos) << line << text;
   }
 }
 
 TEST(MobilityText, ASingularHomeAndOnesThatHoldNothingAreTold) {
   MobilityReport report = Counts();
-  report.home.freedoms = 4;
-  EXPECT_NE(
-      MobilityText(Sliders(), report)
-          .find("  the home pose is singular: 4 freedoms at home, 3 at 2 random poses nearby; "
-                "choose guesses for another home\n"),
-      std::string::npos);
+  report.home.dofs = 4;
+  EXPECT_NE(MobilityText(Sliders(), report)
+                .find("  the home pose is singular: 4 degrees of freedom at home, 3 at 2 random "
+                      "poses nearby; "
+                      "choose guesses for another home\n"),
+            std::string::npos);
   report = Counts();
   for (Mobility& near : report.nearby) near.undriven = 0;
-  EXPECT_NE(MobilityText(Sliders(), report)
-                .find("  only at home: nearby the drives leave 0 freedoms; the home pose is "
-                      "singular for these drives\n"),
-            std::string::npos);
+  EXPECT_NE(
+      MobilityText(Sliders(), report)
+          .find("  only at home: nearby the drives leave 0 degrees of freedom; the home pose is "
+                "singular for these drives\n"),
+      std::string::npos);
   report = Counts();
   report.home.undriven = report.home.redundant = 0;
   report.home.drives_not_unique.clear();

@@ -194,9 +194,10 @@ TEST(Report, CountsTellRanComparedAndVerifiedApart) {
 }
 
 TEST(Report, TheShortLineNamesVerdictValueAndLimit) {
-  EXPECT_EQ(VerdictLine(ViewOf(MakeReport(BentCase())), {}),
-            "two_sliders / bent: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 18 "
-            "checks exceed their limits\n");
+  EXPECT_EQ(
+      VerdictLine(ViewOf(MakeReport(BentCase())), {}),
+      "two_sliders / perturbed: DISAGREE  simulated vs analytic 9.3e-03 (limit 1.0e-06)  3 of 18 "
+      "checks exceed their limits\n");
 }
 
 TEST(Report, CsvOfAnySizeHasARowForEachSample) {

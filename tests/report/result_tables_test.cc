@@ -43,9 +43,9 @@ TEST(CheckTable, HasEveryCheckWithALimitAndHowItEnded) {
   synthetic::Case c;
   const PaperTable agree = CheckTable(ViewOf(test::MakeReport(c)));
   c.simulated.values(40, c.simulated.Find("d2.force")) += 0.5;
-  const Report bent = test::MakeReport(c);
-  const PaperTable differs = CheckTable(ViewOf(bent));
-  EXPECT_EQ(agree.rows.size(), ViewOf(bent).limits());
+  const Report perturbed = test::MakeReport(c);
+  const PaperTable differs = CheckTable(ViewOf(perturbed));
+  EXPECT_EQ(agree.rows.size(), ViewOf(perturbed).limits());
   EXPECT_THAT(agree.caption, testing::EndsWith(": agree"));
   EXPECT_THAT(differs.caption, testing::EndsWith(": disagree"));
   const auto fails = [](const PaperTable& table) {
@@ -60,11 +60,11 @@ TEST(MobilityTable, TellsRanksAndWhatStaticsLeavesOpen) {
   report.home.constraint_rows = 22;
   report.home.constraint_rank = 21;
   report.home.redundant = 1;
-  report.home.freedoms = 3;
+  report.home.dofs = 3;
   report.home.joints_not_unique = {"A", "B"};
   const PaperTable table = MobilityTable(synthetic::TwoSliders(), report);
   EXPECT_THAT(table.rows, Contains(ElementsAre("constraints, rank", "22, 21")));
-  EXPECT_THAT(table.rows, Contains(ElementsAre("freedoms", "3")));
+  EXPECT_THAT(table.rows, Contains(ElementsAre("degrees of freedom", "3")));
   EXPECT_THAT(table.rows, Contains(ElementsAre("redundant constraints", "1")));
   EXPECT_THAT(table.rows, Contains(ElementsAre("joints with reactions left open", "A, B")));
 }

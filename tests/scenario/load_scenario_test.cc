@@ -208,9 +208,9 @@ TEST_F(LoadScenarioTest, ParametersMayBeGivenInDegreesAndMillimetres) {
   // An option replaces what the file gives in another unit, either way.
   EXPECT_DOUBLE_EQ(theta_1({{"parameters.theta_1", "2.1"}}, "parameters: {theta_1_deg: 119}\n"),
                    2.1);
-  const ScenarioResult bent = Load(Complete("analytic: {parameters: {r_a_mm: 7400}}\n"));
-  ASSERT_TRUE(bent.scenario) << bent.diagnostics.Text();
-  EXPECT_EQ(bent.scenario->analytic.parameters, (Overrides{{"r_a", 7.4}}));
+  const ScenarioResult perturbed = Load(Complete("analytic: {parameters: {r_a_mm: 7400}}\n"));
+  ASSERT_TRUE(perturbed.scenario) << perturbed.diagnostics.Text();
+  EXPECT_EQ(perturbed.scenario->analytic.parameters, (Overrides{{"r_a", 7.4}}));
   EXPECT_NE(Messages(Complete("parameters: {theta_1: 2, theta_1_deg: 120}\n"))
                 .find("theta_1 and theta_1_deg are both given"),
             std::string::npos);

@@ -99,7 +99,8 @@ TEST_F(PoseTableTest, ComponentsMayBeLeftToOthers) {
   WritePoses("v.csv", "rx,ry,rz", [](const Mat3&) { return std::vector<double>{0, 0, 0.1}; });
   const std::string text =
       Messages("{output: platform, csv: v.csv, angles: rotation_vector, use: [x, z, yaw]}");
-  EXPECT_NE(text.find("motion gives 3 commands, but stewart has 6 freedoms"), std::string::npos)
+  EXPECT_NE(text.find("motion gives 3 commands, but stewart has 6 degrees of freedom"),
+            std::string::npos)
       << text;
 }
 

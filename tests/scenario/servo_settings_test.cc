@@ -62,7 +62,7 @@ TEST(ServoSettings, WhatDoesNotGoTogetherIsSaid) {
       "forces: {motor: 0}\n"
       "simulation: {mode: force_driven}\n",
       "scenarios/spring_cart/t.yaml");
-  EXPECT_TRUE(Says(free.diagnostics.Text(), "every freedom needs a command"));
+  EXPECT_TRUE(Says(free.diagnostics.Text(), "every degree of freedom needs a command"));
 }
 
 TEST(ServoSettings, LimitsAgainstTheCommandHaveNoDefault) {

@@ -52,13 +52,13 @@ std::vector<Golden> Goldens() {
           "  hint: did you mean 'limb1.drive'?")},
       {"TooFewCommands", replaced("    pitch: 0\n", ""),
        At("3:3",
-          "motion gives 8 commands, but stabilizing_platform has 9 freedoms\n"
+          "motion gives 8 commands, but stabilizing_platform has 9 degrees of freedom\n"
           "  hint: command drives, outputs (OUTPUT.x …), prescribed joints, or couple drives "
           "under motion.equal; what moves by forces needs motion.initial; not held yet: pitch, "
           "platform_free, limb1.U1, limb1.U1_p, limb1.R12, limb1.R12_p, limb1.R22, limb1.S, …")},
       {"TooManyCommands", replaced("    pitch: 0\n", "    pitch: 0\n    platform.yaw: 0\n"),
        At("3:3",
-          "motion gives 10 commands, but stabilizing_platform has 9 freedoms\n"
+          "motion gives 10 commands, but stabilizing_platform has 9 degrees of freedom\n"
           "  hint: leave commands out: each further one contradicts the others; platform.yaw, "
           "limb1.drive - limb1.drive_p, limb2.drive - limb2.drive_p, limb3.drive - limb3.drive_p "
           "are dependent")},

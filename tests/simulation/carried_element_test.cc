@@ -89,9 +89,9 @@ TEST(SimulatedRotors, TurnTheirCarrierInFreeMotion) {
   const VecX in = SignalOf(law, "power.input");
   EXPECT_LT((in - SignalOf(law, "power.energy_rate")).cwiseAbs().maxCoeff(),
             1e-9 * in.cwiseAbs().maxCoeff());
-  fixtures::CarriedRotor bent = rotor;
-  bent.ratio *= 1.0 + 1e-5;
-  EXPECT_GT(Difference(turn(Loaded(bent.AsLaw())), body, "m2.position"), 1e-7);
+  fixtures::CarriedRotor perturbed = rotor;
+  perturbed.ratio *= 1.0 + 1e-5;
+  EXPECT_GT(Difference(turn(Loaded(perturbed.AsLaw())), body, "m2.position"), 1e-7);
   // By itself MuJoCo has no inertia between a joint and a body that turns.
   const RunSummary stock = turn(Loaded(rotor.AsLaw()), Engine::kStock).summary;
   EXPECT_EQ(stock.stop, Stop::kUnsupported);

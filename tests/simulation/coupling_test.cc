@@ -30,9 +30,9 @@ TEST(SimulatedCoupling, TorqueIsThatOfTheEquationOfMotion) {
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     EXPECT_TRUE(run.warnings.empty());
     EXPECT_LT(fixtures::TorqueError(run, Turning, wheels), forward ? 1e-8 : 1e-12);
-    CoupledWheels bent = wheels;
-    bent.curve *= 1.0 + 1e-6;
-    EXPECT_GT(fixtures::TorqueError(run, Turning, bent), 2e-8);
+    CoupledWheels perturbed = wheels;
+    perturbed.curve *= 1.0 + 1e-6;
+    EXPECT_GT(fixtures::TorqueError(run, Turning, perturbed), 2e-8);
     // The coupling's moment is no reaction of the hinge.
     const int mz = run.trace.Find("two.reaction.mz");
     ASSERT_GE(mz, 0);

@@ -4,8 +4,8 @@
 #include "simulation/engine/simulation.h"
 #include "simulation/mjcf/mjcf.h"
 #include "simulation/mjcf/plan.h"
+#include "tests/mechanisms/friction_pendulum.h"
 #include "tests/mechanisms/pushed_block.h"
-#include "tests/mechanisms/rubbing_pendulum.h"
 #include "tests/simulation/torque_error.h"
 
 namespace mbv {
@@ -44,9 +44,9 @@ TEST(SimulatedElements, TorqueIsThatOfTheEquationOfMotion) {
       EXPECT_TRUE(run.warnings.empty());
       EXPECT_LT(fixtures::TorqueError(run, SwingAt, pendulum), forward ? 1e-7 : 1e-12) << linear;
       ExpectBalanced(run, forward ? 1e-6 : 1e-12);
-      RubbingPendulum bent = pendulum;
-      bent.preload *= 1.0 + 1e-3;
-      EXPECT_GT(fixtures::TorqueError(run, SwingAt, bent), 1e-6);
+      RubbingPendulum perturbed = pendulum;
+      perturbed.preload *= 1.0 + 1e-3;
+      EXPECT_GT(fixtures::TorqueError(run, SwingAt, perturbed), 1e-6);
     }
   }
 }
@@ -123,7 +123,7 @@ TEST(SimulatedElements, FrictionByLoadIsThatOfAPushedBlock) {
     const bool forward = mode == SimulationMode::kForward;
     const SimulationRun run = Simulate(m, Swing(), PushAt, {.mode = mode});
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-    double worst = 0.0, bent = 0.0;
+    double worst = 0.0, perturbed = 0.0;
     for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
       DrivenSample at;
       (void)PushAt(run.trace.time_s[i], &at);
@@ -133,10 +133,10 @@ TEST(SimulatedElements, FrictionByLoadIsThatOfAPushedBlock) {
         return std::abs(force - by.Force(at.position[0], at.velocity[0], at.acceleration[0]));
       };
       worst = std::max(worst, off(block));
-      bent = std::max(bent, off({.coefficient = 1.001 * block.coefficient}));
+      perturbed = std::max(perturbed, off({.coefficient = 1.001 * block.coefficient}));
     }
     EXPECT_LT(worst, forward ? 1e-5 : 1e-11);
-    EXPECT_GT(bent, 1e-3);
+    EXPECT_GT(perturbed, 1e-3);
     const VecX in = run.trace.values.col(run.trace.Find("power.input"));
     const VecX rate = run.trace.values.col(run.trace.Find("power.energy_rate"));
     EXPECT_LT((in - rate).cwiseAbs().maxCoeff(), 1e-6 * in.cwiseAbs().maxCoeff());

@@ -103,7 +103,7 @@ Mechanism MakeSlidingBody(JointKind kind, bool reversed) {
 Motion LetGo(const Mechanism& m) {
   Motion motion{.duration_s = 1.0, .sample_s = 0.01, .commands = {}, .loads = {}};
   const Joint& joint = m.joints[0];
-  const int n = FreedomsOf(joint.kind);
+  const int n = DofsOf(joint.kind);
   const double turns[] = {0.4, 0.7, 0.2};
   for (int c = 0; c < n; ++c) {
     const bool slides = IsLength(joint.kind, c);

@@ -37,7 +37,7 @@ double WorstDifference(const Trace& a, const Trace& b) {
 }
 
 // A net of n × n parallelograms: long bars from the ground, pinned to long bars along it. One
-// degree of freedom, and many redundant constraints in the plane, too.
+// DOF, and many redundant constraints in the plane, too.
 Mechanism Net(int n, double guess_deg) {
   const auto at = [](int i) { return 0.2 * i + 0.01 * (i * i % 3); };
   std::string world, bodies, joints, on_posts, on_beams;
@@ -91,7 +91,7 @@ TEST(ManyLoops, ARegularPoseOfANetIsNoLossOfControl) {
   for (const double home_deg : {20.0, 60.0, 90.0}) {
     const Mechanism net = Net(4, home_deg);
     const Mobility mobility = AnalyseMobility(net);
-    EXPECT_EQ(mobility.freedoms, 1);
+    EXPECT_EQ(mobility.dofs, 1);
     EXPECT_TRUE(mobility.drive_forces_unique);
     for (const auto& [from, to] : {std::pair(home_deg, 155.0), std::pair(home_deg, 25.0),
                                    std::pair(150.0, 140.0), std::pair(120.0, 30.0)}) {
@@ -271,7 +271,7 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
     Motion motion = FourBarChainMotion(mechanism);
     motion.duration_s = 0.3;
     const Mobility mobility = AnalyseMobility(mechanism);
-    EXPECT_EQ(mobility.freedoms, 1);
+    EXPECT_EQ(mobility.dofs, 1);
     EXPECT_EQ(mobility.redundant, 3 * loops);
     EXPECT_TRUE(mobility.drive_forces_unique);
     const ReferenceRun reference = RunReference(mechanism, motion);
@@ -285,10 +285,10 @@ TEST(ManyLoops, TheWitnessesAgreeOnChainsOfFourBars) {
     EXPECT_LT(WorstDifference(forward.trace, reference.trace), 1e-8) << loops;
     EXPECT_TRUE(inverse.not_unique.empty());
 
-    Mechanism bent = mechanism;
-    bent.bodies.back().mass *= 1.0 + 1e-6;
+    Mechanism perturbed = mechanism;
+    perturbed.bodies.back().mass *= 1.0 + 1e-6;
     const SimulationRun wrong =
-        Simulate(bent, motion, Commanded(motion), {.mode = SimulationMode::kInverse});
+        Simulate(perturbed, motion, Commanded(motion), {.mode = SimulationMode::kInverse});
     EXPECT_GT(WorstDifference(wrong.trace, reference.trace), 1e-9) << loops;
   }
 }

@@ -98,9 +98,9 @@ TEST(Mjcf, AFourBarIsWrittenAsCommitted) {
 
 TEST(Mjcf, TheGoldenComparisonNoticesAChangedNumberAndAChangedWord) {
   const std::string text = WriteMjcf(fixtures::MakeFourBar());
-  Mechanism bent = fixtures::MakeFourBar();
-  bent.bodies[1].mass *= 1.0 + 1e-9;
-  EXPECT_NE(FirstDifference(text, WriteMjcf(bent)), "");
+  Mechanism perturbed = fixtures::MakeFourBar();
+  perturbed.bodies[1].mass *= 1.0 + 1e-9;
+  EXPECT_NE(FirstDifference(text, WriteMjcf(perturbed)), "");
   EXPECT_NE(FirstDifference(text, WriteMjcf(fixtures::MakeFourBar(JointKind::kSpherical))), "");
 }
 
@@ -185,7 +185,7 @@ TEST(Mjcf, JointPositionsAreTheMechanismsCoordinates) {
     std::vector<std::array<double, 6>> q(m.joints.size());
     for (size_t j = 0; j < m.joints.size(); ++j) {
       q[j] = m.joints[j].home;
-      for (int k = 0; k < FreedomsOf(m.joints[j].kind); ++k) {
+      for (int k = 0; k < DofsOf(m.joints[j].kind); ++k) {
         const int id = mj_name2id(compiled.engine.m.get(), mjOBJ_JOINT,
                                   mjcf::JointName(m.joints[j], k).c_str());
         ASSERT_GE(id, 0) << m.joints[j].name;

@@ -14,7 +14,7 @@ namespace {
 Mechanism DrivenZoo(bool reversed) {
   Mechanism m = fixtures::MakeJointZoo(reversed);
   for (size_t j = 0; j < m.joints.size(); ++j) {
-    for (int k = 0; k < FreedomsOf(m.joints[j].kind); ++k) {
+    for (int k = 0; k < DofsOf(m.joints[j].kind); ++k) {
       Drive drive;
       drive.name = m.joints[j].name + "_" + std::to_string(k);
       drive.kind = JointDrive{static_cast<int>(j), k};

@@ -48,8 +48,8 @@ TEST(AndrewsSqueezer, TheReferenceEndsWhereThePublishedSolutionDoes) {
   EXPECT_NEAR(Last(run.trace, "motor.velocity"), kBetaRate, kRelativeRate * kBetaRate);
   // Mutation: a millionth more torque is seen.
   b.motion.forces[0].force = Constant(0.033 * (1 + 1e-6));
-  const ForwardRun bent = RunForwardReference(b.mechanism, b.motion, {.measure_trust = false});
-  EXPECT_GT(std::abs(Last(bent.trace, "motor.position") - kBeta), 100 * kAngle);
+  const ForwardRun perturbed = RunForwardReference(b.mechanism, b.motion, {.measure_trust = false});
+  EXPECT_GT(std::abs(Last(perturbed.trace, "motor.position") - kBeta), 100 * kAngle);
 }
 
 TEST(AndrewsSqueezer, TheSimulationEndsThereToo) {

@@ -110,10 +110,10 @@ TEST(ShippedModels, ForwardModeAgreesWithTheClosedForms) {
 
 TEST(ShippedModels, AMassWrongByOnePartInAMillionShowsInEveryMode) {
   Case c("spr_tripod/default", 0.3);
-  Mechanism bent = c.mechanism;
-  bent.bodies[bent.FindBody("platform")].mass *= 1.0 + 1e-6;
+  Mechanism perturbed = c.mechanism;
+  perturbed.bodies[perturbed.FindBody("platform")].mass *= 1.0 + 1e-6;
   for (const SimulationMode mode : {SimulationMode::kForward, SimulationMode::kInverse}) {
-    const SimulationRun run = Simulate(bent, c.motion, c.Driven(), {.mode = mode});
+    const SimulationRun run = Simulate(perturbed, c.motion, c.Driven(), {.mode = mode});
     EXPECT_GT(c.WorstDriveError(run), 1e-7);
   }
 }
@@ -128,7 +128,7 @@ TEST(ShippedModels, MasslessLinksCanBeSimulated) {
   }
 }
 
-// Between two positions of three drives for two freedoms no straight way closes: it starts 60 deg
+// Between two positions of three drives for two DOFs no straight way closes: it starts 60 deg
 // of both shoulders from home, and turns by as much from sample to sample.
 TEST(ShippedModels, DependentDrivesMayStartFarFromHomeAndMoveFarFromSampleToSample) {
   const ScenarioOptions far{
@@ -174,7 +174,7 @@ TEST(ShippedModels, AllUniqueReactionsAgreeWithTheReference) {
     ASSERT_TRUE(run.summary.ok()) << run.summary.message;
     int compared = 0;
     for (const Joint& joint : c.mechanism.joints) {
-      if (FreedomsOf(joint.kind) == 6) continue;  // transmits nothing
+      if (DofsOf(joint.kind) == 6) continue;  // transmits nothing
       const auto& not_unique = mobility.joints_not_unique;
       if (std::find(not_unique.begin(), not_unique.end(), joint.name) != not_unique.end()) continue;
       // Scale: the largest of the joint's forces (lever arms are of the order of a metre).

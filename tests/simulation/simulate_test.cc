@@ -69,9 +69,10 @@ TEST(Inverse, AgreesWithTheClosedFormToRoundOff) {
 }
 
 TEST(Inverse, NoticesAMassThatIsWrongByOnePartInABillion) {
-  Mechanism bent = fixtures::MakeFourBar();
-  bent.bodies[2].mass *= 1.0 + 1e-9;
-  const SimulationRun run = Simulate(bent, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
+  Mechanism perturbed = fixtures::MakeFourBar();
+  perturbed.bodies[2].mass *= 1.0 + 1e-9;
+  const SimulationRun run =
+      Simulate(perturbed, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
   EXPECT_GT(TorqueError(run), 1e-11);
 }
 
@@ -207,7 +208,8 @@ TEST(Inverse, RefusesUndrivenFreedoms) {
   m.joints.pop_back();  // open chain: coupler and rocker swing freely
   const SimulationRun run = Simulate(m, OneSecond(), Swing, {.mode = SimulationMode::kInverse});
   EXPECT_EQ(run.summary.stop, Stop::kUnsupported);
-  EXPECT_NE(run.summary.message.find("2 freedoms"), std::string::npos) << run.summary.message;
+  EXPECT_NE(run.summary.message.find("2 degrees of freedom"), std::string::npos)
+      << run.summary.message;
 }
 
 TEST(Forward, ConvergesWithFourthOrder) {

@@ -7,8 +7,8 @@
 #include "model_file/load_model.h"
 #include "reference/forward.h"
 #include "simulation/engine/simulation.h"
+#include "tests/mechanisms/friction_pendulum.h"
 #include "tests/mechanisms/pushed_block.h"
-#include "tests/mechanisms/rubbing_pendulum.h"
 #include "tests/mechanisms/stacked_blocks.h"
 #include "tests/support/source_dir.h"
 
@@ -181,8 +181,8 @@ TEST(SimulatedStickSlip, FrictionByLoadIsThatOfThePushedBlock) {
   EXPECT_LT(Apart(SlipFreely(m, motion), reference, "leg.position"), 1e-10);
   EXPECT_LT(Apart(SlipFreely(m, motion), reference, "rail.reaction.fz"), 1e-7);
   EXPECT_LT(Apart(SlipFreely(m, motion), reference, "dampers.work"), 1e-9);
-  const Mechanism bent = fixtures::PushedBlock{.coefficient = 0.25 + 1e-4}.Make();
-  EXPECT_GT(Apart(SlipFreely(bent, motion), reference, "leg.position"), 1e-6);
+  const Mechanism perturbed = fixtures::PushedBlock{.coefficient = 0.25 + 1e-4}.Make();
+  EXPECT_GT(Apart(SlipFreely(perturbed, motion), reference, "leg.position"), 1e-6);
 }
 
 TEST(SimulatedStickSlip, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
@@ -202,7 +202,7 @@ TEST(SimulatedStickSlip, AFreeJournalRubsByTheLoadOfItsOwnAccelerations) {
   }
 }
 
-// A loop of one freedom stops as a whole, whatever the step's own error leaves in its rates: what
+// A loop of one DOF stops as a whole, whatever the step's own error leaves in its rates: what
 // its joints bear at rest does not depend on the step.
 TEST(SimulatedStickSlip, WhatALoopHoldsRestsWithItAtAnyStep) {
   const LoadResult loaded = LoadModel(std::string(kSourceDir) + "/models/journal_crank/model.yaml");
@@ -247,7 +247,7 @@ TEST(SimulatedStickSlip, FrictionOnACommandedCoordinateIsItsDrives) {
 TEST(SimulatedStickSlip, PushedInOpenLoopIsRefused) {
   const Mechanism m = StackedBlocks{{2.0}, {CoulombFriction(0.5)}}.Make();
   const Motion motion{.duration_s = 1.0, .sample_s = 0.1, .commands = {}, .loads = {}};
-  SimulationOptions options{.drives = DriveMode::kPushed};
+  SimulationOptions options{.drives = DriveMode::kForceDriven};
   options.forces = [](double, VecX* force) {
     *force = VecX::Ones(1);
     return RunSummary::Done();

@@ -42,8 +42,8 @@ inline Finding Warning(const std::string& message) {
 
 inline Report MakeReport(const synthetic::Case& c) {
   Report report;
-  report.scenario = "bent";
-  report.scenario_file = "scenarios/two_sliders/bent.yaml";
+  report.scenario = "perturbed";
+  report.scenario_file = "scenarios/two_sliders/perturbed.yaml";
   report.mechanism = "two_sliders";
   report.model_file = "models/two_sliders/model.yaml";
   report.description = "Two sliders carry a plate";

@@ -89,7 +89,7 @@ void ExpectDeclined(const Outcome& outcome, const std::string& fact, const std::
       << outcome.findings;
 }
 
-TEST(Decline, ACentreOfMassBesideTheLink) {
+TEST(WarnNotApplicable, ACentreOfMassBesideTheLink) {
   const Copy copy("off_axis");
   std::string model = ReadShipped("models/stabilizing_platform/model.yaml");
   Replace("com: [c_1_x, c_1*L1, c_1_z]", "com: [0.4, c_1*L1, c_1_z]", &model);
@@ -109,7 +109,7 @@ TEST(Decline, ACentreOfMassBesideTheLink) {
             std::string::npos);
 }
 
-TEST(Decline, AMissingFractionIsNotTakenAsOneHalf) {
+TEST(WarnNotApplicable, AMissingFractionIsNotTakenAsOneHalf) {
   const Copy copy("no_fraction");
   std::string model = ReadShipped("models/stabilizing_platform/model.yaml");
   const size_t line = model.find("  c_1: {");
@@ -123,7 +123,7 @@ TEST(Decline, AMissingFractionIsNotTakenAsOneHalf) {
                  "reads it by this name");
 }
 
-TEST(Decline, ASpringOnTheCabinRobotAndTheTripod) {
+TEST(WarnNotApplicable, ASpringOnTheCabinRobotAndTheTripod) {
   for (const auto& [name, from, to] : {std::tuple{"cabin_robot", "platform.B", "sliderD"},
                                        std::tuple{"spr_tripod", "world", "platform.O"}}) {
     const Copy copy(std::string("spring_") + name);
@@ -136,7 +136,7 @@ TEST(Decline, ASpringOnTheCabinRobotAndTheTripod) {
   }
 }
 
-TEST(Decline, ALoadOnABodyThatTheEquationsDoNotKnow) {
+TEST(WarnNotApplicable, ALoadOnABodyThatTheEquationsDoNotKnow) {
   const Copy copy("load");
   std::string model = ReadShipped("models/cabin_robot/model.yaml");
   Replace("bodies:\n", "bodies:\n  camera: {}\n", &model);
@@ -154,7 +154,7 @@ TEST(Decline, ALoadOnABodyThatTheEquationsDoNotKnow) {
   EXPECT_EQ(RunFile(bare).reason, "");
 }
 
-TEST(Decline, AnotherMechanismOfTheSameName) {
+TEST(WarnNotApplicable, AnotherMechanismOfTheSameName) {
   // A four-bar by the name of each mechanism that has equations.
   for (const ClosedFormRow& row : ClosedForms()) {
     const Copy copy("named_" + row.mechanism);
@@ -169,12 +169,12 @@ TEST(Decline, AnotherMechanismOfTheSameName) {
   }
 }
 
-TEST(Decline, TheWorkspaceOfAnotherMechanismIsRefused) {
+TEST(WarnNotApplicable, TheWorkspaceOfAnotherMechanismIsRefused) {
   LoadResult loaded = LoadModel(SourcePath("/models/scara_robot/model.yaml"));
   ASSERT_TRUE(loaded.mechanism);
-  Mechanism bent = *loaded.mechanism;
-  bent.joints[size_t(bent.FindJoint("limb3.motor"))].X_PF.translation().x() += 0.01;
-  const WorkspaceOutcome outcome = ComputeWorkspace(bent, false);
+  Mechanism perturbed = *loaded.mechanism;
+  perturbed.joints[size_t(perturbed.FindJoint("limb3.motor"))].X_PF.translation().x() += 0.01;
+  const WorkspaceOutcome outcome = ComputeWorkspace(perturbed, false);
   EXPECT_TRUE(outcome.diagnostics.has_errors());
   EXPECT_NE(outcome.diagnostics.Text().find("joint limb3.motor: centre on world, x is -0.09 m"),
             std::string::npos)
@@ -186,7 +186,7 @@ TEST(Decline, TheWorkspaceOfAnotherMechanismIsRefused) {
   EXPECT_FALSE(ComputeWorkspace(heavy, false).diagnostics.has_errors());
 }
 
-TEST(Decline, AnElasticModelWithAnotherBeam) {
+TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
   const Copy copy("beam");
   std::string model = ReadShipped("models/scara_robot/elastic.yaml");
   Replace("parameters_from: model.yaml",
@@ -222,7 +222,7 @@ TEST(Decline, AnElasticModelWithAnotherBeam) {
 }
 
 // Of a robot's file that has more than the model, and of a closed form that is there.
-TEST(Decline, AStiffnessOfAModelThatLeavesSomethingOutHasACaveat) {
+TEST(WarnNotApplicable, AStiffnessOfAModelThatLeavesSomethingOutHasACaveat) {
   for (const bool whole : {true, false}) {
     const Copy copy(whole ? "whole" : "left_out");
     std::string model = ReadShipped("models/scara_robot/elastic.yaml");

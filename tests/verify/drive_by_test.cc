@@ -46,7 +46,7 @@ TEST(ForceDriven, TheMotionIsJudgedByWhereBentForcesLead) {
   const CheckResult* position =
       outcome.report->comparison.FindCheck("simulated_vs_analytic.position_m");
   ASSERT_NE(position, nullptr);
-  EXPECT_EQ(position->limit_by, "forces bent by 1e-06");
+  EXPECT_EQ(position->limit_by, "forces perturbed by 1e-06");
   // A constant error of 1e-6 of some 150 N on 15 kg moves a leg by ½ a t² ~ 2e-7 m in 0.2 s.
   EXPECT_GT(*position->limit, 2e-8);
   EXPECT_LT(*position->limit, 2e-6);

@@ -107,7 +107,7 @@ TEST(ForeignWitness, ThePendulumIsASmallOne) {
 
 // With four of them every pair stands in a matrix, and a star where it fails.
 TEST(ForeignWitness, PairsOfManyStandInAMatrix) {
-  const std::string one = Mock("answers"), two = Mock("bent");
+  const std::string one = Mock("answers"), two = Mock("perturbed");
   const RunOutcome outcome = RunWith(one.substr(0, one.size() - 1) + ", other" + two.substr(5));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   const std::vector<std::string> lines = PairMatrixLines(outcome.report->comparison);
@@ -124,7 +124,7 @@ TEST(ForeignWitness, PairsOfManyStandInAMatrix) {
 
 // The limit is that of the reference: an error of 1e-8 counts.
 TEST(ForeignWitness, ThatStandsAloneIsNamed) {
-  for (const char* how : {"bent", "kilo"}) {
+  for (const char* how : {"perturbed", "kilo"}) {
     const RunOutcome outcome = RunWith(Mock(how));
     ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
     EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kDisagree) << how;
@@ -135,7 +135,8 @@ TEST(ForeignWitness, ThatStandsAloneIsNamed) {
   EXPECT_NE(kilo.report->comparison.attribution.text.find("(0.001)"), std::string::npos)
       << kilo.report->comparison.attribution.text;
   // An engine that integrates is not held to it.
-  EXPECT_EQ(RunWith(Mock("bent", ", limits: stepped")).report->comparison.verdict, Verdict::kAgree);
+  EXPECT_EQ(RunWith(Mock("perturbed", ", limits: stepped")).report->comparison.verdict,
+            Verdict::kAgree);
 }
 
 struct Mischief {
@@ -389,7 +390,7 @@ TEST(ForeignWitness, SimbodyAgrees) {
 }
 
 // Free motions: springs, six free coordinates, a stiff loop that turns at thousands of rad/s. A
-// bent truth is told, and of three witnesses the odd one out is named.
+// perturbed truth is told, and of three witnesses the odd one out is named.
 TEST(ForeignWitness, SimbodyMovesFreely) {
   const auto run = [](const char* scenario, const std::string& density) {
     RunOptions options;

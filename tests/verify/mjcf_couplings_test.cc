@@ -37,7 +37,7 @@ TEST(MjcfCouplings, AJointEqualityIsAPolynomialFromTheReferencePose) {
   EXPECT_EQ(m.couplings[0].terms[1].polynomial, (std::vector<double>{-2, 0.3}));
   EXPECT_EQ(m.couplings[0].constant, 0.1);
   EXPECT_NEAR(m.joints[m.FindJoint("b_hinge")].home[0], 0.1, 1e-12);
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 2);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 2);
   EXPECT_EQ(loaded.diagnostics.Text().find("left out"), std::string::npos)
       << loaded.diagnostics.Text();
 }
@@ -90,7 +90,7 @@ TEST(MjcfCouplings, AgreeInBothModes) {
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_LT(row.inverse_nrmse, 1e-10);
   EXPECT_LT(row.forward_nrmse, 1e-6);
-  EXPECT_EQ(row.freedoms, 2);
+  EXPECT_EQ(row.dofs, 2);
 }
 
 }  // namespace

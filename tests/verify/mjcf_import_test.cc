@@ -47,7 +47,7 @@ TEST(MjcfImport, ALinkageClosedByConnectIsAMechanism) {
   const Mechanism& m = *loaded.mechanism;
   EXPECT_EQ(m.name, "linkage");
   ASSERT_EQ(m.bodies.size(), 5u);
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 1);
   ASSERT_EQ(m.drives.size(), 1u);
   EXPECT_EQ(m.drives[0].name, "m");
   const Body& coupler = m.bodies[m.FindBody("coupler")];
@@ -203,7 +203,7 @@ TEST(MjcfImport, JointsOfOneBodyBallsWeldsAndKeyframesAreRead) {
   EXPECT_LT((X_b.translation() - p_b).norm(), 1e-12);
   EXPECT_LT((X_b.linear() - R_b).norm(), 1e-12);
   // The weld holds the two as they are at the reference.
-  EXPECT_EQ(AnalyseMobility(m).freedoms, 2 + 3 + 1);
+  EXPECT_EQ(AnalyseMobility(m).dofs, 2 + 3 + 1);
   EXPECT_NE(loaded.diagnostics.Text().find("the keyframe 'home'"), std::string::npos);
 }
 
@@ -231,7 +231,7 @@ TEST(MjcfImport, ClosuresByTwoSitesMeetInTheSites) {
     const LoadResult loaded = LoadText(folder, LinkageBySites(closure));
     ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
     const Mechanism& m = *loaded.mechanism;
-    EXPECT_EQ(AnalyseMobility(m).freedoms, 1);
+    EXPECT_EQ(AnalyseMobility(m).dofs, 1);
     ASSERT_GE(m.FindJoint("top_end"), 0);
     const int rocker = m.FindBody("body_of_top"), coupler = m.FindBody("coupler");
     ASSERT_GE(rocker, 0);

@@ -86,7 +86,7 @@ TEST(StructuralFaults, ExchangedUniversalAxesCloseAgain) {
   const auto j = static_cast<size_t>(crank.FindJoint("C"));
   EXPECT_EQ(faults[0].wrong[0].joints[j].axis, crank.joints[j].axis2);
   EXPECT_EQ(faults[0].wrong[0].joints[j].axis2, crank.joints[j].axis);
-  EXPECT_EQ(AnalyseMobility(faults[0].wrong[0]).freedoms, 1);
+  EXPECT_EQ(AnalyseMobility(faults[0].wrong[0]).dofs, 1);
   EXPECT_NE(Of(LoadNamed("four_bar"), "exchanged universal-joint axes")[0].not_applicable, "");
 }
 
@@ -209,9 +209,8 @@ TEST(StructuralFaults, WithoutAClosureTheIndicesStillFitAndFreedomsAppear) {
       EXPECT_EQ(wrong.joints.size(), mechanism.joints.size() - 1);
       EXPECT_EQ(wrong.FindJoint(fault.where), -1);
       // What is held twice may be held still.
-      const int freedoms = AnalyseMobility(wrong).freedoms;
-      EXPECT_GE(freedoms, whole.freedoms + (whole.redundant == 0 ? 1 : 0))
-          << model << " " << fault.where;
+      const int dofs = AnalyseMobility(wrong).dofs;
+      EXPECT_GE(dofs, whole.dofs + (whole.redundant == 0 ? 1 : 0)) << model << " " << fault.where;
       for (size_t d = 0; d < wrong.drives.size(); ++d) {
         const auto* drive = std::get_if<JointDrive>(&wrong.drives[d].kind);
         if (drive == nullptr) continue;

@@ -16,7 +16,7 @@ namespace {
 
 // The complete inverse problem of the cabin robot: drives from the pose of the end effector.
 //
-// Eight drives, six task freedoms: the rail and the sliders share a direction, and the platform's
+// Eight drives, six task DOFs: the rail and the sliders share a direction, and the platform's
 // tilt γ can be exchanged against the wrist. The redundancy is resolved by two more commands, kept
 // exactly: γ and either the rail position d1 or the platform height Y.
 //

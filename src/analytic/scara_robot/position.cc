@@ -224,9 +224,9 @@ RunSummary ForwardTracker::Follow(const Vec4& theta, Position* position) {
   return RunSummary::Done();
 }
 
-FreedomCount CountFreedoms() {
+DofCount CountDofs() {
   // Each limb gives three translations and rotations in the span of its columns: limbs 1, 2 about
-  // a_i and z (five freedoms), limbs 3, 4 about everything (six, the idle spin of the rod dropped).
+  // a_i and z (five DOFs), limbs 3, 4 about everything (six, the idle spin of the rod dropped).
   const auto rank = [](const MatX& directions) {
     return directions.cols() == 0 ? 0 : static_cast<int>(directions.fullPivLu().rank());
   };
@@ -239,7 +239,7 @@ FreedomCount CountFreedoms() {
     return (A * lu.kernel().topRows(A.cols())).eval();
   };
   std::array<MatX, kLimbs> rotations;
-  FreedomCount count;
+  DofCount count;
   for (int i = 0; i < kLimbs; ++i) {
     if (i < 2) {
       rotations[i].resize(3, 2);
@@ -247,15 +247,15 @@ FreedomCount CountFreedoms() {
     } else {
       rotations[i] = Mat3::Identity();
     }
-    count.limb_freedoms[i] = 3 + rank(rotations[i]);
-    count.freedoms += count.limb_freedoms[i];
+    count.limb_dofs[i] = 3 + rank(rotations[i]);
+    count.dofs += count.limb_dofs[i];
   }
   MatX platform = rotations[0];
   for (int i = 1; i < kLimbs; ++i) {
     MatX both(3, platform.cols() + rotations[i].cols());
     both << platform, rotations[i];
     count.loop_equations[i - 1] = 3 + rank(both);
-    count.freedoms -= count.loop_equations[i - 1];
+    count.dofs -= count.loop_equations[i - 1];
     platform = intersection(platform, rotations[i]);
   }
   count.platform_translations = 3;

@@ -123,16 +123,16 @@ class ForwardTracker {
   Position last_;
 };
 
-/// What the topology gives without numbers: outputs of the limbs and the freedom count.
-struct FreedomCount {
-  std::array<int, 4> limb_freedoms{};   ///< 5, 5, 6, 6 (idle rod spin dropped)
+/// What the topology gives without numbers: outputs of the limbs and the DOF count.
+struct DofCount {
+  std::array<int, 4> limb_dofs{};       ///< 5, 5, 6, 6 (idle rod spin dropped)
   std::array<int, 3> loop_equations{};  ///< ξ of the three independent loops
-  int freedoms = 0;                     ///< F = Σ f − Σ ξ
+  int dofs = 0;                         ///< F = Σ f − Σ ξ
   int platform_translations = 0;        ///< dimensions of the platform's output set
   int platform_rotations = 0;
   Vec3 rotation_axis = Vec3::Zero();  ///< of the one rotation left
 };
 /// Position-and-orientation-characteristic sets of the limbs, intersected and united.
-[[nodiscard]] FreedomCount CountFreedoms();
+[[nodiscard]] DofCount CountDofs();
 
 }  // namespace mbv::scara

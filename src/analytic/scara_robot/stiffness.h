@@ -2,7 +2,7 @@
 //
 //   limbs 3, 4:  motor spring ═ arm ═ C ∘∘ ═ rod ═ B ∘∘∘
 //   limbs 1, 2:  motor spring ═ arm ═ C ∘ ═ parallelogram ═ D ∘ ═ short rod ═ B ∘ (vertical)
-//                ═ elastic member, ∘ passive freedom; base, platform and short bars are rigid
+//                ═ elastic member, ∘ passive DOF; base, platform and short bars are rigid
 //
 // Used terms (world axes; rotation or moment first; twists and wrenches about P):
 //   ΔT_i            small displacement of the platform as limb i sees it
@@ -17,7 +17,7 @@
 //              k66 = 12 E I_y/l³, k35 = −6 E I_z/l², k26 = 6 E I_y/l²
 //   (13), (14) [S J_p; J_pᵀ 0] [f; Δp] = [ΔT; 0], S = J_d K_d⁻¹ J_dᵀ; f = K_i ΔT
 //   (15)       K = Σ K_i
-//   K_D        5 × 5 stiffness of a parallelogram at D (freedoms w, h, q rotations, w, h
+//   K_D        5 × 5 stiffness of a parallelogram at D (DOFs w, h, q rotations, w, h
 //              displacements); the sixth, along q, is the parallelogram's motion
 //   (16), (17) [m; f] = [K_mr K_mt; K_fr K_ft] [Δγ; Δε]
 //   (18)–(20)  m = G_m λ, G_m = [K_mr Λ_γ, K_mt Λ_ε] with orthogonal Λ; G_f alike

@@ -273,7 +273,7 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRe
     }
   }
   for (double yaw : {0.0, 45.0}) {
-    request.Tell(yaw > 0.0 ? 0.6 : 0.2);
+    request.Report(yaw > 0.0 ? 0.6 : 0.2);
     const Volume v = WholeVolume(parameters, limits, yaw * kDegree, request.jobs);
     if (v.lost) return LostWork();
     outcome.text += fmt::format(

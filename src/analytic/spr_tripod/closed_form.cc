@@ -90,10 +90,11 @@ void WireCommands(const Motion& motion, Wiring* wiring, Diagnostics* diagnostics
   };
   wiring->task_space = complete(0);
   if (motion.commands.size() != 3 || (!complete(0) && !complete(3))) {
-    diagnostics->AddError("",
-                          "the commands do not fix the three freedoms in a way the closed form "
-                          "covers",
-                          hint);
+    diagnostics->AddError(
+        "",
+        "the commands do not fix the three degrees of freedom in a way the closed form "
+        "covers",
+        hint);
     return;
   }
   std::copy_n(&slots[wiring->task_space ? 0 : 3], 3, wiring->command.begin());

@@ -119,7 +119,7 @@ void FillPosture(const Geometry& geometry, const Vec3& r, const Tilt& tilt, Post
 
 /// Inverse position problem: the home branch (δ = −ψ, w_z > 0) for O_A at r, by Newton on (6c').
 /// kUnreachable below z = b/2, where several upright assemblies exist, or where no upright
-/// assembly reaches r (`amount` tells by how much z is too small where that is the reason).
+/// assembly reaches r (`amount`: by how much z is too small, where that is the reason).
 [[nodiscard]] RunSummary SolveInverse(const Geometry& geometry, const Vec3& r, Posture* posture);
 
 /// Forward position problem: the home branch for leg lengths q [m], by Newton on |B_i A_i| = q_i

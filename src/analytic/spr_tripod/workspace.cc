@@ -418,7 +418,7 @@ LinePlot HorizontalSectionPlot(const Geometry& geometry, const std::vector<doubl
   return plot;
 }
 
-// Ranges of the joints besides the strokes; empty where none has one.
+// Ranges of the joints other than the strokes; empty where none has one.
 PoseFilter JointFilter(const Mechanism& mechanism, const RangeFilter& within_ranges) {
   std::vector<int> body(mechanism.bodies.size(), -1);  // of the closed form's seven
   for (int k = 0; k < kBodies; ++k) {

@@ -45,7 +45,7 @@ struct FaceIntegrals {
 /// ∫ dq/det J with `points`³ Gauss points [m³].
 [[nodiscard]] double VolumeByInterior(const Geometry& geometry, int points);
 
-/// Says whether a pose counts, besides the stroke.
+/// Whether a pose counts, in addition to the stroke.
 using PoseFilter = std::function<bool(const Posture&)>;
 
 /// Cells of an axis-parallel box, `cells` along each side, whose centre is reachable.
@@ -110,7 +110,7 @@ struct WorkspaceOptions {
   std::vector<double> heights =
       {};  ///< of sections [m]; empty: round ones where the z axis is reached
   int section_azimuths = 180;
-  PoseFilter within_ranges = {};  ///< of the joints besides the stroke; empty: there are none
+  PoseFilter within_ranges = {};  ///< of the joints other than the drives; empty: there are none
   int jobs = 1;                   ///< processes at once for the voxels
   std::function<void(double)> progress = {};  ///< of the voxels, which take nearly all the time
 };

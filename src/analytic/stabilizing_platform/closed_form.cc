@@ -441,8 +441,8 @@ CommandMap MapCommands(const Mechanism& mechanism, const Motion& motion, Diagnos
     const std::string pair = fmt::format("limb{0}.drive - limb{0}.drive_p", i + 1);
     if (!whole_pose) require(map.pair[i], pair);
     if (whole_pose && map.pair[i] >= 0) {
-      diagnostics->AddError("", fmt::format("motion: \"{}\" is commanded besides the pose", pair),
-                            kHint);
+      diagnostics->AddError(
+          "", fmt::format("motion: \"{}\" is commanded in addition to the pose", pair), kHint);
     }
   }
   return map;

@@ -111,14 +111,14 @@ class StepStudy {
       finding.message = fmt::format("--steps: {:g} s violates motion.duration_s / step <= {:g}",
                                     options_.steps_s.back(), kMaxSteps);
     } else {
-      TellThatDrivesAreHeld();
+      ReportHeldDrives();
       return true;
     }
     outcome_.diagnostics.Add(std::move(finding));
     return false;
   }
 
-  void TellThatDrivesAreHeld() {
+  void ReportHeldDrives() {
     const SimulationSettings& settings = prepared_->scenario.simulation;
     if (!settings.forward || settings.drive_by == DriveBy::kMotion) return;
     Finding finding;
@@ -185,7 +185,7 @@ class StepStudy {
     const auto driven = driven_.Of(prepared_->MakeDrivenMotion());
     DrivenSample sample;
     for (long n = 0; static_cast<double>(n) * h <= motion().duration_s * (1.0 + kEps); ++n) {
-      if (!driven(static_cast<double>(n) * h, &sample).ok()) return;  // the runs will tell
+      if (!driven(static_cast<double>(n) * h, &sample).ok()) return;  // the runs report it
     }
   }
 
@@ -194,7 +194,7 @@ class StepStudy {
                               .step_s = planned.step_s};
     (planned.stock ? options.stock_time_constant_steps : options.guidance_steps) =
         planned.constant_steps;
-    // What one run asks for besides is its own: no run depends on those before it.
+    // What one run asks for in addition is its own: no run depends on those before it.
     ComputedOnce<DrivenSample> driven = driven_;
     const SimulatedWitness witness = Simulate(options, planned.title, &driven, progress);
     SteppedRun run = Lost(planned, "");
@@ -234,7 +234,7 @@ class StepStudy {
       const double before = done_;
       const std::string bytes = ToBytes(RunForward(run, [&](const std::string&, double fraction) {
         done_ = before;
-        Tell(run, fraction);
+        ReportProgress(run, fraction);
       }));
       done_ = before;
       return bytes;
@@ -245,13 +245,13 @@ class StepStudy {
                auto ended = bytes ? FromBytes<SteppedRun>(*bytes) : std::nullopt;
                if (!ended) lost_.push_back(run.title);
                done[order[k]] = std::move(ended).value_or(Lost(run, "its process was killed"));
-               Tell(run, 1.0);
+               ReportProgress(run, 1.0);
              });
     return done;
   }
 
   // A part of a run is done.
-  void Tell(const PlannedRun& run, double fraction) {
+  void ReportProgress(const PlannedRun& run, double fraction) {
     done_ += fraction * run.cost();
     if (options_.progress) options_.progress(run.title, std::min(1.0, done_ / cost_));
   }

@@ -2,7 +2,7 @@
 // that its scheme has?
 //
 // Two numbers of the simulation are artificial: the step and the time constant with which
-// constraints are guided. They are refined together, as runs do it, and each alone, for the
+// constraints are stabilized. They are refined together, as runs do it, and each alone, for the
 // corrected engine and for stock MuJoCo (docs/explanation/convergence.md).
 #pragma once
 

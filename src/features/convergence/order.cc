@@ -123,7 +123,7 @@ OrderVerdict JudgeOrder(const OrderFit& fit, const ExpectedOrder& expected) {
   OrderVerdict verdict;
   if (std::isnan(fit.order)) {
     const bool floor = std::find(fit.floor.begin(), fit.floor.end(), true) != fit.floor.end();
-    verdict.text = floor ? "not judged: at the round-off floor, coarser steps may tell"
+    verdict.text = floor ? "not judged: at the round-off floor, coarser steps may show it"
                          : "not judged: too few runs";
     return verdict;
   }

@@ -23,11 +23,12 @@ inline constexpr double kRoundoffError = 1e-12;
 /// Relative errors that stop falling below this are a round-off plateau [1]: constraint forces are
 /// differences of large numbers, which costs up to five digits.
 inline constexpr double kLargestPlateau = 1e-10;
-/// An order is as expected when it is nearer than this; neighbouring whole orders are told apart.
+/// An order is as expected when it is nearer than this; neighbouring whole orders are
+/// distinguished.
 inline constexpr double kOrderTolerance = 0.5;
 
 struct OrderFit {
-  double order = kNan;           ///< least squares over the asymptotic range; NaN: none can be told
+  double order = kNan;           ///< least squares over the asymptotic range; NaN: not determined
   double order_error = kNan;     ///< its standard error; NaN with two points
   std::vector<double> pairwise;  ///< entry i: order between points i − 1 and i; NaN at the first
   std::vector<bool> fitted;      ///< in the asymptotic range
@@ -97,8 +98,8 @@ struct SampleClasses {
                 double window);
   [[nodiscard]] size_t smooth() const;
   /// Largest part of the RMS error near breaks that can be left in the RMS error of the smooth
-  /// samples, if constraints are guided with this time constant: the guidance damps what a break
-  /// leaves like (1 + t/tc) exp(−t/tc).
+  /// samples, if constraints are stabilized with this time constant: the stabilization damps what a
+  /// break leaves like (1 + t/tc) exp(−t/tc).
   [[nodiscard]] double Remains(double time_constant_s) const;
 };
 

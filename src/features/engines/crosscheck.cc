@@ -23,8 +23,8 @@ namespace {
 
 using Rows = std::vector<CrosscheckRow>;
 
-// A run's time by its samples: of a program outside what it tells of its computation, else with the
-// time to start it and to read and write files.
+// A run's time by its samples: of an external program what it reports of its computation, else with
+// the time to start it and to read and write files.
 double MicrosecondsEach(const WitnessRecord& witness) {
   double seconds = witness.summary.wall_s;
   if (witness.foreign && !std::isnan(witness.foreign->compute_s))

@@ -16,7 +16,7 @@ struct CrosscheckRow {
   std::string program;        ///< of a foreign witness, as it calls itself: "Simbody 3.7"
   double force_nrmse = kNan;  ///< of all drive forces, against the generic reference
   double pose_m = kNan;       ///< outputs' origins, against the generic reference
-  double loop_gap_m = kNan;   ///< its own largest; NaN if it tells none
+  double loop_gap_m = kNan;   ///< its own largest; NaN if it reports none
   /// Wall time by samples, of its computation or of its whole run; NaN where it is not timed alone.
   double sample_us = kNan;
   std::string why;  ///< why there is no number; "" if there is

@@ -239,8 +239,9 @@ class UpgradeRun {
     const ForeignWitness program = Program("rows", "--rows");
     ProgramCall call(program);
     std::string& trouble = report_.unavailable;
-    trouble = call.Give("model.xml", survey.mjcf);
-    if (trouble.empty()) trouble = call.Give("states.json", StatesJson(survey.driven, states));
+    trouble = call.WriteInput("model.xml", survey.mjcf);
+    if (trouble.empty())
+      trouble = call.WriteInput("states.json", StatesJson(survey.driven, states));
     if (trouble.empty()) {
       if (const auto failure = call.Run()) trouble = failure->text;
     }
@@ -409,8 +410,8 @@ struct UpgradeArguments {
 };
 
 // One scenario; its exit code.
-int TellUpgrade(const std::string& file, const UpgradeArguments& arguments, UpgradeOptions* options,
-                std::vector<UpgradeReport>* reports) {
+int RunUpgrade(const std::string& file, const UpgradeArguments& arguments, UpgradeOptions* options,
+               std::vector<UpgradeReport>* reports) {
   ProgressLine progress(true);
   if (progress.active()) {
     options->progress = [&](const std::string& stage, double fraction) {
@@ -439,7 +440,7 @@ int RunUpgrade(const UpgradeArguments& arguments) {
   if (exit_code != 0) return exit_code;
   std::vector<UpgradeReport> reports;
   for (const std::string& file : files) {
-    exit_code = WorseExit(exit_code, TellUpgrade(file, arguments, &options, &reports));
+    exit_code = WorseExit(exit_code, RunUpgrade(file, arguments, &options, &reports));
   }
   return WorseExit(exit_code, arguments.json.Write(ToJson(reports), {}));
 }

@@ -70,7 +70,7 @@ enum class AuditNumbers { kStable, kMeasured };
 /// The text of docs/results/equation_audit.md: every registered mechanism's table, stable numbers.
 [[nodiscard]] std::string AuditDocument(const std::string& models_dir);
 
-// The audit of a page as JSON, so that the runs of a night compute it once.
+// The audit of a page as JSON, so that the runs of one regression compute it once.
 
 [[nodiscard]] std::string ToJson(const HtmlAudit& audit);
 /// Empty when the text is not what ToJson() wrote.

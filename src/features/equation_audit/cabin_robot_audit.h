@@ -41,7 +41,7 @@ struct Lengths {
 [[nodiscard]] Lengths LengthsOf(const Mechanism& mechanism);
 
 // Each takes what the equations are given and what the independent computation is given: the same,
-// unless a test bends one of them.
+// unless a test perturbs one of them.
 
 /// Equations (1)–(4), (8), (9): positions of the planar linkage.
 [[nodiscard]] std::vector<AuditRow> PositionRows(const Lengths& lengths, const Lengths& truth);

@@ -55,7 +55,7 @@ void BalanceRows(const Case& full, const Case& massless, std::vector<AuditRow>* 
                   .corrected = "… − Σ f_X,i (B_i × X_i; X_i)",
                   .limit = kForceLimit,
                   .unit = "N",
-                  .note = "f_1 … f_6 against the reference's balls; a limb with mass also pushes "
+                  .note = "f_1 … f_6 against the reference's balls; a limb with mass also loads "
                           "along X"});
   RowMeter f_X({.equation = "(21), f_X",
                 .erratum = "E7",

@@ -299,7 +299,7 @@ Truth TruthAt(const std::string& models_dir, const StiffnessParameters& p, const
   return truth;
 }
 
-// A defect of (11): the limbs' stiffness with it, all else mended.
+// A defect of (11): the limbs' stiffness with it, all else corrected.
 struct Defect {
   const char *equation, *erratum, *printed, *corrected, *note;
   PrintedForms forms;
@@ -307,7 +307,7 @@ struct Defect {
 };
 
 std::vector<Defect> Defects() {
-  const char* const limb = "K_i of the limb alone, rotations times R; all else mended";
+  const char* const limb = "K_i of the limb alone, rotations times R; all else corrected";
   return {
       {"(11) rod axes, limbs 3, 4",
        "E22",
@@ -399,7 +399,7 @@ AuditRow ParallelogramRow(const StiffnessParameters& p, const std::vector<Truth>
   AuditRow texts = TextRow("K_D1", "one rod's share, + k55 d² sin(2 q̂)/8",
                            "2 × […], − k55 d² sin(2 q̂)/8", "N/m", 1e-4,
                            "bar at D on its two rods alone, axes w, h, q, rotations times R; the "
-                           "sixth freedom, along q, is free");
+                           "sixth degree of freedom, along q, is free");
   texts.erratum = "E27";
   RowMeter meter(texts);
   for (const Truth& truth : truths) {

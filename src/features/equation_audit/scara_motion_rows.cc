@@ -13,15 +13,16 @@ using scara::MotorAxis;
 using scara::Radial;
 
 AuditRow TopologyRow(const Mechanism& mechanism) {
-  RowMeter meter({.equation = "F = Σf − Σξ",
-                  .erratum = {},
-                  .printed = "(5 + 5 + 6 + 6) − (6 + 6 + 6) = 4",
-                  .corrected = {},
-                  .limit = 0.0,
-                  .unit = "freedoms",
-                  .note = "against the constraint rank of the model; f_i counts the freedoms of a "
-                          "limb, not of a joint; the cross-bars are essential (6 without them)"});
-  meter.Add(AnalyseMobility(mechanism).freedoms, scara::CountFreedoms().freedoms);
+  RowMeter meter(
+      {.equation = "F = Σf − Σξ",
+       .erratum = {},
+       .printed = "(5 + 5 + 6 + 6) − (6 + 6 + 6) = 4",
+       .corrected = {},
+       .limit = 0.0,
+       .unit = "degrees of freedom",
+       .note = "against the constraint rank of the model; f_i counts the degrees of freedom of a "
+               "limb, not of a joint; the cross-bars are essential (6 without them)"});
+  meter.Add(AnalyseMobility(mechanism).dofs, scara::CountDofs().dofs);
   return meter.Finish();
 }
 
@@ -271,8 +272,8 @@ namespace {
 
 using scara::MotorAxis;
 
-/// (30) with each of its errors optional; the transposes of R_i are always mended (as printed the
-/// shapes do not fit).
+/// (30) with each of its errors optional; the transposes of R_i are always corrected (as printed
+/// the shapes do not fit).
 struct PrintedErrors {
   bool k_for_s = false;            ///< η·k_i for −η·s_i
   bool rod_rate_for_axis = false;  ///< σ_i = angular velocity of the rod, for the motor axis
@@ -363,14 +364,15 @@ std::vector<AuditRow> AccelerationRows(const scara::Parameters& p,
                    .limit = limit,
                    .unit = unit,
                    .note = "θ̈ = J Ẍ + f with the corrected (30); l_i read as L_i"});
-  RowMeter whole({.equation = "(30)",
-                  .erratum = "E7",
-                  .printed = "with all three errors below and misplaced transposes of R_i",
-                  .corrected = "Θ_i = (1/V)[−l1 (η·s) C + (η·u)/V² Rᵀηηᵀ R + (l1/L) RᵀPᵀP R], "
-                               "P = E − n ηᵀ/V",
-                  .limit = limit,
-                  .unit = unit,
-                  .note = "effect on θ̈; the transposes of R_i are mended, else shapes do not fit"});
+  RowMeter whole(
+      {.equation = "(30)",
+       .erratum = "E7",
+       .printed = "with all three errors below and misplaced transposes of R_i",
+       .corrected = "Θ_i = (1/V)[−l1 (η·s) C + (η·u)/V² Rᵀηηᵀ R + (l1/L) RᵀPᵀP R], "
+                    "P = E − n ηᵀ/V",
+       .limit = limit,
+       .unit = unit,
+       .note = "effect on θ̈; the transposes of R_i are corrected, else shapes do not fit"});
   RowMeter first({.equation = "(30) first term",
                   .erratum = "E7a",
                   .printed = "+l1 (η·k_i) C",
@@ -484,7 +486,7 @@ std::vector<AuditRow> CentreRows(const scara::Parameters& p, const std::vector<S
                .corrected = "J_i1 = ½ l1 (ν_i × u_i) Φ_iᵀ",
                .limit = limit,
                .unit = "m/s",
-               .note = "contains θ̇_i, so that J_i1 θ̇ is quadratic in the rates; shapes mended"});
+               .note = "contains θ̇_i, so that J_i1 θ̇ is quadratic in the rates; shapes corrected"});
   RowMeter vC({.equation = "(32)",
                .erratum = "E9",
                .printed = "v_C = v_i1",

@@ -101,7 +101,7 @@ inline void AddAll(RowMeter* meter, const VecX& truth, const VecX& printed, cons
 
 namespace mbv {
 
-/// Rows for Eqs. (1)–(10), (22)–(49), the freedom count and Table 1 of [Zhu 2019].
+/// Rows for Eqs. (1)–(10), (22)–(49), the DOF count and Table 1 of [Zhu 2019].
 [[nodiscard]] AuditTable AuditScaraRobot(const std::string& models_dir);
 
 }  // namespace mbv

@@ -14,7 +14,7 @@
 #include "base/worker_pool.h"
 #include "comparison/comparison.h"
 #include "comparison/verdict.h"
-#include "features/mjcf_audit/own_run_bytes.h"
+#include "features/mjcf_audit/source_model_run_bytes.h"
 #include "features/mjcf_audit/source_options.h"
 #include "kinematics/driven_twists.h"
 #include "mechanism/reach.h"
@@ -28,35 +28,35 @@ namespace {
 
 // Runs of a user's file, measured against the reference. Internal to pipeline/.
 
-class OwnFileRuns {
+class SourceModelRuns {
  public:
   /// `request` outlives it.
-  explicit OwnFileRuns(const OwnFileRequest& request);
+  explicit SourceModelRuns(const SourceModelRequest& request);
 
   /// Why nothing can be run; "" if it can.
   [[nodiscard]] const std::string& declined() const { return declined_; }
 
   struct Measured {
-    OwnRun run;
-    OwnError error;
+    SourceModelRun run;
+    SourceModelError error;
   };
   /// One run with these settings, of another text than the file's if `text` is one.
-  [[nodiscard]] Measured Run(const OwnSettings& settings, const std::string& text = "");
+  [[nodiscard]] Measured Run(const SourceModelSettings& settings, const std::string& text = "");
 
   [[nodiscard]] const std::string& text() const { return task_.text; }
   [[nodiscard]] double length_m() const { return length_m_; }
 
  private:
   void FindCommands();
-  [[nodiscard]] OwnRun InChild(const OwnTask& task) const;
-  [[nodiscard]] OwnError ErrorOf(const OwnRun& run);
+  [[nodiscard]] SourceModelRun InChild(const SourceModelTask& task) const;
+  [[nodiscard]] SourceModelError ErrorOf(const SourceModelRun& run);
   void Solve(const Trace& like);
-  void MeasureForces(const OwnRun& run, OwnError* error) const;
-  void MeasureJointForces(const Trace& trace, OwnError* error) const;
+  void MeasureForces(const SourceModelRun& run, SourceModelError* error) const;
+  void MeasureJointForces(const Trace& trace, SourceModelError* error) const;
 
-  const OwnFileRequest& request_;
+  const SourceModelRequest& request_;
   const Prepared& prepared_;
-  OwnTask task_;
+  SourceModelTask task_;
   std::vector<size_t> command_of_;  // per drive
   Motion motion_;                   // sampled as the runs are
   DrivenTwists twists_;             // of the drives, for the scale of forces
@@ -67,7 +67,7 @@ class OwnFileRuns {
 
 constexpr double kTimeout_s = 30.0;  // of one run
 
-OwnFileRuns::OwnFileRuns(const OwnFileRequest& request)
+SourceModelRuns::SourceModelRuns(const SourceModelRequest& request)
     : request_(request), prepared_(*request.prepared), motion_(prepared_.scenario.motion) {
   length_m_ = CharacteristicLength(prepared_.base);
   task_.file = request.file;
@@ -81,7 +81,7 @@ OwnFileRuns::OwnFileRuns(const OwnFileRequest& request)
 }
 
 // The motion of each drive is its command; nothing else is commanded.
-void OwnFileRuns::FindCommands() {
+void SourceModelRuns::FindCommands() {
   const Motion& motion = prepared_.scenario.motion;
   constexpr size_t kNone = static_cast<size_t>(-1);
   command_of_.assign(prepared_.base.drives.size(), kNone);
@@ -111,12 +111,13 @@ void OwnFileRuns::FindCommands() {
   };
 }
 
-OwnRun OwnFileRuns::InChild(const OwnTask& task) const {
-  const auto answers = InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(RunOwnFile(task)); });
-  std::optional<OwnRun> run;
-  if (answers[0]) run = FromBytes<OwnRun>(*answers[0]);
+SourceModelRun SourceModelRuns::InChild(const SourceModelTask& task) const {
+  const auto answers =
+      InChildren(1, kTimeout_s, [&](size_t) { return ToBytes(RunSourceModel(task)); });
+  std::optional<SourceModelRun> run;
+  if (answers[0]) run = FromBytes<SourceModelRun>(*answers[0]);
   if (run) return *std::move(run);
-  OwnRun failed;
+  SourceModelRun failed;
   failed.summary = {
       .stop = Stop::kEngineFailure,
       .message = fmt::format("MuJoCo crashed on it, or took longer than {:g} s", kTimeout_s),
@@ -125,8 +126,9 @@ OwnRun OwnFileRuns::InChild(const OwnTask& task) const {
   return failed;
 }
 
-OwnFileRuns::Measured OwnFileRuns::Run(const OwnSettings& settings, const std::string& text) {
-  OwnTask task = task_;
+SourceModelRuns::Measured SourceModelRuns::Run(const SourceModelSettings& settings,
+                                               const std::string& text) {
+  SourceModelTask task = task_;
   task.settings = settings;
   if (!text.empty()) task.text = text;
   Measured measured;
@@ -137,15 +139,15 @@ OwnFileRuns::Measured OwnFileRuns::Run(const OwnSettings& settings, const std::s
 }
 
 // The reference at the samples of the runs, which fall on whole steps of the file.
-void OwnFileRuns::Solve(const Trace& like) {
+void SourceModelRuns::Solve(const Trace& like) {
   motion_.sample_s = like.time_s.size() > 1 ? like.time_s[1] : motion_.duration_s;
   motion_.duration_s = like.time_s.back();
   truth_ = RunReference(prepared_.mechanisms.reference, motion_);
   truth_->trace.witness = role::kReference.name;
 }
 
-OwnError OwnFileRuns::ErrorOf(const OwnRun& run) {
-  OwnError error;
+SourceModelError SourceModelRuns::ErrorOf(const SourceModelRun& run) {
+  SourceModelError error;
   error.failure = run.summary.ok() ? "" : run.summary.message;
   error.time_s = run.summary.time_s;
   if (!error.sound()) return error;
@@ -157,7 +159,7 @@ OwnError OwnFileRuns::ErrorOf(const OwnRun& run) {
   error.cost_ms = run.cost_ms;
   error.gap_m = error.gap_rad = 0.0;
   for (size_t c = 0; c < run.gaps.size(); ++c) {
-    const OwnRun::Gap& gap = run.gaps[c];
+    const SourceModelRun::Gap& gap = run.gaps[c];
     if (gap.position_m > error.gap_m) {
       error.gap_m = gap.position_m;
       error.gap_at_s = gap.position_at_s;
@@ -192,7 +194,7 @@ void CloseBands(Trace* run, Trace* truth) {
   }
 }
 
-void OwnFileRuns::MeasureForces(const OwnRun& own_run, OwnError* error) const {
+void SourceModelRuns::MeasureForces(const SourceModelRun& own_run, SourceModelError* error) const {
   Trace run = own_run.trace, truth = truth_->trace;
   CloseBands(&run, &truth);
   ComparisonInput input = InputOf(prepared_);
@@ -200,7 +202,7 @@ void OwnFileRuns::MeasureForces(const OwnRun& own_run, OwnError* error) const {
   input.twists = &twists_;
   input.start_window_s = 0.0;
   error->force_all = ValueOf(ComparePair(input, run, truth).metrics, Metric::kForceNrmse);
-  input.start_window_s = OwnFileAudit().later_s;
+  input.start_window_s = SourceModelAudit().later_s;
   const PairComparison pair = ComparePair(input, run, truth);
   error->force = ValueOf(pair.metrics, Metric::kForceNrmse);
   const auto most = pair.metrics.find(Metric::kForceMax);
@@ -216,7 +218,7 @@ void OwnFileRuns::MeasureForces(const OwnRun& own_run, OwnError* error) const {
   }
 }
 
-void OwnFileRuns::MeasureJointForces(const Trace& trace, OwnError* error) const {
+void SourceModelRuns::MeasureJointForces(const Trace& trace, SourceModelError* error) const {
   double wrong = 0.0, right = 0.0;
   for (size_t c = 0; c < trace.channels.size(); ++c) {
     const Channel& channel = trace.channels[c];
@@ -227,7 +229,7 @@ void OwnFileRuns::MeasureJointForces(const Trace& trace, OwnError* error) const 
     const int other = truth_->trace.Find(channel.name);
     if (other < 0) continue;
     for (size_t i = 0; i < trace.time_s.size(); ++i) {
-      if (trace.time_s[i] < OwnFileAudit().later_s) continue;
+      if (trace.time_s[i] < SourceModelAudit().later_s) continue;
       const auto row = static_cast<Eigen::Index>(i);
       const double truth = truth_->trace.values(row, other);
       const double off = trace.values(row, static_cast<Eigen::Index>(c)) - truth;
@@ -242,7 +244,7 @@ void OwnFileRuns::MeasureJointForces(const Trace& trace, OwnError* error) const 
 }  // namespace
 namespace {
 
-// Settings that would mend a user's file. Internal to pipeline/.
+// Recommended settings for a user's file.
 
 using Clock = std::chrono::steady_clock;
 
@@ -253,20 +255,20 @@ constexpr double kImpratio = 10.0;
 constexpr double kMostStretched = 10.0;  // wall time on a busy machine, over processor time
 
 struct Candidate {
-  OwnSettings settings;
-  OwnTrial trial;
+  SourceModelSettings settings;
+  SourceModelTrial trial;
   double work = 0.0;  // force solutions per step of the file, about
 };
 
-const char* NameOf(OwnIntegrator integrator) {
+const char* NameOf(SourceModelIntegrator integrator) {
   switch (integrator) {
-    case OwnIntegrator::kEuler:
+    case SourceModelIntegrator::kEuler:
       return "Euler";
-    case OwnIntegrator::kRk4:
+    case SourceModelIntegrator::kRk4:
       return "RK4";
-    case OwnIntegrator::kImplicit:
+    case SourceModelIntegrator::kImplicit:
       return "implicit";
-    case OwnIntegrator::kOwn:
+    case SourceModelIntegrator::kOwn:
       break;
   }
   return "";
@@ -288,8 +290,8 @@ double ChildrenSeconds() {
 
 class Search {
  public:
-  Search(const OwnFileRequest& request, const OwnSettings& base, const OwnFileRuns::Measured& own,
-         OwnFileRuns* runs, OwnFileAudit* audit)
+  Search(const SourceModelRequest& request, const SourceModelSettings& base,
+         const SourceModelRuns::Measured& own, SourceModelRuns* runs, SourceModelAudit* audit)
       : request_(request), base_(base), own_(own), runs_(*runs), audit_(*audit) {}
 
   void Run() {
@@ -304,12 +306,13 @@ class Search {
   }
 
  private:
-  Candidate Make(const OwnSettings& settings) const {
+  Candidate Make(const SourceModelSettings& settings) const {
     Candidate candidate{.settings = settings, .trial = {}};
-    OwnTrial& trial = candidate.trial;
+    SourceModelTrial& trial = candidate.trial;
     trial.step_s = own_.run.facts.step_s * settings.step_factor;
-    trial.integrator = settings.integrator == OwnIntegrator::kOwn ? own_.run.facts.integrator
-                                                                  : NameOf(settings.integrator);
+    trial.integrator = settings.integrator == SourceModelIntegrator::kOwn
+                           ? own_.run.facts.integrator
+                           : NameOf(settings.integrator);
     if (settings.time_constant_s > 0.0)
       trial.solref = fmt::format("{:g} 1", settings.time_constant_s);
     if (settings.impedance > 0.0) {
@@ -323,14 +326,15 @@ class Search {
   // All combinations, cheap ones first.
   void MakeGrid() {
     for (const double factor : kStepFactors) {
-      for (const OwnIntegrator integrator :
-           {OwnIntegrator::kEuler, OwnIntegrator::kRk4, OwnIntegrator::kImplicit}) {
+      for (const SourceModelIntegrator integrator :
+           {SourceModelIntegrator::kEuler, SourceModelIntegrator::kRk4,
+            SourceModelIntegrator::kImplicit}) {
         for (const double steps : kTimeConstantSteps) {
           for (const double impedance : kImpedances) Add(factor, integrator, steps, impedance);
         }
       }
     }
-    OwnSettings friction = base_;
+    SourceModelSettings friction = base_;
     friction.impratio = kImpratio;
     candidates_.push_back(Make(friction));
     std::stable_sort(candidates_.begin() + 1, candidates_.end(),
@@ -338,8 +342,8 @@ class Search {
     audit_.planned = candidates_.size();
   }
 
-  void Add(double factor, OwnIntegrator integrator, double steps, double impedance) {
-    OwnSettings settings = base_;
+  void Add(double factor, SourceModelIntegrator integrator, double steps, double impedance) {
+    SourceModelSettings settings = base_;
     settings.step_factor = factor;
     if (own_.run.facts.integrator != NameOf(integrator)) settings.integrator = integrator;
     if (steps > 0.0) {
@@ -348,7 +352,7 @@ class Search {
           std::stod(fmt::format("{:g}", steps * factor * own_.run.facts.step_s));
     }
     if (impedance > 0.0) settings.impedance = impedance;
-    if (factor == 1.0 && settings.integrator == OwnIntegrator::kOwn && steps == 0.0 &&
+    if (factor == 1.0 && settings.integrator == SourceModelIntegrator::kOwn && steps == 0.0 &&
         impedance == 0.0) {
       return;  // the file's own
     }
@@ -378,10 +382,10 @@ class Search {
   }
 
   void MarkFront() {
-    for (OwnTrial& trial : audit_.trials) {
+    for (SourceModelTrial& trial : audit_.trials) {
       trial.front =
           trial.error.sound() &&
-          std::none_of(audit_.trials.begin(), audit_.trials.end(), [&](const OwnTrial& o) {
+          std::none_of(audit_.trials.begin(), audit_.trials.end(), [&](const SourceModelTrial& o) {
             return o.error.sound() && o.error.cost_ms < trial.error.cost_ms &&
                    o.error.force < trial.error.force;
           });
@@ -392,15 +396,15 @@ class Search {
   void Recommend() {
     constexpr double kNearBest = 1.5;
     double force = std::numeric_limits<double>::infinity(), gap = force;
-    for (const OwnTrial& trial : audit_.trials) {
+    for (const SourceModelTrial& trial : audit_.trials) {
       if (!trial.error.sound()) continue;
       force = std::min(force, trial.error.force);
       gap = std::min(gap, trial.error.gap_m);
     }
-    const double most_force = std::max(OwnFileAudit::kGoodForce, kNearBest * force);
-    const double most_gap = std::max(OwnFileAudit::kGoodGap * audit_.length_m, kNearBest * gap);
+    const double most_force = std::max(SourceModelAudit::kGoodForce, kNearBest * force);
+    const double most_gap = std::max(SourceModelAudit::kGoodGap * audit_.length_m, kNearBest * gap);
     for (size_t i = 0; i < audit_.trials.size(); ++i) {
-      const OwnError& error = audit_.trials[i].error;
+      const SourceModelError& error = audit_.trials[i].error;
       if (!error.sound() || !(error.force <= most_force) || !(error.gap_m <= most_gap)) continue;
       const int best = audit_.recommended;
       const bool better = best < 0 || Work(i) < Work(static_cast<size_t>(best)) ||
@@ -414,13 +418,13 @@ class Search {
   // The force error; what changes less may err a little more.
   [[nodiscard]] double Merit(size_t trial) const {
     constexpr double kPerChange = 1.5;
-    const OwnTrial& t = audit_.trials[trial];
+    const SourceModelTrial& t = audit_.trials[trial];
     return t.error.force * (t.solref.empty() ? 1.0 : kPerChange) *
            (t.solimp.empty() ? 1.0 : kPerChange);
   }
 
-  [[nodiscard]] std::string Lines(const OwnTrial& trial) const {
-    const OwnFacts& facts = own_.run.facts;
+  [[nodiscard]] std::string Lines(const SourceModelTrial& trial) const {
+    const SourceModelFacts& facts = own_.run.facts;
     std::string option, closures;
     if (trial.step_s != facts.step_s) option += fmt::format(" timestep=\"{:g}\"", trial.step_s);
     if (trial.integrator != facts.integrator) {
@@ -437,10 +441,10 @@ class Search {
   // Runs the file with the lines in it. Closures that state settings of their own take no defaults:
   // they are named, and changed where they stand.
   void Paste() {
-    const OwnTrial& trial = audit_.trials[static_cast<size_t>(audit_.recommended)];
+    const SourceModelTrial& trial = audit_.trials[static_cast<size_t>(audit_.recommended)];
     audit_.lines = Lines(trial);
     std::string text = mjcf::WithLines(runs_.text(), audit_.lines);
-    OwnFileRuns::Measured pasted = runs_.Run(base_, text);
+    SourceModelRuns::Measured pasted = runs_.Run(base_, text);
     audit_.stubborn = Stubborn(pasted.run.facts, trial);
     if (!audit_.stubborn.empty() && pasted.run.summary.ok()) {
       text = mjcf::WithClosureSettings(text, trial.solref, trial.solimp);
@@ -452,7 +456,8 @@ class Search {
     audit_.pasted = pasted.error;
   }
 
-  static std::vector<std::string> Stubborn(const OwnFacts& facts, const OwnTrial& trial) {
+  static std::vector<std::string> Stubborn(const SourceModelFacts& facts,
+                                           const SourceModelTrial& trial) {
     std::vector<std::string> names;
     for (size_t c = 0; c < facts.closures.size(); ++c) {
       const bool ref = trial.solref.empty() || facts.solref[c] == trial.solref;
@@ -462,18 +467,19 @@ class Search {
     return names;
   }
 
-  const OwnFileRequest& request_;
-  const OwnSettings base_;
-  const OwnFileRuns::Measured& own_;
-  OwnFileRuns& runs_;
-  OwnFileAudit& audit_;
+  const SourceModelRequest& request_;
+  const SourceModelSettings base_;
+  const SourceModelRuns::Measured& own_;
+  SourceModelRuns& runs_;
+  SourceModelAudit& audit_;
   std::vector<Candidate> candidates_;
 };
 
 // Tries settings until the time is over, recommends one and runs the file with its lines in it.
 // `base`: how every run is led and what it leaves out; `own`: the file's run with that.
-void SearchSettings(const OwnFileRequest& request, const OwnSettings& base,
-                    const OwnFileRuns::Measured& own, OwnFileRuns* runs, OwnFileAudit* audit) {
+void SearchSettings(const SourceModelRequest& request, const SourceModelSettings& base,
+                    const SourceModelRuns::Measured& own, SourceModelRuns* runs,
+                    SourceModelAudit* audit) {
   Search(request, base, own, runs, audit).Run();
 }
 
@@ -483,11 +489,11 @@ namespace {
 // What can make a file's forces wrong, and the remedy.
 struct CauseRow {
   const char *key, *title, *meaning;
-  bool (*applies)(const OwnFacts&);
-  void (*mend)(const OwnFacts&, OwnSettings*);
+  bool (*applies)(const SourceModelFacts&);
+  void (*correct)(const SourceModelFacts&, SourceModelSettings*);
 };
 
-bool Always(const OwnFacts& /*facts*/) { return true; }
+bool Always(const SourceModelFacts& /*facts*/) { return true; }
 
 constexpr const char* kVelocityMeaning =
     "A joint that closes a loop moves on a curved path, and to stay on a curve a body must be "
@@ -502,48 +508,49 @@ constexpr const char* kSoftMeaning =
 const std::vector<CauseRow>& Rows() {
   static const std::vector<CauseRow> kRows = {
       {"velocity_term", "the pull that keeps moving loops on their curve", kVelocityMeaning,
-       &Always, [](const OwnFacts&, OwnSettings* s) { s->velocity_term = true; }},
+       &Always, [](const SourceModelFacts&, SourceModelSettings* s) { s->velocity_term = true; }},
       {"softness", "soft loops (solref, solimp)", kSoftMeaning, &Always,
-       [](const OwnFacts& facts, OwnSettings* s) {
+       [](const SourceModelFacts& facts, SourceModelSettings* s) {
          s->time_constant_s = 2.0 * facts.step_s;
          s->impedance = kMjcfImpedance;
        }},
       {"friction", "soft friction losses (solreffriction, solimpfriction)",
-       "To MuJoCo a joint that rubs is held by a damper that gives way where its force exceeds the "
+       "In MuJoCo a joint with dry friction is held by a damper that gives way where its force "
+       "exceeds the "
        "friction loss: near rest it creeps, and the force is less than the loss.",
-       [](const OwnFacts& facts) { return facts.rubs; },
-       [](const OwnFacts&, OwnSettings* s) { s->stiff_friction = true; }},
+       [](const SourceModelFacts& facts) { return facts.has_friction; },
+       [](const SourceModelFacts&, SourceModelSettings* s) { s->stiff_friction = true; }},
       {"integration", "step and integrator",
        "How time is cut into steps: here against the Runge-Kutta method at a quarter of the step.",
        &Always,
-       [](const OwnFacts&, OwnSettings* s) {
-         s->integrator = OwnIntegrator::kRk4;
+       [](const SourceModelFacts&, SourceModelSettings* s) {
+         s->integrator = SourceModelIntegrator::kRk4;
          s->step_factor = 0.25;
        }},
       {"drives", "drives that lag behind their command",
        "The file's own servos or equalities lead the drives; they follow with a delay, and their "
        "forces are those of another motion than the commanded one.",
-       [](const OwnFacts& facts) {
+       [](const SourceModelFacts& facts) {
          return std::any_of(facts.leads.begin(), facts.leads.end(),
                             [](DriveLead lead) { return lead != DriveLead::kAdded; });
        },
-       [](const OwnFacts&, OwnSettings* s) { s->exact_drives = true; }},
+       [](const SourceModelFacts&, SourceModelSettings* s) { s->exact_drives = true; }},
       {"left_out", "what the reference does not have",
        "The file has it, the reference computes without it: not an error of the file.",
-       [](const OwnFacts& facts) { return !facts.left_out.empty(); },
-       [](const OwnFacts&, OwnSettings* s) { s->plain = true; }},
+       [](const SourceModelFacts& facts) { return !facts.left_out.empty(); },
+       [](const SourceModelFacts&, SourceModelSettings* s) { s->plain = true; }},
       {"solver", "a solver that stops early",
        "solver, iterations and tolerance say how well MuJoCo solves for the forces of one step.",
-       [](const OwnFacts& facts) { return facts.rough_solver; },
-       [](const OwnFacts&, OwnSettings* s) { s->exact_solver = true; }}};
+       [](const SourceModelFacts& facts) { return facts.rough_solver; },
+       [](const SourceModelFacts&, SourceModelSettings* s) { s->exact_solver = true; }}};
   return kRows;
 }
 
 class Auditor {
  public:
-  explicit Auditor(const OwnFileRequest& request) : request_(request), runs_(request) {}
+  explicit Auditor(const SourceModelRequest& request) : request_(request), runs_(request) {}
 
-  OwnFileAudit Run() {
+  SourceModelAudit Run() {
     audit_.file = request_.file;
     audit_.duration_s = request_.prepared->scenario.motion.duration_s;
     audit_.length_m = runs_.length_m();
@@ -555,34 +562,34 @@ class Auditor {
 
  private:
   void Audit() {
-    Tell(0.0);
-    const OwnFileRuns::Measured own = runs_.Run({});
+    Report(0.0);
+    const SourceModelRuns::Measured own = runs_.Run({});
     if (own.run.summary.stop == Stop::kUnsupported) {
       audit_.declined = own.run.summary.message;
       return;
     }
     audit_.as_is = own.error;
     audit_.notes = own.run.notes;
-    TellFile(own.run.facts);
+    ReportFile(own.run.facts);
     Attribute(own.run.facts);
     if (audit_.Good(audit_.as_is)) return;
     // Settings are judged where nothing but them is wrong.
-    OwnSettings base;
+    SourceModelSettings base;
     base.exact_drives = true;
     base.plain = !own.run.facts.left_out.empty();
-    base.stiff_friction = own.run.facts.rubs;
-    const OwnFileRuns::Measured bare = runs_.Run(base);
+    base.stiff_friction = own.run.facts.has_friction;
+    const SourceModelRuns::Measured bare = runs_.Run(base);
     audit_.bare = bare.error;
     const bool comparable = !bare.error.sound() || std::isfinite(bare.error.force);
     if (comparable && !audit_.Good(bare.error))
       SearchSettings(request_, base, bare, &runs_, &audit_);
   }
 
-  void Tell(double fraction) const {
+  void Report(double fraction) const {
     if (request_.progress) request_.progress("your own file", fraction);
   }
 
-  void TellFile(const OwnFacts& facts) {
+  void ReportFile(const SourceModelFacts& facts) {
     audit_.step_s = facts.step_s;
     audit_.integrator = facts.integrator;
     audit_.solver = fmt::format("{}, {} iterations, tolerance {:g}", facts.solver, facts.iterations,
@@ -590,7 +597,7 @@ class Auditor {
     audit_.closures = facts.closures;
     audit_.solref = facts.solref;
     audit_.solimp = facts.solimp;
-    TellLeads(facts);
+    ReportActuated(facts);
     audit_.done.emplace_back("contacts are off: with them it would be another mechanism");
     const auto say = [&](const std::vector<std::string>& names, const char* what) {
       constexpr size_t kMost = 6;
@@ -602,11 +609,11 @@ class Auditor {
     if (request_.prepared->scenario.simulation.ignore_ranges) {
       audit_.done.emplace_back("limits of joints are off: home is beyond one");
     }
-    say(facts.pushers, "actuators that drive nothing here are off");
+    say(facts.unused_actuators, "actuators that drive nothing here are off");
     say(facts.left_out, "the file has what the reference does not");
   }
 
-  void TellLeads(const OwnFacts& facts) {
+  void ReportActuated(const SourceModelFacts& facts) {
     std::vector<std::string> servos, equalities, motors, bare;
     for (size_t k = 0; k < facts.leads.size(); ++k) {
       const std::string& name = request_.prepared->base.drives[k].name;
@@ -637,11 +644,11 @@ class Auditor {
   }
 
   // A run, unless runs have taken too long already.
-  OwnError Try(const OwnSettings& settings) {
+  SourceModelError Try(const SourceModelSettings& settings) {
     constexpr double kMost_s = 60.0;
     const double s = Seconds();
     if (s < kMost_s) return runs_.Run(settings).error;
-    OwnError error;
+    SourceModelError error;
     error.failure = fmt::format("left out: other runs had taken {:.0f} s", s);
     return error;
   }
@@ -650,43 +657,45 @@ class Auditor {
     return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
   }
 
-  void Attribute(const OwnFacts& facts) {
+  void Attribute(const SourceModelFacts& facts) {
     std::vector<const CauseRow*> rows;
-    OwnSettings all;
+    SourceModelSettings all;
     for (const CauseRow& row : Rows()) {
       if (!row.applies(facts)) continue;
       rows.push_back(&row);
-      row.mend(facts, &all);
+      row.correct(facts, &all);
     }
     const double steps = 2.0 * static_cast<double>(rows.size()) + 2.0;
     double step = 0.0;
-    audit_.mended = Try(all);
+    audit_.corrected = Try(all);
     for (const CauseRow* row : rows) {
-      OwnSettings without, alone;
-      row->mend(facts, &without);
+      SourceModelSettings without, alone;
+      row->correct(facts, &without);
       for (const CauseRow* other : rows) {
-        if (other != row) other->mend(facts, &alone);
+        if (other != row) other->correct(facts, &alone);
       }
-      Tell((step += 1.0) / steps);
-      OwnCause cause{.key = row->key, .title = row->title, .meaning = row->meaning};
+      Report((step += 1.0) / steps);
+      SourceModelCause cause{.key = row->key, .title = row->title, .meaning = row->meaning};
       cause.without = Try(without);
-      Tell((step += 1.0) / steps);
+      Report((step += 1.0) / steps);
       cause.alone = Try(alone);
       audit_.causes.push_back(std::move(cause));
     }
-    for (OwnCause& cause : audit_.causes) {
+    for (SourceModelCause& cause : audit_.causes) {
       if (cause.key == "left_out") cause.title += ": " + Joined(facts.left_out);
     }
   }
 
-  const OwnFileRequest& request_;
-  OwnFileRuns runs_;
-  OwnFileAudit audit_;
+  const SourceModelRequest& request_;
+  SourceModelRuns runs_;
+  SourceModelAudit audit_;
   const std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
 }  // namespace
 
-OwnFileAudit AuditOwnFile(const OwnFileRequest& request) { return Auditor(request).Run(); }
+SourceModelAudit AuditSourceModel(const SourceModelRequest& request) {
+  return Auditor(request).Run();
+}
 
 }  // namespace mbv

@@ -1,4 +1,5 @@
-// The audit of the user's own MJCF: run as it is, what makes it wrong, what would mend it.
+// The audit of the source model (the user's MJCF): run as it is, what makes it wrong, recommended
+// settings.
 //
 // Every number is a run of MuJoCo on the user's file in a process of its own.
 #pragma once
@@ -12,7 +13,7 @@
 
 namespace mbv {
 
-struct OwnFileRequest {
+struct SourceModelRequest {
   std::string file;                    ///< the user's MJCF
   std::string text = {};               ///< its text; "": read from the file
   const Prepared* prepared = nullptr;  ///< the scenario that was made of it
@@ -22,6 +23,6 @@ struct OwnFileRequest {
   double search_s = 15.0;  ///< processor time for the search of settings
 };
 
-[[nodiscard]] OwnFileAudit AuditOwnFile(const OwnFileRequest& request);
+[[nodiscard]] SourceModelAudit AuditSourceModel(const SourceModelRequest& request);
 
 }  // namespace mbv

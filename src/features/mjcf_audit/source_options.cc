@@ -39,9 +39,9 @@ struct OwnClosure {
   bool weld = false;
 };
 
-struct OwnModel {
+struct SourceModel {
   ModelHandle m;
-  OwnFacts facts;
+  SourceModelFacts facts;
   std::vector<OwnDrive> drives;  ///< per drive of the mechanism
   std::vector<OwnClosure> closures;
   VecX home;  ///< qpos
@@ -51,17 +51,17 @@ struct OwnModel {
 // simulation/.
 
 /// The file's own step, integrator, solver and settings of closures, as facts.
-void TellSettings(OwnModel* own);
+void ReportSettings(SourceModel* own);
 /// Finds what leads each drive; switches off what the mechanism does not have and what would push
 /// against the commanded motion.
-void FindLeads(const OwnTask& task, const ImportedMjcf& imported, OwnModel* own);
+void FindLeads(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own);
 /// Holds free bodies and changes what the task's settings say.
-void TakeSettings(const OwnTask& task, OwnModel* own);
+void TakeSettings(const SourceModelTask& task, SourceModel* own);
 
 class OwnStepper {
  public:
   /// All outlive the stepper.
-  OwnStepper(const OwnTask& task, const OwnModel& own, OwnRun* run);
+  OwnStepper(const SourceModelTask& task, const SourceModel& own, SourceModelRun* run);
   ~OwnStepper();
   OwnStepper(const OwnStepper&) = delete;
   OwnStepper& operator=(const OwnStepper&) = delete;
@@ -90,9 +90,9 @@ class OwnStepper {
   [[nodiscard]] double TargetRate(size_t k) const;
   [[nodiscard]] double TargetAcceleration(size_t k) const;
 
-  const OwnTask& task_;
-  const OwnModel& own_;
-  OwnRun* const run_;
+  const SourceModelTask& task_;
+  const SourceModel& own_;
+  SourceModelRun* const run_;
   const mjModel* const m_;
   const DataHandle d_, shifted_;  // the second one for differences
   const double h_;
@@ -111,9 +111,9 @@ RunSummary Unsupported(const std::string& why) {
 
 std::string AddedName(size_t drive) { return fmt::format("mbverify:drive:{}", drive); }
 
-class OwnModelMaker {
+class SourceModelMaker {
  public:
-  OwnModelMaker(const OwnTask& task, OwnModel* own)
+  SourceModelMaker(const SourceModelTask& task, SourceModel* own)
       : task_(task), mechanism_(*task.mechanism), own_(*own) {}
 
   RunSummary Make() {
@@ -129,7 +129,7 @@ class OwnModelMaker {
     m_ = own_.m.get();
     FindClosures();
     FindHome();
-    TellSettings(&own_);
+    ReportSettings(&own_);
     FindLeads(task_, *imported_, &own_);
     TakeSettings(task_, &own_);
     return RunSummary::Done();
@@ -149,7 +149,8 @@ class OwnModelMaker {
       }
       if (place.joint < 0) {
         return Unsupported(fmt::format(
-            "drive '{}' acts on a freedom that is no hinge or slide of the file", drive.name));
+            "drive '{}' acts on a degree of freedom that is no hinge or slide of the file",
+            drive.name));
       }
       if (mj_id2name(&m, mjOBJ_JOINT, place.joint) == nullptr) {
         return Unsupported(fmt::format(
@@ -229,9 +230,9 @@ class OwnModelMaker {
     }
   }
 
-  const OwnTask& task_;
+  const SourceModelTask& task_;
   const Mechanism& mechanism_;
-  OwnModel& own_;
+  SourceModel& own_;
   const ImportedMjcf* imported_ = nullptr;
   mjModel* m_ = nullptr;
 };
@@ -240,8 +241,8 @@ class OwnModelMaker {
 
 // Compiles the file with an equality for each drive, finds what leads the drives and applies the
 // settings. kUnsupported with the reason where that cannot be; throws EngineError.
-RunSummary MakeOwnModel(const OwnTask& task, OwnModel* own) {
-  return OwnModelMaker(task, own).Make();
+RunSummary MakeSourceModel(const SourceModelTask& task, SourceModel* own) {
+  return SourceModelMaker(task, own).Make();
 }
 
 // Settings of a user's model: what the file says, and what is changed.
@@ -250,11 +251,12 @@ namespace {
 
 class SettingsTaker {
  public:
-  SettingsTaker(const OwnTask& task, OwnModel* own) : task_(task), own_(*own), m_(own->m.get()) {}
+  SettingsTaker(const SourceModelTask& task, SourceModel* own)
+      : task_(task), own_(*own), m_(own->m.get()) {}
 
   void Run() {
-    TellLeftOut();
-    for (int dof = 0; dof < m_->nv; ++dof) own_.facts.rubs |= Rubs(dof);
+    ReportLeftOut();
+    for (int dof = 0; dof < m_->nv; ++dof) own_.facts.has_friction |= HasFriction(dof);
     if (task_.settings.plain) LeaveOut();
     HoldFreeBodies();
     Apply();
@@ -265,7 +267,7 @@ class SettingsTaker {
     return m_->jnt_type[m_->dof_jntid[dof]] == mjJNT_FREE;
   }
 
-  [[nodiscard]] bool Rubs(int dof) const {
+  [[nodiscard]] bool HasFriction(int dof) const {
     return IsScalar(*m_, m_->dof_jntid[dof]) && m_->dof_frictionloss[dof] > 0.0;
   }
 
@@ -291,7 +293,7 @@ class SettingsTaker {
     visit("the medium's viscosity", &m_->opt.viscosity);
   }
 
-  void TellLeftOut() {
+  void ReportLeftOut() {
     ForLeftOut([&](const char* word, const mjtNum* value) {
       std::vector<std::string>& words = own_.facts.left_out;
       if (*value == 0.0 || std::find(words.begin(), words.end(), word) != words.end()) return;
@@ -325,12 +327,12 @@ class SettingsTaker {
   }
 
   void Apply() {
-    const OwnSettings& settings = task_.settings;
+    const SourceModelSettings& settings = task_.settings;
     m_->opt.timestep *= settings.step_factor;
-    if (settings.integrator != OwnIntegrator::kOwn) {
-      m_->opt.integrator = settings.integrator == OwnIntegrator::kEuler ? mjINT_EULER
-                           : settings.integrator == OwnIntegrator::kRk4 ? mjINT_RK4
-                                                                        : mjINT_IMPLICIT;
+    if (settings.integrator != SourceModelIntegrator::kOwn) {
+      m_->opt.integrator = settings.integrator == SourceModelIntegrator::kEuler ? mjINT_EULER
+                           : settings.integrator == SourceModelIntegrator::kRk4 ? mjINT_RK4
+                                                                                : mjINT_IMPLICIT;
     }
     if (settings.impratio > 0.0) m_->opt.impratio = settings.impratio;
     if (settings.exact_solver) {
@@ -340,7 +342,7 @@ class SettingsTaker {
     }
     const std::array<mjtNum, 5> stiff{kMjcfImpedance, kMjcfImpedance, 0.001, 0.5, 2.0};
     for (int dof = 0; settings.stiff_friction && dof < m_->nv; ++dof) {
-      if (!Rubs(dof)) continue;
+      if (!HasFriction(dof)) continue;
       m_->dof_solref[mjNREF * dof] = 2.0 * m_->opt.timestep;
       m_->dof_solref[mjNREF * dof + 1] = 1.0;
       std::copy(stiff.begin(), stiff.end(), m_->dof_solimp + mjNIMP * dof);
@@ -359,17 +361,17 @@ class SettingsTaker {
     }
   }
 
-  const OwnTask& task_;
-  OwnModel& own_;
+  const SourceModelTask& task_;
+  SourceModel& own_;
   mjModel* const m_;
 };
 
 }  // namespace
 
-void TellSettings(OwnModel* own) {
+void ReportSettings(SourceModel* own) {
   static constexpr std::array<const char*, 3> kIntegrators = {"Euler", "RK4", "implicit"};
   static constexpr std::array<const char*, 3> kSolvers = {"PGS", "CG", "Newton"};
-  OwnFacts& facts = own->facts;
+  SourceModelFacts& facts = own->facts;
   const mjOption& option = own->m->opt;
   facts.step_s = option.timestep;
   facts.integrator = kIntegrators.at(static_cast<size_t>(option.integrator));
@@ -389,7 +391,7 @@ void TellSettings(OwnModel* own) {
   }
 }
 
-void TakeSettings(const OwnTask& task, OwnModel* own) { SettingsTaker(task, own).Run(); }
+void TakeSettings(const SourceModelTask& task, SourceModel* own) { SettingsTaker(task, own).Run(); }
 
 // What leads the drives of a user's model, and what is switched off.
 
@@ -425,7 +427,7 @@ bool ActsOn(const mjModel& m, int u, int joint) {
 
 class LeadFinder {
  public:
-  LeadFinder(const OwnTask& task, const ImportedMjcf& imported, OwnModel* own)
+  LeadFinder(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own)
       : task_(task),
         mechanism_(*task.mechanism),
         imported_(&imported),
@@ -514,20 +516,20 @@ class LeadFinder {
       std::fill_n(m_->actuator_biasprm + mjNBIAS * u, mjNBIAS, 0.0);
       m_->actuator_gaintype[u] = mjGAIN_FIXED;
       m_->actuator_biastype[u] = mjBIAS_NONE;
-      if (pushes) own_.facts.pushers.push_back(NameAt(*m_, mjOBJ_ACTUATOR, u, "actuator"));
+      if (pushes) own_.facts.unused_actuators.push_back(NameAt(*m_, mjOBJ_ACTUATOR, u, "actuator"));
     }
   }
 
-  const OwnTask& task_;
+  const SourceModelTask& task_;
   const Mechanism& mechanism_;
   const ImportedMjcf* const imported_;
-  OwnModel& own_;
+  SourceModel& own_;
   mjModel* const m_;
 };
 
 }  // namespace
 
-void FindLeads(const OwnTask& task, const ImportedMjcf& imported, OwnModel* own) {
+void FindLeads(const SourceModelTask& task, const ImportedMjcf& imported, SourceModel* own) {
   LeadFinder(task, imported, own).Run();
 }
 
@@ -545,7 +547,7 @@ RunSummary Unsound(const std::string& what, double t_s) {
 
 }  // namespace
 
-OwnStepper::OwnStepper(const OwnTask& task, const OwnModel& own, OwnRun* run)
+OwnStepper::OwnStepper(const SourceModelTask& task, const SourceModel& own, SourceModelRun* run)
     : task_(task),
       own_(own),
       run_(run),
@@ -619,7 +621,7 @@ double OwnStepper::TargetAcceleration(size_t k) const {
   return (at_.after.position[i] - 2.0 * at_.now.position[i] + at_.before.position[i]) / (h_ * h_);
 }
 
-// Reference acceleration of the added equalities: the commanded one, guided softly.
+// Reference acceleration of the added equalities: the commanded one, softly stabilized.
 void OwnStepper::LeadExactly() {
   constexpr double kGuidance_s = 0.02, kGuidanceSteps = 20.0;
   const double tc = std::max(kGuidance_s, kGuidanceSteps * h_);
@@ -652,7 +654,7 @@ RunSummary OwnStepper::Command(long n) {
   return RunSummary::Done();
 }
 
-// The control at which an actuator pushes with nothing where the joint is as commanded.
+// The control at which an actuator exerts no force where the joint is as commanded.
 void OwnStepper::LeadByActuators(const OwnDrive& drive, double position, double velocity) {
   for (const int u : drive.actuators) {
     const mjtNum* bias = m_->actuator_biasprm + mjNBIAS * u;
@@ -757,7 +759,7 @@ Eigen::Quaterniond QuaternionAt(const mjtNum* q) { return {q[0], q[1], q[2], q[3
 
 }  // namespace
 
-// What acts besides motion and loops.
+// What acts in addition to motion and loops.
 void OwnStepper::Watch(double t_s) {
   for (int i = 0; i < d_->nefc; ++i) {
     const int type = d_->efc_type[i];
@@ -785,7 +787,7 @@ void OwnStepper::RecordGaps(double t_s) {
     const OwnClosure& closure = own_.closures[c];
     const int b1 = m_->eq_obj1id[closure.equality], b2 = m_->eq_obj2id[closure.equality];
     const mjtNum* data = m_->eq_data + mjNEQDATA * closure.equality;
-    OwnRun::Gap& gap = run_->gaps[c];
+    SourceModelRun::Gap& gap = run_->gaps[c];
     const Vec3 apart =
         point(b1, data + (closure.weld ? 3 : 0)) - point(b2, data + (closure.weld ? 0 : 3));
     if (apart.norm() > gap.position_m) {
@@ -841,13 +843,13 @@ void OwnStepper::Record(long sample, double t_s) {
 
 namespace mbv {
 
-OwnRun RunOwnFile(const OwnTask& task) {
-  OwnRun run;
+SourceModelRun RunSourceModel(const SourceModelTask& task) {
+  SourceModelRun run;
   std::vector<std::string> warnings;
   const simulation::EngineSession session(&warnings);
   try {
-    simulation::OwnModel own;
-    run.summary = simulation::MakeOwnModel(task, &own);
+    simulation::SourceModel own;
+    run.summary = simulation::MakeSourceModel(task, &own);
     run.facts = own.facts;
     if (!run.summary.ok()) return run;
     run.step_s = own.m->opt.timestep;

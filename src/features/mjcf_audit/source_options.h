@@ -1,8 +1,9 @@
 // A user's own MJCF, stepped as it is or with some of its settings changed.
 //
 // Only the motion is imposed. Contacts are off, bodies on free joints do not move, couplings that
-// the mechanism does not have and actuators that are no drives are off; OwnRun::facts says what was
-// done. MuJoCo's parser and engine may crash on hostile files: call it in a process of its own.
+// the mechanism does not have and actuators that are no drives are off; SourceModelRun::facts says
+// what was done. MuJoCo's parser and engine may crash on hostile files: call it in a process of its
+// own.
 #pragma once
 
 #include <string>
@@ -23,55 +24,55 @@ enum class DriveLead {
   kAdded,     ///< an added equality of impedance 0.9999, whose reference acceleration is exact
 };
 
-enum class OwnIntegrator { kOwn, kEuler, kRk4, kImplicit };
+enum class SourceModelIntegrator { kOwn, kEuler, kRk4, kImplicit };
 
 /// What differs from the file; NaN and false: nothing.
-struct OwnSettings {
+struct SourceModelSettings {
   double step_factor = 1.0;  ///< of the file's step
-  OwnIntegrator integrator = OwnIntegrator::kOwn;
+  SourceModelIntegrator integrator = SourceModelIntegrator::kOwn;
   double time_constant_s = kNan;  ///< of the closures: solref "x 1"
   double impedance = kNan;        ///< of the closures: solimp "x x 0.001 0.5 2"
   double impratio = kNan;
   /// Supplies J̇q̇, which MuJoCo before 3.7 leaves out of the closures' reference acceleration, as a
   /// central difference of J q̇ along the motion.
   bool velocity_term = false;
-  bool exact_drives = false;    ///< all drives as DriveLead::kAdded
-  bool plain = false;           ///< without what the mechanism does not have: OwnFacts::left_out
+  bool exact_drives = false;  ///< all drives as DriveLead::kAdded
+  bool plain = false;  ///< without what the mechanism does not have: SourceModelFacts::left_out
   bool exact_solver = false;    ///< Newton's method to the end
   bool stiff_friction = false;  ///< friction losses as stiff as MuJoCo allows: 2 steps, 0.9999
 };
 
-struct OwnTask {
+struct SourceModelTask {
   std::string text, file;                ///< MJCF as the user wrote it
   const Mechanism* mechanism = nullptr;  ///< made of the file, with all drives
   DrivenMotion driven;                   ///< of the drives; starts at home at rest
   double duration_s = 1.0;
   double sample_s = 0.01;      ///< wanted; samples fall on whole steps of the file
   bool ignore_ranges = false;  ///< joint limits are off
-  OwnSettings settings = {};
+  SourceModelSettings settings = {};
 };
 
 /// What the file says, and what was made of it.
-struct OwnFacts {
+struct SourceModelFacts {
   double step_s = kNan;            ///< the file's
   std::string integrator, solver;  ///< as MJCF names them
   double tolerance = kNan;
   int iterations = 0;
-  bool rubs = false;                  ///< hinges or slides with a friction loss
+  bool has_friction = false;          ///< hinges or slides with a friction loss
   bool rough_solver = false;          ///< not Newton's method with at least MuJoCo's default effort
   std::vector<std::string> closures;  ///< names
-  std::vector<std::string> solref, solimp;      ///< per closure, as MJCF
-  std::vector<DriveLead> leads;                 ///< per drive
-  std::vector<std::string> motors;              ///< per drive: its motor in the file, or ""
-  std::vector<std::string> left_out;            ///< "armature", "damping", …
-  std::vector<std::string> held;                ///< free bodies
-  std::vector<std::string> damped;              ///< servos with a `kv`, which MuJoCo 2.2 drops
-  std::vector<std::string> couplings, pushers;  ///< equalities and actuators that are off
+  std::vector<std::string> solref, solimp;  ///< per closure, as MJCF
+  std::vector<DriveLead> leads;             ///< per drive
+  std::vector<std::string> motors;          ///< per drive: its motor in the file, or ""
+  std::vector<std::string> left_out;        ///< "armature", "damping", …
+  std::vector<std::string> held;            ///< free bodies
+  std::vector<std::string> damped;          ///< servos with a `kv`, which MuJoCo 2.2 drops
+  std::vector<std::string> couplings, unused_actuators;  ///< equalities and actuators that are off
 };
 
-struct OwnRun {
+struct SourceModelRun {
   RunSummary summary;  ///< kUnsupported: cannot be run so; kEngineFailure: the numbers are unsound
-  OwnFacts facts;
+  SourceModelFacts facts;
   /// DRIVE.force of every drive [N, N m], and the force part of the closures' reactions.
   Trace trace;
   struct Gap {  ///< of one closure, its largest at the samples
@@ -84,6 +85,6 @@ struct OwnRun {
   double cost_ms = kNan;           ///< processor time of mj_step per simulated second
 };
 
-[[nodiscard]] OwnRun RunOwnFile(const OwnTask& task);
+[[nodiscard]] SourceModelRun RunSourceModel(const SourceModelTask& task);
 
 }  // namespace mbv

@@ -31,7 +31,7 @@ namespace {
 // The numbers of a model file that may be wrong.
 
 /// A number of the model and what an error of 1 adds to it.
-struct Bendable {
+struct Perturbable {
   std::string name, unit;
   NumberKind kind = NumberKind::kParameter;
   double value = kNan;
@@ -45,12 +45,12 @@ struct Bendable {
   [[nodiscard]] std::string Text(double error) const;
 };
 
-// One number of the model bent on one bench: is the error seen, and from which size on?
+// One number of the model perturbed on one bench: is the error seen, and from which size on?
 
 /// What is known of errors of one sign.
 struct Direction {
   double sign = 1.0;  ///< of the relative error
-  BentRun run;        ///< at the size asked for, then the largest that was not seen
+  PerturbedRun run;   ///< at the size asked for, then the largest that was not seen
   bool ran = false;   ///< at the size asked for
   bool detected = false, by_force = false;  ///< the same; not running is noticed, too
   double force_change = kNan;               ///< the same
@@ -59,27 +59,27 @@ struct Direction {
   std::string check = {};                   ///< that saw it; "model" where it was refused
 };
 
-class BendSearch {
+class PerturbationSearch {
  public:
-  /// `count` is called before each simulation with what is bent.
-  BendSearch(const MutationOptions& options, const MutationBench& bench,
-             std::function<void(const std::string& what)> count)
+  /// `count` is called before each simulation with what is perturbed.
+  PerturbationSearch(const MutationOptions& options, const MutationBench& bench,
+                     std::function<void(const std::string& what)> count)
       : options_(options), bench_(bench), count_(std::move(count)) {}
 
   /// Both directions at the size asked for; with the smallest errors if these are asked for. What
-  /// is not seen is made worse up to kLargestBend, if `further`.
-  [[nodiscard]] Sighting Look(const Bendable& number, bool further);
+  /// is not seen is made worse up to kLargestPerturbation, if `further`.
+  [[nodiscard]] Detection Look(const Perturbable& number, bool further);
 
   /// After Look(): the direction that shows less, of those that ran.
   [[nodiscard]] const Direction& Weaker() const;
 
  private:
-  BentRun RunAt(const Bendable& number, double error);
-  Direction Try(const Bendable& number, double sign);
-  void BendFurther(const Bendable& number, Direction* way);
-  void FindSmallest(const Bendable& number, double seen, double ratio, double guess,
+  PerturbedRun RunAt(const Perturbable& number, double error);
+  Direction Try(const Perturbable& number, double sign);
+  void PerturbFurther(const Perturbable& number, Direction* way);
+  void FindSmallest(const Perturbable& number, double seen, double ratio, double guess,
                     Direction* way);
-  [[nodiscard]] Sighting Join() const;
+  [[nodiscard]] Detection Join() const;
 
   const MutationOptions& options_;
   const MutationBench& bench_;
@@ -87,7 +87,8 @@ class BendSearch {
   std::array<Direction, 2> ways_;  // larger, smaller
 };
 
-/// The check that shows a bend best: largest value over limit among those that the bend moves.
+/// The check that shows a perturbation best: largest value over limit among those that the
+/// perturbation moves.
 struct BestCheck {
   const CheckResult* check = nullptr;
   double ratio = 0.0;  ///< value over limit
@@ -183,7 +184,7 @@ std::string UnitOf(const Mechanism& mechanism, const Literal& literal) {
   return Has(keys, "damping") ? "N s/m" : "";
 }
 
-std::string Bendable::Text(double error) const {
+std::string Perturbable::Text(double error) const {
   const std::string percent = fmt::format("{:.3g} %", 100.0 * std::abs(error));
   if (value != 0.0) return percent + (error > 0.0 ? " too large" : " too small");
   return fmt::format("{} of {:g}{}{} instead of 0", percent,
@@ -193,9 +194,9 @@ std::string Bendable::Text(double error) const {
 // The model's own parameters, those of instances, and what the file writes out where masses,
 // places, axes, springs and gravity are stated. A literal 0, and 1 of an axis, are structure (an
 // axis, a plane) and no measured numbers; pictures, ranges, guesses and beams act on no force.
-std::vector<Bendable> BendablesOf(const Mechanism& mechanism,
-                                  const std::vector<Literal>& literals) {
-  std::vector<Bendable> all;
+std::vector<Perturbable> PerturbablesOf(const Mechanism& mechanism,
+                                        const std::vector<Literal>& literals) {
+  std::vector<Perturbable> all;
   const std::vector<Parameter>& parameters = mechanism.parameters;
   for (const bool instance : {false, true}) {
     for (const Parameter& p : parameters) {
@@ -214,7 +215,7 @@ std::vector<Bendable> BendablesOf(const Mechanism& mechanism,
 
 constexpr double kRatioRoundoff = 1.0 + 1e-9;  // of a ratio of sizes
 
-bool FailsByForce(const BentRun& run) {
+bool FailsByForce(const PerturbedRun& run) {
   return std::any_of(run.comparison.checks.begin(), run.comparison.checks.end(),
                      [](const CheckResult& check) {
                        return check.limit && !check.pass && IsDriveForce(check.metric);
@@ -225,7 +226,7 @@ std::string NameOf(const BestCheck& best) {
   return best.check == nullptr ? "model" : best.check->name;
 }
 
-BestCheck BestOf(const MutationBench& bench, const BentRun& run) {
+BestCheck BestOf(const MutationBench& bench, const PerturbedRun& run) {
   BestCheck best;
   for (const CheckResult& check : run.comparison.checks) {
     if (!check.limit) continue;
@@ -237,12 +238,12 @@ BestCheck BestOf(const MutationBench& bench, const BentRun& run) {
   return best;
 }
 
-BentRun BendSearch::RunAt(const Bendable& number, double error) {
+PerturbedRun PerturbationSearch::RunAt(const Perturbable& number, double error) {
   count_(fmt::format("{} by {:+.1e}", number.name, error));
   return bench_.Run(number.At(error));
 }
 
-Direction BendSearch::Try(const Bendable& number, double sign) {
+Direction PerturbationSearch::Try(const Perturbable& number, double sign) {
   Direction way{.sign = sign, .run = RunAt(number, sign * options_.size)};
   way.ran = way.run.ran;
   way.detected = way.run.detected();
@@ -256,13 +257,13 @@ Direction BendSearch::Try(const Bendable& number, double sign) {
   return way;
 }
 
-Sighting BendSearch::Look(const Bendable& number, bool further) {
+Detection PerturbationSearch::Look(const Perturbable& number, bool further) {
   double guess = 0.0;  // what one direction shows, the other probably does
   for (size_t k = 0; k < 2; ++k) {
     Direction& way = ways_[k];
     way = Try(number, k == 0 ? 1.0 : -1.0);
     if (!way.detected) {
-      if (further) BendFurther(number, &way);
+      if (further) PerturbFurther(number, &way);
     } else if (way.ran) {
       const BestCheck best = BestOf(bench_, way.run);
       way.check = NameOf(best);
@@ -277,7 +278,7 @@ Sighting BendSearch::Look(const Bendable& number, bool further) {
   return Join();
 }
 
-const Direction& BendSearch::Weaker() const {
+const Direction& PerturbationSearch::Weaker() const {
   const Direction &up = ways_[0], &down = ways_[1];
   if (up.ran != down.ran) return up.ran ? up : down;
   if (up.detected != down.detected) return up.detected ? down : up;
@@ -287,9 +288,9 @@ const Direction& BendSearch::Weaker() const {
   return down.smallest > up.smallest ? down : up;
 }
 
-Sighting BendSearch::Join() const {
+Detection PerturbationSearch::Join() const {
   const Direction &up = ways_[0], &down = ways_[1], &weaker = Weaker();
-  Sighting s;
+  Detection s;
   s.ran = weaker.ran;
   s.detected = up.detected && down.detected;
   s.by_force = s.ran && (up.by_force || !up.ran) && (down.by_force || !down.ran);
@@ -301,19 +302,20 @@ Sighting BendSearch::Join() const {
   return s;
 }
 
-// Not seen at the size asked for: bent by kLargestBend, and if that is seen or refused, by ten
-// times as much as before until it is.
-void BendSearch::BendFurther(const Bendable& number, Direction* way) {
-  if (way->unseen >= kLargestBend) return;
-  BentRun largest = RunAt(number, way->sign * kLargestBend);
+// Not seen at the size asked for: perturbed by kLargestPerturbation, and if that is seen or
+// refused, by ten times as much as before until it is.
+void PerturbationSearch::PerturbFurther(const Perturbable& number, Direction* way) {
+  if (way->unseen >= kLargestPerturbation) return;
+  PerturbedRun largest = RunAt(number, way->sign * kLargestPerturbation);
   if (largest.ran && !largest.detected()) {
-    way->unseen = kLargestBend;
+    way->unseen = kLargestPerturbation;
     way->run = std::move(largest);
     return;
   }
-  for (double size = 10.0 * options_.size; way->unseen < kLargestBend; size *= 10.0) {
-    size = std::min(size, kLargestBend);
-    BentRun run = size < kLargestBend ? RunAt(number, way->sign * size) : std::move(largest);
+  for (double size = 10.0 * options_.size; way->unseen < kLargestPerturbation; size *= 10.0) {
+    size = std::min(size, kLargestPerturbation);
+    PerturbedRun run =
+        size < kLargestPerturbation ? RunAt(number, way->sign * size) : std::move(largest);
     if (!run.ran) return;  // the model itself objects; forces have not seen it up to here
     if (run.detected()) {
       const BestCheck best = BestOf(bench_, run);
@@ -328,14 +330,14 @@ void BendSearch::BendFurther(const Bendable& number, Direction* way) {
 
 // Between way->unseen (0: not known) and `seen`; `ratio` is value over limit at `seen`. `known`: a
 // size that may be the one, or 0.
-void BendSearch::FindSmallest(const Bendable& number, double seen, double ratio, double known,
-                              Direction* way) {
+void PerturbationSearch::FindSmallest(const Perturbable& number, double seen, double ratio,
+                                      double known, Direction* way) {
   const double fine = 1.0 + options_.resolution;
   double unseen = way->unseen, step = fine;
   // Where proportion puts the limit, a little beyond; 0 where nothing is proportional.
   double guess = std::isfinite(ratio) && ratio > 1.0 ? seen / ratio * std::sqrt(fine) : 0.0;
   if (known > 0.0) guess = known;
-  while ((unseen == 0.0 || seen / unseen > fine * kRatioRoundoff) && seen > kSmallestBend) {
+  while ((unseen == 0.0 || seen / unseen > fine * kRatioRoundoff) && seen > kSmallestPerturbation) {
     double size = 0.0;
     if (guess > unseen && guess < seen) {
       size = guess;
@@ -349,8 +351,8 @@ void BendSearch::FindSmallest(const Bendable& number, double seen, double ratio,
       size = std::sqrt(unseen * seen);
     }
     guess = 0.0;
-    size = std::max(size, kSmallestBend);
-    const BentRun run = RunAt(number, way->sign * size);
+    size = std::max(size, kSmallestPerturbation);
+    const PerturbedRun run = RunAt(number, way->sign * size);
     if (!run.detected()) {
       unseen = size;
       continue;
@@ -364,7 +366,7 @@ void BendSearch::FindSmallest(const Bendable& number, double seen, double ratio,
 }  // namespace
 namespace {
 
-// Why a bent parameter is not seen: what it changes in the model, and proof that this has no
+// Why a perturbed parameter is not seen: what it changes in the model, and proof that this has no
 // effect.
 
 // Numbers of a model that differ by less come out of the same expressions.
@@ -503,7 +505,7 @@ Vec6 Needed(const Body& body, const Pose& X_WB, const Vec6& V, const Vec6& A, co
 
 // Largest change of what the bodies' motions call for, relative to the largest that the bodies
 // that differ call for. The motion is the reference's.
-double InertiaEffect(const MutationBench& bench, const Mechanism& bent) {
+double InertiaEffect(const MutationBench& bench, const Mechanism& perturbed) {
   const Mechanism& base = bench.mechanism();
   const Motion& motion = bench.scenario().motion;
   ReferenceSolver solver(base, motion);
@@ -516,9 +518,10 @@ double InertiaEffect(const MutationBench& bench, const Mechanism& bent) {
     for (size_t b = 1; b < base.bodies.size(); ++b) {
       const BodyStates& s = sample.states;
       const Vec6 as_is = Needed(base.bodies[b], s.X_WB[b], s.V_WB[b], s.A_WB[b], base.gravity_W);
-      const Vec6 as_bent = Needed(bent.bodies[b], s.X_WB[b], s.V_WB[b], s.A_WB[b], bent.gravity_W);
-      change_moment = std::max(change_moment, (as_bent - as_is).head<3>().norm());
-      change_force = std::max(change_force, (as_bent - as_is).tail<3>().norm());
+      const Vec6 as_perturbed =
+          Needed(perturbed.bodies[b], s.X_WB[b], s.V_WB[b], s.A_WB[b], perturbed.gravity_W);
+      change_moment = std::max(change_moment, (as_perturbed - as_is).head<3>().norm());
+      change_force = std::max(change_force, (as_perturbed - as_is).tail<3>().norm());
       all_moment = std::max(all_moment, as_is.head<3>().norm());
       all_force = std::max(all_force, as_is.tail<3>().norm());
     }
@@ -528,12 +531,12 @@ double InertiaEffect(const MutationBench& bench, const Mechanism& bent) {
 }
 
 // Largest change of all channels of a quantity, relative to the largest value among them.
-double ChannelChange(const Trace& base, const Trace& bent, Quantity quantity) {
+double ChannelChange(const Trace& base, const Trace& perturbed, Quantity quantity) {
   double change = 0.0, largest = 0.0;
   for (size_t c = 0; c < base.channels.size(); ++c) {
-    const int other = bent.Find(base.channels[c].name);
+    const int other = perturbed.Find(base.channels[c].name);
     if (other < 0 || base.channels[c].quantity != quantity) continue;
-    const VecX a = base.values.col(static_cast<Eigen::Index>(c)), b = bent.values.col(other);
+    const VecX a = base.values.col(static_cast<Eigen::Index>(c)), b = perturbed.values.col(other);
     if (a.size() != b.size() || a.size() == 0) continue;
     change = std::max(change, (a - b).cwiseAbs().maxCoeff());
     largest = std::max(largest, a.cwiseAbs().maxCoeff());
@@ -541,21 +544,21 @@ double ChannelChange(const Trace& base, const Trace& bent, Quantity quantity) {
   return change == 0.0 ? 0.0 : change / largest;
 }
 
-// Largest change of any drive force against the unbent run, relative to the RMS force of all
+// Largest change of any drive force against the unperturbed run, relative to the RMS force of all
 // drives of its unit.
-double ForceSensitivity(const MutationBench& bench, const Trace& bent) {
+double ForceSensitivity(const MutationBench& bench, const Trace& perturbed) {
   const Trace& base = bench.base().trace;
   const Mechanism& m = bench.mechanism();
   std::map<std::string, std::pair<double, double>> sums;  // unit → Σ f², count
   std::map<std::string, double> changes;
   for (const Drive& drive : m.drives) {
     const std::string force = ChannelName(Quantity::kForce, drive.name);
-    const int a = base.Find(force), b = bent.Find(force);
-    if (a < 0 || b < 0 || base.values.rows() != bent.values.rows()) return kNan;
+    const int a = base.Find(force), b = perturbed.Find(force);
+    if (a < 0 || b < 0 || base.values.rows() != perturbed.values.rows()) return kNan;
     const std::string unit = ForceUnit(m, drive);
     sums[unit].first += base.values.col(a).squaredNorm();
     sums[unit].second += static_cast<double>(base.values.rows());
-    const ForceSignal before(base, a), after(bent, b);
+    const ForceSignal before(base, a), after(perturbed, b);
     for (Eigen::Index i = 0; i < base.values.rows(); ++i) {
       changes[unit] = std::max(changes[unit], std::abs(Difference(before.At(i), after.At(i))));
     }
@@ -568,7 +571,7 @@ double ForceSensitivity(const MutationBench& bench, const Trace& bent) {
   return worst;
 }
 
-// Why two exchanged drives are not told apart: how much they differ in the unbent run.
+// Why two exchanged drives are not distinguished: how much they differ in the unperturbed run.
 std::string WhySwapUnseen(const MutationBench& bench, const std::string& a, const std::string& b) {
   const Trace& trace = bench.base().trace;
   double worst = 0.0;
@@ -586,80 +589,83 @@ std::string WhySwapUnseen(const MutationBench& bench, const std::string& a, cons
 }
 
 // What two versions of a model differ in: "the mass of ship; guesses and home pose".
-std::string DescribeChange(const Mechanism& base, const Mechanism& bent) {
+std::string DescribeChange(const Mechanism& base, const Mechanism& perturbed) {
   std::vector<std::string> parts;
   const auto add = [&](const std::string& what, const std::vector<std::string>& names) {
     if (!names.empty()) parts.push_back(what + " " + Listed(names));
   };
-  if (base.bodies.size() != bent.bodies.size() || base.joints.size() != bent.joints.size()) {
+  if (base.bodies.size() != perturbed.bodies.size() ||
+      base.joints.size() != perturbed.joints.size()) {
     return "the number of bodies or joints";
   }
-  if (!Same(base.gravity_W, bent.gravity_W)) parts.emplace_back("gravity");
-  add("the mass of", Which(base.bodies, bent.bodies,
+  if (!Same(base.gravity_W, perturbed.gravity_W)) parts.emplace_back("gravity");
+  add("the mass of", Which(base.bodies, perturbed.bodies,
                            [](const Body& a, const Body& b) { return !Same(a.mass, b.mass); }));
-  add("the centre of mass of", Which(base.bodies, bent.bodies, [](const Body& a, const Body& b) {
-        return !Same(a.p_BoBcm_B, b.p_BoBcm_B);
-      }));
+  add("the centre of mass of",
+      Which(base.bodies, perturbed.bodies,
+            [](const Body& a, const Body& b) { return !Same(a.p_BoBcm_B, b.p_BoBcm_B); }));
   // A mass that changes takes the inertia with it.
-  add("the inertia of", Which(base.bodies, bent.bodies, [](const Body& a, const Body& b) {
+  add("the inertia of", Which(base.bodies, perturbed.bodies, [](const Body& a, const Body& b) {
         return Same(a.mass, b.mass) && !SameMoments(a, b);
       }));
   add("joint frames or axes of",
-      Which(base.joints, bent.joints, [](const Joint& a, const Joint& b) {
+      Which(base.joints, perturbed.joints, [](const Joint& a, const Joint& b) {
         return !Same(a.X_PF, b.X_PF) || !Same(a.X_CM, b.X_CM) || !Same(a.axis, b.axis) ||
                !Same(a.axis2, b.axis2);
       }));
-  add("the ends of", Which(base.drives, bent.drives,
+  add("the ends of", Which(base.drives, perturbed.drives,
                            [](const Drive& a, const Drive& b) { return !SameDrive(a, b); }));
   add("the frame of output",
-      Which(base.outputs, bent.outputs, [](const Output& a, const Output& b) {
+      Which(base.outputs, perturbed.outputs, [](const Output& a, const Output& b) {
         return !Same(a.X_BO, b.X_BO) || !Same(a.X_RbR, b.X_RbR);
       }));
   add("the spring",
-      Which(base.springs, bent.springs, [](const SpringDamper& a, const SpringDamper& b) {
+      Which(base.springs, perturbed.springs, [](const SpringDamper& a, const SpringDamper& b) {
         return !Same(a.stiffness, b.stiffness) || !Same(a.damping, b.damping) ||
                !Same(a.free_length_m, b.free_length_m) || !Same(a.p_from, b.p_from) ||
                !Same(a.p_to, b.p_to);
       }));
   add("the coupling",
-      Which(base.couplings, bent.couplings,
+      Which(base.couplings, perturbed.couplings,
             [](const Coupling& a, const Coupling& b) { return !SameCoupling(a, b); }));
   add("the frames of bushing",
-      Which(base.bushings, bent.bushings, [](const Bushing& a, const Bushing& b) {
+      Which(base.bushings, perturbed.bushings, [](const Bushing& a, const Bushing& b) {
         return !Same(a.X_PF, b.X_PF) || !Same(a.X_CM, b.X_CM);
       }));
   add("the element",
-      Which(base.elements, bent.elements,
+      Which(base.elements, perturbed.elements,
             [](const ForceElement& a, const ForceElement& b) { return !SameElement(a, b); }));
-  if (RangesDiffer(base, bent)) parts.emplace_back("ranges of travel");
-  if (StartDiffers(base, bent)) parts.emplace_back("where the home solution starts");
+  if (RangesDiffer(base, perturbed)) parts.emplace_back("ranges of travel");
+  if (StartDiffers(base, perturbed)) parts.emplace_back("where the home solution starts");
   std::string text;
   for (const std::string& part : parts) text += (text.empty() ? "" : "; ") + part;
   return text;
 }
 
-// One sentence with numbers: what the bend changes in the model, the largest change of any drive
-// force over the run relative to its RMS, and where the effect goes instead (base reactions, joint
-// reactions, inertia forces that the motion does not call for). `bend` is the subject of that
-// sentence: "10 % wrong".
-std::string WhyUnseen(const MutationBench& bench, const Mechanism& bent, const BentRun& run,
-                      const std::string& bend) {
+// One sentence with numbers: what the perturbation changes in the model, the largest change of any
+// drive force over the run relative to its RMS, and where the effect goes instead (base reactions,
+// joint reactions, inertia forces that the motion does not call for). `perturbation` is the subject
+// of that sentence: "10 % wrong".
+std::string WhyUnseen(const MutationBench& bench, const Mechanism& perturbed,
+                      const PerturbedRun& run, const std::string& perturbation) {
   const Mechanism& base = bench.mechanism();
-  const std::string change = DescribeChange(base, bent);
+  const std::string change = DescribeChange(base, perturbed);
   const double sensitivity = ForceSensitivity(bench, run.trace);
-  const std::string proof = fmt::format("{} changes no drive force {}", bend, Bound(sensitivity));
+  const std::string proof =
+      fmt::format("{} changes no drive force {}", perturbation, Bound(sensitivity));
   if (change.empty()) {
     return "no mass, joint, drive or output depends on it (pictures, or numbers that only other "
            "parameters use); " +
            proof;
   }
   std::string text = "it changes " + change;
-  const bool inertia = !GeometryDiffers(base, bent) && Same(base.gravity_W, bent.gravity_W) &&
-                       !Which(base.bodies, bent.bodies, [](const Body& a, const Body& b) {
+  const bool inertia = !GeometryDiffers(base, perturbed) &&
+                       Same(base.gravity_W, perturbed.gravity_W) &&
+                       !Which(base.bodies, perturbed.bodies, [](const Body& a, const Body& b) {
                           return !SameInertia(a, b);
                         }).empty();
   if (inertia) {
-    const double effect = InertiaEffect(bench, bent);
+    const double effect = InertiaEffect(bench, perturbed);
     if (effect <= kNoChange) {
       return text +
              fmt::format("; the motion calls for the same inertia forces as before (to {:.0e}); ",
@@ -692,10 +698,10 @@ class Mutator {
           MutationReport* report)
       : options_(options), own_(own), exact_(exact == nullptr ? own : *exact), report_(*report) {}
 
-  void BendNumbers(const std::vector<Bendable>& numbers) {
+  void PerturbNumbers(const std::vector<Perturbable>& numbers) {
     for (size_t i = options_.part; i < numbers.size(); i += options_.parts) {
       fraction_ = static_cast<double>(i) / static_cast<double>(numbers.size());
-      report_.mutations.push_back(Bend(numbers[i]));
+      report_.mutations.push_back(Perturb(numbers[i]));
     }
   }
 
@@ -715,21 +721,21 @@ class Mutator {
     ++report_.runs;
   }
 
-  [[nodiscard]] BendSearch SearchOn(const MutationBench& bench) {
+  [[nodiscard]] PerturbationSearch SearchOn(const MutationBench& bench) {
     return {options_, bench, [this](const std::string& what) { Count(what); }};
   }
 
   [[nodiscard]] bool two_benches() const { return &own_ != &exact_; }
 
-  Mutation Bend(const Bendable& number) {
+  Mutation Perturb(const Perturbable& number) {
     Mutation m;
     m.name = number.name;
     m.unit = number.unit;
     m.kind = number.kind;
     m.value = number.value;
     m.relative_to = number.relative_to;
-    BendSearch exact = SearchOn(exact_);
-    const Sighting seen = exact.Look(number, true);
+    PerturbationSearch exact = SearchOn(exact_);
+    const Detection seen = exact.Look(number, true);
     // What inverse dynamics proves to have no effect needs no search by a coarser method.
     const bool acts = seen.detected || !std::isnan(seen.smallest) || Changes(seen);
     m.own = two_benches() ? SearchOn(own_).Look(number, acts) : seen;
@@ -745,17 +751,17 @@ class Mutator {
     return m;
   }
 
-  [[nodiscard]] bool Changes(const Sighting& seen) const {
+  [[nodiscard]] bool Changes(const Detection& seen) const {
     return seen.force_change > MutationBench::Visible(exact_.base().ValueOf(exact_.ForceCheck()));
   }
 
-  void Prove(const Bendable& number, const Direction& way, Mutation* m) const {
+  void Prove(const Perturbable& number, const Direction& way, Mutation* m) const {
     const double error = way.sign * way.unseen;
     m->proved_to = way.unseen;
     m->sensitivity = ForceSensitivity(exact_, way.run.trace);
     std::string why;
-    const auto bent = exact_.Bend(number.At(error), &why);
-    m->reason = bent ? WhyUnseen(exact_, *bent, way.run, number.Text(error)) : why;
+    const auto perturbed = exact_.Perturb(number.At(error), &why);
+    m->reason = perturbed ? WhyUnseen(exact_, *perturbed, way.run, number.Text(error)) : why;
   }
 
   FaultResult Put(const StructuralFault& fault) {
@@ -790,21 +796,21 @@ class Mutator {
 
   struct Tried {
     size_t candidate = 0;
-    BentRun run;
+    PerturbedRun run;
   };
   // The fault; of several candidates the first that runs and moves differently; empty when none
   // does.
   std::optional<Tried> FirstThatMoves(const StructuralFault& fault) {
     for (size_t k = 0; k < fault.wrong.size(); ++k) {
       Count(fault.kind);
-      BentRun run = exact_.Run(fault.wrong[k]);
+      PerturbedRun run = exact_.Run(fault.wrong[k]);
       if (fault.wrong.size() == 1 || (run.ran && run.detected())) return Tried{k, std::move(run)};
     }
     return {};
   }
 
-  static FaultSighting See(const MutationBench& bench, const BentRun& run) {
-    FaultSighting seen;
+  static FaultDetection See(const MutationBench& bench, const PerturbedRun& run) {
+    FaultDetection seen;
     seen.ran = run.ran;
     seen.detected = run.detected();
     if (!run.ran) {
@@ -820,7 +826,7 @@ class Mutator {
     return seen;
   }
 
-  std::string WhyFaultUnseen(const StructuralFault& fault, const BentRun& run) {
+  std::string WhyFaultUnseen(const StructuralFault& fault, const PerturbedRun& run) {
     const double change = ForceSensitivity(exact_, run.trace);
     if (change > MutationBench::Visible(0.0)) {
       missed_ = true;
@@ -838,12 +844,12 @@ class Mutator {
 };
 
 // Those that are asked for; unknown names are findings.
-std::vector<Bendable> Chosen(const MutationOptions& options, std::vector<Bendable> all,
-                             MutationReport* report) {
+std::vector<Perturbable> Chosen(const MutationOptions& options, std::vector<Perturbable> all,
+                                MutationReport* report) {
   if (options.numbers.empty()) return all;
-  std::vector<Bendable> chosen;
+  std::vector<Perturbable> chosen;
   std::vector<std::string> names;
-  for (const Bendable& number : all) names.push_back(number.name);
+  for (const Perturbable& number : all) names.push_back(number.name);
   for (const std::string& wanted : options.numbers) {
     const auto found = std::find(names.begin(), names.end(), wanted);
     if (found != names.end()) {
@@ -852,7 +858,7 @@ std::vector<Bendable> Chosen(const MutationOptions& options, std::vector<Bendabl
     }
     Finding finding;
     finding.file = report->scenario;
-    finding.message = fmt::format("the model has no number '{}' to bend", wanted);
+    finding.message = fmt::format("the model has no number '{}' to perturb", wanted);
     finding.hint = DidYouMean(wanted, names);
     report->diagnostics.Add(std::move(finding));
     report->exit_code = 2;
@@ -860,17 +866,17 @@ std::vector<Bendable> Chosen(const MutationOptions& options, std::vector<Bendabl
   return chosen;
 }
 
-std::vector<Bendable> NumbersOf(const MutationBench& bench) {
-  std::vector<Bendable> numbers = BendablesOf(bench.mechanism(), bench.literals());
+std::vector<Perturbable> NumbersOf(const MutationBench& bench) {
+  std::vector<Perturbable> numbers = PerturbablesOf(bench.mechanism(), bench.literals());
   // Its models are loaded anew, by parameters only.
   if (bench.scenario().simulation.extrapolate) {
-    std::erase_if(numbers, [](const Bendable& b) { return b.kind == NumberKind::kLiteral; });
+    std::erase_if(numbers, [](const Perturbable& b) { return b.kind == NumberKind::kLiteral; });
   }
   return numbers;
 }
 
 // In inverse mode, if the scenario has another one and allows it; a reason not to is a warning.
-// Where drives are pushed or servos, their forces tell nothing of an error by themselves: inverse
+// Where drives are force-controlled or servos, their forces show no error by themselves: inverse
 // dynamics does, whatever modes are asked for.
 std::unique_ptr<MutationBench> InverseBench(const MutationBench& own, const std::string& file,
                                             const MutationOptions& options,
@@ -904,11 +910,11 @@ MutationReport MutateScenario(const std::string& file, const MutationOptions& op
   const auto own = MutationBench::Make(file, mode, &report.diagnostics, &report.exit_code);
   if (own == nullptr) return report;
   report.mode = ModeText(own->scenario().simulation);
-  const std::vector<Bendable> numbers = Chosen(options, NumbersOf(*own), &report);
+  const std::vector<Perturbable> numbers = Chosen(options, NumbersOf(*own), &report);
   if (report.exit_code != 0) return report;
   const auto exact = InverseBench(*own, file, options, &report.diagnostics);
   Mutator mutator(options, *own, exact.get(), &report);
-  mutator.BendNumbers(numbers);
+  mutator.PerturbNumbers(numbers);
   if (options.structural && options.numbers.empty()) mutator.PutFaults();
   if (options.parts == 1) SortBySensitivity(&report);
   report.exit_code = mutator.missed() ? 1 : 0;

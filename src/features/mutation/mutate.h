@@ -10,10 +10,11 @@
 
 namespace mbv {
 
-inline constexpr double kLargestBend = 0.1;     ///< unseen numbers are bent up to this
-inline constexpr double kSmallestBend = 1e-15;  ///< smaller errors vanish in the number's digits
+inline constexpr double kLargestPerturbation = 0.1;  ///< unseen numbers are perturbed up to this
+inline constexpr double kSmallestPerturbation =
+    1e-15;  ///< smaller errors vanish in the number's digits
 
-/// Modes of the simulation in which a forward scenario is bent.
+/// Modes of the simulation in which a forward scenario is perturbed.
 enum class MutationModes { kBoth, kOwn, kInverse };
 
 struct MutationOptions {
@@ -28,11 +29,11 @@ struct MutationOptions {
   size_t part = 0, parts = 1;
 };
 
-/// Runs the scenario once as it is and many times with the simulated side bent: in its own mode and
-/// by its own limits, and, where that integrates forward, with MuJoCo's inverse dynamics per sample
-/// (round-off accuracy) by the limits for that. Each number is made larger and smaller; both errors
-/// must be seen. Errors of a number that is zero are relative to the largest one of its unit. The
-/// search is a bisection in log scale, started where proportion puts it.
+/// Runs the scenario once as it is and many times with the simulated side perturbed: in its own
+/// mode and by its own limits, and, where that integrates forward, with MuJoCo's inverse dynamics
+/// per sample (round-off accuracy) by the limits for that. Each number is made larger and smaller;
+/// both errors must be seen. Errors of a number that is zero are relative to the largest one of its
+/// unit. The search is a bisection in log scale, started where proportion puts it.
 [[nodiscard]] MutationReport MutateScenario(const std::string& file,
                                             const MutationOptions& options);
 

@@ -110,7 +110,7 @@ class Workers {
         parts_(static_cast<size_t>(arguments.jobs)),
         ended_(parts_.size(), false) {}
 
-  // Where a worker fails, the report has its exit code and nothing else, and what it said is told.
+  // Where a worker fails, the report has its exit code only, and what it printed is shown.
   MutationReport Run() {
     if (!folder_.trouble().empty()) {
       Say(stderr, "error: {}\n", folder_.trouble());
@@ -162,7 +162,7 @@ class Workers {
     const bool good = report && (end.exit_code == 0 || end.exit_code == 1);
     if (good) parts_[part] = *std::move(report);
     // All workers find the same in the files.
-    if (std::exchange(told_, true) && (good || failure_ > 0)) return;
+    if (std::exchange(reported_, true) && (good || failure_ > 0)) return;
     progress_.Clear();
     SayText(stderr, ReadWholeFile(Place(part, "log")).value_or(""));
     if (good) return;
@@ -177,7 +177,7 @@ class Workers {
   std::vector<bool> ended_;
   double farthest_ = 0.0;
   int failure_ = 0;
-  bool told_ = false;
+  bool reported_ = false;
 };
 
 MutationReport RunHere(const MutateArguments& arguments, MutationOptions options) {
@@ -187,12 +187,12 @@ MutationReport RunHere(const MutateArguments& arguments, MutationOptions options
       progress.Show(number, fraction);
     };
   } else if (!arguments.progress.empty()) {
-    options.progress = [&, told = std::chrono::steady_clock::time_point()](
+    options.progress = [&, reported = std::chrono::steady_clock::time_point()](
                            const std::string&, double fraction) mutable {
       constexpr std::chrono::milliseconds kBetween(500);
       const auto now = std::chrono::steady_clock::now();
-      if (now < told + kBetween) return;
-      told = now;
+      if (now < reported + kBetween) return;
+      reported = now;
       (void)WriteFile(arguments.progress, fmt::format("{:.6f}", fraction), false);
     };
   }
@@ -234,7 +234,7 @@ void AddMutateCommand(CLI::App* app, int* exit_code) {
   arguments->jobs = AllCores();
   CLI::App* mutate = app->add_subcommand(
       "mutate",
-      "Bend each number of the simulated side and put structural faults into it: which errors "
+      "Perturb each number of the simulated side and put structural faults into it: which errors "
       "would be noticed, and down to which size?");
   mutate->add_option("scenario", arguments->scenario, "scenario file that agrees")->required();
   mutate->add_option("--size", arguments->size, "relative error in percent (1%)")

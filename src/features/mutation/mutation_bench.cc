@@ -12,14 +12,14 @@ constexpr double kRoundoff = 1e-12;
 constexpr double kAboveBase = 5.0;
 
 // There is a motion to hold, and a simulation.
-bool CanBeBent(const Scenario& scenario, Diagnostics* diagnostics) {
+bool CanBePerturbed(const Scenario& scenario, Diagnostics* diagnostics) {
   if (scenario.motion.free()) {
     diagnostics->AddError(
         scenario.file,
-        "the motion follows from forces, so there is none to hold while a model is bent",
+        "the motion follows from forces, so there is none to hold while a model is perturbed",
         "command the drives or the outputs");
   } else if (!scenario.simulation.on) {
-    diagnostics->AddError(scenario.file, "has no simulation to bend",
+    diagnostics->AddError(scenario.file, "has no simulation to perturb",
                           "e.g. simulation: {mode: forward}");
   } else {
     return true;
@@ -41,7 +41,7 @@ std::string WhyNothing(const WitnessRuns& runs, bool ignore_ranges) {
 
 }  // namespace
 
-double BentRun::ValueOf(const std::string& check) const {
+double PerturbedRun::ValueOf(const std::string& check) const {
   const CheckResult* found = comparison.FindCheck(check);
   return found == nullptr ? 0.0 : found->value;
 }
@@ -54,28 +54,28 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   ScenarioOptions options;
   if (mode == BenchMode::kInverse) options.set = {{"simulation.mode", "inverse"}};
   if (ReadScenarioHead(file).is_stiffness()) {
-    diagnostics->AddError(file, "is a stiffness scenario", "mutate bends the model of a motion");
+    diagnostics->AddError(file, "is a stiffness scenario", "mutate perturbs the model of a motion");
     return nullptr;
   }
   std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
-  if (!prepared || !CanBeBent(prepared->scenario, diagnostics)) return nullptr;
+  if (!prepared || !CanBePerturbed(prepared->scenario, diagnostics)) return nullptr;
   std::unique_ptr<MutationBench> bench(new MutationBench(*std::move(prepared)));
   bench->literals_ = LoadModel(bench->scenario().model_file, bench->SimulatedOptions()).literals;
   bench->RunTruths();
-  WitnessRuns unbent = bench->Follow(bench->mechanism(), bench->scenario());
-  if (unbent.simulation) {
+  WitnessRuns unperturbed = bench->Follow(bench->mechanism(), bench->scenario());
+  if (unperturbed.simulation) {
     bench->reactions_not_unique_ =
-        ReactionsNotUnique(bench->prepared_.base, unbent.simulation->X_WB);
+        ReactionsNotUnique(bench->prepared_.base, unperturbed.simulation->X_WB);
   }
-  bench->base_ = bench->Judge(std::move(unbent), bench->scenario());
-  const BentRun& base = bench->base_;
+  bench->base_ = bench->Judge(std::move(unperturbed), bench->scenario());
+  const PerturbedRun& base = bench->base_;
   if (base.ran && base.comparison.verdict == Verdict::kAgree) {
     *exit_code = 0;
     return bench;
   }
   *exit_code = base.ran && base.comparison.verdict == Verdict::kDisagree ? 1 : 3;
   diagnostics->AddError(file,
-                        "does not agree before anything is bent: " +
+                        "does not agree before anything is perturbed: " +
                             (base.ran ? base.comparison.reason : base.failure),
                         "mbverify run shows why");
   return nullptr;
@@ -96,7 +96,7 @@ void MutationBench::RunTruths() {
   if (runner.TakesPart(role::kSolver)) runner.Run(role::kSolver);
   // In open loop the limits of motion are how far wrong forces lead.
   const SimulationSettings& settings = scenario().simulation;
-  if (settings.forward && settings.drive_by == DriveBy::kForces) runner.RunBent();
+  if (settings.forward && settings.drive_by == DriveBy::kForces) runner.RunPerturbed();
   truths_ = runner.Take();
 }
 
@@ -104,8 +104,8 @@ LoadOptions MutationBench::SimulatedOptions() const {
   return ModelOptions(scenario(), scenario().simulation.parameters);
 }
 
-std::optional<Mechanism> MutationBench::Bend(const Replacement& replacement,
-                                             std::string* why) const {
+std::optional<Mechanism> MutationBench::Perturb(const Replacement& replacement,
+                                                std::string* why) const {
   LoadOptions options = SimulatedOptions();
   (replacement.literal ? options.literals : options.overrides)[replacement.name] =
       replacement.value;
@@ -120,24 +120,24 @@ std::optional<Mechanism> MutationBench::Bend(const Replacement& replacement,
   return {};
 }
 
-BentRun MutationBench::Run(const Replacement& replacement) const {
-  BentRun bent;
-  const auto mechanism = Bend(replacement, &bent.failure);
+PerturbedRun MutationBench::Run(const Replacement& replacement) const {
+  PerturbedRun perturbed;
+  const auto mechanism = Perturb(replacement, &perturbed.failure);
   if (!mechanism) {
-    bent.loaded = false;
-    return bent;
+    perturbed.loaded = false;
+    return perturbed;
   }
   if (!scenario().simulation.extrapolate) return Run(*mechanism);
-  // Extrapolation loads the model anew, so the bend has to be in the scenario.
+  // Extrapolation loads the model anew, so the perturbation has to be in the scenario.
   MBV_DEMAND(!replacement.literal, replacement.name);
   Scenario wrong = scenario();
   wrong.simulation.parameters[replacement.name] = replacement.value;
   return Run(*mechanism, wrong);
 }
 
-BentRun MutationBench::Run(const Mechanism& wrong) const { return Run(wrong, scenario()); }
+PerturbedRun MutationBench::Run(const Mechanism& wrong) const { return Run(wrong, scenario()); }
 
-// Motion, forces and servos are those of the unbent model: only the simulated side is wrong.
+// Motion, forces and servos are those of the unperturbed model: only the simulated side is wrong.
 WitnessRuns MutationBench::Follow(const Mechanism& wrong, const Scenario& scenario) const {
   WitnessRunner runner(prepared_, {.scenario = &scenario,
                                    .mechanism = &wrong,
@@ -148,22 +148,22 @@ WitnessRuns MutationBench::Follow(const Mechanism& wrong, const Scenario& scenar
   return runner.Take();
 }
 
-BentRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario) const {
+PerturbedRun MutationBench::Run(const Mechanism& wrong, const Scenario& scenario) const {
   return Judge(Follow(wrong, scenario), scenario);
 }
 
-BentRun MutationBench::Judge(WitnessRuns runs, const Scenario& scenario) const {
-  BentRun bent;
-  bent.failure = WhyNothing(runs, scenario.simulation.ignore_ranges);
-  if (!bent.failure.empty()) return bent;
+PerturbedRun MutationBench::Judge(WitnessRuns runs, const Scenario& scenario) const {
+  PerturbedRun perturbed;
+  perturbed.failure = WhyNothing(runs, scenario.simulation.ignore_ranges);
+  if (!perturbed.failure.empty()) return perturbed;
   ComparisonInput input = InputOf(prepared_);
   input.reactions_not_unique = reactions_not_unique_;
   truths_.HandOver(&input);
   runs.HandOver(&input);
-  bent.comparison = Compare(input);
-  bent.trace = std::move(runs.records.front().trace);
-  bent.ran = true;
-  return bent;
+  perturbed.comparison = Compare(input);
+  perturbed.trace = std::move(runs.records.front().trace);
+  perturbed.ran = true;
+  return perturbed;
 }
 
 }  // namespace mbv

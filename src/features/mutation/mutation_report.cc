@@ -20,17 +20,17 @@ std::string InCell(std::string text) {
 }
 
 // By smallest error where it is known, else by the force change.
-double Rank(const Sighting& s) {
+double Rank(const Detection& s) {
   if (!std::isnan(s.smallest)) return s.smallest;
   return s.detected && !std::isnan(s.force_change) ? 1.0 / (1.0 + s.force_change) : 10.0;
 }
 
-std::string SeenText(const Sighting& s) {
+std::string SeenText(const Detection& s) {
   return !s.detected ? "no" : s.by_force ? "drive forces" : s.ran ? "yes" : "refused";
 }
 
 std::string NoteOf(const Mutation& m) {
-  const Sighting& s = m.own;
+  const Detection& s = m.own;
   std::string note;
   if (m.value == 0.0) {
     note = fmt::format("relative to {:g}{}{}; ", m.relative_to, m.unit.empty() ? "" : " ", m.unit);
@@ -86,7 +86,7 @@ std::string Row(const Mutation& m, bool inverse, bool markdown) {
   return NumberTable(inverse).Row(cells) + "\n";
 }
 
-std::string SeenText(const FaultSighting& s) { return s.detected ? "yes" : "no"; }
+std::string SeenText(const FaultDetection& s) { return s.detected ? "yes" : "no"; }
 
 std::string Row(const FaultResult& f, bool inverse, bool markdown) {
   const std::string seen = !f.applicable ? "not applicable" : SeenText(f.own);
@@ -108,7 +108,7 @@ std::string Row(const FaultResult& f, bool inverse, bool markdown) {
   return FaultTable(inverse).Row(cells) + "\n";
 }
 
-// An instance's number of which forces know nothing: part of a long list, told together.
+// An instance's number of which forces know nothing: part of a long list, reported together.
 bool IsIdle(const Mutation& m) {
   return m.kind == NumberKind::kInstance && !m.own.detected && !std::isnan(m.proved_to);
 }
@@ -236,7 +236,7 @@ struct FromFields {
 };
 
 template <typename F, typename S>
-void SightingFields(F& field, S& s) {
+void DetectionFields(F& field, S& s) {
   field("ran", s.ran);
   field("detected", s.detected);
   field("by_force", s.by_force);
@@ -288,13 +288,13 @@ void ReportFields(F& field, R& r) {
   field("wall_s", r.wall_s);
 }
 
-Json JsonOf(const Sighting& s) {
+Json JsonOf(const Detection& s) {
   ToFields field;
-  SightingFields(field, s);
+  DetectionFields(field, s);
   return field.json;
 }
 
-Json JsonOf(const FaultSighting& s) {
+Json JsonOf(const FaultDetection& s) {
   ToFields field;
   FaultFields(field, s);
   return field.json;
@@ -322,15 +322,15 @@ Json JsonOf(const FaultResult& r) {
   return field.json;
 }
 
-Sighting SightingOf(const JsonValue& json) {
-  Sighting s;
+Detection DetectionOf(const JsonValue& json) {
+  Detection s;
   const FromFields field{json};
-  SightingFields(field, s);
+  DetectionFields(field, s);
   return s;
 }
 
-FaultSighting FaultSightingOf(const JsonValue& json) {
-  FaultSighting s;
+FaultDetection FaultDetectionOf(const JsonValue& json) {
+  FaultDetection s;
   const FromFields field{json};
   FaultFields(field, s);
   return s;
@@ -344,8 +344,8 @@ Mutation MutationOf(const JsonValue& json) {
   const auto kind = std::find(std::begin(kKinds), std::end(kKinds), word);
   if (kind == std::end(kKinds)) json.at("kind").Refuse("is no kind of a number");
   m.kind = static_cast<NumberKind>(kind - std::begin(kKinds));
-  m.own = SightingOf(json.at("own"));
-  if (!json.at("inverse").is_null()) m.inverse = SightingOf(json.at("inverse"));
+  m.own = DetectionOf(json.at("own"));
+  if (!json.at("inverse").is_null()) m.inverse = DetectionOf(json.at("inverse"));
   return m;
 }
 
@@ -353,8 +353,8 @@ FaultResult FaultResultOf(const JsonValue& json) {
   FaultResult r;
   const FromFields field{json};
   ResultFields(field, r);
-  r.own = FaultSightingOf(json.at("own"));
-  if (!json.at("inverse").is_null()) r.inverse = FaultSightingOf(json.at("inverse"));
+  r.own = FaultDetectionOf(json.at("own"));
+  if (!json.at("inverse").is_null()) r.inverse = FaultDetectionOf(json.at("inverse"));
   return r;
 }
 

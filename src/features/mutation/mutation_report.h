@@ -13,16 +13,16 @@ namespace mbv {
 /// What one way of running the scenario (its own mode, or inverse dynamics) shows of a number that
 /// is wrong, larger and smaller by the same relative error. Where both ways run, the one that shows
 /// less counts.
-struct Sighting {
+struct Detection {
   bool ran = false;            ///< false: neither way could be simulated; `reason` says why
-  bool detected = false;       ///< both ways: a check failed, or the bent model could not run
+  bool detected = false;       ///< both ways: a check failed, or the perturbed model could not run
   bool by_force = false;       ///< a drive-force check failed
   double force_change = kNan;  ///< drive-force error caused, relative (the NRMSE of the check)
   /// The smallest relative error from which on both ways were detected; one `resolution` smaller
-  /// was not. NaN: not searched for, or nothing up to kLargestBend was detected.
+  /// was not. NaN: not searched for, or nothing up to kLargestPerturbation was detected.
   double smallest = kNan;
   std::string best_check;  ///< the check that fails at `smallest` (or sees it first); "model" when
-                           ///< the bent model is refused
+                           ///< the perturbed model is refused
   std::string only;        ///< "larger" or "smaller": the other way does not run
   std::string reason;      ///< why it did not run, or is not detected
 };
@@ -30,7 +30,7 @@ struct Sighting {
 /// Where a number stands in the model file.
 enum class NumberKind { kParameter, kInstance, kLiteral };
 
-/// One number of the model, bent on the simulated side only.
+/// One number of the model, perturbed on the simulated side only.
 struct Mutation {
   std::string name, unit;  ///< "m_p", "limb2.azimuth", "parts.leg.bodies.rod.mass"
   NumberKind kind = NumberKind::kParameter;
@@ -38,16 +38,16 @@ struct Mutation {
   /// What relative errors are relative to: the value, or if that is zero the largest one of its
   /// unit (1 if there is none).
   double relative_to = kNan;
-  Sighting own;                     ///< in the scenario's mode and by its limits
-  std::optional<Sighting> inverse;  ///< by inverse dynamics, where that is not its mode
-  double proved_to = kNan;          ///< unseen: the largest relative error tried
-  double sensitivity = kNan;        ///< unseen: largest drive-force change there, relative to the
-                                    ///< RMS force
-  std::string reason;               ///< why it is not detected
+  Detection own;                     ///< in the scenario's mode and by its limits
+  std::optional<Detection> inverse;  ///< by inverse dynamics, where that is not its mode
+  double proved_to = kNan;           ///< unseen: the largest relative error tried
+  double sensitivity = kNan;         ///< unseen: largest drive-force change there, relative to the
+                                     ///< RMS force
+  std::string reason;                ///< why it is not detected
 };
 
 /// What one way of running shows of a structural fault.
-struct FaultSighting {
+struct FaultDetection {
   bool ran = false, detected = false;
   std::string check;                  ///< the failed check that is farthest beyond its limit
   double value = kNan, limit = kNan;  ///< of it
@@ -59,8 +59,8 @@ struct FaultResult {
   std::string kind, where;
   bool applicable = false;  ///< false: `reason` says why the mechanism cannot have it
   size_t alike = 0;         ///< equal places by symmetry of parts that were not run
-  FaultSighting own;
-  std::optional<FaultSighting> inverse;
+  FaultDetection own;
+  std::optional<FaultDetection> inverse;
   std::string reason;  ///< not applicable
 };
 

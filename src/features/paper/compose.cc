@@ -28,7 +28,7 @@ class PanelComposer {
     FindChannels();
   }
 
-  // What nobody recorded.
+  // What was not recorded.
   [[nodiscard]] const std::vector<std::string>& missing() const { return missing_; }
 
   [[nodiscard]] bool empty() const { return channels_.empty(); }

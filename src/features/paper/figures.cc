@@ -143,7 +143,7 @@ class FigureSource {
   FigureOutcome* outcome_;
 };
 
-// What is drawn only where somebody asks for it.
+// What is drawn only on request.
 class MoreFigureSource {
  public:
   MoreFigureSource(const std::string& file, const FigureOptions& options, FigureOutcome* outcome,
@@ -171,8 +171,8 @@ class MoreFigureSource {
     if (head.is_stiffness() || head.is_study) {
       return LeaveOut("workspace: is drawn with a motion of the mechanism");
     }
-    Diagnostics told_by_the_run;
-    const auto prepared = Prepare(file_, options_.scenario, &told_by_the_run);
+    Diagnostics run_findings;
+    const auto prepared = Prepare(file_, options_.scenario, &run_findings);
     if (!prepared) return;
     const WorkspaceOutcome reached = ComputeWorkspace(prepared->base, false);
     if (reached.diagnostics.has_errors()) {

@@ -20,7 +20,7 @@ struct FigureOptions {
   Language language = Language::kEnglish;
   std::vector<std::string> formats = {"pdf"};  ///< words of FigureFormats()
   std::vector<std::string> only;               ///< names of figures; empty: all
-  std::vector<std::string> also;               ///< words of MoreFigures(): drawn besides
+  std::vector<std::string> also;               ///< words of MoreFigures(): drawn in addition
   ProgressFunction progress;
 };
 
@@ -52,7 +52,7 @@ struct FigureOutcome {
 
 /// Runs a motion (RunScenario()) and draws the figures that its scenario composes, and the usual
 /// ones; of a stiffness, its mechanism's usual maps; of a study, its plots. Findings are bad input.
-/// `ran`: what running it gave somebody with these options; null: it is run.
+/// `ran`: the result of a run with these options; null: it is run.
 [[nodiscard]] FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
                                         const RunOutcome* ran = nullptr);
 

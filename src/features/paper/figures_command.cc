@@ -36,7 +36,7 @@ constexpr const char* kAllPapers = "all";
 
 Json NumberOrNull(double value) { return std::isfinite(value) ? Json(value) : Json(); }
 
-Json StatementJson(const SaidResult& said) {
+Json StatementJson(const StatedResult& said) {
   return {{"says", said.says},
           {"where", said.where},
           {"printed", NumberOrNull(said.printed)},
@@ -50,7 +50,7 @@ Json PaperJson(const PaperOutcome& outcome, const std::string& folder) {
   auto figures = Json::array(), left_out = Json::array();
   for (const PaperResult& result : outcome.results) {
     auto statements = Json::array();
-    for (const SaidResult& said : result.said) statements.push_back(StatementJson(said));
+    for (const StatedResult& said : result.said) statements.push_back(StatementJson(said));
     figures.push_back({{"name", result.name},
                        {"title", result.title},
                        {"computed_from", result.from},
@@ -77,7 +77,7 @@ void SayPaper(const PaperOutcome& outcome, std::FILE* to) {
   Say(to, "{}\n", outcome.source);
   for (const PaperResult& result : outcome.results) {
     Say(to, "{:<8} {} → {}\n", result.name, result.title, Joined(result.files));
-    for (const SaidResult& said : result.said) Say(to, "         {}\n", SayResult(said));
+    for (const StatedResult& said : result.said) Say(to, "         {}\n", ResultText(said));
     if (!result.differs.empty()) Say(to, "         differs: {}\n", result.differs);
     for (const std::string& row : result.audit) Say(to, "         equation audit: {}\n", row);
   }

@@ -266,7 +266,7 @@ class InputPlacer {
     root_ = scenarios_.front().parent_path();
     for (const fs::path& file : files_) Widen(file, file.parent_path());
     for (const fs::path& scenario : scenarios_) Widen(scenario, scenario.parent_path());
-    for (const fs::path& models : own_models_) Widen(models, models.parent_path());
+    for (const fs::path& models : source_models_) Widen(models, models.parent_path());
     for (const MeshPackage& package : own_packages_) Widen(package.folder, package.folder);
     return !diagnostics_->has_errors();
   }
@@ -304,10 +304,10 @@ class InputPlacer {
         const fs::path models = Whole(folder);
         if (!Holds(models)) continue;
         const bool own = IsBelow(scenario, models.parent_path());
-        (own ? own_models_ : libraries_).insert(models);
+        (own ? source_models_ : libraries_).insert(models);
       }
     }
-    for (const fs::path& models : own_models_) libraries_.erase(models);
+    for (const fs::path& models : source_models_) libraries_.erase(models);
   }
 
   [[nodiscard]] bool Holds(const fs::path& folder) const {
@@ -352,7 +352,7 @@ class InputPlacer {
   }
 
   std::vector<fs::path> scenarios_, files_;
-  std::set<fs::path> own_models_, libraries_;
+  std::set<fs::path> source_models_, libraries_;
   std::vector<MeshPackage> own_packages_, packages_;
   fs::path root_;
   Diagnostics* diagnostics_;
@@ -399,7 +399,7 @@ class InputReader {
                          .file = input.file,
                          .line = line,
                          .column = 1,
-                         .message = "names your home folder, which is nobody's business",
+                         .message = "contains the path of your home directory",
                          .hint = "write paths relative to the file, and nothing in comments"});
       return;
     }

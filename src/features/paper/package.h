@@ -69,11 +69,11 @@ struct PackageInputs {
 /// The licences (`license:`) that model files state, each once: "CC-BY-4.0, MIT"; "" without.
 [[nodiscard]] std::string LicensesOf(const PackageInputs& inputs);
 
-// Whether a text tells whose machine it was written on.
+// Whether a text identifies the user or machine that wrote it.
 
 /// The line (1-based) of the first mention of `path` as a path in `text`; 0 without one.
 [[nodiscard]] int LineNaming(const std::string& text, const std::string& path);
-/// $HOME where it is a folder that tells who its owner is; "" else.
+/// $HOME where its path identifies its owner; "" else.
 [[nodiscard]] std::string HomeFolder();
 
 }  // namespace mbv

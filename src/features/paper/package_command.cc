@@ -47,7 +47,7 @@ int CheckPackageOut(const PackageArguments& arguments) {
   return 0;
 }
 
-void TellPackage(const PackageArguments& arguments, const PackageOutcome& outcome) {
+void PrintPackage(const PackageArguments& arguments, const PackageOutcome& outcome) {
   std::FILE* to = arguments.json.text();
   for (const PackedScenario& scenario : outcome.description.scenarios) {
     Say(to, "{}: {} (exit code {})\n", scenario.file, scenario.verdict, scenario.exit_code);
@@ -97,7 +97,7 @@ int Package(const PackageArguments& arguments) {
     // Inputs were refused before anything ran, and --force is for any other file.
     const std::string trouble = WriteFile(arguments.out, outcome.zip);
     if (!trouble.empty()) return NotWritten(trouble, "");
-    TellPackage(arguments, outcome);
+    PrintPackage(arguments, outcome);
     for (const PackedScenario& scenario : outcome.description.scenarios) {
       exit_code = WorseExit(exit_code, scenario.exit_code);
     }

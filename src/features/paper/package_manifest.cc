@@ -199,7 +199,7 @@ using Json = nlohmann::ordered_json;
 
 constexpr const char* kManifestSchema = "mbverify.package/1";
 
-// Reads what a stranger may have written; each value that is missing or of another type is told.
+// Reads untrusted input; each value that is missing or of another type is reported.
 class ManifestReader {
  public:
   ManifestReader(const std::string& file, Diagnostics* diagnostics)

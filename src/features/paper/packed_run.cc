@@ -67,7 +67,7 @@ class PackedRunner {
     study.out_dir = kResultsFolder;
     study.points.jobs = AllCores();
     const StudyOutcome outcome = RunStudy(run_.scenario.file, study);
-    Tell(outcome.diagnostics, outcome.exit_code, outcome.folder);
+    Report(outcome.diagnostics, outcome.exit_code, outcome.folder);
     if (!outcome.report) return;
     run_.scenario.description = outcome.report->study.description;
     run_.scenario.verdict = outcome.exit_code == 0   ? "limits kept"
@@ -83,7 +83,7 @@ class PackedRunner {
     run.page = options_.page;
     run.programs = options_.programs;
     const RunOutcome outcome = RunScenario(run_.scenario.file, run);
-    Tell(outcome.diagnostics, outcome.exit_code, outcome.folder);
+    Report(outcome.diagnostics, outcome.exit_code, outcome.folder);
     if (!outcome.report && outcome.stiffness == nullptr) return;
     const ResultView view = outcome.report ? ViewOf(*outcome.report) : ViewOf(*outcome.stiffness);
     run_.scenario.verdict = ToText(view.verdict);
@@ -103,7 +103,7 @@ class PackedRunner {
     run_.scenario.figures = folder.target().generic_string();
   }
 
-  void Tell(const Diagnostics& diagnostics, int exit_code, const std::string& folder) {
+  void Report(const Diagnostics& diagnostics, int exit_code, const std::string& folder) {
     for (const Finding& finding : diagnostics.findings()) run_.findings.push_back(finding);
     run_.scenario.exit_code = exit_code;
     run_.scenario.results = fs::path(folder).generic_string();

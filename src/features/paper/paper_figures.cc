@@ -169,8 +169,9 @@ class PaperMaker {
     Deliver(std::move(figure), result);
   }
 
-  SaidResult MeasureWorkspace(const PaperStatement& statement, const WorkspaceOutcome& workspace) {
-    SaidResult said;
+  StatedResult MeasureWorkspace(const PaperStatement& statement,
+                                const WorkspaceOutcome& workspace) {
+    StatedResult said;
     said.says = statement.says;
     said.where = statement.where;
     said.printed = statement.printed;
@@ -247,8 +248,8 @@ class PaperMaker {
   // The entry's own words, then what the paper says and by how much it is off.
   static std::string CaptionOf(const PaperResult& result) {
     std::string caption = result.note;
-    for (const SaidResult& said : result.said) {
-      caption += (caption.empty() ? "" : " ") + SayResult(said) + ".";
+    for (const StatedResult& said : result.said) {
+      caption += (caption.empty() ? "" : " ") + ResultText(said) + ".";
     }
     return caption;
   }
@@ -272,7 +273,7 @@ class PaperMaker {
   PaperRuns runs_;
 };
 
-// Entries by name; unknown ones are findings, and those that are not computed are told.
+// Entries by name; unknown ones are findings, and those that are not computed are reported.
 std::vector<const PaperEntry*> WantedOf(const PaperFile& paper,
                                         const std::vector<std::string>& only,
                                         PaperOutcome* outcome) {
@@ -539,7 +540,7 @@ std::string EntryText(const PaperOutcome& paper, const PaperResult& result) {
   }
   text += fmt::format("Computed from {}.{}{}\n", result.from, result.note.empty() ? "" : " ",
                       result.note);
-  for (const SaidResult& said : result.said) text += "\n* " + SayResult(said);
+  for (const StatedResult& said : result.said) text += "\n* " + ResultText(said);
   if (!result.said.empty()) text += "\n";
   if (!result.differs.empty()) {
     text += "\nThe printed one differs: " + result.differs + AuditText(result) + "\n";

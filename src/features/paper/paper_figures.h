@@ -24,7 +24,7 @@ struct PaperResult {
   std::string caption;  ///< the note with what the paper says and by how much that is off
   std::string differs;  ///< why the printed one does
   std::vector<std::string> audit;  ///< rows of the equation audit
-  std::vector<SaidResult> said;
+  std::vector<StatedResult> said;
   std::string table;               ///< Markdown; "" of a figure
   std::vector<std::string> files;  ///< names
 };

@@ -63,7 +63,7 @@ class SignalMeter {
     return true;
   }
 
-  void Measure(SaidResult* result) {
+  void Measure(StatedResult* result) {
     result->unit = unit_.name;
     switch (statement_.measure) {
       case PaperMeasure::kRange:
@@ -107,7 +107,7 @@ class SignalMeter {
     }
   }
 
-  void Range(SaidResult* result) {
+  void Range(StatedResult* result) {
     for (const auto& [column, other] : pairs_) {
       const auto values = of_->values.col(column).array() * unit_.factor;
       for (const double v : values) {
@@ -214,7 +214,7 @@ double MedianOf(const MapPlot& map) {
   return values.size() % 2 == 1 ? values[half] : (values[half - 1] + values[half]) / 2;
 }
 
-SaidResult ResultOf(const PaperStatement& statement) {
+StatedResult ResultOf(const PaperStatement& statement) {
   return {.says = statement.says,
           .where = statement.where,
           .printed = statement.printed,
@@ -229,17 +229,17 @@ std::string WithUnit(double value, const std::string& unit, const char* sign = "
 
 }  // namespace
 
-SaidResult MeasureSignals(const PaperStatement& statement, const Report& report,
-                          const std::string& file, Diagnostics* diagnostics) {
-  SaidResult result = ResultOf(statement);
+StatedResult MeasureSignals(const PaperStatement& statement, const Report& report,
+                            const std::string& file, Diagnostics* diagnostics) {
+  StatedResult result = ResultOf(statement);
   SignalMeter meter(statement, report, file, diagnostics);
   if (meter.Find()) meter.Measure(&result);
   return result;
 }
 
-SaidResult MeasureMaps(const PaperStatement& statement, const std::vector<MapPlot>& maps,
-                       const std::string& file, Diagnostics* diagnostics) {
-  SaidResult result = ResultOf(statement);
+StatedResult MeasureMaps(const PaperStatement& statement, const std::vector<MapPlot>& maps,
+                         const std::string& file, Diagnostics* diagnostics) {
+  StatedResult result = ResultOf(statement);
   const bool alone = statement.measure == PaperMeasure::kMirror;
   const size_t other = alone ? statement.map : statement.other;
   if (std::max(statement.map, other) >= maps.size()) {
@@ -258,7 +258,7 @@ SaidResult MeasureMaps(const PaperStatement& statement, const std::vector<MapPlo
   return result;
 }
 
-std::string SayResult(const SaidResult& result) {
+std::string ResultText(const StatedResult& result) {
   std::string text = fmt::format("“{}” ({}): ", result.says, result.where);
   if (std::isfinite(result.printed)) {
     text += "printed " + WithUnit(result.printed, result.unit) + ", ";

@@ -11,7 +11,7 @@
 
 namespace mbv {
 
-struct SaidResult {
+struct StatedResult {
   std::string says, where;
   double low = kNan;       ///< of a range
   double measured = kNan;  ///< of a range the largest
@@ -23,14 +23,14 @@ struct SaidResult {
 
 /// Statements about signals. Witnesses, signals and units that the run does not have are findings
 /// in `file`.
-[[nodiscard]] SaidResult MeasureSignals(const PaperStatement& statement, const Report& report,
-                                        const std::string& file, Diagnostics* diagnostics);
+[[nodiscard]] StatedResult MeasureSignals(const PaperStatement& statement, const Report& report,
+                                          const std::string& file, Diagnostics* diagnostics);
 /// Statements about maps, which are square where they are mirrored.
-[[nodiscard]] SaidResult MeasureMaps(const PaperStatement& statement,
-                                     const std::vector<MapPlot>& maps, const std::string& file,
-                                     Diagnostics* diagnostics);
+[[nodiscard]] StatedResult MeasureMaps(const PaperStatement& statement,
+                                       const std::vector<MapPlot>& maps, const std::string& file,
+                                       Diagnostics* diagnostics);
 
 /// "“agree to 0.1 kN” (section 4): printed 0.1 kN, computed 46.6 kN, deviation +46.5 kN".
-[[nodiscard]] std::string SayResult(const SaidResult& result);
+[[nodiscard]] std::string ResultText(const StatedResult& result);
 
 }  // namespace mbv

@@ -275,9 +275,9 @@ std::vector<RerunSignal> CompareTables(const PackedScenario& scenario, const std
   if (!both) return {};
   if (scenario.kind == "study") return ComparePoints(scenario, *both, why);
   if (scenario.kind == "stiffness") {
-    std::string besides;
-    const auto matrices = CutBoth(scenario.results + "/" + kStiffness, packed, rerun, &besides);
-    const auto loads = CutBoth(scenario.results + "/" + kLoads, packed, rerun, &besides);
+    std::string also;
+    const auto matrices = CutBoth(scenario.results + "/" + kStiffness, packed, rerun, &also);
+    const auto loads = CutBoth(scenario.results + "/" + kLoads, packed, rerun, &also);
     if (!matrices) return {};
     return CompareStiffnesses(scenario, name == kLoads, *matrices, loads ? &*loads : nullptr);
   }

@@ -144,12 +144,12 @@ class TableMaker {
 
 // The mechanism of a scenario of any kind, as it runs.
 std::optional<Mechanism> MechanismOf(const std::string& file, const ScenarioOptions& options) {
-  Diagnostics told_by_the_run;
+  Diagnostics run_findings;
   if (ReadScenarioHead(file).is_stiffness()) {
-    auto prepared = PrepareStiffnessFile(file, options, &told_by_the_run);
+    auto prepared = PrepareStiffnessFile(file, options, &run_findings);
     return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
   }
-  auto prepared = Prepare(file, options, &told_by_the_run);
+  auto prepared = Prepare(file, options, &run_findings);
   return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
 }
 

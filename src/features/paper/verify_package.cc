@@ -213,7 +213,8 @@ class CheckedArchive {
     return fmt::format("names '{}' twice in its manifest", Printable(path));
   }
 
-  static constexpr const char* kChanged = "somebody changed it; ask for the archive as it was made";
+  static constexpr const char* kChanged =
+      "checksum mismatch: modified after packaging; ask for the archive as it was made";
   const std::string& file_;
   const fs::path stage_;
   Diagnostics* diagnostics_;

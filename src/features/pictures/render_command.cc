@@ -29,7 +29,7 @@ namespace mbv {
 
 struct RenderRequest {
   ScenarioOptions scenario;
-  std::string video_file;  ///< given: one video instead of single pictures; its ending tells the
+  std::string video_file;  ///< given: one video instead of single pictures; its ending gives the
                            ///< format (features/pictures/video.h)
   double frames_per_s = 25.0;
   bool caption = true;

@@ -25,7 +25,7 @@ enum class VideoFormat { kAnimatedPng, kFfmpeg, kUnknown };
 /// Encodes frames as they come; the video is built in a file of its own in the temporary folder.
 class VideoEncoder {
  public:
-  /// `file` tells the format by its ending.
+  /// the ending of `file` gives the format.
   VideoEncoder(std::string file, double frames_per_s);
   ~VideoEncoder();
   VideoEncoder(const VideoEncoder&) = delete;

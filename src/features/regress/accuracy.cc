@@ -43,7 +43,7 @@ const std::vector<AccuracyColumn>& AccuracyColumns() {
        {"simulated_vs_analytic.pose_m:value", "simulated_vs_reference.pose_m:value",
         "simulated_vs_analytic.position_m:value"},
        " m"},
-      {"bent forces lead",
+      {"perturbed forces lead",
        {"simulated_vs_analytic.pose_m:limit", "simulated_vs_reference.pose_m:limit",
         "simulated_vs_analytic.position_m:limit"},
        " m"},

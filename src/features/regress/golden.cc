@@ -251,7 +251,7 @@ std::optional<DriftFinding> FindDrift(const std::vector<PastValue>& past, double
   if (level(now) < threshold - kLevelRounding) return std::nullopt;
   DriftFinding finding{std::pow(10.0, median), std::pow(10.0, threshold), levels.size(), 0};
   for (auto it = past.rbegin(); it != past.rend(); ++it) {
-    if (!it->good) continue;  // a failed night neither ends nor begins a stretch
+    if (!it->good) continue;  // a failed run neither ends nor begins a stretch
     if (!it->drifted) break;
     finding.since_run = it->run;
   }

@@ -1,7 +1,7 @@
 // Golden traces: each witness' drive forces as kept in the history, to see which witness moved.
 //
 // Values keep 36 bits of mantissa (1.5e-11 relative): far finer than a movement that is reported,
-// coarse enough that roundoff rarely changes the bytes, so equal nights share one copy.
+// coarse enough that roundoff rarely changes the bytes, so equal runs share one copy.
 #pragma once
 
 #include <map>

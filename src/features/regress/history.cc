@@ -143,7 +143,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Runs of a scenario that are looked at: enough for a window of good ones with failed nights
+// Runs of a scenario that are looked at: enough for a window of good ones with failed runs
 // between.
 constexpr int kPastRuns = 400;
 // A database that another program holds is free within 5 s.
@@ -279,7 +279,7 @@ class Appender {
     return rule;
   }
 
-  // Against the last good run with traces: a step is told once, in the run that took it.
+  // Against the last good run with traces: a step is reported once, in the run that took it.
   void FindMovement(long scenario, long since, const GoldenTraces& now, CaseResult* result) {
     if (result->failed()) return;
     Statement last(db_,
@@ -417,7 +417,7 @@ std::string CheckHistory(const std::string& path) {
     if (!fs::is_directory(folder, error) || access(folder.c_str(), W_OK) != 0) {
       return fmt::format("history {}: cannot be made in {}", path, folder.string());
     }
-    // Another file than the history itself, which another night may be making.
+    // Another file than the history itself, which another run may be making.
     const fs::path trial = folder / fmt::format(".history.mbverify-{}", RandomLetters());
     const int file = open(trial.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (file < 0) return fmt::format("history {}: {}", path, std::strerror(errno));

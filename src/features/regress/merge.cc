@@ -1,4 +1,4 @@
-// Whether folders that are to be joined are the whole of one night.
+// Whether folders that are to be joined are the whole of one regression run.
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -22,7 +22,7 @@
 namespace mbv {
 
 /// One folder's run.
-struct NightPart {
+struct RunPart {
   std::string folder;
   RunInfo run;
   size_t cases = 0;
@@ -31,23 +31,24 @@ struct NightPart {
 /// What speaks against it, one line each.
 struct PartTroubles {
   std::vector<std::string> missing;  ///< "shard 3/8 missing", folders without a result
-  std::vector<std::string> foreign;  ///< parts of different nights, labels or programs
+  std::vector<std::string> foreign;  ///< parts of different regression runs, labels or programs
 
   [[nodiscard]] bool empty() const { return missing.empty() && foreign.empty(); }
 };
 
-/// Shards of one night start within this time of each other: less than nights are apart.
-inline constexpr double kNightSpan_h = 12.0;
+/// Shards of one regression run start within this time of each other: less than nightly runs are
+/// apart.
+inline constexpr double kShardSpan_h = 12.0;
 
 // Result folders copied without what is hidden or a link.
 
 namespace {
 
 // Both parts and what each of them says, where that differs.
-void CompareParts(const std::vector<NightPart>& parts, const char* what,
+void CompareParts(const std::vector<RunPart>& parts, const char* what,
                   const std::function<std::string(const RunInfo&)>& value,
                   std::vector<std::string>* troubles) {
-  for (const NightPart& part : parts) {
+  for (const RunPart& part : parts) {
     const std::string here = value(part.run), there = value(parts.front().run);
     if (here == there) continue;
     troubles->push_back(fmt::format("{} has {} '{}', {} has '{}'", part.folder, what, here,
@@ -56,22 +57,23 @@ void CompareParts(const std::vector<NightPart>& parts, const char* what,
   }
 }
 
-void CheckSameNight(const std::vector<NightPart>& parts, std::vector<std::string>* troubles) {
-  const auto earlier = [](const NightPart& a, const NightPart& b) {
+void CheckSameRegression(const std::vector<RunPart>& parts, std::vector<std::string>* troubles) {
+  const auto earlier = [](const RunPart& a, const RunPart& b) {
     return a.run.started_utc < b.run.started_utc;
   };
   const auto [first, last] = std::minmax_element(parts.begin(), parts.end(), earlier);
   const double hours = UtcHours(last->run.started_utc) - UtcHours(first->run.started_utc);
-  if (hours <= kNightSpan_h) return;
-  troubles->push_back(fmt::format("{} started {}, {} started {}: two nights", first->folder,
-                                  first->run.started_utc, last->folder, last->run.started_utc));
+  if (hours <= kShardSpan_h) return;
+  troubles->push_back(fmt::format("{} started {}, {} started {}: two regression runs",
+                                  first->folder, first->run.started_utc, last->folder,
+                                  last->run.started_utc));
 }
 
 // Which of the n shards are there.
-void CheckShards(const std::vector<NightPart>& parts, PartTroubles* troubles) {
+void CheckShards(const std::vector<RunPart>& parts, PartTroubles* troubles) {
   std::set<int> seen;
   int count = 0;
-  for (const NightPart& part : parts) {
+  for (const RunPart& part : parts) {
     const auto shard = ParseShard(part.run.shard);
     if (!shard || (count != 0 && shard->count != count)) {
       troubles->foreign.push_back(part.run.shard.empty()
@@ -93,9 +95,9 @@ void CheckShards(const std::vector<NightPart>& parts, PartTroubles* troubles) {
 }
 
 // All shards list the same scenarios and take every n-th of them.
-void CheckTotal(const std::vector<NightPart>& parts, PartTroubles* troubles) {
+void CheckTotal(const std::vector<RunPart>& parts, PartTroubles* troubles) {
   size_t cases = 0;
-  for (const NightPart& part : parts) cases += part.cases;
+  for (const RunPart& part : parts) cases += part.cases;
   const size_t found = parts.front().run.found;
   if (found == 0 || cases == found || !troubles->empty()) return;
   troubles->missing.push_back(
@@ -105,7 +107,7 @@ void CheckTotal(const std::vector<NightPart>& parts, PartTroubles* troubles) {
 }  // namespace
 
 // A run that is no shard is whole by itself. `unfinished`: folders that hold no result.
-PartTroubles FindPartTroubles(const std::vector<NightPart>& parts,
+PartTroubles FindPartTroubles(const std::vector<RunPart>& parts,
                               const std::vector<std::string>& unfinished) {
   PartTroubles troubles;
   for (const std::string& folder : unfinished) {
@@ -124,7 +126,7 @@ PartTroubles FindPartTroubles(const std::vector<NightPart>& parts,
         parts, "program", [](const RunInfo& run) { return run.program; }, &troubles.foreign);
     const auto total = [](const RunInfo& run) { return fmt::format("{}", run.found); };
     CompareParts(parts, "a number of scenarios of", total, &troubles.foreign);
-    CheckSameNight(parts, &troubles.foreign);
+    CheckSameRegression(parts, &troubles.foreign);
   }
   CheckTotal(parts, &troubles);
   return troubles;
@@ -206,7 +208,7 @@ class Merger {
     for (const std::string& uid : uids_) fingerprint.Add(uid);
     report().run.uid = fmt::format("merge-{}", fingerprint.Text());
     report().fail_on_missing = options_.fail_on_missing;
-    FinishNight(options_, folder_, &outcome_);
+    FinishRegression(options_, folder_, &outcome_);
     return std::move(outcome_);
   }
 
@@ -216,7 +218,7 @@ class Merger {
   std::string Claim() {
     std::vector<std::string> keys;
     for (const CaseResult& result : report().cases) keys.push_back(result.key);
-    std::vector<std::string> names = NightFiles(options_, keys);
+    std::vector<std::string> names = RegressionFiles(options_, keys);
     for (const auto& [name, content] : scripts_) names.push_back(name);
     std::string trouble = FindTaken(options_, keys);
     if (trouble.empty()) trouble = folder_.Claim(names);
@@ -227,7 +229,7 @@ class Merger {
     return trouble;
   }
 
-  // Whether the folders are all of one night; else with --partial a note on every summary.
+  // Whether the folders are all of one regression run; else with --partial a note on every summary.
   void CheckParts() {
     const PartTroubles troubles = FindPartTroubles(parts_, unfinished_);
     if (troubles.empty()) return;
@@ -261,12 +263,12 @@ class Merger {
     run.jobs += part.jobs;
   }
 
-  // Adds one run's cases; "" or what is wrong with it. What it says is a stranger's.
+  // Adds one run's cases; "" or what is wrong with it. Its text is untrusted.
   std::string Read(const std::string& from) {
     std::error_code error;
     if (fs::exists(fs::path(from) / kUnfinished, error)) {
       return fmt::format(
-          "{}: its night has not finished, so that results and regress.json may be of two nights: "
+          "{}: its run has not finished, so that results and regress.json may be of two runs: "
           "run it again, with --resume if it was interrupted",
           from);
     }
@@ -341,7 +343,7 @@ class Merger {
   std::map<std::string, std::string> from_;     // folder of each key
   std::map<std::string, std::string> scripts_;  // by name
   std::set<std::string> uids_;
-  std::vector<NightPart> parts_;
+  std::vector<RunPart> parts_;
   std::vector<std::string> unfinished_;  // folders without a regress.json
 };
 

@@ -35,7 +35,7 @@ std::string ProgramText(const RegressOptions& options) {
                      fingerprint.Text().substr(0, 8));
 }
 
-// Of `mbverify study`: the night itself takes the cores.
+// Of `mbverify study`: the regression run itself takes the cores.
 const std::vector<std::string> kStudyWords = {"--jobs", "1"};
 
 class Run {
@@ -65,7 +65,7 @@ class Run {
     }
     for (const std::string& unread : unread_) AddTrouble(unread, &outcome_);
     for (const std::string& trouble : unpublished_) AddTrouble(trouble, &outcome_);
-    FinishNight(options_, folder_, &outcome_);
+    FinishRegression(options_, folder_, &outcome_);
     // A finished run is not resumed: the next --resume starts anew.
     if (outcome_.trouble.empty()) folder_.ForgetStates();
     return std::move(outcome_);
@@ -108,7 +108,7 @@ class Run {
     std::vector<std::string> keys;
     for (const CaseFile& file : cases_) keys.push_back(file.key);
     std::string trouble = FindTaken(options_, keys);
-    return trouble.empty() ? folder_.Claim(NightFiles(options_, keys)) : trouble;
+    return trouble.empty() ? folder_.Claim(RegressionFiles(options_, keys)) : trouble;
   }
 
   // Scenario, program and options decide a result; and what else was read, see SameInputs().
@@ -174,7 +174,7 @@ class Run {
   }
 
   bool RunWorkers() {
-    // Workers take the cores: threads of OSMesa besides would cost a tenth of a picture's time.
+    // Workers take the cores: additional threads of OSMesa would cost a tenth of a picture's time.
     setenv("LP_NUM_THREADS", "0", /*overwrite=*/0);
     std::vector<WorkerJob> jobs;
     for (size_t i = 0; i < cases_.size(); ++i) {
@@ -198,7 +198,7 @@ class Run {
     return pool.Run(jobs);
   }
 
-  // Of `mbverify run`, besides what is run and where to.
+  // Of `mbverify run`, except what is run and where to.
   std::vector<std::string> RunWords(const CaseFile& file) const {
     std::vector<std::string> words = {"--kept-audits", folder_.Shared().string()};
     const auto agreed = options_.agreed_programs.find(file.file);
@@ -347,8 +347,8 @@ SummaryText ReadSummary(const std::string& text, CaseResult* result) {
   }
 }
 
-// The line that tells what went wrong: the last one with "error:", else the last one.
-std::string TellingLine(const std::string& output) {
+// The line that states what went wrong: the last one with "error:", else the last one.
+std::string ErrorLine(const std::string& output) {
   const std::string tail = LastLines(output, kSearchedLines);
   const size_t error = tail.rfind("error:");
   const size_t at = error == std::string::npos ? tail.size() : error;
@@ -395,11 +395,11 @@ bool EndedBadly(const WorkerEnd& end, double timeout_s, const std::string& outpu
               fmt::format("killed by signal {} ({})", end.signal, strsignal(end.signal)));
   }
   if (!end.trouble.empty()) {
-    return is(CaseStatus::kCrashed, end.trouble + ": " + TellingLine(output));
+    return is(CaseStatus::kCrashed, end.trouble + ": " + ErrorLine(output));
   }
   if (end.exit_code < 0 || end.exit_code > 3) {
     return is(CaseStatus::kInternalError,
-              fmt::format("exit code {}: {}", end.exit_code, TellingLine(output)));
+              fmt::format("exit code {}: {}", end.exit_code, ErrorLine(output)));
   }
   return false;
 }
@@ -421,7 +421,7 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
   std::string reason = words.reason;
   if (!EndedBadly(end, timeout_s, output, &result)) {
     const std::string offence = Offence(result, output + words.culprits);
-    if (reason.empty()) reason = TellingLine(output);
+    if (reason.empty()) reason = ErrorLine(output);
     if (!summary && end.exit_code == 3) {
       // Results that could not be written are never what was expected.
       result.status = CaseStatus::kCouldNotRun;

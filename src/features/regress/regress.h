@@ -68,9 +68,9 @@ struct RegressOutcome {
 [[nodiscard]] bool IsSharedScript(const std::string& name);
 
 /// Joins the folders of shards into one: result folders are copied, and all summaries are written
-/// as if one run had done it. They must be all shards of one night: exit code 3 if some is missing,
-/// 2 if they are of different nights, labels or programs. RegressOptions::partial joins whatever
-/// runs of different scenarios there are, and notes what is missing.
+/// as if one run had done it. They must be all shards of one regression run: exit code 3 if some is
+/// missing, 2 if they are of different regression runs, labels or programs. RegressOptions::partial
+/// joins whatever runs of different scenarios there are, and notes what is missing.
 [[nodiscard]] RegressOutcome MergeRuns(const std::vector<std::string>& folders,
                                        const RegressOptions& options);
 

@@ -112,7 +112,7 @@ struct RegressArguments {
 volatile std::sig_atomic_t interrupted = 0;
 void Interrupt(int) { interrupted = 1; }
 
-// Reports of a night share one script unless each is to be sent alone.
+// Reports of a regression run share one script unless each is to be sent alone.
 void ShareScript(const RegressArguments& arguments, RegressOptions* options) {
   if (arguments.no_reports) {
     options->worker_options.emplace_back("--no-report");
@@ -266,8 +266,9 @@ void AddMergeCommand(CLI::App* app, int* exit_code) {
   AddOutputOptions(merge, arguments.get());
   merge->add_flag("--partial", arguments->options.partial,
                   "join what there is: not all shards, or of different runs");
-  SetFooter(merge, {"merge shard1 shard2 --out night --history nightly.sqlite"},
-            "0 all as expected, 1 some not, 2 bad input (also: shards of different nights), 3 some "
+  SetFooter(merge, {"merge shard1 shard2 --out merged --history nightly.sqlite"},
+            "0 all as expected, 1 some not, 2 bad input (also: shards of different regression "
+            "runs), 3 some "
             "could not run, or a shard is missing");
   merge->callback([arguments, exit_code] { *exit_code = RunMerge(arguments.get()); });
 }

@@ -105,7 +105,7 @@ std::string RunFolder::Claim(const std::vector<std::string>& names) {
   if (std::getline(lines, line) && line == kFilesSchema) {
     while (std::getline(lines, line)) claimed_.insert(line);
   }
-  // Nights of versions that kept no list.
+  // Runs of versions that kept no list.
   const auto report = ReadWholeFile(out_ / "regress.json");
   const bool night = report && ReportFromJson(*report).has_value();
   std::string trouble;
@@ -138,18 +138,19 @@ std::string RunFolder::Write(const std::string& name, const std::string& content
 std::string RunFolder::Begin(const std::string& started_utc) const {
   const std::string trouble =
       Write(kUnfinished,
-            fmt::format("A night that began at {} has not finished. Until it has, result folders "
-                        "may be of it, while index.html, summary.md, junit.xml and regress.json "
-                        "are of the night before.\n`mbverify regress --resume` with the same --out "
-                        "goes on with it; without --resume it starts anew.\n",
-                        started_utc));
-  // The page of the night before is what people open.
+            fmt::format(
+                "A regression run that began at {} has not finished. Until it has, result folders "
+                "may be of it, while index.html, summary.md, junit.xml and regress.json "
+                "are of the run before.\n`mbverify regress --resume` with the same --out "
+                "goes on with it; without --resume it starts anew.\n",
+                started_utc));
+  // The page of the run before is what people open.
   std::string page = ReadWholeFile(out_ / "index.html").value_or("");
   const size_t at = page.find(kIndexMain);
   if (!trouble.empty() || at == std::string::npos || page.find(kUnfinished) != std::string::npos) {
     return trouble;
   }
-  page.insert(at, fmt::format("<p class=\"bad\">A later night began at {} and has not finished: "
+  page.insert(at, fmt::format("<p class=\"bad\">A later run began at {} and has not finished: "
                               "results that this page links to may be of it ({}).</p>\n",
                               started_utc, kUnfinished));
   return Write("index.html", page);
@@ -166,7 +167,7 @@ std::string RunFolder::RunId() {
   std::string id = ReadWholeFile(file).value_or("");
   if (!id.empty()) return id;
   id = RandomLetters() + RandomLetters() + RandomLetters() + RandomLetters();
-  // A run that cannot keep its id cannot keep its states either, which is told there.
+  // A run that cannot keep its id cannot keep its states either, which is reported there.
   (void)WriteFile(file, id, false);
   return id;
 }
@@ -213,7 +214,7 @@ namespace fs = std::filesystem;
 
 constexpr double kThumbnailTimeout_s = 20.0;
 constexpr int kThumbnailPx = 144;
-constexpr size_t kHeadBytes = 200;  // of a file, which tell what it is
+constexpr size_t kHeadBytes = 200;  // of a file, which show what it is
 
 // Pictures may be anybody's (merge): children decode them.
 std::map<std::string, std::string> Thumbnails(const RunFolder& folder,
@@ -256,8 +257,8 @@ void AddTrouble(const std::string& text, RegressOutcome* outcome) {
   outcome->trouble += (outcome->trouble.empty() ? "" : "\n") + text;
 }
 
-std::vector<std::string> NightFiles(const RegressOptions& options,
-                                    const std::vector<std::string>& keys) {
+std::vector<std::string> RegressionFiles(const RegressOptions& options,
+                                         const std::vector<std::string>& keys) {
   std::vector<std::string> names = {"index.html", "regress.json", kUnfinished};
   if (options.junit.empty()) names.emplace_back("junit.xml");
   if (options.markdown.empty()) names.emplace_back("summary.md");
@@ -267,7 +268,7 @@ std::vector<std::string> NightFiles(const RegressOptions& options,
 }
 
 std::string FindTaken(const RegressOptions& options, const std::vector<std::string>& keys) {
-  std::vector<std::string> names = NightFiles(options, keys);
+  std::vector<std::string> names = RegressionFiles(options, keys);
   for (const std::string& file : {options.history, options.junit, options.markdown}) {
     if (file.empty()) continue;
     names.push_back(fs::path(file).lexically_relative(options.out).generic_string());
@@ -278,7 +279,8 @@ std::string FindTaken(const RegressOptions& options, const std::vector<std::stri
     for (size_t end = key.find('/');; end = key.find('/', end + 1)) {
       if (const std::string part = key.substr(0, end); taken.contains(part)) {
         trouble += fmt::format(
-            "{}{}: error: its results would lie at {}, where the night writes a file of its own; "
+            "{}{}: error: its results would lie at {}, where the regression run writes a file of "
+            "its own; "
             "rename the scenario or its folder",
             trouble.empty() ? "" : "\n", key, part);
       }
@@ -288,7 +290,8 @@ std::string FindTaken(const RegressOptions& options, const std::vector<std::stri
   return trouble;
 }
 
-void FinishNight(const RegressOptions& options, const RunFolder& folder, RegressOutcome* outcome) {
+void FinishRegression(const RegressOptions& options, const RunFolder& folder,
+                      RegressOutcome* outcome) {
   RegressReport& report = outcome->report;
   std::sort(report.cases.begin(), report.cases.end(),
             [](const CaseResult& a, const CaseResult& b) { return a.key < b.key; });
@@ -301,7 +304,7 @@ void FinishNight(const RegressOptions& options, const RunFolder& folder, Regress
     }
     AddTrouble(AppendRun(options.history, goldens, &report), outcome);
   }
-  bool whole = true;  // every file of the night is of this one
+  bool whole = true;  // every file is of this regression run
   const auto keep = [&](const fs::path& path, const std::string& trouble) {
     if (trouble.empty()) outcome->files.push_back(path);
     whole = whole && trouble.empty();
@@ -335,8 +338,8 @@ void FinishNight(const RegressOptions& options, const RunFolder& folder, Regress
 
 namespace {
 
-// A summary that an earlier night left there, or nothing yet.
-bool IsOfANight(const std::string& path) {
+// A summary that an earlier run left there, or nothing yet.
+bool IsOfARegression(const std::string& path) {
   const std::string start = ReadWholeFile(path).value_or("").substr(0, kHeadBytes);
   return start.empty() || start.starts_with(kMarkdownTitle) ||
          start.find("\"mbverify.regress/") != std::string::npos ||
@@ -362,7 +365,7 @@ std::string FindClash(const RegressOptions& options, const std::vector<CaseFile>
   // Models, tables and meshes that are read, and whatever else.
   for (const std::string& output : {options.junit, options.markdown, options.json}) {
     std::error_code error;
-    if (!fs::is_regular_file(output, error) || IsOfANight(output)) continue;
+    if (!fs::is_regular_file(output, error) || IsOfARegression(output)) continue;
     return fmt::format("{}: error: mbverify did not write it; choose another output", output);
   }
   return "";

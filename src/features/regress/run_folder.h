@@ -14,8 +14,8 @@
 
 namespace mbv {
 
-/// In a folder whose night has not finished, or was killed.
-inline constexpr const char* kUnfinished = "night_unfinished.txt";
+/// In a folder whose regression run has not finished, or was killed.
+inline constexpr const char* kUnfinished = "unfinished.txt";
 
 class RunFolder {
  public:
@@ -44,8 +44,8 @@ class RunFolder {
 
   /// Name of a scenario's log, relative to the folder.
   [[nodiscard]] static std::string Log(const std::string& key) { return "logs/" + key + ".txt"; }
-  /// Files of the night itself (relative names). Claim() is called with all of them before anything
-  /// is written: "" or which of them are there already and are not ours.
+  /// Files of the regression run itself (relative names). Claim() is called with all of them before
+  /// anything is written: "" or which of them are there already and are not ours.
   [[nodiscard]] std::string Claim(const std::vector<std::string>& names);
   /// "" or what went wrong; only claimed files are written.
   [[nodiscard]] std::string Write(const std::string& name, const std::string& content) const;
@@ -71,30 +71,31 @@ class RunFolder {
   [[nodiscard]] std::filesystem::path StateFile(const std::string& key) const;
 
   std::filesystem::path out_;
-  std::set<std::string> claimed_;  ///< the night's own files
+  std::set<std::string> claimed_;  ///< the regression run's own files
   int lock_ = -1;
 };
 
-// What a night and a merge have in common: which files they own, and how they end.
+// What a regression run and a merge have in common: which files they own, and how they end.
 
 /// Adds a line to the outcome's trouble; nothing for "".
 void AddTrouble(const std::string& text, RegressOutcome* outcome);
 
-/// Names of the files that FinishNight() writes into --out, and the logs of `keys`.
-[[nodiscard]] std::vector<std::string> NightFiles(const RegressOptions& options,
-                                                  const std::vector<std::string>& keys);
+/// Names of the files that FinishRegression() writes into --out, and the logs of `keys`.
+[[nodiscard]] std::vector<std::string> RegressionFiles(const RegressOptions& options,
+                                                       const std::vector<std::string>& keys);
 
-/// Outputs that are inputs, too, as far as loading tells: "" or which.
+/// Outputs that are inputs, too, as far as loading shows: "" or which.
 [[nodiscard]] std::string FindClash(const RegressOptions& options,
                                     const std::vector<CaseFile>& cases);
 
-/// Keys whose results would lie where a file of the night belongs (a folder of scenarios named
-/// "index.html"): "" or which.
+/// Keys whose results would lie where a file of the regression run belongs (a folder of scenarios
+/// named "index.html"): "" or which.
 [[nodiscard]] std::string FindTaken(const RegressOptions& options,
                                     const std::vector<std::string>& keys);
 
 /// Everything after the scenarios ran: history, summaries, files, exit code.
-void FinishNight(const RegressOptions& options, const RunFolder& folder, RegressOutcome* outcome);
+void FinishRegression(const RegressOptions& options, const RunFolder& folder,
+                      RegressOutcome* outcome);
 
 // Times of runs: "2026-01-31T02:00:00Z".
 

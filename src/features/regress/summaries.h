@@ -12,7 +12,7 @@ namespace mbv {
 /// How the Markdown begins, and the name of all test suites together.
 inline constexpr const char* kMarkdownTitle = "## mbverify regression";
 inline constexpr const char* kJUnitName = "mbverify regress";
-/// index.html: before this, RunFolder::Begin() says that the page is an earlier night's.
+/// index.html: before this, RunFolder::Begin() says that the page is of an earlier run.
 inline constexpr const char* kIndexMain = "<main>\n";
 
 /// JUnit XML as GitHub, GitLab and Jenkins read it: one testsuite per model, one testcase per

@@ -21,7 +21,7 @@
 namespace mbv {
 namespace {
 
-// What `mbverify inertia` tells: stated mass properties against those of meshes.
+// What `mbverify inertia` reports: stated mass properties against those of meshes.
 
 using Json = nlohmann::ordered_json;
 
@@ -84,7 +84,7 @@ std::string InertiaTable(const std::vector<BodyInertia>& bodies) {
                              {"centre off mm", 15},
                              {"tensor off", 12},
                              {"  finding", 0}});
-  std::string text = table.Head() + "\n", told;
+  std::string text = table.Head() + "\n", details;
   size_t bad = 0;
   for (const BodyInertia& body : bodies) {
     text += table.Row({Printable(body.body), fmt::format("{:.4g}", body.mass),
@@ -94,12 +94,12 @@ std::string InertiaTable(const std::vector<BodyInertia>& bodies) {
             "\n";
     bad += body.findings.empty() ? 0 : 1;
     for (const InertiaFinding& finding : body.findings) {
-      told += fmt::format("{}: {}: {}\n  hint: {}\n", Printable(body.body), WordOf(finding.mistake),
-                          Printable(finding.text), finding.hint);
+      details += fmt::format("{}: {}: {}\n  hint: {}\n", Printable(body.body),
+                             WordOf(finding.mistake), Printable(finding.text), finding.hint);
     }
   }
   return fmt::format("{}{}{}{} of {} bodies with meshes are sound\n", text,
-                     told.empty() ? "" : "\n", told, bodies.size() - bad, bodies.size());
+                     details.empty() ? "" : "\n", details, bodies.size() - bad, bodies.size());
 }
 
 // The same for programs, with centres and tensors; numbers that are not known are null.

@@ -113,7 +113,7 @@ nlohmann::ordered_json ProgramsJson(const ProgramList& list) {
                         {"command", called.command},
                         {"trusted", called.trust != ProgramTrust::kNone},
                         {"because", TrustWord(called.trust)},
-                        {"doubt", called.doubt}});
+                        {"reason", called.reason}});
   }
   return programs;
 }

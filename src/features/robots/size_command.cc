@@ -67,7 +67,7 @@ bool IsUnknown(const Sized& sized) {
                      [](const MotorEnvelope& e) { return !e.unresolved.empty(); });
 }
 
-int Tell(const SizeArguments& arguments, const Sized& sized, int exit_code) {
+int PrintSized(const SizeArguments& arguments, const Sized& sized, int exit_code) {
   SayText(arguments.json.text(), ToText(sized.envelopes));
   const std::string json = ToJson(sized.envelopes, sized.scenarios);
   if (const int code = arguments.json.Write(json, {}); code != 0) return code;
@@ -92,7 +92,7 @@ int RunSize(const SizeArguments& arguments) {
   for (const std::string& file : files) {
     exit_code = WorseExit(exit_code, AddScenario(file, options, &sized));
   }
-  return sized.envelopes.empty() ? exit_code : Tell(arguments, sized, exit_code);
+  return sized.envelopes.empty() ? exit_code : PrintSized(arguments, sized, exit_code);
 }
 
 }  // namespace

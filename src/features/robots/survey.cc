@@ -69,7 +69,7 @@ void MeasureHome(const Mechanism& m, SurveyRow* row) {
     row->gap_rad = std::max(row->gap_rad, RotationGap(joint, X_FM));
   }
   const Mobility mobility = AnalyseMobility(m);
-  row->freedoms = mobility.freedoms;
+  row->dofs = mobility.dofs;
   row->redundant = mobility.redundant;
 }
 
@@ -147,7 +147,7 @@ std::vector<std::string> Fields(const SurveyRow& row) {
           row.status,
           Count(row.bodies),
           Count(row.loops),
-          Count(row.freedoms),
+          Count(row.dofs),
           Count(row.redundant),
           Small(row.gap_m),
           Small(row.gap_rad),
@@ -199,7 +199,7 @@ std::string SurveyJson(const std::vector<SurveyRow>& rows) {
                       {"status", row.status},
                       {"bodies", count(row.bodies)},
                       {"loops", count(row.loops)},
-                      {"freedoms", count(row.freedoms)},
+                      {"freedoms", count(row.dofs)},
                       {"redundant", count(row.redundant)},
                       {"gap_m", Number(row.gap_m)},
                       {"gap_rad", Number(row.gap_rad)},

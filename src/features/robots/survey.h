@@ -13,8 +13,8 @@ struct SurveyRow {
   std::string file;
   /// ok, disagree, not_closed (loops do not close), refused (a fault of the file), failed
   std::string status = "failed";
-  int bodies = -1, loops = -1, freedoms = -1, redundant = -1;  ///< -1: not known
-  double gap_m = kNan, gap_rad = kNan;                ///< at home, the largest of all loops
+  int bodies = -1, loops = -1, dofs = -1, redundant = -1;  ///< -1: not known
+  double gap_m = kNan, gap_rad = kNan;                     ///< at home, the largest of all loops
   double inverse_nrmse = kNan, forward_nrmse = kNan;  ///< drive forces, simulation and reference
   double seconds = kNan;
   std::string message = "ended before it said anything";
@@ -28,7 +28,7 @@ struct SurveyRow {
 /// For the way out of a child process (math/bytes.h).
 template <typename Visit>
 void VisitMembers(Visit& visit, typename Visit::template Of<SurveyRow>& row) {
-  visit(row.file), visit(row.status), visit(row.bodies), visit(row.loops), visit(row.freedoms);
+  visit(row.file), visit(row.status), visit(row.bodies), visit(row.loops), visit(row.dofs);
   visit(row.redundant), visit(row.gap_m), visit(row.gap_rad), visit(row.inverse_nrmse);
   visit(row.forward_nrmse), visit(row.seconds), visit(row.message), visit(row.caveats);
 }

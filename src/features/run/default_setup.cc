@@ -27,7 +27,7 @@ std::vector<Coordinate> Candidates(const Mechanism& m) {
     candidates.push_back({Coordinate::Kind::kDrive, static_cast<int>(d), 0});
   }
   for (size_t j = 0; j < m.joints.size(); ++j) {
-    for (int c = 0; c < FreedomsOf(m.joints[j].kind); ++c) {
+    for (int c = 0; c < DofsOf(m.joints[j].kind); ++c) {
       const bool driven = std::any_of(m.drives.begin(), m.drives.end(), [&](const Drive& drive) {
         const auto* on = std::get_if<JointDrive>(&drive.kind);
         return on != nullptr && on->joint == static_cast<int>(j) && on->coordinate == c;
@@ -45,7 +45,7 @@ Drive DriveOn(const Mechanism& m, const Coordinate& coordinate) {
   Drive drive{.name = joint.name,
               .kind = JointDrive{coordinate.index, coordinate.component},
               .range = joint.range[coordinate.component]};
-  if (FreedomsOf(joint.kind) > 1) drive.name += fmt::format("_{}", coordinate.component);
+  if (DofsOf(joint.kind) > 1) drive.name += fmt::format("_{}", coordinate.component);
   return drive;
 }
 
@@ -89,7 +89,7 @@ Mechanism WithTurnsHeld(const Mechanism& mechanism) {
 std::vector<Coordinate> TurnsLeft(const Mechanism& m, const std::vector<Coordinate>& held) {
   std::vector<Coordinate> candidates = held;
   for (size_t j = 0; j < m.joints.size(); ++j) {
-    for (int c = 0; c < FreedomsOf(m.joints[j].kind); ++c) {
+    for (int c = 0; c < DofsOf(m.joints[j].kind); ++c) {
       if (!IsOfBall(m.joints[j].kind, c)) continue;
       candidates.push_back({Coordinate::Kind::kJoint, static_cast<int>(j), c});
     }
@@ -205,7 +205,7 @@ class MotionSearch {
   DriveStroke FullStroke(size_t d, double home, bool rests) const {
     const Drive& drive = m_.drives[d];
     DriveStroke stroke{.home = home, .height = 0.0};
-    // Not all at once, so that forces can be told apart.
+    // Not all at once, so that forces can be distinguished.
     stroke.start_s = 0.05 * static_cast<double>(d % 4);
     stroke.duration_s = motion_.duration_s - 0.2;
     if (rests) return stroke;
@@ -282,23 +282,24 @@ std::string ScenarioText(const Mechanism& m, const FirstMotion& motion,
                       QuotedYaml(fmt::format("{}.{}", names.joints[turn.index], turn.component)));
     }
   }
-  return text + fmt::format(
-                    "analytic: none\n"
-                    "simulation: {{mode: forward, step_s: 0.001, stock_too: false{}}}\n"
-                    "{}checks: {{force_nrmse: {{forward: 1.0e-6, inverse: 1.0e-10}}{}}}\n"
-                    "snapshots: {{times_s: [0, {:g}]}}\n",
-                    motion.beyond_ranges ? ", ignore_ranges: true" : "",
-                    holding
-                        ? "# Drives that only hold a freedom carry next to nothing: no scale of "
-                          "their own to judge them by.\n"
-                        : "",
-                    holding ? ", force_nrmse_own: off" : "", 0.5 * motion.duration_s);
+  return text +
+         fmt::format(
+             "analytic: none\n"
+             "simulation: {{mode: forward, step_s: 0.001, stock_too: false{}}}\n"
+             "{}checks: {{force_nrmse: {{forward: 1.0e-6, inverse: 1.0e-10}}{}}}\n"
+             "snapshots: {{times_s: [0, {:g}]}}\n",
+             motion.beyond_ranges ? ", ignore_ranges: true" : "",
+             holding
+                 ? "# Drives that only hold a degree of freedom carry next to nothing: no scale of "
+                   "their own to judge them by.\n"
+                 : "",
+             holding ? ", force_nrmse_own: off" : "", 0.5 * motion.duration_s);
 }
 
 }  // namespace
 
-Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::string>* notes,
-                                  std::vector<Coordinate>* by_forces) {
+Mechanism WithDriveForEachDof(const Mechanism& mechanism, std::vector<std::string>* notes,
+                              std::vector<Coordinate>* by_forces) {
   Mechanism m = mechanism;
   const std::vector<Coordinate> candidates = Candidates(m);
   const CoordinateChoice choice = ChooseCoordinates(m, candidates, m.drives.size());
@@ -308,8 +309,8 @@ Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::s
   if (choice.left() > 0) *by_forces = TurnsLeft(m, taken);
   if (!by_forces->empty()) notes->push_back(ByForcesNote(m, *by_forces));
   if (const auto held = static_cast<int>(by_forces->size()); held < choice.left()) {
-    notes->push_back(
-        fmt::format("{} freedoms cannot be held by a drive on a joint", choice.left() - held));
+    notes->push_back(fmt::format("{} degrees of freedom cannot be held by a drive on a joint",
+                                 choice.left() - held));
   }
   std::vector<Drive> drives;
   std::vector<std::string> dropped, added;
@@ -331,8 +332,9 @@ Mechanism WithDriveForEachFreedom(const Mechanism& mechanism, std::vector<std::s
   }
   if (!added.empty()) {
     notes->push_back(fmt::format(
-        "{} freedom{} without a drive {} held by added drives, chosen by rank: {}", added.size(),
-        added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are", Joined(added, kMostNames)));
+        "{} degree{} of freedom without a drive {} held by added drives, chosen by rank: {}",
+        added.size(), added.size() == 1 ? "" : "s", added.size() == 1 ? "is" : "are",
+        Joined(added, kMostNames)));
   }
   m.drives = std::move(drives);
   return m;
@@ -351,12 +353,13 @@ DefaultSetupResult MakeDefaultSetup(const std::string& file, const std::string& 
   if (!loaded.mechanism) return result;
   DefaultSetup setup;
   std::vector<Coordinate> by_forces;
-  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &setup.notes, &by_forces);
+  Mechanism m = WithDriveForEachDof(*loaded.mechanism, &setup.notes, &by_forces);
   setup.by_forces = static_cast<int>(by_forces.size());
   if (setup.by_forces > 0) AddOutputs(&m);
   if (!name.empty()) m.name = name;
   if (m.drives.empty() && by_forces.empty()) {
-    result.diagnostics.AddError(file, "the mechanism has no freedom: there is nothing to move");
+    result.diagnostics.AddError(file,
+                                "the mechanism has no degree of freedom: there is nothing to move");
     return result;
   }
   // Added drives hold what the robot's own ones leave free; without own ones all move.

@@ -1,4 +1,4 @@
-// A robot from a file, made ready to run: drives for every freedom, and a first motion.
+// A robot from a file, made ready to run: drives for every DOF, and a first motion.
 #pragma once
 
 #include <optional>
@@ -13,14 +13,14 @@
 
 namespace mbv {
 
-/// Gives every degree of freedom of a mechanism one drive. Drives that depend on others are left
-/// out, and degrees of freedom that none of them holds get drives on joints, chosen by rank. Idle
+/// Gives every DOF of a mechanism one drive. Drives that depend on others are left
+/// out, and DOFs that none of them holds get drives on joints, chosen by rank. Idle
 /// spins need none. Rotations of balls that no drive on a joint can hold, such as spins that are
 /// not idle, move by forces: `by_forces` gets coordinates for them. What was done is reported in
 /// `notes`.
-[[nodiscard]] Mechanism WithDriveForEachFreedom(const Mechanism& mechanism,
-                                                std::vector<std::string>* notes,
-                                                std::vector<Coordinate>* by_forces);
+[[nodiscard]] Mechanism WithDriveForEachDof(const Mechanism& mechanism,
+                                            std::vector<std::string>* notes,
+                                            std::vector<Coordinate>* by_forces);
 
 struct DriveStroke {
   double home = 0.0;    ///< [m] or [rad]
@@ -47,7 +47,7 @@ struct DefaultSetup {
   std::vector<ModelMeshFile> meshes;  ///< beside model.yaml
   std::vector<std::string> notes;
   Mechanism mechanism;  ///< as `model` describes it
-  int by_forces = 0;    ///< degrees of freedom that move by forces: the scenario is a free motion
+  int by_forces = 0;    ///< DOFs that move by forces: the scenario is a free motion
 };
 struct DefaultSetupResult {
   std::optional<DefaultSetup> setup;  ///< empty after errors

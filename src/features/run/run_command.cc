@@ -1,4 +1,4 @@
-// What is told when a run does not fit into memory.
+// What is printed when a run does not fit into memory.
 
 #include <fmt/format.h>
 #include <algorithm>
@@ -69,7 +69,8 @@ struct RunArguments {
   std::vector<std::string> scenarios, set, assembly, data;
   std::string out = "out", mode, report_script, kept_audits, agreed;
   JsonOption json;
-  bool no_report = false, no_pictures = false, no_own_file = false, quiet = false, verbose = false;
+  bool no_report = false, no_pictures = false, no_source_model = false, quiet = false,
+       verbose = false;
   bool sizing = false, trust = false;
 };
 
@@ -88,15 +89,15 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   }
   progress->Clear();
   findings->Print(outcome.diagnostics);
-  const auto tell = [&](const auto& report) {
+  const auto print = [&](const auto& report) {
     const TableOptions table{.color = WantsColor(arguments.json.text()),
                              .verbose = arguments.verbose,
                              .sizing = arguments.sizing};
     SayText(arguments.json.text(),
             arguments.quiet ? VerdictLine(ViewOf(report), table) : ToTable(report, table) + "\n");
   };
-  if (outcome.report) tell(*outcome.report);
-  if (outcome.stiffness != nullptr) tell(*outcome.stiffness);
+  if (outcome.report) print(*outcome.report);
+  if (outcome.stiffness != nullptr) print(*outcome.stiffness);
   if (!outcome.folder.empty() && !arguments.quiet) {
     Say(stderr, "results in {}\n", outcome.folder);
   }
@@ -190,7 +191,7 @@ int Run(const RunArguments& arguments) {
   }
   for (const std::string& given : files) {
     std::string file = given;
-    options.own_file = given.ends_with(".xml") && !arguments.no_own_file ? given : "";
+    options.source_model = given.ends_with(".xml") && !arguments.no_source_model ? given : "";
     if (IsRobotFile(given) && !SetUpRobot(given, arguments, &findings, &file)) {
       exit_code = WorseExit(exit_code, 2);
       counts += RunCounts{.scenarios = 1, .bad_input = 1};
@@ -231,9 +232,10 @@ void AddRunCommand(CLI::App* app, int* exit_code) {
   AddAssemblyOption(run, &arguments->assembly);
   run->add_flag("--no-pictures", arguments->no_pictures, "do not draw snapshots");
   run->add_flag("--no-report", arguments->no_report, "do not write report.html");
-  run->add_flag("--no-own-file", arguments->no_own_file,
-                "do not run a robot's MJCF as it is besides");
-  // How regress shares one script, and what the papers' audits gave, among the reports of a night.
+  run->add_flag("--no-own-file", arguments->no_source_model,
+                "do not run a robot's MJCF as it is in addition");
+  // How regress shares one script, and what the papers' audits gave, among the reports of a
+  // regression run.
   run->add_option("--report-script", arguments->report_script)->group("");
   run->add_option("--kept-audits", arguments->kept_audits)->group("");
   // The fingerprint of the programs that regress was allowed to run for this scenario.

@@ -86,8 +86,8 @@ std::optional<double> Misfit(Mechanism mechanism, const Motion& motion, const Al
 // A sentence if the table's forces fit 9.80665, 9.81 or 9.8 m/s² clearly better than the model's
 // own, near value of g; "" otherwise. The reference is computed again with each. Such a table
 // differs by 3e-4 of the weight only, which tolerances of tables hide.
-std::string GravityDoubt(const Mechanism& mechanism, const Motion& motion,
-                         const AlignedTable& table, double start_window_s) {
+std::string GravityWarning(const Mechanism& mechanism, const Motion& motion,
+                           const AlignedTable& table, double start_window_s) {
   const double g = mechanism.gravity_W.norm();
   if (!(std::abs(g / kUsual[0] - 1.0) < kNear)) return "";
   const auto own = Misfit(mechanism, motion, table, start_window_s, g);
@@ -242,7 +242,7 @@ double ForceAtStart(const Mechanism& mechanism, int drive, int moving) {
 double LoadInertia(const Mechanism& mechanism, int drive) {
   const CommandRank rank = RankCommands(mechanism, FromHome(mechanism, -1).commands);
   const auto drives = static_cast<int>(mechanism.drives.size());
-  if (drives != rank.freedoms || rank.redundant > 0 || !mechanism.prescribed.empty()) return kNan;
+  if (drives != rank.dofs || rank.redundant > 0 || !mechanism.prescribed.empty()) return kNan;
   return ForceAtStart(mechanism, drive, drive) - ForceAtStart(mechanism, drive, -1);
 }
 
@@ -272,7 +272,7 @@ class ScenarioRun {
     RunWitnesses();
     if (outcome_.diagnostics.has_errors()) return BadInput();
     Judge();
-    RunOwnFile();
+    RunSourceModel();
     DrawPictures();
     report_.timing.total_s =
         std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -318,7 +318,7 @@ class ScenarioRun {
     runner.RunComputed();
     if (runner.CheckStrokes()) {
       runner.RunFollowing();
-      RunBesides(&runner);
+      RunErrorMeasures(&runner);
       runner.RunForeign();
     }
     runs_ = runner.Take();
@@ -326,7 +326,7 @@ class ScenarioRun {
     report_.findings.Append(runs_.findings);
     if (!runs_.trust.empty()) report_.simulation += "; " + runs_.trust;
     report_.timing = runs_.timing;
-    report_.timing.told = options_.timed;
+    report_.timing.stated = options_.timed;
     for (const EngineRun& run : other_engines_) {
       if (run.engine != runner.judged_engine()) report_.timing.stock_s += run.summary.wall_s;
     }
@@ -334,11 +334,11 @@ class ScenarioRun {
   }
 
   // What the simulation's error is measured by, where it ran: other engines, or wrong forces.
-  void RunBesides(WitnessRunner* runner) {
+  void RunErrorMeasures(WitnessRunner* runner) {
     const auto& simulation = runner->runs().simulation;
     if (!simulation || !simulation->summary.ok()) return;
     if (scenario().simulation.drive_by == DriveBy::kMotion) RunOtherEngines(*runner);
-    if (scenario().simulation.drive_by == DriveBy::kForces) runner->RunBent();
+    if (scenario().simulation.drive_by == DriveBy::kForces) runner->RunPerturbed();
   }
 
   // The simulator's own modelling error: the same run by the other engines.
@@ -393,7 +393,7 @@ class ScenarioRun {
     report_.reactions_not_unique = input.reactions_not_unique;
     report_.comparison = Compare(input);
     NameWaivers();
-    DoubtGravity();
+    WarnGravity();
     report_.tables = scenario().motion.tables;
     report_.smoothed_forces = SmoothedForces(prepared_->mechanisms.reference, scenario().motion);
     report_.sheets = SheetsOf(base(), report_.comparison);
@@ -433,11 +433,11 @@ class ScenarioRun {
   }
 
   // A table that was made with another value of g agrees within any usual tolerance.
-  void DoubtGravity() {
+  void WarnGravity() {
     if (!runs_.table || scenario().motion.free()) return;
-    const std::string doubt = GravityDoubt(prepared_->mechanisms.reference, scenario().motion,
-                                           *runs_.table, scenario().start_window_s);
-    if (!doubt.empty()) AddWarning(doubt);
+    const std::string warning = GravityWarning(prepared_->mechanisms.reference, scenario().motion,
+                                               *runs_.table, scenario().start_window_s);
+    if (!warning.empty()) AddWarning(warning);
   }
 
   void CompareEngines(const ComparisonInput& input) {
@@ -448,13 +448,13 @@ class ScenarioRun {
   }
 
   // What the user's own settings do. No verdict depends on it.
-  void RunOwnFile() {
-    if (options_.own_file.empty()) return;
-    report_.own_file = std::make_shared<const OwnFileAudit>(
-        AuditOwnFile({.file = options_.own_file,
-                      .prepared = &*prepared_,
-                      .reactions_not_unique = report_.reactions_not_unique,
-                      .progress = options_.progress}));
+  void RunSourceModel() {
+    if (options_.source_model.empty()) return;
+    report_.source_model = std::make_shared<const SourceModelAudit>(
+        AuditSourceModel({.file = options_.source_model,
+                          .prepared = &*prepared_,
+                          .reactions_not_unique = report_.reactions_not_unique,
+                          .progress = options_.progress}));
   }
 
   void DrawPictures() {
@@ -575,8 +575,8 @@ HtmlAudit ToHtmlAudit(const AuditTable& table) {
   return audit;
 }
 
-// Computed by the first run that asks, and kept for the others of its night: it is the same for
-// all. A file that is damaged or cannot be written costs time only.
+// Computed by the first run that asks, and kept for the others of its regression run: it is the
+// same for all. A file that is damaged or cannot be written costs time only.
 HtmlAudit RunAudit(const AuditEntry& entry, const fs::path& models, const std::string& kept) {
   const fs::path file = fs::path(kept) / (entry.mechanism + ".json");
   if (!kept.empty()) {

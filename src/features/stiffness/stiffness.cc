@@ -125,7 +125,7 @@ class Runner {
     return true;
   }
 
-  // No load can be in equilibrium where another computation found a freedom that nothing holds.
+  // No load can be in equilibrium where another computation found a DOF that nothing holds.
   bool IsSingular() const {
     for (const StiffnessWitness& witness : run_.report.witnesses) {
       if (witness.result.summary.stop == Stop::kSingular) return true;
@@ -264,7 +264,7 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
     return outcome;
   }
   StiffnessRun run = RunStiffness(*prepared, options.progress);
-  run.report.timing.told = options.timed;
+  run.report.timing.stated = options.timed;
   run.report.findings = outcome.diagnostics;
   run.report.command = "mbverify run " + ShellWord(file);
   for (const auto& [key, value] : options.scenario.set) {
@@ -344,15 +344,15 @@ void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
 }
 
 // Why the closed form does not take this model; "" if it does. One warning each.
-std::string Decline(const PreparedStiffness& prepared, const StiffnessFormRow& row,
-                    Diagnostics* diagnostics) {
+std::string WarnNotApplicable(const PreparedStiffness& prepared, const StiffnessFormRow& row,
+                              Diagnostics* diagnostics) {
   if (row.coverage == nullptr) return "";
   std::vector<Finding> uncovered =
       FindUncovered(row.coverage(prepared.analytic), prepared.analytic, Concern::kStiffness);
-  const std::string reason = ReasonToDecline(uncovered);
+  const std::string reason = ReasonNotApplicable(uncovered);
   for (Finding& finding : uncovered) {
     finding.file = prepared.scenario.file;
-    finding.message = "analytic declines: " + finding.message;
+    finding.message = "analytic is not applicable: " + finding.message;
     diagnostics->Add(std::move(finding));
   }
   return reason;
@@ -401,7 +401,7 @@ void FindForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
     return;
   }
   prepared->form_gap = WitnessGap::kNotApplicable;  // unless it is made
-  prepared->form_reason = Decline(*prepared, *row, diagnostics);
+  prepared->form_reason = WarnNotApplicable(*prepared, *row, diagnostics);
   if (!prepared->form_reason.empty()) return;
   prepared->form = MakeForm(*prepared, *row, prepared->form_model, diagnostics);
   if (prepared->form == nullptr) {

@@ -27,7 +27,7 @@ struct StiffnessArguments {
   JsonOption json;
 };
 
-// Coordinates that --at leaves out keep their values of the usual pose, if it is told by the same
+// Coordinates that --at leaves out keep their values of the usual pose, if it is stated by the same
 // coordinates.
 void FillPose(const Mechanism& mechanism, ScenarioOptions* options) {
   PoseValues rest = ExamplePose(mechanism.name);

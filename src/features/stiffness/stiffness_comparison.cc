@@ -11,7 +11,7 @@
 namespace mbv {
 namespace {
 
-// sqrt(M_ii) per row. An entry that vanishes (a freedom that nothing holds) is compared in units of
+// sqrt(M_ii) per row. An entry that vanishes (a DOF that nothing holds) is compared in units of
 // its kind's largest, times 1e-3.
 Vec6 ScaleOf(const Mat6& M) {
   Vec6 scale;

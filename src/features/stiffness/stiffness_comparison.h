@@ -100,7 +100,7 @@ struct StiffnessComparison {
 [[nodiscard]] std::vector<Vec6> Displacements(const StiffnessResult& result,
                                               const std::vector<Vec6>& loads);
 
-// What one stiffness tells a designer: its weakest directions, what each element contributes to the
+// What one stiffness shows a designer: its weakest directions, what each element contributes to the
 // compliance, and indices that every mechanism has.
 
 /// The unit direction of a pure force (or moment) under which the output yields most along it, and

@@ -32,7 +32,7 @@ struct StiffnessMap {
 /// "platform.x=-0.1:0.1:61,y_mm=-100:100:61,z=-0.1,within=0.1": two ranges LOW:HIGH:POINTS, and
 /// values of other coordinates of the pose, with commas or blanks between them. Without ranges,
 /// those of the mechanism's usual map. Keys may end in _mm or _deg; x … yaw and phi (yaw) are those
-/// of the output by which the pose is told. Wrong ones are findings.
+/// of the output by which the pose is stated. Wrong ones are findings.
 [[nodiscard]] std::optional<StiffnessMap> ParseMap(const std::string& text,
                                                    const PreparedStiffness& prepared,
                                                    Diagnostics* diagnostics);

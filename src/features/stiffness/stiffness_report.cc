@@ -198,9 +198,9 @@ class StiffnessPageWriter {
   std::string Reproduce() const {
     const Timing& timing = report_.timing;
     const std::string times =
-        timing.told ? fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
-                                  timing.analytic_s, timing.reference_s, timing.simulation_s)
-                    : "";
+        timing.stated ? fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
+                                    timing.analytic_s, timing.reference_s, timing.simulation_s)
+                      : "";
     return ReproduceHtml(view_, report_.command, times,
                          "Files beside this page: summary.json (every number), stiffness.csv, "
                          "loads.csv and contributions.csv (17 digits), model.xml (the compliant "

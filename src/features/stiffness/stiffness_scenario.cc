@@ -460,12 +460,13 @@ std::optional<Finding> CheckPose(const Mechanism& mechanism, const PoseValues& p
                    .hint = DidYouMean(
                        name, names, "known: drives, prescribed joints, and OUTPUT.x … OUTPUT.yaw")};
   }
-  const int freedoms = CountFreedoms(mechanism);
-  if (static_cast<int>(pose.size()) == freedoms) return {};
+  const int dofs = CountDofs(mechanism);
+  if (static_cast<int>(pose.size()) == dofs) return {};
   return Finding{
-      .message = fmt::format("pose gives {} coordinates, but {} has {} freedoms", pose.size(),
-                             mechanism.name, freedoms),
-      .hint = "give as many drives or output components (OUTPUT.x …) as there are freedoms"};
+      .message = fmt::format("pose gives {} coordinates, but {} has {} degrees of freedom",
+                             pose.size(), mechanism.name, dofs),
+      .hint =
+          "give as many drives or output components (OUTPUT.x …) as there are degrees of freedom"};
 }
 
 }  // namespace mbv

@@ -363,7 +363,7 @@ namespace fs = std::filesystem;
 
 constexpr const char* kStudySchema = "mbverify.study/1";
 
-// The file's bytes, piece by piece; what cannot be read any more ends it early, which `size` tells.
+// The file's bytes, piece by piece; what cannot be read any more ends it early, which `size` shows.
 FileContent ContentOf(const fs::path& path, std::uint64_t* size) {
   return [path, size](const std::function<void(std::string_view)>& write) {
     std::ifstream stream(path, std::ios::binary);
@@ -500,7 +500,7 @@ std::string StudyFolder::Publish(const std::vector<std::pair<std::string, std::s
   if (!trouble.empty()) return trouble;
   std::error_code error;
   for (const char* ours : {kPointsFile, kForcesFile, kStudyFile}) fs::remove(path_ / ours, error);
-  fs::remove(path_, error);  // unless somebody else put something there
+  fs::remove(path_, error);  // unless it is another file by now
   return "";
 }
 

@@ -50,7 +50,8 @@ struct StudyOutcome {
 [[nodiscard]] std::vector<StudyBand> StudyBands(const StudyBench& bench,
                                                 const std::filesystem::path& file);
 
-// The folder of a study while it is computed, and what tells one study's folder from another's.
+// The folder of a study while it is computed, and what distinguishes one study's folder from
+// another's.
 
 /// study.json of a folder: whose rows it holds.
 struct StudyIdentity {

@@ -60,7 +60,7 @@ class StudyBench {
   [[nodiscard]] const MeasuredForces& measured() const { return measured_; }
   /// The files that it is computed from.
   [[nodiscard]] const std::vector<InputFile>& inputs() const { return inputs_; }
-  /// Tells a study, its scenario and model, and this program from others.
+  /// Distinguishes a study, its scenario and model, and this program from others.
   [[nodiscard]] const std::string& fingerprint() const { return fingerprint_; }
 
   /// A function of the study and the number alone.
@@ -166,7 +166,7 @@ struct StudyMeasures {
   std::string reason;              ///< of the verdict
 };
 
-/// Values are NaN where the witnesses do not tell it. Of a channel: by the first
+/// Values are NaN where the witnesses do not give it. Of a channel: by the first
 /// witness that records it. Of a check: the worst of all witnesses, or of all their pairs;
 /// `motor_margin` is the smallest margin.
 [[nodiscard]] StudyMeasures MeasureQuantities(const StudyRun& run,

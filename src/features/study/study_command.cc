@@ -33,7 +33,7 @@ class StudyProgress {
  public:
   explicit StudyProgress(std::string name) : name_(std::move(name)) {}
 
-  void Tell(std::uint64_t done, std::uint64_t all) {
+  void Report(std::uint64_t done, std::uint64_t all) {
     constexpr double kBetween_s = 30.0;
     if (first_ == 0) first_ = done;
     const double elapsed = Since(start_);
@@ -43,9 +43,9 @@ class StudyProgress {
     const std::string text = fmt::format("{}: {} of {} points", name_, done, all);
     if (line_.active()) {
       line_.Show(text, static_cast<double>(done) / static_cast<double>(all));
-    } else if (Since(told_) > kBetween_s) {
+    } else if (Since(reported_) > kBetween_s) {
       Say(stderr, "{}, {} left\n", text, done > first_ ? TimeText(left) : "?");
-      told_ = StudyClock::now();
+      reported_ = StudyClock::now();
     }
   }
 
@@ -56,13 +56,13 @@ class StudyProgress {
 
   std::string name_;
   ProgressLine line_{true};
-  StudyClock::time_point start_ = StudyClock::now(), told_ = start_;
+  StudyClock::time_point start_ = StudyClock::now(), reported_ = start_;
   std::uint64_t first_ = 0;
 };
 
 // What a study came to; its exit code.
-int TellStudy(const StudyArguments& arguments, const std::string& file,
-              const StudyOutcome& outcome) {
+int PrintStudy(const StudyArguments& arguments, const std::string& file,
+               const StudyOutcome& outcome) {
   SayText(stderr, outcome.diagnostics.Text());
   if (outcome.folder.empty()) return outcome.exit_code;
   int exit_code = outcome.exit_code;
@@ -106,11 +106,11 @@ int RunStudies(StudyArguments arguments) {
     {
       StudyProgress progress(file);
       arguments.options.points.progress = [&](std::uint64_t done, std::uint64_t all) {
-        progress.Tell(done, all);
+        progress.Report(done, all);
       };
       outcome = RunStudy(file, arguments.options);
     }
-    exit_code = WorseExit(exit_code, TellStudy(arguments, file, outcome));
+    exit_code = WorseExit(exit_code, PrintStudy(arguments, file, outcome));
   }
   return exit_code;
 }
@@ -148,7 +148,7 @@ void AddStudyCommand(CLI::App* app, int* exit_code) {
   merge->add_option("folders", arguments->folders, "result folders of the shards")->required();
   merge->add_option("-o,--out", arguments->out, "folder for results")->capture_default_str();
   merge->callback([arguments, exit_code] {
-    *exit_code = TellStudy(*arguments, "", MergeStudies(arguments->folders, arguments->out));
+    *exit_code = PrintStudy(*arguments, "", MergeStudies(arguments->folders, arguments->out));
   });
   const char* codes = "0 limits are kept, 1 one is not, 2 bad input, 3 no point could run";
   SetFooter(merge, {"study merge out/s.shard-1-of-2 out/s.shard-2-of-2 -o out"}, codes);

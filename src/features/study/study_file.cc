@@ -43,7 +43,7 @@ std::string WithoutStart(const std::string& key) {
   return key.starts_with(kParametersStart) ? key.substr(kParametersStart.size()) : key;
 }
 
-// A factor being read: its own unit, and the SI unit of what it is ("" where nobody knows).
+// A factor being read: its own unit, and the SI unit of what it is ("" where it is not known).
 struct FactorDraft {
   Factor factor;
   UnitSuffix unit = kPlain;
@@ -490,7 +490,7 @@ class StudyReader {
                 near.empty() ? "" : "e.g. " + near);
   }
 
-  // The scenario as it is; findings about it are told with its own places.
+  // The scenario as it is; findings about it have its own places.
   bool LoadVaried(const YamlNode& node) {
     const auto name = yaml_.Text(node, "scenario");
     if (!name) return false;
@@ -542,7 +542,7 @@ class StudyReader {
       }
       study_.witnesses.push_back(word);
     }
-    if (items->empty()) yaml_.Error(*node, "witnesses: nobody computes anything");
+    if (items->empty()) yaml_.Error(*node, "witnesses: the list is empty");
   }
 
   void ReadQuantities(const YamlNode& node) {

@@ -12,10 +12,10 @@
 
 namespace mbv {
 
-/// A study with more points is a mistake, unless somebody says that it is none.
+/// A study with more points is a mistake, unless the option for it is given.
 inline constexpr std::uint64_t kMostStudyPoints = 10'000'000;
 
-/// How many points are drawn and from which seed, where somebody asks for others than the file.
+/// How many points are drawn and from which seed, where options ask for others than the file.
 struct DrawnDesign {
   std::optional<std::uint64_t> count = {}, seed = {};
 };
@@ -47,7 +47,7 @@ namespace mbv::internal {
 /// Whether the design is a list of points, however wrong the rest is.
 [[nodiscard]] bool IsListDesign(const YamlNode* node);
 
-/// What a design is read with, besides its factors.
+/// What a design is read with, in addition to its factors.
 struct DesignContext {
   std::string folder;          ///< of the study; a list is read from a file beside it
   std::uint64_t most = 0;      ///< more points are a finding

@@ -12,7 +12,7 @@
 
 namespace mbv {
 
-/// Where a package lies, as somebody says who starts the program.
+/// Where a package lies, as the user of the program states.
 struct MeshPackage {
   std::string name;
   std::filesystem::path folder;
@@ -25,7 +25,7 @@ void UseMeshPackages(std::vector<MeshPackage> packages);
 struct FoundMesh {
   std::filesystem::path path;  ///< empty: `trouble`
   std::string trouble;
-  bool outside = false;  ///< there is one, but nobody allowed that folder
+  bool outside = false;  ///< there is one, but that folder is not allowed
 };
 /// Finds what a robot's file in `folder` calls `name`: a path relative to the folder, an absolute
 /// one, file://…, package://NAME/… or model://NAME/…. Packages are those of UseMeshPackages(), then
@@ -57,7 +57,7 @@ struct MeshFile {
   std::string trouble;
 };
 /// The surfaces of files, which are read in a process of its own and known afterwards by their
-/// content. Each file is told to NoteInput().
+/// content. Each file is passed to NoteInput().
 [[nodiscard]] std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& files);
 
 /// Vertices times `scale`, component by component; where that mirrors, triangles turn so that

@@ -655,7 +655,7 @@ class Companion {
       const int axes = RowOf(joint.kind).axes;
       if (axes > 0) line += ", axis: " + List(joint.axis);
       if (axes > 1) line += ", axis2: " + List(joint.axis2);
-      const int n = FreedomsOf(joint.kind);
+      const int n = DofsOf(joint.kind);
       std::string guess, range;
       bool limited = false;
       for (int k = 0; k < n; ++k) {

@@ -35,7 +35,7 @@ struct UrdfClosure {
   int line = 0;
 };
 
-/// What urdfdom does not tell.
+/// What urdfdom does not read.
 struct UrdfDetails {
   std::vector<UrdfClosure> closures;
   std::map<std::string, int> link_lines, joint_lines;  ///< by name

@@ -143,7 +143,7 @@ class Importer {
     internal::LoadMeshes(std::filesystem::path(file_).parent_path(), place, &tree_.bodies,
                          diagnostics_);
     WarnOfLosses("damping", damped_);
-    WarnOfLosses("friction", rubbing_);
+    WarnOfLosses("friction", friction_);
     return std::move(tree_);
   }
 
@@ -265,7 +265,7 @@ class Importer {
   void TakeExtras() {
     for (const auto& [name, extra] : details_.extras) {
       const auto joint = std::ranges::find(tree_.joints, name, &Joint::name);
-      const bool fits = joint != tree_.joints.end() && FreedomsOf(joint->kind) == 1;
+      const bool fits = joint != tree_.joints.end() && DofsOf(joint->kind) == 1;
       const auto is_good = [](double x) { return std::isfinite(x) && x >= 0.0; };
       if (!fits || !is_good(extra.rotor_inertia) || !std::isfinite(extra.gear_ratio) ||
           extra.gear_ratio == 0.0 || !std::isfinite(extra.stiffness) ||
@@ -286,7 +286,7 @@ class Importer {
       const int line = LineOf(details_.joint_lines, mimic.joint);
       std::vector<std::string> names;
       for (const Joint& joint : tree_.joints) {
-        if (FreedomsOf(joint.kind) == 1) names.push_back(joint.name);
+        if (DofsOf(joint.kind) == 1) names.push_back(joint.name);
       }
       const std::string says = fmt::format("joint '{}': mimic of '{}'", mimic.joint, mimic.of);
       if (!Contains(names, mimic.of)) {
@@ -387,14 +387,14 @@ class Importer {
   void ReadDynamics(const urdf::Joint& from, JointKind kind, int line) {
     UrdfTree::Dynamics dynamics{.joint = from.name};
     const auto take = [&](double value, double* into, Losses* losses) {
-      if (value > 0.0 && std::isfinite(value) && FreedomsOf(kind) == 1) {
+      if (value > 0.0 && std::isfinite(value) && DofsOf(kind) == 1) {
         *into = value;
       } else {
         AddLoss(from.name, value, line, losses);
       }
     };
     take(from.dynamics->damping, &dynamics.damping, &damped_);
-    take(from.dynamics->friction, &dynamics.friction, &rubbing_);
+    take(from.dynamics->friction, &dynamics.friction, &friction_);
     if (dynamics.damping > 0.0 || dynamics.friction > 0.0) tree_.dynamics.push_back(dynamics);
   }
 
@@ -411,7 +411,7 @@ class Importer {
   Diagnostics* diagnostics_;
   UrdfTree tree_;
   std::map<std::string, int> index_;
-  Losses damped_, rubbing_;
+  Losses damped_, friction_;
 };
 
 // TinyXML reads nested elements by recursion: refuse what would exhaust the stack.

@@ -93,7 +93,7 @@ struct UrdfStep {
 };
 
 /// The mechanism with the frames of its balls turned so that their coordinates are zero at home. A
-/// ball of the tree becomes three hinges, which lose a freedom where the middle one is at 90
+/// ball of the tree becomes three hinges, which lose a DOF where the middle one is at 90
 /// degrees: from home, they are the farthest from there. Balls with limits stay as they are.
 [[nodiscard]] Mechanism WithBallsAtZero(const Mechanism& mechanism);
 

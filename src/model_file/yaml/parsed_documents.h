@@ -1,5 +1,5 @@
 // A document is parsed once for a whole command, however often it is loaded: for its kind, for its
-// values, for each witness and for each number that is bent.
+// values, for each witness and for each number that is perturbed.
 #pragma once
 
 #include <list>

@@ -353,11 +353,11 @@ class Scanner {
       Line(line);
     }
     if (!cause_ && quote_ != 0) {
-      Tell(quote_line_, quote_column_, fmt::format("the quote {} is never closed", quote_));
+      AddFinding(quote_line_, quote_column_, fmt::format("the quote {} is never closed", quote_));
     }
     if (!cause_ && !open_.empty()) {
-      Tell(open_.back().line, open_.back().column,
-           fmt::format("the bracket {} is never closed", open_.back().sign));
+      AddFinding(open_.back().line, open_.back().column,
+                 fmt::format("the bracket {} is never closed", open_.back().sign));
     }
     return cause_;
   }
@@ -368,7 +368,7 @@ class Scanner {
     int line, column;
   };
 
-  void Tell(int line, int column, std::string message, std::string hint = "") {
+  void AddFinding(int line, int column, std::string message, std::string hint = "") {
     if (!cause_) cause_ = SyntaxCause{line, column, std::move(message), std::move(hint)};
   }
 
@@ -386,8 +386,8 @@ class Scanner {
     const size_t first = line.find_first_not_of(" \t");
     if (first == std::string::npos || line[first] == '#') return;
     if (line.find('\t') < first) {
-      Tell(line_, static_cast<int>(line.find('\t')) + 1, "the line is indented by a tab",
-           "YAML takes spaces only");
+      AddFinding(line_, static_cast<int>(line.find('\t')) + 1, "the line is indented by a tab",
+                 "YAML takes spaces only");
       return;
     }
     if (first == 0 && (line.starts_with("---") || line[0] == '%')) return;
@@ -442,10 +442,11 @@ class Scanner {
     if (levels_.empty() || indent > levels_.back()) {
       if (!levels_.empty() && !expects_value_) {
         if (opens) {
-          Tell(line_, indent + 1,
-               fmt::format("the line is indented deeper than line {}, which has a value already",
-                           last_line_),
-               fmt::format("indent it by {} spaces as the line above", levels_.back()));
+          AddFinding(
+              line_, indent + 1,
+              fmt::format("the line is indented deeper than line {}, which has a value already",
+                          last_line_),
+              fmt::format("indent it by {} spaces as the line above", levels_.back()));
           return false;
         }
         continues_ = true;
@@ -464,7 +465,7 @@ class Scanner {
                                           : ", ") +
                  std::to_string(level);
     }
-    Tell(
+    AddFinding(
         line_, indent + 1,
         fmt::format("the line is indented by {} spaces, the lines above it by {}", indent, fitting),
         "lines of one level start in the same column");
@@ -474,10 +475,11 @@ class Scanner {
   void NoKey(std::string_view content, int line, int indent) {
     const size_t colon = content.find(':');
     if (colon != std::string_view::npos && colon > 0) {
-      Tell(line, indent + static_cast<int>(colon) + 1, "there is no space after the colon",
-           "write KEY: VALUE");
+      AddFinding(line, indent + static_cast<int>(colon) + 1, "there is no space after the colon",
+                 "write KEY: VALUE");
     } else {
-      Tell(line, indent + 1, "the line has no ': '", "write KEY: VALUE, or - VALUE in a list");
+      AddFinding(line, indent + 1, "the line has no ': '",
+                 "write KEY: VALUE, or - VALUE in a list");
     }
   }
 
@@ -541,8 +543,8 @@ class Scanner {
     const Bracket opened = open_.back();
     open_.pop_back();
     if ((opened.sign == '[') == (sign == ']')) return;
-    Tell(line_, column,
-         fmt::format("the bracket {} closes {} of line {}", sign, opened.sign, opened.line));
+    AddFinding(line_, column,
+               fmt::format("the bracket {} closes {} of line {}", sign, opened.sign, opened.line));
   }
 
   std::optional<SyntaxCause> cause_;
@@ -713,7 +715,7 @@ class TreeBuilder : public YAML::EventHandler {
   std::map<YAML::anchor_t, YamlNodePtr> anchors_;
 };
 
-// A quote that nobody closes takes the rest of the file as its text, and yaml-cpp does not mind.
+// An open quote takes the rest of the file as its text, and yaml-cpp does not mind.
 bool IsNeverClosed(const std::string& text, const YAML::Mark& start) {
   if (start.is_null() || static_cast<size_t>(start.pos) >= text.size()) return false;
   const auto at = static_cast<size_t>(start.pos);

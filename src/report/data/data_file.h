@@ -27,12 +27,14 @@ using DataAbout = std::vector<std::pair<std::string, std::string>>;
 struct DataFormat {
   const char* word;  ///< on the command line
   const char* file;  ///< its name in a result folder
-  /// Writes a file; "" or what went wrong.
+  /// Writes a file; "" or what went wrong. Null where this program was built without the library
+  /// (`option`).
   std::string (*write)(const std::string& path, const DataAbout& about,
                        const std::vector<const Trace*>& traces);
+  const char* option;  ///< of CMake: MBV_WITH_…
 };
 
-/// All formats besides traces.csv, which is always written.
+/// All formats other than traces.csv, which is always written.
 [[nodiscard]] const std::array<DataFormat, 3>& DataFormats();
 /// The row of this word; null if there is none.
 [[nodiscard]] const DataFormat* FindDataFormat(const std::string& word);

@@ -18,7 +18,7 @@ namespace {
 
 constexpr size_t kFewestSplineRows = 6;  // that determine a quintic polynomial
 // A column of rates further from the positions' own, of their RMS, belongs to something else.
-constexpr double kRateDoubt = 0.2;
+constexpr double kRateUncertainty = 0.2;
 // A table that lasts more than so many motions may be in milliseconds.
 constexpr double kMilli = 300.0;
 
@@ -38,7 +38,7 @@ class Loader {
     const RowsPlace place{&yaml(), settings_.place, path_, settings_.csv,
                           source_->steps.col(0).maxCoeff()};
     if (!MakeSplines(place, rows_, &table_)) return {};
-    if (table_.with_rates) DoubtRates();
+    if (table_.with_rates) WarnRates();
     return std::move(table_);
   }
 
@@ -141,7 +141,7 @@ class Loader {
   }
 
   // Rates of another column, sign or unit.
-  void DoubtRates() {
+  void WarnRates() {
     SplineRows alone = rows_;
     alone.rates.clear();
     const Piecewise spline = Smoothed(alone);
@@ -151,7 +151,7 @@ class Loader {
       error += (rows_.rates[i] - rate) * (rows_.rates[i] - rate);
       size += rate * rate;
     }
-    if (error <= kRateDoubt * kRateDoubt * size) return;
+    if (error <= kRateUncertainty * kRateUncertainty * size) return;
     yaml().Warn(*node_.Find("rate"),
                 fmt::format("{}.rate: the column differs from the derivative of the positions by "
                             "{:.0f} % (RMS)",
@@ -385,7 +385,7 @@ class PoseLoader {
                                           source_->time_s[static_cast<size_t>(row)]);
     if (is_rotation) {
       yaml().Error(settings_.place,
-                   where + " pitches beyond 89°, where roll and yaw are not told apart",
+                   where + " pitches beyond 89°, where roll and yaw are not distinguishable",
                    "turn the output's frame");
     } else {
       yaml().Error(settings_.place, where + " is no rotation: its length violates 0.99 … 1.01",

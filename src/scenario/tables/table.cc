@@ -643,7 +643,7 @@ class Plausibility {
   bool regular_ = false;
 };
 
-// The largest digit count that a telling column shows; columns of constants borrow it.
+// The largest digit count that a column with enough values shows; columns of constants borrow it.
 int TableDigits(const std::vector<DigitStatistics>& digits) {
   int significant = 0;
   for (size_t k = 1; k < digits.size(); ++k) {

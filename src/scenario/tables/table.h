@@ -40,7 +40,7 @@ struct TableColumn {
   std::string unit;     ///< of the file's numbers
   double factor = 1.0;  ///< value = factor · number + shift; sign and unit included
   double shift = 0.0;
-  double noise = 0.0;  ///< standard deviation, SI; 0 when too few rows to tell
+  double noise = 0.0;  ///< standard deviation, SI; 0 when too few rows to estimate it
   std::optional<TableTolerance> tolerance;
 };
 

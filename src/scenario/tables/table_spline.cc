@@ -222,7 +222,7 @@ class SplineMaker {
   bool Make() {
     if (table_.periodic && !CheckRounds()) return false;
     Fit();
-    if (table_.moves) Doubt();
+    if (table_.moves) EstimateErrors();
     return true;
   }
 
@@ -275,7 +275,7 @@ class SplineMaker {
     table_.spline = std::make_shared<const Piecewise>(used);
   }
 
-  void Doubt() {
+  void EstimateErrors() {
     const double share = table_.noise_share();
     if (table_.smoothed() || share <= kMostlyNoise) return;
     place_.yaml->AddAt(

@@ -99,7 +99,7 @@ void DigitStatistics::Add(const CellNumber& cell) {
   }
   last_ = cell.value;
   ++count_;
-  if (distinct_.size() < kTelling &&
+  if (distinct_.size() < kEnoughValues &&
       std::find(distinct_.begin(), distinct_.end(), cell.value) == distinct_.end()) {
     distinct_.push_back(cell.value);
   }
@@ -361,7 +361,7 @@ class Heading {
                     table_->columns);
     finding.hint = table_->delimiter == ' ' ? "put names with blanks in quotes, or give the "
                                               "columns by number"
-                                            : "give the columns by number, or mend the heading";
+                                            : "give the columns by number, or correct the heading";
     diagnostics_->Add(std::move(finding));
   }
 

@@ -43,15 +43,17 @@ class DigitStatistics {
   [[nodiscard]] int significant() const { return significant_; }
   /// Few different values, or values in exactly equal steps: the digits left out may be zeros that
   /// the writer dropped, so the column says little about its own format.
-  [[nodiscard]] bool says_little() const { return distinct_.size() < kTelling || equal_steps_; }
+  [[nodiscard]] bool says_little() const {
+    return distinct_.size() < kEnoughValues || equal_steps_;
+  }
 
  private:
-  static constexpr size_t kTelling = 12;  // different values that show a format
+  static constexpr size_t kEnoughValues = 12;  // different values that show a format
   int decimals_ = 0, significant_ = 0;
   bool equal_steps_ = true;
   size_t count_ = 0;
   double last_ = 0.0, step_ = 0.0;
-  std::vector<double> distinct_;  // at most kTelling
+  std::vector<double> distinct_;  // at most kEnoughValues
 };
 
 /// The printed step of each value: one unit of its last digit. Serves both fixed decimals (%.3f)

@@ -202,7 +202,7 @@ RunSummary ClosureSolver::FollowPredicted(const VecX& closed, const VecX& from, 
 void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {
   Eigen::Map<VecX> qvel(system_->data()->qvel, system_->nv());
   rhs_ = -(system_->J() * qvel);
-  system_->AddGuided(1.0, driven_velocity, &rhs_);
+  system_->AddPrescribed(1.0, driven_velocity, &rhs_);
   SolveInto(rhs_, &step_);
   qvel += step_;
   mj_comVel(system_->engine().m.get(), system_->data());
@@ -210,7 +210,7 @@ void ClosureSolver::CorrectVelocity(const VecX& driven_velocity) {
 
 void ClosureSolver::SolveVelocity(const VecX& driven_velocity) {
   rhs_.setZero();
-  system_->AddGuided(1.0, driven_velocity, &rhs_);
+  system_->AddPrescribed(1.0, driven_velocity, &rhs_);
   SolveInto(rhs_, &step_);
   std::copy(step_.begin(), step_.end(), system_->data()->qvel);
   mj_comVel(system_->engine().m.get(), system_->data());
@@ -219,7 +219,7 @@ void ClosureSolver::SolveVelocity(const VecX& driven_velocity) {
 void ClosureSolver::SolveAcceleration(const VecX& driven_acceleration) {
   system_->Bias(&bias_);
   rhs_ = -bias_;
-  system_->AddGuided(1.0, driven_acceleration, &rhs_);
+  system_->AddPrescribed(1.0, driven_acceleration, &rhs_);
   SolveInto(rhs_, &step_);
   std::copy(step_.begin(), step_.end(), system_->data()->qacc);
 }

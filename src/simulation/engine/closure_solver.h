@@ -28,7 +28,7 @@ class ClosureSolver {
   /// factors belong to the final qpos up to round-off.
   [[nodiscard]] RunSummary Close(const VecX& to);
 
-  /// d.qvel with J q̇ = [0; ẋ], minimum norm where freedoms are not driven. Evaluates mj_comVel.
+  /// d.qvel with J q̇ = [0; ẋ], minimum norm where DOFs are not driven. Evaluates mj_comVel.
   void SolveVelocity(const VecX& driven_velocity);
   /// The least change of d.qvel that meets J q̇ = [0; ẋ]. Evaluates mj_comVel.
   void CorrectVelocity(const VecX& driven_velocity);
@@ -58,7 +58,7 @@ class ClosureSolver {
 
   [[nodiscard]] int undriven() const { return system_->nv() - rank_; }
   [[nodiscard]] int redundant() const { return system_->rows() - rank_; }
-  /// Rows of guided coordinates whose force is not unique at the present configuration.
+  /// Rows of prescribed coordinates whose force is not unique at the present configuration.
   [[nodiscard]] std::vector<int> DrivenRowsNotUnique() const;
 
  private:

@@ -349,7 +349,7 @@ RunSummary CloseAtStart(const Motion& motion, const DrivenSample& first, Constra
 
 RunSummary FindCommandedStart(const Motion& motion, const DrivenSample& first, EngineModel* engine,
                               EngineState* start, std::vector<std::string>* notes) {
-  GuideDrives(true, engine);
+  PrescribeDrives(true, engine);
   const DataHandle data = MakeData(*engine->m);
   ConstraintSystem system(*engine, data.get());
   ClosureSolver solver(&system);

@@ -18,7 +18,7 @@ constexpr int kMaxChord = 40, kMaxNewtonSteps = 25, kMaxLoadSteps = 64;
 // Iterations go on to round-off: until this often nothing improves.
 constexpr int kMaxStalls = 2;
 constexpr double kNewtonMerit = 1e-3;  // of the limits of a converged state
-// Scaled eigenvalues below this are idle freedoms and redundant rows: those of the shipped
+// Scaled eigenvalues below this are idle DOFs and redundant rows: those of the shipped
 // mechanisms are below 1e-13, all others above 1e-5.
 constexpr double kStaticsRankTolerance = 1e-10;
 // A first-order answer must satisfy its equations to this.
@@ -317,7 +317,7 @@ bool Statics::LinearDisplacement(const Vec6& F, Vec6* D) {
   VecX dq, dlambda;
   CondensedStep(applied_, f, VecX::Zero(system_->rows()), &dq, &dlambda);
   *D = J_o_ * dq;
-  // A freedom without spring may give way.
+  // A DOF without spring may give way.
   const VecX rest = f + applied_.J.transpose() * dlambda;
   double worst = 0.0;
   for (const int i : free_dofs_) worst = std::max(worst, std::abs(rest[i]) / unit_[i]);

@@ -27,7 +27,7 @@
 //   [J_iᵀ              0 ] [dq_i] = [−f_i              ]                                      (3)
 //
 // (held: J_o is appended to J; a spring tendon is a row of compliance 1/k). The matrix of (3) is
-// small and symmetric; its pseudo-inverse leaves idle freedoms alone and gives redundant rows
+// small and symmetric; its pseudo-inverse leaves idle DOFs alone and gives redundant rows
 // their least forces. It serves all small loads unchanged, which converges by a factor of the
 // relative change of geometry per iteration. Large loads take Newton steps with the tangent of f
 // by central differences, geometric stiffness included, and load steps if need be.

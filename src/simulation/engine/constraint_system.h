@@ -1,9 +1,9 @@
 // MuJoCo's equality constraints as a system r(q) = 0 with Jacobian J and bias J̇q̇.
 //
-// Rows: the closures in plan order, the couplings, then the guided coordinates (drives without a
-// given force, prescribed joints). The residual of a guided row is position − target. MuJoCo 2.2.2
-// has no J̇q̇ in its reference accelerations; it is computed here from MuJoCo's own cvel and
-// cdof_dot:
+// Rows: the closures in plan order, the couplings, then the prescribed coordinates (drives without
+// a given force, prescribed joints). The residual of a prescribed row is position − target.
+// MuJoCo 2.2.2 has no J̇q̇ in its reference accelerations; it is computed here from MuJoCo's own cvel
+// and cdof_dot:
 //
 //   bias acceleration of body b (spatial, about the root's centre of mass c):
 //     A0_b = A0_parent + Σ_j cdof_dot_j q̇_j                                                   (1)
@@ -43,7 +43,7 @@ class ConstraintSystem {
   /// Row of driven coordinate k, or -1 if its force is given.
   [[nodiscard]] int driven_row(int k) const { return driven_row_[k]; }
   /// Adds the multiple of a vector over all driven coordinates to the rows that they have.
-  void AddGuided(double factor, const VecX& per_driven, VecX* per_row) const {
+  void AddPrescribed(double factor, const VecX& per_driven, VecX* per_row) const {
     for (Eigen::Index k = 0; k < per_driven.size(); ++k) {
       const int row = driven_row_[static_cast<size_t>(k)];
       if (row >= 0) (*per_row)[row] += factor * per_driven[k];
@@ -144,7 +144,7 @@ class ConstraintSystem {
   /// rate says.
   void SetSliding(std::vector<int> sign) { sliding_ = std::move(sign); }
   [[nodiscard]] const std::vector<int>& sliding() const { return sliding_; }
-  /// Of an element that rubs, by its joint's load too.
+  /// Of an element with dry friction, by its joint's load too.
   [[nodiscard]] double Breakaway(size_t element) const;
   /// Sum of the breakaway forces of what a row holds.
   [[nodiscard]] double HeldLoss(int row) const;

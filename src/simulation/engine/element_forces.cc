@@ -103,10 +103,10 @@ RunSummary GyroUnsupported(const ForceElement& element, const std::string& descr
           .names_where = true};
 }
 
-// Why friction cannot be simulated where some drive is not guided, or "".
+// Why friction cannot be simulated where the motion of some drive is not prescribed, or "".
 std::string FrictionTrouble(const ForceElement& element, DriveMode drives, bool own_events) {
   const auto& law = std::get<FrictionLaw>(element.law);
-  if (drives == DriveMode::kPushed) {
+  if (drives == DriveMode::kForceDriven) {
     return "in open loop the drive forces jump where it turns round on the commanded motion, and "
            "the motion does so a little earlier or later: servos follow (mode: servo)";
   }
@@ -129,7 +129,7 @@ RunSummary FrictionUnsupported(const EngineModel& engine, size_t e, const std::s
 // In free motion MuJoCo's rows hold friction at rest; by itself MuJoCo lets them do all of it.
 void AddHolding(const ConstraintSystem& system, size_t e, ElementMotion* at) {
   if (system.friction_rows() == 0 || system.engine().elements[e].led) return;
-  if (!Rubs(system.engine().mechanism->elements[e])) return;
+  if (!HasFriction(system.engine().mechanism->elements[e])) return;
   at->sliding = system.sliding().empty() ? 0 : system.sliding()[e];
   at->rests = at->sliding == 0;
   if (at->rests) at->held = system.HeldForce(e);
@@ -228,7 +228,7 @@ double PowerOf(const ForceElement& element, const ElementMotion& at) {
 }
 
 double BreakawayAt(const ForceElement& element, const ElementMotion& at) {
-  if (!at.rests || !Rubs(element)) return 0.0;
+  if (!at.rests || !HasFriction(element)) return 0.0;
   return std::get<FrictionLaw>(element.law).breakaway + at.load_friction;
 }
 
@@ -263,7 +263,7 @@ RunSummary CheckElements(const EngineModel& engine, const Motion& motion, DriveM
   const bool released = motion.free() || IsReleased(engine);
   for (size_t e = 0; e < engine.mechanism->elements.size(); ++e) {
     const ForceElement& element = engine.mechanism->elements[e];
-    if (released && Rubs(element)) {
+    if (released && HasFriction(element)) {
       const std::string why = FrictionTrouble(element, drives, own_events);
       if (!why.empty()) return FrictionUnsupported(engine, e, why);
     }
@@ -295,7 +295,7 @@ void FindLed(EngineModel* engine) {
   rows.setThreshold(kLed);
   if (system.rows() > 0) rows.compute(system.ScaledJ().transpose());
   for (size_t e = 0; e < engine->elements.size(); ++e) {
-    if (!Rubs(engine->mechanism->elements[e])) continue;
+    if (!HasFriction(engine->mechanism->elements[e])) continue;
     const VecX u = ElementGradient(system, e).cwiseProduct(system.dof_unit());
     VecX left = u;
     if (system.rows() > 0) left -= system.ScaledJ().transpose() * rows.solve(u);
@@ -315,7 +315,7 @@ void AddLackingForces(const ConstraintSystem& system, const VecX& driven_acceler
     if (mjcf::IsPlanned(elements[e])) continue;
     const ElementPlace& place = engine.elements[e];
     ElementMotion at = ElementMotionOf(system, e);
-    if (at.rests && Rubs(elements[e])) continue;  // unknown, or MuJoCo's own
+    if (at.rests && HasFriction(elements[e])) continue;  // unknown, or MuJoCo's own
     if (elements[e].drive >= 0 && elements[e].drive < driven_acceleration.size()) {
       at.acceleration = driven_acceleration[elements[e].drive];
     }
@@ -340,7 +340,7 @@ void SetCommandedAcceleration(const VecX& driven_acceleration, ConstraintSystem*
   VecX rates;
   system->Bias(&rates);
   rates = -rates;
-  system->AddGuided(1.0, driven_acceleration, &rates);
+  system->AddPrescribed(1.0, driven_acceleration, &rates);
   const Eigen::CompleteOrthogonalDecomposition<MatX> J(system->ScaledJ());
   const VecX scaled = J.solve(VecX(rates.cwiseQuotient(system->row_unit())));
   Eigen::Map<VecX>(system->data()->qacc, system->nv()) = scaled.cwiseProduct(system->dof_unit());

@@ -1,13 +1,13 @@
 // Force elements on MuJoCo's own coordinates.
 //
 // Damping, linear springs and rotors of joints are MuJoCo's (damping, stiffness, springref,
-// armature; simulation/mjcf/plan.h). What 2.2 has no word for is pushed along the coordinate's
+// armature; simulation/mjcf/plan.h). What 2.2 has no word for is applied along the coordinate's
 // gradient u: springs with other terms than the linear one or without it, rotors on tendons, and
 // dry friction that slides (frictionloss is a soft constraint without Stribeck's curve; it serves
 // at rest in free motion, stick_slip.h):
 //   F(q, q̇, q̈),  qfrc = F u                                                                   (1)
 // A rotor on a tendon needs q̈ before it is known: the commanded one, so that its drive must be
-// guided. So does one that feels its carrier turn. Where freedoms move by forces, MuJoCo has its
+// prescribed. So does one that feels its carrier turn. Where DOFs move by forces, MuJoCo has its
 // J n² as armature, and the rest follows the accelerations that MuJoCo finds (Integrator::Settle):
 // with M MuJoCo's inertia and C what J n q̇ a·ω adds to it, M q̈_{k+1} = f − C q̈_k, which
 // converges, as ½ J (n q̇ ± a·ω)² ≥ 0 makes M + C and M − C positive.
@@ -51,7 +51,7 @@ struct RotorTurning {
 /// Motion of an element's coordinate.
 struct ElementMotion {
   double position = 0.0, rate = 0.0, acceleration = 0.0;
-  bool rests = false;          ///< where it may rub: at most at the rest rate, or held
+  bool rests = false;  ///< where it may have dry friction: at most at the rest rate, or held
   double load_friction = 0.0;  ///< by the joint's load (load_friction.h)
   int sliding = 0;             ///< where it is known: sign of the rate
   double held = 0.0;           ///< force of MuJoCo's row that holds it
@@ -96,9 +96,9 @@ struct ElementSlope {
 };
 [[nodiscard]] ElementSlope SlopeOf(const ForceElement& element, double position);
 
-/// kUnsupported for a rotor on a distance drive that is not guided, and where some drive is not and
-/// MuJoCo steps by itself for rotors with a carrier and for friction other than Coulomb's; for all
-/// friction where drives are pushed in open loop.
+/// kUnsupported for a rotor on a distance drive whose motion is not prescribed, and where some
+/// drive is not and MuJoCo steps by itself for rotors with a carrier and for friction other than
+/// Coulomb's; for all friction where drives are force-controlled in open loop.
 [[nodiscard]] RunSummary CheckElements(const EngineModel& engine, const Motion& motion,
                                        DriveMode drives, bool own_events);
 /// Finds the elements that are led, at the model's reference pose.

@@ -232,7 +232,7 @@ void AddFrictionRows(EngineModel* engine) {
   for (int t = 0; t < m.ntendon; ++t) places.push_back({.tendon = t, .elements = {}});
   for (size_t e = 0; e < engine->elements.size(); ++e) {
     const ElementPlace& place = engine->elements[e];
-    if (place.led || !Rubs(engine->mechanism->elements[e])) continue;
+    if (place.led || !HasFriction(engine->mechanism->elements[e])) continue;
     const int at = place.tendon >= 0 ? m.nv + place.tendon : place.dof;
     const auto& law = std::get<FrictionLaw>(engine->mechanism->elements[e].law);
     // Without a loss there is no row; that by the load is written into it at every node.
@@ -268,7 +268,7 @@ void ReleaseForcedDrives(const Motion& motion, EngineModel* engine) {
   }
 }
 
-void GuideDrives(bool on, EngineModel* engine) {
+void PrescribeDrives(bool on, EngineModel* engine) {
   for (size_t k = 0; k < engine->mechanism->drives.size(); ++k) {
     engine->driven[k].forced = !on;
     engine->m->eq_active[engine->driven[k].equality] = on ? 1 : 0;

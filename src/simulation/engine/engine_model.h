@@ -37,7 +37,7 @@ struct ElementPlace {
   bool led = false;       ///< commands move the coordinate, loops included, where others are free
 };
 
-/// A row of MuJoCo's frictionloss, and the elements that rub there.
+/// A row of MuJoCo's frictionloss, and the elements with dry friction there.
 struct FrictionPlace {
   int dof = -1, tendon = -1;  ///< one of both
   std::vector<size_t> elements;
@@ -101,11 +101,11 @@ void LeaveOutShapes(EngineModel* engine);
 /// What counts as rest in a motion of this length, for every force element.
 void SetRestRates(double duration_s, EngineModel* engine);
 
-/// Gives MuJoCo rows of frictionloss where elements rub on a coordinate that is not led, with the
-/// breakaway forces as losses. To be called before the data is made.
+/// Gives MuJoCo rows of frictionloss where elements have dry friction on a coordinate that is not
+/// led, with the breakaway forces as losses. To be called before the data is made.
 void AddFrictionRows(EngineModel* engine);
 
-/// True if some drive is not guided.
+/// True if the motion of some drive is not prescribed.
 [[nodiscard]] bool IsReleased(const EngineModel& engine);
 /// Gives MuJoCo the inertia of rotors with a carrier along their coordinates, as armature: what is
 /// left of them is smaller than the inertia that it meets (element_forces.h).
@@ -114,7 +114,7 @@ void AddArmatures(EngineModel* engine);
 /// Switches off the guiding constraints of the drives whose force the motion gives.
 void ReleaseForcedDrives(const Motion& motion, EngineModel* engine);
 /// Switches the guiding constraints of all drives on or off.
-void GuideDrives(bool on, EngineModel* engine);
+void PrescribeDrives(bool on, EngineModel* engine);
 /// Finds the actuators of every drive, of a model written with servos. Throws EngineError if there
 /// are none.
 void FindServos(EngineModel* engine);

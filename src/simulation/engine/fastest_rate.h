@@ -32,7 +32,7 @@ struct FastestRate {
                                         double duration_s);
 
 /// Steps per period (2π over the rate) below which the scheme is not stable, and the drift (3)
-/// above which a step is told to be too coarse.
+/// above which a step is reported as too coarse.
 inline constexpr double kLeastStepsPerPeriod = 4.0 * std::numbers::pi, kMostDrift = 1e-5;
 
 }  // namespace mbv::simulation

@@ -18,7 +18,7 @@
 namespace mbv::simulation {
 namespace {
 
-// Stick and slip where freedoms move by forces, with the corrected engine.
+// Stick and slip where DOFs move by forces, with the corrected engine.
 //
 // MuJoCo's frictionloss is a soft constraint: what rests creeps, and what slides stops over many
 // steps. Here its rows hold what rests, as hard as all other rows (integrator.h). Where one would
@@ -39,9 +39,9 @@ class StickSlip {
   /// All outlive the object.
   StickSlip(Session* session, Integrator* integrator, CommandAt command);
 
-  /// True where something that rubs moves by forces.
+  /// True where something with dry friction moves by forces.
   [[nodiscard]] bool acts() const { return !s_.engine.frictions.empty(); }
-  /// Decides at the start, before Integrator::Start(): rates tell who slides.
+  /// Decides at the start, before Integrator::Start(): rates show what slides.
   void FindSliding();
   /// Decides what rests at the start, after Integrator::Start().
   [[nodiscard]] RunSummary Begin();
@@ -78,7 +78,7 @@ class StickSlip {
   const CommandAt command_;
   std::vector<int> sliding_;
   std::vector<char> fresh_;  ///< slides since the present node
-  std::vector<size_t> rubbing_;
+  std::vector<size_t> friction_elements_;
   std::vector<double> rates_;  ///< of these, by (1)
   RunSummary trouble_ = RunSummary::Done();
   int uniform_ = 4;  ///< nodes since the last event, as in Step
@@ -104,14 +104,14 @@ StickSlip::StickSlip(Session* session, Integrator* integrator, CommandAt command
     : s_(*session), integrator_(*integrator), command_(std::move(command)) {
   const std::vector<ForceElement>& elements = s_.engine.mechanism->elements;
   for (size_t e = 0; e < elements.size(); ++e) {
-    if (Rubs(elements[e]) && !s_.engine.elements[e].led) rubbing_.push_back(e);
+    if (HasFriction(elements[e]) && !s_.engine.elements[e].led) friction_elements_.push_back(e);
   }
   sliding_.assign(elements.size(), 0);
   fresh_.assign(elements.size(), 0);
 }
 
 void StickSlip::FindSliding() {
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     const double rate = ElementMotionOf(s_.system, e).rate;
     const bool rests = std::abs(rate) <= kStopped * s_.engine.elements[e].rest_rate;
     sliding_[e] = rests ? 0 : rate > 0.0 ? 1 : -1;
@@ -143,7 +143,8 @@ int StickSlip::Started(size_t element) const {
 }
 
 bool StickSlip::Ended() const {
-  return std::ranges::any_of(rubbing_, [this](size_t e) { return Stopped(e) || Started(e) != 0; });
+  return std::ranges::any_of(friction_elements_,
+                             [this](size_t e) { return Stopped(e) || Started(e) != 0; });
 }
 
 RunSummary StickSlip::Go(double from_s, double h, bool multistep) {
@@ -171,7 +172,7 @@ RunSummary StickSlip::Jump(double t_s) {
 RunSummary StickSlip::LetGo(double t_s) {
   for (int pass = 0; pass < kMostRounds; ++pass) {
     bool changed = false;
-    for (const size_t e : rubbing_) {
+    for (const size_t e : friction_elements_) {
       const int sign = Started(e);
       if (sign == 0) continue;
       sliding_[e] = sign;
@@ -196,16 +197,17 @@ RunSummary StickSlip::FindRates(const Event& event, double t_s) {
   const auto rests = [&](size_t e) {
     return sliding_[e] == 0 || std::ranges::find(event.stops, e) != event.stops.end();
   };
-  const Eigen::Index rows = system.rows(), resting = std::ranges::count_if(rubbing_, rests);
+  const Eigen::Index rows = system.rows(),
+                     resting = std::ranges::count_if(friction_elements_, rests);
   const Eigen::Map<const VecX> v(s_.data->qvel, system.nv());
   MatX S(rows + resting, system.nv());
   VecX missed(rows + resting);
   S.topRows(rows) = system.ScaledJ();
   missed.head(rows) = system.J() * v;
-  system.AddGuided(-1.0, at.motion.velocity, &missed);
+  system.AddPrescribed(-1.0, at.motion.velocity, &missed);
   missed.head(rows) = missed.head(rows).cwiseQuotient(system.row_unit());
   Eigen::Index row = rows;
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     if (!rests(e)) continue;
     const VecX G = ElementGradient(system, e).cwiseProduct(system.dof_unit());
     const double unit = std::max(G.cwiseAbs().maxCoeff(), std::numeric_limits<double>::min());
@@ -216,9 +218,9 @@ RunSummary StickSlip::FindRates(const Event& event, double t_s) {
   factors.setThreshold(kDetermined);
   factors.compute(S);
   const VecX error = factors.solve(missed).cwiseProduct(system.dof_unit());
-  rates_.resize(rubbing_.size());
-  for (size_t k = 0; k < rubbing_.size(); ++k) {
-    const size_t e = rubbing_[k];
+  rates_.resize(friction_elements_.size());
+  for (size_t k = 0; k < friction_elements_.size(); ++k) {
+    const size_t e = friction_elements_[k];
     rates_[k] = ElementMotionOf(system, e).rate - ElementGradient(system, e).dot(error);
   }
   return RunSummary::Done();
@@ -228,8 +230,8 @@ RunSummary StickSlip::FindRates(const Event& event, double t_s) {
 RunSummary StickSlip::Apply(const Event& event, double t_s) {
   if (!event.stops.empty()) {
     if (RunSummary summary = FindRates(event, t_s); !summary.ok()) return summary;
-    for (size_t k = 0; k < rubbing_.size(); ++k) {
-      const size_t e = rubbing_[k];
+    for (size_t k = 0; k < friction_elements_.size(); ++k) {
+      const size_t e = friction_elements_[k];
       const bool stops = std::ranges::find(event.stops, e) != event.stops.end();
       const bool slow = std::abs(rates_[k]) <= kStopped * s_.engine.elements[e].rest_rate;
       if (stops || (slow && fresh_[e] == 0)) sliding_[e] = 0;
@@ -301,7 +303,7 @@ double StickSlip::StartTime(const Integrator::Node& node, size_t element, double
 // The first event of a step that was tried.
 RunSummary StickSlip::Find(const Integrator::Node& node, double from_s, double h, Event* event) {
   std::vector<size_t> stopped, started;
-  for (const size_t e : rubbing_) {
+  for (const size_t e : friction_elements_) {
     if (Stopped(e)) stopped.push_back(e);
     if (Started(e) != 0) started.push_back(e);
   }
@@ -378,7 +380,7 @@ RunSummary Failure(const std::string& message, double t_s) {
 // Home to the first driven sample, with consistent velocities and accelerations.
 RunSummary PutAtStart(Session* s, const DrivenSample& first) {
   if (s->motion.free()) return PutAtFreeStart(s, first);
-  if (s->options.drives != DriveMode::kGuided) return PutAtCommandedStart(s, first);
+  if (s->options.drives != DriveMode::kPrescribedMotion) return PutAtCommandedStart(s, first);
   if (RunSummary summary = CloseAtStart(s->motion, first, &s->system, &s->solver, &s->run->notes);
       !summary.ok()) {
     summary.time_s = 0.0;
@@ -401,8 +403,8 @@ double Rounded(double x) {
   return digit * std::floor(x / digit);
 }
 
-// Springs, dampers and servos against the step: a coarse step is told, one that cannot follow them
-// is refused before it gives numbers.
+// Springs, dampers and servos against the step: a coarse step is reported, one that cannot follow
+// them is refused before it gives numbers.
 RunSummary CheckStep(Session* s) {
   const FastestRate fastest = FastestRateOf(s->system, s->options.servo, s->motion.duration_s);
   const double h = AdjustedStep(s->motion, s->options.step_s);
@@ -441,7 +443,8 @@ RunSummary TroubleAt(const Session& s, double t_s) {
 RunSummary CheckSample(const Session& s, double largest_gap_m, double t_s) {
   const ConstraintSystem::Gap gap = s.system.LargestGap();
   if (gap.position_m < largest_gap_m) return TroubleAt(s, t_s);
-  return Failure(fmt::format("the simulated loops came apart by {:.3g} m", gap.position_m), t_s);
+  return Failure(fmt::format("loop-closure error of {:.3g} m in the simulation", gap.position_m),
+                 t_s);
 }
 
 }  // namespace

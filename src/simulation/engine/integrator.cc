@@ -378,8 +378,8 @@ void Integrator::SetReference(const VecX& v, const DrivenSample& at, Guidance gu
   s_.system.Bias(&bias_);
   rate_ = s_.system.J() * v;
   aref_ = -bias_;
-  s_.system.AddGuided(-1.0, at.velocity, &rate_);
-  s_.system.AddGuided(1.0, at.acceleration, &aref_);
+  s_.system.AddPrescribed(-1.0, at.velocity, &rate_);
+  s_.system.AddPrescribed(1.0, at.acceleration, &aref_);
   if (guidance == Guidance::kNew) guidance_ = b_ * rate_ + k_ * s_.system.residual();
   aref_ -= guidance_;
   Eigen::Map<VecX> R(d_->efc_R, rows);

@@ -23,7 +23,7 @@
 //   a_{n+1} = Σ_i (−1)^{i+1} C(n, i) a_{n+1−i},                                               (6)
 // and the forces are those of least norm that belong to them.
 // The classical Runge–Kutta method builds up the history at the start and after every break of the
-// commanded profiles. Its stages lie off the path by h²; guided back from there, at a rate that
+// commanded profiles. Its stages lie off the path by h²; pulled back from there, at a rate that
 // rises with 1/h, they would leave a velocity error of h². So b (J q̇ − ẋ_ref) + k r of the step's
 // first node serves all of its stages. Rotation vectors of balls
 // and free bodies follow u̇ = ω + ½ u × ω + 1/12 u × (u × ω) [Iserles et al. 2000, Eq. 2.42].

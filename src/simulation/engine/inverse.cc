@@ -79,14 +79,14 @@ RunSummary RunInverse(Session* s, const DrivenMotion& driven) {
       return At(summary, times[i]);
     }
     if (s->solver.undriven() > s->spins.count()) {
-      return {
-          .stop = Stop::kUnsupported,
-          .message = fmt::format("{} freedoms are not driven: their motion follows from forces, "
-                                 "use mode: forward",
-                                 s->solver.undriven() - s->spins.count()),
-          .time_s = times[i],
-          .where = {},
-          .unit = {}};
+      return {.stop = Stop::kUnsupported,
+              .message = fmt::format(
+                  "{} degrees of freedom are not driven: their motion follows from forces, "
+                  "use mode: forward",
+                  s->solver.undriven() - s->spins.count()),
+              .time_s = times[i],
+              .where = {},
+              .unit = {}};
     }
     if (i == 0) {
       if (RunSummary summary = s->spins.TakeLeastTurns(&s->solver, samples[i]); !summary.ok()) {

@@ -182,7 +182,7 @@ Eigen::Map<VecX> Forces(Session* session) {
 
 // The only motion that the loops leave, in units that suit the mechanism; empty where there are
 // more.
-VecX OnlyFreedom(const ConstraintSystem& system) {
+VecX OnlyDof(const ConstraintSystem& system) {
   if (system.rows() == 0) return system.nv() == 1 ? VecX(VecX::Ones(1)) : VecX();
   Eigen::ColPivHouseholderQR<MatX> qr;
   qr.setThreshold(kOpenShare);
@@ -197,7 +197,7 @@ VecX OnlyFreedom(const ConstraintSystem& system) {
 HeldShares::HeldShares(Session* session) : s_(*session) {
   const int rows = s_.system.friction_rows();
   if (rows < 2 || s_.system.sliding().empty()) return;
-  const VecX freedom = OnlyFreedom(s_.system);
+  const VecX freedom = OnlyDof(s_.system);
   if (freedom.size() == 0) return;
   const auto force = Forces(&s_);
   double load = 0.0;

@@ -93,7 +93,7 @@ class Recorder {
   [[nodiscard]] std::vector<Vec3> ForcesAcross(const std::vector<size_t>& elements,
                                                const Loads& loads);
 
-  /// True if something rubs.
+  /// True if there is dry friction.
   [[nodiscard]] bool has_bands() const {
     return columns_.Has(Quantity::kForceBand) || columns_.Has(Quantity::kBaseForceBand);
   }

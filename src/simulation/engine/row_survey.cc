@@ -36,7 +36,7 @@ class RowSurveyor {
       RunSummary summary = s_.solver.Follow(from, at.position);
       if (summary.ok() && s_.solver.undriven() > s_.spins.count()) {
         summary = {.stop = Stop::kUnsupported,
-                   .message = "freedoms are not driven: their motion follows from forces",
+                   .message = "degrees of freedom are not driven: their motion follows from forces",
                    .where = {},
                    .unit = {}};
       }

@@ -1,4 +1,4 @@
-// MuJoCo's equality rows along a motion, as they are when nobody helps them: what is softened,
+// MuJoCo's equality rows along a motion, as MuJoCo takes them without correction: what is softened,
 // which velocity term is left out, which drive forces mj_forward gives for it.
 #pragma once
 
@@ -30,7 +30,7 @@ struct RowSurvey {
 };
 
 /// Of commanded motions, at these times in ascending order, with the stiffest equalities for the
-/// step. kUnsupported: freedoms that nothing drives; and what Simulate() ends with.
+/// step. kUnsupported: DOFs that nothing drives; and what Simulate() ends with.
 [[nodiscard]] RowSurvey SurveyRows(const Mechanism& mechanism, const Motion& motion,
                                    const DrivenMotion& driven, const std::vector<double>& times_s,
                                    double step_s);

@@ -81,7 +81,7 @@ class SpinStopper {
 /// What is commanded at one instant.
 struct Commanded {
   DrivenSample motion;  ///< of everything driven
-  VecX force;           ///< of the drives: pushed or fed forward; empty if nothing is given
+  VecX force;           ///< of the drives: applied or fed forward; empty if nothing is given
 };
 
 /// A state of MuJoCo.
@@ -127,13 +127,14 @@ struct Session {
   Loads loads;
   Recorder recorder;
   WorkMeter work;
-  const bool released;  ///< some drive is not guided: friction and accelerations are MuJoCo's
+  const bool released;  ///< the motion of some drive is not prescribed: friction and accelerations
+                        ///< are MuJoCo's
   const std::vector<size_t> loaded;         ///< elements with friction by their joint's load
   RunSummary trouble = RunSummary::Done();  ///< in finding it
   const bool lacking;     ///< there are force elements that MuJoCo has no word for
   const bool gyroscopic;  ///< some of them need accelerations
   VecX work_rates;        ///< of the state that was asked for last
-  EngineState start;      ///< of a mechanism whose drives are pushed or servos
+  EngineState start;      ///< of a mechanism whose drives are force-controlled or servos
   bool shared = false;    ///< drive forces are not unique: the least ones are reported
   std::function<void(double)> progress;
   VecX given;  ///< forces that the driven coordinates are given
@@ -162,7 +163,7 @@ class LoopClock {
 [[nodiscard]] RunSummary RunCorrected(Session* session, const DrivenMotion& driven);
 [[nodiscard]] RunSummary RunStock(Session* session, const DrivenMotion& driven);
 
-/// Start of a free motion: options.start on the loops, guided coordinates at `first`.
+/// Start of a free motion: options.start on the loops, prescribed coordinates at `first`.
 [[nodiscard]] RunSummary PutAtFreeStart(Session* session, const DrivenSample& first);
 
 /// Brings the system's data from home to the commanded start. Commands of outputs lead there by
@@ -172,8 +173,8 @@ class LoopClock {
 [[nodiscard]] RunSummary CloseAtStart(const Motion& motion, const DrivenSample& first,
                                       ConstraintSystem* system, ClosureSolver* solver,
                                       std::vector<std::string>* notes);
-/// Start of a pushed or servo-driven mechanism: every drive and base on its command. Needs the
-/// guiding constraints of all drives; leaves them switched on.
+/// Start of a force-controlled or servo-driven mechanism: every drive and base on its command.
+/// Needs the guiding constraints of all drives; leaves them switched on.
 [[nodiscard]] RunSummary FindCommandedStart(const Motion& motion, const DrivenSample& first,
                                             EngineModel* engine, EngineState* start,
                                             std::vector<std::string>* notes);

@@ -166,7 +166,7 @@ void Session::ApplyForces(double t_s, const Commanded& at) {
   for (const DriveForce& force : motion.forces) {
     given[force.drive] = Evaluate(force.force, t_s).value;
   }
-  if (options.drives == DriveMode::kPushed) given.head(at.force.size()) = at.force;
+  if (options.drives == DriveMode::kForceDriven) given.head(at.force.size()) = at.force;
   if (options.drives == DriveMode::kServo) RunServos(engine, at, data.get(), &given);
   system.SetGivenForces(given);
   if (options.drives != DriveMode::kServo) system.AddGivenForces(data->qfrc_applied);
@@ -233,7 +233,7 @@ MjcfOptions MjcfOptionsOf(const Motion& motion, const SimulationOptions& options
   MjcfOptions mjcf{.step_s = AdjustedStep(motion, options.step_s),
                    .time_constant_steps = options.stock_time_constant_steps,
                    .default_softness = options.engine == Engine::kDefaults,
-                   .guided = options.drives == DriveMode::kGuided};
+                   .prescribed = options.drives == DriveMode::kPrescribedMotion};
   if (options.drives == DriveMode::kServo) {
     mjcf.kp.assign(options.servo.kp.begin(), options.servo.kp.end());
     mjcf.kv.assign(options.servo.kv.begin(), options.servo.kv.end());
@@ -254,14 +254,14 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   SetRestRates(motion.duration_s, &engine);
   ReleaseForcedDrives(motion, &engine);
   EngineState start;
-  if (options.drives != DriveMode::kGuided) {
+  if (options.drives != DriveMode::kPrescribedMotion) {
     DrivenSample first;
     if (RunSummary summary = driven(0.0, &first); !summary.ok()) return summary;
     if (RunSummary summary = FindCommandedStart(motion, first, &engine, &start, &run->notes);
         !summary.ok()) {
       return summary;
     }
-    GuideDrives(false, &engine);
+    PrescribeDrives(false, &engine);
   }
   if (options.drives == DriveMode::kServo) FindServos(&engine);
   const bool own_events = options.engine == Engine::kCorrected;

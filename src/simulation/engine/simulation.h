@@ -22,9 +22,10 @@ enum class Engine {
 
 /// What moves the drives in forward mode.
 enum class DriveMode {
-  kGuided,  ///< constraints hold them on the commanded motion; the force is the constraint's
-  kPushed,  ///< given forces push them in open loop, from the commanded start
-  kServo,   ///< MuJoCo's own position and velocity actuators follow the commanded motion
+  kPrescribedMotion,  ///< constraints hold them on the commanded motion; the force is the
+                      ///< constraint's
+  kForceDriven,       ///< given forces drive them in open loop, from the commanded start
+  kServo,             ///< MuJoCo's own position and velocity actuators follow the commanded motion
 };
 
 /// Forces of all drives, in model order [N or N m], at any time of the scenario.
@@ -39,19 +40,19 @@ struct SimulationOptions {
   SimulationMode mode = SimulationMode::kForward;
   Engine engine = Engine::kCorrected;
   double step_s = 1e-3;  ///< integration step, > 0; samples fall on whole steps
-  /// Time constant with which closures and driven coordinates are guided back to their commanded
+  /// Time constant with which closures and driven coordinates are pulled back to their commanded
   /// motion (corrected engine), in steps, >= 20: stiffer guidance destabilises the integration,
   /// softer guidance lets errors live longer.
   double guidance_steps = 50.0;
   /// Time constant of the generated file's equality constraints (stock engine), in steps, >= 2:
   /// MuJoCo itself raises smaller ones.
   double stock_time_constant_steps = 2.0;
-  /// Other than kGuided: forward mode of the corrected engine, and every freedom commanded.
-  DriveMode drives = DriveMode::kGuided;
-  DriveForces forces = {};  ///< kPushed: what pushes; kServo: feed-forward, or empty
+  /// Other than kPrescribedMotion: forward mode of the corrected engine, and every DOF commanded.
+  DriveMode drives = DriveMode::kPrescribedMotion;
+  DriveForces forces = {};  ///< kForceDriven: the forces; kServo: feed-forward, or empty
   ServoGains servo = {};    ///< kServo only
   /// Free motion only: poses and twists of all bodies at t = 0. They are put onto the loops of the
-  /// simulated model, with the guided coordinates where they are commanded.
+  /// simulated model, with the prescribed coordinates where they are commanded.
   BodyStates start = {};
 };
 [[nodiscard]] Diagnostics Check(const SimulationOptions& options);
@@ -79,7 +80,7 @@ struct SimulationRun {
 /// break (the integration steps onto them); of a free motion `driven` counts for the commanded
 /// drives and prescribed joints only; `driven` gives the commanded motion, evaluated before the
 /// loop, as are the forces. Fails with what `driven` returned; kNoConvergence (the loops do not
-/// close with the commanded drive positions); kUnsupported (undriven freedoms or a free motion in
+/// close with the commanded drive positions); kUnsupported (undriven DOFs or a free motion in
 /// inverse mode, a load on a merged body, a drive on a ball); kEngineFailure (MuJoCo's errors,
 /// motion not finite, loops apart, a step that springs or servos cannot be followed with). Samples
 /// up to the failure are filled, the others NaN.

@@ -136,7 +136,7 @@ void AddDrive(int u, MjcfImport* in) {
   const int type = m.actuator_trntype[u];
   const bool on_joint = type == mjTRN_JOINT || type == mjTRN_JOINTINPARENT;
   const int j = on_joint ? in->joint_of[static_cast<size_t>(m.actuator_trnid[2 * u])] : -1;
-  if (j < 0 || FreedomsOf(in->mechanism.joints[static_cast<size_t>(j)].kind) != 1) {
+  if (j < 0 || DofsOf(in->mechanism.joints[static_cast<size_t>(j)].kind) != 1) {
     constexpr std::pair<int, const char*> kOthers[] = {{mjTRN_SLIDERCRANK, "slidersite"},
                                                        {mjTRN_TENDON, "tendon"},
                                                        {mjTRN_SITE, "site"},
@@ -329,7 +329,7 @@ void AddEqualities(MjcfImport* in) {
 
 namespace {
 
-constexpr size_t kMost = 6;  // names that are told
+constexpr size_t kMost = 6;  // names that are reported
 
 // Joints with several coordinates of which a number that acts on forces is not zero.
 std::vector<std::string> BallsWith(const MjcfImport& in, const mjtNum* per_dof) {
@@ -436,7 +436,7 @@ std::string TouchingGeoms(const MjcfImport& in) {
   return "";
 }
 
-void TellNames(const MjcfImport& in, const char* text, const std::vector<std::string>& names,
+void WarnNames(const MjcfImport& in, const char* text, const std::vector<std::string>& names,
                const char* hint = "") {
   if (!names.empty()) in.Say(text + Joined(names, kMost), hint);
 }
@@ -453,7 +453,7 @@ void MjcfImport::LeaveOut(const char* element, const char* attribute, const std:
   Say(left_out.back().text, "forces are computed without it");
 }
 
-void TellWhatIsLost(MjcfImport* in) {
+void WarnWhatIsLost(MjcfImport* in) {
   LeaveOutFluid(in);
   LeaveOutBalls(in);
   LeaveOutOf("hinge or slide", "damping", "the negative damping", in->driving, in);
@@ -461,10 +461,10 @@ void TellWhatIsLost(MjcfImport* in) {
   if (!in->held.empty()) {
     in->LeaveOut("body/freejoint", "", "the free joint of " + Joined(in->held, kMost));
   }
-  TellNames(*in, "the gears of these actuators are left out: ", in->geared,
+  WarnNames(*in, "the gears of these actuators are left out: ", in->geared,
             "positions and forces are those of the joint, not of the motor");
-  TellNames(*in, "positions of these joints count from the file's reference (ref): ", in->shifted);
-  TellNames(*in, "zero is beyond the range of these joints, the loops are closed from inside it: ",
+  WarnNames(*in, "positions of these joints count from the file's reference (ref): ", in->shifted);
+  WarnNames(*in, "zero is beyond the range of these joints, the loops are closed from inside it: ",
             in->moved);
   if (in->touching && !in->ContactsAreOff()) {
     const std::string contact = TouchingGeoms(*in);

@@ -45,7 +45,7 @@ struct MjcfImport {
 
   std::vector<ModelCaveat> left_out = {};  ///< what acts on forces and is not in the mechanism
 
-  // What the findings at the end tell.
+  // What the findings at the end report.
   std::vector<std::string> held = {}, geared = {}, shifted = {}, moved = {};
   std::vector<std::string> driving = {};  ///< joints whose damping is negative
   std::set<int> coupling_tendons = {};    ///< that are nothing but the sum in a coupling
@@ -94,6 +94,6 @@ void AddDrives(MjcfImport* in);
 void AddSites(MjcfImport* in);
 void AddShapes(MjcfImport* in);
 /// A finding for each kind of thing that the mechanism cannot express or has otherwise.
-void TellWhatIsLost(MjcfImport* in);
+void WarnWhatIsLost(MjcfImport* in);
 
 }  // namespace mbv::simulation

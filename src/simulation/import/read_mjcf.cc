@@ -29,7 +29,7 @@ ImportedMjcf Import(const mjcf::ForeignMjcf& foreign, const std::string& file,
   AddDrives(&in);
   AddSites(&in);
   AddShapes(&in);
-  TellWhatIsLost(&in);
+  WarnWhatIsLost(&in);
   imported.mechanism = std::move(in.mechanism);
   imported.left_out = std::move(in.left_out);
   imported.joint_of = std::move(in.joint_of);

@@ -122,7 +122,7 @@ class Expander {
     for (const Drive& drive : source_.drives) {
       const auto* driven = std::get_if<JointDrive>(&drive.kind);
       if (driven == nullptr || std::isfinite(drive.stiffness)) continue;
-      if (FreedomsOf(source_.joints[driven->joint].kind) == 1) held[driven->joint] = true;
+      if (DofsOf(source_.joints[driven->joint].kind) == 1) held[driven->joint] = true;
     }
     return held;
   }

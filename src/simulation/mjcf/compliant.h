@@ -8,9 +8,9 @@
 //   hinges in beam axes join them, with stiffness EA/L, 12 E I_z/L³, 12 E I_y/L³, GJ/L, E I_y/L,
 //   E I_z/L: at mid-span force and moment of an Euler–Bernoulli beam act on deformations of their
 //   own, and carried to an end they give its cantilever compliance exactly.
-// * Pieces that cannot move against each other (fixed joints, one-freedom joints of locked drives,
+// * Pieces that cannot move against each other (fixed joints, single-DOF joints of locked drives,
 //   prescribed joints) are one body. Servos are springs at the drive's coordinate; locked drives of
-//   several freedoms and locked legs stay guided by an equality.
+//   several DOFs and locked legs stay held by an equality.
 // * Every joint carries all its reactions: the isostatic rule is for rigid bodies.
 #pragma once
 

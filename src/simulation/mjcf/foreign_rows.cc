@@ -181,7 +181,7 @@ const ForeignRow kRows[] = {
     {"tendon/fixed", "stiffness damping frictionloss", kLeftOut, "the tendon pulls", "0", true},
     {"tendon/spatial", "limited range", kLeftOut, "the tendon stops at its limit", "", true},
     {"tendon/fixed", "limited range", kLeftOut, "the tendon stops at its limit", "", true},
-    {"default/tendon", "*", kNoForce},  // told of the tendons
+    {"default/tendon", "*", kNoForce},  // reported for the tendons
     {"spatial/site", "*", kNoForce},
     {"spatial/geom", "*", kNoForce},
     {"spatial/pulley", "*", kNoForce},

@@ -304,7 +304,7 @@ const char* DrivesText(const MjcfOptions& options) {
            "0;\n"
            "   the first number of eq_data is then a drive's distance from home.\n";
   }
-  if (!options.guided) {
+  if (!options.prescribed) {
     return "1. As it is: nothing holds the drives; ctrl of the motors is the drive force [N, N "
            "m].\n"
            "   With ctrl 0 the mechanism falls from the key \"home\".\n"
@@ -315,7 +315,8 @@ const char* DrivesText(const MjcfOptions& options) {
   return "1. As it is: the equalities drive:NAME hold the drives at home; the first number of\n"
          "   eq_data of one is its distance from home, to be changed while stepping. Their forces\n"
          "   are constraint forces (efc_force).\n"
-         "2. Pushed instead: switch those equalities off (eq_active = 0); then ctrl of the motors\n"
+         "2. Force control instead: switch those equalities off (eq_active = 0); then ctrl of the "
+         "motors\n"
          "   is the drive force [N, N m].\n";
 }
 
@@ -426,15 +427,15 @@ void WriteDefaults(const Sections& s) {
   s.xml->Close();
 }
 
-// From so many degrees of freedom on, MuJoCo's sparse constraint solver is faster.
+// From so many DOFs on, MuJoCo's sparse constraint solver is faster.
 constexpr int kSparseFrom = 40;
 
-int FreedomsOfTree(const Mechanism& mechanism) {
-  int freedoms = 0;
+int DofsOfTree(const Mechanism& mechanism) {
+  int dofs = 0;
   for (const int j : mechanism.tree_joints) {
-    freedoms += FreedomsOf(mechanism.joints[static_cast<size_t>(j)].kind);
+    dofs += DofsOf(mechanism.joints[static_cast<size_t>(j)].kind);
   }
-  return freedoms;
+  return dofs;
 }
 
 }  // namespace
@@ -452,7 +453,7 @@ void WriteHead(const Sections& s) {
   s.xml->Set("integrator", "Euler");
   s.xml->Set("solver", "Newton");
   s.xml->Set("tolerance", "1e-14");
-  s.xml->Set("jacobian", FreedomsOfTree(s.mechanism) < kSparseFrom ? "dense" : "sparse");
+  s.xml->Set("jacobian", DofsOfTree(s.mechanism) < kSparseFrom ? "dense" : "sparse");
   s.xml->Open("flag");
   s.xml->Set("contact", "disable");
   s.xml->Set("energy", "enable");

@@ -264,7 +264,7 @@ std::string JointName(const Joint& joint, int coordinate) {
   if (joint.kind == JointKind::kFree && coordinate < -1) {
     return joint.name + "." + std::to_string(-1 - coordinate);
   }
-  if (FreedomsOf(joint.kind) == 1 || coordinate < 0) return joint.name;
+  if (DofsOf(joint.kind) == 1 || coordinate < 0) return joint.name;
   return joint.name + "." + std::to_string(coordinate);
 }
 

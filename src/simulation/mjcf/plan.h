@@ -6,7 +6,7 @@
 // * Bodies follow the spanning tree at the home pose. A massless body to which nothing but two
 //   tree joints is attached is merged into its outboard body: the joints become several joints of
 //   one MuJoCo body, which is exact.
-// * Joints with several freedoms become several hinges and slides; a ball in the tree stays a
+// * Joints with several DOFs become several hinges and slides; a ball in the tree stays a
 //   ball. A revolute or universal tree joint that transmits a force only is a ball as well.
 //   `ref` makes the position of every hinge and slide equal to the joint coordinate.
 // * Closures: ball and force-only joints are `connect`, fixed ones `weld`. Any other kind is
@@ -26,7 +26,7 @@ namespace mbv::mjcf {
 /// A joint of MuJoCo. `ref` equals the mechanism's coordinate at home.
 struct PlannedJoint {
   enum class Type { kHinge, kSlide, kBall, kFree };
-  std::string name;  ///< JOINT, or JOINT.k for coordinate k of a joint with several freedoms
+  std::string name;  ///< JOINT, or JOINT.k for coordinate k of a joint with several DOFs
   Type type = Type::kHinge;
   int joint = -1;       ///< Mechanism::joints
   int coordinate = -1;  ///< of that joint; -1 for ball, free, and the slides and ball of a free

@@ -369,10 +369,11 @@ void WriteEqualities(const Sections& s) {
     const auto* driven = std::get_if<JointDrive>(&drive.kind);
     const std::string name = DriveEqualityName(drive);
     if (driven == nullptr) {
-      WriteOn(s, "tendon", name, "tendon1", drive.name, s.options.guided);
+      WriteOn(s, "tendon", name, "tendon1", drive.name, s.options.prescribed);
     } else if (IsScalar(s.mechanism.joints[driven->joint].kind, driven->coordinate)) {
       WriteOn(s, "joint", name, "joint1",
-              JointName(s.mechanism.joints[driven->joint], driven->coordinate), s.options.guided);
+              JointName(s.mechanism.joints[driven->joint], driven->coordinate),
+              s.options.prescribed);
     }
   }
   for (const Prescribed& base : s.mechanism.prescribed) {

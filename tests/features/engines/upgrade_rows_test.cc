@@ -52,9 +52,9 @@ TEST(UpgradeRows, NamesTheKnownChanges) {
 }
 
 TEST(UpgradeRows, CallsOtherDifferencesUnexplained) {
-  RowAnswer bent = NewRows();
-  bent.states[0].R[0] *= 1.0 + 1e-5;
-  EXPECT_EQ(Whys(OldRows(), bent)[0],
+  RowAnswer perturbed = NewRows();
+  perturbed.states[0].R[0] *= 1.0 + 1e-5;
+  EXPECT_EQ(Whys(OldRows(), perturbed)[0],
             "not explained: another softness; 3.7.0: the velocity term is supplied");
   RowAnswer tendon = NewRows();
   tendon.states[0].bias[2] = 0.1;

@@ -57,9 +57,9 @@ TEST(StiffnessTruth, ABentBeamIsAnotherOne) {
   const Mat6 right = stiffness_audit::CantileverStiffness(TextbookBeam(), 0.75);
   using S = Section;
   for (double S::*member : {&S::area, &S::I_y, &S::I_z, &S::torsion}) {
-    Beam bent = TextbookBeam();
-    bent.section.*member *= 1.01;
-    const Mat6 change = stiffness_audit::CantileverStiffness(bent, 0.75) - right;
+    Beam perturbed = TextbookBeam();
+    perturbed.section.*member *= 1.01;
+    const Mat6 change = stiffness_audit::CantileverStiffness(perturbed, 0.75) - right;
     EXPECT_NEAR((change.diagonal().array() / right.diagonal().array()).abs().maxCoeff(), 0.01,
                 1e-9);
   }
@@ -81,9 +81,9 @@ TEST(StiffnessTruth, TurnedAxesPermuteAMatrix) {
 TEST(StiffnessTruth, RotationsCountAsDisplacementsAtTheLength) {
   const auto residual = [](stiffness_audit::MatrixKind kind, int r, int c) {
     RowMeter meter(TextRow("", "", "b", "", 1.0, ""));
-    Mat6 bent = Mat6::Zero();
-    bent(r, c) = 1.0;
-    stiffness_audit::AddMatrix(&meter, kind, 4.0, Mat6::Zero(), bent, Mat6::Zero());
+    Mat6 perturbed = Mat6::Zero();
+    perturbed(r, c) = 1.0;
+    stiffness_audit::AddMatrix(&meter, kind, 4.0, Mat6::Zero(), perturbed, Mat6::Zero());
     return meter.Finish().residual_printed;
   };
   using enum stiffness_audit::MatrixKind;

@@ -39,11 +39,11 @@ TEST(CabinAudit, EveryCorrectedFormIsConfirmed) {
 TEST(CabinAudit, BentLengthsLeaveEquationsUnconfirmed) {
   const Lengths truth = cabin_audit::LengthsOf(Robot());
   const auto unconfirmed = [&](double Lengths::*length) {
-    Lengths bent = truth;
-    bent.*length += kBend_m;  // some are zero
-    std::set<std::string> equations = Unconfirmed(PositionRows(bent, truth));
-    equations.merge(Unconfirmed(VelocityRows(bent, truth)));
-    equations.merge(Unconfirmed(WristRows(bent, truth)));
+    Lengths perturbed = truth;
+    perturbed.*length += kBend_m;  // some are zero
+    std::set<std::string> equations = Unconfirmed(PositionRows(perturbed, truth));
+    equations.merge(Unconfirmed(VelocityRows(perturbed, truth)));
+    equations.merge(Unconfirmed(WristRows(perturbed, truth)));
     return equations;
   };
   const auto first = unconfirmed(&Lengths::L1);
@@ -70,11 +70,11 @@ TEST(CabinAudit, BentLengthsLeaveEquationsUnconfirmed) {
 }
 
 TEST(CabinAudit, ABentMassLeavesTheDynamicsUnconfirmed) {
-  Mechanism bent = Robot();
-  for (Parameter& p : bent.parameters) {
+  Mechanism perturbed = Robot();
+  for (Parameter& p : perturbed.parameters) {
     if (p.name == "m_AB") p.value *= kBend;
   }
-  const auto equations = Unconfirmed(cabin_audit::DynamicsRows(bent, Robot()));
+  const auto equations = Unconfirmed(cabin_audit::DynamicsRows(perturbed, Robot()));
   EXPECT_TRUE(equations.contains("(47)"));
   EXPECT_TRUE(equations.contains("(48), (50)–(52)"));
 }

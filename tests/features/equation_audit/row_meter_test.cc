@@ -40,13 +40,13 @@ TEST(RowMeter, OneFormIsPrintAndCorrection) {
 
 // Bent by twice the limit at one state of many.
 TEST(RowMeter, OneBentStateIsEnough) {
-  for (const int bent : {0, 5, 9}) {
+  for (const int perturbed : {0, 5, 9}) {
     RowMeter meter = Meter();
     for (int state = 0; state < 10; ++state) {
       const double truth = std::sin(1.0 + state);
-      meter.Add(truth, truth + 0.5, truth + (state == bent ? 2e-9 : 0.0));
+      meter.Add(truth, truth + 0.5, truth + (state == perturbed ? 2e-9 : 0.0));
     }
-    EXPECT_EQ(meter.Finish().verdict, AuditVerdict::kWrongAndUnfixed) << bent;
+    EXPECT_EQ(meter.Finish().verdict, AuditVerdict::kWrongAndUnfixed) << perturbed;
   }
 }
 

@@ -1,6 +1,6 @@
 // Every row of every audit can fail: the equations' constants and what they are compared with are
-// bent one at a time, and each row with a residual must notice at least one of them. What notices
-// none depends on none of them; those rows are named, and no others may be so.
+// perturbed one at a time, and each row with a residual must notice at least one of them. What
+// notices none depends on none of them; those rows are named, and no others may be so.
 #include <gtest/gtest.h>
 
 #include <functional>
@@ -33,7 +33,7 @@ Rows All(std::vector<Rows> parts) {
   return all;
 }
 
-// What no bent constant is seen by.
+// What no perturbed constant is seen by.
 class Noticed {
  public:
   explicit Noticed(const Rows& right) {
@@ -68,9 +68,9 @@ TEST(AuditRows, OfTheScaraRobotCanFail) {
   using P = scara::Parameters;
   for (double P::*member : {&P::R, &P::r, &P::l1, &P::l2, &P::l3, &P::e, &P::m_p, &P::I_pz,
                             &P::m_arm, &P::arm_radius, &P::arm_com, &P::m_rods, &P::rod_radius}) {
-    P bent = right;
-    bent.*member *= kBendOfAll;
-    noticed.Bent(rows(bent, sweep));
+    P perturbed = right;
+    perturbed.*member *= kBendOfAll;
+    noticed.Bent(rows(perturbed, sweep));
   }
   using State = scara_audit::State;
   const std::vector<std::function<void(State*)>> bends = {
@@ -113,15 +113,15 @@ TEST(AuditRows, OfTheScaraRobotsStiffnessCanFail) {
   Noticed noticed(rows(right));
   using P = scara::StiffnessParameters;
   for (double P::*member : {&P::d, &P::E, &P::G, &P::diameter, &P::K_act}) {
-    P bent = right;
-    bent.*member *= kBendOfAll;
-    noticed.Bent(rows(bent));
+    P perturbed = right;
+    perturbed.*member *= kBendOfAll;
+    noticed.Bent(rows(perturbed));
   }
   for (double scara::Parameters::*member : {&scara::Parameters::l1, &scara::Parameters::l2,
                                             &scara::Parameters::r, &scara::Parameters::e}) {
-    P bent = right;
-    bent.geometry.*member *= kBendOfAll;
-    noticed.Bent(rows(bent));
+    P perturbed = right;
+    perturbed.geometry.*member *= kBendOfAll;
+    noticed.Bent(rows(perturbed));
   }
   EXPECT_EQ(noticed.blind(), std::set<std::string>{});
 }
@@ -139,19 +139,19 @@ TEST(AuditRows, OfTheCabinRobotCanFail) {
   for (double Lengths::*length :
        {&Lengths::L1, &Lengths::L2, &Lengths::L3, &Lengths::L4, &Lengths::a2, &Lengths::d3,
         &Lengths::a3, &Lengths::a4, &Lengths::d6}) {
-    Lengths bent = truth;
-    bent.*length += 1e-6;
-    noticed.Bent(
-        All({cabin_audit::PositionRows(bent, truth), cabin_audit::VelocityRows(bent, truth),
-             cabin_audit::WristRows(bent, truth)}));
+    Lengths perturbed = truth;
+    perturbed.*length += 1e-6;
+    noticed.Bent(All({cabin_audit::PositionRows(perturbed, truth),
+                      cabin_audit::VelocityRows(perturbed, truth),
+                      cabin_audit::WristRows(perturbed, truth)}));
   }
   for (const Parameter& parameter : robot.parameters) {
     if (!parameter.name.starts_with("m_") && !parameter.name.starts_with("I_")) continue;
-    Mechanism bent = robot;
-    for (Parameter& p : bent.parameters) {
+    Mechanism perturbed = robot;
+    for (Parameter& p : perturbed.parameters) {
       if (p.name == parameter.name) p.value *= kBendOfAll;
     }
-    noticed.Bent(cabin_audit::DynamicsRows(bent, robot));
+    noticed.Bent(cabin_audit::DynamicsRows(perturbed, robot));
   }
   // Orientations and rates by angles alone: they are compared with differences of the linkage that
   // Newton closes, whatever its lengths (PlanarTruth).
@@ -182,9 +182,9 @@ TEST(AuditRows, OfTheCabinRobotsStiffnessCanFail) {
       [](auto* p) { p->sections[cabin::kBeamCD].b *= kBendOfAll; },
       [](auto* p) { p->sections[cabin::kBeamAB].b *= kBendOfAll; }};
   for (const auto& bend : bends) {
-    cabin::StiffnessParameters bent = right;
-    bend(&bent);
-    noticed.Bent(rows(bent));
+    cabin::StiffnessParameters perturbed = right;
+    bend(&perturbed);
+    noticed.Bent(rows(perturbed));
   }
   EXPECT_EQ(noticed.blind(), std::set<std::string>{"(55)"});  // equilibrium by angles
 }
@@ -218,9 +218,9 @@ TEST(AuditRows, OfTheTripodCanFail) {
       [](Case* c) { c->truth[3].leg[1].c += Vec3(0, 1e-6, 0); },
       [](Case* c) { c->truth[3].leg[1].A += Vec3(1e-6, 0, 0); }};
   for (const auto& bend : bends) {
-    Case bent = right;
-    bend(&bent);
-    noticed.Bent(rows(bent));
+    Case perturbed = right;
+    bend(&perturbed);
+    noticed.Bent(rows(perturbed));
   }
   // The path law, the example's data, and identities in the angles.
   EXPECT_EQ(noticed.blind(),

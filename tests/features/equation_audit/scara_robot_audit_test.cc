@@ -78,11 +78,11 @@ TEST(ScaraAudit, BentConstantsLeaveEquationsUnconfirmed) {
   ASSERT_TRUE(model.mechanism) << model.diagnostics.Text();
   const std::vector<scara_audit::State> states = scara_audit::Sweep(*model.mechanism);
   const auto unconfirmed = [&](double scara::Parameters::*member) {
-    scara::Parameters bent = scara::ParametersOf(*model.mechanism);
-    bent.*member *= 1.0 + 1e-8;
+    scara::Parameters perturbed = scara::ParametersOf(*model.mechanism);
+    perturbed.*member *= 1.0 + 1e-8;
     std::set<std::string> equations;
-    for (const auto& rows : {PositionRows(*model.mechanism, bent, states),
-                             DynamicsRows(bent, states), LinkRows(bent, states)}) {
+    for (const auto& rows : {PositionRows(*model.mechanism, perturbed, states),
+                             DynamicsRows(perturbed, states), LinkRows(perturbed, states)}) {
       for (const AuditRow& row : rows) {
         if (row.verdict == AuditVerdict::kWrongAndUnfixed) equations.insert(row.equation);
       }

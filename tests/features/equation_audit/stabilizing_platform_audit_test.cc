@@ -74,17 +74,17 @@ TEST(StabilizingPlatformAudit, FindsTheErrorsOfThePrintInTheirKnownSize) {
 TEST(StabilizingPlatformAudit, NoticesEquationsBentByTwiceTheirLimit) {
   const Case right = MakeCase(kModels, 1.0);
   auto bent_case = [&](double sp::PlatformParameters::*parameter, double change) {
-    Case bent = right;
-    bent.parameters.*parameter += change;
-    const sp::PlatformEquations equations(bent.parameters, sp::DrivePairs::kSynchronous);
-    for (size_t n = 0; n < bent.truth.size(); ++n) {
+    Case perturbed = right;
+    perturbed.parameters.*parameter += change;
+    const sp::PlatformEquations equations(perturbed.parameters, sp::DrivePairs::kSynchronous);
+    for (size_t n = 0; n < perturbed.truth.size(); ++n) {
       const RunSummary kinematics =
-          equations.EvaluateKinematics(bent.truth[n].command, &bent.closed[n]);
+          equations.EvaluateKinematics(perturbed.truth[n].command, &perturbed.closed[n]);
       EXPECT_TRUE(kinematics.ok()) << kinematics.message;
-      const RunSummary dynamics = equations.EvaluateDynamics({}, &bent.closed[n]);
+      const RunSummary dynamics = equations.EvaluateDynamics({}, &perturbed.closed[n]);
       EXPECT_TRUE(dynamics.ok()) << dynamics.message;
     }
-    return bent;
+    return perturbed;
   };
   constexpr AuditVerdict kFailed = AuditVerdict::kWrongAndUnfixed;
   EXPECT_EQ(RowOf(LimbRows(right), "(20) R").verdict, AuditVerdict::kWrong);

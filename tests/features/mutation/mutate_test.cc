@@ -106,7 +106,7 @@ TEST(Mutate, OnTheScaraRobotOnlyWhatCannotActStaysUnseen) {
     const Mutation* bar = FindMutation(report, name);
     ASSERT_NE(bar, nullptr) << name;
     EXPECT_TRUE(bar->own.ran) << name;
-    EXPECT_EQ(bar->proved_to, kLargestBend) << bar->reason;
+    EXPECT_EQ(bar->proved_to, kLargestPerturbation) << bar->reason;
   }
   EXPECT_EQ(FindMutation(report, "I_bar_x")->own.only, "smaller");
 }
@@ -210,7 +210,7 @@ TEST(Mutate, WhatForcesCannotSeeIsProvedByBendsOfTenPercent) {
   const MutationReport report = Mutate("spr_tripod/default_inverse", Plain());
   for (const Mutation& m : report.mutations) {
     if (m.own.detected) continue;
-    EXPECT_EQ(m.proved_to, kLargestBend) << m.name;
+    EXPECT_EQ(m.proved_to, kLargestPerturbation) << m.name;
     EXPECT_LE(m.sensitivity, 1e-12) << m.name;
     EXPECT_NE(m.reason.find("10 % too large changes no drive force"), std::string::npos)
         << m.reason;
@@ -413,7 +413,7 @@ TEST(Mutate, ErrorsOfBothSignsMustBeSeen) {
       "scara_robot/pick_place",
       {.size = 0.9, .numbers = {"theta_max"}, .progress = {}, .modes = MutationModes::kInverse});
   ASSERT_EQ(report.mutations.size(), 1u) << report.diagnostics.Text();
-  const Sighting& seen = report.mutations[0].own;
+  const Detection& seen = report.mutations[0].own;
   EXPECT_TRUE(seen.ran);
   EXPECT_EQ(seen.only, "larger");
   EXPECT_FALSE(seen.detected);
@@ -423,8 +423,8 @@ TEST(Mutate, AScenarioThatDisagreesIsNotBent) {
   const MutationReport report = Mutate("spr_tripod/must_fail/analytic_mass");
   EXPECT_EQ(report.exit_code, 1);
   EXPECT_TRUE(report.mutations.empty());
-  EXPECT_EQ(report.runs, 0u) << "nothing is bent";
-  EXPECT_NE(report.diagnostics.Text().find("does not agree before anything is bent"),
+  EXPECT_EQ(report.runs, 0u) << "nothing is perturbed";
+  EXPECT_NE(report.diagnostics.Text().find("does not agree before anything is perturbed"),
             std::string::npos)
       << report.diagnostics.Text();
 }

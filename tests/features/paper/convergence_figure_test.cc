@@ -64,8 +64,8 @@ TEST(ConvergenceFigures, ABentErrorMovesItsPointAndTheSlope) {
   ConvergenceReport report = AConvergence(4.0);
   report.series[0].points[2].error.smooth *= 1.5;
   Judge(SampleClasses({0.0, 1.0, 2.0}, {}, 0.05), &report.series[0]);
-  const FigureSet bent = ConvergenceFigures(report, Language::kEnglish);
-  const FigurePanel& panel = bent.figures[0].panels[0];
+  const FigureSet perturbed = ConvergenceFigures(report, Language::kEnglish);
+  const FigurePanel& panel = perturbed.figures[0].panels[0];
   EXPECT_DOUBLE_EQ(panel.curves[0].points[2].second, 1.5e-5 / 256);
   EXPECT_GT(std::abs(SlopeOf(panel.curves[1]) - 4.0), 1e-2);
 }

@@ -191,13 +191,13 @@ TEST(PackageCommand, PagesThatAuditAPapersEquationsArePackedToo) {
 }
 
 TEST(VerifyCommand, ABentNumberIsToldWithItsSignal) {
-  const Packed packed = FourBar("bent");
+  const Packed packed = FourBar("perturbed");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
-  const ProgramResult bent =
+  const ProgramResult perturbed =
       packed.Edited("scale RESULTS/traces.csv motor.force.simulated 1.001 honest");
-  EXPECT_EQ(bent.exit_code, 1) << bent.err;
-  EXPECT_TRUE(Has(bent.out, "motor.force.simulated by 0.00035")) << bent.out;
-  EXPECT_TRUE(Has(bent.out, "NOT REPEATED")) << bent.out;
+  EXPECT_EQ(perturbed.exit_code, 1) << perturbed.err;
+  EXPECT_TRUE(Has(perturbed.out, "motor.force.simulated by 0.00035")) << perturbed.out;
+  EXPECT_TRUE(Has(perturbed.out, "NOT REPEATED")) << perturbed.out;
   // A last digit is round-off.
   const ProgramResult digit =
       packed.Edited("scale RESULTS/traces.csv motor.force.simulated 1.00000000000001 honest");
@@ -384,9 +384,9 @@ TEST(VerifyCommand, StiffnessesAreJudgedByTheirOwnMetrics) {
                       "results/scara_robot/stiffness");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
   EXPECT_EQ(packed.Verify("").exit_code, 0);
-  const ProgramResult bent = packed.Edited("scale RESULTS/stiffness.csv value 1.001 honest");
-  EXPECT_EQ(bent.exit_code, 1) << bent.err;
-  EXPECT_TRUE(Has(bent.out, "_entry")) << bent.out;
+  const ProgramResult perturbed = packed.Edited("scale RESULTS/stiffness.csv value 1.001 honest");
+  EXPECT_EQ(perturbed.exit_code, 1) << perturbed.err;
+  EXPECT_TRUE(Has(perturbed.out, "_entry")) << perturbed.out;
   const ProgramResult loaded = packed.Edited("scale RESULTS/loads.csv x_m.simulated 1.5 honest");
   EXPECT_EQ(loaded.exit_code, 1) << loaded.err;
   EXPECT_TRUE(Has(loaded.out, "simulated.displacement_")) << loaded.out;
@@ -396,9 +396,10 @@ TEST(VerifyCommand, StudiesAreJudgedPointByPoint) {
   const Packed packed("study", "scenarios/four_bar/study_by_hand.yaml", "results/four_bar_by_hand");
   ASSERT_EQ(packed.made().exit_code, 0) << packed.made().err;
   EXPECT_EQ(packed.Verify("").exit_code, 0);
-  const ProgramResult bent = packed.Edited("scale RESULTS/points.csv motor.force.max 1.001 honest");
-  EXPECT_EQ(bent.exit_code, 1) << bent.err;
-  EXPECT_TRUE(Has(bent.out, "motor.force.max by ")) << bent.out;
+  const ProgramResult perturbed =
+      packed.Edited("scale RESULTS/points.csv motor.force.max 1.001 honest");
+  EXPECT_EQ(perturbed.exit_code, 1) << perturbed.err;
+  EXPECT_TRUE(Has(perturbed.out, "motor.force.max by ")) << perturbed.out;
   const ProgramResult digit =
       packed.Edited("scale RESULTS/points.csv motor.force.max 1.00000000000001 honest");
   EXPECT_EQ(digit.exit_code, 0) << digit.out;

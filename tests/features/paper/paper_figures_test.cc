@@ -82,13 +82,13 @@ TEST(PaperFigures, Table2HoldsTheDigitsOfThePrintAndCountsItsDeviations) {
   EXPECT_THAT(result.files, ElementsAre("table2.md", "table2.tex"));
   EXPECT_THAT(result.table, HasSubstr("\n| 46 | 0.015 | 0.162 | 0.128 | 0.019 | 0.178 | 0.133 |"));
   EXPECT_NEAR(result.said[0].measured, 100.0 * 3 / 33, 1e-9);
-  // One printed number bent beyond 15 %.
+  // One printed number perturbed beyond 15 %.
   for (PaperEntry& entry : paper.entries) {
     if (entry.name.text == "table2") entry.printed[0].signals[1].second[10] = 0.110;
   }
-  const PaperOutcome bent = MakePaperFigures("cabin_robot", paper, options);
-  EXPECT_NEAR(bent.results.at(0).said[0].measured, 100.0 * 4 / 33, 1e-9);
-  EXPECT_THAT(bent.results[0].table, HasSubstr("0.110"));
+  const PaperOutcome perturbed = MakePaperFigures("cabin_robot", paper, options);
+  EXPECT_NEAR(perturbed.results.at(0).said[0].measured, 100.0 * 4 / 33, 1e-9);
+  EXPECT_THAT(perturbed.results[0].table, HasSubstr("0.110"));
   EXPECT_THAT(PaperPage({outcome}), HasSubstr(result.table));
 }
 

@@ -21,11 +21,11 @@ PaperStatement Saying(PaperMeasure measure, const std::string& signals) {
 }
 
 // In a run whose simulation is `off` newtons off at one sample of d2.
-SaidResult MeasuredSignals(const PaperStatement& statement, double off) {
+StatedResult MeasuredSignals(const PaperStatement& statement, double off) {
   synthetic::Case c;
   c.simulated.values(40, c.simulated.Find("d2.force")) += off;
   Diagnostics diagnostics;
-  const SaidResult said =
+  const StatedResult said =
       MeasureSignals(statement, test::SampledReport(c), "paper.yaml", &diagnostics);
   EXPECT_FALSE(diagnostics.has_errors()) << diagnostics.Text();
   return said;
@@ -36,17 +36,17 @@ TEST(PaperStatements, ADifferenceIsTheLargestOneInItsUnit) {
   statement.unit = {.text = "kN"};
   statement.printed = 1e-4;
   EXPECT_NEAR(MeasuredSignals(statement, 0.0).measured, 0.0, 1e-15);
-  const SaidResult said = MeasuredSignals(statement, 0.5);
+  const StatedResult said = MeasuredSignals(statement, 0.5);
   EXPECT_NEAR(said.measured, 5e-4, 1e-15);
   EXPECT_NEAR(said.deviation(), 4e-4, 1e-15);
-  EXPECT_EQ(SayResult(said),
+  EXPECT_EQ(ResultText(said),
             "“agree” (section 4): printed 0.0001 kN, computed 0.0005 kN, deviation +0.0004 kN");
 }
 
 TEST(PaperStatements, AShareIsOfTheLargestValue) {
   const Trace trace = synthetic::ExactTrace("analytic");
   const double largest = trace.values.col(trace.Find("d2.force")).cwiseAbs().maxCoeff();
-  const SaidResult said = MeasuredSignals(Saying(PaperMeasure::kShare, "d2.force"), 0.5);
+  const StatedResult said = MeasuredSignals(Saying(PaperMeasure::kShare, "d2.force"), 0.5);
   EXPECT_NEAR(said.measured, 50.0 / largest, 1e-9);
   EXPECT_EQ(said.unit, "%");
 }
@@ -62,7 +62,7 @@ TEST(PaperStatements, SamplesBeyondAreCounted) {
 TEST(PaperStatements, RangesAndValuesAtTimes) {
   const Trace trace = synthetic::ExactTrace("simulated");
   const auto column = trace.values.col(trace.Find("d1.position"));
-  const SaidResult range = MeasuredSignals(Saying(PaperMeasure::kRange, "d1.position"), 0.0);
+  const StatedResult range = MeasuredSignals(Saying(PaperMeasure::kRange, "d1.position"), 0.0);
   EXPECT_EQ(range.low, column.minCoeff());
   EXPECT_EQ(range.measured, column.maxCoeff());
   PaperStatement statement = Saying(PaperMeasure::kLargest, "d1.position");
@@ -98,11 +98,11 @@ MapPlot MapOf(double off) {
   return map;
 }
 
-SaidResult MeasuredMaps(PaperMeasure measure, const std::vector<MapPlot>& maps) {
+StatedResult MeasuredMaps(PaperMeasure measure, const std::vector<MapPlot>& maps) {
   PaperStatement statement = Saying(measure, "");
   statement.other = 1;
   Diagnostics diagnostics;
-  const SaidResult said = MeasureMaps(statement, maps, "p.yaml", &diagnostics);
+  const StatedResult said = MeasureMaps(statement, maps, "p.yaml", &diagnostics);
   EXPECT_FALSE(diagnostics.has_errors()) << diagnostics.Text();
   return said;
 }

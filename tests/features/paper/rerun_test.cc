@@ -1,4 +1,4 @@
-// A result against its repetition: round-off passes, a bent number is told.
+// A result against its repetition: round-off passes, a perturbed number is told.
 #include "features/paper/rerun.h"
 
 #include <gtest/gtest.h>

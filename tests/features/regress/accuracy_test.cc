@@ -32,7 +32,7 @@ TEST(AccuracyTables, AreFilledByTheirHeadings) {
 
 TEST(AccuracyTables, TakeNumbersOfChecksAndSayWhatWasNotMeasured) {
   EXPECT_EQ(AccuracyText("motion error", kSummary), "3.0e-11 m");
-  EXPECT_EQ(AccuracyText("bent forces lead", kSummary), "4.5e-06 m");
+  EXPECT_EQ(AccuracyText("perturbed forces lead", kSummary), "4.5e-06 m");
   EXPECT_EQ(AccuracyText("best recipe", kSummary), "–");
   EXPECT_EQ(AccuracyText("horizon", kSummary), "2 s");
   EXPECT_EQ(AccuracyText("colour", kSummary), std::nullopt);

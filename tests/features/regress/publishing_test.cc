@@ -68,8 +68,8 @@ TEST_F(PublishingTest, ScenariosNamedLikeFilesOfTheNightAreRefused) {
   options_.history = "out/history.sqlite";
   options_.shared_files["report-0123456789abcdef.js"] = "script";
   for (const std::string name :
-       {"index.html", "regress.json", "junit.xml", "summary.md", "night_unfinished.txt",
-        "history.sqlite", "report-0123456789abcdef.js", "logs/m/agree.txt"}) {
+       {"index.html", "regress.json", "junit.xml", "summary.md", "unfinished.txt", "history.sqlite",
+        "report-0123456789abcdef.js", "logs/m/agree.txt"}) {
     Scenario("agree");
     Write("scenarios/" + name + "/agree.yaml", "mechanism: m\nexpect: {verdict: agree}\n");
     for (const std::string file : {"/agree", ""}) {
@@ -130,7 +130,7 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
   options_.jobs = 1;
   options_.label = "1";
   ASSERT_EQ(RunAll().exit_code, 0);
-  EXPECT_FALSE(fs::exists("out/night_unfinished.txt"));
+  EXPECT_FALSE(fs::exists("out/unfinished.txt"));
   Write("out/m/agree1/notes.txt", "mine");
   int mixed = 0, night = 1;
   const auto check = [&](int call) {
@@ -153,7 +153,7 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     }
     if (nights.size() == 1) return;
     ++mixed;
-    EXPECT_TRUE(fs::exists("out/night_unfinished.txt")) << call;
+    EXPECT_TRUE(fs::exists("out/unfinished.txt")) << call;
     EXPECT_NE(Read("out/index.html").find("has not finished"), std::string::npos) << call;
     RegressOptions join = options_;
     join.out = "joined";
@@ -176,7 +176,7 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     options_.resume = false;
     check(call);
     EXPECT_FALSE(fs::exists("out/.mbverify/night")) << call;
-    EXPECT_FALSE(fs::exists("out/night_unfinished.txt")) << call;
+    EXPECT_FALSE(fs::exists("out/unfinished.txt")) << call;
     EXPECT_EQ(Read("out/index.html").find("has not finished"), std::string::npos) << call;
   }
   EXPECT_GT(mixed, 3);

@@ -64,13 +64,13 @@ TEST_F(RobotCommands, RunTellsWhatTheFilesOwnSettingsDo) {
     EXPECT_NE(run.out.find(said), std::string::npos) << said << "\n" << run.out;
   }
   const std::filesystem::path folder = mbverify.folder() / "out/own/setup/first";
-  EXPECT_NE(ReadAll(folder / "summary.json").find("\"own_file\""), std::string::npos);
+  EXPECT_NE(ReadAll(folder / "summary.json").find("\"source_model\""), std::string::npos);
   EXPECT_NE(ReadAll(folder / "report.html").find("Your own file, run as it is"), std::string::npos);
 
   const ProgramResult without = mbverify(command + " --no-own-file");
   EXPECT_EQ(without.exit_code, 0) << without.err;
   EXPECT_EQ(without.out.find("your file's"), std::string::npos) << without.out;
-  EXPECT_EQ(ReadAll(folder / "summary.json").find("\"own_file\""), std::string::npos);
+  EXPECT_EQ(ReadAll(folder / "summary.json").find("\"source_model\""), std::string::npos);
 }
 
 TEST_F(RobotCommands, InitWritesAModelAndAScenarioThatAgree) {

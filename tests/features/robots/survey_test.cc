@@ -1,4 +1,4 @@
-// Robots from files: drives for every freedom, a first motion, and what a survey makes of them.
+// Robots from files: drives for every DOF, a first motion, and what a survey makes of them.
 #include "features/robots/survey.h"
 
 #include <gtest/gtest.h>
@@ -48,7 +48,7 @@ TEST(Survey, ARobotThatClosesAgreesInBothModes) {
   EXPECT_EQ(row.status, "ok") << row.message;
   EXPECT_EQ(row.bodies, 4);
   EXPECT_EQ(row.loops, 1);
-  EXPECT_EQ(row.freedoms, 1);
+  EXPECT_EQ(row.dofs, 1);
   EXPECT_EQ(row.redundant, 0 + 1);  // a ball in a planar loop holds what the hinges hold, too
   EXPECT_LT(row.gap_m, 1e-10);
   EXPECT_LT(row.gap_rad, 1e-10);
@@ -105,7 +105,7 @@ TEST(Survey, TheExitCodeTellsFaultsOfTheFileFromOthers) {
 }
 
 TEST(Survey, ARowGoesThroughBytesUnchanged) {
-  SurveyRow row{.file = "a.urdf", .status = "ok", .bodies = 3, .loops = 1, .freedoms = 2};
+  SurveyRow row{.file = "a.urdf", .status = "ok", .bodies = 3, .loops = 1, .dofs = 2};
   row.gap_m = 1.0 / 3.0;
   row.message = "a, \"b\"\nc";
   row.caveats = {"not the whole robot", "=cmd"};
@@ -123,7 +123,8 @@ TEST(Survey, ARowGoesThroughBytesUnchanged) {
 
   const std::string csv = SurveyCsv({row});
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
-            "file,status,bodies,loops,freedoms,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
+            "file,status,bodies,loops,degrees of "
+            "degree of freedom,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
             "seconds,caveats,message");
   EXPECT_NE(csv.find("a.urdf,ok,3,1,2,,0.33,,,,,not the whole robot; =cmd,\"a, \"\"b\"\" c\"\n"),
             std::string::npos)
@@ -153,10 +154,10 @@ TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   std::vector<std::string> notes;
   std::vector<Coordinate> by_forces;
-  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
+  const Mechanism m = WithDriveForEachDof(*loaded.mechanism, &notes, &by_forces);
   const Mobility mobility = AnalyseMobility(m);
   EXPECT_EQ(mobility.undriven, 1);  // the spin, which moves by forces
-  EXPECT_EQ(mobility.freedoms, 2);
+  EXPECT_EQ(mobility.dofs, 2);
   ASSERT_EQ(by_forces.size(), 1u);
   EXPECT_TRUE(m.joints[static_cast<size_t>(by_forces[0].index)].kind == JointKind::kSpherical);
   ASSERT_EQ(m.drives.size(), 1u);
@@ -169,7 +170,7 @@ TEST(DefaultSetup, EveryFreedomGetsOneDrive) {
   Mechanism without = *loaded.mechanism;
   without.drives.clear();
   notes.clear();
-  const Mechanism chosen = WithDriveForEachFreedom(without, &notes, &by_forces);
+  const Mechanism chosen = WithDriveForEachDof(without, &notes, &by_forces);
   ASSERT_EQ(chosen.drives.size(), 1u);
   EXPECT_EQ(AnalyseMobility(chosen).undriven, 1);
   EXPECT_EQ(by_forces.size(), 1u);
@@ -184,7 +185,7 @@ TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   ASSERT_TRUE(loaded.mechanism) << loaded.diagnostics.Text();
   std::vector<std::string> notes;
   std::vector<Coordinate> by_forces;
-  const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
+  const Mechanism m = WithDriveForEachDof(*loaded.mechanism, &notes, &by_forces);
   EXPECT_TRUE(by_forces.empty());
   EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("B"))].kind, JointKind::kSpherical);
   EXPECT_EQ(m.joints[static_cast<size_t>(m.FindJoint("C"))].kind, JointKind::kSpherical);
@@ -195,7 +196,7 @@ TEST(DefaultSetup, ARoundRodKeepsItsBalls) {
   EXPECT_NE(notes[0].find("left out: n"), std::string::npos) << notes[0];
 }
 
-// Whatever balls connect keeps its degrees of freedom; those that no drive can hold move by forces.
+// Whatever balls connect keeps its DOFs; those that no drive can hold move by forces.
 TEST(DefaultSetup, BallsStayBalls) {
   const auto rod = [](const char* com, const char* inertia, const char* more) {
     return std::string(
@@ -248,7 +249,7 @@ TEST(DefaultSetup, BallsStayBalls) {
   struct Case {
     const char* what;
     std::string model;
-    int freedoms, by_forces;
+    int dofs, by_forces;
   };
   const std::vector<Case> cases = {
       {"a round rod", rod(kMiddle, kRound, ""), 1, 0},
@@ -269,18 +270,18 @@ TEST(DefaultSetup, BallsStayBalls) {
     ASSERT_TRUE(loaded.mechanism) << c.what << loaded.diagnostics.Text();
     std::vector<std::string> notes;
     std::vector<Coordinate> by_forces;
-    const Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
-    EXPECT_EQ(AnalyseMobility(*loaded.mechanism).freedoms, c.freedoms) << c.what;
-    EXPECT_EQ(AnalyseMobility(m).freedoms, c.freedoms) << c.what;
+    const Mechanism m = WithDriveForEachDof(*loaded.mechanism, &notes, &by_forces);
+    EXPECT_EQ(AnalyseMobility(*loaded.mechanism).dofs, c.dofs) << c.what;
+    EXPECT_EQ(AnalyseMobility(m).dofs, c.dofs) << c.what;
     EXPECT_EQ(static_cast<int>(by_forces.size()), c.by_forces) << c.what;
-    EXPECT_EQ(static_cast<int>(m.drives.size()), c.freedoms - c.by_forces) << c.what;
+    EXPECT_EQ(static_cast<int>(m.drives.size()), c.dofs - c.by_forces) << c.what;
     for (size_t j = 0; j < m.joints.size(); ++j) {
       EXPECT_EQ(m.joints[j].kind, loaded.mechanism->joints[j].kind) << c.what;
     }
   }
 }
 
-// A ball pendulum from MJCF is surveyed with all its degrees of freedom.
+// A ball pendulum from MJCF is surveyed with all its DOFs.
 TEST(Survey, ABallPendulumSwingsFreely) {
   const test::TestFolder folder("survey_ball");
   const SurveyRow row = SurveyFile(
@@ -290,7 +291,7 @@ TEST(Survey, ABallPendulumSwingsFreely) {
                    "diaginertia=\"0.01 0.012 0.003\"/></body></worldbody></mujoco>"),
       folder.PathOf("scratch"));
   EXPECT_EQ(row.status, "ok") << row.message;
-  EXPECT_EQ(row.freedoms, 3);
+  EXPECT_EQ(row.dofs, 3);
   EXPECT_TRUE(std::isnan(row.inverse_nrmse));
   EXPECT_NE(row.message.find("3 degrees of freedom"), std::string::npos) << row.message;
 }
@@ -300,7 +301,7 @@ TEST(DefaultSetup, TheFirstMotionKeepsToTheRanges) {
   ASSERT_TRUE(loaded.mechanism);
   std::vector<std::string> notes;
   std::vector<Coordinate> by_forces;
-  Mechanism m = WithDriveForEachFreedom(*loaded.mechanism, &notes, &by_forces);
+  Mechanism m = WithDriveForEachDof(*loaded.mechanism, &notes, &by_forces);
   const FirstMotion wide = FindFirstMotion(m, {});
   EXPECT_TRUE(wide.found);
   EXPECT_FALSE(wide.beyond_ranges);

@@ -37,11 +37,11 @@ TEST(RunPage, TheAuditOfANightIsComputedOnceAndReadByTheOthers) {
   ASSERT_FALSE(text.empty());
   EXPECT_EQ(EquationsSection(out, kept.string()), alone);
   // It is read, not computed anew; and a damaged file is.
-  std::string bent = text;
-  const size_t at = bent.find("(1)");
+  std::string perturbed = text;
+  const size_t at = perturbed.find("(1)");
   ASSERT_NE(at, std::string::npos);
-  bent.replace(at, 3, "(X)");
-  ASSERT_EQ(WriteFile(file, bent), "");
+  perturbed.replace(at, 3, "(X)");
+  ASSERT_EQ(WriteFile(file, perturbed), "");
   EXPECT_NE(EquationsSection(out, kept.string()).find("(X)"), std::string::npos);
   ASSERT_EQ(WriteFile(file, text.substr(0, text.size() / 2)), "");
   EXPECT_EQ(EquationsSection(out, kept.string()), alone);

@@ -1,5 +1,5 @@
 // Stiffness results of made-up witnesses: each check passes at agreement and fails when its
-// quantity is bent by twice its limit.
+// quantity is perturbed by twice its limit.
 #include "features/stiffness/stiffness_comparison.h"
 
 #include <gtest/gtest.h>

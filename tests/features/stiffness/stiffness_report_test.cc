@@ -109,7 +109,7 @@ struct Bending {
   std::set<std::string> unseen = {};  // where it is not told: it has no place there
 };
 
-// The truth, bent in one place: page, terminal text and summary differ.
+// The truth, perturbed in one place: page, terminal text and summary differ.
 TEST(StiffnessReport, NothingThatItHoldsGoesUntold) {
   const std::vector<Bending> bendings = {
       {"scenario", [](auto* r) { r->scenario = "other"; }},
@@ -163,12 +163,12 @@ TEST(StiffnessReport, NothingThatItHoldsGoesUntold) {
       {"command", [](auto* r) { r->command = "other"; }, {"json", "text"}}};
   const StiffnessReport right = test::StiffArm();
   for (const Bending& bending : bendings) {
-    StiffnessReport bent = right;
-    bending.bend(&bent);
-    EXPECT_EQ(ToJson(bent) == ToJson(right), bending.unseen.contains("json")) << bending.what;
-    EXPECT_EQ(VerboseTable(bent) == VerboseTable(right), bending.unseen.contains("text"))
+    StiffnessReport perturbed = right;
+    bending.bend(&perturbed);
+    EXPECT_EQ(ToJson(perturbed) == ToJson(right), bending.unseen.contains("json")) << bending.what;
+    EXPECT_EQ(VerboseTable(perturbed) == VerboseTable(right), bending.unseen.contains("text"))
         << bending.what;
-    EXPECT_EQ(ToHtml(bent) == ToHtml(right), bending.unseen.contains("page")) << bending.what;
+    EXPECT_EQ(ToHtml(perturbed) == ToHtml(right), bending.unseen.contains("page")) << bending.what;
   }
 }
 

@@ -145,7 +145,7 @@ colour: red
 
 TEST_F(StiffnessScenarioText, TheNumberOfCoordinatesIsThatOfTheFreedoms) {
   const std::string text = FindingsOf(std::string(kMinimal) + "pose: {platform.x: 0}\n");
-  EXPECT_NE(text.find("pose gives 1 coordinates, but scara_robot has 4 freedoms"),
+  EXPECT_NE(text.find("pose gives 1 coordinates, but scara_robot has 4 degrees of freedom"),
             std::string::npos)
       << text;
 }

@@ -58,8 +58,8 @@ TEST(SobolIndices, FindThoseOfIshigamisFunction) {
 
 // The intervals are narrow enough to exclude another function's indices.
 TEST(SobolIndices, IntervalsExcludeIndicesOfAnotherFunction) {
-  const auto bent = [](const std::vector<double>& x) { return Ishigami(x) + 2.0 * x[2]; };
-  const auto result = SobolIndices(Evaluate(bent, 3, {-kPi, kPi}, 4096), 3);
+  const auto perturbed = [](const std::vector<double>& x) { return Ishigami(x) + 2.0 * x[2]; };
+  const auto result = SobolIndices(Evaluate(perturbed, 3, {-kPi, kPi}, 4096), 3);
   const IshigamiTruth truth = TruthOfIshigami();
   EXPECT_LT(result.indices[0].first_interval.upper, truth.first[0]);
   EXPECT_GT(result.indices[2].first_interval.lower, truth.first[2]);

@@ -223,10 +223,10 @@ TEST_F(StudyCommand, PointsAreJudgedByTheScenariosChecks) {
     return Study("out" + scale);
   };
   EXPECT_EQ(with("10").exit_code, 0);
-  const ProgramResult bent = with("10.00001");
-  EXPECT_EQ(bent.exit_code, 1) << bent.out << bent.err;
-  EXPECT_NE(bent.out.find("VIOLATED witnesses disagree at 4 of 4 points"), std::string::npos)
-      << bent.out;
+  const ProgramResult perturbed = with("10.00001");
+  EXPECT_EQ(perturbed.exit_code, 1) << perturbed.out << perturbed.err;
+  EXPECT_NE(perturbed.out.find("VIOLATED witnesses disagree at 4 of 4 points"), std::string::npos)
+      << perturbed.out;
   const nlohmann::json summary = Summary("out10.00001");
   EXPECT_EQ(summary["verdict"], "disagree");
   EXPECT_EQ(summary["disagreements"]["points"], 4);

@@ -21,7 +21,7 @@ struct RubbingPendulum {
 
   [[nodiscard]] Mechanism Make() const {
     Mechanism mechanism;
-    mechanism.name = "rubbing_pendulum";
+    mechanism.name = "friction_pendulum";
     mechanism.gravity_W = Vec3(0, -g, 0);
     mechanism.bodies = {MakeBody("world", 0.0, Vec3::Zero(), Vec3::Zero()),
                         MakeBody("bob", m, Vec3(r, 0, 0), Vec3(0.01, 0.01, I))};

@@ -143,7 +143,7 @@ TEST(Doubts, AStepThatIsTooCoarseIsNamedByTheEnergyThatItLoses) {
       << comparison.attribution.text;
 }
 
-// With every freedom commanded the loops open, too, and power is lost with them.
+// With every DOF commanded the loops open, too, and power is lost with them.
 TEST(Doubts, AStepThatIsTooCoarseForACommandedMotionIsNamedToo) {
   for (const char* step_s : {"0.01", "0.001"}) {
     const RunOutcome outcome =

@@ -6,8 +6,8 @@
 namespace mbv {
 namespace {
 
-OwnError Sound(double force, double gap_m) {
-  OwnError error;
+SourceModelError Sound(double force, double gap_m) {
+  SourceModelError error;
   error.failure = "";
   error.force = error.force_all = force;
   error.gap_m = gap_m;
@@ -17,8 +17,8 @@ OwnError Sound(double force, double gap_m) {
   return error;
 }
 
-OwnFileAudit Example() {
-  OwnFileAudit audit;
+SourceModelAudit Example() {
+  SourceModelAudit audit;
   audit.file = "robot.xml";
   audit.length_m = 1.0;
   audit.as_is = Sound(0.1, 1e-2);
@@ -32,12 +32,12 @@ OwnFileAudit Example() {
                           .meaning = "Steps cut.",
                           .without = Sound(0.08, 1e-2),
                           .alone = Sound(0.02, 1e-4)});
-  audit.mended = Sound(1e-4, 1e-6);
+  audit.corrected = Sound(1e-4, 1e-6);
   return audit;
 }
 
 TEST(OwnFileWords, TheCauseThatTakesTheErrorWithItIsNamed) {
-  OwnFileAudit audit = Example();
+  SourceModelAudit audit = Example();
   ASSERT_EQ(audit.Culprits().size(), 1u);
   EXPECT_NE(CauseSentence(audit).find("made by one thing: loops. Loops give."), std::string::npos);
   audit.causes[1].without.force = 0.03;
@@ -50,51 +50,53 @@ TEST(OwnFileWords, TheCauseThatTakesTheErrorWithItIsNamed) {
 }
 
 TEST(OwnFileWords, WhatStaysWithAllMendedIsNoMatterOfSettings) {
-  OwnFileAudit audit = Example();
+  SourceModelAudit audit = Example();
   EXPECT_EQ(CauseSentence(audit).find("another mechanism"), std::string::npos);
-  audit.mended.force = 0.05;
+  audit.corrected.force = 0.05;
   EXPECT_NE(CauseSentence(audit).find("5 % of the force stays wrong"), std::string::npos);
 }
 
 TEST(OwnFileWords, GoodNeedsForcesAndLoops) {
-  OwnFileAudit audit = Example();
-  audit.as_is = Sound(0.99 * OwnFileAudit::kGoodForce, 0.99 * OwnFileAudit::kGoodGap);
+  SourceModelAudit audit = Example();
+  audit.as_is = Sound(0.99 * SourceModelAudit::kGoodForce, 0.99 * SourceModelAudit::kGoodGap);
   EXPECT_TRUE(audit.Good(audit.as_is));
-  EXPECT_NE(OwnFileSentence(audit).find("nothing is wrong"), std::string::npos);
-  audit.as_is.gap_m = 2.0 * OwnFileAudit::kGoodGap;
+  EXPECT_NE(SourceModelSentence(audit).find("nothing is wrong"), std::string::npos);
+  audit.as_is.gap_m = 2.0 * SourceModelAudit::kGoodGap;
   EXPECT_FALSE(audit.Good(audit.as_is));
-  EXPECT_NE(OwnFileSentence(audit).find("agree to 9.9e-03, but its loops open"), std::string::npos);
-  audit.as_is = Sound(2.0 * OwnFileAudit::kGoodForce, 0.0);
-  EXPECT_NE(OwnFileSentence(audit).find("off by 2 %"), std::string::npos) << OwnFileSentence(audit);
+  EXPECT_NE(SourceModelSentence(audit).find("agree to 9.9e-03, but its loops open"),
+            std::string::npos);
+  audit.as_is = Sound(2.0 * SourceModelAudit::kGoodForce, 0.0);
+  EXPECT_NE(SourceModelSentence(audit).find("off by 2 %"), std::string::npos)
+      << SourceModelSentence(audit);
   audit.as_is.force = kNan;
   EXPECT_FALSE(audit.Good(audit.as_is));
 }
 
 TEST(OwnFileWords, UnsoundNumbersAreNoNumbers) {
-  OwnFileAudit audit = Example();
+  SourceModelAudit audit = Example();
   audit.as_is = {};
   audit.as_is.failure = "MuJoCo reset the simulation at 0.3 s";
   audit.as_is.time_s = 0.3;
-  EXPECT_NE(OwnFileSentence(audit).find("reset the simulation at 0.3 s"), std::string::npos);
+  EXPECT_NE(SourceModelSentence(audit).find("reset the simulation at 0.3 s"), std::string::npos);
   EXPECT_EQ(CauseCells(audit)[0][1], "unsound");
   EXPECT_EQ(CauseCells(audit)[1][2], "-");
-  const nlohmann::ordered_json json = OwnFileJson(audit);
+  const nlohmann::ordered_json json = SourceModelJson(audit);
   EXPECT_EQ(json["as_is"]["failure"], audit.as_is.failure);
   EXPECT_FALSE(json["as_is"].contains("force_nrmse"));
   EXPECT_FALSE(json["good"].get<bool>());
 }
 
 TEST(OwnFileWords, NamesOfTheFileAreEscapedOnThePage) {
-  OwnFileAudit audit = Example();
+  SourceModelAudit audit = Example();
   audit.as_is.joint = "<script>";
   audit.done = {"<b>"};
   audit.lines = "<option timestep=\"0.001\"/>\n";
   audit.pasted = Sound(1e-3, 1e-5);
-  const std::string html = OwnFileHtml(&audit);
+  const std::string html = SourceModelHtml(&audit);
   EXPECT_EQ(html.find("<script>"), std::string::npos);
   EXPECT_EQ(html.find("<b>\n"), std::string::npos);
   EXPECT_NE(html.find("&lt;option timestep="), std::string::npos);
-  EXPECT_EQ(OwnFileHtml(nullptr), "");
+  EXPECT_EQ(SourceModelHtml(nullptr), "");
 }
 
 }  // namespace

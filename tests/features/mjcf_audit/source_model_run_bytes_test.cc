@@ -1,5 +1,5 @@
 // Runs of a user's file on their way out of a child process.
-#include "features/mjcf_audit/own_run_bytes.h"
+#include "features/mjcf_audit/source_model_run_bytes.h"
 
 #include <gtest/gtest.h>
 
@@ -8,8 +8,8 @@
 namespace mbv {
 namespace {
 
-OwnRun ExampleRun() {
-  OwnRun run;
+SourceModelRun ExampleRun() {
+  SourceModelRun run;
   run.summary = {.stop = Stop::kEngineFailure,
                  .message = "it\nended at C",
                  .time_s = 0.5,
@@ -32,8 +32,8 @@ OwnRun ExampleRun() {
 }
 
 TEST(OwnRunBytes, ComeBackAsTheyWere) {
-  const OwnRun run = ExampleRun();
-  const auto back = FromBytes<OwnRun>(ToBytes(run));
+  const SourceModelRun run = ExampleRun();
+  const auto back = FromBytes<SourceModelRun>(ToBytes(run));
   ASSERT_TRUE(back);
   EXPECT_EQ(back->summary.stop, run.summary.stop);
   EXPECT_EQ(back->summary.message, run.summary.message);
@@ -60,10 +60,10 @@ TEST(OwnRunBytes, ComeBackAsTheyWere) {
 TEST(OwnRunBytes, PartsAreNoRun) {
   const std::string bytes = ToBytes(ExampleRun());
   for (size_t size = 0; size < bytes.size(); ++size) {
-    EXPECT_FALSE(FromBytes<OwnRun>(bytes.substr(0, size))) << size;
+    EXPECT_FALSE(FromBytes<SourceModelRun>(bytes.substr(0, size))) << size;
   }
-  EXPECT_FALSE(FromBytes<OwnRun>(bytes + "x"));
-  EXPECT_FALSE(FromBytes<OwnRun>(std::string(1000, '\xff')));
+  EXPECT_FALSE(FromBytes<SourceModelRun>(bytes + "x"));
+  EXPECT_FALSE(FromBytes<SourceModelRun>(std::string(1000, '\xff')));
 }
 
 }  // namespace

@@ -46,8 +46,8 @@ class OwnFile : public testing::Test {
  protected:
   // `run`: another text that is run in place of the one that the reference computes. `height`: of
   // the drive's bump.
-  OwnFileAudit Audit(const std::string& text, const std::string& run = "",
-                     const std::string& height = "") {
+  SourceModelAudit Audit(const std::string& text, const std::string& run = "",
+                         const std::string& height = "") {
     const std::string file = folder_.Write("robot.xml", text);
     const DefaultSetupResult made = MakeDefaultSetup(file, "", "./model.yaml");
     EXPECT_TRUE(made.setup) << made.diagnostics.Text();
@@ -61,18 +61,18 @@ class OwnFile : public testing::Test {
     const auto prepared = Prepare(folder_.Write("first.yaml", scenario), {}, &diagnostics);
     EXPECT_TRUE(prepared) << diagnostics.Text();
     if (!prepared) return {};
-    return AuditOwnFile({.file = file, .text = run, .prepared = &*prepared});
+    return AuditSourceModel({.file = file, .text = run, .prepared = &*prepared});
   }
-  static const OwnCause* Find(const OwnFileAudit& audit, const std::string& key) {
-    for (const OwnCause& cause : audit.causes) {
+  static const SourceModelCause* Find(const SourceModelAudit& audit, const std::string& key) {
+    for (const SourceModelCause& cause : audit.causes) {
       if (cause.key == key) return &cause;
     }
     return nullptr;
   }
   using Keys = std::vector<std::string>;
-  static Keys Named(const OwnFileAudit& audit) {
+  static Keys Named(const SourceModelAudit& audit) {
     Keys keys;
-    for (const OwnCause* cause : audit.Culprits()) keys.push_back(cause->key);
+    for (const SourceModelCause* cause : audit.Culprits()) keys.push_back(cause->key);
     return keys.empty() ? Keys{""} : keys;
   }
   static bool Said(const std::vector<std::string>& lines, const std::string& text) {
@@ -87,46 +87,46 @@ class OwnFile : public testing::Test {
 };
 
 TEST_F(OwnFile, InWhichNothingIsWrongIsToldSo) {
-  const OwnFileAudit audit =
+  const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option timestep='0.0005' integrator='RK4'/>") + kStiff}));
   ASSERT_TRUE(audit.declined.empty()) << audit.declined;
   EXPECT_TRUE(audit.Good(audit.as_is)) << audit.as_is.failure << audit.as_is.force;
   EXPECT_LT(audit.as_is.force, 1e-3);
   EXPECT_LT(audit.as_is.joint_force, 1e-3);  // sign and frame of the closures' forces are right
   EXPECT_FALSE(audit.searched);
-  EXPECT_NE(OwnFileSentence(audit).find("nothing is wrong"), std::string::npos);
+  EXPECT_NE(SourceModelSentence(audit).find("nothing is wrong"), std::string::npos);
   EXPECT_EQ(audit.integrator, "RK4");
 }
 
 TEST_F(OwnFile, SoftLoopsOpenAreNamedAndMendedByTheLines) {
   const std::string text = Text({.head = kSoft});
-  const OwnFileAudit audit = Audit(text);
+  const SourceModelAudit audit = Audit(text);
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
   EXPECT_GT(audit.as_is.gap_m, 1e-3);
   EXPECT_EQ(audit.as_is.joint, "C");
   EXPECT_GT(audit.as_is.force, 0.01);
   EXPECT_EQ(Named(audit), Keys{"softness"});
   EXPECT_GT(Removed(audit.as_is.force, Find(audit, "softness")->without.force), 0.8);
-  EXPECT_LT(audit.mended.force, 1e-3);
+  EXPECT_LT(audit.corrected.force, 1e-3);
   // The lines in the file give what the table promises: here, and to whom pastes them.
   ASSERT_GT(audit.recommended, 0);
-  const OwnError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
+  const SourceModelError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
   EXPECT_TRUE(audit.Good(promised)) << promised.force << " " << promised.gap_m;
   EXPECT_TRUE(audit.stubborn.empty());
   EXPECT_NEAR(audit.pasted.force, promised.force, 1e-9 * promised.force);
-  const OwnFileAudit pasted = Audit(mjcf::WithLines(text, audit.lines));
+  const SourceModelAudit pasted = Audit(mjcf::WithLines(text, audit.lines));
   EXPECT_NEAR(pasted.as_is.force, promised.force, 1e-9 * promised.force) << audit.lines;
   EXPECT_NEAR(pasted.as_is.gap_m, promised.gap_m, 1e-9 * promised.gap_m);
   EXPECT_TRUE(pasted.Good(pasted.as_is));
 }
 
 TEST_F(OwnFile, ClosuresWithSettingsOfTheirOwnAreNamed) {
-  const OwnFileAudit audit = Audit(Text(
+  const SourceModelAudit audit = Audit(Text(
       {.closure =
            R"(<connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.4" solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/>)"}));
   ASSERT_GT(audit.recommended, 0);
   EXPECT_EQ(audit.stubborn, std::vector<std::string>{"C"});
-  const OwnError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
+  const SourceModelError& promised = audit.trials[static_cast<size_t>(audit.recommended)].error;
   EXPECT_NEAR(audit.pasted.force, promised.force, 1e-9 * promised.force);
 }
 
@@ -134,9 +134,9 @@ TEST_F(OwnFile, ClosuresWithSettingsOfTheirOwnAreNamed) {
 TEST_F(OwnFile, ThePullOnTheCurveIsNamed) {
   const std::string stiff_but_slow =
       R"(<default><equality solref="0.04 1" solimp="0.9999 0.9999 0.001 0.5 2"/></default>)";
-  const OwnFileAudit audit = Audit(Text({.head = stiff_but_slow}), "", "0.8");
+  const SourceModelAudit audit = Audit(Text({.head = stiff_but_slow}), "", "0.8");
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
-  const OwnCause* pull = Find(audit, "velocity_term");
+  const SourceModelCause* pull = Find(audit, "velocity_term");
   ASSERT_NE(pull, nullptr);
   EXPECT_EQ(Named(audit)[0], "velocity_term");
   EXPECT_GT(audit.as_is.force, 0.01);
@@ -145,7 +145,7 @@ TEST_F(OwnFile, ThePullOnTheCurveIsNamed) {
 }
 
 TEST_F(OwnFile, ServosThatLagAreNamedAndNoSettingIsBlamed) {
-  const OwnFileAudit audit = Audit(Text(
+  const SourceModelAudit audit = Audit(Text(
       {.head = kStiff,
        .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"}));
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
@@ -174,7 +174,7 @@ TEST_F(OwnFile, ADampedServoKeepsItsDamping) {
     return Text({.head = kStiff,
                  .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", kv)});
   };
-  const OwnFileAudit damped = Audit(servo("kv='40'")), plain = Audit(servo(""));
+  const SourceModelAudit damped = Audit(servo("kv='40'")), plain = Audit(servo(""));
   EXPECT_TRUE(Said(damped.done, "kv is taken over"));
   EXPECT_FALSE(Said(plain.done, "kv is taken over"));
   // A servo that brakes lags more.
@@ -185,15 +185,15 @@ TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
   const std::string holds = R"(<joint name="hold" joint1="A" polycoef="0 1 0 0 0"/>)";
   Barwork bars{.head = kStiff};
   bars.closure += holds;
-  const OwnFileAudit audit = Audit(Text(bars));
+  const SourceModelAudit audit = Audit(Text(bars));
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
   EXPECT_TRUE(Said(audit.done, "m: led by the file's own equality"));
   EXPECT_NE(Find(audit, "drives"), nullptr);
-  EXPECT_LT(audit.mended.force, 1e-3);
+  EXPECT_LT(audit.corrected.force, 1e-3);
 }
 
 TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
-  const OwnFileAudit audit =
+  const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option density='2000'/>") + kStiff}));
   EXPECT_EQ(Named(audit), Keys{"left_out"});
   ASSERT_NE(Find(audit, "left_out"), nullptr);
@@ -203,28 +203,28 @@ TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
 
 // Dry friction is in the reference, too; MuJoCo's gives way before it slides.
 TEST_F(OwnFile, FrictionLossIsJudgedOutsideTheBandThatRestLeaves) {
-  const OwnFileAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='0.3'"}));
+  const SourceModelAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='0.3'"}));
   EXPECT_EQ(Find(audit, "left_out"), nullptr);
   ASSERT_NE(Find(audit, "friction"), nullptr);
-  EXPECT_LT(audit.mended.force, 1e-3);
+  EXPECT_LT(audit.corrected.force, 1e-3);
   EXPECT_GT(audit.as_is.force, 1e-3);
 }
 
 // Damping, armature and springs of hinges are in the reference as well.
 TEST_F(OwnFile, ForceElementsAreNotLeftOut) {
-  const OwnFileAudit audit =
+  const SourceModelAudit audit =
       Audit(Text({.head = kStiff, .joint = "damping='1' armature='0.2' stiffness='3'"}));
   EXPECT_EQ(Find(audit, "left_out"), nullptr);
-  EXPECT_LT(audit.mended.force, 1e-3);
+  EXPECT_LT(audit.corrected.force, 1e-3);
 }
 
 TEST_F(OwnFile, AFreeBaseIsHeldAsIfItWereFixed) {
-  const OwnFileAudit fixed = Audit(Text({.head = kStiff}));
-  const OwnFileAudit free = Audit(Text({.head = kStiff, .base = "<freejoint/>"}));
+  const SourceModelAudit fixed = Audit(Text({.head = kStiff}));
+  const SourceModelAudit free = Audit(Text({.head = kStiff, .base = "<freejoint/>"}));
   ASSERT_TRUE(free.as_is.sound()) << free.as_is.failure;
   EXPECT_TRUE(Said(free.done, "free bodies are held where they are"));
   EXPECT_NEAR(free.as_is.force, fixed.as_is.force, 1e-2 * fixed.as_is.force);
-  EXPECT_LT(free.mended.force, 1e-3);
+  EXPECT_LT(free.corrected.force, 1e-3);
 }
 
 TEST_F(OwnFile, AWeldThatTwistsIsMeasured) {
@@ -239,7 +239,7 @@ TEST_F(OwnFile, AWeldThatTwistsIsMeasured) {
 </worldbody><equality><weld name="W" body1="c" body2="d"/></equality>
 <actuator><motor name="m" joint="A"/></actuator></mujoco>)";
   };
-  const OwnFileAudit loose = Audit(text(soft)), tight = Audit(text(kStiff));
+  const SourceModelAudit loose = Audit(text(soft)), tight = Audit(text(kStiff));
   ASSERT_TRUE(loose.as_is.sound()) << loose.as_is.failure;
   EXPECT_GT(loose.as_is.gap_rad, 1e-3);
   EXPECT_EQ(loose.as_is.twisted, "W");
@@ -249,32 +249,32 @@ TEST_F(OwnFile, AWeldThatTwistsIsMeasured) {
   EXPECT_LT(tight.as_is.joint_force, 1e-2);
 }
 
-// Another mass is no matter of settings: it stays when all is mended, and is told.
+// Another mass is no matter of settings: it stays when all is corrected, and is told.
 TEST_F(OwnFile, AFileOfAnotherMechanismIsNotBlamedOnItsSettings) {
   const std::string right = Text({.head = kStiff});
-  const OwnFileAudit audit = Audit(right, Text({.head = kStiff, .coupler_kg = 1.05}));
-  const OwnFileAudit same = Audit(right, right);
-  EXPECT_LT(same.mended.force, 1e-3);
-  EXPECT_GT(audit.mended.force, 0.01);
+  const SourceModelAudit audit = Audit(right, Text({.head = kStiff, .coupler_kg = 1.05}));
+  const SourceModelAudit same = Audit(right, right);
+  EXPECT_LT(same.corrected.force, 1e-3);
+  EXPECT_GT(audit.corrected.force, 0.01);
   EXPECT_GT(audit.as_is.force, 0.01);
   EXPECT_EQ(Named(audit), Keys{""});
 }
 
 TEST_F(OwnFile, ThatDivergesGivesATimeAndNoNumbers) {
-  const OwnFileAudit audit =
+  const SourceModelAudit audit =
       Audit(Text({.head = "<option timestep='0.05'/>",
                   .actuator = R"(<position name="m" joint="A" kp="1e7"/>)"}));
   EXPECT_FALSE(audit.as_is.sound());
   EXPECT_GE(audit.as_is.time_s, 0.0);
   EXPECT_TRUE(std::isnan(audit.as_is.force));
-  EXPECT_NE(OwnFileSentence(audit).find("no forces that could be compared"), std::string::npos)
-      << OwnFileSentence(audit);
+  EXPECT_NE(SourceModelSentence(audit).find("no forces that could be compared"), std::string::npos)
+      << SourceModelSentence(audit);
 }
 
 TEST_F(OwnFile, FrictionOfContactsIsNoMatterHere) {
-  const OwnFileAudit audit = Audit(Text({.head = kSoft}));
+  const SourceModelAudit audit = Audit(Text({.head = kSoft}));
   bool found = false;
-  for (const OwnTrial& trial : audit.trials) {
+  for (const SourceModelTrial& trial : audit.trials) {
     if (trial.other != "impratio 10") continue;
     found = true;
     EXPECT_EQ(trial.error.force, audit.trials[0].error.force);
@@ -287,7 +287,7 @@ TEST_F(OwnFile, ADriveWithoutANameForItsJointIsDeclined) {
   for (const char* name : {R"(name="A" )", R"(name="B" )", R"(name="D" )"}) {
     text.erase(text.find(name), std::string(name).size());
   }
-  const OwnFileAudit audit = Audit(text);
+  const SourceModelAudit audit = Audit(text);
   EXPECT_NE(audit.declined.find("has no name in the file"), std::string::npos) << audit.declined;
 }
 
