@@ -45,6 +45,8 @@ macro(mbv_optional option)
       list(POP_BACK MBV_MISSING last)
       list(APPEND MBV_MISSING "${last}, or configure with -D${option}=OFF")
     endif()
+  elseif(NOT TARGET PkgConfig::${ARGV1})
+    add_library(PkgConfig::${ARGV1} INTERFACE IMPORTED)
   endif()
 endmacro()
 

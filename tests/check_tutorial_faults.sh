@@ -26,7 +26,7 @@ $ mbverify check models/m/model.yaml
 models/m/model.yaml: ok
 $ mbverify model m
 …
-  freedoms: 1 = 6 body coordinates - rank 5 of 5 joint constraints
+  degrees of freedom: 1 = 6 body coordinates - rank 5 of 5 joint constraints
 …
 $ mbverify check models/n/model.yaml >/dev/null 2>&1
 $ echo $?
@@ -47,7 +47,7 @@ bent() {  # WHAT SED_SCRIPT
 cp "$work/right.md" "$work/document.md"
 expect 0 "the document that is right"
 bent "another answer quoted" 's/^models.*: ok$/models\/m\/model.yaml: fine/'
-bent "a piece of an answer quoted" 's/^  freedoms: 1 = .*/  freedoms: 1/'
+bent "a piece of an answer quoted" 's/^  degrees of freedom: 1 = .*/  degrees of freedom: 1/'
 bent "an answer that is not quoted" '/: ok$/d;/^\$ mbverify model/,/^…$/d'
 bent "an answer longer than quoted" '/^  freedoms/,/^…$/{/^…$/d}'
 bent "another exit code quoted" 's/^2$/3/'

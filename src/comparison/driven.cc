@@ -377,7 +377,7 @@ std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& co
     if (!(*check.limit > kMost * size)) continue;  // one that is no number fails its check
     return fmt::format(
         "{:g} s are too long to drive this mechanism in open loop: forces perturbed by "
-        "{:.0e} lead it {:.2g} {} astray",
+        "{:.0e} make it deviate by {:.2g} {}",
         input.motion->duration_s, input.perturbation, *check.limit, RowOf(check.metric).unit);
   }
   return "";

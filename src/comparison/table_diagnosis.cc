@@ -262,8 +262,7 @@ class Diagnosis {
       case Explanation::Kind::kEither:
         return fmt::format(
             "{} is {:.6g} times {}, or {} with {:.6g} {} added: {} varies too little to "
-            "distinguish them "
-            "apart ({})",
+            "distinguish them ({})",
             columns, finding.factor, channel, channel, finding.offset, series_[k].unit, channel,
             Left(k));
       case Explanation::Kind::kOutliers:

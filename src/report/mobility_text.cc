@@ -103,7 +103,7 @@ std::string RedundancyText(const MobilityReport& report) {
   const Mobility& m = report.home;
   std::string text = fmt::format(
       "  redundant constraints: {}; Kutzbach's count, which cannot see them, gives {} degrees of "
-      "degree of freedom\n",
+      "freedom\n",
       m.redundant, m.kutzbach);
   if (m.redundant == 0) {
     text = fmt::format("  redundant constraints: 0; Kutzbach's count is right\n");

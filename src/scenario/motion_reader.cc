@@ -187,7 +187,7 @@ class FreeMotionReader {
     if (free <= 0) {
       yaml().Error(node,
                    fmt::format("motion commands {} of {} degrees of freedom, so no degree of "
-                               "degree of freedom is left to forces",
+                               "freedom is left to forces",
                                commands, dofs),
                    "leave out forces and initial values, or a command");
       return;

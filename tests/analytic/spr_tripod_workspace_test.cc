@@ -308,7 +308,8 @@ std::vector<std::pair<double, int>> NumbersAfter(const std::string& text, const 
   std::vector<std::pair<double, int>> numbers;
   const size_t at = text.find(key);
   if (at == std::string::npos) return numbers;
-  const std::string line = text.substr(at + key.size(), text.find('\n', at) - at - key.size());
+  const std::string line =
+      text.substr(at + key.size(), text.find('\n', at + key.size()) - at - key.size());
   const std::regex number(R"([-+]?\d+(\.(\d+))?(?![\de.]))");
   for (std::sregex_iterator it(line.begin(), line.end(), number), end; it != end; ++it) {
     numbers.emplace_back(std::stod(it->str()), static_cast<int>((*it)[2].length()));

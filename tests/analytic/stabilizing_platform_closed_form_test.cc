@@ -163,7 +163,7 @@ TEST(StabilizingPlatformClosedForm, RejectsCommandsItHasNoUseFor) {
 TEST(StabilizingPlatformClosedForm, RejectsPairsBesidesTheWholePose) {
   Motion motion = SeaStateMotion(true);
   motion.commands.push_back(SeaStateMotion().commands.back());
-  EXPECT_MENTIONS(FindingsOf(Names(), motion), "is commanded besides the pose");
+  EXPECT_MENTIONS(FindingsOf(Names(), motion), "is commanded in addition to the pose");
 }
 
 TEST(StabilizingPlatformClosedForm, RejectsUnknownModelsErrataAndLoadedBodies) {

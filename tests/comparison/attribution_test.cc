@@ -78,7 +78,7 @@ TEST(Attribution, TwoWitnessesCannotTellWhichIsWrong) {
   Stretch(&c.analytic, "d1.force", 1.02);
   const Attribution attribution = c.Run().attribution;
   EXPECT_TRUE(attribution.odd_one_out.empty());
-  EXPECT_TRUE(Mentions(attribution, "a third witness would tell")) << attribution.text;
+  EXPECT_TRUE(Mentions(attribution, "a third witness would show")) << attribution.text;
 }
 
 TEST(Attribution, RatesThatAreNoDerivativesConvictTheirWitnessThoughTheSimulationFollowsThem) {

@@ -111,7 +111,7 @@ Case Weightless() {
 TEST(Reservations, NothingMovesAndNothingWeighsVerifiesNothing) {
   const Comparison comparison = Weightless().Run();
   EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
-  EXPECT_NE(comparison.reason.find("nothing moves, weighs or pushes"), std::string::npos)
+  EXPECT_NE(comparison.reason.find("nothing moves, weighs or exerts a force"), std::string::npos)
       << comparison.reason;
   Case round = Weightless();
   Bend(&round.simulated, "d1.force", 1e-16);  // round-off

@@ -377,7 +377,7 @@ TEST(TableDiagnosis, WhatASignalThatHardlyVariesLeavesOpenIsSaid) {
     return c.Run();
   };
   const Comparison hardly = of(0.1, 1.005);
-  EXPECT_TRUE(Says(hardly, "varies too little to tell them apart")) << All(hardly);
+  EXPECT_TRUE(Says(hardly, "varies too little to distinguish them")) << All(hardly);
   EXPECT_FALSE(Says(hardly, "preload")) << All(hardly);
   const Comparison swings = of(60.0, 1.005);
   EXPECT_TRUE(Says(swings, "is 1.005 times d1.force: a mass")) << All(swings);

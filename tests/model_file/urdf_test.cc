@@ -223,7 +223,7 @@ TEST(UrdfImport, PluginsOfGazeboAreCaveatsUnlessTheyOnlyMeasureOrDrive) {
   const UrdfTree unknown = WithPlugin("<plugin filename=\"libmine.so\" name=\"m\"/>", &findings);
   ASSERT_EQ(unknown.left_out.size(), 1u);
   EXPECT_EQ(unknown.left_out[0].text,
-            "<plugin> 'libmine.so' ('arm') is left out: what it does to forces is not known");
+            "<plugin> libmine.so ('arm') is left out: what it does to forces is not known");
   EXPECT_NE(findings.Text().find("r.urdf:1:"), std::string::npos) << findings.Text();
   EXPECT_EQ(WithPlugin("<plugin/>", &findings).left_out.size(), 1u);
   EXPECT_NE(WithPlugin("<plugin filename=\"GZ-Sim-Hydrodynamics-System\"/>", &findings)

@@ -36,7 +36,7 @@ SourceModelAudit Example() {
   return audit;
 }
 
-TEST(OwnFileWords, TheCauseThatTakesTheErrorWithItIsNamed) {
+TEST(SourceModelReport, TheCauseThatTakesTheErrorWithItIsNamed) {
   SourceModelAudit audit = Example();
   ASSERT_EQ(audit.Culprits().size(), 1u);
   EXPECT_NE(CauseSentence(audit).find("made by one thing: loops. Loops give."), std::string::npos);
@@ -49,14 +49,14 @@ TEST(OwnFileWords, TheCauseThatTakesTheErrorWithItIsNamed) {
   EXPECT_NE(CauseSentence(audit).find("No single thing"), std::string::npos);
 }
 
-TEST(OwnFileWords, WhatStaysWithAllMendedIsNoMatterOfSettings) {
+TEST(SourceModelReport, WhatStaysWithAllMendedIsNoMatterOfSettings) {
   SourceModelAudit audit = Example();
   EXPECT_EQ(CauseSentence(audit).find("another mechanism"), std::string::npos);
   audit.corrected.force = 0.05;
   EXPECT_NE(CauseSentence(audit).find("5 % of the force stays wrong"), std::string::npos);
 }
 
-TEST(OwnFileWords, GoodNeedsForcesAndLoops) {
+TEST(SourceModelReport, GoodNeedsForcesAndLoops) {
   SourceModelAudit audit = Example();
   audit.as_is = Sound(0.99 * SourceModelAudit::kGoodForce, 0.99 * SourceModelAudit::kGoodGap);
   EXPECT_TRUE(audit.Good(audit.as_is));
@@ -72,7 +72,7 @@ TEST(OwnFileWords, GoodNeedsForcesAndLoops) {
   EXPECT_FALSE(audit.Good(audit.as_is));
 }
 
-TEST(OwnFileWords, UnsoundNumbersAreNoNumbers) {
+TEST(SourceModelReport, UnsoundNumbersAreNoNumbers) {
   SourceModelAudit audit = Example();
   audit.as_is = {};
   audit.as_is.failure = "MuJoCo reset the simulation at 0.3 s";
@@ -86,7 +86,7 @@ TEST(OwnFileWords, UnsoundNumbersAreNoNumbers) {
   EXPECT_FALSE(json["good"].get<bool>());
 }
 
-TEST(OwnFileWords, NamesOfTheFileAreEscapedOnThePage) {
+TEST(SourceModelReport, NamesOfTheFileAreEscapedOnThePage) {
   SourceModelAudit audit = Example();
   audit.as_is.joint = "<script>";
   audit.done = {"<b>"};

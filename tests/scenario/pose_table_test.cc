@@ -113,7 +113,7 @@ TEST_F(PoseTableTest, WrongFilesAreToldWithPlaceAndHint) {
             "  hint: are these the right columns?\n");
   EXPECT_EQ(Messages("{output: platform, csv: up.csv, angles: rotation_vector}"),
             "s.yaml:3:39: error: motion.pose_table: up.csv at t = 0 s pitches beyond 89°, where "
-            "roll and yaw are not told apart\n"
+            "roll and yaw are not distinguishable\n"
             "  hint: turn the output's frame\n");
   EXPECT_EQ(Messages("{output: plattform, csv: q.csv, angles: quaternions}"),
             "s.yaml:3:24: error: motion.pose_table.output: stewart has no output 'plattform'\n"

@@ -245,8 +245,8 @@ TEST(Mjcf, TheHeadSaysHowToUseTheFileInEachForm) {
     const std::string text = WriteMjcf(m, options);
     return text.substr(0, text.find("<compiler"));
   };
-  const std::string held = head({}), free = head({.guided = false});
-  const std::string servo = head({.guided = false, .kp = {1.0}, .kv = {1.0}});
+  const std::string held = head({}), free = head({.prescribed = false});
+  const std::string servo = head({.prescribed = false, .kp = {1.0}, .kv = {1.0}});
   for (const std::string& text : {held, free, servo, head({.statics = true})}) {
     EXPECT_NE(text.find("Two ways to use it:"), std::string::npos) << text;
     EXPECT_NE(text.find("\n1. "), std::string::npos) << text;
@@ -289,7 +289,7 @@ TEST(Mjcf, MoreKeysComeBehindHome) {
   const Compiled plain(mechanism);
   std::vector<double> qpos(plain.engine.m->qpos0, plain.engine.m->qpos0 + plain.engine.m->nq);
   qpos[0] += 0.125;
-  const std::string servos = WriteMjcf(mechanism, {.guided = false, .kp = {2.0}, .kv = {1.0}});
+  const std::string servos = WriteMjcf(mechanism, {.prescribed = false, .kp = {2.0}, .kv = {1.0}});
   for (const std::string& text : {plain.mjcf, servos}) {
     std::vector<std::string> warnings;
     const EngineSession session(&warnings);

@@ -85,7 +85,8 @@ void ExpectDeclined(const Outcome& outcome, const std::string& fact, const std::
   EXPECT_TRUE(outcome.others_ran);
   EXPECT_NE(outcome.reason.find(fact), std::string::npos) << outcome.reason;
   EXPECT_NE(outcome.reason.find(why), std::string::npos) << outcome.reason;
-  EXPECT_NE(outcome.findings.find("warning: analytic declines: " + fact), std::string::npos)
+  EXPECT_NE(outcome.findings.find("warning: analytic is not applicable: " + fact),
+            std::string::npos)
       << outcome.findings;
 }
 
@@ -102,7 +103,8 @@ TEST(WarnNotApplicable, ACentreOfMassBesideTheLink) {
   // `check` says so for the model alone, too.
   const Diagnostics check = CheckFile(file);
   EXPECT_FALSE(check.has_errors());
-  EXPECT_NE(check.Text().find("the closed form will decline: body limb3.link1: centre of mass x"),
+  EXPECT_NE(check.Text().find(
+                "the closed form will not be applicable: body limb3.link1: centre of mass x"),
             std::string::npos)
       << check.Text();
   EXPECT_EQ(CheckFile(SourcePath("/models/stabilizing_platform/model.yaml")).Text().find("decline"),
@@ -201,9 +203,9 @@ TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
   options.pictures = false;
   const RunOutcome outcome = RunScenario(scenario, options);
   EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
-  EXPECT_NE(
-      outcome.diagnostics.Text().find("analytic declines: beam limb1.bar: area is 0.000113097"),
-      std::string::npos)
+  EXPECT_NE(outcome.diagnostics.Text().find(
+                "analytic is not applicable: beam limb1.bar: area is 0.000113097"),
+            std::string::npos)
       << outcome.diagnostics.Text();
   // A caveat of the verdict, in JSON and on the line of -q.
   ASSERT_TRUE(outcome.stiffness);

@@ -68,7 +68,7 @@ TEST(ForceDriven, AHorizonOverWhichErrorsGrowTooFarVerifiesNothing) {
       RunOf("spr_tripod/force_driven", Short({{"checks.force_nrmse", "{forward: 0.05}"}}));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.exit_code, 3);
-  EXPECT_NE(outcome.report->comparison.reason.find("too long to push"), std::string::npos)
+  EXPECT_NE(outcome.report->comparison.reason.find("too long to drive"), std::string::npos)
       << outcome.report->comparison.reason;
 }
 

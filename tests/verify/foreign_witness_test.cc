@@ -102,7 +102,7 @@ TEST(ForeignWitness, ThePendulumIsASmallOne) {
                                      SourcePath("/examples/witness/pendulum.py") + "]}}");
   ASSERT_TRUE(linkage.report);
   EXPECT_EQ(RecordOf(linkage, "pendulum")->summary.message,
-            "declines: it is no body on one revolute joint");
+            "not applicable: it is no body on one revolute joint");
 }
 
 // With four of them every pair stands in a matrix, and a star where it fails.
@@ -227,7 +227,7 @@ INSTANTIATE_TEST_SUITE_P(
                  WitnessGap::kBadAnswer},
         Mischief{"twice", "traces.csv has two columns 'motor.velocity'", WitnessGap::kBadAnswer},
         Mischief{"foot", "units is 'foot, pound'", WitnessGap::kBadAnswer},
-        Mischief{"refuses", "declines: it has a loop", WitnessGap::kDeclined},
+        Mischief{"refuses", "not applicable: it has a loop", WitnessGap::kDeclined},
         Mischief{"schema", "schema is 'mbverify/witness/0'", WitnessGap::kBadAnswer},
         Mischief{"link", "left no traces.csv", WitnessGap::kNoAnswer},
         Mischief{"listed", "witness.json", WitnessGap::kBadAnswer},
@@ -431,7 +431,7 @@ TEST(ForeignWitness, SimbodyDeclinesFriction) {
       RunScenario(SourcePath("/scenarios/rubbing_five_bar/dwell_inverse.yaml"), options);
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
   EXPECT_EQ(outcome.report->comparison.verdict, Verdict::kAgree);
-  EXPECT_EQ(RecordOf(outcome, "simbody")->summary.message, "declines: it has elements");
+  EXPECT_EQ(RecordOf(outcome, "simbody")->summary.message, "not applicable: it has elements");
 }
 #endif
 

@@ -55,7 +55,7 @@ elif how == "foot":
 elif how == "kilo":
     for row in rows:
         row[force] = repr(float(row[force]) / 1000)
-elif how == "bent":
+elif how == "perturbed":
     for row in rows:
         row[force] = repr(float(row[force]) * (1 + 1e-8))
 elif how == "refuses":

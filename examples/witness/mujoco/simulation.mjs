@@ -17,7 +17,7 @@ export class Simulation {
     this.guided = names.map((name) => this.guide(name));
   }
 
-  // The residual of a guided row is its coordinate − home − eq_data[0].
+  // The residual of a prescribed row is its coordinate − home − eq_data[0].
   guide(name) {
     const id = this.equalities[`drive:${name}`] ?? this.equalities[`base:${name}`];
     if (id === undefined) throw new Refused(`the model has no equality that guides ${name}`);

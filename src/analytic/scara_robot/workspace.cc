@@ -135,6 +135,7 @@ Volume EstimateVolume(const Parameters& parameters, const Limits& limits, double
   const auto reached = static_cast<double>(all.reached);
   volume.touches_box = all.at_edge > 0;
   volume.samples = 2LL * cells * cells * cells;
+  volume.reached = all.reached;
   volume.volume_m3 = cell_volume * reached / 2.0;
   volume.uncertainty_m3 = 2.0 * cell_volume * std::sqrt(static_cast<double>(all.differences)) / 2.0;
   volume.fraction_usable = reached > 0 ? static_cast<double>(all.usable) / reached : 0.0;
@@ -246,6 +247,13 @@ Volume WholeVolume(const Parameters& parameters, const Limits& limits, double ya
   return volume;
 }
 
+// "0.00827 +- 2e-05": the last digit is of the error's size.
+std::string WithError(double value, double error) {
+  constexpr int kMostDecimals = 14;
+  const int places = error > 0.0 ? static_cast<int>(std::ceil(-std::log10(error))) : kMostDecimals;
+  return fmt::format("{:.{}f} +- {:.0e}", value, std::clamp(places, 0, kMostDecimals), error);
+}
+
 }  // namespace
 
 WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRequest& request) {
@@ -276,10 +284,18 @@ WorkspaceForm ComputeWorkspaceForm(const Mechanism& mechanism, const WorkspaceRe
     request.Report(yaw > 0.0 ? 0.6 : 0.2);
     const Volume v = WholeVolume(parameters, limits, yaw * kDegree, request.jobs);
     if (v.lost) return LostWork();
+    const double share = v.fraction_usable;
+    const double share_error =
+        2.0 * std::sqrt(share * (1.0 - share) / std::max(1.0, static_cast<double>(v.reached)));
     outcome.text += fmt::format(
-        "reachable volume at yaw {:g} deg: {:.4e} +- {:.1e} m^3 (two standard "
-        "errors, {} samples); {:.1f} % of it away from singular poses\n",
-        yaw, v.volume_m3, v.uncertainty_m3, v.samples, 100 * v.fraction_usable);
+        "reachable volume at yaw {:g} deg: {} m^3 (two standard errors, {} samples); {} % of it "
+        "away from singular poses\n",
+        yaw, WithError(v.volume_m3, v.uncertainty_m3), v.samples,
+        WithError(100.0 * share, 100.0 * share_error));
+    outcome.measures.push_back(
+        {fmt::format("volume at yaw {:g} deg", yaw), v.volume_m3, v.uncertainty_m3, "m3"});
+    outcome.measures.push_back({fmt::format("share away from singular poses at yaw {:g} deg", yaw),
+                                share, share_error, "1"});
   }
   for (double z : {-0.100, -0.165, -0.230}) AddSlice(parameters, limits, z, &outcome);
   outcome.mesh = CylinderMesh(space, 72);

@@ -55,7 +55,7 @@ struct Volume {
   double volume_m3 = kNan;
   double uncertainty_m3 = kNan;   ///< two standard errors
   double fraction_usable = kNan;  ///< of it: s_min ≥ kNearlySingular
-  std::int64_t samples = 0;
+  std::int64_t samples = 0, reached = 0;
   bool touches_box = false;  ///< reached in the outermost cells: there may be more beyond
   bool lost = false;         ///< a process that shared the work was killed: nothing is known
 };

@@ -42,7 +42,7 @@ const char* const kStiff =
 const char* const kSoft =
     R"(<default><equality solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/></default>)";
 
-class OwnFile : public testing::Test {
+class SourceModelAudits : public testing::Test {
  protected:
   // `run`: another text that is run in place of the one that the reference computes. `height`: of
   // the drive's bump.
@@ -82,11 +82,11 @@ class OwnFile : public testing::Test {
     return false;
   }
 
-  const test::TestFolder folder_{std::string("own_file_") +
+  const test::TestFolder folder_{std::string("source_model_") +
                                  testing::UnitTest::GetInstance()->current_test_info()->name()};
 };
 
-TEST_F(OwnFile, InWhichNothingIsWrongIsToldSo) {
+TEST_F(SourceModelAudits, InWhichNothingIsWrongIsToldSo) {
   const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option timestep='0.0005' integrator='RK4'/>") + kStiff}));
   ASSERT_TRUE(audit.declined.empty()) << audit.declined;
@@ -98,7 +98,7 @@ TEST_F(OwnFile, InWhichNothingIsWrongIsToldSo) {
   EXPECT_EQ(audit.integrator, "RK4");
 }
 
-TEST_F(OwnFile, SoftLoopsOpenAreNamedAndMendedByTheLines) {
+TEST_F(SourceModelAudits, SoftLoopsOpenAreNamedAndMendedByTheLines) {
   const std::string text = Text({.head = kSoft});
   const SourceModelAudit audit = Audit(text);
   ASSERT_TRUE(audit.as_is.sound()) << audit.as_is.failure;
@@ -120,7 +120,7 @@ TEST_F(OwnFile, SoftLoopsOpenAreNamedAndMendedByTheLines) {
   EXPECT_TRUE(pasted.Good(pasted.as_is));
 }
 
-TEST_F(OwnFile, ClosuresWithSettingsOfTheirOwnAreNamed) {
+TEST_F(SourceModelAudits, ClosuresWithSettingsOfTheirOwnAreNamed) {
   const SourceModelAudit audit = Audit(Text(
       {.closure =
            R"(<connect name="C" body1="rocker" body2="coupler" anchor="0 0 0.4" solref="0.06 1" solimp="0.5 0.5 0.001 0.5 2"/>)"}));
@@ -131,7 +131,7 @@ TEST_F(OwnFile, ClosuresWithSettingsOfTheirOwnAreNamed) {
 }
 
 // Fast, with a stiff impedance: what is left out is the pull on the curve.
-TEST_F(OwnFile, ThePullOnTheCurveIsNamed) {
+TEST_F(SourceModelAudits, ThePullOnTheCurveIsNamed) {
   const std::string stiff_but_slow =
       R"(<default><equality solref="0.04 1" solimp="0.9999 0.9999 0.001 0.5 2"/></default>)";
   const SourceModelAudit audit = Audit(Text({.head = stiff_but_slow}), "", "0.8");
@@ -144,7 +144,7 @@ TEST_F(OwnFile, ThePullOnTheCurveIsNamed) {
   EXPECT_GT(Removed(audit.as_is.gap_m, pull->without.gap_m), 0.9);
 }
 
-TEST_F(OwnFile, ServosThatLagAreNamedAndNoSettingIsBlamed) {
+TEST_F(SourceModelAudits, ServosThatLagAreNamedAndNoSettingIsBlamed) {
   const SourceModelAudit audit = Audit(Text(
       {.head = kStiff,
        .actuator = R"(<position name="m" joint="A" kp="400"/><velocity joint="A" kv="20"/>)"}));
@@ -156,7 +156,7 @@ TEST_F(OwnFile, ServosThatLagAreNamedAndNoSettingIsBlamed) {
   EXPECT_TRUE(audit.Good(audit.bare));
 }
 
-TEST_F(OwnFile, WhatCutsAServosCommandOrForceIsTold) {
+TEST_F(SourceModelAudits, WhatCutsAServosCommandOrForceIsTold) {
   const auto servo = [](const char* range) {
     return Text({.head = kStiff,
                  .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", range)});
@@ -169,7 +169,7 @@ TEST_F(OwnFile, WhatCutsAServosCommandOrForceIsTold) {
 }
 
 // MuJoCo 2.2 drops `kv`; run as it is, the servo has it.
-TEST_F(OwnFile, ADampedServoKeepsItsDamping) {
+TEST_F(SourceModelAudits, ADampedServoKeepsItsDamping) {
   const auto servo = [](const char* kv) {
     return Text({.head = kStiff,
                  .actuator = fmt::format(R"(<position name="m" joint="A" kp="400" {}/>)", kv)});
@@ -181,7 +181,7 @@ TEST_F(OwnFile, ADampedServoKeepsItsDamping) {
   EXPECT_GT(damped.as_is.force, 2.0 * plain.as_is.force);
 }
 
-TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
+TEST_F(SourceModelAudits, AnEqualityThatHoldsTheDriveLeadsIt) {
   const std::string holds = R"(<joint name="hold" joint1="A" polycoef="0 1 0 0 0"/>)";
   Barwork bars{.head = kStiff};
   bars.closure += holds;
@@ -192,7 +192,7 @@ TEST_F(OwnFile, AnEqualityThatHoldsTheDriveLeadsIt) {
   EXPECT_LT(audit.corrected.force, 1e-3);
 }
 
-TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
+TEST_F(SourceModelAudits, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
   const SourceModelAudit audit =
       Audit(Text({.head = std::string("<option density='2000'/>") + kStiff}));
   EXPECT_EQ(Named(audit), Keys{"left_out"});
@@ -202,7 +202,7 @@ TEST_F(OwnFile, WhatTheReferenceDoesNotHaveIsNoFaultOfTheFile) {
 }
 
 // Dry friction is in the reference, too; MuJoCo's gives way before it slides.
-TEST_F(OwnFile, FrictionLossIsJudgedOutsideTheBandThatRestLeaves) {
+TEST_F(SourceModelAudits, FrictionLossIsJudgedOutsideTheBandThatRestLeaves) {
   const SourceModelAudit audit = Audit(Text({.head = kStiff, .joint = "frictionloss='0.3'"}));
   EXPECT_EQ(Find(audit, "left_out"), nullptr);
   ASSERT_NE(Find(audit, "friction"), nullptr);
@@ -211,14 +211,14 @@ TEST_F(OwnFile, FrictionLossIsJudgedOutsideTheBandThatRestLeaves) {
 }
 
 // Damping, armature and springs of hinges are in the reference as well.
-TEST_F(OwnFile, ForceElementsAreNotLeftOut) {
+TEST_F(SourceModelAudits, ForceElementsAreNotLeftOut) {
   const SourceModelAudit audit =
       Audit(Text({.head = kStiff, .joint = "damping='1' armature='0.2' stiffness='3'"}));
   EXPECT_EQ(Find(audit, "left_out"), nullptr);
   EXPECT_LT(audit.corrected.force, 1e-3);
 }
 
-TEST_F(OwnFile, AFreeBaseIsHeldAsIfItWereFixed) {
+TEST_F(SourceModelAudits, AFreeBaseIsHeldAsIfItWereFixed) {
   const SourceModelAudit fixed = Audit(Text({.head = kStiff}));
   const SourceModelAudit free = Audit(Text({.head = kStiff, .base = "<freejoint/>"}));
   ASSERT_TRUE(free.as_is.sound()) << free.as_is.failure;
@@ -227,7 +227,7 @@ TEST_F(OwnFile, AFreeBaseIsHeldAsIfItWereFixed) {
   EXPECT_LT(free.corrected.force, 1e-3);
 }
 
-TEST_F(OwnFile, AWeldThatTwistsIsMeasured) {
+TEST_F(SourceModelAudits, AWeldThatTwistsIsMeasured) {
   const std::string soft =
       R"(<default><equality solref="0.1 1" solimp="0.3 0.3 0.001 0.5 2"/></default>)";
   const auto text = [](const std::string& head) {
@@ -250,7 +250,7 @@ TEST_F(OwnFile, AWeldThatTwistsIsMeasured) {
 }
 
 // Another mass is no matter of settings: it stays when all is corrected, and is told.
-TEST_F(OwnFile, AFileOfAnotherMechanismIsNotBlamedOnItsSettings) {
+TEST_F(SourceModelAudits, AFileOfAnotherMechanismIsNotBlamedOnItsSettings) {
   const std::string right = Text({.head = kStiff});
   const SourceModelAudit audit = Audit(right, Text({.head = kStiff, .coupler_kg = 1.05}));
   const SourceModelAudit same = Audit(right, right);
@@ -260,7 +260,7 @@ TEST_F(OwnFile, AFileOfAnotherMechanismIsNotBlamedOnItsSettings) {
   EXPECT_EQ(Named(audit), Keys{""});
 }
 
-TEST_F(OwnFile, ThatDivergesGivesATimeAndNoNumbers) {
+TEST_F(SourceModelAudits, ThatDivergesGivesATimeAndNoNumbers) {
   const SourceModelAudit audit =
       Audit(Text({.head = "<option timestep='0.05'/>",
                   .actuator = R"(<position name="m" joint="A" kp="1e7"/>)"}));
@@ -271,7 +271,7 @@ TEST_F(OwnFile, ThatDivergesGivesATimeAndNoNumbers) {
       << SourceModelSentence(audit);
 }
 
-TEST_F(OwnFile, FrictionOfContactsIsNoMatterHere) {
+TEST_F(SourceModelAudits, FrictionOfContactsIsNoMatterHere) {
   const SourceModelAudit audit = Audit(Text({.head = kSoft}));
   bool found = false;
   for (const SourceModelTrial& trial : audit.trials) {
@@ -282,7 +282,7 @@ TEST_F(OwnFile, FrictionOfContactsIsNoMatterHere) {
   EXPECT_TRUE(found);
 }
 
-TEST_F(OwnFile, ADriveWithoutANameForItsJointIsDeclined) {
+TEST_F(SourceModelAudits, ADriveWithoutANameForItsJointIsDeclined) {
   std::string text = Text({.actuator = ""});
   for (const char* name : {R"(name="A" )", R"(name="B" )", R"(name="D" )"}) {
     text.erase(text.find(name), std::string(name).size());

@@ -96,7 +96,8 @@ TEST(PackageCommand, WhatNamesTheHomeFolderIsRefused) {
       "/notes') >" + home + "/my.yaml && cd " + home + " && HOME=" + home +
       " \"$mbverify\" package my.yaml -o paper.zip");
   EXPECT_EQ(made.exit_code, 2);
-  EXPECT_TRUE(Has(made.err, "my.yaml:12:1: error: names your home folder")) << made.err;
+  EXPECT_TRUE(Has(made.err, "my.yaml:12:1: error: contains the path of your home directory"))
+      << made.err;
   EXPECT_FALSE(fs::exists(home + "/paper.zip"));
 }
 

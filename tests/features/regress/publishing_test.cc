@@ -157,7 +157,7 @@ TEST_F(PublishingTest, KilledAtAnyCallLeavesWholeResultsAndTheNextNightIsFine) {
     EXPECT_NE(Read("out/index.html").find("has not finished"), std::string::npos) << call;
     RegressOptions join = options_;
     join.out = "joined";
-    EXPECT_NE(MergeRuns({"out"}, join).trouble.find("may be of two nights"), std::string::npos);
+    EXPECT_NE(MergeRuns({"out"}, join).trouble.find("may be of two runs"), std::string::npos);
   };
   for (int call = 1; !HasFailure(); call += 3) {
     options_.label = std::to_string(++night);

@@ -324,7 +324,7 @@ TEST_F(MergeTest, PartsOfDifferentNightsAreRefused) {
   const std::map<std::string, std::pair<std::string, std::string>> changes = {
       {"label", {"another", "has label 'another'"}},
       {"program", {"mbverify 0.0.1", "has program"}},
-      {"started_utc", {"2026-01-01T02:00:00Z", "two nights"}},
+      {"started_utc", {"2026-01-01T02:00:00Z", "two regression runs"}},
       {"shard", {"2/4", "others are parts of 3"}}};
   for (const auto& [key, change] : changes) {
     Change("shard2", key, change.first);

@@ -60,7 +60,7 @@ TEST_F(RobotCommands, RunTellsWhatTheFilesOwnSettingsDo) {
   EXPECT_EQ(run.exit_code, 0) << run.err;
   EXPECT_NE(run.out.find("AGREE"), std::string::npos) << run.out;
   for (const char* said : {"your file's drive forces are off by", "what makes it wrong",
-                           "paste this before </mujoco>", "<default><equality solref="}) {
+                           "pasted before </mujoco>", "<default><equality solref="}) {
     EXPECT_NE(run.out.find(said), std::string::npos) << said << "\n" << run.out;
   }
   const std::filesystem::path folder = mbverify.folder() / "out/own/setup/first";

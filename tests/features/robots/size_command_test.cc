@@ -21,11 +21,9 @@ class SizeCommand : public testing::Test {
     Write("none.yaml", Scenario("bare.yaml", 1.0));
     Write("geared.yaml", kModel + std::string("motors: {x: {gear_ratio: 1}}\n"));
     Write("unlimited.yaml", Scenario("geared.yaml", 1.0));
-    Write("shaken_model.yaml",
-          kModel + std::string("loads: {shaker: {kind: force, body: cart, point: [0, 0, 0], "
-                               "force: [\"sin(2*pi*30*t)\", 0, 0]}}\n"
-                               "motors: {x: {continuous: 60, peak: 100}}\n"));
-    Write("shaken.yaml", Scenario("shaken_model.yaml", 1.0));
+    Write("shaken.yaml", Scenario("model.yaml", 1.0) +
+                             "loads: {shaker: {on: cart, force: [{sine: {amplitude: 5, "
+                             "frequency_hz: 30}}, 0, 0], in: world}}\n");
   }
   static constexpr const char* kModel =
       "name: cart\nbodies: {cart: {mass: 2, inertia: [1, 1, 1]}}\n"

@@ -123,8 +123,7 @@ TEST(Survey, ARowGoesThroughBytesUnchanged) {
 
   const std::string csv = SurveyCsv({row});
   EXPECT_EQ(csv.substr(0, csv.find('\n')),
-            "file,status,bodies,loops,degrees of "
-            "degree of freedom,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
+            "file,status,bodies,loops,freedoms,redundant,gap_m,gap_rad,inverse_nrmse,forward_nrmse,"
             "seconds,caveats,message");
   EXPECT_NE(csv.find("a.urdf,ok,3,1,2,,0.33,,,,,not the whole robot; =cmd,\"a, \"\"b\"\" c\"\n"),
             std::string::npos)

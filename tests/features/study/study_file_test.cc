@@ -320,7 +320,7 @@ TEST_F(StudyFiles, OthersMayAskForOtherPoints) {
 
 TEST_F(StudyFiles, AValidationWithoutAWitnessThatIsKnownIsRefusedNotCrashedOn) {
   for (const auto& [witnesses, told] : {std::pair{"[referense]", "witnesses = 'referense'"},
-                                        {"[]", "witnesses: nobody computes"},
+                                        {"[]", "witnesses: the list is empty"},
                                         {"[\"\"]", "witnesses is ''"},
                                         {"{}", "witnesses"},
                                         {"[[]]", "witnesses"}}) {
