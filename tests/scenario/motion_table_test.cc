@@ -312,7 +312,7 @@ TEST_F(MotionTableTest, WhatGoesOnAfterTheMotionIsNamed) {
   EXPECT_EQ(Messages(table, "duration_s: 2.98").find("goes on"), std::string::npos);
   EXPECT_EQ(Messages(table, "duration_s: 3").find("goes on"), std::string::npos);
   EXPECT_NE(Messages(table, "duration_s: 3.5").find("error: "), std::string::npos);
-  const std::string brief = Messages(table, "duration_s: 0.005, sample_s: 0.001");
+  const std::string brief = Messages(table, "duration_s: 0.005\n  sample_s: 0.001");
   EXPECT_NE(brief.find("time_unit: ms"), std::string::npos) << brief;
 }
 
