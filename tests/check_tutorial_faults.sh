@@ -49,7 +49,7 @@ expect 0 "the document that is right"
 bent "another answer quoted" 's/^models.*: ok$/models\/m\/model.yaml: fine/'
 bent "a piece of an answer quoted" 's/^  degrees of freedom: 1 = .*/  degrees of freedom: 1/'
 bent "an answer that is not quoted" '/: ok$/d;/^\$ mbverify model/,/^…$/d'
-bent "an answer longer than quoted" '/^  freedoms/,/^…$/{/^…$/d}'
+bent "an answer longer than quoted" '/^  degrees of freedom/,/^…$/{/^…$/d}'
 bent "another exit code quoted" 's/^2$/3/'
 bent "an exit code that nobody asks for" '/^\$ echo/,/^2$/d'
 bent "a block without a file" 's/^`models.*continued$/and more/'
