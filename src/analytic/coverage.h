@@ -133,7 +133,7 @@ enum class Concern {
                                                       const Mechanism& mechanism,
                                                       const Motion& motion);
 
-/// "not applicable: <the first finding> (and 3 more)"; "" if there are none.
+/// "outside what the equations cover: <the first finding> (and 3 more)"; "" if there are none.
 [[nodiscard]] std::string ReasonNotApplicable(std::span<const Finding> uncovered);
 
 }  // namespace mbv

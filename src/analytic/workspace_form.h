@@ -4,6 +4,8 @@
 // row in registry.cc, or from outside by register_closed_form.h.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <functional>
 #include <span>
 #include <string>
@@ -55,6 +57,13 @@ struct WorkspaceForm {
   TriangleMesh mesh;         ///< its boundary, for pictures; empty: none
   std::string mesh_caption;  ///< "spr_tripod / workspace of the platform centre"
 };
+
+/// Decimals that an error leaves: the last one printed is of its size.
+[[nodiscard]] inline int Decimals(double error) {
+  constexpr int kMost = 14;
+  if (!(error > 0.0)) return kMost;
+  return std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 0, kMost);
+}
 
 /// The outcome where a process that shared the work was killed.
 [[nodiscard]] inline WorkspaceForm LostWork() {

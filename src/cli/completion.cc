@@ -26,8 +26,7 @@ struct CommandWords {
   std::string path;  ///< "history list"
   std::string description;
   std::vector<OptionWords> options;
-  std::vector<std::string>
-      names;  ///< kinds of names it takes in addition to files: "models", "scenarios"
+  std::vector<std::string> names;  ///< kinds of names it takes: "models", "scenarios"; files, too
 };
 
 /// All commands and options that help shows, the program itself first.

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "comparison/derivatives.h"
 #include "comparison/drive_motion.h"
 #include "comparison/driven.h"
 #include "comparison/force_band.h"
@@ -512,8 +513,12 @@ void DescribeTable(Comparison* comparison) {
 void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison* comparison) {
   WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
   OtherLimits other;
-  if (IsTable(input, witness.name)) other.tubes = CommandTubes(input);
   const bool engine = IsEngine(witness.name);
+  if (IsTable(input, witness.name)) {
+    other.tubes = CommandTubes(input);
+  } else {
+    metrics.unresolved = UnresolvedBySamples(input, *witness.trace, engine ? nullptr : &metrics);
+  }
   if (engine) other.growth = CommandGrowth(input, metrics);
   std::map<Metric, Measured> commands, others;
   for (const auto& [metric, measured] : metrics.metrics) {

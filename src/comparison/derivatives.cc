@@ -235,13 +235,14 @@ std::string UnresolvedForces(const ComparisonInput& input, const Trace& trace) {
   const auto add = [](const std::string& name, std::string* list) {
     *list += (list->empty() ? "" : ", ") + name;
   };
+  const ForceScale scale = ForceScaleOf(input, trace);
   for (const Drive& drive : mechanism.drives) {
     const int force = trace.Find(Quantity::kForce, drive.name);
     const int velocity = trace.Find(Quantity::kVelocity, drive.name);
     if (force < 0 || velocity < 0) continue;
     const VecX values = ForceSignal(trace, force).Worst();
     const std::string& unit = trace.channels[static_cast<size_t>(force)].unit;
-    const double least = ForceScaleOf(input, trace).Floor(unit);
+    const double least = scale.Floor(unit);
     const double rest = RestFloorOf(input, PositionUnit(mechanism, drive), trace).velocity;
     const VecX power = values.cwiseProduct(trace.values.col(velocity));
     if (!IsResolved(values, least)) {
@@ -292,7 +293,8 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
   }
 }
 
-std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace) {
+std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace,
+                                const WitnessMetrics* measured) {
   constexpr double kTwelvePerOscillation = std::numbers::pi / 6.0;  // six of a power
   if (trace.time_s.size() < 2) return "";
   if (trace.time_s.size() < 2 * kReach + 1) {
@@ -301,8 +303,9 @@ std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace
     return "the samples are too far apart for a motion so fast";
   }
   WitnessMetrics metrics;
-  MeasureDerivatives(input, trace, &metrics);
-  if (!metrics.derivatives_gap.empty()) return metrics.derivatives_gap;
+  if (measured == nullptr) MeasureDerivatives(input, trace, &metrics);
+  const std::string& gap = (measured == nullptr ? &metrics : measured)->derivatives_gap;
+  if (!gap.empty()) return gap;
   return UnresolvedForces(input, trace);
 }
 

@@ -17,7 +17,9 @@ void MeasureDerivatives(const ComparisonInput& input, const Trace& trace, Witnes
 /// Why the samples of a trace do not resolve the motion (by the same formulas) or the forces and
 /// powers of drives (midpoints by four and by six samples disagree): peaks, means, energies and
 /// margins over them then mean nothing. "" where they do. Samples too few for the formulas are
-/// judged by the commands alone: fewer than twelve per oscillation, six of a power.
-[[nodiscard]] std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace);
+/// judged by the commands alone: fewer than twelve per oscillation, six of a power. `measured`:
+/// where MeasureDerivatives() of the trace was called before.
+[[nodiscard]] std::string UnresolvedBySamples(const ComparisonInput& input, const Trace& trace,
+                                              const WitnessMetrics* measured = nullptr);
 
 }  // namespace mbv

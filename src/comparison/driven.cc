@@ -367,8 +367,9 @@ bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
 std::string WhyHorizonTooLong(const ComparisonInput& input, const Comparison& comparison) {
   constexpr double kMost = 1e-2;  // of a radian or of the characteristic length
   if (input.drive_by != DriveBy::kForces) return "";
-  if (input.perturbed == nullptr)
+  if (input.perturbed == nullptr) {
     return "the run with perturbed forces failed, so errors have no measure";
+  }
   const double length_m = CharacteristicLength(*input.mechanism);
   for (const CheckResult& check : comparison.checks) {
     if (!check.limit || !IsTrajectory(check.metric)) continue;

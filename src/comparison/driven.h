@@ -40,9 +40,8 @@ namespace mbv {
 
 /// Limits that do not come from the scenario.
 struct OtherLimits {
-  std::map<Metric, double> tubes;  ///< a table's own uncertainty: the wider of it and the limit
-  std::map<Metric, double>
-      growth;  ///< deviation under perturbed forces: counts instead of the limit
+  std::map<Metric, double> tubes;   ///< a table's own uncertainty: the wider of it and the limit
+  std::map<Metric, double> growth;  ///< by perturbed forces: counts instead of the limit
 };
 void ApplyOther(const OtherLimits& other, const ComparisonInput& input, CheckResult* check);
 

@@ -230,7 +230,6 @@ WitnessMetrics MeasureWitness(const ComparisonInput& input, const Trace& trace) 
   }
   // An integrated velocity carries the integrator's error; only computed ones are checked.
   if (!engine) MeasureDerivatives(input, trace, &metrics);
-  metrics.unresolved = UnresolvedBySamples(input, trace);
   return metrics;
 }
 

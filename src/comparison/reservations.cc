@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "base/text.h"
-#include "comparison/derivatives.h"
 #include "comparison/driven.h"
 #include "comparison/verdict.h"
 #include "mechanism/channels.h"
@@ -168,8 +167,9 @@ void MarkBlind(const ComparisonInput& input, Comparison* comparison) {
   for (CheckResult& check : comparison->checks) {
     const PairComparison* pair = comparison->FindPair(check.subject);
     if (check.metric == Metric::kMotorUse) {
-      const Witness* witness = FindNamed(input.witnesses, check.measured);
-      if (witness != nullptr) check.blind = UnresolvedBySamples(input, *witness->trace);
+      for (const WitnessMetrics& witness : comparison->witnesses) {
+        if (witness.witness == check.measured) check.blind = witness.unresolved;
+      }
       if (!check.blind.empty()) continue;
     }
     if (IsCoarse(input, check)) {

@@ -215,8 +215,9 @@ RunSummary FreeMotion::Segment(double to_s) {
   const auto rates = [this](const State& at, State& out, double t_s) { Rates(at, &out, t_s); };
   while (to_s - now_.time_s > 1e-14 * std::max(duration_s_, to_s)) {
     if (++tried_steps_ > effort_.most_steps) return TooManySteps();
-    if (effort_.progress && tried_steps_ % kProgressSteps == 0)
+    if (effort_.progress && tried_steps_ % kProgressSteps == 0) {
       effort_.progress(now_.time_s / duration_s_);
+    }
     if (tried_steps_ % kLook == 0) {
       if (RunSummary summary = LookAhead(); !summary.ok()) return summary;
     }

@@ -314,8 +314,9 @@ std::string CauseSentence(const SourceModelAudit& audit) {
     text = "No single thing makes most of the force error.";
   } else {
     std::string titles;
-    for (const SourceModelCause* cause : culprits)
+    for (const SourceModelCause* cause : culprits) {
       titles += (titles.empty() ? "" : "; ") + cause->title;
+    }
     text = fmt::format("{}: {}. {}",
                        culprits.size() == 1
                            ? "Most of the force error is made by one thing"

@@ -53,7 +53,7 @@ std::string TerminalText::Word(Verdict verdict) const {
     case Verdict::kDisagree:
       return Painted("DISAGREE", Paint::kBad);
     case Verdict::kNotRun:
-      return Painted("NOT RUN", Paint::kDoubt);
+      return Painted("NOT RUN", Paint::kWarning);
   }
   return "?";
 }
@@ -67,7 +67,7 @@ void TerminalText::Head(const ResultView& view, const std::string& title,
   }
   Line("  " + view.reason);
   for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
-    Line("  " + Painted("caveat", Paint::kDoubt) + ": " + caveat.text);
+    Line("  " + Painted("caveat", Paint::kWarning) + ": " + caveat.text);
   }
   if (!view.attribution.text.empty()) Line("  " + view.attribution.text);
   for (const Finding& finding : view.frame->findings.findings()) Line("  " + ToText(finding));
@@ -114,7 +114,7 @@ void TerminalText::Subject(const std::vector<ShownCheck>& checks, const TextTabl
 std::string TerminalText::CheckLine(const ShownCheck& check, const TextTable& table) const {
   static constexpr std::pair<const char*, Paint> kWords[] = {{"-   ", Paint::kFaint},
                                                              {"FAIL", Paint::kBad},
-                                                             {"void", Paint::kDoubt},
+                                                             {"void", Paint::kWarning},
                                                              {"held", Paint::kFaint},
                                                              {"ok  ", Paint::kGood}};
   const auto& [word, paint] = kWords[static_cast<int>(EndOf(check))];

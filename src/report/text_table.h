@@ -40,7 +40,7 @@ class TextTable {
 
 // The text of a result for a terminal: title with verdict, what is said about it, checks, tables.
 
-enum class Paint { kPlain, kGood, kBad, kDoubt, kTitle, kFaint };
+enum class Paint { kPlain, kGood, kBad, kWarning, kTitle, kFaint };
 
 class TerminalText {
  public:

@@ -61,7 +61,7 @@ bool IsShipped(const fs::path& file) {
 }
 
 // Why neither the scenario's place nor its owner lets its programs run; "" if they do.
-std::string WarnPlace(const fs::path& file, const std::vector<std::string>& command) {
+std::string ReasonNotTrusted(const fs::path& file, const std::vector<std::string>& command) {
   std::string reason = "no folder above it is trusted";
   for (const fs::path& folder : TrustedFolders()) {
     if (!LiesBelow(file, folder)) continue;
@@ -89,7 +89,7 @@ CalledProgram Called(const Scenario& scenario, const ForeignWitness& witness, bo
   } else if (const fs::path file = Real(scenario.file); IsShipped(file)) {
     called.trust = ProgramTrust::kShippedScenario;
   } else {
-    called.reason = WarnPlace(file, called.command);
+    called.reason = ReasonNotTrusted(file, called.command);
     if (called.reason.empty()) called.trust = ProgramTrust::kTrustedFolder;
   }
   return called;

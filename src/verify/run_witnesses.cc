@@ -112,8 +112,9 @@ class ForeignRunner {
 
   std::optional<ProgramFailure> ReadBack() {
     const auto json = call_.Text("witness.json");
-    if (!json)
+    if (!json) {
       return ProgramFailure{WitnessGap::kNoAnswer, "left no witness.json" + call_.OutputTail()};
+    }
     std::string trouble;
     const auto answer = ReadAnswer(*json, &trouble);
     if (!answer) return ProgramFailure{WitnessGap::kBadAnswer, trouble};
@@ -129,8 +130,9 @@ class ForeignRunner {
                             "not applicable: " + QuotedValue(answer->refused, kMostReason)};
     }
     const auto csv = call_.Text("traces.csv");
-    if (!csv)
+    if (!csv) {
       return ProgramFailure{WitnessGap::kNoAnswer, "left no traces.csv" + call_.OutputTail()};
+    }
     auto trace = ReadWitnessTrace(*csv, mechanism_, times_s_, &trouble);
     if (!trace) return ProgramFailure{WitnessGap::kBadAnswer, trouble};
     record_.trace = std::move(*trace);
@@ -383,8 +385,9 @@ void WitnessRunner::RunPerturbed() {
   SimulationOptions options = OptionsOf(scenario(), simulated(), judged_engine());
   options.forces = PerturbedForces(Forces(), prepared_.base, driver().trace, runs_.perturbation);
   SimulatedWitness perturbed = Simulate(options, "perturbed forces");
-  if (!perturbed.run.summary.ok())
+  if (!perturbed.run.summary.ok()) {
     return Warn("perturbed forces: " + perturbed.run.summary.message);
+  }
   runs_.perturbed = std::move(perturbed.run.trace);
   runs_.perturbed->witness = role::kPerturbed.name;
 }

@@ -345,6 +345,25 @@ TEST(SprTripodWorkspace, NoDigitOfAreaAndCentroidIsWrong) {
     for (int k = 0; k < 3; ++k) expect(centroid[static_cast<size_t>(k)], truth.solid.centroid[k]);
     EXPECT_LE(std::abs(report.exact.area - truth.solid.area), report.area_error);
     EXPECT_LE((report.exact.centroid - truth.solid.centroid).norm(), report.centroid_error);
+    // Extremes: against a grid that is four times finer.
+    const WorkspaceRanges fine = RangesOf(g, 80);
+    const auto range = [&](const std::string& key, const Range& exact, double unit) {
+      const auto shown = NumbersAfter(report.text, "\n" + key);
+      ASSERT_EQ(shown.size(), 2u) << key << report.text;
+      expect(shown[0], exact.lower / unit);
+      expect(shown[1], exact.upper / unit);
+    };
+    range("x_m", fine.x, 1.0);
+    range("y_m", fine.y, 1.0);
+    range("z_m", fine.z, 1.0);
+    range("tilt_deg", fine.tilt, kDegWorkspace);
+    range("det J", fine.det, 1.0);
+    range("singular values of J", fine.sigma, 1.0);
+    range("condition of J", fine.cond, 1.0);
+    range("condition of (12)", fine.cond_c, 1.0);
+    range("ball swing_deg", fine.ball_swing, kDegWorkspace);
+    range("ball twist_deg", fine.ball_twist, kDegWorkspace);
+    range("change of lean_deg", fine.lean, kDegWorkspace);
   }
 }
 

@@ -366,8 +366,8 @@ class ScaraStiffness final : public StiffnessForm {
   template <typename Forces>
   Mat6 RodShare(const Position& at, int limb, int side, const MemberSpring& spring,
                 const Forces& force) const {
-    const Eigen::Matrix<double, 5, 6> perturbed = spring.flexibility * force;
-    if (printed_.parallelogram) return 0.5 * force.transpose() * perturbed;
+    const Eigen::Matrix<double, 5, 6> deflection = spring.flexibility * force;
+    if (printed_.parallelogram) return 0.5 * force.transpose() * deflection;
     // Deformation at D → the rod's tip; the rod turns freely about the normal h.
     const Vec3 &a = MotorAxis(limb), &w = at.eta[limb];
     const double cos_q = a.dot(w), sin_q = a.dot(w.cross(a.cross(w).normalized()));
@@ -381,7 +381,7 @@ class ScaraStiffness final : public StiffnessForm {
     Eigen::Matrix4d own = Eigen::Matrix4d::Zero();
     own.diagonal() << k(0, 0), k(2, 2), k(3, 3), k(4, 4);
     own(1, 3) = own(3, 1) = k(2, 4);
-    const Eigen::Matrix<double, 4, 6> deformation = tip * perturbed;
+    const Eigen::Matrix<double, 4, 6> deformation = tip * deflection;
     return deformation.transpose() * own * deformation;
   }
 

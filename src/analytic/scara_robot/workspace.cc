@@ -247,11 +247,9 @@ Volume WholeVolume(const Parameters& parameters, const Limits& limits, double ya
   return volume;
 }
 
-// "0.00827 +- 2e-05": the last digit is of the error's size.
+// "0.00827 +- 2e-05".
 std::string WithError(double value, double error) {
-  constexpr int kMostDecimals = 14;
-  const int places = error > 0.0 ? static_cast<int>(std::ceil(-std::log10(error))) : kMostDecimals;
-  return fmt::format("{:.{}f} +- {:.0e}", value, std::clamp(places, 0, kMostDecimals), error);
+  return fmt::format("{:.{}f} +- {:.0e}", value, Decimals(error), error);
 }
 
 }  // namespace

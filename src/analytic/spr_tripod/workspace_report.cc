@@ -17,18 +17,11 @@ constexpr double kDeg = pi / 180.0;
 // Rounding noise about zero would print as -0.000000000 on one machine and +0.000000000 on another.
 double Clean(double x) { return std::abs(x) < 5e-10 ? 0.0 : x; }
 
-constexpr int kMostDecimals = 14;
 // The error of a Gauss rule is what so many points fewer change.
 constexpr int kFewerPoints = 4;
 // Of an order that is measured on steps far from zero.
 constexpr double kOrderTolerance = 0.5;
 constexpr double kMeasurable = 10.0;  // times the error of the smooth faces
-
-// Digits that an error leaves: the last one printed is of its size.
-int Decimals(double error) {
-  if (!(error > 0.0)) return kMostDecimals;
-  return std::clamp(static_cast<int>(std::ceil(-std::log10(error))), 0, kMostDecimals);
-}
 
 std::string Volume(const VolumeEstimate& v) {
   return fmt::format("{:.{}f} m3 (error {:.0e})", v.value, Decimals(v.error), v.error);
@@ -166,16 +159,18 @@ std::string CornerTable(const Geometry& geometry) {
   return text;
 }
 
-// Extremes over the finest of several grids; those of the others say how well it knows them.
+// Extremes over the finest of several grids, which may miss them by three times what other grids
+// change; the last digit printed is at least as large as that.
 std::string RangeTable(const WorkspaceRanges& r, const std::vector<WorkspaceRanges>& coarser) {
   const auto number = [&](Range WorkspaceRanges::*range, double Range::*end, double unit) {
     constexpr int kMost = 6;
+    constexpr double kTimes = 3.0, kDigit = 10.0;
     const double value = (r.*range).*end;
     double error = 0.0;
     for (const WorkspaceRanges& other : coarser) {
       error = std::max(error, std::abs(value - (other.*range).*end));
     }
-    const int places = std::min(kMost, Decimals(error / unit));
+    const int places = std::min(kMost, Decimals(kDigit * kTimes * error / unit));
     const double shown = value / unit;
     // No sign of what rounds to zero.
     return fmt::format("{:.{}f}", std::abs(shown) < 0.5 * std::pow(10.0, -places) ? 0.0 : shown,

@@ -240,8 +240,9 @@ class UpgradeRun {
     ProgramCall call(program);
     std::string& trouble = report_.unavailable;
     trouble = call.WriteInput("model.xml", survey.mjcf);
-    if (trouble.empty())
+    if (trouble.empty()) {
       trouble = call.WriteInput("states.json", StatesJson(survey.driven, states));
+    }
     if (trouble.empty()) {
       if (const auto failure = call.Run()) trouble = failure->text;
     }

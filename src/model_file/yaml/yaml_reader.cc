@@ -133,8 +133,10 @@ void YamlReader::AddAt(Severity severity, int line, int column, const std::strin
 }
 
 void YamlReader::Add(Finding finding) {
-  if (!given_.insert(fmt::format("{}:{}:{}", finding.line, finding.column, finding.message)).second)
+  if (!given_.insert(fmt::format("{}:{}:{}", finding.line, finding.column, finding.message))
+           .second) {
     return;
+  }
   const auto count = static_cast<int>(diagnostics_.findings().size());
   if (count > kMaxFindings) return;
   if (count == kMaxFindings) {

@@ -503,12 +503,12 @@ class Plausibility {
     if (rows_.numbers[0].size() < kFewestRows) return;
     FindStep();
     CheckHoles();
-    if (mapping_.time_unit_assumed) DoubtTimeUnit();
+    if (mapping_.time_unit_assumed) CheckTimeUnit();
     for (size_t k = 0; k < mapping_.columns.size(); ++k) {
       const TableColumn& column = mapping_.columns[k].column;
       if (!mapping_.columns[k].unit_assumed || std::abs(column.factor) != 1.0) continue;
-      if (column.channel.unit == "rad") DoubtAngles(k);
-      if (column.channel.unit == "m") DoubtLengths(k);
+      if (column.channel.unit == "rad") CheckAngles(k);
+      if (column.channel.unit == "m") CheckLengths(k);
     }
   }
 
@@ -563,7 +563,7 @@ class Plausibility {
   }
 
   // Seconds of a mechanism's motion are sampled more finely than whole ones.
-  void DoubtTimeUnit() {
+  void CheckTimeUnit() {
     const std::vector<double>& times = rows_.numbers[0];
     const bool whole =
         std::all_of(times.begin(), times.end(), [](double t) { return t == std::round(t); });
@@ -589,8 +589,8 @@ class Plausibility {
     return {*low, *high, path > 1.5 * (*high - *low)};
   }
 
-  void DoubtUnit(size_t k, const Extent& extent, const char* taken, const std::string& reason,
-                 const char* hint) {
+  void WarnUnit(size_t k, const Extent& extent, const char* taken, const std::string& reason,
+                const char* hint) {
     const MappedColumn& mapped = mapping_.columns[k];
     const TableHeading& heading = text_.headings[mapped.index];
     Warn(heading.line > 0 ? heading.line : rows_.lines.front(), std::max(1, heading.character),
@@ -599,7 +599,7 @@ class Plausibility {
          hint);
   }
 
-  void DoubtAngles(size_t k) {
+  void CheckAngles(size_t k) {
     constexpr double kTurn = 2.0 * std::numbers::pi;
     const Extent extent = ExtentOf(k);
     const auto multiple = [](double x, double of) {
@@ -611,21 +611,21 @@ class Plausibility {
                        (extent.returns || multiple(extent.span(), 90.0));
     const bool back = extent.returns && extent.span() > 4.0 * kTurn;
     if (!round && !back) return;
-    DoubtUnit(
+    WarnUnit(
         k, extent, "radians",
         fmt::format("{:.3g} turns{}", extent.span() / kTurn, extent.returns ? " to and fro" : ""),
         "are they degrees? state unit: deg (or rad)");
   }
 
-  void DoubtLengths(size_t k) {
+  void CheckLengths(size_t k) {
     constexpr double kTimes = 50.0;
     const Extent extent = ExtentOf(k);
     const double size = CharacteristicLength(mechanism_);
     if (!(extent.span() > kTimes * size)) return;
-    DoubtUnit(k, extent, "metres",
-              fmt::format("{:.3g} times the size of {}, {:.2g} m", extent.span() / size,
-                          mechanism_.name, size),
-              "are they millimetres? state unit: mm (or m)");
+    WarnUnit(k, extent, "metres",
+             fmt::format("{:.3g} times the size of {}, {:.2g} m", extent.span() / size,
+                         mechanism_.name, size),
+             "are they millimetres? state unit: mm (or m)");
   }
 
   static constexpr double kSameStep = 0.05;  // of the median step

@@ -21,7 +21,7 @@ class SizeCommand : public testing::Test {
     Write("none.yaml", Scenario("bare.yaml", 1.0));
     Write("geared.yaml", kModel + std::string("motors: {x: {gear_ratio: 1}}\n"));
     Write("unlimited.yaml", Scenario("geared.yaml", 1.0));
-    Write("shaken.yaml", Scenario("model.yaml", 1.0) +
+    Write("shaken.yaml", Scenario("geared.yaml", 1.0) +
                              "loads: {shaker: {on: cart, force: [{sine: {amplitude: 5, "
                              "frequency_hz: 30}}, 0, 0], in: world}}\n");
   }
