@@ -258,5 +258,15 @@ TEST(StaticPlots, ShowForcesAndTheirErrorsByUnit) {
   EXPECT_EQ(StaticPlotsHtml(page.report), "") << "the simulation left no trace";
 }
 
+// Sections may be called by names from files.
+TEST(Page, NamesOfSectionsAreText) {
+  Page page;
+  page.Add("<b>title</b>", "\"><script>alert(1)</script>", "<p>content</p>");
+  const std::string html = page.Write({});
+  EXPECT_EQ(html.find("<script>alert"), std::string::npos) << html;
+  EXPECT_EQ(html.find("<b>title"), std::string::npos);
+  EXPECT_NE(html.find("<p>content</p>"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mbv
