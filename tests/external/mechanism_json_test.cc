@@ -153,7 +153,7 @@ TEST(MotionText, GivesForcesAndTheStartOfAFreeMotion) {
   motion.time_s = {0.0, 0.5};
   const VecX zero = VecX::Zero(1);
   motion.driven = {{zero, zero, zero}, {zero, zero, zero}};
-  motion.told = {false};
+  motion.commanded = {false};
   motion.forced = {0};
   motion.forces = {{Jet{1.0, 2.0, 3.0}}, {Jet{-0.1, 0.0, 4.0}}};
   EXPECT_EQ(MotionCsv(m, motion), "time_s\n0\n0.5\n");

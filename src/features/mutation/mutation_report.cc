@@ -6,18 +6,11 @@
 
 #include "base/json_document.h"
 #include "base/json_text.h"
+#include "base/markup.h"
 #include "report/text_table.h"
 
 namespace mbv {
 namespace {
-
-// "|" would end a cell of a Markdown table.
-std::string InCell(std::string text) {
-  for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) {
-    text.insert(at, "\\");
-  }
-  return text;
-}
 
 // By smallest error where it is known, else by the force change.
 double Rank(const Detection& s) {
@@ -75,9 +68,9 @@ std::string Row(const Mutation& m, bool inverse, bool markdown) {
   const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
   const std::string by_inverse = NumberCell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
   if (markdown) {
-    return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {}{} |\n", m.name, m.value, m.unit,
+    return fmt::format("| {} | {:g} {} | {} | {} | {} | {}{} |\n", MarkdownCode(m.name), m.value, MarkdownText(m.unit),
                        SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",
-                       InCell(NoteOf(m)));
+                       MarkdownText(NoteOf(m)));
   }
   std::vector<std::string> cells = {
       m.name, fmt::format("{:g}", m.value), " " + m.unit, SeenText(m.own), change, smallest};
@@ -99,8 +92,8 @@ std::string Row(const FaultResult& f, bool inverse, bool markdown) {
   }
   const std::string where = f.where + (f.alike > 0 ? fmt::format(" (and {} alike)", f.alike) : "");
   if (markdown) {
-    return fmt::format("| {} | {} | {} | {}{} |\n", f.kind, where, seen,
-                       inverse ? by_inverse + " | " : "", InCell(note));
+    return fmt::format("| {} | {} | {} | {}{} |\n", MarkdownText(f.kind), MarkdownText(where), seen,
+                       inverse ? by_inverse + " | " : "", MarkdownText(note));
   }
   std::vector<std::string> cells = {f.kind, where, seen};
   if (inverse) cells.push_back(by_inverse);
@@ -118,7 +111,7 @@ std::string IdleText(const MutationReport& report, bool markdown) {
   size_t count = 0;
   for (const Mutation& m : report.mutations) {
     if (!IsIdle(m)) continue;
-    names += (count++ == 0 ? "" : ", ") + (markdown ? "`" + m.name + "`" : m.name);
+    names += (count++ == 0 ? "" : ", ") + (markdown ? MarkdownCode(m.name) : m.name);
   }
   if (count == 0) return "";
   return fmt::format("\n{}Numbers of instances that change no drive force ({}): {}.\n",
@@ -137,7 +130,7 @@ std::string CountText(const MutationReport& report) {
   return text;
 }
 
-std::string Head(const MutationReport& report, bool inverse) {
+std::string Head(const MutationReport& report, bool inverse, bool markdown) {
   const auto count = [&](auto predicate) {
     return std::count_if(report.mutations.begin(), report.mutations.end(), predicate);
   };
@@ -146,7 +139,7 @@ std::string Head(const MutationReport& report, bool inverse) {
   std::string text = fmt::format(
       "{}: {} of {} numbers ({}), each {:g} % too large and too small on the simulated side, turn "
       "the verdict in {} mode; {} of them by the drive forces",
-      report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
+      markdown ? MarkdownText(report.scenario) : report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
       report.mode, by_force);
   if (inverse) {
     text += fmt::format("; {} do in inverse mode",
@@ -192,7 +185,7 @@ void SortBySensitivity(MutationReport* report) {
 
 std::string ToText(const MutationReport& report, bool markdown) {
   const bool inverse = HasInverse(report);
-  std::string text = Head(report, inverse) + NumberHead(report, inverse, markdown);
+  std::string text = Head(report, inverse, markdown) + NumberHead(report, inverse, markdown);
   for (const Mutation& m : report.mutations) {
     if (!IsIdle(m)) text += Row(m, inverse, markdown);
   }
