@@ -87,8 +87,8 @@ std::string ClosestWord(const std::string& word, const std::vector<std::string>&
   std::string best;
   size_t best_distance = std::max<size_t>(2, word.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
-    const size_t lengths = std::max(word.size(), candidate.size()) -
-                           std::min(word.size(), candidate.size());
+    const size_t lengths =
+        std::max(word.size(), candidate.size()) - std::min(word.size(), candidate.size());
     if (lengths >= best_distance) continue;  // the least distance
     const size_t distance = EditDistance(word, candidate);
     if (distance < best_distance) {

@@ -13,7 +13,8 @@ namespace {
 constexpr int kMostLevels = 100;     // of nesting: what follows a document recurses
 constexpr size_t kMostQuoted = 200;  // characters of a refusal, which may quote the document
 
-// What a terminal obeys or a reader does not see, as \uXXXX: the value is the same, the text shows it.
+// What a terminal obeys or a reader does not see, as \uXXXX: the value is the same, the text shows
+// it.
 std::string Visible(std::string json) {
   const auto is_plain = [](char c) { return (c >= ' ' && c != '\x7f') || c == '\n'; };
   if (std::ranges::all_of(json, is_plain)) return json;

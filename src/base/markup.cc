@@ -207,9 +207,8 @@ std::string WithoutLineEnds(std::string_view text) {
 }
 
 constexpr std::pair<char, std::string_view> kMarkdownTexts[] = {
-    {'\\', "\\\\"}, {'|', "\\|"}, {'*', "\\*"},  {'_', "\\_"},  {'`', "\\`"},
-    {'[', "\\["},   {']', "\\]"}, {'<', "&lt;"}, {'>', "&gt;"}, {'&', "&amp;"},
-    {'$', "\\$"},   {'~', "\\~"},
+    {'\\', "\\\\"}, {'|', "\\|"},  {'*', "\\*"},  {'_', "\\_"},   {'`', "\\`"}, {'[', "\\["},
+    {']', "\\]"},   {'<', "&lt;"}, {'>', "&gt;"}, {'&', "&amp;"}, {'$', "\\$"}, {'~', "\\~"},
 };
 
 }  // namespace
@@ -217,7 +216,8 @@ constexpr std::pair<char, std::string_view> kMarkdownTexts[] = {
 std::string MarkdownText(std::string_view text) {
   std::string out;
   for (const char c : OneLine(WithoutLineEnds(text))) {
-    const auto* row = std::ranges::find(kMarkdownTexts, c, &std::pair<char, std::string_view>::first);
+    const auto* row =
+        std::ranges::find(kMarkdownTexts, c, &std::pair<char, std::string_view>::first);
     out += row != std::end(kMarkdownTexts) ? row->second : std::string_view(&c, 1);
   }
   return out;
@@ -225,7 +225,7 @@ std::string MarkdownText(std::string_view text) {
 
 std::string MarkdownCode(std::string_view text) {
   const bool plain = !text.empty() && OneLine(text) == text &&
-                     text.find_first_of("`|\\") == std::string_view::npos;
+                     text.find_first_of("`|\\<>&") == std::string_view::npos;
   return plain ? "`" + std::string(text) + "`" : MarkdownText(text);
 }
 

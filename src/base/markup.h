@@ -6,8 +6,8 @@
 
 namespace mbv {
 
-/// What XML may hold, for writers that escape by themselves: what is no text (base/text.h) as U+FFFD,
-/// marks that mislead as OneLine() shows them, carriage returns as line feeds.
+/// What XML may hold, for writers that escape by themselves: what is no text (base/text.h) as
+/// U+FFFD, marks that mislead as OneLine() shows them, carriage returns as line feeds.
 [[nodiscard]] std::string XmlText(std::string_view text);
 
 /// The same with & < > " ' as entities, safe in elements and in quoted attributes.
@@ -17,15 +17,15 @@ namespace mbv {
 /// that no name is taken as a scheme, a query or a fragment, or ends an attribute.
 [[nodiscard]] std::string EncodeLink(std::string_view path);
 
-/// What Dump() or DumpLine() wrote, inside a script element: '<' as \u003c, so that nothing in it ends
-/// or opens an element, and what they write as \uXXXX as these six characters.
+/// What Dump() or DumpLine() wrote, inside a script element: '<' as \u003c, so that nothing in it
+/// ends or opens an element, and what they write as \uXXXX as these six characters.
 [[nodiscard]] std::string EscapeScript(const std::string& json);
 
 /// RFC 4648, with padding.
 [[nodiscard]] std::string EncodeBase64(std::string_view bytes);
 
-/// `text` in a paragraph, a list or a table of Markdown: nothing in it is markup; line ends and tabs
-/// are blanks, what misleads is shown as OneLine() shows it.
+/// `text` in a paragraph, a list or a table of Markdown: nothing in it is markup; line ends and
+/// tabs are blanks, what misleads is shown as OneLine() shows it.
 [[nodiscard]] std::string MarkdownText(std::string_view text);
 
 /// The same as code, `text`, where that can hold it.

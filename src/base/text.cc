@@ -157,9 +157,9 @@ std::string CsvCell(std::string_view text) {
   // Blanks in front are skipped by some spreadsheets, and wide signs taken as signs.
   const std::string_view begin =
       text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
-  const bool computed =
-      std::ranges::any_of(std::initializer_list<std::string_view>{"=", "+", "-", "@", "＝", "＋", "－", "＠"},
-                          [&](std::string_view sign) { return begin.starts_with(sign); });
+  const bool computed = std::ranges::any_of(
+      std::initializer_list<std::string_view>{"=", "+", "-", "@", "＝", "＋", "－", "＠"},
+      [&](std::string_view sign) { return begin.starts_with(sign); });
   if (computed && !IsNumber(text)) cell += '\'';
   std::string plain(text);
   for (char& c : plain) {

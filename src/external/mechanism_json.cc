@@ -291,7 +291,8 @@ class SchemaExplainer {
       const std::vector<std::string> types = TypesOf(*type);
       if (std::ranges::none_of(types, [&](const auto& each) { return IsOf(each, json); })) {
         std::string needed;
-        for (const std::string& each : types) needed += (needed.empty() ? "" : " or ") + NameOf(each);
+        for (const std::string& each : types)
+          needed += (needed.empty() ? "" : " or ") + NameOf(each);
         return Add(path, fmt::format("is {} where {} is needed", KindOf(json), needed), findings);
       }
     }
@@ -329,7 +330,7 @@ class SchemaExplainer {
     const size_t least = node.value("minItems", size_t{0}),
                  most = node.value("maxItems", json.size());
     if (json.size() < least || json.size() > most) {
-      const std::string needed = least == most             ? fmt::format("{}", least)
+      const std::string needed = least == most               ? fmt::format("{}", least)
                                  : node.contains("maxItems") ? fmt::format("{} … {}", least, most)
                                                              : fmt::format("at least {}", least);
       Add(path, fmt::format("has {} entries, needed: {}", json.size(), needed), findings);
@@ -348,23 +349,30 @@ class SchemaExplainer {
     if (const auto words = node.find("enum"); words != node.end()) {
       if (std::ranges::find(*words, json) == words->end()) {
         std::vector<std::string> known;
-        for (const Value& each : *words) known.push_back(each.is_string() ? each : Value(DumpLine(each)));
-        Add(path, fmt::format("is {}, not one of: {}", QuotedValue(DumpLine(json), 60), Joined(known)),
+        for (const Value& each : *words)
+          known.push_back(each.is_string() ? each : Value(DumpLine(each)));
+        Add(path,
+            fmt::format("is {}, not one of: {}", QuotedValue(DumpLine(json), 60), Joined(known)),
             findings, json.is_string() ? DidYouMean(json, known) : "");
       }
     }
     if (json.is_number()) {
       const double number = json.get<double>();
       if (number < node.value("minimum", -HUGE_VAL)) {
-        Add(path, fmt::format("is {:g}, at least {:g} is needed", number, node.at("minimum").get<double>()),
+        Add(path,
+            fmt::format("is {:g}, at least {:g} is needed", number,
+                        node.at("minimum").get<double>()),
             findings);
       }
       if (number > node.value("maximum", HUGE_VAL)) {
-        Add(path, fmt::format("is {:g}, at most {:g} is needed", number, node.at("maximum").get<double>()),
+        Add(path,
+            fmt::format("is {:g}, at most {:g} is needed", number,
+                        node.at("maximum").get<double>()),
             findings);
       }
     }
-    if (json.is_string() && json.get_ref<const std::string&>().size() < node.value("minLength", size_t{0})) {
+    if (json.is_string() &&
+        json.get_ref<const std::string&>().size() < node.value("minLength", size_t{0})) {
       Add(path, "is empty", findings);
     }
   }

@@ -144,10 +144,10 @@ std::string TopHtml(const PageHead& head) {
 void Page::Add(const std::string& title, const std::string& link, const std::string& content) {
   if (content.empty()) return;
   std::string id = link;
-  id[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(id[0])));
-  navigation_ += fmt::format("<a href=\"#{}\">{}</a>\n", id, link);
-  sections_ +=
-      fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n", id, Escape(title), content);
+  if (!id.empty()) id[0] = static_cast<char>(std::tolower(static_cast<unsigned char>(id[0])));
+  navigation_ += fmt::format("<a href=\"#{}\">{}</a>\n", Escape(id), Escape(link));
+  sections_ += fmt::format("<section id=\"{}\"><h2>{}</h2>\n{}</section>\n", Escape(id),
+                           Escape(title), content);
 }
 
 std::string Page::Write(const PageHead& head) const {

@@ -14,7 +14,8 @@ std::string Label(std::string name) {
   std::ranges::replace_if(
       name,
       [](char c) {
-        return !(IsName(std::string("a") + c) || std::string_view("-:.+").find(c) != std::string_view::npos);
+        return !(IsName(std::string("a") + c) ||
+                 std::string_view("-:.+").find(c) != std::string_view::npos);
       },
       '-');
   return "tab:" + name;
@@ -50,8 +51,9 @@ struct LatexFrame {
 LatexFrame OnOnePage(const PaperTable& table, const std::string& columns,
                      const std::string& titles) {
   return {"% needs \\usepackage{booktabs}\n\\begin{table}\n  \\centering\n  \\caption{" +
-              TexText(table.caption) + "}\n  \\label{" + Label(table.name) + "}\n  \\begin{tabular}{" +
-              columns + "}\n    \\toprule\n" + titles + "    \\midrule\n",
+              TexText(table.caption) + "}\n  \\label{" + Label(table.name) +
+              "}\n  \\begin{tabular}{" + columns + "}\n    \\toprule\n" + titles +
+              "    \\midrule\n",
           "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"};
 }
 

@@ -37,22 +37,34 @@ namespace mbv {
 namespace {
 
 const std::vector<std::string> kHostile = {
-    "\x1b[2J\x1b]0;title\x07",                      // escapes of a terminal
-    "a\xc2\x9b" "31mb\x7f\b",                       // C1, DEL, backspace
-    "one\rtwo\ntool: error: three\n\n# four",       // line ends
-    "user\u202egnp.exe\u2066\u2069\u200e\u200f",    // the order of characters
+    "\x1b[2J\x1b]0;title\x07",  // escapes of a terminal
+    "a\xc2\x9b"
+    "31mb\x7f\b",                                 // C1, DEL, backspace
+    "one\rtwo\ntool: error: three\n\n# four",     // line ends
+    "user\u202egnp.exe\u2066\u2069\u200e\u200f",  // the order of characters
     "in\u200bvi\u200dsi\u2060ble\ufeff\u00ad\u061c\u2028\U000e0041",
-    "=cmd|' /C calc'!A0", "+1+1", "-2+3", "@SUM(A1)", "\t=1", " =2", "＝3",
+    "=cmd|' /C calc'!A0",
+    "+1+1",
+    "-2+3",
+    "@SUM(A1)",
+    "\t=1",
+    " =2",
+    "＝3",
     "a|b`c`*d*_e_[f](javascript:g)~h~$i$",
     "]]><script>alert(1)</script>\"'&<!--",
     "\\input{/etc/passwd}%#&~^{}$x_1$",
-    "[optional]", "*starred", "a,b;\"c\"", "\xff\xfe\xed\xa0\x80\xc0\xaf", "../../etc", ""};
+    "[optional]",
+    "*starred",
+    "a,b;\"c\"",
+    "\xff\xfe\xed\xa0\x80\xc0\xaf",
+    "../../etc",
+    ""};
 
 // Of what a reader does not see, or sees elsewhere.
-const std::vector<std::string> kMarks = {"\u202a", "\u202b", "\u202d", "\u202e", "\u2066", "\u2067",
-                                         "\u2068", "\u2069", "\u200e", "\u200f", "\u200b", "\u200c",
-                                         "\u200d", "\u2060", "\ufeff", "\u00ad", "\u061c", "\u2028",
-                                         "\U000e0041"};
+const std::vector<std::string> kMarks = {"\u202a", "\u202b", "\u202d", "\u202e",    "\u2066",
+                                         "\u2067", "\u2068", "\u2069", "\u200e",    "\u200f",
+                                         "\u200b", "\u200c", "\u200d", "\u2060",    "\ufeff",
+                                         "\u00ad", "\u061c", "\u2028", "\U000e0041"};
 
 enum class Format { kTerminal, kMarkdown, kCsv, kXml, kHtml, kTex, kJson };
 
@@ -89,8 +101,10 @@ Report MotionOf(const std::string& text) {
   Report report = test::FullReport();
   report.description = report.simulation = report.comparison.reason = text;
   report.comparison.attribution = {text, text};
-  report.comparison.caveats = {
-      {.kind = CaveatKind::kWitnessMissing, .of = {text}, .text = text, .gap = WitnessGap::kTimedOut}};
+  report.comparison.caveats = {{.kind = CaveatKind::kWitnessMissing,
+                                .of = {text},
+                                .text = text,
+                                .gap = WitnessGap::kTimedOut}};
   report.findings.Add(test::Warning(text));
   for (WitnessRecord& record : report.witnesses) {
     for (Channel& channel : record.trace.channels) channel.name += text;
@@ -104,7 +118,8 @@ std::vector<CrosscheckRow> EnginesOf(const std::string& text) {
 
 MutationReport MutationOf(const std::string& text) {
   MutationReport report;
-  report.scenario = report.mode = text;
+  report.scenario = text;
+  report.mode = "forward";
   Mutation number;
   number.name = number.unit = number.reason = text;
   number.value = number.relative_to = 1.0;
@@ -196,7 +211,8 @@ const std::vector<Writer>& Writers() {
        [](const std::string& t) {
          return ToText(Finding{Severity::kError, t, 1, 1, t, t});
        }},
-      {"regress", Format::kTerminal, [](const std::string& t) { return ToSummaryText(NightOf(t)); }},
+      {"regress", Format::kTerminal,
+       [](const std::string& t) { return ToSummaryText(NightOf(t)); }},
       {"history", Format::kTerminal,
        [](const std::string& t) {
          const test::TestFolder folder("hostile_history");
@@ -204,20 +220,23 @@ const std::vector<Writer>& Writers() {
          EXPECT_EQ(HistoryWith(t, path), "");
          return ListRuns(path).text + CompareRuns(path, "1", "1").text;
        }},
-      {"survey", Format::kTerminal, [](const std::string& t) { return SurveyTable({RobotOf(t)}); }},
       {"crosscheck", Format::kTerminal, [](const std::string& t) { return ToText(EnginesOf(t)); }},
-      {"mutate", Format::kTerminal, [](const std::string& t) { return ToText(MutationOf(t), false); }},
+      {"mutate", Format::kTerminal,
+       [](const std::string& t) { return ToText(MutationOf(t), false); }},
       {"verdict", Format::kTerminal,
        [](const std::string& t) { return VerdictLine(ViewOf(MotionOf(t)), {}); }},
       {"regress", Format::kMarkdown, [](const std::string& t) { return ToMarkdown(NightOf(t)); }},
       {"table", Format::kMarkdown, [](const std::string& t) { return ToMarkdown(TableOf(t)); }},
-      {"crosscheck", Format::kMarkdown, [](const std::string& t) { return ToMarkdown(EnginesOf(t)); }},
-      {"mutate", Format::kMarkdown, [](const std::string& t) { return ToText(MutationOf(t), true); }},
+      {"crosscheck", Format::kMarkdown,
+       [](const std::string& t) { return ToMarkdown(EnginesOf(t)); }},
+      {"mutate", Format::kMarkdown,
+       [](const std::string& t) { return ToText(MutationOf(t), true); }},
       {"audit", Format::kMarkdown,
        [](const std::string& t) {
          return ToMarkdown(AuditTable{t, t, {{.equation = t, .printed = t, .note = t}}});
        }},
-      {"package", Format::kMarkdown, [](const std::string& t) { return PackageReadme(PackageOf(t)); }},
+      {"package", Format::kMarkdown,
+       [](const std::string& t) { return PackageReadme(PackageOf(t)); }},
       {"crosscheck", Format::kCsv, [](const std::string& t) { return ToCsv(EnginesOf(t)); }},
       {"converge", Format::kCsv,
        [](const std::string& t) {
@@ -225,10 +244,13 @@ const std::vector<Writer>& Writers() {
          report.series.resize(1);
          report.series[0].name = t;
          report.series[0].points.resize(1);
-         report.series[0].points[0].failure = t;
+         report.series[0].fit.pairwise = {1.0};
+         report.series[0].fit.fitted = {true};
+         report.series[0].fit.floor = {false};
          return ToCsv(report);
        }},
-      {"stiffness", Format::kCsv, [](const std::string& t) { return StiffnessCsv(StiffnessOf(t)); }},
+      {"stiffness", Format::kCsv,
+       [](const std::string& t) { return StiffnessCsv(StiffnessOf(t)); }},
       {"loads", Format::kCsv, [](const std::string& t) { return LoadsCsv(StiffnessOf(t)); }},
       {"contributions", Format::kCsv,
        [](const std::string& t) { return ContributionsCsv(StiffnessOf(t)); }},
@@ -246,8 +268,10 @@ const std::vector<Writer>& Writers() {
          return HistoryCsv(path).text;
        }},
       {"traces", Format::kCsv, [](const std::string& t) { return ToCsv(MotionOf(t)); }},
-      {"motion", Format::kCsv, [](const std::string& t) { return MotionCsv(MechanismOf(t), HandedOf()); }},
-      {"forces", Format::kCsv, [](const std::string& t) { return ForcesCsv(MechanismOf(t), HandedOf()); }},
+      {"motion", Format::kCsv,
+       [](const std::string& t) { return MotionCsv(MechanismOf(t), HandedOf()); }},
+      {"forces", Format::kCsv,
+       [](const std::string& t) { return ForcesCsv(MechanismOf(t), HandedOf()); }},
       {"start", Format::kCsv,
        [](const std::string& t) {
          BodyStates start;
@@ -264,10 +288,17 @@ const std::vector<Writer>& Writers() {
        }},
       {"regress", Format::kHtml, [](const std::string& t) { return ToIndexHtml(NightOf(t), {}); }},
       {"crosscheck", Format::kHtml, [](const std::string& t) { return ToHtml(EnginesOf(t)); }},
-      {"stiffness", Format::kHtml, [](const std::string& t) { return ToHtml(StiffnessOf(t)); }},
+      {"stiffness", Format::kHtml,
+       [](const std::string& t) {
+         StiffnessReport report = test::StiffArm();  // a page finds its witnesses by name
+         report.description = report.pose_note = report.loads_text = report.scenario_file = t;
+         return ToHtml(report);
+       }},
       {"survey", Format::kHtml, [](const std::string& t) { return SurveyHtml({RobotOf(t)}, t); }},
       {"data of a page", Format::kHtml,
-       [](const std::string& t) { return EscapeScript(DumpLine(nlohmann::ordered_json({{"a", t}}))); }},
+       [](const std::string& t) {
+         return EscapeScript(DumpLine(nlohmann::ordered_json({{"a", t}})));
+       }},
       {"table", Format::kTex, [](const std::string& t) { return ToLatex(TableOf(t)); }},
       {"figure", Format::kTex, [](const std::string& t) { return ToTex(Verbatim(t)); }},
       {"regress", Format::kJson, [](const std::string& t) { return ToJson(NightOf(t)); }},
@@ -276,7 +307,9 @@ const std::vector<Writer>& Writers() {
       {"survey", Format::kJson, [](const std::string& t) { return SurveyJson({RobotOf(t)}); }},
       {"manifest", Format::kJson, [](const std::string& t) { return ManifestJson(PackageOf(t)); }},
       {"crate", Format::kJson, [](const std::string& t) { return CrateJson(PackageOf(t)); }},
-      {"line", Format::kJson, [](const std::string& t) { return DumpLine(nlohmann::json({{"a", t}})); }}};
+      {"line", Format::kJson, [](const std::string& t) {
+         return DumpLine(nlohmann::json({{"a", t}}));
+       }}};
   return writers;
 }
 
@@ -304,7 +337,8 @@ std::vector<std::vector<std::string>> CsvRows(const std::string& text) {
 std::string CsvTrouble(const std::string& text) {
   const auto rows = CsvRows(text);
   for (const auto& row : rows) {
-    if (row.size() != rows[0].size()) return fmt::format("{} cells of {}", row.size(), rows[0].size());
+    if (row.size() != rows[0].size())
+      return fmt::format("{} cells of {}", row.size(), rows[0].size());
     for (const std::string& cell : row) {
       char* end = nullptr;
       (void)std::strtod(cell.c_str(), &end);
@@ -367,7 +401,8 @@ std::string TexTrouble(const std::string& text) {
     for (size_t at; (at = bare.find(ours)) != std::string::npos;) {
       // What follows the end of a row would be its argument.
       const size_t next = bare.find_first_not_of(" \n", at + std::string(ours).size());
-      if (next != std::string::npos && (bare[next] == '[' || bare[next] == '*')) return "an argument";
+      if (next != std::string::npos && (bare[next] == '[' || bare[next] == '*'))
+        return "an argument";
       bare.erase(at, std::string(ours).size());
     }
   }
@@ -398,8 +433,8 @@ std::string TroubleOf(Format format, const std::string& out, const std::string& 
       return out.find("]]>") != std::string::npos ? "the end of a CDATA section" : "";
     }
     case Format::kHtml: {
-      const bool opens = out.find("<script>alert") != std::string::npos ||
-                         out.find("\"'&<") != std::string::npos;
+      const bool opens =
+          out.find("<script>alert") != std::string::npos || out.find("\"'&<") != std::string::npos;
       return opens ? "markup" : "";
     }
     case Format::kTex:
@@ -410,8 +445,10 @@ std::string TroubleOf(Format format, const std::string& out, const std::string& 
       // The value is the same, where it is text; a mark is one of it.
       const bool same = !text.empty() && FindNonText("a" + text) == std::string::npos;
       const auto has = [&](const auto& self, const nlohmann::json& node) -> bool {
-        if (node.is_string()) return node.get_ref<const std::string&>().find(text) != std::string::npos;
-        return std::any_of(node.begin(), node.end(),
+        if (node.is_string())
+          return node.get_ref<const std::string&>().find(text) != std::string::npos;
+        return node.is_structured() &&
+               std::any_of(node.begin(), node.end(),
                            [&](const nlohmann::json& inner) { return self(self, inner); });
       };
       return same && !has(has, json) ? "another value" : "";
@@ -444,7 +481,7 @@ TEST(HostileTexts, AreSeenByTheChecks) {
       {Format::kMarkdown, "[f](javascript:g)"},
       {Format::kCsv, "a,b\n1,=2+3\n"},
       {Format::kCsv, "a,b\n1,2,3\n"},
-      {Format::kXml, "<a>&</a>"},
+      {Format::kXml, "<a><b></a>"},
       {Format::kXml, "<a>\x01</a>"},
       {Format::kHtml, "<p><script>alert(1)</script></p>"},
       {Format::kTex, "a {"},

@@ -144,7 +144,8 @@ TEST(ReadMesh, CountsThatTheFileCannotHoldAreRefusedAtOnce) {
 TEST(ReadMesh, SmallFilesThatAskForMuchAreRefused) {
   const test::TestFolder folder("read_mesh_much");
   const std::string text =
-      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
       "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
   const std::string dae = Dae("", "Z_UP");
   const auto in_dae = [&](const std::string& from, const std::string& to) {
@@ -164,10 +165,12 @@ TEST(ReadMesh, SmallFilesThatAskForMuchAreRefused) {
     nodes += "</node>";
   }
   nodes += "<node id=\"x12\"><instance_geometry url=\"#g\"/></node>";
-  std::string laughs = in_dae("<library_visual_scenes>",
-                              "<library_nodes>" + nodes + "</library_nodes><library_visual_scenes>");
+  std::string laughs =
+      in_dae("<library_visual_scenes>",
+             "<library_nodes>" + nodes + "</library_nodes><library_visual_scenes>");
   const std::string placed = "0 0 500</translate><instance_geometry url=\"#g\"/>";
-  laughs.replace(laughs.find(placed), placed.size(), "0 0 500</translate><instance_node url=\"#x0\"/>");
+  laughs.replace(laughs.find(placed), placed.size(),
+                 "0 0 500</translate><instance_node url=\"#x0\"/>");
   const std::vector<std::tuple<std::string, std::string, std::string>> files = {
       // A vertex is missing, and the library takes what follows for faces.
       {"list.ply", text + "3 0 1 2\n3000000000000 1 2 3\n", "promises more"},
@@ -176,7 +179,8 @@ TEST(ReadMesh, SmallFilesThatAskForMuchAreRefused) {
       {"word.dae", in_dae("<p>0 2 1", "<p>0 T 1"), "something else"},
       {"part.dae", in_dae("<p>0 2 1", "<p>0 0.999 1"), "something else"},
       {"data.dae", in_dae("<p>0 2 1", "<p><![CDATA[T]]>0 2 1"), "something else"},
-      {"vcount.dae", in_dae("<triangles count=\"4\">", "<polylist count=\"4\"><vcount>3 a</vcount>"),
+      {"vcount.dae",
+       in_dae("<triangles count=\"4\">", "<polylist count=\"4\"><vcount>3 a</vcount>"),
        "something else"},
       {"nodes.dae", laughs, "damaged|more memory"},
       {"polygon.obj", polygon + "f" + corners + "\n", "16000 corners"},
@@ -196,8 +200,9 @@ TEST(ReadMesh, NamesOfObjFilesAreNotRead) {
   const test::TestFolder folder("read_mesh_names");
   std::string obj = "mtllib " + folder.Write("secret.mtl", "newmtl a\n") + "\n";
   for (int k = 0; k < 20'000; ++k) {
-    obj += fmt::format("o a{0}\ng b{0}\nusemtl c{0} \\\n d\nv 0 0 {0}\nv 1 0 {0}\nv 0 1 {0}\nf {1} {2} {3}\n", k,
-                       3 * k + 1, 3 * k + 2, 3 * k + 3);
+    obj += fmt::format(
+        "o a{0}\ng b{0}\nusemtl c{0} \\\n d\nv 0 0 {0}\nv 1 0 {0}\nv 0 1 {0}\nf {1} {2} {3}\n", k,
+        3 * k + 1, 3 * k + 2, 3 * k + 3);
   }
   const MeshText mesh = ReadMeshBytes(obj, ".obj");
   EXPECT_EQ(mesh.trouble, "");

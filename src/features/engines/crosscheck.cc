@@ -150,7 +150,7 @@ std::string ToText(const Rows& rows) {
         {CaseOf(row), "  " + EngineAndProgram(row), NumberOrDash(row.force_nrmse, "{:.1e}"),
          NumberOrDash(row.pose_m, "{:.1e} m"), NumberOrDash(row.loop_gap_m, "{:.1e} m"),
          NumberOrDash(row.sample_us, "{:.3g} us")});
-    text += (row.why.empty() ? "" : "  " + row.why) + "\n";
+    text += (row.why.empty() ? "" : "  " + OneLine(row.why)) + "\n";
   }
   return text;
 }

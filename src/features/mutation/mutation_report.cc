@@ -7,6 +7,7 @@
 #include "base/json_document.h"
 #include "base/json_text.h"
 #include "base/markup.h"
+#include "base/text.h"
 #include "report/text_table.h"
 
 namespace mbv {
@@ -68,9 +69,9 @@ std::string Row(const Mutation& m, bool inverse, bool markdown) {
   const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
   const std::string by_inverse = NumberCell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
   if (markdown) {
-    return fmt::format("| {} | {:g} {} | {} | {} | {} | {}{} |\n", MarkdownCode(m.name), m.value, MarkdownText(m.unit),
-                       SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",
-                       MarkdownText(NoteOf(m)));
+    return fmt::format("| {} | {:g} {} | {} | {} | {} | {}{} |\n", MarkdownCode(m.name), m.value,
+                       MarkdownText(m.unit), SeenText(m.own), change, smallest,
+                       inverse ? by_inverse + " | " : "", MarkdownText(NoteOf(m)));
   }
   std::vector<std::string> cells = {
       m.name, fmt::format("{:g}", m.value), " " + m.unit, SeenText(m.own), change, smallest};
@@ -111,7 +112,7 @@ std::string IdleText(const MutationReport& report, bool markdown) {
   size_t count = 0;
   for (const Mutation& m : report.mutations) {
     if (!IsIdle(m)) continue;
-    names += (count++ == 0 ? "" : ", ") + (markdown ? MarkdownCode(m.name) : m.name);
+    names += (count++ == 0 ? "" : ", ") + (markdown ? MarkdownCode(m.name) : OneLine(m.name));
   }
   if (count == 0) return "";
   return fmt::format("\n{}Numbers of instances that change no drive force ({}): {}.\n",
@@ -139,8 +140,8 @@ std::string Head(const MutationReport& report, bool inverse, bool markdown) {
   std::string text = fmt::format(
       "{}: {} of {} numbers ({}), each {:g} % too large and too small on the simulated side, turn "
       "the verdict in {} mode; {} of them by the drive forces",
-      markdown ? MarkdownText(report.scenario) : report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
-      report.mode, by_force);
+      markdown ? MarkdownText(report.scenario) : OneLine(report.scenario), seen,
+      report.mutations.size(), CountText(report), 100 * report.size, report.mode, by_force);
   if (inverse) {
     text += fmt::format("; {} do in inverse mode",
                         count([](const Mutation& m) { return m.inverse && m.inverse->detected; }));

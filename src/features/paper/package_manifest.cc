@@ -186,13 +186,13 @@ std::string PackageReadme(const PackageDescription& package) {
   text +=
       "| `manifest.json` | what was run, and the SHA-256 of every file |\n"
       "| `ro-crate-metadata.json` | the same as RO-Crate 1.1 |\n\n";
-  text += package.license.empty() ? "The models state no licence.\n"
-                                  : fmt::format("Licence of the models: {}.\n", MarkdownText(package.license));
+  text += package.license.empty()
+              ? "The models state no licence.\n"
+              : fmt::format("Licence of the models: {}.\n", MarkdownText(package.license));
   text += "\nVersions:";
   for (const auto& [name, version] : package.versions) {
-    text +=
-        fmt::format("{} {} {}", &name == &package.versions.front().first ? "" : ",",
-                    MarkdownText(name), MarkdownText(version));
+    text += fmt::format("{} {} {}", &name == &package.versions.front().first ? "" : ",",
+                        MarkdownText(name), MarkdownText(version));
   }
   return text + ".\n";
 }

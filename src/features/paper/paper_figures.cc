@@ -527,15 +527,16 @@ paper gives none.
 std::string AuditText(const PaperResult& result) {
   if (result.audit.empty()) return "";
   std::string text;
-  for (const std::string& row : result.audit) text += (text.empty() ? "" : ", ") + MarkdownCode(row);
+  for (const std::string& row : result.audit)
+    text += (text.empty() ? "" : ", ") + MarkdownCode(row);
   return " Equation audit (`docs/results/equation_audit.md`): " + text + ".";
 }
 
 std::string EntryText(const PaperOutcome& paper, const PaperResult& result) {
   std::string text = fmt::format("### {}: {}\n\n", result.name, MarkdownText(result.title));
   if (result.table.empty()) {
-    text += fmt::format("![{}](../pictures/paper_{}_{}.png)\n\n", MarkdownText(result.title), paper.model,
-                        result.name);
+    text += fmt::format("![{}](../pictures/paper_{}_{}.png)\n\n", MarkdownText(result.title),
+                        paper.model, result.name);
   } else {
     text += result.table + "\n";
   }

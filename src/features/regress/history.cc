@@ -572,8 +572,7 @@ HistoryText ListRuns(const std::string& path) {
                         fmt::format("{}/{}", select.Integer(2), select.Integer(3)),
                         select.Integer(4), select.Integer(5), select.Integer(6), select.Integer(7),
                         select.Real(8), label.empty() ? "" : OneLine(label) + ", ",
-                        OneLine(select.Text(10)),
-                        shard.empty() ? "" : ", shard " + OneLine(shard));
+                        OneLine(select.Text(10)), shard.empty() ? "" : ", shard " + OneLine(shard));
   }
   return {text, database.trouble(), Dump({{"runs", std::move(runs)}})};
 }

@@ -181,8 +181,8 @@ std::string Framed(const char* kind, const char* id, const std::string& title,
 std::string Boxes(const RegressReport& report, const std::vector<const CaseResult*>& cases) {
   std::vector<std::string> failed, missing, drifted;
   for (const CaseResult* result : cases) {
-    const std::string link =
-        fmt::format("<a href=\"#{}\">{}</a>", EscapeMarkup(RowId(*result)), EscapeMarkup(result->key));
+    const std::string link = fmt::format("<a href=\"#{}\">{}</a>", EscapeMarkup(RowId(*result)),
+                                         EscapeMarkup(result->key));
     if (result->failed()) {
       failed.push_back(fmt::format("{} <span class=\"word bad\">{}</span>: {}{}", link,
                                    EscapeMarkup(WordOf(*result)), EscapeMarkup(result->reason),
@@ -207,11 +207,12 @@ std::string Head(const RegressReport& report) {
       fmt::format("<h1>Regression: <span class=\"{}\">{}</span></h1>\n<p class=\"counts\">{}</p>\n",
                   code == 0 ? "good" : "bad", code == 0 ? "all as expected" : "not as expected",
                   CountsText(CountCases(report)));
-  text += fmt::format("<p class=\"soft\">{}{}{}{}, started {}, {:.1f} s with {} worker{}</p>\n",
-                      run.id == 0 ? "" : fmt::format("run {}, ", run.id),
-                      run.label.empty() ? "" : EscapeMarkup(run.label) + ", ", EscapeMarkup(run.program),
-                      run.shard.empty() ? "" : ", shard " + EscapeMarkup(run.shard),
-                      EscapeMarkup(run.started_utc), run.wall_s, run.jobs, run.jobs == 1 ? "" : "s");
+  text += fmt::format(
+      "<p class=\"soft\">{}{}{}{}, started {}, {:.1f} s with {} worker{}</p>\n",
+      run.id == 0 ? "" : fmt::format("run {}, ", run.id),
+      run.label.empty() ? "" : EscapeMarkup(run.label) + ", ", EscapeMarkup(run.program),
+      run.shard.empty() ? "" : ", shard " + EscapeMarkup(run.shard), EscapeMarkup(run.started_utc),
+      run.wall_s, run.jobs, run.jobs == 1 ? "" : "s");
   for (const std::string& note : report.notes) {
     text += "<p class=\"warn\">" + EscapeMarkup(note) + "</p>\n";
   }

@@ -211,16 +211,16 @@ std::string Row(const CaseResult& result) {
                      result.failed()         ? "❌ "
                      : result.drifts.empty() ? ""
                                              : "⚠️ ",
-                     MarkdownText(WordOf(result)), MarkdownText(KeyText(result)), result.cost.wall_s,
-                     result.cost.cpu_s, result.cost.peak_mib());
+                     MarkdownText(WordOf(result)), MarkdownText(KeyText(result)),
+                     result.cost.wall_s, result.cost.cpu_s, result.cost.peak_mib());
 }
 
 std::string Failed(const RegressReport& report) {
   Lines lines(kFailedBytes, kMore);
   for (const CaseResult* result : BySeverity(report)) {
     if (!result->failed()) continue;
-    std::string item = fmt::format("* **{}**: {}: {}\n", MarkdownText(result->key), MarkdownText(WordOf(*result)),
-                                   MarkdownText(result->reason));
+    std::string item = fmt::format("* **{}**: {}: {}\n", MarkdownText(result->key),
+                                   MarkdownText(WordOf(*result)), MarkdownText(result->reason));
     for (const std::string& text : FailureTexts(*result, kChecksOfALine)) {
       item += "  * " + MarkdownText(text) + "\n";
     }
@@ -234,7 +234,8 @@ std::string Drifted(const RegressReport& report) {
   Lines lines(kDriftBytes, kMore);
   for (const CaseResult* result : BySeverity(report)) {
     if (result->drifts.empty()) continue;
-    lines.Add(fmt::format("* **{}**: {}\n", MarkdownText(result->key), MarkdownText(DriftLine(*result))));
+    lines.Add(
+        fmt::format("* **{}**: {}\n", MarkdownText(result->key), MarkdownText(DriftLine(*result))));
   }
   const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Drift\n\n" + text;
@@ -266,8 +267,8 @@ std::string NotComparedText(const RegressReport& report) {
   for (const CaseResult& result : report.cases) {
     if (result.compared || result.not_compared.empty()) continue;
     const Unmeasured& first = result.not_compared.front();
-    lines.Add(
-        fmt::format("* {}: {}: {}\n", MarkdownText(result.key), MarkdownText(first.what), MarkdownText(first.why)));
+    lines.Add(fmt::format("* {}: {}: {}\n", MarkdownText(result.key), MarkdownText(first.what),
+                          MarkdownText(first.why)));
   }
   const std::string text = lines.Text();
   if (text.empty()) return "";
@@ -281,12 +282,13 @@ std::string ToMarkdown(const RegressReport& report) {
   std::string text =
       fmt::format("{}: {}\n\n{}.\n\n", kMarkdownTitle,
                   good ? "all as expected" : "❌ not as expected", CountsText(CountCases(report)));
-  text += fmt::format(
-      "Started {}, {:.1f} s with {} worker{}; {}{}{}{}.\n", MarkdownText(report.run.started_utc),
-      report.run.wall_s, report.run.jobs, report.run.jobs == 1 ? "" : "s",
-      MarkdownText(report.run.program), report.run.label.empty() ? "" : ", " + MarkdownText(report.run.label),
-      report.run.shard.empty() ? "" : ", shard " + MarkdownText(report.run.shard),
-      report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
+  text +=
+      fmt::format("Started {}, {:.1f} s with {} worker{}; {}{}{}{}.\n",
+                  MarkdownText(report.run.started_utc), report.run.wall_s, report.run.jobs,
+                  report.run.jobs == 1 ? "" : "s", MarkdownText(report.run.program),
+                  report.run.label.empty() ? "" : ", " + MarkdownText(report.run.label),
+                  report.run.shard.empty() ? "" : ", shard " + MarkdownText(report.run.shard),
+                  report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
   text += Failed(report) + Missing(report) + Drifted(report) + Caveats(report);
   Lines notes(kNoteBytes, "\nNote: and {} more\n");
   for (const std::string& note : report.notes) notes.Add("\nNote: " + MarkdownText(note) + "\n");
@@ -374,7 +376,8 @@ std::string ToSummaryText(const RegressReport& report) {
     }
   }
   for (const MissingCase& missing : report.missing) {
-    text += fmt::format("{}: missing\n    {}\n", OneLine(missing.key), OneLine(MissingText(missing)));
+    text +=
+        fmt::format("{}: missing\n    {}\n", OneLine(missing.key), OneLine(MissingText(missing)));
   }
   for (const CaseResult* result : cases) {
     if (result->drifts.empty()) continue;

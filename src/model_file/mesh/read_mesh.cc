@@ -281,8 +281,8 @@ class PlyCheck {
     return false;
   }
 
-  // The library reads a line per face, and after a damaged line not those that Run() takes for faces:
-  // a count that no file of this length has is refused wherever a list may begin.
+  // The library reads a line per face, and after a damaged line not those that Run() takes for
+  // faces: a count that no file of this length has is refused wherever a list may begin.
   [[nodiscard]] bool PromisesInSomeLine() const {
     constexpr unsigned long long kNeverMeant = 10'000'000;
     const unsigned long long most = std::max<unsigned long long>(bytes_.size(), kNeverMeant);
@@ -296,7 +296,8 @@ class PlyCheck {
           const auto count = property.count_bytes > 0 ? CountOf(TakeWord(&rest)) : 1;
           if (count > most) return true;
           if (property.count_bytes == 0) (void)TakeWord(&rest);
-          for (unsigned long long i = 0; property.count_bytes > 0 && i < count && !rest.empty(); ++i) {
+          for (unsigned long long i = 0; property.count_bytes > 0 && i < count && !rest.empty();
+               ++i) {
             (void)TakeWord(&rest);
           }
         }
@@ -388,9 +389,11 @@ std::string DaeTrouble(std::string_view bytes) {
     }
   }
   for (const std::string_view open : {"<p", "<vcount", "<v"}) {
-    for (size_t at = bytes.find(open); at != std::string_view::npos; at = bytes.find(open, at + 1)) {
+    for (size_t at = bytes.find(open); at != std::string_view::npos;
+         at = bytes.find(open, at + 1)) {
       const std::string_view rest = bytes.substr(at + open.size());
-      if (rest.empty() || std::string_view(" \t\r\n>").find(rest[0]) == std::string_view::npos) continue;
+      if (rest.empty() || std::string_view(" \t\r\n>").find(rest[0]) == std::string_view::npos)
+        continue;
       const size_t tag = rest.find('>');
       if (tag == std::string_view::npos || rest[tag == 0 ? 0 : tag - 1] == '/') continue;
       const std::string_view inside = rest.substr(tag + 1);
@@ -413,10 +416,12 @@ std::string ObjSurface(std::string_view bytes) {
     const std::string_view line = bytes.substr(from, end + 1 - from);
     from = end + 1;
     if (!continues) {
-      const std::string_view text = line.substr(std::min(line.find_first_not_of(" \t"), line.size()));
-      kept = std::ranges::any_of(
-          std::initializer_list<std::string_view>{"v ", "v\t", "vt ", "vt\t", "vn ", "vn\t", "f ", "f\t"},
-          [&](std::string_view key) { return text.starts_with(key); });
+      const std::string_view text =
+          line.substr(std::min(line.find_first_not_of(" \t"), line.size()));
+      kept =
+          std::ranges::any_of(std::initializer_list<std::string_view>{"v ", "v\t", "vt ", "vt\t",
+                                                                      "vn ", "vn\t", "f ", "f\t"},
+                              [&](std::string_view key) { return text.starts_with(key); });
     }
     if (kept) surface += line;
     const size_t last = line.find_last_not_of("\r\n");
@@ -489,7 +494,8 @@ void LimitMemory([[maybe_unused]] size_t bytes) {
   constexpr rlim_t kLeast = 512UL << 20, kPerByte = 200;
   rlim_t pages = 0;
   std::ifstream("/proc/self/statm") >> pages;
-  const rlim_t most = pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + kLeast + kPerByte * bytes;
+  const rlim_t most =
+      pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + kLeast + kPerByte * bytes;
   rlimit limit{};
   if (pages == 0 || getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur < most) return;
   limit.rlim_cur = most;

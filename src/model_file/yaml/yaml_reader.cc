@@ -298,12 +298,13 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
   const size_t all = node_->entries.size();
   if (path_.empty() && all > counts.known && (counts.telling == 0 || all > 2 * counts.known)) {
     valid_ = false;
-    reader_->RefuseForeign(*std::exchange(node_, nullptr),
-                           counts.known == 0
-                               ? fmt::format("the file is of another kind: none of its {} keys is known", all)
-                               : fmt::format("the file is of another kind: {} of its {} keys {} known",
-                                             counts.known, all, counts.known == 1 ? "is" : "are"),
-                           "known keys: " + Joined(keys));
+    reader_->RefuseForeign(
+        *std::exchange(node_, nullptr),
+        counts.known == 0
+            ? fmt::format("the file is of another kind: none of its {} keys is known", all)
+            : fmt::format("the file is of another kind: {} of its {} keys {} known", counts.known,
+                          all, counts.known == 1 ? "is" : "are"),
+        "known keys: " + Joined(keys));
     return;
   }
   const YamlEntry* before = nullptr;

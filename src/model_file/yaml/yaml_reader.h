@@ -82,8 +82,8 @@ class YamlReader {
              const std::string& hint = "");
   /// A finding of this file, whatever its `file` says.
   void Add(Finding finding);
-  /// The only finding of a file of another kind, which may hold what must not be shown: those before
-  /// and after it are dropped.
+  /// The only finding of a file of another kind, which may hold what must not be shown: those
+  /// before and after it are dropped.
   void RefuseForeign(const YamlNode& root, const std::string& message, const std::string& hint);
   /// Appended to later messages: " (in limb2)". The same message at the same place is given only
   /// once, whatever the note.
