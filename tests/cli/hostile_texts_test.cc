@@ -16,7 +16,6 @@
 #include "external/motion_text.h"
 #include "features/convergence/convergence_report.h"
 #include "features/engines/crosscheck.h"
-#include "features/equation_audit/audit.h"
 #include "features/mutation/mutation_report.h"
 #include "features/paper/package_manifest.h"
 #include "features/regress/history.h"
@@ -231,10 +230,6 @@ const std::vector<Writer>& Writers() {
        [](const std::string& t) { return ToMarkdown(EnginesOf(t)); }},
       {"mutate", Format::kMarkdown,
        [](const std::string& t) { return ToText(MutationOf(t), true); }},
-      {"audit", Format::kMarkdown,
-       [](const std::string& t) {
-         return ToMarkdown(AuditTable{t, t, {{.equation = t, .printed = t, .note = t}}});
-       }},
       {"package", Format::kMarkdown,
        [](const std::string& t) { return PackageReadme(PackageOf(t)); }},
       {"crosscheck", Format::kCsv, [](const std::string& t) { return ToCsv(EnginesOf(t)); }},

@@ -5,7 +5,6 @@
 
 #include "base/json_document.h"
 #include "base/json_text.h"
-#include "base/markup.h"
 #include "features/equation_audit/cabin_robot_audit.h"
 #include "features/equation_audit/scara_robot_audit.h"
 #include "features/equation_audit/spr_tripod_audit.h"
@@ -42,6 +41,15 @@ std::string Residual(double residual, const AuditRow& row, AuditNumbers numbers)
   // Below its limit a residual is roundoff, which differs between machines: show the limit.
   if (residual <= row.limit) return "≤ " + RoundedUp(row.limit);
   return fmt::format("{:.1e}", residual);
+}
+
+std::string MarkdownCell(const std::string& text) {
+  std::string cell;
+  for (char c : text) {
+    if (c == '|') cell += '\\';
+    cell += c == '\n' ? ' ' : c;
+  }
+  return cell;
 }
 
 std::string Numbers(const AuditRow& row, AuditNumbers numbers) {
@@ -83,15 +91,14 @@ const char* ToText(AuditVerdict verdict) {
 }
 
 std::string ToMarkdown(const AuditTable& table, AuditNumbers numbers) {
-  std::string text = fmt::format("## {}\n\nSource: {}\n\n", MarkdownText(table.mechanism),
-                                 MarkdownText(table.source));
+  std::string text = fmt::format("## {}\n\nSource: {}\n\n", table.mechanism, table.source);
   text +=
       "| equation | erratum | verdict | as printed | corrected | residual as printed | residual "
       "corrected | size of the quantity | note |\n|---|---|---|---|---|---|---|---|---|\n";
   for (const AuditRow& row : table.rows) {
-    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", MarkdownText(row.equation),
-                        MarkdownText(row.erratum), ToText(row.verdict), MarkdownText(row.printed),
-                        MarkdownText(row.corrected), Numbers(row, numbers), MarkdownText(row.note));
+    text += fmt::format("| {} | {} | {} | {} | {} | {} | {} |\n", MarkdownCell(row.equation),
+                        MarkdownCell(row.erratum), ToText(row.verdict), MarkdownCell(row.printed),
+                        MarkdownCell(row.corrected), Numbers(row, numbers), MarkdownCell(row.note));
   }
   return text;
 }

@@ -268,10 +268,10 @@ TEST(JUnit, AwkwardTextArrivesUnchanged) {
   const auto* failure = suite->LastChildElement("testcase")->FirstChildElement("failure");
   ASSERT_NE(failure, nullptr);
   EXPECT_STREQ(failure->Attribute("message"),
-               "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ; "
+               "exit code 1, expected 0: <forces> & \"moments\" ]]> | differ\uFFFD; "
                "simulated_vs_analytic.force_nrmse is 1.00e-03, limit 1.0e-06, at "
                "limb2.drive.force, 7.16 s; was 1.70e-13 in run 6");
-  EXPECT_TRUE(std::string(failure->GetText()).ends_with("line 1\nline 2  <b>"))
+  EXPECT_TRUE(std::string(failure->GetText()).ends_with("line 1\nline 2 \uFFFD <b>"))
       << failure->GetText();
   const auto* output = suite->FirstChildElement("testcase")->FirstChildElement("system-out");
   ASSERT_NE(output, nullptr);
