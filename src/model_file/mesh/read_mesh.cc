@@ -454,18 +454,18 @@ bool IsMeshFile(const std::filesystem::path& file) {
 
 MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
   MeshText mesh;
-  const std::string hint = Lower(extension).substr(extension.starts_with('.') ? 1 : 0);
+  const std::string kind = Lower(extension).substr(extension.starts_with('.') ? 1 : 0);
   // The library itself compares the counts of STL, and OBJ has none.
-  mesh.trouble = hint == "ply" ? PlyCheck(bytes).Run() : hint == "dae" ? DaeTrouble(bytes) : "";
+  mesh.trouble = kind == "ply" ? PlyCheck(bytes).Run() : kind == "dae" ? DaeTrouble(bytes) : "";
   if (!mesh.trouble.empty()) return mesh;
-  const std::string surface = hint == "obj" ? ObjSurface(bytes) : "";
-  const std::string& read = hint == "obj" ? surface : bytes;
+  const std::string surface = kind == "obj" ? ObjSurface(bytes) : "";
+  const std::string& read = kind == "obj" ? surface : bytes;
   Assimp::Importer importer;
   importer.SetIOHandler(new NoFiles);  // which it owns
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const aiScene* scene = importer.ReadFileFromMemory(read.data(), read.size(), 0, hint.c_str());
+  const aiScene* scene = importer.ReadFileFromMemory(read.data(), read.size(), 0, kind.c_str());
   // The library's own words may quote the file, which may be something else than a mesh.
   mesh.trouble = scene == nullptr || scene->mRootNode == nullptr
                      ? "it is damaged, or of another kind than its name says"
