@@ -53,25 +53,43 @@ std::string Diagnostics::Text() const {
   return text;
 }
 
+namespace {
+
+// Names and values come from files: none begins a line that looks like another finding.
+std::string Indented(const std::string& text) {
+  std::string shown;
+  for (size_t from = 0; from <= text.size();) {
+    const size_t end = std::min(text.find('\n', from), text.size());
+    shown += (from == 0 ? "" : "\n    ") + OneLine(text.substr(from, end - from));
+    from = end + 1;
+  }
+  return shown;
+}
+
+}  // namespace
+
 std::string ToText(const Finding& finding) {
   std::string text;
   if (!finding.file.empty()) {
-    text += finding.file + ":";
+    text += OneLine(finding.file) + ":";
     if (finding.line > 0) {
       text += std::to_string(finding.line) + ":" + std::to_string(finding.column) + ":";
     }
     text += " ";
   }
   text += finding.severity == Severity::kError ? "error: " : "warning: ";
-  text += Shortened(finding.message);
-  if (!finding.hint.empty()) text += "\n  hint: " + Shortened(finding.hint);
-  return Printable(text);  // names and values come from files
+  text += Indented(Shortened(finding.message));
+  if (!finding.hint.empty()) text += "\n  hint: " + Indented(Shortened(finding.hint));
+  return text;
 }
 
 std::string ClosestWord(const std::string& word, const std::vector<std::string>& candidates) {
   std::string best;
   size_t best_distance = std::max<size_t>(2, word.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
+    const size_t lengths =
+        std::max(word.size(), candidate.size()) - std::min(word.size(), candidate.size());
+    if (lengths >= best_distance) continue;  // the least distance
     const size_t distance = EditDistance(word, candidate);
     if (distance < best_distance) {
       best_distance = distance;
@@ -82,7 +100,7 @@ std::string ClosestWord(const std::string& word, const std::vector<std::string>&
 }
 
 std::string DidYouMean(const std::string& word, const std::vector<std::string>& candidates) {
-  constexpr size_t kLongest = 64;  // longer words are no slips of the pen
+  constexpr size_t kLongest = 1000;  // the time grows with the square
   const std::string near = word.size() > kLongest ? "" : ClosestWord(word, candidates);
   return near.empty() ? "" : fmt::format("did you mean '{}'?", near);
 }

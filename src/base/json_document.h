@@ -89,6 +89,9 @@ class JsonValue {
     return value(key, std::string(otherwise));
   }
 
+  /// Of a document of another schema, which is named only if it is another version of the same: a
+  /// file of another kind may hold what must not be shown.
+  [[noreturn]] void RefuseSchema(const std::string& found, const std::string& needed) const;
   /// Refuses the document for this value.
   [[noreturn]] void Refuse(std::string message, std::string hint = {}) const;
 
@@ -142,8 +145,7 @@ template <typename Read>
     if (schema != nullptr) {
       const std::string found = root.at("schema");
       if (found != schema) {
-        root.at("schema").Refuse("is '" + found + "', needed is " + schema,
-                                 "another version of mbverify may have written it");
+        root.at("schema").RefuseSchema(found, schema);
       }
     }
     return {read(root), {}};

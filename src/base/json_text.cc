@@ -13,9 +13,34 @@ namespace {
 constexpr int kMostLevels = 100;     // of nesting: what follows a document recurses
 constexpr size_t kMostQuoted = 200;  // characters of a refusal, which may quote the document
 
+// What a terminal obeys or a reader does not see, as \uXXXX: the value is the same, the text shows
+// it.
+std::string Visible(std::string json) {
+  const auto is_plain = [](char c) { return (c >= ' ' && c != '\x7f') || c == '\n'; };
+  if (std::ranges::all_of(json, is_plain)) return json;
+  std::string visible;
+  for (size_t at = 0; at < json.size();) {
+    if (is_plain(json[at])) {
+      visible += json[at++];
+      continue;
+    }
+    const auto first = static_cast<unsigned char>(json[at]);
+    const size_t length = first < 0xC0 ? 1 : first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+    const std::string_view character = std::string_view(json).substr(at, length);
+    at += length;
+    if (OneLine(character) == character) {
+      visible += character;
+      continue;
+    }
+    const std::string escaped = nlohmann::json(character).dump(-1, ' ', true);
+    visible += character == "\x7f" ? "\\u007f" : escaped.substr(1, escaped.size() - 2);
+  }
+  return visible;
+}
+
 template <typename Json>
 std::string Dumped(const Json& json, int blanks) {
-  return json.dump(blanks, ' ', false, Json::error_handler_t::replace);
+  return Visible(json.dump(blanks, ' ', false, Json::error_handler_t::replace));
 }
 
 // Without what a terminal obeys, and not longer than a line that is read.
@@ -124,6 +149,15 @@ double JsonValue::NumberOrNan() const {
 
 void JsonValue::Refuse(std::string message, std::string hint) const {
   throw JsonRefusal{.key = path_, .message = std::move(message), .hint = std::move(hint)};
+}
+
+void JsonValue::RefuseSchema(const std::string& found, const std::string& needed) const {
+  constexpr size_t kLongest = 40;
+  if (found.starts_with(needed.substr(0, needed.rfind('/') + 1)) && found.size() <= kLongest) {
+    Refuse(fmt::format("is '{}', needed is {}", found, needed),
+           "another version of mbverify may have written it");
+  }
+  Refuse("is not " + needed, "the file is of another kind");
 }
 
 void JsonValue::RefuseKind(const char* needed) const {

@@ -8,18 +8,43 @@
 
 namespace mbv {
 
-std::string EscapeMarkup(std::string_view text) {
-  constexpr std::string_view kReplacement = "\uFFFD";
-  std::string escaped;
-  escaped.reserve(text.size());
+namespace {
+
+// Bytes of the character that begins here.
+size_t LengthOf(char first) {
+  const auto byte = static_cast<unsigned char>(first);
+  return byte < 0xC0 ? 1 : byte < 0xE0 ? 2 : byte < 0xF0 ? 3 : 4;
+}
+
+}  // namespace
+
+std::string XmlText(std::string_view text) {
+  std::string plain;
+  plain.reserve(text.size());
   size_t bad = FindNonText(text);
-  for (size_t i = 0; i < text.size(); ++i) {
-    const char c = text[i];
+  for (size_t i = 0; i < text.size();) {
     if (i == bad) {
-      escaped += kReplacement;
-      bad = FindNonText(text, i + 1);
+      plain += "\uFFFD";
+      bad = FindNonText(text, ++i);
       continue;
     }
+    const size_t length = LengthOf(text[i]);
+    if (text[i] == '\r') {
+      if (text.substr(i + 1, 1) != "\n") plain += '\n';
+    } else if (length == 1) {
+      plain += text[i];
+    } else {
+      plain += OneLine(text.substr(i, length));
+    }
+    i += length;
+  }
+  return plain;
+}
+
+std::string EscapeMarkup(std::string_view text) {
+  std::string escaped;
+  escaped.reserve(text.size());
+  for (const char c : XmlText(text)) {
     switch (c) {
       case '&':
         escaped += "&amp;";
@@ -59,12 +84,20 @@ std::string EncodeLink(std::string_view path) {
   return link;
 }
 
-std::string EscapeScript(std::string json) {
-  constexpr std::string_view kLess = "\\u003c";
-  for (size_t at = 0; (at = json.find('<', at)) != std::string::npos; at += kLess.size()) {
-    json.replace(at, 1, kLess);
+std::string EscapeScript(const std::string& json) {
+  std::string escaped;
+  for (size_t i = 0; i < json.size(); ++i) {
+    if (json[i] == '<') {
+      escaped += "\\u003c";
+    } else if (json[i] == '\\' && i + 1 < json.size()) {
+      // Dump() writes as \uXXXX what misleads; a page shows it so.
+      if (json[i + 1] == 'u') escaped += '\\';
+      escaped += {json[i], json[++i]};
+    } else {
+      escaped += json[i];
+    }
   }
-  return json;
+  return escaped;
 }
 
 std::string EncodeBase64(std::string_view bytes) {
@@ -102,6 +135,7 @@ constexpr std::pair<std::string_view, std::string_view> kTexTexts[] = {
     {">", "\\ensuremath{>}"},
     {"|", "\\ensuremath{|}"},
     {"\"", "''"},
+    {"`", "{`}"},
     {"−", "\\ensuremath{-}"},
     {"±", "\\ensuremath{\\pm}"},
     {"×", "\\ensuremath{\\times}"},
@@ -157,9 +191,6 @@ constexpr std::pair<std::string_view, std::string_view> kTexTexts[] = {
     {"ö", "\\\"o"},
     {"ü", "\\\"u"},
     {"ß", "\\ss{}"},
-    {"\n", " "},
-    {"\r", " "},
-    {"\t", " "},
     {"η", "\\ensuremath{\\eta}"},
     {"ζ", "\\ensuremath{\\zeta}"},
     {"χ", "\\ensuremath{\\chi}"},
@@ -168,10 +199,45 @@ constexpr std::pair<std::string_view, std::string_view> kTexTexts[] = {
     {"Θ", "\\ensuremath{\\Theta}"},
 };
 
+std::string WithoutLineEnds(std::string_view text) {
+  std::string plain(text);
+  std::ranges::replace_if(
+      plain, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
+  return plain;
+}
+
+constexpr std::pair<char, std::string_view> kMarkdownTexts[] = {
+    {'\\', "\\\\"}, {'|', "\\|"},  {'*', "\\*"},  {'_', "\\_"},   {'`', "\\`"}, {'[', "\\["},
+    {']', "\\]"},   {'<', "&lt;"}, {'>', "&gt;"}, {'&', "&amp;"}, {'$', "\\$"}, {'~', "\\~"},
+};
+
 }  // namespace
 
-std::string TexText(std::string_view text) {
+std::string MarkdownText(std::string_view text) {
   std::string out;
+  for (const char c : OneLine(WithoutLineEnds(text))) {
+    const auto* row =
+        std::ranges::find(kMarkdownTexts, c, &std::pair<char, std::string_view>::first);
+    out += row != std::end(kMarkdownTexts) ? row->second : std::string_view(&c, 1);
+  }
+  return out;
+}
+
+std::string MarkdownCode(std::string_view text) {
+  const bool plain = !text.empty() && OneLine(text) == text &&
+                     text.find_first_of("`|\\<>&") == std::string_view::npos;
+  return plain ? "`" + std::string(text) + "`" : MarkdownText(text);
+}
+
+std::string TexText(std::string_view given_text) {
+  const std::string plain = OneLine(WithoutLineEnds(given_text));
+  std::string_view text = plain;
+  std::string out;
+  // The \\ that ends a row of a table would take these as its own.
+  if (text.starts_with('[') || text.starts_with('*')) {
+    out = "{" + plain.substr(0, 1) + "}";
+    text.remove_prefix(1);
+  }
   while (!text.empty()) {
     size_t taken = 1;
     std::string_view given = text.substr(0, 1);

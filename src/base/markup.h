@@ -1,4 +1,4 @@
-// Text inside XML and HTML.
+// Text inside XML, HTML, Markdown and LaTeX: one function for each.
 #pragma once
 
 #include <string>
@@ -6,24 +6,36 @@
 
 namespace mbv {
 
-/// `text` with & < > " ' as entities, safe in elements and in quoted attributes. What is no text
-/// (base/text.h) becomes U+FFFD.
+/// What XML may hold, for writers that escape by themselves: what is no text (base/text.h) as
+/// U+FFFD, marks that mislead as OneLine() shows them, carriage returns as line feeds.
+[[nodiscard]] std::string XmlText(std::string_view text);
+
+/// The same with & < > " ' as entities, safe in elements and in quoted attributes.
 [[nodiscard]] std::string EscapeMarkup(std::string_view text);
 
 /// A relative link to a file: every byte but letters, digits, '-', '_', '.', '~' and '/' as %XX, so
 /// that no name is taken as a scheme, a query or a fragment, or ends an attribute.
 [[nodiscard]] std::string EncodeLink(std::string_view path);
 
-/// JSON inside a script element: '<' as \u003c, so that nothing in it ends or opens an element.
-[[nodiscard]] std::string EscapeScript(std::string json);
+/// What Dump() or DumpLine() wrote, inside a script element: '<' as \u003c, so that nothing in it
+/// ends or opens an element, and what they write as \uXXXX as these six characters.
+[[nodiscard]] std::string EscapeScript(const std::string& json);
 
 /// RFC 4648, with padding.
 [[nodiscard]] std::string EncodeBase64(std::string_view bytes);
 
+/// `text` in a paragraph, a list or a table of Markdown: nothing in it is markup; line ends and
+/// tabs are blanks, what misleads is shown as OneLine() shows it.
+[[nodiscard]] std::string MarkdownText(std::string_view text);
+
+/// The same as code, `text`, where that can hold it.
+[[nodiscard]] std::string MarkdownCode(std::string_view text);
+
 // Text for LaTeX.
 
 /// `text` as LaTeX sets it, in text and in mathematics, without packages: its special characters
-/// escaped; Greek letters, minus signs, degrees and the like as commands; line ends as blanks.
+/// escaped; Greek letters, minus signs, degrees and the like as commands; line ends as blanks; what
+/// misleads as OneLine() shows it.
 /// Other letters (Chinese) stay as they are.
 [[nodiscard]] std::string TexText(std::string_view text);
 

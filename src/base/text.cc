@@ -5,6 +5,8 @@
 #include <cctype>
 #include <charconv>
 #include <filesystem>
+#include <initializer_list>
+#include <utility>
 
 namespace mbv {
 namespace {
@@ -65,15 +67,22 @@ std::string Printable(std::string_view text) {
 
 namespace {
 
-// U+200B … U+200F, U+202A … U+202E, U+2060 … U+206F, U+FEFF: the code of the one at `at`, else 0.
-unsigned MisleadingAt(std::string_view text, size_t at) {
-  const auto byte = [&](size_t k) {
-    return static_cast<unsigned>(static_cast<unsigned char>(text[at + k]));
-  };
-  if (at + 3 > text.size() || (byte(0) & 0xF0U) != 0xE0U) return 0;
-  const unsigned code = (byte(0) & 0xFU) << 12U | (byte(1) & 0x3FU) << 6U | (byte(2) & 0x3FU);
-  const bool misleads = (code >= 0x200B && code <= 0x200F) || (code >= 0x202A && code <= 0x202E) ||
-                        (code >= 0x2060 && code <= 0x206F) || code == 0xFEFF;
+// Characters that take no room, change the order of others or end a line, where a reader sees
+// nothing of it. (Variation selectors stay: signs like ⚠️ have them.)
+constexpr std::pair<unsigned, unsigned> kMisleading[] = {
+    {0x00AD, 0x00AD}, {0x034F, 0x034F}, {0x061C, 0x061C}, {0x115F, 0x1160},   {0x17B4, 0x17B5},
+    {0x180B, 0x180F}, {0x200B, 0x200F}, {0x2028, 0x202E}, {0x2060, 0x206F},   {0x3164, 0x3164},
+    {0xFEFF, 0xFEFF}, {0xFFA0, 0xFFA0}, {0xFFF0, 0xFFFB}, {0x1D173, 0x1D17A}, {0xE0000, 0xE0FFF}};
+
+// The code of the character of `length` bytes at `at`, if it is one of these, else 0.
+unsigned MisleadingAt(std::string_view text, size_t at, size_t length) {
+  if (length < 2) return 0;
+  unsigned code = static_cast<unsigned char>(text[at]) & (0xFFU >> (length + 1));
+  for (size_t k = 1; k < length; ++k) {
+    code = code << 6U | (static_cast<unsigned char>(text[at + k]) & 0x3FU);
+  }
+  const bool misleads = std::ranges::any_of(
+      kMisleading, [&](const auto& range) { return range.first <= code && code <= range.second; });
   return misleads ? code : 0;
 }
 
@@ -97,8 +106,9 @@ std::string Tamed(std::string_view text, bool one_line) {
     if (length == 0) {
       const auto byte = static_cast<unsigned char>(c);
       shown += {'\\', 'x', kDigits[byte >> 4U], kDigits[byte & 0xFU]};
-    } else if (const unsigned code = MisleadingAt(text, at); code != 0) {
-      shown += "\\u";
+    } else if (const unsigned code = MisleadingAt(text, at, length); code != 0) {
+      shown += code > 0xFFFF ? "\\U000" : "\\u";
+      if (code > 0xFFFF) shown += kDigits[code >> 16U & 0xFU];
       for (const unsigned shift : {12U, 8U, 4U, 0U}) shown += kDigits[code >> shift & 0xFU];
     } else {
       shown += text.substr(at, length);
@@ -144,14 +154,18 @@ std::string Shortened(std::string text, size_t most) {
 
 std::string CsvCell(std::string_view text) {
   std::string cell;
-  const bool computed =
-      !text.empty() && std::string_view("=+-@\t\r").find(text[0]) != std::string_view::npos;
+  // Blanks in front are skipped by some spreadsheets, and wide signs taken as signs.
+  const std::string_view begin =
+      text.substr(std::min(text.find_first_not_of(" \t\r\n"), text.size()));
+  const bool computed = std::ranges::any_of(
+      std::initializer_list<std::string_view>{"=", "+", "-", "@", "＝", "＋", "－", "＠"},
+      [&](std::string_view sign) { return begin.starts_with(sign); });
   if (computed && !IsNumber(text)) cell += '\'';
   std::string plain(text);
   for (char& c : plain) {
     if (c == '\n' || c == '\r' || c == '\t') c = ' ';
   }
-  cell += Printable(plain);
+  cell += OneLine(plain);
   if (cell.find_first_of(",\"") == std::string::npos) return cell;
   std::string quoted = "\"";
   for (const char c : cell) quoted += c == '"' ? std::string("\"\"") : std::string(1, c);

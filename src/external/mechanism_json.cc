@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <Eigen/Dense>
 #include <algorithm>
+#include <cmath>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -15,6 +16,7 @@
 #include "base/diagnostics.h"
 #include "base/json_document.h"
 #include "base/json_text.h"
+#include "base/text.h"
 #include "base/types.h"
 
 namespace mbv {
@@ -223,34 +225,194 @@ Path PathOf(const std::vector<std::string>& context) {
   return path;
 }
 
-bool IsBelow(const Path& path, const Path& above) {
-  return path.size() > above.size() && std::equal(above.begin(), above.end(), path.begin());
-}
+// What of a document a schema's keywords refuse, in words of ours: those of mechanism.schema.json.
+class SchemaExplainer {
+ public:
+  explicit SchemaExplainer(const Value& schema) : schema_(schema) {}
 
-// The schema's errors without those that only say that something below them is wrong.
+  std::vector<JsonFinding> Explain(const Value& json) const {
+    std::vector<JsonFinding> findings;
+    Judge(schema_, json, {}, &findings);
+    return findings;
+  }
+
+ private:
+  static void Add(const Path& path, std::string message, std::vector<JsonFinding>* findings,
+                  std::string hint = "") {
+    findings->push_back({.path = path, .message = std::move(message), .hint = std::move(hint)});
+  }
+
+  static Path Below(Path path, const std::string& step) {
+    path.push_back(step);
+    return path;
+  }
+
+  static bool IsOf(const std::string& type, const Value& json) {
+    return type == "object"    ? json.is_object()
+           : type == "array"   ? json.is_array()
+           : type == "string"  ? json.is_string()
+           : type == "boolean" ? json.is_boolean()
+           : type == "integer" ? json.is_number_integer()
+           : type == "number"  ? json.is_number()
+                               : json.is_null();
+  }
+
+  // A keyword holds one type or a list of them.
+  static std::vector<std::string> TypesOf(const Value& type) {
+    return type.is_array() ? type.get<std::vector<std::string>>()
+                           : std::vector<std::string>{type.get<std::string>()};
+  }
+
+  static std::string NameOf(const std::string& type) {
+    return type == "object"    ? "an object"
+           : type == "array"   ? "a list"
+           : type == "string"  ? "a text"
+           : type == "boolean" ? "true or false"
+           : type == "integer" ? "a whole number"
+           : type == "number"  ? "a number"
+                               : "null";
+  }
+
+  static std::string KindOf(const Value& json) {
+    for (const char* type : {"object", "array", "string", "boolean", "number"}) {
+      if (IsOf(type, json)) return NameOf(type);
+    }
+    return "null";
+  }
+
+  void Judge(const Value& node, const Value& json, const Path& path,
+             std::vector<JsonFinding>* findings) const {
+    if (const auto reference = node.find("$ref"); reference != node.end()) {
+      const std::string pointer = reference->get<std::string>().substr(1);
+      return Judge(schema_.at(Value::json_pointer(pointer)), json, path, findings);
+    }
+    for (const Value& part : node.value("allOf", Value::array())) Judge(part, json, path, findings);
+    if (const auto type = node.find("type"); type != node.end()) {
+      const std::vector<std::string> types = TypesOf(*type);
+      if (std::ranges::none_of(types, [&](const auto& each) { return IsOf(each, json); })) {
+        std::string needed;
+        for (const std::string& each : types)
+          needed += (needed.empty() ? "" : " or ") + NameOf(each);
+        return Add(path, fmt::format("is {} where {} is needed", KindOf(json), needed), findings);
+      }
+    }
+    if (json.is_object()) JudgeObject(node, json, path, findings);
+    if (json.is_array()) JudgeList(node, json, path, findings);
+    JudgeValue(node, json, path, findings);
+    if (const auto choice = node.find("oneOf"); choice != node.end()) {
+      JudgeChoice(*choice, json, path, findings);
+    }
+  }
+
+  void JudgeObject(const Value& node, const Value& json, const Path& path,
+                   std::vector<JsonFinding>* findings) const {
+    for (const std::string key : node.value("required", Value::array())) {
+      if (!json.contains(key)) Add(path, fmt::format("has no '{}'", key), findings);
+    }
+    const Value properties = node.value("properties", Value::object());
+    std::vector<std::string> known;
+    for (const auto& [key, part] : properties.items()) known.push_back(key);
+    const auto others = node.find("additionalProperties");
+    for (const auto& [key, value] : json.items()) {
+      if (properties.contains(key)) {
+        Judge(properties.at(key), value, Below(path, key), findings);
+      } else if (others != node.end() && others->is_object()) {
+        Judge(*others, value, Below(path, key), findings);
+      } else if (others != node.end() && *others == false) {
+        Add(path, fmt::format("has the unknown key '{}'", QuotedValue(key)), findings,
+            DidYouMean(key, known, "known keys: " + Joined(known)));
+      }
+    }
+  }
+
+  void JudgeList(const Value& node, const Value& json, const Path& path,
+                 std::vector<JsonFinding>* findings) const {
+    const size_t least = node.value("minItems", size_t{0}),
+                 most = node.value("maxItems", json.size());
+    if (json.size() < least || json.size() > most) {
+      const std::string needed = least == most               ? fmt::format("{}", least)
+                                 : node.contains("maxItems") ? fmt::format("{} … {}", least, most)
+                                                             : fmt::format("at least {}", least);
+      Add(path, fmt::format("has {} entries, needed: {}", json.size(), needed), findings);
+    }
+    const auto items = node.find("items");
+    for (size_t i = 0; items != node.end() && i < json.size(); ++i) {
+      Judge(*items, json.at(i), Below(path, std::to_string(i)), findings);
+    }
+  }
+
+  static void JudgeValue(const Value& node, const Value& json, const Path& path,
+                         std::vector<JsonFinding>* findings) {
+    if (const auto word = node.find("const"); word != node.end() && *word != json) {
+      Add(path, fmt::format("is not {}", DumpLine(*word)), findings);
+    }
+    if (const auto words = node.find("enum"); words != node.end()) {
+      if (std::ranges::find(*words, json) == words->end()) {
+        std::vector<std::string> known;
+        for (const Value& each : *words)
+          known.push_back(each.is_string() ? each : Value(DumpLine(each)));
+        Add(path,
+            fmt::format("is {}, not one of: {}", QuotedValue(DumpLine(json), 60), Joined(known)),
+            findings, json.is_string() ? DidYouMean(json, known) : "");
+      }
+    }
+    if (json.is_number()) {
+      const double number = json.get<double>();
+      if (number < node.value("minimum", -HUGE_VAL)) {
+        Add(path,
+            fmt::format("is {:g}, at least {:g} is needed", number,
+                        node.at("minimum").get<double>()),
+            findings);
+      }
+      if (number > node.value("maximum", HUGE_VAL)) {
+        Add(path,
+            fmt::format("is {:g}, at most {:g} is needed", number,
+                        node.at("maximum").get<double>()),
+            findings);
+      }
+    }
+    if (json.is_string() &&
+        json.get_ref<const std::string&>().size() < node.value("minLength", size_t{0})) {
+      Add(path, "is empty", findings);
+    }
+  }
+
+  // Of the alternatives, what is wrong with the one that fits best.
+  void JudgeChoice(const Value& choice, const Value& json, const Path& path,
+                   std::vector<JsonFinding>* findings) const {
+    size_t fitting = 0;
+    std::vector<JsonFinding> best;
+    for (const Value& alternative : choice) {
+      std::vector<JsonFinding> found;
+      Judge(alternative, json, path, &found);
+      fitting += found.empty() ? 1 : 0;
+      if (best.empty() || found.size() < best.size()) best = std::move(found);
+    }
+    if (fitting > 1) Add(path, "fits more than one of its alternatives: state one", findings);
+    if (fitting == 0) findings->insert(findings->end(), best.begin(), best.end());
+  }
+
+  const Value& schema_;
+};
+
+// The schema's findings: whether there are any is the library's to say, whose words are not ours.
 std::vector<JsonFinding> SchemaFindings(const Value& json) {
   valijson::Schema schema;
   const Value schema_json = ParseJson<Value>(MechanismSchemaText());
   valijson::SchemaParser(valijson::SchemaParser::kDraft7)
       .populateSchema(valijson::adapters::NlohmannJsonAdapter(schema_json), schema);
   valijson::ValidationResults results;
-  valijson::Validator(valijson::Validator::kStrongTypes)
-      .validate(schema, valijson::adapters::NlohmannJsonAdapter(json), &results);
-  std::vector<JsonFinding> all, deepest;
+  const bool valid = valijson::Validator(valijson::Validator::kStrongTypes)
+                         .validate(schema, valijson::adapters::NlohmannJsonAdapter(json), &results);
+  if (valid) return {};
+  std::vector<JsonFinding> findings = SchemaExplainer(schema_json).Explain(json);
+  if (!findings.empty()) return findings;
+  Path deepest;
   valijson::ValidationResults::Error error;
   while (results.popError(error)) {
-    all.push_back({.path = PathOf(error.context), .message = error.description, .hint = {}});
+    if (Path path = PathOf(error.context); path.size() >= deepest.size()) deepest = std::move(path);
   }
-  for (const JsonFinding& finding : all) {
-    const bool covered = std::any_of(all.begin(), all.end(), [&](const JsonFinding& other) {
-      return IsBelow(other.path, finding.path);
-    });
-    const bool reported =
-        std::any_of(deepest.begin(), deepest.end(),
-                    [&](const JsonFinding& other) { return other.path == finding.path; });
-    if (!covered && !reported) deepest.push_back(finding);
-  }
-  return deepest;
+  return {{.path = deepest, .message = "does not fit the schema", .hint = {}}};
 }
 
 Vec3 VectorAt(const Value& v) {

@@ -2,10 +2,12 @@
 
 #include <fmt/format.h>
 #include <Eigen/Dense>
+#include <initializer_list>
 #include <iterator>
 
 #include "base/json_document.h"
 #include "base/json_text.h"
+#include "base/text.h"
 
 namespace mbv {
 namespace {
@@ -15,6 +17,11 @@ std::vector<std::string> DrivenNames(const Mechanism& mechanism) {
   for (const Drive& drive : mechanism.drives) names.push_back(drive.name);
   for (const Prescribed& base : mechanism.prescribed) names.push_back(base.name);
   return names;
+}
+
+void AddHeadings(const std::string& name, std::initializer_list<const char*> quantities,
+                 std::string* text) {
+  for (const char* quantity : quantities) *text += "," + CsvCell(name + "." + quantity);
 }
 
 void AddNumbers(const Vec3& v, std::string* text) {
@@ -28,7 +35,7 @@ std::string MotionCsv(const Mechanism& mechanism, const HandedMotion& motion) {
   const auto commanded = [&](size_t k) { return motion.commanded.empty() || motion.commanded[k]; };
   std::string text = "time_s";
   for (size_t k = 0; k < names.size(); ++k) {
-    if (commanded(k)) text += fmt::format(",{0}.position,{0}.velocity,{0}.acceleration", names[k]);
+    if (commanded(k)) AddHeadings(names[k], {"position", "velocity", "acceleration"}, &text);
   }
   text += '\n';
   for (size_t i = 0; i < motion.time_s.size(); ++i) {
@@ -47,8 +54,8 @@ std::string MotionCsv(const Mechanism& mechanism, const HandedMotion& motion) {
 std::string ForcesCsv(const Mechanism& mechanism, const HandedMotion& motion) {
   std::string text = "time_s";
   for (const int drive : motion.forced) {
-    text += fmt::format(",{0}.force,{0}.force_rate,{0}.force_acceleration",
-                        mechanism.drives[static_cast<size_t>(drive)].name);
+    AddHeadings(mechanism.drives[static_cast<size_t>(drive)].name,
+                {"force", "force_rate", "force_acceleration"}, &text);
   }
   text += '\n';
   for (size_t i = 0; i < motion.forces.size(); ++i) {
@@ -64,7 +71,7 @@ std::string ForcesCsv(const Mechanism& mechanism, const HandedMotion& motion) {
 std::string StartCsv(const Mechanism& mechanism, const BodyStates& start) {
   std::string text = "body,px,py,pz,R11,R12,R13,R21,R22,R23,R31,R32,R33,wx,wy,wz,vx,vy,vz\n";
   for (size_t b = 0; b < mechanism.bodies.size(); ++b) {
-    text += mechanism.bodies[b].name;
+    text += CsvCell(mechanism.bodies[b].name);
     AddNumbers(start.X_WB[b].translation(), &text);
     for (int r = 0; r < 3; ++r) AddNumbers(start.X_WB[b].linear().row(r).transpose(), &text);
     AddNumbers(start.V_WB[b].head<3>(), &text);
@@ -80,7 +87,7 @@ std::string LoadsCsv(const Mechanism& mechanism, const HandedMotion& motion) {
     for (size_t k = 0; k < motion.loads[i].size(); ++k) {
       const LoadSample& load = motion.loads[i][k];
       text += fmt::format("{:.17g},{},{}", motion.time_s[i], k,
-                          mechanism.bodies[static_cast<size_t>(load.body)].name);
+                          CsvCell(mechanism.bodies[static_cast<size_t>(load.body)].name));
       AddNumbers(load.p_BoQ_B, &text);
       text += load.in_body_axes ? ",body" : ",world";
       AddNumbers(load.force, &text);

@@ -87,6 +87,10 @@ class TraceReader {
 
  private:
   std::string ReadHeading(const TableText& text, Trace* trace) {
+    // Without times it is a file of something else, and not quoted.
+    if (std::ranges::none_of(text.headings, [](const auto& each) { return each.full == kTime; })) {
+      return "traces.csv has no column time_s";
+    }
     std::vector<Channel> channels;
     for (const TableHeading& heading : text.headings) {
       if (heading.full == kTime && time_column_ < 0) {
@@ -103,7 +107,6 @@ class TraceReader {
       if (twice) return fmt::format("traces.csv has two columns '{}'", heading.full);
       channels.push_back(*found);
     }
-    if (time_column_ < 0) return "traces.csv has no column time_s";
     trace->Reset(times_s_, std::move(channels));
     return "";
   }

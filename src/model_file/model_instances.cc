@@ -86,6 +86,9 @@ void ParameterReader::OpenFiles(YamlReader* yaml, const YamlNode& root,
     others_.Append(file.yaml.diagnostics());
     return;
   }
+  if (file.root->Find("parameters") == nullptr && file.root->Find("parameters_from") == nullptr) {
+    file.yaml.RefuseForeign(*file.root, "the file is of another kind: it has no 'parameters'", "");
+  }
   std::vector<std::string> longer = chain;
   longer.push_back(canonical);
   OpenFiles(&file.yaml, *file.root, longer, files);

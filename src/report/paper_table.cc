@@ -2,20 +2,24 @@
 
 #include <algorithm>
 #include <string_view>
-#include <utility>
 
 #include "base/markup.h"
+#include "base/names.h"
 
 namespace mbv {
 namespace {
 
-using Replacement = std::pair<char, std::string_view>;
-
-constexpr Replacement kMarkdownTexts[] = {
-    {'\\', "\\\\"}, {'|', "\\|"}, {'*', "\\*"},  {'_', "\\_"},  {'`', "\\`"},
-    {'[', "\\["},   {']', "\\]"}, {'<', "&lt;"}, {'>', "&gt;"}, {'&', "&amp;"},
-    {'\n', " "},    {'\r', " "},  {'\t', " "},
-};
+// What LaTeX takes in a label.
+std::string Label(std::string name) {
+  std::ranges::replace_if(
+      name,
+      [](char c) {
+        return !(IsName(std::string("a") + c) ||
+                 std::string_view("-:.+").find(c) != std::string_view::npos);
+      },
+      '-');
+  return "tab:" + name;
+}
 
 const std::string& CellOf(const std::vector<std::string>& row, size_t column) {
   static const std::string none;
@@ -47,8 +51,9 @@ struct LatexFrame {
 LatexFrame OnOnePage(const PaperTable& table, const std::string& columns,
                      const std::string& titles) {
   return {"% needs \\usepackage{booktabs}\n\\begin{table}\n  \\centering\n  \\caption{" +
-              TexText(table.caption) + "}\n  \\label{tab:" + table.name + "}\n  \\begin{tabular}{" +
-              columns + "}\n    \\toprule\n" + titles + "    \\midrule\n",
+              TexText(table.caption) + "}\n  \\label{" + Label(table.name) +
+              "}\n  \\begin{tabular}{" + columns + "}\n    \\toprule\n" + titles +
+              "    \\midrule\n",
           "    \\bottomrule\n  \\end{tabular}\n\\end{table}\n"};
 }
 
@@ -59,8 +64,8 @@ LatexFrame OverPages(const PaperTable& table, const std::string& columns,
   return {
       "% needs \\usepackage{booktabs,longtable}, and a page of one column\n"
       "\\begin{longtable}{" +
-          columns + "}\n    \\caption{" + TexText(table.caption) + "}\n    \\label{tab:" +
-          table.name + "} \\\\\n" + head + "    \\endfirsthead\n    \\multicolumn{" + all +
+          columns + "}\n    \\caption{" + TexText(table.caption) + "}\n    \\label{" +
+          Label(table.name) + "} \\\\\n" + head + "    \\endfirsthead\n    \\multicolumn{" + all +
           "}{l}{Table \\thetable, continued} \\\\\n" + head +
           "    \\endhead\n    \\midrule\n    \\endfoot\n    \\bottomrule\n"
           "    \\endlastfoot\n",
@@ -68,15 +73,6 @@ LatexFrame OverPages(const PaperTable& table, const std::string& columns,
 }
 
 }  // namespace
-
-std::string MarkdownText(const std::string& text) {
-  std::string out;
-  for (const char c : text) {
-    const auto* row = std::ranges::find(kMarkdownTexts, c, &Replacement::first);
-    out += row != std::end(kMarkdownTexts) ? row->second : std::string_view(&c, 1);
-  }
-  return out;
-}
 
 std::string ToLatex(const PaperTable& table) {
   std::string columns;

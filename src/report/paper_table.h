@@ -23,8 +23,6 @@ struct PaperTable {
 /// has, a longtable that repeats its head (`\usepackage{longtable}`).
 [[nodiscard]] std::string ToLatex(const PaperTable& table);
 
-/// Text of a cell: '|' and what Markdown would take for its own escaped.
-[[nodiscard]] std::string MarkdownText(const std::string& text);
 [[nodiscard]] std::string ToMarkdown(const PaperTable& table);
 
 }  // namespace mbv

@@ -9,7 +9,10 @@
 namespace mbv {
 namespace {
 
-std::string Padded(const std::string& text, int width) {
+// A row stays one line, whatever its cells hold; cells may be painted.
+std::string Padded(std::string text, int width) {
+  std::ranges::replace_if(
+      text, [](char c) { return c == '\n' || c == '\r' || c == '\t'; }, ' ');
   return width < 0 ? fmt::format("{:<{}}", text, -width) : fmt::format("{:>{}}", text, width);
 }
 
@@ -189,6 +192,7 @@ std::string VerdictLine(const ResultView& view, const TableOptions& options) {
   for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
     line += "; caveat: " + caveat.text;
   }
+  std::ranges::replace(line, '\n', ' ');
   return line + "\n";
 }
 

@@ -31,5 +31,11 @@ TEST(DidYouMeanPath, CorrectsEveryFolderAndTheFile) {
   fs::remove_all(root);
 }
 
+TEST(DidYouMean, LongWordsHaveHintsToo) {
+  const std::string name(90, 'a');
+  EXPECT_EQ(DidYouMean(name + "x", {name, "b"}), "did you mean '" + name + "'?");
+  EXPECT_EQ(DidYouMean(std::string(20'000, 'a'), {name}), "");
+}
+
 }  // namespace
 }  // namespace mbv

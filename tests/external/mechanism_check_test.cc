@@ -111,5 +111,40 @@ TEST(MechanismCheck, TellsWhatIsBent) {
   EXPECT_NE(Findings("[]"), "");
 }
 
+// Whatever single value is taken out or is another, the finding is in words of ours.
+TEST(MechanismCheck, EveryRefusalHasAReasonAndNoLibrarysWords) {
+  const Edited written = Edited::parse(WrittenModel("four_bar"));
+  const Edited flat = written.flatten();
+  size_t refused = 0;
+  for (const auto& [pointer, value] : flat.items()) {
+    for (const Edited& other : {Edited("x"), Edited(-1.5), Edited(nullptr), Edited::array()}) {
+      Edited edited = written;
+      edited[Edited::json_pointer(pointer)] = other;
+      const std::string found = Findings(edited.dump());
+      refused += found.empty() ? 0 : 1;
+      for (const char* words :
+           {"does not fit the schema", "constraint", "validate", "schema node"}) {
+        EXPECT_EQ(found.find(words), std::string::npos) << pointer << " " << other << "\n" << found;
+      }
+    }
+  }
+  EXPECT_GT(refused, flat.size());
+  Edited edited = written;
+  edited["bodies"][1]["mass"] = -2;
+  edited["joints"][0]["axes"] = 1;
+  edited["joints"][0]["kind"] = "revolut";
+  edited["gravity"] = {0, "x"};
+  edited["bodies"][2].erase("mass");
+  const std::string found = Findings(edited.dump());
+  for (const char* part :
+       {"bodies[1].mass: is -2, at least 0 is needed",
+        "joints[0]: has the unknown key 'axes' (did you mean 'axis'?)",
+        "joints[0].kind: is \"revolut\", not one of:", "(did you mean 'revolute'?)",
+        "gravity: has 2 entries, needed: 3", "gravity[1]: is a text where a number is needed",
+        "bodies[2]: has no 'mass'"}) {
+    EXPECT_NE(found.find(part), std::string::npos) << part << "\n" << found;
+  }
+}
+
 }  // namespace
 }  // namespace mbv

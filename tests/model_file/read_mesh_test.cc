@@ -7,7 +7,9 @@
 
 #include <array>
 #include <chrono>
+#include <cmath>
 #include <cstdlib>
+#include <tuple>
 
 #include "base/inputs.h"
 #include "model_file/mesh/mass_properties.h"
@@ -135,6 +137,79 @@ TEST(ReadMesh, CountsThatTheFileCannotHoldAreRefusedAtOnce) {
   const MeshText solid = ReadMeshBytes(ply("binary_little_endian", counts, binary), ".ply");
   EXPECT_EQ(solid.trouble, "");
   EXPECT_NEAR(SolidShape(solid.surface).amount, 1.0 / 6, 1e-6);
+}
+
+// What a small file may ask for, in each format: without an end, with the square of its length, or
+// more memory than it can need. The bounds are counts, so that no time is measured.
+TEST(ReadMesh, SmallFilesThatAskForMuchAreRefused) {
+  const test::TestFolder folder("read_mesh_much");
+  const std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\nproperty float "
+      "z\n"
+      "element face 2\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n1 0 0\n0 1 0\n";
+  const std::string dae = Dae("", "Z_UP");
+  const auto in_dae = [&](const std::string& from, const std::string& to) {
+    std::string changed = dae;
+    return changed.replace(changed.find(from), from.size(), to);
+  };
+  std::string polygon, corners;
+  for (int k = 0; k < 16'000; ++k) {
+    polygon += fmt::format("v {} {} 0\n", std::cos(k * 3.9e-4), std::sin(k * 3.9e-4));
+    corners += fmt::format(" {}", k + 1);
+  }
+  // Each node has ten times the one below it.
+  std::string nodes;
+  for (int k = 0; k < 12; ++k) {
+    nodes += fmt::format("<node id=\"x{}\">", k);
+    for (int i = 0; i < 10; ++i) nodes += fmt::format("<instance_node url=\"#x{}\"/>", k + 1);
+    nodes += "</node>";
+  }
+  nodes += "<node id=\"x12\"><instance_geometry url=\"#g\"/></node>";
+  std::string laughs =
+      in_dae("<library_visual_scenes>",
+             "<library_nodes>" + nodes + "</library_nodes><library_visual_scenes>");
+  const std::string placed = "0 0 500</translate><instance_geometry url=\"#g\"/>";
+  laughs.replace(laughs.find(placed), placed.size(),
+                 "0 0 500</translate><instance_node url=\"#x0\"/>");
+  const std::vector<std::tuple<std::string, std::string, std::string>> files = {
+      // A vertex is missing, and the library takes what follows for faces.
+      {"list.ply", text + "3 0 1 2\n3000000000000 1 2 3\n", "promises more"},
+      {"lines.ply", text + "0 1 1\n\n3 0 1 2\n3000000000000 1 2 3\n", "promises more"},
+      {"polygon.ply", text + "0 0 1\n3 0 1 2\n20000" + corners + "\n", "promises"},
+      {"word.dae", in_dae("<p>0 2 1", "<p>0 T 1"), "something else"},
+      {"part.dae", in_dae("<p>0 2 1", "<p>0 0.999 1"), "something else"},
+      {"data.dae", in_dae("<p>0 2 1", "<p><![CDATA[T]]>0 2 1"), "something else"},
+      {"vcount.dae",
+       in_dae("<triangles count=\"4\">", "<polylist count=\"4\"><vcount>3 a</vcount>"),
+       "something else"},
+      {"nodes.dae", laughs, "damaged|more memory"},
+      {"polygon.obj", polygon + "f" + corners + "\n", "16000 corners"},
+      {"index.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 2000000000\n", "damaged|not there"},
+      {"count.stl", std::string(80, 'x') + "\xff\xff\xff\x7f" + std::string(100, '\0'), "damaged"}};
+  for (const auto& [name, bytes, why] : files) {
+    const MeshFile mesh = ReadMeshFiles({folder.Write(name, bytes)})[0];
+    EXPECT_EQ(mesh.surface, nullptr) << name;
+    EXPECT_THAT(mesh.trouble, testing::ContainsRegex(why)) << name;
+    EXPECT_LT(bytes.size(), 800'000U) << name;
+  }
+}
+
+// The library compares each name of an OBJ file with all others, and a part was looked for in all
+// vertices: what does not make the surface is not read, and parts share one list.
+TEST(ReadMesh, NamesOfObjFilesAreNotRead) {
+  const test::TestFolder folder("read_mesh_names");
+  std::string obj = "mtllib " + folder.Write("secret.mtl", "newmtl a\n") + "\n";
+  for (int k = 0; k < 20'000; ++k) {
+    obj += fmt::format(
+        "o a{0}\ng b{0}\nusemtl c{0} \\\n d\nv 0 0 {0}\nv 1 0 {0}\nv 0 1 {0}\nf {1} {2} {3}\n", k,
+        3 * k + 1, 3 * k + 2, 3 * k + 3);
+  }
+  const MeshText mesh = ReadMeshBytes(obj, ".obj");
+  EXPECT_EQ(mesh.trouble, "");
+  EXPECT_EQ(mesh.surface.triangles.size(), 20'000U);
+  EXPECT_EQ(mesh.surface.vertices.size(), 60'000U);
+  EXPECT_EQ(PartsOf(mesh.surface).size(), 20'000U);
+  EXPECT_EQ(PartsOf(mesh.surface)[7].vertices.size(), 3U);
 }
 
 TEST(ReadMesh, FilesAreReadOnceAndAreInputs) {

@@ -8,6 +8,7 @@
 #include <memory>
 
 #include "base/json_text.h"
+#include "base/markup.h"
 #include "base/text.h"
 #include "cli/cli.h"
 #include "cli/files.h"
@@ -91,12 +92,12 @@ std::string MarkdownTable(const Rows& rows,
   const std::vector<std::string> engines = Distinct(rows, &EngineOf);
   std::string text = "| scenario |", line = "|---|";
   for (const std::string& engine : engines) {
-    text += fmt::format(" {} |", engine);
+    text += fmt::format(" {} |", MarkdownText(engine));
     line += "---|";
   }
   text += "\n" + line + "\n";
   for (const std::string& scenario : Distinct(rows, &CaseOf)) {
-    text += fmt::format("| `{}` |", scenario);
+    text += fmt::format("| {} |", MarkdownCode(scenario));
     for (const std::string& engine : engines) {
       const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& row) {
         return CaseOf(row) == scenario && row.engine == engine;
@@ -149,7 +150,7 @@ std::string ToText(const Rows& rows) {
         {CaseOf(row), "  " + EngineAndProgram(row), NumberOrDash(row.force_nrmse, "{:.1e}"),
          NumberOrDash(row.pose_m, "{:.1e} m"), NumberOrDash(row.loop_gap_m, "{:.1e} m"),
          NumberOrDash(row.sample_us, "{:.3g} us")});
-    text += (row.why.empty() ? "" : "  " + row.why) + "\n";
+    text += (row.why.empty() ? "" : "  " + OneLine(row.why)) + "\n";
   }
   return text;
 }

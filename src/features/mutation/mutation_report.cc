@@ -6,18 +6,12 @@
 
 #include "base/json_document.h"
 #include "base/json_text.h"
+#include "base/markup.h"
+#include "base/text.h"
 #include "report/text_table.h"
 
 namespace mbv {
 namespace {
-
-// "|" would end a cell of a Markdown table.
-std::string InCell(std::string text) {
-  for (size_t at = 0; (at = text.find('|', at)) != std::string::npos; at += 2) {
-    text.insert(at, "\\");
-  }
-  return text;
-}
 
 // By smallest error where it is known, else by the force change.
 double Rank(const Detection& s) {
@@ -75,9 +69,9 @@ std::string Row(const Mutation& m, bool inverse, bool markdown) {
   const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
   const std::string by_inverse = NumberCell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
   if (markdown) {
-    return fmt::format("| `{}` | {:g} {} | {} | {} | {} | {}{} |\n", m.name, m.value, m.unit,
-                       SeenText(m.own), change, smallest, inverse ? by_inverse + " | " : "",
-                       InCell(NoteOf(m)));
+    return fmt::format("| {} | {:g} {} | {} | {} | {} | {}{} |\n", MarkdownCode(m.name), m.value,
+                       MarkdownText(m.unit), SeenText(m.own), change, smallest,
+                       inverse ? by_inverse + " | " : "", MarkdownText(NoteOf(m)));
   }
   std::vector<std::string> cells = {
       m.name, fmt::format("{:g}", m.value), " " + m.unit, SeenText(m.own), change, smallest};
@@ -99,8 +93,8 @@ std::string Row(const FaultResult& f, bool inverse, bool markdown) {
   }
   const std::string where = f.where + (f.alike > 0 ? fmt::format(" (and {} alike)", f.alike) : "");
   if (markdown) {
-    return fmt::format("| {} | {} | {} | {}{} |\n", f.kind, where, seen,
-                       inverse ? by_inverse + " | " : "", InCell(note));
+    return fmt::format("| {} | {} | {} | {}{} |\n", MarkdownText(f.kind), MarkdownText(where), seen,
+                       inverse ? by_inverse + " | " : "", MarkdownText(note));
   }
   std::vector<std::string> cells = {f.kind, where, seen};
   if (inverse) cells.push_back(by_inverse);
@@ -118,7 +112,7 @@ std::string IdleText(const MutationReport& report, bool markdown) {
   size_t count = 0;
   for (const Mutation& m : report.mutations) {
     if (!IsIdle(m)) continue;
-    names += (count++ == 0 ? "" : ", ") + (markdown ? "`" + m.name + "`" : m.name);
+    names += (count++ == 0 ? "" : ", ") + (markdown ? MarkdownCode(m.name) : OneLine(m.name));
   }
   if (count == 0) return "";
   return fmt::format("\n{}Numbers of instances that change no drive force ({}): {}.\n",
@@ -137,7 +131,7 @@ std::string CountText(const MutationReport& report) {
   return text;
 }
 
-std::string Head(const MutationReport& report, bool inverse) {
+std::string Head(const MutationReport& report, bool inverse, bool markdown) {
   const auto count = [&](auto predicate) {
     return std::count_if(report.mutations.begin(), report.mutations.end(), predicate);
   };
@@ -146,8 +140,8 @@ std::string Head(const MutationReport& report, bool inverse) {
   std::string text = fmt::format(
       "{}: {} of {} numbers ({}), each {:g} % too large and too small on the simulated side, turn "
       "the verdict in {} mode; {} of them by the drive forces",
-      report.scenario, seen, report.mutations.size(), CountText(report), 100 * report.size,
-      report.mode, by_force);
+      markdown ? MarkdownText(report.scenario) : OneLine(report.scenario), seen,
+      report.mutations.size(), CountText(report), 100 * report.size, report.mode, by_force);
   if (inverse) {
     text += fmt::format("; {} do in inverse mode",
                         count([](const Mutation& m) { return m.inverse && m.inverse->detected; }));
@@ -192,7 +186,7 @@ void SortBySensitivity(MutationReport* report) {
 
 std::string ToText(const MutationReport& report, bool markdown) {
   const bool inverse = HasInverse(report);
-  std::string text = Head(report, inverse) + NumberHead(report, inverse, markdown);
+  std::string text = Head(report, inverse, markdown) + NumberHead(report, inverse, markdown);
   for (const Mutation& m : report.mutations) {
     if (!IsIdle(m)) text += Row(m, inverse, markdown);
   }

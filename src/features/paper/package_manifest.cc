@@ -8,6 +8,7 @@
 
 #include "base/json_document.h"
 #include "base/json_text.h"
+#include "base/markup.h"
 #include "base/names.h"
 #include "base/text.h"
 
@@ -155,22 +156,24 @@ std::string CrateJson(const PackageDescription& package) {
 }
 
 std::string PackageReadme(const PackageDescription& package) {
-  std::string text = "# " + NameOf(package) + "\n\n";
+  std::string text = "# " + MarkdownText(NameOf(package)) + "\n\n";
   text += fmt::format(
       "Written by mbverify {}. `mbverify verify` with the archive runs everything again and "
       "compares;"
       " in this folder a single result is repeated by its command.\n\n",
-      VersionOf(package, "mbverify"));
+      MarkdownText(VersionOf(package, "mbverify")));
   text += "| scenario | verdict | command | results |\n|---|---|---|---|\n";
   for (const PackedScenario& scenario : package.scenarios) {
-    text += fmt::format("| `{}` | {} (exit code {}) | `{}` | `{}/` |\n", scenario.file,
-                        scenario.verdict, scenario.exit_code, RerunCommand(package, scenario),
-                        scenario.results);
+    text += fmt::format("| {} | {} (exit code {}) | {} | {} |\n", MarkdownCode(scenario.file),
+                        MarkdownText(scenario.verdict), scenario.exit_code,
+                        MarkdownCode(RerunCommand(package, scenario)),
+                        MarkdownCode(scenario.results + "/"));
   }
   text += "\n";
   for (const PackedScenario& scenario : package.scenarios) {
-    text += fmt::format("* `{}`: {}{}{}\n", scenario.file, scenario.description,
-                        scenario.description.empty() ? "" : ". ", scenario.reason);
+    text += fmt::format("* {}: {}{}{}\n", MarkdownCode(scenario.file),
+                        MarkdownText(scenario.description),
+                        scenario.description.empty() ? "" : ". ", MarkdownText(scenario.reason));
   }
   text +=
       "\n| folder or file | holds |\n|---|---|\n| `inputs/` | scenarios, models and what they "
@@ -183,12 +186,13 @@ std::string PackageReadme(const PackageDescription& package) {
   text +=
       "| `manifest.json` | what was run, and the SHA-256 of every file |\n"
       "| `ro-crate-metadata.json` | the same as RO-Crate 1.1 |\n\n";
-  text += package.license.empty() ? "The models state no licence.\n"
-                                  : fmt::format("Licence of the models: {}.\n", package.license);
+  text += package.license.empty()
+              ? "The models state no licence.\n"
+              : fmt::format("Licence of the models: {}.\n", MarkdownText(package.license));
   text += "\nVersions:";
   for (const auto& [name, version] : package.versions) {
-    text +=
-        fmt::format("{} {} {}", &name == &package.versions.front().first ? "" : ",", name, version);
+    text += fmt::format("{} {} {}", &name == &package.versions.front().first ? "" : ",",
+                        MarkdownText(name), MarkdownText(version));
   }
   return text + ".\n";
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <filesystem>
 
+#include "base/markup.h"
 #include "base/text.h"
 #include "features/paper/compose.h"
 #include "features/paper/from_plot.h"
@@ -526,15 +527,16 @@ paper gives none.
 std::string AuditText(const PaperResult& result) {
   if (result.audit.empty()) return "";
   std::string text;
-  for (const std::string& row : result.audit) text += (text.empty() ? "`" : ", `") + row + "`";
+  for (const std::string& row : result.audit)
+    text += (text.empty() ? "" : ", ") + MarkdownCode(row);
   return " Equation audit (`docs/results/equation_audit.md`): " + text + ".";
 }
 
 std::string EntryText(const PaperOutcome& paper, const PaperResult& result) {
-  std::string text = fmt::format("### {}: {}\n\n", result.name, result.title);
+  std::string text = fmt::format("### {}: {}\n\n", result.name, MarkdownText(result.title));
   if (result.table.empty()) {
-    text += fmt::format("![{}](../pictures/paper_{}_{}.png)\n\n", result.title, paper.model,
-                        result.name);
+    text += fmt::format("![{}](../pictures/paper_{}_{}.png)\n\n", MarkdownText(result.title),
+                        paper.model, result.name);
   } else {
     text += result.table + "\n";
   }
@@ -561,7 +563,7 @@ std::string PaperPage(const std::vector<PaperOutcome>& papers) {
     text += "\n### Not computed\n\n";
     for (const auto& [name, why] : paper.left_out) text += fmt::format("* {}: {}\n", name, why);
   }
-  return text;
+  return ForTerminal(text);  // sentences of paper.yaml are Markdown, without marks that mislead
 }
 
 }  // namespace mbv

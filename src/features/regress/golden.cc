@@ -11,6 +11,7 @@
 
 #include "base/demand.h"
 #include "base/roles.h"
+#include "scenario/tables/text.h"
 
 namespace mbv {
 namespace {
@@ -32,12 +33,10 @@ GoldenColumn ColumnOf(std::string_view name) {
 }
 
 std::vector<GoldenColumn> ReadHeader(std::string_view line) {
+  CutLine cut;
+  CutCells(line, ',', &cut);  // names with commas are in quotes
   std::vector<GoldenColumn> columns;
-  for (size_t at = 0; at <= line.size();) {
-    const size_t comma = std::min(line.find(',', at), line.size());
-    columns.push_back(ColumnOf(line.substr(at, comma - at)));
-    at = comma + 1;
-  }
+  for (const TableCell& cell : cut.cells) columns.push_back(ColumnOf(cell.text));
   return columns;
 }
 

@@ -499,9 +499,9 @@ std::string Value(double value) { return std::isnan(value) ? "-" : fmt::format("
 std::string RunLine(Database* database, long run) {
   Statement select(database, "SELECT started_utc, label, program FROM run WHERE id = ?");
   if (!select.Bind(run).Step()) return "";
-  const std::string label = select.Text(1);
-  return fmt::format("run {}: {}{}, {}\n", run, select.Text(0), label.empty() ? "" : ", " + label,
-                     select.Text(2));
+  const std::string label = OneLine(select.Text(1));
+  return fmt::format("run {}: {}{}, {}\n", run, OneLine(select.Text(0)),
+                     label.empty() ? "" : ", " + label, OneLine(select.Text(2)));
 }
 
 std::string CompareRow(Database* database, const std::string& key, const HistoryRow& a,
@@ -511,12 +511,12 @@ std::string CompareRow(Database* database, const std::string& key, const History
   const double ratio = b.key_value / a.key_value;
   const bool same =
       a.status == b.status && moved.empty() && (a.key_value == b.key_value || std::isnan(ratio));
-  std::string line = fmt::format("  {:<52}{:>10} → {:<10}{:>7.1f} s → {:.1f} s", key,
+  std::string line = fmt::format("  {:<52}{:>10} → {:<10}{:>7.1f} s → {:.1f} s", OneLine(key),
                                  Value(a.key_value), Value(b.key_value), a.wall_s, b.wall_s);
   if (same) return line + "  same\n";
-  if (a.status != b.status) line += fmt::format("  {} → {}", a.status, b.status);
+  if (a.status != b.status) line += fmt::format("  {} → {}", OneLine(a.status), OneLine(b.status));
   if (std::isfinite(ratio) && ratio != 1.0) line += fmt::format("  ×{:.3g}", ratio);
-  if (!moved.empty()) line += "  " + moved;
+  if (!moved.empty()) line += "  " + OneLine(moved);
   return line + "\n";
 }
 
@@ -568,11 +568,11 @@ HistoryText ListRuns(const std::string& path) {
                     {"program", select.Text(10)},
                     {"shard", shard}});
     text += fmt::format("{:>5}  {:<20}  {:>9}  {:>4}  {:>8}  {:>8}  {:>7}  {:>8.1f}  {}{}{}\n",
-                        select.Integer(0), select.Text(1),
+                        select.Integer(0), OneLine(select.Text(1)),
                         fmt::format("{}/{}", select.Integer(2), select.Integer(3)),
                         select.Integer(4), select.Integer(5), select.Integer(6), select.Integer(7),
-                        select.Real(8), label.empty() ? "" : label + ", ", select.Text(10),
-                        shard.empty() ? "" : ", shard " + shard);
+                        select.Real(8), label.empty() ? "" : OneLine(label) + ", ",
+                        OneLine(select.Text(10)), shard.empty() ? "" : ", shard " + OneLine(shard));
   }
   return {text, database.trouble(), Dump({{"runs", std::move(runs)}})};
 }
@@ -593,12 +593,12 @@ HistoryText CompareRuns(const std::string& path, const std::string& run_a,
     const auto before = rows_a.find(key);
     scenarios.push_back(
         ComparedJson(&database, key, before == rows_a.end() ? nullptr : &before->second, &row));
-    text += before == rows_a.end() ? fmt::format("  {:<52}  only in run {}\n", key, b)
+    text += before == rows_a.end() ? fmt::format("  {:<52}  only in run {}\n", OneLine(key), b)
                                    : CompareRow(&database, key, before->second, row);
   }
   for (const auto& [key, row] : rows_a) {
     if (rows_b.contains(key)) continue;
-    text += fmt::format("  {:<52}  only in run {}\n", key, a);
+    text += fmt::format("  {:<52}  only in run {}\n", OneLine(key), a);
     scenarios.push_back(ComparedJson(&database, key, &row, nullptr));
   }
   return {text, database.trouble(),

@@ -80,7 +80,7 @@ std::string RowId(const CaseResult& result) {
 
 std::string ListOf(const std::vector<std::string>& texts) {
   std::string html;
-  for (const std::string& text : texts) html += "<li>" + EscapeXml(text) + "</li>";
+  for (const std::string& text : texts) html += "<li>" + EscapeMarkup(text) + "</li>";
   return html.empty() ? "" : "<ul>" + html + "</ul>";
 }
 
@@ -88,29 +88,29 @@ std::string ListOf(const std::vector<std::string>& texts) {
 std::string Notes(const CaseResult& result) {
   std::string text;
   if (result.failed()) {
-    text += "<p class=\"bad\">" + EscapeXml(result.reason) + "</p>" +
+    text += "<p class=\"bad\">" + EscapeMarkup(result.reason) + "</p>" +
             ListOf(FailureTexts(result, kChecksOfARow));
   }
   if (!result.drifts.empty()) {
-    text += "<p class=\"warn\">" + EscapeXml(DriftLine(result)) + "</p>";
+    text += "<p class=\"warn\">" + EscapeMarkup(DriftLine(result)) + "</p>";
   }
   if (!result.failed() && !result.verified) {
-    text += "<p class=\"soft\">" + EscapeXml(result.reason) + "</p>";
+    text += "<p class=\"soft\">" + EscapeMarkup(result.reason) + "</p>";
   }
   for (const std::string& caveat : result.caveats) {
-    text += "<p class=\"warn\">caveat: " + EscapeXml(caveat) + "</p>";
+    text += "<p class=\"warn\">caveat: " + EscapeMarkup(caveat) + "</p>";
   }
   if (!result.not_compared.empty()) {
     text +=
         fmt::format("<details><summary>{} not compared</summary><ul>", result.not_compared.size());
     for (const Unmeasured& item : result.not_compared) {
-      text += "<li>" + EscapeXml(item.what) + ": " + EscapeXml(item.why) + "</li>";
+      text += "<li>" + EscapeMarkup(item.what) + ": " + EscapeMarkup(item.why) + "</li>";
     }
     text += "</ul></details>";
   }
   if (!result.log_tail.empty()) {
     text += "<details><summary>last output</summary><pre tabindex=\"0\">" +
-            EscapeXml(result.log_tail) + "</pre></details>";
+            EscapeMarkup(result.log_tail) + "</pre></details>";
   }
   return text;
 }
@@ -131,14 +131,14 @@ std::string Row(const CaseResult& result, const std::string& thumbnail, size_t s
                                   : fmt::format(
                                         "<img src=\"{}\" alt=\"Mechanism at the first snapshot\" "
                                         "loading=\"lazy\">",
-                                        EscapeXml(thumbnail));
+                                        EscapeMarkup(thumbnail));
   std::string row = fmt::format(
-      "<tr id=\"{}\" data-kind=\"{}\"{}><td class=\"picture\">{}</td>", EscapeXml(RowId(result)),
+      "<tr id=\"{}\" data-kind=\"{}\"{}><td class=\"picture\">{}</td>", EscapeMarkup(RowId(result)),
       KindOf(result), result.expected.verdict == "agree" ? "" : " data-must-fail", picture);
   row += fmt::format("<th scope=\"row\">{}<br><span class=\"soft\">{}</span><br>{}</th>",
-                     EscapeXml(result.key), EscapeXml(result.description), Links(result));
+                     EscapeMarkup(result.key), EscapeMarkup(result.description), Links(result));
   row += fmt::format("<td class=\"word {}\" data-sort=\"{}\">{}</td>", KindOf(result), severity,
-                     EscapeXml(WordOf(result)));
+                     EscapeMarkup(WordOf(result)));
   row += fmt::format("<td class=\"n\" data-label=\"error\" data-sort=\"{}\">{}</td>",
                      key == nullptr || !std::isfinite(key->second.value)
                          ? ""
@@ -181,19 +181,19 @@ std::string Framed(const char* kind, const char* id, const std::string& title,
 std::string Boxes(const RegressReport& report, const std::vector<const CaseResult*>& cases) {
   std::vector<std::string> failed, missing, drifted;
   for (const CaseResult* result : cases) {
-    const std::string link =
-        fmt::format("<a href=\"#{}\">{}</a>", EscapeXml(RowId(*result)), EscapeXml(result->key));
+    const std::string link = fmt::format("<a href=\"#{}\">{}</a>", EscapeMarkup(RowId(*result)),
+                                         EscapeMarkup(result->key));
     if (result->failed()) {
       failed.push_back(fmt::format("{} <span class=\"word bad\">{}</span>: {}{}", link,
-                                   EscapeXml(WordOf(*result)), EscapeXml(result->reason),
+                                   EscapeMarkup(WordOf(*result)), EscapeMarkup(result->reason),
                                    ListOf(FailureTexts(*result, kChecksOfACase))));
     } else if (!result->drifts.empty()) {
-      drifted.push_back(link + ": " + EscapeXml(DriftLine(*result)));
+      drifted.push_back(link + ": " + EscapeMarkup(DriftLine(*result)));
     }
   }
   for (const MissingCase& item : report.missing) {
     missing.push_back(
-        fmt::format("<b>{}</b>: {}", EscapeXml(item.key), EscapeXml(MissingText(item))));
+        fmt::format("<b>{}</b>: {}", EscapeMarkup(item.key), EscapeMarkup(MissingText(item))));
   }
   return Framed("bad", "failed", "not as expected", failed) +
          Framed(report.fail_on_missing ? "bad" : "warn", "missing", "missing", missing) +
@@ -207,13 +207,14 @@ std::string Head(const RegressReport& report) {
       fmt::format("<h1>Regression: <span class=\"{}\">{}</span></h1>\n<p class=\"counts\">{}</p>\n",
                   code == 0 ? "good" : "bad", code == 0 ? "all as expected" : "not as expected",
                   CountsText(CountCases(report)));
-  text += fmt::format("<p class=\"soft\">{}{}{}{}, started {}, {:.1f} s with {} worker{}</p>\n",
-                      run.id == 0 ? "" : fmt::format("run {}, ", run.id),
-                      run.label.empty() ? "" : EscapeXml(run.label) + ", ", EscapeXml(run.program),
-                      run.shard.empty() ? "" : ", shard " + EscapeXml(run.shard),
-                      EscapeXml(run.started_utc), run.wall_s, run.jobs, run.jobs == 1 ? "" : "s");
+  text += fmt::format(
+      "<p class=\"soft\">{}{}{}{}, started {}, {:.1f} s with {} worker{}</p>\n",
+      run.id == 0 ? "" : fmt::format("run {}, ", run.id),
+      run.label.empty() ? "" : EscapeMarkup(run.label) + ", ", EscapeMarkup(run.program),
+      run.shard.empty() ? "" : ", shard " + EscapeMarkup(run.shard), EscapeMarkup(run.started_utc),
+      run.wall_s, run.jobs, run.jobs == 1 ? "" : "s");
   for (const std::string& note : report.notes) {
-    text += "<p class=\"warn\">" + EscapeXml(note) + "</p>\n";
+    text += "<p class=\"warn\">" + EscapeMarkup(note) + "</p>\n";
   }
   return text;
 }
@@ -250,7 +251,7 @@ std::string ToIndexHtml(const RegressReport& report,
       "<meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; img-src data:; "
       "style-src {}; script-src {}\">"
       "<title>mbverify regression {}: {}</title><style>{}</style></head><body>\n",
-      CspHash(IndexStyle()), CspHash(IndexScript()), EscapeXml(report.run.started_utc),
+      CspHash(IndexStyle()), CspHash(IndexScript()), EscapeMarkup(report.run.started_utc),
       ExitCodeOf(report) == 0 ? "all as expected" : "not as expected", IndexStyle());
   html += kIndexMain + Head(report) + Boxes(report, cases) + kControls;
   for (size_t i = 0; i < cases.size(); ++i) {

@@ -11,7 +11,7 @@
 #include <map>
 
 #include "base/files.h"
-#include "base/json_text.h"
+#include "base/json_document.h"
 #include "base/worker_pool.h"
 #include "features/regress/history.h"
 #include "features/regress/run_folder.h"
@@ -230,7 +230,11 @@ class Run {
     CaseResult result = JudgeCase(file, end, options_.timeout_s, output, summary);
     result.fingerprint = FingerprintOf(file);
     if (staged) {
-      AddInputs(ReadWholeFile(*staged / "inputs.json").value_or(""), &result);
+      const auto inputs = ReadWholeFile(*staged / "inputs.json");
+      const std::string damage = inputs ? AddInputs(*inputs, &result) : "";
+      if (!damage.empty()) {
+        report().notes.push_back(fmt::format("{}: inputs.json: {}", file.key, damage));
+      }
       result.has_report = fs::exists(*staged / "report.html");
       const std::string trouble = folder_.Publish(*staged, file.key);
       result.has_folder = trouble.empty();
@@ -273,34 +277,35 @@ RegressOutcome Regress(const RegressOptions& options, const RegressProgress& pro
 
 namespace {
 
-using Json = nlohmann::ordered_json;
-
 constexpr int kTailLines = 12;       // of a log that a failure shows
 constexpr int kSearchedLines = 200;  // of a log, from its end: what went wrong is said there
 
-std::string Word(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_string() ? found->get<std::string>() : "";
+bool States(const JsonValue& json, const char* key) {
+  return json.contains(key) && !json.at(key).is_null();
 }
 
-double Number(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() && found->is_number() ? found->get<double>() : kNan;
+// "" where it is left out.
+std::string Word(const JsonValue& json, const char* key) {
+  return States(json, key) ? json.at(key).get<std::string>() : "";
 }
 
-Json Part(const Json& json, const char* key) {
-  const auto found = json.find(key);
-  return found != json.end() ? *found : Json();
+// NaN where it is left out.
+double Number(const JsonValue& json, const char* key) {
+  return json.contains(key) ? json.at(key).NumberOrNan() : kNan;
+}
+
+std::vector<JsonValue> List(const JsonValue& json, const char* key) {
+  return States(json, key) ? json.at(key).list() : std::vector<JsonValue>();
 }
 
 struct SummaryText {
   std::string reason;
   std::string culprits;  ///< failed checks and where witnesses broke down, one per line
   bool judged = true;    ///< anything was asked; a study may ask nothing
+  std::string damage;    ///< why it is none of ours
 };
 
-// What a summary.json says; throws where it is none of ours.
-SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
+SummaryText SummaryOf(const JsonValue& json, CaseResult* result) {
   SummaryText words;
   words.reason = Word(json, "reason");
   words.judged = json.value("judged", true);
@@ -308,13 +313,13 @@ SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
     result->verdict = verdict;
   }
   if (result->description.empty()) result->description = Word(json, "description");
-  for (const Json& witness : Part(json, "witnesses")) {
+  for (const JsonValue& witness : List(json, "witnesses")) {
     result->ran = result->ran || witness.value("ran", false);
     words.culprits += "\n" + Word(witness, "where");
   }
-  result->compared = Number(Part(json, "counts"), "pairs_compared") > 0.0;
+  result->compared = States(json, "counts") && Number(json.at("counts"), "pairs_compared") > 0.0;
   for (const char* list : {"checks", "checks_off"}) {
-    for (const Json& check : Part(json, list)) {
+    for (const JsonValue& check : List(json, list)) {
       MetricValue& metric = result->metrics[Word(check, "name")];
       metric.value = Number(check, "value");
       metric.channel = Word(check, "channel");
@@ -325,26 +330,31 @@ SummaryText ReadSummaryJson(const Json& json, CaseResult* result) {
       if (!metric.pass) words.culprits += "\n" + Word(check, "name");
     }
   }
-  for (const Json& item : Part(json, "not_compared")) {
+  for (const JsonValue& item : List(json, "not_compared")) {
     result->not_compared.push_back({Word(item, "what"), Word(item, "why")});
   }
-  for (const Json& caveat : Part(json, "caveats")) result->caveats.push_back(Word(caveat, "text"));
-  const Json versions = Part(json, "versions");
-  for (const auto& [name, version] : versions.items()) {
-    if (version.is_string()) result->versions[name] = version;
+  for (const JsonValue& caveat : List(json, "caveats")) {
+    result->caveats.push_back(Word(caveat, "text"));
+  }
+  if (States(json, "versions")) {
+    for (const auto& [name, version] : json.at("versions").items()) {
+      result->versions[name] = version.get<std::string>();
+    }
   }
   return words;
 }
 
-// The same from text; nothing if it is no summary.
+// What a summary.json says of `result`, which stays as it was if it is none of ours.
 SummaryText ReadSummary(const std::string& text, CaseResult* result) {
-  const Json json = ParseIfJson<Json>(text);
-  if (!json.is_object()) return {};
-  try {
-    return ReadSummaryJson(json, result);
-  } catch (const Json::exception&) {
-    return {};
+  CaseResult read = *result;
+  auto words = ReadJson(text, [&](const JsonValue& json) { return SummaryOf(json, &read); });
+  if (!words) {
+    SummaryText damaged;
+    damaged.damage = "summary.json: " + words.refusal.Text();
+    return damaged;
   }
+  *result = std::move(read);
+  return std::move(*words.value);
 }
 
 // The line that states what went wrong: the last one with "error:", else the last one.
@@ -422,7 +432,10 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
   if (!EndedBadly(end, timeout_s, output, &result)) {
     const std::string offence = Offence(result, output + words.culprits);
     if (reason.empty()) reason = ErrorLine(output);
-    if (!summary && end.exit_code == 3) {
+    if (!words.damage.empty()) {
+      result.status = CaseStatus::kInternalError;
+      result.reason = words.damage;
+    } else if (!summary && end.exit_code == 3) {
       // Results that could not be written are never what was expected.
       result.status = CaseStatus::kCouldNotRun;
       result.reason = (offence.empty() ? "no results" : offence) + ": " + reason;
@@ -445,17 +458,23 @@ CaseResult JudgeCase(const CaseFile& file, const WorkerEnd& end, double timeout_
   return result;
 }
 
-void AddInputs(const std::string& inputs, CaseResult* result) {
-  const Json json = ParseIfJson<Json>(inputs);
-  if (!json.is_object()) return;
+std::string AddInputs(const std::string& inputs, CaseResult* result) {
+  const auto read = ReadJson(inputs, [](const JsonValue& json) {
+    std::vector<InputFile> files;
+    for (const JsonValue& input : List(json, "inputs")) {
+      files.push_back({Word(input, "file"), Word(input, "fingerprint")});
+    }
+    return files;
+  });
+  if (!read) return read.refusal.Text();
   Fingerprint fingerprint;
-  for (const Json& input : Part(json, "inputs")) {
-    if (!input.is_object()) continue;
-    result->input_files.push_back({Word(input, "file"), Word(input, "fingerprint")});
-    fingerprint.Add(std::filesystem::path(result->input_files.back().file).filename().string());
-    fingerprint.Add(result->input_files.back().fingerprint);
+  for (const InputFile& input : *read.value) {
+    result->input_files.push_back(input);
+    fingerprint.Add(std::filesystem::path(input.file).filename().string());
+    fingerprint.Add(input.fingerprint);
   }
   if (!result->input_files.empty()) result->inputs = fingerprint.Text();
+  return "";
 }
 
 }  // namespace mbv

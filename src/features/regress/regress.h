@@ -82,7 +82,7 @@ struct RegressOutcome {
                                    const std::string& output,
                                    const std::optional<std::string>& summary);
 
-/// Puts what a worker's inputs.json says into its result.
-void AddInputs(const std::string& inputs, CaseResult* result);
+/// Puts what a worker's inputs.json states into its result; "" or why it is none.
+[[nodiscard]] std::string AddInputs(const std::string& inputs, CaseResult* result);
 
 }  // namespace mbv

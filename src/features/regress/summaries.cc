@@ -168,18 +168,6 @@ std::string ToJUnit(const RegressReport& report) { return JUnitWriter(report).Wr
 
 namespace {
 
-// Text for a table cell or a list: no markup, no line ends.
-std::string Plain(const std::string& text) {
-  std::string plain;
-  for (char c : text) {
-    if (c == '|' || c == '*' || c == '_' || c == '`' || c == '<' || c == '[' || c == '\\') {
-      plain += '\\';
-    }
-    plain += c == '\n' ? ' ' : c;
-  }
-  return plain;
-}
-
 // Job pages take 1 MiB in all (GitHub's limit of a step's summary): every part has its share.
 constexpr size_t kFailedBytes = 400'000, kDriftBytes = 130'000, kMissingBytes = 60'000,
                  kCaveatBytes = 30'000, kNoteBytes = 30'000, kGapBytes = 90'000,
@@ -219,22 +207,22 @@ constexpr size_t kChecksOfALine = 3;
 constexpr const char* kMore = "* … and {} more: see index.html\n";
 
 std::string Row(const CaseResult& result) {
-  return fmt::format("| {} | {}{} | {} | {:.1f} | {:.1f} | {:.0f} |\n", Plain(result.key),
+  return fmt::format("| {} | {}{} | {} | {:.1f} | {:.1f} | {:.0f} |\n", MarkdownText(result.key),
                      result.failed()         ? "❌ "
                      : result.drifts.empty() ? ""
                                              : "⚠️ ",
-                     Plain(WordOf(result)), Plain(KeyText(result)), result.cost.wall_s,
-                     result.cost.cpu_s, result.cost.peak_mib());
+                     MarkdownText(WordOf(result)), MarkdownText(KeyText(result)),
+                     result.cost.wall_s, result.cost.cpu_s, result.cost.peak_mib());
 }
 
 std::string Failed(const RegressReport& report) {
   Lines lines(kFailedBytes, kMore);
   for (const CaseResult* result : BySeverity(report)) {
     if (!result->failed()) continue;
-    std::string item = fmt::format("* **{}**: {}: {}\n", Plain(result->key), Plain(WordOf(*result)),
-                                   Plain(result->reason));
+    std::string item = fmt::format("* **{}**: {}: {}\n", MarkdownText(result->key),
+                                   MarkdownText(WordOf(*result)), MarkdownText(result->reason));
     for (const std::string& text : FailureTexts(*result, kChecksOfALine)) {
-      item += "  * " + Plain(text) + "\n";
+      item += "  * " + MarkdownText(text) + "\n";
     }
     lines.Add(item);
   }
@@ -246,7 +234,8 @@ std::string Drifted(const RegressReport& report) {
   Lines lines(kDriftBytes, kMore);
   for (const CaseResult* result : BySeverity(report)) {
     if (result->drifts.empty()) continue;
-    lines.Add(fmt::format("* **{}**: {}\n", Plain(result->key), Plain(DriftLine(*result))));
+    lines.Add(
+        fmt::format("* **{}**: {}\n", MarkdownText(result->key), MarkdownText(DriftLine(*result))));
   }
   const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Drift\n\n" + text;
@@ -256,7 +245,7 @@ std::string Missing(const RegressReport& report) {
   Lines lines(kMissingBytes, kMore);
   for (const MissingCase& missing : report.missing) {
     lines.Add(fmt::format("* {}**{}**: {}\n", report.fail_on_missing ? "❌ " : "",
-                          Plain(missing.key), Plain(MissingText(missing))));
+                          MarkdownText(missing.key), MarkdownText(MissingText(missing))));
   }
   const std::string text = lines.Text();
   return text.empty() ? "" : "\n### Missing\n\n" + text;
@@ -266,7 +255,7 @@ std::string Caveats(const RegressReport& report) {
   Lines lines(kCaveatBytes, kMore);
   for (const CaseResult& result : report.cases) {
     for (const std::string& caveat : result.caveats) {
-      lines.Add(fmt::format("* **{}**: {}\n", Plain(result.key), Plain(caveat)));
+      lines.Add(fmt::format("* **{}**: {}\n", MarkdownText(result.key), MarkdownText(caveat)));
     }
   }
   const std::string text = lines.Text();
@@ -278,8 +267,8 @@ std::string NotComparedText(const RegressReport& report) {
   for (const CaseResult& result : report.cases) {
     if (result.compared || result.not_compared.empty()) continue;
     const Unmeasured& first = result.not_compared.front();
-    lines.Add(
-        fmt::format("* {}: {}: {}\n", Plain(result.key), Plain(first.what), Plain(first.why)));
+    lines.Add(fmt::format("* {}: {}: {}\n", MarkdownText(result.key), MarkdownText(first.what),
+                          MarkdownText(first.why)));
   }
   const std::string text = lines.Text();
   if (text.empty()) return "";
@@ -293,15 +282,16 @@ std::string ToMarkdown(const RegressReport& report) {
   std::string text =
       fmt::format("{}: {}\n\n{}.\n\n", kMarkdownTitle,
                   good ? "all as expected" : "❌ not as expected", CountsText(CountCases(report)));
-  text += fmt::format(
-      "Started {}, {:.1f} s with {} worker{}; {}{}{}{}.\n", report.run.started_utc,
-      report.run.wall_s, report.run.jobs, report.run.jobs == 1 ? "" : "s",
-      Plain(report.run.program), report.run.label.empty() ? "" : ", " + Plain(report.run.label),
-      report.run.shard.empty() ? "" : ", shard " + report.run.shard,
-      report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
+  text +=
+      fmt::format("Started {}, {:.1f} s with {} worker{}; {}{}{}{}.\n",
+                  MarkdownText(report.run.started_utc), report.run.wall_s, report.run.jobs,
+                  report.run.jobs == 1 ? "" : "s", MarkdownText(report.run.program),
+                  report.run.label.empty() ? "" : ", " + MarkdownText(report.run.label),
+                  report.run.shard.empty() ? "" : ", shard " + MarkdownText(report.run.shard),
+                  report.run.id == 0 ? "" : fmt::format(", run {} of the history", report.run.id));
   text += Failed(report) + Missing(report) + Drifted(report) + Caveats(report);
   Lines notes(kNoteBytes, "\nNote: and {} more\n");
-  for (const std::string& note : report.notes) notes.Add("\nNote: " + Plain(note) + "\n");
+  for (const std::string& note : report.notes) notes.Add("\nNote: " + MarkdownText(note) + "\n");
   text += notes.Text() + NotComparedText(report);
   text +=
       "\n<details><summary>All scenarios</summary>\n\n"
@@ -334,20 +324,6 @@ const KeyWords& WordsOf(const std::string& metric) {
 }
 
 }  // namespace
-
-std::string XmlText(std::string_view text) {
-  std::string kept;
-  size_t from = 0;
-  for (size_t bad = FindNonText(text); bad < text.size(); bad = FindNonText(text, from)) {
-    kept += text.substr(from, bad - from);
-    from = bad + 1;
-  }
-  kept += text.substr(from);
-  std::erase(kept, '\r');
-  return kept;
-}
-
-std::string EscapeXml(std::string_view text) { return EscapeMarkup(XmlText(text)); }
 
 std::string CountsText(const Counts& counts) {
   std::string text = fmt::format("{} scenario{}: {} as expected", counts.total,
@@ -393,19 +369,21 @@ std::string ToSummaryText(const RegressReport& report) {
   const std::vector<const CaseResult*> cases = BySeverity(report);
   for (const CaseResult* result : cases) {
     if (!result->failed()) continue;
-    text += fmt::format("{}: {}\n    {}\n", result->key, WordOf(*result), result->reason);
+    text += fmt::format("{}: {}\n    {}\n", OneLine(result->key), WordOf(*result),
+                        OneLine(result->reason));
     for (const std::string& line : FailureTexts(*result, kChecksOnTerminal)) {
-      text += "    " + line + "\n";
+      text += "    " + OneLine(line) + "\n";
     }
   }
   for (const MissingCase& missing : report.missing) {
-    text += fmt::format("{}: missing\n    {}\n", missing.key, MissingText(missing));
+    text +=
+        fmt::format("{}: missing\n    {}\n", OneLine(missing.key), OneLine(MissingText(missing)));
   }
   for (const CaseResult* result : cases) {
     if (result->drifts.empty()) continue;
-    text += fmt::format("{}: drift\n    {}\n", result->key, DriftLine(*result));
+    text += fmt::format("{}: drift\n    {}\n", OneLine(result->key), OneLine(DriftLine(*result)));
   }
-  for (const std::string& note : report.notes) text += "note: " + note + "\n";
+  for (const std::string& note : report.notes) text += "note: " + OneLine(note) + "\n";
   double peak_mib = 0.0, cpu_s = 0.0;
   for (const CaseResult& result : report.cases) {
     peak_mib = std::max(peak_mib, result.cost.peak_mib());

@@ -45,10 +45,4 @@ inline constexpr const char* kIndexMain = "<main>\n";
 /// Smaller copy of a PNG as a data URI, at most `width_px` wide; "" if it is no PNG.
 [[nodiscard]] std::string ThumbnailUri(const std::string& png, int width_px);
 
-/// `text` without what XML 1.0 cannot hold or readers of it change: control characters but line
-/// feeds and tabs, and broken UTF-8.
-[[nodiscard]] std::string XmlText(std::string_view text);
-/// XmlText() with & < > " ' escaped for XML and HTML.
-[[nodiscard]] std::string EscapeXml(std::string_view text);
-
 }  // namespace mbv

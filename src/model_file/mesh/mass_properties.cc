@@ -128,11 +128,13 @@ class PointSet {
   std::unordered_map<Cell, std::vector<int>, CellHash> cells_;
 };
 
-// The triangles of a mesh with those vertices only that they use.
+// The triangles of a mesh with those vertices only that they use; `numbers` has -1 for each of
+// these, and afterwards their new numbers.
 TriangleMesh WithUsedVertices(const std::vector<Vec3>& vertices,
-                              const std::vector<std::array<int, 3>>& triangles) {
+                              const std::vector<std::array<int, 3>>& triangles,
+                              std::vector<int>* numbers) {
   TriangleMesh used;
-  std::vector<int> index(vertices.size(), -1);
+  std::vector<int>& index = *numbers;
   for (std::array<int, 3> triangle : triangles) {
     for (int& corner : triangle) {
       if (index[corner] < 0) {
@@ -160,7 +162,8 @@ TriangleMesh Welded(const TriangleMesh& mesh, double tolerance) {
       triangles.push_back(moved);
     }
   }
-  return WithUsedVertices(set.points(), triangles);
+  std::vector<int> numbers(set.points().size(), -1);
+  return WithUsedVertices(set.points(), triangles, &numbers);
 }
 
 double DiagonalOf(const TriangleMesh& mesh) {
@@ -198,8 +201,9 @@ std::vector<TriangleMesh> PartsOf(const TriangleMesh& mesh) {
   for (const auto& t : mesh.triangles) triangles[find(t[0])].push_back(t);
   std::vector<TriangleMesh> parts;
   parts.reserve(triangles.size());
+  std::vector<int> numbers(mesh.vertices.size(), -1);  // parts share no vertex: one list for all
   for (const auto& [vertex, of_part] : triangles) {
-    parts.push_back(WithUsedVertices(mesh.vertices, of_part));
+    parts.push_back(WithUsedVertices(mesh.vertices, of_part, &numbers));
   }
   return parts;
 }

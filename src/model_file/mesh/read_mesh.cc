@@ -4,12 +4,18 @@
 #include <assimp/postprocess.h>
 #include <assimp/scene.h>
 #include <fmt/format.h>
+#include <sys/resource.h>
+#include <unistd.h>
 #include <algorithm>
+#include <assimp/IOSystem.hpp>
 #include <assimp/Importer.hpp>
 #include <charconv>
 #include <cmath>
 #include <cstdlib>
+#include <fstream>
+#include <initializer_list>
 #include <map>
+#include <new>
 #include <optional>
 #include <sstream>
 #include <string_view>
@@ -161,6 +167,38 @@ void AddNode(const aiScene& scene, const aiNode& node, const aiMatrix4x4& above,
   }
 }
 
+// Polygons whose corners are there, and that are cut into triangles in time: the time grows with
+// the square of the corners. "" or what is wrong.
+std::string PolygonTrouble(const aiScene& scene) {
+  constexpr unsigned kMostCorners = 10'000;
+  constexpr double kMostPairs = 4e8;  // of corners, in all polygons
+  double pairs = 0.0;
+  for (unsigned m = 0; m < scene.mNumMeshes; ++m) {
+    const aiMesh& part = *scene.mMeshes[m];
+    for (unsigned f = 0; f < part.mNumFaces; ++f) {
+      const aiFace& face = part.mFaces[f];
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        if (face.mIndices[k] >= part.mNumVertices) return "a face has a vertex that is not there";
+      }
+      if (face.mNumIndices > kMostCorners) {
+        return fmt::format("a face has {} corners, at most {} are read", face.mNumIndices,
+                           kMostCorners);
+      }
+      if (face.mNumIndices > 4) pairs += static_cast<double>(face.mNumIndices) * face.mNumIndices;
+    }
+  }
+  return pairs > kMostPairs ? "its faces have too many corners: export it as triangles" : "";
+}
+
+// For the library, the mesh is the only file that there is.
+class NoFiles : public Assimp::IOSystem {
+ public:
+  bool Exists(const char* /*file*/) const override { return false; }
+  char getOsSeparator() const override { return '/'; }
+  Assimp::IOStream* Open(const char* /*file*/, const char* /*mode*/) override { return nullptr; }
+  void Close(Assimp::IOStream* /*file*/) override {}
+};
+
 // Of a PLY file, whose header promises counts: it must end, and what follows must hold them, or the
 // library reads on without an end. "" if it does, or is no PLY file.
 class PlyCheck {
@@ -170,6 +208,7 @@ class PlyCheck {
   std::string Run() {
     if (Lower(bytes_.substr(0, 3)) != "ply") return "";  // the library refuses it
     if (!ReadHeader()) return fmt::format("its header {}", header_trouble_);
+    if (ascii_ && PromisesInSomeLine()) return "one of its lists promises more than it can hold";
     for (const Element& element : elements_) {
       if (element.count > 0 && element.properties.empty()) {
         return fmt::format("its {} {} have no property", element.count, element.name);
@@ -242,6 +281,45 @@ class PlyCheck {
     return false;
   }
 
+  // The library reads a line per face, and after a damaged line not those that Run() takes for
+  // faces: a count that no file of this length has is refused wherever a list may begin.
+  [[nodiscard]] bool PromisesInSomeLine() const {
+    constexpr unsigned long long kNeverMeant = 10'000'000;
+    const unsigned long long most = std::max<unsigned long long>(bytes_.size(), kNeverMeant);
+    for (size_t from = at_; from < bytes_.size();) {
+      const size_t end = std::min(bytes_.find_first_of("\r\n", from), bytes_.size());
+      const std::string_view line = std::string_view(bytes_).substr(from, end - from);
+      from = end + 1;
+      for (const Element& element : elements_) {
+        std::string_view rest = line;
+        for (const Property& property : element.properties) {
+          const auto count = property.count_bytes > 0 ? CountOf(TakeWord(&rest)) : 1;
+          if (count > most) return true;
+          if (property.count_bytes == 0) (void)TakeWord(&rest);
+          for (unsigned long long i = 0; property.count_bytes > 0 && i < count && !rest.empty();
+               ++i) {
+            (void)TakeWord(&rest);
+          }
+        }
+      }
+    }
+    return false;
+  }
+
+  static std::string_view TakeWord(std::string_view* line) {
+    constexpr std::string_view kSpace = " \t";
+    line->remove_prefix(std::min(line->find_first_not_of(kSpace), line->size()));
+    const std::string_view word = line->substr(0, line->find_first_of(kSpace));
+    line->remove_prefix(word.size());
+    return word;
+  }
+
+  static unsigned long long CountOf(std::string_view word) {
+    unsigned long long count = 0;
+    const auto error = std::from_chars(word.data(), word.data() + word.size(), count).ec;
+    return error == std::errc::result_out_of_range ? ~0ULL : count;
+  }
+
   bool NextLine(std::string* line) {
     if (at_ >= bytes_.size()) return false;
     const size_t end = std::min(bytes_.find_first_of("\r\n", at_), bytes_.size());
@@ -296,11 +374,13 @@ class PlyCheck {
   std::vector<Element> elements_;
 };
 
-// Of counts that a DAE file states of its arrays and primitives, one that the file cannot hold: a
-// number and a space are two bytes.
-std::string DaeTrouble(const std::string& bytes) {
+// Of a DAE file: counts of its arrays and primitives that it cannot hold (a number and a space are
+// two bytes), and lists of indices with anything else between them, which the library would read
+// without an end. "" without one.
+std::string DaeTrouble(std::string_view bytes) {
   constexpr std::string_view kCount = "count=";
-  for (size_t at = bytes.find(kCount); at != std::string::npos; at = bytes.find(kCount, at + 1)) {
+  for (size_t at = bytes.find(kCount); at != std::string_view::npos;
+       at = bytes.find(kCount, at + 1)) {
     const char* from = bytes.data() + std::min(at + kCount.size() + 1, bytes.size());
     unsigned long long count = 0;
     const auto [end, error] = std::from_chars(from, bytes.data() + bytes.size(), count);
@@ -308,7 +388,46 @@ std::string DaeTrouble(const std::string& bytes) {
       return "it states a count of " + std::string(from, end) + ", more than it can hold";
     }
   }
+  for (const std::string_view open : {"<p", "<vcount", "<v"}) {
+    for (size_t at = bytes.find(open); at != std::string_view::npos;
+         at = bytes.find(open, at + 1)) {
+      const std::string_view rest = bytes.substr(at + open.size());
+      if (rest.empty() || std::string_view(" \t\r\n>").find(rest[0]) == std::string_view::npos)
+        continue;
+      const size_t tag = rest.find('>');
+      if (tag == std::string_view::npos || rest[tag == 0 ? 0 : tag - 1] == '/') continue;
+      const std::string_view inside = rest.substr(tag + 1);
+      const size_t end = inside.find_first_not_of(" \t\r\n+-0123456789");
+      if (end == std::string_view::npos || !inside.substr(end).starts_with("</")) {
+        return "one of its lists of indices holds something else";
+      }
+    }
+  }
   return "";
+}
+
+// Of an OBJ file what makes its surface. Names of objects, groups and materials are left out: the
+// library compares each with all others, and looks for the files of materials.
+std::string ObjSurface(std::string_view bytes) {
+  std::string surface;
+  bool continues = false, kept = false;
+  for (size_t from = 0; from < bytes.size();) {
+    const size_t end = std::min(bytes.find('\n', from), bytes.size() - 1);
+    const std::string_view line = bytes.substr(from, end + 1 - from);
+    from = end + 1;
+    if (!continues) {
+      const std::string_view text =
+          line.substr(std::min(line.find_first_not_of(" \t"), line.size()));
+      kept =
+          std::ranges::any_of(std::initializer_list<std::string_view>{"v ", "v\t", "vt ", "vt\t",
+                                                                      "vn ", "vn\t", "f ", "f\t"},
+                              [&](std::string_view key) { return text.starts_with(key); });
+    }
+    if (kept) surface += line;
+    const size_t last = line.find_last_not_of("\r\n");
+    continues = last != std::string_view::npos && line[last] == '\\';
+  }
+  return surface;
 }
 
 // What a child answers.
@@ -335,20 +454,26 @@ bool IsMeshFile(const std::filesystem::path& file) {
 
 MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
   MeshText mesh;
-  const std::string kind = Lower(extension);
+  const std::string kind = Lower(extension).substr(extension.starts_with('.') ? 1 : 0);
   // The library itself compares the counts of STL, and OBJ has none.
-  mesh.trouble = kind == ".ply" ? PlyCheck(bytes).Run() : kind == ".dae" ? DaeTrouble(bytes) : "";
+  mesh.trouble = kind == "ply" ? PlyCheck(bytes).Run() : kind == "dae" ? DaeTrouble(bytes) : "";
   if (!mesh.trouble.empty()) return mesh;
+  const std::string surface = kind == "obj" ? ObjSurface(bytes) : "";
+  const std::string& read = kind == "obj" ? surface : bytes;
   Assimp::Importer importer;
+  importer.SetIOHandler(new NoFiles);  // which it owns
   importer.SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_IGNORE_UP_DIRECTION, true);
   importer.SetPropertyInteger(AI_CONFIG_PP_SBP_REMOVE,
                               aiPrimitiveType_POINT | aiPrimitiveType_LINE);
-  const std::string hint = Lower(extension).substr(extension.starts_with('.') ? 1 : 0);
-  const aiScene* scene =
-      importer.ReadFileFromMemory(bytes.data(), bytes.size(), aiProcess_Triangulate, hint.c_str());
-  if (scene == nullptr || scene->mRootNode == nullptr) {
-    mesh.trouble = importer.GetErrorString();
-    if (mesh.trouble.empty()) mesh.trouble = "it holds no mesh";
+  const aiScene* scene = importer.ReadFileFromMemory(read.data(), read.size(), 0, kind.c_str());
+  // The library's own words may quote the file, which may be something else than a mesh.
+  mesh.trouble = scene == nullptr || scene->mRootNode == nullptr
+                     ? "it is damaged, or of another kind than its name says"
+                     : PolygonTrouble(*scene);
+  if (!mesh.trouble.empty()) return mesh;
+  scene = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (scene == nullptr) {
+    mesh.trouble = "its faces cannot be cut into triangles";
     return mesh;
   }
   AddNode(*scene, *scene->mRootNode, aiMatrix4x4(), &mesh.surface);
@@ -359,6 +484,36 @@ MeshText ReadMeshBytes(const std::string& bytes, const std::string& extension) {
   if (finite && mesh.surface.triangles.empty()) mesh.trouble = "it holds no triangle";
   return mesh;
 }
+
+namespace {
+
+// Of a process that reads a file of so many bytes: more is not needed, whatever the file asks for.
+// (Sanitizers reserve memory as they like.)
+void LimitMemory([[maybe_unused]] size_t bytes) {
+#ifndef __SANITIZE_ADDRESS__
+  constexpr rlim_t kLeast = 512UL << 20, kPerByte = 200;
+  rlim_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const rlim_t most =
+      pages * static_cast<rlim_t>(sysconf(_SC_PAGESIZE)) + kLeast + kPerByte * bytes;
+  rlimit limit{};
+  if (pages == 0 || getrlimit(RLIMIT_AS, &limit) != 0 || limit.rlim_cur < most) return;
+  limit.rlim_cur = most;
+  (void)setrlimit(RLIMIT_AS, &limit);
+#endif
+}
+
+// In a child.
+MeshText ReadLimited(const std::string& bytes, const std::string& extension) {
+  LimitMemory(bytes.size());
+  try {
+    return ReadMeshBytes(bytes, extension);
+  } catch (const std::bad_alloc&) {
+    return {{}, "it asks for more memory than a file of its length may"};
+  }
+}
+
+}  // namespace
 
 std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& files) {
   std::vector<MeshFile> result(files.size());
@@ -380,7 +535,7 @@ std::vector<MeshFile> ReadMeshFiles(const std::vector<std::filesystem::path>& fi
     contents.push_back(std::move(*bytes));
   }
   const auto answers = InChildren(unknown.size(), kReadTimeout_s, [&](size_t k) {
-    return Answer(ReadMeshBytes(contents[k], endings[k]));
+    return Answer(ReadLimited(contents[k], endings[k]));
   });
   for (size_t k = 0; k < unknown.size(); ++k) {
     MeshText read =

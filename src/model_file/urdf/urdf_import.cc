@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <map>
 #include <set>
+#include <string_view>
 
 #include "base/names.h"
 #include "base/text.h"
@@ -447,6 +448,17 @@ UrdfTree ReadUrdf(const std::string& text, const std::string& file, Diagnostics*
   };
   if (FindNonText(text) != std::string::npos) return fail("the file is not UTF-8 text");
   if (NestsDeeperThan(text, 100)) return fail("XML elements are nested deeper than 100 levels");
+  // urdfdom's words would quote a file of another kind.
+  tinyxml2::XMLDocument document;
+  if (document.Parse(text.c_str(), text.size()) != tinyxml2::XML_SUCCESS) {
+    diagnostics->Add({Severity::kError, file, document.ErrorLineNum(), 1,
+                      "the file is not well-formed XML", ""});
+    return {};
+  }
+  const tinyxml2::XMLElement* top = document.RootElement();
+  if (top == nullptr || std::string_view(top->Name()) != "robot") {
+    return fail("no URDF: the root element is not <robot>");
+  }
   Diagnostics said;
   urdf::ModelInterfaceSharedPtr model;
   try {

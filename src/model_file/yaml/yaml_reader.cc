@@ -132,7 +132,16 @@ void YamlReader::AddAt(Severity severity, int line, int column, const std::strin
   Add({severity, file_, line, column, message, hint});
 }
 
+void YamlReader::RefuseForeign(const YamlNode& root, const std::string& message,
+                               const std::string& hint) {
+  diagnostics_ = {};
+  given_.clear();
+  Error(root, message, hint);
+  foreign_ = true;
+}
+
 void YamlReader::Add(Finding finding) {
+  if (foreign_) return;
   if (!given_.insert(fmt::format("{}:{}:{}", finding.line, finding.column, finding.message))
            .second) {
     return;
@@ -207,7 +216,7 @@ std::optional<int> YamlReader::Choice(const YamlNode& node, const std::string& p
   std::string list;
   for (const std::string& word : words) list += (list.empty() ? "" : ", ") + word;
   Error(node, fmt::format("{} = {} is not one of: {}", path, Describe(node), list),
-        DidYouMean(ShortValue(*text), words));
+        DidYouMean(*text, words));
   return std::nullopt;
 }
 
@@ -234,12 +243,30 @@ const std::vector<YamlEntry>& YamlReader::Entries(const YamlNode& node, const st
 
 namespace {
 
-// Whether the keys at the top of a file are those of something else, which may hold what must not
-// be shown: none is known or nearly so.
-bool IsForeign(const std::vector<YamlEntry>& entries, const std::vector<std::string>& keys) {
-  return !entries.empty() && std::none_of(entries.begin(), entries.end(), [&](const YamlEntry& e) {
-    return Contains(keys, e.key) || !ClosestWord(e.key, keys).empty();
-  });
+// What files of many kinds have.
+constexpr std::array kCommonKeys = {"name",   "description", "title",  "version", "kind",
+                                    "type",   "parameters",  "source", "license", "date",
+                                    "author", "units",       "label",  "notes",   "schema"};
+
+// Of a key of so many letters, how many may be wrong.
+bool IsNear(const std::string& key, const std::vector<std::string>& keys) {
+  constexpr size_t kShortest = 4;
+  return key.size() >= kShortest && !ClosestWord(key, keys).empty();
+}
+
+struct KeyCounts {
+  size_t known = 0, telling = 0;  // telling: known, and not common
+};
+
+KeyCounts CountKnown(const std::vector<YamlEntry>& entries, const std::vector<std::string>& keys) {
+  KeyCounts counts;
+  for (const YamlEntry& entry : entries) {
+    if (!Contains(keys, entry.key) && !IsNear(entry.key, keys)) continue;
+    ++counts.known;
+    const bool common = std::ranges::find(kCommonKeys, entry.key) != kCommonKeys.end();
+    counts.telling += common ? 0 : 1;
+  }
+  return counts;
 }
 
 }  // namespace
@@ -258,23 +285,28 @@ YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
   if (!node_->is_map()) {
     const size_t dot = path_.rfind('.');
     const std::string own = dot == std::string::npos ? "" : path_.substr(dot + 1);
-    // What is no model or scenario at all may hold what must not be shown.
-    const bool foreign = path_.empty() && node_->is_scalar();
-    const std::string what = foreign ? "a text" : Describe(*node_);
-    reader_->Error(*node_, fmt::format("{} is {}, a map is needed", shown, what),
+    if (path_.empty() && node_->is_scalar()) {
+      reader_->RefuseForeign(*node_, "the file is a text, a map is needed", "");
+      return;
+    }
+    reader_->Error(*node_, fmt::format("{} is {}, a map is needed", shown, Describe(*node_)),
                    is_known(own) ? fmt::format("'{}' belongs into an entry of {}: indent it deeper",
                                                own, path_.substr(0, dot))
                                  : "");
     return;
   }
   valid_ = true;
-  if (path_.empty() && IsForeign(node_->entries, keys)) {
-    std::string hint;
-    for (const std::string& key : keys) hint += (hint.empty() ? "known keys: " : ", ") + key;
-    reader_->Error(*node_,
-                   fmt::format("the file is of another kind: none of its {} keys is known",
-                               node_->entries.size()),
-                   hint);
+  const KeyCounts counts = path_.empty() ? CountKnown(node_->entries, keys) : KeyCounts{};
+  const size_t all = node_->entries.size();
+  if (path_.empty() && all > counts.known && (counts.telling == 0 || all > 2 * counts.known)) {
+    valid_ = false;
+    reader_->RefuseForeign(
+        *std::exchange(node_, nullptr),
+        counts.known == 0
+            ? fmt::format("the file is of another kind: none of its {} keys is known", all)
+            : fmt::format("the file is of another kind: {} of its {} keys {} known", counts.known,
+                          all, counts.known == 1 ? "is" : "are"),
+        "known keys: " + Joined(keys));
     return;
   }
   const YamlEntry* before = nullptr;
@@ -761,34 +793,37 @@ YamlNodePtr YamlReader::Parse(const std::string& text) {
   if (YamlNodePtr known = ParsedDocuments::Find(text)) return known;
   if (!IsText(text, this)) return nullptr;
   TreeBuilder builder(this);
+  // Without a root nothing says of which kind the file is: findings that quote it are dropped.
+  const auto refuse = [&](int line, int column, const std::string& message,
+                          const std::string& hint = "") {
+    diagnostics_ = {};
+    given_.clear();
+    AddAt(Severity::kError, line, column, message, hint);
+    return nullptr;
+  };
   try {
     std::istringstream stream(text);
     YAML::Parser parser(stream);
     if (!parser.HandleNextDocument(builder) || builder.root() == nullptr) {
-      AddAt(Severity::kError, 1, 1, "the file is empty");
-      return nullptr;
+      return refuse(1, 1, "the file is empty");
     }
     if (const YAML::Mark& mark = builder.last_quoted(); IsNeverClosed(text, mark)) {
-      AddAt(Severity::kError, mark.line + 1, mark.column + 1,
-            fmt::format("YAML syntax: the quote {} is never closed",
-                        text[static_cast<size_t>(mark.pos)]));
-      return nullptr;
+      return refuse(mark.line + 1, mark.column + 1,
+                    fmt::format("YAML syntax: the quote {} is never closed",
+                                text[static_cast<size_t>(mark.pos)]));
     }
     if (parser) AddAt(Severity::kWarning, 0, 0, "only the first YAML document is read");
   } catch (const YAML::Exception& e) {
     if (const auto cause = internal::FindSyntaxCause(text)) {
-      AddAt(Severity::kError, cause->line, cause->column, "YAML syntax: " + cause->message,
-            cause->hint);
-    } else {
-      AddAt(Severity::kError, e.mark.line + 1, e.mark.column + 1, "YAML syntax: " + e.msg);
+      return refuse(cause->line, cause->column, "YAML syntax: " + cause->message, cause->hint);
     }
-    return nullptr;
+    return refuse(e.mark.line + 1, e.mark.column + 1,
+                  "YAML syntax: what stands here cannot be read",
+                  "look at quotes, escapes in them, brackets, anchors (&) and aliases (*)");
   } catch (const Stop& stop) {
-    AddAt(Severity::kError, stop.mark.line + 1, stop.mark.column + 1, stop.message);
-    return nullptr;
-  } catch (const std::exception& e) {
-    AddAt(Severity::kError, 0, 0, std::string("YAML syntax: ") + e.what());
-    return nullptr;
+    return refuse(stop.mark.line + 1, stop.mark.column + 1, stop.message);
+  } catch (const std::exception&) {
+    return refuse(0, 0, "YAML syntax: the file cannot be read");
   }
   if (diagnostics_.findings().empty()) ParsedDocuments::Keep(text, builder.root());
   return builder.root();

@@ -82,6 +82,9 @@ class YamlReader {
              const std::string& hint = "");
   /// A finding of this file, whatever its `file` says.
   void Add(Finding finding);
+  /// The only finding of a file of another kind, which may hold what must not be shown: those
+  /// before and after it are dropped.
+  void RefuseForeign(const YamlNode& root, const std::string& message, const std::string& hint);
   /// Appended to later messages: " (in limb2)". The same message at the same place is given only
   /// once, whatever the note.
   void SetNote(std::string note) { note_ = std::move(note); }
@@ -110,13 +113,16 @@ class YamlReader {
   std::string note_;
   Diagnostics diagnostics_;
   std::set<std::string> given_;  // place and message of each finding
+  bool foreign_ = false;
 };
 
 /// A map whose keys are known.
 class YamlMap {
  public:
   /// Reports a node that is no map and every key that is not in `keys`. A null node is an empty
-  /// map. `path` is the key's path for messages; "" for the whole file.
+  /// map. `path` is the key's path for messages; "" for the whole file. A whole file is of another
+  /// kind, and nothing of it is shown or read, if it has unknown keys and either more of them than
+  /// known ones, or no known one that says more than `name`, `version` and the like.
   YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
           const std::vector<std::string>& keys);
 

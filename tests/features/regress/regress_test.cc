@@ -393,5 +393,31 @@ TEST(CaseKey, IsTheSameFromEveryFolder) {
   EXPECT_EQ(CaseKey("mine/a.yaml"), "mine/a");
 }
 
+// What a worker left damaged is named with its key, and nothing of it is taken.
+TEST(JudgeCase, ADamagedSummaryIsAnErrorThatNamesItsKey) {
+  WorkerEnd end;
+  end.exit_code = 0;
+  const std::pair<const char*, const char*> damaged[] = {
+      {R"({"verdict": "agree", "checks": 3})", "summary.json: checks is a number where a list"},
+      {R"({"verdict": "agree", "checks": [{"name": "a", "value": "1"}]})",
+       "summary.json: checks[0].value is a text where a number"},
+      {R"({"verdict": "agree", "witnesses": [1]})", "summary.json: witnesses[0] is a number"},
+      {R"({"verdict": )", "summary.json: line 1, character "},
+      {"[]", "summary.json: "}};
+  for (const auto& [summary, why] : damaged) {
+    const CaseResult result = JudgeCase({}, end, 1.0, "", std::string(summary));
+    EXPECT_EQ(result.status, CaseStatus::kInternalError) << summary;
+    EXPECT_NE(result.reason.find(why), std::string::npos) << result.reason;
+    EXPECT_EQ(result.verdict, "not_run") << summary;
+    EXPECT_TRUE(result.metrics.empty()) << summary;
+  }
+  const CaseResult good = JudgeCase(
+      {}, end, 1.0, "", R"({"verdict": "agree", "checks": [{"name": "a", "value": null}]})");
+  EXPECT_EQ(good.status, CaseStatus::kAsExpected) << good.reason;
+  CaseResult inputs;
+  EXPECT_EQ(AddInputs(R"({"inputs": 3})", &inputs), "inputs is a number where a list is needed");
+  EXPECT_EQ(AddInputs(R"({"inputs": [{"file": "a", "fingerprint": "b"}]})", &inputs), "");
+}
+
 }  // namespace
 }  // namespace mbv
