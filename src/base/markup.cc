@@ -1,6 +1,7 @@
 #include "base/markup.h"
 
 #include <algorithm>
+#include <cctype>
 #include <cstdint>
 #include <utility>
 
@@ -214,11 +215,18 @@ constexpr std::pair<char, std::string_view> kMarkdownTexts[] = {
 }  // namespace
 
 std::string MarkdownText(std::string_view text) {
+  const std::string given = OneLine(WithoutLineEnds(text));
+  // Between letters an underscore emphasises nothing (CommonMark 6.2).
+  const auto is_letter = [&](size_t i) {
+    return i < given.size() && std::isalnum(static_cast<unsigned char>(given[i])) != 0;
+  };
   std::string out;
-  for (const char c : OneLine(WithoutLineEnds(text))) {
+  for (size_t i = 0; i < given.size(); ++i) {
     const auto* row =
-        std::ranges::find(kMarkdownTexts, c, &std::pair<char, std::string_view>::first);
-    out += row != std::end(kMarkdownTexts) ? row->second : std::string_view(&c, 1);
+        std::ranges::find(kMarkdownTexts, given[i], &std::pair<char, std::string_view>::first);
+    const bool inside = given[i] == '_' && i > 0 && is_letter(i - 1) && is_letter(i + 1);
+    out += row != std::end(kMarkdownTexts) && !inside ? row->second
+                                                      : std::string_view(&given[i], 1);
   }
   return out;
 }

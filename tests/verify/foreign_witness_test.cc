@@ -220,7 +220,7 @@ INSTANTIATE_TEST_SUITE_P(
         Mischief{"late", "traces.csv:6 is at t = 0.0401 s where the sample is at 0.04 s",
                  WitnessGap::kBadAnswer},
         Mischief{"short", "traces.csv:6 has 3 cells for 4 columns", WitnessGap::kBadAnswer},
-        Mischief{"untimed", "traces.csv has a column 'seconds'", WitnessGap::kBadAnswer},
+        Mischief{"untimed", "traces.csv has no column time_s", WitnessGap::kBadAnswer},
         Mischief{"unknown",
                  "a column 'motr.force', which is no signal of the mechanism (did you "
                  "mean 'motor.force'?)",

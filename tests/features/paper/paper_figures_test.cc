@@ -5,6 +5,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "base/markup.h"
 #include "tests/support/source_dir.h"
 
 namespace mbv {
@@ -47,7 +48,7 @@ TEST(PaperFigures, EveryEntryIsOnThePageWithItsPictureAndItsAuditRows) {
     const PaperFile paper = PaperOf(model);
     EXPECT_FALSE(paper.entries.empty());
     for (const PaperEntry& entry : paper.entries) {
-      EXPECT_THAT(page, HasSubstr("### " + entry.name.text + ": " + entry.title));
+      EXPECT_THAT(page, HasSubstr("### " + entry.name.text + ": " + MarkdownText(entry.title)));
       if (entry.columns.empty()) {
         EXPECT_THAT(page, HasSubstr("paper_" + model + "_" + entry.name.text + ".png"));
       }
