@@ -5,14 +5,19 @@ if(MBV_BUILD_TESTS)
   mbv_find(benchmark libbenchmark-dev)
 endif()
 
-# The scripts of the pages (web/) are bundled with npm's packages, and tests check their types.
+# The scripts of the pages (web/) are bundled with npm's packages, unless the sources are those of a
+# release, which has the bundles in web/bundled; tests check their types.
 find_program(NODE NAMES node nodejs)
 find_program(NPM npm)
 find_program(TSC tsc)
-if(NOT NODE)
+set(MBV_BUNDLED_WEB OFF)
+if(IS_DIRECTORY ${CMAKE_CURRENT_SOURCE_DIR}/web/bundled)
+  set(MBV_BUNDLED_WEB ON)
+endif()
+if(NOT NODE AND (MBV_BUILD_TESTS OR NOT MBV_BUNDLED_WEB))
   list(APPEND MBV_MISSING "Node.js (nodejs)")
 endif()
-if(NOT NPM)
+if(NOT NPM AND NOT MBV_BUNDLED_WEB)
   list(APPEND MBV_MISSING "npm (npm)")
 endif()
 if(MBV_BUILD_TESTS AND NOT TSC)

@@ -1,5 +1,11 @@
 # Scripts and styles of the pages: packages by npm into the build folder (only when the lock file has
-# changed), bundled and minified into one C++ source for each page.
+# changed), bundled and minified into one C++ source for each page. A release has these sources in
+# web/bundled (scripts/tarball): then neither npm nor Node.js is run.
+if(MBV_BUNDLED_WEB)
+  target_sources(mbv_report PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/web/bundled/html_assets.cc)
+  target_sources(mbv_features_regress PRIVATE ${CMAKE_CURRENT_SOURCE_DIR}/web/bundled/index_assets.cc)
+  return()
+endif()
 set(web ${CMAKE_CURRENT_SOURCE_DIR}/web)
 set(web_build ${CMAKE_BINARY_DIR}/web)
 file(MAKE_DIRECTORY ${web_build})
