@@ -27,74 +27,78 @@ std::string At(double time_s) {
 
 }  // namespace
 
-std::string DrivesHtml(const Report& report) {
-  std::string html;
+ReportSection DriveSection(const Report& report) {
+  ReportSection section{.title = "Drives", .link = "Drives"};
   const PairComparison* main = MainPair(report.comparison);
+  bool floored = false;
   for (const PairComparison& pair : report.comparison.pairs) {
     if (!pair.compared || pair.drives.empty()) continue;
     Table table{.caption = pair.measured + " against " + pair.truth,
-                .head = {Text("drive"), Digits("RMS force"), Digits("RMS error / RMS force"),
-                         Digits("largest error"), Digits("at"), Digits("matching digits")},
-                .rows = {}};
+                .columns = {Text("drive"), Digits("RMS force"), Digits("RMS error / RMS force"),
+                            Digits("largest error"), Digits("at"), Digits("digits")}};
     for (const DriveMetrics& drive : pair.drives) {
-      table.rows.push_back(
-          {Text(drive.drive), Digits(fmt::format("{:.6g} {}", drive.rms_truth, drive.unit)),
-           Digits(NumberOrDash(drive.nrmse)),
-           Digits(NumberOrDash(drive.max_error) + " " + drive.unit), Digits(At(drive.time_s)),
-           Cell{NumberOrDash(drive.digits, "{:.1f}") +
-                    (drive.floored ? " " + Pill("warn", "floored") : ""),
-                true, true}});
+      floored = floored || (drive.floored && &pair == main);
+      table.rows.push_back({drive.drive, fmt::format("{:.6g} {}", drive.rms_truth, drive.unit),
+                            NumberOrDash(drive.nrmse),
+                            NumberOrDash(drive.max_error) + " " + drive.unit, At(drive.time_s),
+                            Cell(NumberOrDash(drive.digits, "{:.1f}"), Mark::kNone,
+                                 drive.floored ? "floored" : "")});
     }
-    const bool first = &pair == main;
-    html += first ? ToHtml(table) : Folded(table.caption, ToHtml(table));
+    if (&pair == main) {
+      section.Add(std::move(table));
+    } else {
+      const std::string title = table.caption;
+      section.Add(Fold{title, {{std::move(table)}}}, On::kPage);
+    }
+  }
+  if (floored) {
+    section.Note(
+        "floored: relative to 0.1 % of what the drive carries, which is more than its own force",
+        On::kAll);
   }
   if (const std::string rest = AtRestText(report.comparison); !rest.empty()) {
-    html += Note(Escape(Sentence(rest)) + " Joint reactions are those without the resting force.");
+    section.Note(Sentence(rest) + " Joint reactions are those without the resting force.");
   }
-  return html;
+  return section;
 }
 
-namespace {
-
-std::string FrictionHtml(const EngineComparison& engine) {
-  if (engine.friction.empty()) return "";
-  Table table{.caption = "Dry friction by MuJoCo's own frictionloss, against " + engine.truth,
-              .head = {Digits("step"), Text("misses farthest"), Digits("by"), Digits("limit")},
-              .rows = {}};
+ReportSection EngineSection(const Report& report) {
+  ReportSection section{.title = "The simulator's own error", .link = "Engine"};
+  if (!report.engine_comparison) return section;
+  const EngineComparison& engine = *report.engine_comparison;
+  Table friction{
+      .caption = "Dry friction by MuJoCo's own frictionloss, against " + engine.truth,
+      .columns = {Digits("step"), Text("misses farthest"), Digits("by"), Digits("limit")}};
   for (const FrictionError& e : engine.friction) {
     const std::string unit = e.unit.empty() ? "" : " " + e.unit;
-    table.rows.push_back({Digits(fmt::format("{:g} ms", 1e3 * e.step_s)),
-                          Text(e.failure.empty() ? e.check : e.failure),
-                          Digits(NumberOrDash(e.value) + unit),
-                          Digits(NumberOrDash(e.limit) + unit)});
+    friction.rows.push_back({fmt::format("{:g} ms", 1e3 * e.step_s),
+                             e.failure.empty() ? e.check : e.failure, NumberOrDash(e.value) + unit,
+                             NumberOrDash(e.limit) + unit});
   }
-  return ToHtml(table) + Note(Escape(Sentence(engine.FrictionText())));
-}
-
-}  // namespace
-
-std::string EngineHtml(const Report& report) {
-  if (!report.engine_comparison) return "";
-  const EngineComparison& engine = *report.engine_comparison;
-  const std::string friction = FrictionHtml(engine);
-  if (engine.engines.empty()) return friction;
+  if (!engine.friction.empty()) {
+    section.Add(std::move(friction), On::kPage);
+    section.Note(Sentence(engine.FrictionText()), On::kAll);
+  }
   Table table{.caption = "The same run by each engine, against " + engine.truth,
-              .head = {Text("engine"), Digits("force error, RMS"),
-                       Digits(fmt::format("from {:g} s", engine.later_s)),
-                       Digits("force error, largest"), Digits("loop gap")},
-              .rows = {}};
-  std::string failures;
+              .columns = {Text("engine"), Digits("force error, RMS"),
+                          Digits(fmt::format("from {:g} s", engine.later_s)),
+                          Digits("force error, largest", On::kPage), Digits("loop gap")}};
   for (const EngineError& e : engine.engines) {
-    const std::string name = EngineComparison::NameOf(e.engine);
-    if (!e.failure.empty()) failures += Note(name + ": no result: " + Escape(e.failure));
-    table.rows.push_back(
-        {Text(name), Digits(NumberOrDash(e.force_nrmse)), Digits(NumberOrDash(e.force_nrmse_later)),
-         Digits(NumberOrDash(e.force_max_rel)), Digits(NumberOrDash(e.closure_max_m) + " m")});
+    table.rows.push_back({EngineComparison::NameOf(e.engine), NumberOrDash(e.force_nrmse),
+                          NumberOrDash(e.force_nrmse_later), NumberOrDash(e.force_max_rel),
+                          NumberOrDash(e.closure_max_m) + " m"});
   }
-  return friction + ToHtml(table) + failures +
-         Note(
-             "What MuJoCo as it is is off by is its own modelling error, not the equations'. Most "
-             "of it are the first moments, in which its soft constraints take up the load.");
+  if (table.rows.empty()) return section;
+  section.Add(std::move(table));
+  for (const EngineError& e : engine.engines) {
+    if (e.failure.empty()) continue;
+    section.Note(fmt::format("{}: no result: {}", EngineComparison::NameOf(e.engine), e.failure),
+                 On::kAll);
+  }
+  section.Note(
+      "What MuJoCo as it is is off by is its own modelling error, not the equations'. Most of it "
+      "are the first moments, in which its soft constraints take up the load.");
+  return section;
 }
 
 // One column per witness that recorded its energies.
@@ -105,11 +109,13 @@ std::string EnergyHtml(const Report& report) {
   }
   if (audits.empty()) return "";
   Table table{
-      .caption = "Energy balance at the end of the run [J]", .head = {Text("of")}, .rows = {}};
-  for (const EnergyAudit* audit : audits) table.head.push_back(Digits(audit->witness));
+      .caption = "Energy balance at the end of the run [J]",
+      .columns = {Text("of")},
+  };
+  for (const EnergyAudit* audit : audits) table.columns.push_back(Digits(audit->witness));
   const auto add = [&](const std::string& title, const auto& value) {
-    std::vector<Cell> row = {Text(title)};
-    for (const EnergyAudit* audit : audits) row.push_back(Digits(value(*audit)));
+    std::vector<Cell> row = {title};
+    for (const EnergyAudit* audit : audits) row.push_back(value(*audit));
     table.rows.push_back(std::move(row));
   };
   for (const EnergyPart& part : audits.back()->parts) {
@@ -142,18 +148,19 @@ std::string AuditHtml(const std::optional<HtmlAudit>& audit) {
   if (!audit) return "";
   if (!audit->note.empty()) return "<p>" + Escape(audit->note) + "</p>\n";
   size_t right = 0, corrected = 0, open = 0;
-  Table table{.caption = "Every numbered equation",
-              .head = {Text("equation"), Text("status"), Text("as printed"), Text("corrected"),
-                       Text("residual"), Text("note")},
-              .rows = {}};
+  Table table{
+      .caption = "Every numbered equation",
+      .columns = {Text("equation"), Text("status"), Text("as printed"), Text("corrected"),
+                  Text("residual"), Text("note")},
+  };
   for (const HtmlEquation& row : audit->rows) {
     right += row.right ? 1 : 0;
     corrected += row.corrected_right ? 1 : 0;
     open += row.right || row.corrected_right ? 0 : 1;
-    const char* kind = row.right ? "ok" : row.corrected_right ? "warn" : "off";
-    table.rows.push_back({Text(row.equation + (row.erratum.empty() ? "" : " " + row.erratum)),
-                          Markup(Pill(kind, row.status)), Text(row.printed), Text(row.corrected),
-                          Text(row.residual), Text(row.note)});
+    const Mark mark = row.right ? Mark::kOk : row.corrected_right ? Mark::kWarn : Mark::kOff;
+    table.rows.push_back({row.equation + (row.erratum.empty() ? "" : " " + row.erratum),
+                          Cell(row.status, mark), row.printed, row.corrected, row.residual,
+                          row.note});
   }
   return "<p>" + Escape(audit->source) +
          fmt::format(
@@ -166,13 +173,14 @@ std::string AuditHtml(const std::optional<HtmlAudit>& audit) {
 
 std::string SignalsHtml(const Report& report) {
   if (report.sheets.empty()) return "";
-  Table table{.caption = "Frame and sign of each force signal",
-              .head = {Text("signal"), Text("unit"), Text("acts on"), Text("exerted by"),
-                       Text("frame and axis"), Text("positive means")},
-              .rows = {}};
+  Table table{
+      .caption = "Frame and sign of each force signal",
+      .columns = {Text("signal"), Text("unit"), Text("acts on"), Text("exerted by"),
+                  Text("frame and axis"), Text("positive means")},
+  };
   for (const SignalSheet& sheet : report.sheets) {
-    table.rows.push_back({Text(sheet.signal), Text(sheet.unit), Text(sheet.acts_on),
-                          Text(sheet.exerted_by), Text(sheet.frame), Text(sheet.positive)});
+    table.rows.push_back(
+        {sheet.signal, sheet.unit, sheet.acts_on, sheet.exerted_by, sheet.frame, sheet.positive});
   }
   return ToHtml(table);
 }
@@ -258,15 +266,16 @@ class PageWriter {
     page_.Add("Verdict", "Verdict", VerdictHtml(view_, Cards(), About()));
     Interactive();
     Pictures();
-    page_.Add("Checks", "Checks",
-              PairMatrixHtml(report_.comparison) + ChecksHtml(view_, kHowToReadChecks));
-    page_.Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
-    page_.Add("Tables that command the motion", "Tables", MotionTableHtml(report_));
-    page_.Add("Drives", "Drives", DrivesHtml(report_));
+    page_.Add("Checks", "Checks", PairsHtml() + ChecksHtml(view_, kHowToReadChecks));
+    page_.Add(ReferenceTableSection(report_, false));
+    page_.Add(MotionTableSection(report_, true));
+    page_.Add(DriveSection(report_));
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("Motors", "Motors", SizingHtml(report_));
-    page_.Add("The simulator's own error", "Engine", EngineHtml(report_));
-    page_.Add("Your own file, run as it is", "File", SourceModelHtml(report_.source_model.get()));
+    page_.Add(EngineSection(report_));
+    if (report_.source_model != nullptr) {
+      page_.Add(SourceModelSection(*report_.source_model, false));
+    }
     page_.Add("Energy", "Energy", EnergyHtml(report_));
     page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
     page_.Add("The paper's equations", "Equations", AuditHtml(input_.audit));
@@ -288,6 +297,11 @@ class PageWriter {
                           report_.start_window_s);
     }
     return html;
+  }
+
+  std::string PairsHtml() const {
+    const Table pairs = PairMatrix(report_.comparison);
+    return pairs.rows.empty() ? "" : ToHtml(pairs);
   }
 
   std::string Cards() const {
@@ -432,27 +446,27 @@ std::string PeakTime(double time_s) {
 }
 
 void AddFigures(const Figures& figures, std::vector<Cell>* row) {
-  row->push_back(Digits(FigureElement(figures.peak, figures.unit)));
-  row->push_back(Digits(PeakTime(figures.time_s)));
-  row->push_back(Digits(FigureElement(figures.rms, figures.unit)));
-  row->push_back(Digits(FigureElement(figures.mean, figures.unit)));
+  row->push_back(FigureElement(figures.peak, figures.unit));
+  row->push_back(PeakTime(figures.time_s));
+  row->push_back(FigureElement(figures.rms, figures.unit));
+  row->push_back(FigureElement(figures.mean, figures.unit));
 }
 
 Table DriveTable(const std::vector<DriveLoad>& loads, const std::string& witness) {
   Table table{
       .caption = "Drives, " + witness,
-      .head = {Text("drive"), Digits("force, peak"), Digits("at"), Digits("RMS"), Digits("mean"),
-               Digits("power, peak"), Digits("at"), Digits("RMS"), Digits("mean"), Digits("stroke"),
-               Digits("speed, peak"), Digits("speed, RMS")},
-      .rows = {}};
+      .columns = {Text("drive"), Digits("force, peak"), Digits("at"), Digits("RMS"), Digits("mean"),
+                  Digits("power, peak"), Digits("at"), Digits("RMS"), Digits("mean"),
+                  Digits("stroke"), Digits("speed, peak"), Digits("speed, RMS")},
+  };
   for (const DriveLoad& load : loads) {
     if (load.witness != witness) continue;
-    std::vector<Cell> row = {Text(load.drive)};
+    std::vector<Cell> row = {load.drive};
     AddFigures(load.force, &row);
     AddFigures(load.power, &row);
-    row.push_back(Digits(FigureElement(load.stroke, load.stroke_unit)));
-    row.push_back(Digits(FigureElement(load.speed.peak, load.speed.unit)));
-    row.push_back(Digits(FigureElement(load.speed.rms, load.speed.unit)));
+    row.push_back(FigureElement(load.stroke, load.stroke_unit));
+    row.push_back(FigureElement(load.speed.peak, load.speed.unit));
+    row.push_back(FigureElement(load.speed.rms, load.speed.unit));
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -461,13 +475,12 @@ Table DriveTable(const std::vector<DriveLoad>& loads, const std::string& witness
 Table JointTable(const std::vector<JointLoad>& loads, const std::string& witness) {
   Table table{
       .caption = "Joint reactions, magnitudes, " + witness,
-      .head = {Text("joint"), Digits("force, peak"), Digits("at"), Digits("RMS"), Digits("mean"),
-               Digits("moment, peak"), Digits("at"), Digits("RMS"), Digits("mean")},
-      .rows = {}};
+      .columns = {Text("joint"), Digits("force, peak"), Digits("at"), Digits("RMS"), Digits("mean"),
+                  Digits("moment, peak"), Digits("at"), Digits("RMS"), Digits("mean")},
+  };
   for (const JointLoad& load : loads) {
     if (load.witness != witness) continue;
-    std::vector<Cell> row = {
-        Markup(Escape(load.joint) + (load.not_unique ? " " + Pill("warn", "not unique") : ""))};
+    std::vector<Cell> row = {Cell(load.joint, Mark::kNone, load.not_unique ? "not unique" : "")};
     AddFigures(load.force, &row);
     AddFigures(load.moment, &row);
     table.rows.push_back(std::move(row));

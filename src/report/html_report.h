@@ -59,10 +59,12 @@ struct HtmlInput {
 /// little-endian 32-bit floats in base64). No '<' occurs in it.
 [[nodiscard]] std::string PageData(const HtmlInput& input);
 
-// The tables of a motion's page. Each returns HTML, or "" when there is nothing to show.
+// The sections of a motion; without blocks, or "", when there is nothing to show.
 
-[[nodiscard]] std::string DrivesHtml(const Report& report);
-[[nodiscard]] std::string EngineHtml(const Report& report);
+/// Errors of each pair's drive forces; a terminal shows the main pair's.
+[[nodiscard]] ReportSection DriveSection(const Report& report);
+/// What MuJoCo's own friction and other engines are off by.
+[[nodiscard]] ReportSection EngineSection(const Report& report);
 /// What drives and joints bear: force, power, stroke and speed; magnitudes of reactions.
 [[nodiscard]] std::string LoadsHtml(const Report& report);
 [[nodiscard]] std::string EnergyHtml(const Report& report);

@@ -27,50 +27,51 @@ std::string ChangeText(double rms, double max, const std::string& unit) {
   return fmt::format("RMS {:.2e}, at most {:.2e} {}", rms, max, unit);
 }
 
-std::string ForceText(const SmoothedForce& force) {
-  return fmt::format("RMS {:.3e} of {:.6g} {}, at most {:.3e} {}", force.change_rms, force.rms,
-                     force.unit, force.change_max, force.unit);
-}
-
 Table TablesTable(const Report& report) {
-  Table html{.caption = "Tables and their splines",
-             .head = {Text("of"), Text("file"), Text("column"), Text("rows"), Text("smoothing"),
-                      Digits("smoothing changes by"), Digits("its second derivative by"),
-                      Digits("which is (RMS)")},
-             .rows = {}};
+  Table html{
+      .caption = "Tables and their splines",
+      .columns = {Text("of"), Text("file"), Text("column"), Text("rows"), Text("smoothing"),
+                  Digits("smoothing changes by"), Digits("its second derivative by"),
+                  Digits("which is (RMS)")},
+  };
   for (const MotionTable& table : report.tables) {
-    html.rows.push_back({Text(table.name), Text(table.file), Text(table.column),
-                         Text(KindText(table)), Text(SmoothingText(table)),
-                         Digits(ChangeText(table.change_rms, table.change_max, table.unit)),
-                         Digits(ChangeText(table.acceleration_change_rms,
-                                           table.acceleration_change_max, table.unit + "/s²")),
-                         Digits(fmt::format("{:.5g} {}/s²", table.acceleration_rms, table.unit))});
+    html.rows.push_back({table.name, table.file, table.column, KindText(table),
+                         SmoothingText(table),
+                         ChangeText(table.change_rms, table.change_max, table.unit),
+                         ChangeText(table.acceleration_change_rms, table.acceleration_change_max,
+                                    table.unit + "/s²"),
+                         fmt::format("{:.5g} {}/s²", table.acceleration_rms, table.unit)});
   }
   return html;
 }
 
 Table ForcesTable(const Report& report) {
-  Table html{.caption = "What smoothing takes out of the drive forces",
-             .head = {Text("drive"), Digits("force, RMS"), Digits("change, RMS"),
-                      Digits("change, largest")},
-             .rows = {}};
+  Table html{
+      .caption = "What smoothing takes out of the drive forces",
+      .columns = {Text("drive"), Digits("force, RMS"), Digits("change, RMS"),
+                  Digits("change, largest")},
+  };
   for (const SmoothedForce& force : report.smoothed_forces) {
-    html.rows.push_back({Text(force.drive), Digits(fmt::format("{:.6g} {}", force.rms, force.unit)),
-                         Digits(fmt::format("{:.3e} {}", force.change_rms, force.unit)),
-                         Digits(fmt::format("{:.3e} {}", force.change_max, force.unit))});
+    html.rows.push_back({force.drive, fmt::format("{:.6g} {}", force.rms, force.unit),
+                         fmt::format("{:.3e} {}", force.change_rms, force.unit),
+                         fmt::format("{:.3e} {}", force.change_max, force.unit)});
   }
   return html;
 }
 
 }  // namespace
 
-std::vector<std::string> MotionTableLines(const Report& report, bool verbose) {
-  std::vector<std::string> lines;
+ReportSection MotionTableSection(const Report& report, bool verbose) {
+  ReportSection section{.title = "Tables that command the motion", .link = "Tables"};
+  if (report.tables.empty()) return section;
+  section.Add(TablesTable(report), On::kPage);
+  Items lines;
   for (const MotionTable& table : report.tables) {
-    lines.push_back(fmt::format("{} follows column '{}' of {}: {}; smoothing: {}", table.name,
-                                table.column, table.file, KindText(table), SmoothingText(table)));
+    lines.texts.push_back(fmt::format("{} follows column '{}' of {}: {}; smoothing: {}", table.name,
+                                      table.column, table.file, KindText(table),
+                                      SmoothingText(table)));
     if (table.moves && (verbose || table.smoothed() || table.noise_share() > kReportedShare)) {
-      lines.push_back(
+      lines.texts.push_back(
           fmt::format("  {} by {}, the second derivative by {} (RMS of all: {:.4g})",
                       table.smoothed() ? "smoothing changes it" : "smoothing: auto would change it",
                       ChangeText(table.change_rms, table.change_max, table.unit),
@@ -79,24 +80,15 @@ std::vector<std::string> MotionTableLines(const Report& report, bool verbose) {
                       table.acceleration_rms));
     }
     if (!verbose) continue;
-    for (const std::string& note : table.notes) lines.push_back("  " + note);
+    for (const std::string& note : table.notes) lines.texts.push_back("  " + note);
   }
-  for (const SmoothedForce& force : report.smoothed_forces) {
-    lines.push_back(
-        fmt::format("smoothing changes the force of {}: {}", force.drive, ForceText(force)));
-  }
-  return lines;
-}
-
-std::string MotionTableHtml(const Report& report) {
-  if (report.tables.empty()) return "";
-  std::string html = ToHtml(TablesTable(report));
-  html += Note(
+  section.Add(std::move(lines), On::kTerminal);
+  section.Note(
       "Quintic splines through all rows, or as near as their noise allows. Without smoothing, the "
       "changes are those that smoothing: auto would make: they are what noise and rounding of the "
       "rows add to the second derivative, which drive forces follow.");
-  if (!report.smoothed_forces.empty()) html += ToHtml(ForcesTable(report));
-  return html;
+  section.Add(ForcesTable(report));
+  return section;
 }
 
 Json MotionTableJson(const Report& report) {

@@ -6,15 +6,13 @@
 #include <vector>
 
 #include "base/json_text.h"
+#include "report/document.h"
 #include "report/report.h"
 
 namespace mbv {
 
-/// Lines for a terminal; empty without a table. Notes of the reader only when `verbose`.
-[[nodiscard]] std::vector<std::string> MotionTableLines(const Report& report, bool verbose);
-
-/// Section of report.html; "" without a table.
-[[nodiscard]] std::string MotionTableHtml(const Report& report);
+/// Without blocks where no table moves anything. Notes of the reader only when `verbose`.
+[[nodiscard]] ReportSection MotionTableSection(const Report& report, bool verbose);
 
 /// `motion_tables` of summary.json.
 [[nodiscard]] nlohmann::ordered_json MotionTableJson(const Report& report);

@@ -7,22 +7,10 @@
 #include <cmath>
 #include <cstdint>
 
-#include "base/demand.h"
 #include "base/markup.h"
 #include "report/html_assets.h"
 
 namespace mbv {
-namespace {
-
-std::string CellHtml(const Cell& cell, const char* tag, const char* scope) {
-  std::string html = std::string("<") + tag + scope;
-  if (cell.number) html += " class=\"n\"";
-  html += ">" + (cell.html ? cell.text : Escape(cell.text)) + "</" + tag + ">";
-  return html;
-}
-
-}  // namespace
-
 std::string Escape(std::string_view text) { return EscapeMarkup(text); }
 
 std::string Base64(std::string_view bytes) { return EncodeBase64(bytes); }
@@ -35,26 +23,6 @@ std::string Base64(std::span<const float> values) {
     for (int shift = 0; shift < 32; shift += 8) bytes += static_cast<char>(word >> shift & 255U);
   }
   return Base64(bytes);
-}
-
-std::string ToHtml(const Table& table) {
-  std::string html = "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"" +
-                     Escape(table.caption) + "\"><table><caption>" + Escape(table.caption) +
-                     "</caption><thead><tr>";
-  for (const Cell& cell : table.head) {
-    // An empty heading names nothing.
-    html += cell.text.empty() ? "<td></td>" : CellHtml(cell, "th", " scope=\"col\"");
-  }
-  html += "</tr></thead><tbody>\n";
-  for (const std::vector<Cell>& row : table.rows) {
-    html += "<tr>";
-    for (size_t i = 0; i < row.size(); ++i) {
-      MBV_DEMAND(row.size() == table.head.size(), row.size());
-      html += i == 0 ? CellHtml(row[i], "th", " scope=\"row\"") : CellHtml(row[i], "td", "");
-    }
-    html += "</tr>\n";
-  }
-  return html + "</tbody></table></div>\n";
 }
 
 std::string NumberOrDash(double value, const char* format) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "comparison/comparison.h"
+#include "report/document.h"
 
 // Pieces of HTML: escaped text, tables, base64.
 
@@ -19,24 +20,6 @@ namespace mbv {
 [[nodiscard]] std::string Base64(std::string_view bytes);
 /// The values as little-endian 32-bit floats.
 [[nodiscard]] std::string Base64(std::span<const float> values);
-
-/// A table cell: text is escaped unless it is marked as HTML.
-struct Cell {
-  std::string text;
-  bool number = false;  ///< aligned to the right
-  bool html = false;    ///< `text` is HTML already
-};
-[[nodiscard]] inline Cell Text(std::string text) { return {std::move(text), false, false}; }
-[[nodiscard]] inline Cell Digits(std::string text) { return {std::move(text), true, false}; }
-[[nodiscard]] inline Cell Markup(std::string html) { return {std::move(html), false, true}; }
-
-/// A table that scrolls by itself where the page is narrow; the first column names the row.
-struct Table {
-  std::string caption;
-  std::vector<Cell> head;
-  std::vector<std::vector<Cell>> rows;
-};
-[[nodiscard]] std::string ToHtml(const Table& table);
 
 /// "–" for what is no number.
 [[nodiscard]] std::string NumberOrDash(double value, const char* format = "{:.2e}");
@@ -78,6 +61,7 @@ class Page {
   /// A section with its link in the navigation: `link` in lower case is its anchor. Without content
   /// there is none.
   void Add(const std::string& title, const std::string& link, const std::string& content);
+  void Add(const ReportSection& section) { Add(section.title, section.link, ToHtml(section)); }
 
   /// The whole page. Its policy forbids every request: what is shown is in the file.
   [[nodiscard]] std::string Write(const PageHead& head) const;

@@ -7,6 +7,7 @@
 
 #include "comparison/force_band.h"
 #include "math/trace.h"
+#include "report/document.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -36,12 +37,8 @@ struct SharedAxis {
 [[nodiscard]] std::vector<SharedAxis> ByUnit(const Trace& trace, Quantity quantity,
                                              const std::vector<std::string>& subjects);
 
-// Every witness against every other, where there are more than three: one number per pair.
-
-/// Lines for a terminal; empty with up to three witnesses.
-[[nodiscard]] std::vector<std::string> PairMatrixLines(const Comparison& comparison);
-
-/// Table of report.html; "" with up to three witnesses.
-[[nodiscard]] std::string PairMatrixHtml(const Comparison& comparison);
+/// Every witness against every other, where there are more than three: one number per pair; else
+/// without rows.
+[[nodiscard]] Table PairMatrix(const Comparison& comparison);
 
 }  // namespace mbv

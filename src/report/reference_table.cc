@@ -36,38 +36,34 @@ std::vector<const TableColumnResult*> ByRatio(const PairComparison& pair) {
   return columns;
 }
 
-std::string ColumnsHtml(const TableVerdict& table, const PairComparison& pair) {
-  Table html{.caption = fmt::format("Columns of {} against {}, worst first", table.name,
-                                    table.judged_against),
-             .head = {Text("signal"), Text("column"), Digits("RMS"), Digits("uncertainty"),
-                      Text("of it"), Digits("RMS difference"), Digits("tube"),
-                      Digits("largest difference"), Digits("tube"), Digits("at"), Text("")},
-             .rows = {}};
+Table ColumnTable(const TableVerdict& table, const PairComparison& pair, bool verbose) {
+  Table columns{.caption = fmt::format("Columns of {} against {}, worst first", table.name,
+                                       table.judged_against),
+                .columns = {Text("signal"), Text("column", On::kPage), Digits("RMS"),
+                            Digits("uncertainty"), Text("of it", verbose ? On::kAll : On::kPage),
+                            Digits("RMS difference"), Digits("tube"), Digits("largest difference"),
+                            Digits("tube"), Digits("at", On::kPage), Text("")}};
   for (const TableColumnResult* column : ByRatio(pair)) {
     const TableColumn& source = SourceOf(table, *column);
-    const bool inside = column->inside();
-    html.rows.push_back(
-        {Text(column->channel), Text(source.heading),
-         Digits(NumberOrOff(column->rms, "{:.6g} ") + source.channel.unit),
-         Digits(NumberOrOff(column->standard)),
-         Text(UncertaintyText(table.uncertainty[column->column])),
-         Digits(NumberOrOff(column->error_rms)), Digits(NumberOrOff(column->tube_rms)),
-         Digits(NumberOrOff(column->error_max)), Digits(NumberOrOff(column->tube_max)),
-         Digits(NumberOrOff(column->time_s, "{:.4g} s")),
-         Markup(inside         ? Pill("ok", "inside")
-                : table.judged ? Pill("fail", "outside")
-                               : Pill("off", "not judged"))});
+    columns.rows.push_back(
+        {column->channel, source.heading, NumberOrOff(column->rms, "{:.6g} ") + source.channel.unit,
+         NumberOrOff(column->standard), UncertaintyText(table.uncertainty[column->column]),
+         NumberOrOff(column->error_rms), NumberOrOff(column->tube_rms),
+         NumberOrOff(column->error_max), NumberOrOff(column->tube_max),
+         NumberOrOff(column->time_s, "{:.4g} s"),
+         column->inside() ? Cell("inside", Mark::kOk)
+         : table.judged   ? Cell("OUTSIDE", Mark::kFail)
+                          : Cell("not judged", Mark::kOff)});
   }
-  return ToHtml(html);
+  return columns;
 }
 
 // The table's values with their tube on the other witness' curve, and the difference in the tube.
-std::string PlotsHtml(const Report& report, const PairComparison& pair) {
+void AddPlots(const Report& report, const PairComparison& pair, ReportSection* section) {
   const TableVerdict& table = *report.comparison.table;
   const Trace* values = TraceOf(report, role::kReference.name);
   const Trace* other = TraceOf(report, table.judged_against);
-  if (values == nullptr || other == nullptr) return "";
-  std::string html;
+  if (values == nullptr || other == nullptr) return;
   const std::vector<const TableColumnResult*> columns = ByRatio(pair);
   for (size_t k = 0; k < std::min(kMostPlots, columns.size()); ++k) {
     const TableColumnResult& column = *columns[k];
@@ -105,12 +101,12 @@ std::string PlotsHtml(const Report& report, const PairComparison& pair) {
                    {.label = fmt::format("tube ±{:.2g}", column.tube_max),
                     .points = {{from, column.tube_max}, {to, column.tube_max}}},
                    {.label = "", .points = {{from, -column.tube_max}, {to, -column.tube_max}}}};
-    html += FigureHtml(ToSvg(signal)) + FigureHtml(ToSvg(error));
+    section->Add(Drawing{ToSvg(signal)});
+    section->Add(Drawing{ToSvg(error)});
   }
   if (columns.size() > kMostPlots) {
-    html += Note(fmt::format("The {} worst of {} columns.", kMostPlots, columns.size()));
+    section->Note(fmt::format("The {} worst of {} columns.", kMostPlots, columns.size()));
   }
-  return html;
 }
 
 }  // namespace
@@ -139,64 +135,27 @@ std::string UncertaintyText(const TableUncertainty& uncertainty) {
   return text;
 }
 
-std::vector<std::string> ReferenceTableLines(const Comparison& comparison, bool verbose) {
-  if (!comparison.table) return {};
-  const TableVerdict& table = *comparison.table;
-  std::vector<std::string> lines = {
-      fmt::format("the reference is the table {}: {}", table.name, table.grid)};
-  if (const PairComparison* pair = TablePair(comparison)) {
-    lines.push_back(
-        fmt::format("  each column against {}; the tube is {:g} times its uncertainty "
-                    "or the limit, whichever is wider",
-                    table.judged_against, table.coverage));
-    size_t width = 0;
-    for (const TableColumnResult& column : pair->columns) {
-      width = std::max(width, column.channel.size());
-    }
-    for (const TableColumnResult* column : ByRatio(*pair)) {
-      lines.push_back(fmt::format(
-          "  {:<{}}  RMS {:.5g} {}, uncertainty {:.1e}, differs by {:.1e} (tube {}), at most "
-          "{:.1e} (tube {}): {}",
-          column->channel, width, column->rms, SourceOf(table, *column).channel.unit,
-          column->standard, column->error_rms, NumberOrOff(column->tube_rms, "{:.1e}"),
-          column->error_max, NumberOrOff(column->tube_max, "{:.1e}"),
-          column->inside() ? "inside"
-          : table.judged   ? "OUTSIDE"
-                           : "not judged"));
-      const std::string parts = UncertaintyText(table.uncertainty[column->column]);
-      if (verbose && !parts.empty()) lines.push_back("      uncertainty: " + parts);
-    }
-  }
-  if (verbose) {
-    for (const std::string& note : table.notes) lines.push_back("  " + note);
-  }
-  return lines;
-}
-
-std::string ReferenceTableHtml(const Report& report) {
-  if (!report.comparison.table) return "";
+ReportSection ReferenceTableSection(const Report& report, bool verbose) {
+  ReportSection section{.title = "The table in the reference's place", .link = "Table"};
+  if (!report.comparison.table) return section;
   const TableVerdict& table = *report.comparison.table;
-  std::string html = "<p>" + Escape(table.name) + ": " + Escape(table.grid) + "</p>\n";
-  if (!table.too_coarse.empty()) {
-    html += "<p class=\"attribution odd\">" + Escape(table.too_coarse) + "</p>\n";
-  }
+  section.Add(Paragraph{fmt::format("the reference is the table {}: {}", table.name, table.grid)});
+  section.Add(Paragraph{table.too_coarse, Paragraph::Look::kOdd}, On::kPage);
   for (const std::string& diagnosis : table.diagnoses) {
-    html += "<p class=\"attribution odd\">" + Escape(diagnosis) + "</p>\n";
+    section.Add(Paragraph{diagnosis, Paragraph::Look::kOdd}, On::kPage);
   }
   if (const PairComparison* pair = TablePair(report.comparison)) {
-    html += ColumnsHtml(table, *pair);
-    html += Note(fmt::format(
-        "The tube is {:g} times the column's uncertainty or the scenario's limit, whichever is "
-        "wider.",
-        table.coverage));
-    html += PlotsHtml(report, *pair);
+    section.Add(ColumnTable(table, *pair, verbose));
+    section.Note(fmt::format("The tube is {:g} times the column's uncertainty or the scenario's "
+                             "limit, whichever is wider.",
+                             table.coverage),
+                 On::kAll);
+    AddPlots(report, *pair, &section);
   }
-  if (!table.notes.empty()) {
-    std::string notes;
-    for (const std::string& note : table.notes) notes += "<li>" + Escape(note) + "</li>\n";
-    html += Folded("How the file was read", "<ul>\n" + notes + "</ul>");
-  }
-  return html;
+  Fold notes{"How the file was read", {}};
+  if (!table.notes.empty()) notes.blocks.push_back({Items{table.notes}});
+  section.Add(std::move(notes), verbose ? On::kAll : On::kPage);
+  return section;
 }
 
 }  // namespace mbv

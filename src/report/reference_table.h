@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "report/document.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -15,13 +16,9 @@ namespace mbv {
 /// "digits 2.9e-04, noise 1.1e-03": the parts of a column's standard uncertainty that are not 0.
 [[nodiscard]] std::string UncertaintyText(const TableUncertainty& uncertainty);
 
-/// Lines for a terminal: the file, its uncertainty, each column with its tube; empty without a
-/// table. Notes of the reader only when `verbose`.
-[[nodiscard]] std::vector<std::string> ReferenceTableLines(const Comparison& comparison,
-                                                           bool verbose);
-
-/// Section of report.html: the columns with tubes, plots of the worst columns, notes; "" without a
-/// table.
-[[nodiscard]] std::string ReferenceTableHtml(const Report& report);
+/// The file, its uncertainty, the columns with tubes, plots of the worst ones, how it was read;
+/// without blocks where there is no table. `verbose`: notes of the reader and what the uncertainty
+/// is made of also on a terminal.
+[[nodiscard]] ReportSection ReferenceTableSection(const Report& report, bool verbose);
 
 }  // namespace mbv

@@ -225,33 +225,36 @@ std::string Margin(const ShownCheck& check) {
                      check.pass ? "" : " over", filled, factor);
 }
 
-std::string EndPill(const ShownCheck& check) {
-  switch (EndOf(check)) {
-    case CheckEnd::kOff:
-      return Pill("off", "off");
-    case CheckEnd::kFail:
-      return Pill("fail", "fail");
-    case CheckEnd::kVoid:
-      return Pill("warn", "verifies nothing");
-    case CheckEnd::kHeld:
-      return Pill("off", "held");
-    case CheckEnd::kOk:
-      return Pill("ok", "ok");
-  }
-  return "";
-}
-
 std::vector<Cell> CheckRow(const ShownCheck& check, bool margins) {
-  std::vector<Cell> row = {
-      Text(Spaced(check.subject)), Text(check.title), Digits(NumberOrDash(check.value)),
-      Digits(check.limit ? fmt::format("{:.1e}", *check.limit) : "off"),
-      Markup(EndPill(check) + (check.floored ? " " + Pill("warn", "floored") : ""))};
-  if (margins) row.push_back(Markup(check.blind.empty() ? Margin(check) : ""));
-  row.push_back(Text(WhereOf(check)));
+  std::vector<Cell> row = {Spaced(check.subject), check.title, NumberOrDash(check.value),
+                           check.limit ? fmt::format("{:.1e}", *check.limit) : "off",
+                           EndCell(check)};
+  if (check.floored) row.back().remark = "floored";
+  if (margins) {
+    row.emplace_back("");
+    if (check.blind.empty()) row.back().html = Margin(check);
+  }
+  row.emplace_back(WhereOf(check));
   return row;
 }
 
 }  // namespace
+
+Cell EndCell(const ShownCheck& check) {
+  switch (EndOf(check)) {
+    case CheckEnd::kOff:
+      return {"off", Mark::kOff};
+    case CheckEnd::kFail:
+      return {"FAIL", Mark::kFail};
+    case CheckEnd::kVoid:
+      return {"verifies nothing", Mark::kWarn};
+    case CheckEnd::kHeld:
+      return {"held", Mark::kOff};
+    case CheckEnd::kOk:
+      break;
+  }
+  return {"ok", Mark::kOk};
+}
 
 const char* SourceWord(Source source) {
   switch (source) {
@@ -301,12 +304,13 @@ std::string VerdictHtml(const ResultView& view, const std::string& cards,
 std::string ChecksHtml(const ResultView& view, const std::string& note) {
   if (view.checks.empty()) return "";
   const bool margins = view.look.margins;
-  Table table{.caption = "Checks, failed ones first",
-              .head = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
-                       Text(margins ? "result" : "")},
-              .rows = {}};
-  if (margins) table.head.push_back(Text("margin"));
-  table.head.push_back(Text("worst at"));
+  Table table{
+      .caption = "Checks, failed ones first",
+      .columns = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
+                  Text(margins ? "result" : "")},
+  };
+  if (margins) table.columns.push_back(Text("margin"));
+  table.columns.push_back(Text("worst at"));
   for (const bool failed : {true, false}) {
     for (const ShownCheck& check : view.checks) {
       if ((EndOf(check) == CheckEnd::kFail) == failed)
@@ -331,16 +335,17 @@ std::string GapsHtml(const ResultView& view) {
 
 std::string ParametersHtml(const std::vector<Parameter>& parameters, bool sources) {
   if (parameters.empty()) return "";
-  Table table{.caption = "Parameters with the scenario's overrides",
-              .head = {Text("name"), Digits("value"), Text("unit")},
-              .rows = {}};
-  if (sources) table.head.push_back(Text("source"));
-  table.head.push_back(Text("note"));
+  Table table{
+      .caption = "Parameters with the scenario's overrides",
+      .columns = {Text("name"), Digits("value"), Text("unit")},
+  };
+  if (sources) table.columns.push_back(Text("source"));
+  table.columns.push_back(Text("note"));
   for (const Parameter& parameter : parameters) {
-    std::vector<Cell> row = {Text(parameter.name), Digits(fmt::format("{:.10g}", parameter.value)),
-                             Text(parameter.unit)};
-    if (sources) row.push_back(Text(SourceWord(parameter.source)));
-    row.push_back(Text(parameter.note));
+    std::vector<Cell> row = {parameter.name, fmt::format("{:.10g}", parameter.value),
+                             parameter.unit};
+    if (sources) row.push_back(SourceWord(parameter.source));
+    row.push_back(parameter.note);
     table.rows.push_back(std::move(row));
   }
   return Folded(fmt::format("{} parameters", parameters.size()), ToHtml(table));
@@ -348,15 +353,18 @@ std::string ParametersHtml(const std::vector<Parameter>& parameters, bool source
 
 std::string ReproduceHtml(const ResultView& view, const std::string& command,
                           const std::string& times, const std::string& files) {
-  Table table{.caption = "Inputs and versions", .head = {Text("what"), Text("is")}, .rows = {}};
+  Table table{
+      .caption = "Inputs and versions",
+      .columns = {Text("what"), Text("is")},
+  };
   if (!view.frame->scenario_file.empty()) {
-    table.rows.push_back({Text("scenario"), Text(view.frame->scenario_file)});
+    table.rows.push_back({"scenario", view.frame->scenario_file});
   }
-  table.rows.push_back({Text("model"), Text(view.frame->model_file)});
+  table.rows.push_back({"model", view.frame->model_file});
   for (const auto& [name, version] : view.frame->versions) {
-    table.rows.push_back({Text(name), Text(version)});
+    table.rows.push_back({name, version});
   }
-  if (!times.empty()) table.rows.push_back({Text("time taken"), Text(times)});
+  if (!times.empty()) table.rows.push_back({"time taken", times});
   return "<pre tabindex=\"0\"><code>" + Escape(command) + "</code></pre>\n" + ToHtml(table) +
          Note(files);
 }

@@ -63,6 +63,8 @@ struct ShownCheck {
 /// How a check ended.
 enum class CheckEnd { kOff, kFail, kVoid, kHeld, kOk };
 [[nodiscard]] CheckEnd EndOf(const ShownCheck& check);
+/// Its word, the same wherever it is shown.
+[[nodiscard]] Cell EndCell(const ShownCheck& check);
 /// "d1.force, 0.25 s"; "" without a place.
 [[nodiscard]] std::string WhereOf(const ShownCheck& check);
 

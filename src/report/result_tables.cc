@@ -33,22 +33,6 @@ std::string InUnit(double value, const std::string& unit) {
   return std::isfinite(value) ? Significant(value) + " " + unit : kDash;
 }
 
-std::string EndText(const ShownCheck& check) {
-  switch (EndOf(check)) {
-    case CheckEnd::kOff:
-      return "off";
-    case CheckEnd::kFail:
-      return "fails";
-    case CheckEnd::kVoid:
-      return "verifies nothing";
-    case CheckEnd::kHeld:
-      return "held";
-    case CheckEnd::kOk:
-      break;
-  }
-  return "ok";
-}
-
 // "kg m^2" → "kg m²".
 std::string PrintedUnit(std::string unit) {
   if (unit == "1") return "";
@@ -65,12 +49,13 @@ std::string NoneOr(const std::vector<std::string>& names) {
 
 }  // namespace
 
-PaperTable ParameterTable(const std::vector<Parameter>& parameters,
-                          const std::map<std::string, StatedNumber>& stated) {
-  PaperTable table;
+Table ParameterTable(const std::vector<Parameter>& parameters,
+                     const std::map<std::string, StatedNumber>& stated) {
+  Table table;
   table.name = "parameters";
   table.caption = "Parameters";
-  table.columns = {{"Parameter"}, {"Value", true}, {"Unit"}, {"Source"}, {"Meaning", false, true}};
+  table.columns = {Text("Parameter"), Digits("Value"), Text("Unit"), Text("Source"),
+                   Wide("Meaning")};
   for (const Parameter& parameter : parameters) {
     const auto at = stated.find(parameter.name);
     const bool written = at != stated.end() && at->second.value == parameter.value;
@@ -83,11 +68,11 @@ PaperTable ParameterTable(const std::vector<Parameter>& parameters,
   return table;
 }
 
-PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& report) {
-  PaperTable table;
+Table MobilityTable(const Mechanism& mechanism, const MobilityReport& report) {
+  Table table;
   table.name = "mobility";
   table.caption = "Mobility of " + mechanism.name;
-  table.columns = {{"Quantity"}, {"Value", false, true}};
+  table.columns = {Text("Quantity"), Wide("Value")};
   const Mobility& m = report.home;
   const auto add = [&](const char* what, const std::string& value) {
     table.rows.push_back({what, value});
@@ -109,31 +94,28 @@ PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& repor
   return table;
 }
 
-PaperTable CheckTable(const ResultView& view) {
-  PaperTable table;
+Table CheckTable(const ResultView& view) {
+  Table table;
   table.name = "checks";
   table.caption = fmt::format("Checks of {}: {}", view.frame->title(), ToText(view.verdict));
-  table.columns = {{"Compared"}, {"Check"}, {"Value", true}, {"Limit", true}, {"Result"}};
+  table.columns = {Text("Compared"), Text("Check"), Digits("Value"), Digits("Limit"),
+                   Text("Result")};
   for (const ShownCheck& check : view.checks) {
     if (!check.limit) continue;
     table.rows.push_back({check.subject, check.title,
                           std::isnan(check.value) ? kDash : fmt::format("{:.1e}", check.value),
-                          fmt::format("{:.1e}", *check.limit), EndText(check)});
+                          fmt::format("{:.1e}", *check.limit), EndCell(check).text});
   }
   return table;
 }
 
-PaperTable SizingTable(const Report& report) {
-  PaperTable table;
+Table SizingTable(const Report& report) {
+  Table table;
   table.name = "sizing";
   table.caption = fmt::format("Motors in {}", report.title());
-  table.columns = {{"Drive"},
-                   {"Torque, peak", true},
-                   {"RMS", true},
-                   {"Speed, peak", true},
-                   {"Power, peak", true},
-                   {"Largest use", true},
-                   {"of"}};
+  table.columns = {
+      Text("Drive"),         Digits("Torque, peak"), Digits("RMS"), Digits("Speed, peak"),
+      Digits("Power, peak"), Digits("Largest use"),  Text("of")};
   for (const MotorLoad* load : MainMotorLoads(report)) {
     const double use = load->largest_use();
     table.rows.push_back({load->drive, InUnit(load->peak_torque, load->torque_unit),

@@ -7,7 +7,7 @@
 
 #include "kinematics/mobility.h"
 #include "mechanism/mechanism.h"
-#include "report/paper_table.h"
+#include "report/document.h"
 #include "report/report.h"
 
 namespace mbv {
@@ -20,13 +20,13 @@ struct StatedNumber {
 
 /// Name, value, unit, source and meaning. A value that stands in `stated` is written with its
 /// digits there; one that was computed or set from outside with six digits at most.
-[[nodiscard]] PaperTable ParameterTable(const std::vector<Parameter>& parameters,
-                                        const std::map<std::string, StatedNumber>& stated);
+[[nodiscard]] Table ParameterTable(const std::vector<Parameter>& parameters,
+                                   const std::map<std::string, StatedNumber>& stated);
 /// Bodies, joints, DOFs, redundant constraints, what drives and statics determine.
-[[nodiscard]] PaperTable MobilityTable(const Mechanism& mechanism, const MobilityReport& report);
+[[nodiscard]] Table MobilityTable(const Mechanism& mechanism, const MobilityReport& report);
 /// Every check that has a limit: what is compared, value, limit, how it ended.
-[[nodiscard]] PaperTable CheckTable(const ResultView& view);
+[[nodiscard]] Table CheckTable(const ResultView& view);
 /// What the run asks of each motor; no rows without motors.
-[[nodiscard]] PaperTable SizingTable(const Report& report);
+[[nodiscard]] Table SizingTable(const Report& report);
 
 }  // namespace mbv

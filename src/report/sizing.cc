@@ -8,7 +8,6 @@
 #include "plot/svg_plot.h"
 #include "report/page.h"
 #include "report/plot_points.h"
-#include "report/text_table.h"
 
 namespace mbv {
 namespace {
@@ -49,23 +48,23 @@ std::string AtRestText(const MotorLoad& load) {
 }
 
 Table FiguresTable(const std::vector<const MotorLoad*>& loads) {
-  Table html{.caption = "Motors, " + loads.front()->witness,
-             .head = {Text("drive"), Digits("margin"), Text("share of each limit"),
-                      Digits("torque, peak"), Digits("RMS"), Digits("mean"),
-                      Digits("continuous limit"), Digits("speed, peak"), Digits("mean"),
-                      Digits("power, driving"), Digits("braking"), Digits("energy per cycle"),
-                      Digits("braking"), Digits("duty"), Digits("inertia ratio")},
-             .rows = {}};
+  Table html{
+      .caption = "Motors, " + loads.front()->witness,
+      .columns = {Text("drive"), Digits("margin"), Text("share of each limit"),
+                  Digits("torque, peak"), Digits("RMS"), Digits("mean"), Digits("continuous limit"),
+                  Digits("speed, peak"), Digits("mean"), Digits("power, driving"),
+                  Digits("braking"), Digits("energy per cycle"), Digits("braking"), Digits("duty"),
+                  Digits("inertia ratio")},
+  };
   for (const MotorLoad* load : loads) {
     const std::string &t = load->torque_unit, &s = load->speed_unit;
-    html.rows.push_back(
-        {Text(load->drive), Digits(NumberOrDash(load->margin(), "{:.3g}")), Text(UsesText(*load)),
-         Digits(WithUnit(load->peak_torque, t)), Digits(WithUnit(load->rms_torque, t)),
-         Digits(WithUnit(load->mean_torque, t)), Digits(WithUnit(load->continuous_torque, t)),
-         Digits(WithUnit(load->peak_speed, s)), Digits(WithUnit(load->mean_speed, s)),
-         Digits(WithUnit(load->peak_power, "W")), Digits(WithUnit(load->peak_brake_power, "W")),
-         Digits(WithUnit(load->energy_J, "J")), Digits(WithUnit(load->brake_energy_J, "J")),
-         Digits(Percent(load->duty)), Digits(NumberOrDash(load->inertia_ratio, "{:.3g}"))});
+    html.rows.push_back({load->drive, NumberOrDash(load->margin(), "{:.3g}"), UsesText(*load),
+                         WithUnit(load->peak_torque, t), WithUnit(load->rms_torque, t),
+                         WithUnit(load->mean_torque, t), WithUnit(load->continuous_torque, t),
+                         WithUnit(load->peak_speed, s), WithUnit(load->mean_speed, s),
+                         WithUnit(load->peak_power, "W"), WithUnit(load->peak_brake_power, "W"),
+                         WithUnit(load->energy_J, "J"), WithUnit(load->brake_energy_J, "J"),
+                         Percent(load->duty), NumberOrDash(load->inertia_ratio, "{:.3g}")});
   }
   return html;
 }
@@ -252,26 +251,18 @@ void Widen(const Report& report, std::vector<MotorEnvelope>* envelopes) {
 }
 
 std::string ToText(const std::vector<MotorEnvelope>& envelopes) {
-  size_t width = 5;
-  for (const MotorEnvelope& e : envelopes) width = std::max(width, e.drive.size());
-  const TextTable table("", {{"drive", -static_cast<int>(width)},
-                             {"peak torque", 16},
-                             {"RMS torque", 16},
-                             {"peak speed", 16},
-                             {"driving", 12},
-                             {"braking", 12},
-                             {"margin", 8},
-                             {"  by", 0}});
-  std::string text = table.Head() + "\n";
+  Table table{.columns = {Text("drive"), Digits("peak torque"), Digits("RMS torque"),
+                          Digits("peak speed"), Digits("driving"), Digits("braking"),
+                          Digits("margin"), Text("by")}};
   for (const MotorEnvelope& e : envelopes) {
-    text += table.Row({e.drive, WithUnit(e.peak_torque.value, e.torque_unit),
-                       WithUnit(e.rms_torque.value, e.torque_unit),
-                       WithUnit(e.peak_speed.value, e.speed_unit),
-                       WithUnit(e.peak_power.value, "W"), WithUnit(e.brake_power.value, "W"),
-                       e.limited ? fmt::format("{:.3g}", e.margin()) : "–",
-                       e.limited ? fmt::format("  {}, {}", e.limited_by, e.use.scenario) : ""}) +
-            "\n";
+    table.rows.push_back({e.drive, WithUnit(e.peak_torque.value, e.torque_unit),
+                          WithUnit(e.rms_torque.value, e.torque_unit),
+                          WithUnit(e.peak_speed.value, e.speed_unit),
+                          WithUnit(e.peak_power.value, "W"), WithUnit(e.brake_power.value, "W"),
+                          e.limited ? fmt::format("{:.3g}", e.margin()) : "–",
+                          e.limited ? fmt::format("{}, {}", e.limited_by, e.use.scenario) : ""});
   }
+  std::string text = ToText(table, {.indent = ""});
   for (const MotorEnvelope& e : envelopes) {
     if (e.unresolved.empty()) continue;
     text += fmt::format("{}: torque, power and margin not known between the samples: {}\n", e.drive,

@@ -7,7 +7,6 @@
 
 #include "base/json_text.h"
 #include "report/page.h"
-#include "report/text_table.h"
 
 namespace mbv {
 
@@ -55,116 +54,6 @@ std::string SourceModelSentence(const SourceModelAudit& audit) {
   }
   return fmt::format("with its own settings your file's drive forces are off by {:.2g} %, and {}",
                      100.0 * e.force, gap);
-}
-
-namespace {
-
-using Cells = std::vector<std::vector<std::string>>;
-
-// Columns as wide as their widest cell; the first to the left.
-void WriteTable(const std::vector<std::string>& head, const Cells& rows, TerminalText* out) {
-  std::vector<TextColumn> columns;
-  for (size_t c = 0; c < head.size(); ++c) {
-    size_t width = head[c].size();
-    for (const auto& row : rows) width = std::max(width, row[c].size());
-    const int wide = static_cast<int>(width);
-    columns.push_back({head[c], c == 0 ? -wide : wide + 2});
-  }
-  const TextTable table("    ", columns);
-  out->TableHead(table);
-  for (const auto& row : rows) out->Line(table.Row(row));
-}
-
-void WriteLines(const std::vector<std::string>& lines, TerminalText* out) {
-  for (const std::string& line : lines) out->Line("    " + line);
-}
-
-}  // namespace
-
-void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out) {
-  out->Line();
-  out->Line("  " + Sentence(SourceModelSentence(audit)));
-  if (!audit.declined.empty()) return;
-  WriteLines({SettingsLine(audit)}, out);
-  WriteLines(audit.done, out);
-  WriteLines(audit.notes, out);
-  WriteLines(MeasuredLines(audit), out);
-  WriteTable(CauseHead(), CauseCells(audit), out);
-  if (!audit.Good(audit.as_is)) out->Line("    " + CauseSentence(audit));
-  if (audit.searched) {
-    WriteTable(TrialHead(), TrialCells(audit, out->verbose()), out);
-    WriteLines(SearchLines(audit), out);
-  }
-  if (!audit.lines.empty()) {
-    out->Line();
-    out->Line("    recommended settings, to be pasted before </mujoco>:");
-    std::string lines = audit.lines;
-    for (size_t end = lines.find('\n'); end != std::string::npos; end = lines.find('\n')) {
-      out->Line("      " + lines.substr(0, end));
-      lines.erase(0, end + 1);
-    }
-    WriteLines(PastedLines(audit), out);
-  }
-  out->Line(
-      fmt::format("    all of this took {:.1f} s (--no-own-file leaves it out)", audit.seconds));
-}
-
-namespace {
-
-std::string TableHtml(const std::string& caption, const std::vector<std::string>& head,
-                      const Cells& rows) {
-  Table table{.caption = caption, .head = {}, .rows = {}};
-  for (size_t c = 0; c < head.size(); ++c) table.head.push_back({head[c], c > 0});
-  for (const auto& row : rows) {
-    std::vector<Cell> cells;
-    for (size_t c = 0; c < row.size(); ++c) cells.push_back({row[c], c > 0});
-    table.rows.push_back(std::move(cells));
-  }
-  return ToHtml(table);
-}
-
-std::string ListHtml(const std::vector<std::string>& lines) {
-  std::string html;
-  for (const std::string& line : lines) html += "<li>" + Escape(line) + "</li>\n";
-  return html.empty() ? "" : "<ul>\n" + html + "</ul>\n";
-}
-
-std::string Paragraph(const std::string& text) {
-  return text.empty() ? "" : "<p>" + Escape(text) + "</p>\n";
-}
-
-}  // namespace
-
-std::string SourceModelHtml(const SourceModelAudit* audit) {
-  if (audit == nullptr) return "";
-  std::string html =
-      "<p class=\"reason\">" + Escape(Sentence(SourceModelSentence(*audit))) + "</p>\n";
-  if (!audit->declined.empty()) return html;
-  html += ListHtml(MeasuredLines(*audit)) + ListHtml(audit->notes);
-  html += Folded("How it was run", ListHtml({SettingsLine(*audit)}) + ListHtml(audit->done));
-  html += TableHtml("One setting corrected at a time", CauseHead(), CauseCells(*audit));
-  if (!audit->Good(audit->as_is)) html += Paragraph(CauseSentence(*audit));
-  std::string meanings;
-  for (const SourceModelCause& cause : audit->causes) {
-    meanings +=
-        "<p><b>" + Escape(Sentence(cause.title)) + "</b> " + Escape(cause.meaning) + "</p>\n";
-  }
-  html += Folded("What these things are", meanings);
-  if (audit->searched) {
-    html += TableHtml("Settings: error against cost", TrialHead(), TrialCells(*audit, false)) +
-            Folded("All settings that were run",
-                   TableHtml("All settings", TrialHead(), TrialCells(*audit, true))) +
-            ListHtml(SearchLines(*audit));
-  }
-  if (!audit->lines.empty()) {
-    html +=
-        "<p>Recommended settings, to be pasted before <code>&lt;/mujoco&gt;</code>:</p>\n<pre>" +
-        Escape(audit->lines) + "</pre>\n" + ListHtml(PastedLines(*audit));
-  }
-  return html +
-         Note(fmt::format("Every number is a run of MuJoCo on the file itself, in all {:.1f} "
-                          "s. The verdict does not depend on it.",
-                          audit->seconds));
 }
 
 namespace {
@@ -243,7 +132,7 @@ std::string Share(double share) {
 
 // A number of a run, or what became of it.
 std::string OrUnsound(const SourceModelError& error, double value) {
-  return error.sound() ? NumberCell(value) : "unsound";
+  return error.sound() ? NumberOrDash(value) : "unsound";
 }
 
 // "solref 0.02 1" of the first closure; says where others differ.
@@ -255,9 +144,8 @@ std::string OfClosures(const std::vector<std::string>& values) {
   return values[0];
 }
 
-std::vector<std::string> CauseRowOf(const SourceModelAudit& audit, const std::string& title,
-                                    const SourceModelError& without,
-                                    const SourceModelError* alone) {
+std::vector<Cell> CauseRowOf(const SourceModelAudit& audit, const std::string& title,
+                             const SourceModelError& without, const SourceModelError* alone) {
   const SourceModelError& own = audit.as_is;
   const bool both = own.sound() && without.sound();
   return {title,
@@ -267,8 +155,6 @@ std::vector<std::string> CauseRowOf(const SourceModelAudit& audit, const std::st
           both ? Share(Removed(own.gap_m, without.gap_m)) : "-",
           alone == nullptr ? "" : OrUnsound(*alone, alone->force)};
 }
-
-}  // namespace
 
 std::string SettingsLine(const SourceModelAudit& audit) {
   return fmt::format("{}: step {:g} ms, {}, solver {}, loops with solref {}, solimp {}",
@@ -297,6 +183,8 @@ std::vector<std::string> MeasuredLines(const SourceModelAudit& audit) {
   }
   return lines;
 }
+
+}  // namespace
 
 std::string CauseSentence(const SourceModelAudit& audit) {
   constexpr double kUnexplained = 0.2;
@@ -338,21 +226,20 @@ std::string CauseSentence(const SourceModelAudit& audit) {
   return text;
 }
 
-std::vector<std::string> CauseHead() {
-  return {"what makes it wrong", "force error", "removed",
-          "loop gap [m]",        "removed",     "it alone leaves"};
-}
+namespace {
 
-std::vector<std::vector<std::string>> CauseCells(const SourceModelAudit& audit) {
-  std::vector<std::vector<std::string>> cells;
+Table CauseTable(const SourceModelAudit& audit) {
+  Table table{.caption = "One setting corrected at a time",
+              .columns = {Text("what makes it wrong"), Digits("force error"), Digits("removed"),
+                          Digits("loop gap [m]"), Digits("removed"), Digits("it alone leaves")}};
   const SourceModelError& own = audit.as_is;
-  cells.push_back(
-      {"as your file is", OrUnsound(own, own.force), "", OrUnsound(own, own.gap_m), "", ""});
+  table.rows.push_back(
+      {"as your file is", OrUnsound(own, own.force), "", OrUnsound(own, own.gap_m)});
   for (const SourceModelCause& cause : audit.causes) {
-    cells.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
+    table.rows.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
   }
-  cells.push_back(CauseRowOf(audit, "without all of these", audit.corrected, nullptr));
-  return cells;
+  table.rows.push_back(CauseRowOf(audit, "without all of these", audit.corrected, nullptr));
+  return table;
 }
 
 std::vector<std::string> SearchLines(const SourceModelAudit& audit) {
@@ -396,26 +283,58 @@ std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
   return lines;
 }
 
-std::vector<std::string> TrialHead() {
-  return {"step", "integrator", "solref", "solimp", "force error", "loop gap", "ms per s", ""};
-}
-
-std::vector<std::vector<std::string>> TrialCells(const SourceModelAudit& audit, bool all) {
-  std::vector<std::vector<std::string>> cells;
+// `all`: also those that are no better for their cost.
+Table TrialTable(const SourceModelAudit& audit, bool all) {
+  Table table{.caption = all ? "All settings" : "Settings: error against cost",
+              .columns = {Text("step"), Text("integrator"), Text("solref"), Text("solimp"),
+                          Digits("force error"), Digits("loop gap"), Digits("ms per s"), Text("")}};
   for (size_t i = 0; i < audit.trials.size(); ++i) {
     const SourceModelTrial& trial = audit.trials[i];
     const bool recommended = static_cast<int>(i) == audit.recommended;
     if (!all && i > 0 && !trial.front && !recommended) continue;
     std::string mark = recommended && i > 0 ? "recommended" : i == 0 ? "your file" : trial.other;
     if (trial.front && mark.empty()) mark = all ? "best for its cost" : "";
-    cells.push_back({fmt::format("{:g} ms", 1e3 * trial.step_s), trial.integrator,
-                     trial.solref.empty() ? "own" : trial.solref,
-                     trial.solimp.empty() ? "own" : trial.solimp,
-                     OrUnsound(trial.error, trial.error.force),
-                     trial.error.sound() ? fmt::format("{:.1e} m", trial.error.gap_m) : "unsound",
-                     trial.error.sound() ? fmt::format("{:.3g}", trial.error.cost_ms) : "-", mark});
+    table.rows.push_back(
+        {fmt::format("{:g} ms", 1e3 * trial.step_s), trial.integrator,
+         trial.solref.empty() ? "own" : trial.solref, trial.solimp.empty() ? "own" : trial.solimp,
+         OrUnsound(trial.error, trial.error.force),
+         trial.error.sound() ? fmt::format("{:.1e} m", trial.error.gap_m) : "unsound",
+         trial.error.sound() ? fmt::format("{:.3g}", trial.error.cost_ms) : "-", mark});
   }
-  return cells;
+  return table;
+}
+
+}  // namespace
+
+ReportSection SourceModelSection(const SourceModelAudit& audit, bool verbose) {
+  ReportSection section{.title = "Your own file, run as it is", .link = "File"};
+  section.Add(Paragraph{Sentence(SourceModelSentence(audit)), Paragraph::Look::kReason});
+  if (!audit.declined.empty()) return section;
+  section.Add(Items{MeasuredLines(audit)});
+  section.Add(Items{audit.notes});
+  section.Add(Fold{"How it was run", {{Items{{SettingsLine(audit)}}}, {Items{audit.done}}}});
+  section.Add(CauseTable(audit));
+  if (!audit.Good(audit.as_is)) section.Add(Paragraph{CauseSentence(audit)});
+  Items meanings;
+  for (const SourceModelCause& cause : audit.causes) {
+    meanings.texts.push_back(Sentence(cause.title) + " " + cause.meaning);
+  }
+  section.Add(Fold{"What these things are", {{std::move(meanings)}}}, On::kPage);
+  if (audit.searched) {
+    section.Add(TrialTable(audit, verbose));
+    section.Add(Fold{"All settings that were run", {{TrialTable(audit, true)}}}, On::kPage);
+    section.Add(Items{SearchLines(audit)});
+  }
+  if (!audit.lines.empty()) {
+    section.Add(Paragraph{"Recommended settings, to be pasted before </mujoco>:"});
+    section.Add(Verbatim{audit.lines});
+    section.Add(Items{PastedLines(audit)});
+  }
+  section.Note(fmt::format("Every number is a run of MuJoCo on the file itself, in all {:.1f} s "
+                           "(--no-own-file leaves it out). The verdict does not depend on it.",
+                           audit.seconds),
+               On::kAll);
+  return section;
 }
 
 }  // namespace mbv

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "base/types.h"
-#include "report/text_table.h"
+#include "report/document.h"
 
 namespace mbv {
 
@@ -96,33 +96,11 @@ struct SourceModelAudit {
 /// One paragraph: what is off, and by how much.
 [[nodiscard]] std::string SourceModelSentence(const SourceModelAudit& audit);
 
-// The audit of the user's own file on a terminal, on the page and in summary.json.
-
-void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out);
-/// A section's content; "" without an audit.
-[[nodiscard]] std::string SourceModelHtml(const SourceModelAudit* audit);
-[[nodiscard]] nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit);
-
-// What the audit of the user's own file says, the same on a terminal and on the page. Internal to
-// report/.
-
-/// "robot.xml: step 2 ms, Euler, …".
-[[nodiscard]] std::string SettingsLine(const SourceModelAudit& audit);
-/// What was measured of the file as it is, a sentence each.
-[[nodiscard]] std::vector<std::string> MeasuredLines(const SourceModelAudit& audit);
 /// What the causes come to.
 [[nodiscard]] std::string CauseSentence(const SourceModelAudit& audit);
-/// What the search came to, and how it was measured.
-[[nodiscard]] std::vector<std::string> SearchLines(const SourceModelAudit& audit);
-/// Whether the lines keep what they promise, and what they do not reach.
-[[nodiscard]] std::vector<std::string> PastedLines(const SourceModelAudit& audit);
-
-/// A row of text per cause, "as it is" first and "all of these" last.
-[[nodiscard]] std::vector<std::string> CauseHead();
-[[nodiscard]] std::vector<std::vector<std::string>> CauseCells(const SourceModelAudit& audit);
-[[nodiscard]] std::vector<std::string> TrialHead();
-/// Of those trials that are worth showing: the file's own, the front, the recommended; or all.
-[[nodiscard]] std::vector<std::vector<std::string>> TrialCells(const SourceModelAudit& audit,
-                                                               bool all);
+/// For terminal and page; `verbose`: with all settings that were run.
+[[nodiscard]] ReportSection SourceModelSection(const SourceModelAudit& audit, bool verbose);
+/// `source_model` of summary.json.
+[[nodiscard]] nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit);
 
 }  // namespace mbv

@@ -26,7 +26,7 @@
 #include "features/study/point_row.h"
 #include "plot/layout.h"
 #include "plot/svg.h"
-#include "report/paper_table.h"
+#include "report/document.h"
 #include "report/result.h"
 #include "tests/features/regress/regress_fixture.h"
 #include "tests/support/reports.h"
@@ -200,7 +200,7 @@ std::string HistoryWith(const std::string& text, const std::string& path) {
   return AppendRun(path, {}, &report);
 }
 
-PaperTable TableOf(const std::string& text) {
+Table TableOf(const std::string& text) {
   return {.name = text, .caption = text, .columns = {{text}, {text, true}}, .rows = {{text, text}}};
 }
 

@@ -19,7 +19,7 @@ std::vector<Parameter> FourParameters() {
 }
 
 TEST(ParameterTable, KeepsTheDigitsThatAreStated) {
-  const PaperTable table = ParameterTable(
+  const Table table = ParameterTable(
       FourParameters(), {{"q_min", {"0.500", "m", 0.5}},
                          {"phi", {"10.2", "deg", 0.17802358370342161}},
                          {"I_x", {"4.76e5", "kg m^2", 4.76e5}},
@@ -35,21 +35,21 @@ TEST(ParameterTable, KeepsTheDigitsThatAreStated) {
 TEST(ParameterTable, ABentValueIsNotWrittenAsStated) {
   std::vector<Parameter> parameters = FourParameters();
   parameters[0].value = 0.51;
-  const PaperTable table = ParameterTable(parameters, {{"q_min", {"0.500", "m", 0.5}}});
+  const Table table = ParameterTable(parameters, {{"q_min", {"0.500", "m", 0.5}}});
   EXPECT_THAT(table.rows[0], ElementsAre("q_min", "0.51", "m", "set", "shortest leg"));
 }
 
 TEST(CheckTable, HasEveryCheckWithALimitAndHowItEnded) {
   synthetic::Case c;
-  const PaperTable agree = CheckTable(ViewOf(test::MakeReport(c)));
+  const Table agree = CheckTable(ViewOf(test::MakeReport(c)));
   c.simulated.values(40, c.simulated.Find("d2.force")) += 0.5;
   const Report perturbed = test::MakeReport(c);
-  const PaperTable differs = CheckTable(ViewOf(perturbed));
+  const Table differs = CheckTable(ViewOf(perturbed));
   EXPECT_EQ(agree.rows.size(), ViewOf(perturbed).limits());
   EXPECT_THAT(agree.caption, testing::EndsWith(": agree"));
   EXPECT_THAT(differs.caption, testing::EndsWith(": disagree"));
-  const auto fails = [](const PaperTable& table) {
-    return std::ranges::count_if(table.rows, [](const auto& row) { return row[4] == "fails"; });
+  const auto fails = [](const Table& table) {
+    return std::ranges::count_if(table.rows, [](const auto& row) { return row[4].text == "FAIL"; });
   };
   EXPECT_EQ(fails(agree), 0);
   EXPECT_GT(fails(differs), 0);
@@ -62,7 +62,7 @@ TEST(MobilityTable, TellsRanksAndWhatStaticsLeavesOpen) {
   report.home.redundant = 1;
   report.home.dofs = 3;
   report.home.joints_not_unique = {"A", "B"};
-  const PaperTable table = MobilityTable(synthetic::TwoSliders(), report);
+  const Table table = MobilityTable(synthetic::TwoSliders(), report);
   EXPECT_THAT(table.rows, Contains(ElementsAre("constraints, rank", "22, 21")));
   EXPECT_THAT(table.rows, Contains(ElementsAre("degrees of freedom", "3")));
   EXPECT_THAT(table.rows, Contains(ElementsAre("redundant constraints", "1")));

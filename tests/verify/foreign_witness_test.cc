@@ -73,7 +73,7 @@ TEST(ForeignWitness, JoinsTheComparison) {
   EXPECT_NE(comparison.FindCheck("mock_vs_reference.force_nrmse"), nullptr);
   EXPECT_NE(comparison.attribution.text.find("mock"), std::string::npos)
       << comparison.attribution.text;
-  EXPECT_TRUE(PairMatrixLines(comparison).empty());  // three: reference, simulated, mock
+  EXPECT_TRUE(PairMatrix(comparison).rows.empty());  // three: reference, simulated, mock
 }
 
 // The smallest one that is shipped, on an axis, a centre of mass and a gravity that no axis of the
@@ -110,15 +110,16 @@ TEST(ForeignWitness, PairsOfManyStandInAMatrix) {
   const std::string one = Mock("answers"), two = Mock("perturbed");
   const RunOutcome outcome = RunWith(one.substr(0, one.size() - 1) + ", other" + two.substr(5));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
-  const std::vector<std::string> lines = PairMatrixLines(outcome.report->comparison);
-  ASSERT_EQ(lines.size(), 6U);
-  EXPECT_NE(lines[0].find("drive force, RMS"), std::string::npos) << lines[0];
-  EXPECT_TRUE(lines[2].starts_with("simulated")) << lines[2];
-  for (size_t row = 2; row < 6; ++row) {
+  const Table pairs = PairMatrix(outcome.report->comparison);
+  EXPECT_NE(pairs.caption.find("drive force, RMS"), std::string::npos) << pairs.caption;
+  const std::vector<std::string> lines = TextLines(pairs, {.indent = ""});
+  ASSERT_EQ(lines.size(), 5U);
+  EXPECT_TRUE(lines[1].starts_with("simulated")) << lines[1];
+  for (size_t row = 1; row < 5; ++row) {
     const auto stars = std::count(lines[row].begin(), lines[row].end(), '*');
     EXPECT_EQ(stars, lines[row].starts_with("other") ? 3 : 1) << lines[row];
   }
-  const std::string html = PairMatrixHtml(outcome.report->comparison);
+  const std::string html = ToHtml(pairs);
   EXPECT_EQ(std::count(html.begin(), html.end(), '*'), 6 + 2);  // caption and label explain
 }
 

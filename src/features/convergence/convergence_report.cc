@@ -6,7 +6,7 @@
 #include "base/json_text.h"
 #include "base/text.h"
 #include "plot/svg_plot.h"
-#include "report/text_table.h"
+#include "report/page.h"
 
 namespace mbv {
 namespace {
@@ -205,32 +205,27 @@ std::string SeriesText(const ConvergenceSeries& series) {
     text += fmt::format("  {} (of the poses)\n", series.pose_verdict.text);
   }
   for (const std::string& note : series.notes) text += "  note: " + note + "\n";
-  const TextTable table("  ", {{"step s", 10},
-                               {"constant s", 12},
-                               {"steps", 9},
-                               {"cpu s", 9},
-                               {"smooth", 10},
-                               {"breaks", 10},
-                               {"change", 10},
-                               {"order", 7},
-                               {"pose m", 10},
-                               {"gap m", 10}});
-  text += table.Head() + "\n";
+  Table table{.columns = {Digits("step s"), Digits("constant s"), Digits("steps"), Digits("cpu s"),
+                          Digits("smooth"), Digits("breaks"), Digits("change"), Digits("order"),
+                          Digits("pose m"), Digits("gap m")}};
   for (size_t i = 0; i < series.points.size(); ++i) {
     const ConvergencePoint& p = series.points[i];
-    const std::string step = fmt::format("{:.4g}", p.step_s);
-    const std::string constant = fmt::format("{:.4g}", p.time_constant_s);
+    std::vector<Cell>& row = table.rows.emplace_back();
+    row = {fmt::format("{:.4g}", p.step_s), fmt::format("{:.4g}", p.time_constant_s)};
     if (!p.failure.empty()) {
-      text += table.Row({step, constant}) + "  no result\n";
+      row.emplace_back("no result");
       continue;
     }
-    text += table.Row({step, constant, fmt::format("{}", p.steps), fmt::format("{:.3f}", p.cpu_s),
-                       NumberCell(p.error.smooth), NumberCell(p.error.breaks),
-                       NumberCell(p.change.smooth), NumberCell(series.fit.pairwise[i], "{:.2f}"),
-                       NumberCell(p.pose_m), NumberCell(p.closure_m)}) +
-            "\n";
+    row.emplace_back(fmt::format("{}", p.steps));
+    row.emplace_back(fmt::format("{:.3f}", p.cpu_s));
+    for (const double value : {p.error.smooth, p.error.breaks, p.change.smooth}) {
+      row.emplace_back(NumberOrDash(value));
+    }
+    row.emplace_back(NumberOrDash(series.fit.pairwise[i], "{:.2f}"));
+    row.emplace_back(NumberOrDash(p.pose_m));
+    row.emplace_back(NumberOrDash(p.closure_m));
   }
-  return text;
+  return text + ToText(table);
 }
 
 std::string ExtrapolationText(const ForceExtrapolation& e) {
@@ -242,14 +237,13 @@ std::string ExtrapolationText(const ForceExtrapolation& e) {
         "from steps {:g} s and {:g} s with order {:.2f} and safety factor {:g}: grid convergence "
         "index {:.1e} of the RMS force\n",
         e.coarse_s, e.fine_s, e.richardson.order, e.richardson.safety, e.index);
-    const TextTable table(
-        "  ", {{"drive", -24}, {"RMS force", 20}, {"uncertainty", 13}, {"from inverse mode", 19}});
-    text += table.Head() + "\n";
+    Table table{.columns = {Text("drive"), Digits("RMS force"), Digits("uncertainty"),
+                            Digits("from inverse mode")}};
     for (const ExtrapolatedDrive& d : e.drives) {
-      text += table.Row({d.drive, fmt::format("{:.9g} {}", d.rms, d.unit),
-                         fmt::format("{:.1e}", d.uncertainty), fmt::format("{:.1e}", d.error)}) +
-              "\n";
+      table.rows.push_back({d.drive, fmt::format("{:.9g} {}", d.rms, d.unit),
+                            fmt::format("{:.1e}", d.uncertainty), fmt::format("{:.1e}", d.error)});
     }
+    text += ToText(table);
   }
   return text + fmt::format("  inverse mode: {:.1e} off (allowed {:.1e}): {}\n", e.error, e.allowed,
                             e.pass ? "ok" : "FINDING");

@@ -17,7 +17,6 @@
 #include "comparison/verdict.h"
 #include "features/run/run_scenario.h"
 #include "report/page.h"
-#include "report/text_table.h"
 
 namespace mbv {
 namespace {
@@ -87,32 +86,37 @@ std::string EngineAndProgram(const CrosscheckRow& row) {
 }
 
 // A row per scenario, a column per engine.
-std::string MarkdownTable(const Rows& rows,
-                          const std::function<std::string(const CrosscheckRow&)>& cell) {
+Table EngineTable(const Rows& rows, const std::function<std::string(const CrosscheckRow&)>& cell) {
   const std::vector<std::string> engines = Distinct(rows, &EngineOf);
-  std::string text = "| scenario |", line = "|---|";
-  for (const std::string& engine : engines) {
-    text += fmt::format(" {} |", MarkdownText(engine));
-    line += "---|";
-  }
-  text += "\n" + line + "\n";
+  Table table{.columns = {Text("scenario")}};
+  for (const std::string& engine : engines) table.columns.push_back(Text(engine));
   for (const std::string& scenario : Distinct(rows, &CaseOf)) {
-    text += fmt::format("| {} |", MarkdownCode(scenario));
+    std::vector<Cell>& row = table.rows.emplace_back();
+    row.push_back(Code(scenario));
     for (const std::string& engine : engines) {
-      const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& row) {
-        return CaseOf(row) == scenario && row.engine == engine;
+      const auto found = std::ranges::find_if(rows, [&](const CrosscheckRow& one) {
+        return CaseOf(one) == scenario && one.engine == engine;
       });
-      text += fmt::format(" {} |", found == rows.end() ? "" : cell(*found));
+      row.emplace_back(found == rows.end() ? "" : cell(*found));
     }
-    text += "\n";
   }
-  return text;
+  return table;
 }
 
-int WidthOf(const std::vector<std::string>& words) {
-  size_t width = 8;
-  for (const std::string& word : words) width = std::max(width, word.size());
-  return -static_cast<int>(width);
+// All engines, of one scenario or of all.
+Table RowTable(const Rows& rows, const std::string& scenario) {
+  Table table{.caption = "Engines on " + scenario,
+              .columns = {Text("scenario", On::kTerminal), Text("engine"),
+                          Digits("drive force, RMS"), Digits("pose [m]"), Digits("loop gap [m]"),
+                          Digits("per sample [us]"), Text("why not")}};
+  for (const CrosscheckRow& row : rows) {
+    if (!scenario.empty() && CaseOf(row) != scenario) continue;
+    table.rows.push_back(
+        {CaseOf(row), EngineAndProgram(row), NumberOrDash(row.force_nrmse, "{:.1e}"),
+         NumberOrDash(row.pose_m, "{:.1e}"), NumberOrDash(row.loop_gap_m, "{:.1e}"),
+         NumberOrDash(row.sample_us, "{:.3g}"), OneLine(row.why)});
+  }
+  return table;
 }
 
 }  // namespace
@@ -137,23 +141,7 @@ Rows CrosscheckRows(const Report& report) {
   return rows;
 }
 
-std::string ToText(const Rows& rows) {
-  const TextTable table("", {{"scenario", WidthOf(Distinct(rows, &CaseOf))},
-                             {"  engine", WidthOf(Distinct(rows, &EngineAndProgram)) - 2},
-                             {"drive force, RMS", 18},
-                             {"pose", 12},
-                             {"loop gap", 12},
-                             {"per sample", 14}});
-  std::string text = table.Head() + "\n";
-  for (const CrosscheckRow& row : rows) {
-    text += table.Row(
-        {CaseOf(row), "  " + EngineAndProgram(row), NumberOrDash(row.force_nrmse, "{:.1e}"),
-         NumberOrDash(row.pose_m, "{:.1e} m"), NumberOrDash(row.loop_gap_m, "{:.1e} m"),
-         NumberOrDash(row.sample_us, "{:.3g} us")});
-    text += (row.why.empty() ? "" : "  " + OneLine(row.why)) + "\n";
-  }
-  return text;
-}
+std::string ToText(const Rows& rows) { return ToText(RowTable(rows, ""), {.indent = ""}); }
 
 std::string ToMarkdown(const Rows& rows) {
   struct Shown {
@@ -168,10 +156,10 @@ std::string ToMarkdown(const Rows& rows) {
       {"Cost of a sample [us]", &CrosscheckRow::sample_us, "{:.3g}"}};
   std::string text;
   for (const Shown& shown : kShown) {
-    text += fmt::format("{}## {}\n\n", text.empty() ? "" : "\n", shown.title);
-    text += MarkdownTable(rows, [&](const CrosscheckRow& row) {
+    const Table table = EngineTable(rows, [&](const CrosscheckRow& row) {
       return NumberOrDash(row.*shown.number, shown.format);
     });
+    text += fmt::format("{}## {}\n\n{}", text.empty() ? "" : "\n", shown.title, ToMarkdown(table));
   }
   return text;
 }
@@ -191,19 +179,7 @@ std::string ToCsv(const Rows& rows) {
 std::string ToHtml(const Rows& rows) {
   Page page;
   for (const std::string& scenario : Distinct(rows, &CaseOf)) {
-    Table table{.caption = "Engines on " + scenario,
-                .head = {Text("engine"), Digits("drive force, RMS"), Digits("pose [m]"),
-                         Digits("loop gap [m]"), Digits("per sample [us]"), Text("why not")},
-                .rows = {}};
-    for (const CrosscheckRow& row : rows) {
-      if (CaseOf(row) != scenario) continue;
-      table.rows.push_back({Text(EngineAndProgram(row)),
-                            Digits(NumberOrDash(row.force_nrmse, "{:.1e}")),
-                            Digits(NumberOrDash(row.pose_m, "{:.1e}")),
-                            Digits(NumberOrDash(row.loop_gap_m, "{:.1e}")),
-                            Digits(NumberOrDash(row.sample_us, "{:.3g}")), Text(row.why)});
-    }
-    page.Add(scenario, scenario, ToHtml(table));
+    page.Add(scenario, scenario, ToHtml(RowTable(rows, scenario)));
   }
   return page.Write({.kicker = "mbverify crosscheck",
                      .title = "Engines side by side",

@@ -16,7 +16,7 @@
 #include "external/witness_answer.h"
 #include "features/run/engine_errors.h"
 #include "mechanism/channels.h"
-#include "report/text_table.h"
+#include "report/document.h"
 #include "simulation/engine/engine.h"
 #include "verify/program_call.h"
 #include "verify/run_witnesses.h"
@@ -39,21 +39,16 @@ std::string LoadingText(const UpgradeReport& report) {
 }
 
 std::string RowsText(const UpgradeReport& report) {
-  const TextTable table("  ", {{fmt::format("rows at {} states", report.states), -20},
-                               {"rows", 5},
-                               {"softness, new/old", 20},
-                               {"|dJ/dt qdot|", 14},
-                               {"left out, old", 15},
-                               {"new", 9}});
-  std::string text = table.Head() + "\n";
+  Table table{.columns = {Text(fmt::format("rows at {} states", report.states)), Digits("rows"),
+                          Digits("softness, new/old"), Digits("|dJ/dt qdot|"),
+                          Digits("left out, old"), Digits("new"), Text("why")}};
   for (const RowChange& change : report.rows) {
-    text += table.Row({change.kind, fmt::format("{}", change.rows), RatioText(change),
-                       fmt::format("{:.2g}", change.velocity_term),
-                       fmt::format("{:.2g}", change.left_out_old),
-                       fmt::format("{:.2g}", change.left_out_new)}) +
-            "  " + change.why + "\n";
+    table.rows.push_back({change.kind, fmt::format("{}", change.rows), RatioText(change),
+                          fmt::format("{:.2g}", change.velocity_term),
+                          fmt::format("{:.2g}", change.left_out_old),
+                          fmt::format("{:.2g}", change.left_out_new), change.why});
   }
-  return text;
+  return ToText(table);
 }
 
 std::string NumberOr(double number, const char* unit, const std::string& why) {
@@ -62,26 +57,24 @@ std::string NumberOr(double number, const char* unit, const std::string& why) {
 }
 
 std::string ForcesText(const UpgradeReport& report) {
-  const std::string heading = "RMS error of all drive forces";
-  size_t width = heading.size();
-  for (const ForceChange& change : report.forces) width = std::max(width, change.how.size());
-  const TextTable table("  ", {{heading, -static_cast<int>(width)},
-                               {report.version_old, 12},
-                               {report.version_new, 12},
-                               {"loop gap, old", 15},
-                               {"new", 12}});
-  std::string text = table.Head() + "\n";
+  Table table{.columns = {Text("RMS error of all drive forces"), Digits(report.version_old),
+                          Digits(report.version_new), Digits("loop gap, old"), Digits("new"),
+                          Text("why not")}};
   for (const ForceChange& change : report.forces) {
-    text += table.Row({change.how, NumberOr(change.nrmse_old, "", change.why_old),
-                       NumberOr(change.nrmse_new, "", change.why_new),
-                       NumberOr(change.gap_old_m, " m", change.why_old),
-                       NumberOr(change.gap_new_m, " m", change.why_new)}) +
-            "\n";
-    for (const std::string& why : {change.why_old, change.why_new}) {
-      if (!why.empty()) text += "    " + why + "\n";
+    std::vector<std::string> why;
+    for (const std::string& one : {change.why_old, change.why_new}) {
+      if (!one.empty()) why.push_back(one);
     }
+    table.rows.push_back({change.how, NumberOr(change.nrmse_old, "", change.why_old),
+                          NumberOr(change.nrmse_new, "", change.why_new),
+                          NumberOr(change.gap_old_m, " m", change.why_old),
+                          NumberOr(change.gap_new_m, " m", change.why_new),
+                          fmt::format("{}", fmt::join(why, "; "))});
   }
-  return text;
+  if (std::ranges::all_of(table.rows, [](const auto& row) { return row.back().text.empty(); })) {
+    table.columns.back().on = On::kPage;
+  }
+  return ToText(table);
 }
 
 nlohmann::ordered_json RowJson(const RowChange& change) {

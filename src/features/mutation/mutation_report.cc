@@ -8,7 +8,7 @@
 #include "base/json_text.h"
 #include "base/markup.h"
 #include "base/text.h"
-#include "report/text_table.h"
+#include "report/page.h"
 
 namespace mbv {
 namespace {
@@ -48,63 +48,51 @@ bool HasInverse(const MutationReport& report) {
                      [](const FaultResult& f) { return f.inverse.has_value(); });
 }
 
-// `inverse`: also by inverse dynamics.
-TextTable NumberTable(bool inverse) {
-  std::vector<TextColumn> columns = {{"number", -22},   {"value", 12}, {"", -11},
-                                     {"detected", -14}, {"force", 9},  {"smallest", 10}};
-  if (inverse) columns.push_back({"inverse", 10});
-  columns.push_back({"  seen first by, or why not", 0});
-  return {"  ", std::move(columns)};
-}
-
-TextTable FaultTable(bool inverse) {
-  std::vector<TextColumn> columns = {{"structural fault", -31}, {"where", -38}, {"detected", -15}};
-  if (inverse) columns.push_back({"inverse", -9});
-  columns.push_back({"how, or why not", 0});
-  return {"  ", std::move(columns)};
-}
-
-std::string Row(const Mutation& m, bool inverse, bool markdown) {
-  const std::string change = NumberCell(m.own.force_change, "{:.1e}");
-  const std::string smallest = NumberCell(m.own.smallest, "{:.1e}");
-  const std::string by_inverse = NumberCell(m.inverse ? m.inverse->smallest : kNan, "{:.1e}");
-  if (markdown) {
-    return fmt::format("| {} | {:g} {} | {} | {} | {} | {}{} |\n", MarkdownCode(m.name), m.value,
-                       MarkdownText(m.unit), SeenText(m.own), change, smallest,
-                       inverse ? by_inverse + " | " : "", MarkdownText(NoteOf(m)));
-  }
-  std::vector<std::string> cells = {
-      m.name, fmt::format("{:g}", m.value), " " + m.unit, SeenText(m.own), change, smallest};
-  if (inverse) cells.push_back(by_inverse);
-  cells.push_back("  " + NoteOf(m));
-  return NumberTable(inverse).Row(cells) + "\n";
-}
-
 std::string SeenText(const FaultDetection& s) { return s.detected ? "yes" : "no"; }
-
-std::string Row(const FaultResult& f, bool inverse, bool markdown) {
-  const std::string seen = !f.applicable ? "not applicable" : SeenText(f.own);
-  const std::string by_inverse = f.inverse ? SeenText(*f.inverse) : "-";
-  std::string note = f.applicable ? f.own.reason : f.reason;
-  if (f.applicable && f.own.ran && f.own.detected) {
-    note = fmt::format("{} = {:.1e} (limit {:.0e})", f.own.check, f.own.value, f.own.limit);
-  } else if (f.applicable && !f.own.ran) {
-    note = "could not run: " + f.own.reason;
-  }
-  const std::string where = f.where + (f.alike > 0 ? fmt::format(" (and {} alike)", f.alike) : "");
-  if (markdown) {
-    return fmt::format("| {} | {} | {} | {}{} |\n", MarkdownText(f.kind), MarkdownText(where), seen,
-                       inverse ? by_inverse + " | " : "", MarkdownText(note));
-  }
-  std::vector<std::string> cells = {f.kind, where, seen};
-  if (inverse) cells.push_back(by_inverse);
-  cells.push_back(note);
-  return FaultTable(inverse).Row(cells) + "\n";
-}
 
 // An instance's number of which forces know nothing: part of a long list, reported together.
 bool IsIdle(const Mutation& m) {
   return m.kind == NumberKind::kInstance && !m.own.detected && !std::isnan(m.proved_to);
+}
+
+std::string Change(double value) { return NumberOrDash(value, "{:.1e}"); }
+
+// `inverse`: also by inverse dynamics.
+Table NumberTable(const MutationReport& report, bool inverse) {
+  Table table{.columns = {Text("number"), Digits("value"), Text("detected"), Digits("force NRMSE"),
+                          Digits("smallest, " + report.mode)}};
+  if (inverse) table.columns.push_back(Digits("inverse"));
+  table.columns.push_back(Text("seen first by, or why not"));
+  for (const Mutation& m : report.mutations) {
+    if (IsIdle(m)) continue;
+    std::vector<Cell> row = {Code(m.name), fmt::format("{:g} {}", m.value, m.unit), SeenText(m.own),
+                             Change(m.own.force_change), Change(m.own.smallest)};
+    if (inverse) row.emplace_back(Change(m.inverse ? m.inverse->smallest : kNan));
+    row.emplace_back(NoteOf(m));
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
+Table FaultTable(const MutationReport& report, bool inverse) {
+  Table table{.columns = {Text("structural fault"), Text("where"), Text("detected")}};
+  if (inverse) table.columns.push_back(Text("inverse"));
+  table.columns.push_back(Text("how, or why not"));
+  for (const FaultResult& f : report.faults) {
+    std::string note = f.applicable ? f.own.reason : f.reason;
+    if (f.applicable && f.own.ran && f.own.detected) {
+      note = fmt::format("{} = {:.1e} (limit {:.0e})", f.own.check, f.own.value, f.own.limit);
+    } else if (f.applicable && !f.own.ran) {
+      note = "could not run: " + f.own.reason;
+    }
+    std::vector<Cell> row = {f.kind,
+                             f.where + (f.alike > 0 ? fmt::format(" (and {} alike)", f.alike) : ""),
+                             f.applicable ? SeenText(f.own) : "not applicable"};
+    if (inverse) row.emplace_back(f.inverse ? SeenText(*f.inverse) : "–");
+    row.emplace_back(note);
+    table.rows.push_back(std::move(row));
+  }
+  return table;
 }
 
 std::string IdleText(const MutationReport& report, bool markdown) {
@@ -158,25 +146,6 @@ std::string Head(const MutationReport& report, bool inverse, bool markdown) {
   return text + fmt::format(" ({} simulations in {:.1f} s)\n\n", report.runs, report.wall_s);
 }
 
-std::string NumberHead(const MutationReport& report, bool inverse, bool markdown) {
-  if (markdown) {
-    return fmt::format(
-        "| number | value | detected | force NRMSE | smallest relative error, {} | {}seen first "
-        "by, or why not |\n|---|---|---|---|---|{}---|\n",
-        report.mode, inverse ? "inverse | " : "", inverse ? "---|" : "");
-  }
-  return NumberTable(inverse).Head() + "\n";
-}
-
-std::string FaultHead(bool inverse, bool markdown) {
-  if (markdown) {
-    return fmt::format(
-        "\n| structural fault | where | detected | {}how, or why not |\n|---|---|---|{}---|\n",
-        inverse ? "inverse | " : "", inverse ? "---|" : "");
-  }
-  return "\n" + FaultTable(inverse).Head() + "\n";
-}
-
 }  // namespace
 
 void SortBySensitivity(MutationReport* report) {
@@ -186,19 +155,16 @@ void SortBySensitivity(MutationReport* report) {
 
 std::string ToText(const MutationReport& report, bool markdown) {
   const bool inverse = HasInverse(report);
-  std::string text = Head(report, inverse, markdown) + NumberHead(report, inverse, markdown);
-  for (const Mutation& m : report.mutations) {
-    if (!IsIdle(m)) text += Row(m, inverse, markdown);
-  }
-  text += IdleText(report, markdown);
+  const auto written = [&](const Table& table) {
+    return markdown ? ToMarkdown(table) : ToText(table);
+  };
+  std::string text = Head(report, inverse, markdown) + written(NumberTable(report, inverse)) +
+                     IdleText(report, markdown);
   text += fmt::format(
       "\n{}The smallest relative error is the smallest one that was detected both ways; one {:g} % "
       "smaller was not.\n",
       markdown ? "" : "  ", 100.0 * report.resolution);
-  if (report.faults.empty()) return text;
-  text += FaultHead(inverse, markdown);
-  for (const FaultResult& fault : report.faults) text += Row(fault, inverse, markdown);
-  return text;
+  return report.faults.empty() ? text : text + "\n" + written(FaultTable(report, inverse));
 }
 
 // Mutation reports as JSON, and back: workers hand their parts over in this form.

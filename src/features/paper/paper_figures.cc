@@ -15,7 +15,7 @@
 #include "model_file/load_model.h"
 #include "plot/check_figures.h"
 #include "plot/style.h"
-#include "report/paper_table.h"
+#include "report/document.h"
 #include "scenario/find_model.h"
 
 namespace mbv {
@@ -190,9 +190,9 @@ class PaperMaker {
   }
 
   void MakeTable(const PaperEntry& entry, const Report& report, PaperResult* result) {
-    PaperTable table;
+    Table table;
     table.name = entry.name.text;
-    table.columns = {{entry.head, true}};
+    table.columns = {Digits(entry.head)};
     for (const double at : entry.printed.empty() ? std::vector<double>{} : entry.printed[0].at) {
       table.rows.push_back({fmt::format("{:g}", at)});
     }
@@ -200,7 +200,7 @@ class PaperMaker {
     if (outcome_.diagnostics.has_errors()) return;
     result->caption = CaptionOf(*result);
     table.caption = entry.title + (result->caption.empty() ? "" : ". " + result->caption);
-    PaperTable bare = table;
+    Table bare = table;
     bare.caption.clear();
     result->table = ToMarkdown(bare);
     AddFile(result, entry.name.text + ".md", ToMarkdown(table));
@@ -208,7 +208,7 @@ class PaperMaker {
   }
 
   void AddColumn(const PaperColumn& column, const PaperEntry& entry, const Report& report,
-                 PaperTable* table) {
+                 Table* table) {
     const Trace* trace = TraceOf(report, column.of.text);
     if (trace == nullptr) return Error(column.of, "no such witness ran");
     const int at = trace->Find(column.signal.text);
@@ -218,7 +218,7 @@ class PaperMaker {
     if (unit == nullptr) return Error(column.unit, "no unit of what is recorded in " + si);
     const bool one_unit = !CommonUnit(entry).empty();
     table->columns.push_back(
-        {one_unit ? column.title : fmt::format("{} ({})", column.title, column.unit.text), true});
+        Digits(one_unit ? column.title : fmt::format("{} ({})", column.title, column.unit.text)));
     for (size_t row = 0; row < table->rows.size(); ++row) {
       const double wanted = entry.printed[0].at[row];
       std::string cell;

@@ -102,7 +102,7 @@ class TableMaker {
 
   void OfMechanism(const Mechanism& mechanism) {
     if (Wanted("parameters")) {
-      PaperTable table = ParameterTable(mechanism.parameters, StatedNumbers(mechanism.file));
+      Table table = ParameterTable(mechanism.parameters, StatedNumbers(mechanism.file));
       table.caption = fmt::format("Parameters of {} in {}", mechanism.name, outcome_.scenario);
       Add(std::move(table), "the model has no parameters");
     }
@@ -124,12 +124,12 @@ class TableMaker {
     return options_.only.empty() || Contains(options_.only, name);
   }
 
-  void Add(PaperTable table, const std::string& without_rows) {
+  void Add(Table table, const std::string& without_rows) {
     if (table.rows.empty()) {
       outcome_.left_out.push_back(table.name + ": " + without_rows);
       return;
     }
-    PaperTable labelled = table;
+    Table labelled = table;
     labelled.name = outcome_.mechanism + "_" + outcome_.scenario + "_" + table.name;
     for (const std::string& format : options_.formats) {
       outcome_.files.emplace_back(table.name + "." + format,
@@ -208,7 +208,7 @@ struct TablesArguments {
 // What was written, one table a line; "" or what went wrong.
 std::string WriteTables(const TablesArguments& arguments, const TablesOutcome& outcome,
                         std::string* written) {
-  for (const PaperTable& table : outcome.tables) {
+  for (const Table& table : outcome.tables) {
     Say(arguments.json.text(), "{:<12} {} rows: {}\n", table.name, table.rows.size(),
         table.caption);
   }
@@ -226,13 +226,15 @@ std::string WriteTables(const TablesArguments& arguments, const TablesOutcome& o
 nlohmann::ordered_json TablesJson(const std::string& file, const TablesOutcome& outcome,
                                   const std::string& folder) {
   auto tables = nlohmann::ordered_json::array();
-  for (const PaperTable& table : outcome.tables) {
+  for (const Table& table : outcome.tables) {
     std::vector<std::string> columns;
-    for (const PaperTableColumn& column : table.columns) columns.push_back(column.title);
+    for (const Column& column : table.columns) columns.push_back(column.title);
+    auto rows = nlohmann::ordered_json::array();
+    for (const auto& row : table.rows) rows.push_back(Texts(row));
     tables.push_back({{"name", table.name},
                       {"caption", table.caption},
                       {"columns", columns},
-                      {"rows", table.rows}});
+                      {"rows", std::move(rows)}});
   }
   std::vector<std::string> files;
   for (const auto& [name, content] : outcome.files) files.push_back(name);

@@ -14,7 +14,7 @@
 #include "cli/options.h"
 #include "cli/terminal.h"
 #include "model_file/mesh/inertia_diagnosis.h"
-#include "report/text_table.h"
+#include "report/document.h"
 #include "scenario/find_model.h"
 #include "verify/model_text.h"
 
@@ -75,30 +75,23 @@ Json BodyJson(const BodyInertia& body) {
 
 // A row per body with meshes, then each finding with its hint.
 std::string InertiaTable(const std::vector<BodyInertia>& bodies) {
-  size_t wide = 10;
-  for (const BodyInertia& body : bodies) wide = std::max(wide, body.body.size());
-  const TextTable table("", {{"body", -static_cast<int>(wide) - 2},
-                             {"mass kg", 10},
-                             {"volume cm³", 12},
-                             {"kg/m³", 10},
-                             {"centre off mm", 15},
-                             {"tensor off", 12},
-                             {"  finding", 0}});
-  std::string text = table.Head() + "\n", details;
+  Table table{.columns = {Text("body"), Digits("mass kg"), Digits("volume cm³"), Digits("kg/m³"),
+                          Digits("centre off mm"), Digits("tensor off"), Text("finding")}};
+  std::string details;
   size_t bad = 0;
   for (const BodyInertia& body : bodies) {
-    text += table.Row({Printable(body.body), fmt::format("{:.4g}", body.mass),
-                       Known(body.solid.amount, 1e6, "{:.4g}"), Known(body.density, 1.0, "{:.4g}"),
-                       Known(body.centre_off * body.r_m, 1e3, "{:.3g}"),
-                       Known(body.tensor_off, 100.0, "{:.1f} %"), "  " + WordsOf(body)}) +
-            "\n";
+    table.rows.push_back({Printable(body.body), fmt::format("{:.4g}", body.mass),
+                          Known(body.solid.amount, 1e6, "{:.4g}"),
+                          Known(body.density, 1.0, "{:.4g}"),
+                          Known(body.centre_off * body.r_m, 1e3, "{:.3g}"),
+                          Known(body.tensor_off, 100.0, "{:.1f} %"), WordsOf(body)});
     bad += body.findings.empty() ? 0 : 1;
     for (const InertiaFinding& finding : body.findings) {
       details += fmt::format("{}: {}: {}\n  hint: {}\n", Printable(body.body),
                              WordOf(finding.mistake), Printable(finding.text), finding.hint);
     }
   }
-  return fmt::format("{}{}{}{} of {} bodies with meshes are sound\n", text,
+  return fmt::format("{}{}{}{} of {} bodies with meshes are sound\n", ToText(table, {.indent = ""}),
                      details.empty() ? "" : "\n", details, bodies.size() - bad, bodies.size());
 }
 

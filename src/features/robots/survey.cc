@@ -24,7 +24,6 @@
 #include "math/bytes.h"
 #include "mechanism/joint_pose.h"
 #include "report/page.h"
-#include "report/text_table.h"
 #include "verify/model_text.h"
 
 namespace mbv {
@@ -223,47 +222,44 @@ std::string SurveyCsv(const std::vector<SurveyRow>& rows) {
   return text + "\n";
 }
 
-std::string SurveyTable(const std::vector<SurveyRow>& rows) {
-  size_t wide = 5;
-  for (const SurveyRow& row : rows) wide = std::max(wide, row.file.size());
-  const TextTable table("", {{"file", -static_cast<int>(wide) - 2},
-                             {"status", -10},
-                             {"bodies", 7},
-                             {"loops", 6},
-                             {"freedoms", 9},
-                             {"redundant", 10},
-                             {"gap m", 9},
-                             {"gap rad", 9},
-                             {"inverse", 9},
-                             {"forward", 9},
-                             {"s", 7}});
-  std::string text = table.Head() + "\n";
+namespace {
+
+// All rows; caveats and messages follow below each on a terminal.
+Table TableOf(const std::vector<SurveyRow>& rows) {
+  Table table;
+  for (size_t k = 0; k < kSurveyColumns.size(); ++k) {
+    Column& column = table.columns.emplace_back(Text(Spaced(kSurveyColumns[k])));
+    column.number = k >= 2 && k <= 10;
+    if (k > 10) column.on = On::kPage;
+  }
   for (const SurveyRow& row : rows) {
-    text += table.Row(Fields(row)) + "\n";
-    for (const std::string& caveat : row.caveats) {
+    const std::vector<std::string> fields = Fields(row);
+    std::vector<Cell>& cells = table.rows.emplace_back(fields.begin(), fields.end());
+    cells[1].mark = row.status == "ok"        ? Mark::kOk
+                    : row.status == "refused" ? Mark::kOff
+                                              : Mark::kFail;
+  }
+  return table;
+}
+
+}  // namespace
+
+std::string SurveyTable(const std::vector<SurveyRow>& rows) {
+  const std::vector<std::string> lines = TextLines(TableOf(rows), {.indent = ""});
+  std::string text = lines[0] + "\n";
+  for (size_t i = 0; i < rows.size(); ++i) {
+    text += lines[i + 1] + "\n";
+    for (const std::string& caveat : rows[i].caveats) {
       text += fmt::format("    caveat: {}\n", Printable(caveat));
     }
-    if (row.status != "ok") text += fmt::format("    {}\n", Printable(row.message));
+    if (rows[i].status != "ok") text += fmt::format("    {}\n", Printable(rows[i].message));
   }
   return text + CountedOk(rows) + "\n";
 }
 
 std::string SurveyHtml(const std::vector<SurveyRow>& rows, const std::string& folder) {
-  Table table{.caption = "Robots below " + folder, .head = {}, .rows = {}};
-  for (const std::string& column : kSurveyColumns) table.head.push_back(Text(Spaced(column)));
-  for (const SurveyRow& row : rows) {
-    std::vector<Cell> cells;
-    const std::vector<std::string> fields = Fields(row);
-    for (size_t k = 0; k < fields.size(); ++k) {
-      const char* kind = row.status == "ok" ? "ok" : row.status == "refused" ? "off" : "fail";
-      if (k == 1) {
-        cells.push_back(Markup(Pill(kind, fields[k])));
-      } else {
-        cells.push_back(k >= 2 && k <= 10 ? Digits(fields[k]) : Text(fields[k]));
-      }
-    }
-    table.rows.push_back(std::move(cells));
-  }
+  Table table = TableOf(rows);
+  table.caption = "Robots below " + folder;
   Page page;
   page.Add("Robots", "Robots", ToHtml(table));
   return page.Write(

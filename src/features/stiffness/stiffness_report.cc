@@ -13,7 +13,7 @@
 #include "plot/svg_plot.h"
 #include "report/page.h"
 #include "report/result.h"
-#include "report/text_table.h"
+#include "report/terminal_text.h"
 
 namespace mbv {
 namespace {
@@ -221,16 +221,19 @@ std::string ToHtml(const StiffnessReport& report) { return StiffnessPageWriter(r
 namespace {
 
 Table MatrixTable(const std::string& caption, const Mat6& M, bool stiffness) {
-  Table table{.caption = caption, .head = {Text("")}, .rows = {}};
+  Table table{
+      .caption = caption,
+      .columns = {Text("")},
+  };
   for (int j = 0; j < 6; ++j) {
-    table.head.push_back(Digits(stiffness ? AxisName(j) : kWrenchNames[j]));
+    table.columns.push_back(Digits(stiffness ? AxisName(j) : kWrenchNames[j]));
   }
-  table.head.push_back(Text("units"));
+  table.columns.push_back(Text("units"));
   for (int i = 0; i < 6; ++i) {
-    std::vector<Cell> row = {Text(stiffness ? kWrenchNames[i] : AxisName(i))};
-    for (int j = 0; j < 6; ++j) row.push_back(Digits(fmt::format("{:.6g}", M(i, j))));
+    std::vector<Cell> row = {stiffness ? kWrenchNames[i] : AxisName(i)};
+    for (int j = 0; j < 6; ++j) row.push_back(fmt::format("{:.6g}", M(i, j)));
     const auto unit = stiffness ? &StiffnessUnit : &ComplianceUnit;
-    row.push_back(Text(fmt::format("{} | {}", unit(i, 0), unit(i, 3))));
+    row.push_back(fmt::format("{} | {}", unit(i, 0), unit(i, 3)));
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -246,12 +249,16 @@ std::string DifferenceCell(double value) {
 }
 
 Table DifferenceTable(const std::string& caption, const Mat6& difference) {
-  Table table{.caption = caption, .head = {Text("")}, .rows = {}};
-  for (int j = 0; j < 6; ++j) table.head.push_back(Digits(AxisName(j)));
+  Table table{
+      .caption = caption,
+      .columns = {Text("")},
+  };
+  for (int j = 0; j < 6; ++j) table.columns.push_back(Digits(AxisName(j)));
   for (int i = 0; i < 6; ++i) {
-    std::vector<Cell> row = {Text(AxisName(i))};
+    std::vector<Cell> row = {AxisName(i)};
     for (int j = 0; j < 6; ++j) {
-      row.push_back({DifferenceCell(difference(i, j)), true, true});
+      row.emplace_back("");
+      row.back().html = DifferenceCell(difference(i, j));
     }
     table.rows.push_back(std::move(row));
   }
@@ -334,40 +341,40 @@ void AddStatistics(const StiffnessPair& pair, Table* table) {
   const LoadErrors& e = *pair.loads;
   for (const bool mean : {true, false}) {
     const Vec6& axis = mean ? e.mean : e.max;
-    std::vector<Cell> row = {Text(pair.measured + " against " + pair.truth),
-                             Text(mean ? "mean" : "largest")};
-    for (int i : {3, 4, 5, 0, 1, 2}) row.push_back(Digits(fmt::format("{:.2e}", axis[i])));
-    row.push_back(Digits(fmt::format("{:.2e}", mean ? e.vector_mean : e.vector_max)));
+    std::vector<Cell> row = {pair.measured + " against " + pair.truth, mean ? "mean" : "largest"};
+    for (int i : {3, 4, 5, 0, 1, 2}) row.push_back(fmt::format("{:.2e}", axis[i]));
+    row.push_back(fmt::format("{:.2e}", mean ? e.vector_mean : e.vector_max));
     table->rows.push_back(std::move(row));
   }
 }
 
 Table DisplacementTable(const StiffnessReport& report, const StiffnessPair& pair) {
-  Table table{.caption = "Every load",
-              .head = {Digits("load"), Digits("F [N]"), Digits("M [N m]")},
-              .rows = {}};
+  Table table{
+      .caption = "Every load",
+      .columns = {Digits("load"), Digits("F [N]"), Digits("M [N m]")},
+  };
   const std::vector<Vec6>* sides[2] = {nullptr, nullptr};
   for (const StiffnessWitness& witness : report.witnesses) {
     if (witness.name == pair.truth) sides[0] = &witness.displacements;
     if (witness.name == pair.measured) sides[1] = &witness.displacements;
   }
   for (const std::string& name : {pair.truth, pair.measured}) {
-    table.head.push_back(Digits(name + " x, y, z [mm]"));
+    table.columns.push_back(Digits(name + " x, y, z [mm]"));
   }
-  table.head.push_back(Digits("error of the vector"));
+  table.columns.push_back(Digits("error of the vector"));
   const auto triple = [](const Vec3& v, const char* format) {
     return fmt::format(fmt::runtime(format), v.x(), v.y(), v.z());
   };
   for (size_t k = 0; k < report.loads.size(); ++k) {
     const Vec6& load = report.loads[k];
-    std::vector<Cell> row = {Digits(std::to_string(k + 1)),
-                             Digits(triple(load.tail<3>(), "{:.1f}, {:.1f}, {:.1f}")),
-                             Digits(triple(load.head<3>(), "{:.3g}, {:.3g}, {:.3g}"))};
+    std::vector<Cell> row = {std::to_string(k + 1),
+                             triple(load.tail<3>(), "{:.1f}, {:.1f}, {:.1f}"),
+                             triple(load.head<3>(), "{:.3g}, {:.3g}, {:.3g}")};
     for (const std::vector<Vec6>* side : sides) {
       const Vec3 shift = 1e3 * (*side)[k].tail<3>();
-      row.push_back(Digits(triple(shift, "{:.5f}, {:.5f}, {:.5f}")));
+      row.push_back(triple(shift, "{:.5f}, {:.5f}, {:.5f}"));
     }
-    row.push_back(Digits(fmt::format("{:.1e}", pair.loads->vector[k])));
+    row.push_back(fmt::format("{:.1e}", pair.loads->vector[k]));
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -418,32 +425,35 @@ std::string WeaknessHtml(const StiffnessReport& report) {
     };
     html += ToHtml(Table{
         .caption = "Weakest directions, world axes",
-        .head = {Text("against"), Digits("stiffness"), Text("direction"), Text("note")},
-        .rows = {{Text("a force"), Digits(fmt::format("{:.5g} N/m", shift.stiffness)),
-                  Text("along " + vector(shift.direction)), Text("")},
-                 {Text("a moment"), Digits(fmt::format("{:.5g} N m/rad", turn.stiffness)),
-                  Text("about " + vector(turn.direction)), Text("")},
-                 {Text("a screw"), Digits(fmt::format("{:.5g} N/m", screw.stiffness)),
-                  Text("about " + vector(screw.axis)),
-                  Text(fmt::format("pitch {:.4g} m/rad, through {} m from the origin; rotations "
-                                   "times L = {:.4g} m",
-                                   screw.pitch_m, vector(screw.point), screw.length_m))}}});
+        .columns = {Text("against"), Digits("stiffness"), Text("direction"), Text("note")},
+        .rows = {
+            {"a force", fmt::format("{:.5g} N/m", shift.stiffness),
+             "along " + vector(shift.direction)},
+            {"a moment", fmt::format("{:.5g} N m/rad", turn.stiffness),
+             "about " + vector(turn.direction)},
+            {"a screw", fmt::format("{:.5g} N/m", screw.stiffness), "about " + vector(screw.axis),
+             fmt::format("pitch {:.4g} m/rad, through {} m from the origin; rotations times "
+                         "L = {:.4g} m",
+                         screw.pitch_m, vector(screw.point), screw.length_m)}}});
   }
   if (report.indices.empty()) return html;
-  Table table{.caption = "Indices", .head = {Text("index")}, .rows = {}};
+  Table table{
+      .caption = "Indices",
+      .columns = {Text("index")},
+  };
   for (const StiffnessWitness& witness : report.witnesses) {
-    if (witness.ran()) table.head.push_back(Digits(witness.name));
+    if (witness.ran()) table.columns.push_back(Digits(witness.name));
   }
-  table.head.push_back(Text("unit"));
-  table.head.push_back(Text("meaning"));
+  table.columns.push_back(Text("unit"));
+  table.columns.push_back(Text("meaning"));
   for (const IndexRow& row : report.indices) {
-    std::vector<Cell> cells = {Text(row.name)};
+    std::vector<Cell> cells = {row.name};
     for (size_t w = 0; w < row.values.size(); ++w) {
       if (!report.witnesses[w].ran()) continue;
-      cells.push_back(Digits(fmt::format("{:.6g}", row.values[w])));
+      cells.push_back(fmt::format("{:.6g}", row.values[w]));
     }
-    cells.push_back(Text(row.unit));
-    cells.push_back(Text(row.meaning));
+    cells.push_back(row.unit);
+    cells.push_back(row.meaning);
     table.rows.push_back(std::move(cells));
   }
   return html + ToHtml(table);
@@ -453,15 +463,15 @@ std::string ContributionsHtml(const StiffnessReport& report) {
   const StiffnessWitness* witness = report.WithShares();
   if (witness == nullptr) return "";
   const std::vector<Contribution> rows = Contributions(witness->result);
-  Table table{.caption = "Compliance caused by each element, percent (" + witness->name + ")",
-              .head = {Text("element"), Digits("weakest force"), Digits("weakest moment")},
-              .rows = {}};
-  for (int i = 0; i < 6; ++i) table.head.push_back(Digits(AxisName(i)));
+  Table table{
+      .caption = "Compliance caused by each element, percent (" + witness->name + ")",
+      .columns = {Text("element"), Digits("weakest force"), Digits("weakest moment")},
+  };
+  for (int i = 0; i < 6; ++i) table.columns.push_back(Digits(AxisName(i)));
   for (const Contribution& row : rows) {
-    std::vector<Cell> cells = {Text(row.element),
-                               Digits(fmt::format("{:.2f}", 100 * row.translation)),
-                               Digits(fmt::format("{:.2f}", 100 * row.rotation))};
-    for (int i = 0; i < 6; ++i) cells.push_back(Digits(fmt::format("{:.2f}", 100 * row.axis[i])));
+    std::vector<Cell> cells = {row.element, fmt::format("{:.2f}", 100 * row.translation),
+                               fmt::format("{:.2f}", 100 * row.rotation)};
+    for (int i = 0; i < 6; ++i) cells.push_back(fmt::format("{:.2f}", 100 * row.axis[i]));
     table.rows.push_back(std::move(cells));
   }
   return ToSvg(BarsOf(rows)) + ToHtml(table) +
@@ -473,11 +483,12 @@ std::string ContributionsHtml(const StiffnessReport& report) {
 std::string LoadsHtml(const StiffnessReport& report) {
   if (report.loads.empty()) return "";
   std::string html = Note(Escape(report.loads_text) + "; world axes, about the output's origin.");
-  Table table{.caption = "Errors over all loads, in parts of the axis' largest displacement",
-              .head = {Text("of"), Text("")},
-              .rows = {}};
+  Table table{
+      .caption = "Errors over all loads, in parts of the axis' largest displacement",
+      .columns = {Text("of"), Text("")},
+  };
   for (const char* name : {"x", "y", "z", "rx", "ry", "rz", "vector"}) {
-    table.head.push_back(Digits(name));
+    table.columns.push_back(Digits(name));
   }
   for (const StiffnessPair& pair : report.comparison.pairs) AddStatistics(pair, &table);
   for (const StiffnessPair& pair : report.printed_pairs) AddStatistics(pair, &table);
@@ -681,36 +692,36 @@ class StiffnessTableWriter {
         witness.name,
         witness.name == role::kAnalytic && !report.model.empty() ? ", " + report.model : "",
         witness.result.rank, report.output));
-    std::vector<TextColumn> columns = {{"", -12}};
+    Table table{.columns = {Text("")}};
     for (int j = 0; j < 6; ++j) {
-      columns.push_back({std::string(AxisName(j)) + (j < 3 ? " [1/rad]" : " [1/m]"), 14});
+      table.columns.push_back(Digits(std::string(AxisName(j)) + (j < 3 ? " [1/rad]" : " [1/m]")));
     }
-    const TextTable table("  ", columns);
-    out_.Line(Faint(table.Head()));
     for (int i = 0; i < 6; ++i) {
-      std::vector<std::string> row = {std::string(kWrenchNames[i]) + (i < 3 ? " [N m]" : " [N]")};
-      for (int j = 0; j < 6; ++j) row.push_back(fmt::format("{:.6g}", witness.result.K(i, j)));
-      out_.Line(table.Row(row));
+      std::vector<Cell>& row = table.rows.emplace_back();
+      row.emplace_back(std::string(kWrenchNames[i]) + (i < 3 ? " [N m]" : " [N]"));
+      for (int j = 0; j < 6; ++j) row.emplace_back(fmt::format("{:.6g}", witness.result.K(i, j)));
     }
+    out_.Add(table);
   }
 
   void Indices(const StiffnessReport& report) {
     if (report.indices.empty()) return;
-    std::vector<TextColumn> columns = {{"index", -20}};
+    Table table{.columns = {Text("index")}};
     for (const StiffnessWitness& witness : report.witnesses) {
-      if (witness.ran()) columns.push_back({witness.name, 14});
+      if (witness.ran()) table.columns.push_back(Digits(witness.name));
     }
-    columns.push_back({"  unit", 0});
-    const TextTable table("  ", columns);
-    out_.TableHead(table);
+    table.columns.push_back(Text("unit"));
+    table.columns.push_back(Text(""));
     for (const IndexRow& row : report.indices) {
-      std::vector<std::string> cells = {row.name};
+      std::vector<Cell>& cells = table.rows.emplace_back();
+      cells.emplace_back(row.name);
       for (size_t w = 0; w < row.values.size(); ++w) {
-        if (report.witnesses[w].ran()) cells.push_back(fmt::format("{:.6g}", row.values[w]));
+        if (report.witnesses[w].ran()) cells.emplace_back(fmt::format("{:.6g}", row.values[w]));
       }
-      cells.push_back(fmt::format("  {:<8} {}", row.unit, Faint(row.meaning)));
-      out_.Line(table.Row(cells));
+      cells.emplace_back(row.unit);
+      cells.emplace_back(row.meaning, Mark::kOff);
     }
+    out_.Add(table);
   }
 
   void Weakest(const StiffnessResult& result) {
@@ -731,23 +742,17 @@ class StiffnessTableWriter {
 
   void Elements(const StiffnessWitness& witness) {
     const std::vector<Contribution> rows = Contributions(witness.result);
-    size_t width = 10;
-    for (const Contribution& row : rows) width = std::max(width, row.element.size() + 2);
     out_.Line();
     out_.Line(fmt::format("  compliance caused by each element, percent ({})", witness.name));
-    std::vector<TextColumn> columns = {
-        {"element", -static_cast<int>(width)}, {"weakest", 10}, {"weakest", 10}};
-    for (int i = 0; i < 6; ++i) columns.push_back({AxisName(i), 8});
-    const TextTable table("  ", columns);
-    out_.Line(Faint(table.Head()));
-    out_.Line(Faint(table.Row({"", "force", "moment"})));
+    Table table{.columns = {Text("element"), Digits("weakest force"), Digits("weakest moment")}};
+    for (int i = 0; i < 6; ++i) table.columns.push_back(Digits(AxisName(i)));
     const auto percent = [](double share) { return fmt::format("{:.2f}", 100 * share); };
     for (const Contribution& row : rows) {
-      std::vector<std::string> cells = {row.element, percent(row.translation),
-                                        percent(row.rotation)};
-      for (int i = 0; i < 6; ++i) cells.push_back(percent(row.axis[i]));
-      out_.Line(table.Row(cells));
+      std::vector<Cell>& cells = table.rows.emplace_back();
+      cells = {row.element, percent(row.translation), percent(row.rotation)};
+      for (int i = 0; i < 6; ++i) cells.emplace_back(percent(row.axis[i]));
     }
+    out_.Add(table);
   }
 
   void Loads(const StiffnessReport& report, const StiffnessPair& pair) {
@@ -756,20 +761,20 @@ class StiffnessTableWriter {
     out_.Line();
     out_.Line(
         fmt::format("  {} against {} under {}", pair.measured, pair.truth, report.loads_text));
-    const TextTable table("  ", {{"", -26}, {"x", 12}, {"y", 12}, {"z", 12}, {"vector", 12}});
-    out_.Line(Faint(table.Head()));
-    const auto row = [&](const char* title, const Vec6& axes, double vector) {
-      std::vector<std::string> cells = {title};
+    Table table{.columns = {Text(""), Digits("x"), Digits("y"), Digits("z"), Digits("vector")}};
+    std::vector<Cell> largest = {"largest displacement [mm]"};
+    for (int i = 3; i < 6; ++i) largest.emplace_back(fmt::format("{:.4g}", 1e3 * e.scale[i]));
+    table.rows.push_back(std::move(largest));
+    const auto add = [&](const char* title, const Vec6& axes, double vector) {
+      std::vector<Cell>& cells = table.rows.emplace_back();
+      cells.emplace_back(title);
       for (const double value : {axes[3], axes[4], axes[5], vector}) {
-        cells.push_back(fmt::format("{:.2e}", value));
+        cells.emplace_back(fmt::format("{:.2e}", value));
       }
-      out_.Line(table.Row(cells));
     };
-    std::vector<std::string> largest = {"largest displacement [mm]"};
-    for (int i = 3; i < 6; ++i) largest.push_back(fmt::format("{:.4g}", 1e3 * e.scale[i]));
-    out_.Line(table.Row(largest));
-    row("error, mean", e.mean, e.vector_mean);
-    row("error, largest", e.max, e.vector_max);
+    add("error, mean", e.mean, e.vector_mean);
+    add("error, largest", e.max, e.vector_max);
+    out_.Add(table);
   }
 
   // Stated, never judged.
@@ -787,10 +792,6 @@ class StiffnessTableWriter {
                       pair.truth, 100 * K.value, K.where));
       Loads(report, pair);
     }
-  }
-
-  [[nodiscard]] std::string Faint(const std::string& text) const {
-    return out_.Painted(text, Paint::kFaint);
   }
 
   TerminalText out_;

@@ -1,18 +1,19 @@
-// A study for a terminal.
+// What a study found as sections for terminal and page; summary.json.
 
 #include "features/study/study_report.h"
 
 #include <fmt/format.h>
-#include <algorithm>
 #include <cmath>
 
 #include "base/json_text.h"
 #include "base/text.h"
-#include "report/text_table.h"
+#include "features/study/study_html.h"
+#include "report/page.h"
 
 namespace mbv {
-namespace internal {
+namespace {
 
+// The key of the design in study files.
 const char* DesignWord(DesignKind kind) {
   switch (kind) {
     case DesignKind::kSobol:
@@ -29,18 +30,6 @@ const char* DesignWord(DesignKind kind) {
       return "list";
   }
   return "?";
-}
-
-std::string PointsText(const StudyReport& report) {
-  const StudySummary& summary = report.summary;
-  std::string text =
-      fmt::format("{} points by {}", summary.points, DesignWord(report.study.design.kind));
-  if (summary.failed > 0) text += fmt::format(", {} of them without a result", summary.failed);
-  if (!report.idle.empty()) {
-    text += fmt::format("; {} {} no quantity", Joined(report.idle),
-                        report.idle.size() == 1 ? "moves" : "move");
-  }
-  return text;
 }
 
 std::string LimitText(const StudyReport& report, const LimitResult& result) {
@@ -75,144 +64,245 @@ std::string DisagreedText(const StudyReport& report) {
                      report.summary.points - report.summary.failed);
 }
 
-}  // namespace internal
+Cell Kept(bool kept) { return kept ? Cell("kept", Mark::kOk) : Cell("VIOLATED", Mark::kFail); }
 
-namespace {
+std::string Six(double value) { return NumberOrDash(value, "{:.6g}"); }
+std::string Count(std::uint64_t count) { return fmt::format("{}", count); }
 
-int WidthOf(const StudyReport& report) {
-  size_t width = 8;
-  for (const StudyQuantity& q : report.study.quantities) width = std::max(width, q.name.size());
-  for (const Factor& factor : report.study.factors) width = std::max(width, factor.name.size());
-  return -static_cast<int>(width);
+void AddPlots(const std::vector<StudyPlot>& plots, StudySection of, ReportSection* section) {
+  for (const StudyPlot& plot : plots) {
+    if (plot.section == of) section->Add(Drawing{plot.svg});
+  }
 }
 
-std::string ValueTable(const StudyReport& report) {
-  const TextTable table("  ", {{"quantity", WidthOf(report)},
-                               {"nominal", 12},
-                               {"least", 12},
-                               {"5 %", 12},
-                               {"median", 12},
-                               {"95 %", 12},
-                               {"most", 12}});
-  std::string text = table.Head() + "\n";
-  for (const QuantitySummary& q : report.summary.quantities) {
-    std::vector<std::string> cells = {q.name};
-    for (const double value : {q.nominal, q.least, q.p5, q.p50, q.p95, q.most}) {
-      cells.push_back(NumberCell(value, "{:.6g}"));
-    }
-    text += table.Row(cells) + "\n";
-  }
-  return text;
-}
-
-std::string IndexTable(const StudyReport& report, const QuantitySummary& q) {
-  const TextTable table("  ", {{"varied", WidthOf(report)},
-                               {"first order", 12},
-                               {"95 % interval", 20},
-                               {"total", 12},
-                               {"95 % interval", 20}});
-  std::string text = fmt::format("\n  Sobol' indices of {}\n{}\n", q.name, table.Head());
-  const auto interval = [](const Interval& i) {
-    return std::isnan(i.lower) ? "-" : fmt::format("{:.3f} … {:.3f}", i.lower, i.upper);
-  };
-  for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
-    const SobolIndex& index = q.sobol->indices[k];
-    text += table.Row({report.study.factors[k].name, NumberCell(index.first, "{:.3f}"),
-                       interval(index.first_interval), NumberCell(index.total, "{:.3f}"),
-                       interval(index.total_interval)}) +
-            "\n";
-  }
-  return text;
-}
-
-std::string SwingTable(const StudyReport& report, const QuantitySummary& q) {
-  const TextTable table("  ", {{"varied", WidthOf(report)}, {"least", 12}, {"most", 12}});
-  std::string text = fmt::format("\n  {} with one number varied at a time, nominal {:.6g}\n{}\n",
-                                 q.name, q.nominal, table.Head());
-  for (const Swing& swing : q.swings) {
-    text += table.Row({report.study.factors[swing.factor].name, NumberCell(swing.lowest, "{:.6g}"),
-                       NumberCell(swing.highest, "{:.6g}")}) +
-            "\n";
-  }
-  return text;
-}
-
-std::string ValidationLines(const StudyReport& report) {
-  const StudyValidationResult& validation = *report.validation;
-  if (!validation.trouble.empty()) return "\n  not validated: " + validation.trouble + "\n";
-  const TextTable table("  ", {{"drive", WidthOf(report)},
-                               {"RMS of E", 12},
-                               {"u_num", 12},
-                               {"u_input", 12},
-                               {"u_D", 12},
-                               {"u_val", 12},
-                               {"outside", 14}});
-  std::string text = fmt::format("\n  computed - measured (E) against {}, V&V 20\n{}\n",
-                                 validation.table, table.Head());
-  for (const DriveValidation& v : validation.drives) {
-    std::vector<std::string> cells = {v.forces.drive};
-    for (const double x : {v.error_rms, v.u_num, v.u_input, v.u_data, v.level}) {
-      cells.push_back(NumberCell(x, "{:.4g}"));
-    }
-    cells.push_back(fmt::format("{} of {}", v.outside, v.samples()));
-    text += table.Row(cells) + "\n";
-  }
-  for (const DriveValidation& v : validation.drives) {
-    text += fmt::format(
-        "  {} {}: validation level u_val = {:.3g} {} ({:.2g} % of the RMS force), mostly {}\n",
-        v.pass() ? "within  " : "BEYOND  ", v.forces.drive, v.level, v.forces.unit,
-        100.0 * v.level / v.measured_rms, v.largest);
-  }
-  return text;
-}
-
-// What the user will want to look at: what violates a limit, and what did not run.
-std::string WorstLines(const StudyReport& report) {
-  std::string text;
+ReportSection Limits(const StudyReport& report) {
+  ReportSection section{.title = "Limits", .link = "Limits"};
+  Table table{.caption = "Limits", .columns = {Text("limit"), Text("verdict"), Text("points")}};
   for (const LimitResult& result : report.summary.limits) {
-    if (result.violations == 0) continue;
+    table.rows.push_back({LimitText(report, result), Kept(result.pass()), ShareText(result)});
+  }
+  if (report.study.witnesses.size() > 1) {
+    table.rows.push_back({"verdicts by the scenario's checks", Kept(report.summary.disagreed == 0),
+                          DisagreedText(report)});
+  }
+  if (report.study.missing) {
+    table.rows.push_back(
+        {"points without a result", Kept(report.summary.few_missing()), MissingText(report)});
+  }
+  if (table.rows.empty()) return section;
+  section.Add(std::move(table));
+  section.Note(
+      std::string(report.study.missing ? "" : "Points without a result violate every limit. ") +
+      "The interval is Clopper and Pearson's, as of independent points.");
+  return section;
+}
+
+ReportSection Quantities(const StudyReport& report) {
+  ReportSection section{.title = "Quantities", .link = "Quantities"};
+  Table table{
+      .caption = "Quantities over all points",
+      .columns = {Text("quantity"), Digits("nominal"), Digits("least"), Digits("5 %"),
+                  Digits("median"), Digits("95 %"), Digits("most"), Digits("mean", On::kPage),
+                  Digits("standard deviation", On::kPage), Digits("missing", On::kPage)}};
+  for (const QuantitySummary& q : report.summary.quantities) {
+    table.rows.push_back({q.name, Six(q.nominal), Six(q.least), Six(q.p5), Six(q.p50), Six(q.p95),
+                          Six(q.most), Six(q.mean), Six(q.deviation), Count(q.missing)});
+  }
+  section.Add(std::move(table));
+  return section;
+}
+
+ReportSection Indices(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+  ReportSection section{.title = "Sobol' indices", .link = "Indices"};
+  AddPlots(plots, StudySection::kIndices, &section);
+  const auto interval = [](const Interval& i) {
+    return std::isnan(i.lower) ? "–" : fmt::format("{:.3f} … {:.3f}", i.lower, i.upper);
+  };
+  for (const QuantitySummary& q : report.summary.quantities) {
+    if (!q.sobol) continue;
+    Table table{.caption = fmt::format("Sobol' indices of {}: {} blocks, {} left out", q.name,
+                                       q.sobol->blocks, q.sobol->left_out),
+                .columns = {Text("varied"), Digits("first order"), Digits("95 %"), Digits("total"),
+                            Digits("95 %")}};
+    for (size_t k = 0; k < q.sobol->indices.size(); ++k) {
+      const SobolIndex& index = q.sobol->indices[k];
+      table.rows.push_back({report.study.factors[k].name, NumberOrDash(index.first, "{:.3f}"),
+                            interval(index.first_interval), NumberOrDash(index.total, "{:.3f}"),
+                            interval(index.total_interval)});
+    }
+    section.Add(std::move(table));
+  }
+  if (section.blocks.empty()) return section;
+  section.Note(
+      "Shares of the variance: first order of the number alone, total with all that it does "
+      "together with others. Saltelli's and Jansen's estimators; intervals by bootstrap of "
+      "blocks.");
+  return section;
+}
+
+ReportSection OneAtATime(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+  ReportSection section{.title = "One number at a time", .link = "Tornado"};
+  AddPlots(plots, StudySection::kTornado, &section);
+  for (const QuantitySummary& q : report.summary.quantities) {
+    Table table{.caption = fmt::format("{} with one number varied at a time, nominal {:.6g}",
+                                       q.name, q.nominal),
+                .columns = {Text("varied alone"), Digits("least"), Digits("most")}};
+    for (const Swing& swing : q.swings) {
+      table.rows.push_back(
+          {report.study.factors[swing.factor].name, Six(swing.lowest), Six(swing.highest)});
+    }
+    section.Add(std::move(table));
+  }
+  return section;
+}
+
+ReportSection Validation(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+  ReportSection section{.title = "Validation", .link = "Validation"};
+  if (!report.validation) return section;
+  const StudyValidationResult& validation = *report.validation;
+  if (!validation.trouble.empty()) {
+    section.Add(Paragraph{"not validated: " + validation.trouble});
+    return section;
+  }
+  Table table{.caption = "Drive forces against " + validation.table +
+                         ", V&V 20: E = computed − "
+                         "measured",
+              .columns = {Text("drive"), Text("verdict"), Digits("mean of E", On::kPage),
+                          Digits("RMS of E"), Digits("u_num"), Digits("u_input"), Digits("u_D"),
+                          Digits("u_val"), Digits("of RMS measured"), Digits("outside"),
+                          Text("largest part")}};
+  const auto four = [](double value) { return NumberOrDash(value, "{:.4g}"); };
+  for (const DriveValidation& v : validation.drives) {
+    table.rows.push_back({fmt::format("{} [{}]", v.forces.drive, v.forces.unit),
+                          v.pass() ? Cell("within", Mark::kOk) : Cell("BEYOND", Mark::kFail),
+                          four(v.error_mean), four(v.error_rms), four(v.u_num), four(v.u_input),
+                          four(v.u_data), four(v.level),
+                          fmt::format("{:.2g} %", 100.0 * v.level / v.measured_rms),
+                          fmt::format("{} of {}", v.outside, v.samples()), v.largest});
+  }
+  section.Add(std::move(table));
+  section.Note(fmt::format(
+      "E = computed − measured; standard uncertainties, RMS over the samples: u_num of the "
+      "scheme ({}), u_input of the varied numbers, u_D of the table; u_val is their root sum of "
+      "squares, the validation level: a smaller error of the model cannot be seen here. A sample "
+      "is outside where |E| > {:g} u_val; {:g} % of them may be [ASME V&V 20-2009].",
+      validation.numerical, report.study.validation->coverage,
+      100.0 * report.study.validation->share));
+  AddPlots(plots, StudySection::kValidation, &section);
+  return section;
+}
+
+ReportSection Bands(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+  ReportSection section{.title = "Drive forces over time", .link = "Bands"};
+  AddPlots(plots, StudySection::kBands, &section);
+  if (section.blocks.empty()) return section;
+  section.Note(fmt::format("Percentiles at each time of {} points ({} left out).",
+                           report.bands[0].points, report.bands[0].left_out));
+  return section;
+}
+
+ReportSection Histograms(const std::vector<StudyPlot>& plots) {
+  ReportSection section{.title = "Distributions", .link = "Histograms"};
+  AddPlots(plots, StudySection::kHistograms, &section);
+  return section;
+}
+
+ReportSection Scatter(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+  ReportSection section{.title = "Point by point", .link = "Scatter"};
+  AddPlots(plots, StudySection::kScatter, &section);
+  if (section.blocks.empty()) return section;
+  section.Note(fmt::format("{} of {} points; the first 8 varied numbers and 6 quantities.",
+                           report.shown.size(), report.summary.points));
+  return section;
+}
+
+// What the user will want to look at: a terminal shows the first point of each violated limit.
+ReportSection Worst(const StudyReport& report) {
+  ReportSection section{.title = "Worst points, and how to run them", .link = "Worst"};
+  Table table{.caption = "Worst points",
+              .columns = {Text("quantity"), Digits("point"), Digits("value"), Text("command")}};
+  for (size_t k = 0; k < report.summary.quantities.size(); ++k) {
+    const QuantitySummary& q = report.summary.quantities[k];
+    for (size_t i = 0; i < q.worst.size(); ++i) {
+      table.rows.push_back({q.name, Count(q.worst[i].point), Six(q.worst[i].value),
+                            Code(report.worst_commands[k][i])});
+    }
+  }
+  section.Add(std::move(table), On::kPage);
+  for (const LimitResult& result : report.summary.limits) {
     const QuantitySummary& q = report.summary.quantities[result.limit.quantity];
-    if (q.worst.empty()) continue;
-    text += fmt::format("\n  worst {}: {:.6g} at point {}\n    {}\n", q.name, q.worst[0].value,
-                        q.worst[0].point, report.worst_commands[result.limit.quantity][0]);
+    if (result.violations == 0 || q.worst.empty()) continue;
+    section.Add(Paragraph{fmt::format("worst {}: {:.6g} at point {}", q.name, q.worst[0].value,
+                                      q.worst[0].point)},
+                On::kTerminal);
+    section.Add(Verbatim{report.worst_commands[result.limit.quantity][0]}, On::kTerminal);
   }
+  return section;
+}
+
+ReportSection Disagreements(const StudyReport& report) {
+  ReportSection section{.title = "Points where witnesses disagree", .link = "Disagreements"};
+  if (report.summary.disagreed == 0) return section;
+  section.Add(Paragraph{DisagreedText(report)}, On::kPage);
   for (size_t k = 0; k < report.summary.first_disagreed.size(); ++k) {
-    text += fmt::format("\n  witnesses disagree at point {}\n    {}\n",
-                        report.summary.first_disagreed[k].point, report.disagreed_commands[k]);
+    section.Add(Paragraph{fmt::format("witnesses disagree at point {}",
+                                      report.summary.first_disagreed[k].point)},
+                On::kTerminal);
+    section.Add(Verbatim{report.disagreed_commands[k]});
   }
+  return section;
+}
+
+ReportSection Failures(const StudyReport& report) {
+  ReportSection section{.title = "Points without a result", .link = "Failures"};
+  if (report.summary.failed == 0) return section;
+  Table table{.caption = "Why points have no result",
+              .columns = {Text("reason"), Digits("points")}};
+  for (const auto& [reason, count] : report.summary.reasons) {
+    table.rows.push_back({reason, Count(count)});
+  }
+  section.Add(std::move(table));
   for (size_t k = 0; k < report.summary.first_failed.size(); ++k) {
     const PointRow& row = report.summary.first_failed[k];
-    text += fmt::format("\n  point {} has no result: {}\n    {}\n", row.point, row.reason,
-                        report.failed_commands[k]);
+    section.Add(Paragraph{fmt::format("point {} has no result: {}", row.point, row.reason)},
+                On::kTerminal);
+    section.Add(Verbatim{report.failed_commands[k]});
   }
-  return text;
+  return section;
 }
 
 }  // namespace
 
-std::string ToText(const StudyReport& report) {
+std::string PointsText(const StudyReport& report) {
+  const StudySummary& summary = report.summary;
   std::string text =
-      fmt::format("study {}: {}\n\n", report.study.name, internal::PointsText(report));
-  text += ValueTable(report);
-  for (const QuantitySummary& q : report.summary.quantities) {
-    if (q.sobol) text += IndexTable(report, q);
-    if (!q.swings.empty()) text += SwingTable(report, q);
+      fmt::format("{} points by {}", summary.points, DesignWord(report.study.design.kind));
+  if (summary.failed > 0) text += fmt::format(", {} of them without a result", summary.failed);
+  if (!report.idle.empty()) {
+    text += fmt::format("; {} {} no quantity", Joined(report.idle),
+                        report.idle.size() == 1 ? "moves" : "move");
   }
-  if (report.validation) text += ValidationLines(report);
-  if (report.judged()) text += "\n";
-  for (const LimitResult& result : report.summary.limits) {
-    text += fmt::format("  {} {}: {}\n", result.pass() ? "kept    " : "VIOLATED",
-                        internal::LimitText(report, result), internal::ShareText(result));
-  }
-  if (report.study.witnesses.size() > 1) {
-    text += fmt::format("  {} {}\n", report.summary.disagreed == 0 ? "kept    " : "VIOLATED",
-                        internal::DisagreedText(report));
-  }
-  if (report.study.missing) {
-    text += fmt::format("  {} {}\n", report.summary.few_missing() ? "kept    " : "VIOLATED",
-                        internal::MissingText(report));
-  }
-  return text + WorstLines(report);
+  return text;
+}
+
+std::vector<ReportSection> SectionsOf(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+  return {Limits(report),
+          Quantities(report),
+          Indices(report, plots),
+          OneAtATime(report, plots),
+          Validation(report, plots),
+          Bands(report, plots),
+          Histograms(plots),
+          Scatter(report, plots),
+          Worst(report),
+          Disagreements(report),
+          Failures(report)};
+}
+
+std::string ToText(const StudyReport& report) {
+  std::string text = fmt::format("study {}: {}\n", report.study.name, PointsText(report));
+  for (const ReportSection& section : SectionsOf(report, {})) text += ToText(section);
+  return text;
 }
 
 // summary.json of a study.
@@ -369,13 +459,13 @@ const char* VerdictWord(const StudyReport& report) {
 }
 
 std::string ReasonText(const StudyReport& report) {
-  std::string text = internal::PointsText(report);
+  std::string text = PointsText(report);
   for (const LimitResult& result : report.summary.limits) {
     if (result.pass()) continue;
-    text += "; " + internal::LimitText(report, result) + ": " + internal::ShareText(result);
+    text += "; " + LimitText(report, result) + ": " + ShareText(result);
   }
-  if (report.summary.disagreed > 0) text += "; " + internal::DisagreedText(report);
-  if (!report.summary.few_missing()) text += "; " + internal::MissingText(report);
+  if (report.summary.disagreed > 0) text += "; " + DisagreedText(report);
+  if (!report.summary.few_missing()) text += "; " + MissingText(report);
   if (report.validation && !report.validation->pass()) {
     text += "; not validated by " + report.validation->table;
   }
@@ -390,7 +480,7 @@ Json ChecksJson(const StudyReport& report) {
         {{"name", name}, {"value", Number(share)}, {"limit", Number(allowed)}, {"pass", pass}});
   };
   for (const LimitResult& result : report.summary.limits) {
-    add(internal::LimitText(report, result), result.share(), result.limit.share, result.pass());
+    add(LimitText(report, result), result.share(), result.limit.share, result.pass());
   }
   if (report.study.witnesses.size() > 1) {
     add("witnesses agree",
@@ -453,7 +543,7 @@ std::string ToJson(const StudyReport& report) {
                {"judged", report.judged()},
                {"reason", ReasonText(report)},
                {"exit_code", report.exit_code()},
-               {"design", internal::DesignWord(study.design.kind)},
+               {"design", DesignWord(study.design.kind)},
                {"seed", study.design.seed},
                {"points", report.summary.points},
                {"witnesses", std::move(witnesses)},

@@ -38,12 +38,10 @@ TEST(UpgradeReport, IsReadByPeople) {
       ToText(ExampleUpgrade()),
       "bar/turn: the generated model in MuJoCo 2.2.2 and 3.14.0\n"
       "  loads without a message\n"
-      "  rows at 25 states    rows   softness, new/old  |dJ/dt qdot|  left out, old      new\n"
-      "  weld                    6           1 … 18.08           6.9            6.9    3e-15"
-      "  3.7.0\n"
-      "  RMS error of all drive forces       2.2.2      3.14.0  loop gap, old         new\n"
-      "  recipe                            3.0e-04           –      1.0e-05 m           –\n"
-      "    diverged\n");
+      "  rows at 25 states  rows  softness, new/old  |dJ/dt qdot|  left out, old    new  why\n"
+      "  weld                  6          1 … 18.08           6.9            6.9  3e-15  3.7.0\n"
+      "  RMS error of all drive forces    2.2.2  3.14.0  loop gap, old  new  why not\n"
+      "  recipe                         3.0e-04       –      1.0e-05 m    –  diverged\n");
 }
 
 TEST(UpgradeReport, TellsWhatIsSaidAndThatNobodyAnswered) {

@@ -27,7 +27,7 @@ TEST(TablesCommand, ADisagreementIsWrittenAndTold) {
       "--formats md --out " +
       mbverify.Out());
   EXPECT_EQ(run.exit_code, 1) << run.err;
-  EXPECT_NE(ReadAll(mbverify.Out() + "/four_bar/turn_inverse/checks.md").find("| fails |"),
+  EXPECT_NE(ReadAll(mbverify.Out() + "/four_bar/turn_inverse/checks.md").find("| FAIL |"),
             std::string::npos);
 }
 

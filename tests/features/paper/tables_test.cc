@@ -14,8 +14,8 @@ std::string TablesScenario(const std::string& name) {
   return std::string(kSourceDir) + "/scenarios/" + name + ".yaml";
 }
 
-const PaperTable* FindTable(const TablesOutcome& outcome, const std::string& name) {
-  for (const PaperTable& table : outcome.tables) {
+const Table* FindTable(const TablesOutcome& outcome, const std::string& name) {
+  for (const Table& table : outcome.tables) {
     if (table.name == name) return &table;
   }
   return nullptr;
@@ -40,7 +40,7 @@ TEST(MakeTables, MotorsOfAModelAreSized) {
   ASSERT_EQ(outcome.tables.size(), 1u) << outcome.diagnostics.Text();
   // The law by hand: docs/how-to/size_motors.md works this machine out (0.19981 N m, 0.1073 N m
   // RMS, 40 π rad/s, 30 % of the rated speed).
-  EXPECT_THAT(outcome.tables[0].rows.at(0),
+  EXPECT_THAT(Texts(outcome.tables[0].rows.at(0)),
               testing::ElementsAre("motor", "0.2 N m", "0.107 N m", "126 rad/s", "23.7 W",
                                    HasSubstr("30"), "rated speed"));
   options.scenario.set = {{"motion.duration_s", "0.1"}};

@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "report/result.h"
-#include "report/text_table.h"
+#include "report/terminal_text.h"
 #include "tests/support/golden_file.h"
 
 namespace mbv {
@@ -78,10 +78,9 @@ TEST(ResultKind, TheTerminalTextNeedsItsOwnTableOnly) {
   TerminalText out({});
   out.Head(view, report.title(), {"looked at twice", ""});
   out.Checks(view);
-  const TextTable table("  ", {{"colour", -10}, {"share", 8}, {"  note", 0}});
-  out.TableHead(table);
-  out.Line(table.Row({"red", fmt::format("{:.3f}", report.hue), "  much"}));
-  out.Line(table.Row({"a long name", "1"}));
+  Table table{.columns = {Text("colour"), Digits("share"), Text("note")}};
+  table.rows = {{"red", fmt::format("{:.3f}", report.hue), "much"}, {"a long name", "1"}};
+  out.Add(table);
   out.Gaps(view);
   out.Times({{"looking", 0.25}}, report.timing.total_s, "; 2 looks");
   EXPECT_EQ(out.text(),
@@ -92,16 +91,16 @@ TEST(ResultKind, TheTerminalTextNeedsItsOwnTableOnly) {
             "  the eye and the book agree\n"
             "  warning: a cloud\n"
             "\n"
-            "  check                              value      limit         worst at\n"
+            "  check          value    limit        worst at\n"
             "  camera vs eye\n"
-            "    hue                           2.50e-01    1.2e-01   FAIL  the left edge\n"
+            "    hue       2.50e-01  1.2e-01  FAIL  the left edge\n"
             "  eye\n"
-            "    darkness                      7.00e+00        off   -\n"
+            "    darkness  7.00e+00      off  off\n"
             "    1 more within limits\n"
             "\n"
             "  colour       share  note\n"
             "  red          0.625  much\n"
-            "  a long name       1\n"
+            "  a long name      1\n"
             "\n"
             "  not compared\n"
             "    book: was out of reach\n"
@@ -116,7 +115,7 @@ TEST(ResultKind, VerboseShowsWhatIsFolded) {
   const ColourReport report = Sunset();
   TerminalText out({.color = false, .verbose = true});
   out.Checks(ViewOf(report));
-  EXPECT_NE(out.text().find("    steadiness [rad]              5.00e-01    2.0e+00   ok\n"),
+  EXPECT_NE(out.text().find("    steadiness [rad]  5.00e-01  2.0e+00  ok\n"),
             std::string::npos)
       << out.text();
 }
