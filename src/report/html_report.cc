@@ -27,74 +27,71 @@ std::string At(double time_s) {
 
 }  // namespace
 
-std::string DrivesHtml(const Report& report) {
-  std::string html;
-  const PairComparison* main = MainPair(report.comparison);
+std::vector<Block> DriveBlocks(const Report& report) {
+  std::vector<Block> blocks;
+  const PairComparison* main = report.comparison.MainPair();
+  bool floored = false;
   for (const PairComparison& pair : report.comparison.pairs) {
     if (!pair.compared || pair.drives.empty()) continue;
-    Table table{.caption = pair.measured + " against " + pair.truth,
-                .head = {Text("drive"), Digits("RMS force"), Digits("RMS error / RMS force"),
-                         Digits("largest error"), Digits("at"), Digits("matching digits")},
-                .rows = {}};
+    Table table{
+        .caption = pair.measured + " against " + pair.truth,
+        .head = {Text("drive"), Digits("RMS force"), Digits("RMS error / RMS force"),
+                 Digits("largest error"), Digits("at"), Digits("matching digits"), Text("")},
+        .rows = {}};
     for (const DriveMetrics& drive : pair.drives) {
+      floored = floored || (drive.floored && &pair == main);
       table.rows.push_back(
           {Text(drive.drive), Digits(fmt::format("{:.6g} {}", drive.rms_truth, drive.unit)),
            Digits(NumberOrDash(drive.nrmse)),
            Digits(NumberOrDash(drive.max_error) + " " + drive.unit), Digits(At(drive.time_s)),
-           Cell{NumberOrDash(drive.digits, "{:.1f}") +
-                    (drive.floored ? " " + Pill("warn", "floored") : ""),
-                true, true}});
+           Digits(NumberOrDash(drive.digits, "{:.1f}")), Text(drive.floored ? "floored" : "")});
     }
-    const bool first = &pair == main;
-    html += first ? ToHtml(table) : Folded(table.caption, ToHtml(table));
+    const std::string folded = &pair == main ? "" : table.caption;
+    blocks.push_back({.table = std::move(table), .folded = folded});
   }
-  if (const std::string rest = AtRestText(report.comparison); !rest.empty()) {
-    html += Note(Escape(Sentence(rest)) + " Joint reactions are those without the resting force.");
+  if (floored) {
+    blocks.push_back({.text = "floored: relative to 0.1 % of what the drive carries, which is more "
+                              "than its own force"});
   }
-  return html;
+  return blocks;
 }
 
-namespace {
-
-std::string FrictionHtml(const EngineComparison& engine) {
-  if (engine.friction.empty()) return "";
-  Table table{.caption = "Dry friction by MuJoCo's own frictionloss, against " + engine.truth,
-              .head = {Digits("step"), Text("misses farthest"), Digits("by"), Digits("limit")},
-              .rows = {}};
-  for (const FrictionError& e : engine.friction) {
-    const std::string unit = e.unit.empty() ? "" : " " + e.unit;
-    table.rows.push_back({Digits(fmt::format("{:g} ms", 1e3 * e.step_s)),
-                          Text(e.failure.empty() ? e.check : e.failure),
-                          Digits(NumberOrDash(e.value) + unit),
-                          Digits(NumberOrDash(e.limit) + unit)});
-  }
-  return ToHtml(table) + Note(Escape(Sentence(engine.FrictionText())));
-}
-
-}  // namespace
-
-std::string EngineHtml(const Report& report) {
-  if (!report.engine_comparison) return "";
+std::vector<Block> EngineBlocks(const Report& report) {
+  if (!report.engine_comparison) return {};
   const EngineComparison& engine = *report.engine_comparison;
-  const std::string friction = FrictionHtml(engine);
-  if (engine.engines.empty()) return friction;
-  Table table{.caption = "The same run by each engine, against " + engine.truth,
-              .head = {Text("engine"), Digits("force error, RMS"),
-                       Digits(fmt::format("from {:g} s", engine.later_s)),
-                       Digits("force error, largest"), Digits("loop gap")},
-              .rows = {}};
+  std::vector<Block> blocks;
+  if (!engine.friction.empty()) {
+    Table table{.caption = "Dry friction by MuJoCo's own frictionloss, against " + engine.truth,
+                .head = {Digits("step"), Text("misses farthest"), Digits("by"), Digits("limit")},
+                .rows = {}};
+    for (const FrictionError& e : engine.friction) {
+      const std::string unit = e.unit.empty() ? "" : " " + e.unit;
+      table.rows.push_back({Digits(fmt::format("{:g} ms", 1e3 * e.step_s)),
+                            Text(e.failure.empty() ? e.check : e.failure),
+                            Digits(NumberOrDash(e.value) + unit),
+                            Digits(NumberOrDash(e.limit) + unit)});
+    }
+    blocks.push_back({.table = std::move(table)});
+    blocks.push_back({.text = Sentence(engine.FrictionText())});
+  }
+  if (engine.engines.empty()) return blocks;
+  Table table{
+      .caption = "The simulator's own error: the same run by each engine, against " + engine.truth,
+      .head = {Text("engine"), Digits("force error, RMS"),
+               Digits(fmt::format("from {:g} s", engine.later_s)), Digits("force error, largest"),
+               Digits("loop gap")},
+      .rows = {}};
   std::string failures;
   for (const EngineError& e : engine.engines) {
     const std::string name = EngineComparison::NameOf(e.engine);
-    if (!e.failure.empty()) failures += Note(name + ": no result: " + Escape(e.failure));
+    if (!e.failure.empty()) failures += name + ": no result: " + Sentence(e.failure) + " ";
     table.rows.push_back(
         {Text(name), Digits(NumberOrDash(e.force_nrmse)), Digits(NumberOrDash(e.force_nrmse_later)),
          Digits(NumberOrDash(e.force_max_rel)), Digits(NumberOrDash(e.closure_max_m) + " m")});
   }
-  return friction + ToHtml(table) + failures +
-         Note(
-             "What MuJoCo as it is is off by is its own modelling error, not the equations'. Most "
-             "of it are the first moments, in which its soft constraints take up the load.");
+  blocks.push_back({.table = std::move(table)});
+  if (!failures.empty()) blocks.push_back({.text = failures});
+  return blocks;
 }
 
 // One column per witness that recorded its energies.
@@ -228,7 +225,7 @@ std::string ForcePlotsHtml(const PairComparison& pair, const Trace& measured, co
 }  // namespace
 
 std::string StaticPlotsHtml(const Report& report) {
-  const PairComparison* pair = MainPair(report.comparison);
+  const PairComparison* pair = report.comparison.MainPair();
   if (pair == nullptr) return "";
   const Trace* measured = TraceOf(report, pair->measured);
   const Trace* truth = TraceOf(report, pair->truth);
@@ -259,13 +256,19 @@ class PageWriter {
     Interactive();
     Pictures();
     page_.Add("Checks", "Checks",
-              PairMatrixHtml(report_.comparison) + ChecksHtml(view_, kHowToReadChecks));
+              ToHtml({Block{.table = PairMatrixTable(report_.comparison)}}) +
+                  ChecksHtml(view_, kHowToReadChecks));
     page_.Add("The table in the reference's place", "Table", ReferenceTableHtml(report_));
     page_.Add("Tables that command the motion", "Tables", MotionTableHtml(report_));
-    page_.Add("Drives", "Drives", DrivesHtml(report_));
+    const std::string rest = AtRestText(report_.comparison);
+    page_.Add("Drives", "Drives",
+              ToHtml(DriveBlocks(report_)) +
+                  (rest.empty() ? ""
+                                : Note(Escape(Sentence(rest)) +
+                                       " Joint reactions are those without the resting force.")));
     page_.Add("What drives and joints bear", "Loads", LoadsHtml(report_));
     page_.Add("Motors", "Motors", SizingHtml(report_));
-    page_.Add("The simulator's own error", "Engine", EngineHtml(report_));
+    page_.Add("The simulator's own error", "Engine", ToHtml(EngineBlocks(report_)));
     page_.Add("Your own file, run as it is", "File", SourceModelHtml(report_.source_model.get()));
     page_.Add("Energy", "Energy", EnergyHtml(report_));
     page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
@@ -292,7 +295,7 @@ class PageWriter {
 
   std::string Cards() const {
     std::string html;
-    if (const PairComparison* pair = MainPair(report_.comparison)) {
+    if (const PairComparison* pair = report_.comparison.MainPair()) {
       html += ForceCards(*pair);
     }
     for (const WitnessMetrics& witness : report_.comparison.witnesses) {
@@ -482,7 +485,7 @@ std::string Shown(const Table& table, bool open) {
 
 // What the others are measured against the main pair's first witness; else the first that ran.
 std::string MainWitness(const Report& report, const LoadFigures& loads) {
-  const PairComparison* pair = MainPair(report.comparison);
+  const PairComparison* pair = report.comparison.MainPair();
   return pair != nullptr ? pair->measured : loads.drives.front().witness;
 }
 

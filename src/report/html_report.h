@@ -59,10 +59,15 @@ struct HtmlInput {
 /// little-endian 32-bit floats in base64). No '<' occurs in it.
 [[nodiscard]] std::string PageData(const HtmlInput& input);
 
+// What page and terminal show of a motion.
+
+/// Each drive's force in every pair; all but the main pair are folded.
+[[nodiscard]] std::vector<Block> DriveBlocks(const Report& report);
+/// MuJoCo as it is, beside what corrects it.
+[[nodiscard]] std::vector<Block> EngineBlocks(const Report& report);
+
 // The tables of a motion's page. Each returns HTML, or "" when there is nothing to show.
 
-[[nodiscard]] std::string DrivesHtml(const Report& report);
-[[nodiscard]] std::string EngineHtml(const Report& report);
 /// What drives and joints bear: force, power, stroke and speed; magnitudes of reactions.
 [[nodiscard]] std::string LoadsHtml(const Report& report);
 [[nodiscard]] std::string EnergyHtml(const Report& report);

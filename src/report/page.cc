@@ -57,6 +57,25 @@ std::string ToHtml(const Table& table) {
   return html + "</tbody></table></div>\n";
 }
 
+std::string ToHtml(const std::vector<Block>& blocks) {
+  std::string html, hidden;
+  for (size_t k = 0; k < blocks.size(); ++k) {
+    const Block& block = blocks[k];
+    std::string& to = block.folded.empty() ? html : hidden;
+    if (!block.text.empty()) to += Note(Escape(block.text));
+    if (!block.table.rows.empty()) to += ToHtml(block.table);
+    if (!block.figures.empty()) {
+      to += "<div class=\"pictures static-plots\">\n";
+      for (const std::string& svg : block.figures) to += FigureHtml(svg);
+      to += "</div>\n";
+    }
+    if (hidden.empty() || (k + 1 < blocks.size() && blocks[k + 1].folded == block.folded)) continue;
+    html += Folded(block.folded, hidden);
+    hidden.clear();
+  }
+  return html;
+}
+
 std::string NumberOrDash(double value, const char* format) {
   return std::isfinite(value) ? fmt::format(fmt::runtime(format), value) : "–";
 }
@@ -126,8 +145,7 @@ std::string HeadHtml(const PageHead& head) {
 
 std::string TopHtml(const PageHead& head) {
   const VerdictWords words = WordsOf(head.verdict);
-  const std::string sign =
-      head.sign ? fmt::format("<span aria-hidden=\"true\">{}</span> ", words.sign) : "";
+  const std::string sign = fmt::format("<span aria-hidden=\"true\">{}</span> ", words.sign);
   const std::string badge =
       head.judges
           ? fmt::format("<div class=\"badges\"><span class=\"verdict {}\">{}{}</span></div>",

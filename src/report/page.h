@@ -38,6 +38,16 @@ struct Table {
 };
 [[nodiscard]] std::string ToHtml(const Table& table);
 
+/// A part of a section that a page and a terminal show alike, each in its way.
+struct Block {
+  std::string text = {};                  ///< a remark
+  Table table = {};                       ///< none without rows
+  std::vector<std::string> figures = {};  ///< SVG; of pages only
+  /// Of pages only: hidden below this title, with the next ones of the same title.
+  std::string folded = {};
+};
+[[nodiscard]] std::string ToHtml(const std::vector<Block>& blocks);
+
 /// "–" for what is no number.
 [[nodiscard]] std::string NumberOrDash(double value, const char* format = "{:.2e}");
 
@@ -66,7 +76,6 @@ struct PageHead {
   Verdict verdict = Verdict::kNotRun;
   std::string word = {};  ///< instead of the verdict's
   bool judges = true;     ///< false: a page of numbers, without a verdict
-  bool sign = true;       ///< ✓, ✗ or ? before the verdict's word
   std::string footer = {};
   std::string script_source =
       {};                    ///< which scripts may run, as in a content security policy; "": none

@@ -9,7 +9,6 @@
 #include "comparison/metrics.h"
 #include "comparison/verdict.h"
 #include "report/page.h"
-#include "report/text_table.h"
 
 namespace mbv {
 
@@ -124,29 +123,9 @@ class PairMatrix {
 
 }  // namespace
 
-std::vector<std::string> PairMatrixLines(const Comparison& comparison) {
+Table PairMatrixTable(const Comparison& comparison) {
   const PairMatrix matrix(comparison);
   if (!matrix.wanted()) return {};
-  size_t width = 0;
-  for (const std::string& name : matrix.names()) width = std::max(width, name.size());
-  std::vector<TextColumn> columns = {{"", -static_cast<int>(width)}};
-  for (const std::string& name : matrix.names()) {
-    columns.push_back({name, static_cast<int>(std::max<size_t>(name.size(), 8) + 2)});
-  }
-  const TextTable table("", columns);
-  std::vector<std::string> lines = {"every pair: " + matrix.Title(), table.Head()};
-  for (const std::string& row : matrix.names()) {
-    std::vector<std::string> cells = {row};
-    for (const std::string& name : matrix.names()) cells.push_back(matrix.CellText(row, name));
-    lines.push_back(table.Row(cells));
-    lines.back().erase(lines.back().find_last_not_of(' ') + 1);
-  }
-  return lines;
-}
-
-std::string PairMatrixHtml(const Comparison& comparison) {
-  const PairMatrix matrix(comparison);
-  if (!matrix.wanted()) return "";
   Table table{.caption = "Every pair: " + matrix.Title(), .head = {Text("")}, .rows = {}};
   for (const std::string& name : matrix.names()) {
     table.head.push_back(Digits(name));
@@ -156,7 +135,7 @@ std::string PairMatrixHtml(const Comparison& comparison) {
       row.push_back(Digits(matrix.CellText(name, other)));
     }
   }
-  return ToHtml(table);
+  return table;
 }
 
 }  // namespace mbv

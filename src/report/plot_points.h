@@ -38,10 +38,7 @@ struct SharedAxis {
 
 // Every witness against every other, where there are more than three: one number per pair.
 
-/// Lines for a terminal; empty with up to three witnesses.
-[[nodiscard]] std::vector<std::string> PairMatrixLines(const Comparison& comparison);
-
-/// Table of report.html; "" with up to three witnesses.
-[[nodiscard]] std::string PairMatrixHtml(const Comparison& comparison);
+/// No rows with up to three witnesses.
+[[nodiscard]] Table PairMatrixTable(const Comparison& comparison);
 
 }  // namespace mbv

@@ -59,20 +59,134 @@ std::string SourceModelSentence(const SourceModelAudit& audit) {
 
 namespace {
 
-using Cells = std::vector<std::vector<std::string>>;
+std::string Share(double share) {
+  if (!std::isfinite(share)) return "-";
+  if (share < 0.0) return "none";
+  return fmt::format("{:.0f} %", 100.0 * share);
+}
 
-// Columns as wide as their widest cell; the first to the left.
-void WriteTable(const std::vector<std::string>& head, const Cells& rows, TerminalText* out) {
-  std::vector<TextColumn> columns;
-  for (size_t c = 0; c < head.size(); ++c) {
-    size_t width = head[c].size();
-    for (const auto& row : rows) width = std::max(width, row[c].size());
-    const int wide = static_cast<int>(width);
-    columns.push_back({head[c], c == 0 ? -wide : wide + 2});
+// A number of a run, or what became of it.
+std::string OrUnsound(const SourceModelError& error, double value) {
+  return error.sound() ? NumberCell(value) : "unsound";
+}
+
+// "solref 0.02 1" of the first closure; says where others differ.
+std::string OfClosures(const std::vector<std::string>& values) {
+  if (values.empty()) return "none";
+  for (const std::string& value : values) {
+    if (value != values[0]) return values[0] + " and others";
   }
-  const TextTable table("    ", columns);
-  out->TableHead(table);
-  for (const auto& row : rows) out->Line(table.Row(row));
+  return values[0];
+}
+
+constexpr const char* kTrials = "Settings: error against cost";
+
+std::vector<Cell> CauseRowOf(const SourceModelAudit& audit, const std::string& title,
+                             const SourceModelError& without, const SourceModelError* alone) {
+  const SourceModelError& own = audit.as_is;
+  const bool both = own.sound() && without.sound();
+  return {Text(title),
+          Digits(OrUnsound(without, without.force)),
+          Digits(both ? Share(Removed(own.force, without.force)) : "-"),
+          Digits(OrUnsound(without, without.gap_m)),
+          Digits(both ? Share(Removed(own.gap_m, without.gap_m)) : "-"),
+          Digits(alone == nullptr ? "" : OrUnsound(*alone, alone->force))};
+}
+
+// "robot.xml: step 2 ms, Euler, …".
+std::string SettingsLine(const SourceModelAudit& audit) {
+  return fmt::format("{}: step {:g} ms, {}, solver {}, loops with solref {}, solimp {}",
+                     std::filesystem::path(audit.file).filename().string(), 1e3 * audit.step_s,
+                     audit.integrator, audit.solver, OfClosures(audit.solref),
+                     OfClosures(audit.solimp));
+}
+
+// What was measured of the file as it is, a sentence each.
+std::vector<std::string> MeasuredLines(const SourceModelAudit& audit) {
+  const SourceModelError& e = audit.as_is;
+  if (!e.sound()) return {};
+  std::vector<std::string> lines;
+  if (std::isfinite(e.force)) {
+    lines.push_back(fmt::format(
+        "drive forces: error {:.1e} of their RMS from {:g} s on, {:.1e} with the start, in which "
+        "soft loops take up the load",
+        e.force, audit.later_s, e.force_all));
+    if (!e.drive.empty()) {
+      lines.back() += fmt::format("; most {:.3g} {} ({}, at {:.3g} s)", e.force_most, e.force_unit,
+                                  e.drive, e.force_at_s);
+    }
+  }
+  if (std::isfinite(e.joint_force)) {
+    lines.push_back(fmt::format(
+        "forces in the joints that close the loops: error {:.1e} of their RMS", e.joint_force));
+  }
+  return lines;
+}
+
+// What the search came to, and how it was measured.
+std::vector<std::string> SearchLines(const SourceModelAudit& audit) {
+  if (!audit.searched) return {};
+  std::vector<std::string> lines = {fmt::format(
+      "{} of {} settings were run{}; of each the file's drives are led exactly, and what the "
+      "reference does not have is left out, so that nothing but settings is judged",
+      audit.trials.size(), audit.planned,
+      std::isnan(audit.budget_s)
+          ? ""
+          : fmt::format(", which took the {:g} s that it may take", audit.budget_s))};
+  for (const SourceModelTrial& trial : audit.trials) {
+    if (trial.other.empty() || audit.trials.empty()) continue;
+    const bool same = trial.error.force == audit.trials[0].error.force;
+    lines.push_back(same ? trial.other + " changes nothing: it acts on the friction of contacts"
+                         : trial.other + fmt::format(" gives {:.2e}", trial.error.force));
+  }
+  if (audit.recommended == 0) {
+    lines.emplace_back("nothing that was tried does better than the file's own settings");
+  }
+  return lines;
+}
+
+// Whether the lines keep what they promise, and what they do not reach.
+std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
+  if (audit.lines.empty()) return {};
+  std::vector<std::string> lines;
+  if (!audit.stubborn.empty()) {
+    std::string names;
+    for (const std::string& name : audit.stubborn) names += (names.empty() ? "" : ", ") + name;
+    lines.push_back(fmt::format(
+        "these closures state settings of their own, or have a class: write solref and solimp "
+        "there, too: {}",
+        names));
+  }
+  lines.push_back(audit.pasted.sound()
+                      ? fmt::format("run with these lines in it, the file gives a force error of "
+                                    "{:.2e} and a loop gap of {:.1e} m",
+                                    audit.pasted.force, audit.pasted.gap_m)
+                      : "run with these lines in it, the file gives nothing: " +
+                            audit.pasted.failure);
+  return lines;
+}
+
+// Of those trials that are worth showing: the file's own, the front, the recommended; or all.
+Table TrialTable(const SourceModelAudit& audit, const char* caption, bool all) {
+  Table table{.caption = caption,
+              .head = {Text("step"), Digits("integrator"), Digits("solref"), Digits("solimp"),
+                       Digits("force error"), Digits("loop gap"), Digits("ms per s"), Digits("")},
+              .rows = {}};
+  for (size_t i = 0; i < audit.trials.size(); ++i) {
+    const SourceModelTrial& trial = audit.trials[i];
+    const SourceModelError& error = trial.error;
+    const bool recommended = static_cast<int>(i) == audit.recommended;
+    if (!all && i > 0 && !trial.front && !recommended) continue;
+    std::string mark = recommended && i > 0 ? "recommended" : i == 0 ? "your file" : trial.other;
+    if (trial.front && mark.empty()) mark = all ? "best for its cost" : "";
+    table.rows.push_back(
+        {Text(fmt::format("{:g} ms", 1e3 * trial.step_s)), Digits(trial.integrator),
+         Digits(trial.solref.empty() ? "own" : trial.solref),
+         Digits(trial.solimp.empty() ? "own" : trial.solimp), Digits(OrUnsound(error, error.force)),
+         Digits(error.sound() ? fmt::format("{:.1e} m", error.gap_m) : "unsound"),
+         Digits(error.sound() ? fmt::format("{:.3g}", error.cost_ms) : "-"), Digits(mark)});
+  }
+  return table;
 }
 
 void WriteLines(const std::vector<std::string>& lines, TerminalText* out) {
@@ -80,6 +194,61 @@ void WriteLines(const std::vector<std::string>& lines, TerminalText* out) {
 }
 
 }  // namespace
+
+std::string CauseSentence(const SourceModelAudit& audit) {
+  constexpr double kUnexplained = 0.2;
+  const SourceModelError &own = audit.as_is, &corrected = audit.corrected;
+  if (audit.causes.empty() || !corrected.sound()) {
+    return corrected.sound()
+               ? ""
+               : "with all of them corrected it is still unsound: " + corrected.failure;
+  }
+  if (!own.sound())
+    return fmt::format("with all of them corrected the force error is {:.1e}", corrected.force);
+  const std::vector<const SourceModelCause*> culprits = audit.Culprits();
+  std::string text;
+  if (culprits.empty()) {
+    text = "No single thing makes most of the force error.";
+  } else {
+    std::string titles;
+    for (const SourceModelCause* cause : culprits) {
+      titles += (titles.empty() ? "" : "; ") + cause->title;
+    }
+    text = fmt::format("{}: {}. {}",
+                       culprits.size() == 1
+                           ? "Most of the force error is made by one thing"
+                           : "Most of the force error is made by things that act together",
+                       titles, culprits[0]->meaning);
+  }
+  if (corrected.force > std::max(kUnexplained * own.force, SourceModelAudit::kGoodForce)) {
+    text += fmt::format(
+        " But {:.2g} % of the force stays wrong with all of them corrected: the cause is not "
+        "settings, the file computes another mechanism than the reference.",
+        100.0 * corrected.force);
+  }
+  if (!audit.searched && audit.Good(audit.bare)) {
+    text += fmt::format(
+        " The settings need no change: with the drives led exactly, and without what the reference "
+        "does not have, the force error is {:.1e}.",
+        audit.bare.force);
+  }
+  return text;
+}
+
+Table CauseTable(const SourceModelAudit& audit) {
+  Table table{.caption = "One setting corrected at a time",
+              .head = {Text("what makes it wrong"), Digits("force error"), Digits("removed"),
+                       Digits("loop gap [m]"), Digits("removed"), Digits("it alone leaves")},
+              .rows = {}};
+  const SourceModelError& own = audit.as_is;
+  table.rows.push_back({Text("as your file is"), Digits(OrUnsound(own, own.force)), Digits(""),
+                        Digits(OrUnsound(own, own.gap_m)), Digits(""), Digits("")});
+  for (const SourceModelCause& cause : audit.causes) {
+    table.rows.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
+  }
+  table.rows.push_back(CauseRowOf(audit, "without all of these", audit.corrected, nullptr));
+  return table;
+}
 
 void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out) {
   out->Line();
@@ -89,10 +258,10 @@ void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out) {
   WriteLines(audit.done, out);
   WriteLines(audit.notes, out);
   WriteLines(MeasuredLines(audit), out);
-  WriteTable(CauseHead(), CauseCells(audit), out);
+  out->Add({{.table = CauseTable(audit)}});
   if (!audit.Good(audit.as_is)) out->Line("    " + CauseSentence(audit));
   if (audit.searched) {
-    WriteTable(TrialHead(), TrialCells(audit, out->verbose()), out);
+    out->Add({{.table = TrialTable(audit, kTrials, out->verbose())}});
     WriteLines(SearchLines(audit), out);
   }
   if (!audit.lines.empty()) {
@@ -110,18 +279,6 @@ void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out) {
 }
 
 namespace {
-
-std::string TableHtml(const std::string& caption, const std::vector<std::string>& head,
-                      const Cells& rows) {
-  Table table{.caption = caption, .head = {}, .rows = {}};
-  for (size_t c = 0; c < head.size(); ++c) table.head.push_back({head[c], c > 0});
-  for (const auto& row : rows) {
-    std::vector<Cell> cells;
-    for (size_t c = 0; c < row.size(); ++c) cells.push_back({row[c], c > 0});
-    table.rows.push_back(std::move(cells));
-  }
-  return ToHtml(table);
-}
 
 std::string ListHtml(const std::vector<std::string>& lines) {
   std::string html;
@@ -142,7 +299,7 @@ std::string SourceModelHtml(const SourceModelAudit* audit) {
   if (!audit->declined.empty()) return html;
   html += ListHtml(MeasuredLines(*audit)) + ListHtml(audit->notes);
   html += Folded("How it was run", ListHtml({SettingsLine(*audit)}) + ListHtml(audit->done));
-  html += TableHtml("One setting corrected at a time", CauseHead(), CauseCells(*audit));
+  html += ToHtml(CauseTable(*audit));
   if (!audit->Good(audit->as_is)) html += Paragraph(CauseSentence(*audit));
   std::string meanings;
   for (const SourceModelCause& cause : audit->causes) {
@@ -151,9 +308,8 @@ std::string SourceModelHtml(const SourceModelAudit* audit) {
   }
   html += Folded("What these things are", meanings);
   if (audit->searched) {
-    html += TableHtml("Settings: error against cost", TrialHead(), TrialCells(*audit, false)) +
-            Folded("All settings that were run",
-                   TableHtml("All settings", TrialHead(), TrialCells(*audit, true))) +
+    html += ToHtml(TrialTable(*audit, kTrials, false)) +
+            Folded("All settings that were run", ToHtml(TrialTable(*audit, "All settings", true))) +
             ListHtml(SearchLines(*audit));
   }
   if (!audit->lines.empty()) {
@@ -231,191 +387,6 @@ nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit) {
   if (!audit.lines.empty()) json["pasted"] = ErrorJson(audit.pasted);
   json["seconds"] = Number(audit.seconds);
   return json;
-}
-
-namespace {
-
-std::string Share(double share) {
-  if (!std::isfinite(share)) return "-";
-  if (share < 0.0) return "none";
-  return fmt::format("{:.0f} %", 100.0 * share);
-}
-
-// A number of a run, or what became of it.
-std::string OrUnsound(const SourceModelError& error, double value) {
-  return error.sound() ? NumberCell(value) : "unsound";
-}
-
-// "solref 0.02 1" of the first closure; says where others differ.
-std::string OfClosures(const std::vector<std::string>& values) {
-  if (values.empty()) return "none";
-  for (const std::string& value : values) {
-    if (value != values[0]) return values[0] + " and others";
-  }
-  return values[0];
-}
-
-std::vector<std::string> CauseRowOf(const SourceModelAudit& audit, const std::string& title,
-                                    const SourceModelError& without,
-                                    const SourceModelError* alone) {
-  const SourceModelError& own = audit.as_is;
-  const bool both = own.sound() && without.sound();
-  return {title,
-          OrUnsound(without, without.force),
-          both ? Share(Removed(own.force, without.force)) : "-",
-          OrUnsound(without, without.gap_m),
-          both ? Share(Removed(own.gap_m, without.gap_m)) : "-",
-          alone == nullptr ? "" : OrUnsound(*alone, alone->force)};
-}
-
-}  // namespace
-
-std::string SettingsLine(const SourceModelAudit& audit) {
-  return fmt::format("{}: step {:g} ms, {}, solver {}, loops with solref {}, solimp {}",
-                     std::filesystem::path(audit.file).filename().string(), 1e3 * audit.step_s,
-                     audit.integrator, audit.solver, OfClosures(audit.solref),
-                     OfClosures(audit.solimp));
-}
-
-std::vector<std::string> MeasuredLines(const SourceModelAudit& audit) {
-  const SourceModelError& e = audit.as_is;
-  if (!e.sound()) return {};
-  std::vector<std::string> lines;
-  if (std::isfinite(e.force)) {
-    lines.push_back(fmt::format(
-        "drive forces: error {:.1e} of their RMS from {:g} s on, {:.1e} with the start, in which "
-        "soft loops take up the load",
-        e.force, audit.later_s, e.force_all));
-    if (!e.drive.empty()) {
-      lines.back() += fmt::format("; most {:.3g} {} ({}, at {:.3g} s)", e.force_most, e.force_unit,
-                                  e.drive, e.force_at_s);
-    }
-  }
-  if (std::isfinite(e.joint_force)) {
-    lines.push_back(fmt::format(
-        "forces in the joints that close the loops: error {:.1e} of their RMS", e.joint_force));
-  }
-  return lines;
-}
-
-std::string CauseSentence(const SourceModelAudit& audit) {
-  constexpr double kUnexplained = 0.2;
-  const SourceModelError &own = audit.as_is, &corrected = audit.corrected;
-  if (audit.causes.empty() || !corrected.sound()) {
-    return corrected.sound()
-               ? ""
-               : "with all of them corrected it is still unsound: " + corrected.failure;
-  }
-  if (!own.sound())
-    return fmt::format("with all of them corrected the force error is {:.1e}", corrected.force);
-  const std::vector<const SourceModelCause*> culprits = audit.Culprits();
-  std::string text;
-  if (culprits.empty()) {
-    text = "No single thing makes most of the force error.";
-  } else {
-    std::string titles;
-    for (const SourceModelCause* cause : culprits) {
-      titles += (titles.empty() ? "" : "; ") + cause->title;
-    }
-    text = fmt::format("{}: {}. {}",
-                       culprits.size() == 1
-                           ? "Most of the force error is made by one thing"
-                           : "Most of the force error is made by things that act together",
-                       titles, culprits[0]->meaning);
-  }
-  if (corrected.force > std::max(kUnexplained * own.force, SourceModelAudit::kGoodForce)) {
-    text += fmt::format(
-        " But {:.2g} % of the force stays wrong with all of them corrected: the cause is not "
-        "settings, the file computes another mechanism than the reference.",
-        100.0 * corrected.force);
-  }
-  if (!audit.searched && audit.Good(audit.bare)) {
-    text += fmt::format(
-        " The settings need no change: with the drives led exactly, and without what the reference "
-        "does not have, the force error is {:.1e}.",
-        audit.bare.force);
-  }
-  return text;
-}
-
-std::vector<std::string> CauseHead() {
-  return {"what makes it wrong", "force error", "removed",
-          "loop gap [m]",        "removed",     "it alone leaves"};
-}
-
-std::vector<std::vector<std::string>> CauseCells(const SourceModelAudit& audit) {
-  std::vector<std::vector<std::string>> cells;
-  const SourceModelError& own = audit.as_is;
-  cells.push_back(
-      {"as your file is", OrUnsound(own, own.force), "", OrUnsound(own, own.gap_m), "", ""});
-  for (const SourceModelCause& cause : audit.causes) {
-    cells.push_back(CauseRowOf(audit, "without " + cause.title, cause.without, &cause.alone));
-  }
-  cells.push_back(CauseRowOf(audit, "without all of these", audit.corrected, nullptr));
-  return cells;
-}
-
-std::vector<std::string> SearchLines(const SourceModelAudit& audit) {
-  if (!audit.searched) return {};
-  std::vector<std::string> lines = {fmt::format(
-      "{} of {} settings were run{}; of each the file's drives are led exactly, and what the "
-      "reference does not have is left out, so that nothing but settings is judged",
-      audit.trials.size(), audit.planned,
-      std::isnan(audit.budget_s)
-          ? ""
-          : fmt::format(", which took the {:g} s that it may take", audit.budget_s))};
-  for (const SourceModelTrial& trial : audit.trials) {
-    if (trial.other.empty() || audit.trials.empty()) continue;
-    const bool same = trial.error.force == audit.trials[0].error.force;
-    lines.push_back(same ? trial.other + " changes nothing: it acts on the friction of contacts"
-                         : trial.other + fmt::format(" gives {:.2e}", trial.error.force));
-  }
-  if (audit.recommended == 0) {
-    lines.emplace_back("nothing that was tried does better than the file's own settings");
-  }
-  return lines;
-}
-
-std::vector<std::string> PastedLines(const SourceModelAudit& audit) {
-  if (audit.lines.empty()) return {};
-  std::vector<std::string> lines;
-  if (!audit.stubborn.empty()) {
-    std::string names;
-    for (const std::string& name : audit.stubborn) names += (names.empty() ? "" : ", ") + name;
-    lines.push_back(fmt::format(
-        "these closures state settings of their own, or have a class: write solref and solimp "
-        "there, too: {}",
-        names));
-  }
-  lines.push_back(audit.pasted.sound()
-                      ? fmt::format("run with these lines in it, the file gives a force error of "
-                                    "{:.2e} and a loop gap of {:.1e} m",
-                                    audit.pasted.force, audit.pasted.gap_m)
-                      : "run with these lines in it, the file gives nothing: " +
-                            audit.pasted.failure);
-  return lines;
-}
-
-std::vector<std::string> TrialHead() {
-  return {"step", "integrator", "solref", "solimp", "force error", "loop gap", "ms per s", ""};
-}
-
-std::vector<std::vector<std::string>> TrialCells(const SourceModelAudit& audit, bool all) {
-  std::vector<std::vector<std::string>> cells;
-  for (size_t i = 0; i < audit.trials.size(); ++i) {
-    const SourceModelTrial& trial = audit.trials[i];
-    const bool recommended = static_cast<int>(i) == audit.recommended;
-    if (!all && i > 0 && !trial.front && !recommended) continue;
-    std::string mark = recommended && i > 0 ? "recommended" : i == 0 ? "your file" : trial.other;
-    if (trial.front && mark.empty()) mark = all ? "best for its cost" : "";
-    cells.push_back({fmt::format("{:g} ms", 1e3 * trial.step_s), trial.integrator,
-                     trial.solref.empty() ? "own" : trial.solref,
-                     trial.solimp.empty() ? "own" : trial.solimp,
-                     OrUnsound(trial.error, trial.error.force),
-                     trial.error.sound() ? fmt::format("{:.1e} m", trial.error.gap_m) : "unsound",
-                     trial.error.sound() ? fmt::format("{:.3g}", trial.error.cost_ms) : "-", mark});
-  }
-  return cells;
 }
 
 }  // namespace mbv

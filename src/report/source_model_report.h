@@ -103,26 +103,9 @@ void WriteSourceModel(const SourceModelAudit& audit, TerminalText* out);
 [[nodiscard]] std::string SourceModelHtml(const SourceModelAudit* audit);
 [[nodiscard]] nlohmann::ordered_json SourceModelJson(const SourceModelAudit& audit);
 
-// What the audit of the user's own file says, the same on a terminal and on the page. Internal to
-// report/.
-
-/// "robot.xml: step 2 ms, Euler, …".
-[[nodiscard]] std::string SettingsLine(const SourceModelAudit& audit);
-/// What was measured of the file as it is, a sentence each.
-[[nodiscard]] std::vector<std::string> MeasuredLines(const SourceModelAudit& audit);
 /// What the causes come to.
 [[nodiscard]] std::string CauseSentence(const SourceModelAudit& audit);
-/// What the search came to, and how it was measured.
-[[nodiscard]] std::vector<std::string> SearchLines(const SourceModelAudit& audit);
-/// Whether the lines keep what they promise, and what they do not reach.
-[[nodiscard]] std::vector<std::string> PastedLines(const SourceModelAudit& audit);
-
-/// A row of text per cause, "as it is" first and "all of these" last.
-[[nodiscard]] std::vector<std::string> CauseHead();
-[[nodiscard]] std::vector<std::vector<std::string>> CauseCells(const SourceModelAudit& audit);
-[[nodiscard]] std::vector<std::string> TrialHead();
-/// Of those trials that are worth showing: the file's own, the front, the recommended; or all.
-[[nodiscard]] std::vector<std::vector<std::string>> TrialCells(const SourceModelAudit& audit,
-                                                               bool all);
+/// A row per cause of the error, "as your file is" first and all of them last.
+[[nodiscard]] Table CauseTable(const SourceModelAudit& audit);
 
 }  // namespace mbv

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "report/html_report.h"
 #include "report/motion_tables.h"
 #include "report/page.h"
 #include "report/plot_points.h"
@@ -24,12 +25,12 @@ class VerdictTableWriter {
     const ResultView view = ViewOf(report);
     out_.Head(view, report.title(), About(report));
     out_.Checks(view);
-    AddLines(PairMatrixLines(report.comparison));
+    out_.Add({{.table = PairMatrixTable(report.comparison)}});
     AddLines(ReferenceTableLines(report.comparison, out_.verbose()));
     AddLines(MotionTableLines(report, out_.verbose()));
     AddLines(SizingLines(report, out_.sizing() || out_.verbose()));
-    if (const PairComparison* pair = MainPair(report.comparison)) Drives(*pair);
-    Engine(report);
+    out_.Add(DriveBlocks(report));
+    out_.Add(EngineBlocks(report));
     if (report.source_model != nullptr) WriteSourceModel(*report.source_model, &out_);
     Energy(report.comparison);
     Tail(report);
@@ -57,60 +58,6 @@ class VerdictTableWriter {
   void AddLines(const std::vector<std::string>& lines) {
     if (!lines.empty()) out_.Line();
     for (const std::string& line : lines) out_.Line("  " + line);
-  }
-
-  void Drives(const PairComparison& pair) {
-    if (pair.drives.empty()) return;
-    size_t width = 33;
-    for (const DriveMetrics& drive : pair.drives) width = std::max(width, drive.drive.size());
-    const TextTable table("  ", {{"drive (" + Spaced(pair.name()) + ")", -static_cast<int>(width)},
-                                 {"RMS force", 16},
-                                 {"NRMSE", 12},
-                                 {"max error", 16},
-                                 {"at", 10},
-                                 {"digits", 9}});
-    out_.TableHead(table);
-    bool floored = false;
-    for (const DriveMetrics& drive : pair.drives) {
-      floored = floored || drive.floored;
-      out_.Line(
-          table.Row({drive.drive, fmt::format("{:.6g} {}", drive.rms_truth, drive.unit),
-                     fmt::format("{:.2e}", drive.nrmse),
-                     fmt::format("{:.2e} {}", drive.max_error, drive.unit),
-                     fmt::format("{:.4g} s", drive.time_s), fmt::format("{:.1f}", drive.digits)}) +
-          (drive.floored ? "  floored" : ""));
-    }
-    if (floored) {
-      out_.Line(
-          out_.Painted("  floored: relative to 0.1 % of what the drive carries, which is more than "
-                       "its own force",
-                       Paint::kFaint));
-    }
-  }
-
-  void Engine(const Report& report) {
-    if (!report.engine_comparison) return;
-    const EngineComparison& engine = *report.engine_comparison;
-    if (!engine.friction.empty()) {
-      out_.Line();
-      out_.Line("  " + engine.FrictionText());
-    }
-    if (engine.engines.empty()) return;
-    const TextTable table("  ", {{"the simulator's own error (against " + engine.truth + ")", -44},
-                                 {"force, RMS", 12},
-                                 {fmt::format("from {:g} s", engine.later_s), 12},
-                                 {"loop gap", 12}});
-    out_.TableHead(table);
-    for (const EngineError& e : engine.engines) {
-      const std::string name = EngineComparison::NameOf(e.engine);
-      if (!e.failure.empty()) {
-        out_.Line(fmt::format("    {}: no result: {}", name, e.failure));
-        continue;
-      }
-      out_.Line(table.Row({"  " + name, fmt::format("{:.2e}", e.force_nrmse),
-                           fmt::format("{:.2e}", e.force_nrmse_later),
-                           fmt::format("{:.2e} m", e.closure_max_m)}));
-    }
   }
 
   // Where the energy came from and went; zeros are left out.

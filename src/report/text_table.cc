@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/text.h"
 #include "report/page.h"
 
 namespace mbv {
@@ -69,7 +70,7 @@ void TerminalText::Head(const ResultView& view, const std::string& title,
     if (!line.empty()) Line("  " + line);
   }
   Line("  " + view.reason);
-  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+  for (const Caveat& caveat : view.caveats) {
     Line("  " + Painted("caveat", Paint::kWarning) + ": " + caveat.text);
   }
   if (!view.attribution.text.empty()) Line("  " + view.attribution.text);
@@ -78,10 +79,12 @@ void TerminalText::Head(const ResultView& view, const std::string& title,
 
 void TerminalText::Checks(const ResultView& view) {
   if (view.checks.empty()) return;
-  const TextTable table("  ", {{"check", -static_cast<int>(view.look.title_width) - 2},
-                               {"value", 12},
-                               {"limit", 11},
-                               {"         worst at", 0}});
+  int width = 28;  // and as much as the longest title needs
+  for (const ShownCheck& check : view.checks) {
+    width = std::max(width, static_cast<int>(PrintedWidth(check.title)) + 2);
+  }
+  const TextTable table(
+      "  ", {{"check", -width}, {"value", 12}, {"limit", 11}, {"         worst at", 0}});
   TableHead(table);
   for (size_t first = 0; first < view.checks.size();) {
     size_t last = first;
@@ -142,6 +145,35 @@ void TerminalText::Gaps(const ResultView& view) {
   }
 }
 
+void TerminalText::Add(const std::vector<Block>& blocks) {
+  for (const Block& block : blocks) {
+    if (!block.folded.empty()) continue;
+    if (!block.text.empty()) {
+      Line();
+      Line("  " + block.text);
+    }
+    const Table& table = block.table;
+    if (table.rows.empty()) continue;
+    std::vector<TextColumn> columns;
+    for (size_t i = 0; i < table.head.size(); ++i) {
+      size_t width = PrintedWidth(table.head[i].text);
+      for (const auto& row : table.rows) width = std::max(width, PrintedWidth(row[i].text));
+      const bool last = i + 1 == table.head.size(), left = !table.head[i].number;
+      const int padded = static_cast<int>(width) + 2;
+      columns.push_back({"  " + table.head[i].text, left ? (last ? 0 : -padded) : padded});
+    }
+    const TextTable text("", columns);
+    Line();
+    Line("  " + table.caption);
+    Line(Painted(text.Head(), Paint::kFaint));
+    for (const auto& row : table.rows) {
+      std::vector<std::string> cells;
+      for (const Cell& cell : row) cells.push_back("  " + cell.text);
+      Line(text.Row(cells));
+    }
+  }
+}
+
 void TerminalText::TableHead(const TextTable& table) {
   Line();
   Line(Painted(table.Head(), Paint::kFaint));
@@ -189,7 +221,7 @@ std::string VerdictLine(const ResultView& view, const TableOptions& options) {
   }
   if (check != nullptr && check->floored) line += " floored";
   if (view.verdict != Verdict::kAgree) line += "  " + view.reason;
-  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+  for (const Caveat& caveat : view.caveats) {
     line += "; caveat: " + caveat.text;
   }
   std::ranges::replace(line, '\n', ' ');

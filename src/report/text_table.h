@@ -64,6 +64,8 @@ class TerminalText {
   void Checks(const ResultView& view);
   /// What could not be compared, and why.
   void Gaps(const ResultView& view);
+  /// What a section of the page shows: its texts and tables that are not folded.
+  void Add(const std::vector<Block>& blocks);
   /// After a blank line, the headings of a table.
   void TableHead(const TextTable& table);
   /// How long each part took, then `more`.

@@ -78,8 +78,8 @@ TEST(SourceModelReport, UnsoundNumbersAreNoNumbers) {
   audit.as_is.failure = "MuJoCo reset the simulation at 0.3 s";
   audit.as_is.time_s = 0.3;
   EXPECT_NE(SourceModelSentence(audit).find("reset the simulation at 0.3 s"), std::string::npos);
-  EXPECT_EQ(CauseCells(audit)[0][1], "unsound");
-  EXPECT_EQ(CauseCells(audit)[1][2], "-");
+  EXPECT_EQ(CauseTable(audit).rows[0][1].text, "unsound");
+  EXPECT_EQ(CauseTable(audit).rows[1][2].text, "-");
   const nlohmann::ordered_json json = SourceModelJson(audit);
   EXPECT_EQ(json["as_is"]["failure"], audit.as_is.failure);
   EXPECT_FALSE(json["as_is"].contains("force_nrmse"));

@@ -4,6 +4,7 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -73,7 +74,7 @@ TEST(ForeignWitness, JoinsTheComparison) {
   EXPECT_NE(comparison.FindCheck("mock_vs_reference.force_nrmse"), nullptr);
   EXPECT_NE(comparison.attribution.text.find("mock"), std::string::npos)
       << comparison.attribution.text;
-  EXPECT_TRUE(PairMatrixLines(comparison).empty());  // three: reference, simulated, mock
+  EXPECT_TRUE(PairMatrixTable(comparison).rows.empty());  // three: reference, simulated, mock
 }
 
 // The smallest one that is shipped, on an axis, a centre of mass and a gravity that no axis of the
@@ -110,16 +111,15 @@ TEST(ForeignWitness, PairsOfManyStandInAMatrix) {
   const std::string one = Mock("answers"), two = Mock("perturbed");
   const RunOutcome outcome = RunWith(one.substr(0, one.size() - 1) + ", other" + two.substr(5));
   ASSERT_TRUE(outcome.report) << outcome.diagnostics.Text();
-  const std::vector<std::string> lines = PairMatrixLines(outcome.report->comparison);
-  ASSERT_EQ(lines.size(), 6U);
-  EXPECT_NE(lines[0].find("drive force, RMS"), std::string::npos) << lines[0];
-  EXPECT_TRUE(lines[2].starts_with("simulated")) << lines[2];
-  for (size_t row = 2; row < 6; ++row) {
-    const auto stars = std::count(lines[row].begin(), lines[row].end(), '*');
-    EXPECT_EQ(stars, lines[row].starts_with("other") ? 3 : 1) << lines[row];
+  const Table table = PairMatrixTable(outcome.report->comparison);
+  ASSERT_EQ(table.rows.size(), 4U);
+  EXPECT_NE(table.caption.find("drive force, RMS"), std::string::npos) << table.caption;
+  EXPECT_EQ(table.rows[0][0].text, "simulated");
+  for (const std::vector<Cell>& row : table.rows) {
+    const auto stars = std::ranges::count_if(
+        row, [](const Cell& cell) { return cell.text.find('*') != std::string::npos; });
+    EXPECT_EQ(stars, row[0].text.starts_with("other") ? 3 : 1) << row[0].text;
   }
-  const std::string html = PairMatrixHtml(outcome.report->comparison);
-  EXPECT_EQ(std::count(html.begin(), html.end(), '*'), 6 + 2);  // caption and label explain
 }
 
 // The limit is that of the reference: an error of 1e-8 counts.
