@@ -354,9 +354,10 @@ Attribution BySingleCheck(const Comparison& comparison) {
     }
     const std::string energy =
         check.subject == role::kSimulated ? internal::EnergyHint(comparison) : "";
-    return {check.subject, fmt::format("{}: {} is {} at {}", NameOf(comparison, check.subject),
+    const std::string place = Place(check.channel, check.time_s);
+    return {check.subject, fmt::format("{}: {} is {}{}{}", NameOf(comparison, check.subject),
                                        RowOf(check.metric).title, AmountOf(check),
-                                       Place(check.channel, check.time_s)) +
+                                       place.empty() ? "" : " at ", place) +
                                energy};
   }
   return {};
@@ -365,8 +366,8 @@ Attribution BySingleCheck(const Comparison& comparison) {
 std::string AgreementText(const ComparisonInput& input, const Comparison& comparison) {
   std::string text;
   // A free motion has no drive force to compare.
-  for (const Metric metric :
-       {Metric::kForceNrmse, Metric::kPoseM, Metric::kPositionM, Metric::kPositionRad}) {
+  for (const Metric metric : {Metric::kForceNrmse, Metric::kStiffnessEntry, Metric::kPoseM,
+                              Metric::kPositionM, Metric::kPositionRad}) {
     const Yardstick yardstick{.title = "", .unit = RowOf(metric).unit, .metric = metric};
     for (const Distance& distance : Distances(input, comparison, yardstick)) {
       text += fmt::format("{}{} and {} agree to {}", text.empty() ? "" : ", ",
@@ -408,8 +409,7 @@ void KeepToIndependence(const ComparisonInput& input, const Comparison& comparis
   if (shared.empty()) {
     std::vector<std::string> others;
     for (const Witness& witness : input.witnesses) {
-      const bool ran = witness.trace != nullptr && witness.summary.ok();
-      if (ran && witness.name != odd && witness.name != role::kReached) {
+      if (witness.ran() && witness.name != odd && witness.name != role::kReached) {
         others.push_back(witness.name);
       }
     }
@@ -440,7 +440,7 @@ std::string AmountOf(const CheckResult& check) {
 }
 
 std::string Place(const std::string& channel, double time_s) {
-  return fmt::format("{}, t = {:.4g} s", channel, time_s);
+  return std::isnan(time_s) ? channel : fmt::format("{}, t = {:.4g} s", channel, time_s);
 }
 
 std::string NameOf(const Comparison& comparison, const std::string& witness) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "comparison/compare_stiffness.h"
 #include "comparison/derivatives.h"
 #include "comparison/drive_motion.h"
 #include "comparison/driven.h"
@@ -107,6 +108,10 @@ void AddForceNotes(const ComparisonInput& input, Comparison* comparison) {
 }  // namespace
 
 void AddNotCompared(const ComparisonInput& input, Comparison* comparison) {
+  if (input.of_stiffness) {
+    internal::AddStiffnessNotes(input, comparison);
+    return;
+  }
   AddMissingNotes(input, comparison);
   AddReactionNotes(input, comparison);
   AddCommandNotes(input, comparison);
@@ -157,18 +162,6 @@ std::string Explain(const Witness& witness) {
     text += fmt::format(" (t = {:.6g} s)", summary.time_s);
   }
   return text;
-}
-
-bool Ran(const Witness& witness) { return witness.trace != nullptr && witness.summary.ok(); }
-
-// Why a pair cannot be compared, from its two witnesses; "" if both ran.
-std::string WhyNot(const Witness& a, const Witness& b) {
-  std::string why;
-  for (const Witness* witness : {&a, &b}) {
-    if (Ran(*witness)) continue;
-    why += (why.empty() ? "" : "; ") + Explain(*witness);
-  }
-  return why;
 }
 
 LimitColumn ColumnOf(const ComparisonInput& input, const std::string& measured) {
@@ -233,16 +226,20 @@ void AddPair(const ComparisonInput& input, const std::string& measured, const st
   const Witness* b = FindNamed(input.witnesses, truth);
   if (a == nullptr || b == nullptr) return;
   PairComparison pair;
-  pair.measured = measured;
-  pair.truth = truth;
-  pair.reason = WhyNot(*a, *b);
-  if (pair.reason.empty()) pair = ComparePair(input, *a->trace, *b->trace);
-  LeaveOutReachedMotion(&pair);
+  if (input.of_stiffness) {
+    pair = CompareStiffnesses(*a, *b);
+  } else {
+    pair.measured = measured;
+    pair.truth = truth;
+    pair.reason = internal::WhyNotCompared(*a, *b);
+    if (pair.reason.empty()) pair = ComparePair(input, *a->trace, *b->trace);
+    LeaveOutReachedMotion(&pair);
+  }
   OtherLimits other;
   if (pair.compared && SharesForces(input, measured, truth)) {
     other.growth = GrowthLimits(input, *a->trace);
   }
-  if (Ran(*a) && Ran(*b) && (IsTable(input, measured) || IsTable(input, truth))) {
+  if (a->ran() && b->ran() && (IsTable(input, measured) || IsTable(input, truth))) {
     other.tubes =
         JudgeTablePair(input, IsTable(input, measured) ? *b : *a, &pair, &*comparison->table);
   }
@@ -366,8 +363,9 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
                                       [](const PairComparison& p) { return p.compared; });
   if (compared == 0) {
     comparison->verdict = Verdict::kNotRun;
-    comparison->reason = input.motion->free() ? "no free motion could be compared"
-                                              : "no drive force could be compared";
+    comparison->reason = input.of_stiffness     ? "no stiffness could be compared"
+                         : input.motion->free() ? "no free motion could be compared"
+                                                : "no drive force could be compared";
     if (!comparison->pairs.empty()) {
       // Rather of a pair that ran than of a witness that was switched off.
       const auto ran = std::find_if(comparison->pairs.begin(), comparison->pairs.end(),
@@ -398,6 +396,19 @@ void Judge(const ComparisonInput& input, Comparison* comparison) {
 }
 
 }  // namespace
+
+bool Witness::ran() const {
+  return stiffness != nullptr ? stiffness->ran() : trace != nullptr && summary.ok();
+}
+
+std::string internal::WhyNotCompared(const Witness& measured, const Witness& truth) {
+  std::string why;
+  for (const Witness* witness : {&measured, &truth}) {
+    if (witness->ran()) continue;
+    why += (why.empty() ? "" : "; ") + Explain(*witness);
+  }
+  return why;
+}
 
 const char* ToText(Verdict verdict) {
   switch (verdict) {
@@ -464,7 +475,8 @@ const char* ToText(CaveatKind kind) {
 }
 
 const PairComparison* Comparison::FindPair(const std::string& name) const {
-  return FindPairNamed(pairs, name);
+  const auto found = std::ranges::find(pairs, name, &PairComparison::name);
+  return found == pairs.end() ? nullptr : &*found;
 }
 
 const CheckResult* Comparison::FindCheck(const std::string& name) const {
@@ -480,18 +492,40 @@ const CheckResult* Comparison::FindCheck(const Role& measured, const Role& truth
   return FindCheck(PairName(measured, truth) + "." + RowOf(metric).key);
 }
 
-size_t Comparison::failed() const { return CountFailed(checks); }
+const PairComparison* Comparison::MainPair() const {
+  for (const auto& [measured, truth] : kMainPairs) {
+    const PairComparison* pair = FindPair(PairName(*measured, *truth));
+    if (pair != nullptr && pair->compared) return pair;
+  }
+  return nullptr;
+}
+
+namespace {
+
+template <typename Counts>
+size_t Count(const std::vector<CheckResult>& checks, const Counts& counts) {
+  return static_cast<size_t>(
+      std::ranges::count_if(checks, [&](const CheckResult& c) { return c.limit && counts(c); }));
+}
+
+}  // namespace
+
+size_t Comparison::failed() const {
+  return Count(checks, [](const CheckResult& c) { return !c.pass; });
+}
 
 size_t Comparison::verified() const {
-  return CountPassed(checks, [](const CheckResult& c) { return !c.follows && c.blind.empty(); });
+  return Count(checks,
+               [](const CheckResult& c) { return c.pass && !c.follows && c.blind.empty(); });
 }
 
 size_t Comparison::followed() const {
-  return CountPassed(checks, [](const CheckResult& c) { return c.follows; });
+  return Count(checks, [](const CheckResult& c) { return c.pass && c.follows; });
 }
 
 size_t Comparison::blind() const {
-  return CountPassed(checks, [](const CheckResult& c) { return !c.follows && !c.blind.empty(); });
+  return Count(checks,
+               [](const CheckResult& c) { return c.pass && !c.follows && !c.blind.empty(); });
 }
 
 namespace {
@@ -511,6 +545,14 @@ void DescribeTable(Comparison* comparison) {
 
 // What a witness shows by itself. Servos follow their commands as well as their gains let them.
 void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison* comparison) {
+  if (input.of_stiffness) {
+    comparison->witnesses.push_back(
+        {.witness = witness.name,
+         .metrics = MeasureStiffness(*witness.stiffness, IsEngine(witness.name))});
+    AddChecks(input, witness.name, "", ColumnOf(input, witness.name),
+              comparison->witnesses.back().metrics, {}, comparison);
+    return;
+  }
   WitnessMetrics metrics = MeasureWitness(input, *witness.trace);
   OtherLimits other;
   const bool engine = IsEngine(witness.name);
@@ -536,18 +578,18 @@ void AddWitness(const ComparisonInput& input, const Witness& witness, Comparison
 
 Comparison Compare(const ComparisonInput& given) {
   ComparisonInput input = given;
-  const DrivenTwists twists = TwistsFor(input);
+  const DrivenTwists twists = input.of_stiffness ? DrivenTwists() : TwistsFor(input);
   if (input.twists == nullptr) input.twists = &twists;
   Comparison comparison;
   if (input.table != nullptr) comparison.table = Introduce(*input.table);
-  comparison.driving = DrivingText(input);
+  if (!input.of_stiffness) comparison.driving = DrivingText(input);
   for (const auto& [measured, truth] : PairsOf(input)) {
     AddPair(input, measured, truth, &comparison);
   }
   for (const Witness& witness : input.witnesses) {
     const Role* role = FindRole(witness.name);
     const bool alone = role == nullptr || role->judged_alone();
-    if (Ran(witness) && alone) AddWitness(input, witness, &comparison);
+    if (witness.ran() && alone) AddWitness(input, witness, &comparison);
   }
   AddNotCompared(input, &comparison);
   if (input.table != nullptr) FinishTable(input, &comparison);

@@ -1,11 +1,12 @@
-// Comparison: traces of the witnesses → metrics, checks, verdict and attribution.
+// Comparison: what the witnesses computed, traces or stiffnesses at a pose → metrics, checks,
+// verdict and attribution.
 //
 // Compared are signals with the same channel name at common sample times. Angles are differenced
 // modulo 2π, orientations as log(RᵀR'). A check passes only if its value is a number at or below
 // its limit. The verdict starts as kNotRun and is kAgree only if drive forces of at least one pair
-// of witnesses were compared (trajectories, where DOFs move by given forces) on enough samples
-// and within limits that are sensitive, no witness broke down and every check passes. What
-// makes an agreement say less than it seems to is a caveat.
+// of witnesses were compared (trajectories, where DOFs move by given forces; of stiffnesses K or
+// C) on enough samples and within limits that are sensitive, no witness broke down and every check
+// passes. What makes an agreement say less than it seems to is a caveat.
 #pragma once
 
 #include <map>
@@ -45,6 +46,8 @@ enum class WitnessGap {
 };
 [[nodiscard]] const char* ToText(WitnessGap gap);  ///< "timed_out"; "" of kNone
 
+struct StiffnessWitness;  // comparison/compare_stiffness.h
+
 /// One witness as handed to the comparison.
 struct Witness {
   std::string name;              ///< of its role (base/roles.h)
@@ -60,8 +63,11 @@ struct Witness {
     double compute_s = kNan;  ///< without its start, reading and writing, as it says itself
   };
   std::optional<Foreign> foreign = {};
-  WitnessGap gap = WitnessGap::kNone;  ///< why it did not run, if the scenario asks it to
-  bool required = false;               ///< without it there is no verdict
+  WitnessGap gap = WitnessGap::kNone;           ///< why it did not run, if the scenario asks it to
+  bool required = false;                        ///< without it there is no verdict
+  const StiffnessWitness* stiffness = nullptr;  ///< instead of a trace
+
+  [[nodiscard]] bool ran() const;  ///< has something to compare
 };
 
 struct ComparisonInput {
@@ -82,6 +88,8 @@ struct ComparisonInput {
   /// Per witness: parameters of the model that the scenario gives it another value of.
   std::map<std::string, std::map<std::string, double>> own_parameters = {};
   std::vector<std::string> left_out = {};  ///< by the model, of the file that it was made from
+  /// The witnesses bring stiffnesses instead of traces; the motion is the pose, commanded.
+  bool of_stiffness = false;
 };
 
 /// Judges where a free motion leads.
@@ -271,6 +279,8 @@ struct Comparison {
   std::optional<TableVerdict> table;
 
   [[nodiscard]] const PairComparison* FindPair(const std::string& name) const;
+  /// The pair that a reader looks at first (kMainPairs); null if none of them was compared.
+  [[nodiscard]] const PairComparison* MainPair() const;
   [[nodiscard]] const CheckResult* FindCheck(const std::string& name) const;
   /// The check of a witness by itself, and of a pair; null if there is none.
   [[nodiscard]] const CheckResult* FindCheck(const Role& witness, Metric metric) const;

@@ -352,6 +352,9 @@ void LeaveOutReachedMotion(PairComparison* pair) {
 
 bool IsEvidence(const ComparisonInput& input, const CheckResult& check) {
   if (!check.limit) return false;
+  if (input.of_stiffness) {
+    return check.metric == Metric::kStiffnessEntry || check.metric == Metric::kComplianceEntry;
+  }
   if (input.motion->free()) return IsTrajectory(check.metric);
   switch (input.drive_by) {
     case DriveBy::kForces:

@@ -36,6 +36,10 @@ inline void KeepWorst(std::map<Metric, Measured>* metrics, Metric metric,
 
 /// Fills drives, force metrics, and whether and why not the pair is compared.
 void CompareForces(const ComparisonInput& input, const PairReader& reader, PairComparison* pair);
+/// Why two witnesses cannot be compared: what stopped them; "" if both ran.
+[[nodiscard]] std::string WhyNotCompared(const Witness& measured, const Witness& truth);
+/// What one would expect to be judged of stiffnesses and is not.
+void AddStiffnessNotes(const ComparisonInput& input, Comparison* comparison);
 /// Joint reactions that both give in the same frame and that statics determines, and the forces of
 /// prescribed joints.
 void CompareReactions(const ComparisonInput& input, const PairReader& reader, PairComparison* pair);

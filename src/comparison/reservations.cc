@@ -198,7 +198,9 @@ std::string WhyNothingVerified(const ComparisonInput& input, const Comparison& c
     coarse = coarse && IsCoarse(input, check);
   }
   const bool motion = input.motion->free() || input.drive_by == DriveBy::kForces;
-  const char* what = motion ? "position and pose" : "force";
+  const char* what = input.of_stiffness ? "stiffness and compliance"
+                     : motion           ? "position and pose"
+                                        : "force";
   if (!any) return fmt::format("every {} check is switched off, so nothing was verified", what);
   if (coarse) {
     return fmt::format("every {} limit is so wide that it verifies nothing: {}", what,
@@ -230,11 +232,10 @@ std::vector<Caveat> MissingWitnesses(const ComparisonInput& input, const Compari
         });
     const bool asked = witness.foreign || witness.required || witness.gap != WitnessGap::kNone;
     if (!asked || compared) continue;
-    const bool no_forces = witness.trace != nullptr && witness.summary.ok();
     missing.push_back(
-        no_forces ? MissingWitnessCaveat(witness.name, WitnessGap::kNoForces,
-                                         WhyNothingInCommon(input, comparison, witness))
-                  : MissingWitnessCaveat(witness.name, witness.gap, witness.summary.message));
+        witness.ran() ? MissingWitnessCaveat(witness.name, WitnessGap::kNoForces,
+                                             WhyNothingInCommon(input, comparison, witness))
+                      : MissingWitnessCaveat(witness.name, witness.gap, witness.summary.message));
   }
   return missing;
 }

@@ -1,7 +1,5 @@
-// What is judged alike, whatever is compared: motions, stiffnesses, or what comes next. A
-// comparison brings measurements (pairs with named metrics, checks) and words; this decides.
+// What is judged alike, whatever is compared: motions, stiffnesses, or what comes next.
 //
-//   pairs            of witnesses: kRolePairs (base/roles.h)
 //   a check          passes only if its value is a number at or below its limit
 //   two against one  those that are closest by far stand against the one that is left
 #pragma once
@@ -42,41 +40,9 @@ template <typename Named>
       std::find_if(all.begin(), all.end(), [&](const Named& one) { return one.name == name; });
   return found == all.end() ? nullptr : &*found;
 }
-/// The pair called "measured_vs_truth", or nullptr.
-template <typename Pair>
-[[nodiscard]] const Pair* FindPairNamed(const std::vector<Pair>& pairs, const std::string& name) {
-  const auto found = std::find_if(pairs.begin(), pairs.end(),
-                                  [&](const Pair& pair) { return pair.name() == name; });
-  return found == pairs.end() ? nullptr : &*found;
-}
-
-/// Of the pairs that were compared, the one that a reader looks at first; null if there is none.
-template <typename Pair>
-[[nodiscard]] const Pair* MainPairOf(const std::vector<Pair>& pairs) {
-  for (const auto& [measured, truth] : kMainPairs) {
-    const Pair* pair = FindPairNamed(pairs, PairName(*measured, *truth));
-    if (pair != nullptr && pair->compared) return pair;
-  }
-  return nullptr;
-}
-
 /// False for NaN, and without a limit.
 [[nodiscard]] inline bool Passes(double value, const std::optional<double>& limit) {
   return limit && value <= *limit;
-}
-
-/// Checks that have a limit and did not pass.
-template <typename Check>
-[[nodiscard]] size_t CountFailed(const std::vector<Check>& checks) {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(),
-                                           [](const Check& c) { return c.limit && !c.pass; }));
-}
-/// Checks that have a limit, passed, and of which `counts` holds.
-template <typename Check, typename Counts>
-[[nodiscard]] size_t CountPassed(const std::vector<Check>& checks, const Counts& counts) {
-  return static_cast<size_t>(std::count_if(checks.begin(), checks.end(), [&](const Check& c) {
-    return c.limit && c.pass && counts(c);
-  }));
 }
 
 /// How far two witnesses are from each other, by one measure.

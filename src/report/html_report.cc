@@ -29,7 +29,7 @@ std::string At(double time_s) {
 
 ReportSection DriveSection(const Report& report) {
   ReportSection section{.title = "Drives", .link = "Drives"};
-  const PairComparison* main = MainPair(report.comparison);
+  const PairComparison* main = report.comparison.MainPair();
   bool floored = false;
   for (const PairComparison& pair : report.comparison.pairs) {
     if (!pair.compared || pair.drives.empty()) continue;
@@ -236,7 +236,7 @@ std::string ForcePlotsHtml(const PairComparison& pair, const Trace& measured, co
 }  // namespace
 
 std::string StaticPlotsHtml(const Report& report) {
-  const PairComparison* pair = MainPair(report.comparison);
+  const PairComparison* pair = report.comparison.MainPair();
   if (pair == nullptr) return "";
   const Trace* measured = TraceOf(report, pair->measured);
   const Trace* truth = TraceOf(report, pair->truth);
@@ -306,7 +306,7 @@ class PageWriter {
 
   std::string Cards() const {
     std::string html;
-    if (const PairComparison* pair = MainPair(report_.comparison)) {
+    if (const PairComparison* pair = report_.comparison.MainPair()) {
       html += ForceCards(*pair);
     }
     for (const WitnessMetrics& witness : report_.comparison.witnesses) {
@@ -495,7 +495,7 @@ std::string Shown(const Table& table, bool open) {
 
 // What the others are measured against the main pair's first witness; else the first that ran.
 std::string MainWitness(const Report& report, const LoadFigures& loads) {
-  const PairComparison* pair = MainPair(report.comparison);
+  const PairComparison* pair = report.comparison.MainPair();
   return pair != nullptr ? pair->measured : loads.drives.front().witness;
 }
 

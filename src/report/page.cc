@@ -94,8 +94,7 @@ std::string HeadHtml(const PageHead& head) {
 
 std::string TopHtml(const PageHead& head) {
   const VerdictWords words = WordsOf(head.verdict);
-  const std::string sign =
-      head.sign ? fmt::format("<span aria-hidden=\"true\">{}</span> ", words.sign) : "";
+  const std::string sign = fmt::format("<span aria-hidden=\"true\">{}</span> ", words.sign);
   const std::string badge =
       head.judges
           ? fmt::format("<div class=\"badges\"><span class=\"verdict {}\">{}{}</span></div>",

@@ -49,7 +49,6 @@ struct PageHead {
   Verdict verdict = Verdict::kNotRun;
   std::string word = {};  ///< instead of the verdict's
   bool judges = true;     ///< false: a page of numbers, without a verdict
-  bool sign = true;       ///< ✓, ✗ or ? before the verdict's word
   std::string footer = {};
   std::string script_source =
       {};                    ///< which scripts may run, as in a content security policy; "": none

@@ -4,55 +4,10 @@
 
 #include <set>
 
-#include "comparison/verdict.h"
-
 namespace mbv {
-namespace {
-
-// Whether a reader wants to see it even if it passes.
-bool IsKey(const CheckResult& check) {
-  const bool simulated = IsEngine(check.measured);
-  switch (check.metric) {
-    case Metric::kForceNrmse:
-    case Metric::kTableTube:
-    case Metric::kMotorUse:
-      return true;
-    case Metric::kForceMax:
-    case Metric::kForceOwn:
-    case Metric::kPoseM:
-    case Metric::kPoseRad:
-      return simulated && check.truth == role::kAnalytic;
-    case Metric::kCommandM:
-    case Metric::kCommandRad:
-    case Metric::kCommandVelocity:
-    case Metric::kCommandAcceleration:
-    case Metric::kClosureM:
-    case Metric::kPower:
-      return simulated;
-    case Metric::kPositionM:
-    case Metric::kPositionRad:
-    case Metric::kVelocity:
-    case Metric::kAcceleration:
-    case Metric::kReaction:
-    case Metric::kReactionOwn:
-    case Metric::kBaseForce:
-    case Metric::kClosureRad:
-    case Metric::kDerivatives:
-      return false;
-    case Metric::kEnergy:
-      return simulated;
-  }
-  return true;
-}
-
-}  // namespace
-
-const PairComparison* MainPair(const Comparison& comparison) {
-  return MainPairOf(comparison.pairs);
-}
 
 std::string AtRestText(const Comparison& comparison) {
-  const PairComparison* pair = MainPair(comparison);
+  const PairComparison* pair = comparison.MainPair();
   if (pair == nullptr || pair->samples_at_rest == 0) return "";
   return fmt::format(
       "friction rests at {} of {} samples: forces are bands there, compared by their ends; RMS "
@@ -104,35 +59,9 @@ std::vector<SignalSheet> SheetsOf(const Mechanism& mechanism, const Comparison& 
 }
 
 ResultView ViewOf(const Report& report) {
-  const Comparison& comparison = report.comparison;
-  ResultView view = ViewOfComparison(report, comparison);
-  view.caveats = comparison.caveats;
-  for (const CheckResult& check : comparison.checks) {
-    const MetricRow& row = RowOf(check.metric);
-    view.checks.push_back(
-        {.name = check.name,
-         .subject = check.subject,
-         .title = *row.unit == '\0' ? row.title : fmt::format("{} [{}]", row.title, row.unit),
-         .value = check.value,
-         .limit = check.limit,
-         .pass = check.pass,
-         .where = check.channel,
-         .time_s = check.time_s,
-         .key = IsKey(check),
-         .verifies = !check.follows,
-         .blind = check.blind,
-         .floored = check.floored,
-         .stated_limit = check.stated_limit,
-         .limit_by = check.limit_by});
-  }
+  ResultView view = ViewOfComparison(report, report.comparison, Metric::kForceNrmse);
   for (const WitnessRecord& witness : report.witnesses) {
     view.witnesses.emplace_back(witness.name, witness.summary);
-  }
-  view.empty_counts = {{"checks_of_a_motion_with_itself", comparison.followed()},
-                       {"checks_blind", comparison.blind()}};
-  if (const PairComparison* pair = MainPair(comparison)) {
-    view.main_pair = pair->measured + " vs " + pair->truth;
-    view.main_check = pair->name() + ".force_nrmse";
   }
   return view;
 }

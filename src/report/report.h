@@ -112,10 +112,6 @@ struct Report : ResultFrame {
 /// What a witness recorded; null if it did not run.
 [[nodiscard]] const Trace* TraceOf(const Report& report, const std::string& witness);
 
-/// The pair a reader looks at first: of servos simulated vs reached; simulated vs analytic if
-/// compared, else simulated vs reference, else reference vs analytic; null if none was compared.
-[[nodiscard]] const PairComparison* MainPair(const Comparison& comparison);
-
 /// Says of the main pair how many samples are bands, and how they count; "" if none.
 [[nodiscard]] std::string AtRestText(const Comparison& comparison);
 

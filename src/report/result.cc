@@ -8,6 +8,84 @@
 #include "comparison/verdict.h"
 
 namespace mbv {
+namespace {
+
+// Whether a reader wants to see it even if it passes.
+bool IsKey(const CheckResult& check) {
+  const bool simulated = IsEngine(check.measured);
+  switch (check.metric) {
+    case Metric::kForceNrmse:
+    case Metric::kTableTube:
+    case Metric::kMotorUse:
+      return true;
+    case Metric::kForceMax:
+    case Metric::kForceOwn:
+    case Metric::kPoseM:
+    case Metric::kPoseRad:
+      return simulated && check.truth == role::kAnalytic;
+    case Metric::kCommandM:
+    case Metric::kCommandRad:
+    case Metric::kCommandVelocity:
+    case Metric::kCommandAcceleration:
+    case Metric::kClosureM:
+    case Metric::kPower:
+      return simulated;
+    case Metric::kPositionM:
+    case Metric::kPositionRad:
+    case Metric::kVelocity:
+    case Metric::kAcceleration:
+    case Metric::kReaction:
+    case Metric::kReactionOwn:
+    case Metric::kBaseForce:
+    case Metric::kClosureRad:
+    case Metric::kDerivatives:
+      return false;
+    case Metric::kEnergy:
+      return simulated;
+    default:
+      return true;  // of stiffnesses
+  }
+}
+
+}  // namespace
+
+ResultView ViewOfComparison(const ResultFrame& frame, const Comparison& comparison,
+                            Metric main_metric) {
+  ResultView view{.frame = &frame,
+                  .verdict = comparison.verdict,
+                  .reason = comparison.reason,
+                  .caveats = comparison.caveats,
+                  .attribution = comparison.attribution,
+                  .not_compared = comparison.not_compared,
+                  .pairs = comparison.pairs.size(),
+                  .verified = comparison.verified(),
+                  .empty_counts = {{"checks_of_a_motion_with_itself", comparison.followed()},
+                                   {"checks_blind", comparison.blind()}}};
+  for (const PairComparison& pair : comparison.pairs) view.pairs_compared += pair.compared ? 1 : 0;
+  for (const CheckResult& check : comparison.checks) {
+    const MetricRow& row = RowOf(check.metric);
+    view.checks.push_back(
+        {.name = check.name,
+         .subject = check.subject,
+         .title = *row.unit == '\0' ? row.title : fmt::format("{} [{}]", row.title, row.unit),
+         .value = check.value,
+         .limit = check.limit,
+         .pass = check.pass,
+         .where = check.channel,
+         .time_s = check.time_s,
+         .key = IsKey(check),
+         .verifies = !check.follows,
+         .blind = check.blind,
+         .floored = check.floored,
+         .stated_limit = check.stated_limit,
+         .limit_by = check.limit_by});
+  }
+  if (const PairComparison* pair = comparison.MainPair()) {
+    view.main_pair = pair->measured + " vs " + pair->truth;
+    view.main_check = pair->name() + "." + RowOf(main_metric).key;
+  }
+  return view;
+}
 
 CheckEnd EndOf(const ShownCheck& check) {
   if (!check.limit) return CheckEnd::kOff;
@@ -116,14 +194,14 @@ Json TimingJson(const ResultView& view) {
                 {"reference_s", timing.reference_s},
                 {"simulation_s", timing.simulation_s},
                 {"render_s", timing.render_s}};
-  if (view.look.steps) times["stock_s"] = timing.stock_s;
+  if (view.in_time) times["stock_s"] = timing.stock_s;
   if (timing.foreign_s > 0.0) times["foreign_s"] = timing.foreign_s;
   times["total_s"] = timing.total_s;
-  if (view.look.steps) {
+  if (view.in_time) {
     times["loop_s"] = timing.loop_s;
     times["steps"] = timing.steps;
   }
-  if (view.look.steps && timing.loop_s > 0.0) {
+  if (view.in_time && timing.loop_s > 0.0) {
     times["steps_per_s"] = static_cast<double>(timing.steps) / timing.loop_s;
   }
   return times;
@@ -158,7 +236,7 @@ Json SummaryHead(const ResultView& view) {
   json["verdict"] = ToText(view.verdict);
   json["reason"] = view.reason;
   json["exit_code"] = frame.exit_code;
-  if (view.caveats) AddCaveats(*view.caveats, &json);
+  AddCaveats(view.caveats, &json);
   json["attribution"] = AttributionJson(view.attribution);
   json["checks"] = ChecksJson(view);
   json["checks_off"] = ChecksOffJson(view);
@@ -204,7 +282,7 @@ Json WitnessHead(const std::string& name, const RunSummary& summary) {
 
 void AddBreakdown(const ResultView& view, const RunSummary& summary, Json* json) {
   if (summary.ok() || summary.stop == Stop::kNotRun) return;
-  if (view.look.steps) (*json)["time_s"] = Number(summary.time_s);
+  if (view.in_time) (*json)["time_s"] = Number(summary.time_s);
   (*json)["where"] = summary.where;
   (*json)["amount"] = Number(summary.amount);
   (*json)["unit"] = summary.unit;
@@ -225,16 +303,16 @@ std::string Margin(const ShownCheck& check) {
                      check.pass ? "" : " over", filled, factor);
 }
 
-std::vector<Cell> CheckRow(const ShownCheck& check, bool margins) {
-  std::vector<Cell> row = {Spaced(check.subject), check.title, NumberOrDash(check.value),
+std::vector<Cell> CheckRow(const ShownCheck& check) {
+  std::vector<Cell> row = {Spaced(check.subject),
+                           check.title,
+                           NumberOrDash(check.value),
                            check.limit ? fmt::format("{:.1e}", *check.limit) : "off",
-                           EndCell(check)};
-  if (check.floored) row.back().remark = "floored";
-  if (margins) {
-    row.emplace_back("");
-    if (check.blind.empty()) row.back().html = Margin(check);
-  }
-  row.emplace_back(WhereOf(check));
+                           EndCell(check),
+                           "",
+                           WhereOf(check)};
+  if (check.floored) row[4].remark = "floored";
+  if (check.blind.empty()) row[5].html = Margin(check);
   return row;
 }
 
@@ -271,19 +349,14 @@ const char* SourceWord(Source source) {
 }
 
 PageHead HeadOf(const ResultView& view) {
-  return {.title = view.frame->title(),
-          .lead = view.frame->description,
-          .verdict = view.verdict,
-          .sign = view.look.signs};
+  return {.title = view.frame->title(), .lead = view.frame->description, .verdict = view.verdict};
 }
 
 std::string VerdictHtml(const ResultView& view, const std::string& cards,
                         const std::string& about) {
-  const auto sentence = [&](const std::string& text) {
-    return Escape(view.look.capitals ? Sentence(text) : text + ".");
-  };
+  const auto sentence = [](const std::string& text) { return Escape(Sentence(text)); };
   std::string html = "<p class=\"reason\">" + sentence(view.reason) + "</p>\n";
-  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+  for (const Caveat& caveat : view.caveats) {
     html +=
         "<p class=\"reason\">" + Pill("warn", "caveat") + " " + sentence(caveat.text) + "</p>\n";
   }
@@ -303,18 +376,12 @@ std::string VerdictHtml(const ResultView& view, const std::string& cards,
 
 std::string ChecksHtml(const ResultView& view, const std::string& note) {
   if (view.checks.empty()) return "";
-  const bool margins = view.look.margins;
-  Table table{
-      .caption = "Checks, failed ones first",
-      .columns = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
-                  Text(margins ? "result" : "")},
-  };
-  if (margins) table.columns.push_back(Text("margin"));
-  table.columns.push_back(Text("worst at"));
+  Table table{.caption = "Checks, failed ones first",
+              .columns = {Text("of"), Text("quantity"), Digits("value"), Digits("limit"),
+                          Text("result"), Text("margin"), Text("worst at")}};
   for (const bool failed : {true, false}) {
     for (const ShownCheck& check : view.checks) {
-      if ((EndOf(check) == CheckEnd::kFail) == failed)
-        table.rows.push_back(CheckRow(check, margins));
+      if ((EndOf(check) == CheckEnd::kFail) == failed) table.rows.push_back(CheckRow(check));
     }
   }
   return ToHtml(table) + Note(note);

@@ -71,24 +71,14 @@ enum class CheckEnd { kOff, kFail, kVoid, kHeld, kOk };
 /// "printed", "assumed", "corrected"; "" where no source is stated.
 [[nodiscard]] const char* SourceWord(Source source);
 
-/// Where kinds look different.
-struct ResultLook {
-  bool signs = true;        ///< ✓, ✗ or ? before the page's verdict
-  bool capitals = true;     ///< the page's sentences start with one
-  bool margins = true;      ///< limit over value, on the page
-  bool steps = true;        ///< simulated in time: steps and other engines are timed
-  size_t title_width = 26;  ///< of checks on a terminal
-};
-
 /// A result of any kind, as it is shown.
 struct ResultView {
   const ResultFrame* frame = nullptr;
   const char* kind = "";  ///< in summary.json; "" for motions, which came first
-  ResultLook look = {};
-
+  bool in_time = true;    ///< what is simulated takes steps: they and other engines are timed
   Verdict verdict = Verdict::kNotRun;
   std::string reason = {};
-  std::optional<std::vector<Caveat>> caveats = {};  ///< empty: the kind knows none
+  std::vector<Caveat> caveats = {};
   Attribution attribution = {};
   std::vector<ShownCheck> checks = {};  ///< off ones included
   std::vector<NotCompared> not_compared = {};
@@ -104,19 +94,10 @@ struct ResultView {
   [[nodiscard]] size_t limits() const;  ///< checks that are not off
 };
 
-/// What any comparison says (comparison/verdict.h); the kind adds checks and witnesses.
-template <typename Judged>
-[[nodiscard]] ResultView ViewOfComparison(const ResultFrame& frame, const Judged& comparison) {
-  ResultView view{.frame = &frame,
-                  .verdict = comparison.verdict,
-                  .reason = comparison.reason,
-                  .attribution = comparison.attribution,
-                  .not_compared = comparison.not_compared,
-                  .pairs = comparison.pairs.size(),
-                  .verified = comparison.verified()};
-  for (const auto& pair : comparison.pairs) view.pairs_compared += pair.compared ? 1 : 0;
-  return view;
-}
+/// What a comparison says, with its checks; the kind adds its witnesses. `main_metric` stands for
+/// the pair that a reader looks at first.
+[[nodiscard]] ResultView ViewOfComparison(const ResultFrame& frame, const Comparison& comparison,
+                                          Metric main_metric);
 
 /// What several runs came to.
 struct RunCounts {

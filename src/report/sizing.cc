@@ -122,7 +122,7 @@ Json MostJson(const MotorEnvelope::Most& most) {
 }  // namespace
 
 std::vector<const MotorLoad*> MainMotorLoads(const Report& report) {
-  const PairComparison* pair = MainPair(report.comparison);
+  const PairComparison* pair = report.comparison.MainPair();
   std::string witness = pair != nullptr ? pair->measured : "";
   if (witness.empty() && !report.motor_loads.empty()) witness = report.motor_loads.front().witness;
   std::vector<const MotorLoad*> loads;

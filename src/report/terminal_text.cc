@@ -35,7 +35,7 @@ void TerminalText::Head(const ResultView& view, const std::string& title,
     if (!line.empty()) Line("  " + line);
   }
   Line("  " + view.reason);
-  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+  for (const Caveat& caveat : view.caveats) {
     Line("  " + Painted("caveat", Paint::kWarning) + ": " + caveat.text);
   }
   if (!view.attribution.text.empty()) Line("  " + view.attribution.text);
@@ -145,7 +145,7 @@ std::string VerdictLine(const ResultView& view, const TableOptions& options) {
   }
   if (check != nullptr && check->floored) line += " floored";
   if (view.verdict != Verdict::kAgree) line += "  " + view.reason;
-  for (const Caveat& caveat : view.caveats.value_or(std::vector<Caveat>{})) {
+  for (const Caveat& caveat : view.caveats) {
     line += "; caveat: " + caveat.text;
   }
   std::ranges::replace(line, '\n', ' ');

@@ -48,8 +48,26 @@ enum class Metric {
   kTableTube,  ///< pair with a table: worst column's difference / its tolerance tube
   kMotorUse,   ///< motors: the largest share of a limit that is used, 1/margin; judged where a
                ///< scenario states `motor_margin`, as 1/motor_margin
+  // Of a stiffness at a pose. Entries are compared in units of sqrt(K_ii K_jj): that number does
+  // not change with the units of length and angle, and is the relative error for i = j.
+  kStiffnessEntry,    ///< pair: max |ΔK_ij| / sqrt(K_ii K_jj)
+  kComplianceEntry,   ///< pair: max |ΔC_ij| / sqrt(C_ii C_jj)
+  kShareEntry,        ///< pair: the same for each element's share of C, in units of the whole C
+  kDisplacementAxis,  ///< pair: max error of Δx, Δy, Δz over the loads / max |Δ| of that axis
+  kDisplacementVector,  ///< pair: max over the loads of |error of (Δx, Δy, Δz)| / |(Δx, Δy, Δz)|
+  kRotationAxis,        ///< pair: as displacement_axis, for the rotation vector
+  kSymmetry,            ///< |K_ij − K_ji| / sqrt(K_ii K_jj)
+  kDefinite,            ///< how far the scaled K's smallest eigenvalue is below zero
+  kSharesSum,           ///< elements' shares add up to C
+  kResidual,            ///< simulation: unbalanced force of the equilibria, over the load
+  kExtrapolation,       ///< simulation: error of the extrapolation to zero load
 };
-inline constexpr int kMetrics = 23;
+inline constexpr int kMetrics = 34;
+
+/// Judges a stiffness; the others judge motions.
+[[nodiscard]] constexpr bool IsOfStiffness(Metric metric) {
+  return metric >= Metric::kStiffnessEntry;
+}
 
 /// Which column of limits applies.
 enum class LimitColumn { kForward, kInverse, kReference, kServo };
@@ -90,9 +108,13 @@ struct MetricRow {
 /// of the mechanism and to 1 rad.
 inline constexpr double kCoarsestLimit = 0.1;
 
+/// Of motions.
 [[nodiscard]] std::span<const MetricRow> MetricRows();
+/// Of stiffnesses: both modes of a simulation have one limit.
+[[nodiscard]] std::span<const MetricRow> StiffnessMetricRows();
 [[nodiscard]] const MetricRow& RowOf(Metric metric);
-[[nodiscard]] const MetricRow* FindMetric(const std::string& key);
+[[nodiscard]] const MetricRow* FindMetric(const std::string& key,
+                                          std::span<const MetricRow> rows = MetricRows());
 
 /// All limits of a scenario, starting from the defaults.
 struct CheckLimits {

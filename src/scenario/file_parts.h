@@ -86,6 +86,21 @@ class ScenarioFile {
     }
   }
 
+  /// Overrides for all witnesses, and where each was written.
+  void ReadParameters(const YamlNode* node) {
+    scenario_.parameters = ReadOverrides(&values_, node, "parameters");
+    if (node == nullptr) return;
+    scenario_.parameter_places = PlacesOf(*node, file_, options_.set);
+    // What an option sets in one unit replaces what the file gives in another.
+    for (const YamlEntry& option : node->entries) {
+      if (option.line >= 0) continue;
+      for (const YamlEntry& entry : node->entries) {
+        if (entry.line < 0 || SplitUnit(entry.key).name != SplitUnit(option.key).name) continue;
+        scenario_.parameters.erase(entry.key);
+      }
+    }
+  }
+
   /// Loads scenario_.model_file; its parameters are in scope from then on.
   void LoadModelWith(const LoadOptions& options) {
     LoadResult loaded = LoadModel(scenario_.model_file, options);

@@ -187,20 +187,6 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     step_s = fitting_s;
   }
 
-  void ReadParameters(const YamlNode* node) {
-    scenario_.parameters = ReadOverrides(&values_, node, "parameters");
-    if (node == nullptr) return;
-    scenario_.parameter_places = PlacesOf(*node, file_, options_.set);
-    // What an option sets in one unit replaces what the file gives in another.
-    for (const YamlEntry& option : node->entries) {
-      if (option.line >= 0) continue;
-      for (const YamlEntry& entry : node->entries) {
-        if (entry.line < 0 || SplitUnit(entry.key).name != SplitUnit(option.key).name) continue;
-        scenario_.parameters.erase(entry.key);
-      }
-    }
-  }
-
   void LoadMechanism(const YamlNode& node) {
     const auto name = yaml_.Text(node, "mechanism");
     if (!name) return;

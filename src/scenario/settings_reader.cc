@@ -25,9 +25,9 @@ LimitValue ReadLimit(ValueReader* values, const YamlNode& node, const std::strin
   return {number.has_value(), number};
 }
 
-std::vector<std::string> CheckKeys() {
-  std::vector<std::string> keys = {"start_window_s"};
-  for (const MetricRow& row : MetricRows()) {
+std::vector<std::string> CheckKeys(std::span<const MetricRow> rows) {
+  std::vector<std::string> keys;
+  for (const MetricRow& row : rows) {
     keys.emplace_back(row.key);
     if (row.metric == Metric::kMotorUse) continue;  // the same for all
     keys.push_back(std::string(kReferencePrefix) + row.key);
@@ -35,14 +35,16 @@ std::vector<std::string> CheckKeys() {
   return keys;
 }
 
-void ReadCheck(ValueReader* values, const YamlEntry& entry, CheckLimits* limits) {
+void ReadCheck(ValueReader* values, const YamlEntry& entry, std::span<const MetricRow> rows,
+               CheckLimits* limits) {
   const std::string path = "checks." + entry.key;
   const bool reference = entry.key.starts_with(kReferencePrefix);
   const MetricRow* row =
-      FindMetric(reference ? entry.key.substr(kReferencePrefix.size()) : entry.key);
+      FindMetric(reference ? entry.key.substr(kReferencePrefix.size()) : entry.key, rows);
   if (row == nullptr) return;  // reported as unknown key
   MetricLimits& target = (*limits)[row->metric];
-  if (entry.value->is_map() && !reference && row->metric != Metric::kMotorUse) {
+  const bool has_modes = row->metric != Metric::kMotorUse && !IsOfStiffness(row->metric);
+  if (entry.value->is_map() && !reference && has_modes) {
     YamlMap map(&values->yaml(), entry.value.get(), path, {"forward", "inverse", "servo"});
     for (const YamlEntry& mode : entry.value->entries) {
       const LimitValue value = ReadLimit(values, *mode.value, JoinPath(path, mode.key));
@@ -241,14 +243,26 @@ CheckLimits DefaultLimits(const Mechanism& mechanism) {
 CheckLimits ReadChecks(ValueReader* values, const YamlNode* node, const Mechanism* mechanism,
                        double* start_window_s) {
   CheckLimits limits = mechanism != nullptr ? DefaultLimits(*mechanism) : CheckLimits();
-  YamlMap map(&values->yaml(), node, "checks", CheckKeys());
+  std::vector<std::string> keys = CheckKeys(MetricRows());
+  keys.insert(keys.begin(), "start_window_s");
+  YamlMap map(&values->yaml(), node, "checks", keys);
   if (!map.valid() || node == nullptr) return limits;
   for (const YamlEntry& entry : node->entries) {
     if (entry.key == "start_window_s") {
       *start_window_s = values->Positive(*entry.value, "checks.start_window_s").value_or(0.0);
     } else {
-      ReadCheck(values, entry, &limits);
+      ReadCheck(values, entry, MetricRows(), &limits);
     }
+  }
+  return limits;
+}
+
+CheckLimits ReadStiffnessChecks(ValueReader* values, const YamlNode* node) {
+  CheckLimits limits;
+  YamlMap map(&values->yaml(), node, "checks", CheckKeys(StiffnessMetricRows()));
+  if (!map.valid() || node == nullptr) return limits;
+  for (const YamlEntry& entry : node->entries) {
+    ReadCheck(values, entry, StiffnessMetricRows(), &limits);
   }
   return limits;
 }

@@ -22,6 +22,8 @@ void CheckGain(const YamlNode& node, const std::string& path, const Gain& gain,
 /// are those of a metre.
 [[nodiscard]] CheckLimits ReadChecks(ValueReader* values, const YamlNode* node,
                                      const Mechanism* mechanism, double* start_window_s);
+/// Limits of a stiffness at a pose.
+[[nodiscard]] CheckLimits ReadStiffnessChecks(ValueReader* values, const YamlNode* node);
 [[nodiscard]] Expectation ReadExpectation(ValueReader* values, const YamlNode* node);
 
 }  // namespace mbv

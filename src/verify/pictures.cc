@@ -131,7 +131,7 @@ Caption CaptionOf(const Report& report) {
   Caption caption{.title = report.mechanism + " / " + report.scenario,
                   .detail = {},
                   .status = ToText(report.comparison.verdict)};
-  if (const PairComparison* pair = MainPair(report.comparison)) {
+  if (const PairComparison* pair = report.comparison.MainPair()) {
     const std::string witnesses = fmt::format("{} against {}", pair->measured, pair->truth);
     const auto force = pair->metrics.find(Metric::kForceNrmse);
     const auto place = pair->metrics.find(Metric::kPoseM);

@@ -11,32 +11,16 @@
 namespace mbv {
 namespace {
 
-// Why the closed form does not take this mechanism and its loads; "" if it does. One warning each.
-std::string WarnNotApplicable(const Scenario& scenario, const Mechanism& mechanism,
-                              const ClosedFormRow& row, Diagnostics* diagnostics) {
-  if (row.coverage == nullptr) return "";
+// What the closed form does not cover of this mechanism and its loads.
+std::vector<Finding> UncoveredBy(const ClosedFormRow& row, const Scenario& scenario,
+                                 const Mechanism& mechanism) {
+  if (row.coverage == nullptr) return {};
   const Coverage coverage = row.coverage(mechanism);
   std::vector<Finding> uncovered = FindUncovered(coverage, mechanism, Concern::kDynamics);
   for (Finding& load : FindUncoveredLoads(coverage, mechanism, scenario.motion)) {
     uncovered.push_back(std::move(load));
   }
-  const std::string reason = ReasonNotApplicable(uncovered);
-  for (Finding& finding : uncovered) {
-    finding.file = scenario.file;
-    finding.message = "analytic is not applicable: " + finding.message;
-    diagnostics->Add(std::move(finding));
-  }
-  return reason;
-}
-
-WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,
-                                 Diagnostics* diagnostics) {
-  const auto load = [&](const Overrides& own, const Role& witness) {
-    return LoadVariant(scenario, base, own, witness, diagnostics);
-  };
-  return {load(scenario.analytic.parameters, role::kAnalytic),
-          load(scenario.reference.parameters, role::kReference),
-          load(scenario.simulation.parameters, role::kSimulated)};
+  return uncovered;
 }
 
 // Every channel that some witness may record.
@@ -60,6 +44,52 @@ std::vector<Channel> RecordableChannels(const Prepared& prepared) {
 }
 
 }  // namespace
+
+std::string WarnNotApplicable(const std::string& scenario_file, std::vector<Finding> uncovered,
+                              Diagnostics* diagnostics) {
+  const std::string reason = ReasonNotApplicable(uncovered);
+  for (Finding& finding : uncovered) {
+    finding.file = scenario_file;
+    finding.message = "analytic is not applicable: " + finding.message;
+    diagnostics->Add(std::move(finding));
+  }
+  return reason;
+}
+
+void AddFormFindings(const std::string& scenario_file, const Diagnostics& found,
+                     Diagnostics* diagnostics) {
+  for (Finding finding : found.findings()) {
+    if (finding.file.empty()) finding.file = scenario_file;
+    diagnostics->Add(std::move(finding));
+  }
+}
+
+WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,
+                                 Diagnostics* diagnostics) {
+  const auto load = [&](const Overrides& own, const Role& witness) {
+    return LoadVariant(scenario, base, own, witness, diagnostics);
+  };
+  return {load(scenario.analytic.parameters, role::kAnalytic),
+          load(scenario.reference.parameters, role::kReference),
+          load(scenario.simulation.parameters, role::kSimulated)};
+}
+
+std::map<std::string, Overrides> OwnParameters(const Scenario& scenario, const Mechanism& base) {
+  std::map<std::string, Overrides> own;
+  const auto add = [&](const Role& role, const Overrides& parameters) {
+    for (const auto& [name, value] : parameters) {
+      if (base.ParameterValue(name) != value) own[role.name][name] = value;
+    }
+  };
+  add(role::kAnalytic, scenario.analytic.parameters);
+  for (const Role* role : {&role::kSolver, &role::kReached}) {
+    add(*role, scenario.reference.parameters);
+  }
+  // A table has the reference's place.
+  if (scenario.reference.table == nullptr) add(role::kReference, scenario.reference.parameters);
+  add(role::kSimulated, scenario.simulation.parameters);
+  return own;
+}
 
 Mechanism LoadVariant(const Scenario& scenario, const Mechanism& base, const Overrides& own,
                       const Role& witness, Diagnostics* diagnostics) {
@@ -104,7 +134,8 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
     fits = false;
   }
   if (!fits) return {nullptr, "the scenario asks for a formulation that does not exist"};
-  if (std::string reason = WarnNotApplicable(scenario, mechanism, *row, diagnostics);
+  if (std::string reason =
+          WarnNotApplicable(scenario.file, UncoveredBy(*row, scenario, mechanism), diagnostics);
       !reason.empty()) {
     return {nullptr, std::move(reason), WitnessGap::kNotApplicable};
   }
@@ -112,10 +143,7 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
   auto closed_form =
       row->factory(mechanism, scenario.motion,
                    {.model = settings.model, .as_printed = settings.as_printed}, &found);
-  for (Finding finding : found.findings()) {
-    if (finding.file.empty()) finding.file = scenario.file;
-    diagnostics->Add(std::move(finding));
-  }
+  AddFormFindings(scenario.file, found, diagnostics);
   if (closed_form == nullptr) return {nullptr, "the closed form does not suit this scenario"};
   return {std::move(closed_form), ""};
 }

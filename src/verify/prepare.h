@@ -51,10 +51,25 @@ struct Prepared {
   [[nodiscard]] DriveForces MakeDriveForces() const;
 };
 
+/// Warns of what a closed form does not cover; in short why it does not apply, "" if it does.
+[[nodiscard]] std::string WarnNotApplicable(const std::string& scenario_file,
+                                            std::vector<Finding> uncovered,
+                                            Diagnostics* diagnostics);
+/// What a factory of closed forms found, about the scenario where it names no file.
+void AddFormFindings(const std::string& scenario_file, const Diagnostics& found,
+                     Diagnostics* diagnostics);
+
 /// Loads a scenario with everything it needs. Empty after bad input; warnings may remain.
 [[nodiscard]] std::optional<Prepared> Prepare(const std::string& file,
                                               const ScenarioOptions& options,
                                               Diagnostics* diagnostics);
+
+/// The mechanism as each witness sees it. Findings are bad input.
+[[nodiscard]] WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,
+                                               Diagnostics* diagnostics);
+/// Of this mechanism, the parameters that the scenario gives single witnesses another value of.
+[[nodiscard]] std::map<std::string, Overrides> OwnParameters(const Scenario& scenario,
+                                                             const Mechanism& base);
 
 /// The mechanism with a witness' own overrides: `base`, or the model loaded again. Findings are bad
 /// input.

@@ -403,28 +403,6 @@ SimulatedWitness WitnessRunner::Simulate(const SimulationOptions& options,
   return RunSimulation(scenario(), simulated(), Driven(), options, StageOf(progress_, stage));
 }
 
-namespace {
-
-// Overrides that change something, by the witnesses that compute with them.
-std::map<std::string, Overrides> OwnParameters(const Prepared& prepared) {
-  const Scenario& scenario = prepared.scenario;
-  std::map<std::string, Overrides> own;
-  const auto add = [&](const Role& role, const Overrides& parameters) {
-    for (const auto& [name, value] : parameters) {
-      if (prepared.base.ParameterValue(name) != value) own[role.name][name] = value;
-    }
-  };
-  add(role::kAnalytic, scenario.analytic.parameters);
-  for (const Role* role : {&role::kSolver, &role::kReached}) {
-    add(*role, scenario.reference.parameters);
-  }
-  if (!prepared.has_table()) add(role::kReference, scenario.reference.parameters);
-  add(role::kSimulated, scenario.simulation.parameters);
-  return own;
-}
-
-}  // namespace
-
 ComparisonInput InputOf(const Prepared& prepared) {
   const Scenario& scenario = prepared.scenario;
   const SimulationSettings& simulation = scenario.simulation;
@@ -437,7 +415,7 @@ ComparisonInput InputOf(const Prepared& prepared) {
           .driven_by = prepared.driver().name,
           .reactions_not_unique = {},
           .drive_by = simulation.forward ? simulation.drive_by : DriveBy::kMotion,
-          .own_parameters = OwnParameters(prepared),
+          .own_parameters = OwnParameters(scenario, prepared.base),
           .left_out = TextsOf(scenario.model_caveats, ModelCaveat::Kind::kLeftOut)};
 }
 

@@ -68,14 +68,15 @@ TEST(Verdict, OnlyANumberWithinALimitPasses) {
 }
 
 TEST(Verdict, SwitchedOffChecksNeitherFailNorPass) {
-  struct Check {
-    std::optional<double> limit;
-    bool pass;
-  };
-  const std::vector<Check> checks = {{1.0, true}, {1.0, false}, {std::nullopt, false}, {1.0, true}};
-  EXPECT_EQ(CountFailed(checks), 1u);
-  EXPECT_EQ(CountPassed(checks, [](const Check&) { return true; }), 2u);
-  EXPECT_EQ(CountPassed(checks, [](const Check&) { return false; }), 0u);
+  Comparison comparison;
+  comparison.checks.resize(5);
+  for (size_t k : {0, 1, 3, 4}) comparison.checks[k].limit = 1.0;
+  for (size_t k : {0, 3, 4}) comparison.checks[k].pass = true;
+  comparison.checks[4].blind = "wide";
+  EXPECT_EQ(comparison.failed(), 1u);
+  EXPECT_EQ(comparison.verified(), 2u);
+  EXPECT_EQ(comparison.followed(), 0u);
+  EXPECT_EQ(comparison.blind(), 1u);
 }
 
 }  // namespace

@@ -70,29 +70,20 @@ double ShareOf(double part, double whole) { return part == 0.0 ? 0.0 : part / wh
 
 CheckLimits RerunLimits(const CheckLimits& limits) {
   CheckLimits own = limits;
-  for (const MetricRow& row : MetricRows()) {
-    MetricLimits& metric = own[row.metric];
-    const auto or_default = [](std::optional<double>* limit, const std::optional<double>& usual) {
-      if (!*limit) *limit = usual;
-    };
-    or_default(&metric.forward, row.limits.forward);
-    or_default(&metric.inverse, row.limits.inverse);
-    or_default(&metric.reference, row.limits.reference);
-    or_default(&metric.servo, metric.forward);
-    for (std::optional<double>* limit : {&metric.forward, &metric.servo}) {
-      if (*limit) **limit *= kRerunShare;
+  const auto or_default = [](std::optional<double>* limit, const std::optional<double>& usual) {
+    if (!*limit) *limit = usual;
+  };
+  for (const auto rows : {MetricRows(), StiffnessMetricRows()}) {
+    for (const MetricRow& row : rows) {
+      MetricLimits& metric = own[row.metric];
+      or_default(&metric.forward, row.limits.forward);
+      or_default(&metric.inverse, row.limits.inverse);
+      or_default(&metric.reference, row.limits.reference);
+      or_default(&metric.servo, metric.forward);
+      for (std::optional<double>* limit : {&metric.forward, &metric.servo}) {
+        if (*limit) **limit *= kRerunShare;
+      }
     }
-  }
-  return own;
-}
-
-StiffnessLimits RerunLimits(const StiffnessLimits& limits) {
-  StiffnessLimits own = limits;
-  for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
-    StiffnessLimit& metric = own[row.metric];
-    if (!metric.simulated) metric.simulated = row.limit.simulated;
-    if (!metric.computed) metric.computed = row.limit.computed;
-    if (metric.simulated) *metric.simulated *= kRerunShare;
   }
   return own;
 }

@@ -13,7 +13,6 @@
 #include <vector>
 
 #include "comparison/comparison.h"
-#include "features/stiffness/stiffness_scenario.h"
 
 namespace mbv {
 
@@ -22,7 +21,6 @@ inline constexpr double kRerunShare = 0.01;
 
 /// The limits that repetitions are judged by.
 [[nodiscard]] CheckLimits RerunLimits(const CheckLimits& limits);
-[[nodiscard]] StiffnessLimits RerunLimits(const StiffnessLimits& limits);
 
 /// One signal.
 struct RerunSignal {

@@ -10,9 +10,9 @@
 #include <string>
 #include <vector>
 
+#include "comparison/compare_stiffness.h"
 #include "features/paper/rerun_report.h"
 #include "features/stiffness/stiffness.h"
-#include "features/stiffness/stiffness_comparison.h"
 #include "features/study/study_file.h"
 #include "mechanism/channels.h"
 #include "scenario/tables/columns.h"
@@ -201,9 +201,9 @@ std::map<std::string, StiffnessWitness> StiffnessesOf(const OwnTable& matrices,
   return witnesses;
 }
 
-bool IsOfLoads(StiffnessMetric metric) {
-  return metric == StiffnessMetric::kDisplacementAxis ||
-         metric == StiffnessMetric::kDisplacementVector || metric == StiffnessMetric::kRotationAxis;
+bool IsOfLoads(Metric metric) {
+  return metric == Metric::kDisplacementAxis || metric == Metric::kDisplacementVector ||
+         metric == Metric::kRotationAxis;
 }
 
 std::vector<RerunSignal> CompareStiffnesses(const PackedScenario& scenario, bool of_loads,
@@ -211,21 +211,22 @@ std::vector<RerunSignal> CompareStiffnesses(const PackedScenario& scenario, bool
   Diagnostics diagnostics;
   const auto prepared = PrepareStiffnessFile(scenario.file, {}, &diagnostics);
   if (!prepared) return {};
-  const StiffnessLimits limits = RerunLimits(prepared->scenario.checks);
+  const CheckLimits limits = RerunLimits(prepared->scenario.checks);
   const auto before = StiffnessesOf(matrices.packed, loads == nullptr ? nullptr : &loads->packed);
   const auto now = StiffnessesOf(matrices.rerun, loads == nullptr ? nullptr : &loads->rerun);
   std::vector<RerunSignal> signals;
   for (const auto& [name, witness] : before) {
     const auto found = now.find(name);
     if (found == now.end()) continue;
-    const StiffnessPair pair = CompareStiffnessPair(found->second, witness);
+    const PairComparison pair = CompareStiffnesses(AsWitness(found->second), AsWitness(witness));
     for (const auto& [metric, worst] : pair.metrics) {
       if (IsOfLoads(metric) != of_loads) continue;
-      const StiffnessLimit& limit = limits[metric];
-      const auto allowed = IsEngine(name) ? limit.simulated : limit.computed;
-      signals.push_back({.signal = fmt::format("{}.{} ({})", name, RowOf(metric).key, worst.where),
-                         .relative = worst.value,
-                         .use = worst.value == 0.0 ? 0.0 : worst.value / allowed.value_or(0.0)});
+      const auto allowed =
+          limits[metric].Of(IsEngine(name) ? LimitColumn::kForward : LimitColumn::kReference);
+      signals.push_back(
+          {.signal = fmt::format("{}.{} ({})", name, RowOf(metric).key, worst.channel),
+           .relative = worst.value,
+           .use = worst.value == 0.0 ? 0.0 : worst.value / allowed.value_or(0.0)});
     }
   }
   return signals;

@@ -99,7 +99,7 @@ std::vector<const WitnessRecord*> ShownWitnesses(const Report& report) {
 
 const WitnessRecord* LineWitness(const Report& report) {
   const std::vector<const WitnessRecord*> shown = ShownWitnesses(report);
-  const PairComparison* pair = MainPair(report.comparison);
+  const PairComparison* pair = report.comparison.MainPair();
   for (const WitnessRecord* record : shown) {
     if (pair != nullptr && record->name == pair->truth) return record;
   }

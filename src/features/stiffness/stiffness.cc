@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <chrono>
 
-#include "base/demand.h"
 #include "base/inputs.h"
 #include "base/output_folder.h"
 #include "base/text.h"
-#include "model_file/load_model.h"
 #include "reference/frame_stiffness.h"
 #include "reference/reference.h"
 #include "report/json.h"
@@ -20,10 +18,6 @@
 namespace mbv {
 namespace {
 
-double Since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 class Runner {
  public:
   Runner(const PreparedStiffness& prepared, const ProgressFunction& progress)
@@ -32,24 +26,46 @@ class Runner {
   StiffnessRun Run() {
     const auto start = std::chrono::steady_clock::now();
     Describe();
-    Show("closed form", 0.0);
-    RunAnalytic();
-    Show("frame elements", 0.1);
-    RunFrame();
-    Show("simulation", 0.2);
-    RunSimulated();
+    Timing& timing = report().timing;
+    const char* off = "switched off in the scenario";
+    const auto add = [&](const Role& role, const char* stage, double fraction,
+                         const std::string& why_not, double* wall_s, const auto& compute) {
+      if (progress_) progress_(stage, fraction);
+      StiffnessWitness witness{.name = role.name};
+      if (why_not.empty()) {
+        const auto begin = std::chrono::steady_clock::now();
+        compute(&witness);
+        *wall_s = witness.result.summary.wall_s = Since(begin);
+      } else {
+        witness.result.summary = NotRun(why_not);
+      }
+      report().witnesses.push_back(std::move(witness));
+    };
+    add(role::kAnalytic, "closed form", 0.0, prepared_.form_reason, &timing.analytic_s,
+        [&](StiffnessWitness* witness) {
+          witness->result = prepared_.form->Evaluate(scenario_.pose);
+          witness->displacements = Displacements(witness->result, scenario_.loads);
+        });
+    report().witnesses.back().gap = prepared_.form_gap;
+    add(role::kReference, "frame elements", 0.1, scenario_.reference.on ? "" : off,
+        &timing.reference_s, [&](StiffnessWitness* witness) { RunFrame(witness); });
+    add(role::kSimulated, "simulation", 0.2,
+        !scenario_.simulation.on ? off
+        : IsSingular()           ? "the stiffness is singular: nothing can be loaded"
+                                 : "",
+        &timing.simulation_s, [&](StiffnessWitness* witness) { Simulate(witness); });
     RunPrinted();
     Judge();
     Measure();
-    run_.report.timing.total_s = Since(start);
+    timing.total_s = Since(start);
     return std::move(run_);
   }
 
  private:
   StiffnessReport& report() { return run_.report; }
 
-  void Show(const char* stage, double fraction) const {
-    if (progress_) progress_(stage, fraction);
+  static double Since(std::chrono::steady_clock::time_point start) {
+    return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   }
 
   void Describe() {
@@ -66,156 +82,92 @@ class Runner {
     r.loads_text = scenario_.loads_text;
     r.versions = Versions();
     r.parameters = prepared_.base.parameters;
-    const Motion motion = PoseMotion(prepared_.base, scenario_.pose);
-    for (const Command& command : motion.commands) {
+    for (const Command& command : scenario_.motion.commands) {
       r.pose.push_back({command.name, Evaluate(command.profile, 0.0).value,
                         CoordinateUnit(prepared_.base, command.terms[0].coordinate)});
     }
   }
 
-  StiffnessWitness& Add(const std::string& name, StiffnessResult result) {
-    StiffnessWitness witness;
-    witness.name = name;
-    witness.displacements = Displacements(result, scenario_.loads);
-    witness.result = std::move(result);
-    report().witnesses.push_back(std::move(witness));
-    return report().witnesses.back();
-  }
-
-  void AddFailed(const std::string& name, RunSummary summary) {
-    StiffnessResult result;
-    result.summary = std::move(summary);
-    Add(name, std::move(result));
-  }
-
-  void RunAnalytic() {
-    if (prepared_.form == nullptr) {
-      AddFailed(role::kAnalytic.name, NotRun(prepared_.form_reason));
-      report().witnesses.back().gap = prepared_.form_gap;
-      return;
-    }
-    const auto start = std::chrono::steady_clock::now();
-    StiffnessResult result = prepared_.form->Evaluate(scenario_.pose);
-    report().timing.analytic_s = result.summary.wall_s = Since(start);
-    Add(role::kAnalytic.name, std::move(result));
-  }
-
-  void RunFrame() {
-    if (!scenario_.reference.on) {
-      AddFailed(role::kReference.name, NotRun("switched off in the scenario"));
-      return;
-    }
-    const auto start = std::chrono::steady_clock::now();
+  // Poses of all bodies of a witness' mechanism, and where its output is; empty after a failure.
+  std::vector<Pose> Assemble(const Mechanism& mechanism, StiffnessWitness* witness) {
     std::vector<Pose> X_WB;
-    if (!Assemble(role::kReference.name, prepared_.reference, &X_WB)) return;
-    StiffnessResult result = FrameStiffness(prepared_.reference, X_WB, prepared_.output);
-    report().timing.reference_s = result.summary.wall_s = Since(start);
-    Add(role::kReference.name, std::move(result));
+    witness->result.summary = CloseLoops(mechanism, scenario_.pose, &X_WB);
+    if (X_WB.empty()) return X_WB;
+    const Output& output = prepared_.base.outputs[static_cast<size_t>(prepared_.output)];
+    report().p_WO = (X_WB[static_cast<size_t>(output.body)] * output.X_BO).translation();
+    return X_WB;
   }
 
-  // Poses of all bodies of a witness' mechanism, and where its output is; false after a failure.
-  bool Assemble(const std::string& witness, const Mechanism& mechanism, std::vector<Pose>* X_WB) {
-    const RunSummary closed = CloseLoops(mechanism, scenario_.pose, X_WB);
-    if (!closed.ok()) {
-      AddFailed(witness, closed);
-      return false;
-    }
-    const Output& output = prepared_.base.outputs[static_cast<size_t>(prepared_.output)];
-    report().p_WO = ((*X_WB)[static_cast<size_t>(output.body)] * output.X_BO).translation();
-    return true;
+  void RunFrame(StiffnessWitness* witness) {
+    const Mechanism& mechanism = prepared_.mechanisms.reference;
+    const std::vector<Pose> X_WB = Assemble(mechanism, witness);
+    if (X_WB.empty()) return;
+    witness->result = FrameStiffness(mechanism, X_WB, prepared_.output);
+    witness->displacements = Displacements(witness->result, scenario_.loads);
   }
 
   // No load can be in equilibrium where another computation found a DOF that nothing holds.
-  bool IsSingular() const {
-    for (const StiffnessWitness& witness : run_.report.witnesses) {
-      if (witness.result.summary.stop == Stop::kSingular) return true;
-    }
-    return false;
+  bool IsSingular() {
+    return std::ranges::any_of(report().witnesses, [](const StiffnessWitness& witness) {
+      return witness.result.summary.stop == Stop::kSingular;
+    });
   }
 
-  void RunSimulated() {
-    if (!scenario_.simulation.on) {
-      AddFailed(role::kSimulated.name, NotRun("switched off in the scenario"));
-      return;
-    }
-    if (IsSingular()) {
-      AddFailed(role::kSimulated.name, NotRun("the stiffness is singular: nothing can be loaded"));
-      return;
-    }
-    const auto start = std::chrono::steady_clock::now();
-    std::vector<Pose> X_WB;
-    if (!Assemble(role::kSimulated.name, prepared_.simulated, &X_WB)) return;
-    CompliantRun run = SimulateStiffness(
-        prepared_.simulated, X_WB, prepared_.output, scenario_.loads,
-        {.force_N = scenario_.simulation.force_N, .moment_Nm = scenario_.simulation.moment_Nm});
-    report().timing.simulation_s = run.result.summary.wall_s = Since(start);
+  void Simulate(StiffnessWitness* witness) {
+    const Mechanism& mechanism = prepared_.mechanisms.simulated;
+    const std::vector<Pose> X_WB = Assemble(mechanism, witness);
+    if (X_WB.empty()) return;
+    CompliantRun run =
+        SimulateStiffness(mechanism, X_WB, prepared_.output, scenario_.loads,
+                          {.force_N = scenario_.force_N, .moment_Nm = scenario_.moment_Nm});
     run_.mjcf = std::move(run.mjcf);
-    StiffnessWitness& witness = Add(role::kSimulated.name, std::move(run.result));
-    witness.residual = run.residual;
-    witness.extrapolation_error = run.extrapolation_error;
+    witness->result = std::move(run.result);
+    witness->residual = run.residual;
+    witness->extrapolation_error = run.extrapolation_error;
     // Under finite loads, geometry included.
-    witness.displacements.clear();
     for (const LoadedDisplacement& loaded : run.loaded) {
-      witness.displacements.push_back(loaded.displacement);
+      witness->displacements.push_back(loaded.displacement);
     }
   }
 
   void RunPrinted() {
     if (prepared_.printed == nullptr) return;
-    StiffnessWitness witness;
+    StiffnessWitness& witness = report().printed.emplace_back();
     witness.name = "printed";
     witness.result = prepared_.printed->Evaluate(scenario_.pose);
     // Its stiffness is compared even where its model finds itself singular.
     witness.displacements = Displacements(witness.result, scenario_.loads);
-    report().printed_pairs.push_back(CompareStiffnessPair(witness, report().witnesses.front()));
-    report().printed.push_back(std::move(witness));
+    report().printed_pairs.push_back(
+        CompareStiffnesses(AsWitness(witness), AsWitness(report().witnesses.front())));
   }
 
   void Judge() {
-    StiffnessInput input;
-    input.limits = scenario_.checks;
-    input.loads = scenario_.loads;
-    input.witnesses = report().witnesses;
-    input.left_out = TextsOf(scenario_.model_caveats, ModelCaveat::Kind::kLeftOut);
-    report().comparison = CompareStiffness(input);
-    switch (report().comparison.verdict) {
-      case Verdict::kAgree:
-        report().exit_code = 0;
-        break;
-      case Verdict::kDisagree:
-        report().exit_code = 1;
-        break;
-      case Verdict::kNotRun:
-        report().exit_code = 3;
-        break;
+    ComparisonInput input{.mechanism = &prepared_.base,
+                          .motion = &scenario_.motion,
+                          .limits = scenario_.checks,
+                          .witnesses = {},
+                          .driven_by = {},
+                          .reactions_not_unique = {},
+                          .own_parameters = OwnParameters(scenario_, prepared_.base),
+                          .left_out = TextsOf(scenario_.model_caveats, ModelCaveat::Kind::kLeftOut),
+                          .of_stiffness = true};
+    for (const StiffnessWitness& witness : report().witnesses) {
+      input.witnesses.push_back(AsWitness(witness));
     }
+    report().comparison = Compare(input);
+    const Verdict verdict = report().comparison.verdict;
+    report().exit_code = verdict == Verdict::kAgree ? 0 : verdict == Verdict::kDisagree ? 1 : 3;
   }
 
   void Measure() {
-    StiffnessReport& r = report();
-    const auto add = [&](const std::string& name, const std::string& unit,
-                         const std::string& meaning, const auto& value_of) {
-      IndexRow row{.name = name, .unit = unit, .meaning = meaning, .values = {}};
-      for (const StiffnessWitness& witness : r.witnesses) {
-        row.values.push_back(witness.ran() ? value_of(witness.result) : kNan);
-      }
-      r.indices.push_back(std::move(row));
-    };
-    if (prepared_.form != nullptr) {
-      const std::vector<StiffnessIndex> indices = prepared_.form->indices();
-      for (size_t k = 0; k < indices.size(); ++k) {
-        add(indices[k].name, indices[k].unit, indices[k].meaning,
-            [&](const StiffnessResult& result) {
-              std::vector<double> values(indices.size());
-              prepared_.form->IndexValues(result, values);
-              return values[k];
-            });
-      }
+    for (const NamedIndex& index : IndicesOf(prepared_.form.get(), {})) {
+      report().indices.push_back({index.name, index.unit, index.meaning, {}});
     }
-    const std::vector<NamedIndex> general = GeneralIndices({});
-    for (size_t k = 0; k < general.size(); ++k) {
-      add(general[k].name, general[k].unit, general[k].meaning,
-          [k](const StiffnessResult& result) { return GeneralIndices(result)[k].value; });
+    for (const StiffnessWitness& witness : report().witnesses) {
+      const std::vector<NamedIndex> indices = IndicesOf(prepared_.form.get(), witness.result);
+      for (size_t k = 0; k < indices.size(); ++k) {
+        report().indices[k].values.push_back(indices[k].value);
+      }
     }
   }
 
@@ -226,6 +178,18 @@ class Runner {
 };
 
 }  // namespace
+
+std::vector<NamedIndex> IndicesOf(const StiffnessForm* form, const StiffnessResult& result) {
+  std::vector<NamedIndex> all;
+  const auto own = form == nullptr ? std::vector<StiffnessIndex>() : form->indices();
+  std::vector<double> values(own.size(), kNan);
+  if (form != nullptr && result.K.allFinite()) form->IndexValues(result, values);
+  for (size_t k = 0; k < own.size(); ++k) {
+    all.push_back({own[k].name, own[k].unit, own[k].meaning, values[k]});
+  }
+  for (NamedIndex& index : GeneralIndices(result)) all.push_back(std::move(index));
+  return all;
+}
 
 RunSummary CloseLoops(const Mechanism& mechanism, const PoseValues& pose, std::vector<Pose>* X_WB) {
   const Motion motion = PoseMotion(mechanism, pose);
@@ -298,20 +262,6 @@ namespace {
 
 constexpr const char* kPrintedModel = "as_printed";
 
-Mechanism WithParameters(const PreparedStiffness& prepared, const Overrides& own,
-                         const char* witness, Diagnostics* diagnostics) {
-  if (own.empty()) return prepared.base;
-  LoadOptions options;
-  options.overrides = Merge(prepared.scenario.parameters, own);
-  LoadResult loaded = LoadModel(prepared.scenario.model_file, options);
-  if (loaded.mechanism) return *std::move(loaded.mechanism);
-  diagnostics->Append(loaded.diagnostics);
-  diagnostics->AddError(
-      prepared.scenario.file,
-      fmt::format("the model cannot be loaded with the parameters of the {} witness", witness), "");
-  return prepared.base;
-}
-
 void ResolveOutput(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   const StiffnessFormRow* row = FindStiffnessForm(prepared->base.name);
   std::string name = prepared->scenario.output;
@@ -319,15 +269,9 @@ void ResolveOutput(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   if (name.empty() && prepared->base.outputs.size() == 1) name = prepared->base.outputs[0].name;
   prepared->output = prepared->base.FindOutput(name);
   if (prepared->output >= 0) return;
-  std::vector<std::string> known;
-  for (const Output& output : prepared->base.outputs) known.push_back(output.name);
-  diagnostics->AddError(prepared->scenario.file,
-                        name.empty()
-                            ? fmt::format("output is not given, and {} has {}", prepared->base.name,
-                                          known.empty() ? "none" : "several")
-                            : fmt::format("there is no output '{}'", name),
-                        known.empty() ? "declare one under outputs: in the model"
-                                      : DidYouMean(name, known, "outputs: " + Joined(known)));
+  Finding none = MissingOutput(prepared->base, name);
+  none.file = prepared->scenario.file;
+  diagnostics->Add(std::move(none));
 }
 
 void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
@@ -343,84 +287,67 @@ void ResolvePose(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   }
 }
 
-// Why the closed form does not take this model; "" if it does. One warning each.
-std::string WarnNotApplicable(const PreparedStiffness& prepared, const StiffnessFormRow& row,
-                              Diagnostics* diagnostics) {
-  if (row.coverage == nullptr) return "";
-  std::vector<Finding> uncovered =
-      FindUncovered(row.coverage(prepared.analytic), prepared.analytic, Concern::kStiffness);
-  const std::string reason = ReasonNotApplicable(uncovered);
-  for (Finding& finding : uncovered) {
-    finding.file = prepared.scenario.file;
-    finding.message = "analytic is not applicable: " + finding.message;
-    diagnostics->Add(std::move(finding));
-  }
-  return reason;
+// What the closed form does not cover of the model.
+std::vector<Finding> UncoveredBy(const StiffnessFormRow& row, const Mechanism& mechanism) {
+  if (row.coverage == nullptr) return {};
+  return FindUncovered(row.coverage(mechanism), mechanism, Concern::kStiffness);
 }
 
 std::unique_ptr<StiffnessForm> MakeForm(const PreparedStiffness& prepared,
                                         const StiffnessFormRow& row, const std::string& model,
                                         Diagnostics* diagnostics) {
-  Diagnostics own;
-  auto form = row.factory(prepared.analytic, prepared.scenario.pose, model, &own);
-  for (Finding finding : own.findings()) {
-    if (finding.file.empty()) finding.file = prepared.scenario.file;
-    diagnostics->Add(std::move(finding));
-  }
+  Diagnostics found;
+  auto form = row.factory(prepared.mechanisms.analytic, prepared.scenario.pose, model, &found);
+  AddFormFindings(prepared.scenario.file, found, diagnostics);
   return form;
 }
 
-void FindForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
+// Makes the closed forms, or says why there are none.
+std::string FindForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
   const AnalyticSettings& settings = prepared->scenario.analytic;
+  const std::string& file = prepared->scenario.file;
   const StiffnessFormRow* row = FindStiffnessForm(prepared->base.name);
-  if (settings.on && settings.stated) prepared->form_gap = WitnessGap::kNotApplicable;
-  if (!settings.on) {
-    prepared->form_reason = "switched off in the scenario";
-    return;
-  }
+  if (!settings.on) return "switched off in the scenario";
+  if (settings.stated) prepared->form_gap = WitnessGap::kNotApplicable;
   if (row == nullptr) {
-    prepared->form_reason = "there is no closed form of the stiffness of " + prepared->base.name;
-    if (!settings.model.empty()) {
-      diagnostics->AddError(prepared->scenario.file, "analytic.model: " + prepared->form_reason,
-                            "");
-    }
-    return;
+    std::string none = "there is no closed form of the stiffness of " + prepared->base.name;
+    if (!settings.model.empty()) diagnostics->AddError(file, "analytic.model: " + none);
+    return none;
   }
   const std::string& output = prepared->base.outputs[size_t(prepared->output)].name;
   if (output != row->output) {
-    prepared->form_reason =
-        fmt::format("the closed form is for output {}, not {}", row->output, output);
-    return;
+    return fmt::format("the closed form is for output {}, not {}", row->output, output);
   }
-  const auto& models = row->models;
-  prepared->form_model = settings.model.empty() ? models.front() : settings.model;
-  if (std::find(models.begin(), models.end(), prepared->form_model) == models.end()) {
-    diagnostics->AddError(
-        prepared->scenario.file,
-        fmt::format("analytic.model = '{}' is not one of: {}", settings.model, Joined(models)), "");
-    return;
+  prepared->form_model = settings.model.empty() ? row->models.front() : settings.model;
+  if (!Contains(row->models, prepared->form_model)) {
+    diagnostics->AddError(file, fmt::format("analytic.model = '{}' is not one of: {}",
+                                            settings.model, Joined(row->models)));
+    return "the scenario asks for a formulation that does not exist";
   }
   prepared->form_gap = WitnessGap::kNotApplicable;  // unless it is made
-  prepared->form_reason = WarnNotApplicable(*prepared, *row, diagnostics);
-  if (!prepared->form_reason.empty()) return;
+  std::string outside =
+      WarnNotApplicable(file, UncoveredBy(*row, prepared->mechanisms.analytic), diagnostics);
+  if (!outside.empty()) return outside;
   prepared->form = MakeForm(*prepared, *row, prepared->form_model, diagnostics);
-  if (prepared->form == nullptr) {
-    prepared->form_reason = "the closed form does not suit this scenario";
-  } else {
-    prepared->form_gap = WitnessGap::kNone;
-  }
-  if (prepared->scenario.compare_printed && prepared->form != nullptr) {
+  if (prepared->form == nullptr) return "the closed form does not suit this scenario";
+  prepared->form_gap = WitnessGap::kNone;
+  if (prepared->scenario.compare_printed) {
     prepared->printed = MakeForm(*prepared, *row, kPrintedModel, diagnostics);
   }
-}
-
-void MakeForms(PreparedStiffness* prepared, Diagnostics* diagnostics) {
-  FindForms(prepared, diagnostics);
-  if (!prepared->scenario.analytic.required || prepared->form != nullptr) return;
-  diagnostics->AddError(prepared->scenario.file, "analytic.required: " + prepared->form_reason, "");
+  return "";
 }
 
 }  // namespace
+
+Finding MissingOutput(const Mechanism& mechanism, const std::string& name) {
+  std::vector<std::string> known;
+  for (const Output& output : mechanism.outputs) known.push_back(output.name);
+  return {.message = name.empty() ? fmt::format("output is not given, and {} has {}",
+                                                mechanism.name, known.empty() ? "none" : "several")
+                                  : fmt::format("there is no output '{}'", name),
+          .hint = known.empty() ? "declare one under outputs: in the model"
+                                : DidYouMean(name, known, "outputs: " + Joined(known))};
+}
 
 PoseValues ExamplePose(const std::string& mechanism) {
   const StiffnessFormRow* row = FindStiffnessForm(mechanism);
@@ -433,33 +360,30 @@ std::optional<PreparedStiffness> PrepareStiffness(StiffnessScenario scenario, Me
   prepared.scenario = std::move(scenario);
   prepared.base = std::move(base);
   const StiffnessScenario& s = prepared.scenario;
+  std::string unknown;
   if (!prepared.base.couplings.empty()) {
-    diagnostics->AddError(
-        s.file,
-        fmt::format("model '{}' couples joints ({}), which stiffness does not know",
-                    prepared.base.name, prepared.base.couplings.front().name),
-        "without the coupling, held by drives, the model has a stiffness");
-    return {};
-  }
-  if (!prepared.base.elements.empty()) {
+    unknown = fmt::format("couples joints ({})", prepared.base.couplings.front().name);
+  } else if (!prepared.base.elements.empty()) {
     const ForceElement& element = prepared.base.elements.front();
+    unknown =
+        fmt::format("has element '{}', a {}", element.name, Described(prepared.base, element));
+  }
+  if (!unknown.empty()) {
     diagnostics->AddError(
         s.file,
-        fmt::format("model '{}' has element '{}', a {}, which stiffness does not know",
-                    prepared.base.name, element.name, Described(prepared.base, element)),
-        "beams and servos are what stiffness knows");
+        fmt::format("model '{}' {}, which stiffness does not know", prepared.base.name, unknown),
+        "beams and servos are what stiffness knows: a model with them alone has one");
     return {};
   }
-  prepared.analytic =
-      WithParameters(prepared, s.analytic.parameters, role::kAnalytic.name, diagnostics);
-  prepared.reference =
-      WithParameters(prepared, s.reference.parameters, role::kReference.name, diagnostics);
-  prepared.simulated =
-      WithParameters(prepared, s.simulation.parameters, role::kSimulated.name, diagnostics);
+  prepared.mechanisms = LoadMechanisms(s, prepared.base, diagnostics);
   ResolveOutput(&prepared, diagnostics);
   ResolvePose(&prepared, diagnostics);
   if (diagnostics->has_errors()) return {};
-  MakeForms(&prepared, diagnostics);
+  prepared.scenario.motion = PoseMotion(prepared.base, prepared.scenario.pose);
+  prepared.form_reason = FindForms(&prepared, diagnostics);
+  if (s.analytic.required && prepared.form == nullptr) {
+    diagnostics->AddError(s.file, "analytic.required: " + prepared.form_reason);
+  }
   if (diagnostics->has_errors()) return {};
   return prepared;
 }

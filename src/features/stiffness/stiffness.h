@@ -7,17 +7,19 @@
 
 #include "analytic/stiffness_form.h"
 #include "base/diagnostics.h"
+#include "features/stiffness/stiffness_measures.h"
 #include "features/stiffness/stiffness_report.h"
 #include "features/stiffness/stiffness_scenario.h"
+#include "verify/prepare.h"
 #include "verify/run_options.h"
 
 namespace mbv {
 
 /// A scenario ready to run: names resolved, closed forms made.
 struct PreparedStiffness {
-  StiffnessScenario scenario;
-  Mechanism base;                            ///< with the scenario's common parameters
-  Mechanism analytic, reference, simulated;  ///< with each witness' own
+  StiffnessScenario scenario;  ///< its motion is the pose, commanded
+  Mechanism base;              ///< with the scenario's common parameters
+  WitnessMechanisms mechanisms;
   int output = 0;
   std::unique_ptr<StiffnessForm> form;  ///< null: none, or switched off
   std::string form_reason;              ///< why, if null
@@ -38,6 +40,9 @@ struct PreparedStiffness {
                                                                     const ScenarioOptions& options,
                                                                     Diagnostics* diagnostics);
 
+/// That a mechanism has no output of this name, or not one alone if it is ""; without a place.
+[[nodiscard]] Finding MissingOutput(const Mechanism& mechanism, const std::string& name);
+
 /// The example pose that is used when none is given; empty for other mechanisms.
 [[nodiscard]] PoseValues ExamplePose(const std::string& mechanism);
 
@@ -47,6 +52,10 @@ struct StiffnessRun {
 };
 [[nodiscard]] StiffnessRun RunStiffness(const PreparedStiffness& prepared,
                                         const ProgressFunction& progress = {});
+
+/// Indices of the paper (`form` may be null), then the general ones; NaN without a stiffness.
+[[nodiscard]] std::vector<NamedIndex> IndicesOf(const StiffnessForm* form,
+                                                const StiffnessResult& result);
 
 /// Poses of all bodies at given coordinates, loops closed by the reference solver.
 [[nodiscard]] RunSummary CloseLoops(const Mechanism& mechanism, const PoseValues& pose,

@@ -12,89 +12,126 @@
 #include "cli/terminal.h"
 #include "features/stiffness/stiffness.h"
 #include "features/stiffness/stiffness_map.h"
-#include "scenario/motion_reader.h"
+#include "model_file/load_model.h"
+#include "scenario/file_parts.h"
 
 namespace mbv {
 namespace {
 
 struct StiffnessArguments {
-  std::string model, output, out, format = "text", seed, closed_form;
+  std::string model, output, out, format = "text", closed_form;
   std::vector<std::string> at, set, indices;
   std::vector<std::vector<std::string>> maps;
-  int loads = 0, jobs = 1;
-  double force_max = 1000.0, moment_max = 1.0;
+  int jobs = 1;
+  RandomLoads loads{.count = 0};
   bool no_simulation = false, verbose = false;
   JsonOption json;
 };
 
-// Coordinates that --at leaves out keep their values of the usual pose, if it is stated by the same
+Finding AtOption(const std::string& option, std::string message, std::string hint = "") {
+  return {.file = option, .message = std::move(message), .hint = std::move(hint)};
+}
+
+// Loads the model with the overrides that the scenario holds; empty after findings.
+std::optional<Mechanism> Load(StiffnessScenario* scenario, Diagnostics* diagnostics) {
+  LoadOptions options;
+  options.overrides = scenario->parameters;
+  options.override_places = scenario->parameter_places;
+  LoadResult loaded = LoadModel(scenario->model_file, options);
+  diagnostics->Append(loaded.diagnostics);
+  scenario->model_caveats = std::move(loaded.caveats);
+  if (loaded.mechanism)
+    scenario->parameters = InPlainUnits(scenario->parameters, *loaded.mechanism);
+  return std::move(loaded.mechanism);
+}
+
+// Numbers and expressions of the model's parameters; parameters among them load the model again.
+// Coordinates that are left out keep their values of the usual pose, if that is stated by the same
 // coordinates.
-void FillPose(const Mechanism& mechanism, ScenarioOptions* options) {
-  PoseValues rest = ExamplePose(mechanism.name);
-  if (rest.empty()) rest = HomePose(mechanism);
-  const std::vector<std::string> coordinates = CoordinateNames(mechanism);
-  bool any = false;
-  for (const auto& [key, value] : options->set) {
-    if (!key.starts_with("pose.")) continue;
-    const std::string name = SplitUnit(key.substr(5)).name;
-    if (std::find(coordinates.begin(), coordinates.end(), name) == coordinates.end()) continue;
-    any = true;
-    if (rest.erase(name) == 0) return;
-  }
-  if (!any) return;
-  for (const auto& [name, value] : rest) {
-    options->set.emplace_back("pose." + name, fmt::format("{:.17g}", value));
-  }
-}
-
-// What was given as an argument of this command stands in the scenario as a key.
-Diagnostics AtArguments(const Diagnostics& diagnostics) {
-  Diagnostics placed;
-  for (Finding finding : diagnostics.findings()) {
-    const auto& [key, value] = finding.set;
-    for (const auto& [above, option] :
-         {std::pair<std::string, std::string>{"pose.", "--at "}, {"parameters.", "--set "}}) {
-      if (key.starts_with(above)) finding.file = option + key.substr(above.size()) + "=" + value;
+void ReadPose(const std::vector<SetValue>& at, StiffnessScenario* scenario,
+              std::optional<Mechanism>* mechanism, Diagnostics* diagnostics) {
+  Scope scope;
+  for (const Parameter& p : (*mechanism)->parameters) scope.Set(p.name, p.value);
+  Overrides parameters;
+  for (const auto& [name, value] : at) {
+    const std::string option = "--at " + name + "=" + value;
+    YamlReader yaml(option);
+    ValueReader values(&yaml, &scope);
+    const YamlNodePtr node = yaml.Parse(value);
+    const auto number = node == nullptr ? std::nullopt : values.Number(*node, name);
+    for (Finding finding : yaml.diagnostics().findings()) {
+      finding.line = 0;  // there is only one
+      diagnostics->Add(std::move(finding));
     }
-    if (key == "output") finding.file = "--output " + value;
-    if (key == "mechanism") finding.file = value;
-    placed.Add(std::move(finding));
+    if (auto fault = PutIntoPose(**mechanism, name, number, &scenario->pose, &parameters)) {
+      diagnostics->Add(AtOption(option, std::move(fault->message), std::move(fault->hint)));
+    }
+    scenario->parameter_places[SplitUnit(name).name] = {.file = option};
   }
-  return placed;
+  if (diagnostics->has_errors()) return;
+  if (!parameters.empty()) {
+    scenario->parameters = Merge(scenario->parameters, parameters);
+    *diagnostics = {};  // warnings of the model come again
+    *mechanism = Load(scenario, diagnostics);
+  }
+  PoseValues& pose = scenario->pose;
+  if (!*mechanism || pose.empty()) return;
+  PoseValues usual = ExamplePose((*mechanism)->name);
+  if (usual.empty()) usual = HomePose(**mechanism);
+  const bool same = std::ranges::all_of(
+      pose, [&](const auto& coordinate) { return usual.contains(coordinate.first); });
+  if (same) pose.merge(usual);
+  if (const auto fault = CheckPose(**mechanism, pose)) {
+    diagnostics->Add(AtOption("--at", fault->message, fault->hint));
+  }
 }
 
-// The request as a scenario, so that it is checked and run like one.
+// The request as a scenario, so that it is checked and run like one; empty after findings.
 std::optional<PreparedStiffness> PrepareRequest(const StiffnessArguments& arguments,
                                                 Diagnostics* diagnostics) {
-  ScenarioOptions options;
-  options.set.emplace_back("mechanism", "\"" + arguments.model + "\"");
-  if (!ReadAssignments(arguments.at, "--at", "platform.x=-0.05", &options.set, "pose.") ||
-      !ReadAssignments(arguments.set, "--set", "K_act=10000", &options.set, "parameters.")) {
+  std::vector<SetValue> at, set;
+  if (!ReadAssignments(arguments.at, "--at", "platform.x=-0.05", &at) ||
+      !ReadAssignments(arguments.set, "--set", "K_act=10000", &set)) {
     return {};
   }
-  if (!arguments.output.empty()) options.set.emplace_back("output", arguments.output);
-  if (arguments.no_simulation) options.set.emplace_back("simulation", "off");
-  if (!arguments.closed_form.empty()) {
-    options.set.emplace_back("analytic.model", arguments.closed_form);
+  const auto model = FindElasticModel(arguments.model, "");
+  if (const Finding* none = std::get_if<Finding>(&model)) {
+    diagnostics->Add(AtOption(arguments.model, none->message, none->hint));
+    return {};
   }
-  if (arguments.loads > 0) {
-    options.set.emplace_back("loads.random.count", std::to_string(arguments.loads));
-    options.set.emplace_back("loads.random.force_max", fmt::format("{:.17g}", arguments.force_max));
-    options.set.emplace_back("loads.random.moment_max",
-                             fmt::format("{:.17g}", arguments.moment_max));
-    if (!arguments.seed.empty()) options.set.emplace_back("loads.random.seed", arguments.seed);
+  StiffnessScenario scenario;
+  scenario.name = "stiffness_at_pose";
+  scenario.model_file = std::get<std::string>(model);
+  LoadOptions options;
+  diagnostics->Append(ReadParameterOptions(set, &options));
+  if (diagnostics->has_errors()) return {};
+  scenario.parameters = options.overrides;
+  scenario.parameter_places = options.override_places;
+  auto mechanism = Load(&scenario, diagnostics);
+  if (!mechanism) return {};
+  if (const auto rigid = CheckElastic(*mechanism, scenario.model_file)) {
+    diagnostics->Add(AtOption(arguments.model, rigid->message));
   }
-  constexpr const char* kText = "kind: stiffness\n";
-  const StiffnessScenarioResult home =
-      LoadStiffnessScenarioText(kText, "mbverify stiffness", {.set = {options.set.front()}});
-  if (home.mechanism) FillPose(*home.mechanism, &options);
-  StiffnessScenarioResult loaded = LoadStiffnessScenarioText(kText, "mbverify stiffness", options);
-  diagnostics->Append(loaded.diagnostics);
-  if (!loaded.scenario) return {};
-  auto prepared =
-      PrepareStiffness(*std::move(loaded.scenario), *std::move(loaded.mechanism), diagnostics);
-  if (prepared) prepared->scenario.file.clear();  // there is none
-  return prepared;
+  ReadPose(at, &scenario, &mechanism, diagnostics);
+  if (diagnostics->has_errors()) return {};
+  scenario.output = arguments.output;
+  if (!scenario.output.empty() && mechanism->FindOutput(scenario.output) < 0) {
+    Finding none = MissingOutput(*mechanism, scenario.output);
+    none.file = "--output " + scenario.output;
+    diagnostics->Add(std::move(none));
+    return {};
+  }
+  scenario.simulation.on = !arguments.no_simulation;
+  scenario.analytic.model = arguments.closed_form;
+  scenario.analytic.stated = !arguments.closed_form.empty();
+  const RandomLoads& loads = arguments.loads;
+  if (loads.count > 0 && !(loads.force_max + loads.moment_max > 0.0)) {
+    diagnostics->Add(AtOption("--loads", "forces and moments up to 0 are no loads"));
+    return {};
+  }
+  scenario.loads = DrawLoads(loads);
+  if (!scenario.loads.empty()) scenario.loads_text = TextOf(loads);
+  return PrepareStiffness(std::move(scenario), *std::move(mechanism), diagnostics);
 }
 
 std::string CommandOf(const StiffnessArguments& arguments) {
@@ -103,8 +140,10 @@ std::string CommandOf(const StiffnessArguments& arguments) {
   for (const std::string& set : arguments.set) command += " --set " + set;
   if (!arguments.output.empty()) command += " --output " + arguments.output;
   if (!arguments.closed_form.empty()) command += " --closed-form " + arguments.closed_form;
-  if (arguments.loads > 0) command += fmt::format(" --loads {}", arguments.loads);
-  if (!arguments.seed.empty()) command += " --seed " + arguments.seed;
+  if (const RandomLoads& loads = arguments.loads; loads.count > 0) {
+    command += fmt::format(" --loads {} --seed {} --force-max {:g} --moment-max {:g}", loads.count,
+                           loads.seed, loads.force_max, loads.moment_max);
+  }
   return command;
 }
 
@@ -163,7 +202,7 @@ MapFolder DrawMaps(const StiffnessArguments& arguments, const PreparedStiffness&
 int Stiffness(const StiffnessArguments& arguments) {
   Diagnostics diagnostics;
   const auto prepared = PrepareRequest(arguments, &diagnostics);
-  SayText(stderr, AtArguments(diagnostics).Text());
+  SayText(stderr, diagnostics.Text());
   if (!prepared) return 2;
   ProgressLine progress_line(true);
   ProgressFunction progress;
@@ -173,7 +212,6 @@ int Stiffness(const StiffnessArguments& arguments) {
     };
   }
   StiffnessRun run = RunStiffness(*prepared, progress);
-  run.report.scenario = "stiffness_at_pose";
   run.report.command = CommandOf(arguments);
   Diagnostics map_diagnostics;
   const MapFolder maps = DrawMaps(arguments, *prepared, progress, &map_diagnostics);
@@ -217,12 +255,17 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
       ->allow_extra_args(false);
   stiffness->add_option("--closed-form", arguments->closed_form,
                         "formulation, e.g. as_printed: the paper's own");
-  stiffness->add_option("--loads", arguments->loads, "displacements under so many random wrenches")
+  stiffness
+      ->add_option("--loads", arguments->loads.count, "displacements under so many random wrenches")
       ->check(CLI::Range(1, 10000));
-  stiffness->add_option("--seed", arguments->seed, "of the random wrenches");
-  stiffness->add_option("--force-max", arguments->force_max, "of the random wrenches [N]")
+  stiffness->add_option("--seed", arguments->loads.seed, "of the random wrenches")
       ->capture_default_str();
-  stiffness->add_option("--moment-max", arguments->moment_max, "of the random wrenches [N m]")
+  const CLI::Range largest(0.0, 1e12);
+  stiffness->add_option("--force-max", arguments->loads.force_max, "of the random wrenches [N]")
+      ->check(largest)
+      ->capture_default_str();
+  stiffness->add_option("--moment-max", arguments->loads.moment_max, "of the random wrenches [N m]")
+      ->check(largest)
       ->capture_default_str();
   stiffness->add_option(
       "--map", arguments->maps,

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <cstring>
 #include <iterator>
 #include <limits>
 #include <numbers>
@@ -13,6 +12,7 @@
 
 #include "base/text.h"
 #include "base/worker_pool.h"
+#include "math/bytes.h"
 #include "model_file/yaml/yaml_reader.h"
 #include "plot/svg_plot.h"
 #include "reference/frame_stiffness.h"
@@ -129,69 +129,33 @@ std::string FixedText(const StiffnessMap& map) {
   return text;
 }
 
-// Rows of a map, computed where bytes of them can be sent from.
-class MapRows {
- public:
-  MapRows(const PreparedStiffness& prepared, const StiffnessMap& map, size_t own, size_t indices)
-      : prepared_(prepared), map_(map), own_(own), indices_(indices) {}
+// Of one pose: whether it counts, is out of range, is reached; rank; indices, the form's own first.
+constexpr size_t kHead = 4;
+using MapCell = std::vector<double>;
 
-  // Per point: whether it counts, is out of range, is reached; rank; indices.
-  [[nodiscard]] std::string BytesOf(size_t row) const {
-    std::string bytes;
-    for (int c = 0; c < map_.axes[0].count; ++c) {
-      const std::vector<double> cell =
-          Cell(PointOf(map_.axes[0], c), PointOf(map_.axes[1], static_cast<int>(row)));
-      bytes.append(reinterpret_cast<const char*>(cell.data()), cell.size() * sizeof(double));
-    }
-    return bytes;
-  }
-
-  void Put(size_t row, const std::string& bytes, MapResult* result) const {
-    std::vector<double> cell(kHead + indices_);
-    const size_t columns = static_cast<size_t>(map_.axes[0].count);
-    for (size_t c = 0; c < columns; ++c) {
-      std::memcpy(cell.data(), bytes.data() + c * cell.size() * sizeof(double),
-                  cell.size() * sizeof(double));
-      const size_t k = row * columns + c;
-      result->points += cell[0] > 0.0;
-      result->out_of_range += cell[1] > 0.0;
-      result->reached += cell[2] > 0.0;
-      result->rank[k] = static_cast<int>(cell[3]);
-      for (size_t i = 0; i < indices_; ++i) result->values[i][k] = cell[kHead + i];
-    }
-  }
-
- private:
-  static constexpr size_t kHead = 4;
-
-  [[nodiscard]] std::vector<double> Cell(double u, double v) const {
-    std::vector<double> cell(kHead + indices_, kNan);
-    cell[0] = cell[1] = cell[2] = 0.0;
-    cell[3] = -1.0;
-    if (std::hypot(u, v) > map_.within * (1 + 1e-9)) return cell;
-    cell[0] = 1.0;
-    PoseValues pose = prepared_.scenario.pose;
-    for (const MapValue& fixed : map_.fixed) pose[fixed.name] = fixed.value;
-    pose[map_.axes[0].name] = u;
-    pose[map_.axes[1].name] = v;
-    bool out_of_range = false;
-    const StiffnessResult at = StiffnessAt(prepared_, pose, &out_of_range);
-    cell[1] = out_of_range ? 1.0 : 0.0;
-    if (out_of_range || !at.K.allFinite()) return cell;
-    cell[2] = 1.0;
-    cell[3] = at.rank;
-    if (prepared_.form != nullptr) {
-      prepared_.form->IndexValues(at, std::span(cell).subspan(kHead, own_));
-    }
-    const std::vector<NamedIndex> general = GeneralIndices(at);
-    for (size_t i = 0; i < general.size(); ++i) cell[kHead + own_ + i] = general[i].value;
-    return cell;
-  }
-
-  const PreparedStiffness& prepared_;
-  const StiffnessMap& map_;
-  const size_t own_, indices_;
-};
+MapCell CellOf(const PreparedStiffness& prepared, const StiffnessMap& map, size_t all, double u,
+               double v) {
+  MapCell cell(kHead + all, kNan);
+  cell[0] = cell[1] = cell[2] = 0.0;
+  cell[3] = -1.0;
+  if (std::hypot(u, v) > map.within * (1 + 1e-9)) return cell;
+  cell[0] = 1.0;
+  PoseValues pose = prepared.scenario.pose;
+  for (const MapValue& fixed : map.fixed) pose[fixed.name] = fixed.value;
+  pose[map.axes[0].name] = u;
+  pose[map.axes[1].name] = v;
+  bool out_of_range = false;
+  const StiffnessResult at = StiffnessAt(prepared, pose, &out_of_range);
+  cell[1] = out_of_range ? 1.0 : 0.0;
+  if (out_of_range || !at.K.allFinite()) return cell;
+  cell[2] = 1.0;
+  cell[3] = at.rank;
+  const std::vector<NamedIndex> general = GeneralIndices(at);
+  const size_t own = all - general.size();
+  if (own > 0) prepared.form->IndexValues(at, std::span(cell).subspan(kHead, own));
+  for (size_t i = 0; i < general.size(); ++i) cell[kHead + own + i] = general[i].value;
+  return cell;
+}
 
 }  // namespace
 
@@ -200,28 +164,36 @@ MapResult ComputeMap(const PreparedStiffness& prepared, const StiffnessMap& map,
   const auto start = std::chrono::steady_clock::now();
   MapResult result;
   result.closed_form = prepared.form != nullptr;
-  if (prepared.form != nullptr) {
-    for (const StiffnessIndex& index : prepared.form->indices()) {
-      result.indices.push_back({index.name, index.unit, index.meaning, kNan});
+  result.indices = IndicesOf(prepared.form.get(), {});
+  const size_t all = result.indices.size();
+  const auto columns = static_cast<size_t>(map.axes[0].count);
+  const auto rows = static_cast<size_t>(map.axes[1].count);
+  result.values.assign(all, std::vector<double>(columns * rows, kNan));
+  result.rank.assign(columns * rows, -1);
+  using Row = std::vector<MapCell>;
+  const auto compute = [&](size_t r) {
+    Row row;
+    for (int c = 0; c < map.axes[0].count; ++c) {
+      row.push_back(CellOf(prepared, map, all, PointOf(map.axes[0], c),
+                           PointOf(map.axes[1], static_cast<int>(r))));
     }
-  }
-  const size_t own = result.indices.size();
-  for (const NamedIndex& index : GeneralIndices({})) result.indices.push_back(index);
-  const auto cells =
-      static_cast<size_t>(map.axes[0].count) * static_cast<size_t>(map.axes[1].count);
-  result.values.assign(result.indices.size(), std::vector<double>(cells, kNan));
-  result.rank.assign(cells, -1);
-  const MapRows rows(prepared, map, own, result.indices.size());
-  ShareOut(
-      static_cast<size_t>(map.axes[1].count), jobs, [&](size_t row) { return rows.BytesOf(row); },
-      [&](size_t row, const std::optional<std::string>& bytes) {
-        if (bytes) {
-          rows.Put(row, *bytes, &result);
-        } else {
-          ++result.lost_rows;
-        }
-        if (progress) progress("map", static_cast<double>(row + 1) / map.axes[1].count);
-      });
+    return ToBytes(row);
+  };
+  const auto take = [&](size_t r, const std::optional<std::string>& bytes) {
+    const auto row = bytes ? FromBytes<Row>(*bytes) : std::nullopt;
+    if (!row) ++result.lost_rows;
+    for (size_t c = 0; row && c < columns; ++c) {
+      const MapCell& cell = (*row)[c];
+      const size_t k = r * columns + c;
+      result.points += cell[0] > 0.0;
+      result.out_of_range += cell[1] > 0.0;
+      result.reached += cell[2] > 0.0;
+      result.rank[k] = static_cast<int>(cell[3]);
+      for (size_t i = 0; i < all; ++i) result.values[i][k] = cell[kHead + i];
+    }
+    if (progress) progress("map", static_cast<double>(r + 1) / map.axes[1].count);
+  };
+  ShareOut(rows, jobs, compute, take);
   result.wall_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   return result;
 }

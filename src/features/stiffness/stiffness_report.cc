@@ -1,22 +1,23 @@
-// Tables of a stiffness run as CSV.
-
 #include "features/stiffness/stiffness_report.h"
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <iterator>
 
 #include "base/json_text.h"
 #include "base/text.h"
-#include "features/stiffness/stiffness_comparison.h"
+#include "comparison/verdict.h"
+#include "features/stiffness/stiffness_measures.h"
 #include "plot/svg_plot.h"
 #include "report/page.h"
-#include "report/result.h"
 #include "report/terminal_text.h"
 
 namespace mbv {
 namespace {
+
+constexpr const char* kWrenchNames[] = {"mx", "my", "mz", "fx", "fy", "fz"};
 
 std::vector<const StiffnessWitness*> AllOf(const StiffnessReport& report) {
   std::vector<const StiffnessWitness*> all;
@@ -25,47 +26,71 @@ std::vector<const StiffnessWitness*> AllOf(const StiffnessReport& report) {
   return all;
 }
 
+// The compared pairs of witnesses, and the printed model's; each with what differs.
+struct ShownPair {
+  const PairComparison* pair;
+  const StiffnessWitness *measured, *truth;
+  StiffnessDifference difference;
+
+  [[nodiscard]] std::string text() const { return pair->measured + " against " + pair->truth; }
+};
+
+std::vector<ShownPair> PairsOf(const StiffnessReport& report) {
+  std::vector<ShownPair> shown;
+  const auto add = [&](const PairComparison& pair, const std::vector<StiffnessWitness>& measured) {
+    if (!pair.compared) return;
+    const StiffnessWitness* a = FindNamed(measured, pair.measured);
+    const StiffnessWitness* b = FindNamed(report.witnesses, pair.truth);
+    shown.push_back({&pair, a, b, DifferenceOf(*a, *b)});
+  };
+  for (const PairComparison& pair : report.comparison.pairs) add(pair, report.witnesses);
+  for (const PairComparison& pair : report.printed_pairs) add(pair, report.printed);
+  return shown;
+}
+
+std::string PoseText(const StiffnessReport& report) {
+  std::string text;
+  for (const PoseEntry& entry : report.pose) {
+    text += (text.empty() ? "" : ", ") +
+            fmt::format("{} = {:.6g} {}", entry.name, entry.value, entry.unit);
+  }
+  return text;
+}
+
 }  // namespace
 
 const StiffnessWitness* StiffnessReport::Shown() const {
-  for (const StiffnessWitness& witness : witnesses) {
-    if (witness.ran()) return &witness;
-  }
-  return nullptr;
+  const auto found = std::ranges::find_if(witnesses, &StiffnessWitness::ran);
+  return found == witnesses.end() ? nullptr : &*found;
 }
 
 const StiffnessWitness* StiffnessReport::WithShares() const {
-  for (const StiffnessWitness& witness : witnesses) {
-    if (!witness.result.shares.empty() && witness.result.C.allFinite()) return &witness;
-  }
-  return nullptr;
+  const auto found = std::ranges::find_if(witnesses, [](const StiffnessWitness& witness) {
+    return !witness.result.shares.empty() && witness.result.C.allFinite();
+  });
+  return found == witnesses.end() ? nullptr : &*found;
 }
 
 ResultView ViewOf(const StiffnessReport& report) {
-  const StiffnessComparison& comparison = report.comparison;
-  ResultView view = ViewOfComparison(report, comparison);
+  ResultView view = ViewOfComparison(report, report.comparison, Metric::kStiffnessEntry);
   view.kind = "stiffness";
-  view.caveats = comparison.caveats;
-  view.look = {
-      .signs = false, .capitals = false, .margins = false, .steps = false, .title_width = 32};
-  for (const StiffnessCheck& check : comparison.checks) {
-    view.checks.push_back({.name = check.name,
-                           .subject = check.subject,
-                           .title = RowOf(check.metric).title,
-                           .value = check.value,
-                           .limit = check.limit,
-                           .pass = check.pass,
-                           .where = check.where});
-  }
+  view.in_time = false;
   for (const StiffnessWitness& witness : report.witnesses) {
     view.witnesses.emplace_back(witness.name, witness.result.summary);
   }
-  if (const StiffnessPair* pair = comparison.MainPair()) {
-    view.main_pair = fmt::format("K {} vs {}", pair->measured, pair->truth);
-    view.main_check = pair->name() + ".stiffness_entry";
-  }
   return view;
 }
+
+// Tables as CSV.
+
+namespace {
+
+template <typename Vector>
+void AddDigits(const Vector& values, std::string* csv) {
+  for (const double value : values) fmt::format_to(std::back_inserter(*csv), ",{:.17g}", value);
+}
+
+}  // namespace
 
 std::string StiffnessCsv(const StiffnessReport& report) {
   std::string text = "witness,matrix,row,column,unit,value\n";
@@ -88,152 +113,69 @@ std::string StiffnessCsv(const StiffnessReport& report) {
 
 std::string LoadsCsv(const StiffnessReport& report) {
   std::string text = "load,mx_Nm,my_Nm,mz_Nm,fx_N,fy_N,fz_N";
-  auto out = std::back_inserter(text);
-  std::vector<const StiffnessWitness*> witnesses;
-  for (const StiffnessWitness* witness : AllOf(report)) {
-    if (witness->displacements.size() != report.loads.size() || report.loads.empty()) continue;
-    witnesses.push_back(witness);
+  std::vector<const StiffnessWitness*> witnesses = AllOf(report);
+  std::erase_if(witnesses, [&](const StiffnessWitness* witness) {
+    return report.loads.empty() || witness->displacements.size() != report.loads.size();
+  });
+  for (const StiffnessWitness* witness : witnesses) {
     for (int i = 0; i < 6; ++i) {
       text +=
           "," + CsvCell(fmt::format("{}_{}.{}", AxisName(i), i < 3 ? "rad" : "m", witness->name));
     }
   }
-  text += "\n";
   for (size_t k = 0; k < report.loads.size(); ++k) {
-    fmt::format_to(out, "{}", k + 1);
-    for (int i = 0; i < 6; ++i) fmt::format_to(out, ",{:.17g}", report.loads[k][i]);
-    for (const StiffnessWitness* witness : witnesses) {
-      for (int i = 0; i < 6; ++i) fmt::format_to(out, ",{:.17g}", witness->displacements[k][i]);
-    }
-    text += "\n";
+    text += fmt::format("\n{}", k + 1);
+    AddDigits(report.loads[k], &text);
+    for (const StiffnessWitness* witness : witnesses) AddDigits(witness->displacements[k], &text);
   }
-  return text;
+  return text + "\n";
 }
 
 std::string ContributionsCsv(const StiffnessReport& report) {
   std::string text = "witness,element,weakest_translation,weakest_rotation,rx,ry,rz,x,y,z\n";
-  auto out = std::back_inserter(text);
   for (const StiffnessWitness* witness : AllOf(report)) {
     for (const Contribution& row : Contributions(witness->result)) {
-      fmt::format_to(out, "{},{},{:.17g},{:.17g}", CsvCell(witness->name), CsvCell(row.element),
-                     row.translation, row.rotation);
-      for (int i = 0; i < 6; ++i) fmt::format_to(out, ",{:.17g}", row.axis[i]);
+      text += CsvCell(witness->name) + "," + CsvCell(row.element);
+      AddDigits(std::array{row.translation, row.rotation}, &text);
+      AddDigits(row.axis, &text);
       text += "\n";
     }
   }
   return text;
 }
 
-// The page of a stiffness run's report.html.
+// What page and terminal show.
 
 namespace {
 
-constexpr const char* kUnitsOfChecks =
-    "Entries are compared in units of √(K<sub>ii</sub> K<sub>jj</sub>), which does not depend on "
-    "the units of length and angle; displacements in units of the largest one along the axis, "
-    "vectors in units of their length.";
-
-class StiffnessPageWriter {
- public:
-  explicit StiffnessPageWriter(const StiffnessReport& report)
-      : report_(report), view_(ViewOf(report)) {}
-
-  std::string Write() {
-    page_.Add("Verdict", "Verdict", VerdictHtml(view_, Cards(), PoseText()));
-    page_.Add("Stiffness", "Stiffness", StiffnessMatricesHtml(report_));
-    page_.Add("Where it is weak", "Weakness", WeaknessHtml(report_));
-    page_.Add("What causes the compliance", "Elements", ContributionsHtml(report_));
-    page_.Add("Displacements under loads", "Loads", LoadsHtml(report_));
-    page_.Add("Checks", "Checks", ChecksHtml(view_, kUnitsOfChecks));
-    page_.Add("What could not be compared", "Gaps", GapsHtml(view_));
-    page_.Add("Parameters", "Parameters", ParametersHtml(report_.parameters, false));
-    page_.Add("Reproduce this run", "Reproduce", Reproduce());
-    PageHead head = HeadOf(view_);
-    head.kicker = "mbverify stiffness report";
-    head.footer =
-        "Written by mbverify; all digits are in stiffness.csv, loads.csv and summary.json.";
-    return page_.Write(head);
+std::string Vector(const Vec3& v) {
+  std::string text;
+  for (const double value : v) {
+    // No "-0.0000".
+    text +=
+        fmt::format("{}{:.4f}", text.empty() ? "(" : ", ", std::abs(value) < 5e-5 ? 0.0 : value);
   }
+  return text + ")";
+}
 
- private:
-  std::string PoseText() const {
-    std::string text = "Stiffness of " + Escape(report_.output) + " with all drives held, at ";
-    for (const PoseEntry& entry : report_.pose) {
-      text += fmt::format("{} = {:.6g} {}, ", Escape(entry.name), entry.value, entry.unit);
-    }
-    text.resize(text.size() - 2);
-    text += ".";
-    if (!report_.pose_note.empty()) text += " " + Escape(report_.pose_note) + ".";
-    return text;
+template <typename Values>
+void AddCells(const Values& values, const char* format, std::vector<Cell>* row) {
+  for (const double value : values) {
+    row->emplace_back(fmt::format(fmt::runtime(format), value));
   }
-
-  std::string Cards() const {
-    std::string html;
-    const auto entry = [&](const std::string& pair, const char* title) {
-      const StiffnessCheck* check = report_.comparison.FindCheck(pair + ".stiffness_entry");
-      if (check == nullptr) return;
-      html += Card(title, fmt::format("{:.1e}", check->value),
-                   Spaced(pair) + ", worst at " + check->where +
-                       (check->limit ? fmt::format(", limit {:.0e}", *check->limit) : ""));
-    };
-    entry(PairName(role::kSimulated, role::kAnalytic), "Stiffness difference");
-    entry(PairName(role::kReference, role::kAnalytic), "Stiffness difference");
-    if (const StiffnessWitness* shown = report_.Shown()) {
-      html += Card("Rank", std::to_string(shown->result.rank), "of K, 6 if the output is held");
-      if (shown->result.C.allFinite()) {
-        const WeakDirection weak = WeakestTranslation(shown->result.C);
-        html += Card("Weakest against a force", fmt::format("{:.4g} N/m", weak.stiffness),
-                     fmt::format("along ({:.2f}, {:.2f}, {:.2f})", weak.direction.x(),
-                                 weak.direction.y(), weak.direction.z()));
-      }
-    }
-    if (const StiffnessWitness* shared = report_.WithShares()) {
-      const Contribution first = Contributions(shared->result).front();
-      html += Card("Largest contributor", fmt::format("{:.1f} %", 100 * first.translation),
-                   first.element + ", in the weakest direction");
-    }
-    return html;
-  }
-
-  std::string Reproduce() const {
-    const Timing& timing = report_.timing;
-    const std::string times =
-        timing.stated ? fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
-                                    timing.analytic_s, timing.reference_s, timing.simulation_s)
-                      : "";
-    return ReproduceHtml(view_, report_.command, times,
-                         "Files beside this page: summary.json (every number), stiffness.csv, "
-                         "loads.csv and contributions.csv (17 digits), model.xml (the compliant "
-                         "MJCF as simulated).");
-  }
-
-  const StiffnessReport& report_;
-  const ResultView view_;
-  Page page_;
-};
-
-}  // namespace
-
-std::string ToHtml(const StiffnessReport& report) { return StiffnessPageWriter(report).Write(); }
-
-// Tables and figures of a stiffness page.
-
-namespace {
+}
 
 Table MatrixTable(const std::string& caption, const Mat6& M, bool stiffness) {
-  Table table{
-      .caption = caption,
-      .columns = {Text("")},
-  };
+  Table table{.caption = caption, .columns = {Text("")}};
   for (int j = 0; j < 6; ++j) {
     table.columns.push_back(Digits(stiffness ? AxisName(j) : kWrenchNames[j]));
   }
   table.columns.push_back(Text("units"));
+  const auto unit = stiffness ? &StiffnessUnit : &ComplianceUnit;
   for (int i = 0; i < 6; ++i) {
     std::vector<Cell> row = {stiffness ? kWrenchNames[i] : AxisName(i)};
-    for (int j = 0; j < 6; ++j) row.push_back(fmt::format("{:.6g}", M(i, j)));
-    const auto unit = stiffness ? &StiffnessUnit : &ComplianceUnit;
-    row.push_back(fmt::format("{} | {}", unit(i, 0), unit(i, 3)));
+    AddCells(M.row(i), "{:.6g}", &row);
+    row.emplace_back(fmt::format("{} | {}", unit(i, 0), unit(i, 3)));
     table.rows.push_back(std::move(row));
   }
   return table;
@@ -249,10 +191,7 @@ std::string DifferenceCell(double value) {
 }
 
 Table DifferenceTable(const std::string& caption, const Mat6& difference) {
-  Table table{
-      .caption = caption,
-      .columns = {Text("")},
-  };
+  Table table{.caption = caption, .columns = {Text("")}};
   for (int j = 0; j < 6; ++j) table.columns.push_back(Digits(AxisName(j)));
   for (int i = 0; i < 6; ++i) {
     std::vector<Cell> row = {AxisName(i)};
@@ -265,182 +204,81 @@ Table DifferenceTable(const std::string& caption, const Mat6& difference) {
   return table;
 }
 
-std::string PairHtml(const StiffnessPair& pair) {
-  if (!pair.compared) return "";
-  const std::string name = pair.measured + " − " + pair.truth;
-  std::string html =
-      ToHtml(DifferenceTable(name + ": ΔK_ij / √(K_ii K_jj), each entry", pair.K_difference));
-  if (pair.C_difference.allFinite()) {
-    html += ToHtml(DifferenceTable(name + ": ΔC_ij / √(C_ii C_jj)", pair.C_difference));
-  }
-  return html;
-}
-
-BarPlot BarsOf(const std::vector<Contribution>& rows) {
-  BarPlot plot{.title = "Compliance caused by each element",
-               .columns = {"against the weakest force", "against the weakest moment"},
-               .rows = {}};
-  for (const Contribution& row : rows) {
-    plot.rows.push_back({row.element, {row.translation, row.rotation}});
-  }
-  return plot;
-}
-
-// As the paper's Fig. 17: theory and simulation per load, one figure per direction.
-LinePlot LoadPlot(const StiffnessReport& report, const StiffnessPair& pair, int axis) {
-  LinePlot plot{.title = fmt::format("Displacement along {}", AxisName(axis)),
-                .x_label = "load",
-                .y_label = fmt::format("{} [mm]", AxisName(axis)),
-                .lines = {}};
-  const auto add = [&](const StiffnessWitness& witness, bool markers) {
-    PlotLine line{.label = witness.name, .points = {}, .markers = markers};
-    for (size_t k = 0; k < witness.displacements.size(); ++k) {
-      line.points.emplace_back(static_cast<double>(k + 1), 1e3 * witness.displacements[k][axis]);
-    }
-    plot.lines.push_back(std::move(line));
-  };
-  for (const StiffnessWitness& witness : report.witnesses) {
-    if (witness.name == pair.measured) add(witness, true);
-  }
-  for (const StiffnessWitness& witness : report.witnesses) {
-    if (witness.name == pair.truth) add(witness, false);
-  }
-  for (const StiffnessWitness& witness : report.printed) add(witness, false);
-  return plot;
-}
-
-LinePlot ErrorPlot(const StiffnessReport& report, const StiffnessPair& pair) {
-  LinePlot plot{.title = pair.measured + " against " + pair.truth + ": error per load",
-                .x_label = "load",
-                .y_label = "error, percent",
-                .log_y = true,
-                .lines = {}};
-  const std::vector<Vec6>* sides[2] = {nullptr, nullptr};
-  for (const StiffnessWitness& witness : report.witnesses) {
-    if (witness.name == pair.measured) sides[0] = &witness.displacements;
-    if (witness.name == pair.truth) sides[1] = &witness.displacements;
-  }
-  for (int axis = 3; axis < 6 && sides[0] != nullptr && sides[1] != nullptr; ++axis) {
-    PlotLine line{.label = fmt::format("{}, of the axis' largest", AxisName(axis)), .points = {}};
-    for (size_t k = 0; k < sides[0]->size(); ++k) {
-      const double error = std::abs((*sides[0])[k][axis] - (*sides[1])[k][axis]);
-      line.points.emplace_back(static_cast<double>(k + 1), 100 * error / pair.loads->scale[axis]);
-    }
-    plot.lines.push_back(std::move(line));
-  }
-  PlotLine vector{.label = "vector, of its length", .points = {}};
-  for (size_t k = 0; k < pair.loads->vector.size(); ++k) {
-    vector.points.emplace_back(static_cast<double>(k + 1), 100 * pair.loads->vector[k]);
-  }
-  plot.lines.push_back(std::move(vector));
-  return plot;
-}
-
-void AddStatistics(const StiffnessPair& pair, Table* table) {
-  if (!pair.loads) return;
-  const LoadErrors& e = *pair.loads;
-  for (const bool mean : {true, false}) {
-    const Vec6& axis = mean ? e.mean : e.max;
-    std::vector<Cell> row = {pair.measured + " against " + pair.truth, mean ? "mean" : "largest"};
-    for (int i : {3, 4, 5, 0, 1, 2}) row.push_back(fmt::format("{:.2e}", axis[i]));
-    row.push_back(fmt::format("{:.2e}", mean ? e.vector_mean : e.vector_max));
-    table->rows.push_back(std::move(row));
-  }
-}
-
-Table DisplacementTable(const StiffnessReport& report, const StiffnessPair& pair) {
-  Table table{
-      .caption = "Every load",
-      .columns = {Digits("load"), Digits("F [N]"), Digits("M [N m]")},
-  };
-  const std::vector<Vec6>* sides[2] = {nullptr, nullptr};
-  for (const StiffnessWitness& witness : report.witnesses) {
-    if (witness.name == pair.truth) sides[0] = &witness.displacements;
-    if (witness.name == pair.measured) sides[1] = &witness.displacements;
-  }
-  for (const std::string& name : {pair.truth, pair.measured}) {
-    table.columns.push_back(Digits(name + " x, y, z [mm]"));
-  }
-  table.columns.push_back(Digits("error of the vector"));
-  const auto triple = [](const Vec3& v, const char* format) {
-    return fmt::format(fmt::runtime(format), v.x(), v.y(), v.z());
-  };
-  for (size_t k = 0; k < report.loads.size(); ++k) {
-    const Vec6& load = report.loads[k];
-    std::vector<Cell> row = {std::to_string(k + 1),
-                             triple(load.tail<3>(), "{:.1f}, {:.1f}, {:.1f}"),
-                             triple(load.head<3>(), "{:.3g}, {:.3g}, {:.3g}")};
-    for (const std::vector<Vec6>* side : sides) {
-      const Vec3 shift = 1e3 * (*side)[k].tail<3>();
-      row.push_back(triple(shift, "{:.5f}, {:.5f}, {:.5f}"));
-    }
-    row.push_back(fmt::format("{:.1e}", pair.loads->vector[k]));
-    table.rows.push_back(std::move(row));
-  }
-  return table;
-}
-
-}  // namespace
-
-std::string StiffnessMatricesHtml(const StiffnessReport& report) {
+ReportSection MatrixSection(const StiffnessReport& report) {
+  ReportSection section{.title = "Stiffness", .link = "Stiffness"};
   const StiffnessWitness* shown = report.Shown();
-  if (shown == nullptr) return "";
-  std::string html = Note(fmt::format(
-      "Wrench [m; f] = K · [rotation; displacement] of {}'s origin ({:.4f}, {:.4f}, {:.4f}) m, "
-      "world axes, drives held by their servos.",
-      Escape(report.output), report.p_WO.x(), report.p_WO.y(), report.p_WO.z()));
-  for (const bool printed : {false, true}) {
-    for (const StiffnessWitness& witness : printed ? report.printed : report.witnesses) {
-      if (!witness.ran()) continue;
-      std::string tables = ToHtml(MatrixTable("K, " + witness.name, witness.result.K, true));
-      if (witness.result.C.allFinite()) {
-        tables += ToHtml(MatrixTable("C = K⁻¹, " + witness.name, witness.result.C, false));
-      }
-      html += &witness == shown ? tables : Folded("K and C, " + witness.name, tables);
+  if (shown == nullptr) return section;
+  section.Note(fmt::format("Wrench [m; f] = K · [rotation; displacement] of {}'s origin ({:.4f}, "
+                           "{:.4f}, {:.4f}) m, world axes, drives held by their servos.",
+                           report.output, report.p_WO.x(), report.p_WO.y(), report.p_WO.z()),
+               On::kAll);
+  for (const StiffnessWitness* witness : AllOf(report)) {
+    if (!witness->ran()) continue;
+    const bool named = witness->name == role::kAnalytic && !report.model.empty();
+    const std::string name = witness->name + (named ? ", " + report.model : "");
+    std::vector<Block> tables = {{MatrixTable(
+        fmt::format("K, {}, rank {}", name, witness->result.rank), witness->result.K, true)}};
+    if (witness->result.C.allFinite()) {
+      tables.push_back({MatrixTable("C = K⁻¹, " + name, witness->result.C, false)});
+    }
+    if (witness != shown) {
+      section.Add(Fold{"K and C, " + witness->name, std::move(tables)}, On::kPage);
+    } else {
+      section.blocks.insert(section.blocks.end(), tables.begin(), tables.end());
     }
   }
-  std::string differences;
-  for (const StiffnessPair& pair : report.comparison.pairs) differences += PairHtml(pair);
-  if (!differences.empty()) html += Folded("Differences, every entry", differences);
-  for (const StiffnessPair& pair : report.printed_pairs) {
-    if (!pair.compared) continue;
-    const WorstEntry& worst = pair.metrics.at(StiffnessMetric::kStiffnessEntry);
-    html += "<p>The paper's own model differs by up to " +
-            fmt::format("<b>{:.3g} %</b> of √(K<sub>ii</sub> K<sub>jj</sub>) at {}",
-                        100 * worst.value, Escape(worst.where)) +
-            "; this is stated, not judged.</p>\n" + Folded("The paper's own model", PairHtml(pair));
+  Fold differences{"Differences, every entry", {}};
+  for (const ShownPair& shown_pair : PairsOf(report)) {
+    const std::string pair = shown_pair.pair->measured + " − " + shown_pair.pair->truth;
+    const auto add = [&](const char* what, const Mat6& difference) {
+      if (difference.allFinite())
+        differences.blocks.push_back({DifferenceTable(pair + what, difference)});
+    };
+    add(": ΔK_ij / √(K_ii K_jj), each entry", shown_pair.difference.K);
+    add(": ΔC_ij / √(C_ii C_jj)", shown_pair.difference.C);
   }
-  return html;
+  section.Add(std::move(differences), On::kPage);
+  return section;
 }
 
-std::string WeaknessHtml(const StiffnessReport& report) {
-  std::string html;
+// Stated, never judged.
+ReportSection PrintedSection(const StiffnessReport& report) {
+  ReportSection section{.title = "The paper's own model", .link = "Printed"};
+  for (const PairComparison& pair : report.printed_pairs) {
+    if (!pair.compared) {
+      section.Add(Paragraph{"the paper's own model: " + pair.reason});
+      continue;
+    }
+    const Measured& K = pair.metrics.at(Metric::kStiffnessEntry);
+    section.Add(
+        Paragraph{fmt::format("The paper's own model differs from {} by {:.3g} % of K "
+                              "(worst: {}); this is stated, not judged.",
+                              pair.truth, 100 * K.value, K.channel)});
+  }
+  return section;
+}
+
+ReportSection WeaknessSection(const StiffnessReport& report) {
+  ReportSection section{.title = "Where it is weak", .link = "Weakness"};
   const StiffnessWitness* shown = report.Shown();
   if (shown != nullptr && shown->result.C.allFinite()) {
     const Mat6& C = shown->result.C;
     const WeakDirection shift = WeakestTranslation(C), turn = WeakestRotation(C);
     const WeakScrew screw = WeakestScrew(C);
-    const auto vector = [](const Vec3& v) {
-      return fmt::format("({:.4f}, {:.4f}, {:.4f})", v.x(), v.y(), v.z());
-    };
-    html += ToHtml(Table{
+    section.Add(Table{
         .caption = "Weakest directions, world axes",
         .columns = {Text("against"), Digits("stiffness"), Text("direction"), Text("note")},
         .rows = {
             {"a force", fmt::format("{:.5g} N/m", shift.stiffness),
-             "along " + vector(shift.direction)},
+             "along " + Vector(shift.direction)},
             {"a moment", fmt::format("{:.5g} N m/rad", turn.stiffness),
-             "about " + vector(turn.direction)},
-            {"a screw", fmt::format("{:.5g} N/m", screw.stiffness), "about " + vector(screw.axis),
-             fmt::format("pitch {:.4g} m/rad, through {} m from the origin; rotations times "
-                         "L = {:.4g} m",
-                         screw.pitch_m, vector(screw.point), screw.length_m)}}});
+             "about " + Vector(turn.direction)},
+            {"a screw", fmt::format("{:.5g} N/m", screw.stiffness), "about " + Vector(screw.axis),
+             fmt::format("pitch {:.4g} m/rad, through {} m from the origin; rotations "
+                         "times L = {:.4g} m",
+                         screw.pitch_m, Vector(screw.point), screw.length_m)}}});
   }
-  if (report.indices.empty()) return html;
-  Table table{
-      .caption = "Indices",
-      .columns = {Text("index")},
-  };
+  Table table{.caption = "Indices", .columns = {Text("index")}};
   for (const StiffnessWitness& witness : report.witnesses) {
     if (witness.ran()) table.columns.push_back(Digits(witness.name));
   }
@@ -449,134 +287,289 @@ std::string WeaknessHtml(const StiffnessReport& report) {
   for (const IndexRow& row : report.indices) {
     std::vector<Cell> cells = {row.name};
     for (size_t w = 0; w < row.values.size(); ++w) {
-      if (!report.witnesses[w].ran()) continue;
-      cells.push_back(fmt::format("{:.6g}", row.values[w]));
+      if (report.witnesses[w].ran()) cells.emplace_back(fmt::format("{:.6g}", row.values[w]));
     }
-    cells.push_back(row.unit);
-    cells.push_back(row.meaning);
+    cells.emplace_back(row.unit);
+    cells.emplace_back(row.meaning);
     table.rows.push_back(std::move(cells));
   }
-  return html + ToHtml(table);
+  section.Add(std::move(table));
+  return section;
 }
 
-std::string ContributionsHtml(const StiffnessReport& report) {
+ReportSection ElementSection(const StiffnessReport& report) {
+  ReportSection section{.title = "What causes the compliance", .link = "Elements"};
   const StiffnessWitness* witness = report.WithShares();
-  if (witness == nullptr) return "";
-  const std::vector<Contribution> rows = Contributions(witness->result);
-  Table table{
-      .caption = "Compliance caused by each element, percent (" + witness->name + ")",
-      .columns = {Text("element"), Digits("weakest force"), Digits("weakest moment")},
-  };
+  if (witness == nullptr) return section;
+  Table table{.caption = "Compliance caused by each element, percent (" + witness->name + ")",
+              .columns = {Text("element"), Digits("weakest force"), Digits("weakest moment")}};
   for (int i = 0; i < 6; ++i) table.columns.push_back(Digits(AxisName(i)));
-  for (const Contribution& row : rows) {
-    std::vector<Cell> cells = {row.element, fmt::format("{:.2f}", 100 * row.translation),
-                               fmt::format("{:.2f}", 100 * row.rotation)};
-    for (int i = 0; i < 6; ++i) cells.push_back(fmt::format("{:.2f}", 100 * row.axis[i]));
+  BarPlot bars{.title = "Compliance caused by each element",
+               .columns = {"against the weakest force", "against the weakest moment"},
+               .rows = {}};
+  for (const Contribution& row : Contributions(witness->result)) {
+    std::vector<Cell> cells = {row.element};
+    AddCells(std::array{100 * row.translation, 100 * row.rotation}, "{:.2f}", &cells);
+    AddCells(Vec6(100 * row.axis), "{:.2f}", &cells);
     table.rows.push_back(std::move(cells));
+    bars.rows.push_back({row.element, {row.translation, row.rotation}});
   }
-  return ToSvg(BarsOf(rows)) + ToHtml(table) +
-         Note(
-             "The column of an axis is the share of C<sub>ii</sub>: stiffening an element by a "
-             "factor takes that part of its share away.");
+  section.Add(Drawing{ToSvg(bars)});
+  section.Add(std::move(table));
+  section.Note(
+      "The column of an axis is the share of C_ii: stiffening an element by a factor takes that "
+      "part of its share away.");
+  return section;
 }
 
-std::string LoadsHtml(const StiffnessReport& report) {
-  if (report.loads.empty()) return "";
-  std::string html = Note(Escape(report.loads_text) + "; world axes, about the output's origin.");
-  Table table{
-      .caption = "Errors over all loads, in parts of the axis' largest displacement",
-      .columns = {Text("of"), Text("")},
+// As the paper's Fig. 17: theory and simulation per load, one figure per direction.
+LinePlot LoadPlot(const StiffnessReport& report, const ShownPair& pair, int axis) {
+  LinePlot plot{.title = fmt::format("Displacement along {}", AxisName(axis)),
+                .x_label = "load",
+                .y_label = fmt::format("{} [mm]", AxisName(axis)),
+                .lines = {}};
+  std::vector<const StiffnessWitness*> shown = {pair.measured, pair.truth};
+  for (const StiffnessWitness& witness : report.printed) shown.push_back(&witness);
+  for (const StiffnessWitness* witness : shown) {
+    PlotLine line{.label = witness->name, .points = {}, .markers = witness == pair.measured};
+    for (size_t k = 0; k < witness->displacements.size(); ++k) {
+      line.points.emplace_back(static_cast<double>(k + 1), 1e3 * witness->displacements[k][axis]);
+    }
+    plot.lines.push_back(std::move(line));
+  }
+  return plot;
+}
+
+LinePlot ErrorPlot(const ShownPair& pair) {
+  LinePlot plot{.title = pair.text() + ": error per load",
+                .x_label = "load",
+                .y_label = "error, percent",
+                .log_y = true,
+                .lines = {}};
+  const LoadErrors& errors = *pair.difference.loads;
+  const auto add = [&](const std::string& label, const auto& error) {
+    PlotLine line{.label = label, .points = {}};
+    for (size_t k = 0; k < errors.vector.size(); ++k) {
+      line.points.emplace_back(static_cast<double>(k + 1), 100 * error(k));
+    }
+    plot.lines.push_back(std::move(line));
   };
+  for (int axis = 3; axis < 6; ++axis) {
+    add(fmt::format("{}, of the axis' largest", AxisName(axis)), [&](size_t k) {
+      const double error =
+          pair.measured->displacements[k][axis] - pair.truth->displacements[k][axis];
+      return std::abs(error) / errors.scale[axis];
+    });
+  }
+  add("vector, of its length", [&](size_t k) { return errors.vector[k]; });
+  return plot;
+}
+
+Table DisplacementTable(const StiffnessReport& report, const ShownPair& pair) {
+  Table table{
+      .caption = "Every load",
+      .columns = {Digits("load"), Digits("F [N]"), Digits("M [N m]"),
+                  Digits(pair.truth->name + " x, y, z [mm]"),
+                  Digits(pair.measured->name + " x, y, z [mm]"), Digits("error of the vector")},
+  };
+  const auto triple = [](const Vec3& v, const char* format) {
+    return fmt::format(fmt::runtime(format), v.x(), v.y(), v.z());
+  };
+  constexpr const char* kMillimetres = "{:.5f}, {:.5f}, {:.5f}";
+  for (size_t k = 0; k < report.loads.size(); ++k) {
+    table.rows.push_back({std::to_string(k + 1),
+                          triple(report.loads[k].tail<3>(), "{:.1f}, {:.1f}, {:.1f}"),
+                          triple(report.loads[k].head<3>(), "{:.3g}, {:.3g}, {:.3g}"),
+                          triple(1e3 * pair.truth->displacements[k].tail<3>(), kMillimetres),
+                          triple(1e3 * pair.measured->displacements[k].tail<3>(), kMillimetres),
+                          fmt::format("{:.1e}", pair.difference.loads->vector[k])});
+  }
+  return table;
+}
+
+ReportSection LoadSection(const StiffnessReport& report) {
+  ReportSection section{.title = "Displacements under loads", .link = "Loads"};
+  if (report.loads.empty()) return section;
+  Table table{.caption = "Errors over all loads, in parts of the axis' largest displacement",
+              .columns = {Text("of"), Text("")}};
   for (const char* name : {"x", "y", "z", "rx", "ry", "rz", "vector"}) {
     table.columns.push_back(Digits(name));
   }
-  for (const StiffnessPair& pair : report.comparison.pairs) AddStatistics(pair, &table);
-  for (const StiffnessPair& pair : report.printed_pairs) AddStatistics(pair, &table);
-  if (!table.rows.empty()) html += ToHtml(table);
-  const StiffnessPair* main = report.comparison.MainPair();
-  if (main == nullptr || !main->loads) return html;
-  html += "<div class=\"pictures static-plots\">\n";
-  for (int axis = 3; axis < 6; ++axis) {
-    html += FigureHtml(ToSvg(LoadPlot(report, *main, axis)));
+  const std::vector<ShownPair> pairs = PairsOf(report);
+  const ShownPair* main = nullptr;
+  for (const ShownPair& pair : pairs) {
+    if (!pair.difference.loads) continue;
+    if (pair.pair == report.comparison.MainPair()) main = &pair;
+    const LoadErrors& e = *pair.difference.loads;
+    const auto add = [&](const char* what, const Vec6& axes, double vector) {
+      std::vector<Cell> row = {pair.text(), what};
+      AddCells(std::array{axes[3], axes[4], axes[5], axes[0], axes[1], axes[2], vector}, "{:.2e}",
+               &row);
+      table.rows.push_back(std::move(row));
+    };
+    add("mean", e.mean, e.vector_mean);
+    add("largest", e.max, e.vector_max);
   }
-  html += FigureHtml(ToSvg(ErrorPlot(report, *main))) + "</div>\n";
-  return html + Folded("Every load", ToHtml(DisplacementTable(report, *main)));
+  section.Note(report.loads_text + "; world axes, about the output's origin.", On::kAll);
+  section.Add(std::move(table));
+  if (main == nullptr) return section;
+  const Vec6& most = main->difference.loads->scale;
+  section.Note(
+      fmt::format("Largest displacements: {:.4g}, {:.4g}, {:.4g} mm along x, y, z; {:.4g}, "
+                  "{:.4g}, {:.4g} rad about them.",
+                  1e3 * most[3], 1e3 * most[4], 1e3 * most[5], most[0], most[1], most[2]),
+      On::kAll);
+  for (int axis = 3; axis < 6; ++axis) section.Add(Drawing{ToSvg(LoadPlot(report, *main, axis))});
+  section.Add(Drawing{ToSvg(ErrorPlot(*main))});
+  section.Add(Fold{"Every load", {{DisplacementTable(report, *main)}}}, On::kPage);
+  return section;
 }
+
+std::vector<ReportSection> SectionsOf(const StiffnessReport& report) {
+  return {MatrixSection(report), PrintedSection(report), WeaknessSection(report),
+          ElementSection(report), LoadSection(report)};
+}
+
+constexpr const char* kUnitsOfChecks =
+    "Entries are compared in units of √(K<sub>ii</sub> K<sub>jj</sub>), which does not depend on "
+    "the units of length and angle; displacements in units of the largest one along the axis, "
+    "vectors in units of their length.";
+
+std::string Cards(const StiffnessReport& report) {
+  std::string html;
+  for (const auto& [measured, truth] : {RolePair{&role::kSimulated, &role::kAnalytic},
+                                        RolePair{&role::kReference, &role::kAnalytic}}) {
+    const CheckResult* check =
+        report.comparison.FindCheck(*measured, *truth, Metric::kStiffnessEntry);
+    if (check == nullptr) continue;
+    html += Card("Stiffness difference", fmt::format("{:.1e}", check->value),
+                 Spaced(check->subject) + ", worst at " + check->channel +
+                     (check->limit ? fmt::format(", limit {:.0e}", *check->limit) : ""));
+  }
+  if (const StiffnessWitness* shown = report.Shown()) {
+    html += Card("Rank", std::to_string(shown->result.rank), "of K, 6 if the output is held");
+    if (shown->result.C.allFinite()) {
+      const WeakDirection weak = WeakestTranslation(shown->result.C);
+      html += Card("Weakest against a force", fmt::format("{:.4g} N/m", weak.stiffness),
+                   fmt::format("along ({:.2f}, {:.2f}, {:.2f})", weak.direction.x(),
+                               weak.direction.y(), weak.direction.z()));
+    }
+  }
+  if (const StiffnessWitness* shared = report.WithShares()) {
+    const Contribution first = Contributions(shared->result).front();
+    html += Card("Largest contributor", fmt::format("{:.1f} %", 100 * first.translation),
+                 first.element + ", in the weakest direction");
+  }
+  return html;
+}
+
+}  // namespace
+
+std::string ToHtml(const StiffnessReport& report) {
+  const ResultView view = ViewOf(report);
+  std::string about = Escape("Stiffness of " + report.output + " with all drives held, at " +
+                             PoseText(report) + ".");
+  if (!report.pose_note.empty()) about += " " + Escape(Sentence(report.pose_note));
+  Page page;
+  page.Add("Verdict", "Verdict", VerdictHtml(view, Cards(report), about));
+  for (const ReportSection& section : SectionsOf(report)) page.Add(section);
+  page.Add("Checks", "Checks", ChecksHtml(view, kUnitsOfChecks));
+  page.Add("What could not be compared", "Gaps", GapsHtml(view));
+  page.Add("Parameters", "Parameters", ParametersHtml(report.parameters, false));
+  const Timing& timing = report.timing;
+  const std::string times =
+      timing.stated ? fmt::format("analytic {:.3f} s, reference {:.3f} s, simulation {:.3f} s",
+                                  timing.analytic_s, timing.reference_s, timing.simulation_s)
+                    : "";
+  page.Add("Reproduce this run", "Reproduce",
+           ReproduceHtml(view, report.command, times,
+                         "Files beside this page: summary.json (every number), stiffness.csv, "
+                         "loads.csv and contributions.csv (17 digits), model.xml (the compliant "
+                         "MJCF as simulated)."));
+  PageHead head = HeadOf(view);
+  head.kicker = "mbverify stiffness report";
+  head.footer = "Written by mbverify; all digits are in stiffness.csv, loads.csv and summary.json.";
+  return page.Write(head);
+}
+
+std::string ToTable(const StiffnessReport& report, const TableOptions& options) {
+  const ResultView view = ViewOf(report);
+  TerminalText out(options);
+  out.Head(view, report.scenario.empty() ? report.mechanism + ", stiffness" : report.title(),
+           {fmt::format("{} at {}", report.output, PoseText(report)), report.pose_note});
+  out.Checks(view);
+  for (const ReportSection& section : SectionsOf(report)) out.Add(section);
+  if (out.verbose()) out.Gaps(view);
+  const Timing& timing = report.timing;
+  out.Times({{role::kAnalytic.called, timing.analytic_s},
+             {role::kReference.called, timing.reference_s},
+             {role::kSimulated.called, timing.simulation_s}},
+            timing.total_s);
+  return out.text();
+}
+
+// summary.json
 
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-template <typename Matrix>
-Json VectorJson(const Matrix& values) {
+template <typename Values>
+Json VectorJson(const Values& values) {
   Json json = Json::array();
-  for (Eigen::Index i = 0; i < values.size(); ++i) json.push_back(Number(values[i]));
+  for (const double value : values) json.push_back(Number(value));
   return json;
 }
 
 Json MatrixJson(const Mat6& M) {
   Json json = Json::array();
-  for (int i = 0; i < 6; ++i) json.push_back(VectorJson(Vec6(M.row(i))));
-  return json;
-}
-
-Json LoadErrorsJson(const LoadErrors& errors) {
-  return {{"axes", {"rx", "ry", "rz", "x", "y", "z"}}, {"largest", VectorJson(errors.scale)},
-          {"error_mean", VectorJson(errors.mean)},     {"error_max", VectorJson(errors.max)},
-          {"vector_mean", Number(errors.vector_mean)}, {"vector_max", Number(errors.vector_max)},
-          {"worst_load", errors.worst_load + 1}};
-}
-
-Json PairJson(const StiffnessPair& pair) {
-  Json json = Json::object();
-  for (const auto& [metric, worst] : pair.metrics) json[RowOf(metric).key] = Number(worst.value);
-  json["K_difference"] = MatrixJson(pair.K_difference);
-  json["C_difference"] = MatrixJson(pair.C_difference);
-  if (pair.loads) json["loads"] = LoadErrorsJson(*pair.loads);
+  for (int i = 0; i < 6; ++i) json.push_back(VectorJson(M.row(i)));
   return json;
 }
 
 Json MetricsJson(const StiffnessReport& report) {
   Json all = Json::object();
-  for (const StiffnessPair& pair : report.comparison.pairs) {
-    if (pair.compared) all[pair.name()] = PairJson(pair);
-  }
-  for (const StiffnessPair& pair : report.printed_pairs) {
-    if (pair.compared) all[pair.name()] = PairJson(pair);
+  for (const ShownPair& shown : PairsOf(report)) {
+    Json& json = all[shown.pair->name()];
+    for (const auto& [metric, worst] : shown.pair->metrics) {
+      json[RowOf(metric).json] = Number(worst.value);
+    }
+    json["K_difference"] = MatrixJson(shown.difference.K);
+    json["C_difference"] = MatrixJson(shown.difference.C);
+    if (!shown.difference.loads) continue;
+    const LoadErrors& errors = *shown.difference.loads;
+    json["loads"] = {
+        {"axes", {"rx", "ry", "rz", "x", "y", "z"}}, {"largest", VectorJson(errors.scale)},
+        {"error_mean", VectorJson(errors.mean)},     {"error_max", VectorJson(errors.max)},
+        {"vector_mean", Number(errors.vector_mean)}, {"vector_max", Number(errors.vector_max)},
+        {"worst_load", errors.worst_load + 1}};
   }
   return all;
 }
 
-Json ContributionsJson(const StiffnessResult& result) {
-  Json json = Json::array();
-  for (const Contribution& row : Contributions(result)) {
-    json.push_back({{"element", row.element},
-                    {"weakest_translation", Number(row.translation)},
-                    {"weakest_rotation", Number(row.rotation)},
-                    {"axes", VectorJson(row.axis)}});
-  }
-  return json;
-}
-
-Json WitnessJson(const StiffnessWitness& witness, const ResultView& view) {
-  const StiffnessResult& result = witness.result;
-  Json json = WitnessHead(witness.name, result.summary);
-  json["rank"] = result.rank;
-  json["K"] = MatrixJson(result.K);
-  json["C"] = MatrixJson(result.C);
-  AddBreakdown(view, result.summary, &json);
-  if (std::isfinite(witness.residual)) json["residual"] = witness.residual;
-  if (std::isfinite(witness.extrapolation_error)) {
-    json["extrapolation"] = witness.extrapolation_error;
-  }
-  json["contributions"] = ContributionsJson(result);
-  return json;
-}
-
 Json WitnessesJson(const std::vector<StiffnessWitness>& witnesses, const ResultView& view) {
-  Json json = Json::array();
-  for (const StiffnessWitness& witness : witnesses) json.push_back(WitnessJson(witness, view));
-  return json;
+  Json all = Json::array();
+  for (const StiffnessWitness& witness : witnesses) {
+    const StiffnessResult& result = witness.result;
+    Json json = WitnessHead(witness.name, result.summary);
+    json["rank"] = result.rank;
+    json["K"] = MatrixJson(result.K);
+    json["C"] = MatrixJson(result.C);
+    AddBreakdown(view, result.summary, &json);
+    if (std::isfinite(witness.residual)) json["residual"] = witness.residual;
+    if (std::isfinite(witness.extrapolation_error)) {
+      json["extrapolation"] = witness.extrapolation_error;
+    }
+    json["contributions"] = Json::array();
+    for (const Contribution& row : Contributions(result)) {
+      json["contributions"].push_back({{"element", row.element},
+                                       {"weakest_translation", Number(row.translation)},
+                                       {"weakest_rotation", Number(row.rotation)},
+                                       {"axes", VectorJson(row.axis)}});
+    }
+    all.push_back(std::move(json));
+  }
+  return all;
 }
 
 Json IndicesJson(const StiffnessReport& report) {
@@ -606,12 +599,6 @@ Json WeakestJson(const Mat6& C) {
             {"pitch_m", Number(screw.pitch_m)}}}};
 }
 
-Json PoseJson(const StiffnessReport& report) {
-  Json json = Json::object();
-  for (const PoseEntry& entry : report.pose) json[entry.name] = Number(entry.value);
-  return json;
-}
-
 }  // namespace
 
 std::string ToJson(const StiffnessReport& report) {
@@ -623,7 +610,8 @@ std::string ToJson(const StiffnessReport& report) {
   json["not_compared"] = NotComparedJson(view);
   json["counts"] = CountsJson(view);
   json["output"] = report.output;
-  json["pose"] = PoseJson(report);
+  json["pose"] = Json::object();
+  for (const PoseEntry& entry : report.pose) json["pose"][entry.name] = Number(entry.value);
   json["analytic_model"] = report.model;
   json["loads"] = report.loads_text;
   json["indices"] = IndicesJson(report);
@@ -632,175 +620,6 @@ std::string ToJson(const StiffnessReport& report) {
   json["findings"] = FindingsJson(report.findings);
   AddSummaryEnd(view, &json);
   return Dump(json);
-}
-
-// The result of a stiffness run for a terminal.
-
-namespace {
-
-std::string Vector(const Vec3& v, const char* format = "{:.4f}") {
-  std::string text;
-  for (int i = 0; i < 3; ++i) {
-    // No "-0.0000".
-    const double value = std::abs(v[i]) < 5e-5 ? 0.0 : v[i];
-    text += (i == 0 ? "(" : ", ") + fmt::format(fmt::runtime(format), value);
-  }
-  return text + ")";
-}
-
-std::string PoseText(const StiffnessReport& report) {
-  std::string text;
-  for (const PoseEntry& entry : report.pose) {
-    text += (text.empty() ? "" : ", ") +
-            fmt::format("{} = {:.6g} {}", entry.name, entry.value, entry.unit);
-  }
-  return text;
-}
-
-class StiffnessTableWriter {
- public:
-  explicit StiffnessTableWriter(const TableOptions& options) : out_(options) {}
-
-  std::string Write(const StiffnessReport& report) {
-    const ResultView view = ViewOf(report);
-    const std::string title =
-        report.scenario.empty() ? report.mechanism + ", stiffness" : report.title();
-    out_.Head(view, title,
-              {fmt::format("{} at {}", report.output, PoseText(report)), report.pose_note});
-    if (const StiffnessWitness* shown = report.Shown()) Matrix(report, *shown);
-    out_.Checks(view);
-    Indices(report);
-    if (const StiffnessWitness* shown = report.Shown()) Weakest(shown->result);
-    if (const StiffnessWitness* shared = report.WithShares()) Elements(*shared);
-    for (const StiffnessPair& pair : report.comparison.pairs) Loads(report, pair);
-    Printed(report);
-    if (out_.verbose()) out_.Gaps(view);
-    const Timing& timing = report.timing;
-    out_.Times({{role::kAnalytic.called, timing.analytic_s},
-                {role::kReference.called, timing.reference_s},
-                {role::kSimulated.called, timing.simulation_s}},
-               timing.total_s);
-    return out_.text();
-  }
-
- private:
-  void Matrix(const StiffnessReport& report, const StiffnessWitness& witness) {
-    out_.Line();
-    out_.Line(fmt::format(
-        "  K ({}{}), rank {}: [m; f] = K [rotation; displacement] of {}'s origin, "
-        "world axes, drives held",
-        witness.name,
-        witness.name == role::kAnalytic && !report.model.empty() ? ", " + report.model : "",
-        witness.result.rank, report.output));
-    Table table{.columns = {Text("")}};
-    for (int j = 0; j < 6; ++j) {
-      table.columns.push_back(Digits(std::string(AxisName(j)) + (j < 3 ? " [1/rad]" : " [1/m]")));
-    }
-    for (int i = 0; i < 6; ++i) {
-      std::vector<Cell>& row = table.rows.emplace_back();
-      row.emplace_back(std::string(kWrenchNames[i]) + (i < 3 ? " [N m]" : " [N]"));
-      for (int j = 0; j < 6; ++j) row.emplace_back(fmt::format("{:.6g}", witness.result.K(i, j)));
-    }
-    out_.Add(table);
-  }
-
-  void Indices(const StiffnessReport& report) {
-    if (report.indices.empty()) return;
-    Table table{.columns = {Text("index")}};
-    for (const StiffnessWitness& witness : report.witnesses) {
-      if (witness.ran()) table.columns.push_back(Digits(witness.name));
-    }
-    table.columns.push_back(Text("unit"));
-    table.columns.push_back(Text(""));
-    for (const IndexRow& row : report.indices) {
-      std::vector<Cell>& cells = table.rows.emplace_back();
-      cells.emplace_back(row.name);
-      for (size_t w = 0; w < row.values.size(); ++w) {
-        if (report.witnesses[w].ran()) cells.emplace_back(fmt::format("{:.6g}", row.values[w]));
-      }
-      cells.emplace_back(row.unit);
-      cells.emplace_back(row.meaning, Mark::kOff);
-    }
-    out_.Add(table);
-  }
-
-  void Weakest(const StiffnessResult& result) {
-    if (!result.C.allFinite()) return;
-    const WeakDirection shift = WeakestTranslation(result.C), turn = WeakestRotation(result.C);
-    const WeakScrew screw = WeakestScrew(result.C);
-    out_.Line();
-    out_.Line(fmt::format("  weakest against a force:  {:.5g} N/m along {}", shift.stiffness,
-                          Vector(shift.direction)));
-    out_.Line(fmt::format("  weakest against a moment: {:.5g} N m/rad about {}", turn.stiffness,
-                          Vector(turn.direction)));
-    out_.Line(
-        fmt::format("  weakest screw: {:.5g} N/m with rotations times L = {:.4g} m: about {} "
-                    "through {} m from the origin,",
-                    screw.stiffness, screw.length_m, Vector(screw.axis), Vector(screw.point)));
-    out_.Line(fmt::format("    pitch {:.4g} m/rad", screw.pitch_m));
-  }
-
-  void Elements(const StiffnessWitness& witness) {
-    const std::vector<Contribution> rows = Contributions(witness.result);
-    out_.Line();
-    out_.Line(fmt::format("  compliance caused by each element, percent ({})", witness.name));
-    Table table{.columns = {Text("element"), Digits("weakest force"), Digits("weakest moment")}};
-    for (int i = 0; i < 6; ++i) table.columns.push_back(Digits(AxisName(i)));
-    const auto percent = [](double share) { return fmt::format("{:.2f}", 100 * share); };
-    for (const Contribution& row : rows) {
-      std::vector<Cell>& cells = table.rows.emplace_back();
-      cells = {row.element, percent(row.translation), percent(row.rotation)};
-      for (int i = 0; i < 6; ++i) cells.emplace_back(percent(row.axis[i]));
-    }
-    out_.Add(table);
-  }
-
-  void Loads(const StiffnessReport& report, const StiffnessPair& pair) {
-    if (!pair.loads) return;
-    const LoadErrors& e = *pair.loads;
-    out_.Line();
-    out_.Line(
-        fmt::format("  {} against {} under {}", pair.measured, pair.truth, report.loads_text));
-    Table table{.columns = {Text(""), Digits("x"), Digits("y"), Digits("z"), Digits("vector")}};
-    std::vector<Cell> largest = {"largest displacement [mm]"};
-    for (int i = 3; i < 6; ++i) largest.emplace_back(fmt::format("{:.4g}", 1e3 * e.scale[i]));
-    table.rows.push_back(std::move(largest));
-    const auto add = [&](const char* title, const Vec6& axes, double vector) {
-      std::vector<Cell>& cells = table.rows.emplace_back();
-      cells.emplace_back(title);
-      for (const double value : {axes[3], axes[4], axes[5], vector}) {
-        cells.emplace_back(fmt::format("{:.2e}", value));
-      }
-    };
-    add("error, mean", e.mean, e.vector_mean);
-    add("error, largest", e.max, e.vector_max);
-    out_.Add(table);
-  }
-
-  // Stated, never judged.
-  void Printed(const StiffnessReport& report) {
-    for (const StiffnessPair& pair : report.printed_pairs) {
-      out_.Line();
-      if (!pair.compared) {
-        out_.Line("  the paper's own model: " + pair.reason);
-        continue;
-      }
-      const WorstEntry& K = pair.metrics.at(StiffnessMetric::kStiffnessEntry);
-      out_.Line(
-          fmt::format("  the paper's own model differs from {} by {:.3g} % of K (worst: {}); not "
-                      "judged",
-                      pair.truth, 100 * K.value, K.where));
-      Loads(report, pair);
-    }
-  }
-
-  TerminalText out_;
-};
-
-}  // namespace
-
-std::string ToTable(const StiffnessReport& report, const TableOptions& options) {
-  return StiffnessTableWriter(options).Write(report);
 }
 
 }  // namespace mbv

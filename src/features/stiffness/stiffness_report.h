@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "features/stiffness/stiffness_comparison.h"
+#include "comparison/compare_stiffness.h"
 #include "mechanism/mechanism.h"
 #include "report/result.h"
 
@@ -28,16 +28,15 @@ struct StiffnessReport : ResultFrame {
   std::string pose_note;                    ///< where the pose comes from, if not from the scenario
   std::string model;                        ///< the closed form's formulation; "" without one
   Vec3 p_WO = Vec3::Constant(kNan);         ///< the output's origin in the world [m]
-  std::vector<StiffnessWitness> witnesses;  ///< analytic, reference, simulated
+  std::vector<StiffnessWitness> witnesses;  ///< in the order in which they are shown
   std::vector<StiffnessWitness> printed;    ///< the paper's own model, or none
-  std::vector<StiffnessPair> printed_pairs;  ///< it against the corrected one
+  std::vector<PairComparison> printed_pairs;  ///< it against the corrected one
   std::vector<IndexRow> indices;
   std::vector<Vec6> loads;
   std::string loads_text;
-  StiffnessComparison comparison;
+  Comparison comparison;
   std::vector<Parameter> parameters;
-  std::vector<std::string> arguments;  ///< of the command line, after the scenario file
-  std::string command;                 ///< "mbverify run FILE …"
+  std::string command;  ///< "mbverify run FILE …"
 
   /// The witness whose numbers are shown: the closed form, else the first that ran; null if none.
   [[nodiscard]] const StiffnessWitness* Shown() const;
@@ -62,11 +61,5 @@ struct StiffnessReport : ResultFrame {
 
 /// report.html: one page that needs no other file and no script.
 [[nodiscard]] std::string ToHtml(const StiffnessReport& report);
-
-/// The tables of the page.
-[[nodiscard]] std::string StiffnessMatricesHtml(const StiffnessReport& report);
-[[nodiscard]] std::string WeaknessHtml(const StiffnessReport& report);
-[[nodiscard]] std::string ContributionsHtml(const StiffnessReport& report);
-[[nodiscard]] std::string LoadsHtml(const StiffnessReport& report);
 
 }  // namespace mbv

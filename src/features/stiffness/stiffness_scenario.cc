@@ -32,216 +32,14 @@ std::vector<Vec6> DrawLoads(const RandomLoads& loads) {
   return wrenches;
 }
 
-namespace {
-
-// Two linear computations differ by rounding only. The simulated stiffness is extrapolated to zero
-// load; its finite displacements also contain the geometric non-linearity of the load itself.
-constexpr StiffnessMetricRow kStiffnessRows[] = {
-    {StiffnessMetric::kStiffnessEntry,
-     "stiffness_entry",
-     "stiffness, worst entry",
-     true,
-     {1e-4, 1e-9}},
-    {StiffnessMetric::kComplianceEntry,
-     "compliance_entry",
-     "compliance, worst entry",
-     true,
-     {1e-4, 1e-9}},
-    {StiffnessMetric::kShareEntry,
-     "share_entry",
-     "elements' shares, worst entry",
-     true,
-     {1e-4, 1e-9}},
-    {StiffnessMetric::kDisplacementAxis,
-     "displacement_axis",
-     "displacement, worst axis",
-     true,
-     {1e-2, 1e-9}},
-    {StiffnessMetric::kDisplacementVector,
-     "displacement_vector",
-     "displacement, worst vector",
-     true,
-     {1e-2, 1e-9}},
-    {StiffnessMetric::kRotationAxis, "rotation_axis", "rotation, worst axis", true, {1e-2, 1e-9}},
-    {StiffnessMetric::kSymmetry, "symmetry", "symmetry", false, {1e-6, 1e-9}},
-    {StiffnessMetric::kDefinite, "definite", "no negative stiffness", false, {1e-6, 1e-9}},
-    {StiffnessMetric::kSharesSum, "shares_sum", "shares add up", false, {1e-6, 1e-9}},
-    {StiffnessMetric::kResidual, "residual", "equilibrium, unbalanced force", false, {1e-8, 1e-8}},
-    {StiffnessMetric::kExtrapolation,
-     "extrapolation",
-     "extrapolation to zero load",
-     false,
-     {1e-5, 1e-5}},
-};
-static_assert(std::size(kStiffnessRows) == kStiffnessMetrics);
-
-}  // namespace
-
-std::span<const StiffnessMetricRow> StiffnessMetricRows() { return kStiffnessRows; }
-
-const StiffnessMetricRow& RowOf(StiffnessMetric metric) {
-  const StiffnessMetricRow& row = kStiffnessRows[static_cast<int>(metric)];
-  MBV_DEMAND(row.metric == metric, row.key);
-  return row;
-}
-
-const StiffnessMetricRow* FindStiffnessMetric(const std::string& key) {
-  for (const StiffnessMetricRow& row : kStiffnessRows) {
-    if (key == row.key) return &row;
-  }
-  return nullptr;
-}
-
-StiffnessLimits::StiffnessLimits() {
-  for (const StiffnessMetricRow& row : kStiffnessRows) (*this)[row.metric] = row.limit;
+std::string TextOf(const RandomLoads& loads) {
+  return fmt::format("{} random wrenches, seed {}: forces 0 … {:g} N, moments 0 … {:g} N m",
+                     loads.count, loads.seed, loads.force_max, loads.moment_max);
 }
 
 namespace {
 
 namespace fs = std::filesystem;
-
-const std::vector<std::string> kStiffnessScenarioKeys = {
-    "kind",      "mechanism",  "description", "parameters",      "pose",   "output", "analytic",
-    "reference", "simulation", "loads",       "compare_printed", "checks", "expect"};
-
-class StiffnessLoader final
-    : public internal::ScenarioFile<StiffnessScenario, StiffnessScenarioResult> {
- public:
-  using ScenarioFile::ScenarioFile;
-
- private:
-  void Read(const YamlNode& root) override {
-    YamlMap map(&yaml_, &root, "", kStiffnessScenarioKeys);
-    scenario_.file = file_;
-    if (const YamlNode* kind = map.Required("kind")) {
-      (void)yaml_.Choice(*kind, "kind", {"stiffness"});
-    }
-    ReadDescription(map);
-    if (const YamlNode* parameters = map.Find("parameters")) {
-      scenario_.parameters = ReadOverrides(&values_, parameters, "parameters");
-      scenario_.parameter_places = PlacesOf(*parameters, file_, options_.set);
-    }
-    if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
-    ReadSettings(map);
-    if (!mechanism_) return;
-    UseSiOverrides();
-    if (const YamlNode* pose = map.Find("pose")) ReadPose(*pose);
-    if (const YamlNode* output = map.Find("output")) ReadOutput(*output);
-    if (mechanism_) CheckWitnessParameters(map);
-    if (!scenario_.analytic.on && !scenario_.reference.on && !scenario_.simulation.on) {
-      yaml_.Error(root, "analytic, reference and simulation are all off");
-    }
-  }
-
-  void LoadMechanism(const YamlNode& node) {
-    const auto name = yaml_.Text(node, "mechanism");
-    if (!name) return;
-    const auto found = FindElasticModel(*name, fs::path(file_).parent_path().string());
-    if (const Finding* none = std::get_if<Finding>(&found)) {
-      yaml_.Error(node, fmt::format("mechanism = '{}': {}", *name, none->message), none->hint);
-      return;
-    }
-    scenario_.model_file = std::get<std::string>(found);
-    LoadWith(scenario_.parameters);
-    if (!mechanism_) return;
-    NameTheCase();
-    if (mechanism_->beams.empty() && !HasServos()) {
-      yaml_.Error(node, fmt::format("mechanism: {} is rigid: it has no beams and no drive with a "
-                                    "stiffness",
-                                    scenario_.model_file));
-    }
-  }
-
-  void LoadWith(const Overrides& overrides) {
-    LoadOptions options;
-    options.overrides = overrides;
-    options.override_places = scenario_.parameter_places;
-    LoadModelWith(options);
-  }
-
-  bool HasServos() const {
-    return std::any_of(mechanism_->drives.begin(), mechanism_->drives.end(),
-                       [](const Drive& drive) { return std::isfinite(drive.stiffness); });
-  }
-
-  void ReadSettings(const YamlMap& map) {
-    scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
-    if (!scenario_.analytic.as_printed.empty()) {
-      yaml_.Error(*map.Find("analytic"), "analytic.as_printed: stiffness models have no errata",
-                  "analytic: {model: as_printed} takes the whole of the paper's own model");
-    }
-    scenario_.reference = ReadStiffnessReference(&values_, map.Find("reference"));
-    scenario_.simulation = ReadStiffnessSimulation(&values_, map.Find("simulation"));
-    scenario_.loads = ReadStiffnessLoads(&values_, map.Find("loads"), &scenario_.loads_text);
-    scenario_.checks = ReadStiffnessChecks(&values_, map.Find("checks"));
-    scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
-    if (const YamlNode* printed = map.Find("compare_printed")) {
-      scenario_.compare_printed = yaml_.Flag(*printed, "compare_printed").value_or(false);
-    }
-  }
-
-  // Coordinates of the pose, and parameters of the model that belong to it.
-  void ReadPose(const YamlNode& node) {
-    if (node.is_scalar() && node.text == "home") return;
-    const std::vector<std::string> coordinates = CoordinateNames(*mechanism_);
-    Overrides parameters;
-    for (const YamlEntry& entry : yaml_.Entries(node, "pose")) {
-      const auto [name, unit] = SplitUnit(entry.key);
-      const auto number = values_.Number(*entry.value, JoinPath("pose", entry.key));
-      const bool coordinate = Contains(coordinates, name);
-      const bool parameter = mechanism_->HasParameter(name);
-      if (!coordinate && !parameter) {
-        UnknownName(entry, name, coordinates);
-        continue;
-      }
-      if (scenario_.pose.contains(name) || parameters.contains(name)) {
-        yaml_.Error(entry, fmt::format("pose: {} is given twice", name));
-      }
-      if (!number) continue;
-      if (coordinate) scenario_.pose[name] = unit.to_si(*number);
-      if (parameter) parameters[name] = unit.to_si(*number);
-      if (parameter)
-        scenario_.parameter_places[name] = PlacesOf(node, file_, options_.set)[entry.key];
-    }
-    if (!parameters.empty()) {
-      scenario_.parameters = Merge(scenario_.parameters, parameters);
-      LoadWith(scenario_.parameters);
-    }
-    if (!mechanism_ || yaml_.has_errors() || scenario_.pose.empty()) return;
-    const auto fault = CheckPose(*mechanism_, scenario_.pose);
-    if (fault) yaml_.Error(node, fault->message, fault->hint);
-  }
-
-  void UnknownName(const YamlEntry& entry, const std::string& name,
-                   std::vector<std::string> known) {
-    for (const Parameter& p : mechanism_->parameters) known.push_back(p.name);
-    yaml_.Error(entry,
-                fmt::format("pose: {} has no coordinate or parameter '{}'", mechanism_->name, name),
-                DidYouMean(name, known,
-                           "known: drives, OUTPUT.x … OUTPUT.yaw, and the model's parameters"));
-  }
-
-  void ReadOutput(const YamlNode& node) {
-    std::vector<std::string> names;
-    for (const Output& output : mechanism_->outputs) names.push_back(output.name);
-    const auto choice = yaml_.Choice(node, "output", names);
-    if (choice) scenario_.output = names[static_cast<size_t>(*choice)];
-  }
-};
-
-}  // namespace
-
-StiffnessScenarioResult LoadStiffnessScenario(const std::string& file,
-                                              const ScenarioOptions& options) {
-  return StiffnessLoader(file, options).LoadFile();
-}
-
-StiffnessScenarioResult LoadStiffnessScenarioText(const std::string& text, const std::string& file,
-                                                  const ScenarioOptions& options) {
-  return StiffnessLoader(file, options).Load(text);
-}
-
-namespace {
 
 constexpr int kMostLoads = 10000;
 
@@ -302,57 +100,8 @@ Vec6 ReadWrench(ValueReader* values, const YamlNode& node, const std::string& pa
   return wrench;
 }
 
-void ReadCheck(ValueReader* values, const YamlEntry& entry, StiffnessLimits* limits) {
-  const bool reference = entry.key.starts_with(kReferencePrefix);
-  const StiffnessMetricRow* row =
-      FindStiffnessMetric(reference ? entry.key.substr(kReferencePrefix.size()) : entry.key);
-  if (row == nullptr) return;  // reported as unknown key
-  std::optional<double> limit;
-  if (!entry.value->is_null() && AsSwitch(*entry.value) != false) {
-    limit = values->Positive(*entry.value, "checks." + entry.key);
-    if (!limit) return;
-  }
-  StiffnessLimit& target = (*limits)[row->metric];
-  (reference ? target.computed : target.simulated) = limit;
-}
-
-}  // namespace
-
-ReferenceSettings ReadStiffnessReference(ValueReader* values, const YamlNode* node) {
-  ReferenceSettings settings;
-  if (node == nullptr || node->is_null()) return settings;
-  if (const auto on = AsSwitch(*node)) {
-    settings.on = *on;
-    return settings;
-  }
-  YamlMap map(&values->yaml(), node, "reference", {"parameters"});
-  settings.parameters = ReadOverrides(values, map.Find("parameters"), "reference.parameters");
-  return settings;
-}
-
-StiffnessSimulation ReadStiffnessSimulation(ValueReader* values, const YamlNode* node) {
-  StiffnessSimulation settings;
-  if (node == nullptr || node->is_null()) return settings;
-  if (const auto on = AsSwitch(*node)) {
-    settings.on = *on;
-    return settings;
-  }
-  YamlMap map(&values->yaml(), node, "simulation", {"parameters", "force_N", "moment_Nm", "mode"});
-  if (const YamlNode* mode = map.Find("mode")) {
-    values->yaml().Warn(*mode, "simulation.mode has no meaning here: stiffness is static");
-  }
-  settings.parameters = ReadOverrides(values, map.Find("parameters"), "simulation.parameters");
-  if (const YamlNode* force = map.Find("force_N")) {
-    settings.force_N = values->Positive(*force, "simulation.force_N").value_or(settings.force_N);
-  }
-  if (const YamlNode* moment = map.Find("moment_Nm")) {
-    settings.moment_Nm =
-        values->Positive(*moment, "simulation.moment_Nm").value_or(settings.moment_Nm);
-  }
-  return settings;
-}
-
-std::vector<Vec6> ReadStiffnessLoads(ValueReader* values, const YamlNode* node, std::string* text) {
+// The wrenches of `loads:` and where they come from.
+std::vector<Vec6> ReadLoads(ValueReader* values, const YamlNode* node, std::string* text) {
   if (node == nullptr || node->is_null() || AsSwitch(*node) == false) return {};
   YamlReader& yaml = values->yaml();
   std::vector<Vec6> loads;
@@ -367,22 +116,141 @@ std::vector<Vec6> ReadStiffnessLoads(ValueReader* values, const YamlNode* node, 
   const YamlNode* random_node = map.Required("random");
   if (random_node == nullptr) return {};
   const RandomLoads random = ReadRandom(values, *random_node);
-  *text = fmt::format("{} random wrenches, seed {}: forces 0 … {:g} N, moments 0 … {:g} N m",
-                      random.count, random.seed, random.force_max, random.moment_max);
+  *text = TextOf(random);
   return DrawLoads(random);
 }
 
-StiffnessLimits ReadStiffnessChecks(ValueReader* values, const YamlNode* node) {
-  StiffnessLimits limits;
-  std::vector<std::string> keys;
-  for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
-    keys.emplace_back(row.key);
-    keys.push_back(std::string(kReferencePrefix) + row.key);
+const std::vector<std::string> kStiffnessScenarioKeys = {
+    "kind",      "mechanism",  "description", "parameters",      "pose",   "output", "analytic",
+    "reference", "simulation", "loads",       "compare_printed", "checks", "expect"};
+
+class StiffnessLoader final
+    : public internal::ScenarioFile<StiffnessScenario, StiffnessScenarioResult> {
+ public:
+  using ScenarioFile::ScenarioFile;
+
+ private:
+  void Read(const YamlNode& root) override {
+    YamlMap map(&yaml_, &root, "", kStiffnessScenarioKeys);
+    scenario_.file = file_;
+    if (const YamlNode* kind = map.Required("kind")) {
+      (void)yaml_.Choice(*kind, "kind", {"stiffness"});
+    }
+    ReadDescription(map);
+    ReadParameters(map.Find("parameters"));
+    if (const YamlNode* mechanism = map.Required("mechanism")) LoadMechanism(*mechanism);
+    ReadSettings(map);
+    if (!mechanism_) return;
+    UseSiOverrides();
+    if (const YamlNode* pose = map.Find("pose")) ReadPose(*pose);
+    if (const YamlNode* output = map.Find("output")) ReadOutput(*output);
+    if (mechanism_) CheckWitnessParameters(map);
+    if (!scenario_.analytic.on && !scenario_.reference.on && !scenario_.simulation.on) {
+      yaml_.Error(root, "analytic, reference and simulation are all off");
+    }
   }
-  YamlMap map(&values->yaml(), node, "checks", keys);
-  if (!map.valid() || node == nullptr) return limits;
-  for (const YamlEntry& entry : node->entries) ReadCheck(values, entry, &limits);
-  return limits;
+
+  void LoadMechanism(const YamlNode& node) {
+    const auto name = yaml_.Text(node, "mechanism");
+    if (!name) return;
+    const auto found = FindElasticModel(*name, fs::path(file_).parent_path().string());
+    if (const Finding* none = std::get_if<Finding>(&found)) {
+      yaml_.Error(node, fmt::format("mechanism = '{}': {}", *name, none->message), none->hint);
+      return;
+    }
+    scenario_.model_file = std::get<std::string>(found);
+    LoadWith(scenario_.parameters);
+    if (!mechanism_) return;
+    NameTheCase();
+    const auto rigid = CheckElastic(*mechanism_, scenario_.model_file);
+    if (rigid) yaml_.Error(node, "mechanism: " + rigid->message);
+  }
+
+  void LoadWith(const Overrides& overrides) {
+    LoadOptions options;
+    options.overrides = overrides;
+    options.override_places = scenario_.parameter_places;
+    LoadModelWith(options);
+  }
+
+  void ReadSettings(const YamlMap& map) {
+    scenario_.analytic = ReadAnalytic(&values_, map.Find("analytic"));
+    if (!scenario_.analytic.as_printed.empty()) {
+      yaml_.Error(*map.Find("analytic"), "analytic.as_printed: stiffness models have no errata",
+                  "analytic: {model: as_printed} takes the whole of the paper's own model");
+    }
+    const YamlNode* reference = map.Find("reference");
+    scenario_.reference = ReadReference(&values_, reference);
+    if (reference != nullptr && reference->is_map() && reference->Find("csv") != nullptr) {
+      yaml_.Error(*reference, "reference.csv: no table replaces the frame elements");
+    }
+    if (const YamlNode* simulation = map.Find("simulation")) ReadSimulation(*simulation);
+    scenario_.loads = ReadLoads(&values_, map.Find("loads"), &scenario_.loads_text);
+    scenario_.checks = ReadStiffnessChecks(&values_, map.Find("checks"));
+    scenario_.expect = ReadExpectation(&values_, map.Find("expect"));
+    if (const YamlNode* printed = map.Find("compare_printed")) {
+      scenario_.compare_printed = yaml_.Flag(*printed, "compare_printed").value_or(false);
+    }
+  }
+
+  void ReadSimulation(const YamlNode& node) {
+    if (node.is_null()) return;
+    SimulationSettings& settings = scenario_.simulation;
+    if (const auto on = AsSwitch(node)) {
+      settings.on = *on;
+      return;
+    }
+    YamlMap map(&yaml_, &node, "simulation", {"parameters", "force_N", "moment_Nm", "mode"});
+    if (const YamlNode* mode = map.Find("mode")) {
+      yaml_.Warn(*mode, "simulation.mode has no meaning here: stiffness is static");
+    }
+    settings.parameters = ReadOverrides(&values_, map.Find("parameters"), "simulation.parameters");
+    for (const auto& [key, load] :
+         {std::pair{"force_N", &scenario_.force_N}, {"moment_Nm", &scenario_.moment_Nm}}) {
+      const YamlNode* number = map.Find(key);
+      if (number != nullptr) *load = values_.Positive(*number, map.PathOf(key)).value_or(*load);
+    }
+  }
+
+  // Coordinates of the pose, and parameters of the model that belong to it.
+  void ReadPose(const YamlNode& node) {
+    if (node.is_scalar() && node.text == "home") return;
+    auto places = PlacesOf(node, file_, options_.set);
+    Overrides parameters;
+    for (const YamlEntry& entry : yaml_.Entries(node, "pose")) {
+      const auto number = values_.Number(*entry.value, JoinPath("pose", entry.key));
+      const auto fault = PutIntoPose(*mechanism_, entry.key, number, &scenario_.pose, &parameters);
+      if (fault) yaml_.Error(entry, "pose: " + fault->message, fault->hint);
+      const std::string name = SplitUnit(entry.key).name;
+      if (parameters.contains(name)) scenario_.parameter_places[name] = places[entry.key];
+    }
+    if (!parameters.empty()) {
+      scenario_.parameters = Merge(scenario_.parameters, parameters);
+      LoadWith(scenario_.parameters);
+    }
+    if (!mechanism_ || yaml_.has_errors() || scenario_.pose.empty()) return;
+    const auto fault = CheckPose(*mechanism_, scenario_.pose);
+    if (fault) yaml_.Error(node, fault->message, fault->hint);
+  }
+
+  void ReadOutput(const YamlNode& node) {
+    std::vector<std::string> names;
+    for (const Output& output : mechanism_->outputs) names.push_back(output.name);
+    const auto choice = yaml_.Choice(node, "output", names);
+    if (choice) scenario_.output = names[static_cast<size_t>(*choice)];
+  }
+};
+
+}  // namespace
+
+StiffnessScenarioResult LoadStiffnessScenario(const std::string& file,
+                                              const ScenarioOptions& options) {
+  return StiffnessLoader(file, options).LoadFile();
+}
+
+StiffnessScenarioResult LoadStiffnessScenarioText(const std::string& text, const std::string& file,
+                                                  const ScenarioOptions& options) {
+  return StiffnessLoader(file, options).Load(text);
 }
 
 // Poses and models of stiffness scenarios.
@@ -450,6 +318,35 @@ PoseValues HomePose(const Mechanism& mechanism) {
     pose[mechanism.prescribed[i].name] = HomeValue(mechanism, joint);
   }
   return pose;
+}
+
+std::optional<Finding> PutIntoPose(const Mechanism& mechanism, const std::string& key,
+                                   std::optional<double> number, PoseValues* pose,
+                                   Overrides* parameters) {
+  const auto [name, unit] = SplitUnit(key);
+  std::vector<std::string> known = CoordinateNames(mechanism);
+  const bool coordinate = Contains(known, name), parameter = mechanism.HasParameter(name);
+  if (!coordinate && !parameter) {
+    for (const Parameter& p : mechanism.parameters) known.push_back(p.name);
+    return Finding{
+        .message = fmt::format("{} has no coordinate or parameter '{}'", mechanism.name, name),
+        .hint = DidYouMean(name, known,
+                           "known: drives, OUTPUT.x … OUTPUT.yaw, and the model's parameters")};
+  }
+  if (pose->contains(name) || parameters->contains(name)) {
+    return Finding{.message = name + " is given twice"};
+  }
+  if (number && coordinate) (*pose)[name] = unit.to_si(*number);
+  if (number && parameter) (*parameters)[name] = unit.to_si(*number);
+  return {};
+}
+
+std::optional<Finding> CheckElastic(const Mechanism& mechanism, const std::string& model_file) {
+  const bool servos = std::ranges::any_of(
+      mechanism.drives, [](const Drive& drive) { return std::isfinite(drive.stiffness); });
+  if (servos || !mechanism.beams.empty()) return {};
+  return Finding{.message =
+                     model_file + " is rigid: it has no beams and no drive with a stiffness"};
 }
 
 std::optional<Finding> CheckPose(const Mechanism& mechanism, const PoseValues& pose) {

@@ -2,11 +2,9 @@
 // data. A scenario file with `kind: stiffness`; see docs/explanation/stiffness.md.
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <span>
 #include <string>
 #include <variant>
 #include <vector>
@@ -31,86 +29,21 @@ struct RandomLoads {
 };
 
 [[nodiscard]] std::vector<Vec6> DrawLoads(const RandomLoads& loads);
-
-// The checks of a stiffness scenario: what is judged and how good it must be.
-//
-//   checks: {stiffness_entry: 1e-5}             simulation against another computation
-//           {reference_stiffness_entry: 1e-10}  frame elements against closed form
-//           {displacement_axis: null}           switched off, and reported as such
-
-/// A judged quantity. Those of a pair compare two witnesses; the others need one only. Entries are
-/// compared in units of sqrt(K_ii K_jj): that number does not change with the units of length and
-/// angle, and is the relative error for i = j.
-enum class StiffnessMetric {
-  kStiffnessEntry,    ///< pair: max |ΔK_ij| / sqrt(K_ii K_jj)
-  kComplianceEntry,   ///< pair: max |ΔC_ij| / sqrt(C_ii C_jj)
-  kShareEntry,        ///< pair: the same for each element's share of C, in units of the whole C
-  kDisplacementAxis,  ///< pair: max error of Δx, Δy, Δz over the loads / max |Δ| of that axis
-  kDisplacementVector,  ///< pair: max over the loads of |error of (Δx, Δy, Δz)| / |(Δx, Δy, Δz)|
-  kRotationAxis,        ///< pair: as displacement_axis, for the rotation vector
-  kSymmetry,            ///< |K_ij − K_ji| / sqrt(K_ii K_jj)
-  kDefinite,            ///< how far the scaled K's smallest eigenvalue is below zero
-  kSharesSum,           ///< elements' shares add up to C
-  kResidual,            ///< unbalanced force of the equilibria, over the load
-  kExtrapolation,       ///< error of the extrapolation to zero load
-};
-inline constexpr int kStiffnessMetrics = 11;
-
-/// Limits of one metric; an empty one is switched off.
-struct StiffnessLimit {
-  std::optional<double> simulated;  ///< a simulation takes part
-  std::optional<double> computed;   ///< closed form and frame elements only
-};
-
-struct StiffnessMetricRow {
-  StiffnessMetric metric;
-  const char* key;       ///< in `checks:` and in check names
-  const char* title;     ///< for people
-  bool of_pair;          ///< compares two witnesses
-  StiffnessLimit limit;  ///< defaults
-};
-
-[[nodiscard]] std::span<const StiffnessMetricRow> StiffnessMetricRows();
-[[nodiscard]] const StiffnessMetricRow& RowOf(StiffnessMetric metric);
-[[nodiscard]] const StiffnessMetricRow* FindStiffnessMetric(const std::string& key);
-
-/// All limits of a scenario, starting from the defaults.
-struct StiffnessLimits {
-  StiffnessLimits();
-  std::array<StiffnessLimit, kStiffnessMetrics> of;
-
-  [[nodiscard]] const StiffnessLimit& operator[](StiffnessMetric m) const {
-    return of[static_cast<size_t>(m)];
-  }
-  [[nodiscard]] StiffnessLimit& operator[](StiffnessMetric m) { return of[static_cast<size_t>(m)]; }
-};
+/// "50 random wrenches, seed 20250201: …"
+[[nodiscard]] std::string TextOf(const RandomLoads& loads);
 
 /// Values of an independent set of coordinates by name: OUTPUT.x … OUTPUT.yaw or DRIVE [m, rad].
 using PoseValues = std::map<std::string, double>;
 
-struct StiffnessSimulation {
-  bool on = true;
-  Overrides parameters;
-  double force_N = 1000.0;   ///< largest load of the extrapolation to zero load, > 0
-  double moment_Nm = 100.0;  ///< > 0
-};
-
-struct StiffnessScenario {
-  std::string file, name, description;
-  std::string model_file;                           ///< the model with beams
-  std::vector<ModelCaveat> model_caveats;           ///< of that model
-  Overrides parameters;                             ///< for all witnesses, the pose's included
-  std::map<std::string, Finding> parameter_places;  ///< where each was written
+/// What of a scenario concerns its stiffness; parameters, witnesses and checks are those of all.
+struct StiffnessScenario : Scenario {
   PoseValues pose;     ///< coordinates; empty: home pose, to be filled in by the user of this
   std::string output;  ///< "" if the file names none
-  AnalyticSettings analytic;
-  ReferenceSettings reference;
-  StiffnessSimulation simulation;
+  /// Largest loads of the simulation's extrapolation to zero load, > 0.
+  double force_N = 1000.0, moment_Nm = 100.0;
   bool compare_printed = false;  ///< the paper's own model, too: stated, never judged
   std::vector<Vec6> loads;       ///< [m; f], about the output's origin, world axes
   std::string loads_text;        ///< where they come from, for people
-  StiffnessLimits checks;
-  Expectation expect;
 };
 
 struct StiffnessScenarioResult {
@@ -140,14 +73,15 @@ struct StiffnessScenarioResult {
 /// What is wrong with a pose's names and their number, without a place.
 [[nodiscard]] std::optional<Finding> CheckPose(const Mechanism& mechanism, const PoseValues& pose);
 
-// The sections of a stiffness scenario that do not need its mechanism.
+/// Takes one entry of a pose: a coordinate, or a parameter of the model that belongs to it. `key`
+/// may end in a unit, in which `number` is; without a number only the name is checked. What is
+/// wrong with it, without a place.
+[[nodiscard]] std::optional<Finding> PutIntoPose(const Mechanism& mechanism, const std::string& key,
+                                                 std::optional<double> number, PoseValues* pose,
+                                                 Overrides* parameters);
 
-[[nodiscard]] ReferenceSettings ReadStiffnessReference(ValueReader* values, const YamlNode* node);
-[[nodiscard]] StiffnessSimulation ReadStiffnessSimulation(ValueReader* values,
-                                                          const YamlNode* node);
-/// The wrenches of `loads:` and where they come from.
-[[nodiscard]] std::vector<Vec6> ReadStiffnessLoads(ValueReader* values, const YamlNode* node,
-                                                   std::string* text);
-[[nodiscard]] StiffnessLimits ReadStiffnessChecks(ValueReader* values, const YamlNode* node);
+/// Why a model has no stiffness: nothing in it yields.
+[[nodiscard]] std::optional<Finding> CheckElastic(const Mechanism& mechanism,
+                                                  const std::string& model_file);
 
 }  // namespace mbv

@@ -79,10 +79,9 @@ TEST(Rerun, LimitsThatAreSwitchedOffAreTheDefaultOnes) {
   EXPECT_EQ(RerunLimits(limits)[Metric::kForceNrmse].reference, 1e-10);
   EXPECT_EQ(RerunLimits(limits)[Metric::kForceNrmse].forward, kRerunShare * 1e-6);
   EXPECT_EQ(RerunLimits(limits)[Metric::kForceNrmse].servo, kRerunShare * 1e-6);
-  StiffnessLimits stiffness;
-  stiffness[StiffnessMetric::kStiffnessEntry] = {};
-  EXPECT_EQ(RerunLimits(stiffness)[StiffnessMetric::kStiffnessEntry].simulated, kRerunShare * 1e-4);
-  EXPECT_EQ(RerunLimits(stiffness)[StiffnessMetric::kStiffnessEntry].computed, 1e-9);
+  limits[Metric::kStiffnessEntry] = {};
+  EXPECT_EQ(RerunLimits(limits)[Metric::kStiffnessEntry].forward, kRerunShare * 1e-4);
+  EXPECT_EQ(RerunLimits(limits)[Metric::kStiffnessEntry].reference, 1e-9);
 }
 
 TEST(Rerun, WhatBothDoNotKnowIsTheSameAndWhatOneKnowsIsNot) {

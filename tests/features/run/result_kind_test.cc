@@ -12,26 +12,26 @@ namespace mbv {
 namespace {
 
 // Two looks at the colour of something.
-struct ColourPair {
-  std::string measured, truth;
-  bool compared = false;
-};
-struct ColourComparison {
-  Verdict verdict = Verdict::kDisagree;
-  std::string reason = "the camera sees red";
-  std::vector<ColourPair> pairs = {{"camera", "eye", true}, {"eye", "book", false}};
-  std::vector<NotCompared> not_compared = {{"book", "was out of reach"}};
-  Attribution attribution = {"camera", "the eye and the book agree"};
-  [[nodiscard]] size_t verified() const { return 1; }
-};
+Comparison ComparedColours() {
+  Comparison comparison;
+  comparison.verdict = Verdict::kDisagree;
+  comparison.reason = "the camera sees red";
+  comparison.pairs.resize(2);
+  comparison.pairs[0].measured = "camera", comparison.pairs[0].truth = "eye";
+  comparison.pairs[0].compared = true;
+  comparison.not_compared = {{"book", "was out of reach"}};
+  comparison.attribution = {"camera", "the eye and the book agree"};
+  return comparison;
+}
 struct ColourReport : ResultFrame {
-  ColourComparison comparison;
+  Comparison comparison = ComparedColours();
   double hue = 0.625;
 };
 
 ResultView ViewOf(const ColourReport& report) {
-  ResultView view = ViewOfComparison(report, report.comparison);
+  ResultView view = ViewOfComparison(report, report.comparison, Metric::kForceNrmse);
   view.kind = "colour";
+  view.verified = 1;
   view.checks = {
       {.name = "camera_vs_eye.hue",
        .subject = "camera_vs_eye",

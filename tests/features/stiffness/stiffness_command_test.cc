@@ -41,8 +41,8 @@ TEST(StiffnessCommand, TextNamesTheWeakestDirectionAndTheCausesOfCompliance) {
   const Program mbverify("stiffness_text");
   const ProgramResult result = mbverify("stiffness scara_robot --no-simulation");
   EXPECT_EQ(result.exit_code, 0) << result.err;
-  for (const char* part : {"weakest against a force:  2246.6 N/m", "weakest screw:", "limb2.arm",
-                           "\n  kappa_m", "  10463.3  "}) {
+  for (const char* part :
+       {"a force", "2246.6 N/m", "a screw", "limb2.arm", "\n  kappa_m", "10463.3"}) {
     EXPECT_NE(result.out.find(part), std::string::npos) << part << result.out;
   }
 }
@@ -72,7 +72,7 @@ TEST(StiffnessCommand, SeededLoadsAreInTheTable) {
   const std::string csv = ReadAll(mbverify.Out() + "/cabin_robot/stiffness_at_pose/loads.csv");
   EXPECT_EQ(Lines(csv), 51u);
   EXPECT_NE(csv.find("\n1,0.24526"), std::string::npos) << csv.substr(0, 800);
-  EXPECT_NE(result.out.find("under 50 random wrenches, seed 20250201"), std::string::npos);
+  EXPECT_NE(result.out.find("50 random wrenches, seed 20250201"), std::string::npos);
 }
 
 struct BadInput {
@@ -97,7 +97,7 @@ INSTANTIATE_TEST_SUITE_P(
         {"model", "scara_robo", "did you mean 'scara_robot'?"},
         {"rigid_model", "spr_tripod", "has no elastic.yaml"},
         {"coordinate", "scara_robot --at platform.hight=1", "platform.hight"},
-        {"misspelt_model", "scara_robo", "\"scara_robo\": error: mechanism = 'scara_robo'"},
+        {"misspelt_model", "scara_robo", "scara_robo: error: there is no such model"},
         {"no_number", "scara_robot --at platform.x=soon", "--at platform.x=soon: error: "},
         {"parameter", "scara_robot --set K_akt=1", "--set K_akt=1: error: "},
         // Values are shown as given, though they look like another option.

@@ -1,10 +1,12 @@
 // Stiffness results of made-up witnesses: each check passes at agreement and fails when its
 // quantity is perturbed by twice its limit.
-#include "features/stiffness/stiffness_comparison.h"
+#include "comparison/compare_stiffness.h"
 
 #include <gtest/gtest.h>
 
 #include <functional>
+
+#include "tests/support/reports.h"
 
 namespace mbv {
 namespace {
@@ -42,13 +44,8 @@ StiffnessWitness MakeWitness(const std::string& name) {
   return witness;
 }
 
-StiffnessInput MakeInput() {
-  StiffnessInput input;
-  input.loads = MakeLoads();
-  for (const char* name : {"analytic", "reference", "simulated"}) {
-    input.witnesses.push_back(MakeWitness(name));
-  }
-  return input;
+std::vector<StiffnessWitness> MakeWitnesses() {
+  return {MakeWitness("analytic"), MakeWitness("reference"), MakeWitness("simulated")};
 }
 
 double Scale(const Mat6& M, int i, int j) { return std::sqrt(M(i, i) * M(j, j)); }
@@ -60,7 +57,7 @@ double LargestDisplacement(const StiffnessWitness& witness, int axis) {
 }
 
 TEST(StiffnessComparison, EqualWitnessesAgree) {
-  const StiffnessComparison comparison = CompareStiffness(MakeInput());
+  const Comparison comparison = test::CompareAll(MakeWitnesses());
   EXPECT_EQ(comparison.verdict, Verdict::kAgree) << comparison.reason;
   EXPECT_EQ(comparison.failed(), 0u);
   // Three pairs with six checks, three witnesses with three, and two of the simulation.
@@ -77,16 +74,16 @@ void PrintTo(const BentEntry& bend, std::ostream* out) { *out << bend.check; }
 class BentCompliance : public testing::TestWithParam<BentEntry> {};
 
 TEST_P(BentCompliance, FailsItsCheckOnly) {
-  StiffnessInput input = MakeInput();
-  GetParam().bend(&input.witnesses[2]);
-  const StiffnessComparison comparison = CompareStiffness(input);
+  std::vector<StiffnessWitness> input = MakeWitnesses();
+  GetParam().bend(&input[2]);
+  const Comparison comparison = test::CompareAll(input);
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree) << comparison.reason;
-  const StiffnessCheck* check = comparison.FindCheck(GetParam().check);
+  const CheckResult* check = comparison.FindCheck(GetParam().check);
   ASSERT_NE(check, nullptr);
   EXPECT_FALSE(check->pass) << check->value;
   EXPECT_NEAR(check->value, 2 * *check->limit, 0.05 * *check->limit);
   // Half as much is within the limit of this check.
-  const StiffnessCheck* other = comparison.FindCheck("reference_vs_analytic.stiffness_entry");
+  const CheckResult* other = comparison.FindCheck("reference_vs_analytic.stiffness_entry");
   ASSERT_NE(other, nullptr);
   EXPECT_TRUE(other->pass);
 }
@@ -133,7 +130,7 @@ INSTANTIATE_TEST_SUITE_P(All, BentCompliance, testing::ValuesIn(kEntries), [](co
 });
 
 TEST(StiffnessComparison, EveryMetricIsBentInATest) {
-  for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
+  for (const MetricRow& row : StiffnessMetricRows()) {
     EXPECT_TRUE(std::any_of(std::begin(kEntries), std::end(kEntries), [&](const BentEntry& bend) {
       return std::string(bend.check).ends_with(std::string(".") + row.key);
     })) << row.key;
@@ -141,9 +138,9 @@ TEST(StiffnessComparison, EveryMetricIsBentInATest) {
 }
 
 TEST(StiffnessComparison, ClosedFormAndFrameAreHeldToTheirOwnLimit) {
-  StiffnessInput input = MakeInput();
-  input.witnesses[0].result.K(3, 3) *= 1 + 2e-9;
-  const StiffnessComparison comparison = CompareStiffness(input);
+  std::vector<StiffnessWitness> input = MakeWitnesses();
+  input[0].result.K(3, 3) *= 1 + 2e-9;
+  const Comparison comparison = test::CompareAll(input);
   EXPECT_FALSE(comparison.FindCheck("reference_vs_analytic.stiffness_entry")->pass);
   EXPECT_TRUE(comparison.FindCheck("simulated_vs_analytic.stiffness_entry")->pass);
   EXPECT_EQ(comparison.verdict, Verdict::kDisagree);
@@ -151,40 +148,37 @@ TEST(StiffnessComparison, ClosedFormAndFrameAreHeldToTheirOwnLimit) {
 
 TEST(StiffnessComparison, TheOddOneOutIsNamed) {
   for (int odd : {0, 1, 2}) {
-    StiffnessInput input = MakeInput();
-    input.witnesses[odd].result.K(3, 3) *= 1.03;
-    const Attribution attribution = CompareStiffness(input).attribution;
-    EXPECT_EQ(attribution.odd_one_out, input.witnesses[odd].name) << attribution.text;
+    std::vector<StiffnessWitness> input = MakeWitnesses();
+    input[odd].result.K(3, 3) *= 1.03;
+    const Attribution attribution = test::CompareAll(input).attribution;
+    EXPECT_EQ(attribution.odd_one_out, input[odd].name) << attribution.text;
     EXPECT_NE(attribution.text.find("K(x, x)"), std::string::npos) << attribution.text;
   }
 }
 
 TEST(StiffnessComparison, NotANumberNeverPasses) {
-  StiffnessInput input = MakeInput();
-  input.witnesses[2].residual = kNan;
-  input.witnesses[2].displacements[4][3] = kNan;
-  const StiffnessComparison comparison = CompareStiffness(input);
+  std::vector<StiffnessWitness> input = MakeWitnesses();
+  input[2].residual = kNan;
+  input[2].displacements[4][3] = kNan;
+  const Comparison comparison = test::CompareAll(input);
   EXPECT_FALSE(comparison.FindCheck("simulated.residual")->pass);
   EXPECT_FALSE(comparison.FindCheck("simulated_vs_analytic.displacement_axis")->pass);
   EXPECT_FALSE(comparison.FindCheck("simulated_vs_analytic.displacement_vector")->pass);
 }
 
 TEST(StiffnessComparison, WithoutComparedStiffnessNothingIsVerified) {
-  StiffnessInput alone = MakeInput();
-  alone.witnesses.resize(1);
-  EXPECT_EQ(CompareStiffness(alone).verdict, Verdict::kNotRun);
-  StiffnessInput off = MakeInput();
-  for (const StiffnessMetric metric :
-       {StiffnessMetric::kStiffnessEntry, StiffnessMetric::kComplianceEntry}) {
-    off.limits[metric] = {};
-  }
-  const StiffnessComparison comparison = CompareStiffness(off);
+  std::vector<StiffnessWitness> alone = MakeWitnesses();
+  alone.resize(1);
+  EXPECT_EQ(test::CompareAll(alone).verdict, Verdict::kNotRun);
+  CheckLimits off;
+  for (const Metric metric : {Metric::kStiffnessEntry, Metric::kComplianceEntry}) off[metric] = {};
+  const Comparison comparison = test::CompareAll(MakeWitnesses(), off);
   EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
   EXPECT_NE(comparison.reason.find("switched off"), std::string::npos) << comparison.reason;
-  StiffnessInput broken = MakeInput();
-  broken.witnesses[2].result.summary.stop = Stop::kNoConvergence;
-  broken.witnesses[2].result.summary.message = "no static equilibrium";
-  EXPECT_EQ(CompareStiffness(broken).verdict, Verdict::kNotRun);
+  std::vector<StiffnessWitness> broken = MakeWitnesses();
+  broken[2].result.summary.stop = Stop::kNoConvergence;
+  broken[2].result.summary.message = "no static equilibrium";
+  EXPECT_EQ(test::CompareAll(broken).verdict, Verdict::kNotRun);
 }
 
 TEST(StiffnessComparison, ErrorsOfLoadsByHand) {
@@ -194,14 +188,39 @@ TEST(StiffnessComparison, ErrorsOfLoadsByHand) {
   second << 1e-3, 0, 0, -1e-3, 2e-3, 2e-3;
   truth.displacements = measured.displacements = {first, second};
   measured.displacements[1] += (Vec6() << 0, 0, 0, 3e-4, 0, 0).finished();
-  const StiffnessPair pair = CompareStiffnessPair(measured, truth);
-  ASSERT_TRUE(pair.loads);
-  EXPECT_DOUBLE_EQ(pair.loads->scale[3], 3e-3);
-  EXPECT_NEAR(pair.loads->max[3], 0.1, 1e-12);
-  EXPECT_NEAR(pair.loads->mean[3], 0.05, 1e-12);
-  EXPECT_NEAR(pair.loads->vector_max, 0.1, 1e-12);  // 0.3 of 3 mm
-  EXPECT_EQ(pair.loads->worst_load, 1);
-  EXPECT_EQ(pair.metrics.at(StiffnessMetric::kDisplacementAxis).where, "x, load 2");
+  const auto loads = DifferenceOf(measured, truth).loads;
+  ASSERT_TRUE(loads);
+  EXPECT_DOUBLE_EQ(loads->scale[3], 3e-3);
+  EXPECT_NEAR(loads->max[3], 0.1, 1e-12);
+  EXPECT_NEAR(loads->mean[3], 0.05, 1e-12);
+  EXPECT_NEAR(loads->vector_max, 0.1, 1e-12);  // 0.3 of 3 mm
+  EXPECT_EQ(loads->worst_load, 1);
+  const PairComparison pair = CompareStiffnesses(AsWitness(measured), AsWitness(truth));
+  EXPECT_EQ(pair.metrics.at(Metric::kDisplacementAxis).channel, "x, load 2");
+}
+
+// A limit of more than a tenth lets anything pass.
+TEST(StiffnessComparison, WideLimitsVerifyNothing) {
+  CheckLimits wide;
+  for (const Metric metric : {Metric::kStiffnessEntry, Metric::kComplianceEntry}) {
+    wide[metric] = {.forward = 0.5, .inverse = 0.5, .reference = 0.5};
+  }
+  const Comparison comparison = test::CompareAll(MakeWitnesses(), wide);
+  EXPECT_EQ(comparison.verdict, Verdict::kNotRun);
+  EXPECT_NE(comparison.reason.find("every stiffness and compliance limit is so wide"),
+            std::string::npos)
+      << comparison.reason;
+}
+
+// What two that agree were given and the third was not leaves open which is wrong.
+TEST(StiffnessComparison, ASharedParameterLeavesOpenWhoIsWrong) {
+  std::vector<StiffnessWitness> witnesses = MakeWitnesses();
+  witnesses[0].result.K(3, 3) *= 1.03;
+  const Attribution attribution =
+      test::CompareAll(witnesses, {}, {{"reference", {{"E", 2e11}}}, {"simulated", {{"E", 2e11}}}})
+          .attribution;
+  EXPECT_EQ(attribution.odd_one_out, "");
+  EXPECT_NE(attribution.text.find("E = 2e+11"), std::string::npos) << attribution.text;
 }
 
 }  // namespace

@@ -1,5 +1,5 @@
 // Weak directions, screws and contributions of compliances that can be read off by hand.
-#include "features/stiffness/stiffness_comparison.h"
+#include "features/stiffness/stiffness_measures.h"
 
 #include <gtest/gtest.h>
 

@@ -68,14 +68,14 @@ TEST_F(StiffnessScenarioText, EveryKeyIsRead) {
   EXPECT_EQ(s.analytic.parameters.at("d"), 0.03);
   EXPECT_EQ(s.reference.parameters.at("E"), 200e9);
   EXPECT_EQ(s.simulation.parameters.at("E"), 190e9);
-  EXPECT_EQ(s.simulation.force_N, 2);
-  EXPECT_EQ(s.simulation.moment_Nm, 0.1);
+  EXPECT_EQ(s.force_N, 2);
+  EXPECT_EQ(s.moment_Nm, 0.1);
   EXPECT_TRUE(s.compare_printed);
   ASSERT_EQ(s.loads.size(), 2u);
   EXPECT_EQ(s.loads[1], (Vec6() << 0, 0, 4, 5, 0, 0).finished());
-  EXPECT_EQ(s.checks[StiffnessMetric::kStiffnessEntry].simulated, 1e-3);
-  EXPECT_EQ(s.checks[StiffnessMetric::kStiffnessEntry].computed, 1e-8);
-  EXPECT_FALSE(s.checks[StiffnessMetric::kRotationAxis].simulated);
+  EXPECT_EQ(s.checks[Metric::kStiffnessEntry].forward, 1e-3);
+  EXPECT_EQ(s.checks[Metric::kStiffnessEntry].reference, 1e-8);
+  EXPECT_FALSE(s.checks[Metric::kRotationAxis].forward);
   EXPECT_EQ(s.expect.verdict, "disagree");
 }
 
@@ -185,9 +185,9 @@ TEST_F(StiffnessScenarioText, TheDocumentsExampleLoadsAndItsTableHoldsTheDefault
   const StiffnessScenarioResult result =
       LoadStiffnessScenarioText(example, "scenarios/cabin_robot/s.yaml");
   EXPECT_TRUE(result.scenario) << result.diagnostics.Text();
-  for (const StiffnessMetricRow& row : StiffnessMetricRows()) {
+  for (const MetricRow& row : StiffnessMetricRows()) {
     std::string line = fmt::format("| `{}` | {} | {:.0e} | {:.0e} |\n", row.key, row.title,
-                                   *row.limit.simulated, *row.limit.computed);
+                                   *row.limits.forward, *row.limits.reference);
     const std::string plain = test::AsPeopleWrite(line);
     EXPECT_NE(document.find(plain), std::string::npos) << plain;
   }
