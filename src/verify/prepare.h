@@ -55,6 +55,8 @@ struct Prepared {
 [[nodiscard]] std::optional<Prepared> Prepare(const std::string& file,
                                               const ScenarioOptions& options,
                                               Diagnostics* diagnostics);
+/// The same of a scenario that was loaded.
+[[nodiscard]] std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics);
 
 /// The mechanism with a witness' own overrides: `base`, or the model loaded again. Findings are bad
 /// input.
