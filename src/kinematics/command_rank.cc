@@ -68,11 +68,12 @@ CommandRank RankCommands(const Mechanism& mechanism, const std::vector<Command>&
   const auto held_rows = rows.size();
   const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
   CommandRank out;
-  out.dofs = columns - RankOf(rows.Matrix());
   for (const Command& command : commands) AddCommand(mechanism, home, command, &rows);
   const internal::SparseRows J = rows.Matrix();
+  const internal::NestedRanks ranks = internal::RanksOf(J, held_rows);
 
-  out.undriven = columns - RankOf(J);
+  out.dofs = columns - ranks.first;
+  out.undriven = columns - ranks.all;
   out.redundant = static_cast<int>(commands.size()) - (out.dofs - out.undriven);
   if (out.undriven > 0) {
     const MatX motion = FindRank(J, NullSpaces::kMotion).motion;

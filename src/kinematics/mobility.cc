@@ -155,6 +155,23 @@ int CountAllDofs(const Mechanism& mechanism) {
   return 6 * (static_cast<int>(mechanism.bodies.size()) - 1) - RankOf(stack.Matrix());
 }
 
+IsostaticDofs CountIsostaticDofs(const Mechanism& mechanism) {
+  const BodyStates states = PosesAtHome(mechanism);
+  RowStack stack(mechanism.bodies.size(), CharacteristicLength(mechanism));
+  stack.AddJoints(mechanism, states, true);
+  const int reactions = stack.size();
+  for (const Joint& joint : mechanism.joints) {
+    if (!joint.transmits_force_only) continue;
+    const ConstraintRows rows = RowsOf(joint, states, false);
+    for (int i = rows.translation_rows; i < rows.rows; ++i) {
+      stack.Add(rows.parent, rows.J_parent.row(i), rows.child, rows.J_child.row(i), false);
+    }
+  }
+  const internal::NestedRanks ranks = internal::RanksOf(stack.Matrix(), reactions);
+  const int columns = 6 * (static_cast<int>(mechanism.bodies.size()) - 1);
+  return {.dofs = columns - ranks.all, .as_balls = columns - ranks.first};
+}
+
 Mobility AnalyseMobility(const Mechanism& mechanism) {
   return AnalyseMobility(mechanism, PosesAtHome(mechanism));
 }

@@ -38,11 +38,16 @@ struct Mobility {
   double largest_dropped = 0.0;  ///< largest singular value counted as zero
 };
 
-/// Mobility at the given body poses (the home pose by default).
-/// Only `dofs` of it, for a quarter of the time and less.
+/// Only the home pose's `dofs`, for a quarter of the time and less.
 [[nodiscard]] int CountDofs(const Mechanism& mechanism);
 /// The same with the idle spins.
 [[nodiscard]] int CountAllDofs(const Mechanism& mechanism);
+/// CountAllDofs(), and what it would be with the rows that transmit reactions only.
+struct IsostaticDofs {
+  int dofs = 0, as_balls = 0;
+};
+[[nodiscard]] IsostaticDofs CountIsostaticDofs(const Mechanism& mechanism);
+/// Mobility at the given body poses (the home pose by default).
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism);
 [[nodiscard]] Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states);
 

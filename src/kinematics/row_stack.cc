@@ -166,24 +166,6 @@ void AddVectors(const MatX& vectors, const std::vector<Eigen::Index>& places, Ei
   }
 }
 
-// The diagonal of R: a part's singular values within a factor of its size, but for matrices made to
-// spoil that (Kahan's), which the gap that is asked for keeps away.
-struct PivotedPart {
-  VecX diagonal;
-  double size = 0.0;
-};
-
-std::vector<PivotedPart> PivotsOf(const SparseRows& J) {
-  std::vector<PivotedPart> pivots;
-  for (const Part& part : PartsOf(J)) {
-    if (part.empty()) continue;
-    const Eigen::ColPivHouseholderQR<MatX> qr(DensePart(J, part));
-    pivots.push_back({qr.matrixQR().diagonal().cwiseAbs(),
-                      static_cast<double>(part.rows.size() + part.columns.size())});
-  }
-  return pivots;
-}
-
 SparseRows SparseOf(const MatX& J) { return J.sparseView(); }
 
 // Rank and vectors of one part.
@@ -242,26 +224,63 @@ std::optional<PartRank> SparsePart(const SparseRows& J, const Part& part, NullSp
 
 }  // namespace
 
-std::optional<int> ClearRank(const SparseRows& J, double tolerance) {
+std::optional<NestedRanks> ClearRanks(const SparseRows& J, Eigen::Index first, double tolerance) {
   constexpr double kClear = 1e3;  // on both sides of the tolerance
-  const std::vector<PivotedPart> parts = PivotsOf(J);
-  double largest = 0.0;
-  for (const PivotedPart& part : parts) largest = std::max(largest, part.diagonal[0]);
-  const double limit = tolerance * largest;
-  int rank = 0;
-  for (const PivotedPart& part : parts) {
-    for (const double pivot : part.diagonal) {
-      const bool kept = pivot > kClear * part.size * limit;
-      if (!kept && !(pivot <= limit / kClear)) return {};
-      rank += kept ? 1 : 0;
-    }
+  double largest = 0.0, largest_first = 0.0;
+  for (Eigen::Index i = 0; i < J.rows(); ++i) {
+    largest = std::max(largest, J.row(i).norm());
+    if (i < first) largest_first = largest;
   }
-  return rank;
+  const double least_kept = kClear * tolerance * largest;
+  const double most_dropped = tolerance * (first > 0 ? largest_first : largest) / kClear;
+  NestedRanks ranks;
+  for (const Part& part : PartsOf(J)) {
+    if (part.empty()) continue;
+    const auto size = static_cast<double>(part.rows.size() + part.columns.size());
+    // The diagonal of R: singular values within a factor of the part's size, but for matrices made
+    // to spoil that (Kahan's), which the gap that is asked for keeps away.
+    const auto rank_of = [&](const Eigen::ColPivHouseholderQR<MatX>& qr) {
+      Eigen::Index rank = 0;
+      for (const double pivot : qr.matrixQR().diagonal().cwiseAbs().eval()) {
+        const bool kept = pivot > size * least_kept;
+        if (!kept && !(pivot <= most_dropped)) return Eigen::Index{-1};
+        rank += kept ? 1 : 0;
+      }
+      return rank;
+    };
+    MatX rows = DensePart(J, part).transpose();  // as columns
+    const Eigen::Index count = std::ranges::lower_bound(part.rows, first) - part.rows.begin();
+    if (count > 0) {
+      const Eigen::ColPivHouseholderQR<MatX> qr(rows.leftCols(count));
+      const Eigen::Index rank = rank_of(qr);
+      if (rank < 0) return {};
+      ranks.first += static_cast<int>(rank);
+      ranks.all += static_cast<int>(rank);
+      // Of the other rows: what the first ones do not span.
+      MatX others = rows.rightCols(rows.cols() - count);
+      others.applyOnTheLeft(qr.householderQ().setLength(rank).adjoint());
+      rows = others.bottomRows(others.rows() - rank);
+    }
+    if (rows.size() == 0) continue;
+    const Eigen::Index rank = rank_of(Eigen::ColPivHouseholderQR<MatX>(rows));
+    if (rank < 0) return {};
+    ranks.all += static_cast<int>(rank);
+  }
+  return ranks;
+}
+
+NestedRanks RanksOf(const SparseRows& J, Eigen::Index first) {
+  if (std::min(J.rows(), J.cols()) <= kLargestDense) {
+    if (const std::optional<NestedRanks> clear = ClearRanks(J, first)) return *clear;
+  }
+  const SparseRows top = J.topRows(first);
+  return {.first = FindRank(top, NullSpaces::kNone).rank,
+          .all = FindRank(J, NullSpaces::kNone).rank};
 }
 
 int RankOf(const SparseRows& J, double tolerance) {
   if (std::min(J.rows(), J.cols()) <= kLargestDense) {
-    if (const std::optional<int> clear = ClearRank(J, tolerance)) return *clear;
+    if (const auto clear = ClearRanks(J, 0, tolerance)) return clear->all;
   }
   return FindRank(J, NullSpaces::kNone, tolerance).rank;
 }

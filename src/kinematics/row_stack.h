@@ -82,7 +82,14 @@ enum class NullSpaces { kNone, kSelfStress, kMotion };
 /// where there is a clear gap; else by singular values.
 [[nodiscard]] int RankOf(const SparseRows& J, double tolerance = kRankTolerance);
 [[nodiscard]] int RankOf(const MatX& J, double tolerance = kRankTolerance);
-/// By QR alone; empty where the gap is not clear.
-[[nodiscard]] std::optional<int> ClearRank(const SparseRows& J, double tolerance = kRankTolerance);
+/// Of the first rows of a matrix, and of all.
+struct NestedRanks {
+  int first = 0, all = 0;
+};
+/// Both for the time of one.
+[[nodiscard]] NestedRanks RanksOf(const SparseRows& J, Eigen::Index first);
+/// By QR alone; empty where a gap is not clear.
+[[nodiscard]] std::optional<NestedRanks> ClearRanks(const SparseRows& J, Eigen::Index first,
+                                                    double tolerance = kRankTolerance);
 
 }  // namespace mbv::internal

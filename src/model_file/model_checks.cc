@@ -234,22 +234,13 @@ void CheckHome(const Mechanism& mechanism, ModelReport* report) {
 }
 
 void CheckIsostaticRule(const Mechanism& mechanism, ModelReport* report) {
-  Mechanism balls = mechanism;
   std::optional<size_t> last;
-  for (size_t j = 0; j < balls.joints.size(); ++j) {
-    Joint& joint = balls.joints[j];
-    if (!joint.transmits_force_only || joint.kind == JointKind::kSpherical) continue;
-    joint.kind = JointKind::kSpherical;
-    last = j;
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    const Joint& joint = mechanism.joints[j];
+    if (joint.transmits_force_only && joint.kind != JointKind::kSpherical) last = j;
   }
   if (!last) return;
-  balls.drives.clear();
-  balls.prescribed.clear();
-  Mechanism passive = mechanism;
-  passive.drives.clear();
-  passive.prescribed.clear();
-  const int dofs = CountAllDofs(passive);
-  const int as_balls = CountAllDofs(balls);
+  const auto [dofs, as_balls] = CountIsostaticDofs(mechanism);
   if (dofs == as_balls) return;
   report->AtJoint(
       *last, Severity::kError,

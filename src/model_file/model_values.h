@@ -101,6 +101,10 @@ class ModelValues {
   [[nodiscard]] YamlReader& yaml() { return yaml_; }
 
  private:
+  /// `path` gives the text where it is needed: in findings and of literals.
+  template <typename PathOf>
+  std::optional<double> NumberAt(const Block& block, const YamlNode& node, const PathOf& path,
+                                 const UnitSuffix& unit);
   std::optional<Mat3> Rotation(const Block& block, const YamlNode& node, const std::string& path);
   std::optional<Mat3> RotationMatrix(const Block& block, const YamlNode& node,
                                      const std::string& path);

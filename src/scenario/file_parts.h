@@ -51,14 +51,31 @@ namespace mbv::internal {
 template <typename Content, typename Result>
 class ScenarioFile {
  public:
-  ScenarioFile(const std::string& file, const ScenarioOptions& options)
-      : file_(file), options_(options), yaml_(file), values_(&yaml_, &scope_) {}
+  ScenarioFile(const std::string& file, const ScenarioOptions& options,
+               ScenarioMemory* memory = nullptr)
+      : file_(file), options_(options), memory_(memory), yaml_(file), values_(&yaml_, &scope_) {}
   virtual ~ScenarioFile() = default;
 
-  Result Load(const std::string& text) {
-    YamlNodePtr root = yaml_.Parse(text);
-    if (root != nullptr) root = SetValues(root, options_.set, &yaml_);
-    if (root != nullptr) Read(*root);
+  Result Load(const std::string& text) { return Load(yaml_.Parse(text)); }
+
+  Result LoadFile() {
+    from_file_ = true;
+    if (memory_ != nullptr) return Load(memory_->Document(&yaml_));
+    const auto text = yaml_.ReadFile();
+    if (text) return Load(*text);
+    return {{}, {}, yaml_.diagnostics()};
+  }
+
+ protected:
+  /// Fills scenario_ and mechanism_; findings go to yaml_.
+  virtual void Read(const YamlNode& root) = 0;
+
+  Result Load(YamlNodePtr root) {
+    if (root != nullptr) {
+      root = memory_ != nullptr ? memory_->Set(root, options_.set, &yaml_)
+                                : SetValues(root, options_.set, &yaml_);
+      Read(*root);
+    }
     Result result;
     result.diagnostics = PlaceSetFindings(yaml_.diagnostics(), options_.set);
     result.diagnostics.Append(model_findings_);
@@ -68,17 +85,6 @@ class ScenarioFile {
     result.mechanism = std::move(mechanism_);
     return result;
   }
-
-  Result LoadFile() {
-    from_file_ = true;
-    const auto text = yaml_.ReadFile();
-    if (text) return Load(*text);
-    return {{}, {}, yaml_.diagnostics()};
-  }
-
- protected:
-  /// Fills scenario_ and mechanism_; findings go to yaml_.
-  virtual void Read(const YamlNode& root) = 0;
 
   void ReadDescription(const YamlMap& map) {
     if (const YamlNode* description = map.Find("description")) {
@@ -103,7 +109,8 @@ class ScenarioFile {
 
   /// Loads scenario_.model_file; its parameters are in scope from then on.
   void LoadModelWith(const LoadOptions& options) {
-    LoadResult loaded = LoadModel(scenario_.model_file, options);
+    LoadResult loaded = memory_ != nullptr ? memory_->Load(scenario_.model_file, options)
+                                           : LoadModel(scenario_.model_file, options);
     model_findings_ = loaded.diagnostics;
     // Wrong overrides alone must not hide what else is wrong with the scenario.
     if (!loaded.mechanism && !options.overrides.empty()) {
@@ -144,6 +151,7 @@ class ScenarioFile {
   std::string file_;
   bool from_file_ = false;  // and not a made-up name
   const ScenarioOptions& options_;
+  ScenarioMemory* memory_;  // null: everything is loaded anew
   YamlReader yaml_;
   Scope scope_;
   ValueReader values_;

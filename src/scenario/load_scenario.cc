@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <charconv>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
 
 #include "base/files.h"
@@ -191,7 +193,8 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     const auto name = yaml_.Text(node, "mechanism");
     if (!name) return;
     const fs::path folder = fs::path(file_).parent_path();
-    const auto model_file = FindModel(*name, folder);
+    const auto model_file =
+        memory_ != nullptr ? memory_->Find(*name, folder) : FindModel(*name, folder);
     if (!model_file) {
       yaml_.Error(node, fmt::format("mechanism = '{}': there is no such model", *name),
                   ModelHint(*name, folder));
@@ -280,7 +283,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
     if (!servo) return;
     CheckGain(*simulation->Find("kp"), "simulation.kp", settings.servo.kp, *mechanism_, &yaml_);
     CheckGain(*simulation->Find("kv"), "simulation.kv", settings.servo.kv, *mechanism_, &yaml_);
-    const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
+    const CommandRank rank = Rank();
     const auto drives = mechanism_->drives.size(), bases = mechanism_->prescribed.size();
     if (!scenario_.motion.free() && static_cast<int>(drives + bases) != rank.dofs) {
       yaml_.Error(
@@ -301,7 +304,7 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
       }
       return;
     }
-    const CommandRank rank = RankCommands(*mechanism_, scenario_.motion.commands);
+    const CommandRank rank = Rank();
     const auto commands = static_cast<int>(scenario_.motion.commands.size());
     int dofs = rank.dofs;
     if (commands != dofs) dofs = ReportMobility(*mechanism_).dofs();
@@ -317,6 +320,11 @@ class ScenarioLoader final : public internal::ScenarioFile<Scenario, ScenarioRes
                   fmt::format("leave out {} of them; not held yet: {}", rank.redundant,
                               JoinWords(rank.free_joints)));
     }
+  }
+
+  [[nodiscard]] CommandRank Rank() const {
+    return memory_ != nullptr ? memory_->Rank(*mechanism_, scenario_.motion.commands)
+                              : RankCommands(*mechanism_, scenario_.motion.commands);
   }
 
   [[nodiscard]] std::vector<std::string> DependentNames(const CommandRank& rank) const {
@@ -374,6 +382,11 @@ ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& opti
   return ScenarioLoader(file, options).LoadFile();
 }
 
+ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& options,
+                            ScenarioMemory* memory) {
+  return ScenarioLoader(file, options, memory).LoadFile();
+}
+
 ScenarioResult LoadScenarioText(const std::string& text, const std::string& file,
                                 const ScenarioOptions& options) {
   return ScenarioLoader(file, options).Load(text);
@@ -411,7 +424,7 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
 namespace {
 
 // A copy whose every node carries `line`.
-YamlNodePtr Relocate(const YamlNode& node, int line) {
+std::shared_ptr<YamlNode> Relocate(const YamlNode& node, int line) {
   auto copy = std::make_shared<YamlNode>(node);
   copy->line = line;
   copy->column = 0;
@@ -493,19 +506,112 @@ Finding AtOption(const SetValue& value) {
   return {.file = "--set " + value.first + "=" + value.second, .set = value};
 }
 
-YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, YamlReader* reader) {
+namespace {
+
+// What the k-th option sets; null after a finding.
+std::shared_ptr<YamlNode> ValueNode(const SetValue& value, size_t k, YamlReader* reader) {
+  const int line = -static_cast<int>(k) - 1;
+  const auto& [key, text] = value;
+  YamlNodePtr node;
+  if (PlainNumber(text)) {
+    auto number = std::make_shared<YamlNode>();
+    number->kind = YamlNode::Kind::kScalar;
+    number->text = text;
+    node = number;
+  } else {
+    node = YamlReader(AtOption(value).file).Parse(text);
+  }
+  if (node != nullptr && !key.empty()) return Relocate(*node, line);
+  reader->AddAt(Severity::kError, line, 0, "the value is no YAML",
+                "write --set key=value, e.g. --set simulation.step_s=0.002");
+  return nullptr;
+}
+
+// SetValues(); `nodes` gets the node of each value, null after a finding.
+YamlNodePtr SetNodes(YamlNodePtr root, const std::vector<SetValue>& values, YamlReader* reader,
+                     std::vector<std::shared_ptr<YamlNode>>* nodes) {
   for (size_t k = 0; k < values.size(); ++k) {
-    const int line = -static_cast<int>(k) - 1;
-    YamlReader value_reader(AtOption(values[k]).file);
-    const YamlNodePtr value = value_reader.Parse(values[k].second);
-    if (value == nullptr || values[k].first.empty()) {
-      reader->AddAt(Severity::kError, line, 0, "the value is no YAML",
-                    "write --set key=value, e.g. --set simulation.step_s=0.002");
-      continue;
-    }
-    root = SetAt(root.get(), "", values[k].first, Relocate(*value, line));
+    nodes->push_back(ValueNode(values[k], k, reader));
+    if (nodes->back() != nullptr) root = SetAt(root.get(), "", values[k].first, nodes->back());
   }
   return root;
+}
+
+}  // namespace
+
+YamlNodePtr SetValues(YamlNodePtr root, const std::vector<SetValue>& values, YamlReader* reader) {
+  std::vector<std::shared_ptr<YamlNode>> nodes;
+  return SetNodes(std::move(root), values, reader, &nodes);
+}
+
+YamlNodePtr ScenarioMemory::Document(YamlReader* reader) {
+  if (document_ != nullptr) return document_;
+  const auto text = reader->ReadFile();
+  const YamlNodePtr document = text ? reader->Parse(*text) : nullptr;
+  if (reader->diagnostics().findings().empty()) document_ = document;
+  return document;
+}
+
+YamlNodePtr ScenarioMemory::Set(const YamlNodePtr& root, const std::vector<SetValue>& values,
+                                YamlReader* reader) {
+  // Where a node goes depends on keys alone.
+  const auto fits = [](const SetValue& before, const SetValue& now) {
+    return before.first == now.first && (before.second == now.second ||
+                                         (PlainNumber(before.second) && PlainNumber(now.second)));
+  };
+  if (root == document_ && root_ != nullptr && std::ranges::equal(set_, values, fits)) {
+    for (size_t k = 0; k < values.size(); ++k) {
+      if (PlainNumber(values[k].second)) nodes_[k]->text = values[k].second;
+    }
+    set_ = values;
+    return root_;
+  }
+  nodes_.clear();
+  set_ = values;
+  YamlNodePtr with = SetNodes(root, values, reader, &nodes_);
+  root_ = reader->diagnostics().findings().empty() ? with : nullptr;
+  return with;
+}
+
+std::optional<std::string> ScenarioMemory::Find(const std::string& model, const fs::path& folder) {
+  const auto known = models_.find(model);
+  if (known != models_.end()) return known->second;
+  return models_[model] = FindModel(model, folder);
+}
+
+LoadResult ScenarioMemory::Load(const std::string& model_file, const LoadOptions& options) {
+  const auto same_override = [](const auto& a, const auto& b) {  // zeros with their signs
+    return a.first == b.first &&
+           std::bit_cast<std::uint64_t>(a.second) == std::bit_cast<std::uint64_t>(b.second);
+  };
+  const bool same = model_.mechanism && model_file_ == model_file &&
+                    std::ranges::equal(options_.overrides, options.overrides, same_override) &&
+                    options_.gravity_W == options.gravity_W;
+  if (same) return model_;
+  rank_.reset();
+  const auto known = texts_.find(model_file);
+  const auto& text =
+      known != texts_.end() ? known->second : texts_[model_file] = YamlReader(model_file).ReadFile();
+  model_file_ = model_file;
+  options_ = options;
+  model_ = text ? LoadModelText(*text, model_file, options) : LoadModel(model_file, options);
+  return model_;
+}
+
+const CommandRank& ScenarioMemory::Rank(const Mechanism& mechanism,
+                                        const std::vector<Command>& commands) {
+  const auto same_term = [](const Command::Term& a, const Command::Term& b) {
+    return a.coordinate.kind == b.coordinate.kind && a.coordinate.index == b.coordinate.index &&
+           a.coordinate.component == b.coordinate.component && a.factor == b.factor;
+  };
+  const auto same = [&](const Command& a, const Command& b) {
+    return std::ranges::equal(a.terms, b.terms, same_term);
+  };
+  if (!rank_ || !std::ranges::equal(commands_, commands, same)) {
+    rank_ = RankCommands(mechanism, commands);
+    commands_ = commands;
+  }
+  return *rank_;
 }
 
 const YamlNode* FindSetNode(const YamlNode& root, const std::string& key) {

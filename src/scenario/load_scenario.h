@@ -1,12 +1,16 @@
 // Scenario file → Scenario, resolved against its mechanism.
 #pragma once
 
+#include <filesystem>
+#include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "base/diagnostics.h"
+#include "kinematics/command_rank.h"
 #include "mechanism/mechanism.h"
 #include "model_file/load_model.h"
 #include "model_file/yaml/value_reader.h"
@@ -37,6 +41,11 @@ struct ScenarioResult {
 /// throws for bad input.
 [[nodiscard]] ScenarioResult LoadScenario(const std::string& file,
                                           const ScenarioOptions& options = {});
+
+class ScenarioMemory;
+/// The same, with what `memory` has of earlier loads of this file.
+[[nodiscard]] ScenarioResult LoadScenario(const std::string& file, const ScenarioOptions& options,
+                                          ScenarioMemory* memory);
 
 /// The same from text, for tests; `file` is used in messages and to find the model.
 [[nodiscard]] ScenarioResult LoadScenarioText(const std::string& text, const std::string& file,
@@ -73,6 +82,37 @@ struct ScenarioHead {
 /// `parameters` takes them. Findings name the option.
 [[nodiscard]] Diagnostics ReadParameterOptions(const std::vector<SetValue>& values,
                                                LoadOptions* options);
+
+/// What loading a scenario file again with other numbers takes over from the loads before: files are
+/// read and parsed once, a model is loaded and its commands are counted again only where a set
+/// number changes it. Results are those without it. For one file, which does not change meanwhile,
+/// and one thread.
+class ScenarioMemory {
+ public:
+  /// The scenario's document, read by `reader`; null after a finding.
+  [[nodiscard]] YamlNodePtr Document(YamlReader* reader);
+  /// SetValues(); where only numbers differ from the last call, they are replaced in its tree.
+  [[nodiscard]] YamlNodePtr Set(const YamlNodePtr& root, const std::vector<SetValue>& values,
+                                YamlReader* reader);
+  /// FindModel() and LoadModel().
+  [[nodiscard]] std::optional<std::string> Find(const std::string& model,
+                                                const std::filesystem::path& folder);
+  [[nodiscard]] LoadResult Load(const std::string& model_file, const LoadOptions& options);
+  /// RankCommands() on the model as it was loaded last.
+  [[nodiscard]] const CommandRank& Rank(const Mechanism& mechanism,
+                                        const std::vector<Command>& commands);
+
+ private:
+  YamlNodePtr document_, root_;
+  std::vector<SetValue> set_;
+  std::vector<std::shared_ptr<YamlNode>> nodes_;  // of root_, with the values of set_
+  std::map<std::string, std::optional<std::string>> models_, texts_;  // by name, by file
+  std::string model_file_;
+  LoadOptions options_;  // of model_
+  LoadResult model_;     // loaded last; without a mechanism: not worth keeping
+  std::vector<Command> commands_;
+  std::optional<CommandRank> rank_;  // of commands_ and model_
+};
 
 /// Moves findings about such nodes from the file to "--set key=value", and sorts all by place.
 [[nodiscard]] Diagnostics PlaceSetFindings(const Diagnostics& diagnostics,

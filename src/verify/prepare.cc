@@ -150,7 +150,10 @@ ClosedFormChoice MakeClosedForm(const Scenario& scenario, const Mechanism& mecha
 
 std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& options,
                                 Diagnostics* diagnostics) {
-  ScenarioResult loaded = LoadScenario(file, options);
+  return Prepare(LoadScenario(file, options), diagnostics);
+}
+
+std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics) {
   diagnostics->Append(loaded.diagnostics);
   if (!loaded.scenario) return {};
   Prepared prepared{.scenario = *std::move(loaded.scenario),
@@ -163,7 +166,7 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
   if (prepared.scenario.simulation.on && !prepared.has_closed_form() &&
       !prepared.scenario.reference.on && !prepared.scenario.motion.free()) {
     Finding finding;
-    finding.file = file;
+    finding.file = prepared.scenario.file;
     finding.message =
         "simulation needs the drive motion, but neither a closed form nor the reference gives it";
     finding.hint = "set reference: on";
@@ -171,7 +174,8 @@ std::optional<Prepared> Prepare(const std::string& file, const ScenarioOptions& 
   }
   std::vector<std::string> foreign;
   for (const ForeignWitness& witness : prepared.scenario.witnesses) foreign.push_back(witness.name);
-  CheckFigures(prepared.scenario.figures, RecordableChannels(prepared), foreign, file, diagnostics);
+  CheckFigures(prepared.scenario.figures, RecordableChannels(prepared), foreign,
+               prepared.scenario.file, diagnostics);
   if (diagnostics->has_errors()) return {};
   return prepared;
 }

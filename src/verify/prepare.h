@@ -63,6 +63,8 @@ void AddFormFindings(const std::string& scenario_file, const Diagnostics& found,
 [[nodiscard]] std::optional<Prepared> Prepare(const std::string& file,
                                               const ScenarioOptions& options,
                                               Diagnostics* diagnostics);
+/// The same of a scenario that was loaded.
+[[nodiscard]] std::optional<Prepared> Prepare(ScenarioResult loaded, Diagnostics* diagnostics);
 
 /// The mechanism as each witness sees it. Findings are bad input.
 [[nodiscard]] WitnessMechanisms LoadMechanisms(const Scenario& scenario, const Mechanism& base,

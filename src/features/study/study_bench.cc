@@ -51,9 +51,11 @@ bool LimitsSamples(const Study& study) {
 }
 
 // Not moved: the run refers to what was prepared.
-void Try(const Study& study, const std::vector<SetValue>& sets, Attempt* attempt, PointRow* row) {
+void Try(const Study& study, const std::vector<SetValue>& sets, ScenarioMemory* memory,
+         Attempt* attempt, PointRow* row) {
   row->values.assign(study.quantities.size(), kNan);
-  attempt->prepared = Prepare(study.scenario, {.set = sets}, &attempt->diagnostics);
+  attempt->prepared =
+      Prepare(LoadScenario(study.scenario, {.set = sets}, memory), &attempt->diagnostics);
   if (!attempt->prepared) {
     row->exit_code = 2;
     row->reason = FirstErrorText(attempt->diagnostics);
@@ -150,7 +152,7 @@ std::unique_ptr<StudyBench> StudyBench::Make(const Study& study, Diagnostics* di
   bench->CheckKeys(diagnostics);
   Attempt attempt;
   PointRow& row = bench->nominal_.row;
-  Try(study, bench->SetsOf({}), &attempt, &row);
+  Try(study, bench->SetsOf({}), &bench->memory_, &attempt, &row);
   for (const Factor& factor : study.factors) row.varied.push_back(factor.axis.nominal);
   diagnostics->Append(attempt.diagnostics);
   if (!attempt.prepared) return nullptr;
@@ -216,7 +218,7 @@ void StudyBench::CheckKeys(Diagnostics* diagnostics) const {
     const Factor& factor = study_.factors[k];
     if (!std::isnan(factor.axis.nominal)) continue;
     const SetValue set{factor.key, fmt::format("{:.17g}", first[k])};
-    const ScenarioResult loaded = LoadScenario(study_.scenario, {.set = {set}});
+    const ScenarioResult loaded = LoadScenario(study_.scenario, {.set = {set}}, &memory_);
     for (const Finding& finding : loaded.diagnostics.findings()) {
       if (finding.set.first.empty() || finding.severity != Severity::kError) continue;
       diagnostics->Add(FindingAt(study_, factor.line, factor.column,
@@ -266,7 +268,7 @@ std::string StudyBench::MovedBy(size_t factor) const {
     sets.emplace_back(study_.factors[factor].key, fmt::format("{:.17g}", end));
     Attempt attempt;
     PointRow row;
-    Try(study_, sets, &attempt, &row);
+    Try(study_, sets, &memory_, &attempt, &row);
     for (size_t k = 0; k < moved.size(); ++k) {
       if (row.values[k] != nominal_.row.values[k]) moved[k] = '1';  // NaN, too
     }
@@ -311,7 +313,7 @@ StudyPoint StudyBench::Run(std::uint64_t number) const {
   point.row.point = number;
   point.row.varied = points_.At(number);
   Attempt attempt;
-  Try(study_, SetsOf(point.row.varied), &attempt, &point.row);
+  Try(study_, SetsOf(point.row.varied), &memory_, &attempt, &point.row);
   point.forces = ForceSamples(forces_, FirstTrace(attempt));
   return point;
 }

@@ -84,6 +84,7 @@ class StudyBench {
   void CheckQuantities(const std::vector<std::string>& channels, Diagnostics* diagnostics) const;
 
   Study study_;
+  mutable ScenarioMemory memory_;
   DesignPoints points_;
   StudyPoint nominal_;
   StudyForces forces_;

@@ -4,8 +4,11 @@
 #include <muParser.h>
 
 #include <algorithm>
+#include <bit>
 #include <cctype>
 #include <cmath>
+#include <cstdint>
+#include <memory>
 #include <mutex>
 #include <numbers>
 #include <unordered_map>
@@ -112,21 +115,75 @@ ExpressionResult Parse(const std::string& text, const std::map<std::string, doub
   }
 }
 
-// Parsing is what an expression costs, and a model that is read again with another parameter has
-// mostly the same ones: results are kept by their text and the numbers in it.
-ExpressionResult Compute(const std::string& text, const std::map<std::string, double>& values) {
-  constexpr size_t kMostKept = 20'000;
-  thread_local std::unordered_map<std::string, ExpressionResult> kept;
-  std::string key = text;
-  for (const auto& [name, value] : values) {
-    key += '\0';
-    key += name;
-    key += '\0';
-    key.append(reinterpret_cast<const char*>(&value), sizeof value);
+// What an expression's text alone shows, and its parsed form. Models are read again and again with
+// other numbers but the same texts, so that both are kept by the text.
+class Expression {
+ public:
+  explicit Expression(const std::string& text) : text_(text), names_(NamesIn(text)) {
+    written_out_ = std::ranges::all_of(
+        names_, [](const UsedName& used) { return used.is_call || used.name == "pi"; });
   }
-  if (const auto found = kept.find(key); found != kept.end()) return found->second;
+
+  [[nodiscard]] const std::vector<UsedName>& names() const { return names_; }
+  [[nodiscard]] bool written_out() const { return written_out_; }
+
+  // With the values of the parameters that it uses, which are always the same ones. The last result
+  // is kept; at the second set of values the expression gets a parser of its own, in which
+  // parameters are variables: what fails there fails once more in words of the first one.
+  ExpressionResult At(const std::map<std::string, double>& values) {
+    const auto same = [](const auto& entry, double slot) {  // zeros with their signs
+      return std::bit_cast<std::uint64_t>(entry.second) == std::bit_cast<std::uint64_t>(slot);
+    };
+    if (result_ && std::ranges::equal(values, slots_, same)) return *result_;
+    if (result_ && !parser_) MakeParser(values);
+    slots_.clear();
+    for (const auto& [name, value] : values) slots_.push_back(value);
+    if (const std::optional<double> value = Again()) {
+      result_ = {.value = value, .error = "", .hint = ""};
+    } else {
+      result_ = Parse(text_, values);
+    }
+    return *result_;
+  }
+
+ private:
+  // Without the parser's rearrangements of variables (x^3 to x*x*x), which change last digits.
+  void MakeParser(const std::map<std::string, double>& values) {
+    parser_ = std::make_unique<mu::Parser>();
+    parser_->EnableOptimizer(false);
+    parser_->ClearConst();
+    parser_->DefineConst("pi", std::numbers::pi);
+    size_t slot = 0;
+    for (const auto& [name, value] : values) parser_->DefineVar(name, &slots_[slot++]);
+    parser_->SetExpr(text_);
+  }
+
+  std::optional<double> Again() {
+    if (!parser_) return {};
+    try {
+      int count = 0;
+      const double* results = parser_->Eval(count);
+      if (count == 1 && WhyNoNumber(results[0]).empty()) return results[0];
+    } catch (const std::exception&) {
+    }
+    return {};
+  }
+
+  std::string text_;
+  std::vector<UsedName> names_;
+  bool written_out_ = false;
+  std::vector<double> slots_;  // values of the last result; of one length, so that they stay put
+  std::optional<ExpressionResult> result_;
+  std::unique_ptr<mu::Parser> parser_;
+};
+
+std::shared_ptr<Expression> ExpressionOf(const std::string& text) {
+  constexpr size_t kMostKept = 4'000;
+  thread_local std::unordered_map<std::string, std::shared_ptr<Expression>> kept;
+  if (text.size() > kMaxExpression) return std::make_shared<Expression>(text);
+  if (const auto found = kept.find(text); found != kept.end()) return found->second;
   if (kept.size() >= kMostKept) kept.clear();
-  return kept.emplace(std::move(key), Parse(text, values)).first->second;
+  return kept.emplace(text, std::make_shared<Expression>(text)).first->second;
 }
 
 // Witnesses may run at the same time: one at a time computes.
@@ -159,9 +216,7 @@ class MuFormula : public Formula {
 }  // namespace
 
 bool IsWrittenOut(const std::string& expression) {
-  const std::vector<UsedName> names = NamesIn(expression);
-  return std::all_of(names.begin(), names.end(),
-                     [](const UsedName& used) { return used.is_call || used.name == "pi"; });
+  return PlainNumber(expression) || ExpressionOf(expression)->written_out();
 }
 
 std::string WhyNoParameterName(const std::string& name) {
@@ -240,7 +295,7 @@ ExpressionResult Scope::Evaluate(const std::string& expression) {
     return {.value = {}, .error = why, .hint = ""};
   }
   const Constants constants = ConstantsOf(expression, {});
-  return constants.good ? Compute(expression, constants.values) : constants.failed;
+  return constants.good ? ExpressionOf(expression)->At(constants.values) : constants.failed;
 }
 
 Scope::Constants Scope::ConstantsOf(const std::string& expression,
@@ -253,7 +308,8 @@ Scope::Constants Scope::ConstantsOf(const std::string& expression,
     return refuse("is no expression: = and \" have no meaning here", "");
   }
   Constants constants;
-  for (const UsedName& used : NamesIn(expression)) {
+  const std::shared_ptr<Expression> known = ExpressionOf(expression);
+  for (const UsedName& used : known->names()) {
     if (used.name == "pi" || constants.values.count(used.name) > 0) continue;
     if (used.is_call) {
       if (TheParser().GetFunDef().count(used.name) > 0) continue;

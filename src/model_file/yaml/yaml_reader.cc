@@ -32,8 +32,10 @@ const YamlNode* YamlNode::Find(std::string_view key) const {
 }
 
 std::string JoinPath(std::string_view path, std::string_view key) {
-  if (path.empty()) return std::string(key);
-  return fmt::format("{}.{}", path, key);
+  std::string joined;
+  joined.reserve(path.size() + 1 + key.size());
+  if (!path.empty()) joined.append(path).append(1, '.');
+  return joined.append(key);
 }
 
 std::optional<double> PlainNumber(std::string_view text) {
@@ -274,6 +276,22 @@ KeyCounts CountKnown(const std::vector<YamlEntry>& entries, const std::vector<st
 YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
                  const std::vector<std::string>& keys)
     : reader_(reader), node_(node), path_(std::move(path)) {
+  Check(keys);
+}
+
+YamlMap::YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
+                 std::initializer_list<std::string_view> keys)
+    : reader_(reader), node_(node), path_(std::move(path)) {
+  const auto is_known = [&](const YamlEntry& entry) {
+    return std::ranges::find(keys, entry.key) != keys.end();
+  };
+  // The usual case, for which no list of texts is made.
+  valid_ = node_ == nullptr || node_->is_null() ||
+           (node_->is_map() && !path_.empty() && std::ranges::all_of(node_->entries, is_known));
+  if (!valid_) Check({keys.begin(), keys.end()});
+}
+
+void YamlMap::Check(const std::vector<std::string>& keys) {
   if (node_ == nullptr || node_->is_null()) {
     valid_ = true;
     return;

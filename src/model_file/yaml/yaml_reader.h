@@ -125,6 +125,8 @@ class YamlMap {
   /// known ones, or no known one that says more than `name`, `version` and the like.
   YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
           const std::vector<std::string>& keys);
+  YamlMap(YamlReader* reader, const YamlNode* node, std::string path,
+          std::initializer_list<std::string_view> keys);
 
   /// The value, or null when the key is left out (or has no value).
   [[nodiscard]] const YamlNode* Find(std::string_view key) const;
@@ -147,6 +149,8 @@ class YamlMap {
                                   std::initializer_list<UnitSuffix> units) const;
 
  private:
+  void Check(const std::vector<std::string>& keys);
+
   YamlReader* reader_;
   const YamlNode* node_;
   std::string path_;

@@ -1,0 +1,192 @@
+// Points computed in memory give what loading everything anew with `--set` gives, to the last bit.
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <random>
+#include <string>
+#include <vector>
+
+#include "external/mechanism_json.h"
+#include "features/study/study_bench.h"
+#include "features/study/study_file.h"
+#include "mechanism/motion.h"
+#include "model_file/yaml/parsed_documents.h"
+#include "scenario/load_scenario.h"
+#include "tests/support/source_dir.h"
+
+namespace mbv {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<std::string> ShippedFiles(bool studies) {
+  std::vector<std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator("scenarios")) {
+    if (entry.path().extension() != ".yaml") continue;
+    const ScenarioHead head = ReadScenarioHead(entry.path());
+    const bool motion = head.is_scenario && !head.is_stiffness();
+    if (studies ? head.is_study : motion) files.push_back(entry.path());
+  }
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::string Bits(const auto& numbers) {
+  std::string text;
+  for (const double number : numbers) text += fmt::format("{:a} ", number);
+  return text;
+}
+
+// All that a witness reads of it.
+std::string TextOf(const ScenarioResult& loaded) {
+  std::string text = loaded.diagnostics.Text();
+  for (const Finding& finding : loaded.diagnostics.findings()) {
+    text += finding.set.first + "=" + finding.set.second + "\n";
+  }
+  if (!loaded.scenario) return text;
+  const Mechanism& mechanism = *loaded.mechanism;
+  text += MechanismJson(mechanism);
+  for (const Pose& X : mechanism.X_WB_home) text += Bits(X.matrix().reshaped());
+  for (const Joint& joint : mechanism.joints) {
+    text += Bits(joint.guess) + Bits(joint.home);
+    for (const CoordinateRange& range : joint.range) {
+      text += Bits(std::vector{range.lower, range.upper});
+    }
+  }
+  for (const Drive& drive : mechanism.drives) {
+    text += Bits(std::vector{drive.range.lower, drive.range.upper});
+  }
+  const Scenario& scenario = *loaded.scenario;
+  const Motion& motion = scenario.motion;
+  text += Bits(std::vector{motion.duration_s, motion.sample_s, scenario.simulation.step_s,
+                           scenario.start_window_s});
+  for (const MetricRow& row : MetricRows()) {
+    const MetricLimits& limits = scenario.checks[row.metric];
+    text += Bits(std::vector{limits.forward.value_or(kNan), limits.inverse.value_or(kNan),
+                             limits.reference.value_or(kNan)});
+  }
+  for (const Overrides* own : {&scenario.parameters, &scenario.analytic.parameters,
+                               &scenario.reference.parameters, &scenario.simulation.parameters}) {
+    for (const auto& [name, value] : *own) text += fmt::format("{}={:a} ", name, value);
+  }
+  text += Bits(scenario.snapshots.times_s);
+  CommandSample sample;
+  for (const double share : {0.0, 0.31, 1.0}) {
+    EvaluateMotion(motion, share * motion.duration_s, &sample);
+    text += Bits(sample.position) + Bits(sample.velocity) + Bits(sample.acceleration);
+    for (const LoadSample& load : sample.loads) text += Bits(load.force) + Bits(load.moment);
+  }
+  if (scenario.reference.table) text += Bits(scenario.reference.table->values.reshaped());
+  return text;
+}
+
+// Keys of everything in a scenario file that is a number, and of its model's parameters.
+void AddKeys(const YamlNode& node, const std::string& path, std::vector<std::string>* keys) {
+  for (const YamlEntry& entry : node.entries) {
+    AddKeys(*entry.value, JoinPath(path, entry.key), keys);
+  }
+  for (size_t k = 0; k < node.items.size(); ++k) {
+    AddKeys(*node.items[k], fmt::format("{}.{}", path, k), keys);
+  }
+  if (node.is_scalar() && PlainNumber(node.text)) keys->push_back(path);
+}
+
+class ScenarioMemoryTest : public testing::Test {
+ protected:
+  void SetUp() override { fs::current_path(kSourceDir); }
+};
+
+TEST_F(ScenarioMemoryTest, AnyNumbersGiveWhatLoadingAnewGives) {
+  const ParsedDocuments documents;
+  std::mt19937_64 random(20261125);
+  const auto pick = [&](size_t count) { return static_cast<size_t>(random() % count); };
+  int loads = 0, refused = 0;
+  for (const std::string& file : ShippedFiles(false)) {
+    YamlReader reader(file);
+    const auto text = reader.ReadFile();
+    const YamlNodePtr root = text ? reader.Parse(*text) : nullptr;
+    const ScenarioResult nominal = LoadScenario(file);
+    if (root == nullptr || !nominal.scenario) continue;
+    std::vector<std::string> keys;
+    AddKeys(*root, "", &keys);
+    for (const Parameter& p : nominal.mechanism->parameters) keys.push_back("parameters." + p.name);
+    ScenarioMemory memory;
+    std::vector<SetValue> set;
+    for (int round = 0; round < 6; ++round) {
+      // New keys, or the same ones with other values; now and then none, or what is no number.
+      if (round % 3 == 0) {
+        set.clear();
+        for (size_t k = pick(4); k > 0; --k) set.emplace_back(keys[pick(keys.size())], "");
+      }
+      for (auto& [key, value] : set) {
+        double number = std::uniform_real_distribution(0.97, 1.03)(random);
+        const std::string name = key.substr(key.find('.') + 1);
+        if (key.starts_with("parameters.") && nominal.mechanism->HasParameter(name)) {
+          number *= nominal.mechanism->ParameterValue(name);
+        } else if (const YamlNode* node = FindSetNode(*root, key)) {
+          number *= PlainNumber(node->text).value_or(1.0);
+        }
+        const std::vector<std::string> odd = {"0", "-0.0", fmt::format("{}", -number), "1e40",
+                                              "2*pi", "nothing", ".nan", "{a: 1}"};
+        value = pick(6) == 0 ? odd[pick(odd.size())] : fmt::format("{:.17g}", number);
+      }
+      const ScenarioResult anew = LoadScenario(file, {.set = set});
+      const ScenarioResult again = LoadScenario(file, {.set = set}, &memory);
+      std::string what = file;
+      for (const auto& [key, value] : set) what += fmt::format(" --set {}={}", key, value);
+      ASSERT_EQ(TextOf(again), TextOf(anew)) << what;
+      ++loads;
+      refused += anew.scenario ? 0 : 1;
+    }
+  }
+  EXPECT_GT(loads, 300);
+  EXPECT_GT(refused, 30);
+  EXPECT_LT(refused, loads / 2);
+}
+
+TEST_F(ScenarioMemoryTest, PointsOfShippedStudiesAreThoseOfTheirCommands) {
+  const ParsedDocuments documents;
+  int studies = 0;
+  for (const std::string& file : ShippedFiles(true)) {
+    const StudyResult read = LoadStudy(file);
+    ASSERT_TRUE(read.study) << read.diagnostics.Text();
+    const Study& study = *read.study;
+    Diagnostics diagnostics;
+    int exit_code = 0;
+    const auto bench = StudyBench::Make(study, &diagnostics, &exit_code);
+    ASSERT_TRUE(bench) << diagnostics.Text();
+    ++studies;
+    for (const std::uint64_t number : {std::uint64_t{5}, std::uint64_t{0}, std::uint64_t{3}}) {
+      if (number >= bench->points().count()) continue;
+      const PointRow row = bench->Run(number).row;
+      std::vector<SetValue> set;
+      for (size_t k = 0; k < row.varied.size(); ++k) {
+        set.emplace_back(study.factors[k].key, fmt::format("{:.17g}", row.varied[k]));
+      }
+      if (const std::string mode = ModeOf(study.witnesses); !mode.empty()) {
+        set.emplace_back("simulation.mode", mode);
+      }
+      Diagnostics found;
+      const auto prepared = Prepare(study.scenario, {.set = set}, &found);
+      if (!prepared) {
+        EXPECT_EQ(row.exit_code, 2) << file << ' ' << number;
+        const auto error = std::ranges::find(found.findings(), Severity::kError, &Finding::severity);
+        EXPECT_EQ(row.reason, error->message) << file << ' ' << number;
+        continue;
+      }
+      const StudyRun run = RunStudyWitnesses(*prepared, study.witnesses);
+      if (!run.failure.empty()) {
+        EXPECT_EQ(row.reason, run.failure) << file << ' ' << number;
+        continue;
+      }
+      EXPECT_EQ(Bits(row.values), Bits(MeasureQuantities(run, study.quantities).values))
+          << file << ' ' << number;
+    }
+  }
+  EXPECT_GE(studies, 13);
+}
+
+}  // namespace
+}  // namespace mbv
