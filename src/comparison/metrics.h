@@ -41,7 +41,6 @@ class ErrorSum {
   [[nodiscard]] double rms_error() const;
   [[nodiscard]] double rms_truth() const;
   [[nodiscard]] double max_error() const { return worst_.value; }
-  [[nodiscard]] double max_truth() const { return max_truth_; }
   [[nodiscard]] double worst_time_s() const { return worst_.time_s; }
   [[nodiscard]] const std::string& worst_channel() const { return worst_.channel; }
   [[nodiscard]] size_t count() const { return count_; }

@@ -102,7 +102,6 @@ void FindForcesNotUnique(const Mechanism& mechanism, const BodyStates& states, d
       mobility->drives_not_unique.push_back(mechanism.drives[d].name);
     }
   }
-  mobility->drive_forces_unique = mobility->drives_not_unique.empty();
 }
 
 BodyStates PosesAtHome(const Mechanism& mechanism) {
@@ -139,7 +138,6 @@ Mobility AnalyseMobility(const Mechanism& mechanism, const BodyStates& states) {
   stack.AddIdle(mechanism, states);
   stack.AddDriven(mechanism, states);
   mobility.undriven = mobility.body_coordinates - RankOf(stack.Matrix());
-  mobility.drives_determine_motion = mobility.undriven == 0;
   FindForcesNotUnique(mechanism, states, length, &mobility);
   return mobility;
 }

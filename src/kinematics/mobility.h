@@ -24,10 +24,9 @@ struct Mobility {
   int redundant = 0;  ///< constraint_rows − constraint_rank
   int kutzbach = 0;   ///< body_coordinates − constraint_rows − idle spins
   int drives = 0, prescribed = 0;
-  int undriven = 0;                      ///< DOFs left with all drives and prescribed joints locked
-  bool drives_determine_motion = false;  ///< undriven == 0
-  bool drive_forces_unique = false;      ///< no self-stress of the locked mechanism acts on a drive
-  std::vector<std::string> drives_not_unique;
+  int undriven = 0;  ///< DOFs left with all drives and prescribed joints locked
+  std::vector<std::string> drives_not_unique;  ///< drives on which a self-stress of the locked
+                                               ///< mechanism acts
   std::vector<std::string> joints_not_unique;  ///< joints with a reaction component that is not
                                                ///< unique (isostatic rule applied)
   std::vector<UndeterminedReaction> reactions_not_unique;  ///< which components

@@ -16,22 +16,6 @@ inline Mat3 Skew(const Vec3& v) {
   return S;
 }
 
-/// Ad(R, p) = [R 0; [p]×R R] (6×6): a twist about B's origin in B to one about A's origin in A.
-inline Mat6 Adjoint(const Pose& X_AB) {
-  Mat6 Ad;
-  const Mat3 R = X_AB.linear();
-  Ad << R, Mat3::Zero(), Skew(X_AB.translation()) * R, R;
-  return Ad;
-}
-
-/// ad(V) = [[ω]× 0; [v]× [ω]×] (6×6): the Lie bracket [V1, V2] = ad(V1) V2.
-inline Mat6 LieBracket(const Vec6& V) {
-  Mat6 ad;
-  const Mat3 W = Skew(V.head<3>());
-  ad << W, Mat3::Zero(), Skew(V.tail<3>()), W;
-  return ad;
-}
-
 /// Spatial inertia about the frame origin (6×6, rotation first), for mass m [kg], centre of mass
 /// c [m] and rotational inertia I_cm [kg m²] about the centre of mass, all in the frame's axes.
 inline Mat6 SpatialInertia(double m, const Vec3& c, const Mat3& I_cm) {

@@ -153,12 +153,4 @@ SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& h
   return result;
 }
 
-SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism) {
-  ClosureHints hints(mechanism->joints.size());
-  for (size_t j = 0; j < hints.size(); ++j) {
-    if (mechanism->joints[j].closure) hints[j] = true;
-  }
-  return BuildSpanningTree(mechanism, hints);
-}
-
 }  // namespace mbv

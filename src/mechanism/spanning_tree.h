@@ -29,9 +29,6 @@ struct SpanningTreeResult {
 /// force-only joints become the closures. Depends only on the order and data of the joints.
 SpanningTreeResult BuildSpanningTree(Mechanism* mechanism, const ClosureHints& hints = {});
 
-/// The same with the hints that Joint::closure itself can carry: true = cut here, false = free.
-SpanningTreeResult BuildSpanningTreeFromFlags(Mechanism* mechanism);
-
 /// True when a drive, a prescribed joint or a coupling leads a coordinate of this joint.
 [[nodiscard]] bool HasLedCoordinate(const Mechanism& mechanism, int joint);
 /// True when one of these or a force element uses a coordinate of this joint.

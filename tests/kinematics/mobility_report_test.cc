@@ -55,7 +55,7 @@ TEST(MobilityReport, APlanarFourBarHasThreeRedundantConstraintsInOneLoop) {
   for (const UndeterminedReaction& reaction : report.home.reactions_not_unique) {
     EXPECT_EQ(reaction.components, (Names{"fz", "mx", "my"})) << reaction.joint;
   }
-  EXPECT_TRUE(report.home.drive_forces_unique);
+  EXPECT_TRUE(report.home.drives_not_unique.empty());
 }
 
 TEST(MobilityReport, TheSpatialSliderCrankIsStaticallyDeterminate) {

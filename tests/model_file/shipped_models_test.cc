@@ -72,7 +72,7 @@ TEST(StabilizingPlatformModel, HasSixFreedomsOnTheShipAndTwoRedundantConstraints
   EXPECT_EQ(mobility.dofs, 6 + 3);  // and the ship's three
   EXPECT_EQ(mobility.redundant, 6);
   EXPECT_EQ(mobility.undriven, 0);
-  EXPECT_TRUE(mobility.drive_forces_unique);
+  EXPECT_TRUE(mobility.drives_not_unique.empty());
 }
 
 TEST(StabilizingPlatformModel, LoadsWithMasslessLinks) {

@@ -34,7 +34,7 @@ TEST(ReferenceCoupling, CountsInMobility) {
   Mechanism m = CoupledWheels().Make();
   const Mobility coupled = AnalyseMobility(m);
   EXPECT_EQ(coupled.dofs, 1);
-  EXPECT_TRUE(coupled.drives_determine_motion);
+  EXPECT_EQ(coupled.undriven, 0);
   m.couplings.push_back(m.couplings[0]);
   const Mobility twice = AnalyseMobility(m);
   EXPECT_EQ(twice.dofs, 1);

@@ -90,7 +90,6 @@ class Amplification {
   explicit Amplification(const PlatformParameters& p);
   [[nodiscard]] double operator()(const LimbMotion& limb) const;
   [[nodiscard]] double neutral_length() const { return l_0_; }
-  [[nodiscard]] double neutral_drive() const { return R_0_; }
   [[nodiscard]] double neutral_ratio() const { return ratio_0_; }
 
  private:

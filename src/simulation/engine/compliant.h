@@ -76,7 +76,6 @@ class Statics {
   /// A length that makes moments comparable with forces and rotations with displacements [m].
   [[nodiscard]] double size() const { return size_; }
   /// False if the output is on the ground.
-  [[nodiscard]] bool output_moves() const { return output_body_ > 0; }
 
  private:
   // (2) and (3) at the stress-free pose. Rows: J_, then spring tendons.
