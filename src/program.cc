@@ -3,6 +3,7 @@
 #include <array>
 
 #include "cli/run_cli.h"
+#include "features/run/run_scenario.h"
 #include "features/stiffness/stiffness.h"
 #include "features/study/study.h"
 #include "verify/check_file.h"
@@ -42,18 +43,38 @@ Diagnostics CheckStiffness(const std::string& file) {
   return diagnostics;
 }
 
-// The first that recognises a file checks it.
+std::optional<Mechanism> StiffnessMechanism(const std::string& file, const ScenarioOptions& options,
+                                            Diagnostics* diagnostics) {
+  auto prepared = PrepareStiffnessFile(file, options, diagnostics);
+  return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
+}
+
+bool IsStudy(const std::string& /*file*/, const ScenarioHead& head) {
+  return !head.is_scenario && head.HasKey("study");
+}
+bool IsStiffness(const std::string& /*file*/, const ScenarioHead& head) {
+  return head.is_scenario && head.kind == "stiffness";
+}
+bool IsScenario(const std::string& /*file*/, const ScenarioHead& head) { return head.is_scenario; }
+bool IsAny(const std::string& /*file*/, const ScenarioHead& /*head*/) { return true; }
+
 constexpr std::array kDocuments = {
-    DocumentKind{IsMechanismJson, CheckMechanismFile},
-    DocumentKind{[](const std::string&, const ScenarioHead& head) { return head.is_study; },
-                 CheckStudy},
-    DocumentKind{[](const std::string&, const ScenarioHead& head) {
-                   return head.is_scenario && head.is_stiffness();
-                 },
-                 CheckStiffness},
-    DocumentKind{[](const std::string&, const ScenarioHead& head) { return head.is_scenario; },
-                 CheckScenario},
-    DocumentKind{[](const std::string&, const ScenarioHead&) { return true; }, CheckModel},
+    DocumentKind{.name = "mechanism", .is = IsMechanismJson, .check = CheckMechanismFile},
+    DocumentKind{.name = "study", .is = IsStudy, .check = CheckStudy, .command = "study"},
+    DocumentKind{.name = "stiffness",
+                 .is = IsStiffness,
+                 .check = CheckStiffness,
+                 .command = "run",
+                 .run = RunStiffnessScenario,
+                 .mechanism = StiffnessMechanism},
+    DocumentKind{.name = "motion",
+                 .is = IsScenario,
+                 .check = CheckScenario,
+                 .command = "run",
+                 .in_time = true,
+                 .run = RunMotion,
+                 .mechanism = MotionMechanism},
+    DocumentKind{.name = "model", .is = IsAny, .check = CheckModel},
 };
 
 }  // namespace

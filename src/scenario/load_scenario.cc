@@ -392,6 +392,8 @@ ScenarioResult LoadScenarioText(const std::string& text, const std::string& file
   return ScenarioLoader(file, options).Load(text);
 }
 
+bool ScenarioHead::HasKey(const std::string& key) const { return Contains(keys, key); }
+
 ScenarioHead ReadScenarioHead(const std::string& file) {
   ScenarioHead head;
   YamlReader yaml(file);
@@ -416,7 +418,7 @@ ScenarioHead ReadScenarioHead(const std::string& file) {
   head.is_scenario = head.is_scenario || root->Find("mechanism") != nullptr;
   const YamlNode* witnesses = root->Find("witnesses");
   head.has_witnesses = witnesses != nullptr && witnesses->is_map();
-  head.is_study = !head.is_scenario && root->Find("study") != nullptr;
+  for (const YamlEntry& entry : root->entries) head.keys.push_back(entry.key);
   if (const YamlNode* expect = root->Find("expect")) head.expect = ReadExpectation(&values, expect);
   return head;
 }

@@ -55,13 +55,13 @@ class ScenarioMemory;
 /// that is no YAML may carry its expectation in a first line "# expect: {…}".
 struct ScenarioHead {
   bool is_scenario = false;    ///< has a `mechanism:` key (or an expectation)
-  bool is_study = false;       ///< has a `study:` key instead (features/study/study_file.h)
   bool has_witnesses = false;  ///< names programs (scenario/load_scenario.h)
   std::string kind;            ///< "motion", "stiffness"; "" means motion
   std::string mechanism, description;
   Expectation expect;
+  std::vector<std::string> keys = {};  ///< at the file's top
 
-  [[nodiscard]] bool is_stiffness() const { return kind == "stiffness"; }
+  [[nodiscard]] bool HasKey(const std::string& key) const;
 };
 [[nodiscard]] ScenarioHead ReadScenarioHead(const std::string& file);
 

@@ -34,13 +34,19 @@ const YamlNode& NodeAt(const YamlNode& root, const std::vector<std::string>& pat
 
 void UseDocumentKinds(std::span<const DocumentKind> kinds) { g_kinds = kinds; }
 
-Diagnostics CheckFile(const std::string& file) {
+const DocumentKind& KindOf(const std::string& file) {
+  MBV_DEMAND(!g_kinds.empty(), file);
   const ScenarioHead head = file.ends_with(".json") ? ScenarioHead{} : ReadScenarioHead(file);
-  for (const DocumentKind& kind : g_kinds) {
-    if (kind.is(file, head)) return kind.check(file);
+  for (const DocumentKind& kind : g_kinds.first(g_kinds.size() - 1)) {
+    if (kind.is(file, head)) return kind;
   }
-  MBV_DEMAND(false && "a kind of document recognises the file", file);
-  return {};
+  return g_kinds.back();
+}
+
+std::optional<Mechanism> MotionMechanism(const std::string& file, const ScenarioOptions& options,
+                                         Diagnostics* diagnostics) {
+  std::optional<Prepared> prepared = Prepare(file, options, diagnostics);
+  return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
 }
 
 bool IsMechanismJson(const std::string& file, const ScenarioHead& /*head*/) {

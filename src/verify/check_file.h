@@ -1,6 +1,7 @@
-// Validation of files without running anything, by the kind of document that each file is.
+// Kinds of documents: how a file is recognised, checked without running anything, and run.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 
@@ -9,17 +10,35 @@
 
 namespace mbv {
 
-/// A kind of file that people write: how it is recognised, and how it is checked.
+struct RunOptions;  // verify/run_options.h
+struct RunOutcome;
+
+/// A kind of file that people write. What it has no use for is null or "".
 struct DocumentKind {
+  const char* name;  ///< "motion", "stiffness", "study", "model", "mechanism"
   bool (*is)(const std::string& file, const ScenarioHead& head);
   Diagnostics (*check)(const std::string& file);
+  const char* command = "";  ///< of the program that runs it
+  bool in_time = false;      ///< a scenario with a motion: it has steps, and a model to perturb
+  RunOutcome (*run)(const std::string& file, const RunOptions& options) = nullptr;
+  /// The mechanism as it runs; empty after findings.
+  std::optional<Mechanism> (*mechanism)(const std::string& file, const ScenarioOptions& options,
+                                        Diagnostics* diagnostics) = nullptr;
+
+  [[nodiscard]] bool runs() const { return *command != '\0'; }
 };
 
-/// The kinds that CheckFile knows from now on, asked in this order; they must outlive every call.
+/// The kinds that the program knows from now on, asked in this order; they must outlive every call.
+/// The last one recognises every file.
 void UseDocumentKinds(std::span<const DocumentKind> kinds);
 
-/// All findings about a file, by the first kind that recognises it.
-[[nodiscard]] Diagnostics CheckFile(const std::string& file);
+/// The first that recognises the file.
+[[nodiscard]] const DocumentKind& KindOf(const std::string& file);
+
+/// All findings about a file.
+[[nodiscard]] inline Diagnostics CheckFile(const std::string& file) {
+  return KindOf(file).check(file);
+}
 
 /// mechanism.json as external witnesses get it: a name that ends in .json.
 [[nodiscard]] bool IsMechanismJson(const std::string& file, const ScenarioHead& head);
@@ -28,5 +47,9 @@ void UseDocumentKinds(std::span<const DocumentKind> kinds);
 [[nodiscard]] Diagnostics CheckModel(const std::string& file);
 /// A scenario of motion, including what its closed form has to say about the motion.
 [[nodiscard]] Diagnostics CheckScenario(const std::string& file);
+/// Of a scenario of motion.
+[[nodiscard]] std::optional<Mechanism> MotionMechanism(const std::string& file,
+                                                       const ScenarioOptions& options,
+                                                       Diagnostics* diagnostics);
 
 }  // namespace mbv

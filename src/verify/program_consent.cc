@@ -158,7 +158,7 @@ ProgramList ProgramsOf(const std::string& file, const ScenarioOptions& options) 
   const ScenarioHead head = ReadScenarioHead(file);
   const bool set = std::ranges::any_of(
       options.set, [](const SetValue& value) { return value.first.starts_with("witnesses"); });
-  if (!head.is_scenario || head.is_stiffness() || !(head.has_witnesses || set)) {
+  if (!head.is_scenario || !(head.has_witnesses || set)) {
     return {.scenario = file};
   }
   const ScenarioResult loaded = LoadScenario(file, options);

@@ -25,7 +25,7 @@ std::vector<std::string> ShippedScenarios() {
   for (const auto& entry : fs::recursive_directory_iterator(root / "scenarios")) {
     if (entry.path().extension() != ".yaml") continue;
     const ScenarioHead head = ReadScenarioHead(entry.path());
-    if (head.is_scenario || head.is_study) {
+    if (head.is_scenario || head.HasKey("study")) {
       files.push_back(entry.path().lexically_relative(root));
     }
   }
@@ -85,8 +85,9 @@ TEST_P(ShippedScenario, GivesWhatItExpects) {
   const Expectation& expect = head.expect;
   const Program mbverify(NameOf(GetParam()));
   const ProgramResult result =
-      head.is_study ? mbverify("study " + GetParam() + " --jobs 1 --out " + mbverify.Out())
-                    : mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());
+      head.HasKey("study")
+          ? mbverify("study " + GetParam() + " --jobs 1 --out " + mbverify.Out())
+          : mbverify("run " + GetParam() + " --no-pictures --out " + mbverify.Out());
   const std::string printed = result.out + result.err;
   EXPECT_EQ(result.exit_code, expect.exit_code) << printed;
   if (expect.exit_code == 2) {

@@ -1,9 +1,11 @@
 #include "features/mutation/mutation_bench.h"
 
+#include <fmt/format.h>
 #include <algorithm>
 
 #include "base/demand.h"
 #include "kinematics/mobility.h"
+#include "verify/check_file.h"
 
 namespace mbv {
 namespace {
@@ -53,8 +55,9 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   *exit_code = 2;
   ScenarioOptions options;
   if (mode == BenchMode::kInverse) options.set = {{"simulation.mode", "inverse"}};
-  if (ReadScenarioHead(file).is_stiffness()) {
-    diagnostics->AddError(file, "is a stiffness scenario", "mutate perturbs the model of a motion");
+  if (const DocumentKind& kind = KindOf(file); kind.runs() && !kind.in_time) {
+    diagnostics->AddError(file, fmt::format("is a {}", kind.name),
+                          "mutate perturbs the model of a motion");
     return nullptr;
   }
   std::optional<Prepared> prepared = Prepare(file, options, diagnostics);

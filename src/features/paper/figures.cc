@@ -19,6 +19,7 @@
 #include "features/workspace/workspace.h"
 #include "plot/draw.h"
 #include "plot/pgf.h"
+#include "verify/check_file.h"
 #include "verify/prepare.h"
 
 namespace mbv {
@@ -151,9 +152,9 @@ class MoreFigureSource {
       : file_(file), options_(options), outcome_(outcome), set_(set) {}
 
   void AddConvergence() {
-    const ScenarioHead head = ReadScenarioHead(file_);
-    if (head.is_stiffness()) return LeaveOut("convergence: a stiffness has no steps");
-    if (head.is_study) return LeaveOut("convergence: of a study's scenario, not of a study");
+    if (const DocumentKind& kind = KindOf(file_); kind.runs() && !kind.in_time) {
+      return LeaveOut(fmt::format("convergence: a {} has no steps", kind.name));
+    }
     ConvergeOptions converge;
     converge.scenario = options_.scenario;
     converge.progress = options_.progress;
@@ -167,8 +168,7 @@ class MoreFigureSource {
   }
 
   void AddWorkspace() {
-    const ScenarioHead head = ReadScenarioHead(file_);
-    if (head.is_stiffness() || head.is_study) {
+    if (const DocumentKind& kind = KindOf(file_); kind.runs() && !kind.in_time) {
       return LeaveOut("workspace: is drawn with a motion of the mechanism");
     }
     Diagnostics run_findings;
@@ -255,11 +255,11 @@ FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
                           const RunOutcome* ran) {
   FigureOutcome outcome;
   FigureSource source(file, options, &outcome);
-  const ScenarioHead head = ReadScenarioHead(file);
-  FigureSet set = head.is_stiffness() ? source.OfStiffness()
-                  : head.is_study     ? source.OfStudy()
-                  : ran != nullptr    ? source.OfMotion(*ran)
-                                      : source.OfMotion();
+  const DocumentKind& kind = KindOf(file);
+  FigureSet set = kind.runs() && kind.run == nullptr     ? source.OfStudy()
+                  : kind.run != nullptr && !kind.in_time ? source.OfStiffness()
+                  : ran != nullptr                       ? source.OfMotion(*ran)
+                                                         : source.OfMotion();
   if (outcome.diagnostics.has_errors()) return outcome;
   MoreFigureSource more(file, options, &outcome, &set);
   if (Contains(options.also, "convergence")) more.AddConvergence();

@@ -242,8 +242,8 @@ bool EndsIn(const std::string& file, std::initializer_list<const char*> endings)
 
 std::string RoleOf(const std::string& file) {
   if (EndsIn(file, {".yaml"})) {
-    const ScenarioHead head = ReadScenarioHead(file);
-    return head.is_study ? "study" : head.is_scenario ? "scenario" : "model";
+    const DocumentKind& kind = KindOf(file);
+    return kind.run != nullptr ? "scenario" : kind.name;
   }
   if (EndsIn(file, {".urdf", ".xml"})) return "model";
   if (EndsIn(file, {".stl", ".STL", ".obj", ".OBJ", ".dae", ".DAE", ".ply", ".PLY"})) return "mesh";
@@ -364,11 +364,9 @@ std::vector<InputFile> LoadAll(const std::vector<std::string>& scenarios,
   const ParsedDocuments documents;
   const InputWatch watch;
   for (const std::string& file : scenarios) {
-    const ScenarioHead head = ReadScenarioHead(file);
-    if (head.is_study) {
-      diagnostics->Append(CheckStudy(file));
-    } else if (head.is_scenario || !fs::exists(file)) {
-      diagnostics->Append(CheckFile(file));
+    const DocumentKind& kind = KindOf(file);
+    if (kind.runs() || !fs::exists(file)) {
+      diagnostics->Append(kind.check(file));
     } else {
       diagnostics->AddError(file, "is neither a scenario nor a study",
                             "of a robot's file mbverify init --from makes a model and a scenario");

@@ -40,10 +40,12 @@ class PackedRunner {
     UseMeshPackages(std::move(packages));
     const ScenarioHead head = ReadScenarioHead(run_.scenario.file);
     run_.scenario.description = head.description;
-    run_.scenario.kind = head.is_study ? "study" : head.is_stiffness() ? "stiffness" : "motion";
+    const DocumentKind& kind = KindOf(run_.scenario.file);
+    run_.scenario.kind = kind.name;
     if (!MayCallPrograms()) return std::move(run_);
-    if (ReadsOutside(head.is_study)) return std::move(run_);
-    head.is_study ? RunAsStudy() : RunAsScenario();
+    const bool study = kind.run == nullptr;
+    if (ReadsOutside(study)) return std::move(run_);
+    study ? RunAsStudy() : RunAsScenario();
     return std::move(run_);
   }
 

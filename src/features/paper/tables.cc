@@ -15,6 +15,7 @@
 #include "features/stiffness/stiffness.h"
 #include "kinematics/mobility.h"
 #include "model_file/yaml/yaml_reader.h"
+#include "verify/check_file.h"
 #include "verify/prepare.h"
 
 namespace mbv {
@@ -145,12 +146,8 @@ class TableMaker {
 // The mechanism of a scenario of any kind, as it runs.
 std::optional<Mechanism> MechanismOf(const std::string& file, const ScenarioOptions& options) {
   Diagnostics run_findings;
-  if (ReadScenarioHead(file).is_stiffness()) {
-    auto prepared = PrepareStiffnessFile(file, options, &run_findings);
-    return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
-  }
-  auto prepared = Prepare(file, options, &run_findings);
-  return prepared ? std::optional(std::move(prepared->base)) : std::nullopt;
+  const DocumentKind& kind = KindOf(file);
+  return kind.mechanism != nullptr ? kind.mechanism(file, options, &run_findings) : std::nullopt;
 }
 
 }  // namespace

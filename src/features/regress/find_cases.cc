@@ -13,6 +13,7 @@
 #include "base/worker_pool.h"
 #include "features/stiffness/stiffness_scenario.h"
 #include "scenario/find_model.h"
+#include "verify/check_file.h"
 
 namespace mbv {
 namespace {
@@ -37,8 +38,9 @@ std::string HeadJson(const std::string& file) {
   Fingerprint fingerprint;
   fingerprint.Add(fs::path(file).filename().string());
   fingerprint.Add(text);
-  const Json json = {{"counts", head.is_scenario || head.is_study || NamesMechanism(text)},
-                     {"study", head.is_study},
+  const DocumentKind& kind = KindOf(file);
+  const Json json = {{"counts", kind.runs() || NamesMechanism(text)},
+                     {"command", kind.runs() ? kind.command : "run"},
                      {"kind", head.kind},
                      {"witnesses", head.has_witnesses},
                      {"mechanism", head.mechanism},
@@ -64,8 +66,7 @@ Found FoundOf(const std::string& file, const std::optional<std::string>& text) {
   if (!json.is_object()) return found;
   ScenarioHead& head = found.file.head;
   found.counts = json.value("counts", true);
-  head.is_study = json.value("study", false);
-  head.is_scenario = found.counts && !head.is_study;
+  found.file.command = json.value("command", "run");
   head.kind = json.value("kind", "");
   head.has_witnesses = json.value("witnesses", false);
   head.mechanism = json.value("mechanism", "");

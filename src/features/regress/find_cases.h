@@ -15,6 +15,7 @@ struct CaseFile {
   std::string inputs;  ///< fingerprint of the file
   std::string models;  ///< the files that its mechanism's name stands for
   ScenarioHead head;
+  std::string command = "run";  ///< of the program that runs it
 };
 
 struct FoundCases {

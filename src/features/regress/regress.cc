@@ -36,7 +36,8 @@ std::string ProgramText(const RegressOptions& options) {
 }
 
 // Of `mbverify study`: the regression run itself takes the cores.
-const std::vector<std::string> kStudyWords = {"--jobs", "1"};
+const std::vector<std::string> kOneWorker = {"--jobs",
+                                             "1"};  // of commands with workers of their own
 
 class Run {
  public:
@@ -179,10 +180,10 @@ class Run {
     std::vector<WorkerJob> jobs;
     for (size_t i = 0; i < cases_.size(); ++i) {
       WorkerJob job{options_.worker, folder_.StagedLog(i)};
-      const bool study = cases_[i].head.is_study;
-      job.argv.insert(job.argv.end(), {study ? "study" : "run", cases_[i].file, "--out",
-                                       folder_.Staging(i).string()});
-      const std::vector<std::string> rest = study ? kStudyWords : RunWords(cases_[i]);
+      const std::string& command = cases_[i].command;
+      job.argv.insert(job.argv.end(),
+                      {command, cases_[i].file, "--out", folder_.Staging(i).string()});
+      const std::vector<std::string> rest = command == "run" ? RunWords(cases_[i]) : kOneWorker;
       job.argv.insert(job.argv.end(), rest.begin(), rest.end());
       jobs.push_back(std::move(job));
     }

@@ -21,7 +21,6 @@
 #include "features/equation_audit/audit.h"
 #include "features/mjcf_audit/source_audit.h"
 #include "features/run/engine_errors.h"
-#include "features/stiffness/stiffness.h"
 #include "kinematics/command_rank.h"
 #include "kinematics/mobility.h"
 #include "mechanism/mechanism.h"
@@ -37,6 +36,7 @@
 #include "scenario/find_model.h"
 #include "scenario/motion_reader.h"
 #include "scenario/tables/table.h"
+#include "verify/check_file.h"
 #include "verify/drive_by.h"
 #include "verify/pictures.h"
 #include "verify/run_witnesses.h"
@@ -531,7 +531,11 @@ class ScenarioRun {
 
 RunOutcome RunScenario(const std::string& file, const RunOptions& options) {
   const ParsedDocuments documents;
-  if (ReadScenarioHead(file).is_stiffness()) return RunStiffnessScenario(file, options);
+  const DocumentKind& kind = KindOf(file);
+  return kind.run != nullptr ? kind.run(file, options) : RunMotion(file, options);
+}
+
+RunOutcome RunMotion(const std::string& file, const RunOptions& options) {
   return ScenarioRun(file, options).Run();
 }
 

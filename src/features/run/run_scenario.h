@@ -15,6 +15,8 @@ namespace mbv {
 /// Runs a scenario file of any kind. Bad input and numerical trouble are in the outcome; only our
 /// own bugs throw (InternalError).
 [[nodiscard]] RunOutcome RunScenario(const std::string& file, const RunOptions& options);
+/// The same of a scenario of motion.
+[[nodiscard]] RunOutcome RunMotion(const std::string& file, const RunOptions& options);
 
 // report.html of a run: gathers what the page shows from the stages.
 

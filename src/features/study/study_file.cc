@@ -25,6 +25,7 @@
 #include "scenario/load_scenario.h"
 #include "scenario/settings_reader.h"
 #include "scenario/tables/text.h"
+#include "verify/check_file.h"
 
 namespace mbv::internal {
 
@@ -502,11 +503,8 @@ class StudyReader {
                   DidYouMeanPath(beside.string()));
       return false;
     }
-    const ScenarioHead head = ReadScenarioHead(study_.scenario);
-    if (!head.is_scenario || head.is_stiffness()) {
-      yaml_.Error(node,
-                  fmt::format("scenario = '{}' is {}", *name,
-                              head.is_stiffness() ? "a stiffness scenario" : "no scenario"),
+    if (const DocumentKind& kind = KindOf(study_.scenario); !kind.in_time) {
+      yaml_.Error(node, fmt::format("scenario = '{}' is a {}", *name, kind.name),
                   "a study varies a scenario with a motion; of a model alone, mbverify init writes "
                   "a first one");
       return false;

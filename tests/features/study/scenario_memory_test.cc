@@ -26,8 +26,8 @@ std::vector<std::string> ShippedFiles(bool studies) {
   for (const auto& entry : fs::recursive_directory_iterator("scenarios")) {
     if (entry.path().extension() != ".yaml") continue;
     const ScenarioHead head = ReadScenarioHead(entry.path());
-    const bool motion = head.is_scenario && !head.is_stiffness();
-    if (studies ? head.is_study : motion) files.push_back(entry.path());
+    const bool motion = head.is_scenario && head.kind != "stiffness";
+    if (studies ? head.HasKey("study") : motion) files.push_back(entry.path());
   }
   std::sort(files.begin(), files.end());
   return files;
@@ -128,8 +128,8 @@ TEST_F(ScenarioMemoryTest, AnyNumbersGiveWhatLoadingAnewGives) {
         } else if (const YamlNode* node = FindSetNode(*root, key)) {
           number *= PlainNumber(node->text).value_or(1.0);
         }
-        const std::vector<std::string> odd = {"0", "-0.0", fmt::format("{}", -number), "1e40",
-                                              "2*pi", "nothing", ".nan", "{a: 1}"};
+        const std::vector<std::string> odd = {
+            "0", "-0.0", fmt::format("{}", -number), "1e40", "2*pi", "nothing", ".nan", "{a: 1}"};
         value = pick(6) == 0 ? odd[pick(odd.size())] : fmt::format("{:.17g}", number);
       }
       const ScenarioResult anew = LoadScenario(file, {.set = set});
@@ -172,7 +172,8 @@ TEST_F(ScenarioMemoryTest, PointsOfShippedStudiesAreThoseOfTheirCommands) {
       const auto prepared = Prepare(study.scenario, {.set = set}, &found);
       if (!prepared) {
         EXPECT_EQ(row.exit_code, 2) << file << ' ' << number;
-        const auto error = std::ranges::find(found.findings(), Severity::kError, &Finding::severity);
+        const auto error =
+            std::ranges::find(found.findings(), Severity::kError, &Finding::severity);
         EXPECT_EQ(row.reason, error->message) << file << ' ' << number;
         continue;
       }

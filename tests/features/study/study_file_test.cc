@@ -159,7 +159,7 @@ TEST_F(StudyFiles, NeedAScenarioWithAMotion) {
   };
   ExpectIn(named("nowhere.yaml"), "there is no such file");
   ExpectIn(named("../models/four_bar/model.yaml"), "is no scenario");
-  ExpectIn(named("cabin_robot/stiffness.yaml"), "is a stiffness scenario");
+  ExpectIn(named("cabin_robot/stiffness.yaml"), "is a stiffness");
   ExpectIn(LoadStudyText("study: 'a b'\n", "s.yaml").diagnostics.Text(), "'a b' is no name");
   ExpectIn(LoadStudyText("[1]", "s.yaml").diagnostics.Text(), "error");
 }
@@ -185,9 +185,9 @@ TEST_F(StudyFiles, ListsAreReadByTheirHeadings) {
 TEST_F(StudyFiles, HeadsKnowTheKind) {
   const test::TestFolder folder("study_head");
   const ScenarioHead head = ReadScenarioHead(folder.Write("s.yaml", "study: s\nscenario: x\n"));
-  EXPECT_TRUE(head.is_study);
+  EXPECT_TRUE(head.HasKey("study"));
   EXPECT_FALSE(head.is_scenario);
-  EXPECT_FALSE(ReadScenarioHead(SourcePath("/scenarios/four_bar/static.yaml")).is_study);
+  EXPECT_FALSE(ReadScenarioHead(SourcePath("/scenarios/four_bar/static.yaml")).HasKey("study"));
 }
 
 TEST_F(StudyFiles, PatternsStandForWhatTheModelWritesOut) {
