@@ -116,6 +116,14 @@ struct TableOptions {
   bool verbose = false;  ///< also how to read each signal, and what could not be compared
   bool sizing = false;   ///< all figures of the motors, not their margins only
 };
+/// A result of a kind that a product brings, as it is shown.
+class OtherResult {
+ public:
+  virtual ~OtherResult() = default;
+  [[nodiscard]] virtual ResultView View() const = 0;
+  [[nodiscard]] virtual std::string Table(const TableOptions& options) const = 0;
+  [[nodiscard]] virtual std::string Json() const = 0;  ///< summary.json
+};
 /// "stabilizing_platform / sea_state: AGREE  simulated vs analytic 4.2e-08 (limit 1.0e-07)".
 [[nodiscard]] std::string VerdictLine(const ResultView& view, const TableOptions& options);
 

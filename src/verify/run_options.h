@@ -16,8 +16,6 @@
 
 namespace mbv {
 
-struct StiffnessReport;  // features/stiffness/stiffness_report.h
-
 struct RunOptions {
   ScenarioOptions scenario;
   ProgramConsent programs;  ///< that it names
@@ -37,12 +35,18 @@ struct RunOptions {
 };
 
 struct RunOutcome {
-  int exit_code = 4;             ///< 0 agree, 1 disagree, 2 bad input, 3 could not run
-  Diagnostics diagnostics;       ///< bad input and warnings
-  std::optional<Report> report;  ///< of a motion; empty after bad input
-  std::shared_ptr<const StiffnessReport> stiffness;  ///< of a stiffness; null after bad input
-  std::vector<FigureSpec> figures;                   ///< that the scenario of a motion composes
-  std::string folder;                                ///< what was written; "" if nothing
+  int exit_code = 4;                         ///< 0 agree, 1 disagree, 2 bad input, 3 could not run
+  Diagnostics diagnostics;                   ///< bad input and warnings
+  std::optional<Report> report;              ///< of a motion; empty after bad input
+  std::shared_ptr<const OtherResult> other;  ///< of another kind; null after bad input
+  std::vector<FigureSpec> figures;           ///< that the scenario of a motion composes
+  std::string folder;                        ///< what was written; "" if nothing
+
+  /// Empty after bad input.
+  [[nodiscard]] std::optional<ResultView> View() const {
+    if (report) return ViewOf(*report);
+    return other == nullptr ? std::nullopt : std::optional(other->View());
+  }
 };
 
 }  // namespace mbv

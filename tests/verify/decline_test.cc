@@ -208,16 +208,16 @@ TEST(WarnNotApplicable, AnElasticModelWithAnotherBeam) {
             std::string::npos)
       << outcome.diagnostics.Text();
   // A caveat of the verdict, in JSON and on the line of -q.
-  ASSERT_TRUE(outcome.stiffness);
-  const std::vector<Caveat>& caveats = outcome.stiffness->comparison.caveats;
+  ASSERT_TRUE(outcome.other);
+  const std::vector<Caveat>& caveats =
+      dynamic_cast<const ShownStiffness&>(*outcome.other).report().comparison.caveats;
   ASSERT_EQ(caveats.size(), 1u);
   EXPECT_EQ(caveats[0].kind, CaveatKind::kWitnessMissing);
   EXPECT_EQ(caveats[0].gap, WitnessGap::kNotApplicable);
   const std::string text = "without the witness analytic, which nothing was compared with: ";
   EXPECT_TRUE(caveats[0].text.starts_with(text)) << caveats[0].text;
-  EXPECT_NE(VerdictLine(ViewOf(*outcome.stiffness), {}).find("; caveat: " + text),
-            std::string::npos);
-  const auto json = nlohmann::json::parse(ToJson(*outcome.stiffness));
+  EXPECT_NE(VerdictLine(outcome.other->View(), {}).find("; caveat: " + text), std::string::npos);
+  const auto json = nlohmann::json::parse(outcome.other->Json());
   EXPECT_EQ(json["caveats"][0]["kind"], "witness_missing");
   EXPECT_EQ(json["caveats"][0]["cause"], "not_applicable");
   EXPECT_TRUE(json["reservations"][0].get<std::string>().starts_with(text));
@@ -238,12 +238,12 @@ TEST(WarnNotApplicable, AStiffnessOfAModelThatLeavesSomethingOutHasACaveat) {
     options.pictures = false;
     const RunOutcome outcome = RunScenario(scenario, options);
     EXPECT_EQ(outcome.exit_code, 0) << outcome.diagnostics.Text();
-    ASSERT_TRUE(outcome.stiffness);
-    const auto json = nlohmann::json::parse(ToJson(*outcome.stiffness));
+    ASSERT_TRUE(outcome.other);
+    const auto json = nlohmann::json::parse(outcome.other->Json());
     ASSERT_EQ(json["caveats"].size(), whole ? 0u : 1u) << json["caveats"];
     if (whole) continue;
     EXPECT_EQ(json["caveats"][0]["kind"], "left_out");
-    EXPECT_NE(VerdictLine(ViewOf(*outcome.stiffness), {})
+    EXPECT_NE(VerdictLine(outcome.other->View(), {})
                   .find("; caveat: not the whole robot: a spring acts on the joint"),
               std::string::npos);
   }

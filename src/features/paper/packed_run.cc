@@ -12,7 +12,6 @@
 #include "features/paper/figures.h"
 #include "features/paper/rerun_judge.h"
 #include "features/run/run_scenario.h"
-#include "features/stiffness/stiffness_report.h"
 #include "features/study/study.h"
 #include "math/bytes.h"
 #include "model_file/mesh/read_mesh.h"
@@ -86,10 +85,10 @@ class PackedRunner {
     run.programs = options_.programs;
     const RunOutcome outcome = RunScenario(run_.scenario.file, run);
     Report(outcome.diagnostics, outcome.exit_code, outcome.folder);
-    if (!outcome.report && outcome.stiffness == nullptr) return;
-    const ResultView view = outcome.report ? ViewOf(*outcome.report) : ViewOf(*outcome.stiffness);
-    run_.scenario.verdict = ToText(view.verdict);
-    run_.scenario.reason = view.reason;
+    const std::optional<ResultView> view = outcome.View();
+    if (!view) return;
+    run_.scenario.verdict = ToText(view->verdict);
+    run_.scenario.reason = view->reason;
     if (options_.figures) Draw(outcome);
   }
 

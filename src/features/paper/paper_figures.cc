@@ -438,7 +438,9 @@ const Report* PaperRuns::Run(const PlacedText& scenario, Diagnostics* diagnostic
   exit_code_ = std::max(exit_code_, ran.exit_code);
   diagnostics->Append(ran.diagnostics);
   if (ran.report) at->second = std::move(*ran.report);
-  if (ran.stiffness) at->second = ReportOfLoads(*ran.stiffness);
+  if (const auto* stiffness = dynamic_cast<const ShownStiffness*>(ran.other.get())) {
+    at->second = ReportOfLoads(stiffness->report());
+  }
   return at->second ? &*at->second : nullptr;
 }
 

@@ -12,7 +12,6 @@
 #include "cli/terminal.h"
 #include "cli/trust.h"
 #include "features/run/run_scenario.h"
-#include "features/stiffness/stiffness.h"
 #include "kinematics/mobility.h"
 #include "model_file/yaml/yaml_reader.h"
 #include "verify/check_file.h"
@@ -178,16 +177,16 @@ TablesOutcome MakeTables(const std::string& file, const TablesOptions& options) 
   const RunOutcome ran = RunScenario(file, run);
   outcome.exit_code = ran.exit_code;
   outcome.diagnostics = ran.diagnostics;
-  if (!ran.report && ran.stiffness == nullptr) return outcome;
+  const std::optional<ResultView> view = ran.View();
+  if (!view) return outcome;
   const auto mechanism = MechanismOf(file, options.scenario);
   if (!mechanism) return outcome;
-  const ResultView view = ran.report ? ViewOf(*ran.report) : ViewOf(*ran.stiffness);
-  outcome.mechanism = view.frame->mechanism;
-  outcome.scenario = view.frame->scenario;
-  outcome.verdict = ToText(view.verdict);
+  outcome.mechanism = view->frame->mechanism;
+  outcome.scenario = view->frame->scenario;
+  outcome.verdict = ToText(view->verdict);
   TableMaker maker(options, &outcome);
   maker.OfMechanism(*mechanism);
-  maker.OfRun(view, ran.report ? &*ran.report : nullptr);
+  maker.OfRun(*view, ran.report ? &*ran.report : nullptr);
   return outcome;
 }
 

@@ -18,7 +18,6 @@
 #include "cli/trust.h"
 #include "features/run/default_setup.h"
 #include "features/run/run_scenario.h"
-#include "features/stiffness/stiffness_report.h"
 #include "mechanism/channels.h"
 #include "report/report.h"
 #include "verify/model_text.h"
@@ -89,15 +88,14 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
   }
   progress->Clear();
   findings->Print(outcome.diagnostics);
-  const auto print = [&](const auto& report) {
+  if (const std::optional<ResultView> view = outcome.View()) {
     const TableOptions table{.color = WantsColor(arguments.json.text()),
                              .verbose = arguments.verbose,
                              .sizing = arguments.sizing};
-    SayText(arguments.json.text(),
-            arguments.quiet ? VerdictLine(ViewOf(report), table) : ToTable(report, table) + "\n");
-  };
-  if (outcome.report) print(*outcome.report);
-  if (outcome.stiffness != nullptr) print(*outcome.stiffness);
+    SayText(arguments.json.text(), arguments.quiet  ? VerdictLine(*view, table)
+                                   : outcome.report ? ToTable(*outcome.report, table) + "\n"
+                                                    : outcome.other->Table(table) + "\n");
+  }
   if (!outcome.folder.empty() && !arguments.quiet) {
     Say(stderr, "results in {}\n", outcome.folder);
   }
@@ -108,9 +106,7 @@ RunOutcome RunOne(const std::string& file, const RunOptions& options, const RunA
 // summary.json of what ran, findings of what did not.
 nlohmann::ordered_json ResultJson(const std::string& file, const RunOutcome& outcome) {
   if (outcome.report) return ParseJson<nlohmann::ordered_json>(ToJson(*outcome.report));
-  if (outcome.stiffness != nullptr) {
-    return ParseJson<nlohmann::ordered_json>(ToJson(*outcome.stiffness));
-  }
+  if (outcome.other) return ParseJson<nlohmann::ordered_json>(outcome.other->Json());
   return {{"scenario_file", file},
           {"exit_code", outcome.exit_code},
           {"findings", FindingObjects(outcome.diagnostics)}};
@@ -206,9 +202,8 @@ int Run(const RunArguments& arguments) {
     const RunOutcome outcome = RunOne(file, options, arguments, &progress, &findings);
     exit_code = WorseExit(exit_code, outcome.exit_code);
     if (arguments.json.wanted()) results.push_back(ResultJson(file, outcome));
-    counts += outcome.report      ? CountOf(ViewOf(*outcome.report))
-              : outcome.stiffness ? CountOf(ViewOf(*outcome.stiffness))
-                                  : RunCounts{.scenarios = 1, .bad_input = 1};
+    const std::optional<ResultView> view = outcome.View();
+    counts += view ? CountOf(*view) : RunCounts{.scenarios = 1, .bad_input = 1};
   }
   if (files.size() > 1) SayText(arguments.json.text(), CountLine(counts));
   return WorseExit(exit_code, arguments.json.Write(

@@ -252,7 +252,7 @@ RunOutcome RunStiffnessScenario(const std::string& file, const RunOptions& optio
       outcome.exit_code = 3;
     }
   }
-  outcome.stiffness = std::make_shared<StiffnessReport>(std::move(run.report));
+  outcome.other = std::make_shared<ShownStiffness>(std::move(run.report));
   return outcome;
 }
 

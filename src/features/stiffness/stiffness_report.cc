@@ -622,4 +622,10 @@ std::string ToJson(const StiffnessReport& report) {
   return Dump(json);
 }
 
+ResultView ShownStiffness::View() const { return ViewOf(report_); }
+std::string ShownStiffness::Table(const TableOptions& options) const {
+  return ToTable(report_, options);
+}
+std::string ShownStiffness::Json() const { return ToJson(report_); }
+
 }  // namespace mbv

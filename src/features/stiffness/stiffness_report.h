@@ -44,6 +44,19 @@ struct StiffnessReport : ResultFrame {
   [[nodiscard]] const StiffnessWitness* WithShares() const;
 };
 
+/// As what runs scenarios hands it on.
+class ShownStiffness final : public OtherResult {
+ public:
+  explicit ShownStiffness(StiffnessReport report) : report_(std::move(report)) {}
+  [[nodiscard]] const StiffnessReport& report() const { return report_; }
+  [[nodiscard]] ResultView View() const override;
+  [[nodiscard]] std::string Table(const TableOptions& options) const override;
+  [[nodiscard]] std::string Json() const override;
+
+ private:
+  StiffnessReport report_;
+};
+
 /// summary.json; the common fields are those of a motion's.
 [[nodiscard]] std::string ToJson(const StiffnessReport& report);
 
