@@ -388,7 +388,9 @@ void PredictTurns(const Mechanism& mechanism, double dt_s, BodyStates* states) {
   for (const ScalarRow& row : CoupledCoordinates(mechanism, *states)) {
     coupled.push_back(Later(row, *states, dt_s));
   }
-  states->turns = std::move(turns);
+  // What follows is that of loads (state_loads.h).
+  if (states->turns.size() < turns.size()) states->turns.resize(turns.size());
+  std::ranges::copy(turns, states->turns.begin());
   states->coupled = std::move(coupled);
 }
 

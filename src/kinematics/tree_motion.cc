@@ -1,7 +1,11 @@
 #include "kinematics/tree_motion.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "kinematics/constraints.h"
 #include "math/spatial.h"
+#include "mechanism/followed_state.h"
 #include "mechanism/joint_pose.h"
 
 namespace mbv::internal {
@@ -62,22 +66,124 @@ void TreeMotion::Step(const VecX& dq, std::vector<Pose>* X_FM) const {
 }  // namespace mbv::internal
 
 namespace mbv {
+namespace {
+
+// Where the followed angles begin in BodyStates::turns: coordinates of all joints, then six of
+// every output.
+size_t FirstAngle(const Mechanism& mechanism) {
+  return mechanism.elements.size() + mechanism.drives.size() + mechanism.prescribed.size();
+}
+
+size_t TurnIndex(const Mechanism& mechanism, const Coordinate& coordinate) {
+  const auto index = static_cast<size_t>(coordinate.index);
+  const auto component = static_cast<size_t>(coordinate.component);
+  size_t at = mechanism.elements.size() + index;
+  if (coordinate.kind == Coordinate::Kind::kDrive) return at;
+  if (coordinate.kind == Coordinate::Kind::kPrescribed) return at + mechanism.drives.size();
+  const bool joint = coordinate.kind == Coordinate::Kind::kJoint;
+  at = FirstAngle(mechanism) + component;
+  const size_t before = joint ? index : mechanism.joints.size();
+  for (size_t j = 0; j < before; ++j) {
+    at += static_cast<size_t>(DofsOf(mechanism.joints[j].kind));
+  }
+  return joint ? at : at + 6 * index;
+}
+
+std::vector<double>* AnglesOf(const Mechanism& mechanism, BodyStates* states) {
+  const size_t first = FirstAngle(mechanism);
+  if (states->turns.size() < first) FollowDriven(mechanism, states);
+  if (states->turns.size() > first) return &states->turns;
+  for (const Joint& joint : mechanism.joints) {
+    for (int c = 0; c < DofsOf(joint.kind); ++c) {
+      states->turns.push_back(joint.home[static_cast<size_t>(c)]);
+    }
+  }
+  for (size_t o = 0; o < mechanism.outputs.size(); ++o) {
+    for (int c = 0; c < 6; ++c) {
+      const Coordinate at{Coordinate::Kind::kOutput, static_cast<int>(o), c};
+      states->turns.push_back(HomeValue(mechanism, at));
+    }
+  }
+  return &states->turns;
+}
+
+std::vector<double> InputsOf(const Mechanism& mechanism, const BodyStates& states,
+                             const StateFunction& function) {
+  std::vector<double> inputs;
+  for (const StateFunction::Input& input : function.inputs) {
+    const size_t at = TurnIndex(mechanism, input.coordinate);
+    const double near = at < states.turns.size() ? states.turns[at] : input.near;
+    const ScalarRow row = CoordinateRow(mechanism, input.coordinate, states, near);
+    inputs.push_back(input.rate ? RateOf(row, states.V_WB) : row.value);
+  }
+  return inputs;
+}
+
+}  // namespace
+
+void FollowAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
+                  BodyStates* states) {
+  if (angles.empty()) return;
+  std::vector<double>& turns = *AnglesOf(mechanism, states);
+  for (const FollowedAngle& angle : angles) {
+    double& turn = turns[TurnIndex(mechanism, angle.coordinate)];
+    turn = CoordinateRow(mechanism, angle.coordinate, *states, turn).value;
+  }
+}
+
+void StartAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
+                 BodyStates* states) {
+  if (angles.empty()) return;
+  std::vector<double>& turns = *AnglesOf(mechanism, states);
+  for (const FollowedAngle& angle : angles) {
+    if (angle.coordinate.kind != Coordinate::Kind::kOutput) continue;
+    turns[TurnIndex(mechanism, angle.coordinate)] = angle.start;
+  }
+  FollowAngles(mechanism, angles, states);
+}
+
+void PredictAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
+                   double dt_s, BodyStates* states) {
+  if (angles.empty()) return;
+  const std::vector<double> turns = *AnglesOf(mechanism, states);
+  for (const FollowedAngle& angle : angles) {
+    const size_t at = TurnIndex(mechanism, angle.coordinate);
+    const ScalarRow row = CoordinateRow(mechanism, angle.coordinate, *states, turns[at]);
+    states->turns[at] = row.value + dt_s * (RateOf(row, states->V_WB) +
+                                            0.5 * dt_s * (RateOf(row, states->A_WB) + row.bias));
+  }
+}
+
+double FollowedNear(const Mechanism& mechanism, const BodyStates& states,
+                    const FollowedAngle& angle) {
+  const size_t at = TurnIndex(mechanism, angle.coordinate);
+  return at < states.turns.size() ? states.turns[at] : angle.start;
+}
 
 LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
                     const LoadSample& sample) {
   LoadSample at = sample;
   if (sample.load == nullptr) return at;
-  std::vector<double> inputs;
   for (const Load::Following& part : sample.load->following) {
-    inputs.clear();
-    for (const StateFunction::Input& input : part.function.inputs) {
-      const ScalarRow row = CoordinateRow(mechanism, input.coordinate, states, input.near);
-      inputs.push_back(input.rate ? RateOf(row, states.V_WB) : row.value);
-    }
     Vec3& vector = part.component < 3 ? at.force : at.moment;
-    vector[part.component % 3] += part.function.value(sample.time_s, inputs);
+    vector[part.component % 3] +=
+        part.function.value(sample.time_s, InputsOf(mechanism, states, part.function));
   }
   return at;
+}
+
+RunSummary CheckLoadsAt(const Mechanism& mechanism, const BodyStates& states,
+                        const std::vector<LoadSample>& samples) {
+  for (const LoadSample& sample : samples) {
+    if (sample.load == nullptr) continue;
+    for (const Load::Following& part : sample.load->following) {
+      const std::vector<double> inputs = InputsOf(mechanism, states, part.function);
+      const double value = part.function.value(sample.time_s, inputs);
+      if (std::isfinite(value)) continue;
+      return LoadHasNoValue(mechanism, *sample.load, part, sample.time_s, inputs, value);
+    }
+  }
+  return RunSummary::Done();
 }
 
 }  // namespace mbv

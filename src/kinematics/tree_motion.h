@@ -5,6 +5,8 @@
 
 #include <vector>
 
+#include "base/run_summary.h"
+#include "mechanism/followed_state.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
 
@@ -39,9 +41,28 @@ class TreeMotion {
 
 namespace mbv {
 
+/// Brings what loads follow of `states->turns` to the poses, which lie within half a rotation of
+/// those it was last brought to (or of home). It stands behind what elements, drives and prescribed
+/// joints count.
+void FollowAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
+                  BodyStates* states);
+/// The same at t = 0, where the angles of outputs begin near their start values.
+void StartAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
+                 BodyStates* states);
+/// As PredictTurns(), which leaves this part as it is.
+void PredictAngles(const Mechanism& mechanism, const std::vector<FollowedAngle>& angles,
+                   double dt_s, BodyStates* states);
+/// The angle where it was followed to last, else its start.
+[[nodiscard]] double FollowedNear(const Mechanism& mechanism, const BodyStates& states,
+                                  const FollowedAngle& angle);
+
 /// The load at the states: its sample with what follows from coordinates and rates added. `load`
 /// and `time_s` of the sample must be set where there is such a part.
 [[nodiscard]] LoadSample AtStates(const Mechanism& mechanism, const BodyStates& states,
                                   const LoadSample& sample);
+
+/// Names the first load that is not finite at the states.
+[[nodiscard]] RunSummary CheckLoadsAt(const Mechanism& mechanism, const BodyStates& states,
+                                      const std::vector<LoadSample>& samples);
 
 }  // namespace mbv

@@ -82,6 +82,7 @@ ClosureSolver::ClosureSolver(const Mechanism& mechanism, const Motion& motion,
       lever_(LongestLever(mechanism)),
       commands_(AllCommands(mechanism, motion)),
       spins_(IdleSpins(mechanism)),
+      followed_(FollowedAngles(mechanism, motion)),
       system_(mechanism.bodies.size(), length_),
       predictor_(length_) {
   MBV_DEMAND(mechanism.X_WB_home.size() == mechanism.bodies.size(), mechanism.name);
@@ -221,6 +222,7 @@ void ClosureSolver::Accept(const VecX& target, Trial* trial) {
   std::swap(states_, trial->states);
   FollowElements(mechanism_, &states_);
   FollowDriven(mechanism_, &states_);
+  FollowAngles(mechanism_, followed_, &states_);
   std::swap(near_values_, trial->near_values);
   target_ = target;
   orientation_ = system_.determinant_sign();
@@ -335,6 +337,7 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
     trial_.states = states_;
     trial_.near_values = near_values_;
     PredictTurns(mechanism_, dt, &trial_.states);
+    PredictAngles(mechanism_, followed_, dt, &trial_.states);
     predictor_.Predict(dt);
     MoveBodies(predictor_.step(), &trial_.states);
     if (Newton(target, true, &trial_) == Step::kDone) {
@@ -347,6 +350,7 @@ RunSummary ClosureSolver::Solve(const CommandSample& command) {
   RunSummary summary = RunSummary::Done();
   if (!done) summary = Follow(target, first ? options_.homotopy_steps : 4);
   if (first && summary.ok()) summary = TakeLeastTurns();
+  if (first && summary.ok()) StartAngles(mechanism_, followed_, &states_);
   if (summary.ok()) summary = CheckPose();
   if (summary.ok()) summary = SolveRates(command);
   if (summary.ok()) summary = TransportTurns(command);

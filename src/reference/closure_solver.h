@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "base/run_summary.h"
+#include "kinematics/tree_motion.h"
 #include "math/parallel_transport.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
@@ -97,6 +98,7 @@ class ClosureSolver {
   const double length_, lever_;
   std::vector<Command> commands_;  ///< of the motion, then prescribed joints held at home
   const std::vector<Spin> spins_;  ///< idle
+  const std::vector<FollowedAngle> followed_;
   SquareSystem system_;
   RowSet rows_;  ///< all joint rows and couplings, then the command rows, then idle spins
   int first_coupling_ = 0, joint_rows_ = 0;

@@ -211,6 +211,11 @@ RunSummary ForceSolver::Solve(const std::vector<LoadSample>& loads, ReferenceSam
   std::vector<Vec6> required;
   sample->friction_signs = FrictionDirections(mechanism_, sample->states, duration_s_);
   RequiredWrenches(mechanism_, sample->states, loads, sample->friction_signs, &required);
+  if (!Stack(required).allFinite()) {
+    if (RunSummary summary = CheckLoadsAt(mechanism_, sample->states, loads); !summary.ok()) {
+      return summary;
+    }
+  }
   if (RunSummary summary = CheckSpinsIdle(spins_, sample->states, required, length_);
       !summary.ok()) {
     return summary;

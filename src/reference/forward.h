@@ -1,9 +1,9 @@
 // Free motion of the reference: forward dynamics of any Mechanism.
 //
-// Poses and twists of all bodies are integrated by Runge–Kutta–Fehlberg 7(8) with error control
-// (Boost.Odeint) from accelerations of FreeDynamics, and with them the work of every drive; after
-// every step the poses are put back onto the loops and commands, then the twists. Poses where the
-// loops lose a constraint for an instant are passed (free_motion.h). No MuJoCo and no paper
+// Poses and twists of all bodies are integrated by RK8(7)13M [Prince, Dormand 1981] with error
+// control (Boost.Odeint) from accelerations of FreeDynamics, and with them the work of every drive;
+// after every step the poses are put back onto the loops and commands, then the twists. Poses where
+// the loops lose a constraint for an instant are passed (free_motion.h). No MuJoCo and no paper
 // formula.
 #pragma once
 

@@ -73,6 +73,7 @@ FreeDynamics::FreeDynamics(const Mechanism& mechanism, const Motion& motion)
       size_(6 * (static_cast<int>(mechanism.bodies.size()) - 1)),
       dofs_(static_cast<int>(motion.initial.size())),
       spins_(IdleSpins(mechanism)),
+      followed_(FollowedAngles(mechanism, motion)),
       near_(mechanism, length_),
       loaded_(LoadedElements(mechanism)) {
   body_scale_.setOnes(size_);
@@ -212,6 +213,7 @@ void FreeDynamics::AddDriveForces(double t_s, const BodyStates& states,
 RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
   FollowCouplings(mechanism_, states);
   FollowElements(mechanism_, states);
+  FollowAngles(mechanism_, followed_, states);
   Factor(t_s, *states);
   if (!(pivot_ > kLost)) return Singular(t_s, *states);
   if (RunSummary summary = CheckDofs(t_s); !summary.ok()) return summary;
@@ -222,6 +224,11 @@ RunSummary FreeDynamics::Accelerate(double t_s, BodyStates* states) {
 
   std::vector<Vec6> required, drives(mechanism_.bodies.size(), Vec6::Zero());
   RequiredWrenches(mechanism_, *states, command_.loads, SignsAt(*states), &required);
+  if (!Stack(required).allFinite()) {
+    if (RunSummary summary = CheckLoadsAt(mechanism_, *states, command_.loads); !summary.ok()) {
+      return summary;
+    }
+  }
   if (RunSummary summary = CheckSpinsIdle(spins_, *states, required, length_); !summary.ok()) {
     summary.time_s = t_s;
     return summary;
@@ -268,11 +275,17 @@ RunSummary FreeDynamics::AccelerateNear(double t_s, BodyStates* states) {
   if (!near_.chosen() || !phase_.held.empty() || !loaded_.empty()) return Accelerate(t_s, states);
   FollowCouplings(mechanism_, states);
   FollowElements(mechanism_, states);
+  FollowAngles(mechanism_, followed_, states);
   FillRows(t_s, *states);
   VecX rates = -Eigen::Map<const VecX>(rows_.bias.data(), rows_.size());
   rates.tail(command_.acceleration.size()) += command_.acceleration;
   Unstack(VecX::Zero(size_), &states->A_WB);
   const VecX needed = NeededWrenches(t_s, *states);
+  if (!needed.allFinite()) {
+    if (RunSummary summary = CheckLoadsAt(mechanism_, *states, command_.loads); !summary.ok()) {
+      return summary;
+    }
+  }
   std::vector<Vec6> required(mechanism_.bodies.size(), Vec6::Zero());
   Unstack(needed, &required);
   if (RunSummary summary = CheckSpinsIdle(spins_, *states, required, length_); !summary.ok()) {
@@ -341,6 +354,7 @@ RunSummary FreeDynamics::Project(double t_s, BodyStates* states, double* moved) 
   for (int i = 0; i < kMostCorrections; ++i) {
     FollowCouplings(mechanism_, states);
     FollowElements(mechanism_, states);
+    FollowAngles(mechanism_, followed_, states);
     Factor(t_s, *states);
     const VecX r = Eigen::Map<const VecX>(rows_.value.data(), rows_.size());
     const Held held = HeldRows(*states);

@@ -28,6 +28,7 @@
 
 #include "base/run_summary.h"
 #include "base/types.h"
+#include "kinematics/tree_motion.h"
 #include "mechanism/idle_spins.h"
 #include "mechanism/mechanism.h"
 #include "mechanism/motion.h"
@@ -185,6 +186,7 @@ class FreeDynamics {
   const double length_, lever_;
   const int size_, dofs_;
   const std::vector<Spin> spins_;  ///< idle: their rows stand between couplings and commands
+  const std::vector<FollowedAngle> followed_;
   VecX body_scale_;
   RowSet rows_;
   int joint_rows_ = 0;

@@ -4,6 +4,8 @@
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
+#include <boost/array.hpp>
 #include <boost/numeric/odeint.hpp>
 #include <cmath>
 #include <complex>
@@ -30,12 +32,72 @@ constexpr long kProgressSteps = 64;  // steps from one report of the progress to
 constexpr long kLook = 1000;
 constexpr double kSurely = 1.1;
 
+// RK8(7)13M [Prince, Dormand 1981, Table 2]. Its error estimate compares weights at all times of a
+// step. That of Fehlberg's 7(8), (41/840) h (k₁ + k₁₁ − k₁₂ − k₁₃) with stages at both ends of the
+// step only, vanishes where accelerations depend on time alone, and does not see what jumps between
+// the ends.
+constexpr size_t kStages = 13;
+using Scheme = odeint::explicit_error_generic_rk<kStages, 8, 8, 7, std::vector<double>>;
+
+template <typename... Numbers>
+boost::array<double, sizeof...(Numbers)> Row(Numbers... numbers) {
+  return {{static_cast<double>(numbers)...}};
+}
+
 }  // namespace
 
+class PrinceDormand : public Scheme {
+ public:
+  PrinceDormand() : Scheme(Inner(), Eighth(), LessSeventh(), Times()) {}
+
+ private:
+  static coef_a_type Inner() {
+    return coef_a_type(
+        Row(1.0 / 18), Row(1.0 / 48, 1.0 / 16), Row(1.0 / 32, 0, 3.0 / 32),
+        Row(5.0 / 16, 0, -75.0 / 64, 75.0 / 64), Row(3.0 / 80, 0, 0, 3.0 / 16, 3.0 / 20),
+        Row(29443841.0 / 614563906, 0, 0, 77736538.0 / 692538347, -28693883.0 / 1125000000,
+            23124283.0 / 1800000000),
+        Row(16016141.0 / 946692911, 0, 0, 61564180.0 / 158732637, 22789713.0 / 633445777,
+            545815736.0 / 2771057229, -180193667.0 / 1043307555),
+        Row(39632708.0 / 573591083, 0, 0, -433636366.0 / 683701615, -421739975.0 / 2616292301,
+            100302831.0 / 723423059, 790204164.0 / 839813087, 800635310.0 / 3783071287),
+        Row(246121993.0 / 1340847787, 0, 0, -37695042795.0 / 15268766246, -309121744.0 / 1061227803,
+            -12992083.0 / 490766935, 6005943493.0 / 2108947869, 393006217.0 / 1396673457,
+            123872331.0 / 1001029789),
+        Row(-1028468189.0 / 846180014, 0, 0, 8478235783.0 / 508512852, 1311729495.0 / 1432422823,
+            -10304129995.0 / 1701304382, -48777925059.0 / 3047939560, 15336726248.0 / 1032824649,
+            -45442868181.0 / 3398467696, 3065993473.0 / 597172653),
+        Row(185892177.0 / 718116043, 0, 0, -3185094517.0 / 667107341, -477755414.0 / 1098053517,
+            -703635378.0 / 230739211, 5731566787.0 / 1027545527, 5232866602.0 / 850066563,
+            -4093664535.0 / 808688257, 3962137247.0 / 1805957418, 65686358.0 / 487910083),
+        Row(403863854.0 / 491063109, 0, 0, -5068492393.0 / 434740067, -411421997.0 / 543043805,
+            652783627.0 / 914296604, 11173962825.0 / 925320556, -13158990841.0 / 6184727034,
+            3936647629.0 / 1978049680, -160528059.0 / 685178525, 248638103.0 / 1413531060, 0));
+  }
+  static coef_c_type Times() {
+    return Row(0, 1.0 / 18, 1.0 / 12, 1.0 / 8, 5.0 / 16, 3.0 / 8, 59.0 / 400, 93.0 / 200,
+               5490023248.0 / 9719169821, 13.0 / 20, 1201146811.0 / 1299019798, 1, 1);
+  }
+  static coef_b_type Eighth() {
+    return Row(14005451.0 / 335480064, 0, 0, 0, 0, -59238493.0 / 1068277825,
+               181606767.0 / 758867731, 561292985.0 / 797845732, -1041891430.0 / 1371343529,
+               760417239.0 / 1151165299, 118820643.0 / 751138087, -528747749.0 / 2220607170,
+               1.0 / 4);
+  }
+  static coef_b_type LessSeventh() {
+    const coef_b_type seventh =
+        Row(13451932.0 / 455176623, 0, 0, 0, 0, -808719846.0 / 976000145, 1757004468.0 / 5645159321,
+            656045339.0 / 265891186, -3867574721.0 / 1518517206, 465885868.0 / 322736535,
+            53011238.0 / 667516719, 2.0 / 45, 0);
+    coef_b_type less = Eighth();
+    for (size_t i = 0; i < kStages; ++i) less[i] -= seventh[i];
+    return less;
+  }
+};
+
 struct FreeMotion::Stepper {
-  using Fehlberg = odeint::runge_kutta_fehlberg78<State>;
-  odeint::controlled_runge_kutta<Fehlberg> controlled;
-  Fehlberg plain = {};  ///< for steps of a given length
+  odeint::controlled_runge_kutta<PrinceDormand> controlled;
+  PrinceDormand plain = {};  ///< for steps of a given length
 
   explicit Stepper(double tolerance)
       : controlled(
@@ -148,7 +210,13 @@ RunSummary FreeMotion::Accept(const State& x, double t_s) {
   now_.pivot = dynamics_.pivot();
   largest_pivot_ = std::max(largest_pivot_, now_.pivot);
   ++steps_;
+  const size_t crossings = crossings_.size();
   Watch();
+  // Beyond a pose that no bridge leads over, steps may have gone on in another assembly.
+  if (friction_elements_.empty() && crossings_.size() > crossings && Passes(crossings_.back())) {
+    trouble_ = RunSummary::Done();
+    return NoWayOn(0.0);
+  }
   TryBridge();
   return RunSummary::Done();
 }
@@ -268,10 +336,10 @@ namespace {
 // Steps grow by this root of the amplitude: the scheme of order 7 is the one whose error is
 // controlled.
 constexpr double kOrder = 7.0;
-// Angle λh [rad] beyond which a step of Runge–Kutta–Fehlberg 7(8) is unstable for sure, so that the
-// estimate is no larger than what is needed; and one so small that no tolerance above round-off
-// asks for it.
-constexpr double kStable = 10.0, kTooFine = 0.02;
+// Angle |λh| [rad] beyond which a step of RK8(7)13M is unstable for every λ in the left half plane,
+// so that the estimate is no larger than what is needed; and one so small that no tolerance above
+// round-off asks for it.
+constexpr double kStable = 5.5, kTooFine = 0.02;
 
 // What yields along a coordinate of gradient u.
 struct Yielding {
@@ -369,6 +437,10 @@ constexpr double kSpacing = 1.0;
 // A bridge whose end must be moved farther onto the loops [rad, characteristic lengths], or whose
 // energy and work differ by a larger share, does not follow the motion.
 constexpr double kMoved = 1e-7, kUnbalanced = 1e-8;
+// Where on a bridge its rates are compared with those of the dynamics; not near the pose.
+constexpr std::array<double, 3> kCompared = {0.25, 0.75, 1.0};
+// Accelerations divide the round-off of a bridge's states by the pivot: up to this share of rates.
+constexpr double kDivided = 1e-6;
 
 }  // namespace
 
@@ -440,7 +512,37 @@ bool FreeMotion::Land(const Hermite& way, double at_s, Node* node) {
   const Energies to = EnergyOf(mechanism_, node->states);
   const double change = to.kinetic + to.gravity + to.springs - from.kinetic - from.gravity -
                         from.springs - (node->work - now_.work).sum();
-  return moved < kMoved && std::abs(change) <= kUnbalanced * std::max(from.kinetic, to.kinetic);
+  const double kinetic = std::max(from.kinetic, to.kinetic);
+  if (!(moved < kMoved && std::abs(change) <= kUnbalanced * kinetic)) return false;
+  return std::ranges::all_of(kCompared, [&](double share) {
+    return RatesFit(way, now_.time_s + share * (at_s - now_.time_s), at_s, kinetic);
+  });
+}
+
+// States and work come from one polynomial, which can balance energy along a wrong motion: here its
+// rates meet the dynamics. With the squares of the distances to its nodes the polynomial's error e
+// grows as ∏ (t − t_k)², so that e = ė / Σ 2/(t − t_k) <= ė (t_b − t_0)/2 for a bridge from t_0 to
+// t_b. Such errors of pose and work have the limits of Land().
+bool FreeMotion::RatesFit(const Hermite& way, double t_s, double to_s, double kinetic) {
+  VecX value, of_way;
+  way.Evaluate(t_s, &value, &of_way);
+  State computed;
+  trouble_ = RunSummary::Done();
+  Rates({value.begin(), value.end()}, &computed, t_s);
+  if (!trouble_.ok()) return false;
+  const VecX error = 0.5 * (to_s - now_.time_s) *
+                     (of_way - Eigen::Map<const VecX>(computed.data(), of_way.size()));
+  const auto bodies = static_cast<Eigen::Index>(now_.states.X_WB.size()) - 1;
+  const Eigen::Index works = kPerBody * bodies;
+  double pose = 0.0, twist = 0.0, fastest = 0.0;
+  for (Eigen::Index at = 0; at < works; at += kPerBody) {
+    pose = std::max(pose, error.segment<7>(at).norm());
+    twist = std::max(twist, error.segment<6>(at + 7).norm());
+    fastest = std::max(fastest, value.segment<6>(at + 7).norm());
+  }
+  const double work = work_unit_ * std::abs(error.tail(error.size() - works).sum());
+  return error.allFinite() && pose < kMoved && twist <= kDivided * fastest &&
+         work <= kUnbalanced * kinetic;
 }
 
 void FreeMotion::TryBridge() {
@@ -455,7 +557,9 @@ void FreeMotion::TryBridge() {
   trouble_ = RunSummary::Done();
   if (!way) return;
   Node end;
-  if (!Land(*way, landing, &end)) return;
+  const bool holds = Land(*way, landing, &end);
+  trouble_ = RunSummary::Done();
+  if (!holds) return;  // a later one is shorter
   const auto states_at = [&](double t_s, BodyStates* states) {
     VecX x, rates;
     way->Evaluate(t_s, &x, &rates);
@@ -516,6 +620,10 @@ SingularityCrossing FreeMotion::Closest(double first_s, double last_s, const Sta
   SingularityCrossing crossing{.time_s = t_s, .pivot = pivot_at(t_s), .joint = {}};
   crossing.joint = dynamics_.SoftJoint(states);
   return crossing;
+}
+
+bool FreeMotion::Passes(const SingularityCrossing& passage) const {
+  return passage.pivot < kPassed * largest_pivot_;
 }
 
 std::vector<SingularityCrossing> FreeMotion::Crossings() const {

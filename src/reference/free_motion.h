@@ -1,12 +1,12 @@
 // Integration of a free motion from sample to sample. Internal to reference/.
 //
-// Runge–Kutta–Fehlberg 7(8) between the times where forces, loads or commands break. Where the
+// Runge–Kutta of orders 8(7) between the times where forces, loads or commands break. Where the
 // loops lose a constraint for an instant, the equations of motion divide by zero although the
 // motion itself goes on smoothly [Bayo, Avello 1994]. Shortly before such a pose the motion is
 // continued by the polynomial through states and rates of the last nodes to the mirror time behind
 // it, put back onto loops and commands, and integrated on from there. The bridge holds only if the
-// loops are closed and the energy balances at its end; otherwise the integration goes on step by
-// step and ends at the pose.
+// loops are closed and the energy balances at its end, and its rates are those of the dynamics;
+// otherwise the integration goes on step by step and ends at the pose.
 //
 // Dry friction (free_friction.cc): while every element slides in one direction or sticks, the
 // equations are smooth. After each step the rates of what slides and the load of what sticks
@@ -92,7 +92,9 @@ class FreeMotion {
   void TryBridge();
   [[nodiscard]] std::optional<Hermite> WayOn(double gap_s);
   [[nodiscard]] bool Land(const Hermite& way, double at_s, Node* node);
+  [[nodiscard]] bool RatesFit(const Hermite& way, double t_s, double to_s, double kinetic);
   void Watch();
+  [[nodiscard]] bool Passes(const SingularityCrossing& passage) const;
 
   // What ends a phase of friction: some elements come to rest, or what is held starts.
   struct FrictionEvent {

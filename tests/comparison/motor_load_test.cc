@@ -102,6 +102,18 @@ TEST(MotorLoad, TheRotorAsksForItsOwnAcceleration) {
   EXPECT_NEAR(LoadOf(motor, SineTrace()).inertia_ratio, 12.0 / 0.04, 1e-9);
 }
 
+// The continuous torque is that of the speed of every instant: with a curve that falls from 2.5 at
+// rest to 0.5 at V, |A sin| is above 2.5 − 2 |sin| where |sin| > 0.625; it is never above 2.5.
+TEST(MotorLoad, TheContinuousTorqueIsThatOfTheSpeedOfEveryInstant) {
+  Motor motor;
+  motor.drive = 0;
+  motor.continuous_curve = {{0.0, 2.5}, {kV, 0.5}};
+  EXPECT_NEAR(LoadOf(motor, SineTrace()).above_continuous, 1.0 - 2 * std::asin(0.625) / pi, 2e-3);
+  // A quarter of a period late: 2 |cos| > 2.5 − 2 |sin|, where |sin| + |cos| > 1.25.
+  const double edge = std::asin(1.25 / std::sqrt(2.0)) - pi / 4;
+  EXPECT_NEAR(LoadOf(motor, SineTrace(pi / 2)).above_continuous, 1.0 - 4 * edge / pi, 2e-3);
+}
+
 TEST(MotorLoad, CurvesAreStraightBetweenTheirPointsAndEnd) {
   Motor motor;
   motor.peak_curve = {{0.0, 4.0}, {20.0, 4.0}, {40.0, 2.0}};

@@ -2,7 +2,10 @@
 #pragma once
 
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <span>
+#include <string>
 #include <vector>
 
 #include "base/run_summary.h"
@@ -215,6 +218,60 @@ inline Motion FloatFree(const Vec6& rates, double duration_s) {
     motion.initial.push_back({"float", {Coordinate::Kind::kJoint, 0, c}, 0.0, rates[c]});
   }
   return motion;
+}
+
+/// A bar of 1.3 kg on a pivot about z with a motor, 0.3 rad from x; its inertia about the pivot is
+/// 0.072 kg m². Its yaw is an output.
+inline Mechanism MakePivotedBar(double gravity = 9.81) {
+  Mechanism m;
+  m.name = "bar";
+  m.gravity_W = Vec3(0, -gravity, 0);
+  Body world;
+  world.name = "world";
+  m.bodies = {world, MakeBody("bar", 1.3, {0.2, 0, 0}, {0.01, 0.02, 0.02})};
+  m.joints = {MakeJoint("pivot", JointKind::kRevolute, 0, {0, 0, 0}, 1, {0, 0, 0}, 0.3)};
+  m.drives.push_back({.name = "motor", .kind = JointDrive{0, 0}, .range = {}});
+  AddTree(&m);
+  m.X_WB_home = TreePoses(m, {m.joints[0].guess});
+  Output output;
+  output.name = "bar";
+  output.body = 1;
+  m.outputs = {output};
+  return m;
+}
+
+/// The bar's angle as the pivot's, the motor's and the output's.
+inline constexpr Coordinate kAnglesOfBar[] = {{Coordinate::Kind::kJoint, 0, 0},
+                                              {Coordinate::Kind::kDrive, 0, 0},
+                                              {Coordinate::Kind::kOutput, 0, 5}};
+
+/// A moment about z on the bar that follows one of its angles.
+inline Load MomentOnBar(const Coordinate& angle, std::function<double(double)> moment) {
+  Load load{.name = "follower", .body = 1, .force = {}, .moment = {}};
+  load.following.push_back(
+      {5, {.inputs = {{angle, false, 0.3}}, .value = [=](double, std::span<const double> x) {
+             return moment(x[0]);
+           }}});
+  return load;
+}
+/// −k (angle − 0.4).
+inline Load SpringOn(const Coordinate& angle, double k) {
+  return MomentOnBar(angle, [k](double q) { return -k * (q - 0.4); });
+}
+/// Has no finite value beyond an angle.
+inline Load NotFiniteBeyond(double angle, bool infinite) {
+  return MomentOnBar(kAnglesOfBar[0], [=](double q) {
+    return infinite ? (q > angle ? HUGE_VAL : 0.0) : std::sqrt(angle - q);
+  });
+}
+/// Component, time and coordinate of such a load.
+inline bool NamesTheLoad(const RunSummary& summary, bool infinite) {
+  const auto contains = [&](const std::string& text) {
+    return summary.message.find(text) != std::string::npos;
+  };
+  return summary.stop == Stop::kUnsupported && summary.where == "loads.follower.moment[2]" &&
+         contains(infinite ? "is infinite at t = " : "is not a number at t = ") &&
+         contains("pivot.position = ");
 }
 
 /// Everything driven stays at these positions.

@@ -129,6 +129,28 @@ TEST(Forward, AConstantForceAcceleratesAMassEvenly) {
   EXPECT_LT(run.uncertainty, kIntegrated);
 }
 
+// Samples are periods of the force, or a fraction of one: no stage of a step shows by itself what
+// happens between.
+TEST(Forward, AForceOfTimeAloneIsFollowedBetweenSamples) {
+  const double mass = 2.0, v0 = 2.5;
+  const Mechanism m = SpringMass(mass, 0.0, 0.0);
+  for (const double frequency : {5.0, 20.0, 63.0, 200.0}) {
+    Motion motion = FreeMotion(m, 0.0, v0, 0.6);
+    motion.forces[0].force = {{SineTerm{100.0, frequency, 0.0}}};
+    const ForwardRun run = RunForwardReference(m, motion);
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    const double w = 2.0 * std::numbers::pi * frequency, a = 100.0 / mass;
+    const auto x = ColumnOf(run.trace, "motor.position");
+    double error = 0.0;
+    for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+      const double t = run.trace.time_s[i];
+      error = std::max(error, std::abs(x[i] - v0 * t - a / w * (t - std::sin(w * t) / w)));
+    }
+    EXPECT_LT(error, kIntegrated) << frequency;
+    EXPECT_LT(run.uncertainty, kIntegrated) << frequency;
+  }
+}
+
 TEST(Forward, WorkAndEnergyBalanceWithDamperAndMotor) {
   const Mechanism m = SpringMass(2.0, 50.0, 3.0);
   Motion motion = FreeMotion(m, 0.1, 0.4, 3.0);
@@ -165,6 +187,37 @@ TEST(Forward, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
     EXPECT_NEAR(run.singular[k].time_s, ((k + 1.0) * std::numbers::pi - start) / rate, 1e-6);
     EXPECT_FALSE(run.singular[k].joint.empty());
   }
+}
+
+// Of J = 0.08 kg m²: q̈ = τ/J. What oscillates faster than a bridge follows is not passed in
+// silence: a shorter bridge is found, or the run ends at the pose.
+TEST(Forward, AParallelogramUnderAnOscillatingTorqueFollowsItOrStops) {
+  const double start = 2.5, rate = 2.5, inertia = 0.08;
+  const Mechanism m = MakeParallelogram(start);
+  constexpr double kMoved = 1e-7;  // what a bridge may be off its loops
+  int followed = 0;
+  for (const double frequency : {1.0, 5.0, 20.0, 40.0, 63.0, 80.0, 100.0, 160.0, 200.0}) {
+    for (const double torque : {0.01, 1.0, 5.0}) {
+      Motion motion = FreeMotion(m, start, rate, 0.6);
+      motion.forces[0].force = {{SineTerm{torque, frequency, 0.0}}};
+      const ForwardRun run = RunForwardReference(m, motion);
+      const double w = 2.0 * std::numbers::pi * frequency, a = torque / inertia;
+      const auto angle = ColumnOf(run.trace, "motor.position");
+      double error = 0.0;
+      for (size_t i = 0; i < run.trace.time_s.size(); ++i) {
+        const double t = run.trace.time_s[i];
+        if (std::isnan(angle[i])) break;
+        error = std::max(error,
+                         std::abs(angle[i] - start - rate * t - a / w * (t - std::sin(w * t) / w)));
+      }
+      EXPECT_LT(error, kMoved) << frequency << " Hz, " << torque << " N m";
+      if (!run.summary.ok()) {
+        EXPECT_EQ(run.summary.stop, Stop::kSingular) << run.summary.message;
+      }
+      followed += run.summary.ok() ? 1 : 0;
+    }
+  }
+  EXPECT_GE(followed, 9);
 }
 
 TEST(Forward, AStartInASingularPoseIsReportedAtOnce) {

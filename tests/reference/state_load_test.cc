@@ -7,21 +7,6 @@
 namespace mbv::fixtures {
 namespace {
 
-// A bar on a hinge about z.
-Mechanism Bar() {
-  Mechanism m;
-  m.name = "bar";
-  m.gravity_W = Vec3(0, -9.81, 0);
-  m.bodies = {MakeBody("world", 0.0, Vec3::Zero(), Vec3::Zero()),
-              MakeBody("bar", 1.3, Vec3(0.2, 0, 0), Vec3(0.01, 0.02, 0.02))};
-  m.joints = {MakeJoint("pivot", JointKind::kRevolute, 0, Vec3::Zero(), 1, Vec3::Zero(), 0.3)};
-  m.joints[0].axis = Vec3::UnitZ();
-  m.drives = {{.name = "motor", .kind = JointDrive{0, 0}, .range = {}}};
-  AddTree(&m);
-  m.X_WB_home = TreePoses(m, {m.joints[0].guess});
-  return m;
-}
-
 // −k (q − 0.4) − c q̇ + a t about z.
 Load Follower(double k, double c, double a) {
   const Coordinate q{Coordinate::Kind::kJoint, 0, 0};
@@ -39,7 +24,7 @@ Motion Swing(const Mechanism& m) {
 }
 
 TEST(StateLoads, AreTheSpringAndTheDamperThatTheyDescribe) {
-  const Mechanism plain = Bar();
+  const Mechanism plain = MakePivotedBar();
   Mechanism sprung = plain;
   sprung.elements = {{.name = "k", .joint = 0, .law = SpringLaw{{3.0}, 0.4}},
                      {.name = "c", .joint = 0, .law = DampingLaw{0.2}}};
@@ -66,7 +51,7 @@ TEST(StateLoads, AreTheSpringAndTheDamperThatTheyDescribe) {
 }
 
 TEST(StateLoads, MoveAFreeBarAsTheSpringDoes) {
-  const Mechanism plain = Bar();
+  const Mechanism plain = MakePivotedBar();
   Mechanism sprung = plain;
   sprung.elements = {{.name = "k", .joint = 0, .law = SpringLaw{{3.0}, 0.4}},
                      {.name = "c", .joint = 0, .law = DampingLaw{0.2}}};
@@ -81,15 +66,78 @@ TEST(StateLoads, MoveAFreeBarAsTheSpringDoes) {
             1e-9);
 }
 
-// A wheel that has turned many times: angles are told within half a turn of home.
-TEST(StateLoads, TakeAnglesWithinHalfATurnOfHome) {
-  const Mechanism m = Bar();
-  Motion motion = DriveMotion(m, {{{ConstantTerm{0.3 + 20 * std::numbers::pi + 1.0}}}}, 0.1, 0.1);
-  motion.loads = {Follower(3.0, 0.0, 0.0)};
+// Through three rotations, and from ten rotations beside home.
+TEST(StateLoads, CountRotationsOfWhatTheyFollowInCommandedMotion) {
+  const Mechanism m = MakePivotedBar(0.0);
+  for (const double start : {0.3, 0.3 + 20 * std::numbers::pi + 1.0}) {
+    for (const Coordinate& coordinate : kAnglesOfBar) {
+      const Profile turning{{ConstantTerm{start}, RampTerm{6.0 * std::numbers::pi}}};
+      Motion motion = DriveMotion(m, {turning}, 1.0, 0.05);
+      motion.loads = {SpringOn(coordinate, 3.0)};
+      const ReferenceRun run = RunReference(m, motion);
+      ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+      // Joints and drives count from home; an output that nothing commands begins next to it.
+      const bool output = coordinate.kind == Coordinate::Kind::kOutput;
+      const double first = output && start > 1.0 ? 1.3 : start;
+      for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+        const double angle = first + 6.0 * std::numbers::pi * 0.05 * static_cast<double>(i);
+        EXPECT_NEAR(At(run.trace, i, "motor.force"), 3.0 * (angle - 0.4), 1e-9)
+            << start << " " << i;
+      }
+    }
+  }
+}
+
+TEST(StateLoads, CountAnOutputFromItsCommand) {
+  const Mechanism m = MakePivotedBar(0.0);
+  Motion motion;
+  motion.duration_s = 1.0;
+  motion.sample_s = 0.05;
+  const double start = 20 * std::numbers::pi + 1.3;
+  motion.commands = {Commanded("bar.yaw", Coordinate::Kind::kOutput, 0, 5,
+                               {{ConstantTerm{start}, RampTerm{9.0}}})};
+  motion.loads = {SpringOn(kAnglesOfBar[2], 3.0)};
   const ReferenceRun run = RunReference(m, motion);
   ASSERT_TRUE(run.summary.ok()) << run.summary.message;
-  const double weight = 1.3 * 9.81 * 0.2 * std::cos(1.3);
-  EXPECT_NEAR(At(run.trace, 0, "motor.force"), weight + 3.0 * (1.3 - 0.4), 1e-12);
+  for (Eigen::Index i = 0; i < run.trace.values.rows(); ++i) {
+    const double angle = start + 9.0 * 0.05 * static_cast<double>(i);
+    EXPECT_NEAR(At(run.trace, i, "motor.force"), 3.0 * (angle - 0.4), 1e-9) << i;
+  }
+}
+
+// J q̈ = −k (q − 0.4), far beyond half a rotation.
+TEST(StateLoads, CountRotationsOfWhatTheyFollowInFreeMotion) {
+  const Mechanism m = MakePivotedBar(0.0);
+  const double inertia = 0.02 + 1.3 * 0.2 * 0.2, k = 0.5, w = std::sqrt(k / inertia);
+  for (const Coordinate& coordinate : kAnglesOfBar) {
+    Motion motion = FreeMotion(m, 0.4, 40.0, 2.0);
+    motion.loads = {SpringOn(coordinate, k)};
+    const ForwardRun run = RunForwardReference(m, motion);
+    ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+    const VecX angle = ColumnOf(run.trace, "motor.position");
+    for (Eigen::Index i = 0; i < angle.size(); ++i) {
+      const double t = run.trace.time_s[static_cast<size_t>(i)];
+      EXPECT_NEAR(angle[i], 0.4 + 40.0 / w * std::sin(w * t), 1e-8) << i;
+    }
+    EXPECT_GT(angle.maxCoeff(), 4.0 * std::numbers::pi);
+  }
+}
+
+// Named with component, coordinate and time.
+TEST(StateLoads, ThatAreNotFiniteAreNamed) {
+  const Mechanism m = MakePivotedBar();
+  for (const bool infinite : {false, true}) {
+    const Load load = NotFiniteBeyond(0.9, infinite);
+    Motion commanded = DriveMotion(m, {{{ConstantTerm{0.3}, RampTerm{1.0}}}}, 1.0, 0.1);
+    commanded.loads = {load};
+    Motion free = FreeMotion(m, 0.3, 6.0, 1.0);
+    free.loads = {load};
+    for (const RunSummary& summary :
+         {RunReference(m, commanded).summary, RunForwardReference(m, free).summary}) {
+      EXPECT_TRUE(NamesTheLoad(summary, infinite)) << summary.message;
+      EXPECT_GT(summary.time_s, 0.05);
+    }
+  }
 }
 
 }  // namespace

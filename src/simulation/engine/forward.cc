@@ -434,6 +434,7 @@ RunSummary CheckStep(Session* s) {
 
 // Of what was recorded.
 RunSummary TroubleAt(const Session& s, double t_s) {
+  if (!s.loads.trouble().ok()) return s.loads.trouble();
   RunSummary summary = s.trouble;
   if (!summary.ok()) summary.time_s = t_s;
   return summary;
@@ -441,6 +442,7 @@ RunSummary TroubleAt(const Session& s, double t_s) {
 
 // After a recorded sample: the motion must be finite and the loops closed.
 RunSummary CheckSample(const Session& s, double largest_gap_m, double t_s) {
+  if (!s.loads.trouble().ok()) return s.loads.trouble();
   const ConstraintSystem::Gap gap = s.system.LargestGap();
   if (gap.position_m < largest_gap_m) return TroubleAt(s, t_s);
   return Failure(fmt::format("loop-closure error of {:.3g} m in the simulation", gap.position_m),
@@ -491,6 +493,7 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
     } else {
       integrator.RungeKutta(h, middles[i], ends[i], step.from_s);
     }
+    if (!s->loads.trouble().ok()) return s->loads.trouble();
     if (!integrator.healthy()) return Failure("the simulated motion diverged", step.to_s);
     if (!friction.acts()) s->work.Step(h, step.uniform == 4, s->WorkRates());
     if (step.sample < 0) continue;
@@ -538,6 +541,7 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
       mj_comVel(m, data);
     }
     s->ApplyForces(static_cast<double>(n) * h, {.motion = at, .force = {}});
+    if (!s->loads.trouble().ok()) return s->loads.trouble();
     if (n % per_sample == 0) {
       mj_forward(m, data);
       s->system.TakeJacobian();

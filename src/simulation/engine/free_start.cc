@@ -4,6 +4,7 @@
 
 #include "kinematics/constraints.h"
 #include "kinematics/home.h"
+#include "kinematics/tree_motion.h"
 #include "simulation/engine/session.h"
 
 namespace mbv::simulation {
@@ -23,7 +24,7 @@ void PutRotation(const Mat3& R, double* wxyz) {
 
 // Per joint and coordinate a value within half a turn: home, or what the states followed on their
 // way (BodyStates::coupled, turns).
-std::vector<std::array<double, 6>> NearValues(const Mechanism& mechanism,
+std::vector<std::array<double, 6>> NearValues(const Mechanism& mechanism, const Motion& motion,
                                               const BodyStates& states) {
   std::vector<std::array<double, 6>> near;
   for (const Joint& joint : mechanism.joints) near.push_back(joint.home);
@@ -35,6 +36,11 @@ std::vector<std::array<double, 6>> NearValues(const Mechanism& mechanism,
     }
   }
   if (states.turns.empty()) return near;
+  for (const FollowedAngle& angle : FollowedAngles(mechanism, motion)) {
+    const Coordinate& at = angle.coordinate;
+    if (at.kind != Coordinate::Kind::kJoint) continue;
+    near[at.index][at.component] = FollowedNear(mechanism, states, angle);
+  }
   const double* value = states.turns.data();
   for (const ForceElement& element : mechanism.elements) {
     if (element.joint >= 0) near[element.joint][element.coordinate] = *value;
@@ -51,9 +57,10 @@ std::vector<std::array<double, 6>> NearValues(const Mechanism& mechanism,
 
 class Start {
  public:
-  Start(const EngineModel& engine, const BodyStates& states, mjData* d)
+  Start(const EngineModel& engine, const Motion& motion, const BodyStates& states, mjData* d)
       : engine_(engine), mechanism_(*engine.mechanism), states_(states), d_(d) {
-    coordinates_ = JointCoordinatesAt(mechanism_, states.X_WB, NearValues(mechanism_, states));
+    coordinates_ =
+        JointCoordinatesAt(mechanism_, states.X_WB, NearValues(mechanism_, motion, states));
   }
 
   // False if a joint has coordinates that body states do not give one by one.
@@ -127,7 +134,7 @@ RunSummary PutAtFreeStart(Session* s, const DrivenSample& first) {
             .where = {},
             .unit = {}};
   }
-  if (!Start(s->engine, start, s->data.get()).Put()) {
+  if (!Start(s->engine, s->motion, start, s->data.get()).Put()) {
     return {
         .stop = Stop::kUnsupported,
         .message =

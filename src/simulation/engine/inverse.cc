@@ -31,6 +31,7 @@ RunSummary SolveDynamics(Session* s, double t_s, const DrivenSample& at, VecX* t
   *tau += Eigen::Map<const VecX>(m->dof_armature, m->nv)
               .cwiseProduct(Eigen::Map<const VecX>(d->qacc, m->nv));
   s->loads.Evaluate(t_s, *d);
+  if (!s->loads.trouble().ok()) return s->loads.trouble();
   *tau = -*tau;
   s->loads.AddGeneralized(d, tau->data());
   if (s->lacking) AddLackingForces(s->system, at.acceleration, tau->data());

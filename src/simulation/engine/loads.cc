@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "math/spatial.h"
+#include "mechanism/followed_state.h"
 #include "simulation/engine/recorder.h"
 
 namespace mbv::simulation {
@@ -65,11 +66,6 @@ Value ValueOf(const EngineModel& engine, const mjData& d, const Coordinate& coor
   return {d.qpos[engine.m->jnt_qposadr[id]], d.qvel[engine.m->jnt_dofadr[id]]};
 }
 
-// An angle in the turn of `near`.
-double InTurnOf(double near, double angle) {
-  return near + std::remainder(angle - near, 2.0 * std::numbers::pi);
-}
-
 bool IsKnown(const EngineModel& engine, const Coordinate& coordinate) {
   if (coordinate.kind == Coordinate::Kind::kOutput) {
     return HasOutputRates(engine, engine.mechanism->outputs[static_cast<size_t>(coordinate.index)]);
@@ -96,19 +92,49 @@ RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load) {
   return RunSummary::Done();
 }
 
-Vec6 FollowingPart(const EngineModel& engine, const mjData& d, const Load& load, double t_s) {
+FollowingLoads::FollowingLoads(const EngineModel& engine, const Motion& motion)
+    : engine_(engine), motion_(motion) {
+  for (const Load& load : motion.loads) {
+    std::vector<Angle>& angles = angles_.emplace_back();
+    for (const Load::Following& part : load.following) {
+      for (const StateFunction::Input& input : part.function.inputs) {
+        angles.push_back({.value = StartAngle(*engine.mechanism, motion, input.coordinate)});
+      }
+    }
+  }
+}
+
+double FollowingLoads::Read(const StateFunction::Input& input, const mjData& d, double t_s,
+                            Angle* angle) const {
+  const Value value = ValueOf(engine_, d, input.coordinate);
+  if (input.rate) return value.rate;
+  const bool counts = input.coordinate.kind != Coordinate::Kind::kOutput;
+  if (counts || IsLength(*engine_.mechanism, input.coordinate)) return value.position;
+  // From there by the mean of the rates.
+  double near = angle->value;
+  if (!std::isnan(angle->time_s)) {
+    near += 0.5 * (angle->rate + value.rate) * (t_s - angle->time_s);
+  }
+  const double turned = near + std::remainder(value.position - near, 2.0 * std::numbers::pi);
+  if (std::isfinite(turned) && std::isfinite(value.rate)) *angle = {t_s, turned, value.rate};
+  return turned;
+}
+
+Vec6 FollowingLoads::PartOf(size_t l, const mjData& d, double t_s) {
   Vec6 sum = Vec6::Zero();
   std::vector<double> inputs;
-  for (const Load::Following& part : load.following) {
+  Angle* angle = angles_[l].data();
+  for (const Load::Following& part : motion_.loads[l].following) {
     inputs.clear();
     for (const StateFunction::Input& input : part.function.inputs) {
-      const Value value = ValueOf(engine, d, input.coordinate);
-      const bool length = IsLength(*engine.mechanism, input.coordinate);
-      inputs.push_back(input.rate ? value.rate
-                       : length   ? value.position
-                                  : InTurnOf(input.near, value.position));
+      inputs.push_back(Read(input, d, t_s, angle++));
     }
-    sum[part.component] += part.function.value(t_s, inputs);
+    const double value = part.function.value(t_s, inputs);
+    if (std::isfinite(value)) {
+      sum[part.component] += value;
+    } else if (trouble_.ok()) {  // left out: the run ends, and MuJoCo gets numbers until then
+      trouble_ = LoadHasNoValue(*engine_.mechanism, motion_.loads[l], part, t_s, inputs, value);
+    }
   }
   return sum;
 }
@@ -142,7 +168,7 @@ void Loads::Evaluate(double t_s, const mjData& d) {
       out.moment[c] = mbv::Evaluate(load.moment[c], t_s).value;
     }
     if (!load.following.empty()) {
-      const Vec6 part = FollowingPart(engine_, d, load, t_s);
+      const Vec6 part = following_.PartOf(i, d, t_s);
       out.force += part.head<3>();
       out.moment += part.tail<3>();
     }

@@ -13,10 +13,32 @@ namespace mbv::simulation {
 /// kUnsupported where a load follows a coordinate that MuJoCo does not have.
 [[nodiscard]] RunSummary CheckLoadInputs(const EngineModel& engine, const Load& load);
 
-/// What a load is in addition to its profiles, at the data's position (tendons) and velocity
-/// (mj_comVel): [force; moment], in the load's axes.
-[[nodiscard]] Vec6 FollowingPart(const EngineModel& engine, const mjData& d, const Load& load,
-                                 double t_s);
+/// What loads are in addition to their profiles. MuJoCo's joints count rotations; the angles of
+/// outputs are counted here, from what was evaluated last.
+class FollowingLoads {
+ public:
+  /// Both outlive the object.
+  FollowingLoads(const EngineModel& engine, const Motion& motion);
+
+  /// [force; moment] of load `l`, in its axes, at the data's position (tendons) and velocity
+  /// (mj_comVel).
+  [[nodiscard]] Vec6 PartOf(size_t l, const mjData& d, double t_s);
+  /// The first part that was not finite.
+  [[nodiscard]] const RunSummary& trouble() const { return trouble_; }
+
+ private:
+  // An angle when it was evaluated last.
+  struct Angle {
+    double time_s = kNan, value = 0.0, rate = 0.0;
+  };
+  [[nodiscard]] double Read(const StateFunction::Input& input, const mjData& d, double t_s,
+                            Angle* angle) const;
+
+  const EngineModel& engine_;
+  const Motion& motion_;
+  std::vector<std::vector<Angle>> angles_;  ///< per load: of all inputs of its parts
+  RunSummary trouble_ = RunSummary::Done();
+};
 
 /// A load in world axes.
 struct WorldLoad {
@@ -31,11 +53,14 @@ struct WorldLoad {
 /// Evaluates the motion's loads at t for the data's current poses.
 class Loads {
  public:
-  Loads(const EngineModel& engine, const Motion& motion) : engine_(engine), motion_(motion) {}
+  Loads(const EngineModel& engine, const Motion& motion)
+      : engine_(engine), motion_(motion), following_(engine, motion) {}
 
   void Evaluate(double t_s, const mjData& d);
   /// True if some load follows the state: then Evaluate() needs tendons and mj_comVel.
   [[nodiscard]] bool follow() const;
+  /// The first load that was not finite; then nothing evaluated since is.
+  [[nodiscard]] const RunSummary& trouble() const { return following_.trouble(); }
   [[nodiscard]] const std::vector<WorldLoad>& world() const { return world_; }
   /// Adds Jᵀ(load) of the loads last evaluated to `qfrc` (nv).
   void AddGeneralized(mjData* d, double* qfrc) const;
@@ -43,6 +68,7 @@ class Loads {
  private:
   const EngineModel& engine_;
   const Motion& motion_;
+  FollowingLoads following_;
   std::vector<WorldLoad> world_;
 };
 
