@@ -285,7 +285,8 @@ std::string PointsText(const StudyReport& report) {
   return text;
 }
 
-std::vector<ReportSection> SectionsOf(const StudyReport& report, const std::vector<StudyPlot>& plots) {
+std::vector<ReportSection> SectionsOf(const StudyReport& report,
+                                      const std::vector<StudyPlot>& plots) {
   return {Limits(report),
           Quantities(report),
           Indices(report, plots),

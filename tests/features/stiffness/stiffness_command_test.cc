@@ -102,6 +102,9 @@ INSTANTIATE_TEST_SUITE_P(
         {"parameter", "scara_robot --set K_akt=1", "--set K_akt=1: error: "},
         // Values are shown as given, though they look like another option.
         {"output", "scara_robot --output 'a --set pose.b'", "--output a --set pose.b: error: "},
+        {"negative_seed", "scara_robot --loads 3 --seed -3", "from 0 to 2^64 - 1"},
+        {"large_seed", "scara_robot --loads 3 --seed 18446744073709551616", "from 0 to 2^64 - 1"},
+        {"no_loads", "scara_robot --loads 3 --force-max 0 --moment-max 0", "are no loads"},
         {"closed_form", "scara_robot --closed-form best",
          "analytic.model = 'best' is not one of: corrected"},
         {"map_coordinate", "scara_robot --no-simulation --map z=-0.1 hight=1",
