@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 #include <algorithm>
+#include <boost/graph/adjacency_list.hpp>
+#include <boost/graph/biconnected_components.hpp>
 #include <cmath>
+#include <optional>
 #include <set>
 
 #include "comparison/driven.h"
@@ -222,31 +225,94 @@ std::vector<JointError> JointErrors(const ComparisonInput& input, const PairRead
   return errors;
 }
 
-// What the joint's bodies have anyway: the smaller moment that turning one of them takes.
-double LocalMoment(const ForceScale& scale, const Joint& joint) {
-  double smallest = kNan;
-  for (const int body : {joint.parent, joint.child}) {
-    const auto b = static_cast<size_t>(body);
-    if (b > 0 && !(smallest <= scale.moment[b])) smallest = scale.moment[b];
-  }
-  return OrZero(smallest);
-}
+// What a body has anyway: its weight and the forces of its joints; the moment that turns it.
+struct Local {
+  double force_N = 0.0, moment_Nm = 0.0;
+};
 
-// The same for forces: the smaller one's weight and the forces of its joints.
-double LocalForce(const ComparisonInput& input, const ForceScale& scale,
-                  const std::vector<JointError>& errors, const Joint& joint) {
-  double smallest = kNan;
-  for (const int body : {joint.parent, joint.child}) {
-    const auto b = static_cast<size_t>(body);
-    if (b == 0) continue;
-    double local = input.mechanism->bodies[b].mass * scale.acceleration[b];
-    for (const JointError& error : errors) {
-      if (error.joint->parent != body && error.joint->child != body) continue;
-      local = std::max(local, OrZero(error.force.rms_truth()));
+// The loops that joints belong to. Legs hold as joints do; loops that meet in one body only (the
+// world, mostly) are apart: they are the blocks of the graph whose vertices are bodies and joints
+// [Hopcroft, Tarjan 1973].
+class Loops {
+ public:
+  explicit Loops(const Mechanism& mechanism) : graph_(mechanism.bodies.size()) {
+    for (const Joint& joint : mechanism.joints) {
+      Add(joint.parent, joint.child, DofsOf(joint.kind) < 6);
     }
-    if (!(smallest <= local)) smallest = local;
+    for (const Drive& drive : mechanism.drives) {
+      if (const auto* leg = std::get_if<DistanceDrive>(&drive.kind)) {
+        Add(leg->body_from, leg->body_to, true);
+      }
+    }
+    block_.assign(bodies_.size(), 0);
+    count_ = boost::biconnected_components(
+        graph_, boost::make_iterator_property_map(block_.begin(), get(boost::edge_index, graph_)));
   }
-  return OrZero(smallest);
+  [[nodiscard]] size_t count() const { return count_; }
+  /// Of a joint, in the mechanism's order; none if it closes no loop.
+  [[nodiscard]] std::optional<size_t> Of(size_t joint) const {
+    const size_t block = block_[2 * joint];
+    return block == block_[2 * joint + 1] ? std::optional(block) : std::nullopt;
+  }
+  /// Calls `visit(loop, body)` for every body at a joint or leg, repeatedly.
+  template <typename Visit>
+  void ForEach(const Visit& visit) const {
+    for (size_t e = 0; e < bodies_.size(); ++e) visit(block_[e], bodies_[e]);
+  }
+
+ private:
+  // What does not hold its child leads nowhere.
+  void Add(int parent, int child, bool holds) {
+    const auto joint = boost::add_vertex(graph_);
+    for (const int body : {parent, child}) {
+      const auto to = static_cast<size_t>(body);
+      boost::add_edge(joint, holds ? to : boost::add_vertex(graph_), bodies_.size(), graph_);
+      bodies_.push_back(to);
+    }
+  }
+
+  boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS, boost::no_property,
+                        boost::property<boost::edge_index_t, size_t>>
+      graph_;
+  std::vector<size_t> bodies_, block_;  ///< per edge
+  size_t count_ = 0;
+};
+
+// Per joint. Where it closes no loop, equilibrium of the smaller of its bodies gives its reaction.
+// In a loop equilibrium of one body does not: a rod transmits what the bodies at its ends leave,
+// and were it massless that would be all. There the loop's largest body counts.
+std::vector<Local> LocalScales(const ComparisonInput& input, const ForceScale& scale,
+                               const std::vector<JointError>& errors) {
+  const Mechanism& mechanism = *input.mechanism;
+  std::vector<Local> bodies(mechanism.bodies.size());
+  const auto raise = [](Local* local, const Local& by) {
+    *local = {std::max(local->force_N, by.force_N), std::max(local->moment_Nm, by.moment_Nm)};
+  };
+  for (size_t b = 1; b < bodies.size(); ++b) {
+    bodies[b] = {mechanism.bodies[b].mass * scale.acceleration[b], scale.moment[b]};
+  }
+  for (const JointError& error : errors) {
+    for (const int body : {error.joint->parent, error.joint->child}) {
+      if (body > 0) raise(&bodies[static_cast<size_t>(body)], {OrZero(error.force.rms_truth())});
+    }
+  }
+  const Loops loops(mechanism);
+  std::vector<Local> of_loops(loops.count()), joints;
+  loops.ForEach([&](size_t loop, size_t body) { raise(&of_loops[loop], bodies[body]); });
+  for (size_t j = 0; j < mechanism.joints.size(); ++j) {
+    if (const auto loop = loops.Of(j)) {
+      joints.push_back(of_loops[*loop]);
+      continue;
+    }
+    const Joint& joint = mechanism.joints[j];
+    const Local& a = bodies[static_cast<size_t>(joint.parent)];
+    const Local& b = bodies[static_cast<size_t>(joint.child)];
+    joints.push_back(joint.parent == 0  ? b
+                     : joint.child == 0 ? a
+                                        : Local{std::min(a.force_N, b.force_N),
+                                                std::min(a.moment_Nm, b.moment_Nm)});
+  }
+  return joints;
 }
 
 // Pooled over all joints, as the drives' forces are.
@@ -276,10 +342,11 @@ void CompareOwn(const ComparisonInput& input, const ForceScale& scale,
   ErrorSum all;
   for (const JointError& error : errors) all.Merge(error.force);
   const double roundoff = kRoundoff * OrZero(all.rms_truth());
+  const std::vector<Local> scales = LocalScales(input, scale, errors);
   for (const JointError& error : errors) {
-    const double turned = LocalMoment(scale, *error.joint);
-    const double local = std::max(LocalForce(input, scale, errors, *error.joint),
-                                  kMomentArm * turned / scale.length_m);
+    const auto joint = static_cast<size_t>(error.joint - input.mechanism->joints.data());
+    const double turned = scales[joint].moment_Nm;
+    const double local = std::max(scales[joint].force_N, kMomentArm * turned / scale.length_m);
     const double least = std::max(ForceScale::kIdle * local, roundoff);
     if (error.force.count() > 0) {
       KeepWorst(&pair->metrics, Metric::kReactionOwn, error.force.MeasuredNrmse(least));

@@ -360,6 +360,27 @@ RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_
                    kOfGravity * input.mechanism->gravity_W.norm() * size / length_m)};
 }
 
+namespace {
+
+// RMS rates of the bodies as one mass M that has their kinetic energy E: v² = 2 E/M; its
+// acceleration from v²/L, and from the power Ė = M v a.
+RestFloor BodyRates(const Mechanism& mechanism, const Trace& trace) {
+  const int column = trace.Find(Quantity::kKineticEnergy);
+  const Eigen::Index rows = trace.values.rows();
+  double mass = 0.0;
+  for (const Body& body : mechanism.bodies) mass += body.mass;
+  if (column < 0 || rows < 2 || !(mass > 0.0)) return {};
+  const VecX energy = trace.values.col(column);
+  const double v = std::sqrt(2.0 * std::max(0.0, energy.mean()) / mass);
+  if (!energy.allFinite() || !(v > 0.0)) return {};
+  const Eigen::Map<const VecX> time(trace.time_s.data(), rows);
+  const VecX power = (energy.tail(rows - 1) - energy.head(rows - 1))
+                         .cwiseQuotient(time.tail(rows - 1) - time.head(rows - 1));
+  return {v, std::max(v * v / CharacteristicLength(mechanism), Rms(power) / (mass * v))};
+}
+
+}  // namespace
+
 RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit,
                       const Trace& trace) {
   const double length_m = CharacteristicLength(*input.mechanism);
@@ -372,6 +393,10 @@ RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_
     floor.acceleration =
         std::max(floor.acceleration, ForceScale::kIdle * size * rates.acceleration);
   }
+  const double size = position_unit == "rad" ? 1.0 / length_m : 1.0;
+  const RestFloor bodies = BodyRates(*input.mechanism, trace);
+  floor.velocity = std::max(floor.velocity, ForceScale::kIdle * size * bodies.velocity);
+  floor.acceleration = std::max(floor.acceleration, ForceScale::kIdle * size * bodies.acceleration);
   return floor;
 }
 

@@ -51,7 +51,8 @@ struct RestFloor {
   double velocity = 0.0, acceleration = 0.0;
 };
 [[nodiscard]] RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit);
-/// At least 0.1 % of the RMS rates of the fastest drive in `trace`, too, whatever its unit.
+/// At least 0.1 % of the RMS rates of the fastest drive in `trace`, too, whatever its unit, and of
+/// those of the bodies: a coordinate that is held changes as its moving ends leave it.
 [[nodiscard]] RestFloor RestFloorOf(const ComparisonInput& input, const std::string& position_unit,
                                     const Trace& trace);
 

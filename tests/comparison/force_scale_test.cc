@@ -358,6 +358,26 @@ TEST(ForceScaleTerms, RestIsAThousandthOfTheLengthOrOfARadianInTheTime) {
   EXPECT_NEAR(RestFloorOf(fast.Input(), "m", fast.trace).acceleration, 1e-3 * 1e5 * length_m, 1e-9);
 }
 
+// 2 kg with 400 J go at 20 m/s, which turns in L with v²/L; 2 kW more or less every second change
+// that by 50 m/s².
+TEST(ForceScaleTerms, RestIsAThousandthOfTheRatesOfAllBodies) {
+  Rod rod;
+  rod.Set("energy.kinetic", 400.0);
+  const double length_m = rod.length_m(), turning = 400.0 / length_m;
+  EXPECT_NEAR(RestFloorOf(rod.Input(), "m", rod.trace).velocity, 0.02, 1e-9);
+  EXPECT_NEAR(RestFloorOf(rod.Input(), "rad", rod.trace).velocity, 0.02 / length_m, 1e-9);
+  EXPECT_NEAR(RestFloorOf(rod.Input(), "m", rod.trace).acceleration, 1e-3 * turning, 1e-9);
+  const int energy = rod.trace.Find("energy.kinetic");
+  for (Eigen::Index i = 0; i < rod.trace.values.rows(); ++i) {
+    rod.trace.values(i, energy) = 400.0 + (i % 2 == 0 ? 1e4 : -1e4) * 0.01;
+  }
+  const double mean = rod.trace.values.col(energy).mean(), v = std::sqrt(mean);
+  EXPECT_NEAR(RestFloorOf(rod.Input(), "m", rod.trace).acceleration,
+              1e-3 * std::max(mean / length_m, 2000.0 / (2.0 * v)), 1e-9);
+  rod.trace.values(3, energy) = kNan;
+  EXPECT_NEAR(RestFloorOf(rod.Input(), "m", rod.trace).velocity, 1e-3 * length_m / 2.0, 1e-12);
+}
+
 TEST(ForceScaleTerms, ElementsHaveTheForceThatTheirLawAsksOfTheMotion) {
   Rod rod(5.0, 30.0);
   const DrivenTwists twists = TwistsFor(rod.Input());

@@ -189,6 +189,22 @@ TEST(Forward, AParallelogramTurnsEvenlyThroughItsFlatPoses) {
   }
 }
 
+// Turned as a whole by 64.6°, its crank is flat at 244.6° in the world: among the nodes of the
+// bridge its quaternion, which is told from the rotation, changes its sign (at 240°).
+TEST(Forward, ABridgeGoesOnWhereAQuaternionChangesItsSign) {
+  const double start = 1.0, rate = 2.5, turned = 240.0 / 180.0 * std::numbers::pi + 0.08;
+  Mechanism m = MakeParallelogram(start);
+  const Mat3 R = RotZ(turned - std::numbers::pi);
+  for (Joint& joint : m.joints) {
+    if (joint.parent == 0) joint.X_PF = Pose(Pose(R) * joint.X_PF);
+  }
+  for (size_t b = 1; b < m.X_WB_home.size(); ++b) m.X_WB_home[b] = Pose(R) * m.X_WB_home[b];
+  const ForwardRun run = RunForwardReference(m, FreeMotion(m, start, rate, 1.5));
+  ASSERT_TRUE(run.summary.ok()) << run.summary.message;
+  ASSERT_EQ(run.singular.size(), 1u);
+  EXPECT_NEAR(ColumnOf(run.trace, "motor.position").tail<1>()[0], start + rate * 1.5, 2e-8);
+}
+
 // Of J = 0.08 kg m²: q̈ = τ/J. What oscillates faster than a bridge follows is not passed in
 // silence: a shorter bridge is found, or the run ends at the pose.
 TEST(Forward, AParallelogramUnderAnOscillatingTorqueFollowsItOrStops) {
