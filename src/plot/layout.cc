@@ -75,7 +75,7 @@ std::string ToTex(std::string_view markup) {
   return Piece(markup, '\0', words, &at);
 }
 
-std::string Verbatim(std::string_view text) {
+std::string AsPlainText(std::string_view text) {
   std::string out;
   for (const char c : text) {
     if (c == '*' || c == '_' || c == '^' || c == '\\' || c == '}') out += '\\';

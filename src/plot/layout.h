@@ -24,7 +24,7 @@ namespace mbv {
 /// For TeX: \textit{F}, \textsubscript{max}, with its special characters escaped.
 [[nodiscard]] std::string ToTex(std::string_view markup);
 /// A text that is shown as it is: its '*', "_{" and "^{" are no markup.
-[[nodiscard]] std::string Verbatim(std::string_view text);
+[[nodiscard]] std::string AsPlainText(std::string_view text);
 
 struct FigureTick {
   double value = 0;

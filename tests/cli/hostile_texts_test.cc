@@ -295,7 +295,7 @@ const std::vector<Writer>& Writers() {
          return EscapeScript(DumpLine(nlohmann::ordered_json({{"a", t}})));
        }},
       {"table", Format::kTex, [](const std::string& t) { return ToLatex(TableOf(t)); }},
-      {"figure", Format::kTex, [](const std::string& t) { return ToTex(Verbatim(t)); }},
+      {"figure", Format::kTex, [](const std::string& t) { return ToTex(AsPlainText(t)); }},
       {"regress", Format::kJson, [](const std::string& t) { return ToJson(NightOf(t)); }},
       {"crosscheck", Format::kJson, [](const std::string& t) { return ToJson(EnginesOf(t)); }},
       {"mutate", Format::kJson, [](const std::string& t) { return ToJson(MutationOf(t)); }},

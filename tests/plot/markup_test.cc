@@ -19,7 +19,7 @@ TEST(FigureMarkup, ForTexSpecialCharactersAreEscaped) {
 
 TEST(FigureMarkup, VerbatimTextIsNoMarkup) {
   const std::string name = "a*b_{c}^{d}\\e";
-  EXPECT_EQ(ToPango(Verbatim(name), 8), name);
+  EXPECT_EQ(ToPango(AsPlainText(name), 8), name);
   EXPECT_NE(ToPango(name, 8), name);
 }
 

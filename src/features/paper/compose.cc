@@ -101,7 +101,7 @@ class PanelComposer {
 
   [[nodiscard]] std::string NameOf(const std::string& channel) const {
     const auto found = spec_.names.find(channel);
-    return found != spec_.names.end() ? found->second : Verbatim(channel);
+    return found != spec_.names.end() ? found->second : AsPlainText(channel);
   }
 
   [[nodiscard]] std::vector<SignalRow> Rows() const {

@@ -80,7 +80,7 @@ class FigureMaker {
     std::vector<SignalRow> rows;
     rows.reserve(drives.size());
     for (const std::string& drive : drives) {
-      rows.push_back({ChannelName(quantity, drive), Verbatim(drive)});
+      rows.push_back({ChannelName(quantity, drive), AsPlainText(drive)});
     }
     AddOverTime(rows, ShownWitnesses(report_), line_, {time_, unit, language_, legend}, &panel);
     return panel;
@@ -228,7 +228,7 @@ class FigureMaker {
       const ShownUnit unit = UsualUnit(first == 0 ? "N" : "N m", largest);
       FigurePanel panel{.x = TimeAxis(), .share = 0.8};
       for (size_t j = 0; j < joints.size(); ++j) {
-        panel.curves.push_back({.label = first == 0 ? Verbatim(joints[j]->joint) : "",
+        panel.curves.push_back({.label = first == 0 ? AsPlainText(joints[j]->joint) : "",
                                 .points = Scaled(Thinned(curves[j], kFigureBins), time_, unit),
                                 .look = static_cast<int>(j)});
       }
@@ -266,7 +266,7 @@ class FigureMaker {
       const VecX power = line_->trace.values.col(force).cwiseProduct(line_->trace.values.col(rate));
       total += power;
       powers.push_back(OverTime(line_->trace, power));
-      names.push_back(Verbatim(drive));
+      names.push_back(AsPlainText(drive));
     }
     const bool sum_only = powers.size() >= kMostCurves;
     if (sum_only) {
@@ -338,7 +338,7 @@ class FigureMaker {
       for (Eigen::Index i = 0; i < trace.values.rows(); i += stride) {
         points.emplace_back(x.factor * trace.values(i, v), y.factor * trace.values(i, f));
       }
-      panel.curves.push_back({.label = drives.size() > 1 ? Verbatim(drives[d]) : "",
+      panel.curves.push_back({.label = drives.size() > 1 ? AsPlainText(drives[d]) : "",
                               .points = points,
                               .look = static_cast<int>(d)});
     }

@@ -49,7 +49,8 @@ void Translate(const std::string& words, FigureWord word, Language language, std
 std::string FigureLabel(const std::string& label) {
   const auto [name, unit] = Parted(label);
   const bool symbol = name.size() == 1 || name.find('_') != std::string::npos;
-  return AxisLabel(symbol ? "" : Verbatim(name), symbol ? SymbolOf(name) : "", UnitInPrint(unit));
+  return AxisLabel(symbol ? "" : AsPlainText(name), symbol ? SymbolOf(name) : "",
+                   UnitInPrint(unit));
 }
 
 Figure FromPlot(const std::string& name, const LinePlot& plot) {
@@ -57,7 +58,7 @@ Figure FromPlot(const std::string& name, const LinePlot& plot) {
                     .y = {FigureLabel(plot.y_label), plot.log_y},
                     .equal_scale = plot.equal_scale};
   for (const PlotLine& line : plot.lines) {
-    FigureCurve curve{.label = Verbatim(line.label),
+    FigureCurve curve{.label = AsPlainText(line.label),
                       .points = line.points,
                       .look = static_cast<int>(panel.curves.size()),
                       .marker = line.markers ? 0 : -1};

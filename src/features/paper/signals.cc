@@ -77,7 +77,7 @@ std::string SayWitness(std::string_view name, Language language) {
   for (const WitnessWords& row : kWitnessWords) {
     if (name == *row.role) return row.words.at(static_cast<size_t>(language));
   }
-  return Verbatim(name);
+  return AsPlainText(name);
 }
 
 std::string AxisLabel(const std::string& name, const std::string& symbol, const std::string& unit) {

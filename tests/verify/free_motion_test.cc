@@ -1,0 +1,137 @@
+// Verdicts of free motions through all stages: right models agree, models that are wrong by a
+// thousandth do not.
+#include <gtest/gtest.h>
+
+#include "features/run/run_scenario.h"
+#include "tests/support/test_folder.h"
+
+namespace mbv {
+namespace {
+
+struct Written {
+  std::string model, scenario;
+};
+
+Comparison RunWritten(const Written& files, std::vector<SetValue> set) {
+  const test::TestFolder folder("free_motion");
+  folder.Write("model.yaml", files.model);
+  RunOptions options;
+  options.pictures = false;
+  options.scenario.set = std::move(set);
+  const RunOutcome outcome =
+      RunScenario(folder.Write("run.yaml", "mechanism: ./model.yaml\n" + files.scenario), options);
+  EXPECT_TRUE(outcome.report) << outcome.diagnostics.Text();
+  return outcome.report ? outcome.report->comparison : Comparison{};
+}
+
+std::string TextOf(const Comparison& comparison) {
+  std::string text = comparison.reason + "\n";
+  for (const CheckResult& check : comparison.checks) {
+    if (!check.pass) text += check.name + " at " + check.channel + "\n";
+  }
+  return text;
+}
+
+// Crank and rocker swing each for itself: the coupler, massless or nearly so, transmits nothing but
+// round-off.
+Written Parallelogram(const std::string& coupler) {
+  return {R"(name: parallelogram
+parameters: {m: 1}
+gravity: [0, -9.81, 0]
+world: {frames: {A: [0, 0, 0], D: [0.5, 0, 0]}}
+bodies:
+  crank: {mass: 1, com: [0.1, 0, 0], inertia: [0.01, 0.01, 0.01], frames: {end: [0.2, 0, 0]}}
+  coupler: {)" +
+              coupler +
+              R"(, frames: {end: [0.5, 0, 0]}}
+  rocker: {mass: m, com: [0.1, 0, 0], inertia: [0.01, 0.01, 0.01], frames: {end: [0.2, 0, 0]}}
+joints:
+  A: {kind: revolute, parent: world.A, child: crank, axis: z, guess_deg: 60}
+  B: {kind: revolute, parent: crank.end, child: coupler, axis: z, guess_deg: -60}
+  C: {kind: revolute, parent: rocker.end, child: coupler.end, axis: z}
+  D: {kind: revolute, parent: world.D, child: rocker, axis: z, guess_deg: 60}
+drives: {motor: {kind: joint, joint: A}}
+)",
+          R"(motion:
+  duration_s: 0.3
+  sample_s: 0.01
+  initial: {motor: {value_deg: 60}}
+  initial_rates: {motor: 2}
+forces: {motor: 0}
+analytic: none
+simulation: {mode: forward, step_s: 0.001}
+)"};
+}
+
+TEST(FreeMotionVerdicts, ARodThatTransmitsNothingIsJudgedByTheLoadsOfItsLoop) {
+  for (const char* coupler : {"mass: 0, inertia: [0, 0, 0]",
+                              "mass: 1e-9, com: [0.25, 0, 0], inertia: [1e-11, 1e-11, 1e-11]"}) {
+    const Written files = Parallelogram(coupler);
+    for (const char* step : {"0.001", "0.0001"}) {
+      const Comparison right = RunWritten(files, {{"simulation.step_s", step}});
+      EXPECT_EQ(right.verdict, Verdict::kAgree) << TextOf(right);
+    }
+    const Comparison wrong = RunWritten(files, {{"simulation.parameters.m", "1.001"}});
+    EXPECT_EQ(wrong.verdict, Verdict::kDisagree);
+    const CheckResult* own = wrong.FindCheck("simulated_vs_reference.reaction_nrmse_own");
+    ASSERT_NE(own, nullptr);
+    EXPECT_FALSE(own->pass);
+  }
+}
+
+// A body swings at 10 m/s on a leg of constant length.
+TEST(FreeMotionVerdicts, ALegThatIsHeldIsJudgedByHowItsEndsMove) {
+  const Written files = {R"(name: held
+parameters: {i: 0.1}
+gravity: [0, 0, -9.81]
+world: {frames: {O: [0, 0, 0]}}
+bodies:
+  body: {mass: 1, com: [0, 0, 0], inertia: [0.04, i, 0.1], frames: {P: [0.3, 0.1, 0]}}
+joints:
+  float: {kind: free, parent: world, child: body, guess: [1, 0, 0, 0, 0, 0]}
+drives: {leg: {kind: distance, from: world.O, to: body.P}}
+outputs: {body: body}
+)",
+                         R"(motion:
+  duration_s: 2
+  sample_s: 0.01
+  commands: {leg: home}
+  initial: {body.y: 0, body.z: 0, body.roll: 0, body.pitch: 0.1, body.yaw: 0}
+  initial_rates: {body.roll: 5, body.y: 8, body.z: 5, body.pitch: 20, body.yaw: 15}
+analytic: none
+simulation: {mode: forward, step_s: 0.0002}
+)"};
+  const Comparison right = RunWritten(files, {});
+  EXPECT_EQ(right.verdict, Verdict::kAgree) << TextOf(right);
+  EXPECT_EQ(RunWritten(files, {{"simulation.parameters.i", "0.1001"}}).verdict, Verdict::kDisagree);
+}
+
+// The moment jumps where the bar passes −1 rad: no step of the reference is small enough, which is
+// no verdict rather than a wrong motion.
+TEST(FreeMotionVerdicts, AMomentThatJumpsHasNoVerdict) {
+  const Comparison jumps = RunWritten({R"(name: bar
+gravity: [0, -9.81, 0]
+bodies:
+  bar: {mass: 1.3, com: [0.2, 0, 0], inertia: [0.01, 0.02, 0.02]}
+joints:
+  pivot: {kind: revolute, parent: world, child: bar, axis: z}
+drives: {motor: {kind: joint, joint: pivot}}
+outputs: {tip: bar}
+)",
+                                       R"(motion:
+  duration_s: 3
+  sample_s: 0.01
+  initial: {motor: {value_deg: 20}}
+  initial_rates: {motor: 1}
+forces: {motor: 0}
+loads:
+  stop: {on: bar, moment: [0, 0, "2*(motor.position > -1) - 0.03*motor.velocity"]}
+analytic: none
+simulation: {mode: forward, step_s: 0.001}
+)"},
+                                      {});
+  EXPECT_EQ(jumps.verdict, Verdict::kNotRun) << TextOf(jumps);
+}
+
+}  // namespace
+}  // namespace mbv
