@@ -225,8 +225,8 @@ std::string MarkdownText(std::string_view text) {
     const auto* row =
         std::ranges::find(kMarkdownTexts, given[i], &std::pair<char, std::string_view>::first);
     const bool inside = given[i] == '_' && i > 0 && is_letter(i - 1) && is_letter(i + 1);
-    out += row != std::end(kMarkdownTexts) && !inside ? row->second
-                                                      : std::string_view(&given[i], 1);
+    out +=
+        row != std::end(kMarkdownTexts) && !inside ? row->second : std::string_view(&given[i], 1);
   }
   return out;
 }

@@ -19,8 +19,8 @@ template <typename PathOf>
 std::optional<double> ModelValues::NumberAt(const Block& block, const YamlNode& node,
                                             const PathOf& path, const UnitSuffix& unit) {
   if (!node.is_scalar()) {
-    yaml_.Error(node, fmt::format("{} is {}, a number or an expression is needed", path(),
-                                  Describe(node)));
+    yaml_.Error(
+        node, fmt::format("{} is {}, a number or an expression is needed", path(), Describe(node)));
     return std::nullopt;
   }
   const ExpressionResult result = block.scope->Evaluate(node.text);
@@ -37,7 +37,8 @@ std::optional<double> ModelValues::NumberAt(const Block& block, const YamlNode& 
 
 std::optional<double> ModelValues::Number(const Block& block, const YamlNode& node,
                                           const std::string& path, const UnitSuffix& unit) {
-  return NumberAt(block, node, [&] { return path; }, unit);
+  return NumberAt(
+      block, node, [&] { return path; }, unit);
 }
 
 std::optional<Vec3> ModelValues::Vector(const Block& block, const YamlNode& node,
@@ -60,7 +61,8 @@ std::optional<double> ModelValues::Number(const Block& block, const YamlMap& map
                                           std::initializer_list<UnitSuffix> units) {
   const YamlMap::InUnit found = map.FindInUnit(key, units);
   if (found.node == nullptr) return std::nullopt;
-  return NumberAt(block, *found.node, [&] { return map.PathOf(found.key); }, found.unit);
+  return NumberAt(
+      block, *found.node, [&] { return map.PathOf(found.key); }, found.unit);
 }
 
 std::optional<Vec3> ModelValues::Vector(const Block& block, const YamlMap& map,
@@ -79,8 +81,8 @@ std::optional<double> ModelValues::Positive(const Block& block, const YamlMap& m
     (void)map.Required(key);
     return std::nullopt;
   }
-  const auto value =
-      NumberAt(block, *found.node, [&] { return map.PathOf(found.key); }, found.unit);
+  const auto value = NumberAt(
+      block, *found.node, [&] { return map.PathOf(found.key); }, found.unit);
   if (!value || *value > 0.0) return value;
   yaml_.Error(*found.node,
               fmt::format("{} = {} violates {} > 0", map.PathOf(found.key), *value, key));
@@ -237,8 +239,8 @@ std::optional<CoordinateRange> ModelValues::Range(const Block& block, const Yaml
   for (int k = 0; k < 2; ++k) {
     const YamlNode& item = *(*items)[k];
     if (item.is_null()) continue;  // no limit on this side
-    const auto value =
-        NumberAt(block, item, [&] { return fmt::format("{}[{}]", path, k); }, unit);
+    const auto value = NumberAt(
+        block, item, [&] { return fmt::format("{}[{}]", path, k); }, unit);
     good = good && value.has_value();
     if (value) (k == 0 ? range.lower : range.upper) = *value;
   }

@@ -558,8 +558,8 @@ YamlNodePtr ScenarioMemory::Set(const YamlNodePtr& root, const std::vector<SetVa
                                 YamlReader* reader) {
   // Where a node goes depends on keys alone.
   const auto fits = [](const SetValue& before, const SetValue& now) {
-    return before.first == now.first && (before.second == now.second ||
-                                         (PlainNumber(before.second) && PlainNumber(now.second)));
+    return before.first == now.first &&
+           (before.second == now.second || (PlainNumber(before.second) && PlainNumber(now.second)));
   };
   if (root == document_ && root_ != nullptr && std::ranges::equal(set_, values, fits)) {
     for (size_t k = 0; k < values.size(); ++k) {
@@ -592,8 +592,8 @@ LoadResult ScenarioMemory::Load(const std::string& model_file, const LoadOptions
   if (same) return model_;
   rank_.reset();
   const auto known = texts_.find(model_file);
-  const auto& text =
-      known != texts_.end() ? known->second : texts_[model_file] = YamlReader(model_file).ReadFile();
+  const auto& text = known != texts_.end() ? known->second
+                                           : texts_[model_file] = YamlReader(model_file).ReadFile();
   model_file_ = model_file;
   options_ = options;
   model_ = text ? LoadModelText(*text, model_file, options) : LoadModel(model_file, options);

@@ -83,8 +83,8 @@ struct ScenarioHead {
 [[nodiscard]] Diagnostics ReadParameterOptions(const std::vector<SetValue>& values,
                                                LoadOptions* options);
 
-/// What loading a scenario file again with other numbers takes over from the loads before: files are
-/// read and parsed once, a model is loaded and its commands are counted again only where a set
+/// What loading a scenario file again with other numbers takes over from the loads before: files
+/// are read and parsed once, a model is loaded and its commands are counted again only where a set
 /// number changes it. Results are those without it. For one file, which does not change meanwhile,
 /// and one thread.
 class ScenarioMemory {

@@ -100,7 +100,8 @@ Table Marked() {
   Table table{.caption = "Checks <1>",
               .columns = {Text("check"), Digits("value"), Text("end"), Text("why", On::kPage),
                           Text("short", On::kTerminal)}};
-  table.rows.push_back({"gap", "1.5e-03", Cell("FAIL", Mark::kFail, "floored"), "long & true", "t"});
+  table.rows.push_back(
+      {"gap", "1.5e-03", Cell("FAIL", Mark::kFail, "floored"), "long & true", "t"});
   table.rows.push_back({Code("a_b"), "2"});
   return table;
 }

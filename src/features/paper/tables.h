@@ -29,7 +29,7 @@ struct TablesOutcome {
   int exit_code = 4;  ///< of the run
   Diagnostics diagnostics;
   std::string mechanism, scenario, verdict;
-  std::vector<Table> tables;                          ///< names as in TableNames()
+  std::vector<Table> tables;                               ///< names as in TableNames()
   std::vector<std::string> left_out;                       ///< sentences
   std::vector<std::pair<std::string, std::string>> files;  ///< name, content
 };

@@ -50,7 +50,7 @@ inline constexpr std::uint64_t kMostShown = 800;
 struct StudyPlot;
 /// With the plots that belong to them; a section without blocks has nothing to show.
 [[nodiscard]] std::vector<ReportSection> SectionsOf(const StudyReport& report,
-                                              const std::vector<StudyPlot>& plots);
+                                                    const std::vector<StudyPlot>& plots);
 /// For a terminal.
 [[nodiscard]] std::string ToText(const StudyReport& report);
 /// summary.json, schema "mbverify.study_summary/1".

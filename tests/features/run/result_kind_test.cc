@@ -115,8 +115,7 @@ TEST(ResultKind, VerboseShowsWhatIsFolded) {
   const ColourReport report = Sunset();
   TerminalText out({.color = false, .verbose = true});
   out.Checks(ViewOf(report));
-  EXPECT_NE(out.text().find("    steadiness [rad]  5.00e-01  2.0e+00  ok\n"),
-            std::string::npos)
+  EXPECT_NE(out.text().find("    steadiness [rad]  5.00e-01  2.0e+00  ok\n"), std::string::npos)
       << out.text();
 }
 
