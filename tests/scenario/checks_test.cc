@@ -15,11 +15,20 @@ namespace {
 
 TEST(Checks, EveryMetricHasItsOwnKeyAndThreeDefaults) {
   std::set<std::string> keys, names;
-  for (const MetricRow& row : MetricRows()) {
+  const auto note = [&](const MetricRow& row) {
     keys.insert(row.key);
     names.insert(row.json);
-    EXPECT_EQ(FindMetric(row.key), &row);
     EXPECT_EQ(&RowOf(row.metric), &row);
+  };
+  for (const MetricRow& row : StiffnessMetricRows()) {
+    note(row);
+    EXPECT_TRUE(IsOfStiffness(row.metric));
+    EXPECT_EQ(FindMetric(row.key, StiffnessMetricRows()), &row);
+  }
+  for (const MetricRow& row : MetricRows()) {
+    note(row);
+    EXPECT_FALSE(IsOfStiffness(row.metric));
+    EXPECT_EQ(FindMetric(row.key), &row);
     for (const LimitColumn column :
          {LimitColumn::kForward, LimitColumn::kInverse, LimitColumn::kReference}) {
       // Which margin motors need, the scenario says.

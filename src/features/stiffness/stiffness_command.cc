@@ -35,7 +35,7 @@ Finding AtOption(const std::string& option, std::string message, std::string hin
 }
 
 // Loads the model with the overrides that the scenario holds; empty after findings.
-std::optional<Mechanism> Load(StiffnessScenario* scenario, Diagnostics* diagnostics) {
+std::optional<Mechanism> LoadModelOf(StiffnessScenario* scenario, Diagnostics* diagnostics) {
   LoadOptions options;
   options.overrides = scenario->parameters;
   options.override_places = scenario->parameter_places;
@@ -74,7 +74,7 @@ void ReadPose(const std::vector<SetValue>& at, StiffnessScenario* scenario,
   if (!parameters.empty()) {
     scenario->parameters = Merge(scenario->parameters, parameters);
     *diagnostics = {};  // warnings of the model come again
-    *mechanism = Load(scenario, diagnostics);
+    *mechanism = LoadModelOf(scenario, diagnostics);
   }
   PoseValues& pose = scenario->pose;
   if (!*mechanism || pose.empty()) return;
@@ -109,7 +109,7 @@ std::optional<PreparedStiffness> PrepareRequest(const StiffnessArguments& argume
   if (diagnostics->has_errors()) return {};
   scenario.parameters = options.overrides;
   scenario.parameter_places = options.override_places;
-  auto mechanism = Load(&scenario, diagnostics);
+  auto mechanism = LoadModelOf(&scenario, diagnostics);
   if (!mechanism) return {};
   if (const auto rigid = CheckElastic(*mechanism, scenario.model_file)) {
     diagnostics->Add(AtOption(arguments.model, rigid->message));

@@ -625,7 +625,7 @@ namespace {
 using Kind = YamlNode::Kind;
 
 // Ends parsing at a place where the rest of the file cannot be read sensibly.
-struct Stop {
+struct Refused {
   YAML::Mark mark;
   std::string message;
 };
@@ -654,7 +654,7 @@ class TreeBuilder : public YAML::EventHandler {
   }
   void OnAlias(const YAML::Mark& mark, YAML::anchor_t anchor) override {
     const auto found = anchors_.find(anchor);
-    if (found == anchors_.end()) throw Stop{mark, "an alias refers to the value it stands in"};
+    if (found == anchors_.end()) throw Refused{mark, "an alias refers to the value it stands in"};
     Add(found->second);
   }
   void OnSequenceStart(const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor,
@@ -707,7 +707,7 @@ class TreeBuilder : public YAML::EventHandler {
   void Open(Kind kind, const YAML::Mark& mark, const std::string& tag, YAML::anchor_t anchor) {
     CheckTag(mark, tag);
     if (levels_.size() >= YamlReader::kMaxDepth) {
-      throw Stop{mark, fmt::format("nested deeper than {} levels", YamlReader::kMaxDepth)};
+      throw Refused{mark, fmt::format("nested deeper than {} levels", YamlReader::kMaxDepth)};
     }
     levels_.push_back({MakeNode(kind, mark), anchor, nullptr, {}});
   }
@@ -728,7 +728,7 @@ class TreeBuilder : public YAML::EventHandler {
     Level& level = levels_.back();
     level.node->size += node->size;
     if (level.node->size > YamlReader::kMaxNodes) {
-      throw Stop{YAML::Mark::null_mark(), "the file has too many values (aliases expanded)"};
+      throw Refused{YAML::Mark::null_mark(), "the file has too many values (aliases expanded)"};
     }
     if (level.node->kind == Kind::kSequence) {
       level.node->items.push_back(node);
@@ -838,7 +838,7 @@ YamlNodePtr YamlReader::Parse(const std::string& text) {
     return refuse(e.mark.line + 1, e.mark.column + 1,
                   "YAML syntax: what stands here cannot be read",
                   "look at quotes, escapes in them, brackets, anchors (&) and aliases (*)");
-  } catch (const Stop& stop) {
+  } catch (const Refused& stop) {
     return refuse(stop.mark.line + 1, stop.mark.column + 1, stop.message);
   } catch (const std::exception&) {
     return refuse(0, 0, "YAML syntax: the file cannot be read");

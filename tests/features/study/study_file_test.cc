@@ -158,7 +158,7 @@ TEST_F(StudyFiles, NeedAScenarioWithAMotion) {
         .diagnostics.Text();
   };
   ExpectIn(named("nowhere.yaml"), "there is no such file");
-  ExpectIn(named("../models/four_bar/model.yaml"), "is no scenario");
+  ExpectIn(named("../models/four_bar/model.yaml"), "is a model");
   ExpectIn(named("cabin_robot/stiffness.yaml"), "is a stiffness");
   ExpectIn(LoadStudyText("study: 'a b'\n", "s.yaml").diagnostics.Text(), "'a b' is no name");
   ExpectIn(LoadStudyText("[1]", "s.yaml").diagnostics.Text(), "error");

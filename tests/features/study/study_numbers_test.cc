@@ -71,7 +71,7 @@ TEST_F(StudyCommand, ALimitThatTooManyPointsViolateEndsWithOne) {
   WriteStudy("{latin_hypercube: 40}", limit + std::to_string((violations - 0.5) / 40.0) + "}}\n");
   const ProgramResult violated = Study("less");
   EXPECT_EQ(violated.exit_code, 1);
-  EXPECT_NE(violated.out.find("VIOLATED x.force.mean < 25"), std::string::npos) << violated.out;
+  EXPECT_NE(violated.out.find("x.force.mean < 25  VIOLATED"), std::string::npos) << violated.out;
   EXPECT_NE(violated.out.find("mbverify run "), std::string::npos) << violated.out;
 }
 
@@ -190,7 +190,7 @@ TEST_F(StudyCommand, AMeasuredTableIsValidatedAgainstTheBand) {
   EXPECT_EQ(drive["largest"], "u_input");
   const ProgramResult heavier = with("2.1");
   EXPECT_EQ(heavier.exit_code, 1) << heavier.out << heavier.err;
-  EXPECT_NE(heavier.out.find("BEYOND   x"), std::string::npos) << heavier.out;
+  EXPECT_NE(heavier.out.find("x [N]  BEYOND"), std::string::npos) << heavier.out;
   EXPECT_NE(ReadAll(File("out2.1/s/report.html")).find("Not validated"), std::string::npos);
 }
 
@@ -225,7 +225,7 @@ TEST_F(StudyCommand, PointsAreJudgedByTheScenariosChecks) {
   EXPECT_EQ(with("10").exit_code, 0);
   const ProgramResult perturbed = with("10.00001");
   EXPECT_EQ(perturbed.exit_code, 1) << perturbed.out << perturbed.err;
-  EXPECT_NE(perturbed.out.find("VIOLATED witnesses disagree at 4 of 4 points"), std::string::npos)
+  EXPECT_NE(perturbed.out.find("VIOLATED  witnesses disagree at 4 of 4 points"), std::string::npos)
       << perturbed.out;
   const nlohmann::json summary = Summary("out10.00001");
   EXPECT_EQ(summary["verdict"], "disagree");

@@ -39,7 +39,7 @@ TEST(StudyReport, AVerdictIsToldTheSameEverywhere) {
   const StudyReport violated = TwoPoints(0.49), kept = TwoPoints(0.5);
   EXPECT_EQ(violated.exit_code(), 1);
   EXPECT_EQ(kept.exit_code(), 0);
-  EXPECT_NE(ToText(violated).find("VIOLATED x.force.max < 15: 1 of 2 points violate it (50 %"),
+  EXPECT_NE(ToText(violated).find("x.force.max < 15  VIOLATED  1 of 2 points violate it (50 %"),
             std::string::npos)
       << ToText(violated);
   EXPECT_EQ(ToText(kept).find("VIOLATED"), std::string::npos);
