@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
+#include <charconv>
 #include <cmath>
 #include <csignal>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -166,6 +168,20 @@ CLI::Validator Positive() {
         return good ? std::string() : fmt::format("'{}' violates > 0", QuotedValue(text));
       },
       "> 0");
+}
+
+CLI::Validator WholeNumber() {
+  return CLI::Validator(
+      [](const std::string& text) {
+        std::uint64_t number = 0;
+        const char* end = text.data() + text.size();
+        const auto parsed = std::from_chars(text.data(), end, number);
+        const bool whole = parsed.ec == std::errc() && parsed.ptr == end;
+        return whole ? std::string()
+                     : fmt::format("'{}': a whole number from 0 to 2^64 - 1 is needed",
+                                   QuotedValue(text));
+      },
+      "");
 }
 
 CLI::Validator OneOf(const std::vector<std::string>& words) {

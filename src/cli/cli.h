@@ -17,6 +17,10 @@ void SetFooter(CLI::App* command, const std::vector<std::string>& examples,
 /// A check that a value is a number above 0.
 [[nodiscard]] CLI::Validator Positive();
 
+/// A check that a value is a whole number from 0 to 2^64 - 1, for options of unsigned numbers,
+/// whose conversion takes -3 for 2^64 - 3 and what is too large for the largest.
+[[nodiscard]] CLI::Validator WholeNumber();
+
 /// A check that a value is one of some words.
 [[nodiscard]] CLI::Validator OneOf(const std::vector<std::string>& words);
 

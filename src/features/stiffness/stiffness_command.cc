@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <charconv>
 #include <cstdint>
 #include <memory>
 
@@ -238,15 +237,6 @@ int Stiffness(const StiffnessArguments& arguments) {
                    arguments.json.Write(ToJson(run.report), {{prepared->base.file, ""}}));
 }
 
-// Unlike the conversion of the option, which takes -3 for 2^64 - 3; "" if it is one.
-std::string CheckSeed(const std::string& text) {
-  std::uint64_t seed = 0;
-  const char* end = text.data() + text.size();
-  const auto parsed = std::from_chars(text.data(), end, seed);
-  const bool whole = parsed.ec == std::errc() && parsed.ptr == end;
-  return whole ? "" : text + ": a whole number from 0 to 2^64 - 1 is needed";
-}
-
 }  // namespace
 
 void AddStiffnessCommand(CLI::App* app, int* exit_code) {
@@ -270,7 +260,7 @@ void AddStiffnessCommand(CLI::App* app, int* exit_code) {
       ->add_option("--loads", arguments->loads.count, "displacements under so many random wrenches")
       ->check(CLI::Range(1, 10000));
   stiffness->add_option("--seed", arguments->loads.seed, "of the random wrenches")
-      ->check(&CheckSeed)
+      ->check(WholeNumber())
       ->capture_default_str();
   const CLI::Range largest(0.0, 1e12);
   stiffness->add_option("--force-max", arguments->loads.force_max, "of the random wrenches [N]")

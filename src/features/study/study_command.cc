@@ -128,10 +128,14 @@ void AddStudyOptions(CLI::App* study, StudyArguments* arguments) {
                    "wall time limit of a point [s]")
       ->check(Positive())
       ->capture_default_str();
-  study->add_option("--count", arguments->options.reading.drawn.count,
-                    "how many points are drawn, instead of the file's number");
-  study->add_option("--seed", arguments->options.reading.drawn.seed,
-                    "which points are drawn, instead of the file's seed");
+  study
+      ->add_option("--count", arguments->options.reading.drawn.count,
+                   "how many points are drawn, instead of the file's number")
+      ->check(WholeNumber());
+  study
+      ->add_option("--seed", arguments->options.reading.drawn.seed,
+                   "which points are drawn, instead of the file's seed")
+      ->check(WholeNumber());
   study->add_flag("--yes", arguments->options.reading.many, "take more than 1e7 points");
   arguments->json.AddTo(study);
 }

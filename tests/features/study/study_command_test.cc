@@ -222,6 +222,12 @@ TEST_F(StudyCommand, OtherCountsAndSeedsAreOtherStudiesOfTheSameFile) {
   const ProgramResult odd = Study("e", "--count 10");
   EXPECT_EQ(odd.exit_code, 2);
   EXPECT_NE(odd.err.find("10 is no power of two"), std::string::npos) << odd.err;
+  for (const char* option : {"--seed -3", "--seed 18446744073709551616", "--count -8",
+                             "--count 18446744073709551624", "--seed 1.5"}) {
+    const ProgramResult refused = Study("f", option);
+    EXPECT_EQ(refused.exit_code, 2) << option;
+    EXPECT_NE(refused.err.find("from 0 to 2^64 - 1"), std::string::npos) << refused.err;
+  }
 }
 
 // The table is m g of a mass of 2 kg; a study of the same mass is within it, one of 2.1 kg is not.
