@@ -333,7 +333,8 @@ std::string BlocksText(const std::vector<Block>& blocks, const TextStyle& style)
 std::string ToHtml(const ReportSection& section) { return BlocksHtml(section.blocks); }
 
 std::string ToText(const ReportSection& section, const TextStyle& style) {
-  return BlocksText(section.blocks, style);
+  const std::string text = BlocksText(section.blocks, style);
+  return (text.empty() || text.starts_with('\n') ? "" : "\n") + text;
 }
 
 }  // namespace mbv

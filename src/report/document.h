@@ -125,7 +125,8 @@ struct ReportSection {
 
 /// The section's content; "" without any.
 [[nodiscard]] std::string ToHtml(const ReportSection& section);
-/// Its paragraphs, lists and tables; the title is left out, pictures have no text.
+/// Its paragraphs, lists and tables after a blank line; the title is left out, pictures have no
+/// text.
 [[nodiscard]] std::string ToText(const ReportSection& section, const TextStyle& style = {});
 
 }  // namespace mbv

@@ -36,10 +36,7 @@ class TerminalText {
   void Gaps(const ResultView& view);
   /// After a blank line.
   void Add(const Table& table) { text_ += "\n" + ToText(table, Style()); }
-  void Add(const ReportSection& section) {
-    const std::string text = ToText(section, Style());
-    text_ += (text.empty() || text.starts_with('\n') ? "" : "\n") + text;
-  }
+  void Add(const ReportSection& section) { text_ += ToText(section, Style()); }
   /// How long each part took, then `more`.
   void Times(const std::vector<std::pair<const char*, double>>& parts, double total_s,
              const std::string& more = "");

@@ -26,6 +26,8 @@ struct DocumentKind {
                                         Diagnostics* diagnostics) = nullptr;
 
   [[nodiscard]] bool runs() const { return *command != '\0'; }
+  /// It is run, but has no motion: neither steps to refine nor a model to perturb.
+  [[nodiscard]] bool timeless() const { return runs() && !in_time; }
 };
 
 /// The kinds that the program knows from now on, asked in this order; they must outlive every call.

@@ -152,7 +152,7 @@ TEST(Section, HasAWriterForPageAndTerminal) {
   section.Add(Marked());
   section.Note("faint");
   EXPECT_EQ(ToText(section),
-            "  said <so>\n  one\n  two\n    run it\n    again\n  inside\n\n  Checks <1>\n" +
+            "\n  said <so>\n  one\n  two\n    run it\n    again\n  inside\n\n  Checks <1>\n" +
                 ToText(Marked()));
   const std::string html = ToHtml(section);
   EXPECT_TRUE(html.starts_with("<p class=\"reason\">said &lt;so&gt;</p>\n<ul>\n<li>one</li>"))

@@ -55,7 +55,7 @@ std::unique_ptr<MutationBench> MutationBench::Make(const std::string& file, Benc
   *exit_code = 2;
   ScenarioOptions options;
   if (mode == BenchMode::kInverse) options.set = {{"simulation.mode", "inverse"}};
-  if (const DocumentKind& kind = KindOf(file); kind.runs() && !kind.in_time) {
+  if (const DocumentKind& kind = KindOf(file); kind.timeless()) {
     diagnostics->AddError(file, fmt::format("is a {}", kind.name),
                           "mutate perturbs the model of a motion");
     return nullptr;

@@ -152,7 +152,7 @@ class MoreFigureSource {
       : file_(file), options_(options), outcome_(outcome), set_(set) {}
 
   void AddConvergence() {
-    if (const DocumentKind& kind = KindOf(file_); kind.runs() && !kind.in_time) {
+    if (const DocumentKind& kind = KindOf(file_); kind.timeless()) {
       return LeaveOut(fmt::format("convergence: a {} has no steps", kind.name));
     }
     ConvergeOptions converge;
@@ -168,7 +168,7 @@ class MoreFigureSource {
   }
 
   void AddWorkspace() {
-    if (const DocumentKind& kind = KindOf(file_); kind.runs() && !kind.in_time) {
+    if (const DocumentKind& kind = KindOf(file_); kind.timeless()) {
       return LeaveOut("workspace: is drawn with a motion of the mechanism");
     }
     Diagnostics run_findings;
@@ -255,11 +255,11 @@ FigureOutcome MakeFigures(const std::string& file, const FigureOptions& options,
                           const RunOutcome* ran) {
   FigureOutcome outcome;
   FigureSource source(file, options, &outcome);
-  const DocumentKind& kind = KindOf(file);
-  FigureSet set = kind.runs() && kind.run == nullptr     ? source.OfStudy()
-                  : kind.run != nullptr && !kind.in_time ? source.OfStiffness()
-                  : ran != nullptr                       ? source.OfMotion(*ran)
-                                                         : source.OfMotion();
+  const std::string_view kind = KindOf(file).name;
+  FigureSet set = kind == "study"       ? source.OfStudy()
+                  : kind == "stiffness" ? source.OfStiffness()
+                  : ran != nullptr      ? source.OfMotion(*ran)
+                                        : source.OfMotion();
   if (outcome.diagnostics.has_errors()) return outcome;
   MoreFigureSource more(file, options, &outcome, &set);
   if (Contains(options.also, "convergence")) more.AddConvergence();

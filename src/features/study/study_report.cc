@@ -302,10 +302,7 @@ std::vector<ReportSection> SectionsOf(const StudyReport& report,
 
 std::string ToText(const StudyReport& report) {
   std::string text = fmt::format("study {}: {}\n", report.study.name, PointsText(report));
-  for (const ReportSection& section : SectionsOf(report, {})) {
-    const std::string shown = ToText(section);
-    text += (shown.empty() || shown.starts_with('\n') ? "" : "\n") + shown;
-  }
+  for (const ReportSection& section : SectionsOf(report, {})) text += ToText(section);
   return text;
 }
 
