@@ -23,6 +23,7 @@ namespace {
 namespace odeint = boost::numeric::odeint;
 
 constexpr double kSmallestStepShare = 1e-10;  // of the duration
+constexpr double kJump = 1e-6;                // a smaller share of a load is no jump
 // Below this share of the largest pivot steps go half the way to the singular pose at most.
 constexpr double kApproach = 0.2;
 constexpr size_t kMostNodes = 600;
@@ -116,6 +117,7 @@ FreeMotion::State FreeMotion::StepFrom(const State& from, double h) {
 FreeMotion::FreeMotion(const Mechanism& mechanism, const Motion& motion, double tolerance,
                        double largest_step_s, Effort effort)
     : mechanism_(mechanism),
+      motion_(motion),
       duration_s_(motion.duration_s),
       largest_step_s_(largest_step_s),
       effort_(std::move(effort)),
@@ -221,13 +223,65 @@ RunSummary FreeMotion::Accept(const State& x, double t_s) {
   return RunSummary::Done();
 }
 
-RunSummary FreeMotion::NoWayOn(double dt_s) const {
+VecX FreeMotion::LoadsAfter(double h) {
+  const double t_s = now_.time_s + h;
+  BodyStates states = StatesOf(StepFrom(Pack(now_), h));
+  states.turns = now_.states.turns;
+  CommandSample at;
+  EvaluateMotion(motion_, t_s, &at);
+  VecX loads(6 * static_cast<Eigen::Index>(at.loads.size()));
+  for (size_t k = 0; k < at.loads.size(); ++k) {
+    const LoadSample load = AtStates(mechanism_, states, at.loads[k]);
+    loads.segment<6>(6 * static_cast<Eigen::Index>(k)) << load.force, load.moment;
+  }
+  return loads;
+}
+
+// What jumps changes by the same amount however short the time is; what is smooth by 2^−12 of it
+// after twelve halvings. (Profiles of time have break times and do not jump within a segment.)
+std::optional<FreeMotion::LoadJump> FreeMotion::JumpHere() {
+  double from = -10.0 * kSmallestStepShare * duration_s_, to = -from;
+  VecX before = LoadsAfter(from), after = LoadsAfter(to);
+  const VecX sizes = before.cwiseAbs().cwiseMax(after.cwiseAbs());
+  if (sizes.size() == 0 || sizes.maxCoeff() == 0.0) return {};
+  const VecX scale = sizes.cwiseMax(1e-9 * sizes.maxCoeff());
+  Eigen::Index most = 0;
+  const double whole = (after - before).cwiseAbs().cwiseQuotient(scale).maxCoeff(&most);
+  if (!(whole > kJump)) return {};
+  for (int halving = 0; halving < 12; ++halving) {
+    const double middle = 0.5 * (from + to);
+    const VecX at = LoadsAfter(middle);
+    const bool first = std::abs(at[most] - before[most]) > std::abs(after[most] - at[most]);
+    (first ? to : from) = middle;
+    (first ? after : before) = at;
+  }
+  trouble_ = RunSummary::Done();
+  if (!(std::abs(after[most] - before[most]) > 0.5 * whole * scale[most])) return {};
+  const auto component = most % 6;
+  return LoadJump{
+      .part = fmt::format("loads.{}.{}[{}]", motion_.loads[static_cast<size_t>(most / 6)].name,
+                          component < 3 ? "force" : "moment", component % 3),
+      .unit = component < 3 ? "N" : "N m",
+      .before = before[most],
+      .after = after[most]};
+}
+
+RunSummary FreeMotion::NoWayOn(double dt_s) {
   if (!trouble_.ok()) return trouble_;
   const bool singular = now_.pivot < kNear * largest_pivot_;
   RunSummary summary;
   summary.time_s = now_.time_s;
   if (!singular) {
     summary.stop = Stop::kNoConvergence;
+    if (const std::optional<LoadJump> jump = JumpHere()) {
+      summary.where = jump->part;
+      summary.names_where = summary.states_time = true;
+      summary.message = fmt::format(
+          "{} jumps from {:.4g} to {:.4g} {} at t = {:.6g} s, which no step of the integration can "
+          "follow; let it change within a short time or way, as 0.5*(1 + tanh(x/w)) does",
+          jump->part, jump->before, jump->after, jump->unit, now_.time_s);
+      return summary;
+    }
     summary.message = std::string("the step of the integration became too small");
     summary.amount = dt_s;
     summary.unit = std::string("s");

@@ -128,7 +128,15 @@ class FreeMotion {
   /// Rates that the integration does not distinguish from zero.
   [[nodiscard]] double Resolved(size_t element) const;
   [[nodiscard]] BodyStates StatesOf(const State& x) const;
-  [[nodiscard]] RunSummary NoWayOn(double dt_s) const;
+  [[nodiscard]] RunSummary NoWayOn(double dt_s);
+  struct LoadJump {
+    std::string part, unit;
+    double before = 0.0, after = 0.0;
+  };
+  /// Force and moment [N, N m] of every load a step of h on from now_.
+  [[nodiscard]] VecX LoadsAfter(double h);
+  /// The component of a load that changes at once about now_.
+  [[nodiscard]] std::optional<LoadJump> JumpHere();
   [[nodiscard]] RunSummary TooManySteps() const;
   /// Every so many steps: whether the springs let the rest be done with the steps that are left.
   [[nodiscard]] RunSummary LookAhead();
@@ -138,6 +146,7 @@ class FreeMotion {
 
   struct Stepper;
   const Mechanism& mechanism_;
+  const Motion& motion_;
   const double duration_s_, largest_step_s_;
   const Effort effort_;
   FreeDynamics dynamics_;

@@ -1,5 +1,6 @@
 // Verdicts of free motions through all stages: right models agree, models that are wrong by a
 // thousandth do not.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "features/run/run_scenario.h"
@@ -7,6 +8,8 @@
 
 namespace mbv {
 namespace {
+
+using testing::HasSubstr;
 
 struct Written {
   std::string model, scenario;
@@ -106,10 +109,9 @@ simulation: {mode: forward, step_s: 0.0002}
   EXPECT_EQ(RunWritten(files, {{"simulation.parameters.i", "0.1001"}}).verdict, Verdict::kDisagree);
 }
 
-// The moment jumps where the bar passes −1 rad: no step of the reference is small enough, which is
-// no verdict rather than a wrong motion.
-TEST(FreeMotionVerdicts, AMomentThatJumpsHasNoVerdict) {
-  const Comparison jumps = RunWritten({R"(name: bar
+// A bar on a pivot, let go, with a moment.
+Comparison RunBar(const std::string& moment) {
+  return RunWritten({R"(name: bar
 gravity: [0, -9.81, 0]
 bodies:
   bar: {mass: 1.3, com: [0.2, 0, 0], inertia: [0.01, 0.02, 0.02]}
@@ -118,19 +120,52 @@ joints:
 drives: {motor: {kind: joint, joint: pivot}}
 outputs: {tip: bar}
 )",
-                                       R"(motion:
+                     R"(motion:
   duration_s: 3
   sample_s: 0.01
   initial: {motor: {value_deg: 20}}
   initial_rates: {motor: 1}
 forces: {motor: 0}
 loads:
-  stop: {on: bar, moment: [0, 0, "2*(motor.position > -1) - 0.03*motor.velocity"]}
+  stop: {on: bar, moment: [0, 0, ")" +
+                         moment + R"("]}
 analytic: none
 simulation: {mode: forward, step_s: 0.001}
 )"},
-                                      {});
-  EXPECT_EQ(jumps.verdict, Verdict::kNotRun) << TextOf(jumps);
+                    {});
+}
+
+// No step of the reference is small enough where a moment jumps by an angle, by time or by the sign
+// of a rate: no verdict rather than a wrong motion, and it says what jumps.
+TEST(FreeMotionVerdicts, ALoadThatJumpsIsNamed) {
+  const Comparison by_angle = RunBar("2*(motor.position > -1) - 0.03*motor.velocity");
+  EXPECT_EQ(by_angle.verdict, Verdict::kNotRun);
+  EXPECT_THAT(by_angle.reason, HasSubstr("loads.stop.moment[2] jumps from 2"));
+  const Comparison by_time = RunBar("0.5*(t > 1.23456) + 0*motor.velocity");
+  EXPECT_EQ(by_time.verdict, Verdict::kNotRun);
+  EXPECT_THAT(by_time.reason,
+              HasSubstr("loads.stop.moment[2] jumps from 0 to 0.5 N m at t = 1.23456 s"));
+  const Comparison by_rate = RunBar("1 - 2*(motor.velocity > 0)");
+  EXPECT_EQ(by_rate.verdict, Verdict::kNotRun);
+  EXPECT_THAT(by_rate.reason, HasSubstr("loads.stop.moment[2] jumps from"));
+}
+
+// What changes within a short way is followed.
+TEST(FreeMotionVerdicts, WhatChangesQuicklyIsFollowed) {
+  const Comparison quick = RunBar("1 + tanh((motor.position + 1)/0.01) - 0.03*motor.velocity");
+  EXPECT_NE(quick.verdict, Verdict::kNotRun) << TextOf(quick);
+}
+
+// Damping that grows until the step cannot follow it: what a quarter of the step does is tried.
+TEST(FreeMotionVerdicts, AStepThatIsTooLargeIsToldFromAMotionThatCannotBeFollowed) {
+  const Comparison coarse = RunBar("-7*t*motor.velocity");
+  EXPECT_EQ(coarse.verdict, Verdict::kNotRun) << TextOf(coarse);
+  EXPECT_THAT(coarse.reason,
+              HasSubstr("simulation.step_s = 0.00025 follows the motion to its end"));
+  const Comparison hopeless = RunBar("-60*t*motor.velocity");
+  EXPECT_EQ(hopeless.verdict, Verdict::kNotRun) << TextOf(hopeless);
+  EXPECT_THAT(hopeless.reason,
+              HasSubstr("a quarter of the step, 0.00025 s, does not reach the end"));
 }
 
 }  // namespace

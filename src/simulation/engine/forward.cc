@@ -369,12 +369,14 @@ namespace {
 // A closure open by more than this part of the mechanism's extent has come apart.
 constexpr double kApart = 0.01;
 
-RunSummary Failure(const std::string& message, double t_s) {
+RunSummary ComeApart(Session* s, const std::string& what, double t_s) {
+  s->came_apart = true;
   return {.stop = Stop::kEngineFailure,
-          .message = message + "; a smaller step may help",
+          .message = fmt::format("{} at t = {:.6g} s", what, t_s),
           .time_s = t_s,
           .where = {},
-          .unit = {}};
+          .unit = {},
+          .states_time = true};
 }
 
 // Home to the first driven sample, with consistent velocities and accelerations.
@@ -441,12 +443,12 @@ RunSummary TroubleAt(const Session& s, double t_s) {
 }
 
 // After a recorded sample: the motion must be finite and the loops closed.
-RunSummary CheckSample(const Session& s, double largest_gap_m, double t_s) {
-  if (!s.loads.trouble().ok()) return s.loads.trouble();
-  const ConstraintSystem::Gap gap = s.system.LargestGap();
-  if (gap.position_m < largest_gap_m) return TroubleAt(s, t_s);
-  return Failure(fmt::format("loop-closure error of {:.3g} m in the simulation", gap.position_m),
-                 t_s);
+RunSummary CheckSample(Session* s, double largest_gap_m, double t_s) {
+  if (!s->loads.trouble().ok()) return s->loads.trouble();
+  const ConstraintSystem::Gap gap = s->system.LargestGap();
+  if (gap.position_m < largest_gap_m) return TroubleAt(*s, t_s);
+  return ComeApart(
+      s, fmt::format("loop-closure error of {:.3g} m in the simulation", gap.position_m), t_s);
 }
 
 }  // namespace
@@ -494,11 +496,11 @@ RunSummary RunCorrected(Session* s, const DrivenMotion& driven) {
       integrator.RungeKutta(h, middles[i], ends[i], step.from_s);
     }
     if (!s->loads.trouble().ok()) return s->loads.trouble();
-    if (!integrator.healthy()) return Failure("the simulated motion diverged", step.to_s);
+    if (!integrator.healthy()) return ComeApart(s, "the simulated motion diverged", step.to_s);
     if (!friction.acts()) s->work.Step(h, step.uniform == 4, s->WorkRates());
     if (step.sample < 0) continue;
     s->Record(static_cast<size_t>(step.sample));
-    if (RunSummary summary = CheckSample(*s, largest_gap, step.to_s); !summary.ok()) return summary;
+    if (RunSummary summary = CheckSample(s, largest_gap, step.to_s); !summary.ok()) return summary;
   }
   clock.Stop(s->run);
   s->run->steps = static_cast<long>(steps.size());
@@ -556,7 +558,8 @@ RunSummary RunStock(Session* s, const DrivenMotion& driven) {
     }
     if (data->warning[mjWARN_BADQACC].number > 0 || data->warning[mjWARN_BADQPOS].number > 0 ||
         data->warning[mjWARN_BADQVEL].number > 0) {
-      return Failure("MuJoCo reset the simulation, which had diverged", static_cast<double>(n) * h);
+      return ComeApart(s, "MuJoCo reset the simulation, which had diverged",
+                       static_cast<double>(n) * h);
     }
   }
   clock.Stop(s->run);

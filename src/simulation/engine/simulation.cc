@@ -243,7 +243,7 @@ MjcfOptions MjcfOptionsOf(const Motion& motion, const SimulationOptions& options
 
 RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMotion& driven,
                const SimulationOptions& options, const std::function<void(double)>& progress,
-               SimulationRun* run) {
+               SimulationRun* run, bool* came_apart) {
   run->mjcf = WriteMjcf(mechanism, MjcfOptionsOf(motion, options));
   EngineModel engine;
   if (RunSummary summary = MakeEngineModel(mechanism, run->mjcf, &engine); !summary.ok()) {
@@ -279,7 +279,25 @@ RunSummary Run(const Mechanism& mechanism, const Motion& motion, const DrivenMot
   session.progress = progress;
   RunSummary summary = RunMode(&session, driven);
   if (summary.ok()) ReportUniqueness(session, run);
+  *came_apart = session.came_apart;
   return summary;
+}
+
+// Where a corrected run has come apart, what a quarter of its step does tells whether the step or
+// the model is to blame.
+std::string WithQuarterStep(const Mechanism& mechanism, const Motion& motion,
+                            const DrivenMotion& driven, SimulationOptions options,
+                            const std::function<void(double)>& progress) {
+  options.step_s = 0.25 * AdjustedStep(motion, options.step_s);
+  SimulationRun run;
+  bool came_apart = false;
+  const RunSummary summary = Run(mechanism, motion, driven, options, progress, &run, &came_apart);
+  if (summary.ok()) {
+    return fmt::format("; simulation.step_s = {:.3g} follows the motion to its end",
+                       options.step_s);
+  }
+  return fmt::format("; a quarter of the step, {:.3g} s, does not reach the end either: {}",
+                     options.step_s, summary.message);
 }
 
 }  // namespace
@@ -308,7 +326,13 @@ SimulationRun Simulate(const Mechanism& mechanism, const Motion& motion, const D
   {
     simulation::EngineSession session(&run.warnings);
     try {
-      run.summary = simulation::Run(mechanism, motion, driven, options, progress, &run);
+      bool came_apart = false;
+      run.summary =
+          simulation::Run(mechanism, motion, driven, options, progress, &run, &came_apart);
+      if (came_apart && options.engine == Engine::kCorrected) {
+        run.summary.message +=
+            simulation::WithQuarterStep(mechanism, motion, driven, options, progress);
+      }
     } catch (const simulation::EngineError& error) {
       run.summary = {.stop = Stop::kEngineFailure,
                      .message = std::string("MuJoCo: ") + error.what(),
