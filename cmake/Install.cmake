@@ -22,9 +22,9 @@ foreach(shell_file "bash mbverify bash-completion/completions" "zsh _mbverify zs
 endforeach()
 # So does the manual page.
 add_custom_command(TARGET mbverify POST_BUILD VERBATIM
-                   COMMAND sh -c "\"$0\" man-page >'${CMAKE_BINARY_DIR}/mbverify.1'"
+                   COMMAND sh -c "\"$0\" man-page | gzip -9n >'${CMAKE_BINARY_DIR}/mbverify.1.gz'"
                            $<TARGET_FILE:mbverify>)
-install(FILES ${CMAKE_BINARY_DIR}/mbverify.1 DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
+install(FILES ${CMAKE_BINARY_DIR}/mbverify.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1
         COMPONENT runtime)
 install(TARGETS mbverify_library EXPORT mbverify ARCHIVE COMPONENT development)
 target_include_directories(mbverify_library INTERFACE

@@ -1,7 +1,9 @@
 // Small owners of OpenGL objects (3.3, core profile). A context must be current.
 #pragma once
 
+#ifndef GL_GLEXT_PROTOTYPES  // mbv_render has it for all its files, whatever they include first
 #define GL_GLEXT_PROTOTYPES
+#endif
 #include <GL/gl.h>
 #include <GL/glext.h>
 #include <map>

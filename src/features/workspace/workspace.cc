@@ -25,9 +25,9 @@ RunSummary DrawInside(const Mechanism& mechanism, const TriangleMesh& mesh,
     PictureOptions options;
     options.camera.azimuth_deg = azimuth;
     options.camera.elevation_deg = elevation;
-    const RunSummary summary =
-        RenderPictures(mechanism, {frame}, overlay, options, [&](int, Picture picture) {
-          outcome->files.emplace_back(name, EncodePng(picture));
+    const RunSummary summary = RenderPictures(
+        mechanism, {frame}, overlay, options, [&, file = name](int, Picture picture) {
+          outcome->files.emplace_back(file, EncodePng(picture));
           return true;
         });
     if (!summary.ok()) return summary;
